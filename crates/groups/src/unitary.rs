@@ -8,8 +8,8 @@ use crate::logarithm::{SERIES, angles, complex, numbers, principal, su_limit, ti
 use std::f64::consts::{PI, SQRT_2};
 use std::marker::PhantomData;
 use symspline_core::matrix::{
-    Dynamic, Matrix, Moved, Storage, arc, by_size, determinant, diagonalize, exp_skew_minus_one, from_parts,
-    orthonormalize, parts_of, polar, reorthonormalize,
+    Dynamic, Matrix, Moved, SINE_LIMIT, Storage, arc, by_size, determinant, diagonalize, exp_skew_minus_one,
+    from_parts, has_angles, log_by_sine, orthonormalize, parts_of, polar, reorthonormalize,
 };
 use symspline_core::scalar::{Each, Lane, Scalar, lane, max_or_nan};
 use symspline_core::space::{Algebra, Ambient, Frame, Origin, Space, below};
@@ -79,9 +79,12 @@ impl<const D: usize, A: Storage> UnitaryGroup<D, A> {
         let limit = if self.is_su() { su_limit(n as f64) } else { SERIES };
         let size = versine.size();
         let mut angle = lane(1.37 * if self.is_su() { 2.0 } else { 1.0 });
-        let log = by_size(size, &[limit], |tier| {
-            if tier == 0 {
-                return sine.times(&arc(&versine));
+        let near = if has_angles::<D, A>(n) { SINE_LIMIT } else { -1.0 };
+        let log = by_size(size, &[near, limit], |tier| {
+            match tier {
+                0 => return log_by_sine(&sine, size),
+                1 => return sine.times(&arc(&versine)),
+                _ => {}
             }
             let parts: Vec<_> = parts_of(e).iter().map(|part| complex::<D>(n, part)).collect();
             let (log, exact) = principal(&parts, self.is_su(), D == 1);

@@ -8,12 +8,12 @@ use super::function::{from_parts, parts_of};
 use super::inverse::{balance, inverse};
 use super::schur::{largest_argument, root};
 use super::select::{Select, by_size};
-use super::series::{LOG_LIMITS, Powers, exp_by, log_terms, terms};
+use super::series::{EXP, LOG_LIMITS, Powers, exp_by, log_terms, terms};
 use crate::scalar::{Lane, Scalar, lane, mask_bits};
 
 /// `exp(A) − 1`.
 pub fn exp_any_minus_one<S: Scalar, const D: usize, A: Storage>(a: &Matrix<S, D, A>) -> Matrix<S, D, A> {
-    exp_by(a, |a, n| Powers::of_any(a, n))
+    exp_by(a, |a, n| Powers::of_any(a, n).sum(terms::<S>(&EXP, n)))
 }
 
 /// The sizes of Z up to which these numbers of terms of the series of artanh are accurate to rounding, derivatives

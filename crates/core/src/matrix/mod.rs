@@ -36,5 +36,8 @@ pub use moved::Moved;
 #[cfg(feature = "dense")]
 pub use schur::{largest_argument, largest_imaginary};
 pub use select::{Select, by_size};
-pub use series::{arc, exp_minus_one, exp_skew_minus_one, log_one_plus, log_one_plus_alike, trig};
+pub use series::{
+    SINE_LIMIT, arc, exp_minus_one, exp_skew_minus_one, has_angles, log_by_sine, log_one_plus,
+    log_one_plus_alike, trig,
+};
 pub use storage::{Known, Small};

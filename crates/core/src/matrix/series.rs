@@ -311,7 +311,7 @@ pub(super) fn trig_here<S: Scalar, const D: usize, A: Storage>(g: &Matrix<S, D, 
 }
 
 /// eˣ − 1 = Σ xʲ/j!, from j = 1
-const EXP: [f64; 25] = {
+pub(super) const EXP: [f64; 25] = {
     let mut c = [0.0; 25];
     let (mut j, mut inverse) = (1, 1.0);
     while j < 25 {
@@ -331,16 +331,15 @@ pub fn exp_minus_one<S: Scalar, const D: usize, A: Storage>(a: &Matrix<S, D, A>)
 pub(super) fn exp_minus_one_here<S: Scalar, const D: usize, A: Storage>(
     a: &Matrix<S, D, A>,
 ) -> Matrix<S, D, A> {
-    exp_by(a, |a, n| Powers::of(a, n))
+    exp_by(a, |a, n| Powers::of(a, n).sum(terms::<S>(&EXP, n)))
 }
 
-/// `exp(A) − 1`, by the powers of A or of a part of it.
+/// `exp(A) − 1`, given the series of a number of terms.
 pub(super) fn exp_by<S: Scalar, const D: usize, A: Storage>(
     a: &Matrix<S, D, A>,
-    powers: impl for<'b> Fn(&'b Matrix<S, D, A>, usize) -> Powers<'b, S, D, A>,
+    inside: impl Fn(&Matrix<S, D, A>, usize) -> Matrix<S, D, A>,
 ) -> Matrix<S, D, A> {
     const LIMITS: [f64; 3] = [0.1, 0.4, 1.5];
-    let inside = |a: &Matrix<S, D, A>, n: usize| powers(a, n).sum(terms::<S>(&EXP, n));
     let size = a.size();
     by_size(size, &LIMITS, |tier| match tier {
         0 => inside(a, 11),
@@ -354,15 +353,78 @@ pub(super) fn exp_by<S: Scalar, const D: usize, A: Storage>(
     })
 }
 
-/// `exp(Ω) − 1` of a skew-Hermitian matrix: `Ω s(G) + G k(G)` with G = Ω*Ω.
+/// sin x and cos x − 1.
+const WAVES: [[f64; 25]; 2] = {
+    let mut c = [[0.0; 25]; 2];
+    let mut j = 1;
+    while j < 25 {
+        c[(j + 1) % 2][j] = if j / 2 % 2 == 0 { EXP[j] } else { -EXP[j] };
+        j += 1;
+    }
+    c
+};
+
+/// arcsin x = Σ (2j)!/(4ʲ j!² (2j + 1)) x²ʲ⁺¹
+const ARCSINE: [f64; 44] = {
+    let mut c = [0.0; 44];
+    let (mut j, mut factor) = (0, 1.0);
+    while j < 22 {
+        c[2 * j + 1] = factor / (2 * j + 1) as f64;
+        factor *= (2 * j + 1) as f64 / (2 * j + 2) as f64;
+        j += 1;
+    }
+    c
+};
+/// Up to these sizes of 1 − cos θ, these numbers of terms of arcsin(sin θ), and one more for every derivative, are
+/// accurate to rounding.
+const ARCSINE_TIERS: [(f64, usize); 3] = [(0.0075, 8), (0.03, 12), (0.09, 20)];
+/// The size of 1 − cos θ up to which [`log_by_sine`] is accurate.
+pub const SINE_LIMIT: f64 = ARCSINE_TIERS[2].0;
+
+/// Whether functions of a skew-Hermitian Ω are polynomials in the Hermitian −iΩ of few coefficients. They cost no
+/// products, which functions of Ω*Ω do.
+pub const fn has_angles<const D: usize, A: Storage>(n: usize) -> bool {
+    D == 2 && !A::ANY && n < 5
+}
+
+/// iA, and its inverse −iA for `sign` −1.
+fn times_i<S: Scalar, const D: usize, A: Storage>(a: &Matrix<S, D, A>, sign: f64) -> Matrix<S, D, A> {
+    a.map_entries(|x| {
+        let mut y = x;
+        y[0] = x[D - 1] * lane(-sign);
+        y[D - 1] = x[0] * lane(sign);
+        y
+    })
+}
+
+/// The principal logarithm of a unitary matrix with this skew-Hermitian part, and this size of 1 − cos θ, at most
+/// [`SINE_LIMIT`]; see [`has_angles`].
+pub fn log_by_sine<S: Scalar, const D: usize, A: Storage>(
+    sine: &Matrix<S, D, A>,
+    versine: Lane,
+) -> Matrix<S, D, A> {
+    let h = times_i(sine, -1.0);
+    let limits = [ARCSINE_TIERS[0].0, ARCSINE_TIERS[1].0];
+    by_size(versine, &limits, |tier| {
+        let c = &ARCSINE[..2 * (ARCSINE_TIERS[tier].1 + S::ORDER)];
+        times_i(&Powers::of(&h, c.len()).sum(c), 1.0)
+    })
+}
+
+/// `exp(Ω) − 1` of a skew-Hermitian matrix: by [angles](has_angles), or `Ω s(G) + G k(G)` with G = Ω*Ω.
 pub fn exp_skew_minus_one<S: Scalar, const D: usize, A: Storage>(omega: &Matrix<S, D, A>) -> Matrix<S, D, A> {
+    if has_angles::<D, A>(omega.rows()) {
+        return exp_by(omega, |omega, n| {
+            let h = times_i(omega, -1.0);
+            let powers = Powers::of(&h, 2 * n);
+            &times_i(&powers.sum(terms::<S>(&WAVES[0], n)), 1.0) + &powers.sum(terms::<S>(&WAVES[1], n))
+        });
+    }
     let g = omega.adjoint_times(omega);
     let [s, k] = trig(&g);
     &omega.times(&s) + &g.times(&k)
 }
 
-/// Up to this size of x [`LOG`] is used.
-const LOG_LIMIT: f64 = 0.35;
 /// log(1 + x) as a polynomial: log(1 + x)/x interpolated at the 28 Chebyshev nodes of |x| ≤ 0.35, which needs
 /// fewer terms than Taylor's 36. Relative error 3e-18, of the derivatives 1e-17 and 2e-16 (at 50 digits).
 #[allow(clippy::excessive_precision)]
@@ -400,9 +462,9 @@ const LOG: [f64; 29] = [
 ];
 
 /// Up to these sizes of x, [`log_terms`] are accurate to rounding.
-pub(super) const LOG_LIMITS: [f64; 2] = [0.1, LOG_LIMIT];
-/// log(1 + x) = Σ −(−x)ʲ/j, whose remainder behind x¹⁶ is below 1e-17 up to the smaller limit, and less than that of
-/// a derivative with one more term.
+pub(super) const LOG_LIMITS: [f64; 2] = [0.1, 0.35];
+/// log(1 + x) = Σ −(−x)ʲ/j. Up to the smaller limit 16 terms are accurate to rounding, and one more for every
+/// derivative.
 const LOG_SHORT: [f64; 19] = {
     let mut c = [0.0; 19];
     let mut j = 1;
