@@ -71,13 +71,13 @@ impl<const D: usize, A: Storage> PositiveDefinite<D, A> {
     /// L e^{tw} L* with p = L L*, with the derivatives in t that t has.
     fn moved(&self, p: &[Lane], [l, w]: &[Matrix<Lane, D, A>; 2], t: Lane, order: usize) -> Moved<D, A> {
         let e = exp_minus_one(&w.scaled(t));
-        let x = &congruent(l, &e) + &self.read(p);
+        let x = &e.congruent_by(l) + &self.read(p);
         if order == 0 {
             return Moved(x, None);
         }
         let d = &w.times(&e) + w;
-        let dd = if order > 1 { congruent(l, &w.times(&d)) } else { d.clone() };
-        Moved(x, Some([congruent(l, &d), dd]))
+        let dd = if order > 1 { w.times(&d).congruent_by(l) } else { d.clone() };
+        Moved(x, Some([d.congruent_by(l), dd]))
     }
 
     fn read<S: Scalar>(&self, x: &[S]) -> Matrix<S, D, A> {
@@ -124,61 +124,29 @@ fn congruent<S: Scalar, const D: usize, A: Storage>(
     g.times(x).times_adjoint_hermitian(g)
 }
 
-/// A linear function of the value and of the derivatives of a matrix; those that S does not have are zero.
-fn of_parts<S: Scalar, const D: usize, A: Storage>(
-    x: &Matrix<S, D, A>,
-    f: impl Fn(&Matrix<Lane, D, A>) -> Matrix<Lane, D, A>,
-) -> [Matrix<Lane, D, A>; 3] {
-    [0, 1, 2].map(|order| {
-        let part = x.map(|x| x.parts()[order]);
-        if order > S::ORDER { part } else { f(&part) }
-    })
-}
-
-/// The matrix with this value and these derivatives.
-fn joined<S: Scalar, const D: usize, A: Storage>(parts: &[Matrix<Lane, D, A>; 3]) -> Matrix<S, D, A> {
-    let [x, d, dd] = parts;
-    Matrix::from_fn(x.rows(), x.cols(), |i, j| {
-        few(|c| S::from_parts([x[(i, j)][c], d[(i, j)][c], dd[(i, j)][c]]))
-    })
-}
-
-/// Replaces a Hermitian matrix x, given by its parts, by (1 + r) x (1 + r) for a Hermitian r with the value 0 and these
-/// derivatives.
-fn turn<S: Scalar, const D: usize, A: Storage>(
+/// (1 + r) x (1 + r) of a Hermitian x, for a Hermitian r with the value 0 and these derivatives.
+fn turned<S: Scalar, const D: usize, A: Storage>(
     [r, rr]: &[Matrix<Lane, D, A>; 2],
-    [x, d, dd]: &mut [Matrix<Lane, D, A>; 3],
-) {
-    let twice_hermitian = |x: Matrix<Lane, D, A>| x.hermitian_part().scaled(lane(2.0));
-    let rx = r.times(x);
-    if S::ORDER > 1 {
-        let first = &r.times(d).scaled(lane(2.0)) + &rr.times(x);
-        *dd = &(&*dd + &twice_hermitian(first)) + &rx.times(r).scaled(lane(2.0));
-    }
-    *d = &*d + &twice_hermitian(rx);
-}
-
-/// The geodesic as in [`Ambient::geodesic`], where factors without derivatives are not multiplied as if they had some.
-fn geodesic_by_parts<S: Scalar, const D: usize, A: Storage>(
-    p: &Matrix<S, D, A>,
-    q: &Matrix<S, D, A>,
-    t: S,
+    x: &Matrix<S, D, A>,
 ) -> Matrix<S, D, A> {
-    let l = cholesky(&p.value());
-    let inverse = solve_lower(&l, &Matrix::identity(p.rows()));
-    let mut b = of_parts(&(q - p), |x| congruent(&inverse, x));
-    let [_, d, dd] = of_parts(p, |x| congruent(&inverse, x));
-    // (δ²)'' = 2δ'²
-    let square = d.times(&d);
-    let half = |x: &Matrix<Lane, D, A>, sign: f64| x.scaled(lane(0.5 * sign));
-    let root = [half(&d, 1.0), &half(&dd, 1.0) - &square.scaled(lane(0.25))];
-    let inverse_root = [half(&d, -1.0), &half(&dd, -1.0) + &square.scaled(lane(0.75))];
-    turn::<S, D, A>(&inverse_root, &mut b);
-    let e = exp_minus_one(&log_one_plus(&joined::<S, D, A>(&b)).times_scalar(t));
-    let mut e = of_parts(&e, Matrix::clone);
-    turn::<S, D, A>(&root, &mut e);
-    let moved = of_parts(&joined::<S, D, A>(&e), |x| congruent(&l, x));
-    &joined::<S, D, A>(&moved) + p
+    let value = x.value();
+    let rx = r.times(&value);
+    let (first, both) = if S::ORDER > 1 {
+        let first = &r.times(&x.part(1)).scaled(lane(2.0)) + &rr.times(&value);
+        (first, rx.times_adjoint_hermitian(r))
+    } else {
+        (rx.clone(), rx.clone())
+    };
+    Matrix::from_fn(x.rows(), x.cols(), |i, j| {
+        few(|c| {
+            // Twice the Hermitian parts.
+            let sign = lane(if c == 0 { 1.0 } else { -1.0 });
+            let [v, d, dd] = x[(i, j)][c].parts();
+            let d = d + rx[(i, j)][c] + rx[(j, i)][c] * sign;
+            let dd = dd + first[(i, j)][c] + first[(j, i)][c] * sign + both[(i, j)][c] * lane(2.0);
+            S::from_parts([v, d, dd])
+        })
+    })
 }
 
 /// `log(L⁻¹ q L⁻*)` for the factor L of p.
@@ -237,13 +205,13 @@ impl<const D: usize, A: Storage> Ambient for PositiveDefinite<D, A> {
     }
     fn prepared_ray<S: Scalar>(&self, p: &[Lane], _v: &[Lane], prepared: &[Lane], t: S, out: &mut [S]) {
         let (l, w) = prepared.split_at(self.point_len());
-        self.moved(p, &[l, w].map(|x| self.read(x)), t.value(), S::ORDER).write(t, out);
+        self.moved(p, &[self.read(l), self.read(w)], t.value(), S::ORDER).write(t, out);
     }
     fn log(&self, p: &[Lane], q: &[Lane], out: &mut [Lane]) -> Lane {
         let (p, q) = (self.read(p), self.read(q));
         let l = cholesky(&p);
         let w = log_whitened(&l, &p, &q);
-        congruent(&l, &w).write(out);
+        w.congruent_by(&l).write(out);
         w.size()
     }
     fn distance(&self, _p: &[Lane], _q: &[Lane], _log: &[Lane], angle: Lane) -> Lane {
@@ -251,34 +219,25 @@ impl<const D: usize, A: Storage> Ambient for PositiveDefinite<D, A> {
     }
     fn geodesic<S: Scalar>(&self, p: &[S], q: &[S], t: S, out: &mut [S]) {
         let (p, q) = (self.read(p), self.read(q));
-        // With storage on the stack, numbers without derivatives are in registers, and the fewer products are faster.
-        if S::ORDER > 0 && !A::ANY {
-            return geodesic_by_parts(&p, &q, t).write(out);
-        }
-        // Whitened by the value of p, p is 1 + δ where δ has derivatives only, so that its square root
-        // is 1 + δ/2 − δ²/8 exactly.
         let l = cholesky(&p.value());
-        let n = self.n;
-        let inverse = solve_lower(&l, &Matrix::identity(n));
-        let lift = |m: &Matrix<Lane, D, A>| m.map(S::constant);
-        let (l, inverse) = (lift(&l), lift(&inverse));
-        let b = congruent(&inverse, &(&q - &p));
-        let (root, b) = if S::ORDER == 0 {
-            (Matrix::identity(n), b)
+        let inverse = solve_lower(&l, &Matrix::identity(self.n));
+        let b = (&q - &p).congruent_by(&inverse);
+        let power = |b: &Matrix<S, D, A>| exp_minus_one(&log_one_plus(b).times_scalar(t));
+        let e = if S::ORDER == 0 {
+            power(&b)
         } else {
-            let delta = congruent(&inverse, &p).map(|x| {
-                let [_, d, dd] = x.parts();
-                S::from_parts([Lane::ZERO, d, dd])
-            });
-            let square = delta.times(&delta);
-            let half = delta.scaled(lane(0.5));
-            let root = (&half - &square.scaled(lane(0.125))).plus_identity(Lane::ONE);
-            let inverse = (&square.scaled(lane(0.375)) - &half).plus_identity(Lane::ONE);
-            (root, congruent(&inverse, &b))
+            // Whitened by the value of p, p is 1 + δ where δ has derivatives only, so that its square root is
+            // 1 + δ/2 − δ²/8 exactly, where (δ²)'' = 2δ'². Factors without derivatives are not multiplied as if they
+            // had some.
+            let delta = p.congruent_by(&inverse);
+            let (d, dd) = (delta.part(1), delta.part(2));
+            let square = d.times_adjoint_hermitian(&d);
+            let half = |x: &Matrix<Lane, D, A>, sign: f64| x.scaled(lane(0.5 * sign));
+            let root = [half(&d, 1.0), &half(&dd, 1.0) - &square.scaled(lane(0.25))];
+            let inverse_root = [half(&d, -1.0), &half(&dd, -1.0) + &square.scaled(lane(0.75))];
+            turned(&root, &power(&turned(&inverse_root, &b)))
         };
-        let e = exp_minus_one(&log_one_plus(&b).times_scalar(t));
-        let g = l.times(&root);
-        (&congruent(&g, &e) + &p).write(out);
+        (&e.congruent_by(&l) + &p).write(out);
     }
     fn transvect(&self, p: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]) {
         // g = exp(½ v p⁻¹) = L exp(½ L⁻¹vL⁻*) L⁻¹

@@ -260,6 +260,11 @@ impl<S: Scalar, const D: usize, A: Storage> Matrix<S, D, A> {
         self.map(|x| x.value())
     }
 
+    /// The value, or the derivative of this order.
+    pub fn part(&self, order: usize) -> Matrix<Lane, D, A> {
+        self.map(|x| x.parts()[order])
+    }
+
     /// A function of every entry.
     pub fn map_entries(&self, f: impl Fn(Entry<S, D>) -> Entry<S, D>) -> Self {
         let x = self.entries();

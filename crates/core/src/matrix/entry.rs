@@ -31,6 +31,24 @@ pub(super) fn mul_add<S: Scalar, const D: usize, const CONJUGATE: bool>(
     out
 }
 
+/// The same with a factor b without derivatives.
+#[inline(always)]
+pub(super) fn mul_add_lane<S: Scalar, const D: usize, const CONJUGATE: bool>(
+    a: Entry<S, D>,
+    b: Entry<Lane, D>,
+    c: Entry<S, D>,
+) -> Entry<S, D> {
+    let mut out = c;
+    if D == 1 {
+        out[0] = a[0].fma_lane(b[0], c[0]);
+    } else {
+        let (ai, bi) = (a[D - 1], if CONJUGATE { -b[D - 1] } else { b[D - 1] });
+        out[0] = a[0].fma_lane(b[0], (-ai).fma_lane(bi, c[0]));
+        out[D - 1] = a[0].fma_lane(bi, ai.fma_lane(b[0], c[D - 1]));
+    }
+    out
+}
+
 /// `a b + c`.
 pub fn multiply_add<const D: usize>(
     a: Entry<Lane, D>,

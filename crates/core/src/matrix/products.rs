@@ -2,7 +2,7 @@
 
 use super::base::{Matrix, Storage};
 use super::blocked::{self, LARGE};
-use super::entry::{Entry, conjugate, inner_add, mul_add};
+use super::entry::{Entry, conjugate, inner_add, mul_add, mul_add_lane};
 use crate::scalar::{Lane, Scalar, few};
 
 impl<S: Scalar, const D: usize, A: Storage> Matrix<S, D, A> {
@@ -109,6 +109,27 @@ impl<S: Scalar, const D: usize, A: Storage> Matrix<S, D, A> {
             return self.times_adjoint(b).hermitian_part();
         }
         Self::hermitian(self.rows(), |i, j| self.row_product(i, b, j, [S::constant(Lane::ZERO); D]))
+    }
+
+    /// `L X L*` of this Hermitian matrix X for a lower triangular L without derivatives: half of the numbers of half of
+    /// the products.
+    #[inline(always)]
+    pub fn congruent_by(&self, l: &Matrix<Lane, D, A>) -> Self {
+        if A::ANY {
+            let l = l.map(S::constant);
+            return l.times(self).times_adjoint_hermitian(&l);
+        }
+        let (n, zero) = (self.rows(), [S::constant(Lane::ZERO); D]);
+        let mut half = Self::zeros(n, n);
+        for i in 0..n {
+            for j in 0..=i {
+                let product = |sum, k| mul_add_lane::<S, D, false>(self[(k, j)], l[(i, k)], sum);
+                half[(i, j)] = (0..=i).fold(zero, product);
+            }
+        }
+        Self::hermitian(n, |i, j| {
+            conjugate((0..=i).fold(zero, |sum, k| mul_add_lane::<S, D, true>(half[(j, k)], l[(i, k)], sum)))
+        })
     }
 
     /// From the entries on and above the diagonal, exactly Hermitian.
