@@ -18,4 +18,5 @@ pub mod rows;
 pub mod scalar;
 pub mod space;
 pub mod special;
+pub mod tridiagonal;
 pub mod validate;

@@ -17,4 +17,6 @@ pub use symspline_smoothing as smoothing;
 pub use symspline_core::derivative;
 #[cfg(feature = "laws")]
 pub use symspline_core::laws;
-pub use symspline_core::{curve, fit, matrix, monitor, parallel, rows, scalar, space, special, validate};
+pub use symspline_core::{
+    curve, fit, matrix, monitor, parallel, rows, scalar, space, special, tridiagonal, validate,
+};

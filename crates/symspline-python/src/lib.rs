@@ -11,6 +11,7 @@ mod hermite;
 mod smoothing;
 mod space;
 mod stiefel;
+mod tridiagonal;
 mod validate;
 mod watch;
 
@@ -80,6 +81,7 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(estimation::posterior_freedom, m)?)?;
     m.add_function(wrap_pyfunction!(estimation::posterior_samples, m)?)?;
     m.add_function(wrap_pyfunction!(stiefel::stiefel, m)?)?;
+    m.add_function(wrap_pyfunction!(tridiagonal::solve_tridiagonal, m)?)?;
     m.add_function(wrap_pyfunction!(set_num_threads, m)?)?;
     m.add_function(wrap_pyfunction!(num_threads, m)?)?;
     errors::register(m)

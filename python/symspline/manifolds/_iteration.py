@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from .._core import solve_tridiagonal
 from .._spaces import Array, Doubles
 from ._condition import Problem, c2_residuals, is_parabola
 from ._frames import products
@@ -178,29 +179,26 @@ class Tridiagonal:
         closed = problem.ends is None
         before = np.roll(inverse, 1, axis=1) if closed else np.concatenate([zero, inverse], axis=1)
         behind = inverse if closed else np.concatenate([inverse, zero], axis=1)
-        self._low, self._high, self._diagonal = before, behind, 2 * (before + behind)
+        # Entries before, on and behind the diagonal.
+        self._rows = np.stack([before, 2 * (before + behind), behind], axis=2)
         self.weight = before + behind
         # A residual is a sixth of the jump of the acceleration, and a third of the right-hand side.
         self._right = np.full_like(before, 3.0)
         for which, end in enumerate(problem.ends or []):
             self._set_end(problem, which, end.kind)
-        self._pivots, self._ratios = self._diagonal.copy(), np.zeros_like(before)
-        for i in range(1, before.shape[1]):
-            self._ratios[:, i] = self._low[:, i] / self._pivots[:, i - 1]
-            self._pivots[:, i] -= self._ratios[:, i] * self._high[:, i - 1]
         self._periodic = _PeriodicCorrection(self, problem, before[:, 0]) if closed else None
 
     def _set_end(self, problem: Problem, which: int, kind: str) -> None:
         """Set the rows of ends whose residual is an error of the velocity."""
         if kind not in ("velocity", "not-a-knot"):
             return
-        node, beside = (0, self._high) if which == 0 else (-1, self._low)
+        node, beside = (0, 2) if which == 0 else (-1, 0)
         own = np.zeros(len(problem.h))
         if kind == "not-a-knot" and not is_parabola(problem):
             near, far = (0, 1) if which == 0 else (-1, -2)
             own = 1 + problem.h[:, near] / problem.h[:, far]
-        beside[:, node] = own
-        self._diagonal[:, node] = self._right[:, node] = 1.0
+        self._rows[:, node, beside] = own
+        self._rows[:, node, 1] = self._right[:, node] = 1.0
         self.weight[:, node] = np.maximum(1.0, own)
 
     def step(self, found: Doubles) -> Doubles:
@@ -222,13 +220,7 @@ class Tridiagonal:
 
     def solved(self, right: Doubles) -> Doubles:
         """The solution without the corners of a closed curve."""
-        x = right.copy()
-        for i in range(1, x.shape[1]):
-            x[:, i] -= self._ratios[:, i, None] * x[:, i - 1]
-        x[:, -1] /= self._pivots[:, -1, None]
-        for i in range(x.shape[1] - 2, -1, -1):
-            x[:, i] = (x[:, i] - self._high[:, i, None] * x[:, i + 1]) / self._pivots[:, i, None]
-        return x
+        return solve_tridiagonal(self._rows, np.ascontiguousarray(right))
 
 
 class _PeriodicCorrection:
