@@ -100,10 +100,8 @@ def frames_along(operations: Operations, p: Array) -> Array:
     # The rotation nearest to the map between tangent spaces: transport is one, projection nearly.
     u, _, v = np.linalg.svd(np.where(np.isfinite(maps), maps, np.eye(dim)))
     turns = u @ v
-    frames = np.empty_like(basis)
-    frames[:, 0] = basis[:, 0]
-    turn = np.broadcast_to(np.eye(dim), (curves, dim, dim))
+    total = np.empty((curves, nodes, dim, dim))
+    total[:, 0] = np.eye(dim)
     for i in range(nodes - 1):
-        turn = turn @ turns[:, i]
-        frames[:, i + 1] = turn @ basis[:, i + 1]
-    return frames
+        np.matmul(total[:, i], turns[:, i], out=total[:, i + 1])
+    return np.asarray(total @ basis)
