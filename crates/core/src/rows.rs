@@ -145,7 +145,7 @@ pub fn apply(
     faults.into_inner().ok().flatten().map_or(Ok(()), Err)
 }
 
-/// Applies a function of eight rows to arrays of rows of `len` numbers.
+/// Applies a function of eight rows to arrays with the same number of rows each, for a result with rows of `len` numbers.
 pub fn map(
     len: usize,
     inputs: &[&[f64]],
@@ -155,15 +155,17 @@ pub fn map(
 ) {
     let length = parallel::block(BLOCK, len);
     let parallel = out.len() > PARALLEL;
+    let total = (out.len() / len).max(1);
+    let widths: Vec<usize> = inputs.iter().map(|x| x.len() / total).collect();
     let blocks: Vec<(usize, &mut [f64])> = out.chunks_mut(length * len).enumerate().collect();
     parallel::for_each(blocks, parallel, monitor, |(block, out)| {
-        let mut x = vec![vec![Lane::ZERO; len]; inputs.len()];
+        let mut x: Vec<Vec<Lane>> = widths.iter().map(|&width| vec![Lane::ZERO; width]).collect();
         let mut result = vec![Lane::ZERO; len];
         let rows = out.len() / len;
         for (group, out) in out.chunks_mut(LANES * len).enumerate() {
             let at: [usize; LANES] = few(|l| block * length + (group * LANES + l).min(rows - 1));
-            for (x, input) in x.iter_mut().zip(inputs) {
-                gather(at.map(|i| &input[i * len..(i + 1) * len]), x);
+            for ((x, input), &width) in x.iter_mut().zip(inputs).zip(&widths) {
+                gather(at.map(|i| &input[i * width..(i + 1) * width]), x);
             }
             f(&x, &mut result);
             scatter(&result, out);

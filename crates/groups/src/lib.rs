@@ -1,5 +1,7 @@
 //! Groups as symmetric spaces: rotations, unitary matrices and rigid motions.
 
+#[cfg(feature = "stiefel")]
+mod frame_pairs;
 #[cfg(feature = "unitary")]
 mod isometries;
 mod logarithm;
@@ -53,6 +55,9 @@ pub fn quaternion_of_matrix(r: &[f64]) -> [f64; 4] {
 #[cfg(feature = "stiefel")]
 /// The manifold of n × k matrices of orthonormal columns, with 1 ≤ k < n.
 pub fn stiefel(k: usize, n: usize) -> Result<Box<dyn Stiefel>, String> {
+    if (k, n) == (2, 4) {
+        return Ok(Box::new(frame_pairs::FramePairs));
+    }
     Ok(stiefel::stiefel(k, n, rotations(&[n.min(2 * k)])?))
 }
 

@@ -41,7 +41,7 @@ impl Pairs<TwoDimensional> {
 
 /// e^v − 1 as a quaternion, without cancellation.
 #[inline(always)]
-fn exp_minus_one<S: Scalar>(v: Vector<S>) -> Quaternion<S> {
+pub fn exp_minus_one<S: Scalar>(v: Vector<S>) -> Quaternion<S> {
     let square = dot(&v, &v);
     let Trig { s, k, .. } = Trig::new(square);
     [square * k, v[0] * s, v[1] * s, v[2] * s]
@@ -49,22 +49,28 @@ fn exp_minus_one<S: Scalar>(v: Vector<S>) -> Quaternion<S> {
 
 /// e^v as a quaternion.
 #[inline(always)]
-fn exp<S: Scalar>(v: Vector<S>) -> Quaternion<S> {
+pub fn exp<S: Scalar>(v: Vector<S>) -> Quaternion<S> {
     let [w, x, y, z] = exp_minus_one(v);
     [w + Lane::ONE, x, y, z]
 }
 
-/// The vector v with e^v = q, and its length.
+/// θ/sin θ of a quaternion e^v with |v| = θ.
 #[inline(always)]
-fn log<S: Scalar>([w, v @ ..]: Quaternion<S>) -> (Vector<S>, Lane) {
+pub fn arc<S: Scalar>([w, v @ ..]: Quaternion<S>) -> S {
     // 1 − |cos θ| = sin²θ/(1 + |cos θ|), without cancellation.
     let behind = w.value().simd_lt(Lane::ZERO);
     let (size, sine2) = (S::select(behind, -w, w), dot(&v, &v));
     let c = size.value() + Lane::ONE;
     let inverse = size.compose([Lane::ONE / c, -(Lane::ONE / (c * c)), lane(2.0) / (c * c * c)]);
     let small = sine2 * inverse;
-    let f = theta_over_sin(S::select(behind, -w + Lane::ONE, small), || behind.select(small.value(), c));
-    (v.each(|x| x * f), sine2.value().sqrt().atan2(w.value()))
+    theta_over_sin(S::select(behind, -w + Lane::ONE, small), || behind.select(small.value(), c))
+}
+
+/// The vector v with e^v = q, and its length.
+#[inline(always)]
+fn log<S: Scalar>(q: Quaternion<S>) -> (Vector<S>, Lane) {
+    let ([w, v @ ..], f) = (q, arc(q));
+    (v.each(|x| x * f), dot(&v, &v).value().sqrt().atan2(w.value()))
 }
 
 /// The vectors of the nearer one of (a, b) and (−a, −b), and their lengths. Their sum is below π inside the cut locus.

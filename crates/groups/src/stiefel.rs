@@ -24,14 +24,61 @@ const MOST: usize = 60;
 
 /// The operations of a manifold, on eight points at once.
 pub trait Stiefel: Send + Sync {
-    /// The number of entries of a point.
-    fn point_len(&self) -> usize;
+    /// n and k
+    fn size(&self) -> (usize, usize);
     /// `exp_p(v)`
     fn exp(&self, p: &[Lane], v: &[Lane], out: &mut [Lane]);
     /// `log_p(q)`, NaN where there is none.
     fn log(&self, p: &[Lane], q: &[Lane], out: &mut [Lane]);
     /// The derivative of `log_p` at `exp_p(v)` in the direction w.
     fn dlog(&self, p: &[Lane], v: &[Lane], w: &[Lane], out: &mut [Lane]);
+
+    /// The inner product tr uᵀ(1 − ppᵀ/2)v.
+    fn inner(&self, p: &[Lane], u: &[Lane], v: &[Lane]) -> Lane {
+        let (n, k) = self.size();
+        let mut sum = dot(u, v);
+        for (i, j) in (0..k * k).map(|c| (c / k, c % k)) {
+            let along =
+                |x: &[Lane]| (0..n).fold(Lane::ZERO, |sum, r| p[r * k + i].mul_add(x[r * k + j], sum));
+            sum -= lane(0.5) * along(u) * along(v);
+        }
+        sum
+    }
+
+    /// D log of the vector to the other inner control point minus the handle, at both ends of a segment with the points
+    /// and handles p, v, q, w: h²/6 times the accelerations.
+    fn bends(&self, x: &[Vec<Lane>], out: &mut [Lane]) {
+        let (n, k) = self.size();
+        let [mut inner, mut other, mut between] = [(); 3].map(|()| vec![Lane::ZERO; n * k]);
+        self.exp(&x[0], &x[1], &mut inner);
+        self.exp(&x[2], &x[3], &mut other);
+        for (x, out) in x.chunks_exact(2).zip(out.chunks_exact_mut(n * k)) {
+            self.log(&inner, &other, &mut between);
+            self.dlog(&x[0], &x[1], &between, out);
+            out.iter_mut().zip(&x[1]).for_each(|(x, v)| *x -= *v);
+            std::mem::swap(&mut inner, &mut other);
+        }
+    }
+
+    /// De Casteljau's algorithm for a segment p, v, q, w, p, v, t: points, handles, and between the inner control points
+    /// the vector w at the first of them, q. Of order 1 or 2, for k = 2 and n = 4 only, the point
+    /// and its velocity or acceleration with respect to t.
+    fn curve(&self, order: usize, x: &[Vec<Lane>], out: &mut [Lane]) {
+        assert_eq!(order, 0, "there are no derivatives");
+        let (len, t) = (out.len(), x[6][0]);
+        let ray = |p: &[Lane], v: &[Lane], t: Lane| {
+            let (v, mut out) = (v.iter().map(|x| *x * t).collect::<Vec<_>>(), vec![Lane::ZERO; len]);
+            self.exp(p, &v, &mut out);
+            out
+        };
+        let between = |p: &[Lane], q: &[Lane]| {
+            let mut v = vec![Lane::ZERO; len];
+            self.log(p, q, &mut v);
+            ray(p, &v, t)
+        };
+        let (a, b, c) = (ray(&x[0], &x[1], t), ray(&x[2], &x[3], t), ray(&x[4], &x[5], Lane::ONE - t));
+        out.copy_from_slice(&between(&between(&a, &b), &between(&b, &c)));
+    }
 }
 
 /// The manifold of n × k matrices, with k < n; `rotations` is SO(m) with m = min(2k, n).
@@ -104,8 +151,8 @@ impl<A: Storage> Frames<A> {
 }
 
 impl<A: Storage> Stiefel for Frames<A> {
-    fn point_len(&self) -> usize {
-        self.n * self.k
+    fn size(&self) -> (usize, usize) {
+        (self.n, self.k)
     }
 
     fn exp(&self, p: &[Lane], v: &[Lane], out: &mut [Lane]) {

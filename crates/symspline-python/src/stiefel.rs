@@ -1,4 +1,4 @@
-//! Exponential and logarithm of Stiefel manifolds.
+//! Exponential, logarithm and curves of Stiefel manifolds.
 
 use crate::arrays::{in_order, zeros};
 use crate::errors::invalid;
@@ -7,8 +7,13 @@ use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn};
 use pyo3::prelude::*;
 use symspline_engine::rows::map;
 
-/// Rows of exp_p(v) for "exp" and p, v; of log_p(q), NaN where there is none, for "log" and p, q; of the derivative of
-/// log_p at exp_p(v) in the direction w for "dlog" and p, v, w.
+/// Rows of an operation on rows of points p, q and vectors:
+/// - "exp" of p, v: exp_p(v);
+/// - "log" of p, q: log_p(q), NaN where there is none;
+/// - "dlog" of p, v, w: the derivative of log_p at exp_p(v) in the direction w;
+/// - "inner" of p, u, v: inner products;
+/// - "bends" of p, v, q, w and "point", "velocity" and "acceleration" of p, v, q, w, p, v, t: see the methods `bends` and
+///   `curve` of the core; where these give two vectors, a row has both.
 #[pyfunction]
 pub fn stiefel<'py>(
     py: Python<'py>,
@@ -19,14 +24,24 @@ pub fn stiefel<'py>(
 ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
     let manifold = symspline_engine::spaces::stiefel(k, n).map_err(invalid)?;
     let slices = inputs.iter().map(in_order).collect::<PyResult<Vec<_>>>()?;
-    let len = manifold.point_len();
-    let out = zeros(py, &[slices[0].len()])?;
+    let rows = slices[0].len() / (n * k);
+    let len = match operation {
+        "inner" => 1,
+        "bends" | "velocity" | "acceleration" => 2 * n * k,
+        _ => n * k,
+    };
+    let out = zeros(py, &[rows, len])?;
     let mut write = out.readwrite();
     let result = write.as_slice_mut()?;
-    watched(py, None, slices[0].len() / len, false, |monitor| match operation {
+    watched(py, None, rows, false, |monitor| match operation {
         "exp" => map(len, &slices, monitor, result, |x, out| manifold.exp(&x[0], &x[1], out)),
         "log" => map(len, &slices, monitor, result, |x, out| manifold.log(&x[0], &x[1], out)),
-        _ => map(len, &slices, monitor, result, |x, out| manifold.dlog(&x[0], &x[1], &x[2], out)),
+        "dlog" => map(len, &slices, monitor, result, |x, out| manifold.dlog(&x[0], &x[1], &x[2], out)),
+        "inner" => map(len, &slices, monitor, result, |x, out| out[0] = manifold.inner(&x[0], &x[1], &x[2])),
+        "bends" => map(len, &slices, monitor, result, |x, out| manifold.bends(x, out)),
+        "point" => map(len, &slices, monitor, result, |x, out| manifold.curve(0, x, out)),
+        "velocity" => map(len, &slices, monitor, result, |x, out| manifold.curve(1, x, out)),
+        _ => map(len, &slices, monitor, result, |x, out| manifold.curve(2, x, out)),
     })?;
     drop(write);
     Ok(out)

@@ -60,7 +60,7 @@ def _bounds(problem: Problem, matrix: Tridiagonal, x: Doubles, pace: Doubles) ->
     u = problem.velocities(x)
     polygon = control_polygons(problem.operations, problem.h, problem.p, u)
     dlog = problem.operations.dlog(*polygon)
-    first = c2_residuals_of(problem, u, polygon, dlog)
+    first = c2_residuals_of(problem, u, dlog - polygon.v)
     term = matrix.step(first)
     size = _largest(term)
     unit = np.where(size[:, None, None] > 0, _unit(term), _unit(matrix.step(_free(problem, first))))

@@ -56,6 +56,8 @@ class Problem(NamedTuple):
         Points.
     frames : ndarray, shape (curves, N+1, dim, numbers of a point)
         Orthonormal frames at the points.
+    forms : ndarray of the same shape, or None
+        The frames as linear forms, if the manifold has them.
     ends : list of End, or None
         Conditions at both ends, None for closed curves.
     """
@@ -64,12 +66,14 @@ class Problem(NamedTuple):
     h: Doubles
     p: Array
     frames: Array
+    forms: Array | None
     ends: list[End] | None
 
     def take_batch(self, chosen: NDArray[np.int64]) -> Problem:
         """Return the problem of some of the curves."""
         ends = self.ends and [end.take_batch(chosen) for end in self.ends]
-        return self._replace(h=self.h[chosen], p=self.p[chosen], frames=self.frames[chosen], ends=ends)
+        forms = None if self.forms is None else self.forms[chosen]
+        return self._replace(h=self.h[chosen], p=self.p[chosen], frames=self.frames[chosen], forms=forms, ends=ends)
 
     def velocities(self, coordinates: Doubles) -> Array:
         """Velocities at all points, of their coordinates in the frames."""
@@ -80,6 +84,9 @@ class Problem(NamedTuple):
 
     def coordinates(self, vectors: Array, nodes: slice) -> Doubles:
         """Coordinates of vectors at some nodes of every curve."""
+        if self.forms is not None:
+            flat = vectors.reshape(*vectors.shape[:2], -1)
+            return np.asarray(np.einsum("cnai,cni->cna", self.forms[:, nodes], flat))
         frames = self.frames[:, nodes]
         frames = frames.reshape(*frames.shape[:3], *self.p.shape[2:])
         pairs = np.broadcast_to(self.p[:, nodes, None], frames.shape)
@@ -104,25 +111,28 @@ class ControlPolygon(NamedTuple):
 
 def control_polygons(operations: Operations, h: Doubles, p: Array, u: Array) -> ControlPolygon:
     """The control polygons of curves with points and velocities; NaN where there is no logarithm."""
-    third = (h / 3).reshape(*h.shape, *[1] * (p.ndim - 2))
-    at = np.stack([p[:, :-1], p[:, 1:]])
-    v = np.stack([third * u[:, :-1], -third * u[:, 1:]])
+    at, v = _handles(h, p, u)
     q = operations.exp(at, v)
     return ControlPolygon(at, v, q, operations.log(q, q[::-1]))
+
+
+def _handles(h: Doubles, p: Array, u: Array) -> tuple[Array, Array]:
+    """The ends of segments, and the handles there."""
+    third = (h / 3).reshape(*h.shape, *[1] * (p.ndim - 2))
+    return np.stack([p[:, :-1], p[:, 1:]]), np.stack([third * u[:, :-1], -third * u[:, 1:]])
 
 
 def c2_residuals(problem: Problem, u: Array) -> Doubles:
     """Return the C² residuals at every node as coordinates: a sixth of the jump of the acceleration, and at an end with
     not-a-knot the error of the velocity."""
-    polygon = control_polygons(problem.operations, problem.h, problem.p, u)
-    return c2_residuals_of(problem, u, polygon, problem.operations.dlog(*polygon))
+    return c2_residuals_of(problem, u, problem.operations.bends(*_handles(problem.h, problem.p, u)))
 
 
-def c2_residuals_of(problem: Problem, u: Array, polygon: ControlPolygon, dlog: Array) -> Doubles:
-    """Return the same from the control polygon and D log."""
+def c2_residuals_of(problem: Problem, u: Array, bends: Array) -> Doubles:
+    """Return the same from the `bends` of the segments."""
     h = problem.h
     square = (h * h).reshape(*h.shape, *[1] * (u.ndim - 2))
-    starts, stops = (dlog - polygon.v) / square
+    starts, stops = bends / square
     if problem.ends is None:
         jumps = np.concatenate([starts[:, :1] - stops[:, -1:], starts[:, 1:] - stops[:, :-1]], axis=1)
         return problem.coordinates(jumps, slice(0, h.shape[1]))

@@ -43,7 +43,8 @@ def fit_of_one_length(task: Task, options: Options, progress: Progress | None) -
     columns.row("max_step")[good] = lengths[good].max(axis=1)
     if good.size:
         ends = _ends(task, h, p)
-        problem = Problem(operations, h, p, frames_along(operations, p), ends).take_batch(good)
+        frames = frames_along(operations, p)
+        problem = Problem(operations, h, p, frames, operations.forms(p, frames), ends).take_batch(good)
         start = np.zeros((good.size, nodes - (ends is None), problem.frames.shape[2]))
         for which, end in enumerate(problem.ends or []):
             if end.kind == "velocity" and end.vector is not None:

@@ -171,16 +171,7 @@ def points_at(operations: Operations, rows: Rows) -> Array:
 
 
 def _bezier(operations: Operations, tau: Doubles, polygon: ControlPolygon) -> Array:
-    t = tau.reshape(-1, *[1] * (polygon.p.ndim - 2))
-    # The outer handles are given by their velocities, which is exact for long ones, too.
-    starts = np.stack([polygon.p[0], polygon.q[0], polygon.p[1]])
-    a, b, c = operations.exp(starts, np.stack([t * polygon.v[0], t * polygon.w[0], (1 - t) * polygon.v[1]]))
-    d, e = _between(operations, np.stack([a, b]), np.stack([b, c]), t)
-    return _between(operations, d, e, t)
-
-
-def _between(operations: Operations, p: Array, q: Array, t: Array) -> Array:
-    return operations.exp(p, t * operations.log(p, q))
+    return operations.curve(0, tau, *polygon)[0]
 
 
 def _geodesic(operations: Operations, tau: Doubles, polygon: ControlPolygon) -> Array:
@@ -192,9 +183,28 @@ def _geodesic(operations: Operations, tau: Doubles, polygon: ControlPolygon) -> 
 
 
 def derivative(operations: Operations, rows: Rows, nu: int) -> tuple[Array, Array]:
-    """Points, and there the velocity or the covariant acceleration, by differences of order eight in normal
-    coordinates. Beyond its ends a segment goes on, so that they are those of one segment everywhere; where it goes
-    over a cut locus soon, steps are shorter."""
+    """Points, and there the velocity or the covariant acceleration. Beyond its ends a segment goes on, so that they are
+    those of one segment everywhere."""
+    if not operations.differentiates:
+        return _by_differences(operations, rows, nu)
+    if not rows.straight.any():
+        return _by_formulas(operations, rows, nu)
+    here, vectors = np.empty_like(rows.polygon.p[0]), np.empty_like(rows.polygon.p[0])
+    for chosen, work in ((~rows.straight, _by_formulas), (rows.straight, _by_differences)):
+        here[chosen], vectors[chosen] = work(operations, rows.at(np.flatnonzero(chosen)), nu)
+    return here, vectors
+
+
+def _by_formulas(operations: Operations, rows: Rows, nu: int) -> tuple[Array, Array]:
+    here, vectors = operations.curve(nu, rows.tau, *rows.polygon)
+    # Vectors that are almost zero have rounding errors of other directions.
+    vectors = operations.project_tangent(here, vectors)
+    return here, vectors / (rows.h**nu).reshape(-1, *[1] * (here.ndim - 1))
+
+
+def _by_differences(operations: Operations, rows: Rows, nu: int) -> tuple[Array, Array]:
+    """The same by differences of order eight in normal coordinates. Where the segment goes over a cut locus soon, steps
+    are shorter."""
     here = points_at(operations, rows)
     vectors, least = np.empty_like(here), np.full(len(here), np.inf)
     axes = tuple(range(1, here.ndim))

@@ -68,12 +68,39 @@ class Operations:
     def inner(self, p: Array, u: Array, v: Array) -> Doubles:
         return self._call("inner", p, u, v)
 
+    def forms(self, p: Array, frames: Array) -> Array | None:
+        """Vectors whose scalar products with the numbers of tangent vectors are the inner products of `frames`, of
+        shape (curves, nodes, dim, numbers of a point), with them; None if they are not known."""
+        return None
+
     def norm(self, p: Array, v: Array) -> Doubles:
         return np.asarray(np.sqrt(np.maximum(self.inner(p, v, v), 0.0)))
 
     def dlog(self, p: Array, v: Array, q: Array, w: Array) -> Array:
         """The derivative of log_p at q = exp_p(v) in the direction w."""
         return self._applied("dlog", self.space._dlog, (p, v, q, w))
+
+    def bends(self, p: Array, v: Array) -> Array:
+        """D log of the vector to the other inner control point minus the handle v, at both ends of segments, which the
+        first axis has: h²/6 times the accelerations."""
+        q = self.exp(p, v)
+        return self.dlog(p, v, q, self.log(q, q[::-1])) - v
+
+    # Whether `curve` has derivatives.
+    differentiates = False
+
+    def curve(self, order: int, tau: Doubles, p: Array, v: Array, q: Array, w: Array) -> tuple[Array, ...]:
+        """De Casteljau's algorithm: points of segments, given by their control polygons, at tau from 0 to 1; with order
+        1 or 2 also the velocities or the covariant accelerations with respect to tau."""
+        t = tau.reshape(-1, *[1] * (p.ndim - 2))
+        # The outer handles are given by their velocities, which is exact for long ones, too.
+        starts = np.stack([p[0], q[0], p[1]])
+        a, b, c = self.exp(starts, np.stack([t * v[0], t * w[0], (1 - t) * v[1]]))
+        d, e = self._between(np.stack([a, b]), np.stack([b, c]), t)
+        return (self._between(d, e, t),)
+
+    def _between(self, p: Array, q: Array, t: Array) -> Array:
+        return self.exp(p, t * self.log(p, q))
 
     def _call(self, name: str, *inputs: Array) -> Array:
         return self._applied(name, self._function(name), inputs)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from .._arrays import short_repr
 from .._core import ValidationError, stiefel
-from .._spaces import Array, Space
+from .._spaces import Array, Doubles, Space
 from ._manifold import Manifold
+from ._operations import Operations
 
 # Of Rentmeesters, Algorithms for data fitting on some common homogeneous spaces (2013), Theorem 5.5.
 _RADIUS = np.sqrt(0.8) * np.pi
@@ -74,12 +76,13 @@ class Stiefel(Manifold):
             exp=self._exp,
             log=self._log,
             project_tangent=_tangential,
-            inner=_inner,
+            inner=self._inner,
             project=_project,
             injectivity_radius=_RADIUS,
             point_shape=(self._n, self._k),
             dim=k * n - k * (k + 1) // 2,
         )
+        self.operations = self._handle = _Compiled(self)
 
     def _key(self) -> tuple[Any, ...]:
         return self._parameters
@@ -103,9 +106,46 @@ class Stiefel(Manifold):
     def _dlog(self, p: Array, v: Array, q: Array, w: Array) -> Array:
         return self._computed("dlog", p, v, w)
 
+    def _inner(self, p: Array, u: Array, v: Array) -> Array:
+        return self._computed("inner", p, u, v)
+
     def _computed(self, operation: str, *inputs: Array) -> Array:
-        arrays = [np.ascontiguousarray(x, dtype=np.float64) for x in np.broadcast_arrays(*inputs)]
-        return stiefel(self._k, self._n, operation, arrays).reshape(arrays[0].shape)
+        same = all(x.shape == inputs[0].shape for x in inputs)
+        arrays = inputs if same else np.broadcast_arrays(*inputs)
+        shape = arrays[0].shape if operation != "inner" else arrays[0].shape[:-2]
+        return _run(self, operation, *arrays).reshape(shape)
+
+
+class _Compiled(Operations):
+    """Compiled operations, which take any leading axes, and give NaN where a number is not finite."""
+
+    def __init__(self, space: Stiefel) -> None:
+        super().__init__(space)
+        self.differentiates = space._parameters == (2, 4)
+
+    def _applied(self, name: str, function: Callable[..., Any], inputs: tuple[Array, ...]) -> Array:
+        # Decompositions of NumPy refuse numbers that are not finite.
+        return super()._applied(name, function, inputs) if name == "project" else np.asarray(function(*inputs))
+
+    def bends(self, p: Array, v: Array) -> Array:
+        found = _run(self.space, "bends", p[0], v[0], p[1], v[1])
+        return found.reshape(*p.shape[1:3], 2, *p.shape[3:]).transpose(2, 0, 1, 3, 4)
+
+    def forms(self, p: Array, frames: Array) -> Array:
+        half = frames.reshape(*frames.shape[:-1], *p.shape[-2:]) / 2
+        p = p[:, :, None]
+        return frames - (p @ (_transposed(p) @ half)).reshape(frames.shape)
+
+    def curve(self, order: int, tau: Doubles, p: Array, v: Array, q: Array, w: Array) -> tuple[Array, ...]:
+        operation = ("point", "velocity", "acceleration")[order]
+        found = _run(self.space, operation, p[0], v[0], q[0], w[0], p[1], v[1], tau)
+        parts = found.reshape(len(tau), 1 if order == 0 else 2, *p.shape[-2:])
+        return tuple(np.ascontiguousarray(parts[:, i]) for i in range(parts.shape[1]))
+
+
+def _run(space: Stiefel, operation: str, *inputs: Array) -> Array:
+    arrays = [np.ascontiguousarray(x, dtype=np.float64) for x in inputs]
+    return stiefel(space._k, space._n, operation, arrays)
 
 
 def _transposed(x: Array) -> Array:
@@ -117,12 +157,14 @@ def _tangential(p: Array, v: Array) -> Array:
     return np.asarray(v - p @ (inside + _transposed(inside)) / 2)
 
 
-def _inner(p: Array, u: Array, v: Array) -> Array:
-    a, b = _transposed(p) @ u, _transposed(p) @ v
-    return np.asarray(np.sum(u * v, axis=(-2, -1)) - np.sum(a * b, axis=(-2, -1)) / 2)
-
-
 def _project(x: Array) -> Array:
     """The nearest matrix with orthonormal columns."""
-    u, _, v = np.linalg.svd(x, full_matrices=False)
-    return np.asarray(u @ v)
+    gram = _transposed(x) @ x
+    off = np.abs(gram - np.eye(x.shape[-1])).max(axis=(-2, -1))
+    # One step of Newton and Schulz (Higham, Functions of Matrices, 2008, section 8.3) squares the distance.
+    found = 1.5 * x - 0.5 * (x @ gram)
+    far = ~(off <= 1e-8)
+    if far.any():
+        u, _, v = np.linalg.svd(x[far], full_matrices=False)
+        found[far] = u @ v
+    return np.asarray(found)
