@@ -124,9 +124,7 @@ def smoothing_variance(
 ) -> _Doubles: ...
 def frames_along(handle: Handle, knots: _Doubles, points: _Doubles, x: _Doubles, gammas: _Doubles) -> _Doubles: ...
 def curvature_along(handle: Handle, velocities: _Doubles, vectors: _Doubles) -> _Doubles: ...
-def bending(
-    handle: Handle, knots: _Doubles, points: _Doubles, velocities: _Doubles, penalty: str
-) -> list[_Doubles]: ...
+def bending(handle: Handle, knots: _Doubles, points: _Doubles, velocities: _Doubles) -> list[_Doubles]: ...
 
 # Times, whitened residuals, their derivatives by the motion, and by the parameters.
 _Term = tuple[_Doubles, _Doubles, Sequence[_Doubles | None], _Doubles | None]
@@ -134,7 +132,7 @@ _Term = tuple[_Doubles, _Doubles, Sequence[_Doubles | None], _Doubles | None]
 def estimate(
     knots: _Doubles,
     penalty: str,
-    factors: Sequence[tuple[int, _Doubles, _Doubles]],
+    factors: Sequence[tuple[Handle, _Doubles, _Doubles]],
     priors: _Doubles,
     terms: Sequence[_Term],
     lams: _Doubles,

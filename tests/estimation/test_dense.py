@@ -104,7 +104,7 @@ def dense_step(own, linear, lam, penalty):
         rows.append(block.reshape(-1, n * m + 3))
         right.append(-at.residuals.ravel())
     whole, right = np.concatenate(rows), np.concatenate(right)
-    _, acceleration, curvature = solve.bending(own.curves[0], penalty)
+    speed, acceleration = solve.bending(own.curves[0])
     spacing = KNOTS[-1] / (n - 1)
     h = np.diff(KNOTS)
     metric = np.zeros((n, n))
@@ -114,12 +114,25 @@ def dense_step(own, linear, lam, penalty):
         )
         pair = np.array(pair) * (1 if penalty == "acceleration" else np.array([[1], [-1]]))
         metric[i : i + 2, i : i + 2] += pair
-    power = 3 if penalty == "acceleration" else 5
-    gradient = basis(KNOTS, 2, penalty).T @ metric @ (acceleration / spacing**2) + curvature / spacing**power
+    # Jacobi's operator: ξ'' + R(ξ, u)u, with R(ξ, u)u = -[u, [u, ξ]] and [x, [y, z]] = x × (y × z) / 4 on SO(3).
+    u, a = speed / spacing, acceleration / spacing**2
+    cross = -np.cross(np.eye(m), u[:, None]).swapaxes(1, 2)
+    operator = np.kron(basis(KNOTS, 2, penalty), np.eye(m)).reshape(n, m, n, m)
+    operator[np.arange(n), :, np.arange(n)] -= cross @ cross / 4
+    if penalty == "acceleration":
+        operator[[0, -1]] = np.kron(basis(KNOTS[[0, -1]], 2, penalty), np.eye(m)).reshape(2, m, n, m)
+    operator = operator.reshape(n * m, n * m)
+    metric = np.kron(metric, np.eye(m))
+    gradient = operator.T @ metric @ a.ravel()
+    if penalty == "jerk":
+        j, further = np.diff(a, axis=0) / h[:, None], np.zeros((n, m))
+        further[:-1] += h[:, None] / 8 * np.cross(u[:-1], np.cross(j, a[:-1]))
+        further[1:] += h[:, None] / 8 * np.cross(u[1:], np.cross(j, a[1:]))
+        gradient += further.ravel()
     matrix = whole.T @ whole
-    matrix[: n * m, : n * m] += lam * np.kron(stiffness(penalty), np.eye(m))
+    matrix[: n * m, : n * m] += lam * operator.T @ metric @ operator
     vector = whole.T @ right
-    vector[: n * m] -= lam * gradient.ravel()
+    vector[: n * m] -= lam * gradient
     cov, x = np.linalg.inv(matrix), np.linalg.solve(matrix, vector)
     squares = float(right @ right)
     information = np.linalg.inv(cov[n * m :, n * m :])

@@ -1,6 +1,7 @@
 """Estimates from data as sensors record them."""
 
 import pickle
+import warnings
 
 import numpy as np
 import pytest
@@ -90,7 +91,7 @@ def test_position_and_imu():
     for name, true in zip(["gyro bias", "accelerometer bias"], bias, strict=True):
         found = product.parameters[name]
         assert np.all(np.abs(found.value - true) < 4 * found.std), name
-    seen = measure.Function(g, lambda pose: pose[:, :3, 3] - y, sigma=0.3)
+    seen = measure.Points(g, y, sigma=0.3)
     poses = ss.estimate([seen, *inertial(s, omega, force)], knots, "se:3", penalty="jerk")
     assert poses.space == ss.SpecialEuclidean(3)
     at = poses(g)
@@ -98,6 +99,22 @@ def test_position_and_imu():
     assert sensors.rms(SO3.distance(at[:, :3, :3], turn(g))) < 1.25 * sensors.rms(SO3.distance(product(g)[0], turn(g)))
     assert [own.shape for own in poses.cov(g)] == [(len(g), 3, 3)] * 2
     assert [own.shape for own in poses.std(g)] == [(len(g),)] * 2
+
+
+def test_spinning_bodies():
+    """λ grows without bound for a constant rotation, and the linear problem must know the curvature of the space."""
+    for rate in (0.1, 0.5, 1.0):
+        rng = np.random.default_rng(0)
+        t, s = sensors.times(rng, 0, 60, 121), np.linspace(0, 60, 1201)
+        axis = rate * np.array([0.2, 0.1, 1.0])
+        turned = ss.rotations.from_rotation_vectors(t[:, None] * axis)
+        seen = SO3.exp(turned, 0.05 * SO3.random_tangent(rng, turned))
+        omega = axis + BIAS + 0.02 * rng.standard_normal((1201, 3))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ss.SmoothingWarning)
+            curve = ss.estimate(fused(t, seen, s, omega), np.linspace(0, 60, 121), "so:3")
+        assert curve.report.iterations <= 8 and curve.df < 5
+        assert sensors.rms(SO3.distance(curve(t), turned)) < 0.03
 
 
 def test_lever_arm():

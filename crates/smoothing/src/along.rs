@@ -1,21 +1,16 @@
 //! Frames along a curve: those at its knots, transported along geodesics to positions nearby.
 
-use crate::frames::{Frames, curvature_gradient, curvature_terms, lanes_of};
-use crate::linearized::{Basis, LinearProblem};
+use crate::frames::{Frames, curvature_terms, lanes_of};
 use crate::path::{Path, nearest, positions};
-use crate::problem::{Ends, Penalty};
 use symspline_core::scalar::{LANES, Lane, gather, scatter};
 use symspline_core::space::{Ambient, Erased, Origin};
 
-/// Velocities, accelerations and the curvature term of the energy at the knots, in coordinates of the frames there and
-/// in units of the mean knot spacing.
+/// Velocities and accelerations at the knots, in coordinates of the frames there and in units of the mean knot spacing.
 pub struct Bending {
     /// γ'.
     pub speeds: Vec<f64>,
     /// ∇γ'.
     pub accelerations: Vec<f64>,
-    /// See [`curvature_gradient`].
-    pub curvature: Vec<f64>,
 }
 
 /// A curve with frames, transported along the polygon of its knots.
@@ -63,16 +58,16 @@ impl<'a> Along<'a> {
     }
 
     /// The motion of the curve at its knots.
-    pub fn bending(&self, penalty: Penalty, ends: Ends) -> Bending {
-        let linearized = LinearProblem::new(Basis::new(self.path.t, ends), &[], &[], penalty);
-        let spacing = linearized.basis.spacing;
+    pub fn bending(&self) -> Bending {
+        let last = self.path.t.len() - 1;
+        let spacing = (self.path.t[last] - self.path.t[0]) / last as f64;
         let in_frames = |vectors: &[f64], unit: f64| -> Vec<f64> {
             self.frames.coordinates(vectors, |i| i).into_iter().map(|x| x * unit).collect()
         };
-        let speeds = in_frames(self.path.velocities, spacing);
-        let accelerations =
-            in_frames(&self.path.accelerations(self.space, &self.path.knots()), spacing * spacing);
-        let curvature = curvature_gradient(self.space, &linearized, &speeds, &accelerations);
-        Bending { speeds, accelerations, curvature }
+        let accelerations = self.path.accelerations(self.space, &self.path.knots());
+        Bending {
+            speeds: in_frames(self.path.velocities, spacing),
+            accelerations: in_frames(&accelerations, spacing * spacing),
+        }
     }
 }

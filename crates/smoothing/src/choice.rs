@@ -38,7 +38,8 @@ pub struct Linear<'a> {
 }
 
 impl<'a> Linear<'a> {
-    /// `curvature` is g, the part of the energy's gradient that is due to curvature.
+    /// `curvature` is g, the part of the energy's gradient that is due to curvature, and `further` the part of it that
+    /// Jacobi's operator does not include.
     pub fn new(
         linearized: &'a LinearProblem,
         m: usize,
@@ -46,12 +47,17 @@ impl<'a> Linear<'a> {
         jacobi: Option<&'a JacobiOperator>,
         periodic: Option<&'a PeriodicCorrection>,
         accelerations: &'a [f64],
-        curvature: &[f64],
+        [curvature, further]: [&[f64]; 2],
         sigma: f64,
     ) -> Self {
         let mut pull = misfit.pull(linearized, m);
         let mut stiffness = match jacobi {
-            Some(jacobi) => jacobi.pull(linearized, accelerations),
+            Some(jacobi) => {
+                let mut out = jacobi.pull(linearized, accelerations);
+                let rows = linearized.values.iter().zip(further.chunks_exact(m));
+                rows.for_each(|(row, x)| row.spread(x, &mut out));
+                out
+            }
             None => linearized.stiffness(accelerations, curvature, m),
         };
         if let Some(periodic) = periodic {
@@ -100,7 +106,8 @@ impl<'a> Linear<'a> {
         let rss = self.misfit.rss(linearized, m, &x);
         // (a + Sδ)ᵀM(a + Sδ), with Jacobi's operator (a + (S + RP)δ)ᵀM(a + (S + RP)δ).
         let bend = |i: usize, c: usize| {
-            let turned = self.jacobi.map_or(Lane::ZERO, |jacobi| jacobi.of_lanes(linearized, i, &x, c));
+            let turned =
+                self.jacobi.map_or(Lane::ZERO, |jacobi| jacobi.of_lanes(linearized, i, &x, c, (0, m)));
             lane(self.accelerations[i * m + c]) + linearized.accelerations[i].of_lanes(&x, m, c) + turned
         };
         let energy = (0..m).fold(Lane::ZERO, |sum, c| sum + linearized.energy(|i| bend(i, c)));

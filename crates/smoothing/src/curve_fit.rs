@@ -3,7 +3,7 @@
 use crate::banded::Banded;
 use crate::choice::Linear;
 use crate::cyclic::PeriodicCorrection;
-use crate::frames::{Frames, curvature_gradient};
+use crate::frames::{Frames, curvature_gradient, jerk_term};
 use crate::gauss_newton::{self, Pull};
 use crate::information::{self, Root};
 use crate::jacobi_operator::JacobiOperator;
@@ -224,12 +224,14 @@ impl<'a> CurveFit<'a> {
         let mut speeds = frames.coordinates(&self.velocities, |i| i);
         accelerations.iter_mut().for_each(|x| *x *= spacing * spacing);
         speeds.iter_mut().for_each(|x| *x *= spacing);
-        let curvature = curvature_gradient(space, linearized, &speeds, &accelerations);
+        let curvature =
+            [curvature_gradient, jerk_term].map(|of| of(space, linearized, &speeds, &accelerations));
+        let curvature: [&[f64]; 2] = [&curvature[0], &curvature[1]];
         let sigma = data.sigma.unwrap_or(f64::NAN);
         let closed = self.ends == Ends::Periodic;
         let periodic = closed.then(|| PeriodicCorrection { overlap: OVERLAP, m, turn: frames.round() });
         let seen_with = |misfit, jacobi| {
-            Linear::new(linearized, m, misfit, jacobi, periodic.as_ref(), &accelerations, &curvature, sigma)
+            Linear::new(linearized, m, misfit, jacobi, periodic.as_ref(), &accelerations, curvature, sigma)
         };
         let (jacobi, later);
         jacobi = self.progress.with_curvature.then(|| JacobiOperator::new(space, linearized, &speeds));

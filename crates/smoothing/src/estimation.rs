@@ -10,14 +10,17 @@
 //! for coefficients c of all coordinates together. Its matrix is banded, with a border of one row per parameter. Each
 //! factor of a product has its own λ.
 
-use crate::banded::{Banded, WIDTH, stride};
+use crate::banded::{Banded, stride};
 use crate::bordered::{Bordered, Inverse};
 use crate::choice::{Look, STRAIGHT, Scoring, choose};
+use crate::frames::jerk_term;
+use crate::jacobi_operator::JacobiOperator;
 use crate::linearized::{Basis, LinearProblem, Row};
 use crate::path::Position;
 use crate::problem::{Criterion, Ends, Penalty};
 use symspline_core::monitor::checkpoint;
 use symspline_core::scalar::{Lane, lane};
+use symspline_core::space::{Erased, Origin};
 
 /// Measurements of one kind, whitened: their noise has variance one.
 #[derive(Clone, Copy)]
@@ -37,23 +40,33 @@ pub struct Measurements<'a> {
 /// A factor of a product.
 #[derive(Clone, Copy)]
 pub struct Factor<'a> {
-    /// Its dimension.
-    pub dim: usize,
-    /// The accelerations at the knots, in units of the mean knot spacing.
+    /// Its space.
+    pub space: &'a Erased<'a>,
+    /// The velocities at the knots in frames along the curve, in units of the mean knot spacing.
+    pub speeds: &'a [f64],
+    /// The accelerations, likewise.
     pub accelerations: &'a [f64],
-    /// The contribution of curvature to the gradient of the energy, see [`LinearProblem::stiffness`].
-    pub curvature: &'a [f64],
+}
+
+impl Factor<'_> {
+    fn dim(&self) -> usize {
+        self.space.dim()
+    }
 }
 
 /// The linear problem at a curve.
 pub struct Estimation<'a> {
     linearized: LinearProblem,
     factors: Vec<Factor<'a>>,
+    /// Jacobi's operators of curved factors.
+    jacobi: Vec<Option<JacobiOperator>>,
     /// The first coordinate of each factor.
     first: Vec<usize>,
     /// The number of coordinates, and of parameters.
     m: usize,
     p: usize,
+    /// The matrices of the energies of all factors, as the entries (i, i − d) at i · 4m + d.
+    penalty: Vec<f64>,
     /// ΣLᵀL, ΣLᵀJ and ΣJᵀJ: the entries (i, i − d) at i · 4m + d, and row by row.
     gram: Vec<f64>,
     side: Vec<f64>,
@@ -100,12 +113,35 @@ impl<'a> Estimation<'a> {
         priors: &[(f64, f64)],
     ) -> Self {
         let linearized = LinearProblem::new(Basis::new(knots, ends), &[], &[], penalty);
-        let m = factors.iter().map(|factor| factor.dim).sum();
-        let first = (0..factors.len()).map(|f| factors[..f].iter().map(|factor| factor.dim).sum()).collect();
+        let m = factors.iter().map(Factor::dim).sum();
+        let first: Vec<usize> =
+            (0..factors.len()).map(|f| factors[..f].iter().map(Factor::dim).sum()).collect();
+        let jacobi: Vec<Option<JacobiOperator>> = factors
+            .iter()
+            .map(|own| {
+                let curved = own.space.curvature() != 0.0;
+                curved.then(|| JacobiOperator::new(own.space, &linearized, own.speeds))
+            })
+            .collect();
         let stiffness = factors
             .iter()
-            .map(|own| linearized.stiffness(own.accelerations, own.curvature, own.dim))
+            .zip(&jacobi)
+            .map(|(own, jacobi)| {
+                let Some(jacobi) = jacobi else {
+                    let flat = vec![0.0; own.accelerations.len()];
+                    return linearized.stiffness(own.accelerations, &flat, own.dim());
+                };
+                let mut out = jacobi.pull(&linearized, own.accelerations);
+                let further = jerk_term(own.space, &linearized, own.speeds, own.accelerations);
+                let rows = linearized.values.iter().zip(further.chunks_exact(own.dim()));
+                rows.for_each(|(row, x)| row.spread(x, &mut out));
+                out
+            })
             .collect();
+        let mut penalty = vec![0.0; linearized.basis.count() * m * stride(m)];
+        for ((own, first), jacobi) in factors.iter().zip(&first).zip(&jacobi) {
+            add_penalty(&linearized, own.dim(), *first, jacobi.as_ref(), m, &mut penalty);
+        }
         let (p, size) = (priors.len(), linearized.basis.count() * m);
         let mut pull = vec![0.0; p + size];
         priors.iter().zip(&mut pull).for_each(|((precision, off), pull)| *pull = -precision * off);
@@ -118,6 +154,8 @@ impl<'a> Estimation<'a> {
             squares: priors.iter().map(|(precision, off)| precision * off * off).sum(),
             count: 0,
             stiffness,
+            penalty,
+            jacobi,
             linearized,
             factors,
             first,
@@ -204,7 +242,7 @@ impl<'a> Estimation<'a> {
 
     /// The λ at which measurements and energy of a factor have about the same weight.
     fn balance(&self, factor: usize) -> f64 {
-        let (first, dim) = (self.first[factor], self.factors[factor].dim);
+        let (first, dim) = (self.first[factor], self.factors[factor].dim());
         let count = self.linearized.basis.count();
         let entry = |i: usize, c: usize| self.gram[(i * self.m + first + c) * stride(self.m)];
         let sum: f64 = (0..count).flat_map(|i| (0..dim).map(move |c| (i, c))).map(|(i, c)| entry(i, c)).sum();
@@ -216,12 +254,7 @@ impl<'a> Estimation<'a> {
         let (m, stride) = (self.m, stride(self.m));
         let of: Vec<usize> = (0..m).map(|c| self.factor_of(c)).collect();
         let band = Banded::of(self.gram.len() / stride, stride - 1, |at| {
-            let (i, d) = (at / stride, at % stride);
-            let own = lane(self.gram[at]);
-            if d % m > 0 || d / m > WIDTH {
-                return own;
-            }
-            lams[of[i % m]].mul_add(lane(self.linearized.penalty[i / m * (WIDTH + 1) + d / m]), own)
+            lams[of[at / stride % m]].mul_add(lane(self.penalty[at]), lane(self.gram[at]))
         });
         let mut corner = Banded::zeros(self.p, self.p.saturating_sub(1));
         for a in 0..self.p {
@@ -242,7 +275,7 @@ impl<'a> Estimation<'a> {
     fn right(&self, lams: &[Lane]) -> Vec<Lane> {
         let mut right: Vec<Lane> = self.pull.iter().map(|x| lane(*x)).collect();
         for (own, first, stiffness, lam) in self.each(lams) {
-            for (k, row) in stiffness.chunks_exact(own.dim).enumerate() {
+            for (k, row) in stiffness.chunks_exact(own.dim()).enumerate() {
                 for (c, x) in row.iter().enumerate() {
                     right[self.p + k * self.m + first + c] -= lam * lane(*x);
                 }
@@ -316,12 +349,16 @@ impl<'a> Estimation<'a> {
 
     /// The penalty, λ times the energy, of the factor `chosen` at changed coefficients.
     fn penalty_at(&self, chosen: usize, lam: Lane, x: &[Lane]) -> Lane {
-        let (own, first) = (self.factors[chosen], self.first[chosen]);
-        let rows = &self.linearized.accelerations;
-        let bend = |i: usize, c: usize| {
-            lane(own.accelerations[i * own.dim + c]) + rows[i].of_lanes(&x[self.p..], self.m, first + c)
+        let (own, first, dim) = (self.factors[chosen], self.first[chosen], self.factors[chosen].dim());
+        let (x, rows) = (&x[self.p..], &self.linearized.accelerations);
+        let turned = |i: usize, c: usize| {
+            let jacobi = self.jacobi[chosen].as_ref();
+            jacobi.map_or(Lane::ZERO, |jacobi| jacobi.of_lanes(&self.linearized, i, x, c, (first, self.m)))
         };
-        lam * (0..own.dim).fold(Lane::ZERO, |sum, c| sum + self.linearized.energy(|i| bend(i, c)))
+        let bend = |i: usize, c: usize| {
+            lane(own.accelerations[i * dim + c]) + rows[i].of_lanes(x, self.m, first + c) + turned(i, c)
+        };
+        lam * (0..dim).fold(Lane::ZERO, |sum, c| sum + self.linearized.energy(|i| bend(i, c)))
     }
 
     fn look(&self, chosen: usize, lams: &[Lane]) -> Look {
@@ -357,7 +394,7 @@ impl<'a> Estimation<'a> {
         for sweep in 0..sweeps {
             for f in (0..self.factors.len()).filter(|&f| given[f].is_none()) {
                 checkpoint();
-                let dim = self.factors[f].dim as f64;
+                let dim = self.factors[f].dim() as f64;
                 let scoring = Scoring {
                     criterion,
                     count: self.count as f64,
@@ -389,7 +426,7 @@ impl<'a> Estimation<'a> {
         let mut of_factors = vec![0.0; self.factors.len()];
         for (i, freedom) in freedoms[self.p..].iter().enumerate() {
             let f = self.factor_of(i % self.m);
-            of_factors[f] += freedom / self.factors[f].dim as f64;
+            of_factors[f] += freedom / self.factors[f].dim() as f64;
         }
         let numbers: Vec<f64> = x.into_iter().map(first).collect();
         let (parameters, coefficients) = numbers.split_at(self.p);
@@ -427,7 +464,7 @@ impl<'a> Estimation<'a> {
         lanes[chosen] = lane(self.balance(chosen) * self.linearized.penalised.stiffest(knots));
         let inverse = self.factored(&lanes).inverse();
         let freedom: f64 = self.freedoms(&inverse).into_iter().map(|x| x.as_array()[0]).sum();
-        freedom + STRAIGHT * self.factors[chosen].dim as f64
+        freedom + STRAIGHT * self.factors[chosen].dim() as f64
     }
 
     /// The sum of squared residuals and their number.
@@ -454,5 +491,29 @@ impl<'a> Estimation<'a> {
                 .collect();
         let corner = (0..self.p * self.p).map(|at| first(&corner.at(at / self.p, at % self.p))).collect();
         [band, side.iter().map(first).collect(), corner]
+    }
+}
+
+/// Adds the matrix of the energy of a factor, whose coordinates begin at `first` of m.
+fn add_penalty(
+    linearized: &LinearProblem,
+    dim: usize,
+    first: usize,
+    jacobi: Option<&JacobiOperator>,
+    m: usize,
+    out: &mut [f64],
+) {
+    let wide = stride(m);
+    let own = jacobi.map_or(&linearized.penalty, |jacobi| &jacobi.penalty);
+    let coupled = if jacobi.is_some() { dim } else { 1 };
+    for (i, row) in own.chunks_exact(stride(coupled)).enumerate() {
+        for (d, x) in row.iter().enumerate().filter(|(d, x)| *d <= i && **x != 0.0) {
+            let j = i - d;
+            // The same for every coordinate if they are not coupled.
+            for c in 0..dim / coupled {
+                let at = |k: usize| k / coupled * m + first + k % coupled + c;
+                out[at(i) * wide + at(i) - at(j)] += x;
+            }
+        }
     }
 }

@@ -5,8 +5,7 @@
 
 use crate::banded::stride;
 use crate::frames::curvature_terms;
-use crate::linearized::{LinearProblem, times_metric};
-use crate::problem::Penalty;
+use crate::linearized::{LinearProblem, of_segment, times_metric};
 use symspline_core::scalar::{Lane, lane};
 use symspline_core::space::{Erased, Origin};
 
@@ -41,10 +40,11 @@ impl JacobiOperator {
         let mut jacobi =
             JacobiOperator { m, turns, penalty: vec![0.0; linearized.basis.count() * m * stride(m)] };
         for i in 0..knots - 1 {
-            let sixth = linearized.basis.h(i) / 6.0;
-            for (left, right, factor) in [(i, i, 2.0), (i + 1, i + 1, 2.0), (i, i + 1, 1.0), (i + 1, i, 1.0)]
+            let (own, other) = of_segment(linearized.penalised, linearized.basis.h(i));
+            for (left, right, factor) in
+                [(i, i, own), (i + 1, i + 1, own), (i, i + 1, other), (i + 1, i, other)]
             {
-                jacobi.add(linearized, left, right, factor * sixth);
+                jacobi.add(linearized, left, right, factor);
             }
         }
         jacobi
@@ -99,10 +99,12 @@ impl JacobiOperator {
         }
     }
 
-    /// (S + RP)ᵀMa: half the gradient of the energy at accelerations a.
+    /// (S + RP)ᵀMa: half the gradient of the energy at accelerations a. For the jerk, [`jerk_term`] is missing.
+    ///
+    /// [`jerk_term`]: crate::frames::jerk_term
     pub fn pull(&self, linearized: &LinearProblem, accelerations: &[f64]) -> Vec<f64> {
         let m = self.m;
-        let mass = times_metric(&linearized.basis, Penalty::Acceleration, accelerations, m);
+        let mass = times_metric(&linearized.basis, linearized.penalised, accelerations, m);
         let mut out = vec![0.0; linearized.basis.count() * m];
         for (knot, x) in mass.chunks_exact(m).enumerate() {
             let turn = self.turn(knot);
@@ -115,10 +117,18 @@ impl JacobiOperator {
     }
 
     /// RPx: the contribution of curvature to coordinate c of the acceleration at a knot if coefficients change by x.
-    pub fn of_lanes(&self, linearized: &LinearProblem, knot: usize, x: &[Lane], c: usize) -> Lane {
+    /// They have `all` coordinates, of which those of the operator begin at `first`.
+    pub fn of_lanes(
+        &self,
+        linearized: &LinearProblem,
+        knot: usize,
+        x: &[Lane],
+        c: usize,
+        (first, all): (usize, usize),
+    ) -> Lane {
         let turns = &self.turns[(knot * self.m + c) * self.m..][..self.m];
-        let of =
-            |(column, turn): (usize, &f64)| linearized.values[knot].of_lanes(x, self.m, column) * lane(*turn);
+        let row = &linearized.values[knot];
+        let of = |(column, turn): (usize, &f64)| row.of_lanes(x, all, first + column) * lane(*turn);
         turns.iter().enumerate().fold(Lane::ZERO, |sum, each| sum + of(each))
     }
 }

@@ -227,7 +227,7 @@ impl Basis {
 
 /// The entries of M that belong to a segment of length h: on the diagonal and beside it. `∫ a b` of functions that are
 /// linear between knots, or `∫ a' b'`.
-fn of_segment(penalty: Penalty, h: f64) -> (f64, f64) {
+pub fn of_segment(penalty: Penalty, h: f64) -> (f64, f64) {
     match penalty {
         Penalty::Acceleration => (h / 3.0, h / 6.0),
         Penalty::Jerk => (1.0 / h, -1.0 / h),

@@ -168,9 +168,8 @@ impl Progress {
         let k = if space.curvature().is_nan() { 1.0 } else { space.curvature() };
         let exponent = 2.0 / f64::from(self.penalty.power() + 1);
         self.report.kappa = k * k * square * (lam / self.density).powf(exponent);
-        self.with_curvature |= self.penalty == Penalty::Acceleration
-            && self.report.kappa > SLOW
-            && m.saturating_pow(3).saturating_mul(knots) <= COUPLED;
+        self.with_curvature |=
+            self.report.kappa > SLOW && m.saturating_pow(3).saturating_mul(knots) <= COUPLED;
     }
 
     /// Records λ, degrees of freedom and noise of the present curve.

@@ -96,8 +96,8 @@ pub fn curvature_along<'py>(
     array(py, velocities.shape(), &found)
 }
 
-/// Velocities, accelerations and the curvature term of the energy at the knots of a curve, (K, m) each, in units of the
-/// mean knot spacing.
+/// Velocities and accelerations at the knots of a curve in the frames along it, (K, m) each, in units of the mean knot
+/// spacing.
 #[pyfunction]
 pub fn bending<'py>(
     py: Python<'py>,
@@ -105,17 +105,13 @@ pub fn bending<'py>(
     knots: Array<'py>,
     points: Array<'py>,
     velocities: Array<'py>,
-    penalty: &str,
-) -> PyResult<[Out<'py>; 3]> {
+) -> PyResult<[Out<'py>; 2]> {
     let space = handle.space.get();
     let (knots, points, velocities) = (in_order(&knots)?, in_order(&points)?, in_order(&velocities)?);
-    let penalty = penalty_named(penalty)?;
-    let found = watched(py, None, knots.len(), false, |_| {
-        Along::new(&space, knots, points, velocities).bending(penalty, free_ends(penalty))
-    })?;
+    let found =
+        watched(py, None, knots.len(), false, |_| Along::new(&space, knots, points, velocities).bending())?;
     let shape = [knots.len(), space.dim()];
-    let [a, b, c] = [found.speeds, found.accelerations, found.curvature].map(|x| array(py, &shape, &x));
-    Ok([a?, b?, c?])
+    Ok([array(py, &shape, &found.speeds)?, array(py, &shape, &found.accelerations)?])
 }
 
 /// λ and whether it is at a bound; the step at the knots (K, m) and of the parameters (p,); their variances; degrees of
@@ -136,15 +132,15 @@ type Solved<'py> = (
     [Out<'py>; 3],
 );
 
-/// Solves the linear problem of measurements. `factors` are the dimension, the accelerations and the curvature term of
-/// each factor, as [`bending`] returns them; `priors` (p, 2) the precision of each parameter and its distance from the
+/// Solves the linear problem of measurements. `factors` are the space, the velocities and the accelerations of each
+/// factor, as [`bending`] returns them; `priors` (p, 2) the precision of each parameter and its distance from the
 /// prior mean. λ that are NaN are chosen, near the guesses that are not NaN.
 #[pyfunction]
 pub fn estimate<'py>(
     py: Python<'py>,
     knots: Array<'py>,
     penalty: &str,
-    factors: Vec<(usize, Array<'py>, Array<'py>)>,
+    factors: Vec<(PyRef<'py, Handle>, Array<'py>, Array<'py>)>,
     priors: Array<'py>,
     terms: Vec<Term<'py>>,
     lams: Array<'py>,
@@ -155,10 +151,12 @@ pub fn estimate<'py>(
     let (criterion, penalty) = (criterion_named(criterion, gamma)?, penalty_named(penalty)?);
     let knots = in_order(&knots)?;
     let priors: Vec<(f64, f64)> = in_order(&priors)?.chunks_exact(2).map(|x| (x[0], x[1])).collect();
-    let m: usize = factors.iter().map(|(dim, ..)| dim).sum();
+    let spaces: Vec<_> = factors.iter().map(|(handle, ..)| handle.space.get()).collect();
+    let m: usize = spaces.iter().map(Origin::dim).sum();
     let own = factors
         .iter()
-        .map(|(dim, a, b)| Ok(Factor { dim: *dim, accelerations: in_order(a)?, curvature: in_order(b)? }))
+        .zip(&spaces)
+        .map(|((_, a, b), space)| Ok(Factor { space, speeds: in_order(a)?, accelerations: in_order(b)? }))
         .collect::<PyResult<Vec<_>>>()?;
     let mut read = Vec::new();
     for (x, residuals, [a, b, c], parameters) in &terms {

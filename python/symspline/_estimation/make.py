@@ -56,7 +56,7 @@ from .measurements import Constant, Measurement, Points
 from .rates import integrate_from
 from .solve import Iteration, Setup, Solution, read_lams
 from .spline import EstimatedSpline, joint
-from .terms import Body, DirectionTerm, PointTerm, RateTerm, Term, bind
+from .terms import Body, DirectionTerm, ForceTerm, PointTerm, RateTerm, Term, bind
 
 _FIT = Options("auto", 1e-12, None)
 # Automatic knots: the first number of them, per degree of freedom, and how often they are chosen.
@@ -423,6 +423,7 @@ def _initial(setup: Setup, part: int, space: Space[Any]) -> Array:
     times = np.concatenate([term.times for term in points]) if points else np.empty(0)
     rates = [term for term in setup.terms if isinstance(term, RateTerm) and term.parts == [part]]
     seen = [term for term in setup.terms if isinstance(term, DirectionTerm) and term.parts == [part]]
+    forces = [term for term in setup.terms if isinstance(term, ForceTerm) and term.parts[0] == part]
     spread = len(np.unique(times)) > 1 and (not rates or np.ptp(times) > 0.8 * (knots[-1] - knots[0]))
     if spread:
         order = np.argsort(times, kind="stable")
@@ -444,7 +445,7 @@ def _initial(setup: Setup, part: int, space: Space[Any]) -> Array:
         if np.isfinite(found).all():
             return np.asarray(found)
     if rates and rates[0].body.is_rotation:
-        return _integrated(knots, space, rates[0], points, seen)
+        return _integrated(knots, space, rates[0], points, seen, forces)
     if seen:
         return _seen(setup, space, seen)
     if len(times):
@@ -456,17 +457,30 @@ def _initial(setup: Setup, part: int, space: Space[Any]) -> Array:
     )
 
 
-def _integrated(knots: Doubles, space: Space[Any], rate: RateTerm, points: list[PointTerm], seen: list[Any]) -> Array:
-    """Return the attitudes that follow from the rates, turned as the points and directions require."""
+def _integrated(
+    knots: Doubles,
+    space: Space[Any],
+    rate: RateTerm,
+    points: list[PointTerm],
+    seen: list[DirectionTerm],
+    forces: list[ForceTerm],
+) -> Array:
+    """Return the attitudes that follow from the rates, turned as the points, directions and forces require.
+
+    On average, the specific force is opposite to gravity.
+    """
     order = np.argsort(rate.times, kind="stable")
     matrices = integrate_from(rate.times[order], rate.omega[order], knots)
     profile = np.zeros((3, 3))
     for term in points:
         own = Body(space).matrices(term.y)
         profile += np.einsum("nij,nkj->ik", own, matrices[_closest(knots, term.times)])
-    for term in seen:
-        near = matrices[_closest(knots, term.times)]
-        profile += np.einsum("nki,njl,nkl->ij", term.reference, near, term.seen)
+    for stars in seen:
+        near = matrices[_closest(knots, stars.times)]
+        profile += np.einsum("nki,njl,nkl->ij", stars.reference, near, stars.seen)
+    for force in forces:
+        near = matrices[_closest(knots, force.times)]
+        profile += np.outer(-force.gravity, np.einsum("nij,nj->i", near, force.f)) / len(force.f)
     return _rotations(space, _nearest(profile) @ matrices)
 
 

@@ -106,7 +106,8 @@ class Points(Measurement):
     t : array_like of float or datetime64, shape (n,)
         Times in any order, possibly repeated.
     y : array_like, shape (n, *point_shape)
-        Points of the space, or of the factor; for a product, a tuple of arrays.
+        Points of the space, or of the factor; for a product, a tuple of arrays. For poses also their positions alone,
+        shape (n, 3), or their rotations, shape (n, 3, 3).
     sigma : float, array_like of shape (n,), or tuple, optional
         Standard deviation of the noise in one coordinate, as a length in the space. For a product or for poses also a
         tuple with one entry per part. By default it is estimated, which requires that there are no other measurements.

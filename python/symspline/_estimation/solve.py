@@ -326,8 +326,8 @@ class Iteration:
         setup = self.setup
         factors, priors, terms = [], [], []
         for space, curve in zip(setup.spaces, self.curves, strict=True):
-            _, accelerations, curvature = bending(curve, setup.penalty)
-            factors.append((space.dim, accelerations, curvature))
+            speeds, accelerations = bending(curve)
+            factors.append((space._handle, speeds, accelerations))
         for name, constant in setup.constants.items():
             off = self.values[name] - np.asarray(constant.start)
             precision = np.zeros(constant.size) if constant.sigma is None else np.asarray(constant.sigma) ** -2.0
@@ -408,11 +408,11 @@ class Iteration:
         return fitted(self.setup, self.points)
 
 
-def bending(curve: CoreCurve, penalty: str) -> list[Doubles]:
-    """Return velocities, accelerations and the curvature term at the knots, in units of their mean distance."""
+def bending(curve: CoreCurve) -> list[Doubles]:
+    """Return velocities and accelerations at the knots in frames along the curve, in units of their mean distance."""
     space = curve.space
     points, velocities = (np.ascontiguousarray(space._as_doubles(x)) for x in (curve.points, curve.velocities))
-    return _core.bending(space._handle, curve.times, points, velocities, penalty)
+    return _core.bending(space._handle, curve.times, points, velocities)
 
 
 def energy(curve: CoreCurve, penalty: str) -> float:
@@ -421,7 +421,7 @@ def energy(curve: CoreCurve, penalty: str) -> float:
     h = np.diff(knots)
     if penalty == "jerk":
         spacing = (knots[-1] - knots[0]) / len(h)
-        accelerations = bending(curve, penalty)[1] / spacing**2
+        accelerations = bending(curve)[1] / spacing**2
         return float(np.sum(np.diff(accelerations, axis=0) ** 2 / h[:, None]))
     root = 0.5 / np.sqrt(3.0)
     x = (knots[:-1, None] + h[:, None] * np.array([0.5 - root, 0.5 + root])).ravel()

@@ -18,6 +18,7 @@ from .._spaces import (
     Euclidean,
     Product,
     Space,
+    SpecialEuclidean,
     SpecialOrthogonal,
     Sphere,
     factors_of,
@@ -487,6 +488,13 @@ def bind(measurement: Measurement, label: str, times: Doubles, space: Space[Any]
         parts = list(range(first, first + counts[number]))
     own = [spaces[part] for part in parts]
     if isinstance(measurement, Points):
+        y: Any = measurement.y
+        if isinstance(chosen, SpecialEuclidean) and not isinstance(y, tuple):
+            # The positions or the rotations of poses.
+            shape = as_array(y, f"{label}.y").shape[1:]
+            for part in parts:
+                if shape == spaces[part].point_shape:
+                    return _points(measurement, label, times, spaces[part], [part])
         return _points(measurement, label, times, chosen, parts)
     if isinstance(measurement, Function):
         return [FunctionTerm(label, measurement, times, parts, chosen)]
