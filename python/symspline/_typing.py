@@ -82,6 +82,7 @@ Numbers = ArrayLike | tuple[ArrayLike | None, ...]
 
 Duplicates = Literal["raise", "first", "mean"]
 Frame = Literal["body", "world"]
+RateInterpolation = Literal["cubic", "linear"]
 RotationOrder = Literal["columns", "rows", "interleaved"]
 TensorOrder = Literal["dipy", "fsl", "mrtrix", "itk"]
 

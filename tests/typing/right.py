@@ -193,6 +193,7 @@ assert_type(ss.poses.twist(motion, x, "world"), NDArray[Any])
 
 turning = ss.CubicSpline(None, np.stack([np.eye(3)] * 2), "so:3")
 assert_type(ss.rotations.angular_velocity(turning, x, "world"), NDArray[Any])
+assert_type(ss.rotations.integrate(t, np.ones((3, 3)), interpolation="linear"), NDArray[Any])
 assert_type(ss.poses.twist(ss.CubicSpline(None, poses.random_point(rng, 3), poses), x, "world"), NDArray[Any])
 ss.tensors.to_vectors(np.eye(3), order="dipy")
 assert_type(ss.shapes.AffineMorph([0, 1], np.zeros((2, 4, 2)), frame="first").t, NDArray[Any])

@@ -53,7 +53,7 @@ from .._validation import one_of
 from ..convert import matrix_to_quaternion
 from ..manifolds._manifold import refuse_functions
 from .measurements import Constant, Measurement, Points
-from .rates import integrate_from
+from .rates import attitudes_at
 from .solve import Iteration, Setup, Solution, read_lams
 from .spline import EstimatedSpline, joint
 from .terms import Body, DirectionTerm, ForceTerm, PointTerm, RateTerm, Term, bind
@@ -470,7 +470,7 @@ def _integrated(
     On average, the specific force is opposite to gravity.
     """
     order = np.argsort(rate.times, kind="stable")
-    matrices = integrate_from(rate.times[order], rate.omega[order], knots)
+    matrices = attitudes_at(rate.times[order], rate.omega[order], knots)
     profile = np.zeros((3, 3))
     for term in points:
         own = Body(space).matrices(term.y)
