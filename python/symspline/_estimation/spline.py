@@ -12,6 +12,7 @@ from .._archive import Entries, entry, read_fitted, read_report
 from .._core import ValidationError
 from .._cubic import CubicSpline
 from .._curves.curve import UncertaintyBand
+from .._curves.ends import end_kinds
 from .._smoothing.factors import grouped, smoothed_spaces
 from .._smoothing.posterior import Parameter, Posterior
 from .._smoothing.report import SmoothingReport
@@ -74,6 +75,14 @@ class EstimatedSpline(SmoothingSpline[P, Any]):
         space = smoothed_spaces(self.space)[next(i for i, own in enumerate(self._smoothed) if own is part)]
         found = self._covariance(part, space, index, np.ascontiguousarray(x), None, [nu])
         return np.asarray(np.sqrt(np.trace(found, axis1=-2, axis2=-1) / space.dim))
+
+    def _coupled(self, parts: list[int], index: tuple[int, ...], x: Doubles, orders: list[int]) -> Doubles:
+        # The measurements may couple the parts, such as attitude and acceleration by an accelerometer.
+        spaces, posterior = smoothed_spaces(self.space), self._posterior(self._smoothed[0])
+        firsts = [self._posterior(self._smoothed[number]).first for number in parts]
+        rows = [first + np.arange(spaces[number].dim) for number, first in zip(parts, firsts, strict=True)]
+        kinds = end_kinds(self._bc_type)
+        return posterior.coupled(self._knots_of(index), index, kinds, x, None, orders, np.concatenate(rows))
 
     @property
     def _made_of(self) -> str:

@@ -261,18 +261,14 @@ class RateTerm(Term):
         return (read if self.bias is None else read + values[self.bias]) - self.omega
 
     def derivatives(self, motion: list[Motion], values: Values) -> tuple[list[dict[int, Doubles]], dict[str, Doubles]]:
-        # With η = Σ ξ_j B_j, and B_j' = −[ω, B_j]/2 in parallel frames, δω = η' + [ω, η] = Σ ξ_j' B_j + ξ_j [ω, B_j]/2.
         (own,) = motion
-        omega = self.body.elements(own.p, own.v)
-        vectors = [self.body.elements(own.p, own.frames[:, j]) for j in range(own.space.dim)]
-        first = np.stack([self.body.of(vector) for vector in vectors], axis=-1)
-        half = [0.5 * self.body.of(self.body.bracket(omega, vector)) for vector in vectors]
+        half, first = self.body.derivatives(own.p, own.v, own.frames)
         part = self.parts[0]
         parameters = {}
         if self.bias is not None:
             size = self.body.size
             parameters[self.bias] = np.broadcast_to(np.eye(size), (len(self.times), size, size))
-        return [{part: np.stack(half, axis=-1)}, {part: first}, {}], parameters
+        return [{part: half}, {part: first}, {}], parameters
 
 
 class DirectionTerm(Term):
@@ -434,6 +430,17 @@ class Body:
     def rates(self, p: Array, v: Array) -> Doubles:
         """Return the components of g⁻¹v."""
         return self.of(self.elements(p, v))
+
+    def derivatives(self, p: Array, v: Array, frames: Array) -> tuple[Doubles, Doubles]:
+        """Return the derivatives of the rates with respect to the coordinates of a move, and their time derivatives.
+
+        With η = Σ ξ_j B_j, and B_j' = −[ω, B_j]/2 in parallel frames, δω = η' + [ω, η] = Σ ξ_j' B_j + ξ_j [ω, B_j]/2.
+        The columns of the second array are the B_j.
+        """
+        omega = self.elements(p, v)
+        vectors = [self.elements(p, frames[:, j]) for j in range(frames.shape[1])]
+        half = [0.5 * self.of(self.bracket(omega, vector)) for vector in vectors]
+        return np.stack(half, axis=-1), np.stack([self.of(vector) for vector in vectors], axis=-1)
 
     def components(self, omega: Any, name: str, n: int) -> Doubles:
         """Return components from the user's angular velocities or matrices."""

@@ -95,16 +95,23 @@ class Posterior(NamedTuple):
         ndarray, shape (n, d, d)
             Covariances, with d = ``len(orders) * space.dim``.
         """
-        found = _core.posterior_covariance(knots, self._known(index, kinds), x, y, orders)
         count, m = len(orders), space.dim
         if self.size == 1 and m > 1:
+            found = self.coupled(knots, index, kinds, x, y, orders, np.arange(1))
             whole = np.zeros((len(x), count, m, count, m))
             each = np.arange(m)
             whole[:, :, each, :, each] = found
             return whole.reshape(len(x), count * m, count * m)
-        own = slice(self.first, self.first + m)
-        square = found.reshape(len(x), count, self.size, count, self.size)[:, :, own, :, own]
-        return np.ascontiguousarray(square.reshape(len(x), count * m, count * m))
+        return self.coupled(knots, index, kinds, x, y, orders, np.arange(self.first, self.first + m))
+
+    def coupled(
+        self, knots: Doubles, index: tuple[int, ...], kinds: Any, x: Doubles, y: Any, orders: list[int], rows: Any
+    ) -> Doubles:
+        """Return the same for some of the coordinates that A couples, given by their numbers `rows`."""
+        found = _core.posterior_covariance(knots, self._known(index, kinds), x, y, orders)
+        count, d = len(orders), len(orders) * len(rows)
+        square = found.reshape(len(x), count, self.size, count, self.size)[:, :, rows][..., rows]
+        return np.ascontiguousarray(square.reshape(len(x), d, d))
 
     def samples(
         self, space: Space, knots: Doubles, index: tuple[int, ...], kinds: Any, rng: np.random.Generator, n: int

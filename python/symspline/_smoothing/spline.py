@@ -392,11 +392,46 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         sigma = np.asarray(part.sigma)[index].item()
         found = self._posterior(part).covariance(space, knots, index, kinds, x, y, orders)
         if part.between and y is None and len(orders) == 1:
-            lam = np.asarray(part.band_lam)[index].item()
-            band = np.ascontiguousarray(part.band[index])
-            own, plain = (_core.smoothing_variance(knots, band, lam, x, orders[0], kinds) for lam in (lam, 0.0))
-            found += (own - plain)[:, None, None] * np.eye(space.dim)
+            found += self._between(part, index, x, orders[0])[:, None, None] * np.eye(space.dim)
         return np.asarray(sigma**2 * found)
+
+    def _between(self, part: Smoothed, index: tuple[int, ...], x: Doubles, nu: int) -> Doubles:
+        """Return the variance of one curve between the knots for noise of variance one."""
+        knots, kinds = self._knots_of(index), end_kinds(self._bc_type)
+        lam = np.asarray(part.band_lam)[index].item()
+        band = np.ascontiguousarray(part.band[index])
+        own, plain = (_core.smoothing_variance(knots, band, lam, x, nu, kinds) for lam in (lam, 0.0))
+        return np.asarray(own - plain)
+
+    def _coupled(self, parts: list[int], index: tuple[int, ...], x: Doubles, orders: list[int]) -> Doubles:
+        """Return the covariance of derivatives in several parts at times x, for the propagation of errors.
+
+        The parts of a smoothing spline are independent. Points and velocities include their variances between the
+        knots, but not the covariance of the two. Accelerations are those of the spline alone, because the acceleration
+        of the random curve between the knots has no finite variance.
+
+        Returns
+        -------
+        ndarray, shape (n, d, d)
+            Covariances, with d = ``len(orders)`` times the sum of the dimensions. The order is the first index, the
+            part the second.
+        """
+        spaces = smoothed_spaces(self.space)
+        ends = np.cumsum([0, *(spaces[number].dim for number in parts)])
+        count, size = len(orders), int(ends[-1])
+        whole = np.zeros((len(x), count, size, count, size))
+        for number, start, end in zip(parts, ends[:-1], ends[1:], strict=True):
+            part, m = self._smoothed[number], int(end - start)
+            found = self._covariance(part, spaces[number], index, x, None, orders)
+            own = found.reshape(len(x), count, m, count, m)
+            if part.between and count > 1:
+                sigma = np.asarray(part.sigma)[index].item()
+                for i, nu in enumerate(orders):
+                    if nu < 2:
+                        added = sigma**2 * self._between(part, index, x, nu)
+                        own[:, i, :, i] += added[:, None, None] * np.eye(m)
+            whole[:, :, start:end, :, start:end] = own
+        return whole.reshape(len(x), count * size, count * size)
 
     def _posterior(self, part: Smoothed) -> Posterior:
         if part.posterior is None:
@@ -453,7 +488,12 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         >>> ss.make_smoothing_spline(None, noisy, "sphere:2", lam=1.0).frames([1.5, 2.0]).shape
         (2, 2, 3)
         """
-        times, shape, per_curve = self._finite_times(x)
+        times, _, per_curve = self._finite_times(x)
+        return self._each([frames for _, frames in self._frames(times, per_curve)])
+
+    def _frames(self, times: Doubles, per_curve: bool) -> list[tuple[Array, Array]]:
+        """Return points and frames along the curve in every part, at times of the core."""
+        shape = times.shape[len(self._batch) :] if per_curve else times.shape
         found = []
         for space, points, p in self._in_parts(times, per_curve):
             out = np.empty((*self._batch, *shape, space.dim, *space.point_shape), space.dtype)
@@ -463,8 +503,8 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
                     space, self._knots_of(index), points[index], at, p[index].reshape(-1, *space.point_shape)
                 )
                 out[index] = rows.reshape(*shape, *rows.shape[1:])
-            found.append(out)
-        return self._each(found)
+            found.append((p, out))
+        return found
 
     def _in_parts(self, times: Doubles, per_curve: bool) -> list[tuple[Space, Array, Array]]:
         """Return every space in which data were smoothed, the points at the knots, and those at times of the core."""
