@@ -19,15 +19,17 @@ array([0.        , 0.        , 1.28700222])
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._arrays import as_array, short_repr
+from ._arrays import as_array, checked_flag, short_repr
 from ._base_curve import check_curve, evaluated
 from ._core import ValidationError
 from ._curves.curve import CurveArrays
+from ._estimation.along import Motion
+from ._estimation.uncertainty import Jacobians, check_uncertain, standard_errors
 from ._pose_files import (
     check_seconds,
     join,
@@ -39,10 +41,11 @@ from ._pose_files import (
     write_kitti,
     write_tum,
 )
-from ._spaces import Array, Euclidean, SpecialEuclidean
+from ._smoothing.factors import smoothed_spaces
+from ._spaces import Array, Euclidean, SpecialEuclidean, SpecialOrthogonal
 from ._typing import Extrapolate, Frame, TimesLike
 from ._validation import one_of
-from .rotations import Spline, attitude, turned
+from .rotations import Spline, attitude, rate_jacobians, turned
 
 __all__ = [
     "Imu",
@@ -60,7 +63,7 @@ __all__ = [
     "write_tum",
 ]
 
-_SE3, _R3 = SpecialEuclidean(3), Euclidean(3)
+_SE3, _SO3, _R3 = SpecialEuclidean(3), SpecialOrthogonal(3), Euclidean(3)
 
 
 class Imu(NamedTuple):
@@ -86,6 +89,7 @@ class Imu(NamedTuple):
     specific_force: Array
 
 
+@overload
 def imu(
     spline: Spline,
     x: TimesLike,
@@ -93,8 +97,32 @@ def imu(
     *,
     extrapolate: Extrapolate = None,
     per_curve: bool = False,
-) -> Imu:
-    """Compute the signals of a gyroscope and an accelerometer at the origin of the body.
+    return_std: Literal[False] = False,
+) -> Imu: ...
+
+
+@overload
+def imu(
+    spline: Spline,
+    x: TimesLike,
+    gravity: ArrayLike = (0.0, 0.0, -9.81),
+    *,
+    extrapolate: Extrapolate = None,
+    per_curve: bool = False,
+    return_std: Literal[True],
+) -> tuple[Imu, Imu]: ...
+
+
+def imu(
+    spline: Spline,
+    x: TimesLike,
+    gravity: ArrayLike = (0.0, 0.0, -9.81),
+    *,
+    extrapolate: Extrapolate = None,
+    per_curve: bool = False,
+    return_std: bool = False,
+) -> Imu | tuple[Imu, Imu]:
+    r"""Compute the signals of a gyroscope and an accelerometer at the origin of the body.
 
     Parameters
     ----------
@@ -109,17 +137,26 @@ def imu(
         Extrapolation policy, as for ``spline(x)``.
     per_curve : bool, default False
         True if every curve of a batch has its own times.
+    return_std : bool, default False
+        True to return standard errors as well. `spline` must then be a `SmoothingSpline`.
 
     Returns
     -------
-    Imu
+    signals : Imu
         Named tuple of two arrays of shape ``(*batch axes, *x.shape, 3)``.
+    std : Imu
+        Standard errors of all components in the same units, only if `return_std` is True.
 
     Raises
     ------
     ValidationError
-        If the curve does not contain exactly one pose, gravity is not three numbers, or the times are nanoseconds since
-        1970 instead of seconds.
+        If the curve does not contain exactly one pose, gravity is not three numbers, the times are nanoseconds since
+        1970 instead of seconds, or standard errors are requested of a curve without a covariance or beyond its knots.
+
+    See Also
+    --------
+    symspline.rotations.angular_velocity : Compute the angular velocity alone.
+    symspline.measure.SpecificForce : Accelerometer readings, from which `symspline.estimate` fits a curve.
 
     Notes
     -----
@@ -127,12 +164,33 @@ def imu(
     both sides of a gap. For poses without noise, pass ``bc_type="not-a-knot"`` if the recording begins or ends in
     motion.
 
+    The specific force is :math:`f = R^T(\ddot x - g)`. If the attitude turns by η in the body frame, and the
+    acceleration changes by :math:`\delta\ddot x`, then f changes by :math:`R^T\delta\ddot x - \eta \times f` to first
+    order. An error of the attitude therefore acts on gravity as well. Standard errors follow from the joint covariance
+    of η and :math:`\delta\ddot x`, which accelerometer readings correlate. They are those of a spline with the knots of
+    the curve. Acceleration that varies faster than the knots is not included.
+
+    On ``se:3`` the standard errors are those of one spline for the attitude and another for the position, as they are
+    estimated. Curves of `SmoothingSpline.sample` on ``se:3`` scatter more, because the position of a screw motion
+    depends on the attitude between the knots. Use ``so:3 x r:3`` for samples.
+
     Examples
     --------
     >>> import numpy as np, symspline as ss
     >>> still = ss.CubicSpline(None, [np.eye(4), np.eye(4)], "se:3")
     >>> imu(still, 0.5).specific_force
     array([0.  , 0.  , 9.81])
+
+    Noisy poses of a body that swings, and the standard errors of its signals:
+
+    >>> rng, t = np.random.default_rng(0), np.linspace(0, 3, 151)
+    >>> angles = np.sin(2 * t)[:, None] * [0, 0, 1] + 0.01 * rng.standard_normal((151, 3))
+    >>> x = np.sin(2 * t)[:, None] * [1, 0, 0] + 0.01 * rng.standard_normal((151, 3))
+    >>> noisy = ss.rotations.from_rotation_vectors(angles), x
+    >>> curve = ss.make_smoothing_spline(t, noisy, "so:3 x r:3", knots=13)
+    >>> signals, std = imu(curve, 1.5, return_std=True)
+    >>> bool(np.all(std.gyro < 0.05)), bool(np.all(std.specific_force < 0.5))
+    (True, True)
     """
     check_curve(spline)
     g = as_array(gravity, "gravity")
@@ -140,7 +198,28 @@ def imu(
         raise ValidationError(f"gravity must be three numbers, a vector in the world, not {short_repr(gravity)}")
     check_seconds(spline.t, "t")
     motion = _Motion(spline, x, "body", extrapolate, per_curve)
-    return Imu(motion.turning, motion.in_frame(motion.position("acceleration") - g))
+    found = Imu(motion.turning, motion.in_frame(motion.position("acceleration") - g))
+    if not checked_flag(return_std, "return_std"):
+        return found
+    own = check_uncertain(spline)
+    spaces = smoothed_spaces(own.space)
+    parts = [spaces.index(_SO3), spaces.index(_R3)]
+    force = found.specific_force.reshape(-1, 3)
+
+    def jacobians(motions: list[Motion]) -> Jacobians:
+        turning, moving = motions
+        moved, changed = (each[parts[0]] for each in rate_jacobians(turning, parts[0], "body"))
+        none = np.zeros_like(moved)
+        tilted = np.cross(force[:, None], np.swapaxes(changed, -1, -2))
+        accelerated = np.swapaxes(moving.frames @ turning.p, -1, -2)
+        return [
+            {parts[0]: np.concatenate([moved, np.swapaxes(tilted, -1, -2)], axis=1)},
+            {parts[0]: np.concatenate([changed, none], axis=1)},
+            {parts[1]: np.concatenate([np.zeros_like(accelerated), accelerated], axis=1)},
+        ]
+
+    std = standard_errors(own, x, parts, jacobians, own._where(extrapolate), per_curve)
+    return found, Imu(std[..., :3], std[..., 3:])
 
 
 def twist(

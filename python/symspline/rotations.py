@@ -16,21 +16,25 @@ array([0., 0., 1.])
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, overload
 from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._arrays import refuse, short_repr
+from ._arrays import checked_flag, refuse, short_repr
 from ._base_curve import check_curve, evaluated
 from ._core import ValidationError
 from ._cubic import CubicSpline
 from ._curves.curve import CurveArrays
 from ._curves.fit import curve_of
 from ._errors import warn
+from ._estimation.along import Motion
 from ._estimation.rates import integrated
+from ._estimation.terms import Body
+from ._estimation.uncertainty import Jacobians, check_uncertain, standard_errors
 from ._hermite import HermiteSpline
+from ._smoothing.factors import smoothed_spaces
 from ._spaces import Array, Doubles, SpecialEuclidean, SpecialOrthogonal, Sphere
 from ._time import knots_of
 from ._typing import Extrapolate, Frame, RateInterpolation, RotationOrder, TimesLike
@@ -121,10 +125,40 @@ def rotation(spline: Spline, x: TimesLike, *, extrapolate: Extrapolate = None, p
     return found
 
 
+@overload
 def angular_velocity(
-    spline: Spline, x: TimesLike, frame: Frame = "body", *, extrapolate: Extrapolate = None, per_curve: bool = False
-) -> Array:
-    """Compute the angular velocity of a curve.
+    spline: Spline,
+    x: TimesLike,
+    frame: Frame = "body",
+    *,
+    extrapolate: Extrapolate = None,
+    per_curve: bool = False,
+    return_std: Literal[False] = False,
+) -> Array: ...
+
+
+@overload
+def angular_velocity(
+    spline: Spline,
+    x: TimesLike,
+    frame: Frame = "body",
+    *,
+    extrapolate: Extrapolate = None,
+    per_curve: bool = False,
+    return_std: Literal[True],
+) -> tuple[Array, Array]: ...
+
+
+def angular_velocity(
+    spline: Spline,
+    x: TimesLike,
+    frame: Frame = "body",
+    *,
+    extrapolate: Extrapolate = None,
+    per_curve: bool = False,
+    return_std: bool = False,
+) -> Array | tuple[Array, Array]:
+    r"""Compute the angular velocity of a curve.
 
     Parameters
     ----------
@@ -139,20 +173,36 @@ def angular_velocity(
         Extrapolation policy, as for ``spline(x)``.
     per_curve : bool, default False
         True if every curve of a batch has its own times.
+    return_std : bool, default False
+        True to return standard errors as well. `spline` must then be a `SmoothingSpline`.
 
     Returns
     -------
-    ndarray, shape ``(*batch axes, *x.shape, 3)``
+    omega : ndarray, shape ``(*batch axes, *x.shape, 3)``
         Radians per unit of time (per second for dates).
+    std : ndarray, shape ``(*batch axes, *x.shape, 3)``
+        Standard error of each component in the same unit, only if `return_std` is True.
 
     Raises
     ------
     ValidationError
-        If the curve does not contain exactly one rotation, or `frame` is invalid.
+        If the curve does not contain exactly one rotation, `frame` is invalid, or standard errors are requested of a
+        curve without a covariance or beyond its knots.
+
+    See Also
+    --------
+    integrate : Compute rotations from angular velocities.
+    symspline.SmoothingSpline.cov : Compute the covariance of a curve.
 
     Notes
     -----
-    The angular velocity ω in the body frame satisfies :math:`R' = R \\hat\\omega`.
+    The angular velocity ω in the body frame satisfies :math:`R' = R \hat\omega`. If the curve moves by ξ in parallel
+    frames along it, whose vectors are the columns of Q in the body frame, then to first order
+
+    .. math:: \delta\omega = Q\xi' + \tfrac12\, \omega \times Q\xi, \qquad
+        \delta(R\omega) = R\,(Q\xi' - \tfrac12\, \omega \times Q\xi).
+
+    Standard errors follow from the covariance of ξ and ξ'.
 
     Examples
     --------
@@ -160,8 +210,35 @@ def angular_velocity(
     >>> turning = from_rotation_vectors([[0, 0, 0], [0, 0, 1], [0, 0, 2.0]])
     >>> angular_velocity(ss.CubicSpline([0, 0.5, 1], turning, "so:3"), 0.3).round(12) + 0.0
     array([0., 0., 2.])
+
+    Noisy attitudes of a body that swings about its axis, and the standard error of its rate:
+
+    >>> import numpy as np
+    >>> rng, t = np.random.default_rng(0), np.linspace(0, 3, 151)
+    >>> seen = from_rotation_vectors(np.sin(2 * t)[:, None] * [0, 0, 1] + 0.01 * rng.standard_normal((151, 3)))
+    >>> omega, std = angular_velocity(ss.make_smoothing_spline(t, seen, "so:3"), 1.5, return_std=True)
+    >>> bool(np.all(np.abs(omega - [0, 0, 2 * np.cos(3)]) < 3 * std)), bool(np.all(std < 0.05))
+    (True, True)
     """
-    return _rate(spline, x, "velocity", frame, extrapolate, per_curve)
+    omega = _rate(spline, x, "velocity", frame, extrapolate, per_curve)
+    if not checked_flag(return_std, "return_std"):
+        return omega
+    own = check_uncertain(spline)
+    part = smoothed_spaces(own.space).index(_SO3)
+
+    def jacobians(motions: list[Motion]) -> Jacobians:
+        return rate_jacobians(motions[0], part, frame)
+
+    return omega, standard_errors(own, x, [part], jacobians, own._where(extrapolate), per_curve)
+
+
+def rate_jacobians(motion: Motion, part: int, frame: str) -> Jacobians:
+    """Return the derivatives of the angular velocity with respect to the move of a curve and its velocity."""
+    moved, changed = Body(_SO3).derivatives(motion.p, motion.v, motion.frames)
+    if frame == "world":
+        # The rotation of the frame by η turns Rω by R(η × ω), which reverses the sign of the half.
+        moved, changed = (motion.p @ own for own in (-moved, changed))
+    return [{part: moved}, {part: changed}]
 
 
 def angular_acceleration(
@@ -459,6 +536,7 @@ def integrate(
     --------
     A quarter turn about the vertical axis, at an increasing rate:
 
+    >>> import numpy as np
     >>> t = np.linspace(0, 1, 11)
     >>> omega = np.pi * t[:, None] * [0, 0, 1]
     >>> as_rotation_vectors(integrate(t, omega))[-1].round(8) + 0.0
