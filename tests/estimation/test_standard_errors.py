@@ -3,7 +3,7 @@
 import io
 import warnings
 
-import motions
+import sensors
 import numpy as np
 import pytest
 from refused import raises
@@ -12,7 +12,7 @@ import symspline as ss
 from symspline import geo, measure, poses, rotations
 from symspline._estimation.along import Motion
 
-SO3, S2, R3 = motions.SO3, ss.Sphere(2), ss.Euclidean(3)
+SO3, S2, R3 = sensors.SO3, ss.Sphere(2), ss.Euclidean(3)
 GRAVITY = np.array([0, 0, -9.81])
 
 
@@ -29,7 +29,7 @@ def agree(many, std, each=0.1, mean=0.03):
 
 
 def attitudes(rng, noise=0.02):
-    truth, t = motions.turning(10, rng, 1.0), uneven(rng, 10, 200)
+    truth, t = sensors.turning(10, rng, 1.0), uneven(rng, 10, 200)
     return truth, t, SO3.exp(truth(t), noise * SO3.random_tangent(rng, truth(t)))
 
 
@@ -50,7 +50,7 @@ def track(rng, latitude, n=150):
 
 def moving(space, rng, n=6):
     """A motion at n times with random velocities, accelerations and frames."""
-    p = motions.walk(space, rng, n)
+    p = sensors.walk(space, rng, n)
     frames = space.frame(p)
     return Motion(space, 0, p, 2 * space.random_tangent(rng, p), 3 * space.random_tangent(rng, p), frames)
 
@@ -142,7 +142,7 @@ def test_angular_velocity(kind, frame):
 
 def fused(rng, space, force=True):
     truth, t, seen = attitudes(rng)
-    path = motions.moving(10, rng)
+    path = sensors.moving(10, rng)
     y = path(t) + 0.1 * rng.standard_normal((len(t), 3))
     if not force:
         data = {"se:3": poses.join(seen, y), "so:3 x r:3": (seen, y), "r:3 x sphere:2 x so:3": (y, seen[..., 0], seen)}
@@ -187,7 +187,7 @@ def test_accelerometers_correlate_attitude_and_acceleration():
     x = np.linspace(1, 9, 30)
     _, std = poses.imu(spline, x, return_std=True)
     tilt = np.sqrt(np.trace(spline.cov(x)[0], axis1=-2, axis2=-1) / 3)
-    assert motions.rms(std.specific_force) < 0.5 * 9.81 * motions.rms(tilt)
+    assert sensors.rms(std.specific_force) < 0.5 * 9.81 * sensors.rms(tilt)
 
 
 # ---- use ----

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from .._arrays import as_array, checked_number, short_repr, whole_number
 from .._core import ValidationError
+from .._cubic import CubicSpline
 from .._curve import Curve
 from .._curves.fit import FitProblem, fit, read_ends
 from .._curves.fit import Points as CorePoints
@@ -58,6 +59,7 @@ from .solve import Iteration, Setup, Solution, read_lams
 from .spline import EstimatedSpline, joint
 from .terms import Body, DirectionTerm, ForceTerm, PointTerm, RateTerm, Term, bind
 
+_R3 = Euclidean(3)
 _FIT = Options("auto", 1e-12, None)
 # Automatic knots: the first number of them, per degree of freedom, and how often they are chosen.
 _FIRST, _PER_FREEDOM, _TRIES = 60, 4, 4
@@ -413,10 +415,14 @@ def _start(setup: Setup, space: Space[Any], axis: TimeAxis, shown: Array, start:
         points = extended(shown, extrapolate="geodesic")
         each = points if isinstance(space, Product) else (points,)
         return [part for factor, own in zip(factors_of(space), each, strict=True) for part in split(factor, own)]
-    return [_initial(setup, part, own) for part, own in enumerate(setup.spaces)]
+    # Attitudes are aligned with the accelerations of the positions.
+    found: dict[int, Array] = {}
+    for part in sorted(range(len(setup.spaces)), key=lambda part: not isinstance(setup.spaces[part], Euclidean)):
+        found[part] = _initial(setup, part, setup.spaces[part], found)
+    return [found[part] for part in range(len(setup.spaces))]
 
 
-def _initial(setup: Setup, part: int, space: Space[Any]) -> Array:
+def _initial(setup: Setup, part: int, space: Space[Any], found: dict[int, Array]) -> Array:
     """Return initial points of one part: smoothed points, integrated rates, or the attitudes of seen directions."""
     knots = setup.knots
     points = [term for term in setup.terms if isinstance(term, PointTerm) and term.parts == [part]]
@@ -441,11 +447,12 @@ def _initial(setup: Setup, part: int, space: Space[Any]) -> Array:
                 on_failure="ignore",
                 loss="linear" if all(loss == "linear" for loss in setup.losses) else "cauchy",
             )
-        found = curve(knots, extrapolate="geodesic")
-        if np.isfinite(found).all():
-            return np.asarray(found)
+        smooth = curve(knots, extrapolate="geodesic")
+        if np.isfinite(smooth).all():
+            return np.asarray(smooth)
     if rates and rates[0].body.is_rotation:
-        return _integrated(knots, space, rates[0], points, seen, forces)
+        sensed = [(force, found[force.parts[1]]) for force in forces]
+        return _integrated(knots, space, rates[0], points, seen, sensed)
     if seen:
         return _seen(setup, space, seen)
     if len(times):
@@ -463,12 +470,9 @@ def _integrated(
     rate: RateTerm,
     points: list[PointTerm],
     seen: list[DirectionTerm],
-    forces: list[ForceTerm],
+    forces: list[tuple[ForceTerm, Array]],
 ) -> Array:
-    """Return the attitudes that follow from the rates, turned as the points, directions and forces require.
-
-    On average, the specific force is opposite to gravity.
-    """
+    """Return the attitudes that follow from the rates, turned as the points, directions and forces require."""
     order = np.argsort(rate.times, kind="stable")
     matrices = attitudes_at(rate.times[order], rate.omega[order], knots)
     profile = np.zeros((3, 3))
@@ -478,9 +482,10 @@ def _integrated(
     for stars in seen:
         near = matrices[_closest(knots, stars.times)]
         profile += np.einsum("nki,njl,nkl->ij", stars.reference, near, stars.seen)
-    for force in forces:
+    for force, positions in forces:
         near = matrices[_closest(knots, force.times)]
-        profile += np.outer(-force.gravity, np.einsum("nij,nj->i", near, force.f)) / len(force.f)
+        acceleration = CubicSpline(knots, positions, _R3)(force.times, 2)
+        profile += np.einsum("ni,njl,nl->ij", acceleration - force.gravity, near, force.f)
     return _rotations(space, _nearest(profile) @ matrices)
 
 

@@ -82,7 +82,8 @@ class Stiefel(Manifold):
             point_shape=(self._n, self._k),
             dim=k * n - k * (k + 1) // 2,
         )
-        self.operations = self._handle = _Compiled(self)
+        self.operations: _Compiled = _Compiled(self)
+        self._handle = self.operations
 
     def _key(self) -> tuple[Any, ...]:
         return self._parameters
@@ -121,7 +122,7 @@ class _Compiled(Operations):
 
     def __init__(self, space: Stiefel) -> None:
         super().__init__(space)
-        self.differentiates = space._parameters == (2, 4)
+        self.differentiates: bool = space._parameters == (2, 4)
 
     def _applied(self, name: str, function: Callable[..., Any], inputs: tuple[Array, ...]) -> Array:
         # Decompositions of NumPy refuse numbers that are not finite.
