@@ -21,12 +21,24 @@ entry per row, which may be complex, or vectors or matrices; an array `points` m
 Curves pass through the points. --smooth is for noisy points: the curve passes near them, as smooth as the data
 suggest, and symspline sample also writes its standard deviation.
 
+With --smooth, the table may have angular velocities (--rates) and velocities (--velocities) next to the points, and one
+curve is fitted to all of them. Give the standard deviation of each, and use --penalty jerk for vehicles and other
+motions with smooth accelerations. Rows can be in any order, and a row may have some of
+the measurements only: the columns of the others are empty or NaN. --rates are in the frame of the body, in radians per
+unit of time (per second for dates). With --rate-bias, the constant error of a gyroscope is estimated, too. --velocities
+are those of positions, in the fixed frame; on other spaces they are tangent vectors at the point in their row, and with
+--lonlat the velocities to the east and to the north in degrees of arc.
+
 examples:
   symspline fit track.csv --lonlat -o track.npz
   symspline fit storms.csv --lonlat --time date --curve storm -o storms.npz
   symspline fit attitude.parquet --space so:3 --columns w,x,y,z --bc-type not-a-knot -o attitude.npz
   symspline fit states.csv --space cp:1 --columns up,down -o states.npz
   symspline fit gps.csv --lonlat --smooth -o gps.npz
+  symspline fit imu.csv --smooth --space so:3 --columns qw,qx,qy,qz --sigma 0.05 --rates wx,wy,wz --rate-sigma 0.02
+      --rate-bias --penalty jerk -o attitude.npz
+  symspline fit car.csv --smooth --space r:2 --columns x,y --sigma 3 --velocities vx,vy --velocity-sigma 0.1
+      --penalty jerk -o car.npz
 
 symspline.load reads the curve in Python; with --curve or --max-gap, it returns a dictionary of all curves by name.
 """
@@ -56,6 +68,7 @@ from ._curves import ENDING, Curves, write_curves
 from ._messages import Problem, Progress, check_target, refuse, say
 from ._points import GLOBE, Columns, points_of, require_globe
 from ._recordings import Recordings
+from ._sensors import Fusion, sensors_of, spread, summary
 from ._tables import check_ending, open_table
 from ._times import is_number, number
 
@@ -97,8 +110,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="?",
         const=_BEST,
         metavar="HOW",
-        help="smooth the points; write it after IN. HOW is gcv (default; with --sigma Mallows' C_p), reml, or a number "
-        "λ >= 0, in a product perhaps one per factor with commas",
+        help="smooth the points; write it after IN. HOW is gcv (default; with --sigma but no rates Mallows' C_p), reml, "
+        "or a number λ >= 0, in a product perhaps one per factor with commas",
     )
     add(
         "--sigma",
@@ -107,6 +120,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "degrees with --lonlat; in a product perhaps one per factor with commas",
     )
     add("--robust", action="store_true", help="reduce the influence of outliers (loss 'cauchy')")
+    add("--penalty", choices=("acceleration", "jerk"), help="derivative that is kept small (default: acceleration)")
+    add = parser.add_argument_group("rates and velocities, with --smooth").add_argument
+    add("--rates", metavar="A,B,C", help="columns of angular velocities in the frame of the body, for so:3, sphere:3, "
+        "se:3 and products with one of them")  # fmt: skip
+    add("--rate-sigma", metavar="S", help="standard deviation of one of these numbers")
+    add("--rate-bias", action="store_true", help="estimate a constant that is added to the rates")
+    add("--velocities", metavar="A,B,...", help="columns of velocities; see above")
+    add("--velocity-sigma", metavar="S", help="standard deviation of one of these numbers, with --lonlat in degrees")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -116,16 +137,25 @@ def run(options: argparse.Namespace) -> int:
     smooth = _smoothing_options(options)
     space = _space(options.space, options.lonlat)
     table = open_table(options.input)
+    sensors = sensors_of(table, options, space, smooth and smooth["sigma"], _numbers)
+    extra = sensors.names if sensors else []
     curve = table.require(options.curve) if options.curve is not None else None
     given = split_names(options.columns)
-    time = time_column(table, options.time, [curve, *given])
-    entries, order = point_entries(table, given, [time, curve], space, options.lonlat, options.quaternion)
+    time = time_column(table, options.time, [curve, *given, *extra])
+    entries, order = point_entries(table, given, [time, curve, *extra], space, options.lonlat, options.quaternion)
     used = [column for entry in entries for column in entry.columns]
-    rows = table.read(used, time, curve)
+    rows = table.read([*used, *extra], time, curve, [*used, *extra] if sensors else [])
     check_days(table, time, rows)
-    numbers = rows.numbers if options.lonlat or order else completed(rows.numbers, entries, space)
     names = [entry.name for entry in entries]
     columns = Columns(names, time or "time", curve or "curve", options.lonlat, rows.utc, order)
+    if sensors and smooth:
+        fusion = Fusion(table, rows, entries, columns, space, sensors)
+        named = curve is not None
+        curves = fusion.fitted(named, _estimation_options(options, smooth))
+        write_curves(options.output, Curves(dict(zip(fusion.groups, curves, strict=True)), named, columns))
+        print(summary(options.output, curves, fusion, named))
+        return 0
+    numbers = rows.numbers if options.lonlat or order else completed(rows.numbers, entries, space)
     points = points_of(space, numbers, columns, table.path, rows.place)
     hint = partial(column_of_names, table, time, [time, *used]) if curve is None else lambda: None
     data = Recordings(table.path, rows, points, space, options, hint)
@@ -185,9 +215,11 @@ def _smoothing_options(options: argparse.Namespace) -> dict[str, Any] | None:
     """
     how = options.smooth
     if how is None:
-        option = "--sigma" if options.sigma is not None else "--robust" if options.robust else None
-        refuse(option, (option, " is for noisy data; give --smooth, too"))
+        names = ("sigma", "robust", "penalty", "rates", "rate_sigma", "rate_bias", "velocities", "velocity_sigma")
+        option = next((name for name in names if getattr(options, name) not in (None, False)), None)
+        refuse(f"--{option}".replace("_", "-"), (option, " is for noisy data; give --smooth, too"))
         return None
+    rates = options.rate_sigma is not None or options.rate_bias
     through = "is for curves through the points; omit it with --smooth"
     bad = [cell for cell in how.split(",") if not is_number(cell)] if how not in (_BEST, *_CRITERIA) else []
     choices = f"give {', '.join(_CRITERIA)} or a number; write the name of the table before --smooth"
@@ -198,6 +230,11 @@ def _smoothing_options(options: argparse.Namespace) -> dict[str, Any] | None:
         (options.method != "auto", f"--method {through}"),
         (options.dedup == "mean", "with --smooth all points of one time count; omit --dedup mean"),
         (bad, f"--smooth {how}: {choices}"),
+        (rates and options.rates is None, "there are no --rates, to which --rate-sigma and --rate-bias belong"),
+        (
+            options.velocity_sigma is not None and options.velocities is None,
+            "there are no --velocities, to which --velocity-sigma belongs",
+        ),
     )
     lam = None if how in (_BEST, *_CRITERIA) else _numbers(how, "--smooth")
     sigma = None if options.sigma is None else _numbers(options.sigma, "--sigma")
@@ -207,7 +244,15 @@ def _smoothing_options(options: argparse.Namespace) -> dict[str, Any] | None:
         sigma = math.radians(sigma)
     criterion = how if how in _CRITERIA else "cp" if how == _BEST and sigma is not None else "gcv"
     loss = "cauchy" if options.robust else "linear"
-    return {"criterion": criterion, "lam": lam, "sigma": sigma, "loss": loss}
+    penalty = options.penalty or "acceleration"
+    return {"criterion": criterion, "lam": lam, "sigma": sigma, "loss": loss, "penalty": penalty}
+
+
+def _estimation_options(options: argparse.Namespace, smooth: dict[str, Any]) -> dict[str, Any]:
+    """Return the options of `symspline.estimate`."""
+    kept = {name: smooth[name] for name in ("lam", "loss", "penalty")}
+    criterion = options.smooth if options.smooth in _CRITERIA else "gcv"
+    return {**kept, "criterion": criterion, "extrapolate": _EXTRAPOLATE.get(options.extrapolate)}
 
 
 def _numbers(text: str, option: str) -> Any:
@@ -274,14 +319,9 @@ def _smoothing_summary(splines: Sequence[SmoothingSpline], lonlat: bool) -> str:
         through = "the curve passes" if len(own) == 1 else f"{rough} curves pass"
         no_noise = f" (no noise was found: {through} through the points; give --sigma or a λ)"
         parts.append(
-            f"{f'{space}: ' if len(spaces) > 1 else ''}λ {_range([report.lam for report in own])}"
-            f"{at_bound if bound else ''}, {_range([report.df for report in own])} degrees of freedom, noise "
-            f"{_range([np.degrees(report.sigma) if lonlat else report.sigma for report in own])}"
+            f"{f'{space}: ' if len(spaces) > 1 else ''}λ {spread([report.lam for report in own])}"
+            f"{at_bound if bound else ''}, {spread([report.df for report in own])} degrees of freedom, noise "
+            f"{spread([np.degrees(report.sigma) if lonlat else report.sigma for report in own])}"
             f"{'°' if lonlat else ''}{no_noise if rough else ''}"
         )
     return "; ".join(parts)
-
-
-def _range(values: Sequence[float]) -> str:
-    least, most = f"{min(values):.3g}", f"{max(values):.3g}"
-    return least if least == most else f"{least} to {most}"

@@ -84,6 +84,10 @@ class Table:
     def __init__(self, path: Path) -> None:
         """Read the names of the columns."""
         self.path, self.groups, self.is_utc, self.columns = path, {}, {}, {}
+        self._sparse: frozenset[str] = frozenset()
+
+    def allow_missing(self) -> None:
+        """Find columns of numbers whose first cells are empty, too."""
 
     def load(self, numbers: Sequence[str], texts: Sequence[str], progress: Progress) -> None:
         """Read columns of numbers and columns of text, if the file was not read as a whole."""
@@ -115,8 +119,12 @@ class Table:
         """Return the columns of the points if none are named: all numeric columns but the others."""
         return self.groups.get("points") or [name for name in self.numeric if name not in others]
 
-    def read(self, numbers: Sequence[str], time: str | None, label: str | None) -> Rows:
-        """Read some columns as numbers, one as times and one as labels."""
+    def read(self, numbers: Sequence[str], time: str | None, label: str | None, sparse: Sequence[str] = ()) -> Rows:
+        """Read some columns as numbers, one as times and one as labels.
+
+        Cells of the columns `sparse` may be empty or NaN; they are NaN in the result.
+        """
+        self._sparse = frozenset(sparse)
         with Progress("reading") as progress:
             self.load(numbers, [name for name in (time, label) if name is not None], progress)
         columns = [self._numbers(name) for name in numbers]
@@ -134,7 +142,7 @@ class Table:
         if array.dtype.kind not in "biuf":
             raise Problem(f"{self.path}: column {name!r} holds {array.dtype}, not numbers")
         values = array.astype(np.float64)
-        bad = np.flatnonzero(~np.isfinite(values))
+        bad = np.flatnonzero(np.isinf(values) if name in self._sparse else ~np.isfinite(values))
         if bad.size:
             raise self._problem(name, int(bad[0]), f"holds {values[bad[0]]}, which is not a finite number")
         return values
@@ -195,8 +203,12 @@ class _Csv(Table):
             (not rows, " has no rows below the names of its columns"),
         )
         self.numeric = [name for name, cell in zip(names, rows[0], strict=False) if name and is_number(cell)]
-        columns = zip(names, zip_longest(*rows, fillvalue=""), strict=False)
-        self.dates = [name for name, cells in columns if _holds_dates(cells)]
+        self._first = list(zip(names, zip_longest(*rows, fillvalue=""), strict=False))
+        self.dates = [name for name, cells in self._first if _holds_dates(cells)]
+
+    def allow_missing(self) -> None:
+        first = {name: next(filter(str.strip, cells), "") for name, cells in self._first}
+        self.numeric = [name for name, cell in first.items() if name and is_number(cell)]
 
     def load(self, numbers: Sequence[str], texts: Sequence[str], progress: Progress) -> None:
         index = {name: i for i, name in enumerate(self.names)}
@@ -225,6 +237,8 @@ class _Csv(Table):
         return f"line {self._lines[row]}"
 
     def _converted(self, cells: Sequence[str], name: str, start: int) -> Array:
+        if name in self._sparse:
+            cells = [cell if cell.strip() else "nan" for cell in cells]
         try:
             return numbers(cells)
         except ValueError:
@@ -310,9 +324,10 @@ class _Parquet(Table):
         pa, _ = _pyarrow()
         for name in (*numbers, *texts):
             cells = self._table.column(name)
-            if cells.null_count:
+            if cells.null_count and name not in self._sparse:
                 raise self._problem(name, int(cells.is_null().to_numpy().argmax()), "is empty")
-            cells = cells.cast(pa.float64()) if pa.types.is_decimal(cells.type) else cells
+            if pa.types.is_decimal(cells.type) or cells.null_count:
+                cells = cells.cast(pa.float64())
             self.columns[name] = np.asarray(cells.to_numpy())
 
 
