@@ -17,7 +17,7 @@ from . import _archive
 from ._arrays import as_array, checked_flag, in_single, is_single, read_only, short_repr
 from ._core import ValidationError
 from ._curve import Curve
-from ._curves.curve import CurveArrays, UncertaintyBand
+from ._curves.curve import CurveArrays, SidePanel, UncertaintyBand
 from ._input import times_of
 from ._options import EvaluationOptions, check_progress, checked_extrapolate, extrapolation_mode, quantity_of
 from ._spaces import Array, Doubles, Product, Space, parts_of
@@ -53,6 +53,10 @@ class SegmentedCurve(Curve[P]):
         Curves that pass through their points have none and return None.
         """
         return None
+
+    def _panels_below(self, x: Doubles) -> list[SidePanel]:
+        """Return the bands at times x of the core, and the residuals of measurements that are not points, for plots."""
+        return []
 
     @property
     @abstractmethod
@@ -474,8 +478,10 @@ class SegmentedCurve(Curve[P]):
         Notes
         -----
         A smoothing spline is drawn with its data and, where possible, with 95 % bands of the curve and the speed;
-        bands of a batch are drawn for a few curves only. The function uses neither pyplot nor any global setting of
-        Matplotlib.
+        bands of a batch are drawn for a few curves only. A curve of `estimate` is drawn with all points among its
+        measurements. It has a panel with the residuals of every other measurement in standard deviations, and one with
+        the radius of the 95 % band if the first panel does not show the band. The function uses neither pyplot nor any
+        global setting of Matplotlib.
 
         Examples
         --------

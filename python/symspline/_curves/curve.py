@@ -346,29 +346,65 @@ CurveArrays = CoreCurve | ProductCurve
 """Curves of a batch in any space: knots, points and velocities."""
 
 
+_NO_TIMES: Doubles = np.empty(0)
+
+
 class UncertaintyBand(NamedTuple):
     """Noisy data near one curve, and the credible band of the curve.
 
     Attributes
     ----------
-    x : ndarray
-        Times of the data as numbers of the core.
+    x : list of ndarray
+        Times of the data in each factor, as numbers of the core.
     points : list of ndarray
         The data in each factor.
     radii : list of ndarray
         Radii of the 95 % band around the curve at the requested times, in each factor.
     speed : ndarray or None
         Standard deviation of the velocity in one direction; None in a product.
+    others : ndarray
+        Times of data that are not points.
     """
 
-    x: Doubles
+    x: list[Doubles]
     points: list[Array]
     radii: list[Doubles]
     speed: Doubles | None
+    others: Doubles = _NO_TIMES
+
+    @property
+    def times(self) -> Doubles:
+        """Sorted times of all data."""
+        return np.unique(np.concatenate([*self.x, self.others]))
 
     def part(self, number: int) -> Self:
         """Return the data and the band in one factor of a product."""
-        return self._replace(points=[self.points[number]], radii=[self.radii[number]], speed=None)
+        kept = {"x": [self.x[number]], "points": [self.points[number]], "radii": [self.radii[number]]}
+        return self._replace(**kept, speed=None, others=_NO_TIMES)
+
+
+class SidePanel(NamedTuple):
+    """Numbers of one curve against time, which a plot shows in a panel of their own.
+
+    Attributes
+    ----------
+    label : str
+        Label of the vertical axis.
+    x : ndarray, shape (n,)
+        Times as numbers of the core.
+    values : ndarray, shape (n, k)
+        Residuals in standard deviations, or radii of the 95 % band.
+    names : tuple of str
+        Names of the components; empty if they have none.
+    factor : int or None
+        Factor of the space in which a band has these radii; None for residuals.
+    """
+
+    label: str
+    x: Doubles
+    values: Doubles
+    names: tuple[str, ...] = ()
+    factor: int | None = None
 
 
 def share(progress: Progress | None, i: int, count: int) -> Progress | None:

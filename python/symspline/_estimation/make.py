@@ -565,7 +565,7 @@ def _curve(
         smoothed,
         parameters,
         tuple(given),
-        tuple(found.residuals),
+        tuple(_residuals_of(setup, found, f"measurements[{i}]") for i in range(len(given))),
     )
     if found.failure:
         raise_or_warn([Fault(0, UNCONVERGED, found.failure)], on_failure, curve)
@@ -579,3 +579,9 @@ def _curve(
             SmoothingWarning,
         )
     return curve
+
+
+def _residuals_of(setup: Setup, found: Solution, label: str) -> Doubles | tuple[Doubles, ...]:
+    """Return the residuals of one measurement, which has one term per part of the space."""
+    own = [rows for term, rows in zip(setup.terms, found.residuals, strict=True) if term.label == label]
+    return own[0] if len(own) == 1 else tuple(own)

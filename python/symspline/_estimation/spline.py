@@ -11,16 +11,16 @@ import numpy as np
 from .._archive import Entries, entry, read_fitted, read_report
 from .._core import ValidationError
 from .._cubic import CubicSpline
-from .._curves.curve import UncertaintyBand
+from .._curves.curve import SidePanel, UncertaintyBand
 from .._curves.ends import end_kinds
-from .._smoothing.factors import grouped, smoothed_spaces
+from .._smoothing.factors import grouped, is_several, smoothed_spaces
 from .._smoothing.posterior import Parameter, Posterior
 from .._smoothing.report import SmoothingReport
 from .._smoothing.solve import Smoothed
 from .._smoothing.spline import SmoothingSpline, radius
-from .._spaces import Doubles
+from .._spaces import Array, Doubles, Product, Space, SpecialOrthogonal, factors_of, parts_of
 from .._typing import P
-from .measurements import Points
+from .measurements import BodyRates, Measurement, Points, SpecificForce
 
 
 def joint(report: SmoothingReport, band: Doubles, side: Doubles, corner: Doubles, size: int, first: int) -> Smoothed:
@@ -32,6 +32,23 @@ def joint(report: SmoothingReport, band: Doubles, side: Doubles, corner: Doubles
     return Smoothed(report, np.zeros((0, 4)), report.lam, 1.0, False, posterior)
 
 
+# Rotations, whose distances are angles.
+_TURNING = (SpecialOrthogonal(2), SpecialOrthogonal(3))
+
+
+def _each(value: Any) -> tuple[Any, ...]:
+    return value if isinstance(value, tuple) else (value,)
+
+
+def _are_used(weights: Any, count: int) -> Any:
+    """Return which of some points have a weight, or an information matrix, that is not zero."""
+    used = np.ones(count, bool)
+    for own in _each(weights):
+        if own is not None:
+            used &= np.asarray(own).reshape(count, -1).any(axis=-1)
+    return used
+
+
 class EstimatedSpline(SmoothingSpline[P, Any]):
     """A C² cubic spline estimated from measurements of any kind; see `estimate`."""
 
@@ -39,7 +56,7 @@ class EstimatedSpline(SmoothingSpline[P, Any]):
     _format = "symspline-estimate"
     _parameters: dict[str, Parameter]
     _measurements: tuple[Any, ...]
-    _residuals: tuple[Doubles, ...]
+    _residuals: tuple[Doubles | tuple[Doubles, ...], ...]
 
     def _fill(self, *parts: Any) -> None:
         *own, self._parameters, self._measurements, self._residuals = parts
@@ -59,7 +76,8 @@ class EstimatedSpline(SmoothingSpline[P, Any]):
     def residuals(self) -> Any:
         """Residuals of each measurement in standard deviations, shape (n, components).
 
-        On products and for poses, points have one array per part.
+        On products and for poses, points and velocities have a tuple with one array per part. Points of weight zero are
+        omitted.
         """
         return self._residuals
 
@@ -86,12 +104,67 @@ class EstimatedSpline(SmoothingSpline[P, Any]):
 
     @property
     def _made_of(self) -> str:
-        return f"estimated, {self._times.shape[-1]} knots, {len(self._parameters)} parameters"
+        counts = [f"{np.size(own.t)} {type(own).__name__}" for own in self._measurements]
+        df = " and ".join(f"{own.report.df:.3g}" for own in self._smoothed[:3])
+        return ", ".join([*counts, f"{self._times.shape[-1]} knots", f"{df} degrees of freedom"])
+
+    # ---- plots ----
 
     def _noise_beside(self, index: tuple[int, ...], x: Doubles) -> UncertaintyBand:
-        parts = list(zip(smoothed_spaces(self.space), self._smoothed, strict=True))
-        radii = [radius(own[-1][0], 0.95) * self._spread(own[-1][1], index, x, 0) for own in grouped(self.space, parts)]
-        return UncertaintyBand(np.empty(0), [], radii, None)
+        radii = [own[-1][1] for own in self._radii(x)]
+        speed = None if is_several(self.space) else self._spread(self._smoothed[0], index, x, 1)
+        others = [self._times_of(own) for own in self._measurements if not isinstance(own, Points)]
+        times, points = zip(*map(self._points_in, range(len(factors_of(self.space)))), strict=True)
+        return UncertaintyBand(list(times), list(points), radii, speed, np.concatenate([np.empty(0), *others]))
+
+    def _radii(self, x: Doubles) -> list[list[tuple[Space, Doubles]]]:
+        """Return the parts of every factor, and the radii of their 95 % bands at times x of the core."""
+        parts = zip(smoothed_spaces(self.space), self._smoothed, strict=True)
+        return grouped(self.space, [(part, radius(part, 0.95) * self._spread(own, (), x, 0)) for part, own in parts])
+
+    def _times_of(self, measurement: Measurement) -> Doubles:
+        """Return the times of a measurement on the time axis of the core, with their estimated offset."""
+        times, _ = self._time_axis.at(measurement.t, (), False)
+        offset = measurement.time_offset
+        return times if offset is None else times + self._parameters[offset.name or "time offset"].value[0]
+
+    def _points_in(self, number: int) -> tuple[Doubles, Array]:
+        """Return times and points of all measured points in one factor, in the order of time."""
+        factor = factors_of(self.space)[number]
+        times, points = [np.empty(0)], [np.empty((0, *factor.point_shape), factor.dtype)]
+        for own in self._measurements:
+            if not isinstance(own, Points) or own.factor not in (None, number):
+                continue
+            y: Any = own.y
+            weights: Any = own.weights
+            if own.factor is None and isinstance(self.space, Product):
+                y = parts_of(y, self.space, "y")[number]
+                weights = weights[number] if isinstance(weights, tuple) else weights
+            rows = factor._numbers(factor._doubles(y, "y"))
+            used = factor._where_finite(rows) & _are_used(weights, len(rows))
+            times.append(self._times_of(own)[used])
+            points.append(np.asarray(factor.project(rows[used])) if used.any() else rows[used])
+        order = np.argsort(np.concatenate(times), kind="stable")
+        return np.concatenate(times)[order], np.concatenate(points)[order]
+
+    def _panels_below(self, x: Doubles) -> list[SidePanel]:
+        panels = [
+            SidePanel(f"95 % band\nof {part}{', rad' if part in _TURNING else ''}", x, values[:, None], factor=number)
+            for number, own in enumerate(self._radii(x))
+            for part, values in own
+        ]
+        kinds = [type(own).__name__ for own in self._measurements]
+        for number, (own, kind) in enumerate(zip(self._measurements, kinds, strict=True)):
+            if isinstance(own, Points):
+                continue
+            label = kind if kinds.count(kind) == 1 else f"{kind} {kinds[: number + 1].count(kind)}"
+            given = self._residuals[number]
+            # Velocities on products and for poses have one array per part.
+            values = np.concatenate([each.reshape(len(each), -1) for each in _each(given)], axis=-1)
+            named = isinstance(own, (BodyRates, SpecificForce)) and values.shape[1] == 3
+            label = f"{label}\nresidual / σ"
+            panels.append(SidePanel(label, self._times_of(own), values, ("x", "y", "z") if named else ()))
+        return panels
 
     # ---- batches, files and pickles ----
 

@@ -26,6 +26,8 @@ MOST = 50
 FEW = 5
 """The largest number of curves whose noisy data are drawn."""
 
+_SEGMENTS = 3
+"""The smallest length of a gap between measurements of several kinds, in median segments."""
 ALPHA = 0.22
 _ANGLES = np.linspace(0, 2 * np.pi, 24, endpoint=False)
 CIRCLE: Array = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=-1)
@@ -81,7 +83,7 @@ class Curve:
     @property
     def given_x(self) -> Array:
         """Times of the given points on the time axis of the core."""
-        return self.x[self.knots] if self.noise is None else self.noise.x[: None if self.shown else 0]
+        return self.x[self.knots] if self.noise is None else self.noise.x[0][: None if self.shown else 0]
 
     @property
     def radii(self) -> Array | None:
@@ -124,14 +126,31 @@ class Curve:
 
     @cached_property
     def gaps(self) -> Array:
-        """Starts and ends, on matplotlib's axis, of gaps that are far longer than most; shape (m, 2)."""
-        long = long_gaps(self.marks)
-        return np.stack([self.marks[:-1][long], self.marks[1:][long]], axis=1)
+        """Starts and ends, on matplotlib's axis, of gaps that are far longer than most; shape (m, 2).
+
+        If several sensors report at different rates, only gaps that are also longer than some segments count.
+        """
+        x = self.data.times if self.noise is None else self.noise.times
+        if len(x) < 3:
+            return np.empty((0, 2))
+        long = long_gaps(x)
+        if self.noise is not None and len(self.noise.others):
+            long &= np.diff(x) > _SEGMENTS * np.median(np.diff(self.data.times))
+        at = self.on_axis(x)
+        return np.stack([at[:-1][long], at[1:][long]], axis=1)
 
     @cached_property
     def marks(self) -> Array:
         """Times of all given points on matplotlib's axis, also of data that are not drawn."""
-        return self.times[self.knots] if self.noise is None else self.on_axis(np.unique(self.noise.x))
+        if self.noise is None:
+            return self.times[self.knots]
+        return self.on_axis(np.unique(np.concatenate(self.noise.x)))
+
+    def legend_of(self, given: str, curve: str, data: str) -> str:
+        """Explain the large symbols: those of given points, or of the curve and of noisy data if there are any."""
+        if self.noise is None:
+            return given
+        return f"{curve}, {data}" if len(self.noise.x[0]) else curve
 
     def samples(self, number: int) -> dict[str, tuple[Array, Any]]:
         """Return groups of times on matplotlib's axis and points, at which large symbols are drawn.

@@ -18,7 +18,7 @@ from .._arrays import short_repr
 from .._core import ValidationError
 from .._disk import path_of, replacing
 from .._spaces import Product, Space, SpecialEuclidean, factors_of
-from . import chart, graphs, matrices, sphere
+from . import chart, graphs, matrices, residuals, sphere
 from .curves import Curve, curves_of, fill_band
 from .graphs import timelines
 from .style import DPI, INK, heading
@@ -71,6 +71,9 @@ _DRAWN: list[tuple[str, Callable[[SubFigure, Sequence[Curve]], None], tuple[floa
 _PICTURES = {name: Picture(draw, *size) for names, draw, size in _DRAWN for name in names.split()}
 _FAMILIES = dict.fromkeys(("rp", "cp", "hp", "gr", "cgr"), Picture(graphs.draw_principal_angles, 10.5, 3.8))
 _FAMILIES["ch"] = Picture(graphs.draw_ratios, 10.5, 3.8)
+# Spaces whose picture shows the band.
+_BANDED = {"euclidean:1", "euclidean:2", "euclidean:3", "hyperbolic:2", "sphere:1", "sphere:2"}
+_BANDED |= {"rp:1", "gr:1,2", "so:2", "o:2", "u:1"}
 _OTHERS = Picture(graphs.draw_components, 10.5, 3.8)
 
 
@@ -96,12 +99,17 @@ def plot(spline: Any, file: Any = None) -> Figure:
     wide = picture.width > 1.5 * picture.height
     widths = [picture.width] if wide else [picture.width, _RATES_WIDTH]
     heights = [_HEAD, picture.height, _RATES_HEIGHT][: 3 if wide else 2]
+    panels = residuals.panels_of(spline, curves[0], [str(own) in _BANDED for own in factors_of(spline.space)])
+    if panels:
+        heights.append(residuals.height(panels))
     figure = CurveFigure(figsize=(sum(widths), sum(heights)), dpi=DPI, facecolor="white")
     grid = figure.add_gridspec(len(heights), len(widths), width_ratios=widths, height_ratios=heights)
     title = shorten(f"{spline._kind} on {spline.space!r}", int(6 * sum(widths)), placeholder=" …")
     heading(figure, title, words + _description(spline, curves), 1 - 0.5 / sum(heights))
     picture.draw(figure.add_subfigure(grid[1, 0]), curves)
     _draw_rates(figure.add_subfigure(grid[2, 0] if wide else grid[1, 1]), curves)
+    if panels:
+        residuals.draw(figure.add_subfigure(grid[-1, :]), curves[0], panels)
     if file is not None:
         save(figure, file)
     return figure

@@ -27,8 +27,13 @@ _LINES, _TICKS = 60, 2000
 # ---- axes ----
 
 
-def timelines(panel: SubFigure, curves: Sequence[Curve], labels: Sequence[str], top: float = TOP) -> list[Axes]:
-    """Add a column of axes with the same time axis, one per label of the vertical axis."""
+def timelines(
+    panel: SubFigure, curves: Sequence[Curve], labels: Sequence[str], top: float = TOP, marked: bool = True
+) -> list[Axes]:
+    """Add a column of axes with the same time axis, one per label of the vertical axis.
+
+    Unless `marked` is False, they show the times of the given points and long gaps.
+    """
     height = (size(panel)[1] - BOTTOM - top) / len(labels)
     made = []
     for i, label in enumerate(labels):
@@ -38,7 +43,8 @@ def timelines(panel: SubFigure, curves: Sequence[Curve], labels: Sequence[str], 
         axes.grid(visible=False, axis="x")
         axes.set_ylabel(label)
         _set_times(axes, curves, size(panel)[0] - LEFT - RIGHT, lowest=i == len(labels) - 1)
-        _mark_knots(axes, curves)
+        if marked:
+            _mark_knots(axes, curves)
         made.append(axes)
     return made
 

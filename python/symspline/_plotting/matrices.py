@@ -85,7 +85,7 @@ def _draw_arrows(axes: Axes, times: Array, row: int, frames: Array, bold: bool) 
 def _explain(axes: Axes, curves: Sequence[Curve], more: str, height: float = 1.0) -> None:
     """Draw a legend of the colours in one line at a given height of the axes."""
     handles = [Line2D([], [], color=color, linewidth=2.4) for color in AXES]
-    given = "bold: given" if curves[0].noise is None else "bold: curve, light: data"
+    given = curves[0].legend_of("bold: given", "bold: curve", "light: data")
     anchor: Any = {"loc": "lower left", "bbox_to_anchor": (0, height), "ncols": 4, "borderaxespad": 0.2}
     handles.append(Line2D([], [], linestyle="none"))
     labels = ["first axis", "second", "third", given + more]
@@ -176,8 +176,7 @@ def _draw_in_rows(view: Array, panel: SubFigure, curves: Sequence[Curve]) -> Non
 
     The rows of ``view`` are the directions to the right, up and, for ellipsoids, towards the viewer.
     """
-    words = "half axes: √eigenvalues; filled: "
-    words += "given" if curves[0].noise is None else "curve, outlines: data"
+    words = f"half axes: √eigenvalues; filled: {curves[0].legend_of('given', 'curve', 'outlines: data')}"
     words += "; x₁ forwards, x₂ right, x₃ up" * (len(view) == 3)
     # The scale to the right of the words is an inch wide.
     words = fill(words, int((size(panel)[0] - LEFT - RIGHT - 1) / 0.075))

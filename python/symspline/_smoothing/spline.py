@@ -610,7 +610,8 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         ]
         several = is_several(self.space)
         speed = None if several else self._spread(self._smoothed[0], index, x, 1)
-        return UncertaintyBand(noisy.times[noisy.used], [own[noisy.used] for own in noisy.points], radii, speed)
+        points = [own[noisy.used] for own in noisy.points]
+        return UncertaintyBand([noisy.times[noisy.used]] * len(points), points, radii, speed)
 
     @property
     def _unconverged(self) -> int:

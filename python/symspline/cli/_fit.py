@@ -110,8 +110,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="?",
         const=_BEST,
         metavar="HOW",
-        help="smooth the points; write it after IN. HOW is gcv (default; with --sigma but no rates Mallows' C_p), reml, "
-        "or a number λ >= 0, in a product perhaps one per factor with commas",
+        help="smooth the points; write it after IN. HOW is gcv (default; Mallows' C_p with --sigma and without rates "
+        "and velocities), reml, or a number λ >= 0, in a product perhaps one per factor with commas",
     )
     add(
         "--sigma",

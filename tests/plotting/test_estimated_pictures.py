@@ -1,0 +1,177 @@
+"""Pictures of estimated curves: points of all measurements, bands, and residuals of the others."""
+
+import numpy as np
+import pytest
+from drawn import axes_named, rendered, texts_of
+
+import symspline as ss
+from symspline import measure
+
+T, S = np.linspace(0, 10, 30), np.linspace(0, 10, 90)
+SO3 = ss.SpecialOrthogonal(3)
+
+
+def rotation(t):
+    return ss.rotations.from_rotation_vectors(np.sin(0.5 * np.multiply.outer(t, [1.0, 0.8, 0.6])))
+
+
+def path(t, nu=0):
+    return np.stack([np.sin(0.5 * t + nu * np.pi / 2), np.cos(0.4 * t + nu * np.pi / 2)], axis=-1) * [0.5**nu, 0.4**nu]
+
+
+def noise(*shape, seed=0):
+    return np.random.default_rng(seed).standard_normal(shape)
+
+
+def noisy_rotations(t, seed=0):
+    return SO3.exp(rotation(t), 0.03 * SO3.random_tangent(np.random.default_rng(seed), rotation(t)))
+
+
+def rates(t, outlier=0.0):
+    truth = ss.CubicSpline(np.linspace(0, 10, 200), rotation(np.linspace(0, 10, 200)), SO3, bc_type="not-a-knot")
+    omega = ss.rotations.angular_velocity(truth, t) + 0.02 * noise(len(t), 3)
+    omega[10, 1] += outlier
+    return measure.BodyRates(t, omega, sigma=0.02, bias=measure.Constant(3))
+
+
+def attitudes(outlier=0.0, **options):
+    given = [measure.Points(T, noisy_rotations(T), sigma=0.03), rates(S, outlier)]
+    return ss.estimate(given, 20, "so:3", penalty="jerk", **options)
+
+
+def dots(axes):
+    found = [line.get_xydata() for line in axes.lines if line.get_marker() == "o"]
+    return np.concatenate(found)
+
+
+def test_residuals_and_band_of_rotations():
+    curve = attitudes()
+    figure = rendered(curve.plot())
+    assert "30 Points, 90 BodyRates, 20 knots" in " ".join(texts_of(figure))
+    panel = axes_named(figure, "BodyRates")
+    assert panel.get_ylabel() == "BodyRates\nresidual / σ"
+    assert [text.get_text() for text in panel.get_legend().get_texts()] == ["x", "y", "z"]
+    residuals = curve.residuals[1]
+    np.testing.assert_allclose(dots(panel), np.column_stack([np.tile(S, 3), residuals.T.ravel()]))
+    share = 100 * np.mean(np.abs(residuals) > 1.96)
+    assert f"{share:.1f} % beyond ±1.96 (5 % expected)" in texts_of(figure)
+    # Frames along the time axis do not show the band.
+    band = axes_named(figure, "95 % band")
+    assert band.get_ylabel() == "95 % band\nof so:3, rad"
+    x, y = band.lines[0].get_data()
+    np.testing.assert_allclose(y, curve.band(x))
+    assert [own.get_label() for own in axes_named(figure, "speed").collections if own.get_label() == "band"]
+
+
+def test_outliers_are_drawn_at_the_edge():
+    curve = attitudes(1.0, loss="cauchy")
+    panel = axes_named(rendered(curve.plot()), "BodyRates")
+    triangles = [line for line in panel.lines if line.get_marker() in "^v" and len(line.get_xdata())]
+    assert [line.get_xdata().tolist() for line in triangles] == [[S[10]]]
+    assert panel.get_ylim()[1] < 8 and np.abs(curve.residuals[1]).max() > 30
+    assert any("1 beyond the axis (triangles)" in text for text in texts_of(panel.figure))
+
+
+def test_points_of_several_sensors_are_drawn():
+    """Points of weight zero are not."""
+    weights = np.where(np.arange(90) % 3, 1.0, 0.0)
+    coarse, fine = path(T) + 0.1 * noise(30, 2), path(S) + 0.02 * noise(90, 2, seed=1)
+    fine[weights == 0] = np.nan
+    given = [
+        measure.Points(T[::-1], coarse[::-1], sigma=0.1),
+        measure.Points(S, fine, sigma=0.02, weights=weights),
+        measure.Velocities(S, path(S), path(S, 1) + 0.1 * noise(90, 2, seed=2), sigma=0.1),
+        measure.Function(S, lambda x: np.sum(x**2, axis=1) - np.sum(path(S) ** 2, axis=1), sigma=0.05),
+    ]
+    curve = ss.estimate(given, 20, "r:2")
+    figure = rendered(curve.plot())
+    picture = figure.axes[0]
+    expected = np.concatenate([coarse, fine[weights > 0]])
+    found = dots(picture)
+    assert sorted(map(tuple, found)) == sorted(map(tuple, expected))
+    assert [own.get_label() for own in picture.get_children() if own.get_label() == "band"] == ["band"]
+    labels = [axes.get_ylabel() for axes in figure.axes]
+    # The picture of the plane shows the band.
+    assert [label for label in labels if "residual" in label] == ["Velocities\nresidual / σ", "Function\nresidual / σ"]
+    assert not any("95 %" in label for label in labels)
+
+
+def test_time_offsets_move_points():
+    offset = measure.Constant(1, sigma=1.0)
+    late = measure.Points(T[2:-2] - 0.3, path(T[2:-2]) + 0.01 * noise(26, 2), sigma=0.01, time_offset=offset)
+    exact = measure.Points(S, path(S) + 0.01 * noise(90, 2, seed=1), sigma=0.01)
+    curve = ss.estimate([exact, late], 20, "r:2")
+    x, _ = curve._points_in(0)
+    moved = T[2:-2] - 0.3 + curve.parameters["time offset"].value[0]
+    np.testing.assert_allclose(x, np.sort(np.concatenate([S, moved])))
+    rendered(curve.plot())
+
+
+@pytest.mark.parametrize("dates", [False, True])
+def test_factors_have_their_own_points(dates):
+    def time(t):
+        return np.datetime64("2024-05-01", "us") + (1e6 * t).astype("m8[us]") if dates else t
+
+    given = [
+        measure.Points(time(T), noisy_rotations(T), sigma=0.03, factor=0),
+        measure.Points(time(S), path(S)[:, :1] + 0.1 * noise(90, 1), sigma=0.1, factor=1),
+    ]
+    given.append(measure.BodyRates(time(S), rates(S).omega, sigma=0.02))
+    curve = ss.estimate(given, 20, "so:3 x r:1")
+    figure = rendered(curve.plot())
+    assert len(dots(axes_named(figure, "x"))) == 90
+    labels = [axes.get_ylabel() for axes in figure.axes]
+    assert "BodyRates\nresidual / σ" in labels and "95 % band\nof so:3, rad" in labels
+    assert "95 % band\nof euclidean:1" not in labels
+
+
+def test_poses_have_a_band_per_part_and_residuals_per_measurement():
+    poses = np.broadcast_to(np.eye(4), (30, 4, 4)).copy()
+    poses[:, :3, :3], poses[:, :2, 3] = noisy_rotations(T), path(T) + 0.1 * noise(30, 2)
+    curve = ss.estimate([measure.Points(T, poses, sigma=(0.03, 0.1)), rates(S)], 20, "se:3", penalty="jerk")
+    turning, moving = curve.residuals[0]
+    assert turning.shape == moving.shape == (30, 3) and curve.residuals[1].shape == (90, 3)
+    figure = rendered(curve.plot())
+    labels = [axes.get_ylabel() for axes in figure.axes]
+    assert [label for label in labels if "95 %" in label] == ["95 % band\nof so:3, rad", "95 % band\nof euclidean:3"]
+    x, y = axes_named(figure, "BodyRates").lines[1].get_data()
+    assert len(x) == len(y) == 90
+
+
+def test_curves_from_files_have_bands_and_no_data(tmp_path):
+    attitudes().save(tmp_path / "a.npz")
+    figure = rendered(ss.load(tmp_path / "a.npz").plot())
+    assert "bold: curve" in texts_of(figure)
+    labels = [axes.get_ylabel() for axes in figure.axes]
+    assert "95 % band\nof so:3, rad" in labels and not any("residual" in label for label in labels)
+    plane = ss.estimate(
+        [measure.Points(T, path(T), sigma=0.1), measure.Velocities(T, path(T), path(T, 1), sigma=0.1)], 8, "r:2"
+    )
+    plane.save(tmp_path / "b.npz")
+    assert len(dots(rendered(ss.load(tmp_path / "b.npz").plot()).axes[0])) == 0
+
+
+def test_curves_without_points():
+    beacons = np.array([[3.0, 0], [0, 3], [-3, -3]])
+
+    def ranges(x):
+        return np.linalg.norm(x[:, None] - beacons, axis=-1)
+
+    measured = ranges(path(S)) + 0.02 * noise(90, 3)
+    curve = ss.estimate([measure.Function(S, lambda x: ranges(x) - measured, sigma=0.02)], 12, "r:2")
+    figure = rendered(curve.plot())
+    assert len(dots(figure.axes[0])) == 0 and len(dots(axes_named(figure, "Function"))) == 270
+
+
+@pytest.mark.parametrize("name", ["s:2", "r:1", "r:3", "spd:2", "h:2", "rp:2", "sphere:3"])
+def test_every_kind_of_picture(name):
+    space = ss.space(name)
+    rng = np.random.default_rng(0)
+    middle = space.random_point(rng)
+    nodes = space.exp(middle, 0.3 * space.random_tangent(rng, np.broadcast_to(middle, (5, *space.point_shape))))
+    truth = ss.CubicSpline(np.linspace(0, 10, 5), nodes, space)
+    y = space.exp(truth(T), 0.03 * space.random_tangent(rng, truth(T)))
+    v = space.transport(truth(T), y, truth(T, 1)) + 0.05 * space.random_tangent(rng, y)
+    given = [measure.Points(T, y, sigma=0.03), measure.Velocities(T, y, v, sigma=0.05)]
+    axes = axes_named(rendered(ss.estimate(given, 12, name).plot()), "Velocities")
+    assert axes.get_legend() is None and len(dots(axes)) == 30 * space.dim
