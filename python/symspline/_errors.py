@@ -5,6 +5,9 @@ from __future__ import annotations
 import os
 import sys
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import Any
 
 import numpy as np
@@ -50,11 +53,27 @@ def raise_or_warn(faults: list[Fault], on_failure: str, spline: Any) -> None:
         warn(message, UserWarning, almost[0].batch_index(batch), almost[0].node)
 
 
+# Categories of warnings that the current call suppresses because its result describes the same.
+_SILENT: ContextVar[tuple[type[Warning], ...]] = ContextVar("silent", default=())
+
+
+@contextmanager
+def silenced(category: type[Warning]) -> Iterator[None]:
+    """Suppress warnings of this package in the current thread; filters of `warnings` are shared by all threads."""
+    token = _SILENT.set((*_SILENT.get(), category))
+    try:
+        yield
+    finally:
+        _SILENT.reset(token)
+
+
 def warn(message: str, category: type[Warning], curve: tuple[int, ...] | None = None, node: int | None = None) -> None:
     """Issue a warning at the line that called this package.
 
     The warning has the attributes ``curve`` and ``node`` of a `SymsplineError`.
     """
+    if issubclass(category, _SILENT.get()):
+        return
     warning: Any = category(message)
     warning.curve, warning.node = curve, node
     warnings.warn(warning, stacklevel=callers_level())

@@ -140,6 +140,25 @@ class ChoiceOptions(LsqOptions, total=False):
     gamma: float
 
 
+class SmoothOptions(TypedDict, total=False):
+    """The keywords of `symspline.xarray.smooth` that it passes to `make_smoothing_spline`."""
+
+    lam: Numbers | None
+    knots: TimesLike | None
+    criterion: Criterion
+    gamma: float
+    penalty: SmoothingPenalty
+    sigma: Numbers | None
+    bc_type: SmoothingBCType | None
+    loss: Loss
+    method: SmoothingMethod
+    tol: float
+    max_iter: int
+    extrapolate: Extrapolate
+    on_failure: OnFailure
+    atol: float | None
+
+
 class SmoothingOptions(ChoiceOptions, total=False):
     """The keywords of `make_smoothing_spline`, and λ."""
 

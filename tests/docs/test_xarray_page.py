@@ -12,13 +12,16 @@ import symspline as ss
 def test_the_example_runs(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     names = {}
-    (block,) = blocks(many_curves.PAGE)
-    run(block, many_curves.PAGE, names)
+    first, *noisy = blocks(many_curves.PAGE)
+    run(first, many_curves.PAGE, names)
     assert names["ds"].converged.all()
     # Geodesics at constant speed.
     speed = names["sx"].speed(names["ds"], names["hours"]).compute()
     total = ss.Sphere(2).distance(names["start"], names["end"]) / (23 * 6 * 3600)
     np.testing.assert_allclose(speed, np.broadcast_to(total[..., None], speed.shape), rtol=1e-6)
+    for block in noisy:
+        run(block, many_curves.PAGE, names)
+    assert names["smooth"].converged.all() and names["ds"].gyro_bias.attrs == {"units": "rad/s"}
 
 
 def test_simulated_curves_are_points():

@@ -206,6 +206,8 @@ def test_a_bad_curve_does_not_stop_a_batch():
     raises("where must be", ss.make_smoothing_spline, t, batch, space, where=[True])
     nothing = ss.make_smoothing_spline(t, batch, space, where=np.zeros(4, bool))
     assert np.isnan(nothing(0.5)).all()
+    weighted = ss.make_smoothing_spline(t, batch, space, where=np.zeros(4, bool), weights=np.ones((4, 40)))
+    assert np.isnan(weighted(0.5)).all()
 
 
 def test_missing_samples_are_the_same_alone_and_in_a_batch():

@@ -329,7 +329,7 @@ def merge_close_knots(knots: Knots, noisy: SmoothingData, lam: float | None) -> 
     """
     most = 1e11
     times = knots.times
-    if times.ndim > 1 or len(times) <= 16:
+    if times.ndim > 1 or len(times) <= 16 or 0 in noisy.batch:
         return knots
     span = float(times[-1] - times[0])
     mean = span / (len(times) - 1)

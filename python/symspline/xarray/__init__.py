@@ -21,12 +21,11 @@ from .._spaces import Space, space_named
 from .._typing import BCType, Extrapolate, Method, OnFailure, SolverOptions
 from .._version import VERSION
 from ._blocks import COLUMNS, Inputs, apply, fitted, resampled, values_at
-from ._spec import check_dims, rehearse, spec_of, times_with_names
+from ._estimation import estimate
+from ._smoothing import smooth
+from ._spec import KNOTS, bare, check_dims, rehearse, spec_of, timed_by, times_with_names
 
-__all__ = ["evaluate", "fit", "lift", "resample", "speed"]
-
-# The dimension of the knots where a result has times of its own, which may have the same name.
-_KNOTS = "symspline_knots"
+__all__ = ["estimate", "evaluate", "fit", "lift", "resample", "smooth", "speed"]
 
 
 def fit(
@@ -256,10 +255,10 @@ def resample(
     times, axes = times_with_names(to, dim, point_dims, curves)
     policy = extrapolation_mode(checked_extrapolate(options.get("extrapolate")), bc_type)
     rehearse(times, spec["t"], da.sizes[dim], policy)
-    inputs: Inputs = [(_bare(da, dim), [_KNOTS, *point_dims]), (times, axes), *rest]
+    inputs: Inputs = [(bare(da, dim), [KNOTS, *point_dims]), (times, axes), *rest]
     (values,) = apply(resampled, inputs, [[*axes, *point_dims]], [spec["space"].dtype], x_axes=len(axes), **spec)
     values.attrs = dict(da.attrs)
-    return _timed_by(values, times, dim).rename(da.name)
+    return timed_by(values, times, dim).rename(da.name)
 
 
 def _along(ds: xr.Dataset, x: Any, quantity: str, extrapolate: Any, lifted: bool = False) -> xr.DataArray:
@@ -281,22 +280,11 @@ def _along(ds: xr.Dataset, x: Any, quantity: str, extrapolate: Any, lifted: bool
     times, axes = times_with_names(x, dim, point_dims, [d for d in points.dims if d not in (dim, *point_dims)])
     t = points[dim].values if dim in points.coords else None
     rehearse(times, t, points.sizes[dim], policy)
-    own = [_KNOTS, *point_dims]
+    own = [KNOTS, *point_dims]
     shape = [] if quantity == "speed" else point_dims
-    inputs: Inputs = [(_bare(points, dim), own), (_bare(velocities, dim), own), (times, axes)]
+    inputs: Inputs = [(bare(points, dim), own), (bare(velocities, dim), own), (times, axes)]
     fixed = {"space": space, "t": t, "quantity": quantity, "policy": policy, "x_axes": len(axes), "lifted": lifted}
     (values,) = apply(values_at, inputs, [[*axes, *shape]], [space.dtype if shape else np.float64], **fixed)
     if quantity == "point":
         values.attrs = dict(points.attrs)
-    return _timed_by(values, times, dim).rename(quantity)
-
-
-def _bare(array: xr.DataArray, dim: str) -> xr.DataArray:
-    """An array whose dimension of knots has nothing to do with times of that name."""
-    return array.drop_vars([name for name, c in array.coords.items() if dim in c.dims]).rename({dim: _KNOTS})
-
-
-def _timed_by(values: xr.DataArray, times: xr.DataArray, dim: str) -> xr.DataArray:
-    """The values with their times as a coordinate, where that can have the name of the dimension of time."""
-    fits = dim not in times.dims or times.ndim == 1
-    return values.assign_coords({dim: times}) if fits else values
+    return timed_by(values, times, dim).rename(quantity)

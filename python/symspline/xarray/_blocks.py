@@ -93,7 +93,7 @@ def fitted(points: Array, *rest: Array, **options: Any) -> tuple[Array, ...]:
 
 def resampled(points: Array, x: Array, *rest: Array, x_axes: int, **options: Any) -> Array:
     spline = spline_of(points, rest, **options)
-    x, per_curve = _per_curve(x, spline._curve.batch, x_axes)
+    x, per_curve = per_curve_times(x, spline._curve.batch, x_axes)
     values: Array = spline(x, per_curve=per_curve)
     values[~np.asarray(spline.report.converged)] = np.nan
     return values
@@ -114,7 +114,7 @@ def values_at(
     """A quantity of the curves of a block; curves that were not fitted are NaN."""
     lead = points.ndim - 1 - len(space.point_shape)
     batch = points.shape[:lead]
-    x, per_curve = _per_curve(x, batch, x_axes)
+    x, per_curve = per_curve_times(x, batch, x_axes)
     good = space._where_finite(velocities).all(axis=-1)
     everyone = bool(good.all())
     if not everyone:
@@ -134,7 +134,7 @@ def values_at(
     return values
 
 
-def _per_curve(x: Array, batch: tuple[int, ...], axes: int) -> tuple[Array, bool]:
+def per_curve_times(x: Array, batch: tuple[int, ...], axes: int) -> tuple[Array, bool]:
     """Times for every curve, if they have its dimensions."""
     if x.ndim == axes:
         return x, False

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import xarray as xr
@@ -16,8 +16,12 @@ from .._input import times_of
 from .._spaces import Array, Euclidean, Product, Space, space_named
 from ._blocks import Inputs, values_at
 
+T = TypeVar("T", xr.DataArray, xr.Dataset)
+
 # A curve of numbers that stands still raises for every invalid option.
 LINE = Euclidean(1)
+# The dimension of the knots where a result has times of its own, which may have the same name.
+KNOTS = "symspline_knots"
 
 
 def spec_of(
@@ -158,3 +162,14 @@ def rehearse(times: xr.DataArray, t: Array | None, nodes: int, policy: str) -> N
     if times.chunks is None:
         still = np.zeros((nodes, 1))
         values_at(still, still, times.values, space=LINE, t=t, quantity="point", policy=policy, x_axes=times.ndim)
+
+
+def bare(array: xr.DataArray, dim: str) -> xr.DataArray:
+    """An array whose dimension of knots has nothing to do with times of that name."""
+    return array.drop_vars([name for name, c in array.coords.items() if dim in c.dims]).rename({dim: KNOTS})
+
+
+def timed_by(values: T, times: xr.DataArray, dim: str) -> T:
+    """The values with their times as a coordinate, where that can have the name of the dimension of time."""
+    fits = dim not in times.dims or times.ndim == 1
+    return values.assign_coords({dim: times}) if fits else values

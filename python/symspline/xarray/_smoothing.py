@@ -1,0 +1,202 @@
+"""Smoothing splines of curves in an xarray object."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Hashable, Sequence
+from functools import reduce
+from operator import getitem
+from typing import Any, Unpack
+
+import numpy as np
+import xarray as xr
+
+from .._arrays import checked_number
+from .._errors import silenced
+from .._options import checked_extrapolate, extrapolation_mode
+from .._smoothing import SmoothingWarning, make_smoothing_spline
+from .._smoothing.factors import is_several
+from .._spaces import Array, Space, SpecialOrthogonal, space_named
+from .._typing import SmoothOptions
+from ._blocks import Inputs, apply, per_curve_times
+from ._spec import KNOTS, LINE, bare, rehearse, spec_of, timed_by, times_with_names
+
+# Columns of the report of a smoothing fit, per part of the space.
+_COLUMNS: dict[str, type] = {"lam": np.float64, "df": np.float64, "sigma": np.float64, "at_bound": np.bool_}
+
+
+def smooth(
+    da: xr.DataArray,
+    space: Space[Any] | str,
+    to: Any = None,
+    *,
+    dim: str = "time",
+    point_dims: Sequence[str] = ("q",),
+    where: xr.DataArray | None = None,
+    std: bool = False,
+    level: float | None = None,
+    **options: Unpack[SmoothOptions],
+) -> xr.Dataset:
+    """Fit smoothing splines to noisy points, and evaluate them in one call.
+
+    Points that are NaN are missing and have no influence. Each curve has its own λ.
+
+    Parameters
+    ----------
+    da : xarray.DataArray
+        Noisy points, as for `fit`. Dask arrays are computed lazily.
+    space : Space or str
+        Space or its name. Products are not supported: smooth each factor separately.
+    to : time, array_like or xarray.DataArray, optional
+        Times at which the curves are evaluated, as `x` of `evaluate`. By default those of the data.
+    dim : str, default "time"
+        Dimension along the curves.
+    point_dims : sequence of str, default ("q",)
+        Dimensions of a point's array.
+    where : xarray.DataArray of bool, optional
+        Mask over the batch dimensions.
+    std : bool, default False
+        Whether the result has the standard deviation of the curve in one coordinate, as `SmoothingSpline.std`.
+    level : float, optional
+        Probability, such as 0.95. The result then has the radius of the band, as `SmoothingSpline.band`.
+    **options
+        Keyword arguments of `make_smoothing_spline`, such as ``penalty="jerk"``, `lam`, `criterion`, `sigma`, `knots`
+        and `loss`. The default of `on_failure` is ``"ignore"``.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``points`` with the dimensions of `evaluate` and the attributes of `da`; ``std`` and ``band`` if requested; and
+        ``lam``, ``df``, ``sigma``, ``at_bound`` and ``converged`` for every curve. For poses, all but ``points`` and
+        ``converged`` have the endings ``_rotation`` and ``_position``. Curves that do not exist or did not converge are
+        NaN.
+
+    Raises
+    ------
+    ValidationError
+        If names, shapes, times or options are invalid, or chunks split a curve.
+
+    See Also
+    --------
+    estimate : Fit a curve to points and rates.
+    fit : Fit curves through the points.
+
+    Notes
+    -----
+    If there are more than 4000 times, or times that are very close together, knots are selected for all curves of a
+    block of dask together. Pass `knots` for results that do not depend on the blocks.
+
+    Examples
+    --------
+    >>> import numpy as np, xarray as xr
+    >>> import symspline.xarray
+    >>> t = np.linspace(0, 1, 50)
+    >>> noisy = np.sin(6 * t) + 0.1 * np.random.default_rng(0).standard_normal((3, 50))
+    >>> da = xr.DataArray(noisy[..., None], dims=("run", "time", "q"), coords={"time": t})
+    >>> ds = symspline.xarray.smooth(da, "r:1", [0.25, 0.5], std=True, penalty="jerk")
+    >>> ds.points.dims, ds["std"].dims, bool((ds.sigma < 0.15).all())
+    (('run', 'time', 'q'), ('run', 'time'), True)
+    """
+    space = space_named(space)
+    given: dict[str, Any] = {"on_failure": "ignore", **options}
+    if level is not None:
+        level = checked_number(level, "level must lie between 0 and 1", lambda x: 0 < x < 1)
+    (_, *rest), spec = spec_of(da, space, dim, point_dims, where, "natural", on_failure=given["on_failure"])
+    t = spec["t"]
+    _rehearse_options(t, da.sizes[dim], given)
+    if to is None:
+        to = xr.DataArray(np.arange(da.sizes[dim]) if t is None else t, dims=dim)
+        to = to if t is None else to.assign_coords({dim: da[dim]})
+    curves = [d for d in da.dims if d not in (dim, *point_dims)]
+    times, axes = times_with_names(to, dim, point_dims, curves)
+    ends = "periodic" if given.get("bc_type") == "periodic" else "natural"
+    rehearse(times, t, da.sizes[dim], extrapolation_mode(checked_extrapolate(given.get("extrapolate")), ends))
+    inputs: Inputs = [(bare(da, dim), [KNOTS, *point_dims]), (times, axes), *rest]
+    endings = ["_rotation", "_position"] if is_several(space) else [""]
+    asked = [name for name, wanted in (("std", std), ("band", level is not None)) if wanted]
+    spreads = [name + ending for name in asked for ending in endings]
+    columns = [name + ending for name in _COLUMNS for ending in endings]
+    dims: list[list[Hashable]] = [[*axes, *point_dims], *([*axes] for _ in spreads), *([] for _ in (*columns, "one"))]
+    dtypes: list[Any] = [space.dtype, *(np.float64 for _ in spreads)]
+    dtypes += [dtype for dtype in _COLUMNS.values() for _ in endings] + [np.bool_]
+    fixed = {"space": space, "t": t, "names": spec["names"], "how": given, "std": std, "level": level}
+    found = apply(_smoothed, inputs, dims, dtypes, x_axes=len(axes), **fixed)
+    ds = xr.Dataset(dict(zip(["points", *spreads, *columns, "converged"], found, strict=True)))
+    ds["points"].attrs = dict(da.attrs)
+    for name in spreads:
+        ds[name].attrs = unit_of(space, da, name)
+    timed: xr.Dataset = timed_by(ds, times, dim)
+    return timed
+
+
+def unit_of(space: Space[Any], da: xr.DataArray, name: str) -> dict[str, Any]:
+    """Return the attributes of a standard deviation or radius: its units, if they are known."""
+    if name.endswith("_rotation") or isinstance(space, SpecialOrthogonal) or space._name in ("sphere", "rp", "cp"):
+        return {"units": "rad"}
+    return {"units": da.attrs["units"]} if space._name == "euclidean" and "units" in da.attrs else {}
+
+
+def _rehearse_options(t: Any, count: int, given: dict[str, Any]) -> None:
+    """Raise errors about the options now, before any block is computed."""
+    # Tuples are for poses, and end conditions may have vectors of the space.
+    shaped = [name for name in ("lam", "sigma", "bc_type") if np.ndim(given.get(name, 0)) != 0]
+    plain = {name: value for name, value in given.items() if name not in shaped}
+    if given.get("criterion") == "cp" and given.get("sigma") is not None:
+        plain.setdefault("sigma", 1.0)
+    if plain.get("lam") is None:
+        plain["lam"] = 1.0
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        make_smoothing_spline(t, np.zeros((count, 1)), LINE, **plain)
+
+
+def _smoothed(
+    points: Array,
+    x: Array,
+    *rest: Array,
+    space: Space[Any],
+    t: Any,
+    names: list[str],
+    how: dict[str, Any],
+    x_axes: int,
+    std: bool,
+    level: float | None,
+) -> tuple[Array, ...]:
+    """Smooth the curves of a block."""
+    batch = points.shape[: points.ndim - 1 - len(space.point_shape)]
+    x, per_curve = per_curve_times(x, batch, x_axes)
+    mask = np.broadcast_to(rest[names.index("where")], batch) if "where" in names else None
+    # A single curve is a batch of one, whose failure does not raise unless that is requested.
+    whole = batch or (1,)
+    rows = points.reshape(*whole, *points.shape[len(batch) :])
+    finite = space._where_finite(rows)
+    weights = None if finite.all() else finite.astype(np.float64)
+    chosen = None if mask is None else mask.reshape(whole)
+    # The variable at_bound describes the curves about which a warning would be.
+    with silenced(SmoothingWarning):
+        curve: Any = make_smoothing_spline(t, rows, space, weights=weights, where=chosen, **how)
+    several = is_several(space)
+    reports = curve.report if several else (curve.report,)
+    converged = np.all([np.asarray(own.converged) for own in reports], axis=0)
+    at = x.reshape(*whole, *x.shape[len(batch) :]) if per_curve else x
+    values = curve(at, per_curve=per_curve)
+    wanted: list[tuple[str, tuple[float, ...]]] = [("std", ())] if std else []
+    wanted += [("band", (level,))] if level is not None else []
+    each: list[Array] = []
+    for name, arguments in wanted:
+        if per_curve:
+            rows_of = [getattr(reduce(getitem, i, curve), name)(at[i], *arguments) for i in np.ndindex(whole)]
+            pairs = [own if several else (own,) for own in rows_of]
+            each += [np.reshape(part, at.shape) for part in zip(*pairs, strict=True)]
+        else:
+            found = getattr(curve, name)(at, *arguments)
+            each += found if several else [found]
+    columns: list[Array] = []
+    for name in ("lam", "df", "sigma"):
+        numbers = getattr(curve, name)
+        columns += [np.broadcast_to(own, whole) for own in (numbers if several else (numbers,))]
+    columns += [np.asarray(own.at_bound) for own in reports]
+    for own in (values, *each):
+        own[~converged] = np.nan
+    outputs = [values, *each, *columns, converged]
+    return tuple(np.asarray(own if batch else own[0]) for own in outputs)
