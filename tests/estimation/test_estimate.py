@@ -115,6 +115,19 @@ def test_spinning_bodies():
             curve = ss.estimate(fused(t, seen, s, omega), np.linspace(0, 60, 121), "so:3")
         assert curve.report.iterations <= 8 and curve.df < 5
         assert sensors.rms(SO3.distance(curve(t), turned)) < 0.03
+def test_unknown_attitude_and_large_bias_of_the_gyro():
+    """The initial attitude follows from accelerations, although the integral of the rates drifts by several radians."""
+    for seed in (31, 32, 33):
+        turn, path, _, s, g, omega, force, y = imu(seed)
+        omega = omega + [0.1, -0.05, 0.2]
+        curve = ss.estimate(
+            [measure.Points(g, y, sigma=0.3, factor=1), *inertial(s, omega, force)],
+            np.linspace(0, 30, 151),
+            "so:3 x r:3",
+            penalty="jerk",
+        )
+        assert curve.report[0].iterations <= 12
+        assert sensors.rms(SO3.distance(curve(g)[0], turn(g))) < 0.05
 
 
 def test_lever_arm():

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from .._arrays import as_array, checked_number, short_repr, whole_number
 from .._core import ValidationError
-from .._cubic import CubicSpline
 from .._curve import Curve
 from .._curves.fit import FitProblem, fit, read_ends
 from .._curves.fit import Points as CorePoints
@@ -59,12 +58,12 @@ from .solve import Iteration, Setup, Solution, read_lams
 from .spline import EstimatedSpline, joint
 from .terms import Body, DirectionTerm, ForceTerm, PointTerm, RateTerm, Term, bind
 
-_R3 = Euclidean(3)
 _FIT = Options("auto", 1e-12, None)
 # Automatic knots: the first number of them, per degree of freedom, and how often they are chosen.
 _FIRST, _PER_FREEDOM, _TRIES = 60, 4, 4
 # The noise may exceed the given standard deviations by this factor without a warning.
 _FACTOR = 2.0
+_SO3 = SpecialOrthogonal(3)
 
 
 class EstimateOptions(TypedDict, total=False):
@@ -415,21 +414,16 @@ def _start(setup: Setup, space: Space[Any], axis: TimeAxis, shown: Array, start:
         points = extended(shown, extrapolate="geodesic")
         each = points if isinstance(space, Product) else (points,)
         return [part for factor, own in zip(factors_of(space), each, strict=True) for part in split(factor, own)]
-    # Attitudes are aligned with the accelerations of the positions.
-    found: dict[int, Array] = {}
-    for part in sorted(range(len(setup.spaces)), key=lambda part: not isinstance(setup.spaces[part], Euclidean)):
-        found[part] = _initial(setup, part, setup.spaces[part], found)
-    return [found[part] for part in range(len(setup.spaces))]
+    return [_initial(setup, part, own) for part, own in enumerate(setup.spaces)]
 
 
-def _initial(setup: Setup, part: int, space: Space[Any], found: dict[int, Array]) -> Array:
+def _initial(setup: Setup, part: int, space: Space[Any]) -> Array:
     """Return initial points of one part: smoothed points, integrated rates, or the attitudes of seen directions."""
     knots = setup.knots
     points = [term for term in setup.terms if isinstance(term, PointTerm) and term.parts == [part]]
     times = np.concatenate([term.times for term in points]) if points else np.empty(0)
     rates = [term for term in setup.terms if isinstance(term, RateTerm) and term.parts == [part]]
     seen = [term for term in setup.terms if isinstance(term, DirectionTerm) and term.parts == [part]]
-    forces = [term for term in setup.terms if isinstance(term, ForceTerm) and term.parts[0] == part]
     spread = len(np.unique(times)) > 1 and (not rates or np.ptp(times) > 0.8 * (knots[-1] - knots[0]))
     if spread:
         order = np.argsort(times, kind="stable")
@@ -451,8 +445,12 @@ def _initial(setup: Setup, part: int, space: Space[Any], found: dict[int, Array]
         if np.isfinite(smooth).all():
             return np.asarray(smooth)
     if rates and rates[0].body.is_rotation:
-        sensed = [(force, found[force.parts[1]]) for force in forces]
-        return _integrated(knots, space, rates[0], points, seen, sensed)
+        forces = [term for term in setup.terms if isinstance(term, ForceTerm) and term.parts[0] == part]
+        vectors = [_force_vectors(setup, term) for term in forces]
+        vectors += [(np.repeat(own.times, own.seen.shape[1]), *_rows(own.reference, own.seen)) for own in seen]
+        # The rows of a rotation matrix are the fixed axes in the frame of the body.
+        vectors += [(np.repeat(own.times, 3), *_rows(np.eye(3), Body(space).matrices(own.y))) for own in points]
+        return _integrated(setup, space, rates[0], vectors)
     if seen:
         return _seen(setup, space, seen)
     if len(times):
@@ -464,29 +462,70 @@ def _initial(setup: Setup, part: int, space: Space[Any], found: dict[int, Array]
     )
 
 
-def _integrated(
-    knots: Doubles,
-    space: Space[Any],
-    rate: RateTerm,
-    points: list[PointTerm],
-    seen: list[DirectionTerm],
-    forces: list[tuple[ForceTerm, Array]],
-) -> Array:
-    """Return the attitudes that follow from the rates, turned as the points, directions and forces require."""
+# Vectors in the fixed frame and the same vectors in the frame of the body, at times.
+_Vectors = tuple[Doubles, Doubles, Doubles]
+# The number of windows with which an initial attitude is aligned in turn, and the ratio of singular values from which
+# vectors determine a rotation.
+_WINDOWS, _RANK = 7, 1e-3
+
+
+def _rows(reference: Doubles, seen: Doubles) -> tuple[Doubles, Doubles]:
+    return np.broadcast_to(reference, seen.shape).reshape(-1, 3), seen.reshape(-1, 3)
+
+
+def _force_vectors(setup: Setup, term: ForceTerm) -> _Vectors:
+    """Return the accelerations without gravity that follow from measured positions, and the specific forces."""
+    points = [own for own in setup.terms if isinstance(own, PointTerm) and own.parts == [term.parts[1]]]
+    times = np.concatenate([own.times for own in points]) if points else np.empty(0)
+    expected = np.tile(-term.gravity, (len(term.times), 1))
+    count = len(np.unique(times))
+    if count > 5:
+        order = np.argsort(times, kind="stable")
+        y = np.concatenate([own.y for own in points])[order]
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            path = make_smoothing_spline(
+                times[order], y, "r:3", knots=min(count, 200), penalty="jerk", on_failure="ignore"
+            )
+        accelerations = path(np.clip(term.times, times.min(), times.max()), 2)
+        if np.isfinite(accelerations).all():
+            expected = expected + accelerations
+    return term.times, expected, term.f
+
+
+def _integrated(setup: Setup, space: Space[Any], rate: RateTerm, vectors: list[_Vectors]) -> Array:
+    """Return the attitudes that follow from the rates and from vectors known in both frames.
+
+    The integral of the rates is aligned with the vectors in windows that become longer, and every alignment yields a
+    better bias of the rates, with which they are integrated again.
+    """
+    knots = setup.knots
     order = np.argsort(rate.times, kind="stable")
-    matrices = attitudes_at(rate.times[order], rate.omega[order], knots)
-    profile = np.zeros((3, 3))
-    for term in points:
-        own = Body(space).matrices(term.y)
-        profile += np.einsum("nij,nkj->ik", own, matrices[_closest(knots, term.times)])
-    for stars in seen:
-        near = matrices[_closest(knots, stars.times)]
-        profile += np.einsum("nki,njl,nkl->ij", stars.reference, near, stars.seen)
-    for force, positions in forces:
-        near = matrices[_closest(knots, force.times)]
-        acceleration = CubicSpline(knots, positions, _R3)(force.times, 2)
-        profile += np.einsum("ni,njl,nl->ij", acceleration - force.gravity, near, force.f)
-    return _rotations(space, _nearest(profile) @ matrices)
+    bias = np.zeros(3) if rate.bias is None else np.array(setup.constants[rate.bias].start)
+    at = np.arange(len(knots))
+    matrices = attitudes_at(rate.times[order], rate.omega[order] - bias, knots)
+    for level in range(_WINDOWS - 1 if rate.bias is not None else 0, -1, -1):
+        profile = np.zeros((len(knots), 3, 3))
+        for times, fixed, body in vectors:
+            index = _closest(knots, times)
+            near = np.einsum("nij,nj->ni", matrices[index], body)
+            np.add.at(profile, index, fixed[:, :, None] * near[:, None, :])
+        if not level:
+            break
+        half = max(1, len(knots) >> (level + 1))
+        total = np.concatenate([np.zeros((1, 3, 3)), np.cumsum(profile, axis=0)])
+        windows = total[np.minimum(at + half + 1, len(knots))] - total[np.maximum(at - half, 0)]
+        sizes = np.linalg.svd(windows, compute_uv=False)
+        if not np.all(sizes[:, 1] > _RANK * sizes[:, 0]):
+            continue
+        # The aligned attitudes turn more slowly than the integrated ones by the remaining bias.
+        aligned = np.stack([_nearest(own) for own in windows]) @ matrices
+        steps = [np.swapaxes(own[:-1], -1, -2) @ own[1:] for own in (aligned, matrices)]
+        spin = np.swapaxes(steps[0], -1, -2) @ _SO3.log(steps[0], steps[1])
+        vector = np.stack([spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0]], axis=-1)
+        bias = bias + np.median(vector / np.diff(knots)[:, None], axis=0)
+        matrices = attitudes_at(rate.times[order], rate.omega[order] - bias, knots)
+    return _rotations(space, _nearest(profile.sum(axis=0)) @ matrices)
 
 
 def _closest(grid: Doubles, x: Doubles) -> NDArray[np.intp]:
