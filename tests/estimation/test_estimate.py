@@ -130,6 +130,13 @@ def test_unknown_attitude_and_large_bias_of_the_gyro():
         assert sensors.rms(SO3.distance(curve(g)[0], turn(g))) < 0.05
 
 
+def test_automatic_knots_of_long_recordings():
+    truth, t, seen, s, omega = gyro(34, end=400, attitudes=2000, rates=6000)
+    curve = ss.estimate(fused(t, seen, s, omega), "auto", "so:3")
+    assert len(curve.t) > 800 and curve.report.sigma < 1.1
+    assert errors(curve, truth, np.linspace(t[0], t[-1], 500))[0] < 0.04
+
+
 def test_lever_arm():
     turn, _, _, s, g, omega, force, y = imu(1)
     arm = np.array([0.4, -0.3, 0.2])

@@ -61,6 +61,8 @@ from .terms import Body, DirectionTerm, ForceTerm, PointTerm, RateTerm, Term, bi
 _FIT = Options("auto", 1e-12, None)
 # Automatic knots: the first number of them, per degree of freedom, and how often they are chosen.
 _FIRST, _PER_FREEDOM, _TRIES = 60, 4, 4
+# If residuals exceed their standard deviations by the first factor, there are so many times more knots in the next try.
+_LARGE, _MORE = 1.2, 4
 # The noise may exceed the given standard deviations by this factor without a warning.
 _FACTOR = 2.0
 _SO3 = SpecialOrthogonal(3)
@@ -240,6 +242,7 @@ def estimate(
         )
     terms, losses = _terms(given, axis, space, loss)
     constants = _constants(terms)
+    before = np.inf
     while True:
         times = axis.knots(shown)
         _check_range(terms, times)
@@ -251,11 +254,29 @@ def estimate(
         if found.failure or not automatic:
             break
         wanted = _PER_FREEDOM * int(np.ceil(max(report.df for report in found.reports))) + 8
+        if _misses(found, before):
+            # Too few knots for the motion: the degrees of freedom are not informative.
+            before, wanted = found.reports[0].sigma, max(wanted, _MORE * len(times))
+            automatic = (automatic[0] + 1, automatic[1])
         if automatic[0] == 0 or wanted <= 1.25 * len(times) or len(times) >= len(automatic[1]):
             break
         automatic = (automatic[0] - 1, automatic[1])
         shown = thin_knots(Knots(automatic[1], axis.knots(automatic[1])), wanted).t
     return _curve(setup, found, given, space, axis, shown, policy, on_failure)
+
+
+def _misses(found: Solution, before: float) -> bool:
+    """Whether the residuals are too large and more knots may help.
+
+    Parameters
+    ----------
+    found : Solution
+        Result with the present knots.
+    before : float
+        Ratio of the residuals and the standard deviations with fewer knots.
+    """
+    sigma = found.reports[0].sigma
+    return sigma > _LARGE and (any(report.at_bound for report in found.reports) or sigma < 0.95 * before)
 
 
 def _is_plain(points: Points) -> bool:
