@@ -20,6 +20,11 @@ SAYS = {
     "storms_from_a_table": "37 storms, 946 fixes, 5900 hours; fastest: Martin 2022",
     "noisy_gps": r"1\d degrees of freedom; half way known to 4\.\d m",
     "noisy_attitude": r"noise 1\.0\d degrees found; the curve is off by 0\.[45]\d degrees",
+    "star_tracker_and_gyro": r"gyro bias, degrees/s: 0\.59 ± 0\.01, -0\.4\d ± 0\.01, 0\.8\d ± 0\.01",
+    "ship_with_gaps": r"through the positions: up to 1\.\d km off\nwith speed and course: up to 0\.[45] km off\n"
+    r"distance sailed: 91\.\d ± 0\.7 km",
+    "drone_imu": r"positions: 0\.3\d m off with GPS only, 0\.[12]\d m with the IMU\nattitude: 0\.1\d degrees off",
+    "time_offset": r"offset 43\d\.\d ± 1\.8 ms; the true offset is 437 ms",
     "noisy_tensors": r"noise 0\.1[3-6] in every coordinate; the curve is off by 0\.1\d",
     "polar_wander": r"[5-8] degrees of freedom; 100 million years ago A95 is 2\.\d degrees",
     "noisy_camera": r"λ = 0\.05\d*, noise 0\.04\d m; λ = 0\.4\d*, noise 0\.05\d rad",
