@@ -7,6 +7,7 @@ import types
 from pathlib import Path
 
 import derivatives_figure
+import estimation
 import links
 import manifolds
 import many_curves
@@ -116,7 +117,7 @@ def test_code_runs(page, tmp_path, monkeypatch):
     assert page.stem != "derivatives" or names["gradient"].points.shape == (5, 3)
 
 
-@pytest.mark.parametrize("module", [manifolds, many_curves, smoothing], ids=lambda module: module.__name__)
+@pytest.mark.parametrize("module", [estimation, manifolds, many_curves, smoothing], ids=lambda module: module.__name__)
 def test_a_page_has_a_place_for_every_table(module):
     text = module.PAGE.read_text(encoding="utf-8")
     for part in module.PARTS:
