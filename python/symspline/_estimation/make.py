@@ -256,7 +256,7 @@ def estimate(
         wanted = _PER_FREEDOM * int(np.ceil(max(report.df for report in found.reports))) + 8
         if _misses(found, before):
             # Too few knots for the motion: the degrees of freedom are not informative.
-            before, wanted = found.reports[0].sigma, max(wanted, _MORE * len(times))
+            before, wanted = float(found.reports[0].sigma), max(wanted, _MORE * len(times))
             automatic = (automatic[0] + 1, automatic[1])
         if automatic[0] == 0 or wanted <= 1.25 * len(times) or len(times) >= len(automatic[1]):
             break
@@ -275,8 +275,8 @@ def _misses(found: Solution, before: float) -> bool:
     before : float
         Ratio of the residuals and the standard deviations with fewer knots.
     """
-    sigma = found.reports[0].sigma
-    return sigma > _LARGE and (any(report.at_bound for report in found.reports) or sigma < 0.95 * before)
+    sigma = float(found.reports[0].sigma)
+    return sigma > _LARGE and (any(bool(own.at_bound) for own in found.reports) or sigma < 0.95 * before)
 
 
 def _is_plain(points: Points) -> bool:
