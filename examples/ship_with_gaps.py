@@ -2,8 +2,8 @@
 A ship's track from position, speed and course
 ==============================================
 
-A ship reports its position, speed and course at irregular times with gaps of up to an hour. Speed and course show how
-the ship turned in between. The data are synthetic.
+A ship reports its position, speed and course at irregular times with gaps of up to 48 minutes. Speed and course show
+how the ship turned in between. The data are synthetic.
 """
 
 # %%

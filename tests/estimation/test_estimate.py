@@ -118,8 +118,8 @@ def test_spinning_bodies():
 def test_unknown_attitude_and_large_bias_of_the_gyro():
     """The initial attitude follows from accelerations, although the integral of the rates drifts by several radians."""
     for seed in (31, 32, 33):
-        turn, path, _, s, g, omega, force, y = imu(seed)
-        omega = omega + [0.1, -0.05, 0.2]
+        turn, _, _, s, g, omega, force, y = imu(seed)
+        omega = omega + np.array([0.1, -0.05, 0.2])
         curve = ss.estimate(
             [measure.Points(g, y, sigma=0.3, factor=1), *inertial(s, omega, force)],
             np.linspace(0, 30, 151),
