@@ -115,6 +115,8 @@ def test_spinning_bodies():
             curve = ss.estimate(fused(t, seen, s, omega), np.linspace(0, 60, 121), "so:3")
         assert curve.report.iterations <= 8 and curve.df < 5
         assert sensors.rms(SO3.distance(curve(t), turned)) < 0.03
+
+
 def test_unknown_attitude_and_large_bias_of_the_gyro():
     """The initial attitude follows from accelerations, although the integral of the rates drifts by several radians."""
     for seed in (31, 32, 33):

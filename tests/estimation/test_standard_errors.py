@@ -3,9 +3,9 @@
 import io
 import warnings
 
-import sensors
 import numpy as np
 import pytest
+import sensors
 from refused import raises
 
 import symspline as ss

@@ -129,6 +129,7 @@ impl<'a> Linear<'a> {
             energies: linearized.null(),
             straight: linearized.null() + STRAIGHT,
             balance: linearized.balance(),
+            most: f64::INFINITY,
             sigma: self.sigma,
         };
         choose(linearized, &scoring, |lam| self.look(lam), guess)
@@ -151,8 +152,9 @@ pub struct Scoring {
     pub energies: f64,
     /// The degrees of freedom below which every λ is equally good.
     pub straight: f64,
-    /// The λ at which data and energy have about the same weight.
+    /// The λ at which data and energy have about the same weight, and the largest one that may be chosen.
     pub balance: f64,
+    pub most: f64,
     /// The standard deviation of the noise, for [`Criterion::Cp`].
     pub sigma: f64,
 }
@@ -174,7 +176,7 @@ pub fn choose(
     let start = scoring.balance.log10();
     let (mut from, mut to) = (
         start + RANGE.0 + f64::from(linearized.penalised.power()) * linearized.basis.short().log10(),
-        start + RANGE.1,
+        (start + RANGE.1).min(scoring.most.log10()),
     );
     let bounds = (from, to);
     if let Some(guess) = guess {

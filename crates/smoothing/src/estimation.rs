@@ -388,7 +388,10 @@ impl<'a> Estimation<'a> {
         const SWEEPS: usize = 2;
         let unit = self.linearized.penalised.unit(self.linearized.basis.spacing);
         let mut lams: Vec<(f64, bool)> = (0..self.factors.len())
-            .map(|f| (given[f].or(guesses[f]).map_or_else(|| self.balance(f), |lam| lam / unit), false))
+            .map(|f| {
+                let known = given[f].or(guesses[f]).map_or_else(|| self.balance(f), |lam| lam / unit);
+                (known.min(self.most(f)), false)
+            })
             .collect();
         let sweeps = if self.factors.len() > 1 && guesses.contains(&None) { SWEEPS } else { 1 };
         for sweep in 0..sweeps {
@@ -404,6 +407,7 @@ impl<'a> Estimation<'a> {
                     energies: self.linearized.null() * dim,
                     straight: self.straight(f, &lams),
                     balance: self.balance(f),
+                    most: self.most(f),
                     sigma: 1.0,
                 };
                 let at = |lam: Lane| {
@@ -456,12 +460,20 @@ impl<'a> Estimation<'a> {
         }
     }
 
+    /// The largest λ of a factor, beyond which its curves have hardly any energy. The information about parameters is a
+    /// small difference of large matrices, and rounding errors would exceed it for larger λ.
+    fn most(&self, factor: usize) -> f64 {
+        /// The share of the limit without parameters.
+        const WITH_PARAMETERS: f64 = 1e-3;
+        let most = self.balance(factor) * self.linearized.penalised.stiffest(self.linearized.basis.knots());
+        if self.p > 0 { WITH_PARAMETERS * most } else { most }
+    }
+
     /// The degrees of freedom below which λ of a factor hardly matters: those of the other factors, and of its curves
     /// without energy.
     fn straight(&self, chosen: usize, lams: &[(f64, bool)]) -> f64 {
         let mut lanes: Vec<Lane> = lams.iter().map(|(lam, _)| lane(*lam)).collect();
-        let knots = self.linearized.basis.knots();
-        lanes[chosen] = lane(self.balance(chosen) * self.linearized.penalised.stiffest(knots));
+        lanes[chosen] = lane(self.most(chosen));
         let inverse = self.factored(&lanes).inverse();
         let freedom: f64 = self.freedoms(&inverse).into_iter().map(|x| x.as_array()[0]).sum();
         freedom + STRAIGHT * self.factors[chosen].dim() as f64

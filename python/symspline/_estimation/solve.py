@@ -281,7 +281,7 @@ class Iteration:
             if number >= setup.max_iter:
                 failure = (
                     f"No convergence of the estimate: the last step is {size:.1e} standard deviations after {number} "
-                    f"iterations (tol {setup.tol:.1e}). Raise max_iter, pass lam, or a better `start`."
+                    f"iterations (tol {setup.tol:.1e}). Pass more knots, lam or a better `start`, or raise max_iter."
                 )
                 break
         left = found.number - found.freedom
