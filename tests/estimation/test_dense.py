@@ -106,31 +106,33 @@ def dense_step(own, linear, lam, penalty):
     whole, right = np.concatenate(rows), np.concatenate(right)
     speed, acceleration = solve.bending(own.curves[0])
     spacing = KNOTS[-1] / (n - 1)
-    h = np.diff(KNOTS)
-    metric = np.zeros((n, n))
-    for i in range(n - 1):
-        pair = (
-            [[h[i] / 3, h[i] / 6], [h[i] / 6, h[i] / 3]] if penalty == "acceleration" else [[1 / h[i], -1 / h[i]]] * 2
-        )
-        pair = np.array(pair) * (1 if penalty == "acceleration" else np.array([[1], [-1]]))
-        metric[i : i + 2, i : i + 2] += pair
-    # Jacobi's operator: ξ'' + R(ξ, u)u, with R(ξ, u)u = -[u, [u, ξ]] and [x, [y, z]] = x × (y × z) / 4 on SO(3).
-    u, a = speed / spacing, acceleration / spacing**2
-    cross = -np.cross(np.eye(m), u[:, None]).swapaxes(1, 2)
-    operator = np.kron(basis(KNOTS, 2, penalty), np.eye(m)).reshape(n, m, n, m)
-    operator[np.arange(n), :, np.arange(n)] -= cross @ cross / 4
-    if penalty == "acceleration":
-        operator[[0, -1]] = np.kron(basis(KNOTS[[0, -1]], 2, penalty), np.eye(m)).reshape(2, m, n, m)
-    operator = operator.reshape(n * m, n * m)
-    metric = np.kron(metric, np.eye(m))
-    gradient = operator.T @ metric @ a.ravel()
+    # Jacobi's operator: ξ'' + R(ξ, u)u, with R(ξ, u)u = -[u, [u, ξ]] and [x, [y, z]] = x × (y × z) / 4 on SO(3). The
+    # jerk changes by R(ξ, u)a = [a, [ξ, u]], too, half of which belongs to either end of a segment.
+    u, a, h = speed / spacing, acceleration / spacing**2, np.diff(KNOTS)
+    unit = np.eye(m)
+    bend = np.cross(u[:, None], np.cross(unit, u[:, None])).swapaxes(1, 2) / 4
+    twist = np.cross(a[:, None], np.cross(unit, u[:, None])).swapaxes(1, 2) / 4
+    flat = np.kron(basis(KNOTS, 2, penalty), unit).reshape(n, m, n * m)
+    values = np.eye(n * m).reshape(n, m, n * m)
+    first, last = bend[:-1], bend[1:]
     if penalty == "jerk":
-        j, further = np.diff(a, axis=0) / h[:, None], np.zeros((n, m))
-        further[:-1] += h[:, None] / 8 * np.cross(u[:-1], np.cross(j, a[:-1]))
-        further[1:] += h[:, None] / 8 * np.cross(u[1:], np.cross(j, a[1:]))
-        gradient += further.ravel()
+        first, last = first - h[:, None, None] / 2 * twist[:-1], last + h[:, None, None] / 2 * twist[1:]
+    else:
+        first, last = first.copy(), last.copy()
+        first[0] = last[-1] = 0
+    left, right_end = flat[:-1] + first @ values[:-1], flat[1:] + last @ values[1:]
+    if penalty == "jerk":
+        rows = (right_end - left) / np.sqrt(h)[:, None, None]
+        known = np.diff(a, axis=0) / np.sqrt(h)[:, None]
+    else:
+        # Two Gauss points integrate products of linear functions exactly.
+        share, root = np.array([0.5 - 0.5 / np.sqrt(3), 0.5 + 0.5 / np.sqrt(3)]), np.sqrt(h / 2)[:, None, None]
+        rows = np.concatenate([root * ((1 - x) * left + x * right_end) for x in share])
+        known = np.concatenate([root[..., 0] * ((1 - x) * a[:-1] + x * a[1:]) for x in share])
+    rows = rows.reshape(-1, n * m)
+    gradient = rows.T @ known.ravel()
     matrix = whole.T @ whole
-    matrix[: n * m, : n * m] += lam * operator.T @ metric @ operator
+    matrix[: n * m, : n * m] += lam * rows.T @ rows
     vector = whole.T @ right
     vector[: n * m] -= lam * gradient
     cov, x = np.linalg.inv(matrix), np.linalg.solve(matrix, vector)

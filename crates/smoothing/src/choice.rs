@@ -38,8 +38,7 @@ pub struct Linear<'a> {
 }
 
 impl<'a> Linear<'a> {
-    /// `curvature` is g, the part of the energy's gradient that is due to curvature, and `further` the part of it that
-    /// Jacobi's operator does not include.
+    /// `curvature` is g, the part of the energy's gradient that is due to curvature.
     pub fn new(
         linearized: &'a LinearProblem,
         m: usize,
@@ -47,17 +46,12 @@ impl<'a> Linear<'a> {
         jacobi: Option<&'a JacobiOperator>,
         periodic: Option<&'a PeriodicCorrection>,
         accelerations: &'a [f64],
-        [curvature, further]: [&[f64]; 2],
+        curvature: &[f64],
         sigma: f64,
     ) -> Self {
         let mut pull = misfit.pull(linearized, m);
         let mut stiffness = match jacobi {
-            Some(jacobi) => {
-                let mut out = jacobi.pull(linearized, accelerations);
-                let rows = linearized.values.iter().zip(further.chunks_exact(m));
-                rows.for_each(|(row, x)| row.spread(x, &mut out));
-                out
-            }
+            Some(jacobi) => jacobi.pull(linearized, accelerations),
             None => linearized.stiffness(accelerations, curvature, m),
         };
         if let Some(periodic) = periodic {
@@ -105,12 +99,14 @@ impl<'a> Linear<'a> {
         let freedom = self.misfit.freedom(linearized, &factors.inverse_band());
         let rss = self.misfit.rss(linearized, m, &x);
         // (a + Sδ)ᵀM(a + Sδ), with Jacobi's operator (a + (S + RP)δ)ᵀM(a + (S + RP)δ).
-        let bend = |i: usize, c: usize| {
-            let turned =
-                self.jacobi.map_or(Lane::ZERO, |jacobi| jacobi.of_lanes(linearized, i, &x, c, (0, m)));
-            lane(self.accelerations[i * m + c]) + linearized.accelerations[i].of_lanes(&x, m, c) + turned
+        let bend = |at: (usize, usize), c: usize| {
+            let of_jacobi = |jacobi: &JacobiOperator| jacobi.of_lanes(linearized, at, &x, c, (0, m));
+            let turned = self.jacobi.map_or(Lane::ZERO, of_jacobi);
+            let flat = linearized.accelerations[at.1].of_lanes(&x, m, c);
+            lane(self.accelerations[at.1 * m + c]) + flat + turned
         };
-        let energy = (0..m).fold(Lane::ZERO, |sum, c| sum + linearized.energy(|i| bend(i, c)));
+        let differ = self.jacobi.is_some_and(JacobiOperator::differs);
+        let energy = (0..m).fold(Lane::ZERO, |sum, c| sum + linearized.energy(differ, |at| bend(at, c)));
         // A matrix that is rounding errors only may have impossible degrees of freedom.
         let least = lane(0.9 * linearized.null().min(linearized.free() as f64));
         let sound = factors.least_pivot().simd_gt(Lane::ZERO) & freedom.simd_gt(least);

@@ -3,7 +3,7 @@
 use crate::banded::Banded;
 use crate::choice::Linear;
 use crate::cyclic::PeriodicCorrection;
-use crate::frames::{Frames, curvature_gradient, jerk_term};
+use crate::frames::{Frames, curvature_gradient};
 use crate::gauss_newton::{self, Pull};
 use crate::information::{self, Root};
 use crate::jacobi_operator::JacobiOperator;
@@ -224,21 +224,22 @@ impl<'a> CurveFit<'a> {
         let mut speeds = frames.coordinates(&self.velocities, |i| i);
         accelerations.iter_mut().for_each(|x| *x *= spacing * spacing);
         speeds.iter_mut().for_each(|x| *x *= spacing);
-        let curvature =
-            [curvature_gradient, jerk_term].map(|of| of(space, linearized, &speeds, &accelerations));
-        let curvature: [&[f64]; 2] = [&curvature[0], &curvature[1]];
+        let curvature = curvature_gradient(space, linearized, &speeds, &accelerations);
         let sigma = data.sigma.unwrap_or(f64::NAN);
         let closed = self.ends == Ends::Periodic;
         let periodic = closed.then(|| PeriodicCorrection { overlap: OVERLAP, m, turn: frames.round() });
         let seen_with = |misfit, jacobi| {
-            Linear::new(linearized, m, misfit, jacobi, periodic.as_ref(), &accelerations, curvature, sigma)
+            Linear::new(linearized, m, misfit, jacobi, periodic.as_ref(), &accelerations, &curvature, sigma)
         };
         let (jacobi, later);
-        jacobi = self.progress.with_curvature.then(|| JacobiOperator::new(space, linearized, &speeds));
+        jacobi = self
+            .progress
+            .with_curvature
+            .then(|| JacobiOperator::new(space, linearized, &speeds, &accelerations));
         let mut linear = seen_with(misfit, jacobi.as_ref());
         let mut lam = self.progress.weigh(space, &linear, &speeds, &self.robust, options.criterion);
         if self.progress.with_curvature && linear.jacobi.is_none() {
-            later = JacobiOperator::new(space, linearized, &speeds);
+            later = JacobiOperator::new(space, linearized, &speeds, &accelerations);
             linear = seen_with(misfit, Some(&later));
             lam = self.progress.weigh(space, &linear, &speeds, &self.robust, options.criterion);
         }

@@ -13,7 +13,6 @@
 use crate::banded::{Banded, stride};
 use crate::bordered::{Bordered, Inverse};
 use crate::choice::{Look, STRAIGHT, Scoring, choose};
-use crate::frames::jerk_term;
 use crate::jacobi_operator::JacobiOperator;
 use crate::linearized::{Basis, LinearProblem, Row};
 use crate::path::Position;
@@ -120,7 +119,7 @@ impl<'a> Estimation<'a> {
             .iter()
             .map(|own| {
                 let curved = own.space.curvature() != 0.0;
-                curved.then(|| JacobiOperator::new(own.space, &linearized, own.speeds))
+                curved.then(|| JacobiOperator::new(own.space, &linearized, own.speeds, own.accelerations))
             })
             .collect();
         let stiffness = factors
@@ -131,11 +130,7 @@ impl<'a> Estimation<'a> {
                     let flat = vec![0.0; own.accelerations.len()];
                     return linearized.stiffness(own.accelerations, &flat, own.dim());
                 };
-                let mut out = jacobi.pull(&linearized, own.accelerations);
-                let further = jerk_term(own.space, &linearized, own.speeds, own.accelerations);
-                let rows = linearized.values.iter().zip(further.chunks_exact(own.dim()));
-                rows.for_each(|(row, x)| row.spread(x, &mut out));
-                out
+                jacobi.pull(&linearized, own.accelerations)
             })
             .collect();
         let mut penalty = vec![0.0; linearized.basis.count() * m * stride(m)];
@@ -351,14 +346,17 @@ impl<'a> Estimation<'a> {
     fn penalty_at(&self, chosen: usize, lam: Lane, x: &[Lane]) -> Lane {
         let (own, first, dim) = (self.factors[chosen], self.first[chosen], self.factors[chosen].dim());
         let (x, rows) = (&x[self.p..], &self.linearized.accelerations);
-        let turned = |i: usize, c: usize| {
-            let jacobi = self.jacobi[chosen].as_ref();
-            jacobi.map_or(Lane::ZERO, |jacobi| jacobi.of_lanes(&self.linearized, i, x, c, (first, self.m)))
+        let jacobi = self.jacobi[chosen].as_ref();
+        let turned = |at: (usize, usize), c: usize| {
+            jacobi.map_or(Lane::ZERO, |jacobi| jacobi.of_lanes(&self.linearized, at, x, c, (first, self.m)))
         };
-        let bend = |i: usize, c: usize| {
-            lane(own.accelerations[i * dim + c]) + rows[i].of_lanes(x, self.m, first + c) + turned(i, c)
+        let bend = |at: (usize, usize), c: usize| {
+            let i = at.1;
+            lane(own.accelerations[i * dim + c]) + rows[i].of_lanes(x, self.m, first + c) + turned(at, c)
         };
-        lam * (0..dim).fold(Lane::ZERO, |sum, c| sum + self.linearized.energy(|i| bend(i, c)))
+        let differ = jacobi.is_some_and(JacobiOperator::differs);
+        let energy = |c: usize| self.linearized.energy(differ, |at| bend(at, c));
+        lam * (0..dim).fold(Lane::ZERO, |sum, c| sum + energy(c))
     }
 
     fn look(&self, chosen: usize, lams: &[Lane]) -> Look {

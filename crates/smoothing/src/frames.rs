@@ -180,8 +180,9 @@ pub fn curvature_terms(space: &Erased, speeds: &[f64], accelerations: &[f64]) ->
 /// g, the contribution of curvature to half the gradient of the energy, for velocities u and accelerations a at the
 /// knots.
 ///
-/// If the curve moves by ξ, a changes by ξ'' + R(ξ, u)u, whose transpose turns Ma into R(Ma, u)u. Without the matrix R
-/// it is MR(a, u)u, which is the same up to the distance of the knots.
+/// If the curve moves by ξ, a changes by ξ'' + R(ξ, u)u, and ∇a by the derivative of that and by R(ξ, u)a. R is
+/// symmetric in pairs, so that the gradients are R(a, u)u and, for the jerk j, R(Da, u)u + R(j, a)u, where D is the
+/// stiffness matrix of hat functions.
 pub fn curvature_gradient(
     space: &Erased,
     linearized: &LinearProblem,
@@ -189,36 +190,14 @@ pub fn curvature_gradient(
     accelerations: &[f64],
 ) -> Vec<f64> {
     let (m, basis, penalty) = (space.dim(), &linearized.basis, linearized.penalised);
-    match penalty {
-        Penalty::Acceleration => {
-            times_metric(basis, penalty, &curvature_terms(space, speeds, accelerations), m)
-        }
-        Penalty::Jerk => {
-            let mut out = curvature_terms(space, speeds, &times_metric(basis, penalty, accelerations, m));
-            let further = jerk_term(space, linearized, speeds, accelerations);
-            out.iter_mut().zip(further).for_each(|(x, y)| *x += y);
-            out
-        }
+    if penalty == Penalty::Acceleration {
+        return times_metric(basis, penalty, &curvature_terms(space, speeds, accelerations), m);
     }
-}
-
-/// The part of g for the jerk j that is due to the derivative along the curve: if the curve moves by ξ, ∇a changes by
-/// the derivative of the change of a and by R(ξ, u)a. R is symmetric in pairs, so that the gradient is R(j, a)u.
-/// Integrals over segments by the trapezoidal rule.
-pub fn jerk_term(
-    space: &Erased,
-    linearized: &LinearProblem,
-    speeds: &[f64],
-    accelerations: &[f64],
-) -> Vec<f64> {
-    let (m, basis) = (space.dim(), &linearized.basis);
-    let mut out = vec![0.0; accelerations.len()];
-    if linearized.penalised == Penalty::Acceleration {
-        return out;
-    }
+    let mut out = curvature_terms(space, speeds, &times_metric(basis, penalty, accelerations, m));
     let segments = basis.knots() - 1;
     let jerk = |at: usize| (accelerations[at + m] - accelerations[at]) / basis.h(at / m);
     let jerks: Vec<f64> = (0..segments * m).map(jerk).collect();
+    // The integral over a segment by the trapezoidal rule: half of it belongs to either end.
     for end in 0..2 {
         let at = |x: &[f64]| x[end * m..][..segments * m].to_vec();
         let terms = triples(space, [&at(speeds), &jerks, &at(accelerations)]);
@@ -230,7 +209,7 @@ pub fn jerk_term(
 }
 
 /// The triple products [x, [y, z]] of coordinates, one after another.
-fn triples(space: &Erased, arrays: [&[f64]; 3]) -> Vec<f64> {
+pub fn triples(space: &Erased, arrays: [&[f64]; 3]) -> Vec<f64> {
     let m = space.dim();
     let count = arrays[0].len() / m;
     let mut out = vec![0.0; arrays[0].len()];

@@ -319,15 +319,16 @@ impl LinearProblem {
         out
     }
 
-    /// The energy aᵀMa of one coordinate, given its acceleration at every knot.
-    pub fn energy(&self, acceleration: impl Fn(usize) -> Lane) -> Lane {
+    /// The energy aᵀMa of one coordinate, given its acceleration at the first (0) or last (1) end of a segment, which is
+    /// a knot. If `differ` is false, both are the same.
+    pub fn energy(&self, differ: bool, acceleration: impl Fn((usize, usize)) -> Lane) -> Lane {
         let mut energy = Lane::ZERO;
-        let mut left = acceleration(0);
+        let mut left = acceleration((0, 0));
         for i in 0..self.basis.knots() - 1 {
-            let right = acceleration(i + 1);
+            let right = acceleration((1, i + 1));
             let (own, other) = of_segment(self.penalised, self.basis.h(i));
             energy += (left * left + right * right) * lane(own) + left * right * lane(2.0 * other);
-            left = right;
+            left = if differ { acceleration((0, i + 1)) } else { right };
         }
         energy
     }
@@ -446,12 +447,12 @@ mod tests {
         // ∫ x'''² of a function whose third derivative is constant on every segment.
         let square = |s: usize| value(basis, &c, s, 0.5, 3).powi(2) * basis.h(s);
         let exact: f64 = (0..5).map(square).sum();
-        let acceleration = |i: usize| {
+        let acceleration = |(_, i): (usize, usize)| {
             let mut x = [0.0];
             linearized.accelerations[i].apply(&c, &mut x);
             lane(x[0])
         };
-        let energy = linearized.energy(acceleration).as_array()[0];
+        let energy = linearized.energy(false, acceleration).as_array()[0];
         let form: f64 = (0..6)
             .flat_map(|i| (0..=WIDTH.min(i)).map(move |d| (i, d)))
             .map(|(i, d)| linearized.penalty[i * BAND + d] * c[i] * c[i - d] * if d > 0 { 2.0 } else { 1.0 })
