@@ -206,7 +206,7 @@ def gtsam_wnoa(gtsam: Any, data: Gyro, strength: float) -> Found:
 
 
 def symspline(data: Gyro, **options: Any) -> Found:
-    curve = ss.estimate(data.terms(), 81, SO3, **options)
+    curve = ss.estimate(data.terms(), 81, SO3, criterion="gcv", **options)
     bias = curve.parameters["gyro bias"]
     return Found(curve(data.t), ss.rotations.angular_velocity(curve, data.s), bias.value, bias.std)
 

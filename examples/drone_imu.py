@@ -41,8 +41,7 @@ alone = ss.make_smoothing_spline(t, gps, "r:3")
 # %%
 # All sensors
 # -----------
-# The accelerometer measures the second derivative. The penalty on the jerk leaves accelerations free at the ends, and
-# restricted likelihood chooses λ such that the biases are not smoothed away.
+# The accelerometer measures the second derivative. The penalty on the jerk leaves accelerations free at the ends.
 
 curve = ss.estimate(
     [
@@ -53,7 +52,6 @@ curve = ss.estimate(
     np.linspace(0, end, 151),
     space,
     penalty="jerk",
-    criterion="reml",
 )
 
 x = np.linspace(t[0], t[-1], 1000)

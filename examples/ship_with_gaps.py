@@ -34,8 +34,7 @@ y = globe.exp(truth(t), metres / radius * globe.random_tangent(rng, truth(t)))
 # Position, speed and course
 # --------------------------
 # Speed and course at a measured position are a tangent vector there, in radians per second: north and east are two unit
-# vectors, and the course is the angle from north. There are few reports, for which restricted likelihood chooses λ more
-# reliably than cross-validation.
+# vectors, and the course is the angle from north.
 
 lon_y, lat_y = np.radians(ss.geo.to_lonlat(y))
 to_east = np.stack([-np.sin(lon_y), np.cos(lon_y), 0 * lon_y], axis=-1)
@@ -50,7 +49,6 @@ curve = ss.estimate(
     [positions, ss.measure.Velocities(t, y, v, sigma=metres_per_second / radius)],
     60,
     globe,
-    criterion="reml",
 )
 
 x = np.linspace(t[0], t[-1], 800)

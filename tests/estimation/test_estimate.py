@@ -98,6 +98,7 @@ def test_position_and_imu():
     assert sensors.rms(at[:, :3, 3] - path(g)) < 1.25 * sensors.rms(product(g)[1] - path(g))
     assert sensors.rms(SO3.distance(at[:, :3, :3], turn(g))) < 1.25 * sensors.rms(SO3.distance(product(g)[0], turn(g)))
     assert [own.shape for own in poses.cov(g)] == [(len(g), 3, 3)] * 2
+    assert poses.plot().axes
     assert [own.shape for own in poses.std(g)] == [(len(g),)] * 2
 
 

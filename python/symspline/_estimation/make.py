@@ -73,7 +73,7 @@ class EstimateOptions(TypedDict, total=False):
 
     penalty: SmoothingPenalty
     lam: Numbers | None
-    criterion: Criterion
+    criterion: Criterion | None
     gamma: float
     loss: Loss
     start: Curve[Any] | None
@@ -109,7 +109,7 @@ def estimate(
     *,
     penalty: SmoothingPenalty = "acceleration",
     lam: Numbers | None = None,
-    criterion: Criterion = "gcv",
+    criterion: Criterion | None = None,
     gamma: float = 1.4,
     loss: Loss = "linear",
     start: Curve[Any] | None = None,
@@ -140,8 +140,10 @@ def estimate(
     lam : float or tuple, optional
         Weight λ ≥ 0 of the penalty, for products and poses also a tuple with one entry per part. None, the default,
         lets `criterion` choose λ.
-    criterion : {"gcv", "reml", "cp"}, default "gcv"
-        Criterion for λ, as for `make_smoothing_spline`. With ``"cp"``, the standard deviations must be right.
+    criterion : {"reml", "gcv", "cp"}, optional
+        Criterion for λ, as for `make_smoothing_spline`. The default is ``"reml"``, and ``"gcv"`` for a single `Points`
+        term. Cross-validation smooths slow effects such as biases away where sensors differ in number and accuracy,
+        and the covariance does not contain that error. With ``"cp"``, the standard deviations must be right.
     gamma : float, default 1.4
         Weight of a degree of freedom in ``"gcv"``.
     loss : {"linear", "huber", "cauchy"}, default "linear"
@@ -228,7 +230,8 @@ def estimate(
     if not given:
         raise ValidationError("there are no measurements")
     one_of(penalty, "penalty", "acceleration", "jerk")
-    one_of(criterion, "criterion", "gcv", "reml", "cp")
+    if criterion is not None:
+        one_of(criterion, "criterion", "gcv", "reml", "cp")
     one_of(loss, "loss", "linear", "huber", "cauchy")
     gamma = checked_number(gamma, "gamma must be a number >= 1", lambda x: 1 <= x < np.inf)
     tol = checked_number(tol, "tol must be a number > 0", lambda x: 0 < x < np.inf)
@@ -238,7 +241,20 @@ def estimate(
     axis, shown, automatic = _knots(knots, given)
     if len(given) == 1 and isinstance(given[0], Points) and _is_plain(given[0]) and start is None:
         return _smoothed(
-            given[0], shown, knots, space, penalty, lam, criterion, gamma, loss, tol, most, policy, on_failure, progress
+            given[0],
+            shown,
+            knots,
+            space,
+            penalty,
+            lam,
+            criterion or "gcv",
+            gamma,
+            loss,
+            tol,
+            most,
+            policy,
+            on_failure,
+            progress,
         )
     terms, losses = _terms(given, axis, space, loss)
     constants = _constants(terms)
@@ -248,7 +264,7 @@ def estimate(
         _check_range(terms, times)
         if penalty == "jerk" and len(times) < 4:
             raise ValidationError(f"penalty='jerk' needs at least 4 knots, but there are {len(times)}")
-        setup = Setup(spaces, times, terms, losses, constants, penalty, criterion, gamma, tol, lams, most)
+        setup = Setup(spaces, times, terms, losses, constants, penalty, criterion or "reml", gamma, tol, lams, most)
         points = _start(setup, space, axis, shown, start)
         found = Iteration(setup, points, progress).run()
         if found.failure or not automatic:

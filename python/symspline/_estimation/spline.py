@@ -18,9 +18,16 @@ from .._smoothing.posterior import Parameter, Posterior
 from .._smoothing.report import SmoothingReport
 from .._smoothing.solve import Smoothed
 from .._smoothing.spline import SmoothingSpline, radius
-from .._spaces import Array, Doubles, Product, Space, SpecialOrthogonal, factors_of, parts_of
+from .._spaces import Array, Doubles, Product, Space, SpecialEuclidean, SpecialOrthogonal, factors_of, parts_of
 from .._typing import P
 from .measurements import BodyRates, Measurement, Points, SpecificForce
+
+
+def _are_partial(points: Points, factor: Space[Any]) -> bool:
+    """Whether points are positions or rotations of poses only."""
+    y: Any = points.y
+    partial = isinstance(factor, SpecialEuclidean) and not isinstance(y, tuple)
+    return partial and np.shape(y)[1:] != factor.point_shape
 
 
 def joint(report: SmoothingReport, band: Doubles, side: Doubles, corner: Doubles, size: int, first: int) -> Smoothed:
@@ -140,6 +147,8 @@ class EstimatedSpline(SmoothingSpline[P, Any]):
             if own.factor is None and isinstance(self.space, Product):
                 y = parts_of(y, self.space, "y")[number]
                 weights = weights[number] if isinstance(weights, tuple) else weights
+            if _are_partial(own, factor):
+                continue
             rows = factor._numbers(factor._doubles(y, "y"))
             used = factor._where_finite(rows) & _are_used(weights, len(rows))
             times.append(self._times_of(own)[used])
@@ -155,7 +164,7 @@ class EstimatedSpline(SmoothingSpline[P, Any]):
         ]
         kinds = [type(own).__name__ for own in self._measurements]
         for number, (own, kind) in enumerate(zip(self._measurements, kinds, strict=True)):
-            if isinstance(own, Points):
+            if isinstance(own, Points) and not _are_partial(own, factors_of(self.space)[own.factor or 0]):
                 continue
             label = kind if kinds.count(kind) == 1 else f"{kind} {kinds[: number + 1].count(kind)}"
             given = self._residuals[number]
