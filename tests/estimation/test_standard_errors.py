@@ -153,7 +153,9 @@ def fused(rng, space, force=True):
     else:
         seen_at = measure.Points(t, y, sigma=0.1, factor=1)
     sensor = measure.SpecificForce(t, read, sigma=0.1, gravity=GRAVITY)
-    return ss.estimate([seen_at, gyro(rng, truth, t), sensor], np.linspace(0, 10, 41), space, penalty="jerk")
+    return ss.estimate(
+        [seen_at, gyro(rng, truth, t), sensor], np.linspace(0, 10, 41), space, penalty="jerk", criterion="gcv"
+    )
 
 
 def apart(many, spline):

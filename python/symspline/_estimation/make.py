@@ -65,6 +65,8 @@ _FIRST, _PER_FREEDOM, _TRIES = 60, 4, 4
 _LARGE, _MORE = 1.2, 4
 # The noise may exceed the given standard deviations by this factor without a warning.
 _FACTOR = 2.0
+# Curves with the largest λ for the jerk have fewer degrees of freedom than this.
+_PARABOLA = 3.5
 _SO3 = SpecialOrthogonal(3)
 
 
@@ -645,7 +647,9 @@ def _curve(
     )
     if found.failure:
         raise_or_warn([Fault(0, UNCONVERGED, found.failure)], on_failure, curve)
-    chosen = [np.isnan(np.asarray(own)) for own in setup.lams]
+    # Parabolas have no jerk, which is no reason for a warning.
+    stiff = [setup.penalty == "jerk" and report.df < _PARABOLA for report in found.reports]
+    chosen = [np.asarray(np.isnan(lam) and not own) for lam, own in zip(setup.lams, stiff, strict=True)]
     warn_of_bounds(space, list(found.reports), chosen, [np.asarray(np.inf)] * len(setup.spaces))
     sigma = found.reports[0].sigma
     if sigma > _FACTOR and np.isnan(setup.lams).all():

@@ -251,7 +251,7 @@ def _smoothing_options(options: argparse.Namespace) -> dict[str, Any] | None:
 def _estimation_options(options: argparse.Namespace, smooth: dict[str, Any]) -> dict[str, Any]:
     """Return the options of `symspline.estimate`."""
     kept = {name: smooth[name] for name in ("lam", "loss", "penalty")}
-    criterion = options.smooth if options.smooth in _CRITERIA else "gcv"
+    criterion = options.smooth if options.smooth in _CRITERIA else None
     return {**kept, "criterion": criterion, "extrapolate": _EXTRAPOLATE.get(options.extrapolate)}
 
 
