@@ -647,7 +647,7 @@ def _curve(
     )
     if found.failure:
         raise_or_warn([Fault(0, UNCONVERGED, found.failure)], on_failure, curve)
-    # Parabolas have no jerk, which is no reason for a warning.
+    # Parabolas have no jerk, so that the largest λ does not need a warning.
     stiff = [setup.penalty == "jerk" and report.df < _PARABOLA for report in found.reports]
     chosen = [np.asarray(np.isnan(lam) and not own) for lam, own in zip(setup.lams, stiff, strict=True)]
     warn_of_bounds(space, list(found.reports), chosen, [np.asarray(np.inf)] * len(setup.spaces))
