@@ -282,7 +282,7 @@ impl<'a> CurveFit<'a> {
         let tol = self.robust.tol(options.tol);
         let small = self.progress.judge(&step, &deviations, reach, tol, self.robust.reweighs());
         self.inverse = Some(inverse);
-        self.known = Some(Known::new(&linear.matrix(lam)));
+        self.known = Some(linear.matrix(lam).known());
         let taken = self.progress.report.iterations - self.progress.begun;
         let over = taken >= self.robust.most(options.max_iter);
         if !self.robust.last() && self.progress.settled && (small || over) {
@@ -297,7 +297,7 @@ impl<'a> CurveFit<'a> {
                 let system = linear.factored(lane(lam / softness));
                 let band = system.inverse_band();
                 self.inverse = Some(system.mean(&band));
-                self.known = Some(Known::new(&linear.matrix(lam / softness)));
+                self.known = Some(linear.matrix(lam / softness).known());
                 self.progress.note(&linear, &band, lam / softness, softness);
             }
             self.progress.report.state =

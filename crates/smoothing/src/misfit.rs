@@ -9,6 +9,7 @@ use crate::cyclic::{Factored, PeriodicCorrection};
 use crate::information::Seen;
 use crate::jacobi_operator::JacobiOperator;
 use crate::linearized::{LinearProblem, OVERLAP, Row};
+use crate::problem::Known;
 use std::borrow::Cow;
 use symspline_core::scalar::{LANES, Lane, few, lane};
 
@@ -51,6 +52,19 @@ pub struct Whole {
     pub coupled: usize,
     /// The continuation of a closed curve, for the coupled coordinates.
     pub periodic: Option<PeriodicCorrection>,
+}
+
+impl Whole {
+    /// The matrix of the first lane as plain numbers.
+    pub fn known(&self) -> Known {
+        let rows = stride(self.coupled);
+        let entry = |at: usize| {
+            let (i, d) = (at / rows, at % rows);
+            if d <= i { self.matrix.at(i, i - d).as_array()[0] } else { 0.0 }
+        };
+        let turn = self.periodic.as_ref().map_or_else(Vec::new, |periodic| periodic.turn.clone());
+        Known { coupled: self.coupled, matrix: (0..self.matrix.size * rows).map(entry).collect(), turn }
+    }
 }
 
 impl<'a> Misfit<'a> {

@@ -2,7 +2,6 @@
 
 use crate::banded::stride;
 use crate::cyclic::PeriodicCorrection;
-use crate::misfit::Whole;
 use std::f64::consts::PI;
 use symspline_core::fit::{End, Ends as FitEnds};
 use symspline_core::scalar::few;
@@ -236,18 +235,6 @@ pub struct Known {
 }
 
 impl Known {
-    /// From A for one λ.
-    pub(crate) fn new(whole: &Whole) -> Self {
-        let Whole { matrix, coupled, periodic } = whole;
-        let rows = stride(*coupled);
-        let entry = |at: usize| {
-            let (i, d) = (at / rows, at % rows);
-            if d <= i { matrix.at(i, i - d).as_array()[0] } else { 0.0 }
-        };
-        let turn = periodic.as_ref().map_or_else(Vec::new, |periodic| periodic.turn.clone());
-        Known { coupled: *coupled, matrix: (0..matrix.size * rows).map(entry).collect(), turn }
-    }
-
     /// The same for m coupled coordinates.
     pub fn of_all(&self, m: usize) -> Known {
         if self.coupled == m {

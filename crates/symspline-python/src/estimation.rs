@@ -2,7 +2,6 @@
 
 use crate::arrays::{in_order, zeros};
 use crate::errors::invalid;
-use crate::smoothing::criterion_named;
 use crate::space::Handle;
 use crate::watch::watched;
 use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
@@ -10,7 +9,7 @@ use pyo3::prelude::*;
 use symspline_engine::smoothing::along::Along;
 use symspline_engine::smoothing::estimation::{Estimation, Factor, Measurements};
 use symspline_engine::smoothing::posterior::Posterior;
-use symspline_engine::smoothing::{EndCondition, Ends, Penalty, positions};
+use symspline_engine::smoothing::{Criterion, EndCondition, Ends, Penalty, positions};
 use symspline_engine::space::{Ambient, Origin};
 
 type Array<'py> = PyReadonlyArrayDyn<'py, f64>;
@@ -53,6 +52,18 @@ pub fn penalty_named(name: &str) -> PyResult<Penalty> {
         "jerk" => Ok(Penalty::Jerk),
         _ => Err(invalid(format!("penalty must be 'acceleration' or 'jerk', not {name:?}"))),
     }
+}
+
+/// The criterion of this name.
+pub fn criterion_named(name: &str, gamma: f64) -> PyResult<Criterion> {
+    Ok(match name {
+        "gcv" => Criterion::Gcv { gamma },
+        "reml" => Criterion::Reml,
+        "cp" => Criterion::Cp,
+        _ => {
+            return Err(invalid(format!("criterion must be 'gcv', 'reml' or 'cp', not {name:?}")));
+        }
+    })
 }
 
 /// The ends of an open curve with a penalty.

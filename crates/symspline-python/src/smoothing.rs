@@ -3,14 +3,14 @@
 use crate::arrays::{in_order, reserve, zeros};
 use crate::curves::EndOf;
 use crate::errors::invalid;
-use crate::estimation::{ends_named, penalty_named};
+use crate::estimation::{criterion_named, ends_named, penalty_named};
 use crate::space::Handle;
 use crate::watch::{Progress, is_heavy, watched};
 use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyListMethods, PyTuple, PyTupleMethods};
 use symspline_engine::smoothing::{
-    Criterion, Data, Loss, Observations, Options, Report, Smooth, State, Tier, chi, smooth as run,
+    Data, Loss, Observations, Options, Report, Smooth, State, Tier, chi, smooth as run,
     variance as variance_at,
 };
 use symspline_engine::space::{Ambient, Origin};
@@ -185,18 +185,6 @@ fn gathered<'py>(
     }
     drop(write);
     Ok(out)
-}
-
-/// The criterion of this name.
-pub fn criterion_named(name: &str, gamma: f64) -> PyResult<Criterion> {
-    Ok(match name {
-        "gcv" => Criterion::Gcv { gamma },
-        "reml" => Criterion::Reml,
-        "cp" => Criterion::Cp,
-        _ => {
-            return Err(invalid(format!("criterion must be 'gcv', 'reml' or 'cp', not {name:?}")));
-        }
-    })
 }
 
 /// state, iterations, lam, band_lam, at_bound, freedom, sigma, step, rate, kappa, exact.
