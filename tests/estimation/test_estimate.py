@@ -318,6 +318,8 @@ def test_samples_of_batches_products_and_closed_curves():
     assert batch.sample(rng, 5)(3.5).shape == (5, 2, 2)
     assert batch.cov([1.5, 2.5, 3.5]).shape == (2, 3, 2, 2) and batch.frames([1.5]).shape == (2, 1, 2, 2)
     assert np.allclose(np.sqrt(batch.cov(2.5)[..., 0, 0]), batch.std(2.5))
+    masked = ss.make_smoothing_spline(None, noisy, "r:2", where=[True, False]).sample(rng, 5)(3.5)
+    assert np.isfinite(masked[:, 0]).all() and np.isnan(masked[:, 1]).all()
     both = ss.make_smoothing_spline(None, (noisy[0], noisy[1]), "r:2 x r:2")
     assert both.sample(rng, 4)(3.5)[1].shape == (4, 2) and [own.shape for own in both.cov(2.5)] == [(2, 2)] * 2
     angle = np.linspace(0, 2 * np.pi, 41)

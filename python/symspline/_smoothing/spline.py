@@ -564,6 +564,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         n = whole_number(n, "n", 1)
         kinds = end_kinds(self._bc_type)
         moved: list[Array] = []
+        valid = np.ones(self._batch, bool)
         drawn: dict[tuple[int, tuple[int, ...]], Doubles] = {}
         per_curve = self._times.ndim > 1
         parts = self._in_parts(self._times, per_curve)
@@ -579,6 +580,10 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
                 first = posterior.first
                 own = drawn[key][..., first : first + space.dim] * np.asarray(part.sigma)[index].item()
                 points = whole[index]
+                if not space._where_finite(points).all():
+                    # Curves that failed or are masked have no posterior.
+                    out[(slice(None), *index)], valid[index] = np.nan, False
+                    continue
                 frames = frames_at(space, knots, points, knots, points)
                 vectors = np.einsum("nkj,kj...->nk...", own, frames)
                 out[(slice(None), *index)] = space.project(space._apply("exp", p=points, v=vectors))
@@ -589,7 +594,9 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         factors = factors_of(self.space)
         joined = [join(factor, rows) for factor, rows in zip(factors, grouped(self.space, moved), strict=True)]
         through: P = self._in_factors(joined)
-        return CubicSpline(self._t, through, self.space, bc_type=self._bc_type, extrapolate=self._extrapolate)
+        where = None if valid.all() else np.broadcast_to(valid, (n, *self._batch))
+        options: Any = {"bc_type": self._bc_type, "extrapolate": self._extrapolate, "where": where}
+        return CubicSpline(self._t, through, self.space, **options)
 
     # ---- plots ----
 
