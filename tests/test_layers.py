@@ -33,7 +33,7 @@ LAYERS = [
     ["_base_curve", "_bspline"],
     ["_cubic"],
     ["_functional"],
-    ["_adapters", "_files", "_hermite", "_pairs", "_segments", "_smoothing", "convert", "jax", "torch"],
+    ["_adapters", "_files", "_grid", "_hermite", "_pairs", "_segments", "_smoothing", "convert", "jax", "torch"],
     ["_estimation"],
     ["_pose_files", "geo", "measure", "poses", "quantum", "rotations", "shapes", "subspaces", "tensors", "testing"],
     ["cli", "xarray"],

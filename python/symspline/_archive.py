@@ -37,9 +37,10 @@ from .manifolds._manifold import refuse_functions
 VERSION = 2
 # Texts are the same for all curves of a file.
 TEXTS = ("format", "space", "t_unit", "data_t_unit")
-_JSON = ("bc_type", "extrapolate", "report", "noise", "parameters", "degree", "names", "rows")
+_AXIS_UNIT = re.compile(r"axis_\d{1,2}_unit")
+_JSON = ("bc_type", "extrapolate", "report", "noise", "parameters", "degree", "names", "rows", "grid")
 _ARRAY = re.compile(
-    r"(?:version|t|data_t|knots)|(?:points|velocities|control_points|data|data_weights|data_information|band|matrix|turn|side|corner)"
+    r"(?:version|t|data_t|knots|axis_\d{1,2})|(?:points|velocities|control_points|data|data_weights|data_information|band|matrix|turn|side|corner)"
     r"(?:_\d{1,9})?"
 )
 # Compressed entries are at most this much larger than the file, or of this size.
@@ -96,7 +97,7 @@ def write(file: Any, state: Mapping[str, Any]) -> None:
         named=True,
     )
     arrays: dict[str, Any] = {
-        name: value if name in TEXTS or isinstance(value, np.ndarray) else json.dumps(value, default=_as_json)
+        name: value if _is_text(name) or isinstance(value, np.ndarray) else json.dumps(value, default=_as_json)
         for name, value in state.items()
     }
     arrays |= {"space": str(state["space"]), "version": state["version"]}
@@ -108,6 +109,10 @@ def write(file: Any, state: Mapping[str, Any]) -> None:
         np.savez(out, **arrays)
 
 
+def _is_text(name: str) -> bool:
+    return name in TEXTS or _AXIS_UNIT.fullmatch(name) is not None
+
+
 def _as_json(value: Any) -> Any:
     if isinstance(value, np.ndarray) and value.dtype.kind == "c":
         return {"re": value.real.tolist(), "im": value.imag.tolist()}
@@ -117,13 +122,14 @@ def _as_json(value: Any) -> Any:
 def read_state(file: Any) -> Stored:
     """Return the entries of an open file of curves."""
     try:
-        arrays = read(file, lambda name: name in TEXTS or name in _JSON or _ARRAY.fullmatch(name))
+        arrays = read(file, lambda name: _is_text(name) or name in _JSON or _ARRAY.fullmatch(name))
     except zipfile.BadZipFile:
         raise ValidationError("this is damaged or not a symspline curve: it is not an NPZ file") from None
     if "format" not in arrays:
         raise ValidationError("this is not a symspline curve")
     check_version(arrays)
-    decode = dict.fromkeys(TEXTS, text_in) | dict.fromkeys(_JSON, json_in)
+    texts = filter(_is_text, arrays)
+    decode = dict.fromkeys(texts, text_in) | dict.fromkeys(_JSON, json_in)
     return Stored((name, decode.get(name, Entries.get)(arrays, name)) for name in arrays)
 
 

@@ -152,3 +152,26 @@ def posterior_samples(knots: _Doubles, known: _Known, normal: _Doubles) -> _Doub
 def chi_squared(m: int, probability: float) -> float: ...
 def set_num_threads(n: int) -> None: ...
 def num_threads() -> int: ...
+
+# Knots, conditions at both ends or None for a periodic axis, and the extrapolation policy.
+_GridAxis = tuple[_Doubles, Sequence[str] | None, str]
+# Failed rows; axis, kind, node, value, limit and residual of the first; the largest residual, step and iterations.
+_GridFound = tuple[int, tuple[int, str, int | None, float, float, float] | None, float, float, int]
+
+def grid_rows(
+    handle: Handle, axis: _GridAxis, rows: _Doubles, progress: _Progress | None
+) -> tuple[_Doubles, _GridFound]: ...
+def grid_product(
+    handle: Handle,
+    arrays: object,
+    x: Sequence[_Doubles],
+    along: int | None,
+    last: int,
+    progress: _Progress | None = None,
+) -> tuple[_Doubles, _Doubles | None, _GridFound]: ...
+def grid_scattered(
+    handle: Handle, arrays: object, x: _Doubles, along: int | None, last: int, progress: _Progress | None = None
+) -> tuple[_Doubles, _Doubles | None, _GridFound]: ...
+def grid_midpoint(
+    handle: Handle, points: tuple[_Doubles, _Doubles], vectors: Sequence[_Doubles] | None
+) -> tuple[_Doubles, _Doubles | None]: ...

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ._archive import TEXTS, Entries, Stored, read_state, restore, write
+from ._archive import FORMATS, TEXTS, Entries, Stored, read_state, restore, write
 from ._arrays import short_repr
 from ._core import ValidationError
 from ._curve import Curve
@@ -57,8 +57,9 @@ def save(curves: Curve[Any] | Mapping[str, Curve[Any]], file: File) -> None:
     >>> ss.load(file) == {"long": long, "short": short}
     True
     """
-    if isinstance(curves, Curve):
-        write(file, curves._state())
+    state: Any = getattr(curves, "_state", None)
+    if state and isinstance(curves, tuple(FORMATS.values())):
+        write(file, state())
     elif isinstance(curves, Mapping) and all(isinstance(curve, Curve) for curve in curves.values()):
         write(file, _joined(curves))
     else:

@@ -2,7 +2,8 @@
 //!
 //! A curve consists of three arrays: knots t, points p and velocities u = γ'(t). [`fit`] computes the velocities,
 //! [`curve`] evaluates curves, [`space`] contains the geometry, and [`spaces`] lists all spaces. [`derivative`]
-//! computes the sensitivity of a curve to its data, [`smoothing`] fits curves close to noisy points. Arrays are
+//! computes the sensitivity of a curve to its data, [`smoothing`] fits curves close to noisy points, [`grid`]
+//! interpolates over several parameters. Arrays are
 //! one-dimensional: the numbers of each point are adjacent, matrices row by row, point after point.
 //!
 //! [`fit`] does not check its input: pass a problem to [`validate::validate`] first. It describes the first fault, or
@@ -10,6 +11,8 @@
 
 pub mod spaces;
 
+#[cfg(feature = "grid")]
+pub use symspline_grid as grid;
 #[cfg(feature = "smoothing")]
 pub use symspline_smoothing as smoothing;
 

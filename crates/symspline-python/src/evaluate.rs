@@ -196,7 +196,7 @@ fn sampled<'py>(
 }
 
 /// The extrapolation policy, and whether times outside the knots are an error.
-fn policy_named(name: &str) -> PyResult<(Outside, bool)> {
+pub fn policy_named(name: &str) -> PyResult<(Outside, bool)> {
     Ok(match name {
         "raise" => (Outside::Continue, true),
         "continue" => (Outside::Continue, false),

@@ -7,6 +7,7 @@ mod errors;
 mod estimation;
 mod evaluate;
 mod fit;
+mod grid;
 mod hermite;
 mod smoothing;
 mod space;
@@ -80,6 +81,10 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(estimation::posterior_covariance, m)?)?;
     m.add_function(wrap_pyfunction!(estimation::posterior_freedom, m)?)?;
     m.add_function(wrap_pyfunction!(estimation::posterior_samples, m)?)?;
+    m.add_function(wrap_pyfunction!(grid::grid_rows, m)?)?;
+    m.add_function(wrap_pyfunction!(grid::grid_product, m)?)?;
+    m.add_function(wrap_pyfunction!(grid::grid_scattered, m)?)?;
+    m.add_function(wrap_pyfunction!(grid::grid_midpoint, m)?)?;
     m.add_function(wrap_pyfunction!(stiefel::stiefel, m)?)?;
     m.add_function(wrap_pyfunction!(tridiagonal::solve_tridiagonal, m)?)?;
     m.add_function(wrap_pyfunction!(set_num_threads, m)?)?;

@@ -1,0 +1,229 @@
+"""The axes of a grid, and coordinates to evaluate at."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+
+from .._arrays import as_array, refuse, short_repr
+from .._core import ValidationError
+from .._options import extrapolation_mode
+from .._spaces import Array, Doubles
+from .._time import TimeAxis, time_axis_of
+
+Ends = tuple[str, str] | None
+_WORDS = ("natural", "not-a-knot", "clamped")
+_HELP = (
+    "bc_type must be 'natural', 'not-a-knot', 'clamped' or 'periodic', or a sequence with one entry per axis, each of "
+    "these or a pair of 'natural', 'not-a-knot' or 'clamped' for the start and the end of the axis"
+)
+
+
+class GridAxis(NamedTuple):
+    """One axis of a grid.
+
+    Attributes
+    ----------
+    time_axis : TimeAxis
+        Conversion of coordinates of the user to numbers of the core.
+    t : ndarray, shape (n,)
+        Knots as given.
+    knots : ndarray, shape (n,)
+        Knots as numbers of the core.
+    ends : tuple of str or None
+        Conditions at both ends; None for a periodic axis.
+    """
+
+    time_axis: TimeAxis
+    t: Array
+    knots: Doubles
+    ends: Ends
+
+    @property
+    def bc_type(self) -> str | tuple[str, str]:
+        """End conditions as the user would pass them."""
+        if self.ends is None:
+            return "periodic"
+        return self.ends[0] if self.ends[0] == self.ends[1] else self.ends
+
+    @property
+    def is_periodic(self) -> bool:
+        """Whether the axis repeats."""
+        return self.ends is None
+
+
+class Sites(NamedTuple):
+    """Coordinates at which a grid is evaluated.
+
+    Attributes
+    ----------
+    x : list of ndarray
+        Coordinates along each axis as numbers of the core: of equal lengths, or of any lengths for an outer product.
+    outer : bool
+        Whether these are the factors of an outer product.
+    modes : list of str
+        Extrapolation policy along each axis, by its name in the core.
+    """
+
+    x: list[Doubles]
+    outer: bool
+    modes: list[str]
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Shape of the results without the axes of a point."""
+        return tuple(len(x) for x in self.x) if self.outer else self.x[0].shape
+
+    def reversed(self) -> Self:
+        """Return the same coordinates with the order of axes reversed."""
+        return self._replace(x=self.x[::-1], modes=self.modes[::-1])
+
+    def along(self, axis: int, x: Doubles) -> Self:
+        """Return these coordinates with others along one axis."""
+        return self._replace(x=[*self.x[:axis], x, *self.x[axis + 1 :]])
+
+
+def read_axes(axes: Any, shape: tuple[int, ...] | None, bc_type: Any) -> list[GridAxis]:
+    """Read the axes of a grid.
+
+    Parameters
+    ----------
+    axes : sequence
+        Knots of each axis; None counts the nodes from 0.
+    shape : tuple of int
+        Numbers of nodes.
+    bc_type : str or sequence
+        End conditions as in `GridSpline`.
+    """
+    if not isinstance(axes, (tuple, list)) or len(axes) == 0:
+        raise ValidationError(
+            f"axes must be a tuple with the knots of each axis, such as (u, v), not {short_repr(axes)}"
+        )
+    dims = len(axes)
+    conditions = _conditions(bc_type, dims)
+    if shape is None or len(shape) < dims:
+        raise ValidationError(f"points has {len(shape or ())} grid axes, but there are {dims} axes of knots")
+    if len(shape) > dims:
+        raise ValidationError(
+            f"points has the grid axes {shape}, but there are {dims} axes of knots. Pass one array of knots per axis, "
+            "or None for 0, 1, ..., n - 1."
+        )
+    return [_axis(k, *each) for k, each in enumerate(zip(axes, shape, conditions, strict=True))]
+
+
+def _axis(k: int, t: Any, nodes: int, ends: Ends) -> GridAxis:
+    if nodes < 2:
+        raise ValidationError(f"axis {k} of points has {nodes} nodes, but a spline needs at least two")
+    if t is None:
+        t = np.arange(nodes, dtype=np.float64)
+    time_axis, shown = time_axis_of(t)
+    if shown.shape != (nodes,):
+        raise ValidationError(f"axes[{k}] has shape {shown.shape}, but points has {nodes} nodes along axis {k}")
+    knots = time_axis.knots(shown)
+    refuse(~np.isfinite(knots), f"axes[{k}]", lambda index: f"is {knots[index]}, but knots must be finite")
+    steps = np.diff(knots)
+    bad = np.flatnonzero(~(steps > 0))
+    if bad.size:
+        i = int(bad[0])
+        raise ValidationError(
+            f"axes[{k}][{i + 1}] = {shown[i + 1]} is not greater than axes[{k}][{i}] = {shown[i]}, but knots must "
+            "increase. Sort the knots together with the points, and merge nodes with equal knots."
+        )
+    return GridAxis(time_axis, shown, knots, ends)
+
+
+def _conditions(bc_type: Any, dims: int) -> list[Ends]:
+    if isinstance(bc_type, str):
+        return [_ends(bc_type)] * dims
+    if not isinstance(bc_type, (tuple, list)) or len(bc_type) != dims:
+        raise ValidationError(f"{_HELP}; got {short_repr(bc_type)} for {dims} axes")
+    return [_ends(each) for each in bc_type]
+
+
+def _ends(value: Any) -> Ends:
+    if isinstance(value, str) and value == "periodic":
+        return None
+    pair = (value, value) if isinstance(value, str) else value
+    if isinstance(pair, (tuple, list)) and len(pair) == 2 and all(isinstance(w, str) and w in _WORDS for w in pair):
+        return pair[0], pair[1]
+    raise ValidationError(f"{_HELP}; got {short_repr(value)}")
+
+
+def coordinates(axes: list[GridAxis], x: Any, outer: bool) -> tuple[list[Doubles], tuple[int, ...], bool]:
+    """Read coordinates along each axis.
+
+    Returns
+    -------
+    list of ndarray
+        Flat coordinates as numbers of the core.
+    tuple of int
+        Shape of the results.
+    bool
+        Whether the coordinates are the factors of an outer product.
+    """
+    dims = len(axes)
+    if not outer and not isinstance(x, (tuple, list)):
+        array = as_array(x, "x")
+        if dims == 1 and (array.ndim == 0 or array.shape[-1:] != (1,)):
+            x = (array,)
+        elif array.ndim and array.shape[-1] == dims:
+            x = tuple(np.moveaxis(array, -1, 0))
+        else:
+            raise ValidationError(
+                f"x has shape {array.shape}, but its last axis must hold the {dims} coordinates. Pass a tuple of "
+                f"{dims} arrays, or an array of shape (..., {dims})."
+            )
+    if len(x) != dims:
+        raise ValidationError(f"x has {len(x)} coordinates, but the grid has {dims} axes")
+    own = [axis.time_axis.at(each, (), False, axis.knots)[0] for axis, each in zip(axes, x, strict=True)]
+    for k, each in enumerate(own):
+        refuse(~np.isfinite(each), f"x[{k}]", lambda _: "is not finite; coordinates must be finite")
+    if outer:
+        for k, each in enumerate(own):
+            if each.ndim > 1:
+                raise ValidationError(f"the coordinates along axis {k} have shape {each.shape}, but must be a vector")
+        lead = tuple(size for each in own for size in each.shape)
+        return [np.ascontiguousarray(each.ravel()) for each in own], lead, True
+    try:
+        shape = np.broadcast_shapes(*(each.shape for each in own))
+    except ValueError:
+        shapes = ", ".join(str(each.shape) for each in own)
+        raise ValidationError(f"the coordinates do not broadcast: their shapes are {shapes}") from None
+    if dims > 1 and len(shape) == dims and all(each.size == each.shape[k] for k, each in enumerate(_padded(own))):
+        # Each coordinate varies along an axis of its own, as those of an open mesh do.
+        return [np.ascontiguousarray(each.ravel()) for each in own], shape, True
+    return [np.ascontiguousarray(np.broadcast_to(each, shape).ravel()) for each in own], shape, False
+
+
+def _padded(arrays: list[Doubles]) -> list[Doubles]:
+    most = max(array.ndim for array in arrays)
+    return [array.reshape((1,) * (most - array.ndim) + array.shape) for array in arrays]
+
+
+def sites_of(
+    axes: list[GridAxis], x: list[Doubles], outer: bool, extrapolate: Any
+) -> tuple[Sites, list[np.ndarray[Any, np.dtype[np.bool_]]]]:
+    """Return sites under an extrapolation policy, and for each axis which coordinates give NaN.
+
+    Raises
+    ------
+    ValidationError
+        If the policy is to raise and a coordinate is outside its axis.
+    """
+    own, modes, missing = [], [], []
+    for k, (axis, each) in enumerate(zip(axes, x, strict=True)):
+        mode = extrapolation_mode(extrapolate, axis.bc_type)
+        first, last = axis.knots[0], axis.knots[-1]
+        outside = ~((each >= first) & (each <= last))
+        if mode == "raise" and outside.any():
+            i = int(np.flatnonzero(outside)[0])
+            message = (
+                f"the coordinate {each[i]} is outside axis {k}, which extends from {first} to {last}; pass "
+                "extrapolate=True or 'geodesic' to continue the spline there, or False for NaN"
+            )
+            raise axis.time_axis.explain(ValidationError(message))
+        missing.append(outside if mode == "nan" else np.zeros(outside.shape, bool))
+        own.append(np.where(outside, first, each) if mode == "nan" else each)
+        modes.append("continue" if mode in ("raise", "nan") else mode)
+    return Sites(own, outer, modes), missing

@@ -1,0 +1,501 @@
+"""C² interpolation of points on a grid."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Any, ClassVar, Generic, Self
+
+import numpy as np
+
+from .. import _archive
+from .._archive import Entries, entry, read_array, read_space, read_times, suffix_of, times_state
+from .._arrays import checked_atol, checked_flag, short_repr, whole_number
+from .._core import ConvergenceError, CutLocusError, ValidationError
+from .._cubic import CubicSpline
+from .._errors import warn
+from .._faults import CUT_LOCUS
+from .._options import check_on_failure, check_progress, checked_extrapolate
+from .._report import ConvergenceWarning
+from .._spaces import Array, Product, Space, factors_of, space_named
+from .._typing import Extrapolate, File, OnFailure, P, PointsLike, Progress, TimesLike
+from .axes import GridAxis, coordinates, read_axes, sites_of
+from .compiled import CompiledGrid, Found
+from .evaluation import FactorGrid, order_of_each
+from .nodes import check_steps, read_nodes, validate_nodes
+from .report import GridReport
+
+
+class GridSpline(Generic[P]):
+    r"""Interpolate points on a grid by a C² spline in every parameter.
+
+    The value at :math:`(x_1, \dots, x_D)` is computed axis after axis: a `CubicSpline` along the first axis through
+    every row of nodes is evaluated at :math:`x_1`, then a spline along the second axis through these points is
+    evaluated at :math:`x_2`, and so on. On a Euclidean space the result is the tensor-product spline.
+
+    Parameters
+    ----------
+    axes : sequence of array_like
+        Knots of each axis, strictly increasing numbers or dates. None means 0, 1, ..., n - 1.
+    points : array_like, shape (n_1, ..., n_D, *point_shape)
+        Points at the nodes. For a `Product`, a tuple with one array per factor. Nodes with NaN are missing: they divide
+        a row into runs with a spline each, and values whose row has no run there are NaN.
+    space : Space or str
+        A space or its name, such as ``SpecialOrthogonal(3)`` or ``"so:3"``.
+    bc_type : str or sequence, default "not-a-knot"
+        End conditions: ``"not-a-knot"``, ``"natural"``, ``"clamped"`` (zero velocity) or ``"periodic"`` for all axes,
+        or a sequence with one entry per axis, each of these or a pair of conditions for the start and the end. The
+        last nodes of a periodic axis repeat the first ones. Beside missing nodes, runs end naturally on natural axes,
+        and with not-a-knot otherwise.
+    symmetric : bool, default False
+        Whether to evaluate the midpoint between the given and the reverse order of axes, so that reversing the axes
+        changes nothing. Values then cost twice as much.
+    extrapolate : {None, "raise", True, False, "geodesic", "periodic"}, default None
+        Extrapolation policy as in `CubicSpline`, for all axes. None raises, except along periodic axes, which repeat.
+    on_failure : {"raise", "warn", "ignore"}, default "raise"
+        Action if a spline does not converge or meets a cut locus, here or in an evaluation. With ``"warn"`` and
+        ``"ignore"`` the values that depend on a row at its cut locus are NaN.
+    check : bool, default True
+        Whether to validate the points. If False, they are not projected either.
+    atol : float, optional
+        Largest distance of a point from the manifold. By default 1e-8, or 1e-4 for points in single precision.
+    progress : callable, optional
+        Function that is called from time to time with the finished and the total number of nodes.
+
+    Raises
+    ------
+    ValidationError
+        If the input does not meet the requirements above.
+    CutLocusError
+        If two neighbouring nodes are not joined by a unique shortest geodesic.
+    ConvergenceError
+        If a spline along the first axis does not converge. Its attribute ``spline`` holds the grid.
+
+    Warns
+    -----
+    FarPointsWarning
+        If more than half of the steps along an axis exceed 0.6 of the distance to the cut locus.
+    ConvergenceWarning
+        If a spline fails and `on_failure` is ``"warn"``.
+
+    See Also
+    --------
+    CubicSpline : Interpolate points along one axis.
+
+    Notes
+    -----
+    The result passes through the points, and is twice continuously differentiable as a composition of C² maps. For
+    smooth data its error is of order 4 in the spacing. Exchanging the axes changes it with order 8, see
+    `GridReport.axis_order_gap`.
+
+    At scattered coordinates, the splines along all axes but the first use the 24 nodes on either side: the influence
+    of a node decays by a factor of 0.27 per node, and :math:`0.27^{24} = 2 \cdot 10^{-14}`.
+
+    Examples
+    --------
+    >>> import numpy as np, symspline as ss
+    >>> u, v = np.linspace(0, 1, 11), np.linspace(0, 1, 9)
+    >>> turns = np.stack(np.broadcast_arrays(u[:, None], u[:, None] * v, v), axis=-1)
+    >>> grid = ss.GridSpline((u, v), ss.rotations.from_rotation_vectors(turns), "so:3")
+    >>> ss.rotations.as_rotation_vectors(grid((0.33, 0.47))).round(4)
+    array([0.33  , 0.1551, 0.47  ])
+    >>> grid.grid(np.linspace(0, 1, 5), [0.1, 0.2]).shape
+    (5, 2, 3, 3)
+    """
+
+    _format: ClassVar[str] = "symspline-grid"
+    _axes: list[GridAxis]
+    _factors: list[FactorGrid]
+    _symmetric: bool
+    _extrapolate: Extrapolate
+    _on_failure: OnFailure
+
+    def __init_subclass__(cls) -> None:
+        _archive.FORMATS[cls._format] = cls
+
+    def __init__(
+        self,
+        axes: Sequence[TimesLike | None],
+        points: PointsLike,
+        space: Space[P] | str,
+        *,
+        bc_type: str | Sequence[str | tuple[str, str]] = "not-a-knot",
+        symmetric: bool = False,
+        extrapolate: Extrapolate = None,
+        on_failure: OnFailure = "raise",
+        check: bool = True,
+        atol: float | None = None,
+        progress: Progress | None = None,
+    ) -> None:
+        self._space: Space[Any] = space_named(space)
+        self._symmetric = checked_flag(symmetric, "symmetric")
+        self._extrapolate = checked_extrapolate(extrapolate)
+        check_on_failure(on_failure)
+        check_progress(progress)
+        self._on_failure = on_failure
+        if not isinstance(axes, (tuple, list)):
+            read_axes(axes, None, bc_type)
+        arrays, tols, shape = read_nodes(points, self._space, len(axes))
+        self._axes = read_axes(axes, shape, bc_type)
+        if checked_flag(check, "check"):
+            validate_nodes(self._space, arrays, tols if atol is None else [checked_atol(atol)] * len(tols), self._axes)
+            check_steps(self._space, arrays, len(shape), on_failure == "raise")
+        self._fill(arrays, None, progress)
+        self._handle(self.report._found, "the nodes")
+
+    def _fill(
+        self, arrays: list[Array], velocities: list[Array | None] | None, progress: Progress | None = None
+    ) -> None:
+        each: list[Array | None] = velocities or [None] * len(arrays)
+        self._factors = [
+            FactorGrid(factor, self._axes, points, self._symmetric, own, progress)
+            for factor, points, own in zip(factors_of(self._space), arrays, each, strict=True)
+        ]
+        for array in arrays:
+            array.flags.writeable = False
+
+    def _handle(self, found: Found, where: str) -> None:
+        """Raise an error or warn about rows that failed."""
+        if found.fault is None or self._on_failure == "ignore":
+            return
+        more = f" ({found.failed} rows failed)" if found.failed > 1 else ""
+        message = f"{found.fault.message(())}{more}, in the evaluation of {where}"
+        if self._on_failure == "warn":
+            warn(message, ConvergenceWarning)
+            return
+        kind = CutLocusError if found.fault.kind == CUT_LOCUS else ConvergenceError
+        error: Any = kind(f"{message}. Pass on_failure='warn' to get the other values.")
+        error.spline, error.node = self, found.fault.node
+        error.value, error.limit = found.fault.value, found.fault.limit
+        raise error
+
+    # ---- data ----
+
+    @property
+    def space(self) -> Space[P]:
+        """Space of the points."""
+        return self._space
+
+    @property
+    def axes(self) -> tuple[Array, ...]:
+        """Knots of each axis, as passed to the constructor."""
+        return tuple(axis.t for axis in self._axes)
+
+    @property
+    def points(self) -> P:
+        """Points at the nodes, on the space; NaN for missing nodes."""
+        points: P = self._joined([factor.points for factor in self._factors])
+        return points
+
+    @property
+    def bc_type(self) -> tuple[str | tuple[str, str], ...]:
+        """End conditions of each axis."""
+        return tuple(axis.bc_type for axis in self._axes)
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether values are midpoints of both orders of axes."""
+        return self._symmetric
+
+    @cached_property
+    def report(self) -> GridReport:
+        """Report of the grid: convergence, missing nodes, and the effect of the order of axes.
+
+        Examples
+        --------
+        >>> import numpy as np, symspline as ss
+        >>> u = np.linspace(0, 1, 8)
+        >>> ss.GridSpline((u, u), (u[:, None] * u)[..., None], "r:1").report.converged
+        True
+        """
+        return GridReport._of(self._axes, self._factors)
+
+    def _joined(self, parts: list[Any]) -> Any:
+        """Return results of all factors as points or vectors of the space."""
+        return tuple(parts) if isinstance(self._space, Product) else parts[0]
+
+    # ---- evaluation ----
+
+    def __call__(
+        self,
+        x: Any,
+        nu: Sequence[int] | int | None = None,
+        *,
+        extrapolate: Extrapolate = None,
+        progress: Progress | None = None,
+    ) -> P:
+        """Evaluate the grid or its derivatives at scattered coordinates.
+
+        Parameters
+        ----------
+        x : tuple of array_like, or array_like of shape (..., D)
+            The coordinates: one array per axis, which broadcast against each other, or one array whose last axis holds
+            the D coordinates.
+        nu : tuple of int, optional
+            Order of the derivative along each axis, at most 2 in total. By default, points are computed. Second
+            derivatives are covariant; mixed ones do not depend on the order.
+        extrapolate : {None, "raise", True, False, "geodesic", "periodic"}, default None
+            Extrapolation policy; by default that of the grid.
+        progress : callable, optional
+            Function that is called from time to time with the finished and the total number of points.
+
+        Returns
+        -------
+        ndarray or tuple of ndarray, shape (*broadcast shape, *point_shape)
+            Points or tangent vectors; NaN where nodes are missing.
+
+        Raises
+        ------
+        ValidationError
+            If a coordinate is outside its axis, or a derivative is not available.
+        CutLocusError, ConvergenceError
+            If a spline fails; see `on_failure` in `GridSpline`.
+
+        See Also
+        --------
+        GridSpline.grid : Evaluate on an outer product of coordinates, which is much faster.
+
+        Examples
+        --------
+        >>> import numpy as np, symspline as ss
+        >>> u = np.linspace(0, 1, 8)
+        >>> surface = ss.GridSpline((u, u), (u[:, None] * u)[..., None], "r:1")
+        >>> surface((0.5, [0.25, 0.75]))[:, 0].round(6)
+        array([0.125, 0.375])
+        >>> surface([0.5, 0.25], nu=(1, 0)).round(6)
+        array([0.25])
+        """
+        values: P = self._evaluate(*coordinates(self._axes, x, False), nu, extrapolate, progress)
+        return values
+
+    def grid(
+        self,
+        *x: TimesLike,
+        nu: Sequence[int] | int | None = None,
+        extrapolate: Extrapolate = None,
+        progress: Progress | None = None,
+    ) -> P:
+        """Evaluate the grid or its derivatives on the outer product of coordinates.
+
+        The cost is linear in the number of values, and the working memory is bounded.
+
+        Parameters
+        ----------
+        *x : array_like
+            Coordinates along each axis: a number or a vector each.
+        nu : tuple of int, optional
+            Order of the derivative along each axis, as in `GridSpline.__call__`.
+        extrapolate : {None, "raise", True, False, "geodesic", "periodic"}, default None
+            Extrapolation policy; by default that of the grid.
+        progress : callable, optional
+            Function that is called from time to time with the finished and the total number of points.
+
+        Returns
+        -------
+        ndarray or tuple of ndarray, shape (*lengths of the coordinates, *point_shape)
+            Points or tangent vectors; NaN where nodes are missing. A number as coordinate gives no axis.
+
+        Raises
+        ------
+        ValidationError
+            If a coordinate is outside its axis, or a derivative is not available.
+        CutLocusError, ConvergenceError
+            If a spline fails; see `on_failure` in `GridSpline`.
+
+        Examples
+        --------
+        >>> import numpy as np, symspline as ss
+        >>> u = np.linspace(0, 1, 8)
+        >>> surface = ss.GridSpline((u, u), (u[:, None] * u)[..., None], "r:1")
+        >>> surface.grid([0.25, 0.5], [0.5, 1.0])[..., 0].round(6)
+        array([[0.125, 0.25 ],
+               [0.25 , 0.5  ]])
+        """
+        values: P = self._evaluate(*coordinates(self._axes, x, True), nu, extrapolate, progress)
+        return values
+
+    def _evaluate(
+        self, x: list[Any], shape: tuple[int, ...], outer: bool, nu: Any, extrapolate: Any, progress: Progress | None
+    ) -> Any:
+        orders = order_of_each(nu, len(self._axes))
+        check_progress(progress)
+        policy = self._extrapolate if extrapolate is None else checked_extrapolate(extrapolate)
+        sites, missing = sites_of(self._axes, x, outer, policy)
+        if sum(orders) and "geodesic" in sites.modes and any(orders[:-1]):
+            raise ValidationError(
+                "extrapolate='geodesic' has derivatives along the last axis only; pass extrapolate=True for others"
+            )
+        results, found = [], Found()
+        for factor in self._factors:
+            values, own = factor.evaluate(sites, orders, progress)
+            values = np.asarray(values)
+            for k, bad in enumerate(missing):
+                if bad.any():
+                    values[(slice(None),) * k + (bad,) if outer else bad] = np.nan
+            results.append(values.reshape(*shape, *factor.space.point_shape))
+            found = found.merged(own)
+        self._handle(found, "the grid")
+        return self._joined(results)
+
+    def section(self, axis: int, at: Any) -> CubicSpline[P] | GridSpline[P]:
+        """Return the section at a fixed coordinate along one axis.
+
+        Parameters
+        ----------
+        axis : int
+            Axis of the fixed coordinate.
+        at : float or datetime64
+            The coordinate.
+
+        Returns
+        -------
+        CubicSpline or GridSpline
+            The spline over the other axes, with their end conditions: a `CubicSpline` if there is one such axis. For
+            ``axis=0`` it equals the grid. For other axes it passes through the values at the nodes of the other axes,
+            and differs from the grid between them as much as the order of axes matters (`GridReport.axis_order_gap`).
+
+        Raises
+        ------
+        ValidationError
+            If the grid has one axis only, the coordinate is outside the axis, or a curve would have missing nodes.
+
+        Examples
+        --------
+        >>> import numpy as np, symspline as ss
+        >>> u = np.linspace(0, 1, 8)
+        >>> surface = ss.GridSpline((u, u), (u[:, None] * u)[..., None], "r:1")
+        >>> surface.section(axis=0, at=0.5)(0.25).round(6)
+        array([0.125])
+        """
+        dims = len(self._axes)
+        if dims == 1:
+            raise ValidationError("the grid has one axis only, so that a section is a point: call the grid instead")
+        number = whole_number(axis, "axis", 0)
+        if number >= dims:
+            raise ValidationError(f"axis must be less than {dims}, not {short_repr(axis)}")
+        others = [own for k, own in enumerate(self._axes) if k != number]
+        nodes = self.grid(*(at if k == number else own.t for k, own in enumerate(self._axes)))
+        if dims > 2:
+            return GridSpline(
+                tuple(own.t for own in others),
+                nodes,
+                self._space,
+                bc_type=tuple(own.bc_type for own in others),
+                symmetric=self._symmetric,
+                extrapolate=self._extrapolate,
+                on_failure=self._on_failure,
+            )
+        first = nodes[0] if isinstance(nodes, tuple) else nodes
+        gaps = np.flatnonzero(~factors_of(self._space)[0]._where_finite(first))
+        if gaps.size:
+            raise ValidationError(
+                f"the section at {at} has no points at the nodes {short_repr(gaps.tolist())} of the other axis. "
+                "Evaluate the grid itself, which gives NaN there."
+            )
+        bc: Any = others[0].bc_type
+        return CubicSpline(
+            others[0].t, nodes, self._space, bc_type=bc, extrapolate=self._extrapolate, on_failure=self._on_failure
+        )
+
+    # ---- files, pickles and text ----
+
+    def save(self, file: File) -> None:
+        """Write the grid to an NPZ file that `symspline.load` reads.
+
+        Parameters
+        ----------
+        file : path or binary file
+            File to write. An existing file is replaced as a whole once all data are on disk.
+
+        Raises
+        ------
+        ValidationError
+            If the space is a `Manifold` that is made of functions.
+        OSError
+            If the file cannot be written.
+
+        Examples
+        --------
+        >>> import io, numpy as np, symspline as ss
+        >>> u = np.linspace(0, 1, 8)
+        >>> surface = ss.GridSpline((u, u), (u[:, None] * u)[..., None], "r:1")
+        >>> file = io.BytesIO()
+        >>> surface.save(file)
+        >>> _ = file.seek(0)
+        >>> ss.load(file) == surface
+        True
+        """
+        _archive.write(file, self._state())
+
+    def _state(self) -> dict[str, Any]:
+        state: dict[str, Any] = {
+            "format": self._format,
+            "version": _archive.VERSION,
+            "space": self._space,
+            "extrapolate": self._extrapolate,
+            "grid": {
+                "bc_type": [axis.bc_type for axis in self._axes],
+                "symmetric": self._symmetric,
+                "on_failure": self._on_failure,
+            },
+        }
+        for k, axis in enumerate(self._axes):
+            state |= times_state(f"axis_{k}", axis.t, axis.time_axis)
+        for i, factor in enumerate(self._factors):
+            suffix = suffix_of(self._space, i)
+            state[f"points{suffix}"] = np.asarray(factor.points)
+            if isinstance(factor.forward, CompiledGrid) and factor.forward.span is None:
+                state[f"velocities{suffix}"] = np.ascontiguousarray(factor.forward.velocities)
+        return state
+
+    @classmethod
+    def _from_state(cls, state: Entries) -> Self:
+        self = cls.__new__(cls)
+        self._space = read_space(state)
+        with entry("extrapolate"):
+            self._extrapolate = checked_extrapolate(state["extrapolate"])
+        with entry("grid"):
+            options = state["grid"]
+            conditions = [word if isinstance(word, str) else tuple(word) for word in options["bc_type"]]
+            self._symmetric = checked_flag(options["symmetric"], "symmetric")
+            self._on_failure = options["on_failure"]
+            check_on_failure(self._on_failure)
+            knots = [read_times(state, f"axis_{k}")[1] for k in range(len(conditions))]
+        arrays: list[Array] = []
+        velocities: list[Array | None] = []
+        for i, factor in enumerate(factors_of(self._space)):
+            suffix = suffix_of(self._space, i)
+            with entry(f"points{suffix}"):
+                arrays.append(read_array(state, f"points{suffix}", factor))
+                shape = arrays[-1].shape[: arrays[-1].ndim - len(factor.point_shape)]
+                self._axes = read_axes(tuple(knots), shape, conditions)
+            name = f"velocities{suffix}"
+            with entry(name):
+                velocities.append(read_array(state, name, factor) if name in state else None)
+                if velocities[-1] is not None and velocities[-1].shape != arrays[-1].shape:
+                    raise ValidationError(f"its shape {velocities[-1].shape} is not that of the points")
+        self._fill(arrays, velocities)
+        return self
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return _archive.restore, (self._state(),)
+
+    def __eq__(self, other: object) -> bool:
+        if type(other) is not type(self) or not isinstance(other, GridSpline):
+            return NotImplemented
+        mine, theirs = self._state(), other._state()
+        return mine.keys() == theirs.keys() and all(
+            np.array_equal(value, theirs[name], equal_nan=value.dtype.kind in "fc")
+            if isinstance(value, np.ndarray)
+            else value == theirs[name]
+            for name, value in mine.items()
+        )
+
+    __hash__: ClassVar[None] = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        nodes = " x ".join(str(len(axis.knots)) for axis in self._axes)
+        return f"<{type(self).__name__} on {self._space!r}: {nodes} nodes>"
+
+
+_archive.FORMATS[GridSpline._format] = GridSpline
