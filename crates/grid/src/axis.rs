@@ -1,6 +1,5 @@
 //! One axis of a grid: its knots, the conditions at its ends, and the runs of nodes in a row.
 
-use std::ops::Range;
 use symspline_core::curve::Outside;
 
 /// A condition at one end of an axis.
@@ -64,7 +63,8 @@ impl Axis<'_> {
         if i < n { self.knots[i] } else { self.knots[i - self.different()] + self.period() }
     }
 
-    fn period(&self) -> f64 {
+    /// The length of the axis.
+    pub fn period(&self) -> f64 {
         self.knots[self.nodes() - 1] - self.knots[0]
     }
 
@@ -127,36 +127,6 @@ impl Axis<'_> {
         runs
     }
 
-    /// The run within a window of nodes that contains the segment of a coordinate, and the coordinate there.
-    pub fn run_at(&self, window: &Window, valid: impl Fn(usize) -> bool, x: f64) -> Option<(Run, f64)> {
-        let (segment, x) = self.locate(x);
-        if window.closed {
-            let runs = self.runs(valid);
-            return runs.into_iter().find_map(|run| Some((run, self.coordinate_in(run, segment, x)?)));
-        }
-        let nodes = &window.nodes;
-        let valid = |i: usize| valid(self.index(i));
-        // A window of a periodic axis may begin behind the segment.
-        let around = nodes.start > segment;
-        let (i, x) = if around { (segment + self.different(), x + self.period()) } else { (segment, x) };
-        let (mut first, mut last) = if valid(i) && valid(i + 1) {
-            (i, i + 2)
-        } else if valid(i) && x == self.knot(i) {
-            (i, i + 1)
-        } else if valid(i + 1) && x == self.knot(i + 1) {
-            (i + 1, i + 2)
-        } else {
-            return None;
-        };
-        while first > nodes.start && valid(first - 1) {
-            first -= 1;
-        }
-        while last < nodes.end && valid(last) {
-            last += 1;
-        }
-        Some((Run { first, nodes: last - first, closed: false }, x))
-    }
-
     /// The coordinate in the numbering of a run, if the run contains it.
     pub fn coordinate_in(&self, run: Run, segment: usize, x: f64) -> Option<f64> {
         let (first, last) = (run.first as isize, (run.first + run.nodes - 1) as isize);
@@ -200,33 +170,5 @@ impl Axis<'_> {
             });
         }
         None
-    }
-}
-
-/// The nodes near a coordinate on which its value depends. On a periodic axis, numbers continue after the last node.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Window {
-    pub nodes: Range<usize>,
-    /// Whether it is a whole periodic row.
-    pub closed: bool,
-}
-
-/// The nodes of a window on either side of a segment. The influence of a node decays by 0.27 per node on equal knots:
-/// 0.27²⁴ = 2e-14.
-const REACH: usize = 24;
-
-impl Window {
-    pub fn around(axis: &Axis, x: f64) -> Window {
-        let (n, (segment, _)) = (axis.nodes(), axis.locate(x));
-        let most = 2 * (REACH + 1);
-        if axis.ends.is_none() {
-            if n <= most + 1 {
-                return Window { nodes: 0..n, closed: true };
-            }
-            let first = (segment + axis.different() - REACH) % axis.different();
-            return Window { nodes: first..first + most, closed: false };
-        }
-        let first = segment.saturating_sub(REACH).min(n.saturating_sub(most));
-        Window { nodes: first..n.min(first + most), closed: false }
     }
 }

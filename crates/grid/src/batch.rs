@@ -23,12 +23,10 @@ struct Group {
     velocities: Vec<f64>,
 }
 
-/// A fitted curve: its owner, its run, knots, points and velocities.
+/// A fitted curve: its owner, its run and its velocities.
 pub struct Fitted<'a> {
     pub owner: usize,
     pub run: Run,
-    pub t: &'a [f64],
-    pub points: &'a [f64],
     pub velocities: &'a [f64],
 }
 
@@ -84,8 +82,6 @@ impl Batch {
             group.curves.iter().zip(group.offsets.windows(2)).map(move |(&(owner, run), offsets)| Fitted {
                 owner,
                 run,
-                t: &group.t[offsets[0]..offsets[1]],
-                points: &group.points[offsets[0] * len..offsets[1] * len],
                 velocities: &group.velocities[offsets[0] * len..offsets[1] * len],
             })
         })

@@ -45,6 +45,11 @@ impl Grid<'_> {
     pub fn len(&self) -> usize {
         self.space.point_len()
     }
+
+    /// Whether no node is missing.
+    pub fn is_complete(&self) -> bool {
+        (0..self.points.len() / self.len()).all(|node| is_valid(self.points, node, self.len()))
+    }
 }
 
 /// Whether a node has a point.

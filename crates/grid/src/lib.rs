@@ -16,7 +16,9 @@ mod product;
 mod rows;
 mod samples;
 mod scattered;
+mod stages;
 mod summary;
+mod window;
 
 pub use axis::{Axis, Condition};
 pub use grid::{Derivative, Grid};

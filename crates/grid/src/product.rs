@@ -1,11 +1,10 @@
 //! Values on the outer product of coordinates.
 
 use crate::grid::{Derivative, Grid};
-use crate::rows::{evaluate_rows, fit_rows, push_rows};
+use crate::rows::Along;
+use crate::stages::{Nodes, Route};
 use crate::summary::Summary;
 use std::sync::Mutex;
-use symspline_core::curve::Quantity;
-use symspline_core::derivative::Of;
 use symspline_core::monitor::Monitor;
 use symspline_core::parallel;
 
@@ -54,86 +53,27 @@ pub fn product(
             (x0, points, tangents)
         })
         .collect();
+    let route = Route { space: grid.space, axes: grid.axes, derivative };
+    let nodes = Nodes {
+        points: grid.points,
+        velocities: grid.velocities,
+        tangents: &[],
+        complete: grid.is_complete(),
+    };
     parallel::for_each(blocks, false, monitor, |(x0, points, tangents)| {
         let go_on = |_| !monitor.poll();
         let inner = Monitor::new(&go_on);
-        let mut coordinates = x.to_vec();
-        coordinates[0] = x0;
-        let found = block(grid, &coordinates, derivative, &inner, || monitor.advance(points.len() / len));
-        let (found_points, found_tangents, own) = found;
-        points.copy_from_slice(&found_points);
-        tangents.copy_from_slice(&found_tangents);
+        let advance = || monitor.advance(points.len() / len);
+        let coordinates: Vec<Along> =
+            std::iter::once(x0).chain(x[1..].iter().copied()).map(Along::Shared).collect();
+        let first = route.evaluate(0, nodes, coordinates[0], &inner);
+        advance();
+        let (found, own) = route.go_on(first, &coordinates, &inner, advance);
+        points.copy_from_slice(&found.points);
+        tangents.copy_from_slice(&found.tangents);
         if let Ok(mut all) = summary.lock() {
             all.merge(&own);
         }
     });
     summary.into_inner().unwrap_or_default()
-}
-
-/// The same for a few coordinates of axis 0. Returns points, and tangent vectors if a derivative is requested.
-fn block(
-    grid: &Grid,
-    x: &[&[f64]],
-    derivative: Derivative,
-    monitor: &Monitor,
-    advance: impl Fn(),
-) -> (Vec<f64>, Vec<f64>, Summary) {
-    let (space, len, dims) = (&grid.space, grid.len(), x.len());
-    let mut summary = Summary::default();
-    let (mut rows, mut tangents): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
-    for (k, axis) in grid.axes.iter().enumerate() {
-        let mut fitted = Vec::new();
-        let (nodes, velocities) = if k == 0 {
-            (grid.points, grid.velocities)
-        } else {
-            fitted.resize(rows.len(), 0.0);
-            summary.merge(&fit_rows(space, axis, k, &rows, monitor, &mut fitted));
-            (&rows[..], &fitted[..])
-        };
-        let size = nodes.len() / axis.nodes() * x[k].len();
-        let evaluate = |quantity| {
-            let mut out = vec![0.0; size];
-            evaluate_rows(space, axis, nodes, velocities, x[k], quantity, monitor, &mut out);
-            out
-        };
-        let last = k + 1 == dims;
-        let found = evaluate(Quantity::Point);
-        let moved = if derivative.begins_at(k, dims) {
-            let second = last && derivative.last == 2;
-            evaluate(if second { Quantity::Acceleration } else { Quantity::Velocity })
-        } else if !tangents.is_empty() {
-            let of = if last && derivative.last == 1 { Of::Velocity } else { Of::Point };
-            let mut out = vec![0.0; size];
-            push_rows(space, axis, nodes, velocities, &tangents, x[k], of, monitor, &mut out);
-            out
-        } else {
-            Vec::new()
-        };
-        // The next axis comes last.
-        let next = grid.axes.get(k + 1).map_or(1, |axis| axis.nodes());
-        (rows, tangents) = (first_axis_last(found, next, len), first_axis_last(moved, next, len));
-        advance();
-    }
-    (rows, tangents, summary)
-}
-
-/// Moves the first axis of an array of points behind the others.
-fn first_axis_last(array: Vec<f64>, first: usize, len: usize) -> Vec<f64> {
-    let rest = array.len() / (first * len);
-    if first == 1 || rest <= 1 {
-        return array;
-    }
-    let mut out = vec![0.0; array.len()];
-    // Tiles, so that both arrays stay in the cache.
-    const TILE: usize = 16;
-    for from in (0..first).step_by(TILE) {
-        for start in (0..rest).step_by(TILE) {
-            for r in start..rest.min(start + TILE) {
-                for f in from..first.min(from + TILE) {
-                    out[(r * first + f) * len..][..len].copy_from_slice(&array[(f * rest + r) * len..][..len]);
-                }
-            }
-        }
-    }
-    out
 }

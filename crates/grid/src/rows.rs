@@ -12,6 +12,33 @@ use symspline_core::monitor::Monitor;
 use symspline_core::parallel;
 use symspline_core::space::{Ambient, Erased};
 
+/// Coordinates along one axis.
+#[derive(Clone, Copy)]
+pub enum Along<'a> {
+    /// The same coordinates for all rows.
+    Shared(&'a [f64]),
+    /// One coordinate per row; rows take them in turn.
+    Own(&'a [f64]),
+}
+
+impl<'a> Along<'a> {
+    /// The number of coordinates of each row.
+    pub fn per_row(self) -> usize {
+        match self {
+            Along::Shared(x) => x.len(),
+            Along::Own(_) => 1,
+        }
+    }
+
+    /// The coordinates of a row.
+    fn of(self, row: usize) -> &'a [f64] {
+        match self {
+            Along::Shared(x) => x,
+            Along::Own(x) => &x[row % x.len()..][..1],
+        }
+    }
+}
+
 /// The number of rows with missing nodes that are processed at a time.
 const BLOCK: usize = 256;
 
@@ -75,36 +102,42 @@ pub fn fit_rows(
 }
 
 /// Whether all nodes have points.
-fn is_complete(rows: &[f64], len: usize) -> bool {
+pub fn is_complete(rows: &[f64], len: usize) -> bool {
     rows.chunks_exact(len).all(|point| !point[0].is_nan())
 }
 
-/// Evaluates a quantity of all rows at the same coordinates, row after row; NaN outside the runs of a row.
+/// Evaluates a quantity of all rows, row after row; NaN outside the runs of a row. `complete` states that no node is
+/// missing.
 pub fn evaluate_rows(
     space: &Erased,
     axis: &Axis,
     rows: &[f64],
     velocities: &[f64],
-    x: &[f64],
+    complete: bool,
+    x: Along,
     quantity: Quantity,
     monitor: &Monitor,
     out: &mut [f64],
 ) {
-    let (n, len) = (axis.nodes(), space.point_len());
-    if is_complete(rows, len) {
+    let (n, len, per_row) = (axis.nodes(), space.point_len(), x.per_row());
+    if complete {
         let curves = Curves { t: axis.knots, nodes: n, points: rows, velocities };
-        let times = Times { x, count: x.len() };
+        let own: Vec<f64> = match x {
+            Along::Shared(x) => x.to_vec(),
+            Along::Own(x) => x.iter().copied().cycle().take(rows.len() / (n * len)).collect(),
+        };
+        let times = Times { x: &own, count: per_row };
         return evaluate(space, &curves, &times, quantity, axis.outside, monitor, out);
     }
     out.fill(f64::NAN);
-    let per_block = (BLOCK * 16 / x.len().max(1)).max(1);
+    let per_block = (BLOCK * 16 / per_row.max(1)).max(1);
     let blocks = rows.chunks(per_block * n * len).zip(velocities.chunks(per_block * n * len));
-    for ((rows, velocities), out) in blocks.zip(out.chunks_mut(per_block * x.len() * len)) {
+    for (k, ((rows, velocities), out)) in blocks.zip(out.chunks_mut(per_block * per_row * len)).enumerate() {
         let mut samples = Samples::default();
         let each = rows.chunks_exact(n * len).zip(velocities.chunks_exact(n * len)).enumerate();
         for (row, (points, velocities)) in each {
-            for (k, &x_k) in x.iter().enumerate() {
-                sample(axis, &mut samples, row * x.len() + k, points, velocities, x_k, len);
+            for (i, &x) in x.of(k * per_block + row).iter().enumerate() {
+                sample(axis, &mut samples, row * per_row + i, points, velocities, x, len);
             }
         }
         samples.evaluate(space, quantity, axis.outside_segment(), monitor, len, out);
@@ -112,7 +145,7 @@ pub fn evaluate_rows(
 }
 
 /// Adds a sample of one row, unless the row has no nodes there.
-pub fn sample(
+fn sample(
     axis: &Axis,
     samples: &mut Samples,
     owner: usize,
@@ -139,7 +172,7 @@ pub fn push_rows(
     rows: &[f64],
     velocities: &[f64],
     tangents: &[f64],
-    x: &[f64],
+    x: Along,
     of: Of,
     monitor: &Monitor,
     out: &mut [f64],
@@ -150,13 +183,15 @@ pub fn push_rows(
         .chunks_exact(row_len)
         .zip(velocities.chunks_exact(row_len))
         .zip(tangents.chunks_exact(row_len))
-        .zip(out.chunks_exact_mut(x.len() * len))
+        .zip(out.chunks_exact_mut(x.per_row() * len))
+        .enumerate()
         .collect();
-    parallel::for_each(items, false, monitor, |(((points, velocities), tangents), out)| {
+    parallel::for_each(items, false, monitor, |(row, (((points, velocities), tangents), out))| {
         out.fill(f64::NAN);
         for run in axis.runs(|i| is_valid(points, i, len)) {
             // The coordinates in this run, and their numbers.
             let inside: Vec<(usize, f64)> = x
+                .of(row)
                 .iter()
                 .enumerate()
                 .filter_map(|(k, &x)| {
@@ -192,15 +227,7 @@ pub fn push_rows(
 
 /// Carries tangent vectors at the nodes of one curve to the coordinates x. `curve` contains knots, points, velocities and
 /// tangent vectors.
-pub fn push_curve(
-    space: &Erased,
-    axis: &Axis,
-    run: Run,
-    curve: [&[f64]; 4],
-    x: &[f64],
-    of: Of,
-    out: &mut [f64],
-) {
+fn push_curve(space: &Erased, axis: &Axis, run: Run, curve: [&[f64]; 4], x: &[f64], of: Of, out: &mut [f64]) {
     let [t, points, velocities, tangents] = curve;
     if velocities.iter().chain(tangents).any(|v| !v.is_finite()) {
         return out.fill(f64::NAN);

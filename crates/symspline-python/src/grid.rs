@@ -96,9 +96,16 @@ pub fn grid_product<'py>(
     let lead: Vec<usize> = rows.iter().map(|x| x.len()).collect();
     // Points are counted once per axis.
     let units = lead.iter().product::<usize>() * lead.len();
-    evaluated(py, handle, &arrays, &lead, Derivative { along, last }, units, progress, |grid, derivative, monitor, out| {
-        grid::product(grid, &rows, derivative, monitor, out.0, out.1)
-    })
+    evaluated(
+        py,
+        handle,
+        &arrays,
+        &lead,
+        Derivative { along, last },
+        units,
+        progress,
+        |grid, derivative, monitor, out| grid::product(grid, &rows, derivative, monitor, out.0, out.1),
+    )
 }
 
 /// Evaluates a grid at scattered coordinates, shape (n, axes), like [`grid_product`].
@@ -115,9 +122,16 @@ pub fn grid_scattered<'py>(
 ) -> PyResult<Evaluated<'py>> {
     let count = x.shape()[0];
     let x = in_order(&x)?;
-    evaluated(py, handle, &arrays, &[count], Derivative { along, last }, count, progress, |grid, derivative, monitor, out| {
-        grid::scattered(grid, x, derivative, monitor, out.0, out.1)
-    })
+    evaluated(
+        py,
+        handle,
+        &arrays,
+        &[count],
+        Derivative { along, last },
+        count,
+        progress,
+        |grid, derivative, monitor, out| grid::scattered(grid, x, derivative, monitor, out.0, out.1),
+    )
 }
 
 /// The common part of both: new arrays with the leading axes `lead`, and the numbers of one point behind.

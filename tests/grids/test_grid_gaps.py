@@ -1,0 +1,124 @@
+"""Missing nodes: runs of rows, isolated nodes, and what a missing node changes."""
+
+import numpy as np
+import pytest
+from grids.fields import Field, knots
+
+import symspline as ss
+from symspline._grid.axes import Sites
+from symspline._grid.on_manifold import ManifoldGrid
+
+SO3 = ss.space("so:3")
+
+
+def holes(rng, shape, share, periodic):
+    """Random missing nodes, the same at both ends of periodic axes."""
+    missing = rng.uniform(size=shape) < share
+    for k in np.flatnonzero(periodic):
+        first = np.take(missing, 0, axis=k)
+        np.moveaxis(missing, k, 0)[-1] = first
+    return missing
+
+
+@pytest.mark.parametrize(
+    "bc_type", ["not-a-knot", "natural", "clamped", (("natural", "clamped"), ("clamped", "natural"))]
+)
+@pytest.mark.parametrize("share", [0.05, 0.2, 0.5])
+def test_gaps_divide_rows_into_runs(bc_type, share):
+    """The compiled loops against those for manifolds, which fit each run by itself."""
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        axes = knots(rng, rng.integers(3, 9)), knots(rng, rng.integers(2, 9))
+        points = Field(SO3, seed, size=0.2).on(*axes)
+        points[holes(rng, points.shape[:2], share, (False, False))] = np.nan
+        if np.isnan(points).all():
+            continue
+        grid = ss.GridSpline(axes, points, SO3, bc_type=bc_type)
+        x = [np.concatenate([rng.uniform(0, 1, 6), t]) for t in axes]
+        found = grid.grid(*x)
+        expected, *_ = ManifoldGrid(SO3, grid._axes, grid.points).run(Sites(x, True, ["continue"] * 2), None, 0, None)
+        assert np.array_equal(np.isnan(found), np.isnan(expected))
+        assert np.nanmax(np.abs(found - expected), initial=0) < 1e-13
+        # Values at the nodes are the nodes.
+        assert np.nanmax(np.abs(found[6:, 6:] - points), initial=0) < 1e-13
+        assert np.array_equal(np.isnan(found[6:, 6:]), np.isnan(points))
+
+
+@pytest.mark.parametrize("bc_type", ["not-a-knot", ("periodic", "natural"), ("natural", "periodic"), "periodic"])
+@pytest.mark.parametrize("share", [0.0, 0.05, 0.3])
+def test_scattered_coordinates_see_the_same_gaps(bc_type, share):
+    periodic = [word == "periodic" for word in ([bc_type] * 2 if isinstance(bc_type, str) else bc_type)]
+    for seed in range(4):
+        rng = np.random.default_rng(100 + seed)
+        axes = knots(rng, rng.integers(4, 10)), knots(rng, rng.integers(4, 20))
+        points = Field(SO3, seed, size=0.2).on(*axes)
+        for k in np.flatnonzero(periodic):
+            np.moveaxis(points, k, 0)[-1] = np.take(points, 0, axis=k)
+        points[holes(rng, points.shape[:2], share, periodic)] = np.nan
+        grid = ss.GridSpline(axes, points, SO3, bc_type=bc_type)
+        x = [np.concatenate([rng.uniform(0, 1, 5), t]) for t in axes]
+        for nu in [None, (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)]:
+            outer = grid.grid(*x, nu=nu).reshape(-1, 3, 3)
+            chosen = rng.choice(len(outer), 40)
+            pairs = grid(tuple(own.ravel()[chosen] for own in np.meshgrid(*x, indexing="ij")), nu)
+            outer = outer[chosen]
+            assert np.array_equal(np.isnan(outer), np.isnan(pairs))
+            size = np.nanmax(np.abs(outer), initial=1)
+            assert np.nanmax(np.abs(outer - pairs), initial=0) < (1e-12 if nu is None else 1e-8) * size
+
+
+def test_a_run_across_the_ends_of_a_periodic_axis_is_one_run():
+    rng = np.random.default_rng(1)
+    t = knots(rng, 12)
+    points = rng.normal(size=(12, 1))
+    points[-1] = points[0]
+    points[[4, 5]] = np.nan
+    grid = ss.GridSpline((t,), points, "r:1", bc_type="periodic")
+    turned = np.concatenate([t[6:], t[1:4] + t[-1] - t[0]])
+    expected = ss.CubicSpline(turned, np.concatenate([points[6:], points[1:4]]), "r:1", bc_type="not-a-knot")
+    x = rng.uniform(turned[0], turned[-1], 50)
+    assert np.abs(grid(x) - expected(x)).max() < 1e-13
+    assert np.isnan(grid(rng.uniform(t[3] + 1e-9, t[6] - 1e-9, 9))).all()
+
+
+def test_an_isolated_node_has_a_point_and_no_derivative():
+    points = np.arange(15.0).reshape(5, 3, 1)
+    points[[1, 3], :] = np.nan
+    grid = ss.GridSpline((None, None), points, "r:1")
+    assert np.abs(grid((2.0, 1.5)) - 7.5).max() < 1e-13
+    assert np.isnan(grid((2.0, 1.5), (1, 0))).all()
+    assert np.abs(grid((2.0, 1.5), (0, 1)) - 1).max() < 1e-13
+    assert np.isnan(grid((2.1, 1.5))).all()
+
+
+def test_a_missing_node_changes_only_what_its_rows_and_columns_demand():
+    """Values are NaN between the neighbours of a missing node, and there only; elsewhere its influence decays."""
+    rng = np.random.default_rng(2)
+    axes = np.arange(41.0), np.arange(41.0)
+    points = Field(SO3, size=0.3).on(axes[0] / 40, axes[1] / 40)
+    whole = ss.GridSpline(axes, points, SO3)
+    gap = points.copy()
+    gap[20, 20] = np.nan
+    grid = ss.GridSpline(axes, gap, SO3)
+    x = np.sort(rng.uniform(0, 40, (2, 120)))
+    found, before = grid.grid(*x), whole.grid(*x)
+    missing = np.isnan(found).all(axis=(2, 3))
+    near = [np.abs(own - 20) < 1 for own in x]
+    assert np.array_equal(missing, near[0][:, None] & near[1][None])
+    change = np.abs(found - before).max(axis=(2, 3))
+    far = (np.abs(x[0] - 20) > 15)[:, None] | (np.abs(x[1] - 20) > 15)[None]
+    assert np.nanmax(change[far & ~missing]) < 1e-14
+    assert 1e-9 < np.nanmax(change) < 1e-6
+
+
+def test_a_failed_row_is_missing_for_the_next_axis():
+    points = Field(ss.Sphere(2)).on(np.linspace(0, 1, 6), np.linspace(0, 1, 5))
+    points[3, 2] = -points[2, 2]
+    with pytest.raises(ss.CutLocusError, match=r"points\[2, 2\] and points\[3, 2\]"):
+        ss.GridSpline((None, None), points, "sphere:2")
+    with pytest.warns(ss.ConvergenceWarning, match="along axis 0"):
+        grid = ss.GridSpline((None, None), points, "sphere:2", on_failure="warn")
+    assert not grid.report.converged
+    found = grid.grid(np.linspace(0, 5, 11), np.linspace(0, 4, 9))
+    assert np.isnan(found[:, 3:6]).all()
+    assert np.isfinite(found[:, :3]).all()
