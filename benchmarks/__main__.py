@@ -10,7 +10,7 @@ from pathlib import Path
 
 import symspline as ss
 
-from . import cost, data, every_space, limits, machine, side_by_side
+from . import cost, data, every_space, grids, limits, machine, side_by_side
 from .data import FULL, QUICK, Sizes
 from .tables import table
 from .timing import Effort
@@ -24,6 +24,7 @@ def main() -> None:
     parser = argparse.ArgumentParser("python -m benchmarks", description="Benchmarks of symspline.")
     parser.add_argument("--quick", action="store_true", help="a smoke test: tiny sizes, nothing is kept")
     parser.add_argument("--spaces", action="store_true", help="only the tables of every space")
+    parser.add_argument("--grids", action="store_true", help="only the tables of grids")
     parser.add_argument(
         "--large", action="store_true", help=f"with a curve in {every_space.LARGE.space} among the spaces"
     )
@@ -34,6 +35,11 @@ def main() -> None:
             print("A smoke test: it shows that the benchmarks run; its numbers mean nothing.\n", flush=True)
         threads = ss.num_threads()
         sizes, effort = (QUICK, Effort(2, 0, 0.1)) if given.quick else (FULL, Effort(7, 0.02, 10))
+        if not given.spaces:
+            grid_sizes = grids.QUICK if given.quick else grids.FULL
+            _write(folder, "grids", grids.pieces(grid_sizes, threads, effort))
+        if given.grids:
+            return
         if not given.spaces:
             _write(folder, "measured", _pieces(folder, sizes, threads, effort))
         plan = every_space.QUICK if given.quick else every_space.FULL

@@ -52,6 +52,10 @@ def objects():
         "BSpline": ss.BSpline([0, 0, 0, 1, 1, 1], P, 2, "sphere:2"),
         "BezierCurve": ss.BezierCurve(P, "sphere:2"),
         "AffineMorph": ss.shapes.AffineMorph(T, [SQUARE, 2 * SQUARE, SQUARE + 1]),
+        "GridSpline": ss.GridSpline(
+            (T, None), P[[0, 1]].repeat(2, axis=0)[[0, 1, 2]][:, None] * np.ones((3, 2, 1)), "sphere:2"
+        ),
+        "GridSpline, volume": ss.GridSpline((None, T, DAYS), np.full((2, 3, 3, 1), 0.5), "r:1", symmetric=True),
         "Report": sphere.report,
         "Stiefel": ss.Stiefel(2, 3),
     }

@@ -42,13 +42,13 @@ impl Derivative {
 
 impl Grid<'_> {
     /// The number of numbers of a point.
-    pub fn len(&self) -> usize {
+    pub fn point_len(&self) -> usize {
         self.space.point_len()
     }
 
     /// Whether no node is missing.
     pub fn is_complete(&self) -> bool {
-        (0..self.points.len() / self.len()).all(|node| is_valid(self.points, node, self.len()))
+        (0..self.points.len() / self.point_len()).all(|node| is_valid(self.points, node, self.point_len()))
     }
 }
 

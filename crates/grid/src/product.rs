@@ -25,7 +25,7 @@ pub fn product(
     points: &mut [f64],
     tangents: &mut [f64],
 ) -> Summary {
-    let len = grid.len();
+    let len = grid.point_len();
     let behind: usize = x[1..].iter().map(|x| x.len()).product();
     if x[0].is_empty() || behind == 0 {
         return Summary::default();

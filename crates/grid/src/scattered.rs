@@ -30,7 +30,7 @@ pub fn scattered(
     points: &mut [f64],
     tangents: &mut [f64],
 ) -> Summary {
-    let (dims, len) = (grid.axes.len(), grid.len());
+    let (dims, len) = (grid.axes.len(), grid.point_len());
     let mut queries: Vec<Query> = x
         .chunks_exact(dims)
         .enumerate()
@@ -109,7 +109,7 @@ fn block(
     let route = Route { space: grid.space, axes: &axes, derivative };
     let mut first = Arrays::default();
     for (start, count) in row_ranges(grid, &windows) {
-        let numbers = axes[0].nodes() * grid.len();
+        let numbers = axes[0].nodes() * grid.point_len();
         let range = start * numbers..(start + count) * numbers;
         let nodes = Nodes {
             points: &grid.points[range.clone()],

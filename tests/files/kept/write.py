@@ -40,6 +40,9 @@ def curves():
         "estimate": ss.estimate(MEASURED, 5, "so:3", lam=0.1),
         "bspline": ss.BSpline([0, 0, 0, 1, 2, 2, 2], [*P, P[0]], 2, "sphere:2"),
         "bezier": ss.BezierCurve([P, P[::-1]], "sphere:2"),
+        "grid": ss.GridSpline(
+            (DATES, None), TURNS[None] @ TURNS[[0, 2, 1], None], "so:3", bc_type=("natural", "clamped")
+        ),
         "several": {"a": spline, "b": spline},
         "several_smoothing": {"a": smooth, "b": smooth},
     }
@@ -50,6 +53,9 @@ def values(found):
     if isinstance(found, dict):
         return {name: values(curve) for name, curve in found.items()}
     numbers = {"class": type(found).__name__, "space": str(found.space), "repr": repr(found)}
+    if isinstance(found, ss.GridSpline):
+        x = (found.axes[0][0] + (found.axes[0][-1] - found.axes[0][0]) // 3, 1.5)
+        return numbers | {f"nu={nu}": [plain(found(x, nu))] for nu in [(0, 0), (1, 0), (0, 2)]}
     start, end = np.ravel(found.domain[0])[0], np.ravel(found.domain[1])[-1]
     for nu in range(3):
         factors = found(start + (end - start) // 2, nu)
