@@ -24,6 +24,7 @@ LAYERS = [
         "_time",
         "_typing",
         "_version",
+        "_warnings",
     ],
     ["_spaces"],
     ["_curves", "manifolds"],

@@ -2,12 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import sys
-import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
-from contextvars import ContextVar
 from typing import Any
 
 import numpy as np
@@ -15,8 +9,8 @@ import numpy as np
 from ._core import ConvergenceError, CutLocusError, ValidationError
 from ._faults import CUT_LOCUS, Fault
 from ._report import ConvergenceWarning
+from ._warnings import warn
 
-_PACKAGE = os.path.dirname(__file__)
 # The times are considered the reason if an interval is shorter than its neighbours by this factor, and if its speed
 # exceeds the median by the same factor.
 _CLOSE = 10
@@ -51,32 +45,6 @@ def raise_or_warn(faults: list[Fault], on_failure: str, spline: Any) -> None:
     if almost:
         message = almost[0].message(batch) + _more(almost, "curves")
         warn(message, UserWarning, almost[0].batch_index(batch), almost[0].node)
-
-
-# Categories of warnings that the current call suppresses because its result describes the same.
-_SILENT: ContextVar[tuple[type[Warning], ...]] = ContextVar("silent", default=())
-
-
-@contextmanager
-def silenced(category: type[Warning]) -> Iterator[None]:
-    """Suppress warnings of this package in the current thread; filters of `warnings` are shared by all threads."""
-    token = _SILENT.set((*_SILENT.get(), category))
-    try:
-        yield
-    finally:
-        _SILENT.reset(token)
-
-
-def warn(message: str, category: type[Warning], curve: tuple[int, ...] | None = None, node: int | None = None) -> None:
-    """Issue a warning at the line that called this package.
-
-    The warning has the attributes ``curve`` and ``node`` of a `SymsplineError`.
-    """
-    if issubclass(category, _SILENT.get()):
-        return
-    warning: Any = category(message)
-    warning.curve, warning.node = curve, node
-    warnings.warn(warning, stacklevel=callers_level())
 
 
 def _explained_by_close_times(fault: Fault, batch: tuple[int, ...], spline: Any) -> Fault:
@@ -123,11 +91,3 @@ def _explained_by_close_times(fault: Fault, batch: tuple[int, ...], spline: Any)
 
 def _more(faults: list[Fault], what: str) -> str:
     return f" (and {len(faults) - 1} more {what})" if len(faults) > 1 else ""
-
-
-def callers_level() -> int:
-    """Return the number of frames between this function and the code that called the package."""
-    frame, level = sys._getframe(1), 1
-    while frame.f_back is not None and frame.f_code.co_filename.startswith(_PACKAGE):
-        frame, level = frame.f_back, level + 1
-    return level

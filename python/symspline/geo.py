@@ -22,7 +22,6 @@ from ._arrays import checked_flag, checked_number, short_repr
 from ._base_curve import check_curve
 from ._core import ValidationError
 from ._cubic import CubicSpline
-from ._errors import warn
 from ._estimation.along import Motion
 from ._estimation.uncertainty import Jacobians, check_uncertain, standard_errors
 from ._exceptions import SymsplineError
@@ -32,6 +31,7 @@ from ._segments import check_smooth, cut
 from ._smoothing.many import smooth_many
 from ._spaces import Sphere
 from ._typing import Duplicates, FloatArray, TimesLike
+from ._warnings import warn
 
 if TYPE_CHECKING:
     import pandas as pd

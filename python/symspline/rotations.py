@@ -28,7 +28,6 @@ from ._core import ValidationError
 from ._cubic import CubicSpline
 from ._curves.curve import CurveArrays
 from ._curves.fit import curve_of
-from ._errors import warn
 from ._estimation.along import Motion
 from ._estimation.rates import integrated
 from ._estimation.terms import Body
@@ -39,6 +38,7 @@ from ._spaces import Array, Doubles, SpecialEuclidean, SpecialOrthogonal, Sphere
 from ._time import knots_of
 from ._typing import Extrapolate, Frame, RateInterpolation, RotationOrder, TimesLike
 from ._validation import length, one_of, real_numbers
+from ._warnings import warn
 from .convert import matrix_to_quaternion, quaternion_to_matrix
 from .convert._quaternions import checked_order
 

@@ -13,7 +13,7 @@ from .._curve import Curve
 from .._curves.fit import FitProblem, fit, read_ends
 from .._curves.fit import Points as CorePoints
 from .._curves.solve import Options
-from .._errors import raise_or_warn, warn
+from .._errors import raise_or_warn
 from .._faults import UNCONVERGED, Fault
 from .._input import times_of
 from .._options import check_on_failure, check_progress, checked_extrapolate
@@ -46,6 +46,7 @@ from .._typing import (
     TimesLike,
 )
 from .._validation import one_of
+from .._warnings import warn
 from ..manifolds._manifold import refuse_functions
 from .measurements import Constant, Measurement, Points
 from .solve import Iteration, Setup, Solution, read_lams

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from .._curves.curve import CurveArrays
-from .._errors import warn
 from .._faults import of_index
 from .._spaces import Array, Space, factors_of
+from .._warnings import warn
 from .data import SmoothingData, points_of
 from .factors import is_several, smoothed_spaces, split
 

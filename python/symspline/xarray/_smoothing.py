@@ -12,12 +12,12 @@ import numpy as np
 import xarray as xr
 
 from .._arrays import checked_number
-from .._errors import silenced
 from .._options import checked_extrapolate, extrapolation_mode
 from .._smoothing import SmoothingWarning, make_smoothing_spline
 from .._smoothing.factors import is_several
 from .._spaces import Array, Space, SpecialOrthogonal, space_named
 from .._typing import SmoothOptions
+from .._warnings import silenced
 from ._blocks import Inputs, apply, per_curve_times
 from ._spec import KNOTS, LINE, bare, rehearse, spec_of, timed_by, times_with_names
 
