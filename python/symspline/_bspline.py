@@ -14,11 +14,12 @@ from ._core import CutLocusError, ValidationError
 from ._curve import Curve
 from ._curves.curve import NORMS
 from ._curves.ends import ends_of
-from ._curves.fit import Points, validated
+from ._curves.fit import Points, unwrapped, validated
 from ._curves.integrals import EXACT
 from ._curves.reduced import reduced
 from ._faults import of_index
 from ._options import quantity_of
+from ._representatives import warn_of_far_data
 from ._spaces import Array, Doubles, Product, Space, point_tol, space_named
 from ._time import onto_ends
 from ._typing import FloatArray, P
@@ -49,6 +50,12 @@ class BSpline(Curve[P]):
         If the input does not meet the requirements above.
     CutLocusError
         If two neighbouring control points are not joined by a unique shortest geodesic.
+
+    Warns
+    -----
+    FarPointsWarning
+        If there are at least five control points and more than half of the steps between them exceed 0.6 of the
+        distance to the cut locus.
 
     See Also
     --------
@@ -84,7 +91,10 @@ class BSpline(Curve[P]):
         degree = whole_number(degree, "degree", 1)
         doubles, tol = _control_array(control_points, space, 2)
         knots = _checked_knots(knots, space._lead(doubles)[-1], degree)
-        self._fill(space, knots, _checked_points(space, doubles, tol), degree)
+        *batch, count = space._lead(doubles)
+        data = unwrapped(space, Points(doubles, tol, tuple(batch), count))
+        self._fill(space, knots, _checked_points(space, data.numbers, tol), degree)
+        warn_of_far_data(space, [data])
 
     def __call__(self, x: ArrayLike, nu: int = 0) -> P:
         """Evaluate the curve or its derivatives.

@@ -15,7 +15,7 @@ from ._core import ValidationError
 from ._curves.curve import CurveArrays, longest_step
 from ._curves.derivatives import Gradient, SampleTimes, sample_times
 from ._curves.ends import ends_in_factors, freeze_bc_type, take_batch
-from ._curves.fit import Fit, Problem, curve_of, fit, mask_of, read, read_ends
+from ._curves.fit import Fit, Problem, curve_of, fit, mask_of, moved_ends, read, read_ends
 from ._curves.integrals import alternative_energy
 from ._errors import raise_or_warn
 from ._options import fit_options, order_of, with_atol
@@ -173,6 +173,7 @@ class CubicSpline(SegmentedCurve[P], Generic[P, R]):
             data = with_atol(data, atol)
         batch, nodes = data[0].batch, data[0].nodes
         time_axis, shown_times, times = knots_of(t, batch, nodes)
+        bc_type = moved_ends(bc_type, space, data)
         ends = read_ends(bc_type, space, batch)
         skip_invalid = bool(batch) and on_failure != "raise"
         mask = None if where is None else mask_of(where, batch)

@@ -28,7 +28,7 @@ from ._options import (
 )
 from ._report import Report
 from ._representatives import warn_of_representatives
-from ._spaces import Array, Product, Space, factors_of, parts_of, point_tol, space_named
+from ._spaces import Array, Product, Quotient, Space, factors_of, parts_of, point_tol, space_named
 from ._time import TimeAxis, knots_of
 from ._typing import (
     AnyArray,
@@ -91,8 +91,24 @@ def fit(
     ((3, 3), True)
     """
     spline = CubicSpline(t, points, space, **options)
-    velocities: P = in_library(library_of(points), spline.velocities)
+    velocities: P = in_library(library_of(points), _at_given(points, spline))
     return velocities, spline.report
+
+
+def _at_given(points: Any, spline: CubicSpline[Any]) -> Any:
+    """Return the velocities of a curve at the points of the user, which may be other representatives."""
+    space, velocities = spline.space, spline.velocities
+    if not any(isinstance(factor, Quotient) for factor in factors_of(space)):
+        return velocities
+    given = fitting.read_given(points, space)
+    each = zip(factors_of(space), given, spline._curve.parts, strict=True)
+    moved = [
+        own._moved_like(own._numbers(part.numbers), curve.points, curve.velocities)
+        if isinstance(own, Quotient)
+        else curve.velocities
+        for own, part, curve in each
+    ]
+    return tuple(moved) if isinstance(space, Product) else moved[0]
 
 
 @overload
@@ -204,6 +220,9 @@ def _nodes_around(t: TimesLike | None, points: Any, velocities: Any, space: Spac
     ends, so the values are bit-identical.
     """
     everything = t, points, velocities
+    if any(isinstance(factor, Quotient) for factor in factors_of(space)):
+        # Representatives are chosen from the first point on.
+        return everything
     if type(t) is not np.ndarray or t.dtype != np.float64 or t.ndim != 1 or len(t) < _MANY:
         return everything
     times = np.asarray(x) if isinstance(x, (int, float, np.ndarray)) else None
@@ -254,6 +273,8 @@ def read_velocities(velocities: Any, space: Space[Any], data: list[fitting.Point
             shape = factor._numbers(part.numbers).shape
             raise ValidationError(f"velocities has shape {numbers.shape}, but points {shape}")
         refuse(~np.isfinite(numbers), "velocities", lambda _: "is not finite")
+        if part.moves is not None and isinstance(factor, Quotient):
+            numbers = np.ascontiguousarray(factor._moved_by(numbers, part.moves))
         found.append((numbers, point_tol(array.dtype)))
     return found
 
@@ -333,6 +354,7 @@ def fit_many(
             knots.append(knots_of(t, (), data[0].nodes))
         except (ValidationError, TypeError, ValueError) as error:
             raise ValidationError(str(error))._of_curve(number) from None
+    bc_type = fitting.moved_ends_of_many(bc_type, space, points)
     ends = fitting.read_ends(bc_type, space, (len(pairs),))
     times = [times for *_, times in knots]
     problem = fitting.Problem(

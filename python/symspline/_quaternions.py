@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 Rows = tuple[tuple[Any, ...], ...]
 
 
@@ -14,6 +17,13 @@ def rotation_rows(w: Any, x: Any, y: Any, z: Any) -> Rows:
         (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
         (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
     )
+
+
+def matrices_of_quaternions(q: Any) -> NDArray[np.float64]:
+    """Return the rotation matrices of quaternions (w, x, y, z), which need not have unit length."""
+    q = np.asarray(q, np.float64)
+    q = q / np.linalg.norm(q, axis=-1, keepdims=True)
+    return np.stack([np.stack(row, axis=-1) for row in rotation_rows(*np.moveaxis(q, -1, 0))], axis=-2)
 
 
 def quaternion_rows(matrix: Any) -> Rows:

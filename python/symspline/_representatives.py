@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from contextlib import suppress
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from ._curves.curve import CurveArrays
 from ._curves.fit import Points
 from ._faults import of_index
 from ._report import MAX_STEP, Columns, FarPointsWarning
-from ._spaces import Array, Doubles, Space, Sphere, Unitary, factors_of
+from ._spaces import Array, Doubles, Space, Sphere, Unitary, cover_of, factors_of
 from ._warnings import warn
 from .manifolds import Manifold
 
@@ -124,7 +124,7 @@ def _opposite(points: Array) -> NDArray[np.intp]:
 # ---- long steps ----
 
 
-def warn_of_far_points(curves: Sequence[CurveArrays], longest_steps: Sequence[Sequence[Columns | Doubles]]) -> None:
+def warn_of_far_points(curves: Sequence[CurveArrays], longest_steps: Sequence[Sequence[Columns | Doubles]]) -> bool:
     """Warn if more than half of the steps of a curve exceed 0.6 of the distance to the cut locus.
 
     Parameters
@@ -133,8 +133,13 @@ def warn_of_far_points(curves: Sequence[CurveArrays], longest_steps: Sequence[Se
         The curves of one fit.
     longest_steps : sequence of sequence of Columns or ndarray
         The longest steps of each curve in every factor, or its reports. Points need not be examined if these are short.
+
+    Returns
+    -------
+    bool
+        Whether there is such a curve.
     """
-    found: list[tuple[tuple[int, ...], int, int, Space]] = []
+    found: list[_Far] = []
     for number, curve in enumerate(curves):
         steps = curve.times.shape[-1] - 1
         if steps < _LEAST:
@@ -145,13 +150,46 @@ def warn_of_far_points(curves: Sequence[CurveArrays], longest_steps: Sequence[Se
             # The deciding angle never exceeds the distance.
             if not (_longest(own) > limit).any():
                 continue
-            far = np.count_nonzero(cut_fractions(part.space, part.points) > FAR, axis=-1)
+            far = _count_far(part.space, part.points)
             if isinstance(own, Columns):
                 # Curves that did not converge are reported elsewhere, according to `on_failure`.
                 far = np.where(own.row("converged").reshape(curve.batch), far, 0)
             for index in np.argwhere(far > steps / 2).tolist():
                 place = tuple([number] * (len(curves) > 1) + index)
-                found.append((place, int(far[tuple(index)]), steps, part.space))
+                found.append(_Far(place, int(far[tuple(index)]), steps, part.space))
+    _warn_of_far(found)
+    return bool(found)
+
+
+def warn_of_far_data(space: Space[Any], data: Sequence[Points]) -> None:
+    """Warn in the same way about data that a curve does not pass through, in every factor."""
+    found = []
+    for factor, part in zip(factors_of(space), data, strict=True):
+        steps = part.nodes - 1
+        if steps < _LEAST:
+            continue
+        far = _count_far(factor, factor._numbers(part.numbers))
+        found += [
+            _Far(tuple(index), int(far[tuple(index)]), steps, factor) for index in np.argwhere(far > steps / 2).tolist()
+        ]
+    _warn_of_far(found)
+
+
+class _Far(NamedTuple):
+    """A curve with long steps: its index, the numbers of long and of all steps, and their space."""
+
+    place: tuple[int, ...]
+    far: int
+    steps: int
+    space: Space[Any]
+
+
+def _count_far(space: Space[Any], points: Array) -> NDArray[np.intp]:
+    """Return the number of long steps of every curve."""
+    return np.asarray(np.count_nonzero(cut_fractions(space, points) > FAR, axis=-1))
+
+
+def _warn_of_far(found: list[_Far]) -> None:
     if not found:
         return
     place, count, steps, space = found[0]
@@ -160,9 +198,10 @@ def warn_of_far_points(curves: Sequence[CurveArrays], longest_steps: Sequence[Se
     more = f" (and of {others} more curves)" if others else ""
     warn(
         f"more than half of the steps are long: {count} of {steps} steps between neighbouring points{of}{more} are "
-        f"beyond {FAR} of the way to the cut locus of {space!r}, where several C² curves may exist. Where points have "
-        "equivalent representatives, as orientations of crystals do, take the one nearest to the previous point. Where "
-        "phases, signs or bases do not count, remove them, or use a projective space or a Grassmannian. Otherwise put "
+        f"beyond {FAR} of the way to the cut locus of {cover_of(space)!r}, where several C² curves may exist. Where "
+        "points have equivalent representatives, as orientations of crystals do, use a Quotient, whose method unwrap "
+        "takes the one nearest to the previous point. Where phases, signs or bases do not count, use a Quotient, a "
+        "projective space, or a Grassmannian, whose curves give continuous bases by their method lift. Otherwise put "
         "points in between.",
         FarPointsWarning,
         place,
@@ -184,6 +223,7 @@ def cut_fractions(space: Space[Any], points: Array) -> Doubles:
     ndarray, shape (..., N)
         NaN where a point is not finite or the fraction is unknown.
     """
+    space = cover_of(space)
     finite = space._where_finite(points)
     good = finite[..., :-1] & finite[..., 1:]
     result = np.full(good.shape, np.nan)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ._arrays import as_array, checked_number, refuse, short_repr, whole_number
 from ._core import ValidationError
 from ._cubic import CubicSpline
-from ._curves.fit import read
+from ._curves.fit import read_given
 from ._functional import fit_many
 from ._input import times_of
 from ._smoothing import SmoothingReport, SmoothingSpline
@@ -184,7 +184,7 @@ def check_smooth(smooth: Any, duplicates: str, options: dict[str, Any]) -> None:
 
 def _used(weight_options: dict[str, Any], points: Any, space: Space) -> NDArray[np.bool_]:
     """Return which points have a nonzero weight."""
-    found = read_precision(**weight_options, space=space, data=read(points, space))
+    found = read_precision(**weight_options, space=space, data=read_given(points, space))
     return np.asarray(np.any([own.weights > 0 for own in found], axis=0))
 
 
@@ -232,7 +232,7 @@ def cut(
     space = space_named(space)
     least = whole_number(min_points, "min_points", 2)
     one_of(duplicates, "duplicates", "raise", "first", "mean")
-    data = read(points, space)
+    data = read_given(points, space)
     if data[0].batch:
         raise ValidationError(f"points has batch axes {data[0].batch}, but a recording must be a single curve")
     given, zone = times_of(t, "t")

@@ -42,7 +42,7 @@ from ._pose_files import (
     write_tum,
 )
 from ._smoothing.factors import smoothed_spaces
-from ._spaces import Array, Euclidean, SpecialEuclidean, SpecialOrthogonal
+from ._spaces import Array, Euclidean, SpecialEuclidean, SpecialOrthogonal, cover_of
 from ._typing import Extrapolate, Frame, TimesLike
 from ._validation import one_of
 from .rotations import Spline, attitude, rate_jacobians, turned
@@ -344,7 +344,7 @@ class _Motion:
     def __init__(self, spline: Spline, x: TimesLike, frame: str, extrapolate: Any, per_curve: bool) -> None:
         self._in_body = one_of(frame, "frame", "body", "world") == "body"
         self._attitude = attitude(spline)
-        found = [part for part in spline._curve.parts if part.space in (_SE3, _R3)]
+        found = [part for part in spline._curve.parts if cover_of(part.space) in (_SE3, _R3)]
         if len(found) != 1:
             raise ValidationError(
                 f"the curve must be on se:3, or on a product with one so:3 and one r:3, not on {spline.space}"
@@ -365,7 +365,7 @@ class _Motion:
     def position(self, quantity: str) -> Array:
         """The position in the frame of the world, or its velocity or acceleration."""
         values = self._at(self._position, quantity)
-        if self._position.space != _SE3:
+        if cover_of(self._position.space) != _SE3:
             return values
         values = values[..., :3, 3]
         if quantity == "acceleration":

@@ -34,7 +34,8 @@ from ._estimation.terms import Body
 from ._estimation.uncertainty import Jacobians, check_uncertain, standard_errors
 from ._hermite import HermiteSpline
 from ._smoothing.factors import smoothed_spaces
-from ._spaces import Array, Doubles, SpecialEuclidean, SpecialOrthogonal, Sphere
+from ._spaces import Array, Doubles, SpecialEuclidean, SpecialOrthogonal, Sphere, cover_of
+from ._spaces.point_groups import elements, proper_symbol
 from ._time import knots_of
 from ._typing import Extrapolate, Frame, RateInterpolation, RotationOrder, TimesLike
 from ._validation import length, one_of, real_numbers
@@ -55,6 +56,7 @@ __all__ = [
     "from_rotation_6d",
     "from_rotation_vectors",
     "integrate",
+    "point_group",
     "quaternion",
     "rotation",
     "velocities",
@@ -376,14 +378,14 @@ def attitude(spline: Spline) -> CurveArrays:
         If the curve does not contain exactly one rotation.
     """
     check_curve(spline)
-    found = [part for part in spline._curve.parts if part.space in (_SO3, _SE3)]
+    found = [part for part in spline._curve.parts if cover_of(part.space) in (_SO3, _SE3)]
     if len(found) != 1:
         raise ValidationError(
             f"the curve must be on so:3, se:3, or a product with one of them, not on {spline.space}; to convert "
             "quaternions to points of so:3, use symspline.rotations.from_quaternions"
         )
     curve = found[0]
-    if curve.space == _SO3:
+    if cover_of(curve.space) == _SO3:
         return curve
     if curve not in _ATTITUDES:
         # The rotation of a screw motion is a geodesic of SO(3), and so the control points are those of its curve.
@@ -793,6 +795,50 @@ def from_rotation_6d(numbers: ArrayLike, *, order: RotationOrder | None = None) 
         second = second / sine[..., None]
     rows = np.stack([first, second, np.cross(first, second)], axis=-2)
     return _SO3.project(rows if order == "rows" else _swapped(rows))
+
+
+# ---- symmetry ----
+
+
+def point_group(symbol: str) -> Doubles:
+    """Return the rotations of a point group of crystals.
+
+    Parameters
+    ----------
+    symbol : str
+        Hermann–Mauguin or Schoenflies symbol of one of the eleven proper point groups: 1 (C1), 2 (C2), 222 (D2),
+        4 (C4), 422 (D4), 3 (C3), 32 (D3), 6 (C6), 622 (D6), 23 (T) and 432 (O). The symbol of a Laue group, such as
+        m-3m (Oh), denotes its rotations.
+
+    Returns
+    -------
+    ndarray, shape (k, 3, 3)
+        The rotations, the identity first.
+
+    Raises
+    ------
+    ValidationError
+        If the symbol is unknown.
+
+    See Also
+    --------
+    symspline.Quotient : Orientations up to the symmetry of a crystal.
+
+    Notes
+    -----
+    The conventions are those of orix: the main axis is z, and the two-fold axes of 32 and 622 include x. The two-fold
+    axis of 2 is z.
+
+    Examples
+    --------
+    >>> point_group("m-3m").shape
+    (24, 3, 3)
+    >>> point_group("C2")[1]
+    array([[-1.,  0.,  0.],
+           [ 0., -1.,  0.],
+           [ 0.,  0.,  1.]])
+    """
+    return elements(proper_symbol(symbol)) + 0.0
 
 
 def _hat(v: Array) -> Array:

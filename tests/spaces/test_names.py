@@ -16,7 +16,9 @@ import symspline as ss
 CLASSES = [
     cls
     for cls in vars(ss).values()
-    if inspect.isclass(cls) and issubclass(cls, ss.Space) and cls not in (ss.Space, ss.Product, ss.Manifold)
+    if inspect.isclass(cls)
+    and issubclass(cls, ss.Space)
+    and cls not in (ss.Space, ss.Product, ss.Manifold, ss.Quotient)
 ]
 
 

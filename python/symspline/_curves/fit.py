@@ -13,19 +13,20 @@ from itertools import pairwise
 from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .. import _core
 from .._arrays import as_array
 from .._core import ValidationError
 from .._faults import INVALID, Fault
 from .._report import Columns, Report, shaped
-from .._spaces import POINT_TOL, Array, Doubles, Product, Space, factors_of, parts_of, point_tol
+from .._spaces import POINT_TOL, Array, Doubles, Product, Quotient, Space, cover_of, factors_of, parts_of, point_tol
 from .._typing import Progress
 from ..manifolds import Manifold
 from ..manifolds._checks import hermite_on_manifold
 from ..manifolds._on_manifold import OnManifold
 from .curve import CoreCurve, CurveArrays, ProductCurve, share
-from .ends import End, ends_in_factors, ends_of
+from .ends import End, ends_in_factors, ends_of, split_ends
 from .reduced import ReducedCurve
 from .solve import Mask, Options, Solved, Task, solve, solve_single, without
 
@@ -50,12 +51,16 @@ class Points(NamedTuple):
         Shape of the batch axes.
     nodes : int
         Number of points per curve.
+    moves : ndarray of int or None
+        In a quotient, the transformations that were applied to the points of the user, shape (*batch, nodes). None
+        if the points were not changed.
     """
 
     numbers: Doubles
     tol: float
     batch: tuple[int, ...]
     nodes: int
+    moves: NDArray[np.intp] | None = None
 
 
 class Problem(NamedTuple, Generic[_Times, _Data]):
@@ -128,7 +133,27 @@ def kind_of(space: Space) -> type[CoreCurve]:
 
 
 def read(points: Any, space: Space[Any]) -> list[Points]:
-    """Read points from the user in each factor."""
+    """Read points from the user in each factor, in quotients as representatives that are continuous along the curve."""
+    found = read_given(points, space)
+    if not any(isinstance(factor, Quotient) for factor in factors_of(space)):
+        return found
+    return [unwrapped(*pair) for pair in zip(factors_of(space), found, strict=True)]
+
+
+def unwrapped(space: Space[Any], part: Points) -> Points:
+    """Choose representatives that are continuous along each curve."""
+    if not isinstance(space, Quotient):
+        return part
+    numbers = space._numbers(part.numbers)
+    moves = space._transformations(numbers, space._where_finite(numbers))
+    if (moves == space._group.identity).all():
+        return part
+    moved = np.ascontiguousarray(space._moved_by(numbers, moves))
+    return part._replace(numbers=space._as_doubles(moved), moves=moves)
+
+
+def read_given(points: Any, space: Space[Any]) -> list[Points]:
+    """Read points from the user in each factor, as they are."""
     if not isinstance(space, Product):
         return [_read(space, points)]
     found = _in_factors(space, _read, parts_of(points, space, "points"))
@@ -169,6 +194,43 @@ def read_ends(bc_type: Any, space: Space[Any], batch: tuple[int, ...]) -> list[l
     return _in_factors(space, lambda factor, ends: ends_of(ends, factor, batch), conditions)
 
 
+def moved_ends(bc_type: Any, space: Space[Any], data: list[Points]) -> Any:
+    """Return end conditions for the chosen representatives.
+
+    Vectors at the last point are tangent at the representative that the user gave.
+    """
+    return _moved_ends(bc_type, space, [part.moves if part.moves is None else part.moves[..., -1] for part in data])
+
+
+def moved_ends_of_many(bc_type: Any, space: Space[Any], points: list[list[Points]]) -> Any:
+    """Return end conditions for the chosen representatives of single curves of different lengths."""
+    last: list[NDArray[np.intp] | None] = []
+    for i, factor in enumerate(factors_of(space)):
+        own = [each[i].moves for each in points]
+        known = isinstance(factor, Quotient) and any(moves is not None for moves in own)
+        still = factor._group.identity if isinstance(factor, Quotient) else 0
+        last.append(np.array([still if moves is None else moves[-1] for moves in own]) if known else None)
+    return _moved_ends(bc_type, space, last)
+
+
+def _moved_ends(bc_type: Any, space: Space[Any], last: list[NDArray[np.intp] | None]) -> Any:
+    if isinstance(bc_type, str) or all(own is None for own in last):
+        return bc_type
+    _, (_, word, vector) = split_ends(bc_type)
+    if vector is None:
+        return bc_type
+    moved = []
+    for factor, own, part in zip(factors_of(space), last, parts_of(vector, space, "an end vector"), strict=True):
+        if own is None or not isinstance(factor, Quotient):
+            moved.append(part)
+            continue
+        numbers = factor._numbers(factor._doubles(part, "an end vector"))
+        lead = factor._leads({"an end vector": numbers.shape}, own.shape)
+        numbers = np.broadcast_to(numbers, lead + factor.point_shape)
+        moved.append(factor._moved_by(numbers, np.broadcast_to(own, lead)))
+    return bc_type[0], (word, tuple(moved) if isinstance(space, Product) else moved[0])
+
+
 def curve_of(
     space: Space[Any], times: Doubles, arrays: Sequence[tuple[Array, Array]], fitted: bool = True
 ) -> CurveArrays:
@@ -201,12 +263,12 @@ def fit(problem: FitProblem, progress: Progress | None = None) -> Fit:
         # The core validates the points in the same call.
         data = points[0]
         tol = data.tol if check else None
-        task = Task(space, times, data.numbers, ends[0], tol, None, mask, check and skip)
+        task = Task(cover_of(space), times, data.numbers, ends[0], tol, None, mask, check and skip)
         found = solve_single(task, options, progress)
         single = CoreCurve(space, times, found.points, found.velocities)
         return Fit(single, [found.columns], options.method, found.faults)
     tasks = [
-        Task(factor, times, part.numbers, end, part.tol if check else None, None, mask, check and skip)
+        Task(cover_of(factor), times, part.numbers, end, part.tol if check else None, None, mask, check and skip)
         for factor, part, end in zip(factors_of(space), points, ends, strict=True)
     ]
     solved, faults = _solve(space, tasks, options, progress)
@@ -228,7 +290,7 @@ def fit_many(problem: ManyProblem, progress: Progress | None) -> tuple[list[Fit]
         parts = [own[i] for own in points]
         tol = max(part.tol for part in parts) if check else None
         numbers = np.concatenate([part.numbers for part in parts])
-        tasks.append(Task(factor, row, numbers, end, tol, offsets, mask, check and skip))
+        tasks.append(Task(cover_of(factor), row, numbers, end, tol, offsets, mask, check and skip))
     solved, faults = _solve(space, tasks, options, progress)
 
     def one(i: int, start: int, stop: int) -> Fit:
@@ -251,7 +313,7 @@ def validated(
 ) -> tuple[list[Array], list[Fault]]:
     """Validate points and project them onto the space. Return them in each factor, and the faults of skipped curves."""
     tasks = [
-        Task(factor, times, part.numbers, end, part.tol, mask=mask, skip_invalid=skip_invalid)
+        Task(cover_of(factor), times, part.numbers, end, part.tol, mask=mask, skip_invalid=skip_invalid)
         for factor, part, end in zip(factors_of(space), points, ends, strict=True)
     ]
     tasks, faults = _validated(space, tasks, _ANY)
@@ -285,7 +347,7 @@ def hermite_data(
     def checked(factor: Space, own: tuple[Points, tuple[Array, float]]) -> tuple[Array, Array, Array]:
         part, (vectors, tangent_tol) = own
         if isinstance(factor, Manifold):
-            task = Task(factor, times, part.numbers, _NATURAL, part.tol)
+            task = Task(cover_of(factor), times, part.numbers, _NATURAL, part.tol)
             return *hermite_on_manifold(task, vectors), np.full(math.prod(part.batch), np.inf)
         doubles = factor._as_doubles(vectors)
         found, tangent, longest = _core.hermite(factor._handle, times, part.numbers, doubles, part.tol, tangent_tol)

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, Never
 import numpy as np
 
 from .._core import ValidationError
-from .._spaces import Array, ComplexGrassmannian, Doubles, Grassmannian, Hyperbolic, Space
+from .._spaces import Array, ComplexGrassmannian, Doubles, Grassmannian, Hyperbolic, Space, cover_of
 from .._spaces.base import LARGE as _LARGE
 from .._typing import Progress
 from .curve import NORMS, CoreCurve, CurveArrays
@@ -73,6 +73,7 @@ def span_of(space: Space, *arrays: Array) -> Span:
 
 
 def _small(space: Space, m: int) -> Space:
+    space = cover_of(space)
     if isinstance(space, (Grassmannian, ComplexGrassmannian)):
         return type(space)(space.point_shape[1], m)
     if isinstance(space, Hyperbolic):

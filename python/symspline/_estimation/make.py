@@ -29,6 +29,7 @@ from .._spaces import (
     Space,
     SpecialEuclidean,
     factors_of,
+    refuse_quotients,
     space_named,
 )
 from .._time import Moments, TimeAxis, knots_of, time_axis_of
@@ -213,6 +214,7 @@ def estimate(
     """
     space = space_named(space)
     refuse_functions(space, "curves are not estimated")
+    refuse_quotients(space, "curves are not estimated")
     policy = checked_extrapolate(extrapolate)
     check_on_failure(on_failure)
     check_progress(progress)

@@ -17,7 +17,7 @@ from matplotlib.figure import Figure, SubFigure
 from .._arrays import short_repr
 from .._core import ValidationError
 from .._disk import path_of, replacing
-from .._spaces import Product, Space, SpecialEuclidean, factors_of
+from .._spaces import Product, Space, SpecialEuclidean, cover_of, factors_of
 from . import chart, graphs, matrices, residuals, sphere
 from .curves import Curve, curves_of, fill_band
 from .graphs import timelines
@@ -79,7 +79,7 @@ _OTHERS = Picture(graphs.draw_components, 10.5, 3.8)
 
 def picture_of(space: Space) -> Picture:
     """Return the picture of a space or its family, or graphs of the components if there is none."""
-    name = str(space)
+    name = str(cover_of(space))
     return _PICTURES.get(name) or _FAMILIES.get(name.partition(":")[0], _OTHERS)
 
 
@@ -99,7 +99,7 @@ def plot(spline: Any, file: Any = None) -> Figure:
     wide = picture.width > 1.5 * picture.height
     widths = [picture.width] if wide else [picture.width, _RATES_WIDTH]
     heights = [_HEAD, picture.height, _RATES_HEIGHT][: 3 if wide else 2]
-    panels = residuals.panels_of(spline, curves[0], [str(own) in _BANDED for own in factors_of(spline.space)])
+    panels = residuals.panels_of(spline, curves[0], [str(cover_of(own)) in _BANDED for own in factors_of(spline.space)])
     if panels:
         heights.append(residuals.height(panels))
     figure = CurveFigure(figsize=(sum(widths), sum(heights)), dpi=DPI, facecolor="white")

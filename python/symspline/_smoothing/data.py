@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from .._arrays import as_array, refuse, short_repr
 from .._core import ValidationError
 from .._curves.ends import End, end_kinds, map_ends, split_ends
-from .._curves.fit import Points, read, read_ends, validated
+from .._curves.fit import Points, moved_ends, read, read_ends, validated
 from .._faults import INVALID, Fault
 from .._input import times_of
 from .._options import with_atol
@@ -107,7 +107,7 @@ def read_noisy(
     if weights is not None:
         each = zip(data, grouped(space, precisions), strict=True)
         data = [_without_missing(part, [one.weights for one in own]) for part, own in each]
-    ends = read_ends(bc_type, space, batch)
+    ends = read_ends(moved_ends(bc_type, space, data), space, batch)
     return SmoothingData(time_axis, shown_times, times, [], precisions, batch), data, ends
 
 

@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from .._curves.ends import End
-from .._spaces import Array, Euclidean, Product, Space, SpecialEuclidean, SpecialOrthogonal, factors_of
+from .._spaces import Array, Euclidean, Product, Space, SpecialEuclidean, SpecialOrthogonal, cover_of, factors_of
 
 _T = TypeVar("_T")
 
@@ -24,7 +24,8 @@ def parts_of_factor(space: Space) -> tuple[Space, ...]:
     if isinstance(space, SpecialEuclidean):
         n = space.point_shape[0] - 1
         return SpecialOrthogonal(n), Euclidean(n)
-    return (space,)
+    # Data of quotients are smoothed as representatives that are continuous along the curve.
+    return (cover_of(space),)
 
 
 def smoothed_spaces(space: Space[Any]) -> tuple[Space, ...]:

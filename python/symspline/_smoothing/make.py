@@ -15,7 +15,7 @@ from .._curves.fit import Points, Problem, fit, mask_of
 from .._curves.solve import Options, in_batch
 from .._errors import raise_or_warn
 from .._options import check_on_failure, check_progress, checked_extrapolate
-from .._representatives import warn_of_far_points, warn_of_signs
+from .._representatives import warn_of_far_data, warn_of_far_points, warn_of_signs
 from .._spaces import Product, Space, SpecialEuclidean, factors_of, space_named
 from .._typing import (
     ChoiceOptions,
@@ -203,6 +203,9 @@ def make_smoothing_spline(
         that was found.
     ConvergenceWarning
         If a curve fails and `on_failure` is ``"warn"``.
+    FarPointsWarning
+        If a curve has at least four segments and more than half of its steps, or of the steps between neighbouring
+        data, exceed 0.6 of the distance to the cut locus.
     UserWarning
         If the data are about as far from their curve as random points of a compact space would be.
 
@@ -330,7 +333,8 @@ def make_smoothing_spline(
         for one, own in zip(factors, whole.points, strict=True)
     ]
     warn_of_signs(space, [smoothed_data])
-    warn_of_far_points([fitted.curve], [fitted.columns])
+    if not warn_of_far_points([fitted.curve], [fitted.columns]):
+        warn_of_far_data(space, smoothed_data)
     return spline
 
 

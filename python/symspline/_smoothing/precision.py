@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from .._arrays import as_array, cast, refuse
 from .._core import ValidationError
 from .._curves.fit import Points
-from .._spaces import Array, Doubles, Product, Space, factors_of
+from .._spaces import Array, Doubles, Product, Quotient, Space, factors_of
 from .._spaces.base import LARGE
 from .factors import coordinates_in_parts, parts_of_factor, split
 
@@ -75,6 +75,11 @@ def read_precision(weights: Any, frames: Any, space: Space, data: list[Points]) 
             for space_of, one, at, rows in zip(spaces, each, frames_of, points, strict=True):
                 doubles = np.ascontiguousarray(space_of._as_doubles(rows))
                 found.append(_in_factor(space_of, one, at, part._replace(numbers=doubles)))
+                if part.moves is not None and found[-1].information is not None:
+                    raise ValidationError(
+                        f"information matrices of {space_of!r} refer to frames at the given representatives, but "
+                        "other representatives were chosen. Pass points that `space.unwrap` returned."
+                    )
             continue
         precision = _in_factor(factor, given, frame, part)
         found += [precision] if len(spaces) == 1 else _in_parts(precision, factor, part)
@@ -170,10 +175,30 @@ def _with_matrices(given: ArrayLike, frames: Any, space: Space, data: Points) ->
     least, most = (np.linalg.eigvalsh(matrices)[..., i] for i in (0, -1))
     negative = "has a negative eigenvalue, but it must be the inverse of a covariance"
     _check(least >= -_ROUNDING * np.maximum(most, 0.0), negative)
+    if data.moves is not None and isinstance(space, Quotient):
+        frames = _moved_frames(frames, space, data, data.moves)
     if frames is not None:
         into = _inverse_frames(frames, space, data, np.any(matrices != 0, axis=(-2, -1)))
         matrices = np.swapaxes(into, -1, -2) @ matrices @ into
     return _of_matrices(matrices)
+
+
+def _moved_frames(frames: Any, space: Quotient[Any], data: Points, moves: Any) -> Array:
+    """Return the frames at the points of the user, moved with these points to the chosen representatives."""
+    numbers, lead = space._numbers(data.numbers), (*data.batch, data.nodes)
+    if frames is None:
+        given = space._moved_by(numbers, space._group.inverse[moves])
+        # Points without weight may be NaN.
+        good = space._where_finite(given)
+        found = np.zeros((*lead, space.dim, *space.point_shape), space.dtype)
+        found[good] = space.frame(given[good])
+    else:
+        found = space._numbers(space._doubles(frames, "frames"))
+        if found.shape not in ((lead[-1], space.dim, *space.point_shape), (*lead, space.dim, *space.point_shape)):
+            # Other shapes are rejected with the frames themselves.
+            return found
+    shape = (*lead, space.dim)
+    return space._moved_by(np.broadcast_to(found, shape + space.point_shape), np.broadcast_to(moves[..., None], shape))
 
 
 def _of_matrices(matrices: Doubles) -> Precision:

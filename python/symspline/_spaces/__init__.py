@@ -20,6 +20,7 @@ from .groups import (
 from .indefinite import AntiDeSitter, DeSitter, IndefiniteGrassmannian
 from .positive import HermitianPositiveDefinite, Siegel, SpecialPositiveDefinite, SymmetricPositiveDefinite
 from .product import Product, factors_of, parts_of, product_norm, space, space_named
+from .quotient import Quotient, cover_of, refuse_quotients
 from .subspaces import (
     ComplexGrassmannian,
     ComplexHyperbolic,

@@ -29,6 +29,8 @@ _MOST = 2**40
 
 # The classes of all spaces except products, by name.
 CLASSES: dict[str, type[Space[Any]]] = {}
+# Functions that read names of spaces derived from others, by a text that only such names contain.
+DERIVED: dict[str, Callable[[str], Space[Any]]] = {}
 # Complex counterparts of real spaces, for the message about complex points.
 COMPLEX_TWINS = {
     "rp": "ComplexProjective",

@@ -4,6 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
+from .._core import ValidationError
+from .._quaternions import matrices_of_quaternions
 from .._typing import ComplexArray, FloatArray
 from .actions import DisconnectedGroup, Group
 from .base import Array
@@ -13,7 +17,8 @@ class SpecialOrthogonal(Group[FloatArray]):
     r"""The rotation group SO(n).
 
     A point is an orthogonal n × n matrix of determinant 1. In SO(3), distance is the angle of the rotation from one
-    point to the other, and a SciPy ``Rotation`` of any shape, or a list of them, is accepted wherever points are.
+    point to the other. A SciPy ``Rotation`` or orix ``Orientation`` of any shape, or a list of them, is accepted
+    wherever points are.
 
     Parameters
     ----------
@@ -45,14 +50,27 @@ class SpecialOrthogonal(Group[FloatArray]):
         return super()._array(_matrices(value) if self.point_shape == (3, 3) else value, name)
 
 
-def _matrices(value: Any) -> Any:
-    """Return the matrices of a SciPy ``Rotation`` or of a list of them; any other value is returned unchanged.
+def _are_rotations(value: Any) -> bool:
+    return hasattr(value, "as_matrix") or hasattr(value, "improper")
 
-    Rotations are recognised by their method ``as_matrix``, so that SciPy need not be installed.
+
+def _matrices(value: Any) -> Any:
+    """Return the matrices of rotations of SciPy or orix, or of a list of them; other values are returned unchanged.
+
+    SciPy's rotations are recognised by their method ``as_matrix`` and those of orix by their attribute ``improper``, so
+    that neither need be installed.
     """
     if hasattr(value, "as_matrix"):
         return value.as_matrix()
-    if isinstance(value, (list, tuple)) and any(hasattr(part, "as_matrix") for part in value):
+    if _are_rotations(value):
+        improper = np.argwhere(value.improper)
+        if len(improper):
+            raise ValidationError(
+                f"rotation {improper[0].tolist()} is improper, a rotation followed by the inversion, but points of "
+                "so:3 are rotations. Remove improper rotations."
+            )
+        return matrices_of_quaternions(value.data)
+    if isinstance(value, (list, tuple)) and any(map(_are_rotations, value)):
         return [_matrices(part) for part in value]
     return value
 

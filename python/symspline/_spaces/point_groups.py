@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,29 +37,35 @@ _GENERATORS: dict[str, list[object]] = {
     "23": [_HALF_Z, _HALF_X, _THIRD_DIAGONAL],
     "432": [_QUARTER_Z, _HALF_X, _THIRD_DIAGONAL],
 }
-# Schoenflies symbols, then Laue groups by both symbols.
+# The Schoenflies symbol of each proper group, and both symbols of its Laue group.
 _ALIASES = {
-    **dict(C1="1", C2="2", D2="222", C4="4", D4="422", C3="3", D3="32", C6="6", D6="622", T="23", O="432"),
-    **{"-1": "1", "2/m": "2", "mmm": "222", "4/m": "4", "4/mmm": "422", "-3": "3", "-3m": "32", "6/m": "6"},
-    **{"6/mmm": "622", "m-3": "23", "m-3m": "432"},
-    **dict(Ci="1", C2h="2", D2h="222", C4h="4", D4h="422", S6="3", D3d="32", C6h="6", D6h="622", Th="23", Oh="432"),
+    "1": ("C1", "-1", "Ci"),
+    "2": ("C2", "2/m", "C2h"),
+    "222": ("D2", "mmm", "D2h"),
+    "4": ("C4", "4/m", "C4h"),
+    "422": ("D4", "4/mmm", "D4h"),
+    "3": ("C3", "-3", "S6"),
+    "32": ("D3", "-3m", "D3d"),
+    "6": ("C6", "6/m", "C6h"),
+    "622": ("D6", "6/mmm", "D6h"),
+    "23": ("T", "m-3", "Th"),
+    "432": ("O", "m-3m", "Oh"),
 }
+_PROPER = {alias: symbol for symbol, aliases in _ALIASES.items() for alias in (symbol, *aliases)}
 
 
 def proper_symbol(symbol: object) -> str:
-    """Return the Hermann–Mauguin symbol of the proper point group that a symbol stands for.
+    """Return the Hermann–Mauguin symbol of the proper point group that a symbol denotes.
 
     Raises
     ------
     ValidationError
         If the symbol is unknown.
     """
-    if isinstance(symbol, str):
-        name = _ALIASES.get(symbol, symbol)
-        if name in _GENERATORS:
-            return name
-    known = ", ".join(f"{name} or {alias}" for alias, name in _ALIASES.items() if len(alias) < 3 and alias.isalnum())
-    laue = ", ".join(alias for alias in _ALIASES if not alias.isalnum() or alias == "mmm")
+    if isinstance(symbol, str) and symbol in _PROPER:
+        return _PROPER[symbol]
+    known = ", ".join(f"{own} or {aliases[0]}" for own, aliases in _ALIASES.items())
+    laue = ", ".join(aliases[1] for aliases in _ALIASES.values())
     raise ValidationError(
         f"{short_repr(symbol)} is not the symbol of a point group. Pass one of the proper point groups {known}, or "
         f"one of the Laue groups {laue}."
@@ -78,7 +85,7 @@ def elements(symbol: str) -> Array:
     return read_only(np.array(found))
 
 
-def recognised(group: NDArray[np.generic]) -> str | None:
+def recognised(group: NDArray[Any]) -> str | None:
     """Return the symbol of the proper point group with the same elements, in any order, or None."""
     if group.shape[1:] != (3, 3) or group.dtype.kind != "f":
         return None

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from .._arrays import short_repr
 from .._core import Handle, ValidationError
 from .._typing import AnyArray, AnyArrays, FloatArray, P, PProduct
-from .base import CLASSES, Space, example_of
+from .base import CLASSES, DERIVED, Space, example_of
 
 Tuple = tuple[Any, ...]
 # Points of factors, which are not products themselves.
@@ -222,7 +222,8 @@ def space(name: str | Space[Any]) -> Space[Any]:
     ----------
     name : str or Space
         The name of a space, followed by a colon and its parameters, such as ``"sphere:2"`` or ``"h:3"``. The names of
-        the factors of a product are joined by ``" x "``, as in ``"so:3 x r:3"``. A space is returned unchanged.
+        the factors of a product are joined by ``" x "``, as in ``"so:3 x r:3"``. A slash and the symbol of a group
+        make a `Quotient`, as in ``"so:3/432"``. A space is returned unchanged.
 
     Returns
     -------
@@ -303,7 +304,10 @@ def _whole(cls: Any) -> str:
     return f"give its dimension, such as {example_of(cls)}"
 
 
-def _named(name: str) -> Space:
+def _named(name: str) -> Space[Any]:
+    for mark, read in DERIVED.items():
+        if mark in name:
+            return read(name)
     word, _, parameters = name.partition(":")
     word = word.strip().lower()
     # SO(1, n) is the usual notation for the Lorentz group.

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 
 from .._core import ValidationError
 from .._options import order_of
-from .._spaces import Product, Space, parts_of, space_named
+from .._spaces import Product, Space, parts_of, refuse_quotients, space_named
 from ._models import Model
 from ._registry import QUOTIENTS, model_of, second_fundamental_form
 from ._spectral import adjoint
@@ -76,6 +76,7 @@ def evaluate(t: Any, points: Any, velocities: Any, space: Space[Any] | str, x: A
     """
     nu = order_of(nu)
     space = space_named(space)
+    refuse_quotients(space, "functions of JAX are not made")
     if isinstance(space, Product):
         each = zip(
             parts_of(points, space, "points"), parts_of(velocities, space, "velocities"), space.factors, strict=True

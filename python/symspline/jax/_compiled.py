@@ -12,7 +12,7 @@ from jax.custom_derivatives import SymbolicZero
 from .._adapters import split
 from .._curves.ends import ends_in_factors
 from .._options import order_of
-from .._spaces import Product, Space, parts_of, space_named
+from .._spaces import Product, Space, parts_of, refuse_quotients, space_named
 from .._typing import CurveOptions
 from ..manifolds._manifold import refuse_functions
 from ._primitives import Fixed, fit_p, jvp_p
@@ -91,6 +91,7 @@ def curve(
     """
     nu = order_of(nu)
     space = space_named(space)
+    refuse_quotients(space, "functions of JAX are not made")
     refuse_functions(space, "derivatives with respect to the data are not made")
     if isinstance(space, Product):
         each = zip(parts_of(points, space, "points"), space.factors, ends_in_factors(bc_type, space), strict=True)

@@ -11,7 +11,7 @@ import jax.numpy as jnp
 from .._adapters import split
 from .._arrays import short_repr
 from .._core import ValidationError
-from .._spaces import Space, SpecialOrthogonal, Sphere, space_named
+from .._spaces import Space, SpecialOrthogonal, Sphere, refuse_quotients, space_named
 from ._casteljau import arrays_of
 from ._chain import Data, defects, step_of, weights
 from ._models import Curved, Model, Rotations
@@ -70,6 +70,7 @@ def fit(
     ((3, 3), ())
     """
     space = space_named(space)
+    refuse_quotients(space, "functions of JAX are not made")
     model = _model_of(space)
     if isinstance(steps, bool) or not isinstance(steps, int) or steps < 1:
         raise ValidationError(f"steps must be a whole number from 1 on, not {short_repr(steps)}")

@@ -105,7 +105,7 @@ def _far(space: Manifold, lengths: Doubles, what: str) -> dict[int, Fault]:
         if not np.isfinite(distance):
             why = f"have no geodesic between them: the function log of {space!r} is not finite there"
         problem = f"{what.format(i, i + 1)}{{of}} {why}"
-        fault = Fault(curve, CUT_LOCUS, problem, "put a point between them", i, float(distance), limit)
+        fault = Fault(curve, CUT_LOCUS, problem, space._remedy, i, float(distance), limit)
         faults.setdefault(curve, fault)
     return faults
 

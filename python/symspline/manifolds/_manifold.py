@@ -105,6 +105,9 @@ class Manifold(Space):
     True
     """
 
+    # What to do about two points without a unique geodesic.
+    _remedy = "put a point between them"
+
     def __init__(
         self,
         *,

@@ -38,13 +38,15 @@ class Stiefel(Manifold):
     See Also
     --------
     Grassmannian : Subspaces, without a basis.
+    Quotient : Bases whose columns have arbitrary signs.
     SpecialOrthogonal : Frames of the whole space.
 
     Notes
     -----
     The manifold is symmetric only for k = 1, the sphere, so its curves are those of `Manifold`. On `Grassmannian` a
-    curve joins subspaces; here it joins their bases, column by column. The logarithm is computed by the iteration of
-    Zimmermann and Hüper [2]_.
+    curve joins subspaces; here it joins their bases, column by column. Where the signs of columns are arbitrary, as
+    those of eigenvectors and singular vectors are, fit ``Quotient(space, "signs")``. The logarithm is computed by the
+    iteration of Zimmermann and Hüper [2]_.
 
     References
     ----------
@@ -64,6 +66,10 @@ class Stiefel(Manifold):
 
     _name = "stiefel"
     _aliases = ("st",)
+    _remedy = (
+        "put a point between them, or fit symspline.Quotient(space, 'signs') if the signs of columns are arbitrary, as "
+        "those of eigenvectors and singular vectors are"
+    )
 
     def __init__(self, k: int, n: int) -> None:
         for value in (k, n):
