@@ -124,7 +124,7 @@ def _opposite(points: Array) -> NDArray[np.intp]:
 # ---- long steps ----
 
 
-def warn_of_far_points(curves: Sequence[CurveArrays], longest_steps: Sequence[Sequence[Columns | Doubles]]) -> bool:
+def warn_of_far_points(curves: Sequence[CurveArrays], longest_steps: Sequence[Sequence[Columns | Doubles]]) -> None:
     """Warn if more than half of the steps of a curve exceed 0.6 of the distance to the cut locus.
 
     Parameters
@@ -133,11 +133,6 @@ def warn_of_far_points(curves: Sequence[CurveArrays], longest_steps: Sequence[Se
         The curves of one fit.
     longest_steps : sequence of sequence of Columns or ndarray
         The longest steps of each curve in every factor, or its reports. Points need not be examined if these are short.
-
-    Returns
-    -------
-    bool
-        Whether there is such a curve.
     """
     found: list[_Far] = []
     for number, curve in enumerate(curves):
@@ -158,11 +153,10 @@ def warn_of_far_points(curves: Sequence[CurveArrays], longest_steps: Sequence[Se
                 place = tuple([number] * (len(curves) > 1) + index)
                 found.append(_Far(place, int(far[tuple(index)]), steps, part.space))
     _warn_of_far(found)
-    return bool(found)
 
 
-def warn_of_far_data(space: Space[Any], data: Sequence[Points]) -> None:
-    """Warn in the same way about data that a curve does not pass through, in every factor."""
+def warn_of_far_data(space: Space[Any], data: Sequence[Points]) -> bool:
+    """Warn in the same way about data in every factor that a curve need not pass through, and return whether it did."""
     found = []
     for factor, part in zip(factors_of(space), data, strict=True):
         steps = part.nodes - 1
@@ -173,6 +167,7 @@ def warn_of_far_data(space: Space[Any], data: Sequence[Points]) -> None:
             _Far(tuple(index), int(far[tuple(index)]), steps, factor) for index in np.argwhere(far > steps / 2).tolist()
         ]
     _warn_of_far(found)
+    return bool(found)
 
 
 class _Far(NamedTuple):

@@ -323,18 +323,20 @@ def make_smoothing_spline(
         fault if chosen is None else fault._replace(curve=int(chosen[fault.curve]))
         for fault in next((own for _, _, own in found if own), [])
     ]
+    valid_data = [
+        Points(one._as_doubles(own), 0.0, batch, whole.times.shape[-1])
+        for one, own in zip(factors, whole.points, strict=True)
+    ]
+    # Errors that this data cause do not show the reason.
+    far_data = warn_of_far_data(space, valid_data)
     if faults:
         raise_or_warn(sorted(faults, key=lambda fault: fault.curve), on_failure, spline)
     counts = [np.sum(own.weights > 0, axis=-1) for own in whole.precisions]
     warn_of_bounds(space, [part.report for part in noise], [spread(np.isnan(own)) for own in lams], counts)
     warn_of_spread(space, fitted.curve, whole, [part.report.df for part in noise])
-    smoothed_data = [
-        Points(one._as_doubles(own), 0.0, batch, whole.times.shape[-1])
-        for one, own in zip(factors, whole.points, strict=True)
-    ]
-    warn_of_signs(space, [smoothed_data])
-    if not warn_of_far_points([fitted.curve], [fitted.columns]):
-        warn_of_far_data(space, smoothed_data)
+    warn_of_signs(space, [valid_data])
+    if not far_data:
+        warn_of_far_points([fitted.curve], [fitted.columns])
     return spline
 
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import short_repr, whole_number
 from .._core import ConvergenceError, CutLocusError, ValidationError
-from .._typing import FloatArray, P
+from .._typing import P
 from .base import DERIVED, Array, Space
 from .finite_groups import Factor, FiniteGroup, Indices
 from .groups import SpecialOrthogonal, SpecialUnitary
@@ -20,6 +20,8 @@ from .unwrap import Nearest, along_path, nearest_of, over_grid
 
 # Values that a space computes on demand from its own name or radius.
 _CACHED = ("_text", "_curve_kind", "_longest_near_step")
+# Operations on two points, of which the second one is replaced by its representative nearest to the first.
+_OF_PAIRS = ("distance", "log", "geodesic", "transport")
 # Classes of quotients by the class of their spaces.
 _CLASSES: dict[type[Any], type[Any]] = {}
 # Largest number of floating-point numbers of the representatives that are compared at a time.
@@ -295,27 +297,19 @@ class Quotient(Space[P]):
 
     # ---- geometry ----
 
-    def distance(self, p: ArrayLike, q: ArrayLike) -> FloatArray:
-        nearest, found = self._nearer(p, q)
+    def _finite(self, operation: str, t: NDArray[np.float64] | None = None, **inputs: Any) -> Any:
+        if operation not in _OF_PAIRS:
+            return self.cover._finite(operation, t, **inputs)
+        nearest, found = self._nearer(inputs["p"], inputs["q"])
         lead = nearest.shape[: nearest.ndim - len(self._point_shape)]
-        result: FloatArray = self._require_finite("distance", found.distance.reshape(lead)[()])
-        return result
-
-    def log(self, p: ArrayLike, q: ArrayLike) -> P:
-        return self.cover.log(p, self._nearer(p, q)[0])
-
-    def geodesic(self, p: ArrayLike, q: ArrayLike, t: ArrayLike) -> P:
-        return self.cover.geodesic(p, self._nearer(p, q)[0], t)
-
-    def transport(self, p: ArrayLike, q: ArrayLike, v: ArrayLike) -> P:
-        # The result is at the given representative of q, not at the nearest one.
-        nearest, found = self._nearer(p, q)
-        moved = np.asarray(self.cover.transport(p, nearest, v))
-        axes = len(self._point_shape)
-        back = self._group.inverse[found.moves].reshape(nearest.shape[: nearest.ndim - axes])
-        result: Any = self._moved_by(moved, np.broadcast_to(back, moved.shape[: moved.ndim - axes]))
-        vectors: P = result
-        return vectors
+        if operation == "distance":
+            return self._require_finite(operation, found.distance.reshape(lead)[()])
+        result: Any = self.cover._finite(operation, t, **(inputs | {"q": nearest}))
+        if operation != "transport":
+            return result
+        # Transported vectors are tangent at the given representative of q, not at the nearest one.
+        back = self._group.inverse[found.moves].reshape(lead)
+        return self._moved_by(result, np.broadcast_to(back, result.shape[: result.ndim - len(self._point_shape)]))
 
     def symmetry(self, p: ArrayLike, x: ArrayLike) -> P:
         return self.cover.symmetry(p, self._nearer(p, x)[0])

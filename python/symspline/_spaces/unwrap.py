@@ -101,7 +101,7 @@ def along_path(group: FiniteGroup, points: Array, finite: NDArray[np.bool_], com
 
 
 def over_grid(group: FiniteGroup, points: Array, finite: NDArray[np.bool_], compare: Compare) -> Indices:
-    """Return the transformations that make points continuous over one grid of `finite.ndim` axes.
+    """Return the transformations that make points continuous over one grid, without batch axes.
 
     Points are joined along a minimum spanning tree of the distances between neighbours. Loops whose steps do not
     return to the same representative cause a warning.

@@ -1,7 +1,7 @@
 """Conversions between representations of points.
 
-The representations are models of hyperbolic space, projectors, reflections, density matrices, quaternions, and
-totally geodesic submanifolds.
+The representations are models of hyperbolic space, projectors, reflections, density matrices, quaternions,
+objects of orix, and totally geodesic submanifolds.
 
 All functions are vectorised over the leading axes. Input may deviate by 1e-8 in double precision and by 1e-4 in single
 precision; results are exact up to rounding errors.
@@ -23,6 +23,7 @@ from ._models import (
     positive_definite_to_siegel,
     siegel_to_positive_definite,
 )
+from ._orix import matrix_to_orix
 from ._quaternions import matrix_to_quaternion, quaternion_to_matrix
 from ._subspaces import (
     basis_to_projector,
@@ -45,6 +46,7 @@ __all__ = [
     "half_space_to_hyperboloid",
     "hyperboloid_to_ball",
     "hyperboloid_to_half_space",
+    "matrix_to_orix",
     "matrix_to_quaternion",
     "positive_definite_to_siegel",
     "projector_to_basis",
