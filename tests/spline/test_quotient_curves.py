@@ -143,6 +143,23 @@ def test_periodic_curves():
     assert CUBIC.distance(spline(t + 0.1), same(t + 0.1)).max() < 1e-7
 
 
+def test_curves_that_end_at_another_representative_are_not_closed():
+    t = np.linspace(0, 1, 13)
+    quarter = ss.rotations.from_rotation_vectors(np.pi / 2 * t[:, None] * [0, 0, 1])
+    given = at_random(CUBIC, quarter, np.random.default_rng(5))
+    given[-1] = given[0]
+    for fit in (
+        lambda: ss.CubicSpline(t, given, CUBIC, bc_type="periodic"),
+        lambda: ss.fit_many([(t, quarter), (t, given)], CUBIC, bc_type="periodic"),
+        lambda: ss.make_smoothing_spline(t, given, CUBIC, bc_type="periodic"),
+    ):
+        with pytest.raises(ss.ValidationError, match=r"is not closed: .* end at points\[12\]"):
+            fit()
+    four = np.concatenate([given[:-1]] * 4 + [given[:1]])
+    spline = ss.CubicSpline(None, four, CUBIC, bc_type="periodic")
+    assert spline.length() == pytest.approx(2 * np.pi)
+
+
 # ---- noise ----
 
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from .. import _core
 from .._arrays import as_array
 from .._core import ValidationError
-from .._faults import INVALID, Fault
+from .._faults import INVALID, Fault, of_index
 from .._report import Columns, Report, shaped
 from .._spaces import POINT_TOL, Array, Doubles, Product, Quotient, Space, cover_of, factors_of, parts_of, point_tol
 from .._typing import Progress
@@ -26,7 +26,7 @@ from ..manifolds import Manifold
 from ..manifolds._checks import hermite_on_manifold
 from ..manifolds._on_manifold import OnManifold
 from .curve import CoreCurve, CurveArrays, ProductCurve, share
-from .ends import End, ends_in_factors, ends_of, split_ends
+from .ends import End, ends_in_factors, ends_of, is_closed, split_ends
 from .reduced import ReducedCurve
 from .solve import Mask, Options, Solved, Task, solve, solve_single, without
 
@@ -198,12 +198,25 @@ def moved_ends(bc_type: Any, space: Space[Any], data: list[Points]) -> Any:
     """Return end conditions for the chosen representatives.
 
     Vectors at the last point are tangent at the representative that the user gave.
+
+    Raises
+    ------
+    ValidationError
+        If a closed curve does not return to the representative of its first point.
     """
+    if is_closed(bc_type):
+        for factor, part in zip(factors_of(space), data, strict=True):
+            _check_closed(factor, part)
     return _moved_ends(bc_type, space, [part.moves if part.moves is None else part.moves[..., -1] for part in data])
 
 
 def moved_ends_of_many(bc_type: Any, space: Space[Any], points: list[list[Points]]) -> Any:
     """Return end conditions for the chosen representatives of single curves of different lengths."""
+    for number, parts in enumerate(points):
+        try:
+            moved_ends(bc_type if is_closed(bc_type) else "natural", space, parts)
+        except ValidationError as error:
+            raise error._of_curve(number) from None
     last: list[NDArray[np.intp] | None] = []
     for i, factor in enumerate(factors_of(space)):
         own = [each[i].moves for each in points]
@@ -211,6 +224,22 @@ def moved_ends_of_many(bc_type: Any, space: Space[Any], points: list[list[Points
         still = factor._group.identity if isinstance(factor, Quotient) else 0
         last.append(np.array([still if moves is None else moves[-1] for moves in own]) if known else None)
     return _moved_ends(bc_type, space, last)
+
+
+def _check_closed(space: Space[Any], part: Points) -> None:
+    if not isinstance(space, Quotient):
+        return
+    numbers = space._numbers(part.numbers)
+    first, last = (np.take(numbers, i, axis=len(part.batch)).reshape(-1, *space.point_shape) for i in (0, -1))
+    good = space._where_finite(first) & space._where_finite(last)
+    opens = np.flatnonzero(good)[space._nearest(first[good], last[good]).moves != space._group.identity]
+    if opens.size:
+        curve = [int(i) for i in np.unravel_index(opens[0], part.batch)]
+        raise ValidationError(
+            f"the curve{of_index(curve)} is not closed: continuous representatives from points[0] on end at "
+            f"points[{part.nodes - 1}], which is equivalent to points[0], but another representative. Repeat the "
+            "points until they return to the same representative, or use another bc_type."
+        )
 
 
 def _moved_ends(bc_type: Any, space: Space[Any], last: list[NDArray[np.intp] | None]) -> Any:

@@ -48,6 +48,13 @@ def matrix_to_orix(
     -----
     Orientations of orix map vectors of the sample to vectors of the crystal, so that symmetry multiplies their
     matrices from the left.
+
+    Examples
+    --------
+    >>> from orix.quaternion import symmetry  # doctest: +SKIP
+    >>> matrix_to_orix([[0, -1, 0], [1, 0, 0], [0, 0, 1]], symmetry.Oh)  # doctest: +SKIP
+    Orientation () m-3m
+    [0.7071 0.     0.     0.7071]
     """
     quaternions = matrix_to_quaternion(matrix, scalar_first=True)
     try:
