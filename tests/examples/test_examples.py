@@ -19,6 +19,8 @@ SAYS = {
     "pod_over_a_parameter": r"4 numbers in place of 80: off by 0\.\d%; with interpolated numbers by \d\d\.\d%",
     "storms_from_a_table": "37 storms, 946 fixes, 5900 hours; fastest: Martin 2022",
     "noisy_gps": r"1\d degrees of freedom; half way known to 4\.\d m",
+    "crystal_orientations": r"median error: \d\d\.\d degrees without the symmetry, 0\.\d\d with it\n"
+    r"steps between rows that jump: \d{4} as measured, 0 with",
     "noisy_attitude": r"noise 1\.0\d degrees found; the curve is off by 0\.[45]\d degrees",
     "star_tracker_and_gyro": r"gyro bias, degrees/s: 0\.59 ± 0\.01, -0\.4\d ± 0\.01, 0\.8\d ± 0\.01",
     "ship_with_gaps": r"through the positions: up to 1\.\d km off\nwith speed and course: up to 0\.[45] km off\n"
