@@ -91,8 +91,11 @@ axes.semilogy(fine, errors[1], label="on so:3/432")
 axes.set(xlabel="position, mm", ylabel="degrees", title="distance from the true orientation")
 axes.legend()
 for axes, own, title in zip(
-    below.subplots(1, 2), (area, continuous), ("as measured", "continuous representatives"), strict=True
+    below.subplots(1, 2),
+    (area, continuous),
+    ("orientations as measured", "continuous representatives"),
+    strict=True,
 ):
     axes.imshow(colours(own), origin="lower", extent=(0, 1.5, -0.6, 0.6))
-    axes.set(xlabel="mm", title=f"orientations {title}")
+    axes.set(xlabel="mm", title=title)
 plt.show()

@@ -256,7 +256,7 @@ class Quotient(Space[P]):
         --------
         >>> import symspline as ss
         >>> axes = ss.Quotient("sphere:2", [1, -1])
-        >>> axes.unwrap([[0.6, 0.8, 0], [-0.8, -0.6, 0], [1, 0, 0]])
+        >>> axes.unwrap([[0.6, 0.8, 0], [-0.8, -0.6, 0], [1, 0, 0]]) + 0.0
         array([[0.6, 0.8, 0. ],
                [0.8, 0.6, 0. ],
                [1. , 0. , 0. ]])
