@@ -21,7 +21,7 @@ from ._errors import raise_or_warn
 from ._options import fit_options, order_of, with_atol
 from ._report import Report, combined
 from ._representatives import warn_of_representatives
-from ._spaces import Array, Space, space_named
+from ._spaces import Array, Product, Quotient, Space, space_named
 from ._time import TimeAxis, knots_of
 from ._typing import BCType, Extrapolate, Method, OnFailure, P, PointsLike, Progress, TimesLike
 
@@ -173,7 +173,8 @@ class CubicSpline(SegmentedCurve[P], Generic[P, R]):
             data = with_atol(data, atol)
         batch, nodes = data[0].batch, data[0].nodes
         time_axis, shown_times, times = knots_of(t, batch, nodes)
-        bc_type = moved_ends(bc_type, space, data)
+        if isinstance(space, (Product, Quotient)):
+            bc_type = moved_ends(bc_type, space, data)
         ends = read_ends(bc_type, space, batch)
         skip_invalid = bool(batch) and on_failure != "raise"
         mask = None if where is None else mask_of(where, batch)

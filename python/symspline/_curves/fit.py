@@ -134,6 +134,8 @@ def kind_of(space: Space) -> type[CoreCurve]:
 
 def read(points: Any, space: Space[Any]) -> list[Points]:
     """Read points from the user in each factor, in quotients as representatives that are continuous along the curve."""
+    if not isinstance(space, (Product, Quotient)):
+        return [_read(space, points)]
     found = read_given(points, space)
     if not any(isinstance(factor, Quotient) for factor in factors_of(space)):
         return found
@@ -292,7 +294,8 @@ def fit(problem: FitProblem, progress: Progress | None = None) -> Fit:
         # The core validates the points in the same call.
         data = points[0]
         tol = data.tol if check else None
-        task = Task(cover_of(space), times, data.numbers, ends[0], tol, None, mask, check and skip)
+        own = space.cover if isinstance(space, Quotient) else space
+        task = Task(own, times, data.numbers, ends[0], tol, None, mask, check and skip)
         found = solve_single(task, options, progress)
         single = CoreCurve(space, times, found.points, found.velocities)
         return Fit(single, [found.columns], options.method, found.faults)
