@@ -10,17 +10,20 @@ import numpy as np
 from .._arrays import refuse
 from .._core import CutLocusError, ValidationError
 from .._curves.fit import Points, validated
-from .._errors import warn
 from .._report import FarPointsWarning
 from .._representatives import FAR, cut_fractions
-from .._spaces import Array, Space, factors_of, parts_of, point_tol
+from .._spaces import Array, Quotient, Space, cover_of, factors_of, parts_of, point_tol
+from .._warnings import warn
 from .axes import GridAxis
 
 _NATURAL: Any = [("natural", None), ("natural", None)]
 
 
 def read_nodes(points: Any, space: Space[Any], dims: int) -> tuple[list[Array], list[float], tuple[int, ...]]:
-    """Read points in each factor, their tolerances, and the numbers of nodes of the grid."""
+    """Read points in each factor, their tolerances, and the numbers of nodes of the grid.
+
+    In quotients, representatives are chosen that are continuous over the grid.
+    """
     parts = parts_of(points, space, "points")
     arrays, tols = [], []
     for factor, part in zip(factors_of(space), parts, strict=True):
@@ -30,7 +33,17 @@ def read_nodes(points: Any, space: Space[Any], dims: int) -> tuple[list[Array], 
     shapes = [a.shape[: a.ndim - len(f.point_shape)] for f, a in zip(factors_of(space), arrays, strict=True)]
     if len(set(shapes)) > 1:
         raise ValidationError(f"the factors of points have different numbers of nodes: {shapes}")
+    if len(shapes[0]) == dims:
+        arrays = [_unwrapped(*pair, dims) for pair in zip(factors_of(space), arrays, strict=True)]
     return arrays, tols, shapes[0]
+
+
+def _unwrapped(space: Space[Any], array: Array, dims: int) -> Array:
+    """Choose representatives that are continuous over the grid."""
+    if not isinstance(space, Quotient):
+        return array
+    moves = space._transformations(array, space._where_finite(array), dims)
+    return np.ascontiguousarray(space._moved_by(array, moves))
 
 
 def validate_nodes(space: Space[Any], arrays: list[Array], tols: list[float], axes: list[GridAxis]) -> None:
@@ -62,6 +75,7 @@ def validate_nodes(space: Space[Any], arrays: list[Array], tols: list[float], ax
 
 def _on_space(space: Space[Any], points: Array, tol: float, nodes: Array) -> Array:
     """Return points projected onto the space."""
+    space = cover_of(space)
     single = len(points) == 1
     rows = np.ascontiguousarray(np.repeat(points, 2, axis=0) if single else points)
     data = Points(space._as_doubles(rows), tol, (), len(rows))
@@ -78,7 +92,7 @@ def _on_space(space: Space[Any], points: Array, tol: float, nodes: Array) -> Arr
 
 def _close(space: Space[Any], arrays: list[Array], axis: int) -> None:
     """Make the first and the last nodes of a periodic axis equal, in place."""
-    for factor, array in zip(factors_of(space), arrays, strict=True):
+    for factor, array in zip(map(cover_of, factors_of(space)), arrays, strict=True):
         first, last = (np.take(array, i, axis=axis) for i in (0, -1))
         both = factor._where_finite(first) & factor._where_finite(last)
         apart = np.zeros(both.shape)
@@ -115,7 +129,7 @@ def check_steps(space: Space[Any], arrays: list[Array], dims: int, raises: bool)
     FarPointsWarning
         If more than half of the steps along an axis exceed 0.6 of the distance to the cut locus.
     """
-    for factor, array in zip(factors_of(space), arrays, strict=True):
+    for factor, array in zip(map(cover_of, factors_of(space)), arrays, strict=True):
         if math.isinf(factor.injectivity_radius):
             continue
         for k in range(dims):
@@ -136,7 +150,8 @@ def check_steps(space: Space[Any], arrays: list[Array], dims: int, raises: bool)
                 warn(
                     f"more than half of the steps are long: along axis {k}, {far} of {known.size} steps between "
                     f"neighbouring nodes are beyond {FAR} of the way to the cut locus of {factor!r}. Usually the "
-                    "representation of the points is inconsistent: choose representatives that are continuous over "
-                    "the grid, or add nodes.",
+                    "representation of the points is inconsistent. Where points have equivalent representatives, "
+                    "pass a Quotient as space; its method unwrap chooses representatives that are continuous over the "
+                    "grid. Otherwise add nodes.",
                     FarPointsWarning,
                 )

@@ -12,10 +12,10 @@ import numpy as np
 
 from .._core import ValidationError
 from .._cubic import CubicSpline
-from .._errors import silenced
 from .._report import ConvergenceWarning, FarPointsWarning
 from .._spaces import Array, Doubles, Space
 from .._typing import Extrapolate, Progress
+from .._warnings import silenced
 from .axes import GridAxis, Sites
 from .compiled import Found, row_fault
 

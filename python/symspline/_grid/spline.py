@@ -13,12 +13,12 @@ from .._archive import Entries, entry, read_array, read_space, read_times, suffi
 from .._arrays import checked_atol, checked_flag, short_repr, whole_number
 from .._core import ConvergenceError, CutLocusError, ValidationError
 from .._cubic import CubicSpline
-from .._errors import warn
 from .._faults import CUT_LOCUS
 from .._options import check_on_failure, check_progress, checked_extrapolate
 from .._report import ConvergenceWarning
-from .._spaces import Array, Product, Space, factors_of, space_named
+from .._spaces import Array, Product, Space, cover_of, factors_of, space_named
 from .._typing import Extrapolate, File, OnFailure, P, PointsLike, Progress, TimesLike
+from .._warnings import warn
 from .axes import GridAxis, coordinates, read_axes, sites_of
 from .compiled import CompiledGrid, Found
 from .evaluation import FactorGrid, order_of_each
@@ -148,7 +148,7 @@ class GridSpline(Generic[P]):
     ) -> None:
         each: list[Array | None] = velocities or [None] * len(arrays)
         self._factors = [
-            FactorGrid(factor, self._axes, points, self._symmetric, own, progress)
+            FactorGrid(cover_of(factor), self._axes, points, self._symmetric, own, progress)
             for factor, points, own in zip(factors_of(self._space), arrays, each, strict=True)
         ]
         for array in arrays:
