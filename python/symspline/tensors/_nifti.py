@@ -1,21 +1,4 @@
-"""Diffusion tensors: six numbers in the order of each program, and volumes in NIfTI files.
-
-Examples
---------
->>> import symspline as ss
->>> t = ss.tensors.from_vectors([[2, 0, 1, 0, 0, 1], [1, 0.5, 2, 0, 0, 1]], order="dipy")
->>> ss.tensors.to_vectors(ss.CubicSpline(None, t, "spd:3")(0.5), order="mrtrix").shape
-(6,)
-
-Fits of noisy signals sometimes have negative eigenvalues. Such tensors are not points of ``spd:3``. Raise the
-eigenvalues to a threshold well above the noise, because small eigenvalues are far from all other points of that space:
-
->>> import numpy as np
->>> sizes, axes = np.linalg.eigh(np.diag([1.5e-3, 4e-4, -4e-5]))
->>> raised = np.einsum("...ij,...j,...kj->...ik", axes, np.maximum(sizes, 1e-4), axes)
-
-Alternatively, drop such voxels from the batch, or mask them by ``where=``.
-"""
+"""Volumes of tensors in NIfTI files."""
 
 from __future__ import annotations
 
@@ -27,138 +10,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._arrays import as_array, refuse, short_repr
-from ._core import ValidationError
-from ._disk import damage, path_of, replacing
-from ._spaces import point_tol
-from ._typing import TensorOrder
-from ._validation import largest
+from .._arrays import as_array, refuse, short_repr
+from .._core import ValidationError
+from .._disk import damage, path_of, replacing
+from .._typing import TensorOrder
+from ._orders import Array, from_vectors, to_vectors
 
-__all__ = ["Volume", "from_vectors", "read_nifti", "to_vectors", "write_nifti"]
-
-Array = NDArray[Any]
 File = str | PathLike[str]
 
-_ORDERS = {
-    # Lower triangle row by row: dipy.reconst.dti.from_lower_triangular. So are NIfTI files with the intent
-    # NIFTI_INTENT_SYMMATRIX (nifti1.h), which ITK, ANTs and DTI-TK write.
-    "dipy": "xx xy yy xz yz zz",
-    # Upper triangle row by row: what dtifit --save_tensor writes and fslmaths -tensor_decomp reads.
-    "fsl": "xx xy xz yy yz zz",
-    # Diagonal first: "volumes 0-5: D11, D22, D33, D12, D13, D23" in the help of dwi2tensor.
-    "mrtrix": "xx yy zz xy xz yz",
-    # Upper triangle row by row: itk::SymmetricSecondRankTensor in memory (itkNiftiImageIO.cxx, UpperToLowerOrder).
-    "itk": "xx xy xz yy yz zz",
-}
 # nifti1.h: the lower triangle row by row along the fifth axis.
 _SYMMATRIX = 1005
-
-
-# ---- six numbers ----
-
-
-def from_vectors(x: ArrayLike, *, order: TensorOrder) -> Array:
-    """Convert six numbers per tensor to symmetric matrices, points of ``SymmetricPositiveDefinite(3)``.
-
-    Parameters
-    ----------
-    x : array_like, shape (..., 6)
-        Six numbers per tensor.
-    order : {"dipy", "fsl", "mrtrix", "itk"}
-        Order of the entries:
-
-        - ``"dipy"``: xx, xy, yy, xz, yz, zz, as in ``dipy.reconst.dti.from_lower_triangular`` and in NIfTI files of
-          symmetric matrices. The command ``dipy_fit_dti`` has written the order of FSL.
-        - ``"fsl"``: xx, xy, xz, yy, yz, zz, as written by ``dtifit --save_tensor``.
-        - ``"mrtrix"``: xx, yy, zz, xy, xz, yz, as written by ``dwi2tensor``.
-        - ``"itk"``: xx, xy, xz, yy, yz, zz, as in ``SymmetricSecondRankTensor`` in memory. NIfTI files written by ITK
-          and ANTs have the order ``"dipy"``; `read_nifti` accounts for this.
-
-    Returns
-    -------
-    ndarray, shape (..., 3, 3)
-        Symmetric matrices, in single precision if x is. Numbers that are not finite are kept. A spline raises an error
-        for matrices that are not positive definite.
-
-    Raises
-    ------
-    ValidationError
-        If x is not real of shape (..., 6), or the order is unknown.
-
-    Examples
-    --------
-    >>> from_vectors([1, 2, 3, 4, 5, 6], order="mrtrix")
-    array([[1., 4., 5.],
-           [4., 2., 6.],
-           [5., 6., 3.]])
-    """
-    pairs = _pairs(order)
-    array = _real(x, "x")
-    if array.ndim < 1 or array.shape[-1] != 6:
-        raise ValidationError(f"x has shape {array.shape}, but needs shape (..., 6), six numbers per tensor")
-    index = np.zeros((3, 3), int)
-    for number, (i, j) in enumerate(pairs):
-        index[i, j] = index[j, i] = number
-    return array[..., index]
-
-
-def to_vectors(matrices: ArrayLike, *, order: TensorOrder) -> Array:
-    """Convert symmetric matrices to six numbers per tensor, the inverse of `from_vectors`.
-
-    Parameters
-    ----------
-    matrices : array_like, shape (..., 3, 3)
-        Symmetric matrices.
-    order : {"dipy", "fsl", "mrtrix", "itk"}
-        Order of the entries; see `from_vectors`.
-
-    Returns
-    -------
-    ndarray, shape (..., 6)
-        Six numbers per tensor, in single precision if the matrices are.
-
-    Raises
-    ------
-    ValidationError
-        If a matrix is not symmetric, or the order is unknown.
-
-    Examples
-    --------
-    >>> to_vectors([[1, 4, 5], [4, 2, 6], [5, 6, 3]], order="fsl")
-    array([1., 4., 5., 2., 6., 3.])
-    """
-    pairs = _pairs(order)
-    array = _real(matrices, "matrices")
-    if array.ndim < 2 or array.shape[-2:] != (3, 3):
-        raise ValidationError(f"matrices has shape {array.shape}, but needs shape (..., 3, 3)")
-    with np.errstate(invalid="ignore"):
-        off = largest(array - np.swapaxes(array, -1, -2))
-        bad = off > point_tol(array.dtype) * largest(array)
-        advice = "six numbers can represent symmetric matrices only"
-        refuse(bad, "matrices", lambda i: f"is not symmetric: |A - Aᵀ| is {off[i]:.3e}; {advice}")
-    rows, columns = np.transpose(pairs)
-    return array[..., rows, columns]
-
-
-def _pairs(order: Any) -> list[list[int]]:
-    """Return the row and the column of each of the six numbers."""
-    if isinstance(order, str) and order in _ORDERS:
-        return [["xyz".index(axis) for axis in pair] for pair in _ORDERS[order].split()]
-    raise ValidationError(
-        f"order must be {', '.join(map(repr, _ORDERS))}, the program that wrote the six numbers, not "
-        f"{short_repr(order)}: the numbers do not show it"
-    )
-
-
-def _real(value: ArrayLike, name: str) -> Array:
-    """Return real numbers in single or double precision."""
-    array = as_array(value, name)
-    if array.dtype.kind not in "biuf":
-        raise ValidationError(f"{name} must be an array of real numbers, not of {array.dtype}")
-    return array.astype(np.float32 if array.dtype in (np.float16, np.float32) else np.float64, copy=False)
-
-
-# ---- NIfTI files ----
 
 
 @dataclass(frozen=True)
@@ -172,9 +33,11 @@ class Volume:
     mask : ndarray of bool, shape (X, Y, Z)
         Mask.
     affine : ndarray, shape (4, 4)
-        Map from voxels to millimetres.
+        Map from indices of voxels to positions, in the unit of the header, which is usually millimetres.
     header : object, optional
-        Header of the file that was read. `write_nifti` keeps its units, codes and texts. None for a new volume.
+        Header of the file that was read, an object of nibabel: ``header.get_xyzt_units()``,
+        ``header.get_sform(coded=True)``, ``header["intent_code"]``, ``header["descrip"]``. `write_nifti` keeps it. None
+        for a new volume.
 
     Examples
     --------
@@ -236,7 +99,7 @@ def read_nifti(file: File, *, order: TensorOrder | None = None, mask: ArrayLike 
     """
     path = _path(file)
     image, numbers = _load(path)
-    if int(image.header["intent_code"]) == _SYMMATRIX:
+    if is_symmatrix(image.header):
         if order not in (None, "dipy", "itk"):
             raise ValidationError(
                 f"the intent of {path} is symmetric matrices in the order of NIfTI, not in that of "
@@ -256,19 +119,23 @@ def read_nifti(file: File, *, order: TensorOrder | None = None, mask: ArrayLike 
     return Volume(from_vectors(numbers[inside], order=order), inside, np.asarray(image.affine, float), image.header)
 
 
-def write_nifti(file: File, volume: Volume, *, order: TensorOrder) -> None:
+def write_nifti(file: File, volume: Volume, *, order: TensorOrder, like: Any = None) -> None:
     """Write diffusion tensors to a NIfTI file, with zeros outside the mask.
+
+    Units, the codes of both affine maps, texts, times and extensions of the original file are kept.
 
     Parameters
     ----------
     file : path
         File name that ends in .nii or .nii.gz.
     volume : Volume
-        Tensors, mask, affine map, and header of the original file, whose units, codes and texts are kept. For new
-        tensors use ``dataclasses.replace(volume, tensors=...)``.
+        Tensors, mask, affine map, and header of the original file. For new tensors use
+        ``dataclasses.replace(volume, tensors=...)``.
     order : {"dipy", "fsl", "mrtrix", "itk"}
         Program that will read the file; see `from_vectors`. For ``"itk"`` the file has five axes, and the intent and
         order of symmetric matrices.
+    like : path, nibabel image or Volume, optional
+        Source of the header, instead of `volume`.
 
     Raises
     ------
@@ -281,6 +148,11 @@ def write_nifti(file: File, volume: Volume, *, order: TensorOrder) -> None:
     -----
     The numbers are reordered, but their axes do not change. FSL writes tensors in the axes of the voxels, MRtrix in
     those of the scanner. To convert between such programs, rotate the tensors by the rotation of the affine map.
+
+    A header has up to two affine maps, the qform and the sform, each with a code that names its target, such as the
+    scanner or a standard brain. Where the affine map of the volume differs from that of the header, because the voxels
+    are others, both maps are composed with the map from new to old voxels, and keep their codes. A file of a volume
+    without a header has millimetres as unit. Timing of slices is dropped if the shape changes.
 
     Examples
     --------
@@ -309,12 +181,48 @@ def write_nifti(file: File, volume: Volume, *, order: TensorOrder) -> None:
     numbers = np.zeros((*mask.shape, 6), inside.dtype)
     numbers[mask] = inside
     shaped = numbers[:, :, :, None] if order == "itk" else numbers
+    source = volume if like is None else like
+    header = source.header if isinstance(source, Volume) else image_of(source).header
+    kind = nibabel.Nifti2Image if isinstance(header, nibabel.Nifti2Header) else nibabel.Nifti1Image
     # The type of the numbers in the header would round these.
-    image = nibabel.Nifti1Image(shaped, volume.affine, volume.header, dtype=numbers.dtype)
-    if order == "itk" or int(image.header["intent_code"]) == _SYMMATRIX:
+    image = kind(shaped, volume.affine, header, dtype=numbers.dtype)
+    if header is None:
+        image.header.set_xyzt_units("mm")
+    else:
+        _keep_maps(image, header)
+    if order == "itk" or is_symmatrix(image.header):
         image.header["intent_code"], image.header["intent_p1"] = (_SYMMATRIX, 3) if order == "itk" else (0, 0)
     with replacing(path) as temporary:
         nibabel.save(image, temporary)
+
+
+def image_of(like: Any) -> Any:
+    """Return a NIfTI image that is given as such or by the name of its file."""
+    image = _image(_path(like, "like")) if isinstance(like, (str, PathLike)) else like
+    if not isinstance(image, _nibabel().Nifti1Pair):
+        raise TypeError(f"like must be a path, a NIfTI image of nibabel or a Volume, not {short_repr(like)}")
+    return image
+
+
+def is_symmatrix(header: Any) -> bool:
+    """Whether the intent of a header is symmetric matrices, in the order of NIfTI."""
+    return int(header["intent_code"]) == _SYMMATRIX
+
+
+def _keep_maps(image: Any, header: Any) -> None:
+    """Compose the two affine maps of a header with the map from the voxels of an image to those of the header."""
+    voxels = np.linalg.solve(header.get_best_affine(), image.affine)
+    # Headers hold single precision.
+    if np.allclose(voxels, np.eye(4), rtol=0, atol=1e-5):
+        voxels = np.eye(4)
+    if header["sform_code"] or header["qform_code"]:
+        for name in ("sform", "qform"):
+            map, code = getattr(header, f"get_{name}")(coded=True)
+            getattr(image, f"set_{name}")(None if map is None else map @ voxels, int(code))
+    image.header["pixdim"][1:4] = header["pixdim"][1:4] * np.linalg.norm(voxels[:3, :3], axis=0)
+    if image.shape[:3] != header.get_data_shape()[:3]:
+        for name in ("slice_code", "slice_start", "slice_end", "slice_duration"):
+            image.header[name] = 0
 
 
 def _path(file: Any, name: str = "file") -> Path:
@@ -324,10 +232,19 @@ def _path(file: Any, name: str = "file") -> Path:
     return path
 
 
+def _image(path: Path) -> Any:
+    nibabel = _nibabel()
+    with damage(path, "is damaged or not a NIfTI file"):
+        image = nibabel.load(path)
+        if not isinstance(image, nibabel.Nifti1Pair):
+            raise ValidationError("this is not a NIfTI file. Convert it, for example with nib-convert.")
+        return image
+
+
 def _load(path: Path) -> tuple[Any, Array]:
     """Return the image in a file, and its numbers."""
+    image = _image(path)
     with damage(path, "is damaged or not a NIfTI file"):
-        image = _nibabel().load(path)
         return image, np.asanyarray(image.dataobj)
 
 
