@@ -43,14 +43,12 @@ def spec_of(
         Arguments of `spline_of`.
     """
     space = space_named(space)
-    if not isinstance(da, xr.DataArray):
-        raise ValidationError(f"da must be an xarray.DataArray, not {type(da).__name__}")
     check_dims(da, space, dim, point_dims)
     # Its type is refused or taken with the points.
     space._doubles(np.zeros(space.point_shape, da.dtype), "da")
     kinds, vectors = split(bc_type)
     if dim not in da.coords:
-        _refuse_other_times(da, dim)
+        refuse_other_times(da, dim)
     t = da[dim].values if dim in da.coords else None
     still = np.zeros((da.sizes[dim], 1))
     CubicSpline(t, still, LINE, bc_type=joined(kinds, (np.zeros(1), np.zeros(1))), **options)
@@ -71,6 +69,17 @@ def spec_of(
 
 
 def check_dims(da: xr.DataArray, space: Space, dim: str, point_dims: Sequence[str]) -> None:
+    """Raise ValidationError unless an array has these dimensions, and chunks do not split a curve."""
+    check_names(da, space, [dim], point_dims)
+    check_whole(da, dim, "a curve needs all of its points")
+    for name in point_dims:
+        check_whole(da, name, "a point needs all of its numbers")
+
+
+def check_names(da: xr.DataArray, space: Space, dims: Sequence[str], point_dims: Sequence[str]) -> None:
+    """Raise ValidationError unless an array has the dimensions of nodes and of points."""
+    if not isinstance(da, xr.DataArray):
+        raise ValidationError(f"da must be an xarray.DataArray, not {type(da).__name__}")
     if isinstance(space, Product):
         raise ValidationError(f"{space} is a product, whose factors are independent; fit each factor separately")
     if not isinstance(point_dims, (tuple, list)) or len(point_dims) != len(space.point_shape):
@@ -78,28 +87,31 @@ def check_dims(da: xr.DataArray, space: Space, dim: str, point_dims: Sequence[st
             f"a point of {space} has shape {space.point_shape}, so point_dims must be {len(space.point_shape)} names "
             f"in a tuple, not {short_repr(point_dims)}"
         )
-    for name in (dim, *point_dims):
+    for name in (*dims, *point_dims):
         if name not in da.dims:
             raise ValidationError(f"da has the dimensions {da.dims}, but not {name!r}; pass dim= and point_dims=")
-    if len({dim, *point_dims}) <= len(point_dims):
-        raise ValidationError(f"dim {dim!r} and point_dims {tuple(point_dims)} name a dimension twice")
+    if len({*dims, *point_dims}) < len(dims) + len(point_dims):
+        named = f"dim {dims[0]!r}" if len(dims) == 1 else f"to {tuple(dims)}"
+        raise ValidationError(f"{named} and point_dims {tuple(point_dims)} name a dimension twice")
     found = tuple(da.sizes[name] for name in point_dims)
     if found != space.point_shape:
         raise ValidationError(
             f"{tuple(point_dims)} have sizes {found}, but a point of {space} has shape {space.point_shape}"
         )
-    for name in (dim, *point_dims):
-        # Not of its coordinates, which may be cut otherwise.
-        parts = da.variable.chunksizes.get(name, ())
-        if len(parts) > 1:
-            what = "a curve needs all of its points" if name == dim else "a point needs all of its numbers"
-            raise ValidationError(
-                f"{name!r} is cut into {len(parts)} chunks, but {what} at once; pass da.chunk({{{name!r}: -1}}), with "
-                "smaller chunks along other dimensions"
-            )
 
 
-def _refuse_other_times(da: xr.DataArray, dim: str) -> None:
+def check_whole(da: xr.DataArray, name: str, reason: str) -> None:
+    """Raise ValidationError if chunks split a dimension."""
+    # Not of its coordinates, which may be cut otherwise.
+    parts = da.variable.chunksizes.get(name, ())
+    if len(parts) > 1:
+        raise ValidationError(
+            f"{name!r} is cut into {len(parts)} chunks, but {reason} at once; pass da.chunk({{{name!r}: -1}}), with "
+            "smaller chunks along other dimensions"
+        )
+
+
+def refuse_other_times(da: xr.DataArray, dim: str) -> None:
     """Raise ValidationError if another coordinate along the curves holds times, which would be ignored."""
     found = [name for name, c in da.coords.items() if dim in c.dims and _are_times(name, c)]
     if not found:
