@@ -72,7 +72,7 @@ def test_rows_without_times_are_at_whole_numbers(run):
 
 
 def test_help_has_examples_and_the_version_is_that_of_the_core(capsys):
-    for verb in ("", "fit", "sample", "plot", "check"):
+    for verb in ("", "fit", "sample", "plot", "check", "grid"):
         with pytest.raises(SystemExit) as end:
             main([*verb.split(), "--help"])
         assert end.value.code == 0

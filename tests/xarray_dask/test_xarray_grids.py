@@ -161,7 +161,7 @@ def test_axes_without_coordinates_count_from_the_start():
     da = field(90, 8).drop_vars(["x", "y"])
     to = {"x": np.linspace(0, 89, 50), "y": [0, 0.5, 7]}
     whole = sx.resample(da, S2, to)
-    grid = ss.GridSpline(None, da.isel(level=0).transpose("x", "y", "q").values, S2)
+    grid = ss.GridSpline((None, None), da.isel(level=0).transpose("x", "y", "q").values, S2)
     assert same(whole.isel(level=0).transpose("x", "y", "q").values, grid.grid(*to.values()))
     assert 0 < abs(sx.resample(da.chunk(x=30), S2, to) - whole).max() < 1e-12
 
@@ -190,7 +190,9 @@ def test_matrices_and_complex_points(space):
     da = xr.DataArray(points, dims=("x", "y", *dims))
     found = sx.resample(da.chunk(x=3), space, {"x": [0.5, 4.5], "y": [0, 1.5, 4]}, point_dims=dims)
     assert found.dtype == space.dtype
-    np.testing.assert_allclose(found, ss.GridSpline(None, points, space).grid([0.5, 4.5], [0, 1.5, 4]), atol=1e-13)
+    np.testing.assert_allclose(
+        found, ss.GridSpline((None, None), points, space).grid([0.5, 4.5], [0, 1.5, 4]), atol=1e-13
+    )
 
 
 def test_from_store_to_store_without_reading_everything(tmp_path):

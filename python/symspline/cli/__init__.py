@@ -5,6 +5,7 @@ example:
   symspline check track.npz
   symspline sample track.npz --every 10min -o smooth.csv
   symspline plot track.npz -o track.png
+  symspline grid dti.nii.gz --order fsl --zoom 2 -o fine.nii.gz
 
 See also `symspline VERB --help`. Exit codes: 0 success, 1 not converged or check failed, 2 invalid input or usage,
 130 interrupted. An output file appears only when it is complete; a failed run leaves an older file unchanged.
@@ -21,7 +22,7 @@ from typing import Any, NoReturn
 
 from .._exceptions import ConvergenceError, SymsplineError
 from .._version import VERSION
-from . import _check, _fit, _plot, _sample
+from . import _check, _fit, _grid, _plot, _sample
 from ._messages import Problem, for_command_line, say
 
 __all__ = ["main"]
@@ -79,7 +80,7 @@ def _parser() -> _Parser:
     parser = _Parser("symspline", **_texts(__doc__))
     parser.add_argument("--version", action="version", version=f"symspline {VERSION}")
     verbs = parser.add_subparsers(required=True, metavar="VERB")
-    for verb in (_fit, _sample, _plot, _check):
+    for verb in (_fit, _sample, _plot, _check, _grid):
         texts = _texts(verb.__doc__)
         summary = texts["description"].partition("\n")[0]
         own = verbs.add_parser(verb.__name__.rpartition("._")[2], help=summary, **texts)

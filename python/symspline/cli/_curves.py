@@ -16,6 +16,7 @@ from .._archive import json_in, read
 from .._arrays import brief
 from .._cubic import CubicSpline
 from .._files import load, save
+from .._grid import GridSpline
 from .._spaces import Space
 from ._messages import Problem, reading, refuse, writing
 from ._points import GLOBE, LONLAT, Columns, count_with_quaternion, labels, require_globe
@@ -57,6 +58,7 @@ def read_curves(path: Path, lonlat: bool = False) -> Curves:
         found = load(file)
         named = isinstance(found, dict)
         for curve in found.values() if named else [found]:
+            refuse(path, (isinstance(curve, GridSpline), " is a grid; see symspline grid --help"))
             if not isinstance(curve, CubicSpline):
                 kind = type(curve).__name__
                 raise Problem(f"{path} is a {kind}, whose acceleration jumps at knots; use symspline.load")

@@ -99,7 +99,7 @@ def read_nifti(file: File, *, order: TensorOrder | None = None, mask: ArrayLike 
     """
     path = _path(file)
     image, numbers = _load(path)
-    if is_symmatrix(image.header):
+    if _is_symmatrix(image.header):
         if order not in (None, "dipy", "itk"):
             raise ValidationError(
                 f"the intent of {path} is symmetric matrices in the order of NIfTI, not in that of "
@@ -190,7 +190,7 @@ def write_nifti(file: File, volume: Volume, *, order: TensorOrder, like: Any = N
         image.header.set_xyzt_units("mm")
     else:
         _keep_maps(image, header)
-    if order == "itk" or is_symmatrix(image.header):
+    if order == "itk" or _is_symmatrix(image.header):
         image.header["intent_code"], image.header["intent_p1"] = (_SYMMATRIX, 3) if order == "itk" else (0, 0)
     with replacing(path) as temporary:
         nibabel.save(image, temporary)
@@ -204,7 +204,12 @@ def image_of(like: Any) -> Any:
     return image
 
 
-def is_symmatrix(header: Any) -> bool:
+def written_order(volume: Volume, order: TensorOrder | None) -> TensorOrder:
+    """Return the order in which to write a volume that was read from a file in this order."""
+    return "itk" if order is None or _is_symmatrix(volume.header) else order
+
+
+def _is_symmatrix(header: Any) -> bool:
     """Whether the intent of a header is symmetric matrices, in the order of NIfTI."""
     return int(header["intent_code"]) == _SYMMATRIX
 

@@ -14,7 +14,7 @@ from .._arrays import as_array, short_repr
 from .._core import ValidationError
 from .._grid import GridSpline
 from .._typing import Progress, TensorOrder, VoxelOptions
-from ._nifti import File, Volume, image_of, is_symmatrix, read_nifti, write_nifti
+from ._nifti import File, Volume, image_of, read_nifti, write_nifti, written_order
 from ._orders import Array
 
 Floats = NDArray[np.float64]
@@ -159,9 +159,7 @@ def resample_nifti(
     (3, 3, 3)
     """
     volume = read_nifti(src, order=order, mask=mask)
-    write_nifti(
-        dst, resample(volume, **options), order="itk" if order is None or is_symmatrix(volume.header) else order
-    )
+    write_nifti(dst, resample(volume, **options), order=written_order(volume, order))
 
 
 def _blocks(
@@ -174,7 +172,7 @@ def _blocks(
     # A spline needs two nodes, so that an axis with a single voxel is none of its axes.
     kept = [axis for axis, n in enumerate(volume.mask.shape) if n > 1]
     nodes = full.squeeze(tuple(axis for axis in range(3) if axis not in kept))
-    spline = GridSpline(None, nodes, "spd:3", bc_type=bc_type, symmetric=symmetric) if kept else None
+    spline = GridSpline((None,) * len(kept), nodes, "spd:3", bc_type=bc_type, symmetric=symmetric) if kept else None
     step = max(1, _BLOCK // math.prod(shape[1:]))
     for start in range(0, shape[0], step):
         block = positions[0][start : start + step], *positions[1:]

@@ -285,7 +285,7 @@ def resample(
            [0.    , 0.    , 1.    ]])
     """
     if isinstance(to, Mapping):
-        grid = {"point_dims": point_dims, "where": where, "symmetric": symmetric, "options": options}
+        grid: dict[str, Any] = {"point_dims": point_dims, "where": where, "symmetric": symmetric, "options": options}
         return resample_grid(da, space, to, bc_type="not-a-knot" if bc_type is None else bc_type, **grid)
     if symmetric or isinstance(bc_type, Mapping):
         name = "symmetric=True" if symmetric else "bc_type by dimension"

@@ -55,7 +55,7 @@ def resample_grid(
             f"symmetric, {', '.join(_OPTIONS)}"
         )
     how = {"on_failure": "ignore", **options, "bc_type": _ends(bc_type, list(to)), "symmetric": symmetric}
-    GridSpline(None, np.zeros([min(da.sizes[dim], _FEW) for dim in to] + [1]), LINE, **how)
+    GridSpline((None,) * len(to), np.zeros([min(da.sizes[dim], _FEW) for dim in to] + [1]), LINE, **how)
     if where is not None:
         da = da.where(_mask(where, da, point_dims))
     batch = [d for d in da.dims if d not in (*to, *point_dims)]

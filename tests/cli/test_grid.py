@@ -1,0 +1,272 @@
+"""Grids of points: ``symspline grid``."""
+
+import shlex
+import sys
+
+import numpy as np
+import pytest
+from compare import parts
+
+import symspline as ss
+from symspline.cli import main
+
+RNG = np.random.default_rng(3)
+LAT = np.array([30.0, 31, 33, 36, 38, 39])
+LON = np.linspace(0, 20, 8)
+
+
+def directions(noise=0.02):
+    lat, lon = np.meshgrid(LAT, LON, indexing="ij")
+    sphere = ss.Sphere(2)
+    points = ss.geo.from_lonlat(lon * 3 + lat, 50 * np.sin(lat / 9) * np.cos(lon / 15))
+    return sphere.exp(points, noise * sphere.random_tangent(np.random.default_rng(0), points))
+
+
+@pytest.fixture
+def wind(run):
+    points = directions()
+    np.savez("wind.npz", points=points, lat=LAT, lon=LON)
+    return points
+
+
+def arrays(name):
+    with np.load(name) as file:
+        return dict(file)
+
+
+def test_values_are_those_of_the_library(wind, run):
+    out = run("grid wind.npz --space s:2 --bc-type natural,not-a-knot --zoom 2,3 -o fine.npz")
+    assert out.startswith("fine.npz: 11 x 22 values of sphere:2, axis order gap ")
+    found = arrays("fine.npz")
+    assert list(found) == ["lat", "lon", "points"]
+    np.testing.assert_allclose(found["lat"], np.interp(np.arange(11) / 2, np.arange(6), LAT))
+    np.testing.assert_allclose(found["lon"][::3], LON)
+    spline = ss.GridSpline((LAT, LON), wind, "sphere:2", bc_type=("natural", "not-a-knot"))
+    np.testing.assert_array_equal(found["points"], spline.grid(found["lat"], found["lon"]))
+    run("grid wind.npz --space s:2 --axes lat,lon --symmetric --points 4,5 -o fine.npz")
+    found = arrays("fine.npz")
+    spline = ss.GridSpline((LAT, LON), wind, "sphere:2", symmetric=True)
+    np.testing.assert_array_equal(found["points"], spline.grid(np.linspace(30, 39, 4), np.linspace(0, 20, 5)))
+
+
+def test_values_at_given_positions(wind, run, fails):
+    np.savez("to.npz", lon=[0.5, 19.0], lat=LAT[2:4], other=1)
+    run("grid wind.npz --space s:2 --to to.npz -o out.npz")
+    expected = ss.GridSpline((LAT, LON), wind, "sphere:2").grid(LAT[2:4], [0.5, 19.0])
+    np.testing.assert_array_equal(arrays("out.npz")["points"], expected)
+    np.savez("to.npz", lon=[0.5, 19.0])
+    assert fails("grid wind.npz --space s:2 --to to.npz -o x.npz") == (
+        "to.npz has no array 'lat' with one axis, the positions along 'lat'"
+    )
+    np.savez("to.npz", lon=[0.5, 21.0], lat=LAT)
+    assert "21" in fails("grid wind.npz --space s:2 --to to.npz -o x.npz")
+
+
+def test_splines_are_saved_and_sampled(wind, run, fails):
+    out = run("grid wind.npz --space s:2 -o spline.npz")
+    assert out.startswith("spline.npz: a spline through 6 x 8 points of sphere:2, axis order gap ")
+    spline = ss.load("spline.npz")
+    assert isinstance(spline, ss.GridSpline)
+    run("grid spline.npz --points 5,6 -o a.npz")
+    run("grid wind.npz --space s:2 --points 5,6 -o b.npz")
+    a, b = arrays("a.npz"), arrays("b.npz")
+    assert list(a) == ["axis0", "axis1", "points"]
+    np.testing.assert_array_equal(a["points"], b["points"])
+    assert fails("grid spline.npz -o c.npz") == "spline.npz: this is a spline; give --to, --zoom or --points"
+    assert "for which --space cannot be given" in fails("grid spline.npz --space s:2 --zoom 2 -o c.npz")
+    assert fails("sample spline.npz -n 5 -o c.csv") == "spline.npz is a grid; see symspline grid --help"
+
+
+def test_missing_points_and_axes_without_names(wind, run):
+    points = wind.copy()
+    points[2:4, 5], points[0, 0] = np.nan, np.nan
+    np.savez("wind.npz", points=points.astype(np.float32))
+    out = run("grid wind.npz --space sphere:2 --zoom 2 -o fine.npz")
+    found = arrays("fine.npz")
+    assert list(found) == ["axis0", "axis1", "points"] and "% of them missing" in out
+    missing = np.isnan(found["points"]).any(axis=-1)
+    assert 0 < missing.mean() < 0.5 and missing[4, 10] and missing[0, 0] and not missing[2, 2]
+    np.testing.assert_allclose(found["points"][::2, ::2][2, 2], points[2, 2], atol=1e-7)
+
+
+def test_dates_on_an_axis(run, fails):
+    days = np.datetime64("2021-08-28", "s") + np.array([0, 6, 12, 24, 48]) * np.timedelta64(3600, "s")
+    values = np.cumsum(RNG.standard_normal((5, 4, 2)), axis=0)
+    np.savez("a.npz", when=days, points=values)
+    assert "there are arrays 'when' for the axes" in fails("grid a.npz --space r:2 --zoom 2 -o b.npz")
+    np.savez("a.npz", when=days, x=np.arange(4), points=values)
+    run("grid a.npz --space r:2 --zoom 2,1 -o b.npz")
+    found = arrays("b.npz")
+    assert found["when"][1] == np.datetime64("2021-08-28T03:00") and found["x"].tolist() == [0, 1, 2, 3]
+    expected = ss.GridSpline((days, np.arange(4.0)), values, "r:2").grid(found["when"], found["x"])
+    np.testing.assert_array_equal(found["points"], expected)
+    run("grid a.npz --space r:2 --points 3,2 -o b.npz")
+    assert (arrays("b.npz")["when"] == days[0] + np.arange(3) * np.timedelta64(86400, "s")).all()
+
+
+def test_products_have_one_array_per_factor(run):
+    space = ss.space("so:3 x r:3")
+    rng = np.random.default_rng(0)
+    p = space.random_point(rng)
+    poses = tuple(np.stack([np.stack([own] * 5)] * 4) for own in p)
+    poses = space.exp(poses, tuple(0.1 * own for own in space.random_tangent(rng, poses)))
+    np.savez("poses.npz", points_0=poses[0], points_1=poses[1], u=np.arange(4.0), v=np.arange(5.0))
+    run("grid poses.npz --space 'so:3 x r:3' --zoom 2 -o fine.npz")
+    found = arrays("fine.npz")
+    expected = ss.GridSpline((None, None), poses, space).grid(found["u"], found["v"])
+    for i, own in enumerate(parts(expected)):
+        np.testing.assert_array_equal(found[f"points_{i}"], own)
+
+
+@pytest.mark.parametrize(
+    "line, problem",
+    [
+        ("grid wind.npz -o x.npz", "say which space the points are on with --space"),
+        ("grid wind.npz --space s:2 --axes lat,lno -o x.npz", "wind.npz has no array 'lno'; did you mean 'lon'?"),
+        (
+            "grid wind.npz --space s:2 --axes lat -o x.npz",
+            "wind.npz: there are arrays 'lat' for the axes, but the points have 2 axes",
+        ),
+        ("grid wind.npz --space s:3 -o x.npz", "wind.npz: 'points' has shape (6, 8, 3), which must end in (4,)"),
+        (
+            "grid wind.npz --space spd:3 --zoom 2 -o x.npz",
+            "wind.npz: 'points' has shape (6, 8, 3), which must end in (3, 3)",
+        ),
+        ("grid wind.npz --space s:2 --zoom 0 -o x.npz", "--zoom 0: give numbers larger than 0, separated by commas"),
+        ("grid wind.npz --space s:2 --points 3 -o x.npz", "--points 3: there are 2 axes, which need 2 numbers, not 1"),
+        ("grid wind.npz --space s:2 --points 3,1 -o x.npz", "--points 3,1: give whole numbers from 2 on"),
+        ("grid wind.npz --space s:2 --zoom 2 --points 3,3 -o x.npz", "argument --points: not allowed with"),
+        ("grid wind.npz --space s:2 --bc-type guess -o x.npz", "--bc-type guess: give not-a-knot, natural"),
+        ("grid wind.npz --space s:2 --order fsl -o x.npz", "--order is not for .npz files"),
+        ("grid wind.npz --space s:2 --zoom 2 -o x.zarr", "x.zarr: values of a .npz file are written to such a file"),
+        (
+            "grid wind.npz --space s:2 -o x.csv",
+            "x.csv: the name of a grid must end in .npz or .nii or .nii.gz or .zarr",
+        ),
+        ("grid none.npz --space s:2 -o x.npz", "cannot read none.npz: No such file or directory"),
+        ("grid none.nii --order fsl --zoom 2 -o x.nii", "cannot read none.nii: No such file or directory"),
+        ("grid none.zarr --space s:2 --zoom 2 -o x.zarr", "cannot read none.zarr: No such file or directory"),
+        ("grid dti.nii -o x.nii", "x.nii: give --to, --zoom or --points, or write the spline to an .npz file"),
+        ("grid wind.npz --space s:2 --zoom 2 -o no/x.npz", "cannot write no/x.npz: there is no folder no"),
+    ],
+)
+def test_invalid_usage_fails(wind, fails, line, problem):
+    assert fails(line).startswith(problem)
+
+
+def test_points_off_the_space_fail(wind, fails, run):
+    np.savez("a.npz", points=wind * (1 + 1e-5))
+    run("grid a.npz --space s:2 --zoom 2 -o b.npz")
+    wind[3, 2] *= 1.1
+    np.savez("a.npz", points=wind)
+    problem = fails("grid a.npz --space s:2 --zoom 2 -o c.npz")
+    assert "3" in problem and "space.project" not in problem
+    np.savez("c.npz", curve=wind[0])
+    assert fails("grid c.npz --space s:2 -o d.npz").startswith("c.npz has no array 'points' of points")
+
+
+def test_points_that_are_far_apart_are_noted(run):
+    np.savez("a.npz", points=ss.geo.from_lonlat(*np.meshgrid(150 * np.arange(6), np.arange(3.0))))
+    notes = run("grid a.npz --space s:2 --zoom 2 -o b.npz", notes=True)
+    assert "symspline: more than half of the steps" in notes and "Warning" not in notes
+
+
+def test_progress_on_a_terminal(wind, capsys, monkeypatch):
+    monkeypatch.setattr("symspline.cli._messages._WAIT", 0)
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    assert main(shlex.split("grid wind.npz --space s:2 --zoom 3 -o b.npz")) == 0
+    assert "%" in capsys.readouterr().err
+
+
+# ---- NIfTI ----
+
+
+@pytest.fixture
+def dti(run):
+    nibabel = pytest.importorskip("nibabel")
+    spd = ss.SymmetricPositiveDefinite(3)
+    mask = np.ones((5, 4, 3), bool)
+    mask[0, 0] = False
+    tensors = spd.exp(1e-3 * np.eye(3), 3e-4 * spd.random_tangent(np.random.default_rng(0), np.stack([np.eye(3)] * 57)))
+    volume = ss.tensors.Volume(tensors, mask, np.diag([2.0, 2, 3, 1]))
+    ss.tensors.write_nifti("dti.nii.gz", volume, order="fsl")
+    nibabel.save(
+        nibabel.Nifti1Image((mask & (np.arange(5) > 0)[:, None, None]).astype(np.uint8), volume.affine), "m.nii"
+    )
+    return volume
+
+
+def test_volumes_are_those_of_the_library(dti, run, fails):
+    out = run("grid dti.nii.gz --order fsl --zoom 2,2,1 --mask m.nii --bc-type natural -o fine.nii.gz")
+    ss.tensors.resample_nifti("dti.nii.gz", "b.nii.gz", order="fsl", zoom=(2, 2, 1), mask="m.nii", bc_type="natural")
+    found, expected = (ss.tensors.read_nifti(name, order="fsl") for name in ("fine.nii.gz", "b.nii.gz"))
+    np.testing.assert_array_equal(found.tensors, expected.tensors)
+    inside = len(found.tensors)
+    assert out == f"fine.nii.gz: 9 x 7 x 3 voxels, {inside} of them inside the mask, from 48 of 5 x 4 x 3\n"
+    run("grid dti.nii.gz --order fsl --points 9,7,5 -o c.nii")
+    run("grid dti.nii.gz --order fsl --zoom 2 -o d.nii")
+    run("grid dti.nii.gz --order fsl --to d.nii -o e.nii")
+    c, d, e = (ss.tensors.read_nifti(name, order="fsl") for name in ("c.nii", "d.nii", "e.nii"))
+    np.testing.assert_array_equal(c.tensors, d.tensors)
+    np.testing.assert_allclose(e.tensors, d.tensors, rtol=1e-5)
+    assert fails("grid dti.nii.gz --zoom 2 -o x.nii").startswith("order is required")
+    assert "not of r:6" in fails("grid dti.nii.gz --order fsl --space r:6 --zoom 2 -o x.nii")
+    assert fails("grid dti.nii.gz --order fsl --zoom 2 -o x.npz").startswith("x.npz: values of a .nii.gz file")
+
+
+def test_the_spline_of_a_volume(dti, run):
+    assert "a spline through 5 x 4 x 3 points of spd:3" in run("grid dti.nii.gz --order fsl -o dti.npz")
+    spline = ss.load("dti.npz")
+    np.testing.assert_array_equal(np.isfinite(spline.points).all(axis=(-2, -1)), dti.mask)
+    np.testing.assert_allclose(spline.points[dti.mask], dti.tensors, rtol=1e-12)
+    np.testing.assert_allclose(spline.grid([2], [3], [1])[0, 0, 0], spline.points[2, 3, 1], rtol=1e-9)
+
+
+# ---- Zarr ----
+
+
+@pytest.fixture
+def store(run):
+    xr, _ = pytest.importorskip("xarray"), pytest.importorskip("zarr")
+    points = np.stack([directions(0.01), directions(0.03)], axis=1)
+    coords = {"lat": LAT, "lon": LON}
+    da = xr.DataArray(points, dims=("lat", "day", "lon", "q"), coords=coords, attrs={"source": "a model"})
+    xr.Dataset({"wind": da.chunk(lat=3, day=1), "area": ("lat", LAT)}).to_zarr("wind.zarr", consolidated=False)
+    return da
+
+
+def test_stores_are_those_of_the_library(store, run, fails):
+    xr = pytest.importorskip("xarray")
+    import symspline.xarray as sx
+
+    line = "grid wind.zarr --variable wind --space s:2 --axes lat,lon"
+    out = run(f"{line} --zoom 2 --bc-type natural,not-a-knot -o fine.zarr")
+    assert out == "fine.zarr: 2 x 11 x 15 values of sphere:2\n"
+    found = xr.open_zarr("fine.zarr", consolidated=False)["wind"]
+    to = {
+        "lat": np.interp(np.arange(11) / 2, np.arange(6), LAT),
+        "lon": np.interp(np.arange(15) / 2, np.arange(8), LON),
+    }
+    expected = sx.resample(store, "sphere:2", to, bc_type={"lat": "natural"})
+    assert found.dims == ("day", "lat", "lon", "q") and found.attrs == store.attrs
+    np.testing.assert_allclose(found, expected, atol=1e-13)
+    assert fails(f"{line} --zoom 2 -o fine.zarr") == "cannot write fine.zarr: it is a folder"
+    problem = "wind.zarr: the dimensions day are those of several grids; write them to a .zarr store"
+    assert fails(f"{line} --zoom 2 -o x.npz") == problem
+    assert fails("grid wind.zarr --space s:2 --zoom 2 -o x.zarr").startswith("wind.zarr has the variables")
+    assert fails(f"{line[:-3]}lno --zoom 2 -o x.zarr") == "wind.zarr has no axis 'lno'; did you mean 'lon'?"
+
+
+def test_a_store_as_a_whole(store, run):
+    run("grid wind.zarr --variable wind --space s:2 --points 4,2,5 -o fine.npz")
+    found = arrays("fine.npz")
+    expected = ss.GridSpline((LAT, np.arange(2.0), LON), store.values, "sphere:2")
+    np.testing.assert_allclose(found["points"], expected.grid(found["lat"], found["day"], found["lon"]), atol=1e-13)
+
+
+def test_a_run_that_fails_leaves_no_store(store, fails, folder):
+    for chunk in sorted((folder / "wind.zarr/wind/c/0/0").rglob("*")):
+        if chunk.is_file():
+            chunk.write_bytes(b"damaged")
+    problem = fails("grid wind.zarr --variable wind --space s:2 --axes lat,lon --zoom 2 -o x.zarr")
+    assert problem.startswith("wind.zarr is damaged: ")
