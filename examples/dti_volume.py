@@ -170,6 +170,6 @@ for name, found in exact.items():
     )
     right.semilogx(np.sort(100 * off), np.linspace(0, 100, off.size), **styles[name], label=name)
 left.set(title="without noise", xlabel="position, mm", ylabel="determinant / true one")
-right.legend(loc="upper left")
+right.legend(loc="upper left", fontsize="small")
 right.set(title="without noise", xlabel="error, %", ylabel="% of voxels below it", xlim=(1e-3, 100))
 plt.show()

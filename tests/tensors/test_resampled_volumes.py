@@ -114,6 +114,11 @@ def test_slices_and_lines_of_voxels():
     assert found.mask.shape == (13, 11, 1) and np.array_equal(found.affine, np.diag([0.5, 0.5, 1, 1]))
     expected = flat(np.arange(13) / 2, np.arange(11) / 2, np.arange(5))[:, :, 2:3]
     np.testing.assert_allclose(full(found), expected, rtol=1e-9)
+    mixed = resample(plane, voxel_size=0.5, bc_type=("natural", "clamped", "not-a-knot"))
+    middle = np.arange(13) / 2, np.arange(11) / 2
+    nodes = plane.tensors.reshape(7, 6, 3, 3)
+    grid = ss.GridSpline((None, None), nodes, "spd:3", bc_type=("natural", "clamped"))
+    np.testing.assert_allclose(full(mixed)[:, :, 0], grid.grid(*middle), rtol=1e-12)
     single = Volume(plane.tensors[:1], np.ones((1, 1, 1), bool), np.eye(4))
     assert np.array_equal(resample(single, zoom=3).tensors, single.tensors)
 
@@ -221,6 +226,13 @@ def test_new_files_are_in_millimetres(tmp_path):
 )
 def test_invalid_voxels_raise(match, options):
     raises(match, resample, volume(), **options)
+
+
+def test_masks_without_voxels_or_with_others_raise():
+    empty = Volume(np.empty((0, 3, 3)), np.zeros(SHAPE, bool), np.eye(4))
+    raises("the mask of the volume is empty", resample, empty, zoom=2)
+    wrong = dataclasses.replace(volume(), mask=np.zeros(SHAPE, bool))
+    raises("but the mask has 0 voxels", resample, wrong, zoom=2)
 
 
 def test_tensors_that_are_not_positive_definite_are_named():

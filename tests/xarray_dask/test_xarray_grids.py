@@ -251,5 +251,24 @@ def test_invalid_grids_raise(match, to, options, chunks):
     raises(re.escape(match), sx.resample, da, options.pop("space"), to, **options)
 
 
+def test_points_at_their_cut_locus_warn_and_are_missing():
+    da = field(60, 8)[:, :, :1]
+    da[3, :, 0, 30] = -da[3, :, 0, 31].values
+    to = {"x": inner(da.x.values, 119), "y": da.y.values}
+    with pytest.warns(ss.ConvergenceWarning, match="cut locus"):
+        found = sx.resample(da, S2, to)
+    assert 0 < found.isnull().mean() < 0.5
+    raises("cut locus", sx.resample, da, S2, to, on_failure="raise", error=ss.CutLocusError)
+
+
+def test_points_off_the_space_raise_in_their_block():
+    da = field(60, 8)
+    da[3, :, 0, 50] *= 1.1
+    made = sx.resample(da.chunk(x=10), S2, {"x": inner(da.x.values, 119), "y": da.y.values})
+    made.isel(x=slice(0, 20)).compute(scheduler="synchronous")
+    with pytest.raises(ss.ValidationError, match="1e-8"):
+        made.compute(scheduler="synchronous")
+
+
 def test_points_must_not_be_split():
     raises("'q' is cut into 3 chunks", sx.resample, field().chunk(q=1), S2, {"x": [0.5]})

@@ -70,7 +70,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--symmetric", action="store_true", help="take the midpoint of both orders of the axes")
     add = parser.add_mutually_exclusive_group().add_argument
     add("--to", type=Path, metavar="FILE", help="values at the axes in an NPZ file, or at the voxels of a NIfTI file")
-    add("--zoom", metavar="Z", help="this number of values per node: one number, or one per axis with commas")
+    add("--zoom", metavar="Z", help="intervals between values per interval of nodes: one number, or one per axis")
     add("--points", metavar="N,M,...", help="this number of equidistant values along each axis")
     add = parser.add_argument
     add(

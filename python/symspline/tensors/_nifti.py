@@ -169,14 +169,7 @@ def write_nifti(file: File, volume: Volume, *, order: TensorOrder, like: Any = N
     path = _path(file)
     if not path.name.endswith((".nii", ".nii.gz")):
         raise ValidationError(f"file = {short_repr(str(path))}: the name of a NIfTI file must end in .nii or .nii.gz")
-    if not isinstance(volume, Volume):
-        raise TypeError(f"volume must be a symspline.tensors.Volume, not {short_repr(volume)}")
-    mask = np.asarray(volume.mask, bool)
-    found, needed = np.shape(volume.tensors), (int(mask.sum()), 3, 3)
-    if found != needed:
-        raise ValidationError(
-            f"tensors have shape {found}, but the mask has {needed[0]} voxels, which need shape {needed}"
-        )
+    mask = check_volume(volume)
     inside = to_vectors(volume.tensors, order="dipy" if order == "itk" else order)
     numbers = np.zeros((*mask.shape, 6), inside.dtype)
     numbers[mask] = inside
@@ -194,6 +187,19 @@ def write_nifti(file: File, volume: Volume, *, order: TensorOrder, like: Any = N
         image.header["intent_code"], image.header["intent_p1"] = (_SYMMATRIX, 3) if order == "itk" else (0, 0)
     with replacing(path) as temporary:
         nibabel.save(image, temporary)
+
+
+def check_volume(volume: Volume) -> NDArray[np.bool_]:
+    """Return the mask, or raise an error unless there is one tensor per voxel of it."""
+    if not isinstance(volume, Volume):
+        raise TypeError(f"volume must be a symspline.tensors.Volume, not {short_repr(volume)}")
+    mask = np.asarray(volume.mask, bool)
+    found, needed = np.shape(volume.tensors), (int(mask.sum()), 3, 3)
+    if found != needed:
+        raise ValidationError(
+            f"tensors have shape {found}, but the mask has {needed[0]} voxels, which need shape {needed}"
+        )
+    return mask
 
 
 def image_of(like: Any) -> Any:

@@ -14,7 +14,7 @@ from .._arrays import as_array, short_repr
 from .._core import ValidationError
 from .._grid import GridSpline
 from .._typing import Progress, TensorOrder, VoxelOptions
-from ._nifti import File, Volume, image_of, read_nifti, write_nifti, written_order
+from ._nifti import File, Volume, check_volume, image_of, read_nifti, write_nifti, written_order
 from ._orders import Array
 
 Floats = NDArray[np.float64]
@@ -93,8 +93,8 @@ def resample(
     >>> fine.mask.shape, fine.affine.diagonal(), fine.tensors[-2].diagonal().round(12)
     ((3, 3, 3), array([1., 1., 1., 1.]), array([2., 2., 2.]))
     """
-    if not isinstance(volume, Volume):
-        raise TypeError(f"volume must be a symspline.tensors.Volume, not {short_repr(volume)}")
+    if not check_volume(volume).any():
+        raise ValidationError("the mask of the volume is empty, so that there are no tensors to interpolate")
     positions, affine = _target(volume, zoom, voxel_size, like)
     _check_tensors(volume)
     shape = tuple(map(len, positions))
@@ -172,7 +172,8 @@ def _blocks(
     # A spline needs two nodes, so that an axis with a single voxel is none of its axes.
     kept = [axis for axis, n in enumerate(volume.mask.shape) if n > 1]
     nodes = full.squeeze(tuple(axis for axis in range(3) if axis not in kept))
-    spline = GridSpline((None,) * len(kept), nodes, "spd:3", bc_type=bc_type, symmetric=symmetric) if kept else None
+    ends = bc_type if isinstance(bc_type, str) or len(bc_type) != 3 else [bc_type[axis] for axis in kept]
+    spline = GridSpline((None,) * len(kept), nodes, "spd:3", bc_type=ends, symmetric=symmetric) if kept else None
     step = max(1, _BLOCK // math.prod(shape[1:]))
     for start in range(0, shape[0], step):
         block = positions[0][start : start + step], *positions[1:]

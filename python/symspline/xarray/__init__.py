@@ -243,13 +243,14 @@ def resample(
     symmetric : bool, default False
         Whether values on a grid are the midpoint of both orders of its dimensions, as for `GridSpline`.
     **options
-        Other options of `fit`. A grid has `extrapolate`, `on_failure` and `atol`.
+        Other options of `fit`. A grid has `extrapolate`, `on_failure` (by default ``"warn"``) and `atol`.
 
     Returns
     -------
     xarray.DataArray
         Points as from `evaluate`, with name and attributes of `da`. Curves that did not converge are NaN. Batch
-        dimensions come first, then those of the grid in the order of `da`.
+        dimensions come first, then those of the grid in the order of `da`. Values on a grid that depend on neighbouring
+        points at their cut locus are NaN.
 
     Raises
     ------
@@ -263,8 +264,9 @@ def resample(
     distance between neighbouring points. The nodes of a halo are read and fitted again, so that chunks should have a
     hundred nodes or more along each dimension. A periodic dimension is not split.
 
-    Missing points (NaN) of a grid divide its rows into runs, each with a spline of its own. Values that are not between
-    points of a run along every dimension are NaN.
+    Points of a grid that are off the space raise an error when their block is computed. Missing points (NaN) divide the
+    rows into runs, each with a spline of its own. Values that are not between points of a run along every dimension are
+    NaN.
 
     Examples
     --------

@@ -54,7 +54,7 @@ def resample_grid(
             f"{min(unknown)} is an option of curves along one dimension; for a grid, the options are bc_type, "
             f"symmetric, {', '.join(_OPTIONS)}"
         )
-    how = {"on_failure": "ignore", **options, "bc_type": _ends(bc_type, list(to)), "symmetric": symmetric}
+    how = {"on_failure": "warn", **options, "bc_type": _ends(bc_type, list(to)), "symmetric": symmetric}
     GridSpline((None,) * len(to), np.zeros([min(da.sizes[dim], _FEW) for dim in to] + [1]), LINE, **how)
     if where is not None:
         da = da.where(_mask(where, da, point_dims))
