@@ -176,6 +176,21 @@ def test_periodic_axes_are_not_split():
     whole = sx.resample(da, S2, to, bc_type=ends)
     assert same(sx.resample(da.chunk(angle=20), S2, to, bc_type=ends).values, whole.values)
     np.testing.assert_allclose(whole[0], whole[-1], atol=1e-14)
+    turned = sx.resample(da.chunk(angle=20), S2, {"angle": to["angle"] + 4 * np.pi, "y": to["y"]}, bc_type=ends)
+    np.testing.assert_allclose(turned, whole, atol=1e-12)
+
+
+def test_positions_outside():
+    da = field(90, 8)
+    to = {"x": da.x.values[[0, -1]] + [-1, 1], "y": da.y.values}
+    whole = sx.resample(da, S2, to, extrapolate="geodesic")
+    assert abs(sx.resample(da.chunk(x=30), S2, to, extrapolate="geodesic") - whole).max() < 1e-12
+    assert np.isfinite(whole).all() and sx.resample(da.chunk(x=30), S2, to, extrapolate=False).isnull().all()
+    length = da.x.values[-1] - da.x.values[0]
+    beyond = {"x": da.x.values[10:20] + length, "y": da.y.values[1:3]}
+    found = sx.resample(da.chunk(x=30), S2, beyond, extrapolate="periodic")
+    inside = sx.resample(da, S2, beyond | {"x": da.x.values[10:20]})
+    np.testing.assert_allclose(found, inside, atol=1e-12)
 
 
 @pytest.mark.parametrize("space", ["so:3", "spd:2", "cp:1"])

@@ -15,6 +15,8 @@ eigenvalues to a threshold well above the noise, because small eigenvalues are f
 >>> raised = np.einsum("...ij,...j,...kj->...ik", axes, np.maximum(sizes, 1e-4), axes)
 
 Alternatively, drop such voxels from the batch, or mask them by ``where=``.
+
+`resample` interpolates a volume at other voxels, and `resample_nifti` does so from file to file.
 """
 
 from ._nifti import Volume, read_nifti, write_nifti

@@ -59,9 +59,10 @@ def resample_grid(
     if where is not None:
         da = da.where(_mask(where, da, point_dims))
     batch = [d for d in da.dims if d not in (*to, *point_dims)]
-    policy = extrapolation_mode(checked_extrapolate(options.get("extrapolate")), None)
+    outside = checked_extrapolate(options.get("extrapolate"))
     axes = [
-        _axis(da, dim, x, point_dims, policy, ends) for (dim, x), ends in zip(to.items(), how["bc_type"], strict=True)
+        _axis(da, dim, x, point_dims, extrapolation_mode(outside, ends), ends)
+        for (dim, x), ends in zip(to.items(), how["bc_type"], strict=True)
     ]
     values = _joined(da.drop_vars(list(da.coords)), axes, [], {"space": space, "how": how}, list(point_dims))
     values = values.transpose(*batch, *(d for d in da.dims if d in to), *point_dims)
