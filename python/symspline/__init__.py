@@ -32,10 +32,13 @@ from ._hermite import HermiteSpline  # noqa: E402
 from ._report import ConvergenceWarning, FarPointsWarning, Report  # noqa: E402
 from ._segments import fit_segments  # noqa: E402
 from ._smoothing import (  # noqa: E402
+    SmoothingGrid,
+    SmoothingGridReport,
     SmoothingReport,
     SmoothingSpline,
     SmoothingWarning,
     make_lsq_spline,
+    make_smoothing_grid,
     make_smoothing_spline,
 )
 from ._spaces import (  # noqa: E402
@@ -113,6 +116,8 @@ __all__ = [
     "Report",
     "Siegel",
     "Similarity",
+    "SmoothingGrid",
+    "SmoothingGridReport",
     "SmoothingReport",
     "SmoothingSpline",
     "SmoothingWarning",
@@ -138,6 +143,7 @@ __all__ = [
     "geo",
     "load",
     "make_lsq_spline",
+    "make_smoothing_grid",
     "make_smoothing_spline",
     "manifolds",
     "measure",

@@ -70,12 +70,14 @@ BCWords = (
     | tuple[Literal["natural", "clamped", "not-a-knot"], Literal["natural", "clamped", "not-a-knot"]]
 )
 
+SmoothingWord = Literal["natural", "clamped", "periodic"]
 SmoothingEnd = Literal["natural", "clamped"] | tuple[int, ArrayLike]
 SmoothingBCType = Literal["natural", "clamped", "periodic", "not-a-knot"] | tuple[SmoothingEnd, SmoothingEnd]
 SmoothingMethod = Literal["auto", "linearized", "newton"]
 SmoothingPenalty = Literal["acceleration", "jerk"]
 CovarianceOrder = Literal[0, 1, "joint"]
 Criterion = Literal["gcv", "reml", "cp"]
+GridCriterion = Literal["gcv", "cp"]
 Loss = Literal["linear", "huber", "cauchy"]
 # One number, one for each curve of a batch, or a tuple with one of these for each factor of a product.
 Numbers = ArrayLike | tuple[ArrayLike | None, ...]

@@ -90,16 +90,14 @@ def warn_of_spread(space: Space, curve: CurveArrays, noisy: SmoothingData, dfs: 
     parts = zip(factors_of(space), curve.parts, strict=True)
     at_curve = [x for factor, part in parts for x in split(factor, part.evaluate(at, "point", "raise", at.ndim > 1))]
     for x, (factor, own), precision, df in zip(at_curve, points_of(noisy, space), noisy.precisions, dfs, strict=True):
-        # Other spaces have no uniform distribution of points, or no largest distance.
-        if not np.isfinite(factor.injectivity_radius) or np.isnan(factor.curvature):
+        expected = random_distance(factor)
+        if expected is None:
             continue
         counts = np.broadcast_to(_counts(precision.weights), (*noisy.batch, noisy.times.shape[-1]))
         found = _median_distance(factor, x, own[chosen], counts[..., ::every])
-        random = factor.random_point(np.random.default_rng(0), (2, _SAMPLE))
-        expected = float(np.median(factor._apply("distance", p=random[0], q=random[1])))
         count = np.sum(counts, axis=-1)
         # A curve through all data has no residuals to compare.
-        far = np.argwhere((found**2 * count > _FAR * expected**2 * (count - df)) & (count - df >= 1))
+        far = np.argwhere(is_far(found, expected, count, df))
         if len(far):
             index = tuple(map(int, far[0]))
             more = f" (and {len(far) - 1} more curves)" if len(far) > 1 else ""
@@ -111,6 +109,28 @@ def warn_of_spread(space: Space, curve: CurveArrays, noisy: SmoothingData, dfs: 
                 index,
             )
             return
+
+
+def random_distance(space: Space) -> float | None:
+    """Return the median distance of random points, or None for spaces without a largest distance."""
+    if not np.isfinite(space.injectivity_radius) or np.isnan(space.curvature):
+        return None
+    random = space.random_point(np.random.default_rng(0), (2, _SAMPLE))
+    return float(np.median(space._apply("distance", p=random[0], q=random[1])))
+
+
+def is_far(distance: Any, expected: float, count: Any, df: Any) -> Any:
+    """Return whether data are about as far from a smooth fit as random points would be.
+
+    Parameters
+    ----------
+    distance, expected : float or ndarray
+        Median distances of the data from the fit, and of random points.
+    count, df : float or ndarray
+        Number of data, and degrees of freedom with which the fit follows them. A fit through all data has no residuals
+        to compare.
+    """
+    return (distance**2 * count > _FAR * expected**2 * (count - df)) & (count - df >= 1)
 
 
 def _counts(weights: Array) -> Any:

@@ -1,0 +1,352 @@
+"""Smoothing of noisy points on a grid."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from .._arrays import as_array, checked_atol, checked_number, refuse
+from .._core import ConvergenceError, ValidationError
+from .._grid.axes import GridAxis, read_axes
+from .._grid.nodes import read_nodes, validate_nodes
+from .._options import check_on_failure, check_progress, checked_extrapolate
+from .._report import ConvergenceWarning
+from .._spaces import Array, Doubles, Product, Space, cover_of, factors_of, space_named
+from .._typing import Extrapolate, GridCriterion, Numbers, OnFailure, P, PointsLike, Progress, SmoothingWord, TimesLike
+from .._validation import one_of
+from .._warnings import warn
+from ..manifolds._manifold import refuse_functions
+from .axes import Nodes, SmoothedNodes, noise_level, smooth_axes
+from .common_lam import LamCriterion
+from .factors import grouped, is_several, join, smoothed_spaces, split
+from .grid_report import SmoothedPart
+from .smoothing_grid import SmoothingGrid
+from .solve import one_per_curve
+from .warned import SmoothingWarning, is_far, random_distance
+
+# Ratio of the degrees of freedom to the number of data from which rows follow nearly all data.
+_ALL = 0.9
+
+
+def make_smoothing_grid(
+    axes: Sequence[TimesLike | None],
+    points: PointsLike,
+    space: Space[P] | str,
+    *,
+    lam: Numbers | Sequence[Any] | None = None,
+    weights: Numbers | None = None,
+    criterion: GridCriterion = "gcv",
+    gamma: float = 1.0,
+    sigma: Numbers | None = None,
+    bc_type: SmoothingWord | Sequence[SmoothingWord | tuple[SmoothingWord, SmoothingWord]] = "natural",
+    extrapolate: Extrapolate = None,
+    on_failure: OnFailure = "raise",
+    atol: float | None = None,
+    progress: Progress | None = None,
+) -> SmoothingGrid[P]:
+    r"""Fit a C² surface close to noisy points on a grid.
+
+    The rows along the first axis are smoothed, then the rows of the smooth points along the second axis, and so on.
+    All rows along an axis have the same λ, which the data determine unless `lam` is given. On a Euclidean space the
+    result is the tensor-product smoothing spline.
+
+    Parameters
+    ----------
+    axes : sequence of array_like
+        Coordinates of the nodes along each axis, strictly increasing numbers or dates. None means 0, 1, ...,
+        n - 1.
+    points : array_like, shape (n_1, ..., n_D, *space.point_shape)
+        Noisy points at the nodes. For a `Product`, a tuple with one array per factor. Nodes with NaN are missing. They
+        are filled between the data of a row, and remain NaN outside; see Notes.
+    space : Space or str
+        A space or its name. Points of `SpecialEuclidean` are smoothed as rotations and positions.
+    lam : float or sequence, optional
+        Weight λ ≥ 0 of the bending energy, in units of weight · length³ of the axis (seconds for dates): one number for
+        all axes, or a sequence with one entry per axis. Entries that are None are chosen by `criterion`. For products
+        and poses an entry can be a tuple with one number per part.
+    weights : array_like, shape (n_1, ..., n_D), optional
+        Weights ≥ 0 of the nodes: the inverse variances of their noise up to a common factor. Nodes of weight 0 are
+        missing.
+    criterion : {"gcv", "cp"}, default "gcv"
+        Criterion for λ: generalised cross-validation, or Mallows' C_p, which requires `sigma`.
+    gamma : float, default 1.0
+        Weight of a degree of freedom in ``"gcv"``, at least 1. A value of 1.2 is safer for grids of fewer than about
+        100 nodes, where the surface occasionally passes through all data. On larger grids it smooths too much, and
+        standard deviations are then too small.
+    sigma : float or tuple, optional
+        Standard deviation of the noise in one coordinate for weight one, as a length in the space: radians on the unit
+        sphere. For products and poses a tuple with one number per part.
+    bc_type : {"natural", "clamped", "periodic"} or sequence, default "natural"
+        End conditions for all axes, or a sequence with one entry per axis, each of these or a pair for the start and
+        the end. The last nodes along a periodic axis belong to the same points of the surface as the first ones. They
+        can be further data, NaN, or copies of the first nodes, which count once.
+    extrapolate, on_failure, atol : optional
+        As for `GridSpline`.
+    progress : callable, optional
+        Function that is called after each pass over the grid with the finished and the total number of nodes.
+
+    Returns
+    -------
+    SmoothingGrid
+        A `GridSpline` through the smooth points, with λ, the noise level and standard deviations.
+
+    Raises
+    ------
+    ValidationError
+        If the input does not meet the requirements above.
+    CutLocusError
+        If neighbouring points of the surface are at or past each other's cut locus.
+    ConvergenceError
+        If the smoothing of a row does not converge. The attribute ``spline`` holds the surface.
+
+    Warns
+    -----
+    SmoothingWarning
+        If a chosen λ is at a bound: the rows follow nearly all data, or have no bending energy.
+    ConvergenceWarning
+        If a row fails and `on_failure` is ``"warn"``.
+    UserWarning
+        If the data are about as far from the surface as random points of a compact space would be.
+
+    See Also
+    --------
+    GridSpline : Interpolate points on a grid.
+    make_smoothing_spline : Fit a curve close to noisy points.
+
+    Notes
+    -----
+    Let :math:`K_k` be the matrix of the bending energy of the natural spline through the nodes of axis k. On a
+    Euclidean space with equal weights w, the points at the nodes are
+
+    .. math:: (1 + \lambda_1 K_1 / w)^{-1} \otimes (1 + \lambda_2 K_2 / w)^{-1} \otimes \dots
+
+    times the data. The natural spline through them is the minimiser of a sum of squares and penalties. On other spaces
+    the order of the axes matters, but little for smooth data.
+
+    The criterion for λ is that of the surface: it contains the distances of all data from the surface, and the degrees
+    of freedom of the surface. It is minimised along one axis after the other, in two rounds. In grids of more than
+    20 000 nodes, rows with about this many nodes in total, which are distributed evenly, determine each λ.
+
+    Missing nodes have weight zero. After the pass along an axis, the row fills the nodes between its first and its last
+    datum. The weights of the next pass are the inverse variances that the nodes then have, in units of those in a
+    complete row: filled nodes, and nodes beside gaps, count less. A row with a single datum keeps it.
+
+    References
+    ----------
+    P. Craven, G. Wahba, Smoothing noisy data with spline functions, Numer. Math. 31 (1979).
+
+    L. Xiao, Y. Li, D. Ruppert, Fast bivariate P-splines: the sandwich smoother, J. R. Stat. Soc. B 75 (2013).
+
+    Examples
+    --------
+    >>> import numpy as np, symspline as ss
+    >>> u, v = np.linspace(0, 1, 20), np.linspace(0, 1, 30)
+    >>> turns = np.stack(np.broadcast_arrays(np.sin(2 * u)[:, None], u[:, None] * v, v), axis=-1)
+    >>> truth, space = ss.rotations.from_rotation_vectors(turns), ss.space("so:3")
+    >>> noisy = space.exp(truth, 0.02 * space.random_tangent(np.random.default_rng(0), truth))
+    >>> surface = ss.make_smoothing_grid((u, v), noisy, space)
+    >>> bool(space.distance(surface.points, truth).max() < 0.02), round(surface.sigma, 2)
+    (True, 0.02)
+    """
+    space = space_named(space)
+    refuse_functions(space, "smoothing grids are not made")
+    checked_extrapolate(extrapolate)
+    check_on_failure(on_failure)
+    check_progress(progress)
+    chosen_by = one_of(criterion, "criterion", "gcv", "cp")
+    if chosen_by == "cp" and sigma is None:
+        raise ValidationError("criterion='cp' needs the standard deviation of the noise. Pass sigma.")
+    gamma = checked_number(gamma, "gamma must be a number >= 1", lambda x: 1 <= x < np.inf)
+    if not isinstance(axes, (tuple, list)):
+        read_axes(axes, None, bc_type)
+    data, tols, shape = read_nodes(points, space, len(axes))
+    own_axes = _checked_ends(read_axes(axes, shape, bc_type))
+    w = _read_weights(weights, shape)
+    for array in data:
+        array[w == 0] = np.nan
+    # Noisy data at both ends of a periodic axis may differ.
+    validate_nodes(
+        space,
+        data,
+        tols if atol is None else [checked_atol(atol)] * len(tols),
+        [axis._replace(ends=("natural", "natural")) for axis in own_axes],
+    )
+    w = _without_copies(np.where(factors_of(space)[0]._where_finite(data[0]), w, 0.0), data, own_axes)
+    lams, sigmas = _lams(lam, len(shape), space), _in_parts(sigma, "sigma", space)
+
+    bc_types = tuple(axis.bc_type for axis in own_axes)
+    # Representatives in quotients are continuous over the grid, so that they are smoothed in the covering space.
+    spaces = tuple(map(cover_of, smoothed_spaces(space)))
+    arrays = [own for pair in zip(factors_of(space), data, strict=True) for own in split(*pair)]
+    size, found = int(np.prod(shape)), []
+    for i, (part, array) in enumerate(zip(spaces, arrays, strict=True)):
+
+        def advance(done: int, total: int, i: int = i) -> None:
+            if progress is not None:
+                progress((i * total + done) * size, len(spaces) * total * size)
+
+        used = np.where((w > 0).reshape(*shape, *[1] * len(part.point_shape)), array, np.nan)
+        nodes = Nodes(tuple(axis.knots for axis in own_axes), used, w, part, bc_types)
+        rule = LamCriterion(1.0, sigmas[i]) if chosen_by == "cp" else LamCriterion(gamma, None)
+        found.append(smooth_axes(nodes, lams[i], rule, advance))
+
+    smoothed = [
+        _summary(part, array, w, one, sigma)
+        for part, array, one, sigma in zip(spaces, arrays, found, sigmas, strict=True)
+    ]
+    joined = [
+        join(factor, rows)
+        for factor, rows in zip(factors_of(space), grouped(space, [o.points for o in found]), strict=True)
+    ]
+    through: Any = tuple(joined) if isinstance(space, Product) else joined[0]
+    options = {
+        "bc_type": tuple(axis.bc_type for axis in own_axes),
+        "extrapolate": extrapolate,
+        "on_failure": on_failure,
+    }
+    surface: SmoothingGrid[P] = SmoothingGrid._through(tuple(axes), through, space, data, w, smoothed, options)
+    _handle_failures(found, surface, on_failure)
+    _warn_of_bounds(space, smoothed, lams)
+    for part, array, own, one in zip(spaces, arrays, found, smoothed, strict=True):
+        _warn_of_spread(part, array, own.points, w, one.df)
+    return surface
+
+
+def _checked_ends(axes: list[GridAxis]) -> list[GridAxis]:
+    for k, axis in enumerate(axes):
+        if axis.ends is not None and "not-a-knot" in axis.ends:
+            raise ValidationError(
+                f"bc_type 'not-a-knot' of axis {k} is not available for smoothing grids. Use 'natural', 'clamped' or "
+                "'periodic'."
+            )
+        if axis.is_periodic and len(axis.knots) < 4:
+            raise ValidationError(f"axis {k} is periodic and needs at least 4 nodes, but has {len(axis.knots)}")
+    return axes
+
+
+def _read_weights(weights: Any, shape: tuple[int, ...]) -> Doubles:
+    if weights is None:
+        return np.ones(shape)
+    array = as_array(weights, "weights")
+    if array.shape != shape or array.dtype.kind not in "iufb":
+        raise ValidationError(
+            f"weights must be numbers of shape {shape}, one per node, not {array.dtype} of shape {array.shape}"
+        )
+    found = array.astype(np.float64)
+    bad = ~(np.isfinite(found) & (found >= 0))
+    refuse(bad, "weights", lambda i: f"is {found[i]}, but must be finite and >= 0. Use 0 for missing nodes.")
+    return found
+
+
+def _without_copies(weights: Doubles, data: list[Array], axes: list[GridAxis]) -> Doubles:
+    """Return the weights without those of the last nodes of periodic axes that are copies of the first nodes."""
+    for k, axis in enumerate(axes):
+        if not axis.is_periodic:
+            continue
+        ends = [(np.take(own, 0, axis=k), np.take(own, -1, axis=k)) for own in (*data, weights)]
+        if all(np.array_equal(first, last, equal_nan=True) for first, last in ends):
+            np.moveaxis(weights, k, 0)[-1] = 0.0
+    if not np.any(weights):
+        raise ValidationError("all weights are 0. A surface needs at least one node with data.")
+    return weights
+
+
+def _lams(lam: Any, dims: int, space: Space[Any]) -> list[tuple[float | None, ...]]:
+    """Return the given λ of every axis for each part of the space."""
+    is_sequence = isinstance(lam, (tuple, list)) or (isinstance(lam, np.ndarray) and lam.ndim > 0)
+    if is_sequence and len(lam) != dims:
+        raise ValidationError(
+            f"lam has {len(lam)} entries, but there are {dims} axes. Pass one number for all, or one entry for each."
+        )
+    each = [_in_parts(one, f"lam[{k}]", space) for k, one in enumerate(lam)] if is_sequence else None
+    per_axis = each or [_in_parts(lam, "lam", space)] * dims
+    return [tuple(None if np.isnan(x) else x for x in own) for own in zip(*per_axis, strict=True)]
+
+
+def _in_parts(value: Any, name: str, space: Space[Any]) -> list[float]:
+    """Return a number >= 0 for each part of the space; NaN for None."""
+    spaces = smoothed_spaces(space)
+    several = is_several(space) and isinstance(value, tuple)
+    if several and len(value) != len(spaces):
+        raise ValidationError(
+            f"{name} has {len(value)} entries, but there are {len(spaces)} parts to smooth: "
+            f"{', '.join(map(repr, spaces))}. Pass one entry per part."
+        )
+    return [float(one_per_curve(one, name, ())[0]) for one in (value if several else [value] * len(spaces))]
+
+
+def _summary(space: Space[Any], data: Array, weights: Doubles, found: SmoothedNodes, sigma: float) -> SmoothedPart:
+    """Return the properties of the surface in one part of the space."""
+    used = (weights > 0) & space._where_finite(found.points)
+    distances = space._apply("distance", p=found.points[used], q=data[used])
+    df = float(np.sum(weights[used] * found.variance[used]))
+    rss = float(np.sum(weights[used] * distances**2))
+    estimated = noise_level(rss, int(np.count_nonzero(used)), df, space.dim)
+    return SmoothedPart(found.axes, found.variance, df, estimated if np.isnan(sigma) else sigma)
+
+
+def _handle_failures(found: list[SmoothedNodes], surface: SmoothingGrid[Any], on_failure: str) -> None:
+    """Raise an error or warn about rows that did not converge."""
+    first = next((own.failed for own in found if own.failed), None)
+    if first is None or on_failure == "ignore":
+        return
+    k, *others = first
+    row = ", ".join(map(str, [*others[:k], ":", *others[k:]] if len(surface.axes) > 1 else [":"]))
+    failed = sum(axis.failed for own in found for axis in own.axes)
+    message = (
+        f"No convergence of the smoothing along axis {k} in the row points[{row}]"
+        + (f" (and in {failed - 1} more rows)" if failed > 1 else "")
+        + ". Check units and signs of the data, or pass a larger lam."
+    )
+    if on_failure == "warn":
+        warn(message, ConvergenceWarning)
+        return
+    error = ConvergenceError(message)
+    error.spline = surface
+    raise error
+
+
+def _warn_of_bounds(space: Space[Any], smoothed: list[SmoothedPart], lams: list[tuple[float | None, ...]]) -> None:
+    """Warn once if a chosen λ is at a bound, or close to it."""
+    for i, (part, own, given) in enumerate(zip(smoothed_spaces(space), smoothed, lams, strict=True)):
+        for k, axis in enumerate(own.axes):
+            rough = axis.df > _ALL * axis.count
+            if given[k] is not None or not axis.evaluations or not (axis.at_bound or rough):
+                continue
+            of = f" in part {i}, {part!r}," if is_several(space) else ""
+            if rough:
+                what = "a lam so small that rows follow nearly all nodes"
+                advice = (
+                    "The standard deviations are only valid if the data are that accurate. Correlated noise causes "
+                    "this. Pass a larger gamma, sigma= with criterion='cp', or lam=."
+                )
+            else:
+                what = "a lam so large that rows are geodesics"
+                advice = (
+                    "This is correct for data along geodesics. Otherwise the surface bends faster than the nodes "
+                    "resolve, or less than their noise: plot the data, and pass lam= to set the smoothness."
+                )
+            warn(
+                f"The smoothing{of} along axis {k} chose {what} ({axis.df:.3g} degrees of freedom for {axis.count} "
+                f"nodes). {advice}",
+                SmoothingWarning,
+            )
+            return
+
+
+def _warn_of_spread(space: Space[Any], data: Array, points: Array, weights: Doubles, df: float) -> None:
+    """Warn if the data are about as far from the surface as random points of a compact space would be."""
+    expected = random_distance(space)
+    if expected is None:
+        return
+    used = (weights > 0) & space._where_finite(points)
+    distance = float(np.median(space._apply("distance", p=points[used], q=data[used])))
+    if is_far(distance, expected, np.count_nonzero(used), df):
+        warn(
+            f"half of the data are {distance:.2g} or more away from their smooth surface. For random points of "
+            f"{space!r} this distance is {expected:.2g}, so the surface has little meaning. Check the units and signs "
+            "of the data.",
+            UserWarning,
+        )
