@@ -18,7 +18,7 @@ NEEDS = {"symspline.xarray": "xarray"}
 # They change how the process runs, or take functions that the user vouches for.
 LEFT_OUT = {"set_num_threads", "show_config", "from_geomstats", "from_pymanopt", "map"}
 # Made by `make_smoothing_spline` only.
-LEFT_OUT |= {"SmoothingSpline"}
+LEFT_OUT |= {"SmoothingGrid", "SmoothingSpline"}
 # An abstract class.
 LEFT_OUT |= {"Curve"}
 
@@ -56,6 +56,7 @@ def objects():
             (T, None), P[[0, 1]].repeat(2, axis=0)[[0, 1, 2]][:, None] * np.ones((3, 2, 1)), "sphere:2"
         ),
         "GridSpline, volume": ss.GridSpline((None, T, DAYS), np.full((2, 3, 3, 1), 0.5), "r:1", symmetric=True),
+        "SmoothingGrid": ss.make_smoothing_grid((None, T), np.eye(3)[..., None], "r:1", lam=0.1),
         "Report": sphere.report,
         "Stiefel": ss.Stiefel(2, 3),
     }
