@@ -21,6 +21,7 @@ MEASURED = [
     ss.measure.Points(np.arange(6), TURNS, sigma=0.1),
     ss.measure.BodyRates([1, 2.5, 4], [[0, 0.1, 0.25]] * 3, sigma=0.05, bias=ss.measure.Constant(3)),
 ]
+NOISY_SURFACE = np.sin(np.arange(20.0) ** 2).reshape(5, 4, 1)
 
 
 def curves():
@@ -43,6 +44,7 @@ def curves():
         "grid": ss.GridSpline(
             (DATES, None), TURNS[None] @ TURNS[[0, 2, 1], None], "so:3", bc_type=("natural", "clamped")
         ),
+        "smoothing_grid": ss.make_smoothing_grid((range(5), [0, 1, 3, 4]), NOISY_SURFACE, "r:1", lam=(0.1, 0.2)),
         "several": {"a": spline, "b": spline},
         "several_smoothing": {"a": smooth, "b": smooth},
     }
