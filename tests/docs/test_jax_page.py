@@ -24,11 +24,14 @@ def double_precision():
 
 def test_examples_run():
     names = {}
-    first, second = blocks(PAGE)
+    first, second, third = blocks(PAGE)
     # A Hessian takes half a minute to compile; what it is made of is tested with the functions.
-    run(f"{first}\n{second}".replace("jax.hessian(", "jax.grad("), PAGE, names)
+    run(f"{first}\n{second}\n{third}".replace("jax.hessian(", "jax.grad("), PAGE, names)
     assert names["error"] < 1e-5 and np.isfinite(names["jerk"]).all()
     assert names["hessian"].shape == (5, 3)
+    height, h = names["height"], 1e-5
+    differences = [height(1.5 + h, 0.7) - height(1.5 - h, 0.7), height(1.5, 0.7 + h) - height(1.5, 0.7 - h)]
+    np.testing.assert_allclose(names["slope"], np.array(differences) / (2 * h), atol=1e-8)
 
 
 def test_the_table_can_be_made():
