@@ -47,6 +47,7 @@ def test_values_are_those_of_the_definition(name):
         expected = one_value(space, (U, V), points, (X[0][i, 0], X[1][j]), ends)
         assert space.distance(np.asarray(values[i, j]), expected) < 1e-7
         np.testing.assert_allclose(space.project(np.asarray(values[i, j])), values[i, j], atol=1e-12)
+    assert space.distance(np.asarray(values), ss.GridSpline((U, V), points, space, bc_type=ends)(X)).max() < 1e-7
     outer = grid_spline((X[0][:, 0], X[1]), (U, V), points, space, bc_type=ends, grid=True)
     assert space.distance(np.asarray(outer), np.asarray(values)).max() < 1e-7
 
@@ -191,6 +192,7 @@ def test_invalid_grids_raise():
             "must not contain vectors",
             lambda: grid_spline(FLAT, (U, V), points, "sphere:2", bc_type=("natural", ((1, np.zeros(3)), "natural"))),
         ),
+        ("it is not finite", lambda: grid_spline(FLAT, (U, V), np.where(points > 0.9, np.nan, points), "sphere:2")),
         ("does not support", lambda: grid_evaluate((U, V), field("spd:2"), "spd:2", FLAT)),
     ]:
         raises(match, call)

@@ -92,6 +92,10 @@ def grid_spline(
     ValidationError
         If shapes do not match, or a point is NaN. Missing nodes are not supported in JAX.
 
+    See Also
+    --------
+    symspline.GridSpline : The same surface without JAX, faster at many coordinates, and with missing nodes.
+
     Notes
     -----
     The spline along the first axis through every row of nodes is evaluated at the first coordinate. A spline along the
