@@ -130,7 +130,10 @@ def test_invalid_bases_raise():
         (r"x\[1\] does not determine .* singular values 2 and 3 are 1 and 1", lambda: from_snapshots(EQUAL, 2)),
         ("values 2 and 3 are 0 and 0", lambda: from_snapshots(np.outer([1, 2, 3.0], [1, 1, 1]) * [1, 0, 0], 2)),
         ("must contain at least one snapshot", lambda: from_snapshots(np.zeros((5, 0)), 1)),
-        ("one curve on a Grassmannian, not <CubicSpline on Sphere", lambda: reduced_operator(SPHERE, np.eye(3), 0.5)),
+        (
+            "one curve or a grid on a Grassmannian, not <CubicSpline on Sphere",
+            lambda: reduced_operator(SPHERE, np.eye(3), 0.5),
+        ),
         (r"operator has shape \(59, 60\), but bases of 60", lambda: reduced_operator(curve(), np.ones((59, N)), 0.5)),
     ]:
         raises(match, call)
