@@ -2,15 +2,17 @@
 
 import sys
 
+import convection
 import numpy as np
 import order
 import page
 import pytest
 import reconstruct
 import recordings
+import reduced_bases
 import riemannian_cubics as cubics
 
-SCRIPTS = ("order", "cubics", "reconstruct", "ends")
+SCRIPTS = ("order", "cubics", "reconstruct", "ends", "bases")
 
 
 @pytest.fixture(params=["S²", "SO(3)"])
@@ -40,6 +42,25 @@ def test_spline_is_close_to_the_cubic_and_bends_more(case):
     falls = np.log(rows[0].distance / rows[1].distance) / np.log(11 / 5)
     assert 3 < falls < 5
     assert cubics.text(rows).count("\n") == 3
+
+
+def test_bicubic_bases_are_equally_good_near_a_reference_and_the_spline_is_better_elsewhere():
+    unseen = convection.Unseen(convection.drift(40), 6)
+    found = reduced_bases.errors(unseen, (7, 7))
+    near = [
+        found[name][0]
+        for name in (reduced_bases.ALIGNED, reduced_bases.BICUBIC, reduced_bases.LOCAL, reduced_bases.GRID)
+    ]
+    assert max(near) < 1.5 * min(near)
+    assert found[reduced_bases.ENTRIES][0] > 3 * max(near) and found[reduced_bases.BILINEAR][0] > 1.2 * max(near)
+    assert found[reduced_bases.GRID][1] < 2 * np.sqrt(np.mean(unseen.model_errors(unseen.own) ** 2))
+    wind = convection.Unseen(convection.wind(7), 6)
+    text = reduced_bases.text("Wind", wind, [(4, 9)])
+    assert text.count("| 4 × 9 |") == 2
+    turned = reduced_bases.errors(wind, (4, 13))
+    assert all(
+        turned[reduced_bases.GRID][0] < 0.7 * own[0] for name, own in turned.items() if name != reduced_bases.GRID
+    )
 
 
 def test_recordings_of_others_can_be_read(tmp_path):
