@@ -19,6 +19,8 @@ SAYS = {
     "dti_volume": r"(?s)noisy, six numbers, linear +off by 6\.\d\d %, determinant up to 3\.\d .*cubic.* [1-9] tensors "
     r"not positive.*clean, log-Euclidean, cubic +off by 0\.1\d %.*clean, grid spline +off by 0\.\d\d %.*1\.6 times",
     "pod_over_a_parameter": r"4 numbers in place of 80: off by 0\.\d%; with interpolated numbers by \d\d\.\d%",
+    "reduced_bases_over_two_parameters": r"largest error: numbers interpolated 1\d\.\d%, GridSpline 1\.4%, own "
+    r"simulation 1\.4%\nfrom 4 x 4 matrices at the nodes: 1\.[34]%",
     "storms_from_a_table": "37 storms, 946 fixes, 5900 hours; fastest: Martin 2022",
     "noisy_gps": r"1\d degrees of freedom; half way known to 4\.\d m",
     "crystal_orientations": r"median error: \d\d\.\d degrees without the symmetry, 0\.\d\d with it\n"
