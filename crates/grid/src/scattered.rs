@@ -17,8 +17,8 @@ use symspline_core::scalar::LANES;
 /// The number of nodes of all windows together that a thread processes at a time.
 const BLOCK: usize = 1 << 13;
 
-/// A query: the extents of its windows along the axes after the first, its segment along the first axis, and its number.
-type Query = (Vec<(usize, usize)>, usize, usize);
+/// A query: the number of its windows along the axes after the first, its segment along the first axis, and its number.
+type Query = (usize, usize, usize);
 
 /// Evaluates the grid at coordinates given row by row. `points` receives the points, and `tangents` the derivative if
 /// one is requested. The monitor counts the coordinates.
@@ -35,20 +35,18 @@ pub fn scattered(
         .chunks_exact(dims)
         .enumerate()
         .map(|(number, x)| {
-            let extents = (1..dims).map(|k| Window::extent(&grid.axes[k], x[k])).collect();
-            (extents, grid.axes[0].locate(x[0]).0, number)
+            let windows = (1..dims)
+                .fold(0, |windows, k| windows * grid.axes[k].nodes() + Window::extent(&grid.axes[k], x[k]).0);
+            (windows, grid.axes[0].locate(x[0]).0, number)
         })
         .collect();
     queries.sort_unstable();
     let vectors = if derivative.is_vector() { len } else { 0 };
     let mut found = vec![0.0; queries.len() * (len + vectors)];
-    let groups: Vec<&[Query]> = queries
-        .chunk_by(|a, b| a.0 == b.0)
-        .flat_map(|same| {
-            let nodes: usize = same[0].0.iter().map(|(_, nodes)| nodes).product();
-            same.chunks((BLOCK / nodes).max(1).next_multiple_of(LANES))
-        })
-        .collect();
+    let nodes: usize = grid.axes[1..].iter().map(|axis| Window::extent(axis, axis.knots[0]).1).product();
+    let size = (BLOCK / nodes).max(1).next_multiple_of(LANES);
+    let groups: Vec<&[Query]> =
+        queries.chunk_by(|a, b| a.0 == b.0).flat_map(|same| same.chunks(size)).collect();
     let (mut blocks, mut rest) = (Vec::new(), &mut found[..]);
     for &own in &groups {
         let (out, others) = std::mem::take(&mut rest).split_at_mut(own.len() * (len + vectors));
@@ -93,8 +91,9 @@ fn block(
     monitor: &Monitor,
 ) -> (Arrays, Summary) {
     let dims = grid.axes.len();
+    let first = queries[0].2 * dims;
     let windows: Vec<Window> =
-        queries[0].0.iter().zip(&grid.axes[1..]).map(|(&extent, axis)| Window::new(axis, extent)).collect();
+        (1..dims).map(|k| Window::new(&grid.axes[k], Window::extent(&grid.axes[k], x[first + k]))).collect();
     let axes: Vec<Axis> =
         std::iter::once(grid.axes[0]).chain(windows.iter().map(|window| window.axis())).collect();
     let along = |k: usize| queries.iter().map(move |(.., number)| x[number * dims + k]);
