@@ -19,7 +19,14 @@ from ._core import ValidationError
 from ._curve import Curve
 from ._curves.curve import CurveArrays, SidePanel, UncertaintyBand
 from ._input import times_of
-from ._options import EvaluationOptions, check_progress, checked_extrapolate, extrapolation_mode, quantity_of
+from ._options import (
+    EvaluationOptions,
+    check_progress,
+    checked_extrapolate,
+    extrapolation_mode,
+    quantity_of,
+    require_matplotlib,
+)
 from ._spaces import Array, Doubles, Product, Space, parts_of
 from ._time import TimeAxis, onto_ends
 from ._typing import AnyArray, AnyArrays, BCType, Extrapolate, File, FloatArray, Out, P, Progress, Time, TimesLike
@@ -489,8 +496,7 @@ class SegmentedCurve(Curve[P]):
         >>> quarter = ss.CubicSpline(None, [[1, 0, 0], [0, 1, 0]], ss.Sphere(2))
         >>> figure = quarter.plot()
         """
-        if find_spec("matplotlib") is None:
-            raise ImportError("plots need matplotlib; install it with: pip install 'symspline[plot]'")
+        require_matplotlib()
         from ._plotting import plot
 
         return plot(self, file)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from typing import Any, TypedDict
 
 import numpy as np
@@ -104,3 +105,9 @@ def check_on_failure(on_failure: Any) -> None:
     """Raise ValidationError unless the argument is one of the three policies."""
     if not isinstance(on_failure, str) or on_failure not in ("raise", "warn", "ignore"):
         raise ValidationError(f"on_failure must be 'raise', 'warn' or 'ignore', not {short_repr(on_failure)}")
+
+
+def require_matplotlib() -> None:
+    """Raise ImportError if Matplotlib is not installed."""
+    if find_spec("matplotlib") is None:
+        raise ImportError("plots need matplotlib; install it with: pip install 'symspline[plot]'")

@@ -16,7 +16,6 @@ np.float64(0.0)
 
 from __future__ import annotations
 
-from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -26,6 +25,7 @@ from ._arrays import as_array, read_only, refuse, short_repr
 from ._core import ValidationError
 from ._cubic import CubicSpline
 from ._input import times_of
+from ._options import require_matplotlib
 from ._spaces import Euclidean, Grassmannian, SpecialOrthogonal, SymmetricPositiveDefinite
 from ._typing import AnyArray, BCWords, File, TimesLike
 from ._validation import check_orthonormal, numbers, one_of
@@ -380,8 +380,7 @@ class AffineMorph:
         >>> square, kite = [[0, 0], [1, 0], [1, 1], [0, 1]], [[0, 0], [1, 0], [1.5, 1.5], [0, 1]]
         >>> figure = AffineMorph([0, 1], [square, kite]).plot()
         """
-        if find_spec("matplotlib") is None:
-            raise ImportError("plots need matplotlib; install it with: pip install 'symspline[plot]'")
+        require_matplotlib()
         from ._plotting.film import plot_film
 
         figure: Figure = plot_film(self.t, self.landmarks, self, file)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Any, ClassVar, Generic, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self
 
 import numpy as np
 
@@ -14,16 +14,19 @@ from .._arrays import checked_atol, checked_flag, short_repr, whole_number
 from .._core import ConvergenceError, CutLocusError, ValidationError
 from .._cubic import CubicSpline
 from .._faults import CUT_LOCUS
-from .._options import check_on_failure, check_progress, checked_extrapolate
+from .._options import check_on_failure, check_progress, checked_extrapolate, require_matplotlib
 from .._report import ConvergenceWarning
 from .._spaces import Array, Product, Space, cover_of, factors_of, space_named
 from .._typing import Extrapolate, File, OnFailure, P, PointsLike, Progress, TimesLike
 from .._warnings import warn
-from .axes import GridAxis, coordinates, read_axes, sites_of
+from .axes import GridAxis, Sites, coordinates, read_axes, sites_of
 from .compiled import CompiledGrid, Found
 from .evaluation import FactorGrid, order_of_each
 from .nodes import check_steps, read_nodes, validate_nodes
 from .report import GridReport
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 class GridSpline(Generic[P]):
@@ -396,6 +399,70 @@ class GridSpline(Generic[P]):
         return CubicSpline(
             others[0].t, nodes, self._space, bc_type=bc, extrapolate=self._extrapolate, on_failure=self._on_failure
         )
+
+    # ---- plots ----
+
+    def plot(self, file: File | None = None) -> Figure:
+        """Plot the points over the first two axes.
+
+        The picture depends on the space:
+
+        - S²: arrows of the first two coordinates over an image of the angle to the third axis; CP¹ and the complex
+          Gr(1, 2) likewise, with Bloch vectors.
+        - SO(3), SU(2) and S³ (unit quaternions, scalar first): an orientation map. The colour is the direction of the
+          axis that moves most; lines show the misorientation to the node with a ring.
+        - SPD(2) and SPD(3): ellipses over an image of the anisotropy, for SPD(3) with the colours of the longest axis.
+        - S¹, SO(2), O(2), U(1), RP¹ and Gr(1, 2): the angle.
+        - R¹: an image. R²: arrows over an image of their lengths. R³: a surface; SE(3): a surface with frames.
+        - All other spaces: the distance to the node with a ring.
+
+        A product has one panel per factor. Dots are nodes; areas without values are blank.
+
+        Parameters
+        ----------
+        file : str, path or file object, optional
+            File to which the figure is saved, such as ``"grid.pdf"``.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The figure, which you can modify or save.
+
+        Raises
+        ------
+        ImportError
+            If Matplotlib is not installed.
+        ValidationError
+            If all nodes of the section are missing, or the only axis has missing nodes.
+
+        Notes
+        -----
+        A grid with one axis has the figure of its `CubicSpline`. For three and more axes, the figure shows the section
+        at the middle nodes of the further axes, which the heading names.
+
+        Examples
+        --------
+        >>> import numpy as np, symspline as ss
+        >>> u = np.linspace(0, 1, 8)
+        >>> figure = ss.GridSpline((u, u), (u[:, None] * u)[..., None], "r:1").plot()
+        """
+        require_matplotlib()
+        from .._plotting import plot, plot_grid
+
+        if len(self._axes) > 1:
+            return plot_grid(self, file)
+        if self.report.missing:
+            raise ValidationError(
+                "the only axis of the grid has missing nodes, so that it is not one curve. Plot the curves of "
+                "fit_segments instead."
+            )
+        bc: Any = self._axes[0].bc_type
+        curve = CubicSpline(self._axes[0].t, self.points, self._space, bc_type=bc, on_failure=self._on_failure)
+        return plot(curve, file)
+
+    def _values_of(self, factor: FactorGrid, x: list[Any]) -> Array:
+        """Evaluate a factor on an outer product of coordinates of the core; NaN where splines fail."""
+        return factor.evaluate(Sites(x, True, ["continue"] * len(x)), (0,) * len(x))[0]
 
     # ---- files, pickles and text ----
 

@@ -24,7 +24,8 @@ from .graphs import timelines
 from .style import DPI, INK, heading
 
 _HEAD, _RATES_WIDTH, _RATES_HEIGHT = 0.95, 5.8, 4.0
-_FACTORS = 6
+FACTORS = 6
+"""The largest number of factors of a product that are drawn."""
 _NORMAL = 1.96
 """Half width of the 95 % interval of a normal distribution, in standard deviations."""
 
@@ -138,8 +139,8 @@ def _description(spline: Any, curves: Sequence[Curve]) -> str:
     """Describe the data, the convergence of the solver, the number of curves with bands, and the number of gaps."""
     words = [spline._made_of]
     factors = len(factors_of(spline.space))
-    if factors > _FACTORS:
-        words.append(f"{_FACTORS} of {factors} factors")
+    if factors > FACTORS:
+        words.append(f"{FACTORS} of {factors} factors")
     if spline._unconverged:
         words.append(f"{spline._unconverged} not converged" if spline._curve.batch else "not converged")
     if curves[0].noise is not None:
@@ -182,7 +183,7 @@ def _draw_rates(panel: SubFigure, curves: Sequence[Curve]) -> None:
 
 def _of_factors(curves: Sequence[Curve]) -> Picture:
     """Return the picture of a product space, which has the pictures of its factors."""
-    factors = factors_of(curves[0].space)[:_FACTORS]
+    factors = factors_of(curves[0].space)[:FACTORS]
     rows = 1 if len(factors) <= 3 else 2
     columns = -(-len(factors) // rows)
 

@@ -98,9 +98,7 @@ def draw_graph(panel: SubFigure, curves: Sequence[Curve]) -> None:
         draw_graph_of(axes, curve, *curve.marked(np.ravel))
 
 
-def _draw_angle(
-    angles: Callable[[Any], Array], panel: SubFigure, curves: Sequence[Curve], period: float = 2 * np.pi
-) -> None:
+def _draw_angle(angles: Callable[[Any], Array], period: float, panel: SubFigure, curves: Sequence[Curve]) -> None:
     """Draw an angle against time, without jumps."""
     (axes,) = timelines(panel, curves, ["angle, degrees"])
     for curve in curves:
@@ -112,10 +110,14 @@ def _draw_angle(
 
 # Points of S¹ have the angle of a unit vector. Points of RP¹ and Gr(1, 2) are lines, whose angle has the period π.
 # Points of SO(2) and O(2) have the angle of the first axis, and points of U(1) their phase.
-draw_circle = partial(_draw_angle, lambda points: np.arctan2(points[:, 1], points[:, 0]))
-draw_slope = partial(_draw_angle, lambda lines: np.arctan2(lines[:, 1], lines[:, 0]).ravel(), period=np.pi)
-draw_turn = partial(_draw_angle, lambda matrices: np.arctan2(matrices[:, 1, 0], matrices[:, 0, 0]))
-draw_phase = partial(_draw_angle, lambda numbers: np.angle(numbers[:, 0, 0]))
+ANGLES: dict[str, tuple[Callable[[Any], Array], float]] = {
+    "sphere:1": (lambda points: np.arctan2(points[:, 1], points[:, 0]), 2 * np.pi),
+    "rp:1 gr:1,2": (lambda lines: np.arctan2(lines[:, 1], lines[:, 0]).ravel(), np.pi),
+    "so:2 o:2": (lambda matrices: np.arctan2(matrices[:, 1, 0], matrices[:, 0, 0]), 2 * np.pi),
+    "u:1": (lambda numbers: np.angle(numbers[:, 0, 0]), 2 * np.pi),
+}
+"""The angle of points, and its period."""
+draw_circle, draw_slope, draw_turn, draw_phase = (partial(_draw_angle, *own) for own in ANGLES.values())
 
 
 # ---- several numbers ----
