@@ -19,7 +19,7 @@ _HEAD, _LEFT, _BOTTOM, _TOP, _NAMED = 0.95, 0.85, 0.6, 0.1, 0.4
 """Heights and margins in inches. Panels with a name have a larger margin at the top."""
 _SIDE = 4.4
 """Longer side of an image in inches."""
-_PIXELS, _NUMBERS = 240, 2e7
+_PIXELS, _NUMBERS = 240, 4e6
 """Pixels along the longer side, and the largest number of coordinates of all points; large points get fewer pixels."""
 _GAP, _NARROW = 0.36, 0.28
 """Distance between symbols in inches, and the smallest one between those at nodes."""

@@ -1,0 +1,384 @@
+"""Pictures of grids: the content of images, symbols and nodes, of missing nodes, sections and dates."""
+
+import sys
+from io import BytesIO
+
+import numpy as np
+import pytest
+from drawn import axes_named, rendered, texts_of
+from matplotlib.collections import PolyCollection
+from matplotlib.dates import date2num, num2date
+from matplotlib.figure import Figure
+from matplotlib.quiver import Quiver
+from refused import raises
+
+import symspline as ss
+from symspline._plotting import fields
+
+# Spaces with a picture of their own, with some of the others.
+SPACES = "r:1 r:2 r:3 sphere:1 sphere:2 sphere:3 rp:1 gr:1,2 so:2 o:2 u:1 so:3 su:2 spd:2 spd:3 cp:1 cgr:1,2 se:3"
+OTHERS = "gr:2,5 hpd:2 se:2"
+U, V = np.array([0.0, 0.7, 1.1, 2.0, 3.2, 3.6, 4.5]), np.array([-1.0, -0.6, 0.1, 0.4, 1.5])
+
+
+def smooth_field(name, u=U, v=V):
+    """A smooth field, whose grid meets no cut locus."""
+    space, rng = ss.space(name), np.random.default_rng(2)
+    middle = space.random_point(rng)
+    around = np.broadcast_to(middle, (len(u), len(v), *space.point_shape))
+    tangents = [space.random_tangent(rng, middle) for _ in range(2)]
+    first, second = (0.6 * v / space.norm(middle, v) for v in tangents)
+    extra = (1,) * len(space.point_shape)
+    x, y = (part.reshape(part.shape + extra) for part in np.meshgrid(u / np.ptp(u), v / np.ptp(v), indexing="ij"))
+    return space.project(space.exp(around, x * first + np.sin(2 * y) * second))
+
+
+def grid_on(name, points=None, axes=(U, V), **options):
+    return ss.GridSpline(axes, smooth_field(name) if points is None else points, name, **options)
+
+
+def image_of(figure, label="field"):
+    """The image of the picture with its pixels' coordinates, and values of shape (m, n)."""
+    axes = axes_named(figure, label)
+    (image,) = axes.images
+    left, right, low, high = image.get_extent()
+    shown = image.get_array().swapaxes(0, 1)
+    m, n = shown.shape[:2]
+    x, y = left + (right - left) * (np.arange(m) + 0.5) / m, low + (high - low) * (np.arange(n) + 0.5) / n
+    return x, y, shown
+
+
+def nodes_of(figure, label="nodes"):
+    (line,) = [line for axes in figure.axes for line in axes.lines if line.get_label() == label]
+    return line.get_xydata()
+
+
+@pytest.mark.parametrize("name", f"{SPACES} {OTHERS}".split())
+def test_every_space_is_drawn(name):
+    figure = rendered(grid_on(name).plot())
+    assert isinstance(figure, Figure)
+    assert f"C² grid on {ss.space(name)!r}" in texts_of(figure)
+    assert "7 × 5 nodes" in texts_of(figure)
+    if name in ("r:3", "se:3"):
+        return
+    dots = nodes_of(figure)
+    np.testing.assert_allclose(dots, np.stack(np.meshgrid(U, V, indexing="ij"), axis=-1).reshape(-1, 2))
+    assert (name in OTHERS.split()) == ("distance to the ringed node" in texts_of(figure))
+
+
+def test_numbers_and_distances_are_those_of_the_grid():
+    grid = grid_on("r:1")
+    x, y, shown = image_of(grid.plot())
+    np.testing.assert_allclose(shown, grid.grid(x, y)[..., 0], atol=1e-12)
+    assert len(x) > 200 and abs(len(y) - len(x) * np.ptp(V) / np.ptp(U)) < 1
+    grid = grid_on("gr:2,5")
+    figure = grid.plot()
+    x, y, shown = image_of(figure)
+    ((a, b),) = nodes_of(figure, "ringed node")
+    np.testing.assert_allclose((a, b), (U[3], V[2]))
+    np.testing.assert_allclose(shown, grid.space.distance(grid((a, b)), grid.grid(x, y)), atol=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("name", "turn"), [("sphere:1", 360), ("so:2", 360), ("u:1", 360), ("rp:1", 180), ("gr:1,2", 180)]
+)
+def test_angles(name, turn):
+    """Angles are those of the points, modulo their period; small ranges have colours of their own."""
+    for size in (1.0, 0.05):
+        angle = np.radians(turn) * (size * (0.12 * U[:, None] + 0.1 * V) + 0.45)
+        vectors = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+        points = {
+            "so:2": np.stack([vectors, vectors[..., ::-1] * [-1, 1]], axis=-1),
+            "u:1": np.exp(1j * angle)[..., None, None],
+            "gr:1,2": vectors[..., None],
+        }.get(name, vectors)
+        figure = rendered(grid_on(name, points).plot())
+        x, y, shown = image_of(figure)
+        flat = ss.GridSpline((U, V), np.degrees(angle)[..., None], "r:1").grid(x, y)[..., 0]
+        np.testing.assert_allclose((shown - flat + turn / 2) % turn, turn / 2, atol=1e-6)
+        low, high = axes_named(figure, "angle, degrees").get_ylim()
+        assert ((low, high) == (-turn / 2, turn / 2)) == (size == 1)
+
+
+def test_arrows_are_directions_over_the_polar_angle():
+    grid = grid_on("sphere:2")
+    figure = rendered(grid.plot())
+    x, y, shown = image_of(figure)
+    np.testing.assert_allclose(shown, np.degrees(np.arccos(grid.grid(x, y)[..., 2])), atol=1e-6)
+    (arrows,) = [each for each in axes_named(figure, "field").collections if isinstance(each, Quiver)]
+    assert len(arrows.U) == 35
+    np.testing.assert_allclose(np.stack([arrows.U, arrows.V], axis=-1), grid(arrows.XY)[:, :2], atol=1e-9)
+    # States have the Bloch vector, whose third component is the difference of the probabilities.
+    states = grid_on("cp:1")
+    x, y, shown = image_of(states.plot())
+    found = states.grid(x, y)
+    np.testing.assert_allclose(np.cos(np.radians(shown)), np.abs(found[..., 0]) ** 2 - np.abs(found[..., 1]) ** 2)
+
+
+def test_vectors_of_the_plane():
+    grid = grid_on("r:2")
+    figure = rendered(grid.plot())
+    x, y, shown = image_of(figure)
+    np.testing.assert_allclose(shown, np.linalg.norm(grid.grid(x, y), axis=-1))
+    (arrows,) = [each for each in axes_named(figure, "field").collections if isinstance(each, Quiver)]
+    np.testing.assert_allclose(np.stack([arrows.U, arrows.V], axis=-1), grid(arrows.XY), atol=1e-9)
+    # No arrow is longer than the distance of neighbours.
+    assert np.hypot(arrows.U, arrows.V).max() / arrows.scale <= 0.36
+
+
+@pytest.mark.parametrize("name", ["so:3", "sphere:3", "su:2"])
+def test_orientation_maps_show_the_axis_that_moves_most(name):
+    """The first axis moves least under turns about it, and the image of another one has the colour."""
+    turns = np.sin(U)[:, None, None] * V[:, None] * [1.3, 0.05, 0.02] + [0.1, 0.2, 0.3]
+    matrices = ss.rotations.from_rotation_vectors(turns)
+    quaternion = np.concatenate(
+        [
+            np.cos(np.linalg.norm(turns, axis=-1, keepdims=True) / 2),
+            turns * np.sinc(np.linalg.norm(turns, axis=-1, keepdims=True) / 2 / np.pi) / 2,
+        ],
+        axis=-1,
+    )
+    w, a, b, c = np.moveaxis(quaternion, -1, 0)
+    spins = np.stack([w - 1j * c, -1j * a - b, -1j * a + b, w + 1j * c], axis=-1).reshape(*w.shape, 2, 2)
+    figure = rendered(grid_on(name, {"so:3": matrices, "sphere:3": quaternion, "su:2": spins}[name]).plot())
+    x, y, shown = image_of(figure)
+    (caption,) = [text for text in texts_of(figure) if text.startswith("direction of the")]
+    number = ["first", "second", "third"].index(caption.split("\n")[1].split()[0])
+    assert number > 0
+    frames = ss.GridSpline((U, V), matrices, "so:3").grid(x, y)
+    np.testing.assert_allclose(shown[..., :3], fields.direction_colors(frames[..., number]), atol=0.02)
+    assert (shown[..., 3] == 1).all()
+
+
+def test_contours_are_misorientations():
+    grid = grid_on("so:3")
+    figure = rendered(grid.plot())
+    ((a, b),) = nodes_of(figure, "ringed node")
+    # Contours of one level are one artist in some versions of Matplotlib, and all levels one in others.
+    lines = [path.vertices for each in axes_named(figure, "field").collections for path in each.get_paths()]
+    found = np.concatenate([line for line in lines if len(line) > 2])
+    inside = (found >= [U[0], V[0]]).all(axis=1) & (found <= [U[-1], V[-1]]).all(axis=1)
+    first = ss.rotations.as_rotation_vectors(grid((a, b)).T @ grid(found[inside]))
+    angles = np.degrees(np.linalg.norm(first, axis=-1))
+    labels = {float(text[:-1]) for text in texts_of(figure) if text.endswith("°")}
+    assert len(labels) >= 2
+    np.testing.assert_allclose(np.abs(angles[:, None] - sorted(labels)).min(axis=1), 0, atol=0.15)
+
+
+def test_angles_between_rotations():
+    rng = np.random.default_rng(3)
+    first = ss.SpecialOrthogonal(3).random_point(rng)
+    axis = rng.standard_normal(3)
+    axis /= np.linalg.norm(axis)
+    angle = np.array([0, 1e-9, 0.3, 2.0, np.pi - 1e-9, np.pi])
+    others = first @ ss.rotations.from_rotation_vectors(angle[:, None] * axis)
+    np.testing.assert_allclose(fields.angles_between(first, others), angle, atol=1e-15, rtol=1e-7)
+
+
+def test_colors_of_directions():
+    x, y, z = np.eye(3)
+    colors = fields.direction_colors(np.stack([x, y, z, -x, -z]))
+    red, green, white, cyan, dark = colors
+    np.testing.assert_allclose(white, 1)
+    assert np.ptp(dark) < 0.2 and dark.max() < 0.25
+    assert red.argmax() == 0 and green.argmax() == 1 and cyan.argmin() == 0
+    rng = np.random.default_rng(5)
+    near = ss.Sphere(2).random_point(rng, (200,))
+    moved = ss.Sphere(2).exp(near, 1e-4 * ss.Sphere(2).random_tangent(rng, near))
+    assert np.abs(fields.direction_colors(near) - fields.direction_colors(moved)).max() < 5e-3
+    assert np.isnan(fields.direction_colors(np.array([[np.nan] * 3, [1, 0, 0]]))[0]).all()
+
+
+@pytest.mark.parametrize("n", [2, 3])
+def test_anisotropy(n):
+    values = np.array([2.0, 0.3, 0.1])[:n]
+    turn = ss.SpecialOrthogonal(n).random_point(np.random.default_rng(4))
+    spread = np.sqrt(np.sum((values - values.mean()) ** 2) / np.sum(values**2) * n / (n - 1))
+    np.testing.assert_allclose(fields.anisotropy(turn @ np.diag(values) @ turn.T), spread)
+    np.testing.assert_allclose(fields.anisotropy(5 * np.eye(n)), 0, atol=1e-12)
+    np.testing.assert_allclose(fields.anisotropy(np.diag([1.0] + [1e-12] * (n - 1))), 1)
+
+
+def test_colors_of_tensors():
+    """Red, green and blue for sticks along the axes, white for balls, and no jump where the longest axes change."""
+    for i in range(3):
+        stick = np.full(3, 1e-9)
+        stick[i] = 1
+        np.testing.assert_allclose(fields.tensor_colors(np.diag(stick)[None])[0], np.eye(3)[i], atol=1e-6)
+    np.testing.assert_allclose(fields.tensor_colors(np.eye(3)[None]), 1)
+    a, b = (fields.tensor_colors(np.diag([1 + e, 1 - e, 0.1])[None]) for e in (1e-6, -1e-6))
+    np.testing.assert_allclose(a, b, atol=1e-5)
+
+
+@pytest.mark.parametrize("name", ["spd:2", "spd:3"])
+def test_ellipses_are_those_of_the_tensors(name):
+    grid = grid_on(name)
+    figure = rendered(grid.plot())
+    (ellipses,) = [each for each in axes_named(figure, "field").collections if isinstance(each, PolyCollection)]
+    tensors = grid(np.asarray(ellipses.get_offsets()))[:, :2, :2]
+    rings = np.array([path.vertices[:97] for path in ellipses.get_paths()])
+    solved = np.linalg.solve(tensors, rings.swapaxes(1, 2))
+    np.testing.assert_allclose(np.sum(rings.swapaxes(1, 2) * solved, axis=1), 1, atol=1e-9)
+    x, y, shown = image_of(figure)
+    if name == "spd:2":
+        np.testing.assert_allclose(shown, fields.anisotropy(grid.grid(x, y)))
+    else:
+        expected = fields.tensor_colors(grid.grid(x, y).reshape(-1, 3, 3)).reshape(len(x), len(y), 3)
+        np.testing.assert_allclose(shown[..., :3], expected, atol=0.01)
+
+
+@pytest.mark.parametrize("name", ["r:1", "sphere:1", "sphere:2", "so:3", "spd:3", "se:3", "gr:2,5"])
+def test_missing_nodes_are_blank(name):
+    u = np.linspace(0, 1, 12)
+    points = np.array(smooth_field(name, u, u))
+    points[:4, 6:] = np.nan
+    points[8, 3] = np.nan
+    grid = grid_on(name, points, (u, u))
+    figure = rendered(grid.plot())
+    assert "12 × 12 nodes, 25 missing" in texts_of(figure)
+    if name in ("r:3", "se:3"):
+        return
+    assert len(nodes_of(figure)) == 144 - 25
+    x, y, shown = image_of(figure)
+    values = grid.grid(x, y)
+    present = np.isfinite(values).all(axis=tuple(range(2, values.ndim)))
+    assert 0.5 < present.mean() < 0.9
+    drawn = shown[..., 3] == 1 if shown.ndim > 2 else ~np.ma.getmaskarray(shown)
+    np.testing.assert_array_equal(drawn, present)
+
+
+def test_dense_nodes_have_no_dots_and_irregular_ones_regular_symbols():
+    u = np.linspace(0, 1, 101)
+    figure = rendered(ss.GridSpline((u, u), smooth_field("sphere:2", u, u), "sphere:2").plot())
+    assert not [line for line in axes_named(figure, "field").lines if line.get_label() == "nodes"]
+    (arrows,) = [each for each in axes_named(figure, "field").collections if isinstance(each, Quiver)]
+    assert 100 < len(arrows.U) < 300
+
+
+def test_products_have_a_panel_per_factor():
+    points = smooth_field("so:3"), smooth_field("r:3"), smooth_field("r:1")
+    grid = ss.GridSpline((U, V), points, "so:3 x r:3 x r:1")
+    figure = rendered(grid.plot())
+    for factor in grid.space.factors:
+        assert repr(factor) in texts_of(figure)
+    maps = [axes for axes in figure.axes if axes.get_label() == "field"]
+    assert len(maps) == 2
+    (image,) = maps[1].images
+    assert image.get_array().min() >= points[2].min() - 0.1
+    seven = ss.GridSpline((U, V), (smooth_field("r:1"),) * 7, " x ".join(["r:1"] * 7))
+    figure = rendered(seven.plot())
+    assert "7 × 5 nodes, 6 of 7 factors" in texts_of(figure)
+    assert len([axes for axes in figure.axes if axes.get_label() == "field"]) == 6
+
+
+def test_positions_are_a_surface_with_their_nodes():
+    points = smooth_field("r:3")
+    points[2, 2] = np.nan
+    figure = rendered(grid_on("r:3", points).plot())
+    (axes,) = figure.axes
+    (dots,) = [line for line in axes.lines if line.get_label() == "nodes"]
+    np.testing.assert_allclose(np.stack(dots.get_data_3d(), axis=-1), np.delete(points.reshape(-1, 3), 12, axis=0))
+
+
+def test_frames_stand_on_the_surface_of_poses():
+    grid = grid_on("se:3")
+    figure = rendered(grid.plot())
+    (axes,) = figure.axes
+    sticks = [np.stack(line.get_data_3d(), axis=-1) for line in axes.lines if line.get_linewidth() == 1.2]
+    assert len(sticks) == 3
+    frames = np.stack([line.reshape(-1, 3, 3)[:, 1] - line.reshape(-1, 3, 3)[:, 0] for line in sticks], axis=-1)
+    length = np.linalg.norm(frames[0, :, 0])
+    # The frame of the first node, and of the last one.
+    for k, pose in ((0, grid.points[0, 0]), (-1, grid.points[-1, -1])):
+        np.testing.assert_allclose(frames[k] / length, pose[:3, :3], atol=1e-9)
+        np.testing.assert_allclose(sticks[0].reshape(-1, 3, 3)[k, 0], pose[:3, 3], atol=1e-12)
+
+
+def test_further_axes_are_fixed_at_their_middle_nodes():
+    w, days = np.array([0.0, 0.123456, 1.0]), np.datetime64("2024-02-27") + np.array([0, 1, 3, 4])
+    x, y, z, s = np.meshgrid(U, V, w, np.arange(4.0), indexing="ij")
+    grid = ss.GridSpline((U, V, w, days), (x * y + z + s**2)[..., None], "r:1")
+    figure = rendered(grid.plot())
+    assert "axis 2 at 0.1235, axis 3 at 2024-03-01, 7 × 5 × 3 × 4 nodes" in texts_of(figure)
+    x, y, shown = image_of(figure)
+    np.testing.assert_allclose(shown, grid.grid(x, y, w[1], days[2])[..., 0])
+    points = np.array(grid.points)
+    points[:, :, 1] = np.nan
+    raises("all nodes of the section are missing", ss.GridSpline((U, V, w, days), points, "r:1").plot)
+
+
+@pytest.mark.parametrize("unit, step", [("D", 1), ("h", 7), ("ms", 40)])
+def test_dates_on_either_axis(unit, step):
+    days = np.datetime64("2024-02-27", unit) + step * np.array([0, 1, 2, 4, 5]).astype(f"timedelta64[{unit}]")
+    for flipped in (False, True):
+        points = smooth_field("r:1")
+        axes = (days, U) if flipped else (U, days)
+        grid = ss.GridSpline(axes, points.swapaxes(0, 1) if flipped else points, "r:1")
+        figure = rendered(grid.plot())
+        dots = nodes_of(figure)[:, 0 if flipped else 1]
+        np.testing.assert_allclose(np.unique(dots), date2num(days), rtol=0, atol=2e-11)
+        x, y, shown = image_of(figure)
+        at = [np.datetime64(num2date(number).replace(tzinfo=None), "us") for number in (x, y)[not flipped]]
+        coordinates = (at, y) if flipped else (x, at)
+        np.testing.assert_allclose(shown, grid.grid(*map(np.asarray, coordinates))[..., 0], atol=2e-4)
+
+
+def test_times_that_dates_cannot_show():
+    nanoseconds = np.datetime64("2024-01-01", "ns") + np.arange(5) * np.timedelta64(100, "ns")
+    figure = rendered(ss.GridSpline((U, nanoseconds), smooth_field("r:1"), "r:1").plot())
+    assert "axis 1, seconds since 2024-01-01T00:00:00.000000000" in texts_of(figure)
+    np.testing.assert_allclose(np.unique(nodes_of(figure)[:, 1]), 1e-7 * np.arange(5), atol=1e-15)
+    integers = 2**60 + 1000 * np.arange(5)
+    figure = rendered(ss.GridSpline((U, integers), smooth_field("r:1"), "r:1").plot())
+    np.testing.assert_allclose(np.unique(nodes_of(figure)[:, 1]), integers.astype(float))
+
+
+def test_one_axis_gives_the_figure_of_the_curve():
+    points = smooth_field("sphere:2")[:, 2]
+    figure = rendered(ss.GridSpline((U,), points, "sphere:2").plot())
+    assert "C² spline on Sphere(2)" in texts_of(figure) and "7 points, not-a-knot ends" in texts_of(figure)
+    assert axes_named(figure, "speed")
+    points[3] = np.nan
+    raises("the only axis of the grid has missing nodes", ss.GridSpline((U,), points, "sphere:2").plot)
+
+
+def test_scales_are_equal_unless_one_axis_is_much_longer():
+    for v, equal in ((V, True), (1000 * V, False)):
+        figure = grid_on("r:1", axes=(U, v)).plot()
+        axes = axes_named(figure, "field")
+        box = axes.get_window_extent()
+        ratio = (box.height / np.ptp(axes.get_ylim())) / (box.width / np.ptp(axes.get_xlim()))
+        assert (abs(ratio - 1) < 0.02) == equal
+
+
+def test_large_points_have_fewer_pixels():
+    u = np.linspace(0, 1, 5)
+    figure = rendered(ss.GridSpline((u, u), smooth_field("gr:3,200", u, u), "gr:3,200").plot())
+    x, y, _ = image_of(figure)
+    assert 60 < len(x) == len(y) < 100
+
+
+def test_failed_rows_are_blank():
+    """The picture has no values that depend on a row that meets a cut locus."""
+    u = np.arange(6.0)
+    points = np.broadcast_to([0.0, 0.0, 1.0], (6, 6, 3)).copy()
+    points[3, 2] = [0, 0, -1]
+    grid = ss.GridSpline((u, u), points, "sphere:2", on_failure="ignore")
+    figure = rendered(grid.plot())
+    assert any("not converged" in text for text in texts_of(figure))
+    _, _, shown = image_of(figure)
+    assert 0.1 < np.ma.getmaskarray(shown).mean() < 0.9
+
+
+def test_the_figure_is_saved(tmp_path):
+    grid = grid_on("r:1")
+    path, file = tmp_path / "grid.pdf", BytesIO()
+    assert isinstance(grid.plot(path), Figure) and path.read_bytes().startswith(b"%PDF")
+    grid.plot(file)
+    assert file.getvalue().startswith(b"\x89PNG")
+
+
+def test_without_matplotlib(monkeypatch):
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    with pytest.raises(ImportError, match=r"^plots need matplotlib.*pip install 'symspline\[plot\]'$"):
+        grid_on("r:1").plot()
