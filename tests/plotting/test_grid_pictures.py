@@ -162,7 +162,7 @@ def test_contours_are_misorientations():
     angles = np.degrees(np.linalg.norm(first, axis=-1))
     labels = {float(text[:-1]) for text in texts_of(figure) if text.endswith("°")}
     assert len(labels) >= 2
-    np.testing.assert_allclose(np.abs(angles[:, None] - sorted(labels)).min(axis=1), 0, atol=0.15)
+    np.testing.assert_allclose(np.abs(angles[:, None] - sorted(labels)).min(axis=1), 0, atol=0.05)
 
 
 def test_angles_between_rotations():
