@@ -134,8 +134,9 @@ def _key(panel: SubFigure, axes: Axes, caption: str) -> Axes:
 
 def _contours(axes: Axes, field: Field, values: Array, unit: str) -> None:
     """Draw labelled contour lines of distances to the node in the middle, and a ring around this node."""
-    look: Any = {"color": "none", "markeredgecolor": INK, "markeredgewidth": 1.4, "clip_on": False}
-    axes.plot(*field.ring, "o", markersize=9, zorder=5, label="ringed node", path_effects=HALO, **look)
+    look: Any = {"color": "none", "markersize": 9, "clip_on": False, "zorder": 5}
+    axes.plot(*field.ring, "o", markeredgecolor="white", markeredgewidth=3, **look)
+    axes.plot(*field.ring, "o", markeredgecolor=INK, markeredgewidth=1.4, label="ringed node", **look)
     if not np.isfinite(values).any() or np.nanmax(values) <= 0:
         return
     levels = MaxNLocator(7, steps=[1, 2, 5, 10]).tick_values(0, float(np.nanmax(values)))[1:-1]

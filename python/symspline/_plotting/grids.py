@@ -17,6 +17,9 @@ from .surfaces import draw_surface
 
 _HEAD, _LEFT, _BOTTOM, _TOP, _NAMED = 0.95, 0.85, 0.6, 0.1, 0.4
 """Heights and margins in inches. Panels with a name have a larger margin at the top."""
+_SURFACES = {"euclidean:3", "se:3"}
+_HIGH = 4.4
+"""Smallest height of panels with surfaces in inches."""
 _SIDE = 4.4
 """Longer side of an image in inches."""
 _PIXELS, _NUMBERS = 240, 4e6
@@ -96,6 +99,8 @@ def plot_grid(grid: Any, file: Any = None) -> Figure:
     rows = -(-len(factors) // columns)
     top = _NAMED if len(factors) > 1 else _TOP
     width, height = sides[0].inches + _LEFT + RIGHT, sides[1].inches + _BOTTOM + top
+    if any(str(factor.space) in _SURFACES for factor in factors):
+        height = max(height, _HIGH)
     figure = CurveFigure(figsize=(columns * width, _HEAD + rows * height), dpi=DPI, facecolor="white")
     layout = figure.add_gridspec(1 + rows, columns, height_ratios=[_HEAD] + [height] * rows)
     title, most = f"C² grid on {grid.space!r}", int(6 * columns * width)
@@ -105,7 +110,7 @@ def plot_grid(grid: Any, file: Any = None) -> Figure:
     for i, factor in enumerate(factors):
         panel = figure.add_subfigure(layout[1 + i // columns, i % columns])
         nodes = factor.points[(slice(None), slice(None), *middles)]
-        _draw_factor(panel, grid, factor, nodes, sides, fixed, top)
+        _draw_factor(panel, grid, factor, nodes, sides, fixed, (height - sides[1].inches - top, top))
         if len(factors) > 1:
             panel.text(_LEFT / width, 1 - 0.28 / height, repr(factor.space), color=INK, fontsize=12)
     if file is not None:
@@ -124,9 +129,15 @@ def _sides(axes: Any) -> list[Side]:
 
 
 def _draw_factor(
-    panel: SubFigure, grid: Any, factor: Any, nodes: Any, sides: list[Side], fixed: list[Array], top: float
+    panel: SubFigure,
+    grid: Any,
+    factor: Any,
+    nodes: Any,
+    sides: list[Side],
+    fixed: list[Array],
+    margins: tuple[float, float],
 ) -> None:
-    """Draw one factor over the first two axes, with a dot per node."""
+    """Draw one factor over the first two axes, with a dot per node. The margins are those at the bottom and top."""
     space = factor.space
     valid = space._where_finite(nodes)
     if not valid.any():
@@ -149,10 +160,10 @@ def _draw_factor(
         extent=(left, right, low, high),
         gap=min(side.inches * np.diff(x).min() / np.ptp(x) for side, x in zip(sides, symbols, strict=True)),
     )
-    if str(space) in ("euclidean:3", "se:3"):
+    if str(space) in _SURFACES:
         draw_surface(panel, field, nodes)
         return
-    axes = panel.add_axes(inside(panel, _LEFT, _BOTTOM, RIGHT, top), label="field")
+    axes = panel.add_axes(inside(panel, _LEFT, margins[0], RIGHT, margins[1]), label="field")
     plain(axes)
     axes.grid(visible=False)
     draw_field(panel, axes, field)

@@ -26,7 +26,7 @@ def draw_surface(panel: SubFigure, field: Field, nodes: Any) -> None:
     dots = _positions(nodes).reshape(-1, 3)
     dots = dots[np.isfinite(dots[:, 0])]
     axes = box(panel, [], [np.concatenate([positions[known], dots])], below=0.4)
-    look: Any = {"rstride": 1, "cstride": 1, "linewidth": 0, "color": _FACE, "alpha": 0.75, "antialiased": False}
+    look: Any = {"rstride": 1, "cstride": 1, "linewidth": 0, "color": _FACE, "antialiased": False}
     axes.plot_surface(*np.moveaxis(positions, -1, 0), **look)
     symbols = _positions(field.symbols)
     for lines in (symbols, symbols.swapaxes(0, 1)):
