@@ -8,8 +8,8 @@ The pose of a tool was measured at seven angles of one joint and five of another
 # %%
 # The naive way
 # -------------
-# Interpolate the nine numbers of each rotation matrix with SciPy. Between the nodes the results are not rotations: their
-# columns are too short, and a box that the tool holds shrinks.
+# Interpolate the nine numbers of each rotation matrix with SciPy. Between the nodes the results are not rotations:
+# their columns are too short, and a box that the tool holds shrinks.
 
 import matplotlib.pyplot as plt
 import numpy as np

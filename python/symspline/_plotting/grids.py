@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
 from .._core import ValidationError
+from .._spaces import factors_of
 from .fields import RIGHT, Field, draw_field
 from .figure import FACTORS, CurveFigure, save
 from .style import DATES, DPI, INK, Array, heading, inside, plain
@@ -107,12 +108,12 @@ def plot_grid(grid: Any, file: Any = None) -> Figure:
     if len(title) > most:
         title = shorten(f"C² grid on {grid.space}", most, placeholder=" …")
     heading(figure, title, _description(grid, middles), 1 - 0.5 / (_HEAD + rows * height))
-    for i, factor in enumerate(factors):
+    for i, (factor, named) in enumerate(zip(factors, factors_of(grid.space), strict=False)):
         panel = figure.add_subfigure(layout[1 + i // columns, i % columns])
         nodes = factor.points[(slice(None), slice(None), *middles)]
         _draw_factor(panel, grid, factor, nodes, sides, fixed, (height - sides[1].inches - top, top))
         if len(factors) > 1:
-            panel.text(_LEFT / width, 1 - 0.28 / height, repr(factor.space), color=INK, fontsize=12)
+            panel.text(_LEFT / width, 1 - 0.28 / height, repr(named), color=INK, fontsize=12)
     if file is not None:
         save(figure, file)
     return figure
