@@ -4,16 +4,22 @@ import re
 from pathlib import Path
 from typing import Any
 
-HERE = Path(__file__).parent
+from matplotlib.figure import Figure
+
+PAGE = Path(__file__).parent / "guide" / "grids.md"
+
+
+def first_figure() -> Figure:
+    """Run the first block of code of the page, and return the figure that it makes."""
+    found = re.search(r"^```python\n(.*?)^```$", PAGE.read_text(encoding="utf-8"), re.M | re.S)
+    names: dict[str, Any] = {}
+    exec(compile(found[1] if found else "", PAGE.name, "exec"), names)
+    figure: Figure = names["figure"]
+    return figure
 
 
 def main() -> None:
-    """Run the first block of code of the page, and save the figure that it makes."""
-    page = HERE / "guide" / "grids.md"
-    found = re.search(r"^```python\n(.*?)^```$", page.read_text(encoding="utf-8"), re.M | re.S)
-    names: dict[str, Any] = {}
-    exec(compile(found[1] if found else "", page.name, "exec"), names)
-    names["figure"].savefig(page.with_suffix(".png"), dpi=85)
+    first_figure().savefig(PAGE.with_suffix(".png"), dpi=85)
 
 
 if __name__ == "__main__":

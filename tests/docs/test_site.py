@@ -8,6 +8,7 @@ from pathlib import Path
 
 import derivatives_figure
 import estimation
+import grids_figure
 import links
 import manifolds
 import many_curves
@@ -128,6 +129,10 @@ def test_the_figure_of_derivatives_can_be_made(tmp_path, monkeypatch):
     monkeypatch.setattr(derivatives_figure, "__file__", str(tmp_path / "figure.py"))
     derivatives_figure.main()
     assert (tmp_path / "derivatives.png").stat().st_size > 10_000
+
+
+def test_the_figure_of_grids_can_be_made():
+    assert len(grids_figure.first_figure().axes) == 3
 
 
 def test_links_to_files_lead_somewhere():

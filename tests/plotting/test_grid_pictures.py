@@ -247,6 +247,16 @@ def test_missing_nodes_are_blank(name):
     np.testing.assert_array_equal(drawn, present)
 
 
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("name", ["r:1", "r:2", "r:3", "sphere:1", "sphere:2", "so:3", "spd:3", "gr:2,5", "se:3"])
+def test_fields_without_extent(name):
+    """All points are equal, or there is one node only, which has no values around it."""
+    points = np.broadcast_to(smooth_field(name)[3, 2], smooth_field(name).shape).copy()
+    rendered(grid_on(name, points).plot())
+    points[:3] = points[4:] = points[:, :2] = points[:, 3:] = np.nan
+    rendered(grid_on(name, points).plot())
+
+
 def test_dense_nodes_have_no_dots_and_irregular_ones_regular_symbols():
     u = np.linspace(0, 1, 101)
     figure = rendered(ss.GridSpline((u, u), smooth_field("sphere:2", u, u), "sphere:2").plot())

@@ -219,7 +219,8 @@ def _draw_orientations(matrices: Callable[[Any], Array], panel: SubFigure, axes:
     Contour lines of the misorientation to the node that has a ring show the rest of the rotation.
     """
     frames = field.at_pixels(matrices)
-    seen = frames[np.isfinite(frames[..., 0, 0])]
+    middle = matrices(field.reference[None])
+    seen = np.concatenate([frames[np.isfinite(frames[..., 0, 0])], middle])
     number = int(np.linalg.norm(seen.mean(axis=0), axis=0).argmin())
     _show(axes, field, direction_colors(frames[..., number]))
     words = ("first", "second", "third")[number]
@@ -235,7 +236,7 @@ def _draw_orientations(matrices: Callable[[Any], Array], panel: SubFigure, axes:
         key.text(at[0], at[1], name, color=INK, fontsize=9, ha="center", va="center", path_effects=HALO)
     words = "rim: −x₃\n\nlines: misorien-\ntation to the\nringed node"
     key.text(0, -1.15, words, color=INK, fontsize=9, ha="center", va="top")
-    _contours(axes, field, np.degrees(angles_between(matrices(field.reference[None])[0], frames)), "°")
+    _contours(axes, field, np.degrees(angles_between(middle[0], frames)), "°")
 
 
 def direction_colors(vectors: Array) -> Array:

@@ -31,7 +31,7 @@ def draw_surface(panel: SubFigure, field: Field, nodes: Any) -> None:
     symbols = _positions(field.symbols)
     for lines in (symbols, symbols.swapaxes(0, 1)):
         broken = np.concatenate([lines, np.full_like(lines[:, :1], np.nan)], axis=1)
-        axes.plot(*broken.reshape(-1, 3).T, color=INK, linewidth=0.5, alpha=0.45)
+        axes.plot(*broken.reshape(-1, 3).T, color=INK, linewidth=0.5, alpha=0.45, zorder=4)
     axes.plot(*dots.T, "o", color=INK, markersize=2.2, label="nodes", zorder=5)
     _name_axes(axes, symbols)
     if field.pixels.ndim > 3:
