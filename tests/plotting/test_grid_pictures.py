@@ -265,6 +265,15 @@ def test_dense_nodes_have_no_dots_and_irregular_ones_regular_symbols():
     assert 100 < len(arrows.U) < 300
 
 
+def test_smoothing_grids_show_their_nodes():
+    noisy = smooth_field("r:1") + 0.1 * np.random.default_rng(8).standard_normal((7, 5, 1))
+    grid = ss.make_smoothing_grid((U, V), noisy, "r:1", lam=0.1)
+    figure = rendered(grid.plot())
+    assert "Smoothing grid on Euclidean(1)" in texts_of(figure)
+    x, y, shown = image_of(figure)
+    np.testing.assert_allclose(shown, grid.grid(x, y)[..., 0], atol=1e-12)
+
+
 def test_products_have_a_panel_per_factor():
     points = smooth_field("so:3"), smooth_field("r:3"), smooth_field("r:1")
     grid = ss.GridSpline((U, V), points, "so:3 x r:3 x r:1")

@@ -107,6 +107,7 @@ class GridSpline(Generic[P]):
     """
 
     _format: ClassVar[str] = "symspline-grid"
+    _kind: ClassVar[str] = "C² grid"
     _axes: list[GridAxis]
     _factors: list[FactorGrid]
     _symmetric: bool

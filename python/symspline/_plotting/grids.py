@@ -104,9 +104,9 @@ def plot_grid(grid: Any, file: Any = None) -> Figure:
         height = max(height, _HIGH)
     figure = CurveFigure(figsize=(columns * width, _HEAD + rows * height), dpi=DPI, facecolor="white")
     layout = figure.add_gridspec(1 + rows, columns, height_ratios=[_HEAD] + [height] * rows)
-    title, most = f"C² grid on {grid.space!r}", int(6 * columns * width)
+    title, most = f"{grid._kind} on {grid.space!r}", int(6 * columns * width)
     if len(title) > most:
-        title = shorten(f"C² grid on {grid.space}", most, placeholder=" …")
+        title = shorten(f"{grid._kind} on {grid.space}", most, placeholder=" …")
     heading(figure, title, _description(grid, middles), 1 - 0.5 / (_HEAD + rows * height))
     for i, (factor, named) in enumerate(zip(factors, factors_of(grid.space), strict=False)):
         panel = figure.add_subfigure(layout[1 + i // columns, i % columns])

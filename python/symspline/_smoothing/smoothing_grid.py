@@ -40,6 +40,7 @@ class SmoothingGrid(GridSpline[P], Generic[P]):
     """
 
     _format = "symspline-smoothing-grid"
+    _kind = "Smoothing grid"
     _data: list[Array]
     _weights: Doubles
     _smoothed: list[SmoothedPart]
