@@ -24,7 +24,8 @@ SAYS = {
     "storms_from_a_table": "37 storms, 946 fixes, 5900 hours; fastest: Martin 2022",
     "noisy_gps": r"1\d degrees of freedom; half way known to 4\.\d m",
     "crystal_orientations": r"median error: \d\d\.\d degrees without the symmetry, 0\.\d\d with it\n"
-    r"measured map: 0\.7\d degrees .*\nsmooth map: 0\.1\d degrees .*\nsteps between rows that jump: \d{4} as measured, 0 with",
+    r"measured map: 0\.7\d degrees .*\nsmooth map: 0\.1\d degrees .*\n"
+    r"steps between rows that jump: \d{4} as measured, 0 with",
     "poses_over_joints": r"Linear .* 58 % of its volume\.\nLargest error of the position: 5 mm\n"
     r"matrices, projected: largest error 7\.\d°\nquaternions: largest error 1\d\d\.\d°\nGridSpline: .* 0\.6°",
     "noisy_attitude": r"noise 1\.0\d degrees found; the curve is off by 0\.[45]\d degrees",
