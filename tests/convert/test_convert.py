@@ -189,8 +189,9 @@ SINGLE = [
     (convert.matrix_to_quaternion, np.eye(3), {"scalar_first": True}),
     (convert.quaternion_to_matrix, [1.0, 0.0, 0.0, 0.0], {"scalar_first": True}),
 ]
-# Those of totally geodesic parts have tests of their own, in tests/spaces.
+# Those of totally geodesic parts and of orix have tests of their own, in tests/spaces.
 PARTS = {
+    "matrix_to_orix",
     *("siegel_to_positive_definite", "positive_definite_to_siegel"),
     *("quaternions_to_subspace", "subspace_to_quaternions"),
 }

@@ -1,7 +1,7 @@
 """Grids: any nodes, masks and coordinates give values that are missing exactly where nodes are, or an error."""
 
 import numpy as np
-from grids.fields import Field
+from grids.grid_fields import Field
 from hypothesis import given, note
 from hypothesis import strategies as st
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from cases import REPRESENTATIVE, SINGLE
-from grids.fields import Field, factors_of, inside, knots
+from grids.grid_fields import Field, factors_of, inside, knots
 from scipy.interpolate import RectBivariateSpline
 
 import symspline as ss

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from grids.fields import Field, knots
+from grids.grid_fields import Field, knots
 
 import symspline as ss
 from symspline._grid.axes import Sites

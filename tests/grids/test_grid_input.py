@@ -5,7 +5,7 @@ import pickle
 
 import numpy as np
 import pytest
-from grids.fields import Field, inside, knots
+from grids.grid_fields import Field, inside, knots
 
 import symspline as ss
 

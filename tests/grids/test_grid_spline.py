@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from cases import REPRESENTATIVE, SINGLE, SPACES
-from grids.fields import Field, apart, inside, knots
+from grids.grid_fields import Field, apart, inside, knots
 from scipy.interpolate import RectBivariateSpline, make_interp_spline
 
 import symspline as ss

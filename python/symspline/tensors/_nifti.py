@@ -97,7 +97,7 @@ def read_nifti(file: File, *, order: TensorOrder | None = None, mask: ArrayLike 
     ...     tensors.read_nifti(f"{folder}/dti.nii.gz", order="fsl").mask.shape
     (1, 1, 1)
     """
-    path = _path(file)
+    path = checked_path(file)
     image, numbers = _load(path)
     if _is_symmatrix(image.header):
         if order not in (None, "dipy", "itk"):
@@ -166,7 +166,7 @@ def write_nifti(file: File, volume: Volume, *, order: TensorOrder, like: Any = N
     (1, 3, 3)
     """
     nibabel = _nibabel()
-    path = _path(file)
+    path = checked_path(file)
     if not path.name.endswith((".nii", ".nii.gz")):
         raise ValidationError(f"file = {short_repr(str(path))}: the name of a NIfTI file must end in .nii or .nii.gz")
     mask = check_volume(volume)
@@ -204,7 +204,7 @@ def check_volume(volume: Volume) -> NDArray[np.bool_]:
 
 def image_of(like: Any) -> Any:
     """Return a NIfTI image that is given as such or by the name of its file."""
-    image = _image(_path(like, "like")) if isinstance(like, (str, PathLike)) else like
+    image = _image(checked_path(like, "like")) if isinstance(like, (str, PathLike)) else like
     if not isinstance(image, _nibabel().Nifti1Pair):
         raise TypeError(f"like must be a path, a NIfTI image of nibabel or a Volume, not {short_repr(like)}")
     return image
@@ -236,7 +236,7 @@ def _keep_maps(image: Any, header: Any) -> None:
             image.header[name] = 0
 
 
-def _path(file: Any, name: str = "file") -> Path:
+def checked_path(file: Any, name: str = "file") -> Path:
     path = path_of(file, name, method="read")
     if path is None:
         raise TypeError(f"{name} must be the name of a file, because nibabel does not accept open files")
@@ -263,7 +263,7 @@ def _mask(mask: Any, numbers: Array, affine: NDArray[np.float64]) -> NDArray[np.
     if mask is None:
         return np.asarray(np.isfinite(numbers).all(axis=-1) & numbers.any(axis=-1))
     if isinstance(mask, (str, PathLike)):
-        image, voxels = _load(_path(mask, "mask"))
+        image, voxels = _load(checked_path(mask, "mask"))
         # Headers hold single precision.
         if not np.allclose(image.affine, affine, rtol=1e-4, atol=1e-4):
             raise ValidationError(

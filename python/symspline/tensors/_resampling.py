@@ -14,7 +14,7 @@ from .._arrays import as_array, short_repr
 from .._core import ValidationError
 from .._grid import GridSpline
 from .._typing import Progress, TensorOrder, VoxelOptions
-from ._nifti import File, Volume, check_volume, image_of, read_nifti, write_nifti, written_order
+from ._nifti import File, Volume, check_volume, checked_path, image_of, read_nifti, write_nifti, written_order
 from ._orders import Array
 
 Floats = NDArray[np.float64]
@@ -158,8 +158,9 @@ def resample_nifti(
     ...     tensors.read_nifti(f"{folder}/fine.nii.gz", order="fsl").mask.shape
     (3, 3, 3)
     """
-    volume = read_nifti(src, order=order, mask=mask)
-    write_nifti(dst, resample(volume, **options), order=written_order(volume, order))
+    source, target = checked_path(src, "src"), checked_path(dst, "dst")
+    volume = read_nifti(source, order=order, mask=mask)
+    write_nifti(target, resample(volume, **options), order=written_order(volume, order))
 
 
 def _blocks(
