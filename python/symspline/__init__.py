@@ -27,6 +27,7 @@ from ._estimation import estimate  # noqa: E402
 from ._exceptions import SymsplineError  # noqa: E402
 from ._files import load, save  # noqa: E402
 from ._functional import evaluate, fit, fit_many  # noqa: E402
+from ._geodesics import PiecewiseGeodesic  # noqa: E402
 from ._grid import GridReport, GridSpline  # noqa: E402
 from ._hermite import HermiteSpline  # noqa: E402
 from ._report import ConvergenceWarning, FarPointsWarning, Report  # noqa: E402
@@ -109,6 +110,7 @@ __all__ = [
     "Lorentz",
     "Manifold",
     "Orthogonal",
+    "PiecewiseGeodesic",
     "Product",
     "QuaternionicProjective",
     "Quotient",

@@ -19,8 +19,8 @@ from ._typing import File, Number, P, Time
 class Curve(ABC, Generic[P]):
     """A curve on a space, or a batch of curves.
 
-    This is the base class of `CubicSpline`, `HermiteSpline`, `SmoothingSpline`, `BSpline` and `BezierCurve`. Call a
-    curve to evaluate it or its derivatives. A batch is a sequence of curves.
+    This is the base class of `CubicSpline`, `HermiteSpline`, `PiecewiseGeodesic`, `SmoothingSpline`, `BSpline` and
+    `BezierCurve`. Call a curve to evaluate it or its derivatives. A batch is a sequence of curves.
 
     Examples
     --------

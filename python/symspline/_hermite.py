@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any, Self
+from typing import Any, Literal, Self
 
 from numpy.typing import ArrayLike
 
 from ._archive import Entries, check_curves, read_segments
 from ._base_curve import SegmentedCurve
-from ._core import ValidationError
 from ._curves.curve import CurveArrays
-from ._curves.fit import curve_of, hermite_data, read
+from ._curves.fit import Points, curve_of, hermite_data, read, read_ends, validated
+from ._curves.slopes import check_method, local_velocities
 from ._functional import read_velocities
 from ._options import checked_extrapolate, with_atol
 from ._representatives import warn_of_representatives
-from ._spaces import Array, Space, space_named
+from ._spaces import POINT_TOL, Array, Doubles, Space, factors_of, space_named
 from ._time import TimeAxis, knots_of
 from ._typing import Extrapolate, P, PointsLike, TimesLike
 
@@ -108,13 +108,117 @@ class HermiteSpline(SegmentedCurve[P]):
         batch, nodes = data[0].batch, data[0].nodes
         vectors = read_velocities(velocities, space, data)
         time_axis, shown_times, times = knots_of(t, batch, nodes)
-        try:
-            found = hermite_data(space, times, data, vectors)
-        except ValidationError as error:
-            raise time_axis.explain(error) from None
-        curve = curve_of(space, times, [own[:2] for own in found], fitted=False)
+        with time_axis.explained():
+            curve = _hermite(space, times, data, vectors)
         self._fill(time_axis, shown_times, curve, "natural", extrapolate)
-        warn_of_representatives(space, [data], [curve], [[own[2] for own in found]])
+
+    @classmethod
+    def from_points(
+        cls,
+        t: TimesLike | None,
+        points: PointsLike,
+        space: Space[P] | str,
+        *,
+        method: Literal["catmull-rom", "akima", "pchip"] = "catmull-rom",
+        extrapolate: Extrapolate = None,
+        atol: float | None = None,
+    ) -> HermiteSpline[P]:
+        r"""Interpolate points by a C¹ curve that depends on neighbouring points only.
+
+        The velocity at each point is computed from the geodesics to its neighbours. No equations are solved, a change
+        of one point changes the curve in at most six segments, and there is no C² condition.
+
+        Parameters
+        ----------
+        t : array_like of float or datetime64, shape (n,) or (..., n), or None
+            Strictly increasing knots. None means 0, 1, ..., n - 1.
+        points : array_like, shape (..., n, *space.point_shape)
+            Points to interpolate, at least two per curve. Leading axes are batch axes. For a `Product`, pass a tuple
+            with one array per factor.
+        space : Space or str
+            A space or its name, such as ``Sphere(2)`` or ``"sphere:2"``.
+        method : {"catmull-rom", "akima", "pchip"}, default "catmull-rom"
+            Formula for the velocities.
+
+            - ``"catmull-rom"``: the velocity of the parabola through the point and its two neighbours. It is the
+              Catmull–Rom spline for knots at any distances.
+            - ``"akima"``: Akima's weighted mean of the velocities of the two adjacent geodesics. Weights depend on four
+              segments. The curve does not overshoot next to straight parts.
+            - ``"pchip"``: the weighted harmonic mean of both velocities, zero where the curve turns back. In flat
+              space, every component is monotone where its data are.
+        extrapolate : {None, "raise", True, False, "geodesic", "periodic"}, default None
+            Extrapolation policy, as for `HermiteSpline`.
+        atol : float, optional
+            Largest distance of a point from the manifold. By default 1e-8, or 1e-4 for points in single precision.
+
+        Returns
+        -------
+        HermiteSpline
+            The curve. With two points it is a geodesic.
+
+        Raises
+        ------
+        ValidationError
+            If the input does not meet the requirements above.
+        CutLocusError
+            If two neighbouring points or control points are not joined by a unique shortest geodesic.
+
+        See Also
+        --------
+        CubicSpline : Interpolate points by a C² curve.
+        PiecewiseGeodesic : Join points by geodesics.
+
+        Notes
+        -----
+        Let :math:`m_i = \log_{p_i}(p_{i+1}) / h_i` be the velocity of the geodesic between two neighbours. At the node
+        i, the velocities of the segments i - 2 to i + 1 are transported to :math:`p_i` along these geodesics. The
+        formulas of flat space are then applied in the tangent space at :math:`p_i`:
+
+        .. math:: \frac{h_i m_{i-1} + h_{i-1} m_i}{h_{i-1} + h_i}, \qquad
+                  \frac{|m_{i+1} - m_i| \, m_{i-1} + |m_{i-1} - m_{i-2}| \, m_i}{|m_{i+1} - m_i| + |m_{i-1} - m_{i-2}|}
+
+        for ``"catmull-rom"`` and ``"akima"``. At the ends, the first formula becomes that of the outer parabola.
+        On a Euclidean space, the second formula and that of ``"pchip"`` are applied to each component, and the results
+        equal SciPy's ``Akima1DInterpolator`` and ``PchipInterpolator``. On other spaces, components depend on the
+        choice of a frame. Norms of vectors replace the absolute values there, and ``"pchip"`` gives the harmonic mean
+        of both speeds in the direction of the bisector, times the cosine of half the angle between both directions.
+        The curve is therefore independent of coordinates: an isometry that is applied to the points is applied to the
+        curve. In one dimension, both definitions agree. Without an invariant metric, as on poses, only
+        ``"catmull-rom"`` has this property.
+
+        References
+        ----------
+        .. [1] E. Catmull, R. Rom, A Class of Local Interpolating Splines, Computer Aided Geometric Design (1974).
+        .. [2] H. Akima, A New Method of Interpolation and Smooth Curve Fitting Based on Local Procedures, J. ACM 17
+           (1970).
+        .. [3] F. N. Fritsch, J. Butland, A Method for Constructing Local Monotone Piecewise Cubic Interpolants, SIAM J.
+           Sci. Stat. Comput. 5 (1984).
+
+        Examples
+        --------
+        >>> import symspline as ss
+        >>> points = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
+        >>> curve = ss.HermiteSpline.from_points([0, 1, 3], points, "sphere:2")
+        >>> curve.velocities[1].round(4) + 0.0
+        array([-1.0472,  0.    ,  0.2618])
+        >>> steps = [[0.0], [0.0], [1.0], [1.0]]
+        >>> ss.HermiteSpline.from_points(None, steps, "r:1", method="pchip").velocities.ravel()
+        array([0., 0., 0., 0.])
+        """
+        space = space_named(space)
+        checked_extrapolate(extrapolate)
+        check_method(method)
+        data = with_atol(read(points, space), atol)
+        batch, nodes = data[0].batch, data[0].nodes
+        time_axis, shown_times, times = knots_of(t, batch, nodes)
+        with time_axis.explained():
+            valid, _ = validated(space, times, data, read_ends("natural", space, batch))
+            vectors = [
+                (local_velocities(factor, times, own, method), POINT_TOL)
+                for factor, own in zip(factors_of(space), valid, strict=True)
+            ]
+            curve = _hermite(space, times, data, vectors)
+        return HermiteSpline._of(time_axis, shown_times, curve, "natural", extrapolate)
 
     @classmethod
     def _from_state(cls, state: Entries) -> Self:
@@ -127,3 +231,11 @@ class HermiteSpline(SegmentedCurve[P]):
 
     def _with(self, time_axis: TimeAxis, t: Array, curve: CurveArrays, index: Any) -> Any:
         return HermiteSpline._of(time_axis, t, curve, "natural", self._extrapolate)
+
+
+def _hermite(space: Space[Any], times: Doubles, data: list[Points], vectors: list[tuple[Array, float]]) -> CurveArrays:
+    """Return the curve through points with velocities, after validation. See `hermite_data`."""
+    found = hermite_data(space, times, data, vectors)
+    curve = curve_of(space, times, [own[:2] for own in found], fitted=False)
+    warn_of_representatives(space, [data], [curve], [[own[2] for own in found]])
+    return curve

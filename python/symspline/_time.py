@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -116,6 +118,14 @@ class TimeAxis:
     def take_batch(self, index: Any) -> TimeAxis:
         """Return the time axis of one curve or a slice of curves along the first batch axis."""
         return replace(self, origin=self.origin[index][()]) if np.ndim(self.origin) else self
+
+    @contextmanager
+    def explained(self) -> Iterator[None]:
+        """Add to errors what their times are measured from."""
+        try:
+            yield
+        except ValidationError as error:
+            raise self.explain(error) from None
 
     def _doubles(self, array: NDArray[Any], origin: Any, name: str) -> Doubles:
         if self.dates:

@@ -1,0 +1,194 @@
+"""Velocities at the knots of curves through points, from geodesics between neighbouring points."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .._core import CutLocusError, ValidationError
+from .._faults import of_index
+from .._spaces import Array, Doubles, Euclidean, Space, cover_of
+
+METHODS = ("catmull-rom", "akima", "pchip")
+# Weights of Akima's formula below this part of the largest one are rounding errors, as in SciPy.
+_AKIMA_ROUNDING = 1e-9
+# In Slopes, the segment before a node and the segment after it.
+_BEFORE, _AFTER = 1, 2
+
+
+def geodesic_velocities(space: Space[Any], times: Doubles, points: Array) -> tuple[Array, Array]:
+    """Return the velocities of the geodesics between neighbouring points, at their starts and at their ends.
+
+    Parameters
+    ----------
+    times : ndarray, shape (n,) or (..., n)
+        Knots.
+    points : ndarray, shape (..., n, *point_shape)
+        Points on the space.
+
+    Raises
+    ------
+    CutLocusError
+        If two neighbouring points lie at or past each other's cut locus.
+    """
+    cover = cover_of(space)
+    p, q = cover._neighbours(points)
+    h = _wide(np.diff(times), cover)
+    if not p.size:
+        return np.zeros_like(p), np.zeros_like(p)
+    try:
+        return cover.log(p, q) / h, -cover.log(q, p) / h
+    except CutLocusError as error:
+        lead = p.shape[: p.ndim - len(cover.point_shape)]
+        *curve, i = next(index for index in np.ndindex(lead) if not _are_joined(cover, p[index], q[index]))
+        of = of_index([int(k) for k in curve])
+        what = str(error).partition(": ")[2]
+        raise CutLocusError(f"points[{i}] and points[{i + 1}]{of}: {what}. Put a point between them.") from None
+
+
+def _are_joined(space: Space[Any], p: Array, q: Array) -> bool:
+    try:
+        space.log(p, q)
+    except CutLocusError:
+        return False
+    return True
+
+
+def local_velocities(space: Space[Any], times: Doubles, points: Array, method: str) -> Array:
+    """Return velocities at the nodes that depend on a few neighbouring points only.
+
+    Parameters
+    ----------
+    method : {"catmull-rom", "akima", "pchip"}
+        Formula, see `symspline.HermiteSpline.from_points`.
+    """
+    cover = cover_of(space)
+    starts, ends = geodesic_velocities(space, times, points)
+    axis = points.ndim - len(cover.point_shape) - 1
+    if points.shape[axis] == 2:
+        # One segment is a geodesic.
+        return np.concatenate([starts, ends], axis=axis)
+    slopes = _Slopes(cover, times, points, starts, ends)
+    if method == "akima":
+        return slopes.akima()
+    return slopes.catmull_rom() if method == "catmull-rom" else slopes.pchip()
+
+
+class _Slopes:
+    """Velocities of the geodesics of the four segments around each node, transported to the node.
+
+    Parameters
+    ----------
+    space : Space
+        A space that is not a quotient.
+    starts, ends : ndarray
+        Velocities of `geodesic_velocities`.
+    """
+
+    def __init__(self, space: Space[Any], times: Doubles, points: Array, starts: Array, ends: Array) -> None:
+        self.space, self.axes = space, len(space.point_shape)
+        # The axis of nodes comes first, so that formulas are those of SciPy.
+        self.points, starts, ends = (self._nodes_first(array) for array in (points, starts, ends))
+        h = np.moveaxis(np.broadcast_to(np.diff(times), (*points.shape[: -1 - self.axes], len(starts))), -1, 0)
+        self.h = _wide(h, space)
+        n = len(self.points)
+        m = np.zeros((4, *self.points.shape), points.dtype)
+        m[_AFTER, :-1], m[_BEFORE, 1:] = starts, ends
+        # Along its own geodesic a velocity is parallel, so that only the outer segments need a transport.
+        m[3, :-2] = space.transport(self.points[1:-1], self.points[:-2], starts[1:])
+        m[0, 2:] = space.transport(self.points[1:-1], self.points[2:], ends[:-1])
+        # Beyond the ends, the velocities of segments form an arithmetic sequence, as in SciPy's Akima1DInterpolator.
+        m[1, 0] = 2 * m[2, 0] - m[3, 0]
+        m[0, 0] = 2 * m[1, 0] - m[2, 0]
+        m[0, 1] = 2 * m[1, 1] - m[2, 1]
+        m[3, n - 2] = 2 * m[2, n - 2] - m[1, n - 2]
+        m[2, -1] = 2 * m[1, -1] - m[0, -1]
+        m[3, -1] = 2 * m[2, -1] - m[1, -1]
+        self.m = m
+
+    def catmull_rom(self) -> Array:
+        """Return the velocities of parabolas through three points in the tangent space."""
+        _, before, after, _ = self.m
+        h = self.h
+        v = np.empty_like(self.points)
+        v[1:-1] = (h[1:] * before[1:-1] + h[:-1] * after[1:-1]) / (h[:-1] + h[1:])
+        v[0], v[-1] = self._parabola_at_ends()
+        return self._nodes_last(v)
+
+    def akima(self) -> Array:
+        """Return velocities by Akima's formula."""
+        first, before, after, last = self.m
+        left, right = self._size(before - first), self._size(last - after)
+        total = left + right
+        limit = total.max(axis=tuple(i for i in range(total.ndim) if i == 0 or i >= total.ndim - self.axes))
+        limit = limit.reshape(*limit.shape, *(1,) * self.axes)
+        weighted = total > _AKIMA_ROUNDING * limit
+        ratio = left / np.where(weighted, total, 1.0)
+        return self._nodes_last(np.where(weighted, before + ratio * (after - before), (first + last) / 2))
+
+    def pchip(self) -> Array:
+        """Return velocities by the weighted harmonic mean of Fritsch and Butland."""
+        _, before, after, _ = self.m
+        v = np.empty_like(self.points)
+        own = [each[1:-1] for each in (before, after)]
+        sizes = [self._size(each, 1) for each in own]
+        # The harmonic mean along the bisector of both directions, where they have equal signs, times the cosine of half
+        # the angle between them. Across the bisector signs differ, and the formula for components gives zero. In one
+        # dimension, half the sum of the directions is 1, -1 or 0, and this is the formula of SciPy.
+        with np.errstate(all="ignore"):
+            units = [np.nan_to_num(each / size) for each, size in zip(own, sizes, strict=True)]
+            sum_of_units = units[0] + units[1]
+            w1, w2 = 2 * self.h[1:] + self.h[:-1], self.h[1:] + 2 * self.h[:-1]
+            mean = np.nan_to_num((w1 + w2) / (w1 / sizes[0] + w2 / sizes[1]))
+        v[1:-1] = np.where((sizes[0] > 0) & (sizes[1] > 0), mean * sum_of_units / 2, 0.0)
+        for i, end, near, next_ in ((0, *self._end(0)), (-1, *self._end(-1))):
+            v[i] = self._limited(end, near, next_, i)
+        return self._nodes_last(v)
+
+    def _parabola_at_ends(self) -> tuple[Array, Array]:
+        return self._end(0)[0], self._end(-1)[0]
+
+    def _end(self, i: int) -> tuple[Array, Array, Array]:
+        """Return the velocity of a parabola at an end, and those of the two nearest segments."""
+        near, next_ = (self.m[2, 0], self.m[3, 0]) if i == 0 else (self.m[1, -1], self.m[0, -1])
+        h0, h1 = (self.h[0], self.h[1]) if i == 0 else (self.h[-1], self.h[-2])
+        return ((2 * h0 + h1) * near - h0 * next_) / (h0 + h1), near, next_
+
+    def _limited(self, v: Array, near: Array, next_: Array, i: int) -> Array:
+        """Limit the velocity at an end as `scipy.interpolate.PchipInterpolator` does."""
+        at = self.points[i]
+        turns = self._sign(at, near, next_) <= 0
+        size, most = self._size(v, at=at), 3 * self._size(near, at=at)
+        v = np.where(turns & (size > most), v * (most / np.where(size > 0, size, 1.0)), v)
+        return np.where(self._sign(at, v, near) > 0, v, 0.0)
+
+    def _size(self, v: Array, skip: int = 0, at: Array | None = None) -> Any:
+        """Return the norms of vectors with the axes of points, or in flat space the size of each component."""
+        if isinstance(self.space, Euclidean):
+            return np.abs(v)
+        p = self.points[skip : len(self.points) - skip] if at is None else at
+        return _wide(np.asarray(self.space.norm(p, v)), self.space)
+
+    def _sign(self, p: Array, v: Array, w: Array) -> Any:
+        """Return numbers with the signs of inner products, or in flat space of products of components."""
+        if isinstance(self.space, Euclidean):
+            return np.sign(v) * np.sign(w)
+        return _wide(np.asarray(self.space.inner(p, v, w)), self.space)
+
+    def _nodes_first(self, array: Array) -> Array:
+        return np.moveaxis(array, -1 - self.axes, 0)
+
+    def _nodes_last(self, array: Array) -> Array:
+        return np.ascontiguousarray(np.moveaxis(array, 0, -1 - self.axes))
+
+
+def check_method(method: Any) -> None:
+    """Raise ValidationError unless a formula of `local_velocities` has this name."""
+    if not isinstance(method, str) or method not in METHODS:
+        raise ValidationError(f"method must be one of {', '.join(map(repr, METHODS))}, not {method!r}")
+
+
+def _wide(values: Doubles, space: Space[Any]) -> Doubles:
+    """Append the axes of a point."""
+    return values.reshape(values.shape + (1,) * len(space.point_shape))

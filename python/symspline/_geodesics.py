@@ -1,0 +1,166 @@
+"""Curves of geodesics between neighbouring points."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Self
+
+import numpy as np
+
+from ._archive import Entries, check_curves, read_segments
+from ._base_curve import SegmentedCurve
+from ._curves.curve import CoreCurve, CurveArrays
+from ._curves.fit import read, read_ends, validated
+from ._curves.geodesics import GeodesicCurve, joined
+from ._options import checked_extrapolate, with_atol
+from ._representatives import warn_of_representatives
+from ._spaces import Array, Doubles, Space, space_named
+from ._time import TimeAxis, knots_of
+from ._typing import Extrapolate, FloatArray, Number, P, PointsLike, TimesLike
+from .manifolds import Manifold
+
+# A change of velocity below this part of the speed is a rounding error of a straight curve.
+_STRAIGHT = 1e-9
+
+
+class PiecewiseGeodesic(SegmentedCurve[P]):
+    r"""Join points by geodesics.
+
+    The speed is constant on each segment, and the velocity jumps at the knots. On rotations, the result equals SciPy's
+    ``Slerp``; on a Euclidean space, it is linear interpolation. Use it as a baseline for comparisons, or for data that
+    are too coarse for a smooth curve.
+
+    Parameters
+    ----------
+    t : array_like of float or datetime64, shape (n,) or (..., n), or None
+        Strictly increasing knots, shared by all curves or one row per curve. None means 0, 1, ..., n - 1. Velocities
+        for dates are per second. Dates with a time zone are converted to UTC.
+    points : array_like, shape (..., n, *space.point_shape)
+        Points to join, at least two per curve. Leading axes are batch axes. Points within `atol` of the manifold are
+        projected onto it. For a `Product`, pass a tuple with one array per factor.
+    space : Space or str
+        A space or its name, such as ``Sphere(2)`` or ``"sphere:2"``.
+    extrapolate : {None, "raise", True, False, "geodesic", "periodic"}, default None
+        Extrapolation policy for times beyond the knots. None and ``"raise"`` raise `ValidationError`. True and
+        ``"geodesic"`` continue the first and last segments. False gives NaN. ``"periodic"`` repeats the curve.
+    atol : float, optional
+        Largest distance of a point from the manifold. By default 1e-8, or 1e-4 for points in single precision.
+
+    Raises
+    ------
+    ValidationError
+        If the input does not meet the requirements above.
+    CutLocusError
+        If two neighbouring points are not joined by a unique shortest geodesic.
+
+    Warns
+    -----
+    FarPointsWarning
+        If a curve has at least four segments and more than half of its steps exceed 0.6 of the distance to the cut
+        locus.
+    UserWarning
+        If points on ``Sphere(3)`` look like unit quaternions with inconsistent signs.
+
+    See Also
+    --------
+    CubicSpline : Interpolate points by a C² curve.
+    HermiteSpline.from_points : Interpolate points by a C¹ curve.
+    Space.geodesic : Evaluate the geodesic between two points.
+
+    Notes
+    -----
+    On the segment between the points :math:`p_i` and :math:`p_{i+1}`, the curve is :math:`[p_i, p_{i+1}]_\tau`, the
+    geodesic (6) with :math:`\tau = (t - t_i) / h_i`. At a knot, the velocity of the segment after it is returned, and
+    at the last knot that of the last segment. The covariant acceleration is zero except for rounding errors.
+
+    References
+    ----------
+    G. Bogfjellmo, K. Modin, O. Verdier, A Numerical Algorithm for C²-Splines on Symmetric Spaces, SIAM J. Numer.
+    Anal. 56 (2018), equation (6).
+
+    Examples
+    --------
+    >>> import symspline as ss
+    >>> curve = ss.PiecewiseGeodesic([0, 1, 3], [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "sphere:2")
+    >>> curve(0.5).round(8)
+    array([0.70710678, 0.70710678, 0.        ])
+    >>> curve.speed([0.5, 1.0]).round(4)
+    array([1.5708, 0.7854])
+    >>> curve.length().round(8)
+    np.float64(3.14159265)
+    """
+
+    _kind = "piecewise geodesic"
+    _format = "symspline-geodesics"
+    _ends = "joined by geodesics"
+    _unconverged = 0
+
+    def __init__(
+        self,
+        t: TimesLike | None,
+        points: PointsLike,
+        space: Space[P] | str,
+        *,
+        extrapolate: Extrapolate = None,
+        atol: float | None = None,
+    ) -> None:
+        space = space_named(space)
+        checked_extrapolate(extrapolate)
+        data = with_atol(read(points, space), atol)
+        batch, nodes = data[0].batch, data[0].nodes
+        time_axis, shown_times, times = knots_of(t, batch, nodes)
+        with time_axis.explained():
+            valid, _ = validated(space, times, data, read_ends("natural", space, batch))
+            curve = joined(space, times, valid)
+        self._fill(time_axis, shown_times, curve, "natural", extrapolate)
+        warn_of_representatives(space, [data], [curve], [[_longest_step(part) for part in curve.parts]])
+
+    @classmethod
+    def _from_state(cls, state: Entries) -> Self:
+        time_axis, knots, curve, extrapolate = read_segments(state, fitted=False)
+        check_curves(state, curve, [True] * len(curve.parts))
+        geodesics = joined(curve.space, curve.times, [part.points for part in curve.parts])
+        return cls._of(time_axis, knots, geodesics, "natural", extrapolate)
+
+    @property
+    def velocities(self) -> P:
+        """Velocities γ' after the knots, with the shape of the points; at the last knot, the velocity before it."""
+        velocities: P = self._curve.velocities
+        return velocities
+
+    def bending_energy(self) -> Number:
+        """Compute the bending energy of the curve.
+
+        Returns
+        -------
+        ndarray or float, shape ``batch axes``
+            Infinity if the velocity jumps at a knot, since no curve of finite energy has a jump. Zero for a single
+            geodesic.
+
+        Examples
+        --------
+        >>> import symspline as ss
+        >>> ss.PiecewiseGeodesic(None, [[0.0], [1.0], [0.0]], "r:1").bending_energy()
+        np.float64(inf)
+        """
+        # The curves of all factors are of this class.
+        jumps = [
+            part.jumps().max(axis=-1, initial=0.0) for part in self._curve.parts if isinstance(part, GeodesicCurve)
+        ]
+        energy: FloatArray = np.where(np.max(jumps, axis=0) > _STRAIGHT, np.inf, 0.0)
+        return energy[()]
+
+    def __repr__(self) -> str:
+        return f"<PiecewiseGeodesic on {self.space!r}: {self._batch_text}{self._t.shape[-1]} points>"
+
+    def _with(self, time_axis: TimeAxis, t: Array, curve: CurveArrays, index: Any) -> Any:
+        return PiecewiseGeodesic._of(time_axis, t, curve, "natural", self._extrapolate)
+
+
+def _longest_step(part: CoreCurve) -> Doubles:
+    """Return the largest distance between neighbouring points of each curve."""
+    p, q = part.space._neighbours(part.points)
+    if isinstance(part.space, Manifold):
+        # A manifold that is made of functions may have no distance.
+        return np.full(math.prod(part.batch), np.inf)
+    return np.asarray(part.space.distance(p, q).max(axis=-1, initial=0.0)).ravel()
