@@ -136,7 +136,7 @@ class HermiteSpline(SegmentedCurve[P]):
             Points to interpolate, at least two per curve. Leading axes are batch axes. For a `Product`, pass a tuple
             with one array per factor.
         space : Space or str
-            A space or its name, such as ``Sphere(2)`` or ``"sphere:2"``.
+            A space or its name, such as ``Sphere(2)`` or ``"sphere:2"``. A `Manifold` must have a function `transport`.
         method : {"catmull-rom", "akima", "pchip"}, default "catmull-rom"
             Formula for the velocities.
 

@@ -14,7 +14,7 @@ from ._curves.fit import Points
 from ._curves.solve import Options
 from ._typing import Extrapolate, Progress
 
-_QUANTITIES = ("point", "velocity", "acceleration")
+_QUANTITIES = ("point", "velocity", "acceleration", "jerk")
 _RAISE = "raise"
 _EXTRAPOLATION_MODES = {
     None: "raise",
@@ -34,9 +34,9 @@ class EvaluationOptions(TypedDict, total=False):
     progress: Progress | None
 
 
-def quantity_of(nu: Any) -> str:
-    """The core's name of the derivative of order `nu`."""
-    return _QUANTITIES[order_of(nu)]
+def quantity_of(nu: Any, most: int = 2) -> str:
+    """The name of the derivative of order `nu`. Those up to the second order are known to the core."""
+    return _QUANTITIES[order_of(nu, most)]
 
 
 def order_of(nu: Any, most: int = 2) -> int:
@@ -48,7 +48,7 @@ def order_of(nu: Any, most: int = 2) -> int:
         If `nu` is not an integer, such as True or 1.0, or is out of range.
     """
     if isinstance(nu, bool) or not isinstance(nu, (int, np.integer)) or not 0 <= nu <= most:
-        words = "0, 1 or 2" if most == 2 else "0 or 1"
+        words = f"{', '.join(map(str, range(most)))} or {most}"
         raise ValidationError(f"nu must be {words}, not {short_repr(nu)}")
     return int(nu)
 

@@ -140,9 +140,10 @@ DERIVATIVES = {
 
 
 @pytest.mark.parametrize("name", DERIVATIVES)
-def test_orders_of_derivatives_are_integers_from_0_to_2(name):
+def test_orders_of_derivatives_are_small_integers(name):
     call = DERIVATIVES[name]
+    most, words = (3, "0, 1, 2 or 3") if name == "call" else (2, "0, 1 or 2")
     for nu in (np.int64(1), np.uint8(1)):
         assert np.array_equal(call(0.5, nu=nu), call(0.5, nu=1))
-    for nu in (True, 0.5, 1.0, np.float64(1), np.nan, 3, -1, "1", None, [1]):
-        raises("nu must be 0, 1 or 2, not", call, 0.5, nu=nu)
+    for nu in (True, 0.5, 1.0, np.float64(1), np.nan, most + 1, -1, "1", None, [1]):
+        raises(f"nu must be {words}, not", call, 0.5, nu=nu)

@@ -61,6 +61,14 @@ def _can_write_into(out: Array, dtype: Any, read: Array) -> bool:
     return apart and out.dtype == dtype and out.flags.c_contiguous and out.flags.aligned
 
 
+def write_into(out: Any, values: Any, space: Space[Any]) -> Any:
+    """Write results in each factor into existing arrays, and return these."""
+    for own, array in zip(parts_of(out, space, "out"), parts_of(values, space, "values"), strict=True):
+        _check_out(own, array.shape, array.dtype)
+        np.copyto(own, array, casting="same_kind")
+    return out
+
+
 class CoreCurve:
     """Curves of a batch in a space that is not a product. Times are numbers of the compiled core.
 

@@ -6,11 +6,11 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.polynomial import chebyshev
 
 from .. import _core
 from .._arrays import short_repr
 from .._core import ValidationError
+from .._curves.jerk import differentiation, transported
 from .._curves.reduced import ReducedCurve, span_of
 from .._spaces import Array, Doubles, Space
 from .._typing import Progress
@@ -139,7 +139,7 @@ class FactorGrid:
         starts, widths = _segments(self.axes[axis].knots, x, left, sites.modes[axis])
         nodes = np.cos(np.pi * (np.arange(_NODES) + 0.5) / _NODES)
         at = starts[:, None] + widths[:, None] * (nodes + 1) / 2
-        weights = _differentiation(nodes, 2 * (x - starts) / widths - 1) * (2 / widths)[:, None]
+        weights = differentiation(nodes, 2 * (x - starts) / widths - 1) * (2 / widths)[:, None]
         result = np.zeros_like(here)
         shape = (1,) * axis + (-1,) if sites.outer else (-1,)
         lead = len(sites.shape) + len(self.space.point_shape)
@@ -147,7 +147,7 @@ class FactorGrid:
             points, vectors, own = self._direct(sites.along(axis, np.ascontiguousarray(at[:, k])), order, None)
             found = found.merged(own)
             factor = weights[:, k].reshape(shape + (1,) * (lead - len(shape)))
-            result += factor * _transported(self.space, points, here, vectors)
+            result += factor * transported(self.space, points, here, vectors)
         return result, here, found
 
 
@@ -183,24 +183,6 @@ def _segments(knots: Doubles, x: Doubles, left: bool, mode: str) -> tuple[Double
     # The first and the last segment continue outside the knots.
     starts = np.where(x > knots[-1], x, np.where(x < knots[0], x - widths, starts))
     return starts, widths
-
-
-def _differentiation(nodes: Doubles, x: Doubles) -> Doubles:
-    """Return the weights of values at `nodes` in the derivative of their interpolating polynomial at x."""
-    degree = len(nodes) - 1
-    derivatives = np.stack(
-        [chebyshev.chebval(x, chebyshev.chebder(np.eye(degree + 1)[n])) for n in range(degree + 1)], axis=-1
-    )
-    return np.asarray(derivatives @ np.linalg.inv(chebyshev.chebvander(nodes, degree)))
-
-
-def _transported(space: Space[Any], p: Array, q: Array, vectors: Any) -> Array:
-    """Transport vectors from p to q along geodesics; NaN where anything is missing."""
-    valid = space._where_finite(p) & space._where_finite(q) & space._where_finite(vectors)
-    out = np.full(vectors.shape, np.nan, vectors.dtype)
-    if valid.any():
-        out[valid] = space.transport(p[valid], q[valid], vectors[valid])
-    return out
 
 
 def _midpoint(
