@@ -161,7 +161,7 @@ class SegmentedCurve(Curve[P]):
         Let a be the largest size of the acceleration on a segment and h the length of its interval. Errors are about
         1e-12 of a/h, and up to 1e-8 of it if the step between two points exceeds half of the distance to the cut locus.
         A `Manifold` must have a function `transport`, and errors are larger there, because accelerations are
-        differences. The jerk takes about 60 times the time of the acceleration.
+        differences. The jerk takes about 100 times the time of the acceleration.
         """
         if progress is not None:
             check_progress(progress)

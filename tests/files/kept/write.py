@@ -37,6 +37,7 @@ def curves():
         "product": ss.CubicSpline(None, POSES, "so:3 x r:3", bc_type="clamped"),
         "complex": ss.CubicSpline(None, [[1, 0], [0.6, 0.8j]], "cp:1", bc_type=((1, [0, 0.5j]), "natural")),
         "hermite": ss.HermiteSpline([0, 1], P[:2], [[0, 0.5, 0], [0.25, 0, 0]], "sphere:2"),
+        "geodesics": ss.PiecewiseGeodesic(DATES, POSES, "so:3 x r:3", extrapolate="geodesic"),
         "smoothing": smooth,
         "estimate": ss.estimate(MEASURED, 5, "so:3", lam=0.1),
         "bspline": ss.BSpline([0, 0, 0, 1, 2, 2, 2], [*P, P[0]], 2, "sphere:2"),
