@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from . import _archive
-from ._arrays import as_array, checked_flag, in_single, is_single, read_only, short_repr
+from ._arrays import as_array, checked_flag, in_single, is_single, read_only, refuse, short_repr
 from ._core import ValidationError
 from ._curve import Curve
 from ._curves.curve import CurveArrays, SidePanel, UncertaintyBand, write_into
@@ -373,6 +373,34 @@ class SegmentedCurve(Curve[P]):
             if extrapolate is None
             else extrapolation_mode(checked_extrapolate(extrapolate), self._bc_type)
         )
+
+    def _core_times(self, x: Any, name: str, per_curve: bool = False) -> tuple[Doubles, bool]:
+        batch, knots = self._batch, self._times
+        if per_curve and np.shape(x)[: len(batch)] != batch:
+            raise ValidationError(
+                f"with per_curve=True the shape of {name} must begin with the batch axes {batch}; got {np.shape(x)}"
+            )
+        times, own = self._time_axis.at(x, batch, per_curve, knots, name)
+        if knots.ndim > 1 and not own:
+            times, own = np.broadcast_to(times, batch + times.shape), True
+        samples = (1,) * (times.ndim - len(batch) if own else 0)
+        first, last = (
+            end.reshape(end.shape + samples) if knots.ndim > 1 else end for end in (knots[..., 0], knots[..., -1])
+        )
+
+        def say(i: Any) -> str:
+            ends = [np.broadcast_to(end, times.shape)[i] for end in (first, last)]
+            where = f"outside the knots [{ends[0]}, {ends[1]}]" if np.isfinite(times[i]) else "not finite"
+            return f"= {times[i]} is {where}"
+
+        try:
+            refuse(~((times >= first) & (times <= last)), name, say)
+        except ValidationError as error:
+            raise self._time_axis.explain(error) from None
+        return times, own
+
+    def _shown_times(self, x: Doubles) -> NDArray[Any]:
+        return self._time_axis.shown(x, self._batch)
 
     # ---- data ----
 

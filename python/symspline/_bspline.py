@@ -116,7 +116,7 @@ class BSpline(Curve[P]):
         ValidationError
             If a time is not finite or lies outside the domain of the curve.
         """
-        values: P = self._curve.evaluate(self._times(x), quantity_of(nu))
+        values: P = self._curve.evaluate(self._core_times(x)[0], quantity_of(nu))
         return values
 
     def speed(self, x: ArrayLike) -> FloatArray:
@@ -144,14 +144,18 @@ class BSpline(Curve[P]):
         >>> line.speed([0.5, 1.0])
         array([1.5, 1.5])
         """
-        speeds: FloatArray = self._curve.evaluate(self._times(x), "speed")[()]
+        speeds: FloatArray = self._curve.evaluate(self._core_times(x)[0], "speed")[()]
         return speeds
 
-    def _times(self, x: ArrayLike) -> Doubles:
-        """Return times in the domain of the curve as float64."""
-        times = as_array(x, "x")
+    def _core_times(self, x: Any, name: str = "x", per_curve: bool = False) -> tuple[Doubles, bool]:
+        times = as_array(x, name)
         if times.dtype.kind not in "biuf":
-            raise ValidationError(f"x must be real numbers, not {times.dtype}")
+            raise ValidationError(f"{name} must be real numbers, not {times.dtype}")
+        batch = self._batch
+        if per_curve and times.shape[: len(batch)] != batch:
+            raise ValidationError(
+                f"with per_curve=True the shape of {name} must begin with the batch axes {batch}; got {times.shape}"
+            )
         start, end = self.domain
         times, _ = onto_ends(cast(times), np.array([start, end]), (), False, times.dtype)
         outside = ~((times >= start) & (times <= end))
@@ -160,8 +164,11 @@ class BSpline(Curve[P]):
             where = f"outside the domain [{start}, {end}] of the curve" if np.isfinite(times[i]) else "not finite"
             return f"= {times[i]} is {where}"
 
-        refuse(outside, "x", say)
-        return times
+        refuse(outside, name, say)
+        return times, per_curve
+
+    def _shown_times(self, x: Doubles) -> Doubles:
+        return x
 
     @property
     def domain(self) -> tuple[float, float]:
@@ -251,9 +258,19 @@ class ControlledCurve:
         return shape[: len(shape) - len(self.space.point_shape) - 1]
 
     def evaluate(self, x: Doubles, quantity: str, outside: str = "raise", per_curve: bool = False) -> Any:
-        """A quantity at times in the domain; with ``per_curve`` x has the batch axes, along which it is constant."""
+        """A quantity at times in the domain; with ``per_curve`` the leading axes of x are the batch axes."""
         if per_curve:
-            x = np.ascontiguousarray(x[(0,) * len(self.batch)])
+            batch = self.batch
+            rows = x.reshape(-1, *x.shape[len(batch) :])
+            if not (rows == rows[0]).all():
+                # The core evaluates all curves of a batch at the same times.
+                control = self.control_points.reshape(-1, *self.control_points.shape[len(batch) :])
+                each = [
+                    ControlledCurve(self.space, self.knots, own, self.degree).evaluate(row, quantity)
+                    for own, row in zip(control, np.ascontiguousarray(rows), strict=True)
+                ]
+                return np.reshape(each, (*batch, *each[0].shape))
+            x = np.ascontiguousarray(rows[0])
         space, control, span = reduced(self.space, self.control_points)
         values = _core.evaluate_bspline(space._handle, self.knots, space._as_doubles(control), self.degree, x, quantity)
         if quantity in NORMS:

@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import cached_property
 from typing import Any, ClassVar, Generic, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from . import _archive
-from ._arrays import short_repr
+from ._arrays import as_array, cast, checked_flag, refuse, short_repr
+from ._core import ValidationError
+from ._curves.arc_length import ArcLength
 from ._curves.integrals import Evaluable, bending_energy, integrate
-from ._spaces import Space
-from ._typing import File, Number, P, Time
+from ._spaces import Doubles, Space
+from ._typing import File, Number, P, Time, TimesLike
+
+# Relative rounding error of an arc length that a user computed.
+_ROUNDING = 1e-12
 
 
 class Curve(ABC, Generic[P]):
@@ -96,13 +102,28 @@ class Curve(ABC, Generic[P]):
     def domain(self) -> tuple[Time, Time]:
         """First and last time. They are arrays with the batch axes if every curve has its own times."""
 
-    def length(self) -> Number:
-        r"""Compute the length of the curve from the first to the last knot.
+    def length(self, a: TimesLike | None = None, b: TimesLike | None = None) -> Number:
+        r"""Compute the length of the curve, or of the part between two times.
+
+        Parameters
+        ----------
+        a, b : array_like of float or datetime64, optional
+            Start and end of the part; b must not be before a. Both must be in the domain of the curve. Arrays are
+            broadcast. By default, the first and the last time of the domain.
 
         Returns
         -------
-        ndarray or float, shape ``batch axes``
-            The integral of the speed, :math:`\int \lVert\gamma'\rVert \, dt`.
+        ndarray or float, shape ``(*batch axes, *shape of the times)``
+            The integral of the speed, :math:`\int_a^b \lVert\gamma'\rVert \, dt`.
+
+        Raises
+        ------
+        ValidationError
+            If a time is not in the domain of the curve, or b is before a.
+
+        See Also
+        --------
+        Curve.arc_length : Compute the length from the start of the domain to many times.
 
         Examples
         --------
@@ -110,11 +131,166 @@ class Curve(ABC, Generic[P]):
         >>> quarter = ss.CubicSpline(None, [[1, 0, 0], [0, 1, 0]], ss.Sphere(2))
         >>> round(float(quarter.length()), 8)
         1.57079633
+        >>> quarter.length([0, 0.25], [0.5, 1]).round(8)
+        array([0.78539816, 1.17809725])
         """
         curve = self._curve
-        return integrate(
-            curve.times, lambda x: curve.evaluate(x, "speed", "continue", True), curve.batch, curve.quad_rtol
+        if a is None and b is None:
+            return integrate(
+                curve.times, lambda x: curve.evaluate(x, "speed", "continue", True), curve.batch, curve.quad_rtol
+            )
+        ends = [
+            self._domain_ends[number] if x is None else self._core_times(x, name)
+            for number, (x, name) in enumerate([(a, "a"), (b, "b")])
+        ]
+        shapes = [x.shape[len(self._batch) * own :] for x, own in ends]
+        start, stop = (self._with_batch(x, own, max(map(len, shapes))) for x, own in ends)
+        try:
+            start, stop = np.broadcast_arrays(start, stop)
+        except ValueError:
+            raise ValidationError(f"a and b have shapes {shapes[0]} and {shapes[1]}, which do not broadcast") from None
+        refuse(stop < start, "b", lambda _: "is before a. Exchange a and b.")
+        return self._by_columns(ArcLength.between, start, stop)
+
+    def arc_length(self, x: TimesLike, *, per_curve: bool = False) -> Number:
+        """Compute the length of the curve from the start of its domain to given times.
+
+        Parameters
+        ----------
+        x : array_like of float or datetime64
+            Times in the domain of the curve, of any shape and in any order.
+        per_curve : bool, default False
+            True if every curve of a batch has its own times. The leading axes of x are then the batch axes.
+
+        Returns
+        -------
+        ndarray or float, shape ``(*batch axes, *x.shape)``
+            Arc lengths. With `per_curve`, the batch axes appear only once.
+
+        Raises
+        ------
+        ValidationError
+            If a time is not in the domain of the curve.
+
+        See Also
+        --------
+        Curve.at_length : Compute the times at which the curve has given arc lengths.
+
+        Examples
+        --------
+        >>> import symspline as ss
+        >>> curve = ss.HermiteSpline([0, 1], [[0.0], [1.0]], [[0.0], [2.0]], "r:1")  # x = t²
+        >>> curve.arc_length([0.0, 0.5, 1.0]).round(12)
+        array([0.  , 0.25, 1.  ])
+        """
+        times, own = self._core_times(x, "x", checked_flag(per_curve, "per_curve"))
+        return self._by_columns(ArcLength.at, self._with_batch(times, own, times.ndim - len(self._batch) * own))
+
+    def at_length(self, s: ArrayLike, *, per_curve: bool = False) -> Time:
+        """Compute the times at which the curve has given arc lengths.
+
+        Use it to sample a curve at constant speed, that is at equal distances along the curve.
+
+        Parameters
+        ----------
+        s : array_like
+            Arc lengths from the start of the domain, between 0 and the length of the curve, of any shape.
+        per_curve : bool, default False
+            True if every curve of a batch has its own arc lengths. The leading axes of s are then the batch axes.
+
+        Returns
+        -------
+        ndarray or float, shape ``(*batch axes, *s.shape)``
+            Times, the inverse of `arc_length`. If the curve rests, this is the first time with this arc length. Dates
+            are in nanoseconds. Curves that failed have NaN or NaT.
+
+        Raises
+        ------
+        ValidationError
+            If an arc length is negative or exceeds the length of the curve.
+
+        See Also
+        --------
+        Curve.arc_length : Compute the length of the curve from its start to given times.
+
+        Examples
+        --------
+        Five points at equal distances along a curve:
+
+        >>> import numpy as np
+        >>> import symspline as ss
+        >>> curve = ss.HermiteSpline([0, 1], [[0.0], [1.0]], [[0.0], [2.0]], "r:1")  # x = t²
+        >>> t = curve.at_length(np.linspace(0, curve.length(), 5))
+        >>> curve(t)[:, 0].round(12)
+        array([0.  , 0.25, 0.5 , 0.75, 1.  ])
+        """
+        array = as_array(s, "s")
+        if array.dtype.kind not in "biuf":
+            raise ValidationError(f"s must be real numbers, not {array.dtype}")
+        batch, own = self._batch, checked_flag(per_curve, "per_curve")
+        if own and array.shape[: len(batch)] != batch:
+            raise ValidationError(
+                f"with per_curve=True the shape of s must begin with the batch axes {batch}; got {array.shape}"
+            )
+        wanted = self._with_batch(cast(array), own, array.ndim - len(batch) * own)
+        if 0 in batch:
+            return self._shown_times(wanted)
+        total = self._arc.lengths[..., -1].reshape(batch + (1,) * (wanted.ndim - len(batch)))
+        # An arc length that exceeds the length by rounding is the length, such as the last of np.linspace.
+        reach = _ROUNDING * total
+        wrong = ~((wanted >= -reach) & (wanted <= total + reach)) & ~np.isnan(total)
+        refuse(
+            wrong | np.isnan(wanted),
+            "s",
+            lambda i: (
+                f"= {wanted[i]} is not an arc length of the curve: it must be between 0 and "
+                f"{np.broadcast_to(total, wanted.shape)[i]}"
+            ),
         )
+        times = np.asarray(self._by_columns(ArcLength.times_at, np.clip(wanted, 0.0, total)))
+        found: Time = self._shown_times(times)[()]
+        return found
+
+    @cached_property
+    def _arc(self) -> ArcLength:
+        return ArcLength(self._curve)
+
+    @abstractmethod
+    def _core_times(self, x: TimesLike, name: str, per_curve: bool = False) -> tuple[Doubles, bool]:
+        """Return times as numbers of the core, and whether each curve then has its own times.
+
+        Raises
+        ------
+        ValidationError
+            If a time is not in the domain of the curve.
+        """
+
+    @abstractmethod
+    def _shown_times(self, x: Doubles) -> NDArray[Any]:
+        """Return times as the user counts them. The numbers of the core have the batch axes in front."""
+
+    @property
+    def _domain_ends(self) -> list[tuple[Doubles, bool]]:
+        """First and last time as numbers of the core, and whether each curve has its own."""
+        times = self._curve.times
+        return [(np.asarray(times[..., i]), times.ndim > 1) for i in (0, -1)]
+
+    def _with_batch(self, x: Doubles, own: bool, inner: int) -> Doubles:
+        """Return an array of one value per curve and sample, shape (*batch, ...) with `inner` axes of samples."""
+        batch = self._batch
+        lead, shape = (batch, x.shape[len(batch) :]) if own else ((1,) * len(batch), x.shape)
+        ones = (1,) * (inner - len(shape))
+        return np.broadcast_to(x.reshape(lead + ones + shape), batch + ones + shape)
+
+    def _by_columns(self, call: Callable[..., Doubles], *arrays: Doubles) -> Number:
+        """Call a method of the arc length, which takes shape (*batch, m), for any number of axes of samples."""
+        batch, shape = self._batch, arrays[0].shape
+        if 0 in shape:
+            return np.zeros(shape)
+        values: Number = call(self._arc, *(np.ascontiguousarray(x.reshape(*batch, -1)) for x in arrays)).reshape(shape)[
+            ()
+        ]
+        return values
 
     def bending_energy(self) -> Number:
         r"""Compute the bending energy of the curve.

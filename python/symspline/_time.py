@@ -77,7 +77,12 @@ class TimeAxis:
         return self._doubles(knots, self.origin, "t")
 
     def at(
-        self, x: TimesLike, batch: tuple[int, ...], per_curve: bool, knots: Doubles | None = None
+        self,
+        x: TimesLike,
+        batch: tuple[int, ...],
+        per_curve: bool,
+        knots: Doubles | None = None,
+        name: str = "x",
     ) -> tuple[Doubles, bool]:
         """Convert sampling times to numbers of the core, and return whether each curve then has its own times.
 
@@ -91,29 +96,66 @@ class TimeAxis:
             Whether the leading axes of x are the batch axes.
         knots : ndarray, optional
             Knots as numbers of the core. A time that exceeds the first or last knot by rounding becomes that knot.
+        name : str
+            Name of the times in messages.
         """
-        given, zone = times_of(x, "x")
-        array = as_array(given, "x")
+        given, zone = times_of(x, name)
+        array = as_array(given, name)
         if {zone, self.zone} == {UTC_ZONE, NO_ZONE}:
             here, there = ("a time zone", "none") if zone == UTC_ZONE else ("no time zone", "one")
             raise ValidationError(
-                f"x has {here}, but the knots have {there}; pass both with a time zone, or both without"
+                f"{name} has {here}, but the knots have {there}; pass both with a time zone, or both without"
             )
         if self.durations and array.dtype.kind == "m":
-            array = _durations(array, "x")
+            array = _durations(array, name)
         if array.dtype.kind not in ("M" if self.dates else "iufb"):
-            required = "dates, so x must be datetime64" if self.dates else "numbers, so x must be numbers"
+            required = f"dates, so {name} must be datetime64" if self.dates else f"numbers, so {name} must be numbers"
             raise ValidationError(f"the knots are {required}, not {array.dtype}")
         if np.ndim(self.origin) == 0:
-            times = self._doubles(array, self.origin, "x")
+            times = self._doubles(array, self.origin, name)
         else:
             # Times of each curve are differences from its own first knot.
             own = array.shape[len(batch) :] if per_curve else array.shape
             origin = self.origin.reshape(batch + (1,) * len(own))
-            times, per_curve = self._doubles(np.broadcast_to(array, batch + own), origin, "x"), True
+            times, per_curve = self._doubles(np.broadcast_to(array, batch + own), origin, name), True
         if knots is None or array.dtype.kind != "f":
             return times, per_curve
         return onto_ends(times, knots, batch, per_curve, array.dtype, 0.0 if self.dates else self.origin)
+
+    def shown(self, x: Doubles, batch: tuple[int, ...]) -> NDArray[Any]:
+        """Convert numbers of the core to times of the user, the inverse of `at`.
+
+        Dates are in nanoseconds, or in the unit of the knots if it is finer, as long as they are in the range of this
+        unit. NaN becomes NaT. Durations are numbers of seconds.
+
+        Parameters
+        ----------
+        x : ndarray
+            Times as numbers of the core, with the batch axes in front if each curve has its own origin.
+        batch : tuple of int
+            The batch axes of the curves.
+        """
+        if self.origin is None:
+            return x
+        origin = np.asarray(self.origin)
+        if origin.ndim:
+            origin = origin.reshape(batch + (1,) * (x.ndim - len(batch)))
+        if not self.dates:
+            return np.asarray(origin.astype(np.float64) + x)
+        missing = np.isnan(x)
+        reach = float(np.abs(x[~missing]).max(initial=0.0))
+        for unit in ("ns", "us", "s"):
+            fine = np.promote_types(origin.dtype, f"datetime64[{unit}]") if unit != "s" else np.dtype("datetime64[s]")
+            start = origin.astype(fine)
+            per_second = _SECONDS[np.datetime_data(fine)[0]]
+            # Half of the range: the sum must not overflow either.
+            fits = reach * per_second < 2.0**62 and np.abs(start.astype(np.int64)).max(initial=0) < 2**62
+            if fits and np.array_equal(start.astype(origin.dtype), origin):
+                break
+        ticks = np.rint(np.where(missing, 0.0, x) * per_second).astype(np.int64)
+        return np.where(
+            missing, np.datetime64("NaT"), start + ticks.astype(f"timedelta64[{np.datetime_data(fine)[0]}]")
+        )
 
     def take_batch(self, index: Any) -> TimeAxis:
         """Return the time axis of one curve or a slice of curves along the first batch axis."""

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Any, Protocol
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,25 +26,50 @@ def integrate(times: Doubles, f: Callable[[Doubles], Any], batch: tuple[int, ...
     bisection then converges to the kink. An error that does not decrease for several rounds is a rounding error, and
     bisection stops.
     """
-    times = np.broadcast_to(times, (*batch, times.shape[-1]))
-    a, b = times[..., :-1], times[..., 1:]
+    total = np.zeros(batch)
     if 0 in batch:
-        return np.zeros(batch)
+        return total
     # Values beyond the floating-point range become infinite, and a curve without a solution is NaN.
     with np.errstate(all="ignore"):
-        return _refined(a, b, f, batch, tol)
+        for own in panels(times, f, batch, tol):
+            total = total + (own.left + own.right).sum(axis=-1)
+    result: Number = total[()]
+    return result
 
 
-def _refined(a: Doubles, b: Doubles, f: Callable[[Doubles], Any], batch: tuple[int, ...], tol: float) -> Number:
-    total = np.zeros(batch)
-    whole = _rule(a, b, f)
+class Panels(NamedTuple):
+    """Intervals, and the integrals over their two halves.
+
+    Attributes
+    ----------
+    a, middle, b : ndarray, shape (*batch, k)
+        Ends and midpoints of the intervals.
+    left, right : ndarray, shape (*batch, k)
+        Integrals over the halves.
+    """
+
+    a: Doubles
+    middle: Doubles
+    b: Doubles
+    left: Doubles
+    right: Doubles
+
+    def where(self, kept: NDArray[np.bool_]) -> Panels:
+        """Return some of the intervals."""
+        return Panels(*(x[..., kept] for x in self))
+
+
+def panels(times: Doubles, f: Callable[[Doubles], Any], batch: tuple[int, ...], tol: float = EXACT) -> Iterator[Panels]:
+    """Yield intervals that cover all segments, in any order, with integrals to the relative tolerance `tol`."""
+    times = np.broadcast_to(times, (*batch, times.shape[-1]))
+    a, b = times[..., :-1], times[..., 1:]
+    whole = rule(a, b, f)
     scale = np.abs(whole).sum(axis=-1)
     before, stalled = np.full(batch, np.inf), np.zeros(batch, dtype=int)
     while True:
         middle = a / 2 + b / 2
-        halves = _rule(a, middle, f), _rule(middle, b, f)
-        better = halves[0] + halves[1]
-        error = np.abs(better - whole)
+        own = Panels(a, middle, b, rule(a, middle, f), rule(middle, b, f))
+        error = np.abs(own.left + own.right - whole)
         left = error.sum(axis=-1)
         stalled = stalled + ~(left <= before / 2)
         before = left
@@ -52,15 +77,17 @@ def _refined(a: Doubles, b: Doubles, f: Callable[[Doubles], Any], batch: tuple[i
         open_still = (stalled <= _PATIENCE)[..., None] & (error > tol * scale[..., None])
         rough = open_still.reshape(-1, a.shape[-1]).any(axis=0)
         if not rough.any():
-            result: Number = (total + better.sum(axis=-1))[()]
-            return result
-        total = total + better[..., ~rough].sum(axis=-1)
-        ends = ((a, middle), (middle, b))
-        a, b = (np.concatenate([x[..., rough], y[..., rough]], axis=-1) for x, y in ends)
-        whole = np.concatenate([half[..., rough] for half in halves], axis=-1)
+            yield own
+            return
+        yield own.where(~rough)
+        split = own.where(rough)
+        a = np.concatenate([split.a, split.middle], axis=-1)
+        b = np.concatenate([split.middle, split.b], axis=-1)
+        whole = np.concatenate([split.left, split.right], axis=-1)
 
 
-def _rule(a: Doubles, b: Doubles, f: Callable[[Doubles], Any]) -> Doubles:
+def rule(a: Doubles, b: Doubles, f: Callable[[Doubles], Any]) -> Doubles:
+    """Integrate over intervals from a to b by the Gauss–Legendre rule."""
     half = (b - a) / 2
     x = (a / 2 + b / 2)[..., None] + half[..., None] * _NODES
     values = f(np.ascontiguousarray(x.reshape(*a.shape[:-1], -1))).reshape(x.shape)
