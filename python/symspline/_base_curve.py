@@ -5,6 +5,8 @@ from __future__ import annotations
 from abc import abstractmethod
 from base64 import b64encode
 from collections.abc import Callable
+from dataclasses import replace
+from datetime import timedelta
 from html import escape
 from importlib.util import find_spec
 from io import BytesIO
@@ -14,10 +16,11 @@ import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from . import _archive
-from ._arrays import as_array, checked_flag, in_single, is_single, read_only, refuse, short_repr
+from ._arrays import as_array, checked_flag, checked_number, in_single, is_single, read_only, refuse, short_repr
 from ._core import ValidationError
 from ._curve import Curve
 from ._curves.curve import CurveArrays, SidePanel, UncertaintyBand, write_into
+from ._curves.fit import curve_of
 from ._curves.jerk import jerk
 from ._input import times_of
 from ._options import (
@@ -457,6 +460,143 @@ class SegmentedCurve(Curve[P]):
         return _archive.segments_state(
             self._format, self.space, self._t, self._time_axis, self._extrapolate, self._curve
         )
+
+    # ---- parts and copies in other times ----
+
+    def restrict(self, a: TimesLike | None = None, b: TimesLike | None = None) -> SegmentedCurve[P]:
+        """Return the part of the curve between two knots.
+
+        Parameters
+        ----------
+        a, b : float or datetime64, optional
+            First and last knot of the part. By default, the first and the last knot of the curve.
+
+        Returns
+        -------
+        HermiteSpline
+            A curve with the same segments between the two knots. It raises beyond them, as `extrapolate` is None.
+
+        Raises
+        ------
+        ValidationError
+            If a time is not a knot of every curve of the batch, or b is not after a.
+
+        Notes
+        -----
+        The part is exact, and its covariant acceleration is continuous where that of the curve is. On a curved space
+        part of a segment is in general not a cubic Bézier curve, so that curves are cut at knots only.
+
+        Examples
+        --------
+        >>> import symspline as ss
+        >>> spline = ss.CubicSpline(None, [[0.0], [1.0], [0.0], [2.0]], "r:1")
+        >>> part = spline.restrict(1, 3)
+        >>> part.t, bool(part(1.5) == spline(1.5))
+        (array([1., 2., 3.]), True)
+        """
+        knots = self._times
+        first, last = (
+            end if x is None else self._knot(x, name) for x, name, end in ((a, "a", 0), (b, "b", knots.shape[-1] - 1))
+        )
+        if not first < last:
+            raise ValidationError("b must be a later knot than a. Exchange a and b, or omit one of them.")
+        kept = slice(first, last + 1)
+        return self._in_times(self._t[..., kept], kept, 1, None)
+
+    def reverse(self) -> SegmentedCurve[P]:
+        """Return the curve in the opposite direction, over the same domain.
+
+        Returns
+        -------
+        HermiteSpline
+            A curve whose point at time x is that of this curve at time ``t[0] + t[-1] - x``.
+
+        Notes
+        -----
+        The result is exact, and its covariant acceleration is continuous where that of the curve is.
+
+        Examples
+        --------
+        >>> import symspline as ss
+        >>> spline = ss.CubicSpline([0, 1, 4], [[0.0], [1.0], [0.0]], "r:1")
+        >>> spline.reverse().t
+        array([0., 3., 4.])
+        """
+        t, last = self._t, self._t[..., -1:]
+        mirrored = (t[..., :1] + (last - t))[..., ::-1].copy()
+        # The sum can differ from the last knot by rounding.
+        mirrored[..., -1] = last[..., 0]
+        return self._in_times(mirrored, slice(None, None, -1), -1, self._policy)
+
+    def shift(self, dt: float | timedelta | np.timedelta64) -> SegmentedCurve[P]:
+        """Return the curve at times that are later by a constant.
+
+        Parameters
+        ----------
+        dt : float or timedelta64
+            Time by which the knots move. A ``timedelta`` or ``timedelta64`` if the knots are dates, otherwise a
+            number. Negative values move the curve to earlier times.
+
+        Returns
+        -------
+        HermiteSpline
+            A curve whose point at time ``x + dt`` is that of this curve at time x.
+
+        Raises
+        ------
+        ValidationError
+            If `dt` is invalid, or so large that knots coincide after rounding.
+
+        Examples
+        --------
+        >>> import symspline as ss
+        >>> ss.CubicSpline([0, 1, 4], [[0.0], [1.0], [0.0]], "r:1").shift(10).t
+        array([10., 11., 14.])
+        """
+        if self._time_axis.dates:
+            if not isinstance(dt, (timedelta, np.timedelta64)) or np.isnat(np.timedelta64(dt)):
+                raise ValidationError(f"the knots are dates, so dt must be a timedelta64, not {short_repr(dt)}")
+            return self._in_times(self._t + np.timedelta64(dt), slice(None), 1, self._policy)
+        step = checked_number(dt, "the knots are numbers, so dt must be a finite number", np.isfinite)
+        return self._in_times(
+            self._t + (dt if isinstance(dt, (int, np.integer)) else step), slice(None), 1, self._policy
+        )
+
+    def _knot(self, x: TimesLike, name: str) -> int:
+        """Return the index of a knot that is given by its time."""
+        times, own = self._core_times(x, name)
+        if times.ndim > len(self._batch) * own:
+            raise ValidationError(f"{name} must be a single time, not an array of shape {np.shape(times)}")
+        is_knot = self._times == times[..., None]
+        # The knot must have the same number in all curves of a batch.
+        found = np.flatnonzero(is_knot.reshape(-1, is_knot.shape[-1]).all(axis=0))
+        if not len(found):
+            raise ValidationError(f"{name} = {short_repr(x)} is not a knot of the curve. Pass an entry of curve.t.")
+        return int(found[0])
+
+    @property
+    def _policy(self) -> Extrapolate:
+        """The extrapolation policy without reference to the end conditions."""
+        return "periodic" if self._extrapolation_mode == "periodic" else self._extrapolate
+
+    def _in_times(self, t: Array, nodes: slice, sign: int, extrapolate: Extrapolate) -> SegmentedCurve[P]:
+        """Return the Hermite spline of some nodes at other times, with velocities multiplied by the sign."""
+        t = np.ascontiguousarray(t)
+        origin = None if self._time_axis.plain else t[..., :1] if t.ndim > 1 else t[0]
+        time_axis = replace(self._time_axis, origin=origin)
+        times = time_axis.knots(t)
+        if not (np.diff(times) > 0).all():
+            raise ValidationError("knots coincide after rounding. Use a smaller dt, or dates.")
+        index = (slice(None),) * len(self._batch) + (nodes,)
+        arrays = [
+            (np.ascontiguousarray(part.points[index]), sign * np.ascontiguousarray(part.velocities[index]))
+            for part in self._curve.parts
+        ]
+        curve = curve_of(self.space, times, arrays, fitted=False)
+        found: SegmentedCurve[P] = _archive.FORMATS["symspline-hermite"]._of(
+            time_axis, t, curve, "natural", extrapolate
+        )
+        return found
 
     # ---- comparison, text and plots ----
 
