@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._arrays import as_array, brief, refuse
-from ._core import ValidationError
+from ._arrays import as_array, brief, cast, refuse
+from ._core import ValidationError, number_lines
 from ._disk import path_of, replacing
 from ._input import times_of
 from ._spaces import Array, Doubles, SpecialEuclidean, SpecialOrthogonal
@@ -139,8 +139,10 @@ def write_tum_rows(file: Any, t: Array, poses: Doubles, head: str = "") -> None:
     ValidationError
         If dates are finer than nanoseconds, or too far from 1970 to be counted in them.
     """
-    times = _exact_seconds(t) if t.dtype.kind == "M" else t.tolist()
-    _write(file, ([time, *pose] for time, pose in zip(times, poses.tolist(), strict=True)), " ", head)
+    if t.dtype.kind == "M":
+        _write(file, poses, " ", head, _exact_seconds(t))
+    else:
+        _write(file, np.column_stack([t, poses]), " ", head)
 
 
 def _exact_seconds(dates: Array) -> list[str]:
@@ -230,7 +232,7 @@ def write_kitti(file: Any, poses: Any) -> None:
     >>> file.getvalue()
     '1.0 0.0 0.0 0.0 0.0 1.0 0.0 0.0 0.0 0.0 1.0 0.0\n'
     """
-    _write(file, _checked(poses)[:, :3].reshape(-1, 12).tolist(), " ")
+    _write(file, _checked(poses)[:, :3].reshape(-1, 12), " ")
 
 
 # ---- EuRoC: nanoseconds, x, y, z, qw, qx, qy, qz ----
@@ -313,8 +315,8 @@ def write_euroc(file: Any, t: ArrayLike, poses: Any) -> None:
         refuse(np.abs(times.astype(np.float64)) > _LAST, "t", lambda i: f"is {times[i]}, after the year 2262")
         times = np.rint(1e9 * times.astype(np.float64)).astype(np.int64)
     ns = times.astype("datetime64[ns]").astype(np.int64).tolist()
-    values = np.concatenate([x, matrix_to_quaternion(r, scalar_first=True)], axis=1).tolist()
-    _write(file, ([time, *row] for time, row in zip(ns, values, strict=True)), ",", _EUROC)
+    values = np.concatenate([x, matrix_to_quaternion(r, scalar_first=True)], axis=1)
+    _write(file, values, ",", _EUROC, map(str, ns))
 
 
 # ---- poses of two parts ----
@@ -381,7 +383,7 @@ def split(poses: ArrayLike) -> tuple[Array, Array]:
     >>> position.tolist()
     [0.0, 0.0, 0.0]
     """
-    g = as_array(poses, "poses")
+    g = _SE3._array(poses, "poses")
     if g.shape[-2:] != (4, 4):
         raise ValidationError(f"poses must have shape (..., 4, 4), not {g.shape}")
     return g[..., :3, :3].copy(), g[..., :3, 3].copy()
@@ -389,7 +391,7 @@ def split(poses: ArrayLike) -> tuple[Array, Array]:
 
 def _checked(poses: Any) -> Array:
     """Poses to write, shape (n, 4, 4)."""
-    g = join(*poses) if isinstance(poses, tuple) and len(poses) == 2 else as_array(poses, "poses")
+    g = join(*poses) if isinstance(poses, tuple) and len(poses) == 2 else _SE3._array(poses, "poses")
     _SE3.check_point(g)
     if g.ndim != 3:
         raise ValidationError(f"a file holds poses of shape (n, 4, 4), not {g.shape}")
@@ -529,9 +531,14 @@ def _name(file: Any) -> str:
     return str(name)
 
 
-def _write(file: Any, rows: Iterable[list[Any]], separator: str, head: str = "") -> None:
+def _write(file: Any, rows: Array, separator: str, head: str = "", first: Iterable[str] | None = None) -> None:
+    """Write rows of numbers as lines, which may begin with a first column of texts."""
     # The shortest text from which the same number is read.
-    text = f"{head}\n" * bool(head) + "".join(f"{separator.join(map(str, row))}\n" for row in rows)
+    text = number_lines(cast(rows), separator)
+    if first is not None:
+        lines = zip(first, text.splitlines(), strict=True)
+        text = "".join(f"{start}{separator}{line}\n" for start, line in lines)
+    text = f"{head}\n" * bool(head) + text
     path = path_of(file, method="write", text=True)
     if path is None:
         file.write(text)

@@ -39,27 +39,46 @@ def numbers(value: ArrayLike, name: str, axes: int) -> tuple[Array, float]:
     >>> numbers([1, 2], "x", 1)
     (array([1., 2.]), 1e-08)
     """
+    array, tol = _cast_numbers(value, name, axes)
+    check_finite(array, name)
+    return array.copy(), tol
+
+
+def _cast_numbers(value: ArrayLike, name: str, axes: int) -> tuple[Array, float]:
     array = as_array(value, name)
     if array.dtype.kind not in "biufc":
         raise ValidationError(f"{name} must be an array of numbers, not of {array.dtype}")
     if array.ndim < axes:
         raise ValidationError(f"{name} has shape {array.shape}, but needs at least {axes} axes")
-    tol = point_tol(array.dtype)
-    array = cast(array.copy(), np.complex128 if array.dtype.kind == "c" else np.float64)
+    return cast(array, np.complex128 if array.dtype.kind == "c" else np.float64), point_tol(array.dtype)
+
+
+def check_finite(array: Array, name: str) -> None:
+    """Raise ValidationError for numbers that are not finite."""
     refuse(~np.isfinite(array), name, lambda i: f"is {array[i]}, but must be finite; remove missing values")
-    return array, tol
 
 
 def real_numbers(value: ArrayLike, name: str, shape: tuple[int | None, ...]) -> tuple[Array, float]:
     """Return the same for real numbers with the given last axes; None allows any length except 0."""
     array, tol = numbers(value, name, len(shape))
+    _check_real(array, name, shape)
+    return array, tol
+
+
+def unchecked_numbers(value: ArrayLike, name: str, shape: tuple[int | None, ...]) -> tuple[Array, float]:
+    """Return the same for real numbers that may be infinite or NaN; the array may be `value` itself."""
+    array, tol = _cast_numbers(value, name, len(shape))
+    _check_real(array, name, shape)
+    return array, tol
+
+
+def _check_real(array: Array, name: str, shape: tuple[int | None, ...]) -> None:
     last = array.shape[array.ndim - len(shape) :]
     fits = all(n == m or (m is None and n > 0) for n, m in zip(last, shape, strict=True))
     if array.dtype.kind == "c" or not fits:
         wanted = ", ".join("n" if m is None else str(m) for m in shape)
         kind = "complex" if array.dtype.kind == "c" else "real"
         raise ValidationError(f"{name} must be real, of shape (..., {wanted}), not {kind} of shape {array.shape}")
-    return array, tol
 
 
 def square_matrices(value: ArrayLike, name: str) -> tuple[Array, float]:

@@ -41,7 +41,7 @@ from ._typing import Extrapolate, Frame, RateInterpolation, RotationOrder, Times
 from ._validation import length, one_of, real_numbers
 from ._warnings import warn
 from .convert import matrix_to_quaternion, quaternion_to_matrix
-from .convert._quaternions import checked_order
+from .convert._quaternions import checked_order, converted, quaternion_form
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
@@ -123,7 +123,8 @@ def rotation(spline: Spline, x: TimesLike, *, extrapolate: Extrapolate = None, p
             f"the value at index {missing[0].tolist()} is NaN, which SciPy's Rotation cannot hold: its curve was not "
             "fitted, or its time is outside the knots. Use spline(x), or remove these values"
         )
-    found: Rotation = Rotation.from_matrix(matrices)
+    # The conversion of matrices by SciPy orthogonalises them, which takes ten times as long.
+    found: Rotation = Rotation.from_quat(matrix_to_quaternion(matrices, scalar_first=False))
     return found
 
 
@@ -629,7 +630,7 @@ def as_quaternions(rotations: ArrayLike | Rotation, *, scalar_first: bool | None
     >>> as_quaternions([[0, -1, 0], [1, 0, 0], [0, 0, 1]], scalar_first=False).round(8)
     array([0.        , 0.        , 0.70710678, 0.70710678])
     """
-    return matrix_to_quaternion(_given(rotations), scalar_first=scalar_first)
+    return converted(_given(rotations), "rotations", "matrix", quaternion_form(scalar_first))
 
 
 def from_quaternions(quaternions: ArrayLike, *, scalar_first: bool | None = None, atol: float | None = None) -> Array:
@@ -657,7 +658,7 @@ def from_quaternions(quaternions: ArrayLike, *, scalar_first: bool | None = None
            [0., 1., 0.],
            [0., 0., 1.]])
     """
-    return quaternion_to_matrix(quaternions, scalar_first=scalar_first, atol=atol)
+    return converted(quaternions, "quaternions", quaternion_form(scalar_first), "matrix", atol)
 
 
 def as_rotation_vectors(rotations: ArrayLike | Rotation) -> Array:
@@ -678,12 +679,7 @@ def as_rotation_vectors(rotations: ArrayLike | Rotation) -> Array:
     >>> as_rotation_vectors([[0, -1, 0], [1, 0, 0], [0, 0, 1]]).round(8)
     array([0.        , 0.        , 1.57079633])
     """
-    q = as_quaternions(rotations, scalar_first=True)
-    w, v = q[..., 0], q[..., 1:]
-    sine = length(v)
-    # angle / sin(angle/2). Without a rotation v is zero, and any factor will do.
-    factor = 2 * np.arctan2(sine, w) / np.where(sine > 0, sine, 1)
-    return np.asarray(factor[..., None] * v)
+    return converted(_given(rotations), "rotations", "matrix", "vector")
 
 
 def from_rotation_vectors(vectors: ArrayLike) -> Array:
@@ -706,7 +702,7 @@ def from_rotation_vectors(vectors: ArrayLike) -> Array:
            [ 1.,  0.,  0.],
            [ 0.,  0.,  1.]])
     """
-    return _SO3.exp(np.eye(3), _hat(real_numbers(vectors, "vectors", (3,))[0]))
+    return converted(vectors, "vectors", "vector", "matrix")
 
 
 def as_rotation_6d(rotations: ArrayLike | Rotation, *, order: RotationOrder | None = None) -> Array:

@@ -6,7 +6,9 @@ use symspline_core::space::{Entry, Erased, Kernels};
 #[cfg(feature = "forms")]
 pub use symspline_forms::{PositiveDefinite, Siegel};
 #[cfg(feature = "groups")]
-pub use symspline_groups::{Rotations, SpecialEuclidean, matrix_of_quaternion, quaternion_of_matrix};
+pub use symspline_groups::{
+    Rotations, SpecialEuclidean, conversions, matrix_of_quaternion, quaternion_of_matrix,
+};
 #[cfg(feature = "stiefel")]
 pub use symspline_groups::{Stiefel, stiefel};
 #[cfg(feature = "unitary")]

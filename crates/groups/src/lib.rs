@@ -1,5 +1,6 @@
 //! Groups as symmetric spaces: rotations, unitary matrices and rigid motions.
 
+pub mod conversions;
 #[cfg(feature = "stiefel")]
 mod frame_pairs;
 #[cfg(feature = "unitary")]

@@ -88,7 +88,7 @@ fn vector(p: &[Lane], v: &[Lane]) -> Vector<Lane> {
 
 /// e^Ω as a quaternion.
 #[inline(always)]
-fn exp<S: Scalar>(omega: Vector<S>) -> Quaternion<S> {
+pub fn exp<S: Scalar>(omega: Vector<S>) -> Quaternion<S> {
     let half = Trig::new(dot(&omega, &omega) * lane(0.25));
     let [x, y, z] = omega.each(|o| o * (half.s * HALF));
     [half.c, x, y, z]
@@ -96,7 +96,7 @@ fn exp<S: Scalar>(omega: Vector<S>) -> Quaternion<S> {
 
 /// The rotation vector of a quaternion, and its angle.
 #[inline(always)]
-fn log<S: Scalar>(q: Quaternion<S>) -> (Vector<S>, Lane) {
+pub fn log<S: Scalar>(q: Quaternion<S>) -> (Vector<S>, Lane) {
     let flip = q[0].value().simd_lt(Lane::ZERO);
     let [w, v @ ..] = q.each(|x| S::select(flip, -x, x));
     // y = 1 − cos(θ/2) = sin²/(1 + cos), and θ = 2 (θ/2)/sin(θ/2) sin(θ/2).

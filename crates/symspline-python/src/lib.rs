@@ -1,6 +1,7 @@
 //! The compiled module `symspline._core`: arrays in, arrays out, validation; no mathematics.
 
 mod arrays;
+mod conversions;
 mod curves;
 mod derivative;
 mod errors;
@@ -87,6 +88,8 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(grid::grid_midpoint, m)?)?;
     m.add_function(wrap_pyfunction!(stiefel::stiefel, m)?)?;
     m.add_function(wrap_pyfunction!(tridiagonal::solve_tridiagonal, m)?)?;
+    m.add_function(wrap_pyfunction!(conversions::convert_rotations, m)?)?;
+    m.add_function(wrap_pyfunction!(conversions::number_lines, m)?)?;
     m.add_function(wrap_pyfunction!(set_num_threads, m)?)?;
     m.add_function(wrap_pyfunction!(num_threads, m)?)?;
     errors::register(m)

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .._arrays import checked_atol, refuse
-from .._core import ValidationError
-from .._quaternions import Rows, quaternion_rows, rotation_rows
-from .._validation import Array, length, off_one, real_numbers, unit_vectors, unmoved_by_underflow
+from .._core import ValidationError, convert_rotations
+from .._validation import Array, check_finite, off_one, unchecked_numbers, unit_vectors, unmoved_by_underflow
+
+Form = Literal["matrix", "scalar first", "scalar last", "vector"]
+_SHAPES: dict[Form, tuple[int, ...]] = {"matrix": (3, 3), "scalar first": (4,), "scalar last": (4,), "vector": (3,)}
 
 
 @unmoved_by_underflow()
@@ -44,19 +48,7 @@ def matrix_to_quaternion(matrix: ArrayLike, *, scalar_first: bool | None = None)
     >>> matrix_to_quaternion([[0, -1, 0], [1, 0, 0], [0, 0, 1]], scalar_first=True).round(8)
     array([0.70710678, 0.        , 0.        , 0.70710678])
     """
-    first = checked_order(scalar_first)
-    r, tol = real_numbers(matrix, "matrix", (3, 3))
-    off = off_one(r)
-    advice = "SpecialOrthogonal(3).project(matrix) projects nearby matrices onto the rotations"
-    refuse(~(off <= tol), "matrix", lambda i: f"is not a rotation: |RᵀR - 1| is {off[i]:.3e}; {advice}")
-    determinants = np.linalg.det(r)
-    what, advice = "is a reflection, not a rotation: its determinant is", "swap two columns, or change the sign of one"
-    refuse(~(determinants > 0), "matrix", lambda i: f"{what} {determinants[i]:.3g}; {advice}")
-    table = _matrices(quaternion_rows(r))
-    best = np.argmax(np.diagonal(table, axis1=-2, axis2=-1), axis=-1)
-    q = np.take_along_axis(table, best[..., None, None], axis=-2)[..., 0, :]
-    q = q / np.where(q[..., 0] < 0, -length(q), length(q))[..., None]
-    return q if first else np.roll(q, -1, axis=-1)
+    return converted(matrix, "matrix", "matrix", quaternion_form(scalar_first))
 
 
 @unmoved_by_underflow()
@@ -92,16 +84,48 @@ def quaternion_to_matrix(
            [ 0.96, -0.28,  0.  ],
            [ 0.  ,  0.  ,  1.  ]])
     """
-    first = checked_order(scalar_first)
-    q, tol = real_numbers(quaternion, "quaternion", (4,))
+    return converted(quaternion, "quaternion", quaternion_form(scalar_first), "matrix", atol)
+
+
+def converted(value: ArrayLike, name: str, form: Form, wanted: Form, atol: float | None = None) -> Array:
+    """Convert rotations to another form by the core; messages refer to them by `name`.
+
+    Raises
+    ------
+    ValidationError
+        If the numbers are not rotations within the tolerance.
+    """
+    x, tol = unchecked_numbers(value, name, _SHAPES[form])
     tol = tol if atol is None else checked_atol(atol)
-    q = unit_vectors(q, tol, "quaternion", "a unit quaternion")
-    return _matrices(rotation_rows(*np.moveaxis(q if first else np.roll(q, 1, axis=-1), -1, 0)))
+    found, valid = convert_rotations(x, form, wanted, tol)
+    if not valid:
+        check_finite(x, name)
+        if form == "matrix":
+            _check_rotations(x, tol, name)
+        elif form == "vector":
+            _check_angles(x, found, tol, name)
+        else:
+            unit_vectors(x, tol, name, "a unit quaternion")
+    return found
 
 
-def _matrices(rows: Rows) -> Array:
-    """Return matrices with the given entries."""
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+def _check_angles(v: Array, found: Array, tol: float, name: str) -> None:
+    good = off_one(found) <= tol
+    refuse(~good, name, lambda i: f"is {v[i]}, but angles must be small enough for sine and cosine; reduce them")
+
+
+def _check_rotations(r: Array, tol: float, name: str) -> None:
+    off = off_one(r)
+    advice = f"SpecialOrthogonal(3).project({name}) projects nearby matrices onto the rotations"
+    refuse(~(off <= tol), name, lambda i: f"is not a rotation: |RᵀR - 1| is {off[i]:.3e}; {advice}")
+    determinants = np.linalg.det(r)
+    what, advice = "is a reflection, not a rotation: its determinant is", "swap two columns, or change the sign of one"
+    refuse(~(determinants > 0), name, lambda i: f"{what} {determinants[i]:.3g}; {advice}")
+
+
+def quaternion_form(scalar_first: bool | None) -> Form:
+    """Return the name of the order of quaternions in the core."""
+    return "scalar first" if checked_order(scalar_first) else "scalar last"
 
 
 def checked_order(scalar_first: bool | None) -> bool:
