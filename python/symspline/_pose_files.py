@@ -16,6 +16,7 @@ from ._core import ValidationError, number_lines
 from ._disk import path_of, replacing
 from ._input import times_of
 from ._spaces import Array, Doubles, SpecialEuclidean, SpecialOrthogonal
+from ._typing import PointsLike
 from ._validation import length, off_one
 from .convert import matrix_to_quaternion, quaternion_to_matrix
 
@@ -351,18 +352,19 @@ def join(rotations: Any, positions: ArrayLike) -> Array:
     if r.shape[-2:] != (3, 3) or x.shape != (*r.shape[:-2], 3):
         raise ValidationError(
             f"rotations of shape (..., 3, 3) and positions of shape (..., 3) are needed, not {r.shape} and {x.shape}"
+            + _SO3._conversion(r.shape, "points") * (r.shape[-2:] != (3, 3))
         )
     poses = np.zeros((*x.shape[:-1], 4, 4))
     poses[..., :3, :3], poses[..., :3, 3], poses[..., 3, 3] = r, x, 1.0
     return poses
 
 
-def split(poses: ArrayLike) -> tuple[Array, Array]:
+def split(poses: PointsLike) -> tuple[Array, Array]:
     """Split poses into rotations and positions, points of ``so:3 x r:3``.
 
     Parameters
     ----------
-    poses : array_like, shape (..., 4, 4)
+    poses : array_like, shape (..., 4, 4), or scipy.spatial.transform.RigidTransform
         Points of ``se:3``.
 
     Returns

@@ -902,6 +902,10 @@ class Space(Generic[P]):
         """Return points as an array. Subclasses accept objects of other libraries as well."""
         return as_array(value, name)
 
+    def _conversion(self, shape: tuple[int, ...], name: str) -> str:
+        """Return the part of a message that names the function for values of another shape, or an empty text."""
+        return ""
+
     def _point_axes(self, array: Array) -> tuple[int, ...]:
         return tuple(range(array.ndim - len(self.point_shape), array.ndim))
 
@@ -929,6 +933,7 @@ class Space(Generic[P]):
         if array.shape[array.ndim - len(shape) :] != shape or array.ndim < len(shape):
             raise ValidationError(
                 f"{name} has shape {array.shape}, but {self!r} needs shape (..., {', '.join(map(str, shape))})"
+                f"{self._conversion(array.shape, name)}"
             )
         return cast(array, self._dtype).view(np.float64)
 

@@ -49,15 +49,32 @@ class SpecialOrthogonal(Group[FloatArray]):
     def _array(self, value: Any, name: str) -> Array:
         return super()._array(_matrices(value) if self.point_shape == (3, 3) else value, name)
 
+    def _conversion(self, shape: tuple[int, ...], name: str) -> str:
+        if self.point_shape != (3, 3):
+            return ""
+        if shape[-2:] == (4, 4) and len(shape) > 2:
+            return ". symspline.poses.split(poses) returns the rotations and positions of poses."
+        if shape[-1:] == (4,):
+            return ". symspline.rotations.from_quaternions converts quaternions to rotations."
+        if shape[-1:] != (3,):
+            return ""
+        if name in _POINTS:
+            return ". symspline.rotations.from_rotation_vectors converts rotation vectors to rotations."
+        return ". symspline.rotations.velocities(rotations, rates) converts angular velocities to tangent vectors."
+
+
+# Arguments that are points, not tangent vectors.
+_POINTS = ("points", "p", "q")
+
 
 def _are_rotations(value: Any) -> bool:
     return hasattr(value, "as_matrix") or hasattr(value, "improper")
 
 
 def _matrices(value: Any) -> Any:
-    """Return the matrices of rotations of SciPy or orix, or of a list of them; other values are returned unchanged.
+    """Return the matrices of rotations or poses, or of a list of them; other values are returned unchanged.
 
-    SciPy's rotations are recognised by their method ``as_matrix`` and those of orix by their attribute ``improper``, so
+    Objects of SciPy are recognised by their method ``as_matrix`` and those of orix by their attribute ``improper``, so
     that neither need be installed.
     """
     if hasattr(value, "as_matrix"):
@@ -167,7 +184,9 @@ class SpecialEuclidean(Group[FloatArray]):
     r"""The group SE(n) of rigid motions, or poses.
 
     A point is a homogeneous (n + 1) × (n + 1) matrix [[R, t], [0, 1]]. Geodesics are screw motions. For positions that
-    move independently of the rotation, use ``Product(SpecialOrthogonal(3), Euclidean(3))``.
+    move independently of the rotation, use ``Product(SpecialOrthogonal(3), Euclidean(3))``. A SciPy
+    ``RigidTransform`` of any shape, or a list of them, is accepted wherever points of SE(3) are, and
+    ``RigidTransform.from_matrix`` converts points back.
 
     Parameters
     ----------
@@ -198,6 +217,43 @@ class SpecialEuclidean(Group[FloatArray]):
     """
 
     _name = "se"
+
+    def _array(self, value: Any, name: str) -> Array:
+        if self.point_shape == (4, 4):
+            if isinstance(value, tuple) and len(value) == 2 and _are_parts(*value):
+                raise ValidationError(
+                    f"{name} is a pair of rotations and positions, but points of {self!r} are 4 × 4 matrices. "
+                    "symspline.poses.join(rotations, positions) returns them, and curves on so:3 x r:3 accept the pair."
+                )
+            value = _matrices(value)
+        return super()._array(value, name)
+
+    def _conversion(self, shape: tuple[int, ...], name: str) -> str:
+        if self.point_shape != (4, 4):
+            return ""
+        if shape[-1:] == (7,):
+            return (
+                ". symspline.poses.join(rotations, positions) returns poses, and "
+                "symspline.rotations.from_quaternions converts quaternions to rotations."
+            )
+        if shape[-2:] == (3, 3):
+            return ". symspline.poses.join(rotations, positions) returns poses; curves of rotations are on so:3."
+        return ""
+
+
+def _are_parts(rotations: Any, positions: Any) -> bool:
+    """Whether the first of two values looks like rotations or quaternions, and the second like positions."""
+    first, second = _shape(rotations), _shape(positions)
+    found = _are_rotations(rotations) or first[-2:] == (3, 3) or first[-1:] == (4,)
+    return found and second[-1:] == (3,)
+
+
+def _shape(value: Any) -> tuple[int, ...]:
+    """Return the shape of a value, or () if it has none."""
+    try:
+        return tuple(np.shape(value))
+    except (TypeError, ValueError, RuntimeError):
+        return ()
 
 
 # ---- groups of invertible matrices, which have no bi-invariant metric ----
