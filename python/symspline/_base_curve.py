@@ -580,7 +580,7 @@ class SegmentedCurve(Curve[P]):
         return "periodic" if self._extrapolation_mode == "periodic" else self._extrapolate
 
     def _in_times(self, t: Array, nodes: slice, sign: int, extrapolate: Extrapolate) -> SegmentedCurve[P]:
-        """Return the Hermite spline of some nodes at other times, with velocities multiplied by the sign."""
+        """Return the curve through some nodes at other times, with velocities multiplied by the sign."""
         t = np.ascontiguousarray(t)
         origin = None if self._time_axis.plain else t[..., :1] if t.ndim > 1 else t[0]
         time_axis = replace(self._time_axis, origin=origin)
@@ -592,6 +592,12 @@ class SegmentedCurve(Curve[P]):
             (np.ascontiguousarray(part.points[index]), sign * np.ascontiguousarray(part.velocities[index]))
             for part in self._curve.parts
         ]
+        return self._of_nodes(time_axis, t, times, arrays, extrapolate)
+
+    def _of_nodes(
+        self, time_axis: TimeAxis, t: Array, times: Doubles, arrays: list[tuple[Array, Array]], extrapolate: Extrapolate
+    ) -> SegmentedCurve[P]:
+        """Return the curve with given points and velocities at its knots in each factor: a Hermite spline."""
         curve = curve_of(self.space, times, arrays, fitted=False)
         found: SegmentedCurve[P] = _archive.FORMATS["symspline-hermite"]._of(
             time_axis, t, curve, "natural", extrapolate

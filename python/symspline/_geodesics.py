@@ -153,6 +153,12 @@ class PiecewiseGeodesic(SegmentedCurve[P]):
     def __repr__(self) -> str:
         return f"<PiecewiseGeodesic on {self.space!r}: {self._batch_text}{self._t.shape[-1]} points>"
 
+    def _of_nodes(
+        self, time_axis: TimeAxis, t: Array, times: Doubles, arrays: list[tuple[Array, Array]], extrapolate: Extrapolate
+    ) -> PiecewiseGeodesic[P]:
+        curve = joined(self.space, times, [points for points, _ in arrays])
+        return PiecewiseGeodesic._of(time_axis, t, curve, "natural", extrapolate)
+
     def _with(self, time_axis: TimeAxis, t: Array, curve: CurveArrays, index: Any) -> Any:
         return PiecewiseGeodesic._of(time_axis, t, curve, "natural", self._extrapolate)
 

@@ -86,3 +86,19 @@ def test_invalid_times_raise(rng):
     dated = ss.CubicSpline(np.arange("2024-01-01", "2024-01-06", dtype="M8[D]"), curve.points, "r:2")
     with pytest.raises(ss.ValidationError, match="the knots are dates, so dt must be a timedelta64, not 3"):
         dated.shift(3)
+
+
+def test_parts_of_piecewise_geodesics_are_piecewise_geodesics():
+    """Their velocities jump at the knots, so that they are not Hermite splines."""
+    rng = np.random.default_rng(9)
+    t = np.array([0.0, 0.7, 1.0, 2.5, 3.0])
+    curve = ss.PiecewiseGeodesic(t, ss.Sphere(2).random_point(rng, 5), "sphere:2")
+    x = np.linspace(0.7, 2.5, 41)
+    part, back, later = curve.restrict(0.7, 2.5), curve.reverse(), curve.shift(2)
+    for own in (part, back, later):
+        assert isinstance(own, ss.PiecewiseGeodesic)
+    for nu in (0, 1):
+        inside = ~np.isin(x, t)
+        assert np.abs(part(x, nu) - curve(x, nu))[inside].max() < 1e-12
+        assert np.abs(later(x + 2, nu) - curve(x, nu))[inside].max() < 1e-12
+        assert np.abs(back(3 - x, nu) - (-1) ** nu * curve(x, nu))[inside].max() < 1e-12
