@@ -38,6 +38,7 @@ from ._typing import AnyArray, AnyArrays, BCType, Extrapolate, File, FloatArray,
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+_LARGEST = float(np.finfo(np.float64).max)
 # Resolution of pictures in notebooks, in dots per inch.
 _DOTS = 60
 
@@ -557,10 +558,10 @@ class SegmentedCurve(Curve[P]):
             if not isinstance(dt, (timedelta, np.timedelta64)) or np.isnat(np.timedelta64(dt)):
                 raise ValidationError(f"the knots are dates, so dt must be a timedelta64, not {short_repr(dt)}")
             return self._in_times(self._t + np.timedelta64(dt), slice(None), 1, self._policy)
-        step = checked_number(dt, "the knots are numbers, so dt must be a finite number", np.isfinite)
-        return self._in_times(
-            self._t + (dt if isinstance(dt, (int, np.integer)) else step), slice(None), 1, self._policy
-        )
+        # Comparison is exact for integers of any size.
+        step = checked_number(dt, "the knots are numbers, so dt must be a finite number", lambda x: abs(x) <= _LARGEST)
+        exact = isinstance(dt, (int, np.integer)) and abs(int(dt)) < 2**62
+        return self._in_times(self._t + (dt if exact else step), slice(None), 1, self._policy)
 
     def _knot(self, x: TimesLike, name: str) -> int:
         """Return the index of a knot that is given by its time."""
