@@ -167,6 +167,6 @@ def _longest_step(part: CoreCurve) -> Doubles:
     """Return the largest distance between neighbouring points of each curve."""
     p, q = part.space._neighbours(part.points)
     if isinstance(part.space, Manifold):
-        # A manifold that is made of functions may have no distance.
+        # The distance may be unknown on a manifold that is made of functions.
         return np.full(math.prod(part.batch), np.inf)
     return np.asarray(part.space.distance(p, q).max(axis=-1, initial=0.0)).ravel()

@@ -69,7 +69,7 @@ class Field:
     gap: float
 
     def at_pixels(self, function: Callable[[Any], Array]) -> Array:
-        """Apply a function of points, one row per point, to the pixels; NaN where there is no point."""
+        """Apply a function of points, one row per point, to the pixels; NaN where nodes are missing."""
         valid = self.space._where_finite(self.pixels)
         values = function(self.pixels[valid])
         out = np.full((*valid.shape, *values.shape[1:]), np.nan)
