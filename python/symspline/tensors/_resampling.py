@@ -170,7 +170,7 @@ def _blocks(
     shape = tuple(map(len, positions))
     full = np.full((*volume.mask.shape, 3, 3), np.nan)
     full[volume.mask] = volume.tensors
-    # A spline needs two nodes per axis, so axes with a single voxel are left out.
+    # A spline needs two nodes per axis, so axes with a single voxel are omitted.
     kept = [axis for axis, n in enumerate(volume.mask.shape) if n > 1]
     nodes = full.squeeze(tuple(axis for axis in range(3) if axis not in kept))
     ends = bc_type if isinstance(bc_type, str) or len(bc_type) != 3 else [bc_type[axis] for axis in kept]
