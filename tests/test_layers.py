@@ -30,8 +30,9 @@ LAYERS = [
     ["_curves", "manifolds"],
     ["_errors", "_options", "_plotting", "_representatives", "_validation"],
     ["_archive"],
-    ["_curve"],
-    ["_base_curve", "_bspline"],
+    ["_curve", "_curve_base"],
+    ["_bspline", "_timed_curve"],
+    ["_append", "_composed", "_piecewise_cubic"],
     ["_cubic"],
     ["_functional"],
     [
@@ -93,7 +94,7 @@ def layer(name):
 def test_the_graph_is_that_of_the_package():
     assert {"_spaces.base", "_curves.curve", "_arrays"} <= GRAPH["_curves.reduced"] | GRAPH["_spaces"] | GRAPH["_time"]
     # An import inside a function.
-    assert "_plotting" in GRAPH["_base_curve"]
+    assert "_plotting" in GRAPH["_piecewise_cubic"]
 
 
 def test_every_module_imports_from_layers_below():

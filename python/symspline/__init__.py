@@ -18,10 +18,11 @@ _cpu.load(_Path(__file__).parent)
 
 from . import convert, geo, manifolds, measure, poses, quantum, rotations, shapes, subspaces, tensors, testing  # noqa: E402
 from ._bspline import BezierCurve, BSpline  # noqa: E402
+from ._composed import RetimedCurve, SegmentedCurve  # noqa: E402
 from ._config import show_config  # noqa: E402
 from ._core import ConvergenceError, CutLocusError, ValidationError, num_threads  # noqa: E402
 from ._cubic import CubicSpline  # noqa: E402
-from ._curve import Curve  # noqa: E402
+from ._curve import Curve, Derivative  # noqa: E402
 from ._curves.derivatives import Gradient  # noqa: E402
 from ._estimation import estimate  # noqa: E402
 from ._exceptions import SymsplineError  # noqa: E402
@@ -96,6 +97,7 @@ __all__ = [
     "Curve",
     "CutLocusError",
     "DeSitter",
+    "Derivative",
     "Euclidean",
     "FarPointsWarning",
     "GeneralLinear",
@@ -116,6 +118,8 @@ __all__ = [
     "Quotient",
     "RealProjective",
     "Report",
+    "RetimedCurve",
+    "SegmentedCurve",
     "Siegel",
     "Similarity",
     "SmoothingGrid",

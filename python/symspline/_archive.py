@@ -38,11 +38,13 @@ VERSION = 2
 # Texts are the same for all curves of a file.
 TEXTS = ("format", "space", "t_unit", "data_t_unit")
 _AXIS_UNIT = re.compile(r"axis_\d{1,2}_unit")
-_JSON = ("bc_type", "extrapolate", "report", "noise", "parameters", "degree", "names", "rows", "grid")
+_JSON = ("bc_type", "extrapolate", "report", "noise", "parameters", "degree", "names", "rows", "grid", "law", "plain")
 _ARRAY = re.compile(
     r"(?:version|t|data_t|knots|axis_\d{1,2})|(?:points|velocities|control_points|data|data_weights|data_information|band|matrix|turn|side|corner|variance)"
     r"(?:_\d{1,9})?"
 )
+# At most four levels of curves that are made of others.
+_PART = re.compile(r"(?:\d{1,6}/){1,4}")
 # Compressed entries are at most this much larger than the file, or of this size.
 _RATIO, _SMALL = 100, 2**24
 _Report = TypeVar("_Report")
@@ -96,17 +98,38 @@ def write(file: Any, state: Mapping[str, Any]) -> None:
         "curves are not saved (files hold no functions: pickle them, or keep t, points and velocities)",
         named=True,
     )
-    arrays: dict[str, Any] = {
-        name: value if _is_text(name) or isinstance(value, np.ndarray) else json.dumps(value, default=_as_json)
-        for name, value in state.items()
-    }
-    arrays |= {"space": str(state["space"]), "version": state["version"]}
+    arrays = _flat(state)
     path = path_of(file, method="write")
     if path is None:
         np.savez(file, **arrays)
         return
     with replacing(path) as temporary, open(temporary, "wb") as out:
         np.savez(out, **arrays)
+
+
+def _flat(state: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the arrays of a file. Those of the curves of which a curve is made have their number in front."""
+    arrays: dict[str, Any] = {}
+    for name, value in state.items():
+        if name.isdigit():
+            arrays |= {f"{name}/{key}": own for key, own in _flat(value).items()}
+        elif _is_text(name) or isinstance(value, np.ndarray):
+            arrays[name] = value
+        else:
+            arrays[name] = json.dumps(value, default=_as_json)
+    return arrays | {"space": str(state["space"]), "version": state["version"]}
+
+
+def _nested(arrays: Mapping[str, Any]) -> Stored:
+    """Return the state of a curve from the arrays of a file, the inverse of `_flat`."""
+    state, parts = Stored(), dict[str, Stored]()
+    for name, value in arrays.items():
+        number, slash, rest = name.partition("/")
+        if slash:
+            parts.setdefault(number, Stored())[rest] = value
+        else:
+            state[name] = text_in(arrays, name) if _is_text(name) else json_in(arrays, name) if name in _JSON else value
+    return Stored(state | {number: _nested(own) for number, own in parts.items()})
 
 
 def _is_text(name: str) -> bool:
@@ -116,21 +139,30 @@ def _is_text(name: str) -> bool:
 def _as_json(value: Any) -> Any:
     if isinstance(value, np.ndarray) and value.dtype.kind == "c":
         return {"re": value.real.tolist(), "im": value.imag.tolist()}
+    if not hasattr(value, "tolist"):
+        raise ValidationError(
+            "curves with a time law that is a function are not saved. Pickle them, or save the curve."
+        )
     return value.tolist()
 
 
 def read_state(file: Any) -> Stored:
     """Return the entries of an open file of curves."""
     try:
-        arrays = read(file, lambda name: _is_text(name) or name in _JSON or _ARRAY.fullmatch(name))
+        arrays = read(file, _is_entry)
     except zipfile.BadZipFile:
         raise ValidationError("this is damaged or not a symspline curve: it is not an NPZ file") from None
     if "format" not in arrays:
         raise ValidationError("this is not a symspline curve")
     check_version(arrays)
-    texts = filter(_is_text, arrays)
-    decode = dict.fromkeys(texts, text_in) | dict.fromkeys(_JSON, json_in)
-    return Stored((name, decode.get(name, Entries.get)(arrays, name)) for name in arrays)
+    return _nested(arrays)
+
+
+def _is_entry(name: str) -> bool:
+    """Whether an array of a file is an entry of a state, or of a curve of which a curve is made."""
+    found = _PART.match(name)
+    own = name[found.end() :] if found else name
+    return _is_text(own) or own in _JSON or _ARRAY.fullmatch(own) is not None
 
 
 # ---- archives ----

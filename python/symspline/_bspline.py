@@ -21,8 +21,8 @@ from ._faults import of_index
 from ._options import quantity_of
 from ._representatives import warn_of_far_data
 from ._spaces import Array, Doubles, Product, Space, point_tol, space_named
-from ._time import onto_ends
-from ._typing import FloatArray, P
+from ._time import TimeAxis, onto_ends
+from ._typing import FloatArray, P, Progress
 from .manifolds._manifold import refuse_functions
 
 
@@ -85,6 +85,7 @@ class BSpline(Curve[P]):
 
     _format = "symspline-bspline"
     _curve: ControlledCurve
+    _time_axis = TimeAxis()
 
     def __init__(self, knots: ArrayLike, control_points: ArrayLike, degree: int, space: Space[P] | str) -> None:
         space = _factor(space)
@@ -246,6 +247,7 @@ class ControlledCurve:
     """
 
     quad_rtol = EXACT
+    max_nu = 2
 
     def __init__(self, space: Space[Any], knots: Doubles, control_points: Any, degree: int) -> None:
         self.space, self.knots, self.control_points, self.degree = space, knots, control_points, degree
@@ -257,7 +259,19 @@ class ControlledCurve:
         shape: tuple[int, ...] = self.control_points.shape
         return shape[: len(shape) - len(self.space.point_shape) - 1]
 
-    def evaluate(self, x: Doubles, quantity: str, outside: str = "raise", per_curve: bool = False) -> Any:
+    @property
+    def parts(self) -> tuple[ControlledCurve]:
+        """The curve itself."""
+        return (self,)
+
+    def evaluate(
+        self,
+        x: Doubles,
+        quantity: str,
+        outside: str = "raise",
+        per_curve: bool = False,
+        progress: Progress | None = None,
+    ) -> Any:
         """A quantity at times in the domain; with ``per_curve`` the leading axes of x are the batch axes."""
         if per_curve:
             batch = self.batch

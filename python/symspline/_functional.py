@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ._arrays import refuse, short_repr
-from ._base_curve import evaluated
 from ._core import ValidationError
 from ._cubic import CubicSpline
 from ._curves import fit as fitting
+from ._curves.at_times import evaluated
 from ._curves.curve import CurveArrays
 from ._curves.ends import freeze_bc_type, take_batch
 from ._errors import raise_or_warn

@@ -8,11 +8,11 @@ from typing import Any, Self
 import numpy as np
 
 from ._archive import Entries, check_curves, read_segments
-from ._base_curve import SegmentedCurve
 from ._curves.curve import CoreCurve, CurveArrays
 from ._curves.fit import read, read_ends, validated
 from ._curves.geodesics import GeodesicCurve, joined
 from ._options import checked_extrapolate, with_atol
+from ._piecewise_cubic import PiecewiseCubic
 from ._representatives import warn_of_representatives
 from ._spaces import Array, Doubles, Space, space_named
 from ._time import TimeAxis, knots_of
@@ -23,7 +23,7 @@ from .manifolds import Manifold
 _STRAIGHT = 1e-9
 
 
-class PiecewiseGeodesic(SegmentedCurve[P]):
+class PiecewiseGeodesic(PiecewiseCubic[P]):
     r"""Join points by geodesics.
 
     The speed is constant on each segment, and the velocity jumps at the knots. On rotations, the result equals SciPy's
@@ -93,6 +93,7 @@ class PiecewiseGeodesic(SegmentedCurve[P]):
     _kind = "piecewise geodesic"
     _format = "symspline-geodesics"
     _ends = "joined by geodesics"
+    _of_velocities = False
     _unconverged = 0
 
     def __init__(

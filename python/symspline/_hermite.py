@@ -7,19 +7,19 @@ from typing import Any, Literal, Self
 from numpy.typing import ArrayLike
 
 from ._archive import Entries, check_curves, read_segments
-from ._base_curve import SegmentedCurve
 from ._curves.curve import CurveArrays
 from ._curves.fit import Points, curve_of, hermite_data, read, read_ends, validated
 from ._curves.slopes import check_method, local_velocities
 from ._functional import read_velocities
 from ._options import checked_extrapolate, with_atol
+from ._piecewise_cubic import PiecewiseCubic
 from ._representatives import warn_of_representatives
 from ._spaces import POINT_TOL, Array, Doubles, Space, factors_of, space_named
 from ._time import TimeAxis, knots_of
 from ._typing import Extrapolate, P, PointsLike, TimesLike
 
 
-class HermiteSpline(SegmentedCurve[P]):
+class HermiteSpline(PiecewiseCubic[P]):
     r"""Interpolate points and velocities by a C¹ cubic Hermite spline.
 
     Each segment is the cubic Bézier curve of a `CubicSpline`, with control points that follow from the given

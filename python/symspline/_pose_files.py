@@ -105,7 +105,7 @@ def write_tum(file: Any, t: ArrayLike, poses: Any) -> None:
     t : array_like, shape (n,)
         Times in seconds. Dates become seconds since 1970.
     poses : array_like, shape (n, 4, 4), or pair of rotations (n, 3, 3) and positions (n, 3)
-        Poses to write.
+        Poses to write. Rows of NaN, such as those in the gaps of a `SegmentedCurve`, are omitted.
 
     Raises
     ------
@@ -124,8 +124,8 @@ def write_tum(file: Any, t: ArrayLike, poses: Any) -> None:
     >>> file.getvalue()
     '0.5 0.0 0.0 0.0 0.0 0.0 0.0 1.0\n'
     """
-    r, x = split(_checked(poses))
-    times = _moments(t, len(x))
+    times, g = _timed(t, poses)
+    r, x = split(g)
     if times.dtype.kind == "M":
         times = (times - np.datetime64(0, "s")) / np.timedelta64(1, "s")
     rows = np.concatenate([x, matrix_to_quaternion(r, scalar_first=False)], axis=1)
@@ -296,7 +296,7 @@ def write_euroc(file: Any, t: ArrayLike, poses: Any) -> None:
     t : array_like of datetime64 or float, shape (n,)
         Times. Numbers are seconds since 1970 and are rounded to nanoseconds.
     poses : array_like, shape (n, 4, 4), or pair of rotations (n, 3, 3) and positions (n, 3)
-        Poses to write.
+        Poses to write. Rows of NaN, such as those in the gaps of a `SegmentedCurve`, are omitted.
 
     See Also
     --------
@@ -310,8 +310,8 @@ def write_euroc(file: Any, t: ArrayLike, poses: Any) -> None:
     >>> file.getvalue().splitlines()[1]
     '500000000,0.0,0.0,0.0,1.0,0.0,0.0,0.0'
     """
-    r, x = split(_checked(poses))
-    times = _moments(t, len(x))
+    times, g = _timed(t, poses)
+    r, x = split(g)
     if times.dtype.kind != "M":
         refuse(np.abs(times.astype(np.float64)) > _LAST, "t", lambda i: f"is {times[i]}, after the year 2262")
         times = np.rint(1e9 * times.astype(np.float64)).astype(np.int64)
@@ -389,6 +389,27 @@ def split(poses: PointsLike) -> tuple[Array, Array]:
     if g.shape[-2:] != (4, 4):
         raise ValidationError(f"poses must have shape (..., 4, 4), not {g.shape}")
     return g[..., :3, :3].copy(), g[..., :3, 3].copy()
+
+
+def _timed(t: ArrayLike, poses: Any) -> tuple[Array, Array]:
+    """Return the times and the poses to write, without rows of NaN."""
+    if isinstance(poses, tuple) and len(poses) == 2:
+        rotations, positions = (as_array(own, "poses") for own in poses)
+        missing = _missing(rotations, 2) & _missing(positions, 1)
+        times = _moments(t, len(missing))
+        return times[~missing], _checked((rotations[~missing], positions[~missing]))
+    array = _SE3._array(poses, "poses")
+    # The last row of a pose is constant.
+    missing = _missing(array[..., :3, :], 2) if array.ndim == 3 else np.zeros(array.shape[:1], bool)
+    times = _moments(t, len(missing))
+    return times[~missing], _checked(array[~missing])
+
+
+def _missing(array: Array, axes: int) -> NDArray[np.bool_]:
+    """Return which rows are NaN in all their numbers."""
+    if array.dtype.kind != "f" or array.ndim != axes + 1:
+        return np.zeros(array.shape[:1], bool)
+    return np.asarray(np.isnan(array).all(axis=tuple(range(1, axes + 1))))
 
 
 def _checked(poses: Any) -> Array:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._arrays import as_array, checked_number, refuse, short_repr, whole_number
+from ._composed import SegmentedCurve
 from ._core import ValidationError
 from ._cubic import CubicSpline
 from ._curves.fit import read_given
@@ -46,19 +47,19 @@ class SmoothCuts(CutOptions, SmoothingOptions, total=False):
 @overload
 def fit_segments(  # type: ignore[overload-overlap]
     t: TimesLike, points: PointsLike, space: Product[PProduct], *, smooth: Literal[True], **options: Unpack[SmoothCuts]
-) -> list[SmoothingSpline[PProduct, tuple[SmoothingReport, ...]]]: ...
+) -> SegmentedCurve[PProduct, SmoothingSpline[PProduct, tuple[SmoothingReport, ...]]]: ...
 
 
 @overload
 def fit_segments(
     t: TimesLike, points: PointsLike, space: SpecialEuclidean, *, smooth: Literal[True], **options: Unpack[SmoothCuts]
-) -> list[SmoothingSpline[FloatArray, tuple[SmoothingReport, ...]]]: ...
+) -> SegmentedCurve[FloatArray, SmoothingSpline[FloatArray, tuple[SmoothingReport, ...]]]: ...
 
 
 @overload
 def fit_segments(
     t: TimesLike, points: PointsLike, space: Space[P] | str, *, smooth: Literal[True], **options: Unpack[SmoothCuts]
-) -> list[SmoothingSpline[P]]: ...
+) -> SegmentedCurve[P, SmoothingSpline[P]]: ...
 
 
 @overload
@@ -69,7 +70,7 @@ def fit_segments(
     *,
     smooth: Literal[False] = False,
     **options: Unpack[FitCuts],
-) -> list[CubicSpline[P]]: ...
+) -> SegmentedCurve[P, CubicSpline[P]]: ...
 
 
 def fit_segments(
@@ -82,7 +83,7 @@ def fit_segments(
     duplicates: Duplicates = "raise",
     smooth: bool = False,
     **options: Any,
-) -> list[Any]:
+) -> SegmentedCurve[Any, Any]:
     """Fit a recording with gaps, one curve per segment.
 
     The recording is cut wherever neighbouring times are more than `max_gap` apart. A single curve across a long gap
@@ -114,8 +115,9 @@ def fit_segments(
 
     Returns
     -------
-    list of CubicSpline or list of SmoothingSpline
-        Curves in the order of time. A segment begins at ``curve.t[0]`` and ends at ``curve.t[-1]``.
+    SegmentedCurve
+        One curve per segment, a `CubicSpline` or a `SmoothingSpline`, in the order of time. The result is a sequence of
+        these curves, and also a function of time, which is NaN in the gaps.
 
     Raises
     ------
@@ -138,6 +140,12 @@ def fit_segments(
     >>> morning.t, morning.points[:, 0], noon.t
     (array([0., 1., 2.]), array([0. , 1.5, 4. ]), array([14., 15.]))
 
+    The result is also one function of time:
+
+    >>> day = ss.fit_segments([0, 1, 2, 14, 15], [[0], [1], [4], [0], [3]], "r:1", max_gap=5)
+    >>> day([1.0, 5.0, 14.5])[:, 0]
+    array([1. , nan, 1.5])
+
     Noisy data:
 
     >>> t = np.r_[0:10:0.1, 30:40:0.1]
@@ -157,12 +165,12 @@ def fit_segments(
             f"max_gap={max_gap}, and the median step is {np.median(steps) if len(steps) else 0:.3g}"
         )
     if not smooth:
-        return fit_many(curves, space, **options)
+        return SegmentedCurve(fit_many(curves, space, **options))
     own = [
         (*curve, {key: _of_rows(value, kept) for key, value in weight_options.items()})
         for curve, kept in zip(curves, rows, strict=True)
     ]
-    return smooth_many(own, space, **options)
+    return SegmentedCurve(smooth_many(own, space, **options))
 
 
 def check_smooth(smooth: Any, duplicates: str, options: dict[str, Any]) -> None:

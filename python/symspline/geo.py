@@ -19,7 +19,6 @@ from typing import TYPE_CHECKING, Any, Literal, overload
 import numpy as np
 
 from ._arrays import checked_flag, checked_number, short_repr
-from ._base_curve import check_curve
 from ._core import ValidationError
 from ._cubic import CubicSpline
 from ._estimation.along import Motion
@@ -30,6 +29,7 @@ from ._lonlat import compass, from_lonlat, to_lonlat
 from ._segments import check_smooth, cut
 from ._smoothing.many import smooth_many
 from ._spaces import Sphere
+from ._timed_curve import check_timed
 from ._typing import Duplicates, FloatArray, TimesLike
 from ._warnings import warn
 
@@ -404,6 +404,6 @@ def _fitted(curves: list[tuple[Any, Any]], names: list[str], smooth: bool, optio
 
 
 def _check_globe(spline: CubicSpline[Any, Any]) -> None:
-    check_curve(spline)
+    check_timed(spline)
     if str(spline.space) != "sphere:2":
         raise ValidationError(f"the curve must be on Sphere(2), not on {spline.space!r}")

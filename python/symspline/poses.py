@@ -25,9 +25,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ._arrays import as_array, checked_flag, short_repr
-from ._base_curve import check_curve, evaluated
 from ._core import ValidationError
-from ._curves.curve import CurveArrays
+from ._curves.at_times import evaluated
+from ._curves.composed import AnyCurve
 from ._estimation.along import Motion
 from ._estimation.uncertainty import Jacobians, check_uncertain, standard_errors
 from ._pose_files import (
@@ -43,6 +43,7 @@ from ._pose_files import (
 )
 from ._smoothing.factors import smoothed_spaces
 from ._spaces import Array, Euclidean, SpecialEuclidean, SpecialOrthogonal, cover_of
+from ._timed_curve import check_timed
 from ._typing import Extrapolate, Frame, TimesLike
 from ._validation import one_of
 from .rotations import Spline, attitude, rate_jacobians, turned
@@ -192,11 +193,11 @@ def imu(
     >>> bool(np.all(std.gyro < 0.05)), bool(np.all(std.specific_force < 0.5))
     (True, True)
     """
-    check_curve(spline)
+    check_timed(spline)
     g = as_array(gravity, "gravity")
     if g.shape != (3,) or g.dtype.kind not in "iuf" or not np.isfinite(g).all():
         raise ValidationError(f"gravity must be three numbers, a vector in the world, not {short_repr(gravity)}")
-    check_seconds(spline.t, "t")
+    check_seconds(np.asarray(spline.domain), "t")
     motion = _Motion(spline, x, "body", extrapolate, per_curve)
     found = Imu(motion.turning, motion.in_frame(motion.position("acceleration") - g))
     if not checked_flag(return_std, "return_std"):
@@ -377,5 +378,5 @@ class _Motion:
         """Rᵀv for vectors in the world if the frame is that of the body."""
         return turned(np.swapaxes(self.rotation, -1, -2), v) if self._in_body else v
 
-    def _at(self, curve: CurveArrays, quantity: str) -> Array:
+    def _at(self, curve: AnyCurve, quantity: str) -> Array:
         return np.asarray(evaluated(curve, self._time_axis, self._x, quantity, self._where, self._per_curve))

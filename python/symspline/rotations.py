@@ -23,9 +23,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ._arrays import checked_flag, refuse, short_repr
-from ._base_curve import check_curve, evaluated
 from ._core import ValidationError
 from ._cubic import CubicSpline
+from ._curves.at_times import evaluated
+from ._curves.composed import Joined, Retimed
 from ._curves.curve import CurveArrays
 from ._curves.fit import curve_of
 from ._estimation.along import Motion
@@ -37,6 +38,7 @@ from ._smoothing.factors import smoothed_spaces
 from ._spaces import Array, Doubles, SpecialEuclidean, SpecialOrthogonal, Sphere, cover_of
 from ._spaces.point_groups import elements, proper_symbol
 from ._time import knots_of
+from ._timed_curve import check_timed
 from ._typing import Extrapolate, Frame, RateInterpolation, RotationOrder, TimesLike
 from ._validation import length, one_of, real_numbers
 from ._warnings import warn
@@ -325,8 +327,9 @@ def quaternion(
     first = checked_order(scalar_first)
     curve = _lift(attitude(spline))
     where = spline._where(extrapolate)
-    ends = curve.points[..., 0, :], curve.points[..., -1, :]
-    if where == "periodic" and np.any(_dot(*ends) < 0):
+    # Only curves with knots are periodic.
+    ends = (curve.points[..., 0, :], curve.points[..., -1, :]) if where == "periodic" else None
+    if ends is not None and np.any(_dot(*ends) < 0):
         times, per_curve = spline._time_axis.at(x, curve.batch, per_curve, curve.times)
         times, turns = _wrapped(curve, times, per_curve)
         q = curve.evaluate(times, "point", "raise", True)
@@ -370,7 +373,7 @@ def velocities(rotations: ArrayLike | Rotation, rates: ArrayLike, frame: Frame =
     return (r @ hat if frame == "body" else hat @ r) + 0.0
 
 
-def attitude(spline: Spline) -> CurveArrays:
+def attitude(spline: Spline) -> Any:
     """Return the curve of the rotations alone, on SO(3).
 
     Raises
@@ -378,16 +381,22 @@ def attitude(spline: Spline) -> CurveArrays:
     ValidationError
         If the curve does not contain exactly one rotation.
     """
-    check_curve(spline)
+    check_timed(spline)
     found = [part for part in spline._curve.parts if cover_of(part.space) in (_SO3, _SE3)]
     if len(found) != 1:
         raise ValidationError(
             f"the curve must be on so:3, se:3, or a product with one of them, not on {spline.space}; to convert "
             "quaternions to points of so:3, use symspline.rotations.from_quaternions"
         )
-    curve = found[0]
+    return _rotations_of(found[0])
+
+
+def _rotations_of(curve: Any) -> Any:
+    """Return the curve of the rotations of a curve on SO(3) or SE(3)."""
     if cover_of(curve.space) == _SO3:
         return curve
+    if isinstance(curve, (Joined, Retimed)):
+        return curve.map(_rotations_of)
     if curve not in _ATTITUDES:
         # The rotation of a screw motion is a geodesic of SO(3), and so the control points are those of its curve.
         parts = [np.ascontiguousarray(array[..., :3, :3]) for array in (curve.points, curve.velocities)]
@@ -425,12 +434,16 @@ def _dot(p: Array, q: Array) -> Array:
     return result
 
 
-def _lift(curve: CurveArrays) -> CurveArrays:
+def _lift(curve: Any) -> Any:
     """Return the curve on S³ above a curve on SO(3).
 
     The Bézier segments of one are above those of the other if neighbouring control points differ by less than half a
     turn. The signs at the knots follow from the quaternions of the control points.
     """
+    if isinstance(curve, Retimed):
+        return curve.map(_lift)
+    if isinstance(curve, Joined):
+        return _without_jumps(curve.map(_lift))
     if curve not in _LIFTS:
         q = matrix_to_quaternion(curve.points, scalar_first=True)
         # q' = ½ q (0, ω), and so half the velocity of the rotation in the frame that q makes.
@@ -441,6 +454,26 @@ def _lift(curve: CurveArrays) -> CurveArrays:
         np.cumprod(changes, axis=-1, out=signs[..., 1:, 0])
         _LIFTS[curve] = _above(curve, signs * q, signs * rate)
     return _LIFTS[curve]
+
+
+def _without_jumps(curve: Joined) -> Joined:
+    """Return a curve on S³ with signs such that each section begins near the end of the one before."""
+    sections = [curve.sections[0]]
+    for own in curve.sections[1:]:
+        times = np.asarray(sections[-1].times[-1]), np.asarray(own.times[0])
+        end, start = (
+            each.evaluate(x, "point", "raise", False) for each, x in zip((sections[-1], own), times, strict=True)
+        )
+        sections.append(_multiplied(own, np.where(_dot(end, start) < 0, -1.0, 1.0)))
+    return Joined(sections, curve.offsets)
+
+
+def _multiplied(curve: Any, sign: Any) -> Any:
+    """Return a curve on S³ multiplied by 1 or -1, one number per curve."""
+    if isinstance(curve, (Joined, Retimed)):
+        return curve.map(lambda own: _multiplied(own, sign))
+    factor = np.asarray(sign)[..., None, None]
+    return _above(curve, factor * curve.points, factor * curve.velocities)
 
 
 def _above(curve: CurveArrays, q: Array, velocities: Array) -> CurveArrays:

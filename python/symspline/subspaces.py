@@ -21,12 +21,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._arrays import as_array, cast, checked_number, refuse, whole_number
-from ._base_curve import check_curve
 from ._core import CutLocusError, ValidationError
 from ._cubic import CubicSpline
 from ._grid import GridSpline
 from ._grid.axes import coordinates
 from ._input import times_of
+from ._piecewise_cubic import check_curve
 from ._spaces import (
     ComplexGrassmannian,
     Euclidean,

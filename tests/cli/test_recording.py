@@ -62,7 +62,7 @@ def test_means_are_those_of_the_library(run, name):
     t = np.array([0.0, 1, 1, 1, 1, 2, 3, 3, 4])
     write_table("a.npz", {"t": t, **numbered(p)})
     run(f"fit a.npz --space '{name}' --dedup mean -o b.npz")
-    assert [ss.load("b.npz")] == ss.fit_segments(t, p, space, max_gap=9, duplicates="mean")
+    assert [ss.load("b.npz")] == list(ss.fit_segments(t, p, space, max_gap=9, duplicates="mean"))
 
 
 def test_max_gap(run, fit, fails):

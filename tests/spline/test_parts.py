@@ -71,11 +71,9 @@ def test_batches_with_their_own_knots(rng):
 
 def test_invalid_times_raise(rng):
     curve = ss.CubicSpline(None, rng.standard_normal((5, 2)), "r:2")
-    with pytest.raises(ss.ValidationError, match=r"a = 0\.5 is not a knot of the curve"):
-        curve.restrict(0.5, 3)
     with pytest.raises(ss.ValidationError, match=r"b = 9\.0 is outside the knots"):
         curve.restrict(0, 9)
-    with pytest.raises(ss.ValidationError, match="b must be a later knot than a"):
+    with pytest.raises(ss.ValidationError, match="b must be after a"):
         curve.restrict(3, 3)
     with pytest.raises(ss.ValidationError, match="a must be a single time"):
         curve.restrict([0, 1])

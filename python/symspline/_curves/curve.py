@@ -92,6 +92,8 @@ class CoreCurve:
     velocities: Any
     # Whether the core computes points in the space itself, and not in a smaller one.
     _compiled: ClassVar[bool] = True
+    # Highest order of derivatives.
+    max_nu: ClassVar[int] = 3
 
     def __init__(self, space: Space, times: Doubles, points: Array, velocities: Array, fitted: bool = True) -> None:
         self.space, self.times, self.points, self.velocities = space, times, points, velocities
@@ -264,6 +266,8 @@ class ProductCurve:
 
     Points, velocities and results of methods are tuples with one entry per factor.
     """
+
+    max_nu: ClassVar[int] = 3
 
     def __init__(self, space: Space[Any], parts: tuple[CoreCurve, ...]) -> None:
         self.space: Space[Any] = space

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from .._base_curve import call_at_times
 from .._core import ValidationError
+from .._curves.at_times import call_at_times
 from .._smoothing import SmoothingSpline
 from .._smoothing.factors import smoothed_spaces, split
 from .._spaces import Doubles, factors_of

@@ -9,9 +9,9 @@ import numpy as np
 import xarray as xr
 
 from .._adapters import joined
-from .._base_curve import call_at_times
 from .._core import ConvergenceError, CutLocusError, ValidationError
 from .._cubic import CubicSpline
+from .._curves.at_times import call_at_times
 from .._functional import given
 from .._report import Report, columns_of
 from .._spaces import Array, Space

@@ -46,6 +46,10 @@ def curves():
             (DATES, None), TURNS[None] @ TURNS[[0, 2, 1], None], "so:3", bc_type=("natural", "clamped")
         ),
         "smoothing_grid": ss.make_smoothing_grid((range(5), [0, 1, 3, 4]), NOISY_SURFACE, "r:1", lam=(0.1, 0.2)),
+        "part": ss.CubicSpline(DATES, P, "sphere:2").restrict(DATES[0], DATES[1] + np.timedelta64(90, "m")),
+        "segments": ss.SegmentedCurve(
+            [spline.restrict(0, 1), spline.reverse().shift(2.5), spline.restrict(2.5).shift(9)]
+        ),
         "several": {"a": spline, "b": spline},
         "several_smoothing": {"a": smooth, "b": smooth},
     }

@@ -1,0 +1,335 @@
+"""Curves made of other curves: with other times, and one after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+from itertools import pairwise
+from types import GenericAlias
+from typing import TYPE_CHECKING, Any, Generic, Literal, Self, overload
+
+import numpy as np
+
+from ._archive import VERSION, Entries, entry, read_times, restore, times_state
+from ._arrays import short_repr
+from ._core import ValidationError
+from ._curve import Curve
+from ._curves.composed import Affine, Joined, Retimed, TimeMap, part_of_times
+from ._options import checked_extrapolate, extrapolation_mode
+from ._spaces import Doubles, Space
+from ._time import TimeAxis
+from ._timed_curve import TimedCurve
+from ._typing import Extrapolate, P, Time
+
+if TYPE_CHECKING:
+    from typing_extensions import TypeVar
+
+    # The class of the segments.
+    C = TypeVar("C", bound=Curve[Any], covariant=True, default=Curve[Any])
+else:
+    from typing import TypeVar
+
+    C = TypeVar("C", covariant=True)
+
+
+# Domains that overlap by rounding, in units in the last place.
+_ROUNDING = 4
+
+
+class ComposedCurve(TimedCurve[P]):
+    """Base class of curves that are made of other curves."""
+
+    _curve: Joined | Retimed
+
+    def _compose(self, time_axis: TimeAxis, curve: Any, extrapolate: Extrapolate) -> None:
+        self._time_axis, self._curve, self._extrapolate = time_axis, curve, extrapolate
+        self._extrapolation_mode = self._where(extrapolate)
+
+    @property
+    def space(self) -> Space[P]:
+        """Space of the curve."""
+        return self._curve.space
+
+    @property
+    def domain(self) -> tuple[Time, Time]:
+        """First and last time."""
+        first, last = (self._shown_times(np.asarray(self._curve.times[..., i]))[()] for i in (0, -1))
+        return first, last
+
+    def _where(self, extrapolate: Any) -> str:
+        mode = extrapolation_mode(checked_extrapolate(extrapolate), "natural")
+        if mode not in ("raise", "nan"):
+            raise ValidationError(
+                f"extrapolate must be None, 'raise' or False, not {extrapolate!r}, for a {type(self).__name__}"
+            )
+        return mode
+
+
+class RetimedCurve(ComposedCurve[P]):
+    """A curve at other times.
+
+    The methods `Curve.restrict`, `Curve.reverse`, `Curve.shift` and `Curve.retime` return curves of this class. It
+    evaluates the original curve, so that its points and derivatives are exact.
+
+    See Also
+    --------
+    Curve.retime : Return the same path with another time law.
+    Curve.restrict : Return the part of a curve between two times.
+
+    Notes
+    -----
+    Curves with a general time law are not saved; the law is a function. They can be pickled if the law can be.
+
+    Examples
+    --------
+    >>> import symspline as ss
+    >>> quarter = ss.CubicSpline(None, [[1, 0, 0], [0, 1, 0]], "sphere:2")
+    >>> part = quarter.restrict(0.25, 0.5)
+    >>> part
+    <RetimedCurve on Sphere(2): from 0.25 to 0.5>
+    >>> round(float(part.length()), 8)
+    0.39269908
+    """
+
+    _format = "symspline-retimed"
+    _curve: Retimed
+    _source: Curve[P]
+
+    def __init__(self) -> None:
+        raise TypeError("curves of this class are made by the methods restrict, reverse, shift and retime of a curve")
+
+    def _fill(self, *parts: Any) -> None:
+        source: Curve[P]
+        law: TimeMap
+        source, time_axis, law, times = parts
+        self._source = source
+        self._compose(time_axis, Retimed(source._curve, law, times), None)
+
+    def _restricted(self, start: Doubles, stop: Doubles) -> Self:
+        times = part_of_times(self._curve.times, start, stop, self._batch)
+        return self._of(self._source, self._time_axis, self._curve.law, times)
+
+    def _picked(self, index: Any) -> Self:
+        times, law = self._curve.times, self._curve.law
+        if isinstance(law, Affine) and np.ndim(law.offset):
+            law = Affine(law.sign, law.offset[index])
+        own = times[index] if times.ndim > 1 else times
+        return self._of(self._source[index], self._time_axis.take_batch(index), law, own)
+
+    def _state(self) -> dict[str, Any]:
+        law: Any = self._curve.law
+        if isinstance(law, Affine):
+            law = {"sign": law.sign, "offset": np.asarray(law.offset)}
+        origin = np.atleast_1d(0.0 if self._time_axis.plain else self._time_axis.origin)
+        head = {"format": self._format, "version": VERSION, "space": self.space}
+        axis = {"plain": self._time_axis.plain} | times_state("t", origin, self._time_axis)
+        return head | axis | {"law": law, "knots": self._curve.times, "0": self._source._state()}
+
+    @classmethod
+    def _from_state(cls, state: Entries) -> Self:
+        source, law, times = restore(state["0"]), state["law"], state["knots"]
+        with entry("law"):
+            if isinstance(law, dict):
+                offset = np.asarray(law["offset"], np.float64)
+                law = Affine({-1: -1, 1: 1}[law["sign"]], offset if offset.ndim else float(offset))
+        time_axis, origin = read_times(state, "t")
+        time_axis = replace(time_axis, origin=None if state["plain"] else origin if np.ndim(times) > 1 else origin[0])
+        with entry("knots"):
+            if not (np.isfinite(times).all() and (np.diff(times) >= 0).all() and times.shape[-1] > 1):
+                raise ValidationError("the times do not increase")
+            curve = cls._of(source, time_axis, law, times)
+            curve._curve.evaluate(times, "point", "raise", times.ndim > 1)
+        return curve
+
+    def __eq__(self, other: object) -> bool:
+        """Whether both are the same curve at the same times."""
+        if not isinstance(other, RetimedCurve):
+            return NotImplemented
+        return (
+            self._source == other._source
+            and np.array_equal(np.asarray(self.domain), np.asarray(other.domain))
+            and self._curve.law == other._curve.law
+            and np.array_equal(self._curve.times, other._curve.times)
+        )
+
+    def __repr__(self) -> str:
+        return f"<RetimedCurve on {self.space!r}: {self._batch_text}{_span_text(self)}>"
+
+
+class SegmentedCurve(ComposedCurve[P], Generic[P, C]):
+    """Curves one after the other, with gaps between them.
+
+    This is one function of time and a sequence of its segments. It is NaN in the gaps, where there are no data.
+    `fit_segments` returns it for a recording with gaps.
+
+    Parameters
+    ----------
+    curves : sequence of Curve
+        The segments, in the order of time, on one space. A segment must not begin before the previous one ends. They
+        may be batches of curves that share their times, with equal batch axes.
+    extrapolate : {None, "raise", False}, default None
+        Extrapolation policy for times before the first and after the last segment. None and ``"raise"`` raise
+        `ValidationError`, False gives NaN.
+
+    Raises
+    ------
+    ValidationError
+        If there are no curves, or they do not meet the requirements above.
+
+    See Also
+    --------
+    fit_segments : Fit a recording with gaps, one curve per segment.
+    Curve.concatenate : Join two curves that meet.
+
+    Notes
+    -----
+    Where two segments meet, the result has the values of the later one. Lengths and bending energies are sums over the
+    segments.
+
+    Examples
+    --------
+    >>> import symspline as ss
+    >>> morning = ss.CubicSpline([0, 1, 2], [[0.0], [1.0], [4.0]], "r:1")
+    >>> noon = ss.CubicSpline([14, 15], [[0.0], [3.0]], "r:1")
+    >>> day = ss.SegmentedCurve([morning, noon])
+    >>> day([1.0, 5.0, 14.5])[:, 0]
+    array([1. , nan, 1.5])
+    >>> len(day), day[1] is noon
+    (2, True)
+    """
+
+    _format = "symspline-segments"
+    _curve: Joined
+
+    def __init__(self, curves: Sequence[C], *, extrapolate: Literal["raise", False] | None = None) -> None:
+        segments = _checked_segments(curves)
+        time_axis = segments[0]._time_axis
+        offsets = [_offset(own._time_axis, time_axis) for own in segments]
+        joined = Joined([own._curve for own in segments], offsets)
+        _check_order(segments, joined)
+        self._fill(segments, time_axis, joined, extrapolate)
+
+    def _fill(self, *parts: Any) -> None:
+        self._segments: tuple[C, ...] = parts[0]
+        self._compose(*parts[1:])
+
+    def _of_segments(self, segments: Any) -> Self:
+        """Return other segments with the same extrapolation policy."""
+        policy: Any = self._extrapolate
+        return type(self)(segments, extrapolate=policy)
+
+    @property
+    def gaps(self) -> list[tuple[Time, Time]]:
+        """Pairs of times between which there is no segment."""
+        ends = [own.domain for own in self._segments]
+        return [(a[1], b[0]) for a, b in pairwise(ends) if b[0] > a[1]]
+
+    if not TYPE_CHECKING:
+        # The class of the segments may be omitted at run time, too.
+        __class_getitem__ = classmethod(GenericAlias)
+
+    def __len__(self) -> int:
+        """Return the number of segments."""
+        return len(self._segments)
+
+    @overload  # type: ignore[override]
+    def __getitem__(self, index: int | np.integer[Any]) -> C: ...
+    @overload
+    def __getitem__(self, index: slice[Any, Any, Any]) -> SegmentedCurve[P, C]: ...
+    def __getitem__(self, index: Any) -> Any:
+        """Return one segment, or the curve of several consecutive ones."""
+        if isinstance(index, slice):
+            return self._of_segments(self._segments[index])
+        if not isinstance(index, (int, np.integer)):
+            raise TypeError(f"the index of a segment must be an integer or a slice, not {short_repr(index)}")
+        return self._segments[index]
+
+    def __iter__(self) -> Iterator[C]:  # type: ignore[override]
+        return iter(self._segments)
+
+    def _picked(self, index: Any) -> Self:
+        return self._of_segments([own[index] for own in self._segments])
+
+    def _restricted(self, start: Doubles, stop: Doubles) -> Curve[P]:
+        kept: list[Any] = []
+        for own, offset in zip(self._segments, self._curve.offsets, strict=True):
+            first, last = own._curve.times[[0, -1]] + offset
+            if max(first, start) < min(last, stop):
+                ends = (np.asarray(max(first, start) - offset), np.asarray(min(last, stop) - offset))
+                kept.append(own if start <= first and last <= stop else own._restricted(*ends))
+        if not kept:
+            raise ValidationError("there is no segment between a and b, which are in one gap")
+        return self._of_segments(kept)
+
+    def _shifted(self, step: Any) -> Curve[P]:
+        return self._of_segments([own._shifted(step) for own in self._segments])
+
+    def _state(self) -> dict[str, Any]:
+        head = {"format": self._format, "version": VERSION, "space": self.space, "extrapolate": self._extrapolate}
+        return head | {str(i): own._state() for i, own in enumerate(self._segments)}
+
+    @classmethod
+    def _from_state(cls, state: Entries) -> Self:
+        segments = [restore(state[str(i)]) for i in range(sum(name.isdigit() for name in state))]
+        with entry("extrapolate"):
+            return cls(segments, extrapolate=state["extrapolate"])
+
+    def __eq__(self, other: object) -> bool:
+        """Whether all segments are equal."""
+        return self._segments == other._segments if isinstance(other, SegmentedCurve) else NotImplemented
+
+    def __repr__(self) -> str:
+        batch = f"{' x '.join(map(str, self._batch))} curves, " if self._batch else ""
+        return f"<SegmentedCurve on {self.space!r}: {batch}{len(self)} segments, {_span_text(self)}>"
+
+
+def _span_text(curve: Curve[Any]) -> str:
+    first, last = curve.domain
+    return f"from {first} to {last}" if not np.ndim(first) else "with times of their own"
+
+
+def _checked_segments(curves: Any) -> tuple[Any, ...]:
+    if isinstance(curves, Curve) or not isinstance(curves, Iterable):
+        raise TypeError(f"curves must be a sequence of curves, not {short_repr(curves)}")
+    segments = tuple(curves)
+    if not segments:
+        raise ValidationError("curves is empty; pass at least one curve")
+    first = segments[0]
+    for i, own in enumerate(segments):
+        if not isinstance(own, Curve):
+            raise TypeError(f"curves[{i}] must be a curve, not {short_repr(own)}")
+        if own.space != first.space:
+            raise ValidationError(f"curves[{i}] is on {own.space!r}, but curves[0] is on {first.space!r}")
+        if own._batch != first._batch:
+            raise ValidationError(f"curves[{i}] has batch axes {own._batch}, but curves[0] has {first._batch}")
+        if own._curve.times.ndim > 1:
+            raise ValidationError(
+                f"curves[{i}] is a batch whose curves have their own times. Make one SegmentedCurve per curve."
+            )
+        if (own._time_axis.dates, own._time_axis.zone) != (first._time_axis.dates, first._time_axis.zone):
+            raise ValidationError(
+                f"curves[{i}] has times of another kind than curves[0]. Use numbers for all, or dates for all, with or "
+                "without a time zone."
+            )
+    return segments
+
+
+def _offset(time_axis: TimeAxis, reference: TimeAxis) -> float:
+    """Return the origin of a time axis as a number of another one."""
+    if time_axis.plain and reference.plain:
+        return 0.0
+    if reference.dates:
+        return float(reference.knots(np.asarray(time_axis.origin)))
+    # Differences of integers are exact.
+    return float((0 if time_axis.plain else time_axis.origin) - (0 if reference.plain else reference.origin))
+
+
+def _check_order(segments: Sequence[Any], joined: Joined) -> None:
+    """Raise ValidationError if a segment begins before the previous one ends."""
+    for i in range(1, len(segments)):
+        stop, start = joined.stops[i - 1], joined.starts[i]
+        if start < stop - _ROUNDING * np.spacing(max(abs(start), abs(stop))):
+            raise ValidationError(
+                f"curves[{i}] begins at {segments[i].domain[0]}, before curves[{i - 1}] ends at "
+                f"{segments[i - 1].domain[1]}. Sort the curves by time, or restrict them."
+            )

@@ -1,0 +1,327 @@
+"""Curves that are made of other curves: one after the other, or the same path at other times.
+
+They satisfy the protocol `integrals.Evaluable`, with times as numbers of the core, and have the same factors as the
+curves of which they are made.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._arrays import refuse
+from .._core import ValidationError
+from .._spaces import Doubles, Product, Space, product_norm
+from .._typing import Progress
+from .curve import NORMS, CoreCurve, ProductCurve
+from .jerk import jerk
+
+# The quantities of each order that follow from those of lower orders by the chain rule.
+_ORDERS = {
+    "point": ("point",),
+    "velocity": ("velocity",),
+    "acceleration": ("velocity", "acceleration"),
+    "jerk": ("velocity", "acceleration", "jerk"),
+    "body velocity": ("body velocity",),
+    "body acceleration": ("body velocity", "body acceleration"),
+}
+# Relative rounding error of a law at the ends of the curve.
+_ROUNDING = 1e-9
+
+
+class AnyCurve(Protocol):
+    """Curves of a batch: arrays, control points, or a composition of other curves."""
+
+    @property
+    def space(self) -> Space[Any]: ...
+    @property
+    def times(self) -> Doubles: ...
+    @property
+    def batch(self) -> tuple[int, ...]: ...
+    @property
+    def quad_rtol(self) -> float: ...
+    @property
+    def max_nu(self) -> int:
+        """Highest order of derivatives."""
+        ...
+
+    @property
+    def parts(self) -> tuple[Any, ...]:
+        """One curve per factor of a product; the curve itself on other spaces."""
+        ...
+
+    def evaluate(
+        self, x: Doubles, quantity: str, outside: str, per_curve: bool, progress: Progress | None = None
+    ) -> Any: ...
+
+
+class TimeMap(Protocol):
+    """Times of a curve as a function of other times, with derivatives."""
+
+    def __call__(self, x: Any, nu: int = 0, /) -> Any: ...
+
+
+@dataclass(frozen=True, eq=False)
+class Affine:
+    """The map that takes x to ``offset + sign * x``.
+
+    Attributes
+    ----------
+    sign : int
+        1 or -1.
+    offset : ndarray or float
+        One number, or one per curve.
+    """
+
+    sign: int = 1
+    offset: Any = 0.0
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Affine):
+            return NotImplemented
+        return self.sign == other.sign and np.array_equal(self.offset, other.offset)
+
+    def __call__(self, x: Any, nu: int = 0, /) -> Any:
+        if nu:
+            return np.full(np.shape(x), float(self.sign) if nu == 1 else 0.0)
+        offset = np.asarray(self.offset)
+        if offset.ndim:
+            offset = offset.reshape(offset.shape + (1,) * (np.ndim(x) - offset.ndim))
+        return offset + self.sign * x
+
+
+class Joined:
+    """Curves one after the other, with gaps where one ends before the next begins.
+
+    Values in gaps are NaN. Lengths and energies are sums over the curves, so that gaps contribute nothing.
+
+    Attributes
+    ----------
+    sections : tuple of curves
+        The curves, on one space and with the same batch axes. Curves of a batch share their times.
+    offsets : tuple of float
+        Origins of the times of the sections.
+    times : ndarray
+        Times between which the curves are smooth.
+    """
+
+    def __init__(self, sections: Sequence[AnyCurve], offsets: Sequence[float]) -> None:
+        self.sections, self.offsets = tuple(sections), tuple(offsets)
+        self.space: Space[Any] = sections[0].space
+        self.batch = sections[0].batch
+        self.quad_rtol = max(own.quad_rtol for own in sections)
+        knots = [own.times + offset for own, offset in zip(sections, offsets, strict=True)]
+        self.starts, self.stops = (np.array([own[i] for own in knots]) for i in (0, -1))
+        self.times = np.unique(np.concatenate(knots))
+        self.max_nu = min(own.max_nu for own in sections)
+
+    @property
+    def parts(self) -> tuple[Any, ...]:
+        """The same curves in each factor of a product."""
+        if not isinstance(self.space, Product):
+            return (self,)
+        return tuple(Joined(own, self.offsets) for own in zip(*(own.parts for own in self.sections), strict=True))
+
+    def map(self, function: Callable[[Any], Any]) -> Joined:
+        """Return the curve whose sections are the values of a function of the sections."""
+        return Joined([function(own) for own in self.sections], self.offsets)
+
+    def evaluate(
+        self, x: Doubles, quantity: str, outside: str, per_curve: bool, progress: Progress | None = None
+    ) -> Any:
+        """Evaluate a quantity at times x; see `CoreCurve.evaluate`. Only ``"continue"`` gives zero norms in gaps."""
+        _check_inside(self, x, outside, per_curve)
+        shape = x.shape[len(self.batch) :] if per_curve else x.shape
+        flat = x.reshape((*self.batch, -1) if per_curve else -1)
+        number = np.clip(np.searchsorted(self.starts, flat, side="right") - 1, 0, len(self.starts) - 1)
+        gap = (flat < self.starts[number]) | (flat > self.stops[number])
+        # A call without times evaluates the first section, for the type and the shape of its values.
+        used = np.unique(number) if number.size else np.zeros(1, np.intp)
+        found = []
+        for done, i in enumerate(used):
+            here = number == i
+            columns = here.reshape(-1, here.shape[-1]).any(axis=0)
+            values = self._in_section(i, flat[..., columns], quantity, per_curve)
+            found.append((here, columns, values))
+            if progress is not None:
+                progress(done + 1, len(used))
+        missing = 0.0 if outside == "continue" and quantity in NORMS else np.nan
+
+        def assembled(*values: Any) -> Any:
+            return self._assembled(found, values, gap, missing).reshape(
+                (*self.batch, *shape, *values[0].shape[len(self.batch) + 1 :])
+            )
+
+        return _by_factor(assembled, [values for *_, values in found])
+
+    def _in_section(self, i: int, x: Doubles, quantity: str, per_curve: bool) -> Any:
+        own = self.sections[i]
+        times = np.clip(x, self.starts[i], self.stops[i]) - self.offsets[i]
+        # The difference can exceed the ends by rounding.
+        times = np.ascontiguousarray(np.clip(times, own.times[0], own.times[-1]))
+        return values_at(own, times, quantity, "raise", per_curve)
+
+    def _assembled(self, found: list[Any], values: Sequence[Any], gap: NDArray[np.bool_], missing: float) -> Any:
+        """Return the values of all sections in one array of shape (*batch, m, ...)."""
+        axes, rest = (slice(None),) * len(self.batch), values[0].shape[len(self.batch) + 1 :]
+        result = np.full((*self.batch, gap.shape[-1], *rest), np.nan, values[0].dtype)
+        for (here, columns, _), own in zip(found, values, strict=True):
+            kept = here[..., columns]
+            kept = kept.reshape(kept.shape + (1,) * len(rest))
+            result[(*axes, columns)] = np.where(kept, own, result[(*axes, columns)])
+        result[np.broadcast_to(gap, (*self.batch, gap.shape[-1]))] = missing
+        return result
+
+
+class Retimed:
+    """A curve at other times: γ(σ(x)).
+
+    Attributes
+    ----------
+    source : curve
+        The curve γ.
+    law : callable
+        The function σ, called with times and the order of a derivative.
+    times : ndarray
+        Times between which the result is smooth, within its domain.
+    """
+
+    def __init__(self, source: AnyCurve, law: TimeMap, times: Doubles) -> None:
+        self.source, self.law, self.times = source, law, times
+        self.space: Space[Any] = source.space
+        self.batch = source.batch
+        self.quad_rtol = source.quad_rtol
+        self.max_nu = source.max_nu if isinstance(law, Affine) else min(2, source.max_nu)
+
+    @property
+    def parts(self) -> tuple[Any, ...]:
+        """The same curve in each factor of a product."""
+        if not isinstance(self.space, Product):
+            return (self,)
+        return tuple(Retimed(own, self.law, self.times) for own in self.source.parts)
+
+    def map(self, function: Callable[[Any], Any]) -> Retimed:
+        """Return a function of the source at the same times."""
+        return Retimed(function(self.source), self.law, self.times)
+
+    def evaluate(
+        self, x: Doubles, quantity: str, outside: str, per_curve: bool, progress: Progress | None = None
+    ) -> Any:
+        """Evaluate a quantity at times x; see `CoreCurve.evaluate`."""
+        _check_inside(self, x, outside, per_curve)
+        at = self._source_times(x, per_curve)
+
+        def value(name: str) -> Any:
+            return values_at(self.source, at, name, "raise", per_curve)
+
+        if quantity == "point":
+            result = value("point")
+        elif quantity == "speed":
+            result = np.abs(self.law(x, 1)) * value("speed")
+        elif quantity == "bend" and isinstance(self.law, Affine):
+            result = value("bend")
+        elif quantity == "bend":
+            result = product_norm(tuple(_acceleration_norm(part, x, outside, per_curve) for part in self.parts))
+        else:
+            lower = _ORDERS[quantity]
+            factors = _chain_rule([self.law(x, order) for order in range(1, len(lower) + 1)])
+            before = x.ndim if per_curve else len(self.batch) + x.ndim
+            result = _by_factor(lambda *own: _weighted(factors, own, before), [value(name) for name in lower])
+        if progress is not None:
+            progress(1, 1)
+        return result
+
+    def _source_times(self, x: Doubles, per_curve: bool) -> Doubles:
+        """Return the times of the source, which can exceed its ends by rounding only."""
+        times = np.asarray(self.law(x, 0), np.float64)
+        first, last = ends_beside(self.source.times, times, self.batch, per_curve)
+        reach = _ROUNDING * (last - first)
+        wrong = ~((times >= first - reach) & (times <= last + reach))
+        if wrong.any():
+            i = tuple(np.argwhere(wrong)[0].tolist())
+            raise ValidationError(
+                f"law returns {np.broadcast_to(times, wrong.shape)[i]} at x = {np.broadcast_to(x, wrong.shape)[i]}, "
+                f"outside the domain of the curve [{np.ravel(first)[0]}, {np.ravel(last)[0]}]. Pass a law with values "
+                "in the domain."
+            )
+        return np.ascontiguousarray(np.clip(times, first, last)) if times.ndim == wrong.ndim else times
+
+
+def values_at(
+    curve: AnyCurve, x: Doubles, quantity: str, outside: str, per_curve: bool, progress: Progress | None = None
+) -> Any:
+    """Evaluate a quantity of a curve of any kind, also the jerk."""
+    if quantity == "jerk" and isinstance(curve, (CoreCurve, ProductCurve)):
+        return jerk(curve, x, outside, per_curve, progress)
+    return curve.evaluate(x, quantity, outside, per_curve, progress)
+
+
+def ends_beside(times: Doubles, x: Doubles, batch: tuple[int, ...], per_curve: bool) -> tuple[Any, Any]:
+    """Return the first and the last of `times` in a shape that broadcasts with times x."""
+    first, last = times[..., 0], times[..., -1]
+    if times.ndim == 1:
+        return first, last
+    ones = (1,) * (x.ndim - len(batch) if per_curve else x.ndim)
+    return first.reshape(batch + ones), last.reshape(batch + ones)
+
+
+def part_of_times(times: Doubles, start: Any, stop: Any, batch: tuple[int, ...]) -> Doubles:
+    """Return the ends of a part of a domain, and the times between them."""
+    if np.ndim(start) or np.ndim(stop) or times.ndim > 1:
+        start, stop = (np.broadcast_to(end, batch)[..., None] for end in (start, stop))
+        return np.concatenate([start, np.clip(times, start, stop), stop], axis=-1)
+    return np.concatenate([[start], times[(times > start) & (times < stop)], [stop]])
+
+
+def _check_inside(curve: Joined | Retimed, x: Doubles, outside: str, per_curve: bool) -> None:
+    """Raise ValidationError if a time is not finite or lies outside the domain."""
+    if outside == "continue":
+        return
+    first, last = ends_beside(curve.times, x, curve.batch, per_curve)
+    wrong = ~((x >= first) & (x <= last))
+
+    def say(i: Any) -> str:
+        time = np.broadcast_to(x, wrong.shape)[i]
+        ends = [np.broadcast_to(end, wrong.shape)[i] for end in (first, last)]
+        where = f"outside the domain [{ends[0]}, {ends[1]}] of the curve" if np.isfinite(time) else "not finite"
+        return f"= {time} is {where}"
+
+    refuse(wrong, "x", say)
+
+
+def _by_factor(function: Callable[..., Any], values: Sequence[Any]) -> Any:
+    """Apply a function of arrays to values that are tuples with one array per factor, or arrays."""
+    if isinstance(values[0], tuple):
+        return tuple(function(*own) for own in zip(*values, strict=True))
+    return function(*values)
+
+
+def _chain_rule(s: Sequence[Any]) -> tuple[Any, ...]:
+    """Return the factors of γ', ∇γ' and ∇∇γ' in the last derivative of γ∘σ, from the derivatives s of σ."""
+    if len(s) == 1:
+        return (s[0],)
+    if len(s) == 2:
+        return (s[1], s[0] ** 2)
+    return (s[2], 3 * s[0] * s[1], s[0] ** 3)
+
+
+def _weighted(factors: Sequence[Any], values: Sequence[Any], before: int) -> Any:
+    """Return a sum of vectors with factors, one per time; the vectors have `before` axes before those of a point."""
+    total: Any = 0.0
+    for factor, own in zip(factors, values, strict=True):
+        total = total + np.reshape(factor, np.shape(factor) + (1,) * (own.ndim - before)) * own
+    return total
+
+
+def _acceleration_norm(part: Any, x: Doubles, outside: str, per_curve: bool) -> Any:
+    """Return the norm of the acceleration in one factor, NaN where the curve is."""
+    points, vectors = (part.evaluate(x, name, outside, per_curve) for name in ("point", "acceleration"))
+    space: Space[Any] = part.space
+    valid = space._where_finite(points) & space._where_finite(vectors)
+    norms = np.full(valid.shape, np.nan)
+    norms[valid] = space.norm(points[valid], vectors[valid])
+    return norms
