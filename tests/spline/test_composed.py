@@ -42,7 +42,11 @@ def test_parts_and_their_union_are_the_curve(space, batch):
         # The points are the same numbers, since the same curve is evaluated at the same times.
         assert close(part(INSIDE, nu), curve(INSIDE, nu), 0)
         assert close(whole(INSIDE, nu), curve(INSIDE, nu), 0)
+        assert close(part(A, nu), curve(A, nu), 0) and close(whole(B, nu), curve(B, nu), 0)
+        shapes = [getattr(own(B, nu), "shape", None) for own in (part, whole, curve)]
+        assert shapes[0] == shapes[1] == shapes[2]
     assert close(part.speed(INSIDE), curve.speed(INSIDE), 0)
+    assert np.shape(part.speed(A)) == np.shape(whole.speed(A)) == batch
     assert close(part.length(), curve.length(A, B))
     assert close(whole.length(), curve.length(), 1e-11)
     back = part.reverse()

@@ -248,7 +248,7 @@ class Retimed:
                 f"outside the domain of the curve [{np.ravel(first)[0]}, {np.ravel(last)[0]}]. Pass a law with values "
                 "in the domain."
             )
-        return np.ascontiguousarray(np.clip(times, first, last)) if times.ndim == wrong.ndim else times
+        return np.asarray(np.clip(times, first, last), order="C") if times.ndim == wrong.ndim else times
 
 
 def values_at(
