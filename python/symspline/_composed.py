@@ -96,7 +96,7 @@ class RetimedCurve(ComposedCurve[P]):
     _source: Curve[P]
 
     def __init__(self) -> None:
-        raise TypeError("curves of this class are made by the methods restrict, reverse, shift and retime of a curve")
+        raise TypeError("RetimedCurve has no public constructor. Call restrict, reverse, shift or retime of a curve.")
 
     def _fill(self, *parts: Any) -> None:
         source: Curve[P]

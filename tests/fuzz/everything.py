@@ -18,7 +18,7 @@ NEEDS = {"symspline.xarray": "xarray"}
 # They change how the process runs, or take functions that the user vouches for.
 LEFT_OUT = {"set_num_threads", "show_config", "from_geomstats", "from_pymanopt", "map"}
 # Made by `make_smoothing_spline` only.
-LEFT_OUT |= {"SmoothingGrid", "SmoothingSpline"}
+LEFT_OUT |= {"RetimedCurve", "SmoothingGrid", "SmoothingSpline"}
 # An abstract class.
 LEFT_OUT |= {"Curve"}
 
@@ -51,6 +51,10 @@ def objects():
         "SmoothingSpline": ss.make_smoothing_spline(T, P, "sphere:2", 0.1),
         "BSpline": ss.BSpline([0, 0, 0, 1, 1, 1], P, 2, "sphere:2"),
         "BezierCurve": ss.BezierCurve(P, "sphere:2"),
+        "RetimedCurve": sphere.restrict(0.25, 0.75),
+        "RetimedCurve of dates": ss.CubicSpline(DAYS, P, "sphere:2").restrict(DAYS[0], DAYS[0] + (DAYS[1] - DAYS[0]) // 2),
+        "SegmentedCurve": ss.SegmentedCurve([sphere, sphere.shift(10)]),
+        "Derivative": sphere.derivative(),
         "AffineMorph": ss.shapes.AffineMorph(T, [SQUARE, 2 * SQUARE, SQUARE + 1]),
         "GridSpline": ss.GridSpline(
             (T, None), P[[0, 1]].repeat(2, axis=0)[[0, 1, 2]][:, None] * np.ones((3, 2, 1)), "sphere:2"
