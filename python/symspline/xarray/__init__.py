@@ -14,7 +14,7 @@ from typing import Any, Unpack
 import numpy as np
 import xarray as xr
 
-from .._arrays import short_repr
+from .._arrays import checked_flag, short_repr
 from .._core import ValidationError
 from .._options import checked_extrapolate, extrapolation_mode, quantity_of
 from .._spaces import Space, space_named
@@ -34,7 +34,9 @@ def fit(
     space: Space | str,
     *,
     dim: str = "time",
+    time: str | None = None,
     point_dims: Sequence[str] = ("q",),
+    skipna: bool = False,
     bc_type: BCType = "natural",
     method: Method = "auto",
     tol: float = 1e-12,
@@ -53,10 +55,17 @@ def fit(
     space : Space or str
         Space or its name. Products are not supported: fit each factor separately.
     dim : str, default "time"
-        Dimension along the curves. Its coordinate holds the knots, numbers or ``datetime64`` (rates are then per
-        second). Without a coordinate the knots are 0, 1, ...; another coordinate that looks like times raises an error.
+        Dimension along the curves.
+    time : str, optional
+        Coordinate of the knots, numbers or ``datetime64`` (rates are then per second). It may have batch dimensions, as
+        ``time(traj, obs)`` with a row of times per curve. By default the coordinate of `dim`, or the only other
+        coordinate along `dim` that looks like times by its type, name or attributes. Without any, the knots are 0, 1,
+        ...
     point_dims : sequence of str, default ("q",)
         Dimensions of a point's array in order, such as rows and columns of matrices.
+    skipna : bool, default False
+        True to drop missing samples, where the point or its time is NaN or NaT, from each curve. Curves with fewer than
+        two samples left are NaN, subject to `on_failure`.
     bc_type : str, tuple or pair, default "natural"
         End conditions, as for `CubicSpline`. Vectors have the shape of a point, or are DataArrays.
     method, tol, max_iter, extrapolate, atol
@@ -73,13 +82,14 @@ def fit(
     xarray.Dataset
         ``points`` (projected onto the manifold) and ``velocities``, with batch dimensions first, then `dim` and
         `point_dims`; and the columns of `Report` for every curve. Coordinates are those of `da`, and the points keep
-        its attributes. Attributes of the Dataset hold the space and all other information that `evaluate`, `lift` and
-        `speed` need, also after the Dataset was stored and read again.
+        its attributes. With `skipna`, missing samples are NaN in both. Attributes of the Dataset hold the space and all
+        other information that `evaluate`, `lift` and `speed` need, also after the Dataset was stored and read again.
 
     Raises
     ------
     ValidationError
-        If names, shapes, times or options are invalid, or chunks split a curve.
+        If names, shapes, times or options are invalid, chunks split a curve, or several coordinates could hold the
+        times.
 
     Examples
     --------
@@ -89,12 +99,32 @@ def fit(
     >>> ds = symspline.xarray.fit(da, "sphere:2")
     >>> ds.velocities.dims, ds.converged.values
     (('curve', 'time', 'q'), array([ True]))
+
+    Trajectories with times of their own, the second of which ends early:
+
+    >>> time = np.array([["2024-05-01", "2024-05-02", "2024-05-04"], ["2024-05-07", "2024-05-08", "NaT"]], "M8[ns]")
+    >>> points = np.stack([np.eye(3), [[1, 0, 0], [0, 1, 0], [np.nan] * 3]])
+    >>> da = xr.DataArray(points, dims=("traj", "obs", "q"), coords={"time": (("traj", "obs"), time)})
+    >>> ds = symspline.xarray.fit(da, "sphere:2", dim="obs", skipna=True)
+    >>> x = np.array(["2024-05-03", "2024-05-07T12"], "M8[ns]")
+    >>> symspline.xarray.evaluate(ds, x, extrapolate=False).isel(q=1).round(3).values
+    array([[0.65 ,   nan],
+           [  nan, 0.707]])
     """
-    options = {"method": method, "tol": tol, "max_iter": max_iter, "extrapolate": extrapolate, "atol": atol}
-    inputs, spec = spec_of(da, space, dim, point_dims, where, bc_type, on_failure=on_failure, **options)
+    options: dict[str, Any] = {
+        "method": method,
+        "tol": tol,
+        "max_iter": max_iter,
+        "extrapolate": extrapolate,
+        "atol": atol,
+    }
+    chosen: dict[str, Any] = {"time": time, "skipna": checked_flag(skipna, "skipna"), "on_failure": on_failure}
+    inputs, spec, times = spec_of(da, space, dim, point_dims, where, bc_type, **chosen, **options)
     axes: list[Hashable] = [dim, *point_dims]
     dtype = spec["space"].dtype
-    variables = apply(fitted, inputs, [axes, axes, *([] for _ in COLUMNS)], [dtype, dtype, *COLUMNS.values()], **spec)
+    variables = apply(
+        fitted, inputs, [axes, axes, *([] for _ in COLUMNS)], [dtype, dtype, *COLUMNS.values()], skipna=skipna, **spec
+    )
     ds = xr.Dataset(dict(zip(("points", "velocities", *COLUMNS), variables, strict=True)))
     ds.points.attrs = dict(da.attrs)
     words = spec["kinds"]
@@ -106,6 +136,11 @@ def fit(
         "extrapolate": extrapolation_mode(extrapolate, bc_type),
         "symspline": VERSION,
     }
+    if times is not None and times.name != dim:
+        ds.attrs["curve_time"] = times.name
+    if skipna:
+        # Attributes of netCDF files cannot be Boolean.
+        ds.attrs["skipna"] = 1
     return ds
 
 
@@ -117,8 +152,8 @@ def evaluate(ds: xr.Dataset, x: Any, *, nu: int = 0, extrapolate: Extrapolate = 
     ds : xarray.Dataset
         Result of `fit`, or points, velocities and attributes that were stored and read again.
     x : time, array_like or xarray.DataArray
-        One time, a one-dimensional array of times along `dim`, or a DataArray with any dimensions. If it has batch
-        dimensions, every curve has its own times.
+        One time, a one-dimensional array of times, or a DataArray with any dimensions. If it has batch dimensions,
+        every curve has its own times. An array has the dimension `dim`, or the name of the coordinate of the times.
     nu : {0, 1, 2}, default 0
         0 for points, 1 for the velocity γ', 2 for the covariant acceleration ∇γ'.
     extrapolate : bool or str, optional
@@ -128,7 +163,8 @@ def evaluate(ds: xr.Dataset, x: Any, *, nu: int = 0, extrapolate: Extrapolate = 
     -------
     xarray.DataArray
         Batch dimensions, then those of `x`, then those of a point. The times are a coordinate. Points keep the
-        attributes of the data, rates do not. Curves that do not exist are NaN.
+        attributes of the data, rates do not. Curves that do not exist are NaN. With ``skipna=True`` in `fit`, missing
+        times of a curve's own give NaN.
 
     Raises
     ------
@@ -211,7 +247,9 @@ def resample(
     to: Any,
     *,
     dim: str = "time",
+    time: str | None = None,
     point_dims: Sequence[str] = ("q",),
+    skipna: bool = False,
     where: xr.DataArray | None = None,
     bc_type: BCType | Mapping[str, Any] | None = None,
     symmetric: bool = False,
@@ -233,8 +271,13 @@ def resample(
         one-dimensional array each. The splines follow the order of the mapping.
     dim : str, default "time"
         Dimension along the curves. A mapping names the dimensions instead.
+    time : str, optional
+        Coordinate of the times, for example ``time(traj, obs)`` with a row of times per curve. By default the
+        coordinate of `dim`, or the only other coordinate along `dim` that looks like times.
     point_dims : sequence of str, default ("q",)
         Dimensions of a point's array.
+    skipna : bool, default False
+        True to drop missing samples from each curve, as for `fit`. A grid always skips missing points.
     where : xarray.DataArray of bool, optional
         Mask over the batch dimensions, for a grid also over its dimensions.
     bc_type : str, tuple, pair or mapping, optional
@@ -287,21 +330,30 @@ def resample(
            [0.    , 0.    , 1.    ]])
     """
     if isinstance(to, Mapping):
+        if time is not None or skipna:
+            raise ValidationError(
+                "time and skipna are for curves along one dimension; a grid has the coordinates of its dimensions, and "
+                "skips missing points. Omit them."
+            )
         grid: dict[str, Any] = {"point_dims": point_dims, "where": where, "symmetric": symmetric, "options": options}
         return resample_grid(da, space, to, bc_type="not-a-knot" if bc_type is None else bc_type, **grid)
     if symmetric or isinstance(bc_type, Mapping):
         name = "symmetric=True" if symmetric else "bc_type by dimension"
         raise ValidationError(f"{name} is for grids; pass to as a mapping of dimensions to positions")
     bc_type = "natural" if bc_type is None else bc_type
-    (_, *rest), spec = spec_of(da, space, dim, point_dims, where, bc_type, **{"on_failure": "ignore"} | options)
+    chosen: dict[str, Any] = {"time": time, "skipna": checked_flag(skipna, "skipna"), "on_failure": "ignore", **options}
+    (_, *rest), spec, knots = spec_of(da, space, dim, point_dims, where, bc_type, **chosen)
     curves = [d for d in da.dims if d not in (dim, *point_dims)]
-    times, axes = times_with_names(to, dim, point_dims, curves)
+    label = dim if knots is None else knots.name
+    times, axes = times_with_names(to, label, point_dims, curves)
     policy = extrapolation_mode(checked_extrapolate(options.get("extrapolate")), bc_type)
-    rehearse(times, spec["t"], da.sizes[dim], policy)
+    if not (skipna or "t" in spec["names"]):
+        rehearse(times, spec["t"], da.sizes[dim], policy)
     inputs: Inputs = [(bare(da, dim), [KNOTS, *point_dims]), (times, axes), *rest]
-    (values,) = apply(resampled, inputs, [[*axes, *point_dims]], [spec["space"].dtype], x_axes=len(axes), **spec)
+    spec |= {"x_axes": len(axes), "skipna": skipna, "policy": policy}
+    (values,) = apply(resampled, inputs, [[*axes, *point_dims]], [spec["space"].dtype], **spec)
     values.attrs = dict(da.attrs)
-    return timed_by(values, times, dim).rename(da.name)
+    return timed_by(values, times, label).rename(da.name)
 
 
 def _along(ds: xr.Dataset, x: Any, quantity: str, extrapolate: Any, lifted: bool = False) -> xr.DataArray:
@@ -320,14 +372,31 @@ def _along(ds: xr.Dataset, x: Any, quantity: str, extrapolate: Any, lifted: bool
         check_dims(array, space, dim, point_dims)
     if extrapolate is not None:
         policy = extrapolation_mode(checked_extrapolate(extrapolate), ds.attrs.get("bc_type"))
-    times, axes = times_with_names(x, dim, point_dims, [d for d in points.dims if d not in (dim, *point_dims)])
-    t = points[dim].values if dim in points.coords else None
-    rehearse(times, t, points.sizes[dim], policy)
-    own = [KNOTS, *point_dims]
+    knots = _knots(ds, dim)
+    label, skipna = (dim if knots is None else knots.name), bool(ds.attrs.get("skipna", 0))
+    times, axes = times_with_names(x, label, point_dims, [d for d in points.dims if d not in (dim, *point_dims)])
+    own: list[Hashable] = [KNOTS, *point_dims]
     shape = [] if quantity == "speed" else point_dims
     inputs: Inputs = [(bare(points, dim), own), (bare(velocities, dim), own), (times, axes)]
-    fixed = {"space": space, "t": t, "quantity": quantity, "policy": policy, "x_axes": len(axes), "lifted": lifted}
+    fixed: dict[str, Any] = {"space": space, "t": None, "quantity": quantity, "policy": policy, "skipna": skipna}
+    if knots is not None and knots.ndim > 1:
+        inputs.append((bare(knots, dim), [KNOTS]))
+    else:
+        fixed["t"] = None if knots is None else knots.values
+        if not skipna:
+            rehearse(times, fixed["t"], points.sizes[dim], policy)
+    fixed |= {"x_axes": len(axes), "lifted": lifted}
     (values,) = apply(values_at, inputs, [[*axes, *shape]], [space.dtype if shape else np.float64], **fixed)
     if quantity == "point":
         values.attrs = dict(points.attrs)
-    return timed_by(values, times, dim).rename(quantity)
+    return timed_by(values, times, label).rename(quantity)
+
+
+def _knots(ds: xr.Dataset, dim: str) -> Any:
+    """Return the coordinate of the knots of the curves of `fit`."""
+    name = ds.attrs.get("curve_time", dim)
+    if name in ds.points.coords:
+        return ds.points.coords[name]
+    if "curve_time" in ds.attrs:
+        raise ValidationError(f"ds is not what symspline.xarray.fit returns: it has no coordinate {name!r} of times")
+    return None

@@ -16,8 +16,10 @@ from .._estimation.measurements import Measurement
 from .._smoothing.factors import is_several
 from .._spaces import Array, Euclidean, Space, space_named
 from .._typing import Numbers, TimesLike
+from ._missing import missing
 from ._smoothing import unit_of
 from ._spec import check_dims, timed_by, times_with_names
+from ._times import times_along
 
 
 def estimate(
@@ -33,6 +35,7 @@ def estimate(
     velocity_sigma: Numbers | None = None,
     measurements: Sequence[Measurement] = (),
     dim: str = "time",
+    time: str | None = None,
     rate_dim: str | None = None,
     velocity_dim: str | None = None,
     point_dims: Sequence[str] = ("q",),
@@ -42,7 +45,9 @@ def estimate(
 ) -> xr.Dataset:
     """Fit one curve to points, angular velocities and velocities, each with its own times.
 
-    The function calls `symspline.estimate`. Missing values (NaN) are omitted, and dask arrays are computed.
+    The function calls `symspline.estimate`. Measurements whose values or times are missing (NaN, NaT)
+    are omitted, and dask arrays are computed. The times of rates and velocities are the coordinate of their dimension,
+    or the only other coordinate along it that looks like times.
 
     Parameters
     ----------
@@ -71,6 +76,9 @@ def estimate(
         Further measurements, objects of `symspline.measure`.
     dim : str, default "time"
         Dimension of the points along the curve.
+    time : str, optional
+        Coordinate of the times of the points. By default the coordinate of `dim`, or the only other coordinate along
+        `dim` that looks like times.
     rate_dim, velocity_dim : str, optional
         Dimensions along the curve of rates and velocities, by default `dim`.
     point_dims : sequence of str, default ("q",)
@@ -131,8 +139,9 @@ def estimate(
     own = [dim, *point_dims]
     _refuse_others(points, own, "points")
     rows = points.transpose(*own)
-    y, at = np.asarray(rows.values), _times(points, dim, "points")
-    finite = space._where_finite(space._numbers(space._doubles(y, "points")))
+    times_of_points = _times(points, dim, "points", time, point_dims)
+    y, at = np.asarray(rows.values), np.asarray(times_of_points.values)
+    finite = space._where_finite(space._numbers(space._doubles(y, "points"))) & ~missing(at)
     sigmas = sigma if isinstance(sigma, tuple) or np.ndim(sigma) == 0 else np.asarray(sigma)[finite]
     given: list[Measurement] = [measure.Points(at[finite], y[finite], sigma=sigmas)]
     components: xr.DataArray | None = None
@@ -148,8 +157,9 @@ def estimate(
     elif velocity_sigma is not None:
         raise ValidationError("velocity_sigma belongs to velocities, but there are none. Pass velocities.")
     curve: Any = estimate_curve([*given, *measurements], knots, space, **options)
-    times, axes = times_with_names(points[dim] if to is None else to, dim, point_dims, [])
-    return _result(curve, space, points, times, [*axes, *point_dims], dim, level, components)
+    label = times_of_points.name
+    times, axes = times_with_names(times_of_points[~missing(at)] if to is None else to, label, point_dims, [])
+    return _result(curve, space, points, times, [*axes, *point_dims], label, level, components)
 
 
 def _refuse_others(array: xr.DataArray, own: Sequence[Hashable], name: str) -> None:
@@ -160,18 +170,24 @@ def _refuse_others(array: xr.DataArray, own: Sequence[Hashable], name: str) -> N
         )
 
 
-def _times(array: xr.DataArray, along: str, name: str) -> Array:
+def _times(
+    array: xr.DataArray, along: str, name: str, time: str | None = None, point_dims: Sequence[str] = ()
+) -> xr.DataArray:
     if along not in array.dims:
         raise ValidationError(f"{name} has the dimensions {array.dims}, but not {along!r}. Pass the name of its times.")
-    if along not in array.coords:
+    remedy = "Pass time= to choose" if name == "points" else f"Remove the others by {name}.drop_vars"
+    times = times_along(array, along, time, point_dims, remedy)
+    if times is None:
         raise ValidationError(f"{along!r} of {name} has no coordinate, which would hold the times. Assign one.")
-    return np.asarray(array[along].values)
+    if times.ndim > 1:
+        _refuse_others(array, [along, *point_dims], name)
+    return times
 
 
 def _body_rates(rates: xr.DataArray, along: str, sigma: Any, bias: bool) -> measure.BodyRates:
     if not isinstance(rates, xr.DataArray):
         raise ValidationError(f"rates must be an xarray.DataArray, not {type(rates).__name__}")
-    times = _times(rates, along, "rates")
+    times = np.asarray(_times(rates, along, "rates").values)
     rest = [d for d in rates.dims if d != along]
     if len(rest) != 1 or rates.sizes[rest[0]] != 3:
         raise ValidationError(
@@ -184,7 +200,7 @@ def _body_rates(rates: xr.DataArray, along: str, sigma: Any, bias: bool) -> meas
     if sigma is None:
         raise ValidationError("rates need the standard deviation of a component. Pass rate_sigma.")
     omega = np.asarray(rates.transpose(along, *rest).values)
-    good = np.isfinite(omega).all(axis=1)
+    good = np.isfinite(omega).all(axis=1) & ~missing(times)
     constant = measure.Constant(3) if bias else None
     return measure.BodyRates(times[good], omega[good], sigma=sigma, bias=constant)
 
@@ -194,20 +210,21 @@ def _velocities(
 ) -> measure.Velocities:
     if not isinstance(velocities, xr.DataArray):
         raise ValidationError(f"velocities must be an xarray.DataArray, not {type(velocities).__name__}")
-    times = _times(velocities, along, "velocities")
+    times = np.asarray(_times(velocities, along, "velocities", None, point_dims).values)
     check_dims(velocities.compute(), space, along, point_dims)
     _refuse_others(velocities, [along, *point_dims], "velocities")
     if sigma is None:
         raise ValidationError("velocities need the standard deviation of a coordinate. Pass velocity_sigma.")
     v = np.asarray(velocities.transpose(along, *point_dims).values)
     flat = isinstance(space, Euclidean)
-    if not flat and not np.array_equal(times, at):
+    if not flat and not np.array_equal(times, at, equal_nan=True):
         raise ValidationError(
             f"velocities on {space} are tangent vectors at the points, and need their times. Pass other velocities as "
             "symspline.measure.Velocities in `measurements`."
         )
     feet = np.zeros_like(v) if flat else y
-    good = np.isfinite(v).all(axis=tuple(range(1, v.ndim))) & np.isfinite(feet).all(axis=tuple(range(1, v.ndim)))
+    numbers = tuple(range(1, v.ndim))
+    good = ~missing(times) & np.isfinite(v).all(axis=numbers) & np.isfinite(feet).all(axis=numbers)
     return measure.Velocities(times[good], feet[good], v[good], sigma=sigma)
 
 
@@ -217,7 +234,7 @@ def _result(
     points: xr.DataArray,
     times: xr.DataArray,
     dims: list[Hashable],
-    dim: str,
+    label: Hashable,
     level: float | None,
     components: xr.DataArray | None,
 ) -> xr.Dataset:
@@ -244,6 +261,6 @@ def _result(
             coords |= {d: components[d] for d in own_dims if d in components.coords}
         for ending, values in (("", parameter.value), ("_std", parameter.std)):
             variables[name + ending] = (own_dims, values, attrs)
-    ds = timed_by(xr.Dataset(variables, coords=coords), times, dim)
+    ds = timed_by(xr.Dataset(variables, coords=coords), times, label)
     ds.attrs = {"space": str(space)}
     return ds

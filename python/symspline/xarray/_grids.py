@@ -13,7 +13,8 @@ from .._grid import GridSpline
 from .._options import checked_extrapolate, extrapolation_mode
 from .._spaces import Array, Space, space_named
 from ._blocks import Inputs, apply
-from ._spec import KNOTS, LINE, check_names, check_whole, refuse_other_times, rehearse, times_with_names
+from ._spec import KNOTS, LINE, check_names, check_whole, rehearse, times_with_names
+from ._times import times_along
 
 # The influence of a node on a spline decays by 0.27 per node, to 2e-15 of its size.
 _HALO = 26
@@ -91,8 +92,13 @@ def _mask(where: Any, da: xr.DataArray, point_dims: Sequence[str]) -> xr.DataArr
 
 def _axis(da: xr.DataArray, dim: str, x: Any, point_dims: Sequence[str], policy: str, ends: Any) -> _Axis:
     """Check the positions along one dimension, and divide them into blocks."""
-    if dim not in da.coords:
-        refuse_other_times(da, dim)
+    own = None if dim in da.coords else times_along(da, dim, None, point_dims, f"Make one the coordinate of {dim!r}")
+    if own is not None:
+        raise ValidationError(
+            f"{dim!r} has no coordinate of its own, but {own.name!r} with dimensions {own.dims} looks like times. Pass "
+            f"da.swap_dims({{{dim!r}: {own.name!r}}}) with to={{{own.name!r}: ...}}, or da.drop_vars({own.name!r}) for "
+            "the nodes 0, 1, 2, ..."
+        )
     nodes, count = (da[dim].values if dim in da.coords else None), da.sizes[dim]
     given, _ = times_with_names(x, dim, point_dims, [])
     if given.dims not in ((), (dim,)):

@@ -6,19 +6,21 @@ import warnings
 from collections.abc import Hashable, Sequence
 from functools import reduce
 from operator import getitem
-from typing import Any, Unpack
+from typing import Any, NamedTuple, Unpack
 
 import numpy as np
 import xarray as xr
 
 from .._arrays import checked_number
+from .._exceptions import SymsplineError
 from .._options import checked_extrapolate, extrapolation_mode
 from .._smoothing import SmoothingWarning, make_smoothing_spline
 from .._smoothing.factors import is_several
 from .._spaces import Array, Space, SpecialOrthogonal, space_named
 from .._typing import SmoothOptions
 from .._warnings import silenced
-from ._blocks import Inputs, apply, per_curve_times
+from ._blocks import Inputs, apply, knots_of_block, per_curve_times
+from ._missing import missing, named_curve, of_equal_length, times_of_rows
 from ._spec import KNOTS, LINE, bare, rehearse, spec_of, timed_by, times_with_names
 
 # Columns of the report of a smoothing fit, per part of the space.
@@ -31,6 +33,7 @@ def smooth(
     to: Any = None,
     *,
     dim: str = "time",
+    time: str | None = None,
     point_dims: Sequence[str] = ("q",),
     where: xr.DataArray | None = None,
     std: bool = False,
@@ -39,7 +42,8 @@ def smooth(
 ) -> xr.Dataset:
     """Fit smoothing splines to noisy points, and evaluate them in one call.
 
-    Points that are NaN are missing and have no influence. Each curve has its own λ.
+    Points that are NaN are missing and have no influence. Samples whose time is NaN or NaT are dropped from each curve.
+    Each curve has its own λ.
 
     Parameters
     ----------
@@ -48,9 +52,13 @@ def smooth(
     space : Space or str
         Space or its name. Products are not supported: smooth each factor separately.
     to : time, array_like or xarray.DataArray, optional
-        Times at which the curves are evaluated, as `x` of `evaluate`. By default those of the data.
+        Times at which the curves are evaluated, as `x` of `evaluate`. By default those of the data;
+        values at missing times are NaN.
     dim : str, default "time"
         Dimension along the curves.
+    time : str, optional
+        Coordinate of the times, for example ``time(traj, obs)`` with a row of times per curve. By default the
+        coordinate of `dim`, or the only other coordinate along `dim` that looks like times.
     point_dims : sequence of str, default ("q",)
         Dimensions of a point's array.
     where : xarray.DataArray of bool, optional
@@ -101,16 +109,20 @@ def smooth(
     given: dict[str, Any] = {"on_failure": "ignore", **options}
     if level is not None:
         level = checked_number(level, "level must lie between 0 and 1", lambda x: 0 < x < 1)
-    (_, *rest), spec = spec_of(da, space, dim, point_dims, where, "natural", on_failure=given["on_failure"])
-    t = spec["t"]
-    _rehearse_options(t, da.sizes[dim], given)
+    chosen: dict[str, Any] = {"time": time, "skipna": True, "on_failure": given["on_failure"]}
+    (_, *rest), spec, knots = spec_of(da, space, dim, point_dims, where, "natural", **chosen)
+    own_times, t, label = "t" in spec["names"], spec["t"], dim if knots is None else knots.name
+    if knots is not None and t is not None and (gone := missing(t)).any():
+        knots, t = knots[~gone], t[~gone]
+    _rehearse_options(t, da.sizes[dim] if t is None else len(t), given)
     if to is None:
-        to = xr.DataArray(np.arange(da.sizes[dim]) if t is None else t, dims=dim)
-        to = to if t is None else to.assign_coords({dim: da[dim]})
+        to = xr.DataArray(np.arange(da.sizes[dim]), dims=dim) if knots is None else knots
     curves = [d for d in da.dims if d not in (dim, *point_dims)]
-    times, axes = times_with_names(to, dim, point_dims, curves)
+    times, axes = times_with_names(to, label, point_dims, curves)
     ends = "periodic" if given.get("bc_type") == "periodic" else "natural"
-    rehearse(times, t, da.sizes[dim], extrapolation_mode(checked_extrapolate(given.get("extrapolate")), ends))
+    if not own_times:
+        policy = extrapolation_mode(checked_extrapolate(given.get("extrapolate")), ends)
+        rehearse(times, t, da.sizes[dim] if t is None else len(t), policy)
     inputs: Inputs = [(bare(da, dim), [KNOTS, *point_dims]), (times, axes), *rest]
     endings = ["_rotation", "_position"] if is_several(space) else [""]
     asked = [name for name, wanted in (("std", std), ("band", level is not None)) if wanted]
@@ -119,13 +131,13 @@ def smooth(
     dims: list[list[Hashable]] = [[*axes, *point_dims], *([*axes] for _ in spreads), *([] for _ in (*columns, "one"))]
     dtypes: list[Any] = [space.dtype, *(np.float64 for _ in spreads)]
     dtypes += [dtype for dtype in _COLUMNS.values() for _ in endings] + [np.bool_]
-    fixed = {"space": space, "t": t, "names": spec["names"], "how": given, "std": std, "level": level}
+    fixed = {"space": space, "t": spec["t"], "names": spec["names"], "how": given, "std": std, "level": level}
     found = apply(_smoothed, inputs, dims, dtypes, x_axes=len(axes), **fixed)
     ds = xr.Dataset(dict(zip(["points", *spreads, *columns, "converged"], found, strict=True)))
     ds["points"].attrs = dict(da.attrs)
     for name in spreads:
         ds[name].attrs = unit_of(space, da, name)
-    timed: xr.Dataset = timed_by(ds, times, dim)
+    timed: xr.Dataset = timed_by(ds, times, label)
     return timed
 
 
@@ -150,6 +162,15 @@ def _rehearse_options(t: Any, count: int, given: dict[str, Any]) -> None:
         make_smoothing_spline(t, np.zeros((count, 1)), LINE, **plain)
 
 
+class _Wanted(NamedTuple):
+    """What is fitted and evaluated in every block."""
+
+    space: Space[Any]
+    how: dict[str, Any]
+    spreads: list[tuple[str, tuple[float, ...]]]
+    """Methods of the curve and their arguments."""
+
+
 def _smoothed(
     points: Array,
     x: Array,
@@ -163,27 +184,70 @@ def _smoothed(
     level: float | None,
 ) -> tuple[Array, ...]:
     """Smooth the curves of a block."""
+    named = dict(zip(names, rest, strict=True))
     batch = points.shape[: points.ndim - 1 - len(space.point_shape)]
     x, per_curve = per_curve_times(x, batch, x_axes)
-    mask = np.broadcast_to(rest[names.index("where")], batch) if "where" in names else None
+    t = knots_of_block(t, named, batch)
+    wanted = _Wanted(space, how, [("std", ())] * std + ([] if level is None else [("band", (level,))]))
     # A single curve is a batch of one, whose failure does not raise unless that is requested.
     whole = batch or (1,)
+    mask = np.broadcast_to(named["where"], batch).reshape(whole) if "where" in named else None
     rows = points.reshape(*whole, *points.shape[len(batch) :])
+    at = x.reshape(*whole, *x.shape[len(batch) :]) if per_curve else x
+    if t is None or not missing(t).any():
+        outputs = _smooth_rows(rows, t, at, per_curve, mask, wanted)
+    else:
+        outputs = _smooth_timed(rows, t, at, per_curve, mask, wanted)
+    return tuple(np.asarray(own if batch else own[0]) for own in outputs)
+
+
+def _smooth_timed(
+    rows: Array, t: Array, at: Array, per_curve: bool, mask: Array | None, wanted: _Wanted
+) -> list[Array]:
+    """Smooth curves without the samples whose time is missing. Curves with fewer than two samples are NaN."""
+    space, nodes = wanted.space, t.shape[-1]
+    whole = rows.shape[: rows.ndim - 1 - len(space.point_shape)]
+    own_shape = at.shape[len(whole) :] if per_curve else at.shape
+    times = times_of_rows(t, whole, nodes)
+    rows = rows.reshape(-1, nodes, *space.point_shape)
+    chosen = np.ones(len(rows), bool) if mask is None else mask.reshape(-1)
+    at = at.reshape(-1, *own_shape) if per_curve else at
+    parts = 2 if is_several(space) else 1
+    shapes = [(*own_shape, *space.point_shape), *[own_shape] * (len(wanted.spreads) * parts)]
+    outputs = [np.full((len(rows), *shape), np.nan, space.dtype if i == 0 else float) for i, shape in enumerate(shapes)]
+    for dtype in (*(own for own in _COLUMNS.values() for _ in range(parts)), np.bool_):
+        outputs.append(np.full(len(rows), np.nan if dtype is np.float64 else False, dtype))
+    for curves, kept in of_equal_length(~missing(times)):
+        knots, here, gone = times[curves[:, None], kept], at, None
+        if per_curve:
+            gone = missing(at[curves])
+            here = np.where(gone, knots[:, 0].reshape(-1, *[1] * len(own_shape)), at[curves])
+        try:
+            found = _smooth_rows(rows[curves[:, None], kept], knots, here, per_curve, chosen[curves], wanted)
+        except SymsplineError as error:
+            raise named_curve(error, whole, curves) from None
+        for i, (output, own) in enumerate(zip(outputs, found, strict=True)):
+            if gone is not None and i < len(shapes):
+                own[gone] = np.nan
+            output[curves] = own
+    return [own.reshape(*whole, *own.shape[1:]) for own in outputs]
+
+
+def _smooth_rows(rows: Array, t: Any, at: Array, per_curve: bool, mask: Array | None, wanted: _Wanted) -> list[Array]:
+    """Smooth curves whose times are all known: values, spreads, columns of the report, and convergence."""
+    space = wanted.space
+    whole = rows.shape[: rows.ndim - 1 - len(space.point_shape)]
     finite = space._where_finite(rows)
     weights = None if finite.all() else finite.astype(np.float64)
-    chosen = None if mask is None else mask.reshape(whole)
     # The variable at_bound describes the curves about which a warning would be.
     with silenced(SmoothingWarning):
-        curve: Any = make_smoothing_spline(t, rows, space, weights=weights, where=chosen, **how)
+        curve: Any = make_smoothing_spline(t, rows, space, weights=weights, where=mask, **wanted.how)
     several = is_several(space)
     reports = curve.report if several else (curve.report,)
     converged = np.all([np.asarray(own.converged) for own in reports], axis=0)
-    at = x.reshape(*whole, *x.shape[len(batch) :]) if per_curve else x
     values = curve(at, per_curve=per_curve)
-    wanted: list[tuple[str, tuple[float, ...]]] = [("std", ())] if std else []
-    wanted += [("band", (level,))] if level is not None else []
     each: list[Array] = []
-    for name, arguments in wanted:
+    for name, arguments in wanted.spreads:
         if per_curve:
             rows_of = [getattr(reduce(getitem, i, curve), name)(at[i], *arguments) for i in np.ndindex(whole)]
             pairs = [own if several else (own,) for own in rows_of]
@@ -198,5 +262,4 @@ def _smoothed(
     columns += [np.asarray(own.at_bound) for own in reports]
     for own in (values, *each):
         own[~converged] = np.nan
-    outputs = [values, *each, *columns, converged]
-    return tuple(np.asarray(own if batch else own[0]) for own in outputs)
+    return [values, *each, *columns, converged]

@@ -15,6 +15,8 @@ from .._cubic import CubicSpline
 from .._input import times_of
 from .._spaces import Array, Euclidean, Product, Space, space_named
 from ._blocks import Inputs, values_at
+from ._missing import missing
+from ._times import times_along
 
 T = TypeVar("T", xr.DataArray, xr.Dataset)
 
@@ -31,8 +33,10 @@ def spec_of(
     point_dims: Sequence[str],
     where: xr.DataArray | None,
     bc_type: Any,
+    time: str | None = None,
+    skipna: bool = False,
     **options: Any,
-) -> tuple[Inputs, dict[str, Any]]:
+) -> tuple[Inputs, dict[str, Any], xr.DataArray | None]:
     """Check a fit as far as that is possible without its points.
 
     Returns
@@ -41,21 +45,29 @@ def spec_of(
         The points, then all else that has dimensions of the curves, each with its core dimensions.
     spec : dict
         Arguments of `spline_of`.
+    times : xarray.DataArray or None
+        Coordinate of the knots. If it has dimensions of the curves, it is an input as well.
     """
     space = space_named(space)
     check_dims(da, space, dim, point_dims)
     # Its type is refused or taken with the points.
     space._doubles(np.zeros(space.point_shape, da.dtype), "da")
     kinds, vectors = split(bc_type)
-    if dim not in da.coords:
-        refuse_other_times(da, dim)
-    t = da[dim].values if dim in da.coords else None
-    still = np.zeros((da.sizes[dim], 1))
-    CubicSpline(t, still, LINE, bc_type=joined(kinds, (np.zeros(1), np.zeros(1))), **options)
+    times = times_along(da, dim, time, point_dims)
+    t = None if times is None or times.ndim > 1 else np.asarray(times.values)
+    rehearsed = t[~missing(t)] if skipna and t is not None else t
+    if skipna and (rehearsed is None or len(rehearsed) < 2):
+        rehearsed = np.arange(2.0)
+    still = np.zeros((da.sizes[dim] if rehearsed is None else len(rehearsed), 1))
+    CubicSpline(rehearsed, still, LINE, bc_type=joined(kinds, (np.zeros(1), np.zeros(1))), **options)
     own = [dim, *point_dims]
     curves = [d for d in da.dims if d not in own]
     inputs: Inputs = [(da, own)]
     names = []
+    if times is not None and t is None:
+        check_whole(times, dim, "a curve needs all of its times")
+        names.append("t")
+        inputs.append((bare(times, dim), [KNOTS]))
     if where is not None:
         if not isinstance(where, xr.DataArray) or where.dtype != bool or not set(where.dims) <= set(curves):
             raise ValidationError(f"where must be a DataArray of bool whose dimensions are among {tuple(curves)}")
@@ -65,7 +77,7 @@ def spec_of(
         if vector is not None:
             names.append(name)
             inputs.append((_vector(vector, name, space, point_dims, curves), list(point_dims)))
-    return inputs, {"space": space, "t": t, "kinds": kinds, "names": names, "how": options}
+    return inputs, {"space": space, "t": t, "kinds": kinds, "names": names, "how": options}, times
 
 
 def check_dims(da: xr.DataArray, space: Space, dim: str, point_dims: Sequence[str]) -> None:
@@ -111,32 +123,6 @@ def check_whole(da: xr.DataArray, name: str, reason: str) -> None:
         )
 
 
-def refuse_other_times(da: xr.DataArray, dim: str) -> None:
-    """Raise ValidationError if another coordinate along the curves holds times, which would be ignored."""
-    found = [name for name, c in da.coords.items() if dim in c.dims and _are_times(name, c)]
-    if not found:
-        return
-    names = ", ".join(f"{name!r} with dimensions {da.coords[name].dims}" for name in found)
-    raise ValidationError(
-        f"{dim!r} has no coordinate of its own, which would hold the knots, but other coordinates look like times: "
-        f"{names}. If all curves have the same times, pass da.swap_dims({{{dim!r}: name}}) with dim=name. If every "
-        "curve has its own, call symspline.CubicSpline with one row of times per curve. For the knots 0, 1, 2, ... "
-        "pass da.drop_vars(names)."
-    )
-
-
-def _are_times(name: Hashable, coordinate: xr.DataArray) -> bool:
-    """Whether a coordinate holds times, by its type, its name, or its attributes of the CF conventions (4.4)."""
-    words = coordinate.attrs
-    return (
-        coordinate.dtype.kind in "mM"
-        or str(name).lower() in ("t", "time", "times")
-        or words.get("standard_name") == "time"
-        or words.get("axis") == "T"
-        or " since " in str(words.get("units", ""))
-    )
-
-
 def _vector(vector: Any, name: str, space: Space, point_dims: Sequence[str], curves: list[Hashable]) -> xr.DataArray:
     """A vector of an end condition."""
     if not isinstance(vector, xr.DataArray):
@@ -156,9 +142,12 @@ def _vector(vector: Any, name: str, space: Space, point_dims: Sequence[str], cur
 
 
 def times_with_names(
-    x: Any, dim: str, point_dims: Sequence[str], curves: list[Hashable]
+    x: Any, dim: Hashable, point_dims: Sequence[str], curves: list[Hashable]
 ) -> tuple[xr.DataArray, list[Hashable]]:
-    """Times with names of their dimensions, and those of them that no curve has."""
+    """Times with names of their dimensions, and those of them that no curve has.
+
+    Times without names have the dimension `dim`.
+    """
     if not isinstance(x, xr.DataArray):
         array = as_array(times_of(x, "x")[0], "x")
         if array.ndim > 1:
@@ -170,18 +159,18 @@ def times_with_names(
 
 
 def rehearse(times: xr.DataArray, t: Array | None, nodes: int, policy: str) -> None:
-    """Raise now what the curves would raise about their times."""
+    """Raise now what the curves would raise about their times, if all have the same knots."""
     if times.chunks is None:
         still = np.zeros((nodes, 1))
         values_at(still, still, times.values, space=LINE, t=t, quantity="point", policy=policy, x_axes=times.ndim)
 
 
-def bare(array: xr.DataArray, dim: str) -> xr.DataArray:
+def bare(array: xr.DataArray, dim: Hashable) -> xr.DataArray:
     """An array whose dimension of knots has nothing to do with times of that name."""
     return array.drop_vars([name for name, c in array.coords.items() if dim in c.dims]).rename({dim: KNOTS})
 
 
-def timed_by(values: T, times: xr.DataArray, dim: str) -> T:
+def timed_by(values: T, times: xr.DataArray, dim: Hashable) -> T:
     """The values with their times as a coordinate, where that can have the name of the dimension of time."""
     fits = dim not in times.dims or times.ndim == 1
     return values.assign_coords({dim: times}) if fits else values

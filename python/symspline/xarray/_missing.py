@@ -1,0 +1,119 @@
+"""Curves with missing samples, which are dropped curve by curve."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._adapters import joined
+from .._core import ValidationError
+from .._cubic import CubicSpline
+from .._functional import fit_many
+from .._report import ConvergenceWarning
+from .._spaces import Array, Space
+from .._warnings import warn
+
+Mask = NDArray[np.bool_]
+
+
+def missing(times: Array) -> Mask:
+    """Return where times are NaN or NaT."""
+    if times.dtype.kind in "mM":
+        return np.isnat(times)
+    return np.isnan(times) if times.dtype.kind == "f" else np.zeros(times.shape, bool)
+
+
+def times_of_rows(t: Array | None, batch: tuple[int, ...], nodes: int) -> Array:
+    """Return the times of each curve of a flattened batch, shape (curves, nodes)."""
+    t = np.arange(nodes, dtype=np.float64) if t is None else t
+    return np.broadcast_to(t, (*batch, nodes)).reshape(-1, nodes)
+
+
+def of_equal_length(valid: Mask) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
+    """Group curves by their number of valid samples.
+
+    Parameters
+    ----------
+    valid : ndarray of bool, shape (curves, nodes)
+        Valid samples.
+
+    Yields
+    ------
+    curves : ndarray of int, shape (k,)
+        Curves with the same number m of valid samples, at least two.
+    nodes : ndarray of int, shape (k, m)
+        The valid samples of each of them.
+    """
+    counts = valid.sum(axis=1)
+    for count in np.unique(counts[counts > 1]):
+        curves = np.flatnonzero(counts == count)
+        yield curves, np.nonzero(valid[curves])[1].reshape(len(curves), count)
+
+
+def fit_valid(
+    points: Array, t: Array | None, named: dict[str, Array], space: Space[Any], kinds: Any, how: dict[str, Any]
+) -> tuple[Array, Array, list[CubicSpline[Any]]]:
+    """Fit each curve of a block to its valid samples.
+
+    Returns
+    -------
+    points, velocities : ndarray, shape (*batch, nodes, *point_shape)
+        NaN at missing samples, and for curves that do not exist.
+    splines : list of CubicSpline
+        The curves of the flattened batch.
+    """
+    lead = points.ndim - 1 - len(space.point_shape)
+    batch, nodes = points.shape[:lead], points.shape[lead]
+    rows = points.reshape(-1, nodes, *space.point_shape)
+    times = times_of_rows(t, batch, nodes)
+    valid = space._where_finite(rows) & ~missing(times)
+    mask = np.broadcast_to(named.get("where", np.True_), batch).reshape(-1)
+    enough = valid.sum(axis=1) > 1
+    _report_short(np.flatnonzero(mask & ~enough), valid, batch, how["on_failure"])
+    # Curves that are too short are masked. Their times must increase nevertheless.
+    pairs = [
+        (times[i][own], rows[i][own]) if enough[i] else (np.arange(2.0), rows[i][[0, 0]]) for i, own in enumerate(valid)
+    ]
+    start, end = (named[name].reshape(-1, *space.point_shape) if name in named else None for name in ("start", "end"))
+    try:
+        splines = fit_many(pairs, space, bc_type=joined(kinds, (start, end)), where=mask & enough, **how)
+    except ValidationError as error:
+        raise named_curve(error, batch, np.arange(len(rows))) from None
+    found = np.full((2, *rows.shape), np.nan, space.dtype)
+    for i, spline in enumerate(splines):
+        if enough[i]:
+            found[0, i, valid[i]], found[1, i, valid[i]] = spline.points, spline.velocities
+    return found[0].reshape(points.shape), found[1].reshape(points.shape), splines
+
+
+def _report_short(short: NDArray[np.intp], valid: Mask, batch: tuple[int, ...], on_failure: str) -> None:
+    """Raise or warn if curves have too few samples."""
+    if not short.size or on_failure == "ignore":
+        return
+    first, more = short[0], f" (and {len(short) - 1} more curves)" if len(short) > 1 else ""
+    index = tuple(map(int, np.unravel_index(first, batch))) if batch else ()
+    of = f"curve {','.join(map(str, index))}" if index else "the curve"
+    message = (
+        f"{of}{more} has {valid[first].sum()} valid samples, but needs at least two. Mask it by where=, or pass "
+        "on_failure='ignore' to make it NaN."
+    )
+    if on_failure == "warn":
+        return warn(message, ConvergenceWarning, index)
+    error = ValidationError(message)
+    error.curve = index
+    raise error
+
+
+def named_curve(error: Any, batch: tuple[int, ...], curves: NDArray[np.intp]) -> Any:
+    """Return an error whose curve is named by its index in the batch instead of its number among some curves."""
+    number = getattr(error, "curve", None)
+    if not number:
+        return error
+    index = tuple(map(int, np.unravel_index(curves[number[0]], batch))) if batch else ()
+    name = f"curve {','.join(map(str, index))}" if index else "the curve"
+    error = error._with_message(str(error).replace(f"curve {number[0]}", name))
+    error.curve = index
+    return error
