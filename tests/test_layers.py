@@ -44,6 +44,7 @@ LAYERS = [
         "_pairs",
         "_segments",
         "_smoothing",
+        "_tracks",
         "convert",
         "jax",
         "torch",

@@ -17,6 +17,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Literal, overload
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ._arrays import checked_flag, checked_number, short_repr
 from ._core import ValidationError
@@ -30,6 +31,7 @@ from ._segments import check_smooth, cut
 from ._smoothing.many import smooth_many
 from ._spaces import Sphere
 from ._timed_curve import check_timed
+from ._tracks import read_tracks
 from ._typing import Duplicates, FloatArray, TimesLike
 from ._warnings import warn
 
@@ -40,6 +42,9 @@ __all__ = ["EARTH_RADIUS", "cog", "compass", "from_lonlat", "resample", "sog", "
 
 EARTH_RADIUS = 6_371_008.8
 """Mean radius in metres: R₁ of the ellipsoid GRS 80 (Moritz, Geodetic reference system 1980)."""
+
+# Values of the column ``quality`` of resampled tables.
+_QUALITIES = ["good", "lam at bound", "not converged"]
 
 
 @overload
@@ -244,7 +249,8 @@ def resample(
     *,
     by: str | Sequence[str] | None = None,
     time: str | None = None,
-    columns: tuple[str, str] = ("lon", "lat"),
+    columns: tuple[str, str] | None = None,
+    interpolate: str | Sequence[str] = (),
     max_gap: Any,
     min_points: int = 2,
     duplicates: Duplicates = "raise",
@@ -255,7 +261,7 @@ def resample(
     """Resample the positions of a pandas table to regular times.
 
     One C² curve is fitted per track (a vessel, an animal, a storm), and a new one after every gap. The result includes
-    speed and course over ground.
+    speed and course over ground, and the quality of every row.
 
     Parameters
     ----------
@@ -264,11 +270,17 @@ def resample(
     every : str or pandas.Timedelta, default "1min"
         Step between the new times, which are whole multiples of it in UTC.
     by : str or sequence of str, optional
-        Column, or columns, whose values identify the tracks, such as ``"mmsi"``. None means one track.
+        Column, or columns, whose values identify the tracks, such as ``"mmsi"``. None means one track, or for a table
+        of Movebank the column ``individual-local-identifier``. An empty list always means one track.
     time : str, optional
-        Column of the times. None means the index.
-    columns : tuple of str, default ("lon", "lat")
-        Columns of longitude and latitude, in degrees.
+        Column of the times: dates, or texts in ISO 8601. None means the index, or for a table of Movebank whose index
+        does not hold dates the column ``timestamp``.
+    columns : tuple of str, optional
+        Columns of longitude and latitude, in degrees. By default ``("lon", "lat")``, or the columns of Movebank,
+        ``("location-long", "location-lat")``.
+    interpolate : str or sequence of str, optional
+        Columns of numbers to interpolate linearly in time, such as depths or temperatures. Angles that pass 360°, such
+        as headings, are not suitable.
     max_gap : float or timedelta64
         Longest gap within a curve, in seconds or as a duration; see `symspline.fit_segments`. The result has no rows
         within gaps.
@@ -287,14 +299,23 @@ def resample(
     -------
     pandas.DataFrame
         The columns ``by``, the times, longitude and latitude under their names, ``sog`` in m/s, and ``cog`` in degrees
-        clockwise from north. Times keep their time zone. With ``on_failure="warn"`` or ``"ignore"``, the numbers of
-        segments whose curve did not converge are NaN.
+        clockwise from north. Times keep their time zone. With ``smooth=True`` there are the standard errors
+        ``position_std`` (of each of the two coordinates, in metres), ``sog_std`` and ``cog_std``, and the smoothing
+        parameter ``lam``.
+
+        The column ``quality`` is categorical: ``"good"``; ``"lam at bound"`` for a smoothing spline whose λ is at a
+        bound, so that the track is a great circle or is not smoothed; or ``"not converged"``, with
+        ``on_failure="warn"`` or ``"ignore"``, where the numbers of the curve are NaN.
+
+        Next are the other columns of `frame` that are constant, which means that no track has two different values.
+        Examples are the name of a ship or the species of an animal; missing values do not count. The columns in
+        `interpolate` are last. All others are dropped.
 
     Raises
     ------
     ValidationError
-        If a column does not exist, a position or a name is missing, every segment has fewer than ``min_points`` points,
-        or `symspline.fit_segments` does not accept the positions or times.
+        If a column does not exist, a position, a time or a name is missing, every segment has fewer than ``min_points``
+        points, or `symspline.fit_segments` does not accept the positions or times.
     ConvergenceError, CutLocusError
         As for `CubicSpline` and `make_smoothing_spline`. The message names the track.
 
@@ -306,76 +327,101 @@ def resample(
     >>> track = resample(table, "5min", max_gap=3600)
     >>> len(track), track["lon"].iloc[1].round(3), track["sog"].iloc[1].round(2)
     (5, np.float64(10.05), np.float64(18.53))
+
+    A download from Movebank, with a sensor:
+
+    >>> storks = pd.DataFrame(
+    ...     {
+    ...         "timestamp": ["2013-08-06 09:57:00.000", "2013-08-06 10:57:00.000", "2013-08-06 11:56:00.000"],
+    ...         "location-long": [11.02, 11.05, 11.20],
+    ...         "location-lat": [47.75, 47.76, 47.90],
+    ...         "external-temperature": [20.0, 22.0, 24.0],
+    ...         "individual-taxon-canonical-name": "Ciconia ciconia",
+    ...         "individual-local-identifier": "DER AN858",
+    ...     }
+    ... )
+    >>> hourly = resample(storks, "1h", max_gap="6h", interpolate="external-temperature")
+    >>> list(hourly.columns[:3]), hourly["external-temperature"].round(2).tolist()
+    (['individual-local-identifier', 'timestamp', 'location-long'], [20.1, 22.1])
     """
     import pandas as pd
 
-    keys: list[Any] = [] if by is None else list(by) if isinstance(by, (list, tuple)) else [by]
-    if not isinstance(frame, pd.DataFrame):
-        raise ValidationError(f"frame must be a pandas DataFrame, not {short_repr(frame)}")
-    for name in (*keys, time, *columns):
-        if name is not None and name not in frame.columns:
-            raise ValidationError(
-                f"column {name!r} does not exist; the columns are {', '.join(map(str, frame.columns))}"
-            )
-    name = time or frame.index.name or "time"
-    stamps = frame.index.to_series(index=range(len(frame))) if time is None else frame[time].reset_index(drop=True)
-    if stamps.dtype.kind != "M":
-        raise ValidationError(f"column {name!r} must hold dates; convert strings by pandas.to_datetime")
+    table, more = read_tracks(frame, by, time, columns, interpolate)
     check_smooth(smooth, duplicates, options)
     for option in ("weights", "frames"):
         if smooth and option in options:
             raise ValidationError(
                 f"resample does not support {option}, because they belong to rows; use symspline.fit_segments"
             )
-    for column in [*keys, *columns]:
-        missing = np.flatnonzero(frame[column].isna())
-        if missing.size:
-            raise ValidationError(
-                f"{len(missing)} rows have no {column!r}, the first of them row {missing[0]}; drop them by "
-                f"frame.dropna(subset=[{column!r}])"
-            )
+    computed = ["sog", "cog", *(["position_std", "sog_std", "cog_std", "lam"] if smooth else []), "quality"]
+    own_names = [*table.keys, table.name, *table.columns]
+    if clash := [name for name in (*own_names, *more) if name in computed]:
+        raise ValidationError(f"the column {clash[0]!r} has the name of a column of the result. Rename it.")
+    max_gap = pd.Timedelta(max_gap).to_timedelta64() if isinstance(max_gap, str) else max_gap
     step = pd.Timedelta(every)
-    zone = stamps.dt.tz
-    utc = (stamps.dt.tz_convert("UTC").dt.tz_localize(None) if zone is not None else stamps).to_numpy()
-    tracks = frame.groupby(keys if len(keys) > 1 else keys[0] if keys else np.zeros(len(frame)), sort=False)
-    vectors = from_lonlat(*(frame[column].to_numpy() for column in columns))
     curves: list[tuple[Any, Any]] = []
     names: list[str] = []
-    owners: list[dict[Any, Any]] = []
-    for label, rows in tracks.indices.items():
+    owners: list[int] = []
+    for track, rows in enumerate(table.rows):
         # A curve needs two positions.
         if len(rows) < 2:
             continue
-        owner = dict(zip(keys, label if len(keys) > 1 else [label], strict=False))
-        of = "".join(f"{key} {value}, " for key, value in owner.items())
-        own = rows[np.argsort(utc[rows], kind="stable")]
+        of = table.called(track)
         try:
-            used = np.ones(len(own), bool) if smooth else None
-            segments = cut(utc[own], vectors[own], "sphere:2", max_gap, min_points, duplicates, used).curves
+            vectors = from_lonlat(*(frame[column].to_numpy()[rows] for column in table.columns))
+            used = np.ones(len(rows), bool) if smooth else None
+            segments = cut(table.times[rows], vectors, "sphere:2", max_gap, min_points, duplicates, used).curves
         except ValidationError as error:
             raise ValidationError(f"{of}rows in the order of time: {error}" if of else str(error)) from None
         curves += segments
         names += [f"{of}the segment from {np.datetime_as_string(t[0][0], 's')} on" for t, _ in segments]
-        owners += [owner] * len(segments)
+        owners += [track] * len(segments)
     if not curves and len(frame):
         raise ValidationError(
             f"every track has fewer than {min_points} positions between gaps longer than max_gap={short_repr(max_gap)} "
             "seconds; increase max_gap or decrease min_points"
         )
-    tables = []
+    if not curves:
+        return pd.DataFrame(columns=[*own_names, *computed, *more])
+    parts = []
     for spline, owner in zip(_fitted(curves, names, smooth, options), owners, strict=True):
         x = pd.date_range(pd.Timestamp(spline.t[0]).ceil(step), pd.Timestamp(spline.t[-1]).floor(step), freq=step)
-        at = x.to_numpy()
-        lon, lat = to_lonlat(spline(at))
-        shown_times = x if zone is None else x.tz_localize("UTC").tz_convert(zone)
-        values = {name: shown_times, columns[0]: lon, columns[1]: lat}
+        rates = pd.DataFrame({table.name: x} | _along(spline, x.to_numpy(), table.columns, radius, smooth))
+        for column in more:
+            rates[column] = table.linear(column, owner, x.to_numpy())
+        parts.append(rates)
+    found = pd.concat(parts, ignore_index=True)
+    tracks = np.repeat(owners, [len(part) for part in parts])
+    if table.zone is not None:
+        found[table.name] = found[table.name].dt.tz_localize("UTC").dt.tz_convert(table.zone)
+    constant = table.constant([*own_names, *computed, *more])
+    for column in (*table.keys, *constant):
+        found[column] = table.first_values(column, tracks)
+    return found[[*own_names, *computed, *constant, *more]]
+
+
+def _along(
+    spline: Any, at: NDArray[np.datetime64], columns: tuple[Any, Any], radius: float, smooth: bool
+) -> dict[Any, Any]:
+    """Return the columns of a segment: positions, speed, course, standard errors, λ and quality."""
+    import pandas as pd
+
+    lon, lat = to_lonlat(spline(at))
+    values: dict[Any, Any] = {columns[0]: lon, columns[1]: lat}
+    quality = "good"
+    if smooth:
+        (speed, speed_std), (course, course_std) = (
+            sog(spline, at, radius=radius, return_std=True),
+            cog(spline, at, return_std=True),
+        )
+        values |= {"sog": speed, "cog": course, "position_std": radius * spline.std(at)}
+        values |= {"sog_std": speed_std, "cog_std": course_std, "lam": spline.lam}
+        quality = "lam at bound" if spline.report.at_bound else quality
+    else:
         values |= {"sog": sog(spline, at, radius=radius), "cog": cog(spline, at)}
-        if not spline.report.converged:
-            values |= dict.fromkeys((*columns, "sog", "cog"), np.nan)
-        tables.append(pd.DataFrame(owner | values))
-    if not tables:
-        return pd.DataFrame(columns=[*keys, name, *columns, "sog", "cog"])
-    return pd.concat(tables, ignore_index=True)
+    if not spline.report.converged:
+        values, quality = dict.fromkeys(values, np.nan), "not converged"
+    return values | {"quality": pd.Categorical([quality] * len(at), _QUALITIES)}
 
 
 def _fitted(curves: list[tuple[Any, Any]], names: list[str], smooth: bool, options: dict[str, Any]) -> Any:

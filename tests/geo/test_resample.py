@@ -28,7 +28,7 @@ def ais(zone=None):
 @pytest.mark.parametrize("zone", [None, "Europe/Berlin"])
 def test_tracks_at_full_minutes(zone):
     found = geo.resample(ais(zone), "1min", by="mmsi", time="when", max_gap=600, duplicates="first")
-    assert list(found.columns) == ["mmsi", "when", "lon", "lat", "sog", "cog"]
+    assert list(found.columns) == ["mmsi", "when", "lon", "lat", "sog", "cog", "quality"]
     minutes = (found["when"] - pd.Timestamp("2026-03-01 06:00", tz=zone)) / pd.Timedelta("1min")
     east = found["mmsi"] == 211
     assert sorted(minutes[east]) == [0, 1, 2, 3, 65, 66, 67]
@@ -53,7 +53,7 @@ def test_it_is_the_curve_itself():
     np.testing.assert_array_equal(found["lat"], lat)
     assert len(found) == 49 * 60 // 90 + 1
     none = geo.resample(table[:0], "90min", max_gap=60)
-    assert list(none.columns) == ["time", "lon", "lat", "sog", "cog"] and len(none) == 0
+    assert list(none.columns) == ["time", "lon", "lat", "sog", "cog", "quality"] and len(none) == 0
 
 
 def test_noisy_tracks_are_smoothed():
@@ -77,6 +77,12 @@ def test_invalid_resampling_raises():
     for change, what in [
         (lambda t: {"by": "ship"}, "column 'ship' does not exist; the columns are mmsi, when, lon, lat"),
         (lambda t: {"time": "lon"}, "column 'lon' must hold dates"),
+        (lambda t: {"time": "text", "frame": t.assign(text="1.2.2026 10:00")}, "column 'text' must hold .* ISO 8601"),
+        (lambda t: {"interpolate": "mmsi"}, "interpolate has the column 'mmsi', but only columns of numbers"),
+        (lambda t: {"interpolate": "name", "frame": t.assign(name="x")}, "interpolate has the column 'name'"),
+        (lambda t: {"interpolate": "sog", "frame": t.assign(sog=1.0)}, "column 'sog' has the name of a column of the"),
+        (lambda t: {"frame": pd.concat([t, t[["lon"]]], axis=1)}, "two columns with the name 'lon'"),
+        (lambda t: {"frame": t.assign(when=t["when"].where(t["mmsi"] != 999))}, r"no 'when', .* \(mmsi 999\)"),
         (lambda t: {"duplicates": "raise"}, r"mmsi 211, rows in the order of time: t\[2\] and t\[3\] are both"),
         (lambda t: {"smooth": 0.5}, "smooth must be True or False, not 0.5"),
         (lambda t: {"smooth": True, "duplicates": "mean"}, "Omit duplicates='mean'"),
@@ -109,6 +115,9 @@ def test_rows_of_curves_that_did_not_converge_are_nan(smooth):
     found = geo.resample(table, "1h", on_failure="ignore", **options)
     wild = found["mmsi"] == 244
     assert found.loc[wild, ["lon", "lat", "sog", "cog"]].isna().all(axis=None)
+    assert (found["quality"][wild] == "not converged").all()
+    if not smooth:
+        assert (found["quality"][~wild] == "good").all() and found["lon"][~wild].notna().all()
     whose = "mmsi 244, the segment from 2026-01-01T00:00:00 on"
     with pytest.raises(ss.ConvergenceError, match=whose) as error:
         geo.resample(table[12:], "1h", **options)
@@ -123,11 +132,12 @@ def test_several_columns_tell_tracks_apart():
     table = pd.concat([table, table.assign(trip=2, lat=table["lat"] + 1)])
     options = {"time": "when", "max_gap": 600, "duplicates": "first"}
     found = geo.resample(table, "1min", by=["mmsi", "trip"], **options)
-    assert list(found.columns) == ["mmsi", "trip", "when", "lon", "lat", "sog", "cog"]
+    assert list(found.columns) == ["mmsi", "trip", "when", "lon", "lat", "sog", "cog", "quality"]
     for trip in (1, 2):
         alone = geo.resample(table[table["trip"] == trip], "1min", by="mmsi", **options)
         own = found[found["trip"] == trip].drop(columns="trip").reset_index(drop=True)
-        pd.testing.assert_frame_equal(own, alone)
+        assert (alone["trip"] == trip).all()
+        pd.testing.assert_frame_equal(own, alone.drop(columns="trip"))
     with pytest.raises(ss.ValidationError, match="mmsi 211, trip 1, rows in the order of time"):
         geo.resample(table, by=("mmsi", "trip"), **options | {"duplicates": "raise"})
     one = geo.resample(ais(), "1min", by=["mmsi"], **options)
