@@ -50,7 +50,8 @@ LAYERS = [
         "torch",
     ],
     ["_estimation"],
-    ["_pose_files", "geo", "measure", "poses", "quantum", "rotations", "shapes", "subspaces", "tensors", "testing"],
+    ["_pose_files"],
+    ["_head_positions", "geo", "measure", "poses", "quantum", "rotations", "shapes", "subspaces", "tensors", "testing"],
     ["cli", "xarray"],
     ["__init__", "__main__"],
 ]

@@ -91,8 +91,8 @@ def tum_rows(file: Any) -> tuple[Doubles, Lines]:
     OSError
         If the file cannot be read.
     """
-    lines = _lines(file)
-    return _parsed(lines, TUM, f"a line of a TUM trajectory has {len(TUM)}: {' '.join(TUM)}"), lines
+    lines = lines_of(file)
+    return parsed(lines, TUM, f"a line of a TUM trajectory has {len(TUM)}: {' '.join(TUM)}"), lines
 
 
 def write_tum(file: Any, t: ArrayLike, poses: Any) -> None:
@@ -141,9 +141,9 @@ def write_tum_rows(file: Any, t: Array, poses: Doubles, head: str = "") -> None:
         If dates are finer than nanoseconds, or too far from 1970 to be counted in them.
     """
     if t.dtype.kind == "M":
-        _write(file, poses, " ", head, _exact_seconds(t))
+        write(file, poses, " ", head, _exact_seconds(t))
     else:
-        _write(file, np.column_stack([t, poses]), " ", head)
+        write(file, np.column_stack([t, poses]), " ", head)
 
 
 def _exact_seconds(dates: Array) -> list[str]:
@@ -195,15 +195,15 @@ def read_kitti(file: Any, times: Any = None) -> tuple[Doubles, Array]:
     >>> poses[0, :3, 3].tolist()
     [5.0, 6.0, 7.0]
     """
-    lines = _lines(file)
-    rows = _parsed(lines, _KITTI, "KITTI poses are lines with the twelve numbers of [R | x]").reshape(-1, 3, 4)
+    lines = lines_of(file)
+    rows = parsed(lines, _KITTI, "KITTI poses are lines with the twelve numbers of [R | x]").reshape(-1, 3, 4)
     r = rows[:, :, :3]
     off = off_one(r)
     bad = ~((off <= _ROUNDED) & (np.linalg.det(r) > 0))
     refuse(bad, f"{lines.file}: pose ", lambda i: f"has no rotation: |RᵀR - 1| is {off[i]:.1e}")
     t = np.arange(len(rows), dtype=float)
     if times is not None:
-        t = _parsed(_lines(times, "times"), ("time",), "times of KITTI are one number per line")[:, 0]
+        t = parsed(lines_of(times, "times"), ("time",), "times of KITTI are one number per line")[:, 0]
     if len(t) != len(rows):
         raise ValidationError(f"{_name(times)} has {len(t)} times, but {lines.file} {len(rows)} poses")
     return t, join(_SO3.project(r), rows[:, :, 3])
@@ -233,7 +233,7 @@ def write_kitti(file: Any, poses: Any) -> None:
     >>> file.getvalue()
     '1.0 0.0 0.0 0.0 0.0 1.0 0.0 0.0 0.0 0.0 1.0 0.0\n'
     """
-    _write(file, _checked(poses)[:, :3].reshape(-1, 12), " ")
+    write(file, checked_poses(poses)[:, :3].reshape(-1, 12), " ")
 
 
 # ---- EuRoC: nanoseconds, x, y, z, qw, qx, qy, qz ----
@@ -279,10 +279,10 @@ def read_euroc(file: Any) -> tuple[NDArray[np.datetime64], Array]:
     (['1970-01-01T00:00:01.000000000'], [1.0, 2.0, 3.0])
     """
     form = "EuRoC poses are lines of 'nanoseconds,x,y,z,qw,qx,qy,qz'"
-    lines = _lines(file)
+    lines = lines_of(file)
     # Double precision cannot represent nanoseconds since 1970.
-    ns = _parsed(lines, ("nanoseconds",), form, 0, dtype=np.int64)[:, 0]
-    rows = _parsed(lines, ("x", "y", "z", "qw", "qx", "qy", "qz"), form, 1)
+    ns = parsed(lines, ("nanoseconds",), form, 0, dtype=np.int64)[:, 0]
+    rows = parsed(lines, ("x", "y", "z", "qw", "qx", "qy", "qz"), form, 1)
     return ns.astype("datetime64[ns]"), join(rotations_in_rows(rows[:, 3:], lines.file, lines.place), rows[:, :3])
 
 
@@ -317,7 +317,7 @@ def write_euroc(file: Any, t: ArrayLike, poses: Any) -> None:
         times = np.rint(1e9 * times.astype(np.float64)).astype(np.int64)
     ns = times.astype("datetime64[ns]").astype(np.int64).tolist()
     values = np.concatenate([x, matrix_to_quaternion(r, scalar_first=True)], axis=1)
-    _write(file, values, ",", _EUROC, map(str, ns))
+    write(file, values, ",", _EUROC, map(str, ns))
 
 
 # ---- poses of two parts ----
@@ -396,13 +396,13 @@ def _timed(t: ArrayLike, poses: Any) -> tuple[Array, Array]:
     if isinstance(poses, tuple) and len(poses) == 2:
         rotations, positions = (as_array(own, "poses") for own in poses)
         missing = _missing(rotations, 2) & _missing(positions, 1)
-        times = _moments(t, len(missing))
-        return times[~missing], _checked((rotations[~missing], positions[~missing]))
+        times = moments(t, len(missing))
+        return times[~missing], checked_poses((rotations[~missing], positions[~missing]))
     array = _SE3._array(poses, "poses")
     # The last row of a pose is constant.
     missing = _missing(array[..., :3, :], 2) if array.ndim == 3 else np.zeros(array.shape[:1], bool)
-    times = _moments(t, len(missing))
-    return times[~missing], _checked(array[~missing])
+    times = moments(t, len(missing))
+    return times[~missing], checked_poses(array[~missing])
 
 
 def _missing(array: Array, axes: int) -> NDArray[np.bool_]:
@@ -412,7 +412,7 @@ def _missing(array: Array, axes: int) -> NDArray[np.bool_]:
     return np.asarray(np.isnan(array).all(axis=tuple(range(1, axes + 1))))
 
 
-def _checked(poses: Any) -> Array:
+def checked_poses(poses: Any) -> Array:
     """Poses to write, shape (n, 4, 4)."""
     g = join(*poses) if isinstance(poses, tuple) and len(poses) == 2 else _SE3._array(poses, "poses")
     _SE3.check_point(g)
@@ -421,7 +421,7 @@ def _checked(poses: Any) -> Array:
     return g
 
 
-def _moments(t: ArrayLike, count: int) -> Array:
+def moments(t: ArrayLike, count: int) -> Array:
     """Times to write: numbers of seconds, or dates."""
     times = as_array(times_of(t, "t")[0], "t")
     if times.shape != (count,):
@@ -482,7 +482,7 @@ def rotations_in_rows(q: Doubles, file: object, place: Callable[[int], str], ato
     return quaternion_to_matrix(q / sizes[:, None], scalar_first=True)
 
 
-def _lines(file: Any, name: str = "file") -> Lines:
+def lines_of(file: Any, name: str = "file") -> Lines:
     """Return the lines that are not comments; `name` is the name of the argument."""
     path = path_of(file, name, method="read", text=True)
     if path is None:
@@ -504,7 +504,7 @@ def _lines(file: Any, name: str = "file") -> Lines:
     return Lines(_name(file), [number for number, _ in kept], [line for _, line in kept])
 
 
-def _parsed(lines: Lines, columns: Sequence[str], form: str, start: int | None = None, dtype: Any = np.float64) -> Any:
+def parsed(lines: Lines, columns: Sequence[str], form: str, start: int | None = None, dtype: Any = np.float64) -> Any:
     """Return the numbers in lines, with one column per name.
 
     Parameters
@@ -554,7 +554,7 @@ def _name(file: Any) -> str:
     return str(name)
 
 
-def _write(file: Any, rows: Array, separator: str, head: str = "", first: Iterable[str] | None = None) -> None:
+def write(file: Any, rows: Array, separator: str, head: str = "", first: Iterable[str] | None = None) -> None:
     """Write rows of numbers as lines, which may begin with a first column of texts."""
     # The shortest text from which the same number is read.
     text = number_lines(cast(rows), separator)

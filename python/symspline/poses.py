@@ -30,6 +30,7 @@ from ._curves.at_times import evaluated
 from ._curves.composed import AnyCurve
 from ._estimation.along import Motion
 from ._estimation.uncertainty import Jacobians, check_uncertain, standard_errors
+from ._head_positions import read_head_pos, write_head_pos
 from ._pose_files import (
     check_seconds,
     join,
@@ -55,11 +56,13 @@ __all__ = [
     "linear_acceleration",
     "linear_velocity",
     "read_euroc",
+    "read_head_pos",
     "read_kitti",
     "read_tum",
     "split",
     "twist",
     "write_euroc",
+    "write_head_pos",
     "write_kitti",
     "write_tum",
 ]

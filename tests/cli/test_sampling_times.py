@@ -78,10 +78,12 @@ def test_times_along_a_curve(along):
     assert len(along("--every 10min", day)) == 145
     assert along("--every 6H", day)[-1] == day[-1]
     assert along("--every 7h", day).tolist() == along("--every 25200", day).tolist()
-    assert len(along("--every 7h", day)) == 4
+    # 438 291 hours since 1970 are a multiple of seven.
+    sevenths = np.arange("2020-01-01T03:00", "2020-01-02T00:01", 420, dtype="M8[m]")
+    assert along("--every 7h", day).astype("M8[m]").tolist() == sevenths.tolist()
     half = along("--every 0.5s", np.array(["2020-01-01T00:00:00", "2020-01-01T00:00:01"], "datetime64[s]"))
     assert half.astype(str).tolist()[1] == "2020-01-01T00:00:00.500"
-    assert along("--every 1e30d", day).tolist() == along("--every 2d", day).tolist()
+    # The even days since 1970.
     assert along("--every 2d", day).tolist() == [day[0].astype("datetime64[s]").item()]
     np.testing.assert_array_equal(along("--every 0.1", np.array([0.0, 1.0])), np.minimum(np.arange(11) * 0.1, 1))
     assert along("--every 0.3", np.array([0.0, 1.0]))[-1] == 3 * 0.3
@@ -107,6 +109,7 @@ def test_invalid_steps(fails):
         (DAY, "--every=1y", "units are ns, us, ms, s, min, h, d"),
         (DAY, "--every=0.5ns", "whole number of nanoseconds"),
         (DAY, "--every=1ns", "samples of one curve"),
+        (DAY, "--every=1e30d", "no multiple of this step lies between the start and the end of the curve"),
         (DAY, "--every=1e401", "too long"),
         (DAY, "--every=1e-999999999", "too short"),
         (DAY, "--every=1e99999999999999999999", "exponent is too large"),
@@ -134,10 +137,24 @@ def test_steps_of_large_whole_numbers(along):
         assert along("-n 3", knots).tolist() == [start, start + 4, start + 8]
 
 
+def test_dates_are_aligned_as_those_of_resample(along):
+    """Whole multiples in UTC, before and after 1970, whatever the unit of the knots."""
+    pd = pytest.importorskip("pandas")
+    table = pd.DataFrame({"lon": [0.0, 1, 2], "lat": 0.0})
+    for start, unit in [("2021-08-28T05:47:13", "s"), ("1969-12-30T22:59:59.999", "ms"), ("2024-02-29T23:00", "us")]:
+        knots = np.datetime64(start, unit) + np.array([0, 5, 31]) * np.timedelta64(3599, "s")
+        table.index = pd.DatetimeIndex(knots)
+        for step in ("1h", "10min", "7h", "90s"):
+            expected = ss.geo.resample(table, step, max_gap="10D")["time"].to_numpy()
+            found = along(f"--every {step}", knots)
+            np.testing.assert_array_equal(found, expected)
+            assert found[0] >= knots[0] and found[-1] <= knots[-1]
+
+
 def test_dates_out_of_range(along):
     assert along("--every 1d", FAR).astype("datetime64[D]")[-1] == FAR[-1]
     short = np.array([0, 10**9], "datetime64[ns]")
-    assert along("--every 200000d", short).tolist() == short[:1].tolist()
+    assert along("--every 200000d", short).tolist() == short[:1].tolist()  # 1970 itself
     assert along("-n 2", FINE).tolist() == FINE.tolist()
 
 

@@ -20,6 +20,11 @@ examples:
   symspline sample attitude.npz -n 1000 --nu 0,1,2 -o attitude.parquet
   symspline sample storms.npz --at satellites.csv --nu 0,1 -o storms.csv
 
+With dates, --every 1h samples at full hours in UTC and --every 1d at midnight, as symspline.geo.resample does: the
+times are whole multiples of the step since 1970-01-01. The first sample is at or after the start of a curve, and the
+last one at or before its end. Use -n for samples from the start to the end. With numbers, --every counts from the
+start.
+
 --at reads the column of times of the table that was fitted, or finds one as symspline fit does. If the file also has
 the column of the curves' names, every row is for its curve, otherwise for all curves.
 """
@@ -56,7 +61,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("curves", type=Path, metavar="CURVE", help="file of curves to read: .npz")
     which = parser.add_mutually_exclusive_group(required=True)
-    steps = "a step from the start on: a number, for dates of seconds, or a duration in ns, us, ms, s, min, h or d"
+    steps = (
+        "a step: for dates a duration in ns, us, ms, s (or no unit), min, h or d, with samples at its whole multiples "
+        "in UTC, such as full hours; for numbers a number, with samples from the start on"
+    )
     which.add_argument("--every", metavar="DT", help=steps)
     count = "the number of equidistant samples from the start to the end"
     which.add_argument("-n", dest="number", type=number, metavar="N", help=count)
@@ -81,6 +89,11 @@ def run(options: argparse.Namespace) -> int:
         times, rows = _given(options.at, curves)
     else:
         times, rows = {name: _along(spline.t, options) for name, spline in splines.items()}, None
+        empty = (
+            f"no multiple of this step lies between the start and the end of {'any' if curves.named else 'the'} curve"
+        )
+        none = not any(map(len, times.values()))
+        refuse(f"--every {options.every}: ", (none, f"{empty}; use a shorter step, or -n"))
     functions: Any = (samples_of, deviations_of) if stds else (samples_of,)
     samples: list[Samples] = []
     with Progress("sampling") as progress:

@@ -143,7 +143,11 @@ def longest_gap(text: str, dates: bool) -> float:
 
 
 def every(step: str, knots: Times) -> Times:
-    """Return times from the first knot to at most the last, one per step."""
+    """Return times from the first to the last knot, one per step.
+
+    Dates are whole multiples of the step since 1970-01-01 in UTC, as those of `symspline.geo.resample`. Numbers start
+    at the first knot.
+    """
     count, unit = _duration(step, "--every")
     kind = knots.dtype.kind
     if unit and kind != "M":
@@ -166,9 +170,21 @@ def every(step: str, knots: Times) -> Times:
         knots = _in_unit(knots, unit)
         ticks = np.ones(1, f"datetime64[{unit}]").astype(knots.dtype).astype(np.int64)
         jump = jump // _NANOSECONDS[unit] * int(ticks[0])
+        return _whole_multiples(knots, jump, step)
     span = _span(knots)
     samples = _samples(span // jump, step)
-    return _after(knots, np.uint64(min(jump, span)) * np.arange(samples, dtype=np.uint64))
+    return _after(knots[:1], np.uint64(min(jump, span)) * np.arange(samples, dtype=np.uint64))
+
+
+def _whole_multiples(ends: Times, jump: int, step: str) -> Times:
+    """Return the dates between two ends that are whole multiples of a step since 1970."""
+    first, last = (int(end) for end in ends.astype(np.int64))
+    start = -(-first // jump) * jump
+    samples = _samples((last - start) // jump, step) if start <= last else 0
+    # A step that is longer than the time between the ends may not fit into 64 bits.
+    jump = min(jump, last - first)
+    begin = np.array([start if samples else first], np.int64).astype(ends.dtype)
+    return _after(begin, np.uint64(jump) * np.arange(samples, dtype=np.uint64))
 
 
 def spread(count: int, knots: Times) -> Times:
@@ -179,7 +195,7 @@ def spread(count: int, knots: Times) -> Times:
     knots = _in_unit(knots, "us") if dates else knots
     span = _span(knots)
     steps = np.rint(np.linspace(0, span, count)[: count - 1]).astype(np.uint64)
-    times = _after(knots, np.append(steps, np.uint64(span if count > 1 else 0)))
+    times = _after(knots[:1], np.append(steps, np.uint64(span if count > 1 else 0)))
     return _coarsest(times) if dates else times
 
 
@@ -189,9 +205,9 @@ def _span(knots: Times) -> int:
     return int(last - first)
 
 
-def _after(knots: Times, steps: NDArray[np.uint64]) -> Times:
-    """Return the first knot plus whole numbers. The sum is exact, as it is computed modulo 2**64."""
-    return np.asarray((knots[:1].astype(np.int64).astype(np.uint64) + steps).astype(np.int64).astype(knots.dtype))
+def _after(start: Times, steps: NDArray[np.uint64]) -> Times:
+    """Return a start, of shape (1,), plus whole numbers. The sum is exact, as it is computed modulo 2**64."""
+    return np.asarray((start.astype(np.int64).astype(np.uint64) + steps).astype(np.int64).astype(start.dtype))
 
 
 def _in_unit(knots: Times, unit: Any) -> Times:
