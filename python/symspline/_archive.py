@@ -38,7 +38,10 @@ VERSION = 2
 # Texts are the same for all curves of a file.
 TEXTS = ("format", "space", "t_unit", "data_t_unit")
 _AXIS_UNIT = re.compile(r"axis_\d{1,2}_unit")
-_JSON = ("bc_type", "extrapolate", "report", "noise", "parameters", "degree", "names", "rows", "grid", "law", "plain")
+_JSON = (
+    *("bc_type", "c1_nodes", "extrapolate", "report", "noise", "parameters", "degree", "names", "rows", "grid", "law"),
+    "plain",
+)
 _ARRAY = re.compile(
     r"(?:version|t|data_t|knots|axis_\d{1,2})|(?:points|velocities|control_points|data|data_weights|data_information|band|matrix|turn|side|corner|variance)"
     r"(?:_\d{1,9})?"
@@ -306,9 +309,18 @@ def read_segments(
     return time_axis, knots, curve_of(space, times, arrays, fitted), extrapolate
 
 
-def read_fitted(state: Entries, counted: TimeAxis | None = None) -> tuple[Any, ...]:
+def read_c1_nodes(state: Entries) -> tuple[int, ...]:
+    """Return the nodes with prescribed velocities; most curves have none."""
+    nodes = state.get("c1_nodes", [])
+    last = len(np.atleast_1d(state["t"]).T) - 1
+    if not isinstance(nodes, list) or not all(type(node) is int and 0 < node < last for node in nodes):
+        raise ValidationError(f"entry 'c1_nodes' is {short_repr(nodes)}, but must be a list of indices of inner points")
+    return tuple(nodes)
+
+
+def read_fitted(state: Entries, counted: TimeAxis | None = None, *, fitted: bool = True) -> tuple[Any, ...]:
     """Return the arguments of `CubicSpline._fill`: the same with end conditions and reports."""
-    time_axis, knots, curve, extrapolate = read_segments(state, counted)
+    time_axis, knots, curve, extrapolate = read_segments(state, counted, fitted=fitted)
     space = curve.space
     with entry("bc_type"):
         bc_type = freeze_bc_type(_read_bc_type(state["bc_type"], space))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cached_property
 from types import GenericAlias
 from typing import TYPE_CHECKING, Any, Generic, Self
@@ -10,11 +11,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ._append import columns_of, joined_columns, joined_curve, local_data
-from ._archive import Entries, read_fitted
+from ._archive import Entries, read_c1_nodes, read_fitted
 from ._core import ValidationError
+from ._curves.conditions import fit_with_conditions
 from ._curves.curve import CurveArrays, longest_step
 from ._curves.derivatives import Gradient, SampleTimes, sample_times
-from ._curves.ends import ends_in_factors, freeze_bc_type, take_batch
+from ._curves.ends import ends_in_factors, freeze_bc_type, split_accelerations, take_batch
 from ._curves.fit import Fit, Problem, curve_of, fit, mask_of, moved_ends, read, read_ends
 from ._curves.integrals import alternative_energy
 from ._errors import raise_or_warn
@@ -24,7 +26,7 @@ from ._report import Report, combined
 from ._representatives import warn_of_representatives
 from ._spaces import Array, Product, Quotient, Space, space_named
 from ._time import TimeAxis, knots_of
-from ._typing import BCType, Extrapolate, Method, OnFailure, P, PointsLike, Progress, TimesLike
+from ._typing import BCType, CubicBCType, Extrapolate, Method, OnFailure, P, PointsLike, Progress, TimesLike
 
 if TYPE_CHECKING:
     from typing_extensions import TypeVar
@@ -65,6 +67,11 @@ class CubicSpline(PiecewiseCubic[P], Generic[P, R]):
         - A pair sets each end separately. Its entries are ``"natural"``, ``"not-a-knot"``, ``"clamped"``,
           ``(1, velocity)`` or ``(2, acceleration)``. Vectors are derivatives with respect to t, tangent at the
           corresponding end point, with the shape of a point or with batch axes in front.
+        - An entry of a pair may also be ``[(1, velocity), (2, acceleration)]``, as in SciPy's
+          ``make_interp_spline``. The curve then has an additional knot in the middle of the outer segment, see Notes.
+    velocities : dict of int to array_like, optional
+        Velocities at inner points, by the index of the point, such as ``{3: v}``. Each has the shape of a point, or
+        batch axes in front. The curve is C² except at these points, where the acceleration may jump, see Notes.
     method : {"auto", "quasi-newton", "newton", "fixed-point", "homotopy"}, default "auto"
         Solver. ``"fixed-point"`` is Algorithm 1 of the paper. ``"homotopy"`` follows the solution from flat space to
         the given points. ``"auto"`` starts with quasi-Newton and uses Newton's method and the homotopy for curves that
@@ -131,6 +138,15 @@ class CubicSpline(PiecewiseCubic[P], Generic[P, R]):
     The solver determines the velocities from the C² condition (13), extended from unit intervals to arbitrary ones.
     The clamped spline of the paper is ``bc_type=((1, v0), (1, vN))``.
 
+    A velocity and an acceleration at the same end are one condition too many for the knots t. They would determine the
+    first segment and, by the C² condition, all others; errors then grow by the factor :math:`2 + \sqrt 3` from one
+    segment to the next. The curve therefore has one more knot in the middle of the outer segment, and its point there
+    is determined such that both conditions hold. `t` and `points` of the spline contain this knot, and `bc_type` the
+    velocity. `jvp` and `vjp` treat the additional point as one of the points.
+
+    A velocity in `velocities` replaces the C² condition at its point. The sections on both sides are then independent
+    C² curves with this end velocity. `jvp` and `vjp` are not available.
+
     If steps exceed 0.55 of the distance to the cut locus, or 0.4 of it where quasi-Newton is slow, several C² curves
     may pass through the points. ``"auto"`` then runs all solvers and a trust-region method within a budget, and keeps
     the solution with the lowest bending energy. `Report.method` names the solver that found it.
@@ -156,7 +172,8 @@ class CubicSpline(PiecewiseCubic[P], Generic[P, R]):
         points: PointsLike,
         space: Space[P] | str,
         *,
-        bc_type: BCType = "natural",
+        bc_type: CubicBCType = "natural",
+        velocities: Mapping[int, PointsLike] | None = None,
         method: Method = "auto",
         tol: float = 1e-12,
         max_iter: int | None = None,
@@ -169,26 +186,35 @@ class CubicSpline(PiecewiseCubic[P], Generic[P, R]):
     ) -> None:
         space = space_named(space)
         options = fit_options(method, tol, max_iter, extrapolate, on_failure, check, progress)
+        conditions, accelerations = split_accelerations(bc_type)
         data = read(points, space)
         if atol is not None:
             data = with_atol(data, atol)
         batch, nodes = data[0].batch, data[0].nodes
         time_axis, shown_times, times = knots_of(t, batch, nodes)
         if isinstance(space, (Product, Quotient)):
-            bc_type = moved_ends(bc_type, space, data)
-        ends = read_ends(bc_type, space, batch)
+            conditions = moved_ends(conditions, space, data)
+        ends = read_ends(conditions, space, batch)
         skip_invalid = bool(batch) and on_failure != "raise"
         mask = None if where is None else mask_of(where, batch)
         problem = Problem(space, times, data, ends, options, bool(check), mask, skip_invalid)
         try:
-            found = fit(problem, progress)
+            if velocities is None and accelerations is None:
+                found = fit(problem, progress)
+            else:
+                found, shown_times, self._c1_nodes = fit_with_conditions(
+                    problem, time_axis, shown_times, velocities, accelerations, progress
+                )
         except ValidationError as error:
             raise time_axis.explain(error) from None
         self._fit = found
-        super()._fill(time_axis, shown_times, found.curve, freeze_bc_type(bc_type), extrapolate)
+        super()._fill(time_axis, shown_times, found.curve, freeze_bc_type(conditions), extrapolate)
         if found.faults:
             raise_or_warn(found.faults, on_failure, self)
         warn_of_representatives(space, [data], [found.curve], [found.columns])
+
+    # Nodes with a prescribed velocity, where the acceleration may jump.
+    _c1_nodes: tuple[int, ...] = ()
 
     def _fill(self, *parts: Any) -> None:
         """Set the state of a curve, and its reports or the fit from which they are created."""
@@ -228,7 +254,7 @@ class CubicSpline(PiecewiseCubic[P], Generic[P, R]):
         Raises
         ------
         ValidationError
-            If the times or points are invalid, or the curve is closed.
+            If the times or points are invalid, the curve is closed, or it has prescribed velocities at inner points.
         CutLocusError, ConvergenceError
             As for the constructor.
 
@@ -255,6 +281,11 @@ class CubicSpline(PiecewiseCubic[P], Generic[P, R]):
         """
         if type(self) is not CubicSpline:
             raise ValidationError(f"points cannot be appended to a {type(self).__name__}. Fit all points again.")
+        if self._c1_nodes:
+            raise ValidationError(
+                f"points cannot be appended to a curve with prescribed velocities at the inner points {self._c1_nodes}. "
+                "Fit all points again."
+            )
         local = local_data(self, t, points, lag)
         part = CubicSpline(local.t, local.points, self.space, bc_type=local.bc_type, extrapolate=self._extrapolate)
         if not local.kept:
@@ -379,7 +410,18 @@ class CubicSpline(PiecewiseCubic[P], Generic[P, R]):
 
         Derivatives follow from the C² condition, which only converged curves satisfy. For the others they would be
         wrong without notice.
+
+        Raises
+        ------
+        ValidationError
+            If the C² condition does not hold at some nodes, because velocities are prescribed there.
         """
+        if self._c1_nodes:
+            raise ValidationError(
+                f"derivatives with respect to the data are not available for a curve with prescribed velocities at the "
+                f"inner points {self._c1_nodes}. Fit the curves between these points separately, with their velocities "
+                "in bc_type."
+            )
         if all(np.all(report.converged) for report in self._reports):
             return self._curve
         found = []
@@ -401,7 +443,11 @@ class CubicSpline(PiecewiseCubic[P], Generic[P, R]):
 
     @property
     def bc_type(self) -> BCType:
-        """End conditions, as passed to the constructor."""
+        """End conditions, as passed to the constructor.
+
+        At an end with a velocity and an acceleration this is the velocity alone, because the curve satisfies the
+        second condition by its additional point.
+        """
         return self._bc_type
 
     @cached_property
@@ -430,25 +476,38 @@ class CubicSpline(PiecewiseCubic[P], Generic[P, R]):
             return (self,)
         each = zip(self._curve.parts, ends_in_factors(self._bc_type, self.space), self._reports, strict=True)
         return tuple(
-            CubicSpline._of(self._time_axis, self._t, curve, ends, self._extrapolate, [report])
+            self._alike(self._time_axis, self._t, curve, ends, self._extrapolate, [report])
             for curve, ends, report in each
         )
+
+    def _alike(self, *parts: Any) -> CubicSpline[Any, Any]:
+        """Return a spline with the given state whose velocities are prescribed at the same nodes."""
+        found: CubicSpline[Any, Any] = CubicSpline._of(*parts)
+        if self._c1_nodes:
+            found._c1_nodes = self._c1_nodes
+        return found
 
     # ---- batches ----
 
     def _with(self, time_axis: TimeAxis, t: Array, curve: CurveArrays, index: Any) -> Any:
         ends = take_batch(self._bc_type, index, len(self._batch), self.space)
         reports = [report.map(lambda column: column[index]) for report in self._reports]
-        return CubicSpline._of(time_axis, t, curve, ends, self._extrapolate, reports)
+        return self._alike(time_axis, t, curve, ends, self._extrapolate, reports)
 
     # ---- files, pickles and text ----
 
     def _state(self) -> dict[str, Any]:
-        return super()._state() | {"bc_type": self._bc_type, "report": [vars(report) for report in self._reports]}
+        own = {"bc_type": self._bc_type, "report": [vars(report) for report in self._reports]}
+        nodes = {"c1_nodes": list(self._c1_nodes)} if self._c1_nodes else {}
+        return super()._state() | own | nodes
 
     @classmethod
     def _from_state(cls, state: Entries) -> Self:
-        return cls._of(*read_fitted(state))
+        nodes = read_c1_nodes(state)
+        found = cls._of(*read_fitted(state, fitted=not nodes))
+        if nodes:
+            found._c1_nodes = nodes
+        return found
 
     def __repr__(self) -> str:
         knots = self._times.shape[-1]

@@ -85,7 +85,9 @@ def unconverged(number: int, columns: Columns, tol: float, more_advice: str = ""
     return Fault(number, UNCONVERGED, what, remedy, None, float(residual), tol, about_times=True)
 
 
-def from_core(raw: CoreFault, columns: Columns, tol: float, quaternions: bool) -> Fault:
+def from_core(
+    raw: CoreFault, columns: Columns, tol: float, quaternions: bool, names: Sequence[int] | None = None
+) -> Fault:
     """Convert a fault from the compiled core, with its message.
 
     Parameters
@@ -96,12 +98,17 @@ def from_core(raw: CoreFault, columns: Columns, tol: float, quaternions: bool) -
         Tolerance of the fit.
     quaternions : bool
         Whether points may be unit quaternions, whose inconsistent signs are the usual cause of antipodes.
+    names : sequence of int, optional
+        Indices of the nodes in messages, if they are not 0, 1, ...
     """
     number, kind, node, value, limit, why = raw
     if kind == "invalid":
         return Fault(number, INVALID, str(why), "", node, value, limit)
     own, about_times = CUT_LOCUS, False
-    handle, pair = f"the control handle at points[{node}]{{of}}", f"points[{node}] and points[{(node or 0) + 1}]{{of}}"
+    following = (node or 0) + 1
+    if names is not None and node is not None:
+        node, following = names[node], names[min(following, len(names) - 1)]
+    handle, pair = f"the control handle at points[{node}]{{of}}", f"points[{node}] and points[{following}]{{of}}"
     past = f"lie at or past each other's cut locus: angle {value}, limit {limit}"
     if kind == "almost-cut":
         own, remedy = ALMOST_CUT, ""

@@ -65,6 +65,9 @@ Method = Literal["auto", "quasi-newton", "newton", "fixed-point", "homotopy"]
 # The condition at one end: a word, or the order of a derivative and its value.
 End = Literal["natural", "clamped", "not-a-knot"] | tuple[int, ArrayLike]
 BCType = Literal["natural", "clamped", "not-a-knot", "periodic"] | tuple[End, End]
+# A velocity and an acceleration at one end, as pairs of an order and a value.
+TwoConditions = list[tuple[int, ArrayLike]] | tuple[tuple[int, ArrayLike], tuple[int, ArrayLike]]
+CubicBCType = BCType | tuple[End | TwoConditions, End | TwoConditions]
 BCWords = (
     Literal["natural", "clamped", "not-a-knot", "periodic"]
     | tuple[Literal["natural", "clamped", "not-a-knot"], Literal["natural", "clamped", "not-a-knot"]]

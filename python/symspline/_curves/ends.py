@@ -19,7 +19,7 @@ _ORDERS = {1: "velocity", 2: "acceleration"}
 _NATURAL: list[End] = [("natural", None), ("natural", None)]
 _HELP = (
     "bc_type must be 'natural', 'clamped', 'not-a-knot' or 'periodic', or a pair with one of 'natural', 'clamped', "
-    "'not-a-knot', (1, velocity), (2, acceleration) for either end"
+    "'not-a-knot', (1, velocity), (2, acceleration), [(1, velocity), (2, acceleration)] for either end"
 )
 
 
@@ -42,18 +42,58 @@ def split_ends(bc_type: Any) -> list[tuple[str, str | int, Any]]:
     ValidationError
         If the conditions are not a pair, or an end is neither a word nor a pair of an order and a vector.
     """
-    if not isinstance(bc_type, (tuple, list)) or len(bc_type) != 2:
-        raise ValidationError(f"{_HELP}; got {short_repr(bc_type)}")
+    _check_pair(bc_type)
     split: list[tuple[str, str | int, Any]] = []
     for name, end in zip(("start", "end"), bc_type, strict=True):
         if isinstance(end, str) and end in _WORDS:
             split.append((name, end, None))
             continue
+        if _is_double(end):
+            raise ValidationError(
+                f"bc_type prescribes a velocity and an acceleration at the {name}, which is available in CubicSpline "
+                "only. Prescribe one of them."
+            )
         pair = isinstance(end, (tuple, list)) and len(end) == 2
         if not pair or not isinstance(end[0], (int, np.integer)) or end[0] not in _ORDERS:
             raise ValidationError(f"{_HELP}; the {name} is {short_repr(end)}")
         split.append((name, int(end[0]), end[1]))
     return split
+
+
+def split_accelerations(bc_type: Any) -> tuple[Any, Any]:
+    """Separate the accelerations from ends at which a velocity and an acceleration are prescribed.
+
+    Returns
+    -------
+    bc_type : str or pair
+        The end conditions without these accelerations.
+    accelerations : pair or None
+        For each end, ``(2, acceleration)`` if there are two conditions, and otherwise ``"natural"``. None if no end has
+        two conditions.
+    """
+    if isinstance(bc_type, str):
+        return bc_type, None
+    _check_pair(bc_type)
+    doubles = [dict(end) if _is_double(end) else None for end in bc_type]
+    if not any(doubles):
+        return bc_type, None
+    velocities = tuple((1, own[1]) if own else end for own, end in zip(doubles, bc_type, strict=True))
+    return velocities, tuple((2, own[2]) if own else "natural" for own in doubles)
+
+
+def _check_pair(bc_type: Any) -> None:
+    if not isinstance(bc_type, (tuple, list)) or len(bc_type) != 2:
+        raise ValidationError(f"{_HELP}; got {short_repr(bc_type)}")
+
+
+def _is_double(end: Any) -> bool:
+    """Whether an end has the form [(1, velocity), (2, acceleration)], in any order."""
+    if not isinstance(end, (tuple, list)) or len(end) != 2:
+        return False
+    if not all(isinstance(own, (tuple, list)) and len(own) == 2 for own in end):
+        return False
+    orders = [own[0] for own in end]
+    return all(isinstance(order, (int, np.integer)) for order in orders) and sorted(orders) == [1, 2]
 
 
 def _end(name: str, word: str | int, vector: Any, space: Space, batch: tuple[int, ...]) -> End:

@@ -303,7 +303,7 @@ def fit(problem: FitProblem, progress: Progress | None = None) -> Fit:
         Task(cover_of(factor), times, part.numbers, end, part.tol if check else None, None, mask, check and skip)
         for factor, part, end in zip(factors_of(space), points, ends, strict=True)
     ]
-    solved, faults = _solve(space, tasks, options, progress)
+    solved, faults = solve_tasks(space, tasks, options, progress)
     curve = curve_of(space, times, [found[:2] for found in solved])
     return Fit(curve, [found.columns for found in solved], options.method, faults)
 
@@ -323,7 +323,7 @@ def fit_many(problem: ManyProblem, progress: Progress | None) -> tuple[list[Fit]
         tol = max(part.tol for part in parts) if check else None
         numbers = np.concatenate([part.numbers for part in parts])
         tasks.append(Task(cover_of(factor), row, numbers, end, tol, offsets, mask, check and skip))
-    solved, faults = _solve(space, tasks, options, progress)
+    solved, faults = solve_tasks(space, tasks, options, progress)
 
     def one(i: int, start: int, stop: int) -> Fit:
         own = slice(start, stop)
@@ -348,7 +348,7 @@ def validated(
         Task(cover_of(factor), times, part.numbers, end, part.tol, mask=mask, skip_invalid=skip_invalid)
         for factor, part, end in zip(factors_of(space), points, ends, strict=True)
     ]
-    tasks, faults = _validated(space, tasks, _ANY)
+    tasks, faults = validated_tasks(space, tasks, _ANY)
     return [task.space._numbers(task.points) for task in tasks], faults
 
 
@@ -388,7 +388,7 @@ def hermite_data(
     return _in_factors(space, checked, list(zip(points, velocities, strict=True)))
 
 
-def _solve(
+def solve_tasks(
     space: Space, tasks: list[Task], options: Options, progress: Progress | None
 ) -> tuple[list[Solved], list[Fault]]:
     """Validate the tasks of all factors, then solve them. Return the solutions and the faults."""
@@ -399,12 +399,12 @@ def _solve(
             number = vars(error).pop("_factor", None)
             raise (error if number is None else _in_factor(error, number, tasks[number].space)) from None
         return solved, _faults_of(solved, [])
-    tasks, invalid = _validated(space, tasks, options)
+    tasks, invalid = validated_tasks(space, tasks, options)
     solved = [kind_of(task.space).solve(task, options, share(progress, i, len(tasks))) for i, task in enumerate(tasks)]
     return solved, _faults_of(solved, invalid)
 
 
-def _validated(space: Space, tasks: list[Task], options: Options) -> tuple[list[Task], list[Fault]]:
+def validated_tasks(space: Space, tasks: list[Task], options: Options) -> tuple[list[Task], list[Fault]]:
     """Validate tasks and project their points. A curve that is skipped in one factor is masked in all of them."""
     each = _in_factors(space, lambda factor, task: kind_of(factor).validate(task, options), tasks)
     found = {fault.curve: fault for _, faults in reversed(each) for fault in faults}

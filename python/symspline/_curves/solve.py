@@ -51,6 +51,8 @@ class Task(NamedTuple):
         Curves to fit, of the shape of the batch; masked curves are NaN. None fits all curves.
     skip_invalid : bool
         Whether curves with points off the space are masked instead of raising an error.
+    names : sequence of int or None
+        Indices of the nodes in messages; None for 0, 1, ...
     """
 
     space: Space
@@ -61,6 +63,7 @@ class Task(NamedTuple):
     offsets: list[int] | None = None
     mask: Mask | None = None
     skip_invalid: bool = False
+    names: Sequence[int] | None = None
 
     @property
     def batch(self) -> tuple[int, ...]:
@@ -84,27 +87,28 @@ Solver = Callable[[Task, Options, Progress | None], Solved]
 
 def solve(tasks: Sequence[Task], options: Options, progress: Progress | None = None) -> list[Solved]:
     """Validate and solve the tasks of all factors, which share knots and masks, in one call of the core."""
-    _, times, _, _, _, offsets, mask, skip = tasks[0]
+    _, times, _, _, _, offsets, mask, skip, _ = tasks[0]
     factors = [(task.space._handle, task.points, task.ends, task.tol) for task in tasks]
     each = _core.fit(factors, times, *options, offsets, None if mask is None else mask.ravel().tolist(), skip, progress)
-    return [_solved(task.space, options, own) for task, own in zip(tasks, each, strict=True)]
+    return [_solved(task, options, own) for task, own in zip(tasks, each, strict=True)]
 
 
 def solve_single(task: Task, options: Options, progress: Progress | None = None) -> Solved:
     """Validate and solve the task of one space, as `solve` but without its loops."""
-    space, times, points, ends, tol, offsets, mask, skip = task
+    space, times, points, ends, tol, offsets, mask, skip, _ = task
     factors = ((space._handle, points, ends, tol),)
     each = _core.fit(factors, times, *options, offsets, None if mask is None else mask.ravel().tolist(), skip, progress)
-    return _solved(space, options, each[0])
+    return _solved(task, options, each[0])
 
 
-def _solved(space: Space, options: Options, found: Any) -> Solved:
+def _solved(task: Task, options: Options, found: Any) -> Solved:
     """Return what the core found for one task."""
+    space = task.space
     points, velocities, tables, raw = found
     columns, faults = Columns(*tables), []
     if raw:
         quaternions = space._name == "sphere"
-        faults = [from_core(one, columns, options.tol, quaternions) for one in raw]
+        faults = [from_core(one, columns, options.tol, quaternions, task.names) for one in raw]
     if space._complex:
         points, velocities = space._numbers(points), space._numbers(velocities)
     return Solved(points, velocities, columns, faults)
@@ -125,7 +129,7 @@ def validate(task: Task) -> tuple[Task, list[Fault]]:
     ValidationError
         If any other input is invalid.
     """
-    space, times, points, ends, tol, offsets, mask, skip = task
+    space, times, points, ends, tol, offsets, mask, skip, _ = task
     if tol is None:
         return task._replace(points=points.copy()), []
     found, raw = _core.validate(

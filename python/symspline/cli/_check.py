@@ -89,6 +89,11 @@ def _measure(spline: CubicSpline) -> tuple[list[float], float]:
     values, excess = [distance], [distance / (relative + floor)]
     for nu in range(3):
         jumps = segments.jumps(nu, closed)
+        if nu == 2 and spline._c1_nodes:
+            # The acceleration may jump where a velocity is prescribed.
+            size = jumps.size.copy()
+            size[..., [node - 1 for node in spline._c1_nodes]] = 0
+            jumps = replace(jumps, size=size)
         if nu == 0 and isinstance(spline.space, _POSITIVE):
             jumps = replace(jumps, largest=1.0)
         rounding = floor / shorter**nu

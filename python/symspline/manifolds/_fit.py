@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
@@ -35,7 +36,8 @@ def fit_of_one_length(task: Task, options: Options, progress: Progress | None) -
     h = np.broadcast_to(np.diff(task.times), (*batch, nodes - 1)).reshape(count, nodes - 1)
     steps = operations.log(p[:, :-1], p[:, 1:])
     lengths = operations.norm(p[:, :-1], steps)
-    faults = _far(space, lengths, "points[{0}] and points[{1}]")
+    names = range(nodes) if task.names is None else task.names
+    faults = _far(space, lengths, "points[{0}] and points[{1}]", names)
     good = np.array([i for i in range(count) if i not in faults], np.int64)
     velocities = np.full(p.shape, np.nan, space.dtype)
     columns = Columns.empty(count)
@@ -63,7 +65,7 @@ def fit_of_one_length(task: Task, options: Options, progress: Progress | None) -
         coordinates = problem.coordinates(found.velocities[:, unknowns], unknowns)
         columns.row("velocity_error")[good] = velocity_errors(problem, coordinates, pace)
         polygon = control_polygons(operations, problem.h, problem.p, found.velocities)
-        faults |= _unfit(space, polygon, good, columns, options.tol)
+        faults |= _unfit(space, polygon, good, columns, options.tol, names)
         for i in faults:
             if faults[i].kind == CUT_LOCUS:
                 velocities[i] = np.nan
@@ -95,7 +97,7 @@ def _ends(task: Task, h: Doubles, p: Array) -> list[End] | None:
     return found
 
 
-def _far(space: Manifold, lengths: Doubles, what: str) -> dict[int, Fault]:
+def _far(space: Manifold, lengths: Doubles, what: str, names: Sequence[int]) -> dict[int, Fault]:
     """Return the faults of curves with two points that are not joined by a unique geodesic."""
     faults: dict[int, Fault] = {}
     limit = space.injectivity_radius
@@ -104,21 +106,26 @@ def _far(space: Manifold, lengths: Doubles, what: str) -> dict[int, Fault]:
         why = f"are {distance:.6g} apart, the injectivity radius is {limit:.6g}"
         if not np.isfinite(distance):
             why = f"have no geodesic between them: the function log of {space!r} is not finite there"
-        problem = f"{what.format(i, i + 1)}{{of}} {why}"
-        fault = Fault(curve, CUT_LOCUS, problem, space._remedy, i, float(distance), limit)
+        problem = f"{what.format(names[i], names[i + 1])}{{of}} {why}"
+        fault = Fault(curve, CUT_LOCUS, problem, space._remedy, names[i], float(distance), limit)
         faults.setdefault(curve, fault)
     return faults
 
 
 def _unfit(
-    space: Manifold, polygon: ControlPolygon, good: NDArray[np.int64], columns: Columns, tol: float
+    space: Manifold,
+    polygon: ControlPolygon,
+    good: NDArray[np.int64],
+    columns: Columns,
+    tol: float,
+    names: Sequence[int],
 ) -> dict[int, Fault]:
     """Return the faults of curves that were solved."""
     faults: dict[int, Fault] = {}
     norm = space.operations.norm
     outer = np.maximum(*norm(polygon.p, polygon.v))
     inner = norm(polygon.q[0], polygon.w[0])
-    far = _far(space, np.maximum(outer, inner), "the control points between points[{0}] and points[{1}]")
+    far = _far(space, np.maximum(outer, inner), "the control points between points[{0}] and points[{1}]", names)
     for number, own in enumerate(good.tolist()):
         if not columns.row("converged")[own]:
             faults[own] = unconverged(own, columns, tol, "; exp, log and dlog must fit each other")

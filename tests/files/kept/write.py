@@ -50,6 +50,13 @@ def curves():
         "segments": ss.SegmentedCurve(
             [spline.restrict(0, 1), spline.reverse().shift(2.5), spline.restrict(2.5).shift(9)]
         ),
+        "sections": ss.CubicSpline(
+            range(6),
+            TURNS,
+            "so:3",
+            bc_type=([(1, still := np.zeros((3, 3))), (2, still)], "natural"),
+            velocities={3: still},
+        ),
         "several": {"a": spline, "b": spline},
         "several_smoothing": {"a": smooth, "b": smooth},
     }

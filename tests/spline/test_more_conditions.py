@@ -1,0 +1,319 @@
+"""Velocities at inner points, and a velocity with an acceleration at one end."""
+
+import io
+import pickle
+
+import numpy as np
+import pytest
+from cases import loop_over, walk
+from compare import each, same, vectors_off
+from curves import S2, at_node, every_kind, tangents_at
+from refused import raises
+from scipy.interpolate import CubicSpline as FlatSpline
+from scipy.interpolate import make_interp_spline
+
+import symspline as ss
+from symspline._pairs import segments_of
+from symspline.cli._check import _measure
+
+T = np.array([0.0, 0.4, 1.5, 2.0, 2.2, 3.1, 4.5, 5.0, 5.3])
+FLAT = ss.Euclidean(2)
+
+
+def flat_points(rng, batch=()):
+    return rng.standard_normal((*batch, len(T), 2))
+
+
+def nine_points(space, rng, step=0.4):
+    if isinstance(space, ss.Product):
+        return tuple(nine_points(factor, rng, step) for factor in space.factors)
+    return walk(space, step, len(T), rng)
+
+
+# ---- velocities at inner points ----
+
+
+def test_sections_equal_those_of_scipy(rng):
+    y = flat_points(rng)
+    u, v, w = rng.standard_normal((3, 2))
+    spline = ss.CubicSpline(T, y, FLAT, bc_type=("natural", (1, w)), velocities={3: u, 6: v})
+    ends = [(2, np.zeros(2)), (1, u), (1, v), (1, w)]
+    for (a, b), first, last in zip([(0, 3), (3, 6), (6, 8)], ends, ends[1:], strict=False):
+        flat = FlatSpline(T[a : b + 1], y[a : b + 1], bc_type=(first, last))
+        x = np.linspace(T[a], T[b], 30)[1:-1]
+        for nu in range(3):
+            assert np.abs(spline(x, nu) - flat(x, nu)).max() < 1e-12
+
+
+def test_sections_of_a_closed_curve_equal_those_of_scipy(rng):
+    y = flat_points(rng)
+    y[-1] = y[0]
+    u, v = rng.standard_normal((2, 2))
+    spline = ss.CubicSpline(T, y, FLAT, bc_type="periodic", velocities={2: u, 5: v})
+    outer = [5, 6, 7, 0, 1, 2]
+    times = np.r_[T[5:8], T[-1] - T[0] + T[:3]]
+    for t, p, pair in ((T[2:6], y[2:6], (u, v)), (times, y[outer], (v, u))):
+        flat = FlatSpline(t, p, bc_type=((1, pair[0]), (1, pair[1])))
+        x = np.linspace(t[0], t[-1], 40)[1:-1]
+        for nu in range(3):
+            assert np.abs(spline(x, nu) - flat(x, nu)).max() < 1e-12
+    one = ss.CubicSpline(T, y, FLAT, bc_type="periodic", velocities={2: u})
+    assert np.abs(one(T[2], 1) - u).max() < 1e-14
+    assert np.abs(one(T[0], 2) - one(T[-1] - 1e-12, 2)).max() < 1e-9
+
+
+@every_kind
+def test_velocities_hold_and_the_curve_is_c2_elsewhere(space, rng):
+    p = nine_points(space, rng)
+    given = {node: tangents_at(space, at_node(space, p, node), seed=node) for node in (2, 5)}
+    spline = ss.CubicSpline(T, p, space, bc_type="not-a-knot", velocities=given)
+    assert spline.report.converged
+    for node, vector in given.items():
+        here = at_node(space, spline.points, node)
+        assert vectors_off(space, spline(T[node]), spline(T[node], nu=1), here, vector) < 1e-12
+    for part in spline._parts:
+        for nu in range(3):
+            sizes = np.array(segments_of(part).jumps(nu).size)
+            if nu == 2:
+                assert sizes[[1, 4]].max() > 1e-3
+                sizes[[1, 4]] = 0
+            assert sizes.max() < 1e-6 if isinstance(part.space, ss.Manifold) else sizes.max() < 1e-9
+
+
+@every_kind
+def test_sections_equal_separate_curves(space, rng):
+    p = nine_points(space, rng)
+    v = tangents_at(space, at_node(space, p, 4))
+    spline = ss.CubicSpline(T, p, space, velocities={4: v})
+    parts = [each(lambda a, s=s: a[s], p) for s in (slice(0, 5), slice(4, None))]
+    first = ss.CubicSpline(T[:5], parts[0], space, bc_type=("natural", (1, v)))
+    second = ss.CubicSpline(T[4:], parts[1], space, bc_type=((1, v), "natural"))
+    for one, x in ((first, np.linspace(0, T[4], 9)[:-1]), (second, np.linspace(T[4], T[-1], 9))):
+        difference = each(lambda a, b: np.abs(a - b).max(), spline(x), one(x))
+        assert np.max(difference) < 1e-12
+
+
+def test_the_velocities_of_all_inner_points_give_a_hermite_spline(rng):
+    p = nine_points(S2, rng)
+    v = tangents_at(S2, p)
+    spline = ss.CubicSpline(
+        T, p, S2, bc_type=((1, v[0]), (1, v[-1])), velocities={i: v[i] for i in range(1, len(T) - 1)}
+    )
+    x = np.linspace(0, T[-1], 50)
+    assert np.abs(spline(x) - ss.HermiteSpline(T, p, v, S2)(x)).max() < 1e-14
+
+
+def test_curves_of_a_batch_are_those_alone(rng):
+    p = np.array([[nine_points(S2, rng) for _ in range(3)] for _ in range(2)])
+    t = np.cumsum(rng.uniform(0.5, 1.5, (2, 3, len(T))), axis=-1)
+    v = tangents_at(S2, p[..., 3, :])
+    a = tangents_at(S2, p[..., 0, :], seed=5)
+    u = tangents_at(S2, p[..., 0, :], seed=6)
+    options = {"velocities": {3: v}, "bc_type": ([(2, a), (1, u)], "natural")}
+    for knots in (T, t):
+        batch = ss.CubicSpline(knots, p, S2, **options)
+        for i in np.ndindex(2, 3):
+            own = {"velocities": {3: v[i]}, "bc_type": ([(2, a[i]), (1, u[i])], "natural")}
+            alone = ss.CubicSpline(knots if knots.ndim == 1 else knots[i], p[i], S2, **own)
+            assert same(batch.velocities[i], alone.velocities) and same(batch[i[0]][i[1]].points, alone.points)
+    masked = ss.CubicSpline(T, p, S2, where=np.arange(6).reshape(2, 3) != 4, **options)
+    assert np.isnan(masked(1.0)[1, 1]).all() and np.isfinite(masked(1.0)).sum() == 15
+
+
+def test_quotients(rng):
+    space = ss.space("pu:2")
+    p = np.array(walk(ss.space("su:2"), 0.3, len(T), rng))
+    v = {4: ss.space("su:2").random_tangent(rng, p[4])}
+    u, a = (ss.space("su:2").random_tangent(rng, p[-1]) for _ in range(2))
+    signs = np.where(np.arange(len(T)) % 3 == 1, -1.0, 1.0)
+    ends = ("natural", [(1, u), (2, a)])
+    plain = ss.CubicSpline(T, p, space, velocities=v, bc_type=ends)
+    flipped = ss.CubicSpline(
+        T,
+        p * signs[:, None, None],
+        space,
+        velocities={4: v[4] * signs[4]},
+        bc_type=("natural", [(1, u * signs[-1]), (2, a * signs[-1])]),
+    )
+    x = np.linspace(0, T[-1], 20)
+    assert np.abs(space.distance(plain(x), flipped(x))).max() < 1e-7
+    assert np.abs(plain(T[-1], 2) - a).max() < 1e-11
+
+
+def test_invalid_velocities_raise(rng):
+    p = nine_points(S2, rng)
+    v = tangents_at(S2, p[3])
+    for given, match in [
+        ([v], r"velocities must be a dict from indices of inner points to the velocities there, such as \{3: v\}"),
+        ({0: v}, r"velocities has the key 0, but keys must be indices of inner points \(1 to 7\)\. Use bc_type"),
+        ({8: v}, r"the key 8"),
+        ({-3: v}, r"the key -3"),
+        ({True: v}, r"the key True"),
+        ({3.0: v}, r"the key 3\.0"),
+        ({3: v[:2]}, r"velocities\[3\] has shape \(2,\)"),
+        ({3: [v, v]}, r"velocities\[3\] has shape \(2, 3\), which does not broadcast to \(3,\)"),
+        ({3: v * np.nan}, r"velocities\[3\] must be finite"),
+        ({3: p[3]}, r"velocities\[3\]: vector 0 is not tangent at its point"),
+    ]:
+        raises(match, ss.CubicSpline, T, p, S2, velocities=given)
+    fast = {3: 60 * v / np.linalg.norm(v)}
+    match = r"between points\[0\] and points\[3\]: the end velocity has speed 60\.0+, too fast for its segment"
+    raises(match, ss.CubicSpline, T, p, S2, velocities=fast)
+
+
+def test_messages_name_the_points_of_the_whole_curve(rng):
+    p = np.array(nine_points(S2, rng, 0.1))
+    p[7] = -p[6]
+    v = tangents_at(S2, p[3])
+    with pytest.raises(ss.CutLocusError, match=r"points\[6\] and points\[7\]") as caught:
+        ss.CubicSpline(T, p, S2, velocities={3: v})
+    assert caught.value.node == 6
+    raises(r"points\[5\]", ss.CubicSpline, T, np.where(np.arange(9)[:, None] == 5, 2.0, p), S2, velocities={3: v})
+
+
+def test_derivatives_with_respect_to_data_are_refused(rng):
+    p = nine_points(S2, rng)
+    spline = ss.CubicSpline(T, p, S2, velocities={3: tangents_at(S2, p[3])})
+    raises("derivatives with respect to the data are not available", spline.jvp, 1.0, p)
+    raises("derivatives with respect to the data are not available", spline.vjp, 1.0, p[0])
+    raises("points cannot be appended to a curve with prescribed velocities", spline.append, 6.0, p[0])
+
+
+# ---- a velocity and an acceleration at one end ----
+
+
+@every_kind
+@loop_over("which", [(0,), (1,), (0, 1)])
+def test_both_conditions_hold(space, which, rng):
+    p = nine_points(space, rng)
+    vectors = {e: [tangents_at(space, at_node(space, p, -e), seed=s + e) for s in (3, 7)] for e in which}
+    ends = tuple([(1, vectors[e][0]), (2, vectors[e][1])] if e in which else "not-a-knot" for e in (0, 1))
+    spline = ss.CubicSpline(T, p, space, bc_type=ends)
+    assert spline.report.converged and len(spline.t) == len(T) + len(which)
+    for e in which:
+        x, here = T[-e], at_node(space, p, -e)
+        for order, bound in ((1, 1e-12), (2, 1e-7 if "Manifold" in str(spline._parts) else 1e-10)):
+            assert vectors_off(space, spline(x), spline(x, nu=order), here, vectors[e][order - 1]) < bound
+    original = np.isin(spline.t, T)
+    for part, own in zip(spline._parts, p if isinstance(p, tuple) else (p,), strict=True):
+        assert np.abs(part.points[original] - own).max() < 1e-12
+        segments = segments_of(part)
+        for nu in range(3):
+            bound = 1e-6 if isinstance(part.space, ss.Manifold) else 1e-9
+            assert segments.jumps(nu).size.max() < bound
+
+
+def test_flat_curves_equal_the_dense_solution(rng):
+    """The C² spline with the additional knot, as B-splines: n + 3 coefficients and as many equations."""
+    from scipy.interpolate import BSpline
+
+    y, (v, a) = flat_points(rng), rng.standard_normal((2, 2))
+    spline = ss.CubicSpline(T, y, FLAT, bc_type=([(1, v), (2, a)], "natural"))
+    knots = np.insert(T, 1, (T[0] + T[1]) / 2)
+    assert np.array_equal(spline.t, knots)
+    padded = np.r_[[knots[0]] * 3, knots, [knots[-1]] * 3]
+    basis = BSpline(padded, np.eye(len(padded) - 4), 3)
+    rows = [*basis(T), basis(T[0], 1), basis(T[0], 2), basis(T[-1], 2)]
+    dense = BSpline(padded, np.linalg.solve(rows, [*y, v, a, [0, 0]]), 3)
+    x = np.linspace(T[0], T[-1], 100)
+    for nu in range(3):
+        assert np.abs(spline(x, nu) - dense(x, nu)).max() < 1e-11
+
+
+def test_cubics_are_reproduced():
+    f = np.polynomial.Polynomial([1.0, -2.0, 0.5, 0.7])
+    y = f(T)[:, None]
+    spline = ss.CubicSpline(T, y, "r:1", bc_type=([(1, [f.deriv()(0)]), (2, [f.deriv(2)(0)])], "not-a-knot"))
+    x = np.linspace(0, T[-1], 100)
+    assert np.abs(spline(x)[:, 0] - f(x)).max() < 1e-12
+
+
+def test_the_curve_is_stable_where_an_initial_value_problem_is_not():
+    """SciPy's spline with both conditions at one end, and none at the other, grows by 2 + √3 per segment."""
+    t = np.linspace(0, 6, 41)
+    y, v, a = np.sin(t) + 0.3 * np.cos(2 * t), 1.0, -1.2
+    x = np.linspace(0, 6, 400)
+    truth = np.sin(x) + 0.3 * np.cos(2 * x)
+    initial = make_interp_spline(t, y, k=3, bc_type=([(1, v), (2, a)], None))
+    assert np.abs(initial(x) - truth).max() > 1e10
+    spline = ss.CubicSpline(t, y[:, None], "r:1", bc_type=([(1, [v]), (2, [a])], "not-a-knot"))
+    assert np.abs(spline(x)[:, 0] - truth).max() < 1e-4
+    # The influence of the acceleration at the end decays with the same factor.
+    other = ss.CubicSpline(t, y[:, None], "r:1", bc_type=([(1, [v]), (2, [a + 1])], "not-a-knot"))
+    change = np.abs(other.velocities - spline.velocities)[2:14, 0]
+    assert np.allclose(change[:-1] / change[1:], 2 + np.sqrt(3), rtol=1e-3)
+
+
+def test_two_points_with_two_conditions_at_both_ends(rng):
+    p = walk(S2, 0.5, 2, rng)
+    v, a, w, b = (tangents_at(S2, p[i], seed=s) for s, i in enumerate((0, 0, 1, 1)))
+    spline = ss.CubicSpline([1, 4], p, S2, bc_type=([(1, v), (2, a)], [(1, w), (2, b)]))
+    assert np.allclose(spline.t, [1, 2, 3, 4], rtol=1e-15)
+    for x, nu, expected in ((1, 1, v), (1, 2, a), (4, 1, w), (4, 2, b)):
+        assert np.abs(spline(x, nu) - expected).max() < 1e-12
+
+
+def test_dates_and_large_integers():
+    y = np.array([[0.0], [1.0], [3.0]])
+    ends = ([(1, [0.0]), (2, [1e-12])], "natural")
+    dates = np.array(["2024-01-01", "2024-01-02", "2024-01-05"], "datetime64[D]")
+    spline = ss.CubicSpline(dates, y, "r:1", bc_type=ends)
+    assert spline.t[1] == np.datetime64("2024-01-01T12") and np.array_equal(spline.t[[0, 2, 3]], dates)
+    ticks = np.array([2**60, 2**60 + 1000, 2**60 + 5000])
+    spline = ss.CubicSpline(ticks, y, "r:1", bc_type=ends)
+    assert spline.t.tolist() == [2**60, 2**60 + 500, 2**60 + 1000, 2**60 + 5000]
+    assert np.abs(spline(ticks[0], 2) - 1e-12).max() < 1e-20
+
+
+def test_files_and_pickles(rng):
+    p = nine_points(S2, rng)
+    v, a = (tangents_at(S2, p[0], seed=s) for s in (1, 2))
+    spline = ss.CubicSpline(T, p, S2, bc_type=([(1, v), (2, a)], "natural"), velocities={4: tangents_at(S2, p[4])})
+    file = io.BytesIO()
+    spline.save(file)
+    file.seek(0)
+    for found in (ss.load(file), pickle.loads(pickle.dumps(spline))):
+        assert found == spline and found._c1_nodes == (5,)
+        raises("not available", found.jvp, 1.0)
+    # The command `symspline check` allows jumps of the acceleration at these nodes only.
+    assert _measure(spline)[1] <= 1
+    spline._c1_nodes = (4,)
+    assert _measure(spline)[1] > 1
+    assert spline.bc_type[0][0] == 1 and same(spline.bc_type[0][1], v)
+    # The result is an ordinary spline through its points with the velocity.
+    plain = ss.CubicSpline(T, p, S2, bc_type=([(1, v), (2, a)], "natural"))
+    assert same(ss.CubicSpline(plain.t, plain.points, S2, bc_type=plain.bc_type).velocities, plain.velocities)
+    assert plain.jvp(1.0, np.zeros((10, 3))).shape == (3,)
+
+
+def test_invalid_pairs_of_conditions_raise(rng):
+    p = nine_points(S2, rng)
+    v = tangents_at(S2, p[0])
+    for end, match in [
+        ([(1, v), (1, v)], r"bc_type must be .*\[\(1, velocity\), \(2, acceleration\)\] for either end"),
+        ([(1, v), (2, v), (2, v)], r"bc_type must be "),
+        ([(1, v), (2, p[0])], r"the start acceleration is not tangent at its point"),
+        ([(1, p[0]), (2, v)], r"the start velocity is not tangent at its point"),
+        ([(1, v), (2, v * np.nan)], r"the start acceleration contains NaN"),
+    ]:
+        raises(match, ss.CubicSpline, T, p, S2, bc_type=(end, "natural"))
+    raises(
+        "bc_type prescribes a velocity and an acceleration at the start, which is available in CubicSpline only",
+        ss.fit_many,
+        [(T, p)],
+        S2,
+        bc_type=([(1, v), (2, v)], "natural"),
+    )
+
+
+def test_accelerations_without_a_curve_raise(rng):
+    p = nine_points(S2, rng)
+    v = tangents_at(S2, p[0])
+    with pytest.raises((ss.ConvergenceError, ss.CutLocusError), match=r"control handle|no convergence"):
+        ss.CubicSpline(T, p, S2, bc_type=([(1, v), (2, 1e4 * v)], "natural"))
+    # Other curves of a batch are not affected.
+    both = np.stack([p, p])
+    ends = ([(1, v), (2, np.stack([v, 1e4 * v]))], "natural")
+    batch = ss.CubicSpline(T, both, S2, bc_type=ends, on_failure="ignore")
+    assert batch.report.converged.tolist() == [True, False]
+    assert np.abs(batch[0](0.0, 2) - v).max() < 1e-12
