@@ -27,14 +27,12 @@ space = ss.space("r:3 x so:3")
 noise = [0.04 * rng.standard_normal((len(t), 3)), np.radians(3) * rng.standard_normal((len(t), 3))]
 tracked = (truth[0] + noise[0], truth[1] @ Rotation.from_rotvec(noise[1]).as_matrix())
 
-pose = ss.CubicSpline(t, ss.poses.join(tracked[1], tracked[0]), "se:3")
-attitude, place = ss.poses.split(pose(t))
+place, attitude = ss.CubicSpline(t, tracked, space)(t)
 
 # %%
 # A λ for each
 # ------------
-# Positions and attitudes are smoothed separately, each with its own λ: in the product of R³ and SO(3), and in ``se:3``
-# too.
+# Positions and attitudes are smoothed separately, each with its own λ and noise level.
 
 path = ss.make_smoothing_spline(t, tracked, space)
 print(

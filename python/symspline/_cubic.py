@@ -283,7 +283,7 @@ class CubicSpline(PiecewiseCubic[P], Generic[P, R]):
             raise ValidationError(f"points cannot be appended to a {type(self).__name__}. Fit all points again.")
         if self._c1_nodes:
             raise ValidationError(
-                f"points cannot be appended to a curve with prescribed velocities at the inner points {self._c1_nodes}. "
+                f"points cannot be appended to a curve with prescribed velocities at points {self._c1_nodes}. "
                 "Fit all points again."
             )
         local = local_data(self, t, points, lag)

@@ -19,7 +19,7 @@ array([0.        , 0.        , 1.28700222])
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any, Literal, NamedTuple, overload
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -46,8 +46,12 @@ from ._smoothing.factors import smoothed_spaces
 from ._spaces import Array, Euclidean, SpecialEuclidean, SpecialOrthogonal, cover_of
 from ._timed_curve import check_timed
 from ._typing import Extrapolate, Frame, TimesLike
-from ._validation import one_of
-from .rotations import Spline, attitude, rate_jacobians, turned
+from ._validation import one_of, real_numbers
+from .rotations import Spline, attitude, rate_jacobians, rotation_of, turned
+from .rotations import velocities as rotation_velocities
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import RigidTransform, Rotation
 
 __all__ = [
     "Imu",
@@ -60,7 +64,9 @@ __all__ = [
     "read_kitti",
     "read_tum",
     "split",
+    "transform",
     "twist",
+    "velocities",
     "write_euroc",
     "write_head_pos",
     "write_kitti",
@@ -268,6 +274,131 @@ def twist(
         omega = turned(motion.rotation, omega)
         velocity = velocity - np.cross(omega, motion.position("point"))
     return np.concatenate([omega, motion.in_frame(velocity)], axis=-1)
+
+
+@overload
+def velocities(
+    poses: tuple[ArrayLike | Rotation, ArrayLike], twists: ArrayLike, frame: Frame = "body"
+) -> tuple[Array, Array]: ...
+
+
+@overload
+def velocities(poses: ArrayLike | RigidTransform, twists: ArrayLike, frame: Frame = "body") -> Array: ...
+
+
+def velocities(poses: Any, twists: ArrayLike, frame: Frame = "body") -> Array | tuple[Array, Array]:
+    """Convert twists to tangent vectors at poses.
+
+    This is the inverse of `twist`. Use the result as velocities of a `symspline.HermiteSpline` or as end vectors.
+
+    Parameters
+    ----------
+    poses : array_like, shape (..., 4, 4), scipy.spatial.transform.RigidTransform, or tuple
+        Points of ``se:3``, or a tuple of rotations and positions, points of ``so:3 x r:3``.
+    twists : array_like, shape (..., 6)
+        Twists (ω, v), angular part first.
+    frame : {"body", "world"}, default "body"
+        Frame of the twists, as for `twist`.
+
+    Returns
+    -------
+    ndarray, shape (..., 4, 4), or tuple
+        Tangent vectors :math:`g \\hat\\xi` (body) or :math:`\\hat\\xi g` (world). For a tuple of rotations and
+        positions, a tuple of tangent vectors of shape (..., 3, 3) and velocities of shape (..., 3).
+
+    Raises
+    ------
+    ValidationError
+        If the input does not meet the requirements above.
+
+    See Also
+    --------
+    symspline.rotations.velocities : Convert angular velocities to tangent vectors.
+
+    References
+    ----------
+    Lynch & Park, "Modern Robotics", 2017, section 3.3.2.
+
+    Examples
+    --------
+    >>> import numpy as np, symspline as ss
+    >>> pose = ss.poses.join(np.eye(3), [1.0, 0, 0])
+    >>> velocities(pose, [0, 0, 2, 0, 0, 3])
+    array([[ 0., -2.,  0.,  0.],
+           [ 2.,  0.,  0.,  0.],
+           [ 0.,  0.,  0.,  3.],
+           [ 0.,  0.,  0.,  0.]])
+    >>> velocities(pose, [0, 0, 2, 0, 0, 3], "world")[:3, 3]
+    array([0., 2., 3.])
+    """
+    one_of(frame, "frame", "body", "world")
+    pair = isinstance(poses, tuple) and len(poses) == 2
+    g = join(*poses) if pair else _SE3._array(poses, "poses")
+    _SE3.check_point(g)
+    xi = real_numbers(twists, "twists", (6,))[0]
+    r, x = np.asarray(g[..., :3, :3], np.float64), np.asarray(g[..., :3, 3], np.float64)
+    try:
+        np.broadcast_shapes(x.shape[:-1], xi.shape[:-1])
+    except ValueError:
+        raise ValidationError(f"poses {g.shape} and twists {xi.shape} do not broadcast") from None
+    turning = rotation_velocities(r, xi[..., :3], frame)
+    moving = turned(r, xi[..., 3:]) if frame == "body" else xi[..., 3:] + np.cross(xi[..., :3], x)
+    if pair:
+        return turning, moving
+    vectors = np.zeros((*moving.shape[:-1], 4, 4))
+    vectors[..., :3, :3], vectors[..., :3, 3] = turning, moving
+    return vectors
+
+
+def transform(
+    spline: Spline, x: TimesLike, *, extrapolate: Extrapolate = None, per_curve: bool = False
+) -> RigidTransform:
+    """Evaluate a curve as a SciPy ``RigidTransform``.
+
+    Parameters
+    ----------
+    spline : CubicSpline or HermiteSpline
+        Curve on ``se:3``, or on a product with one ``so:3`` and one ``r:3``.
+    x : array_like
+        Times.
+    extrapolate : bool or str, optional
+        Extrapolation policy, as for ``spline(x)``.
+    per_curve : bool, default False
+        True if every curve of a batch has its own times.
+
+    Returns
+    -------
+    scipy.spatial.transform.RigidTransform, shape ``(*batch axes, *x.shape)``
+        Poses. SciPy before 1.17 supports at most one axis.
+
+    Raises
+    ------
+    ImportError
+        If SciPy is not installed, or older than 1.16.
+    ValidationError
+        If a value is NaN.
+
+    See Also
+    --------
+    symspline.rotations.rotation : Evaluate a curve as a ``Rotation``.
+
+    Examples
+    --------
+    >>> import numpy as np, symspline as ss
+    >>> x = np.array([[0.0, 0, 0], [1, 2, 3], [2, 4, 6]])
+    >>> path = ss.CubicSpline(None, (np.tile(np.eye(3), (3, 1, 1)), x), "so:3 x r:3")
+    >>> transform(path, 0.5).translation.round(12)
+    array([0.5, 1. , 1.5])
+    """
+    try:
+        from scipy.spatial.transform import RigidTransform
+    except ImportError:
+        raise ImportError(
+            "transform returns a SciPy RigidTransform; install SciPy 1.16 or newer with: pip install 'scipy>=1.16'"
+        ) from None
+    motion = _Motion(spline, x, "world", extrapolate, per_curve)
+    found: RigidTransform = RigidTransform.from_components(motion.position("point"), rotation_of(motion.rotation))
+    return found
 
 
 def linear_velocity(

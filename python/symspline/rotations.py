@@ -114,11 +114,15 @@ def rotation(spline: Spline, x: TimesLike, *, extrapolate: Extrapolate = None, p
     >>> rotation(ss.CubicSpline(None, turning, "so:3"), 0.5).as_rotvec().round(12)
     array([0. , 0. , 0.5])
     """
+    return rotation_of(_at(spline, x, "point", extrapolate, per_curve))
+
+
+def rotation_of(matrices: Array) -> Rotation:
+    """Return the ``Rotation`` of points of a curve."""
     try:
         from scipy.spatial.transform import Rotation
     except ImportError:
         raise ImportError("rotation returns a SciPy Rotation; install SciPy with: pip install scipy") from None
-    matrices = _at(spline, x, "point", extrapolate, per_curve)
     missing = np.argwhere(np.isnan(matrices[..., 0, 0]))
     if len(missing):
         raise ValidationError(
@@ -663,6 +667,12 @@ def as_quaternions(rotations: ArrayLike | Rotation, *, scalar_first: bool | None
     >>> as_quaternions([[0, -1, 0], [1, 0, 0], [0, 0, 1]], scalar_first=False).round(8)
     array([0.        , 0.        , 0.70710678, 0.70710678])
     """
+    if hasattr(rotations, "as_quat"):
+        # Two conversions of SciPy's own quaternions would take ten times as long.
+        first = checked_order(scalar_first)
+        q = np.asarray(rotations.as_quat())
+        q = np.where(q[..., 3:] < 0, -q, q) + 0.0
+        return np.roll(q, 1, axis=-1) if first else q
     return converted(_given(rotations), "rotations", "matrix", quaternion_form(scalar_first))
 
 
@@ -712,6 +722,8 @@ def as_rotation_vectors(rotations: ArrayLike | Rotation) -> Array:
     >>> as_rotation_vectors([[0, -1, 0], [1, 0, 0], [0, 0, 1]]).round(8)
     array([0.        , 0.        , 1.57079633])
     """
+    if hasattr(rotations, "as_rotvec"):
+        return np.array(rotations.as_rotvec())
     return converted(_given(rotations), "rotations", "matrix", "vector")
 
 

@@ -52,7 +52,9 @@ def objects():
         "BSpline": ss.BSpline([0, 0, 0, 1, 1, 1], P, 2, "sphere:2"),
         "BezierCurve": ss.BezierCurve(P, "sphere:2"),
         "RetimedCurve": sphere.restrict(0.25, 0.75),
-        "RetimedCurve of dates": ss.CubicSpline(DAYS, P, "sphere:2").restrict(DAYS[0], DAYS[0] + (DAYS[1] - DAYS[0]) // 2),
+        "RetimedCurve of dates": ss.CubicSpline(DAYS, P, "sphere:2").restrict(
+            DAYS[0], DAYS[0] + (DAYS[1] - DAYS[0]) // 2
+        ),
         "SegmentedCurve": ss.SegmentedCurve([sphere, sphere.shift(10)]),
         "Derivative": sphere.derivative(),
         "AffineMorph": ss.shapes.AffineMorph(T, [SQUARE, 2 * SQUARE, SQUARE + 1]),
@@ -138,7 +140,10 @@ def pools(things):
         "spline": curves,
         "curves": [[(T, P), (None, P)], {"a": curves[0]}],
         "nu": [0, 1, 2],
-        "bc_type": ["natural", "not-a-knot", "periodic", "clamped", ((1, [0, 1, 0]), "natural")],
+        "bc_type": [
+            *("natural", "not-a-knot", "periodic", "clamped", ((1, [0, 1, 0]), "natural")),
+            ([(1, [0, 1, 0]), (2, [0, 0, 0])], "natural"),
+        ],
         "p": [P[0], QUBIT[0], TURNS[0], POSES[0], SPD[0]],
         "q": [P[1], QUBIT[1], TURNS[1], POSES[1], SPD[1]],
         "v": [np.zeros(3), [0, 1.0, 0], np.zeros((3, 3))],
@@ -180,7 +185,8 @@ def pools(things):
         "dims": [(2,)],
         "n": [2, 3],
         "k": [1],
-        "velocities": [np.zeros((3, 3))],
+        "velocities": [np.zeros((3, 3)), {1: np.zeros(3)}],
+        "twists": [np.zeros(6), np.zeros((3, 6))],
         "u": [np.zeros((3, 3))],
         "cotangent": [np.zeros(3)],
         "every": ["1h"],

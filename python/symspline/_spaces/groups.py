@@ -238,6 +238,8 @@ class SpecialEuclidean(Group[FloatArray]):
             )
         if shape[-2:] == (3, 3):
             return ". symspline.poses.join(rotations, positions) returns poses; curves of rotations are on so:3."
+        if shape[-1:] == (6,) and name not in _POINTS:
+            return ". symspline.poses.velocities(poses, twists) converts twists to tangent vectors."
         return ""
 
 

@@ -193,8 +193,18 @@ def parts_of(value: Any, space: Space[Any], name: str) -> Tuple:
         return (value,)
     count = len(space.factors)
     if not isinstance(value, (tuple, list)) or len(value) != count:
-        raise ValidationError(f"{name} must be a tuple of {count} arrays, one per factor of {space!r}")
+        raise ValidationError(
+            f"{name} must be a tuple of {count} arrays, one per factor of {space!r}{_conversion(value, space)}"
+        )
     return tuple(value)
+
+
+def _conversion(value: Any, space: Product[Any]) -> str:
+    """Return a sentence that names the conversion of poses to points of the factors."""
+    poses = hasattr(value, "translation") or (isinstance(value, np.ndarray) and value.shape[-2:] == (4, 4))
+    if not poses or not any(factor.point_shape == (3, 3) for factor in space.factors):
+        return ""
+    return ". symspline.poses.split(poses) returns the rotations and positions of poses."
 
 
 def product_norm(lengths: Tuple) -> FloatArray:
