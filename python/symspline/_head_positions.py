@@ -150,7 +150,6 @@ def write_head_pos(file: Any, t: ArrayLike, poses: Any, *, gof: ArrayLike = 1.0,
             raise ValidationError(f"{name} must be finite")
         more.append(np.broadcast_to(values, times.shape))
     speed = np.append(0.0, 100 * np.linalg.norm(np.diff(positions, axis=0), axis=1) / steps)[: len(times)]
-    q = matrix_to_quaternion(rotations, scalar_first=True)
-    # Only the vector part is stored, so the scalar part must not be negative.
-    vector = np.where(q[:, :1] < 0, -1.0, 1.0) * q[:, 1:] + 0.0
+    # Only the vector part is stored, because the scalar part is not negative.
+    vector = matrix_to_quaternion(rotations, scalar_first=True)[:, 1:] + 0.0
     write(file, np.column_stack([times, vector, positions, *more, speed]), " ", " ".join(_COLUMNS))

@@ -121,6 +121,7 @@ def test_other_columns_are_kept_where_they_are_constant():
             "name": [None, "Ida", None, "Ida", None, None, "Bo", *[None] * 5],
             "flag": pd.array([1, None, 1] * 4, dtype="Int64"),
             "heading": np.arange(12),
+            "status": ["under way", "moored", "moored"] * 4,
             "route": [[1, 2]] * 12,
             "draught": np.repeat([4.5, 6.0], 6),
         }
