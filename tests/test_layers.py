@@ -29,7 +29,7 @@ LAYERS = [
     ["_spaces"],
     ["_curves", "manifolds"],
     ["_errors", "_options", "_plotting", "_representatives", "_validation"],
-    ["_archive"],
+    ["_archive", "_search"],
     ["_curve", "_curve_base"],
     ["_bspline", "_timed_curve"],
     ["_append", "_composed", "_piecewise_cubic"],

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Callable, Iterator
-from functools import cached_property
-from typing import Any, ClassVar, Generic, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from . import _archive
 from ._arrays import as_array, cast, checked_flag, refuse, short_repr
@@ -16,7 +15,8 @@ from ._core import ValidationError
 from ._curves.arc_length import ArcLength
 from ._curves.composed import AnyCurve
 from ._curves.integrals import bending_energy, integrate
-from ._spaces import Doubles, Space
+from ._search.searchable import Searchable
+from ._spaces import Doubles
 from ._time import TimeAxis
 from ._typing import File, Number, P, Time, TimesLike
 
@@ -24,7 +24,7 @@ from ._typing import File, Number, P, Time, TimesLike
 _ROUNDING = 1e-12
 
 
-class CurveBase(ABC, Generic[P]):
+class CurveBase(Searchable[P]):
     """The part of `Curve` that does not make new curves, except those of a batch."""
 
     # Name of the format in files and pickles.
@@ -80,11 +80,6 @@ class CurveBase(ABC, Generic[P]):
         >>> ss.BezierCurve([[0.0], [3.0]], "r:1").speed([0.5, 1.0])
         array([3., 3.])
         """
-
-    @property
-    @abstractmethod
-    def space(self) -> Space[P]:
-        """Space of the curve."""
 
     @property
     @abstractmethod
@@ -240,10 +235,6 @@ class CurveBase(ABC, Generic[P]):
         found: Time = self._shown_times(times)[()]
         return found
 
-    @cached_property
-    def _arc(self) -> ArcLength:
-        return ArcLength(self._curve)
-
     @abstractmethod
     def _core_times(self, x: TimesLike, name: str, per_curve: bool = False) -> tuple[Doubles, bool]:
         """Return times as numbers of the core, and whether each curve then has its own times.
@@ -253,10 +244,6 @@ class CurveBase(ABC, Generic[P]):
         ValidationError
             If a time is not in the domain of the curve.
         """
-
-    @abstractmethod
-    def _shown_times(self, x: Doubles) -> NDArray[Any]:
-        """Return times as the user counts them. The numbers of the core have the batch axes in front."""
 
     @property
     def _domain_ends(self) -> list[tuple[Doubles, bool]]:
