@@ -44,6 +44,7 @@ LAYERS = [
         "_pairs",
         "_segments",
         "_smoothing",
+        "_time_law",
         "_tracks",
         "convert",
         "jax",

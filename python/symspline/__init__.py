@@ -78,6 +78,7 @@ from ._spaces import (  # noqa: E402
     space,
 )
 from ._threads import set_num_threads  # noqa: E402
+from ._time_law import TimeLaw, time_law  # noqa: E402
 from ._version import VERSION  # noqa: E402
 from .manifolds import Manifold, Stiefel  # noqa: E402
 
@@ -138,6 +139,7 @@ __all__ = [
     "SymmetricPositiveDefinite",
     "Symplectic",
     "SymsplineError",
+    "TimeLaw",
     "Unitary",
     "ValidationError",
     "convert",
@@ -165,6 +167,7 @@ __all__ = [
     "subspaces",
     "tensors",
     "testing",
+    "time_law",
 ]
 
 if _threads := _os.environ.get("SYMSPLINE_NUM_THREADS"):

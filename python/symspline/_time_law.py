@@ -1,0 +1,478 @@
+"""Time laws of paths: the fastest traversal under limits of speed and acceleration."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ._arrays import as_array, cast, checked_number, read_only, refuse, short_repr, whole_number
+from ._core import ValidationError
+from ._curve import Curve
+from ._options import order_of
+from ._spaces import Array, Doubles, factors_of, parts_of, product_norm
+from ._time import TimeAxis
+from ._typing import FloatArray
+
+# Velocities before and after a knot that differ by more than this part jump.
+_JUMP = 1e-6
+# Part of the largest norm along the path below which a norm is a rounding error.
+_ZERO = 1e-12
+# Times outside the domain by this part of the duration are rounding errors.
+_ROUNDING = 1e-12
+# Intervals next to a rest, each half as long as the next.
+_HALVINGS = 14
+# Steps of bisection for the largest u, and the part of u by which it is first reduced.
+_STEPS = 10
+_NEAR = 1e-6
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class TimeLaw:
+    """Times of a curve as a function of the time of a traversal.
+
+    `time_law` returns objects of this class. The function is increasing and continuously differentiable, and its second
+    derivative is constant between the knots.
+
+    Attributes
+    ----------
+    knots : ndarray, shape (n,)
+        Times of the traversal at the points of the grid, in seconds if the curve has dates; the first is zero.
+    values : ndarray, shape (n,)
+        Times of the curve at the knots, in seconds since its first knot if they are dates.
+    rates : ndarray, shape (n,)
+        First derivatives at the knots.
+    max_speed, max_acceleration : tuple of float
+        Limits in each factor of the space; infinite without a limit.
+
+    See Also
+    --------
+    time_law : Compute the fastest traversal of a path.
+
+    Examples
+    --------
+    >>> import symspline as ss
+    >>> path = ss.CubicSpline(None, [[0.0], [1.0]], "r:1")
+    >>> law = ss.time_law(path, max_acceleration=4.0)
+    >>> law
+    <TimeLaw: duration 1.0>
+    >>> law([0.0, 0.5, 1.0]).round(6)
+    array([0. , 0.5, 1. ])
+    """
+
+    knots: FloatArray
+    values: FloatArray
+    rates: FloatArray
+    max_speed: tuple[float, ...]
+    max_acceleration: tuple[float, ...]
+    _time_axis: TimeAxis = field(default_factory=TimeAxis)
+
+    @property
+    def duration(self) -> float:
+        """Time of the whole traversal."""
+        return float(self.knots[-1])
+
+    @property
+    def domain(self) -> tuple[float, float]:
+        """First and last time of the traversal, zero and the duration."""
+        return 0.0, self.duration
+
+    def __call__(self, x: ArrayLike, nu: int = 0) -> Any:
+        """Evaluate the time of the curve, or its derivatives.
+
+        Parameters
+        ----------
+        x : array_like
+            Times of the traversal, from zero to the duration, of any shape.
+        nu : {0, 1, 2}, default 0
+            Order of the derivative.
+
+        Returns
+        -------
+        ndarray or float, shape x.shape
+            Times of the curve, or their derivatives. Times of curves with dates are ``datetime64`` in nanoseconds, and
+            the derivatives refer to seconds. The second derivative at a knot is that after it.
+
+        Raises
+        ------
+        ValidationError
+            If a time is outside the domain.
+        """
+        order = order_of(nu)
+        array = as_array(x, "x")
+        if array.dtype.kind not in "biuf":
+            raise ValidationError(f"x must be real numbers, not {array.dtype}")
+        times, last = cast(array), self.duration
+        slack = _ROUNDING * last
+        refuse(
+            ~((times >= -slack) & (times <= last + slack)),
+            "x",
+            lambda i: f"= {times[i]} is outside the domain [0, {last}] of the time law",
+        )
+        times = np.clip(times, 0.0, last)
+        k = np.clip(np.searchsorted(self.knots, times, "right") - 1, 0, len(self.knots) - 2)
+        ahead, rate = times - self.knots[k], self.rates[k]
+        second = (np.diff(self.rates) / np.diff(self.knots))[k]
+        if order == 2:
+            return second[()]
+        if order == 1:
+            return (rate + second * ahead)[()]
+        values = np.clip(self.values[k] + ahead * (rate + ahead * second / 2), self.values[k], self.values[k + 1])
+        return self._time_axis.shown(np.asarray(values), ())[()]
+
+    def __repr__(self) -> str:
+        return f"<TimeLaw: duration {self.duration:.6}>"
+
+
+def time_law(
+    curve: Curve[Any],
+    *,
+    max_acceleration: float | tuple[float | None, ...],
+    max_speed: float | tuple[float | None, ...] | None = None,
+    initial_speed: float = 0.0,
+    final_speed: float = 0.0,
+    grid_size: int = 1000,
+) -> TimeLaw:
+    r"""Compute the fastest traversal of a path under limits of speed and acceleration.
+
+    The points of the curve stay the same; the times at which they are reached change.
+
+    Parameters
+    ----------
+    curve : Curve
+        The path, one curve.
+    max_acceleration : float or tuple
+        Largest norm of the covariant acceleration. For a `Product`, a tuple with one limit per factor, in which None
+        means no limit.
+    max_speed : float or tuple, optional
+        Largest norm of the velocity, likewise. By default there is no limit.
+    initial_speed, final_speed : float, default 0.0
+        Norm of the velocity at the start and at the end. In a product, the norm over all factors.
+    grid_size : int, default 1000
+        Number of intervals of the grid on the path. It is increased to at least four per segment of the curve.
+
+    Returns
+    -------
+    TimeLaw
+        The times of the curve as a function of the time of the traversal.
+
+    Raises
+    ------
+    ValidationError
+        If an argument is invalid, if the curve does not move during an interval or does not have a positive limit in
+        each moving factor, or if a speed at an end cannot be reached within the limits.
+
+    See Also
+    --------
+    Curve.at_length : Compute times of equal distances along a curve, for a traversal at constant speed.
+
+    Notes
+    -----
+    Let :math:`x` be the time of the curve :math:`\gamma`. The traversal has the velocity :math:`\gamma' \dot x` and the
+    acceleration :math:`\nabla\gamma' \, u + \gamma' \ddot x`, where :math:`u = \dot x^2` and
+    :math:`\ddot x = \tfrac12 du/dx`; for the arc length these are the formulas
+    :math:`\lVert a\rVert^2 = \ddot s^2 + \kappa^2 \dot s^4`. On a grid that contains the knots, :math:`u` is piecewise
+    linear. The limits are imposed at both ends of each interval, where the acceleration may differ on the two sides. A
+    backward pass computes the largest :math:`u` from which the end can be reached, and a forward pass accelerates as
+    much as the limits allow, as in TOPP-RA [1]_. Between the points of the grid, limits are exceeded by terms of
+    second order in the steps, usually less than 0.1 %. Increase `grid_size` if the curvature changes within few
+    intervals.
+
+    Where the velocity jumps, as at the knots of a `PiecewiseGeodesic`, the traversal comes to rest. A curve whose
+    velocity vanishes at single times, such as an end with zero velocity, is accepted.
+
+    References
+    ----------
+    .. [1] H. Pham, Q.-C. Pham, A New Approach to Time-Optimal Path Parameterization Based on Reachability Analysis,
+           IEEE Trans. Robot. 34 (2018).
+
+    Examples
+    --------
+    A turn of a camera by 180° with limits in rad/s and rad/s²:
+
+    >>> import numpy as np
+    >>> import symspline as ss
+    >>> path = ss.CubicSpline(None, [[1, 0, 0], [0, 1, 0], [-1, 0, 0]], "sphere:2")
+    >>> law = ss.time_law(path, max_speed=1.0, max_acceleration=0.5)
+    >>> round(law.duration, 2), round(np.pi / 1.0 + 1.0 / 0.5, 2)
+    (5.14, 5.14)
+    >>> x = law(1.0)
+    >>> round(float(path.speed(x) * law(1.0, nu=1)), 3)
+    0.5
+    """
+    if not isinstance(curve, Curve):
+        raise ValidationError(f"curve must be a curve of symspline, not {short_repr(curve)}")
+    if curve._curve.batch:
+        raise ValidationError("curve is a batch, but a time law belongs to one curve. Pass one of them, as curve[0].")
+    count = len(factors_of(curve.space))
+    speeds, accelerations = (
+        _limits(value, count, name)
+        for value, name in ((max_speed, "max_speed"), (max_acceleration, "max_acceleration"))
+    )
+    ends = [
+        checked_number(value, f"{name} must be a number that is not negative", lambda x: x >= 0)
+        for value, name in ((initial_speed, "initial_speed"), (final_speed, "final_speed"))
+    ]
+    path = _sampled(curve, whole_number(grid_size, "grid_size", 4))
+    problem = _problem(path, np.array(speeds), np.array(accelerations), (ends[0], ends[1]))
+    u = _forward(problem, _backward(problem))
+    rates = np.sqrt(u)
+    steps = 2 * np.diff(path.x) / (rates[:-1] + rates[1:])
+    if not (np.isfinite(steps).all() and (steps > 0).all()):
+        where = int(np.flatnonzero(~(np.isfinite(steps) & (steps > 0)))[0])
+        raise ValidationError(
+            f"curve has no fastest traversal between its times {path.x[where]} and {path.x[where + 1]}: increase "
+            "grid_size or the limits"
+        )
+    knots = np.concatenate([[0.0], np.cumsum(steps)])
+    axis = getattr(curve, "_time_axis", TimeAxis())
+    return TimeLaw(read_only(knots), read_only(path.x), read_only(rates), speeds, accelerations, axis)
+
+
+def _limits(value: Any, count: int, name: str) -> tuple[float, ...]:
+    """Return one limit per factor."""
+    values = (value,) * count if value is None else value if isinstance(value, (tuple, list)) else (value,)
+    if len(values) != count:
+        raise ValidationError(
+            f"{name} must be a tuple with {count} limits, one per factor of the space, not {short_repr(value)}"
+            if count > 1
+            else f"{name} must be one number, not {short_repr(value)}"
+        )
+    if name == "max_acceleration" and all(one is None for one in values):
+        raise ValidationError("max_acceleration is needed: without it, the traversal would start with a jump")
+    requirement = f"{name} must be a positive number" + (", or None, in each factor" if count > 1 else "")
+    return tuple(math.inf if one is None else checked_number(one, requirement, lambda x: x > 0) for one in values)
+
+
+class _Path(NamedTuple):
+    """A path on a grid. The last axis of arrays is that of the factors.
+
+    Attributes
+    ----------
+    x : ndarray, shape (n,)
+        Grid.
+    p, q, r : ndarray, shape (2, n - 1, factors)
+        |∇γ'|², ⟨∇γ', γ'⟩ and |γ'|² at the starts and at the ends of the intervals.
+    rests : ndarray of bool, shape (n,)
+        Where the velocity jumps, so that the traversal rests.
+    """
+
+    x: Doubles
+    p: Doubles
+    q: Doubles
+    r: Doubles
+    rests: Array
+
+    @property
+    def squares(self) -> Doubles:
+        """Largest |γ'|² at the grid on either side, shape (n, factors)."""
+        return np.maximum(np.append(self.r[0], self.r[1, -1:], axis=0), np.append(self.r[0, :1], self.r[1], axis=0))
+
+
+def _sampled(curve: Curve[Any], size: int) -> _Path:
+    knots = curve._curve.times
+    each = max(4, math.ceil(size / (len(knots) - 1)))
+    jumping = _jumps(curve, knots)
+    x = _graded(knots, each, np.concatenate([[True], jumping, [True]]))
+    rests = np.isin(x, knots[1:-1][jumping])
+    # Derivatives can jump at knots. Those of an interval are evaluated after its start and before its end.
+    times = np.ascontiguousarray(np.stack([x[:-1], x[1:] - 1e-9 * np.diff(x)]))
+    parts = [_values(curve, times, quantity) for quantity in ("point", "velocity", "acceleration")]
+    if not all(np.isfinite(own).all() for values in parts for own in values):
+        raise ValidationError("curve has points, velocities or accelerations that are not finite")
+    p, q, r = [], [], []
+    for space, points, v, a in zip(factors_of(curve.space), *parts, strict=True):
+        p.append(space.inner(points, a, a))
+        q.append(space.inner(points, a, v))
+        r.append(space.inner(points, v, v))
+    moving = np.sqrt(np.sum(r, axis=0))
+    still = ~(moving > _ZERO * moving.max()).any(axis=0)
+    if still.any():
+        where = int(np.flatnonzero(still)[0])
+        raise ValidationError(
+            f"curve does not move between its times {x[where]} and {x[where + 1]}. Remove repeated points: a traversal "
+            "of a path does not rest."
+        )
+    return _Path(x, np.stack(p, axis=-1), np.stack(q, axis=-1), np.stack(r, axis=-1), rests)
+
+
+def _values(curve: Curve[Any], x: Doubles, quantity: str) -> tuple[Array, ...]:
+    """Evaluate the curve in each factor."""
+    return parts_of(curve._curve.evaluate(x, quantity, "continue", False), curve.space, quantity)
+
+
+def _graded(knots: Doubles, each: int, rests: Array) -> Doubles:
+    """Divide every segment into `each` intervals, with shorter ones next to knots at which the traversal rests."""
+    x = np.append((knots[:-1, None] + np.diff(knots)[:, None] * np.arange(each) / each).ravel(), knots[-1])
+    step, at = np.diff(knots) / each, np.flatnonzero(rests)
+    parts = 0.5 ** np.arange(1, _HALVINGS + 1)
+    after = (knots[at[:-1], None] + step[at[:-1], None] * parts).ravel()
+    before = (knots[at[1:], None] - step[at[1:] - 1, None] * parts).ravel()
+    return np.unique(np.concatenate([x, after, before]))
+
+
+def _jumps(curve: Curve[Any], knots: Doubles) -> Array:
+    """Return the inner knots at which the velocity jumps."""
+    times = np.ascontiguousarray(np.stack([knots[1:-1] - 1e-9 * np.diff(knots)[:-1], knots[1:-1]]))
+    jumps, sizes = [], []
+    for space, p, v in zip(
+        factors_of(curve.space), _values(curve, times, "point"), _values(curve, times, "velocity"), strict=True
+    ):
+        # Representatives of points may differ on both sides of a knot.
+        moved = np.asarray(space.transport(p[0], p[1], v[0]))
+        jumps.append(space.norm(p[1], v[1] - moved))
+        sizes.append(space.norm(p[0], v[0]))
+    size = product_norm(tuple(sizes))
+    return np.asarray(product_norm(tuple(jumps)) > _JUMP * size + 1e-9 * size.max(initial=0.0))
+
+
+Row = list[tuple[float, ...]]
+
+
+class _Problem(NamedTuple):
+    """Limits on a grid, as lists, in which single numbers are found faster than in arrays.
+
+    The constraint p u² + 2 q u a + r a² ≤ A² of one factor, for u and the second derivative a, holds at both ends of an
+    interval of length h, where u differs by 2 h a. Each constraint is a polynomial of a, given u at one end, with the
+    coefficients ``lead``, 2 u ``half`` and u² ``p`` - A².
+
+    Attributes
+    ----------
+    h : list of float
+        Steps of the grid.
+    most : list of float
+        Largest u at the grid.
+    from_start, from_end : list of list of tuple
+        For each interval, the numbers ``lead``, ``half``, ``p`` and A² of all constraints, given u at its start or end.
+    ends : tuple
+        Values of u at both ends; None where γ' vanishes, so that all values of u are a rest.
+    """
+
+    h: list[float]
+    most: list[float]
+    from_start: list[Row]
+    from_end: list[Row]
+    ends: tuple[float | None, float | None]
+
+
+def _problem(path: _Path, speeds: Doubles, accelerations: Doubles, wanted: tuple[float, float]) -> _Problem:
+    limited = np.isfinite(accelerations)
+    p, q, r = (own[..., limited] for own in (path.p, path.q, path.r))
+    limits = np.broadcast_to(accelerations[limited] ** 2, p.shape)
+    squares = path.squares
+    with np.errstate(all="ignore"):
+        # The largest u with any a, from the determinant of the quadratic form.
+        form = p * r - q * q
+        turning = np.min(np.where(form > 0, np.sqrt(limits * r / form), np.inf), axis=-1)
+        most = np.min(np.where(squares > 0, speeds**2 / squares, np.inf), axis=-1)
+        most = np.minimum(most, np.minimum(np.append(turning[0], np.inf), np.append(np.inf, turning[1])))
+    most[path.rests] = 0.0
+    total = np.sqrt(squares.sum(axis=-1))
+    ends = tuple(
+        _end(most, total, end, speed, name)
+        for end, speed, name in ((0, wanted[0], "initial_speed"), (-1, wanted[1], "final_speed"))
+    )
+    h = np.diff(path.x)
+    step = 2 * h[:, None]
+    rows = [
+        np.concatenate([_rows(p[i], q[i], r[i], limits[i], shift) for i, shift in pair], axis=1).tolist()
+        for pair in (((0, 0 * step), (1, step)), ((1, 0 * step), (0, -step)))
+    ]
+    return _Problem(h.tolist(), most.tolist(), rows[0], rows[1], (ends[0], ends[1]))
+
+
+def _rows(p: Doubles, q: Doubles, r: Doubles, limits: Doubles, shift: Doubles) -> Doubles:
+    """Return the coefficients of p (u + shift a)² + 2 q (u + shift a) a + r a² ≤ A², shape (n - 1, factors, 4)."""
+    lead = p * shift**2 + 2 * q * shift + r
+    lead = np.where(lead <= 1e-14 * (p * shift**2 + r), 0.0, lead)
+    return np.stack([lead, p * shift + q, p, limits], axis=-1)
+
+
+def _end(most: Doubles, total: Doubles, end: int, speed: float, name: str) -> float | None:
+    """Return u at an end with the given speed, and limit the largest u there."""
+    if total[end] <= 1e-9 * total.max():
+        if speed > 0:
+            raise ValidationError(
+                f"{name} = {speed} cannot be reached where the velocity of the curve is zero. Pass 0."
+            )
+        # There is no bound for u from the end alone.
+        most[end] = min(most[end], 4 * most[1 if end == 0 else -2])
+        return None
+    u = float(speed / total[end]) ** 2
+    if u > most[end] * (1 + 1e-9):
+        raise ValidationError(f"{name} = {speed} exceeds the limits at this end. Reduce it.")
+    most[end] = u
+    return u
+
+
+def _feasible(row: Row, u: float) -> tuple[float, float] | None:
+    """Return the interval of a that all constraints of an interval allow, given u at one of its ends."""
+    least, most = -math.inf, math.inf
+    for lead, half, p, square in row:
+        b, rest = u * half, p * u * u - square
+        if lead == 0.0:
+            if rest > 0:
+                return None
+            continue
+        root = b * b - lead * rest
+        if root < 0:
+            return None
+        root = math.sqrt(root)
+        least, most = max(least, (-b - root) / lead), min(most, (root - b) / lead)
+    return (least, most) if least <= most else None
+
+
+def _backward(problem: _Problem) -> tuple[list[float], list[float]]:
+    """Return the largest u at the grid from which the end can be reached, and the next u on the way."""
+    count = len(problem.h)
+    largest, following = [0.0] * (count + 1), [0.0] * count
+    largest[-1] = problem.most[-1]
+
+    def before(k: int, u: float) -> float | None:
+        """Return the largest u at the start of interval k with the given u at its end."""
+        interval, h = _feasible(problem.from_end[k], u), 2 * problem.h[k]
+        if interval is None:
+            return None
+        a = max(interval[0], (u - problem.most[k]) / h)
+        return max(u - h * a, 0.0) if a <= interval[1] else None
+
+    for k in range(count - 1, -1, -1):
+        u = largest[k + 1]
+        found = before(k, u)
+        if found is None:
+            # The largest u at the end of the interval for which the limits at its start can be kept, usually near.
+            part = _NEAR
+            while part < 0.5 and before(k, u * (1 - part)) is None:
+                part *= 4
+            low, high = (u * (1 - part), u * (1 - part / 4)) if part < 0.5 else (0.0, u)
+            for _ in range(_STEPS):
+                middle = (low + high) / 2
+                low, high = (low, middle) if before(k, middle) is None else (middle, high)
+            u, found = low, before(k, low) or 0.0
+        largest[k], following[k] = found, u
+    return largest, following
+
+
+def _forward(problem: _Problem, backward: tuple[list[float], list[float]]) -> Doubles:
+    """Return u at the grid, with the largest acceleration at any time that allows the end to be reached."""
+    largest, following = backward
+    start, end = problem.ends
+    if start is not None and start > largest[0] * (1 + 1e-9):
+        raise ValidationError("initial_speed is too high: the curve cannot be followed within the limits. Reduce it.")
+    u = largest[0] if start is None else min(start, largest[0])
+    values = [u]
+    for k, h in enumerate(problem.h):
+        # The set of u and a within the limits is convex, so that this share of the backward pass is in it.
+        share = following[k] * min(u / largest[k], 1.0) if largest[k] > 0 else 0.0
+        interval = _feasible(problem.from_start[k], u)
+        if interval is not None:
+            a = min(interval[1], (largest[k + 1] - u) / (2 * h))
+            share = max(share, u + 2 * h * a) if a >= interval[0] else share
+        u = min(share, largest[k + 1])
+        values.append(u)
+    if end is not None and values[-1] < end * (1 - 1e-9):
+        raise ValidationError("final_speed cannot be reached on this path within the limits. Reduce it.")
+    return np.array(values)
