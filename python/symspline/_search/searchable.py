@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from functools import cached_property
-from typing import Any, Generic
+from typing import Any, Generic, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import checked_flag
+from .._arrays import checked_flag, checked_number, short_repr
 from .._core import ValidationError
 from .._curves.arc_length import ArcLength
 from .._curves.integrals import Evaluable
@@ -18,6 +19,10 @@ from .._spaces import Array, Doubles, Space, factors_of, parts_of
 from .._typing import FloatArray, P, Time
 from ..manifolds import Manifold
 from .closest import ClosestPoints
+from .extrema import checked_values, crossings, extrema
+
+# Names of quantities in the core.
+_QUANTITIES = {"speed": "speed", "acceleration": "bend"}
 
 
 class Searchable(ABC, Generic[P]):
@@ -114,6 +119,124 @@ class Searchable(ABC, Generic[P]):
         with np.errstate(all="ignore"):
             times, distances = self._closest.search(rows, curve)
         return self._shown_times(times.reshape(shape))[()], distances.reshape(shape)[()]
+
+    def extrema(
+        self,
+        function: Literal["speed", "acceleration"] | Callable[[Any], Any] = "speed",
+        *,
+        kind: Literal["max", "min"] = "max",
+    ) -> tuple[Any, FloatArray]:
+        """Find the local maxima or minima of the speed, or of another function of time.
+
+        Parameters
+        ----------
+        function : {"speed", "acceleration"} or callable, default "speed"
+            The norm of the velocity, the norm of the covariant acceleration, or a function that takes an array of times
+            and returns an array of real numbers of the same shape.
+        kind : {"max", "min"}, default "max"
+            Whether maxima or minima are returned.
+
+        Returns
+        -------
+        times : ndarray, shape (m,)
+            Increasing times of the extrema. An end of the domain counts if the function is larger (or smaller) there
+            than next to it. The largest of all values is therefore among them.
+        values : ndarray, shape (m,)
+            Values of the function at these times.
+
+        Raises
+        ------
+        ValidationError
+            If the curve is a batch, or an argument is invalid.
+
+        See Also
+        --------
+        Curve.solve : Find the times at which a function has a given value.
+
+        Notes
+        -----
+        The function is interpolated at 24 Chebyshev nodes on every segment, and the extrema are the roots of the
+        derivative of the polynomial. Segments are halved up to seven times until the polynomial represents the
+        function to ten significant digits. Extrema at which the function varies less than that, or features much
+        shorter than a segment, can be missed. A function that jumps at knots has the value after the knot there.
+
+        Examples
+        --------
+        >>> import symspline as ss
+        >>> curve = ss.CubicSpline(None, [[0.0], [1.0], [0.0]], "r:1")
+        >>> times, speeds = curve.extrema("speed")
+        >>> times.round(8), speeds.round(8)
+        (array([0., 2.]), array([1.5, 1.5]))
+        >>> curve.extrema(lambda x: curve(x)[..., 0])[0].round(8)
+        array([1.])
+        """
+        if not isinstance(kind, str) or kind not in ("max", "min"):
+            raise ValidationError(f"kind must be 'max' or 'min', not {short_repr(kind)}")
+        f = self._function(function)
+        times = extrema(f, self._curve.times, 1.0 if kind == "max" else -1.0)
+        return self._shown_times(times), f(times)
+
+    def solve(
+        self, function: Literal["speed", "acceleration"] | Callable[[Any], Any], value: float = 0.0
+    ) -> NDArray[Any]:
+        """Find the times at which the speed, or another function of time, has a given value.
+
+        Parameters
+        ----------
+        function : {"speed", "acceleration"} or callable
+            The norm of the velocity, the norm of the covariant acceleration, or a function that takes an array of times
+            and returns an array of real numbers of the same shape.
+        value : float, default 0.0
+            The value to find.
+
+        Returns
+        -------
+        ndarray, shape (m,)
+            Increasing times at which the function crosses the value, also by a jump.
+
+        Raises
+        ------
+        ValidationError
+            If the curve is a batch, or an argument is invalid.
+
+        See Also
+        --------
+        Curve.extrema : Find the local maxima or minima of a function.
+
+        Notes
+        -----
+        Sign changes between the Chebyshev nodes that `extrema` uses are refined by Chandrupatla's method. Two crossings
+        between neighbouring nodes, and times at which the function touches the value without crossing it, can be
+        missed.
+
+        Examples
+        --------
+        The times at which a motion has reached half of its height:
+
+        >>> import symspline as ss
+        >>> curve = ss.CubicSpline(None, [[0.0], [1.0], [0.0]], "r:1")
+        >>> curve.solve(lambda x: curve(x)[..., 0], 0.5).round(6)
+        array([0.347296, 1.652704])
+        """
+        number = checked_number(value, "value must be a finite number", math.isfinite)
+        return self._shown_times(crossings(self._function(function), self._curve.times, number))
+
+    def _function(self, function: Any) -> Callable[[Doubles], Doubles]:
+        """Return a function of times of the core, of one curve."""
+        if self._curve.batch:
+            raise ValidationError(
+                "the curve is a batch, but extrema belong to one curve. Use one of them, as curve[0]."
+            )
+        if callable(function):
+            return lambda x: checked_values(function(self._shown_times(x)), x.shape)
+        if not isinstance(function, str) or function not in _QUANTITIES:
+            raise ValidationError(
+                f"function must be 'speed', 'acceleration' or a function of times, not {short_repr(function)}"
+            )
+        quantity = _QUANTITIES[function]
+        return lambda x: checked_values(
+            self._curve.evaluate(np.ascontiguousarray(x), quantity, "continue", False), x.shape
+        )
 
     @cached_property
     def _closest(self) -> ClosestPoints:
