@@ -25,6 +25,8 @@ def test_roots_and_extrema_of_polynomials(seed):
         return ours(x)[..., 0]
 
     np.testing.assert_allclose(ours.solve(height, 0.3), scipy.solve(0.3, extrapolate=False), rtol=1e-12)
+    # A root at an end of the domain counts.
+    assert ours.solve(height, y[0])[0] == t[0]
     turns = np.sort(scipy.derivative().roots(extrapolate=False))
     maxima, minima = (ours.extrema(height, kind=kind) for kind in ("max", "min"))
     inner = np.sort(np.concatenate([x[(x > t[0]) & (x < t[-1])] for x in (maxima[0], minima[0])]))
