@@ -9,6 +9,7 @@ from types import GenericAlias
 from typing import TYPE_CHECKING, Any, Generic, Literal, Self, overload
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ._archive import VERSION, Entries, entry, read_times, restore, times_state
 from ._arrays import short_repr
@@ -19,7 +20,7 @@ from ._options import checked_extrapolate, extrapolation_mode
 from ._spaces import Doubles, Space
 from ._time import TimeAxis
 from ._timed_curve import TimedCurve
-from ._typing import Extrapolate, P, Time
+from ._typing import Extrapolate, FloatArray, P, Time
 
 if TYPE_CHECKING:
     from typing_extensions import TypeVar
@@ -243,6 +244,17 @@ class SegmentedCurve(ComposedCurve[P], Generic[P, C]):
         if not isinstance(index, (int, np.integer)):
             raise TypeError(f"the index of a segment must be an integer or a slice, not {short_repr(index)}")
         return self._segments[index]
+
+    def closest(
+        self, points: ArrayLike | tuple[ArrayLike, ...], *, per_curve: bool = False
+    ) -> tuple[Time, FloatArray | float]:
+        # Points in the gaps are not defined.
+        found = [segment.closest(points, per_curve=per_curve) for segment in self]
+        times, distances = (np.stack([np.asarray(own) for own in each]) for each in zip(*found, strict=True))
+        known = np.where(np.isnan(distances), np.inf, distances)
+        nearest = np.expand_dims(np.argmin(known, axis=0), 0)
+        time, distance = (np.take_along_axis(x, nearest, axis=0)[0][()] for x in (times, distances))
+        return time, distance
 
     def __iter__(self) -> Iterator[C]:  # type: ignore[override]
         return iter(self._segments)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,7 +14,6 @@ from ._core import ValidationError
 from ._curve import Curve
 from ._options import order_of
 from ._spaces import Array, Doubles, factors_of, parts_of, product_norm
-from ._time import TimeAxis
 from ._typing import FloatArray
 
 # Velocities before and after a knot that differ by more than this part jump.
@@ -68,7 +67,6 @@ class TimeLaw:
     rates: FloatArray
     max_speed: tuple[float, ...]
     max_acceleration: tuple[float, ...]
-    _time_axis: TimeAxis = field(default_factory=TimeAxis)
 
     @property
     def duration(self) -> float:
@@ -93,8 +91,8 @@ class TimeLaw:
         Returns
         -------
         ndarray or float, shape x.shape
-            Times of the curve, or their derivatives. Times of curves with dates are ``datetime64`` in nanoseconds, and
-            the derivatives refer to seconds. The second derivative at a knot is that after it.
+            Times of the curve, in seconds since its first knot if they are dates, or their derivatives. The second
+            derivative at a knot is that after it.
 
         Raises
         ------
@@ -121,7 +119,7 @@ class TimeLaw:
         if order == 1:
             return (rate + second * ahead)[()]
         values = np.clip(self.values[k] + ahead * (rate + ahead * second / 2), self.values[k], self.values[k + 1])
-        return self._time_axis.shown(np.asarray(values), ())[()]
+        return values[()]
 
     def __repr__(self) -> str:
         return f"<TimeLaw: duration {self.duration:.6}>"
@@ -167,6 +165,7 @@ def time_law(
 
     See Also
     --------
+    Curve.retime : Return the curve of the traversal.
     Curve.at_length : Compute times of equal distances along a curve, for a traversal at constant speed.
 
     Notes
@@ -228,8 +227,8 @@ def time_law(
             "grid_size or the limits"
         )
     knots = np.concatenate([[0.0], np.cumsum(steps)])
-    axis = getattr(curve, "_time_axis", TimeAxis())
-    return TimeLaw(read_only(knots), read_only(path.x), read_only(rates), speeds, accelerations, axis)
+    values = path.x if curve._time_axis.dates else curve._shown_times(path.x)
+    return TimeLaw(read_only(knots), read_only(values), read_only(rates), speeds, accelerations)
 
 
 def _limits(value: Any, count: int, name: str) -> tuple[float, ...]:
@@ -281,8 +280,6 @@ def _sampled(curve: Curve[Any], size: int) -> _Path:
     # Derivatives can jump at knots. Those of an interval are evaluated after its start and before its end.
     times = np.ascontiguousarray(np.stack([x[:-1], x[1:] - 1e-9 * np.diff(x)]))
     parts = [_values(curve, times, quantity) for quantity in ("point", "velocity", "acceleration")]
-    if not all(np.isfinite(own).all() for values in parts for own in values):
-        raise ValidationError("curve has points, velocities or accelerations that are not finite")
     p, q, r = [], [], []
     for space, points, v, a in zip(factors_of(curve.space), *parts, strict=True):
         p.append(space.inner(points, a, a))
@@ -301,7 +298,10 @@ def _sampled(curve: Curve[Any], size: int) -> _Path:
 
 def _values(curve: Curve[Any], x: Doubles, quantity: str) -> tuple[Array, ...]:
     """Evaluate the curve in each factor."""
-    return parts_of(curve._curve.evaluate(x, quantity, "continue", False), curve.space, quantity)
+    values = parts_of(curve._curve.evaluate(x, quantity, "continue", False), curve.space, quantity)
+    if not all(np.isfinite(own).all() for own in values):
+        raise ValidationError("curve is not finite in its whole domain. Pass one segment of a recording with gaps.")
+    return values
 
 
 def _graded(knots: Doubles, each: int, rests: Array) -> Doubles:

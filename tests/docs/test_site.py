@@ -12,7 +12,7 @@ import grids_figure
 import links
 import manifolds
 import many_curves
-import motion_figures
+import paths_figures
 import pytest
 import smoothing
 from pages import blocks, run
@@ -132,9 +132,9 @@ def test_the_figure_of_derivatives_can_be_made(tmp_path, monkeypatch):
     assert (tmp_path / "derivatives.png").stat().st_size > 10_000
 
 
-def test_the_figures_of_motion_can_be_made():
-    names = motion_figures.names_of_page()
-    assert len(motion_figures.closest(names).axes) == 1 and len(motion_figures.law(names).axes) == 2
+def test_the_figures_of_paths_can_be_made():
+    names = paths_figures.names_of_page()
+    assert len(paths_figures.closest(names).axes) == 1 and len(paths_figures.law(names).axes) == 2
 
 
 def test_the_figure_of_grids_can_be_made():

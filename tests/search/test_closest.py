@@ -210,6 +210,21 @@ def test_dates_shapes_and_failed_curves():
     assert np.isfinite([times[0], distances[0]]).all() and np.isnan([times[1], distances[1]]).all()
 
 
+def test_composed_curves():
+    space = ss.space("so:3")
+    curve = ss.CubicSpline(uneven(8), points_on(space, 8), space)
+    targets = points_on(space, 5, seed=3)
+    start, stop = curve.domain
+    part = curve.restrict(start + 0.4, stop - 0.3)
+    assert (part.closest(targets)[1] <= dense(part, targets, 20_000) + 1e-9).all()
+    # Two halves with a gap between them, in which there are no points.
+    halves = ss.SegmentedCurve([curve.restrict(b=curve.t[3]), curve.restrict(a=curve.t[4]).shift(5.0)])
+    each = [segment.closest(targets) for segment in halves]
+    times, distances = halves.closest(targets)
+    np.testing.assert_array_equal(distances, np.minimum(each[0][1], each[1][1]))
+    np.testing.assert_allclose(space.distance(halves(times), targets), distances, atol=1e-9)
+
+
 @pytest.mark.parametrize("name", NO_METRIC)
 def test_spaces_without_a_metric_raise(name):
     space = ss.space(name)

@@ -1,4 +1,4 @@
-"""Makes the figures of guide/motion.md from the code of that page."""
+"""Makes the figures of guide/paths.md from the code of that page."""
 
 import re
 from pathlib import Path
@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-PAGE = Path(__file__).parent / "guide" / "motion.md"
+PAGE = Path(__file__).parent / "guide" / "paths.md"
 
 
 def names_of_page() -> dict[str, Any]:
@@ -43,13 +43,9 @@ def law(names: dict[str, Any]) -> Figure:
     """Draw speed and acceleration against time, with their limits."""
     figure = Figure(figsize=(7, 4), layout="constrained")
     acceleration = np.linalg.norm(names["acceleration"], axis=-1)
-    for axes, values, limit, label in zip(
-        figure.subplots(2, 1, sharex=True),
-        (names["speed"], acceleration),
-        (1.0, 2.0),
-        ("speed", "acceleration"),
-        strict=True,
-    ):
+    rows = ("speed", names["speed"], 1.0), ("acceleration", acceleration, 2.0)
+    panels = figure.subplots(2, 1, sharex=True)
+    for axes, (label, values, limit) in zip(panels, rows, strict=True):
         axes.axhline(limit, color="0.5", linestyle="--", linewidth=0.8)
         axes.plot(names["clock"], values)
         axes.set(ylabel=label, ylim=(0, 1.15 * limit))
@@ -60,7 +56,7 @@ def law(names: dict[str, Any]) -> Figure:
 def main() -> None:
     names = names_of_page()
     for name, draw in (("closest", closest), ("law", law)):
-        draw(names).savefig(PAGE.with_name(f"motion_{name}.png"), dpi=85)
+        draw(names).savefig(PAGE.with_name(f"paths_{name}.png"), dpi=85)
 
 
 if __name__ == "__main__":
