@@ -268,7 +268,8 @@ class _Path(NamedTuple):
     @property
     def squares(self) -> Doubles:
         """Largest |γ'|² at the grid on either side, shape (n, factors)."""
-        return np.maximum(np.append(self.r[0], self.r[1, -1:], axis=0), np.append(self.r[0, :1], self.r[1], axis=0))
+        after, before = np.append(self.r[0], self.r[1, -1:], axis=0), np.append(self.r[0, :1], self.r[1], axis=0)
+        return np.asarray(np.maximum(after, before))
 
 
 def _sampled(curve: Curve[Any], size: int) -> _Path:

@@ -203,6 +203,7 @@ def test_dates_shapes_and_failed_curves():
     time, distance = curve.closest([0.25])
     assert time == np.datetime64("2026-03-01T12:15") and distance == 0
     assert curve.closest(np.zeros((0, 4, 1)))[0].shape == (0, 4)
+    assert ss.CubicSpline(None, np.zeros((0, 3, 1)), "r:1").closest([1.0])[1].shape == (0,)
     points = np.stack([points_on(ss.space("sphere:2"), 4), points_on(ss.space("sphere:2"), 4, seed=2)])
     mask = [True, False]
     curves = ss.CubicSpline(None, points, "sphere:2", where=mask)

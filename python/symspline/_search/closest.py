@@ -61,7 +61,8 @@ class Pairs(NamedTuple):
     def where(self, kept: Any) -> Self:
         """Return some of the intervals."""
         index = kept if isinstance(kept, slice) else np.flatnonzero(kept)
-        return type(self)(*(x[index] for x in self))
+        kept_values: Any = (x[index] for x in self)
+        return type(self)(*kept_values)
 
     @property
     def bound(self) -> Doubles:
@@ -70,7 +71,7 @@ class Pairs(NamedTuple):
 
     def split(self, at: Any, distance: Doubles, lengths: tuple[Doubles, Doubles]) -> Self:
         """Return both parts of every interval, given the distance at the time in between and their lengths."""
-        halves = (
+        halves: tuple[tuple[Any, Any], ...] = (
             (self.target, self.target),
             (self.start, at),
             (at, self.stop),
@@ -78,7 +79,8 @@ class Pairs(NamedTuple):
             (distance, self.last),
             lengths,
         )
-        return type(self)(*(np.stack(both, axis=-1).ravel() for both in halves))
+        interleaved: Any = (np.stack(both, axis=-1).ravel() for both in halves)
+        return type(self)(*interleaved)
 
 
 class ClosestPoints:
@@ -189,9 +191,10 @@ class _Search:
         each = zip(self.table.factors, self.table.points, self.targets, strict=True)
         distance = product_norm(tuple(_distances(factor, p[:, edges][self.curve], q[:, None]) for factor, p, q in each))
         self._improve(target.ravel(), self.table.times[:, edges][self.curve].ravel(), distance.ravel())
-        own, start, stop, first, last = (
+        parts: Any = (
             x.ravel() for x in (target[:, 1:], number[:, :-1], number[:, 1:], distance[:, :-1], distance[:, 1:])
         )
+        own, start, stop, first, last = parts
         return stride, Pairs(own, start, stop, first, last, self._length(own, start, stop))
 
     def _halves(self, pairs: Pairs, stride: int) -> Pairs:

@@ -76,7 +76,7 @@ class Pieces(NamedTuple):
 
     def time(self, number: Any, tau: Doubles) -> Doubles:
         """Return times in intervals, where tau is from -1 to 1."""
-        return self.a[number] + (self.b - self.a)[number] * (tau + 1) / 2
+        return np.asarray(self.a[number] + (self.b - self.a)[number] * (tau + 1) / 2)
 
 
 def _nodes(a: Doubles, b: Doubles) -> Doubles:

@@ -110,6 +110,8 @@ class Searchable(ABC, Generic[P]):
                 f"got leading axes {lead}"
             )
         shape = lead if own else batch + lead
+        if 0 in shape:
+            return self._shown_times(np.zeros(shape)), np.zeros(shape)
         inner = shape[len(batch) :]
         rows = [
             np.broadcast_to(x, shape + factor.point_shape).reshape(-1, *factor.point_shape)
