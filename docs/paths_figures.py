@@ -47,7 +47,7 @@ def law(names: dict[str, Any]) -> Figure:
     panels = figure.subplots(2, 1, sharex=True)
     for axes, (label, values, limit) in zip(panels, rows, strict=True):
         axes.axhline(limit, color="0.5", linestyle="--", linewidth=0.8)
-        axes.plot(names["clock"], values)
+        axes.plot(names["seconds"], values)
         axes.set(ylabel=label, ylim=(0, 1.15 * limit))
     panels[-1].set(xlabel="time")
     return figure
