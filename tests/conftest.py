@@ -6,7 +6,7 @@
     motion       curves of rotations and poses: rates, quaternions, recordings
     derivatives  with respect to the data
     in_jax       the compiled spline as a function in JAX, and splines written in JAX
-    free         `BSpline` and `BezierCurve`
+    free         `BSpline`, `BezierCurve` and `CumulativeBSpline`
     files, convert, cli, plotting, demo
     manifolds    curves on manifolds made of functions, Stiefel manifolds, surfaces; the public suite of laws
     geo          positions, speed and course on a globe

@@ -22,6 +22,7 @@ from ._composed import RetimedCurve, SegmentedCurve  # noqa: E402
 from ._config import show_config  # noqa: E402
 from ._core import ConvergenceError, CutLocusError, ValidationError, num_threads  # noqa: E402
 from ._cubic import CubicSpline  # noqa: E402
+from ._cumulative import CumulativeBSpline  # noqa: E402
 from ._curve import Curve, Derivative  # noqa: E402
 from ._curves.derivatives import Gradient  # noqa: E402
 from ._estimation import estimate  # noqa: E402
@@ -31,7 +32,7 @@ from ._functional import evaluate, fit, fit_many  # noqa: E402
 from ._geodesics import PiecewiseGeodesic  # noqa: E402
 from ._grid import GridReport, GridSpline  # noqa: E402
 from ._hermite import HermiteSpline  # noqa: E402
-from ._report import ConvergenceWarning, FarPointsWarning, Report  # noqa: E402
+from ._report import ConvergenceWarning, CumulativeReport, FarPointsWarning, Report  # noqa: E402
 from ._segments import fit_segments  # noqa: E402
 from ._smoothing import (  # noqa: E402
     SmoothingGrid,
@@ -95,6 +96,8 @@ __all__ = [
     "ConvergenceError",
     "ConvergenceWarning",
     "CubicSpline",
+    "CumulativeBSpline",
+    "CumulativeReport",
     "Curve",
     "CutLocusError",
     "DeSitter",

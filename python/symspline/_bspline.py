@@ -7,26 +7,19 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from . import _core
 from ._archive import VERSION, Entries, Stored, entry, read_array, read_space
-from ._arrays import as_array, cast, refuse, whole_number
-from ._core import CutLocusError, ValidationError
-from ._curve import Curve
-from ._curves.curve import NORMS
-from ._curves.ends import ends_of
-from ._curves.fit import Points, unwrapped, validated
-from ._curves.integrals import EXACT
-from ._curves.reduced import reduced
-from ._faults import of_index
-from ._options import quantity_of
+from ._arrays import whole_number
+from ._controlled import ControlledSpline, checked_knots, checked_points, control_array
+from ._core import ValidationError
+from ._curves.controlled import ControlledCurve
+from ._curves.fit import Points, unwrapped
 from ._representatives import warn_of_far_data
-from ._spaces import Array, Doubles, Product, Space, point_tol, space_named
-from ._time import TimeAxis, onto_ends
-from ._typing import FloatArray, P, Progress
+from ._spaces import Product, Space, space_named
+from ._typing import P
 from .manifolds._manifold import refuse_functions
 
 
-class BSpline(Curve[P]):
+class BSpline(ControlledSpline[P]):
     """Construct a B-spline curve from control points.
 
     The curve is evaluated by de Boor's algorithm with geodesics in place of straight lines. On a Euclidean space the
@@ -85,123 +78,20 @@ class BSpline(Curve[P]):
 
     _format = "symspline-bspline"
     _curve: ControlledCurve
-    _time_axis = TimeAxis()
 
     def __init__(self, knots: ArrayLike, control_points: ArrayLike, degree: int, space: Space[P] | str) -> None:
         space = _factor(space)
         degree = whole_number(degree, "degree", 1)
-        doubles, tol = _control_array(control_points, space, 2)
-        knots = _checked_knots(knots, space._lead(doubles)[-1], degree)
+        doubles, tol = control_array(control_points, space, 2)
+        knots = checked_knots(knots, space._lead(doubles)[-1], degree)
         *batch, count = space._lead(doubles)
         data = unwrapped(space, Points(doubles, tol, tuple(batch), count))
-        self._fill(space, knots, _checked_points(space, data.numbers, tol), degree)
+        self._fill(ControlledCurve(space, knots, checked_points(space, data.numbers, tol), degree))
         warn_of_far_data(space, [data])
 
-    def __call__(self, x: ArrayLike, nu: int = 0) -> P:
-        """Evaluate the curve or its derivatives.
-
-        Parameters
-        ----------
-        x : array_like
-            Times between ``knots[degree]`` and ``knots[-degree - 1]``, of any shape and in any order.
-        nu : {0, 1, 2}, default 0
-            Order of the derivative: 0 for points, 1 for the velocity, 2 for the covariant acceleration.
-
-        Returns
-        -------
-        ndarray, shape ``(*batch axes, *x.shape, *point_shape)``
-            Points or tangent vectors.
-
-        Raises
-        ------
-        ValidationError
-            If a time is not finite or lies outside the domain of the curve.
-        """
-        values: P = self._curve.evaluate(self._core_times(x)[0], quantity_of(nu))
-        return values
-
-    def speed(self, x: ArrayLike) -> FloatArray:
-        """Compute the speed of the curve.
-
-        Parameters
-        ----------
-        x : array_like
-            Times in the domain of the curve, of any shape and in any order.
-
-        Returns
-        -------
-        ndarray, shape ``(*batch axes, *x.shape)``
-            The norm of the velocity.
-
-        Raises
-        ------
-        ValidationError
-            If a time is not finite or lies outside the domain of the curve.
-
-        Examples
-        --------
-        >>> import symspline as ss
-        >>> line = ss.BSpline([0, 0, 2, 2], [[0.0], [3.0]], 1, "r:1")
-        >>> line.speed([0.5, 1.0])
-        array([1.5, 1.5])
-        """
-        speeds: FloatArray = self._curve.evaluate(self._core_times(x)[0], "speed")[()]
-        return speeds
-
-    def _core_times(self, x: Any, name: str = "x", per_curve: bool = False) -> tuple[Doubles, bool]:
-        times = as_array(x, name)
-        if times.dtype.kind not in "biuf":
-            raise ValidationError(f"{name} must be real numbers, not {times.dtype}")
-        batch = self._batch
-        if per_curve and times.shape[: len(batch)] != batch:
-            raise ValidationError(
-                f"with per_curve=True the shape of {name} must begin with the batch axes {batch}; got {times.shape}"
-            )
-        start, end = self.domain
-        times, _ = onto_ends(cast(times), np.array([start, end]), (), False, times.dtype)
-        outside = ~((times >= start) & (times <= end))
-
-        def say(i: Any) -> str:
-            where = f"outside the domain [{start}, {end}] of the curve" if np.isfinite(times[i]) else "not finite"
-            return f"= {times[i]} is {where}"
-
-        refuse(outside, name, say)
-        return times, per_curve
-
-    def _shown_times(self, x: Doubles) -> Doubles:
-        return x
-
-    @property
-    def domain(self) -> tuple[float, float]:
-        """First and last time of the curve."""
-        return float(self.knots[self.degree]), float(self.knots[-self.degree - 1])
-
-    @property
-    def knots(self) -> Doubles:
-        """Knots, shape (n + degree + 1,)."""
-        return self._curve.knots
-
-    @property
-    def control_points(self) -> P:
-        """Control points, shape (..., n, *point_shape)."""
-        points: P = self._curve.control_points
-        return points
-
-    @property
-    def degree(self) -> int:
-        """Degree of the curve."""
-        return self._curve.degree
-
-    @property
-    def space(self) -> Space[P]:
-        """Space of the curve."""
-        return self._curve.space
-
     def _picked(self, index: Any) -> Self:
-        return self._of(self.space, self.knots, np.ascontiguousarray(self.control_points[index]), self.degree)
-
-    def _fill(self, *parts: Any) -> None:
-        self._curve = ControlledCurve(*parts)
+        control = np.ascontiguousarray(self.control_points[index])
+        return self._of(ControlledCurve(self.space, self.knots, control, self.degree))
 
     def _state(self) -> dict[str, Any]:
         head = {"format": self._format, "version": VERSION, "space": self.space}
@@ -214,82 +104,12 @@ class BSpline(Curve[P]):
         if isinstance(state, Stored):
             with entry("control_points"):
                 # They keep the values that they had after projection.
-                _checked_points(space, *_control_array(control, space, 2))
+                checked_points(space, *control_array(control, space, 2))
             with entry("degree"):
                 degree = whole_number(degree, "degree", 1)
             with entry("knots"):
-                knots = _checked_knots(knots, space._lead(space._doubles(control, "control_points"))[-1], degree)
-        return cls._of(space, knots, control, degree)
-
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, BSpline):
-            return NotImplemented
-        return (
-            self.space == other.space
-            and self.degree == other.degree
-            and np.array_equal(self.knots, other.knots)
-            and np.array_equal(self.control_points, other.control_points)
-        )
-
-    def __repr__(self) -> str:
-        count = self._curve.control_points.shape[-1 - len(self.space.point_shape)]
-        what = f"{self._batch_text}{count} control points, degree {self.degree}"
-        return f"<{type(self).__name__} on {self.space!r}: {what}>"
-
-
-class ControlledCurve:
-    """Knots, control points and degree of B-spline curves, and evaluation in the core.
-
-    Attributes
-    ----------
-    times : ndarray
-        The distinct knots of the domain, between which the curve is smooth.
-    """
-
-    quad_rtol = EXACT
-    max_nu = 2
-
-    def __init__(self, space: Space[Any], knots: Doubles, control_points: Any, degree: int) -> None:
-        self.space, self.knots, self.control_points, self.degree = space, knots, control_points, degree
-        self.times = np.unique(knots[degree : knots.size - degree])
-        control_points.flags.writeable = knots.flags.writeable = False
-
-    @property
-    def batch(self) -> tuple[int, ...]:
-        shape: tuple[int, ...] = self.control_points.shape
-        return shape[: len(shape) - len(self.space.point_shape) - 1]
-
-    @property
-    def parts(self) -> tuple[ControlledCurve]:
-        """The curve itself."""
-        return (self,)
-
-    def evaluate(
-        self,
-        x: Doubles,
-        quantity: str,
-        outside: str = "raise",
-        per_curve: bool = False,
-        progress: Progress | None = None,
-    ) -> Any:
-        """A quantity at times in the domain; with ``per_curve`` the leading axes of x are the batch axes."""
-        if per_curve:
-            batch = self.batch
-            rows = x.reshape(-1, *x.shape[len(batch) :])
-            if not (rows == rows[0]).all():
-                # The core evaluates all curves of a batch at the same times.
-                control = self.control_points.reshape(-1, *self.control_points.shape[len(batch) :])
-                each = [
-                    ControlledCurve(self.space, self.knots, own, self.degree).evaluate(row, quantity)
-                    for own, row in zip(control, np.ascontiguousarray(rows), strict=True)
-                ]
-                return np.reshape(each, (*batch, *each[0].shape))
-            x = np.ascontiguousarray(rows[0])
-        space, control, span = reduced(self.space, self.control_points)
-        values = _core.evaluate_bspline(space._handle, self.knots, space._as_doubles(control), self.degree, x, quantity)
-        if quantity in NORMS:
-            return values
-        return space._numbers(values) if span is None else span.embed_samples(space._numbers(values), self.batch)
+                knots = checked_knots(knots, space._lead(space._doubles(control, "control_points"))[-1], degree)
+        return cls._of(ControlledCurve(space, knots, control, degree))
 
 
 class BezierCurve(BSpline[P]):
@@ -343,7 +163,7 @@ class BezierCurve(BSpline[P]):
 
     def __init__(self, control_points: ArrayLike, space: Space[P] | str) -> None:
         space = _factor(space)
-        count = space._lead(_control_array(control_points, space, 2)[0])[-1]
+        count = space._lead(control_array(control_points, space, 2)[0])[-1]
         super().__init__([0.0] * count + [1.0] * count, control_points, count - 1, space)
 
     @classmethod
@@ -364,72 +184,3 @@ def _factor(space: Space[P] | str) -> Space[P]:
         )
     refuse_functions(space, "B-spline and Bézier curves are not made")
     return space
-
-
-def _control_array(value: ArrayLike, space: Space[Any], least: int) -> tuple[Doubles, float]:
-    """Return control points as floating-point numbers of the core, and their tolerance."""
-    array = space._array(value, "control_points")
-    doubles = space._doubles(array, "control_points") if array.ndim > len(space.point_shape) else None
-    if doubles is None or array.size == 0 or space._lead(doubles)[-1] < least:
-        shape = ", ".join(map(str, space.point_shape))
-        raise ValidationError(
-            f"control_points has shape {array.shape}; a curve needs shape (..., n, {shape}) with n >= {least}"
-        )
-    return doubles, point_tol(array.dtype)
-
-
-def _checked_points(space: Space[Any], doubles: Doubles, tol: float) -> Array:
-    """Project control points onto the space.
-
-    Raises
-    ------
-    ValidationError
-        If a control point is not on the space.
-    CutLocusError
-        If two neighbouring control points are not joined by a unique shortest geodesic.
-    """
-    *batch, count = space._lead(doubles)
-    data, ends = Points(doubles, tol, tuple(batch), count), ends_of("natural", space, tuple(batch))
-    try:
-        (points,), _ = validated(space, np.arange(count, dtype=np.float64), [data], [ends])
-    except ValidationError as error:
-        raise ValidationError(str(error).replace("points[", "control_points[")) from None
-    p, q = space._neighbours(points)
-    try:
-        space._apply("log", p=p, q=q)
-    except CutLocusError as error:
-        row, _, why = str(error).removeprefix("pair ").partition(": the points ")
-        *curve, i = map(int, np.unravel_index(int(row), (*batch, count - 1)))
-        raise CutLocusError(f"control_points[{i}] and control_points[{i + 1}]{of_index(curve)} {why}") from None
-    return points
-
-
-def _checked_knots(knots: ArrayLike, count: int, degree: int) -> Doubles:
-    """Return a copy of the knots of a B-spline with `count` control points after validation."""
-    array = as_array(knots, "knots")
-    if array.ndim != 1 or array.dtype.kind not in "biuf":
-        raise ValidationError(
-            f"knots must be a one-dimensional array of real numbers, not {array.dtype} of shape {array.shape}"
-        )
-    needed = count + degree + 1
-    if count <= degree:
-        raise ValidationError(f"degree {degree} needs at least {degree + 1} control points, got {count}")
-    if array.size != needed:
-        raise ValidationError(f"{count} control points of degree {degree} need {needed} knots, got {array.size}")
-    result = cast(array.copy())
-    refuse(~np.isfinite(result), "knots", lambda _: "is not finite")
-    falls = np.flatnonzero(result[1:] < result[:-1])
-    if falls.size:
-        raise ValidationError(f"knots[{falls[0] + 1}] = {result[falls[0] + 1]} is before knots[{falls[0]}]")
-    if not np.isfinite(float(result[-1]) - float(result[0])):
-        raise ValidationError("knots span more than the floating-point range")
-    times, repeats = np.unique(result, return_counts=True)
-    if repeats.max() > degree + 1:
-        most = np.argmax(repeats)
-        raise ValidationError(
-            f"knots repeat {times[most]} {repeats[most]} times; with degree {degree} a knot may repeat at most "
-            f"{degree + 1} times"
-        )
-    if not result[degree] < result[count]:
-        raise ValidationError(f"the domain of the curve is empty: knots[{degree}] and knots[{count}] are equal")
-    return result

@@ -97,8 +97,25 @@ def transport(
 ) -> _Doubles: ...
 def lift_knots(handle: Handle, t: _Doubles, points: _Doubles, velocities: _Doubles) -> _Doubles: ...
 def evaluate_bspline(
-    handle: Handle, knots: _Doubles, control: _Doubles, degree: int, x: _Doubles, quantity: str
+    handle: Handle,
+    knots: _Doubles,
+    control: _Doubles,
+    degree: int,
+    x: _Doubles,
+    quantity: str,
+    steps: _Doubles | None = None,
 ) -> _Doubles: ...
+def cumulative_steps(handle: Handle, control: _Doubles) -> _Doubles: ...
+def fit_cumulative(
+    handle: Handle,
+    knots: _Doubles,
+    degree: int,
+    t: _Doubles,
+    points: _Doubles,
+    weights: _Doubles,
+    tol: float,
+    max_iter: int,
+) -> tuple[_Doubles, list[bool], list[int], list[float], list[float]]: ...
 def push(handle: Handle, curves: object, points: _Doubles, knots: _Doubles, ends: list[_Doubles]) -> _Doubles: ...
 def pull(handle: Handle, curves: object, cotangent: _Doubles) -> tuple[_Doubles, _Doubles, _Doubles, _Doubles]: ...
 def smooth(

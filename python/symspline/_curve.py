@@ -102,8 +102,9 @@ class Derivative(Generic[P]):
 class Curve(CurveBase[P]):
     """A curve on a space, or a batch of curves.
 
-    This is the base class of `CubicSpline`, `HermiteSpline`, `PiecewiseGeodesic`, `SmoothingSpline`, `BSpline` and
-    `BezierCurve`. Call a curve to evaluate it or its derivatives. A batch is a sequence of curves.
+    This is the base class of `CubicSpline`, `HermiteSpline`, `PiecewiseGeodesic`, `SmoothingSpline`, `BSpline`,
+    `BezierCurve` and `CumulativeBSpline`. Call a curve to evaluate it or its derivatives. A batch is a sequence of
+    curves.
 
     Examples
     --------

@@ -327,3 +327,43 @@ def _count(value: Any) -> Any:
 
 def _skipped(bits: int) -> tuple[str, ...]:
     return tuple(name for i, name in enumerate(SOLVERS) if bits >> i & 1) if bits else ()
+
+
+@dataclass(frozen=True)
+class CumulativeReport:
+    """Report of a least-squares fit of a `CumulativeBSpline`.
+
+    For a batch of curves, every field is an array with the batch axes.
+
+    Attributes
+    ----------
+    converged : bool or ndarray of bool
+        Whether the last step was below the tolerance, or at the level of rounding errors.
+    iterations : int or ndarray of int
+        Number of Gauss–Newton steps. For a product, the largest number of its factors.
+    step : float or ndarray
+        Last step of a control point, relative to the longest step between control points.
+    residual_sum : float or ndarray
+        Weighted sum of the squared distances between the curve and the data.
+
+    See Also
+    --------
+    CumulativeBSpline.fit : Fit a cumulative B-spline by least squares.
+
+    Examples
+    --------
+    >>> import symspline as ss
+    >>> curve = ss.CumulativeBSpline.fit(None, [[0.0], [1.0], [4.0], [9.0], [16.0]], 2, "r:1")
+    >>> curve.report.converged, round(curve.report.residual_sum, 12)
+    (True, 0.0)
+    """
+
+    converged: bool | NDArray[np.bool_] = field(metadata=BOOL)
+    iterations: int | NDArray[np.int64] = field(metadata=INT)
+    step: Number = field(metadata=FLOAT)
+    residual_sum: Number = field(metadata=FLOAT)
+
+    def _picked(self, index: Any) -> CumulativeReport:
+        """Return the report of one curve, or of a slice of the batch."""
+        picked = {name: np.asarray(value)[index] for name, value in vars(self).items()}
+        return replace(self, **{name: x if x.ndim else x.item() for name, x in picked.items()})

@@ -44,10 +44,9 @@ from ._pose_files import (
 )
 from ._smoothing.factors import smoothed_spaces
 from ._spaces import Array, Euclidean, SpecialEuclidean, SpecialOrthogonal, cover_of
-from ._timed_curve import check_timed
 from ._typing import Extrapolate, Frame, TimesLike
 from ._validation import one_of, real_numbers
-from .rotations import Spline, attitude, rate_jacobians, rotation_of, turned
+from .rotations import Spline, attitude, check_motion, rate_jacobians, rotation_of, turned
 from .rotations import velocities as rotation_velocities
 
 if TYPE_CHECKING:
@@ -136,7 +135,7 @@ def imu(
 
     Parameters
     ----------
-    spline : CubicSpline or HermiteSpline
+    spline : CubicSpline, HermiteSpline or CumulativeBSpline
         Curve on ``se:3``, or on a product with one ``so:3`` and one ``r:3``.
     x : array_like
         Times.
@@ -202,7 +201,7 @@ def imu(
     >>> bool(np.all(std.gyro < 0.05)), bool(np.all(std.specific_force < 0.5))
     (True, True)
     """
-    check_timed(spline)
+    check_motion(spline)
     g = as_array(gravity, "gravity")
     if g.shape != (3,) or g.dtype.kind not in "iuf" or not np.isfinite(g).all():
         raise ValidationError(f"gravity must be three numbers, a vector in the world, not {short_repr(gravity)}")
@@ -239,7 +238,7 @@ def twist(
 
     Parameters
     ----------
-    spline : CubicSpline or HermiteSpline
+    spline : CubicSpline, HermiteSpline or CumulativeBSpline
         Curve on ``se:3``, or on a product with one ``so:3`` and one ``r:3``.
     x : array_like
         Times.
@@ -408,7 +407,7 @@ def linear_velocity(
 
     Parameters
     ----------
-    spline : CubicSpline or HermiteSpline
+    spline : CubicSpline, HermiteSpline or CumulativeBSpline
         Curve on ``se:3``, or on a product with one ``so:3`` and one ``r:3``.
     x : array_like
         Times.
@@ -446,7 +445,7 @@ def linear_acceleration(
 
     Parameters
     ----------
-    spline : CubicSpline or HermiteSpline
+    spline : CubicSpline, HermiteSpline or CumulativeBSpline
         Curve on ``se:3``, or on a product with one ``so:3`` and one ``r:3``.
     x : array_like
         Times.
@@ -479,7 +478,8 @@ class _Motion:
     def __init__(self, spline: Spline, x: TimesLike, frame: str, extrapolate: Any, per_curve: bool) -> None:
         self._in_body = one_of(frame, "frame", "body", "world") == "body"
         self._attitude = attitude(spline)
-        found = [part for part in spline._curve.parts if cover_of(part.space) in (_SE3, _R3)]
+        parts: Any = spline._curve.parts
+        found = [part for part in parts if cover_of(part.space) in (_SE3, _R3)]
         if len(found) != 1:
             raise ValidationError(
                 f"the curve must be on se:3, or on a product with one so:3 and one r:3, not on {spline.space}"

@@ -25,8 +25,10 @@ from numpy.typing import ArrayLike
 from ._arrays import checked_flag, refuse, short_repr
 from ._core import ValidationError
 from ._cubic import CubicSpline
+from ._cumulative import CumulativeBSpline
 from ._curves.at_times import evaluated
 from ._curves.composed import Joined, Retimed
+from ._curves.controlled import CumulativeCurve
 from ._curves.curve import CurveArrays
 from ._curves.fit import curve_of
 from ._estimation.along import Motion
@@ -64,7 +66,7 @@ __all__ = [
     "velocities",
 ]
 
-Spline = CubicSpline[Any, Any] | HermiteSpline[Any]
+Spline = CubicSpline[Any, Any] | HermiteSpline[Any] | CumulativeBSpline[Any]
 
 _SO3, _SE3, _S3 = SpecialOrthogonal(3), SpecialEuclidean(3), Sphere(3)
 _SIX = ("columns", "rows", "interleaved")
@@ -88,7 +90,7 @@ def rotation(spline: Spline, x: TimesLike, *, extrapolate: Extrapolate = None, p
 
     Parameters
     ----------
-    spline : CubicSpline or HermiteSpline
+    spline : CubicSpline, HermiteSpline or CumulativeBSpline
         Curve on ``so:3``, ``se:3``, or a product with one of them.
     x : array_like
         Times.
@@ -171,7 +173,7 @@ def angular_velocity(
 
     Parameters
     ----------
-    spline : CubicSpline or HermiteSpline
+    spline : CubicSpline, HermiteSpline or CumulativeBSpline
         Curve on ``so:3``, ``se:3``, or a product with one of them.
     x : array_like
         Times.
@@ -257,7 +259,7 @@ def angular_acceleration(
 
     Parameters
     ----------
-    spline : CubicSpline or HermiteSpline
+    spline : CubicSpline, HermiteSpline or CumulativeBSpline
         Curve on ``so:3``, ``se:3``, or a product with one of them.
     x : array_like
         Times.
@@ -377,6 +379,12 @@ def velocities(rotations: ArrayLike | Rotation, rates: ArrayLike, frame: Frame =
     return (r @ hat if frame == "body" else hat @ r) + 0.0
 
 
+def check_motion(spline: Any) -> None:
+    """Raise TypeError unless an argument is a curve whose rates can be computed."""
+    if not isinstance(spline, CumulativeBSpline):
+        check_timed(spline)
+
+
 def attitude(spline: Spline) -> Any:
     """Return the curve of the rotations alone, on SO(3).
 
@@ -385,7 +393,7 @@ def attitude(spline: Spline) -> Any:
     ValidationError
         If the curve does not contain exactly one rotation.
     """
-    check_timed(spline)
+    check_motion(spline)
     found = [part for part in spline._curve.parts if cover_of(part.space) in (_SO3, _SE3)]
     if len(found) != 1:
         raise ValidationError(
@@ -401,6 +409,8 @@ def _rotations_of(curve: Any) -> Any:
         return curve
     if isinstance(curve, (Joined, Retimed)):
         return curve.map(_rotations_of)
+    if isinstance(curve, CumulativeCurve):
+        return curve.with_control_points(_SO3, curve.control_points[..., :3, :3])
     if curve not in _ATTITUDES:
         # The rotation of a screw motion is a geodesic of SO(3), and so the control points are those of its curve.
         parts = [np.ascontiguousarray(array[..., :3, :3]) for array in (curve.points, curve.velocities)]
@@ -448,6 +458,11 @@ def _lift(curve: Any) -> Any:
         return curve.map(_lift)
     if isinstance(curve, Joined):
         return _without_jumps(curve.map(_lift))
+    if isinstance(curve, CumulativeCurve):
+        raise TypeError(
+            "spline must be a curve of cubic segments, such as a symspline.CubicSpline, not a cumulative B-spline. Use "
+            "rotations.as_quaternions of its points; their signs are not continuous."
+        )
     if curve not in _LIFTS:
         q = matrix_to_quaternion(curve.points, scalar_first=True)
         # q' = ½ q (0, ω), and so half the velocity of the rotation in the frame that q makes.

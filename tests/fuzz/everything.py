@@ -50,6 +50,7 @@ def objects():
         "HermiteSpline": ss.HermiteSpline(T, P, np.zeros((3, 3)), "sphere:2"),
         "SmoothingSpline": ss.make_smoothing_spline(T, P, "sphere:2", 0.1),
         "BSpline": ss.BSpline([0, 0, 0, 1, 1, 1], P, 2, "sphere:2"),
+        "CumulativeBSpline": ss.CumulativeBSpline([0, 0, 0, 1, 1, 1], TURNS, "so:3", degree=2),
         "BezierCurve": ss.BezierCurve(P, "sphere:2"),
         "RetimedCurve": sphere.restrict(0.25, 0.75),
         "RetimedCurve of dates": ss.CubicSpline(DAYS, P, "sphere:2").restrict(

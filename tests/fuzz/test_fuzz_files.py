@@ -106,7 +106,7 @@ def test_files_with_other_arrays(data):
         elif array.ndim == 0:
             words = [
                 "symspline-curve", "symspline-hermite", "symspline-bspline", "symspline-smoothing",
-                "sphere:2", "s:2 x s:2", "r:1", "ns",
+                "symspline-cumulative", "sphere:2", "s:2 x s:2", "r:1", "ns",
                 "generic", "Y", "10s",
             ]  # fmt: skip
             arrays[key] = np.array(draw(st.one_of(st.sampled_from(words), st.text(max_size=9), st.integers(-2, 3))))

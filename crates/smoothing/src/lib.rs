@@ -17,6 +17,7 @@ mod banded;
 mod bordered;
 pub mod chi;
 mod choice;
+mod cumulative;
 mod curve_fit;
 mod cyclic;
 pub mod estimation;
@@ -38,6 +39,7 @@ mod smooth;
 mod start;
 mod variance;
 
+pub use cumulative::{Outcome, Samples, fit_cumulative};
 pub use observations::Observations;
 pub use path::{Position, positions};
 pub use problem::{

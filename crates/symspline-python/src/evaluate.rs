@@ -1,15 +1,15 @@
 //! Evaluation, called from Python.
 
 use crate::arrays::{in_order, unwritten, zeros};
-use crate::errors::{format_index, invalid, number};
+use crate::errors::{CutLocusError, format_index, invalid, number};
 use crate::space::Handle;
 use crate::validate::of_curve;
 use crate::watch::{Progress, is_heavy, watched};
 use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use symspline_engine::curve::{
-    BSpline, Curves, Outside, Quantity, Times, evaluate as run, evaluate_bspline as run_bspline,
-    lift as run_lift, lift_knots as find_knots, transport as run_transport,
+    BSpline, Curves, Outside, Quantity, Times, cumulative_steps as run_steps, evaluate as run,
+    evaluate_bspline as run_bspline, lift as run_lift, lift_knots as find_knots, transport as run_transport,
 };
 use symspline_engine::monitor::Monitor;
 use symspline_engine::space::{Ambient, Erased};
@@ -219,9 +219,10 @@ fn quantity_named(name: &str) -> PyResult<Quantity> {
     })
 }
 
-/// Evaluates B-spline curves at times inside their domain. The result has the batch axes, x.shape and the axes of a
-/// point (or none).
+/// Evaluates B-spline curves at times inside their domain; with `steps`, cumulative B-splines. The result has the batch
+/// axes, x.shape and the axes of a point (or none).
 #[pyfunction]
+#[pyo3(signature = (handle, knots, control, degree, x, quantity, steps=None))]
 pub fn evaluate_bspline<'py>(
     py: Python<'py>,
     handle: &Handle,
@@ -230,14 +231,18 @@ pub fn evaluate_bspline<'py>(
     degree: usize,
     x: Array<'py>,
     quantity: &str,
+    steps: Option<Array<'py>>,
 ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
     let quantity = quantity_named(quantity)?;
     let axes = control.ndim() - handle.point_axes();
     let mut shape = [&control.shape()[..axes - 1], x.shape()].concat();
-    if !quantity.is_length() {
+    if quantity.is_of_body() {
+        shape.push(quantity.len(&handle.space.get()));
+    } else if !quantity.is_length() {
         shape.extend_from_slice(&control.shape()[axes..]);
     }
-    let curve = BSpline { knots: in_order(&knots)?, control: in_order(&control)?, degree };
+    let steps = steps.as_ref().map_or(Ok(&[][..]), in_order)?;
+    let curve = BSpline { knots: in_order(&knots)?, control: in_order(&control)?, degree, steps };
     let out = zeros(py, &shape)?;
     let mut write = out.readwrite();
     let (x, result) = (in_order(&x)?, write.as_slice_mut()?);
@@ -245,6 +250,34 @@ pub fn evaluate_bspline<'py>(
         run_bspline(&handle.space.get(), &curve, x, quantity, monitor, result);
     })?;
     drop(write);
+    Ok(out)
+}
+
+/// The steps of cumulative B-splines, for control points of shape (..., n, point).
+#[pyfunction]
+pub fn cumulative_steps<'py>(
+    py: Python<'py>,
+    handle: &Handle,
+    control: Array<'py>,
+) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+    let axes = control.ndim() - handle.point_axes();
+    let mut shape = control.shape().to_vec();
+    let count = shape[axes - 1];
+    shape[axes - 1] = count - 1;
+    let out = zeros(py, &shape)?;
+    let mut write = out.readwrite();
+    let (control, result) = (in_order(&control)?, write.as_slice_mut()?);
+    let done = watched(py, None, result.len(), is_heavy(&handle.space.get()), |_| {
+        run_steps(&handle.space.get(), control, count, result)
+    })?;
+    drop(write);
+    done.map_err(|(row, angle)| {
+        let limit = handle.space.get().cut_angle();
+        CutLocusError::new_err(format!(
+            "pair {row}: the points lie at or past each other's cut locus: angle {angle}, limit {limit}; \
+             the geodesic between them is not unique"
+        ))
+    })?;
     Ok(out)
 }
 

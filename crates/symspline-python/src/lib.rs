@@ -69,10 +69,12 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(derivative::pull, m)?)?;
     m.add_function(wrap_pyfunction!(evaluate::evaluate, m)?)?;
     m.add_function(wrap_pyfunction!(evaluate::evaluate_bspline, m)?)?;
+    m.add_function(wrap_pyfunction!(evaluate::cumulative_steps, m)?)?;
     m.add_function(wrap_pyfunction!(evaluate::lift, m)?)?;
     m.add_function(wrap_pyfunction!(evaluate::transport, m)?)?;
     m.add_function(wrap_pyfunction!(evaluate::lift_knots, m)?)?;
     m.add_function(wrap_pyfunction!(smoothing::smooth, m)?)?;
+    m.add_function(wrap_pyfunction!(smoothing::fit_cumulative, m)?)?;
     m.add_function(wrap_pyfunction!(smoothing::smoothing_variance, m)?)?;
     m.add_function(wrap_pyfunction!(smoothing::chi_squared, m)?)?;
     m.add_function(wrap_pyfunction!(estimation::frames_along, m)?)?;

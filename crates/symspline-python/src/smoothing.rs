@@ -2,16 +2,18 @@
 
 use crate::arrays::{in_order, reserve, zeros};
 use crate::curves::EndOf;
-use crate::errors::invalid;
+use crate::errors::{CutLocusError, invalid, number};
 use crate::estimation::{criterion_named, ends_named, penalty_named};
 use crate::space::Handle;
+use crate::validate::of_curve;
 use crate::watch::{Progress, is_heavy, watched};
 use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyListMethods, PyTuple, PyTupleMethods};
+use symspline_engine::parallel;
 use symspline_engine::smoothing::{
-    Data, Loss, Observations, Options, Report, Smooth, State, Tier, chi, smooth as run,
-    variance as variance_at,
+    Data, Loss, Observations, Options, Outcome, Report, Samples, Smooth, State, Tier, chi,
+    fit_cumulative as fit, smooth as run, variance as variance_at,
 };
 use symspline_engine::space::{Ambient, Origin};
 
@@ -233,4 +235,84 @@ pub fn smoothing_variance<'py>(
 #[pyfunction]
 pub fn chi_squared(m: usize, probability: f64) -> f64 {
     chi::quantile(m, probability)
+}
+
+/// Control points, and of each curve whether it converged, its iterations, the last step, and the sum of squares.
+type Fitted<'py> = (Bound<'py, PyArrayDyn<f64>>, Vec<bool>, Vec<usize>, Vec<f64>, Vec<f64>);
+
+/// Fits cumulative B-splines to points (..., N, point) by least squares; `weights` has one row per curve.
+#[pyfunction]
+pub fn fit_cumulative<'py>(
+    py: Python<'py>,
+    handle: &Handle,
+    knots: Array<'py>,
+    degree: usize,
+    t: Array<'py>,
+    points: Array<'py>,
+    weights: Array<'py>,
+    tol: f64,
+    max_iter: usize,
+) -> PyResult<Fitted<'py>> {
+    let axes = points.ndim() - handle.point_axes() - 1;
+    let (batch, row) = (&points.shape()[..axes], &points.shape()[axes + 1..]);
+    let (knots, t) = (in_order(&knots)?, in_order(&t)?);
+    let (points, weights) = (in_order(&points)?, in_order(&weights)?);
+    let (curves, count, size) =
+        (batch.iter().product::<usize>(), knots.len() - degree - 1, row.iter().product::<usize>());
+    let samples = |c: usize| Samples {
+        knots,
+        degree,
+        t,
+        points: &points[c * t.len() * size..][..t.len() * size],
+        weights: &weights[c * t.len()..][..t.len()],
+    };
+    for c in 0..curves {
+        if let Some(j) = samples(c).undetermined() {
+            let (start, end) = (knots[j], knots[j + degree + 1]);
+            return Err(invalid(format!(
+                "knots: control point {j}{} acts on times from {} to {}, where too few data determine it. Use fewer \
+                 knots there, or add data",
+                of_curve(c, batch),
+                number(start),
+                number(end)
+            )));
+        }
+    }
+    let space = handle.space.get();
+    let out = zeros(py, &[batch, &[count], row].concat())?;
+    let mut write = out.readwrite();
+    let result = write.as_slice_mut()?;
+    let outcomes = watched(py, None, curves, is_heavy(&space), |monitor| {
+        let mut found: Vec<Option<Result<Outcome, usize>>> = vec![None; curves];
+        let items = result.chunks_mut((count * size).max(1)).zip(&mut found).enumerate().collect();
+        parallel::for_each(items, curves > 1, monitor, |(c, (out, found))| {
+            let fitted = fit(&space, &samples(c), tol, max_iter, monitor);
+            *found = Some(fitted.map(|(control, outcome)| {
+                out.copy_from_slice(&control);
+                outcome
+            }));
+        });
+        found
+    })?;
+    drop(write);
+    let mut columns = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    for (c, outcome) in outcomes.into_iter().enumerate() {
+        let outcome = match outcome {
+            Some(Ok(outcome)) => outcome,
+            Some(Err(pair)) => {
+                return Err(CutLocusError::new_err(format!(
+                    "knots: the data near control points {pair} and {}{} are not joined by a unique shortest \
+                     geodesic. Use more knots there, or check the data",
+                    pair + 1,
+                    of_curve(c, batch)
+                )));
+            }
+            None => continue,
+        };
+        columns.0.push(outcome.converged);
+        columns.1.push(outcome.iterations);
+        columns.2.push(outcome.step);
+        columns.3.push(outcome.cost);
+    }
+    Ok((out, columns.0, columns.1, columns.2, columns.3))
 }

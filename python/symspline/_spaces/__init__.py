@@ -2,6 +2,7 @@
 # mypy: implicit-reexport
 """The spaces: points, tangent vectors and their geometry."""
 
+from .actions import Group
 from .base import POINT_TOL, POINT_TOL_FLOAT32, Array, Doubles, Space, point_tol
 from .groups import (
     Affine,

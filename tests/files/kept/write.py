@@ -41,6 +41,8 @@ def curves():
         "smoothing": smooth,
         "estimate": ss.estimate(MEASURED, 5, "so:3", lam=0.1),
         "bspline": ss.BSpline([0, 0, 0, 1, 2, 2, 2], [*P, P[0]], 2, "sphere:2"),
+        "cumulative": ss.CumulativeBSpline.fit(range(6), TURNS, 2, "so:3"),
+        "cumulative_product": ss.CumulativeBSpline(None, (TURNS[:5], np.arange(15.0).reshape(5, 3)), "so:3 x r:3"),
         "bezier": ss.BezierCurve([P, P[::-1]], "sphere:2"),
         "grid": ss.GridSpline(
             (DATES, None), TURNS[None] @ TURNS[[0, 2, 1], None], "so:3", bc_type=("natural", "clamped")
@@ -74,7 +76,7 @@ def values(found):
     for nu in range(3):
         factors = found(start + (end - start) // 2, nu)
         numbers[f"nu={nu}"] = [plain(part) for part in (factors if isinstance(factors, tuple) else [factors])]
-    if hasattr(found, "report"):
+    if getattr(found, "report", None) is not None:
         numbers["converged"] = plain(found.report.converged)
         numbers["iterations"] = plain(found.report.iterations)
     if hasattr(found, "std"):

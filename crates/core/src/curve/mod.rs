@@ -3,6 +3,7 @@
 mod bezier;
 mod bspline;
 mod collocation;
+mod cumulative;
 pub(crate) mod data;
 mod evaluate;
 #[cfg(feature = "dense")]
@@ -13,6 +14,7 @@ mod transport;
 
 pub use bezier::Segment;
 pub use bspline::{BSpline, evaluate_bspline};
+pub use cumulative::{Coordinates, Multiplication, cumulative_basis, cumulative_steps};
 pub use data::{Curves, Job, Outside, Quantity, Times};
 pub use evaluate::evaluate;
 #[cfg(feature = "dense")]
