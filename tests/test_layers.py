@@ -47,6 +47,7 @@ LAYERS = [
         "_smoothing",
         "_time_law",
         "_tracks",
+        "_statistics",
         "convert",
         "jax",
         "torch",

@@ -78,6 +78,7 @@ from ._spaces import (  # noqa: E402
     Unitary,
     space,
 )
+from ._statistics import TangentPCA, tangent_pca  # noqa: E402
 from ._threads import set_num_threads  # noqa: E402
 from ._time_law import TimeLaw, time_law  # noqa: E402
 from ._version import VERSION  # noqa: E402
@@ -143,6 +144,7 @@ __all__ = [
     "Symplectic",
     "SymsplineError",
     "TimeLaw",
+    "TangentPCA",
     "Unitary",
     "ValidationError",
     "convert",
@@ -168,6 +170,7 @@ __all__ = [
     "show_config",
     "space",
     "subspaces",
+    "tangent_pca",
     "tensors",
     "testing",
     "time_law",

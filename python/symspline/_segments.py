@@ -18,14 +18,10 @@ from ._input import times_of
 from ._smoothing import SmoothingReport, SmoothingSpline
 from ._smoothing.many import smooth_many
 from ._smoothing.precision import read_precision
-from ._spaces import Array, Product, Space, SpecialEuclidean, factors_of, parts_of, space_named
+from ._spaces import Array, Groups, Product, Space, SpecialEuclidean, factors_of, karcher_mean, parts_of, space_named
 from ._time import Moments, time_axis_of
 from ._typing import Duplicates, FitOptions, FloatArray, P, PointsLike, PProduct, SmoothingOptions, TimesLike
 from ._validation import one_of
-
-# Limit of the iteration for a Karcher mean. Each step reduces the error by about the square of the distance between
-# the points, so a few steps are enough for points close together.
-_STEPS = 50
 
 
 class CutOptions(TypedDict, total=False):
@@ -317,28 +313,14 @@ def _at_once(space: Space, points: Array, starts: NDArray[np.intp], duplicates: 
     ----------
     starts : ndarray of int
         Index of the first point of every time.
-
-    References
-    ----------
-    H. Karcher, Riemannian center of mass and mollifier smoothing, Comm. Pure Appl. Math. 30 (1977).
     """
     kept = points[starts]
     if duplicates == "first":
         return kept
     counts = np.diff(np.append(starts, len(points)))
     several = counts > 1
-    points = space.project(points[np.repeat(several, counts)])
-    counts = counts[several]
-    starts = np.cumsum(counts) - counts
-    means: Array = points[starts]
-    floor = 8 * np.finfo(np.float64).eps * space._rounding(means)
-    sizes = counts.reshape(-1, *[1] * len(space.point_shape))
-    for _ in range(_STEPS):
-        logs = space.log(np.repeat(means, counts, axis=0), points)
-        step = np.add.reduceat(logs, starts, axis=0) / sizes
-        means = space.exp(means, step)
-        if (space.norm(means, step) <= floor).all():
-            break
+    rows = space.project(points[np.repeat(several, counts)])
+    means = karcher_mean(space, Groups(rows, counts[several], np.ones(len(rows))))
     kept = kept.astype(kept.dtype if kept.dtype.kind in "fc" else np.float64)
     kept[several] = means
     return kept

@@ -49,6 +49,7 @@ from .data import (
     with_enough_knots,
 )
 from .factors import grouped, is_several, join, parts_of_factor, smoothed_spaces, split_ends
+from .regression import check_infinite, geodesic_knots, geodesic_options, is_infinite, with_infinite_lam
 from .report import SmoothingReport
 from .solve import NO_CURVE, SolverOptions, one_per_curve, smoothed
 from .spline import SmoothingSpline
@@ -130,8 +131,9 @@ def make_smoothing_spline(
         the smoothed poses.
     lam : float, array_like or tuple, optional
         Weight λ ≥ 0 of the penalty, in units of weight · time³, or weight · time⁵ for the jerk. With 0 the curve is as
-        close to the data as its knots allow; large values give a geodesic. For a batch also an array with one value per
-        curve; for products and poses also a tuple with one entry per part. By default `criterion` chooses λ.
+        close to the data as its knots allow; ``numpy.inf`` gives a geodesic, see Notes. For a batch also an array with
+        one value per curve; for products and poses also a tuple with one entry per part. By default `criterion`
+        chooses λ.
     weights : array_like or tuple, optional
         Weights ≥ 0 of the data, shape (N,) or (..., N): the inverse variances of their noise up to a common factor.
         Points of weight 0 are ignored and may be NaN. Alternatively information matrices W, shape (N, m, m) or (...,
@@ -225,8 +227,16 @@ def make_smoothing_spline(
     sum over the segments of differences of the accelerations at the knots. For information matrices,
     :math:`e_j^T W_j e_j` replaces :math:`w_j d^2`, where :math:`e_j` are the coordinates of ``space.log(y, γ(t))``.
 
+    With ``lam=numpy.inf`` the curve is the geodesic with the least sum of squared distances, the least-squares line of
+    geodesic regression (Fletcher 2013). It has two knots, or more if it is so long that its ends do not determine it.
+    Ends are natural and the penalty is the acceleration. Poses of `SpecialEuclidean` are regressed as rotations and
+    positions, so that the curve passes through poses on a geodesic of ``"so:3 x r:3"`` at the times of the data.
+
     References
     ----------
+    P. T. Fletcher, Geodesic regression and the theory of least squares on Riemannian manifolds, Int. J. Comput. Vis.
+    105 (2013).
+
     P. Craven, G. Wahba, Smoothing noisy data with spline functions, Numer. Math. 31 (1979).
 
     C. Gu, Smoothing Spline ANOVA Models, 2nd ed., Springer (2013), Section 3.2.
@@ -260,7 +270,9 @@ def make_smoothing_spline(
     options = SolverOptions(criterion, gamma, penalty, loss, method, tol, most, False)
     whole, data, of_factors = read_noisy(t, points, space, weights, frames, bc_type, atol)
     batch = whole.batch
-    lams, sigmas = _in_parts(space, lam, "lam", batch), _in_parts(space, sigma, "sigma", batch)
+    lams, sigmas = _in_parts(space, lam, "lam", batch, infinite=True), _in_parts(space, sigma, "sigma", batch)
+    check_infinite(lams, bc_type, penalty)
+    geodesics = is_infinite(lams)
     if loss != "linear" and sigma is None and any(own.is_singular for own in whole.precisions):
         raise ValidationError(
             f"loss={loss!r} estimates the noise level from the data, but `weights` has matrices without information in "
@@ -276,7 +288,8 @@ def make_smoothing_spline(
     factors = factors_of(space)
     ends = [part for factor, own in zip(factors, of_factors, strict=True) for part in split_ends(factor, own)]
     every = knots_for(whole, knots)
-    free = knots is None or has_all_times(every, noisy)
+    # A geodesic has no freedom between its knots.
+    free = not geodesics and (knots is None or has_all_times(every, noisy))
 
     def run(at: Knots, raise_lam: bool = False) -> list[Any]:
         at = at.of_curves(chosen)
@@ -293,7 +306,11 @@ def make_smoothing_spline(
         raise ValidationError(
             f"A closed curve needs at least 4 knots, but there are {every.times.shape[-1]}. Pass more data or knots."
         )
-    if knots is None:
+    if geodesics:
+        at = geodesic_knots(every, space, run)
+        options = geodesic_options(space, options)
+        found = run(at)
+    elif knots is None:
         found, at = with_enough_knots(every, noisy, lams, run)
         finer = in_gaps(at, whole)
         # Knots in gaps are tried before a larger λ, which would affect the whole curve.
@@ -316,7 +333,9 @@ def make_smoothing_spline(
         conditions.append(_joined(factor, [map_ends(one, spread) for one in of_ends]))
     good = None if chosen is None else spread(np.ones(len(chosen), bool))
     fitted = fit(Problem(space, at.times, parts, conditions, _FIT, check=False, mask=good))
-    noise = [part.map(spread) for _, part, _ in found]
+    noise = [
+        with_infinite_lam(part.map(spread), spread(lam), batch) for (_, part, _), lam in zip(found, lams, strict=True)
+    ]
     kept = _conditions(bc_type, conditions, space)
     spline = SmoothingSpline._of(whole.time_axis, at.t, fitted.curve, kept, policy, fitted.reports(), whole, noise)
     faults += [
@@ -421,17 +440,17 @@ def make_lsq_spline(
 
 
 def _chosen(lams: list[Any], at: Knots) -> list[Any]:
-    """Return λ, which is the cube of the interval if there are only two knots.
+    """Return λ, which is the cube of the interval if there are only two knots and it is not given or infinite.
 
     The curve is then the nearest geodesic for every λ, and there is nothing to choose.
     """
     if at.times.shape[-1] > 2:
         return lams
     cube = np.ravel(at.times[..., 1] - at.times[..., 0]) ** 3
-    return [np.where(np.isnan(lam), cube, lam) for lam in lams]
+    return [np.where(np.isfinite(lam), lam, cube) for lam in lams]
 
 
-def _in_parts(space: Space, value: Any, name: str, batch: tuple[int, ...]) -> list[Any]:
+def _in_parts(space: Space, value: Any, name: str, batch: tuple[int, ...], infinite: bool = False) -> list[Any]:
     """Return one array with a number per curve for each space in which data are smoothed."""
     spaces = smoothed_spaces(space)
     if is_several(space) and isinstance(value, tuple):
@@ -440,8 +459,8 @@ def _in_parts(space: Space, value: Any, name: str, batch: tuple[int, ...]) -> li
                 f"`{name}` has {len(value)} entries, but there are {len(spaces)} parts to smooth: "
                 f"{', '.join(map(repr, spaces))}. Pass one entry per part."
             )
-        return [one_per_curve(one, name, batch) for one in value]
-    return [one_per_curve(value, name, batch)] * len(spaces)
+        return [one_per_curve(one, name, batch, infinite) for one in value]
+    return [one_per_curve(value, name, batch, infinite)] * len(spaces)
 
 
 def transport_end_velocities(

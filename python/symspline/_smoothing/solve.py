@@ -144,13 +144,15 @@ def _reason(state: str, number: int, report: SmoothingReport, options: SolverOpt
     )
 
 
-def one_per_curve(value: Any, name: str, batch: tuple[int, ...]) -> Doubles:
-    """Return a number >= 0 per curve; NaN for None."""
+def one_per_curve(value: Any, name: str, batch: tuple[int, ...], infinite: bool = False) -> Doubles:
+    """Return a number >= 0 per curve, which may be infinite if `infinite` is True; NaN for None."""
     if value is None:
         return np.full(int(np.prod(batch)), np.nan)
     array = np.asarray(value)
     if array.dtype.kind not in "iuf" or array.shape not in ((), batch):
         own = f" or an array of shape {batch}" if batch else ""
         raise ValidationError(f"{name} must be a number{own}, not {short_repr(value)}")
-    refuse(~(np.isfinite(array) & (array >= 0)), name, lambda i: f"must be finite and >= 0, not {array[i]}")
+    allowed = ">= 0" if infinite else "finite and >= 0"
+    good = (array >= 0) & (infinite | np.isfinite(array))
+    refuse(~good, name, lambda i: f"must be {allowed}, not {array[i]}")
     return np.ascontiguousarray(np.broadcast_to(array, batch), np.float64).ravel()

@@ -22,6 +22,7 @@ from .indefinite import AntiDeSitter, DeSitter, IndefiniteGrassmannian
 from .positive import HermitianPositiveDefinite, Siegel, SpecialPositiveDefinite, SymmetricPositiveDefinite
 from .product import Product, factors_of, parts_of, product_norm, space, space_named
 from .quotient import Quotient, cover_of, refuse_quotients
+from .statistics import Groups, karcher_mean, require_metric
 from .subspaces import (
     ComplexGrassmannian,
     ComplexHyperbolic,

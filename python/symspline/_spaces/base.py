@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from .._arrays import as_array, cast, refuse, short_repr, whole_number
 from .._core import Handle, ValidationError
 from .._typing import AnyArray, FloatArray, P
+from .statistics import Groups, geometric_median, grouped, groups_of, karcher_mean, require_metric
 
 Array = AnyArray
 Doubles = FloatArray
@@ -788,6 +789,125 @@ class Space(Generic[P]):
         units = np.eye(self.dim, size).reshape(-1, *self._doubles_shape)
         # The core combines a frame at p with random coefficients. Unit coefficients give the frame itself.
         return self._finite("random_tangent", p=self._numbers(at_each), noise=self._numbers(units))
+
+    # ---- statistics ----
+
+    def mean(self, points: ArrayLike, weights: ArrayLike | None = None) -> P:
+        r"""Compute the Karcher mean of points.
+
+        Parameters
+        ----------
+        points : array_like, shape (..., n, *point_shape)
+            Points, at least one. The mean is over the last axis before those of a point; the axes before it are batch
+            axes. On a `Product`, a tuple of such arrays.
+        weights : array_like, shape (n,) or (..., n), optional
+            Weights >= 0. Points of weight 0 are ignored and may be NaN. By default all points have the same weight.
+
+        Returns
+        -------
+        ndarray, shape (..., *point_shape)
+            The means. On a `Product`, a tuple of arrays. On quotients, projective spaces and Grassmannians, they are
+            representatives near the first point of each batch.
+
+        Raises
+        ------
+        ValidationError
+            If an array does not have the required shape, a point is not in the space, or a weight is invalid.
+        CutLocusError
+            If a point reaches the cut locus of the mean.
+        ConvergenceError
+            If the points are spread too far for a mean.
+
+        See Also
+        --------
+        Space.median : A mean that is robust against outliers.
+        tangent_pca : Principal components about the mean.
+
+        Notes
+        -----
+        The mean minimises :math:`\sum_i w_i\, d(m, x_i)^2`. It is unique if the points are in a ball of radius less
+        than half the injectivity radius [1]_; the iteration starts at the first point. On groups without an invariant
+        metric, such as `SpecialEuclidean`, it is the point at which the weighted sum of the logarithms vanishes [2]_.
+
+        References
+        ----------
+        .. [1] H. Karcher, Riemannian center of mass and mollifier smoothing, Comm. Pure Appl. Math. 30 (1977).
+        .. [2] X. Pennec, V. Arsigny, Exponential barycenters of the canonical Cartan connection and invariant means on
+           Lie groups, in: Matrix Information Geometry, Springer (2013).
+
+        Examples
+        --------
+        >>> import symspline as ss
+        >>> ss.Sphere(2).mean([[1, 0, 0], [0, 1, 0]]).round(8)
+        array([0.70710678, 0.70710678, 0.        ])
+        >>> ss.Euclidean(1).mean([[0.0], [1.0]], weights=[1, 3])
+        array([0.75])
+        """
+        lead, groups = self._samples(points, weights, "mean")
+        result: P = self._batched(karcher_mean(self, groups), lead[:-1])
+        return result
+
+    def median(self, points: ArrayLike, weights: ArrayLike | None = None) -> P:
+        r"""Compute the geometric median of points, which outliers hardly affect.
+
+        Parameters
+        ----------
+        points, weights : array_like
+            Points and weights, as for `Space.mean`.
+
+        Returns
+        -------
+        ndarray, shape (..., *point_shape)
+            The medians. On a `Product`, a tuple of arrays.
+
+        Raises
+        ------
+        ValidationError
+            If an array does not have the required shape, a point is not in the space, a weight is invalid, or the
+            space has no invariant, positive definite metric.
+        CutLocusError
+            If a point reaches the cut locus of an iterate.
+        ConvergenceError
+            If the iteration does not converge.
+
+        See Also
+        --------
+        Space.mean : The Karcher mean.
+
+        Notes
+        -----
+        The median minimises :math:`\sum_i w_i\, d(m, x_i)` [1]_. It is computed by Weiszfeld's algorithm. Where an
+        iterate is one of the points, the step of [2]_ either moves on or shows that this point is the median. On a
+        line the median of an even number of points is not unique, and any of the medians is returned.
+
+        References
+        ----------
+        .. [1] P. T. Fletcher, S. Venkatasubramanian, S. Joshi, The geometric median on Riemannian manifolds with
+           application to robust atlas estimation, NeuroImage 45 (2009).
+        .. [2] Y. Vardi, C.-H. Zhang, The multivariate L1-median and associated data depth, PNAS 97 (2000).
+
+        Examples
+        --------
+        >>> import symspline as ss
+        >>> ss.Euclidean(2).median([[0, 0], [2, 0], [1, 1], [1, -1], [1, 0], [500, 0]])
+        array([1., 0.])
+        """
+        require_metric(self, "median")
+        lead, groups = self._samples(points, weights, "median")
+        result: P = self._batched(geometric_median(self, groups), lead[:-1])
+        return result
+
+    def _samples(self, points: Any, weights: Any, what: str) -> tuple[tuple[int, ...], Groups]:
+        """Return the leading axes of checked points, and the points of positive weight in groups."""
+        given = self._array(points, "points")
+        array = self._numbers(self._doubles(given, "points"))
+        lead, kept, full = grouped(array, len(self._point_shape), weights, what)
+        # Single precision has another tolerance.
+        self.check_point(kept.astype(given.dtype) if given.dtype.kind in "fc" else kept)
+        return lead, groups_of(lead, kept, full)
+
+    def _batched(self, rows: Array, batch: tuple[int, ...]) -> Any:
+        return rows.reshape(batch + self._point_shape)
 
     # ---- random points ----
 

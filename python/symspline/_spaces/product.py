@@ -14,6 +14,7 @@ from .._arrays import short_repr
 from .._core import Handle, ValidationError
 from .._typing import AnyArray, AnyArrays, FloatArray, P, PProduct
 from .base import CLASSES, DERIVED, Space, example_of
+from .statistics import Groups
 
 Tuple = tuple[Any, ...]
 # Points of factors, which are not products themselves.
@@ -157,6 +158,26 @@ class Product(Space[PProduct]):
 
     def random_tangent(self, rng: np.random.Generator, p: ArrayLike) -> PProduct:
         return self._each("random_tangent", (rng,) * len(self.factors), p)
+
+    def mean(self, points: ArrayLike, weights: ArrayLike | None = None) -> PProduct:
+        # Squared distances add, so that the mean of every factor minimises its own sum.
+        return self._each("mean", points, (weights,) * len(self.factors))
+
+    def _samples(self, points: Any, weights: Any, what: str) -> tuple[tuple[int, ...], Groups]:
+        each = [
+            factor._samples(own, weights, what)
+            for factor, (own,) in zip(self.factors, self._split(points), strict=True)
+        ]
+        leads = [lead for lead, _ in each]
+        if any(lead != leads[0] for lead in leads):
+            raise ValidationError(
+                f"the factors of `points` have the leading axes {leads}. Pass as many points for each factor."
+            )
+        _, first = each[0]
+        return leads[0], first._replace(points=tuple(groups.points for _, groups in each))
+
+    def _batched(self, rows: Tuple, batch: tuple[int, ...]) -> Tuple:
+        return tuple(factor._batched(own, batch) for factor, own in zip(self.factors, rows, strict=True))
 
     def _finite(self, operation: str, t: NDArray[np.float64] | None = None, **inputs: Any) -> Any:
         each = tuple(

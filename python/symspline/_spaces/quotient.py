@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import short_repr, whole_number
-from .._core import ConvergenceError, CutLocusError, ValidationError
+from .._core import CutLocusError, ValidationError
 from .._typing import P
 from .base import DERIVED, Array, Space
 from .finite_groups import Factor, FiniteGroup, Indices
@@ -28,8 +28,6 @@ _CLASSES: dict[type[Any], type[Any]] = {}
 _BLOCK = 2**22
 # Errors of transformations that are not isometries are larger than this.
 _TOL = 1e-6
-# Limit of the iteration for a mean. Each step reduces the error by about the square of the radius of the points.
-_STEPS = 100
 
 
 class Quotient(Space[P]):
@@ -313,61 +311,6 @@ class Quotient(Space[P]):
 
     def symmetry(self, p: ArrayLike, x: ArrayLike) -> P:
         return self.cover.symmetry(p, self._nearer(p, x)[0])
-
-    def mean(self, points: ArrayLike) -> P:
-        """Compute the Karcher mean of points, such as the mean orientation of a grain.
-
-        Parameters
-        ----------
-        points : array_like, shape (..., n, *point_shape)
-            Points, at least one. Leading axes are batch axes.
-
-        Returns
-        -------
-        ndarray, shape (..., *point_shape)
-            The representatives, near the first point of each batch, of the points with the least sum of squared
-            distances.
-
-        Raises
-        ------
-        ValidationError
-            If an array does not have the shape of points.
-        ConvergenceError
-            If the points are spread too far for a mean.
-
-        See Also
-        --------
-        Quotient.distance : The distance between the nearest representatives.
-
-        References
-        ----------
-        H. Karcher, Riemannian center of mass and mollifier smoothing, Comm. Pure Appl. Math. 30 (1977).
-
-        Examples
-        --------
-        >>> import numpy as np, symspline as ss
-        >>> cubic = ss.space("so:3/432")
-        >>> turned = ss.rotations.from_rotation_vectors(np.radians([[0, 0, 10], [0, 0, 110]]))
-        >>> np.degrees(ss.rotations.as_rotation_vectors(cubic.mean(turned))).round(8) + 0.0
-        array([ 0.,  0., 15.])
-        """
-        array = self._numbers(self._doubles(points, "points"))
-        axis = array.ndim - len(self._point_shape) - 1
-        if axis < 0 or not array.shape[axis]:
-            raise ValidationError(f"`points` has shape {array.shape}, but a mean needs at least one point.")
-        self.cover.check_point(points)
-        found: Any = self.cover.project(np.take(array, 0, axis=axis))
-        floor = 8 * np.finfo(np.float64).eps * self.cover._rounding(found)
-        for _ in range(_STEPS):
-            step = np.mean(self.log(np.expand_dims(found, axis), array), axis=axis)
-            found = self.cover.exp(found, step)
-            if np.all(self.cover.norm(found, step) <= floor):
-                mean: P = found
-                return mean
-        raise ConvergenceError(
-            f"the mean did not converge in {_STEPS} steps: the points are spread too far. "
-            "Take the mean of points that are closer together."
-        )
 
     # ---- names ----
 
