@@ -40,6 +40,8 @@ class Case:
 CASES = [
     Case("euclidean:1", smooth=False),
     Case("euclidean:3", interface=True),
+    Case("torus:1", smooth=False, few=True),
+    Case("torus:3", interface=True),
     Case("sphere:1", smooth=False),
     Case("sphere:2", interface=True),
     Case("sphere:3"),
@@ -83,6 +85,8 @@ CASES = [
     Case("spd:2", far=1.5, interface=True),
     Case("spd:3", far=1.5),
     Case("sspd:3", far=1.5, few=True, interface=True),
+    Case("logspd:1", far=1.5, smooth=False, few=True),
+    Case("logspd:3", far=1.5, interface=True),
     Case("siegel:1", far=1.5, few=True),
     Case("siegel:2", far=1.5, few=True, interface=True),
     Case("hpd:1", far=1.5, smooth=False, few=True, interface=True),

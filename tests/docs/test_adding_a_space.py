@@ -18,7 +18,7 @@ PAGE = ROOT / "docs/adding-a-space.md"
 
 
 def test_the_page_of_rust_is_the_one_that_is_tested():
-    source = (ROOT / "crates/engine/tests/torus.rs").read_text(encoding="utf-8")
+    source = (ROOT / "crates/engine/tests/circles.rs").read_text(encoding="utf-8")
     region = source.split("// ---- the page begins ----\n")[1].split("// ---- the page ends ----\n")[0]
     assert "\n".join(blocks(PAGE, "rust")) == region
 
@@ -41,16 +41,16 @@ def torus(monkeypatch):
     # It does not stay among the known spaces.
     monkeypatch.setattr("symspline._spaces.base.CLASSES", {})
     (code,) = blocks(PAGE)
-    module = types.ModuleType("symspline._spaces.torus", doc="The flat torus.")
+    module = types.ModuleType("symspline._spaces.circles", doc="The flat torus.")
     module.__package__ = "symspline._spaces"
     monkeypatch.setitem(sys.modules, module.__name__, module)
     exec(compile(code, "adding-a-space.md", "exec"), vars(module))
-    return module.Torus
+    return module.Circles
 
 
 def test_the_docstring_of_the_class_is_complete(torus, monkeypatch):
-    monkeypatch.setattr(ss, "Torus", torus, raising=False)
-    assert test_docstrings.problems("symspline.Torus", torus) == []
+    monkeypatch.setattr(ss, "Circles", torus, raising=False)
+    assert test_docstrings.problems("symspline.Circles", torus) == []
 
 
 def test_the_class_has_a_symmetry_and_a_group(torus):
@@ -69,7 +69,7 @@ def test_the_class_has_a_symmetry_and_a_group(torus):
 def test_the_cases_are_cases():
     (lines,) = (block.splitlines() for block in blocks(PAGE, "diff") if block.startswith("+++ tests/cases.py"))
     added = eval(f"[{''.join(line[1:] for line in lines if line.startswith('+ '))}]", {"Case": Case})
-    assert [case.name for case in added] == ["torus:1", "torus:2"]
+    assert [case.name for case in added] == ["circles:1", "circles:2"]
     # As the page says, some case of the family stands for it.
     assert any(case.interface for case in added) and not set(added) & set(CASES)
 
@@ -81,4 +81,4 @@ def test_files_exist():
     paths = [*links, *(f"../{name}" for name in names)]
     missing = {path for path in paths if not (ROOT / "docs" / path).exists()}
     # The page that would be added.
-    assert missing == {"../crates/vectors/src/torus.rs"}
+    assert missing == {"../crates/vectors/src/circles.rs"}

@@ -29,8 +29,8 @@ def run(script, timeout=100):
 
 def test_names_of_huge_spaces_do_not_abort():
     script = """
-    families = ["r", "sphere", "h", "rp", "cp", "ch", "hp", "so", "o", "u", "su", "spd", "sspd", "hpd", "siegel",
-                "gl", "cgl", "sl", "sp", "aff", "sim", "lorentz"]
+    families = ["r", "torus", "sphere", "h", "rp", "cp", "ch", "hp", "so", "o", "u", "su", "spd", "sspd", "logspd",
+                "hpd", "siegel", "gl", "cgl", "sl", "sp", "aff", "sim", "lorentz"]
     names = [f"{family}:{n}" for family in families for n in (300, 3000, 20_000, 100_000, 10**7, 2**24, 10**12)]
     names += [f"{family}:{k},{n}" for family in ("gr", "cgr", "st") for k in (2, 400) for n in (10**5, 10**9)]
     names += ["igr:0,1,1099511627776,1", "igr:0,1,3000,3000", "se:3 x gl:100000", "sphere:2 x so:100000"]

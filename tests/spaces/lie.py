@@ -10,7 +10,14 @@ from scipy.linalg import expm
 
 import symspline as ss
 
-CONGRUENT = (ss.SymmetricPositiveDefinite, ss.HermitianPositiveDefinite, ss.SpecialPositiveDefinite, ss.Siegel)
+FLAT = (ss.Euclidean, ss.Torus)
+CONGRUENT = (
+    ss.LogEuclidean,
+    ss.SymmetricPositiveDefinite,
+    ss.HermitianPositiveDefinite,
+    ss.SpecialPositiveDefinite,
+    ss.Siegel,
+)
 GROUPS = (
     *(ss.SpecialOrthogonal, ss.Orthogonal, ss.SpecialUnitary, ss.Unitary, ss.SpecialEuclidean),
     *(ss.GeneralLinear, ss.ComplexGeneralLinear, ss.Affine, ss.Similarity),
@@ -54,11 +61,17 @@ class Lie:
     def algebra(self, rng):
         """A random element of g."""
         space, n = self.space, self.space.point_shape[0]
-        if isinstance(space, ss.Euclidean):
+        if isinstance(space, FLAT):
             x = np.zeros((n + 1, n + 1))
             turn = rng.standard_normal((n, n))
             x[:n, :n], x[:n, n] = turn - turn.T, rng.standard_normal(n)
+            if isinstance(space, ss.Torus):
+                # Its isometries are shifts and signed permutations.
+                x[:n, :n] = 0
             return x
+        if isinstance(space, ss.LogEuclidean):
+            x = rng.standard_normal((n, n))
+            return x - x.T
         if isinstance(space, ss.Siegel):
             x = rng.standard_normal((n, n))
             return np.kron([[0.0, 1.0], [-1.0, 0.0]], np.eye(n // 2)) @ (x + x.T) / 2
@@ -85,7 +98,7 @@ class Lie:
         """A random element of G, in another component than the unit where there is one."""
         g = self.exp(size * self.algebra(rng))
         flip = np.eye(g.shape[-1])
-        last = 0 if isinstance(self.space, ss.Euclidean) else -1
+        last = 0 if isinstance(self.space, FLAT) else -1
         flip[last, last] = -1.0
         if isinstance(self.space, ss.Orthogonal):
             return np.array([g[0] @ flip, g[1]])
@@ -103,7 +116,7 @@ class Lie:
     def push(self, g, v):
         """g · v of a tangent vector."""
         space = self.space
-        if isinstance(space, ss.Euclidean):
+        if isinstance(space, FLAT):
             return g[:-1, :-1] @ v
         if isinstance(space, ss.IndefiniteGrassmannian):
             return g @ v @ np.linalg.inv(g)
@@ -116,7 +129,7 @@ class Lie:
     def at(self, x, p):
         """The infinitesimal action (5), a tangent vector at p."""
         space = self.space
-        if isinstance(space, ss.Euclidean):
+        if isinstance(space, FLAT):
             return x[:-1, :-1] @ p + x[:-1, -1]
         if isinstance(space, GROUPS):
             return x[0] @ p - p @ x[1]
@@ -128,7 +141,7 @@ class Lie:
     def lift(self, p, v):
         """The element of m_p that moves p with velocity v: the connection ϖ of (26)."""
         space = self.space
-        if isinstance(space, ss.Euclidean):
+        if isinstance(space, FLAT):
             x = np.zeros((len(p) + 1, len(p) + 1))
             x[:-1, -1] = v
             return x
@@ -143,7 +156,7 @@ class Lie:
     def involution(self, p, x):
         """Conjugation by the symmetry at p: 1 on h_p, −1 on m_p."""
         space = self.space
-        if isinstance(space, ss.Euclidean):
+        if isinstance(space, FLAT):
             s = -np.eye(len(p) + 1)
             s[:-1, -1], s[-1, -1] = 2 * p, 1.0
             return s @ x @ s

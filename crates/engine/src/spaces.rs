@@ -4,7 +4,7 @@ use std::sync::Arc;
 use symspline_core::space::{Entry, Erased, Kernels};
 
 #[cfg(feature = "forms")]
-pub use symspline_forms::{PositiveDefinite, Siegel};
+pub use symspline_forms::{LogEuclidean, PositiveDefinite, Siegel};
 #[cfg(feature = "groups")]
 pub use symspline_groups::{
     Rotations, SpecialEuclidean, conversions, matrix_of_quaternion, quaternion_of_matrix,
@@ -18,7 +18,7 @@ pub use symspline_linear::{GeneralLinear, IndefiniteGrassmannian, Members};
 #[cfg(feature = "subspaces")]
 pub use symspline_subspaces::{Lines, Subspaces};
 #[cfg(feature = "vectors")]
-pub use symspline_vectors::{AntiDeSitter, Curved, DeSitter, Euclidean, Hyperbolic, Sphere};
+pub use symspline_vectors::{AntiDeSitter, Curved, DeSitter, Euclidean, Hyperbolic, Sphere, Torus};
 
 /// The families of spaces that were compiled. These are references to the statics of their crates: a copy of one would
 /// contain its functions, with all their code.

@@ -6,6 +6,7 @@ use symspline_engine::spaces::{AnySpace, all};
 /// A few sizes of every kind: the smallest, one for every branch of the code, and one of another shape.
 const SIZES: &[(&str, &[&[usize]])] = &[
     ("euclidean", &[&[1], &[3]]),
+    ("torus", &[&[1], &[2], &[7]]),
     ("sphere", &[&[1], &[2], &[3], &[6]]),
     ("hyperbolic", &[&[1], &[2], &[3], &[6]]),
     ("ds", &[&[2], &[3], &[6]]),
@@ -23,6 +24,7 @@ const SIZES: &[(&str, &[&[usize]])] = &[
     ("spd", &[&[1], &[2], &[3], &[4]]),
     ("hpd", &[&[1], &[2], &[3]]),
     ("sspd", &[&[2], &[3], &[4]]),
+    ("logspd", &[&[1], &[2], &[3], &[4]]),
     ("siegel", &[&[1], &[2]]),
     ("se", &[&[2], &[3]]),
     ("gl", &[&[1], &[2], &[3], &[4]]),

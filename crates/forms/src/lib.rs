@@ -1,8 +1,10 @@
 //! Positive definite matrices.
 
+mod log_euclidean;
 mod positive_definite;
 mod siegel;
 
+pub use log_euclidean::LogEuclidean;
 pub use positive_definite::PositiveDefinite;
 pub use siegel::{HalfPlane, Siegel};
 
@@ -21,6 +23,11 @@ pub static FAMILY: &[Entry] = &[
         },
     },
     Entry { names: &["sspd", "special-positive-definite"], parameters: &["n"], make: |p| real(p, true) },
+    Entry {
+        names: &["logspd", "log-euclidean"],
+        parameters: &["n"],
+        make: |p| table(LogEuclidean::new(p[0])),
+    },
     Entry { names: &["siegel"], parameters: &["n"], make: |p| half_space(p[0]) },
 ];
 

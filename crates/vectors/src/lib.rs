@@ -1,4 +1,4 @@
-//! Spaces whose points are vectors: flat space, spheres, hyperbolic, de Sitter and anti-de Sitter space.
+//! Spaces whose points are vectors: flat space, tori, spheres, hyperbolic, de Sitter and anti-de Sitter space.
 
 pub mod constant_curvature;
 mod curved;
@@ -6,9 +6,11 @@ mod euclidean;
 mod hyperbolic;
 mod lorentzian;
 mod sphere;
+mod torus;
 
 pub use curved::{AntiDeSitter, Curved, DeSitter, Hyperbolic, Sphere};
 pub use euclidean::Euclidean;
+pub use torus::Torus;
 
 #[cfg(feature = "named")]
 use symspline_core::space::{Entry, table};
@@ -17,6 +19,7 @@ use symspline_core::space::{Entry, table};
 #[cfg(feature = "named")]
 pub static FAMILY: &[Entry] = &[
     Entry { names: &["euclidean", "r"], parameters: &["n"], make: |p| table(Euclidean::new(p[0])) },
+    Entry { names: &["torus"], parameters: &["n"], make: |p| table(Torus::new(p[0])) },
     Entry { names: &["sphere", "s"], parameters: &["n"], make: |p| table(Sphere::new(p[0])) },
     Entry { names: &["hyperbolic", "h"], parameters: &["n"], make: |p| table(Hyperbolic::new(p[0])) },
     Entry { names: &["ds", "de-sitter"], parameters: &["n"], make: |p| table(DeSitter::new(p[0])) },

@@ -19,7 +19,13 @@ from .groups import (
     Unitary,
 )
 from .indefinite import AntiDeSitter, DeSitter, IndefiniteGrassmannian
-from .positive import HermitianPositiveDefinite, Siegel, SpecialPositiveDefinite, SymmetricPositiveDefinite
+from .positive import (
+    HermitianPositiveDefinite,
+    LogEuclidean,
+    Siegel,
+    SpecialPositiveDefinite,
+    SymmetricPositiveDefinite,
+)
 from .product import Product, factors_of, parts_of, product_norm, space, space_named
 from .quotient import Quotient, cover_of, refuse_quotients
 from .statistics import Groups, karcher_mean, require_metric
@@ -31,4 +37,4 @@ from .subspaces import (
     QuaternionicProjective,
     RealProjective,
 )
-from .vectors import Euclidean, Hyperbolic, Sphere
+from .vectors import Euclidean, Hyperbolic, Sphere, Torus

@@ -480,7 +480,9 @@ class Space(Generic[P]):
                                                             quaternions, as 2 × 2 complex blocks
         `Hyperbolic`, `ComplexHyperbolic`                   g*Jg = J, J = diag(−1, 1, …, 1); for         g x
                                                             `Hyperbolic` with g₀₀ > 0
+        `Torus`                                             (A, b; 0, 1), A a signed permutation         A x + b
         `SymmetricPositiveDefinite`                         invertible matrix                            g x gᵀ
+        `LogEuclidean`                                      multiple of an orthogonal matrix             g x gᵀ
         `HermitianPositiveDefinite`                         invertible matrix                            g x g*
         `SpecialPositiveDefinite`                           matrix of determinant ±1                     g x gᵀ
         `Siegel`                                            symplectic matrix                            g x gᵀ

@@ -9,7 +9,7 @@ import numpy as np
 
 from .._core import ValidationError
 from .._typing import ComplexArray, FloatArray, P
-from .actions import Congruent, preserves, require
+from .actions import Congruent, adjoint, preserves, require
 from .base import Array
 
 # Beyond this size, random exponents are scaled so that they do not grow with the size. Otherwise the exponential of a
@@ -56,6 +56,59 @@ class SymmetricPositiveDefinite(_PositiveDefinite[FloatArray]):
     """
 
     _name = "spd"
+
+
+class LogEuclidean(_PositiveDefinite[FloatArray]):
+    r"""Symmetric positive definite matrices with the log-Euclidean metric.
+
+    A point is a symmetric positive definite n × n matrix. The matrix logarithm is an isometry to the flat space of
+    symmetric matrices, so that the spline is the exponential of the cubic spline of the logarithms.
+
+    Parameters
+    ----------
+    n : int
+        Size of the matrices, at least 1.
+
+    See Also
+    --------
+    SymmetricPositiveDefinite : The same matrices with the affine-invariant metric.
+    symspline.tensors : Diffusion tensors.
+
+    Notes
+    -----
+    The metric at P is that of the derivative of the logarithm, :math:`\lVert D\log_P V \rVert_F`, and
+    :math:`\exp_P(V) = \exp(\log P + D\log_P V)` [1]_. Distances are invariant under rotations, scaling and inversion,
+    but not under all congruences. Use this space for comparison with software for diffusion tensors;
+    `SymmetricPositiveDefinite` does not depend on the choice of coordinates.
+    References
+    ----------
+    .. [1] V. Arsigny, P. Fillard, X. Pennec, N. Ayache, Geometric means in a novel vector space structure on symmetric
+       positive-definite matrices, SIAM J. Matrix Anal. Appl. 29 (2007).
+
+    Examples
+    --------
+    >>> import numpy as np, symspline as ss
+    >>> ss.LogEuclidean(2).geodesic(np.eye(2), 4 * np.eye(2), 0.5).round(12)
+    array([[2., 0.],
+           [0., 2.]])
+    """
+
+    _name = "logspd"
+
+    def _reflected(self, p: Array, x: Array) -> Any:
+        return _function(np.exp, 2 * _function(np.log, p) - _function(np.log, x))
+
+    def _require_subgroup(self, g: Array, tol: float) -> None:
+        square = g @ adjoint(g)
+        size = np.trace(square, axis1=-2, axis2=-1)[..., None, None] / g.shape[-1]
+        defects = np.abs(square / size - np.eye(g.shape[-1])).max(axis=(-2, -1))
+        require(self, defects, tol, "|ggᵀ/c − 1|", "Pass a multiple of an orthogonal matrix.")
+
+
+def _function(f: Any, x: Array) -> Any:
+    """Return a function of symmetric matrices."""
+    values, vectors = np.linalg.eigh(x)
+    return (vectors * f(values)[..., None, :]) @ adjoint(vectors)
 
 
 class SpecialPositiveDefinite(_PositiveDefinite[FloatArray]):

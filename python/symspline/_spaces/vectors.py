@@ -1,4 +1,4 @@
-"""Euclidean space, spheres and hyperbolic spaces: spaces of constant curvature, whose points are vectors."""
+"""Euclidean space, tori, spheres and hyperbolic spaces: spaces of constant curvature, whose points are vectors."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .._arrays import as_array, refuse
+from .._core import ValidationError
 from .._typing import FloatArray
 from .actions import Preserving, homogeneous, require
 from .base import Array, Space
@@ -48,6 +50,62 @@ class Euclidean(Space[FloatArray]):
         return (g[..., :-1, :-1] @ x[..., None])[..., 0] + g[..., :-1, -1]
 
 
+class Torus(Space[FloatArray]):
+    r"""The flat torus Tⁿ, whose points are n angles.
+
+    A point is an array of n angles in radians, such as the torsion angles of a molecule or the angles of the joints of
+    an arm. Angles that differ by whole turns are the same point. Input may be any finite numbers; points that are
+    returned are in (−π, π]. Use ``numpy.unwrap(spline(x), axis=-2)`` for angles without jumps.
+
+    Parameters
+    ----------
+    n : int
+        Number of angles, at least 1.
+
+    See Also
+    --------
+    Euclidean : Angles that count whole turns.
+    Sphere.from_angles : Unit vectors of the plane with given angles.
+
+    Notes
+    -----
+    Neighbouring points are joined the shorter way around each circle, so that a step of 200° is one of −160°. Steps of
+    exactly π in any angle raise `CutLocusError`. If the joints turn by more than π between two samples, use
+    `Euclidean` and angles that count turns.
+
+    Examples
+    --------
+    >>> import numpy as np, symspline as ss
+    >>> spline = ss.CubicSpline(None, np.radians([[170.0, 0], [-170, 10], [-150, 20]]), "torus:2")
+    >>> np.degrees(spline([0.25, 1.5])).round(8)
+    array([[ 175. ,    2.5],
+           [-160. ,   15. ]])
+    """
+
+    _name = "torus"
+
+    def __init__(self, n: int) -> None:
+        super().__init__(n)
+
+    def _reflected(self, p: Array, x: Array) -> Any:
+        return 2 * p - x
+
+    def _element(self, g: Any) -> Any:
+        g = homogeneous(self, g, self.dim)
+        linear = g[..., :-1, :-1]
+        require(
+            self,
+            np.abs(linear - np.round(linear)).max(axis=(-2, -1)),
+            1e-8,
+            "the distance of its linear part from integers",
+            "Pass [[A, b], [0, 1]] with a signed permutation A of the angles and angles b.",
+        )
+        return g
+
+    def _moved(self, g: Array, x: Array) -> Any:
+        return (g[..., :-1, :-1] @ x[..., None])[..., 0] + g[..., :-1, -1]
+
+
 class Sphere(Preserving[FloatArray]):
     """The unit sphere Sⁿ.
 
@@ -74,6 +132,85 @@ class Sphere(Preserving[FloatArray]):
 
     _name = "sphere"
     _linear = True
+
+    def from_angles(self, angles: ArrayLike) -> FloatArray:
+        """Convert angles to points of the circle, ``Sphere(1)``.
+
+        Parameters
+        ----------
+        angles : array_like, any shape
+            Angles in radians.
+
+        Returns
+        -------
+        ndarray, shape (..., 2)
+            The unit vectors (cos, sin).
+
+        Raises
+        ------
+        ValidationError
+            If the sphere is not ``Sphere(1)``, or an angle is not a finite number.
+
+        See Also
+        --------
+        Sphere.as_angles : The inverse operation.
+        Torus : Several angles as a point.
+
+        Examples
+        --------
+        >>> import numpy as np, symspline as ss
+        >>> ss.Sphere(1).from_angles([0.0, np.pi / 2]).round(15)
+        array([[1., 0.],
+               [0., 1.]])
+        """
+        self._require_circle("from_angles")
+        given = as_array(angles, "angles")
+        if given.dtype.kind not in "biuf":
+            raise ValidationError(f"angles must be real numbers, not {given.dtype}")
+        given = given.astype(np.float64)
+        refuse(~np.isfinite(given), "angles", lambda i: f"is {given[i]}, but angles must be finite")
+        return np.stack([np.cos(given), np.sin(given)], axis=-1)
+
+    def as_angles(self, points: ArrayLike) -> FloatArray:
+        """Convert points of the circle, ``Sphere(1)``, to angles.
+
+        Parameters
+        ----------
+        points : array_like, shape (..., 2)
+            Points.
+
+        Returns
+        -------
+        ndarray, shape (...)
+            Angles in radians, in (−π, π].
+
+        Raises
+        ------
+        ValidationError
+            If the sphere is not ``Sphere(1)``, or an array is not a point of it.
+
+        See Also
+        --------
+        Sphere.from_angles : The inverse operation.
+
+        Examples
+        --------
+        >>> import symspline as ss
+        >>> ss.Sphere(1).as_angles([0.0, -1.0])
+        np.float64(-1.5707963267948966)
+        """
+        self._require_circle("as_angles")
+        self.check_point(points)
+        x = self._doubles(points, "points")
+        # A sine of −0 would give −π.
+        angles: FloatArray = np.arctan2(x[..., 1] + 0.0, x[..., 0])
+        return angles
+
+    def _require_circle(self, method: str) -> None:
+        if self.dim != 1:
+            raise ValidationError(
+                f"{method} converts angles on the circle, but this is {self!r}. Use Sphere(1).{method}."
+            )
 
 
 class Hyperbolic(Preserving[FloatArray]):

@@ -1,4 +1,4 @@
-//! The flat torus, which the library does not have: the example of `docs/adding-a-space.md`, which quotes
+//! The flat torus as unit vectors, which the library has as angles: the example of `docs/adding-a-space.md`, which quotes
 //! everything between the two markers below.
 
 // ---- the page begins ----
@@ -9,14 +9,14 @@ use symspline_engine::special::Trig;
 
 /// Tⁿ = S¹ × … × S¹: n unit vectors of R².
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Torus {
+pub struct Circles {
     n: usize,
 }
 
-impl Torus {
+impl Circles {
     /// The torus of n circles.
     pub fn new(n: usize) -> Result<Self, String> {
-        if n == 0 { Err("Torus(n) needs n >= 1".into()) } else { Ok(Torus { n }) }
+        if n == 0 { Err("Circles(n) needs n >= 1".into()) } else { Ok(Circles { n }) }
     }
 }
 
@@ -56,7 +56,7 @@ fn angle_between<S: Scalar>(p: [S; 2], q: [S; 2]) -> S {
     S::from_parts([sin.value().atan2(cos.value()), d, dd])
 }
 
-impl Model for Torus {
+impl Model for Circles {
     fn point_shape(&self) -> Vec<usize> {
         vec![self.n, 2]
     }
@@ -149,7 +149,7 @@ use symspline_engine::spaces::Euclidean;
 #[test]
 fn it_obeys_every_law() {
     for n in 1..=3 {
-        let torus = Torus::new(n).unwrap();
+        let torus = Circles::new(n).unwrap();
         assert_eq!(check(&Erased(&torus), 0), [""; 0], "n = {n}");
     }
 }
@@ -188,7 +188,7 @@ fn difference(a: &[f64], b: &[f64]) -> f64 {
 
 fn run(operation: Operation, inputs: &[&[f64]], t: &[f64], len: usize) -> Result<Vec<f64>, Fault> {
     let mut out = vec![0.0; len];
-    apply(&Erased(&Torus::new(2).unwrap()), operation, inputs, t, &Monitor::new(&ON), &mut out).map(|()| out)
+    apply(&Erased(&Circles::new(2).unwrap()), operation, inputs, t, &Monitor::new(&ON), &mut out).map(|()| out)
 }
 
 /// The velocities of the spline through points.
@@ -211,9 +211,9 @@ fn values(space: &Erased, curves: &Curves, times: &Times, quantity: Quantity) ->
 
 #[test]
 fn parameters_are_checked() {
-    assert!(Torus::new(0).is_err());
+    assert!(Circles::new(0).is_err());
     let (_, off, why) =
-        project_points(&Erased(&Torus::new(2).unwrap()), &mut [1.0, 0.0, 0.0, 2.0], 1e-8).unwrap_err();
+        project_points(&Erased(&Circles::new(2).unwrap()), &mut [1.0, 0.0, 0.0, 2.0], 1e-8).unwrap_err();
     assert_eq!((off, why.as_str()), (1.0, "its rows have the norms [1.0, 2.0], not 1"));
 }
 
@@ -244,13 +244,13 @@ fn the_cut_locus_is_at_pi_in_any_coordinate() {
     assert!((angle - PI).abs() < 1e-15);
     let mut points = ANGLES.concat();
     (points[6], points[7]) = (8.1, -4.0 + PI);
-    let fault = spline(&Erased(&Torus::new(2).unwrap()), &point(&points), [End::Natural; 2]).unwrap_err();
+    let fault = spline(&Erased(&Circles::new(2).unwrap()), &point(&points), [End::Natural; 2]).unwrap_err();
     assert!(matches!(fault, Status::CutLocus { index: 2, .. }), "{fault:?}");
 }
 
 #[test]
 fn the_spline_is_the_flat_one_of_the_angles() {
-    let (torus, flat) = (Torus::new(2).unwrap(), Euclidean::new(2).unwrap());
+    let (torus, flat) = (Circles::new(2).unwrap(), Euclidean::new(2).unwrap());
     let (torus, flat) = (Erased(&torus), Erased(&flat));
     let angles = ANGLES.concat();
     let points = point(&angles);
@@ -276,7 +276,7 @@ fn the_spline_is_the_flat_one_of_the_angles() {
 
 #[test]
 fn the_spline_is_c2_at_the_knots() {
-    let torus = Torus::new(2).unwrap();
+    let torus = Circles::new(2).unwrap();
     let torus = Erased(&torus);
     let points = point(&ANGLES.concat());
     // A start so fast the wrong way that the first inner handle takes the other way round.
