@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cache
-from math import prod
+from math import isqrt, prod
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -51,7 +51,18 @@ from ._validation import (
 if TYPE_CHECKING:
     from qutip import QobjEvo
 
-__all__ = ["bloch_vector", "from_bloch_vector", "from_kets", "hamiltonian", "propagator", "pulses", "qobjevo"]
+__all__ = [
+    "berry_phase",
+    "bloch_vector",
+    "density",
+    "from_bloch_vector",
+    "from_kets",
+    "hamiltonian",
+    "propagator",
+    "pulses",
+    "purify",
+    "qobjevo",
+]
 
 _STAGES = 8
 # For steps of this length, the error of eight stages is a rounding error.
@@ -481,6 +492,180 @@ def _gauss() -> tuple[Doubles, Doubles, Doubles]:
     odd = 2 * np.arange(_STAGES) + 1
     integrals = (p[:, 1:] - np.c_[-p[:, 0], p[:, : _STAGES - 1]]) / odd
     return (1 + y) / 2, w / 2, integrals @ (p[:, :_STAGES] * odd * w[:, None] / 4).T
+
+
+# ---- geometric phases ----
+
+
+def berry_phase(spline: CubicSpline[Any, Any]) -> Any:
+    r"""Compute the geometric phase that a state acquires along a closed curve.
+
+    Parameters
+    ----------
+    spline : CubicSpline
+        Closed curve on `ComplexProjective`: its first and last points are the same state up to a phase.
+
+    Returns
+    -------
+    float or ndarray, shape (*batch axes)
+        Phases in (−π, π].
+
+    Raises
+    ------
+    ValidationError
+        If the curve is on another space, or is not closed.
+
+    See Also
+    --------
+    propagator : The unitary that moves the state and does not add another phase.
+    CubicSpline.lift : Evaluate the states that are transported in parallel.
+
+    Notes
+    -----
+    The phase is :math:`\varphi` in :math:`\psi(T) = e^{i\varphi} \psi(0)` for the horizontal lift ψ, which satisfies
+    :math:`\langle\psi | \psi'\rangle = 0` [1]_. It is the limit of :math:`-\arg \prod_k \langle\psi_k |
+    \psi_{k+1}\rangle` for states along the curve in any phases. For a qubit it is minus half the solid angle that the
+    curve encloses counterclockwise on the Bloch sphere, up to multiples of 2π.
+
+    References
+    ----------
+    .. [1] B. Simon, Holonomy, the quantum adiabatic theorem, and Berry's phase, Phys. Rev. Lett. 51 (1983).
+
+    Examples
+    --------
+    A circle of latitude at 60° from the pole encloses the solid angle π:
+
+    >>> import numpy as np, symspline as ss
+    >>> angle = np.linspace(0, 2 * np.pi, 65)
+    >>> across = np.sqrt(0.75) * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    >>> circle = np.concatenate([across, np.full((65, 1), 0.5)], axis=-1)
+    >>> loop = ss.CubicSpline(angle, ss.quantum.from_bloch_vector(circle), "cp:1", bc_type="periodic")
+    >>> round(ss.quantum.berry_phase(loop) / np.pi, 4)
+    np.float64(-0.5)
+    """
+    space = _quantum_space(spline)
+    if not isinstance(space, ComplexProjective):
+        raise ValidationError(f"a Berry phase is that of a curve on ComplexProjective, not on {space!r}.")
+    first, last = spline.points[..., 0, :], spline.points[..., -1, :]
+    gaps = np.asarray(space.distance(first, last))
+    refuse(
+        gaps > 1e-8,
+        "spline",
+        lambda i: f"is not closed: its last point is at distance {gaps[i]:.3g} from the first. Repeat the first point.",
+    )
+    lifted = spline.lift(spline.t[..., -1:], per_curve=spline.t.ndim > 1)[..., 0, :]
+    overlap = np.sum(first.conj() * lifted, axis=-1)
+    return np.angle(overlap)[()]
+
+
+# ---- mixed states ----
+
+
+def purify(states: ArrayLike) -> Array:
+    r"""Convert density matrices along a path to pure states of a doubled system, with the Bures metric.
+
+    Parameters
+    ----------
+    states : array_like, shape (..., m, n, n)
+        Density matrices of m states: Hermitian, positive semidefinite, of trace one.
+
+    Returns
+    -------
+    ndarray, shape (..., m, n²)
+        Unit vectors, points of ``ComplexProjective(n**2 - 1)``.
+
+    Raises
+    ------
+    ValidationError
+        If a matrix is not a density matrix.
+
+    See Also
+    --------
+    density : The inverse operation.
+
+    Notes
+    -----
+    A purification of ρ is a matrix W with :math:`W W^* = \rho`. It is determined up to a unitary factor. The factor
+    of each state is chosen such that :math:`W_k^* W_{k+1}` is positive semidefinite: W is parallel along the path
+    [1]_. The distance between neighbours in projective space is then their Bures angle
+    :math:`\arccos \operatorname{tr} \lvert\sqrt{\rho_k}\sqrt{\rho_{k+1}}\rvert`. The spline through the
+    purifications is a smooth path of mixed states.
+
+    References
+    ----------
+    .. [1] A. Uhlmann, Parallel transport and "quantum holonomy" along density operators, Rep. Math. Phys. 24 (1986).
+
+    Examples
+    --------
+    >>> import numpy as np, symspline as ss
+    >>> states = [np.diag([p, 1 - p]) for p in (0.5, 0.7, 1.0)]
+    >>> path = ss.CubicSpline(None, ss.quantum.purify(states), "cp:3")
+    >>> ss.quantum.density(path(1.0)).real.round(8)
+    array([[0.7, 0. ],
+           [0. , 0.3]])
+    """
+    given, tol = square_matrices(states, "states")
+    if given.ndim < 3 or not given.shape[-3]:
+        raise ValidationError(f"states has shape {given.shape}, but must have shape (..., m, n, n) with m >= 1.")
+    given = given.astype(np.complex128)
+    refuse(~np.isfinite(given).all(axis=(-2, -1)), "states", lambda _: "is not finite")
+    off = np.abs(given - adjoint(given)).max(axis=(-2, -1))
+    refuse(off > tol, "states", lambda i: f"is not Hermitian: ρ − ρ* has an entry of {off[i]:.3g}")
+    values, vectors = np.linalg.eigh((given + adjoint(given)) / 2)
+    traces = values.sum(axis=-1)
+    refuse(abs(traces - 1) > tol, "states", lambda i: f"has the trace {traces[i]:.9g}. Divide it by its trace.")
+    refuse(
+        values[..., 0] < -tol,
+        "states",
+        lambda i: f"is not positive semidefinite: its smallest eigenvalue is {values[i][0]:.3g}",
+    )
+    roots = (vectors * np.sqrt(np.maximum(values, 0))[..., None, :]) @ adjoint(vectors)
+    for k in range(1, roots.shape[-3]):
+        u, _, v = np.linalg.svd(adjoint(roots[..., k, :, :]) @ roots[..., k - 1, :, :])
+        roots[..., k, :, :] = roots[..., k, :, :] @ u @ v
+    flat = roots.reshape(*roots.shape[:-2], -1)
+    return np.asarray(flat / np.linalg.norm(flat, axis=-1, keepdims=True))
+
+
+def density(purifications: ArrayLike) -> Array:
+    """Convert pure states of a doubled system to density matrices, by a partial trace.
+
+    Parameters
+    ----------
+    purifications : array_like, shape (..., n²)
+        Unit vectors, such as points of a curve through the result of `purify`.
+
+    Returns
+    -------
+    ndarray, shape (..., n, n)
+        Density matrices.
+
+    Raises
+    ------
+    ValidationError
+        If the number of entries is not a square, or a vector is not a unit vector.
+
+    See Also
+    --------
+    purify : The inverse operation.
+
+    Examples
+    --------
+    A Bell state is maximally mixed for either qubit:
+
+    >>> import symspline as ss
+    >>> ss.quantum.density([2**-0.5, 0, 0, 2**-0.5]).real.round(8)
+    array([[0.5, 0. ],
+           [0. , 0.5]])
+    """
+    given, tol = numbers(purifications, "purifications", 1)
+    n = isqrt(given.shape[-1])
+    if not n or n * n != given.shape[-1]:
+        raise ValidationError(f"purifications has shape {given.shape}, but must have shape (..., n²).")
+    norms = np.linalg.norm(given, axis=-1)
+    refuse(~(abs(norms - 1) <= tol), "purifications", lambda i: f"has the norm {norms[i]:.9g}. Normalise it.")
+    w = given.reshape(*given.shape[:-1], n, n)
+    return np.asarray(w @ adjoint(w))
 
 
 # ---- states ----
