@@ -612,8 +612,12 @@ def purify(states: ArrayLike) -> Array:
     off = np.abs(given - adjoint(given)).max(axis=(-2, -1))
     refuse(off > tol, "states", lambda i: f"is not Hermitian: ρ − ρ* has an entry of {off[i]:.3g}")
     values, vectors = np.linalg.eigh((given + adjoint(given)) / 2)
-    traces = values.sum(axis=-1)
-    refuse(abs(traces - 1) > tol, "states", lambda i: f"has the trace {traces[i]:.9g}. Divide it by its trace.")
+    traces: Array = np.asarray(values.sum(axis=-1))
+    refuse(
+        np.asarray(np.abs(traces - 1) > tol),
+        "states",
+        lambda i: f"has the trace {traces[i]:.9g}. Divide it by its trace.",
+    )
     refuse(
         values[..., 0] < -tol,
         "states",

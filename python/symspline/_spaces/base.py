@@ -908,7 +908,7 @@ class Space(Generic[P]):
         self.check_point(kept.astype(given.dtype) if given.dtype.kind in "fc" else kept)
         return lead, groups_of(lead, kept, full)
 
-    def _batched(self, rows: Array, batch: tuple[int, ...]) -> Any:
+    def _batched(self, rows: Any, batch: tuple[int, ...]) -> Any:
         return rows.reshape(batch + self._point_shape)
 
     # ---- random points ----
