@@ -188,7 +188,8 @@ fn difference(a: &[f64], b: &[f64]) -> f64 {
 
 fn run(operation: Operation, inputs: &[&[f64]], t: &[f64], len: usize) -> Result<Vec<f64>, Fault> {
     let mut out = vec![0.0; len];
-    apply(&Erased(&Circles::new(2).unwrap()), operation, inputs, t, &Monitor::new(&ON), &mut out).map(|()| out)
+    apply(&Erased(&Circles::new(2).unwrap()), operation, inputs, t, &Monitor::new(&ON), &mut out)
+        .map(|()| out)
 }
 
 /// The velocities of the spline through points.

@@ -1,6 +1,6 @@
 //! Laws of the triple product.
 
-use super::draw::{Draw, combined, exp, minus, norm, rounding, scaled, tangent_at};
+use super::draw::{Draw, combined, exp, minus, norm, rounding, scaled, step_between, tangent_at};
 use super::verdict::{Verdict, within};
 use crate::scalar::{Lane, dot, lane};
 use crate::space::{Ambient, Erased, Frame, Origin};
@@ -118,7 +118,7 @@ pub fn stretch(space: &Erased, draw: &mut Draw) -> Verdict {
         let mut moved = vec![Lane::ZERO; p.len()];
         for (k, w) in [4.0 / 5.0, -1.0 / 5.0, 4.0 / 105.0, -1.0 / 280.0].into_iter().enumerate() {
             let r = 0.01 * (k + 1) as f64;
-            moved = sum(&moved, &scaled(&minus(&at(r), &at(-r)), w / 0.01));
+            moved = sum(&moved, &scaled(&step_between(&at(r), &at(-r)), w / 0.01));
         }
         space.velocity(&q, &mut moved);
         let (mut frame, mut chord) = (vec![Lane::ZERO; space.frame_len()], vec![Lane::ZERO; x.len()]);

@@ -1,7 +1,8 @@
 //! Laws of points and tangent vectors as arrays.
 
 use super::draw::{
-    Draw, STEPS, combined, distance, exp, is_other, length, log, minus, norm, rounding, scaled, tangent_at,
+    Draw, STEPS, combined, distance, exp, is_other, length, log, minus, norm, rounding, scaled, step_between,
+    tangent_at,
 };
 use super::verdict::{Verdict, within};
 use crate::scalar::{Jet, LANES, Lane, lane};
@@ -290,8 +291,11 @@ fn derivatives_at(space: &Erased, draw: &mut Draw, part: f64, loose: f64) -> Ver
     let (mut d, mut dd) = (vec![Lane::ZERO; p.len()], vec![Lane::ZERO; p.len()]);
     for (k, w) in WEIGHTS.into_iter().enumerate() {
         let r = STEP * (k + 1) as f64;
-        for ((d, dd), (a, b)) in d.iter_mut().zip(&mut dd).zip(at(r).iter().zip(&at(-r))) {
-            *d += (a.v - b.v) * lane(w / STEP);
+        let (a, b) = (at(r), at(-r));
+        let values = |x: &[Jet]| x.iter().map(|x| x.v).collect::<Vec<_>>();
+        let steps = step_between(&values(&a), &values(&b));
+        for ((d, dd), (step, (a, b))) in d.iter_mut().zip(&mut dd).zip(steps.iter().zip(a.iter().zip(&b))) {
+            *d += *step * lane(w / STEP);
             *dd += (a.d - b.d) * lane(w / STEP);
         }
     }

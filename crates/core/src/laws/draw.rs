@@ -139,6 +139,16 @@ pub fn minus(a: &[Lane], b: &[Lane]) -> Vec<Lane> {
     combined(a, -1.0, b)
 }
 
+/// `a − b` of arrays of points close together. Angles in (−π, π] may differ by a whole turn, which is not a step.
+pub fn step_between(a: &[Lane], b: &[Lane]) -> Vec<Lane> {
+    let turn = lane(std::f64::consts::TAU);
+    let turned = |d: Lane, a: Lane, b: Lane| {
+        let angles = a.abs().max(b.abs()).simd_le(lane(std::f64::consts::PI));
+        (angles & d.abs().simd_gt(lane(4.0))).select(d - turn * (d / turn).round(), d)
+    };
+    a.iter().zip(b).map(|(&a, &b)| turned(a - b, a, b)).collect()
+}
+
 pub fn norm(a: &[Lane]) -> Lane {
     dot(a, a).sqrt()
 }
