@@ -472,6 +472,12 @@ def linear_acceleration(
     return motion.in_frame(motion.position("acceleration"))
 
 
+def _cross(a: Array, b: Array) -> Array:
+    """Return the cross product of vectors, with fewer copies than ``numpy.cross`` makes."""
+    (x, y, z), (u, v, w) = np.moveaxis(a, -1, 0), np.moveaxis(b, -1, 0)
+    return np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=-1)
+
+
 class _Motion:
     """Motion of a body at times x, with vectors in a frame."""
 
@@ -485,28 +491,37 @@ class _Motion:
                 f"the curve must be on se:3, or on a product with one so:3 and one r:3, not on {spline.space}"
             )
         self._position = found[0]
+        self._is_se3 = cover_of(found[0].space) == _SE3
         self._time_axis, self._x = spline._time_axis, x
         self._where, self._per_curve = spline._where(extrapolate), per_curve
 
     @cached_property
+    def _screw(self) -> tuple[Array, Array, Array]:
+        """On se:3, the twist (ω, v) = g⁻¹g', its derivative, and the pose, from one evaluation."""
+        values = self._at(self._position, "motion")
+        return values[..., :6], values[..., 6:12], values[..., 12:].reshape(*values.shape[:-1], 4, 4)
+
+    @cached_property
     def rotation(self) -> Array:
-        return self._at(self._attitude, "point")
+        return self._screw[2][..., :3, :3] if self._is_se3 else self._at(self._attitude, "point")
 
     @cached_property
     def turning(self) -> Array:
         """The angular velocity in the frame of the body."""
-        return self._at(self._attitude, "body velocity")
+        return self._screw[0][..., :3] if self._is_se3 else self._at(self._attitude, "body velocity")
 
     def position(self, quantity: str) -> Array:
         """The position in the frame of the world, or its velocity or acceleration."""
-        values = self._at(self._position, quantity)
-        if cover_of(self._position.space) != _SE3:
-            return values
-        values = values[..., :3, 3]
+        if not self._is_se3:
+            return self._at(self._position, quantity)
+        twist, change, pose = self._screw
+        if quantity == "point":
+            return pose[..., :3, 3]
+        along = twist[..., 3:]
         if quantity == "acceleration":
-            # ẍ is not the acceleration of the connection.
-            values = values + np.cross(turned(self.rotation, self.turning), self.position("velocity"))
-        return values
+            # ẋ = Rv and ẍ = R(v' + ω × v)
+            along = change[..., 3:] + _cross(twist[..., :3], along)
+        return turned(pose[..., :3, :3], along)
 
     def in_frame(self, v: Array) -> Array:
         """Rᵀv for vectors in the world if the frame is that of the body."""

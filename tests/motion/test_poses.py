@@ -61,7 +61,7 @@ def test_twist_is_that_of_the_matrices(name):
     for frame, hat in (("body", inverse @ change), ("world", change @ inverse)):
         expected = np.stack([hat[:, 2, 1], hat[:, 0, 2], hat[:, 1, 0], *hat[:, :3, 3].T], axis=-1)
         assert np.abs(poses.twist(spline, INNER, frame) - expected).max() < 1e-8
-    assert np.array_equal(poses.twist(spline, INNER)[:, :3], rotations.angular_velocity(spline, INNER))
+    assert np.abs(poses.twist(spline, INNER)[:, :3] - rotations.angular_velocity(spline, INNER)).max() < 1e-13
 
 
 def circle(n=40):
@@ -150,11 +150,20 @@ def test_nanoseconds_are_not_seconds():
     assert np.abs(dated.specific_force - plain.specific_force).max() < 1e-12
 
 
+def test_a_retimed_curve_has_the_signals_of_its_motion():
+    spline = curve("se:3")
+    slow = spline.retime(lambda x, nu=0: [x**2 / 4, x / 2, 0.5 + 0 * x][nu], domain=(0.5, 4))
+    h, x = 1e-4, np.linspace(1, 3.5, 7)
+    before, here, after = (slow(x + k * h)[..., :3, 3] for k in (-1, 0, 1))
+    assert np.abs(poses.linear_velocity(slow, x) - (after - before) / (2 * h)).max() < 3e-7
+    assert np.abs(poses.linear_acceleration(slow, x) - (after - 2 * here + before) / h**2).max() < 3e-6
+
+
 def test_nothing_is_evaluated_twice():
     for name, call, most in [
-        ("se:3", poses.imu, 4),
+        ("se:3", poses.imu, 1),
         ("so:3 x r:3", poses.imu, 3),
-        ("se:3", poses.twist, 3),
+        ("se:3", poses.twist, 1),
         ("so:3 x r:3", poses.linear_velocity, 1),
     ]:
         assert 1 <= core_calls("evaluate", partial(call, curve(name), INNER)) <= most

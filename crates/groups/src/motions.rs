@@ -31,7 +31,7 @@ pub fn write_vector(g: &Motion<Lane>, [omega, v]: Twist<Lane>, w: &mut [Lane]) {
 
 /// ξ of a tangent vector gξ.
 #[inline(always)]
-fn twist(g: &Motion<Lane>, w: &[Lane]) -> Twist<Lane> {
+pub fn twist(g: &Motion<Lane>, w: &[Lane]) -> Twist<Lane> {
     [angular(g.q, w), rotate(conjugate(g.q), [w[4], w[5], w[6]])]
 }
 

@@ -379,4 +379,10 @@ impl Covered for SpecialEuclidean {
         }
         self.last_row(if w.is_none() { Lane::ONE } else { Lane::ZERO }, out);
     }
+    #[inline(always)]
+    fn body<'o>(&self, y: &[Lane], w: &[Lane], out: &'o mut [Lane]) -> &'o [Lane] {
+        let dim = 3 * (self.n - 1);
+        self.pack(motions::twist(&motions::read(y), w), &mut out[..dim]);
+        &out[..dim]
+    }
 }

@@ -215,6 +215,7 @@ fn quantity_named(name: &str) -> PyResult<Quantity> {
         "bend" => Quantity::AccelerationNorm,
         "body velocity" => Quantity::BodyVelocity,
         "body acceleration" => Quantity::BodyAcceleration,
+        "motion" => Quantity::Motion,
         _ => return Err(invalid(format!("unknown quantity {name:?}"))),
     })
 }

@@ -226,6 +226,13 @@ class Retimed:
             result = value("bend")
         elif quantity == "bend":
             result = product_norm(tuple(_acceleration_norm(part, x, outside, per_curve) for part in self.parts))
+        elif quantity == "motion":
+            # The twist, its derivative, and the point; see `CoreCurve.evaluate`.
+            dim, found = self.space.dim, value("motion")
+            first, second = (np.asarray(self.law(x, order))[..., None] for order in (1, 2))
+            twist, change = found[..., :dim], found[..., dim : 2 * dim]
+            rates = [first * twist, second * twist + first**2 * change]
+            result = np.concatenate([*rates, found[..., 2 * dim :]], axis=-1)
         else:
             lower = _ORDERS[quantity]
             factors = _chain_rule([self.law(x, order) for order in range(1, len(lower) + 1)])

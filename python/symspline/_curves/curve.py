@@ -26,7 +26,7 @@ from .solve import Options, Solved, Task, solve_single, validate
 Tuple = tuple[Any, ...]
 NORMS = ("speed", "bend")
 # Quantities that are real numbers or vectors, not points or tangent vectors of the space.
-REAL = (*NORMS, "body velocity", "body acceleration")
+REAL = (*NORMS, "body velocity", "body acceleration", "motion")
 # Matrices of these spaces have a constant last row, which the core also writes for curves without a solution.
 _CONSTANT_ROW = (SpecialEuclidean, Similarity, Affine)
 
@@ -151,8 +151,9 @@ class CoreCurve:
         x : ndarray
             Sampling times.
         quantity : str
-            ``"point"``, ``"velocity"``, ``"acceleration"``, ``"speed"`` or ``"bend"``, which is |∇γ'|. Rotations also
-            have ``"body velocity"`` and ``"body acceleration"``.
+            ``"point"``, ``"velocity"``, ``"acceleration"``, ``"speed"`` or ``"bend"``, which is |∇γ'|. Rotations and
+            poses also have ``"body velocity"``, ``"body acceleration"``, and ``"motion"``: both of these and the
+            point, one after the other.
         outside : {"raise", "continue", "geodesic", "periodic"}
             Extrapolation policy.
         per_curve : bool

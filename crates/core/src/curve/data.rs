@@ -39,6 +39,8 @@ pub enum Quantity {
     BodyVelocity,
     /// ∇γ' in the body frame: angular acceleration.
     BodyAcceleration,
+    /// γ' and ∇γ' in the body frame, and γ, one after the other.
+    Motion,
 }
 
 /// The extrapolation policy for times outside the knots.
@@ -76,7 +78,7 @@ impl Quantity {
 
     /// Whether the result is a vector in the body frame.
     pub fn is_of_body(self) -> bool {
-        matches!(self, Quantity::BodyVelocity | Quantity::BodyAcceleration)
+        matches!(self, Quantity::BodyVelocity | Quantity::BodyAcceleration | Quantity::Motion)
     }
 
     /// The number of derivatives of the curve that the quantity requires.
@@ -84,7 +86,10 @@ impl Quantity {
         match self {
             Quantity::Point => 0,
             Quantity::Velocity | Quantity::Speed | Quantity::BodyVelocity => 1,
-            Quantity::Acceleration | Quantity::AccelerationNorm | Quantity::BodyAcceleration => 2,
+            Quantity::Acceleration
+            | Quantity::AccelerationNorm
+            | Quantity::BodyAcceleration
+            | Quantity::Motion => 2,
         }
     }
 }

@@ -23,6 +23,7 @@ impl Quantity {
     pub fn len(self, space: &Erased) -> usize {
         match self {
             _ if self.is_length() => 1,
+            Quantity::Motion => 2 * space.dim() + space.point_len(),
             _ if self.is_of_body() => space.dim(),
             _ => space.point_len(),
         }
@@ -123,7 +124,8 @@ impl Job<'_> {
         let cover = space.cover();
         let (len, ambient) = (C::LEN, self.len);
         let mut buffer = vec![Lane::ZERO; 4 * ambient];
-        let mut result = vec![Lane::ZERO; 2 * ambient];
+        let dim = (self.size.max(ambient) - ambient) / 2;
+        let mut result = vec![Lane::ZERO; 2 * ambient.max(self.size)];
         self.each(
             out,
             len,
@@ -139,6 +141,14 @@ impl Job<'_> {
             },
             |cursor, segment, gamma, vectors, out| {
                 let (p, vector) = self.sample(&cover, cursor, segment, gamma, vectors, len);
+                if let (Quantity::Motion, Some(w)) = (self.quantity, vector) {
+                    let (first, second) = w.split_at(len);
+                    let (rates, point) = result[..self.size].split_at_mut(2 * dim);
+                    space.body(p, first, &mut rates[..dim]);
+                    space.body(p, second, &mut rates[dim..]);
+                    space.leave(segment.side, p, None, point);
+                    return out.write(&result[..self.size]);
+                }
                 let [point, result] = two(&mut result, ambient);
                 if let (true, Some(w)) = (self.quantity.is_of_body(), vector) {
                     return out.write(space.body(p, w, result));
@@ -186,7 +196,7 @@ impl Job<'_> {
         }
     }
 
-    /// Points of eight samples, and vectors there if the quantity requires them.
+    /// Points of eight samples, and vectors there if the quantity requires them; two for [`Quantity::Motion`].
     #[inline(always)]
     fn sample<'v, S: Scalar, M: Ambient>(
         &self,
@@ -217,17 +227,19 @@ impl Job<'_> {
                 dd[i] = second * cursor.rate * cursor.rate;
             }
         }
-        match self.quantity.order() {
-            0 => (p, None),
-            1 => {
-                space.velocity(p, d);
-                (p, Some(d))
-            }
-            _ => {
-                space.acceleration(p, d, dd);
-                (p, Some(dd))
-            }
+        if self.quantity.order() == 2 {
+            space.acceleration(p, d, dd);
         }
+        if self.quantity.order() == 1 || self.quantity == Quantity::Motion {
+            space.velocity(p, d);
+        }
+        let derivatives = match self.quantity.order() {
+            0 => None,
+            1 => Some(&derivatives[..len]),
+            _ if self.quantity == Quantity::Motion => Some(&derivatives[..2 * len]),
+            _ => Some(&derivatives[len..2 * len]),
+        };
+        (p, derivatives)
     }
 
     /// Gathers the ends of eight segments, and the handles there: h/3 times the velocities.

@@ -231,9 +231,9 @@ pub trait Covered: Space {
     /// with it the end point y of the segment and the tangent vector w there.
     fn choose(&self, from: &[Lane], qyw: [&mut [Lane]; 3]);
     /// A tangent vector w at y of the cover in the body frame, in the first numbers of `out`: the element ω of the
-    /// Lie algebra with p' = pω. Only rotations of three dimensions have it.
+    /// Lie algebra with p' = pω. Only rotations of three dimensions and rigid motions have it.
     fn body<'o>(&self, _y: &[Lane], _w: &[Lane], _out: &'o mut [Lane]) -> &'o [Lane] {
-        unreachable!("body frames are those of rotations of three dimensions")
+        unreachable!("body frames are those of rotations of three dimensions and of rigid motions")
     }
     /// The component of a disconnected space that contains a point: 1 or −1 in each lane. One cover serves both.
     fn side(&self, _p: &[Lane]) -> Lane {
