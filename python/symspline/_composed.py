@@ -154,7 +154,7 @@ class RetimedCurve(ComposedCurve[P]):
         )
 
     def __repr__(self) -> str:
-        return f"<RetimedCurve on {self.space!r}: {self._batch_text}{_span_text(self)}>"
+        return f"<RetimedCurve on {self.space!r}: {self._batch_text}{self._span_text}>"
 
 
 class SegmentedCurve(ComposedCurve[P], Generic[P, C]):
@@ -292,12 +292,7 @@ class SegmentedCurve(ComposedCurve[P], Generic[P, C]):
 
     def __repr__(self) -> str:
         batch = f"{' x '.join(map(str, self._batch))} curves, " if self._batch else ""
-        return f"<SegmentedCurve on {self.space!r}: {batch}{len(self)} segments, {_span_text(self)}>"
-
-
-def _span_text(curve: Curve[Any]) -> str:
-    first, last = curve.domain
-    return f"from {first} to {last}" if not np.ndim(first) else "with times of their own"
+        return f"<SegmentedCurve on {self.space!r}: {batch}{len(self)} segments, {self._span_text}>"
 
 
 def _checked_segments(curves: Any) -> tuple[Any, ...]:

@@ -144,7 +144,7 @@ class ControlledSpline(Curve[P]):
 
     def __repr__(self) -> str:
         count = self.knots.size - self.degree - 1
-        what = f"{self._batch_text}{count} control points, degree {self.degree}"
+        what = f"{self._batch_text}{count} control points, degree {self.degree}, {self._span_text}"
         return f"<{type(self).__name__} on {self.space!r}: {what}>"
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from functools import cached_property
 from types import GenericAlias
@@ -512,7 +513,15 @@ class CubicSpline(PiecewiseCubic[P], Generic[P, R]):
     def __repr__(self) -> str:
         knots = self._times.shape[-1]
         bc = self._bc_type if isinstance(self._bc_type, str) else "custom end conditions"
-        return f"<CubicSpline on {self.space!r}: {self._batch_text}{knots} points, {bc}>"
+        text = f"{self._batch_text}{knots} points, {self._span_text}, {bc}{self._failed_text}"
+        return f"<CubicSpline on {self.space!r}: {text}>"
+
+    @property
+    def _failed_text(self) -> str:
+        """The number of curves that did not converge, for the representation."""
+        failed = self._unconverged
+        count = f" ({failed} of {math.prod(self._batch)})" if self._batch else ""
+        return f", NOT converged{count}" if failed else ""
 
     # Title of plots.
     _kind = "C² spline"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from abc import abstractmethod
 from collections.abc import Callable, Iterator
 from typing import Any, ClassVar, Self
@@ -317,6 +318,14 @@ class CurveBase(Searchable[P]):
         """The batch in the representation of the curve."""
         return f"{' x '.join(map(str, self._batch))} curves, " if self._batch else ""
 
+    @property
+    def _span_text(self) -> str:
+        """The domain in the representation of the curve."""
+        first, last = self.domain
+        if np.ndim(first):
+            return "each with its own times"
+        return f"from {_time_text(first)} to {_time_text(last)}"
+
     @abstractmethod
     def _picked(self, index: Any) -> Self:
         """Return one curve of a batch, or a slice of the batch."""
@@ -391,3 +400,10 @@ class CurveBase(Searchable[P]):
     @abstractmethod
     def _from_state(cls, state: _archive.Entries) -> Self:
         """Return the curve of a state."""
+
+
+def _time_text(x: Any) -> str:
+    """Return a time in a few characters; dates without the zeros at their end."""
+    if isinstance(x, np.datetime64):
+        return re.sub(r"(:00)?\.?0*$", "", str(x)) if "." in str(x) else str(x)
+    return f"{float(x):.6g}"

@@ -152,7 +152,7 @@ class PiecewiseGeodesic(PiecewiseCubic[P]):
         return energy[()]
 
     def __repr__(self) -> str:
-        return f"<PiecewiseGeodesic on {self.space!r}: {self._batch_text}{self._t.shape[-1]} points>"
+        return f"<PiecewiseGeodesic on {self.space!r}: {self._batch_text}{self._t.shape[-1]} points, {self._span_text}>"
 
     def _of_nodes(
         self, time_axis: TimeAxis, t: Array, times: Doubles, arrays: list[tuple[Array, Array]], extrapolate: Extrapolate

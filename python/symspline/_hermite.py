@@ -227,7 +227,8 @@ class HermiteSpline(PiecewiseCubic[P]):
         return cls._of(time_axis, knots, curve, "natural", extrapolate)
 
     def __repr__(self) -> str:
-        return f"<HermiteSpline on {self.space!r}: {self._batch_text}{self._curve.times.shape[-1]} points>"
+        count = self._curve.times.shape[-1]
+        return f"<HermiteSpline on {self.space!r}: {self._batch_text}{count} points, {self._span_text}>"
 
     def _with(self, time_axis: TimeAxis, t: Array, curve: CurveArrays, index: Any) -> Any:
         return HermiteSpline._of(time_axis, t, curve, "natural", self._extrapolate)

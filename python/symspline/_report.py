@@ -141,8 +141,9 @@ class Report:
         else:
             state = f"{np.count_nonzero(converged)} of {converged.size} curves converged"
             many = "at most " if converged.size > 1 else ""
+        worst = f" (curve {_place_of_worst(self.residual)})" if converged.size > 1 and np.isfinite(residual) else ""
         text = (
-            f"{state}: {self.method}, {many}{iterations} iterations, residual {many}{residual:.1e}, "
+            f"{state}: {self.method}, {many}{iterations} iterations, residual {many}{residual:.1e}{worst}, "
             f"longest step {_worst(self.max_step):.3g}, contraction {_worst(self.rate):.2g}"
         )
         if self.invariant_radius is not None and not np.isnan(self.invariant_radius).any():
@@ -150,6 +151,12 @@ class Report:
         if self.velocity_error is not None:
             text += f", velocities within {_worst(self.velocity_error):.1e}"
         return text
+
+    def __repr__(self) -> str:
+        if np.ndim(self.converged):
+            # The fields of a batch are long arrays.
+            return f"<Report of {np.size(self.converged)} curves: {self}>"
+        return f"Report({', '.join(f'{own.name}={getattr(self, own.name)!r}' for own in fields(self))})"
 
     def __eq__(self, other: object) -> bool:
         return same_report(self, other) if isinstance(other, Report) else NotImplemented
@@ -181,6 +188,12 @@ class Report:
 def _worst(values: Any) -> Any:
     """Return the largest value, without those of failed curves, which are NaN."""
     return np.fmax.reduce(np.ravel(values))
+
+
+def _place_of_worst(values: Any) -> str:
+    """Return the index of the largest value in the batch."""
+    index = np.unravel_index(np.nanargmax(values), np.shape(values))
+    return ", ".join(str(i) for i in index)
 
 
 def columns_of(kind: type) -> dict[str, type]:

@@ -152,7 +152,7 @@ def test_batches_are_single_curves():
         assert curve == ss.PiecewiseGeodesic(times[i], points[i], S2)
         assert np.array_equal(curves(x, per_curve=True)[i], curve(x[i]))
     assert len(curves[1:]) == 2
-    assert repr(curves) == "<PiecewiseGeodesic on Sphere(2): 3 curves, 6 points>"
+    assert repr(curves) == "<PiecewiseGeodesic on Sphere(2): 3 curves, 6 points, each with its own times>"
 
 
 def test_quotients_take_the_nearest_representative():

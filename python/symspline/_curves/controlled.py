@@ -90,9 +90,22 @@ class CumulativeCurve(ControlledCurve):
         return points
 
     def _at(self, x: Doubles, quantity: str) -> Any:
+        if quantity == "motion":
+            return self._motion(x)
         space, control = self.space, self.space._as_doubles(self.control_points)
         values = _core.evaluate_bspline(space._handle, self.knots, control, self.degree, x, quantity, self._steps)
         return values if quantity in REAL else space._numbers(values)
+
+    def _motion(self, x: Doubles) -> Any:
+        """Return the twist g⁻¹g' on se:3, its derivative and the pose g, as the core does for other curves."""
+        g, velocity, acceleration = (self._at(x, name) for name in ("point", "velocity", "acceleration"))
+        turned = np.swapaxes(g[..., :3, :3], -1, -2)
+        rates = []
+        # The acceleration is gξ' for the twist ξ.
+        for vector in (velocity, acceleration):
+            body = turned @ vector[..., :3, :]
+            rates += [body[..., [2, 0, 1], [1, 2, 0]], body[..., 3]]
+        return np.concatenate([*rates, g.reshape(*g.shape[:-2], 16)], axis=-1)
 
     def evaluate(
         self,

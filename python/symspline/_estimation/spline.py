@@ -218,4 +218,5 @@ class EstimatedSpline(SmoothingSpline[P, Any]):
 
     def __repr__(self) -> str:
         knots, parameters = self._times.shape[-1], ", ".join(self._parameters) or "no parameters"
-        return f"<EstimatedSpline on {self.space!r}: {knots} knots, {parameters}>"
+        text = f"{knots} knots, {self._span_text}, {parameters}{self._failed_text}"
+        return f"<EstimatedSpline on {self.space!r}: {text}>"

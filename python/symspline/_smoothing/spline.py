@@ -659,7 +659,8 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
 
     def __repr__(self) -> str:
         data, knots = self._noisy.times.shape[-1], self._times.shape[-1]
-        return f"<SmoothingSpline on {self.space!r}: {self._batch_text}{data} data, {knots} knots>"
+        text = f"{self._batch_text}{data} data, {knots} knots, {self._span_text}{self._failed_text}"
+        return f"<SmoothingSpline on {self.space!r}: {text}>"
 
 
 def radius(space: Space, level: float) -> float:

@@ -68,7 +68,7 @@ def values(found):
     """Numbers that describe a curve, or each curve of a mapping."""
     if isinstance(found, dict):
         return {name: values(curve) for name, curve in found.items()}
-    numbers = {"class": type(found).__name__, "space": str(found.space), "repr": repr(found)}
+    numbers = {"class": type(found).__name__, "space": str(found.space)}
     if isinstance(found, ss.GridSpline):
         x = (found.axes[0][0] + (found.axes[0][-1] - found.axes[0][0]) // 3, 1.5)
         return numbers | {f"nu={nu}": [plain(found(x, nu))] for nu in [(0, 0), (1, 0), (0, 2)]}

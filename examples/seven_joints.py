@@ -1,0 +1,66 @@
+"""
+An arm with seven joints
+========================
+
+A robot arm has seven joints, and every joint has its own limits of speed and acceleration. You have joint angles at a
+few poses of the arm, and want the fastest smooth motion through them.
+"""
+
+# %%
+# Angles as numbers
+# -----------------
+# Joint angles jump from 180° to −180°. If you interpolate the numbers, a joint that crosses this jump turns the long way
+# round: here the last joint moves by 20°, and the numbers move by 340°.
+
+import matplotlib.pyplot as plt
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+import symspline as ss
+
+degrees = np.array([
+    [0, -30, 0, -100, 0, 70, 170],
+    [25, -10, 20, -120, 15, 90, -170],
+    [60, 15, 35, -90, 40, 110, -150],
+    [85, 30, 20, -60, 20, 95, 175],
+    [90, 10, 0, -75, 0, 80, 150],
+])  # fmt: skip
+angles = np.radians(degrees)
+naive = CubicSpline(np.arange(5), degrees)
+
+# %%
+# A path on the torus
+# -------------------
+# The points of ``"torus:7"`` are seven angles. Neighbouring points are joined the short way round. For limits of single
+# joints, use a product of seven circles: every factor then has its own limits.
+
+joints = ss.space(" x ".join(["torus:1"] * 7))
+path = ss.CubicSpline(None, np.split(angles, 7, axis=1), joints)
+
+# %%
+# The fastest traversal
+# ---------------------
+# `time_law` computes the fastest time law under the limits, from rest to rest. `retime` applies it to the path.
+
+speed = np.radians([150, 150, 150, 180, 180, 225, 225])  # rad/s
+acceleration = np.radians([450, 450, 450, 600, 600, 750, 750])  # rad/s²
+law = ss.time_law(path, max_speed=tuple(speed), max_acceleration=tuple(acceleration))
+motion = path.retime(law)
+print(f"the motion takes {law.duration:.2f} s")
+
+t = np.linspace(0, law.duration, 500)
+rates = np.concatenate(motion(t, nu=1), axis=1)
+used = np.abs(rates) / speed
+
+figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4), layout="constrained")
+x = np.linspace(0, 4, 500)
+left.plot(x, naive(x)[:, 6], color="0.6", label="numbers: the long way round")
+turned = np.degrees(np.unwrap(path(x)[6][:, 0]))
+left.plot(x, turned, color="C0", label="torus")
+left.plot(range(5), degrees[:, 6], "k.")
+left.set(xlabel="waypoint", ylabel="last joint in degrees", title="Angles of the last joint")
+left.legend()
+right.plot(t, 100 * used)
+right.axhline(100, color="0.5", linestyle="--", linewidth=0.8)
+right.set(xlabel="s", ylabel="% of the limit", ylim=(0, None), title="Speeds of the seven joints")
+plt.show()
