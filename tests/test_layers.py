@@ -27,7 +27,7 @@ LAYERS = [
         "_warnings",
     ],
     ["_spaces"],
-    ["_curves", "manifolds"],
+    ["_closed_forms", "_curves", "manifolds"],
     ["_errors", "_options", "_plotting", "_representatives", "_validation"],
     ["_archive", "_search"],
     ["_curve", "_curve_base"],

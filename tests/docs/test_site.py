@@ -26,7 +26,7 @@ PAGES = sorted(path for path in DOCS.rglob("*") if path.suffix in (".md", ".rst"
 PAGES = [path for path in PAGES if not {"gallery", "generated", "backreferences", "_templates"} & set(path.parts)]
 GALLERY = (ROOT / "examples/index.rst").read_text(encoding="utf-8")
 # Their own tests run or compare what they quote.
-OTHERS = {"adding-a-space.md", "jax.md", "shapes.md", "smoothing.md", "solvers.md"}
+OTHERS = {"adding-a-space.md", "array_api.md", "jax.md", "shapes.md", "smoothing.md", "solvers.md"}
 
 
 def listed(page):

@@ -23,7 +23,8 @@ def data(name, step=0.8):
 @pytest.mark.parametrize(
     ("name", "ends"),
     [("sphere:2", "natural"), ("sphere:2", "velocity"), ("sphere:3", "clamped"), ("so:2", "natural")]
-    + [("so:3", ends) for ends in ("natural", "clamped", "velocity")],
+    + [("so:3", ends) for ends in ("natural", "clamped", "velocity")]
+    + [("se:3", "velocity"), ("spd:2", "natural"), ("hpd:2", "velocity"), ("r:2", "clamped")],
 )
 def test_velocities_are_those_of_the_core(name, ends):
     space, points, v = data(name)
@@ -71,6 +72,32 @@ def test_gradients_through_fit_and_evaluate_are_those_of_the_core():
     found = jax.jit(jax.grad(in_jax, (0, 1, 2)))(T, points, v)
     for a, b in zip(found, jax.grad(compiled, (0, 1, 2))(T, points, v), strict=True):
         np.testing.assert_allclose(a, b, atol=1e-11)
+
+
+@pytest.mark.parametrize("name", ["se:3", "spd:2"])
+def test_derivatives_under_jit_and_vmap_are_those_of_the_core(name):
+    """Of first order beside differences of the core, for two curves with their own knots."""
+    space = ss.space(name)
+    points = np.stack([walk(space, 0.5, 4, np.random.default_rng(i)) for i in range(2)])
+    moves = np.stack([[unit_tangent(space, p, np.random.default_rng(i)) for p in row] for i, row in enumerate(points)])
+    knots = np.stack([T[:4], 1.2 * T[:4]])
+
+    def moved(s, t, p, v):
+        return t * (1 + s * t), p + s * v
+
+    def velocities(t, p, v):
+        return jax.jvp(lambda s: fit(*moved(s, t, p, v), space)[0], (0.0,), (1.0,))
+
+    found, change = jax.jit(jax.vmap(velocities))(knots, points, moves)
+    np.testing.assert_allclose(found, ss.CubicSpline(knots, points, space).velocities, atol=1e-11)
+    h = 1e-3
+
+    def core(s):
+        t, p = moved(s, knots, points, moves)
+        return ss.CubicSpline(t, space.project(p), space).velocities
+
+    difference = sum(w * core(k * h) for w, k in ((1, -2), (-8, -1), (8, 1), (-1, 2))) / (12 * h)
+    np.testing.assert_allclose(change, difference, atol=1e-8)
 
 
 def test_second_derivatives_follow_the_refitted_curve():

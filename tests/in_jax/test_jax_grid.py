@@ -193,6 +193,6 @@ def test_invalid_grids_raise():
             lambda: grid_spline(FLAT, (U, V), points, "sphere:2", bc_type=("natural", ((1, np.zeros(3)), "natural"))),
         ),
         ("it is not finite", lambda: grid_spline(FLAT, (U, V), np.where(points > 0.9, np.nan, points), "sphere:2")),
-        ("does not support", lambda: grid_evaluate((U, V), field("spd:2"), "spd:2", FLAT)),
+        ("does not support", lambda: grid_evaluate((U, V), field("u:2"), "u:2", FLAT)),
     ]:
         raises(match, call)

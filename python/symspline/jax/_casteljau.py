@@ -7,12 +7,12 @@ from typing import Any, overload
 import jax
 import jax.numpy as jnp
 
+from .._closed_forms import casteljau
+from .._closed_forms.models import Model
 from .._core import ValidationError
 from .._options import order_of
 from .._spaces import Product, Space, parts_of, refuse_quotients, space_named
-from ._models import Model
-from ._registry import QUOTIENTS, model_of, second_fundamental_form
-from ._spectral import adjoint
+from ._registry import LIBRARY, model_of
 
 
 @overload
@@ -129,47 +129,19 @@ def _values(model: Model, space: Space, t: Any, points: Any, velocities: Any, x:
     if nu == 0:
         found = curve(x)
     elif nu == 1:
-        point, found = velocity(x)
-        if isinstance(space, QUOTIENTS):
-            found = _horizontal(space, point, found)
+        found = casteljau.velocity(space, *velocity(x))
     else:
         (point, first), (_, second) = acceleration(x)
-        if isinstance(space, QUOTIENTS):
-            found = _horizontal(space, point, first, second)
-        else:
-            found = second - second_fundamental_form(space, point, first, first)
+        found = casteljau.acceleration(LIBRARY, space, point, first, second)
     # As in `symspline._time.onto_ends`, a few units in the last place beyond the ends are rounding.
     reach = 4 * jnp.finfo(x.dtype).eps * jnp.maximum(jnp.abs(t[0]), jnp.abs(t[-1]))
     inside = (x >= t[0] - reach) & (x <= t[-1] + reach)
     return jnp.where(jnp.expand_dims(inside, tuple(range(x.ndim, found.ndim))), found, jnp.nan)
 
 
-def _horizontal(space: Space, y: Any, first: Any, second: Any = None) -> Any:
-    """Return (I − YY*)Y', or the acceleration (I − YY*)(Y'' − 2Y'(Y*Y')), for any representatives Y of a curve."""
-    if len(space.point_shape) == 1:
-        columns = (None if a is None else a[..., None] for a in (y, first, second))
-        return _horizontal_columns(*columns)[..., 0]
-    return _horizontal_columns(y, first, second)
-
-
-def _horizontal_columns(y: Any, first: Any, second: Any) -> Any:
-    change = first if second is None else second - 2 * first @ (adjoint(y) @ first)
-    return change - y @ (adjoint(y) @ change)
-
-
 def _casteljau(model: Model, t: Any, points: Any, velocities: Any, x: Any) -> Any:
-    """Evaluate (8) of the paper in the arrays of the model.
-
-    The geodesics of one stage are one computation, because JAX compiles each computation.
-    """
+    """Evaluate one curve in the arrays of the model."""
     h = jnp.diff(t)
-    p, q = points[:-1], points[1:]
-    handles = jnp.stack([model.times(h / 3, velocities[:-1]), model.times(-h / 3, velocities[1:])])
-    inner = model.exp(jnp.stack([p, q]), handles)
-    starts = jnp.stack([p, inner[0], q])
-    handles = jnp.stack([handles[0], model.log(inner[0], inner[1]), handles[1]])
+    starts, handles = casteljau.control(model, h, points, velocities)
     i = jnp.clip(jnp.searchsorted(t, x, side="right") - 1, 0, t.shape[0] - 2)
-    s = (x - t[i]) / h[i]
-    a, b, c = model.exp(starts[:, i], model.times(jnp.stack([s, s, 1 - s]), handles[:, i]))
-    left, right = model.between(jnp.stack([a, b]), jnp.stack([b, c]), s)
-    return model.between(left, right, s)
+    return casteljau.bezier(model, starts[:, i], handles[:, i], (x - t[i]) / h[i])

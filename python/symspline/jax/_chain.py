@@ -1,23 +1,24 @@
-"""The C² condition on spheres in JAX, and the quasi-Newton step from its residual.
+"""The quasi-Newton step from the residual of the C² condition, in JAX.
 
-Knots t, points p and velocities u of one curve have shapes (N+1,), (N+1, n+1) and (N+1, n+1).
+Knots, nodes and velocities of one curve have n rows, in the arrays of the chain.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 
-from ._models import Curved
-from ._series import stumpff
-
-_SPHERE = Curved(1)
+from .._closed_forms.condition import Chain, PoseChain, PositiveChain, SphereChain, residual, weights
+from .._closed_forms.library import adjoint
+from .._closed_forms.motions import turned
+from ._registry import LIBRARY
 
 
 class Data(NamedTuple):
-    """What a curve is made of: knots, points, and velocities at the ends, which count where one is given."""
+    """The data of a curve: knots, nodes, and velocities at the ends, which count where one is given."""
 
     t: Any
     p: Any
@@ -25,75 +26,76 @@ class Data(NamedTuple):
     last: Any
 
 
-def defects(given: tuple[bool, bool], u: Any, data: Data) -> Any:
-    """Return the residuals of the C² condition at inner knots and of the end conditions.
-
-    On unequal knots (13) has factors sinh(ad)/ad. Each residual is a velocity times its weight in `weights`.
-
-    Parameters
-    ----------
-    given : tuple of bool
-        Whether the velocity is given at the start and at the end; otherwise the acceleration is zero, (20).
-    """
-    t, p, first, last = data
-    h = jnp.diff(t)[:, None]
-    ahead, back = h * u[:-1] / 3, -h * u[1:] / 3
-    left, right = _SPHERE.exp(p[:-1], ahead), _SPHERE.exp(p[1:], back)
-    starts = jnp.stack([left, right])
-    logs = _transported(starts, jnp.stack([p[:-1], p[1:]]), _SPHERE.log(starts, starts[::-1]))
-    after, before = (logs - jnp.stack([ahead, back])) / h**2
-    inner = _stretched(back[:-1], after[1:]) - _stretched(ahead[1:], before[:-1])
-    start = first - u[0] if given[0] else 3 * after[0]
-    end = last - u[-1] if given[1] else -3 * before[-1]
-    return jnp.concatenate([start[None], 3 * inner, end[None]])
+def residual_of(chain: Chain, given: tuple[bool, bool], u: Any, data: Data) -> Any:
+    """Return the residuals of the C² condition and of the end conditions."""
+    return residual(chain, given, jnp.diff(data.t), data.p, u, data.first, data.last)
 
 
-def weights(given: tuple[bool, bool], t: Any) -> tuple[Any, Any, Any]:
-    """Return the three diagonals of the condition in flat space."""
-    r = 1 / jnp.diff(t)
-    zero = jnp.zeros(1, r.dtype)
-    middle = 2 * (jnp.concatenate([zero, r]) + jnp.concatenate([r, zero]))
-    below, above = jnp.concatenate([zero, r]), jnp.concatenate([r, zero])
-    if given[0]:
-        middle, above = middle.at[0].set(1.0), above.at[0].set(0.0)
-    if given[1]:
-        middle, below = middle.at[-1].set(1.0), below.at[-1].set(0.0)
-    return below, middle, above
-
-
-def step_of(given: tuple[bool, bool], t: Any, p: Any) -> Any:
+def step_of(chain: Chain, given: tuple[bool, bool], t: Any, p: Any) -> Any:
     """Return the quasi-Newton step from residuals to velocities.
 
-    The step solves a tridiagonal system in frames that are transported in parallel from point to point. The choice of
+    The step solves a tridiagonal system in frames that are transported in parallel from node to node. The choice of
     frames does not affect the solution, so the step is not differentiated.
     """
-    below, middle, above = weights(given, jax.lax.stop_gradient(t))
-    frames = _frames(jax.lax.stop_gradient(p))
+    below, middle, above = weights(LIBRARY, given, jnp.diff(jax.lax.stop_gradient(t)))
+    to_first, from_first = _transport(chain, jax.lax.stop_gradient(p))
 
-    def step(defect: Any) -> Any:
-        rows = jnp.einsum("iab,ia->ib", frames, defect)
-        return jnp.einsum("iab,ib->ia", frames, jax.lax.linalg.tridiagonal_solve(below, middle, above, rows))
+    def step(rows: Any) -> Any:
+        flat = to_first(rows).reshape(len(rows), -1)
+        return from_first(_solved(below, middle, above, flat).reshape(rows.shape))
 
     return step
 
 
-def _frames(p: Any) -> Any:
-    """Return rotations that transport tangent vectors at the first point along the polygon to each point."""
+def _solved(below: Any, middle: Any, above: Any, rows: Any) -> Any:
+    if jnp.iscomplexobj(rows):
+        below, middle, above = (a.astype(rows.dtype) for a in (below, middle, above))
+    return jax.lax.linalg.tridiagonal_solve(below, middle, above, rows)
+
+
+def _transport(chain: Chain, p: Any) -> tuple[Callable[[Any], Any], Callable[[Any], Any]]:
+    """Return the parallel transport of vectors along the nodes to the first one, and its inverse."""
+    if isinstance(chain, SphereChain):
+        frames = _rotations(p)
+        return lambda v: jnp.einsum("iab,ia->ib", frames, v), lambda v: jnp.einsum("iab,ib->ia", frames, v)
+    if isinstance(chain, PositiveChain):
+        # In frames L the transport is the unitary factor of L_p⁻¹ L_q.
+        left, _, right = jnp.linalg.svd(LIBRARY.solve_lower(p[:-1], p[1:]))
+        frames = _products(adjoint(left @ right))
+        return lambda v: adjoint(frames) @ v @ frames, lambda v: frames @ v @ adjoint(frames)
+    if isinstance(chain, PoseChain):
+        # A geodesic exp(sd) transports by Ad(exp(−sd/2)) in the frame of the body.
+        columns = _adjoint_columns(chain, chain.model.exp(_at_rest(p[1:]), -0.5 * chain.model.log(p[:-1], p[1:])))
+        frames = _products(columns)
+        inverse = jnp.linalg.inv(frames)
+        return lambda v: jnp.einsum("iab,ib->ia", inverse, v), lambda v: jnp.einsum("iab,ib->ia", frames, v)
+    return lambda v: v, lambda v: v
+
+
+def _products(steps: Any) -> Any:
+    """Return the products of matrices from the first node to each node."""
+    one = jnp.eye(steps.shape[-1], dtype=steps.dtype)
+    return jax.lax.associative_scan(lambda x, y: y @ x, jnp.concatenate([one[None], steps]))
+
+
+def _rotations(p: Any) -> Any:
+    """Return the rotations that transport tangent vectors at the first point along the polygon to each point."""
     a, b = p[:-1], p[1:]
     s = a + b
-    one = jnp.eye(p.shape[-1], dtype=p.dtype)
     scale = 1 + jnp.sum(a * b, axis=-1)
     outer = s[:, :, None] * s[:, None, :] / scale[:, None, None]
-    turns = one - outer + 2 * b[:, :, None] * a[:, None, :]
-    return jax.lax.associative_scan(lambda x, y: y @ x, jnp.concatenate([one[None], turns]))
+    return _products(jnp.eye(p.shape[-1], dtype=p.dtype) - outer + 2 * b[:, :, None] * a[:, None, :])
 
 
-def _transported(a: Any, b: Any, v: Any) -> Any:
-    """Transport tangent vectors at a in parallel along geodesics to b."""
-    return v - _SPHERE.inner(v, b) / (1 + _SPHERE.inner(a, b)) * (a + b)
+def _at_rest(p: Any) -> Any:
+    """Return poses without rotation and translation."""
+    return jnp.zeros_like(p).at[..., 0].set(1.0)
 
 
-def _stretched(v: Any, w: Any) -> Any:
-    """sinh(ad_v)/ad_v of w: across v by sin|v|/|v|, and along v as it is."""
-    z = _SPHERE.inner(v, v)
-    return stumpff(1, 1, z) * w + stumpff(3, 1, z) * _SPHERE.inner(v, w) * v
+def _adjoint_columns(chain: Chain, poses: Any) -> Any:
+    """Return the matrices of Ad, which maps the twist (ω, v) to (Rω, Rv + x × Rω)."""
+    quaternion, place = poses[:, None, :4], poses[:, None, 4:]
+    twists = jnp.eye(6, dtype=poses.dtype)
+    turn = turned(chain.lib, quaternion, twists[:, :3])
+    ahead = turned(chain.lib, quaternion, twists[:, 3:]) + jnp.cross(place, turn)
+    return jnp.swapaxes(jnp.concatenate([turn, ahead], axis=-1), -1, -2)

@@ -10,13 +10,13 @@ import jax.numpy as jnp
 from jax.custom_derivatives import SymbolicZero
 
 from .._adapters import split
+from .._closed_forms.casteljau import second_fundamental_form
 from .._curves.ends import ends_in_factors
 from .._options import order_of
 from .._spaces import Product, Space, parts_of, refuse_quotients, space_named
 from .._typing import CurveOptions
 from ..manifolds._manifold import refuse_functions
 from ._primitives import Fixed, fit_p, jvp_p
-from ._registry import second_fundamental_form
 
 Array = jax.Array
 
@@ -127,7 +127,7 @@ def _curve_jvp(fixed: Fixed, nu: int, primals: Any, tangents: Any) -> Any:
     if in_time:
         ahead = found[nu + 1]
         if nu:
-            ahead += second_fundamental_form(fixed.space, point, value, found[1])
+            ahead += second_fundamental_form(jnp, fixed.space, point, value, found[1])
         moved += ahead * jnp.expand_dims(dx, tuple(range(-len(fixed.space.point_shape), 0)))
     if any(moving):
         # One vector: its transpose is asked for as a whole.
@@ -135,5 +135,7 @@ def _curve_jvp(fixed: Fixed, nu: int, primals: Any, tangents: Any) -> Any:
         jvp = partial(jvp_p.bind, jnp.concatenate(parts), x, *data, velocities)
         moved += jvp(fixed=fixed, lead=0, nu=nu, moving=moving)
         if nu:
-            moved += second_fundamental_form(fixed.space, point, value, jvp(fixed=fixed, lead=0, nu=0, moving=moving))
+            moved += second_fundamental_form(
+                jnp, fixed.space, point, value, jvp(fixed=fixed, lead=0, nu=0, moving=moving)
+            )
     return value, moved

@@ -10,17 +10,18 @@ import jax.numpy as jnp
 
 from .._adapters import split
 from .._arrays import short_repr
+from .._closed_forms.condition import Chain, weights
 from .._core import ValidationError
-from .._spaces import Space, SpecialOrthogonal, Sphere, refuse_quotients, space_named
+from .._spaces import Space, refuse_quotients, space_named
 from ._casteljau import arrays_of
-from ._chain import Data, defects, step_of, weights
-from ._models import Curved, Model, Rotations
+from ._chain import Data, residual_of, step_of
+from ._registry import LIBRARY, chain_of
 
 
 def fit(
     t: Any, points: Any, space: Space | str, *, bc_type: Any = "natural", steps: int = 40
 ) -> tuple[jax.Array, jax.Array]:
-    """Compute the velocities of C² splines through points of a sphere or rotations, in JAX alone.
+    """Compute the velocities of C² splines through points, in JAX alone.
 
     This is `symspline.fit` written in JAX. It runs on the device of JAX and has derivatives of any order, in forward
     and reverse mode.
@@ -32,7 +33,7 @@ def fit(
     points : array, shape (..., n, *space.point_shape)
         Points, which are first projected onto the manifold.
     space : Space or str
-        ``sphere:n``, ``so:2`` or ``so:3``.
+        ``r:n``, ``sphere:n``, ``spd:n``, ``hpd:n``, ``so:2``, ``so:3``, ``se:2`` or ``se:3``.
     bc_type : {"natural", "clamped"} or pair, default "natural"
         End conditions. A pair has one of these words or ``(1, velocity)`` for either end.
     steps : int, default 40
@@ -71,7 +72,7 @@ def fit(
     """
     space = space_named(space)
     refuse_quotients(space, "functions of JAX are not made")
-    model = _model_of(space)
+    chain = chain_of(space)
     if isinstance(steps, bool) or not isinstance(steps, int) or steps < 1:
         raise ValidationError(f"steps must be a whole number from 1 on, not {short_repr(steps)}")
     points, _, t, _ = arrays_of(space, points, jnp.zeros_like(jnp.asarray(points)), t, 0.0)
@@ -81,19 +82,13 @@ def fit(
 
     def one(t: Any, points: Any, first: Any, last: Any) -> Any:
         rows = jnp.zeros_like(points).at[0].set(first).at[-1].set(last)
-        p, v = model.to_internal(points, rows)
-        if isinstance(model, Rotations):
-            # Of both signs of a quaternion the one nearer to that before.
-            signs = jnp.where(jnp.sum(p[:-1] * p[1:], axis=-1) < 0, -1.0, 1.0)
-            along = jnp.concatenate([jnp.ones_like(signs[:1]), jnp.cumprod(signs)])[:, None]
-            p, v = along * p, along * v
+        p, v = chain.enter(points, rows)
         data = Data(t, p, v[0], v[-1])
-        u = _velocities(given, steps, data)
-        left = jnp.linalg.norm(defects(given, u, data), axis=-1) / weights(given, t)[1]
-        largest = jnp.max(jnp.linalg.norm(jax.lax.stop_gradient(u), axis=-1))
+        u = _velocities(chain, given, steps, data)
+        left = _norms(residual_of(chain, given, u, data)) / weights(LIBRARY, given, jnp.diff(t))[1]
+        largest = jnp.max(_norms(jax.lax.stop_gradient(u)))
         residual = jnp.max(jax.lax.stop_gradient(left)) / jnp.where(largest > 0, largest, 1.0)
-        # The velocities of the arrays that the model represents.
-        return jax.jvp(model.from_internal, (p,), (u,))[1], residual
+        return chain.leave(p, u), residual
 
     for _ in batch:
         one = jax.vmap(one, (0 if t.ndim > 1 else None, 0, 0, 0))
@@ -101,15 +96,9 @@ def fit(
     return found
 
 
-def _model_of(space: Space) -> Model:
-    if isinstance(space, Sphere):
-        return Curved(1)
-    if isinstance(space, SpecialOrthogonal) and space.point_shape[0] in (2, 3):
-        return Rotations(space.point_shape[0])
-    raise ValidationError(
-        f"symspline.jax.fit does not support {space}, but only sphere:n, so:2 and so:3; use symspline.jax.curve, which "
-        "supports every space"
-    )
+def _norms(rows: Any) -> Any:
+    """Return the length of every row."""
+    return jnp.linalg.norm(rows.reshape(len(rows), -1), axis=-1)
 
 
 def _ends(bc_type: Any, points: Any, core: int) -> tuple[tuple[bool, bool], list[Any]]:
@@ -134,26 +123,28 @@ def _ends(bc_type: Any, points: Any, core: int) -> tuple[tuple[bool, bool], list
     return (pair[0] != "natural", pair[1] != "natural"), ends
 
 
-@partial(jax.custom_jvp, nondiff_argnums=(0, 1))
-def _velocities(given: tuple[bool, bool], steps: int, data: Data) -> Any:
-    step = step_of(given, data.t, data.p)
+@partial(jax.custom_jvp, nondiff_argnums=(0, 1, 2))
+def _velocities(chain: Chain, given: tuple[bool, bool], steps: int, data: Data) -> Any:
+    step = step_of(chain, given, data.t, data.p)
 
     def further(u: Any, _: Any) -> Any:
-        return u + step(defects(given, u, data)), None
+        return u + step(residual_of(chain, given, u, data)), None
 
-    return jax.lax.scan(further, jnp.zeros_like(data.p), None, length=steps)[0]
+    start = jnp.zeros((len(data.p), *data.first.shape), data.first.dtype)
+    return jax.lax.scan(further, start, None, length=steps)[0]
 
 
 @_velocities.defjvp
-def _velocities_jvp(given: tuple[bool, bool], steps: int, primals: Any, tangents: Any) -> Any:
+def _velocities_jvp(chain: Chain, given: tuple[bool, bool], steps: int, primals: Any, tangents: Any) -> Any:
     """Differentiate F(u, data) = 0: du = −F_u⁻¹ F_data, by the same steps."""
     (data,), (change,) = primals, tangents
-    u = _velocities(given, steps, data)
+    u = _velocities(chain, given, steps, data)
     # A tangent vector leaves the tangent space when its point moves.
-    normal = -jnp.sum(u * change.p, axis=-1, keepdims=True) * data.p
-    ahead = jax.jvp(partial(defects, given), (u, data), (normal, change))[1]
-    _, linear = jax.linearize(lambda u: defects(given, u, data), u)
-    step = step_of(given, data.t, data.p)
+    normal = chain.normal_change(data.p, u, change.p)
+    condition = partial(residual_of, chain, given)
+    ahead = jax.jvp(condition, (u, data), (normal, change))[1]
+    _, linear = jax.linearize(lambda u: condition(u, data), u)
+    step = step_of(chain, given, data.t, data.p)
 
     def further(du: Any, _: Any) -> Any:
         return du + step(linear(du) + ahead), None

@@ -4,27 +4,35 @@ from __future__ import annotations
 
 from typing import Any
 
+import jax
 import jax.numpy as jnp
+from jax.scipy.linalg import expm, solve_triangular
 
-from .. import _spaces
+from .._closed_forms import condition, registry
+from .._closed_forms.library import Library
+from .._closed_forms.models import Model
 from .._core import ValidationError
 from .._spaces import Space
-from ._models import Curved, Lines, Model, Planes, Poses, Positive, Rotations
+from ._series import arc, stumpff
+from ._spectral import arcs, logarithm
 
-_LINES = (_spaces.RealProjective, _spaces.ComplexProjective)
-_PLANES = (_spaces.Grassmannian, _spaces.ComplexGrassmannian)
-_MODELS: list[tuple[tuple[type[Space[Any]], ...], Model]] = [
-    ((_spaces.Euclidean,), Model()),
-    ((_spaces.Sphere,), Curved(1)),
-    ((_spaces.Hyperbolic,), Curved(-1)),
-    (_LINES, Lines()),
-    (_PLANES, Planes()),
-    ((_spaces.SymmetricPositiveDefinite, _spaces.HermitianPositiveDefinite), Positive()),
-]
-QUOTIENTS = (*_LINES, *_PLANES)
-_COLUMN = (_spaces.Sphere, _spaces.RealProjective, _spaces.ComplexProjective)
-_COLUMNS = (_spaces.Grassmannian, _spaces.ComplexGrassmannian, _spaces.QuaternionicProjective)
-_LORENTZ = (_spaces.Hyperbolic, _spaces.ComplexHyperbolic)
+
+def _constant(array: Any, like: Any) -> Any:
+    return jnp.asarray(array, like.dtype)
+
+
+def _solve_lower(root: Any, x: Any) -> Any:
+    return solve_triangular(root, x, lower=True)
+
+
+def _fold(step: Any, start: Any, numbers: Any) -> Any:
+    # One compiled step, where a loop of Python would compile as many as there are numbers.
+    return jax.lax.scan(
+        lambda value, number: (step(value, number), None), start, jnp.asarray(numbers, start.real.dtype)
+    )[0]
+
+
+LIBRARY = Library(jnp, _constant, stumpff, arc, logarithm, expm, arcs, _solve_lower, _fold)
 
 
 def model_of(space: Space) -> Model:
@@ -35,40 +43,27 @@ def model_of(space: Space) -> Model:
     ValidationError
         If the space is not supported in JAX.
     """
-    for classes, model in _MODELS:
-        if isinstance(space, classes):
-            return model
-    if isinstance(space, _spaces.SpecialOrthogonal) and space.point_shape[0] in (2, 3):
-        return Rotations(space.point_shape[0])
-    if isinstance(space, _spaces.SpecialEuclidean):
-        return Poses(space.point_shape[0] - 1)
-    raise ValidationError(
-        f"symspline.jax.evaluate does not support {space}, but only r, sphere, hyperbolic, rp, cp, gr, cgr, spd, hpd, "
-        "so:2, so:3, se:2 and se:3; use symspline.jax.curve, which supports every space"
-    )
+    model = registry.model_of(LIBRARY, space)
+    if model is None:
+        raise ValidationError(
+            f"symspline.jax.evaluate does not support {space}, but only r, sphere, hyperbolic, rp, cp, gr, cgr, spd, "
+            "hpd, so:2, so:3, se:2 and se:3; use symspline.jax.curve, which supports every space"
+        )
+    return model
 
 
-def second_fundamental_form(space: Space, point: Any, vector: Any, motion: Any) -> Any:
-    """What the derivative of a field of tangent vectors as arrays has beyond its covariant derivative.
+def chain_of(space: Space) -> condition.Chain:
+    """Return the nodes of a space for a fit.
 
-    Of unit vectors, and of k orthonormal columns X, it is −X Ẋ*V, which keeps X*V = 0 (minus the second fundamental
-    form). A field gΩ on a group has the covariant derivative g(Ω' + ½[ω, Ω]) where g moves by gω, and the array
-    g(Ω' + ωΩ) as derivative: that is ½g(ωΩ + Ωω) more, or ½(ġ g⁻¹V + V g⁻¹ġ); the same holds for positive definite
-    matrices, whose covariant acceleration is γ'' − γ'γ⁻¹γ'.
-
-    Args:
-        point: γ, shape (..., *point_shape).
-        vector: the field at γ.
-        motion: how γ moves; the result is linear in it.
+    Raises
+    ------
+    ValidationError
+        If fits in the space are not supported in JAX.
     """
-    if isinstance(space, _spaces.Euclidean):
-        return jnp.zeros_like(motion)
-    if isinstance(space, _COLUMN):
-        return -point * jnp.sum(jnp.conj(motion) * vector, axis=-1, keepdims=True)
-    if isinstance(space, _LORENTZ):
-        products = jnp.conj(motion) * vector
-        return point * (jnp.sum(products[..., 1:], axis=-1, keepdims=True) - products[..., :1])
-    if isinstance(space, _COLUMNS):
-        return -point @ (jnp.conj(jnp.swapaxes(motion, -1, -2)) @ vector)
-    inverse = jnp.linalg.inv(point)
-    return 0.5 * (motion @ inverse @ vector + vector @ inverse @ motion)
+    chain = condition.chain_of(registry.model_of(LIBRARY, space))
+    if chain is None:
+        raise ValidationError(
+            f"symspline.jax.fit does not support {space}, but only r, sphere, spd, hpd, so:2, so:3, se:2 and se:3; use "
+            "symspline.jax.curve, which supports every space"
+        )
+    return chain

@@ -43,12 +43,6 @@ def _stumpff_jvp(n: int, sign: int, primals: Any, tangents: Any) -> Any:
     return stumpff(n, sign, z), slope * dz
 
 
-def unbent(z: Any) -> Any:
-    """(1 − φ cot φ) / z for z = 4φ² < 4π²: what stands before ω×(ω×v) in the inverse of V(ω) = ∫ exp(sω) ds."""
-    u = z / 4
-    return (stumpff(2, 1, u) - stumpff(3, 1, u)) / (4 * stumpff(1, 1, u))
-
-
 @partial(jax.custom_jvp, nondiff_argnums=(0, 1))
 def _arc(n: int, sign: int, y: Any, rest: Any) -> Any:
     """The n-th derivative of `arc`."""

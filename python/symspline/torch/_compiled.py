@@ -1,4 +1,4 @@
-"""Splines as differentiable functions in PyTorch, on the CPU."""
+"""The compiled spline as a differentiable function, on the CPU."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from typing import Any, Unpack, overload
 import numpy as np
 import torch
 
-from ._adapters import fitted, movable, split
-from ._curves.ends import ends_in_factors
-from ._spaces import Product, Space, parts_of, space_named
-from ._typing import CurveOptions
-from .manifolds._manifold import refuse_functions
+from .._adapters import fitted, movable, split
+from .._curves.ends import ends_in_factors
+from .._spaces import Product, Space, parts_of, space_named
+from .._typing import CurveOptions
+from ..manifolds._manifold import refuse_functions
 
 
 @overload

@@ -1,0 +1,200 @@
+"""The C² condition (13) of the paper for the velocities of one spline, with any end conditions of `residual`.
+
+Nodes are along the first axis. Axes of a batch may follow.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from .library import Library, adjoint, hermitian
+from .models import Curved, Model, Positive, whitened
+from .motions import Poses, Rotations
+
+# Terms of the series of sinh(ad)/ad. The last is below rounding for handles up to 20 long; a handle has about a third
+# of the length of its segment.
+_TERMS = 14
+
+
+class Chain:
+    """Nodes and velocities of a spline in flat space; the others override what differs."""
+
+    def __init__(self, model: Model) -> None:
+        self.model = model
+        self.lib = model.lib
+
+    def enter(self, points: Any, velocities: Any) -> tuple[Any, Any]:
+        """Return nodes and velocities in the arrays of the chain from those of the user."""
+        return self.model.to_internal(points, velocities)
+
+    def leave(self, p: Any, u: Any) -> Any:
+        """Return velocities as the arrays of the user."""
+        return self.model.velocities_from_internal(p, u)
+
+    def scale(self, p: Any) -> Any:
+        """Return the largest number of every curve whose rounding is in the logarithms."""
+        return self.lib.xp.amax(abs(p), (0, -1))
+
+    def tangent(self, p: Any, u: Any) -> Any:
+        """Return the nearest tangent vectors at p."""
+        return u
+
+    def normal_change(self, p: Any, u: Any, dp: Any) -> Any:
+        """Return the normal part of the change of tangent vectors u whose points move by dp."""
+        return self.lib.xp.zeros_like(u)
+
+    def logs(self, p: Any, ahead: Any, back: Any) -> tuple[Any, Any]:
+        """Return the vectors from inner handle to inner handle, transported to the outer points.
+
+        On a group, transport along the geodesic exp(sa) is Ad(exp(−sa/2)) in the frame of the body. Back from
+        g = p exp(a), the vector log(g⁻¹ r) becomes log(exp(−a/2) p⁻¹ r exp(−a/2)).
+        """
+        exp, log, stack = self.model.exp, self.model.log, self.lib.xp.stack
+        ends, handles = stack([p[:-1], p[1:]]), stack([ahead, back])
+        inner = exp(ends, handles)
+        others = stack([inner[1], inner[0]])
+        first, last = log(exp(ends, 0.5 * handles), exp(others, -0.5 * handles))
+        return first, last
+
+    def stretched(self, v: Any, w: Any) -> Any:
+        """Return sinh(ad_v)/ad_v of w."""
+        divisors = [2.0 * k * (2 * k + 1) for k in range(_TERMS, 0, -1)]
+        return self.lib.fold(lambda total, divisor: w + self.curvature(v, total) / divisor, w, divisors)
+
+    def curvature(self, v: Any, w: Any) -> Any:
+        """Return ad_v² w, which is −R(w, v)v. On a group ad_v is ½[v, ·]."""
+        return 0 * w
+
+
+class SphereChain(Chain):
+    """Unit vectors, or rotations as unit quaternions."""
+
+    def __init__(self, model: Curved | Rotations) -> None:
+        super().__init__(model)
+        self.sphere = model if isinstance(model, Curved) else Curved(model.lib, 1)
+
+    def enter(self, points: Any, velocities: Any) -> tuple[Any, Any]:
+        p, u = self.model.to_internal(points, velocities)
+        if isinstance(self.model, Rotations) and len(p) > 1:
+            # Of both signs of a quaternion the one nearer to that before.
+            xp = self.lib.xp
+            signs = 1 - 2.0 * (self.sphere.inner(p[:-1], p[1:]) < 0)
+            along = xp.concatenate([xp.ones_like(p[:1, ..., :1]), xp.cumprod(signs, 0)])
+            p, u = along * p, along * u
+        return p, u
+
+    def tangent(self, p: Any, u: Any) -> Any:
+        return u - self.sphere.inner(p, u) * p
+
+    def normal_change(self, p: Any, u: Any, dp: Any) -> Any:
+        return -self.sphere.inner(u, dp) * p
+
+    def logs(self, p: Any, ahead: Any, back: Any) -> tuple[Any, Any]:
+        exp, log, stack = self.sphere.exp, self.sphere.log, self.lib.xp.stack
+        ends = stack([p[:-1], p[1:]])
+        left, right = exp(ends, stack([ahead, back]))
+        starts, others = stack([left, right]), stack([right, left])
+        first, last = self._transported(starts, ends, log(starts, others))
+        return first, last
+
+    def _transported(self, a: Any, b: Any, v: Any) -> Any:
+        """Transport tangent vectors at a in parallel along geodesics to b."""
+        inner = self.sphere.inner
+        return v - inner(v, b) / (1 + inner(a, b)) * (a + b)
+
+    def stretched(self, v: Any, w: Any) -> Any:
+        """Across v by sin|v|/|v|, and along v as it is."""
+        z = self.sphere.inner(v, v)
+        return self.lib.stumpff(1, 1, z) * w + self.lib.stumpff(3, 1, z) * self.sphere.inner(v, w) * v
+
+
+class PoseChain(Chain):
+    """Rigid motions and twists of the body."""
+
+    def curvature(self, v: Any, w: Any) -> Any:
+        return 0.25 * self._bracket(v, self._bracket(v, w))
+
+    def _bracket(self, v: Any, w: Any) -> Any:
+        cross = self.lib.xp.linalg.cross
+        turn, ahead, other, beside = v[..., :3], v[..., 3:], w[..., :3], w[..., 3:]
+        return self.lib.xp.concatenate([cross(turn, other), cross(turn, beside) + cross(ahead, other)], axis=-1)
+
+
+class PositiveChain(Chain):
+    """Positive definite matrices as Cholesky factors L, and velocities L⁻¹ V L⁻*."""
+
+    def enter(self, points: Any, velocities: Any) -> tuple[Any, Any]:
+        root = self.lib.xp.linalg.cholesky(hermitian(points))
+        return root, whitened(self.lib, root, velocities)
+
+    def leave(self, p: Any, u: Any) -> Any:
+        return p @ u @ adjoint(p)
+
+    def scale(self, p: Any) -> Any:
+        return self.lib.xp.ones_like(p[0, ..., 0, 0])
+
+    def tangent(self, p: Any, u: Any) -> Any:
+        return hermitian(u)
+
+    def logs(self, p: Any, ahead: Any, back: Any) -> tuple[Any, Any]:
+        """In the frame L of a point the handle is exp(a), and exp(−a/2) · exp(−a/2) transports back from it.
+
+        With X = exp(−a/2) L_p⁻¹ L_q exp(b/2), the vector at p is log XX*, and that at q is −log X*X.
+        """
+        outer = self.lib.exponential(self.lib.xp.stack([-0.5 * ahead, 0.5 * back]))
+        x = outer[0] @ self.lib.solve_lower(p[:-1], p[1:]) @ outer[1]
+        first, last = self.lib.logarithm(self.lib.xp.stack([x @ adjoint(x), adjoint(x) @ x]))
+        return first, -last
+
+    def curvature(self, v: Any, w: Any) -> Any:
+        inner = v @ w - w @ v
+        return 0.25 * (v @ inner - inner @ v)
+
+
+def chain_of(model: Model | None) -> Chain | None:
+    """Return the chain of a model; None if fits are not supported."""
+    if isinstance(model, Rotations) or (isinstance(model, Curved) and model.sign > 0):
+        return SphereChain(model)
+    if isinstance(model, Poses):
+        return PoseChain(model)
+    if isinstance(model, Positive):
+        return PositiveChain(model)
+    return Chain(model) if type(model) is Model else None
+
+
+def residual(chain: Chain, given: tuple[bool, bool], h: Any, p: Any, u: Any, first: Any, last: Any) -> Any:
+    """Return the residuals of the C² condition at inner nodes and of the end conditions.
+
+    On unequal knots (13) has factors sinh(ad)/ad. Each residual is a velocity times its weight in `weights`.
+
+    Parameters
+    ----------
+    given : tuple of bool
+        Whether the velocity is given at the start and at the end; otherwise the acceleration is zero, (20).
+    h : array, shape (n - 1, ...)
+        Lengths of the intervals.
+    p, u : array, shape (n, ...)
+        Nodes and velocities in the arrays of the chain.
+    first, last : array
+        Velocities at the ends, which count where they are given.
+    """
+    times = chain.model.times
+    ahead, back = times(h / 3, u[:-1]), times(-h / 3, u[1:])
+    from_start, from_end = chain.logs(p, ahead, back)
+    after, before = times(1 / h**2, from_start - ahead), times(1 / h**2, from_end - back)
+    stack = chain.lib.xp.stack
+    right, left = chain.stretched(stack([back[:-1], ahead[1:]]), stack([after[1:], before[:-1]]))
+    start = first - u[0] if given[0] else 3 * after[0]
+    end = last - u[-1] if given[1] else -3 * before[-1]
+    return chain.lib.xp.concatenate([start[None], 3 * (right - left), end[None]])
+
+
+def weights(lib: Library, given: tuple[bool, bool], h: Any) -> tuple[Any, Any, Any]:
+    """Return the three diagonals of the condition in flat space."""
+    xp, r = lib.xp, 1 / h
+    zero, one = xp.zeros_like(r[:1]), xp.ones_like(r[:1])
+    first, last = (one if own else 2 * end for own, end in zip(given, (r[:1], r[-1:]), strict=True))
+    middle = xp.concatenate([first, 2 * (r[:-1] + r[1:]), last])
+    above = xp.concatenate([zero if given[0] else r[:1], r[1:], zero])
+    below = xp.concatenate([zero, r[:-1], zero if given[1] else r[-1:]])
+    return below, middle, above
