@@ -138,7 +138,11 @@ def exists(name):
         module = f"{module}.{part}"
         if not hasattr(thing, part):
             if inspect.ismodule(thing) and importlib.util.find_spec(module):
-                thing = importlib.import_module(module)
+                try:
+                    thing = importlib.import_module(module)
+                except ModuleNotFoundError:
+                    # It needs a library that is not installed, such as PyTorch.
+                    return True
                 continue
             return inspect.isclass(thing) and part in fields_of(thing)
         thing = getattr(thing, part)

@@ -5,11 +5,12 @@ Nodes are along the first axis. Axes of a batch may follow.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from .library import Library, adjoint, hermitian
 from .models import Curved, Model, Positive, whitened
-from .motions import Poses, Rotations
+from .motions import Poses, Rotations, cross_matrix
 
 # Terms of the series of sinh(ad)/ad. The last is below rounding for handles up to 20 long; a handle has about a third
 # of the length of its segment.
@@ -59,11 +60,12 @@ class Chain:
     def stretched(self, v: Any, w: Any) -> Any:
         """Return sinh(ad_v)/ad_v of w."""
         divisors = [2.0 * k * (2 * k + 1) for k in range(_TERMS, 0, -1)]
-        return self.lib.fold(lambda total, divisor: w + self.curvature(v, total) / divisor, w, divisors)
+        curvature = self.curvature(v)
+        return self.lib.fold(lambda total, divisor: w + curvature(total) / divisor, w, divisors)
 
-    def curvature(self, v: Any, w: Any) -> Any:
-        """Return ad_v² w, which is −R(w, v)v. On a group ad_v is ½[v, ·]."""
-        return 0 * w
+    def curvature(self, v: Any) -> Callable[[Any], Any]:
+        """Return the map from w to ad_v² w, which is −R(w, v)v. On a group ad_v is ½[v, ·]."""
+        return lambda w: 0 * w
 
 
 class SphereChain(Chain):
@@ -111,13 +113,14 @@ class SphereChain(Chain):
 class PoseChain(Chain):
     """Rigid motions and twists of the body."""
 
-    def curvature(self, v: Any, w: Any) -> Any:
-        return 0.25 * self._bracket(v, self._bracket(v, w))
-
-    def _bracket(self, v: Any, w: Any) -> Any:
-        cross = self.lib.xp.linalg.cross
-        turn, ahead, other, beside = v[..., :3], v[..., 3:], w[..., :3], w[..., 3:]
-        return self.lib.xp.concatenate([cross(turn, other), cross(turn, beside) + cross(ahead, other)], axis=-1)
+    def curvature(self, v: Any) -> Callable[[Any], Any]:
+        # [(ω, v), (ω', v')] = (ω × ω', ω × v' + v × ω')
+        concatenate = self.lib.xp.concatenate
+        turn, ahead = cross_matrix(self.lib, v[..., :3]), cross_matrix(self.lib, v[..., 3:])
+        rows = [concatenate([turn, 0 * turn], axis=-1), concatenate([ahead, turn], axis=-1)]
+        half = 0.5 * concatenate(rows, axis=-2)
+        square = half @ half
+        return lambda w: (square @ w[..., None])[..., 0]
 
 
 class PositiveChain(Chain):
@@ -146,9 +149,14 @@ class PositiveChain(Chain):
         first, last = self.lib.logarithm(self.lib.xp.stack([x @ adjoint(x), adjoint(x) @ x]))
         return first, -last
 
-    def curvature(self, v: Any, w: Any) -> Any:
-        inner = v @ w - w @ v
-        return 0.25 * (v @ inner - inner @ v)
+    def curvature(self, v: Any) -> Callable[[Any], Any]:
+        half = 0.5 * v
+
+        def twice(w: Any) -> Any:
+            inner = half @ w - w @ half
+            return half @ inner - inner @ half
+
+        return twice
 
 
 def chain_of(model: Model | None) -> Chain | None:

@@ -12,7 +12,7 @@ class Library(NamedTuple):
     Attributes
     ----------
     xp : module
-        `jax.numpy` or `torch`. The formulas use names and keywords that both have.
+        ``jax.numpy`` or ``torch``. The formulas use names and keywords that both have.
     constant : callable
         ``constant(array, like)`` converts an array of NumPy to the library, in the precision and on the device of
         `like`.

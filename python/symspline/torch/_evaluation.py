@@ -117,10 +117,10 @@ def _values(model: Model, space: Space, t: Any, points: Any, velocities: Any, x:
     at = [a.detach().movedim(0, -1).contiguous() for a in (t, x)]
     i = (torch.searchsorted(*at, right=True) - 1).clamp(0, len(h) - 1).movedim(-1, 0)
     begin, length = t.gather(0, i), h.gather(0, i)
-    polygons = [_rows(a, i) for a in (starts, handles)]
+    starts, handles = _rows(starts, i), _rows(handles, i)
 
     def curve(x: Any) -> Any:
-        return model.from_internal(casteljau.bezier(model, *polygons, (x - begin) / length))
+        return model.from_internal(casteljau.bezier(model, starts, handles, (x - begin) / length))
 
     def velocity(x: Any) -> Any:
         return along(curve, x)

@@ -70,7 +70,8 @@ class _Logarithm(torch.autograd.Function):
 
     @staticmethod
     def forward(a: Any, *directions: Any) -> Any:
-        return divided.derivative(torch, _divided_logarithm, *torch.linalg.eigh(a), directions)
+        values, vectors = torch.linalg.eigh(a)
+        return divided.derivative(torch, _divided_logarithm, values, vectors, directions)
 
     @staticmethod
     def setup_context(ctx: Any, inputs: Any, output: Any) -> None:
@@ -124,5 +125,5 @@ def along(function: Any, x: Any) -> tuple[Any, Any]:
     PyTorch computes faster than by dual numbers.
     """
     values, backward = torch.func.vjp(function, x)
-    zero = torch.utils._pytree.tree_map(torch.zeros_like, values)
+    zero = torch.zeros_like(values) if isinstance(values, torch.Tensor) else tuple(map(torch.zeros_like, values))
     return values, torch.func.vjp(lambda cotangent: backward(cotangent)[0], zero)[1](torch.ones_like(x))[0]
