@@ -7,6 +7,7 @@ Every entry is the result of a call. Columns of libraries that are not installed
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from importlib import import_module
 from importlib.util import find_spec
@@ -94,8 +95,9 @@ def jax_columns(call: Call) -> list[str]:
 
     with jax.enable_x64(True):
         t, p, u, x = (jnp.asarray(a) for a in DATA)
-        works = _accepted(call, [t, p, u, x], jax.Array)
         compiled = _accepted(jax.jit(lambda p: call(t, p, u, x)), [p], jax.Array)
+        # A call without `jit` compiles every operation by itself, which takes long.
+        works = compiled if compiled == "yes" else _accepted(call, [t, p, u, x], jax.Array)
         first = lambda p: jax.jvp(lambda p: call(t, p, u, x), (p,), (u,))[1]  # noqa: E731
         second = lambda p: jax.jvp(first, (p,), (u,))[1]  # noqa: E731
         order = 2 if _finite(jax.jit(second), p) else int(_finite(jax.jit(first), p))
@@ -120,7 +122,9 @@ def _finite(function: Call, p: Any) -> bool:
 def _accepted(call: Call, arrays: list[Any], kind: type) -> str:
     """Return whether a call works, and whether its result is of the library of its arguments."""
     try:
-        found = call(*arrays)
+        # PyTorch and NumPy warn of conversions.
+        with warnings.catch_warnings(action="ignore"):
+            found = call(*arrays)
     except Exception:
         return "no"
     return "yes" if isinstance(found, kind) else "returns NumPy"
