@@ -107,7 +107,8 @@ class ControlledSpline(Curve[P]):
     @property
     def knots(self) -> Doubles:
         """Knots, shape (n + degree + 1,)."""
-        return self._curve.knots
+        knots: Doubles = self._curve.knots
+        return knots
 
     @property
     def control_points(self) -> P:
@@ -118,12 +119,14 @@ class ControlledSpline(Curve[P]):
     @property
     def degree(self) -> int:
         """Degree of the curve."""
-        return self._curve.degree
+        degree: int = self._curve.degree
+        return degree
 
     @property
     def space(self) -> Space[P]:
         """Space of the curve."""
-        return self._curve.space
+        space: Space[P] = self._curve.space
+        return space
 
     def _fill(self, *parts: Any) -> None:
         (self._curve,) = parts

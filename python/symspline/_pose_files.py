@@ -394,7 +394,7 @@ def split(poses: PointsLike) -> tuple[Array, Array]:
 def _timed(t: ArrayLike, poses: Any) -> tuple[Array, Array]:
     """Return the times and the poses to write, without rows of NaN."""
     if isinstance(poses, tuple) and len(poses) == 2:
-        rotations, positions = (as_array(own, "poses") for own in poses)
+        rotations, positions = _SO3._array(poses[0], "poses"), as_array(poses[1], "poses")
         missing = _missing(rotations, 2) & _missing(positions, 1)
         times = moments(t, len(missing))
         return times[~missing], checked_poses((rotations[~missing], positions[~missing]))

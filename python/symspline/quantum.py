@@ -608,7 +608,7 @@ def purify(states: ArrayLike) -> Array:
     if given.ndim < 3 or not given.shape[-3]:
         raise ValidationError(f"states has shape {given.shape}, but must have shape (..., m, n, n) with m >= 1.")
     given = given.astype(np.complex128)
-    refuse(~np.isfinite(given).all(axis=(-2, -1)), "states", lambda _: "is not finite")
+    refuse(np.asarray(~np.isfinite(given).all(axis=(-2, -1))), "states", lambda _: "is not finite")
     off = np.abs(given - adjoint(given)).max(axis=(-2, -1))
     refuse(off > tol, "states", lambda i: f"is not Hermitian: ρ − ρ* has an entry of {off[i]:.3g}")
     values, vectors = np.linalg.eigh((given + adjoint(given)) / 2)
