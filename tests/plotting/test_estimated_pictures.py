@@ -141,7 +141,7 @@ def test_poses_have_a_band_per_part_and_residuals_per_measurement():
 def test_curves_from_files_have_bands_and_no_data(tmp_path):
     attitudes().save(tmp_path / "a.npz")
     figure = rendered(ss.load(tmp_path / "a.npz").plot())
-    assert "bold: curve" in texts_of(figure)
+    assert "curve" in texts_of(figure) and "data" not in texts_of(figure)
     labels = [axes.get_ylabel() for axes in figure.axes]
     assert "95 % band\nof so:3, rad" in labels and not any("residual" in label for label in labels)
     plane = ss.estimate(

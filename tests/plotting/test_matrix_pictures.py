@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
-from drawn import axes_named, lines_of, rendered, spline_on
+from drawn import axes_named, lines_of, rendered, spline_on, texts_of
 from matplotlib.collections import PolyCollection
 
 import symspline as ss
 from symspline._plotting import matrices as pictures
-from symspline._plotting.matrices import AXES, VIEW
+from symspline._plotting.matrices import AXES
+from symspline._plotting.rows import REACH, VIEW
 
 PAULI = np.array([[[0, 1], [1, 0]], [[0, -1j], [1j, 0]], [[1, 0], [0, -1]]])
 ROTATIONS = {
@@ -20,15 +21,54 @@ ROTATIONS = {
 
 
 @pytest.mark.parametrize("name", ROTATIONS)
-def test_given_frames_are_bold(name):
+def test_given_frames_and_the_curve_have_a_row_each(name):
     spline = spline_on(name, (4,), [0, 1, 2.5, 4])
-    faint, bold = (q for q in spline.plot().axes[0].collections if hasattr(q, "U"))
-    np.testing.assert_allclose(np.unique(bold.X), spline.t)
-    assert bold.width > faint.width and len(faint.X) > len(bold.X)
-    right_up = np.sort(np.hypot(bold.U, bold.V).reshape(4, 3))
+    figure = rendered(spline.plot())
+    given, curve = (q for q in figure.axes[0].collections if hasattr(q, "U"))
     np.testing.assert_allclose(VIEW @ VIEW.T, np.eye(3), atol=1e-3)
-    lengths = np.linalg.norm((VIEW @ ROTATIONS[name](spline.points))[:, :2], axis=1)
-    np.testing.assert_allclose(right_up, 0.7 * np.sort(lengths), atol=1e-12)
+    for row, (arrows, times) in enumerate(((given, spline.t), (curve, np.linspace(0, 4, len(curve.X) // 3)))):
+        np.testing.assert_allclose(arrows.X, np.repeat(times, 3), atol=4 / 1000)
+        assert set(arrows.Y) == {-row}
+        right_up = np.sort(np.hypot(arrows.U, arrows.V).reshape(-1, 3))
+        lengths = np.linalg.norm((VIEW @ ROTATIONS[name](spline(arrows.X[::3])))[:, :2], axis=1)
+        np.testing.assert_allclose(right_up, REACH * np.sort(lengths), atol=1e-9)
+    # The view is explained, and the rows are named.
+    assert {"given", "curve", "view", "x₁", "x₂", "x₃"} <= set(texts_of(figure))
+
+
+def test_rows_fit_into_narrow_panels():
+    """Neighbouring symbols do not overlap, and none leaves its panel."""
+    t = np.linspace(0, 6, 30)
+    turned = ss.rotations.from_rotation_vectors(np.multiply.outer(t, [0.2, 0.3, 0.8]))
+    figure = rendered(ss.CubicSpline(t, (turned, np.stack([t, t, t], axis=1)), "so:3 x r:3").plot())
+    axes = figure.axes[0]
+    panel = axes.figure.bbox
+    for arrows in (q for q in axes.collections if hasattr(q, "U")):
+        at = axes.transData.transform(np.column_stack([arrows.X, arrows.Y]))
+        assert np.diff(np.unique(at[:, 0])).min() > 0.9 * REACH * figure.dpi
+        assert at[:, 0].min() - REACH * figure.dpi > panel.x0 and at[:, 0].max() + REACH * figure.dpi < panel.x1
+    number = len(next(q for q in axes.collections if hasattr(q, "U")).X) // 3
+    assert 2 <= number < 30 and f"{number} of 30" in texts_of(figure)
+
+
+def test_discs_have_the_radius_of_the_band():
+    """Turns by the radius of the band, about axes at right angles to an arrow, move its tip to the rim of its disc."""
+    t, rng = np.linspace(0, 10, 40), np.random.default_rng(1)
+    space = ss.space("so:3")
+    points = ss.rotations.from_rotation_vectors(np.multiply.outer(np.sin(t), [0.3, 0.6, 0.3]))
+    spline = ss.make_smoothing_spline(t, space.exp(points, 0.1 * space.random_tangent(rng, points)), space)
+    axes = rendered(spline.plot()).axes[0]
+    discs = [c for c in axes.collections if c.get_label() == "band"]
+    assert len(discs) == 3
+    at = discs[0].get_offsets()[4, 0]
+    turn = np.linspace(0, 2 * np.pi, 1000)[:, None]
+    for i, found in enumerate(discs):
+        frame = np.roll(spline(at), -i, axis=1)
+        about = np.cos(turn) * frame[:, 1] + np.sin(turn) * frame[:, 2]
+        tips = ss.rotations.from_rotation_vectors(float(spline.band(at)) * about) @ frame[:, 0]
+        gaps = np.linalg.norm(found.get_paths()[4].vertices[:, None] - REACH * tips @ VIEW[:2].T, axis=2)
+        assert gaps.min(axis=1).max() < 2e-4
+        assert gaps.min(axis=0).max() < 0.02
 
 
 @pytest.mark.parametrize("name", ["rp:4", "cp:2", "gr:2,5", "gr:4,5", "cgr:2,3", "cgr:2,5"])
@@ -71,17 +111,26 @@ def test_ellipses_are_drawn_to_scale(name):
     spline = spline_on(name, (4,), [0, 1, 2.5, 4])
     figure = rendered(spline.plot())
     axes = figure.axes[0]
-    faint, bold = (found for found in axes.collections if isinstance(found, PolyCollection))
+    bold, faint = (found for found in axes.collections if isinstance(found, PolyCollection))
     np.testing.assert_allclose(bold.get_offsets(), np.stack([spline.t, [0] * 4], axis=1))
     assert len(faint.get_offsets()) > 4 and bold.get_linewidth()[0] > faint.get_linewidth()[0]
     assert bold.get_facecolor()[0, 3] > 0 == faint.get_facecolor()[0, 3]
+    # The curve is drawn at equidistant times in a row of its own, and neighbours do not overlap.
+    times, rows = faint.get_offsets().T
+    np.testing.assert_allclose(times, np.linspace(0, 4, len(times)), atol=4 / 1000)
+    assert set(rows) == {-1}
+    boxes = [path.get_extents(faint.get_transform()) for path in faint.get_paths()]
+    left, right = (
+        axes.transData.transform(faint.get_offsets())[:, 0] + [getattr(b, x) for b in boxes] for x in ("x0", "x1")
+    )
+    assert (left[1:] > right[:-1]).all() and right[-1] < figure.bbox.x1
     view = np.eye(2) if name == "spd:2" else VIEW[:2]
     roots = np.sqrt(np.linalg.eigvalsh(view @ spline.points @ view.T))
     # The bar shows the length of a number.
     (bar,) = [line for line in axes.lines if line.get_marker() == "|"]
     (number,) = [float(text.get_text()) for text in axes.texts if text.get_text().replace(".", "").isdigit()]
     unit = np.ptp(axes.transAxes.transform(bar.get_xydata())[:, 0]) / number
-    scale = bold.get_transform().get_matrix()[:2, :2]
+    scale = bold.get_transform().get_affine().get_matrix()[:2, :2]
     radii = np.linalg.norm([path.vertices @ scale for path in bold.get_paths()], axis=-1)
     found = np.stack([radii.min(axis=1), radii.max(axis=1)], axis=1)
     np.testing.assert_allclose(found, unit * roots, rtol=1e-2)

@@ -198,11 +198,31 @@ def test_dates_and_repeated_times():
 
 def test_data_of_frames_stand_beside_the_curve():
     spline = smooth("so:3")
+    figure = rendered(spline.plot())
+    light, bold = (c for c in figure.axes[0].collections if hasattr(c, "U"))
+    assert light.width < bold.width and set(light.X) <= set(T) and set(light.Y) == {0} and set(bold.Y) == {-1}
+    x, y = axes_named(figure, "95 % band").lines[0].get_data()
+    np.testing.assert_allclose(y, spline.band(x))
+
+
+def test_ellipses_have_bands():
+    """All matrices at the distance of the radius have ellipses inside the shaded area."""
+    spline, space = smooth("spd:2"), ss.space("spd:2")
     axes = rendered(spline.plot()).axes[0]
-    arrows = [c for c in axes.collections if hasattr(c, "U") and len(c.U)]
-    light, bold = sorted(arrows, key=lambda c: c.width)
-    np.testing.assert_allclose(light.get_offsets()[:, 0], bold.get_offsets()[:, 0])
-    assert set(light.get_offsets()[:, 0]) <= set(T)
+    (shaded,) = bands_of(axes)
+    at = shaded.get_offsets()[3, 0]
+    vertices = shaded.get_paths()[3].vertices
+    middle, radius = spline(at), float(spline.band(at))
+    tangents = space.random_tangent(np.random.default_rng(0), np.broadcast_to(middle, (500, 2, 2)))
+    tangents *= (radius / space.norm(middle, tangents))[:, None, None]
+    near = space.exp(middle, tangents)
+    # Lengths of vectors in units of the ellipses at the same directions.
+    rings = [vertices[:97], vertices[97:194]]
+    outline = next(c for c in axes.collections if c.get_label() != "band" and set(c.get_offsets()[:, 1]) == {-1.0})
+    unit = np.linalg.norm(outline.get_paths()[3].vertices, axis=1).max() / np.sqrt(np.linalg.eigvalsh(middle)[-1])
+    for ring, largest in zip(rings, (True, False), strict=True):
+        length = np.einsum("ki,mij,kj->mk", ring / unit, np.linalg.inv(near), ring / unit)
+        assert (length > 1 - 1e-9).all() if largest else (length < 1 + 1e-9).all()
 
 
 def test_a_long_gap_has_samples_of_its_own():

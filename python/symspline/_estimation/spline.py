@@ -13,12 +13,12 @@ from .._core import ValidationError
 from .._cubic import CubicSpline
 from .._curves.curve import SidePanel, UncertaintyBand
 from .._curves.ends import end_kinds
-from .._smoothing.factors import grouped, is_several, smoothed_spaces
+from .._smoothing.factors import is_several, smoothed_spaces
 from .._smoothing.posterior import Parameter, Posterior
 from .._smoothing.report import SmoothingReport
 from .._smoothing.solve import Smoothed
-from .._smoothing.spline import SmoothingSpline, radius
-from .._spaces import Array, Doubles, Product, Space, SpecialEuclidean, SpecialOrthogonal, factors_of, parts_of
+from .._smoothing.spline import SmoothingSpline
+from .._spaces import Array, Doubles, Product, Space, SpecialEuclidean, factors_of, parts_of
 from .._typing import P
 from .measurements import BodyRates, Measurement, Points, SpecificForce
 
@@ -37,10 +37,6 @@ def joint(report: SmoothingReport, band: Doubles, side: Doubles, corner: Doubles
     """
     posterior = Posterior(band, np.zeros((0, 0)), size, side, corner, first)
     return Smoothed(report, np.zeros((0, 4)), report.lam, 1.0, False, posterior)
-
-
-# Rotations, whose distances are angles.
-_TURNING = (SpecialOrthogonal(2), SpecialOrthogonal(3))
 
 
 def _each(value: Any) -> tuple[Any, ...]:
@@ -124,11 +120,6 @@ class EstimatedSpline(SmoothingSpline[P, Any]):
         times, points = zip(*map(self._points_in, range(len(factors_of(self.space)))), strict=True)
         return UncertaintyBand(list(times), list(points), radii, speed, np.concatenate([np.empty(0), *others]))
 
-    def _radii(self, x: Doubles) -> list[list[tuple[Space, Doubles]]]:
-        """Return the parts of every factor, and the radii of their 95 % bands at times x of the core."""
-        parts = zip(smoothed_spaces(self.space), self._smoothed, strict=True)
-        return grouped(self.space, [(part, radius(part, 0.95) * self._spread(own, (), x, 0)) for part, own in parts])
-
     def _times_of(self, measurement: Measurement) -> Doubles:
         """Return the times of a measurement on the time axis of the core, with their estimated offset."""
         times, _ = self._time_axis.at(measurement.t, (), False)
@@ -157,11 +148,7 @@ class EstimatedSpline(SmoothingSpline[P, Any]):
         return np.concatenate(times)[order], np.concatenate(points)[order]
 
     def _panels_below(self, x: Doubles) -> list[SidePanel]:
-        panels = [
-            SidePanel(f"95 % band\nof {part}{', rad' if part in _TURNING else ''}", x, values[:, None], factor=number)
-            for number, own in enumerate(self._radii(x))
-            for part, values in own
-        ]
+        panels = super()._panels_below(x)
         kinds = [type(own).__name__ for own in self._measurements]
         for number, (own, kind) in enumerate(zip(self._measurements, kinds, strict=True)):
             if isinstance(own, Points) and not _are_partial(own, factors_of(self.space)[own.factor or 0]):

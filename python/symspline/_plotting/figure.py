@@ -47,7 +47,7 @@ class Picture(NamedTuple):
     height: float = 5.2
 
 
-_GRAPH, _ROWS = (10.5, 3.2), (10.5, 2.7)
+_GRAPH, _ROWS = (10.5, 3.2), (10.5, 3.6)
 _DRAWN: list[tuple[str, Callable[[SubFigure, Sequence[Curve]], None], tuple[float, ...]]] = [
     ("euclidean:1", graphs.draw_graph, _GRAPH),
     ("euclidean:2", chart.draw_plane, ()),

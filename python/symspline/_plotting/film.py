@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from .._core import ValidationError
 from .figure import CurveFigure, save
-from .matrices import VIEW
+from .rows import VIEW
 from .style import DATES, DPI, EDGE, HALO, INK, Array, heading, plain, show_dates, time_colors, window
 
 # Drawings in the strip, and in each row of the small multiples.

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from .._spaces import HermitianPositiveDefinite, Space, SymmetricPositiveDefinite
 from .curves import Curve, draw_graph_of
-from .style import DISTINCT, EDGE, GAP, INK, Array, Indices, evenly, inside, legend, plain, show_dates, size
+from .style import DISTINCT, EDGE, GAP, INK, Array, Indices, inside, legend, plain, show_dates, size
 
 SUBSCRIPTS = str.maketrans("0123456789,", "₀₁₂₃₄₅₆₇₈₉,")
 _NAMED, _OTHERS = 12, 100
@@ -49,18 +49,6 @@ def timelines(
     return made
 
 
-def row_axes(panel: SubFigure, curves: Sequence[Curve], top: float = 0.4) -> tuple[Axes, Indices]:
-    """Add axes for rows of pictures along the time axis, and return the indices of the curves that have a row.
-
-    Row i is at height −i. There are as many rows as fit.
-    """
-    rows = evenly(len(curves), int(size(panel)[1] // 0.8))
-    (axes,) = timelines(panel, curves, [""], top=top)
-    axes.set(ylim=(0.5 - len(rows), 0.5), yticks=[])
-    axes.spines["left"].set_visible(False)
-    return axes, rows
-
-
 def _set_times(axes: Axes, curves: Sequence[Curve], width: float, lowest: bool) -> None:
     first, last = min(curve.times[0] for curve in curves), max(curve.times[-1] for curve in curves)
     axes.set_xlim(first - 0.01 * (last - first), last + 0.01 * (last - first))
@@ -73,12 +61,12 @@ def _set_times(axes: Axes, curves: Sequence[Curve], width: float, lowest: bool) 
 
 
 def _mark_knots(axes: Axes, curves: Sequence[Curve]) -> None:
-    """Mark knots or noisy data by thin lines, or by short ticks if lines would be too many.
+    """Mark knots by thin lines, or by short ticks if lines would be too many. Noisy data have short ticks.
 
     Bands mark long gaps between points.
     """
     knots = np.unique(np.concatenate([curve.marks for curve in curves]))
-    height = 1.0 if len(knots) <= _LINES else 0.04
+    height = 1.0 if len(knots) <= _LINES and curves[0].noise is None else 0.04
     look: Any = {"transform": axes.get_xaxis_transform()}
     line: Any = {"color": EDGE, "linewidth": 0.8, "linestyle": (0, (1, 2)), "zorder": 1}
     axes.vlines(knots[:: 1 + len(knots) // _TICKS], 0, height, **look, **line)

@@ -18,17 +18,14 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import to_rgba
 from matplotlib.figure import SubFigure
 from matplotlib.lines import Line2D
-from matplotlib.transforms import Affine2D
 from numpy.typing import NDArray
 
 from .._quaternions import rotation_rows
 from .chart import box, plane
 from .curves import Curve
-from .graphs import LEFT, RIGHT, row_axes
-from .style import AXES, DATA, INK, Array, legend, size, time_colors, window
-
-VIEW = np.array([[-0.5, 0.866, 0.0], [-0.296, -0.171, 0.940], [0.814, 0.470, 0.342]])
-"""Directions to the right, up and towards the viewer, who sees the first axis point forwards and the third up."""
+from .rows import REACH, VIEW, Rows
+from .sphere import caps
+from .style import AXES, DATA, INK, Array, legend, time_colors, window
 
 _ARROW = np.array([[1.0, 0.0], [-0.7, 0.55], [-0.35, 0.0], [-0.7, -0.55]])
 """A body in the plane that points along its first axis."""
@@ -42,15 +39,29 @@ _CIRCLE = np.stack([np.cos(_ANGLES), np.sin(_ANGLES), 0 * _ANGLES], axis=-1)
 
 
 def _draw_rotations(matrices: Callable[[Any], Array], panel: SubFigure, curves: Sequence[Curve]) -> None:
-    """Draw the columns of rotation matrices, shape (..., 3, 3), as arrows along a time axis. Given ones are bold."""
-    width, height = size(panel)
-    axes, rows = row_axes(panel, curves)
-    length = min(0.7, 0.4 * height / len(rows))
-    number = int((width - LEFT - RIGHT) / (0.5 * length))
-    for row, i in enumerate(rows):
-        for group, (times, points) in curves[i].samples(number).items():
-            _draw_arrows(axes, times, -row, length * matrices(points), group == "bold")
-    _explain(axes, curves, "" if len(rows) == len(curves) else f"; {len(rows)} of the curves")
+    """Draw the columns of rotation matrices, shape (..., 3, 3), as arrows along a time axis.
+
+    Discs at the tips contain the true direction of an axis with the probability of the band.
+    """
+    rows = Rows.of(panel, curves)
+    length = min(REACH, 0.48 * rows.height)
+    words = _left_out(rows, curves)
+    for i, row in enumerate(rows.rows):
+        times, points, radii = rows.symbols(i, 0.9 * length)
+        frames = matrices(points)
+        if radii is not None:
+            _draw_discs(rows, i, times, length, frames, radii)
+            words = "discs: 95 % bands"
+        _draw_arrows(rows.axes, times, -i, length * frames, light=row.name == "data")
+    _explain(rows.axes, words)
+    rows.draw_view()
+
+
+def _left_out(rows: Rows, curves: Sequence[Curve]) -> str:
+    """Describe how many curves of a batch have a row, if not all have."""
+    return (
+        f"{len(rows.rows)} of {len(curves)} curves" if rows.rows[0].name == "" and len(rows.rows) < len(curves) else ""
+    )
 
 
 def rotations(quaternions: Array) -> Array:
@@ -70,25 +81,37 @@ draw_rotations = partial(_draw_rotations, np.asarray)
 draw_spins = partial(_draw_rotations, lambda matrices: rotations(quaternions(matrices)))
 
 
-def _draw_arrows(axes: Axes, times: Array, row: int, frames: Array, bold: bool) -> None:
+def _draw_arrows(axes: Axes, times: Array, row: int, frames: Array, light: bool) -> None:
     """Draw the columns of matrices, shape (m, 3, 3), in inches. Nearer columns cover farther ones."""
     seen = VIEW @ frames
     order = np.argsort(seen[:, 2], axis=-1)
     right, up, _ = np.moveaxis(np.take_along_axis(seen, order[:, None], axis=-1), 1, 0)
     look: Any = {"units": "inches", "scale_units": "inches", "scale": 1, "clip_on": False}
-    look |= {"headwidth": 3.5, "headlength": 4.5, "headaxislength": 4.2}
-    look |= {"width": 0.032, "alpha": 1, "zorder": 4} if bold else {"width": 0.014, "alpha": 0.55, "zorder": 3}
+    look |= {"headwidth": 3.5, "headlength": 4.5, "headaxislength": 4.2, "zorder": 4}
+    look |= {"width": 0.018, "alpha": 0.6} if light else {"width": 0.028, "alpha": 1}
     positions = np.repeat(times, 3), np.full(3 * len(times), row)
     axes.quiver(*positions, right.ravel(), up.ravel(), color=np.array(AXES)[order.ravel()], **look)
 
 
-def _explain(axes: Axes, curves: Sequence[Curve], more: str, height: float = 1.0) -> None:
+def _draw_discs(rows: Rows, row: int, times: Array, length: float, frames: Array, radii: Array) -> None:
+    """Draw the caps of angular radii ``radii`` around the columns of rotation matrices, shape (m, 3, 3).
+
+    The rotations by angles up to r move a unit vector to all points of the cap of radius r around it.
+    """
+    for i, color in enumerate(AXES):
+        rings = length * caps(frames[:, :, i], radii) @ VIEW[:2].T
+        look: Any = {"facecolors": [to_rgba(color, 0.3)], "linewidths": 0, "label": "band", "zorder": 5}
+        rows.axes.add_collection(PolyCollection(list(rings), **look, **rows.in_inches(times, row)))
+
+
+def _explain(axes: Axes, more: str, height: float = 1.0) -> None:
     """Draw a legend of the colours in one line at a given height of the axes."""
     handles = [Line2D([], [], color=color, linewidth=2.4) for color in AXES]
-    given = curves[0].legend_of("bold: given", "bold: curve", "light: data")
+    labels = ["first axis", "second", "third"]
+    if more:
+        handles.append(Line2D([], [], linestyle="none"))
+        labels.append(more)
     anchor: Any = {"loc": "lower left", "bbox_to_anchor": (0, height), "ncols": 4, "borderaxespad": 0.2}
-    handles.append(Line2D([], [], linestyle="none"))
-    labels = ["first axis", "second", "third", given + more]
     legend(axes, handles, labels, handlelength=1.2, columnspacing=1.2, **anchor)
 
 
@@ -144,7 +167,7 @@ def draw_poses(panel: SubFigure, curves: Sequence[Curve]) -> None:
                 curve.draw_dots(axes, poses[:, :3, 3], markersize=3.5 if curve.alone else 2)
             else:
                 curve.draw_dots(axes, curve.given[:, :3, 3])
-    _explain(axes, curves, "", height=-0.06)
+    _explain(axes, curves[0].legend_of("bold: given", "bold: curve", "light: data"), height=-0.06)
 
 
 # ---- positive definite matrices ----
@@ -176,59 +199,66 @@ def _draw_in_rows(view: Array, panel: SubFigure, curves: Sequence[Curve]) -> Non
 
     The rows of ``view`` are the directions to the right, up and, for ellipsoids, towards the viewer.
     """
-    words = f"half axes: √eigenvalues; filled: {curves[0].legend_of('given', 'curve', 'outlines: data')}"
-    words += "; x₁ forwards, x₂ right, x₃ up" * (len(view) == 3)
-    # The scale to the right of the words is an inch wide.
-    words = fill(words, int((size(panel)[0] - LEFT - RIGHT - 1) / 0.075))
-    axes, rows = row_axes(panel, curves, top=0.25 + 0.15 * (1 + words.count("\n")))
-    if len(rows) < len(curves):
-        words += f"; {len(rows)} of the curves"
-    axes.text(0, 1.02, words, transform=axes.transAxes, color=INK, fontsize=9, va="bottom")
-    width, height = axes.bbox.width / panel.dpi, axes.bbox.height / len(rows) / panel.dpi
-    largest = max(np.sqrt(np.linalg.eigvalsh(curves[i].extent).max()) for i in rows)
-    inches = min(0.45 * height, 0.7) / largest
-    number = int(width / (0.9 * inches * largest))
-    for row, i in enumerate(rows):
-        for group, (times, points) in curves[i].samples(number).items():
-            _draw_row(axes, -row, inches, times, view @ points @ view.T, group)
-    _draw_scale(axes, width, inches)
+    rows = Rows.of(panel, curves)
+    # The largest horizontal and vertical half widths of the ellipses.
+    across, high = (
+        np.sqrt(max(float((view[i] @ row.curve.extent @ view[i]).max()) for row in rows.rows)) for i in (0, 1)
+    )
+    inches = min(REACH / across, 0.45 * rows.height / high)
+    words = ["half axes: √eigenvalues", _left_out(rows, curves)]
+    for i in range(len(rows.rows)):
+        times, points, radii = rows.symbols(i, 1.05 * inches * across)
+        _draw_row(rows, i, inches, times, view @ points @ view.T, radii)
+        if radii is not None:
+            words[1] = "shaded: 95 % bands"
+    # The scale to the right of the words is an inch wide, and the view as well.
+    has_view = len(view) == 3
+    text = fill("; ".join(filter(None, words)), int((rows.width - 1 - has_view) / 0.075))
+    rows.axes.text(0, 1.02, text, transform=rows.axes.transAxes, color=INK, fontsize=9, va="bottom")
+    _draw_scale(rows, inches, 1.0 * has_view)
+    if has_view:
+        rows.draw_view()
 
 
 draw_ellipses = partial(_draw_in_rows, np.eye(2))
 draw_ellipsoids = partial(_draw_in_rows, VIEW)
 
 
-def _draw_scale(axes: Axes, width: float, inches: float) -> None:
-    """Draw a bar above the right corner whose length is 1, 2 or 5 times a power of ten."""
+def _draw_scale(rows: Rows, inches: float, right: float) -> None:
+    """Draw a bar above the axes whose length is 1, 2 or 5 times a power of ten, ``right`` inches from the corner."""
     longest = 0.8 / inches
     power = 10.0 ** np.floor(np.log10(longest))
     length = max(step for step in (power, 2 * power, 5 * power) if step < 1.01 * longest)
-    ends = [1 - length * inches / width, 1]
-    look: dict[str, Any] = {"transform": axes.transAxes, "color": INK, "clip_on": False}
-    axes.plot(ends, [1.07, 1.07], "|-", linewidth=1.2, markersize=5, **look)
-    axes.text(ends[0] - 0.01, 1.07, f"{length:g}", fontsize=9, ha="right", va="center_baseline", **look)
+    end, height = 1 - right / rows.width, 1 + 0.14 / (rows.height * len(rows.rows))
+    ends = [end - length * inches / rows.width, end]
+    look: dict[str, Any] = {"transform": rows.axes.transAxes, "color": INK, "clip_on": False}
+    rows.axes.plot(ends, [height, height], "|-", linewidth=1.2, markersize=5, **look)
+    start = ends[0] - 0.05 / rows.width
+    rows.axes.text(start, height, f"{length:g}", fontsize=9, ha="right", va="center_baseline", **look)
 
 
-def _draw_row(axes: Axes, row: int, inches: float, times: Array, matrices: Array, group: str) -> None:
-    """Draw ellipses in a row of the axes, coloured by time; those of noisy data have one colour.
+def _draw_row(rows: Rows, row: int, inches: float, times: Array, matrices: Array, radii: Array | None) -> None:
+    """Draw ellipses in a row, coloured by time; those of noisy data have one colour.
 
-    ``inches`` is the length of 1 on paper, as the time axis has another scale. The groups are those of `Curve.samples`.
+    ``inches`` is the length of 1 on paper, as the time axis has another scale. Bands are shaded. The matrices at
+    distances up to r from P in the affine-invariant metric have ellipses between those of exp(−r)P and exp(r)P, and
+    touch both.
     """
+    axes, name = rows.axes, rows.rows[row].name
     first, last = axes.get_xlim()
-    colors, bold = time_colors((times - first) / (last - first)), group == "bold"
-    if group == "data":
+    colors = time_colors((times - first) / (last - first))
+    if name == "data":
         colors[:] = to_rgba(INK)
-    look: dict[str, Any] = {
-        "offsets": np.column_stack([times, np.full(len(times), row)]),
-        "offset_transform": axes.transData,
-        "transform": Affine2D().scale(inches) + axes.figure.dpi_scale_trans,
-        "clip_on": False,
-        "zorder": {"between": 3, "bold": 4, "data": 5}[group],
-        "edgecolors": colors,
-    }
-    filled = colors * [1, 1, 1, 0.45 if bold else 0]
-    rings = list(outlines(matrices))
-    axes.add_collection(PolyCollection(rings, facecolors=filled, linewidths=1.6 if bold else 0.7, **look))
+    rings, look = inches * outlines(matrices), rows.in_inches(times, row)
+    if radii is not None:
+        scales = np.exp(radii / 2)[:, None, None]
+        shaded = np.concatenate([scales * rings, (rings / scales)[:, ::-1]], axis=1)
+        faces = colors * [1, 1, 1, 0.3]
+        axes.add_collection(PolyCollection(list(shaded), facecolors=faces, linewidths=0, label="band", **look))
+    look |= {"edgecolors": colors, "linewidths": {"given": 1.6, "data": 0.8}.get(name, 1.2), "zorder": 4}
+    filled = colors * [1, 1, 1, {"given": 0.45, "": 0.25}.get(name, 0.0)]
+    axes.add_collection(PolyCollection(list(rings), facecolors=filled, **look))
     if matrices.shape[1] == 3:
-        for lines in sections(matrices).swapaxes(0, 1):
-            axes.add_collection(LineCollection(list(lines), linewidths=0.9 if bold else 0.4, **look))
+        look["linewidths"] = 0.6 * look["linewidths"]
+        for lines in inches * sections(matrices).swapaxes(0, 1):
+            axes.add_collection(LineCollection(list(lines), **look))

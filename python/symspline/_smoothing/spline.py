@@ -13,10 +13,10 @@ from .._archive import Entries, read_fitted, read_times
 from .._arrays import checked_number, short_repr, whole_number
 from .._core import ValidationError
 from .._cubic import CubicSpline
-from .._curves.curve import CurveArrays, UncertaintyBand
+from .._curves.curve import CurveArrays, SidePanel, UncertaintyBand
 from .._curves.ends import end_kinds, is_closed
 from .._options import order_of
-from .._spaces import Array, Doubles, Product, Space, factors_of
+from .._spaces import Array, Doubles, Product, Space, SpecialOrthogonal, factors_of
 from .._time import TimeAxis
 from .._typing import AnyArray, AnyArrays, CovarianceOrder, FloatArray, Number, P, TimesLike
 from .data import SmoothingData
@@ -55,6 +55,8 @@ else:
 
 
 _T = TypeVar("_T")
+# Rotations, whose distances are angles.
+_TURNING = (SpecialOrthogonal(2), SpecialOrthogonal(3))
 
 
 class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
@@ -619,6 +621,18 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         speed = None if several else self._spread(self._smoothed[0], index, x, 1)
         points = [own[noisy.used] for own in noisy.points]
         return UncertaintyBand([noisy.times[noisy.used]] * len(points), points, radii, speed)
+
+    def _radii(self, x: Doubles) -> list[list[tuple[Space, Doubles]]]:
+        """Return the parts of every factor, and the radii of their 95 % bands at times x of the core."""
+        parts = zip(smoothed_spaces(self.space), self._smoothed, strict=True)
+        return grouped(self.space, [(part, radius(part, 0.95) * self._spread(own, (), x, 0)) for part, own in parts])
+
+    def _panels_below(self, x: Doubles) -> list[SidePanel]:
+        return [
+            SidePanel(f"95 % band\nof {part}{', rad' if part in _TURNING else ''}", x, values[:, None], factor=number)
+            for number, own in enumerate([] if self._batch else self._radii(x))
+            for part, values in own
+        ]
 
     @property
     def _unconverged(self) -> int:

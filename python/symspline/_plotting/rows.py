@@ -1,0 +1,139 @@
+"""Symbols in rows along a time axis, such as frames and ellipses.
+
+The only curve of a figure has two rows: its given points, and the curve at equidistant times. Curves of a batch have
+one row each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import SubFigure
+from matplotlib.transforms import Affine2D
+
+from .curves import Curve
+from .graphs import BOTTOM, LEFT, RIGHT, timelines
+from .style import INK, Array, Indices, evenly, size
+
+VIEW = np.array([[-0.5, 0.866, 0.0], [-0.296, -0.171, 0.940], [0.814, 0.470, 0.342]])
+"""Directions to the right, up and towards the viewer, who sees the first axis point forwards and the third up."""
+REACH = 0.5
+"""The largest distance in inches by which a symbol extends to the left and right, which the margins have space for."""
+
+_TOP, _LEAST = 0.65, 0.6
+"""Margin at the top, and the smallest height of a row in inches."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One row.
+
+    Attributes
+    ----------
+    curve : Curve
+        Curve of the row.
+    name : {"given", "data", "curve", ""}
+        Whether the row has given points, noisy data or samples of the curve; empty for a curve of a batch.
+    """
+
+    curve: Curve
+    name: str
+
+    def symbols(self, width: float, reach: float) -> tuple[Array, Any, Array | None]:
+        """Return times on matplotlib's axis, points, and the radii of the band, for symbols that fit into the row.
+
+        The time axis has ``width`` inches, and symbols extend by at most ``reach`` inches to the left and right. Given
+        points that are close together are omitted; samples of the curve are equidistant.
+        """
+        curve = self.curve
+        if self.name in ("given", "data"):
+            times = curve.on_axis(curve.given_x)
+            kept = _apart(times, 1.2 * reach / width * (curve.times[-1] - curve.times[0]))
+            return times[kept], curve.given[kept], None
+        number = max(2, int(width / (2 * reach)) + 1)
+        even = np.searchsorted(curve.x, np.linspace(curve.x[0], curve.x[-1], number))
+        return curve.times[even], curve.points[even], None if curve.radii is None else curve.radii[even]
+
+
+def _apart(times: Array, least: float) -> Indices:
+    """Return the indices of times, the first among them, whose distances are ``least`` or more."""
+    kept = [0]
+    for i, time in enumerate(times):
+        if time - times[kept[-1]] >= least * (1 - 1e-9):
+            kept.append(i)
+    return np.array(kept)
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Axes with rows of symbols. Row i is at height −i.
+
+    Attributes
+    ----------
+    axes : Axes
+        The axes.
+    rows : list of Row
+        The rows.
+    width, height : float
+        Length of the time axis, and height of a row, in inches.
+    """
+
+    axes: Axes
+    rows: list[Row]
+    width: float
+    height: float
+
+    @classmethod
+    def of(cls, panel: SubFigure, curves: Sequence[Curve]) -> Rows:
+        """Add axes to a panel, with as many rows as fit."""
+        high = size(panel)[1] - BOTTOM - _TOP
+        (axes,) = timelines(panel, curves, [""], top=_TOP)
+        if curves[0].alone:
+            rows = [Row(curves[0], "curve")]
+            if len(curves[0].given):
+                rows.insert(0, Row(curves[0], "given" if curves[0].noise is None else "data"))
+        else:
+            rows = [Row(curves[i], "") for i in evenly(len(curves), max(1, int(high // _LEAST)))]
+        axes.set(ylim=(0.5 - len(rows), 0.5), yticks=[])
+        axes.spines["left"].set_visible(False)
+        return cls(axes, rows, size(panel)[0] - LEFT - RIGHT, high / len(rows))
+
+    def symbols(self, i: int, reach: float) -> tuple[Array, Any, Array | None]:
+        """Name a row, and return its symbols, which extend by at most ``reach`` inches; see `Row.symbols`."""
+        row = self.rows[i]
+        times, points, radii = row.symbols(self.width, reach)
+        look: Any = {"transform": self.axes.get_yaxis_transform(), "clip_on": False}
+        left = -0.9 / self.width
+        if not row.name:
+            self.axes.plot([left, left + 0.2 / self.width], [-i, -i], color=row.curve.color, linewidth=3, **look)
+            return times, points, radii
+        look |= {"color": INK, "fontsize": 9}
+        self.axes.text(left, -i, row.name, va="bottom", **look)
+        if row.name != "curve" and len(times) < len(row.curve.given):
+            self.axes.text(left, -i, f"{len(times)} of {len(row.curve.given)}", va="top", **look | {"fontsize": 8})
+        return times, points, radii
+
+    def in_inches(self, times: Array, row: int) -> dict[str, Any]:
+        """Return the options of a collection with paths in inches around times in a row."""
+        return {
+            "offsets": np.column_stack([times, np.full(len(times), -row)]),
+            "offset_transform": self.axes.transData,
+            "transform": Affine2D() + self.axes.figure.dpi_scale_trans,
+            "clip_on": False,
+        }
+
+    def draw_view(self) -> None:
+        """Draw the axes of space above the right corner, as they are seen."""
+        axes, inches = self.axes, np.array([1 / self.width, 1 / (self.height * len(self.rows))])
+        foot = np.array([1.0, 1.0]) + [0.05, 0.28] * inches
+        look: Any = {"xycoords": "axes fraction", "color": INK, "ha": "center", "va": "center"}
+        arrow: Any = {"arrowstyle": "-|>,head_width=0.12,head_length=0.25", "color": INK, "linewidth": 0.9}
+        arrow |= {"shrinkA": 0, "shrinkB": 0}
+        for name, end in zip(("x₁", "x₂", "x₃"), VIEW[:2].T, strict=True):
+            axes.annotate("", foot + 0.26 * end * inches, foot, xycoords="axes fraction", arrowprops=arrow)
+            axes.annotate(name, foot + 0.38 * end * inches, fontsize=8, **look)
+        axes.annotate("view", foot + [0.0, -0.3] * inches, fontsize=9, **look)
