@@ -161,6 +161,28 @@ def test_frames_stand_on_the_path():
         assert color in [line.get_color() for line in axes.lines if line.get_linewidth() == 2.0]
 
 
+@pytest.mark.parametrize("name", ["se:3", "r:3"])
+def test_boxes_are_filled(name):
+    """The box contains the curve and the frames, and is not much larger, also if the path is flat."""
+    t = np.linspace(0, 6, 40)
+    path = np.stack([8 * np.cos(0.8 * t), 5 * np.sin(0.8 * t), 0.1 * t], axis=-1)
+    poses = np.broadcast_to(np.eye(4), (40, 4, 4)).copy()
+    poses[:, :3, 3] = path
+    figure = rendered(ss.CubicSpline(t, poses if name == "se:3" else path, name).plot())
+    axes = figure.axes[0]
+    drawn = [np.stack(line.get_data_3d(), axis=1) for line in axes.lines if line.get_label() != "shadow"]
+    points = np.concatenate(drawn)
+    low, high = np.nanmin(points, axis=0), np.nanmax(points, axis=0)
+    limits = np.array([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()])
+    assert (low > limits[:, 0]).all() and (high < limits[:, 1]).all()
+    assert (np.ptp(limits, axis=1) < np.maximum(1.25 * (high - low), 0.35 * (high - low)[0])).all()
+    # The scales of the three axes are equal.
+    np.testing.assert_allclose(np.ptp(limits, axis=1) / axes._box_aspect, np.ptp(limits[0]) / axes._box_aspect[0])
+    words = " ".join(texts_of(figure))
+    assert "grey: shadow on the floor" in words
+    assert ("24 of 40 given" in words) == (name == "se:3")
+
+
 def test_lengths_of_rigid_motions_are_those_in_the_body():
     labels = {axes.get_ylabel() for axes in spline_on("se:3").plot().axes}
     assert {"speed\n|(ω, v)|", "acceleration\n|(ω′, v′)|"} <= labels

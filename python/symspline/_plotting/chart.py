@@ -19,6 +19,7 @@ from .style import EDGE, GRID, INK, PAPER, Array, closest, inside, note, plain, 
 
 _PLANE = Hyperbolic(2)
 _ORIGIN = np.array([1.0, 0.0, 0.0])
+SHADOW = "grey: shadow on the floor"
 _STEPS = np.multiply.outer(10.0 ** np.arange(-9, 3), [1, 2, 5]).ravel()
 
 
@@ -37,6 +38,7 @@ def draw_3d(panel: SubFigure, curves: Sequence[Curve]) -> None:
             _draw_hose(axes, curve, curve.radii)
         curve.draw_line(axes, curve.points)
         curve.draw_dots(axes, curve.given)
+    note(panel, SHADOW)
 
 
 def _draw_hose(axes: Any, curve: Curve, radii: Array) -> None:
@@ -66,30 +68,33 @@ def plane(panel: SubFigure) -> Axes:
 
 
 def box(
-    panel: SubFigure, lines: Sequence[Array], others: Sequence[Array], margin: float = 1.1, below: float = 0.1
+    panel: SubFigure, lines: Sequence[Array], others: Sequence[Array], margin: float = 0.05, below: float = 0.3
 ) -> Any:
     """Add a box with equal scales around lines of shape (m, 3), with their shadows on the floor.
 
-    The box contains the points ``others``, too. Its width is ``margin`` times that of the lines, and ``below`` inches
-    under it stay empty.
+    The box contains the points ``others``, too. Its sides are longer than the extent of all points by ``margin`` times
+    the longest one at both ends, and ``below`` inches under it stay empty.
     """
-    axes: Any = panel.add_axes(inside(panel, 0.0, below, 0.3, 0.0), projection="3d", facecolor="none")
+    axes: Any = panel.add_axes(inside(panel, 0.0, below, 0.45, 0.0), projection="3d", facecolor="none")
     everything = np.concatenate([*lines, *others])
-    middle, half = window(everything, margin)
+    middle, half = window(everything, 1.0)
     half = half or 1.0
+    # No side is shorter than a fifth of the longest one.
+    sides = np.maximum(np.ptp(everything, axis=0) / 2 + 2 * margin * half, 0.2 * half)
     for line in lines:
-        axes.plot(*line.T[:2], np.full(len(line), middle[2] - half), color=GRID, linewidth=1.2, zorder=2)
+        look: Any = {"color": GRID, "linewidth": 1.2, "zorder": 2, "label": "shadow"}
+        axes.plot(*line.T[:2], np.full(len(line), middle[2] - sides[2]), **look)
     axes.tick_params(color=EDGE, labelcolor=INK, labelsize=8, pad=0)
-    axes.set_box_aspect((1, 1, 1), zoom=0.9)
-    for axis, number, name in zip("xyz", middle, "₁₂₃", strict=True):
-        getattr(axes, f"set_{axis}lim")(number - half, number + half)
+    axes.set_box_aspect(tuple(sides), zoom=0.95)
+    for axis, number, side, name in zip("xyz", middle, sides, "₁₂₃", strict=True):
+        getattr(axes, f"set_{axis}lim")(number - side, number + side)
         # White walls with faint lines.
         wall = getattr(axes, f"{axis}axis")
         wall.set_pane_color("white")
         wall.pane.set_edgecolor(GRID)
         wall.line.set_color(EDGE)
         wall._axinfo["grid"].update(color=GRID, linewidth=0.6)
-        wall.set_major_locator(MaxNLocator(5))
+        wall.set_major_locator(MaxNLocator(max(2, round(5 * side / sides.max()))))
         wall.label.set(text=f"x{name}", color=INK, fontsize=10)
     # Choose the direction from which the curve looks widest.
     angles = np.radians([-60, -30, 30, 60])

@@ -21,7 +21,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from .._quaternions import rotation_rows
-from .chart import box, plane
+from .chart import SHADOW, box, plane
 from .curves import Curve
 from .rows import REACH, VIEW, Rows
 from .sphere import caps
@@ -145,9 +145,17 @@ def draw_flat_poses(panel: SubFigure, curves: Sequence[Curve]) -> None:
 def draw_poses(panel: SubFigure, curves: Sequence[Curve]) -> None:
     """Draw poses of SE(3) as frames on the path. Given ones are bold."""
     paths = [curve.points[:, :3, 3] for curve in curves]
-    axes = box(panel, paths, [curve.given[:, :3, 3] for curve in curves], 1.2, below=0.4)
+    given = [curve.given[:, :3, 3] for curve in curves]
+    length = 0.16 * window(np.concatenate([*paths, *given]), 1.0)[1] or 0.2
     number = max(2, _MANY // len(curves))
-    length = 0.12 * float(np.ptp(axes.get_xlim()))
+    # The box contains the tips of all frames that are drawn.
+    tips = [
+        (poses[:, :3, 3] + length * poses[:, :3, i])
+        for curve in curves
+        for _, poses in curve.samples(number).values()
+        for i in range(3)
+    ]
+    axes = box(panel, paths, given + tips, 0.02, below=0.45)
 
     def draw(poses: Array, length: float, **look: Any) -> None:
         feet = poses[:, :3, 3]
@@ -167,7 +175,11 @@ def draw_poses(panel: SubFigure, curves: Sequence[Curve]) -> None:
                 curve.draw_dots(axes, poses[:, :3, 3], markersize=3.5 if curve.alone else 2)
             else:
                 curve.draw_dots(axes, curve.given[:, :3, 3])
-    _explain(axes, curves[0].legend_of("bold: given", "bold: curve", "light: data"), height=-0.06)
+    bold = sum(len(curve.samples(number)["bold"][0]) for curve in curves)
+    count = sum(len(curve.given) for curve in curves)
+    given = "bold: given" if bold == count else f"bold: {bold} of {count} given"
+    words = curves[0].legend_of(given, "bold: curve", "light: data")
+    _explain(axes, f"{words}; {SHADOW}", height=-0.08)
 
 
 # ---- positive definite matrices ----
