@@ -27,18 +27,20 @@ from ._estimation.uncertainty import Jacobians, check_uncertain, standard_errors
 from ._exceptions import SymsplineError
 from ._functional import fit_many
 from ._lonlat import compass, from_lonlat, to_lonlat
+from ._options import require_matplotlib
 from ._segments import check_smooth, cut
 from ._smoothing.many import smooth_many
 from ._spaces import Sphere
 from ._timed_curve import check_timed
 from ._tracks import read_tracks
-from ._typing import Duplicates, FloatArray, TimesLike
+from ._typing import Duplicates, File, FloatArray, TimesLike
 from ._warnings import warn
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.figure import Figure
 
-__all__ = ["EARTH_RADIUS", "cog", "compass", "from_lonlat", "resample", "sog", "to_lonlat"]
+__all__ = ["EARTH_RADIUS", "cog", "compass", "from_lonlat", "plot", "resample", "sog", "to_lonlat"]
 
 EARTH_RADIUS = 6_371_008.8
 """Mean radius in metres: R₁ of the ellipsoid GRS 80 (Moritz, Geodetic reference system 1980)."""
@@ -398,6 +400,58 @@ def resample(
     for column in (*table.keys, *constant):
         found[column] = table.first_values(column, tracks)
     return found[[*own_names, *computed, *constant, *more]]
+
+
+def plot(spline: CubicSpline[Any, Any], file: File | None = None, *, radius: float = EARTH_RADIUS) -> Figure:
+    """Plot a track on the Earth, with land, its speed in km/h and its acceleration.
+
+    Tracks that fit into a circle of 25 degrees around a point are enlarged, with a scale bar and a small globe that
+    shows where they are. Longer ones are drawn on a globe and on a map.
+
+    Parameters
+    ----------
+    spline : CubicSpline
+        Curve on ``Sphere(2)``, or a batch of curves.
+    file : str, path or file object, optional
+        File to which the figure is saved, such as ``"track.pdf"``.
+    radius : float, default EARTH_RADIUS
+        Radius of the globe in metres.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        The figure, which you can modify or save.
+
+    Raises
+    ------
+    ImportError
+        If Matplotlib is not installed.
+    ValidationError
+        If the curve is on another space.
+
+    See Also
+    --------
+    symspline.CubicSpline.plot : Plot a curve on any space, without land and in radians.
+
+    Notes
+    -----
+    If times are not dates, the speed is in kilometres per unit of time. The land is that of Natural Earth at 1:110
+    million, which is in the public domain. Its coastlines are accurate to some ten kilometres, so that views narrower
+    than two degrees show no land.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> times = np.array(["2024-03-01T00", "2024-03-01T08", "2024-03-01T20"], "datetime64[s]")
+    >>> flight = ss.CubicSpline(times, from_lonlat([0, -74, -47], [51, 41, -24]), "sphere:2")
+    >>> figure = plot(flight)
+    """
+    require_matplotlib()
+    from ._plotting import plot as draw
+
+    _check_globe(spline)
+    size = checked_number(radius, "radius must be a number above 0", lambda r: 0 < r < np.inf)
+    return draw(spline, file, radius=size)
 
 
 def _along(

@@ -7,6 +7,7 @@ sizes.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from io import BytesIO
 from textwrap import shorten
 from typing import Any, NamedTuple
@@ -93,10 +94,15 @@ class CurveFigure(Figure):
         return buffer.getvalue()
 
 
-def plot(spline: Any, file: Any = None) -> Figure:
-    """Draw the figure of a spline, and save it if ``file`` is given. See `symspline.CubicSpline.plot`."""
+def plot(spline: Any, file: Any = None, radius: float | None = None) -> Figure:
+    """Draw the figure of a spline, and save it if ``file`` is given. See `symspline.CubicSpline.plot`.
+
+    The radius in metres is that of the Earth, if a curve on S² is one of longitude and latitude.
+    """
     curves, words = curves_of(spline)
     picture = _of_factors(curves) if isinstance(spline.space, Product) else picture_of(spline.space)
+    if radius is not None:
+        picture = picture._replace(draw=partial(sphere.draw_earth, radius))
     wide = picture.width > 1.5 * picture.height
     widths = [picture.width] if wide else [picture.width, _RATES_WIDTH]
     heights = [_HEAD, picture.height, _RATES_HEIGHT][: 3 if wide else 2]
@@ -108,7 +114,7 @@ def plot(spline: Any, file: Any = None) -> Figure:
     title = shorten(f"{spline._kind} on {spline.space!r}", int(6 * sum(widths)), placeholder=" …")
     heading(figure, title, words + _description(spline, curves), 1 - 0.5 / sum(heights))
     picture.draw(figure.add_subfigure(grid[1, 0]), curves)
-    _draw_rates(figure.add_subfigure(grid[2, 0] if wide else grid[1, 1]), curves)
+    _draw_rates(figure.add_subfigure(grid[2, 0] if wide else grid[1, 1]), curves, radius)
     if panels:
         residuals.draw(figure.add_subfigure(grid[-1, :]), curves[0], panels)
     if file is not None:
@@ -152,16 +158,25 @@ def _description(spline: Any, curves: Sequence[Curve]) -> str:
     return ", ".join(words)
 
 
-def _draw_rates(panel: SubFigure, curves: Sequence[Curve]) -> None:
-    """Draw |γ'| and |∇γ'| of every curve, and the band of the speed if the noise is known."""
-    per = ("", "") if curves[0].time_name == "t" else (", 1/s", ", 1/s²")
+def _draw_rates(panel: SubFigure, curves: Sequence[Curve], radius: float | None) -> None:
+    """Draw |γ'| and |∇γ'| of every curve, and the band of the speed if the noise is known.
+
+    On the Earth they are in km/h and m/s², or in km per unit of time.
+    """
+    no_dates = curves[0].time_name == "t"
+    per = ("", "") if no_dates else (", 1/s", ", 1/s²")
+    scales = (1.0, 1.0)
     # Rigid motions have no invariant lengths, see `SpecialEuclidean`.
     rigid = isinstance(curves[0].space, SpecialEuclidean)
     first, second = ("|(ω, v)|", "|(ω′, v′)|") if rigid else ("|γ′|", "|∇γ′|")
-    upper, lower = timelines(panel, curves, [f"speed\n{first}{per[0]}", f"acceleration\n{second}{per[1]}"])
+    names = [f"{first}{per[0]}", f"{second}{per[1]}"]
+    if radius is not None:
+        names = ["km per unit of t", "km per unit of t²"] if no_dates else ["km/h", "m/s²"]
+        scales = (radius / 1000,) * 2 if no_dates else (3.6 * radius, radius)
+    upper, lower = timelines(panel, curves, [f"speed\n{names[0]}", f"acceleration\n{names[1]}"])
     top = highest = rounding = 0.0
     for curve in curves:
-        speed, bend = curve.at("speed"), curve.at("bend")
+        speed, bend = scales[0] * curve.at("speed"), scales[1] * curve.at("bend")
         look: Any = {"color": curve.color, "linewidth": 1.8 if curve.alone else 1.1}
         upper.plot(curve.times, speed, **look)
         lower.plot(curve.times, bend, **look)
@@ -169,9 +184,9 @@ def _draw_rates(panel: SubFigure, curves: Sequence[Curve]) -> None:
         # Rounding errors of points between the closest knots, which a curve at rest has.
         points = curve.data.points if isinstance(curve.space, Product) else (curve.data.points,)
         size = max(np.abs(part).max() for part in points)
-        rounding = max(rounding, 1e-15 * size / np.diff(curve.data.times).min())
+        rounding = max(rounding, 1e-15 * scales[0] * size / np.diff(curve.data.times).min())
         if curve.noise is not None and curve.noise.speed is not None and curve.shown:
-            spread = _NORMAL * curve.noise.speed
+            spread = scales[0] * _NORMAL * curve.noise.speed
             fill_band(upper, curve, np.maximum(speed - spread, 0), speed + spread)
             top = max(top, (speed + spread).max())
     top = top if top > rounding else 1.0

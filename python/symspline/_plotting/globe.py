@@ -118,18 +118,20 @@ def label_directions(axes: Axes, view: View, directions: Mapping[str, tuple[floa
         text.set(ha="center", va="center", path_effects=HALO)
 
 
-def draw_frame(axes: Axes, view: View, middle: Array, half: float) -> None:
-    """Draw a square frame with a graticule, which has labels on the left and at the bottom.
+def draw_frame(axes: Axes, view: View, middle: Array, half: float | Array) -> None:
+    """Draw a frame with a graticule, which has labels on the left and at the bottom.
 
-    ``middle`` and ``half`` are the centre of the frame in the projection, and half of its width.
+    ``middle`` is the centre of the frame in the projection, and ``half`` half of its width and height. One number is
+    that of a square.
     """
+    half = np.broadcast_to(half, 2)
     (west, south), (east, north) = middle - half, middle + half
     lon, lat = (float(value) for value in to_lonlat(view.up))
-    reach = np.arcsin(min(1.0, float(np.linalg.norm(middle)) + 1.45 * half))
+    reach = np.arcsin(min(1.0, float(np.linalg.norm(middle)) + 1.02 * float(np.linalg.norm(half))))
     aside = np.sin(reach) / np.cos(np.radians(lat))
     around = np.degrees(np.arcsin(aside)) if aside < 1 else 180.0
     reach = np.degrees(reach)
-    spacing = closest(_STEPS, np.degrees(2 * half) / 5), closest(_STEPS, around / 3.5) if around < 180 else 30
+    spacing = closest(_STEPS, np.degrees(2 * half[1]) / 5), closest(_STEPS, around / 3.5) if around < 180 else 30
     parallels = _multiples(spacing[0], max(lat - reach, -90), min(lat + reach, 90))
     meridians = _multiples(spacing[1], lon - around, lon + around)
     steps = np.linspace(-1, 1, 721)

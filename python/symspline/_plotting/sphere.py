@@ -16,11 +16,17 @@ from matplotlib.figure import SubFigure
 from numpy.typing import NDArray
 
 from .._lonlat import to_lonlat
+from . import land
 from .curves import CIRCLE, Curve, disc_indices, draw_tube
 from .globe import View, degrees, draw_frame, draw_globe, label_directions, middle_of
-from .style import GRID, PAPER, Array, inside, note, plain, size, window
+from .style import GRID, HALO, INK, MARK, PAPER, Array, inside, note, plain, size, window
 
 _SMALL = np.radians(25)
+_LOCATOR = 3.9
+"""Width in inches of the column of the small globe beside a frame."""
+_COARSE = np.radians(2)
+"""Frames narrower than this have no land, as the coastlines are too coarse."""
+_RING: dict[str, Any] = {"markersize": 12, "markeredgewidth": 1.4, "zorder": 6}
 _WIDEST = 1.5
 _POLE = 60
 """Neighbouring samples are on both sides of a pole if their longitudes differ by more degrees."""
@@ -33,14 +39,60 @@ _AXES = {"x₁": (1.0, 0.0, 0.0), "x₂": (0.0, 1.0, 0.0), "x₃": (0.0, 0.0, 1.
 
 
 def draw_sphere(panel: SubFigure, curves: Sequence[Curve]) -> None:
-    """Draw curves on S²: on a globe and, if there is space, on a map of all longitudes and latitudes."""
+    """Draw curves on S²: on a globe and, if there is space, on a map of all longitudes and latitudes.
+
+    Curves that are close together are drawn in a frame, beside a globe that shows where it is.
+    """
+    _draw_sphere(panel, curves, None)
+
+
+def draw_earth(radius: float, panel: SubFigure, curves: Sequence[Curve]) -> None:
+    """Draw curves of longitude and latitude on the Earth, whose radius is in metres: with land, and a scale bar."""
+    _draw_sphere(panel, curves, radius)
+
+
+def _draw_sphere(panel: SubFigure, curves: Sequence[Curve], radius: float | None) -> None:
     width, height = size(panel)
-    look = _Globe(below=0.1, right=width - min(width, height) + 0.1)
-    axes, view, _ = _draw_globe(panel, np.concatenate([curve.extent for curve in curves]), look)
+    wide = width > 2 * height
+    look = _Globe(below=0.1, right=width - min(width, height) + 0.1, beside=_LOCATOR if wide else 0.0)
+    axes, view, is_part = _draw_globe(panel, np.concatenate([curve.extent for curve in curves]), look)
     for curve in curves:
         _draw_on_globe(axes, view, curve, curve.points, curve.given, curve.radii)
-    if width > 2 * height:
-        _draw_map(panel, curves, height)
+    if radius is not None and (not is_part or np.ptp(axes.get_xlim()) > _COARSE):
+        land.draw_on_globe(axes, view)
+    if radius is not None and is_part:
+        _draw_scale(axes, radius / 1000)
+    if wide and is_part:
+        _draw_locator(panel, axes, view, radius is not None)
+    elif wide:
+        _draw_map(panel, curves, height, radius is not None)
+
+
+def _draw_scale(axes: Axes, radius: float) -> None:
+    """Draw a bar in the lower right corner of a frame, whose length is 1, 2 or 5 times a power of ten in km."""
+    (west, east), (south, north) = axes.get_xlim(), axes.get_ylim()
+    steps = np.multiply.outer(10.0 ** np.arange(-9, 5), [1, 2, 5]).ravel()
+    length = steps[steps < 0.25 * (east - west) * radius][-1]
+    end, height = east - 0.03 * (east - west), south + 0.06 * (north - south)
+    look: dict[str, Any] = {"color": INK, "zorder": 7}
+    axes.plot([end - length / radius, end], [height] * 2, "|-", linewidth=1.2, markersize=6, label="scale", **look)
+    at, halo = (end - length / radius / 2, height + 0.015 * (north - south)), {"path_effects": HALO}
+    axes.text(*at, f"{length:g} km", ha="center", va="bottom", fontsize=9, **look, **halo)
+
+
+def _draw_locator(panel: SubFigure, frame: Axes, view: View, has_land: bool) -> None:
+    """Draw a small globe to the right of a frame, with the outline of the frame."""
+    width, _ = size(panel)
+    axes = panel.add_axes(inside(panel, width - _LOCATOR + 0.3, 0.6, 0.3, 0.35), label="locator")
+    draw_globe(axes, view, 30)
+    if has_land:
+        land.draw_on_globe(axes, view)
+    (west, east), (south, north) = frame.get_xlim(), frame.get_ylim()
+    outline = np.array([[west, south], [east, south], [east, north], [west, north], [west, south]])
+    axes.plot(*outline.T, color=MARK, linewidth=1.4, zorder=6, label="frame")
+    if max(east - west, north - south) < 0.15:
+        # A small frame would not be seen.
+        axes.plot((west + east) / 2, (south + north) / 2, "o", color="none", markeredgecolor=MARK, **_RING)
 
 
 def draw_bloch(panel: SubFigure, curves: Sequence[Curve]) -> None:
@@ -122,6 +174,8 @@ class _Globe(NamedTuple):
         Labelled directions, such as "x".
     half : bool
         Whether only the northern half is drawn.
+    beside : float
+        Width in inches of the space to the right of a part of the globe, whose frame fills the rest.
     """
 
     below: float = 0.35
@@ -130,6 +184,7 @@ class _Globe(NamedTuple):
     lats: tuple[float, float] = (-90, 90)
     labels: Any = None
     half: bool = False
+    beside: float = 0.0
 
 
 def _draw_globe(panel: SubFigure, points: Array, look: _Globe, above: Array | None = None) -> tuple[Axes, View, bool]:
@@ -141,9 +196,18 @@ def _draw_globe(panel: SubFigure, points: Array, look: _Globe, above: Array | No
     far = np.arctan2(np.linalg.norm(view.flat(points), axis=-1), points @ view.up).max()
     if 1e-7 < far < _SMALL:
         width, height = size(panel)
-        side = min(width, height)
-        axes = panel.add_axes(inside(panel, 0.95, 0.5, width - side + 0.2, height - side + 0.65))
-        draw_frame(axes, view, *window(view.flat(points), 1.22))
+        if look.beside:
+            right, top = look.beside, 0.15
+        else:
+            side = min(width, height)
+            right, top = width - side + 0.2, height - side + 0.65
+        axes = panel.add_axes(inside(panel, 0.95, 0.5, right, top))
+        flat = view.flat(points)
+        middle, _ = window(flat, 1.0)
+        ratio = (width - 0.95 - right) / (height - 0.5 - top)
+        across, high = 0.61 * np.ptp(flat, axis=0)
+        high = max(high, across / ratio)
+        draw_frame(axes, view, middle, np.array([ratio * high, high]))
         axes.tick_params(labelsize=8)
         return axes, view, True
     lon, lat = middle_of(points if above is None else above)
@@ -208,7 +272,7 @@ def _interrupted(line: Array, after: Any, gaps: Any) -> Array:
 # ---- on the map ----
 
 
-def _draw_map(panel: SubFigure, curves: Sequence[Curve], left: float) -> None:
+def _draw_map(panel: SubFigure, curves: Sequence[Curve], left: float, has_land: bool) -> None:
     axes = panel.add_axes(inside(panel, left + 0.65, 0.5, 0.3, 0.2))
     plain(axes)
     axes.set(aspect="equal", xlim=(-180, 180), ylim=(-90, 90), facecolor=PAPER, label="map")
@@ -217,6 +281,8 @@ def _draw_map(panel: SubFigure, curves: Sequence[Curve], left: float) -> None:
     axes.set_xticks(range(-180, 181, 30), minor=True)
     axes.grid(which="minor", color=GRID, linewidth=0.6)
     axes.tick_params(which="minor", length=0)
+    if has_land:
+        land.draw_on_map(axes)
     for curve in curves:
         positions, given = curve.marked(lonlat_of)
         if curve.radii is not None:

@@ -18,6 +18,8 @@ EDGE, GRID, INK, PAPER = "#a8a18f", "#b9c8d1", "#22303a", "#eff4f7"
 SPLINE = "#0b559f"
 DATA = "#7d8f9c"
 """Colour of noisy data if there is one curve."""
+MARK = "#c4402f"
+"""Colour of the outline of a frame on a globe."""
 GAP = "#faeee4"
 """Colour of long gaps between points."""
 DISTINCT = ["#0b559f", "#d95f0e", "#009e73", "#cc79a7", "#56b4e9", "#8a6d00"]

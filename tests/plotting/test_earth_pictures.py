@@ -1,0 +1,148 @@
+"""Pictures of tracks on the Earth: land, scale, locator and units."""
+
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from drawn import axes_named, rendered, texts_of
+from matplotlib.figure import Figure
+from matplotlib.patches import PathPatch
+from matplotlib.transforms import Affine2D
+from refused import raises
+
+import symspline as ss
+from symspline import geo
+from symspline._plotting import land
+from symspline._plotting.globe import View
+
+DATES = np.datetime64("2024-05-01T08:00") + np.arange(9).astype("m8[h]")
+U = np.linspace(0, 1, 9)
+FLIGHT = geo.from_lonlat([0, -74, -46.6, 28, 103.8, 139.7], [51.5, 40.7, -23.5, -26.2, 1.35, 35.7])
+
+
+def track(lon, lat, size, times=DATES):
+    return ss.CubicSpline(times, geo.from_lonlat(lon + size * U, lat + size * np.sin(2 * U)), "sphere:2")
+
+
+def windings(polygons, points):
+    """How often polygons go counterclockwise round points, by the crossings of rays to the right."""
+    total = np.zeros(len(points), int)
+    x, y = points.T
+    for ring in polygons:
+        for (x0, y0), (x1, y1) in pairwise(ring):
+            if y0 != y1:
+                crossed = (y >= min(y0, y1)) & (y < max(y0, y1)) & (x < x0 + (y - y0) / (y1 - y0) * (x1 - x0))
+                total += np.where(crossed, 1 if y1 > y0 else -1, 0)
+    return total
+
+
+def test_land_contains_known_positions():
+    dry = [(2.3, 48.9), (-100, 40), (134, -25), (25, 0), (90, -80), (-42, 72), (100, 60), (-60, -10)]
+    wet = [(-30, 30), (-150, 0), (80, -30), (0, 80), (51, 42), (5, 38), (-89, 25), (-170, -60)]
+    assert (windings(land.rings(), np.array(dry)) == 1).all() and (windings(land.rings(), np.array(wet)) == 0).all()
+    assert len(land.rings()) == 128 and all((ring[0] == ring[-1]).all() for ring in land.rings())
+    assert Path(land.__file__).with_name("land.npz").stat().st_size < 60_000
+
+
+@pytest.mark.parametrize("lon, lat", [(20, 10), (-160, -5), (179, 60), (-90, -89), (-60, -40), (-129, -42)])
+def test_land_is_on_the_side_of_the_viewer(lon, lat):
+    """Also opposite to a continent, whose outline is then moved to the horizon."""
+    view = View.above(lon, lat)
+    axes = Figure().add_subplot()
+    land.draw_on_globe(axes, view)
+    (drawn,) = [patch for patch in axes.get_children() if patch.get_label() == "land"]
+    points = ss.Sphere(2).random_point(np.random.default_rng(0), 600)
+    points = points[points @ view.up > 0.15]
+    # Matplotlib simplifies polygons by a fraction of a pixel.
+    polygons = drawn.get_path().to_polygons(Affine2D().scale(1e4))
+    filled = windings(polygons, 1e4 * view.flat(points)) != 0
+    known = windings(land.rings(), np.column_stack(geo.to_lonlat(points))) != 0
+    assert np.mean(filled == known) > 0.99 and 0.03 < known.mean() < 0.8
+
+
+def test_coastlines_have_no_edge_along_the_date_line():
+    axes = Figure().add_subplot()
+    land.draw_on_globe(axes, View.above(180, -70))
+    (coast,) = [line for line in axes.lines if line.get_label() == "coastline"]
+    steps = np.linalg.norm(np.diff(coast.get_xydata(), axis=0), axis=1)
+    assert np.nanmax(steps) < 0.1
+
+
+def land_of(axes):
+    return [own for own in axes.get_children() if isinstance(own, PathPatch) and own.get_label() == "land"]
+
+
+def test_whole_globe_has_land_on_both_maps():
+    figure = rendered(geo.plot(ss.CubicSpline(None, FLIGHT, "sphere:2")))
+    globe, chart = figure.axes[0], axes_named(figure, "map")
+    assert len(land_of(globe)) == len(land_of(chart)) == 1
+    assert not land_of(rendered(ss.CubicSpline(None, FLIGHT, "sphere:2").plot()).axes[0])
+
+
+@pytest.mark.parametrize("size, has_land, length", [(12.0, True, "500 km"), (0.01, False, "0.5 km")])
+def test_local_tracks_are_enlarged(size, has_land, length):
+    figure = rendered(geo.plot(track(5, 40, size)))
+    frame, locator = figure.axes[0], axes_named(figure, "locator")
+    assert bool(land_of(frame)) == has_land and land_of(locator)
+    # The frame is filled by the track, and wider than high.
+    line = next(
+        line.get_xydata()
+        for line in frame.lines
+        if len(line.get_xdata()) > 1000 and np.isfinite(line.get_xydata()).all()
+    )
+    low, high = line.min(axis=0), line.max(axis=0)
+    limits = np.array([frame.get_xlim(), frame.get_ylim()])
+    assert (low > limits[:, 0]).all() and (high < limits[:, 1]).all()
+    assert ((high - low) / np.ptp(limits, axis=1)).max() == pytest.approx(1 / 1.22)
+    assert np.ptp(limits[0]) > 1.4 * np.ptp(limits[1])
+    # The outline on the small globe is that of the frame.
+    (outline,) = [line.get_xydata() for line in locator.lines if line.get_label() == "frame"]
+    np.testing.assert_allclose([outline.min(axis=0), outline.max(axis=0)], limits.T)
+    # The bar is as long as it says.
+    (bar,) = [line.get_xdata() for line in frame.lines if line.get_label() == "scale"]
+    assert f"{np.ptp(bar) * geo.EARTH_RADIUS / 1000:.3g} km" in texts_of(figure)
+    assert any(text.endswith(" km") for text in texts_of(figure)) and length
+
+
+def test_speed_is_in_kilometres_per_hour():
+    spline = track(5, 40, 2.0)
+    figure = rendered(geo.plot(spline))
+    speed, acceleration = axes_named(figure, "speed"), axes_named(figure, "acceleration")
+    assert speed.get_ylabel() == "speed\nkm/h" and acceleration.get_ylabel() == "acceleration\nm/s²"
+    x = np.linspace(0, 28800, 5)
+    at = DATES[0] + x.astype("m8[s]")
+    drawn = np.interp(
+        x, 86400 * (speed.lines[0].get_xdata() - speed.lines[0].get_xdata()[0]), speed.lines[0].get_ydata()
+    )
+    np.testing.assert_allclose(drawn, 3.6 * geo.sog(spline, at), rtol=1e-3)
+    bend = acceleration.lines[0].get_ydata().max()
+    fine = DATES[0] + np.arange(0, 28801, 60).astype("m8[s]")
+    norm = ss.Sphere(2).norm(spline(fine), spline(fine, nu=2))
+    assert bend == pytest.approx(geo.EARTH_RADIUS * norm.max(), rel=1e-3)
+    bare = geo.plot(track(5, 40, 2.0, np.arange(9.0)), radius=1000.0)
+    assert axes_named(bare, "speed").get_ylabel() == "speed\nkm per unit of t"
+    unit = track(5, 40, 2.0, np.arange(9.0)).speed(0.0)
+    assert axes_named(bare, "speed").lines[0].get_ydata()[0] == pytest.approx(unit)
+
+
+def test_smoothed_tracks_have_a_band_in_the_same_unit():
+    t = np.datetime64("2024-05-01") + np.arange(60).astype("m8[m]")
+    rng = np.random.default_rng(0)
+    lonlat = np.stack([10 + 0.02 * np.arange(60), 50 + 0.1 * np.sin(np.arange(60) / 9)]) + 0.002 * rng.standard_normal(
+        (2, 60)
+    )
+    spline = ss.make_smoothing_spline(t, geo.from_lonlat(*lonlat), "sphere:2")
+    speed = axes_named(rendered(geo.plot(spline)), "speed")
+    (band,) = [own for own in speed.collections if own.get_label() == "band"]
+    wanted = speed.lines[0].get_ydata()[600] + 1.96 * 3.6 * geo.EARTH_RADIUS * spline.std(
+        t[0] + (t[-1] - t[0]) / 2, nu=1
+    )
+    assert np.abs(band.get_paths()[0].vertices[:, 1] - wanted).min() < 1e-3 * wanted
+
+
+def test_other_curves_are_refused(tmp_path):
+    raises("must be on Sphere", geo.plot, ss.CubicSpline(None, np.eye(3), "r:3"))
+    raises("radius must be a number above 0", geo.plot, track(5, 40, 2.0), radius=-1.0)
+    geo.plot(track(5, 40, 2.0), tmp_path / "track.svg")
+    assert (tmp_path / "track.svg").read_text("utf-8").startswith("<?xml")
