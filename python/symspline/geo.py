@@ -442,6 +442,7 @@ def plot(spline: CubicSpline[Any, Any], file: File | None = None, *, radius: flo
     Examples
     --------
     >>> import numpy as np
+    >>> import symspline as ss
     >>> times = np.array(["2024-03-01T00", "2024-03-01T08", "2024-03-01T20"], "datetime64[s]")
     >>> flight = ss.CubicSpline(times, from_lonlat([0, -74, -47], [51, 41, -24]), "sphere:2")
     >>> figure = plot(flight)

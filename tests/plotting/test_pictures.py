@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from drawn import axes_named, dots_of, lines_of, rendered, texts_of
+from drawn import axes_named, dots_of, lines_of, rendered, spline_on, texts_of
 
 import symspline as ss
 from symspline._plotting import chart, globe, sphere
@@ -180,6 +180,48 @@ def test_no_line_jumps_across_the_half_sphere(name, points, crossings):
     np.testing.assert_allclose(line[gaps - 1], -line[gaps + 1], atol=1e-12)
     for dot in dots:
         assert np.nanmin(np.linalg.norm(line - dot, axis=1)) < 1e-12
+
+
+def test_crossings_of_the_rim_have_equal_letters():
+    axes = rendered(ss.CubicSpline(None, HALF_SPHERE, "rp:2").plot()).axes[0]
+    letters = {}
+    for text in axes.texts:
+        letters.setdefault(text.get_text(), []).append(np.array(text.get_position()))
+    assert all(len(letters[name]) == 2 for name in "abc") and "d" not in letters
+    for first, second in (letters[name] for name in "abc"):
+        # The projection of the rim is an ellipse with the middle 0.
+        np.testing.assert_allclose(first, -second, atol=1e-9)
+
+
+def test_labels_of_axes_avoid_the_curve():
+    view = globe.View.above(20, 42)
+    axes = rendered(ss.CubicSpline(None, HALF_SPHERE, "rp:2").plot()).axes[0]
+    curve = np.concatenate([line for line in lines_of(axes) if len(line) > 1000])
+    for text in axes.texts:
+        if text.get_text()[0] == "x":
+            assert np.nanmin(np.linalg.norm(curve - text.get_position(), axis=1)) > 0.1
+    # A label stays at the end of its axis if there is space.
+    end = view.flat(np.array([0.0, 0.0, 1.17]))
+    for near, stays in ((end, False), (end + 0.3, True)):
+        at = globe._free(end, view.flat(np.array([0.0, 0.0, 1.0])), near[None])
+        assert (at == end).all() == stays and np.linalg.norm(at - near) > 0.1
+
+
+@pytest.mark.parametrize("name", ["r:2", "h:2", "sphere:2", "rp:2", "cp:1"])
+def test_arrow_heads_point_along_the_curve(name):
+    spline = spline_on(name)
+    axes = rendered(spline.plot()).axes[0]
+    (heads,) = [own for own in axes.collections if own.get_label() == "time"]
+    assert len(heads.get_offsets()) == 3
+    line = max((line for line in lines_of(axes)), key=lambda line: np.isfinite(line[:, 0]).sum())
+    for path, at in zip(heads.get_paths(), heads.get_offsets(), strict=True):
+        i = int(np.nanargmin(np.linalg.norm(line - at, axis=1)))
+        along = line[min(i + 1, len(line) - 1)] - line[max(i - 1, 0)]
+        tip = path.vertices[0] / np.linalg.norm(path.vertices[0])
+        assert tip @ along / np.linalg.norm(along) > 0.99
+    # A point at rest has no direction.
+    rest = ss.CubicSpline(None, np.stack([spline.points[0]] * 3), spline.space)
+    assert not [own for own in rendered(rest.plot()).axes[0].collections if own.get_label() == "time"]
 
 
 def test_small_curve_on_the_half_sphere_is_enlarged():

@@ -13,6 +13,7 @@ from matplotlib.patches import Circle
 from matplotlib.ticker import MaxNLocator
 
 from .._spaces import Hyperbolic
+from .arrows import draw_arrows
 from .curves import CIRCLE, Curve, disc_indices, draw_in_plane
 from .globe import centre_of
 from .style import EDGE, GRID, INK, PAPER, Array, closest, inside, note, plain, window
@@ -27,6 +28,7 @@ def draw_plane(panel: SubFigure, curves: Sequence[Curve]) -> None:
     """Draw curves in R² with equal scales."""
     axes = plane(panel)
     for curve in curves:
+        draw_arrows(axes, curve, curve.points)
         draw_in_plane(axes, curve, np.asarray, lambda p, radii: p[:, None] + radii[:, None, None] * CIRCLE)
 
 
@@ -120,6 +122,7 @@ def draw_disk(panel: SubFigure, curves: Sequence[Curve]) -> None:
     spacing = 0.5 if half > 1 else closest(_STEPS, 0.6 * reach)
     _draw_grid(axes, spacing)
     for curve in curves:
+        draw_arrows(axes, curve, flat(curve.points, middle))
         draw_in_plane(axes, curve, partial(flat, middle=middle), rims)
     text = f"Poincaré disk; geodesics that cross the axes every {spacing:g}"
     if middle is not _ORIGIN:

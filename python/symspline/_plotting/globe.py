@@ -15,6 +15,8 @@ from .._spaces import Euclidean, Space
 from .style import EDGE, GRID, HALO, INK, PAPER, Array, closest
 
 SEA = LinearSegmentedColormap.from_list("sea", ["#c3d3de", "#dfe9ef", "#f4f8fa"])
+_CLEAR = 0.12
+"""Distance of a label from curves, if the radius of the globe is 1."""
 _STEPS = np.append(np.multiply.outer(10.0 ** np.arange(-9, 1), [1, 2, 5]).ravel(), [10, 15, 30, 45, 90])
 
 
@@ -106,16 +108,31 @@ def draw_globe(axes: Axes, view: View, spacing: int, half: bool = False) -> None
         axes.plot(*view.visible(line).T, color=GRID, linewidth=0.6, zorder=2)
 
 
-def label_directions(axes: Axes, view: View, directions: Mapping[str, tuple[float, float, float]]) -> None:
-    """Draw labelled half axes from the centre of a ball. Those on the far side are faint."""
+def label_directions(
+    axes: Axes, view: View, directions: Mapping[str, tuple[float, float, float]], avoided: Array
+) -> None:
+    """Draw labelled half axes from the centre of a ball. Those on the far side are faint.
+
+    A label is at the end of its axis or, if positions ``avoided``, shape (m, 2), are there, beside it.
+    """
     for label, direction in directions.items():
         end = np.array(direction)
         alpha = 0.9 if end @ view.up > -1e-9 else 0.5
         stick = view.flat(np.stack([0 * end, end]))
         axes.plot(*stick.T, color=INK, linewidth=0.8, alpha=0.6 * alpha, zorder=3)
-        x, y = view.flat(1.17 * end)
+        x, y = _free(view.flat(1.17 * end), view.flat(end), avoided)
         text = axes.text(x, y, label, color=INK, fontsize=11, alpha=alpha, zorder=7)
         text.set(ha="center", va="center", path_effects=HALO)
+
+
+def _free(wanted: Array, tip: Array, avoided: Array) -> Array:
+    """Return a position of a label that is not too close to others, or the best one around a tip."""
+    angles = np.linspace(0, 2 * np.pi, 16, endpoint=False)
+    around = tip + 0.17 * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+    candidates = np.concatenate([wanted[None], around])
+    gaps = np.linalg.norm(candidates[:, None] - avoided, axis=-1)
+    closest = np.nanmin(gaps, axis=1, initial=np.inf)
+    return np.asarray(candidates[0 if closest[0] > _CLEAR else closest.argmax()])
 
 
 def draw_frame(axes: Axes, view: View, middle: Array, half: float | Array) -> None:

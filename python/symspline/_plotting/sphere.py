@@ -17,15 +17,18 @@ from numpy.typing import NDArray
 
 from .._lonlat import to_lonlat
 from . import land
+from .arrows import draw_arrows
 from .curves import CIRCLE, Curve, disc_indices, draw_tube
 from .globe import View, degrees, draw_frame, draw_globe, label_directions, middle_of
-from .style import GRID, HALO, INK, MARK, PAPER, Array, inside, note, plain, size, window
+from .style import GRID, HALO, INK, MARK, PAPER, SPLINE, Array, inside, note, plain, size, window
 
 _SMALL = np.radians(25)
 _LOCATOR = 3.9
 """Width in inches of the column of the small globe beside a frame."""
 _COARSE = np.radians(2)
 """Frames narrower than this have no land, as the coastlines are too coarse."""
+_LETTERS = "abcdefghijklmnop"
+"""Names of the points at which a curve leaves the hemisphere and returns."""
 _RING: dict[str, Any] = {"markersize": 12, "markeredgewidth": 1.4, "zorder": 6}
 _WIDEST = 1.5
 _POLE = 60
@@ -130,8 +133,10 @@ def _draw_on_half(what: str, vectors: Callable[[Any], Array], panel: SubFigure, 
             given = given * np.where(np.sum(given * near, axis=1) < 0, -1.0, 1.0)[:, None]
         whole, radii = (line, curve.radii) if is_part else (broken_at_rim(line), None)
         _draw_on_globe(axes, view, curve, whole, given, radii)
-    words = "part of the sphere: opposite points" if is_part else "opposite points of the rim"
-    note(panel, f"{words} are the same {what}" + ("; points are normals" if what == "plane" else ""))
+        if not is_part and curve.alone:
+            _name_crossings(axes, view, whole)
+    words = "part of the sphere: opposite points" if is_part else "opposite points of the rim (equal letters)"
+    note(panel, f"{words} are the same {what}" + (";\npoints are normals" if what == "plane" else ""))
 
 
 # Points of RP² and Gr(1, 3) are lines. Points of Gr(2, 3) are planes, represented by their normals.
@@ -155,6 +160,7 @@ def _draw_on_globe(axes: Axes, view: View, curve: Curve, line: Array, given: Arr
         draw_tube(axes, curve, np.where(seen, view.outline(rings), np.nan))
     curve.draw_line(axes, view.hidden(line), linewidth=1, linestyle=(0, (2, 2)), alpha=0.6)
     curve.draw_line(axes, view.visible(line))
+    draw_arrows(axes, curve, view.visible(line))
     curve.draw_dots(axes, view.hidden(given), alpha=0.35)
     curve.draw_dots(axes, view.visible(given))
 
@@ -215,9 +221,10 @@ def _draw_globe(panel: SubFigure, points: Array, look: _Globe, above: Array | No
     axes = panel.add_axes(inside(panel, 0.1, look.below, look.right, 0.1))
     draw_globe(axes, view, look.spacing, look.half)
     if look.labels:
+        seen = points if above is None else above
         high, low, wide = (1.1, -0.85, 1.2) if look.half else (1.22, -1.22, 1.22)
         axes.set(xlim=(-wide, wide), ylim=(low, high))
-        label_directions(axes, view, look.labels)
+        label_directions(axes, view, look.labels, view.flat(seen))
     return axes, view, False
 
 
@@ -264,6 +271,21 @@ def broken_at_rim(line: Array) -> Array:
     return _interrupted(line * side, crossings, gaps)
 
 
+def _name_crossings(axes: Axes, view: View, broken: Array) -> None:
+    """Write one letter at both points where a curve leaves the hemisphere and where it returns.
+
+    ``broken`` is the result of `broken_at_rim`.
+    """
+    (gaps,) = np.nonzero(np.isnan(broken[:, 0]))
+    flat = view.flat(broken)
+    for i, letter in zip(gaps[: len(_LETTERS)], _LETTERS, strict=False):
+        for j in (i - 1, i + 1):
+            outwards = flat[j] / max(float(np.linalg.norm(flat[j])), 1e-9)
+            at = flat[j] + 0.09 * outwards
+            text = axes.text(*at, letter, color=SPLINE, fontsize=10, weight="bold", zorder=8)
+            text.set(ha="center", va="center", path_effects=HALO)
+
+
 def _interrupted(line: Array, after: Any, gaps: Any) -> Array:
     """Insert three rows after some of the rows of a line."""
     return np.insert(line, np.repeat(after + 1, 3), np.reshape(gaps, (-1, line.shape[1])), axis=0)
@@ -288,6 +310,7 @@ def _draw_map(panel: SubFigure, curves: Sequence[Curve], left: float, has_land: 
         if curve.radii is not None:
             _draw_band(axes, curve, positions, curve.radii)
         curve.draw_line(axes, broken(positions))
+        draw_arrows(axes, curve, broken(positions))
         curve.draw_dots(axes, given, clip_on=False, **{} if curve.noise else {"markersize": 4.5})
 
 

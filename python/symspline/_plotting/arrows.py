@@ -1,0 +1,34 @@
+"""Arrow heads on curves in plane pictures, which show the direction of time."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
+from matplotlib.transforms import Affine2D
+
+from .curves import Curve
+from .style import Array
+
+_HEAD = np.array([[0.09, 0.0], [-0.06, 0.065], [-0.025, 0.0], [-0.06, -0.065]])
+"""Corners in inches."""
+_SHARES = (0.2, 0.5, 0.8)
+"""Parts of the length of a single curve at which it has arrow heads. Others have one in the middle."""
+
+
+def draw_arrows(axes: Axes, curve: Curve, positions: Array) -> None:
+    """Draw arrow heads on a line through positions of shape (m, 2), which may be broken by NaN, in equal scales."""
+    steps = np.diff(positions, axis=0)
+    lengths = np.linalg.norm(np.nan_to_num(steps), axis=1)
+    total = np.cumsum(lengths)
+    # The steps of a point at rest are rounding errors.
+    if total[-1] <= 1e-12 * np.abs(np.nan_to_num(positions)).max():
+        return
+    at = np.searchsorted(total, np.multiply(_SHARES if curve.alone else (0.5,), total[-1]))
+    (x, y), middles = (steps[at] / lengths[at, None]).T, (positions[at] + positions[at + 1]) / 2
+    turns = np.stack([np.stack([x, y], axis=-1), np.stack([-y, x], axis=-1)], axis=1)
+    look = {"offsets": middles, "offset_transform": axes.transData, "clip_on": False, "zorder": 4.5}
+    scale = Affine2D().scale(1.0 if curve.alone else 0.8) + axes.figure.dpi_scale_trans
+    heads = PolyCollection(list(_HEAD @ turns), facecolor=curve.color, linewidth=0, transform=scale, **look)
+    heads.set_label("time")
+    axes.add_collection(heads)
