@@ -22,7 +22,7 @@ def draw_arrows(axes: Axes, curve: Curve, positions: Array) -> None:
     lengths = np.linalg.norm(np.nan_to_num(steps), axis=1)
     total = np.cumsum(lengths)
     # The steps of a point at rest are rounding errors.
-    if total[-1] <= 1e-12 * np.abs(np.nan_to_num(positions)).max():
+    if total[-1] <= 1e-10 * np.abs(np.nan_to_num(positions)).max():
         return
     at = np.searchsorted(total, np.multiply(_SHARES if curve.alone else (0.5,), total[-1]))
     (x, y), middles = (steps[at] / lengths[at, None]).T, (positions[at] + positions[at + 1]) / 2
