@@ -358,6 +358,8 @@ class AffineMorph:
     def plot(self, file: File | None = None) -> Figure:
         """Plot a film strip and small multiples of the film, in the plane or in space.
 
+        Up to twelve landmarks have their numbers; of more, only the first one has.
+
         Parameters
         ----------
         file : path or file object, optional

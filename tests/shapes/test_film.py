@@ -51,6 +51,15 @@ def test_small_multiples_are_the_film(n):
     assert {"t = 0", "t = 4"} <= set(texts_of(figure))
 
 
+@pytest.mark.parametrize("count, numbers", [(12, 12), (13, 1), (40, 1)])
+def test_many_landmarks_have_no_numbers(count, numbers):
+    angles = 2 * np.pi * np.arange(count) / count
+    ring = np.stack([np.cos(angles), np.sin(angles)], axis=-1) * (2 + np.sin(3 * angles))[:, None]
+    figure = rendered(AffineMorph([0, 1, 2], np.stack([ring, 1.2 * ring + 0.1 * ring**2, ring + 1])).plot())
+    for axes in figure.axes[1:]:
+        assert sum(text.get_text().isdigit() for text in axes.texts) == numbers
+
+
 def test_the_strip_is_undistorted_and_inside():
     x = turned(2, 5)
     strip = rendered(AffineMorph(KNOTS, x).plot()).axes[0]

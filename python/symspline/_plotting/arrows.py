@@ -21,8 +21,9 @@ def draw_arrows(axes: Axes, curve: Curve, positions: Array) -> None:
     steps = np.diff(positions, axis=0)
     lengths = np.linalg.norm(np.nan_to_num(steps), axis=1)
     total = np.cumsum(lengths)
-    # The steps of a point at rest are rounding errors.
-    if total[-1] <= 1e-10 * np.abs(np.nan_to_num(positions)).max():
+    # The speed of a point at rest is a rounding error.
+    moved = curve.at("speed").max() * (curve.x[-1] - curve.x[0])
+    if moved <= 1e-12 * np.abs(curve.points).max() or not total[-1] > 0:
         return
     at = np.searchsorted(total, np.multiply(_SHARES if curve.alone else (0.5,), total[-1]))
     (x, y), middles = (steps[at] / lengths[at, None]).T, (positions[at] + positions[at + 1]) / 2

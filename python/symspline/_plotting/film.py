@@ -18,6 +18,8 @@ from .style import DATES, DPI, EDGE, HALO, INK, Array, heading, plain, show_date
 # Drawings in the strip, and in each row of the small multiples.
 _STRIP, _ROWS, _COLUMNS = 25, 2, 6
 _WIDTH, _HEIGHT = 11.4, 7.6
+_NUMBERED = 12
+"""The largest number of landmarks that all have their number; of more, the first one has it."""
 
 
 def plot_film(t: NDArray[Any], landmarks: Array, film: Callable[[Any], Array], file: Any = None) -> Figure:
@@ -100,12 +102,12 @@ def _draw_strip(axes: Axes, t: NDArray[Any], strip: NDArray[Any], given: Array, 
 
 
 def _draw_one(axes: Axes, x: Any, drawing: Array, color: Any) -> None:
-    """Draw one drawing at its position, with the numbers of its landmarks."""
+    """Draw one drawing at its position, with the numbers of its landmarks if they are few."""
     axes.spines[:].set(color=EDGE, linewidth=0.5)
     axes.fill(*drawing.T, facecolor=(color, 0.15), edgecolor=color, linewidth=1.4)
-    axes.plot(*drawing.T, "o", color=color, markersize=3)
+    axes.plot(*drawing.T, "o", color=color, markersize=float(np.clip(12 / np.sqrt(len(drawing)), 1.2, 3)))
     look: Any = {"textcoords": "offset points", "fontsize": 7, "color": INK, "path_effects": HALO}
-    for number, at in enumerate(drawing):
+    for number, at in enumerate(drawing if len(drawing) <= _NUMBERED else drawing[:1]):
         axes.annotate(str(number), at, (3, 3), **look)
     name = np.datetime_as_string(x, "m").replace("T", " ") if isinstance(x, np.datetime64) else f"t = {x:.3g}"
     axes.text(0.03, 0.95, name, transform=axes.transAxes, va="top", fontsize=8, color=INK)
