@@ -276,7 +276,7 @@ class CubicSpline(PiecewiseCubic[P], Generic[P, R]):
         >>> import symspline as ss
         >>> spline = ss.CubicSpline(None, [[0.0], [1.0], [0.0]], "r:1")
         >>> spline.append(3, [1.0])
-        <CubicSpline on Euclidean(1): 4 points, natural>
+        <CubicSpline on Euclidean(1): 4 points, from 0 to 3, natural>
         >>> spline.append([3, 5], [[1.0], [2.0]]).t
         array([0., 1., 2., 3., 5.])
         """

@@ -99,7 +99,7 @@ class CumulativeBSpline(ControlledSpline[P]):
     >>> turns = ss.rotations.from_rotation_vectors([[0, 0, 0.1 * i * i] for i in range(6)])
     >>> curve = ss.CumulativeBSpline(None, turns, "so:3")
     >>> curve
-    <CumulativeBSpline on SpecialOrthogonal(3): 6 control points, degree 3>
+    <CumulativeBSpline on SpecialOrthogonal(3): 6 control points, degree 3, from 0 to 3>
     >>> curve.domain
     (0.0, 3.0)
     >>> ss.rotations.angular_velocity(curve, 1.5).round(6)

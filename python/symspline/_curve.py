@@ -151,7 +151,7 @@ class Curve(CurveBase[P]):
         >>> import symspline as ss
         >>> spline = ss.CubicSpline(None, [[0.0], [1.0], [0.0], [2.0]], "r:1")
         >>> spline.restrict(1, 3)
-        <HermiteSpline on Euclidean(1): 3 points>
+        <HermiteSpline on Euclidean(1): 3 points, from 1 to 3>
         >>> part = spline.restrict(0.5, 2.5)
         >>> part.domain, bool(part(1.5) == spline(1.5))
         ((np.float64(0.5), np.float64(2.5)), True)
@@ -191,7 +191,7 @@ class Curve(CurveBase[P]):
         >>> import symspline as ss
         >>> spline = ss.CubicSpline(None, [[0.0], [1.0], [0.0], [2.0]], "r:1")
         >>> spline.restrict(0, 1).concatenate(spline.restrict(1, 3))
-        <HermiteSpline on Euclidean(1): 4 points>
+        <HermiteSpline on Euclidean(1): 4 points, from 0 to 3>
         """
         if not isinstance(other, Curve):
             raise TypeError(f"other must be a curve, not {short_repr(other)}")

@@ -385,7 +385,7 @@ class CurveBase(Searchable[P]):
         >>> ss.CubicSpline(None, [[1, 0, 0], [0, 1, 0]], "sphere:2").save(file)
         >>> _ = file.seek(0)
         >>> ss.load(file)
-        <CubicSpline on Sphere(2): 2 points, natural>
+        <CubicSpline on Sphere(2): 2 points, from 0 to 1, natural>
         """
         _archive.write(file, self._state())
 

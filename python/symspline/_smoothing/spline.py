@@ -82,7 +82,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
     >>> t = np.linspace(0, 1, 50)
     >>> y = np.sin(6 * t) + 0.1 * np.random.default_rng(0).standard_normal(50)
     >>> ss.make_smoothing_spline(t, y[:, None], "r:1")
-    <SmoothingSpline on Euclidean(1): 50 data, 50 knots>
+    <SmoothingSpline on Euclidean(1): 50 data, 50 knots, from 0 to 1>
     """
 
     _kind = "Smoothing spline"
