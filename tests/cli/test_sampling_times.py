@@ -1,5 +1,7 @@
 """Times in tables, and sampling times along a curve."""
 
+from fractions import Fraction
+
 import numpy as np
 import pytest
 from tabular import table, write
@@ -85,8 +87,8 @@ def test_times_along_a_curve(along):
     assert half.astype(str).tolist()[1] == "2020-01-01T00:00:00.500"
     # The even days since 1970.
     assert along("--every 2d", day).tolist() == [day[0].astype("datetime64[s]").item()]
-    np.testing.assert_array_equal(along("--every 0.1", np.array([0.0, 1.0])), np.minimum(np.arange(11) * 0.1, 1))
-    assert along("--every 0.3", np.array([0.0, 1.0]))[-1] == 3 * 0.3
+    np.testing.assert_array_equal(along("--every 0.1", np.array([0.0, 1.0])), np.arange(11) / 10)
+    assert along("--every 0.3", np.array([0.0, 1.0]))[-1] == 0.9
     assert along("-n 3", day).astype(str).tolist()[1] == "2020-01-01T12:00:00"
     thirds = along("-n 4", np.array(["2020-01-01T00:00:00", "2020-01-01T00:00:01"], "datetime64[s]"))
     assert thirds.astype(str).tolist()[1] == "2020-01-01T00:00:00.333333"
@@ -94,6 +96,27 @@ def test_times_along_a_curve(along):
         knots = np.array([0, 10**18 + 1], f"datetime64[{fine}]")
         spread = along("-n 1000", knots)
         assert spread[0] == knots[0] and spread[-1] == knots[-1] and (np.diff(spread) > np.timedelta64(0)).all()
+
+
+def test_times_have_no_rounding_errors(along):
+    """Each is the number that is nearest to its exact value, so that its text is short."""
+    knots = np.array([17.0, 19.0])
+    for option, times in [
+        ("--every 0.1", [f"{17 + i // 10}.{i % 10}" for i in range(21)]),
+        ("--every 0.25", [f"{17 + i * 0.25}" for i in range(9)]),
+        ("-n 11", [f"{17 + i // 5}.{i % 5 * 2}" for i in range(11)]),
+    ]:
+        assert along(option, knots).tolist() == list(map(float, times))
+    for knots, option in [
+        (np.array([1305031102.1758, 1305031110.25]), "--every 0.0333"),
+        (np.array([0.1234567890123, 0.7]), "-n 1001"),
+        (np.array([-1e-30, 3e5]), "-n 7"),
+    ]:
+        found = along(option, knots)
+        first, last = (Fraction(repr(float(knot))) for knot in knots)
+        step = (last - first) / (len(found) - 1) if option[1] == "n" else Fraction(option.split()[1])
+        assert found.tolist() == [float(first + i * step) for i in range(len(found))]
+        assert found[0] == knots[0] and found[-1] <= knots[-1]
 
 
 DAY = np.array(["2020-01-01", "2020-01-02"], "datetime64[D]")

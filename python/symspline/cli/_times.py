@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from decimal import Decimal, InvalidOperation
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -158,7 +160,7 @@ def every(step: str, knots: Times) -> Times:
             raise Problem(f"--every {step}: that is too {'long' if length else 'short'}")
         # The last sample is at the end if the step divides the curve up to rounding.
         samples = _samples((float(knots[-1]) - float(knots[0])) / length * (1 + 1e-12), step)
-        return np.asarray(np.minimum(knots[0] + length * np.arange(samples), knots[-1]))
+        return np.asarray(np.minimum(_equidistant(_decimal(knots[0]), count, 1, samples), knots[-1]))
     if kind == "M":
         count *= _NANOSECONDS[unit or "s"]
     if count != int(count):
@@ -176,6 +178,22 @@ def every(step: str, knots: Times) -> Times:
     return _after(knots[:1], np.uint64(min(jump, span)) * np.arange(samples, dtype=np.uint64))
 
 
+def _decimal(time: Any) -> Fraction:
+    """Return the shortest decimal number that reads back as a floating-point number."""
+    return Fraction(repr(float(time)))
+
+
+def _equidistant(first: Fraction, step: Fraction | Decimal, divisor: int, count: int) -> NDArray[np.float64]:
+    """Return the numbers ``first + i step / divisor`` for i < count, each rounded once from its exact value."""
+    step = Fraction(step) / divisor
+    scale = math.lcm(first.denominator, step.denominator)
+    start, jump = int(first * scale), int(step * scale)
+    if max(abs(start) + abs(jump) * count, scale) <= _EXACT:
+        # All of these integers are exact as floating-point numbers.
+        return np.asarray((start + jump * np.arange(count)) / scale)
+    return np.fromiter(((start + jump * i) / scale for i in range(count)), np.float64, count)
+
+
 def _whole_multiples(ends: Times, jump: int, step: str) -> Times:
     """Return the dates between two ends that are whole multiples of a step since 1970."""
     first, last = (int(end) for end in ends.astype(np.int64))
@@ -190,7 +208,8 @@ def _whole_multiples(ends: Times, jump: int, step: str) -> Times:
 def spread(count: int, knots: Times) -> Times:
     """Return equidistant times from the first to the last knot, dates to a microsecond."""
     if knots.dtype.kind == "f":
-        return np.linspace(knots[0], knots[-1], count)
+        first, last = _decimal(knots[0]), _decimal(knots[-1])
+        return _equidistant(first, last - first, max(count - 1, 1), count)
     dates = knots.dtype.kind == "M"
     knots = _in_unit(knots, "us") if dates else knots
     span = _span(knots)
