@@ -88,11 +88,12 @@ def test_not_enough_memory(curves, fails, monkeypatch):
 
 def test_progress_on_a_terminal(curves, capsys, monkeypatch):
     monkeypatch.setattr("symspline.cli._messages._WAIT", 0)
+    monkeypatch.setattr("symspline.cli._csv._WRITTEN", 2000)
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
     assert main(shlex.split("sample a.npz -n 5000 -o b.csv")) == 0
     shown = capsys.readouterr().err
     assert "\rsampling: 100 %" in shown and "\rwriting: 40 %" in shown
-    assert shown.endswith(" \r") and "\n" not in shown
+    assert shown.endswith(" \rb.csv: 5000 rows\n")
 
 
 @pytest.mark.skipif(os.name != "posix", reason="links and pipes as on POSIX systems")
@@ -104,5 +105,6 @@ def test_links_are_followed_and_pipes_refused(run, fails):
     assert os.path.islink("a.npz") and os.listdir("kept") == ["curve.npz"]
     os.mkfifo("pipe.npz")
     assert fails("fit a.csv --space s:2 -o pipe.npz") == (
-        "cannot write pipe.npz: it is a device, a pipe or a socket; give the name of a regular file"
+        "cannot write pipe.npz: it is a device, a pipe or a socket; give the name of a regular file, or - for "
+        "standard output"
     )

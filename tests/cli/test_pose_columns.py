@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from curves import points_on
 from scipy.spatial.transform import Rotation
-from tabular import TIMES, numbers, read_table, table, write, write_table
+from tabular import TIMES, numbers, table, write, write_table
 
 import symspline as ss
 from symspline.convert import quaternion_to_matrix
@@ -44,21 +44,24 @@ def test_quaternions_by_their_names_in_any_order(run):
             assert ((q[1:] * q[:-1]).sum(1) > 0.99).all() and q[0, 0] >= 0 > q[:, 0].min()
 
 
-def test_derivatives_of_quaternions_are_those_on_their_sphere(run, monkeypatch):
-    """The sphere covers the rotations: the same curve there, with derivatives of its own."""
+def test_derivatives_of_quaternions_are_angular_velocities(run):
+    """In the frame of the body, compared with finite differences of SciPy's rotations."""
+    write_table("a.csv", columns())
+    run("fit a.csv --space so:3 -o b.npz")
+    run("sample b.npz -n 100 --nu 0,1,2 -o c.csv")
+    found, h = table("c.csv"), 1e-4
+    assert list(found) == ["t", *WXYZ, "wx", "wy", "wz", "wx_d1", "wy_d1", "wz_d1"]
+    spline, x = ss.load("b.npz"), np.linspace(0, 5, 100)[1:-1]
 
-    signs = np.where(np.cumsum(np.append(False, (Q[1:] * Q[:-1]).sum(1) < 0)) % 2, -1, 1)
-    start = np.sign(Q[0, 0])
-    on_sphere = ss.CubicSpline(TIMES, start * signs[:, None] * Q, "sphere:3")
-    write_table("a.npz", columns())
-    run("fit a.npz --space so:3 --columns qw,qx,qy,qz -o b.npz")
-    run("sample b.npz -n 100 --nu 0,1,2 -o c.npz")
-    found, x = read_table("c.npz"), np.linspace(0, 5, 100)
-    for nu, mark in enumerate(("", "_d1", "_d2")):
-        expected = on_sphere(x, nu)
-        np.testing.assert_allclose(
-            np.stack([found[name + mark] for name in WXYZ], 1), expected, atol=1e-12 * np.abs(expected).max()
-        )
+    def rates(x):
+        before, after = (Rotation.from_matrix(spline(x + step)) for step in (-h / 2, h / 2))
+        return (before.inv() * after).as_rotvec() / h
+
+    np.testing.assert_allclose(numbers(found, "wx", "wy", "wz")[1:-1], rates(x), atol=1e-6)
+    change = (rates(x + h / 2) - rates(x - h / 2)) / h
+    # The acceleration has kinks at the knots.
+    away = np.abs(x[:, None] - TIMES).min(axis=1) > 2 * h
+    np.testing.assert_allclose(numbers(found, "wx_d1", "wy_d1", "wz_d1")[1:-1][away], change[away], atol=1e-4)
 
 
 @pytest.mark.parametrize("space", ["se:3", "so:3 x r:3", "r:3 x so:3"])
@@ -164,7 +167,11 @@ def test_curves_that_do_not_fit_a_tum_trajectory(run, fails):
     ss.CubicSpline(None, p, "se:3").save("a.npz")
     assert "no derivatives" in fails("sample a.npz -n 3 --nu 0,1 -o b.tum")
     ss.CubicSpline(None, np.stack([p, p]), "se:3").save("a.npz")
-    assert "is one curve" in fails("sample a.npz -n 3 -o b.tum")
+    problem = "curve '1' begins before the end of curve '0'; choose one with --curve, or write one file per curve"
+    assert problem in fails("sample a.npz -n 3 -o b.tum")
+    run("sample a.npz -n 3 --curve 1 -o b.tum")
+    run("sample a.npz -n 3 -o 'c_{curve}.tum'")
+    assert Path("b.tum").read_text() == Path("c_1.tum").read_text() == Path("c_0.tum").read_text()
     t = np.array(["1960-01-01", "2020-01-01"], "datetime64[s]")
     ss.CubicSpline(t, p[:2], "se:3").save("a.npz")
     assert "counted from 1970 on" in fails("sample a.npz -n 3 -o b.tum")

@@ -69,15 +69,12 @@ def test_max_gap(run, fit, fails):
     line([0, 1, 2, 12, 13, 40, 60, 61])
     out = run("fit a.csv --space r:1 --max-gap 5 -o a.npz")
     assert out.startswith("a.npz: 3 curves through 7 points") and out.endswith("; 1 row alone between gaps omitted\n")
-    assert ss.load("a.npz") == {
-        "1": through([0, 1, 2], [0, 1, 2]),
-        "2": through([12, 13], [3, 4]),
-        "3": through([60, 61], [6, 7]),
-    }
+    segments = [through([0, 1, 2], [0, 1, 2]), through([12, 13], [3, 4]), through([60, 61], [6, 7])]
+    assert ss.load("a.npz") == ss.SegmentedCurve(segments)
     run("sample a.npz --every 1 -o b.csv")
     assert table("b.csv")["curve"] == [*"1112233"]
     # As long as the limit is no gap.
-    assert list(fit("--max-gap 27")) == ["1"]
+    assert len(fit("--max-gap 27")) == 1
     for gap, problem in [
         ("0.5", "every point is alone"),
         ("5s", "give a gap without a unit"),

@@ -100,9 +100,12 @@ def test_samples_have_standard_deviations(run):
     run("check a.npz")
     run("sample a.npz -n 7 --nu 0,1 -o b.csv")
     found, curve = read_table("b.csv"), ss.load("a.npz")
-    assert list(found) == ["t", *Q, "std", *(f"{name}_d1" for name in Q), "std_d1"]
+    assert list(found) == ["t", *Q, "std", *W, *(f"std_{name}" for name in W)]
     # A unit quaternion changes half as much as the angle of its rotation.
     np.testing.assert_allclose(found["std"], curve.std(found["t"]) / 2, rtol=1e-12)
+    omega, std = ss.rotations.angular_velocity(curve, found["t"], return_std=True)
+    np.testing.assert_allclose(np.stack([found[name] for name in W], axis=1), omega, atol=1e-14)
+    np.testing.assert_allclose(np.stack([found[f"std_{name}"] for name in W], axis=1), std, rtol=1e-12)
 
 
 @pytest.mark.parametrize("blank", ["", " ", "nan", "NaN"])
@@ -304,6 +307,6 @@ def test_as_a_process():
     write("imu.csv", "\n".join(dated))
     command = [sys.executable, "-m", "symspline", "fit", "imu.csv", *OPTIONS.split(), "-o", "a.npz"]
     done = subprocess.run(command, capture_output=True, text=True, check=True, encoding="utf-8")
-    assert not done.stderr and "gyro bias: 0.0" in done.stdout
+    assert not done.stdout and "\ngyro bias: 0.0" in done.stderr
     curve = ss.load("a.npz")
     assert curve.t.dtype.kind == "M" and np.all(np.abs(curve.parameters["gyro bias"].value - BIAS) < 0.02)

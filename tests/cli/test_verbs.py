@@ -72,7 +72,7 @@ def test_rows_without_times_are_at_whole_numbers(run):
 
 
 def test_help_has_examples_and_the_version_is_that_of_the_core(capsys):
-    for verb in ("", "fit", "sample", "plot", "check", "grid"):
+    for verb in ("", "fit", "sample", "plot", "check", "info", "grid"):
         with pytest.raises(SystemExit) as end:
             main([*verb.split(), "--help"])
         assert end.value.code == 0
@@ -132,16 +132,20 @@ def test_samples_outside(run):
 
 
 def test_invalid_usage_fails(curves, fails):
-    assert fails("").endswith("(see symspline --help)")
-    assert "invalid choice: 'ft'" in fails("ft")
+    assert fails("ft").endswith("invalid choice: 'ft'; did you mean fit? (see symspline --help)")
+    assert "invalid choice: 'x'; choose from fit, sample, plot, check, info, grid" in fails("x")
     assert fails("fit a.csv --space s:2") == "the following arguments are required: -o (see symspline fit --help)"
-    assert "unrecognized arguments: --tiem" in fails("fit a.csv --space s:2 --tiem t -o b.npz")
+    problem = "unrecognized arguments: --tiem t; did you mean --time? (see symspline fit --help)"
+    assert fails("fit a.csv --space s:2 --tiem t -o b.npz") == problem
     assert "--every -n --at is required" in fails("sample a.npz -o b.csv")
     assert "--" in fails("sample a.npz --every=-- -o b.csv")
     assert "not allowed with" in fails("sample a.npz -n 3 --every 1 -o b.csv")
     assert fails("sample a.npz -n 3 --nu 0,3 -o b.csv").startswith("--nu 0,3: give one or more of 0, 1 and 2")
     assert fails("fit a.csv --space s:2 -o b.csv") == "b.csv: the name of a file of curves must end in .npz"
-    ending = "b.xls: the name of a table must end in .csv or .npz or .parquet or .tum or .txt"
+    ending = (
+        "b.xls: the name of a table must end in .csv or .npz or .parquet or .json or .geojson or .gpx or .tum or .txt "
+        "or .tsv"
+    )
     assert fails("sample a.npz -n 3 -o b.xls") == ending
     assert fails("plot a.npz -o b.txt").startswith("b.txt: the name of a picture must end in .")
     assert "must end in .csv" in fails("fit a.xls --space s:2 -o b.npz")

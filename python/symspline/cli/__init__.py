@@ -6,28 +6,29 @@ example:
   symspline sample track.npz --every 10min -o smooth.csv
   symspline plot track.npz -o track.png
   symspline grid dti.nii.gz --order fsl --zoom 2 -o fine.nii.gz
+  symspline fit - --lonlat -o - < track.csv | symspline sample - -n 100 -o - | head
 
-See also `symspline VERB --help`. Exit codes: 0 success, 1 not converged or check failed, 2 invalid input or usage,
-130 interrupted. An output file appears only when it is complete; a failed run leaves an older file unchanged.
+See also `symspline VERB --help`, and `symspline info` for the spaces and formats of files. Exit codes: 0 success, 1 not
+converged or check failed, 2 invalid input or usage, 130 interrupted. Results go to standard output only for -o -;
+descriptions, warnings and errors go to standard error. An output file appears only when it is complete; a failed run
+leaves an older file unchanged.
 """
 
 from __future__ import annotations
 
-import argparse
 import io
 import os
 import sys
 from collections.abc import Sequence
-from typing import Any, NoReturn
 
 from .._exceptions import ConvergenceError, SymsplineError
 from .._version import VERSION
-from . import _check, _fit, _grid, _plot, _sample
-from ._messages import Problem, for_command_line, say
+from . import _check, _fit, _grid, _info, _plot, _sample
+from ._help import Parser, add_completion, texts_of
+from ._messages import QUIET, USUAL, VERBOSE, Problem, for_command_line, say, set_level
 
 __all__ = ["main"]
 
-_COMMON: dict[str, Any] = {"formatter_class": argparse.RawDescriptionHelpFormatter, "allow_abbrev": False}
 FAILED, BAD, INTERRUPTED, BROKEN_PIPE = 1, 2, 130, 141
 
 
@@ -37,9 +38,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # Names of curves may contain characters that the terminal cannot show.
         sys.stdout.reconfigure(errors="backslashreplace")
     try:
-        options = _parser().parse_args(arguments)
+        parser = _parser()
+        options = parser.parse_args(arguments)
+        if not hasattr(options, "run"):
+            parser.print_help()
+            return 0
+        set_level(options.level)
         # argparse makes an empty list of --option=--.
-        if any(isinstance(value, list) for value in vars(options).values()):
+        if any(
+            [] in (value if isinstance(value, list) else [value]) or value == [] for value in vars(options).values()
+        ):
             raise Problem("an option has the value --, which has no meaning here")
         code: int = options.run(options)
         print(end="", flush=True)
@@ -71,25 +79,19 @@ def _drop_output() -> None:
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-class _Parser(argparse.ArgumentParser):
-    def error(self, message: str) -> NoReturn:
-        raise Problem(f"{message} (see {self.prog} --help)")
-
-
-def _parser() -> _Parser:
-    parser = _Parser("symspline", **_texts(__doc__))
+def _parser() -> Parser:
+    parser = Parser("symspline", **texts_of(__doc__))
     parser.add_argument("--version", action="version", version=f"symspline {VERSION}")
-    verbs = parser.add_subparsers(required=True, metavar="VERB")
-    for verb in (_fit, _sample, _plot, _check, _grid):
-        texts = _texts(verb.__doc__)
+    add_completion(parser)
+    verbs = parser.add_subparsers(metavar="VERB")
+    for verb in (_fit, _sample, _plot, _check, _info, _grid):
+        texts = texts_of(verb.__doc__)
         summary = texts["description"].partition("\n")[0]
         own = verbs.add_parser(verb.__name__.rpartition("._")[2], help=summary, **texts)
         verb.add_arguments(own)
+        level = own.add_mutually_exclusive_group().add_argument
+        quiet = "print only warnings and errors, besides results"
+        level("-q", "--quiet", dest="level", action="store_const", const=QUIET, default=USUAL, help=quiet)
+        level("-v", "--verbose", dest="level", action="store_const", const=VERBOSE, help="print more about the work")
         own.set_defaults(run=verb.run)
     return parser
-
-
-def _texts(doc: str | None) -> dict[str, Any]:
-    """Return the help texts in the docstring of a module, which is absent under ``python -OO``."""
-    description, _, examples = (doc or "").partition("\nexample")
-    return {"description": description, "epilog": f"example{examples}", **_COMMON}

@@ -48,12 +48,13 @@ _POSITIVE = (SymmetricPositiveDefinite, HermitianPositiveDefinite)
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options of ``symspline check``."""
-    parser.add_argument("curves", type=Path, metavar="CURVE", help="file of curves to read: .npz")
+    parser.add_argument("curves", type=Path, metavar="CURVE", help="file of curves to read: .npz, or -")
+    parser.add_argument("--curve", action="append", metavar="NAME", help="which curve; may be repeated (default: all)")
 
 
 def run(options: argparse.Namespace) -> int:
     """Measure all curves, print the table, and compare with what is allowed."""
-    curves = read_curves(options.curves)
+    curves = read_curves(options.curves).chosen(options.curves, options.curve)
     width = max(len("curve"), *(len(brief(name)) for name in curves.splines)) + 2 if curves.named else 0
 
     def line(name: str, count: object, *cells: str) -> None:

@@ -4,46 +4,76 @@ from __future__ import annotations
 
 import json
 import zipfile
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import reduce
 from operator import getitem
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import numpy as np
 
 from .._archive import json_in, read
 from .._arrays import brief
+from .._composed import SegmentedCurve
 from .._cubic import CubicSpline
 from .._files import load, save
 from .._grid import GridSpline
 from .._spaces import Space
-from ._messages import Problem, reading, refuse, writing
+from ._messages import Problem, did_you_mean, refuse
 from ._points import GLOBE, LONLAT, Columns, count_with_quaternion, labels, require_globe
+from ._streams import CURVES, Source, writing
 
-ENDING = (".npz",)
 _COLUMNS = "columns"
 """The entry of the file with the columns, which the library ignores."""
 
 
 @dataclass(frozen=True)
 class Curves:
-    """Curves of one space by name, and their columns. If ``named`` is False, the name has no meaning."""
+    """Curves of one space.
+
+    Attributes
+    ----------
+    splines : dict
+        Curves by name.
+    named : bool
+        Whether the names have a meaning.
+    columns : Columns
+        Names of their columns in a table.
+    segmented : bool
+        Whether the curves are the segments of one recording, in the order of time.
+    """
 
     splines: dict[str, CubicSpline]
     named: bool
     columns: Columns
+    segmented: bool = False
 
     def called(self, name: str) -> str:
         """Refer to a curve in a message."""
-        return f"curve {name!r}" if self.named else "the curve"
+        return f"{'segment' if self.segmented else 'curve'} {name!r}" if self.named else "the curve"
+
+    def chosen(self, file: object, names: Sequence[str] | None) -> Curves:
+        """Return the curves of these names, with all segments of each; a single one needs no name."""
+        if names is None:
+            return self
+        splines: dict[str, CubicSpline] = {}
+        for name in names:
+            # A curve that was cut at gaps has the segments NAME/1, NAME/2, ...
+            found = {key: own for key, own in self.splines.items() if name in (key, key.rpartition("/")[0])}
+            refuse(file, (not found, f" has no curve {name!r}; {did_you_mean(name, list(self.splines))}"))
+            splines |= found
+        return replace(self, splines=splines, named=len(splines) > 1)
 
 
 def write_curves(path: Path, curves: Curves) -> None:
     """Write curves to a file that `symspline.load` also reads."""
+    splines: Any = curves.splines if curves.named else next(iter(curves.splines.values()))
+    if curves.segmented:
+        splines = SegmentedCurve(list(curves.splines.values()))
     with writing(path) as temporary:
         with open(temporary, "wb") as file:
-            save(curves.splines if curves.named else next(iter(curves.splines.values())), file)
+            save(splines, file)
         columns = np.array(json.dumps(asdict(curves.columns)))
         with zipfile.ZipFile(temporary, "a") as archive, archive.open(f"{_COLUMNS}.npy", "w") as entry:
             np.lib.format.write_array(entry, columns)
@@ -51,17 +81,21 @@ def write_curves(path: Path, curves: Curves) -> None:
 
 def read_curves(path: Path, lonlat: bool = False) -> Curves:
     """Read the curves in a file of ``symspline fit`` or of the library; ``lonlat`` as for ``symspline sample``."""
-    with reading(path), open(path, "rb") as file:
+    source = Source(path, CURVES[0])
+    with source.open() as file:
         if not zipfile.is_zipfile(file):
-            raise Problem(f"{path} is not a file of curves, such as `symspline fit` makes")
+            raise Problem(f"{source} is not a file of curves, such as `symspline fit` makes")
         file.seek(0)
         found = load(file)
         named = isinstance(found, dict)
+        segmented = isinstance(found, SegmentedCurve)
+        if segmented:
+            found, named = {str(i): curve for i, curve in enumerate(found, 1)}, True
         for curve in found.values() if named else [found]:
-            refuse(path, (isinstance(curve, GridSpline), " is a grid; see symspline grid --help"))
+            refuse(source, (isinstance(curve, GridSpline), " is a grid; see symspline grid --help"))
             if not isinstance(curve, CubicSpline):
                 kind = type(curve).__name__
-                raise Problem(f"{path} is a {kind}, whose acceleration jumps at knots; use symspline.load")
+                raise Problem(f"{source} is a {kind}, whose acceleration jumps at knots; use symspline.load")
         if named:
             splines = found
         else:
@@ -72,13 +106,13 @@ def read_curves(path: Path, lonlat: bool = False) -> Curves:
         space = next(iter(splines.values())).space
         if lonlat:
             require_globe(space)
-        columns = _columns(path, file, space)
+        columns = _columns(source, file, space)
     if lonlat and not columns.lonlat:
         columns = replace(columns, points=LONLAT, lonlat=True)
-    return Curves(splines, named, columns)
+    return Curves(splines, named, columns, segmented)
 
 
-def _columns(path: Path, file: BinaryIO, space: Space) -> Columns:
+def _columns(path: object, file: BinaryIO, space: Space) -> Columns:
     """Return the columns that `write_curves` wrote, or the usual ones if another program wrote the curves."""
     try:
         entries = read(file, lambda name: name == _COLUMNS)

@@ -64,26 +64,27 @@ from .._smoothing import SmoothingSpline, SmoothingWarning
 from .._smoothing.many import smooth_many
 from .._spaces import Space, factors_of, space_named
 from ._columns import ORDERS, check_days, column_of_names, completed, point_entries, split_names, time_column
-from ._curves import ENDING, Curves, write_curves
-from ._messages import Problem, Progress, check_target, refuse, say
+from ._curves import Curves, write_curves
+from ._formats import open_table
+from ._messages import Problem, Progress, refuse, say, tell
 from ._points import GLOBE, Columns, points_of, require_globe
 from ._recordings import Recordings
 from ._sensors import Fusion, sensors_of, spread, summary
-from ._tables import check_ending, open_table
+from ._streams import CURVES, STANDARD, TABLES, check_target, endings, format_of
 from ._times import is_number, number
 
 _FOR_ROTATIONS = "For rotations give --space so:3, or rp:3, where signs do not count"
 _EXTRAPOLATE: dict[str, Any] = {"continue": True, "geodesic": "geodesic", "periodic": "periodic"}
 _METHODS = "auto (default), quasi-newton, newton, homotopy or fixed-point"
-_CRITERIA = ("gcv", "reml")
-_BEST = "best"
+_CRITERIA = ("gcv", "cp", "reml")
 _ENDS = "natural (default), not-a-knot, clamped, periodic; or two of the first three with a comma, for start and end"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options of ``symspline fit``."""
     add = parser.add_argument
-    add("input", type=Path, metavar="IN", help="table to read: .csv, .npz, .parquet, .tum or .txt")
+    add("input", type=Path, metavar="IN", help=f"table to read: {endings()}, or - for standard input")
+    add("--from", dest="format", choices=TABLES, help="format of the table (default: as its name ends, CSV for -)")
     add("--space", metavar="S", help="such as sphere:2, so:3, spd:3, cp:1 or 'so:3 x r:3'")
     add("--time", metavar="COL", help="column of times, or none for 0, 1, 2, ...; see above for the default")
     add("--columns", metavar="A,B,...", help="columns of a point (default: all other numeric columns)")
@@ -103,16 +104,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--tol", type=number, help="relative C² residual that counts as converged (default: 1e-12)")
     add("--extrapolate", choices=_EXTRAPOLATE, help="continue the last segment outside the times, or go on along a "
         "geodesic, or periodically (default: times outside are an error)")  # fmt: skip
-    add("-o", dest="output", type=Path, metavar="OUT", required=True, help="file of curves to write: .npz")
-    add = parser.add_argument_group("noisy data").add_argument
     add(
-        "--smooth",
-        nargs="?",
-        const=_BEST,
-        metavar="HOW",
-        help="smooth the points; write it after IN. HOW is gcv (default; Mallows' C_p with --sigma and without rates "
-        "and velocities), reml, or a number λ >= 0, in a product perhaps one per factor with commas",
+        "-o",
+        dest="output",
+        type=Path,
+        metavar="OUT",
+        required=True,
+        help="file of curves to write: .npz, or - for standard output",
     )
+    add = parser.add_argument_group("noisy data").add_argument
+    add("--smooth", action="store_true", help="fit curves near the points")
+    criterion = (
+        "how λ is chosen: gcv (default), reml, or cp, Mallows' C_p, which needs --sigma and is the default with it, "
+        "without rates and velocities"
+    )
+    add("--criterion", choices=_CRITERIA, help=criterion)
+    add("--lam", metavar="L", help="a number λ >= 0 instead, in a product perhaps one per factor with commas")
     add(
         "--sigma",
         metavar="S",
@@ -132,11 +139,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Read, fit and write."""
-    check_ending(options.output, ENDING, "a file of curves")
-    check_target(options.output)
+    format_of(options.output, None, CURVES, "a file of curves")
+    check_target(options.output, options.input, binary=True)
     smooth = _smoothing_options(options)
     space = _space(options.space, options.lonlat)
-    table = open_table(options.input)
+    table = open_table(options.input, options.format)
     sensors = sensors_of(table, options, space, smooth and smooth["sigma"], _numbers)
     extra = sensors.names if sensors else []
     curve = table.require(options.curve) if options.curve is not None else None
@@ -153,15 +160,19 @@ def run(options: argparse.Namespace) -> int:
         named = curve is not None
         curves = fusion.fitted(named, _estimation_options(options, smooth))
         write_curves(options.output, Curves(dict(zip(fusion.groups, curves, strict=True)), named, columns))
-        print(summary(options.output, curves, fusion, named))
+        for line in summary(_called(options.output), curves, fusion, named):
+            tell(line)
         return 0
     numbers = rows.numbers if options.lonlat or order else completed(rows.numbers, entries, space)
     points = points_of(space, numbers, columns, table.path, rows.place)
     hint = partial(column_of_names, table, time, [time, *used]) if curve is None else lambda: None
     data = Recordings(table.path, rows, points, space, options, hint)
     fitted = _fitted(data, space, options, smooth)
-    write_curves(options.output, Curves(dict(zip(data.groups, fitted, strict=True)), data.named, columns))
-    print(f"{options.output}: {_summary(fitted, options.lonlat)}{_prepared(data, options.dedup)}{_gaps(fitted)}")
+    segmented = options.max_gap is not None and curve is None
+    write_curves(options.output, Curves(dict(zip(data.groups, fitted, strict=True)), data.named, columns, segmented))
+    tell(
+        f"{_called(options.output)}: {_summary(fitted, options.lonlat)}{_prepared(data, options.dedup)}{_gaps(fitted)}"
+    )
     same = data.merged or data.repeated
     column = hint() if same else None
     if column is not None:
@@ -170,6 +181,10 @@ def run(options: argparse.Namespace) -> int:
             f"holds several tracks, fit each of them with --curve {column}"
         )
     return 0
+
+
+def _called(output: Path) -> str:
+    return "standard output" if output == STANDARD else str(output)
 
 
 def _space(name: str | None, lonlat: bool) -> Space:
@@ -213,36 +228,46 @@ def _smoothing_options(options: argparse.Namespace) -> dict[str, Any] | None:
     Problem
         Options contradict each other.
     """
-    how = options.smooth
-    if how is None:
-        names = ("sigma", "robust", "penalty", "rates", "rate_sigma", "rate_bias", "velocities", "velocity_sigma")
+    if not options.smooth:
+        names = (
+            "criterion",
+            "lam",
+            "sigma",
+            "robust",
+            "penalty",
+            "rates",
+            "rate_sigma",
+            "rate_bias",
+            "velocities",
+            "velocity_sigma",
+        )
         option = next((name for name in names if getattr(options, name) not in (None, False)), None)
         refuse(f"--{option}".replace("_", "-"), (option, " is for noisy data; give --smooth, too"))
         return None
     rates = options.rate_sigma is not None or options.rate_bias
     through = "is for curves through the points; omit it with --smooth"
-    bad = [cell for cell in how.split(",") if not is_number(cell)] if how not in (_BEST, *_CRITERIA) else []
-    choices = f"give {', '.join(_CRITERIA)} or a number; write the name of the table before --smooth"
     refuse(
         "",
         (options.bc_type != "natural", f"--bc-type {options.bc_type} {through}: smoothing has natural ends"),
         (options.tol is not None, f"--tol {through}"),
         (options.method != "auto", f"--method {through}"),
         (options.dedup == "mean", "with --smooth all points of one time count; omit --dedup mean"),
-        (bad, f"--smooth {how}: {choices}"),
+        (options.lam and options.criterion, "--lam gives λ, which --criterion would choose; omit one of them"),
+        (options.criterion == "cp" and options.sigma is None, "--criterion cp needs the noise; give it with --sigma"),
         (rates and options.rates is None, "there are no --rates, to which --rate-sigma and --rate-bias belong"),
         (
             options.velocity_sigma is not None and options.velocities is None,
             "there are no --velocities, to which --velocity-sigma belongs",
         ),
     )
-    lam = None if how in (_BEST, *_CRITERIA) else _numbers(how, "--smooth")
+    lam = None if options.lam is None else _numbers(options.lam, "--lam")
     sigma = None if options.sigma is None else _numbers(options.sigma, "--sigma")
     if sigma is not None and not np.all(np.greater(sigma, 0)):
         raise Problem(f"--sigma {options.sigma}: the standard deviation must be greater than 0")
     if options.lonlat and isinstance(sigma, float):
         sigma = math.radians(sigma)
-    criterion = how if how in _CRITERIA else "cp" if how == _BEST and sigma is not None else "gcv"
+    known = sigma is not None and lam is None
+    criterion = options.criterion or ("cp" if known else "gcv")
     loss = "cauchy" if options.robust else "linear"
     penalty = options.penalty or "acceleration"
     return {"criterion": criterion, "lam": lam, "sigma": sigma, "loss": loss, "penalty": penalty}
@@ -251,8 +276,7 @@ def _smoothing_options(options: argparse.Namespace) -> dict[str, Any] | None:
 def _estimation_options(options: argparse.Namespace, smooth: dict[str, Any]) -> dict[str, Any]:
     """Return the options of `symspline.estimate`."""
     kept = {name: smooth[name] for name in ("lam", "loss", "penalty")}
-    criterion = options.smooth if options.smooth in _CRITERIA else None
-    return {**kept, "criterion": criterion, "extrapolate": _EXTRAPOLATE.get(options.extrapolate)}
+    return {**kept, "criterion": options.criterion, "extrapolate": _EXTRAPOLATE.get(options.extrapolate)}
 
 
 def _numbers(text: str, option: str) -> Any:

@@ -50,7 +50,8 @@ from ._grid_files import (
     write_arrays,
 )
 from ._grid_positions import positions, values_option
-from ._messages import Progress, check_target, refuse, writing
+from ._messages import Progress, refuse, tell
+from ._streams import check_target, writing
 
 _ENDS = ("not-a-knot", "natural", "clamped", "periodic")
 _ORDERS = ("dipy", "fsl", "mrtrix", "itk")
@@ -81,7 +82,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Read, fit, and write values or the spline."""
     source, target = (check_ending_of(path) for path in (options.input, options.output))
-    check_target(options.output)
+    check_target(options.output, options.input, options.to, options.mask)
     option = values_option(options)
     volume, store = source in VOLUMES, source == ZARR
     unused = [
@@ -98,10 +99,10 @@ def run(options: argparse.Namespace) -> int:
     )
     how = {"bc_type": _bc_type(options.bc_type), "symmetric": options.symmetric}
     if volume and option:
-        print(f"{options.output}: {_grid_volumes.resampled(options, option, how)}")
+        tell(f"{options.output}: {_grid_volumes.resampled(options, option, how)}")
         return 0
     if target == ZARR:
-        print(f"{options.output}: {_grid_stores.resampled(options, how)}")
+        tell(f"{options.output}: {_grid_stores.resampled(options, how)}")
         return 0
     read = _grid_volumes.read_grid if volume else _grid_stores.read_grid if store else read_arrays
     grid = read(options)
@@ -117,7 +118,7 @@ def run(options: argparse.Namespace) -> int:
             values = spline.grid(*x, progress=progress)
         write_arrays(options.output, grid.names, x, values)
         done = f"{sizes(map(len, x))} values of {spline.space}{missing(values)}"
-    print(f"{options.output}: {done}{_summary(spline)}")
+    tell(f"{options.output}: {done}{_summary(spline)}")
     return 0
 
 

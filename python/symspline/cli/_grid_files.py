@@ -21,7 +21,8 @@ from .._grid import GridSpline
 from .._report import FarPointsWarning
 from .._spaces import Product, Space, factors_of, space_named
 from ._columns import split_names
-from ._messages import did_you_mean, reading, refuse, say, writing
+from ._messages import did_you_mean, reading, refuse, say
+from ._streams import writing
 
 Array = NDArray[Any]
 

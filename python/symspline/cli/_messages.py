@@ -1,8 +1,7 @@
-"""Messages, errors and progress of the command line, and files that cannot be read or written."""
+"""Messages, errors and progress of the command line."""
 
 from __future__ import annotations
 
-import os
 import re
 import sys
 import time
@@ -10,15 +9,14 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from difflib import get_close_matches
-from pathlib import Path
 from typing import Self
 
 from .._arrays import brief
-from .._disk import replacing
 from .._spaces.base import CLASSES
 
 _NAMES = {cls.__name__: name for name, cls in CLASSES.items()}
 _SPACE = re.compile(rf"\b({'|'.join(_NAMES)})\((.*?)\)")
+_ALL_SPACES = re.compile("known names are .*")
 _FOR_PYTHON = (
     "; use space.project(x) if these are meant to be points",
     " (np.linalg.qr gives an orthonormal basis)",
@@ -29,6 +27,10 @@ _FOR_PYTHON = (
 _LONGEST = 1000
 _WAIT = 0.3
 """Seconds between two updates; shorter work shows nothing."""
+
+
+QUIET, USUAL, VERBOSE = -1, 0, 1
+_level = USUAL
 
 
 class Problem(Exception):
@@ -55,6 +57,7 @@ def for_command_line(error: Exception) -> str:
     message = str(error)
     for advice in _FOR_PYTHON:
         message = message.replace(advice, "")
+    message = _ALL_SPACES.sub("symspline info lists the names", message)
     return _SPACE.sub(lambda space: f"{_NAMES[space[1]]}:{space[2].replace(' ', '')}", message)
 
 
@@ -77,7 +80,7 @@ def listed(names: Sequence[str]) -> str:
 
 
 @contextmanager
-def reading(path: Path, verb: str = "read") -> Iterator[None]:
+def reading(path: object, verb: str = "read") -> Iterator[None]:
     """Raise `Problem` if the file cannot be read."""
     try:
         yield
@@ -85,25 +88,16 @@ def reading(path: Path, verb: str = "read") -> Iterator[None]:
         raise Problem(f"cannot {verb} {path}: {error.strerror or error}") from None
 
 
-def check_target(path: Path) -> None:
-    """Raise `Problem` before any work is done if the output file cannot be written."""
-    # The target of a symbolic link is written.
-    folder = path.resolve().parent if path.is_symlink() else path.parent
-    special = path.exists() and not path.is_file()
-    refuse(
-        f"cannot write {path}: ",
-        (path.is_dir(), "it is a folder"),
-        (special, "it is a device, a pipe or a socket; give the name of a regular file"),
-        (not folder.is_dir(), f"there is no folder {folder}"),
-        (not os.access(folder, os.W_OK), f"no permission to write into {folder}"),
-    )
+def set_level(level: int) -> None:
+    """Set how much `tell` and `Progress` print: ``QUIET``, ``USUAL`` or ``VERBOSE``."""
+    global _level
+    _level = level
 
 
-@contextmanager
-def writing(path: Path) -> Iterator[Path]:
-    """Yield a temporary file that replaces ``path`` if the body succeeds."""
-    with reading(path, "write"), replacing(path) as temporary:
-        yield temporary
+def tell(message: object, level: int = USUAL) -> None:
+    """Print a description of the work on stderr, if the level is reached."""
+    if level <= _level:
+        print(brief(message, _LONGEST), file=sys.stderr)
 
 
 def say(message: object) -> None:
@@ -123,7 +117,7 @@ class Progress:
 
     def __enter__(self) -> Self:
         self._next = time.monotonic() + _WAIT
-        self._shows = sys.stderr is not None and sys.stderr.isatty()
+        self._shows = _level > QUIET and sys.stderr is not None and sys.stderr.isatty()
         return self
 
     def __call__(self, done: int, total: int) -> None:

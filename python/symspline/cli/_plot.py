@@ -14,20 +14,22 @@ import argparse
 from pathlib import Path
 
 from ._curves import read_curves
-from ._messages import Problem, check_target, did_you_mean, listed, refuse, writing
+from ._messages import Problem, did_you_mean, listed, refuse, tell
+from ._streams import STANDARD, check_target, writing
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options of ``symspline plot``."""
     add = parser.add_argument
-    add("curves", type=Path, metavar="CURVE", help="file of curves to read: .npz")
+    add("curves", type=Path, metavar="CURVE", help="file of curves to read: .npz, or -")
     add("--curve", metavar="NAME", help="which curve, if there are several")
-    add("-o", dest="output", type=Path, metavar="PICTURE", required=True, help="picture to write")
+    add("-o", dest="output", type=Path, metavar="PICTURE", required=True, help="picture to write, or -")
+    add("--to", metavar="FORMAT", help="format of the picture, such as pdf (default: as its name ends, PNG for -)")
 
 
 def run(options: argparse.Namespace) -> int:
     """Draw the curve, and write the picture."""
-    check_target(options.output)
+    check_target(options.output, options.curves, binary=True)
     curves = read_curves(options.curves)
     names, name = list(curves.splines), options.curve
     several = f" has {len(names)} curves; say which with --curve: {listed(names)}"
@@ -40,9 +42,9 @@ def run(options: argparse.Namespace) -> int:
     except ImportError as error:
         raise Problem(str(error)) from None
     known = sorted(figure.canvas.get_supported_filetypes())
-    ending = f": the name of a picture must end in .{', .'.join(known)}"
-    refuse(options.output, (options.output.suffix[1:].lower() not in known, ending))
+    form = options.to or ("png" if options.output == STANDARD else options.output.suffix[1:].lower())
+    refuse(options.output, (form not in known, f": the name of a picture must end in .{', .'.join(known)}"))
     with writing(options.output) as temporary:
-        figure.savefig(temporary)
-    print(f"{options.output}: a picture of {curves.called(name)}")
+        figure.savefig(temporary, format=form)
+    tell(f"{options.output}: a picture of {curves.called(name)}")
     return 0

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from argparse import Namespace
 from collections.abc import Callable, Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -37,10 +36,10 @@ class Recordings:
         and those that share their time with another row of noisy data.
     """
 
-    def __init__(self, path: Path, rows: Rows, points: Any, space: Space, options: Namespace, hint: Hint) -> None:
+    def __init__(self, path: object, rows: Rows, points: Any, space: Space, options: Namespace, hint: Hint) -> None:
         """Read the curves. ``hint`` returns a column that may hold the names of several curves."""
         self._path, self._rows, self._points, self._space, self._hint = path, rows, points, space, hint
-        self._options, self._smooth = options, options.smooth is not None
+        self._options, self._smooth = options, options.smooth
         self.named = rows.labels is not None or options.max_gap is not None
         self.merged = self.alone = self.repeated = 0
         self.curves: list[tuple[Any, Any]] = []

@@ -6,12 +6,20 @@ was fitted, or x0, x1, ... in the order of the array, m11, m12, ... for a matrix
 a complex number.
 
 --nu 1 writes the velocity, x0_d1, ... or x0_d1_re, ..., and --nu 2 the covariant acceleration, x0_d2, ..., per unit of
-time, which is a second for dates. For longitude and latitude these are east_d1, north_d1, ..., in degrees of arc; for
-unit quaternions, whose sign does not jump along a curve, the derivatives on their sphere.
+time, which is a second for dates. For longitude and latitude these are east_d1, north_d1, ..., in degrees of arc. For
+unit quaternions, whose sign does not jump along a curve, they are the angular velocity wx, wy, wz in the frame of the
+body, in radians per unit of time, as symspline fit --rates reads it, and the angular acceleration wx_d1, wy_d1, wz_d1.
 
-Curves fitted with --smooth have the standard deviation of a coordinate of the point, std, and of the velocity, std_d1,
-in the units of the columns next to them: degrees for longitude and latitude, radians for rotation matrices, half of
-that for unit quaternions. A product has std1, std2, ... for its factors, and a pose std_position and std_rotation. A
+Curves fitted with --smooth have the standard error of a coordinate of the point, std, and of the velocity, std_d1, in
+the units of the columns next to them:
+
+  std           degrees for longitude and latitude; radians of the angle for rotation matrices, and half of that for a
+                number of a unit quaternion, which changes by half of the angle; otherwise the unit of the points
+  std_d1        the same per unit of time
+  std_wx, ...   the standard errors of wx, wy and wz, in radians per unit of time
+
+A product has std1, std2, ... for its factors, and a pose has std_position and
+std_rotation, in the unit of the position and in radians as above. A
 line or a subspace has many arrays: the representative may change from one segment of a curve to the next, and vectors
 belong to the one in their row.
 
@@ -25,6 +33,9 @@ times are whole multiples of the step since 1970-01-01. The first sample is at o
 last one at or before its end. Use -n for samples from the start to the end. With numbers, --every counts from the
 start.
 
+With one recording that --max-gap cut into segments, --at evaluates each time on its segment and omits times in gaps. A
+TUM trajectory is one file with all segments in the order of time. -o 'x_{curve}.csv' writes one file per curve.
+
 --at reads the column of times of the table that was fitted, or finds one as symspline fit does. If the file also has
 the column of the curves' names, every row is for its curve, otherwise for all curves.
 """
@@ -32,7 +43,7 @@ the column of the curves' names, every row is for its curve, otherwise for all c
 from __future__ import annotations
 
 import argparse
-from itertools import chain
+from itertools import chain, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -41,16 +52,20 @@ from numpy.typing import NDArray
 
 from .._pose_files import TUM
 from .._smoothing import SmoothingSpline
-from .._spaces import space_named
+from .._spaces import Doubles, space_named
 from .._time import onto_ends
 from ._columns import quaternion_by_names, time_column
 from ._curves import Curves, read_curves
-from ._messages import Problem, Progress, check_target, did_you_mean, first_duplicate, refuse
+from ._formats import open_table, write_table
+from ._messages import Problem, Progress, did_you_mean, first_duplicate, refuse, say, tell
 from ._points import Columns, Samples, deviations_of, samples_of
-from ._recordings import Groups, group
-from ._tables import TUM_ENDINGS, Rows, check_ending, open_table, write_table
+from ._recordings import group
+from ._streams import STANDARD, TABLES, check_inputs, check_target, endings, format_of
+from ._tables import Layout, Rows, Table
 from ._times import Times, every, number, spread
 
+_EACH = "{curve}"
+"""Replaced by the name of a curve in the name of the output."""
 _MOST = 10**9
 _TUM_NAMES = list(TUM[1:])
 _TUM_SPACES = [space_named(name) for name in ("se:3", "so:3 x r:3", "r:3 x so:3")]
@@ -59,7 +74,7 @@ _TUM_SPACES = [space_named(name) for name in ("se:3", "so:3 x r:3", "r:3 x so:3"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options of ``symspline sample``."""
     add = parser.add_argument
-    add("curves", type=Path, metavar="CURVE", help="file of curves to read: .npz")
+    add("curves", type=Path, metavar="CURVE", help="file of curves to read: .npz, or - for standard input")
     which = parser.add_mutually_exclusive_group(required=True)
     steps = (
         "a step: for dates a duration in ns, us, ms, s (or no unit), min, h or d, with samples at its whole multiples "
@@ -68,50 +83,81 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     which.add_argument("--every", metavar="DT", help=steps)
     count = "the number of equidistant samples from the start to the end"
     which.add_argument("-n", dest="number", type=number, metavar="N", help=count)
-    which.add_argument("--at", type=Path, metavar="FILE", help="a table with times: .csv, .npz or .parquet")
+    which.add_argument("--at", type=Path, metavar="FILE", help=f"a table with times: {endings()}, or -")
+    add("--curve", action="append", metavar="NAME", help="which curve; may be repeated (default: all)")
     add("--nu", default="0", metavar="0,1,2", help="points (0, default), velocities (1), accelerations (2)")
     add("--lonlat", action="store_true", help="write longitude and latitude of any curve on sphere:2")
-    add("-o", dest="output", type=Path, metavar="OUT", required=True, help="table to write")
+    add("--digits", type=int, metavar="N", help="round the numbers to N significant digits, but not the times")
+    add("--from", dest="format", choices=TABLES, help="format of the table of --at (default: as its name ends)")
+    add("--to", choices=TABLES, help="format to write (default: as the name of OUT ends, CSV for -)")
+    out = f"table to write: {endings()}, or - for standard output; {_EACH} in its name makes one file per curve"
+    add("-o", dest="output", type=Path, metavar="OUT", required=True, help=out)
 
 
 def run(options: argparse.Namespace) -> int:
     """Evaluate, and write the table."""
-    suffix = check_ending(options.output)
-    check_target(options.output)
-    orders = _orders(options.nu)
-    curves = read_curves(options.curves, options.lonlat)
-    splines, columns = curves.splines, curves.columns
-    stds = all(isinstance(spline, SmoothingSpline) for spline in splines.values())
-    if suffix in TUM_ENDINGS:
-        # A trajectory has no columns for standard deviations.
-        columns, stds = _tum_columns(curves, orders), False
-    if options.at is not None:
-        times, rows = _given(options.at, curves)
-    else:
-        times, rows = {name: _along(spline.t, options) for name, spline in splines.items()}, None
-        empty = (
-            f"no multiple of this step lies between the start and the end of {'any' if curves.named else 'the'} curve"
-        )
-        none = not any(map(len, times.values()))
-        refuse(f"--every {options.every}: ", (none, f"{empty}; use a shorter step, or -n"))
-    functions: Any = (samples_of, deviations_of) if stds else (samples_of,)
-    samples: list[Samples] = []
+    form = format_of(options.output, options.to)
+    check_inputs(options.curves, options.at)
+    inputs = options.curves, options.at
+    check_target(options.output, *inputs, binary=form in ("npz", "parquet"))
+    orders, digits = _orders(options.nu), options.digits
+    refuse(f"--digits {digits}: ", (digits is not None and not 1 <= digits <= 17, "give a number between 1 and 17"))
+    every_curve = read_curves(options.curves, options.lonlat)
+    curves = every_curve.chosen(options.curves, options.curve)
+    columns = _tum_columns(curves, orders) if form == "tum" else curves.columns
+    times, rows = _times(options, curves, every_curve)
+    # A trajectory has no columns for standard deviations.
+    smooth = form != "tum" and all(isinstance(spline, SmoothingSpline) for spline in curves.splines.values())
+    functions: Any = (samples_of, deviations_of) if smooth else (samples_of,)
+    samples: dict[str, Samples] = {}
     with Progress("sampling") as progress:
         for done, (name, x) in enumerate(times.items(), 1):
-            blocks = [function(splines[name], x, nu, columns) for nu in orders for function in functions]
-            samples.append(list(chain.from_iterable(blocks)))
+            blocks = [function(curves.splines[name], x, nu, columns) for nu in orders for function in functions]
+            found = list(chain.from_iterable(blocks))
+            samples[name] = [(key, _rounded(own, digits)) for key, own in found] if digits else found
             progress(done, len(times))
+    if _EACH in options.output.name:
+        for name in samples:
+            path = options.output.with_name(options.output.name.replace(_EACH, name.replace("/", "_")))
+            check_target(path, *inputs)
+            _write(path, form, {name: times[name]}, samples, None, columns, False)
+    else:
+        named = curves.named
+        if form == "tum" and named:
+            _check_order(curves)
+            named = False
+        _write(options.output, form, times, samples, rows, columns, named)
+    return 0
+
+
+def _write(
+    path: Path,
+    form: str,
+    times: dict[str, Times],
+    samples: dict[str, Samples],
+    rows: NDArray[np.int64] | None,
+    columns: Columns,
+    named: bool,
+) -> None:
+    """Write the table of some curves, in the order of ``rows``."""
     pairs: list[tuple[str, NDArray[Any]]] = [(columns.time, np.concatenate(list(times.values())))]
-    if curves.named:
+    if named:
         pairs.append((columns.curve, np.repeat(list(times), [len(x) for x in times.values()])))
-    for parts in zip(*samples, strict=True):
+    for parts in zip(*(samples[name] for name in times), strict=True):
         pairs.append((parts[0][0], np.concatenate([numbers for _, numbers in parts])))
     twice = first_duplicate([name for name, _ in pairs])
     refuse("", (twice is not None, f"two columns would have the name {twice!r}; rename them"))
     order = slice(None) if rows is None else np.argsort(rows)
-    write_table(options.output, {name: column[order] for name, column in pairs}, bool(columns.utc))
-    print(f"{options.output}: {len(pairs[0][1])} rows")
-    return 0
+    lonlat = tuple(columns.points) if columns.lonlat else None
+    layout = Layout(columns.time, columns.curve if named else None, lonlat, bool(columns.utc))
+    write_table(path, form, {name: column[order] for name, column in pairs}, layout)
+    tell(f"{'standard output' if path == STANDARD else path}: {len(pairs[0][1])} rows")
+
+
+def _rounded(numbers: Doubles, digits: int) -> Doubles:
+    """Round to significant digits."""
+    texts = (f"{number:.{digits - 1}e}" for number in numbers.tolist())
+    return np.fromiter(map(float, texts), np.float64, len(numbers))
 
 
 def _orders(text: str) -> list[int]:
@@ -124,17 +170,38 @@ def _orders(text: str) -> list[int]:
 def _tum_columns(curves: Curves, orders: list[int]) -> Columns:
     space = next(iter(curves.splines.values())).space
     spaces = " or of ".join(map(str, _TUM_SPACES))
-    other = "write {} to a .csv, .npz or .parquet file"
     refuse(
         "a TUM trajectory ",
         (space not in _TUM_SPACES, f"has poses, points of {spaces}, not of {space}"),
-        (curves.named, f"is one curve; {other.format('several')}"),
-        (orders != [0], f"has poses and no derivatives; {other.format('those')}"),
+        (orders != [0], "has poses and no derivatives; write those to a .csv, .npz or .parquet file"),
     )
     return Columns(_TUM_NAMES, quaternion=quaternion_by_names(_TUM_NAMES, space))
 
 
+def _check_order(curves: Curves) -> None:
+    """Raise `Problem` unless every curve begins after the end of the previous one."""
+    for (name, own), (other, following) in pairwise(curves.splines.items()):
+        if not own.t[-1] < following.t[0]:
+            raise Problem(
+                f"a TUM trajectory has increasing times, but {curves.called(other)} begins before the end of "
+                f"{curves.called(name)}; choose one with --curve, or write one file per curve, such as -o x_{_EACH}.txt"
+            )
+
+
 # ---- times ----
+
+
+def _times(
+    options: argparse.Namespace, curves: Curves, every_curve: Curves
+) -> tuple[dict[str, Times], NDArray[np.int64] | None]:
+    """Return the times of every curve, and their rows if every row of a table is for one curve."""
+    if options.at is not None:
+        return _given(open_table(options.at, options.format), curves, every_curve)
+    times = {name: _along(spline.t, options) for name, spline in curves.splines.items()}
+    empty = f"no multiple of this step lies between the start and the end of {'any' if curves.named else 'the'} curve"
+    none = not any(map(len, times.values()))
+    refuse(f"--every {options.every}: ", (none, f"{empty}; use a shorter step, or -n"))
+    return times, None
 
 
 def _along(knots: Times, options: argparse.Namespace) -> Times:
@@ -146,26 +213,49 @@ def _along(knots: Times, options: argparse.Namespace) -> Times:
     return spread(int(count), knots)
 
 
-def _given(path: Path, curves: Curves) -> tuple[dict[str, Times], NDArray[np.int64] | None]:
-    """Return the times of every curve in a file, and their rows if every row is for one curve."""
-    table, usual = open_table(path), curves.columns.time
+def _given(table: Table, curves: Curves, every_curve: Curves) -> tuple[dict[str, Times], NDArray[np.int64] | None]:
+    path, usual, label = table.path, curves.columns.time, curves.columns.curve
     only = table.names[0] if len(table.names) == 1 else None
     time = usual if usual in table.names else only or time_column(table, None, [])
     if time is None:
         raise Problem(f"{path} has no column {usual!r} of times; {did_you_mean(usual, table.names)}")
-    labelled = curves.named and curves.columns.curve in table.names
-    rows = table.read([], time, curves.columns.curve if labelled else None)
-    groups: Groups = group(rows) if labelled else dict.fromkeys(curves.splines, group(rows)[""])
+    labelled = every_curve.named and label in table.names
+    rows = table.read([], time, label if labelled else None)
+    if labelled:
+        groups = {
+            name: own for name, own in group(rows).items() if name in curves.splines or name not in every_curve.splines
+        }
+    elif curves.segmented and curves.named:
+        groups = _by_segment(rows, curves)
+    else:
+        groups = dict.fromkeys(curves.splines, group(rows)[""])
     for name, own in groups.items():
         if name not in curves.splines:
             near = did_you_mean(name, list(curves.splines))
             raise Problem(f"{path}, {rows.place(int(own[0]))}: there is no curve {name!r}; {near}")
         _check_times(path, rows, own, curves, name)
-    order = np.concatenate(list(groups.values())) if labelled else None
+    refuse(path, (not any(map(len, groups.values())), " has no times of these curves"))
+    single = labelled or curves.segmented
+    order = np.concatenate(list(groups.values())) if single else None
     return {name: rows.times[own] for name, own in groups.items()}, order
 
 
-def _check_times(path: Path, rows: Rows, own: NDArray[np.int64], curves: Curves, name: str) -> None:
+def _by_segment(rows: Rows, curves: Curves) -> dict[str, NDArray[np.int64]]:
+    """Return the rows of every segment; those in the gaps between segments are omitted."""
+    splines = list(curves.splines.values())
+    starts = np.array([spline.t[0] for spline in splines])
+    if rows.times.dtype.kind != starts.dtype.kind and "M" in (rows.times.dtype.kind, starts.dtype.kind):
+        # `_check_times` describes the difference.
+        return {next(iter(curves.splines)): np.arange(len(rows.times))}
+    segment = np.maximum(np.searchsorted(starts, rows.times, "right") - 1, 0)
+    ends = np.array([spline.t[-1] for spline in splines])
+    in_gap = (rows.times > ends[segment]) & (segment < len(splines) - 1)
+    if in_gap.any():
+        say(f"{int(in_gap.sum())} of {len(in_gap)} times lie in gaps between segments, and are omitted")
+    return {name: np.flatnonzero((segment == i) & ~in_gap) for i, name in enumerate(curves.splines)}
+
+
+def _check_times(path: object, rows: Rows, own: NDArray[np.int64], curves: Curves, name: str) -> None:
     """Raise `Problem` unless the curve has points at these times."""
     spline, called = curves.splines[name], curves.called(name)
     times, knots = rows.times[own], spline.t

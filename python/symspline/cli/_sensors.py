@@ -6,7 +6,6 @@ import warnings
 from argparse import Namespace
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -30,7 +29,7 @@ _POSITION = 3
 # Vectors in tables are rounded, so that they are tangent only up to this fraction of their size.
 _TANGENT = 1e-4
 _FOR_PYTHON = "Raise max_iter, pass lam, or a better `start`."
-_FOR_COMMAND_LINE = "Give λ with --smooth, or another --penalty, and check the standard deviations."
+_FOR_COMMAND_LINE = "Give λ with --lam, or another --penalty, and check the standard deviations."
 # Residuals may exceed the given standard deviations by this factor without a note.
 _FACTOR = 2.0
 
@@ -329,8 +328,8 @@ class Fusion:
 # ---- report ----
 
 
-def summary(path: Path, curves: Sequence[SmoothingSpline[Any, Any]], fusion: Fusion, named: bool) -> str:
-    """Describe the curves, one line for all and one per bias."""
+def summary(path: str, curves: Sequence[SmoothingSpline[Any, Any]], fusion: Fusion, named: bool) -> list[str]:
+    """Describe the curves in one line for all and one per bias."""
     space = curves[0].space
     kinds = zip(fusion.counts, ("points", "rates", "velocities"), strict=True)
     counts = [f"{count} {kind}" for count, kind in kinds if count]
@@ -357,7 +356,7 @@ def summary(path: Path, curves: Sequence[SmoothingSpline[Any, Any]], fusion: Fus
         for key, found in curve.parameters.items():
             each = zip(found.value, found.std, strict=True)
             lines.append(f"{key}{of}: {', '.join(f'{value:.3g} ± {std:.2g}' for value, std in each)}")
-    return "\n".join(lines)
+    return lines
 
 
 def _joined(words: Sequence[str]) -> str:

@@ -1,0 +1,152 @@
+"""Describe a table or a file of curves
+
+For a table the columns are listed, with their ranges and missing values, the column of times with its step, its repeats
+and its gaps, and a column that may hold the names of several curves. For curves the space, the nodes, the time span and
+the ends are listed, for those near noisy points also λ and the noise.
+
+Without FILE, the spaces, the formats of files and the optional libraries are listed.
+
+examples:
+  symspline info track.csv
+  symspline info storms.npz
+  symspline info
+"""
+
+from __future__ import annotations
+
+import argparse
+import zipfile
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .._report import long_gaps
+from .._smoothing import SmoothingSpline
+from .._smoothing.factors import is_several, smoothed_spaces
+from .._spaces.base import CLASSES, example_of
+from ._columns import column_of_names, time_column
+from ._curves import read_curves
+from ._formats import open_table
+from ._messages import Problem, Progress, listed
+from ._streams import TABLES, Source, endings, format_of
+from ._tables import Rows, Table
+
+_LIBRARIES = {"pyarrow": "Parquet and large CSV files", "gpxpy": "GPX files", "matplotlib": "symspline plot"}
+_LIBRARIES |= {"nibabel": "NIfTI files", "zarr": "Zarr stores", "shtab": "completion in shells"}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options of ``symspline info``."""
+    parser.add_argument("file", nargs="?", type=Path, metavar="FILE", help="table or file of curves, or -")
+    parser.add_argument("--from", dest="format", choices=TABLES, help="format of FILE (default: as its name ends)")
+    parser.add_argument("--time", metavar="COL", help="column of times")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Print a description on standard output."""
+    path = options.file
+    if path is None:
+        lines = _installation()
+    elif _is_curve(Source(path, format_of(path, options.format, what="a table or a file of curves"))):
+        lines = _curves(path)
+    else:
+        lines = _table(open_table(path, options.format), options.time)
+    print("\n".join(lines))
+    return 0
+
+
+def _installation() -> list[str]:
+    spaces = [(example_of(cls).rpartition("'")[0].rpartition("'")[2], cls) for cls in CLASSES.values()]
+    lines = ["spaces, such as:"]
+    lines += [f"  {name:<14}{(cls.__doc__ or '').partition(chr(10))[0]}" for name, cls in spaces]
+    lines += [f"formats of tables: {endings()}", "optional libraries:"]
+    return lines + [
+        f"  {name:<12}{'installed' if find_spec(name) else 'missing':<11}{use}" for name, use in _LIBRARIES.items()
+    ]
+
+
+def _is_curve(source: Source) -> bool:
+    with source.open() as file:
+        return zipfile.is_zipfile(file) and "format.npy" in zipfile.ZipFile(file).namelist()
+
+
+# ---- tables ----
+
+
+def _table(table: Table, given: str | None) -> list[str]:
+    table.allow_missing()
+    texts = [name for name in table.names if name and name not in table.numeric]
+    with Progress("reading") as progress:
+        table._sparse = frozenset(table.numeric)
+        table.load(table.numeric, texts, progress)
+    columns = {name: table.columns[name] for name in table.names if name}
+    lines = [f"{table.path}: {table.path.format} table, {len(next(iter(columns.values())))} rows"]
+    width = max(map(len, columns)) + 2
+    lines += [f"  {name:{width}}{_described(np.asarray(own))}" for name, own in columns.items()]
+    try:
+        time = time_column(table, given, [])
+        rows = table.read([], time, None) if time is not None else None
+    except Problem as problem:
+        return [*lines, str(problem)]
+    if rows is None or time is None:
+        return [*lines, "times: no column; the points are at 0, 1, 2, ..."]
+    lines.append(f"times in column {time!r}: {_times(rows)}")
+    names = column_of_names(table, time, [time]) if (np.diff(rows.times.astype(np.int64)) <= 0).any() else None
+    return lines if names is None else [*lines, f"--curve {names} makes a curve of each {names}"]
+
+
+def _described(values: Any) -> str:
+    if values.dtype.kind in "OUST":
+        texts = list(dict.fromkeys(map(str, values.tolist())))
+        return (
+            f"{len(texts)} text{'s' if len(texts) > 1 else ''}: {listed(texts[:3])}{', ...' if len(texts) > 3 else ''}"
+        )
+    missing = np.isnan(values) if values.dtype.kind == "f" else np.zeros(len(values), bool)
+    found = values[~missing]
+    if not found.size:
+        return "no values"
+    return f"{found.min()} to {found.max()}{f', {missing.sum()} missing' if missing.any() else ''}"
+
+
+def _times(rows: Rows) -> str:
+    times = rows.times
+    unit = " s" if times.dtype.kind == "M" else ""
+    seconds = (times - times[0]) / np.timedelta64(1, "s") if unit else times.astype(np.float64)
+    steps = np.diff(seconds)
+    parts = [f"{times.min()} to {times.max()}{' UTC' if rows.utc else ''}"]
+    ahead = steps[steps > 0]
+    if ahead.size:
+        parts.append(f"usual step {np.median(ahead):.6g}{unit}")
+    counts = ((int((steps == 0).sum()), "repeated"), (int((steps < 0).sum()), "before the previous one"))
+    parts += [f"{count} {what}" for count, what in counts if count]
+    if ahead.size == steps.size:
+        gaps = steps[long_gaps(seconds)]
+        parts += (
+            [f"{gaps.size} long gap{'s' if gaps.size > 1 else ''}, up to {gaps.max():.6g}{unit}"] if gaps.size else []
+        )
+    return ", ".join(parts)
+
+
+# ---- curves ----
+
+
+def _curves(path: Path) -> list[str]:
+    curves = read_curves(path)
+    count = len(curves.splines)
+    space = next(iter(curves.splines.values())).space
+    words = "segments of one recording" if curves.segmented else f"curve{'s' if count > 1 else ''}"
+    lines = [f"{path}: {count} {words} on {space}, columns {listed(curves.columns.points)}"]
+    for name, spline in curves.splines.items():
+        ends = spline.bc_type if isinstance(spline.bc_type, str) else ", ".join(map(str, spline.bc_type))
+        parts = [f"{len(spline.t)} nodes, {spline.t[0]} to {spline.t[-1]}"]
+        if isinstance(spline, SmoothingSpline):
+            reports = spline.report if isinstance(spline.report, tuple) else (spline.report,)
+            for own, report in zip(smoothed_spaces(space), reports, strict=True):
+                noise = f"λ {report.lam:.3g}, {report.df:.3g} degrees of freedom, noise {report.sigma:.3g}"
+                parts.append(f"{own}: {noise}" if is_several(space) else noise)
+        else:
+            parts.append(f"{ends} ends, residual {spline.report.residual:.1e}")
+        lines.append(f"  {f'{name}: ' if curves.named else ''}{'; '.join(parts)}")
+    return lines

@@ -1,0 +1,189 @@
+"""Tables in JSON, GeoJSON and GPX."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from datetime import UTC
+from typing import Any, BinaryIO
+
+import numpy as np
+
+from ._csv import date_texts
+from ._messages import Problem, refuse
+from ._streams import Source
+from ._tables import FIRST, Array, Layout, Table
+from ._times import is_date_like
+
+_TIME, _LON, _LAT, _TRACK = "time", "lon", "lat", "track"
+# Properties of lines that hold the times of their points.
+_LINE_TIMES = ("coordTimes", "times")
+_EXACT = 2**53
+
+
+# ---- reading ----
+
+
+class RecordsTable(Table):
+    """Values of one column have one type: numbers, or texts."""
+
+    def __init__(self, path: Source, read: Callable[[Source, BinaryIO], dict[str, list[Any]]]) -> None:
+        super().__init__(path)
+        with path.open() as file:
+            cells = read(path, file)
+        self.names = list(cells)
+        for name, values in cells.items():
+            kinds = {type(value) for value in values} - {type(None)}
+            # Larger whole numbers are exact as texts only.
+            exact = all(type(value) is not int or abs(value) <= _EXACT for value in values)
+            if kinds and kinds <= {int, float} and exact:
+                self.columns[name] = np.array([np.nan if value is None else value for value in values], np.float64)
+                self.numeric.append(name)
+                continue
+            texts = ["" if value is None else str(value) for value in values]
+            self.columns[name] = texts
+            if is_date_like(next(filter(None, texts[:FIRST]), "")):
+                self.dates.append(name)
+
+
+def json_columns(path: Source, file: BinaryIO) -> dict[str, list[Any]]:
+    """Read a list of objects with one value per column, or an object with one list per column."""
+    return _columns(path, _json(path, file))
+
+
+def geojson_columns(path: Source, file: BinaryIO) -> dict[str, list[Any]]:
+    """Read a collection of features: points with properties, or lines with their times in ``coordTimes``."""
+    content = _json(path, file)
+    rows: list[dict[str, Any]] = []
+    try:
+        features = content["features"] if content["type"] == "FeatureCollection" else [content]
+        for number, feature in enumerate(features):
+            rows += _feature(feature, str(number))
+    except (KeyError, TypeError, ValueError, AttributeError):
+        raise Problem(f"{path}: GeoJSON must be a collection of features that are points or lines") from None
+    return _columns(path, rows)
+
+
+def gpx_columns(path: Source, file: BinaryIO) -> dict[str, list[Any]]:
+    """Read the time, longitude, latitude and height of all points of a GPX file, and the name of their track."""
+    gpxpy = _gpxpy()
+    try:
+        gpx = gpxpy.parse(file.read().decode("utf-8-sig"))
+    except (UnicodeDecodeError, ValueError, gpxpy.gpx.GPXException) as error:
+        raise Problem(f"{path} is damaged or not a GPX file: {error}") from None
+    rows: list[dict[str, Any]] = []
+    for number, track in enumerate(gpx.tracks, 1):
+        for part, segment in enumerate(track.segments, 1):
+            name = track.name or str(number)
+            label = f"{name}/{part}" if len(track.segments) > 1 else name
+            for point in segment.points:
+                time = point.time and point.time.astimezone(UTC).isoformat()
+                own = {_TIME: time, _LON: point.longitude, _LAT: point.latitude, "ele": point.elevation}
+                rows.append({name: value for name, value in own.items() if value is not None} | {_TRACK: label})
+    refuse(path, (not rows, " has no tracks with points"))
+    return _columns(path, rows)
+
+
+def _json(path: Source, file: BinaryIO) -> Any:
+    try:
+        return json.load(file)
+    except (ValueError, RecursionError) as error:
+        raise Problem(f"{path} is not JSON: {error}") from None
+
+
+def _columns(path: Source, content: Any) -> dict[str, list[Any]]:
+    if isinstance(content, dict) and content and all(isinstance(values, list) for values in content.values()):
+        return content
+    shape = " is not a table: give a list of objects, one per row, or an object of lists, one per column"
+    rows = isinstance(content, list) and content and all(isinstance(row, dict) for row in content)
+    refuse(path, (not rows, shape))
+    names = dict.fromkeys(name for row in content for name in row)
+    return {name: [row.get(name) for row in content] for name in names}
+
+
+def _feature(feature: Any, number: str) -> list[dict[str, Any]]:
+    properties = dict(feature.get("properties") or {})
+    coordinates = feature["geometry"]["coordinates"]
+    if feature["geometry"]["type"] == "Point":
+        return [_place(coordinates) | properties]
+    if feature["geometry"]["type"] != "LineString":
+        raise ValueError
+    times = next((properties.pop(name) for name in _LINE_TIMES if name in properties), None)
+    label = {_TRACK: str(properties.get("name", number))}
+    rows = [_place(own) | label for own in coordinates]
+    return rows if times is None else [{_TIME: time} | row for time, row in zip(times, rows, strict=True)]
+
+
+def _place(coordinates: Any) -> dict[str, Any]:
+    lon, lat, *_ = coordinates
+    return {_LON: lon, _LAT: lat}
+
+
+def _gpxpy() -> Any:
+    try:
+        import gpxpy
+        import gpxpy.gpx
+    except ImportError:
+        raise Problem("GPX files need gpxpy; install it with: pip install gpxpy") from None
+    return gpxpy
+
+
+# ---- writing ----
+
+
+def _values(columns: Mapping[str, Array], layout: Layout) -> dict[str, list[Any]]:
+    """Return columns as lists of numbers and texts; NaN becomes None."""
+    found: dict[str, list[Any]] = {}
+    for name, own in columns.items():
+        if own.dtype.kind == "M":
+            found[name] = date_texts(own, layout.utc)
+        else:
+            missing = np.isnan(own) if own.dtype.kind == "f" else np.zeros(len(own), bool)
+            found[name] = np.where(missing, None, own.astype(object)).tolist() if missing.any() else own.tolist()
+    return found
+
+
+def write_json(file: BinaryIO, columns: Mapping[str, Array], layout: Layout) -> None:
+    """Write a list of objects, one per row and line."""
+    rows = zip(*_values(columns, layout).values(), strict=True)
+    lines = ",\n".join(json.dumps(dict(zip(columns, row, strict=True)), ensure_ascii=False) for row in rows)
+    file.write(f"[\n{lines}\n]\n".encode())
+
+
+def write_geojson(file: BinaryIO, columns: Mapping[str, Array], layout: Layout) -> None:
+    """Write a collection of points, one per row and line, whose other columns are properties."""
+    lon, lat = _lonlat(layout, "GeoJSON")
+    values = _values(columns, layout)
+    others = {name: own for name, own in values.items() if name not in (lon, lat)}
+    features = []
+    for place, *own in zip(zip(values[lon], values[lat], strict=True), *others.values(), strict=True):
+        geometry = {"type": "Point", "coordinates": place}
+        properties = dict(zip(others, own, strict=True))
+        features.append(json.dumps({"type": "Feature", "properties": properties, "geometry": geometry}))
+    collection = ",\n".join(features)
+    file.write(f'{{"type": "FeatureCollection", "features": [\n{collection}\n]}}\n'.encode())
+
+
+def write_gpx(file: BinaryIO, columns: Mapping[str, Array], layout: Layout) -> None:
+    """Write one track per curve."""
+    gpx = _gpxpy().gpx
+    lon, lat = _lonlat(layout, "GPX")
+    dates = columns[layout.time]
+    refuse("", (dates.dtype.kind != "M", "GPX files have dates, but the times of these curves are numbers"))
+    times = dates.astype("datetime64[us]").tolist()
+    names = columns[layout.curve].tolist() if layout.curve is not None else [None] * len(times)
+    whole, tracks = gpx.GPX(), {}
+    for name, time, x, y in zip(names, times, columns[lon].tolist(), columns[lat].tolist(), strict=True):
+        if name not in tracks:
+            track, segment = gpx.GPXTrack(name=name), gpx.GPXTrackSegment()
+            track.segments.append(segment)
+            whole.tracks.append(track)
+            tracks[name] = segment
+        tracks[name].points.append(gpx.GPXTrackPoint(y, x, time=time.replace(tzinfo=UTC)))
+    file.write(whole.to_xml().encode())
+
+
+def _lonlat(layout: Layout, what: str) -> tuple[str, ...]:
+    if layout.lonlat is None:
+        raise Problem(f"{what} has longitude and latitude: write it for curves on sphere:2, with --lonlat")
+    return layout.lonlat

@@ -1,0 +1,140 @@
+"""Files and standard streams, their formats, and compressed text."""
+
+from __future__ import annotations
+
+import gzip
+import io
+import os
+import shutil
+import sys
+import tempfile
+import zlib
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path, PurePath
+from typing import BinaryIO
+
+from .._disk import replacing
+from ._messages import Problem, reading, refuse
+
+STANDARD = Path("-")
+"""The name of standard input or output on the command line."""
+
+CURVES = ("npz",)
+TABLES = ("csv", "npz", "parquet", "json", "geojson", "gpx", "tum")
+_SAME = {"txt": "tum", "tsv": "csv"}
+_TEXT = ("csv", "tsv", "json", "geojson", "gpx", "tum", "txt")
+_GZIP = b"\x1f\x8b"
+
+
+def format_of(path: Path, given: str | None, known: Sequence[str] = TABLES, what: str = "a table") -> str:
+    """Return the format of a file: the given one, that of its ending, or the first one for a standard stream."""
+    if given is not None or path == STANDARD:
+        return given or known[0]
+    name = path.name.lower()
+    plain = PurePath(name.removesuffix(".gz"))
+    ending = plain.suffix[1:] if plain.suffix[1:] in _TEXT else PurePath(name).suffix[1:]
+    endings = [*known, *(end for end, kind in _SAME.items() if kind in known)]
+    refuse(path, (ending not in endings, f": the name of {what} must end in .{' or .'.join(endings)}"))
+    return _SAME.get(ending, ending)
+
+
+def endings(known: Sequence[str] = TABLES) -> str:
+    """List the endings of names for a help text."""
+    return ", ".join(f".{name}" for name in (*known, *(end for end, kind in _SAME.items() if kind in known)))
+
+
+# ---- reading ----
+
+
+@dataclass(frozen=True)
+class Source:
+    """A file to read, or standard input."""
+
+    path: Path
+    format: str
+
+    def __str__(self) -> str:
+        """Return its name for messages."""
+        return "standard input" if self.path == STANDARD else str(self.path)
+
+    @property
+    def size(self) -> int:
+        """Number of bytes, without decompression."""
+        return len(_standard_input()) if self.path == STANDARD else os.stat(self.path).st_size
+
+    @contextmanager
+    def open(self) -> Iterator[BinaryIO]:
+        """Open the file, which can be done more than once; compressed text is decompressed."""
+        with reading(self):
+            file: BinaryIO = io.BytesIO(_standard_input()) if self.path == STANDARD else self.path.open("rb")
+            with file:
+                packed = file.read(len(_GZIP)) == _GZIP
+                file.seek(0)
+                yield io.BytesIO(self._unpacked(file)) if packed else file
+
+    def _unpacked(self, file: BinaryIO) -> bytes:
+        try:
+            return gzip.decompress(file.read())
+        except (EOFError, zlib.error, gzip.BadGzipFile):
+            raise Problem(f"{self} is damaged: it cannot be decompressed") from None
+
+
+@cache
+def _standard_input() -> bytes:
+    return sys.stdin.buffer.read()
+
+
+def check_inputs(*paths: Path | None) -> None:
+    """Raise `Problem` if standard input is to be read twice."""
+    refuse("", (paths.count(STANDARD) > 1, "standard input (-) can be read for one of the files only"))
+
+
+# ---- writing ----
+
+
+def check_target(path: Path, *inputs: Path | None, binary: bool = False) -> None:
+    """Raise `Problem` before any work is done if the output file cannot be written, or is an input."""
+    if path == STANDARD:
+        refuse("", (binary and sys.stdout.isatty(), "binary data are not written to a terminal; redirect the output"))
+        return
+    # The target of a symbolic link is written.
+    folder = path.resolve().parent if path.is_symlink() else path.parent
+    special = path.exists() and not path.is_file()
+    same = any(own is not None and own.exists() and path.exists() and path.samefile(own) for own in inputs)
+    refuse(
+        f"cannot write {path}: ",
+        (path.is_dir(), "it is a folder"),
+        (special, "it is a device, a pipe or a socket; give the name of a regular file, or - for standard output"),
+        (not folder.is_dir(), f"there is no folder {folder}"),
+        (not os.access(folder, os.W_OK), f"no permission to write into {folder}"),
+        (same, "it is an input; give the output another name"),
+    )
+
+
+@contextmanager
+def writing(path: Path) -> Iterator[Path]:
+    """Yield a temporary file that replaces ``path``, or is copied to standard output, if the body succeeds."""
+    if path != STANDARD:
+        with reading(path, "write"), replacing(path) as temporary:
+            yield temporary
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        temporary = Path(folder, "output")
+        yield temporary
+        with open(temporary, "rb") as file:
+            shutil.copyfileobj(file, sys.stdout.buffer)
+
+
+@contextmanager
+def written(path: Path) -> Iterator[BinaryIO]:
+    """Open a file to write in binary mode; it is compressed if its name ends in .gz."""
+    with writing(path) as temporary, open(temporary, "wb") as file:
+        if path.suffix.lower() != ".gz":
+            yield file
+            return
+        # Without a date, equal tables have equal files.
+        with gzip.GzipFile("", "wb", 6, file, mtime=0) as packed:
+            yield packed  # type: ignore[misc]
