@@ -17,6 +17,8 @@ _CONVERSIONS = ("as_matrix", "full", "to_numpy", "datetime64", "numpy", "toarray
 ISO_DATE = re.compile(
     r"(?P<body>\d{4}-\d\d-\d\d(?:[T ]\d\d:\d\d(?::\d\d(?:\.\d{1,9})?)?)?) ?(?P<zone>Z|[+-]\d\d(?::?\d\d)?)?", re.ASCII
 )
+# Texts that are equal after this translation are dates of one form.
+ZEROS = str.maketrans("123456789", "0" * 9)
 UTC_ZONE, NO_ZONE = "UTC", "none"
 
 
@@ -172,6 +174,9 @@ def _moments(array: NDArray[Any], name: str) -> tuple[Any, str | None]:
     if required is timedelta:
         durations = [getattr(cell, "asm8", cell) for cell in cells]
         return np.array(durations, "timedelta64").reshape(array.shape), None
+    at_once = _moments_of_texts(cells) if required is str else None
+    if at_once is not None:
+        return at_once[0].reshape(array.shape), UTC_ZONE if at_once[1] else NO_ZONE
     pairs = [_moment(cell, name, i, array) for i, cell in enumerate(cells)]
     zones = [zone for _, zone in pairs]
     if len(set(zones)) > 1:
@@ -179,6 +184,43 @@ def _moments(array: NDArray[Any], name: str) -> tuple[Any, str | None]:
         has = ["no time zone", "a time zone"][zones[0]]
         raise ValidationError(f"{name}{_index(i, array)} is {_short(cells[i])}, but {_short(first)} before has {has}")
     return np.array([moment for moment, _ in pairs]).reshape(array.shape), UTC_ZONE if zones[0] else NO_ZONE
+
+
+def _moments_of_texts(cells: list[str]) -> tuple[NDArray[Any], bool] | None:
+    """Convert texts, all of one form in one step, and return whether they have a time zone.
+
+    The result is None if a text is not a date, or only some have a time zone.
+    """
+    shapes = [cell.translate(ZEROS) for cell in cells]
+    numbers = {shape: number for number, shape in enumerate(dict.fromkeys(shapes))}
+    matches = [ISO_DATE.fullmatch(shape) for shape in numbers]
+    zoned = {match is not None and match["zone"] is not None for match in matches}
+    if None in matches or len(zoned) > 1:
+        return None
+    of_cell = np.array([numbers[shape] for shape in shapes])
+    texts = np.array(cells)
+    found = []
+    for number, match in enumerate(matches):
+        assert match is not None
+        codes = texts[of_cell == number].view(np.uint32).reshape(-1, texts.itemsize // 4)
+        try:
+            moments = _column(codes, match.span("body")).astype("datetime64")
+        except ValueError:
+            return None
+        if match["zone"] is not None:
+            names, of_row = np.unique(_column(codes, match.span("zone")), return_inverse=True)
+            moments = moments - np.array([minutes_of(zone) for zone in names.tolist()], "timedelta64[m]")[of_row]
+        found.append(moments)
+    result = np.empty(len(cells), np.result_type(*found))
+    for number, moments in enumerate(found):
+        result[of_cell == number] = moments
+    return result, zoned == {True}
+
+
+def _column(codes: NDArray[np.uint32], span: tuple[int, int]) -> NDArray[np.str_]:
+    """Return the same characters of all texts."""
+    part = np.ascontiguousarray(codes[:, slice(*span)])
+    return part.view(f"U{part.shape[1]}")[:, 0]
 
 
 def _short(cell: Any) -> str:

@@ -140,6 +140,51 @@ def test_tum_trajectories_in_and_out(run, ending, space):
     run(f"fit b.{ending} --space '{space}' -o c.npz")
 
 
+def test_a_recording_with_a_gap_is_one_trajectory(run, fails):
+    t = np.r_[np.arange(0, 3, 0.05), 15 + np.arange(0, 2, 0.05)] + 1305031102.1758
+    turns = Rotation.from_rotvec(np.outer(t - t[0], [0.1, 0.02, 0.3])).as_quat()
+    rows = np.column_stack([t, np.cos(t), np.sin(t), 0.1 * (t - t[0]), turns])
+    write("a.txt", "".join(" ".join(f"{value:.6f}" for value in row) + "\n" for row in rows))
+    assert "; 1 long gap, up to 12.05 (--max-gap cuts there)" in run("fit a.txt --space se:3 -o whole.npz")
+    run("fit a.txt --space se:3 --max-gap 1 -o a.npz")
+    curve = ss.load("a.npz")
+    assert isinstance(curve, ss.SegmentedCurve) and len(curve) == 2
+    run("sample a.npz --every 0.5 -o x.txt")
+    found = np.loadtxt("x.txt")
+    first, second = (own.domain for own in curve)
+    np.testing.assert_allclose(
+        found[:, 0], np.r_[np.arange(first[0], first[1], 0.5), np.arange(second[0], second[1], 0.5)], atol=1e-6
+    )
+    np.testing.assert_allclose(found[:, 1:4], curve(found[:, 0])[:, :3, 3], atol=1e-12)
+    run("sample a.npz --at a.txt -o y.txt")
+    np.testing.assert_allclose(np.loadtxt("y.txt")[:, :4], rows[:, :4], atol=1e-6)
+    # Times in the gap are omitted, and one segment is chosen.
+    write("at.csv", f"time\n{t[70]}\n{t[50] + 5}\n{t[3]}\n")
+    out = run("sample a.npz --at at.csv -o z.csv", notes=True)
+    assert "1 of 3 times lie in gaps between segments, and are omitted" in out
+    assert (table("z.csv")["curve"], len(table("z.csv")["time"])) == (["2", "1"], 2)
+    run("sample a.npz --curve 2 -n 4 -o z.csv")
+    assert "curve" not in table("z.csv") and float(table("z.csv")["time"][0]) == second[0]
+    run("sample a.npz -n 4 -o 'z_{curve}.txt'")
+    np.testing.assert_array_equal(np.loadtxt("z_2.txt")[:, 0], np.array(table("z.csv")["time"], float))
+    assert [line.split()[0] for line in run("check a.npz").splitlines()] == ["curve", "1", "2", "All"]
+    assert run("check a.npz --curve 2").splitlines()[1].split()[0] == "40"
+    assert fails("check a.npz --curve 3") == "a.npz has no curve '3'; there are 1, 2"
+
+
+def test_sampled_rates_can_be_fitted(run):
+    """The columns wx, wy, wz are those that ``fit --rates`` reads."""
+    write_table("a.csv", columns())
+    run("fit a.csv --space so:3 --bc-type not-a-knot -o a.npz")
+    run("sample a.npz -n 200 --nu 0,1 -o b.csv")
+    sigmas = "--sigma 0.001 --rate-sigma 0.001 --lam 1e-9"
+    run(f"fit b.csv --space so:3 --columns qw,qx,qy,qz --smooth --rates wx,wy,wz {sigmas} -o c.npz")
+    a, c, x = ss.load("a.npz"), ss.load("c.npz"), np.linspace(0.5, 4.5, 50)
+    assert a.space.distance(a(x), c(x)).max() < 1e-3
+    omega = [ss.rotations.angular_velocity(own, x) for own in (a, c)]
+    assert np.abs(omega[0] - omega[1]).max() < 2e-2
+
+
 def test_tum_of_curves_from_matrices_and_dates(run):
     t = np.array("2021-08-29", "datetime64[ns]") + np.array([0, 1_000_000_007])
     ss.CubicSpline(t, poses()[:2], "se:3").save("a.npz")

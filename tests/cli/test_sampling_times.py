@@ -193,3 +193,14 @@ def test_times_with_and_without_a_zone_do_not_mix(run, fails):
         # Arrays of NumPy know of no zone.
         np.savez("at.npz", time=np.array(["2021-08-28T12:00"], "M8[s]"))
         run("sample a.npz --at at.npz -o b.csv")
+
+
+def test_many_dates_in_several_forms(run):
+    """Fractions and offsets differ from row to row, as at the change to summer time."""
+    times = np.datetime64("2021-03-28T00:59:58", "ms") + 250 * np.arange(40)
+    local = [time + np.timedelta64(1 + (i >= 8), "h") for i, time in enumerate(times)]
+    cells = [f"{str(time).removesuffix('.000')}{'+01:00' if i < 8 else '+0200'}" for i, time in enumerate(local)]
+    assert len(set(map(len, cells))) > 2
+    dated(cells)
+    run("fit a.csv --space r:1 -o a.npz")
+    np.testing.assert_array_equal(ss.load("a.npz").t, times)

@@ -91,7 +91,9 @@ class CsvTable(Table):
             return False
         keys = {name: str(i) for i, name in enumerate(self.names)}
         comma = self._delimiter == ";" and any("," in cell for _, cells in self._first for cell in cells)
-        types = {keys[name]: pa.float64() for name in numbers} | {keys[name]: pa.string() for name in texts}
+        if self._time in self.numeric:
+            numbers, texts = [*numbers, self._time], [name for name in texts if name != self._time]
+        types = {keys[name]: pa.string() for name in texts} | {keys[name]: pa.float64() for name in numbers}
         try:
             with self.path.open() as file:
                 table = reader.read_csv(
@@ -114,7 +116,10 @@ class CsvTable(Table):
             # Blanks before quotes have another meaning there.
             if compute.any(compute.match_substring(table[keys[name]], '"')).as_py():
                 return False
-        self.columns = {name: np.asarray(table[keys[name]].to_numpy()) for name in numbers}
+        self.columns = {name: _floats(table[keys[name]]) for name in numbers}
+        if self._time in numbers and not np.abs(self.columns[self._time]).max(initial=0.0) <= 2**53:
+            # Larger whole numbers are exact as texts only.
+            return False
         self.columns |= {name: table[keys[name]].to_pylist() for name in texts}
         return True
 
@@ -163,6 +168,14 @@ class CsvTable(Table):
                 raise Problem(f"{self.path}, line {reader.line_num}: {error}") from None
             finally:
                 text.detach()
+
+
+def _floats(column: Any) -> Array:
+    """Return the numbers of a column of pyarrow, whose own conversion would import pandas."""
+    full = column.fill_null(np.nan) if column.null_count else column
+    chunks = [chunk for chunk in full.chunks if len(chunk)]
+    parts = [np.frombuffer(own.buffers()[1])[own.offset : own.offset + len(own)] for own in chunks]
+    return np.concatenate([np.empty(0), *parts])
 
 
 def write_csv(file: BinaryIO, columns: Mapping[str, Array], layout: Layout) -> None:

@@ -66,7 +66,7 @@ from .._spaces import Space, factors_of, space_named
 from ._columns import ORDERS, check_days, column_of_names, completed, point_entries, split_names, time_column
 from ._curves import Curves, write_curves
 from ._formats import open_table
-from ._messages import Problem, Progress, refuse, say, tell
+from ._messages import VERBOSE, Problem, Progress, listed, refuse, say, tell
 from ._points import GLOBE, Columns, points_of, require_globe
 from ._recordings import Recordings
 from ._sensors import Fusion, sensors_of, spread, summary
@@ -154,6 +154,8 @@ def run(options: argparse.Namespace) -> int:
     rows = table.read([*used, *extra], time, curve, [*used, *extra] if sensors else [])
     check_days(table, time, rows)
     names = [entry.name for entry in entries]
+    at = "times 0, 1, 2, ..." if time is None else f"times in column {time}"
+    tell(f"{table.path}: {table.path.format} table, points in columns {listed(names)}, {at}", VERBOSE)
     columns = Columns(names, time or "time", curve or "curve", options.lonlat, rows.utc, order)
     if sensors and smooth:
         fusion = Fusion(table, rows, entries, columns, space, sensors)

@@ -11,7 +11,7 @@ from typing import Any, NoReturn
 
 from ._messages import Problem
 
-_SHELLS = ("bash", "zsh", "tcsh")
+_SHELLS = ("bash", "zsh")
 # The first column of a table in a help text, with the blanks after it.
 _TERM = re.compile(r" *\S+ {2,}")
 

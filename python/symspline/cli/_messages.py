@@ -106,7 +106,7 @@ def say(message: object) -> None:
 
 
 class Progress:
-    """Update one line on stderr if it is a terminal, and clear it at the end.
+    """Update one line on stderr if it is a terminal, and clear it at the end; with ``-v``, print the time taken.
 
     Call an instance with the amount done and the total, from any loop or by the library.
     """
@@ -116,7 +116,8 @@ class Progress:
         self._width = 0
 
     def __enter__(self) -> Self:
-        self._next = time.monotonic() + _WAIT
+        self._start = time.monotonic()
+        self._next = self._start + _WAIT
         self._shows = _level > QUIET and sys.stderr is not None and sys.stderr.isatty()
         return self
 
@@ -131,3 +132,4 @@ class Progress:
     def __exit__(self, *_: object) -> None:
         if self._width:
             print("\r" + " " * self._width, end="\r", file=sys.stderr, flush=True)
+        tell(f"{self._work} took {time.monotonic() - self._start:.2f} s", VERBOSE)

@@ -124,7 +124,7 @@ def _gpxpy() -> Any:
         import gpxpy
         import gpxpy.gpx
     except ImportError:
-        raise Problem("GPX files need gpxpy; install it with: pip install gpxpy") from None
+        raise Problem("GPX files need gpxpy; install it with: pip install 'symspline[gpx]'") from None
     return gpxpy
 
 

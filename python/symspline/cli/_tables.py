@@ -96,6 +96,7 @@ class Table:
         self.path, self.groups, self.is_utc, self.columns = path, {}, {}, {}
         self.names, self.numeric, self.dates = [], [], []
         self._sparse: frozenset[str] = frozenset()
+        self._time: str | None = None
 
     def allow_missing(self) -> None:
         """Find columns of numbers whose first cells are empty, too."""
@@ -135,7 +136,7 @@ class Table:
 
         Cells of the columns `sparse` may be empty or NaN; they are NaN in the result.
         """
-        self._sparse = frozenset(sparse)
+        self._sparse, self._time = frozenset(sparse), time
         with Progress("reading") as progress:
             self.load(numbers, [name for name in (time, label) if name is not None], progress)
         columns = [self._numbers(name) for name in numbers]

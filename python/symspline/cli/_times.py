@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._core import ValidationError
-from .._input import ISO_DATE, UTC_ZONE, times_of
+from .._input import ISO_DATE, UTC_ZONE, ZEROS, times_of
 from ._messages import Problem, refuse
 
 Times = NDArray[Any]
@@ -83,11 +83,14 @@ def parse_times(cells: Sequence[str], fail: Fail) -> tuple[Times, bool]:
     if style == "number":
         with suppress(ValueError):
             return _numeric_times(cells, fail), False
-    for i, own in enumerate(map(_style, cells)):
-        if own is None and style != "number":
-            raise fail(i, f"holds {cells[i]!r}, not a time: write 0.5, 2021-08-29 or 2021-08-29T16:55:00Z")
-        if own != style:
-            raise fail(i, f"holds {cells[i]!r}, but {cells[0]!r} before; write all times in the same way")
+    # Texts of one form have one style.
+    alike = {cell.translate(ZEROS) for cell in cells}
+    if style in (None, "number") or set(map(_style, alike)) != {style}:
+        for i, own in enumerate(map(_style, cells)):
+            if own is None and style != "number":
+                raise fail(i, f"holds {cells[i]!r}, not a time: write 0.5, 2021-08-29 or 2021-08-29T16:55:00Z")
+            if own != style:
+                raise fail(i, f"holds {cells[i]!r}, but {cells[0]!r} before; write all times in the same way")
     try:
         times, zone = times_of(list(cells), "time")
     except ValidationError:

@@ -1,0 +1,109 @@
+"""Help at the width of the terminal, completion, and ``symspline info``."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tabular import AXES, PAIR, TRACK, write
+
+import symspline as ss
+from symspline.cli import main
+
+VERBS = ("", "fit", "sample", "plot", "check", "info", "grid")
+
+
+@pytest.mark.parametrize("columns", [60, 80, 140])
+def test_help_is_wrapped_at_the_width_of_the_terminal(columns, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", str(columns))
+    for verb in VERBS:
+        with pytest.raises(SystemExit):
+            main([*verb.split(), "--help"])
+        lines = capsys.readouterr().out.partition("\n\n")[2].splitlines()
+        # Commands are not broken, so that they can be copied.
+        text = [line for line in lines if not line.startswith("  symspline ") and "{" not in line]
+        assert max(map(len, text)) < columns, max(text, key=len)
+        assert columns > 100 or max(map(len, text)) > columns - 15
+
+
+def test_without_arguments_help_is_printed(capsys):
+    assert main([]) == 0
+    out, err = capsys.readouterr()
+    assert out.startswith("usage: symspline") and "  fit " in out and not err
+
+
+def test_completion():
+    pytest.importorskip("shtab")
+    line = [sys.executable, "-m", "symspline", "--print-completion"]
+    for shell in ("bash", "zsh"):
+        done = subprocess.run([*line, shell], capture_output=True, text=True, timeout=60)
+        assert (done.returncode, done.stderr) == (0, "") and "--max-gap" in done.stdout
+    script = subprocess.run([*line, "bash"], capture_output=True, text=True, timeout=60).stdout
+    if os.path.exists("/bin/bash"):
+        ask = "COMP_WORDS=(symspline fit --crit); COMP_CWORD=2; _shtab_symspline; echo ${COMPREPLY[@]}"
+        done = subprocess.run(["/bin/bash", "-c", f"{script}\n{ask}"], capture_output=True, text=True, timeout=60)
+        assert done.stdout == "--criterion\n"
+
+
+def test_completion_without_its_library(fails, monkeypatch):
+    monkeypatch.setitem(sys.modules, "shtab", None)
+    assert "pip install 'symspline[completion]'" in fails("--print-completion bash")
+
+
+def test_info_of_tables(run):
+    write("a.csv", TRACK)
+    assert run("info a.csv").splitlines() == [
+        "a.csv: csv table, 4 rows",
+        "  time  4 texts: 2021-08-29T00:00Z, 2021-08-29T06:00Z, 2021-08-29T12:00Z, ...",
+        "  lon   -179.0 to 178.5",
+        "  lat   28.0 to 31.5",
+        "times in column 'time': 2021-08-29T00:00 to 2021-08-29T18:00 UTC, usual step 21600 s",
+    ]
+    rows = [
+        (f"{t:.2f}", t * t, who) for who in ("ann", "bob") for t in [*np.arange(0, 2, 0.05), *np.arange(14, 15, 0.05)]
+    ]
+    write("b.csv", "t,x,who\n" + "".join(",".join(map(str, row)) + "\n" for row in rows) + "15,,bob\n")
+    out = run("info b.csv")
+    assert "x    0.0 to 2" in out and ", 1 missing\n" in out
+    assert "usual step 0.05, 1 before the previous one\n" in out and out.endswith(
+        "--curve who makes a curve of each who\n"
+    )
+    write("c.csv", "t,x\n" + "".join(f"{t:.2f},1\n" for t in [*np.arange(0, 2, 0.05), *np.arange(14, 15, 0.05)]))
+    assert "usual step 0.05, 1 long gap, up to 12.05\n" in run("info c.csv")
+    np.savez("d.npz", t=[0.0, 1, 1, 3], points=np.eye(4))
+    assert "times in column 't': 0.0 to 3.0, usual step 1.5, 1 repeated" in run("info d.npz")
+    write("e.csv", "hours,x\n0,1\n1,2\n")
+    assert "hours may hold the times; say --time hours" in run("info e.csv")
+    assert "usual step 1\n" in run("info e.csv --time hours")
+
+
+def test_info_of_curves(run, curves):
+    out = run("info a.npz")
+    assert out.startswith("a.npz: 1 curve on sphere:2, columns x, y, z\n  3 nodes, 0.0 to 3.0; natural ends, residual ")
+    write("pair.csv", PAIR)
+    run("fit pair.csv --space s:2 --curve id -o pair.npz")
+    assert [line.split(":")[0] for line in run("info pair.npz").splitlines()] == ["pair.npz", "  a", "  b"]
+    write("n.csv", "t,x\n" + "".join(f"{t},{np.sin(t) + 0.1 * np.cos(17 * t)}\n" for t in np.arange(0, 6, 0.1)))
+    run("fit n.csv --space r:1 --smooth -o n.npz")
+    assert "; λ " in run("info n.npz") and " degrees of freedom, noise 0.0" in run("info n.npz")
+    write("gap.csv", "t,x\n0,1\n1,2\n9,3\n10,4\n")
+    run("fit gap.csv --space r:1 --max-gap 2 -o gap.npz")
+    assert run("info gap.npz").startswith(
+        "gap.npz: 2 segments of one recording on euclidean:1, columns x\n  1: 2 nodes"
+    )
+
+
+def test_info_of_the_installation(run):
+    out = run("info")
+    assert "  sphere:2 " in out and "  so:2 " in out and ".geojson" in out and "matplotlib" in out
+    assert max(map(len, out.splitlines())) < 100
+
+
+def test_more_or_less_about_the_work(run):
+    write("a.csv", AXES)
+    assert run("fit a.csv --space s:2 -o a.npz -q") == ""
+    out = run("fit a.csv --space s:2 -o a.npz -v")
+    assert "a.csv: csv table, points in columns x, y, z, times in column t" in out and "reading took " in out
+    assert Path("a.npz").exists() and ss.load("a.npz").space == ss.Sphere(2)
