@@ -56,9 +56,9 @@ def test_info_of_tables(run):
     write("a.csv", TRACK)
     assert run("info a.csv").splitlines() == [
         "a.csv: csv table, 4 rows",
-        "  time  4 texts: 2021-08-29T00:00Z, 2021-08-29T06:00Z, 2021-08-29T12:00Z, ...",
-        "  lon   -179.0 to 178.5",
-        "  lat   28.0 to 31.5",
+        "  time: 4 texts: 2021-08-29T00:00Z, 2021-08-29T06:00Z, 2021-08-29T12:00Z, ...",
+        "  lon: -179.0 to 178.5",
+        "  lat: 28.0 to 31.5",
         "times in column 'time': 2021-08-29T00:00 to 2021-08-29T18:00 UTC, usual step 21600 s",
     ]
     rows = [
@@ -66,7 +66,7 @@ def test_info_of_tables(run):
     ]
     write("b.csv", "t,x,who\n" + "".join(",".join(map(str, row)) + "\n" for row in rows) + "15,,bob\n")
     out = run("info b.csv")
-    assert "x    0.0 to 2" in out and ", 1 missing\n" in out
+    assert "  x: 0.0 to 2" in out and ", 1 missing\n" in out
     assert "usual step 0.05, 1 before the previous one\n" in out and out.endswith(
         "--curve who makes a curve of each who\n"
     )
@@ -97,7 +97,7 @@ def test_info_of_curves(run, curves):
 
 def test_info_of_the_installation(run):
     out = run("info")
-    assert "  sphere:2 " in out and "  so:2 " in out and ".geojson" in out and "matplotlib" in out
+    assert "  sphere:2: " in out and "  so:2: " in out and ".geojson" in out and "matplotlib" in out
     assert max(map(len, out.splitlines())) < 100
 
 

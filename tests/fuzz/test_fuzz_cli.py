@@ -68,6 +68,11 @@ OPTIONS = {
     "--method": st.sampled_from(["auto", "fixed-point", "quasi-newton", "newton", "x"]),
     "--tol": st.sampled_from(["1e-9", "0", "-1", "nan", "inf", "x", "1e400", "1e-300"]),
     "--extrapolate": st.sampled_from(["continue", "geodesic", "periodic", "x"]),
+    "--max-gap": st.one_of(st.sampled_from(STEPS), words),
+    "--from": st.sampled_from(["csv", "json", "geojson", "npz", "parquet", "tum", "x"]),
+    "--smooth": None,
+    "--criterion": st.sampled_from(["gcv", "reml", "cp", "x"]),
+    "--lam": st.sampled_from(["0", "1", "1,2", "-1", "x"]),
     "--surprise": None,
 }
 
@@ -98,6 +103,8 @@ def test_fit(data):
         arguments = draw(some_options(OPTIONS, 3))
         if not any(a.startswith(("--space", "--lonlat")) for a in arguments):
             arguments += ["--space", draw(st.sampled_from(SPACES))]
+        if draw(st.booleans()):
+            run(path, "info", str(table))
         if run(path, "fit", str(table), "-o", str(output), *arguments) == 0:
             use(draw, path, output)
 
@@ -105,6 +112,7 @@ def test_fit(data):
 def use(draw, path, curve):
     """What can be done with a file of curves, fitted or not."""
     run(path, "check", str(curve))
+    run(path, "info", str(curve))
     run(path, "sample", str(curve), "-n", "3", "-o", str(path / "samples.csv"))
     if rarely(draw, 20):
         run(path, "plot", str(curve), "-o", str(path / draw(st.sampled_from(["a.svg", "a.x", "a"]))))
@@ -133,6 +141,8 @@ SAMPLE = {
     "--nu": st.sampled_from(["0", "1", "2", "0,1,2", "1,1", "3", "", "x", "0,"]),
     "--lonlat": None,
     "--curve": words,
+    "--to": st.sampled_from(["csv", "json", "geojson", "npz", "parquet", "tum", "x"]),
+    "--digits": st.sampled_from(["1", "3", "17", "0", "-1", "99", "x"]),
 }
 
 
@@ -146,7 +156,9 @@ def test_sample(data):
         arguments = draw(some_options(SAMPLE, 2))
         if draw(st.booleans()):
             arguments += ["--at", str(times)]
-        output = path / draw(st.sampled_from(["a.csv", "a.npz", "a.parquet", "a.x", "no/a.csv"]))
+        output = path / draw(
+            st.sampled_from(["a.csv", "a.npz", "a.parquet", "a.json", "a.geojson", "a.csv.gz", "a.x", "no/a.csv"])
+        )
         run(path, "sample", str(curve), "-o", str(output), *arguments)
 
 

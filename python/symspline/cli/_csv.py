@@ -91,8 +91,9 @@ class CsvTable(Table):
             return False
         keys = {name: str(i) for i, name in enumerate(self.names)}
         comma = self._delimiter == ";" and any("," in cell for _, cells in self._first for cell in cells)
-        if self._time in self.numeric:
-            numbers, texts = [*numbers, self._time], [name for name in texts if name != self._time]
+        time = self._time if self._time in self.numeric else None
+        if time is not None:
+            numbers, texts = [*numbers, time], [name for name in texts if name != time]
         types = {keys[name]: pa.string() for name in texts} | {keys[name]: pa.float64() for name in numbers}
         try:
             with self.path.open() as file:
@@ -117,7 +118,7 @@ class CsvTable(Table):
             if compute.any(compute.match_substring(table[keys[name]], '"')).as_py():
                 return False
         self.columns = {name: _floats(table[keys[name]]) for name in numbers}
-        if self._time in numbers and not np.abs(self.columns[self._time]).max(initial=0.0) <= 2**53:
+        if time is not None and not np.abs(self.columns[time]).max(initial=0.0) <= 2**53:
             # Larger whole numbers are exact as texts only.
             return False
         self.columns |= {name: table[keys[name]].to_pylist() for name in texts}

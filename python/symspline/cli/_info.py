@@ -22,19 +22,25 @@ from typing import Any
 
 import numpy as np
 
+from .._arrays import brief
 from .._report import long_gaps
 from .._smoothing import SmoothingSpline
 from .._smoothing.factors import is_several, smoothed_spaces
+from .._spaces import Doubles
 from .._spaces.base import CLASSES, example_of
+from .._time import time_axis_of
 from ._columns import column_of_names, time_column
 from ._curves import read_curves
 from ._formats import open_table
-from ._messages import Problem, Progress, listed
+from ._messages import Problem, Progress, listed, refuse
 from ._streams import TABLES, Source, endings, format_of
 from ._tables import Rows, Table
 
 _LIBRARIES = {"pyarrow": "Parquet and large CSV files", "gpxpy": "GPX files", "matplotlib": "symspline plot"}
 _LIBRARIES |= {"nibabel": "NIfTI files", "zarr": "Zarr stores", "shtab": "completion in shells"}
+
+
+_LONGEST = 1000
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -53,17 +59,19 @@ def run(options: argparse.Namespace) -> int:
         lines = _curves(path)
     else:
         lines = _table(open_table(path, options.format), options.time)
-    print("\n".join(lines))
+    # Lines may quote any part of a file.
+    for line in lines:
+        print(line[: len(line) - len(line.lstrip())] + brief(line.lstrip(), _LONGEST))
     return 0
 
 
 def _installation() -> list[str]:
     spaces = [(example_of(cls).rpartition("'")[0].rpartition("'")[2], cls) for cls in CLASSES.values()]
     lines = ["spaces, such as:"]
-    lines += [f"  {name:<14}{(cls.__doc__ or '').partition(chr(10))[0]}" for name, cls in spaces]
+    lines += [f"  {name}: {(cls.__doc__ or '').partition(chr(10))[0]}" for name, cls in spaces]
     lines += [f"formats of tables: {endings()}", "optional libraries:"]
     return lines + [
-        f"  {name:<12}{'installed' if find_spec(name) else 'missing':<11}{use}" for name, use in _LIBRARIES.items()
+        f"  {name}: {'installed' if find_spec(name) else 'missing'}, {use}" for name, use in _LIBRARIES.items()
     ]
 
 
@@ -82,9 +90,9 @@ def _table(table: Table, given: str | None) -> list[str]:
         table._sparse = frozenset(table.numeric)
         table.load(table.numeric, texts, progress)
     columns = {name: table.columns[name] for name in table.names if name}
+    refuse(table.path, (not columns, " has no columns"))
     lines = [f"{table.path}: {table.path.format} table, {len(next(iter(columns.values())))} rows"]
-    width = max(map(len, columns)) + 2
-    lines += [f"  {name:{width}}{_described(np.asarray(own))}" for name, own in columns.items()]
+    lines += [f"  {name}: {_described(np.asarray(own))}" for name, own in columns.items()]
     try:
         time = time_column(table, given, [])
         rows = table.read([], time, None) if time is not None else None
@@ -92,8 +100,10 @@ def _table(table: Table, given: str | None) -> list[str]:
         return [*lines, str(problem)]
     if rows is None or time is None:
         return [*lines, "times: no column; the points are at 0, 1, 2, ..."]
-    lines.append(f"times in column {time!r}: {_times(rows)}")
-    names = column_of_names(table, time, [time]) if (np.diff(rows.times.astype(np.int64)) <= 0).any() else None
+    axis, knots = time_axis_of(rows.times)
+    seconds = axis.knots(knots)
+    lines.append(f"times in column {time!r}: {_times(rows, seconds)}")
+    names = column_of_names(table, time, [time]) if (np.diff(seconds) <= 0).any() else None
     return lines if names is None else [*lines, f"--curve {names} makes a curve of each {names}"]
 
 
@@ -110,18 +120,16 @@ def _described(values: Any) -> str:
     return f"{found.min()} to {found.max()}{f', {missing.sum()} missing' if missing.any() else ''}"
 
 
-def _times(rows: Rows) -> str:
-    times = rows.times
+def _times(rows: Rows, seconds: Doubles) -> str:
+    times, steps = rows.times, np.diff(seconds)
     unit = " s" if times.dtype.kind == "M" else ""
-    seconds = (times - times[0]) / np.timedelta64(1, "s") if unit else times.astype(np.float64)
-    steps = np.diff(seconds)
     parts = [f"{times.min()} to {times.max()}{' UTC' if rows.utc else ''}"]
     ahead = steps[steps > 0]
     if ahead.size:
         parts.append(f"usual step {np.median(ahead):.6g}{unit}")
     counts = ((int((steps == 0).sum()), "repeated"), (int((steps < 0).sum()), "before the previous one"))
     parts += [f"{count} {what}" for count, what in counts if count]
-    if ahead.size == steps.size:
+    if ahead.size and ahead.size == steps.size:
         gaps = steps[long_gaps(seconds)]
         parts += (
             [f"{gaps.size} long gap{'s' if gaps.size > 1 else ''}, up to {gaps.max():.6g}{unit}"] if gaps.size else []

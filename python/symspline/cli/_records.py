@@ -138,8 +138,8 @@ def _values(columns: Mapping[str, Array], layout: Layout) -> dict[str, list[Any]
         if own.dtype.kind == "M":
             found[name] = date_texts(own, layout.utc)
         else:
-            missing = np.isnan(own) if own.dtype.kind == "f" else np.zeros(len(own), bool)
-            found[name] = np.where(missing, None, own.astype(object)).tolist() if missing.any() else own.tolist()
+            # NaN is not equal to itself.
+            found[name] = [value if value == value else None for value in own.tolist()]
     return found
 
 

@@ -98,7 +98,11 @@ def check_inputs(*paths: Path | None) -> None:
 def check_target(path: Path, *inputs: Path | None, binary: bool = False) -> None:
     """Raise `Problem` before any work is done if the output file cannot be written, or is an input."""
     if path == STANDARD:
-        refuse("", (binary and sys.stdout.isatty(), "binary data are not written to a terminal; redirect the output"))
+        refuse(
+            "standard output ",
+            (not hasattr(sys.stdout, "buffer"), "does not take bytes here; give the name of a file"),
+            (binary and sys.stdout.isatty(), "is a terminal, to which binary data are not written; redirect it"),
+        )
         return
     # The target of a symbolic link is written.
     folder = path.resolve().parent if path.is_symlink() else path.parent
