@@ -1,7 +1,7 @@
 """Make a table of points along curves
 
-The table is a CSV, NPZ or Parquet file or a TUM trajectory; the ending of its name selects the format. Columns are
-the time, the name of the curve if there are several, and the numbers of the point. They are named as in the table that
+The table is a CSV, NPZ, Parquet, JSON, GeoJSON or GPX file or a TUM trajectory; the ending of its name or --to selects
+the format. Columns are the time, the name of the curve if there are several, and the numbers of the point. They are named as in the table that
 was fitted, or x0, x1, ... in the order of the array, m11, m12, ... for a matrix, row by row, and x0_re and x0_im for
 a complex number.
 
