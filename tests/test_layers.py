@@ -30,7 +30,7 @@ LAYERS = [
     ["_closed_forms", "_curves", "manifolds"],
     ["_errors", "_options", "_plotting", "_representatives", "_validation"],
     ["_archive", "_search"],
-    ["_curve", "_curve_base"],
+    ["_curve", "_curve_base", "_curve_plots"],
     ["_controlled", "_timed_curve"],
     ["_bspline", "_cumulative"],
     ["_append", "_composed", "_piecewise_cubic"],
@@ -38,6 +38,7 @@ LAYERS = [
     ["_functional"],
     [
         "_adapters",
+        "_compare",
         "_files",
         "_geodesics",
         "_grid",
@@ -99,7 +100,7 @@ def layer(name):
 def test_the_graph_is_that_of_the_package():
     assert {"_spaces.base", "_curves.curve", "_arrays"} <= GRAPH["_curves.reduced"] | GRAPH["_spaces"] | GRAPH["_time"]
     # An import inside a function.
-    assert "_plotting" in GRAPH["_piecewise_cubic"]
+    assert "_plotting" in GRAPH["_curve_plots"]
 
 
 def test_every_module_imports_from_layers_below():

@@ -18,6 +18,7 @@ _cpu.load(_Path(__file__).parent)
 
 from . import convert, geo, manifolds, measure, poses, quantum, rotations, shapes, subspaces, tensors, testing  # noqa: E402
 from ._bspline import BezierCurve, BSpline  # noqa: E402
+from ._compare import plot  # noqa: E402
 from ._composed import RetimedCurve, SegmentedCurve  # noqa: E402
 from ._config import show_config  # noqa: E402
 from ._core import ConvergenceError, CutLocusError, ValidationError, num_threads  # noqa: E402
@@ -165,6 +166,7 @@ __all__ = [
     "manifolds",
     "measure",
     "num_threads",
+    "plot",
     "poses",
     "quantum",
     "rotations",

@@ -77,6 +77,7 @@ class BSpline(ControlledSpline[P]):
     """
 
     _format = "symspline-bspline"
+    _kind = "B-spline"
     _curve: ControlledCurve
 
     def __init__(self, knots: ArrayLike, control_points: ArrayLike, degree: int, space: Space[P] | str) -> None:
@@ -160,6 +161,7 @@ class BezierCurve(BSpline[P]):
     """
 
     _format = "symspline-bezier"
+    _kind = "Bézier curve"
 
     def __init__(self, control_points: ArrayLike, space: Space[P] | str) -> None:
         space = _factor(space)

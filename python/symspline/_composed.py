@@ -93,6 +93,7 @@ class RetimedCurve(ComposedCurve[P]):
     """
 
     _format = "symspline-retimed"
+    _kind = "Retimed curve"
     _curve: Retimed
     _source: Curve[P]
 
@@ -105,6 +106,26 @@ class RetimedCurve(ComposedCurve[P]):
         source, time_axis, law, times = parts
         self._source = source
         self._compose(time_axis, Retimed(source._curve, law, times), None)
+
+    @property
+    def _made_of(self) -> str:
+        return self._span_text
+
+    @property
+    def _unconverged(self) -> int:
+        return self._source._unconverged
+
+    @property
+    def _node_times(self) -> Doubles:
+        given = self._source._node_times
+        times = self._curve.times
+        if not len(given):
+            return times[:0]
+        at = np.asarray(self._curve.law(times))
+        after = np.clip(np.searchsorted(given, at), 1, len(given) - 1)
+        apart = np.minimum(abs(at - given[after - 1]), abs(at - given[after]))
+        kept: Doubles = times[apart <= _ROUNDING * np.spacing(np.abs(given).max() + np.ptp(given))]
+        return kept
 
     def _restricted(self, start: Doubles, stop: Doubles) -> Self:
         times = part_of_times(self._curve.times, start, stop, self._batch)
@@ -200,6 +221,7 @@ class SegmentedCurve(ComposedCurve[P], Generic[P, C]):
     """
 
     _format = "symspline-segments"
+    _kind = "Segmented curve"
     _curve: Joined
 
     def __init__(self, curves: Sequence[C], *, extrapolate: Literal["raise", False] | None = None) -> None:
@@ -224,6 +246,23 @@ class SegmentedCurve(ComposedCurve[P], Generic[P, C]):
         """Pairs of times between which there is no segment."""
         ends = [own.domain for own in self._segments]
         return [(a[1], b[0]) for a, b in pairwise(ends) if b[0] > a[1]]
+
+    @property
+    def _made_of(self) -> str:
+        return f"{len(self)} segments"
+
+    @property
+    def _unconverged(self) -> int:
+        return sum(own._unconverged for own in self._segments)
+
+    @property
+    def _node_times(self) -> Doubles:
+        pairs = zip(self._segments, self._curve.offsets, strict=True)
+        return np.unique(np.concatenate([own._node_times + offset for own, offset in pairs]))
+
+    @property
+    def _breaks(self) -> Doubles:
+        return np.stack([self._curve.stops[:-1], self._curve.starts[1:]], axis=1)
 
     if not TYPE_CHECKING:
         # The class of the segments may be omitted at run time, too.

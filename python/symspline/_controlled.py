@@ -145,6 +145,10 @@ class ControlledSpline(Curve[P]):
             )
         )
 
+    @property
+    def _made_of(self) -> str:
+        return f"{self.knots.size - self.degree - 1} control points, degree {self.degree}"
+
     def __repr__(self) -> str:
         count = self.knots.size - self.degree - 1
         what = f"{self._batch_text}{count} control points, degree {self.degree}, {self._span_text}"

@@ -15,15 +15,15 @@ from ._core import ConvergenceError, ValidationError
 from ._curves.controlled import CumulativeCurve, CumulativeProduct, cumulative_of
 from ._curves.ends import ends_of
 from ._curves.fit import Points, read_given, validated
-from ._options import check_on_failure, require_matplotlib
+from ._options import check_on_failure
 from ._report import ConvergenceWarning, CumulativeReport
 from ._representatives import warn_of_far_data
 from ._spaces import Doubles, Euclidean, Group, Quotient, Space, factors_of, parts_of, space_named
-from ._typing import File, OnFailure, P, PointsLike
+from ._typing import OnFailure, P, PointsLike
 from ._warnings import warn
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    pass
 
 
 class CumulativeBSpline(ControlledSpline[P]):
@@ -237,56 +237,9 @@ class CumulativeBSpline(ControlledSpline[P]):
         _check_converged(curve, report, on_failure)
         return curve
 
-    def plot(self, file: File | None = None) -> Figure:
-        """Plot the curve, its speed and the size of its covariant acceleration.
-
-        The panels are those of `CubicSpline.plot`. Dots mark the points of the curve at its knots.
-
-        Parameters
-        ----------
-        file : str, path or file object, optional
-            File to which the figure is saved, such as ``"curve.pdf"``.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-            The figure, which you can modify or save.
-
-        Raises
-        ------
-        ImportError
-            If Matplotlib is not installed.
-
-        Examples
-        --------
-        >>> import symspline as ss
-        >>> figure = ss.CumulativeBSpline(None, [[0.0], [1.0], [0.0], [2.0]], "r:1").plot()
-        """
-        require_matplotlib()
-        from ._plotting import plot
-
-        return plot(self, file)
-
-    # ---- the interface of plots and of motions ----
-
-    @property
-    def t(self) -> Doubles:
-        """Distinct knots in the domain of the curve."""
-        return self._curve.times
-
     @property
     def _unconverged(self) -> int:
         return 0 if self.report is None else int(np.sum(~np.asarray(self.report.converged)))
-
-    @property
-    def _made_of(self) -> str:
-        return f"{self.knots.size - self.degree - 1} control points, degree {self.degree}"
-
-    def _noise_beside(self, index: tuple[int, ...], x: Doubles) -> None:
-        return None
-
-    def _panels_below(self, x: Doubles) -> list[Any]:
-        return []
 
     def _where(self, extrapolate: Any) -> str:
         """Return the extrapolation policy. B-splines have no values outside their domain."""

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from . import _archive
 from ._arrays import as_array, checked_number, short_repr
 from ._core import ValidationError
-from ._curve_base import CurveBase
+from ._curve_plots import CurvePlots
 from ._curves.composed import Affine, TimeMap, part_of_times
 from ._options import order_of
 from ._spaces import Doubles, factors_of, parts_of
@@ -99,7 +99,7 @@ class Derivative(Generic[P]):
         return self.curve.derivative(self.nu + order_of(nu, 3))
 
 
-class Curve(CurveBase[P]):
+class Curve(CurvePlots[P]):
     """A curve on a space, or a batch of curves.
 
     This is the base class of `CubicSpline`, `HermiteSpline`, `PiecewiseGeodesic`, `SmoothingSpline`, `BSpline`,

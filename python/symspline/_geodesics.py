@@ -90,11 +90,10 @@ class PiecewiseGeodesic(PiecewiseCubic[P]):
     np.float64(3.14159265)
     """
 
-    _kind = "piecewise geodesic"
+    _kind = "Piecewise geodesic"
     _format = "symspline-geodesics"
     _ends = "joined by geodesics"
     _of_velocities = False
-    _unconverged = 0
 
     def __init__(
         self,

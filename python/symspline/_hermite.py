@@ -90,7 +90,6 @@ class HermiteSpline(PiecewiseCubic[P]):
     _kind = "C¹ Hermite spline"
     _format = "symspline-hermite"
     _ends = "given velocities"
-    _unconverged = 0
 
     def __init__(
         self,

@@ -3,12 +3,8 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from base64 import b64encode
 from dataclasses import replace
-from html import escape
-from importlib.util import find_spec
-from io import BytesIO
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,29 +14,22 @@ from ._arrays import as_array, read_only, short_repr
 from ._core import ValidationError
 from ._curve import Curve, check_increasing
 from ._curves.at_times import call_at_times, evaluated
-from ._curves.curve import CurveArrays, SidePanel, UncertaintyBand
+from ._curves.curve import CurveArrays
 from ._curves.fit import curve_of
 from ._input import times_of
-from ._options import check_progress, extrapolation_mode, quantity_of, require_matplotlib
+from ._options import check_progress, extrapolation_mode, quantity_of
 from ._spaces import Array, Doubles, Product, Space, parts_of
 from ._time import TimeAxis
 from ._timed_curve import TimedCurve
-from ._typing import BCType, Extrapolate, File, P, Progress, Time, TimesLike
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from ._typing import BCType, Extrapolate, P, Progress, Time, TimesLike
 
 # Relative difference of velocities that are equal up to rounding.
 _SAME = 1e-12
-# Resolution of pictures in notebooks, in dots per inch.
-_DOTS = 60
 
 
 class PiecewiseCubic(TimedCurve[P]):
     """Base class of curves of cubic Bézier segments, which are given by knots, points and velocities."""
 
-    # Title of plots.
-    _kind: ClassVar[str]
     # Whether points and velocities at the knots determine the curve.
     _of_velocities: ClassVar[bool] = True
 
@@ -51,24 +40,11 @@ class PiecewiseCubic(TimedCurve[P]):
 
     @property
     def _made_of(self) -> str:
-        """Description of the data, for the title of a plot."""
         return f"{self._t.shape[-1]} points{' each' if self._batch else ''}, {self._ends}"
 
-    def _noise_beside(self, index: tuple[int, ...], x: Doubles) -> UncertaintyBand | None:
-        """Return the noisy data of one curve of a batch, with uncertainty bands at times x of the core.
-
-        Curves that pass through their points have none and return None.
-        """
-        return None
-
-    def _panels_below(self, x: Doubles) -> list[SidePanel]:
-        """Return the bands at times x of the core, and the residuals of measurements that are not points, for plots."""
-        return []
-
     @property
-    @abstractmethod
-    def _unconverged(self) -> int:
-        """Number of curves that failed."""
+    def _node_times(self) -> Doubles:
+        return self._times
 
     _t: Array
     _curve: CurveArrays
@@ -368,7 +344,7 @@ class PiecewiseCubic(TimedCurve[P]):
         )
         return found
 
-    # ---- comparison, text and plots ----
+    # ---- comparison and plots ----
 
     def __eq__(self, other: object) -> bool:
         """Whether spaces, knots, points and velocities are equal, bit by bit."""
@@ -384,72 +360,6 @@ class PiecewiseCubic(TimedCurve[P]):
                 for a, b in zip(self._curve.parts, other._curve.parts, strict=True)
             )
         )
-
-    def _repr_html_(self) -> str:
-        """Return the representation for notebooks, with a small plot if Matplotlib is installed."""
-        text = f"<pre>{escape(repr(self))}</pre>"
-        if find_spec("matplotlib") is None:
-            return text
-        picture = BytesIO()
-        try:
-            self.plot().savefig(picture, format="png", dpi=_DOTS)
-        except ValidationError:
-            # Curves that failed cannot be plotted.
-            return text
-        data = b64encode(picture.getvalue()).decode()
-        return f'{text}<img src="data:image/png;base64,{data}" alt="{escape(repr(self))}">'
-
-    def plot(self, file: File | None = None) -> Figure:
-        """Plot the curve, its speed and the size of its covariant acceleration.
-
-        The first panel depends on the space:
-
-        - S²: a globe and a map; H²: the Poincaré disk; R¹, R² and R³: the graph or the curve.
-        - SO(3), O(3), SU(2) and S³ (unit quaternions, scalar first): rotated frames along the time axis.
-        - S¹, SO(2), O(2), U(1), RP¹ and Gr(1, 2): the continuous angle against time.
-        - SE(3): frames along the path of the positions; SE(2): arrow heads on it.
-        - CP¹ and the complex Gr(1, 2): the Bloch sphere.
-        - RP², Gr(1, 3) and Gr(2, 3): a hemisphere, with the normals of planes. A curve that leaves it through the rim
-          re-enters on the opposite side.
-        - Other projective spaces and Grassmannians: the principal angles to the first point.
-        - SPD(2) and SPD(3): ellipses and ellipsoids along the time axis.
-        - All other spaces: the components against time, with dashed imaginary parts.
-
-        A product has one such panel per factor. At most 50 curves of a batch are drawn.
-
-        Parameters
-        ----------
-        file : str, path or file object, optional
-            File to which the figure is saved, such as ``"curve.pdf"``.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-            The figure, which you can modify or save.
-
-        Raises
-        ------
-        ImportError
-            If Matplotlib is not installed.
-
-        Notes
-        -----
-        A smoothing spline is drawn with its data and, where possible, with 95 % bands of the curve and the speed;
-        bands of a batch are drawn for a few curves only. A curve of `estimate` is drawn with all points among its
-        measurements. It has a panel with the residuals of every other measurement in standard deviations, and one with
-        the radius of the 95 % band if the first panel does not show the band. The function uses neither pyplot nor any
-        global setting of Matplotlib.
-
-        Examples
-        --------
-        >>> import symspline as ss
-        >>> quarter = ss.CubicSpline(None, [[1, 0, 0], [0, 1, 0]], ss.Sphere(2))
-        >>> figure = quarter.plot()
-        """
-        require_matplotlib()
-        from ._plotting import plot
-
-        return plot(self, file)
 
 
 def _agree(first: Any, second: Any, axis: int) -> bool:

@@ -34,8 +34,17 @@ def axes_named(figure, label):
     return found
 
 
+def rate_axes(figure):
+    """The axes of speeds or velocities, and those of accelerations, one per factor."""
+    firsts = [(axes, axes.get_ylabel().split("\n")[0]) for axes in figure.axes]
+    return [axes for axes, name in firsts if name in ("speed", "velocity")], [
+        axes for axes, name in firsts if name == "acceleration"
+    ]
+
+
 def lines_of(axes):
-    return [line.get_xydata() for line in axes.lines]
+    """The lines of curves in axes with a time axis."""
+    return [line.get_xydata() for line in axes.lines if line.get_gid() == "_curve"]
 
 
 def dots_of(axes):

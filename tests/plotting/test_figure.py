@@ -8,7 +8,7 @@ from io import BytesIO
 
 import numpy as np
 import pytest
-from drawn import axes_named, lines_of, points_around, rendered, spline_on, texts_of
+from drawn import axes_named, lines_of, points_around, rate_axes, rendered, spline_on, texts_of
 from matplotlib.dates import date2num
 from matplotlib.figure import Figure
 from refused import raises
@@ -45,6 +45,7 @@ KINDS = {name: draw for draw, names in DRAWN_BY.items() for name in names.split(
 
 # Batches, of every kind of picture.
 FIRST = {draw: name for name, draw in reversed(KINDS.items())}
+SIGNED = {"euclidean:1", "sphere:1", "hyperbolic:1", "rp:1", "gr:1,2", "so:2", "o:2", "u:1", "spd:1"}
 DRAWN = [*((name, (6,)) for name in KINDS), *((name, (3, 6)) for name in FIRST.values())]
 
 
@@ -55,13 +56,46 @@ def test_every_space_is_drawn(name, shape):
     figure = rendered(spline.plot())
     assert isinstance(figure, Figure)
     assert f"C² spline on {spline.space!r}" in texts_of(figure)
-    curves = shape[0] if len(shape) > 1 else 1
-    for label, nu in (("speed", 1), ("acceleration", 2)):
-        lines = lines_of(axes_named(figure, label))
-        assert len(lines) == curves
-        for line, curve in zip(lines, spline if len(shape) > 1 else [spline], strict=True):
+    curves = spline if len(shape) > 1 else [spline]
+    if name.startswith("se:"):
+        check_rates_of_poses(figure, spline.space, curves)
+        return
+    for (axes,), nu in zip(rate_axes(figure), (1, 2), strict=True):
+        lines = lines_of(axes)
+        assert len(lines) == len(curves)
+        signed = name in SIGNED
+        assert (axes.get_ylabel().split("\n")[1] in ("γ′", "∇γ′")) == signed
+        for line, curve in zip(lines, curves, strict=True):
             norm = spline.space.norm(curve(line[:, 0]), curve(line[:, 0], nu))
-            np.testing.assert_allclose(line[:, 1], norm, atol=1e-6)
+            np.testing.assert_allclose(np.abs(line[:, 1]), norm, atol=1e-6)
+            if signed:
+                # No kinks at zeros: the second difference is that of a smooth function inside segments.
+                x = np.linspace(*curve.domain, 2001)[1:-1]
+                drawn = np.interp(x, *line.T)
+                assert np.abs(np.diff(drawn)).max() < 0.02 * np.ptp(drawn) + 1e-9
+            else:
+                assert line[:, 1].min() >= 0
+
+
+def check_rates_of_poses(figure, space, curves):
+    """Rates of rotation and of translation are those of the frame, by differences of rotations and positions."""
+    n, step = space.point_shape[0] - 1, 1e-5
+    turning, moving = axes_named(figure, "turning rate"), axes_named(figure, "speed")
+    for line, other, curve in zip(lines_of(turning), lines_of(moving), curves, strict=True):
+        x = line[200:-200:50, 0]
+        before, after = curve(x - step), curve(x + step)
+        angles = ss.SpecialOrthogonal(n).distance(before[:, :n, :n], after[:, :n, :n])
+        # The norm of SO(n) is that of the rotation vector.
+        np.testing.assert_allclose(np.abs(line[200:-200:50, 1]), angles / (2 * step), atol=1e-5)
+        moved = np.linalg.norm(after[:, :n, n] - before[:, :n, n], axis=1) / (2 * step)
+        np.testing.assert_allclose(other[200:-200:50, 1], moved, atol=1e-5)
+    pairs = [
+        [axes for axes in figure.axes if axes.get_ylabel().startswith(name)] for name in ("turning\n", "acceleration")
+    ]
+    for (first,), (second,) in [pairs]:
+        for line, other, curve in zip(lines_of(first), lines_of(second), curves, strict=True):
+            norm = space.norm(curve(line[:, 0]), curve(line[:, 0], 2))
+            np.testing.assert_allclose(np.hypot(line[:, 1], other[:, 1]), norm, atol=1e-6)
 
 
 def test_knots_are_marked():
@@ -81,28 +115,33 @@ def test_rounding_is_not_blown_up():
     """A great circle at constant speed has acceleration 0, whatever the rounding; a point at rest has no speed."""
     angle = np.arange(5)
     spline = ss.CubicSpline(None, np.stack([np.cos(angle), np.sin(angle)], axis=-1), "sphere:1")
-    assert axes_named(spline.plot(), "acceleration").get_ylim()[1] > 0.1
+    ((axes,), (bend,)) = rate_axes(spline.plot())
+    assert bend.get_ylim()[1] > 0.1 and axes.get_ylim()[0] < 0 < 1 < axes.get_ylim()[1]
     for name in FIRST.values():
         point = ss.space(name).random_point(np.random.default_rng(3))
         figure = ss.CubicSpline(None, np.stack([point] * 3), name).plot()
-        assert axes_named(figure, "speed").get_ylim()[1] > 0.5
+        assert rate_axes(figure)[0][0].get_ylim()[1] > 0.5
 
 
 def test_the_heading_counts_curves():
     figure = spline_on("r:2", (7, 10, 4)).plot()
-    assert len(axes_named(figure, "speed").lines) == 50
-    assert "50 of 70 curves, 4 points each, natural ends" in texts_of(figure)
+    assert len(lines_of(axes_named(figure, "speed"))) == 5
+    assert len(lines_of(figure.axes[0])) == 50
+    texts = texts_of(figure)
+    assert "5 of 70 curves, 4 points each, natural ends" in texts
+    assert {"curve (0, 0)", "curve (6, 9)", "start", "given points", "other curves"} <= set(texts)
+    assert "5–95 % of 70 curves" in texts
     good = [[1.0, 0, 0], [0, 1, 0], [0, 0, 1]]
     points = [good, [[1.0, 0, 0], [-1, 0, 0], [0, 1, 0]], good]
     figure = rendered(ss.CubicSpline(None, points, "sphere:2", on_failure="ignore").plot())
-    assert len(axes_named(figure, "speed").lines) == 2
+    assert len(lines_of(axes_named(figure, "speed"))) == 2
     assert "2 of 3 curves, 3 points each, natural ends, 1 not converged" in texts_of(figure)
     raises("nothing to plot", ss.CubicSpline(None, points[1], "sphere:2", on_failure="ignore").plot)
     figure = spline_on("sphere:2", max_iter=1, on_failure="ignore").plot()
     assert any(text.endswith("not converged") for text in texts_of(figure))
     spline = ss.CubicSpline(None, (np.arange(4.0)[:, None],) * 7, " x ".join(["r:1"] * 7))
     figure = rendered(spline.plot())
-    assert "4 points, natural ends, 6 of 7 factors" in texts_of(figure) and len(figure.axes) == 6 + 2
+    assert "4 points, natural ends, 6 of 7 factors" in texts_of(figure) and len(figure.axes) == 6 + 12
 
 
 @pytest.mark.parametrize(
@@ -112,8 +151,8 @@ def test_the_heading_counts_curves():
 def test_dates(name, unit, step):
     t = np.datetime64("2024-02-27", unit) + step * np.array([0, 1, 2, 4, 5]).astype(f"timedelta64[{unit}]")
     figure = rendered(spline_on(name, (5,), t).plot())
-    axes = axes_named(figure, "speed")
-    np.testing.assert_allclose(axes.lines[0].get_xdata()[[0, -1]], date2num(t[[0, -1]]), rtol=0, atol=2e-11)
+    ((axes,), _) = rate_axes(figure)
+    np.testing.assert_allclose(lines_of(axes)[0][[0, -1], 0], date2num(t[[0, -1]]), rtol=0, atol=2e-11)
     assert axes.get_ylabel().endswith("1/s")
     labels = [text.get_text() for text in axes_named(figure, "acceleration").get_xticklabels()]
     assert 2 <= sum(map(bool, labels)) <= 12
@@ -130,8 +169,9 @@ def test_dates_of_every_curve_and_whole_numbers():
     assert axes.get_xlabel().startswith("seconds since 2024-01-01")
     np.testing.assert_allclose(axes.lines[0].get_xdata()[[0, -1]], [0, 4e-7], atol=1e-15)
     t = 1_700_000_000_000_000_000 + 10**9 * np.arange(4)
-    axes = axes_named(rendered(spline_on("r:2", (4,), t).plot()), "speed")
-    np.testing.assert_allclose(axes.lines[0].get_xdata()[[0, -1]], t[[0, -1]].astype(float))
+    axes = axes_named(rendered(spline_on("r:2", (4,), t).plot()), "acceleration")
+    assert axes.get_xlabel() == "t − 1700000000000000000"
+    np.testing.assert_array_equal(lines_of(axes)[0][[0, -1], 0], [0, 3e9])
 
 
 @pytest.mark.parametrize("shape", [(5,), (3, 5)], ids=["one curve", "batch"])
@@ -143,9 +183,11 @@ def test_product_has_a_picture_a_factor(name, shape):
     figure = rendered(spline.plot())
     assert {repr(factor) for factor in space.factors} <= set(texts_of(figure))
     first = spline[0] if len(shape) > 1 else spline
-    line = lines_of(axes_named(figure, "speed"))[0]
-    np.testing.assert_allclose(line[:, 1], first.speed(line[:, 0]), atol=1e-12)
-    assert len(figure.axes) == 4 + 2
+    for i, (axes, factor) in enumerate(zip(rate_axes(figure)[0], space.factors, strict=True)):
+        line = lines_of(axes)[0]
+        norm = factor.norm(first(line[:, 0])[i], first(line[:, 0], 1)[i])
+        np.testing.assert_allclose(line[:, 1], norm, atol=1e-12)
+    assert len(figure.axes) == 4 + 2 * 4
 
 
 def test_figure_is_saved(tmp_path):

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from drawn import axes_named, points_around, rendered, texts_of
+from drawn import axes_named, lines_of, points_around, rate_axes, rendered, texts_of
 from matplotlib.dates import date2num
 from matplotlib.path import Path
 from test_figure import KINDS
@@ -45,8 +45,8 @@ def test_every_space_shows_data(name):
     spline = smooth(name)
     figure = rendered(spline.plot())
     assert f"Smoothing spline on {spline.space!r}" in texts_of(figure)
-    speed = axes_named(figure, "speed")
-    x, y = speed.lines[0].get_data()
+    speed = rate_axes(figure)[0][0]
+    x, y = lines_of(speed)[0].T
     if name.startswith("se"):
         # Turns and positions have a deviation each, and no speed in common.
         assert not bands_of(speed)
@@ -80,7 +80,7 @@ def test_data_are_drawn_and_not_knots():
 def test_few_of_many_curves_have_data():
     figure = rendered(smooth("r:2", curves=12).plot())
     (heading,) = [text for text in texts_of(figure) if "degrees of freedom" in text]
-    assert heading.startswith("12 curves, 40 data each, ") and heading.endswith("data and 95 % bands of 5")
+    assert heading.startswith("5 of 12 curves, 40 data each, ") and heading.endswith("band 95 %")
     assert len(bands_of(figure.axes[0])) == len(bands_of(axes_named(figure, "speed"))) == 5
     assert len(data_of(figure.axes[0])) == 5 * 40
 

@@ -459,7 +459,8 @@ class GridSpline(Generic[P]):
             )
         bc: Any = self._axes[0].bc_type
         curve = CubicSpline(self._axes[0].t, self.points, self._space, bc_type=bc, on_failure=self._on_failure)
-        return plot(curve, file)
+        figure: Figure = plot(curve, file)
+        return figure
 
     def _values_of(self, factor: FactorGrid, x: list[Any]) -> Array:
         """Evaluate a factor on an outer product of coordinates of the core; NaN where splines fail."""

@@ -18,6 +18,8 @@ _SHARES = (0.2, 0.5, 0.8)
 
 def draw_arrows(axes: Axes, curve: Curve, positions: Array) -> None:
     """Draw arrow heads on a line through positions of shape (m, 2), which may be broken by NaN, in equal scales."""
+    if curve.faint or not curve.has_line:
+        return
     steps = np.diff(positions, axis=0)
     lengths = np.linalg.norm(np.nan_to_num(steps), axis=1)
     total = np.cumsum(lengths)

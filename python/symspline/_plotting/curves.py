@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-from functools import cached_property, reduce
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -13,18 +13,17 @@ from matplotlib.patches import PathPatch
 from matplotlib.path import Path
 from numpy.typing import NDArray
 
-from .._core import ValidationError
-from .._curves.curve import CurveArrays as Data
+from .._curves.composed import AnyCurve
 from .._curves.curve import UncertaintyBand
 from .._report import long_gaps
 from .._spaces import Space
-from .style import DATA, DATES, INK, Array, Indices, colors, evenly
+from .style import DATA, DATES, INK, SPLINE, Array, Indices, evenly
 
 _SECOND = np.timedelta64(1, "s")
-MOST = 50
-"""The largest number of curves of a batch that are drawn."""
-FEW = 5
-"""The largest number of curves whose noisy data are drawn."""
+_NO_GAPS: Array = np.empty((0, 2))
+# Labels of artists that the legend of a page explains. Those with an underscore are not in legends of matplotlib.
+LINE, DOTS, START, DATA_DOTS, FAINT = "_curve", "_given", "_start", "_data", "_others"
+QUANTILES, BAND = "_quantiles", "band"
 
 _SEGMENTS = 3
 """The smallest length of a gap between measurements of several kinds, in median segments."""
@@ -35,40 +34,95 @@ CIRCLE: Array = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=-1)
 
 
 @dataclass(frozen=True)
+class Axis:
+    """The time axis that all curves of a figure share.
+
+    Attributes
+    ----------
+    dates : bool
+        Whether it shows dates, which matplotlib resolves to a microsecond.
+    start : datetime64, number or None
+        Time from which the axis counts. None if it shows the times of the curves.
+    name : str
+        Label of the axis.
+    seconds : bool
+        Whether times are dates or durations, so that rates are per second.
+    """
+
+    dates: bool = False
+    start: Any = None
+    name: str = "t"
+    seconds: bool = False
+
+    def positions(self, first: Any, since: Array) -> Array:
+        """Return the positions of times, given as differences from a first time."""
+        if self.dates:
+            return np.asarray(DATES.date2num(first + np.rint(1e6 * since).astype("timedelta64[us]")))
+        if isinstance(self.start, np.datetime64):
+            return np.asarray(float((first - self.start) / _SECOND) + since)
+        # The difference of integers is exact.
+        return np.asarray(float(first if self.start is None else first - self.start) + since)
+
+
+@dataclass(frozen=True)
 class Curve:
     """A curve and its look.
 
     Attributes
     ----------
-    data : CurveArrays
-        A single curve.
+    data : curve
+        A single curve, as `_curves.composed.AnyCurve` describes it.
     first : scalar
-        First knot as the user gave it.
+        First time as the user gave it.
+    x0 : float
+        The same time on the time axis of the core.
     x : ndarray
-        Sampling times on the time axis of the core. They contain all knots.
+        Sampling times on the time axis of the core. They contain the nodes.
+    nodes : ndarray
+        Times of the given points. If there are none, the first time.
+    axis : Axis
+        Time axis of the figure.
     color : color
         Colour of the line.
     alone : bool
         Whether it is the only curve of the figure.
-    start : datetime64 or None
-        First date of all curves, if times are dates.
-    dates : bool
-        Whether time axes show dates, which matplotlib resolves to a microsecond.
     noise : UncertaintyBand or None
-        Noisy data near the curve, and bands at the times x. None if the knots are the data.
-    shown : bool
-        Whether noisy data and bands are drawn.
+        Noisy data near the curve, and bands at the times x. None if the nodes are the data.
+    has_nodes : bool
+        Whether the curve has given points.
+    has_line : bool
+        Whether there is a curve, and not only points.
+    faint : bool
+        Whether the curve is one of many in the background, without points.
+    label : str or None
+        Name of the curve in a legend.
+    breaks : ndarray, shape (m, 2)
+        Starts and ends of gaps in the curve, on the time axis of the core.
+    segments : tuple of Curve
+        Parts between the gaps. Empty for a curve without gaps.
+    reference : point, optional
+        First point of a curve of which this is a segment.
+    batch : Batch or None
+        The batch of which this is the first of a few curves.
     """
 
-    data: Data
+    data: AnyCurve
     first: Any
+    x0: float
     x: Array
+    nodes: Array
+    axis: Axis
     color: Any
     alone: bool
-    start: Any
-    dates: bool
     noise: UncertaintyBand | None = None
-    shown: bool = True
+    has_nodes: bool = True
+    has_line: bool = True
+    faint: bool = False
+    label: str | None = None
+    breaks: Array = field(default_factory=lambda: _NO_GAPS)
+    segments: tuple[Curve, ...] = ()
+    reference: Any = None
+    batch: Batch | None = None
 
     @property
     def space(self) -> Space:
@@ -77,18 +131,18 @@ class Curve:
 
     @property
     def given(self) -> Any:
-        """Given points: those at the knots, or noisy data that are drawn."""
-        return self.data.points if self.noise is None else self.noise.points[0][: None if self.shown else 0]
+        """Given points: those at the nodes, or noisy data."""
+        return self.points[self.knots] if self.noise is None else self.noise.points[0]
 
     @property
     def given_x(self) -> Array:
         """Times of the given points on the time axis of the core."""
-        return self.x[self.knots] if self.noise is None else self.noise.x[0][: None if self.shown else 0]
+        return self.x[self.knots] if self.noise is None else self.noise.x[0]
 
     @property
     def radii(self) -> Array | None:
         """Radii of the band at the times x; None if no band is drawn."""
-        return self.noise.radii[0] if self.noise is not None and self.shown else None
+        return self.noise.radii[0] if self.noise is not None else None
 
     @property
     def extent(self) -> Any:
@@ -114,25 +168,25 @@ class Curve:
 
     def on_axis(self, x: Array) -> Array:
         """Return the positions of times on matplotlib's axis."""
-        first, since = self.first, x - self.x[0]
-        if self.dates:
-            return np.asarray(DATES.date2num(first + np.rint(1e6 * since).astype("timedelta64[us]")))
-        return np.asarray(float(first if self.start is None else (first - self.start) / _SECOND) + since)
+        return self.axis.positions(self.first, x - self.x0)
 
     @cached_property
     def knots(self) -> Indices:
-        """Indices of the knots among the times x."""
-        return np.searchsorted(self.x, self.data.times)
+        """Indices of the nodes among the times x."""
+        return np.searchsorted(self.x, self.nodes)
 
     @cached_property
     def gaps(self) -> Array:
-        """Starts and ends, on matplotlib's axis, of gaps that are far longer than most; shape (m, 2).
+        """Starts and ends of gaps on matplotlib's axis, shape (m, 2).
 
-        If several sensors report at different rates, only gaps that are also longer than some segments count.
+        They are the gaps between segments or, in one curve, those between data that are far longer than most. If
+        several sensors report at different rates, only gaps that are also longer than some segments count.
         """
-        x = self.data.times if self.noise is None else self.noise.times
-        if len(x) < 3:
-            return np.empty((0, 2))
+        if len(self.breaks):
+            return self.on_axis(self.breaks)
+        x = self.nodes if self.noise is None else self.noise.times
+        if len(x) < 3 or not self.has_line:
+            return _NO_GAPS
         long = long_gaps(x)
         if self.noise is not None and len(self.noise.others):
             long &= np.diff(x) > _SEGMENTS * np.median(np.diff(self.data.times))
@@ -141,15 +195,18 @@ class Curve:
 
     @cached_property
     def marks(self) -> Array:
-        """Times of all given points on matplotlib's axis, also of data that are not drawn."""
+        """Times of all given points on matplotlib's axis, also of data that are not drawn.
+
+        If there are none, they are the times between which the curve is smooth.
+        """
         if self.noise is None:
-            return self.times[self.knots]
+            return self.times[self.knots] if self.has_nodes else self.on_axis(self.data.times)
         return self.on_axis(np.unique(np.concatenate(self.noise.x)))
 
     def legend_of(self, given: str, curve: str, data: str) -> str:
         """Explain the large symbols: those of given points, or of the curve and of noisy data if there are any."""
         if self.noise is None:
-            return given
+            return given if self.has_nodes else curve
         return f"{curve}, {data}" if len(self.noise.x[0]) else curve
 
     def samples(self, number: int) -> dict[str, tuple[Array, Any]]:
@@ -160,11 +217,18 @@ class Curve:
         "between" is empty.
         """
         even = np.linspace(self.x[0], self.x[-1], number)
-        if self.noise is None:
+        if not self.has_line:
+            kept = evenly(len(self.x), number)
+            none = self.times[:0], self.points[:0]
+            return {"between": none, "bold": none, "data": (self.times[kept], self.points[kept])}
+        if self.noise is None and self.has_nodes:
             bold = self.knots[evenly(len(self.knots), number)]
             gap = np.abs(even[:, None] - self.x[bold]).min(axis=1)
-            between = np.searchsorted(self.x, even[gap > 0.6 * (even[1] - even[0])])
+            between = np.unique(np.searchsorted(self.x, even[gap > 0.6 * (even[1] - even[0])]))
             return {name: (self.times[i], self.points[i]) for name, i in (("between", between), ("bold", bold))}
+        if self.noise is None:
+            bold = np.unique(self._nearest(even))
+            return {"between": (self.times[:0], self.points[:0]), "bold": (self.times[bold], self.points[bold])}
         x, points = self.given_x, self.given
         if len(x):
             data = np.unique(np.abs(x[:, None] - np.linspace(x[0], x[-1], number)).argmin(axis=0))
@@ -182,15 +246,23 @@ class Curve:
         """Return the rows of samples of the curve that are closest in time to the given points."""
         return line[self._nearest(self.given_x)]
 
-    @property
-    def time_name(self) -> str:
-        """Label of a time axis."""
-        return "" if self.dates else "t" if self.start is None else f"seconds since {self.start}"
-
     def part(self, number: int) -> Curve:
         """Return the curve in one factor of a product space."""
         noise = None if self.noise is None else self.noise.part(number)
-        return replace(self, data=self.data.parts[number], noise=noise)
+        segments = tuple(own.part(number) for own in self.segments)
+        own: dict[str, Any] = {"noise": noise, "segments": segments, "batch": self.batch and self.batch.part(number)}
+        reference = None if self.reference is None else self.reference[number]
+        return replace(self, data=self.data.parts[number], reference=reference, **own)
+
+    @property
+    def unbroken(self) -> tuple[Curve, ...]:
+        """The segments between gaps, or the curve itself."""
+        return self.segments or (self,)
+
+    @property
+    def first_point(self) -> Any:
+        """First point of the curve, also if this is a later segment."""
+        return self.points[0] if self.reference is None else self.reference
 
     def at(self, quantity: str) -> Any:
         """Evaluate a quantity at the times x."""
@@ -200,71 +272,73 @@ class Curve:
 
     def draw_line(self, axes: Axes, positions: Array, **look: Any) -> None:
         """Draw a line through positions of shape (m, 2) or (m, 3)."""
+        if not self.has_line:
+            return
         # A narrow band must remain visible beside the line.
         width = 1.4 if not self.alone else 2.4 if self.noise is None else 1.8
-        axes.plot(*positions.T, **{"color": self.color, "linewidth": width, "zorder": 4} | look)
+        # The first line of a curve has its name in legends.
+        known = {line.get_label() for line in axes.lines}
+        label = self.label if self.label and self.label not in known and "linestyle" not in look else LINE
+        own: dict[str, Any] = {"color": self.color, "linewidth": width, "zorder": 4, "label": label}
+        if self.faint:
+            look = look | {"linewidth": 0.8, "alpha": 0.45, "zorder": 3.2, "label": FAINT}
+        (line,) = axes.plot(*positions.T, **own | look)
+        line.set_gid(LINE)
 
     def draw_dots(self, axes: Axes, positions: Array, **look: Any) -> None:
         """Draw given points, shape (N+1, 2) or (N+1, 3). The first is white; noisy data are small and light."""
+        if self.faint:
+            return
+        if not self.has_line:
+            size = float(np.clip(60 / np.sqrt(max(len(positions), 1)), 3, 8))
+            rings: dict[str, Any] = {"color": self.color, "markersize": size, "markerfacecolor": "none", "zorder": 7}
+            axes.plot(*positions.T, "o", **rings | {"label": self.label or DATA_DOTS} | look)
+            return
         if self.noise is not None:
             size = float(np.clip(25 / np.sqrt(max(len(positions), 1)), 1.5, 3.5))
             dots: Any = {"color": DATA if self.alone else self.color, "alpha": 0.75 if self.alone else 0.4}
-            dots |= {"markersize": size, "markeredgewidth": 0, "zorder": 3.5}
+            dots |= {"markersize": size, "markeredgewidth": 0, "zorder": 3.5, "label": DATA_DOTS}
             axes.plot(*positions.T, "o", **dots | look)
             return
-        size = float(np.clip(30 / np.sqrt(len(positions)), 2, 6.5)) * (1 if self.alone else 0.6)
-        color = INK if self.alone else self.color
+        size = float(np.clip(30 / np.sqrt(max(len(positions), 1)), 2, 6.5)) * (1 if self.alone else 0.6)
+        color = INK if self.alone and self.color == SPLINE else self.color
         look = {"color": color, "markersize": size, "markeredgecolor": color, "zorder": 6} | look
-        axes.plot(*positions.T, "o", **look)
-        axes.plot(*positions[:1].T, "o", **look | {"color": "white", "markeredgewidth": 1.2})
+        if self.has_nodes:
+            axes.plot(*positions.T, "o", label=DOTS, **look)
+        if self.reference is None:
+            axes.plot(*positions[:1].T, "o", label=START, **look | {"color": "white", "markeredgewidth": 1.2})
 
 
-def curves_of(spline: Any) -> tuple[list[Curve], str]:
-    """Return the curves to draw, and a description of them.
+@dataclass(frozen=True)
+class Batch:
+    """Many curves with the same times, for quantiles.
 
-    Raises
-    ------
-    ValidationError
-        No curve is finite.
+    Attributes
+    ----------
+    data : curve
+        The curves, as `_curves.composed.AnyCurve` describes them.
+    valid : ndarray of bool
+        Curves that did not fail, in a flat array.
+    x : ndarray
+        Times on the time axis of the core.
+    times : ndarray
+        Positions of these times on matplotlib's axis.
     """
-    batch = spline._curve.batch
-    everything = int(np.prod(batch))
-    good = np.flatnonzero(_finite(spline._curve))
-    if not everything:
-        raise ValidationError("there is nothing to plot: the batch has no curves")
-    if not good.size:
-        raise ValidationError("there is nothing to plot: the fit failed (a cut-locus fault, see spline.report)")
-    drawn = good[evenly(len(good), MOST)]
-    few = drawn[evenly(len(drawn), FEW)]
-    start = spline.t.min() if spline.t.dtype.kind == "M" else None
-    dates = start is not None and bool((spline.t.max() - start) / _SECOND > 1e-3)
-    firsts = np.broadcast_to(spline.t, (*batch, spline.t.shape[-1]))[..., 0]
-    curves = []
-    for i, color in zip(drawn, colors(len(drawn)), strict=True):
-        index = tuple(map(int, np.unravel_index(i, batch)))
-        data = reduce(lambda curves, k: curves.take_batch(k), index, spline._curve)
-        x = _samples(data.times)
-        noise = spline._noise_beside(index, x)
-        alone = len(drawn) == 1
-        curves.append(Curve(data, firsts[index], x, color, alone, start, dates, noise, bool(i in few)))
-    number = f"{len(drawn)} of {everything}" if len(drawn) < everything else f"{everything}"
-    return curves, f"{number} curves, " if batch else ""
 
+    data: AnyCurve
+    valid: NDArray[np.bool_]
+    x: Array
+    times: Array
 
-def _finite(data: Data) -> NDArray[np.bool_]:
-    """Return whether each curve is finite, in a flat array."""
-    start = np.broadcast_to(data.times, (*data.batch, data.times.shape[-1]))[..., :1]
-    return np.asarray(np.isfinite(data.evaluate(np.ascontiguousarray(start), "speed", "raise", True))).ravel()
+    def part(self, number: int) -> Batch:
+        """Return the curves in one factor of a product space."""
+        return replace(self, data=self.data.parts[number])
 
-
-def _samples(knots: Array) -> Array:
-    """Return times that divide every segment evenly, with more of them in long segments."""
-    segments, lengths = len(knots) - 1, np.diff(knots)
-    least = max(1200 // segments, 16 if segments <= 10_000 else 1)
-    numbers = np.maximum(least, np.ceil(1200 * lengths / np.ptp(knots))).astype(int)
-    segment = np.repeat(np.arange(segments), numbers)
-    step = np.arange(len(segment)) - np.repeat(np.cumsum(numbers) - numbers, numbers)
-    return np.append(knots[segment] + lengths[segment] * step / numbers[segment], knots[-1])
+    def at(self, quantity: str) -> Any:
+        """Evaluate a quantity of all curves at the times x, shape (curves, m, ...)."""
+        values = self.data.evaluate(self.x, quantity, "raise", False)
+        count = len(self.data.batch)
+        return values.reshape(-1, *values.shape[count:])[self.valid]
 
 
 # ---- bands ----
@@ -293,9 +367,25 @@ def draw_graph_of(axes: Axes, curve: Curve, line: Array, given: Array, unit: flo
     curve.draw_dots(axes, np.column_stack([curve.on_axis(curve.given_x), given]))
 
 
+def fill_quantiles(
+    axes: Axes, curves: Sequence[Curve], numbers: Callable[[Callable[[str], Any]], Array]
+) -> tuple[float, ...]:
+    """Fill the area between the 5 % and the 95 % quantile of numbers of all curves of a batch against time.
+
+    ``numbers`` takes a function that evaluates a quantity, and returns one row per curve. Return the lowest and the
+    highest quantile, if there is a batch.
+    """
+    batch = curves[0].batch
+    if batch is None:
+        return ()
+    low, high = np.quantile(numbers(batch.at), [0.05, 0.95], axis=0)
+    axes.fill_between(batch.times, low, high, color=DATA, alpha=0.25, linewidth=0, label=QUANTILES, zorder=1.5)
+    return float(low.min()), float(high.max())
+
+
 def fill_band(axes: Axes, curve: Curve, low: Array, high: Array, **look: Any) -> None:
     """Draw a band against time."""
-    look |= {"color": curve.color, "alpha": ALPHA, "linewidth": 0, "label": "band"}
+    look |= {"color": curve.color, "alpha": ALPHA, "linewidth": 0, "label": BAND}
     axes.fill_between(curve.times, low, high, **look)
 
 
@@ -320,7 +410,7 @@ def draw_tube(axes: Axes, curve: Curve, rings: Array) -> None:
     path = Path.make_compound_path(*map(Path.make_compound_path_from_polys, polygons))
     # ``add_patch`` would compute the extent of every side in a slow loop.
     axes.update_datalim(rings[good].reshape(-1, 2))
-    axes.add_artist(PathPatch(path, facecolor=curve.color, alpha=ALPHA, linewidth=0, zorder=3, label="band"))
+    axes.add_artist(PathPatch(path, facecolor=curve.color, alpha=ALPHA, linewidth=0, zorder=3, label=BAND))
 
 
 def _turned_left(rings: Array) -> Array:

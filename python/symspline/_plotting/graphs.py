@@ -13,14 +13,28 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from .._spaces import HermitianPositiveDefinite, Space, SymmetricPositiveDefinite
-from .curves import Curve, draw_graph_of
-from .style import DISTINCT, EDGE, GAP, INK, Array, Indices, inside, legend, plain, show_dates, size
+from .curves import LINE, Curve, draw_graph_of, fill_quantiles
+from .style import (
+    BOTTOM,
+    DISTINCT,
+    EDGE,
+    GAP,
+    INK,
+    LEFT,
+    OWN_AXES,
+    RIGHT,
+    TOP,
+    Array,
+    Indices,
+    inside,
+    legend,
+    plain,
+    show_dates,
+    size,
+)
 
 SUBSCRIPTS = str.maketrans("0123456789,", "₀₁₂₃₄₅₆₇₈₉,")
 _NAMED, _OTHERS = 12, 100
-LEFT, RIGHT, BOTTOM, TOP = 0.95, 0.6, 0.55, 0.25
-"""Margins in inches, which align the time axes of several panels."""
-
 _LINES, _TICKS = 60, 2000
 
 
@@ -39,23 +53,36 @@ def timelines(
     for i, label in enumerate(labels):
         lower, upper = BOTTOM + (len(labels) - 1 - i) * height, top + i * height
         axes = panel.add_axes(inside(panel, LEFT, lower + (0.3 if lower > BOTTOM else 0), RIGHT, upper))
+        made.append(axes)
+        axes.set_gid("time")
+        if axes in OWN_AXES:
+            _name_axes(axes, curves, label)
+            continue
         plain(axes)
         axes.grid(visible=False, axis="x")
         axes.set_ylabel(label)
         _set_times(axes, curves, size(panel)[0] - LEFT - RIGHT, lowest=i == len(labels) - 1)
         if marked:
             _mark_knots(axes, curves)
-        made.append(axes)
     return made
+
+
+def _name_axes(axes: Axes, curves: Sequence[Curve], label: str) -> None:
+    """Label axes of the user that have no labels, and mark gaps."""
+    axis = curves[0].axis
+    axes.set(xlabel=axes.get_xlabel() or axis.name, ylabel=axes.get_ylabel() or label)
+    if axis.dates:
+        show_dates(axes, 3, 7)
+    _mark_gaps(axes, curves)
 
 
 def _set_times(axes: Axes, curves: Sequence[Curve], width: float, lowest: bool) -> None:
     first, last = min(curve.times[0] for curve in curves), max(curve.times[-1] for curve in curves)
     axes.set_xlim(first - 0.01 * (last - first), last + 0.01 * (last - first))
-    if curves[0].dates:
+    if curves[0].axis.dates:
         # For some spans the locator does not find an interval between narrower limits.
         show_dates(axes, *((3, 10) if width > 7 else (2, 5)))
-    axes.set_xlabel(curves[0].time_name if lowest else "")
+    axes.set_xlabel(curves[0].axis.name if lowest else "")
     axes.tick_params(labelbottom=lowest)
     axes.xaxis.offsetText.set_visible(lowest)
 
@@ -65,15 +92,21 @@ def _mark_knots(axes: Axes, curves: Sequence[Curve]) -> None:
 
     Bands mark long gaps between points.
     """
-    knots = np.unique(np.concatenate([curve.marks for curve in curves]))
+    marked = [curve.marks for curve in curves if not curve.faint]
+    knots = np.unique(np.concatenate(marked))
     height = 1.0 if len(knots) <= _LINES and curves[0].noise is None else 0.04
     look: Any = {"transform": axes.get_xaxis_transform()}
     line: Any = {"color": EDGE, "linewidth": 0.8, "linestyle": (0, (1, 2)), "zorder": 1}
     axes.vlines(knots[:: 1 + len(knots) // _TICKS], 0, height, **look, **line)
+    _mark_gaps(axes, curves)
+
+
+def _mark_gaps(axes: Axes, curves: Sequence[Curve]) -> None:
     gaps = np.unique(np.concatenate([curve.gaps for curve in curves]), axis=0)
     if len(gaps):
+        look: Any = {"transform": axes.get_xaxis_transform(), "facecolor": GAP, "linewidth": 0, "zorder": 0.5}
         spans = [(start, end - start) for start, end in gaps.tolist()]
-        axes.broken_barh(spans, (0, 1), label="gaps", facecolor=GAP, linewidth=0, zorder=0.5, **look)
+        axes.broken_barh(spans, (0, 1), label="gaps", **look)
 
 
 # ---- one number ----
@@ -82,6 +115,7 @@ def _mark_knots(axes: Axes, curves: Sequence[Curve]) -> None:
 def draw_graph(panel: SubFigure, curves: Sequence[Curve]) -> None:
     """Draw the graphs of curves in R¹."""
     (axes,) = timelines(panel, curves, ["x"])
+    fill_quantiles(axes, curves, lambda at: at("point")[..., 0])
     for curve in curves:
         draw_graph_of(axes, curve, *curve.marked(np.ravel))
 
@@ -89,9 +123,21 @@ def draw_graph(panel: SubFigure, curves: Sequence[Curve]) -> None:
 def _draw_angle(angles: Callable[[Any], Array], period: float, panel: SubFigure, curves: Sequence[Curve]) -> None:
     """Draw an angle against time, without jumps."""
     (axes,) = timelines(panel, curves, ["angle, degrees"])
+    middle = angles(curves[0].first_point[None])[0]
+
+    def unwrapped(line: Array) -> Array:
+        """Return angles without jumps that begin close to the first curve; the last axis is time."""
+        line = np.unwrap(line, period=period, axis=-1)
+        return np.asarray(line - period * np.rint((line[..., :1] - middle) / period))
+
+    def of_batch(at: Callable[[str], Any]) -> Array:
+        points = at("point")
+        return np.degrees(unwrapped(angles(points.reshape(-1, *points.shape[2:])).reshape(points.shape[:2])))
+
+    fill_quantiles(axes, curves, of_batch)
     for curve in curves:
         line, given = curve.marked(angles)
-        line = np.unwrap(line, period=period)
+        line = unwrapped(line)
         given = given + period * np.rint((curve.closest_samples(line) - given) / period)
         draw_graph_of(axes, curve, np.degrees(line), np.degrees(given), np.degrees(1.0))
 
@@ -114,7 +160,9 @@ draw_circle, draw_slope, draw_turn, draw_phase = (partial(_draw_angle, *own) for
 def draw_numbers(
     panel: SubFigure, curves: Sequence[Curve], label: str, names: Sequence[str], numbers: Callable[[Any, Any], Array]
 ) -> None:
-    """Draw several numbers against time, the first twelve with their names.
+    """Draw several numbers against time, at most twelve with their names.
+
+    If there are more, those with the largest ranges have names, in the order of their ranges.
 
     Parameters
     ----------
@@ -129,30 +177,56 @@ def draw_numbers(
     numbers : callable
         Function of the first point of a curve and of several points, with one row per point.
     """
-    in_row = min(6, int((size(panel)[0] - LEFT - RIGHT) / 0.9))
+    in_row = max(1, min(6, int((size(panel)[0] - LEFT - RIGHT) / 0.9)))
     width = 1.8 if curves[0].alone else 0.9
-    looks = _looks(names[:_NAMED])
+    drawn = [curve.marked(partial(numbers, curve.first_point)) for curve in curves]
+    named, rest = _choose(names, np.max([np.ptp(line, axis=0) for line, _ in drawn], axis=0))
+    labels = [names[i] for i in named]
+    looks = _looks(labels)
     handles = [Line2D([], [], linewidth=width, **look) for look in looks]
-    labels = list(names[:_NAMED])
-    rest = np.arange(len(names))[_NAMED:]
-    if rest.size:
+    if len(rest):
         handles.append(Line2D([], [], color=INK, linewidth=0.4))
-        labels.append(f"{rest.size} others")
+        labels.append(f"{len(rest)} others")
         rest = rest[:: 1 + len(rest) // _OTHERS]
     (axes,) = timelines(panel, curves, [label], top=0.25 + 0.22 * -(-len(labels) // in_row))
-    for curve in curves:
-        values, given = curve.marked(partial(numbers, curve.points[0]))
-        axes.plot(curve.times, values[:, rest], color=INK, linewidth=0.4, alpha=0.4)
-        for i, look in enumerate(looks):
-            axes.plot(curve.times, values[:, i], linewidth=width, **look)
+    for curve, (values, given) in zip(curves, drawn, strict=True):
+        if curve.has_line:
+            axes.plot(curve.times, values[:, rest], color=INK, linewidth=0.4, alpha=0.4)
+        for i, look in zip(named, looks, strict=True):
+            if curve.has_line:
+                (line,) = axes.plot(curve.times, values[:, i], linewidth=width, **look)
+                line.set_gid(LINE)
+                # Axes of the user get the names, and a legend only if the user adds one.
+                line.set_label(names[i] if curve is curves[0] and axes in OWN_AXES else LINE)
             positions, color = np.column_stack([curve.on_axis(curve.given_x), given[:, i]]), look["color"]
-            if curve.alone and curve.noise is None:
+            if not curve.has_line or (curve.alone and curve.noise is None and curve.has_nodes):
                 axes.plot(*positions.T, "o", color=color, markersize=3)
             elif curve.alone:
                 curve.draw_dots(axes, positions, color=color, alpha=0.4)
+    if axes in OWN_AXES:
+        return
     order = [i for column in range(in_row) for i in range(column, len(labels), in_row)]
     anchor: Any = {"loc": "lower right", "bbox_to_anchor": (1, 1), "ncols": in_row, "borderaxespad": 0}
     legend(axes, [handles[i] for i in order], [labels[i] for i in order], handlelength=1.6, **anchor)
+
+
+def _choose(names: Sequence[str], ranges: Array) -> tuple[Indices, Indices]:
+    """Return the numbers with names, and the others. Real and imaginary parts stay together."""
+    if len(names) <= _NAMED:
+        return np.arange(len(names)), np.arange(0)
+    groups: list[list[int]] = []
+    for i, name in enumerate(names):
+        if name.startswith("Im ") and groups:
+            groups[-1].append(i)
+        else:
+            groups.append([i])
+    groups.sort(key=lambda own: -ranges[own].max())
+    named: list[int] = []
+    for own in groups:
+        if len(named) + len(own) > _NAMED:
+            break
+        named += own
+    return np.array(named), np.setdiff1d(np.arange(len(names)), named)
 
 
 def _looks(names: Sequence[str]) -> list[dict[str, Any]]:

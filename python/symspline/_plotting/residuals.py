@@ -12,8 +12,8 @@ from matplotlib.lines import Line2D
 
 from .._curves.curve import SidePanel
 from .curves import ALPHA, Curve
-from .graphs import BOTTOM, TOP, timelines
-from .style import DATA, DISTINCT, EDGE, INK, legend
+from .graphs import timelines
+from .style import BOTTOM, DATA, DISTINCT, EDGE, INK, TOP, legend, points
 
 _HEIGHT = 1.35
 _NORMAL = 1.96
@@ -49,7 +49,7 @@ def _draw_radii(axes: Axes, curve: Curve, own: SidePanel) -> None:
     axes.plot(curve.times, radii, color=curve.color, linewidth=1.2)
     axes.set_ylim(0, 1.15 * radii.max())
     words = "radius of the ball that contains the true point with 95 % probability"
-    axes.text(1, 1.02, words, transform=axes.transAxes, ha="right", va="bottom", color=INK, fontsize=9)
+    axes.text(1, 1.02, words, transform=axes.transAxes, ha="right", va="bottom", color=INK, fontsize=points(9))
 
 
 def _draw_residuals(axes: Axes, curve: Curve, own: SidePanel) -> None:
@@ -75,7 +75,7 @@ def _draw_residuals(axes: Axes, curve: Curve, own: SidePanel) -> None:
     words = f"{100 * np.mean(sizes > _NORMAL):.1f} % beyond ±{_NORMAL} (5 % expected)"
     beyond = int((sizes > top).sum())
     words += f"; {beyond} beyond the axis (triangles)" if beyond else ""
-    axes.text(1, 1.02, words, transform=axes.transAxes, ha="right", va="bottom", color=INK, fontsize=9)
+    axes.text(1, 1.02, words, transform=axes.transAxes, ha="right", va="bottom", color=INK, fontsize=points(9))
     if own.names:
         handles = [Line2D([], [], linestyle="none", marker="o", markersize=5, color=color) for color in DISTINCT]
         place: Any = {"loc": "lower left", "bbox_to_anchor": (0, 1), "ncols": len(own.names), "borderaxespad": 0}

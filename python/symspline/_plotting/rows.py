@@ -16,8 +16,8 @@ from matplotlib.figure import SubFigure
 from matplotlib.transforms import Affine2D
 
 from .curves import Curve
-from .graphs import BOTTOM, LEFT, RIGHT, timelines
-from .style import INK, Array, Indices, evenly, size
+from .graphs import timelines
+from .style import BOTTOM, INK, LEFT, RIGHT, Array, Indices, evenly, size
 
 VIEW = np.array([[-0.5, 0.866, 0.0], [-0.296, -0.171, 0.940], [0.814, 0.470, 0.342]])
 """Directions to the right, up and towards the viewer, who sees the first axis point forwards and the third up."""
@@ -50,12 +50,13 @@ class Row:
         points that are close together are omitted; samples of the curve are equidistant.
         """
         curve = self.curve
-        if self.name in ("given", "data"):
+        if self.name in ("given", "data") or not curve.has_line:
             times = curve.on_axis(curve.given_x)
             kept = _apart(times, 1.2 * reach / width * (curve.times[-1] - curve.times[0]))
             return times[kept], curve.given[kept], None
         number = max(2, int(width / (2 * reach)) + 1)
-        even = np.searchsorted(curve.x, np.linspace(curve.x[0], curve.x[-1], number))
+        # Times in a gap have the sample at its end.
+        even = np.unique(np.searchsorted(curve.x, np.linspace(curve.x[0], curve.x[-1], number)))
         return curve.times[even], curve.points[even], None if curve.radii is None else curve.radii[even]
 
 
@@ -94,7 +95,7 @@ class Rows:
         (axes,) = timelines(panel, curves, [""], top=_TOP)
         if curves[0].alone:
             rows = [Row(curves[0], "curve")]
-            if len(curves[0].given):
+            if curves[0].has_nodes and len(curves[0].given):
                 rows.insert(0, Row(curves[0], "given" if curves[0].noise is None else "data"))
         else:
             rows = [Row(curves[i], "") for i in evenly(len(curves), max(1, int(high // _LEAST)))]

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from typing import Any
+from weakref import WeakSet
 
 import numpy as np
-from matplotlib import colormaps, dates
+from matplotlib import colormaps, dates, rcParams
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.patheffects import withStroke
@@ -28,6 +29,10 @@ AXES = ["#d55e00", "#009e73", "#0072b2"]
 """Red, green and blue for the axes of a frame, in shades that colour-blind readers can distinguish."""
 HALO = [withStroke(linewidth=2.5, foreground="white", alpha=0.85)]
 DPI = 150
+LEFT, RIGHT, BOTTOM, TOP = 0.95, 0.6, 0.55, 0.25
+"""Margins in inches, which align the time axes of several panels."""
+OWN_AXES: WeakSet[Axes] = WeakSet()
+"""Axes of the user, whose look does not change."""
 DATES: Any = dates
 """The module of matplotlib, which has no types."""
 
@@ -42,20 +47,25 @@ def time_colors(share: Any) -> Any:
     return colormaps["viridis"](0.85 * share)
 
 
+def points(size: float) -> float:
+    """Return a font size for users whose default size is not that of matplotlib."""
+    return size * float(rcParams["font.size"]) / 10
+
+
 def heading(figure: Figure, title: str, subtitle: str, height: float) -> None:
     """Write title and subtitle in the upper left corner."""
-    figure.text(0.03, height, title, color=INK, fontsize=18, weight="bold")
-    figure.text(0.03, height - 0.3 / figure.get_figheight(), subtitle, color=INK, fontsize=12)
+    figure.text(0.03, height, title, color=INK, fontsize=points(18), weight="bold")
+    figure.text(0.03, height - 0.3 / figure.get_figheight(), subtitle, color=INK, fontsize=points(12))
 
 
 def note(panel: SubFigure, text: str) -> None:
     """Write a line below a picture."""
-    panel.text(0.5, 0.02, text, ha="center", color=INK, fontsize=9)
+    panel.text(0.5, 0.02, text, ha="center", color=INK, fontsize=points(9))
 
 
-def legend(axes: Axes, handles: list[Any], labels: list[str], **look: Any) -> None:
+def legend(axes: Axes | Figure, handles: list[Any], labels: list[str], **look: Any) -> None:
     """Add a legend without a frame."""
-    axes.legend(handles, labels, frameon=False, labelcolor=INK, fontsize=9, **look)
+    axes.legend(handles, labels, frameon=False, labelcolor=INK, fontsize=points(9), **look)
 
 
 def size(panel: SubFigure) -> tuple[float, float]:
@@ -70,16 +80,18 @@ def inside(panel: SubFigure, left: float, bottom: float, right: float, top: floa
 
 
 def plain(axes: Axes) -> None:
-    """Give axes a light look: a faint grid and no box."""
+    """Give axes a light look: a faint grid and no box. Axes of the user keep theirs."""
+    if axes in OWN_AXES:
+        return
     axes.set_facecolor("none")
     axes.grid(color=GRID, linewidth=0.6)
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
     axes.spines[["left", "bottom"]].set_color(EDGE)
-    axes.tick_params(color=EDGE, labelcolor=INK, labelsize=9)
+    axes.tick_params(color=EDGE, labelcolor=INK, labelsize=points(9))
     for axis in (axes.xaxis, axes.yaxis):
-        axis.label.set(color=INK, fontsize=10)
-        axis.offsetText.set(color=INK, fontsize=9)
+        axis.label.set(color=INK, fontsize=points(10))
+        axis.offsetText.set(color=INK, fontsize=points(9))
 
 
 def show_dates(axes: Axes, least: int, most: int) -> None:

@@ -41,7 +41,8 @@ def run(options: argparse.Namespace) -> int:
         figure = curves.splines[name].plot()
     except ImportError as error:
         raise Problem(str(error)) from None
-    known = sorted(figure.canvas.get_supported_filetypes())
+    # A still image in a format of animations would mislead.
+    known = sorted(set(figure.canvas.get_supported_filetypes()) - {"gif", "apng"})
     form = options.to or ("png" if options.output == STANDARD else options.output.suffix[1:].lower())
     refuse(options.output, (form not in known, f": the name of a picture must end in .{', .'.join(known)}"))
     with writing(options.output) as temporary:

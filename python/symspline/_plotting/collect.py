@@ -1,0 +1,189 @@
+"""Curves and data of the user as curves with samples to draw, with a common time axis."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import reduce
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._core import ValidationError
+from .._spaces import Product, Space, parts_of
+from .curves import Axis, Batch, Curve
+from .style import Array, colors, evenly
+
+FEW = 5
+"""The largest number of curves of a batch that are drawn with their points."""
+MOST = 50
+"""The largest number of curves of a batch that are drawn, those in the background included."""
+_FOR_QUANTILES = 200
+"""The largest number of curves along the first batch axis from which quantiles are computed."""
+_QUANTILE_TIMES = 300
+_SAMPLES = 1200
+"""Samples of a curve with few segments."""
+_FAR = 1e3
+"""An axis counts from a number if the first time is larger than this multiple of the time span."""
+_SECOND = np.timedelta64(1, "s")
+
+
+class Scatter:
+    """Points at given times, with the interface of curves; evaluated at these times only."""
+
+    def __init__(self, space: Space[Any], times: Array, points: Any) -> None:
+        self.space, self.times, self.points = space, times, points
+        self.batch: tuple[int, ...] = ()
+        self.quad_rtol, self.max_nu = 0.0, 0
+
+    @property
+    def parts(self) -> tuple[Scatter, ...]:
+        """The points in each factor of a product."""
+        if not isinstance(self.space, Product):
+            return (self,)
+        each = zip(self.space.factors, self.points, strict=True)
+        return tuple(Scatter(factor, self.times, points) for factor, points in each)
+
+    def evaluate(self, x: Array, quantity: str, outside: str, per_curve: bool, progress: Any = None) -> Any:
+        """Return the points."""
+        return self.points
+
+
+def axis_of(ends: Sequence[tuple[Any, Any]], durations: bool = False, raw: bool = False) -> Axis:
+    """Return the time axis for curves with given first and last times.
+
+    Numbers that are far from zero, such as seconds since 1970, are shown as differences from a round number unless
+    ``raw`` is True. Dates that differ by less than a millisecond are shown as seconds since the first.
+    """
+    firsts, lasts = (np.concatenate([np.ravel(pair[i]) for pair in ends]) for i in (0, 1))
+    first, last = firsts.min(), lasts.max()
+    if firsts.dtype.kind == "M":
+        if (last - first) / _SECOND > 1e-3:
+            return Axis(dates=True, name="", seconds=True)
+        return Axis(start=first, name=f"seconds since {first}", seconds=True)
+    name = "t, seconds" if durations else "t"
+    span = float(last - first)
+    if raw or not span > 0 or abs(float(first)) < _FAR * span:
+        return Axis(name=name, seconds=durations)
+    unit = 10 ** int(np.ceil(np.log10(span)))
+    exact = firsts.dtype.kind in "iu"
+    start = int(first) // int(max(unit, 1)) * int(max(unit, 1)) if exact else float(np.floor(first / unit) * unit)
+    return Axis(start=start, name=f"{name} − {start if exact else f'{start:.15g}'}", seconds=durations)
+
+
+def curves_of(
+    curve: Any, axis: Axis, color: Any = None, label: str | None = None, alone: bool = True
+) -> tuple[list[Curve], str]:
+    """Return the curves to draw, and a description of them. The first has the batch, if there are many.
+
+    Raises
+    ------
+    ValidationError
+        If no curve is finite.
+    """
+    batch = curve._curve.batch
+    everything = int(np.prod(batch))
+    if not everything:
+        raise ValidationError("there is nothing to plot: the batch has no curves")
+    valid = _finite(curve._curve)
+    good = np.flatnonzero(valid)
+    if not good.size:
+        raise ValidationError("there is nothing to plot: the fit failed (a cut-locus fault, see spline.report)")
+    drawn = good[evenly(len(good), MOST)]
+    few = drawn[evenly(len(drawn), FEW)]
+    looks = dict(zip(few.tolist(), colors(len(few)), strict=True))
+    made = []
+    # Curves with points come first.
+    for i in [*few.tolist(), *(i for i in drawn.tolist() if i not in looks)]:
+        index = tuple(map(int, np.unravel_index(i, batch)))
+        one = reduce(lambda curves, k: curves._picked(k), index, curve)
+        name = label if not batch else f"curve {index[0] if len(index) == 1 else index}"
+        look = {"color": color or looks.get(i), "alone": alone and len(drawn) == 1, "label": name}
+        made.append(_drawn(one, curve._noise_beside, index, axis, look, faint=i not in looks))
+    if len(drawn) > len(few):
+        made[0] = replace(made[0], batch=_batch_of(curve, made[0], valid))
+    number = f"{len(few)} of {everything}" if len(few) < everything else f"{everything}"
+    return made, f"{number} curves, " if batch else ""
+
+
+def _drawn(one: Any, noise_beside: Any, index: Any, axis: Axis, look: dict[str, Any], faint: bool) -> Curve:
+    """Return one curve with its samples."""
+    data = one._curve
+    nodes, breaks = one._node_times, one._breaks
+    x, parts = samples(data.times, breaks)
+    noise = None if faint else noise_beside(index, x)
+    if faint:
+        look = look | {"color": "#7d8f9c"}
+    has_nodes = len(nodes) > 0
+    nodes = nodes if has_nodes else x[:1]
+    first, x0 = one.domain[0], float(data.times[0])
+    made = Curve(data, first, x0, x, nodes, axis, noise=noise, has_nodes=has_nodes, faint=faint, breaks=breaks, **look)
+    if len(parts) < 2:
+        return made
+    start = made.points[0] if not isinstance(data.space, Product) else tuple(own[0] for own in made.points)
+    segments = [
+        replace(
+            made,
+            x=own,
+            nodes=nodes[(nodes >= own[0]) & (nodes <= own[-1])] if has_nodes else own[:1],
+            reference=start if i else None,
+        )
+        for i, own in enumerate(parts)
+    ]
+    return replace(made, segments=tuple(segments))
+
+
+def _batch_of(curve: Any, first: Curve, valid: NDArray[np.bool_]) -> Batch | None:
+    """Return the batch for quantiles, or None if the curves have their own times."""
+    data = curve._curve
+    if data.times.ndim > 1:
+        return None
+    step = -(-len(curve) // _FOR_QUANTILES)
+    kept = valid.reshape(data.batch)[::step].ravel()
+    x = np.linspace(data.times[0], data.times[-1], _QUANTILE_TIMES)
+    return Batch(curve[::step]._curve, kept, x, first.on_axis(x))
+
+
+def _finite(data: Any) -> NDArray[np.bool_]:
+    """Return whether each curve is finite, in a flat array."""
+    start = np.broadcast_to(data.times, (*data.batch, data.times.shape[-1]))[..., :1]
+    return np.asarray(np.isfinite(data.evaluate(np.ascontiguousarray(start), "speed", "raise", True))).ravel()
+
+
+def samples(times: Array, breaks: Array) -> tuple[Array, list[Array]]:
+    """Return sampling times, and those of each part between breaks.
+
+    They divide every interval evenly, with more of them in long intervals.
+    """
+    bounds = [times[0], *np.ravel(breaks), times[-1]]
+    made = []
+    for i, (start, stop) in enumerate(zip(bounds[::2], bounds[1::2], strict=True)):
+        own = times[(times >= start) & (times <= stop)]
+        # A curve that meets the next one there has the values of the next one.
+        last = np.nextafter(stop, start) if 2 * i + 2 < len(bounds) and bounds[2 * i + 2] == stop else stop
+        made.append(np.append(_divided(own)[:-1], last))
+    return np.concatenate(made), made
+
+
+def _divided(knots: Array) -> Array:
+    segments, lengths = len(knots) - 1, np.diff(knots)
+    least = max(_SAMPLES // segments, 16 if segments <= 10_000 else 1)
+    numbers = np.maximum(least, np.ceil(_SAMPLES * lengths / np.ptp(knots))).astype(int)
+    segment = np.repeat(np.arange(segments), numbers)
+    step = np.arange(len(segment)) - np.repeat(np.cumsum(numbers) - numbers, numbers)
+    return np.append(knots[segment] + lengths[segment] * step / numbers[segment], knots[-1])
+
+
+def scatter_of(space: Space[Any], first: Any, times: Array, points: Any, axis: Axis, color: Any, label: Any) -> Curve:
+    """Return data as a curve without a line. Times must not decrease."""
+    data = Scatter(space, times, points)
+    return Curve(data, first, float(times[0]), times, times, axis, color, False, has_line=False, label=label)
+
+
+def finite_rows(space: Space[Any], points: Any) -> NDArray[np.bool_]:
+    """Return which points of a product or another space have no missing values."""
+    valid = [
+        np.isfinite(own.reshape(len(own), -1)).all(axis=1) for own in map(np.asarray, parts_of(points, space, "points"))
+    ]
+    return np.asarray(np.all(valid, axis=0))

@@ -1,0 +1,203 @@
+"""The page of a curve: a heading, the picture of the space, and velocity and acceleration against time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from textwrap import shorten
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib import rcParams
+from matplotlib.artist import Artist
+from matplotlib.figure import Figure, SubFigure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from .._spaces import Product, cover_of, factors_of
+from . import residuals, sphere
+from .collect import axis_of, curves_of
+from .curves import BAND, DATA_DOTS, DOTS, FAINT, QUANTILES, START, Curve
+from .figure import BANDED, FACTORS, draw_picture, finish, new_figure, picture_of, picture_of_factors
+from .panels import check_axes, draw_into, has_dark_background, next_color
+from .rates import draw_rates, rows_of
+from .style import BOTTOM, DATA, INK, TOP, heading, legend, points
+from .theme import invert_page, is_dark, kept_color, light_colors
+
+_HEAD, _RATES_WIDTH, _RATES_HEIGHT = 1.2, 5.8, 4.0
+_ROW = 1.5
+"""Height of a rate in inches, if there are more than two in a column."""
+
+
+class Page(NamedTuple):
+    """A figure with what it shows.
+
+    Attributes
+    ----------
+    figure : Figure
+        The figure.
+    curves : list of Curve
+        The curves.
+    picture : SubFigure
+        Panel with the picture of the space.
+    """
+
+    figure: Figure
+    curves: list[Curve]
+    picture: SubFigure
+
+
+def plot(curve: Any, file: Any = None, *, ax: Any = None, show: bool = False, **look: Any) -> Any:
+    """Draw a curve: a page with panels, or the picture alone into axes. See `symspline.CubicSpline.plot`."""
+    if ax is not None:
+        return _plot_into(curve, ax, show=show, **look)
+    figure = page_of(curve, show=show, **look).figure
+    return finish(figure, file, show)
+
+
+def page_of(
+    curve: Any,
+    color: Any = None,
+    label: str | None = None,
+    title: str | None = None,
+    figsize: tuple[float, float] | None = None,
+    show: bool = False,
+    radius: float | None = None,
+) -> Page:
+    """Draw the page of a curve.
+
+    The radius in metres is that of the Earth, if a curve on S² is one of longitude and latitude.
+    """
+    color = kept_color(color, is_dark(rcParams["figure.facecolor"]))
+    curves, words = curves_of(curve, _axis(curve), color, label)
+    space = curve.space
+    has_band = [str(cover_of(own)) in BANDED for own in factors_of(space)]
+    below = residuals.panels_of(curve, curves[0], has_band)
+    title = title or shorten(f"{curve._kind} on {space!r}", 63, placeholder=" …")
+    return draw_page(curves, title, words + _description(curve, curves), figsize, show, below, radius)
+
+
+def draw_page(
+    curves: list[Curve],
+    title: str,
+    words: str,
+    figsize: tuple[float, float] | None = None,
+    show: bool = False,
+    below: Sequence[Any] = (),
+    radius: float | None = None,
+) -> Page:
+    """Draw a heading, the picture of the space, rates and further panels."""
+    space = curves[0].space
+    picture = picture_of_factors(curves) if isinstance(space, Product) else picture_of(space)
+    wide = picture.width > 1.5 * picture.height
+    widths = [picture.width] if wide else [picture.width, _RATES_WIDTH]
+    rates = any(curve.has_line for curve in curves)
+    columns = 2 if isinstance(space, Product) and wide else 1
+    heights = [_HEAD, picture.height]
+    if wide and rates:
+        count = len(rows_of(space, False, FACTORS)) // columns
+        heights.append(_RATES_HEIGHT if count < 3 else BOTTOM + TOP + _ROW * count)
+    if below:
+        heights.append(residuals.height(below))
+    size = figsize or (sum(widths) if rates or wide else widths[0], sum(heights))
+    dark = is_dark(rcParams["figure.facecolor"])
+    with light_colors(dark):
+        figure = new_figure(size, show)
+        heights = [_HEAD, *(h * (size[1] - _HEAD) / sum(heights[1:]) for h in heights[1:])]
+        grid = figure.add_gridspec(
+            len(heights), len(widths), width_ratios=widths, height_ratios=np.maximum(heights, 1e-3)
+        )
+        heading(figure, title, words, 1 - 0.5 / size[1])
+        panel = figure.add_subfigure(grid[1, 0] if wide or rates else grid[1, :])
+        if isinstance(space, Product):
+            picture.draw(panel, curves)
+        elif radius is not None:
+            sphere.draw_earth(radius, panel, [part for curve in curves for part in curve.unbroken])
+        else:
+            draw_picture(panel, space, curves)
+        if rates:
+            draw_rates(figure.add_subfigure(grid[2, 0] if wide else grid[1, 1]), curves, FACTORS, columns, radius)
+        if below:
+            residuals.draw(figure.add_subfigure(grid[-1, :]), curves[0], below)
+        _explain(figure, curves, 1 - 0.92 / size[1])
+    if dark:
+        invert_page(figure)
+    return Page(figure, curves, panel)
+
+
+def _axis(curve: Any, raw: bool = False) -> Any:
+    return axis_of([curve.domain], curve._time_axis.durations, raw)
+
+
+def _plot_into(
+    curve: Any,
+    ax: Any,
+    color: Any = None,
+    label: str | None = None,
+    title: str | None = None,
+    show: bool = False,
+) -> Any:
+    """Draw the picture of a curve into axes."""
+    check_axes(ax, curve.space)
+    color = kept_color(color or next_color(ax), has_dark_background(ax))
+    curves, _ = curves_of(curve, _axis(curve, raw=True), color, label)
+    return draw_into(ax, curves, title, show)
+
+
+def _description(spline: Any, curves: Sequence[Curve]) -> str:
+    """Describe the data, the convergence of the solver, the number of curves with bands, and the number of gaps."""
+    words = [spline._made_of]
+    factors = len(factors_of(spline.space))
+    if factors > FACTORS:
+        words.append(f"{FACTORS} of {factors} factors")
+    if spline._unconverged:
+        words.append(f"{spline._unconverged} not converged" if spline._curve.batch else "not converged")
+    if curves[0].noise is not None:
+        words.append("band 95 %")
+    if len(curves[0].breaks):
+        count = int(np.sum(curves[0].breaks[:, 1] > curves[0].breaks[:, 0]))
+        words.append(f"{count} gap{'s' if count != 1 else ''}")
+        return ", ".join(filter(None, words))
+    gaps = sum(len(curve.gaps) for curve in curves if not curve.faint)
+    if gaps:
+        words.append(f"{gaps} long gap{'s' if gaps > 1 else ''}")
+    return ", ".join(filter(None, words))
+
+
+def _explain(figure: Figure, curves: Sequence[Curve], height: float) -> None:
+    """Explain lines, markers and bands in one line below the heading."""
+    drawn = {artist.get_label() for axes in figure.axes for artist in axes.get_children()}
+    few = [curve for curve in curves if not curve.faint]
+    dot: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 5}
+    handles: list[Artist] = []
+    labels: list[str] = []
+
+    def add(handle: Artist, label: str) -> None:
+        handles.append(handle)
+        labels.append(label)
+
+    for curve in few:
+        if curve.label:
+            look = {} if curve.has_line else dot | {"markerfacecolor": "none"}
+            add(Line2D([], [], color=curve.color, linewidth=2, **look), curve.label)
+    color = INK if few[0].alone else DATA
+    if START in drawn:
+        add(Line2D([], [], color="white", markeredgecolor=color, markeredgewidth=1.2, **dot), "start")
+    if DOTS in drawn:
+        add(Line2D([], [], color=color, **dot), "given points")
+    if DATA_DOTS in drawn:
+        add(Line2D([], [], color=DATA, **dot), "data")
+    if BAND in drawn:
+        add(Patch(facecolor=few[0].color, alpha=0.22), "95 % band")
+    if FAINT in drawn:
+        add(Line2D([], [], color=DATA, linewidth=0.7), "other curves")
+    if QUANTILES in drawn and few[0].batch is not None:
+        add(Patch(facecolor=DATA, alpha=0.25), f"5–95 % of {int(few[0].batch.valid.sum())} curves")
+    if handles:
+        place: Any = {"loc": "upper left", "bbox_to_anchor": (0.03, height), "borderaxespad": 0, "borderpad": 0}
+        inches = points(1) * sum(0.45 + 0.065 * len(label) for label in labels)
+        rows = int(np.ceil(inches / (0.9 * figure.get_figwidth())))
+        columns = -(-len(labels) // rows)
+        # A legend fills its columns one after the other, but is read row by row.
+        order = [i for column in range(columns) for i in range(column, len(labels), columns)]
+        handles, labels = [handles[i] for i in order], [labels[i] for i in order]
+        legend(figure, handles, labels, ncols=columns, handlelength=1.4, columnspacing=1.4, **place)

@@ -1,0 +1,160 @@
+"""Axes of the user in place of a panel."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from textwrap import fill
+from typing import Any
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.transforms import Bbox
+
+from .._arrays import short_repr
+from .._core import ValidationError
+from .._spaces import Product, Space, cover_of
+from .curves import START, Curve
+from .figure import PATHS, VIEWS, draw_picture
+from .style import BOTTOM, INK, LEFT, OWN_AXES, RIGHT, TOP, points
+from .theme import invert, invert_ticks, is_dark, light_colors
+
+
+class AxesPanel:
+    """Existing axes with the methods of a ``SubFigure`` that pictures use.
+
+    A picture adds its axes and gets those of the user. The look of their frame does not change.
+
+    Parameters
+    ----------
+    axes : Axes
+        Axes to draw into.
+    square : bool
+        Whether the panel is as wide as high at most, so that pictures have no second part.
+    """
+
+    def __init__(self, axes: Axes, square: bool) -> None:
+        self.axes = axes
+        figure: Any = axes.get_figure(root=True)
+        self.dpi = figure.dpi
+        box = axes.get_window_extent()
+        width, height = box.width / self.dpi + LEFT + RIGHT, box.height / self.dpi + BOTTOM + TOP
+        width, height = (min(width, height),) * 2 if square else (width, height)
+        self.bbox = Bbox.from_bounds(0, 0, width * self.dpi, height * self.dpi)
+        self._used = False
+        OWN_AXES.add(axes)
+
+    def add_axes(self, rectangle: Any, projection: str | None = None, **look: Any) -> Any:
+        """Return the axes of the user; further ones are insets."""
+        if self._used:
+            return self.axes.inset_axes(rectangle, projection=projection, **look)
+        wanted = projection or "rectilinear"
+        if self.axes.name != wanted:
+            kind = f"projection='{wanted}'" if projection else "no projection"
+            raise ValidationError(
+                f"ax has the projection {self.axes.name!r}, but this picture needs axes with {kind}. Create them by "
+                + (f"figure.add_subplot(projection='{wanted}')." if projection else "figure.add_subplot().")
+            )
+        self._used = True
+        # Names of axes that the user chose remain.
+        kept = {name: value for name, value in look.items() if name not in ("facecolor", "label")}
+        for name in ("xlabel", "ylabel", "zlabel"):
+            if name in kept and getattr(self.axes, f"get_{name}")():
+                del kept[name]
+        self.axes.set(**kept)
+        return self.axes
+
+    def text(self, x: float, y: float, words: str, **look: Any) -> Any:
+        """Write words below the axes, in as many lines as their width requires."""
+        letters = max(20, int(self.axes.get_window_extent().width / self.dpi / 0.065))
+        words = "\n".join(fill(line, letters) for line in words.splitlines())
+        own: Any = {"ha": "center", "color": INK, "fontsize": points(9)} | look
+        return self.axes.annotate(
+            words,
+            (0.5, 0),
+            (0, -8 if not self.axes.axison else -28),
+            xycoords="axes fraction",
+            textcoords="offset points",
+            va="top",
+            **own,
+        )
+
+
+def draw_into(ax: Axes, curves: Sequence[Curve], title: str | None, show: bool) -> Axes:
+    """Draw the picture of curves into axes that `check_axes` has accepted."""
+    before, had = set(ax.findobj()), ax.has_data()
+    names = list(ax._axis_map)
+    limits = {name: getattr(ax, f"get_{name}lim")() for name in names if had}
+    figure: Any = ax.get_figure(root=True)
+    dark = has_dark_background(ax)
+    with light_colors(dark):
+        draw_picture(AxesPanel(ax, square=str(cover_of(curves[0].space)) in PATHS), curves[0].space, curves)
+    for name, (low, high) in limits.items():
+        # Pictures with limits of their own must not hide what was there.
+        if not getattr(ax, f"get_autoscale{name}_on")():
+            own = getattr(ax, f"get_{name}lim")()
+            getattr(ax, f"set_{name}lim")(min(low, own[0]), max(high, own[1]))
+    _name_start(ax)
+    for artist in ax.get_children():
+        # Arrow heads, shadows and scale bars are not in legends of the user.
+        if artist not in before and artist.get_label() in ("time", "shadow", "scale"):
+            artist.set_label(f"_{artist.get_label()}")
+    if dark:
+        _darken(ax, before, figure.get_facecolor())
+    if title is not None:
+        # Explanations of symbols are above the axes.
+        above = ax.get_legend() is not None or any(float(np.asarray(text.get_position())[1]) > 1 for text in ax.texts)
+        ax.set_title(title, pad=26 if above else None)
+    if show:
+        from matplotlib import pyplot
+
+        pyplot.show()
+    return ax
+
+
+def has_dark_background(ax: Axes) -> bool:
+    """Whether axes of the user are dark."""
+    figure: Any = ax.get_figure(root=True)
+    facecolor: Any = ax.get_facecolor()
+    return is_dark(facecolor if ax.axison and facecolor[3] else figure.get_facecolor())
+
+
+def _darken(ax: Any, before: set[Artist], background: Any) -> None:
+    """Invert new artists in axes of the user; ticks and labels have the colours of the user, except in boxes."""
+    box = ax.name == "3d"
+    kept = {artist for axis in ax._axis_map.values() for artist in axis.findobj()}
+    labels = [axis.label for axis in ax._axis_map.values()] if box else []
+    invert([artist for artist in ax.findobj() if artist not in before and artist not in kept] + labels, background)
+    if box:
+        invert_ticks(ax, background)
+
+
+def _name_start(ax: Axes) -> None:
+    """Name the first of the markers of starting points in legends."""
+    marks = [line for line in ax.lines if line.get_label() in (START, "start")]
+    if marks and all(line.get_label() == START for line in marks):
+        # Markers on the far side of a globe are faint.
+        next((line for line in marks if line.get_alpha() is None), marks[0]).set_label("start")
+
+
+def check_axes(ax: Any, space: Space) -> None:
+    """Raise an error unless a picture of the space can be drawn into axes."""
+    if not isinstance(ax, Axes):
+        raise TypeError(f"ax must be axes of matplotlib, not {short_repr(ax)}")
+    if isinstance(space, Product):
+        raise ValidationError(
+            f"ax is one set of axes, but a curve on {space!r} has one picture per factor. Omit ax to draw a page."
+        )
+    if str(cover_of(space)) in VIEWS and ax.has_data():
+        raise ValidationError(
+            "ax already contains a picture, and the view of this picture depends on the curves. Draw all of them in "
+            "one call: symspline.plot([first, second], ax=ax)."
+        )
+
+
+def next_color(ax: Any) -> Any:
+    """Return the next colour of the property cycle of axes."""
+    (probe,) = ax.plot(*[[]] * (3 if ax.name == "3d" else 2))
+    color = probe.get_color()
+    probe.remove()
+    return color

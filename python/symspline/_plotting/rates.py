@@ -1,0 +1,198 @@
+"""Velocities and accelerations against time: signed in one dimension, one panel per unit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import SubFigure
+
+from .._spaces import Product, Space, SpecialEuclidean, cover_of, factors_of
+from .curves import LINE, Curve, fill_band, fill_quantiles
+from .graphs import timelines
+from .style import EDGE, Array
+
+NORMAL = 1.96
+"""Half width of the 95 % interval of a normal distribution, in standard deviations."""
+_LONGEST = 10
+"""Number of letters of a space in the label of an axis."""
+At = Callable[[str], Any]
+
+
+class Rate(NamedTuple):
+    """A number against time.
+
+    Attributes
+    ----------
+    label : str
+        Label of the vertical axis.
+    order : int
+        1 for velocities, 2 for accelerations.
+    values : callable
+        Takes a function that evaluates a quantity, and returns numbers.
+    signed : bool
+        Whether the numbers have a sign.
+    scale : float
+        Factor by which the numbers are multiples of norms.
+    """
+
+    label: str
+    order: int
+    values: Callable[[At], Array]
+    signed: bool = False
+    scale: float = 1.0
+
+
+def _turned(p: Any, v: Any) -> Array:
+    """Return the component of a vector along the direction in which the angle of a unit vector increases."""
+    return np.asarray(p[..., 0] * v[..., 1] - p[..., 1] * v[..., 0])
+
+
+def _of_column(p: Any, v: Any) -> Array:
+    return _turned(p[..., 0], v[..., 0])
+
+
+# Spaces of dimension one: a number with the sign of a velocity or an acceleration v at p.
+_SIGNS: dict[str, Callable[[Any, Any], Array]] = {
+    "euclidean:1": lambda p, v: v[..., 0],
+    "sphere:1": _turned,
+    "hyperbolic:1": lambda p, v: v[..., 1],
+    "rp:1": _turned,
+    "gr:1,2": _of_column,
+    "so:2": _of_column,
+    "o:2": _of_column,
+    "u:1": lambda p, v: np.imag(np.conj(p) * v)[..., 0, 0],
+    "spd:1": lambda p, v: v[..., 0, 0],
+}
+
+
+def rates_of(space: Space[Any], seconds: bool, radius: float | None = None) -> list[Rate]:
+    """Return the rates of a space that is not a product, velocities first.
+
+    With the radius of the Earth in metres they are in km/h and m/s², or in km per unit of time.
+    """
+    if radius is not None:
+        units = ("km/h", "m/s²") if seconds else ("km per unit of t", "km per unit of t²")
+        first, second = (3.6 * radius, radius) if seconds else (radius / 1000,) * 2
+        return [
+            Rate(f"speed\n{units[0]}", 1, lambda at: first * at("speed"), scale=first),
+            Rate(f"acceleration\n{units[1]}", 2, lambda at: second * at("bend"), scale=second),
+        ]
+    per = [", 1/s", ", 1/s²"] if seconds else ["", ""]
+    own = cover_of(space)
+    if isinstance(own, SpecialEuclidean):
+        return _rates_of_poses(own, seconds)
+    sign = _SIGNS.get(str(own))
+    if sign is None:
+        return [
+            Rate(f"speed\n|γ′|{per[0]}", 1, lambda at: at("speed")),
+            Rate(f"acceleration\n|∇γ′|{per[1]}", 2, lambda at: at("bend")),
+        ]
+    return [
+        Rate(f"velocity\nγ′{per[0]}", 1, lambda at: np.copysign(at("speed"), sign(at("point"), at("velocity"))), True),
+        Rate(
+            f"acceleration\n∇γ′{per[1]}",
+            2,
+            lambda at: np.copysign(at("bend"), sign(at("point"), at("acceleration"))),
+            True,
+        ),
+    ]
+
+
+def _rates_of_poses(space: SpecialEuclidean, seconds: bool) -> list[Rate]:
+    """Return rates of turning and of moving, which have different units.
+
+    A tangent vector at (R, p) is (R ω̂, R v) with the twist (ω, v) in the body. Its lengths are ‖R ω̂‖/√2 = |ω| and |v|,
+    and those of the covariant acceleration are |ω′| and |v′|.
+    """
+    n = space.point_shape[0] - 1
+    turn = ["rad/s", "rad/s²"] if seconds else ["rad/t", "rad/t²"]
+    move = [", 1/s", ", 1/s²"] if seconds else ["", ""]
+
+    def turning(quantity: str) -> Callable[[At], Array]:
+        if n == 2:
+            return lambda at: _of_column(at("point")[..., :2, :2], at(quantity)[..., :2, :2])
+        return lambda at: np.linalg.norm(at(quantity)[..., :n, :n], axis=(-2, -1)) / np.sqrt(2)
+
+    def moving(quantity: str) -> Callable[[At], Array]:
+        return lambda at: np.linalg.norm(at(quantity)[..., :n, n], axis=-1)
+
+    first, second = ("ω", "ω′") if n == 2 else ("|ω|", "|ω′|")
+    return [
+        Rate(f"turning rate\n{first}, {turn[0]}", 1, turning("velocity"), n == 2),
+        Rate(f"speed\n|v|{move[0]}", 1, moving("velocity")),
+        Rate(f"turning\nacceleration\n{second}, {turn[1]}", 2, turning("acceleration"), n == 2),
+        Rate(f"acceleration\n|v′|{move[1]}", 2, moving("acceleration")),
+    ]
+
+
+def rows_of(space: Space[Any], seconds: bool, most: int, radius: float | None = None) -> list[tuple[int | None, Rate]]:
+    """Return the rates of a space, with the number of the factor of a product."""
+    if not isinstance(space, Product):
+        return [(None, own) for own in rates_of(space, seconds, radius)]
+    found: list[tuple[int | None, Rate]] = []
+    for i, factor in enumerate(factors_of(space)[:most]):
+        for own in rates_of(factor, seconds):
+            name, _, unit = own.label.rpartition("\n")
+            found.append((i, own._replace(label=f"{name}\n{unit} of {_short_name(factor)}")))
+    return found
+
+
+def _short_name(space: Space[Any]) -> str:
+    """Return a short name of a space for the label of an axis."""
+    name = str(space).replace("euclidean:", "r:").replace("hyperbolic:", "h:")
+    return name if len(name) <= _LONGEST else f"{name[: _LONGEST - 1]}…"
+
+
+def draw_rates(panel: SubFigure, curves: Sequence[Curve], most: int, columns: int, radius: float | None) -> None:
+    """Draw the rates of curves: velocities and accelerations below each other, or in one column each."""
+    curves = [curve for curve in curves if curve.has_line and not curve.faint]
+    rows = rows_of(curves[0].space, curves[0].axis.seconds, most, radius)
+    groups = [rows]
+    panels: list[Any] = [panel]
+    if columns > 1:
+        groups = [[row for row in rows if row[1].order == order] for order in (1, 2)]
+        panels = [*np.asarray(panel.subfigures(1, 2))]
+    for own, group in zip(panels, groups, strict=True):
+        made = timelines(own, curves, [rate.label for _, rate in group])
+        for axes, (number, rate) in zip(made, group, strict=True):
+            parts = curves if number is None else [curve.part(number) for curve in curves]
+            _draw_rate(axes, parts, rate)
+
+
+def _draw_rate(axes: Axes, curves: Sequence[Curve], rate: Rate) -> None:
+    """Draw one rate. Its axis includes zero, and rounding errors of constants are not magnified."""
+    drawn = [0.0, *fill_quantiles(axes, curves, rate.values)]
+    top = rounding = 0.0
+    for curve in curves:
+        values = rate.values(curve.at)
+        for part in curve.unbroken:
+            shown = values[np.searchsorted(curve.x, part.x)]
+            width = 1.8 if curve.alone else 1.1
+            (line,) = axes.plot(part.times, shown, color=curve.color, linewidth=width, label=LINE)
+            line.set_gid(LINE)
+        low, high = values, values
+        if rate.order == 1 and curve.noise is not None and curve.noise.speed is not None:
+            spread = rate.scale * NORMAL * curve.noise.speed
+            low, high = values - spread, values + spread
+            low = low if rate.signed else np.maximum(low, 0)
+            fill_band(axes, curve, low, high)
+        drawn += [float(low.min()), float(high.max())]
+        top = max(top, rate.scale * float(curve.at("speed").max()))
+        # Rounding errors of points between the closest knots, which a curve at rest has.
+        rounding = max(rounding, 1e-15 * rate.scale * np.abs(curve.points).max() / np.diff(curve.data.times).min())
+    top = top if top > rounding else 1.0
+    unit = top if rate.order == 1 else top / max(curve.x[-1] - curve.x[0] for curve in curves)
+    _limit(axes, min(drawn), max(drawn), unit, rounding if rate.order == 1 else 1e-9 * unit, rate.signed)
+
+
+def _limit(axes: Axes, low: float, high: float, unit: float, small: float, signed: bool) -> None:
+    """Set the limits of the vertical axis, those of a unit if all values are small."""
+    if max(high, -low) <= small:
+        low, high = (-unit if signed else 0.0), unit
+    if signed:
+        axes.axhline(0.0, color=EDGE, linewidth=0.8, zorder=1)
+    margin = 0.08 * (high - low)
+    axes.set_ylim(low - margin if signed else 0.0, high + margin)

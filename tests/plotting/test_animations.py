@@ -1,0 +1,88 @@
+"""Animations: what moves, where to, and files."""
+
+import matplotlib.animation
+import numpy as np
+import pytest
+from drawn import rate_axes, spline_on
+from PIL import Image
+from refused import raises
+from test_figure import KINDS
+
+import symspline as ss
+
+ONE_OF_EACH = {draw: name for name, draw in KINDS.items()}.values()
+ORANGE = "#d95f0e"
+
+
+def at_frame(curve, row):
+    """The figure of an animation at a sample of the curve."""
+    moving = curve.animate(frames=2)
+    moving._draw_was_started = True
+    moving._func(row)
+    return moving._fig
+
+
+@pytest.mark.parametrize("name", ONE_OF_EACH)
+def test_every_space_moves(name):
+    figure = at_frame(spline_on(name), 17)
+    for axes in rate_axes(figure)[0]:
+        cursor, dot = axes.lines[-1], axes.lines[-2]
+        (line,) = [line for line in axes.lines if line.get_gid() == "_curve"]
+        assert cursor.get_xdata()[0] == line.get_xdata()[17]
+        assert (dot.get_xdata()[0], dot.get_ydata()[0]) == (line.get_xdata()[17], line.get_ydata()[17])
+
+
+def test_the_marker_is_on_the_curve():
+    """On the plane, on both sides of a globe, and on a map that the curve leaves on one side."""
+    spline = spline_on("r:2")
+    x = np.linspace(*spline.domain, 1201)
+    figure = at_frame(spline, 240)
+    dot = figure.axes[0].lines[-1]
+    np.testing.assert_allclose(np.ravel(dot.get_xydata()), spline(x[240]), atol=1e-12)
+    angle = np.radians(np.linspace(100, 260, 6))
+    around = ss.CubicSpline(None, np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=-1), "sphere:2")
+    figure = at_frame(around, 1100)
+    plan = next(axes for axes in figure.axes if axes.get_label() == "map")
+    lon, lat = plan.lines[-1].get_xydata()[0]
+    point = around(np.linspace(0, 5, 1201)[1100])
+    assert lon == pytest.approx(np.degrees(np.arctan2(point[1], point[0]))) and lat == pytest.approx(0)
+
+
+def test_frames_of_poses_move():
+    spline = spline_on("se:3")
+    figure = at_frame(spline, 100)
+    pose = spline(np.linspace(*spline.domain, 1201)[100])
+    sticks = [np.stack(line.get_data_3d(), axis=1) for line in figure.axes[0].lines[-3:]]
+    for i, stick in enumerate(sticks):
+        np.testing.assert_allclose(stick[0], pose[:3, 3], atol=1e-12)
+        along = stick[1] - stick[0]
+        np.testing.assert_allclose(along / np.linalg.norm(along), pose[:3, i], atol=1e-12)
+
+
+def test_gaps_are_skipped():
+    segments = [spline_on("r:1", t=np.arange(6.0)), spline_on("r:1", t=20 + np.arange(6.0))]
+    at_frame(ss.SegmentedCurve(segments), 1300)
+
+
+def test_files(tmp_path):
+    path = tmp_path / "a.gif"
+    spline_on("r:1").animate(path, frames=3, fps=10)
+    with Image.open(path) as image:
+        assert image.n_frames == 3 and image.info["duration"] == 100
+    assert [own.name for own in tmp_path.iterdir()] == ["a.gif"]
+
+
+def test_films_need_ffmpeg(tmp_path, monkeypatch):
+    monkeypatch.setattr(matplotlib.animation.writers, "is_available", lambda name: name == "pillow")
+    raises("needs the program ffmpeg, which is not installed", spline_on("r:1").animate, tmp_path / "a.mp4")
+
+
+def test_invalid_arguments(tmp_path):
+    animate = spline_on("r:1").animate
+    raises("must end in .gif", animate, tmp_path / "a.png")
+    raises("frames must be", animate, frames=1)
+    raises("fps must be", animate, fps=0)
+    raises("this is a batch of 3 curves", spline_on("r:1", (3, 5)).animate)
+    for name in ("a.gif", "a.mp4"):
+        raises("is an animation, but plot writes still images", spline_on("r:1").plot, tmp_path / name)
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,76 @@
+"""Pictures of several curves and data."""
+
+import numpy as np
+import pytest
+from drawn import lines_of, points_around, rate_axes, rendered, spline_on, texts_of
+from matplotlib.figure import Figure
+from refused import raises
+
+import symspline as ss
+
+NAMES = ["r:1", "r:2", "r:3", "sphere:1", "sphere:2", "so:3", "se:2", "se:3", "spd:2", "gr:2,3", "rp:2", "h:2", "cp:1"]
+NAMES += ["spd:4", "gr:2,5", "u:2"]
+T = np.array([0.0, 1.1, 1.9, 3.2, 4.0, 5.3])
+
+
+def pair(name):
+    spline = spline_on(name, t=T)
+    return spline, ss.PiecewiseGeodesic(T, spline.points, name)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_curves_and_data_in_one_picture(name):
+    spline, polygon = pair(name)
+    figure = rendered(ss.plot([spline, polygon, (T, spline.points)], labels=["spline", "polygon", "measured"]))
+    assert {"spline", "polygon", "measured", "2 curves, 6 data"} <= set(texts_of(figure))
+    for axes in rate_axes(figure)[0]:
+        assert len(lines_of(axes)) == 2
+
+
+def test_data_of_products_with_missing_points():
+    space, rng = ss.space("sphere:2 x r:1"), np.random.default_rng(3)
+    points = tuple(points_around(own, rng, (6,)) for own in space.factors)
+    spline = ss.CubicSpline(T, points, space)
+    points[1][2] = np.nan
+    figure = rendered(ss.plot([(T[::-1], tuple(own[::-1] for own in points)), spline], labels=["given", None]))
+    assert "1 curve, 5 data" in texts_of(figure)
+    (dots,) = [
+        line for axes in figure.axes for line in axes.lines if axes.get_ylabel() == "x" and line.get_label() == "given"
+    ]
+    np.testing.assert_allclose(dots.get_xdata(), np.delete(T, 2))
+
+
+def test_lists_of_fit_many_and_axes():
+    rng = np.random.default_rng(0)
+    curves = ss.fit_many([(None, rng.normal(size=(n, 2))) for n in (4, 7, 5)], "r:2")
+    ax = Figure().add_subplot()
+    assert ss.plot(curves, ax=ax, labels=list("abc"), colors=["red", "green", "blue"], title="three") is ax
+    lines = [line for line in ax.lines if line.get_gid() == "_curve"]
+    assert [line.get_color() for line in lines] == ["red", "green", "blue"]
+    assert ax.get_legend_handles_labels()[1] == ["a", "start", "b", "c"]
+
+
+def test_times_of_all_curves_have_one_origin():
+    t = 1305031100.0 + T
+    figure = ss.plot([spline_on("r:2", t=t), spline_on("r:2", t=t + 30), (t + 10, np.zeros((6, 2)))])
+    starts = [line[0, 0] for line in lines_of(rate_axes(figure)[0][0])]
+    np.testing.assert_allclose(np.diff(starts), 30)
+    dates = np.datetime64("2024-01-01") + np.arange(6)
+    rendered(ss.plot([spline_on("r:1", t=dates), (dates + 1, np.zeros((6, 1)))]))
+
+
+def test_what_cannot_be_compared_raises():
+    spline, polygon = pair("r:2")
+    raises("curves must contain at least one curve", ss.plot, [(T, np.zeros((6, 2)))])
+    raises(r"curves\[1\] is on", ss.plot, [spline, spline_on("r:3")])
+    raises(r"curves\[0\] is a batch of 3 curves", ss.plot, [spline_on("r:2", (3, 5))])
+    raises("labels must be a list of 2 strings", ss.plot, [spline, polygon], labels=["one"])
+    raises("colors must be a list of 2 colours", ss.plot, [spline, polygon], colors="red")
+    raises(r"colors\[1\] must be a colour", ss.plot, [spline, polygon], colors=["red", "nothing"])
+    raises(r"curves\[1\]: points have shape \(6, 3\)", ss.plot, [spline, (T, np.zeros((6, 3)))])
+    raises(r"curves\[1\]: all points are missing", ss.plot, [spline, (T, np.full((6, 2), np.nan))])
+    dates = np.datetime64("2024-01-01") + np.arange(6)
+    raises(r"curves\[1\] has dates as times", ss.plot, [spline, spline_on("r:2", t=dates)])
+    for wrong in (3, "sphere:2", [spline, 3]):
+        with pytest.raises(TypeError, match=r"^curves"):
+            ss.plot(wrong)

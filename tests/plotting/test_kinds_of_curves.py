@@ -1,0 +1,135 @@
+"""Plots of all classes of curves, of gaps, of times far from zero, and of batches."""
+
+import numpy as np
+import pytest
+from drawn import axes_named, lines_of, points_around, rate_axes, rendered, spline_on, texts_of
+
+import symspline as ss
+
+NAMES = ["euclidean:1", "euclidean:2", "sphere:2", "so:3", "spd:2", "gr:2,5", "cp:1", "rp:2", "hyperbolic:2"]
+T = np.array([0.0, 1.1, 1.9, 3.2, 4.0, 5.3])
+
+
+def bezier(name):
+    space = ss.space(name)
+    return ss.BezierCurve(points_around(space, np.random.default_rng(1), (5,)), space)
+
+
+CURVES = {
+    "B-spline": lambda name: ss.BSpline([0, 0, 0, 0, 1, 2, 2, 2, 2], bezier(name).control_points, 3, name),
+    "Bézier curve": bezier,
+    "Piecewise geodesic": lambda name: ss.PiecewiseGeodesic(T, spline_on(name, t=T).points, name),
+    "Retimed curve": lambda name: spline_on(name, t=T).restrict(0.5, 3.5),
+    "Segmented curve": lambda name: ss.SegmentedCurve([spline_on(name, t=T), spline_on(name, t=T + 15)]),
+    "C¹ Hermite spline": lambda name: spline_on(name, t=T).restrict(1.1, 4.0),
+}
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("kind", CURVES)
+def test_every_kind_of_curve_is_drawn(kind, name):
+    curve = CURVES[kind](name)
+    figure = rendered(curve.plot())
+    assert f"{kind} on {curve.space!r}" in texts_of(figure)
+    for axes, nu in zip([own[0] for own in rate_axes(figure)], (1, 2), strict=True):
+        line = np.concatenate(lines_of(axes))
+        x = line[::7, 0]
+        norm = curve.space.norm(curve(x), curve(x, nu))
+        np.testing.assert_allclose(np.abs(line[::7, 1]), norm, atol=1e-6)
+
+
+def test_notebooks_show_every_kind():
+    for make in CURVES.values():
+        assert "<img" in make("euclidean:2")._repr_html_()
+
+
+def test_given_points_of_a_part_are_those_of_the_whole():
+    """The ends of a part are not given points; those between are."""
+    part = spline_on("r:2", t=T).restrict(0.5, 3.5)
+    (dots,) = [line.get_xydata() for line in part.plot().axes[0].lines if line.get_label() == "_given"]
+    np.testing.assert_allclose(dots, spline_on("r:2", t=T)(T[1:4]), atol=1e-12)
+    mirrored = bezier("r:2").reverse().plot()
+    assert not [line for line in mirrored.axes[0].lines if line.get_label() == "_given"]
+
+
+@pytest.mark.parametrize("name", ["r:1", "r:2", "so:3", "se:3", "sphere:2 x r:1"])
+def test_gaps_between_segments_are_shaded_and_lines_stop(name):
+    if " x " in name:
+        space, rng = ss.space(name), np.random.default_rng(0)
+        points = tuple(points_around(own, rng, (6,)) for own in space.factors)
+        segments = [ss.CubicSpline(T + shift, points, space) for shift in (0, 15)]
+    else:
+        segments = [spline_on(name, t=T), spline_on(name, t=T + 15)]
+    figure = rendered(ss.SegmentedCurve(segments).plot())
+    assert "2 segments, 1 gap" in texts_of(figure)
+    axes = rate_axes(figure)[0][0]
+    (band,) = [own for own in axes.collections if own.get_label() == "gaps"]
+    assert sorted(set(band.get_paths()[0].vertices[:, 0])) == [5.3, 15.0]
+    assert [line[[0, -1], 0].tolist() for line in lines_of(axes)] == [[0.0, 5.3], [15.0, 20.3]]
+
+
+def test_segments_that_meet_are_not_joined_where_velocities_differ():
+    second = ss.CubicSpline([1, 2], [[1.0], [5.0]], "r:1")
+    whole = ss.SegmentedCurve([ss.CubicSpline([0, 1], [[0.0], [1.0]], "r:1"), second])
+    figure = whole.plot()
+    assert "2 segments, 0 gaps" in texts_of(figure)
+    first, last = lines_of(axes_named(figure, "velocity"))
+    np.testing.assert_allclose(first[:, 1], 1.0)
+    np.testing.assert_allclose(last[:, 1], 4.0)
+
+
+@pytest.mark.parametrize(
+    ("t", "name", "ends"),
+    [
+        (1305031102.175 + np.arange(6), "t − 1305031100", [2.175, 7.175]),
+        (1_700_000_000_000_000_001 + np.arange(6), "t − 1700000000000000000", [1.0, 6.0]),
+        (-5e6 + 0.1 * np.arange(6), "t − -5000000", [0.0, 0.5]),
+        (np.arange(6) + 50.0, "t", [50.0, 55.0]),
+        (np.arange(6).astype("m8[s]"), "t, seconds", [0.0, 5.0]),
+    ],
+)
+def test_times_far_from_zero_are_differences_from_a_round_number(t, name, ends):
+    axes = axes_named(rendered(spline_on("r:2", t=t).plot()), "acceleration")
+    assert axes.get_xlabel() == name and axes.xaxis.get_offset_text().get_text() == ""
+    np.testing.assert_allclose(lines_of(axes)[0][[0, -1], 0], ends, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["euclidean:1", "sphere:1"])
+def test_quantiles_of_a_batch(name):
+    space, rng = ss.space(name), np.random.default_rng(4)
+    middle = space.random_point(rng)
+    points = space.exp(middle, 0.3 * space.random_tangent(rng, np.broadcast_to(middle, (40, 6, *space.point_shape))))
+    batch = ss.CubicSpline(T, points, space)
+    figure = rendered(batch.plot())
+    assert "5–95 % of 40 curves" in texts_of(figure)
+    for axes in figure.axes:
+        assert len(lines_of(axes)) == 5
+    axes = axes_named(figure, "velocity")
+    (band,) = [own for own in axes.collections if own.get_label() == "_quantiles"]
+    corners = band.get_paths()[0].vertices
+    x = np.unique(corners[:, 0])[100:200:20]
+    velocities, at = batch(x, 1), batch(x)
+    # The sign is that of the increasing angle or number.
+    signed = velocities[..., 0]
+    if name == "sphere:1":
+        signed = at[..., 0] * velocities[..., 1] - at[..., 1] * velocities[..., 0]
+    for time, values in zip(x, signed.T, strict=True):
+        drawn = corners[corners[:, 0] == time, 1]
+        expected = np.quantile(values, [0.05, 0.95])
+        np.testing.assert_allclose([drawn.min(), drawn.max()], expected, atol=1e-9)
+
+
+def test_angles_of_a_batch_are_unwrapped_beside_each_other():
+    angles = np.pi - 0.1 + np.linspace(0, 0.4, 6) * np.linspace(0.8, 1.2, 20)[:, None]
+    batch = ss.CubicSpline(T, np.stack([np.cos(angles), np.sin(angles)], axis=-1), "sphere:1")
+    axes = axes_named(batch.plot(), "angle, degrees")
+    (band,) = [own for own in axes.collections if own.get_label() == "_quantiles"]
+    corners = band.get_paths()[0].vertices
+    assert np.ptp(corners[:, 1]) < 40
+
+
+def test_curves_with_their_own_times_have_no_quantiles():
+    t = T + np.linspace(0, 1, 12)[:, None]
+    figure = rendered(spline_on("r:1", (12, 6), t).plot())
+    assert not any("5–95 %" in text for text in texts_of(figure))
+    assert len(lines_of(figure.axes[0])) == 5

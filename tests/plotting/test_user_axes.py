@@ -1,0 +1,145 @@
+"""Pictures in axes of the user: which axes they need, colours, legends, and styles."""
+
+import matplotlib
+import matplotlib.style
+import numpy as np
+import pytest
+from drawn import lines_of, rendered, spline_on
+from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
+from refused import raises
+from test_figure import KINDS
+
+import symspline as ss
+
+ONE_OF_EACH = {draw: name for name, draw in KINDS.items()}.values()
+
+
+def axes_for(name, figure=None):
+    projection = "3d" if name in ("euclidean:3", "se:3") else None
+    return (figure or Figure(figsize=(6, 5))).add_subplot(projection=projection)
+
+
+@pytest.mark.parametrize("name", ONE_OF_EACH)
+def test_every_picture_is_drawn_into_axes(name):
+    ax = axes_for(name)
+    assert spline_on(name).plot(ax=ax, title="mine") is ax
+    assert ax.get_title() == "mine"
+    assert ax.get_figure().axes == [ax]
+    rendered(ax.get_figure())
+
+
+def test_the_projection_is_checked():
+    flat, solid = axes_for("r:2"), axes_for("se:3")
+    raises(r"needs axes with projection='3d'", spline_on("r:3").plot, ax=flat)
+    raises(r"needs axes with no projection", spline_on("r:2").plot, ax=solid)
+    raises("one picture per factor", spline_on_product().plot, ax=flat)
+    with pytest.raises(TypeError, match=r"^ax must be axes of matplotlib"):
+        spline_on("r:2").plot(ax="left")
+
+
+def spline_on_product():
+    return ss.CubicSpline(None, (np.arange(4.0)[:, None], np.arange(4.0)[:, None]), "r:1 x r:1")
+
+
+def test_colours_and_legends():
+    """Colours come from the property cycle, and the start of the first curve is named."""
+    ax = axes_for("r:2")
+    first, second = spline_on("r:2"), ss.CubicSpline(None, np.random.default_rng(5).normal(size=(4, 2)), "r:2")
+    first.plot(ax=ax, label="first")
+    second.plot(ax=ax, label="second")
+    second.plot(ax=ax, color="tab:red", label="third")
+    lines = [line for line in ax.lines if line.get_gid() == "_curve"]
+    assert [to_hex(line.get_color()) for line in lines] == ["#1f77b4", "#ff7f0e", "#d62728"]
+    assert ax.get_legend_handles_labels()[1] == ["first", "start", "second", "third"]
+    # The limits contain all curves.
+    for line in lines:
+        (low, high), x = ax.get_xlim(), line.get_xdata()
+        assert low <= x.min() and x.max() <= high
+
+
+def test_limits_of_boxes_contain_all_curves():
+    ax = axes_for("se:3")
+    curves = [ss.CubicSpline(None, shift + np.eye(3), "r:3") for shift in (0, 50, -20)]
+    for curve in curves:
+        curve.plot(ax=ax)
+    assert ax.get_xlim()[0] < -20 and ax.get_xlim()[1] > 50
+
+
+def test_times_and_frames_of_the_user_stay():
+    ax = axes_for("r:1")
+    ax.set_xlabel("hours")
+    t = 1305031102.0 + np.arange(6)
+    spline_on("r:1", t=t).plot(ax=ax)
+    assert ax.get_xlabel() == "hours" and ax.spines["top"].get_visible()
+    np.testing.assert_allclose(lines_of(ax)[0][[0, -1], 0], t[[0, -1]])
+
+
+def test_views_that_depend_on_the_curves_are_drawn_once():
+    ax = axes_for("sphere:2")
+    spline_on("sphere:2").plot(ax=ax)
+    raises(r"symspline.plot\(\[first, second\], ax=ax\)", spline_on("sphere:2").plot, ax=ax)
+
+
+def test_invalid_options():
+    plot = spline_on("r:2").plot
+    raises("color must be a colour of matplotlib", plot, color="no colour")
+    raises("figsize must be width and height", plot, figsize=(1, -1))
+    raises("figsize must be width and height", plot, figsize=(1, np.nan))
+    raises("figsize and ax exclude each other", plot, figsize=(5, 4), ax=axes_for("r:2"))
+    raises("file and ax exclude each other", plot, "a.png", ax=axes_for("r:2"))
+    for name in ("label", "title", "show"):
+        with pytest.raises(TypeError, match=f"^{name} must be"):
+            plot(**{name: 3})
+
+
+def test_title_colour_label_and_size_of_a_page():
+    figure = spline_on("r:2").plot(title="A drive", color="tab:green", label="car", figsize=(9, 5))
+    assert figure.get_size_inches().tolist() == [9, 5]
+    texts = [text.get_text() for text in figure.findobj(matplotlib.text.Text)]
+    assert {"A drive", "car", "start", "given points"} <= set(texts)
+    assert {line.get_color() for axes in figure.axes for line in axes.lines if line.get_gid()} == {"tab:green"}
+
+
+def luminance(color):
+    return matplotlib.colors.to_rgb(color) @ np.array([0.3, 0.6, 0.1])
+
+
+@pytest.mark.parametrize("name", ["euclidean:2", "sphere:2", "euclidean:3", "so:3", "hyperbolic:2"])
+def test_dark_styles(name):
+    with matplotlib.style.context("dark_background"):
+        page = rendered(spline_on(name).plot())
+        ax = axes_for(name)
+        spline_on(name).plot(ax=ax, color="tab:olive")
+        rendered(ax.get_figure())
+    assert luminance(page.get_facecolor()[:3]) < 0.1
+    for text in page.findobj(matplotlib.text.Text):
+        assert not text.get_text() or luminance(text.get_color()) > 0.5
+    for axes in (*page.axes, ax):
+        for line in axes.lines:
+            if line.get_gid() == "_curve":
+                assert luminance(line.get_color()) > 0.3
+    # The colour of the user remains.
+    own = [line for line in ax.lines if line.get_gid() == "_curve"]
+    assert all(to_hex(line.get_color()) == to_hex("tab:olive") for line in own)
+
+
+def test_font_sizes_follow_the_user():
+    def size(figure):
+        (text,) = [own for own in figure.findobj(matplotlib.text.Text) if own.get_text().startswith("C² spline")]
+        return text.get_fontsize()
+
+    usual = size(spline_on("r:2").plot())
+    with matplotlib.rc_context({"font.size": 15}):
+        assert size(spline_on("r:2").plot()) == pytest.approx(1.5 * usual)
+
+
+def test_windows_use_pyplot(monkeypatch):
+    from matplotlib import pyplot
+
+    monkeypatch.setattr(pyplot, "show", lambda: shown.append(pyplot.get_fignums()))
+    pyplot.switch_backend("agg")
+    shown = []
+    figure = spline_on("r:3").plot(show=True)
+    assert shown == [[figure.number]]
+    pyplot.close(figure)
