@@ -1,8 +1,9 @@
 """Fit C² splines to the points in a table, through them or, with --smooth, near them
 
 A table is a CSV, NPZ, Parquet, JSON, GeoJSON or GPX file or a TUM trajectory; the ending of its name or --from selects
-the format. Every row is a point at a time. Times are numbers, or ISO dates such as 2021-08-29, 2021-08-29 16:55 or 2021-08-29T16:55:00.5+02:00,
-all written in the same way. Dates with Z or an offset are converted to UTC, and rates are per second.
+the format. Every row is a point at a time. Times are numbers, or ISO dates such as 2021-08-29, 2021-08-29 16:55 or
+2021-08-29T16:55:00.5+02:00, all written in the same way. Dates with Z or an offset are converted to UTC, and rates are
+per second.
 
 The numbers of a point are in columns in the order of its array, and --columns names them in that order: a matrix
 row by row, in a product one factor after the other. A complex number A has the columns A_re and A_im, which --columns
@@ -15,9 +16,9 @@ datetime or timestamp, in the plural or with words such as iso, utc, unix, base,
 The command asks if another column seems to hold times. Without any, times are 0, 1, 2, ...
 
 CSV files name the columns in their first line; blank lines are skipped. Cells are separated by commas, semicolons or
-tabs, and between semicolons numbers may have decimal commas. In an NPZ file columns are arrays with one
-entry per row, which may be complex, or vectors or matrices; an array `points` may hold all numbers of the points. A
-.tum or .txt file is a trajectory of the TUM benchmark: time tx ty tz qx qy qz qw.
+tabs, and between semicolons numbers may have decimal commas. In an NPZ file columns are arrays with one entry per row,
+which may be complex, or vectors or matrices; an array `points` may hold all numbers of the points. A .tum or .txt file
+is a trajectory of the TUM benchmark: time tx ty tz qx qy qz qw.
 
 Curves pass through the points. --smooth is for noisy points: the curve passes near them, as smooth as the data
 suggest, and symspline sample also writes its standard deviation.
@@ -41,8 +42,8 @@ examples:
   symspline fit car.csv --smooth --space r:2 --columns x,y --sigma 3 --velocities vx,vy --velocity-sigma 0.1
       --penalty jerk -o car.npz
 
-symspline.load reads the curve in Python. With --curve, it returns a dictionary of all curves by name, and with --max-gap
-alone a SegmentedCurve.
+symspline.load reads the curve in Python. With --curve, it returns a dictionary of all curves by name, and with
+--max-gap alone a SegmentedCurve.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """Make a table of points along curves
 
 The table is a CSV, NPZ, Parquet, JSON, GeoJSON or GPX file or a TUM trajectory; the ending of its name or --to selects
-the format. Columns are the time, the name of the curve if there are several, and the numbers of the point. They are named as in the table that
-was fitted, or x0, x1, ... in the order of the array, m11, m12, ... for a matrix, row by row, and x0_re and x0_im for
-a complex number.
+the format. Columns are the time, the name of the curve if there are several, and the numbers of the point. They are
+named as in the table that was fitted, or x0, x1, ... in the order of the array, m11, m12, ... for a matrix, row by row,
+and x0_re and x0_im for a complex number.
 
 --nu 1 writes the velocity, x0_d1, ... or x0_d1_re, ..., and --nu 2 the covariant acceleration, x0_d2, ..., per unit of
 time, which is a second for dates. For longitude and latitude these are east_d1, north_d1, ..., in degrees of arc. For
