@@ -9,8 +9,8 @@ few poses of the arm, and want the fastest smooth motion through them.
 # %%
 # Angles as numbers
 # -----------------
-# Joint angles jump from 180° to −180°. If you interpolate the numbers, a joint that crosses this jump turns the long way
-# round: here the last joint moves by 20°, and the numbers move by 340°.
+# Joint angles jump from 180° to −180°. If you interpolate the numbers, a joint that crosses this jump turns the long
+# way round: here the last joint moves by 20°, and the numbers move by 340°.
 
 import matplotlib.pyplot as plt
 import numpy as np
