@@ -452,7 +452,8 @@ def plot(spline: CubicSpline[Any, Any], file: File | None = None, *, radius: flo
 
     _check_globe(spline)
     size = checked_number(radius, "radius must be a number above 0", lambda r: 0 < r < np.inf)
-    return draw(spline, file, radius=size)
+    figure: Figure = draw(spline, file, radius=size)
+    return figure
 
 
 def _along(
