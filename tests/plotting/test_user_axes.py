@@ -101,6 +101,11 @@ def test_title_colour_label_and_size_of_a_page():
     assert {line.get_color() for axes in figure.axes for line in axes.lines if line.get_gid()} == {"tab:green"}
 
 
+def test_small_pages_are_scaled():
+    figure = rendered(spline_on("so:3").plot(figsize=(2, 1)))
+    assert figure.get_size_inches().tolist() == [2, 1]
+
+
 def luminance(color):
     return matplotlib.colors.to_rgb(color) @ np.array([0.3, 0.6, 0.1])
 

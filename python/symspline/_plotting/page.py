@@ -98,14 +98,14 @@ def draw_page(
         heights.append(_RATES_HEIGHT if count < 3 else BOTTOM + TOP + _ROW * count)
     if below:
         heights.append(residuals.height(below))
-    size = figsize or (sum(widths) if rates or wide else widths[0], sum(heights))
+    natural = (sum(widths) if rates or wide else widths[0], sum(heights))
+    # Margins are in inches, so that a smaller page is one that is scaled down.
+    size = natural if figsize is None else (max(figsize[0], natural[0]), max(figsize[1], natural[1]))
     dark = is_dark(rcParams["figure.facecolor"])
     with light_colors(dark):
         figure = new_figure(size, show)
         heights = [_HEAD, *(h * (size[1] - _HEAD) / sum(heights[1:]) for h in heights[1:])]
-        grid = figure.add_gridspec(
-            len(heights), len(widths), width_ratios=widths, height_ratios=np.maximum(heights, 1e-3)
-        )
+        grid = figure.add_gridspec(len(heights), len(widths), width_ratios=widths, height_ratios=heights)
         heading(figure, title, words, 1 - 0.5 / size[1])
         panel = figure.add_subfigure(grid[1, 0] if wide or rates else grid[1, :])
         if isinstance(space, Product):
@@ -121,6 +121,8 @@ def draw_page(
         _explain(figure, curves, 1 - 0.92 / size[1])
     if dark:
         invert_page(figure)
+    if figsize is not None:
+        figure.set_size_inches(figsize)
     return Page(figure, curves, panel)
 
 
