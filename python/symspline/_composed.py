@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from types import GenericAlias
 from typing import TYPE_CHECKING, Any, Generic, Literal, Self, overload
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ._archive import VERSION, Entries, entry, read_times, restore, times_state
 from ._arrays import short_repr
@@ -33,6 +33,8 @@ else:
     C = TypeVar("C", covariant=True)
 
 
+# Differences of values that are equal up to rounding.
+_EQUAL = 1e-9
 # Domains that overlap by rounding, in units in the last place.
 _ROUNDING = 4
 
@@ -298,6 +300,47 @@ class SegmentedCurve(ComposedCurve[P], Generic[P, C]):
     def __iter__(self) -> Iterator[C]:  # type: ignore[override]
         return iter(self._segments)
 
+    def extrema(
+        self,
+        function: Literal["speed", "acceleration"] | Callable[[Any], Any] = "speed",
+        *,
+        kind: Literal["max", "min"] = "max",
+    ) -> tuple[NDArray[Any], NDArray[np.float64]]:
+        found = [own.extrema(function, kind=kind) for own in self._segments]
+        times = np.concatenate([own[0] for own in found])
+        values = np.concatenate([own[1] for own in found])
+        sign = 1 if kind == "max" else -1
+        # Where two segments meet, their ends are extrema of the whole only if both are, or if there is a jump.
+        kept = np.ones(len(times), bool)
+        for t in self._meetings:
+            here = np.flatnonzero(times == t)
+            value = [np.asarray(_at(own, function, t)) for own in self._beside(t)]
+            if len(here) == 2:
+                kept[here[int(sign * values[here[0]] >= sign * values[here[1]])]] = False
+            elif len(here) == 1 and not sign * values[here[0]] > sign * min(value, key=lambda x: sign * x) + _EQUAL:
+                kept[here] = False
+        return times[kept], values[kept]
+
+    def solve(
+        self, function: Literal["speed", "acceleration"] | Callable[[Any], Any], value: float = 0.0
+    ) -> NDArray[Any]:
+        found = [own.solve(function, value) for own in self._segments]
+        jumps = []
+        for t in self._meetings:
+            left, right = (float(np.asarray(_at(own, function, t))) - value for own in self._beside(t))
+            if left * right < 0:
+                jumps.append(np.asarray(t)[None])
+        return np.unique(np.concatenate([*found, *jumps]))
+
+    @property
+    def _meetings(self) -> list[Any]:
+        """Times at which a segment begins where the one before ends."""
+        return [b.domain[0] for a, b in pairwise(self._segments) if b.domain[0] == a.domain[1]]
+
+    def _beside(self, t: Any) -> list[Curve[Any]]:
+        """Return both segments that meet at a time."""
+        return [own for own in self._segments if t in own.domain]
+
     def _picked(self, index: Any) -> Self:
         return self._of_segments([own[index] for own in self._segments])
 
@@ -311,6 +354,14 @@ class SegmentedCurve(ComposedCurve[P], Generic[P, C]):
         if not kept:
             raise ValidationError("there is no segment between a and b, which are in one gap")
         return self._of_segments(kept)
+
+    def _reversed(self) -> Curve[P]:
+        first, last = (np.asarray(end)[()] for end in self.domain)
+        turned = []
+        for own in reversed(self._segments):
+            start, stop = (np.asarray(end)[()] for end in own.domain)
+            turned.append(own._reversed()._shifted((first - start) + (last - stop)))
+        return self._of_segments(turned)
 
     def _shifted(self, step: Any) -> Curve[P]:
         return self._of_segments([own._shifted(step) for own in self._segments])
@@ -332,6 +383,15 @@ class SegmentedCurve(ComposedCurve[P], Generic[P, C]):
     def __repr__(self) -> str:
         batch = f"{' x '.join(map(str, self._batch))} curves, " if self._batch else ""
         return f"<SegmentedCurve on {self.space!r}: {batch}{len(self)} segments, {self._span_text}>"
+
+
+def _at(curve: Curve[Any], function: Any, t: Any) -> Any:
+    """Return a quantity of a segment at a time, as `Curve.extrema` names it."""
+    if callable(function):
+        return np.asarray(function(np.asarray(t)[None]))[0]
+    return curve._curve.evaluate(
+        curve._core_times(t, "x")[0], {"speed": "speed"}.get(function, "bend"), "continue", False
+    )
 
 
 def _checked_segments(curves: Any) -> tuple[Any, ...]:

@@ -406,4 +406,4 @@ def _time_text(x: Any) -> str:
     """Return a time in a few characters; dates without the zeros at their end."""
     if isinstance(x, np.datetime64):
         return re.sub(r"(:00)?\.?0*$", "", str(x)) if "." in str(x) else str(x)
-    return f"{float(x):.6g}"
+    return f"{float(x):.6g}" if abs(float(x)) < 1e6 else f"{float(x):.13g}"

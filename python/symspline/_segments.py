@@ -161,12 +161,17 @@ def fit_segments(
             f"max_gap={max_gap}, and the median step is {np.median(steps) if len(steps) else 0:.3g}"
         )
     if not smooth:
-        return SegmentedCurve(fit_many(curves, space, **options))
+        return SegmentedCurve(fit_many(curves, space, **options), extrapolate=_policy(options))
     own = [
         (*curve, {key: _of_rows(value, kept) for key, value in weight_options.items()})
         for curve, kept in zip(curves, rows, strict=True)
     ]
-    return SegmentedCurve(smooth_many(own, space, **options))
+    return SegmentedCurve(smooth_many(own, space, **options), extrapolate=_policy(options))
+
+
+def _policy(options: dict[str, Any]) -> Any:
+    """Return the extrapolation policy of the whole. Gaps are NaN; other policies apply to single segments only."""
+    return False if options.get("extrapolate") is False else None
 
 
 def check_smooth(smooth: Any, duplicates: str, options: dict[str, Any]) -> None:
