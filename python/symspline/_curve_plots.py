@@ -120,7 +120,7 @@ class CurvePlots(CurveBase[P]):
 
         Without `ax`, a figure with several panels is created. The first panel depends on the space:
 
-        - S²: a globe and a map; H²: the Poincaré disk; R¹, R² and R³: the graph or the curve.
+        - S²: a globe and a map, or an enlarged part; H²: the Poincaré disk; R¹, R² and R³: the graph or the curve.
         - SO(3), O(3), SU(2) and S³ (unit quaternions, scalar first): rotated frames along the time axis.
         - S¹, SO(2), O(2), U(1), RP¹ and Gr(1, 2): the continuous angle against time.
         - SE(3): frames along the path of the positions; SE(2): arrow heads on it.
@@ -129,6 +129,7 @@ class CurvePlots(CurveBase[P]):
           re-enters on the opposite side.
         - Other projective spaces and Grassmannians: the principal angles to the first point.
         - SPD(2) and SPD(3): ellipses and ellipsoids along the time axis.
+        - Stiefel manifolds: the components of each column against time.
         - All other spaces: the components against time, with dashed imaginary parts. If there are more than twelve,
           the twelve with the largest ranges have names.
 

@@ -38,6 +38,7 @@ from ._warnings import warn
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 __all__ = ["EARTH_RADIUS", "cog", "compass", "from_lonlat", "plot", "resample", "sog", "to_lonlat"]
@@ -402,7 +403,48 @@ def resample(
     return found[[*own_names, *computed, *constant, *more]]
 
 
-def plot(spline: CubicSpline[Any, Any], file: File | None = None, *, radius: float = EARTH_RADIUS) -> Figure:
+@overload
+def plot(
+    spline: CubicSpline[Any, Any],
+    file: File | None = None,
+    *,
+    radius: float = EARTH_RADIUS,
+    ax: None = None,
+    color: str | tuple[float, ...] | None = None,
+    label: str | None = None,
+    title: str | None = None,
+    figsize: tuple[float, float] | None = None,
+    show: bool = False,
+) -> Figure: ...
+
+
+@overload
+def plot(
+    spline: CubicSpline[Any, Any],
+    file: None = None,
+    *,
+    radius: float = EARTH_RADIUS,
+    ax: Axes,
+    color: str | tuple[float, ...] | None = None,
+    label: str | None = None,
+    title: str | None = None,
+    figsize: None = None,
+    show: bool = False,
+) -> Axes: ...
+
+
+def plot(
+    spline: CubicSpline[Any, Any],
+    file: File | None = None,
+    *,
+    radius: float = EARTH_RADIUS,
+    ax: Axes | None = None,
+    color: str | tuple[float, ...] | None = None,
+    label: str | None = None,
+    title: str | None = None,
+    figsize: tuple[float, float] | None = None,
+    show: bool = False,
+) -> Figure | Axes:
     """Plot a track on the Earth, with land, its speed in km/h and its acceleration.
 
     Tracks that fit into a circle of 25 degrees around a point are enlarged, with a scale bar and a small globe that
@@ -416,18 +458,22 @@ def plot(spline: CubicSpline[Any, Any], file: File | None = None, *, radius: flo
         File to which the figure is saved, such as ``"track.pdf"``.
     radius : float, default EARTH_RADIUS
         Radius of the globe in metres.
+    ax : matplotlib.axes.Axes, optional
+        Axes into which the globe or the enlarged track is drawn, without the other panels.
+    color, label, title, figsize, show : optional
+        As for `symspline.CubicSpline.plot`.
 
     Returns
     -------
-    matplotlib.figure.Figure
-        The figure, which you can modify or save.
+    matplotlib.figure.Figure or matplotlib.axes.Axes
+        The figure, which you can modify or save, or `ax`.
 
     Raises
     ------
     ImportError
         If Matplotlib is not installed.
     ValidationError
-        If the curve is on another space.
+        If the curve is on another space, or an argument is invalid.
 
     See Also
     --------
@@ -448,12 +494,14 @@ def plot(spline: CubicSpline[Any, Any], file: File | None = None, *, radius: flo
     >>> figure = plot(flight)
     """
     require_matplotlib()
+    from ._plotting import checked_look
     from ._plotting import plot as draw
 
     _check_globe(spline)
     size = checked_number(radius, "radius must be a number above 0", lambda r: 0 < r < np.inf)
-    figure: Figure = draw(spline, file, radius=size)
-    return figure
+    look = checked_look(file, ax, color, label, title, figsize, show)
+    drawn: Figure | Axes = draw(spline, file, ax=ax, show=show, radius=size, **look)
+    return drawn
 
 
 def _along(

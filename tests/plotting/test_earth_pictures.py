@@ -51,7 +51,7 @@ def test_land_is_on_the_side_of_the_viewer(lon, lat):
     view = View.above(lon, lat)
     axes = Figure().add_subplot()
     land.draw_on_globe(axes, view)
-    (drawn,) = [patch for patch in axes.get_children() if patch.get_label() == "land"]
+    (drawn,) = [patch for patch in axes.get_children() if patch.get_label() == "_land"]
     points = ss.Sphere(2).random_point(np.random.default_rng(0), 600)
     points = points[points @ view.up > 0.15]
     # Matplotlib simplifies polygons by a fraction of a pixel.
@@ -64,13 +64,13 @@ def test_land_is_on_the_side_of_the_viewer(lon, lat):
 def test_coastlines_have_no_edge_along_the_date_line():
     axes = Figure().add_subplot()
     land.draw_on_globe(axes, View.above(180, -70))
-    (coast,) = [line for line in axes.lines if line.get_label() == "coastline"]
+    (coast,) = [line for line in axes.lines if line.get_label() == "_coastline"]
     steps = np.linalg.norm(np.diff(coast.get_xydata(), axis=0), axis=1)
     assert np.nanmax(steps) < 0.1
 
 
 def land_of(axes):
-    return [own for own in axes.get_children() if isinstance(own, PathPatch) and own.get_label() == "land"]
+    return [own for own in axes.get_children() if isinstance(own, PathPatch) and own.get_label() == "_land"]
 
 
 def test_whole_globe_has_land_on_both_maps():
@@ -97,10 +97,10 @@ def test_local_tracks_are_enlarged(size, has_land, length):
     assert ((high - low) / np.ptp(limits, axis=1)).max() == pytest.approx(1 / 1.22)
     assert np.ptp(limits[0]) > 1.4 * np.ptp(limits[1])
     # The outline on the small globe is that of the frame.
-    (outline,) = [line.get_xydata() for line in locator.lines if line.get_label() == "frame"]
+    (outline,) = [line.get_xydata() for line in locator.lines if line.get_label() == "_frame"]
     np.testing.assert_allclose([outline.min(axis=0), outline.max(axis=0)], limits.T)
     # The bar is as long as it says.
-    (bar,) = [line.get_xdata() for line in frame.lines if line.get_label() == "scale"]
+    (bar,) = [line.get_xdata() for line in frame.lines if line.get_label() == "_scale"]
     assert f"{np.ptp(bar) * geo.EARTH_RADIUS / 1000:.3g} km" in texts_of(figure)
     assert any(text.endswith(" km") for text in texts_of(figure)) and length
 
@@ -139,6 +139,13 @@ def test_smoothed_tracks_have_a_band_in_the_same_unit():
         t[0] + (t[-1] - t[0]) / 2, nu=1
     )
     assert np.abs(band.get_paths()[0].vertices[:, 1] - wanted).min() < 1e-3 * wanted
+
+
+def test_axes_of_the_user_have_land():
+    ax = Figure().add_subplot()
+    assert geo.plot(track(5, 40, 12.0), ax=ax, title="Rhône") is ax
+    assert land_of(ax) and ax.get_title() == "Rhône" and any(line.get_label() == "_scale" for line in ax.lines)
+    rendered(ax.figure)
 
 
 def test_other_curves_are_refused(tmp_path):

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from refused import raises
 
 import symspline as ss
-from symspline._plotting import chart, graphs, matrices, sphere
+from symspline._plotting import chart, columns, graphs, matrices, sphere
 from symspline._plotting.figure import picture_of
 
 DRAWN_BY = {
@@ -41,6 +41,7 @@ DRAWN_BY = {
     matrices.draw_ellipsoids: "spd:3",
     matrices.draw_flat_poses: "se:2",
     matrices.draw_poses: "se:3",
+    columns.draw_columns: "stiefel:2,4 stiefel:5,7",
 }
 KINDS = {name: draw for draw, names in DRAWN_BY.items() for name in names.split()}
 

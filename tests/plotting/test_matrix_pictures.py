@@ -171,7 +171,7 @@ def test_boxes_are_filled(name):
     poses[:, :3, 3] = path
     figure = rendered(ss.CubicSpline(t, poses if name == "se:3" else path, name).plot())
     axes = figure.axes[0]
-    drawn = [np.stack(line.get_data_3d(), axis=1) for line in axes.lines if line.get_label() != "shadow"]
+    drawn = [np.stack(line.get_data_3d(), axis=1) for line in axes.lines if line.get_label() != "_shadow"]
     points = np.concatenate(drawn)
     low, high = np.nanmin(points, axis=0), np.nanmax(points, axis=0)
     limits = np.array([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()])
@@ -223,6 +223,21 @@ def test_components_with_the_largest_ranges_have_names(name, shape):
     largest = [names[i] for i in np.argsort(-ranges)[: 6 if is_complex else 12]]
     expected = [f"{part} {own}" for own in largest for part in ("Re", "Im")] if is_complex else largest
     assert found == {*expected, f"{(2 if is_complex else 1) * len(names) - 12} others"}
+
+
+def test_columns_of_frames_have_a_panel_each():
+    spline = spline_on("stiefel:2,4")
+    figure = rendered(spline.plot())
+    panels = [axes_named(figure, f"column {j}") for j in (1, 2)]
+    assert panels[0].get_ylim() == panels[1].get_ylim()
+    for j, axes in enumerate(panels):
+        lines = [line for line in axes.lines if len(line.get_xdata()) > 1000]
+        drawn = np.stack([line.get_ydata() for line in lines], axis=1)
+        np.testing.assert_allclose(drawn, spline(lines[0].get_xdata())[:, :, j], atol=1e-12)
+        dots = np.stack([line.get_ydata() for line in axes.lines if line.get_marker() == "o"], axis=1)
+        np.testing.assert_allclose(dots, spline.points[:, :, j], atol=1e-12)
+    assert [text.get_text() for text in panels[0].get_legend().texts] == ["x₁", "x₂", "x₃", "x₄"]
+    assert axes_named(spline_on("stiefel:5,7").plot(), "components")
 
 
 def test_imaginary_parts_are_dashed():

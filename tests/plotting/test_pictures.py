@@ -211,7 +211,7 @@ def test_labels_of_axes_avoid_the_curve():
 def test_arrow_heads_point_along_the_curve(name):
     spline = spline_on(name)
     axes = rendered(spline.plot()).axes[0]
-    (heads,) = [own for own in axes.collections if own.get_label() == "time"]
+    (heads,) = [own for own in axes.collections if own.get_label() == "_time"]
     assert len(heads.get_offsets()) == 3
     line = max((line for line in lines_of(axes)), key=lambda line: np.isfinite(line[:, 0]).sum())
     for path, at in zip(heads.get_paths(), heads.get_offsets(), strict=True):
@@ -221,7 +221,7 @@ def test_arrow_heads_point_along_the_curve(name):
         assert tip @ along / np.linalg.norm(along) > 0.99
     # A point at rest has no direction.
     rest = ss.CubicSpline(None, np.stack([spline.points[0]] * 3), spline.space)
-    assert not [own for own in rendered(rest.plot()).axes[0].collections if own.get_label() == "time"]
+    assert not [own for own in rendered(rest.plot()).axes[0].collections if own.get_label() == "_time"]
 
 
 def test_small_curve_on_the_half_sphere_is_enlarged():

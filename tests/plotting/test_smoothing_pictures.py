@@ -37,7 +37,8 @@ def bands_of(axes):
 
 
 # One of every kind of picture.
-NAMES = [*{draw: name for name, draw in KINDS.items()}.values(), "rp:3", "ch:2", "spd:4", "u:3"]
+NAMES = [name for name in {draw: name for name, draw in KINDS.items()}.values() if not name.startswith("stiefel")]
+NAMES += ["rp:3", "ch:2", "spd:4", "u:3"]
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -33,5 +33,5 @@ def draw_arrows(axes: Axes, curve: Curve, positions: Array) -> None:
     look = {"offsets": middles, "offset_transform": axes.transData, "clip_on": False, "zorder": 4.5}
     scale = Affine2D().scale(1.0 if curve.alone else 0.8) + axes.figure.dpi_scale_trans
     heads = PolyCollection(list(_HEAD @ turns), facecolor=curve.color, linewidth=0, transform=scale, **look)
-    heads.set_label("time")
+    heads.set_label("_time")
     axes.add_collection(heads)

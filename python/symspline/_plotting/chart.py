@@ -84,7 +84,7 @@ def box(
     # No side is shorter than a fifth of the longest one.
     sides = np.maximum(np.ptp(everything, axis=0) / 2 + 2 * margin * half, 0.2 * half)
     for line in lines:
-        look: Any = {"color": GRID, "linewidth": 1.2, "zorder": 2, "label": "shadow"}
+        look: Any = {"color": GRID, "linewidth": 1.2, "zorder": 2, "label": "_shadow"}
         axes.plot(*line.T[:2], np.full(len(line), middle[2] - sides[2]), **look)
     axes.tick_params(color=EDGE, labelcolor=INK, labelsize=8, pad=0)
     axes.set_box_aspect(tuple(sides), zoom=0.95)

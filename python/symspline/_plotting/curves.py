@@ -104,6 +104,8 @@ class Curve:
         First point of a curve of which this is a segment.
     batch : Batch or None
         The batch of which this is the first of a few curves.
+    radius : float or None
+        Radius of the Earth in metres, if the curve is one of longitude and latitude.
     """
 
     data: AnyCurve
@@ -123,6 +125,11 @@ class Curve:
     segments: tuple[Curve, ...] = ()
     reference: Any = None
     batch: Batch | None = None
+    radius: float | None = None
+
+    def on_earth(self, radius: float | None) -> Curve:
+        """Return the curve with a radius of the Earth."""
+        return replace(self, radius=radius, segments=tuple(replace(own, radius=radius) for own in self.segments))
 
     @property
     def space(self) -> Space:

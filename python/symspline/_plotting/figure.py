@@ -17,7 +17,7 @@ from .._arrays import short_repr
 from .._core import ValidationError
 from .._disk import path_of, replacing
 from .._spaces import Space, cover_of, factors_of
-from . import chart, graphs, matrices, sphere
+from . import chart, columns, graphs, matrices, sphere
 from .curves import Curve
 from .style import DPI, INK, points
 
@@ -67,6 +67,7 @@ _DRAWN: list[tuple[str, Callable[[Any, Sequence[Curve]], None], tuple[float, ...
 ]
 _PICTURES = {name: Picture(draw, *size) for names, draw, size in _DRAWN for name in names.split()}
 _FAMILIES = dict.fromkeys(("rp", "cp", "hp", "gr", "cgr"), Picture(graphs.draw_principal_angles, 10.5, 3.8))
+_FAMILIES["stiefel"] = Picture(columns.draw_columns, 10.5, 4.6)
 _FAMILIES["ch"] = Picture(graphs.draw_ratios, 10.5, 3.8)
 # Spaces whose picture shows the band.
 BANDED = {"euclidean:1", "euclidean:2", "euclidean:3", "hyperbolic:2", "sphere:1", "sphere:2"}
@@ -152,14 +153,14 @@ def picture_of_factors(curves: Sequence[Curve]) -> Picture:
     """Return the picture of a product space, which has the pictures of its factors."""
     factors = factors_of(curves[0].space)[:FACTORS]
     rows = 1 if len(factors) <= 3 else 2
-    columns = -(-len(factors) // rows)
+    width = -(-len(factors) // rows)
 
     def draw(panel: SubFigure, curves: Sequence[Curve]) -> None:
-        cells = np.asarray(panel.subfigures(2 * rows, columns, height_ratios=[0.3, 4.3] * rows))
+        cells = np.asarray(panel.subfigures(2 * rows, width, height_ratios=[0.3, 4.3] * rows))
         for i, factor in enumerate(factors):
-            row, column = divmod(i, columns)
+            row, column = divmod(i, width)
             caption, cell = cells[2 * row : 2 * row + 2, column]
             caption.text(0.5, 0.3, repr(factor), ha="center", color=INK, fontsize=points(12))
             draw_picture(cell, factor, [curve.part(i) for curve in curves])
 
-    return Picture(draw, 4.8 * columns, 4.6 * rows)
+    return Picture(draw, 4.8 * width, 4.6 * rows)

@@ -56,11 +56,11 @@ def draw_on_globe(axes: Axes, view: View) -> None:
             # which this circle compensates.
             outlines.append(Outline.unit_circle())
     if outlines:
-        look = {"facecolor": LAND, "linewidth": 0, "zorder": 1, "label": "land"}
+        look = {"facecolor": LAND, "linewidth": 0, "zorder": 1, "label": "_land"}
         land = axes.add_artist(PathPatch(Outline.make_compound_path(*outlines), **look))
         land.set_clip_path(Circle((0, 0), 1, transform=axes.transData))
     broken = [np.concatenate([line, np.full((1, 3), np.nan)]) for _, line in _coasts()]
-    axes.plot(*view.visible(np.concatenate(broken)).T, color=EDGE, linewidth=0.5, zorder=1.5, label="coastline")
+    axes.plot(*view.visible(np.concatenate(broken)).T, color=EDGE, linewidth=0.5, zorder=1.5, label="_coastline")
 
 
 def _azimuth_steps(points: Array, view: View) -> Array:
@@ -75,7 +75,7 @@ def _outline(points: Array, steps: Array, view: View) -> Array:
     hidden = points @ view.up <= 0
     long = np.flatnonzero((np.abs(steps) > _CHORD) & hidden[1:] & hidden[:-1])
     parts, done = [], 0
-    for i in long:
+    for i in long.tolist():
         angles = np.arctan2(flat[i, 1], flat[i, 0]) + np.linspace(0, steps[i], int(abs(steps[i]) / _CHORD) + 2)[1:-1]
         parts += [flat[done : i + 1], np.stack([np.cos(angles), np.sin(angles)], axis=-1)]
         done = i + 1
@@ -85,4 +85,4 @@ def _outline(points: Array, steps: Array, view: View) -> Array:
 def draw_on_map(axes: Axes) -> None:
     """Draw the land on a map of all longitudes and latitudes."""
     whole = Outline.make_compound_path(*map(Outline, rings()))
-    axes.add_artist(PathPatch(whole, facecolor=LAND, edgecolor=EDGE, linewidth=0.4, zorder=0.5, label="land"))
+    axes.add_artist(PathPatch(whole, facecolor=LAND, edgecolor=EDGE, linewidth=0.4, zorder=0.5, label="_land"))

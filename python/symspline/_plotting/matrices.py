@@ -25,7 +25,7 @@ from .chart import SHADOW, box, plane
 from .curves import Curve
 from .rows import REACH, VIEW, Rows
 from .sphere import caps
-from .style import AXES, DATA, INK, Array, legend, time_colors, window
+from .style import AXES, DATA, INK, Array, legend, points, time_colors, window
 
 _ARROW = np.array([[1.0, 0.0], [-0.7, 0.55], [-0.35, 0.0], [-0.7, -0.55]])
 """A body in the plane that points along its first axis."""
@@ -47,8 +47,8 @@ def _draw_rotations(matrices: Callable[[Any], Array], panel: SubFigure, curves: 
     length = min(REACH, 0.48 * rows.height)
     words = _left_out(rows, curves)
     for i, row in enumerate(rows.rows):
-        times, points, radii = rows.symbols(i, 0.9 * length)
-        frames = matrices(points)
+        times, symbols, radii = rows.symbols(i, length)
+        frames = matrices(symbols)
         if radii is not None:
             _draw_discs(rows, i, times, length, frames, radii)
             words = "discs: 95 % bands"
@@ -177,8 +177,8 @@ def draw_poses(panel: SubFigure, curves: Sequence[Curve]) -> None:
                 curve.draw_dots(axes, curve.given[:, :3, 3])
     bold = sum(len(curve.samples(number)["bold"][0]) for curve in curves)
     count = sum(len(curve.given) for curve in curves)
-    given = "bold: given" if bold == count else f"bold: {bold} of {count} given"
-    words = curves[0].legend_of(given, "bold: curve", "light: data")
+    name = "bold: given" if bold == count else f"bold: {bold} of {count} given"
+    words = curves[0].legend_of(name, "bold: curve", "light: data")
     _explain(axes, f"{words}; {SHADOW}", height=-0.08)
 
 
@@ -219,14 +219,14 @@ def _draw_in_rows(view: Array, panel: SubFigure, curves: Sequence[Curve]) -> Non
     inches = min(REACH / across, 0.45 * rows.height / high)
     words = ["half axes: √eigenvalues", _left_out(rows, curves)]
     for i in range(len(rows.rows)):
-        times, points, radii = rows.symbols(i, 1.05 * inches * across)
-        _draw_row(rows, i, inches, times, view @ points @ view.T, radii)
+        times, symbols, radii = rows.symbols(i, 1.05 * inches * across)
+        _draw_row(rows, i, inches, times, view @ symbols @ view.T, radii)
         if radii is not None:
             words[1] = "shaded: 95 % bands"
     # The scale to the right of the words is an inch wide, and the view as well.
     has_view = len(view) == 3
-    text = fill("; ".join(filter(None, words)), int((rows.width - 1 - has_view) / 0.075))
-    rows.axes.text(0, 1.02, text, transform=rows.axes.transAxes, color=INK, fontsize=9, va="bottom")
+    text = fill("; ".join(filter(None, words)), max(14, int((rows.width - 1 - has_view) / 0.075)))
+    rows.axes.text(0, 1.02, text, transform=rows.axes.transAxes, color=INK, fontsize=points(9), va="bottom")
     _draw_scale(rows, inches, 1.0 * has_view)
     if has_view:
         rows.draw_view()
@@ -241,12 +241,14 @@ def _draw_scale(rows: Rows, inches: float, right: float) -> None:
     longest = 0.8 / inches
     power = 10.0 ** np.floor(np.log10(longest))
     length = max(step for step in (power, 2 * power, 5 * power) if step < 1.01 * longest)
-    end, height = 1 - right / rows.width, 1 + 0.14 / (rows.height * len(rows.rows))
-    ends = [end - length * inches / rows.width, end]
+    # The whole width of the axes, also if symbols have a margin in them.
+    width = rows.axes.bbox.width / rows.axes.figure.dpi
+    end, height = 1 - right / width, 1 + 0.14 / (rows.height * len(rows.rows))
+    ends = [end - length * inches / width, end]
     look: dict[str, Any] = {"transform": rows.axes.transAxes, "color": INK, "clip_on": False}
     rows.axes.plot(ends, [height, height], "|-", linewidth=1.2, markersize=5, **look)
-    start = ends[0] - 0.05 / rows.width
-    rows.axes.text(start, height, f"{length:g}", fontsize=9, ha="right", va="center_baseline", **look)
+    start = ends[0] - 0.05 / width
+    rows.axes.text(start, height, f"{length:g}", fontsize=points(9), ha="right", va="center_baseline", **look)
 
 
 def _draw_row(rows: Rows, row: int, inches: float, times: Array, matrices: Array, radii: Array | None) -> None:
@@ -257,7 +259,7 @@ def _draw_row(rows: Rows, row: int, inches: float, times: Array, matrices: Array
     touch both.
     """
     axes, name = rows.axes, rows.rows[row].name
-    first, last = axes.get_xlim()
+    first, last = (edge([float(own.curve.times[i]) for own in rows.rows]) for edge, i in ((min, 0), (max, -1)))
     colors = time_colors((times - first) / (last - first))
     if name == "data":
         colors[:] = to_rgba(INK)

@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from .._spaces import Product, cover_of, factors_of
-from . import residuals, sphere
+from . import residuals
 from .collect import axis_of, curves_of
 from .curves import BAND, DATA_DOTS, DOTS, FAINT, QUANTILES, START, Curve
 from .figure import BANDED, FACTORS, draw_picture, finish, new_figure, picture_of, picture_of_factors
@@ -63,17 +63,15 @@ def page_of(
     show: bool = False,
     radius: float | None = None,
 ) -> Page:
-    """Draw the page of a curve.
-
-    The radius in metres is that of the Earth, if a curve on S² is one of longitude and latitude.
-    """
+    """Draw the page of a curve, on the Earth if its radius in metres is given."""
     color = kept_color(color, is_dark(rcParams["figure.facecolor"]))
     curves, words = curves_of(curve, _axis(curve), color, label)
+    curves = [own.on_earth(radius) for own in curves]
     space = curve.space
     has_band = [str(cover_of(own)) in BANDED for own in factors_of(space)]
     below = residuals.panels_of(curve, curves[0], has_band)
     title = title or shorten(f"{curve._kind} on {space!r}", 63, placeholder=" …")
-    return draw_page(curves, title, words + _description(curve, curves), figsize, show, below, radius)
+    return draw_page(curves, title, words + _description(curve, curves), figsize, show, below)
 
 
 def draw_page(
@@ -83,7 +81,6 @@ def draw_page(
     figsize: tuple[float, float] | None = None,
     show: bool = False,
     below: Sequence[Any] = (),
-    radius: float | None = None,
 ) -> Page:
     """Draw a heading, the picture of the space, rates and further panels."""
     space = curves[0].space
@@ -110,12 +107,10 @@ def draw_page(
         panel = figure.add_subfigure(grid[1, 0] if wide or rates else grid[1, :])
         if isinstance(space, Product):
             picture.draw(panel, curves)
-        elif radius is not None:
-            sphere.draw_earth(radius, panel, [part for curve in curves for part in curve.unbroken])
         else:
             draw_picture(panel, space, curves)
         if rates:
-            draw_rates(figure.add_subfigure(grid[2, 0] if wide else grid[1, 1]), curves, FACTORS, columns, radius)
+            draw_rates(figure.add_subfigure(grid[2, 0] if wide else grid[1, 1]), curves, FACTORS, columns)
         if below:
             residuals.draw(figure.add_subfigure(grid[-1, :]), curves[0], below)
         _explain(figure, curves, 1 - 0.92 / size[1])
@@ -137,12 +132,13 @@ def _plot_into(
     label: str | None = None,
     title: str | None = None,
     show: bool = False,
+    radius: float | None = None,
 ) -> Any:
     """Draw the picture of a curve into axes."""
     check_axes(ax, curve.space)
     color = kept_color(color or next_color(ax), has_dark_background(ax))
     curves, _ = curves_of(curve, _axis(curve, raw=True), color, label)
-    return draw_into(ax, curves, title, show)
+    return draw_into(ax, [own.on_earth(radius) for own in curves], title, show)
 
 
 def _description(spline: Any, curves: Sequence[Curve]) -> str:

@@ -95,10 +95,6 @@ def draw_into(ax: Axes, curves: Sequence[Curve], title: str | None, show: bool) 
             own = getattr(ax, f"get_{name}lim")()
             getattr(ax, f"set_{name}lim")(min(low, own[0]), max(high, own[1]))
     _name_start(ax)
-    for artist in ax.get_children():
-        # Arrow heads, shadows and scale bars are not in legends of the user.
-        if artist not in before and artist.get_label() in ("time", "shadow", "scale"):
-            artist.set_label(f"_{artist.get_label()}")
     if dark:
         _darken(ax, before, figure.get_facecolor())
     if title is not None:

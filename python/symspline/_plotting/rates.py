@@ -35,7 +35,7 @@ class Rate(NamedTuple):
     signed : bool
         Whether the numbers have a sign.
     scale : float
-        Factor by which the numbers are multiples of norms.
+        Factor from the lengths of tangent vectors to the numbers.
     """
 
     label: str
@@ -68,18 +68,8 @@ _SIGNS: dict[str, Callable[[Any, Any], Array]] = {
 }
 
 
-def rates_of(space: Space[Any], seconds: bool, radius: float | None = None) -> list[Rate]:
-    """Return the rates of a space that is not a product, velocities first.
-
-    With the radius of the Earth in metres they are in km/h and m/s², or in km per unit of time.
-    """
-    if radius is not None:
-        units = ("km/h", "m/s²") if seconds else ("km per unit of t", "km per unit of t²")
-        first, second = (3.6 * radius, radius) if seconds else (radius / 1000,) * 2
-        return [
-            Rate(f"speed\n{units[0]}", 1, lambda at: first * at("speed"), scale=first),
-            Rate(f"acceleration\n{units[1]}", 2, lambda at: second * at("bend"), scale=second),
-        ]
+def rates_of(space: Space[Any], seconds: bool) -> list[Rate]:
+    """Return the rates of a space that is not a product, velocities first."""
     per = [", 1/s", ", 1/s²"] if seconds else ["", ""]
     own = cover_of(space)
     if isinstance(own, SpecialEuclidean):
@@ -128,10 +118,10 @@ def _rates_of_poses(space: SpecialEuclidean, seconds: bool) -> list[Rate]:
     ]
 
 
-def rows_of(space: Space[Any], seconds: bool, most: int, radius: float | None = None) -> list[tuple[int | None, Rate]]:
+def rows_of(space: Space[Any], seconds: bool, most: int) -> list[tuple[int | None, Rate]]:
     """Return the rates of a space, with the number of the factor of a product."""
     if not isinstance(space, Product):
-        return [(None, own) for own in rates_of(space, seconds, radius)]
+        return [(None, own) for own in rates_of(space, seconds)]
     found: list[tuple[int | None, Rate]] = []
     for i, factor in enumerate(factors_of(space)[:most]):
         for own in rates_of(factor, seconds):
@@ -146,10 +136,23 @@ def _short_name(space: Space[Any]) -> str:
     return name if len(name) <= _LONGEST else f"{name[: _LONGEST - 1]}…"
 
 
-def draw_rates(panel: SubFigure, curves: Sequence[Curve], most: int, columns: int, radius: float | None) -> None:
+def _rates_on_earth(radius: float, seconds: bool) -> list[Rate]:
+    """Return speed and acceleration on the Earth, whose radius is in metres."""
+    first, second = (3.6 * radius, radius) if seconds else (radius / 1000,) * 2
+    names = ("km/h", "m/s²") if seconds else ("km per unit of t", "km per unit of t²")
+    return [
+        Rate(f"speed\n{names[0]}", 1, lambda at: first * at("speed"), scale=first),
+        Rate(f"acceleration\n{names[1]}", 2, lambda at: second * at("bend"), scale=second),
+    ]
+
+
+def draw_rates(panel: SubFigure, curves: Sequence[Curve], most: int, columns: int) -> None:
     """Draw the rates of curves: velocities and accelerations below each other, or in one column each."""
     curves = [curve for curve in curves if curve.has_line and not curve.faint]
-    rows = rows_of(curves[0].space, curves[0].axis.seconds, most, radius)
+    seconds, radius = curves[0].axis.seconds, curves[0].radius
+    rows = rows_of(curves[0].space, seconds, most)
+    if radius is not None:
+        rows = [(None, own) for own in _rates_on_earth(radius, seconds)]
     groups = [rows]
     panels: list[Any] = [panel]
     if columns > 1:
@@ -182,7 +185,7 @@ def _draw_rate(axes: Axes, curves: Sequence[Curve], rate: Rate) -> None:
         drawn += [float(low.min()), float(high.max())]
         top = max(top, rate.scale * float(curve.at("speed").max()))
         # Rounding errors of points between the closest knots, which a curve at rest has.
-        rounding = max(rounding, 1e-15 * rate.scale * np.abs(curve.points).max() / np.diff(curve.data.times).min())
+        rounding = max(rounding, rate.scale * 1e-15 * np.abs(curve.points).max() / np.diff(curve.data.times).min())
     top = top if top > rounding else 1.0
     unit = top if rate.order == 1 else top / max(curve.x[-1] - curve.x[0] for curve in curves)
     _limit(axes, min(drawn), max(drawn), unit, rounding if rate.order == 1 else 1e-9 * unit, rate.signed)

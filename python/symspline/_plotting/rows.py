@@ -17,7 +17,7 @@ from matplotlib.transforms import Affine2D
 
 from .curves import Curve
 from .graphs import timelines
-from .style import BOTTOM, INK, LEFT, RIGHT, Array, Indices, evenly, size
+from .style import INK, OWN_AXES, Array, Indices, evenly, points
 
 VIEW = np.array([[-0.5, 0.866, 0.0], [-0.296, -0.171, 0.940], [0.814, 0.470, 0.342]])
 """Directions to the right, up and towards the viewer, who sees the first axis point forwards and the third up."""
@@ -52,11 +52,13 @@ class Row:
         curve = self.curve
         if self.name in ("given", "data") or not curve.has_line:
             times = curve.on_axis(curve.given_x)
-            kept = _apart(times, 1.2 * reach / width * (curve.times[-1] - curve.times[0]))
+            kept = _apart(times, 1.1 * reach / width * (curve.times[-1] - curve.times[0]))
             return times[kept], curve.given[kept], None
         number = max(2, int(width / (2 * reach)) + 1)
-        # Times in a gap have the sample at its end.
-        even = np.unique(np.searchsorted(curve.x, np.linspace(curve.x[0], curve.x[-1], number)))
+        wanted = np.linspace(curve.x[0], curve.x[-1], number)
+        even = np.searchsorted(curve.x, wanted)
+        # There are no samples in gaps.
+        even = np.unique(even[curve.x[even] - wanted < 0.1 * (wanted[1] - wanted[0])])
         return curve.times[even], curve.points[even], None if curve.radii is None else curve.radii[even]
 
 
@@ -91,32 +93,50 @@ class Rows:
     @classmethod
     def of(cls, panel: SubFigure, curves: Sequence[Curve]) -> Rows:
         """Add axes to a panel, with as many rows as fit."""
-        high = size(panel)[1] - BOTTOM - _TOP
         (axes,) = timelines(panel, curves, [""], top=_TOP)
-        if curves[0].alone:
-            rows = [Row(curves[0], "curve")]
-            if curves[0].has_nodes and len(curves[0].given):
-                rows.insert(0, Row(curves[0], "given" if curves[0].noise is None else "data"))
+        width, high = axes.bbox.width / panel.dpi, axes.bbox.height / panel.dpi
+        if axes in OWN_AXES:
+            # Other axes have margins for the symbols at both ends.
+            start, stop = min(curve.times[0] for curve in curves), max(curve.times[-1] for curve in curves)
+            margin = REACH * (stop - start) / max(width - 2 * REACH, 1.0)
+            axes.set_xlim(start - margin, stop + margin)
+            width = max(width - 2 * REACH, 1.0)
+        first = curves[0]
+        if len(curves) == 1 and first.has_line:
+            rows = [Row(first, "curve")]
+            if len(first.given) and (first.noise is not None or first.has_nodes):
+                rows.insert(0, Row(first, "given" if first.noise is None else "data"))
         else:
             rows = [Row(curves[i], "") for i in evenly(len(curves), max(1, int(high // _LEAST)))]
-        axes.set(ylim=(0.5 - len(rows), 0.5), yticks=[])
+        axes.set_ylim(0.5 - len(rows), 0.5)
+        axes.set_yticks([])
         axes.spines["left"].set_visible(False)
-        return cls(axes, rows, size(panel)[0] - LEFT - RIGHT, high / len(rows))
+        return cls(axes, rows, width, high / len(rows))
 
     def symbols(self, i: int, reach: float) -> tuple[Array, Any, Array | None]:
         """Name a row, and return its symbols, which extend by at most ``reach`` inches; see `Row.symbols`."""
         row = self.rows[i]
-        times, points, radii = row.symbols(self.width, reach)
+        times, symbols, radii = row.symbols(self.width, reach)
         look: Any = {"transform": self.axes.get_yaxis_transform(), "clip_on": False}
         left = -0.9 / self.width
+        if self.axes in OWN_AXES:
+            names = [own.name or own.curve.label or "" for own in self.rows]
+            self.axes.set_yticks([-k for k in range(len(names))], names)
+            self.axes.tick_params(axis="y", length=0)
+            return times, symbols, radii
+        if not row.name and row.curve.label:
+            self.axes.text(left, -i, row.curve.label, color=row.curve.color, fontsize=points(9), va="center", **look)
+            return times, symbols, radii
         if not row.name:
             self.axes.plot([left, left + 0.2 / self.width], [-i, -i], color=row.curve.color, linewidth=3, **look)
-            return times, points, radii
-        look |= {"color": INK, "fontsize": 9}
+            return times, symbols, radii
+        look |= {"color": INK, "fontsize": points(9)}
         self.axes.text(left, -i, row.name, va="bottom", **look)
         if row.name != "curve" and len(times) < len(row.curve.given):
-            self.axes.text(left, -i, f"{len(times)} of {len(row.curve.given)}", va="top", **look | {"fontsize": 8})
-        return times, points, radii
+            self.axes.text(
+                left, -i, f"{len(times)} of {len(row.curve.given)}", va="top", **look | {"fontsize": points(8)}
+            )
+        return times, symbols, radii
 
     def in_inches(self, times: Array, row: int) -> dict[str, Any]:
         """Return the options of a collection with paths in inches around times in a row."""
@@ -128,13 +148,17 @@ class Rows:
         }
 
     def draw_view(self) -> None:
-        """Draw the axes of space above the right corner, as they are seen."""
+        """Draw the axes of space above the right corner, as they are seen. Axes of the user have no space for them."""
+        if self.axes in OWN_AXES:
+            return
         axes, inches = self.axes, np.array([1 / self.width, 1 / (self.height * len(self.rows))])
         foot = np.array([1.0, 1.0]) + [0.05, 0.28] * inches
         look: Any = {"xycoords": "axes fraction", "color": INK, "ha": "center", "va": "center"}
         arrow: Any = {"arrowstyle": "-|>,head_width=0.12,head_length=0.25", "color": INK, "linewidth": 0.9}
         arrow |= {"shrinkA": 0, "shrinkB": 0}
         for name, end in zip(("x₁", "x₂", "x₃"), VIEW[:2].T, strict=True):
-            axes.annotate("", foot + 0.26 * end * inches, foot, xycoords="axes fraction", arrowprops=arrow)
-            axes.annotate(name, foot + 0.38 * end * inches, fontsize=8, **look)
-        axes.annotate("view", foot + [0.0, -0.3] * inches, fontsize=9, **look)
+            axes.annotate(
+                "", tuple(foot + 0.26 * end * inches), tuple(foot), xycoords="axes fraction", arrowprops=arrow
+            )
+            axes.annotate(name, tuple(foot + 0.38 * end * inches), fontsize=points(8), **look)
+        axes.annotate("view", tuple(foot + [0.0, -0.3] * inches), fontsize=points(9), **look)

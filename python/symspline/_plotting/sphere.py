@@ -20,7 +20,7 @@ from . import land
 from .arrows import draw_arrows
 from .curves import CIRCLE, Curve, disc_indices, draw_tube
 from .globe import View, degrees, draw_frame, draw_globe, label_directions, middle_of
-from .style import GRID, HALO, INK, MARK, PAPER, SPLINE, Array, inside, note, plain, size, window
+from .style import GRID, HALO, INK, MARK, PAPER, SPLINE, Array, inside, note, plain, points, size, window
 
 _SMALL = np.radians(25)
 _LOCATOR = 3.9
@@ -44,18 +44,11 @@ _AXES = {"x₁": (1.0, 0.0, 0.0), "x₂": (0.0, 1.0, 0.0), "x₃": (0.0, 0.0, 1.
 def draw_sphere(panel: SubFigure, curves: Sequence[Curve]) -> None:
     """Draw curves on S²: on a globe and, if there is space, on a map of all longitudes and latitudes.
 
-    Curves that are close together are drawn in a frame, beside a globe that shows where it is.
+    Curves that are close together are drawn in a frame, beside a globe that shows where it is. Curves on the Earth have
+    land and a scale bar.
     """
-    _draw_sphere(panel, curves, None)
-
-
-def draw_earth(radius: float, panel: SubFigure, curves: Sequence[Curve]) -> None:
-    """Draw curves of longitude and latitude on the Earth, whose radius is in metres: with land, and a scale bar."""
-    _draw_sphere(panel, curves, radius)
-
-
-def _draw_sphere(panel: SubFigure, curves: Sequence[Curve], radius: float | None) -> None:
     width, height = size(panel)
+    radius = curves[0].radius
     wide = width > 2 * height
     look = _Globe(below=0.1, right=width - min(width, height) + 0.1, beside=_LOCATOR if wide else 0.0)
     axes, view, is_part = _draw_globe(panel, np.concatenate([curve.extent for curve in curves]), look)
@@ -78,9 +71,10 @@ def _draw_scale(axes: Axes, radius: float) -> None:
     length = steps[steps < 0.25 * (east - west) * radius][-1]
     end, height = east - 0.03 * (east - west), south + 0.06 * (north - south)
     look: dict[str, Any] = {"color": INK, "zorder": 7}
-    axes.plot([end - length / radius, end], [height] * 2, "|-", linewidth=1.2, markersize=6, label="scale", **look)
-    at, halo = (end - length / radius / 2, height + 0.015 * (north - south)), {"path_effects": HALO}
-    axes.text(*at, f"{length:g} km", ha="center", va="bottom", fontsize=9, **look, **halo)
+    axes.plot([end - length / radius, end], [height] * 2, "|-", linewidth=1.2, markersize=6, label="_scale", **look)
+    middle, above = end - length / radius / 2, height + 0.015 * (north - south)
+    look |= {"ha": "center", "va": "bottom", "fontsize": points(9), "path_effects": HALO}
+    axes.text(middle, above, f"{length:g} km", **look)
 
 
 def _draw_locator(panel: SubFigure, frame: Axes, view: View, has_land: bool) -> None:
@@ -92,7 +86,7 @@ def _draw_locator(panel: SubFigure, frame: Axes, view: View, has_land: bool) -> 
         land.draw_on_globe(axes, view)
     (west, east), (south, north) = frame.get_xlim(), frame.get_ylim()
     outline = np.array([[west, south], [east, south], [east, north], [west, north], [west, south]])
-    axes.plot(*outline.T, color=MARK, linewidth=1.4, zorder=6, label="frame")
+    axes.plot(*outline.T, color=MARK, linewidth=1.4, zorder=6, label="_frame")
     if max(east - west, north - south) < 0.15:
         # A small frame would not be seen.
         axes.plot((west + east) / 2, (south + north) / 2, "o", color="none", markeredgecolor=MARK, **_RING)
@@ -126,6 +120,7 @@ def _draw_on_half(what: str, vectors: Callable[[Any], Array], panel: SubFigure, 
     look = _Globe(lats=(_HEIGHT, _HEIGHT), labels=_AXES, half=True)
     above = [line * sides(line) for line in lines]
     axes, view, is_part = _draw_globe(panel, np.concatenate(lines), look, np.concatenate(above))
+    crossed = False
     for curve, line, shown in zip(curves, lines, lines if is_part else above, strict=True):
         given = shown[curve.knots]
         if curve.noise is not None:
@@ -134,8 +129,12 @@ def _draw_on_half(what: str, vectors: Callable[[Any], Array], panel: SubFigure, 
         whole, radii = (line, curve.radii) if is_part else (broken_at_rim(line), None)
         _draw_on_globe(axes, view, curve, whole, given, radii)
         if not is_part and curve.alone:
-            _name_crossings(axes, view, whole)
-    words = "part of the sphere: opposite points" if is_part else "opposite points of the rim (equal letters)"
+            crossed |= _name_crossings(axes, view, whole)
+    words = (
+        "part of the sphere: opposite points"
+        if is_part
+        else "opposite points of the rim" + " (equal letters)" * crossed
+    )
     note(panel, f"{words} are the same {what}" + (";\npoints are normals" if what == "plane" else ""))
 
 
@@ -271,8 +270,8 @@ def broken_at_rim(line: Array) -> Array:
     return _interrupted(line * side, crossings, gaps)
 
 
-def _name_crossings(axes: Axes, view: View, broken: Array) -> None:
-    """Write one letter at both points where a curve leaves the hemisphere and where it returns.
+def _name_crossings(axes: Axes, view: View, broken: Array) -> bool:
+    """Write one letter at both points where a curve leaves the hemisphere and where it returns, if it does.
 
     ``broken`` is the result of `broken_at_rim`.
     """
@@ -281,9 +280,10 @@ def _name_crossings(axes: Axes, view: View, broken: Array) -> None:
     for i, letter in zip(gaps[: len(_LETTERS)], _LETTERS, strict=False):
         for j in (i - 1, i + 1):
             outwards = flat[j] / max(float(np.linalg.norm(flat[j])), 1e-9)
-            at = flat[j] + 0.09 * outwards
-            text = axes.text(*at, letter, color=SPLINE, fontsize=10, weight="bold", zorder=8)
+            x, y = (flat[j] + 0.09 * outwards).tolist()
+            text = axes.text(x, y, letter, color=SPLINE, fontsize=points(10), weight="bold", zorder=8)
             text.set(ha="center", va="center", path_effects=HALO)
+    return bool(gaps.size)
 
 
 def _interrupted(line: Array, after: Any, gaps: Any) -> Array:
