@@ -233,12 +233,16 @@ def time_law(
 
 def _limits(value: Any, count: int, name: str) -> tuple[float, ...]:
     """Return one limit per factor."""
+    if isinstance(value, np.ndarray) and value.ndim == 1:
+        value = tuple(value)
     values = (value,) * count if value is None else value if isinstance(value, (tuple, list)) else (value,)
     if len(values) != count:
         raise ValidationError(
-            f"{name} must be a tuple with {count} limits, one per factor of the space, not {short_repr(value)}"
+            f"{name} must be a tuple with {count} limits, one per factor of the space; got {len(values)}: "
+            f"{short_repr(value)}"
             if count > 1
-            else f"{name} must be one number, not {short_repr(value)}"
+            else f"{name} must be one number, not {len(values)}. For a limit per joint, use a product with one factor "
+            "per joint, such as 'torus:1 x torus:1'."
         )
     if name == "max_acceleration" and all(one is None for one in values):
         raise ValidationError("max_acceleration is needed: without it, the traversal would start with a jump")

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from .._composed import SegmentedCurve
 from .._core import ValidationError
 from .._curves.at_times import call_at_times
 from .._smoothing import SmoothingSpline
@@ -25,6 +26,11 @@ Jacobians = list[dict[int, Doubles]]
 
 def check_uncertain(spline: Any) -> SmoothingSpline[Any, Any]:
     """Return the curve, or raise ValidationError if it has no covariance."""
+    if isinstance(spline, SegmentedCurve) and all(isinstance(own, SmoothingSpline) for own in spline):
+        raise ValidationError(
+            "return_std=True needs one smoothing spline, but spline is a SegmentedCurve. Pass its segments one by one, "
+            "with times in their domains."
+        )
     if not isinstance(spline, SmoothingSpline):
         raise ValidationError(
             f"return_std=True needs a curve with a covariance, but spline is a {type(spline).__name__}. Fit the curve "

@@ -7,7 +7,7 @@
 //! where p₀, …, p_d are the control points whose basis functions B_m of degree d are not zero at t. Points are square
 //! matrices, or vectors, which are added.
 
-use super::bspline::BSpline;
+use super::data::BSpline;
 use crate::matrix::{Matrix, inverse};
 use crate::monitor::checkpoint;
 use crate::scalar::{LANES, Lane, Scalar, few, gather, lane, scatter};

@@ -110,3 +110,30 @@ pub struct Job<'a> {
     pub(super) size: usize,
     pub(super) len: usize,
 }
+
+/// A B-spline curve: `knots.len() = control points + degree + 1`, as in SciPy.
+pub struct BSpline<'a> {
+    /// Non-decreasing knots, possibly repeated.
+    pub knots: &'a [f64],
+    /// Control points, one after another, curve after curve.
+    pub control: &'a [f64],
+    /// The degree.
+    pub degree: usize,
+    /// For cumulative B-splines on groups, their [steps](super::cumulative_steps); empty for de Boor's algorithm.
+    pub steps: &'a [f64],
+}
+
+impl BSpline<'_> {
+    /// Control points of one curve.
+    pub fn count(&self) -> usize {
+        self.knots.len() - self.degree - 1
+    }
+
+    /// The knot interval that contains a time; the last one at the end of the domain.
+    pub fn interval(&self, x: f64) -> usize {
+        let last = self.count() - 1;
+        let k = self.knots.partition_point(|&t| t <= x).saturating_sub(1).clamp(self.degree, last);
+        // Skip empty intervals at the end.
+        (self.degree..=k).rev().find(|&k| self.knots[k] < self.knots[k + 1]).unwrap_or(k)
+    }
+}

@@ -13,9 +13,9 @@ mod sample_cursor;
 mod transport;
 
 pub use bezier::Segment;
-pub use bspline::{BSpline, evaluate_bspline};
+pub use bspline::evaluate_bspline;
 pub use cumulative::{Coordinates, Multiplication, cumulative_basis, cumulative_steps};
-pub use data::{Curves, Job, Outside, Quantity, Times};
+pub use data::{BSpline, Curves, Job, Outside, Quantity, Times};
 pub use evaluate::evaluate;
 #[cfg(feature = "dense")]
 pub use lift::{lift, lift_knots};
