@@ -46,6 +46,7 @@ class ComposedCurve(TimedCurve[P]):
 
     def _compose(self, time_axis: TimeAxis, curve: Any, extrapolate: Extrapolate) -> None:
         self._time_axis, self._curve, self._extrapolate = time_axis, curve, extrapolate
+        self._extrapolation_mode = "raise"
         self._extrapolation_mode = self._where(extrapolate)
 
     @property
@@ -60,6 +61,8 @@ class ComposedCurve(TimedCurve[P]):
         return first, last
 
     def _where(self, extrapolate: Any) -> str:
+        if extrapolate is None:
+            return self._extrapolation_mode
         mode = extrapolation_mode(checked_extrapolate(extrapolate), "natural")
         if mode not in ("raise", "nan"):
             raise ValidationError(

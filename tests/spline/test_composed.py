@@ -277,3 +277,32 @@ def test_quaternions_have_no_jumps_of_sign():
     whole = ss.rotations.quaternion(curve, x, scalar_first=True)
     joined = curve.restrict(b=4.4).concatenate(curve.restrict(4.4, 7).concatenate(curve.restrict(7)))
     np.testing.assert_allclose(ss.rotations.quaternion(joined, x, scalar_first=True), whole, atol=1e-12)
+
+
+def test_searches_and_reversal_of_segments():
+    first = ss.CubicSpline(np.arange(5.0), np.sin(np.arange(5.0))[:, None], "r:1")
+    second = ss.CubicSpline(np.arange(8.0, 13), 3 * np.sin(np.arange(5.0))[:, None], "r:1")
+    curve = ss.SegmentedCurve([first, second])
+    times, speeds = curve.extrema("speed")
+    # The largest speed is at the start of the second segment.
+    assert speeds.max() == pytest.approx(curve.speed(8.0)) and times[speeds.argmax()] == 8.0
+    heights = curve.extrema(lambda x: curve(x)[..., 0])[0]
+    np.testing.assert_allclose(heights[1] - heights[0], 8.0)
+    # The ends of a gap are not crossings.
+    np.testing.assert_allclose(
+        ss.SegmentedCurve([first, first.shift(8)]).solve("speed", 0.2),
+        np.concatenate([first.solve("speed", 0.2), 8 + first.solve("speed", 0.2)]),
+    )
+    # Where segments meet, only jumps count.
+    whole = first.restrict(b=2.3).concatenate(first.restrict(2.3))
+    for kind in ("max", "min"):
+        np.testing.assert_allclose(whole.extrema(kind=kind)[0], first.extrema(kind=kind)[0], atol=1e-9)
+    faster = first.concatenate(ss.HermiteSpline([4, 5], [first(4.0), [1.0]], [[3.0], [0.0]], "r:1"))
+    assert 4.0 in faster.extrema()[0] and 4.0 in faster.solve("speed", 2.0)
+    back = curve.reverse()
+    assert isinstance(back, ss.SegmentedCurve) and back.gaps == [(4.0, 8.0)]
+    assert back.length() == pytest.approx(curve.length())
+    x = np.array([0.5, 3.9, 6.0, 8.2, 12.0])
+    np.testing.assert_allclose(back(x), curve(12 - x), atol=1e-13)
+    outside = ss.fit_segments([0, 1, 2, 9, 10.0], [[0.0], [1], [2], [1], [1]], "r:1", max_gap=3, extrapolate=False)
+    assert np.isnan(outside(11.0)).all()
