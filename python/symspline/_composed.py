@@ -287,6 +287,8 @@ class SegmentedCurve(ComposedCurve[P], Generic[P, C]):
             return self._of_segments(self._segments[index])
         if not isinstance(index, (int, np.integer)):
             raise TypeError(f"the index of a segment must be an integer or a slice, not {short_repr(index)}")
+        if not -len(self) <= index < len(self):
+            raise IndexError(f"index {short_repr(index)} is out of range: there are {len(self)} segments")
         return self._segments[index]
 
     def closest(

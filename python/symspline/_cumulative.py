@@ -256,6 +256,11 @@ class CumulativeBSpline(ControlledSpline[P]):
     def _fill(self, *parts: Any) -> None:
         self._curve, self.report = parts
 
+    @property
+    def t(self) -> Doubles:
+        """Distinct knots in the domain of the curve."""
+        return self._curve.times
+
     def _picked(self, index: Any) -> Self:
         return self._of(self._curve.take_batch(index), None if self.report is None else self.report._picked(index))
 

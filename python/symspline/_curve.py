@@ -399,6 +399,8 @@ def _checked_shift(time_axis: TimeAxis, dt: Any) -> Any:
         if not isinstance(dt, (timedelta, np.timedelta64)) or np.isnat(np.timedelta64(dt)):
             raise ValidationError(f"the knots are dates, so dt must be a timedelta64, not {short_repr(dt)}")
         return np.timedelta64(dt)
+    if isinstance(dt, np.timedelta64):
+        raise ValidationError(f"the times are numbers, so dt must be a finite number, not {short_repr(dt)}")
     # Comparison is exact for integers of any size.
     step = checked_number(dt, "the knots are numbers, so dt must be a finite number", lambda x: abs(x) <= _LARGEST)
     exact = isinstance(dt, (int, np.integer)) and abs(int(dt)) < 2**62

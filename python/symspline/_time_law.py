@@ -14,7 +14,7 @@ from ._core import ValidationError
 from ._curve import Curve
 from ._options import order_of
 from ._spaces import Array, Doubles, factors_of, parts_of, product_norm
-from ._typing import FloatArray
+from ._typing import FloatArray, Number
 
 # Velocities before and after a knot that differ by more than this part jump.
 _JUMP = 1e-6
@@ -78,7 +78,7 @@ class TimeLaw:
         """First and last time of the traversal, zero and the duration."""
         return 0.0, self.duration
 
-    def __call__(self, x: ArrayLike, nu: int = 0) -> Any:
+    def __call__(self, x: ArrayLike, nu: int = 0) -> Number:
         """Evaluate the time of the curve, or its derivatives.
 
         Parameters

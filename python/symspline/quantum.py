@@ -34,7 +34,7 @@ from ._options import order_of
 from ._piecewise_cubic import check_curve
 from ._spaces import ComplexGrassmannian, ComplexProjective, Doubles, Space, SpecialUnitary, Unitary
 from ._time import onto_ends
-from ._typing import Extrapolate, TimesLike
+from ._typing import Extrapolate, Number, TimesLike
 from ._validation import (
     Array,
     adjoint,
@@ -497,7 +497,7 @@ def _gauss() -> tuple[Doubles, Doubles, Doubles]:
 # ---- geometric phases ----
 
 
-def berry_phase(spline: CubicSpline[Any, Any]) -> Any:
+def berry_phase(spline: CubicSpline[Any, Any]) -> Number:
     r"""Compute the geometric phase that a state acquires along a closed curve.
 
     Parameters

@@ -250,7 +250,7 @@ def test_files_pickles_and_text(tmp_path):
         assert np.array_equal(found(3.3), curve(3.3)) and np.array_equal(found.cov(3.3), curve.cov(3.3))
         assert np.array_equal(found.parameters["gyro bias"].std, curve.parameters["gyro bias"].std)
         assert found.measurements == () and found.report == curve.report
-    assert "31 knots, gyro bias" in repr(curve)
+    assert "31 knots, from 0.0215778 to 9.98802, gyro bias" in repr(curve)
     assert [own.shape for own in curve.residuals] == [(51, 3), (501, 3)]
     assert curve.data[1] is seen
 

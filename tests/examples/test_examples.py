@@ -42,6 +42,7 @@ SAYS = {
     "first_curve": r"lengths from 0\.\d\d to 1\.\d\d; of the spline 1 ± \de-16",
     "five_orientations": r"largest step of a component: 0\.00\d\non S³ and on SO\(3\): \de-1[3-6] apart",
     "tracking_gap": r"longest time between points: 12\.1 s",
+    "seven_joints": r"the motion takes 1\.44 s",
     "camera_path": r"from frame to frame 57\.\d to 57\.\d mm",
     "date_line": r"speed 17\.2 m/s, course 123 degrees",
     "wind_over_a_year": r"on 1 December \(x = 10\.5\) from 35\d degrees, and the spline of the degrees gives 188",

@@ -65,7 +65,7 @@ def test_several_curves_share_a_file(rng, tmp_path):
     )
     ss.save({"short": short, "long": long}, tmp_path / "several.npz")
     assert ss.load(tmp_path / "several.npz") == {"short": short, "long": long}
-    for missing in ("plot", "lift", "transport", "velocities", "t", "report"):
+    for missing in ("lift", "transport", "velocities", "t", "report"):
         assert not hasattr(short, missing)
 
 

@@ -17,6 +17,8 @@ MODULES = [
 NEEDS = {"symspline.xarray": "xarray"}
 # They change how the process runs, or take functions that the user vouches for.
 LEFT_OUT = {"set_num_threads", "show_config", "from_geomstats", "from_pymanopt", "map"}
+# Animations warn if they are not drawn.
+LEFT_OUT |= {"animate"}
 # Made by `make_smoothing_spline` only.
 LEFT_OUT |= {"RetimedCurve", "SmoothingGrid", "SmoothingSpline"}
 # An abstract class.

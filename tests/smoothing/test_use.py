@@ -82,7 +82,7 @@ def test_invalid_input_raises():
         ({"t": 1e101 * T}, r"t spans more than 1e\+100, too much for smoothing"),
         ({"t": np.where(T > 5, np.nan, T)}, "is nan"),
         ({"t": np.zeros(40)}, "have one time only"),
-        ({"lam": -1.0}, "lam must be finite and >= 0"),
+        ({"lam": -1.0}, "lam must be >= 0, not -1.0"),
         ({"weights": -np.ones(40)}, r"weights\[0\] is -1.0"),
         ({"weights": np.ones(39)}, "weights has shape"),
         ({"weights": np.eye(1, 40)[0]}, "have one time only"),

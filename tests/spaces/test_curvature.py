@@ -115,6 +115,8 @@ def shortest_loop(space):
         case ss.SpecialUnitary():
             n = space.point_shape[0]
             p, v = np.eye(n), unit(n, 0, 0, 1j) - unit(n, 1, 1, 1j)
+        case ss.Torus():
+            p, v = np.zeros(space.point_shape), np.eye(space.point_shape[0])[0]
         case _:
             pytest.fail(f"add a shortest closed geodesic of {type(space).__name__} here")
     return p, v / space.norm(p, v)

@@ -128,7 +128,10 @@ assert_type(ss.fit(t, p, sphere, method="newton"), tuple[Float, ss.Report])
 assert_type(ss.evaluate(t, p, np.zeros((3, 3)), sphere, x, nu=1), Float)
 assert_type(ss.evaluate(t, p, np.zeros((3, 3)), "sphere:2", x), NDArray[Any])
 assert_type(ss.fit_many([(t, p), (None, p)], sphere), list[ss.CubicSpline[Float]])
-assert_type(ss.fit_segments(t, p, sphere, max_gap=1.5, bc_type="not-a-knot"), list[ss.CubicSpline[Float]])
+assert_type(
+    ss.fit_segments(t, p, sphere, max_gap=1.5, bc_type="not-a-knot"), ss.SegmentedCurve[Float, ss.CubicSpline[Float]]
+)
+assert_type(ss.fit_segments(t, p, sphere, max_gap=1.5)[0], ss.CubicSpline[Float])
 ss.fit_segments(t, p, sphere, max_gap=np.timedelta64(5, "m"), duplicates="mean")
 # A file does not show to type checkers what it holds.
 loaded: ss.CubicSpline[Float] = ss.load("curve.npz")  # pyright: ignore[reportAny]

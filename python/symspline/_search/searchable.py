@@ -127,7 +127,7 @@ class Searchable(ABC, Generic[P]):
         function: Literal["speed", "acceleration"] | Callable[[Any], Any] = "speed",
         *,
         kind: Literal["max", "min"] = "max",
-    ) -> tuple[Any, FloatArray]:
+    ) -> tuple[NDArray[Any], FloatArray]:
         """Find the local maxima or minima of the speed, or of another function of time.
 
         Parameters

@@ -330,14 +330,14 @@ def resample(
            [0.    , 0.    , 1.    ]])
     """
     if isinstance(to, Mapping):
-        if time is not None or skipna:
+        if time is not None or checked_flag(skipna, "skipna"):
             raise ValidationError(
                 "time and skipna are for curves along one dimension; a grid has the coordinates of its dimensions, and "
                 "skips missing points. Omit them."
             )
         grid: dict[str, Any] = {"point_dims": point_dims, "where": where, "symmetric": symmetric, "options": options}
         return resample_grid(da, space, to, bc_type="not-a-knot" if bc_type is None else bc_type, **grid)
-    if symmetric or isinstance(bc_type, Mapping):
+    if checked_flag(symmetric, "symmetric") or isinstance(bc_type, Mapping):
         name = "symmetric=True" if symmetric else "bc_type by dimension"
         raise ValidationError(f"{name} is for grids; pass to as a mapping of dimensions to positions")
     bc_type = "natural" if bc_type is None else bc_type
