@@ -68,4 +68,7 @@ def by_differences(space, t, points, bc, change, x, orders=(0, 1, 2)):
 
 def inside(t, rng, n=7):
     """Times between the knots that stay there when the knots move a little."""
-    return np.sort(rng.uniform(t[0] + 0.05, t[-1] - 0.05, n))
+    x = rng.uniform(t[0] + 0.05, t[-1] - 0.05, n)
+    nearest = t[np.abs(x[:, None] - t).argmin(axis=1)]
+    # A time must not change its segment when the knots move by the steps of finite differences.
+    return np.sort(np.where(np.abs(x - nearest) < 0.01, nearest + 0.01, x))
