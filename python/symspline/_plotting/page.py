@@ -70,7 +70,9 @@ def page_of(
     space = curve.space
     has_band = [str(cover_of(own)) in BANDED for own in factors_of(space)]
     below = residuals.panels_of(curve, curves[0], has_band)
-    title = title or shorten(f"{curve._kind} on {space!r}", 63, placeholder=" …")
+    # Names of products are shorter than their representations.
+    name = str(space) if isinstance(space, Product) else repr(space)
+    title = title or shorten(f"{curve._kind} on {name}", 63, placeholder=" …")
     return draw_page(curves, title, words + _description(curve, curves), figsize, show, below)
 
 
