@@ -114,12 +114,10 @@ class TimeLaw:
         k = np.clip(np.searchsorted(self.knots, times, "right") - 1, 0, len(self.knots) - 2)
         ahead, rate = times - self.knots[k], self.rates[k]
         second = (np.diff(self.rates) / np.diff(self.knots))[k]
-        if order == 2:
-            return second[()]
-        if order == 1:
-            return (rate + second * ahead)[()]
-        values = np.clip(self.values[k] + ahead * (rate + ahead * second / 2), self.values[k], self.values[k + 1])
-        return values[()]
+        steps = ahead * (rate + ahead * second / 2)
+        values = np.clip(self.values[k] + steps, self.values[k], self.values[k + 1])
+        found: Number = (values, rate + second * ahead, second)[order][()]
+        return found
 
     def __repr__(self) -> str:
         return f"<TimeLaw: duration {self.duration:.6}>"

@@ -555,7 +555,8 @@ def berry_phase(spline: CubicSpline[Any, Any]) -> Number:
     )
     lifted = spline.lift(spline.t[..., -1:], per_curve=spline.t.ndim > 1)[..., 0, :]
     overlap = np.sum(first.conj() * lifted, axis=-1)
-    return np.angle(overlap)[()]
+    phase: Number = np.angle(overlap)[()]
+    return phase
 
 
 # ---- mixed states ----
