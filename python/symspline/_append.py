@@ -93,7 +93,7 @@ def _new_times(spline: Any, t: TimesLike) -> tuple[Array, bool]:
     known = np.broadcast_to(spline._curve.times[..., -1:], (*later.shape[:-1], 1))
     if not (np.diff(np.concatenate([known, later], axis=-1)) > 0).all():
         raise ValidationError(
-            f"t = {short_repr(t)} must increase from the last knot on, {short_repr(spline.domain[1])}. Sort the "
+            f"t = {short_repr(t)} must increase from the last knot on, {spline.domain[1]}. Sort the "
             "points, or remove those that the curve already has."
         )
     return array, single

@@ -330,7 +330,7 @@ class Curve(CurvePlots[P]):
         """
         return Derivative(self, order_of(nu, self._curve.max_nu))
 
-    # ---- what classes of curves do in their own way ----
+    # ---- hooks that classes of curves override ----
 
     def _restricted(self, start: Doubles, stop: Doubles) -> Curve[P]:
         """Return the part between two times of the core, one per curve if each curve has its own times."""
@@ -439,7 +439,7 @@ def _smooth_parts(law: _Law, start: float, stop: float, knots: Doubles) -> Doubl
 
     If the law does not increase, knots of the curve are not sought. Integrals then take more evaluations.
     """
-    own = np.asarray(getattr(law.function, "x", ()), np.float64).ravel()
+    own = np.asarray(getattr(law.function, "x", getattr(law.function, "knots", ())), np.float64).ravel()
     times = np.unique(np.concatenate([[start], own[(own > start) & (own < stop)], [stop]]))
     sampled = np.unique(np.concatenate([times, np.linspace(start, stop, 4 * len(knots) + 1)]))
     values = law(sampled)
@@ -470,7 +470,7 @@ def _check_meeting(first: Curve[Any], second: Curve[Any]) -> None:
         size = 0.0 if first._time_axis.dates else max(abs(start), abs(stop))
     except TypeError:
         raise ValidationError(
-            f"other begins at {start}, but the curve ends at {stop}: these are not comparable"
+            f"other begins at {start}, but the curve ends at {stop}. Use numbers for both, or dates for both."
         ) from None
     if apart > 4 * np.spacing(size):
         raise ValidationError(

@@ -135,7 +135,7 @@ class CurvePlots(CurveBase[P]):
 
         A product has one such panel per factor. The other panels show the speed |γ'| and the size |∇γ'| of the
         covariant acceleration, with one panel per factor of a product. In one dimension both have a sign. For poses,
-        rates of rotation and of translation have panels of their own, because their units differ.
+        rates of rotation and of translation have separate panels, because their units differ.
 
         Parameters
         ----------

@@ -361,7 +361,7 @@ def resample(
     if clash := [name for name in (*own_names, *more) if name in computed]:
         raise ValidationError(f"the column {clash[0]!r} has the name of a column of the result. Rename it.")
     max_gap = pd.Timedelta(max_gap).to_timedelta64() if isinstance(max_gap, str) else max_gap
-    step = pd.Timedelta(every)
+    step = _step(every)
     curves: list[tuple[Any, Any]] = []
     names: list[str] = []
     owners: list[int] = []
@@ -401,6 +401,22 @@ def resample(
     for column in (*table.keys, *constant):
         found[column] = table.first_values(column, tracks)
     return found[[*own_names, *computed, *constant, *more]]
+
+
+def _step(every: Any) -> Any:
+    """Return the step between the new times."""
+    import pandas as pd
+
+    advice = "Pass a text such as '1h' or '10min', or a pandas.Timedelta."
+    if isinstance(every, (int, float, np.number)) and not isinstance(every, np.timedelta64):
+        raise ValidationError(f"every must be a duration, not {short_repr(every)}. {advice}")
+    try:
+        step = pd.Timedelta(every)
+    except (ValueError, TypeError):
+        raise ValidationError(f"every must be a duration, not {short_repr(every)}. {advice}") from None
+    if pd.isna(step) or step <= pd.Timedelta(0):
+        raise ValidationError(f"every must be more than 0, not {short_repr(every)}. {advice}")
+    return step
 
 
 @overload

@@ -20,12 +20,13 @@ from .._typing import Progress
 from .curve import NORMS, CoreCurve, ProductCurve
 from .jerk import jerk
 
-# The quantities of each order that follow from those of lower orders by the chain rule.
+# Orders of derivatives.
+_NU = {"point": 0, "velocity": 1, "acceleration": 2, "jerk": 3, "body velocity": 1, "body acceleration": 2}
+# The quantities from which each one follows by the chain rule.
 _ORDERS = {
     "point": ("point",),
     "velocity": ("velocity",),
     "acceleration": ("velocity", "acceleration"),
-    "jerk": ("velocity", "acceleration", "jerk"),
     "body velocity": ("body velocity",),
     "body acceleration": ("body velocity", "body acceleration"),
 }
@@ -218,12 +219,14 @@ class Retimed:
         def value(name: str) -> Any:
             return values_at(self.source, at, name, "raise", per_curve)
 
-        if quantity == "point":
-            result = value("point")
+        if quantity == "point" or (isinstance(self.law, Affine) and quantity in NORMS):
+            result = value(quantity)
+        elif isinstance(self.law, Affine) and quantity in _NU:
+            # Derivatives of odd order change their sign with the direction.
+            sign = self.law.sign ** _NU[quantity]
+            result = _by_factor(lambda own: sign * own, [value(quantity)])
         elif quantity == "speed":
             result = np.abs(self.law(x, 1)) * value("speed")
-        elif quantity == "bend" and isinstance(self.law, Affine):
-            result = value("bend")
         elif quantity == "bend":
             result = product_norm(tuple(_acceleration_norm(part, x, outside, per_curve) for part in self.parts))
         elif quantity == "motion":
@@ -308,12 +311,8 @@ def _by_factor(function: Callable[..., Any], values: Sequence[Any]) -> Any:
 
 
 def _chain_rule(s: Sequence[Any]) -> tuple[Any, ...]:
-    """Return the factors of γ', ∇γ' and ∇∇γ' in the last derivative of γ∘σ, from the derivatives s of σ."""
-    if len(s) == 1:
-        return (s[0],)
-    if len(s) == 2:
-        return (s[1], s[0] ** 2)
-    return (s[2], 3 * s[0] * s[1], s[0] ** 3)
+    """Return the factors of γ' and ∇γ' in the last derivative of γ∘σ, from the derivatives s of σ."""
+    return (s[0],) if len(s) == 1 else (s[1], s[0] ** 2)
 
 
 def _weighted(factors: Sequence[Any], values: Sequence[Any], before: int) -> Any:

@@ -33,7 +33,7 @@ _POINTS = chebyshev.chebpts1(_NODES)
 _TO_COEFFICIENTS = np.linalg.inv(chebyshev.chebvander(_POINTS, _NODES - 1))
 
 
-class Pieces(NamedTuple):
+class Intervals(NamedTuple):
     """A function as a polynomial on each of several intervals, which cover the domain in order.
 
     Attributes
@@ -85,9 +85,9 @@ def _nodes(a: Doubles, b: Doubles) -> Doubles:
 
 def extrema(f: Function, knots: Doubles, sign: float) -> Doubles:
     """Return the times of local maxima (sign 1) or minima (sign -1), including those at the ends of the domain."""
-    pieces = Pieces.of(f, knots)
-    scale = float(np.abs(pieces.values).max())
-    slopes = sign * chebyshev.chebder(pieces.coefficients)
+    intervals = Intervals.of(f, knots)
+    scale = float(np.abs(intervals.values).max())
+    slopes = sign * chebyshev.chebder(intervals.coefficients)
     tau = np.linspace(-1, 1, _SIGNS)
     values = chebyshev.chebval(tau, slopes)
     # Changes that rounding errors explain do not have a sign.
@@ -97,10 +97,10 @@ def extrema(f: Function, knots: Doubles, sign: float) -> Doubles:
         return np.asarray(knots[[0, -1]])
     signs = np.sign(values[number, place])
     turns = np.flatnonzero((signs[:-1] > 0) & (signs[1:] < 0))
-    found = pieces.time(number[turns], tau[place[turns]])
+    found = intervals.time(number[turns], tau[place[turns]])
     inside = number[turns] == number[turns + 1]
     # In other cases, the maximum is at a knot, or a constant part begins there.
-    found[~inside] = pieces.b[number[turns[~inside]]]
+    found[~inside] = intervals.b[number[turns[~inside]]]
     own = turns[inside]
     ends = tau[place[own]], tau[place[own + 1]]
 
@@ -109,20 +109,22 @@ def extrema(f: Function, knots: Doubles, sign: float) -> Doubles:
 
     starts, stops = (values[number[i], place[i]] for i in (own, own + 1))
     root = roots(slope, ends, (starts, stops), (ends[0] + ends[1]) / 2, np.zeros(len(own)))
-    found[inside] = pieces.time(number[own], root)
-    rough = np.flatnonzero(inside)[pieces.rough[number[own]]]
-    found[rough], real = _refined(lambda x: sign * f(x), pieces, number[turns[rough]], found[rough])
+    found[inside] = intervals.time(number[own], root)
+    rough = np.flatnonzero(inside)[intervals.rough[number[own]]]
+    found[rough], real = _refined(lambda x: sign * f(x), intervals, number[turns[rough]], found[rough])
     found = np.delete(found, rough[~real])
     outer = [knots[:1]] if signs[0] < 0 else []
     return np.concatenate([*outer, found, *([knots[-1:]] if signs[-1] > 0 else [])])
 
 
-def _refined(f: Function, pieces: Pieces, number: NDArray[np.intp], x: Doubles) -> tuple[Doubles, NDArray[np.bool_]]:
+def _refined(
+    f: Function, intervals: Intervals, number: NDArray[np.intp], x: Doubles
+) -> tuple[Doubles, NDArray[np.bool_]]:
     """Improve maxima next to kinks by golden-section search, and return whether they are maxima of the function."""
     if not len(x):
         return x, np.zeros(0, np.bool_)
-    reach = (pieces.b - pieces.a)[number] / _NODES
-    a, b = np.maximum(x - reach, pieces.a[number]), np.minimum(x + reach, pieces.b[number])
+    reach = (intervals.b - intervals.a)[number] / _NODES
+    a, b = np.maximum(x - reach, intervals.a[number]), np.minimum(x + reach, intervals.b[number])
     ends = np.maximum(f(a), f(b))
     for _ in range(_GOLDEN):
         left, right = b - _RATIO * (b - a), a + _RATIO * (b - a)
@@ -134,10 +136,10 @@ def _refined(f: Function, pieces: Pieces, number: NDArray[np.intp], x: Doubles) 
 
 def crossings(f: Function, knots: Doubles, value: float) -> Doubles:
     """Return the times at which a function crosses a value, in increasing order."""
-    pieces = Pieces.of(f, knots)
+    intervals = Intervals.of(f, knots)
     ends = f(knots[[0, -1]])
-    times = np.concatenate([knots[:1], _nodes(pieces.a, pieces.b).ravel(), knots[-1:]])
-    values = np.concatenate([ends[:1], pieces.values.ravel(), ends[1:]]) - value
+    times = np.concatenate([knots[:1], _nodes(intervals.a, intervals.b).ravel(), knots[-1:]])
+    values = np.concatenate([ends[:1], intervals.values.ravel(), ends[1:]]) - value
     exact = np.flatnonzero((values == 0) & np.append(True, values[:-1] != 0))
     own = np.flatnonzero(values[:-1] * values[1:] < 0)
     interval, outer = (times[own], times[own + 1]), (values[own], values[own + 1])

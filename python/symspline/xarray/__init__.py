@@ -100,7 +100,7 @@ def fit(
     >>> ds.velocities.dims, ds.converged.values
     (('curve', 'time', 'q'), array([ True]))
 
-    Trajectories with times of their own, the second of which ends early:
+    Trajectories with separate times, the second of which ends early:
 
     >>> time = np.array([["2024-05-01", "2024-05-02", "2024-05-04"], ["2024-05-07", "2024-05-08", "NaT"]], "M8[ns]")
     >>> points = np.stack([np.eye(3), [[1, 0, 0], [0, 1, 0], [np.nan] * 3]])
