@@ -14,8 +14,8 @@ from ._core import ValidationError
 if TYPE_CHECKING:
     import pandas as pd
 
-# Columns of a Movebank download, of its interface for programs, which has underscores, and of tables from R. See the Movebank Attribute
-# Dictionary, http://vocab.nerc.ac.uk/collection/MVB.
+# Columns of a Movebank download, of its interface for programs, which has underscores, and of tables from R. See the
+# Movebank Attribute Dictionary, http://vocab.nerc.ac.uk/collection/MVB.
 _MOVEBANK = ("location-long", "location-lat", "timestamp", "individual-local-identifier")
 _LAYOUTS = (
     ("lon", "lat", None, None),

@@ -306,3 +306,24 @@ def test_searches_and_reversal_of_segments():
     np.testing.assert_allclose(back(x), curve(12 - x), atol=1e-13)
     outside = ss.fit_segments([0, 1, 2, 9, 10.0], [[0.0], [1], [2], [1], [1]], "r:1", max_gap=3, extrapolate=False)
     assert np.isnan(outside(11.0)).all()
+
+
+def test_integrals_along_a_time_law(rng):
+    """The second derivative of a time law jumps between its many knots."""
+    points = ss.Sphere(2).project(np.array([3, 0, 0]) + np.cumsum(0.3 * rng.standard_normal((9, 3)), axis=0))
+    curve = ss.CubicSpline(np.cumsum(rng.uniform(0.5, 1.5, 9)), points, "sphere:2")
+    law = ss.time_law(curve, max_speed=1, max_acceleration=2)
+    motion = curve.retime(law)
+    assert motion.length() == pytest.approx(curve.length(), rel=1e-13)
+    # Midpoints of many short intervals between the knots of the law.
+    fine = np.concatenate([np.linspace(a, b, 21) for a, b in zip(law.knots[:-1], law.knots[1:], strict=True)])
+    steps = np.diff(fine)
+    middle = fine[:-1] + steps / 2
+    norms = curve.space.norm(motion(middle), motion(middle, nu=2))
+    assert motion.bending_energy() == pytest.approx(np.sum(norms**2 * steps), rel=1e-6)
+
+
+def test_a_small_jump_of_the_velocity_is_kept():
+    first = ss.HermiteSpline([0, 1], [[0.0], [1.0]], [[1.0], [1.0]], "r:1")
+    second = ss.HermiteSpline([1, 2], [[1.0], [2.0]], [[1.0 + 1e-9], [1.0]], "r:1")
+    assert isinstance(first.concatenate(second), ss.SegmentedCurve)

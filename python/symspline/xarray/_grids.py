@@ -95,9 +95,9 @@ def _axis(da: xr.DataArray, dim: str, x: Any, point_dims: Sequence[str], policy:
     own = None if dim in da.coords else times_along(da, dim, None, point_dims, f"Make one the coordinate of {dim!r}")
     if own is not None:
         raise ValidationError(
-            f"{dim!r} has no coordinate with its name, but {own.name!r} with dimensions {own.dims} looks like times. Pass "
-            f"da.swap_dims({{{dim!r}: {own.name!r}}}) with to={{{own.name!r}: ...}}, or da.drop_vars({own.name!r}) for "
-            "the nodes 0, 1, 2, ..."
+            f"{dim!r} has no own coordinate, but {own.name!r} with dimensions {own.dims} looks like times. Pass "
+            f"da.swap_dims({{{dim!r}: {own.name!r}}}) with to={{{own.name!r}: ...}}, or da.drop_vars({own.name!r}) "
+            "for the nodes 0, 1, 2, ..."
         )
     nodes, count = (da[dim].values if dim in da.coords else None), da.sizes[dim]
     given, _ = times_with_names(x, dim, point_dims, [])
