@@ -6,7 +6,8 @@ RUST := $(shell find crates -name '*.rs' -o -name Cargo.toml) Cargo.toml .cargo/
 # Wheels of all these packages exist for the usual platforms; nothing but symspline is compiled.
 INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
 
-.PHONY: demo check test test-oracles test-torch test-aarch64 fuzz bench docs wheel sdist test-wheel crate crate-msrv crate-semver check-tools clean
+.PHONY: demo check test test-oracles test-torch test-aarch64 fuzz bench docs wheel sdist test-wheel crate crate-msrv \
+	crate-semver publish-wheels publish-crates check-tools clean
 
 demo: .venv/built
 	$(BIN)/python examples/storms/demo.py --out demo-output
@@ -100,6 +101,14 @@ crate-msrv:
 	cargo +$(MSRV) check --quiet -p symspline --all-features --target-dir target/msrv
 
 MSRV = $(shell sed -n 's/^rust-version = "\(.*\)"/\1/p' Cargo.toml)
+
+# What a maintainer runs for a release; CONTRIBUTING.md describes the credentials.
+publish-wheels: | check-tools
+	$(INSTALL) twine
+	$(BIN)/python -m twine upload dist/symspline-*
+
+publish-crates:
+	cargo publish $(CRATES)
 
 # Whether the interface is compatible with that of the published version; needs cargo-semver-checks.
 crate-semver:
