@@ -1,7 +1,10 @@
 """Layers of the package: a module imports from its own layer and those below, and never in a circle."""
 
 import ast
+import importlib
 from pathlib import Path
+
+import pytest
 
 import symspline
 
@@ -143,3 +146,9 @@ def test_modules_are_public_by_name_only():
 
 def test_dir_shows_public_names_only():
     assert {name for name in dir(symspline) if not name.startswith("__")} == set(symspline.__all__)
+
+
+@pytest.mark.parametrize("name", sorted(PUBLIC - {"cli", "torch"}))
+def test_dir_of_a_module_shows_public_names_only(name):
+    module = importlib.import_module(f"symspline.{name}")
+    assert {name for name in dir(module) if not name.startswith("_")} == set(module.__all__)

@@ -15,7 +15,7 @@ from ._curves.curve import CurveArrays
 from ._curves.fit import Points
 from ._faults import of_index
 from ._report import MAX_STEP, Columns, FarPointsWarning
-from ._spaces import Array, Doubles, Space, Sphere, Unitary, cover_of, factors_of
+from ._spaces import Array, Doubles, Space, Sphere, Torus, Unitary, cover_of, factors_of
 from ._warnings import warn
 from .manifolds import Manifold
 
@@ -191,13 +191,15 @@ def _warn_of_far(found: list[_Far]) -> None:
     of = of_index(place)
     others = len({place for place, *_ in found}) - 1
     more = f" (and of {others} more curves)" if others else ""
+    # Steps of degrees look like steps at random on a torus.
+    angles = " Angles must be in radians." if isinstance(cover_of(space), Torus) else ""
     warn(
         f"more than half of the steps are long: {count} of {steps} steps between neighbouring points{of}{more} are "
-        f"beyond {FAR} of the way to the cut locus of {cover_of(space)!r}, where several C² curves may exist. Where "
-        "points have equivalent representatives, as orientations of crystals do, use a Quotient, whose method unwrap "
-        "takes the one nearest to the previous point. Where phases, signs or bases do not count, use a Quotient, a "
-        "projective space, or a Grassmannian, whose curves give continuous bases by their method lift. Otherwise put "
-        "points in between.",
+        f"beyond {FAR} of the way to the cut locus of {cover_of(space)!r}, where several C² curves may exist.{angles} "
+        "Where points have equivalent representatives, as orientations of crystals do, use a Quotient, whose method "
+        "unwrap takes the one nearest to the previous point. Where phases, signs or bases do not count, use a "
+        "Quotient, a projective space, or a Grassmannian, whose curves give continuous bases by their method lift. "
+        "Otherwise put points in between.",
         FarPointsWarning,
         place,
     )

@@ -89,7 +89,7 @@ def square_matrices(value: ArrayLike, name: str) -> tuple[Array, float]:
     return array, tol
 
 
-def unit_vectors(x: Array, tol: float, name: str, what: str) -> Array:
+def unit_vectors(x: Array, tol: float, name: str, what: str, advice: str = "divide it by its length") -> Array:
     """Normalise unit vectors.
 
     Raises
@@ -98,7 +98,6 @@ def unit_vectors(x: Array, tol: float, name: str, what: str) -> Array:
         If the length of a vector is not 1.
     """
     lengths = length(np.abs(x))
-    advice = "divide it by its length"
     refuse(~(np.abs(lengths - 1) <= tol), name, lambda i: f"is not {what}: its length is {lengths[i]}, not 1; {advice}")
     return x / lengths[..., None]
 

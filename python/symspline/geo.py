@@ -43,6 +43,11 @@ if TYPE_CHECKING:
 
 __all__ = ["EARTH_RADIUS", "cog", "compass", "from_lonlat", "plot", "resample", "sog", "to_lonlat"]
 
+
+def __dir__() -> list[str]:
+    return __all__
+
+
 EARTH_RADIUS = 6_371_008.8
 """Mean radius in metres: R₁ of the ellipsoid GRS 80 (Moritz, Geodetic reference system 1980)."""
 

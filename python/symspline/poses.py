@@ -72,6 +72,11 @@ __all__ = [
     "write_tum",
 ]
 
+
+def __dir__() -> list[str]:
+    return __all__
+
+
 _SE3, _SO3, _R3 = SpecialEuclidean(3), SpecialOrthogonal(3), Euclidean(3)
 
 

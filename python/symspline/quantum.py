@@ -64,6 +64,11 @@ __all__ = [
     "qobjevo",
 ]
 
+
+def __dir__() -> list[str]:
+    return __all__
+
+
 _STAGES = 8
 # For steps of this length, the error of eight stages is a rounding error.
 _LONGEST_STEP = 0.4

@@ -66,6 +66,11 @@ __all__ = [
     "velocities",
 ]
 
+
+def __dir__() -> list[str]:
+    return __all__
+
+
 Spline = CubicSpline[Any, Any] | HermiteSpline[Any] | CumulativeBSpline[Any]
 
 _SO3, _SE3, _S3 = SpecialOrthogonal(3), SpecialEuclidean(3), Sphere(3)

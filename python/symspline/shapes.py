@@ -35,6 +35,11 @@ if TYPE_CHECKING:
 
 __all__ = ["AffineMorph", "from_landmarks", "to_landmarks"]
 
+
+def __dir__() -> list[str]:
+    return __all__
+
+
 Array = NDArray[np.float64]
 
 # If landmarks are closer to a hyperplane than this, in units of their largest extent, their shape is a rounding error.

@@ -49,6 +49,10 @@ _FAR = 0.1
 __all__ = ["OperatorSpline", "align", "from_snapshots", "reduced_operator"]
 
 
+def __dir__() -> list[str]:
+    return __all__
+
+
 def from_snapshots(x: ArrayLike, rank: int | None = None, *, energy: float | None = None) -> Array:
     """Compute bases of the proper orthogonal decomposition of snapshots.
 

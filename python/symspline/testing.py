@@ -27,6 +27,10 @@ from .manifolds import Manifold
 __all__ = ["Conformance", "check"]
 
 
+def __dir__() -> list[str]:
+    return __all__
+
+
 # Lengths of steps as parts of the longest.
 _PARTS = (1e-8, 1e-4, 1e-2, 0.3, 1.0)
 # Central differences of order four: positions, weights, step, and error relative to the compared quantity.

@@ -64,6 +64,7 @@ def test_invalid_products_raise():
         ((P, FLAT, FLAT), {}, r"points must be a tuple of 2 arrays"),
         ((FLAT, P), {}, r"points has shape \(3, 1\), but Sphere\(2\) needs"),
         ((P, np.zeros((4, 1))), {}, r"points"),
+        (np.zeros((3, 4)), {}, r"If x is your array, pass \(x\[..., 0:3\], x\[..., 3:4\]\)"),
         ((TWO, np.zeros((3, 3, 1))), {}, r"batch axes differ"),
         ((OFF, FLAT), {}, r"factor 0, Sphere\(2\): points\[2\] is off the space"),
         ((P, FLAT), {"bc_type": ((1, [0, 0, 0]), "natural")}, r"an end vector must be a tuple of 2 arrays"),

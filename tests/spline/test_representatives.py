@@ -127,6 +127,13 @@ def test_data_in_representations_that_do_not_fit_warn(space, points):
     ss.CubicSpline(None, smooth(space), space)
 
 
+def test_degrees_on_a_torus_warn():
+    degrees = np.array([0, 40, 80, 120, 160, 200.0])[:, None]
+    with pytest.warns(ss.FarPointsWarning, match="Angles must be in radians"):
+        ss.CubicSpline(None, degrees, "torus:1")
+    ss.CubicSpline(None, np.radians(degrees), "torus:1")
+
+
 def test_the_nearest_representative_is_silent():
     points = orientations()
     for i in range(1, len(points)):

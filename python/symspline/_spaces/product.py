@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from difflib import get_close_matches
 from functools import lru_cache, reduce
+from itertools import pairwise
 from typing import Any, TypeVar, overload
 
 import numpy as np
@@ -221,7 +222,13 @@ def parts_of(value: Any, space: Space[Any], name: str) -> Tuple:
 
 
 def _conversion(value: Any, space: Product[Any]) -> str:
-    """Return a sentence that names the conversion of poses to points of the factors."""
+    """Return a sentence that names the conversion of one array to points of the factors."""
+    shapes = [factor.point_shape for factor in space.factors]
+    if isinstance(value, np.ndarray) and value.ndim and all(len(shape) == 1 for shape in shapes):
+        ends = np.cumsum([0, *(shape[0] for shape in shapes)]).tolist()
+        if value.shape[-1] == ends[-1]:
+            parts = ", ".join(f"x[..., {a}:{b}]" for a, b in pairwise(ends))
+            return f". If x is your array, pass ({parts})."
     poses = hasattr(value, "translation") or (isinstance(value, np.ndarray) and value.shape[-2:] == (4, 4))
     if not poses or not any(factor.point_shape == (3, 3) for factor in space.factors):
         return ""

@@ -105,7 +105,7 @@ def converted(value: ArrayLike, name: str, form: Form, wanted: Form, atol: float
         elif form == "vector":
             _check_angles(x, found, tol, name)
         else:
-            unit_vectors(x, tol, name, "a unit quaternion")
+            unit_vectors(x, tol, name, "a unit quaternion", "divide it by its length, or pass a larger atol")
     return found
 
 

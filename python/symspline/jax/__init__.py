@@ -16,3 +16,7 @@ from ._fitting import fit
 from ._grid import grid_evaluate, grid_spline
 
 __all__ = ["curve", "evaluate", "fit", "grid_evaluate", "grid_spline"]
+
+
+def __dir__() -> list[str]:
+    return __all__

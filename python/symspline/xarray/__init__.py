@@ -29,6 +29,10 @@ from ._spec import KNOTS, bare, check_dims, rehearse, spec_of, timed_by, times_w
 __all__ = ["estimate", "evaluate", "fit", "lift", "resample", "smooth", "speed"]
 
 
+def __dir__() -> list[str]:
+    return __all__
+
+
 def fit(
     da: xr.DataArray,
     space: Space | str,
