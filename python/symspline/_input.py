@@ -17,8 +17,7 @@ _CONVERSIONS = ("as_matrix", "full", "to_numpy", "datetime64", "numpy", "toarray
 ISO_DATE = re.compile(
     r"(?P<body>\d{4}-\d\d-\d\d(?:[T ]\d\d:\d\d(?::\d\d(?:\.\d{1,9})?)?)?) ?(?P<zone>Z|[+-]\d\d(?::?\d\d)?)?", re.ASCII
 )
-# Texts that are equal after this translation are dates of one form.
-ZEROS = str.maketrans("123456789", "0" * 9)
+_ZEROS = str.maketrans("123456789", "0" * 9)
 UTC_ZONE, NO_ZONE = "UTC", "none"
 
 
@@ -186,12 +185,19 @@ def _moments(array: NDArray[Any], name: str) -> tuple[Any, str | None]:
     return np.array([moment for moment, _ in pairs]).reshape(array.shape), UTC_ZONE if zones[0] else NO_ZONE
 
 
+def shapes_of(cells: list[str]) -> list[str]:
+    """Return texts with zeros in place of 1 to 9, so that dates of one form become equal."""
+    # One translation is several times faster than one per text.
+    shapes = "\n".join(cells).translate(_ZEROS).split("\n")
+    return shapes if len(shapes) == len(cells) else [cell.translate(_ZEROS) for cell in cells]
+
+
 def _moments_of_texts(cells: list[str]) -> tuple[NDArray[Any], bool] | None:
     """Convert texts, all of one form in one step, and return whether they have a time zone.
 
     The result is None if a text is not a date, or only some have a time zone.
     """
-    shapes = [cell.translate(ZEROS) for cell in cells]
+    shapes = shapes_of(cells)
     numbers = {shape: number for number, shape in enumerate(dict.fromkeys(shapes))}
     matches = [ISO_DATE.fullmatch(shape) for shape in numbers]
     zoned = {match is not None and match["zone"] is not None for match in matches}

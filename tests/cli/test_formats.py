@@ -64,7 +64,7 @@ def test_t_and_points_of_an_npz_file(run, fails):
         ({"t": np.array(["2020", "NaT"], "M8[D]"), "points": np.eye(2)}, "--space s:1", "column 't' holds no time"),
         ({"t": [0, 1], "points": np.eye(2)}, "--space s:1 --columns point", "did you mean 'points'?"),
         ({"t": [], "points": np.empty((0, 2))}, "--space s:1", "c.npz has no rows"),
-        ({"t": [0, 1], "points": np.array([["a"], ["b"]])}, "--space r:1", "not numbers"),
+        ({"t": [0, 1], "points": np.array([["a"], ["b"]])}, "--space r:1", "holds 'a', which is not a number"),
         ({"t": np.array([{}, {}])}, "--space r:1", "c.npz: entry 't' holds Python objects"),
     ]:
         np.savez("c.npz", **arrays)
@@ -92,7 +92,7 @@ def test_parquet_of_all_kinds(run, fails):
     np.testing.assert_array_equal(made["b"].points, [[3, 1.5], [4, 1.5]])
     assert str(made["a"].t[1]) == "2020-01-02"
     problem = fails("fit a.parquet --space r:3 --curve id -o b.npz")
-    assert problem == "a.parquet, row 1 (counted from 0): column 'z' is empty"
+    assert problem == "a.parquet, row 1 (counted from 0): column 'z' is empty or NaN"
     Path("b.parquet").write_bytes(Path("a.parquet").read_bytes()[:300])
     assert fails("fit b.parquet --space r:3 -o b.npz") == "b.parquet is damaged or not a Parquet file"
 

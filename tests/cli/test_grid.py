@@ -1,7 +1,10 @@
 """Grids of points: ``symspline grid``."""
 
+import io
 import shlex
+import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -47,6 +50,22 @@ def test_values_are_those_of_the_library(wind, run):
     found = arrays("fine.npz")
     spline = ss.GridSpline((LAT, LON), wind, "sphere:2", symmetric=True)
     np.testing.assert_array_equal(found["points"], spline.grid(np.linspace(30, 39, 4), np.linspace(0, 20, 5)))
+
+
+def test_a_pipe_of_two_commands(wind):
+    def process(line, given):
+        command = [sys.executable, "-m", "symspline", *line.split()]
+        return subprocess.run(command, input=given, capture_output=True, timeout=120)
+
+    fitted = process("grid - --space s:2 -o -", Path("wind.npz").read_bytes())
+    assert fitted.stderr.decode().startswith("standard output: a spline through 6 x 8 points of sphere:2")
+    sampled = process("grid - --points 5,6 -o -", fitted.stdout)
+    assert sampled.returncode == 0
+    found = np.load(io.BytesIO(sampled.stdout))["points"]
+    spline = ss.GridSpline((LAT, LON), wind, "sphere:2")
+    np.testing.assert_array_equal(found, spline.grid(np.linspace(30, 39, 5), np.linspace(0, 20, 6)))
+    damaged = process("grid - --space s:2 -o -", b"no grid")
+    assert (damaged.returncode, damaged.stderr) == (2, b"symspline: standard input is not an NPZ file\n")
 
 
 def test_values_at_given_positions(wind, run, fails):

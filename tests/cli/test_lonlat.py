@@ -1,5 +1,7 @@
 """Tables of longitudes and latitudes."""
 
+from pathlib import Path
+
 import numpy as np
 from tabular import FIXES, TRACK, numbers, table, write
 
@@ -59,3 +61,19 @@ def test_longitudes_go_once_around_at_most(run, fails):
         write("a.csv", f"t,lon,lat\n0,5,1\n1,{lon},2\n")
         problem = fails("fit a.csv --lonlat -o b.npz")
         assert f"a.csv, line 3: longitude {lon} is not between -360 and 360 degrees" in problem
+
+
+def test_tracks_are_drawn_on_the_earth(run, fails):
+    write("a.csv", TRACK)
+    run("fit a.csv --lonlat -o a.npz")
+    run("plot a.npz -o a.svg")
+    # Land, and speeds in km/h; without positions on the Earth there are neither.
+    track = Path("a.svg").read_text(encoding="utf-8")
+    run("fit a.csv --space r:2 -o plane.npz")
+    run("plot plane.npz -o plane.svg")
+    assert "km/h" in track and "km/h" not in Path("plane.svg").read_text(encoding="utf-8")
+    ss.CubicSpline(None, np.eye(3), "s:2").save("b.npz")
+    run("plot b.npz -o plain.svg")
+    run("plot b.npz --lonlat -o earth.svg")
+    assert len(Path("earth.svg").read_bytes()) > 2 * len(Path("plain.svg").read_bytes())
+    assert fails("plot plane.npz --lonlat -o x.svg") == "--lonlat is for sphere:2, not for euclidean:2"

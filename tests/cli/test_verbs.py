@@ -143,8 +143,8 @@ def test_invalid_usage_fails(curves, fails):
     assert fails("sample a.npz -n 3 --nu 0,3 -o b.csv").startswith("--nu 0,3: give one or more of 0, 1 and 2")
     assert fails("fit a.csv --space s:2 -o b.csv") == "b.csv: the name of a file of curves must end in .npz"
     ending = (
-        "b.xls: the name of a table must end in .csv or .npz or .parquet or .json or .geojson or .gpx or .tum or .txt "
-        "or .tsv"
+        "b.xls: the name of a table must end in .csv or .tsv or .npz or .parquet or .json or .geojson or .gpx or .tum "
+        "or .txt"
     )
     assert fails("sample a.npz -n 3 -o b.xls") == ending
     assert fails("plot a.npz -o b.txt").startswith("b.txt: the name of a picture must end in .")

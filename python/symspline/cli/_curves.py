@@ -20,9 +20,10 @@ from .._cubic import CubicSpline
 from .._files import load, save
 from .._grid import GridSpline
 from .._spaces import Space
+from ._formats import CURVES
 from ._messages import Problem, did_you_mean, refuse
 from ._points import GLOBE, LONLAT, Columns, count_with_quaternion, labels, require_globe
-from ._streams import CURVES, Source, writing
+from ._streams import Source, writing
 
 _COLUMNS = "columns"
 """The entry of the file with the columns, which the library ignores."""

@@ -56,31 +56,50 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from .._cubic import CubicSpline
 from .._exceptions import SymsplineError
 from .._functional import fit_many
-from .._report import long_gaps
 from .._representatives import IN_PYTHON
-from .._smoothing import SmoothingSpline, SmoothingWarning
+from .._smoothing import SmoothingWarning
 from .._smoothing.many import smooth_many
-from .._spaces import Space, factors_of, space_named
-from ._columns import ORDERS, check_days, column_of_names, completed, point_entries, split_names, time_column
+from .._spaces import Space, space_named
+from . import _summary
+from ._columns import ORDERS, check_days, column_of_names, point_columns, split_names, time_column
 from ._curves import Curves, write_curves
-from ._formats import open_table
+from ._formats import CURVES, TABLES, endings, format_of, open_table
 from ._messages import VERBOSE, Problem, Progress, listed, refuse, say, tell
-from ._points import GLOBE, Columns, points_of, require_globe
+from ._points import GLOBE, Columns, require_globe
 from ._recordings import Recordings
-from ._sensors import Fusion, sensors_of, spread, summary
-from ._streams import CURVES, STANDARD, TABLES, check_target, endings, format_of
-from ._times import is_number, number
+from ._sensors import Fusion, sensors_of
+from ._streams import called, check_target
+from ._times import number, option_numbers
 
-_FOR_ROTATIONS = "For rotations give --space so:3, or rp:3, where signs do not count"
-_EXTRAPOLATE: dict[str, Any] = {"continue": True, "geodesic": "geodesic", "periodic": "periodic"}
 _METHODS = "auto (default), quasi-newton, newton, homotopy or fixed-point"
-_CRITERIA = ("gcv", "cp", "reml")
 _ENDS = "natural (default), not-a-knot, clamped, periodic; or two of the first three with a comma, for start and end"
+_POLICIES = {"continue": True, "geodesic": "geodesic", "periodic": "periodic"}
+_EXTRAPOLATE = (
+    "continue the last segment outside the times, or go on along a geodesic, or periodically (default: times outside "
+    "are an error)"
+)
+_MAX_GAP = (
+    "cut curves at longer gaps between neighbouring times: a number or, for dates, a duration such as 12h; the "
+    "segments are curves 1, 2, ... or, with --curve, NAME/1, NAME/2, ...; single points are omitted"
+)
+_CRITERION = (
+    "how λ is chosen: gcv (default), reml, or cp, Mallows' C_p, which needs --sigma and is the default with it, "
+    "without rates and velocities"
+)
+_SIGMA = (
+    "known standard deviation of the noise in a coordinate: in the unit of distances, radians for rotations, degrees "
+    "with --lonlat; in a product perhaps one per factor with commas"
+)
+_RATES = (
+    "columns of angular velocities in the frame of the body, for so:3, sphere:3, se:3 and products with one of them"
+)
+_FOR_ROTATIONS = "For rotations give --space so:3, or rp:3, where signs do not count"
+_NOISY = ("criterion", "lam", "sigma", "robust", "penalty", "rates", "rate_sigma", "rate_bias", "velocities",
+          "velocity_sigma")  # fmt: skip
+"""Options that need --smooth."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -96,44 +115,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--quaternion", choices=ORDERS, help="order of a quaternion, if the names do not show it")
     add("--sort", action="store_true", help="put the rows of every curve in the order of their times")
     add("--dedup", choices=("first", "mean"), help="keep the first of the points of one time, or their mean")
-    add(
-        "--max-gap",
-        metavar="DT",
-        help="cut curves at longer gaps between neighbouring times: a number or, for dates, a duration such as 12h; "
-        "the segments are curves 1, 2, ... or, with --curve, NAME/1, NAME/2, ...; single points are omitted",
-    )
+    add("--max-gap", metavar="DT", help=_MAX_GAP)
     add("--bc-type", default="natural", metavar="END", help=_ENDS)
     add("--method", default="auto", metavar="M", help=_METHODS)
     add("--tol", type=number, help="relative C² residual that counts as converged (default: 1e-12)")
-    add("--extrapolate", choices=_EXTRAPOLATE, help="continue the last segment outside the times, or go on along a "
-        "geodesic, or periodically (default: times outside are an error)")  # fmt: skip
-    add(
-        "-o",
-        dest="output",
-        type=Path,
-        metavar="OUT",
-        required=True,
-        help="file of curves to write: .npz, or - for standard output",
-    )
+    add("--extrapolate", choices=_POLICIES, help=_EXTRAPOLATE)
+    out = "file of curves to write: .npz, or - for standard output"
+    add("-o", dest="output", type=Path, metavar="OUT", required=True, help=out)
     add = parser.add_argument_group("noisy data").add_argument
     add("--smooth", action="store_true", help="fit curves near the points")
-    criterion = (
-        "how λ is chosen: gcv (default), reml, or cp, Mallows' C_p, which needs --sigma and is the default with it, "
-        "without rates and velocities"
-    )
-    add("--criterion", choices=_CRITERIA, help=criterion)
+    add("--criterion", choices=("gcv", "cp", "reml"), help=_CRITERION)
     add("--lam", metavar="L", help="a number λ >= 0 instead, in a product perhaps one per factor with commas")
-    add(
-        "--sigma",
-        metavar="S",
-        help="known standard deviation of the noise in a coordinate: in the unit of distances, radians for rotations, "
-        "degrees with --lonlat; in a product perhaps one per factor with commas",
-    )
+    add("--sigma", metavar="S", help=_SIGMA)
     add("--robust", action="store_true", help="reduce the influence of outliers (loss 'cauchy')")
     add("--penalty", choices=("acceleration", "jerk"), help="derivative that is kept small (default: acceleration)")
     add = parser.add_argument_group("rates and velocities, with --smooth").add_argument
-    add("--rates", metavar="A,B,C", help="columns of angular velocities in the frame of the body, for so:3, sphere:3, "
-        "se:3 and products with one of them")  # fmt: skip
+    add("--rates", metavar="A,B,C", help=_RATES)
     add("--rate-sigma", metavar="S", help="standard deviation of one of these numbers")
     add("--rate-bias", action="store_true", help="estimate a constant that is added to the rates")
     add("--velocities", metavar="A,B,...", help="columns of velocities; see above")
@@ -147,37 +144,32 @@ def run(options: argparse.Namespace) -> int:
     smooth = _smoothing_options(options)
     space = _space(options.space, options.lonlat)
     table = open_table(options.input, options.format)
-    sensors = sensors_of(table, options, space, smooth and smooth["sigma"], _numbers)
+    sensors = sensors_of(table, options, space, smooth and smooth["sigma"])
     extra = sensors.names if sensors else []
     curve = table.require(options.curve) if options.curve is not None else None
     given = split_names(options.columns)
     time = time_column(table, options.time, [curve, *given, *extra])
-    entries, order = point_entries(table, given, [time, curve, *extra], space, options.lonlat, options.quaternion)
-    used = [column for entry in entries for column in entry.columns]
-    rows = table.read([*used, *extra], time, curve, [*used, *extra] if sensors else [])
+    points = point_columns(table, given, [time, curve, *extra], space, options.lonlat, options.quaternion)
+    rows = table.read([*points.used, *extra], time, curve, [*points.used, *extra] if sensors else [])
     check_days(table, time, rows)
-    names = [entry.name for entry in entries]
     at = "times 0, 1, 2, ..." if time is None else f"times in column {time}"
-    tell(f"{table.path}: {table.path.format} table, points in columns {listed(names)}, {at}", VERBOSE)
-    columns = Columns(names, time or "time", curve or "curve", options.lonlat, rows.utc, order)
+    tell(f"{table.path}: {table.path.format} table, points in columns {listed(points.names)}, {at}", VERBOSE)
+    columns = Columns(points.names, time or "time", curve or "curve", options.lonlat, rows.utc, points.quaternion)
     if sensors and smooth:
-        fusion = Fusion(table, rows, entries, columns, space, sensors)
-        named = curve is not None
-        curves = fusion.fitted(named, _estimation_options(options, smooth))
-        write_curves(options.output, Curves(dict(zip(fusion.groups, curves, strict=True)), named, columns))
-        for line in summary(_called(options.output), curves, fusion, named):
+        fusion = Fusion(table, rows, points, sensors)
+        curves = fusion.fitted(_estimation_options(options, smooth))
+        write_curves(options.output, Curves(curves, curve is not None, columns))
+        first, *biases = _summary.estimated(curves, curve is not None, fusion.counts, fusion.omitted)
+        for line in (f"{called(options.output)}: {first}", *biases):
             tell(line)
         return 0
-    numbers = rows.numbers if options.lonlat or order else completed(rows.numbers, entries, space)
-    points = points_of(space, numbers, columns, table.path, rows.place)
-    hint = partial(column_of_names, table, time, [time, *used]) if curve is None else lambda: None
-    data = Recordings(table.path, rows, points, space, options, hint)
+    hint = partial(column_of_names, table, time, [time, *points.used]) if curve is None else lambda: None
+    data = Recordings(table.path, rows, points.read(rows.numbers, rows.place), space, options, hint)
     fitted = _fitted(data, space, options, smooth)
     segmented = options.max_gap is not None and curve is None
     write_curves(options.output, Curves(dict(zip(data.groups, fitted, strict=True)), data.named, columns, segmented))
-    tell(
-        f"{_called(options.output)}: {_summary(fitted, options.lonlat)}{_prepared(data, options.dedup)}{_gaps(fitted)}"
-    )
+    words = f"{_summary.fitted(fitted, options.lonlat)}{data.changes()}{_summary.long_gaps_of(fitted)}"
+    tell(f"{called(options.output)}: {words}")
     same = data.merged or data.repeated
     column = hint() if same else None
     if column is not None:
@@ -186,10 +178,6 @@ def run(options: argparse.Namespace) -> int:
             f"holds several tracks, fit each of them with --curve {column}"
         )
     return 0
-
-
-def _called(output: Path) -> str:
-    return "standard output" if output == STANDARD else str(output)
 
 
 def _space(name: str | None, lonlat: bool) -> Space:
@@ -205,24 +193,32 @@ def _fitted(
     data: Recordings, space: Space, options: argparse.Namespace, smooth: dict[str, Any] | None
 ) -> Sequence[CubicSpline]:
     """All curves, fitted in one call."""
-    common: dict[str, Any] = {"extrapolate": _EXTRAPOLATE.get(options.extrapolate)}
-    ends = _bc_type(options.bc_type)
-    tol = {} if options.tol is None else {"tol": options.tol}
-    fitted: Sequence[CubicSpline]
+    common: dict[str, Any] = {"extrapolate": _POLICIES.get(options.extrapolate)}
+    if smooth is None:
+        common |= {"bc_type": _bc_type(options.bc_type), "method": options.method}
+        common |= {} if options.tol is None else {"tol": options.tol}
     try:
         with warnings.catch_warnings(record=True) as noted, Progress("fitting") as progress:
             # The summary counts the curves whose λ is at a bound.
             warnings.simplefilter("ignore", SmoothingWarning)
-            common["progress"] = progress
+            fitted: Sequence[CubicSpline]
             if smooth is None:
-                fitted = fit_many(data.curves, space, bc_type=ends, method=options.method, **tol, **common)
+                fitted = fit_many(data.curves, space, progress=progress, **common)
             else:
-                fitted = smooth_many([(*curve, {}) for curve in data.curves], space, **common, **smooth)
+                curves = [(*curve, {}) for curve in data.curves]
+                fitted = smooth_many(curves, space, progress=progress, **common, **smooth)
     except SymsplineError as error:
         raise error._with_message(data.located(error)) from None
     for note in noted:
         say(data.located(note.message).replace(IN_PYTHON, _FOR_ROTATIONS))
     return fitted
+
+
+def _bc_type(text: str) -> Any:
+    ends = tuple(end.strip() for end in text.split(","))
+    if ends != ("periodic",) and (len(ends) > 2 or not set(ends) <= {"natural", "not-a-knot", "clamped"}):
+        raise Problem(f"--bc-type {text}: give {_ENDS.replace(' (default)', '')}")
+    return ends[0] if len(ends) == 1 else ends
 
 
 def _smoothing_options(options: argparse.Namespace) -> dict[str, Any] | None:
@@ -234,22 +230,11 @@ def _smoothing_options(options: argparse.Namespace) -> dict[str, Any] | None:
         Options contradict each other.
     """
     if not options.smooth:
-        names = (
-            "criterion",
-            "lam",
-            "sigma",
-            "robust",
-            "penalty",
-            "rates",
-            "rate_sigma",
-            "rate_bias",
-            "velocities",
-            "velocity_sigma",
-        )
-        option = next((name for name in names if getattr(options, name) not in (None, False)), None)
-        refuse(f"--{option}".replace("_", "-"), (option, " is for noisy data; give --smooth, too"))
+        option = next((name for name in _NOISY if getattr(options, name) not in (None, False)), "")
+        refuse(f"--{option.replace('_', '-')}", (option, " is for noisy data; give --smooth, too"))
         return None
     rates = options.rate_sigma is not None or options.rate_bias
+    velocities = options.velocity_sigma is not None
     through = "is for curves through the points; omit it with --smooth"
     refuse(
         "",
@@ -260,97 +245,18 @@ def _smoothing_options(options: argparse.Namespace) -> dict[str, Any] | None:
         (options.lam and options.criterion, "--lam gives λ, which --criterion would choose; omit one of them"),
         (options.criterion == "cp" and options.sigma is None, "--criterion cp needs the noise; give it with --sigma"),
         (rates and options.rates is None, "there are no --rates, to which --rate-sigma and --rate-bias belong"),
-        (
-            options.velocity_sigma is not None and options.velocities is None,
-            "there are no --velocities, to which --velocity-sigma belongs",
-        ),
+        (velocities and options.velocities is None, "there are no --velocities, to which --velocity-sigma belongs"),
     )
-    lam = None if options.lam is None else _numbers(options.lam, "--lam")
-    sigma = None if options.sigma is None else _numbers(options.sigma, "--sigma")
-    if sigma is not None and not np.all(np.greater(sigma, 0)):
-        raise Problem(f"--sigma {options.sigma}: the standard deviation must be greater than 0")
+    lam = None if options.lam is None else option_numbers(options.lam, "--lam")
+    sigma = None if options.sigma is None else option_numbers(options.sigma, "--sigma", positive=True)
     if options.lonlat and isinstance(sigma, float):
         sigma = math.radians(sigma)
-    known = sigma is not None and lam is None
-    criterion = options.criterion or ("cp" if known else "gcv")
-    loss = "cauchy" if options.robust else "linear"
-    penalty = options.penalty or "acceleration"
+    criterion = options.criterion or ("cp" if sigma is not None and lam is None else "gcv")
+    loss, penalty = "cauchy" if options.robust else "linear", options.penalty or "acceleration"
     return {"criterion": criterion, "lam": lam, "sigma": sigma, "loss": loss, "penalty": penalty}
 
 
 def _estimation_options(options: argparse.Namespace, smooth: dict[str, Any]) -> dict[str, Any]:
     """Return the options of `symspline.estimate`."""
     kept = {name: smooth[name] for name in ("lam", "loss", "penalty")}
-    return {**kept, "criterion": options.criterion, "extrapolate": _EXTRAPOLATE.get(options.extrapolate)}
-
-
-def _numbers(text: str, option: str) -> Any:
-    """A number, or a tuple of several."""
-    cells = text.split(",")
-    refuse(f"{option} {text}: ", (not all(map(is_number, cells)), "give a number such as 0.1"))
-    values = tuple(map(float, cells))
-    bad = [value for value in values if not 0 <= value < np.inf]
-    refuse(f"{option} {text}: ", (bad, f"{next(iter(bad), 0):g} is not a finite number >= 0"))
-    return values if len(values) > 1 else values[0]
-
-
-def _bc_type(text: str) -> Any:
-    ends = tuple(end.strip() for end in text.split(","))
-    if ends != ("periodic",) and (len(ends) > 2 or not set(ends) <= {"natural", "not-a-knot", "clamped"}):
-        raise Problem(f"--bc-type {text}: give {_ENDS.replace(' (default)', '')}")
-    return ends[0] if len(ends) == 1 else ends
-
-
-def _prepared(data: Recordings, dedup: str | None) -> str:
-    """Report the rows that were merged or omitted, which the curves do not show."""
-    same = "merged with others of the same time" if dedup == "mean" else "omitted after another of their time"
-    counts = ((data.merged, f"{same} (--dedup {dedup})"), (data.alone, "alone between gaps omitted"))
-    return "".join(f"; {count} row{'s' if count > 1 else ''} {what}" for count, what in counts if count)
-
-
-def _gaps(splines: Sequence[CubicSpline]) -> str:
-    """Report steps that are far longer than most, across which nothing was measured."""
-    found = []
-    for spline in splines:
-        times = spline._times
-        if isinstance(spline, SmoothingSpline):
-            times = np.unique(spline._noisy.times[spline._noisy.used])
-        found += np.diff(times)[long_gaps(times)].tolist()
-    if not found:
-        return ""
-    gaps = f"{len(found)} long gap{'s' if len(found) > 1 else ''}"
-    unit = " s" if splines[0].t.dtype.kind == "M" else ""
-    return f"; {gaps}, up to {max(found):.4g}{unit} (--max-gap cuts there)"
-
-
-def _summary(splines: Sequence[CubicSpline], lonlat: bool) -> str:
-    many, most = ("s", "at most ") if len(splines) > 1 else ("", "")
-    smooth = [spline for spline in splines if isinstance(spline, SmoothingSpline)]
-    where = "near" if smooth else "through"
-    points = sum(len(spline.data[0]) for spline in smooth) or sum(len(spline.t) for spline in splines)
-    words = f"{len(splines)} curve{many} {where} {points} points of {splines[0].space}, converged: "
-    if smooth:
-        return words + _smoothing_summary(smooth, lonlat)
-    reports = [spline.report for spline in splines]
-    iterations, residual = max(r.iterations for r in reports), max(r.residual for r in reports)
-    return f"{words}{reports[0].method}, {most}{iterations} iterations, residual {most}{residual:.1e}"
-
-
-def _smoothing_summary(splines: Sequence[SmoothingSpline], lonlat: bool) -> str:
-    reports = [spline.report if isinstance(spline.report, tuple) else (spline.report,) for spline in splines]
-    spaces = factors_of(splines[0].space)
-    parts = []
-    # A pose has a report for its rotation and one for its position, of which the first is shown.
-    for space, own in zip(spaces, zip(*reports, strict=True), strict=False):
-        bound = sum(bool(report.at_bound) for report in own)
-        rough = sum(bool(report.at_bound) and report.df > 2.5 for report in own)
-        at_bound = " (at its bound)" if len(own) == 1 else f" ({bound} at a bound)"
-        through = "the curve passes" if len(own) == 1 else f"{rough} curves pass"
-        no_noise = f" (no noise was found: {through} through the points; give --sigma or a λ)"
-        parts.append(
-            f"{f'{space}: ' if len(spaces) > 1 else ''}λ {spread([report.lam for report in own])}"
-            f"{at_bound if bound else ''}, {spread([report.df for report in own])} degrees of freedom, noise "
-            f"{spread([np.degrees(report.sigma) if lonlat else report.sigma for report in own])}"
-            f"{'°' if lonlat else ''}{no_noise if rough else ''}"
-        )
-    return "; ".join(parts)
+    return {**kept, "criterion": options.criterion, "extrapolate": _POLICIES.get(options.extrapolate)}

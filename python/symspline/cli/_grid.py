@@ -19,7 +19,7 @@ Values are those of splines along the first axis, then along the second through 
 takes the midpoint with those of the reverse order.
 
 The output has the format of the input. Without --to, --zoom and --points it is the spline itself, an NPZ file that
-symspline.load reads in Python.
+symspline.load reads in Python. A file name of - means standard input or output, an NPZ file.
 
 examples:
   symspline grid wind.npz --space sphere:2 --axes lat,lon --bc-type not-a-knot,periodic --zoom 2 -o fine.npz
@@ -31,36 +31,48 @@ examples:
 from __future__ import annotations
 
 import argparse
+import math
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from .._archive import read
+from .._disk import damage
 from .._grid import GridSpline
+from .._report import FarPointsWarning
 from .._spaces import POINT_TOL_FLOAT32
-from . import _grid_stores, _grid_volumes
 from ._grid_files import (
     NPZ,
     VOLUMES,
     ZARR,
     Grid,
-    check_ending_of,
-    far_points_noted,
-    missing,
+    ending_of,
     read_arrays,
-    sizes,
+    read_store,
+    read_volume,
+    resample_store,
+    resample_volume,
     write_arrays,
 )
-from ._grid_positions import positions, values_option
-from ._messages import Progress, refuse, tell
-from ._streams import check_target, writing
+from ._messages import Problem, Progress, reading, refuse, say, tell
+from ._streams import called, check_target, writing
+from ._tables import Array
+from ._times import is_number, spread
 
 _ENDS = ("not-a-knot", "natural", "clamped", "periodic")
 _ORDERS = ("dipy", "fsl", "mrtrix", "itk")
+_VALUES = ("to", "zoom", "points")
+_MOST = 10**9
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options of ``symspline grid``."""
     add = parser.add_argument
-    add("input", type=Path, metavar="IN", help="grid to read: .npz, .nii, .nii.gz or .zarr")
+    add("input", type=Path, metavar="IN", help="grid to read: .npz, .nii, .nii.gz or .zarr, or - for NPZ")
     add("--space", metavar="S", help="such as sphere:2, so:3 or spd:3, which is the default for NIfTI files")
     add("--axes", metavar="A,B,...", help="arrays or dimensions of the axes, in the order of the splines")
     add("--variable", metavar="NAME", help="variable of a Zarr store that has several")
@@ -73,23 +85,33 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--to", type=Path, metavar="FILE", help="values at the axes in an NPZ file, or at the voxels of a NIfTI file")
     add("--zoom", metavar="Z", help="intervals between values per interval of nodes: one number, or one per axis")
     add("--points", metavar="N,M,...", help="this number of equidistant values along each axis")
-    add = parser.add_argument
-    add(
-        "-o", dest="output", type=Path, metavar="OUT", required=True, help="file to write, in the format of IN, or .npz"
-    )
+    out = "file to write, in the format of IN, or .npz; - for NPZ on standard output"
+    parser.add_argument("-o", dest="output", type=Path, metavar="OUT", required=True, help=out)
 
 
 def run(options: argparse.Namespace) -> int:
     """Read, fit, and write values or the spline."""
-    source, target = (check_ending_of(path) for path in (options.input, options.output))
-    check_target(options.output, options.input, options.to, options.mask)
-    option = values_option(options)
+    source, target = ending_of(options.input), ending_of(options.output)
+    check_target(options.output, options.input, options.to, options.mask, binary=True)
+    option = next((name for name in _VALUES if getattr(options, name) is not None), None)
+    _check_formats(options, source, target, option)
+    how = {"bc_type": _bc_type(options.bc_type), "symmetric": options.symmetric}
+    with _far_points_noted():
+        if source in VOLUMES and option:
+            done = resample_volume(options, None if option == "to" else _numbers(options, option, 3), how)
+        elif target == ZARR:
+            done = resample_store(options, how, lambda names, axes: _positions(options, option, names, axes))
+        else:
+            done = _resampled(options, source, option, how)
+    tell(f"{called(options.output)}: {done}")
+    return 0
+
+
+def _check_formats(options: argparse.Namespace, source: str, target: str, option: str | None) -> None:
+    """Raise `Problem` for options of other formats, and outputs that the input cannot be written to."""
     volume, store = source in VOLUMES, source == ZARR
-    unused = [
-        name
-        for name, used in (("order", volume), ("mask", volume), ("variable", store), ("axes", not volume))
-        if getattr(options, name) is not None and not used
-    ]
+    uses = {"order": volume, "mask": volume, "variable": store, "axes": not volume}
+    unused = [name for name, used in uses.items() if getattr(options, name) is not None and not used]
     same = target == source or (volume and target in VOLUMES)
     refuse(f"--{''.join(unused[:1])} ", (unused, f"is not for {source} files"))
     refuse(
@@ -97,29 +119,6 @@ def run(options: argparse.Namespace) -> int:
         (option is None and target != NPZ, "give --to, --zoom or --points, or write the spline to an .npz file"),
         (option and not same and (volume or target != NPZ), f"values of a {source} file are written to such a file"),
     )
-    how = {"bc_type": _bc_type(options.bc_type), "symmetric": options.symmetric}
-    if volume and option:
-        tell(f"{options.output}: {_grid_volumes.resampled(options, option, how)}")
-        return 0
-    if target == ZARR:
-        tell(f"{options.output}: {_grid_stores.resampled(options, how)}")
-        return 0
-    read = _grid_volumes.read_grid if volume else _grid_stores.read_grid if store else read_arrays
-    grid = read(options)
-    spline = grid.spline or _fitted(grid, how)
-    if option is None:
-        refuse(f"{options.input}: ", (grid.spline, "this is a spline; give --to, --zoom or --points"))
-        with writing(options.output) as temporary, open(temporary, "wb") as file:
-            spline.save(file)
-        done = f"a spline through {sizes(map(len, spline.axes))} points of {spline.space}"
-    else:
-        x = positions(options, grid.names, spline.axes)
-        with Progress("sampling") as progress:
-            values = spline.grid(*x, progress=progress)
-        write_arrays(options.output, grid.names, x, values)
-        done = f"{sizes(map(len, x))} values of {spline.space}{missing(values)}"
-    tell(f"{options.output}: {done}{_summary(spline)}")
-    return 0
 
 
 def _bc_type(text: str) -> Any:
@@ -129,10 +128,93 @@ def _bc_type(text: str) -> Any:
     return ends[0] if len(ends) == 1 else ends
 
 
+@contextmanager
+def _far_points_noted() -> Iterator[None]:
+    """Print the warning about points that are far apart."""
+    with warnings.catch_warnings(record=True) as noted:
+        warnings.simplefilter("ignore")
+        warnings.simplefilter("always", FarPointsWarning)
+        yield
+    for note in noted:
+        say(note.message)
+
+
+def _resampled(options: argparse.Namespace, source: str, option: str | None, how: dict[str, Any]) -> str:
+    """Write the spline, or an NPZ file of its values, and describe the result."""
+    read_grid = read_volume if source in VOLUMES else read_store if source == ZARR else read_arrays
+    grid = read_grid(options)
+    spline = grid.spline or _fitted(grid, how)
+    gap = f", axis order gap {spline.report.axis_order_gap:.1e}"
+    if option is None:
+        refuse(f"{options.input}: ", (grid.spline, "this is a spline; give --to, --zoom or --points"))
+        with writing(options.output) as temporary, open(temporary, "wb") as file:
+            spline.save(file)
+        return f"a spline through {' x '.join(str(len(axis)) for axis in spline.axes)} points of {spline.space}{gap}"
+    x = _positions(options, option, grid.names, spline.axes)
+    with Progress("sampling") as progress:
+        values = spline.grid(*x, progress=progress)
+    write_arrays(options.output, grid.names, x, values)
+    first = values[0] if isinstance(values, tuple) else values
+    missing = np.isnan(first).mean() if first.size else 0.0
+    share = f", {100 * missing:.2g} % of them missing" if missing else ""
+    return f"{' x '.join(str(len(axis)) for axis in x)} values of {spline.space}{share}{gap}"
+
+
 def _fitted(grid: Grid, how: dict[str, Any]) -> GridSpline:
-    with far_points_noted(), Progress("fitting") as progress:
+    with Progress("fitting") as progress:
         return GridSpline(grid.axes, grid.points, grid.space, atol=POINT_TOL_FLOAT32, progress=progress, **how)
 
 
-def _summary(spline: GridSpline) -> str:
-    return f", axis order gap {spline.report.axis_order_gap:.1e}"
+# ---- positions of the values ----
+
+
+def _numbers(options: argparse.Namespace, option: str, count: int) -> list[float]:
+    """Read one number per axis, or one number for all of them."""
+    text = getattr(options, option)
+    cells = text.split(",")
+    zoom = option == "zoom"
+    numbers = [float(cell) for cell in cells if is_number(cell)]
+    good = [0 < x <= _MOST if zoom else 2 <= x <= _MOST and x == int(x) for x in numbers]
+    needed = "numbers larger than 0" if zoom else "whole numbers from 2 on"
+    one = zoom and len(cells) == 1
+    refuse(
+        f"--{option} {text}: ",
+        (not all(good) or len(good) < len(cells), f"give {needed}, separated by commas"),
+        (len(cells) != count and not one, f"there are {count} axes, which need {count} numbers, not {len(cells)}"),
+    )
+    return numbers * (count if one else 1)
+
+
+def _positions(
+    options: argparse.Namespace, option: str | None, names: Sequence[str], axes: Sequence[Array]
+) -> list[Array]:
+    """Return the positions along each axis, numbers or dates as its nodes are."""
+    if option == "to":
+        return _positions_in_file(options.to, names)
+    floats = [axis if axis.dtype.kind == "M" else axis.astype(np.float64) for axis in axes]
+    numbers = _numbers(options, option or "", len(axes))
+    if option == "points":
+        return [spread(int(count), axis) for count, axis in zip(numbers, floats, strict=True)]
+    return [_between(axis, zoom) for axis, zoom in zip(floats, numbers, strict=True)]
+
+
+def _between(axis: Array, zoom: float) -> Array:
+    """Divide the interval between two nodes into ``zoom`` equal ones, wherever the nodes are."""
+    last = len(axis) - 1
+    x = np.minimum(np.arange(math.floor(last * zoom + 1e-6) + 1) / zoom, last)
+    if axis.dtype.kind != "M":
+        return np.interp(x, np.arange(last + 1), axis)
+    # Dates are whole numbers, at least of microseconds.
+    axis = axis.astype(np.promote_types(axis.dtype, "datetime64[us]"))
+    after = (axis - axis[0]).astype(np.int64)
+    return np.asarray(axis[0] + np.rint(np.interp(x, np.arange(last + 1), after)).astype(np.int64))
+
+
+def _positions_in_file(path: Path, names: Sequence[str]) -> list[Array]:
+    refuse(path, (path.suffix.lower() != NPZ, ": positions are read from an .npz file with one array per axis"))
+    with reading(path), open(path, "rb") as file, damage(path, "is damaged or not an NPZ file"):
+        arrays = read(file, lambda name: name in names)
+    for name in names:
+        if name not in arrays or arrays[name].ndim != 1:
+            raise Problem(f"{path} has no array {name!r} with one axis, the positions along {name!r}")
+    return [arrays[name] for name in names]

@@ -1,33 +1,35 @@
-"""Grids of points in NPZ files: an array of points, and one array per axis."""
+"""Grids of points in NPZ files, volumes of diffusion tensors in NIfTI files, and Zarr stores."""
 
 from __future__ import annotations
 
 import argparse
-import warnings
+import os
+import secrets
+import shutil
 import zipfile
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from .._archive import Entries, read
+from .._archive import read
+from .._arrays import brief
 from .._disk import damage
+from .._exceptions import SymsplineError
 from .._files import load
 from .._grid import GridSpline
-from .._report import FarPointsWarning
 from .._spaces import Product, Space, factors_of, space_named
 from ._columns import split_names
-from ._messages import did_you_mean, reading, refuse, say
-from ._streams import writing
-
-Array = NDArray[Any]
+from ._messages import Problem, Progress, did_you_mean, reading, refuse
+from ._streams import STANDARD, Source, writing
+from ._tables import Array
 
 NPZ, ZARR = ".npz", ".zarr"
 VOLUMES = (".nii", ".nii.gz")
+_TENSORS = "spd:3"
 
 
 @dataclass(frozen=True)
@@ -52,55 +54,40 @@ class Grid:
     spline: GridSpline[Any] | None = None
 
 
-def check_ending_of(path: Path) -> str:
+def ending_of(path: Path) -> str:
     """Return the ending of the name of a grid, which selects the format."""
     endings = (NPZ, *VOLUMES, ZARR)
-    found = [ending for ending in endings if path.name.lower().endswith(ending)]
+    found = [ending for ending in endings if path == STANDARD or path.name.lower().endswith(ending)]
     refuse(path, (not found, f": the name of a grid must end in {' or '.join(endings)}"))
     return found[0]
 
 
-def space_of(options: argparse.Namespace) -> Space[Any]:
-    """Return the space that is given by its name."""
+def _space_of(options: argparse.Namespace) -> Space[Any]:
     refuse("", (options.space is None, "say which space the points are on with --space, such as --space sphere:2"))
     return space_named(options.space)
 
 
-def sizes(numbers: Iterable[int]) -> str:
-    """Return sizes such as 57 x 61."""
-    return " x ".join(map(str, numbers))
+def _usual_names(count: int) -> list[str]:
+    return [f"axis{i}" for i in range(count)]
 
 
-def missing(values: Any) -> str:
-    """Describe how many values are NaN."""
-    first = values[0] if isinstance(values, tuple) else values
-    share = np.isnan(first).mean() if first.size else 0.0
-    return f", {100 * share:.2g} % of them missing" if share else ""
-
-
-@contextmanager
-def far_points_noted() -> Iterator[None]:
-    """Print the warning about points that are far apart."""
-    with warnings.catch_warnings(record=True) as noted:
-        warnings.simplefilter("ignore")
-        warnings.simplefilter("always", FarPointsWarning)
-        yield
-    for note in noted:
-        say(note.message)
+# ---- NPZ ----
 
 
 def read_arrays(options: argparse.Namespace) -> Grid:
     """Read the grid or the spline in an NPZ file."""
-    path = options.input
-    with reading(path), open(path, "rb") as file:
+    path = Source(options.input, "npz")
+    with path.open() as file:
         refuse(path, (not zipfile.is_zipfile(file), " is not an NPZ file"))
         file.seek(0)
         with damage(path, "is damaged, or holds other objects than numbers"):
             arrays = read(file, lambda name: True)
-    if "format" in arrays:
-        return _spline(options)
-    space = space_of(options)
-    keys = [f"points_{i}" for i in range(len(factors_of(space)))] if isinstance(space, Product) else ["points"]
+        if "format" in arrays:
+            file.seek(0)
+            return _spline(options, path, load(file))
+    space = _space_of(options)
+    several = isinstance(space, Product)
+    keys = [f"points_{i}" for i in range(len(factors_of(space)))] if several else ["points"]
     absent = next((key for key in keys if key not in arrays), None)
     refuse(path, (absent, f" has no array {absent!r} of points; {did_you_mean('points', [*arrays])}"))
     points = [arrays[key] for key in keys]
@@ -109,37 +96,25 @@ def read_arrays(options: argparse.Namespace) -> Grid:
     wrong = count < 1 or points[0].shape[count:] != factor.point_shape
     needed = f"has shape {points[0].shape}, which must end in {factor.point_shape}, the shape of a point of {factor}"
     refuse(path, (wrong, f": {keys[0]!r} {needed}, after the sizes of the axes"))
-    names = _names(options, arrays, keys, count)
-    axes = [arrays[name] for name in names] if names else [None] * count
-    return Grid(names or usual_names(count), axes, tuple(points) if isinstance(space, Product) else points[0], space)
-
-
-def usual_names(count: int) -> list[str]:
-    """Name axes that have no names."""
-    return [f"axis{i}" for i in range(count)]
-
-
-def _names(options: argparse.Namespace, arrays: Entries, keys: Sequence[str], count: int) -> list[str]:
-    """Return the names of the arrays of the axes; empty if the file has none."""
-    path, given = options.input, split_names(options.axes)
+    given = split_names(options.axes)
     for name in given:
         refuse(path, (name not in arrays, f" has no array {name!r}; {did_you_mean(name, [*arrays])}"))
     names = given or [name for name, array in arrays.items() if array.ndim == 1 and name not in keys]
     listed = ", ".join(map(repr, names))
     wrong = f": there are arrays {listed} for the axes, but the points have {count} axes; name these with --axes"
     refuse(path, (names and len(names) != count, wrong))
-    return names
+    axes = [arrays[name] for name in names] if names else [None] * count
+    return Grid(names or _usual_names(count), axes, tuple(points) if several else points[0], space)
 
 
-def _spline(options: argparse.Namespace) -> Grid:
-    given = [f"--{name}" for name in ("space", "axes") if getattr(options, name) is not None]
-    spline = load(options.input)
+def _spline(options: argparse.Namespace, path: Source, spline: Any) -> Grid:
+    given = " and ".join(f"--{name}" for name in ("space", "axes") if getattr(options, name) is not None)
     refuse(
-        options.input,
+        path,
         (not isinstance(spline, GridSpline), " is a curve, not a grid; see symspline sample"),
-        (given, f" is a spline, for which {' and '.join(given)} cannot be given"),
+        (given, f" is a spline, for which {given} cannot be given"),
     )
-    return Grid(usual_names(len(spline.axes)), spline=spline)
+    return Grid(_usual_names(len(spline.axes)), spline=spline)
 
 
 def write_arrays(path: Path, names: Sequence[str], axes: Sequence[Array], points: Any) -> None:
@@ -148,3 +123,147 @@ def write_arrays(path: Path, names: Sequence[str], axes: Sequence[Array], points
     arrays = {f"points_{i}": part for i, part in enumerate(points)} if several else {"points": points}
     with writing(path) as temporary, open(temporary, "wb") as file:
         np.savez(file, **dict(zip(names, axes, strict=True)), **arrays)  # type: ignore[arg-type]
+
+
+# ---- NIfTI ----
+
+
+def read_volume(options: argparse.Namespace) -> Grid:
+    """Read the tensors of a file on a grid of voxels, NaN outside the mask."""
+    volume = _volume(options)
+    nodes = np.full((*volume.mask.shape, 3, 3), np.nan)
+    nodes[volume.mask] = volume.tensors
+    return Grid(["i", "j", "k"], [None] * 3, nodes, space_named(_TENSORS))
+
+
+def resample_volume(options: argparse.Namespace, zoom: list[float] | None, how: dict[str, Any]) -> str:
+    """Write the tensors at other voxels, those of another file if zoom is None, and describe the result."""
+    from ..tensors import resample, write_nifti
+    from ..tensors._nifti import written_order
+
+    volume = _volume(options)
+    if options.to is not None:
+        with reading(options.to), open(options.to, "rb"):
+            voxels: dict[str, Any] = {"like": options.to}
+    elif options.points is not None:
+        voxels = {"zoom": [(n - 1) / max(m - 1, 1) for n, m in zip(zoom or (), volume.mask.shape, strict=True)]}
+    else:
+        voxels = {"zoom": zoom}
+    with Progress("resampling") as progress:
+        fine = resample(volume, **voxels, **how, progress=progress)
+    write_nifti(options.output, fine, order=written_order(volume, options.order))
+    inside = f"{len(fine.tensors)} of them inside the mask"
+    return f"{_sizes(fine.mask.shape)} voxels, {inside}, from {len(volume.tensors)} of {_sizes(volume.mask.shape)}"
+
+
+def _volume(options: argparse.Namespace) -> Any:
+    from ..tensors import read_nifti
+
+    other = options.space is not None and space_named(options.space) != space_named(_TENSORS)
+    refuse(options.input, (other, f" holds diffusion tensors, points of {_TENSORS}, not of {options.space}"))
+    for path in filter(None, (options.input, options.mask)):
+        # Errors of nibabel have no name of a file.
+        with reading(path), open(path, "rb"):
+            pass
+    try:
+        return read_nifti(options.input, order=options.order, mask=options.mask)
+    except ImportError as error:
+        raise Problem(str(error)) from None
+
+
+def _sizes(numbers: Sequence[int]) -> str:
+    return " x ".join(map(str, numbers))
+
+
+# ---- Zarr, read and written block by block ----
+
+
+def read_store(options: argparse.Namespace) -> Grid:
+    """Read a variable as a whole."""
+    array, axes, point_dims = _opened(options)
+    others = [name for name in array.dims if name not in (*axes, *point_dims)]
+    several = f": the dimensions {', '.join(map(str, others))} are those of several grids; write them to a .zarr store"
+    refuse(options.input, (others, several))
+    return Grid(axes, _nodes(array, axes), array.transpose(*axes, *point_dims).values, _space_of(options))
+
+
+def resample_store(
+    options: argparse.Namespace, how: dict[str, Any], positions: Callable[[list[str], list[Array]], list[Array]]
+) -> str:
+    """Write the values of a variable to another store, and describe the result."""
+    array, axes, point_dims = _opened(options)
+    from dask import callbacks
+
+    from ..xarray import resample
+
+    ends = how["bc_type"]
+    if not isinstance(ends, str):
+        refuse("--bc-type ", (len(ends) != len(axes), f"has {len(ends)} entries, but there are {len(axes)} axes"))
+        how = how | {"bc_type": dict(zip(axes, ends, strict=True))}
+    to = dict(zip(axes, positions(axes, _nodes(array, axes)), strict=True))
+    made = resample(array, _space_of(options), to, point_dims=point_dims, on_failure="raise", **how)
+    blocks: dict[str, int] = {}
+
+    def finished(*_: Any) -> None:
+        blocks["done"] += 1
+        progress(blocks["done"], blocks["all"])
+
+    counter: Any = callbacks.Callback
+    counted = counter(start=lambda graph: blocks.update(done=0, all=len(graph)), posttask=finished)
+    with _new_store(options.output) as store, Progress("resampling") as progress, counted:
+        try:
+            made.to_dataset(name=array.name).to_zarr(store, consolidated=False)
+        except (SymsplineError, OSError, MemoryError):
+            raise
+        except Exception as error:
+            # Damaged chunks raise errors of their decompressors.
+            raise Problem(f"{options.input} is damaged: {brief(error)}") from None
+    sizes = _sizes([made.sizes[name] for name in made.dims if name not in point_dims])
+    return f"{sizes} values of {_space_of(options)}"
+
+
+def _nodes(array: Any, axes: list[str]) -> list[Array]:
+    return [array[name].values if name in array.coords else np.arange(float(array.sizes[name])) for name in axes]
+
+
+def _opened(options: argparse.Namespace) -> tuple[Any, list[str], list[str]]:
+    """Return the variable of a store, and the names of the axes of the grid and of the points."""
+    space, path = _space_of(options), options.input
+    refuse(path, (isinstance(space, Product), f": {space} is a product, which a Zarr store cannot hold"))
+    try:
+        import xarray
+        import zarr  # noqa: F401
+    except ImportError:
+        needed = "install them with: pip install 'symspline[xarray]' zarr"
+        raise Problem(f"Zarr stores need xarray and zarr; {needed}") from None
+    with reading(path):
+        os.listdir(path)
+    with damage(path, "is damaged or not a Zarr store"):
+        store = xarray.open_zarr(path, consolidated=False)
+    names = [str(name) for name in store.data_vars]
+    several = f" has the variables {', '.join(names)}; select one with --variable"
+    refuse(path, (options.variable is None and len(names) != 1, several))
+    name = options.variable or names[0]
+    refuse(path, (name not in names, f" has no variable {name!r}; {did_you_mean(name, names)}"))
+    array = store[name]
+    dims = [str(dim) for dim in array.dims]
+    count = len(space.point_shape)
+    few = f": {name!r} has the dimensions {', '.join(dims)}, but a point of {space} alone has {count}"
+    refuse(path, (len(dims) <= count, few))
+    others, point_dims = dims[:-count], dims[-count:]
+    axes = split_names(options.axes) or others
+    for axis in axes:
+        refuse(path, (axis not in others, f" has no axis {axis!r}; {did_you_mean(axis, others)}"))
+    return array.chunk(dict.fromkeys(point_dims, -1)), axes, point_dims
+
+
+@contextmanager
+def _new_store(path: Path) -> Iterator[Path]:
+    """Yield a temporary folder that becomes a store if the body succeeds."""
+    temporary = path.with_name(f".{secrets.token_hex(8)}{path.name[-32:]}")
+    try:
+        with reading(path, "write"):
+            yield temporary
+            temporary.rename(path)
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)

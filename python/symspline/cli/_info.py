@@ -18,23 +18,21 @@ import argparse
 import zipfile
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from .._arrays import brief
-from .._report import long_gaps
 from .._smoothing import SmoothingSpline
-from .._smoothing.factors import is_several, smoothed_spaces
 from .._spaces import Doubles
 from .._spaces.base import CLASSES, example_of
 from .._time import time_axis_of
 from ._columns import column_of_names, time_column
 from ._curves import read_curves
-from ._formats import open_table
-from ._messages import Problem, Progress, listed, refuse
-from ._streams import TABLES, Source, endings, format_of
-from ._tables import Rows, Table
+from ._formats import TABLES, endings, format_of, open_table
+from ._messages import Problem, listed, refuse
+from ._streams import Source
+from ._summary import counted, gaps_in, smoothing_of
+from ._tables import Array, Rows, Table
 
 _LIBRARIES = {"pyarrow": "Parquet and large CSV files", "gpxpy": "GPX files", "matplotlib": "symspline plot"}
 _LIBRARIES |= {"nibabel": "NIfTI files", "zarr": "Zarr stores", "shtab": "completion in shells"}
@@ -84,15 +82,10 @@ def _is_curve(source: Source) -> bool:
 
 
 def _table(table: Table, given: str | None) -> list[str]:
-    table.allow_missing()
-    texts = [name for name in table.names if name and name not in table.numeric]
-    with Progress("reading") as progress:
-        table._sparse = frozenset(table.numeric)
-        table.load(table.numeric, texts, progress)
-    columns = {name: table.columns[name] for name in table.names if name}
+    columns = {name: own for name, own in table.columns.items() if name}
     refuse(table.path, (not columns, " has no columns"))
     lines = [f"{table.path}: {table.path.format} table, {len(next(iter(columns.values())))} rows"]
-    lines += [f"  {name}: {_described(np.asarray(own))}" for name, own in columns.items()]
+    lines += [f"  {name}: {_described(table.shown(name))}" for name in columns]
     try:
         time = time_column(table, given, [])
         rows = table.read([], time, None) if time is not None else None
@@ -107,17 +100,13 @@ def _table(table: Table, given: str | None) -> list[str]:
     return lines if names is None else [*lines, f"--curve {names} makes a curve of each {names}"]
 
 
-def _described(values: Any) -> str:
-    if values.dtype.kind in "OUST":
-        texts = list(dict.fromkeys(map(str, values.tolist())))
-        return (
-            f"{len(texts)} text{'s' if len(texts) > 1 else ''}: {listed(texts[:3])}{', ...' if len(texts) > 3 else ''}"
-        )
-    missing = np.isnan(values) if values.dtype.kind == "f" else np.zeros(len(values), bool)
-    found = values[~missing]
-    if not found.size:
-        return "no values"
-    return f"{found.min()} to {found.max()}{f', {missing.sum()} missing' if missing.any() else ''}"
+def _described(values: list[str] | Array) -> str:
+    if isinstance(values, list):
+        texts = list(dict.fromkeys(values))
+        return f"{counted(len(texts), 'text')}: {', '.join(texts[:3])}{', ...' if len(texts) > 3 else ''}"
+    found = values[values == values]
+    missing = len(values) - len(found)
+    return f"{found.min()} to {found.max()}{f', {missing} missing' if missing else ''}" if found.size else "no values"
 
 
 def _times(rows: Rows, seconds: Doubles) -> str:
@@ -129,12 +118,8 @@ def _times(rows: Rows, seconds: Doubles) -> str:
         parts.append(f"usual step {np.median(ahead):.6g}{unit}")
     counts = ((int((steps == 0).sum()), "repeated"), (int((steps < 0).sum()), "before the previous one"))
     parts += [f"{count} {what}" for count, what in counts if count]
-    if ahead.size and ahead.size == steps.size:
-        gaps = steps[long_gaps(seconds)]
-        parts += (
-            [f"{gaps.size} long gap{'s' if gaps.size > 1 else ''}, up to {gaps.max():.6g}{unit}"] if gaps.size else []
-        )
-    return ", ".join(parts)
+    gaps = gaps_in(seconds, unit) if ahead.size == steps.size > 0 else ""
+    return ", ".join([*parts, gaps] if gaps else parts)
 
 
 # ---- curves ----
@@ -144,17 +129,16 @@ def _curves(path: Path) -> list[str]:
     curves = read_curves(path)
     count = len(curves.splines)
     space = next(iter(curves.splines.values())).space
-    words = "segments of one recording" if curves.segmented else f"curve{'s' if count > 1 else ''}"
-    lines = [f"{path}: {count} {words} on {space}, columns {listed(curves.columns.points)}"]
+    words = f"{count} segments of one recording" if curves.segmented else counted(count, "curve")
+    lines = [f"{path}: {words} on {space}, columns {listed(curves.columns.points)}"]
     for name, spline in curves.splines.items():
-        ends = spline.bc_type if isinstance(spline.bc_type, str) else ", ".join(map(str, spline.bc_type))
         parts = [f"{len(spline.t)} nodes, {spline.t[0]} to {spline.t[-1]}"]
         if isinstance(spline, SmoothingSpline):
-            reports = spline.report if isinstance(spline.report, tuple) else (spline.report,)
-            for own, report in zip(smoothed_spaces(space), reports, strict=True):
+            for part, (report,) in smoothing_of([spline]):
                 noise = f"λ {report.lam:.3g}, {report.df:.3g} degrees of freedom, noise {report.sigma:.3g}"
-                parts.append(f"{own}: {noise}" if is_several(space) else noise)
+                parts.append(part + noise)
         else:
+            ends = spline.bc_type if isinstance(spline.bc_type, str) else ", ".join(map(str, spline.bc_type))
             parts.append(f"{ends} ends, residual {spline.report.residual:.1e}")
         lines.append(f"  {f'{name}: ' if curves.named else ''}{'; '.join(parts)}")
     return lines

@@ -1,7 +1,8 @@
 """Draw a curve
 
-The picture shows the curve, its speed and its acceleration. The ending of its name selects the format: .png, .pdf,
-.svg or another one that matplotlib can write.
+The picture shows the curve, its speed and its acceleration. Tracks that were fitted with --lonlat are drawn on the
+Earth with land, with their speed in km/h; --lonlat does so for any curve on sphere:2. The ending of the picture's name
+selects the format: .png, .pdf, .svg or another one that matplotlib can write.
 
 examples:
   symspline plot track.npz -o track.png
@@ -13,9 +14,10 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from .. import geo
 from ._curves import read_curves
 from ._messages import Problem, did_you_mean, listed, refuse, tell
-from ._streams import STANDARD, check_target, writing
+from ._streams import STANDARD, called, check_target, writing
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -23,6 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("curves", type=Path, metavar="CURVE", help="file of curves to read: .npz, or -")
     add("--curve", metavar="NAME", help="which curve, if there are several")
+    add("--lonlat", action="store_true", help="draw any curve on sphere:2 on the Earth")
     add("-o", dest="output", type=Path, metavar="PICTURE", required=True, help="picture to write, or -")
     add("--to", metavar="FORMAT", help="format of the picture, such as pdf (default: as its name ends, PNG for -)")
 
@@ -30,15 +33,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Draw the curve, and write the picture."""
     check_target(options.output, options.curves, binary=True)
-    curves = read_curves(options.curves)
+    curves = read_curves(options.curves, options.lonlat)
     names, name = list(curves.splines), options.curve
     several = f" has {len(names)} curves; say which with --curve: {listed(names)}"
     refuse(options.curves, (name is None and len(names) > 1, several))
     if name is not None and name not in names:
         raise Problem(f"{options.curves} has no curve {name!r}; {did_you_mean(name, names)}")
     name = names[0] if name is None else name
+    spline = curves.splines[name]
     try:
-        figure = curves.splines[name].plot()
+        figure = geo.plot(spline) if curves.columns.lonlat else spline.plot()
     except ImportError as error:
         raise Problem(str(error)) from None
     # A still image in a format of animations would mislead.
@@ -47,5 +51,5 @@ def run(options: argparse.Namespace) -> int:
     refuse(options.output, (form not in known, f": the name of a picture must end in .{', .'.join(known)}"))
     with writing(options.output) as temporary:
         figure.savefig(temporary, format=form)
-    tell(f"{options.output}: a picture of {curves.called(name)}")
+    tell(f"{called(options.output)}: a picture of {curves.called(name)}")
     return 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import count
@@ -26,6 +27,7 @@ GLOBE, ROTATIONS, POSES = map(space_named, ("sphere:2", "so:3", "se:3"))
 LONLAT = ["lon", "lat"]
 RATES = ("wx", "wy", "wz")
 """Columns of angular velocities."""
+IN_BRACKETS = re.compile(r"[(\[].*?[)\]]")
 # Longitudes may start at -180 or at 0, or continue across the date line. 400 is an error, and 999 a missing value.
 _LARGEST = (360, 90)
 
@@ -129,10 +131,47 @@ def width(space: Space, quaternion: bool) -> int:
     return math.prod(space.point_shape) * (2 if space._complex else 1)
 
 
+def in_order(space: Space, scalar_last: int) -> list[int]:
+    """Return `Columns.quaternion` for columns in the order of the factors, the scalar first (0) or last (1)."""
+    columns: list[int] = []
+    for factor in factors_of(space):
+        own = list(range(len(columns), len(columns) + width(factor, True)))
+        if factor in (ROTATIONS, POSES):
+            own[-4:] = np.roll(own[-4:], scalar_last).tolist()
+        columns += own
+    return columns
+
+
+def quaternion_by_names(names: Sequence[str], space: Space) -> list[int] | None:
+    """Return `Columns.quaternion` for names that end in w, x, y and z after a common beginning; None for other names.
+
+    Positions whose names end in x, y and z may also be in any order.
+    """
+    plain = [IN_BRACKETS.sub("", name).strip().lower() for name in names]
+    scalars = [name for name in plain if name.endswith("w")]
+    quaternion = [scalars[0][:-1] + letter for letter in "wxyz"] if len(scalars) == 1 else []
+    if not quaternion or any(plain.count(name) != 1 for name in quaternion):
+        return None
+    scalar_first = [plain.index(name) for name in quaternion]
+    rest = [i for i in range(len(names)) if i not in scalar_first]
+    columns: list[int] = []
+    for factor in factors_of(space):
+        turns = factor in (ROTATIONS, POSES)
+        count = width(factor, True) - (4 if turns else 0)
+        own, rest = rest[:count], rest[count:]
+        by_letter = sorted(own, key=lambda i: plain[i][-1:])
+        if [plain[i][-1:] for i in by_letter] == [*"xyz"]:
+            own = by_letter
+        elif factor == POSES:
+            return None
+        columns += own + (scalar_first if turns else [])
+    return columns
+
+
 # ---- numbers ----
 
 
-def points_of(space: Space, numbers: Doubles, columns: Columns, file: object, place: Place) -> Any:
+def points_of(space: Space, numbers: Doubles, lonlat: bool, order: list[int] | None, file: object, place: Place) -> Any:
     """Return the points of all rows, projected onto the space if they are off it by rounding in a file only.
 
     Raises
@@ -140,7 +179,7 @@ def points_of(space: Space, numbers: Doubles, columns: Columns, file: object, pl
     Problem
         A point is farther off.
     """
-    if columns.lonlat:
+    if lonlat:
         for name, values, largest in zip(("longitude", "latitude"), numbers.T, _LARGEST, strict=True):
             wild = np.flatnonzero(np.abs(values) > largest)
             if wild.size:
@@ -149,13 +188,13 @@ def points_of(space: Space, numbers: Doubles, columns: Columns, file: object, pl
                     f"{largest} degrees; omit missing values, or say with --columns LON,LAT which is which"
                 )
         return from_lonlat(*numbers.T)
-    if columns.quaternion is not None:
-        numbers = numbers[:, columns.quaternion]
+    if order:
+        numbers = numbers[:, order]
     parts, start = [], 0
     for factor in factors_of(space):
-        own = np.ascontiguousarray(numbers[:, start : start + width(factor, columns.quaternion is not None)])
+        own = np.ascontiguousarray(numbers[:, start : start + width(factor, order is not None)])
         start += own.shape[1]
-        if columns.quaternion is not None and factor in (ROTATIONS, POSES):
+        if order and factor in (ROTATIONS, POSES):
             rotations = rotations_in_rows(own[:, -4:], file, place, POINT_TOL_FLOAT32)
             part = join(rotations, own[:, :3]) if factor == POSES else rotations
         else:

@@ -13,10 +13,11 @@ from .._core import CutLocusError
 from .._segments import cut
 from .._spaces import Space
 from ._messages import Problem, refuse
+from ._summary import counted
 from ._tables import Rows
 from ._times import longest_gap
 
-Groups = Mapping[str, NDArray[np.int64]]
+Index = NDArray[np.int64]
 Hint = Callable[[], str | None]
 
 
@@ -43,16 +44,15 @@ class Recordings:
         self.named = rows.labels is not None or options.max_gap is not None
         self.merged = self.alone = self.repeated = 0
         self.curves: list[tuple[Any, Any]] = []
-        self.groups: dict[str, NDArray[np.int64]] = {}
-        asked = [name for name in ("sort", "dedup", "max_gap") if getattr(options, name)]
-        if asked and not rows.times.size:
-            option = asked[0].replace("_", "-")
-            raise Problem(f"--{option} needs times, and there is no column of times; say which with --time")
+        self.groups: dict[str, Index] = {}
+        asked = next((name for name in ("sort", "dedup", "max_gap") if getattr(options, name)), "")
+        needs = f"--{asked.replace('_', '-')} needs times, and there is no column of times; say which with --time"
+        refuse("", (asked and not rows.times.size, needs))
         groups = group(rows)
         for name, own in groups.items():
             if options.sort:
                 own = own[np.argsort(rows.times[own], kind="stable")]
-            segments = self._segments(name, own)
+            segments = self._segments(own, f" of curve {name!r}" if rows.labels is not None else "")
             for number, (curve, kept) in enumerate(segments, 1):
                 part = name if len(segments) == 1 else f"{name}/{number}"
                 new = name if options.max_gap is None else part if rows.labels is not None else str(number)
@@ -62,6 +62,13 @@ class Recordings:
                 self.curves.append(curve)
         none_left = f": with --max-gap {options.max_gap} every point is alone; a curve needs two"
         refuse(path, (not self.groups, none_left))
+
+    def changes(self) -> str:
+        """Describe the rows that were merged or omitted, which the curves do not show."""
+        dedup = self._options.dedup
+        same = "merged with others of the same time" if dedup == "mean" else "omitted after another of their time"
+        counts = ((self.merged, f"{same} (--dedup {dedup})"), (self.alone, "alone between gaps omitted"))
+        return "".join(f"; {counted(count, 'row')} {what}" for count, what in counts if count)
 
     def located(self, note: Any) -> str:
         """Return the message of an error or a warning with lines of the file and names instead of numbers.
@@ -83,20 +90,20 @@ class Recordings:
             text = text.replace(f"curve {number}", f"curve {name!r}" if self.named else "the curve")
         return f"{self._path}: {text}" if text != str(note) else text
 
-    def _segments(self, name: str, own: NDArray[np.int64]) -> list[tuple[tuple[Any, Any], NDArray[np.int64]]]:
+    def _segments(self, own: Index, of: str) -> list[tuple[tuple[Any, Any], Index]]:
         """Return the curves in the rows of one name, and the rows of each."""
-        times, options = self._rows.times, self._options
-        times = times[own] if times.size else times
-        of = f" of curve {name!r}" if self._rows.labels is not None else ""
-        again = np.append(False, times[1:] == times[:-1])
-        first = own if options.dedup is None or not times.size else own[~again]
+        options, times = self._options, self._rows.times[own] if self._rows.times.size else None
+        again = np.zeros(len(own), bool)
+        if times is not None:
+            again[1:] = times[1:] == times[:-1]
+        first = own if options.dedup is None else own[~again]
         self._check(first, of)
         self.merged += len(own) - len(first)
         self.repeated += int(again.sum()) if self._smooth and options.dedup is None else 0
         given = self._points
         points = tuple(part[own] for part in given) if isinstance(given, tuple) else given[own]
-        if options.dedup is None and options.max_gap is None:
-            return [((times if times.size else None, points), own)]
+        if times is None or (options.dedup is None and options.max_gap is None):
+            return [((times, points), own)]
         gap = np.inf if options.max_gap is None else longest_gap(options.max_gap, times.dtype.kind == "M")
         used = np.ones(len(own), bool) if self._smooth else None
         try:
@@ -109,7 +116,7 @@ class Recordings:
         self.alone += len(first) - sum(map(len, found.rows))
         return [(curve, own[kept]) for curve, kept in zip(found.curves, found.rows, strict=True)]
 
-    def _check(self, own: NDArray[np.int64], of: str) -> None:
+    def _check(self, own: Index, of: str) -> None:
         """Raise `Problem` unless there are two points whose times increase, or do not decrease."""
         if len(own) < 2:
             where = f", {self._rows.place(int(own[0]))}" if len(own) else ""
@@ -131,11 +138,11 @@ class Recordings:
             )
 
 
-def group(rows: Rows) -> Groups:
+def group(rows: Rows) -> Mapping[str, Index]:
     """Return the rows of every curve, which is one curve named "" if rows have no labels."""
     if rows.labels is None:
         return {"": np.arange(max(len(rows.numbers), len(rows.times)))}
-    codes: dict[str, int] = {}
-    of_row = np.array([codes.setdefault(label, len(codes)) for label in rows.labels], dtype=np.int64)
+    codes = {label: code for code, label in enumerate(dict.fromkeys(rows.labels))}
+    of_row = np.fromiter(map(codes.__getitem__, rows.labels), np.int64, len(rows.labels))
     order = np.argsort(of_row, kind="stable")
     return dict(zip(codes, np.split(order, np.cumsum(np.bincount(of_row))[:-1]), strict=True))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from datetime import UTC
 from typing import Any, BinaryIO
 
@@ -12,48 +12,25 @@ import numpy as np
 from ._csv import date_texts
 from ._messages import Problem, refuse
 from ._streams import Source
-from ._tables import FIRST, Array, Layout, Table
-from ._times import is_date_like
+from ._tables import Array, Layout, Table, Texts
+from ._times import EXACT
 
 _TIME, _LON, _LAT, _TRACK = "time", "lon", "lat", "track"
 # Properties of lines that hold the times of their points.
 _LINE_TIMES = ("coordTimes", "times")
-_EXACT = 2**53
 
 
 # ---- reading ----
 
 
-class RecordsTable(Table):
-    """Values of one column have one type: numbers, or texts."""
-
-    def __init__(self, path: Source, read: Callable[[Source, BinaryIO], dict[str, list[Any]]]) -> None:
-        super().__init__(path)
-        with path.open() as file:
-            cells = read(path, file)
-        self.names = list(cells)
-        for name, values in cells.items():
-            kinds = {type(value) for value in values} - {type(None)}
-            # Larger whole numbers are exact as texts only.
-            exact = all(type(value) is not int or abs(value) <= _EXACT for value in values)
-            if kinds and kinds <= {int, float} and exact:
-                self.columns[name] = np.array([np.nan if value is None else value for value in values], np.float64)
-                self.numeric.append(name)
-                continue
-            texts = ["" if value is None else str(value) for value in values]
-            self.columns[name] = texts
-            if is_date_like(next(filter(None, texts[:FIRST]), "")):
-                self.dates.append(name)
-
-
-def json_columns(path: Source, file: BinaryIO) -> dict[str, list[Any]]:
+def read_json(path: Source) -> Table:
     """Read a list of objects with one value per column, or an object with one list per column."""
-    return _columns(path, _json(path, file))
+    return _table(path, _json(path))
 
 
-def geojson_columns(path: Source, file: BinaryIO) -> dict[str, list[Any]]:
+def read_geojson(path: Source) -> Table:
     """Read a collection of features: points with properties, or lines with their times in ``coordTimes``."""
-    content = _json(path, file)
+    content = _json(path)
     rows: list[dict[str, Any]] = []
     try:
         features = content["features"] if content["type"] == "FeatureCollection" else [content]
@@ -61,16 +38,17 @@ def geojson_columns(path: Source, file: BinaryIO) -> dict[str, list[Any]]:
             rows += _feature(feature, str(number))
     except (KeyError, TypeError, ValueError, AttributeError):
         raise Problem(f"{path}: GeoJSON must be a collection of features that are points or lines") from None
-    return _columns(path, rows)
+    return _table(path, rows)
 
 
-def gpx_columns(path: Source, file: BinaryIO) -> dict[str, list[Any]]:
+def read_gpx(path: Source) -> Table:
     """Read the time, longitude, latitude and height of all points of a GPX file, and the name of their track."""
     gpxpy = _gpxpy()
-    try:
-        gpx = gpxpy.parse(file.read().decode("utf-8-sig"))
-    except (UnicodeDecodeError, ValueError, gpxpy.gpx.GPXException) as error:
-        raise Problem(f"{path} is damaged or not a GPX file: {error}") from None
+    with path.open() as file:
+        try:
+            gpx = gpxpy.parse(file.read().decode("utf-8-sig"))
+        except (UnicodeDecodeError, ValueError, gpxpy.gpx.GPXException) as error:
+            raise Problem(f"{path} is damaged or not a GPX file: {error}") from None
     rows: list[dict[str, Any]] = []
     for number, track in enumerate(gpx.tracks, 1):
         for part, segment in enumerate(track.segments, 1):
@@ -81,24 +59,34 @@ def gpx_columns(path: Source, file: BinaryIO) -> dict[str, list[Any]]:
                 own = {_TIME: time, _LON: point.longitude, _LAT: point.latitude, "ele": point.elevation}
                 rows.append({name: value for name, value in own.items() if value is not None} | {_TRACK: label})
     refuse(path, (not rows, " has no tracks with points"))
-    return _columns(path, rows)
+    return _table(path, rows)
 
 
-def _json(path: Source, file: BinaryIO) -> Any:
-    try:
-        return json.load(file)
-    except (ValueError, RecursionError) as error:
-        raise Problem(f"{path} is not JSON: {error}") from None
+def _json(path: Source) -> Any:
+    with path.open() as file:
+        try:
+            return json.load(file)
+        except (ValueError, RecursionError) as error:
+            raise Problem(f"{path} is not JSON: {error}") from None
 
 
-def _columns(path: Source, content: Any) -> dict[str, list[Any]]:
+def _table(path: Source, content: Any) -> Table:
     if isinstance(content, dict) and content and all(isinstance(values, list) for values in content.values()):
-        return content
+        return Table(path, {name: _column(values) for name, values in content.items()})
     shape = " is not a table: give a list of objects, one per row, or an object of lists, one per column"
     rows = isinstance(content, list) and content and all(isinstance(row, dict) for row in content)
     refuse(path, (not rows, shape))
     names = dict.fromkeys(name for row in content for name in row)
-    return {name: [row.get(name) for row in content] for name in names}
+    return Table(path, {name: _column([row.get(name) for row in content]) for name in names})
+
+
+def _column(values: list[Any]) -> Any:
+    """Return numbers as an array, and other values as texts."""
+    kinds = set(map(type, values)) - {type(None)}
+    # Larger whole numbers are exact as texts only.
+    if kinds and kinds <= {int, float} and all(type(own) is not int or abs(own) <= EXACT for own in values):
+        return np.array([np.nan if value is None else value for value in values], np.float64)
+    return Texts(["" if value is None else str(value) for value in values])
 
 
 def _feature(feature: Any, number: str) -> list[dict[str, Any]]:
@@ -154,11 +142,11 @@ def write_geojson(file: BinaryIO, columns: Mapping[str, Array], layout: Layout) 
     """Write a collection of points, one per row and line, whose other columns are properties."""
     lon, lat = _lonlat(layout, "GeoJSON")
     values = _values(columns, layout)
-    others = {name: own for name, own in values.items() if name not in (lon, lat)}
+    places = zip(values.pop(lon), values.pop(lat), strict=True)
     features = []
-    for place, *own in zip(zip(values[lon], values[lat], strict=True), *others.values(), strict=True):
+    for place, *own in zip(places, *values.values(), strict=True):
         geometry = {"type": "Point", "coordinates": place}
-        properties = dict(zip(others, own, strict=True))
+        properties = dict(zip(values, own, strict=True))
         features.append(json.dumps({"type": "Feature", "properties": properties, "geometry": geometry}))
     collection = ",\n".join(features)
     file.write(f'{{"type": "FeatureCollection", "features": [\n{collection}\n]}}\n'.encode())

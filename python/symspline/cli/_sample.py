@@ -56,11 +56,11 @@ from .._spaces import Doubles, space_named
 from .._time import onto_ends
 from ._columns import quaternion_by_names, time_column
 from ._curves import Curves, read_curves
-from ._formats import open_table, write_table
+from ._formats import TABLES, endings, format_of, is_binary, open_table, write_table
 from ._messages import Problem, Progress, did_you_mean, first_duplicate, refuse, say, tell
 from ._points import Columns, Samples, deviations_of, samples_of
 from ._recordings import group
-from ._streams import STANDARD, TABLES, check_inputs, check_target, endings, format_of
+from ._streams import called, check_inputs, check_target
 from ._tables import Layout, Rows, Table
 from ._times import Times, every, number, spread
 
@@ -99,7 +99,7 @@ def run(options: argparse.Namespace) -> int:
     form = format_of(options.output, options.to)
     check_inputs(options.curves, options.at)
     inputs = options.curves, options.at
-    check_target(options.output, *inputs, binary=form in ("npz", "parquet"))
+    check_target(options.output, *inputs, binary=is_binary(form))
     orders, digits = _orders(options.nu), options.digits
     refuse(f"--digits {digits}: ", (digits is not None and not 1 <= digits <= 17, "give a number between 1 and 17"))
     every_curve = read_curves(options.curves, options.lonlat)
@@ -151,7 +151,7 @@ def _write(
     lonlat = tuple(columns.points) if columns.lonlat else None
     layout = Layout(columns.time, columns.curve if named else None, lonlat, bool(columns.utc))
     write_table(path, form, {name: column[order] for name, column in pairs}, layout)
-    tell(f"{'standard output' if path == STANDARD else path}: {len(pairs[0][1])} rows")
+    tell(f"{called(path)}: {len(pairs[0][1])} rows")
 
 
 def _rounded(numbers: Doubles, digits: int) -> Doubles:

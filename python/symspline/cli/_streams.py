@@ -1,4 +1,4 @@
-"""Files and standard streams, their formats, and compressed text."""
+"""Files and standard streams, and compressed text."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ import shutil
 import sys
 import tempfile
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path, PurePath
+from pathlib import Path
 from typing import BinaryIO
 
 from .._disk import replacing
@@ -22,31 +22,7 @@ from ._messages import Problem, reading, refuse
 STANDARD = Path("-")
 """The name of standard input or output on the command line."""
 
-CURVES = ("npz",)
-TABLES = ("csv", "npz", "parquet", "json", "geojson", "gpx", "tum")
-_SAME = {"txt": "tum", "tsv": "csv"}
-_TEXT = ("csv", "tsv", "json", "geojson", "gpx", "tum", "txt")
 _GZIP = b"\x1f\x8b"
-
-
-def format_of(path: Path, given: str | None, known: Sequence[str] = TABLES, what: str = "a table") -> str:
-    """Return the format of a file: the given one, that of its ending, or the first one for a standard stream."""
-    if given is not None or path == STANDARD:
-        return given or known[0]
-    name = path.name.lower()
-    plain = PurePath(name.removesuffix(".gz"))
-    ending = plain.suffix[1:] if plain.suffix[1:] in _TEXT else PurePath(name).suffix[1:]
-    endings = [*known, *(end for end, kind in _SAME.items() if kind in known)]
-    refuse(path, (ending not in endings, f": the name of {what} must end in .{' or .'.join(endings)}"))
-    return _SAME.get(ending, ending)
-
-
-def endings(known: Sequence[str] = TABLES) -> str:
-    """List the endings of names for a help text."""
-    return ", ".join(f".{name}" for name in (*known, *(end for end, kind in _SAME.items() if kind in known)))
-
-
-# ---- reading ----
 
 
 @dataclass(frozen=True)
@@ -60,11 +36,6 @@ class Source:
         """Return its name for messages."""
         return "standard input" if self.path == STANDARD else str(self.path)
 
-    @property
-    def size(self) -> int:
-        """Number of bytes, without decompression."""
-        return len(_standard_input()) if self.path == STANDARD else os.stat(self.path).st_size
-
     @contextmanager
     def open(self) -> Iterator[BinaryIO]:
         """Open the file, which can be done more than once; compressed text is decompressed."""
@@ -73,13 +44,11 @@ class Source:
             with file:
                 packed = file.read(len(_GZIP)) == _GZIP
                 file.seek(0)
-                yield io.BytesIO(self._unpacked(file)) if packed else file
-
-    def _unpacked(self, file: BinaryIO) -> bytes:
-        try:
-            return gzip.decompress(file.read())
-        except (EOFError, zlib.error, gzip.BadGzipFile):
-            raise Problem(f"{self} is damaged: it cannot be decompressed") from None
+                try:
+                    unpacked = io.BytesIO(gzip.decompress(file.read())) if packed else file
+                except (EOFError, zlib.error, gzip.BadGzipFile):
+                    raise Problem(f"{self} is damaged: it cannot be decompressed") from None
+                yield unpacked
 
 
 @cache
@@ -92,7 +61,9 @@ def check_inputs(*paths: Path | None) -> None:
     refuse("", (paths.count(STANDARD) > 1, "standard input (-) can be read for one of the files only"))
 
 
-# ---- writing ----
+def called(output: Path) -> str:
+    """Return the name of an output for messages."""
+    return "standard output" if output == STANDARD else str(output)
 
 
 def check_target(path: Path, *inputs: Path | None, binary: bool = False) -> None:

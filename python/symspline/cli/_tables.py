@@ -1,25 +1,25 @@
-"""Rows of numbers, times and labels in the named columns of a table."""
+"""Tables: columns of numbers, dates and texts, and their rows as numbers, times and labels."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from datetime import date, time, timedelta
+from itertools import islice
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ._messages import Problem, Progress, did_you_mean, refuse
+from ._messages import Problem, did_you_mean, refuse
 from ._streams import Source
-from ._times import parse_times
+from ._times import EXACT, first_date, is_number, numbers, parse_times
 
 Array = NDArray[Any]
 Place = Callable[[int], str]
 
 RE, IM = "_re", "_im"
 FIRST = 50
-"""Rows that are searched for dates, as the first ones may hold units or be empty."""
+"""Rows that are searched for numbers and dates, as the first ones may hold units or be empty."""
 
 
 @dataclass(frozen=True)
@@ -68,45 +68,88 @@ class Layout:
     utc: bool
 
 
+class Texts:
+    """A column of text, as a list or, in large files, as an array of pyarrow.
+
+    Parameters
+    ----------
+    cells : list of str or pyarrow.ChunkedArray
+        One text per row.
+    comma : bool
+        Whether numbers may have a decimal comma.
+    """
+
+    def __init__(self, cells: Any, comma: bool = False) -> None:
+        self._cells, self._comma = cells, comma
+
+    def __len__(self) -> int:
+        """Return the number of rows."""
+        return len(self._cells)
+
+    def tolist(self, rows: int | None = None) -> list[str]:
+        """Return all texts, or those of the first rows, without blanks at their ends."""
+        cells = self._cells[:rows] if rows is not None else self._cells
+        return list(map(str.strip, cells if isinstance(cells, list) else cells.to_pylist()))
+
+    def plain(self, rows: int | None = None) -> list[str]:
+        """Return texts with decimal points, from which numbers are read."""
+        cells = self.tolist(rows)
+        return [cell.replace(",", ".") for cell in cells] if self._comma else cells
+
+    @property
+    def is_numeric(self) -> bool:
+        """Whether the first text that is not empty is a number."""
+        return is_number(next(filter(None, self.plain(FIRST)), ""))
+
+    def converted(self) -> NDArray[np.float64] | None:
+        """Return an array of pyarrow as numbers, NaN where it is empty; None if another cell is not a number."""
+        if isinstance(self._cells, list):
+            return None
+        import pyarrow as pa
+        from pyarrow import compute
+
+        cells = compute.utf8_trim_whitespace(self._cells)
+        if self._comma:
+            cells = compute.replace_substring(cells, ",", ".")
+        try:
+            found = compute.replace_substring_regex(cells, "^$", "nan").cast(pa.float64())
+        except pa.ArrowInvalid:
+            return None
+        # The conversion of pyarrow would import pandas.
+        chunks = [chunk for chunk in found.chunks if len(chunk)]
+        parts = [np.frombuffer(own.buffers()[1])[own.offset : own.offset + len(own)] for own in chunks]
+        return np.concatenate([np.empty(0), *parts])
+
+
 class Table:
-    """A file with named columns. Its subclasses read the formats.
+    """Named columns of a file.
 
     Attributes
     ----------
     path : Source
-    names, numeric, dates : list of str
-        All columns in the order of the file, those with numbers, and those with dates or text that looks like dates.
-    groups : dict
+    columns : dict
+        For every name an array of numbers or dates, or `Texts`.
+    groups : mapping
         The columns of each array of an NPZ file.
-    is_utc : dict
+    is_utc : mapping
         Whether a column of dates has the time zone UTC; empty if it is unknown.
-    columns : mapping
-        Columns that were read, with the type that they have in the file.
+    place : callable
+        Describes the position of a row.
     """
 
-    names: list[str]
-    numeric: list[str]
-    dates: list[str]
-    groups: dict[str, list[str]]
-    is_utc: dict[str, bool]
-    columns: dict[str, Any]
-
-    def __init__(self, path: Source) -> None:
-        """Read the names of the columns."""
-        self.path, self.groups, self.is_utc, self.columns = path, {}, {}, {}
-        self.names, self.numeric, self.dates = [], [], []
-        self._sparse: frozenset[str] = frozenset()
-        self._time: str | None = None
-
-    def allow_missing(self) -> None:
-        """Find columns of numbers whose first cells are empty, too."""
-
-    def load(self, numbers: Sequence[str], texts: Sequence[str], progress: Progress) -> None:
-        """Read columns of numbers and columns of text, if the file was not read as a whole."""
-
-    def place(self, row: int) -> str:
-        """Describe the position of a row."""
-        return f"row {row} (counted from 0)"
+    def __init__(
+        self,
+        path: Source,
+        columns: dict[str, Any],
+        place: Place = "row {} (counted from 0)".format,
+        groups: Mapping[str, list[str]] | None = None,
+        is_utc: Mapping[str, bool] | None = None,
+    ) -> None:
+        self.path, self.columns, self.place = path, columns, place
+        self.groups, self.is_utc = groups or {}, is_utc or {}
+        self.names = list(columns)
+        self.numeric = [name for name, own in columns.items() if name and _is_numeric(own)]
+        self.dates = [name for name, own in columns.items() if _holds_dates(own)]
 
     def require(self, name: str) -> str:
         """Return the name if there is such a column."""
@@ -120,28 +163,31 @@ class Table:
         if name in self.groups or name in self.names:
             return self.groups.get(name, [name])
         both = [name + RE, name + IM]
-        missing = [part for part in both if part not in self.names]
-        if len(missing) == 1:
-            (found,) = set(both) - set(missing)
-            needs = f"has a column {found!r}, but no {missing[0]!r}; a complex number needs both"
-            raise Problem(f"{self.path} {needs}")
-        return [self.require(name)] if missing else both
+        found = [part for part in both if part in self.names]
+        if len(found) == 1:
+            missing = both[found == both[:1]]
+            raise Problem(f"{self.path} has a column {found[0]!r}, but no {missing!r}; a complex number needs both")
+        return found or [self.require(name)]
 
     def points(self, others: Sequence[str | None]) -> list[str]:
         """Return the columns of the points if none are named: all numeric columns but the others."""
         return self.groups.get("points") or [name for name in self.numeric if name not in others]
 
-    def read(self, numbers: Sequence[str], time: str | None, label: str | None, sparse: Sequence[str] = ()) -> Rows:
+    def shown(self, name: str) -> list[str] | Array:
+        """Return the values of a column, as numbers if they all are, to describe them."""
+        column = self.columns[name]
+        if not isinstance(column, Texts):
+            return column if column.dtype.kind != "O" else column.astype(np.str_).tolist()
+        return self._numbers(name, True) if column.is_numeric else column.tolist()
+
+    def read(self, names: Sequence[str], time: str | None, label: str | None, sparse: Sequence[str] = ()) -> Rows:
         """Read some columns as numbers, one as times and one as labels.
 
         Cells of the columns `sparse` may be empty or NaN; they are NaN in the result.
         """
-        self._sparse, self._time = frozenset(sparse), time
-        with Progress("reading") as progress:
-            self.load(numbers, [name for name in (time, label) if name is not None], progress)
-        columns = [self._numbers(name) for name in numbers]
+        columns = [self._numbers(name, name in sparse) for name in names]
         times, utc = self._times(time) if time is not None else (np.empty(0), False)
-        labels = self._texts(label) if label is not None else None
+        labels = self._labels(label) if label is not None else None
         given = [*columns, *([times] if time is not None else []), *([labels] if labels is not None else [])]
         lengths = sorted(set(map(len, given)))
         differ = f": arrays differ in length: {' and '.join(map(str, lengths))}"
@@ -149,41 +195,72 @@ class Table:
         table = np.stack(columns, axis=1) if columns else np.empty((0, 0))
         return Rows(table, times, utc, labels, self.place)
 
-    def _numbers(self, name: str) -> NDArray[np.float64]:
-        array = np.asarray(self.columns[name])
-        if array.dtype.kind not in "biuf":
-            raise Problem(f"{self.path}: column {name!r} holds {array.dtype}, not numbers")
-        values = array.astype(np.float64)
-        bad = np.flatnonzero(np.isinf(values) if name in self._sparse else ~np.isfinite(values))
+    def _numbers(self, name: str, sparse: bool) -> NDArray[np.float64]:
+        column = self.columns[name]
+        if isinstance(column, Texts):
+            values = self._read(name, column, sparse)
+        elif column.dtype.kind in "biuf":
+            values = column.astype(np.float64)
+        else:
+            raise Problem(f"{self.path}: column {name!r} holds {column.dtype}, not numbers")
+        bad = np.flatnonzero(np.isinf(values) if sparse else ~np.isfinite(values))
         if bad.size:
-            raise self._problem(name, int(bad[0]), f"holds {values[bad[0]]}, which is not a finite number")
+            value = values[bad[0]]
+            found = "is empty or NaN" if np.isnan(value) else f"holds {value}, which is not a finite number"
+            raise self._problem(name, int(bad[0]), found)
         return values
 
-    def _texts(self, name: str) -> list[str]:
-        column = self.columns[name]
-        if isinstance(column, list):
-            texts = [cell.strip() for cell in column]
-        else:
-            for row, cell in enumerate(column.tolist() if column.dtype.kind in "OS" else ()):
-                if not isinstance(cell, (str, int, float, date, time, timedelta)):
-                    kind = type(cell).__name__
-                    raise self._problem(name, row, f"holds {kind}, not a text, a number or a time")
-            texts = [text.strip() for text in column.astype(np.str_).tolist()]
-        if "" in texts:
-            raise self._problem(name, texts.index(""), "is empty")
-        return texts
+    def _read(self, name: str, column: Texts, sparse: bool) -> NDArray[np.float64]:
+        """Return texts as numbers."""
+        found = column.converted()
+        if found is not None and (sparse or not np.isnan(found).any()):
+            return found
+        cells = column.plain()
+        cells = [cell or "nan" for cell in cells] if sparse else cells
+        try:
+            return numbers(cells)
+        except ValueError:
+            row = next(i for i, cell in enumerate(cells) if not is_number(cell))
+            if not cells[row]:
+                raise self._problem(name, row, "is empty") from None
+            units = "; if this line holds units, remove it" if row == 0 else ""
+            shown = column.tolist()[row]
+            raise self._problem(name, row, f"holds {shown!r}, which is not a number{units}") from None
 
     def _times(self, name: str) -> tuple[Array, bool | None]:
         column = self.columns[name]
-        if isinstance(column, list) or column.dtype.kind in "OUT":
-            return parse_times(self._texts(name), lambda row, found: self._problem(name, row, found))
+        if isinstance(column, Texts):
+            found = column.converted() if column.is_numeric else None
+            # Larger whole numbers are exact as texts only.
+            if found is not None and np.abs(found).max(initial=0.0) <= EXACT:
+                return found, False
+            return parse_times(self._labels(name), lambda row, what: self._problem(name, row, what))
         if column.dtype.kind in "iu":
             return column, False
         if column.dtype.kind != "M":
-            return self._numbers(name), False
+            return self._numbers(name, False), False
         if np.isnat(column).any():
             raise self._problem(name, int(np.isnat(column).argmax()), "holds no time")
         return column, self.is_utc.get(name)
 
+    def _labels(self, name: str) -> list[str]:
+        column = self.columns[name]
+        if isinstance(column, np.ndarray) and column.dtype.kind == "O":
+            raise Problem(f"{self.path}: column {name!r} holds {column.dtype}, not texts, numbers or times")
+        texts = column.tolist() if isinstance(column, Texts) else column.astype(np.str_).tolist()
+        if "" in texts:
+            raise self._problem(name, texts.index(""), "is empty")
+        return texts
+
     def _problem(self, name: str, row: int, found: str) -> Problem:
         return Problem(f"{self.path}, {self.place(row)}: column {name!r} {found}")
+
+
+def _is_numeric(column: Any) -> bool:
+    return column.is_numeric if isinstance(column, Texts) else column.dtype.kind in "biuf"
+
+
+def _holds_dates(column: Any) -> bool:
+    if isinstance(column, Texts):
+        return first_date(list(islice(column.plain(FIRST), FIRST)))
+    return column.dtype.kind in "Mm"

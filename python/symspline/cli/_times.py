@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._core import ValidationError
-from .._input import ISO_DATE, UTC_ZONE, ZEROS, times_of
+from .._input import ISO_DATE, UTC_ZONE, shapes_of, times_of
 from ._messages import Problem, refuse
 
 Times = NDArray[Any]
@@ -33,8 +33,8 @@ _DURATION = re.compile(r"(\d+\.?\d*(?:e[+-]?\d+)?|\.\d+) ?([a-z]*)", re.IGNORECA
 _SECOND = 10**9
 _NANOSECONDS = {"ns": 1, "us": 10**3, "ms": 10**6, "s": _SECOND}
 _NANOSECONDS |= {"min": 60 * _SECOND, "h": 3600 * _SECOND, "d": 24 * 3600 * _SECOND}
-# Whole numbers up to here are exact as floating-point numbers.
-_EXACT = 2**53
+EXACT = 2**53
+"""Whole numbers up to here are exact as floating-point numbers."""
 _MOST = 10**9
 # Exponents of floating-point numbers are smaller.
 _EXPONENT = 400
@@ -69,6 +69,20 @@ def number(text: str) -> float:
     return float(numbers([text])[0])
 
 
+def option_numbers(text: str, option: str, positive: bool = False) -> Any:
+    """Read the numbers in an option, finite and at least 0: one, or a tuple of several."""
+    cells = text.split(",")
+    refuse(f"{option} {text}: ", (not all(map(is_number, cells)), "give a number such as 0.1"))
+    values = tuple(map(float, cells))
+    bad = [value for value in values if not 0 <= value < math.inf]
+    refuse(
+        f"{option} {text}: ",
+        (bad, f"{next(iter(bad), 0):g} is not a finite number >= 0"),
+        (positive and 0 in values, "the standard deviation must be greater than 0"),
+    )
+    return values if len(values) > 1 else values[0]
+
+
 def parse_times(cells: Sequence[str], fail: Fail) -> tuple[Times, bool]:
     """Read the times in a column: numbers if the first cell is one, otherwise ISO dates.
 
@@ -84,7 +98,7 @@ def parse_times(cells: Sequence[str], fail: Fail) -> tuple[Times, bool]:
         with suppress(ValueError):
             return _numeric_times(cells, fail), False
     # Texts of one form have one style.
-    alike = {cell.translate(ZEROS) for cell in cells}
+    alike = set(shapes_of(list(cells)))
     if style in (None, "number") or set(map(_style, alike)) != {style}:
         for i, own in enumerate(map(_style, cells)):
             if own is None and style != "number":
@@ -104,7 +118,7 @@ def _numeric_times(cells: Sequence[str], fail: Fail) -> Times:
     bad = np.flatnonzero(~np.isfinite(values))
     if bad.size:
         raise fail(int(bad[0]), f"holds {cells[bad[0]]!r}, which is not a time")
-    if np.abs(values).max(initial=0) > _EXACT:
+    if np.abs(values).max(initial=0) > EXACT:
         with suppress(ValueError, OverflowError):
             return np.array([int(cell) for cell in cells], dtype=np.int64)
     return values
@@ -131,9 +145,10 @@ def is_date_like(text: str) -> bool:
     return _DATE_LIKE.match(text.strip()) is not None
 
 
-def is_packed_day(cell: str) -> bool:
-    """Whether a number looks like a day of these centuries: 20210829."""
-    return _PACKED_DAY.fullmatch(cell.strip()) is not None
+def first_date(cells: Sequence[str]) -> bool:
+    """Whether the first cell that looks like a date or a number looks like a date, such as 20210829."""
+    first = next((cell for cell in cells if is_number(cell) or is_date_like(cell)), "")
+    return is_date_like(first) or _PACKED_DAY.fullmatch(first.strip()) is not None
 
 
 # ---- durations, and times along a curve ----
@@ -155,7 +170,9 @@ def every(step: str, knots: Times) -> Times:
     """
     count, unit = _duration(step, "--every")
     kind = knots.dtype.kind
-    if unit and kind != "M":
+    if kind == "M":
+        return _multiples(count * _NANOSECONDS[unit or "s"], knots, step)
+    if unit:
         raise Problem(f"--every {step}: the times of this curve are numbers; give a step without a unit")
     if kind == "f":
         length = float(count)
@@ -163,22 +180,38 @@ def every(step: str, knots: Times) -> Times:
             raise Problem(f"--every {step}: that is too {'long' if length else 'short'}")
         # The last sample is at the end if the step divides the curve up to rounding.
         samples = _samples((float(knots[-1]) - float(knots[0])) / length * (1 + 1e-12), step)
-        return np.asarray(np.minimum(_equidistant(_decimal(knots[0]), count, 1, samples), knots[-1]))
-    if kind == "M":
-        count *= _NANOSECONDS[unit or "s"]
-    if count != int(count):
-        units = "a whole number of nanoseconds" if kind == "M" else "a whole number, as the times are"
-        raise Problem(f"--every {step}: a step must be {units}")
-    jump = int(count)
-    if kind == "M":
-        unit = next(unit for unit in ("s", "ms", "us", "ns") if jump % _NANOSECONDS[unit] == 0)
-        knots = _in_unit(knots, unit)
-        ticks = np.ones(1, f"datetime64[{unit}]").astype(knots.dtype).astype(np.int64)
-        jump = jump // _NANOSECONDS[unit] * int(ticks[0])
-        return _whole_multiples(knots, jump, step)
-    span = _span(knots)
-    samples = _samples(span // jump, step)
-    return _after(knots[:1], np.uint64(min(jump, span)) * np.arange(samples, dtype=np.uint64))
+        return np.asarray(np.minimum(_equidistant(_decimal(knots[0]), Fraction(count), samples), knots[-1]))
+    refuse(f"--every {step}: ", (count != int(count), "a step must be a whole number, as the times are"))
+    first, last = knots[[0, -1]].tolist()
+    jump = min(int(count), last - first)
+    return _after(first, np.uint64(jump) * _indices(_samples((last - first) // int(count), step)), knots.dtype)
+
+
+def _multiples(step: Decimal, knots: Times, option: str) -> Times:
+    """Return the dates between the ends that are whole multiples of a step in nanoseconds since 1970."""
+    refuse(f"--every {option}: ", (step != int(step), "a step must be a whole number of nanoseconds"))
+    unit = next(unit for unit in ("s", "ms", "us", "ns") if int(step) % _NANOSECONDS[unit] == 0)
+    ends = _in_unit(knots, unit)
+    ticks = int(np.ones(1, f"datetime64[{unit}]").astype(ends.dtype).astype(np.int64)[0])
+    jump = int(step) // _NANOSECONDS[unit] * ticks
+    first, last = ends.astype(np.int64).tolist()
+    start = -(-first // jump) * jump
+    samples = _samples((last - start) // jump, option) if start <= last else 0
+    # A step that is longer than the time between the ends may not fit into 64 bits.
+    return _after(start, np.uint64(min(jump, last - first)) * _indices(samples), ends.dtype)
+
+
+def spread(count: int, knots: Times) -> Times:
+    """Return equidistant times from the first to the last knot, dates to a microsecond."""
+    if knots.dtype.kind == "f":
+        first, last = _decimal(knots[0]), _decimal(knots[-1])
+        return _equidistant(first, (last - first) / max(count - 1, 1), count)
+    dates = knots.dtype.kind == "M"
+    ends = _in_unit(knots, "us") if dates else knots[[0, -1]]
+    start, stop = ends.astype(np.int64 if dates else ends.dtype).tolist()
+    steps = np.rint(np.linspace(0, stop - start, count)[: count - 1]).astype(np.uint64)
+    times = _after(start, np.append(steps, np.uint64(stop - start if count > 1 else 0)), ends.dtype)
+    return _coarsest(times) if dates else times
 
 
 def _decimal(time: Any) -> Fraction:
@@ -186,50 +219,23 @@ def _decimal(time: Any) -> Fraction:
     return Fraction(repr(float(time)))
 
 
-def _equidistant(first: Fraction, step: Fraction | Decimal, divisor: int, count: int) -> NDArray[np.float64]:
-    """Return the numbers ``first + i step / divisor`` for i < count, each rounded once from its exact value."""
-    step = Fraction(step) / divisor
+def _equidistant(first: Fraction, step: Fraction, count: int) -> NDArray[np.float64]:
+    """Return the numbers ``first + i step`` for i < count, each rounded once from its exact value."""
     scale = math.lcm(first.denominator, step.denominator)
     start, jump = int(first * scale), int(step * scale)
-    if max(abs(start) + abs(jump) * count, scale) <= _EXACT:
+    if max(abs(start) + abs(jump) * count, scale) <= EXACT:
         # All of these integers are exact as floating-point numbers.
         return np.asarray((start + jump * np.arange(count)) / scale)
     return np.fromiter(((start + jump * i) / scale for i in range(count)), np.float64, count)
 
 
-def _whole_multiples(ends: Times, jump: int, step: str) -> Times:
-    """Return the dates between two ends that are whole multiples of a step since 1970."""
-    first, last = (int(end) for end in ends.astype(np.int64))
-    start = -(-first // jump) * jump
-    samples = _samples((last - start) // jump, step) if start <= last else 0
-    # A step that is longer than the time between the ends may not fit into 64 bits.
-    jump = min(jump, last - first)
-    begin = np.array([start if samples else first], np.int64).astype(ends.dtype)
-    return _after(begin, np.uint64(jump) * np.arange(samples, dtype=np.uint64))
+def _indices(count: int) -> NDArray[np.uint64]:
+    return np.arange(count, dtype=np.uint64)
 
 
-def spread(count: int, knots: Times) -> Times:
-    """Return equidistant times from the first to the last knot, dates to a microsecond."""
-    if knots.dtype.kind == "f":
-        first, last = _decimal(knots[0]), _decimal(knots[-1])
-        return _equidistant(first, last - first, max(count - 1, 1), count)
-    dates = knots.dtype.kind == "M"
-    knots = _in_unit(knots, "us") if dates else knots
-    span = _span(knots)
-    steps = np.rint(np.linspace(0, span, count)[: count - 1]).astype(np.uint64)
-    times = _after(knots[:1], np.append(steps, np.uint64(span if count > 1 else 0)))
-    return _coarsest(times) if dates else times
-
-
-def _span(knots: Times) -> int:
-    """Return the exact difference between the last and the first knot."""
-    first, last = knots[[0, -1]].astype(np.int64 if knots.dtype.kind == "M" else knots.dtype).tolist()
-    return int(last - first)
-
-
-def _after(start: Times, steps: NDArray[np.uint64]) -> Times:
-    """Return a start, of shape (1,), plus whole numbers. The sum is exact, as it is computed modulo 2**64."""
-    return np.asarray((start.astype(np.int64).astype(np.uint64) + steps).astype(np.int64).astype(start.dtype))
+def _after(start: int, steps: NDArray[np.uint64], dtype: Any) -> Times:
+    """Return a start plus whole numbers. The sum is exact, as it is computed modulo 2**64."""
+    return np.asarray((np.uint64(start % 2**64) + steps).astype(np.int64).astype(dtype))
 
 
 def _in_unit(knots: Times, unit: Any) -> Times:
