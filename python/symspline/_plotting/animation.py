@@ -194,8 +194,8 @@ def _row_of_curve(axes: Axes) -> float:
 
 def _frame_at_time(axes: Axes, matrices: Array, curve: Curve) -> Update:
     """Return a function that moves a frame along the time axis."""
-    look: Any = {"units": "inches", "scale_units": "inches", "scale": 1, "clip_on": False, "zorder": 9}
-    look |= {"width": 0.05, "headwidth": 3.2, "headlength": 4, "headaxislength": 3.8, "color": AXES}
+    look: Any = {"units": "inches", "scale_units": "inches", "scale": 1, "clip_on": False, "in_layout": False}
+    look |= {"width": 0.05, "headwidth": 3.2, "headlength": 4, "headaxislength": 3.8, "color": AXES, "zorder": 9}
     start, height = curve.times[:1].repeat(3), np.full(3, _row_of_curve(axes))
     arrows = axes.quiver(start, height, np.ones(3), np.ones(3), **look)
 

@@ -4,23 +4,45 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
+from itertools import product
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import SubFigure
+from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 from matplotlib.ticker import MaxNLocator
+from mpl_toolkits.mplot3d import proj3d
 
 from .._spaces import Hyperbolic
 from .arrows import draw_arrows
 from .curves import CIRCLE, Curve, disc_indices, draw_in_plane
 from .globe import centre_of
-from .style import EDGE, GRID, INK, PAPER, Array, closest, inside, note, plain, window
+from .style import (
+    AXES,
+    EDGE,
+    GRID,
+    INK,
+    OWN_AXES,
+    PAPER,
+    Array,
+    closest,
+    inside,
+    legend,
+    note,
+    plain,
+    points,
+    size,
+    text_factor,
+    window,
+)
 
 _PLANE = Hyperbolic(2)
 _ORIGIN = np.array([1.0, 0.0, 0.0])
 SHADOW = "grey: shadow on the floor"
+_BESIDE, _UNDER = 0.45, 0.35
+"""Margins of a box in inches, which have the labels of its axes."""
 _STEPS = np.multiply.outer(10.0 ** np.arange(-9, 3), [1, 2, 5]).ravel()
 
 
@@ -75,9 +97,9 @@ def box(
     """Add a box with equal scales around lines of shape (m, 3), with their shadows on the floor.
 
     The box contains the points ``others``, too. Its sides are longer than the extent of all points by ``margin`` times
-    the longest one at both ends, and ``below`` inches under it stay empty.
+    the longest one at both ends. It fills the panel, of which ``below`` inches at the bottom stay empty.
     """
-    axes: Any = panel.add_axes(inside(panel, 0.0, below, 0.45, 0.0), projection="3d", facecolor="none")
+    axes: Any = panel.add_axes((0, 0, 1, 1), projection="3d", facecolor="none")
     everything = np.concatenate([*lines, *others])
     middle, half = window(everything, 1.0)
     half = half or 1.0
@@ -86,8 +108,8 @@ def box(
     for line in lines:
         look: Any = {"color": GRID, "linewidth": 1.2, "zorder": 2, "label": "_shadow"}
         axes.plot(*line.T[:2], np.full(len(line), middle[2] - sides[2]), **look)
-    axes.tick_params(color=EDGE, labelcolor=INK, labelsize=8, pad=0)
-    axes.set_box_aspect(tuple(sides), zoom=0.95)
+    axes.tick_params(color=EDGE, labelcolor=INK, labelsize=points(8) * text_factor(axes), pad=0)
+    factor = OWN_AXES.get(axes, 1.0)
     for axis, number, side, name in zip("xyz", middle, sides, "₁₂₃", strict=True):
         getattr(axes, f"set_{axis}lim")(number - side, number + side)
         # White walls with faint lines.
@@ -96,13 +118,50 @@ def box(
         wall.pane.set_edgecolor(GRID)
         wall.line.set_color(EDGE)
         wall._axinfo["grid"].update(color=GRID, linewidth=0.6)
-        wall.set_major_locator(MaxNLocator(max(2, round(5 * side / sides.max()))))
-        wall.label.set(text=f"x{name}", color=INK, fontsize=10)
-    # Choose the direction from which the curve looks widest.
+        wall.set_major_locator(MaxNLocator(max(1 + (factor == 1), round(5 * factor * side / sides.max()))))
+        wall.label.set(text=f"x{name}", color=INK, fontsize=points(10))
+    # Flat boxes are seen from farther above. Choose the direction from which the curve looks widest.
     angles = np.radians([-60, -30, 30, 60])
     right = everything[:, 1:2] * np.cos(angles) - everything[:, :1] * np.sin(angles)
-    axes.view_init(elev=24, azim=(-60, -30, 30, 60)[np.std(right, axis=0).argmax()])
+    elevation = float(np.interp(sides[2] / sides[:2].max(), [0.2, 1], [38, 24]))
+    axes.view_init(elev=elevation, azim=(-60, -30, 30, 60)[np.std(right, axis=0).argmax()])
+    axes.set_box_aspect(tuple(sides))
+    _fill(panel, axes, middle + sides * np.array(list(product((-1, 1), repeat=3))), below)
     return axes
+
+
+def _fill(panel: SubFigure, axes: Any, corners: Array, below: float) -> None:
+    """Choose the position of axes so that a box fills the panel, with margins for the labels around it.
+
+    Axes of the user keep their position. The box is enlarged in them, where there is space.
+    """
+    width, height = size(panel)
+    free = np.array([width - 2 * _BESIDE, height - below - _UNDER])
+    square = min(width, height)
+    if axes not in OWN_AXES:
+        axes.set_position((0, 0, square / width, square / height))
+    # Positions of the corners in the square of the axes.
+    x, y, _ = proj3d.proj_transform(*corners.T, axes.get_proj())
+    flat = axes.transAxes.inverted().transform(axes.transData.transform(np.column_stack([x, y])))
+    low, extent = flat.min(axis=0), np.ptp(flat, axis=0)
+    if axes in OWN_AXES:
+        axes.set_box_aspect(axes._box_aspect, zoom=float(np.clip(0.8 / extent.max(), 1.0, 1.4)))
+        return
+    side = float((free / extent).min())
+    left, bottom = np.array([_BESIDE, below + _UNDER]) + (free - side * extent) / 2 - side * low
+    axes.set_position((left / width, bottom / height, side / width, side / height))
+
+
+def frame_handles() -> tuple[list[Any], list[str]]:
+    """Return the handles and labels of a legend of the colours of frames."""
+    return [Line2D([], [], color=color, linewidth=2.4) for color in AXES], ["first axis", "second", "third"]
+
+
+def explain_frames(panel: Any, axes: Any) -> None:
+    """Draw a legend of the colours of frames below a box, or above axes of the user."""
+    holder, anchor = (axes, (0, 1)) if axes in OWN_AXES else (panel, (0.02, 0.28 / size(panel)[1]))
+    look: Any = {"loc": "lower left", "bbox_to_anchor": anchor, "handlelength": 1.2, "columnspacing": 1.2}
+    legend(holder, *frame_handles(), **look)
 
 
 # ---- the hyperbolic plane ----

@@ -36,5 +36,4 @@ def draw_columns(panel: SubFigure, curves: Sequence[Curve]) -> None:
         axes.set_ylim(low.min(), high.max())
     handles = [Line2D([], [], color=color, linewidth=width) for color in DISTINCT[:n]]
     names = [f"x{i + 1}".translate(SUBSCRIPTS) for i in range(n)]
-    place = {"loc": "lower right", "bbox_to_anchor": (1, 1), "ncols": n, "borderaxespad": 0}
-    legend(made[0], handles, names, handlelength=1.6, **place)
+    legend(made[0], handles, names, handlelength=1.6, loc="lower right", bbox_to_anchor=(1, 1), borderaxespad=0)

@@ -25,6 +25,7 @@ from .graphs import ANGLES
 from .matrices import outlines, quaternions, rotations
 from .sphere import bloch_vectors
 from .style import EDGE, HALO, INK, Array, size
+from .theme import KEPT
 
 RIGHT = 1.35
 """Width in inches of the margin beside the image, which has the key of its colours."""
@@ -132,7 +133,7 @@ def _key(panel: SubFigure, axes: Axes, caption: str) -> Axes:
     return key
 
 
-def _contours(axes: Axes, field: Field, values: Array, unit: str) -> None:
+def _contours(axes: Axes, field: Field, values: Array, unit: str, gid: str | None = None) -> None:
     """Draw labelled contour lines of distances to the node in the middle, and a ring around this node."""
     look: Any = {"color": "none", "markersize": 9, "clip_on": False, "zorder": 5}
     axes.plot(*field.ring, "o", markeredgecolor="white", markeredgewidth=3, **look)
@@ -146,8 +147,9 @@ def _contours(axes: Axes, field: Field, values: Array, unit: str) -> None:
     m, n = values.shape
     x, y = (left + (right - left) * (np.arange(m) + 0.5) / m), (low + (high - low) * (np.arange(n) + 0.5) / n)
     lines = axes.contour(x, y, np.ma.masked_invalid(values).T, levels, colors=INK, linewidths=0.8, alpha=0.7, zorder=3)
+    lines.set_gid(gid)
     for text in axes.clabel(lines, fmt=lambda level: f"{level:g}{unit}", fontsize=8, colors=INK):
-        text.set(path_effects=HALO)
+        text.set(path_effects=HALO, gid=gid)
 
 
 # ---- numbers and angles ----
@@ -187,7 +189,14 @@ def _draw_arrows(axes: Axes, field: Field, vectors: Callable[[Any], Array], long
     """Draw vectors, shape (k, 2), as arrows around their positions. The longest one fits between symbols."""
     positions, arrows = field.at_symbols(vectors)
     look: Any = {"units": "inches", "scale_units": "inches", "angles": "uv", "pivot": "mid", "clip_on": False}
-    look |= {"width": 0.022, "headwidth": 4, "headlength": 5, "headaxislength": 4.5, "minlength": 0.5}
+    look |= {
+        "width": 0.022,
+        "headwidth": 4,
+        "headlength": 5,
+        "headaxislength": 4.5,
+        "minlength": 0.5,
+        "in_layout": False,
+    }
     scale = (longest or 1.0) / (0.9 * field.gap)
     axes.quiver(*positions.T, *arrows.T, color=INK, scale=scale, zorder=4, **look)
 
@@ -230,13 +239,14 @@ def _draw_orientations(matrices: Callable[[Any], Array], panel: SubFigure, axes:
     polar = np.pi * radius
     share = np.sin(polar) / np.maximum(radius, 1e-12)
     disc = direction_colors(np.stack([share * x, share * y, np.cos(polar)], axis=-1))
-    disc[radius > 1] = 1
+    disc = np.concatenate([disc, (radius <= 1)[..., None]], axis=-1)
     key.imshow(disc.swapaxes(0, 1), origin="lower", extent=(-1, 1, -1, 1))
     for at, name in (((0, 0), "x₃"), ((0.5, 0), "x₁"), ((0, 0.5), "x₂")):
-        key.text(at[0], at[1], name, color=INK, fontsize=9, ha="center", va="center", path_effects=HALO)
+        look: Any = {"ha": "center", "va": "center", "path_effects": HALO, "gid": KEPT}
+        key.text(at[0], at[1], name, color=INK, fontsize=9, **look)
     words = "rim: −x₃\n\nlines: misorien-\ntation to the\nringed node"
     key.text(0, -1.15, words, color=INK, fontsize=9, ha="center", va="top")
-    _contours(axes, field, np.degrees(angles_between(middle[0], frames)), "°")
+    _contours(axes, field, np.degrees(angles_between(middle[0], frames)), "°", KEPT)
 
 
 def direction_colors(vectors: Array) -> Array:
@@ -270,12 +280,12 @@ def anisotropy(matrices: Array) -> Array:
     return np.asarray(ratio * np.sqrt(n / (n - 1)))
 
 
-def _draw_ellipses(axes: Axes, field: Field) -> None:
+def _draw_ellipses(axes: Axes, field: Field, **look: Any) -> None:
     """Draw the ellipses of the first two coordinates, all on one scale."""
     positions, blocks = field.at_symbols(lambda points: points[:, :2, :2])
     rings = outlines(blocks)
     inches = 0.46 * field.gap / (np.abs(rings).max(initial=0) or 1.0)
-    look: dict[str, Any] = {
+    look |= {
         "offsets": positions,
         "offset_transform": axes.transData,
         "transform": Affine2D().scale(inches) + axes.figure.dpi_scale_trans,
@@ -298,10 +308,10 @@ def draw_tensors(panel: SubFigure, axes: Axes, field: Field) -> None:
     _show(axes, field, field.at_pixels(tensor_colors))
     key = _key(panel, axes, "longest axis")
     for i, color in enumerate(np.eye(3)):
-        key.barh(0.75 - 0.5 * i, 0.5, 0.3, left=-0.7, color=tuple(color))
+        key.barh(0.75 - 0.5 * i, 0.5, 0.3, left=-0.7, color=tuple(color), gid=KEPT)
         key.text(0.0, 0.75 - 0.5 * i, f"x{'₁₂₃'[i]}", color=INK, fontsize=9, va="center")
     key.text(0, -0.75, "white:\nisotropic\n\nellipses: seen\nalong x₃", color=INK, fontsize=9, ha="center", va="top")
-    _draw_ellipses(axes, field)
+    _draw_ellipses(axes, field, gid=KEPT)
 
 
 def tensor_colors(matrices: Array) -> Array:

@@ -6,11 +6,14 @@ sizes.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from io import BytesIO
 from typing import Any, NamedTuple
 
 import numpy as np
+from matplotlib import rcParams
 from matplotlib.figure import Figure, SubFigure
 
 from .._arrays import short_repr
@@ -19,7 +22,9 @@ from .._disk import path_of, replacing
 from .._spaces import Space, cover_of, factors_of
 from . import chart, columns, graphs, matrices, sphere
 from .curves import Curve
+from .shrink import shrink, small_text
 from .style import DPI, INK, points
+from .theme import invert_page, is_dark, light_colors
 
 FACTORS = 6
 """The largest number of factors of a product that are drawn."""
@@ -116,6 +121,21 @@ def new_figure(size: tuple[float, float], show: bool) -> Figure:
     return figure
 
 
+@contextmanager
+def drawing(size: tuple[float, float], show: bool = False, factor: float = 1.0) -> Iterator[Figure]:
+    """Create a figure to draw into, in the colours of a light style, and adapt it to the style of the user afterwards.
+
+    Lines, symbols and text are reduced by a factor.
+    """
+    dark = is_dark(rcParams["figure.facecolor"])
+    with light_colors(dark), small_text(factor):
+        figure = new_figure(size, show)
+        yield figure
+    shrink(figure.findobj(), factor)
+    if dark:
+        invert_page(figure)
+
+
 def finish(figure: Figure, file: Any, show: bool) -> Figure:
     """Save the figure if there is a file, and open windows."""
     if file is not None:
@@ -149,9 +169,16 @@ def save(figure: Figure, file: Any) -> None:
         figure.savefig(temporary, format=ending)
 
 
+def captions(space: Space[Any]) -> list[str]:
+    """Return the names of the factors of a product, with their numbers if several factors are equal."""
+    names = [repr(factor) for factor in factors_of(space)]
+    several = max(Counter(names).values()) > 1
+    return [f"factor {i}: {name}" if several else name for i, name in enumerate(names)]
+
+
 def picture_of_factors(curves: Sequence[Curve]) -> Picture:
     """Return the picture of a product space, which has the pictures of its factors."""
-    factors = factors_of(curves[0].space)[:FACTORS]
+    factors, names = factors_of(curves[0].space)[:FACTORS], captions(curves[0].space)
     rows = 1 if len(factors) <= 3 else 2
     width = -(-len(factors) // rows)
 
@@ -160,7 +187,7 @@ def picture_of_factors(curves: Sequence[Curve]) -> Picture:
         for i, factor in enumerate(factors):
             row, column = divmod(i, width)
             caption, cell = cells[2 * row : 2 * row + 2, column]
-            caption.text(0.5, 0.3, repr(factor), ha="center", color=INK, fontsize=points(12))
+            caption.text(0.5, 0.3, names[i], ha="center", color=INK, fontsize=points(12))
             draw_picture(cell, factor, [curve.part(i) for curve in curves])
 
     return Picture(draw, 4.8 * width, 4.6 * rows)

@@ -11,9 +11,9 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from .._core import ValidationError
-from .figure import CurveFigure, save
+from .figure import drawing, finish
 from .rows import VIEW
-from .style import DATES, DPI, EDGE, HALO, INK, Array, heading, plain, show_dates, time_colors, window
+from .style import DATES, EDGE, HALO, INK, Array, heading, plain, show_dates, time_colors, window
 
 # Drawings in the strip, and in each row of the small multiples.
 _STRIP, _ROWS, _COLUMNS = 25, 2, 6
@@ -41,21 +41,19 @@ def plot_film(t: NDArray[Any], landmarks: Array, film: Callable[[Any], Array], f
         raise ValidationError(f"pictures of landmarks are made in 2 or 3 dimensions, not in {n}")
     strip, multiples = _times(t, _STRIP), _times(t, _ROWS * _COLUMNS)
     seen = [film(x) if n == 2 else film(x) @ VIEW[:2].T for x in (t, strip, multiples)]
-    figure = CurveFigure(figsize=(_WIDTH, _HEIGHT), dpi=DPI, facecolor="white")
-    heading(figure, "Morph along a C² spline of affine shapes", f"{drawings} drawings of {count} landmarks", 0.93)
     # Every drawing fits into a square of this size around its centre.
     size = 2.1 * max(float(np.abs(_centred(x)).max()) for x in seen)
-    _draw_strip(figure.add_axes((0.05, 0.58, 0.9, 0.26)), t, strip, seen[0], seen[1], size)
     middle, half = window(seen[2].reshape(-1, 2), 1.25)
-    for i, (x, drawing) in enumerate(zip(multiples, seen[2], strict=True)):
-        row, column = divmod(i, _COLUMNS)
-        axes = figure.add_axes((0.03 + column * 0.157, 0.26 - row * 0.25, 0.15, 0.24), aspect="equal")
-        axes.set(xticks=[], yticks=[])
-        axes.set(xlim=(middle[0] - half, middle[0] + half), ylim=(middle[1] - half, middle[1] + half))
-        _draw_one(axes, x, drawing, time_colors(i / (len(multiples) - 1)))
-    if file is not None:
-        save(figure, file)
-    return figure
+    with drawing((_WIDTH, _HEIGHT)) as figure:
+        heading(figure, "Morph along a C² spline of affine shapes", f"{drawings} drawings of {count} landmarks", 0.93)
+        _draw_strip(figure.add_axes((0.05, 0.58, 0.9, 0.26)), t, strip, seen[0], seen[1], size)
+        for i, (x, landmarks) in enumerate(zip(multiples, seen[2], strict=True)):
+            row, column = divmod(i, _COLUMNS)
+            axes = figure.add_axes((0.03 + column * 0.157, 0.26 - row * 0.25, 0.15, 0.24), aspect="equal")
+            axes.set(xticks=[], yticks=[])
+            axes.set(xlim=(middle[0] - half, middle[0] + half), ylim=(middle[1] - half, middle[1] + half))
+            _draw_one(axes, x, landmarks, time_colors(i / (len(multiples) - 1)))
+    return finish(figure, file, False)
 
 
 def _times(t: NDArray[Any], number: int) -> NDArray[Any]:

@@ -34,7 +34,7 @@ from .style import (
 )
 
 SUBSCRIPTS = str.maketrans("0123456789,", "₀₁₂₃₄₅₆₇₈₉,")
-_NAMED, _OTHERS = 12, 100
+_NAMED, _OTHERS, _IN_ROW = 12, 100, 6
 _LINES, _TICKS = 60, 2000
 
 
@@ -177,7 +177,7 @@ def draw_numbers(
     numbers : callable
         Function of the first point of a curve and of several points, with one row per point.
     """
-    in_row = max(1, min(6, int((size(panel)[0] - LEFT - RIGHT) / 0.9)))
+    space = size(panel)[0] - LEFT - RIGHT
     width = 1.8 if curves[0].alone else 0.9
     drawn = [curve.marked(partial(numbers, curve.first_point)) for curve in curves]
     named, rest = _choose(names, np.max([np.ptp(line, axis=0) for line, _ in drawn], axis=0))
@@ -188,7 +188,8 @@ def draw_numbers(
         handles.append(Line2D([], [], color=INK, linewidth=0.4))
         labels.append(f"{len(rest)} others")
         rest = rest[:: 1 + len(rest) // _OTHERS]
-    (axes,) = timelines(panel, curves, [label], top=0.25 + 0.22 * -(-len(labels) // in_row))
+    rows = -(-len(labels) // max(1, min(_IN_ROW, int(space / 0.9))))
+    (axes,) = timelines(panel, curves, [label], top=0.25 + 0.22 * rows)
     for curve, (values, given) in zip(curves, drawn, strict=True):
         if curve.has_line:
             axes.plot(curve.times, values[:, rest], color=INK, linewidth=0.4, alpha=0.4)
@@ -205,9 +206,8 @@ def draw_numbers(
                 curve.draw_dots(axes, positions, color=color, alpha=0.4)
     if axes in OWN_AXES:
         return
-    order = [i for column in range(in_row) for i in range(column, len(labels), in_row)]
-    anchor: Any = {"loc": "lower right", "bbox_to_anchor": (1, 1), "ncols": in_row, "borderaxespad": 0}
-    legend(axes, [handles[i] for i in order], [labels[i] for i in order], handlelength=1.6, **anchor)
+    anchor: Any = {"loc": "lower right", "bbox_to_anchor": (1, 1), "borderaxespad": 0}
+    legend(axes, handles, labels, rows=rows, handlelength=1.6, **anchor)
 
 
 def _choose(names: Sequence[str], ranges: Array) -> tuple[Indices, Indices]:

@@ -10,10 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
 from .._core import ValidationError
-from .._spaces import factors_of
 from .fields import RIGHT, Field, draw_field
-from .figure import FACTORS, CurveFigure, save
-from .style import DATES, DPI, INK, Array, heading, inside, plain
+from .figure import FACTORS, captions, drawing, finish
+from .style import DATES, INK, Array, heading, inside, plain, points
 from .surfaces import draw_surface
 
 _HEAD, _LEFT, _BOTTOM, _TOP, _NAMED = 0.95, 0.85, 0.6, 0.1, 0.4
@@ -102,21 +101,19 @@ def plot_grid(grid: Any, file: Any = None) -> Figure:
     width, height = sides[0].inches + _LEFT + RIGHT, sides[1].inches + _BOTTOM + top
     if any(str(factor.space) in _SURFACES for factor in factors):
         height = max(height, _HIGH)
-    figure = CurveFigure(figsize=(columns * width, _HEAD + rows * height), dpi=DPI, facecolor="white")
-    layout = figure.add_gridspec(1 + rows, columns, height_ratios=[_HEAD] + [height] * rows)
     title, most = f"{grid._kind} on {grid.space!r}", int(6 * columns * width)
     if len(title) > most:
         title = shorten(f"{grid._kind} on {grid.space}", most, placeholder=" …")
-    heading(figure, title, _description(grid, middles), 1 - 0.5 / (_HEAD + rows * height))
-    for i, (factor, named) in enumerate(zip(factors, factors_of(grid.space), strict=False)):
-        panel = figure.add_subfigure(layout[1 + i // columns, i % columns])
-        nodes = factor.points[(slice(None), slice(None), *middles)]
-        _draw_factor(panel, grid, factor, nodes, sides, fixed, (height - sides[1].inches - top, top))
-        if len(factors) > 1:
-            panel.text(_LEFT / width, 1 - 0.28 / height, repr(named), color=INK, fontsize=12)
-    if file is not None:
-        save(figure, file)
-    return figure
+    with drawing((columns * width, _HEAD + rows * height)) as figure:
+        layout = figure.add_gridspec(1 + rows, columns, height_ratios=[_HEAD] + [height] * rows)
+        heading(figure, title, _description(grid, middles), 1 - 0.5 / (_HEAD + rows * height))
+        for i, (factor, name) in enumerate(zip(factors, captions(grid.space), strict=False)):
+            panel = figure.add_subfigure(layout[1 + i // columns, i % columns])
+            nodes = factor.points[(slice(None), slice(None), *middles)]
+            _draw_factor(panel, grid, factor, nodes, sides, fixed, (height - sides[1].inches - top, top))
+            if len(factors) > 1:
+                panel.text(_LEFT / width, 1 - 0.28 / height, name, color=INK, fontsize=points(12))
+    return finish(figure, file, False)
 
 
 def _sides(axes: Any) -> list[Side]:

@@ -21,11 +21,11 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from .._quaternions import rotation_rows
-from .chart import SHADOW, box, plane
+from .chart import SHADOW, box, explain_frames, frame_handles, plane
 from .curves import Curve
 from .rows import REACH, VIEW, Rows
 from .sphere import caps
-from .style import AXES, DATA, INK, Array, legend, points, time_colors, window
+from .style import AXES, DATA, INK, Array, axes_size, legend, note, points, time_colors, window
 
 _ARROW = np.array([[1.0, 0.0], [-0.7, 0.55], [-0.35, 0.0], [-0.7, -0.55]])
 """A body in the plane that points along its first axis."""
@@ -53,7 +53,7 @@ def _draw_rotations(matrices: Callable[[Any], Array], panel: SubFigure, curves: 
             _draw_discs(rows, i, times, length, frames, radii)
             words = "discs: 95 % bands"
         _draw_arrows(rows.axes, times, -i, length * frames, light=row.name == "data")
-    _explain(rows.axes, words)
+    _explain(rows.axes, words, rows.width)
     rows.draw_view()
 
 
@@ -86,7 +86,8 @@ def _draw_arrows(axes: Axes, times: Array, row: int, frames: Array, light: bool)
     seen = VIEW @ frames
     order = np.argsort(seen[:, 2], axis=-1)
     right, up, _ = np.moveaxis(np.take_along_axis(seen, order[:, None], axis=-1), 1, 0)
-    look: Any = {"units": "inches", "scale_units": "inches", "scale": 1, "clip_on": False}
+    # Layouts would add the length of the arrows in data to their extent.
+    look: Any = {"units": "inches", "scale_units": "inches", "scale": 1, "clip_on": False, "in_layout": False}
     look |= {"headwidth": 3.5, "headlength": 4.5, "headaxislength": 4.2, "zorder": 4}
     look |= {"width": 0.018, "alpha": 0.6} if light else {"width": 0.028, "alpha": 1}
     positions = np.repeat(times, 3), np.full(3 * len(times), row)
@@ -104,15 +105,14 @@ def _draw_discs(rows: Rows, row: int, times: Array, length: float, frames: Array
         rows.axes.add_collection(PolyCollection(list(rings), **look, **rows.in_inches(times, row)))
 
 
-def _explain(axes: Axes, more: str, height: float = 1.0) -> None:
-    """Draw a legend of the colours in one line at a given height of the axes."""
-    handles = [Line2D([], [], color=color, linewidth=2.4) for color in AXES]
-    labels = ["first axis", "second", "third"]
+def _explain(axes: Axes, more: str, width: float) -> None:
+    """Draw a legend of the colours above axes of a given width in inches, with further words."""
+    handles, labels = frame_handles()
     if more:
         handles.append(Line2D([], [], linestyle="none"))
         labels.append(more)
-    anchor: Any = {"loc": "lower left", "bbox_to_anchor": (0, height), "ncols": 4, "borderaxespad": 0.2}
-    legend(axes, handles, labels, handlelength=1.2, columnspacing=1.2, **anchor)
+    anchor: Any = {"loc": "lower left", "bbox_to_anchor": (0, 1), "borderaxespad": 0.2}
+    legend(axes, handles, labels, width, handlelength=1.2, columnspacing=1.2, **anchor)
 
 
 # ---- rigid motions: the path of a body, and its orientation ----
@@ -179,7 +179,8 @@ def draw_poses(panel: SubFigure, curves: Sequence[Curve]) -> None:
     count = sum(len(curve.given) for curve in curves)
     name = "bold: given" if bold == count else f"bold: {bold} of {count} given"
     words = curves[0].legend_of(name, "bold: curve", "light: data")
-    _explain(axes, f"{words}; {SHADOW}", height=-0.08)
+    explain_frames(panel, axes)
+    note(panel, f"{words}; {SHADOW}")
 
 
 # ---- positive definite matrices ----
@@ -242,7 +243,7 @@ def _draw_scale(rows: Rows, inches: float, right: float) -> None:
     power = 10.0 ** np.floor(np.log10(longest))
     length = max(step for step in (power, 2 * power, 5 * power) if step < 1.01 * longest)
     # The whole width of the axes, also if symbols have a margin in them.
-    width = rows.axes.bbox.width / rows.axes.figure.dpi
+    width, _ = axes_size(rows.axes)
     end, height = 1 - right / width, 1 + 0.14 / (rows.height * len(rows.rows))
     ends = [end - length * inches / width, end]
     look: dict[str, Any] = {"transform": rows.axes.transAxes, "color": INK, "clip_on": False}

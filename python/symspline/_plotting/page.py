@@ -17,15 +17,17 @@ from .._spaces import Product, cover_of, factors_of
 from . import residuals
 from .collect import axis_of, curves_of
 from .curves import BAND, DATA_DOTS, DOTS, FAINT, QUANTILES, START, Curve
-from .figure import BANDED, FACTORS, draw_picture, finish, new_figure, picture_of, picture_of_factors
+from .figure import BANDED, FACTORS, draw_picture, drawing, finish, picture_of, picture_of_factors
 from .panels import check_axes, draw_into, has_dark_background, next_color
 from .rates import draw_rates, rows_of
-from .style import BOTTOM, DATA, INK, TOP, heading, legend, points
-from .theme import invert_page, is_dark, kept_color, light_colors
+from .style import BOTTOM, DATA, INK, TOP, heading, legend
+from .theme import is_dark, kept_color
 
 _HEAD, _RATES_WIDTH, _RATES_HEIGHT = 1.2, 5.8, 4.0
 _ROW = 1.5
 """Height of a rate in inches, if there are more than two in a column."""
+_SMALLEST = 0.6
+"""Text is not reduced by less than this factor, unless there is no space for a page otherwise."""
 
 
 class Page(NamedTuple):
@@ -98,11 +100,8 @@ def draw_page(
     if below:
         heights.append(residuals.height(below))
     natural = (sum(widths) if rates or wide else widths[0], sum(heights))
-    # Margins are in inches, so that a smaller page is one that is scaled down.
-    size = natural if figsize is None else (max(figsize[0], natural[0]), max(figsize[1], natural[1]))
-    dark = is_dark(rcParams["figure.facecolor"])
-    with light_colors(dark):
-        figure = new_figure(size, show)
+    size, factor = _layout(natural, figsize)
+    with drawing(size, show, factor) as figure:
         heights = [_HEAD, *(h * (size[1] - _HEAD) / sum(heights[1:]) for h in heights[1:])]
         grid = figure.add_gridspec(len(heights), len(widths), width_ratios=widths, height_ratios=heights)
         heading(figure, title, words, 1 - 0.5 / size[1])
@@ -116,11 +115,22 @@ def draw_page(
         if below:
             residuals.draw(figure.add_subfigure(grid[-1, :]), curves[0], below)
         _explain(figure, curves, 1 - 0.92 / size[1])
-    if dark:
-        invert_page(figure)
     if figsize is not None:
         figure.set_size_inches(figsize)
     return Page(figure, curves, panel)
+
+
+def _layout(natural: tuple[float, float], figsize: tuple[float, float] | None) -> tuple[tuple[float, float], float]:
+    """Return the size in inches at which a page is laid out, and the factor by which that page is then reduced.
+
+    Margins and text have fixed sizes, so that a page that is smaller than its natural size is a larger one, reduced.
+    """
+    if figsize is None:
+        return natural, 1.0
+    share = np.divide(figsize, natural)
+    factor = float(np.clip(share.min(), _SMALLEST, 1.0))
+    size = np.maximum(np.divide(figsize, factor), np.multiply(_SMALLEST, natural))
+    return (float(size[0]), float(size[1])), float(min(1.0, *np.divide(figsize, size)))
 
 
 def _axis(curve: Any, raw: bool = False) -> Any:
@@ -194,10 +204,4 @@ def _explain(figure: Figure, curves: Sequence[Curve], height: float) -> None:
         add(Patch(facecolor=DATA, alpha=0.25), f"5–95 % of {int(few[0].batch.valid.sum())} curves")
     if handles:
         place: Any = {"loc": "upper left", "bbox_to_anchor": (0.03, height), "borderaxespad": 0, "borderpad": 0}
-        inches = points(1) * sum(0.45 + 0.065 * len(label) for label in labels)
-        rows = int(np.ceil(inches / (0.9 * figure.get_figwidth())))
-        columns = -(-len(labels) // rows)
-        # A legend fills its columns one after the other, but is read row by row.
-        order = [i for column in range(columns) for i in range(column, len(labels), columns)]
-        handles, labels = [handles[i] for i in order], [labels[i] for i in order]
-        legend(figure, handles, labels, ncols=columns, handlelength=1.4, columnspacing=1.4, **place)
+        legend(figure, handles, labels, 0.9 * figure.get_figwidth(), handlelength=1.4, columnspacing=1.4, **place)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
 from .._arrays import short_repr
@@ -16,8 +17,12 @@ from .._core import ValidationError
 from .._spaces import Product, Space, cover_of
 from .curves import START, Curve
 from .figure import PATHS, VIEWS, draw_picture
-from .style import BOTTOM, INK, LEFT, OWN_AXES, RIGHT, TOP, points
+from .shrink import shrink
+from .style import BOTTOM, INK, LEFT, OWN_AXES, RIGHT, TOP, axes_size, points, text_factor
 from .theme import invert, invert_ticks, is_dark, light_colors
+
+_FULL, _SMALLEST = 3.2, 0.5
+"""The shorter side in inches of axes whose symbols have their full size, and the smallest factor for others."""
 
 
 class AxesPanel:
@@ -36,13 +41,15 @@ class AxesPanel:
     def __init__(self, axes: Axes, square: bool) -> None:
         self.axes = axes
         figure: Any = axes.get_figure(root=True)
-        self.dpi = figure.dpi
         box = axes.get_window_extent()
+        # Small axes count as larger ones, reduced.
+        self.factor = float(np.clip(min(box.width, box.height) / figure.dpi / _FULL, _SMALLEST, 1.0))
+        self.dpi = self.factor * figure.dpi
         width, height = box.width / self.dpi + LEFT + RIGHT, box.height / self.dpi + BOTTOM + TOP
         width, height = (min(width, height),) * 2 if square else (width, height)
         self.bbox = Bbox.from_bounds(0, 0, width * self.dpi, height * self.dpi)
         self._used = False
-        OWN_AXES.add(axes)
+        OWN_AXES[axes] = self.factor
 
     def add_axes(self, rectangle: Any, projection: str | None = None, **look: Any) -> Any:
         """Return the axes of the user; further ones are insets."""
@@ -66,7 +73,7 @@ class AxesPanel:
 
     def text(self, x: float, y: float, words: str, **look: Any) -> Any:
         """Write words below the axes, in as many lines as their width requires."""
-        letters = max(20, int(self.axes.get_window_extent().width / self.dpi / 0.065))
+        letters = max(20, int(axes_size(self.axes)[0] * self.factor / text_factor(self.axes) / 0.065))
         words = "\n".join(fill(line, letters) for line in words.splitlines())
         own: Any = {"ha": "center", "color": INK, "fontsize": points(9)} | look
         return self.axes.annotate(
@@ -82,19 +89,23 @@ class AxesPanel:
 
 def draw_into(ax: Axes, curves: Sequence[Curve], title: str | None, show: bool) -> Axes:
     """Draw the picture of curves into axes that `check_axes` has accepted."""
+    panel = AxesPanel(ax, square=str(cover_of(curves[0].space)) in PATHS)
     before, had = set(ax.findobj()), ax.has_data()
     names = list(ax._axis_map)
     limits = {name: getattr(ax, f"get_{name}lim")() for name in names if had}
     figure: Any = ax.get_figure(root=True)
     dark = has_dark_background(ax)
     with light_colors(dark):
-        draw_picture(AxesPanel(ax, square=str(cover_of(curves[0].space)) in PATHS), curves[0].space, curves)
+        draw_picture(panel, curves[0].space, curves)
     for name, (low, high) in limits.items():
         # Pictures with limits of their own must not hide what was there.
         if not getattr(ax, f"get_autoscale{name}_on")():
             own = getattr(ax, f"get_{name}lim")()
             getattr(ax, f"set_{name}lim")(min(low, own[0]), max(high, own[1]))
     _name_start(ax)
+    own = _own(ax)
+    legend = set() if ax.get_legend() is None else set(ax.get_legend().findobj(Text))
+    shrink([artist for artist in ax.findobj() if artist not in before | own | legend], panel.factor, text_factor(ax))
     if dark:
         _darken(ax, before, figure.get_facecolor())
     if title is not None:
@@ -115,10 +126,14 @@ def has_dark_background(ax: Axes) -> bool:
     return is_dark(facecolor if ax.axison and facecolor[3] else figure.get_facecolor())
 
 
+def _own(ax: Any) -> set[Artist]:
+    """Return the artists of the axis of axes, which belong to the user."""
+    return {artist for own in ax._axis_map.values() for artist in own.findobj()}
+
+
 def _darken(ax: Any, before: set[Artist], background: Any) -> None:
     """Invert new artists in axes of the user; ticks and labels have the colours of the user, except in boxes."""
-    box = ax.name == "3d"
-    kept = {artist for axis in ax._axis_map.values() for artist in axis.findobj()}
+    box, kept = ax.name == "3d", _own(ax)
     labels = [axis.label for axis in ax._axis_map.values()] if box else []
     invert([artist for artist in ax.findobj() if artist not in before and artist not in kept] + labels, background)
     if box:

@@ -123,10 +123,14 @@ def rows_of(space: Space[Any], seconds: bool, most: int) -> list[tuple[int | Non
     if not isinstance(space, Product):
         return [(None, own) for own in rates_of(space, seconds)]
     found: list[tuple[int | None, Rate]] = []
-    for i, factor in enumerate(factors_of(space)[:most]):
+    factors = factors_of(space)
+    names = [_short_name(factor) for factor in factors]
+    if len(set(names)) < len(names):
+        names = [f"factor {i}" for i in range(len(names))]
+    for i, factor in enumerate(factors[:most]):
         for own in rates_of(factor, seconds):
             name, _, unit = own.label.rpartition("\n")
-            found.append((i, own._replace(label=f"{name}\n{unit} of {_short_name(factor)}")))
+            found.append((i, own._replace(label=f"{name}\n{unit} of {names[i]}")))
     return found
 
 

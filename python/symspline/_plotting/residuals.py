@@ -78,5 +78,5 @@ def _draw_residuals(axes: Axes, curve: Curve, own: SidePanel) -> None:
     axes.text(1, 1.02, words, transform=axes.transAxes, ha="right", va="bottom", color=INK, fontsize=points(9))
     if own.names:
         handles = [Line2D([], [], linestyle="none", marker="o", markersize=5, color=color) for color in DISTINCT]
-        place: Any = {"loc": "lower left", "bbox_to_anchor": (0, 1), "ncols": len(own.names), "borderaxespad": 0}
+        place: Any = {"loc": "lower left", "bbox_to_anchor": (0, 1), "borderaxespad": 0}
         legend(axes, handles[: len(own.names)], list(own.names), handlelength=0.8, columnspacing=1.2, **place)

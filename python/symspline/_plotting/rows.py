@@ -17,7 +17,7 @@ from matplotlib.transforms import Affine2D
 
 from .curves import Curve
 from .graphs import timelines
-from .style import INK, OWN_AXES, Array, Indices, evenly, points
+from .style import INK, OWN_AXES, Array, Indices, axes_size, evenly, points
 
 VIEW = np.array([[-0.5, 0.866, 0.0], [-0.296, -0.171, 0.940], [0.814, 0.470, 0.342]])
 """Directions to the right, up and towards the viewer, who sees the first axis point forwards and the third up."""
@@ -94,7 +94,7 @@ class Rows:
     def of(cls, panel: SubFigure, curves: Sequence[Curve]) -> Rows:
         """Add axes to a panel, with as many rows as fit."""
         (axes,) = timelines(panel, curves, [""], top=_TOP)
-        width, high = axes.bbox.width / panel.dpi, axes.bbox.height / panel.dpi
+        width, high = axes_size(axes)
         if axes in OWN_AXES:
             # Other axes have margins for the symbols at both ends.
             start, stop = min(curve.times[0] for curve in curves), max(curve.times[-1] for curve in curves)

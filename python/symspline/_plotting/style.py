@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from typing import Any
-from weakref import WeakSet
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from matplotlib import colormaps, dates, rcParams
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure, SubFigure
+from matplotlib.figure import Figure, FigureBase, SubFigure
 from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
@@ -31,8 +31,10 @@ HALO = [withStroke(linewidth=2.5, foreground="white", alpha=0.85)]
 DPI = 150
 LEFT, RIGHT, BOTTOM, TOP = 0.95, 0.6, 0.55, 0.25
 """Margins in inches, which align the time axes of several panels."""
-OWN_AXES: WeakSet[Axes] = WeakSet()
-"""Axes of the user, whose look does not change."""
+OWN_AXES: WeakKeyDictionary[Axes, float] = WeakKeyDictionary()
+"""Axes of the user, whose look does not change, and the factor by which symbols and text in them are reduced."""
+_POWERS = -4, 6
+"""Numbers on axes outside these powers of ten have a common power of ten."""
 DATES: Any = dates
 """The module of matplotlib, which has no types."""
 
@@ -63,14 +65,34 @@ def note(panel: SubFigure, text: str) -> None:
     panel.text(0.5, 0.02, text, ha="center", color=INK, fontsize=points(9))
 
 
-def legend(axes: Axes | Figure, handles: list[Any], labels: list[str], **look: Any) -> None:
-    """Add a legend without a frame."""
-    axes.legend(handles, labels, frameon=False, labelcolor=INK, fontsize=points(9), **look)
+def legend(
+    axes: Axes | FigureBase, handles: list[Any], labels: list[str], width: float = np.inf, rows: int = 1, **look: Any
+) -> None:
+    """Add a legend without a frame, which is read row by row, in as many rows as a width in inches requires."""
+    inches = points(1) * sum(0.45 + 0.065 * len(label) for label in labels)
+    columns = -(-len(labels) // max(rows, int(np.ceil(inches / width))))
+    # A legend fills its columns one after the other.
+    order = [i for column in range(columns) for i in range(column, len(labels), columns)]
+    handles, labels = [handles[i] for i in order], [labels[i] for i in order]
+    size = points(9) * (text_factor(axes) if isinstance(axes, Axes) else 1.0)
+    axes.legend(handles, labels, frameon=False, labelcolor=INK, fontsize=size, ncols=columns, **look)
 
 
 def size(panel: SubFigure) -> tuple[float, float]:
     """Return width and height in inches."""
     return panel.bbox.width / panel.dpi, panel.bbox.height / panel.dpi
+
+
+def text_factor(axes: Axes) -> float:
+    """Return the factor by which text is reduced in axes of the user, which is legible if they are small."""
+    return max(0.75, OWN_AXES.get(axes, 1.0))
+
+
+def axes_size(axes: Axes) -> tuple[float, float]:
+    """Return width and height of axes in inches, or in reduced inches for small axes of the user."""
+    figure: Any = axes.get_figure(root=True)
+    scale = figure.dpi * OWN_AXES.get(axes, 1.0)
+    return axes.bbox.width / scale, axes.bbox.height / scale
 
 
 def inside(panel: SubFigure, left: float, bottom: float, right: float, top: float) -> tuple[float, float, float, float]:
@@ -89,6 +111,7 @@ def plain(axes: Axes) -> None:
     axes.spines[["top", "right"]].set_visible(False)
     axes.spines[["left", "bottom"]].set_color(EDGE)
     axes.tick_params(color=EDGE, labelcolor=INK, labelsize=points(9))
+    axes.ticklabel_format(axis="both", scilimits=_POWERS, useMathText=True)
     for axis in (axes.xaxis, axes.yaxis):
         axis.label.set(color=INK, fontsize=points(10))
         axis.offsetText.set(color=INK, fontsize=points(9))

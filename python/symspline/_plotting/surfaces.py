@@ -5,16 +5,17 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from matplotlib.colors import LightSource
 from matplotlib.figure import SubFigure
-from matplotlib.lines import Line2D
 
-from .chart import box
+from .chart import box, explain_frames
 from .fields import Field
-from .style import AXES, HALO, INK, Array, evenly, legend
+from .style import AXES, HALO, INK, Array, evenly
 
 _LINES, _FRAMES = 80, 9
 """Points along an axis of the surface, and the largest number of frames along it."""
-_FACE = "#b9cfdf"
+_FACE = "#d9e6ef"
+_SUN = LightSource(azdeg=225, altdeg=70)
 
 
 def draw_surface(panel: SubFigure, field: Field, nodes: Any) -> None:
@@ -26,8 +27,10 @@ def draw_surface(panel: SubFigure, field: Field, nodes: Any) -> None:
     dots = _positions(nodes).reshape(-1, 3)
     dots = dots[np.isfinite(dots[:, 0])]
     axes = box(panel, [], [np.concatenate([positions[known], dots])], below=0.4)
-    look: Any = {"rstride": 1, "cstride": 1, "linewidth": 0, "color": _FACE, "antialiased": False}
-    axes.plot_surface(*np.moveaxis(positions, -1, 0), **look)
+    look: Any = {"rstride": 1, "cstride": 1, "linewidth": 0, "color": _FACE, "antialiased": False, "lightsource": _SUN}
+    # The order of the axes decides which side of the surface is bright.
+    upwards = np.nansum(np.cross(np.diff(positions, axis=0)[:, 1:], np.diff(positions, axis=1)[1:])[..., 2]) > 0
+    axes.plot_surface(*np.moveaxis(positions.swapaxes(0, 1) if upwards else positions, -1, 0), **look)
     symbols = _positions(field.symbols)
     for lines in (symbols, symbols.swapaxes(0, 1)):
         broken = np.concatenate([lines, np.full_like(lines[:, :1], np.nan)], axis=1)
@@ -36,6 +39,7 @@ def draw_surface(panel: SubFigure, field: Field, nodes: Any) -> None:
     _name_axes(axes, symbols)
     if field.pixels.ndim > 3:
         _draw_frames(axes, field)
+        explain_frames(panel, axes)
 
 
 def _positions(points: Any) -> Array:
@@ -59,6 +63,3 @@ def _draw_frames(axes: Any, field: Field) -> None:
     for i, color in enumerate(AXES):
         sticks = np.stack([feet, feet + length * poses[:, :3, i], np.full_like(feet, np.nan)], axis=1)
         axes.plot(*sticks.reshape(-1, 3).T, color=color, linewidth=1.2, zorder=5)
-    handles = [Line2D([], [], color=color, linewidth=2.4) for color in AXES]
-    where: Any = {"loc": "lower left", "bbox_to_anchor": (0, -0.06), "ncols": 3, "borderaxespad": 0.2}
-    legend(axes, handles, ["first axis", "second", "third"], handlelength=1.2, columnspacing=1.2, **where)

@@ -35,6 +35,8 @@ _COLOURS += (
     "legend.labelcolor",
     "patch.edgecolor",
 )
+KEPT = "kept"
+"""Group of artists whose colours have a meaning, or that are drawn over such colours; they are not inverted."""
 _WEIGHTS = np.array([0.299, 0.587, 0.114])
 
 
@@ -77,6 +79,8 @@ def invert(artists: Sequence[Artist], background: Any) -> None:
         return tuple(inverted(to_rgba(color), background))
 
     for artist in artists:
+        if artist.get_gid() == KEPT:
+            continue
         if isinstance(artist, Text):
             artist.set_color(new(artist.get_color()))
         elif isinstance(artist, Line2D):
