@@ -6,8 +6,8 @@ RUST := $(shell find crates -name '*.rs' -o -name Cargo.toml) Cargo.toml .cargo/
 # Wheels of all these packages exist for the usual platforms; nothing but symspline is compiled.
 INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
 
-.PHONY: demo check test test-oracles test-torch test-aarch64 fuzz bench docs wheel sdist test-wheel crate crate-msrv \
-	crate-semver publish-wheels publish-crates check-tools clean
+.PHONY: demo check test test-oracles test-torch test-aarch64 fuzz bench docs wheel sdist test-wheel crate \
+	crate-msrv crate-semver publish-wheels publish-crates check-tools clean docs-check
 
 demo: .venv/built
 	$(BIN)/python examples/storms/demo.py --out demo-output
@@ -65,6 +65,11 @@ docs: .venv/tools
 		print(*tomllib.load(open("pyproject.toml", "rb"))["project"]["optional-dependencies"]["docs"])')
 	SYMSPLINE_NUM_THREADS=1 $(BIN)/python -m sphinx -W --keep-going -q -b html -d build/doctrees docs build/docs
 	$(BIN)/python docs/links.py build/docs
+
+# What a reader of the built site would stumble over, on a desktop and on a phone; needs Node.js and Chromium.
+docs-check:
+	npm install --prefix build/check --silent --no-audit --no-fund playwright-core@1 axe-core@4
+	node docs/check_pages.mjs build/docs build/check
 
 # One wheel for every processor of this architecture, in dist/: on x86-64 with three compiled modules, so three builds.
 wheel: .venv/maturin

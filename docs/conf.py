@@ -2,25 +2,26 @@
 
 from __future__ import annotations
 
+import os
 import re
 import sys
 from pathlib import Path
 from typing import Any
 
 HERE = Path(__file__).parent
-# `gallery_pictures` lies here, and the package in the checkout.
+# `gallery_pictures` and `typeset` lie here, and the package in the checkout.
 sys.path[:0] = [str(HERE), str(HERE.parent / "python")]
 
+import api_members  # noqa: E402
+import inventories  # noqa: E402
 import matplotlib as mpl  # noqa: E402
 from docutils import nodes  # noqa: E402
+from pygments.lexers import TextLexer  # noqa: E402
+from sphinx import addnodes  # noqa: E402
 
 import symspline  # noqa: E402
 
 mpl.use("agg")
-
-
-def _is_space(thing: object) -> bool:
-    return isinstance(thing, type) and issubclass(thing, symspline.Space) and thing is not symspline.Space
 
 
 project = "symspline"
@@ -32,16 +33,21 @@ extensions = [
     "myst_parser",
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
+    "sphinx.ext.intersphinx",
     "sphinx.ext.napoleon",
     "sphinx.ext.viewcode",
     "sphinx_design",
     "sphinx_gallery.gen_gallery",
+    "typeset",
 ]
 exclude_patterns = ["gallery/*.ipynb", "gallery/*.py"]
 templates_path = ["_templates"]
 
 # ---- pages ----
 
+html_math_renderer = "katex"
+# Primes of formulas in plain text, such as γ', are not apostrophes.
+smartquotes = False
 myst_enable_extensions = ["attrs_inline", "colon_fence", "deflist", "dollarmath"]
 # Links to headings.
 myst_heading_anchors = 3
@@ -51,7 +57,7 @@ nitpicky = True
 nitpick_ignore = [("py:obj", "spline")]
 # Other projects' names cannot be looked up without a network, and types of arrays stand for what they take.
 nitpick_ignore_regex = [
-    ("py:class", r"ndarray|array_like|optional|value|str to float|bool|\d+|[A-Z]"),
+    ("py:class", r"ndarray|array_like|optional|value|str to float|bool|max_speed|\d+|[A-Za-z]|\*\w+"),
     ("py:obj", "transvection"),
     (
         "py:.*",
@@ -66,13 +72,14 @@ autosummary_generate = True
 autosummary_ignore_module_all = False
 # A space's own page has what is its own; what all share stands on the page of `Space`.
 autosummary_context = {
-    "spaces": [name for name in symspline.__all__ if _is_space(getattr(symspline, name))],
+    "spaces": [name for name in symspline.__all__ if api_members.is_space(getattr(symspline, name))],
+    "groups": api_members.all_grouped(),
     # Of what a module shares with the package, whose page is that of the package.
     "shared": {
         "symspline.manifolds": [name for name in symspline.manifolds.__all__ if name in symspline.__all__],
     },
 }
-autodoc_member_order = "bysource"
+# Types stand in the sections Parameters and Returns.
 autodoc_typehints = "none"
 # It is described without being installed: it is large, and nothing on these pages runs it.
 autodoc_mock_imports = ["torch"]
@@ -86,9 +93,16 @@ napoleon_attr_annotations = False
 maximum_signature_line_length = 90
 add_module_names = False
 
+# Short inventories of other projects, which lie here, so that their names link without a network.
+intersphinx_mapping = {
+    name: (url, f"inventories/{name}.inv") for name, (url, _) in inventories.PROJECTS.items()
+}
+
 # ---- gallery ----
 
 sphinx_gallery_conf = {
+    # SYMSPLINE_GALLERY=0 builds the pages without running the examples, whose pictures are then missing.
+    "plot_gallery": os.environ.get("SYMSPLINE_GALLERY", "1") != "0",
     "examples_dirs": ["../examples"],
     "gallery_dirs": ["gallery"],
     "copyfile_regex": r"index\.rst",
@@ -117,6 +131,8 @@ html_theme = "pydata_sphinx_theme"
 html_title = f"symspline {release}"
 html_static_path = ["_static"]
 html_css_files = ["symspline.css"]
+html_logo = "_static/logo.svg"
+html_favicon = "_static/favicon.svg"
 # These have nothing beside them.
 html_sidebars: dict[str, list[str]] = {"index": [], "start": []}
 html_copy_source = html_show_sourcelink = False
@@ -129,9 +145,11 @@ html_theme_options = {
     "footer_start": ["copyright"],
     "footer_end": [],
     "primary_sidebar_end": [],
-    "pygments_light_style": "tango",
-    "pygments_dark_style": "monokai",
+    # With a contrast that everybody can read.
+    "pygments_light_style": "a11y-high-contrast-light",
+    "pygments_dark_style": "a11y-high-contrast-dark",
 }
+html_context = {"default_mode": "auto"}
 
 # ---- what docstrings and pages have that Sphinx would misread ----
 
@@ -141,11 +159,19 @@ COLON = "\ue000"
 
 
 def _escape(app: Any, what: str, name: str, thing: object, options: Any, lines: list[str]) -> None:
-    """Norms |v| and shapes (..., *point_shape) are no markup; they stand plain for `help`."""
+    """Norms |v| and shapes (..., *point_shape) are not markup, and each docstring numbers its own references."""
+    label = re.sub(r"\W+", "-", name.lower())
+    math = False
     for i, line in enumerate(lines):
-        if line.startswith((">>>", "...", "    >>>", "    ...")):
+        math = line.startswith(".. math::") or (math and line.startswith(" "))
+        if math or line.startswith((">>>", "...", "    >>>", "    ...")):
             continue
-        parts = re.split(r"(``.*?``)", line)
+        line = re.sub(
+            r"\[(\d+)\](?=_\W|_$)|(?<=^\.\. )\[(\d+)\]",
+            lambda found: f"[#{label}-{found[1] or found[2]}]",
+            line,
+        )
+        parts = re.split(r"(``.*?``|:math:`.*?`)", line)
         parts[::2] = (re.sub(r"\||(?<=[( ])\*(?=\w[\w.]*[),])", r"\\\g<0>", part) for part in parts[::2])
         lines[i] = "".join(parts)
     if what in ("property", "attribute", "data"):
@@ -154,7 +180,42 @@ def _escape(app: Any, what: str, name: str, thing: object, options: Any, lines: 
 
 
 def _restore(app: Any, what: str, name: str, thing: object, options: Any, lines: list[str]) -> None:
-    lines[:] = [line.replace(COLON, ":") for line in lines]
+    # Napoleon separates types from descriptions by two hyphens.
+    lines[:] = [line.replace(COLON, ":").replace(" -- ", " – ") for line in lines]
+
+
+# Names in the types of parameters and results that link to a page.
+TYPES = {
+    **{name: ("py", "class", f"symspline.{name}") for name in symspline.__all__ if name[0].isupper()},
+    **inventories.TYPES,
+}
+TYPE = re.compile(
+    rf"(?<![\w.])({'|'.join(map(re.escape, sorted(TYPES, key=len, reverse=True)))})(?![\w.]*\w)"
+)
+
+
+def _link_types(app: Any, doctree: nodes.document) -> None:
+    """Link the names in types, which Napoleon writes in italics."""
+    for field in doctree.findall(nodes.field_body):
+        for shown in list(field.findall(nodes.emphasis)):
+            parts = TYPE.split(shown.astext())
+            if len(parts) == 1 or isinstance(shown.parent, addnodes.pending_xref):
+                continue
+            new: list[nodes.Node] = []
+            for text, name in zip(parts[::2], [*parts[1::2], ""], strict=True):
+                new += [nodes.emphasis(text, text)] if text else []
+                if name:
+                    domain, kind, target = TYPES[name]
+                    link = addnodes.pending_xref(
+                        "",
+                        nodes.emphasis(name, name),
+                        refdomain=domain,
+                        reftype=kind,
+                        reftarget=target,
+                        refexplicit=True,
+                    )
+                    new.append(link)
+            shown.parent.replace(shown, new)
 
 
 def _public(app: Any, env: Any, node: Any, contnode: nodes.Node) -> nodes.Node | None:
@@ -181,8 +242,11 @@ def _with_source(app: Any) -> list[Any]:
 
 
 def setup(app: Any) -> None:
+    # Tables in text are shown as they are.
+    app.add_lexer("csv", TextLexer)
     app.connect("autodoc-process-docstring", _escape, priority=100)
     app.connect("autodoc-process-docstring", _restore, priority=900)
+    app.connect("doctree-read", _link_types)
     app.connect("missing-reference", _public)
     app.connect("source-read", _links)
     app.connect("html-collect-pages", _with_source, priority=100)

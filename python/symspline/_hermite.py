@@ -176,13 +176,13 @@ class HermiteSpline(PiecewiseCubic[P]):
         .. math:: \frac{h_i m_{i-1} + h_{i-1} m_i}{h_{i-1} + h_i}, \qquad
                   \frac{|m_{i+1} - m_i| \, m_{i-1} + |m_{i-1} - m_{i-2}| \, m_i}{|m_{i+1} - m_i| + |m_{i-1} - m_{i-2}|}
 
-        for ``"catmull-rom"`` and ``"akima"``. At the ends, the first formula becomes that of the outer parabola.
-        On a Euclidean space, the second formula and that of ``"pchip"`` are applied to each component, and the results
-        equal SciPy's ``Akima1DInterpolator`` and ``PchipInterpolator``. On other spaces, components depend on the
-        choice of a frame. Norms of vectors replace the absolute values there, and ``"pchip"`` gives the harmonic mean
-        of both speeds in the direction of the bisector, times the cosine of half the angle between both directions.
-        The curve is therefore independent of coordinates: an isometry that is applied to the points is applied to the
-        curve. In one dimension, both definitions agree. Without an invariant metric, as on poses, only
+        for ``"catmull-rom"`` [1]_ and ``"akima"`` [2]_. At the ends, the first formula becomes that of the outer
+        parabola. On a Euclidean space, the second formula and that of ``"pchip"`` [3]_ are applied to each component,
+        and the results equal SciPy's ``Akima1DInterpolator`` and ``PchipInterpolator``. On other spaces, components
+        depend on the choice of a frame. Norms of vectors replace the absolute values there, and ``"pchip"`` gives the
+        harmonic mean of both speeds in the direction of the bisector, times the cosine of half the angle between both
+        directions. The curve is therefore independent of coordinates: an isometry that is applied to the points is
+        applied to the curve. In one dimension, both definitions agree. Without an invariant metric, as on poses, only
         ``"catmull-rom"`` has this property.
 
         References

@@ -68,8 +68,9 @@ class Quotient(Space[P]):
 
     Notes
     -----
-    Distances are the smallest ones between representatives, such as the disorientation of crystals, and `log` and
-    `geodesic` lead to the nearest representative. Other methods and curves are those of the space of representatives.
+    Distances are the smallest ones between representatives, such as the disorientation of crystals, and `Space.log` and
+    `Space.geodesic` lead to the nearest representative. Other methods and curves are those of the space of
+    representatives.
     `Space.act` acts on representatives.
 
     Names of quotients are ``"so:3/432"`` for a group on the right, ``"432\\so:3"`` for one on the left, and
@@ -248,7 +249,7 @@ class Quotient(Space[P]):
 
         See Also
         --------
-        Quotient.distance : The distance between the nearest representatives.
+        Space.distance : The distance between the nearest representatives.
 
         Examples
         --------
