@@ -1,4 +1,4 @@
-"""How good smoothing splines are, beside other ways and beside their goals: the tables of ``smoothing.md``.
+"""How good smoothing splines are, beside other ways and beside their goals: the tables of ``smoothing_accuracy.md``.
 
 python docs/smoothing.py [--write] [PART ...]
 
@@ -25,7 +25,7 @@ import symspline as ss
 
 Array = NDArray[np.float64]
 
-PAGE = Path(__file__).parent / "smoothing.md"
+PAGE = Path(__file__).parent / "smoothing_accuracy.md"
 SPACES = {
     "S²": "sphere:2",
     "SO(3)": "so:3",

@@ -1,4 +1,4 @@
-"""Tables in Markdown, and their place on the page ``docs/comparisons.md``."""
+"""Tables in Markdown, and their place on the page ``docs/comparisons_tables.md``."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 HERE = Path(__file__).parent
-PAGE = HERE.parent / "comparisons.md"
+PAGE = HERE.parent / "comparisons_tables.md"
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:

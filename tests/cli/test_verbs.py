@@ -14,11 +14,11 @@ from tabular import AXES, PAIR, numbers, table, write
 import symspline as ss
 from symspline.cli import main
 
-README = Path(__file__).parents[2] / "README.md"
+ROOT = Path(__file__).parents[2]
 
 
-def test_the_example_of_the_readme(run):
-    section = README.read_text(encoding="utf-8").split("## Command line")[1].split("\n## ")[0]
+def test_the_example_of_the_start_page(run):
+    section = (ROOT / "docs/start.md").read_text(encoding="utf-8").split("## Command line")[1].split("\n## ")[0]
     write("ida.csv", re.search(r"```csv\n(.*?)```", section, re.S)[1])
     lines = re.search(r"```sh\n(.*?)```", section, re.S)[1].splitlines()
     assert [line.split()[1] for line in lines] == ["fit", "check", "sample", "plot"]
@@ -82,7 +82,7 @@ def test_help_has_examples_and_the_version_is_that_of_the_core(capsys):
     with pytest.raises(SystemExit):
         main(["--version"])
     assert capsys.readouterr().out == f"symspline {ss.__version__}\n"
-    assert f'version = "{ss.__version__}"' in (README.parent / "Cargo.toml").read_text(encoding="utf-8")
+    assert f'version = "{ss.__version__}"' in (ROOT / "Cargo.toml").read_text(encoding="utf-8")
 
 
 def test_as_a_module():

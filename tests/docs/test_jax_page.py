@@ -24,11 +24,10 @@ def double_precision():
 
 def test_examples_run():
     names = {}
-    first, second, third = blocks(PAGE)
     # A Hessian takes half a minute to compile; what it is made of is tested with the functions.
-    run(f"{first}\n{second}\n{third}".replace("jax.hessian(", "jax.grad("), PAGE, names)
+    run("\n".join(blocks(PAGE)).replace("jax.hessian(", "jax.grad("), PAGE, names)
     assert names["error"] < 1e-5 and np.isfinite(names["jerk"]).all()
-    assert names["hessian"].shape == (5, 3)
+    assert names["hessian"].shape == (5, 3) and names["figure"].axes
     height, h = names["height"], 1e-5
     differences = [height(1.5 + h, 0.7) - height(1.5 - h, 0.7), height(1.5, 0.7 + h) - height(1.5, 0.7 - h)]
     np.testing.assert_allclose(names["slope"], np.array(differences) / (2 * h), atol=1e-8)

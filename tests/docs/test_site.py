@@ -3,30 +3,49 @@
 import doctest
 import importlib
 import re
+import shutil
 import types
 from pathlib import Path
 
 import derivatives_figure
 import estimation
-import grids_figure
+import guide_figures
 import links
 import manifolds
 import many_curves
 import paths_figures
 import pytest
 import smoothing
-from pages import blocks, run
+from pages import blocks, run, with_output
 
 import symspline as ss
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
+README = ROOT / "README.md"
 PAGES = sorted(path for path in DOCS.rglob("*") if path.suffix in (".md", ".rst"))
 # Made by the build, where there was one.
 PAGES = [path for path in PAGES if not {"gallery", "generated", "backreferences", "_templates"} & set(path.parts)]
 GALLERY = (ROOT / "examples/index.rst").read_text(encoding="utf-8")
 # Their own tests run or compare what they quote.
-OTHERS = {"adding-a-space.md", "array_api.md", "jax.md", "shapes.md", "smoothing.md", "solvers.md"}
+OTHERS = {
+    "adding-a-space.md",
+    "array_api.md",
+    "from_geomstats.md",
+    "jax.md",
+    "manifolds.md",
+    "shapes.md",
+    "smoothing.md",
+    "solvers.md",
+    "xarray.md",
+}
+
+
+def with_data(page, folder, monkeypatch):
+    """Go to a folder that holds the tables beside the page."""
+    for table in page.parent.glob("*.csv"):
+        shutil.copy(table, folder)
+    monkeypatch.chdir(folder)
 
 
 def listed(page):
@@ -96,7 +115,9 @@ def test_every_figure_of_the_paper_has_an_entry():
         assert re.search(r"\(Figs?\. ", title) and numbers.split(",")[0] in title
 
 
-@pytest.mark.parametrize("page", [page for page in PAGES if blocks(page, "pycon")], ids=lambda page: page.stem)
+@pytest.mark.parametrize(
+    "page", [page for page in [*PAGES, README] if blocks(page, "pycon")], ids=lambda page: page.stem
+)
 def test_sessions_are_as_printed(page):
     session = "\n".join(blocks(page, "pycon"))
     test = doctest.DocTestParser().get_doctest(session, {}, page.name, str(page), 0)
@@ -108,15 +129,27 @@ def test_sessions_are_as_printed(page):
 
 @pytest.mark.parametrize(
     "page",
-    [page for page in [*PAGES, ROOT / "README.md"] if blocks(page) and page.name not in OTHERS],
+    [page for page in [*PAGES, README] if blocks(page) and page.name not in OTHERS],
     ids=lambda page: page.stem,
 )
-def test_code_runs(page, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_code_runs(page, tmp_path, monkeypatch, capsys):
+    with_data(page, tmp_path, monkeypatch)
     names = {}
-    for block in blocks(page):
+    for block, output in with_output(page):
         run(block, page, names)
+        printed = capsys.readouterr().out
+        assert output is None or printed == output
+    assert (
+        str(page.relative_to(ROOT).with_suffix("")).removeprefix("docs/") not in guide_figures.PAGES
+        or names["figure"].axes
+    )
     assert page.stem != "derivatives" or names["gradient"].points.shape == (5, 3)
+
+
+def test_pages_show_the_figures_of_their_code():
+    for name in guide_figures.PAGES:
+        page = DOCS / f"{name}.md"
+        assert page.with_suffix(".png").exists() and f"]({page.stem}.png)" in page.read_text("utf-8"), name
 
 
 @pytest.mark.parametrize("module", [estimation, manifolds, many_curves, smoothing], ids=lambda module: module.__name__)
@@ -135,10 +168,6 @@ def test_the_figure_of_derivatives_can_be_made(tmp_path, monkeypatch):
 def test_the_figures_of_paths_can_be_made():
     names = paths_figures.names_of_page()
     assert len(paths_figures.closest(names).axes) == 1 and len(paths_figures.law(names).axes) == 2
-
-
-def test_the_figure_of_grids_can_be_made():
-    assert len(grids_figure.first_figure().axes) == 3
 
 
 def test_links_to_files_lead_somewhere():

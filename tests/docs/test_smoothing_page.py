@@ -1,4 +1,6 @@
-"""The example and the tables of ``docs/smoothing.md`` can be made and agree with theory."""
+"""The examples of ``docs/smoothing.md`` run, and the tables of ``smoothing_accuracy.md`` agree with theory."""
+
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,17 +13,21 @@ import symspline as ss
 # Tables have geodesics in them.
 pytestmark = pytest.mark.filterwarnings("ignore::symspline.SmoothingWarning")
 
+PAGE = Path(smoothing.__file__).with_name("smoothing.md")
+
 
 def test_the_examples_run():
     names = {}
-    first, _, matrices, covariances = blocks(smoothing.PAGE)
-    run(first, smoothing.PAGE, names)
+    first, _, outliers, matrices, covariances = blocks(PAGE)
+    run(first, PAGE, names)
     sphere, t, truth = names["sphere"], names["t"], names["truth"]
     errors = [smoothing.rms(sphere, points, truth) for points in (names["s"](t), names["noisy"])]
     assert errors == pytest.approx([0.013, 0.071], abs=5e-4)
-    run(matrices, smoothing.PAGE, names)
+    run(outliers, PAGE, names)
+    assert sphere.distance(names["robust"](t), truth).max() < 0.1
+    run(matrices, PAGE, names)
     assert f"s.sigma  # {names['s'].sigma:.2f}:" in matrices
-    run(covariances, smoothing.PAGE, names)
+    run(covariances, PAGE, names)
     assert f"# {names['factor']:.2f}\n" in covariances
     variances = np.trace(names["smooth"](np.arange(200)), axis1=1, axis2=2) / 3
     assert np.mean(variances) / names["factor"] == pytest.approx(1, abs=0.02)
