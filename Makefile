@@ -12,15 +12,16 @@ INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no
 demo: .venv/built
 	$(BIN)/python examples/storms/demo.py --out demo-output
 
-# Format, lints, types, docstrings, and the laws of every space in Rust: what to run before a commit.
+# Format, lints, spelling, types, docstrings, and the laws of every space in Rust: what to run before a commit.
 check: .venv/tools
 	cargo fmt --all --check
 	cargo clippy --quiet --all-targets -- -D warnings
 	cargo test --quiet --workspace --exclude symspline-benches
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	$(BIN)/codespell *.md Makefile benchmarks crates docs examples packaging python tests
 	$(BIN)/mypy
-	$(BIN)/python -m pytest tests/test_docstrings.py
+	$(BIN)/python -m pytest tests/test_docstrings.py tests/test_language.py
 
 test: check
 	$(BIN)/python -m pytest --numprocesses auto --dist worksteal --doctest-modules python tests

@@ -33,7 +33,7 @@ def count(number: float) -> str:
 
 
 def verdict(found: float | None, least: float) -> str:
-    return "not measured" if found is None else "reached" if found >= least else "**missed**"
+    return "not measured" if found is None else "reached" if found >= least else "not reached"
 
 
 def _cell(cell: object) -> str:
