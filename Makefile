@@ -7,7 +7,7 @@ RUST := $(shell find crates -name '*.rs' -o -name Cargo.toml) Cargo.toml .cargo/
 INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
 
 .PHONY: demo check test test-oracles test-torch test-aarch64 fuzz bench docs wheel sdist test-wheel crate \
-	crate-msrv crate-semver publish-wheels publish-crates check-tools clean docs-check
+	crate-msrv crate-semver publish-wheels publish-crates publish-npm check-tools clean docs-check wasm test-wasm
 
 demo: .venv/built
 	$(BIN)/python examples/storms/demo.py --out demo-output
@@ -120,6 +120,28 @@ publish-crates:
 crate-semver:
 	cargo semver-checks --package symspline
 
+# The npm package in build/npm and the page of figures in build/play; `make docs` shows the page if it has been built.
+# Needs Node.js, the Rust target wasm32-unknown-unknown, and wasm-bindgen of the version in crates/symspline-wasm.
+WASM_BINDGEN ?= wasm-bindgen
+WASM_VERSION = $(shell sed -n 's/^wasm-bindgen = "=\(.*\)"/\1/p' crates/symspline-wasm/Cargo.toml)
+wasm: build/node/built
+	@$(WASM_BINDGEN) --version | grep -q ' $(WASM_VERSION)$$' || { echo "the npm package needs wasm-bindgen $(WASM_VERSION): \
+	cargo install --locked wasm-bindgen-cli --version $(WASM_VERSION)"; exit 1; }
+	cd crates/symspline-wasm && cargo build --quiet --release --target-dir $(CURDIR)/target/wasm
+	node packaging/npm/build.mjs target/wasm/wasm32-unknown-unknown/release/symspline_wasm.wasm $(WASM_BINDGEN)
+
+build/node/built: packaging/npm/package.json
+	@command -v node >/dev/null || { echo "the npm package needs Node.js 18 or newer"; exit 1; }
+	mkdir -p build/node && cp packaging/npm/package.json build/node/
+	npm install --prefix build/node --no-audit --no-fund --no-package-lock --silent
+	touch $@
+
+# The npm package against the Python package, and the page in Chromium (CHROMIUM=/path/to/it), for which `make wasm`
+# comes first. `make test` contains these tests, and skips them where nothing was built.
+test-wasm: .venv/tools
+	cd crates/symspline-wasm && cargo fmt --check && cargo clippy --quiet --target-dir $(CURDIR)/target/wasm -- -D warnings
+	$(BIN)/python -m pytest tests/javascript -rs
+
 .venv/maturin: | check-tools
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv
 	$(INSTALL) 'maturin>=1.9,<2'
@@ -145,4 +167,4 @@ check-tools:
 		{ echo "$(PYTHON) cannot make virtual environments: install its venv package (Debian: python3-venv)"; exit 1; }
 
 clean:
-	rm -rf .venv .venv-oracles target demo-output dist build docs/gallery docs/api/generated docs/api/backreferences
+	rm -rf .venv .venv-oracles target demo-output dist build docs/gallery docs/api/generated docs/api/backreferences docs/_static/play

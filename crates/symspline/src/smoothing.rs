@@ -67,6 +67,7 @@ pub enum Loss {
 #[must_use = "the options do nothing before `fit`"]
 pub struct Smoothing {
     criterion: Criterion,
+    gamma: f64,
     loss: Loss,
     lam: Option<f64>,
     sigma: Option<f64>,
@@ -83,6 +84,7 @@ impl Default for Smoothing {
     fn default() -> Self {
         Smoothing {
             criterion: Criterion::Gcv,
+            gamma: 1.4,
             loss: Loss::Linear,
             lam: None,
             sigma: None,
@@ -101,6 +103,13 @@ impl Smoothing {
     /// The criterion that chooses λ; by default [`Criterion::Gcv`].
     pub fn criterion(mut self, criterion: Criterion) -> Self {
         self.criterion = criterion;
+        self
+    }
+
+    /// The factor of the degrees of freedom in generalised cross-validation, at least 1; by default 1.4, as in Python.
+    /// With 1 the criterion is the classical one, which smooths too little in some samples.
+    pub fn gamma(mut self, gamma: f64) -> Self {
+        self.gamma = gamma;
         self
     }
 
@@ -168,6 +177,10 @@ impl Smoothing {
                 return Err(Error::InvalidOption { name, value, requirement: "a finite number >= 0" });
             }
         }
+        if !(self.gamma >= 1.0 && self.gamma.is_finite()) {
+            let (name, value) = ("gamma", self.gamma);
+            return Err(Error::InvalidOption { name, value, requirement: "a finite number >= 1" });
+        }
         let table = space.table()?;
         let handle = Erased(&*table);
         let len = handle.point_len();
@@ -205,7 +218,7 @@ impl Smoothing {
         };
         let options = engine::Options {
             criterion: match self.criterion {
-                Criterion::Gcv => engine::Criterion::Gcv { gamma: 1.0 },
+                Criterion::Gcv => engine::Criterion::Gcv { gamma: self.gamma },
                 Criterion::Reml => engine::Criterion::Reml,
                 Criterion::Cp => engine::Criterion::Cp,
             },
