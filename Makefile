@@ -116,6 +116,9 @@ publish-wheels: | check-tools
 publish-crates:
 	cargo publish $(CRATES)
 
+publish-npm: wasm
+	cd build/npm && npm publish
+
 # Whether the interface is compatible with that of the published version; needs cargo-semver-checks.
 crate-semver:
 	cargo semver-checks --package symspline

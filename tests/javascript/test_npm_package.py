@@ -87,7 +87,7 @@ def test_splines_equal_those_of_python(splines: list[tuple[Any, dict[str, Any]]]
 def test_smoothing_splines_equal_those_of_python(tmp_path: Path) -> None:
     rng = np.random.default_rng(7)
     t = np.sort(rng.uniform(0, 10, 60))
-    x = np.linspace(t[0], t[-1], 37)
+    x, knots = np.linspace(t[0], t[-1], 37), np.linspace(t[0], t[-1], 9)
     cases, wanted = [], []
     for name in ("sphere:2", "so:3", "spd:2", "h:2", "r:3"):
         space = ss.space(name)
@@ -101,8 +101,8 @@ def test_smoothing_splines_equal_those_of_python(tmp_path: Path) -> None:
             ({}, {}),
             ({"gamma": 1, "weights": weights}, {"gamma": 1, "weights": weights.tolist()}),
             ({"loss": "huber", "sigma": 0.05}, {"loss": "huber", "sigma": 0.05}),
-            ({"lam": 0.01, "knots": np.linspace(t[0], t[-1], 9)}, {"lam": 0.01, "knots": np.linspace(t[0], t[-1], 9).tolist()}),
-        ]:  # fmt: skip
+            ({"lam": 0.01, "knots": knots}, {"lam": 0.01, "knots": knots.tolist()}),
+        ]:
             wanted.append(ss.make_smoothing_spline(t, points, name, **python))
             cases.append(shared | {"options": javascript})
     for smooth, found in zip(wanted, run_cases(cases, tmp_path), strict=True):
