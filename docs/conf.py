@@ -92,6 +92,7 @@ napoleon_use_ivar = True
 napoleon_attr_annotations = False
 maximum_signature_line_length = 90
 add_module_names = False
+toc_object_entries_show_parents = "hide"
 
 # Short inventories of other projects, which lie here, so that their names link without a network.
 intersphinx_mapping = {

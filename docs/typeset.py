@@ -10,6 +10,8 @@ from docutils import nodes
 
 # Numbers with a character at which browsers break lines.
 BREAKABLE = re.compile(r"([-+−]?\d[\d.,]*(?:e[-+−]?\d+|[-–]\d[\d.,]*)|[-+−]\d[\d.,]*)")
+# The parameters of a signature, one on each line.
+SIGNATURE = re.compile(r'<dl>\n((?:<dd><em class="sig-param">.*?</dd>\n)+)</dl>', re.S)
 KATEX = ("katex/katex.min.js", "math.js")
 
 
@@ -27,6 +29,15 @@ def _display(self: Any, node: nodes.Element) -> None:
     self.body.append(self.starttag(node, "div", "", CLASS="math displayed notranslate nohighlight"))
     self.body.append(f"{self.encode(text)}</div>\n")
     raise nodes.SkipNode
+
+
+def _mend_signatures(app: Any, page: str, template: str, context: dict[str, Any], doctree: object) -> None:
+    """Sphinx writes long signatures as lists of definitions without terms, which screen readers cannot read."""
+    if "body" in context:
+        context["body"] = SIGNATURE.sub(
+            lambda found: f'<div class="sig-lines">\n{found[1].replace("<dd>", "<div>").replace("</dd>", "</div>")}</div>',
+            context["body"],
+        )
 
 
 def _add_files(app: Any, page: str, template: str, context: dict[str, Any], doctree: object) -> None:
@@ -70,6 +81,7 @@ def setup(app: Any) -> dict[str, bool]:
     app.add_html_math_renderer("katex", (_inline, None), (_display, None))
     app.connect("doctree-read", _keep_numbers_whole)
     app.connect("html-page-context", _add_files)
+    app.connect("html-page-context", _mend_signatures)
     # After the theme, which puts the function there.
     app.connect("html-page-context", _name_buttons, priority=900)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -80,7 +80,7 @@ _BLOCK = 2**26
 
 
 def hamiltonian(spline: CubicSpline[Any, Any], x: TimesLike, *, nu: int = 0, extrapolate: Extrapolate = None) -> Array:
-    """Compute the Hamiltonian that drives states along a curve, or its derivative.
+    r"""Compute the Hamiltonian that drives states along a curve, or its derivative.
 
     Parameters
     ----------
@@ -106,10 +106,11 @@ def hamiltonian(spline: CubicSpline[Any, Any], x: TimesLike, *, nu: int = 0, ext
 
     Notes
     -----
-    For states and subspaces, H has the least norm at every time: H = i[P', P] for the projector P [1]_. Its Frobenius
-    norm is √2 times the speed of the curve; for single states its spectral norm is the speed. H does not depend on
-    phases or bases of the points. It is as smooth as the velocity, C¹, and ∫ ‖H'‖² dt is twice
-    `CubicSpline.bending_energy`. For gates, H = iU'U* is unique. See also §4.2 of the paper.
+    For states and subspaces, H has the least norm at every time: :math:`H = i[P', P]` for the projector P
+    [1]_. Its Frobenius norm is :math:`\sqrt2` times the speed of the curve; for single states its spectral norm is the
+    speed. H does not depend on phases or bases of the points. It is as smooth as the velocity, C¹, and
+    :math:`\int \lVert H' \rVert^2 \, dt` is twice `CubicSpline.bending_energy`. For gates, :math:`H = iU'U^*` is
+    unique. See also §4.2 of the paper.
 
     References
     ----------
@@ -364,9 +365,9 @@ def propagator(spline: CubicSpline[Any, Any], x: TimesLike) -> Array:
 
     Notes
     -----
-    The result is accurate up to rounding errors and does not depend on the other times in `x`. It is computed by Gauss
-    collocation of order 16 inside every segment, where the curve is analytic; Gauss methods preserve U*U [1]_. For
-    states or subspaces in high dimensions, computations are in the span of the data.
+    The result is accurate up to rounding errors and does not depend on the other times in `x`. It is
+    computed by Gauss collocation of order 16 inside every segment, where the curve is analytic; Gauss methods preserve
+    :math:`U^*U` [1]_. For states or subspaces in high dimensions, computations are in the span of the data.
 
     References
     ----------

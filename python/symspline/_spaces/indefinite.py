@@ -103,10 +103,11 @@ class DeSitter(Indefinite[FloatArray], Preserving[FloatArray]):
 
     Notes
     -----
-    The invariant metric −u₀v₀ + u₁v₁ + … + uₙvₙ has one negative square, and its curvature is 1. The group of
-    isometries is O(1, n). Geodesics are trigonometric, straight or hyperbolic if their velocity is space-like, null or
-    time-like, respectively. Points with ⟨p, q⟩ > −1 are joined by one geodesic of less than half a turn. No geodesic
-    joins points with ⟨p, q⟩ < −1. Space-like geodesics are closed.
+    The invariant metric :math:`-u_0 v_0 + u_1 v_1 + \dots + u_n v_n` has one negative square, and its
+    curvature is 1. The group of isometries is :math:`O(1, n)`. Geodesics are trigonometric, straight or hyperbolic if
+    their velocity is space-like, null or time-like, respectively. Points with :math:`\langle p, q \rangle > -1` are
+    joined by one geodesic of less than half a turn. No geodesic joins points with :math:`\langle p, q \rangle < -1`.
+    Space-like geodesics are closed.
 
     ``invariant_form`` evaluates the metric. It does not give lengths, so ``inner``, ``norm`` and ``distance`` are
     Euclidean ones of the arrays. ``distance(p, q)`` is the length of ``log(p, q)`` and is not symmetric. The rounding
@@ -144,10 +145,11 @@ class AntiDeSitter(Indefinite[FloatArray], Preserving[FloatArray]):
 
     Notes
     -----
-    The invariant metric is the form −u₀v₀ − u₁v₁ + u₂v₂ + … + uₙvₙ. On tangent vectors it has one negative square, and
-    its curvature is −1. The group of isometries is O(2, n − 1). Geodesics are trigonometric, straight or hyperbolic if
-    their velocity is time-like, null or space-like, respectively. Points with ⟨p, q⟩ < 1 are joined by one geodesic of
-    less than half a turn. No geodesic joins points with ⟨p, q⟩ > 1. Time-like geodesics are closed.
+    The invariant metric is the form :math:`-u_0 v_0 - u_1 v_1 + u_2 v_2 + \dots + u_n v_n`. On tangent
+    vectors it has one negative square, and its curvature is −1. The group of isometries is :math:`O(2, n - 1)`.
+    Geodesics are trigonometric, straight or hyperbolic if their velocity is time-like, null or space-like,
+    respectively. Points with :math:`\langle p, q \rangle < 1` are joined by one geodesic of less than half a turn. No
+    geodesic joins points with :math:`\langle p, q \rangle > 1`. Time-like geodesics are closed.
 
     ``invariant_form`` evaluates the metric. It does not give lengths, so ``inner``, ``norm`` and ``distance`` are
     Euclidean ones of the arrays. ``distance(p, q)`` is the length of ``log(p, q)`` and is not symmetric. The rounding
@@ -168,7 +170,7 @@ class AntiDeSitter(Indefinite[FloatArray], Preserving[FloatArray]):
 
 
 class IndefiniteGrassmannian(Indefinite[FloatArray]):
-    """Subspaces on which an indefinite form of signature (p, q) has signature (a, b).
+    r"""Subspaces on which an indefinite form of signature (p, q) has signature (a, b).
 
     The form on ℝᵖ⁺ᑫ is −x₁² − … − x_p² + x_{p+1}² + …: in both signatures the number of negative squares comes first.
     A point is the reflection P in a subspace, which is 1 on it and −1 on its orthogonal complement. It is a square
@@ -188,10 +190,11 @@ class IndefiniteGrassmannian(Indefinite[FloatArray]):
 
     Notes
     -----
-    The space is O(p, q) / (O(a, b) × O(p − a, q − b)). Geodesics are P exp(tΩ), as in `GeneralLinear`, and
-    ``log(P, Q) = P log(PQ)`` exists unless PQ has a negative eigenvalue. ``invariant_form`` evaluates the metric
-    ⟨u, v⟩ = tr(uv)/8. On a line spanned by x, with the velocity v orthogonal to x, it is ⟨v, v⟩/⟨x, x⟩. It does not
-    give lengths; ``inner``, ``norm`` and ``distance`` are those of Ω = P⁻¹v as an array of numbers.
+    The space is :math:`O(p, q) / (O(a, b) \times O(p - a, q - b))`. Geodesics are :math:`P \exp(t\Omega)`,
+    as in `GeneralLinear`, and :math:`\log_P(Q) = P \log(PQ)` exists unless PQ has a negative eigenvalue.
+    ``invariant_form`` evaluates the metric :math:`\langle u, v \rangle = \operatorname{tr}(uv)/8`. On a line spanned by
+    x, with the velocity v orthogonal to x, it is :math:`\langle v, v \rangle / \langle x, x \rangle`. It does not give
+    lengths; ``inner``, ``norm`` and ``distance`` are those of :math:`\Omega = P^{-1}v` as an array of numbers.
 
     ``igr:0,1,1,n`` is `DeSitter` with x and −x as one point, and ``igr:1,0,2,n-1`` is `AntiDeSitter` with the same
     identification.

@@ -188,9 +188,9 @@ class Siegel(_PositiveDefinite[FloatArray]):
 
     Notes
     -----
-    The space is a totally geodesic subspace of `SymmetricPositiveDefinite` and has its metric. Distances are √2 times
-    those of Siegel's metric :math:`\operatorname{tr} Y^{-1} dZ\, Y^{-1} d\bar Z`. For n = 1 it is the hyperbolic plane
-    with distances multiplied by √2.
+    The space is a totally geodesic subspace of `SymmetricPositiveDefinite` and has its metric. Distances
+    are :math:`\sqrt2` times those of Siegel's metric :math:`\operatorname{tr} Y^{-1} dZ\, Y^{-1} d\bar Z`. For n = 1 it
+    is the hyperbolic plane with distances multiplied by :math:`\sqrt2`.
 
     Examples
     --------

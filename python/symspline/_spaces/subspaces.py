@@ -253,8 +253,9 @@ class QuaternionicProjective(Preserving[ComplexArray]):
 
     Notes
     -----
-    The space is a totally geodesic subspace of `ComplexGrassmannian` and has its metric. Distances are √2 times the
-    angles :math:`\arccos |\langle p, q \rangle|` between lines. HP¹ is the sphere S⁴ of radius 1/√2.
+    The space is a totally geodesic subspace of `ComplexGrassmannian` and has its metric. Distances are
+    :math:`\sqrt2` times the angles :math:`\arccos |\langle p, q \rangle|` between lines. :math:`\mathbb{HP}^1` is the
+    sphere :math:`S^4` of radius :math:`1/\sqrt2`.
 
     Examples
     --------

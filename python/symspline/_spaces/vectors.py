@@ -231,8 +231,8 @@ class Hyperbolic(Preserving[FloatArray]):
 
     Notes
     -----
-    The rounding error of a point p is about :math:`\varepsilon \lVert p \rVert^2`. Points up to distance 15 from
-    (1, 0, …) are supported; the error is about 10⁻³ there.
+    The rounding error of a point p is about :math:`\varepsilon \lVert p \rVert^2`. Points up to distance 15
+    from (1, 0, …) are supported; the error is about :math:`10^{-3}` there.
 
     Examples
     --------

@@ -256,7 +256,7 @@ def _time(rest: Array) -> Array:
 
 
 def siegel_to_positive_definite(z: ArrayLike) -> Array:
-    """Convert points X + iY of Siegel's upper half space to symplectic positive definite matrices.
+    r"""Convert points X + iY of Siegel's upper half space to symplectic positive definite matrices.
 
     Parameters
     ----------
@@ -275,8 +275,9 @@ def siegel_to_positive_definite(z: ArrayLike) -> Array:
 
     Notes
     -----
-    The half space Sp(2n, R)/U(n) is embedded in `SymmetricPositiveDefinite(2n)` as the matrices
-    (Y + XY⁻¹X, XY⁻¹; Y⁻¹X, Y⁻¹) [1]_. For n = 1 it is the hyperbolic plane.
+    The half space :math:`Sp(2n, \mathbb R)/U(n)` is embedded in `SymmetricPositiveDefinite(2n)` as the
+    matrices :math:`\begin{pmatrix} Y + XY^{-1}X & XY^{-1} \\ Y^{-1}X & Y^{-1} \end{pmatrix}` [1]_. For n = 1 it is the
+    hyperbolic plane.
 
     References
     ----------

@@ -297,7 +297,7 @@ def _signs(n: int, negative: int) -> Array:
 
 
 def quaternions_to_subspace(q: ArrayLike) -> Array:
-    """Convert points of quaternionic projective space HPⁿ to planes of C²ⁿ⁺².
+    r"""Convert points of quaternionic projective space HPⁿ to planes of C²ⁿ⁺².
 
     Parameters
     ----------
@@ -316,9 +316,10 @@ def quaternions_to_subspace(q: ArrayLike) -> Array:
 
     Notes
     -----
-    A unit vector of n + 1 quaternions a + bi + cj + dk, up to a unit quaternion on its right, spans a line [1]_.
-    Replacing every quaternion by the matrix (a + bi, c + di; −c + di, a − bi) gives a plane of C²ⁿ⁺²: a point of
-    ``hp:n`` and of ``cgr:2,2n+2``, where curves through such points remain points of ``hp:n``.
+    A unit vector of n + 1 quaternions a + bi + cj + dk, up to a unit quaternion on its right, spans a line
+    [1]_. Replacing every quaternion by the matrix
+    :math:`\begin{pmatrix} a + bi & c + di \\ -c + di & a - bi \end{pmatrix}` gives a plane of :math:`\mathbb C^{2n+2}`:
+    a point of ``hp:n`` and of ``cgr:2,2n+2``, where curves through such points remain points of ``hp:n``.
 
     References
     ----------

@@ -18,10 +18,10 @@ _RADIUS = np.sqrt(0.8) * np.pi
 
 
 class Stiefel(Manifold):
-    """Define the Stiefel manifold of frames of k orthonormal vectors in Rⁿ.
+    r"""Define the Stiefel manifold of frames of k orthonormal vectors in Rⁿ.
 
     Points are n × k matrices with orthonormal columns. The metric is the canonical metric
-    ⟨u, v⟩ = tr uᵀ(1 − pp ᵀ/2)v of Edelman, Arias and Smith [1]_.
+    :math:`\langle u, v \rangle = \operatorname{tr} u^T (1 - pp^T/2) v` of Edelman, Arias and Smith [1]_.
 
     Parameters
     ----------
