@@ -64,7 +64,7 @@ bench: .venv/tools
 docs: .venv/tools
 	$(INSTALL) $$($(BIN)/python -c 'import tomllib; \
 		print(*tomllib.load(open("pyproject.toml", "rb"))["project"]["optional-dependencies"]["docs"])')
-	SYMSPLINE_NUM_THREADS=1 $(BIN)/python -m sphinx -W --keep-going -q -b html -d build/doctrees docs build/docs
+	SYMSPLINE_NUM_THREADS=1 $(BIN)/python -m sphinx -j auto -W --keep-going -q -b html -d build/doctrees docs build/docs
 	$(BIN)/python docs/links.py build/docs
 
 # What a reader of the built site would stumble over, on a desktop and on a phone; needs Node.js and Chromium.

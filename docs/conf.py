@@ -123,7 +123,8 @@ sphinx_gallery_conf = {
     "show_signature": False,
     "write_computation_times": False,
     "download_all_examples": False,
-    "parallel": False,
+    # As many examples at once as Sphinx has processes.
+    "parallel": True,
 }
 
 # ---- looks ----

@@ -104,28 +104,28 @@ ROWS = [
         "action of the group",
         "Space.act",
         f"{ISOMETRY} tests/spaces/test_actions.py::test_elements_act_as_a_group",
-        "notation.md",
+        "theory/symmetric_spaces.md",
     ),
     Row(
         "(3), (4)",
         "splitting of the Lie algebra",
         "Space.symmetry",
         f"{LEMMAS}test_equations_3_and_4_symmetric_splitting",
-        "notation.md",
+        "theory/symmetric_spaces.md",
     ),
     Row(
         "(5), (6)",
         "geodesics as orbits of the group",
         "Space.geodesic",
         f"{LEMMAS}test_equations_6_and_10_geodesics_are_orbits",
-        "notation.md",
+        "theory/symmetric_spaces.md",
     ),
     Row(
         "(7)",
         "ends of a geodesic",
         "Space.geodesic",
         f"{LAWS}test_geodesic_divides_the_distance",
-        "notation.md",
+        "theory/de_casteljau.md",
         source="space/traits.rs::geodesic",
     ),
     Row(
@@ -133,7 +133,7 @@ ROWS = [
         "De Casteljau's construction; its last geodesic is from q₁ to p₁",
         "BezierCurve CubicSpline.control_points",
         "tests/free/test_free_curves.py::test_a_cubic_is_a_segment_of_the_spline",
-        "gallery/de_casteljau.rst",
+        "theory/de_casteljau.md gallery/de_casteljau.rst",
         source="curve/bezier.rs::at",
     ),
     Row(
@@ -142,7 +142,7 @@ ROWS = [
         "Space.transvection Space.exp",
         f"{LEMMAS}test_equations_6_and_10_geodesics_are_orbits "
         f"{LAWS}test_transvection_is_the_product_of_two_symmetries",
-        "notation.md",
+        "theory/symmetric_spaces.md",
         source="space/traits.rs::transvect",
     ),
     Row(
@@ -150,7 +150,7 @@ ROWS = [
         "logarithm",
         "Space.log",
         f"{LAWS}test_exp_and_log_are_inverse",
-        "notation.md",
+        "theory/symmetric_spaces.md",
         source="space/traits.rs::log",
     ),
     Row(
@@ -158,7 +158,7 @@ ROWS = [
         "C¹ condition",
         "CubicSpline.control_points",
         C2,
-        "gallery/c2_condition.rst",
+        "theory/c2_condition.md gallery/c2_condition.rst",
         source="curve/bezier.rs::read",
     ),
     Row(
@@ -166,23 +166,29 @@ ROWS = [
         "C² condition",
         "Report.residual",
         C2,
-        "gallery/c2_condition.rst",
+        "theory/c2_condition.md gallery/c2_condition.rst",
         source="fit/condition.rs::sweep",
     ),
-    Row("Theorem 2.2", "(12) and (13) make the curve C²", "CubicSpline", C2, "theorem.md"),
+    Row(
+        "Theorem 2.2",
+        "(12) and (13) make the curve C²",
+        "CubicSpline",
+        C2,
+        "theory/c2_condition.md theorem.md",
+    ),
     Row(
         "Remark 2.3, (14), (15)",
         "differences in Euclidean space",
         "CubicSpline",
         "tests/fit/test_curve_laws.py::test_flat_space_is_scipy",
-        "theorem.md",
+        "theory/c2_condition.md theorem.md",
     ),
     Row(
         "(16)–(18)",
         'iteration map: `method="fixed-point"`',
         "CubicSpline",
         "tests/fit/test_solvers.py::test_every_iterate_is_that_of_the_paper",
-        "solvers.md",
+        "theory/algorithm.md solvers.md",
         source="space/traits.rs::inner_handles fit/fixed_point.rs::solve",
     ),
     Row(
@@ -190,7 +196,7 @@ ROWS = [
         "clamped spline: `bc_type=((1, v), (1, w))`",
         "CubicSpline",
         "tests/spline/test_ends.py::test_end_conditions_hold",
-        "guide/ends.md",
+        "theory/ends.md guide/ends.md",
         source="fit/fixed_point.rs::end_velocity fit/ends.rs::residual",
     ),
     Row(
@@ -198,7 +204,7 @@ ROWS = [
         'natural spline: `bc_type="natural"`',
         "CubicSpline",
         "tests/spline/test_ends.py::test_end_conditions_hold",
-        "guide/ends.md",
+        "theory/ends.md guide/ends.md",
         source="fit/fixed_point.rs::end_velocity fit/ends.rs::residual",
     ),
     Row(
@@ -206,7 +212,7 @@ ROWS = [
         "D",
         "Report.max_step",
         f"{CERTIFICATE}test_radius_is_the_smallest_of_38",
-        REGION,
+        f"theory/convergence.md {REGION}",
         source="fit/unroll.rs::walk_sized",
     ),
     Row(
@@ -214,7 +220,7 @@ ROWS = [
         "K",
         "Space.curvature",
         "tests/spaces/test_curvature.py::test_curvature_is_the_largest_triple_product",
-        "notation.md",
+        "theory/symmetric_spaces.md",
         source="space/traits.rs::curvature",
     ),
     Row(
@@ -223,7 +229,7 @@ ROWS = [
         "CubicSpline",
         "tests/fit/test_solvers.py::test_every_iterate_is_that_of_the_paper "
         "tests/fit/test_solvers.py::test_fixed_point_is_linear_with_a_rate_of_one_half",
-        "solvers.md",
+        "theory/algorithm.md solvers.md",
         source="fit/fixed_point.rs::solve",
     ),
     Row(
@@ -231,7 +237,7 @@ ROWS = [
         "linear convergence of Algorithm 1",
         "Report.invariant_radius Report.contraction_bound",
         f"{CERTIFICATE}test_algorithm_1_stays_within",
-        "convergence.md",
+        "theory/convergence.md convergence.md",
         source="fit/certificate.rs::invariant_radius fit/certificate.rs::contraction_bound",
     ),
     Row(
@@ -307,7 +313,7 @@ ROWS = [
         "CubicSpline",
         "tests/fit/test_solvers.py::test_newton_takes_one_step_in_flat_space "
         "tests/fit/test_solvers.py::test_newton_converges_quadratically",
-        "solvers.md",
+        "theory/newton.md solvers.md",
         source="fit/solve.rs::solve",
     ),
     Row(
@@ -315,7 +321,7 @@ ROWS = [
         "connection",
         "Space.transport",
         f"{LEMMAS}test_equation_26_connection_is_consistent_and_equivariant",
-        "notation.md",
+        "theory/symmetric_spaces.md",
         source="space/traits.rs::parallel_transport",
     ),
     Row(
@@ -323,14 +329,14 @@ ROWS = [
         "derivative of ξ ↦ exp(ξ) · p",
         "Space.act",
         f"{LEMMAS}test_lemma_a1_derivative_of_the_orbit_map",
-        "notation.md",
+        "theory/symmetric_spaces.md",
     ),
     Row(
         "Lemma A.2",
         "π dexp = sinh(ad)/ad",
         "Space.exp Space.transvection",
         f"{LEMMAS}test_lemma_a2_dexp_is_sinh_ad_over_ad",
-        "notation.md",
+        "theory/symmetric_spaces.md",
     ),
     Row(
         "Lemma A.3",
@@ -365,7 +371,7 @@ ROWS = [
         "C² condition of Popiel and Noakes",
         "Space.symmetry Manifold",
         f"{LEMMAS}test_equation_29_is_the_c2_condition",
-        "theorem.md",
+        "theory/c2_condition.md theorem.md",
     ),
     Row(
         "(32), (33)",
@@ -386,7 +392,7 @@ ROWS = [
         "V; U − V denotes D + V",
         "Report.invariant_radius",
         f"{CERTIFICATE}test_radius_is_the_smallest_of_38",
-        REGION,
+        f"theory/convergence.md {REGION}",
         source="fit/certificate.rs::invariant_radius",
     ),
     Row(
@@ -394,7 +400,7 @@ ROWS = [
         "invariant region",
         "Report.invariant_radius",
         f"{CERTIFICATE}test_algorithm_1_stays_within",
-        REGION,
+        f"theory/convergence.md {REGION}",
     ),
     Row(
         "Lemma C.2",
@@ -432,29 +438,47 @@ ROWS = [
         f"{LEMMAS}test_proposition_c6_clamped_ends_stay",
         "convergence.md",
     ),
-    Row("Figures 1, 4", "De Casteljau's construction", "BezierCurve", EXAMPLES, "gallery/de_casteljau.rst"),
+    Row(
+        "Figures 1, 4",
+        "De Casteljau's construction",
+        "BezierCurve",
+        EXAMPLES,
+        "figures.md#figures-1-and-4-de-casteljaus-construction gallery/de_casteljau.rst",
+    ),
     Row(
         "Figures 2, 3",
         "movement and C² condition",
         "Space.transvection",
         EXAMPLES,
-        "gallery/c2_condition.rst",
+        "figures.md#figures-2-and-3-movement-and-condition-13 gallery/c2_condition.rst",
     ),
-    Row("Figure 5", "five orientations", "CubicSpline.plot", EXAMPLES, "gallery/five_orientations.rst"),
-    Row("Figure 6", "six states of a qubit", "CubicSpline.plot", EXAMPLES, "gallery/qubit_control.rst"),
+    Row(
+        "Figure 5",
+        "five orientations",
+        "CubicSpline.plot",
+        EXAMPLES,
+        "figures.md#figure-5-five-orientations gallery/five_orientations.rst",
+    ),
+    Row(
+        "Figure 6",
+        "six states of a qubit",
+        "CubicSpline.plot",
+        EXAMPLES,
+        "figures.md#figure-6-six-states-of-a-qubit gallery/qubit_control.rst",
+    ),
     Row(
         "Figures 7, 8, 9",
         "affine shapes",
         "shapes.from_landmarks",
         f"{EXAMPLES} tests/shapes/test_film.py::test_the_figures_of_the_page",
-        "gallery/affine_shapes.rst shapes.md",
+        "figures.md#figures-7-8-and-9-affine-shapes gallery/affine_shapes.rst shapes.md",
     ),
     Row(
         "Figure 10",
         "region of Theorem 3.1",
         "Report.invariant_radius",
         EXAMPLES,
-        "gallery/where_the_iteration_converges.rst",
+        "figures.md#figure-10-the-region-of-convergence gallery/where_the_iteration_converges.rst",
     ),
     Row(
         "Appendix D",
@@ -534,7 +558,8 @@ def problems() -> list[str]:
 
 def _linked(page: str) -> str:
     """A link, or the name alone of a page that is not there yet."""
-    title = Path(page.partition("#")[0]).stem.replace("_", " ")
+    path = Path(page.partition("#")[0])
+    title = ": ".join([*path.parts[:-1], path.stem.replace("_", " ")])
     return f"[{title}]({page})" if has_page(page) else f"`{page}`"
 
 
