@@ -100,8 +100,8 @@ export class Rotations extends Figure {
     if (width > 720) {
       const w = width * 0.54;
       return {
-        main: [w * 0.5, height * 0.3, Math.min(w * 0.24, height * 0.21)],
-        small: [[w * 0.25, height * 0.72, w * 0.1], [w * 0.75, height * 0.72, w * 0.1]],
+        main: [w * 0.5, height * 0.27, Math.min(w * 0.27, height * 0.25)],
+        small: [[w * 0.25, height * 0.67, w * 0.12], [w * 0.75, height * 0.67, w * 0.12]],
         strip: [w, height - 32], chart: { x: w + 18, y: 12, width: width - w - 22, height: height - 18 },
       };
     }
@@ -121,7 +121,7 @@ export class Rotations extends Figure {
     rotations.forEach((rotation, i) => {
       const [x, y, size] = i ? small[i - 1] : main;
       drawAeroplane(context, rotation, [x, y], size, tints[i], colors.paper);
-      stage.text(names[i], x, y + size * 1.45 + 10, { align: "center", color: colors.ink, size: i ? 12 : 14, weight: 600 });
+      stage.text(names[i], x, y + size * (i ? 1.15 : 0.95) + 10, { align: "center", color: colors.ink, size: i ? 12 : 14, weight: 600 });
     });
     // Attitudes at the knots, which can be selected.
     const [width, y] = strip;
