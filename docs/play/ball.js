@@ -47,6 +47,7 @@ export class Ball {
     let from = this.direction(x, y);
     return {
       cursor: "grab",
+      turning: true,
       move: (toX, toY) => {
         const to = this.direction(toX, toY);
         this.view = orthonormal(product(between(from, to), this.view));

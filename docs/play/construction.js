@@ -28,7 +28,7 @@ const SPACES = {
     code: (c) => [assign("lon", c.map((p) => p[0])), assign("lat", c.map((p) => p[1])), "points = ss.geo.from_lonlat(lon, lat)"],
   },
   disk: {
-    name: "h:2", start: [[-0.86, -0.2], [-0.3, 0.55], [0.3, -0.5], [0.84, 0.3]],
+    name: "h:2", start: [[-0.62, -0.35], [-0.28, 0.42], [0.3, -0.38], [0.68, 0.3]],
     // From the disk of Poincaré to the hyperboloid, by stereographic projection.
     point: ([u, v]) => {
       const r = u * u + v * v;

@@ -1,5 +1,6 @@
 // What all figures share: knots with times, a cursor that runs along the curve, controls, and the Python program.
 
+import { SymsplineError } from "symspline";
 import { CodePanel } from "./code.js";
 import { Clock, Stage } from "./stage.js";
 import { clamp, rounded } from "./vectors.js";
@@ -64,6 +65,11 @@ export class Figure {
     if (button) button.textContent = on ? "Pause" : "Play";
   }
 
+  /** The curve that the Python program computes. */
+  get curve() {
+    return this.spline;
+  }
+
   /** Fits the curves again before the next frame. */
   changed() {
     this.dirty = true;
@@ -77,7 +83,7 @@ export class Figure {
       this.fit();
       this.error = null;
     } catch (error) {
-      if (!error.name?.endsWith("Error") || error.limit === undefined) throw error;
+      if (!(error instanceof SymsplineError)) throw error;
       this.error = error;
     }
     if (this.note) {

@@ -79,6 +79,10 @@ export class Globe extends Figure {
 
   // ---- curves ----
 
+  get curve() {
+    return this.smooth ?? this.spline;
+  }
+
   fit() {
     const { t, ends, space } = this;
     this.points = this.lonlat.map(fromLonlat);
@@ -86,7 +90,7 @@ export class Globe extends Figure {
     this.x = linspace(t[0], t[t.length - 1], SAMPLES);
     this.noisy = this.noise > 0 ? this.measured() : null;
     this.smooth = this.noisy && this.smoothed();
-    const shown = this.smooth ?? this.spline;
+    const shown = this.curve;
     this.line = shown.evaluate(this.x);
     this.motion = [1, 2].map((nu) => shown.evaluate(this.x, nu).map((v) => EARTH * norm(v)));
     this.band = this.smooth && [...this.smooth.band(this.x)];
@@ -121,12 +125,12 @@ export class Globe extends Figure {
     const steps = points.slice(1).map((q, i) => space.log(points[i], q));
     const places = [];
     const speed = [];
-    for (const x of this.x) {
-      const i = clamp(t.findIndex((time) => time > x) - 1, 0, t.length - 2);
-      const at = x >= t[t.length - 1] ? t.length - 2 : i;
-      places.push(space.exp(points[at], steps[at].map((v) => (v * (x - t[at])) / (t[at + 1] - t[at]))));
-      speed.push((EARTH * norm(steps[at])) / (t[at + 1] - t[at]));
-    }
+    steps.forEach((step, i) => {
+      const last = i === steps.length - 1;
+      const own = this.x.filter((x) => x >= t[i] && (last || x < t[i + 1]));
+      places.push(...space.geodesic(points[i], points[i + 1], own.map((x) => (x - t[i]) / (t[i + 1] - t[i]))));
+      speed.push(...new Array(own.length).fill((EARTH * norm(step)) / (t[i + 1] - t[i])));
+    });
     const jumps = t.slice(1, -1).map((time, k) => {
       const before = scaled(space.log(points[k + 1], points[k]), -1 / (time - t[k]));
       const after = scaled(steps[k + 1], 1 / (t[k + 2] - time));
@@ -188,14 +192,15 @@ export class Globe extends Figure {
   /** Sea and land change only with the view, and are kept as a picture. */
   earth(context, stage) {
     const { ball, canvas } = this;
-    const name = [ball.version, stage.version, canvas.width, canvas.height].join();
+    const turning = Boolean(stage.held?.turning);
+    const name = [ball.version, stage.version, canvas.width, canvas.height, turning].join();
     if (name !== this.kept) {
       this.kept = name;
       this.picture ??= document.createElement("canvas");
       Object.assign(this.picture, { width: canvas.width, height: canvas.height });
       const own = this.picture.getContext("2d");
       own.setTransform(stage.ratio, 0, 0, stage.ratio, 0, 0);
-      drawEarth(own, ball, stage.colors);
+      drawEarth(own, ball, stage.colors, turning);
     }
     context.drawImage(this.picture, 0, 0, stage.width, stage.height);
   }
@@ -218,8 +223,7 @@ export class Globe extends Figure {
       }
     }
     draw(this.line, colors.spline, 3.5);
-    const shown = this.smooth ?? this.spline;
-    const [x, y, depth] = this.ball.project(shown.evaluate(clamp(this.cursor, ...shown.domain)));
+    const [x, y, depth] = this.ball.project(this.curve.evaluate(clamp(this.cursor, ...this.curve.domain)));
     if (depth > 0) mark(context, [x, y], 5, colors.spline, colors.paper, 2);
   }
 

@@ -1,9 +1,9 @@
 // The land of the Earth on a globe. The method is that of the package's own maps.
 
-import rings from "./land.json";
+import outlines from "./land.json";
 import { clamp, fromLonlat } from "./vectors.js";
 
-const LAND = rings.map((differences) => {
+const LAND = outlines.map((differences) => {
   const points = [];
   const edge = [];
   let [lon, lat] = [0, 0];
@@ -16,11 +16,18 @@ const LAND = rings.map((differences) => {
   return { points, edge };
 });
 
+/** Every third corner, for a globe that turns under the hand. */
+const COARSE = LAND.filter(({ points }) => points.length > 12).map(({ points, edge }) => {
+  const kept = points.map((_, i) => i).filter((i) => i % 3 === 0 || edge[i]);
+  return { points: kept.map((i) => points[i]), edge: kept.map((i) => edge[i]) };
+});
+
 /** Longest chord along the horizon in radians. */
 const CHORD = 0.1;
 
-/** Draws sea, land and a grid of meridians and parallels. */
-export function drawEarth(context, ball, colors) {
+/** Draws sea, land and a grid of meridians and parallels; `coarse` is for a globe that turns. */
+export function drawEarth(context, ball, colors, coarse = false) {
+  const rings = coarse ? COARSE : LAND;
   const { x, y, radius } = ball;
   context.beginPath();
   context.arc(x, y, radius, 0, 2 * Math.PI);
@@ -30,7 +37,7 @@ export function drawEarth(context, ball, colors) {
   context.clip();
   context.beginPath();
   let around = 0;
-  for (const { points } of LAND) around += addRing(context, ball, points);
+  for (const { points } of rings) around += addRing(context, ball, points);
   // The land that contains the point opposite to the viewer goes around the horizon, which this circle compensates.
   if (around) {
     context.moveTo(x + radius, y);
@@ -39,7 +46,7 @@ export function drawEarth(context, ball, colors) {
   context.fillStyle = colors.land;
   context.fill("evenodd");
   context.beginPath();
-  for (const ring of LAND) addCoast(context, ball, ring);
+  for (const ring of rings) addCoast(context, ball, ring);
   context.strokeStyle = colors.coast;
   context.lineWidth = 0.7;
   context.stroke();

@@ -47,6 +47,7 @@ async function start() {
     const name = root.dataset.figure;
     figures[name] = new FIGURES[name](root);
     root.classList.add("play-ready");
+    performance.mark(`symspline-play-${name}`);
     // The first figure can be used before the others are there.
     await new Promise((resolve) => setTimeout(resolve));
   }

@@ -4,11 +4,7 @@
 export class SymsplineError extends Error {
   constructor(message, { argument = null, index = null, value = null, limit = null } = {}) {
     super(message);
-    this.name = new.target.name;
-    this.argument = argument;
-    this.index = index;
-    this.value = value;
-    this.limit = limit;
+    Object.assign(this, { argument, index, value, limit });
   }
 }
 
@@ -20,6 +16,11 @@ export class CutLocusError extends SymsplineError {}
 
 /** The solver did not reach the tolerance. */
 export class ConvergenceError extends SymsplineError {}
+
+// The names of the classes themselves are shortened by programs that make scripts small.
+for (const [name, Class] of Object.entries({ SymsplineError, ValidationError, CutLocusError, ConvergenceError })) {
+  Object.defineProperty(Class.prototype, "name", { value: name, configurable: true, writable: true });
+}
 
 const CLASSES = { validation: ValidationError, "cut-locus": CutLocusError, convergence: ConvergenceError };
 

@@ -5,12 +5,16 @@ use crate::fit::{C2Residual, Chain, ChainEnds, NodeVectors, Run, Visit, sweep, s
 use crate::scalar::{LANES, Lane};
 use crate::space::{Covered, Erased, Evaluation, Kernels, Space};
 
+/// Whether every space calls the one copy of these loops through its table. Modules for browsers are small rather than
+/// fast: loops for each space would be two thirds of them.
+const SMALL: bool = cfg!(target_family = "wasm");
+
 impl<M: Space> Kernels for M {
     fn walk(&self, chain: &mut Chain, runs: &[Run; LANES]) {
-        if M::HOT { chain.walk(self, runs) } else { chain.walk_by_table(&Erased(self), runs) }
+        if M::HOT && !SMALL { chain.walk(self, runs) } else { chain.walk_by_table(&Erased(self), runs) }
     }
     fn walk_again(&self, chain: &mut Chain, runs: &[Run; LANES], visit: Visit) {
-        if M::HOT {
+        if M::HOT && !SMALL {
             chain.walk_again(self, runs, visit)
         } else {
             chain.walk_again_by_table(&Erased(self), runs, visit)
@@ -25,7 +29,7 @@ impl<M: Space> Kernels for M {
         work: &mut NodeVectors<Lane>,
         at_rest: Lane,
     ) -> C2Residual {
-        if M::HOT {
+        if M::HOT && !SMALL {
             sweep(self, chain, ends, u, r, work, at_rest)
         } else {
             sweep_by_table(&Erased(self), chain, ends, u, r, work, at_rest)
@@ -44,9 +48,18 @@ struct Samples<'a> {
 
 impl Evaluation for Samples<'_> {
     fn direct<M: Space>(self, space: &M) {
-        if M::HOT { self.job.run(space, self.out) } else { self.job.run_by_table(&Erased(space), self.out) }
+        if M::HOT && !SMALL {
+            self.job.run(space, self.out)
+        } else {
+            self.job.run_by_table(&Erased(space), self.out)
+        }
     }
     fn covered<C: Covered>(self, space: &C) {
+        if SMALL {
+            // Rates in the frame of the body come from the covering space only, and are not part of such modules.
+            assert!(!self.job.quantity.is_of_body());
+            return self.job.run_by_table(&Erased(space), self.out);
+        }
         self.job.run_covered(space, self.out);
     }
 }

@@ -1,0 +1,136 @@
+"""The page of figures in headless Chromium: points are dragged, and its Python programs give the curves that it draws."""
+
+from __future__ import annotations
+
+import gzip
+import json
+import os
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import symspline as ss
+from javascript.npm_tools import PAGE, ROOT, TOOLS, node, require
+
+require(PAGE, TOOLS / "playwright-core")
+CHROMIUM = os.environ.get("CHROMIUM") or shutil.which("chromium") or shutil.which("google-chrome")
+if CHROMIUM is None:
+    pytest.skip("Chromium is not installed: set CHROMIUM to its path", allow_module_level=True)
+
+CURVES = (
+    *("globe", "dragged", "noisy", "smooth", "rotations", "turned", "up", "bloch", "ellipses"),
+    *("plane", "sphere", "disk"),
+)
+
+
+@pytest.fixture(scope="module", params=[1280, 390])
+def seen(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """What was seen on the page, at the width of a desktop and of a phone."""
+    pictures = Path(os.environ.get("PLAY_PICTURES") or tmp_path_factory.mktemp("pictures"))
+    found: dict[str, Any] = json.loads(node("play.mjs", TOOLS, CHROMIUM, PAGE, request.param, pictures, timeout=300))
+    return found
+
+
+def test_nothing_is_logged_and_nothing_is_fetched_from_elsewhere(seen: dict[str, Any]) -> None:
+    assert seen["logged"] == []
+    assert {url.split(":")[0] for url in seen["requests"]} <= {"file", "data"}
+    assert seen["overflow"] <= 0
+
+
+def test_the_page_starts_soon(seen: dict[str, Any]) -> None:
+    # It takes a third of a second on an idle machine; here several tests may run.
+    assert seen["times"]["globe"] < 15_000
+
+
+def test_frames_are_cheap(seen: dict[str, Any]) -> None:
+    # A frame of 60 per second has 16.7 ms. Half of them suffices for a loaded machine without a graphics card.
+    assert seen["frames"]["count"] > 20
+    assert seen["frames"]["median"] < 33
+
+
+def test_a_dragged_point_follows_the_cursor_and_the_curve_passes_through_it(seen: dict[str, Any]) -> None:
+    dragged = seen["dragged"]
+    # Longitudes and latitudes are rounded to a hundredth of a degree.
+    assert np.hypot(*np.subtract(dragged["place"][:2], dragged["target"])) < 1
+    assert np.abs(np.subtract(dragged["knots"], dragged["points"])).max() < 1e-14
+    assert np.abs(ss.geo.from_lonlat(*dragged["lonlat"]) - dragged["points"][2]).max() < 1e-15
+
+
+def test_the_curve_is_twice_continuously_differentiable(seen: dict[str, Any]) -> None:
+    near = np.array(seen["dragged"]["near"])
+    before, after = near[:, :, 0], near[:, :, 1]
+    assert np.abs(after - before).max() < 1e-8
+    # The same from points alone: one-sided differences of second order, and their tangential parts.
+    h, samples = seen["dragged"]["h"], np.array(seen["dragged"]["differences"])
+    side = np.array([-1, 1])[:, None]
+    first = side * np.einsum("k,csk...->cs...", [-1.5, 2, -0.5, 0], samples) / h
+    second = np.einsum("k,csk...->cs...", [2, -5, 4, -1], samples) / h**2
+    p = samples[:, :, 0]
+    second -= (second * p).sum(-1, keepdims=True) * p
+    assert np.abs(np.diff(first, axis=1)).max() < 1e-5 * np.abs(first).max()
+    assert np.abs(np.diff(second, axis=1)).max() < 1e-2 * np.abs(second).max()
+
+
+def test_the_grabbed_place_of_the_globe_stays_under_the_cursor(seen: dict[str, Any]) -> None:
+    turned = seen["turned"]
+    assert np.hypot(*np.subtract(turned["place"][:2], turned["target"])) < 0.5
+    assert turned["place"][2] > 0
+
+
+def test_times_keys_and_double_clicks(seen: dict[str, Any]) -> None:
+    assert seen["times"]["knot"] == pytest.approx(11, abs=0.1)
+    start, up, following, added, removed, later = seen["keys"]
+    assert up["lonlat"] != start["lonlat"] and len(up["lonlat"]) == 5
+    assert following["selected"] == (start["selected"] + 1) % 5
+    assert len(added["t"]) == 6 and len(removed["t"]) == 5 and removed["lonlat"] == up["lonlat"]
+    assert later["t"] != removed["t"] or later["selected"] in (0, 4)
+    assert len(seen["added"]["t"]) == 6
+
+
+@pytest.mark.parametrize("name", CURVES)
+@pytest.mark.filterwarnings("default")
+def test_the_python_program_gives_the_curve_that_is_drawn(seen: dict[str, Any], name: str) -> None:
+    shown = seen["curves"][name]
+    scope: dict[str, Any] = {}
+    exec(shown["program"], scope)
+    x, points = np.array(shown["x"]), np.array(shown["points"])
+    values = scope["spline"](x)
+    if name == "bloch":
+        values = ss.quantum.bloch_vector(values)
+    scale = np.abs(points).max()
+    assert np.abs(values.reshape(points.shape) - points).max() < 1e-12 * max(scale, 1)
+    assert np.abs(scope["x"] - x).max() < 1e-12 * x[-1]
+
+
+def test_the_construction_ends_on_the_curve(seen: dict[str, Any]) -> None:
+    assert np.abs(np.subtract(*seen["construction"].values())).max() < 1e-13
+
+
+def test_opposite_points_give_a_message(seen: dict[str, Any]) -> None:
+    assert "cut locus" in seen["antipodes"]["message"]
+    assert "cut locus" not in seen["antipodes"]["after"]
+
+
+def test_the_globe_can_be_mounted_elsewhere(seen: dict[str, Any]) -> None:
+    assert seen["hero"] == {"pictures": 0, "width": 320, "points": 5}
+    assert seen["code"].startswith("import numpy as np")
+
+
+def test_the_page_is_small() -> None:
+    files = [PAGE, PAGE.with_name("play.js"), PAGE.with_name("play.css")]
+    assert sum(len(gzip.compress(file.read_bytes())) for file in files) < 1e6
+    assert len(gzip.compress((ROOT / "build/npm/symspline_bg.wasm").read_bytes())) < 600e3
+
+
+def test_coastlines_are_those_of_the_package() -> None:
+    with np.load(ROOT / "python/symspline/_plotting/land.npz") as file:
+        rings = np.split(file["points"] / 100, file["starts"])
+    kept = json.loads((ROOT / "docs/play/land.json").read_text())
+    assert len(kept) == len(rings)
+    for differences, ring in zip(kept, rings, strict=True):
+        corners = np.reshape(differences, (-1, 2)).cumsum(axis=0) / 10
+        distance = np.abs(ring[:, None] - corners).max(axis=-1).min(axis=1)
+        assert distance.max() <= 0.0501
