@@ -41,6 +41,9 @@ extensions = [
     "typeset",
 ]
 exclude_patterns = ["gallery/*.ipynb", "gallery/*.py"]
+# `make wasm` puts the figures of the page "Drag the points" there; without them the site has pictures instead.
+if (HERE / "_static/play/play.js").exists():
+    tags.add("play")  # type: ignore[name-defined]  # noqa: F821
 templates_path = ["_templates"]
 
 # ---- pages ----
@@ -136,7 +139,7 @@ html_css_files = ["symspline.css"]
 html_logo = "_static/logo.svg"
 html_favicon = "_static/favicon.svg"
 # These have nothing beside them.
-html_sidebars: dict[str, list[str]] = {"index": [], "start": []}
+html_sidebars: dict[str, list[str]] = {"index": [], "start": [], "play": []}
 html_copy_source = html_show_sourcelink = False
 html_theme_options = {
     "show_prev_next": False,
