@@ -112,13 +112,18 @@ class RetimedCurve(ComposedCurve[P]):
         self._source = source
         self._compose(time_axis, Retimed(source._curve, law, times), None)
 
-    @property
-    def _made_of(self) -> str:
+    def _made_of(self, radius: float | None = None) -> str:
         return self._span_text
 
     @property
     def _unconverged(self) -> int:
         return self._source._unconverged
+
+    @property
+    def _rate_limits(self) -> list[tuple[float, float]]:
+        # Of the law that `time_law` returns; other laws are functions.
+        law = getattr(self._curve.law, "function", None)
+        return [*zip(getattr(law, "max_speed", ()), getattr(law, "max_acceleration", ()), strict=True)]
 
     @property
     def _node_times(self) -> Doubles:
@@ -252,8 +257,7 @@ class SegmentedCurve(ComposedCurve[P], Generic[P, C]):
         ends = [own.domain for own in self._segments]
         return [(a[1], b[0]) for a, b in pairwise(ends) if b[0] > a[1]]
 
-    @property
-    def _made_of(self) -> str:
+    def _made_of(self, radius: float | None = None) -> str:
         return f"{len(self)} segments"
 
     @property

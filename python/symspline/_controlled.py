@@ -145,8 +145,7 @@ class ControlledSpline(Curve[P]):
             )
         )
 
-    @property
-    def _made_of(self) -> str:
+    def _made_of(self, radius: float | None = None) -> str:
         return f"{self.knots.size - self.degree - 1} control points, degree {self.degree}"
 
     def __repr__(self) -> str:

@@ -34,9 +34,8 @@ class CurvePlots(CurveBase[P]):
     # Title of plots.
     _kind: ClassVar[str] = "Curve"
 
-    @property
-    def _made_of(self) -> str:
-        """Description of the data, for the title of a plot."""
+    def _made_of(self, radius: float | None = None) -> str:
+        """Return a description of the data, for the title of a plot; noise in metres on a globe of a given radius."""
         return ""
 
     @property
@@ -48,6 +47,11 @@ class CurvePlots(CurveBase[P]):
     def _node_times(self) -> Doubles:
         """Times of the core at which one curve passes through given points; empty if there are none."""
         return np.empty(0)
+
+    @property
+    def _rate_limits(self) -> list[tuple[float, float]]:
+        """Limits of speed and acceleration in each factor of the space; empty if there are none."""
+        return []
 
     @property
     def _breaks(self) -> Doubles:

@@ -38,8 +38,7 @@ class PiecewiseCubic(TimedCurve[P]):
     def _ends(self) -> str:
         """End conditions, as the title of a plot names them."""
 
-    @property
-    def _made_of(self) -> str:
+    def _made_of(self, radius: float | None = None) -> str:
         return f"{self._t.shape[-1]} points{' each' if self._batch else ''}, {self._ends}"
 
     @property

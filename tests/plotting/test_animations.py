@@ -1,5 +1,8 @@
 """Animations: what moves, where to, and files."""
 
+import json
+import subprocess
+
 import matplotlib.animation
 import numpy as np
 import pytest
@@ -70,6 +73,21 @@ def test_files(tmp_path):
     with Image.open(path) as image:
         assert image.n_frames == 3 and image.info["duration"] == 100
     assert [own.name for own in tmp_path.iterdir()] == ["a.gif"]
+
+
+@pytest.mark.skipif(not matplotlib.animation.writers.is_available("ffmpeg"), reason="ffmpeg is not installed")
+@pytest.mark.parametrize("kind", ["mp4", "webm"])
+def test_films(tmp_path, kind):
+    """ffprobe counts the frames, and reads the size and the rate."""
+    path = tmp_path / f"a.{kind}"
+    spline_on("so:3").animate(path, frames=4, fps=8)
+    shown = "stream=nb_read_frames,r_frame_rate,width,height"
+    command = ["ffprobe", "-v", "error", "-count_frames", "-show_entries", shown, "-of", "json", str(path)]
+    (stream,) = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)["streams"]
+    assert stream["nb_read_frames"] == "4" and stream["r_frame_rate"] == "8/1"
+    width, height = spline_on("so:3").plot().get_size_inches()
+    assert abs(stream["width"] - 80 * width) < 2 and abs(stream["height"] - 80 * height) < 2
+    assert [own.name for own in tmp_path.iterdir()] == [f"a.{kind}"]
 
 
 def test_films_need_ffmpeg(tmp_path, monkeypatch):

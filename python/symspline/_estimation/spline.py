@@ -105,8 +105,7 @@ class EstimatedSpline(SmoothingSpline[P, Any]):
         kinds = end_kinds(self._bc_type)
         return posterior.coupled(self._knots_of(index), index, kinds, x, None, orders, np.concatenate(rows))
 
-    @property
-    def _made_of(self) -> str:
+    def _made_of(self, radius: float | None = None) -> str:
         counts = [f"{np.size(own.t)} {type(own).__name__}" for own in self._measurements]
         df = " and ".join(f"{own.report.df:.3g}" for own in self._smoothed[:3])
         return ", ".join([*counts, f"{self._times.shape[-1]} knots", f"{df} degrees of freedom"])

@@ -41,7 +41,7 @@ from .style import (
 _PLANE = Hyperbolic(2)
 _ORIGIN = np.array([1.0, 0.0, 0.0])
 SHADOW = "grey: shadow on the floor"
-_BESIDE, _UNDER = 0.45, 0.35
+_BESIDE, _UNDER, _ABOVE = 0.45, 0.35, 0.1
 """Margins of a box in inches, which have the labels of its axes."""
 _STEPS = np.multiply.outer(10.0 ** np.arange(-9, 3), [1, 2, 5]).ravel()
 
@@ -136,7 +136,7 @@ def _fill(panel: SubFigure, axes: Any, corners: Array, below: float) -> None:
     Axes of the user keep their position. The box is enlarged in them, where there is space.
     """
     width, height = size(panel)
-    free = np.array([width - 2 * _BESIDE, height - below - _UNDER])
+    free = np.array([width - 2 * _BESIDE, height - below - _UNDER - _ABOVE])
     square = min(width, height)
     if axes not in OWN_AXES:
         axes.set_position((0, 0, square / width, square / height))

@@ -119,6 +119,7 @@ def _drawn(one: Any, noise_beside: Any, index: Any, axis: Axis, look: dict[str, 
     nodes = nodes if has_nodes else x[:1]
     first, x0 = one.domain[0], float(data.times[0])
     made = Curve(data, first, x0, x, nodes, axis, noise=noise, has_nodes=has_nodes, faint=faint, breaks=breaks, **look)
+    made = replace(made, limits=tuple(one._rate_limits))
     if len(parts) < 2:
         return made
     start = made.points[0] if not isinstance(data.space, Product) else tuple(own[0] for own in made.points)

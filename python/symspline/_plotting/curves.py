@@ -106,6 +106,8 @@ class Curve:
         The batch of which this is the first of a few curves.
     radius : float or None
         Radius of the Earth in metres, if the curve is one of longitude and latitude.
+    limits : tuple of pair
+        Limits of speed and acceleration in each factor of the space; empty if there are none.
     """
 
     data: AnyCurve
@@ -126,6 +128,7 @@ class Curve:
     reference: Any = None
     batch: Batch | None = None
     radius: float | None = None
+    limits: tuple[tuple[float, float], ...] = ()
 
     def on_earth(self, radius: float | None) -> Curve:
         """Return the curve with a radius of the Earth."""
@@ -259,6 +262,7 @@ class Curve:
         segments = tuple(own.part(number) for own in self.segments)
         own: dict[str, Any] = {"noise": noise, "segments": segments, "batch": self.batch and self.batch.part(number)}
         reference = None if self.reference is None else self.reference[number]
+        own["limits"] = self.limits[number : number + 1]
         return replace(self, data=self.data.parts[number], reference=reference, **own)
 
     @property
@@ -346,6 +350,11 @@ class Batch:
         values = self.data.evaluate(self.x, quantity, "raise", False)
         count = len(self.data.batch)
         return values.reshape(-1, *values.shape[count:])[self.valid]
+
+
+def interrupted(line: Array, after: Any, gaps: Any) -> Array:
+    """Insert three rows after some of the rows of a line: its end, NaN, and where it begins again."""
+    return np.insert(line, np.repeat(after + 1, 3), np.reshape(gaps, (-1, line.shape[1])), axis=0)
 
 
 # ---- bands ----

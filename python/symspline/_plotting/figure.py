@@ -73,6 +73,7 @@ _DRAWN: list[tuple[str, Callable[[Any, Sequence[Curve]], None], tuple[float, ...
 _PICTURES = {name: Picture(draw, *size) for names, draw, size in _DRAWN for name in names.split()}
 _FAMILIES = dict.fromkeys(("rp", "cp", "hp", "gr", "cgr"), Picture(graphs.draw_principal_angles, 10.5, 3.8))
 _FAMILIES["stiefel"] = Picture(columns.draw_columns, 10.5, 4.6)
+_FAMILIES["torus"] = Picture(graphs.draw_torus, 10.5, 3.8)
 _FAMILIES["ch"] = Picture(graphs.draw_ratios, 10.5, 3.8)
 # Spaces whose picture shows the band.
 BANDED = {"euclidean:1", "euclidean:2", "euclidean:3", "hyperbolic:2", "sphere:1", "sphere:2"}

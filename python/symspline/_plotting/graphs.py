@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from .._spaces import HermitianPositiveDefinite, Space, SymmetricPositiveDefinite
-from .curves import LINE, Curve, draw_graph_of, fill_quantiles
+from .curves import LINE, Curve, draw_graph_of, fill_quantiles, interrupted
 from .style import (
     BOTTOM,
     DISTINCT,
@@ -158,7 +158,12 @@ draw_circle, draw_slope, draw_turn, draw_phase = (partial(_draw_angle, *own) for
 
 
 def draw_numbers(
-    panel: SubFigure, curves: Sequence[Curve], label: str, names: Sequence[str], numbers: Callable[[Any, Any], Array]
+    panel: SubFigure,
+    curves: Sequence[Curve],
+    label: str,
+    names: Sequence[str],
+    numbers: Callable[[Any, Any], Array],
+    period: float = np.inf,
 ) -> None:
     """Draw several numbers against time, at most twelve with their names.
 
@@ -176,6 +181,8 @@ def draw_numbers(
         Names of the numbers. The name "Im ..." follows that of the real part.
     numbers : callable
         Function of the first point of a curve and of several points, with one row per point.
+    period : float
+        Numbers that differ by multiples of it are equal. They are between −period / 2 and period / 2.
     """
     space = size(panel)[0] - LEFT - RIGHT
     width = 1.8 if curves[0].alone else 0.9
@@ -192,10 +199,11 @@ def draw_numbers(
     (axes,) = timelines(panel, curves, [label], top=0.25 + 0.22 * rows)
     for curve, (values, given) in zip(curves, drawn, strict=True):
         if curve.has_line:
-            axes.plot(curve.times, values[:, rest], color=INK, linewidth=0.4, alpha=0.4)
+            for i in rest:
+                axes.plot(*_line(curve.times, values[:, i], period), color=INK, linewidth=0.4, alpha=0.4)
         for i, look in zip(named, looks, strict=True):
             if curve.has_line:
-                (line,) = axes.plot(curve.times, values[:, i], linewidth=width, **look)
+                (line,) = axes.plot(*_line(curve.times, values[:, i], period), linewidth=width, **look)
                 line.set_gid(LINE)
                 # Axes of the user get the names, and a legend only if the user adds one.
                 line.set_label(names[i] if curve is curves[0] and axes in OWN_AXES else LINE)
@@ -208,6 +216,19 @@ def draw_numbers(
         return
     anchor: Any = {"loc": "lower right", "bbox_to_anchor": (1, 1), "borderaxespad": 0}
     legend(axes, handles, labels, rows=rows, handlelength=1.6, **anchor)
+
+
+def _line(times: Array, values: Array, period: float) -> Array:
+    """Return times and values, broken by NaN where a line leaves the period and returns on the other side."""
+    line, steps = np.column_stack([times, values]), np.diff(values)
+    (jumps,) = np.nonzero(np.abs(steps) > period / 2)
+    gaps = []
+    for i in jumps:
+        short = steps[i] - period * np.rint(steps[i] / period)
+        edge = np.copysign(period / 2, short)
+        time = times[i] + (edge - values[i]) / short * (times[i + 1] - times[i])
+        gaps.append([[time, edge], [np.nan] * 2, [time, -edge]])
+    return interrupted(line, jumps, gaps).T
 
 
 def _choose(names: Sequence[str], ranges: Array) -> tuple[Indices, Indices]:
@@ -272,6 +293,13 @@ def independent(space: Space) -> Indices:
     if isinstance(space, HermitianPositiveDefinite):
         return np.flatnonzero(np.stack([np.triu(whole), np.triu(whole, 1)], axis=-1))
     return np.arange(whole.size * (2 if space.dtype.kind == "c" else 1))
+
+
+def draw_torus(panel: SubFigure, curves: Sequence[Curve]) -> None:
+    """Draw angles between −180 and 180 degrees."""
+    names = component_names(curves[0].space.point_shape, False)
+    degrees = lambda _, points: np.degrees(points)  # noqa: E731
+    draw_numbers(panel, curves, "angles, degrees", names, degrees, 360)
 
 
 def draw_ratios(panel: SubFigure, curves: Sequence[Curve]) -> None:

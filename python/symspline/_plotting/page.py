@@ -19,8 +19,8 @@ from .collect import axis_of, curves_of
 from .curves import BAND, DATA_DOTS, DOTS, FAINT, QUANTILES, START, Curve
 from .figure import BANDED, FACTORS, draw_picture, drawing, finish, picture_of, picture_of_factors
 from .panels import check_axes, draw_into, has_dark_background, next_color
-from .rates import draw_rates, rows_of
-from .style import BOTTOM, DATA, INK, TOP, heading, legend
+from .rates import LIMIT, draw_rates, rows_of
+from .style import BOTTOM, DATA, INK, MARK, TOP, heading, legend
 from .theme import is_dark, kept_color
 
 _HEAD, _RATES_WIDTH, _RATES_HEIGHT = 1.2, 5.8, 4.0
@@ -155,7 +155,7 @@ def _plot_into(
 
 def _description(spline: Any, curves: Sequence[Curve]) -> str:
     """Describe the data, the convergence of the solver, the number of curves with bands, and the number of gaps."""
-    words = [spline._made_of]
+    words = [spline._made_of(curves[0].radius)]
     factors = len(factors_of(spline.space))
     if factors > FACTORS:
         words.append(f"{FACTORS} of {factors} factors")
@@ -198,6 +198,8 @@ def _explain(figure: Figure, curves: Sequence[Curve], height: float) -> None:
         add(Line2D([], [], color=DATA, **dot), "data")
     if BAND in drawn:
         add(Patch(facecolor=few[0].color, alpha=0.22), "95 % band")
+    if LIMIT in drawn:
+        add(Line2D([], [], color=MARK, linewidth=1, linestyle="--"), "limit")
     if FAINT in drawn:
         add(Line2D([], [], color=DATA, linewidth=0.7), "other curves")
     if QUANTILES in drawn and few[0].batch is not None:

@@ -79,7 +79,7 @@ class AxesPanel:
         return self.axes.annotate(
             words,
             (0.5, 0),
-            (0, -8 if not self.axes.axison else -28),
+            (0, -28 if self.axes.axison and self.axes.name != "3d" else -8),
             xycoords="axes fraction",
             textcoords="offset points",
             va="top",

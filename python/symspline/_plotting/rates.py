@@ -12,10 +12,11 @@ from matplotlib.figure import SubFigure
 from .._spaces import Product, Space, SpecialEuclidean, cover_of, factors_of
 from .curves import LINE, Curve, fill_band, fill_quantiles
 from .graphs import timelines
-from .style import EDGE, Array
+from .style import EDGE, MARK, Array
 
 NORMAL = 1.96
 """Half width of the 95 % interval of a normal distribution, in standard deviations."""
+LIMIT = "_limit"
 _LONGEST = 10
 """Number of letters of a space in the label of an axis."""
 At = Callable[[str], Any]
@@ -36,6 +37,8 @@ class Rate(NamedTuple):
         Whether the numbers have a sign.
     scale : float
         Factor from the lengths of tangent vectors to the numbers.
+    whole : bool
+        Whether the number is the whole length of a vector, which can have a limit.
     """
 
     label: str
@@ -43,6 +46,7 @@ class Rate(NamedTuple):
     values: Callable[[At], Array]
     signed: bool = False
     scale: float = 1.0
+    whole: bool = True
 
 
 def _turned(p: Any, v: Any) -> Array:
@@ -110,12 +114,13 @@ def _rates_of_poses(space: SpecialEuclidean, seconds: bool) -> list[Rate]:
         return lambda at: np.linalg.norm(at(quantity)[..., :n, n], axis=-1)
 
     first, second = ("ω", "ω′") if n == 2 else ("|ω|", "|ω′|")
-    return [
+    rates = [
         Rate(f"turning rate\n{first}, {turn[0]}", 1, turning("velocity"), n == 2),
         Rate(f"speed\n|v|{move[0]}", 1, moving("velocity")),
         Rate(f"turning\nacceleration\n{second}, {turn[1]}", 2, turning("acceleration"), n == 2),
         Rate(f"acceleration\n|v′|{move[1]}", 2, moving("acceleration")),
     ]
+    return [rate._replace(whole=False) for rate in rates]
 
 
 def rows_of(space: Space[Any], seconds: bool, most: int) -> list[tuple[int | None, Rate]]:
@@ -190,6 +195,10 @@ def _draw_rate(axes: Axes, curves: Sequence[Curve], rate: Rate) -> None:
         top = max(top, rate.scale * float(curve.at("speed").max()))
         # Rounding errors of points between the closest knots, which a curve at rest has.
         rounding = max(rounding, rate.scale * 1e-15 * np.abs(curve.points).max() / np.diff(curve.data.times).min())
+    for limit in {curve.limits[0][rate.order - 1] for curve in curves if curve.limits and rate.whole} - {np.inf}:
+        for bound in (limit, -limit) if rate.signed else (limit,):
+            axes.axhline(rate.scale * bound, color=MARK, linewidth=1, linestyle="--", zorder=2, label=LIMIT)
+            drawn.append(rate.scale * bound)
     top = top if top > rounding else 1.0
     unit = top if rate.order == 1 else top / max(curve.x[-1] - curve.x[0] for curve in curves)
     _limit(axes, min(drawn), max(drawn), unit, rounding if rate.order == 1 else 1e-9 * unit, rate.signed)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from .._lonlat import to_lonlat
 from . import land
 from .arrows import draw_arrows
-from .curves import CIRCLE, Curve, disc_indices, draw_tube
+from .curves import CIRCLE, Curve, disc_indices, draw_tube, interrupted
 from .globe import View, degrees, draw_frame, draw_globe, label_directions, middle_of
 from .style import GRID, HALO, INK, MARK, PAPER, SPLINE, Array, inside, note, plain, points, size, window
 
@@ -267,7 +267,7 @@ def broken_at_rim(line: Array) -> Array:
         rim = (before + share * (after - before)) * [1, 1, 0]
         rim /= np.linalg.norm(rim)
         gaps.append([rim, np.full(3, np.nan), -rim])
-    return _interrupted(line * side, crossings, gaps)
+    return interrupted(line * side, crossings, gaps)
 
 
 def _name_crossings(axes: Axes, view: View, broken: Array) -> bool:
@@ -286,16 +286,11 @@ def _name_crossings(axes: Axes, view: View, broken: Array) -> bool:
     return bool(gaps.size)
 
 
-def _interrupted(line: Array, after: Any, gaps: Any) -> Array:
-    """Insert three rows after some of the rows of a line."""
-    return np.insert(line, np.repeat(after + 1, 3), np.reshape(gaps, (-1, line.shape[1])), axis=0)
-
-
 # ---- on the map ----
 
 
 def _draw_map(panel: SubFigure, curves: Sequence[Curve], left: float, has_land: bool) -> None:
-    axes = panel.add_axes(inside(panel, left + 0.65, 0.5, 0.3, 0.2))
+    axes = panel.add_axes(inside(panel, left + 0.65, 0.5, 0.4, 0.2))
     plain(axes)
     axes.set(aspect="equal", xlim=(-180, 180), ylim=(-90, 90), facecolor=PAPER, label="map")
     axes.set_xticks(range(-180, 181, 60), [degrees(x, "E", "W") for x in range(-180, 181, 60)])
@@ -343,7 +338,7 @@ def broken(positions: Array) -> Array:
     step = np.diff(positions[:, 0])
     short = step - 360 * np.rint(step / 360)
     (jumps,) = np.nonzero((np.abs(step) > 180) | (np.abs(short) > _POLE))
-    return _interrupted(positions, jumps, [_gap(positions[i], positions[i + 1], short[i]) for i in jumps])
+    return interrupted(positions, jumps, [_gap(positions[i], positions[i + 1], short[i]) for i in jumps])
 
 
 def _gap(before: Array, after: Array, step: float) -> Any:

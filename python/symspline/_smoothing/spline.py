@@ -602,13 +602,13 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
 
     # ---- plots ----
 
-    @property
-    def _made_of(self) -> str:
+    def _made_of(self, radius: float | None = None) -> str:
         count = int(np.max(np.sum(self._noisy.used, axis=-1)))
         df = _ranges([part.report.df for part in self._smoothed], 3)
-        sigma = _ranges([part.sigma for part in self._smoothed], 2)
+        sigma = _ranges([part.sigma * (radius or 1) for part in self._smoothed], 3 if radius else 2)
         each = " each" if self._batch else ""
-        return f"{count} data{each}, {df} degrees of freedom, noise {sigma}"
+        unit = " m" if radius else ""
+        return f"{count} data{each}, {df} degrees of freedom, noise {sigma}{unit}"
 
     def _noise_beside(self, index: tuple[int, ...], x: Doubles) -> UncertaintyBand:
         noisy = self._noisy.map(itemgetter(index), ())
