@@ -17,6 +17,7 @@ DOCS = Path(__file__).parent
 PAGES = (
     "jax",
     "manifolds",
+    "smoothing",
     "start",
     "xarray",
     "guide/batches",

@@ -19,7 +19,7 @@ ROOT = Path(__file__).parents[2]
 
 def test_the_example_of_the_start_page(run):
     section = (ROOT / "docs/start.md").read_text(encoding="utf-8").split("## Command line")[1].split("\n## ")[0]
-    write("ida.csv", re.search(r"```csv\n(.*?)```", section, re.S)[1])
+    write("ida.csv", re.search(r"```text\n(.*?)```", section, re.S)[1])
     lines = re.search(r"```sh\n(.*?)```", section, re.S)[1].splitlines()
     assert [line.split()[1] for line in lines] == ["fit", "check", "sample", "plot"]
     for line in lines:
