@@ -121,6 +121,8 @@ def read_tracks(
                 f"interpolate has the column {name!r}, but only columns of numbers other than times, positions and "
                 "names of tracks can be interpolated"
             )
+    if time is None and not dated and (found := [own for own in frame.columns if frame[own].dtype.kind == "M"]):
+        raise ValidationError(f"the index of frame holds no dates. Pass the column of the times: time={found[0]!r}.")
     name = time if time is not None else frame.index.name or "time"
     stamps = frame.index.to_series(index=range(len(frame))) if time is None else frame[time].reset_index(drop=True)
     for column in keys:

@@ -77,6 +77,7 @@ def test_invalid_resampling_raises():
     for change, what in [
         (lambda t: {"by": "ship"}, "column 'ship' does not exist; the columns are mmsi, when, lon, lat"),
         (lambda t: {"time": "lon"}, "column 'lon' must hold dates"),
+        (lambda t: {"time": None}, r"the index of frame holds no dates. Pass the column of the times: time='when'\."),
         (lambda t: {"time": "text", "frame": t.assign(text="1.2.2026 10:00")}, "column 'text' must hold .* ISO 8601"),
         (lambda t: {"interpolate": "mmsi"}, "interpolate has the column 'mmsi', but only columns of numbers"),
         (lambda t: {"interpolate": "name", "frame": t.assign(name="x")}, "interpolate has the column 'name'"),
