@@ -160,7 +160,7 @@ def test_products_have_one_array_per_factor(run):
         ("grid wind.npz --space s:2 --zoom 2 -o x.zarr", "x.zarr: values of a .npz file are written to such a file"),
         (
             "grid wind.npz --space s:2 -o x.csv",
-            "x.csv: the name of a grid must end in .npz or .nii or .nii.gz or .zarr",
+            "x.csv: the name of a grid must end in .npz, .nii, .nii.gz or .zarr",
         ),
         ("grid none.npz --space s:2 -o x.npz", "cannot read none.npz: No such file or directory"),
         ("grid none.nii --order fsl --zoom 2 -o x.nii", "cannot read none.nii: No such file or directory"),

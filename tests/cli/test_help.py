@@ -56,7 +56,7 @@ def test_info_of_tables(run):
     write("a.csv", TRACK)
     assert run("info a.csv").splitlines() == [
         "a.csv: csv table, 4 rows",
-        "  time: 4 texts: 2021-08-29T00:00Z, 2021-08-29T06:00Z, 2021-08-29T12:00Z, ...",
+        "  time: 4 distinct texts: 2021-08-29T00:00Z, 2021-08-29T06:00Z, 2021-08-29T12:00Z, ...",
         "  lon: -179.0 to 178.5",
         "  lat: 28.0 to 31.5",
         "times in column 'time': 2021-08-29T00:00 to 2021-08-29T18:00 UTC, usual step 21600 s",
@@ -67,13 +67,11 @@ def test_info_of_tables(run):
     write("b.csv", "t,x,who\n" + "".join(",".join(map(str, row)) + "\n" for row in rows) + "15,,bob\n")
     out = run("info b.csv")
     assert "  x: 0.0 to 2" in out and ", 1 missing\n" in out
-    assert "usual step 0.05, 1 before the previous one\n" in out and out.endswith(
-        "--curve who makes a curve of each who\n"
-    )
+    assert "usual step 0.05, 1 step back in time\n" in out and out.endswith("--curve who fits one curve per who\n")
     write("c.csv", "t,x\n" + "".join(f"{t:.2f},1\n" for t in [*np.arange(0, 2, 0.05), *np.arange(14, 15, 0.05)]))
     assert "usual step 0.05, 1 long gap, up to 12.05\n" in run("info c.csv")
     np.savez("d.npz", t=[0.0, 1, 1, 3], points=np.eye(4))
-    assert "times in column 't': 0.0 to 3.0, usual step 1.5, 1 repeated" in run("info d.npz")
+    assert "times in column 't': 0.0 to 3.0, usual step 1.5, 1 repeated time" in run("info d.npz")
     write("e.csv", "hours,x\n0,1\n1,2\n")
     assert "hours may hold the times; say --time hours" in run("info e.csv")
     assert "usual step 1\n" in run("info e.csv --time hours")

@@ -31,7 +31,7 @@ def test_sort(fit, fails):
     line([0, 3, 1, 2])
     problem = fails("fit a.csv --space r:1 -o a.npz")
     assert problem.startswith("a.csv, line 4: time 1.0 does not come after 3.0 in line 3")
-    assert problem.endswith("times must increase; --sort puts rows in order")
+    assert problem.endswith("times must increase; --sort puts the rows in order")
     assert fit("--sort") == through([0, 1, 2, 3], [0, 2, 3, 1])
     line([5, 0, 1, 4], id=[*"abba"])
     assert fit("--curve id --sort") == {"a": through([4, 5], [3, 0]), "b": through([0, 1], [1, 2])}
@@ -76,7 +76,7 @@ def test_max_gap(run, fit, fails):
     # As long as the limit is no gap.
     assert len(fit("--max-gap 27")) == 1
     for gap, problem in [
-        ("0.5", "every point is alone"),
+        ("0.5", "every point is alone; the median step is 1"),
         ("5s", "give a gap without a unit"),
         ("soon", "--max-gap soon: a duration is a number"),
     ]:

@@ -61,7 +61,7 @@ def test_times_may_repeat(run, fails):
     run("fit a.csv --lonlat --smooth --dedup first -o a.npz")
     near(ss.load("a.npz"), ss.make_smoothing_spline(T[:30], PLACES[::2], "sphere:2"))
     write_table("a.csv", {"t": -(T // 2), "lon": LON, "lat": LAT})
-    assert fails("fit a.csv --lonlat --smooth -o b.npz").endswith("must not decrease; --sort puts rows in order")
+    assert fails("fit a.csv --lonlat --smooth -o b.npz").endswith("must not decrease; --sort puts the rows in order")
     write_table("a.csv", {"t": T - T, "lon": LON, "lat": LAT})
     assert "The data have one time only" in fails("fit a.csv --lonlat --smooth -o b.npz")
 

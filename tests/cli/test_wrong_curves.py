@@ -28,7 +28,7 @@ def test_equal_times_of_several_tracks_suggest_their_column_first(run, fails):
             for options in ["", "--sort"]:
                 ships(order, identity)
                 message = fails(f"fit ships.csv --lonlat {options} -o a.npz")
-                assert "; --curve ship makes a curve of each ship, " in message
+                assert "; --curve ship fits one curve per ship; otherwise " in message
                 assert message.index("--curve") < max(message.find("--dedup"), message.find("--sort"))
                 if order == "by time" and not options:
                     run("fit ships.csv --lonlat --curve ship -o a.npz")

@@ -19,7 +19,7 @@ def test_the_commands_of_the_guide(tmp_path):
     command = f'symspline() {{ "{sys.executable}" -m symspline "$@"; }}\nset -eo pipefail\n' + "".join(blocks)
     done = subprocess.run([shell, "-c", command], cwd=tmp_path, capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stderr
-    assert "--curve storm makes a curve of each storm" in done.stdout and done.stdout.endswith("]\n")
+    assert "--curve storm fits one curve per storm" in done.stdout and done.stdout.endswith("]\n")
     assert sorted(path.name for path in tmp_path.glob("hourly*")) == [
         "hourly.csv",
         "hourly_Ida.csv",

@@ -54,7 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Measure all curves, print the table, and compare with what is allowed."""
-    curves = read_curves(options.curves).chosen(options.curves, options.curve)
+    curves = read_curves(options.curves).chosen(options.curve)
     width = max(len("curve"), *(len(brief(name)) for name in curves.splines)) + 2 if curves.named else 0
 
     def line(name: str, count: object, *cells: str) -> None:
@@ -71,7 +71,7 @@ def run(options: argparse.Namespace) -> int:
             failed.append(name)
     if failed:
         many = f"{len(failed)} of {len(curves.splines)} curves: {listed(failed)}"
-        raise Failure(f"{options.curves}: more than rounding allows in {many if curves.named else 'the curve'}")
+        raise Failure(f"{curves.file}: more than rounding allows in {many if curves.named else 'the curve'}")
     print("All is within what rounding allows.")
     return 0
 

@@ -249,7 +249,9 @@ def _check_count(
     other = [name for name in table.names if name not in known]
     if other and not given:
         advice += f" (no numbers in the first row of {listed(other)})"
-    point = "longitude and latitude are 2 numbers" if lonlat else f"a point of {space} has {described(space)}"
+    turned = count_with_quaternion(space)
+    either = f", or {turned} numbers with a quaternion" if turned else ""
+    point = "longitude and latitude are 2 numbers" if lonlat else f"a point of {space} has {described(space)}{either}"
     kind = "numbers" if any(len(entry) > 2 for entry in entries) else "columns"
     found = f"{len(entries)} {kind}: {listed([name for name, *_ in entries])}" if entries else "no columns"
     raise Problem(f"{table.path}: {point}, and there are {found}{advice}")

@@ -41,6 +41,8 @@ class Curves:
         Whether the names have a meaning.
     columns : Columns
         Names of their columns in a table.
+    file : Source or None
+        The file that was read.
     segmented : bool
         Whether the curves are the segments of one recording, in the order of time.
     """
@@ -49,12 +51,13 @@ class Curves:
     named: bool
     columns: Columns
     segmented: bool = False
+    file: Source | None = None
 
     def called(self, name: str) -> str:
         """Refer to a curve in a message."""
         return f"{'segment' if self.segmented else 'curve'} {name!r}" if self.named else "the curve"
 
-    def chosen(self, file: object, names: Sequence[str] | None) -> Curves:
+    def chosen(self, names: Sequence[str] | None) -> Curves:
         """Return the curves of these names, with all segments of each; a single one needs no name."""
         if names is None:
             return self
@@ -62,7 +65,7 @@ class Curves:
         for name in names:
             # A curve that was cut at gaps has the segments NAME/1, NAME/2, ...
             found = {key: own for key, own in self.splines.items() if name in (key, key.rpartition("/")[0])}
-            refuse(file, (not found, f" has no curve {name!r}; {did_you_mean(name, list(self.splines))}"))
+            refuse(self.file, (not found, f" has no curve {name!r}; {did_you_mean(name, list(self.splines))}"))
             splines |= found
         return replace(self, splines=splines, named=len(splines) > 1)
 
@@ -110,7 +113,7 @@ def read_curves(path: Path, lonlat: bool = False) -> Curves:
         columns = _columns(source, file, space)
     if lonlat and not columns.lonlat:
         columns = replace(columns, points=LONLAT, lonlat=True)
-    return Curves(splines, named, columns, segmented)
+    return Curves(splines, named, columns, segmented, source)
 
 
 def _columns(path: object, file: BinaryIO, space: Space) -> Columns:

@@ -168,7 +168,7 @@ def run(options: argparse.Namespace) -> int:
     fitted = _fitted(data, space, options, smooth)
     segmented = options.max_gap is not None and curve is None
     write_curves(options.output, Curves(dict(zip(data.groups, fitted, strict=True)), data.named, columns, segmented))
-    words = f"{_summary.fitted(fitted, options.lonlat)}{data.changes()}{_summary.long_gaps_of(fitted)}"
+    words = f"{_summary.fitted(fitted, options.lonlat)}{data.changes()}{_summary.bridged(fitted)}"
     tell(f"{called(options.output)}: {words}")
     same = data.merged or data.repeated
     column = hint() if same else None

@@ -7,7 +7,7 @@ from pathlib import Path, PurePath
 from typing import BinaryIO, NamedTuple
 
 from . import _binary, _csv, _records
-from ._messages import refuse
+from ._messages import alternatives, refuse
 from ._streams import STANDARD, Source, written
 from ._tables import Array, Layout, Table
 
@@ -41,7 +41,7 @@ def format_of(path: Path, given: str | None, known: Sequence[str] = TABLES, what
     formats = {f".{end}": form for form in known for end in _FORMATS[form].endings}
     form = formats.get(unpacked.suffix, "")
     wrong = not form or (unpacked != name and is_binary(form))
-    refuse(path, (wrong, f": the name of {what} must end in {' or '.join(formats)}"))
+    refuse(path, (wrong, f": the name of {what} must end in {alternatives([*formats])}"))
     return form
 
 

@@ -23,7 +23,7 @@ from .._files import load
 from .._grid import GridSpline
 from .._spaces import Product, Space, factors_of, space_named
 from ._columns import split_names
-from ._messages import Problem, Progress, did_you_mean, reading, refuse
+from ._messages import Problem, Progress, alternatives, did_you_mean, reading, refuse
 from ._streams import STANDARD, Source, writing
 from ._tables import Array
 
@@ -58,7 +58,7 @@ def ending_of(path: Path) -> str:
     """Return the ending of the name of a grid, which selects the format."""
     endings = (NPZ, *VOLUMES, ZARR)
     found = [ending for ending in endings if path == STANDARD or path.name.lower().endswith(ending)]
-    refuse(path, (not found, f": the name of a grid must end in {' or '.join(endings)}"))
+    refuse(path, (not found, f": the name of a grid must end in {alternatives(endings)}"))
     return found[0]
 
 

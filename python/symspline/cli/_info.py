@@ -31,7 +31,7 @@ from ._curves import read_curves
 from ._formats import TABLES, endings, format_of, open_table
 from ._messages import Problem, listed, refuse
 from ._streams import Source
-from ._summary import counted, gaps_in, smoothing_of
+from ._summary import counted, gaps_in, smoothed
 from ._tables import Array, Rows, Table
 
 _LIBRARIES = {"pyarrow": "Parquet and large CSV files", "gpxpy": "GPX files", "matplotlib": "symspline plot"}
@@ -97,13 +97,13 @@ def _table(table: Table, given: str | None) -> list[str]:
     seconds = axis.knots(knots)
     lines.append(f"times in column {time!r}: {_times(rows, seconds)}")
     names = column_of_names(table, time, [time]) if (np.diff(seconds) <= 0).any() else None
-    return lines if names is None else [*lines, f"--curve {names} makes a curve of each {names}"]
+    return lines if names is None else [*lines, f"--curve {names} fits one curve per {names}"]
 
 
 def _described(values: list[str] | Array) -> str:
     if isinstance(values, list):
         texts = list(dict.fromkeys(values))
-        return f"{counted(len(texts), 'text')}: {', '.join(texts[:3])}{', ...' if len(texts) > 3 else ''}"
+        return f"{counted(len(texts), 'distinct text')}: {', '.join(texts[:3])}{', ...' if len(texts) > 3 else ''}"
     found = values[values == values]
     missing = len(values) - len(found)
     return f"{found.min()} to {found.max()}{f', {missing} missing' if missing else ''}" if found.size else "no values"
@@ -116,10 +116,11 @@ def _times(rows: Rows, seconds: Doubles) -> str:
     ahead = steps[steps > 0]
     if ahead.size:
         parts.append(f"usual step {np.median(ahead):.6g}{unit}")
-    counts = ((int((steps == 0).sum()), "repeated"), (int((steps < 0).sum()), "before the previous one"))
-    parts += [f"{count} {what}" for count, what in counts if count]
-    gaps = gaps_in(seconds, unit) if ahead.size == steps.size > 0 else ""
-    return ", ".join([*parts, gaps] if gaps else parts)
+    repeats, back = int((steps == 0).sum()), int((steps < 0).sum())
+    parts += [counted(repeats, "repeated time")] if repeats else []
+    parts += [f"{counted(back, 'step')} back in time"] if back else []
+    parts += [gaps_in([seconds], unit)] if ahead.size == steps.size > 0 else []
+    return ", ".join(filter(None, parts))
 
 
 # ---- curves ----
@@ -134,9 +135,7 @@ def _curves(path: Path) -> list[str]:
     for name, spline in curves.splines.items():
         parts = [f"{len(spline.t)} nodes, {spline.t[0]} to {spline.t[-1]}"]
         if isinstance(spline, SmoothingSpline):
-            for part, (report,) in smoothing_of([spline]):
-                noise = f"λ {report.lam:.3g}, {report.df:.3g} degrees of freedom, noise {report.sigma:.3g}"
-                parts.append(part + noise)
+            parts.append(smoothed([spline], curves.columns.lonlat))
         else:
             ends = spline.bc_type if isinstance(spline.bc_type, str) else ", ".join(map(str, spline.bc_type))
             parts.append(f"{ends} ends, residual {spline.report.residual:.1e}")

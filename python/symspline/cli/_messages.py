@@ -79,6 +79,11 @@ def listed(names: Sequence[str]) -> str:
     return shown if len(names) <= 12 else f"{shown}, … ({len(names)})"
 
 
+def alternatives(names: Sequence[str]) -> str:
+    """Join names by commas and "or"."""
+    return " or ".join([*filter(None, [", ".join(names[:-1])]), names[-1]])
+
+
 @contextmanager
 def reading(path: object, verb: str = "read") -> Iterator[None]:
     """Raise `Problem` if the file cannot be read."""

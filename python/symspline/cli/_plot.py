@@ -16,7 +16,7 @@ from pathlib import Path
 
 from .. import geo
 from ._curves import read_curves
-from ._messages import Problem, did_you_mean, listed, refuse, tell
+from ._messages import Problem, alternatives, listed, refuse, tell
 from ._streams import STANDARD, called, check_target, writing
 
 
@@ -34,13 +34,11 @@ def run(options: argparse.Namespace) -> int:
     """Draw the curve, and write the picture."""
     check_target(options.output, options.curves, binary=True)
     curves = read_curves(options.curves, options.lonlat)
-    names, name = list(curves.splines), options.curve
+    curves = curves.chosen(None if options.curve is None else [options.curve])
+    names = list(curves.splines)
     several = f" has {len(names)} curves; say which with --curve: {listed(names)}"
-    refuse(options.curves, (name is None and len(names) > 1, several))
-    if name is not None and name not in names:
-        raise Problem(f"{options.curves} has no curve {name!r}; {did_you_mean(name, names)}")
-    name = names[0] if name is None else name
-    spline = curves.splines[name]
+    refuse(curves.file, (len(names) > 1, several))
+    spline = curves.splines[names[0]]
     try:
         figure = geo.plot(spline) if curves.columns.lonlat else spline.plot()
     except ImportError as error:
@@ -48,8 +46,13 @@ def run(options: argparse.Namespace) -> int:
     # A still image in a format of animations would mislead.
     known = sorted(set(figure.canvas.get_supported_filetypes()) - {"gif", "apng"})
     form = options.to or ("png" if options.output == STANDARD else options.output.suffix[1:].lower())
-    refuse(options.output, (form not in known, f": the name of a picture must end in .{', .'.join(known)}"))
+    refuse(
+        options.output,
+        (form not in known, f": the name of a picture must end in {alternatives([f'.{end}' for end in known])}"),
+    )
     with writing(options.output) as temporary:
         figure.savefig(temporary, format=form)
-    tell(f"{called(options.output)}: a picture of {curves.called(name)}")
+    tell(
+        f"{called(options.output)}: a picture of {'the curve' if options.curve is None else f'curve {options.curve!r}'}"
+    )
     return 0

@@ -60,8 +60,13 @@ class Recordings:
                     raise Problem(f"--max-gap: two curves would have the name {new!r}")
                 self.groups[new] = kept
                 self.curves.append(curve)
-        none_left = f": with --max-gap {options.max_gap} every point is alone; a curve needs two"
-        refuse(path, (not self.groups, none_left))
+        if not self.groups:
+            raise Problem(f"{path}: with --max-gap {options.max_gap} every point is alone{self._usual_step(groups)}")
+
+    def _usual_step(self, groups: Mapping[str, Index]) -> str:
+        steps = np.concatenate([np.diff(self._rows.times[own]) for own in groups.values()])
+        unit, dates = np.timedelta64(1, "s"), steps.dtype.kind == "m"
+        return f"; the median step is {np.median(steps / unit if dates else steps):.6g}{' s' if dates else ''}"
 
     def changes(self) -> str:
         """Describe the rows that were merged or omitted, which the curves do not show."""
@@ -129,9 +134,9 @@ class Recordings:
             i = bad[0]
             before, here = self._rows.place(int(own[i])), self._rows.place(int(own[i + 1]))
             column = self._hint()
-            curves = "" if column is None else f"--curve {column} makes a curve of each {column}, "
+            curves = "" if column is None else f"--curve {column} fits one curve per {column}; otherwise "
             same = times[i + 1] == times[i]
-            repair = "--dedup first or mean makes one point of them" if same else "--sort puts rows in order"
+            repair = "--dedup first or mean makes one point of them" if same else "--sort puts the rows in order"
             raise Problem(
                 f"{self._path}, {here}: time {times[i + 1]}{of} does not come after {times[i]} in {before}; times must "
                 f"{'not decrease' if self._smooth else 'increase'}; {curves}{repair}"

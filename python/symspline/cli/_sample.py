@@ -103,7 +103,7 @@ def run(options: argparse.Namespace) -> int:
     orders, digits = _orders(options.nu), options.digits
     refuse(f"--digits {digits}: ", (digits is not None and not 1 <= digits <= 17, "give a number between 1 and 17"))
     every_curve = read_curves(options.curves, options.lonlat)
-    curves = every_curve.chosen(options.curves, options.curve)
+    curves = every_curve.chosen(options.curve)
     columns = _tum_columns(curves, orders) if form == "tum" else curves.columns
     times, rows = _times(options, curves, every_curve)
     # A trajectory has no columns for standard deviations.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -30,13 +30,13 @@ def spread(values: Sequence[Any]) -> str:
     return least if least == most else f"{least} to {most}"
 
 
-def gaps_in(times: Doubles, unit: str) -> str:
-    """Describe the steps that are far longer than most; empty if there are none."""
-    found = np.diff(times)[long_gaps(times)]
+def gaps_in(recordings: Iterable[Doubles], unit: str) -> str:
+    """Describe the steps that are far longer than most of a recording; empty if there are none."""
+    found = np.concatenate([np.diff(times)[long_gaps(times)] for times in recordings])
     return f"{counted(found.size, 'long gap')}, up to {found.max():.6g}{unit}" if found.size else ""
 
 
-def smoothing_of(splines: Sequence[SmoothingSpline[Any, Any]]) -> list[tuple[str, list[SmoothingReport]]]:
+def _reports(splines: Sequence[SmoothingSpline[Any, Any]]) -> list[tuple[str, list[SmoothingReport]]]:
     """Return the reports of all curves for every space in which they were smoothed, which is named if several are."""
     space = splines[0].space
     reports = [spline.report if is_several(space) else (spline.report,) for spline in splines]
@@ -51,11 +51,16 @@ def fitted(splines: Sequence[CubicSpline], lonlat: bool) -> str:
     where = "near" if smooth else "through"
     words = f"{counted(len(splines), 'curve')} {where} {points} points of {splines[0].space}, converged: "
     if smooth:
-        return words + "; ".join(_chosen(name, own) + _noise(own, lonlat) for name, own in smoothing_of(smooth))
+        return words + smoothed(smooth, lonlat)
     reports = [spline.report for spline in splines]
     most = "at most " if len(splines) > 1 else ""
     iterations, residual = max(r.iterations for r in reports), max(r.residual for r in reports)
     return f"{words}{reports[0].method}, {most}{iterations} iterations, residual {most}{residual:.1e}"
+
+
+def smoothed(splines: Sequence[SmoothingSpline[Any, Any]], lonlat: bool) -> str:
+    """Describe λ, the degrees of freedom and the noise, which is in degrees with ``lonlat``."""
+    return "; ".join(_chosen(name, own) + _noise(own, lonlat) for name, own in _reports(splines))
 
 
 def _chosen(name: str, own: Sequence[SmoothingReport]) -> str:
@@ -74,18 +79,16 @@ def _noise(own: Sequence[SmoothingReport], lonlat: bool) -> str:
     return f", noise {noise}{'°' if lonlat else ''}{advice}"
 
 
-def long_gaps_of(splines: Sequence[CubicSpline]) -> str:
+def bridged(splines: Sequence[CubicSpline]) -> str:
     """Describe the gaps across which curves pass although nothing was measured there."""
-    steps: list[Doubles] = []
-    for spline in splines:
-        times = spline._times
-        if isinstance(spline, SmoothingSpline):
-            times = np.unique(spline._noisy.times[spline._noisy.used])
-        steps.append(np.diff(times)[long_gaps(times)])
-    found = np.concatenate(steps)
-    unit = " s" if splines[0].t.dtype.kind == "M" else ""
-    gaps = f"; {counted(found.size, 'long gap')}, up to {found.max(initial=0.0):.4g}{unit} (--max-gap cuts there)"
-    return gaps if found.size else ""
+    gaps = gaps_in(map(_data_times, splines), " s" if splines[0].t.dtype.kind == "M" else "")
+    return f"; {gaps} (--max-gap cuts there)" if gaps else ""
+
+
+def _data_times(spline: CubicSpline) -> Doubles:
+    if isinstance(spline, SmoothingSpline):
+        return np.unique(spline._noisy.times[spline._noisy.used])
+    return spline._times
 
 
 def estimated(
@@ -96,7 +99,7 @@ def estimated(
     kinds = zip(counts, ("points", "rates", "velocities"), strict=True)
     given = [f"{count} {kind}" for count, kind in kinds if count]
     near = " and ".join([*filter(None, [", ".join(given[:-1])]), given[-1]])
-    reports = smoothing_of(splines)
+    reports = _reports(splines)
     # All spaces share one factor.
     sizes = [report.sigma for report in reports[0][1]]
     advice = " (check --sigma, --rate-sigma and --velocity-sigma)" if max(sizes) > _FACTOR else ""
