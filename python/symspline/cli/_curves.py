@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import reduce
 from operator import getitem
@@ -47,7 +47,7 @@ class Curves:
         Whether the curves are the segments of one recording, in the order of time.
     """
 
-    splines: dict[str, CubicSpline]
+    splines: Mapping[str, CubicSpline]
     named: bool
     columns: Columns
     segmented: bool = False
@@ -127,16 +127,13 @@ def _columns(path: object, file: BinaryIO, space: Space) -> Columns:
         # Damaged files raise errors of zipfile, of its decompressors and of NumPy.
         raise Problem(f"{path} is damaged: {brief(error)}") from None
     names, order = columns.points, columns.quaternion
-    count = len(labels(space)) if order is None else count_with_quaternion(space)
-    good = (
-        isinstance(names, list)
-        and len(names) == (len(LONLAT) if columns.lonlat else count)
-        and all(isinstance(name, str) for name in (*names, columns.time, columns.curve))
-        and isinstance(columns.lonlat, bool)
-        and (columns.utc is None or isinstance(columns.utc, bool))
-        and (order is None or (isinstance(order, list) and all(type(i) is int for i in order)))
-        and (order is None or sorted(order) == list(range(len(names))))
-        and not (columns.lonlat and (space != GLOBE or order is not None))
-    )
+    numbers = count_with_quaternion(space) if order else len(labels(space))
+    texts = isinstance(names, list) and all(isinstance(name, str) for name in (*names, columns.time, columns.curve))
+    good = texts and columns.lonlat in (True, False) and columns.utc in (True, False, None)
+    if good and columns.lonlat:
+        good = len(names) == len(LONLAT) and space == GLOBE and order is None
+    elif good:
+        whole = order is None or (isinstance(order, list) and all(type(i) is int for i in order))
+        good = len(names) == numbers and whole and (order is None or sorted(order) == list(range(len(names))))
     refuse(path, (not good, f" is damaged: its names of columns do not suit {space}"))
     return columns

@@ -205,7 +205,7 @@ def _fitted(
             if smooth is None:
                 fitted = fit_many(data.curves, space, progress=progress, **common)
             else:
-                curves = [(*curve, {}) for curve in data.curves]
+                curves: Any = [(*curve, {}) for curve in data.curves]
                 fitted = smooth_many(curves, space, progress=progress, **common, **smooth)
     except SymsplineError as error:
         raise error._with_message(data.located(error)) from None

@@ -100,9 +100,9 @@ def _table(table: Table, given: str | None) -> list[str]:
     return lines if names is None else [*lines, f"--curve {names} fits one curve per {names}"]
 
 
-def _described(values: list[str] | Array) -> str:
-    if isinstance(values, list):
-        texts = list(dict.fromkeys(values))
+def _described(values: Array) -> str:
+    if values.dtype.kind in "OUST":
+        texts = list(dict.fromkeys(map(str, values.tolist())))
         return f"{counted(len(texts), 'distinct text')}: {', '.join(texts[:3])}{', ...' if len(texts) > 3 else ''}"
     found = values[values == values]
     missing = len(values) - len(found)

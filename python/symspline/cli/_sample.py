@@ -54,12 +54,13 @@ from .._pose_files import TUM
 from .._smoothing import SmoothingSpline
 from .._spaces import Doubles, space_named
 from .._time import onto_ends
-from ._columns import quaternion_by_names, time_column
+from ._columns import time_column
 from ._curves import Curves, read_curves
 from ._formats import TABLES, endings, format_of, is_binary, open_table, write_table
 from ._messages import Problem, Progress, did_you_mean, first_duplicate, refuse, say, tell
-from ._points import Columns, Samples, deviations_of, samples_of
+from ._points import Columns, quaternion_by_names
 from ._recordings import group
+from ._samples import Samples, deviations_of, samples_of
 from ._streams import called, check_inputs, check_target
 from ._tables import Layout, Rows, Table
 from ._times import Times, every, number, spread
@@ -257,13 +258,13 @@ def _by_segment(rows: Rows, curves: Curves) -> dict[str, NDArray[np.int64]]:
 
 def _check_times(path: object, rows: Rows, own: NDArray[np.int64], curves: Curves, name: str) -> None:
     """Raise `Problem` unless the curve has points at these times."""
-    spline, called = curves.splines[name], curves.called(name)
+    spline, curve = curves.splines[name], curves.called(name)
     times, knots = rows.times[own], spline.t
     dates = knots.dtype.kind == "M"
     expected, found = ("dates", "numbers") if dates else ("numbers", "dates")
     these, those = ("a time zone", "none") if rows.utc else ("no time zone", "one")
-    kinds = f": the times of {called} are {expected}, but these are {found}"
-    zones = f": its times have {these}, but those of {called} have {those}: which time is meant is in doubt"
+    kinds = f": the times of {curve} are {expected}, but these are {found}"
+    zones = f": its times have {these}, but those of {curve} have {those}: which time is meant is in doubt"
     mixed = dates and {rows.utc, curves.columns.utc} == {True, False}
     refuse(path, ((times.dtype.kind == "M") != dates, kinds), (mixed, f"{zones}; write both with a zone, or neither"))
     if spline._extrapolation_mode != "raise":
@@ -272,6 +273,6 @@ def _check_times(path: object, rows: Rows, own: NDArray[np.int64], curves: Curve
     outside = np.flatnonzero((inside < knots[0]) | (inside > knots[-1]))
     if outside.size:
         raise Problem(
-            f"{path}, {rows.place(int(own[outside[0]]))}: time {times[outside[0]]} is outside {called}, which runs "
+            f"{path}, {rows.place(int(own[outside[0]]))}: time {times[outside[0]]} is outside {curve}, which runs "
             f"from {knots[0]} to {knots[-1]}; fit with --extrapolate to define the curve there"
         )

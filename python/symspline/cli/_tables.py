@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import islice
 from typing import Any
@@ -173,12 +174,15 @@ class Table:
         """Return the columns of the points if none are named: all numeric columns but the others."""
         return self.groups.get("points") or [name for name in self.numeric if name not in others]
 
-    def shown(self, name: str) -> list[str] | Array:
+    def shown(self, name: str) -> Array:
         """Return the values of a column, as numbers if they all are, to describe them."""
         column = self.columns[name]
         if not isinstance(column, Texts):
-            return column if column.dtype.kind != "O" else column.astype(np.str_).tolist()
-        return self._numbers(name, True) if column.is_numeric else column.tolist()
+            return np.asarray(column)
+        if column.is_numeric:
+            with suppress(Problem):
+                return self._numbers(name, True)
+        return np.array(column.tolist())
 
     def read(self, names: Sequence[str], time: str | None, label: str | None, sparse: Sequence[str] = ()) -> Rows:
         """Read some columns as numbers, one as times and one as labels.

@@ -170,9 +170,7 @@ def every(step: str, knots: Times) -> Times:
     """
     count, unit = _duration(step, "--every")
     kind = knots.dtype.kind
-    if kind == "M":
-        return _multiples(count * _NANOSECONDS[unit or "s"], knots, step)
-    if unit:
+    if unit and kind != "M":
         raise Problem(f"--every {step}: the times of this curve are numbers; give a step without a unit")
     if kind == "f":
         length = float(count)
@@ -181,24 +179,28 @@ def every(step: str, knots: Times) -> Times:
         # The last sample is at the end if the step divides the curve up to rounding.
         samples = _samples((float(knots[-1]) - float(knots[0])) / length * (1 + 1e-12), step)
         return np.asarray(np.minimum(_equidistant(_decimal(knots[0]), Fraction(count), samples), knots[-1]))
-    refuse(f"--every {step}: ", (count != int(count), "a step must be a whole number, as the times are"))
-    first, last = knots[[0, -1]].tolist()
-    jump = min(int(count), last - first)
-    return _after(first, np.uint64(jump) * _indices(_samples((last - first) // int(count), step)), knots.dtype)
+    count *= _NANOSECONDS[unit or "s"] if kind == "M" else 1
+    whole = "of nanoseconds" if kind == "M" else "as the times are"
+    refuse(f"--every {step}: ", (count != int(count), f"a step must be a whole number {whole}"))
+    ends, jump = _in_ticks(knots, int(count)) if kind == "M" else (knots[[0, -1]], int(count))
+    first, last = _integers(ends)
+    start = -(-first // jump) * jump if kind == "M" else first
+    samples = _samples((last - start) // jump, step) if start <= last else 0
+    # A step that is longer than the time between the ends may not fit into 64 bits.
+    return _after(start, np.uint64(min(jump, last - first)) * np.arange(samples, dtype=np.uint64), ends.dtype)
 
 
-def _multiples(step: Decimal, knots: Times, option: str) -> Times:
-    """Return the dates between the ends that are whole multiples of a step in nanoseconds since 1970."""
-    refuse(f"--every {option}: ", (step != int(step), "a step must be a whole number of nanoseconds"))
-    unit = next(unit for unit in ("s", "ms", "us", "ns") if int(step) % _NANOSECONDS[unit] == 0)
+def _in_ticks(knots: Times, nanoseconds: int) -> tuple[Times, int]:
+    """Return the ends and a step in the coarsest unit in which both are whole numbers."""
+    unit = next(unit for unit in ("s", "ms", "us", "ns") if nanoseconds % _NANOSECONDS[unit] == 0)
     ends = _in_unit(knots, unit)
     ticks = int(np.ones(1, f"datetime64[{unit}]").astype(ends.dtype).astype(np.int64)[0])
-    jump = int(step) // _NANOSECONDS[unit] * ticks
-    first, last = ends.astype(np.int64).tolist()
-    start = -(-first // jump) * jump
-    samples = _samples((last - start) // jump, option) if start <= last else 0
-    # A step that is longer than the time between the ends may not fit into 64 bits.
-    return _after(start, np.uint64(min(jump, last - first)) * _indices(samples), ends.dtype)
+    return ends, nanoseconds // _NANOSECONDS[unit] * ticks
+
+
+def _integers(ends: Times) -> list[int]:
+    found: list[int] = ends.astype(np.int64 if ends.dtype.kind == "M" else ends.dtype).tolist()
+    return found
 
 
 def spread(count: int, knots: Times) -> Times:
@@ -208,7 +210,7 @@ def spread(count: int, knots: Times) -> Times:
         return _equidistant(first, (last - first) / max(count - 1, 1), count)
     dates = knots.dtype.kind == "M"
     ends = _in_unit(knots, "us") if dates else knots[[0, -1]]
-    start, stop = ends.astype(np.int64 if dates else ends.dtype).tolist()
+    start, stop = _integers(ends)
     steps = np.rint(np.linspace(0, stop - start, count)[: count - 1]).astype(np.uint64)
     times = _after(start, np.append(steps, np.uint64(stop - start if count > 1 else 0)), ends.dtype)
     return _coarsest(times) if dates else times
@@ -227,10 +229,6 @@ def _equidistant(first: Fraction, step: Fraction, count: int) -> NDArray[np.floa
         # All of these integers are exact as floating-point numbers.
         return np.asarray((start + jump * np.arange(count)) / scale)
     return np.fromiter(((start + jump * i) / scale for i in range(count)), np.float64, count)
-
-
-def _indices(count: int) -> NDArray[np.uint64]:
-    return np.arange(count, dtype=np.uint64)
 
 
 def _after(start: int, steps: NDArray[np.uint64], dtype: Any) -> Times:
