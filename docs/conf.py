@@ -73,6 +73,8 @@ default_role = "autolink"
 
 autosummary_generate = True
 autosummary_ignore_module_all = False
+# Public modules list their names in `__all__` and hide it from `dir`, by which Sphinx would look for it.
+autosummary_imported_members = True
 # A space's own page has what is its own; what all share stands on the page of `Space`.
 autosummary_context = {
     "spaces": [name for name in symspline.__all__ if api_members.is_space(getattr(symspline, name))],

@@ -35,8 +35,7 @@ def _mend_signatures(app: Any, page: str, template: str, context: dict[str, Any]
     """Sphinx writes long signatures as lists of definitions without terms, which screen readers cannot read."""
     if "body" in context:
         context["body"] = SIGNATURE.sub(
-            lambda found: f'<div class="sig-lines">\n{found[1].replace("<dd>", "<div>").replace("</dd>", "</div>")}</div>',
-            context["body"],
+            lambda found: f'<div class="sig-lines">\n{found[1].replace("dd>", "div>")}</div>', context["body"]
         )
 
 

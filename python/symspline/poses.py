@@ -2,8 +2,8 @@
 
 A pose maps the body frame to the world frame: [[R, x], [0, 1]] with attitude R and position x. Fit curves of poses on
 ``so:3 x r:3``. This product has an invariant metric, and the noise and smoothing of attitude and position stay
-separate. `split` converts 4 × 4 matrices, such as ``poses_se3`` of evo, to its points. The matrices themselves are
-points of ``se:3``, whose geodesics are the screw motions of joints and tools.
+separate. `symspline.poses.split` converts 4 × 4 matrices, such as ``poses_se3`` of evo, to its points. The matrices
+themselves are points of ``se:3``, whose geodesics are the screw motions of joints and tools.
 
 Examples
 --------

@@ -39,8 +39,8 @@ def test_handles_and_end_velocities(name):
 
 
 def test_examples_of_symmetric_spaces():
-    """The table of symmetric_spaces.md."""
-    for name in ("sphere:3", "so:4", "spd:3", "gr:2,5"):
+    """The table of symmetric_spaces.md, and the formulas in the docstrings of these spaces."""
+    for name in ("sphere:3", "h:3", "so:4", "spd:3", "gr:2,5"):
         space = ss.space(name)
         p, q, x = points_near(space, 3, 0.7)
         v = space.log(p, q)
@@ -51,6 +51,12 @@ def test_examples_of_symmetric_spaces():
             back = angle / np.sin(angle) * (q - np.cos(angle) * p)
             c, s = np.cos(size), np.sin(size) / size
             moved = x + (p @ x) * ((c - 1) * p + s * v) + (v @ x) * ((c - 1) / size**2 * v - s * p)
+        elif name == "h:3":
+            size = space.norm(p, v)
+            length = np.arccosh(p[0] * q[0] - p[1:] @ q[1:])
+            out = np.cosh(size) * p + np.sinh(size) / size * v
+            back = length / np.sinh(length) * (q - np.cosh(length) * p)
+            moved = space.symmetry(space.exp(p, v / 2), space.symmetry(p, x))
         elif name == "so:4":
             omega = p.T @ v
             out, back = p @ expm(omega), p @ logm(p.T @ q).real

@@ -33,7 +33,11 @@ class SpecialOrthogonal(Group[FloatArray]):
 
     Notes
     -----
-    The metric is :math:`\langle u, v \rangle = \tfrac12 \operatorname{tr} u^T v`.
+    The metric is :math:`\langle u, v \rangle = \tfrac12 \operatorname{tr} u^T v`, and
+
+    .. math:: \exp_p(v) = p \exp(p^{-1} v), \qquad \log_p(q) = p \log(p^{-1} q).
+
+    Rotations that differ by a half turn have no unique shortest geodesic.
 
     Examples
     --------

@@ -44,8 +44,12 @@ class SymmetricPositiveDefinite(_PositiveDefinite[FloatArray]):
 
     Notes
     -----
-    The metric at p is :math:`\operatorname{tr} p^{-1} u p^{-1} v`. The relative rounding error is proportional to the
-    condition number of a point.
+    The metric at p is :math:`\operatorname{tr} p^{-1} u p^{-1} v`, and
+
+    .. math:: \exp_p(v) = p^{1/2} \exp(p^{-1/2} v p^{-1/2})\, p^{1/2}, \qquad
+              \log_p(q) = p^{1/2} \log(p^{-1/2} q p^{-1/2})\, p^{1/2}.
+
+    The relative rounding error is proportional to the condition number of a point.
 
     Examples
     --------

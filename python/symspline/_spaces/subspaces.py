@@ -199,6 +199,11 @@ class Grassmannian(_Subspaces[FloatArray]):
     Notes
     -----
     The distance is :math:`\sqrt{\sum_i \theta_i^2}` with the principal angles :math:`\theta_i` between two subspaces.
+    For a tangent vector with the singular value decomposition :math:`v = U \Theta V^T`,
+
+    .. math:: \exp_p(v) = p V \cos\Theta\, V^T + U \sin\Theta\, V^T.
+
+    Subspaces with a principal angle of a right angle have no unique shortest geodesic.
 
     Examples
     --------

@@ -107,7 +107,7 @@ class Torus(Space[FloatArray]):
 
 
 class Sphere(Preserving[FloatArray]):
-    """The unit sphere Sⁿ.
+    r"""The unit sphere Sⁿ.
 
     A point is a unit vector of n + 1 numbers. Distance is the angle between two vectors. S² describes directions and
     positions on a globe, and S³ unit quaternions. On S³, q and −q are different points; use `SpecialOrthogonal` for
@@ -122,6 +122,16 @@ class Sphere(Preserving[FloatArray]):
     --------
     RealProjective : Lines, on which x and −x are the same point.
     SpecialOrthogonal : Rotations.
+
+    Notes
+    -----
+    With the length :math:`\theta` of v in the exponential, and the angle :math:`\theta` between p and q in the
+    logarithm,
+
+    .. math:: \exp_p(v) = \cos\theta\, p + \frac{\sin\theta}{\theta}\, v, \qquad
+              \log_p(q) = \frac{\theta}{\sin\theta}\, (q - \cos\theta\, p).
+
+    Antipodal points have no unique shortest geodesic.
 
     Examples
     --------
@@ -231,6 +241,12 @@ class Hyperbolic(Preserving[FloatArray]):
 
     Notes
     -----
+    With the Minkowski product :math:`\langle u, v \rangle = -u_0 v_0 + u_1 v_1 + \dots + u_n v_n`, the length
+    :math:`\theta` of v in the exponential, and :math:`\cosh\theta = -\langle p, q \rangle` in the logarithm,
+
+    .. math:: \exp_p(v) = \cosh\theta\, p + \frac{\sinh\theta}{\theta}\, v, \qquad
+              \log_p(q) = \frac{\theta}{\sinh\theta}\, (q - \cosh\theta\, p).
+
     The rounding error of a point p is about :math:`\varepsilon \lVert p \rVert^2`. Points up to distance 15
     from (1, 0, …) are supported; the error is about :math:`10^{-3}` there.
 
