@@ -90,6 +90,7 @@ export class Globe extends Figure {
     this.x = linspace(t[0], t[t.length - 1], SAMPLES);
     this.noisy = this.noise > 0 ? this.measured() : null;
     this.smooth = this.noisy && this.smoothed();
+    for (const name of ["geodesics", "lonlat"]) if (this.control(name)) this.control(name).disabled = Boolean(this.noisy);
     const shown = this.curve;
     this.line = shown.evaluate(this.x);
     this.motion = [1, 2].map((nu) => shown.evaluate(this.x, nu).map((v) => EARTH * norm(v)));
@@ -276,7 +277,7 @@ export class Globe extends Figure {
     if (this.smooth) {
       const { df, sigma } = this.smooth;
       const level = format(rounded((sigma / DEGREE), 2));
-      return `λ = ${this.smooth.lam.toPrecision(3)}, ${df.toFixed(1)} degrees of freedom per coordinate, estimated noise ${level}°. The band contains the true position with a probability of 95 %.`;
+      return `λ = ${this.smooth.lam.toPrecision(3)}, ${df.toFixed(1)} degrees of freedom per coordinate, estimated noise ${level}°. The band contains the true position with a probability of 95 %, on average over time.`;
     }
     return "";
   }
@@ -289,7 +290,7 @@ export class Globe extends Figure {
       this.select(found);
       return { cursor: "move", move: (px, py) => this.movePoint(found, this.ball.unproject(px, py)) };
     }
-    if (this.ball.contains(x, y)) return this.ball.grab(x, y);
+    if (this.ball.contains(x, y)) return { ...this.ball.grab(x, y), scrolls: this.bare };
     return this.bare ? null : this.chart.hit(x, y);
   }
 

@@ -10,6 +10,8 @@ import { between, clamp, linspace, norm, plus, product, rounded, scaled, transpo
 /** Yaw, pitch and roll in radians. */
 const START = { t: [0, 1, 2.2, 3, 4.2], angles: [[0, 0.1, 0], [0.9, -0.5, -0.7], [2, 0.9, 0.4], [2.6, 0.2, 1.1], [3.6, -0.3, 0]] };
 const DEGREES = 180 / Math.PI;
+/** A pitch of 100°, which yaw, pitch and roll write as 80°, with yaw and roll turned by 180°. */
+const PAST = 100 / DEGREES;
 
 /** The rotation with yaw, pitch and roll: about z, then the new −y (nose up), then the new x. */
 const fromAngles = ([yaw, pitch, roll]) => product(turn([0, 0, yaw]), product(turn([0, -pitch, 0]), turn([roll, 0, 0])));
@@ -28,7 +30,7 @@ export class Rotations extends Figure {
     });
     this.control("up")?.addEventListener("click", () => {
       const [yaw, , roll] = toAngles(this.points[this.selected]);
-      this.set(this.selected, fromAngles([yaw, Math.PI / 2 - 0.02, roll]));
+      this.set(this.selected, fromAngles([yaw, PAST, roll]));
       this.toKnot();
     });
   }
@@ -100,8 +102,8 @@ export class Rotations extends Figure {
     if (width > 720) {
       const w = width * 0.54;
       return {
-        main: [w * 0.5, height * 0.27, Math.min(w * 0.27, height * 0.25)],
-        small: [[w * 0.25, height * 0.67, w * 0.12], [w * 0.75, height * 0.67, w * 0.12]],
+        main: [w * 0.5, height * 0.25, Math.min(w * 0.22, height * 0.2)],
+        small: [[w * 0.25, height * 0.67, w * 0.1], [w * 0.75, height * 0.67, w * 0.1]],
         strip: [w, height - 32], chart: { x: w + 18, y: 12, width: width - w - 22, height: height - 18 },
       };
     }
@@ -121,7 +123,7 @@ export class Rotations extends Figure {
     rotations.forEach((rotation, i) => {
       const [x, y, size] = i ? small[i - 1] : main;
       drawAeroplane(context, rotation, [x, y], size, tints[i], colors.paper);
-      stage.text(names[i], x, y + size * (i ? 1.15 : 0.95) + 10, { align: "center", color: colors.ink, size: i ? 12 : 14, weight: 600 });
+      stage.text(names[i], x, y + size * 1.2 + 10, { align: "center", color: colors.ink, size: i ? 12 : 14, weight: 600 });
     });
     // Attitudes at the knots, which can be selected.
     const [width, y] = strip;

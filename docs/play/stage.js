@@ -15,7 +15,7 @@ function onTheme(callback) {
  * The canvas of a figure.
  *
  * `draw(context, stage)` paints it; `hit(x, y, stage)` returns what lies under the pointer, an object with `cursor`,
- * `move(x, y)`, and if needed `end()`, or nothing.
+ * `move(x, y)`, and if needed `end()`, or nothing. With `scrolls`, a finger that moves up or down scrolls the page instead.
  */
 export class Stage {
   constructor(canvas, { draw, hit = () => null, key = () => false, add = null }) {
@@ -120,7 +120,8 @@ export class Stage {
     const onTouch = (event) => {
       const box = canvas.getBoundingClientRect();
       const touch = event.changedTouches[0];
-      if (this.hit(touch.clientX - box.left, touch.clientY - box.top, this)) event.preventDefault();
+      const found = this.hit(touch.clientX - box.left, touch.clientY - box.top, this);
+      if (found && !found.scrolls) event.preventDefault();
     };
     canvas.addEventListener("touchstart", onTouch, { passive: false });
     if (add) canvas.addEventListener("dblclick", (event) => add(...place(event)));
