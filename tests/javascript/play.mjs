@@ -84,6 +84,15 @@ seen.dragged = await globe((figures) => {
 seen.dragged.target = target;
 seen.curves.dragged = await shown("globe");
 
+seen.globe = await globe((figures) => {
+  const { x, motion, naive, geodesics, t, lonlat, ends } = figures.globe;
+  const rows = (points) => points.map((p) => [...p]);
+  return {
+    x: [...x], motion, t, lonlat, ends, naive: { ...naive, places: rows(naive.places) },
+    geodesics: { ...geodesics, places: rows(geodesics.places) },
+  };
+});
+
 // What is under the cursor stays there while the globe turns.
 const held = await globe((figures) => {
   const { ball } = figures.globe;
@@ -202,6 +211,15 @@ seen.curves.rotations = await shown("rotations");
 const main = await look((figures) => figures.rotations.main);
 await drag("rotations", [main[0], main[1]], [main[0] + 40, main[1] - 60]);
 seen.curves.turned = await shown("rotations");
+seen.rotations = await look((figures) => {
+  const { x, motion, eulerMotion, slerp, t } = figures.rotations;
+  const times = [...x].filter((_, i) => i % 13 === 5);
+  const h = 1e-5;
+  return {
+    x: [...x], t, motion, euler: eulerMotion, slerp, times, h, at: times.map((time) => figures.rotations.at(time).map((m) => [...m])),
+    near: times.map((time) => [-h, h].map((step) => figures.rotations.at(time + step)[2])),
+  };
+});
 await page.click('[data-figure="rotations"] [data-play="up"]');
 await settled();
 seen.curves.up = await shown("rotations");
@@ -210,12 +228,14 @@ await origin("states");
 const state1 = await look((figures) => figures.states.kind.places[1]);
 await drag("states", state1, [state1[0] + 25, state1[1] + 30]);
 seen.curves.bloch = await shown("states");
+seen.field = await look((figures) => figures.states.kind.field);
 await page.click('[data-play="ellipses"]');
 await settled();
 await origin("states");
 const tip = await look((figures) => ({ from: figures.states.kind.handles[2].tips[1], at: figures.states.kind.handles[2].at }));
 await drag("states", tip.from, [tip.at[0] + 12, tip.at[1] + 20]);
 seen.curves.ellipses = await shown("states");
+seen.area = await look((figures) => figures.states.kind.area[0]);
 for (const kind of ["plane", "sphere", "disk"]) {
   await page.click(`[data-play="${kind}"]`);
   await settled();

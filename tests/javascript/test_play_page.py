@@ -1,4 +1,4 @@
-"""The page of figures in headless Chromium: points are dragged, and its Python programs give the curves that it draws."""
+"""The page of figures in headless Chromium: its points are dragged, and its Python programs give the drawn curves."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 
 import symspline as ss
 from javascript.npm_tools import PAGE, ROOT, TOOLS, node, require
@@ -93,9 +94,7 @@ def test_times_keys_and_double_clicks(seen: dict[str, Any]) -> None:
 @pytest.mark.parametrize("name", CURVES)
 @pytest.mark.filterwarnings("default")
 def test_the_python_program_gives_the_curve_that_is_drawn(seen: dict[str, Any], name: str) -> None:
-    shown = seen["curves"][name]
-    scope: dict[str, Any] = {}
-    exec(shown["program"], scope)
+    shown, scope = seen["curves"][name], run(seen, name)
     x, points = np.array(shown["x"]), np.array(shown["points"])
     values = scope["spline"](x)
     if name == "bloch":
@@ -103,6 +102,70 @@ def test_the_python_program_gives_the_curve_that_is_drawn(seen: dict[str, Any], 
     scale = np.abs(points).max()
     assert np.abs(values.reshape(points.shape) - points).max() < 1e-12 * max(scale, 1)
     assert np.abs(scope["x"] - x).max() < 1e-12 * x[-1]
+
+
+def run(seen: dict[str, Any], name: str) -> dict[str, Any]:
+    """Run the Python program of a figure."""
+    scope: dict[str, Any] = {}
+    exec(seen["curves"][name]["program"], scope)
+    return scope
+
+
+def test_graphs_of_the_globe(seen: dict[str, Any]) -> None:
+    found, scope = seen["globe"], run(seen, "dragged")
+    x, t = np.array(found["x"]), np.array(found["t"])
+    assert found["motion"][0] == pytest.approx(scope["speed"], rel=1e-10)
+    acceleration = 6371 * np.linalg.norm(scope["spline"](x, nu=2), axis=-1)
+    assert found["motion"][1] == pytest.approx(acceleration, rel=1e-8)
+    polygon = ss.PiecewiseGeodesic(t, scope["points"], "sphere:2")
+    assert np.abs(found["geodesics"]["places"] - polygon(x)).max() < 1e-14
+    inner = ~np.isin(x, t)
+    assert np.array(found["geodesics"]["speed"])[inner] == pytest.approx(6371 * polygon.speed(x)[inner])
+    # Jumps of the velocity at the inner knots, relative to the largest speed.
+    h = 1e-6
+    jumps = [np.linalg.norm(polygon(k + h, nu=1) - polygon(k - h, nu=1)) for k in t[1:-1]]
+    jumps /= polygon.speed(x).max()
+    assert np.array(found["geodesics"]["jumps"]) == pytest.approx(np.column_stack([t[1:-1], jumps]), rel=1e-5)
+
+
+def test_graphs_of_longitude_and_latitude(seen: dict[str, Any]) -> None:
+    found = seen["globe"]
+    flat = CubicSpline(found["t"], found["lonlat"], bc_type="not-a-knot")
+    x, h = np.array(found["x"])[1:-1], 2e-4
+    before, at, after = (ss.geo.from_lonlat(*flat(x + step).T) for step in (-h, 0, h))
+    assert np.abs(found["naive"]["places"][1:-1] - at).max() < 1e-12
+    speed = np.linalg.norm(after - before, axis=-1) / (2 * h)
+    second = (before - 2 * at + after) / h**2
+    second -= (second * at).sum(-1, keepdims=True) * at
+    assert found["naive"]["speed"][1:-1] == pytest.approx(6371 * speed, rel=1e-5)
+    wanted = 6371 * np.linalg.norm(second, axis=-1)
+    assert found["naive"]["acceleration"][1:-1] == pytest.approx(wanted, abs=1e-4 * wanted.max())
+
+
+def test_graphs_of_rotations(seen: dict[str, Any]) -> None:
+    found, scope = seen["rotations"], run(seen, "turned")
+    x, times = np.array(found["x"]), np.array(found["times"])
+    assert found["motion"][0] == pytest.approx(np.linalg.norm(scope["rates"], axis=-1), rel=1e-10)
+    second = np.rad2deg(ss.rotations.angular_acceleration(scope["spline"], x))
+    assert found["motion"][1] == pytest.approx(np.linalg.norm(second, axis=-1), rel=1e-8, abs=1e-8)
+    spline, slerp, euler = np.swapaxes(np.reshape(found["at"], (len(times), 3, 3, 3)), 0, 1)
+    assert np.abs(spline - scope["spline"](times)).max() < 1e-12
+    polygon = ss.PiecewiseGeodesic(found["t"], scope["points"], "so:3")
+    assert np.abs(slerp - polygon(times)).max() < 1e-12
+    knot = np.isin(x, found["t"])
+    assert np.array(found["slerp"]["speed"])[~knot] == pytest.approx(np.rad2deg(polygon.speed(x))[~knot])
+    # Euler angles: the rotation between two times, by the trace of the matrix of a small turn.
+    before, after = np.swapaxes(np.reshape(found["near"], (len(times), 2, 3, 3)), 0, 1)
+    rate = np.rad2deg(np.linalg.norm(after - before, axis=(1, 2)) / np.sqrt(2) / (2 * found["h"]))
+    assert np.interp(times, x, found["euler"][0]) == pytest.approx(rate, rel=1e-5)
+    assert np.abs(np.swapaxes(euler, 1, 2) @ euler - np.eye(3)).max() < 1e-12
+
+
+def test_field_and_areas(seen: dict[str, Any]) -> None:
+    pauli = np.array([[[0, 1], [1, 0]], [[0, -1j], [1j, 0]], [[1, 0], [0, -1]]])
+    hamiltonians = run(seen, "bloch")["H"]
+    assert np.abs(seen["field"] - np.einsum("xij,kji->xk", hamiltonians, pauli).real).max() < 1e-10
+    assert seen["area"] == pytest.approx(run(seen, "ellipses")["areas"], rel=1e-10)
 
 
 def test_the_construction_ends_on_the_curve(seen: dict[str, Any]) -> None:
