@@ -13,6 +13,7 @@ HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE), str(HERE.parent / "python")]
 
 import api_members  # noqa: E402
+import gallery_pictures  # noqa: E402
 import inventories  # noqa: E402
 import matplotlib as mpl  # noqa: E402
 from docutils import nodes  # noqa: E402
@@ -116,6 +117,7 @@ sphinx_gallery_conf = {
     # The demonstration is a program of several files.
     "ignore_pattern": r"(demo|maps|tracks|hurdat)\.py$",
     "image_scrapers": ("gallery_pictures",),
+    "reset_modules": ("gallery_pictures.use_style",),
     "backreferences_dir": "api/backreferences",
     "doc_module": ("symspline",),
     "reference_url": {"symspline": None},
@@ -253,6 +255,7 @@ def setup(app: Any) -> None:
     app.add_lexer("csv", TextLexer)
     app.connect("autodoc-process-docstring", _escape, priority=100)
     app.connect("autodoc-process-docstring", _restore, priority=900)
+    app.connect("builder-inited", gallery_pictures.put_thumbnails, priority=900)
     app.connect("doctree-read", _link_types)
     app.connect("missing-reference", _public)
     app.connect("source-read", _links)

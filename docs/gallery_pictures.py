@@ -1,12 +1,22 @@
-"""Which pictures of an example its page shows: every figure that it holds, those of pyplot and those of `plot`."""
+"""The pictures of the gallery: which figures a page shows, with what alternative text, style and thumbnail."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import matplotlib.pyplot as plt
+from gallery_texts import TEXTS, Texts
 from matplotlib.figure import Figure
+from matplotlib.transforms import Bbox
+from PIL import Image
 from sphinx_gallery.scrapers import figure_rst
+
+STYLE = Path(__file__).parents[1] / "examples" / "gallery.mplstyle"
+_DPI = 110
+_THUMBNAIL = 480, 320
+_MARGIN = 0.06
+"""Margin around the subject of a thumbnail in inches."""
 
 
 def figures(names: dict[str, Any]) -> list[Figure]:
@@ -18,19 +28,54 @@ def figures(names: dict[str, Any]) -> list[Figure]:
 
 
 def scrape(block: Any, block_vars: dict[str, Any], gallery_conf: dict[str, Any]) -> str:
-    """Sphinx-Gallery calls it after every block of code: saves the figures that are new, and says how to show them."""
+    """Save the new figures of a block of code, and return how to show them. Sphinx-Gallery calls it."""
     names = block_vars["example_globals"]
     shown = names.setdefault("__shown__", [])
-    files = []
+    texts = TEXTS[Path(block_vars["src_file"]).stem]
+    found = ""
     for figure in figures(names):
         if any(figure is other for other in shown):
             continue
         shown.append(figure)
-        path = next(block_vars["image_path_iterator"])
-        figure.savefig(path, dpi=110)
-        files.append(path)
+        path = Path(next(block_vars["image_path_iterator"]))
+        figure.savefig(path, dpi=_DPI)
+        if len(shown) == texts.subject[0]:
+            _save_subject(figure, texts, path)
+        found += figure_rst([str(path)], gallery_conf["src_dir"], texts.alt[len(shown) - 1])
     plt.close("all")
-    return figure_rst(files, gallery_conf["src_dir"])
+    return found
+
+
+def _save_subject(figure: Figure, texts: Texts, path: Path) -> None:
+    """Save the part of a figure that its thumbnail shows: one of its axes with their labels."""
+    figure.canvas.draw()
+    box = figure.axes[texts.subject[1]].get_tightbbox()
+    assert box is not None
+    inches = Bbox(figure.dpi_scale_trans.inverted().transform(box)).padded(_MARGIN)
+    inches = Bbox.from_bounds(inches.x0, inches.y0, texts.share * inches.width, inches.height)
+    folder = path.parent / "subjects"
+    folder.mkdir(exist_ok=True)
+    # Twice the resolution of the picture, as the subject is enlarged.
+    figure.savefig(folder / f"{path.stem[:-4]}.png", dpi=2 * _DPI, bbox_inches=inches)
+
+
+def put_thumbnails(app: Any) -> None:
+    """Replace the thumbnails by the subjects of the figures, after Sphinx-Gallery has made its own."""
+    images = Path(app.srcdir) / "gallery" / "images"
+    for path in sorted(images.glob("subjects/*.png")):
+        thumbnail = Image.new("RGB", _THUMBNAIL, "white")
+        with Image.open(path) as file:
+            subject = file.convert("RGB")
+        subject.thumbnail(_THUMBNAIL, Image.Resampling.LANCZOS)
+        thumbnail.paste(subject, tuple((a - b) // 2 for a, b in zip(_THUMBNAIL, subject.size, strict=True)))
+        thumbnail.save(images / "thumb" / f"{path.stem}_thumb.png")
+
+
+def use_style(gallery_conf: dict[str, Any], name: str) -> None:
+    """Draw every example in the style of the gallery. Sphinx-Gallery calls it before and after each example."""
+    plt.rcdefaults()
+    plt.switch_backend("agg")
+    plt.style.use(STYLE)
 
 
 def _get_sg_image_scraper() -> Any:

@@ -49,13 +49,20 @@ shapes = ss.shapes.from_landmarks([A, B, C, D, A], base=0)
 spline = ss.CubicSpline(None, shapes, "gr:2,3", bc_type="periodic")
 
 x = np.linspace(0, 4, 2000)  # none of them is the time of (C)
-fig9, ax = plt.subplots(figsize=(7, 3.2), layout="constrained")
-for values, name in zip(coordinates(spline(x)).T, "ab", strict=True):
-    ax.plot(x, np.where(np.abs(values) < 30, values, np.nan), label=f"${name}$")
-ax.set(
-    ylim=(-12, 12), xticks=range(5), xticklabels=[f"({name})" for name in "ABCDA"], title="Fig. 9: a and b"
-)
-ax.legend(frameon=False)
+coordinates_of_curve = coordinates(spline(x))
+drawn = np.where(np.abs(coordinates_of_curve) < 30, coordinates_of_curve, np.nan)
+fig9, (left, right) = plt.subplots(1, 2, figsize=(10, 4), layout="constrained")
+left.plot(x, drawn, label=["a", "b"])
+left.axvline(2, color="0.6", linewidth=0.8, linestyle="--")
+left.set(ylim=(-6, 6), xticks=range(5), xticklabels=[f"({name})" for name in "ABCDA"])
+left.set_title("Fig. 9: a and b are infinite at (C)")
+left.legend()
+right.plot(*drawn.T, color="0.6")
+for number, name in enumerate("ABD"):
+    place = coordinates(shapes[[0, 1, 3]])[number]
+    right.plot(*place, "o", color="C0")
+    right.annotate(f"({name})", place, (6, -12), textcoords="offset points")
+right.set(xlim=(-6, 6), ylim=(-6, 6), aspect="equal", xlabel="a", ylabel="b", title="(C) is at infinity")
 
 # %%
 # The kernel of the 2 × 3 matrix of a shape is the normal of its plane. It meets the half sphere (24) once, and the
@@ -97,4 +104,3 @@ print(
 
 dome = spline.plot()
 plt.show()
-# sphinx_gallery_thumbnail_number = 3

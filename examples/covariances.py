@@ -73,4 +73,3 @@ below.axhspan(-2, -1, color="0.9")
 below.set(ylim=(-1.5, 1.5), ylabel="correlation", xlabel="t", xticks=t)
 ellipses = spline.plot()
 plt.show()
-# sphinx_gallery_thumbnail_number = 2

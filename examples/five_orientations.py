@@ -74,4 +74,3 @@ print(f"on S³ and on SO(3): {up_to_sign.max():.0e} apart")
 frames_of_s3 = on_s3.plot()
 frames_of_so3 = spline.plot()
 plt.show()
-# sphinx_gallery_thumbnail_number = 2

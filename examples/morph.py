@@ -65,4 +65,3 @@ below.legend()
 
 strip = film.plot()
 plt.show()
-# sphinx_gallery_thumbnail_number = 2

@@ -87,4 +87,3 @@ for i, name in enumerate("xyz"):
 axes[1].set(xlabel="time", ylabel="field", title="The Hamiltonian of the curve, continuous, and its pulses")
 axes[1].legend(ncols=3)
 plt.show()
-# sphinx_gallery_thumbnail_number = 1

@@ -75,4 +75,3 @@ axes.annotate(
 figure.colorbar(dots, label="speed over ground, km/h", extend="max")
 axes.set(xlim=(-140, 0), ylim=(5, 67), xlabel="longitude", ylabel="latitude", title="Every hour of 37 storms")
 plt.show()
-# sphinx_gallery_thumbnail_number = 2

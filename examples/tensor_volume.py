@@ -2,7 +2,8 @@
 A volume of diffusion tensors
 =============================
 
-Tensors of all voxels were measured on four days. They are to be interpolated for a day between, in the order of MRtrix.
+The tensors of all voxels of a brain were measured on four days after a stroke. You need them for a day between, in the
+order of MRtrix. The brain is a phantom: white matter with fibres around the ventricles, grey matter and a lesion.
 """
 
 # %%
@@ -24,15 +25,37 @@ import symspline as ss
 
 rng = np.random.default_rng(0)
 days = np.array([0.0, 7.0, 21.0, 56.0])
-mask = np.linalg.norm(np.indices((10, 10, 10)) - 4.5, axis=0) < 4
-recorded = np.zeros((*mask.shape, len(days), 6))
-recorded[mask] = np.array([1.5e-3, 1e-4, 0, 6e-4, 0, 4e-4]) * rng.uniform(
-    0.9, 1.1, (mask.sum(), len(days), 1)
+x, y, z = np.meshgrid(
+    np.linspace(-1, 1, 40), np.linspace(-1.2, 1.2, 48), np.linspace(-0.2, 0.2, 3), indexing="ij"
 )
+radius, angle = np.hypot(x / 0.9, y / 1.1), np.arctan2(y / 1.1, x / 0.9)
+mask = radius < 1
+ventricles = np.hypot((np.abs(x) - 0.17) / 0.11, y / 0.45) < 1
+white = (radius + 0.03 * np.cos(8 * angle) > 0.35) & (radius + 0.05 * np.cos(12 * angle) < 0.75) & ~ventricles
+lesion = np.hypot(x - 0.5, y - 0.25) < 0.2
+
+# %%
+# Fibres run around the ventricles. The tensors of a voxel are D = a 1 + (b − a) f fᵀ, with the fibre f.
+
+fibres = np.stack([-0.9 * np.sin(angle), 1.1 * np.cos(angle), 0.3 * np.ones_like(x)], axis=-1)
+fibres /= np.linalg.norm(fibres, axis=-1, keepdims=True)
+across = np.where(ventricles, 2.8e-3, np.where(white, 0.45e-3, 0.8e-3))[..., None, None]
+along = np.where(white, 1.5e-3, across[..., 0, 0])[..., None, None]
+tensors = across * np.eye(3) + (along - across) * fibres[..., :, None] * fibres[..., None, :]
+# Diffusion in the lesion is low at first, and high in the end.
+factor = np.where(lesion[..., None], [0.45, 0.55, 0.9, 1.5], 1.0) * np.exp(
+    0.03 * rng.normal(size=(*x.shape, 4))
+)
+measured = factor[..., None, None] * tensors[..., None, :, :]
+
+# %%
+# The scanner software wrote one file per day, with the six entries in the order of FSL.
+
 folder = Path(tempfile.mkdtemp())
 names = [folder / f"day{day:02.0f}.nii.gz" for day in days]
-for i, name in enumerate(names):  # as FSL would have written them
-    nibabel.save(nibabel.Nifti1Image(recorded[..., i, :], np.eye(4)), name)
+for i, name in enumerate(names):
+    six = measured[:, :, :, i][..., [0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]] * mask[..., None]
+    nibabel.save(nibabel.Nifti1Image(six, np.diag([4.0, 4.0, 4.0, 1.0])), name)
 
 volumes = [ss.tensors.read_nifti(name, order="fsl", mask=mask) for name in names]
 matrices = np.stack([volume.tensors for volume in volumes], axis=1)
@@ -60,9 +83,29 @@ print(
 
 ss.tensors.write_nifti(folder / "day30.nii.gz", replace(volumes[0], tensors=tensors), order="mrtrix")
 
-figure, axes = plt.subplots(figsize=(5, 4), layout="constrained")
-diffusivity = np.full(mask.shape, np.nan)
-diffusivity[mask] = values.mean(axis=-1)
-figure.colorbar(axes.imshow(diffusivity[5], origin="lower"), label="mean diffusivity, mm²/s")
-axes.set(title="day 30, slice 5", xticks=[], yticks=[])
+# %%
+# The middle slice. Red fibres run to the left and right, green ones from front to back. The lesion is dark on day 7
+# and bright on day 56; on day 30, when nothing was measured, it has almost the diffusivity of its surroundings.
+
+
+def in_slice(values):
+    volume = np.full((*mask.shape, *values.shape[1:]), np.nan)
+    volume[mask] = values
+    return np.swapaxes(volume[:, :, 1], 0, 1)
+
+
+sizes, vectors = np.linalg.eigh(tensors)
+anisotropy = np.sqrt(1.5) * np.std(sizes, axis=1) * np.sqrt(3) / np.linalg.norm(sizes, axis=1)
+directions = np.abs(vectors[:, :, 2]) * anisotropy[:, None]
+figure, axes = plt.subplots(1, 4, figsize=(11, 3.6), layout="constrained")
+axes[0].imshow(np.nan_to_num(in_slice(directions)), origin="lower")
+axes[0].set(title="fibres, day 30")
+for panel, day in zip(axes[1:], (7.0, 30.0, 56.0), strict=True):
+    diffusivity = 1e3 * np.trace(curves(day), axis1=1, axis2=2) / 3
+    image = panel.imshow(in_slice(diffusivity), origin="lower", vmin=0.3, vmax=1.5, cmap="gray")
+    panel.set(title=f"day {day:.0f}" + ", interpolated" * (day == 30))
+for panel in axes:
+    panel.set(xticks=[], yticks=[])
+    panel.spines[:].set_visible(False)
+figure.colorbar(image, ax=axes, label="mean diffusivity, 10⁻³ mm²/s", extend="max")
 plt.show()

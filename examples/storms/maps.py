@@ -9,7 +9,9 @@ from typing import Any
 
 import numpy as np
 from hurdat import Storm
+from matplotlib import rc_context
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
 from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure
@@ -20,6 +22,7 @@ from tracks import GLOBE, KMH, Comparison, Times, comparison, every, samples, sl
 from symspline import CubicSpline
 from symspline._plotting.globe import View, degrees, draw_frame, draw_globe
 from symspline._plotting.style import DPI, EDGE, GRID, HALO, INK, SPLINE, heading, window
+from symspline._plotting.theme import invert_page
 from symspline.geo import from_lonlat, to_lonlat
 
 Array = NDArray[np.float64]
@@ -51,6 +54,9 @@ def _draw_land(axes: Axes, view: View) -> None:
 
 # ---- the tracks ----
 
+NIGHT = "#14181e"
+"""The background of dark pages."""
+
 _LON, _LAT = -62, 28
 _OVERVIEW = View.above(_LON, _LAT)
 # Names that fit beside their track: at its first (0) or last (-1) fix, moved by so many points.
@@ -71,8 +77,10 @@ _NAMES = {
 }
 
 
-def draw_tracks(storms: Sequence[Storm], splines: Sequence[CubicSpline], path: Path) -> None:
-    """All tracks on a globe, coloured by speed."""
+def draw_tracks(
+    storms: Sequence[Storm], splines: Sequence[CubicSpline], path: Path, dark: bool = False
+) -> None:
+    """Draw all tracks on a globe, coloured by speed, on a transparent ground; for dark pages if `dark` is True."""
     figure = Figure(figsize=(13, 10.4), dpi=DPI)
     axes = figure.add_axes((0.01, 0.085, 0.98, 0.845))
     draw_globe(axes, _OVERVIEW, 15)
@@ -85,13 +93,19 @@ def draw_tracks(storms: Sequence[Storm], splines: Sequence[CubicSpline], path: P
         if storm.label in _NAMES:
             _draw_name(axes, storm, spline)
     bar = figure.colorbar(
-        lines, cax=figure.add_axes((0.3, 0.055, 0.4, 0.016)), orientation="horizontal", extend="max"
+        ScalarMappable(lines.norm, SPEED),
+        cax=figure.add_axes((0.3, 0.055, 0.4, 0.016)),
+        orientation="horizontal",
+        extend="max",
     )
     bar.set_label("speed of the storm, km/h", color=INK, fontsize=11)
     bar.outline.set_visible(False)
     title = f"{len(storms)} Atlantic storms as C² curves on the sphere"
-    heading(figure, title, "best tracks of 2021 and 2022, NOAA HURDAT2; white dots: fixes", 0.955)
-    figure.savefig(path)
+    heading(figure, title, "best tracks of 2021 and 2022, NOAA HURDAT2; dots: fixes", 0.955)
+    if dark:
+        with rc_context({"figure.facecolor": NIGHT}):
+            invert_page(figure)
+    figure.savefig(path, transparent=True)
 
 
 def _draw_track(axes: Axes, spline: CubicSpline) -> LineCollection:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import pytest
+from gallery_texts import TEXTS
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 
@@ -15,7 +16,7 @@ SAYS = {
     "imu_from_a_recording": "",
     "qubit_control": r"the same .* 1\.\d\d of 1\.57 apart\nmissed by (\d\.\de-1[4-7]|0\.0e\+00), strongest field "
     r".*\nQuTiP comes through all six, up to (-?\de-1\d|0e\+00)",
-    "tensor_volume": r"280 voxels, mean diffusivity 8.\d\de-04 mm²/s, all positive: True",
+    "tensor_volume": r"35\d\d voxels, mean diffusivity 9.\d\de-04 mm²/s, all positive: True",
     "dti_volume": r"(?s)noisy, six numbers, linear +off by 6\.\d\d %, determinant up to 3\.\d .*cubic.* [1-9] tensors "
     r"not positive.*clean, log-Euclidean, cubic +off by 0\.1\d %.*clean, grid spline +off by 0\.\d\d %.*1\.6 times",
     "pod_over_a_parameter": r"4 numbers in place of 80: off by 0\.\d%; with interpolated numbers by \d\d\.\d%",
@@ -70,7 +71,12 @@ def test_a_recipe_draws_a_picture(name, tmp_path, monkeypatch, capsys):
     assert re.match(SAYS[name], said), said
     of_pyplot = [plt.figure(number) for number in plt.get_fignums()]
     others = [value for value in names.values() if isinstance(value, Figure)]
-    for number, figure in enumerate(dict.fromkeys(of_pyplot + others)):
+    figures = list(dict.fromkeys(of_pyplot + others))
+    # The gallery has an alternative text for each, and a thumbnail of one of their axes.
+    subject, alt = TEXTS[name]
+    assert len(figures) == len(alt) and subject[0] <= len(alt)
+    assert any(subject[1] < len(figure.axes) for figure in figures)
+    for number, figure in enumerate(figures):
         figure.savefig(tmp_path / f"{number}.png", dpi=40)
     plt.close("all")
     pictures = list(tmp_path.glob("*.png"))
@@ -79,4 +85,11 @@ def test_a_recipe_draws_a_picture(name, tmp_path, monkeypatch, capsys):
 
 
 def test_every_recipe_is_here():
-    assert sorted(path.stem for path in FOLDER.glob("*.py")) == sorted(SAYS)
+    names = sorted(path.stem for path in FOLDER.glob("*.py"))
+    assert names == sorted(SAYS) == sorted(TEXTS)
+
+
+def test_alternative_texts_are_sentences():
+    for texts in TEXTS.values():
+        assert all(40 < len(alt) < 300 and alt[0].isupper() and alt.endswith(".") for alt in texts.alt)
+        assert len(set(texts.alt)) == len(texts.alt)

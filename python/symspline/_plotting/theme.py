@@ -87,7 +87,7 @@ def invert(artists: Sequence[Artist], background: Any) -> None:
             _change(artist, ("color", "markerfacecolor", "markeredgecolor"), new)
         elif isinstance(artist, Patch):
             _change(artist, ("facecolor", "edgecolor"), new)
-        elif isinstance(artist, Collection):
+        elif isinstance(artist, Collection) and artist.get_array() is None:
             for name in ("facecolor", "edgecolor"):
                 values = to_rgba_array(getattr(artist, f"get_{name}")())
                 if len(values):
