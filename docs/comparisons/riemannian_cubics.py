@@ -117,14 +117,14 @@ def text(rows: Sequence[Row]) -> str:
         )
     head = (
         "points",
-        "longest step, rad",
-        "energy of the cubic",
-        "excess of the spline",
+        "step, rad",
+        "energy",
+        "excess",
         "distance, rad",
         "order",
-        "cubic to motion, rad",
-        "time, spline",
-        "time, cubic",
+        "to motion, rad",
+        "spline",
+        "cubic",
     )
     return table(head, cells)
 
