@@ -28,6 +28,18 @@ def test_help_is_wrapped_at_the_width_of_the_terminal(columns, capsys, monkeypat
         assert columns > 100 or max(map(len, text)) > columns - 15
 
 
+def test_tables_in_help_have_a_hanging_indent(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "60")
+    for verb, term in [("sample", "std "), ("sample", "std_wx, ..."), ("check", "distance"), ("grid", ".npz")]:
+        with pytest.raises(SystemExit):
+            main([verb, "--help"])
+        lines = capsys.readouterr().out.splitlines()
+        first = next(i for i, line in enumerate(lines) if line.startswith(f"  {term}"))
+        start = len(lines[first]) - len(lines[first][2 + len(term) :].lstrip())
+        assert lines[first + 1].startswith(" " * start) and lines[first + 1][start] != " "
+        assert not any(line.endswith("not-a-") for line in lines)
+
+
 def test_without_arguments_help_is_printed(capsys):
     assert main([]) == 0
     out, err = capsys.readouterr()

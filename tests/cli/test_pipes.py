@@ -47,6 +47,16 @@ def test_results_are_alone_on_standard_output():
         assert (done.returncode, done.stderr) == (0, b"") and done.stdout.startswith(start)
 
 
+def test_messages_name_standard_input(run):
+    write("pair.csv", PAIR)
+    run("fit pair.csv --space s:2 --curve id -o pair.npz")
+    curves = Path("pair.npz").read_bytes()
+    done = process("plot - -o x.png", curves)
+    assert done.stderr == b"symspline: standard input has 2 curves; say which with --curve: a, b\n"
+    done = process("sample - -n 3 --curve c -o x.csv", curves)
+    assert done.stderr == b"symspline: standard input has no curve 'c'; there are a, b\n"
+
+
 def test_a_failure_writes_nothing_to_standard_output():
     done = process("fit - --space s:2 -o -", b"t,x,y,z\n0,1,0,0\n1,2,0,0\n")
     assert (done.returncode, done.stdout) == (2, b"")

@@ -100,6 +100,10 @@ def test_order_of_quaternions_from_the_option(run, fails):
     assert "are not the 4 numbers of a quaternion" in fails(
         "fit a.csv --space so:3 --quaternion wxyz --columns qw,qx -o c.npz"
     )
+    write_table("b.csv", columns(x=PLACES[:, 0]))
+    assert "row by row, or 4 numbers with a quaternion, and there are 5 columns: qw, qx, qy, qz, x; say which" in fails(
+        "fit b.csv --space so:3 -o c.npz"
+    )
     # On the sphere of quaternions they are what they were.
     run("fit a.csv --space sphere:3 -o a.npz")
 

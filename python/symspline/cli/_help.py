@@ -13,7 +13,7 @@ from ._messages import Problem
 
 _SHELLS = ("bash", "zsh")
 # The first column of a table in a help text, with the blanks after it.
-_TERM = re.compile(r" *\S+ {2,}")
+_TERM = re.compile(r" *\S+(?: \S+)* {2,}")
 
 
 class Parser(argparse.ArgumentParser):
@@ -47,6 +47,9 @@ class Parser(argparse.ArgumentParser):
 
 class _Formatter(argparse.HelpFormatter):
     """Wraps paragraphs; the lines of examples and of tables stay apart."""
+
+    def _split_lines(self, text: str, width: int) -> list[str]:
+        return _wrapped(text, width, 0).split("\n")
 
     def _fill_text(self, text: str, width: int, indent: str) -> str:
         return "\n\n".join(_filled(paragraph.split("\n"), width) for paragraph in text.strip().split("\n\n"))

@@ -92,12 +92,11 @@ def sensors_of(table: Table, options: Namespace, space: Space, sigma: Any) -> Se
         (options.dedup, "cannot be combined with --dedup: all measurements of one time count"),
         (options.max_gap, "cannot be combined with --max-gap; select the curves with --curve"),
     )
-    rates, velocities = ([c for n in split_names(text) for c in table.expand(n)] if text is not None else []
-                         for text in (options.rates, options.velocities))  # fmt: skip
+    rates, velocities = _columns(table, options.rates), _columns(table, options.velocities)
     rotation = moving = None
     if rates:
         kinds = (ROTATIONS, _QUATERNIONS, POSES)
-        rotation = _factor(space, [factor in kinds for factor in factors_of(space)])
+        rotation = _only([factor in kinds for factor in factors_of(space)])
         refuse(
             "--rates needs a space with one rotation, such as so:3, sphere:3, se:3, ",
             (rotation is None, f"not {space}"),
@@ -114,6 +113,10 @@ def sensors_of(table: Table, options: Namespace, space: Space, sigma: Any) -> Se
     return Sensors(rates, velocities, sigma, rate_sigma, velocity_sigma, options.rate_bias, *factors)
 
 
+def _columns(table: Table, text: str | None) -> list[str]:
+    return [] if text is None else [column for name in split_names(text) for column in table.expand(name)]
+
+
 def _check_count(option: str, columns: list[str], count: int, words: str) -> None:
     there = f"there are {len(columns)} columns" if len(columns) > 1 else "there is 1 column"
     refuse(f"{option} {','.join(columns)}: ", (len(columns) != count, f"{words}, and {there}"))
@@ -127,7 +130,7 @@ def _sigma(kind: str, option: str, text: str | None) -> float:
     return float(value)
 
 
-def _factor(space: Space, found: list[bool]) -> int | None:
+def _only(found: list[bool]) -> int | None:
     """Return the index of the only factor that was found."""
     return found.index(True) if sum(found) == 1 else None
 
@@ -137,8 +140,8 @@ def _moving(space: Space) -> int:
     factors = factors_of(space)
     if len(factors) == 1:
         return 0
-    found = _factor(space, [isinstance(own, Euclidean) for own in factors])
-    found = _factor(space, [own == POSES for own in factors]) if found is None else found
+    found = _only([isinstance(own, Euclidean) for own in factors])
+    found = _only([own == POSES for own in factors]) if found is None else found
     if found is None:
         raise Problem(f"--velocities needs a space with one position, such as r:3, se:3 or so:3 x r:3, not {space}")
     return found
