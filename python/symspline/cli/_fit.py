@@ -156,20 +156,11 @@ def run(options: argparse.Namespace) -> int:
     tell(f"{table.path}: {table.path.format} table, points in columns {listed(points.names)}, {at}", VERBOSE)
     columns = Columns(points.names, time or "time", curve or "curve", options.lonlat, rows.utc, points.quaternion)
     if sensors and smooth:
-        fusion = Fusion(table, rows, points, sensors)
-        curves = fusion.fitted(_estimation_options(options, smooth))
-        write_curves(options.output, Curves(curves, curve is not None, columns))
-        first, *biases = _summary.estimated(curves, curve is not None, fusion.counts, fusion.omitted)
-        for line in (f"{called(options.output)}: {first}", *biases):
-            tell(line)
+        _fit_sensors(options, smooth, Fusion(table, rows, points, sensors), columns)
         return 0
     hint = partial(column_of_names, table, time, [time, *points.used]) if curve is None else lambda: None
     data = Recordings(table.path, rows, points.read(rows.numbers, rows.place), space, options, hint)
-    fitted = _fitted(data, space, options, smooth)
-    segmented = options.max_gap is not None and curve is None
-    write_curves(options.output, Curves(dict(zip(data.groups, fitted, strict=True)), data.named, columns, segmented))
-    words = f"{_summary.fitted(fitted, options.lonlat)}{data.changes()}{_summary.bridged(fitted)}"
-    tell(f"{called(options.output)}: {words}")
+    _fit_points(options, smooth, data, columns)
     same = data.merged or data.repeated
     column = hint() if same else None
     if column is not None:
@@ -178,6 +169,27 @@ def run(options: argparse.Namespace) -> int:
             f"holds several tracks, fit each of them with --curve {column}"
         )
     return 0
+
+
+def _fit_sensors(options: argparse.Namespace, smooth: dict[str, Any], fusion: Fusion, columns: Columns) -> None:
+    """Fit curves to points, rates and velocities, and write them."""
+    named = options.curve is not None
+    kept = {name: smooth[name] for name in ("lam", "loss", "penalty")}
+    extrapolate = _POLICIES.get(options.extrapolate)
+    curves = fusion.fitted({**kept, "criterion": options.criterion, "extrapolate": extrapolate})
+    write_curves(options.output, Curves(curves, named, columns))
+    first, *biases = _summary.estimated(curves, named, fusion.counts, fusion.omitted)
+    for line in (f"{called(options.output)}: {first}", *biases):
+        tell(line)
+
+
+def _fit_points(options: argparse.Namespace, smooth: dict[str, Any] | None, data: Recordings, columns: Columns) -> None:
+    """Fit curves through the points, or near them, and write them."""
+    fitted = _fitted(data, options, smooth)
+    segmented = options.max_gap is not None and options.curve is None
+    write_curves(options.output, Curves(dict(zip(data.groups, fitted, strict=True)), data.named, columns, segmented))
+    words = f"{_summary.fitted(fitted, options.lonlat)}{data.changes()}{_summary.bridged(fitted)}"
+    tell(f"{called(options.output)}: {words}")
 
 
 def _space(name: str | None, lonlat: bool) -> Space:
@@ -189,9 +201,7 @@ def _space(name: str | None, lonlat: bool) -> Space:
     return space
 
 
-def _fitted(
-    data: Recordings, space: Space, options: argparse.Namespace, smooth: dict[str, Any] | None
-) -> Sequence[CubicSpline]:
+def _fitted(data: Recordings, options: argparse.Namespace, smooth: dict[str, Any] | None) -> Sequence[CubicSpline]:
     """All curves, fitted in one call."""
     common: dict[str, Any] = {"extrapolate": _POLICIES.get(options.extrapolate)}
     if smooth is None:
@@ -203,10 +213,10 @@ def _fitted(
             warnings.simplefilter("ignore", SmoothingWarning)
             fitted: Sequence[CubicSpline]
             if smooth is None:
-                fitted = fit_many(data.curves, space, progress=progress, **common)
+                fitted = fit_many(data.curves, data.space, progress=progress, **common)
             else:
                 curves: Any = [(*curve, {}) for curve in data.curves]
-                fitted = smooth_many(curves, space, progress=progress, **common, **smooth)
+                fitted = smooth_many(curves, data.space, progress=progress, **common, **smooth)
     except SymsplineError as error:
         raise error._with_message(data.located(error)) from None
     for note in noted:
@@ -254,9 +264,3 @@ def _smoothing_options(options: argparse.Namespace) -> dict[str, Any] | None:
     criterion = options.criterion or ("cp" if sigma is not None and lam is None else "gcv")
     loss, penalty = "cauchy" if options.robust else "linear", options.penalty or "acceleration"
     return {"criterion": criterion, "lam": lam, "sigma": sigma, "loss": loss, "penalty": penalty}
-
-
-def _estimation_options(options: argparse.Namespace, smooth: dict[str, Any]) -> dict[str, Any]:
-    """Return the options of `symspline.estimate`."""
-    kept = {name: smooth[name] for name in ("lam", "loss", "penalty")}
-    return {**kept, "criterion": options.criterion, "extrapolate": _POLICIES.get(options.extrapolate)}

@@ -26,6 +26,7 @@ class Recordings:
 
     Attributes
     ----------
+    space : Space
     curves : list of tuple
         Times and points of each curve.
     groups : dict
@@ -39,7 +40,7 @@ class Recordings:
 
     def __init__(self, path: object, rows: Rows, points: Any, space: Space, options: Namespace, hint: Hint) -> None:
         """Read the curves. ``hint`` returns a column that may hold the names of several curves."""
-        self._path, self._rows, self._points, self._space, self._hint = path, rows, points, space, hint
+        self._path, self._rows, self._points, self.space, self._hint = path, rows, points, space, hint
         self._options, self._smooth = options, options.smooth
         self.named = rows.labels is not None or options.max_gap is not None
         self.merged = self.alone = self.repeated = 0
@@ -112,7 +113,7 @@ class Recordings:
         gap = np.inf if options.max_gap is None else longest_gap(options.max_gap, times.dtype.kind == "M")
         used = np.ones(len(own), bool) if self._smooth else None
         try:
-            found = cut(times, points, self._space, gap, 2, options.dedup or "raise", used)
+            found = cut(times, points, self.space, gap, 2, options.dedup or "raise", used)
         except CutLocusError:
             raise Problem(
                 f"{self._path}: points{of} with one time are too far apart to have a mean; --dedup first takes the "

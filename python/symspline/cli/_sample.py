@@ -107,8 +107,24 @@ def run(options: argparse.Namespace) -> int:
     curves = every_curve.chosen(options.curve)
     columns = _tum_columns(curves, orders) if form == "tum" else curves.columns
     times, rows = _times(options, curves, every_curve)
-    # A trajectory has no columns for standard deviations.
-    smooth = form != "tum" and all(isinstance(spline, SmoothingSpline) for spline in curves.splines.values())
+    samples = _sampled(curves, times, orders, columns, form != "tum", digits)
+    if _EACH in options.output.name:
+        for name in samples:
+            path = options.output.with_name(options.output.name.replace(_EACH, name.replace("/", "_")))
+            check_target(path, *inputs)
+            _write(path, form, {name: times[name]}, samples, None, columns, False)
+        return 0
+    if form == "tum":
+        _check_order(curves)
+    _write(options.output, form, times, samples, rows, columns, curves.named and form != "tum")
+    return 0
+
+
+def _sampled(
+    curves: Curves, times: dict[str, Times], orders: list[int], columns: Columns, stds: bool, digits: int | None
+) -> dict[str, Samples]:
+    """Return the columns of every curve, with standard deviations if all curves have them and ``stds`` is True."""
+    smooth = stds and all(isinstance(spline, SmoothingSpline) for spline in curves.splines.values())
     functions: Any = (samples_of, deviations_of) if smooth else (samples_of,)
     samples: dict[str, Samples] = {}
     with Progress("sampling") as progress:
@@ -117,18 +133,7 @@ def run(options: argparse.Namespace) -> int:
             found = list(chain.from_iterable(blocks))
             samples[name] = [(key, _rounded(own, digits)) for key, own in found] if digits else found
             progress(done, len(times))
-    if _EACH in options.output.name:
-        for name in samples:
-            path = options.output.with_name(options.output.name.replace(_EACH, name.replace("/", "_")))
-            check_target(path, *inputs)
-            _write(path, form, {name: times[name]}, samples, None, columns, False)
-    else:
-        named = curves.named
-        if form == "tum" and named:
-            _check_order(curves)
-            named = False
-        _write(options.output, form, times, samples, rows, columns, named)
-    return 0
+    return samples
 
 
 def _write(
