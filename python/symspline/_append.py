@@ -8,69 +8,79 @@ import numpy as np
 
 from ._arrays import as_array, short_repr, whole_number
 from ._core import ValidationError
-from ._curves.curve import CurveArrays
 from ._curves.ends import is_closed
-from ._curves.fit import curve_of
+from ._curves.fit import Fit, FitProblem, Problem, curve_of, moved_ends, read, read_ends
+from ._curves.solve import Options
 from ._input import times_of
-from ._report import NUMBERS, Columns
-from ._spaces import Array, Product, factors_of, parts_of
-from ._time import Moments
+from ._report import INTEGERS, NUMBERS, Columns
+from ._spaces import Array, Doubles, Product, Quotient, Space, factors_of, parts_of
 from ._typing import TimesLike
 
-# Fields of reports that a local fit does not determine for the whole curve.
-_UNKNOWN = ("invariant_radius", "contraction_bound", "guaranteed_sweeps", "alternative_energy")
+# Adjacent rows of reports that a local fit does not determine for the whole curve, those of which the largest value
+# counts, and the one of which the value of the last part counts.
+_UNKNOWN = slice(NUMBERS.index("invariant_radius"), NUMBERS.index("alternative_energy") + 1)
 _LARGEST = ("residual", "max_step", "velocity_error")
+_RATE = NUMBERS.index("rate")
+_CONVERGED = INTEGERS.index("converged")
+_OPTIONS = Options("auto", 1e-12, None)
 
 
 class Local(NamedTuple):
-    """The data of the last part of a curve and of the points that follow it.
+    """The fit of the last part of a curve and of the points that follow it.
 
     Attributes
     ----------
-    t : TimesLike
-        Knots.
-    points : ndarray or tuple of ndarray
-        Points, in the form in which a user passes them.
-    bc_type : pair
-        The velocity of the curve at the first knot, and the condition at the last one.
+    t : ndarray
+        Knots of the whole curve as the user counts them.
+    times : ndarray
+        Knots of the whole curve as numbers of the core.
+    problem : Problem
+        The last part, which begins with the velocity of the curve there.
     kept : int
         Number of segments of the curve before this part.
     """
 
-    t: Any
-    points: Any
-    bc_type: Any
+    t: Array
+    times: Doubles
+    problem: FitProblem
     kept: int
 
 
-def local_data(spline: Any, t: TimesLike, points: Any, lag: int | None) -> Local:
-    """Return the points of a new fit, after validation of the times, the points and the lag."""
-    if is_closed(spline.bc_type):
+def local_fit(spline: Any, t: TimesLike, points: Any, lag: int | None) -> Local:
+    """Return the problem of a new fit, after validation of the times, the points and the lag."""
+    bc_type, space, curve = spline._bc_type, spline.space, spline._curve
+    if is_closed(bc_type):
         raise ValidationError("a closed curve has no end to which points can be appended")
-    segments = spline._curve.times.shape[-1] - 1
-    count = segments if lag is None else min(whole_number(lag, "lag", 2), segments)
-    kept = segments - count
-    space, axis = spline.space, len(spline._batch)
-    tail = (slice(None),) * axis + (slice(kept, None),)
+    segments = curve.times.shape[-1] - 1
+    kept = 0 if lag is None else max(segments - whole_number(lag, "lag", 2), 0)
     new_t, single = _new_times(spline, t)
-    own = []
-    for factor, part, given in zip(
-        factors_of(space), spline._curve.parts, parts_of(points, space, "points"), strict=True
-    ):
-        new = factor._array(given, "points")
-        new = new[(slice(None),) * axis + (None,)] if single else new
-        if new.shape != (*spline._batch, new_t.shape[-1], *factor.point_shape):
-            shape = (*spline._batch, *(() if single else (new_t.shape[-1],)), *factor.point_shape)
-            raise ValidationError(f"points has shape {np.shape(given)}, but {shape} is needed for these times")
-        own.append(np.concatenate([part.points[tail], new], axis=axis))
-    bc_type = spline.bc_type
+    batch, parts = curve.batch, curve.parts
+    data = read(_with_new(space, parts, points, batch, kept, None if single else new_t.shape[-1]), space)
+    if isinstance(space, (Product, Quotient)):
+        bc_type = moved_ends(bc_type, space, data)
+    ends = read_ends(bc_type, space, batch)
     if kept:
-        start = [part.velocities[(slice(None),) * axis + (kept,)] for part in spline._curve.parts]
-        last = bc_type if isinstance(bc_type, str) else bc_type[1]
-        bc_type = ((1, tuple(start) if isinstance(space, Product) else start[0]), last)
-    joined = np.concatenate([spline._t[..., kept:], new_t], axis=-1)
-    times = Moments(joined, spline._time_axis.zone) if spline._time_axis.dates else joined
-    return Local(times, tuple(own) if isinstance(space, Product) else own[0], bc_type, kept)
+        at = (slice(None),) * len(batch) + (kept,)
+        starts = [np.ascontiguousarray(part.space._as_doubles(part.velocities[at])) for part in parts]
+        ends = [own and [("velocity", start), own[1]] for own, start in zip(ends, starts, strict=True)]
+    shown = np.concatenate([spline._t, new_t], axis=-1)
+    times = spline._time_axis.knots(shown)
+    last = times[..., kept:]
+    return Local(shown, times, Problem(space, np.ascontiguousarray(last), data, ends, _OPTIONS), kept)
+
+
+def _with_new(space: Space[Any], parts: Any, points: Any, batch: tuple[int, ...], kept: int, count: int | None) -> Any:
+    """Return the last points of a curve and the new ones; without `count`, there is one without an axis."""
+    axis = len(batch)
+    tail, one = (slice(None),) * axis + (slice(kept, None),), (slice(None),) * axis + (None,)
+    joined = []
+    for factor, part, given in zip(factors_of(space), parts, parts_of(points, space, "points"), strict=True):
+        new = factor._array(given, "points")
+        shape = batch + (() if count is None else (count,)) + factor.point_shape
+        if new.shape != shape:
+            raise ValidationError(f"points has shape {np.shape(given)}, but {shape} is needed for these times")
+        joined.append(np.concatenate([part.points[tail], new[one] if count is None else new], axis=axis))
+    return tuple(joined) if isinstance(space, Product) else joined[0]
 
 
 def _new_times(spline: Any, t: TimesLike) -> tuple[Array, bool]:
@@ -99,31 +109,29 @@ def _new_times(spline: Any, t: TimesLike) -> tuple[Array, bool]:
     return array, single
 
 
-def joined_curve(first: CurveArrays, second: CurveArrays, times: Any, kept: int) -> CurveArrays:
-    """Return the first segments of one curve, followed by another curve."""
-    axis = len(first.batch)
+def joined(spline: Any, found: Fit, local: Local) -> Fit:
+    """Return the first segments of a curve, followed by another curve, with the report of both."""
+    curve, kept = spline._curve, local.kept
+    axis = len(curve.batch)
     head = (slice(None),) * axis + (slice(kept),)
     arrays = [
         (
             np.concatenate([a.points[head], b.points], axis=axis),
             np.concatenate([a.velocities[head], b.velocities], axis=axis),
         )
-        for a, b in zip(first.parts, second.parts, strict=True)
+        for a, b in zip(curve.parts, found.curve.parts, strict=True)
     ]
-    return curve_of(first.space, times, arrays)
+    columns = [_joined_columns(a, b) for a, b in zip(columns_of(spline), found.columns, strict=True)]
+    return Fit(curve_of(spline.space, local.times, arrays), columns, found.method, found.faults)
 
 
-def joined_columns(first: Columns, second: Columns) -> Columns:
+def _joined_columns(first: Columns, second: Columns) -> Columns:
     """Return the report of a curve whose last part was fitted again."""
-    numbers = second.numbers.copy()
-    for name in _LARGEST:
-        row = NUMBERS.index(name)
-        numbers[row] = np.fmax(first.numbers[row], second.numbers[row])
-    for name in _UNKNOWN:
-        numbers[NUMBERS.index(name)] = np.nan
-    joined = Columns(second.integers.copy(), numbers)
-    joined.row("converged")[:] &= first.row("converged")
-    return joined
+    numbers, integers = np.fmax(first.numbers, second.numbers), second.integers.copy()
+    numbers[_RATE] = second.numbers[_RATE]
+    numbers[_UNKNOWN] = np.nan
+    integers[_CONVERGED] &= first.integers[_CONVERGED]
+    return Columns(integers, numbers)
 
 
 def columns_of(spline: Any) -> list[Columns]:

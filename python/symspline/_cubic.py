@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Generic, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._append import columns_of, joined_columns, joined_curve, local_data
+from ._append import joined, local_fit
 from ._archive import Entries, read_c1_nodes, read_fitted
 from ._core import ValidationError
 from ._curves.conditions import fit_with_conditions
@@ -287,16 +287,17 @@ class CubicSpline(PiecewiseCubic[P], Generic[P, R]):
                 f"points cannot be appended to a curve with prescribed velocities at points {self._c1_nodes}. "
                 "Fit all points again."
             )
-        local = local_data(self, t, points, lag)
-        part = CubicSpline(local.t, local.points, self.space, bc_type=local.bc_type, extrapolate=self._extrapolate)
-        if not local.kept:
-            return part
-        shown = np.concatenate([self._t[..., : local.kept], part._t], axis=-1)
-        times = self._time_axis.knots(shown)
-        curve = joined_curve(self._curve, part._curve, times, local.kept)
-        columns = [joined_columns(a, b) for a, b in zip(columns_of(self), part._fit.columns, strict=True)]
-        found = Fit(curve, columns, part._fit.method, [])
-        return CubicSpline._of(self._time_axis, shown, curve, self._bc_type, self._extrapolate, found)
+        local, axis = local_fit(self, t, points, lag), self._time_axis
+        try:
+            part = fit(local.problem)
+        except ValidationError as error:
+            raise axis.explain(error) from None
+        found = joined(self, part, local) if local.kept else part
+        spline = CubicSpline._of(axis, local.t, found.curve, self._bc_type, self._extrapolate, found)
+        if part.faults:
+            raise_or_warn(part.faults, "raise", spline)
+        warn_of_representatives(self.space, [local.problem.points], [part.curve], [part.columns])
+        return spline
 
     # ---- sensitivity to the data ----
 
