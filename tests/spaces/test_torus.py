@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from refused import raises
 from scipy.interpolate import CubicSpline
 
 import symspline as ss
@@ -71,6 +72,18 @@ def test_opposite_angles_raise_and_long_steps_warn():
     with pytest.warns(ss.FarPointsWarning, match=r"Torus\(1\)"):
         spline = ss.CubicSpline(None, np.radians([[0.0], [200], [400], [600], [800]]), "torus:1")
     np.testing.assert_allclose(spline(0.5), np.radians([-80]))
+
+
+def test_angles_with_too_many_turns_raise():
+    angles = np.array([[0.0, 1], [1e7, 2], [2e7, 3]])
+    np.testing.assert_allclose(ss.CubicSpline(None, angles, "torus:2").points[1, 0], np.angle(np.exp(1e7j)), atol=1e-8)
+    for size in (1e8, 1e300):
+        angles[1, 0] = size
+        raises("points.1. is off the space .* rounding error of its angle", ss.CubicSpline, None, angles, "torus:2")
+    circle = ss.Torus(1)
+    for call in (circle.distance, circle.log, circle.exp):
+        raises("not finite", call, [0.1], [1e300])
+    raises("cannot be projected", circle.project, [-1e300])
 
 
 def test_random_angles_are_uniform():

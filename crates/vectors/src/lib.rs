@@ -2,15 +2,13 @@
 
 pub mod constant_curvature;
 mod curved;
-mod euclidean;
+mod flat;
 mod hyperbolic;
 mod lorentzian;
 mod sphere;
-mod torus;
 
 pub use curved::{AntiDeSitter, Curved, DeSitter, Hyperbolic, Sphere};
-pub use euclidean::Euclidean;
-pub use torus::Torus;
+pub use flat::{Euclidean, Flat, Torus};
 
 #[cfg(feature = "named")]
 use symspline_core::space::{Entry, table};

@@ -54,8 +54,9 @@ class Torus(Space[FloatArray]):
     r"""The flat torus Tⁿ, whose points are n angles.
 
     A point is an array of n angles in radians, such as the torsion angles of a molecule or the angles of the joints of
-    an arm. Angles that differ by whole turns are the same point. Input may be any finite numbers; points that are
-    returned are in (−π, π]. Use ``numpy.unwrap(spline(x), axis=-2)`` for angles without jumps.
+    an arm. Angles that differ by whole turns are the same point. Input may have any number of turns, unless the
+    rounding errors of the angles exceed the tolerance of points: 4.5e7 rad at 1e-8. Points that are returned are in
+    (−π, π]. Use ``numpy.unwrap(spline(x), axis=-2)`` for angles without jumps.
 
     Parameters
     ----------

@@ -69,10 +69,14 @@ impl<'a, S: Scalar> Samples<'a, S> {
     fn write(&mut self, x: &[f64], first: usize, quantity: Quantity, out: &mut [f64]) {
         let size = quantity.len(self.space);
         let samples = out.len() / size;
+        let mut last = self.curve.degree;
         for (group, out) in out.chunks_mut(LANES * size).enumerate() {
             let at: [usize; LANES] = few(|l| first + (group * LANES + l).min(samples - 1));
             let times = at.map(|i| x[i % x.len()]);
-            let interval = times.map(|x| self.curve.interval(x));
+            let interval = few(|l| {
+                last = self.curve.interval_near(times[l], last);
+                last
+            });
             self.points(at.map(|i| i / x.len()), interval, times);
             self.finish(quantity, out);
         }

@@ -41,6 +41,8 @@ pub enum Quantity {
     BodyAcceleration,
     /// γ' and ∇γ' in the body frame, and γ, one after the other.
     Motion,
+    /// γ and γ', one after the other.
+    State,
 }
 
 /// The extrapolation policy for times outside the knots.
@@ -85,7 +87,7 @@ impl Quantity {
     pub fn order(self) -> usize {
         match self {
             Quantity::Point => 0,
-            Quantity::Velocity | Quantity::Speed | Quantity::BodyVelocity => 1,
+            Quantity::Velocity | Quantity::Speed | Quantity::BodyVelocity | Quantity::State => 1,
             Quantity::Acceleration
             | Quantity::AccelerationNorm
             | Quantity::BodyAcceleration
@@ -135,5 +137,10 @@ impl BSpline<'_> {
         let k = self.knots.partition_point(|&t| t <= x).saturating_sub(1).clamp(self.degree, last);
         // Skip empty intervals at the end.
         (self.degree..=k).rev().find(|&k| self.knots[k] < self.knots[k + 1]).unwrap_or(k)
+    }
+
+    /// The same, at once if it is `hint`, an earlier result.
+    pub fn interval_near(&self, x: f64, hint: usize) -> usize {
+        if self.knots[hint] <= x && x < self.knots[hint + 1] { hint } else { self.interval(x) }
     }
 }

@@ -24,6 +24,7 @@ impl Quantity {
         match self {
             _ if self.is_length() => 1,
             Quantity::Motion => 2 * space.dim() + space.point_len(),
+            Quantity::State => 2 * space.point_len(),
             _ if self.is_of_body() => space.dim(),
             _ => space.point_len(),
         }
@@ -105,6 +106,7 @@ impl Job<'_> {
                 let (p, vector) = self.sample(space, cursor, segment, gamma, vectors, len);
                 match vector {
                     Some(v) if self.quantity.is_length() => out.write(&[norm(space, p, v)]),
+                    Some(v) if self.quantity == Quantity::State => out.write_both(p, v),
                     vector => out.write(vector.unwrap_or(p)),
                 }
             },
@@ -154,11 +156,13 @@ impl Job<'_> {
                     return out.write(space.body(p, w, result));
                 }
                 space.leave(segment.side, p, vector, result);
-                if self.quantity.is_length() {
+                if self.quantity == Quantity::State || self.quantity.is_length() {
                     space.leave(segment.side, p, None, point);
-                    out.write(&[norm(space, point, result)]);
-                } else {
-                    out.write(result);
+                }
+                match self.quantity {
+                    Quantity::State => out.write_both(point, result),
+                    quantity if quantity.is_length() => out.write(&[norm(space, point, result)]),
+                    _ => out.write(result),
                 }
             },
         );
@@ -277,6 +281,13 @@ impl Rows<'_> {
         } else {
             scatter_apart(lanes, self.stride, self.out);
         }
+    }
+
+    /// Writes two arrays, one after the other.
+    #[inline(always)]
+    fn write_both(self, first: &[Lane], second: &[Lane]) {
+        scatter_apart(first, self.stride, self.out);
+        scatter_apart(second, self.stride, &mut self.out[first.len()..]);
     }
 }
 
