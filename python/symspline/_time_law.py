@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from . import _core
 from ._arrays import as_array, cast, checked_number, read_only, refuse, short_repr, whole_number
 from ._core import ValidationError
 from ._curve import Curve
@@ -24,9 +25,6 @@ _ZERO = 1e-12
 _ROUNDING = 1e-12
 # Intervals next to a rest, each half as long as the next.
 _HALVINGS = 14
-# Steps of bisection for the largest u, and the part of u by which it is first reduced.
-_STEPS = 10
-_NEAR = 1e-6
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -215,8 +213,7 @@ def time_law(
     ]
     path = _sampled(curve, whole_number(grid_size, "grid_size", 4))
     problem = _problem(path, np.array(speeds), np.array(accelerations), (ends[0], ends[1]))
-    u = _forward(problem, _backward(problem))
-    rates = np.sqrt(u)
+    rates = np.sqrt(_fastest(problem))
     steps = 2 * np.diff(path.x) / (rates[:-1] + rates[1:])
     if not (np.isfinite(steps).all() and (steps > 0).all()):
         where = int(np.flatnonzero(~(np.isfinite(steps) & (steps > 0)))[0])
@@ -332,40 +329,34 @@ def _jumps(curve: Curve[Any], knots: Doubles) -> Array:
     return np.asarray(product_norm(tuple(jumps)) > _JUMP * size + 1e-9 * size.max(initial=0.0))
 
 
-Row = list[tuple[float, ...]]
-
-
 class _Problem(NamedTuple):
-    """Limits on a grid, as lists, in which single numbers are found faster than in arrays.
-
-    The constraint p u² + 2 q u a + r a² ≤ A² of one factor, for u and the second derivative a, holds at both ends of an
-    interval of length h, where u differs by 2 h a. Each constraint is a polynomial of a, given u at one end, with the
-    coefficients ``lead``, 2 u ``half`` and u² ``p`` - A².
+    """Limits on a grid, for the core.
 
     Attributes
     ----------
-    h : list of float
+    h : ndarray, shape (n - 1,)
         Steps of the grid.
-    most : list of float
+    most : ndarray, shape (n,)
         Largest u at the grid.
-    from_start, from_end : list of list of tuple
-        For each interval, the numbers ``lead``, ``half``, ``p`` and A² of all constraints, given u at its start or end.
+    forms : tuple of ndarray, each of shape (2, n - 1, factors)
+        p, q and r of the path in the factors with a limit of the acceleration.
+    limits : ndarray, shape (factors,)
+        Squares of these limits.
     ends : tuple
         Values of u at both ends; None where γ' vanishes, so that all values of u are a rest.
     """
 
-    h: list[float]
-    most: list[float]
-    from_start: list[Row]
-    from_end: list[Row]
+    h: Doubles
+    most: Doubles
+    forms: tuple[Doubles, Doubles, Doubles]
+    limits: Doubles
     ends: tuple[float | None, float | None]
 
 
 def _problem(path: _Path, speeds: Doubles, accelerations: Doubles, wanted: tuple[float, float]) -> _Problem:
     limited = np.isfinite(accelerations)
-    p, q, r = (own[..., limited] for own in (path.p, path.q, path.r))
-    limits = np.broadcast_to(accelerations[limited] ** 2, p.shape)
-    squares = path.squares
+    p, q, r = (np.ascontiguousarray(own[..., limited]) for own in (path.p, path.q, path.r))
+    limits, squares = accelerations[limited] ** 2, path.squares
     with np.errstate(all="ignore"):
         # The largest u with any a, from the determinant of the quadratic form.
         form = p * r - q * q
@@ -378,20 +369,7 @@ def _problem(path: _Path, speeds: Doubles, accelerations: Doubles, wanted: tuple
         _end(most, total, end, speed, name)
         for end, speed, name in ((0, wanted[0], "initial_speed"), (-1, wanted[1], "final_speed"))
     )
-    h = np.diff(path.x)
-    step = 2 * h[:, None]
-    rows = [
-        np.concatenate([_rows(p[i], q[i], r[i], limits[i], shift) for i, shift in pair], axis=1).tolist()
-        for pair in (((0, 0 * step), (1, step)), ((1, 0 * step), (0, -step)))
-    ]
-    return _Problem(h.tolist(), most.tolist(), rows[0], rows[1], (ends[0], ends[1]))
-
-
-def _rows(p: Doubles, q: Doubles, r: Doubles, limits: Doubles, shift: Doubles) -> Doubles:
-    """Return the coefficients of p (u + shift a)² + 2 q (u + shift a) a + r a² ≤ A², shape (n - 1, factors, 4)."""
-    lead = p * shift**2 + 2 * q * shift + r
-    lead = np.where(lead <= 1e-14 * (p * shift**2 + r), 0.0, lead)
-    return np.stack([lead, p * shift + q, p, limits], axis=-1)
+    return _Problem(np.diff(path.x), most, (p, q, r), limits, (ends[0], ends[1]))
 
 
 def _end(most: Doubles, total: Doubles, end: int, speed: float, name: str) -> float | None:
@@ -411,71 +389,12 @@ def _end(most: Doubles, total: Doubles, end: int, speed: float, name: str) -> fl
     return u
 
 
-def _feasible(row: Row, u: float) -> tuple[float, float] | None:
-    """Return the interval of a that all constraints of an interval allow, given u at one of its ends."""
-    least, most = -math.inf, math.inf
-    for lead, half, p, square in row:
-        b, rest = u * half, p * u * u - square
-        if lead == 0.0:
-            if rest > 0:
-                return None
-            continue
-        root = b * b - lead * rest
-        if root < 0:
-            return None
-        root = math.sqrt(root)
-        least, most = max(least, (-b - root) / lead), min(most, (root - b) / lead)
-    return (least, most) if least <= most else None
-
-
-def _backward(problem: _Problem) -> tuple[list[float], list[float]]:
-    """Return the largest u at the grid from which the end can be reached, and the next u on the way."""
-    count = len(problem.h)
-    largest, following = [0.0] * (count + 1), [0.0] * count
-    largest[-1] = problem.most[-1]
-
-    def before(k: int, u: float) -> float | None:
-        """Return the largest u at the start of interval k with the given u at its end."""
-        interval, h = _feasible(problem.from_end[k], u), 2 * problem.h[k]
-        if interval is None:
-            return None
-        a = max(interval[0], (u - problem.most[k]) / h)
-        return max(u - h * a, 0.0) if a <= interval[1] else None
-
-    for k in range(count - 1, -1, -1):
-        u = largest[k + 1]
-        found = before(k, u)
-        if found is None:
-            # The largest u at the end of the interval for which the limits at its start can be kept, usually near.
-            part = _NEAR
-            while part < 0.5 and before(k, u * (1 - part)) is None:
-                part *= 4
-            low, high = (u * (1 - part), u * (1 - part / 4)) if part < 0.5 else (0.0, u)
-            for _ in range(_STEPS):
-                middle = (low + high) / 2
-                low, high = (low, middle) if before(k, middle) is None else (middle, high)
-            u, found = low, before(k, low) or 0.0
-        largest[k], following[k] = found, u
-    return largest, following
-
-
-def _forward(problem: _Problem, backward: tuple[list[float], list[float]]) -> Doubles:
+def _fastest(problem: _Problem) -> Doubles:
     """Return u at the grid, with the largest acceleration at any time that allows the end to be reached."""
-    largest, following = backward
     start, end = problem.ends
-    if start is not None and start > largest[0] * (1 + 1e-9):
+    largest, u = _core.time_law(problem.h, problem.most, problem.forms, problem.limits, start)
+    if start is not None and start > largest * (1 + 1e-9):
         raise ValidationError("initial_speed is too high: the curve cannot be followed within the limits. Reduce it.")
-    u = largest[0] if start is None else min(start, largest[0])
-    values = [u]
-    for k, h in enumerate(problem.h):
-        # The set of u and a within the limits is convex, so that this share of the backward pass is in it.
-        share = following[k] * min(u / largest[k], 1.0) if largest[k] > 0 else 0.0
-        interval = _feasible(problem.from_start[k], u)
-        if interval is not None:
-            a = min(interval[1], (largest[k + 1] - u) / (2 * h))
-            share = max(share, u + 2 * h * a) if a >= interval[0] else share
-        u = min(share, largest[k + 1])
-        values.append(u)
-    if end is not None and values[-1] < end * (1 - 1e-9):
+    if end is not None and u[-1] < end * (1 - 1e-9):
         raise ValidationError("final_speed cannot be reached on this path within the limits. Reduce it.")
-    return np.array(values)
+    return u

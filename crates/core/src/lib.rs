@@ -16,6 +16,7 @@ pub mod monitor;
 pub mod parallel;
 pub mod rows;
 pub mod scalar;
+pub mod search;
 pub mod space;
 pub mod special;
 pub mod tridiagonal;

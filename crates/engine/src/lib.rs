@@ -2,7 +2,7 @@
 //!
 //! A curve consists of three arrays: knots t, points p and velocities u = γ'(t). [`fit`] computes the velocities,
 //! [`curve`] evaluates curves, [`space`] contains the geometry, and [`spaces`] lists all spaces. [`derivative`]
-//! computes the sensitivity of a curve to its data, [`smoothing`] fits curves close to noisy points, [`grid`]
+//! computes the sensitivity of a curve to its data, [`search`] finds its nearest points to others, [`smoothing`] fits curves close to noisy points, [`grid`]
 //! interpolates over several parameters. Arrays are
 //! one-dimensional: the numbers of each point are adjacent, matrices row by row, point after point.
 //!
@@ -21,5 +21,5 @@ pub use symspline_core::derivative;
 #[cfg(feature = "laws")]
 pub use symspline_core::laws;
 pub use symspline_core::{
-    curve, fit, matrix, monitor, parallel, rows, scalar, space, special, tridiagonal, validate,
+    curve, fit, matrix, monitor, parallel, rows, scalar, search, space, special, tridiagonal, validate,
 };

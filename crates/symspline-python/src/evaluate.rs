@@ -140,7 +140,7 @@ struct Evaluation<'a> {
     outside: Outside,
 }
 
-fn curves_of<'a>([t, points, velocities]: [&'a Array; 3]) -> PyResult<Curves<'a>> {
+pub fn curves_of<'a>([t, points, velocities]: [&'a Array; 3]) -> PyResult<Curves<'a>> {
     Ok(Curves {
         t: in_order(t)?,
         nodes: t.shape()[t.ndim() - 1],

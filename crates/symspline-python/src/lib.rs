@@ -10,6 +10,7 @@ mod evaluate;
 mod fit;
 mod grid;
 mod hermite;
+mod search;
 mod smoothing;
 mod space;
 mod stiefel;
@@ -89,6 +90,10 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(grid::grid_scattered, m)?)?;
     m.add_function(wrap_pyfunction!(grid::grid_midpoint, m)?)?;
     m.add_function(wrap_pyfunction!(stiefel::stiefel, m)?)?;
+    m.add_function(wrap_pyfunction!(search::closest, m)?)?;
+    m.add_function(wrap_pyfunction!(search::closest_on_curves, m)?)?;
+    m.add_function(wrap_pyfunction!(search::roots, m)?)?;
+    m.add_function(wrap_pyfunction!(search::time_law, m)?)?;
     m.add_function(wrap_pyfunction!(tridiagonal::solve_tridiagonal, m)?)?;
     m.add_function(wrap_pyfunction!(conversions::convert_rotations, m)?)?;
     m.add_function(wrap_pyfunction!(conversions::number_lines, m)?)?;

@@ -122,12 +122,14 @@ impl Handle {
     }
 
     /// Raises unless every row is a point within `tol`; `shape` is the shape of the rows.
+    #[pyo3(signature = (points, shape, tol, name=None))]
     fn check_points(
         &self,
         py: Python,
         points: PyReadonlyArrayDyn<f64>,
         shape: Vec<usize>,
         tol: f64,
+        name: Option<&str>,
     ) -> PyResult<()> {
         let points = in_order(&points)?;
         require_memory(memory(&self.space.get(), None), || {
@@ -137,8 +139,13 @@ impl Handle {
         copy.extend_from_slice(points);
         let done = py.detach(|| project_points(&self.space.get(), &mut copy, tol));
         done.map_err(|(row, off, why)| {
-            let which =
-                if shape.is_empty() { "it".into() } else { format!("point {}", format_index(row, &shape)) };
+            let index = format_index(row, &shape);
+            let which = match (name, shape.is_empty()) {
+                (None, true) => "it".into(),
+                (None, false) => format!("point {index}"),
+                (Some(name), true) => name.into(),
+                (Some(name), false) => format!("{name}[{index}]"),
+            };
             invalid(off_space(&which, off, tol, &why))
         })
     }

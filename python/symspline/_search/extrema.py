@@ -9,9 +9,9 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
+from .. import _core
 from .._core import ValidationError
 from .._spaces import Doubles
-from .roots import roots
 
 Function = Callable[[Doubles], Doubles]
 
@@ -104,11 +104,11 @@ def extrema(f: Function, knots: Doubles, sign: float) -> Doubles:
     own = turns[inside]
     ends = tau[place[own]], tau[place[own + 1]]
 
-    def slope(x: Doubles, index: Any) -> Doubles:
+    def slope(index: Any, x: Doubles) -> Doubles:
         return np.asarray(chebyshev.chebval(x, slopes[:, number[own[index]]], tensor=False))
 
     starts, stops = (values[number[i], place[i]] for i in (own, own + 1))
-    root = roots(slope, ends, (starts, stops), (ends[0] + ends[1]) / 2, np.zeros(len(own)))
+    root = _core.roots(slope, ends, (starts, stops), (ends[0] + ends[1]) / 2)
     found[inside] = intervals.time(number[own], root)
     rough = np.flatnonzero(inside)[intervals.rough[number[own]]]
     found[rough], real = _refined(lambda x: sign * f(x), intervals, number[turns[rough]], found[rough])
@@ -144,17 +144,23 @@ def crossings(f: Function, knots: Doubles, value: float) -> Doubles:
     own = np.flatnonzero(values[:-1] * values[1:] < 0)
     interval, outer = (times[own], times[own + 1]), (values[own], values[own + 1])
     guess = (interval[0] + interval[1]) / 2
-    found = roots(lambda x, _: f(x) - value, interval, outer, guess, np.zeros(len(own)))
+    found = _core.roots(lambda _, x: f(x) - value, interval, outer, guess)
     return np.sort(np.concatenate([times[exact], found]))
 
 
-def checked_values(values: Any, shape: tuple[int, ...]) -> Doubles:
-    """Return the values of a function of the user."""
+def checked_values(values: Any, times: NDArray[Any]) -> Doubles:
+    """Return the values of a function of the user at some times."""
     array = np.asarray(values)
-    if array.shape != shape or array.dtype.kind not in "biuf":
+    if array.shape != times.shape or array.dtype.kind not in "biuf":
         raise ValidationError(
-            f"function must return one real number per time, shape {shape}; got {array.dtype} of shape {array.shape}"
+            f"function must return one real number per time, shape {times.shape}; got {array.dtype} of shape "
+            f"{array.shape}"
         )
-    if not np.isfinite(array).all():
-        raise ValidationError("function must return finite numbers in the whole domain of the curve")
+    good = np.isfinite(array)
+    if not good.all():
+        i = np.unravel_index(np.argmin(good), good.shape)
+        raise ValidationError(
+            f"function must return finite numbers in the whole domain of the curve; at the time {times[i]} it returned "
+            f"{array[i]}"
+        )
     return array.astype(np.float64)

@@ -15,7 +15,7 @@ from .._arrays import checked_flag, checked_number, short_repr
 from .._core import ValidationError
 from .._curves.arc_length import ArcLength
 from .._curves.integrals import Evaluable
-from .._spaces import Array, Doubles, Space, factors_of, parts_of
+from .._spaces import Array, Doubles, Space, factors_of, parts_of, point_tol
 from .._typing import FloatArray, P, Time
 from ..manifolds import Manifold
 from .closest import ClosestPoints
@@ -117,7 +117,7 @@ class Searchable(ABC, Generic[P]):
             np.broadcast_to(x, shape + factor.point_shape).reshape(-1, *factor.point_shape)
             for x, factor in zip(targets, factors_of(space), strict=True)
         ]
-        curve = np.repeat(np.arange(math.prod(batch)), math.prod(inner))
+        curve = np.repeat(np.arange(math.prod(batch), dtype=np.int64), math.prod(inner))
         with np.errstate(all="ignore"):
             times, distances = self._closest.search(rows, curve)
         return self._shown_times(times.reshape(shape))[()], distances.reshape(shape)[()]
@@ -230,19 +230,23 @@ class Searchable(ABC, Generic[P]):
                 "the curve is a batch, but extrema belong to one curve. Use one of them, as curve[0]."
             )
         if callable(function):
-            return lambda x: checked_values(function(self._shown_times(x)), x.shape)
+            return lambda x: _called(function, self._shown_times(x))
         if not isinstance(function, str) or function not in _QUANTITIES:
             raise ValidationError(
                 f"function must be 'speed', 'acceleration' or a function of times, not {short_repr(function)}"
             )
         quantity = _QUANTITIES[function]
         return lambda x: checked_values(
-            self._curve.evaluate(np.ascontiguousarray(x), quantity, "continue", False), x.shape
+            self._curve.evaluate(np.ascontiguousarray(x), quantity, "continue", False), self._shown_times(x)
         )
 
     @cached_property
     def _closest(self) -> ClosestPoints:
         return ClosestPoints(self._curve, self.space, self._arc)
+
+
+def _called(function: Callable[[Any], Any], times: NDArray[Any]) -> Doubles:
+    return checked_values(function(times), times)
 
 
 def _check_metric(space: Space[Any]) -> None:
@@ -258,12 +262,16 @@ def _check_metric(space: Space[Any]) -> None:
 def _checked(space: Space[Any], value: Any) -> Array:
     """Return points of one factor as an array of numbers, projected onto the space."""
     array = space._array(value, "points")
-    numbers = space._numbers(space._doubles(array, "points"))
-    try:
-        space.check_point(array)
-    except ValidationError as error:
-        raise ValidationError(f"points are invalid: {error}") from None
-    return numbers if isinstance(space, Manifold) else space._apply("project", x=numbers)
+    doubles = space._doubles(array, "points")
+    if isinstance(space, Manifold):
+        try:
+            space.check_point(array)
+        except ValidationError as error:
+            raise ValidationError(f"points are invalid: {error}") from None
+        return space._numbers(doubles)
+    lead = space._lead(doubles)
+    space._handle.check_points(space._rows(doubles, lead), lead, point_tol(array.dtype), "points")
+    return space._apply("project", x=space._numbers(doubles))
 
 
 def _lead(space: Space[Any], arrays: list[Array]) -> tuple[int, ...]:
