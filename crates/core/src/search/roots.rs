@@ -85,7 +85,7 @@ impl State {
         let Self { a, b, fa, fb, .. } = *self;
         let best = if fa.abs() < fb.abs() { a } else { b };
         let near = (2.0 * f64::EPSILON * best.abs() + self.tol) / (b - a).abs();
-        if near > 0.5 || fa == 0.0 || !fa.is_finite() {
+        if !(near <= 0.5) || fa == 0.0 || !fa.is_finite() {
             return Some(best);
         }
         let (xi, phi) = ((a - b) / (c - b), (fa - fb) / (fc - fb));
