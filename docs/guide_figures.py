@@ -11,6 +11,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+import matplotlib.style
 from matplotlib.figure import Figure
 
 DOCS = Path(__file__).parent
@@ -48,6 +49,9 @@ PAGES = (
 """Pages with such a picture. That of guide/from_geomstats needs geomstats, and is made by its name."""
 
 
+STYLE = DOCS.parent / "examples/gallery.mplstyle"
+
+
 def figure_of(page: Path) -> Figure:
     """Run the code of the page, in the present folder, until there is a figure."""
     names: dict[str, Any] = {}
@@ -67,8 +71,8 @@ def main() -> None:
                 shutil.copy(table, folder)
             os.chdir(folder)
             try:
-                figure = figure_of(page)
-                figure.savefig(page.with_suffix(".png"), dpi=85, bbox_inches="tight")
+                with matplotlib.style.context(STYLE.resolve()):
+                    figure_of(page).savefig(page.with_suffix(".png"), dpi=85, bbox_inches="tight")
             finally:
                 os.chdir(here)
 
