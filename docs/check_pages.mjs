@@ -85,7 +85,7 @@ function wideProblems() {
   const found = [];
   for (const error of document.querySelectorAll(".katex-error")) found.push(`formula: ${error.title}`);
   for (const math of document.querySelectorAll(".math")) {
-    if (!math.querySelector(".katex, .katex-error")) found.push(`formula not typeset: ${math.textContent}`);
+    if (!math.matches(".katex-error") && !math.querySelector(".katex")) found.push(`formula not typeset: ${math.textContent}`);
   }
   for (const image of document.querySelectorAll("article img")) {
     // A thumbnail stands above its title.
