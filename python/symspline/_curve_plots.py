@@ -6,7 +6,7 @@ from base64 import b64encode
 from html import escape
 from importlib.util import find_spec
 from io import BytesIO
-from typing import TYPE_CHECKING, ClassVar, overload
+from typing import TYPE_CHECKING, ClassVar, Unpack, overload
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from ._curve_base import CurveBase
 from ._curves.curve import SidePanel, UncertaintyBand
 from ._options import require_matplotlib
 from ._spaces import Doubles
-from ._typing import File, P
+from ._typing import AxesLook, File, P, PageLook
 
 if TYPE_CHECKING:
     from matplotlib.animation import FuncAnimation
@@ -91,11 +91,7 @@ class CurvePlots(CurveBase[P]):
         file: File | None = None,
         *,
         ax: None = None,
-        color: str | tuple[float, ...] | None = None,
-        label: str | None = None,
-        title: str | None = None,
-        figsize: tuple[float, float] | None = None,
-        show: bool = False,
+        **look: Unpack[PageLook],
     ) -> Figure: ...
     @overload
     def plot(
@@ -103,11 +99,7 @@ class CurvePlots(CurveBase[P]):
         file: None = None,
         *,
         ax: Axes,
-        color: str | tuple[float, ...] | None = None,
-        label: str | None = None,
-        title: str | None = None,
-        figsize: None = None,
-        show: bool = False,
+        **look: Unpack[AxesLook],
     ) -> Axes: ...
     def plot(
         self,
@@ -133,13 +125,15 @@ class CurvePlots(CurveBase[P]):
           re-enters on the opposite side.
         - Other projective spaces and Grassmannians: the principal angles to the first point.
         - SPD(2) and SPD(3): ellipses and ellipsoids along the time axis.
+        - Tori: the angles in degrees; lines break where an angle passes 180 degrees.
         - Stiefel manifolds: the components of each column against time.
         - All other spaces: the components against time, with dashed imaginary parts. If there are more than twelve,
           the twelve with the largest ranges have names.
 
         A product has one such panel per factor. The other panels show the speed |γ'| and the size |∇γ'| of the
         covariant acceleration, with one panel per factor of a product. In one dimension both have a sign. For poses,
-        rates of rotation and of translation have separate panels, because their units differ.
+        rates of rotation and of translation have separate panels, because their units differ. Dashed lines show the
+        limits of a curve that was retimed by a law of `time_law`.
 
         Parameters
         ----------
@@ -157,7 +151,7 @@ class CurvePlots(CurveBase[P]):
         title : str, optional
             Title of the figure, or of `ax`.
         figsize : pair of float, optional
-            Width and height of the figure in inches.
+            Width and height of the figure in inches. Text is smaller on a page that is smaller than the default.
         show : bool, default False
             Whether to open a window by pyplot, in which you can rotate three-dimensional pictures.
 

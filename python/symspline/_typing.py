@@ -57,6 +57,23 @@ TimesLike = ArrayLike | date | timedelta | Sequence[date] | Sequence[timedelta]
 # Called with the finished and the total number of points.
 Progress = Callable[[int, int], object]
 File = str | PathLike[str] | IO[bytes]
+Color = str | tuple[float, ...]
+
+
+class AxesLook(TypedDict, total=False):
+    """The options of plots into existing axes."""
+
+    color: Color | None
+    label: str | None
+    title: str | None
+    show: bool
+
+
+class PageLook(AxesLook, total=False):
+    """The options of plots that create a figure."""
+
+    figsize: tuple[float, float] | None
+
 
 Extrapolate = Literal["raise", "geodesic", "periodic"] | bool | None
 OnFailure = Literal["raise", "warn", "ignore"]

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Literal, overload
+from typing import TYPE_CHECKING, Any, Literal, Unpack, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +33,7 @@ from ._smoothing.many import smooth_many
 from ._spaces import Sphere
 from ._timed_curve import check_timed
 from ._tracks import read_tracks
-from ._typing import Duplicates, File, FloatArray, TimesLike
+from ._typing import AxesLook, Duplicates, File, FloatArray, PageLook, TimesLike
 from ._warnings import warn
 
 if TYPE_CHECKING:
@@ -431,11 +431,7 @@ def plot(
     *,
     radius: float = EARTH_RADIUS,
     ax: None = None,
-    color: str | tuple[float, ...] | None = None,
-    label: str | None = None,
-    title: str | None = None,
-    figsize: tuple[float, float] | None = None,
-    show: bool = False,
+    **look: Unpack[PageLook],
 ) -> Figure: ...
 
 
@@ -446,11 +442,7 @@ def plot(
     *,
     radius: float = EARTH_RADIUS,
     ax: Axes,
-    color: str | tuple[float, ...] | None = None,
-    label: str | None = None,
-    title: str | None = None,
-    figsize: None = None,
-    show: bool = False,
+    **look: Unpack[AxesLook],
 ) -> Axes: ...
 
 

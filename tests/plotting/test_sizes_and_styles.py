@@ -36,7 +36,9 @@ def test_small_axes_can_be_laid_out(name):
         warnings.simplefilter("error")
         rendered(figure)
     box, page = axes.get_tightbbox(), figure.bbox
-    assert box.x0 > page.x0 - 15 and box.x1 < page.x1 + 15 and box.y0 > page.y0 - 15 and box.y1 < page.y1 + 15
+    # Boxes in three dimensions have labels that layouts do not know exactly.
+    most = 30 if axes.name == "3d" else 15
+    assert page.x0 - most < box.x0 < box.x1 < page.x1 + most and page.y0 - most < box.y0 < box.y1 < page.y1 + most
 
 
 def test_lines_are_thinner_in_small_axes():

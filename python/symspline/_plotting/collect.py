@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from .._core import ValidationError
 from .._spaces import Product, Space, parts_of
-from .curves import Axis, Batch, Curve
+from .curves import SECOND, Axis, Batch, Curve
 from .style import Array, colors, evenly
 
 FEW = 5
@@ -26,7 +26,6 @@ _SAMPLES = 1200
 """Samples of a curve with few segments."""
 _FAR = 1e3
 """An axis counts from a number if the first time is larger than this multiple of the time span."""
-_SECOND = np.timedelta64(1, "s")
 
 
 class Scatter:
@@ -59,7 +58,7 @@ def axis_of(ends: Sequence[tuple[Any, Any]], durations: bool = False, raw: bool 
     firsts, lasts = (np.concatenate([np.ravel(pair[i]) for pair in ends]) for i in (0, 1))
     first, last = firsts.min(), lasts.max()
     if firsts.dtype.kind == "M":
-        if (last - first) / _SECOND > 1e-3:
+        if (last - first) / SECOND > 1e-3:
             return Axis(dates=True, name="", seconds=True)
         return Axis(start=first, name=f"seconds since {first}", seconds=True)
     name = "t, seconds" if durations else "t"

@@ -19,7 +19,7 @@ from .._report import long_gaps
 from .._spaces import Space
 from .style import DATA, DATES, INK, SPLINE, Array, Indices, evenly
 
-_SECOND = np.timedelta64(1, "s")
+SECOND = np.timedelta64(1, "s")
 _NO_GAPS: Array = np.empty((0, 2))
 # Labels of artists that the legend of a page explains. Those with an underscore are not in legends of matplotlib.
 LINE, DOTS, START, DATA_DOTS, FAINT = "_curve", "_given", "_start", "_data", "_others"
@@ -59,7 +59,7 @@ class Axis:
         if self.dates:
             return np.asarray(DATES.date2num(first + np.rint(1e6 * since).astype("timedelta64[us]")))
         if isinstance(self.start, np.datetime64):
-            return np.asarray(float((first - self.start) / _SECOND) + since)
+            return np.asarray(float((first - self.start) / SECOND) + since)
         # The difference of integers is exact.
         return np.asarray(float(first if self.start is None else first - self.start) + since)
 

@@ -81,7 +81,7 @@ def _draw_strip(axes: Axes, t: NDArray[Any], strip: NDArray[Any], given: Array, 
     dates = t.dtype.kind == "M"
     positions, knots = (np.asarray(DATES.date2num(values) if dates else values, float) for values in (strip, t))
     if dates:
-        show_dates(axes, 3, 8)
+        show_dates(axes.xaxis, 3, 8)
     else:
         axes.set_xlabel("t")
     span = positions[-1] - positions[0]

@@ -72,7 +72,7 @@ def _name_axes(axes: Axes, curves: Sequence[Curve], label: str) -> None:
     axis = curves[0].axis
     axes.set(xlabel=axes.get_xlabel() or axis.name, ylabel=axes.get_ylabel() or label)
     if axis.dates:
-        show_dates(axes, 3, 7)
+        show_dates(axes.xaxis, 3, 7)
     _mark_gaps(axes, curves)
 
 
@@ -81,7 +81,7 @@ def _set_times(axes: Axes, curves: Sequence[Curve], width: float, lowest: bool) 
     axes.set_xlim(first - 0.01 * (last - first), last + 0.01 * (last - first))
     if curves[0].axis.dates:
         # For some spans the locator does not find an interval between narrower limits.
-        show_dates(axes, *((3, 10) if width > 7 else (2, 5)))
+        show_dates(axes.xaxis, *((3, 10) if width > 7 else (2, 5)))
     axes.set_xlabel(curves[0].axis.name if lowest else "")
     axes.tick_params(labelbottom=lowest)
     axes.xaxis.offsetText.set_visible(lowest)

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure, SubFigure
 from .._core import ValidationError
 from .fields import RIGHT, Field, draw_field
 from .figure import FACTORS, captions, drawing, finish
-from .style import DATES, INK, Array, heading, inside, plain, points
+from .style import DATES, INK, Array, heading, inside, plain, points, show_dates
 from .surfaces import draw_surface
 
 _HEAD, _LEFT, _BOTTOM, _TOP, _NAMED = 0.95, 0.85, 0.6, 0.1, 0.4
@@ -55,7 +55,7 @@ class Side(NamedTuple):
     @property
     def has_dates(self) -> bool:
         """Whether the axis shows dates, which matplotlib resolves to a microsecond."""
-        return _has_dates(self.axis)
+        return bool(self.axis.time_axis.dates and self.axis.knots[-1] - self.axis.knots[0] > 1e-3)
 
     def pixels(self, most: int) -> Array:
         """Return the coordinates of the centres of pixels."""
@@ -171,7 +171,7 @@ def _draw_factor(
         getattr(axes, f"set_{letter}lim")(first - margin, last + margin)
         getattr(axes, f"set_{letter}label")(side.label)
         if side.has_dates:
-            _show_dates(getattr(axes, f"{letter}axis"))
+            show_dates(getattr(axes, f"{letter}axis"), 2, 6)
 
 
 def _draw_nodes(axes: Axes, sides: list[Side], valid: Any) -> None:
@@ -189,17 +189,6 @@ def _middle(valid: Any) -> tuple[int, int]:
     nodes = np.argwhere(valid)
     i, j = nodes[np.abs(nodes / np.maximum(np.array(valid.shape) - 1, 1) - 0.5).sum(axis=1).argmin()]
     return int(i), int(j)
-
-
-def _show_dates(axis: Any) -> None:
-    """Label an axis by dates."""
-    locator = DATES.AutoDateLocator(minticks=2, maxticks=6)
-    axis.set_major_locator(locator)
-    axis.set_major_formatter(DATES.ConciseDateFormatter(locator))
-
-
-def _has_dates(axis: Any) -> bool:
-    return bool(axis.time_axis.dates and axis.knots[-1] - axis.knots[0] > 1e-3)
 
 
 def _description(grid: Any, middles: list[int]) -> str:

@@ -25,7 +25,7 @@ from .chart import SHADOW, box, explain_frames, frame_handles, plane
 from .curves import Curve
 from .rows import REACH, VIEW, Rows
 from .sphere import caps
-from .style import AXES, DATA, INK, Array, axes_size, legend, note, points, time_colors, window
+from .style import AXES, DATA, INK, Array, axes_size, legend, note, points, round_below, time_colors, window
 
 _ARROW = np.array([[1.0, 0.0], [-0.7, 0.55], [-0.35, 0.0], [-0.7, -0.55]])
 """A body in the plane that points along its first axis."""
@@ -239,9 +239,7 @@ draw_ellipsoids = partial(_draw_in_rows, VIEW)
 
 def _draw_scale(rows: Rows, inches: float, right: float) -> None:
     """Draw a bar above the axes whose length is 1, 2 or 5 times a power of ten, ``right`` inches from the corner."""
-    longest = 0.8 / inches
-    power = 10.0 ** np.floor(np.log10(longest))
-    length = max(step for step in (power, 2 * power, 5 * power) if step < 1.01 * longest)
+    length = round_below(0.8 / inches)
     # The whole width of the axes, also if symbols have a margin in them.
     width, _ = axes_size(rows.axes)
     end, height = 1 - right / width, 1 + 0.14 / (rows.height * len(rows.rows))

@@ -104,7 +104,7 @@ def draw_into(ax: Axes, curves: Sequence[Curve], title: str | None, show: bool) 
             getattr(ax, f"set_{name}lim")(min(low, own[0]), max(high, own[1]))
     _name_start(ax)
     own = _own(ax)
-    legend = set() if ax.get_legend() is None else set(ax.get_legend().findobj(Text))
+    legend = {text for own in [ax.get_legend()] if own is not None for text in own.findobj(Text)}
     shrink([artist for artist in ax.findobj() if artist not in before | own | legend], panel.factor, text_factor(ax))
     if dark:
         _darken(ax, before, figure.get_facecolor())

@@ -13,11 +13,10 @@ from matplotlib.lines import Line2D
 from .._curves.curve import SidePanel
 from .curves import ALPHA, Curve
 from .graphs import timelines
+from .rates import NORMAL
 from .style import BOTTOM, DATA, DISTINCT, EDGE, INK, TOP, legend, points
 
 _HEIGHT = 1.35
-_NORMAL = 1.96
-"""Half width of the interval that contains 95 % of the residuals, if their standard deviations are right."""
 _LEAST = 3.6
 """The smallest limit of the vertical axis. Residuals far beyond most others are drawn at the edge."""
 
@@ -59,7 +58,7 @@ def _draw_residuals(axes: Axes, curve: Curve, own: SidePanel) -> None:
     sizes = np.abs(values)
     top = max(_LEAST, min(1.1 * float(sizes.max()), 1.5 * float(np.quantile(sizes, 0.99))))
     axes.set_ylim(-top, top)
-    axes.axhspan(-_NORMAL, _NORMAL, facecolor=curve.color, alpha=0.08, linewidth=0, zorder=0.6, label="95 %")
+    axes.axhspan(-NORMAL, NORMAL, facecolor=curve.color, alpha=0.08, linewidth=0, zorder=0.6, label="95 %")
     axes.axhline(0.0, color=EDGE, linewidth=0.8, zorder=1)
     size = float(np.clip(40 / np.sqrt(values.size), 1.2, 3.5))
     look: Any = {"linestyle": "none", "markeredgewidth": 0, "zorder": 3, "rasterized": values.size > 5000}
@@ -72,7 +71,7 @@ def _draw_residuals(axes: Axes, curve: Curve, own: SidePanel) -> None:
             far = sign * column > top
             edge = np.full(int(far.sum()), 0.95 * sign * top)
             axes.plot(times[far], edge, marker=marker, markersize=6, color=color, **look)
-    words = f"{100 * np.mean(sizes > _NORMAL):.1f} % beyond ±{_NORMAL} (5 % expected)"
+    words = f"{100 * np.mean(sizes > NORMAL):.1f} % beyond ±{NORMAL} (5 % expected)"
     beyond = int((sizes > top).sum())
     words += f"; {beyond} beyond the axis (triangles)" if beyond else ""
     axes.text(1, 1.02, words, transform=axes.transAxes, ha="right", va="bottom", color=INK, fontsize=points(9))

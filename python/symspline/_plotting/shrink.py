@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import numpy as np
 from matplotlib import rc_context, rcParams
@@ -15,7 +16,7 @@ from matplotlib.quiver import Quiver
 from matplotlib.text import Text
 from matplotlib.transforms import Affine2D
 
-_TEXT = "font.size", "axes.labelpad", *(f"{axis}tick.major.{name}" for axis in "xy" for name in ("pad", "size"))
+_TEXT: Any = "font.size", "axes.labelpad", *(f"{axis}tick.major.{name}" for axis in "xy" for name in ("pad", "size"))
 
 
 @contextmanager
@@ -30,21 +31,18 @@ def shrink(artists: Iterable[Artist], factor: float, text: float = 1.0) -> None:
     if factor == 1:
         return
     for artist in artists:
+        own: Any = artist
         if isinstance(artist, Line2D):
-            artist.set_linewidth(factor * artist.get_linewidth())
-            artist.set(
-                markersize=factor * artist.get_markersize(), markeredgewidth=factor * artist.get_markeredgewidth()
-            )
-        elif isinstance(artist, Quiver):
-            artist.width *= factor
-            artist.scale /= factor
-        elif isinstance(artist, Collection):
-            artist.set_linewidth(factor * np.asarray(artist.get_linewidth()))
-            figure = artist.get_figure(root=True)
-            if figure is not None and artist.get_transform().contains_branch(figure.dpi_scale_trans):
-                # Its paths are in inches.
-                artist.set_transform(Affine2D().scale(factor) + artist.get_transform())
-        elif isinstance(artist, Patch):
-            artist.set_linewidth(factor * artist.get_linewidth())
+            own.set(markersize=factor * own.get_markersize(), markeredgewidth=factor * own.get_markeredgewidth())
+        if isinstance(artist, Quiver):
+            own.width *= factor
+            own.scale /= factor
+        elif isinstance(artist, (Line2D, Patch, Collection)):
+            own.set_linewidth(factor * np.asarray(own.get_linewidth()))
         elif isinstance(artist, Text) and text < 1:
-            artist.set_fontsize(text * artist.get_fontsize())
+            own.set_fontsize(text * own.get_fontsize())
+        if isinstance(artist, Collection) and not isinstance(artist, Quiver) and own.figure is not None:
+            inches = own.get_figure(root=True).dpi_scale_trans
+            if own.get_transform().contains_branch(inches):
+                # Its paths are in inches.
+                own.set_transform(Affine2D().scale(factor) + own.get_transform())

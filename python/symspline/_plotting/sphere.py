@@ -20,7 +20,7 @@ from . import land
 from .arrows import draw_arrows
 from .curves import CIRCLE, Curve, disc_indices, draw_tube, interrupted
 from .globe import View, degrees, draw_frame, draw_globe, label_directions, middle_of
-from .style import GRID, HALO, INK, MARK, PAPER, SPLINE, Array, inside, note, plain, points, size, window
+from .style import GRID, HALO, INK, MARK, PAPER, SPLINE, Array, inside, note, plain, points, round_below, size, window
 
 _SMALL = np.radians(25)
 _LOCATOR = 3.9
@@ -67,8 +67,7 @@ def draw_sphere(panel: SubFigure, curves: Sequence[Curve]) -> None:
 def _draw_scale(axes: Axes, radius: float) -> None:
     """Draw a bar in the lower right corner of a frame, whose length is 1, 2 or 5 times a power of ten in km."""
     (west, east), (south, north) = axes.get_xlim(), axes.get_ylim()
-    steps = np.multiply.outer(10.0 ** np.arange(-9, 5), [1, 2, 5]).ravel()
-    length = steps[steps < 0.25 * (east - west) * radius][-1]
+    length = round_below(0.25 * (east - west) * radius)
     end, height = east - 0.03 * (east - west), south + 0.06 * (north - south)
     look: dict[str, Any] = {"color": INK, "zorder": 7}
     axes.plot([end - length / radius, end], [height] * 2, "|-", linewidth=1.2, markersize=6, label="_scale", **look)

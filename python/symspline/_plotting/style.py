@@ -117,11 +117,11 @@ def plain(axes: Axes) -> None:
         axis.offsetText.set(color=INK, fontsize=points(9))
 
 
-def show_dates(axes: Axes, least: int, most: int) -> None:
-    """Label a time axis by at least ``least`` and at most ``most`` dates."""
+def show_dates(axis: Any, least: int, most: int) -> None:
+    """Label an axis by at least ``least`` and at most ``most`` dates."""
     locator = DATES.AutoDateLocator(minticks=least, maxticks=most)
-    axes.xaxis.set_major_locator(locator)
-    axes.xaxis.set_major_formatter(DATES.ConciseDateFormatter(locator))
+    axis.set_major_locator(locator)
+    axis.set_major_formatter(DATES.ConciseDateFormatter(locator))
 
 
 def window(positions: Array, margin: float) -> tuple[Array, float]:
@@ -133,6 +133,12 @@ def window(positions: Array, margin: float) -> tuple[Array, float]:
 def evenly(count: int, most: int) -> Indices:
     """Return at most ``most`` evenly spaced numbers from 0 to count − 1."""
     return np.unique(np.linspace(0, count - 1, min(count, most)).astype(int))
+
+
+def round_below(value: float) -> float:
+    """Return the largest of 1, 2 and 5 times powers of ten up to a value."""
+    power = 10.0 ** np.floor(np.log10(value))
+    return float(max(step for step in (power, 2 * power, 5 * power) if step < 1.01 * value))
 
 
 def closest(steps: Any, value: float) -> float:
