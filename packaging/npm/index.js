@@ -1,12 +1,19 @@
 // Smooth curves through points of curved spaces. The compiled module does the arithmetic; this file reads its input.
 
-import { checked, ConvergenceError, CutLocusError, SymsplineError, ValidationError } from "./errors.js";
+import { checked as converted, ConvergenceError, CutLocusError, SymsplineError, ValidationError } from "./errors.js";
 import { known, number, optional, row, rows, vector, word } from "./input.js";
 import start, * as core from "./symspline.js";
 
 export { ConvergenceError, CutLocusError, SymsplineError, ValidationError };
 
 let started;
+let loaded = false;
+
+/** Calls a function of the compiled module. */
+function checked(call) {
+  if (!loaded) throw new SymsplineError("the compiled module is not loaded: call `await init()` first");
+  return converted(call);
+}
 
 /** Loads the compiled module. Await it once before anything else. */
 export function init(source) {
@@ -14,7 +21,9 @@ export function init(source) {
     started = undefined;
     throw error;
   });
-  return started.then(() => undefined);
+  return started.then(() => {
+    loaded = true;
+  });
 }
 
 async function load(source) {
@@ -45,7 +54,7 @@ export class Space {
 
   /** The names of all spaces. */
   static get names() {
-    return core.Space.names().split(" ");
+    return checked(() => core.Space.names()).split(" ");
   }
 
   exp(p, v) {

@@ -214,6 +214,20 @@ def test_example_of_the_readme_runs() -> None:
     assert done.returncode == 0, done.stderr
 
 
+def test_use_before_loading_raises() -> None:
+    program = f"""
+        import {{ CubicSpline, init, Space, SymsplineError }} from "{PACKAGE.as_posix()}/index.js";
+        for (const use of [() => Space.names, () => new CubicSpline(null, [[1], [2]], "r:1")]) {{
+          try {{ use(); process.exit(2); }}
+          catch (error) {{ if (!(error instanceof SymsplineError && error.message.includes("await init()"))) throw error; }}
+        }}
+        await Promise.all([init(), init()]);
+        if (new CubicSpline(null, [[1], [2]], "r:1").evaluate(0.5)[0] !== 1.5) process.exit(3);
+    """
+    done = subprocess.run([str(NODE), "--input-type=module"], input=program, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
 def test_types_name_what_the_module_exports() -> None:
     exported = set(node("exports.mjs", PACKAGE).split())
     declared = {
