@@ -1,6 +1,7 @@
 // Graphs over time below a figure, with knots that can be dragged and a cursor that can be moved.
 
 import { dot, line, nearest } from "./stage.js";
+import { clamp } from "./vectors.js";
 
 /** Round numbers for the axis of a graph. */
 function ticks(most, count = 3) {
@@ -65,7 +66,9 @@ export class Chart {
     context.rect(inner.x - 2, top - 2, inner.width + 4, height + 4);
     context.clip();
     for (const { x, y, color, width = 2, dash, jumps = [] } of lines) {
-      line(context, Array.from(x, (time, i) => (Number.isFinite(y[i]) ? [this.toX(time), middle - y[i] * scale] : null)), color, width, dash);
+      // Values far outside are not seen, but dashes would be drawn all the way there.
+      const place = (time, value) => [this.toX(time), middle - clamp(value * scale, -2 * height, 2 * height)];
+      line(context, Array.from(x, (time, i) => (Number.isFinite(y[i]) ? place(time, y[i]) : null)), color, width, dash);
       for (const [time, jump] of jumps) {
         // An impulse, which no scale can show: an arrow that is longer for a larger jump of the velocity.
         const [at, tall] = [this.toX(time), Math.min(1, jump) * (height - 10)];

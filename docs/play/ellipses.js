@@ -74,7 +74,7 @@ export class Ellipses {
     if (!figure.error) {
       const x = clamp(figure.cursor, t[0], t.at(-1));
       const naive = shape(this.naive.evaluate(x));
-      ellipse(context, main, naive, main[2], { stroke: colors.third, dash: [2, 5], width: 2 });
+      ellipse(context, main, naive, main[2], { stroke: colors.third, dash: [3, 4], width: 2 });
       ellipse(context, main, shape(this.spline.evaluate(x)), main[2], { fill: colors.band, stroke: colors.spline, width: 3.5 });
       const text = Number.isFinite(naive[1]) ? "" : "The entries form no ellipse at this time.";
       stage.text(text, main[0], main[1] + main[2] + 24, { align: "center", color: colors.third });
@@ -94,7 +94,7 @@ export class Ellipses {
     });
     if (!figure.error) {
       const lines = (pair) => [
-        { x: this.x, y: pair[1], color: colors.third, dash: [2, 5], ignore: true }, { x: this.x, y: pair[0], color: colors.spline, width: 2.5 },
+        { x: this.x, y: pair[1], color: colors.third, dash: [3, 4], ignore: true }, { x: this.x, y: pair[0], color: colors.spline, width: 2.5 },
       ];
       this.chart.draw(context, stage, chart, [{ title: "Area", lines: lines(this.area) }, { title: "Ratio of the axes", lines: lines(this.ratio) }]);
     }

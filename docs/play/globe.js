@@ -214,7 +214,7 @@ export class Globe extends Figure {
       context.globalAlpha = 1;
       line(context, near, color, width, dash);
     };
-    if (this.naive) draw(this.naive.places, colors.third, 2, [2, 5]);
+    if (this.naive) draw(this.naive.places, colors.third, 2, [3, 4]);
     if (this.geodesics) draw(this.geodesics.places, colors.other, 2, [7, 5]);
     if (this.smooth) {
       this.drawBand(context, colors);
@@ -264,8 +264,8 @@ export class Globe extends Figure {
       acceleration.unshift({ x: [], y: [], color: colors.other, jumps: geodesics.jumps });
     }
     if (naive) {
-      speed.unshift({ x, y: naive.speed, color: colors.third, dash: [2, 5], ignore: true });
-      acceleration.unshift({ x, y: naive.acceleration, color: colors.third, dash: [2, 5], ignore: true });
+      speed.unshift({ x, y: naive.speed, color: colors.third, dash: [3, 4], ignore: true });
+      acceleration.unshift({ x, y: naive.acceleration, color: colors.third, dash: [3, 4], ignore: true });
     }
     return [
       { title: "Speed in km/h", lines: speed },

@@ -146,7 +146,7 @@ export class Rotations extends Figure {
 
   panels(colors) {
     const { x, motion, slerp, eulerMotion } = this;
-    const euler = (y) => ({ x, y, color: colors.third, dash: [2, 5], ignore: true });
+    const euler = (y) => ({ x, y, color: colors.third, dash: [3, 4], ignore: true });
     return [
       {
         title: "Angular speed in °/s",

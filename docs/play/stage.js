@@ -188,6 +188,7 @@ export function line(context, places, color, width = 2, dash = []) {
   context.strokeStyle = color;
   context.lineWidth = width;
   context.setLineDash(dash);
+  context.lineCap = dash.length ? "butt" : "round";
   context.stroke();
   context.setLineDash([]);
 }
