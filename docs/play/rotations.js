@@ -4,12 +4,14 @@ import { CubicSpline, Space } from "symspline";
 import { CAMERA, drawAeroplane } from "./aeroplane.js";
 import { Chart } from "./chart.js";
 import { assign } from "./code.js";
-import { ARROWS, Figure, SAMPLES } from "./figure.js";
+import { ARROWS, Figure } from "./figure.js";
 import { between, clamp, linspace, norm, plus, product, rounded, scaled, transposed, turn, turnVector } from "./vectors.js";
 
 /** Yaw, pitch and roll in radians. */
-const START = { t: [0, 1, 2.2, 3, 4.2], angles: [[0, 0.1, 0], [0.9, -0.5, -0.7], [2, 0.9, 0.4], [2.6, 0.2, 1.1], [3.6, -0.3, 0]] };
+const START = { t: [0, 1, 2.2, 3, 4.2], angles: [[0, 0.1, 0], [0.7, -0.4, -0.6], [1.5, 0.8, 0.2], [2.1, 0.2, 0.8], [2.9, -0.3, 0]] };
 const DEGREES = 180 / Math.PI;
+/** Samples of rotations take longer than those of other figures. */
+const SAMPLES = 240;
 /** A pitch of 100°, which yaw, pitch and roll write as 80°, with yaw and roll turned by 180°. */
 const PAST = 100 / DEGREES;
 
@@ -220,7 +222,7 @@ export class Rotations extends Figure {
     return [
       "import numpy as np", "import symspline as ss", "", "# Seconds, and rotation vectors in radians.", assign("t", [...this.t]),
       assign("vectors", this.vectors), "points = ss.rotations.from_rotation_vectors(vectors)",
-      `spline = ss.CubicSpline(t, points, "so:3", bc_type="${this.ends}")`, "", "x = np.linspace(t[0], t[-1], 400)",
+      `spline = ss.CubicSpline(t, points, "so:3", bc_type="${this.ends}")`, "", "x = np.linspace(t[0], t[-1], 240)",
       "rotations = spline(x)", "rates = np.rad2deg(ss.rotations.angular_velocity(spline, x))  # body frame, °/s", "",
     ].join("\n");
   }
