@@ -84,8 +84,11 @@ def test_info_of_tables(run):
     assert "usual step 0.05, 1 long gap, up to 12.05\n" in run("info c.csv")
     np.savez("d.npz", t=[0.0, 1, 1, 3], points=np.eye(4))
     assert "times in column 't': 0.0 to 3.0, usual step 1.5, 1 repeated time" in run("info d.npz")
-    write("mixed.csv", "t,x,code\n0,1,7\n1,2,A3\n")
-    assert "  code: 2 distinct texts: 7, A3\n" in run("info mixed.csv")
+    write("mixed.csv", "t,x,code,note,nothing\n0,1,7,,\n1,2,A3,here,\n")
+    out = run("info mixed.csv")
+    assert "  code: 2 distinct texts: 7, A3\n  note: 1 distinct text: here, 1 missing\n  nothing: no values\n" in out
+    np.savez("other.npz", t=[0.0, 1, 1, 3], x=[1.0, 2, 3, 4], ship=["a", "a", "b"])
+    assert "1 repeated time\n" in run("info other.npz")
     write("e.csv", "hours,x\n0,1\n1,2\n")
     assert "hours may hold the times; say --time hours" in run("info e.csv")
     assert "usual step 1\n" in run("info e.csv --time hours")

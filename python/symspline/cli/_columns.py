@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -99,19 +100,21 @@ def column_of_names(table: Table, time: str | None, used: Sequence[str | None]) 
 
     Each of its values occurs in two rows or more, never twice at one time.
     """
-    for name in table.names if time is not None else ():
+    if time is None:
+        return None
+    times = table.read([], time, None).times
+    for name in table.names:
         if name in used or name in table.dates:
             continue
-        try:
-            rows = table.read([], time, name)
-        except Problem:
-            # A cell is empty, or does not hold a text.
-            continue
-        labels = np.unique(np.array(rows.labels), return_inverse=True)[1]
-        order = np.lexsort((rows.times, labels))
-        same = (np.diff(labels[order]) == 0) & (rows.times[order][1:] == rows.times[order][:-1])
-        if labels.max() > 0 and np.bincount(labels).min() > 1 and not same.any():
-            return name
+        # A cell may be empty, or not hold a text.
+        with suppress(Problem):
+            labels = np.unique(np.array(table.labels(name)), return_inverse=True)[1]
+            if len(labels) != len(times):
+                continue
+            order = np.lexsort((times, labels))
+            same = (np.diff(labels[order]) == 0) & (times[order][1:] == times[order][:-1])
+            if labels.max() > 0 and np.bincount(labels).min() > 1 and not same.any():
+                return name
     return None
 
 

@@ -102,11 +102,17 @@ def _table(table: Table, given: str | None) -> list[str]:
 
 def _described(values: Array) -> str:
     if values.dtype.kind in "OUST":
-        texts = list(dict.fromkeys(map(str, values.tolist())))
-        return f"{counted(len(texts), 'distinct text')}: {', '.join(texts[:3])}{', ...' if len(texts) > 3 else ''}"
-    found = values[values == values]
-    missing = len(values) - len(found)
-    return f"{found.min()} to {found.max()}{f', {missing} missing' if missing else ''}" if found.size else "no values"
+        cells = list(map(str, values.tolist()))
+        texts = list(dict.fromkeys(filter(None, cells)))
+        missing = cells.count("")
+        shown = f"{counted(len(texts), 'distinct text')}: {', '.join(texts[:3])}{', ...' if len(texts) > 3 else ''}"
+    else:
+        found = values[values == values]
+        missing = len(values) - len(found)
+        shown = f"{found.min()} to {found.max()}" if len(found) else ""
+    if missing == len(values):
+        return "no values"
+    return f"{shown}{f', {missing} missing' if missing else ''}"
 
 
 def _times(rows: Rows, seconds: Doubles) -> str:

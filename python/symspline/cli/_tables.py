@@ -191,7 +191,7 @@ class Table:
         """
         columns = [self._numbers(name, name in sparse) for name in names]
         times, utc = self._times(time) if time is not None else (np.empty(0), False)
-        labels = self._labels(label) if label is not None else None
+        labels = self.labels(label) if label is not None else None
         given = [*columns, *([times] if time is not None else []), *([labels] if labels is not None else [])]
         lengths = sorted(set(map(len, given)))
         differ = f": arrays differ in length: {' and '.join(map(str, lengths))}"
@@ -238,7 +238,7 @@ class Table:
             # Larger whole numbers are exact as texts only.
             if found is not None and np.abs(found).max(initial=0.0) <= EXACT:
                 return found, False
-            return parse_times(self._labels(name), lambda row, what: self._problem(name, row, what))
+            return parse_times(self.labels(name), lambda row, what: self._problem(name, row, what))
         if column.dtype.kind in "iu":
             return column, False
         if column.dtype.kind != "M":
@@ -247,7 +247,8 @@ class Table:
             raise self._problem(name, int(np.isnat(column).argmax()), "holds no time")
         return column, self.is_utc.get(name)
 
-    def _labels(self, name: str) -> list[str]:
+    def labels(self, name: str) -> list[str]:
+        """Return a column as texts, none of which is empty."""
         column = self.columns[name]
         if isinstance(column, np.ndarray) and column.dtype.kind == "O":
             raise Problem(f"{self.path}: column {name!r} holds {column.dtype}, not texts, numbers or times")
