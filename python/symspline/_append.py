@@ -65,8 +65,8 @@ def local_fit(spline: Any, t: TimesLike, points: Any, lag: int | None) -> Local:
         ends = [own and [("velocity", start), own[1]] for own, start in zip(ends, starts, strict=True)]
     shown = np.concatenate([spline._t, new_t], axis=-1)
     times = spline._time_axis.knots(shown)
-    last = times[..., kept:]
-    return Local(shown, times, Problem(space, np.ascontiguousarray(last), data, ends, _OPTIONS), kept)
+    last, names = np.ascontiguousarray(times[..., kept:]), range(kept, times.shape[-1])
+    return Local(shown, times, Problem(space, last, data, ends, _OPTIONS, names=names), kept)
 
 
 def _with_new(space: Space[Any], parts: Any, points: Any, batch: tuple[int, ...], kept: int, count: int | None) -> Any:

@@ -293,7 +293,7 @@ class CubicSpline(PiecewiseCubic[P], Generic[P, R]):
         except ValidationError as error:
             raise axis.explain(error) from None
         found = joined(self, part, local) if local.kept else part
-        spline = CubicSpline._of(axis, local.t, found.curve, self._bc_type, self._extrapolate, found)
+        spline: CubicSpline[P] = CubicSpline._of(axis, local.t, found.curve, self._bc_type, self._extrapolate, found)
         if part.faults:
             raise_or_warn(part.faults, "raise", spline)
         warn_of_representatives(self.space, [local.problem.points], [part.curve], [part.columns])

@@ -89,6 +89,11 @@ def test_invalid_points_raise(rng):
     ]:
         with pytest.raises(ss.ValidationError, match=message):
             call()
+    angles = np.linspace(0, 3, 30)
+    arc = ss.CubicSpline(angles, np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1), "sphere:2")
+    with pytest.raises(ss.CutLocusError, match=r"points\[29\] and points\[30\]") as caught:
+        arc.append(4.0, -arc.points[-1])
+    assert caught.value.node == 29 and len(caught.value.spline.t) == 31
     square = ss.CubicSpline(None, [[0, 0], [1, 0], [1, 1], [0, 0]], "r:2", bc_type="periodic")
     with pytest.raises(ss.ValidationError, match="closed curve has no end"):
         square.append(9, [0, 0])

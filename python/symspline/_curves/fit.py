@@ -80,6 +80,8 @@ class Problem(NamedTuple, Generic[_Times, _Data]):
         Curves to fit; masked curves are NaN. None fits all curves.
     skip_invalid : bool
         Whether curves with points off the space are masked instead of raising an error.
+    names : sequence of int or None
+        Indices of the nodes in messages; None for 0, 1, ...
     """
 
     space: Space[Any]
@@ -90,6 +92,7 @@ class Problem(NamedTuple, Generic[_Times, _Data]):
     check: bool = True
     mask: Mask | None = None
     skip_invalid: bool = False
+    names: Sequence[int] | None = None
 
 
 FitProblem = Problem[Doubles, list[Points]]
@@ -289,18 +292,18 @@ def mask_of(where: Any, batch: tuple[int, ...]) -> Mask | None:
 
 def fit(problem: FitProblem, progress: Progress | None = None) -> Fit:
     """Fit curves with equal numbers of points."""
-    space, times, points, ends, options, check, mask, skip = problem
+    space, times, points, ends, options, check, mask, skip, names = problem
     if len(points) == 1 and kind_of(space) is CoreCurve:
         # The core validates the points in the same call.
         data = points[0]
         tol = data.tol if check else None
         own = space.cover if isinstance(space, Quotient) else space
-        task = Task(own, times, data.numbers, ends[0], tol, None, mask, check and skip)
+        task = Task(own, times, data.numbers, ends[0], tol, None, mask, check and skip, names)
         found = solve_single(task, options, progress)
         single = CoreCurve(space, times, found.points, found.velocities)
         return Fit(single, [found.columns], options.method, found.faults)
     tasks = [
-        Task(cover_of(factor), times, part.numbers, end, part.tol if check else None, None, mask, check and skip)
+        Task(cover_of(factor), times, part.numbers, end, part.tol if check else None, None, mask, check and skip, names)
         for factor, part, end in zip(factors_of(space), points, ends, strict=True)
     ]
     solved, faults = solve_tasks(space, tasks, options, progress)
@@ -310,7 +313,7 @@ def fit(problem: FitProblem, progress: Progress | None = None) -> Fit:
 
 def fit_many(problem: ManyProblem, progress: Progress | None) -> tuple[list[Fit], list[Fault]]:
     """Fit single curves of different lengths in one call of the core per factor. Return the fits and the faults."""
-    space, times, points, ends, options, check, mask, skip = problem
+    space, times, points, ends, options, check, mask, skip, _ = problem
     offsets = np.cumsum([0, *map(len, times)]).tolist()
     row = np.concatenate(times)
     invalid: list[Fault] = []
@@ -450,7 +453,7 @@ def _in_factor(error: ValidationError, number: int, factor: Space) -> Validation
 
 def _check_precision(problem: ManyProblem) -> list[Fault]:
     """Validate curves whose tolerance is stricter than the largest one, which the common call applies to all curves."""
-    space, times, points, _, _, _, mask, skip = problem
+    space, times, points, _, _, _, mask, skip, _ = problem
     faults: dict[int, Fault] = {}
     for i, factor in enumerate(factors_of(space)):
         most = max(own[i].tol for own in points)

@@ -76,7 +76,7 @@ def fit_in_sections(problem: FitProblem, inner: InnerVelocities, progress: Progr
     independent, and each section between two such nodes is a fit with prescribed end velocities. A closed curve is
     rotated to begin at the first of these nodes.
     """
-    space, times, points, ends, options, check, mask, skip = problem
+    space, times, points, ends, options, check, mask, skip, _ = problem
     tasks = [
         Task(cover_of(factor), times, part.numbers, end, part.tol if check else None, None, mask, check and skip)
         for factor, part, end in zip(factors_of(space), points, ends, strict=True)
