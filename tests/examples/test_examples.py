@@ -73,9 +73,10 @@ def test_a_recipe_draws_a_picture(name, tmp_path, monkeypatch, capsys):
     others = [value for value in names.values() if isinstance(value, Figure)]
     figures = list(dict.fromkeys(of_pyplot + others))
     # The gallery has an alternative text for each, and a thumbnail of one of their axes.
-    subject, alt = TEXTS[name]
-    assert len(figures) == len(alt) and subject[0] <= len(alt)
-    assert any(subject[1] < len(figure.axes) for figure in figures)
+    texts = TEXTS[name]
+    number, axes = texts.subject
+    assert len(figures) == len(texts.alt) >= number and 0 < texts.share <= 1
+    assert any(axes < len(figure.axes) for figure in figures)
     for number, figure in enumerate(figures):
         figure.savefig(tmp_path / f"{number}.png", dpi=40)
     plt.close("all")
