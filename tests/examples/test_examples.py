@@ -16,7 +16,7 @@ SAYS = {
     "imu_from_a_recording": "",
     "qubit_control": r"the same .* 1\.\d\d of 1\.57 apart\nmissed by (\d\.\de-1[4-7]|0\.0e\+00), strongest field "
     r".*\nQuTiP comes through all six, up to (-?\de-1\d|0e\+00)",
-    "tensor_volume": r"35\d\d voxels, mean diffusivity 9.\d\de-04 mm²/s, all positive: True",
+    "tensor_volume": r"35\d\d voxels, mean diffusivity 1\.00e-03 mm²/s, all positive: True",
     "dti_volume": r"(?s)noisy, six numbers, linear +off by 6\.\d\d %, determinant up to 3\.\d .*cubic.* [1-9] tensors "
     r"not positive.*clean, log-Euclidean, cubic +off by 0\.1\d %.*clean, grid spline +off by 0\.\d\d %.*1\.6 times",
     "pod_over_a_parameter": r"4 numbers in place of 80: off by 0\.\d%; with interpolated numbers by \d\d\.\d%",
