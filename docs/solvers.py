@@ -151,8 +151,8 @@ def measured(space: ss.Space, far: float, count: int, n: int = 12) -> figures.Po
     for seed, part in enumerate(np.random.default_rng(0).uniform(0.0, 1.0, count)):
         p = walk(space, far * part**1.5 / k, seed, n)
         curve = fit(p, space, method="fixed-point")
-        leg = space.norm(p, curve.velocities).max() / 3
-        rows.append((k * curve.report.max_step, k * leg, curve.report.rate, curve.report.converged))
+        handle = space.norm(p, curve.velocities).max() / 3
+        rows.append((k * curve.report.max_step, k * handle, curve.report.rate, curve.report.converged))
     columns = np.array(rows, float).T
     return figures.Points(*columns[:3], columns[3] > 0)
 

@@ -36,7 +36,7 @@ def roots(kd: Array, kv: Array) -> tuple[Array, Array, Array]:
 
 
 def contraction(kd: Array, kv: Array) -> Array:
-    """The bound of the contraction of Algorithm 1 where legs are at most V (docs/convergence.md)."""
+    """The bound of the contraction of Algorithm 1 where handles are at most V (docs/convergence.md)."""
     ku = kd + 2 * kv
     stretch = np.sinh(kv) / kv
     own = (2 - ku / np.tan(ku)) * stretch - 1 + ku * (np.cosh(kv) - 1) / kv
@@ -57,10 +57,10 @@ def region(found: Mapping[str, Points]) -> Figure:
             dots = _draw(ax, points, marker)
         ax.set(xlabel="K D", ylabel="K V")
         ax.spines[["top", "right"]].set_visible(False)
-    near.set(xlim=(0, 0.36), ylim=(0, 1), title="Range of Theorem 3.1")
-    near.text(0.04, 0.6, "(38) holds: legs stay below V", fontsize=10, color="#31688e")
-    near.text(0.275, 0.29, "α < 1:\nsweeps contract", fontsize=10, color="#9a5b00")
-    near.text(0.12, 0.01, "longest legs of the solutions", fontsize=9, color="#333333")
+    near.set(xlim=(0, 0.36), ylim=(0, 1), title="Region of Theorem 3.1")
+    near.text(0.04, 0.6, "(38) holds: handles stay below V", fontsize=10, color="#31688e")
+    near.text(0.262, 0.27, "α < 1:\nsweeps contract", fontsize=10, color="#9a5b00")
+    near.text(0.12, 0.01, "longest handles of the solutions", fontsize=9, color="#333333")
     everywhere.set(xlim=(0, 3.1), ylim=(0, 2.1), title="Everywhere")
     for name, marker in zip(found, MARKERS, strict=False):
         everywhere.scatter([], [], marker=marker, s=18, color="#777777", label=name)
