@@ -59,7 +59,7 @@ def region(found: Mapping[str, Points]) -> Figure:
         ax.spines[["top", "right"]].set_visible(False)
     near.set(xlim=(0, 0.36), ylim=(0, 1), title="Region of Theorem 3.1")
     near.text(0.04, 0.6, "(38) holds: handles stay below V", fontsize=10, color="#31688e")
-    near.text(0.262, 0.27, "α < 1:\nsweeps contract", fontsize=10, color="#9a5b00")
+    near.text(0.275, 0.23, "α < 1:\nsweeps\ncontract", fontsize=10, color="#9a5b00")
     near.text(0.12, 0.01, "longest handles of the solutions", fontsize=9, color="#333333")
     everywhere.set(xlim=(0, 3.1), ylim=(0, 2.1), title="Everywhere")
     for name, marker in zip(found, MARKERS, strict=False):
