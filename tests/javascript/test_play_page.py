@@ -185,7 +185,6 @@ def test_the_globe_can_be_mounted_elsewhere(seen: dict[str, Any]) -> None:
 def test_the_page_is_small() -> None:
     files = [PAGE, PAGE.with_name("play.js"), PAGE.with_name("play.css")]
     assert sum(len(gzip.compress(file.read_bytes())) for file in files) < 1e6
-    assert len(gzip.compress((ROOT / "build/npm/symspline_bg.wasm").read_bytes())) < 600e3
 
 
 def test_coastlines_are_those_of_the_package() -> None:
