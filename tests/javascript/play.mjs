@@ -213,7 +213,7 @@ await drag("rotations", [main[0], main[1]], [main[0] + 40, main[1] - 60]);
 seen.curves.turned = await shown("rotations");
 seen.rotations = await look((figures) => {
   const { x, motion, eulerMotion, slerp, t } = figures.rotations;
-  const times = [...x].filter((_, i) => i % 13 === 5);
+  const times = [...x].filter((_, i) => i % 13 === 6);
   const h = 1e-5;
   return {
     x: [...x], t, motion, euler: eulerMotion, slerp, times, h, at: times.map((time) => figures.rotations.at(time).map((m) => [...m])),

@@ -219,7 +219,9 @@ def test_use_before_loading_raises() -> None:
         import {{ CubicSpline, init, Space, SymsplineError }} from "{PACKAGE.as_posix()}/index.js";
         for (const use of [() => Space.names, () => new CubicSpline(null, [[1], [2]], "r:1")]) {{
           try {{ use(); process.exit(2); }}
-          catch (error) {{ if (!(error instanceof SymsplineError && error.message.includes("await init()"))) throw error; }}
+          catch (error) {{
+            if (!(error instanceof SymsplineError && error.message.includes("await init()"))) throw error;
+          }}
         }}
         await Promise.all([init(), init()]);
         if (new CubicSpline(null, [[1], [2]], "r:1").evaluate(0.5)[0] !== 1.5) process.exit(3);
