@@ -78,7 +78,7 @@ impl Space {
     fn apply(&self, operation: Operation, inputs: &[&[f64]], t: &[f64]) -> Result<Vec<f64>, Fault> {
         let space = self.0.get();
         let len = space.point_len();
-        if inputs[0].len() % len != 0 || inputs.iter().any(|row| row.len() != inputs[0].len()) {
+        if !inputs[0].len().is_multiple_of(len) || inputs.iter().any(|row| row.len() != inputs[0].len()) {
             let message = format!("arrays must contain equally many points of {len} numbers");
             return Err(Fault::invalid("points", None, message));
         }
