@@ -53,7 +53,7 @@ def test_operations_wrap():
     rng = np.random.default_rng(2)
     p, q = rng.uniform(-20, 20, (2, 1000, 3))
     v = TORUS.log(p, q)
-    assert is_wrapped(v) and is_wrapped(TORUS.project(p))
+    assert is_wrapped(v) and is_wrapped(TORUS.project(p)) and is_wrapped(TORUS.transvection(p, 40 * v, q))
     np.testing.assert_allclose(np.exp(1j * TORUS.exp(p, v)), np.exp(1j * q), atol=1e-13)
     np.testing.assert_allclose(TORUS.distance(p, q), np.linalg.norm(np.angle(np.exp(1j * (q - p))), axis=-1))
     edges = [np.pi, -np.pi, np.nextafter(np.pi, 4), np.nextafter(-np.pi, 0), 3 * np.pi]
