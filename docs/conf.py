@@ -116,6 +116,7 @@ sphinx_gallery_conf = {
     "filename_pattern": r"\.py$",
     # The demonstration is a program of several files.
     "ignore_pattern": r"(demo|maps|tracks|hurdat)\.py$",
+    "minigallery_sort_order": "gallery_pictures.place",
     "image_scrapers": ("gallery_pictures",),
     "reset_modules": ("gallery_pictures.use_style",),
     "backreferences_dir": "api/backreferences",

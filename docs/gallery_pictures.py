@@ -19,6 +19,21 @@ _MARGIN = 0.06
 """Margin around the subject of a thumbnail in inches."""
 
 
+_ORDER = [
+    Path(line.strip()).stem
+    for line in (Path(__file__).parents[1] / "examples" / "index.rst")
+    .read_text(encoding="utf-8")
+    .splitlines()
+    if line.strip().startswith("../examples/")
+]
+"""Names of the examples in the order of the gallery."""
+
+
+def place(path: str) -> int:
+    """The place of an example in the gallery. Sphinx-Gallery sorts thumbnails by it."""
+    return _ORDER.index(Path(path).stem)
+
+
 def figures(names: dict[str, Any]) -> list[Figure]:
     """The figures among the variables of an example, and those of pyplot, each once and the oldest first."""
     of_pyplot = [plt.figure(number) for number in plt.get_fignums()]
