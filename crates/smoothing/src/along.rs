@@ -52,7 +52,7 @@ impl<'a> Along<'a> {
         out
     }
 
-    /// R(ξ, γ')γ' for vectors ξ, in coordinates of a frame along the curve: see [`curvature_terms`].
+    /// R(ξ, γ')γ' for vectors ξ, in coordinates of a frame along the curve: see `curvature_terms`.
     pub fn curvature(space: &Erased, velocities: &[f64], vectors: &[f64]) -> Vec<f64> {
         curvature_terms(space, velocities, vectors)
     }

@@ -9,7 +9,7 @@ use crate::scalar::{Each, Lane, Scalar, few, lane};
 /// Vectors have [`SCALE`](Isometry::SCALE) times the length of their images, and the deciding angles are
 /// [`ANGLE`](Isometry::ANGLE) times those of the images.
 pub trait Isometry: Copy + Send + Sync {
-    /// The space with the fast formulas. Its points have at most [`MOST`] numbers.
+    /// The space with the fast formulas. Its points have at most `MOST` numbers.
     type Image: Space;
     /// The space itself by general formulas, which recognise, project and describe its points.
     type General: Ambient;
