@@ -52,7 +52,8 @@ def short_repr(value: Any) -> str:
     if isinstance(value, np.ndarray) and value.size > 1000:
         # With many short axes NumPy would write out all of it.
         return f"an array of shape {value.shape}"
-    return brief(repr(value))
+    # Scalars of NumPy are shown as numbers and dates, without the names of their types.
+    return brief(str(value) if isinstance(value, (np.number, np.datetime64, np.timedelta64)) else repr(value))
 
 
 def brief(text: object, most: int = 150) -> str:

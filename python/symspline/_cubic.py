@@ -291,7 +291,10 @@ class CubicSpline(PiecewiseCubic[P], Generic[P, R]):
         try:
             part = fit(local.problem)
         except ValidationError as error:
-            raise axis.explain(error) from None
+            part_of_curve = (
+                error._with_message(f"in the part from node {local.kept} on: {error}") if local.kept else error
+            )
+            raise axis.explain(part_of_curve) from None
         found = joined(self, part, local) if local.kept else part
         spline: CubicSpline[P] = CubicSpline._of(axis, local.t, found.curve, self._bc_type, self._extrapolate, found)
         if part.faults:

@@ -25,6 +25,8 @@ _ZERO = 1e-12
 _ROUNDING = 1e-12
 # Intervals next to a rest, each half as long as the next.
 _HALVINGS = 14
+# Limits between this and its inverse are valid.
+_LEAST_LIMIT = 1e-100
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -241,8 +243,11 @@ def _limits(value: Any, count: int, name: str) -> tuple[float, ...]:
         )
     if name == "max_acceleration" and all(one is None for one in values):
         raise ValidationError("max_acceleration is needed: without it, the traversal would start with a jump")
-    requirement = f"{name} must be a positive number" + (", or None, in each factor" if count > 1 else "")
-    return tuple(math.inf if one is None else checked_number(one, requirement, lambda x: x > 0) for one in values)
+    # Squares of limits must be floating-point numbers.
+    requirement = f"{name} must be a positive number between {_LEAST_LIMIT} and {1 / _LEAST_LIMIT}"
+    requirement += ", or None, in each factor" if count > 1 else ""
+    valid = lambda x: _LEAST_LIMIT <= x <= 1 / _LEAST_LIMIT  # noqa: E731
+    return tuple(math.inf if one is None else checked_number(one, requirement, valid) for one in values)
 
 
 class _Path(NamedTuple):

@@ -210,6 +210,7 @@ def test_invalid_input_raises():
     raises("curve must be a curve", ss.time_law, 3, max_acceleration=1.0)
     raises("max_acceleration is needed", ss.time_law, curve, max_acceleration=None)
     raises("max_acceleration must be a positive number", ss.time_law, curve, max_acceleration=0.0)
+    raises("max_speed must be a positive number between", ss.time_law, curve, max_acceleration=1.0, max_speed=1e300)
     raises("max_speed must be one number", ss.time_law, curve, max_acceleration=1.0, max_speed=(1.0, 2.0))
     raises("max_acceleration must be a tuple with 2 limits", ss.time_law, pair, max_acceleration=1.0)
     raises("final_speed must be", ss.time_law, curve, max_acceleration=1.0, final_speed=-1.0)
