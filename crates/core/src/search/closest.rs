@@ -7,7 +7,7 @@ const COARSE: usize = 64;
 /// Intervals that are divided in one call, which bounds the memory of the search.
 const MOST: usize = 1 << 16;
 /// Rounds in which intervals between samples are divided further.
-const ROUNDS: usize = 6;
+const ROUNDS: usize = 8;
 /// Largest part of the depth of a minimum by which its estimate from a cubic polynomial can be too high.
 const MARGIN: f64 = 0.25;
 
@@ -203,7 +203,7 @@ impl<D: Distances> Search<'_, D> {
                 length: self.length(i.target, i.ends),
             })
             .collect();
-        for _ in 0..ROUNDS {
+        for round in 0..ROUNDS {
             let (mut minima, mut rest) = (Vec::new(), Vec::new());
             for own in open {
                 let (x, lowest) = own.cubic_minimum();
@@ -211,7 +211,12 @@ impl<D: Distances> Search<'_, D> {
                     continue;
                 }
                 let bracketed = own.slopes[0] < 0.0 && own.slopes[1] > 0.0;
-                if bracketed { minima.push((own, x)) } else { rest.push((own, x)) }
+                if bracketed {
+                    minima.push((own, x));
+                } else {
+                    // Estimates can remain on one side of the minimum; midpoints reach the other side.
+                    rest.push((own, if round % 2 == 0 { x } else { own.ends[0].midpoint(own.ends[1]) }));
+                }
             }
             self.minima(&minima)?;
             if rest.is_empty() {
@@ -307,5 +312,47 @@ impl Interval {
         };
         let x = self.ends[0] + if inside { tau } else { 0.5 } * h;
         (x.clamp(self.ends[0], self.ends[1]), lowest)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::convert::Infallible;
+    use std::f64::consts::{PI, TAU};
+
+    /// The distance d(x) = 3 + cos(2πx − ½) of one target, whose derivative is unknown before some time.
+    struct Wave {
+        unknown_before: f64,
+    }
+
+    fn distance(x: f64) -> f64 {
+        3.0 + (TAU * x - 0.5).cos()
+    }
+
+    impl Distances for Wave {
+        type Error = Infallible;
+
+        fn of_samples(&mut self, _: &[usize], number: &[usize]) -> Result<Vec<f64>, Infallible> {
+            Ok(number.iter().map(|&i| distance(i as f64)).collect())
+        }
+
+        fn at(&mut self, _: &[usize], x: &[f64]) -> Result<[Vec<f64>; 2], Infallible> {
+            let slope = |&x: &f64| {
+                if x < self.unknown_before { f64::NAN } else { -TAU * (TAU * x - 0.5).sin() * distance(x) }
+            };
+            Ok([x.iter().map(|&x| distance(x)).collect(), x.iter().map(slope).collect()])
+        }
+    }
+
+    /// The distance increases at both ends of the only interval, so that the minimum is found by division.
+    #[test]
+    fn minima_without_a_change_of_sign_at_the_ends_are_found() {
+        for unknown_before in [0.0, 0.1, 0.4] {
+            let samples = Samples { count: 2, times: &[0.0, 1.0], lengths: &[0.0, 20.0] };
+            let found = closest(samples, 0, &[0], &mut Wave { unknown_before }).unwrap();
+            assert!((found[0].distance - 2.0).abs() < 1e-12, "{unknown_before}: {found:?}");
+            assert!((found[0].time - (PI + 0.5) / TAU).abs() < 1e-7, "{unknown_before}: {found:?}");
+        }
     }
 }

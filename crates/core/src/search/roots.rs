@@ -16,7 +16,7 @@ pub struct Bracket {
 /// Bisection alone takes at most this number of steps from any interval to two neighbouring floating-point numbers.
 const STEPS: usize = 1100;
 
-/// The state of one root: it is between a, the latest time, and b; c is the time before.
+/// The state of one root: it is between a, the latest time, and b. The next time is x.
 struct State {
     index: usize,
     a: f64,
