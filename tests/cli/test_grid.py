@@ -4,6 +4,7 @@ import io
 import shlex
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -283,9 +284,14 @@ def test_a_store_as_a_whole(store, run):
     np.testing.assert_allclose(found["points"], expected.grid(found["lat"], found["day"], found["lon"]), atol=1e-13)
 
 
-def test_a_run_that_fails_leaves_no_store(store, fails, folder):
+def test_a_run_that_fails_leaves_no_store(store, fails, folder, monkeypatch):
+    # The other day is written after the damaged one has failed.
+    grid = ss.GridSpline.grid
+    monkeypatch.setattr(ss.GridSpline, "grid", lambda *args, **kwargs: time.sleep(0.3) or grid(*args, **kwargs))
     for chunk in sorted((folder / "wind.zarr/wind/c/0/0").rglob("*")):
         if chunk.is_file():
             chunk.write_bytes(b"damaged")
     problem = fails("grid wind.zarr --variable wind --space s:2 --axes lat,lon --zoom 2 -o x.zarr")
     assert problem.startswith("wind.zarr is damaged: ")
+    time.sleep(0.6)
+    assert [path.name for path in folder.iterdir()] == ["wind.zarr"]

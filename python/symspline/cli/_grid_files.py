@@ -8,6 +8,7 @@ import secrets
 import shutil
 import zipfile
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -192,7 +193,7 @@ def resample_store(
 ) -> str:
     """Write the values of a variable to another store, and describe the result."""
     array, axes, point_dims = _opened(options)
-    from dask import callbacks
+    from dask import callbacks, config
 
     from ..xarray import resample
 
@@ -212,7 +213,9 @@ def resample_store(
     counted = counter(start=lambda graph: blocks.update(done=0, all=len(graph)), posttask=finished)
     with _new_store(options.output) as store, Progress("resampling") as progress, counted:
         try:
-            made.to_dataset(name=array.name).to_zarr(store, consolidated=False)
+            # Where a block fails, others are still at work. They end before the store is removed.
+            with ThreadPoolExecutor(os.cpu_count()) as pool, config.set(pool=pool):
+                made.to_dataset(name=array.name).to_zarr(store, consolidated=False)
         except (SymsplineError, OSError, MemoryError):
             raise
         except Exception as error:
