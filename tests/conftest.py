@@ -31,6 +31,8 @@ A law of spaces runs as one case per family (`cases.every_family`), whatever doe
 space on `cases.REPRESENTATIVE`. Lists that would multiply take turns instead.
 """
 
+import importlib.metadata
+import os
 import signal
 import sys
 
@@ -41,6 +43,14 @@ import symspline as ss
 
 # Type checkers read these files. They are not run.
 collect_ignore = ["typing/right.py", "typing/wrong.py"]
+
+# Without these emitters XLA compiles a third faster; it reads this when the first array is made. Versions that do not
+# know the flag end the process.
+try:
+    if importlib.metadata.version("jaxlib").startswith("0.10."):
+        os.environ.setdefault("XLA_FLAGS", "--xla_cpu_use_fusion_emitters=false")
+except importlib.metadata.PackageNotFoundError:
+    pass
 
 # What a shell starts in the background ignores Ctrl-C, and so would all that tests start.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:

@@ -1,14 +1,7 @@
-"""Precision and compiler options of the tests in JAX."""
-
-import os
+"""Precision and optimisation of the tests in JAX."""
 
 import jax
 import pytest
-
-# Without these emitters XLA compiles a quarter faster; it reads this when the first array is made. Versions that do not
-# know the flag end the process.
-if jax.__version__.startswith("0.10."):
-    os.environ.setdefault("XLA_FLAGS", "--xla_cpu_use_fusion_emitters=false")
 
 
 @pytest.fixture(autouse=True)

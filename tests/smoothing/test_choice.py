@@ -100,21 +100,21 @@ def test_degrees_of_freedom_are_the_trace_of_the_influence(name, length, lam):
     space, rng = ss.space(name), np.random.default_rng(1)
     p = space.random_point(rng)
     v = space.random_tangent(rng, p)
-    t = np.linspace(0, 1, 25)
+    t = np.linspace(0, 1, 15)
     data = space.exp(p, (length / space.norm(p, v)) * np.multiply.outer(t, v))
     frame = space.frame(data)
     step = 1e-4
-    moved = np.broadcast_to(data, (25, space.dim, 2, *data.shape)).copy()
-    for k in range(25):
+    moved = np.broadcast_to(data, (len(t), space.dim, 2, *data.shape)).copy()
+    for k in range(len(t)):
         for way, sign in enumerate((step, -step)):
             moved[k, :, way, k] = space.exp(data[k], sign * frame[k])
     curves = ss.make_smoothing_spline(t, moved, space, lam, tol=1e-9, max_iter=100, method="newton")
-    ends = np.stack([curves(t)[k, :, :, k] for k in range(25)])
+    ends = np.stack([curves(t)[k, :, :, k] for k in range(len(t))])
     logs = space.log(data[:, None, None], ends)
     followed = space.inner(data[:, None], logs[:, :, 0] - logs[:, :, 1], frame) / (2 * step)
     # The flat matrix has the curvature at knots only: an error of second order in their distance.
     found = ss.make_smoothing_spline(t, data, space, lam).df
-    assert found == pytest.approx(np.sum(followed) / space.dim, rel=5e-4)
+    assert found == pytest.approx(np.sum(followed) / space.dim, rel=6e-4)
 
 
 @pytest.mark.parametrize("loss", ["huber", "cauchy"])
