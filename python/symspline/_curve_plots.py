@@ -179,8 +179,8 @@ class CurvePlots(CurveBase[P]):
         other measurement in standard deviations, and one with the radius of the 95 % band if the first panel does not
         show the band.
 
-        Of a batch, at most five curves are drawn with their points. Areas between the 5 % and the 95 % quantile
-        represent the others where numbers are drawn against time, and thin lines do so elsewhere.
+        Of a batch of more than five curves, three are drawn with their points. Areas between the 5 % and the 95 %
+        quantile represent the others where numbers are drawn against time, and thin lines do so elsewhere.
 
         Times that are far from zero, such as seconds since 1970, are shown as differences from a round number, which
         the label of the axis names.

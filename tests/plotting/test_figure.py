@@ -127,10 +127,10 @@ def test_rounding_is_not_blown_up():
 
 def test_the_heading_counts_curves():
     figure = spline_on("r:2", (7, 10, 4)).plot()
-    assert len(lines_of(axes_named(figure, "speed"))) == 5
+    assert len(lines_of(axes_named(figure, "speed"))) == 3
     assert len(lines_of(figure.axes[0])) == 50
     texts = texts_of(figure)
-    assert "5 of 70 curves, 4 points each, natural ends" in texts
+    assert "3 of 70 curves, 4 points each, natural ends" in texts
     assert {"curve (0, 0)", "curve (6, 9)", "start", "given points", "other curves"} <= set(texts)
     assert "5–95 % of 70 curves" in texts
     good = [[1.0, 0, 0], [0, 1, 0], [0, 0, 1]]

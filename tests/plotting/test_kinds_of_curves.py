@@ -103,7 +103,7 @@ def test_quantiles_of_a_batch(name):
     figure = rendered(batch.plot())
     assert "5–95 % of 40 curves" in texts_of(figure)
     for axes in figure.axes:
-        assert len(lines_of(axes)) == 5
+        assert len(lines_of(axes)) == 3
     axes = axes_named(figure, "velocity")
     (band,) = [own for own in axes.collections if own.get_label() == "_quantiles"]
     corners = band.get_paths()[0].vertices
@@ -132,4 +132,45 @@ def test_curves_with_their_own_times_have_no_quantiles():
     t = T + np.linspace(0, 1, 12)[:, None]
     figure = rendered(spline_on("r:1", (12, 6), t).plot())
     assert not any("5–95 %" in text for text in texts_of(figure))
-    assert len(lines_of(figure.axes[0])) == 5
+    assert len(lines_of(figure.axes[0])) == 3
+
+
+def test_the_part_of_a_line_in_a_long_gap_is_light():
+    t = np.array([0.0, 1, 2, 3, 20, 21, 22, 23])
+    spline = spline_on("r:2", (8,), t)
+    figure = rendered(spline.plot())
+    lines = {line.get_label(): line.get_xydata() for line in figure.axes[0].lines}
+    assert "long gap" in texts_of(figure)
+    light, bold = lines["_bridge"], lines["_curve"]
+    x = np.linspace(0, 23, 2000)
+    for line, inside in ((light, (x > 3) & (x < 20)), (bold, (x <= 3) | (x >= 20))):
+        drawn = line[np.isfinite(line).all(axis=1)]
+        expected = spline(x[inside])
+        distance = np.linalg.norm(expected[:, None] - drawn, axis=-1)
+        size = 0.02 * np.ptp(spline(x), axis=0).max()
+        assert distance.min(axis=1).max() < size and distance.min(axis=0).max() < size
+    # Neighbours of gaps connect both parts.
+    np.testing.assert_array_equal(light[np.isfinite(light).all(axis=1)][[0, -1]], spline(t[[3, 4]]))
+    assert "long gap" not in texts_of(spline_on("r:2", t=T).plot())
+
+
+@pytest.mark.parametrize("name", ["r:2", "se:2"])
+@pytest.mark.parametrize(("across", "high"), [(50.0, 5.0), (20.0, 25.0), (5.0, 4.0), (3.0, 0.0), (0.0, 0.0)])
+def test_pages_have_the_proportions_of_curves_in_the_plane(name, across, high):
+    """Long curves are above their rates, and fill their axes."""
+    t = np.sort(np.random.default_rng(0).uniform(0, 9, 30))
+    path = np.stack([across * t / np.ptp(t), high * np.sin(t)], axis=-1)
+    points = path
+    if name == "se:2":
+        points = np.broadcast_to(np.eye(3), (30, 3, 3)).copy()
+        points[:, :2, 2] = path
+    figure = rendered(ss.CubicSpline(t - t[0], points, name).plot())
+    picture, rate = figure.axes[:2]
+    box = picture.get_window_extent()
+    is_long = across > 2 * 2 * high
+    assert (rate.get_window_extent().y1 < box.y0) == is_long
+    for low, top in (picture.get_xlim(), picture.get_ylim()):
+        assert top > low
+    if across and high:
+        shares = np.ptp(path, axis=0) / [np.ptp(picture.get_xlim()), np.ptp(picture.get_ylim())]
+        assert shares.max() > 0.8 and shares.min() > 0.3

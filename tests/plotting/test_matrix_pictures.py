@@ -150,6 +150,20 @@ def test_bodies_of_the_plane_point_along_their_first_axis():
         assert left @ pose[:2, 1] == pytest.approx(np.linalg.norm(left))
 
 
+def test_bodies_of_the_plane_do_not_overlap():
+    rng = np.random.default_rng(2)
+    t = np.cumsum(rng.exponential(0.5, 60))
+    poses = np.broadcast_to(np.eye(3), (60, 3, 3)).copy()
+    poses[:, :2, 2] = np.stack([t, 0.3 * np.sin(t)], axis=-1)
+    axes = rendered(ss.CubicSpline(t, poses, "se:2").plot()).axes[0]
+    paths = [path.vertices for own in axes.collections for path in own.get_paths()]
+    lengths = {round(np.linalg.norm(path[0] - path[2]), 9) for path in paths}
+    feet = np.sort([path[0, 0] for path in paths])
+    assert len(lengths) == 1 and 5 < len(feet) < 30 and np.diff(feet).min() > 1.4 * lengths.pop()
+    dots = [line for line in axes.lines if line.get_label() == "_given"]
+    np.testing.assert_allclose(dots[0].get_xydata(), poses[:, :2, 2])
+
+
 def test_frames_stand_on_the_path():
     spline = spline_on("se:3", (5,))
     axes = rendered(spline.plot()).axes[0]

@@ -50,6 +50,20 @@ def test_globe_is_turned_towards_the_curve():
     assert np.ptp(view.flat(equator), axis=0).min() > 0.5  # not seen from its edge
 
 
+def test_globe_is_turned_towards_the_few_curves_with_points():
+    """The others of a batch are all around; what is behind the globe is not drawn."""
+    rng = np.random.default_rng(1)
+    points = ss.Sphere(2).project(rng.normal(size=(41, 1, 3)) + 0.05 * rng.normal(size=(41, 6, 3)))
+    named = [0, 20, 40]
+    points[named] = ss.Sphere(2).project(from_lonlat(130, -40) + 0.2 * rng.normal(size=(3, 6, 3)))
+    axes = rendered(ss.CubicSpline(None, points, "sphere:2").plot()).axes[0]
+    seen = [line.get_xydata() for line in axes.lines if line.get_label() == "_given"]
+    assert len(seen) == 3 and np.isfinite(seen).all() and np.linalg.norm(seen, axis=-1).max() < 0.8
+    others = [line for line in axes.lines if line.get_label() == "_others"]
+    assert len(others) == 38 and all(line.get_linestyle() == "-" for line in others)
+    assert min(np.isfinite(line.get_xydata()).all(axis=1).sum() for line in others) == 0
+
+
 @pytest.mark.parametrize("lon, lat", [(10, 50), (179.9, 0), (40, 89), (0, -89.9)])
 @pytest.mark.parametrize("size", [1e-5, 10])
 def test_small_curve_is_enlarged_with_labels(lon, lat, size):

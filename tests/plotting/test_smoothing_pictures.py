@@ -81,9 +81,9 @@ def test_data_are_drawn_and_not_knots():
 def test_few_of_many_curves_have_data():
     figure = rendered(smooth("r:2", curves=12).plot())
     (heading,) = [text for text in texts_of(figure) if "degrees of freedom" in text]
-    assert heading.startswith("5 of 12 curves, 40 data each, ") and heading.endswith("band 95 %")
-    assert len(bands_of(figure.axes[0])) == len(bands_of(axes_named(figure, "speed"))) == 5
-    assert len(data_of(figure.axes[0])) == 5 * 40
+    assert heading.startswith("3 of 12 curves, 40 data each, ") and heading.endswith("band 95 %")
+    assert len(bands_of(figure.axes[0])) == len(bands_of(axes_named(figure, "speed"))) == 3
+    assert len(data_of(figure.axes[0])) == 3 * 40
 
 
 def test_products_lack_a_speed_band():

@@ -15,8 +15,8 @@ from .._spaces import Product, Space, parts_of
 from .curves import SECOND, Axis, Batch, Curve
 from .style import Array, colors, evenly
 
-FEW = 5
-"""The largest number of curves of a batch that are drawn with their points."""
+FEW, _OF_MANY = 5, 3
+"""The largest number of curves of a batch that are all drawn with their points, and the number of larger batches."""
 MOST = 50
 """The largest number of curves of a batch that are drawn, those in the background included."""
 _FOR_QUANTILES = 200
@@ -90,7 +90,7 @@ def curves_of(
     if not good.size:
         raise ValidationError("there is nothing to plot: the fit failed (a cut-locus fault, see spline.report)")
     drawn = good[evenly(len(good), MOST)]
-    few = drawn[evenly(len(drawn), FEW)]
+    few = drawn[evenly(len(drawn), FEW if len(drawn) <= FEW else _OF_MANY)]
     looks = dict(zip(few.tolist(), colors(len(few)), strict=True))
     made = []
     # Curves with points come first.

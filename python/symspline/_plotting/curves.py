@@ -23,7 +23,7 @@ SECOND = np.timedelta64(1, "s")
 _NO_GAPS: Array = np.empty((0, 2))
 # Labels of artists that the legend of a page explains. Those with an underscore are not in legends of matplotlib.
 LINE, DOTS, START, DATA_DOTS, FAINT = "_curve", "_given", "_start", "_data", "_others"
-QUANTILES, BAND = "_quantiles", "band"
+QUANTILES, BAND, BRIDGE = "_quantiles", "band", "_bridge"
 
 _SEGMENTS = 3
 """The smallest length of a gap between measurements of several kinds, in median segments."""
@@ -204,6 +204,12 @@ class Curve:
         return np.stack([at[:-1][long], at[1:][long]], axis=1)
 
     @cached_property
+    def bridges(self) -> NDArray[np.bool_]:
+        """Whether the times x are inside long gaps between data."""
+        after = np.searchsorted(np.ravel(self.gaps), self.times) % 2 == 1
+        return np.asarray(after & ~np.isin(self.times, self.gaps))
+
+    @cached_property
     def marks(self) -> Array:
         """Times of all given points on matplotlib's axis, also of data that are not drawn.
 
@@ -293,6 +299,14 @@ class Curve:
         own: dict[str, Any] = {"color": self.color, "linewidth": width, "zorder": 4, "label": label}
         if self.faint:
             look = look | {"linewidth": 0.8, "alpha": 0.45, "zorder": 3.2, "label": FAINT}
+        elif len(positions) == len(self.x) and self.bridges.any():
+            # One sample on both sides connects the parts.
+            near = self.bridges.copy()
+            near[1:] |= self.bridges[:-1]
+            near[:-1] |= self.bridges[1:]
+            light = own | look | {"linewidth": 0.5 * width, "alpha": 0.6, "label": BRIDGE}
+            axes.plot(*np.where(near[:, None], positions, np.nan).T, **light)
+            positions = np.where(self.bridges[:, None], np.nan, positions)
         (line,) = axes.plot(*positions.T, **own | look)
         line.set_gid(LINE)
 

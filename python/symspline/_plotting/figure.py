@@ -75,6 +75,8 @@ _FAMILIES = dict.fromkeys(("rp", "cp", "hp", "gr", "cgr"), Picture(graphs.draw_p
 _FAMILIES["stiefel"] = Picture(columns.draw_columns, 10.5, 4.6)
 _FAMILIES["torus"] = Picture(graphs.draw_torus, 10.5, 3.8)
 _FAMILIES["ch"] = Picture(graphs.draw_ratios, 10.5, 3.8)
+_LONG = 2.0
+"""Curves in the plane are in a panel that is wide or narrow if one side is longer than the other by this factor."""
 # Spaces whose picture shows the band.
 BANDED = {"euclidean:1", "euclidean:2", "euclidean:3", "hyperbolic:2", "sphere:1", "sphere:2"}
 BANDED |= {"rp:1", "gr:1,2", "so:2", "o:2", "u:1"}
@@ -91,6 +93,19 @@ def picture_of(space: Space) -> Picture:
     """Return the picture of a space or its family, or graphs of the components if there is none."""
     name = str(cover_of(space))
     return _PICTURES.get(name) or _FAMILIES.get(name.partition(":")[0], _OTHERS)
+
+
+def fitted(picture: Picture, curves: Sequence[Curve]) -> Picture:
+    """Return the picture in a panel with about the proportions of the curves, if they are in the plane."""
+    if picture.draw not in (chart.draw_plane, matrices.draw_flat_poses):
+        return picture
+    points = np.concatenate([curve.extent for curve in curves])
+    across, high = np.ptp(points if points.ndim == 2 else points[:, :2, 2], axis=0)
+    if across > _LONG * high:
+        return picture._replace(width=10.5, height=float(np.clip(10.5 * high / max(across, 1e-300), 1.2, 4.0)) + 1.2)
+    if high > _LONG * across:
+        return picture._replace(width=float(np.clip(5.2 * across / high, 2.0, 4.0)) + 1.2)
+    return picture
 
 
 def draw_picture(panel: Any, space: Space, curves: Sequence[Curve]) -> None:

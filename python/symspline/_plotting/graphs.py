@@ -35,7 +35,7 @@ from .style import (
 
 SUBSCRIPTS = str.maketrans("0123456789,", "₀₁₂₃₄₅₆₇₈₉,")
 _NAMED, _OTHERS, _IN_ROW = 12, 100, 6
-_LINES, _TICKS = 60, 2000
+_LINES, _TICKS = 40, 2000
 
 
 # ---- axes ----
@@ -94,9 +94,9 @@ def _mark_knots(axes: Axes, curves: Sequence[Curve]) -> None:
     """
     marked = [curve.marks for curve in curves if not curve.faint]
     knots = np.unique(np.concatenate(marked))
-    height = 1.0 if len(knots) <= _LINES and curves[0].noise is None else 0.04
+    height, style = (1.0, (0, (1, 2))) if len(knots) <= _LINES and curves[0].noise is None else (0.04, "-")
     look: Any = {"transform": axes.get_xaxis_transform()}
-    line: Any = {"color": EDGE, "linewidth": 0.8, "linestyle": (0, (1, 2)), "zorder": 1}
+    line: Any = {"color": EDGE, "linewidth": 0.8, "linestyle": style, "zorder": 1}
     axes.vlines(knots[:: 1 + len(knots) // _TICKS], 0, height, **look, **line)
     _mark_gaps(axes, curves)
 

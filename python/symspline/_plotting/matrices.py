@@ -25,10 +25,12 @@ from .chart import SHADOW, box, explain_frames, frame_handles, plane
 from .curves import Curve
 from .rows import REACH, VIEW, Rows
 from .sphere import caps
-from .style import AXES, DATA, INK, Array, axes_size, legend, note, points, round_below, time_colors, window
+from .style import AXES, DATA, INK, Array, apart, axes_size, legend, note, points, round_below, time_colors, window
 
 _ARROW = np.array([[1.0, 0.0], [-0.7, 0.55], [-0.35, 0.0], [-0.7, -0.55]])
 """A body in the plane that points along its first axis."""
+_LENGTH = 0.14
+"""Distance in inches from a position to the tip of such an arrow head."""
 _MANY = 24
 """The number of bodies of all curves, or two per curve if that is more."""
 _ANGLES = np.linspace(0, 2 * np.pi, 97)
@@ -119,9 +121,10 @@ def _explain(axes: Axes, more: str, width: float) -> None:
 
 
 def draw_flat_poses(panel: SubFigure, curves: Sequence[Curve]) -> None:
-    """Draw poses of SE(2) as arrow heads on the path that point along their first axis. Given ones are filled."""
+    """Draw poses of SE(2) as arrow heads that point along their first axis. Given ones are filled."""
     axes = plane(panel)
-    _, half = window(np.concatenate([curve.extent[:, :2, 2] for curve in curves]), 1.0)
+    positions = np.concatenate([curve.extent[:, :2, 2] for curve in curves])
+    unit = float(np.max(np.ptp(positions, axis=0) / axes_size(axes))) or 1.0
     number = max(2, _MANY // len(curves))
 
     def draw(poses: Array, **look: Any) -> None:
@@ -129,17 +132,25 @@ def draw_flat_poses(panel: SubFigure, curves: Sequence[Curve]) -> None:
         axes.add_collection(PolyCollection(list(turned + poses[:, None, :2, 2]), zorder=5, **look))
 
     for curve in curves:
-        length = 0.07 * (half or 1.0) * (1 if curve.alone else 0.6)
+        length = _LENGTH * unit * (1 if curve.alone else 0.6)
         curve.draw_line(axes, curve.points[:, :2, 2], linewidth=1.2, alpha=0.6)
-        groups = {group: poses for group, (_, poses) in curve.samples(number).items()}
+        groups = {group: _apart(poses, 2 * length) for group, (_, poses) in curve.samples(number).items()}
+        free = np.linalg.norm(groups["between"][:, None, :2, 2] - curve.given[:, :2, 2], axis=-1) > 2 * length
+        groups["between"] = groups["between"][free.all(axis=1)]
         edge, light = (INK, DATA) if curve.alone else (curve.color, curve.color)
+        curve.draw_dots(axes, curve.given[:, :2, 2], zorder=4.5)
         if "data" in groups:
-            curve.draw_dots(axes, curve.given[:, :2, 2])
             draw(groups["data"], facecolor="none", edgecolor=light, alpha=0.6)
         draw(groups["between"], facecolor="none", edgecolor=curve.color)
         draw(groups["bold"][1:], facecolor=edge, edgecolor=edge)
         draw(groups["bold"][:1], facecolor="white", edgecolor=edge)
     axes.autoscale_view()
+
+
+def _apart(poses: Array, least: float) -> Array:
+    """Return poses, the first among them, whose distances along the path are ``least`` or more."""
+    steps = np.linalg.norm(np.diff(poses[:, :2, 2], axis=0, prepend=poses[:1, :2, 2]), axis=1)
+    return np.asarray(poses[apart(np.cumsum(steps), least)])
 
 
 def draw_poses(panel: SubFigure, curves: Sequence[Curve]) -> None:

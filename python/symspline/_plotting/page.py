@@ -16,8 +16,8 @@ from matplotlib.patches import Patch
 from .._spaces import Product, cover_of, factors_of
 from . import residuals
 from .collect import axis_of, curves_of
-from .curves import BAND, DATA_DOTS, DOTS, FAINT, QUANTILES, START, Curve
-from .figure import BANDED, FACTORS, draw_picture, drawing, finish, picture_of, picture_of_factors
+from .curves import BAND, BRIDGE, DATA_DOTS, DOTS, FAINT, QUANTILES, START, Curve
+from .figure import BANDED, FACTORS, draw_picture, drawing, finish, fitted, picture_of, picture_of_factors
 from .panels import check_axes, draw_into, has_dark_background, next_color
 from .rates import LIMIT, draw_rates, rows_of
 from .style import BOTTOM, DATA, INK, MARK, TOP, heading, legend
@@ -88,7 +88,7 @@ def draw_page(
 ) -> Page:
     """Draw a heading, the picture of the space, rates and further panels."""
     space = curves[0].space
-    picture = picture_of_factors(curves) if isinstance(space, Product) else picture_of(space)
+    picture = picture_of_factors(curves) if isinstance(space, Product) else fitted(picture_of(space), curves)
     wide = picture.width > 1.5 * picture.height
     widths = [picture.width] if wide else [picture.width, _RATES_WIDTH]
     rates = any(curve.has_line for curve in curves)
@@ -198,6 +198,8 @@ def _explain(figure: Figure, curves: Sequence[Curve], height: float) -> None:
         add(Line2D([], [], color=DATA, **dot), "data")
     if BAND in drawn:
         add(Patch(facecolor=few[0].color, alpha=0.22), "95 % band")
+    if BRIDGE in drawn:
+        add(Line2D([], [], color=few[0].color, linewidth=1, alpha=0.6), "long gap")
     if LIMIT in drawn:
         add(Line2D([], [], color=MARK, linewidth=1, linestyle="--"), "limit")
     if FAINT in drawn:

@@ -17,7 +17,7 @@ from matplotlib.transforms import Affine2D
 
 from .curves import Curve
 from .graphs import timelines
-from .style import INK, OWN_AXES, Array, Indices, axes_size, evenly, points
+from .style import INK, OWN_AXES, Array, apart, axes_size, evenly, points
 
 VIEW = np.array([[-0.5, 0.866, 0.0], [-0.296, -0.171, 0.940], [0.814, 0.470, 0.342]])
 """Directions to the right, up and towards the viewer, who sees the first axis point forwards and the third up."""
@@ -52,7 +52,7 @@ class Row:
         curve = self.curve
         if self.name in ("given", "data") or not curve.has_line:
             times = curve.on_axis(curve.given_x)
-            kept = _apart(times, 1.1 * reach / width * (curve.times[-1] - curve.times[0]))
+            kept = apart(times, 1.1 * reach / width * (curve.times[-1] - curve.times[0]))
             return times[kept], curve.given[kept], None
         number = max(2, int(width / (2 * reach)) + 1)
         wanted = np.linspace(curve.x[0], curve.x[-1], number)
@@ -60,15 +60,6 @@ class Row:
         # There are no samples in gaps.
         even = np.unique(even[curve.x[even] - wanted < 0.1 * (wanted[1] - wanted[0])])
         return curve.times[even], curve.points[even], None if curve.radii is None else curve.radii[even]
-
-
-def _apart(times: Array, least: float) -> Indices:
-    """Return the indices of times, the first among them, whose distances are ``least`` or more."""
-    kept = [0]
-    for i, time in enumerate(times):
-        if time - times[kept[-1]] >= least * (1 - 1e-9):
-            kept.append(i)
-    return np.array(kept)
 
 
 @dataclass(frozen=True)

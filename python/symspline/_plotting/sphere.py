@@ -51,7 +51,8 @@ def draw_sphere(panel: SubFigure, curves: Sequence[Curve]) -> None:
     radius = curves[0].radius
     wide = width > 2 * height
     look = _Globe(below=0.1, right=width - min(width, height) + 0.1, beside=_LOCATOR if wide else 0.0)
-    axes, view, is_part = _draw_globe(panel, np.concatenate([curve.extent for curve in curves]), look)
+    everything, seen = (np.concatenate([own.extent for own in curves if not (few and own.faint)]) for few in (0, 1))
+    axes, view, is_part = _draw_globe(panel, everything, look, seen)
     for curve in curves:
         _draw_on_globe(axes, view, curve, curve.points, curve.given, curve.radii)
     if radius is not None and (not is_part or np.ptp(axes.get_xlim()) > _COARSE):
@@ -156,10 +157,12 @@ def _draw_on_globe(axes: Axes, view: View, curve: Curve, line: Array, given: Arr
         rings = caps(line[discs], radii[discs])
         seen = np.max(rings @ view.up, axis=1)[:, None, None] > 0
         draw_tube(axes, curve, np.where(seen, view.outline(rings), np.nan))
-    curve.draw_line(axes, view.hidden(line), linewidth=1, linestyle=(0, (2, 2)), alpha=0.6)
+    if not curve.faint:
+        curve.draw_line(axes, view.hidden(line), linewidth=1, linestyle=(0, (2, 2)), alpha=0.6)
     curve.draw_line(axes, view.visible(line))
     draw_arrows(axes, curve, view.visible(line))
-    curve.draw_dots(axes, view.hidden(given), alpha=0.35)
+    if curve.alone:
+        curve.draw_dots(axes, view.hidden(given), alpha=0.35)
     curve.draw_dots(axes, view.visible(given))
 
 

@@ -135,6 +135,15 @@ def evenly(count: int, most: int) -> Indices:
     return np.unique(np.linspace(0, count - 1, min(count, most)).astype(int))
 
 
+def apart(values: Array, least: float) -> Indices:
+    """Return the indices of increasing values, the first among them, whose distances are ``least`` or more."""
+    kept = [0] if len(values) else []
+    for i, value in enumerate(values):
+        if value - values[kept[-1]] >= least * (1 - 1e-9):
+            kept.append(i)
+    return np.array(kept, dtype=np.intp)
+
+
 def round_below(value: float) -> float:
     """Return the largest of 1, 2 and 5 times powers of ten up to a value."""
     power = 10.0 ** np.floor(np.log10(value))
