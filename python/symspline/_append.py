@@ -20,7 +20,7 @@ from ._typing import TimesLike
 # counts, and the one of which the value of the last part counts.
 _UNKNOWN = slice(NUMBERS.index("invariant_radius"), NUMBERS.index("alternative_energy") + 1)
 _LARGEST = ("residual", "max_step", "velocity_error")
-_RATE = NUMBERS.index("rate")
+_MAXIMA = np.array([[name != "rate"] for name in NUMBERS])
 _CONVERGED = INTEGERS.index("converged")
 _OPTIONS = Options("auto", 1e-12, None)
 
@@ -126,12 +126,11 @@ def joined(spline: Any, found: Fit, local: Local) -> Fit:
 
 
 def _joined_columns(first: Columns, second: Columns) -> Columns:
-    """Return the report of a curve whose last part was fitted again."""
-    numbers, integers = np.fmax(first.numbers, second.numbers), second.integers.copy()
-    numbers[_RATE] = second.numbers[_RATE]
-    numbers[_UNKNOWN] = np.nan
-    integers[_CONVERGED] &= first.integers[_CONVERGED]
-    return Columns(integers, numbers)
+    """Return the report of a curve whose last part was fitted again, in the arrays of that fit."""
+    np.fmax(first.numbers, second.numbers, out=second.numbers, where=_MAXIMA)
+    second.numbers[_UNKNOWN] = np.nan
+    second.integers[_CONVERGED] &= first.integers[_CONVERGED]
+    return second
 
 
 def columns_of(spline: Any) -> list[Columns]:
