@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from noisy import rms
 from refused import raises
+from scipy.spatial.transform import Rotation
 
 import symspline as ss
 
@@ -301,3 +302,72 @@ def test_the_advice_of_messages_helps():
         ss.make_smoothing_spline(t, noisy, space, max_iter=2, method="newton")
     # What was tried already is not proposed again.
     assert "method='newton'" not in str(caught.value)
+
+
+def vibration(n, cycle, rng):
+    """Irregular times, and rotation vectors that oscillate with a given number of data per cycle."""
+    t = np.cumsum(rng.uniform(0.8, 1.2, n))
+    phase = 2 * np.pi * t / cycle
+    return t, np.stack([np.sin(phase), np.cos(0.9 * phase), np.sin(0.8 * phase + 1)], axis=-1)
+
+
+@pytest.mark.parametrize("name", ["so:3", "sphere:2 x r:3", "se:3"])
+@pytest.mark.parametrize("variant", ["closed", "gap", "weights", "lam", "batch", "own times"])
+def test_motion_that_is_fast_for_the_length_of_a_recording_is_no_noise(name, variant):
+    """9000 data with 1125 cycles, which 2000 knots do not resolve."""
+    rng = np.random.default_rng(5)
+    t, angle = vibration(9_000, 8, rng)
+    if variant == "closed":
+        angle *= np.sin(np.linspace(0, np.pi, len(t)))[:, None]
+    if variant == "gap":
+        t[5000:] += 3
+    space, noise = ss.space(name), 0.05 * rng.normal(size=(2, *angle.shape))
+    rotations = (Rotation.from_rotvec(angle) * Rotation.from_rotvec(noise[0])).as_matrix()
+    positions = 40 * (angle + noise[1])
+    poses = np.broadcast_to(np.eye(4), (len(t), 4, 4)).copy()
+    poses[:, :3, :3], poses[:, :3, 3] = rotations, positions
+    data = {"r:3": positions, "so:3": rotations, "se:3": poses}.get(name, (rotations[:, 0], positions))
+    options = {"closed": {"bc_type": "periodic"}, "lam": {"lam": 0.1}}.get(variant, {})
+    if variant == "weights":
+        options["weights"] = np.where(np.arange(len(t)) % 900 < 2, 0.0, 1.0)
+    if variant in ("batch", "own times"):
+        data = tuple(np.stack([own] * 2) for own in data) if isinstance(data, tuple) else np.stack([data] * 2)
+        t = np.stack([t, t + 0.1]) if variant == "own times" else t
+    spline = ss.make_smoothing_spline(t, data, space, **options)
+    expected = len(t) / 8
+    assert np.all(np.ravel(spline.df) > 1.2 * expected), spline
+
+
+def test_motion_between_rests_is_no_noise():
+    """4 s of fast motion in 1000 s. No part of the recording that begins at an even time contains it."""
+    rng = np.random.default_rng(0)
+    t, angle = vibration(30_000, 12, rng)
+    moving = slice(9_300, 9_700)
+    angle[: moving.start] = angle[moving.start]
+    angle[moving.stop :] = angle[moving.stop - 1]
+    data = angle + 0.02 * rng.normal(size=angle.shape)
+    spline = ss.make_smoothing_spline(t, data, "r:3")
+    assert rms(spline.space, spline(t[moving]), angle[moving]) < 0.2
+
+
+@pytest.mark.parametrize("name", ["sphere:2", "so:3", "r:3"])
+@pytest.mark.parametrize("cycle", [20, 10, 7])
+def test_no_oscillation_is_taken_for_noise(name, cycle):
+    """Means of several data would be close to each other."""
+    space, rng = ss.space(name), np.random.default_rng(1)
+    for scale in (0.3, 1.0):
+        for n in rng.integers(100, 600, 12).tolist():
+            t, angle = vibration(n, cycle, rng)
+            noise = 0.05 * rng.normal(size=angle.shape)
+            turns = (Rotation.from_rotvec(scale * angle) * Rotation.from_rotvec(noise)).as_matrix()
+            data = {"so:3": turns, "r:3": scale * angle + noise}.get(name, turns[:, 0])
+            assert ss.make_smoothing_spline(t, data, space).df > n / cycle
+
+
+def test_the_gap_in_which_a_curve_is_free_to_turn_is_named():
+    t, angle = vibration(80, 20, np.random.default_rng(2))
+    t[30:] += 40
+    turns = Rotation.from_rotvec(angle).as_matrix()
+    expected = r"Between t = [23]\d\..* and 7\d\..* there are no data.*fit_segments"
+    with pytest.raises(ss.ConvergenceError, match=expected):
+        ss.make_smoothing_spline(t, turns, "so:3", max_iter=4)

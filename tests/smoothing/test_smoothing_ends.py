@@ -98,7 +98,7 @@ def test_gauss_newton_fits_closed_curves(name):
     t, noisy = np.append(t, 10.0), np.append(noisy, beside(space, noisy[:1], 0.05), axis=0)
     knots = np.r_[0:8:1.0, 8.5, 10.0]
     flat, exact = both_solvers(t, noisy, space, 0.3, knots=knots, bc_type="periodic", **TIGHT)
-    assert exact.report.iterations <= 15
+    assert exact.report.iterations <= 20
     # Few knots far apart: the estimating equation is off by more than usual.
     assert space.distance(flat.points, exact.points).max() < 0.3 * exact.sigma
     assert flatness(space, t, noisy, exact, 0.3, lambda _: "periodic", True) < 1e-8

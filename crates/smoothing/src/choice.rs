@@ -189,6 +189,12 @@ pub fn choose(
         (0..LANES).for_each(|l| seen.push((at[l], scores[l], freedom[l])));
     };
     (0..passes).for_each(|part| look(&mut seen, from, to, part, passes));
+    // The score may have a minimum between the roughest curve that has a score and its neighbours.
+    seen.sort_by(|a, b| a.0.total_cmp(&b.0));
+    if let Some(best) = lowest_of(&seen, 0..seen.len()).filter(|&best| best > 0 && rough(&seen, best)) {
+        let (left, right) = (seen[best - 1].0, seen[(best + 1).min(seen.len() - 1)].0);
+        look(&mut seen, left, right, 0, 1);
+    }
     for _ in 0..4 {
         seen.sort_by(|a, b| a.0.total_cmp(&b.0));
         let Some(best) = least(&seen, straight) else { return (10f64.powf(from), true) };
@@ -255,16 +261,18 @@ pub struct Look {
 /// preferred: cross-validation has one if the data show noise, even if the score decreases beyond it.
 fn least(seen: &[(f64, f64, f64)], straight: f64) -> Option<usize> {
     let end = seen.iter().position(|look| look.2 <= straight).map_or(seen.len(), |first| first + 1);
-    let lowest = |positions: &mut dyn Iterator<Item = usize>| {
-        positions.filter(|&i| seen[i].1.is_finite()).min_by(|&a, &b| seen[a].1.total_cmp(&seen[b].1))
-    };
-    let best = lowest(&mut (0..end))?;
+    let best = lowest_of(seen, 0..end)?;
     // Where the curve hardly changes, rounding errors create local minima.
     let below = |i: usize, j: usize| seen[j].1 - seen[i].1 > 1e-8 * (1.0 + seen[i].1.abs());
     let inside = |i: &usize| !rough(seen, *i) && below(*i, i - 1) && below(*i, i + 1);
     let between =
-        if rough(seen, best) { lowest(&mut (0..end.saturating_sub(1)).filter(inside)) } else { None };
+        if rough(seen, best) { lowest_of(seen, (0..end.saturating_sub(1)).filter(inside)) } else { None };
     between.or(Some(best))
+}
+
+/// The position with the lowest score.
+fn lowest_of(seen: &[(f64, f64, f64)], positions: impl Iterator<Item = usize>) -> Option<usize> {
+    positions.filter(|&i| seen[i].1.is_finite()).min_by(|&a, &b| seen[a].1.total_cmp(&seen[b].1))
 }
 
 /// Whether no rougher curve has a score.

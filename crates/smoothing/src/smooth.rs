@@ -148,6 +148,10 @@ fn beginnings(
             information::roots(data.information, space.dim()).iter().map(|root| root.weight).collect()
         };
         let data = Data { weights: &weights, ..*data };
+        let period = data.knots[data.knots.len() - 1] - data.knots[0];
+        let density = weights.iter().sum::<f64>() / period;
+        let exponent = 1.0 / f64::from(options.penalty.power() + 1);
+        let averaged = data.lam.map(|lam| (lam / density).powf(exponent));
         let [times, points, weights] = if options.loss == Loss::Linear {
             [data.times.to_vec(), data.points.to_vec(), weights.clone()]
         } else {
@@ -155,14 +159,13 @@ fn beginnings(
             loss::plausible(space, &data)
         };
         found.levels = match options.ends {
-            Ends::Open(_) => levels(space, &times, &points, &weights),
+            Ends::Open(_) => levels(space, &times, &points, &weights, averaged),
             // One period before and one after, so that the initial curve closes.
             Ends::Periodic => {
-                let period = data.knots[data.knots.len() - 1] - data.knots[0];
                 let turns = |x: f64| move |t: &f64| t + x * period;
                 let times =
                     [-1.0, 0.0, 1.0].map(|x| times.iter().map(turns(x)).collect::<Vec<f64>>()).concat();
-                levels(space, &times, &points.repeat(3), &weights.repeat(3))
+                levels(space, &times, &points.repeat(3), &weights.repeat(3), averaged)
             }
         };
         found.levels.reverse();

@@ -1,8 +1,9 @@
 //! Initial curves: means of neighbouring data.
 //!
 //! A pyramid of weighted means of pairs: noise decreases from level to level, and distances due to motion increase.
-//! The level whose neighbours are closest to each other provides the points of the initial spline. (The iteration
-//! often fails from the data themselves if the noise is large.)
+//! The level whose neighbours are closest to each other, among those before distances increase clearly, provides the
+//! points of the initial spline. (The iteration often fails from the data themselves if the noise is large. At much
+//! coarser levels fast oscillations average out, and they would be taken for noise, unless a given λ does the same.)
 
 use crate::frames::lanes_of;
 use symspline_core::scalar::{LANES, Lane, gather, scatter};
@@ -18,8 +19,18 @@ pub struct Level {
     weights: Vec<f64>,
 }
 
-/// The levels for given data, the best first, and then coarser ones. The last has two points.
-pub fn levels(space: &Erased, times: &[f64], points: &[f64], weights: &[f64]) -> Vec<Level> {
+/// The factor of a mean squared distance that is clearly larger. Distances of random points vary by less.
+const FARTHER: f64 = 1.3;
+
+/// The levels for given data, the best first, and then coarser ones. The last has two points. `averaged` is the time over
+/// which a given λ averages the data.
+pub fn levels(
+    space: &Erased,
+    times: &[f64],
+    points: &[f64],
+    weights: &[f64],
+    averaged: Option<f64>,
+) -> Vec<Level> {
     let mut level = Level { times: times.to_vec(), points: points.to_vec(), weights: weights.to_vec() };
     while level.times.windows(2).any(|t| t[0] == t[1]) {
         level = level.paired(space, |level, i| level.times[i] == level.times[i + 1]);
@@ -34,7 +45,17 @@ pub fn levels(space: &Erased, times: &[f64], points: &[f64], weights: &[f64]) ->
         }
         level = level.paired(space, |_, _| true);
     }
-    let best = (0..found.len()).min_by(|&a, &b| found[a].0.total_cmp(&found[b].0)).unwrap_or(0);
+    let mut best = 0;
+    for (i, (distance, level)) in found.iter().enumerate() {
+        let least = found[best].0;
+        let is_averaged = averaged.is_some_and(|time| level.spacing() < time);
+        if *distance > FARTHER * least && !is_averaged {
+            break;
+        }
+        if *distance < least {
+            best = i;
+        }
+    }
     let last = found.last().map(|(_, level)| level.ends(space));
     found.into_iter().skip(best).map(|(_, level)| level).chain(last).collect()
 }
@@ -47,7 +68,7 @@ impl Level {
         const NEAR: f64 = 0.1;
         loop {
             let last = self.times.len() - 1;
-            let least = NEAR * (self.times[last] - self.times[0]) / last as f64;
+            let least = NEAR * self.spacing();
             let near = |level: &Level, i: usize| level.times[i + 1] - level.times[i] < least;
             if last < 3 || !(0..last).any(|i| near(&self, i)) {
                 return self;
@@ -118,6 +139,12 @@ impl Level {
                 .sum::<f64>();
         }
         sum / count as f64
+    }
+
+    /// The mean distance in time.
+    fn spacing(&self) -> f64 {
+        let last = self.times.len() - 1;
+        (self.times[last] - self.times[0]) / last as f64
     }
 
     /// First and last point.

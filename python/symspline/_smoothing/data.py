@@ -27,8 +27,12 @@ from .precision import Precision, read_precision
 _GAPS = 12
 # The cube of the time between the first and the last datum must not overflow.
 _LONGEST = 1e100
-# If there are more knots than the first number, the fit begins with the second number of knots.
+# If there are more knots than the first number, the fit begins with the second number of knots or more.
 _MANY, _FIRST = 4000, 2000
+# Number of short parts of a long recording that are fitted before, and the largest number of data of each.
+_PARTS, _PART = 8, 1000
+# Motion shows in the distances between data and those that follow after this number of others.
+_LAG = 5
 # Largest number of times that the knots are adapted to λ.
 _TRIES = 4
 
@@ -70,6 +74,12 @@ class SmoothingData(NamedTuple):
         points, precisions = [function(own) for own in self.points], [own.map(function) for own in self.precisions]
         return self._replace(t=t, times=times, points=points, precisions=precisions, batch=batch)
 
+    def rows(self, index: NDArray[np.intp]) -> SmoothingData:
+        """Return some of the data of each curve."""
+        at = (slice(None),) * len(self.batch) + (index,)
+        points, precisions = [own[at] for own in self.points], [own.rows(index) for own in self.precisions]
+        return self._replace(t=self.t[..., index], times=self.times[..., index], points=points, precisions=precisions)
+
 
 class Knots(NamedTuple):
     """Knots as the user sees them, and as the core counts them; shape (K,) or (..., K)."""
@@ -86,6 +96,7 @@ class Knots(NamedTuple):
 
 
 Ends = list[list[End] | None]
+RunPart = Callable[[Knots, SmoothingData], list[Any]]
 
 
 def read_noisy(
@@ -350,27 +361,68 @@ def merge_close_knots(knots: Knots, noisy: SmoothingData, lam: float | None) -> 
 
 
 def with_enough_knots(
-    whole: Knots, noisy: SmoothingData, lams: list[Any], run: Callable[[Knots], list[Any]]
+    whole: Knots,
+    noisy: SmoothingData,
+    space: Space,
+    lams: list[Any],
+    run: Callable[[Knots], list[Any]],
+    run_part: RunPart,
 ) -> tuple[list[Any], Knots]:
-    """Fit with as many knots as λ and the degrees of freedom require, and return the results and the knots."""
+    """Fit with as many knots as λ and the degrees of freedom require, and return the results and the knots.
+
+    ``run_part`` fits other data with free ends.
+    """
     given = all(np.isfinite(lam).all() for lam in lams)
     at = merge_close_knots(whole, noisy, _of_all(lams) if given else None)
     if at.times.shape[-1] > _MANY:
-        at = thin_knots(at, _FIRST)
+        at = thin_knots(at, max(_FIRST, _n_knots_for_df(_df_from_parts(noisy, space, run_part))))
     for tries in range(_TRIES):
         found = run(at)
         count = at.times.shape[-1]
         known = [np.asarray(part.report.lam) for _, part, _ in found]
-        better = merge_close_knots(whole, noisy, _of_all(known))
-        most = 2 * max(_n_knots_for_df(part.report.df) for _, part, _ in found)
-        if better.times.shape[-1] > max(_MANY, most):
-            better = thin_knots(better, max(_FIRST, most))
-        wanted = better.times.shape[-1]
-        # More knots would make a rough curve rougher, and a stiff curve needs fewer.
-        if tries == _TRIES - 1 or count >= wanted > 0.8 * count or (most <= 2 * count and wanted > count):
+        apart = merge_close_knots(whole, noisy, _of_all(known))
+        most = apart.times.shape[-1]
+        enough = max(_n_knots_for_df(part.report.df) for _, part, _ in found)
+        if tries == _TRIES - 1 or (most > 0.8 * count and count > 0.8 * min(enough, most)):
             break
-        at = better
+        at = thin_knots(apart, max(_FIRST, 2 * enough)) if most > max(_MANY, 2 * enough) else apart
     return found, at
+
+
+def _df_from_parts(noisy: SmoothingData, space: Space, run_part: RunPart) -> float:
+    """Estimate the degrees of freedom of a long recording from short parts, in which all times are knots.
+
+    The choice of λ would take motion for noise that is too fast for the knots. The estimate is that of the liveliest
+    part, without the geodesic that each part has.
+    """
+    (used,) = np.nonzero(np.logical_or.reduce(noisy.used.reshape(-1, noisy.used.shape[-1])))
+    length = min(_PART, len(used) // (2 * _PARTS))
+    densest = 0.0
+    for start in _starts(noisy, space, used, length):
+        part = noisy.rows(used[start : start + length])
+        if (part.times[..., -1] > part.times[..., 0]).all():
+            found = run_part(merge_close_knots(_different(part.t, part.times), part, None), part)
+            excess = np.concatenate([np.ravel(own.report.df) for _, own, _ in found]) - 2
+            # As `thin_knots` distributes knots.
+            spans = [np.ptp(own.times, axis=-1).max() for own in (part, noisy)]
+            share = 0.5 * (length / len(used) + spans[0] / spans[1])
+            densest = float(np.max(excess / share, initial=densest, where=np.isfinite(excess)))
+    return densest
+
+
+def _starts(noisy: SmoothingData, space: Space, used: NDArray[np.intp], length: int) -> list[int]:
+    """Return where parts of a recording begin: evenly distributed ones, and those in which the data move most."""
+    starts = np.linspace(0, len(used) - length, _PARTS).astype(int).tolist()
+    size = length // 4
+    count = (len(used) - _LAG) // size
+    for part, points in points_of(noisy, space):
+        first, second = (np.take(points, used[i : i + count * size], axis=len(noisy.batch)) for i in (0, _LAG))
+        steps = part.distance(first, second).reshape(-1, count, size)
+        # Outliers do not change the median.
+        motion = np.median(steps, axis=-1).max(axis=0, initial=0.0)
+        liveliest = np.argsort(motion)[-_PARTS // 2 :] * size + size // 2 - length // 2
+        starts += np.clip(liveliest, 0, len(used) - length).tolist()
+    return sorted(set(starts))
 
 
 def _of_all(lams: list[Any]) -> float:

@@ -37,6 +37,7 @@ from .._typing import (
 )
 from ..manifolds._manifold import refuse_functions
 from .data import (
+    Ends,
     Knots,
     SmoothingData,
     checked_ends,
@@ -56,6 +57,7 @@ from .spline import SmoothingSpline
 from .warned import warn_of_bounds, warn_of_spread
 
 _FIT = Options("auto", 1e-12, None)
+_FREE: list[End] = [("natural", None), ("natural", None)]
 
 
 @overload
@@ -147,7 +149,8 @@ def make_smoothing_spline(
     knots : int or array_like, optional
         Knots of the curve: their number, or an increasing array that reaches from the first to the last time. About
         four times the degrees of freedom are enough. By default all times of the data are knots; if there are more
-        than 4000 times, as many as the degrees of freedom require.
+        than 4000 times, as many as the degrees of freedom require. Short parts of the recording, in which all times
+        are knots, determine the first number, so that fast motion is not taken for noise.
     criterion : {"gcv", "reml", "cp"}, default "gcv"
         Criterion for λ: generalised cross-validation, restricted maximum likelihood, or Mallows' C_p, which requires
         `sigma`.
@@ -292,9 +295,16 @@ def make_smoothing_spline(
     free = not geodesics and (knots is None or has_all_times(every, noisy))
 
     def run(at: Knots, raise_lam: bool = False) -> list[Any]:
-        at = at.of_curves(chosen)
-        shared = noisy, at, options._replace(raise_lam=raise_lam), free, progress
-        each = zip(points_of(noisy, space), noisy.precisions, _chosen(lams, at), sigmas, ends, strict=True)
+        return run_on(noisy, at.of_curves(chosen), ends, options._replace(raise_lam=raise_lam), progress)
+
+    def run_part(at: Knots, part: SmoothingData) -> list[Any]:
+        return run_on(part, at, [_FREE] * len(ends), options, None)
+
+    def run_on(
+        data: SmoothingData, at: Knots, ends: Ends, options: SolverOptions, progress: Progress | None
+    ) -> list[Any]:
+        shared = data, at, options, free, progress
+        each = zip(points_of(data, space), data.precisions, _chosen(lams, at), sigmas, ends, strict=True)
         return [smoothed(part, own, p, lam, sigma, end, *shared) for (part, own), p, lam, sigma, end in each]
 
     if penalty == "jerk" and every.times.shape[-1] < 4:
@@ -311,7 +321,7 @@ def make_smoothing_spline(
         options = geodesic_options(space, options)
         found = run(at)
     elif knots is None:
-        found, at = with_enough_knots(every, noisy, lams, run)
+        found, at = with_enough_knots(every, noisy, space, lams, run, run_part)
         finer = in_gaps(at, whole)
         # Knots in gaps are tried before a larger λ, which would affect the whole curve.
         if any(NO_CURVE in fault.what for _, _, own in found for fault in own):

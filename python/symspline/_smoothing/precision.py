@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import as_array, cast, refuse
 from .._core import ValidationError
@@ -48,6 +48,12 @@ class Precision(NamedTuple):
         if information is not None and information.ndim > 3:
             information = function(information)
         return Precision(function(self.weights) if self.weights.ndim > 1 else self.weights, information)
+
+    def rows(self, index: NDArray[np.intp]) -> Precision:
+        """Return the weights of some of the data of each curve."""
+        return Precision(
+            self.weights[..., index], None if self.information is None else self.information[..., index, :, :]
+        )
 
 
 def read_precision(weights: Any, frames: Any, space: Space, data: list[Points]) -> list[Precision]:

@@ -12,6 +12,7 @@ from .._core import ValidationError
 from .._curves.ends import End
 from .._curves.reduced import reduced
 from .._faults import UNCONVERGED, Fault
+from .._report import long_gaps
 from .._spaces import Array, Doubles, Space
 from .._typing import Progress
 from .data import Knots, SmoothingData
@@ -108,7 +109,7 @@ def smoothed(
     report = SmoothingReport(METHODS[int(np.any(exact))], state == 0, iterations, step, rate, lams, at_bound, df, noise)
     numbers = small._numbers(found)
     faults = [
-        Fault(number, UNCONVERGED, _reason(_STATES[kind], number, report, options))
+        Fault(number, UNCONVERGED, _reason(_STATES[kind], number, report, options, noisy, precision))
         for number, kind in enumerate(np.ravel(state).tolist())
         if kind
     ]
@@ -118,7 +119,14 @@ def smoothed(
     return on_space, Smoothed(report, band, band_lam, scale, between, posterior), faults
 
 
-def _reason(state: str, number: int, report: SmoothingReport, options: SolverOptions) -> str:
+def _reason(
+    state: str,
+    number: int,
+    report: SmoothingReport,
+    options: SolverOptions,
+    noisy: SmoothingData,
+    precision: Precision,
+) -> str:
     if state == "no curve":
         return (
             f"The smoothing{{of}} led to points that {NO_CURVE}: the curve turns too far between two knots. Pass more "
@@ -138,9 +146,27 @@ def _reason(state: str, number: int, report: SmoothingReport, options: SolverOpt
             "criterion."
         )
     other = "" if options.method == "newton" else " or pass method='newton'"
+    gap = _longest_gap(number, noisy, precision)
     return (
         f"No convergence of the smoothing{{of}}: the last step is {step:.1e} standard deviations after "
-        f"{iterations} iterations (tol {options.tol:.1e}). Raise max_iter{other}."
+        f"{iterations} iterations (tol {options.tol:.1e}). {gap}Raise max_iter{other}."
+    )
+
+
+def _longest_gap(number: int, noisy: SmoothingData, precision: Precision) -> str:
+    """Describe the longest gap between the data of a curve, if it is far longer than most."""
+    t, times, weights = (
+        np.broadcast_to(own, (*noisy.batch, own.shape[-1])).reshape(-1, own.shape[-1])[number]
+        for own in (noisy.t, noisy.times, precision.weights)
+    )
+    used = np.flatnonzero(weights > 0)
+    if len(used) < 3 or not long_gaps(times[used]).any():
+        return ""
+    longest = int(np.diff(times[used]).argmax())
+    first, last = (short_repr(t[i]) for i in used[longest : longest + 2])
+    return (
+        f"Between t = {first} and {last} there are no data, and the curve is free to turn; cut the recording at such "
+        "gaps (symspline.fit_segments). "
     )
 
 
