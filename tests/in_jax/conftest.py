@@ -14,3 +14,10 @@ def double_precision(request):
             yield
     finally:
         jax.config.update("jax_disable_most_optimizations", before)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def memory_of_a_module():
+    """What XLA compiled for a module is not kept for the next one."""
+    yield
+    jax.clear_caches()
