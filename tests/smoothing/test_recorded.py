@@ -311,30 +311,27 @@ def vibration(n, cycle, rng):
     return t, np.stack([np.sin(phase), np.cos(0.9 * phase), np.sin(0.8 * phase + 1)], axis=-1)
 
 
-@pytest.mark.parametrize("name", ["so:3", "sphere:2 x r:3", "se:3"])
-@pytest.mark.parametrize("variant", ["closed", "gap", "weights", "lam", "batch", "own times"])
+@pytest.mark.parametrize("name", ["so:3", "sphere:2 x r:3"])
+@pytest.mark.parametrize("variant", ["closed", "gap", "weights", "batch"])
 def test_motion_that_is_fast_for_the_length_of_a_recording_is_no_noise(name, variant):
-    """9000 data with 1125 cycles, which 2000 knots do not resolve."""
+    """18 000 data with 2600 cycles, which 2000 knots do not resolve."""
     rng = np.random.default_rng(5)
-    t, angle = vibration(9_000, 8, rng)
+    t, angle = vibration(18_000, 7, rng)
     if variant == "closed":
         angle *= np.sin(np.linspace(0, np.pi, len(t)))[:, None]
     if variant == "gap":
         t[5000:] += 3
-    space, noise = ss.space(name), 0.05 * rng.normal(size=(2, *angle.shape))
-    rotations = (Rotation.from_rotvec(angle) * Rotation.from_rotvec(noise[0])).as_matrix()
+    space, noise = ss.space(name), 0.02 * rng.normal(size=(2, *angle.shape))
+    rotations = (Rotation.from_rotvec(0.3 * angle) * Rotation.from_rotvec(noise[0])).as_matrix()
     positions = 40 * (angle + noise[1])
-    poses = np.broadcast_to(np.eye(4), (len(t), 4, 4)).copy()
-    poses[:, :3, :3], poses[:, :3, 3] = rotations, positions
-    data = {"r:3": positions, "so:3": rotations, "se:3": poses}.get(name, (rotations[:, 0], positions))
-    options = {"closed": {"bc_type": "periodic"}, "lam": {"lam": 0.1}}.get(variant, {})
+    data = rotations if name == "so:3" else (rotations[:, 0], positions)
+    options = {"bc_type": "periodic"} if variant == "closed" else {}
     if variant == "weights":
         options["weights"] = np.where(np.arange(len(t)) % 900 < 2, 0.0, 1.0)
-    if variant in ("batch", "own times"):
+    if variant == "batch":
         data = tuple(np.stack([own] * 2) for own in data) if isinstance(data, tuple) else np.stack([data] * 2)
-        t = np.stack([t, t + 0.1]) if variant == "own times" else t
     spline = ss.make_smoothing_spline(t, data, space, **options)
-    expected = len(t) / 8
+    expected = len(t) / 7
     assert np.all(np.ravel(spline.df) > 1.2 * expected), spline
 
 
