@@ -140,7 +140,7 @@ def test_the_part_of_a_line_in_a_long_gap_is_light():
     spline = spline_on("r:2", (8,), t)
     figure = rendered(spline.plot())
     lines = {line.get_label(): line.get_xydata() for line in figure.axes[0].lines}
-    assert "long gap" in texts_of(figure)
+    assert "curve in a long gap" in texts_of(figure)
     light, bold = lines["_bridge"], lines["_curve"]
     x = np.linspace(0, 23, 2000)
     for line, inside in ((light, (x > 3) & (x < 20)), (bold, (x <= 3) | (x >= 20))):
@@ -151,7 +151,7 @@ def test_the_part_of_a_line_in_a_long_gap_is_light():
         assert distance.min(axis=1).max() < size and distance.min(axis=0).max() < size
     # Neighbours of gaps connect both parts.
     np.testing.assert_array_equal(light[np.isfinite(light).all(axis=1)][[0, -1]], spline(t[[3, 4]]))
-    assert "long gap" not in texts_of(spline_on("r:2", t=T).plot())
+    assert "curve in a long gap" not in texts_of(spline_on("r:2", t=T).plot())
 
 
 @pytest.mark.parametrize("name", ["r:2", "se:2"])

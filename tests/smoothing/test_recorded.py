@@ -365,6 +365,44 @@ def test_the_gap_in_which_a_curve_is_free_to_turn_is_named():
     t, angle = vibration(80, 20, np.random.default_rng(2))
     t[30:] += 40
     turns = Rotation.from_rotvec(angle).as_matrix()
-    expected = r"Between t = [23]\d\..* and 7\d\..* there are no data.*fit_segments"
+    expected = r"between t = [23]\d\..* and 7\d\..*: cut the recording.*fit_segments"
     with pytest.raises(ss.ConvergenceError, match=expected):
         ss.make_smoothing_spline(t, turns, "so:3", max_iter=4)
+
+
+def test_long_recordings_with_few_weights():
+    """Parts of a recording have enough data in every curve and factor, or there are no parts."""
+    rng = np.random.default_rng(3)
+    t, angle = vibration(6_000, 40, rng)
+    data = angle[:, :2] + 0.05 * rng.normal(size=(len(t), 2))
+    for step in (400, 100):
+        few = np.where(np.arange(len(t)) % step == 0, 1.0, 0.0)
+        spline = ss.make_smoothing_spline(t, data, "r:2", lam=1e3, weights=few)
+        short = ss.make_smoothing_spline(t[::step], data[::step], "r:2", lam=1e3)
+        assert spline.df == pytest.approx(short.df, rel=0.01)
+    once = ss.make_smoothing_spline(t, data, "r:2")
+    half = np.where((np.arange(len(t)) > 1000) & (np.arange(len(t)) < 5000), 0.0, 1.0)
+    both = ss.make_smoothing_spline(t, (data, data), "r:2 x r:2", weights=(np.ones(len(t)), half))
+    assert both.df[0] == pytest.approx(once.df, rel=0.01) and 0.2 * once.df < both.df[1] < 0.5 * once.df
+    batch = ss.make_smoothing_spline(t, np.stack([data, data]), "r:2", weights=np.stack([np.ones(len(t)), half]))
+    np.testing.assert_allclose(batch.df, both.df, rtol=0.01)
+    information = np.broadcast_to(np.diag([1.0, 4.0]), (2, len(t), 2, 2))
+    assert np.all(ss.make_smoothing_spline(t, np.stack([data, data]), "r:2", weights=information).df > 150)
+
+
+def test_repeated_times_are_no_gaps():
+    turns = Rotation.from_rotvec(np.random.default_rng(0).normal(size=(60, 3))).as_matrix()
+    with pytest.raises(ss.ConvergenceError) as caught:
+        ss.make_smoothing_spline(np.repeat(np.arange(20.0), 3), turns, "so:3", max_iter=1)
+    assert "fit_segments" not in str(caught.value)
+
+
+@pytest.mark.parametrize("options", [{"gamma": 1.0}, {"criterion": "cp", "sigma": 0.05}])
+def test_three_data_per_period_are_enough_for_these_criteria(options):
+    rng = np.random.default_rng(1)
+    for n in rng.integers(100, 600, 8).tolist():
+        t, angle = vibration(n, 3, rng)
+        data = angle + 0.05 * rng.normal(size=angle.shape)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ss.SmoothingWarning)
+            assert ss.make_smoothing_spline(t, data, "r:3", **options).df > n / 3

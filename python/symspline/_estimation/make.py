@@ -18,8 +18,8 @@ from .._faults import UNCONVERGED, Fault
 from .._input import times_of
 from .._options import check_on_failure, check_progress, checked_extrapolate
 from .._smoothing import SmoothingReport, SmoothingSpline, SmoothingWarning, make_smoothing_spline
-from .._smoothing.data import Knots, thin_knots
 from .._smoothing.factors import grouped, join, smoothed_spaces
+from .._smoothing.knots import Knots, thin_knots
 from .._smoothing.posterior import Parameter
 from .._smoothing.warned import warn_of_bounds
 from .._spaces import (

@@ -23,7 +23,7 @@ SECOND = np.timedelta64(1, "s")
 _NO_GAPS: Array = np.empty((0, 2))
 # Labels of artists that the legend of a page explains. Those with an underscore are not in legends of matplotlib.
 LINE, DOTS, START, DATA_DOTS, FAINT = "_curve", "_given", "_start", "_data", "_others"
-QUANTILES, BAND, BRIDGE = "_quantiles", "band", "_bridge"
+QUANTILES, BAND, BRIDGE, GAPS = "_quantiles", "band", "_bridge", "gaps"
 
 _SEGMENTS = 3
 """The smallest length of a gap between measurements of several kinds, in median segments."""
@@ -298,13 +298,13 @@ class Curve:
         label = self.label if self.label and self.label not in known and "linestyle" not in look else LINE
         own: dict[str, Any] = {"color": self.color, "linewidth": width, "zorder": 4, "label": label}
         if self.faint:
-            look = look | {"linewidth": 0.8, "alpha": 0.45, "zorder": 3.2, "label": FAINT}
+            look = look | {"linewidth": 0.9, "alpha": 0.7, "zorder": 3.2, "label": FAINT}
         elif len(positions) == len(self.x) and self.bridges.any():
             # One sample on both sides connects the parts.
             near = self.bridges.copy()
             near[1:] |= self.bridges[:-1]
             near[:-1] |= self.bridges[1:]
-            light = own | look | {"linewidth": 0.5 * width, "alpha": 0.6, "label": BRIDGE}
+            light = own | look | {"linewidth": 0.5 * width, "linestyle": (0, (4, 2)), "label": BRIDGE}
             axes.plot(*np.where(near[:, None], positions, np.nan).T, **light)
             positions = np.where(self.bridges[:, None], np.nan, positions)
         (line,) = axes.plot(*positions.T, **own | look)

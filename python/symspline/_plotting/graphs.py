@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from .._spaces import HermitianPositiveDefinite, Space, SymmetricPositiveDefinite
-from .curves import LINE, Curve, draw_graph_of, fill_quantiles, interrupted
+from .curves import GAPS, LINE, Curve, draw_graph_of, fill_quantiles, interrupted
 from .style import (
     BOTTOM,
     DISTINCT,
@@ -35,7 +35,8 @@ from .style import (
 
 SUBSCRIPTS = str.maketrans("0123456789,", "₀₁₂₃₄₅₆₇₈₉,")
 _NAMED, _OTHERS, _IN_ROW = 12, 100, 6
-_LINES, _TICKS = 40, 2000
+FEW_KNOTS, _TICKS = 40, 2000
+"""The largest number of knots that have lines, and a bound for that of ticks."""
 
 
 # ---- axes ----
@@ -94,7 +95,7 @@ def _mark_knots(axes: Axes, curves: Sequence[Curve]) -> None:
     """
     marked = [curve.marks for curve in curves if not curve.faint]
     knots = np.unique(np.concatenate(marked))
-    height, style = (1.0, (0, (1, 2))) if len(knots) <= _LINES and curves[0].noise is None else (0.04, "-")
+    height, style = (1.0, (0, (1, 2))) if len(knots) <= FEW_KNOTS and curves[0].noise is None else (0.04, "-")
     look: Any = {"transform": axes.get_xaxis_transform()}
     line: Any = {"color": EDGE, "linewidth": 0.8, "linestyle": style, "zorder": 1}
     axes.vlines(knots[:: 1 + len(knots) // _TICKS], 0, height, **look, **line)
@@ -106,7 +107,7 @@ def _mark_gaps(axes: Axes, curves: Sequence[Curve]) -> None:
     if len(gaps):
         look: Any = {"transform": axes.get_xaxis_transform(), "facecolor": GAP, "linewidth": 0, "zorder": 0.5}
         spans = [(start, end - start) for start, end in gaps.tolist()]
-        axes.broken_barh(spans, (0, 1), label="gaps", **look)
+        axes.broken_barh(spans, (0, 1), label=GAPS, **look)
 
 
 # ---- one number ----

@@ -16,11 +16,11 @@ from matplotlib.patches import Patch
 from .._spaces import Product, cover_of, factors_of
 from . import residuals
 from .collect import axis_of, curves_of
-from .curves import BAND, BRIDGE, DATA_DOTS, DOTS, FAINT, QUANTILES, START, Curve
+from .curves import BAND, BRIDGE, DATA_DOTS, DOTS, FAINT, GAPS, QUANTILES, START, Curve
 from .figure import BANDED, FACTORS, draw_picture, drawing, finish, fitted, picture_of, picture_of_factors
 from .panels import check_axes, draw_into, has_dark_background, next_color
 from .rates import LIMIT, draw_rates, rows_of
-from .style import BOTTOM, DATA, INK, MARK, TOP, heading, legend
+from .style import BOTTOM, DATA, GAP, INK, MARK, TOP, heading, legend
 from .theme import is_dark, kept_color
 
 _HEAD, _RATES_WIDTH, _RATES_HEIGHT = 1.2, 5.8, 4.0
@@ -199,7 +199,9 @@ def _explain(figure: Figure, curves: Sequence[Curve], height: float) -> None:
     if BAND in drawn:
         add(Patch(facecolor=few[0].color, alpha=0.22), "95 % band")
     if BRIDGE in drawn:
-        add(Line2D([], [], color=few[0].color, linewidth=1, alpha=0.6), "long gap")
+        add(Line2D([], [], color=few[0].color, linewidth=1.2, linestyle=(0, (4, 2))), "curve in a long gap")
+    if GAPS in drawn:
+        add(Patch(facecolor=GAP), "gap")
     if LIMIT in drawn:
         add(Line2D([], [], color=MARK, linewidth=1, linestyle="--"), "limit")
     if FAINT in drawn:

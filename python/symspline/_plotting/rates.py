@@ -11,7 +11,7 @@ from matplotlib.figure import SubFigure
 
 from .._spaces import Product, Space, SpecialEuclidean, cover_of, factors_of
 from .curves import LINE, Curve, fill_band, fill_quantiles
-from .graphs import timelines
+from .graphs import FEW_KNOTS, timelines
 from .style import EDGE, MARK, Array
 
 NORMAL = 1.96
@@ -182,7 +182,7 @@ def _draw_rate(axes: Axes, curves: Sequence[Curve], rate: Rate) -> None:
         values = rate.values(curve.at)
         for part in curve.unbroken:
             shown = values[np.searchsorted(curve.x, part.x)]
-            width = 1.8 if curve.alone else 1.1
+            width = (1.8 if len(curve.marks) <= FEW_KNOTS else 1.0) if curve.alone else 1.1
             (line,) = axes.plot(part.times, shown, color=curve.color, linewidth=width, label=LINE)
             line.set_gid(LINE)
         low, high = values, values

@@ -37,19 +37,14 @@ from .._typing import (
 )
 from ..manifolds._manifold import refuse_functions
 from .data import (
-    Ends,
-    Knots,
     SmoothingData,
     checked_ends,
-    has_all_times,
-    in_gaps,
-    knots_for,
     points_of,
     read_noisy,
     valid_curves,
-    with_enough_knots,
 )
 from .factors import grouped, is_several, join, parts_of_factor, smoothed_spaces, split_ends
+from .knots import Knots, has_all_times, in_gaps, knots_for, with_enough_knots
 from .regression import check_infinite, geodesic_knots, geodesic_options, is_infinite, with_infinite_lam
 from .report import SmoothingReport
 from .solve import NO_CURVE, SolverOptions, one_per_curve, smoothed
@@ -295,17 +290,16 @@ def make_smoothing_spline(
     free = not geodesics and (knots is None or has_all_times(every, noisy))
 
     def run(at: Knots, raise_lam: bool = False) -> list[Any]:
-        return run_on(noisy, at.of_curves(chosen), ends, options._replace(raise_lam=raise_lam), progress)
-
-    def run_part(at: Knots, part: SmoothingData) -> list[Any]:
-        return run_on(part, at, [_FREE] * len(ends), options, None)
-
-    def run_on(
-        data: SmoothingData, at: Knots, ends: Ends, options: SolverOptions, progress: Progress | None
-    ) -> list[Any]:
-        shared = data, at, options, free, progress
-        each = zip(points_of(data, space), data.precisions, _chosen(lams, at), sigmas, ends, strict=True)
+        at = at.of_curves(chosen)
+        shared = noisy, at, options._replace(raise_lam=raise_lam), free, progress
+        each = zip(points_of(noisy, space), noisy.precisions, _chosen(lams, at), sigmas, ends, strict=True)
         return [smoothed(part, own, p, lam, sigma, end, *shared) for (part, own), p, lam, sigma, end in each]
+
+    def df_of_part(i: int, rows: SmoothingData, at: Knots) -> Any:
+        part, own = points_of(rows, space)[i]
+        shared = _FREE, rows, at, options, free, None
+        _, found, _ = smoothed(part, own, rows.precisions[i], lams[i], sigmas[i], *shared)
+        return np.ravel(found.report.df)
 
     if penalty == "jerk" and every.times.shape[-1] < 4:
         raise ValidationError(
@@ -321,7 +315,7 @@ def make_smoothing_spline(
         options = geodesic_options(space, options)
         found = run(at)
     elif knots is None:
-        found, at = with_enough_knots(every, noisy, space, lams, run, run_part)
+        found, at = with_enough_knots(every, noisy, space, lams, run, df_of_part)
         finer = in_gaps(at, whole)
         # Knots in gaps are tried before a larger λ, which would affect the whole curve.
         if any(NO_CURVE in fault.what for _, _, own in found for fault in own):

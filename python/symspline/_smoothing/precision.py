@@ -51,9 +51,8 @@ class Precision(NamedTuple):
 
     def rows(self, index: NDArray[np.intp]) -> Precision:
         """Return the weights of some of the data of each curve."""
-        return Precision(
-            self.weights[..., index], None if self.information is None else self.information[..., index, :, :]
-        )
+        information = None if self.information is None else np.take(self.information, index, axis=-3)
+        return Precision(np.take(self.weights, index, axis=-1), information)
 
 
 def read_precision(weights: Any, frames: Any, space: Space, data: list[Points]) -> list[Precision]:

@@ -10,8 +10,8 @@ import numpy as np
 
 from .._core import ValidationError
 from .._spaces import Doubles, Space, SpecialEuclidean, factors_of
-from .data import Knots, thin_knots
 from .factors import smoothed_spaces
+from .knots import Knots, thin_knots
 from .solve import Smoothed, SolverOptions
 
 # Number of knots from which the length of the geodesic is determined.

@@ -15,7 +15,8 @@ from .._faults import UNCONVERGED, Fault
 from .._report import long_gaps
 from .._spaces import Array, Doubles, Space
 from .._typing import Progress
-from .data import Knots, SmoothingData
+from .data import SmoothingData
+from .knots import Knots
 from .posterior import Posterior
 from .precision import Precision
 from .report import METHODS, SmoothingReport
@@ -159,14 +160,15 @@ def _longest_gap(number: int, noisy: SmoothingData, precision: Precision) -> str
         np.broadcast_to(own, (*noisy.batch, own.shape[-1])).reshape(-1, own.shape[-1])[number]
         for own in (noisy.t, noisy.times, precision.weights)
     )
-    used = np.flatnonzero(weights > 0)
-    if len(used) < 3 or not long_gaps(times[used]).any():
+    t = t[weights > 0]
+    different, index = np.unique(times[weights > 0], return_index=True)
+    if len(index) < 3 or not long_gaps(different).any():
         return ""
-    longest = int(np.diff(times[used]).argmax())
-    first, last = (short_repr(t[i]) for i in used[longest : longest + 2])
+    longest = int(np.diff(different).argmax())
+    first, last = (short_repr(t[i]) for i in index[longest : longest + 2])
     return (
-        f"Between t = {first} and {last} there are no data, and the curve is free to turn; cut the recording at such "
-        "gaps (symspline.fit_segments). "
+        f"No data determine how far the curve turns between t = {first} and {last}: cut the recording at such gaps "
+        "(symspline.fit_segments). "
     )
 
 

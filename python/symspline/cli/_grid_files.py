@@ -193,7 +193,7 @@ def resample_store(
 ) -> str:
     """Write the values of a variable to another store, and describe the result."""
     array, axes, point_dims = _opened(options)
-    from dask import callbacks, config
+    from dask import callbacks, config, system
 
     from ..xarray import resample
 
@@ -213,8 +213,8 @@ def resample_store(
     counted = counter(start=lambda graph: blocks.update(done=0, all=len(graph)), posttask=finished)
     with _new_store(options.output) as store, Progress("resampling") as progress, counted:
         try:
-            # Where a block fails, others are still at work. They end before the store is removed.
-            with ThreadPoolExecutor(os.cpu_count()) as pool, config.set(pool=pool):
+            # If a block fails, other threads are still writing. They end before the store is removed.
+            with ThreadPoolExecutor(system.CPU_COUNT) as pool, config.set(pool=pool):
                 made.to_dataset(name=array.name).to_zarr(store, consolidated=False)
         except (SymsplineError, OSError, MemoryError):
             raise

@@ -1,0 +1,261 @@
+"""The knots of a curve near noisy data: those of the user, or as many as the degrees of freedom require."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._arrays import as_array, short_repr
+from .._core import ValidationError
+from .._input import times_of
+from .._spaces import Array, Doubles, Space
+from .data import SmoothingData, points_of
+
+# Segments longer than this fraction of the curve are divided if no curve was found without additional knots.
+_GAPS = 12
+# If there are more knots than the first number, the fit begins with the second number of knots or more.
+_MANY, _FIRST = 4000, 2000
+# Number of evenly distributed short parts that are fitted before, and the smallest and largest number of data of each.
+_PARTS, _FEW, _PART = 8, 50, 1000
+# Motion shows in the distances between data and those that follow after this number of others.
+_LAG = 5
+# Largest number of times that the knots are adapted to λ.
+_TRIES = 4
+
+DfOfPart = Callable[[int, SmoothingData, "Knots"], Array]
+"""Returns the degrees of freedom of curves with free ends in the smoothed space with a given number."""
+
+
+class Knots(NamedTuple):
+    """Knots as the user sees them, and as the core counts them; shape (K,) or (..., K)."""
+
+    t: Array
+    times: Doubles
+
+    def of_curves(self, chosen: NDArray[np.intp] | None) -> Knots:
+        """Return the knots of some curves of a batch; None selects all curves."""
+        if chosen is None or self.times.ndim == 1:
+            return self
+        t, times = (x.reshape(-1, x.shape[-1])[chosen] for x in (self.t, self.times))
+        return Knots(t, np.ascontiguousarray(times))
+
+
+def knots_for(noisy: SmoothingData, knots: Any) -> Knots:
+    """Return the knots of a curve from the argument `knots`: None, their number, or the knots themselves."""
+    t, times = noisy.t, noisy.times
+    if isinstance(knots, (int, np.integer)) and not isinstance(knots, bool):
+        return thin_knots(_different(t, times), int(knots))
+    if knots is None:
+        return _different(t, times)
+    if isinstance(knots, (str, bool)):
+        raise ValidationError(f"knots must be None, a number of knots, or an array of them, not {short_repr(knots)}")
+    given = as_array(times_of(knots, "knots")[0], "knots")
+    if given.ndim != 1:
+        raise ValidationError(
+            f"knots has shape {given.shape}, but must have shape (K,). All curves have the same knots."
+        )
+    found, _ = noisy.time_axis.at(knots, noisy.batch, False)
+    if found.shape[-1:] < (2,):
+        raise ValidationError("knots must have at least two entries")
+    if not np.all(np.diff(found) > 0):
+        index = int(np.argwhere(~(np.diff(found) > 0))[0][-1])
+        raise ValidationError(f"knots[{index + 1}] is not after knots[{index}], but knots must increase")
+    ends = np.stack([found[..., 0], found[..., -1]], axis=-1)
+    data_ends = np.stack([times[..., 0], times[..., -1]], axis=-1)
+    size = np.abs(data_ends).max(axis=-1, keepdims=True)
+    if noisy.time_axis.origin is not None and not noisy.time_axis.dates:
+        size = size + np.abs(np.asarray(noisy.time_axis.origin, np.float64))[..., None]
+    # The last knot of linspace may be a few units in the last place before the last datum.
+    beside = (ends != data_ends) & (np.abs(ends - data_ends) <= 4 * np.spacing(size))
+    if beside.any():
+        found = np.broadcast_to(
+            found, (*np.broadcast_shapes(found.shape[:-1], ends.shape[:-1]), found.shape[-1])
+        ).copy()
+        found[..., [0, -1]] = np.where(beside, data_ends, ends)
+    if np.any(found[..., 0] > times[..., 0]) or np.any(found[..., -1] < times[..., -1]):
+        raise ValidationError("knots must reach from the first to the last time of the data")
+    if noisy.time_axis.dates:
+        given = given.astype(np.promote_types(given.dtype, t.dtype))
+    elif noisy.time_axis.plain:
+        given = found
+    # Curves with an origin of time of their own have one row of knots each.
+    return Knots(np.broadcast_to(given, found.shape).copy(), found)
+
+
+def has_all_times(knots: Knots, noisy: SmoothingData) -> bool:
+    """Whether there is a knot at every time of data with a nonzero weight."""
+    used = np.broadcast_to(noisy.used, (*noisy.batch, noisy.times.shape[-1]))
+    if noisy.times.ndim == 1:
+        used = np.logical_or.reduce(used.reshape(-1, used.shape[-1]))
+    if knots.times.ndim == 1 and noisy.times.ndim == 1:
+        return bool(np.isin(noisy.times[used], knots.times).all())
+    return bool(np.all([np.isin(t[u], k).all() for t, u, k in zip(noisy.times, used, knots.times, strict=True)]))
+
+
+def _different(t: Array, times: Doubles) -> Knots:
+    if times.ndim == 1:
+        _, index = np.unique(times, return_index=True)
+        return Knots(t[index], times[index])
+    if np.any(np.diff(times) == 0):
+        raise ValidationError(
+            "times repeat, and each curve has its own times. Pass knots, which apply to all curves, or smooth the "
+            "curves one by one."
+        )
+    return Knots(t, times)
+
+
+def thin_knots(knots: Knots, count: int) -> Knots:
+    """Select a number of knots, distributed evenly in the mean of index and time.
+
+    Neither crowded nor sparse parts then receive too few.
+    """
+    there = knots.times.shape[-1]
+    if count < 2:
+        raise ValidationError(f"knots must be at least 2, not {count}")
+    if count >= there:
+        return knots
+    place = np.linspace(0, 1, there)
+    if knots.times.ndim == 1:
+        place = 0.5 * (place + (knots.times - knots.times[0]) / np.ptp(knots.times))
+    index = np.searchsorted(place, np.linspace(0, 1, count) * (1 - 1e-12))
+    return _picked(knots, np.unique(np.append(index[:-1], there - 1)))
+
+
+def merge_close_knots(knots: Knots, noisy: SmoothingData, lam: float | None) -> Knots:
+    """Remove knots that are too close together.
+
+    Rounding errors of λ/h³ would otherwise exceed the weights of the data. If λ is None, a λ is assumed that has the
+    same effect as the weights for evenly distributed knots.
+    """
+    most = 1e11
+    times = knots.times
+    if times.ndim > 1 or len(times) <= 16 or 0 in noisy.batch:
+        return knots
+    span = float(times[-1] - times[0])
+    mean = span / (len(times) - 1)
+    weight = max(float(np.max(np.mean(own.weights, axis=-1))) for own in noisy.precisions)
+    # Units of the mean distance prevent overflow.
+    ratio = 1.0 if lam is None else lam / weight / mean / mean / mean
+    least = min(mean * (ratio / most) ** (1 / 3), span / 15)
+    if np.diff(times).min() >= least:
+        return knots
+    # Index of the first knot that is far enough from each knot.
+    following = np.searchsorted(times, times + least).tolist()
+    stop = int(np.searchsorted(times, times[-1] - least, side="right"))
+    kept, i = [], 0
+    while i < max(stop, 1):
+        kept.append(i)
+        i = following[i]
+    return _picked(knots, np.array([*kept, len(times) - 1]))
+
+
+def with_enough_knots(
+    whole: Knots,
+    noisy: SmoothingData,
+    space: Space,
+    lams: list[Any],
+    run: Callable[[Knots], list[Any]],
+    df_of_part: DfOfPart,
+) -> tuple[list[Any], Knots]:
+    """Fit with as many knots as λ and the degrees of freedom require, and return the results and the knots."""
+    given = all(np.isfinite(lam).all() for lam in lams)
+    at = merge_close_knots(whole, noisy, _of_all(lams) if given else None)
+    if at.times.shape[-1] > _MANY:
+        at = thin_knots(at, max(_FIRST, _n_knots_for_df(_df_from_parts(noisy, space, df_of_part))))
+    for tries in range(_TRIES):
+        found = run(at)
+        count = at.times.shape[-1]
+        known = [np.asarray(part.report.lam) for _, part, _ in found]
+        apart = merge_close_knots(whole, noisy, _of_all(known))
+        most = apart.times.shape[-1]
+        enough = max(_n_knots_for_df(part.report.df) for _, part, _ in found)
+        if tries == _TRIES - 1 or (most > 0.8 * count and count > 0.8 * min(enough, most)):
+            break
+        # A stiff curve needs fewer knots than it had, and a rough curve more.
+        at = thin_knots(apart, max(_FIRST, 2 * enough)) if most > max(_MANY, 2 * enough) else apart
+    return found, at
+
+
+def _df_from_parts(noisy: SmoothingData, space: Space, df_of_part: DfOfPart) -> float:
+    """Estimate the degrees of freedom of a long recording from short parts, in which all times are knots.
+
+    For few knots, the choice of λ takes fast motion for noise. The estimate is that of the liveliest part in any of the
+    smoothed spaces, without the geodesic that each part has. It is 0 if there are too few data for parts.
+    """
+    densest = 0.0
+    for number, ((part, points), own) in enumerate(zip(points_of(noisy, space), noisy.precisions, strict=True)):
+        (used,) = np.nonzero((own.weights > 0).reshape(-1, own.weights.shape[-1]).all(axis=0))
+        length = min(_PART, len(used) // (2 * _PARTS))
+        if length < _FEW or 0 in noisy.batch:
+            continue
+        for start in _starts(part, np.take(points, used, axis=len(noisy.batch)), len(noisy.batch), length):
+            rows = noisy.rows(used[start : start + length])
+            if not (rows.times[..., -1] > rows.times[..., 0]).all():
+                continue
+            excess = df_of_part(number, rows, merge_close_knots(_different(rows.t, rows.times), rows, None)) - 2
+            # The share of the recording, as `thin_knots` counts it.
+            spans = [np.ptp(times, axis=-1).max() for times in (rows.times, noisy.times)]
+            share = 0.5 * (length / len(used) + spans[0] / spans[1])
+            densest = float(np.max(excess / share, initial=densest, where=np.isfinite(excess)))
+    return densest
+
+
+def _starts(space: Space, points: Array, axis: int, length: int) -> list[int]:
+    """Return where parts of a recording begin: evenly distributed ones, and those in which the data move most.
+
+    ``axis`` is that of the data among the axes of the points.
+    """
+    total, size = points.shape[axis], length // 4
+    starts = np.linspace(0, total - length, _PARTS).astype(int).tolist()
+    count = (total - _LAG) // size
+    first, second = (points[(slice(None),) * axis + (slice(i, i + count * size),)] for i in (0, _LAG))
+    # Outliers do not change the median.
+    motion = np.median(space.distance(first, second).reshape(-1, count, size), axis=-1).max(axis=0)
+    liveliest = np.argsort(motion)[-_PARTS // 2 :] * size + size // 2 - length // 2
+    return sorted({*starts, *np.clip(liveliest, 0, total - length).tolist()})
+
+
+def _of_all(lams: list[Any]) -> float:
+    """Return one λ from which the knots of all curves are selected.
+
+    It is the smallest λ, so that the roughest curve has enough knots, but at least 1e-3 of the largest one.
+    """
+    flat = np.concatenate([np.ravel(lam) for lam in lams])
+    flat = flat[np.isfinite(flat)]
+    return float(max(flat.min(), 1e-3 * flat.max())) if flat.size else 0.0
+
+
+def _n_knots_for_df(df: Any) -> int:
+    """Return a number of knots that is enough for these degrees of freedom.
+
+    Three times as many knots would already lose nothing.
+    """
+    return 4 * int(np.ceil(np.max(df, initial=2.0, where=np.isfinite(df)))) + 8
+
+
+def in_gaps(knots: Knots, noisy: SmoothingData) -> Knots:
+    """Add knots in long gaps.
+
+    Between two points far apart, the curve of the space may turn faster than one segment can.
+    """
+    if knots.times.ndim > 1 or len(knots.times) < 3:
+        return knots
+    h = np.diff(knots.times)
+    parts = np.ceil(h * _GAPS / h.sum()).astype(int)
+    i = np.repeat(np.arange(len(h)), parts)
+    j = np.arange(len(i)) - np.repeat(np.cumsum(parts) - parts, parts)
+    # Dates are divided in their own unit.
+    first, step = knots.t[i], knots.t[i + 1] - knots.t[i]
+    whole = step.dtype.kind in "ium"
+    shown_times = np.append(first + (step * j // parts[i] if whole else step * (j / parts[i])), knots.t[-1:])
+    times, _ = noisy.time_axis.at(shown_times, (), False)
+    inner = np.flatnonzero(j == 0)
+    times[inner], times[-1] = knots.times[:-1], knots.times[-1]
+    return Knots(shown_times, times) if np.all(np.diff(times) > 0) else knots
+
+
+def _picked(knots: Knots, index: NDArray[np.intp]) -> Knots:
+    return Knots(knots.t[..., index], np.ascontiguousarray(knots.times[..., index]))
