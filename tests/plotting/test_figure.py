@@ -66,7 +66,7 @@ def test_every_space_is_drawn(name, shape):
         lines = lines_of(axes)
         assert len(lines) == len(curves)
         signed = name in SIGNED
-        assert (axes.get_ylabel().split("\n")[1] in ("γ′", "∇γ′")) == signed
+        assert (axes.get_ylabel().split("\n")[1].split(",")[0] in ("γ′", "∇γ′")) == signed
         for line, curve in zip(lines, curves, strict=True):
             norm = spline.space.norm(curve(line[:, 0]), curve(line[:, 0], nu))
             np.testing.assert_allclose(np.abs(line[:, 1]), norm, atol=1e-6)
@@ -91,9 +91,7 @@ def check_rates_of_poses(figure, space, curves):
         np.testing.assert_allclose(np.abs(line[200:-200:50, 1]), angles / (2 * step), atol=1e-5)
         moved = np.linalg.norm(after[:, :n, n] - before[:, :n, n], axis=1) / (2 * step)
         np.testing.assert_allclose(other[200:-200:50, 1], moved, atol=1e-5)
-    pairs = [
-        [axes for axes in figure.axes if axes.get_ylabel().startswith(name)] for name in ("turning\n", "acceleration")
-    ]
+    pairs = [[axes for axes in figure.axes if axes.get_ylabel().startswith(name)] for name in ("its", "acceleration")]
     for (first,), (second,) in [pairs]:
         for line, other, curve in zip(lines_of(first), lines_of(second), curves, strict=True):
             norm = space.norm(curve(line[:, 0]), curve(line[:, 0], 2))
@@ -177,19 +175,19 @@ def test_dates_of_every_curve_and_whole_numbers():
 
 
 @pytest.mark.parametrize("shape", [(5,), (3, 5)], ids=["one curve", "batch"])
-@pytest.mark.parametrize("name", ["sphere:2 x sphere:3 x h:2 x r:4", "cp:1 x gr:2,3 x spd:3 x u:3"])
+@pytest.mark.parametrize("name", ["sphere:2 x h:2", "sphere:2 x sphere:3 x h:2 x r:4", "cp:1 x gr:2,3 x spd:3 x u:3"])
 def test_product_has_a_picture_a_factor(name, shape):
     space = ss.space(name)
     rng = np.random.default_rng(2)
     spline = ss.CubicSpline(None, tuple(points_around(s, rng, shape) for s in space.factors), space)
     figure = rendered(spline.plot())
-    assert {repr(factor) for factor in space.factors} <= set(texts_of(figure))
+    assert set(name.split(" x ")) <= set(texts_of(figure))
     first = spline[0] if len(shape) > 1 else spline
     for i, (axes, factor) in enumerate(zip(rate_axes(figure)[0], space.factors, strict=True)):
         line = lines_of(axes)[0]
         norm = factor.norm(first(line[:, 0])[i], first(line[:, 0], 1)[i])
         np.testing.assert_allclose(line[:, 1], norm, atol=1e-12)
-    assert len(figure.axes) == 4 + 2 * 4
+    assert len(figure.axes) == 3 * len(space.factors)
 
 
 def test_figure_is_saved(tmp_path):

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from drawn import axes_named, lines_of, points_around, rate_axes, rendered, spline_on, texts_of
+from matplotlib.colors import to_hex
 
 import symspline as ss
 
@@ -137,7 +138,7 @@ def test_curves_with_their_own_times_have_no_quantiles():
 
 def test_the_part_of_a_line_in_a_long_gap_is_light():
     t = np.array([0.0, 1, 2, 3, 20, 21, 22, 23])
-    spline = spline_on("r:2", (8,), t)
+    spline = ss.CubicSpline(t, np.stack([t, np.sin(t)], axis=-1), "r:2")
     figure = rendered(spline.plot())
     lines = {line.get_label(): line.get_xydata() for line in figure.axes[0].lines}
     assert "curve in a long gap" in texts_of(figure)
@@ -152,6 +153,92 @@ def test_the_part_of_a_line_in_a_long_gap_is_light():
     # Neighbours of gaps connect both parts.
     np.testing.assert_array_equal(light[np.isfinite(light).all(axis=1)][[0, -1]], spline(t[[3, 4]]))
     assert "curve in a long gap" not in texts_of(spline_on("r:2", t=T).plot())
+
+
+@pytest.mark.parametrize("name", ["r:2", "r:3", "se:2", "se:3"])
+def test_pictures_are_not_as_large_as_a_curve_in_a_long_gap(name):
+    """The spline leaves the neighbourhood of its data by ten times their extent."""
+    t = np.array([0.0, 1, 2, 3, 60, 61, 62, 63])
+    path = np.stack([np.sin(2 * t), np.cos(3 * t), np.sin(t)], axis=-1)[:, : int(name[-1])]
+    space = ss.space(name)
+    points = path
+    if name.startswith("se"):
+        points = np.broadcast_to(np.eye(len(path[0]) + 1), (8, *space.point_shape)).copy()
+        points[:, :-1, -1] = path
+    spline = ss.CubicSpline(t, points, space)
+    far = np.abs(spline(np.linspace(3, 60, 50))).max()
+    axes = rendered(spline.plot()).axes[0]
+    assert far > 8
+    assert all(np.abs(getattr(axes, f"get_{k}lim")()).max() < 5 for k in axes._axis_map)
+    bridge = next(line for line in axes.lines if line.get_label() == "_bridge")
+    ends = np.stack(bridge.get_data_3d() if name.endswith("3") else bridge.get_data(), axis=1)
+    ends = ends[np.isfinite(ends).all(axis=1)][[0, -1]]
+    np.testing.assert_allclose(ends, path[[3, 4]], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("lengths", "text"),
+    [((25.0,), "gap of 25"), ((25.0, 70.0), "gaps, up to 70"), (("20s",), "gap of 20 s"), (("3h",), "gap of 3 h")],
+)
+def test_lengths_of_gaps(lengths, text):
+    steps = np.array([1.0] * 6)
+    if isinstance(lengths[0], str):
+        lengths = np.array([lengths[0][:-1]], float) * {"s": 1, "h": 3600}[lengths[0][-1]]
+        t = np.datetime64("2026-03-01T10:00", "ms") + (
+            1000 * np.cumsum(np.concatenate([steps, lengths, steps]))
+        ).astype("timedelta64[ms]")
+    else:
+        t = np.cumsum(np.concatenate([steps, *([own, *steps] for own in lengths)]))
+    assert text in texts_of(spline_on("r:1", (len(t),), t).plot())
+
+
+def test_segments_have_their_own_colours_and_starts():
+    parts = [spline_on("r:2", t=T + shift) for shift in (0, 15, 40)]
+    curve = ss.SegmentedCurve(parts)
+    figure = rendered(curve.plot())
+    assert {"segment 0", "segment 1", "segment 2"} <= set(texts_of(figure))
+    for axes in (figure.axes[0], *rate_axes(figure)[0]):
+        assert len({to_hex(line.get_color()) for line in axes.lines if line.get_gid() == "_curve"}) == 3
+    starts = [line.get_xydata()[0] for line in figure.axes[0].lines if line.get_label() == "_start"]
+    np.testing.assert_allclose(starts, [part(part.domain[0]) for part in parts])
+    figure = curve.plot(color="tab:red", label="track")
+    assert "track" in texts_of(figure) and "segment 0" not in texts_of(figure)
+    many = ss.SegmentedCurve([spline_on("r:2", t=T + 15 * i) for i in range(7)]).plot()
+    assert "segment 0" not in texts_of(many)
+    assert len([line for line in many.axes[0].lines if line.get_label() == "_start"]) == 1
+
+
+@pytest.mark.parametrize("name", ["r:2", "r:3", "sphere:2", "h:2", "rp:2", "cp:1"])
+def test_batches_close_to_their_mean_show_it(name):
+    """The line of the mean is that of the Karcher means, and no curve is named."""
+    space, rng = ss.space(name), np.random.default_rng(8)
+    p = space.random_point(rng)
+    v = space.random_tangent(rng, p)
+    t = np.cumsum(rng.exponential(1.0, 9))
+    path = np.stack([space.exp(p, s * v / space.norm(p, v)) for s in np.linspace(0, 0.9, 9)])
+    points = np.broadcast_to(path, (12, *path.shape))
+    points = space.exp(points, 0.03 * space.random_tangent(rng, points))
+    batch = ss.CubicSpline(t, points, space)
+    figure = rendered(batch.plot())
+    assert {"mean curve", "single curves", "5–95 % of 12 curves", "12 curves, 9 points each, natural ends"} <= set(
+        texts_of(figure)
+    )
+    assert "given points" not in texts_of(figure) and "curve 0" not in texts_of(figure)
+    speed = axes_named(figure, "speed")
+    (line,) = lines_of(speed)
+    x = line[100:-100:50, 0]
+    step = 1e-4
+    means = [space.mean(np.moveaxis(batch(x + shift), 0, 1)) for shift in (-step, step)]
+    np.testing.assert_allclose(line[100:-100:50, 1], space.distance(*means) / (2 * step), rtol=2e-3, atol=1e-4)
+    if name in ("r:2", "r:3"):
+        drawn = next(line for line in figure.axes[0].lines if line.get_label() == "mean curve")
+        drawn = np.stack(drawn.get_data_3d() if name == "r:3" else drawn.get_data(), axis=1)
+        np.testing.assert_allclose(drawn[100:-100:50], batch(x).mean(axis=0), atol=1e-6)
+    # Far from each other, some of the curves have their names instead.
+    centres = space.exp(p, 0.3 * space.random_tangent(rng, np.broadcast_to(p, (12, 1, *space.point_shape))))
+    around = np.broadcast_to(centres, points.shape)
+    apart = space.exp(around, 0.05 * space.random_tangent(rng, around))
+    assert {"curve 0", "other curves"} <= set(texts_of(ss.CubicSpline(None, apart, space).plot()))
 
 
 @pytest.mark.parametrize("name", ["r:2", "se:2"])

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from drawn import axes_named, lines_of, rendered, spline_on, texts_of
 from matplotlib.collections import PolyCollection
+from scipy.spatial.transform import Rotation
 
 import symspline as ss
 from symspline._plotting import matrices as pictures
@@ -140,9 +141,10 @@ def test_ellipses_are_drawn_to_scale(name):
 def test_bodies_of_the_plane_point_along_their_first_axis():
     spline = spline_on("se:2", (5,))
     figure = rendered(spline.plot())
-    between, given, first = figure.axes[0].collections
+    given, first, between = figure.axes[0].collections
     paths = [path.vertices for path in (*first.get_paths(), *given.get_paths())]
     assert len(between.get_paths()) > 5 and len(paths) == 5
+    assert {"given poses", "poses of the curve", "start"} <= set(texts_of(figure))
     for path, pose in zip(paths, spline.points, strict=True):
         tip = (path[0] - pose[:2, 2]) / np.linalg.norm(path[0] - pose[:2, 2])
         np.testing.assert_allclose(tip, pose[:2, 0])
@@ -155,13 +157,46 @@ def test_bodies_of_the_plane_do_not_overlap():
     t = np.cumsum(rng.exponential(0.5, 60))
     poses = np.broadcast_to(np.eye(3), (60, 3, 3)).copy()
     poses[:, :2, 2] = np.stack([t, 0.3 * np.sin(t)], axis=-1)
-    axes = rendered(ss.CubicSpline(t, poses, "se:2").plot()).axes[0]
+    figure = rendered(ss.CubicSpline(t, poses, "se:2").plot())
+    axes = figure.axes[0]
+    assert "some of the poses" in texts_of(figure) and "given poses" not in texts_of(figure)
     paths = [path.vertices for own in axes.collections for path in own.get_paths()]
     lengths = {round(np.linalg.norm(path[0] - path[2]), 9) for path in paths}
     feet = np.sort([path[0, 0] for path in paths])
     assert len(lengths) == 1 and 5 < len(feet) < 30 and np.diff(feet).min() > 1.4 * lengths.pop()
     dots = [line for line in axes.lines if line.get_label() == "_given"]
     np.testing.assert_allclose(dots[0].get_xydata(), poses[:, :2, 2])
+
+
+@pytest.mark.parametrize(("name", "size"), [("so:3", 0.05), ("so:3", 1e-7), ("sphere:3", 0.02), ("su:2", 0.02)])
+def test_small_rotations_are_graphs(name, size):
+    """Frames would look equal. The graphs are in the axes of space, and begin at zero."""
+    rng = np.random.default_rng(5)
+    vectors = np.cumsum(size * rng.normal(size=(7, 3)), axis=0)
+    first = Rotation.from_rotvec([0.4, -1.0, 0.2])
+    rotations = Rotation.from_rotvec(vectors) * first
+    x, y, z, w = rotations.as_quat().T
+    points = {
+        "so:3": rotations.as_matrix(),
+        "sphere:3": np.stack([w, x, y, z], axis=-1),
+        "su:2": np.moveaxis(np.array([[w - 1j * z, -y - 1j * x], [y - 1j * x, w + 1j * z]]), -1, 0),
+    }[name]
+    spline = ss.CubicSpline(None, points, name)
+    figure = rendered(spline.plot())
+    assert {"about x₁", "about x₂", "about x₃"} <= set(texts_of(figure)) and "first axis" not in texts_of(figure)
+    expected = (rotations * rotations[0].inv()).as_rotvec(degrees=True)
+    dots = [line.get_xydata()[:, 1] for line in figure.axes[0].lines if line.get_marker() == "o"]
+    np.testing.assert_allclose(np.transpose(dots), expected, rtol=1e-6, atol=1e-9)
+    moving = spline.animate(frames=2)
+    moving._draw_was_started = True
+    moving._func(17)
+
+
+def test_large_rotations_are_frames():
+    """A turn, also one that ends where it began, and matrices of different determinants."""
+    angles = np.linspace(0, 2 * np.pi, 9)
+    turn = ss.CubicSpline(None, Rotation.from_rotvec(angles[:, None] * [0, 0, 1]).as_matrix(), "so:3")
+    assert "first axis" in texts_of(turn.plot())
 
 
 def test_frames_stand_on_the_path():
@@ -202,12 +237,12 @@ def test_rotation_and_translation_have_panels_of_their_own():
     labels = [axes.get_ylabel() for axes in spline_on("se:3").plot().axes[1:]]
     assert labels == [
         "turning rate\n|ω|, rad/t",
+        "its derivative\n|ω′|, rad/t²",
         "speed\n|v|",
-        "turning\nacceleration\n|ω′|, rad/t²",
         "acceleration\n|v′|",
     ]
     dates = np.datetime64("2024-01-01") + np.arange(6)
-    labels = [axes.get_ylabel() for axes in spline_on("se:2", t=dates).plot().axes[1:3]]
+    labels = [axes.get_ylabel() for axes in spline_on("se:2", t=dates).plot().axes[1:4:2]]
     assert labels == ["turning rate\nω, rad/s", "speed\n|v|, 1/s"]
 
 

@@ -5,11 +5,12 @@ import pytest
 from drawn import axes_named, dots_of, lines_of, rendered, spline_on, texts_of
 
 import symspline as ss
+from symspline import geo
 from symspline._plotting import chart, globe, sphere
 from symspline.geo import from_lonlat
 
 MERIDIAN = np.array([[1.0, 0, 0], [1, 0, 1], [0, 0, 1], [-1, 0, 2], [-1, 0, 0]])
-DATE_LINE = from_lonlat([150, 170, -170, 175, -160], [-20, 10, 20, 30, 40])
+DATE_LINE = from_lonlat([90, 150, -170, 175, -100], [-20, 10, 20, 30, 40])
 ROUND = from_lonlat([0, 120, 240, 360], [10, 20, 30, 10])
 NEAR_POLE = from_lonlat([20, 25, -150, -140], [40, 80, 85, 30])
 
@@ -17,7 +18,8 @@ NEAR_POLE = from_lonlat([20, 25, -150, -140], [40, 80, 85, 30])
 @pytest.mark.parametrize("points", [MERIDIAN, -MERIDIAN, DATE_LINE, ROUND, NEAR_POLE])
 def test_no_line_jumps_across_the_map(points):
     spline = ss.CubicSpline(None, ss.Sphere(2).project(points), "sphere:2")
-    line = lines_of(axes_named(rendered(spline.plot()), "map"))[0]
+    # Maps with land are not centred on the curve.
+    line = lines_of(axes_named(rendered(geo.plot(spline)), "map"))[0]
     steps = np.abs(np.diff(line, axis=0))
     assert np.isnan(line).any()
     assert np.nanmax(steps[:, 0]) < 60 and np.nanmax(steps[:, 1]) < 5
@@ -57,11 +59,24 @@ def test_globe_is_turned_towards_the_few_curves_with_points():
     named = [0, 20, 40]
     points[named] = ss.Sphere(2).project(from_lonlat(130, -40) + 0.2 * rng.normal(size=(3, 6, 3)))
     axes = rendered(ss.CubicSpline(None, points, "sphere:2").plot()).axes[0]
-    seen = [line.get_xydata() for line in axes.lines if line.get_label() == "_given"]
+    seen = [line.get_xydata() for line in axes.lines if line.get_label() == "_given" and line.get_alpha() is None]
     assert len(seen) == 3 and np.isfinite(seen).all() and np.linalg.norm(seen, axis=-1).max() < 0.8
     others = [line for line in axes.lines if line.get_label() == "_others"]
     assert len(others) == 38 and all(line.get_linestyle() == "-" for line in others)
     assert min(np.isfinite(line.get_xydata()).all(axis=1).sum() for line in others) == 0
+
+
+@pytest.mark.parametrize(("west", "middle"), [(-60, 0), (100, 180), (20, 0), (160, 240), (-170, 0)])
+def test_maps_are_centred_on_curves(west, middle):
+    """Only if a curve would leave the map otherwise, and by multiples of 60 degrees."""
+    lon = west + np.linspace(0, 120, 7)
+    spline = ss.CubicSpline(None, from_lonlat(lon, 20 * np.sin(lon)), "sphere:2")
+    plan = next(axes for axes in rendered(spline.plot()).axes if axes.get_label() == "map")
+    assert globe.degrees(middle, "E", "W") in [text.get_text() for text in plan.get_xticklabels()][3]
+    dots = [line.get_xydata() for line in plan.lines if line.get_label() == "_given"]
+    np.testing.assert_allclose((dots[0][:, 0] + middle - lon + 180) % 360, 180, atol=1e-9)
+    curve = next(line.get_xydata() for line in plan.lines if line.get_gid() == "_curve")
+    assert np.isfinite(curve).all()
 
 
 @pytest.mark.parametrize("lon, lat", [(10, 50), (179.9, 0), (40, 89), (0, -89.9)])

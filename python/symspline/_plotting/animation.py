@@ -11,6 +11,7 @@ from matplotlib.animation import FuncAnimation, writers
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import SubFigure
+from matplotlib.quiver import Quiver
 
 from .._arrays import checked_number, short_repr, whole_number
 from .._core import ValidationError
@@ -178,7 +179,7 @@ def _bodies(picture: SubFigure, curve: Curve) -> Iterator[Update]:
 
 def _body(panel: SubFigure, name: str, curve: Curve) -> Iterator[Update]:
     axes = panel.axes[0]
-    if name in _FRAMES:
+    if name in _FRAMES and any(isinstance(own, Quiver) for own in axes.collections):
         yield _frame_at_time(axes, _FRAMES[name](curve.points), curve)
     elif name == "se:3":
         yield _frame_in_space(axes, curve.points)

@@ -50,17 +50,19 @@ def draw_plane(panel: SubFigure, curves: Sequence[Curve]) -> None:
     """Draw curves in R² with equal scales."""
     axes = plane(panel)
     for curve in curves:
-        draw_arrows(axes, curve, curve.points)
+        draw_arrows(axes, curve, curve.near_data(curve.points))
         draw_in_plane(axes, curve, np.asarray, lambda p, radii: p[:, None] + radii[:, None, None] * CIRCLE)
 
 
 def draw_3d(panel: SubFigure, curves: Sequence[Curve]) -> None:
     """Draw curves in R³ in a box with equal scales, with their shadows on the floor."""
-    axes = box(panel, [curve.points for curve in curves], [curve.given for curve in curves])
-    for curve in curves:
+    paths = [curve.near_data(curve.points) for curve in curves]
+    shadows = [curve.outside_gaps(path) for curve, path in zip(curves, paths, strict=True)]
+    axes = box(panel, shadows, paths + [curve.given for curve in curves])
+    for curve, path in zip(curves, paths, strict=True):
         if curve.radii is not None:
             _draw_hose(axes, curve, curve.radii)
-        curve.draw_line(axes, curve.points)
+        curve.draw_line(axes, path)
         curve.draw_dots(axes, curve.given)
     note(panel, SHADOW)
 
@@ -96,11 +98,13 @@ def box(
 ) -> Any:
     """Add a box with equal scales around lines of shape (m, 3), with their shadows on the floor.
 
-    The box contains the points ``others``, too. Its sides are longer than the extent of all points by ``margin`` times
-    the longest one at both ends. It fills the panel, of which ``below`` inches at the bottom stay empty.
+    The box contains the points ``others``, too. Rows that are NaN are ignored. Its sides are longer than the extent of
+    all points by ``margin`` times the longest one at both ends. It fills the panel, of which ``below`` inches at the
+    bottom stay empty.
     """
     axes: Any = panel.add_axes((0, 0, 1, 1), projection="3d", facecolor="none")
     everything = np.concatenate([*lines, *others])
+    everything = everything[np.isfinite(everything[:, 0])]
     middle, half = window(everything, 1.0)
     half = half or 1.0
     # No side is shorter than a fifth of the longest one.

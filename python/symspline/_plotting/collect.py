@@ -10,19 +10,26 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .._core import ValidationError
-from .._spaces import Product, Space, parts_of
+from .._core import ConvergenceError, CutLocusError, ValidationError
+from .._curves.fit import FitProblem, fit, read
+from .._curves.solve import Options
+from .._spaces import Product, Space, cover_of, parts_of
 from .curves import SECOND, Axis, Batch, Curve
-from .style import Array, colors, evenly
+from .figure import PATHS
+from .style import SPLINE, Array, colors, evenly
 
 FEW, _OF_MANY = 5, 3
 """The largest number of curves of a batch that are all drawn with their points, and the number of larger batches."""
 MOST = 50
 """The largest number of curves of a batch that are drawn, those in the background included."""
 _FOR_QUANTILES = 200
-"""The largest number of curves along the first batch axis from which quantiles are computed."""
+"""The largest number of curves along the first batch axis from which quantiles and means are computed."""
 _QUANTILE_TIMES = 300
+_SEGMENTS = ["#7b3294", "#a6611a", "#56b4e9", "#cc79a7", "#8a6d00", "#4d4d4d"]
+"""Colours of segments, if they are few; other colours than those of components."""
 _SAMPLES = 1200
+_NATURAL: Any = [[("natural", None)] * 2]
+_FIT = Options("auto", 1e-12, None)
 """Samples of a curve with few segments."""
 _FAR = 1e3
 """An axis counts from a number if the first time is larger than this multiple of the time span."""
@@ -92,15 +99,18 @@ def curves_of(
     drawn = good[evenly(len(good), MOST)]
     few = drawn[evenly(len(drawn), FEW if len(drawn) <= FEW else _OF_MANY)]
     looks = dict(zip(few.tolist(), colors(len(few)), strict=True))
-    made = []
+    made: list[Curve] = []
+    mean = _mean_of(curve, valid, axis, color, label, alone) if len(drawn) > len(few) else None
+    if mean is not None:
+        made, few, looks = [mean], drawn, {}
     # Curves with points come first.
-    for i in [*few.tolist(), *(i for i in drawn.tolist() if i not in looks)]:
+    for i in [*looks, *(i for i in drawn.tolist() if i not in looks)]:
         index = tuple(map(int, np.unravel_index(i, batch)))
         one = reduce(lambda curves, k: curves._picked(k), index, curve)
         name = label if not batch else f"curve {index[0] if len(index) == 1 else index}"
         look = {"color": color or looks.get(i), "alone": alone and len(drawn) == 1, "label": name}
         made.append(_drawn(one, curve._noise_beside, index, axis, look, faint=i not in looks))
-    if len(drawn) > len(few):
+    if looks and len(drawn) > len(few):
         made[0] = replace(made[0], batch=_batch_of(curve, made[0], valid))
     number = f"{len(few)} of {everything}" if len(few) < everything else f"{everything}"
     return made, f"{number} curves, " if batch else ""
@@ -122,16 +132,43 @@ def _drawn(one: Any, noise_beside: Any, index: Any, axis: Axis, look: dict[str, 
     if len(parts) < 2:
         return made
     start = made.points[0] if not isinstance(data.space, Product) else tuple(own[0] for own in made.points)
-    segments = [
-        replace(
-            made,
-            x=own,
-            nodes=nodes[(nodes >= own[0]) & (nodes <= own[-1])] if has_nodes else own[:1],
-            reference=start if i else None,
-        )
-        for i, own in enumerate(parts)
-    ]
+    few = len(parts) <= len(_SEGMENTS)
+    has_names = few and made.alone and made.color == SPLINE and made.label is None
+    segments = []
+    for i, own in enumerate(parts):
+        within = nodes[(nodes >= own[0]) & (nodes <= own[-1])] if has_nodes else own[:1]
+        part = replace(made, x=own, nodes=within, reference=start if i else None, has_start=few or not i)
+        segments.append(replace(part, color=_SEGMENTS[i], label=f"segment {i}") if has_names else part)
     return replace(made, segments=tuple(segments))
+
+
+def _mean_of(
+    curve: Any, valid: NDArray[np.bool_], axis: Axis, color: Any, label: str | None, alone: bool
+) -> Curve | None:
+    """Return the curve through the Karcher means of a batch at many times; None unless the batch is close to it.
+
+    It is, if the distance that contains 95 % of the curves is less than half the extent of the mean, at half of the
+    times.
+    """
+    space, data, nodes = curve.space, curve._curve, curve._node_times
+    if str(cover_of(space)) not in PATHS or data.times.ndim > 1:
+        return None
+    first, x0 = curve.domain[0], float(data.times[0])
+    many = np.union1d(np.linspace(x0, data.times[-1], _QUANTILE_TIMES), data.times)
+    own = Curve(data, first, x0, many, nodes, axis, color or SPLINE, alone, label=label or "mean curve", is_mean=True)
+    batch = _batch_of(curve, own, valid)
+    points = data.evaluate(many, "point", "raise", False).reshape(-1, len(many), *space.point_shape)
+    points = points[valid][:: -(-len(valid) // _FOR_QUANTILES)].swapaxes(0, 1)
+    try:
+        means = space.mean(points)
+    except (ConvergenceError, CutLocusError):
+        return None
+    spread = np.quantile(space.distance(means[:, None], points), 0.95, axis=1)
+    if np.median(spread) > 0.5 * space.distance(means[0], means).max():
+        return None
+    x, _ = samples(data.times, np.empty((0, 2)))
+    problem = FitProblem(space, many, read(means, space), _NATURAL, _FIT)
+    return replace(own, data=fit(problem).curve, x=x, batch=batch)
 
 
 def _batch_of(curve: Any, first: Curve, valid: NDArray[np.bool_]) -> Batch | None:

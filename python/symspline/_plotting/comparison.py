@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from textwrap import shorten
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,7 @@ from .._core import ValidationError
 from .._spaces import Product, factors_of, parts_of
 from .._time import TimeAxis, knots_of
 from .collect import axis_of, curves_of, finite_rows, scatter_of
-from .curves import Curve
+from .curves import Curve, title_on
 from .figure import finish
 from .looks import checked_color
 from .page import draw_page
@@ -61,7 +60,7 @@ def compare(
     words = [f"{count} curve{'s' if count > 1 else ''}"]
     if count < len(drawn):
         words.append(f"{sum(len(own.x) for own in drawn if not own.has_line)} data")
-    title = title or shorten(f"Comparison on {space!r}", 63, placeholder=" …")
+    title = title or title_on("Comparison", space)
     return finish(draw_page(drawn, title, ", ".join(words), figsize, show).figure, file, show)
 
 

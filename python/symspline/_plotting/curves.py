@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from textwrap import shorten
 from typing import Any
 
 import numpy as np
@@ -16,17 +17,23 @@ from numpy.typing import NDArray
 from .._curves.composed import AnyCurve
 from .._curves.curve import UncertaintyBand
 from .._report import long_gaps
-from .._spaces import Space
+from .._spaces import Product, Space
 from .style import DATA, DATES, INK, SPLINE, Array, Indices, evenly
 
 SECOND = np.timedelta64(1, "s")
 _NO_GAPS: Array = np.empty((0, 2))
 # Labels of artists that the legend of a page explains. Those with an underscore are not in legends of matplotlib.
 LINE, DOTS, START, DATA_DOTS, FAINT = "_curve", "_given", "_start", "_data", "_others"
-QUANTILES, BAND, BRIDGE, GAPS = "_quantiles", "band", "_bridge", "gaps"
+QUANTILES, BAND, BRIDGE, GAPS, POSES, BODIES = "_quantiles", "band", "_bridge", "gaps", "_poses", "_bodies"
+KNOTS = "_knots"
+BODY: Array = np.array([[1.0, 0.0], [-0.7, 0.55], [-0.35, 0.0], [-0.7, -0.55], [1.0, 0.0]])
+"""A body in the plane that points along its first axis."""
+BODY_COLOR = "#cfe0ee"
 
 _SEGMENTS = 3
 """The smallest length of a gap between measurements of several kinds, in median segments."""
+_BEYOND = 0.5
+"""How far pictures follow a curve into a long gap, as part of the extent of its data."""
 ALPHA = 0.22
 _ANGLES = np.linspace(0, 2 * np.pi, 24, endpoint=False)
 CIRCLE: Array = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=-1)
@@ -108,6 +115,10 @@ class Curve:
         Radius of the Earth in metres, if the curve is one of longitude and latitude.
     limits : tuple of pair
         Limits of speed and acceleration in each factor of the space; empty if there are none.
+    is_mean : bool
+        Whether it is the mean of a batch, without points.
+    has_start : bool
+        Whether a marker shows where the curve starts.
     """
 
     data: AnyCurve
@@ -129,6 +140,8 @@ class Curve:
     batch: Batch | None = None
     radius: float | None = None
     limits: tuple[tuple[float, float], ...] = ()
+    is_mean: bool = False
+    has_start: bool = True
 
     def on_earth(self, radius: float | None) -> Curve:
         """Return the curve with a radius of the Earth."""
@@ -156,8 +169,22 @@ class Curve:
 
     @property
     def extent(self) -> Any:
-        """All points that the picture must contain."""
-        return self.points if self.noise is None else np.concatenate([self.points, self.given])
+        """All points that the picture must contain: given points, and the curve outside long gaps."""
+        points = self.points[~self.bridges]
+        return points if self.noise is None else np.concatenate([points, self.given])
+
+    def near_data(self, positions: Array) -> Array:
+        """Return positions of samples, shape (m, n), NaN in long gaps where they are far from all others.
+
+        Bands show how far a smoothing spline may be from its data in a gap.
+        """
+        if self.noise is not None or not self.bridges.any():
+            return positions
+        others = positions[~self.bridges]
+        low, high = others.min(axis=0), others.max(axis=0)
+        margin = _BEYOND * (high - low).max()
+        far = np.any((positions < low - margin) | (positions > high + margin), axis=1)
+        return np.where((far & self.bridges)[:, None], np.nan, positions)
 
     def marked(self, numbers: Callable[[Any], Array]) -> tuple[Array, Array]:
         """Apply a function to the points at the times x, one row per point, and to the given points."""
@@ -209,6 +236,10 @@ class Curve:
         after = np.searchsorted(np.ravel(self.gaps), self.times) % 2 == 1
         return np.asarray(after & ~np.isin(self.times, self.gaps))
 
+    def outside_gaps(self, positions: Array) -> Array:
+        """Return positions of samples, shape (m, n), NaN in long gaps."""
+        return np.where(self.bridges[:, None], np.nan, positions)
+
     @cached_property
     def marks(self) -> Array:
         """Times of all given points on matplotlib's axis, also of data that are not drawn.
@@ -228,9 +259,9 @@ class Curve:
     def samples(self, number: int) -> dict[str, tuple[Array, Any]]:
         """Return groups of times on matplotlib's axis and points, at which large symbols are drawn.
 
-        The group "bold" has at most ``number`` knots; the group "between" is evenly spaced between them. For noisy
-        data, the group "data" has some of the data, "bold" has the samples of the curve that are closest to them, and
-        "between" is empty.
+        The group "bold" has at most ``number`` knots; the group "between" is evenly spaced between them, outside long
+        gaps. For noisy data, the group "data" has some of the data, "bold" has the samples of the curve that are
+        closest to them, and "between" is empty.
         """
         even = np.linspace(self.x[0], self.x[-1], number)
         if not self.has_line:
@@ -241,6 +272,7 @@ class Curve:
             bold = self.knots[evenly(len(self.knots), number)]
             gap = np.abs(even[:, None] - self.x[bold]).min(axis=1)
             between = np.unique(np.searchsorted(self.x, even[gap > 0.6 * (even[1] - even[0])]))
+            between = between[~self.bridges[between]]
             return {name: (self.times[i], self.points[i]) for name, i in (("between", between), ("bold", bold))}
         if self.noise is None:
             bold = np.unique(self._nearest(even))
@@ -299,15 +331,20 @@ class Curve:
         own: dict[str, Any] = {"color": self.color, "linewidth": width, "zorder": 4, "label": label}
         if self.faint:
             look = look | {"linewidth": 0.9, "alpha": 0.7, "zorder": 3.2, "label": FAINT}
-        elif len(positions) == len(self.x) and self.bridges.any():
+        self.plot_line(axes, positions, **own | look)
+
+    def plot_line(self, axes: Axes, positions: Array, **look: Any) -> None:
+        """Draw a line with a given look, thin and dashed in long gaps, for animations to find it."""
+        if len(positions) == len(self.x) and self.bridges.any() and not self.faint:
             # One sample on both sides connects the parts.
             near = self.bridges.copy()
             near[1:] |= self.bridges[:-1]
             near[:-1] |= self.bridges[1:]
-            light = own | look | {"linewidth": 0.5 * width, "linestyle": (0, (4, 2)), "label": BRIDGE}
-            axes.plot(*np.where(near[:, None], positions, np.nan).T, **light)
-            positions = np.where(self.bridges[:, None], np.nan, positions)
-        (line,) = axes.plot(*positions.T, **own | look)
+            light = look | {"linewidth": 0.5 * look["linewidth"], "linestyle": (0, (4, 2)), "label": BRIDGE}
+            *others, last = positions.T
+            axes.plot(*others, np.where(near, last, np.nan), **light)
+            positions = np.column_stack([*others, np.where(self.bridges, np.nan, last)])
+        (line,) = axes.plot(*positions.T, **look)
         line.set_gid(LINE)
 
     def draw_dots(self, axes: Axes, positions: Array, **look: Any) -> None:
@@ -326,12 +363,13 @@ class Curve:
             axes.plot(*positions.T, "o", **dots | look)
             return
         size = float(np.clip(30 / np.sqrt(max(len(positions), 1)), 2, 6.5)) * (1 if self.alone else 0.6)
-        color = INK if self.alone and self.color == SPLINE else self.color
+        color = INK if self.alone and self.color == SPLINE and self.label is None else self.color
         look = {"color": color, "markersize": size, "markeredgecolor": color, "zorder": 6} | look
-        if self.has_nodes:
+        if self.has_nodes and not self.is_mean:
             axes.plot(*positions.T, "o", label=DOTS, **look)
-        if self.reference is None:
-            axes.plot(*positions[:1].T, "o", label=START, **look | {"color": "white", "markeredgewidth": 1.2})
+        if self.has_start:
+            look |= {"color": "white", "markeredgewidth": 1.2, "zorder": 6.5}
+            axes.plot(*positions[:1].T, "o", label=START, **look)
 
 
 @dataclass(frozen=True)
@@ -366,6 +404,19 @@ class Batch:
         return values.reshape(-1, *values.shape[count:])[self.valid]
 
 
+def short_name(space: Space[Any]) -> str:
+    """Return the shortest name that `symspline.space` accepts, such as "so:3 x r:3"."""
+    return str(space).replace("euclidean:", "r:").replace("hyperbolic:", "h:")
+
+
+def title_on(what: str, space: Space[Any], most: int = 63) -> str:
+    """Return the title of a figure, with the name of a space; a short one of products, and if there is no space."""
+    title = f"{what} on {space!r}"
+    if isinstance(space, Product) or len(title) > most:
+        title = f"{what} on {short_name(space)}"
+    return shorten(title, most, placeholder=" …")
+
+
 def interrupted(line: Array, after: Any, gaps: Any) -> Array:
     """Insert three rows after some of the rows of a line: its end, NaN, and where it begins again."""
     return np.insert(line, np.repeat(after + 1, 3), np.reshape(gaps, (-1, line.shape[1])), axis=0)
@@ -385,7 +436,7 @@ def draw_in_plane(
     if curve.radii is not None:
         discs = disc_indices(curve)
         draw_tube(axes, curve, rims(flat(curve.points[discs]), curve.radii[discs]))
-    curve.draw_line(axes, flat(curve.points))
+    curve.draw_line(axes, curve.near_data(flat(curve.points)))
     curve.draw_dots(axes, flat(curve.given))
 
 

@@ -21,7 +21,8 @@ from .._core import ValidationError
 from .._disk import path_of, replacing
 from .._spaces import Space, cover_of, factors_of
 from . import chart, columns, graphs, matrices, sphere
-from .curves import Curve
+from .curves import Curve, short_name
+from .rates import IN_ROW
 from .shrink import shrink, small_text
 from .style import DPI, INK, points
 from .theme import invert_page, is_dark, light_colors
@@ -187,7 +188,7 @@ def save(figure: Figure, file: Any) -> None:
 
 def captions(space: Space[Any]) -> list[str]:
     """Return the names of the factors of a product, with their numbers if several factors are equal."""
-    names = [repr(factor) for factor in factors_of(space)]
+    names = [short_name(factor) for factor in factors_of(space)]
     several = max(Counter(names).values()) > 1
     return [f"factor {i}: {name}" if several else name for i, name in enumerate(names)]
 
@@ -195,7 +196,7 @@ def captions(space: Space[Any]) -> list[str]:
 def picture_of_factors(curves: Sequence[Curve]) -> Picture:
     """Return the picture of a product space, which has the pictures of its factors."""
     factors, names = factors_of(curves[0].space)[:FACTORS], captions(curves[0].space)
-    rows = 1 if len(factors) <= 3 else 2
+    rows = 1 if len(factors) <= IN_ROW else 2
     width = -(-len(factors) // rows)
 
     def draw(panel: SubFigure, curves: Sequence[Curve]) -> None:

@@ -105,7 +105,7 @@ def draw_globe(axes: Axes, view: View, spacing: int, half: bool = False) -> None
     lines = [from_lonlat(steps, lat) for lat in range(south + spacing, 90, spacing)]
     lines += [from_lonlat(lon, np.linspace(south, 90, 721)) for lon in range(-180, 180, spacing)]
     for line in lines:
-        axes.plot(*view.visible(line).T, color=GRID, linewidth=0.6, zorder=2)
+        axes.plot(*view.visible(line).T, color=GRID, linewidth=0.6, alpha=0.7, zorder=2)
 
 
 def label_directions(

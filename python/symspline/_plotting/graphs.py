@@ -10,10 +10,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import SubFigure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from .._spaces import HermitianPositiveDefinite, Space, SymmetricPositiveDefinite
-from .curves import GAPS, LINE, Curve, draw_graph_of, fill_quantiles, interrupted
+from .curves import DOTS, GAPS, KNOTS, LINE, Curve, draw_graph_of, fill_quantiles, interrupted
 from .style import (
     BOTTOM,
     DISTINCT,
@@ -62,6 +63,10 @@ def timelines(
         plain(axes)
         axes.grid(visible=False, axis="x")
         axes.set_ylabel(label)
+        # All labels of a figure are aligned, and have at least three numbers beside them.
+        axes.yaxis.set_label_coords(-0.58 / (size(panel)[0] - LEFT - RIGHT), 0.5)
+        numbers = int(np.clip(height / 0.3, 4, 9))
+        axes.yaxis.set_major_locator(MaxNLocator(numbers, steps=[1, 2, 2.5, 5, 10], min_n_ticks=3))
         _set_times(axes, curves, size(panel)[0] - LEFT - RIGHT, lowest=i == len(labels) - 1)
         if marked:
             _mark_knots(axes, curves)
@@ -98,6 +103,7 @@ def _mark_knots(axes: Axes, curves: Sequence[Curve]) -> None:
     height, style = (1.0, (0, (1, 2))) if len(knots) <= FEW_KNOTS and curves[0].noise is None else (0.04, "-")
     look: Any = {"transform": axes.get_xaxis_transform()}
     line: Any = {"color": EDGE, "linewidth": 0.8, "linestyle": style, "zorder": 1}
+    line["label"] = KNOTS if height == 1 else ""
     axes.vlines(knots[:: 1 + len(knots) // _TICKS], 0, height, **look, **line)
     _mark_gaps(axes, curves)
 
@@ -201,16 +207,16 @@ def draw_numbers(
     for curve, (values, given) in zip(curves, drawn, strict=True):
         if curve.has_line:
             for i in rest:
-                axes.plot(*_line(curve.times, values[:, i], period), color=INK, linewidth=0.4, alpha=0.4)
+                axes.plot(*_line(curve.times, values[:, i], period).T, color=INK, linewidth=0.4, alpha=0.4)
         for i, look in zip(named, looks, strict=True):
             if curve.has_line:
-                (line,) = axes.plot(*_line(curve.times, values[:, i], period), linewidth=width, **look)
-                line.set_gid(LINE)
                 # Axes of the user get the names, and a legend only if the user adds one.
-                line.set_label(names[i] if curve is curves[0] and axes in OWN_AXES else LINE)
+                label = names[i] if curve is curves[0] and axes in OWN_AXES else LINE
+                line = _line(curve.times, values[:, i], period)
+                curve.plot_line(axes, line, linewidth=width, label=label, **look)
             positions, color = np.column_stack([curve.on_axis(curve.given_x), given[:, i]]), look["color"]
             if not curve.has_line or (curve.alone and curve.noise is None and curve.has_nodes):
-                axes.plot(*positions.T, "o", color=color, markersize=3)
+                axes.plot(*positions.T, "o", color=color, markersize=3, label=DOTS)
             elif curve.alone:
                 curve.draw_dots(axes, positions, color=color, alpha=0.4)
     if axes in OWN_AXES:
@@ -229,7 +235,7 @@ def _line(times: Array, values: Array, period: float) -> Array:
         edge = np.copysign(period / 2, short)
         time = times[i] + (edge - values[i]) / short * (times[i + 1] - times[i])
         gaps.append([[time, edge], [np.nan] * 2, [time, -edge]])
-    return interrupted(line, jumps, gaps).T
+    return interrupted(line, jumps, gaps)
 
 
 def _choose(names: Sequence[str], ranges: Array) -> tuple[Indices, Indices]:

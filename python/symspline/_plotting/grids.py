@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from textwrap import shorten
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
 from .._core import ValidationError
+from .curves import title_on
 from .fields import RIGHT, Field, draw_field
 from .figure import FACTORS, captions, drawing, finish
 from .style import DATES, INK, Array, heading, inside, plain, points, show_dates
@@ -101,9 +101,7 @@ def plot_grid(grid: Any, file: Any = None) -> Figure:
     width, height = sides[0].inches + _LEFT + RIGHT, sides[1].inches + _BOTTOM + top
     if any(str(factor.space) in _SURFACES for factor in factors):
         height = max(height, _HIGH)
-    title, most = f"{grid._kind} on {grid.space!r}", int(6 * columns * width)
-    if len(title) > most:
-        title = shorten(f"{grid._kind} on {grid.space}", most, placeholder=" …")
+    title = title_on(grid._kind, grid.space, int(6 * columns * width))
     with drawing((columns * width, _HEAD + rows * height)) as figure:
         layout = figure.add_gridspec(1 + rows, columns, height_ratios=[_HEAD] + [height] * rows)
         heading(figure, title, _description(grid, middles), 1 - 0.5 / (_HEAD + rows * height))

@@ -22,17 +22,18 @@ from numpy.typing import NDArray
 
 from .._quaternions import rotation_rows
 from .chart import SHADOW, box, explain_frames, frame_handles, plane
-from .curves import Curve
+from .curves import BODIES, BODY, BODY_COLOR, POSES, START, Curve
+from .graphs import draw_numbers
 from .rows import REACH, VIEW, Rows
 from .sphere import caps
-from .style import AXES, DATA, INK, Array, apart, axes_size, legend, note, points, round_below, time_colors, window
+from .style import AXES, INK, Array, apart, axes_size, legend, note, points, round_below, time_colors, window
 
-_ARROW = np.array([[1.0, 0.0], [-0.7, 0.55], [-0.35, 0.0], [-0.7, -0.55]])
-"""A body in the plane that points along its first axis."""
 _LENGTH = 0.14
-"""Distance in inches from a position to the tip of such an arrow head."""
+"""Distance in inches from the position of a body in the plane to its tip."""
 _MANY = 24
 """The number of bodies of all curves, or two per curve if that is more."""
+_SMALL = np.radians(12)
+"""Rotations by less than this are graphs, as their frames would look equal."""
 _ANGLES = np.linspace(0, 2 * np.pi, 97)
 _CIRCLE = np.stack([np.cos(_ANGLES), np.sin(_ANGLES), 0 * _ANGLES], axis=-1)
 
@@ -43,8 +44,17 @@ _CIRCLE = np.stack([np.cos(_ANGLES), np.sin(_ANGLES), 0 * _ANGLES], axis=-1)
 def _draw_rotations(matrices: Callable[[Any], Array], panel: SubFigure, curves: Sequence[Curve]) -> None:
     """Draw the columns of rotation matrices, shape (..., 3, 3), as arrows along a time axis.
 
-    Discs at the tips contain the true direction of an axis with the probability of the band.
+    Discs at the tips contain the true direction of an axis with the probability of the band. Frames that would look
+    equal are replaced by graphs of the rotations from the first one.
     """
+    if all(curve.alone for curve in curves):
+        first = matrices(curves[0].first_point)
+        if all(_turns(matrices(curve.extent), first).max() < _SMALL for curve in curves):
+            names = [f"about {name}" for name in ("x₁", "x₂", "x₃")]
+            numbers = lambda _, points: np.degrees(_rotation_vectors(matrices(points), first))  # noqa: E731
+            parts = [part for curve in curves for part in curve.unbroken]
+            draw_numbers(panel, parts, "rotation from the first\npoint, degrees", names, numbers)
+            return
     rows = Rows.of(panel, curves)
     length = min(REACH, 0.48 * rows.height)
     words = _left_out(rows, curves)
@@ -57,6 +67,20 @@ def _draw_rotations(matrices: Callable[[Any], Array], panel: SubFigure, curves: 
         _draw_arrows(rows.axes, times, -i, length * frames, light=row.name == "data")
     _explain(rows.axes, words, rows.width)
     rows.draw_view()
+
+
+def _turns(matrices: Array, first: Array) -> Array:
+    """Return the angles in radians of rotations from a first matrix, shape (m,)."""
+    # ‖R − S‖² is 8 sin²(θ/2), and 8 for matrices of different determinants.
+    return 2 * np.arcsin(np.minimum(np.linalg.norm(matrices - first, axis=(1, 2)) / np.sqrt(8), 1))
+
+
+def _rotation_vectors(matrices: Array, first: Array) -> Array:
+    """Return the rotation vectors of rotations by less than a right angle from a first matrix, shape (m, 3)."""
+    steps = matrices @ first.T
+    twice = np.stack([steps[:, k - 1, k - 2] - steps[:, k - 2, k - 1] for k in range(3)], axis=-1)
+    sines = np.linalg.norm(twice, axis=1, keepdims=True) / 2
+    return np.asarray(twice / 2 / np.sinc(np.arcsin(np.minimum(sines, 1)) / np.pi))
 
 
 def _left_out(rows: Rows, curves: Sequence[Curve]) -> str:
@@ -121,29 +145,40 @@ def _explain(axes: Axes, more: str, width: float) -> None:
 
 
 def draw_flat_poses(panel: SubFigure, curves: Sequence[Curve]) -> None:
-    """Draw poses of SE(2) as arrow heads that point along their first axis. Given ones are filled."""
+    """Draw poses of SE(2) as bodies that point along their first axis.
+
+    Given poses are filled bodies if they are far enough from each other, the first one white; light bodies are along
+    the curve. Otherwise they are dots, and some of them light bodies.
+    """
     axes = plane(panel)
     positions = np.concatenate([curve.extent[:, :2, 2] for curve in curves])
     unit = float(np.max(np.ptp(positions, axis=0) / axes_size(axes))) or 1.0
-    number = max(2, _MANY // len(curves))
 
-    def draw(poses: Array, **look: Any) -> None:
-        turned = length * _ARROW @ poses[:, :2, :2].swapaxes(1, 2)
-        axes.add_collection(PolyCollection(list(turned + poses[:, None, :2, 2]), zorder=5, **look))
+    def draw(poses: Array, label: str, **look: Any) -> None:
+        if len(poses):
+            turned = length * BODY[:-1] @ poses[:, :2, :2].swapaxes(1, 2)
+            bodies = list(turned + poses[:, None, :2, 2])
+            axes.add_collection(PolyCollection(bodies, zorder=4.5, label=label, **look))
 
     for curve in curves:
         length = _LENGTH * unit * (1 if curve.alone else 0.6)
-        curve.draw_line(axes, curve.points[:, :2, 2], linewidth=1.2, alpha=0.6)
-        groups = {group: _apart(poses, 2 * length) for group, (_, poses) in curve.samples(number).items()}
-        free = np.linalg.norm(groups["between"][:, None, :2, 2] - curve.given[:, :2, 2], axis=-1) > 2 * length
-        groups["between"] = groups["between"][free.all(axis=1)]
-        edge, light = (INK, DATA) if curve.alone else (curve.color, curve.color)
-        curve.draw_dots(axes, curve.given[:, :2, 2], zorder=4.5)
-        if "data" in groups:
-            draw(groups["data"], facecolor="none", edgecolor=light, alpha=0.6)
-        draw(groups["between"], facecolor="none", edgecolor=curve.color)
-        draw(groups["bold"][1:], facecolor=edge, edgecolor=edge)
-        draw(groups["bold"][:1], facecolor="white", edgecolor=edge)
+        given, edge = curve.given, INK if curve.alone and curve.has_line else curve.color
+        path = curve.points[:, :2, 2]
+        curve.draw_line(axes, curve.near_data(path), linewidth=1.6)
+        has_bodies = curve.noise is None and curve.has_nodes and len(_apart(given, 2 * length)) == len(given)
+        if has_bodies:
+            draw(given[1:], POSES, facecolor=edge, edgecolor=edge)
+            draw(given[:1], START, facecolor="white", edgecolor=edge)
+        else:
+            small = float(np.clip(22 / np.sqrt(max(len(given), 1)), 1.5, 4.0))
+            curve.draw_dots(axes, given[:, :2, 2], markersize=small)
+        way = float(np.sum(np.linalg.norm(np.diff(path, axis=0), axis=1)))
+        dense = curve.noise is None and curve.has_nodes and not has_bodies
+        some = _apart(given if dense else curve.points[~curve.bridges], max(4 * length, way * len(curves) / _MANY))
+        if has_bodies:
+            free = np.linalg.norm(some[:, None, :2, 2] - given[:, :2, 2], axis=-1) > 2 * length
+            some = some[free.all(axis=1)]
+        draw(some, BODIES, facecolor=BODY_COLOR, edgecolor=curve.color, linewidth=0.8)
     axes.autoscale_view()
 
 
@@ -155,9 +190,10 @@ def _apart(poses: Array, least: float) -> Array:
 
 def draw_poses(panel: SubFigure, curves: Sequence[Curve]) -> None:
     """Draw poses of SE(3) as frames on the path. Given ones are bold."""
-    paths = [curve.points[:, :3, 3] for curve in curves]
+    paths = [curve.near_data(curve.points[:, :3, 3]) for curve in curves]
     given = [curve.given[:, :3, 3] for curve in curves]
-    length = 0.16 * window(np.concatenate([*paths, *given]), 1.0)[1] or 0.2
+    everything = np.concatenate([*paths, *given])
+    length = 0.16 * window(everything[np.isfinite(everything[:, 0])], 1.0)[1] or 0.2
     number = max(2, _MANY // len(curves))
     # The box contains the tips of all frames that are drawn.
     tips = [
@@ -166,7 +202,8 @@ def draw_poses(panel: SubFigure, curves: Sequence[Curve]) -> None:
         for _, poses in curve.samples(number).values()
         for i in range(3)
     ]
-    axes = box(panel, paths, given + tips, 0.02, below=0.45)
+    shadows = [curve.outside_gaps(path) for curve, path in zip(curves, paths, strict=True)]
+    axes = box(panel, shadows, paths + given + tips, 0.02, below=0.45)
 
     def draw(poses: Array, length: float, **look: Any) -> None:
         feet = poses[:, :3, 3]

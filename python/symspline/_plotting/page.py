@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from textwrap import shorten
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,14 +15,33 @@ from matplotlib.patches import Patch
 from .._spaces import Product, cover_of, factors_of
 from . import residuals
 from .collect import axis_of, curves_of
-from .curves import BAND, BRIDGE, DATA_DOTS, DOTS, FAINT, GAPS, QUANTILES, START, Curve
+from .curves import (
+    BAND,
+    BODIES,
+    BODY,
+    BODY_COLOR,
+    BRIDGE,
+    DATA_DOTS,
+    DOTS,
+    FAINT,
+    GAPS,
+    KNOTS,
+    POSES,
+    QUANTILES,
+    START,
+    Axis,
+    Curve,
+    title_on,
+)
 from .figure import BANDED, FACTORS, draw_picture, drawing, finish, fitted, picture_of, picture_of_factors
 from .panels import check_axes, draw_into, has_dark_background, next_color
-from .rates import LIMIT, draw_rates, rows_of
-from .style import BOTTOM, DATA, GAP, INK, MARK, TOP, heading, legend
+from .rates import LIMIT, columns_of, draw_rates
+from .style import BOTTOM, DATA, EDGE, GAP, INK, MARK, TOP, Array, heading, legend
 from .theme import is_dark, kept_color
 
 _HEAD, _RATES_WIDTH, _RATES_HEIGHT = 1.2, 5.8, 4.0
+_UNITS = (172_800, 86_400, "d"), (7200, 3600, "h"), (100, 60, "min"), (0, 1, "s")
+"""The least number of seconds for which a unit is used, its length in seconds, and its name."""
 _ROW = 1.5
 """Height of a rate in inches, if there are more than two in a column."""
 _SMALLEST = 0.6
@@ -72,9 +90,7 @@ def page_of(
     space = curve.space
     has_band = [str(cover_of(own)) in BANDED for own in factors_of(space)]
     below = residuals.panels_of(curve, curves[0], has_band)
-    # Names of products are shorter than their representations.
-    name = str(space) if isinstance(space, Product) else repr(space)
-    title = title or shorten(f"{curve._kind} on {name}", 63, placeholder=" …")
+    title = title or title_on(curve._kind, space)
     return draw_page(curves, title, words + _description(curve, curves), figsize, show, below)
 
 
@@ -92,10 +108,9 @@ def draw_page(
     wide = picture.width > 1.5 * picture.height
     widths = [picture.width] if wide else [picture.width, _RATES_WIDTH]
     rates = any(curve.has_line for curve in curves)
-    columns = 2 if isinstance(space, Product) and wide else 1
     heights = [_HEAD, picture.height]
     if wide and rates:
-        count = len(rows_of(space, False, FACTORS)) // columns
+        count = max(map(len, columns_of(space, False, FACTORS, wide)))
         heights.append(_RATES_HEIGHT if count < 3 else BOTTOM + TOP + _ROW * count)
     if below:
         heights.append(residuals.height(below))
@@ -111,7 +126,7 @@ def draw_page(
         else:
             draw_picture(panel, space, curves)
         if rates:
-            draw_rates(figure.add_subfigure(grid[2, 0] if wide else grid[1, 1]), curves, FACTORS, columns)
+            draw_rates(figure.add_subfigure(grid[2, 0] if wide else grid[1, 1]), curves, FACTORS, wide)
         if below:
             residuals.draw(figure.add_subfigure(grid[-1, :]), curves[0], below)
         _explain(figure, curves, 1 - 0.92 / size[1])
@@ -173,6 +188,16 @@ def _description(spline: Any, curves: Sequence[Curve]) -> str:
     return ", ".join(filter(None, words))
 
 
+def _lengths(gaps: Array, axis: Axis) -> str:
+    """Describe the lengths of gaps, given on matplotlib's axis, in seconds if the axis has a unit."""
+    longest = float(np.diff(gaps).max()) * (86_400 if axis.dates else 1)
+    length = f"{longest:.3g}"
+    if axis.seconds:
+        unit, name = next((unit, name) for least, unit, name in _UNITS if longest >= least)
+        length = f"{longest / unit:.3g} {name}"
+    return f"gap of {length}" if len(gaps) == 1 else f"gaps, up to {length}"
+
+
 def _explain(figure: Figure, curves: Sequence[Curve], height: float) -> None:
     """Explain lines, markers and bands in one line below the heading."""
     drawn = {artist.get_label() for axes in figure.axes for artist in axes.get_children()}
@@ -185,15 +210,24 @@ def _explain(figure: Figure, curves: Sequence[Curve], height: float) -> None:
         handles.append(handle)
         labels.append(label)
 
-    for curve in few:
-        if curve.label:
+    for curve in (part for own in few for part in own.unbroken):
+        if curve.label and curve.label not in labels:
             look = {} if curve.has_line else dot | {"markerfacecolor": "none"}
             add(Line2D([], [], color=curve.color, linewidth=2, **look), curve.label)
     color = INK if few[0].alone else DATA
+    body: dict[str, Any] = {"linestyle": "none", "marker": BODY, "markersize": 10, "markeredgecolor": few[0].color}
     if START in drawn:
-        add(Line2D([], [], color="white", markeredgecolor=color, markeredgewidth=1.2, **dot), "start")
+        look = body if POSES in drawn else dot | {"markeredgewidth": 1.2}
+        add(Line2D([], [], **look | {"color": "white", "markeredgecolor": color}), "start")
     if DOTS in drawn:
         add(Line2D([], [], color=color, **dot), "given points")
+    if KNOTS in drawn:
+        add(Line2D([], [], color=EDGE, linewidth=1, linestyle=":"), "times of points" if few[0].has_nodes else "knots")
+    if POSES in drawn:
+        add(Line2D([], [], **body | {"markeredgecolor": color, "color": color}), "given poses")
+    if BODIES in drawn:
+        few_of_many = few[0].noise is None and few[0].has_nodes and POSES not in drawn
+        add(Line2D([], [], **body, color=BODY_COLOR), "some of the poses" if few_of_many else "poses of the curve")
     if DATA_DOTS in drawn:
         add(Line2D([], [], color=DATA, **dot), "data")
     if BAND in drawn:
@@ -201,11 +235,11 @@ def _explain(figure: Figure, curves: Sequence[Curve], height: float) -> None:
     if BRIDGE in drawn:
         add(Line2D([], [], color=few[0].color, linewidth=1.2, linestyle=(0, (4, 2))), "curve in a long gap")
     if GAPS in drawn:
-        add(Patch(facecolor=GAP), "gap")
+        add(Patch(facecolor=GAP), _lengths(np.unique(np.concatenate([own.gaps for own in few]), axis=0), few[0].axis))
     if LIMIT in drawn:
         add(Line2D([], [], color=MARK, linewidth=1, linestyle="--"), "limit")
     if FAINT in drawn:
-        add(Line2D([], [], color=DATA, linewidth=0.7), "other curves")
+        add(Line2D([], [], color=DATA, linewidth=0.7), "single curves" if few[0].is_mean else "other curves")
     if QUANTILES in drawn and few[0].batch is not None:
         add(Patch(facecolor=DATA, alpha=0.25), f"5–95 % of {int(few[0].batch.valid.sum())} curves")
     if handles:

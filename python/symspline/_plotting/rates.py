@@ -9,14 +9,18 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import SubFigure
 
-from .._spaces import Product, Space, SpecialEuclidean, cover_of, factors_of
-from .curves import LINE, Curve, fill_band, fill_quantiles
+from .._spaces import Product, Space, SpecialEuclidean, Sphere, cover_of, factors_of
+from .curves import LINE, Curve, fill_band, fill_quantiles, short_name
 from .graphs import FEW_KNOTS, timelines
 from .style import EDGE, MARK, Array
 
 NORMAL = 1.96
 """Half width of the 95 % interval of a normal distribution, in standard deviations."""
 LIMIT = "_limit"
+IN_ROW = 3
+"""The largest number of factors whose pictures are in one row."""
+# Other spaces than spheres, in which the length of a velocity is an angle per time.
+_ANGULAR = {"so:2", "so:3", "o:2", "o:3", "u:1", "rp:1", "rp:2", "gr:1,2", "gr:1,3", "gr:2,3"}
 _LONGEST = 10
 """Number of letters of a space in the label of an axis."""
 At = Callable[[str], Any]
@@ -73,9 +77,11 @@ _SIGNS: dict[str, Callable[[Any, Any], Array]] = {
 
 
 def rates_of(space: Space[Any], seconds: bool) -> list[Rate]:
-    """Return the rates of a space that is not a product, velocities first."""
-    per = [", 1/s", ", 1/s²"] if seconds else ["", ""]
+    """Return the rates of a space that is not a product."""
     own = cover_of(space)
+    per = [", 1/s", ", 1/s²"] if seconds else ["", ""]
+    if isinstance(own, Sphere) or str(own) in _ANGULAR:
+        per = [", rad/s", ", rad/s²"] if seconds else [", rad/t", ", rad/t²"]
     if isinstance(own, SpecialEuclidean):
         return _rates_of_poses(own, seconds)
     sign = _SIGNS.get(str(own))
@@ -116,32 +122,36 @@ def _rates_of_poses(space: SpecialEuclidean, seconds: bool) -> list[Rate]:
     first, second = ("ω", "ω′") if n == 2 else ("|ω|", "|ω′|")
     rates = [
         Rate(f"turning rate\n{first}, {turn[0]}", 1, turning("velocity"), n == 2),
+        Rate(f"its derivative\n{second}, {turn[1]}", 2, turning("acceleration"), n == 2),
         Rate(f"speed\n|v|{move[0]}", 1, moving("velocity")),
-        Rate(f"turning\nacceleration\n{second}, {turn[1]}", 2, turning("acceleration"), n == 2),
         Rate(f"acceleration\n|v′|{move[1]}", 2, moving("acceleration")),
     ]
     return [rate._replace(whole=False) for rate in rates]
 
 
-def rows_of(space: Space[Any], seconds: bool, most: int) -> list[tuple[int | None, Rate]]:
-    """Return the rates of a space, with the number of the factor of a product."""
+def columns_of(space: Space[Any], seconds: bool, most: int, wide: bool) -> list[list[tuple[int | None, Rate]]]:
+    """Return the rates of a space in columns, with the number of the factor of a product.
+
+    In wide figures, up to three factors have a column each, below their pictures. More of them have one for velocities
+    and one for accelerations.
+    """
     if not isinstance(space, Product):
-        return [(None, own) for own in rates_of(space, seconds)]
-    found: list[tuple[int | None, Rate]] = []
+        return [[(None, own) for own in rates_of(space, seconds)]]
     factors = factors_of(space)
-    names = [_short_name(factor) for factor in factors]
+    each = [rates_of(factor, seconds) for factor in factors[:most]]
+    if wide and len(each) <= IN_ROW:
+        return [[(i, own) for own in rates] for i, rates in enumerate(each)]
+    names = [_cut(short_name(factor)) for factor in factors]
     if len(set(names)) < len(names):
         names = [f"factor {i}" for i in range(len(names))]
-    for i, factor in enumerate(factors[:most]):
-        for own in rates_of(factor, seconds):
-            name, _, unit = own.label.rpartition("\n")
-            found.append((i, own._replace(label=f"{name}\n{unit} of {names[i]}")))
-    return found
+    rows: list[tuple[int | None, Rate]] = [
+        (i, own._replace(label=f"{own.label} of {names[i]}")) for i, rates in enumerate(each) for own in rates
+    ]
+    return [[row for row in rows if row[1].order == order] for order in (1, 2)] if wide else [rows]
 
 
-def _short_name(space: Space[Any]) -> str:
-    """Return a short name of a space for the label of an axis."""
-    name = str(space).replace("euclidean:", "r:").replace("hyperbolic:", "h:")
+def _cut(name: str) -> str:
+    """Return a name that fits into the label of an axis."""
     return name if len(name) <= _LONGEST else f"{name[: _LONGEST - 1]}…"
 
 
@@ -155,19 +165,15 @@ def _rates_on_earth(radius: float, seconds: bool) -> list[Rate]:
     ]
 
 
-def draw_rates(panel: SubFigure, curves: Sequence[Curve], most: int, columns: int) -> None:
-    """Draw the rates of curves: velocities and accelerations below each other, or in one column each."""
+def draw_rates(panel: SubFigure, curves: Sequence[Curve], most: int, wide: bool) -> None:
+    """Draw the rates of curves in the columns of `columns_of`."""
     curves = [curve for curve in curves if curve.has_line and not curve.faint]
     seconds, radius = curves[0].axis.seconds, curves[0].radius
-    rows = rows_of(curves[0].space, seconds, most)
+    columns = columns_of(curves[0].space, seconds, most, wide)
     if radius is not None:
-        rows = [(None, own) for own in _rates_on_earth(radius, seconds)]
-    groups = [rows]
-    panels: list[Any] = [panel]
-    if columns > 1:
-        groups = [[row for row in rows if row[1].order == order] for order in (1, 2)]
-        panels = [*np.asarray(panel.subfigures(1, 2))]
-    for own, group in zip(panels, groups, strict=True):
+        columns = [[(None, own) for own in _rates_on_earth(radius, seconds)]]
+    panels = panel.subfigures(1, len(columns), squeeze=False)[0]
+    for own, group in zip(panels, columns, strict=True):
         made = timelines(own, curves, [rate.label for _, rate in group])
         for axes, (number, rate) in zip(made, group, strict=True):
             parts = curves if number is None else [curve.part(number) for curve in curves]
@@ -183,8 +189,7 @@ def _draw_rate(axes: Axes, curves: Sequence[Curve], rate: Rate) -> None:
         for part in curve.unbroken:
             shown = values[np.searchsorted(curve.x, part.x)]
             width = (1.8 if len(curve.marks) <= FEW_KNOTS else 1.0) if curve.alone else 1.1
-            (line,) = axes.plot(part.times, shown, color=curve.color, linewidth=width, label=LINE)
-            line.set_gid(LINE)
+            part.plot_line(axes, np.column_stack([part.times, shown]), color=part.color, linewidth=width, label=LINE)
         low, high = values, values
         if rate.order == 1 and curve.noise is not None and curve.noise.speed is not None:
             spread = rate.scale * NORMAL * curve.noise.speed

@@ -23,7 +23,7 @@ _LEAST = 3.6
 
 def panels_of(spline: Any, curve: Curve, has_band: Sequence[bool]) -> list[SidePanel]:
     """Return the panels of a spline, without the bands of factors whose picture shows them; a batch has none."""
-    if not curve.alone:
+    if not curve.alone or curve.is_mean:
         return []
     panels = spline._panels_below(curve.x)
     return [own for own in panels if len(own.x) and (own.factor is None or not has_band[own.factor])]

@@ -15,14 +15,15 @@ from matplotlib.axes import Axes
 from matplotlib.figure import SubFigure
 from numpy.typing import NDArray
 
-from .._lonlat import to_lonlat
+from .._lonlat import from_lonlat, to_lonlat
 from . import land
 from .arrows import draw_arrows
 from .curves import CIRCLE, Curve, disc_indices, draw_tube, interrupted
 from .globe import View, degrees, draw_frame, draw_globe, label_directions, middle_of
 from .style import GRID, HALO, INK, MARK, PAPER, SPLINE, Array, inside, note, plain, points, round_below, size, window
 
-_SMALL = np.radians(25)
+_SMALL, _SMALL_WIDE = np.radians([25, 50])
+"""The largest distance from the middle of curves that are drawn in a frame, and in a wide one."""
 _LOCATOR = 3.9
 """Width in inches of the column of the small globe beside a frame."""
 _COARSE = np.radians(2)
@@ -31,6 +32,8 @@ _LETTERS = "abcdefghijklmnop"
 """Names of the points at which a curve leaves the hemisphere and returns."""
 _RING: dict[str, Any] = {"markersize": 12, "markeredgewidth": 1.4, "zorder": 6}
 _WIDEST = 1.5
+_FREE = 60
+"""The smallest range of longitudes without curves, in degrees, that becomes the edges of a map."""
 _POLE = 60
 """Neighbouring samples are on both sides of a pole if their longitudes differ by more degrees."""
 _HEIGHT = 42
@@ -161,8 +164,7 @@ def _draw_on_globe(axes: Axes, view: View, curve: Curve, line: Array, given: Arr
         curve.draw_line(axes, view.hidden(line), linewidth=1, linestyle=(0, (2, 2)), alpha=0.6)
     curve.draw_line(axes, view.visible(line))
     draw_arrows(axes, curve, view.visible(line))
-    if curve.alone:
-        curve.draw_dots(axes, view.hidden(given), alpha=0.35)
+    curve.draw_dots(axes, view.hidden(given), alpha=0.35)
     curve.draw_dots(axes, view.visible(given))
 
 
@@ -201,7 +203,7 @@ def _draw_globe(panel: SubFigure, points: Array, look: _Globe, above: Array | No
     """
     view = View.above(*middle_of(points))
     far = np.arctan2(np.linalg.norm(view.flat(points), axis=-1), points @ view.up).max()
-    if 1e-7 < far < _SMALL:
+    if 1e-7 < far < (_SMALL_WIDE if look.beside else _SMALL):
         width, height = size(panel)
         if look.beside:
             right, top = look.beside, 0.15
@@ -292,29 +294,43 @@ def _name_crossings(axes: Axes, view: View, broken: Array) -> bool:
 
 
 def _draw_map(panel: SubFigure, curves: Sequence[Curve], left: float, has_land: bool) -> None:
+    """Draw a map. Maps without land are centred on the curves, by a multiple of 60 degrees."""
     axes = panel.add_axes(inside(panel, left + 0.65, 0.5, 0.4, 0.2))
     plain(axes)
+    middle = 0 if has_land else _middle_meridian(np.concatenate([curve.extent for curve in curves if not curve.faint]))
     axes.set(aspect="equal", xlim=(-180, 180), ylim=(-90, 90), facecolor=PAPER, label="map")
-    axes.set_xticks(range(-180, 181, 60), [degrees(x, "E", "W") for x in range(-180, 181, 60)])
+    axes.set_xticks(range(-180, 181, 60), [degrees(x + middle, "E", "W") for x in range(-180, 181, 60)])
     axes.set_yticks(range(-90, 91, 30), [degrees(y, "N", "S") for y in range(-90, 91, 30)])
     axes.set_xticks(range(-180, 181, 30), minor=True)
     axes.grid(which="minor", color=GRID, linewidth=0.6)
     axes.tick_params(which="minor", length=0)
     if has_land:
         land.draw_on_map(axes)
+    turn = np.stack([from_lonlat(middle, 0), from_lonlat(middle + 90, 0), [0, 0, 1]], axis=-1)
     for curve in curves:
-        positions, given = curve.marked(lonlat_of)
+        positions, given = curve.marked(lambda points: lonlat_of(points @ turn))
         if curve.radii is not None:
-            _draw_band(axes, curve, positions, curve.radii)
+            _draw_band(axes, curve, positions, curve.points @ turn, curve.radii)
         curve.draw_line(axes, broken(positions))
         draw_arrows(axes, curve, broken(positions))
         curve.draw_dots(axes, given, clip_on=False, **{} if curve.noise else {"markersize": 4.5})
 
 
-def _draw_band(axes: Axes, curve: Curve, positions: Array, radii: Array) -> None:
+def _middle_meridian(points: Array) -> int:
+    """Return the longitude of the middle of a map that a curve does not leave, or else 0."""
+    lon = np.sort(to_lonlat(points)[0])
+    steps = np.diff(lon, append=lon[0] + 360)
+    widest = int(steps.argmax())
+    edge = lon[widest] + steps[widest] / 2
+    if steps[widest] < _FREE or lon[widest] + steps[widest] >= 180 >= lon[widest]:
+        return 0
+    return int(60 * np.rint((edge + 180) / 60)) % 360
+
+
+def _draw_band(axes: Axes, curve: Curve, positions: Array, points: Array, radii: Array) -> None:
     """Draw the band on the map, on both sides of the date line. Caps around a pole have no rim there."""
     discs = disc_indices(curve)
-    lon, lat = to_lonlat(caps(curve.points[discs], radii[discs]))
+    lon, lat = to_lonlat(caps(points[discs], radii[discs]))
     middle = np.unwrap(positions[discs, 0], period=360)[:, None]
     lon = middle + (lon - middle + 180) % 360 - 180
     lon[np.ptp(lon, axis=1) > 180] = np.nan

@@ -41,7 +41,7 @@ DATES: Any = dates
 
 def colors(number: int) -> list[Any]:
     """Return one colour per curve: the default colour for one curve, and dark to light colours for several."""
-    return [SPLINE] if number == 1 else list(time_colors(np.linspace(0, 1, number)))
+    return [SPLINE] if number == 1 else [tuple(own) for own in time_colors(np.linspace(0, 1, number))]
 
 
 def time_colors(share: Any) -> Any:
