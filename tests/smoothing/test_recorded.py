@@ -73,7 +73,7 @@ def test_robust_losses_converge_on_few_irregular_data(loss):
     """Reweighting converges slowly on some, and gaps between bursts may need more smoothing than was chosen."""
     for name in ("r:2", "so:3"):
         for kind in ("uniform", "bursts"):
-            for seed in range(60):
+            for seed in range(24):
                 space, t, _, noisy, _ = recorded(name, kind, 20, 100 + seed, True, sigma=0.01)
                 with warnings.catch_warnings():
                     warnings.simplefilter("ignore", ss.SmoothingWarning)
@@ -406,3 +406,54 @@ def test_three_data_per_period_are_enough_for_these_criteria(options):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ss.SmoothingWarning)
             assert ss.make_smoothing_spline(t, data, "r:3", **options).df > n / 3
+
+
+@pytest.mark.parametrize("name", ["r:2", "sphere:2", "so:3", "se:3", "sphere:2 x r:3"])
+@pytest.mark.parametrize("loss", ["linear", "huber"])
+def test_curves_are_geodesics_before_and_after_their_data(name, loss):
+    """Data with weight in the middle tenth: the curve is that of these data, and the same λ is chosen."""
+    space, rng = ss.space(name), np.random.default_rng(7)
+    n = 1500
+    t = np.cumsum(rng.exponential(0.01, n))
+    points = []
+    for part in getattr(space, "factors", [space]):
+        p = part.random_point(rng)
+        v, w = part.random_tangent(rng, np.stack([p, p]))
+        around = np.sin(t)[:, None] * v.reshape(1, -1) + np.cos(2 * t)[:, None] * w.reshape(1, -1)
+        truth = part.exp(p, 0.4 * around.reshape(n, *p.shape))
+        points.append(part.exp(truth, 0.02 * part.random_tangent(rng, truth)))
+    points = tuple(points) if len(points) > 1 else points[0]
+    rows = slice(700, 850)
+    weights = np.zeros(n)
+    weights[rows] = 1
+    inner = tuple(own[rows] for own in points) if isinstance(points, tuple) else points[rows]
+    alone = ss.make_smoothing_spline(t[rows], inner, space, loss=loss)
+    spline = ss.make_smoothing_spline(t, points, space, weights=weights, loss=loss)
+    np.testing.assert_allclose(spline.lam, alone.lam, rtol=1e-9)
+    np.testing.assert_allclose(spline.df, alone.df, rtol=1e-9)
+    assert np.max(space.distance(spline(t[rows]), alone(t[rows]))) < 1e-9
+    if name != "se:3":
+        # Its geodesics are those of so:3 x r:3 at the knots.
+        np.testing.assert_allclose(spline.speed(t[[0, -1]]), alone.speed(t[[700, 849]]), rtol=1e-9)
+        assert np.max(space.norm(spline(t[:600]), spline(t[:600], 2))) < 1e-4
+    # Standard errors are the same at the data, and grow without them.
+    inside, whole = (own.std(t[[700, 750, 849]]) for own in (alone, spline))
+    np.testing.assert_allclose(whole, inside, rtol=1e-4)
+    grown = np.asarray(spline.std(t[[849, 1000, 1200, 1499]]))
+    assert (np.diff(grown) > 0).all()
+
+
+def test_the_standard_error_of_a_line_grows_as_that_of_its_slope():
+    """Beside the data, positions and velocities are those of least squares for a line."""
+    n = 400
+    t = np.linspace(0, 10, n)
+    x = 0.3 * t + 0.1 * np.random.default_rng(3).normal(size=n)
+    weights = np.where((t > 4) & (t < 5), 1.0, 0.0)
+    line = ss.make_smoothing_spline(t, x[:, None], "r:1", weights=weights, lam=1e6)
+    used = t[weights > 0]
+    spread = np.sum((used - used.mean()) ** 2)
+    far = np.array([0.0, 2.0, 7.0, 10.0])
+    expected = line.sigma * np.sqrt(1 / len(used) + (far - used.mean()) ** 2 / spread)
+    np.testing.assert_allclose(line.std(far), expected, rtol=1e-3)
+    slope, start = np.polyfit(used, x[weights > 0], 1)
+    np.testing.assert_allclose(line(far)[:, 0], start + slope * far, rtol=1e-3)

@@ -38,6 +38,10 @@ pub struct CurveFit<'a> {
     /// Knots.
     pub knots: Vec<f64>,
     positions: Vec<Position>,
+    /// Whether there is a datum at a knot, or in a segment beside it.
+    supported: Vec<bool>,
+    /// Whether the points are the result already, of which only A and its inverse are computed.
+    solved: bool,
     /// Roots of the information matrices.
     roots: Vec<Root>,
     linearized: LinearProblem,
@@ -75,6 +79,11 @@ impl<'a> CurveFit<'a> {
     ) -> Self {
         let &Options { ends, penalty, .. } = options;
         let positions = positions(&knots, data.times);
+        let mut supported = vec![false; knots.len()];
+        for &(segment, position) in &positions {
+            supported[segment] |= position < 1.0;
+            supported[segment + 1] |= position > 0.0;
+        }
         let basis = Basis::new(&knots, ends);
         let unit = penalty.unit(basis.spacing);
         let linearized = LinearProblem::new(basis, &positions, data.weights, penalty);
@@ -93,6 +102,8 @@ impl<'a> CurveFit<'a> {
             roots,
             data,
             positions,
+            supported,
+            solved: false,
             linearized,
             ends,
             robust,
@@ -108,6 +119,46 @@ impl<'a> CurveFit<'a> {
             inverse: None,
             known: None,
             progress: Progress::new(lam.map(|lam| lam / unit), stiffest, density, penalty),
+        }
+    }
+
+    /// The same curve with more knots before and after it. It is continued by geodesics, which the smoothing spline with
+    /// natural ends is beyond its data. [`CurveFit::conclude`] completes it.
+    pub fn prolonged(self, space: &Erased, data: Data<'a>, options: &Options) -> Self {
+        let report = self.report();
+        let failed = matches!(report.state, State::NoCurve | State::Undetermined);
+        let points = if failed {
+            vec![f64::NAN; data.knots.len() * space.point_len()]
+        } else {
+            self.path().prolonged(space, data.knots)
+        };
+        let lam = data.lam.or(Some(report.lam));
+        let given = Data { lam, ..data };
+        let mut long = CurveFit::new(given, space.dim(), data.knots.to_vec(), points, options, self.robust);
+        (long.solved, long.progress.report) = (true, report);
+        long
+    }
+
+    /// Computes A and its inverse from the velocities of a prolonged curve; without them there is no such curve.
+    pub fn conclude(
+        &mut self,
+        space: &Erased,
+        options: &Options,
+        monitor: &Monitor,
+        velocities: Option<Vec<f64>>,
+    ) {
+        let report = self.report();
+        if matches!(report.state, State::NoCurve | State::Undetermined) {
+            return;
+        }
+        let Some(velocities) = velocities else {
+            self.progress.report.state = State::NoCurve;
+            return;
+        };
+        self.velocities = velocities;
+        self.advance(space, options, monitor, true);
+        if self.progress.report.state != State::Undetermined {
+            self.progress.report = report;
         }
     }
 
@@ -157,6 +208,11 @@ impl<'a> CurveFit<'a> {
     /// Whether the last step was within a few standard deviations of the points, and was not taken back.
     pub fn steps_are_short(&self) -> bool {
         self.before.is_some() && self.retreats == 0 && self.progress.report.step < 3.0
+    }
+
+    /// Whether it is the result of [`CurveFit::prolonged`].
+    pub fn is_prolonged(&self) -> bool {
+        self.solved
     }
 
     /// Whether the iteration has ended.
@@ -252,7 +308,7 @@ impl<'a> CurveFit<'a> {
         let inverse = system.mean(&band);
         self.progress.note(&linear, &band, lam, 1.0);
 
-        let exact = self.progress.takes_gauss_newton(space, options.tier);
+        let exact = !self.solved && self.progress.takes_gauss_newton(space, options.tier);
         if exact && self.strays > 0 {
             return self.begin_again();
         }
@@ -270,7 +326,13 @@ impl<'a> CurveFit<'a> {
         } else {
             let change = linear.step(lam, &system);
             let mut step = vec![0.0; linearized.values.len() * m];
-            linearized.values.iter().zip(step.chunks_exact_mut(m)).for_each(|(row, x)| row.apply(&change, x));
+            if !self.solved {
+                linearized
+                    .values
+                    .iter()
+                    .zip(step.chunks_exact_mut(m))
+                    .for_each(|(row, x)| row.apply(&change, x));
+            }
             (step, None)
         };
         let deviations: Vec<f64> = linearized
@@ -304,9 +366,12 @@ impl<'a> CurveFit<'a> {
                 if self.progress.unsettled { State::Unsettled } else { State::Converged };
             return;
         }
-        // Beyond this distance the estimate is not valid.
+        // Beyond this distance the estimate is not valid. In a Euclidean space it is exact, and the curve may have a
+        // long way to go where there are no data.
         let farthest = residuals.distances.iter().copied().fold(0.0, f64::max).sqrt() + 0.1 * reach;
-        let longest = step.chunks_exact(m).map(length).fold(0.0, larger);
+        let flat = space.curvature() == 0.0;
+        let counted = step.chunks_exact(m).zip(&self.supported).filter(|(_, near)| **near || !flat);
+        let longest = counted.map(|(x, _)| length(x)).fold(0.0, larger);
         let further =
             if self.progress.settled { self.progress.further(&step, self.robust.reweighs()) } else { 1.0 };
         let limited = longest * further > farthest;

@@ -41,6 +41,22 @@ fn at_knot((segment, position): Position) -> Option<usize> {
 }
 
 impl Path<'_> {
+    /// Points at increasing times, continued by geodesics beyond the ends.
+    pub fn prolonged(&self, space: &Erased, times: &[f64]) -> Vec<f64> {
+        let len = space.point_len();
+        let last = self.t.len() - 1;
+        let inside: Vec<f64> = times.iter().map(|t| t.clamp(self.t[0], self.t[last])).collect();
+        let points = self.at(space, &positions(self.t, &inside));
+        let mut beyond = vec![0.0; points.len()];
+        for (i, (t, near)) in times.iter().zip(&inside).enumerate() {
+            let end = if *t < *near { 0 } else { last };
+            for c in 0..len {
+                beyond[i * len + c] = (t - near) * self.velocities[end * len + c];
+            }
+        }
+        moved(space, &points, &beyond)
+    }
+
     /// Evaluates positions eight at a time: `visit` receives the group, and the point with derivatives in units of
     /// the segment.
     fn each<S: Scalar>(

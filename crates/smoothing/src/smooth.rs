@@ -3,8 +3,8 @@
 use crate::curve_fit::CurveFit;
 use crate::information;
 use crate::loss;
-use crate::path::{Path, moved, positions};
-use crate::problem::{Data, Ends, Loss, Options, Smooth, State};
+use crate::path::Path;
+use crate::problem::{Data, EndCondition, Ends, Loss, Options, Penalty, Smooth, State};
 use crate::robust::Robust;
 use crate::start::{Level, levels};
 use symspline_core::fit::{
@@ -27,6 +27,42 @@ const PARALLEL: usize = 4096;
 
 /// Smooths curves; they are independent of each other.
 pub fn smooth(space: &Erased, data: &[Data], options: &Options, monitor: &Monitor) -> Vec<Smooth> {
+    let near: Vec<Data> = data.iter().map(|data| near_data(data, options)).collect();
+    let mut tracks: Vec<CurveFit> = solve(space, &near, options, monitor)
+        .into_iter()
+        .zip(data)
+        .map(|(track, data)| {
+            let whole = track.knots.len() == data.knots.len();
+            if whole { track } else { track.prolonged(space, *data, options) }
+        })
+        .collect();
+    let mut long: Vec<&mut CurveFit> = tracks.iter_mut().filter(|track| track.is_prolonged()).collect();
+    if !long.is_empty() && !monitor.cancelled() {
+        let shared: Vec<&CurveFit> = long.iter().map(|track| &**track).collect();
+        let fitted = fit_tracks(space, &shared, options, &LONG_FIT, monitor);
+        let items: Vec<_> = long.iter_mut().zip(fitted).collect();
+        parallel::for_each(items, data.len() > 1, monitor, |(track, velocities)| {
+            track.conclude(space, options, monitor, velocities);
+        });
+    }
+    tracks.into_iter().map(CurveFit::finish).collect()
+}
+
+/// The data with the knots between the first and the last datum, if the curve is a geodesic beyond them.
+///
+/// There, its points are far from determined, and the linearised problem is not valid on the way to them.
+fn near_data<'a>(data: &Data<'a>, options: &Options) -> Data<'a> {
+    let (Ends::Open(kinds), Penalty::Acceleration) = (options.ends, options.penalty) else { return *data };
+    let [Some(first), Some(last)] = [data.times.first(), data.times.last()] else { return *data };
+    let knots = data.knots;
+    let [natural, also] = kinds.map(|kind| kind == EndCondition::Natural);
+    let start = if natural { knots.partition_point(|t| t <= first).saturating_sub(1) } else { 0 };
+    let stop = if also { knots.partition_point(|t| t < last) } else { knots.len() - 1 };
+    if stop <= start { *data } else { Data { knots: &knots[start..=stop.min(knots.len() - 1)], ..*data } }
+}
+
+/// Iterates until all curves have converged or failed.
+fn solve<'a>(space: &Erased, data: &[Data<'a>], options: &Options, monitor: &Monitor) -> Vec<CurveFit<'a>> {
     let len = space.point_len();
     let work: usize = data.iter().map(|d| d.times.len()).sum::<usize>() * space.dim();
     let threads = data.len() > 1 && work > PARALLEL;
@@ -77,7 +113,7 @@ pub fn smooth(space: &Erased, data: &[Data], options: &Options, monitor: &Monito
             none
         })
     });
-    ended.map(CurveFit::finish).collect()
+    ended.collect()
 }
 
 /// The velocities of the splines through the points of curves.
@@ -196,7 +232,7 @@ fn start<'a>(
             let Some(velocities) = velocities else { continue };
             let path = Path { t: &level.times, points: &level.points, velocities: &velocities };
             let knots = data[*c].knots;
-            let mut points = prolonged(space, &path, knots);
+            let mut points = path.prolonged(space, knots);
             if options.ends == Ends::Periodic {
                 let (len, last) = (space.point_len(), points.len() - space.point_len());
                 points.copy_within(..len, last);
@@ -206,21 +242,4 @@ fn start<'a>(
             tracks[*c] = Some(CurveFit::new(own, m, knots.to_vec(), points, options, robust));
         }
     }
-}
-
-/// Points of a curve, continued by geodesics beyond its ends.
-fn prolonged(space: &Erased, path: &Path, times: &[f64]) -> Vec<f64> {
-    let len = space.point_len();
-    let last = path.t.len() - 1;
-    let inside: Vec<f64> = times.iter().map(|t| t.clamp(path.t[0], path.t[last])).collect();
-    let mut points = path.at(space, &positions(path.t, &inside));
-    let mut beyond = vec![0.0; points.len()];
-    for (i, (t, near)) in times.iter().zip(&inside).enumerate() {
-        let end = if *t < *near { 0 } else { last };
-        for c in 0..len {
-            beyond[i * len + c] = (t - near) * path.velocities[end * len + c];
-        }
-    }
-    points = moved(space, &points, &beyond);
-    points
 }
