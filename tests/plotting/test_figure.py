@@ -91,7 +91,10 @@ def check_rates_of_poses(figure, space, curves):
         np.testing.assert_allclose(np.abs(line[200:-200:50, 1]), angles / (2 * step), atol=1e-5)
         moved = np.linalg.norm(after[:, :n, n] - before[:, :n, n], axis=1) / (2 * step)
         np.testing.assert_allclose(other[200:-200:50, 1], moved, atol=1e-5)
-    pairs = [[axes for axes in figure.axes if axes.get_ylabel().startswith(name)] for name in ("its", "acceleration")]
+    pairs = [
+        [axes for axes in figure.axes if axes.get_ylabel().startswith(name)]
+        for name in ("turning accel", "acceleration")
+    ]
     for (first,), (second,) in [pairs]:
         for line, other, curve in zip(lines_of(first), lines_of(second), curves, strict=True):
             norm = space.norm(curve(line[:, 0]), curve(line[:, 0], 2))

@@ -237,7 +237,7 @@ def test_rotation_and_translation_have_panels_of_their_own():
     labels = [axes.get_ylabel() for axes in spline_on("se:3").plot().axes[1:]]
     assert labels == [
         "turning rate\n|ω|, rad/t",
-        "its derivative\n|ω′|, rad/t²",
+        "turning accel.\n|ω′|, rad/t²",
         "speed\n|v|",
         "acceleration\n|v′|",
     ]

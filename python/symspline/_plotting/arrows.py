@@ -12,8 +12,8 @@ from .style import Array
 
 _HEAD = np.array([[0.09, 0.0], [-0.06, 0.065], [-0.025, 0.0], [-0.06, -0.065]])
 """Corners in inches."""
-_SHARES = (0.2, 0.5, 0.8)
-"""Parts of the length of a single curve at which it has arrow heads. Others have one in the middle."""
+_SHARES, _FEW_SHARES = (0.2, 0.5, 0.8), (0.3, 0.7)
+"""Parts of the length at which a single curve has arrow heads, and at which several curves have them."""
 
 
 def draw_arrows(axes: Axes, curve: Curve, positions: Array) -> None:
@@ -27,7 +27,7 @@ def draw_arrows(axes: Axes, curve: Curve, positions: Array) -> None:
     moved = curve.at("speed").max() * (curve.x[-1] - curve.x[0])
     if moved <= 1e-12 * np.abs(curve.points).max() or not total[-1] > 0:
         return
-    at = np.searchsorted(total, np.multiply(_SHARES if curve.alone else (0.5,), total[-1]))
+    at = np.searchsorted(total, np.multiply(_SHARES if curve.alone else _FEW_SHARES, total[-1]))
     (x, y), middles = (steps[at] / lengths[at, None]).T, (positions[at] + positions[at + 1]) / 2
     turns = np.stack([np.stack([x, y], axis=-1), np.stack([-y, x], axis=-1)], axis=1)
     look = {"offsets": middles, "offset_transform": axes.transData, "clip_on": False, "zorder": 4.5}

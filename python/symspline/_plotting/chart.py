@@ -64,7 +64,12 @@ def draw_3d(panel: SubFigure, curves: Sequence[Curve]) -> None:
             _draw_hose(axes, curve, curve.radii)
         curve.draw_line(axes, path)
         curve.draw_dots(axes, curve.given)
-    note(panel, SHADOW)
+    note(panel, SHADOW + leaves_box(paths))
+
+
+def leaves_box(paths: Sequence[Array]) -> str:
+    """Return words about curves that leave the box around their data."""
+    return "; the dashed curve leaves the box" if any(np.isnan(path).any() for path in paths) else ""
 
 
 def _draw_hose(axes: Any, curve: Curve, radii: Array) -> None:

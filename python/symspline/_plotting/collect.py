@@ -25,7 +25,7 @@ MOST = 50
 _FOR_QUANTILES = 200
 """The largest number of curves along the first batch axis from which quantiles and means are computed."""
 _QUANTILE_TIMES = 300
-_SEGMENTS = ["#7b3294", "#a6611a", "#56b4e9", "#cc79a7", "#8a6d00", "#4d4d4d"]
+_SEGMENTS = ["#7b3294", "#56b4e9", "#4d4d4d", "#cc79a7", "#8a6d00", "#a6611a"]
 """Colours of segments, if they are few; other colours than those of components."""
 _SAMPLES = 1200
 _NATURAL: Any = [[("natural", None)] * 2]

@@ -32,7 +32,7 @@ BODY_COLOR = "#cfe0ee"
 
 _SEGMENTS = 3
 """The smallest length of a gap between measurements of several kinds, in median segments."""
-_BEYOND = 0.5
+BEYOND = 0.5
 """How far pictures follow a curve into a long gap, as part of the extent of its data."""
 ALPHA = 0.22
 _ANGLES = np.linspace(0, 2 * np.pi, 24, endpoint=False)
@@ -182,7 +182,7 @@ class Curve:
             return positions
         others = positions[~self.bridges]
         low, high = others.min(axis=0), others.max(axis=0)
-        margin = _BEYOND * (high - low).max()
+        margin = BEYOND * (high - low).max()
         far = np.any((positions < low - margin) | (positions > high + margin), axis=1)
         return np.where((far & self.bridges)[:, None], np.nan, positions)
 
@@ -330,7 +330,7 @@ class Curve:
         label = self.label if self.label and self.label not in known and "linestyle" not in look else LINE
         own: dict[str, Any] = {"color": self.color, "linewidth": width, "zorder": 4, "label": label}
         if self.faint:
-            look = look | {"linewidth": 0.9, "alpha": 0.7, "zorder": 3.2, "label": FAINT}
+            look = look | {"linewidth": 0.8, "alpha": 0.5, "zorder": 3.2, "label": FAINT}
         self.plot_line(axes, positions, **own | look)
 
     def plot_line(self, axes: Axes, positions: Array, **look: Any) -> None:
@@ -368,7 +368,7 @@ class Curve:
         if self.has_nodes and not self.is_mean:
             axes.plot(*positions.T, "o", label=DOTS, **look)
         if self.has_start:
-            look |= {"color": "white", "markeredgewidth": 1.2, "zorder": 6.5}
+            look |= {"color": "white", "markeredgewidth": 1.2, "zorder": 6.5, "markersize": 1.2 * look["markersize"]}
             axes.plot(*positions[:1].T, "o", label=START, **look)
 
 

@@ -14,7 +14,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from .._spaces import HermitianPositiveDefinite, Space, SymmetricPositiveDefinite
-from .curves import DOTS, GAPS, KNOTS, LINE, Curve, draw_graph_of, fill_quantiles, interrupted
+from .curves import BEYOND, DOTS, GAPS, KNOTS, LINE, Curve, draw_graph_of, fill_quantiles, interrupted
 from .style import (
     BOTTOM,
     DISTINCT,
@@ -125,6 +125,8 @@ def draw_graph(panel: SubFigure, curves: Sequence[Curve]) -> None:
     fill_quantiles(axes, curves, lambda at: at("point")[..., 0])
     for curve in curves:
         draw_graph_of(axes, curve, *curve.marked(np.ravel))
+    if axes not in OWN_AXES:
+        _look_at_data(axes, curves, [curve.points for curve in curves])
 
 
 def _draw_angle(angles: Callable[[Any], Array], period: float, panel: SubFigure, curves: Sequence[Curve]) -> None:
@@ -221,8 +223,20 @@ def draw_numbers(
                 curve.draw_dots(axes, positions, color=color, alpha=0.4)
     if axes in OWN_AXES:
         return
+    _look_at_data(axes, curves, [values[:, named] for values, _ in drawn])
     anchor: Any = {"loc": "lower right", "bbox_to_anchor": (1, 1), "borderaxespad": 0}
     legend(axes, handles, labels, rows=rows, handlelength=1.6, **anchor)
+
+
+def _look_at_data(axes: Axes, curves: Sequence[Curve], lines: Sequence[Array]) -> None:
+    """Set the vertical limits so that lines in long gaps, which no data determine, may leave the axes."""
+    if not any(curve.bridges.any() and curve.noise is None for curve in curves):
+        return
+    others = np.concatenate([line[~curve.bridges] for curve, line in zip(curves, lines, strict=True)])
+    low, high = float(others.min()), float(others.max())
+    margin = BEYOND * (high - low)
+    bottom, top = axes.get_ylim()
+    axes.set_ylim(max(bottom, low - margin), min(top, high + margin))
 
 
 def _line(times: Array, values: Array, period: float) -> Array:

@@ -21,7 +21,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from .._quaternions import rotation_rows
-from .chart import SHADOW, box, explain_frames, frame_handles, plane
+from .chart import SHADOW, box, explain_frames, frame_handles, leaves_box, plane
 from .curves import BODIES, BODY, BODY_COLOR, POSES, START, Curve
 from .graphs import draw_numbers
 from .rows import REACH, VIEW, Rows
@@ -158,7 +158,10 @@ def draw_flat_poses(panel: SubFigure, curves: Sequence[Curve]) -> None:
         if len(poses):
             turned = length * BODY[:-1] @ poses[:, :2, :2].swapaxes(1, 2)
             bodies = list(turned + poses[:, None, :2, 2])
-            axes.add_collection(PolyCollection(bodies, zorder=4.5, label=label, **look))
+            axes.add_collection(PolyCollection(bodies, zorder=6.6, label=label, **look))
+            # Where the body is.
+            dot = INK if look["facecolor"] != INK else "white"
+            axes.plot(*poses[:, :2, 2].T, "o", color=dot, markersize=1.8, zorder=6.7, label="_feet")
 
     for curve in curves:
         length = _LENGTH * unit * (1 if curve.alone else 0.6)
@@ -178,7 +181,9 @@ def draw_flat_poses(panel: SubFigure, curves: Sequence[Curve]) -> None:
         if has_bodies:
             free = np.linalg.norm(some[:, None, :2, 2] - given[:, :2, 2], axis=-1) > 2 * length
             some = some[free.all(axis=1)]
-        draw(some, BODIES, facecolor=BODY_COLOR, edgecolor=curve.color, linewidth=0.8)
+        first = int(dense)
+        draw(some[:first], BODIES, facecolor="white", edgecolor=curve.color, linewidth=0.8)
+        draw(some[first:], BODIES, facecolor=BODY_COLOR, edgecolor=curve.color, linewidth=0.8)
     axes.autoscale_view()
 
 
@@ -228,7 +233,7 @@ def draw_poses(panel: SubFigure, curves: Sequence[Curve]) -> None:
     name = "bold: given" if bold == count else f"bold: {bold} of {count} given"
     words = curves[0].legend_of(name, "bold: curve", "light: data")
     explain_frames(panel, axes)
-    note(panel, f"{words}; {SHADOW}")
+    note(panel, f"{words}; {SHADOW}{leaves_box(paths)}")
 
 
 # ---- positive definite matrices ----

@@ -122,7 +122,7 @@ def _rates_of_poses(space: SpecialEuclidean, seconds: bool) -> list[Rate]:
     first, second = ("ω", "ω′") if n == 2 else ("|ω|", "|ω′|")
     rates = [
         Rate(f"turning rate\n{first}, {turn[0]}", 1, turning("velocity"), n == 2),
-        Rate(f"its derivative\n{second}, {turn[1]}", 2, turning("acceleration"), n == 2),
+        Rate(f"turning accel.\n{second}, {turn[1]}", 2, turning("acceleration"), n == 2),
         Rate(f"speed\n|v|{move[0]}", 1, moving("velocity")),
         Rate(f"acceleration\n|v′|{move[1]}", 2, moving("acceleration")),
     ]

@@ -63,7 +63,7 @@ def draw_sphere(panel: SubFigure, curves: Sequence[Curve]) -> None:
     if radius is not None and is_part:
         _draw_scale(axes, radius / 1000)
     if wide and is_part:
-        _draw_locator(panel, axes, view, radius is not None)
+        _draw_locator(panel, axes, view, curves, radius is not None)
     elif wide:
         _draw_map(panel, curves, height, radius is not None)
 
@@ -80,8 +80,8 @@ def _draw_scale(axes: Axes, radius: float) -> None:
     axes.text(middle, above, f"{length:g} km", **look)
 
 
-def _draw_locator(panel: SubFigure, frame: Axes, view: View, has_land: bool) -> None:
-    """Draw a small globe to the right of a frame, with the outline of the frame."""
+def _draw_locator(panel: SubFigure, frame: Axes, view: View, curves: Sequence[Curve], has_land: bool) -> None:
+    """Draw curves on a small globe to the right of a frame, with the outline of the frame."""
     width, _ = size(panel)
     axes = panel.add_axes(inside(panel, width - _LOCATOR + 0.3, 0.6, 0.3, 0.35), label="locator")
     draw_globe(axes, view, 30)
@@ -90,6 +90,10 @@ def _draw_locator(panel: SubFigure, frame: Axes, view: View, has_land: bool) -> 
     (west, east), (south, north) = frame.get_xlim(), frame.get_ylim()
     outline = np.array([[west, south], [east, south], [east, north], [west, north], [west, south]])
     axes.plot(*outline.T, color=MARK, linewidth=1.4, zorder=6, label="_frame")
+    frame.spines[:].set_color(MARK)
+    for curve in curves:
+        if curve.has_line:
+            axes.plot(*view.visible(curve.points).T, color=curve.color, linewidth=0.8, zorder=4)
     if max(east - west, north - south) < 0.15:
         # A small frame would not be seen.
         axes.plot((west + east) / 2, (south + north) / 2, "o", color="none", markeredgecolor=MARK, **_RING)

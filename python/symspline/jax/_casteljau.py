@@ -71,7 +71,7 @@ def evaluate(t: Any, points: Any, velocities: Any, space: Space[Any] | str, x: A
     >>> from symspline.jax import evaluate
     >>> p = jnp.array([[1.0, 0, 0], [0, 1, 0]])
     >>> curve = lambda x: evaluate(jnp.arange(2.0), p, jnp.zeros((2, 3)), "sphere:2", x)
-    >>> jax.jacfwd(jax.jacfwd(curve))(0.5).shape
+    >>> jax.jit(jax.jacfwd(jax.jacfwd(curve)))(0.5).shape
     (3,)
     """
     nu = order_of(nu)

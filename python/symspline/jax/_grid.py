@@ -179,10 +179,11 @@ def grid_evaluate(
 
     Examples
     --------
-    >>> import jax.numpy as jnp
+    >>> import jax, jax.numpy as jnp
     >>> from symspline.jax import grid_evaluate
     >>> points = jnp.array([[[1.0, 0], [0.6, 0.8]], [[0.8, 0.6], [0, 1]]])
-    >>> values, residual = grid_evaluate((None, None), points, "sphere:1", (0.5, [0.2, 0.7]))
+    >>> compiled = jax.jit(lambda points: grid_evaluate((None, None), points, "sphere:1", (0.5, [0.2, 0.7])))
+    >>> values, residual = compiled(points)
     >>> values.shape, residual.shape
     ((2, 2), (2,))
     """
