@@ -141,7 +141,7 @@ def test_the_part_of_a_line_in_a_long_gap_is_light():
     spline = ss.CubicSpline(t, np.stack([t, np.sin(t)], axis=-1), "r:2")
     figure = rendered(spline.plot())
     lines = {line.get_label(): line.get_xydata() for line in figure.axes[0].lines}
-    assert "curve in a long gap" in texts_of(figure)
+    assert "curve in a long gap, cut off far from the data" in texts_of(figure)
     light, bold = lines["_bridge"], lines["_curve"]
     x = np.linspace(0, 23, 2000)
     for line, inside in ((light, (x > 3) & (x < 20)), (bold, (x <= 3) | (x >= 20))):
@@ -152,7 +152,7 @@ def test_the_part_of_a_line_in_a_long_gap_is_light():
         assert distance.min(axis=1).max() < size and distance.min(axis=0).max() < size
     # Neighbours of gaps connect both parts.
     np.testing.assert_array_equal(light[np.isfinite(light).all(axis=1)][[0, -1]], spline(t[[3, 4]]))
-    assert "curve in a long gap" not in texts_of(spline_on("r:2", t=T).plot())
+    assert not any("long gap" in text for text in texts_of(spline_on("r:2", t=T).plot()))
 
 
 @pytest.mark.parametrize("name", ["r:2", "r:3", "se:2", "se:3"])

@@ -229,7 +229,7 @@ def test_boxes_are_filled(name):
     # The scales of the three axes are equal.
     np.testing.assert_allclose(np.ptp(limits, axis=1) / axes._box_aspect, np.ptp(limits[0]) / axes._box_aspect[0])
     words = " ".join(texts_of(figure))
-    assert "grey: shadow on the floor" in words
+    assert "thin: shadow on the floor" in words
     assert ("24 of 40 given" in words) == (name == "se:3")
 
 

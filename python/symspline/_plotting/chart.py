@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import to_rgba
 from matplotlib.figure import SubFigure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
@@ -40,7 +41,7 @@ from .style import (
 
 _PLANE = Hyperbolic(2)
 _ORIGIN = np.array([1.0, 0.0, 0.0])
-SHADOW = "grey: shadow on the floor"
+SHADOW = "thin: shadow on the floor"
 _BESIDE, _UNDER, _ABOVE = 0.45, 0.35, 0.1
 """Margins of a box in inches, which have the labels of its axes."""
 _STEPS = np.multiply.outer(10.0 ** np.arange(-9, 3), [1, 2, 5]).ravel()
@@ -58,18 +59,18 @@ def draw_3d(panel: SubFigure, curves: Sequence[Curve]) -> None:
     """Draw curves in R³ in a box with equal scales, with their shadows on the floor."""
     paths = [curve.near_data(curve.points) for curve in curves]
     shadows = [curve.outside_gaps(path) for curve, path in zip(curves, paths, strict=True)]
-    axes = box(panel, shadows, paths + [curve.given for curve in curves])
+    axes = box(panel, shadows, paths + [curve.given for curve in curves], colors=shadow_colors(curves))
     for curve, path in zip(curves, paths, strict=True):
         if curve.radii is not None:
             _draw_hose(axes, curve, curve.radii)
         curve.draw_line(axes, path)
         curve.draw_dots(axes, curve.given)
-    note(panel, SHADOW + leaves_box(paths))
+    note(panel, SHADOW)
 
 
-def leaves_box(paths: Sequence[Array]) -> str:
-    """Return words about curves that leave the box around their data."""
-    return "; the dashed curve leaves the box" if any(np.isnan(path).any() for path in paths) else ""
+def shadow_colors(curves: Sequence[Curve]) -> list[Any]:
+    """Return the colours of shadows: those of named curves, and grey of others."""
+    return [to_rgba(curve.color, 0.3) if curve.label and not curve.faint else GRID for curve in curves]
 
 
 def _draw_hose(axes: Any, curve: Curve, radii: Array) -> None:
@@ -99,9 +100,14 @@ def plane(panel: SubFigure) -> Axes:
 
 
 def box(
-    panel: SubFigure, lines: Sequence[Array], others: Sequence[Array], margin: float = 0.05, below: float = 0.3
+    panel: SubFigure,
+    lines: Sequence[Array],
+    others: Sequence[Array],
+    margin: float = 0.05,
+    below: float = 0.3,
+    colors: Sequence[Any] = (),
 ) -> Any:
-    """Add a box with equal scales around lines of shape (m, 3), with their shadows on the floor.
+    """Add a box with equal scales around lines of shape (m, 3), with their shadows in given colours on the floor.
 
     The box contains the points ``others``, too. Rows that are NaN are ignored. Its sides are longer than the extent of
     all points by ``margin`` times the longest one at both ends. It fills the panel, of which ``below`` inches at the
@@ -114,10 +120,11 @@ def box(
     half = half or 1.0
     # No side is shorter than a fifth of the longest one.
     sides = np.maximum(np.ptp(everything, axis=0) / 2 + 2 * margin * half, 0.2 * half)
-    for line in lines:
-        look: Any = {"color": GRID, "linewidth": 1.2, "zorder": 2, "label": "_shadow"}
+    for line, color in zip(lines, colors, strict=True):
+        look: Any = {"color": color, "linewidth": 1.2, "zorder": 2, "label": "_shadow"}
         axes.plot(*line.T[:2], np.full(len(line), middle[2] - sides[2]), **look)
     axes.tick_params(color=EDGE, labelcolor=INK, labelsize=points(8) * text_factor(axes), pad=0)
+    axes.tick_params(axis="z", pad=3)
     factor = OWN_AXES.get(axes, 1.0)
     for axis, number, side, name in zip("xyz", middle, sides, "₁₂₃", strict=True):
         getattr(axes, f"set_{axis}lim")(number - side, number + side)

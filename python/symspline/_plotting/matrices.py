@@ -21,7 +21,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from .._quaternions import rotation_rows
-from .chart import SHADOW, box, explain_frames, frame_handles, leaves_box, plane
+from .chart import SHADOW, box, explain_frames, frame_handles, plane, shadow_colors
 from .curves import BODIES, BODY, BODY_COLOR, POSES, START, Curve
 from .graphs import draw_numbers
 from .rows import REACH, VIEW, Rows
@@ -72,7 +72,7 @@ def _draw_rotations(matrices: Callable[[Any], Array], panel: SubFigure, curves: 
 def _turns(matrices: Array, first: Array) -> Array:
     """Return the angles in radians of rotations from a first matrix, shape (m,)."""
     # ‖R − S‖² is 8 sin²(θ/2), and 8 for matrices of different determinants.
-    return 2 * np.arcsin(np.minimum(np.linalg.norm(matrices - first, axis=(1, 2)) / np.sqrt(8), 1))
+    return np.asarray(2 * np.arcsin(np.minimum(np.linalg.norm(matrices - first, axis=(1, 2)) / np.sqrt(8), 1)))
 
 
 def _rotation_vectors(matrices: Array, first: Array) -> Array:
@@ -208,7 +208,7 @@ def draw_poses(panel: SubFigure, curves: Sequence[Curve]) -> None:
         for i in range(3)
     ]
     shadows = [curve.outside_gaps(path) for curve, path in zip(curves, paths, strict=True)]
-    axes = box(panel, shadows, paths + given + tips, 0.02, below=0.45)
+    axes = box(panel, shadows, paths + given + tips, 0.02, below=0.45, colors=shadow_colors(curves))
 
     def draw(poses: Array, length: float, **look: Any) -> None:
         feet = poses[:, :3, 3]
@@ -233,7 +233,7 @@ def draw_poses(panel: SubFigure, curves: Sequence[Curve]) -> None:
     name = "bold: given" if bold == count else f"bold: {bold} of {count} given"
     words = curves[0].legend_of(name, "bold: curve", "light: data")
     explain_frames(panel, axes)
-    note(panel, f"{words}; {SHADOW}{leaves_box(paths)}")
+    note(panel, f"{words}; {SHADOW}")
 
 
 # ---- positive definite matrices ----

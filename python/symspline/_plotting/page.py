@@ -233,7 +233,8 @@ def _explain(figure: Figure, curves: Sequence[Curve], height: float) -> None:
     if BAND in drawn:
         add(Patch(facecolor=few[0].color, alpha=0.22), "95 % band")
     if BRIDGE in drawn:
-        add(Line2D([], [], color=few[0].color, linewidth=1.2, linestyle=(0, (4, 2))), "curve in a long gap")
+        words = "curve in a long gap" + ", cut off far from the data" * (few[0].noise is None)
+        add(Line2D([], [], color=few[0].color, linewidth=1.2, linestyle=(0, (4, 2))), words)
     if GAPS in drawn:
         add(Patch(facecolor=GAP), _lengths(np.unique(np.concatenate([own.gaps for own in few]), axis=0), few[0].axis))
     if LIMIT in drawn:
