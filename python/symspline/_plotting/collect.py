@@ -151,17 +151,20 @@ def _mean_of(
     times.
     """
     space, data, nodes = curve.space, curve._curve, curve._node_times
-    if str(cover_of(space)) not in PATHS or data.times.ndim > 1:
+    if str(cover_of(space)) not in PATHS:
         return None
-    first, x0 = curve.domain[0], float(data.times[0])
-    many = np.union1d(np.linspace(x0, data.times[-1], _QUANTILE_TIMES), data.times)
-    own = Curve(data, first, x0, many, nodes, axis, color or SPLINE, alone, label=label or "mean curve", is_mean=True)
+    first, x0 = np.ravel(curve.domain[0])[0], float(data.times.flat[0])
+    x = data.times.ravel()
+    own = Curve(data, first, x0, x, nodes, axis, color or SPLINE, alone, label=label or "mean curve", is_mean=True)
     batch = _batch_of(curve, own, valid)
-    points = data.evaluate(many, "point", "raise", False).reshape(-1, len(many), *space.point_shape)
-    points = points[valid][:: -(-len(valid) // _FOR_QUANTILES)].swapaxes(0, 1)
+    if batch is None:
+        return None
+    many = np.union1d(batch.x, data.times)
+    points = replace(batch, x=many).at("point").swapaxes(0, 1)
     try:
         means = space.mean(points)
-    except (ConvergenceError, CutLocusError):
+    except (ConvergenceError, CutLocusError, ValidationError):
+        # Points of hyperbolic space that are far away are rounded off it.
         return None
     spread = np.quantile(space.distance(means[:, None], points), 0.95, axis=1)
     if np.median(spread) > 0.5 * space.distance(means[0], means).max():
