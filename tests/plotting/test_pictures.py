@@ -260,3 +260,17 @@ def test_small_curve_on_the_half_sphere_is_enlarged():
     assert np.ptp(axes.get_xlim()) < 0.2
     (line,) = [line for line in lines_of(axes) if len(line) > 1000 and np.isfinite(line).all()]
     assert np.linalg.norm(np.diff(line, axis=0), axis=1).max() < 0.01
+
+
+@pytest.mark.parametrize(
+    ("size", "is_part"), [((20, 20), True), ((60, 30), True), ((20, 80), False), ((120, 30), False)]
+)
+def test_curves_are_enlarged_if_the_frame_is_on_the_globe(size, is_part):
+    lon, lat = np.transpose([[0, 0], [0.5, 0.8], [1, 1]]) * np.reshape(size, (2, 1))
+    spline = ss.CubicSpline(None, from_lonlat(lon - size[0] / 2, lat - size[1] / 2), "sphere:2")
+    figure = rendered(spline.plot())
+    assert any(axes.get_label() == "locator" for axes in figure.axes) == is_part
+    assert any(axes.get_label() == "map" for axes in figure.axes) != is_part
+    if is_part:
+        corners = np.abs([figure.axes[0].get_xlim(), figure.axes[0].get_ylim()]).max(axis=1)
+        assert np.linalg.norm(corners) < 1

@@ -214,15 +214,18 @@ def _draw_globe(panel: SubFigure, points: Array, look: _Globe, above: Array | No
         else:
             side = min(width, height)
             right, top = width - side + 0.2, height - side + 0.65
-        axes = panel.add_axes(inside(panel, 0.95, 0.5, right, top))
         flat = view.flat(points)
         middle, _ = window(flat, 1.0)
         ratio = (width - 0.95 - right) / (height - 0.5 - top)
         across, high = 0.61 * np.ptp(flat, axis=0)
         high = max(high, across / ratio)
-        draw_frame(axes, view, middle, np.array([ratio * high, high]))
-        axes.tick_params(labelsize=8)
-        return axes, view, True
+        half = np.array([ratio * high, high])
+        # The corners of the frame must be on the globe.
+        if np.linalg.norm(np.abs(middle) + half) < 1:
+            axes = panel.add_axes(inside(panel, 0.95, 0.5, right, top))
+            draw_frame(axes, view, middle, half)
+            axes.tick_params(labelsize=8)
+            return axes, view, True
     lon, lat = middle_of(points if above is None else above)
     view = View.above(lon, float(np.clip(lat, *look.lats)))
     axes = panel.add_axes(inside(panel, 0.1, look.below, look.right, 0.1))
