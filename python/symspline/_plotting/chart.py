@@ -25,8 +25,10 @@ from .style import (
     EDGE,
     GRID,
     INK,
+    LEFT,
     OWN_AXES,
     PAPER,
+    RIGHT,
     Array,
     closest,
     inside,
@@ -42,7 +44,7 @@ from .style import (
 _PLANE = Hyperbolic(2)
 _ORIGIN = np.array([1.0, 0.0, 0.0])
 SHADOW = "thin: shadow on the floor"
-_BESIDE, _UNDER, _ABOVE = 0.45, 0.35, 0.1
+_BESIDE, _UNDER, _ABOVE = 0.6, 0.35, 0.1
 """Margins of a box in inches, which have the labels of its axes."""
 _STEPS = np.multiply.outer(10.0 ** np.arange(-9, 3), [1, 2, 5]).ravel()
 
@@ -93,7 +95,10 @@ def _draw_hose(axes: Any, curve: Curve, radii: Array) -> None:
 
 def plane(panel: SubFigure) -> Axes:
     """Add axes with equal scales."""
-    axes = panel.add_axes(inside(panel, 0.8, 0.55, 0.25, 0.2), xlabel="x₁", ylabel="x₂")
+    width, height = size(panel)
+    # The edges of wide axes are those of the rates below.
+    left, right = (LEFT, RIGHT) if width > 1.5 * height else (0.8, 0.25)
+    axes = panel.add_axes(inside(panel, left, 0.55, right, 0.2), xlabel="x₁", ylabel="x₂")
     plain(axes)
     axes.set_aspect("equal", adjustable="datalim")
     return axes
@@ -114,6 +119,8 @@ def box(
     bottom stay empty.
     """
     axes: Any = panel.add_axes((0, 0, 1, 1), projection="3d", facecolor="none")
+    # Markers of both ends are in front of lines. Surfaces hide what is behind them.
+    axes.computed_zorder = not lines
     everything = np.concatenate([*lines, *others])
     everything = everything[np.isfinite(everything[:, 0])]
     middle, half = window(everything, 1.0)
@@ -125,6 +132,7 @@ def box(
         axes.plot(*line.T[:2], np.full(len(line), middle[2] - sides[2]), **look)
     axes.tick_params(color=EDGE, labelcolor=INK, labelsize=points(8) * text_factor(axes), pad=0)
     axes.tick_params(axis="z", pad=3)
+    axes.zaxis.labelpad = 1
     factor = OWN_AXES.get(axes, 1.0)
     for axis, number, side, name in zip("xyz", middle, sides, "₁₂₃", strict=True):
         getattr(axes, f"set_{axis}lim")(number - side, number + side)
@@ -134,7 +142,7 @@ def box(
         wall.pane.set_edgecolor(GRID)
         wall.line.set_color(EDGE)
         wall._axinfo["grid"].update(color=GRID, linewidth=0.6)
-        wall.set_major_locator(MaxNLocator(max(1 + (factor == 1), round(5 * factor * side / sides.max()))))
+        wall.set_major_locator(MaxNLocator(max(1 + 2 * (factor == 1), round(5 * factor * side / sides.max()))))
         wall.label.set(text=f"x{name}", color=INK, fontsize=points(10))
     # Flat boxes are seen from farther above. Choose the direction from which the curve looks widest.
     angles = np.radians([-60, -30, 30, 60])

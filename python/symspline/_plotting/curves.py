@@ -25,14 +25,14 @@ _NO_GAPS: Array = np.empty((0, 2))
 # Labels of artists that the legend of a page explains. Those with an underscore are not in legends of matplotlib.
 LINE, DOTS, START, DATA_DOTS, FAINT = "_curve", "_given", "_start", "_data", "_others"
 QUANTILES, BAND, BRIDGE, GAPS, POSES, BODIES = "_quantiles", "band", "_bridge", "gaps", "_poses", "_bodies"
-KNOTS = "_knots"
+KNOTS, END = "_knots", "_end"
 BODY: Array = np.array([[1.0, 0.0], [-0.7, 0.55], [-0.35, 0.0], [-0.7, -0.55], [1.0, 0.0]])
 """A body in the plane that points along its first axis."""
 BODY_COLOR = "#cfe0ee"
 
 _SEGMENTS = 3
 """The smallest length of a gap between measurements of several kinds, in median segments."""
-BEYOND = 0.5
+BEYOND = 0.15
 """How far pictures follow a curve into a long gap, as part of the extent of its data."""
 ALPHA = 0.22
 _ANGLES = np.linspace(0, 2 * np.pi, 24, endpoint=False)
@@ -368,8 +368,12 @@ class Curve:
         if self.has_nodes and not self.is_mean:
             axes.plot(*positions.T, "o", label=DOTS, **look)
         if self.has_start:
-            look |= {"color": "white", "markeredgewidth": 1.2, "zorder": 6.5, "markersize": 1.2 * look["markersize"]}
+            look |= {"color": "white", "markeredgewidth": 1.4, "zorder": 6.5, "markersize": 1.3 * look["markersize"]}
             axes.plot(*positions[:1].T, "o", label=START, **look)
+        if positions.shape[1] == 3 and len(positions):
+            # Curves in space have no arrow heads.
+            look |= {"color": color, "markeredgecolor": "white", "markeredgewidth": 1.0, "zorder": 6.6}
+            axes.plot(*positions[-1:].T, "s", label=END, **look | {"markersize": max(7.0, look["markersize"])})
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ of the eigenvalues: one standard deviation, if the matrices are covariances.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from textwrap import fill
 from typing import Any
@@ -174,7 +175,9 @@ def draw_flat_poses(panel: SubFigure, curves: Sequence[Curve]) -> None:
             draw(given[:1], START, facecolor="white", edgecolor=edge)
         else:
             small = float(np.clip(22 / np.sqrt(max(len(given), 1)), 1.5, 4.0))
-            curve.draw_dots(axes, given[:, :2, 2], markersize=small)
+            # The first of the given poses is a body.
+            dots = replace(curve, has_start=not curve.has_nodes)
+            dots.draw_dots(axes, given[:, :2, 2], markersize=small)
         way = float(np.sum(np.linalg.norm(np.diff(path, axis=0), axis=1)))
         dense = curve.noise is None and curve.has_nodes and not has_bodies
         some = _apart(given if dense else curve.points[~curve.bridges], max(4 * length, way * len(curves) / _MANY))
@@ -182,7 +185,7 @@ def draw_flat_poses(panel: SubFigure, curves: Sequence[Curve]) -> None:
             free = np.linalg.norm(some[:, None, :2, 2] - given[:, :2, 2], axis=-1) > 2 * length
             some = some[free.all(axis=1)]
         first = int(dense)
-        draw(some[:first], BODIES, facecolor="white", edgecolor=curve.color, linewidth=0.8)
+        draw(some[:first], START, facecolor="white", edgecolor=curve.color, linewidth=0.8)
         draw(some[first:], BODIES, facecolor=BODY_COLOR, edgecolor=curve.color, linewidth=0.8)
     axes.autoscale_view()
 

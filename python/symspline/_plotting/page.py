@@ -23,6 +23,7 @@ from .curves import (
     BRIDGE,
     DATA_DOTS,
     DOTS,
+    END,
     FAINT,
     GAPS,
     KNOTS,
@@ -216,9 +217,12 @@ def _explain(figure: Figure, curves: Sequence[Curve], height: float) -> None:
             add(Line2D([], [], color=curve.color, linewidth=2, **look), curve.label)
     color = INK if few[0].alone else DATA
     body: dict[str, Any] = {"linestyle": "none", "marker": BODY, "markersize": 10, "markeredgecolor": few[0].color}
+    some_of_many = BODIES in drawn and POSES not in drawn and few[0].noise is None and few[0].has_nodes
     if START in drawn:
-        look = body if POSES in drawn else dot | {"markeredgewidth": 1.2}
+        look = body if POSES in drawn or some_of_many else dot | {"markeredgewidth": 1.2}
         add(Line2D([], [], **look | {"color": "white", "markeredgecolor": color}), "start")
+    if END in drawn:
+        add(Line2D([], [], **dot | {"marker": "s", "color": color}), "end")
     if DOTS in drawn:
         add(Line2D([], [], color=color, **dot), "given points")
     if KNOTS in drawn:
@@ -226,8 +230,7 @@ def _explain(figure: Figure, curves: Sequence[Curve], height: float) -> None:
     if POSES in drawn:
         add(Line2D([], [], **body | {"markeredgecolor": color, "color": color}), "given poses")
     if BODIES in drawn:
-        few_of_many = few[0].noise is None and few[0].has_nodes and POSES not in drawn
-        add(Line2D([], [], **body, color=BODY_COLOR), "some of the poses" if few_of_many else "poses of the curve")
+        add(Line2D([], [], **body, color=BODY_COLOR), "some of the poses" if some_of_many else "poses of the curve")
     if DATA_DOTS in drawn:
         add(Line2D([], [], color=DATA, **dot), "data")
     if BAND in drawn:
