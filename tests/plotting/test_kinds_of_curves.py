@@ -141,7 +141,7 @@ def test_the_part_of_a_line_in_a_long_gap_is_light():
     spline = ss.CubicSpline(t, np.stack([t, np.sin(t)], axis=-1), "r:2")
     figure = rendered(spline.plot())
     lines = {line.get_label(): line.get_xydata() for line in figure.axes[0].lines}
-    assert "curve in a long gap, cut off far from the data" in texts_of(figure)
+    assert "curve in a long gap, cut off" in texts_of(figure)
     light, bold = lines["_bridge"], lines["_curve"]
     x = np.linspace(0, 23, 2000)
     for line, inside in ((light, (x > 3) & (x < 20)), (bold, (x <= 3) | (x >= 20))):
@@ -167,13 +167,16 @@ def test_pictures_are_not_as_large_as_a_curve_in_a_long_gap(name):
         points[:, :-1, -1] = path
     spline = ss.CubicSpline(t, points, space)
     far = np.abs(spline(np.linspace(3, 60, 50))).max()
-    axes = rendered(spline.plot()).axes[0]
+    figure = rendered(spline.plot())
+    axes = figure.axes[0]
     assert far > 8
     assert all(np.abs(getattr(axes, f"get_{k}lim")()).max() < 5 for k in axes._axis_map)
-    bridge = next(line for line in axes.lines if line.get_label() == "_bridge")
-    ends = np.stack(bridge.get_data_3d() if name.endswith("3") else bridge.get_data(), axis=1)
-    ends = ends[np.isfinite(ends).all(axis=1)][[0, -1]]
-    np.testing.assert_allclose(ends, path[[3, 4]], atol=1e-12)
+    bridges = [line for line in axes.lines if line.get_label() == "_bridge"]
+    drawn = [np.stack(line.get_data_3d() if name.endswith("3") else line.get_data(), axis=1) for line in bridges]
+    finite = np.concatenate([own[np.isfinite(own).all(axis=1)] for own in drawn])
+    for node in path[[3, 4]]:
+        assert np.linalg.norm(finite - node, axis=1).min() < 1e-12
+    assert ("after the first gap" in texts_of(figure)) == name.endswith("3")
 
 
 @pytest.mark.parametrize(

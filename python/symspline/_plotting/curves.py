@@ -25,10 +25,12 @@ _NO_GAPS: Array = np.empty((0, 2))
 # Labels of artists that the legend of a page explains. Those with an underscore are not in legends of matplotlib.
 LINE, DOTS, START, DATA_DOTS, FAINT = "_curve", "_given", "_start", "_data", "_others"
 QUANTILES, BAND, BRIDGE, GAPS, POSES, BODIES = "_quantiles", "band", "_bridge", "gaps", "_poses", "_bodies"
-KNOTS, END = "_knots", "_end"
+KNOTS, END, AFTER = "_knots", "_end", "_after"
 BODY: Array = np.array([[1.0, 0.0], [-0.7, 0.55], [-0.35, 0.0], [-0.7, -0.55], [1.0, 0.0]])
 """A body in the plane that points along its first axis."""
 BODY_COLOR = "#cfe0ee"
+AFTER_COLOR = "#6aa5d8"
+"""Colour of curves in space after their first long gap."""
 
 _SEGMENTS = 3
 """The smallest length of a gap between measurements of several kinds, in median segments."""
@@ -331,6 +333,13 @@ class Curve:
         own: dict[str, Any] = {"color": self.color, "linewidth": width, "zorder": 4, "label": label}
         if self.faint:
             look = look | {"linewidth": 0.8, "alpha": 0.5, "zorder": 3.2, "label": FAINT}
+        if positions.shape[1] == 3 and self.alone and self.color == SPLINE and len(self.gaps):
+            # Without a time axis, the parts before and after a gap could not be distinguished.
+            after = (self.times >= self.gaps[0, 1])[:, None]
+            self.plot_line(
+                axes, np.where(after, positions, np.nan), **own | {"color": AFTER_COLOR, "label": AFTER} | look
+            )
+            positions = np.where(after, np.nan, positions)
         self.plot_line(axes, positions, **own | look)
 
     def plot_line(self, axes: Axes, positions: Array, **look: Any) -> None:

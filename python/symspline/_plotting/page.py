@@ -16,6 +16,8 @@ from .._spaces import Product, cover_of, factors_of
 from . import residuals
 from .collect import axis_of, curves_of
 from .curves import (
+    AFTER,
+    AFTER_COLOR,
     BAND,
     BODIES,
     BODY,
@@ -235,8 +237,10 @@ def _explain(figure: Figure, curves: Sequence[Curve], height: float) -> None:
         add(Line2D([], [], color=DATA, **dot), "data")
     if BAND in drawn:
         add(Patch(facecolor=few[0].color, alpha=0.22), "95 % band")
+    if AFTER in drawn:
+        add(Line2D([], [], color=AFTER_COLOR, linewidth=2), "after the first gap")
     if BRIDGE in drawn:
-        words = "curve in a long gap" + ", cut off far from the data" * (few[0].noise is None)
+        words = "curve in a long gap" + ", cut off" * (few[0].noise is None)
         add(Line2D([], [], color=few[0].color, linewidth=1.2, linestyle=(0, (4, 2))), words)
     if GAPS in drawn:
         add(Patch(facecolor=GAP), _lengths(np.unique(np.concatenate([own.gaps for own in few]), axis=0), few[0].axis))
