@@ -10,7 +10,7 @@ from ._arrays import as_array, short_repr, whole_number
 from ._core import ValidationError
 from ._curves.ends import is_closed
 from ._curves.fit import Fit, FitProblem, Problem, curve_of, moved_ends, read, read_ends
-from ._curves.solve import Options
+from ._curves.solve import DEFAULTS
 from ._input import times_of
 from ._report import INTEGERS, NUMBERS, Columns
 from ._spaces import Array, Doubles, Product, Quotient, Space, factors_of, parts_of
@@ -22,7 +22,6 @@ _UNKNOWN = slice(NUMBERS.index("invariant_radius"), NUMBERS.index("alternative_e
 _LARGEST = ("residual", "max_step", "velocity_error")
 _MAXIMA = np.array([[name != "rate"] for name in NUMBERS])
 _CONVERGED = INTEGERS.index("converged")
-_OPTIONS = Options("auto", 1e-12, None)
 
 
 class Local(NamedTuple):
@@ -66,7 +65,7 @@ def local_fit(spline: Any, t: TimesLike, points: Any, lag: int | None) -> Local:
     shown = np.concatenate([spline._t, new_t], axis=-1)
     times = spline._time_axis.knots(shown)
     last, names = np.ascontiguousarray(times[..., kept:]), range(kept, times.shape[-1])
-    return Local(shown, times, Problem(space, last, data, ends, _OPTIONS, names=names), kept)
+    return Local(shown, times, Problem(space, last, data, ends, DEFAULTS, names=names), kept)
 
 
 def _with_new(space: Space[Any], parts: Any, points: Any, batch: tuple[int, ...], kept: int, count: int | None) -> Any:

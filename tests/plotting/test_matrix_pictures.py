@@ -299,3 +299,12 @@ def test_imaginary_parts_are_dashed():
     for i in range(4):
         drawn = lines[2 * i].get_ydata() + 1j * lines[2 * i + 1].get_ydata()
         np.testing.assert_allclose(drawn, entries[:, i], atol=1e-12)
+
+
+def test_rotation_vectors_are_those_of_scipy_up_to_half_a_turn():
+    first = Rotation.from_rotvec([0.3, 2.0, -0.4])
+    axes = np.random.default_rng(1).normal(size=(7, 3))
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    vectors = axes * np.array([0, 1e-9, 0.1, 1.5, 1.6, 2.5, 3.1])[:, None]
+    found = pictures._rotation_vectors((Rotation.from_rotvec(vectors) * first).as_matrix(), first.as_matrix())
+    np.testing.assert_allclose(found, vectors, atol=1e-12, rtol=1e-6)

@@ -40,7 +40,7 @@ pub struct CurveFit<'a> {
     positions: Vec<Position>,
     /// Whether there is a datum at a knot, or in a segment beside it.
     supported: Vec<bool>,
-    /// Whether the points are the result already, of which only A and its inverse are computed.
+    /// Whether the points are already those of the result, so that only A and its inverse are computed.
     solved: bool,
     /// Roots of the information matrices.
     roots: Vec<Root>,

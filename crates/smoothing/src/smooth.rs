@@ -50,14 +50,14 @@ pub fn smooth(space: &Erased, data: &[Data], options: &Options, monitor: &Monito
 
 /// The data with the knots between the first and the last datum, if the curve is a geodesic beyond them.
 ///
-/// There, its points are far from determined, and the linearised problem is not valid on the way to them.
+/// Data hardly determine its points there, and the iteration would diverge on curved spaces.
 fn near_data<'a>(data: &Data<'a>, options: &Options) -> Data<'a> {
     let (Ends::Open(kinds), Penalty::Acceleration) = (options.ends, options.penalty) else { return *data };
     let [Some(first), Some(last)] = [data.times.first(), data.times.last()] else { return *data };
     let knots = data.knots;
-    let [natural, also] = kinds.map(|kind| kind == EndCondition::Natural);
-    let start = if natural { knots.partition_point(|t| t <= first).saturating_sub(1) } else { 0 };
-    let stop = if also { knots.partition_point(|t| t < last) } else { knots.len() - 1 };
+    let natural = kinds.map(|kind| kind == EndCondition::Natural);
+    let start = if natural[0] { knots.partition_point(|t| t <= first).saturating_sub(1) } else { 0 };
+    let stop = if natural[1] { knots.partition_point(|t| t < last) } else { knots.len() - 1 };
     if stop <= start { *data } else { Data { knots: &knots[start..=stop.min(knots.len() - 1)], ..*data } }
 }
 

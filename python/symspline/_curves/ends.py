@@ -16,7 +16,7 @@ End = tuple[str, Doubles | None]
 
 _WORDS = {"natural", "clamped", "not-a-knot"}
 _ORDERS = {1: "velocity", 2: "acceleration"}
-_NATURAL: list[End] = [("natural", None), ("natural", None)]
+NATURAL: list[End] = [("natural", None), ("natural", None)]
 _HELP = (
     "bc_type must be 'natural', 'clamped', 'not-a-knot' or 'periodic', or a pair with one of 'natural', 'clamped', "
     "'not-a-knot', (1, velocity), (2, acceleration), [(1, velocity), (2, acceleration)] for either end"
@@ -29,7 +29,7 @@ def ends_of(bc_type: Any, space: Space, batch: tuple[int, ...]) -> list[End] | N
         if bc_type == "periodic":
             return None
         if bc_type == "natural":
-            return _NATURAL
+            return NATURAL
         bc_type = (bc_type, bc_type)
     return [_end(name, word, vector, space, batch) for name, word, vector in split_ends(bc_type)]
 

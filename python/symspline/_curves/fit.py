@@ -26,7 +26,7 @@ from ..manifolds import Manifold
 from ..manifolds._checks import hermite_on_manifold
 from ..manifolds._on_manifold import OnManifold
 from .curve import CoreCurve, CurveArrays, ProductCurve, share
-from .ends import End, ends_in_factors, ends_of, is_closed, split_ends
+from .ends import NATURAL, End, ends_in_factors, ends_of, is_closed, split_ends
 from .reduced import ReducedCurve
 from .solve import Mask, Options, Solved, Task, solve, solve_single, without
 
@@ -35,7 +35,6 @@ _Times = TypeVar("_Times")
 _Data = TypeVar("_Data")
 # Options for a validation, which has no solver.
 _ANY = Options("auto", 0.0, None)
-_NATURAL: list[End] = [("natural", None), ("natural", None)]
 
 
 class Points(NamedTuple):
@@ -382,7 +381,7 @@ def hermite_data(
     def checked(factor: Space, own: tuple[Points, tuple[Array, float]]) -> tuple[Array, Array, Array]:
         part, (vectors, tangent_tol) = own
         if isinstance(factor, Manifold):
-            task = Task(cover_of(factor), times, part.numbers, _NATURAL, part.tol)
+            task = Task(cover_of(factor), times, part.numbers, NATURAL, part.tol)
             return *hermite_on_manifold(task, vectors), np.full(math.prod(part.batch), np.inf)
         doubles = factor._as_doubles(vectors)
         found, tangent, longest = _core.hermite(factor._handle, times, part.numbers, doubles, part.tol, tangent_tol)
@@ -462,7 +461,7 @@ def _check_precision(problem: ManyProblem) -> list[Fault]:
                 continue
             # Invalid times are an error in any case, which is raised later.
             knots = np.arange(len(times[number]), dtype=float)
-            task = Task(factor, knots, own[i].numbers, _NATURAL, own[i].tol)
+            task = Task(factor, knots, own[i].numbers, NATURAL, own[i].tol)
             try:
                 kind_of(factor).validate(task, _ANY)
             except ValidationError as error:

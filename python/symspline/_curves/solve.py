@@ -30,6 +30,9 @@ class Options(NamedTuple):
     max_iter: int | None
 
 
+DEFAULTS = Options("auto", 1e-12, None)
+
+
 class Task(NamedTuple):
     """Points to interpolate in a space that is not a product.
 

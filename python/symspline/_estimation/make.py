@@ -12,7 +12,7 @@ from .._core import ValidationError
 from .._curve import Curve
 from .._curves.fit import FitProblem, fit, read_ends
 from .._curves.fit import Points as CorePoints
-from .._curves.solve import Options
+from .._curves.solve import DEFAULTS
 from .._errors import raise_or_warn
 from .._faults import UNCONVERGED, Fault
 from .._input import times_of
@@ -55,7 +55,6 @@ from .spline import EstimatedSpline, joint
 from .start import initial_points
 from .terms import Term, bind
 
-_FIT = Options("auto", 1e-12, None)
 # Automatic knots: the first number of them, per degree of freedom, and how often they are chosen.
 _FIRST, _PER_FREEDOM, _TRIES = 60, 4, 4
 # If residuals exceed their standard deviations by the first factor, there are so many times more knots in the next try.
@@ -457,7 +456,7 @@ def _curve(
         doubles = np.ascontiguousarray(factor._as_doubles(join(factor, own)))
         parts.append(CorePoints(doubles, 0.0, (), len(setup.knots)))
         ends.append(read_ends(setup.bc_type, factor, ())[0])
-    through = fit(FitProblem(space, setup.knots, parts, ends, _FIT, check=False))
+    through = fit(FitProblem(space, setup.knots, parts, ends, DEFAULTS, check=False))
     band, side, corner = found.matrices
     size, first, smoothed = sum(own.dim for own in setup.spaces), 0, []
     for part, report in zip(setup.spaces, found.reports, strict=True):

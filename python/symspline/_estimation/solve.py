@@ -14,7 +14,7 @@ from .._arrays import short_repr
 from .._core import ValidationError
 from .._curves.curve import CoreCurve
 from .._curves.fit import FitProblem, Points, fit, read_ends
-from .._curves.solve import Options
+from .._curves.solve import DEFAULTS
 from .._smoothing.posterior import frames_at
 from .._smoothing.report import SmoothingReport
 from .._spaces import Array, Doubles, Space
@@ -22,7 +22,6 @@ from .along import Motion
 from .measurements import Constant
 from .terms import Linearised, Term, Values
 
-_FIT = Options("auto", 1e-12, None)
 # λ has converged if its logarithm changes by less than the first number; after so many rounds it is kept.
 _SETTLED, _ROUNDS = 3e-3, 12
 # Steps of more standard deviations than this lead from a linearisation that is not yet informative about λ.
@@ -195,7 +194,7 @@ def fitted(setup: Setup, points: list[Array]) -> list[CoreCurve] | None:
     for space, rows in zip(setup.spaces, points, strict=True):
         data = Points(np.ascontiguousarray(space._as_doubles(rows)), 0.0, (), len(setup.knots))
         ends = read_ends(setup.bc_type, space, ())
-        found = fit(FitProblem(space, setup.knots, [data], ends, _FIT, check=False))
+        found = fit(FitProblem(space, setup.knots, [data], ends, DEFAULTS, check=False))
         if any(fault.failed for fault in found.faults):
             return None
         curves.append(found.curve)

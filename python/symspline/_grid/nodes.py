@@ -9,14 +9,13 @@ import numpy as np
 
 from .._arrays import refuse
 from .._core import CutLocusError, ValidationError
+from .._curves.ends import NATURAL
 from .._curves.fit import Points, validated
 from .._report import FarPointsWarning
 from .._representatives import FAR, cut_fractions
 from .._spaces import Array, Quotient, Space, cover_of, factors_of, parts_of, point_tol
 from .._warnings import warn
 from .axes import GridAxis
-
-_NATURAL: Any = [("natural", None), ("natural", None)]
 
 
 def read_nodes(points: Any, space: Space[Any], dims: int) -> tuple[list[Array], list[float], tuple[int, ...]]:
@@ -80,7 +79,7 @@ def _on_space(space: Space[Any], points: Array, tol: float, nodes: Array) -> Arr
     rows = np.ascontiguousarray(np.repeat(points, 2, axis=0) if single else points)
     data = Points(space._as_doubles(rows), tol, (), len(rows))
     try:
-        (found,), _ = validated(space, np.arange(float(len(rows))), [data], [_NATURAL])
+        (found,), _ = validated(space, np.arange(float(len(rows))), [data], [NATURAL])
     except ValidationError as error:
         node: Any = vars(error).get("node")
         if node is None or (node >= len(nodes) and not single):

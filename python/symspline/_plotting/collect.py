@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._core import ConvergenceError, CutLocusError, ValidationError
+from .._curves.ends import NATURAL
 from .._curves.fit import FitProblem, fit, read
-from .._curves.solve import Options
+from .._curves.solve import DEFAULTS
 from .._spaces import Product, Space, cover_of, parts_of
 from .curves import SECOND, Axis, Batch, Curve
 from .figure import PATHS
@@ -28,8 +29,6 @@ _QUANTILE_TIMES = 300
 _SEGMENTS = ["#7b3294", "#56b4e9", "#4d4d4d", "#cc79a7", "#8a6d00", "#a6611a"]
 """Colours of segments, if they are few; other colours than those of components."""
 _SAMPLES = 1200
-_NATURAL: Any = [[("natural", None)] * 2]
-_FIT = Options("auto", 1e-12, None)
 """Samples of a curve with few segments."""
 _FAR = 1e3
 """An axis counts from a number if the first time is larger than this multiple of the time span."""
@@ -145,10 +144,10 @@ def _drawn(one: Any, noise_beside: Any, index: Any, axis: Axis, look: dict[str, 
 def _mean_of(
     curve: Any, valid: NDArray[np.bool_], axis: Axis, color: Any, label: str | None, alone: bool
 ) -> Curve | None:
-    """Return the curve through the Karcher means of a batch at many times; None unless the batch is close to it.
+    """Return the curve through the Karcher means of a batch, or None if the batch is not close to it.
 
-    It is, if the distance that contains 95 % of the curves is less than half the extent of the mean, at half of the
-    times.
+    A batch is close to its mean if, at half of the times, 95 % of the curves are nearer to the mean than half of the
+    extent of the mean curve.
     """
     space, data, nodes = curve.space, curve._curve, curve._node_times
     if str(cover_of(space)) not in PATHS:
@@ -170,7 +169,7 @@ def _mean_of(
     if np.median(spread) > 0.5 * space.distance(means[0], means).max():
         return None
     x, _ = samples(data.times, np.empty((0, 2)))
-    problem = FitProblem(space, many, read(means, space), _NATURAL, _FIT)
+    problem = FitProblem(space, many, read(means, space), [NATURAL], DEFAULTS)
     return replace(own, data=fit(problem).curve, x=x, batch=batch)
 
 

@@ -343,7 +343,7 @@ class Curve:
         self.plot_line(axes, positions, **own | look)
 
     def plot_line(self, axes: Axes, positions: Array, **look: Any) -> None:
-        """Draw a line with a given look, thin and dashed in long gaps, for animations to find it."""
+        """Draw a line, thin and dashed in long gaps, and mark it for animations."""
         if len(positions) == len(self.x) and self.bridges.any() and not self.faint:
             # One sample on both sides connects the parts.
             near = self.bridges.copy()
@@ -423,7 +423,7 @@ def short_name(space: Space[Any]) -> str:
 
 
 def title_on(what: str, space: Space[Any], most: int = 63) -> str:
-    """Return the title of a figure, with the name of a space; a short one of products, and if there is no space."""
+    """Return the title of a figure. Products and long titles have the short name of the space."""
     title = f"{what} on {space!r}"
     if isinstance(space, Product) or len(title) > most:
         title = f"{what} on {short_name(space)}"

@@ -77,11 +77,12 @@ def _turns(matrices: Array, first: Array) -> Array:
 
 
 def _rotation_vectors(matrices: Array, first: Array) -> Array:
-    """Return the rotation vectors of rotations by less than a right angle from a first matrix, shape (m, 3)."""
+    """Return the rotation vectors of rotations from a first matrix, shape (m, 3)."""
     steps = matrices @ first.T
     twice = np.stack([steps[:, k - 1, k - 2] - steps[:, k - 2, k - 1] for k in range(3)], axis=-1)
     sines = np.linalg.norm(twice, axis=1, keepdims=True) / 2
-    return np.asarray(twice / 2 / np.sinc(np.arcsin(np.minimum(sines, 1)) / np.pi))
+    angles = np.arctan2(sines, (np.trace(steps, axis1=1, axis2=2)[:, None] - 1) / 2)
+    return np.asarray(twice / 2 * np.divide(angles, sines, out=np.ones_like(angles), where=sines > 0))
 
 
 def _left_out(rows: Rows, curves: Sequence[Curve]) -> str:

@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike
 
 from .._arrays import checked_number, short_repr, whole_number
 from .._core import ValidationError
-from .._curves.ends import End, freeze_bc_type, is_closed, map_ends
+from .._curves.ends import NATURAL, End, freeze_bc_type, is_closed, map_ends
 from .._curves.fit import Points, Problem, fit, mask_of
-from .._curves.solve import Options, in_batch
+from .._curves.solve import DEFAULTS, in_batch
 from .._errors import raise_or_warn
 from .._options import check_on_failure, check_progress, checked_extrapolate
 from .._representatives import warn_of_far_data, warn_of_far_points, warn_of_signs
@@ -50,9 +50,6 @@ from .report import SmoothingReport
 from .solve import NO_CURVE, SolverOptions, one_per_curve, smoothed
 from .spline import SmoothingSpline
 from .warned import warn_of_bounds, warn_of_spread
-
-_FIT = Options("auto", 1e-12, None)
-_FREE: list[End] = [("natural", None), ("natural", None)]
 
 
 @overload
@@ -297,7 +294,7 @@ def make_smoothing_spline(
 
     def df_of_part(i: int, rows: SmoothingData, at: Knots) -> Any:
         part, own = points_of(rows, space)[i]
-        shared = _FREE, rows, at, options, free, None
+        shared = NATURAL, rows, at, options, free, None
         _, found, _ = smoothed(part, own, rows.precisions[i], lams[i], sigmas[i], *shared)
         return np.ravel(found.report.df)
 
@@ -336,7 +333,7 @@ def make_smoothing_spline(
         parts.append(Points(doubles, 0.0, batch, at.times.shape[-1]))
         conditions.append(_joined(factor, [map_ends(one, spread) for one in of_ends]))
     good = None if chosen is None else spread(np.ones(len(chosen), bool))
-    fitted = fit(Problem(space, at.times, parts, conditions, _FIT, check=False, mask=good))
+    fitted = fit(Problem(space, at.times, parts, conditions, DEFAULTS, check=False, mask=good))
     noise = [
         with_infinite_lam(part.map(spread), spread(lam), batch) for (_, part, _), lam in zip(found, lams, strict=True)
     ]
