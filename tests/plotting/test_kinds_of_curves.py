@@ -141,7 +141,7 @@ def test_the_part_of_a_line_in_a_long_gap_is_light():
     spline = ss.CubicSpline(t, np.stack([t, np.sin(t)], axis=-1), "r:2")
     figure = rendered(spline.plot())
     lines = {line.get_label(): line.get_xydata() for line in figure.axes[0].lines}
-    assert "curve in a long gap, cut off" in texts_of(figure)
+    assert "curve in a long gap, partly outside the axes" in texts_of(figure)
     light, bold = lines["_bridge"], lines["_curve"]
     x = np.linspace(0, 23, 2000)
     for line, inside in ((light, (x > 3) & (x < 20)), (bold, (x <= 3) | (x >= 20))):

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from drawn import axes_named, lines_of, rendered, spline_on, texts_of
 from matplotlib.collections import PolyCollection
+from matplotlib.figure import Figure
 from scipy.spatial.transform import Rotation
 
 import symspline as ss
@@ -170,7 +171,7 @@ def test_bodies_of_the_plane_do_not_overlap():
 
 @pytest.mark.parametrize(("name", "size"), [("so:3", 0.05), ("so:3", 1e-7), ("sphere:3", 0.02), ("su:2", 0.02)])
 def test_small_rotations_are_graphs(name, size):
-    """Frames would look equal. The graphs are in the axes of space, and begin at zero."""
+    """Frames would look equal. The graphs, one per axis of space, begin at zero."""
     rng = np.random.default_rng(5)
     vectors = np.cumsum(size * rng.normal(size=(7, 3)), axis=0)
     first = Rotation.from_rotvec([0.4, -1.0, 0.2])
@@ -183,13 +184,54 @@ def test_small_rotations_are_graphs(name, size):
     }[name]
     spline = ss.CubicSpline(None, points, name)
     figure = rendered(spline.plot())
-    assert {"about x₁", "about x₂", "about x₃"} <= set(texts_of(figure)) and "first axis" not in texts_of(figure)
-    expected = (rotations * rotations[0].inv()).as_rotvec(degrees=True)
-    dots = [line.get_xydata()[:, 1] for line in figure.axes[0].lines if line.get_marker() == "o"]
+    assert [axes.get_ylabel() for axes in figure.axes[:3]] == [f"about x{i},\nrad" for i in "₁₂₃"]
+    assert "first axis" not in texts_of(figure)
+    expected = (rotations * rotations[0].inv()).as_rotvec()
+    dots = [line.get_ydata() for axes in figure.axes[:3] for line in axes.lines if line.get_label() == "_given"]
+    np.testing.assert_allclose(np.transpose(dots), expected, rtol=1e-6, atol=1e-9)
+    # One set of axes has all of them.
+    axes = spline.plot(ax=Figure().add_subplot())
+    assert axes.get_ylabel() == "rotation vector from the first point"
+    dots = [line.get_ydata() for line in axes.lines if line.get_label() == "_given"]
     np.testing.assert_allclose(np.transpose(dots), expected, rtol=1e-6, atol=1e-9)
     moving = spline.animate(frames=2)
     moving._draw_was_started = True
     moving._func(17)
+
+
+def test_long_gaps_are_seen_in_graphs():
+    """Rotations and positions with a gap have axes per coordinate, with a band that covers the ball of the curve's."""
+    rng = np.random.default_rng(3)
+    t = np.concatenate([np.linspace(0, 4, 40), np.linspace(9, 12, 30)])
+    turns = Rotation.from_rotvec(np.multiply.outer(np.sin(t / 3), [0.9, -1.2, 0.7]) + 0.05 * rng.normal(size=(70, 3)))
+    path = np.stack([t, np.cos(t), 100 * t], axis=-1) + 0.1 * rng.normal(size=(70, 3))
+    curve = ss.make_smoothing_spline(t, (turns.as_matrix(), path), "so:3 x r:3")
+    figure = rendered(curve.plot())
+    labels = [axes.get_ylabel() for axes in figure.axes]
+    assert labels[:6] == [*(f"about x{i},\nrad" for i in "₁₂₃"), "x₁", "x₂", "x₃"]
+    assert not any("95 %" in label for label in labels)
+    first = Rotation.from_matrix(curve.points[0][0])
+    ball = rng.normal(size=(2000, 3))
+    ball *= 0.999 / np.linalg.norm(ball, axis=1, keepdims=True)
+    for number, axes in enumerate(figure.axes[:6]):
+        (band,) = [own for own in axes.collections if own.get_label() == "band"]
+        corners = band.get_paths()[0].vertices
+        for x in (1.0, 3.7, 6.5, 10.0):
+            x = corners[np.abs(corners[:, 0] - x).argmin(), 0]
+            turn, place = curve(x)
+            around = Rotation.from_matrix(turn) * Rotation.from_rotvec(curve.band(x)[0] * ball)
+            vectors = (around * first.inv()).as_rotvec()
+            inside = np.hstack([vectors, place + curve.band(x)[1] * ball])[:, number]
+            drawn = corners[corners[:, 0] == x, 1]
+            assert drawn.min() < inside.min() and inside.max() < drawn.max()
+
+
+def test_how_far_a_curve_goes_in_a_gap_is_written():
+    t = np.array([0.0, 1, 2, 3, 20, 21, 22, 23])
+    spline = ss.CubicSpline(t, np.sin(3 * t)[:, None], "r:1")
+    x = np.linspace(3, 20, 1000)
+    words = texts_of(rendered(spline.plot()))
+    assert f"up to {spline(x).max():.2g}" in words or f"down to {spline(x).min():.2g}".replace("-", "−") in words
 
 
 def test_large_rotations_are_frames():

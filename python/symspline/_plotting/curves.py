@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from .._curves.composed import AnyCurve
 from .._curves.curve import UncertaintyBand
 from .._report import long_gaps
-from .._spaces import Product, Space
+from .._spaces import Product, Space, short_name
 from .style import DATA, DATES, INK, SPLINE, Array, Indices, evenly
 
 SECOND = np.timedelta64(1, "s")
@@ -25,7 +25,7 @@ _NO_GAPS: Array = np.empty((0, 2))
 # Labels of artists that the legend of a page explains. Those with an underscore are not in legends of matplotlib.
 LINE, DOTS, START, DATA_DOTS, FAINT = "_curve", "_given", "_start", "_data", "_others"
 QUANTILES, BAND, BRIDGE, GAPS, POSES, BODIES = "_quantiles", "band", "_bridge", "gaps", "_poses", "_bodies"
-KNOTS, END, AFTER = "_knots", "_end", "_after"
+KNOTS, TICKS, END, AFTER = "_knots", "_ticks", "_end", "_after"
 BODY: Array = np.array([[1.0, 0.0], [-0.7, 0.55], [-0.35, 0.0], [-0.7, -0.55], [1.0, 0.0]])
 """A body in the plane that points along its first axis."""
 BODY_COLOR = "#cfe0ee"
@@ -417,11 +417,6 @@ class Batch:
         return values.reshape(-1, *values.shape[count:])[self.valid]
 
 
-def short_name(space: Space[Any]) -> str:
-    """Return the shortest name that `symspline.space` accepts, such as "so:3 x r:3"."""
-    return str(space).replace("euclidean:", "r:").replace("hyperbolic:", "h:")
-
-
 def title_on(what: str, space: Space[Any], most: int = 63) -> str:
     """Return the title of a figure. Products and long titles have the short name of the space."""
     title = f"{what} on {space!r}"
@@ -453,12 +448,15 @@ def draw_in_plane(
     curve.draw_dots(axes, flat(curve.given))
 
 
-def draw_graph_of(axes: Axes, curve: Curve, line: Array, given: Array, unit: float = 1.0) -> None:
-    """Draw numbers against time with their band, and those of the given points. Radii are multiplied by ``unit``."""
+def draw_graph_of(axes: Axes, curve: Curve, line: Array, given: Array, unit: float | Array = 1.0, **dots: Any) -> None:
+    """Draw numbers against time with their band, and those of the given points. Radii are multiplied by ``unit``.
+
+    Further arguments are the look of the given points.
+    """
     if curve.radii is not None:
         fill_band(axes, curve, line - unit * curve.radii, line + unit * curve.radii, zorder=3)
     curve.draw_line(axes, np.column_stack([curve.times, line]))
-    curve.draw_dots(axes, np.column_stack([curve.on_axis(curve.given_x), given]))
+    curve.draw_dots(axes, np.column_stack([curve.on_axis(curve.given_x), given]), **dots)
 
 
 def fill_quantiles(

@@ -19,9 +19,9 @@ from matplotlib.figure import Figure, SubFigure
 from .._arrays import short_repr
 from .._core import ValidationError
 from .._disk import path_of, replacing
-from .._spaces import Space, cover_of, factors_of
+from .._spaces import Space, cover_of, factors_of, short_name
 from . import chart, columns, graphs, matrices, sphere
-from .curves import Curve, short_name
+from .curves import Curve
 from .rates import IN_ROW
 from .shrink import shrink, small_text
 from .style import DPI, INK, points
@@ -56,16 +56,14 @@ _DRAWN: list[tuple[str, Callable[[Any, Sequence[Curve]], None], tuple[float, ...
     ("euclidean:3", chart.draw_3d, ()),
     ("sphere:1", graphs.draw_circle, _GRAPH),
     ("sphere:2", sphere.draw_sphere, (11.4, 4.6)),
-    ("sphere:3", matrices.draw_quaternions, _ROWS),
     ("hyperbolic:2", chart.draw_disk, ()),
     ("rp:1 gr:1,2", graphs.draw_slope, _GRAPH),
     ("rp:2 gr:1,3", sphere.draw_lines, ()),
     ("gr:2,3", sphere.draw_normals, ()),
     ("cp:1 cgr:1,2", sphere.draw_bloch, ()),
     ("so:2 o:2", graphs.draw_turn, _GRAPH),
-    ("so:3 o:3", matrices.draw_rotations, _ROWS),
+    ("sphere:3 so:3 o:3 su:2", matrices.draw_rotations, _ROWS),
     ("u:1", graphs.draw_phase, _GRAPH),
-    ("su:2", matrices.draw_spins, _ROWS),
     ("spd:2", matrices.draw_ellipses, _ROWS),
     ("spd:3", matrices.draw_ellipsoids, _ROWS),
     ("se:2", matrices.draw_flat_poses, ()),
@@ -79,8 +77,8 @@ _FAMILIES["ch"] = Picture(graphs.draw_ratios, 10.5, 3.8)
 _LONG = 2.0
 """Curves in the plane are in a panel that is wide or narrow if one side is longer than the other by this factor."""
 # Spaces whose picture shows the band.
-BANDED = {"euclidean:1", "euclidean:2", "euclidean:3", "hyperbolic:2", "sphere:1", "sphere:2"}
-BANDED |= {"rp:1", "gr:1,2", "so:2", "o:2", "u:1"}
+_BANDED = {"euclidean:1", "euclidean:2", "euclidean:3", "hyperbolic:2", "sphere:1", "sphere:2"}
+_BANDED |= {"rp:1", "gr:1,2", "so:2", "o:2", "u:1"}
 _OTHERS = Picture(graphs.draw_components, 10.5, 3.8)
 # Spaces whose picture shows many curves of a batch.
 PATHS = {"euclidean:2", "euclidean:3", "sphere:2", "hyperbolic:2", "rp:2", "gr:1,3", "gr:2,3", "cp:1", "cgr:1,2"}
@@ -117,6 +115,11 @@ def draw_picture(panel: Any, space: Space, curves: Sequence[Curve]) -> None:
     if name not in _IN_ROWS:
         curves = [part for curve in curves for part in curve.unbroken]
     picture_of(space).draw(panel, curves)
+
+
+def shows_band(curve: Curve) -> bool:
+    """Whether the picture of a curve shows its band."""
+    return str(cover_of(curve.space)) in _BANDED or matrices.are_graphs([curve])
 
 
 class CurveFigure(Figure):
@@ -205,6 +208,13 @@ def picture_of_factors(curves: Sequence[Curve]) -> Picture:
             row, column = divmod(i, width)
             caption, cell = cells[2 * row : 2 * row + 2, column]
             caption.text(0.5, 0.3, names[i], ha="center", color=INK, fontsize=points(12))
-            draw_picture(cell, factor, [curve.part(i) for curve in curves])
+            parts = [curve.part(i) for curve in curves]
+            if str(factor) == "euclidean:3" and any(len(curve.gaps) for curve in parts):
+                # Only a time axis shows gaps, and the axes below have the same.
+                graphs.draw_coordinates(
+                    cell, [own for part in parts for own in part.unbroken], "{}", ["x₁", "x₂", "x₃"]
+                )
+            else:
+                draw_picture(cell, factor, parts)
 
     return Picture(draw, 4.8 * width, 4.6 * rows)

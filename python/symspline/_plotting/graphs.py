@@ -14,7 +14,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from .._spaces import HermitianPositiveDefinite, Space, SymmetricPositiveDefinite
-from .curves import BEYOND, DOTS, GAPS, KNOTS, LINE, Curve, draw_graph_of, fill_quantiles, interrupted
+from .curves import BEYOND, DOTS, GAPS, KNOTS, LINE, TICKS, Curve, draw_graph_of, fill_quantiles, interrupted
 from .style import (
     BOTTOM,
     DISTINCT,
@@ -30,12 +30,17 @@ from .style import (
     inside,
     legend,
     plain,
+    points,
     show_dates,
     size,
 )
 
 SUBSCRIPTS = str.maketrans("0123456789,", "₀₁₂₃₄₅₆₇₈₉,")
 _NAMED, _OTHERS, _IN_ROW = 12, 100, 6
+_NARROW = 1.3
+"""The largest width of lines in low axes."""
+_BETWEEN = 0.3
+"""The distance between axes in inches."""
 FEW_KNOTS, _TICKS = 40, 2000
 """The largest number of knots that have lines, and a bound for that of ticks."""
 
@@ -50,11 +55,11 @@ def timelines(
 
     Unless `marked` is False, they show the times of the given points and long gaps.
     """
-    height = (size(panel)[1] - BOTTOM - top) / len(labels)
+    height = (size(panel)[1] - BOTTOM - top + _BETWEEN) / len(labels)
     made = []
     for i, label in enumerate(labels):
         lower, upper = BOTTOM + (len(labels) - 1 - i) * height, top + i * height
-        axes = panel.add_axes(inside(panel, LEFT, lower + (0.3 if lower > BOTTOM else 0), RIGHT, upper))
+        axes = panel.add_axes(inside(panel, LEFT, lower, RIGHT, upper))
         made.append(axes)
         axes.set_gid("time")
         if axes in OWN_AXES:
@@ -64,7 +69,8 @@ def timelines(
         axes.grid(visible=False, axis="x")
         axes.set_ylabel(label)
         # All labels of a figure are aligned, and have at least three numbers beside them.
-        axes.yaxis.set_label_coords(-0.58 / (size(panel)[0] - LEFT - RIGHT), 0.5)
+        right = 0.58 if "\n" in label else 0.68
+        axes.yaxis.set_label_coords(-right / (size(panel)[0] - LEFT - RIGHT), 0.5)
         numbers = int(np.clip(height / 0.3, 4, 9))
         axes.yaxis.set_major_locator(MaxNLocator(numbers, steps=[1, 2, 2.5, 5, 10], min_n_ticks=3))
         _set_times(axes, curves, size(panel)[0] - LEFT - RIGHT, lowest=i == len(labels) - 1)
@@ -103,7 +109,7 @@ def _mark_knots(axes: Axes, curves: Sequence[Curve]) -> None:
     height, style = (1.0, (0, (1, 2))) if len(knots) <= FEW_KNOTS and curves[0].noise is None else (0.04, "-")
     look: Any = {"transform": axes.get_xaxis_transform()}
     line: Any = {"color": EDGE, "linewidth": 0.8, "linestyle": style, "zorder": 1}
-    line["label"] = KNOTS if height == 1 else ""
+    line["label"] = KNOTS if height == 1 else TICKS
     axes.vlines(knots[:: 1 + len(knots) // _TICKS], 0, height, **look, **line)
     _mark_gaps(axes, curves)
 
@@ -127,6 +133,8 @@ def draw_graph(panel: SubFigure, curves: Sequence[Curve]) -> None:
         draw_graph_of(axes, curve, *curve.marked(np.ravel))
     if axes not in OWN_AXES:
         _look_at_data(axes, curves, [curve.points for curve in curves])
+        for curve in curves:
+            _write_extremes(axes, curve, curve.points[:, 0])
 
 
 def _draw_angle(angles: Callable[[Any], Array], period: float, panel: SubFigure, curves: Sequence[Curve]) -> None:
@@ -164,6 +172,53 @@ draw_circle, draw_slope, draw_turn, draw_phase = (partial(_draw_angle, *own) for
 
 
 # ---- several numbers ----
+
+
+def draw_coordinates(
+    panel: SubFigure,
+    curves: Sequence[Curve],
+    label: str,
+    names: Sequence[str],
+    numbers: Callable[[Any], Array] = np.asarray,
+    stretch: Callable[[Array], Array] = np.ones_like,
+    title: str = "",
+) -> None:
+    """Draw a few numbers against time, each in axes of its own with its name in the label.
+
+    Parameters
+    ----------
+    panel, curves : SubFigure, sequence of Curve
+        Panel to draw into, and curves to draw.
+    label, names : str, sequence of str
+        Label of the vertical axes, with "{}" for the name, and names of the numbers.
+    numbers : callable
+        Function of several points, with one row per point.
+    stretch : callable
+        Bounds, from the lengths of these rows, of how much the numbers differ if points have the distance 1.
+    title : str
+        What the numbers are, in small letters above the axes. In axes of the user, which get all numbers, it is the
+        label.
+    """
+    if not isinstance(panel, SubFigure):
+        draw_numbers(panel, curves, title, names, lambda _, own: numbers(own))
+        return
+    made = timelines(panel, curves, [label.format(name) for name in names])
+    made[0].set_title(title, loc="right", color=INK, fontsize=points(9), pad=3)
+    for i, axes in enumerate(made):
+        axes.margins(y=0.1)
+        drawn = []
+        for curve in curves:
+            line, given = curve.marked(numbers)
+            size = float(np.clip(30 / np.sqrt(max(len(given), 1)), 1.5, 3))
+            look = {"markersize": size, "color": INK} if curve.noise is None else {"markersize": size}
+            draw_graph_of(axes, curve, line[:, i], given[:, i], stretch(np.linalg.norm(line, axis=1)), **look)
+            drawn.append(line[:, i])
+        for own in axes.lines:
+            if own.get_gid() == LINE:
+                own.set_linewidth(min(own.get_linewidth(), _NARROW))
+        _look_at_data(axes, curves, drawn)
+        for curve, line in zip(curves, drawn, strict=True):
+            _write_extremes(axes, curve, line)
 
 
 def draw_numbers(
@@ -237,6 +292,24 @@ def _look_at_data(axes: Axes, curves: Sequence[Curve], lines: Sequence[Array]) -
     margin = BEYOND * (high - low)
     bottom, top = axes.get_ylim()
     axes.set_ylim(max(bottom, low - margin), min(top, high + margin))
+
+
+def _write_extremes(axes: Axes, curve: Curve, line: Array) -> None:
+    """Write how far a line in long gaps goes where it leaves the axes."""
+    bottom, top = axes.get_ylim()
+    for start, end in curve.gaps:
+        (inside,) = np.nonzero((curve.times > start) & (curve.times < end) & np.isfinite(line))
+        if not len(inside):
+            continue
+        for i, words, height, va in (
+            (inside[line[inside].argmin()], "down to", 0.04, "bottom"),
+            (inside[line[inside].argmax()], "up to", 0.96, "top"),
+        ):
+            if not bottom <= line[i] <= top:
+                look: Any = {"ha": "center", "va": va, "color": INK, "fontsize": points(8), "zorder": 5}
+                look["bbox"] = {"facecolor": GAP, "edgecolor": "none", "pad": 1}
+                words = f"{words} {line[i]:.2g}".replace("-", "−")
+                axes.text((start + end) / 2, height, words, transform=axes.get_xaxis_transform(), **look)
 
 
 def _line(times: Array, values: Array, period: float) -> Array:

@@ -22,9 +22,10 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from .._quaternions import rotation_rows
+from .._spaces import cover_of
 from .chart import SHADOW, box, explain_frames, frame_handles, plane, shadow_colors
 from .curves import BODIES, BODY, BODY_COLOR, POSES, START, Curve
-from .graphs import draw_numbers
+from .graphs import draw_coordinates
 from .rows import REACH, VIEW, Rows
 from .sphere import caps
 from .style import AXES, INK, Array, apart, axes_size, legend, note, points, round_below, time_colors, window
@@ -34,7 +35,11 @@ _LENGTH = 0.14
 _MANY = 24
 """The number of bodies of all curves, or two per curve if that is more."""
 _SMALL = np.radians(12)
-"""Rotations by less than this are graphs, as their frames would look equal."""
+"""Rotations by less than this are graphs."""
+_LARGE = np.radians(150)
+"""Rotations by less than this are graphs if there are long gaps."""
+_JUMP = np.radians(170)
+"""Rotation vectors are drawn up to this length."""
 _ANGLES = np.linspace(0, 2 * np.pi, 97)
 _CIRCLE = np.stack([np.cos(_ANGLES), np.sin(_ANGLES), 0 * _ANGLES], axis=-1)
 
@@ -42,20 +47,15 @@ _CIRCLE = np.stack([np.cos(_ANGLES), np.sin(_ANGLES), 0 * _ANGLES], axis=-1)
 # ---- rotations ----
 
 
-def _draw_rotations(matrices: Callable[[Any], Array], panel: SubFigure, curves: Sequence[Curve]) -> None:
-    """Draw the columns of rotation matrices, shape (..., 3, 3), as arrows along a time axis.
+def draw_rotations(panel: SubFigure, curves: Sequence[Curve]) -> None:
+    """Draw the columns of rotation matrices as arrows along a time axis, or graphs of their rotation vectors.
 
-    Discs at the tips contain the true direction of an axis with the probability of the band. Frames that would look
-    equal are replaced by graphs of the rotations from the first one.
+    Discs at the tips contain the true direction of an axis with the probability of the band.
     """
-    if all(curve.alone for curve in curves):
-        first = matrices(curves[0].first_point)
-        if all(_turns(matrices(curve.extent), first).max() < _SMALL for curve in curves):
-            names = [f"about {name}" for name in ("x₁", "x₂", "x₃")]
-            numbers = lambda _, points: np.degrees(_rotation_vectors(matrices(points), first))  # noqa: E731
-            parts = [part for curve in curves for part in curve.unbroken]
-            draw_numbers(panel, parts, "rotation from the first\npoint, degrees", names, numbers)
-            return
+    if are_graphs(curves):
+        _draw_rotation_vectors(panel, [part for curve in curves for part in curve.unbroken])
+        return
+    matrices = _MATRICES[str(cover_of(curves[0].space))]
     rows = Rows.of(panel, curves)
     length = min(REACH, 0.48 * rows.height)
     words = _left_out(rows, curves)
@@ -68,6 +68,35 @@ def _draw_rotations(matrices: Callable[[Any], Array], panel: SubFigure, curves: 
         _draw_arrows(rows.axes, times, -i, length * frames, light=row.name == "data")
     _explain(rows.axes, words, rows.width)
     rows.draw_view()
+
+
+def are_graphs(curves: Sequence[Curve]) -> bool:
+    """Whether curves of rotations are drawn as graphs: frames would look equal, or would not show long gaps."""
+    matrices = _MATRICES.get(str(cover_of(curves[0].space)))
+    if matrices is None or not all(curve.alone for curve in curves):
+        return False
+    first = matrices(curves[0].first_point)
+    largest = max(_turns(matrices(curve.extent), first).max() for curve in curves)
+    return bool(largest < _SMALL or (largest < _LARGE and any(len(curve.gaps) for curve in curves)))
+
+
+def _draw_rotation_vectors(panel: SubFigure, curves: Sequence[Curve]) -> None:
+    """Draw the graphs of the rotation vectors of rotations from the first one."""
+    matrices = _MATRICES[str(cover_of(curves[0].space))]
+    first = matrices(curves[0].first_point)
+
+    def numbers(points: Any) -> Array:
+        vectors = _rotation_vectors(matrices(points), first)
+        # In long gaps the vector may jump where the angle reaches half a turn.
+        return np.where(np.linalg.norm(vectors, axis=1, keepdims=True) < _JUMP, vectors, np.nan)
+
+    def stretch(angles: Array) -> Array:
+        # The largest singular value of the inverse of the left Jacobian.
+        return np.asarray(1 / np.sinc(angles / 2 / np.pi))
+
+    names = ["about x₁", "about x₂", "about x₃"]
+    title = "rotation vector from the first point"
+    draw_coordinates(panel, curves, "{},\nrad", names, numbers, stretch, title)
 
 
 def _turns(matrices: Array, first: Array) -> Array:
@@ -104,9 +133,13 @@ def quaternions(matrices: NDArray[Any]) -> Array:
 
 
 # Points of S³ are unit quaternions, scalar first. Those of SU(2) act on R³ as rotations.
-draw_quaternions = partial(_draw_rotations, rotations)
-draw_rotations = partial(_draw_rotations, np.asarray)
-draw_spins = partial(_draw_rotations, lambda matrices: rotations(quaternions(matrices)))
+_MATRICES: dict[str, Callable[[Any], Array]] = {
+    "sphere:3": rotations,
+    "so:3": np.asarray,
+    "o:3": np.asarray,
+    "su:2": lambda matrices: rotations(quaternions(matrices)),
+}
+"""Matrices of rotations, shape (..., 3, 3)."""
 
 
 def _draw_arrows(axes: Axes, times: Array, row: int, frames: Array, light: bool) -> None:

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from .._spaces import Product, cover_of, factors_of
+from .._spaces import Product, factors_of
 from . import residuals
 from .collect import axis_of, curves_of
 from .curves import (
@@ -32,11 +32,12 @@ from .curves import (
     POSES,
     QUANTILES,
     START,
+    TICKS,
     Axis,
     Curve,
     title_on,
 )
-from .figure import BANDED, FACTORS, draw_picture, drawing, finish, fitted, picture_of, picture_of_factors
+from .figure import FACTORS, draw_picture, drawing, finish, fitted, picture_of, picture_of_factors, shows_band
 from .panels import check_axes, draw_into, has_dark_background, next_color
 from .rates import LIMIT, columns_of, draw_rates
 from .style import BOTTOM, DATA, EDGE, GAP, INK, MARK, TOP, Array, heading, legend
@@ -91,7 +92,8 @@ def page_of(
     curves, words = curves_of(curve, _axis(curve), color, label)
     curves = [own.on_earth(radius) for own in curves]
     space = curve.space
-    has_band = [str(cover_of(own)) in BANDED for own in factors_of(space)]
+    parts = [curves[0].part(i) for i in range(len(factors_of(space)))] if isinstance(space, Product) else curves[:1]
+    has_band = [shows_band(part) for part in parts]
     below = residuals.panels_of(curve, curves[0], has_band)
     title = title or title_on(curve._kind, space)
     return draw_page(curves, title, words + _description(curve, curves), figsize, show, below)
@@ -227,8 +229,6 @@ def _explain(figure: Figure, curves: Sequence[Curve], height: float) -> None:
         add(Line2D([], [], **dot | {"marker": "s", "color": color}), "end")
     if DOTS in drawn:
         add(Line2D([], [], color=color, **dot), "given points")
-    if KNOTS in drawn:
-        add(Line2D([], [], color=EDGE, linewidth=1, linestyle=":"), "times of points" if few[0].has_nodes else "knots")
     if POSES in drawn:
         add(Line2D([], [], **body | {"markeredgecolor": color, "color": color}), "given poses")
     if BODIES in drawn:
@@ -240,7 +240,7 @@ def _explain(figure: Figure, curves: Sequence[Curve], height: float) -> None:
     if AFTER in drawn:
         add(Line2D([], [], color=AFTER_COLOR, linewidth=2), "after the first gap")
     if BRIDGE in drawn:
-        words = "curve in a long gap" + ", cut off" * (few[0].noise is None)
+        words = "curve in a long gap" + ", partly outside the axes" * (few[0].noise is None)
         add(Line2D([], [], color=few[0].color, linewidth=1.2, linestyle=(0, (4, 2))), words)
     if GAPS in drawn:
         add(Patch(facecolor=GAP), _lengths(np.unique(np.concatenate([own.gaps for own in few]), axis=0), few[0].axis))
@@ -250,6 +250,10 @@ def _explain(figure: Figure, curves: Sequence[Curve], height: float) -> None:
         add(Line2D([], [], color=DATA, linewidth=0.7), "single curves" if few[0].is_mean else "other curves")
     if QUANTILES in drawn and few[0].batch is not None:
         add(Patch(facecolor=DATA, alpha=0.25), f"5–95 % of {int(few[0].batch.valid.sum())} curves")
+    if drawn & {KNOTS, TICKS}:
+        look = {"linestyle": ":"} if KNOTS in drawn else {"linestyle": "none", "marker": "|", "markeredgewidth": 1.6}
+        times = "times of data" if few[0].noise is not None else "times of points" if few[0].has_nodes else "knots"
+        add(Line2D([], [], color=EDGE, linewidth=1, **look), times)
     if handles:
         place: Any = {"loc": "upper left", "bbox_to_anchor": (0.03, height), "borderaxespad": 0, "borderpad": 0}
         legend(figure, handles, labels, 0.9 * figure.get_figwidth(), handlelength=1.4, columnspacing=1.4, **place)

@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import SubFigure
 
-from .._spaces import Product, Space, SpecialEuclidean, Sphere, cover_of, factors_of
-from .curves import LINE, Curve, fill_band, fill_quantiles, short_name
+from .._spaces import Product, Space, SpecialEuclidean, Sphere, cover_of, factors_of, short_name
+from .curves import LINE, Curve, fill_band, fill_quantiles
 from .graphs import FEW_KNOTS, timelines
 from .style import EDGE, MARK, Array
 

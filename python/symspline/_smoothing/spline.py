@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any, Generic, Self, overload
 
@@ -16,7 +16,7 @@ from .._cubic import CubicSpline
 from .._curves.curve import CurveArrays, SidePanel, UncertaintyBand
 from .._curves.ends import end_kinds, is_closed
 from .._options import order_of
-from .._spaces import Array, Doubles, Product, Space, SpecialOrthogonal, factors_of
+from .._spaces import Array, Doubles, Product, Space, SpecialOrthogonal, factors_of, short_name
 from .._time import TimeAxis
 from .._typing import AnyArray, AnyArrays, CovarianceOrder, FloatArray, Number, P, TimesLike
 from .data import SmoothingData
@@ -604,7 +604,8 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
 
     def _made_of(self, radius: float | None = None) -> str:
         count = int(np.max(np.sum(self._noisy.used, axis=-1)))
-        df = _ranges([part.report.df for part in self._smoothed], 3)
+        names = [f" ({short_name(part)})" for part in smoothed_spaces(self.space)] if len(self._smoothed) > 1 else [""]
+        df = _ranges([part.report.df for part in self._smoothed], 3, names)
         sigma = _ranges([part.sigma * (radius or 1) for part in self._smoothed], 3 if radius else 2)
         each = " each" if self._batch else ""
         unit = " m" if radius else ""
@@ -682,10 +683,11 @@ def radius(space: Space, level: float) -> float:
     return float(np.sqrt(_core.chi_squared(space.dim, level)))
 
 
-def _ranges(factors: list[Any], digits: int) -> str:
-    """Return the range of a number for every factor, or one range for all if there are more than three factors."""
-    few = factors if len(factors) <= 3 else [np.concatenate([np.ravel(values) for values in factors])]
-    return " and ".join(_range(np.ravel(values), digits) for values in few)
+def _ranges(factors: list[Any], digits: int, names: Sequence[str] = ("",) * 3) -> str:
+    """Return the range of a number for every factor, with its name, or one range for all of more than three factors."""
+    if len(factors) > 3:
+        factors, names = [np.concatenate([np.ravel(values) for values in factors])], [""]
+    return " and ".join(_range(np.ravel(values), digits) + name for values, name in zip(factors, names, strict=False))
 
 
 def _range(values: Doubles, digits: int) -> str:

@@ -26,7 +26,7 @@ from .positive import (
     SpecialPositiveDefinite,
     SymmetricPositiveDefinite,
 )
-from .product import Product, factors_of, parts_of, product_norm, space, space_named
+from .product import Product, factors_of, parts_of, product_norm, short_name, space, space_named
 from .quotient import Quotient, cover_of, refuse_quotients
 from .statistics import Groups, karcher_mean, require_metric
 from .subspaces import (

@@ -292,6 +292,11 @@ def space(name: str | Space[Any]) -> Space[Any]:
 space_named = space
 
 
+def short_name(space: Space[Any]) -> str:
+    """Return the shortest name that `symspline.space` accepts, such as "so:3 x r:3"."""
+    return str(space).replace("euclidean:", "r:").replace("hyperbolic:", "h:")
+
+
 def spaces_named(name: Any) -> list[Space]:
     """Return the spaces that a name lists, none of them a product.
 
