@@ -13,6 +13,7 @@ from mpl_toolkits.mplot3d import proj3d
 from test_figure import KINDS
 
 import symspline as ss
+from symspline._plotting.style import plain
 from symspline.shapes import AffineMorph
 
 ONE_OF_EACH = {draw: name for name, draw in KINDS.items()}.values()
@@ -102,9 +103,28 @@ def test_boxes_fill_their_panel(shape):
 def test_small_rates_have_a_power_of_ten():
     figure = rendered(spline_on("sphere:3", t=1e6 * np.arange(6.0)).plot())
     axes = axes_named(figure, "acceleration")
-    assert axes.yaxis.get_offset_text().get_text()
-    numbers = [own.get_text().removeprefix("$\\mathdefault{").removesuffix("}$") for own in axes.get_yticklabels()]
+    assert axes.yaxis.get_offset_text().get_text() == "×10⁻¹²"
+    numbers = [own.get_text() for own in axes.get_yticklabels()]
     assert all(len(number) < 6 for number in numbers)
+
+
+@pytest.mark.parametrize(
+    ("limits", "expected"),
+    [
+        ((1e-8, 5e-8), "×10⁻⁸"),
+        ((-1e9, 1e9), "×10⁹"),
+        ((5.2e6 - 20, 5.2e6 + 20), "+5.2×10⁶"),
+        ((-1e6 - 1e-3, -1e6), "−1×10⁶"),
+        ((0, 100), ""),
+    ],
+)
+def test_powers_and_differences_are_plain_text(limits, expected):
+    axes = Figure().add_subplot()
+    plain(axes)
+    axes.set_ylim(limits)
+    rendered(axes.figure)
+    assert axes.yaxis.get_offset_text().get_text() == expected
+    assert not any("$" in label.get_text() for label in axes.get_yticklabels())
 
 
 def test_equal_factors_have_numbers():

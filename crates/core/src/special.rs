@@ -9,7 +9,7 @@
 //! Small arguments use the Taylor series, others the library functions. The choice for a lane depends on its own
 //! argument only, so that a result never depends on its neighbours.
 
-use crate::scalar::{Lane, Scalar, lane};
+use crate::scalar::{Lane, Scalar, few, lane};
 
 /// Largest |x| for which [`Trig`] uses its Taylor series: 12 terms leave less than 1e-19 there.
 const TRIG_SERIES: f64 = 2.5;
@@ -172,8 +172,8 @@ pub fn theta_over_sin<S: Scalar>(y: S, rest: impl FnOnce() -> Lane) -> S {
 #[inline(always)]
 fn arc<S: Scalar>(y: Lane, rest: impl FnOnce() -> Lane) -> [Lane; 3] {
     let ay = y.abs();
-    let within = ARC_TIERS.map(|(limit, _)| ay.simd_le(lane(limit)));
-    let terms = ARC_TIERS.map(|(_, terms)| terms + S::ORDER);
+    let within: [Lane; ARC_TIERS.len()] = few(|i| ay.simd_le(lane(ARC_TIERS[i].0)));
+    let terms: [usize; ARC_TIERS.len()] = few(|i| ARC_TIERS[i].1 + S::ORDER);
     if within[0].all() {
         return polynomial::<S>(&ARC[..terms[0]], y);
     }
@@ -194,7 +194,7 @@ pub fn arc_defect<S: Scalar>(y: S) -> S {
     let limits = [0.0075, 0.09, 0.3];
     let terms = [7, 14, 22];
     let series = |tier: usize| polynomial::<S>(&ARC[1..1 + terms[tier] + S::ORDER], yv);
-    let within = limits.map(|limit| yv.abs().simd_le(lane(limit)));
+    let within: [Lane; 3] = few(|i| yv.abs().simd_le(lane(limits[i])));
     let top = (0..3).find(|&i| within[i].all()).unwrap_or(3);
     let mut e = if top < 3 {
         series(top)

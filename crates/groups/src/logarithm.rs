@@ -21,7 +21,7 @@ pub fn complex<const D: usize>(n: usize, numbers: &[Lane]) -> Matrix<Lane, 2> {
 }
 
 /// The numbers of a complex matrix that exist for D = 1 (the real ones) or D = 2.
-pub fn numbers<const D: usize>(m: &Matrix<Lane, 2>) -> Vec<Lane> {
+fn numbers<const D: usize>(m: &Matrix<Lane, 2>) -> Vec<Lane> {
     m.entries().iter().flat_map(|x| x[..D].iter().copied()).collect()
 }
 
@@ -39,11 +39,19 @@ pub fn angles(e: &Matrix<Lane, 2>) -> Vec<Lane> {
     eigen(e).0
 }
 
+/// The principal logarithm of a matrix from the numbers of its value and its derivatives, likewise, and its angle, see
+/// [`principal`].
+pub fn log_of_parts<const D: usize>(n: usize, parts: &[Vec<Lane>], su: bool) -> (Vec<Vec<Lane>>, Lane) {
+    let parts: Vec<_> = parts.iter().map(|part| complex::<D>(n, part)).collect();
+    let (log, angle) = principal(&parts, su, D == 1);
+    (log.iter().map(numbers::<D>).collect(), angle)
+}
+
 /// The logarithm of Q = 1 + E by eigenvectors, with its derivatives, and its deciding angle: every angle is known
 /// to rounding, also near π. For SU(n) the angles add up to zero.
 ///
 /// Derivatives of T with Q = e^{iT} solve `Q' = e^{iT}'`, with the divided differences of `e^{iθ}`.
-pub fn principal(parts: &[Matrix<Lane, 2>], su: bool, real: bool) -> (Vec<Matrix<Lane, 2>>, Lane) {
+fn principal(parts: &[Matrix<Lane, 2>], su: bool, real: bool) -> (Vec<Matrix<Lane, 2>>, Lane) {
     let n = parts[0].rows();
     let (mut theta, mut v) = eigen(&parts[0]);
     let angle = if su {

@@ -4,7 +4,7 @@
 //! A tangent vector at p is v = pΩ with skew-Hermitian Ω; its transvection is
 //! `E_p(v)x = p e^{Ω/2} p⁻¹ x e^{Ω/2}`. Angles are the arguments of eigenvalues.
 
-use crate::logarithm::{SERIES, angles, complex, numbers, principal, su_limit, times_minus_i};
+use crate::logarithm::{SERIES, angles, complex, log_of_parts, su_limit, times_minus_i};
 use std::f64::consts::{PI, SQRT_2};
 use std::marker::PhantomData;
 use symspline_core::matrix::{
@@ -86,11 +86,9 @@ impl<const D: usize, A: Storage> UnitaryGroup<D, A> {
                 1 => return sine.times(&arc(&versine)),
                 _ => {}
             }
-            let parts: Vec<_> = parts_of(e).iter().map(|part| complex::<D>(n, part)).collect();
-            let (log, exact) = principal(&parts, self.is_su(), D == 1);
-            let log = from_parts(n, n, &log.iter().map(numbers::<D>).collect::<Vec<_>>());
+            let (log, exact) = log_of_parts::<D>(n, &parts_of(e), self.is_su());
             angle = size.simd_le(lane(limit)).select(angle, exact);
-            log
+            from_parts(n, n, &log)
         });
         // Small steps have small angles.
         let bound = size.simd_le(lane(limit)).select(log.size(), angle);

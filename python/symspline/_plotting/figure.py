@@ -151,7 +151,8 @@ def drawing(size: tuple[float, float], show: bool = False, factor: float = 1.0) 
     with light_colors(dark), small_text(factor):
         figure = new_figure(size, show)
         yield figure
-    shrink(figure.findobj(), factor)
+    if factor < 1:
+        shrink(figure.findobj(), factor)
     if dark:
         invert_page(figure)
 

@@ -180,7 +180,7 @@ def draw_coordinates(
     label: str,
     names: Sequence[str],
     numbers: Callable[[Any], Array] = np.asarray,
-    stretch: Callable[[Array], Array] = np.ones_like,
+    growth: Callable[[Array], Array] = np.ones_like,
     title: str = "",
 ) -> None:
     """Draw a few numbers against time, each in axes of its own with its name in the label.
@@ -193,7 +193,7 @@ def draw_coordinates(
         Label of the vertical axes, with "{}" for the name, and names of the numbers.
     numbers : callable
         Function of several points, with one row per point.
-    stretch : callable
+    growth : callable
         Bounds, from the lengths of these rows, of how much the numbers differ if points have the distance 1.
     title : str
         What the numbers are, in small letters above the axes. In axes of the user, which get all numbers, it is the
@@ -211,7 +211,7 @@ def draw_coordinates(
             line, given = curve.marked(numbers)
             size = float(np.clip(30 / np.sqrt(max(len(given), 1)), 1.5, 3))
             look = {"markersize": size, "color": INK} if curve.noise is None else {"markersize": size}
-            draw_graph_of(axes, curve, line[:, i], given[:, i], stretch(np.linalg.norm(line, axis=1)), **look)
+            draw_graph_of(axes, curve, line[:, i], given[:, i], growth(np.linalg.norm(line, axis=1)), **look)
             drawn.append(line[:, i])
         for own in axes.lines:
             if own.get_gid() == LINE:

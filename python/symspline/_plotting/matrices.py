@@ -90,13 +90,13 @@ def _draw_rotation_vectors(panel: SubFigure, curves: Sequence[Curve]) -> None:
         # In long gaps the vector may jump where the angle reaches half a turn.
         return np.where(np.linalg.norm(vectors, axis=1, keepdims=True) < _JUMP, vectors, np.nan)
 
-    def stretch(angles: Array) -> Array:
+    def growth(angles: Array) -> Array:
         # The largest singular value of the inverse of the left Jacobian.
         return np.asarray(1 / np.sinc(angles / 2 / np.pi))
 
     names = ["about x₁", "about x₂", "about x₃"]
     title = "rotation vector from the first point"
-    draw_coordinates(panel, curves, "{},\nrad", names, numbers, stretch, title)
+    draw_coordinates(panel, curves, "{},\nrad", names, numbers, growth, title)
 
 
 def _turns(matrices: Array, first: Array) -> Array:

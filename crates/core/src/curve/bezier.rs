@@ -69,9 +69,9 @@ impl<S: Scalar> Segment<S> {
         len: usize,
         choose: impl FnOnce(&[Lane], [&mut [Lane]; 3]),
     ) {
-        let [p0, p1] = self.ends.each_mut().map(|x| &mut x[..len]);
-        let [a, b] = self.handles.each_mut().map(|x| &mut x[..len]);
-        let [q0, q1] = self.controls.each_mut().map(|x| &mut x[..len]);
+        let ([p0, p1], [a, b], [q0, q1]) = (&mut self.ends, &mut self.handles, &mut self.controls);
+        let (p0, p1, a, b) = (&mut p0[..len], &mut p1[..len], &mut a[..len], &mut b[..len]);
+        let (q0, q1) = (&mut q0[..len], &mut q1[..len]);
         let middle = &mut self.middle[..len];
         self.rays.iter_mut().for_each(|ray| ray.resize(space.ray_len(), Lane::ZERO));
         let [first, between, last] = &mut self.rays;
@@ -94,9 +94,9 @@ impl<S: Scalar> Segment<S> {
     /// computed, so that handles close to the cut locus remain exact.
     #[inline(always)]
     pub fn at<M: Ambient>(&mut self, space: &M, len: usize, t: S, gamma: &mut [S]) {
-        let [p0, p1] = self.ends.each_ref().map(|x| &x[..len]);
-        let [a, b] = self.handles.each_ref().map(|x| &x[..len]);
-        let [x, y, z] = self.level.each_mut().map(|x| &mut x[..len]);
+        let ([p0, p1], [a, b], [x, y, z]) = (&self.ends, &self.handles, &mut self.level);
+        let (p0, p1, a, b) = (&p0[..len], &p1[..len], &a[..len], &b[..len]);
+        let (x, y, z) = (&mut x[..len], &mut y[..len], &mut z[..len]);
         let gamma = &mut gamma[..len];
         let [first, middle, last] = &self.rays;
         space.prepared_ray(p0, a, first, t, x);
@@ -116,9 +116,13 @@ impl<S: Scalar> Segment<S> {
 #[cold]
 #[inline(never)]
 fn between<S: Scalar, M: Ambient>(space: &M, controls: &[Vec<Lane>; 2], lanes: Lane, t: S, y: &mut [S]) {
-    let [p, q] =
-        controls.each_ref().map(|q| q[..y.len()].iter().map(|&x| S::constant(x)).collect::<Vec<S>>());
-    let mut x = y.to_vec();
+    let [mut p, mut q, mut x] = [y.to_vec(), y.to_vec(), y.to_vec()];
+    for i in 0..y.len() {
+        p[i] = S::constant(controls[0][i]);
+        q[i] = S::constant(controls[1][i]);
+    }
     space.geodesic(&p, &q, t, &mut x);
-    y.iter_mut().zip(&x).for_each(|(y, x)| *y = S::select(lanes, *x, *y));
+    for i in 0..y.len() {
+        y[i] = S::select(lanes, x[i], y[i]);
+    }
 }

@@ -303,11 +303,16 @@ fn norm<M: Ambient>(space: &M, p: &[Lane], v: &[Lane]) -> Lane {
 #[cold]
 #[inline(never)]
 fn scaled_norm<M: Ambient>(space: &M, p: &[Lane], v: &[Lane]) -> Lane {
+    let (v, largest) = scaled_down(v);
+    max_or_nan(space.inner(p, &v, &v), Lane::ZERO).sqrt() * largest
+}
+
+/// Numbers divided by the largest of them, which is the second result.
+fn scaled_down(v: &[Lane]) -> (Vec<Lane>, Lane) {
     let largest = v.iter().fold(Lane::ZERO, |most, v| max_or_nan(most, v.abs()));
     let zero = largest.simd_eq(Lane::ZERO);
     let unit = zero.select(Lane::ONE, largest);
-    let v: Vec<Lane> = v.iter().map(|v| *v / unit).collect();
-    max_or_nan(space.inner(p, &v, &v), Lane::ZERO).sqrt() * largest
+    (v.iter().map(|v| *v / unit).collect(), largest)
 }
 
 /// The first two rows of a buffer.
@@ -327,18 +332,20 @@ fn go_straight<S: Scalar, M: Ambient>(
     let Segment { ends: [p0, p1], handles: [a, b], .. } = segment;
     let beyond = Lane::new(cursor.beyond);
     let (before, behind) = (beyond.simd_lt(Lane::ZERO), beyond.simd_gt(Lane::ZERO));
-    let pick = |x: &[Lane], y: &[Lane]| -> Vec<Lane> {
-        x.iter().zip(y).map(|(x, y)| before.select(*x, *y)).collect()
-    };
-    let velocity: Vec<Lane> = pick(a, b).iter().map(|handle| *handle * lane(3.0)).collect();
+    let velocity = pick(before, a, b, lane(3.0));
     let mut straight = gamma.to_vec();
     space.ray(
-        &pick(p0, p1),
+        &pick(before, p0, p1, Lane::ONE),
         &velocity,
         S::from_parts([beyond / cursor.h, Lane::ONE, Lane::ZERO]),
         &mut straight,
     );
-    for (g, s) in gamma.iter_mut().zip(&straight) {
-        *g = S::select(before | behind, *s, *g);
+    for i in 0..gamma.len() {
+        gamma[i] = S::select(before | behind, straight[i], gamma[i]);
     }
+}
+
+/// A factor times x on the lanes of a mask, and times y on the others.
+fn pick(mask: Lane, x: &[Lane], y: &[Lane], factor: Lane) -> Vec<Lane> {
+    x.iter().zip(y).map(|(x, y)| mask.select(*x, *y) * factor).collect()
 }

@@ -83,7 +83,14 @@ pub fn function_of<S: Scalar, const D: usize, A: Storage>(h: &Matrix<S, D, A>, f
 /// Value and derivatives of a matrix, each as plain numbers.
 pub fn parts_of<S: Scalar, const D: usize, A: Storage>(m: &Matrix<S, D, A>) -> Vec<Vec<Lane>> {
     let numbers = m.entries().as_flattened();
-    (0..=S::ORDER).map(|k| numbers.iter().map(|x| x.parts()[k]).collect()).collect()
+    let mut parts = vec![vec![Lane::ZERO; numbers.len()]; 1 + S::ORDER];
+    for (i, x) in numbers.iter().enumerate() {
+        let x = x.parts();
+        for (k, part) in parts.iter_mut().enumerate() {
+            part[i] = x[k];
+        }
+    }
+    parts
 }
 
 /// A matrix of value and derivatives.

@@ -29,16 +29,19 @@ impl<T: Select, const F: usize> Select for [T; F] {
 ///
 /// The result of a lane depends on its own size only, never on its neighbours.
 pub fn by_size<R: Select>(size: Lane, limits: &[f64], mut f: impl FnMut(usize) -> R) -> R {
-    let within = |i: usize| size.simd_le(lane(limits[i]));
-    let top = (0..limits.len()).find(|&i| within(i).all()).unwrap_or(limits.len());
-    if !(0..top).any(|i| within(i).any()) {
-        return f(top);
-    }
+    let top = limit_of_all(size, limits);
     let mut result = f(top);
     for i in (0..top).rev() {
-        if within(i).any() {
-            result = R::select(within(i), f(i), result);
+        let within = size.simd_le(lane(limits[i]));
+        if within.any() {
+            result = R::select(within, f(i), result);
         }
     }
     result
+}
+
+/// The first limit that no lane exceeds.
+#[inline(never)]
+fn limit_of_all(size: Lane, limits: &[f64]) -> usize {
+    limits.iter().position(|&x| size.simd_le(lane(x)).all()).unwrap_or(limits.len())
 }
