@@ -9,22 +9,28 @@ INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no
 # Every process would compile what it imports: a third of the time of the tests.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo check test test-oracles test-torch test-aarch64 fuzz bench docs wheel sdist test-wheel crate \
-	crate-msrv crate-semver publish-wheels publish-crates publish-npm check-tools clean docs-check wasm test-wasm
+.PHONY: demo check check-rust check-types check-python test test-oracles test-torch test-aarch64 fuzz bench docs wheel \
+	sdist test-wheel crate crate-msrv crate-semver publish-wheels publish-crates publish-npm check-tools clean docs-check wasm test-wasm
 
 demo: .venv/built
 	$(BIN)/python examples/storms/demo.py --out demo-output
 
-# Format, lints, spelling, types, docstrings, and the laws of every space in Rust: what to run before a commit. The Rust
-# tests use the crates that were compiled for the module.
-check: .venv/tools
+# Format, lints, spelling, types, docstrings, and the laws of every space in Rust: what to run before a commit.
+check: check-rust check-types check-python
+
+# The tests use the crates that were compiled for the module.
+check-rust: .venv/tools
 	cargo fmt --all --check
 	cargo clippy --quiet --release --all-targets -- -D warnings
 	cargo test --quiet --release --workspace --exclude symspline-benches
+
+check-types: .venv/tools
+	$(BIN)/mypy
+
+check-python: .venv/tools
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/codespell *.md Makefile benchmarks crates docs examples packaging python tests
-	$(BIN)/mypy
 	$(BIN)/python -m pytest tests/test_docstrings.py tests/test_language.py
 
 test: check

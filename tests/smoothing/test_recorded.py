@@ -457,3 +457,60 @@ def test_the_standard_error_of_a_line_grows_as_that_of_its_slope():
     np.testing.assert_allclose(line.std(far), expected, rtol=1e-3)
     slope, start = np.polyfit(used, x[weights > 0], 1)
     np.testing.assert_allclose(line(far)[:, 0], start + slope * far, rtol=1e-3)
+
+
+def with_gap(name, missing, seed, n=1500):
+    """Irregular times of a moving body, and points of which a part in the middle has no weight."""
+    space, rng = ss.space(name), np.random.default_rng([seed, len(name)])
+    t = np.cumsum(rng.exponential(0.01, n))
+    base = np.stack([np.sin(t), np.cos(t), 0.3 * np.sin(2 * t)], axis=-1)
+    if name == "r:2":
+        truth = base[:, :2]
+    elif name == "sphere:2":
+        truth = space.project(base)
+    else:
+        truth = ss.rotations.from_rotation_vectors(base)
+    if name == "se:3":
+        truth = np.pad(truth, ((0, 0), (0, 1), (0, 1)))
+        truth[:, :3, 3], truth[:, 3, 3] = np.column_stack([base[:, :2], t]), 1
+    noisy = space.exp(truth, 0.05 * space.random_tangent(rng, truth))
+    weights = np.ones(n)
+    first = int(n * (1 - missing) / 2)
+    weights[first : first + int(n * missing)] = 0
+    return space, t, noisy, weights
+
+
+@pytest.mark.parametrize("name", ["r:2", "sphere:2", "so:3", "se:3"])
+@pytest.mark.parametrize("missing", [0.1, 0.3, 0.6])
+def test_recordings_with_a_long_gap(name, missing):
+    """One is as good as many: a curve of a batch is that of its data alone, to the last bit."""
+    many = [with_gap(name, missing, seed) for seed in range(3)]
+    for space, t, noisy, weights in many:
+        alone = ss.make_smoothing_spline(t, noisy, space, weights=weights)
+        used = weights > 0
+        assert name == "se:3" or rms(space, alone(t[used]), noisy[used]) < 0.12
+    batch = np.stack([weights, np.roll(weights, 50)])
+    both = ss.make_smoothing_spline(t, np.stack([noisy, noisy]), space, weights=batch)
+    assert np.array_equal(both[0].points, alone.points) and np.array_equal(both[0](t), alone(t))
+
+
+def test_knots_in_a_gap_of_a_flat_space_change_nothing():
+    space, t, noisy, weights = with_gap("r:2", 0.3, 5)
+    used = weights > 0
+    many = ss.make_smoothing_spline(t, noisy, space, weights=weights)
+    few = ss.make_smoothing_spline(t[used], noisy[used], space)
+    np.testing.assert_allclose(many.lam, few.lam, rtol=1e-5)
+    np.testing.assert_allclose(many(t), few(t), atol=1e-6)
+    np.testing.assert_allclose(many.std(t), few.std(t), rtol=1e-5)
+
+
+@pytest.mark.parametrize("name", ["sphere:2", "so:3"])
+def test_a_curve_in_a_gap_does_not_depend_on_the_number_of_knots(name):
+    """30 knots in the gap, all of which are used, or 600."""
+    space, t, noisy, weights = with_gap(name, 0.3, 1)
+    inside = np.flatnonzero((weights == 0) & (np.arange(len(t)) % 20 > 0))
+    few = np.delete(np.arange(len(t)), inside)
+    curves = [ss.make_smoothing_spline(t[i], noisy[i], space, 1e-3, weights=weights[i]) for i in (slice(None), few)]
+    difference = space.distance(curves[0](t), curves[1](t))
+    assert np.max(difference / curves[1].std(t)) < 0.05
+    np.testing.assert_allclose(curves[0].std(t), curves[1].std(t), rtol=0.05)

@@ -22,12 +22,16 @@ const LONG_FIT: FitOptions = FitOptions { max_iter: None, ..FIT };
 /// The C² residual that suffices for an intermediate spline.
 const ENOUGH: f64 = 1e-8;
 const NATURAL: FitEnds<'static> = FitEnds::Open([End::Natural; 2]);
+/// The smallest part of a gap between knots in its middle. A curve without data is smooth, and 32 segments represent it
+/// to a small part of its standard error.
+const IN_GAP: f64 = 32.0;
 /// Knots times dimensions from which several threads are faster.
 const PARALLEL: usize = 4096;
 
 /// Smooths curves; they are independent of each other.
 pub fn smooth(space: &Erased, data: &[Data], options: &Options, monitor: &Monitor) -> Vec<Smooth> {
-    let near: Vec<Data> = data.iter().map(|data| near_data(data, options)).collect();
+    let knots: Vec<Vec<f64>> = data.iter().map(|data| knots_near_data(data, options)).collect();
+    let near: Vec<Data> = data.iter().zip(&knots).map(|(data, knots)| Data { knots, ..*data }).collect();
     let mut tracks: Vec<CurveFit> = solve(space, &near, options, monitor)
         .into_iter()
         .zip(data)
@@ -48,17 +52,36 @@ pub fn smooth(space: &Erased, data: &[Data], options: &Options, monitor: &Monito
     tracks.into_iter().map(CurveFit::finish).collect()
 }
 
-/// The data with the knots between the first and the last datum, if the curve is a geodesic beyond them.
+/// The knots that are near data: those between the first and the last datum, if the curve is a geodesic beyond them, and
+/// some of those in gaps.
 ///
-/// Data hardly determine its points there, and the iteration would diverge on curved spaces.
-fn near_data<'a>(data: &Data<'a>, options: &Options) -> Data<'a> {
-    let (Ends::Open(kinds), Penalty::Acceleration) = (options.ends, options.penalty) else { return *data };
-    let [Some(first), Some(last)] = [data.times.first(), data.times.last()] else { return *data };
+/// Data hardly determine the points at others, and the iteration would diverge on curved spaces.
+fn knots_near_data(data: &Data, options: &Options) -> Vec<f64> {
+    let Ends::Open(kinds) = options.ends else { return data.knots.to_vec() };
+    let [Some(first), Some(last)] = [data.times.first(), data.times.last()] else { return data.knots.to_vec() };
     let knots = data.knots;
-    let natural = kinds.map(|kind| kind == EndCondition::Natural);
-    let start = if natural[0] { knots.partition_point(|t| t <= first).saturating_sub(1) } else { 0 };
-    let stop = if natural[1] { knots.partition_point(|t| t < last) } else { knots.len() - 1 };
-    if stop <= start { *data } else { Data { knots: &knots[start..=stop.min(knots.len() - 1)], ..*data } }
+    let geodesic =
+        kinds.map(|kind| kind == EndCondition::Natural && options.penalty == Penalty::Acceleration);
+    let start = if geodesic[0] { knots.partition_point(|t| t <= first).saturating_sub(1) } else { 0 };
+    let stop = if geodesic[1] { knots.partition_point(|t| t < last) } else { knots.len() - 1 };
+    let stop = stop.min(knots.len() - 1);
+    if stop <= start { knots.to_vec() } else { thinned_in_gaps(&knots[start..=stop], data.times) }
+}
+
+/// Knots without most of those that are far from data: in a gap, their distance is at least half of that to the nearest
+/// datum, or the [`IN_GAP`]th part of the gap.
+fn thinned_in_gaps(knots: &[f64], times: &[f64]) -> Vec<f64> {
+    let mut kept = vec![knots[0]];
+    for &t in &knots[1..knots.len() - 1] {
+        let after = times.partition_point(|x| *x <= t);
+        let (before, next) = (times[after.saturating_sub(1)], times[after.min(times.len() - 1)]);
+        let least = (0.5 * (t - before).min(next - t)).min((next - before) / IN_GAP);
+        if t - kept[kept.len() - 1] >= least {
+            kept.push(t);
+        }
+    }
+    kept.push(knots[knots.len() - 1]);
+    kept
 }
 
 /// Iterates until all curves have converged or failed.

@@ -19,7 +19,7 @@ from .._disk import path_of, replacing
 from .._spaces import Product, cover_of, factors_of
 from .curves import LINE, Curve
 from .figure import FACTORS
-from .matrices import outlines, quaternions, rotations
+from .matrices import MATRICES, outlines
 from .page import page_of
 from .rows import REACH, VIEW
 from .style import AXES, Array
@@ -28,13 +28,6 @@ _DPI = 80
 _MOST_FRAMES = 10_000
 _CURSOR = "#d95f0e"
 _FORMATS = {".gif": "pillow", ".apng": "pillow", ".webp": "pillow", ".mp4": "ffmpeg", ".webm": "ffmpeg"}
-_FRAMES: dict[str, Callable[[Any], Array]] = {
-    "sphere:3": rotations,
-    "so:3": np.asarray,
-    "o:3": np.asarray,
-    "su:2": lambda points: rotations(quaternions(points)),
-}
-"""Rotation matrices of points, for spaces whose picture shows frames along the time axis."""
 Update = Callable[[int], None]
 
 
@@ -179,8 +172,8 @@ def _bodies(picture: SubFigure, curve: Curve) -> Iterator[Update]:
 
 def _body(panel: SubFigure, name: str, curve: Curve) -> Iterator[Update]:
     axes = panel.axes[0]
-    if name in _FRAMES and any(isinstance(own, Quiver) for own in axes.collections):
-        yield _frame_at_time(axes, _FRAMES[name](curve.points), curve)
+    if name in MATRICES and any(isinstance(own, Quiver) for own in axes.collections):
+        yield _frame_at_time(axes, MATRICES[name](curve.points), curve)
     elif name == "se:3":
         yield _frame_in_space(axes, curve.points)
     elif name in ("spd:2", "spd:3"):

@@ -55,7 +55,7 @@ def draw_rotations(panel: SubFigure, curves: Sequence[Curve]) -> None:
     if are_graphs(curves):
         _draw_rotation_vectors(panel, [part for curve in curves for part in curve.unbroken])
         return
-    matrices = _MATRICES[str(cover_of(curves[0].space))]
+    matrices = MATRICES[str(cover_of(curves[0].space))]
     rows = Rows.of(panel, curves)
     length = min(REACH, 0.48 * rows.height)
     words = _left_out(rows, curves)
@@ -72,7 +72,7 @@ def draw_rotations(panel: SubFigure, curves: Sequence[Curve]) -> None:
 
 def are_graphs(curves: Sequence[Curve]) -> bool:
     """Whether curves of rotations are drawn as graphs: frames would look equal, or would not show long gaps."""
-    matrices = _MATRICES.get(str(cover_of(curves[0].space)))
+    matrices = MATRICES.get(str(cover_of(curves[0].space)))
     if matrices is None or not all(curve.alone for curve in curves):
         return False
     first = matrices(curves[0].first_point)
@@ -82,7 +82,7 @@ def are_graphs(curves: Sequence[Curve]) -> bool:
 
 def _draw_rotation_vectors(panel: SubFigure, curves: Sequence[Curve]) -> None:
     """Draw the graphs of the rotation vectors of rotations from the first one."""
-    matrices = _MATRICES[str(cover_of(curves[0].space))]
+    matrices = MATRICES[str(cover_of(curves[0].space))]
     first = matrices(curves[0].first_point)
 
     def numbers(points: Any) -> Array:
@@ -133,7 +133,7 @@ def quaternions(matrices: NDArray[Any]) -> Array:
 
 
 # Points of S³ are unit quaternions, scalar first. Those of SU(2) act on R³ as rotations.
-_MATRICES: dict[str, Callable[[Any], Array]] = {
+MATRICES: dict[str, Callable[[Any], Array]] = {
     "sphere:3": rotations,
     "so:3": np.asarray,
     "o:3": np.asarray,
