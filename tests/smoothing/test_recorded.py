@@ -304,6 +304,14 @@ def test_the_advice_of_messages_helps():
     assert "method='newton'" not in str(caught.value)
 
 
+def test_the_advice_for_the_jerk_helps():
+    space, t, noisy, weights = with_gap("r:2", 0.5, 2, n=3000)
+    options = {"weights": weights, "penalty": "jerk"}
+    with pytest.raises(ss.ConvergenceError, match="pass a number of knots, such as knots=500"):
+        ss.make_smoothing_spline(t, noisy, space, **options)
+    assert ss.make_smoothing_spline(t, noisy, space, knots=500, **options).report.converged
+
+
 def vibration(n, cycle, rng):
     """Irregular times, and rotation vectors that oscillate with a given number of data per cycle."""
     t = np.cumsum(rng.uniform(0.8, 1.2, n))

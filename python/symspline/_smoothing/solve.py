@@ -134,6 +134,11 @@ def _reason(
             "knots in the gaps of the data, a larger lam, or cut the recording at its gaps (symspline.fit_segments). "
             "Check units and signs of the data."
         )
+    if state == "undetermined" and options.penalty == "jerk":
+        return (
+            "The data{of} do not determine the curve. With penalty='jerk' there can be few knots in gaps of the data: "
+            "pass a number of knots, such as knots=500."
+        )
     if state == "undetermined":
         return (
             "The data{of} do not determine the curve. With lam=0 there must be data near every knot: pass fewer "
