@@ -184,14 +184,14 @@ def test_small_rotations_are_graphs(name, size):
     }[name]
     spline = ss.CubicSpline(None, points, name)
     figure = rendered(spline.plot())
-    assert [axes.get_ylabel() for axes in figure.axes[:3]] == [f"about x{i},\nrad" for i in "₁₂₃"]
+    assert [axes.get_ylabel() for axes in figure.axes[:3]] == [f"about x{i}" for i in "₁₂₃"]
     assert "first axis" not in texts_of(figure)
     expected = (rotations * rotations[0].inv()).as_rotvec()
     dots = [line.get_ydata() for axes in figure.axes[:3] for line in axes.lines if line.get_label() == "_given"]
     np.testing.assert_allclose(np.transpose(dots), expected, rtol=1e-6, atol=1e-9)
     # One set of axes has all of them.
     axes = spline.plot(ax=Figure().add_subplot())
-    assert axes.get_ylabel() == "rotation vector from the first point"
+    assert axes.get_ylabel() == "rotation vector from the first point, rad"
     dots = [line.get_ydata() for line in axes.lines if line.get_label() == "_given"]
     np.testing.assert_allclose(np.transpose(dots), expected, rtol=1e-6, atol=1e-9)
     moving = spline.animate(frames=2)
@@ -208,7 +208,7 @@ def test_long_gaps_are_seen_in_graphs():
     curve = ss.make_smoothing_spline(t, (turns.as_matrix(), path), "so:3 x r:3")
     figure = rendered(curve.plot())
     labels = [axes.get_ylabel() for axes in figure.axes]
-    assert labels[:6] == [*(f"about x{i},\nrad" for i in "₁₂₃"), "x₁", "x₂", "x₃"]
+    assert labels[:6] == [*(f"about x{i}" for i in "₁₂₃"), "x₁", "x₂", "x₃"]
     assert not any("95 %" in label for label in labels)
     first = Rotation.from_matrix(curve.points[0][0])
     ball = rng.normal(size=(2000, 3))
@@ -224,6 +224,19 @@ def test_long_gaps_are_seen_in_graphs():
             inside = np.hstack([vectors, place + curve.band(x)[1] * ball])[:, number]
             drawn = corners[corners[:, 0] == x, 1]
             assert drawn.min() < inside.min() and inside.max() < drawn.max()
+
+
+def test_several_curves_with_a_gap_keep_their_colours_and_move():
+    t = np.array([0.0, 1, 2, 3, 20, 21, 22, 23])
+    turns = Rotation.from_rotvec(np.multiply.outer(np.sin(t), [0.3, 0.2, 0.5])).as_matrix()
+    curves = [ss.CubicSpline(t, (turns, k * np.stack([t, t**2, t], axis=-1)), "so:3 x r:3") for k in (1, 2)]
+    figure = rendered(ss.plot(curves, labels=["one", "two"]))
+    axes = axes_named(figure, "x₁")
+    colors = {line.get_color() for line in axes.lines if line.get_label() == "_given"}
+    assert len(colors) == 2 and not axes.texts
+    moving = curves[0].animate(frames=3)
+    moving._draw_was_started = True
+    moving._func(40)
 
 
 def test_how_far_a_curve_goes_in_a_gap_is_written():

@@ -212,9 +212,7 @@ def picture_of_factors(curves: Sequence[Curve]) -> Picture:
             parts = [curve.part(i) for curve in curves]
             if str(factor) == "euclidean:3" and any(len(curve.gaps) for curve in parts):
                 # Only a time axis shows gaps, and the axes below have the same.
-                graphs.draw_coordinates(
-                    cell, [own for part in parts for own in part.unbroken], "{}", ["x₁", "x₂", "x₃"]
-                )
+                graphs.draw_coordinates(cell, [own for part in parts for own in part.unbroken], ["x₁", "x₂", "x₃"])
             else:
                 draw_picture(cell, factor, parts)
 

@@ -177,20 +177,19 @@ draw_circle, draw_slope, draw_turn, draw_phase = (partial(_draw_angle, *own) for
 def draw_coordinates(
     panel: SubFigure,
     curves: Sequence[Curve],
-    label: str,
     names: Sequence[str],
     numbers: Callable[[Any], Array] = np.asarray,
     growth: Callable[[Array], Array] = np.ones_like,
     title: str = "",
 ) -> None:
-    """Draw a few numbers against time, each in axes of its own with its name in the label.
+    """Draw a few numbers against time, each in axes of its own.
 
     Parameters
     ----------
     panel, curves : SubFigure, sequence of Curve
         Panel to draw into, and curves to draw.
-    label, names : str, sequence of str
-        Label of the vertical axes, with "{}" for the name, and names of the numbers.
+    names : sequence of str
+        Names of the numbers.
     numbers : callable
         Function of several points, with one row per point.
     growth : callable
@@ -202,7 +201,7 @@ def draw_coordinates(
     if not isinstance(panel, SubFigure):
         draw_numbers(panel, curves, title, names, lambda _, own: numbers(own))
         return
-    made = timelines(panel, curves, [label.format(name) for name in names])
+    made = timelines(panel, curves, names)
     made[0].set_title(title, loc="right", color=INK, fontsize=points(9), pad=3)
     for i, axes in enumerate(made):
         axes.margins(y=0.1)
@@ -210,7 +209,8 @@ def draw_coordinates(
         for curve in curves:
             line, given = curve.marked(numbers)
             size = float(np.clip(30 / np.sqrt(max(len(given), 1)), 1.5, 3))
-            look = {"markersize": size, "color": INK} if curve.noise is None else {"markersize": size}
+            look: Any = {"color": INK} if curve.noise is None and curve.alone else {}
+            look |= {"markersize": size}
             draw_graph_of(axes, curve, line[:, i], given[:, i], growth(np.linalg.norm(line, axis=1)), **look)
             drawn.append(line[:, i])
         for own in axes.lines:
@@ -295,9 +295,9 @@ def _look_at_data(axes: Axes, curves: Sequence[Curve], lines: Sequence[Array]) -
 
 
 def _write_extremes(axes: Axes, curve: Curve, line: Array) -> None:
-    """Write how far a line in long gaps goes where it leaves the axes."""
+    """Write how far the only line goes in long gaps where it leaves the axes."""
     bottom, top = axes.get_ylim()
-    for start, end in curve.gaps:
+    for start, end in curve.gaps if curve.alone else ():
         (inside,) = np.nonzero((curve.times > start) & (curve.times < end) & np.isfinite(line))
         if not len(inside):
             continue

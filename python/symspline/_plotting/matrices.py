@@ -95,8 +95,7 @@ def _draw_rotation_vectors(panel: SubFigure, curves: Sequence[Curve]) -> None:
         return np.asarray(1 / np.sinc(angles / 2 / np.pi))
 
     names = ["about x₁", "about x₂", "about x₃"]
-    title = "rotation vector from the first point"
-    draw_coordinates(panel, curves, "{},\nrad", names, numbers, growth, title)
+    draw_coordinates(panel, curves, names, numbers, growth, "rotation vector from the first point, rad")
 
 
 def _turns(matrices: Array, first: Array) -> Array:
