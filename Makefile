@@ -8,6 +8,8 @@ INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no
 
 # Every process would compile what it imports: a third of the time of the tests.
 unexport PYTHONDONTWRITEBYTECODE
+# Cargo counts its own jobs.
+unexport MAKEFLAGS MFLAGS
 
 .PHONY: demo check check-rust check-types check-python test test-oracles test-torch test-aarch64 fuzz bench docs wheel \
 	sdist test-wheel crate crate-msrv crate-semver publish-wheels publish-crates publish-npm check-tools clean docs-check wasm test-wasm

@@ -58,7 +58,9 @@ pub fn smooth(space: &Erased, data: &[Data], options: &Options, monitor: &Monito
 /// Data hardly determine the points at others, and the iteration would diverge on curved spaces.
 fn knots_near_data(data: &Data, options: &Options) -> Vec<f64> {
     let Ends::Open(kinds) = options.ends else { return data.knots.to_vec() };
-    let [Some(first), Some(last)] = [data.times.first(), data.times.last()] else { return data.knots.to_vec() };
+    let [Some(first), Some(last)] = [data.times.first(), data.times.last()] else {
+        return data.knots.to_vec();
+    };
     let knots = data.knots;
     let geodesic =
         kinds.map(|kind| kind == EndCondition::Natural && options.penalty == Penalty::Acceleration);
