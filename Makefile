@@ -6,13 +6,15 @@ RUST := $(shell find crates -name '*.rs' -o -name Cargo.toml) Cargo.toml .cargo/
 # Wheels of all these packages exist for the usual platforms; nothing but symspline is compiled.
 INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
 
-# Every process would compile what it imports: a third of the time of the tests.
+# Python keeps compiled modules, even where the environment forbids it. Otherwise every process compiles its imports anew,
+# which takes three times as long.
 unexport PYTHONDONTWRITEBYTECODE
-# Cargo counts its own jobs.
+# Cargo would try to use the job server of make, which its recipes do not inherit.
 unexport MAKEFLAGS MFLAGS
 
 .PHONY: demo check check-rust check-types check-python test test-oracles test-torch test-aarch64 fuzz bench docs wheel \
-	sdist test-wheel crate crate-msrv crate-semver publish-wheels publish-crates publish-npm check-tools clean docs-check wasm test-wasm
+	sdist test-wheel crate crate-msrv crate-semver publish-wheels publish-crates publish-npm check-tools clean \
+	docs-check wasm test-wasm
 
 demo: .venv/built
 	$(BIN)/python examples/storms/demo.py --out demo-output
@@ -20,7 +22,7 @@ demo: .venv/built
 # Format, lints, spelling, types, docstrings, and the laws of every space in Rust: what to run before a commit.
 check: check-rust check-types check-python
 
-# The tests use the crates that were compiled for the module.
+# With --release, the crates that were compiled for the module are used again.
 check-rust: .venv/tools
 	cargo fmt --all --check
 	cargo clippy --quiet --release --all-targets -- -D warnings

@@ -22,8 +22,8 @@ const LONG_FIT: FitOptions = FitOptions { max_iter: None, ..FIT };
 /// The C² residual that suffices for an intermediate spline.
 const ENOUGH: f64 = 1e-8;
 const NATURAL: FitEnds<'static> = FitEnds::Open([End::Natural; 2]);
-/// The smallest part of a gap between knots in its middle. A curve without data is smooth, and 32 segments represent it
-/// to a small part of its standard error.
+/// The number of segments in a gap, about. A curve without data is smooth, so that 32 segments represent it with an error
+/// far below its standard error.
 const IN_GAP: f64 = 32.0;
 /// Knots times dimensions from which several threads are faster.
 const PARALLEL: usize = 4096;
@@ -52,10 +52,10 @@ pub fn smooth(space: &Erased, data: &[Data], options: &Options, monitor: &Monito
     tracks.into_iter().map(CurveFit::finish).collect()
 }
 
-/// The knots that are near data: those between the first and the last datum, if the curve is a geodesic beyond them, and
-/// some of those in gaps.
+/// The knots of the iteration. Beyond the first and the last datum, a curve with natural ends is a geodesic and needs no
+/// knots. In gaps, it needs some of them.
 ///
-/// Data hardly determine the points at others, and the iteration would diverge on curved spaces.
+/// Data hardly determine the points at other knots, and the iteration would diverge on curved spaces.
 fn knots_near_data(data: &Data, options: &Options) -> Vec<f64> {
     let Ends::Open(kinds) = options.ends else { return data.knots.to_vec() };
     let [Some(first), Some(last)] = [data.times.first(), data.times.last()] else {
@@ -70,8 +70,8 @@ fn knots_near_data(data: &Data, options: &Options) -> Vec<f64> {
     if stop <= start { knots.to_vec() } else { thinned_in_gaps(&knots[start..=stop], data.times) }
 }
 
-/// Knots without most of those that are far from data: in a gap, their distance is at least half of that to the nearest
-/// datum, or the [`IN_GAP`]th part of the gap.
+/// Knots without most of those in gaps. Two neighbours in a gap are apart by at least half of the distance to the nearest
+/// datum, or by the length of the gap divided by [`IN_GAP`].
 fn thinned_in_gaps(knots: &[f64], times: &[f64]) -> Vec<f64> {
     let mut kept = vec![knots[0]];
     for &t in &knots[1..knots.len() - 1] {

@@ -211,7 +211,7 @@ def picture_of_factors(curves: Sequence[Curve]) -> Picture:
             caption.text(0.5, 0.3, names[i], ha="center", color=INK, fontsize=points(12))
             parts = [curve.part(i) for curve in curves]
             if str(factor) == "euclidean:3" and any(len(curve.gaps) for curve in parts):
-                # Only a time axis shows gaps, and the axes below have the same.
+                # A time axis shows the gap. It is that of the rates below.
                 graphs.draw_coordinates(cell, [own for part in parts for own in part.unbroken], ["x₁", "x₂", "x₃"])
             else:
                 draw_picture(cell, factor, parts)

@@ -195,8 +195,7 @@ def draw_coordinates(
     growth : callable
         Bounds, from the lengths of these rows, of how much the numbers differ if points have the distance 1.
     title : str
-        What the numbers are, in small letters above the axes. In axes of the user, which get all numbers, it is the
-        label.
+        Description of the numbers, above the axes. If the user gave axes, which show all numbers, it is their label.
     """
     if not isinstance(panel, SubFigure):
         draw_numbers(panel, curves, title, names, lambda _, own: numbers(own))
@@ -295,7 +294,7 @@ def _look_at_data(axes: Axes, curves: Sequence[Curve], lines: Sequence[Array]) -
 
 
 def _write_extremes(axes: Axes, curve: Curve, line: Array) -> None:
-    """Write how far the only line goes in long gaps where it leaves the axes."""
+    """Label the extreme values in long gaps of a line that leaves the axes, if there is only one curve."""
     bottom, top = axes.get_ylim()
     for start, end in curve.gaps if curve.alone else ():
         (inside,) = np.nonzero((curve.times > start) & (curve.times < end) & np.isfinite(line))

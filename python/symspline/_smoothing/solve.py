@@ -110,7 +110,7 @@ def smoothed(
     report = SmoothingReport(METHODS[int(np.any(exact))], state == 0, iterations, step, rate, lams, at_bound, df, noise)
     numbers = small._numbers(found)
     faults = [
-        Fault(number, UNCONVERGED, _reason(_STATES[kind], number, report, options, noisy, precision))
+        Fault(number, UNCONVERGED, _reason(_STATES[kind], number, report, options, noisy, precision, at.shape[-1]))
         for number, kind in enumerate(np.ravel(state).tolist())
         if kind
     ]
@@ -127,6 +127,7 @@ def _reason(
     options: SolverOptions,
     noisy: SmoothingData,
     precision: Precision,
+    knots: int,
 ) -> str:
     if state == "no curve":
         return (
@@ -135,10 +136,17 @@ def _reason(
             "Check units and signs of the data."
         )
     if state == "undetermined" and options.penalty == "jerk":
-        return (
-            "The data{of} do not determine the curve. With penalty='jerk' there can be few knots in gaps of the data: "
-            "pass a number of knots, such as knots=500."
-        )
+        weights = np.broadcast_to(precision.weights, (*noisy.batch, precision.weights.shape[-1]))
+        has_weight = weights.reshape(-1, weights.shape[-1])[number] > 0
+        used = int(has_weight.sum())
+        if used < 3:
+            return f"The data{{of}} do not determine the curve: penalty='jerk' needs at least 3 data, not {used}."
+        if not has_weight.all():
+            return (
+                f"The data{{of}} do not determine the curve: for penalty='jerk', too many of the {knots} knots have no "
+                "data near them. Remove the times before the first and after the last datum with a nonzero weight. If "
+                f"there is a gap between the data, pass fewer knots, for example knots={max(knots // 6, 10)}."
+            )
     if state == "undetermined":
         return (
             "The data{of} do not determine the curve. With lam=0 there must be data near every knot: pass fewer "

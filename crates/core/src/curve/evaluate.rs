@@ -307,7 +307,7 @@ fn scaled_norm<M: Ambient>(space: &M, p: &[Lane], v: &[Lane]) -> Lane {
     max_or_nan(space.inner(p, &v, &v), Lane::ZERO).sqrt() * largest
 }
 
-/// Numbers divided by the largest of them, which is the second result.
+/// Numbers divided by their largest absolute value, and this value.
 fn scaled_down(v: &[Lane]) -> (Vec<Lane>, Lane) {
     let largest = v.iter().fold(Lane::ZERO, |most, v| max_or_nan(most, v.abs()));
     let zero = largest.simd_eq(Lane::ZERO);
@@ -345,7 +345,7 @@ fn go_straight<S: Scalar, M: Ambient>(
     }
 }
 
-/// A factor times x on the lanes of a mask, and times y on the others.
+/// x on the lanes of a mask and y on the others, times a factor.
 fn pick(mask: Lane, x: &[Lane], y: &[Lane], factor: Lane) -> Vec<Lane> {
     x.iter().zip(y).map(|(x, y)| mask.select(*x, *y) * factor).collect()
 }
