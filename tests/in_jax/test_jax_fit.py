@@ -8,6 +8,7 @@ from cases import unit_tangent, walk
 from refused import raises
 
 import symspline as ss
+from symspline._closed_forms.tridiagonal import cyclic_reduction
 from symspline.jax import curve, evaluate, fit
 
 QUICK = True
@@ -140,3 +141,45 @@ def test_invalid_arguments_raise():
         ("sphere:2", {"bc_type": ((1, np.zeros(2)), "natural")}, "start velocity has shape"),
     ]:
         raises(match, fit, T[:3], np.eye(3), space, **options)
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 6, 11])
+def test_cyclic_reduction_solves_dense_systems(n):
+    def solve(diagonal, *columns):
+        return [np.linalg.solve(diagonal, a) for a in columns]
+
+    rng = np.random.default_rng(n)
+    below, above, rows = rng.standard_normal((3, n, 2, 2, 2))
+    diagonal = rng.standard_normal((n, 2, 2, 2)) + 8 * np.eye(2)
+    below[0] = above[-1] = 0
+    found = cyclic_reduction(np, solve, below, diagonal, above, rows[..., :1])
+    dense = np.zeros((2, n, 2, n, 2))
+    for i in range(n):
+        for j, block in ((i - 1, below), (i, diagonal), (i + 1, above)):
+            if 0 <= j < n:
+                dense[:, i, :, j] = block[i]
+    right = np.moveaxis(rows[..., :1], 1, 0).reshape(2, 2 * n, 1)
+    expected = np.linalg.solve(dense.reshape(2, 2 * n, 2 * n), right)
+    np.testing.assert_allclose(np.moveaxis(found, 1, 0).reshape(2, 2 * n, 1), expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["r:2", "so:2", "so:3", "se:3", "spd:2", "hpd:2"])
+def test_single_precision_stays_single_where_double_is_allowed(name):
+    space, points, _ = data(name, 0.5)
+    single = jnp.asarray(points, jnp.complex64 if np.iscomplexobj(points) else jnp.float32)
+    u, residual = fit(T, single, space)
+    assert u.dtype == single.dtype and residual.dtype == jnp.float32
+    expected = ss.CubicSpline(T, points, space).velocities
+    np.testing.assert_allclose(u, expected, atol=2e-5 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("name", ["sphere:2", "se:3", "hpd:2"])
+def test_products_of_matrices_keep_single_precision_on_a_gpu(name):
+    """JAX would shorten them there, which no test on a CPU can measure."""
+    space, points, _ = data(name, 0.5)
+    single = jnp.asarray(points, jnp.complex64 if np.iscomplexobj(points) else jnp.float32)
+    values = jax.jit(lambda p: evaluate(T, p, fit(T, p, space)[0], space, T))
+    for function in (values, jax.grad(lambda p: jnp.sum(abs(values(p)) ** 3))):
+        products = [line for line in jax.jit(function).lower(single).as_text().splitlines() if "dot_general" in line]
+        assert products
+        assert all("precision = [HIGHEST, HIGHEST]" in line for line in products)

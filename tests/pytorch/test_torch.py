@@ -48,3 +48,22 @@ def test_products_batches_and_single_precision():
     curve(X, T, many, "sphere:3").sum().backward()
     assert many.grad.dtype == torch.float32
     assert many.grad.shape == many.shape
+
+
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a GPU")
+@pytest.mark.parametrize("name", ["sphere:2", "so:3", "u:2"])
+def test_values_and_gradients_stay_on_the_gpu(name):
+    points, vector = points_of(name), torch.zeros(ss.space(name).point_shape, dtype=torch.float64)
+
+    def value_and_gradients(device):
+        given = [a.detach().to(device).requires_grad_() for a in (X, T, points, vector)]
+        x, t, own, end = given
+        value = curve(x, t, own, name, bc_type=("natural", (1, end)))
+        with torch.autograd.forward_ad.dual_level():
+            dual = torch.autograd.forward_ad.make_dual(own, own)
+            moved = torch.autograd.forward_ad.unpack_dual(curve(x, t, dual, name)).tangent
+        return value, moved, *torch.autograd.grad((value.real**3).sum(), given)
+
+    for found, expected in zip(value_and_gradients("cuda"), value_and_gradients("cpu"), strict=True):
+        assert found.device.type == "cuda"
+        torch.testing.assert_close(found.cpu(), expected, rtol=0, atol=1e-14)

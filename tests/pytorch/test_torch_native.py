@@ -12,7 +12,6 @@ from cases import unit_tangent, walk
 
 import symspline as ss
 from symspline.torch import curve, evaluate, fit
-from symspline.torch._fitting import cyclic_reduction
 
 # PyTorch warns of its own code.
 pytestmark = pytest.mark.filterwarnings("ignore:`torch.jit:FutureWarning", "ignore:`torch.jit:DeprecationWarning")
@@ -193,23 +192,6 @@ def test_times_outside_the_knots_are_nan():
     np.testing.assert_array_equal(torch.isnan(value).all(dim=-1), [True, False, True])
 
 
-@pytest.mark.parametrize("n", [1, 2, 3, 6, 11])
-def test_cyclic_reduction_solves_dense_systems(n):
-    rng = np.random.default_rng(n)
-    below, above, rows = rng.standard_normal((3, n, 2, 2, 2))
-    diagonal = rng.standard_normal((n, 2, 2, 2)) + 8 * np.eye(2)
-    below[0] = above[-1] = 0
-    found = cyclic_reduction(*map(torch.tensor, (below, diagonal, above, rows[..., :1])))
-    dense = np.zeros((2, n, 2, n, 2))
-    for i in range(n):
-        for j, block in ((i - 1, below), (i, diagonal), (i + 1, above)):
-            if 0 <= j < n:
-                dense[:, i, :, j] = block[i]
-    right = np.moveaxis(rows[..., :1], 1, 0).reshape(2, 2 * n, 1)
-    expected = np.linalg.solve(dense.reshape(2, 2 * n, 2 * n), right)
-    np.testing.assert_allclose(np.moveaxis(found.numpy(), 1, 0).reshape(2, 2 * n, 1), expected, atol=1e-12)
-
-
 def test_curves_that_do_not_converge_are_named():
     points = np.stack([np.eye(3)[[0, 1, 0]], [[1.0, 0, 0], [-1, 0, 0], [0, 1, 0]]])
     with pytest.raises(ss.ConvergenceError, match=r"of curve \(1,\)") as caught:
@@ -252,3 +234,17 @@ def test_the_example_of_the_guide():
     exec(code, names)
     assert names["acceleration"].shape == (100, 50, 3)
     assert torch.isfinite(names["gradient"]).all()
+
+
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a GPU")
+@pytest.mark.parametrize("name", SPACES)
+def test_fits_on_a_gpu_are_those_of_the_core(name):
+    space, points, _ = data(name)
+    expected = ss.CubicSpline(T, points, space)
+    for dtype, tolerance in ((torch.float64, 1e-12), (torch.float32, 2e-5)):
+        t, own, x = (torch.tensor(a, dtype=dtype, device="cuda") for a in (T, points, X))
+        velocities = fit(t, own, space)
+        values = evaluate(t, own, velocities, space, x)
+        for found, exact in ((velocities, expected.velocities), (values, expected(X))):
+            assert found.device.type == "cuda" and found.dtype == dtype
+            np.testing.assert_allclose(found.cpu(), exact, atol=tolerance * np.abs(exact).max())

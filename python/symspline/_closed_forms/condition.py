@@ -80,8 +80,9 @@ class SphereChain(Chain):
         if isinstance(self.model, Rotations) and len(p) > 1:
             # Of both signs of a quaternion the one nearer to that before.
             xp = self.lib.xp
-            signs = 1 - 2.0 * (self.sphere.inner(p[:-1], p[1:]) < 0)
-            along = xp.concatenate([xp.ones_like(p[:1, ..., :1]), xp.cumprod(signs, 0)])
+            one = xp.ones_like(p[..., :1])
+            signs = xp.where(self.sphere.inner(p[:-1], p[1:]) < 0, -one[1:], one[1:])
+            along = xp.concatenate([one[:1], xp.cumprod(signs, 0)])
             p, u = along * p, along * u
         return p, u
 

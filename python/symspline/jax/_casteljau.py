@@ -12,6 +12,7 @@ from .._closed_forms.models import Model
 from .._core import ValidationError
 from .._options import order_of
 from .._spaces import Product, Space, parts_of, refuse_quotients, space_named
+from ._precision import full_precision
 from ._registry import LIBRARY, model_of
 
 
@@ -23,6 +24,7 @@ def evaluate(t: Any, points: Any, velocities: Any, space: Space | str, x: Any, *
 def evaluate(t: Any, points: Any, velocities: Any, space: Product, x: Any, *, nu: int = 0) -> tuple[jax.Array, ...]: ...
 
 
+@full_precision
 def evaluate(t: Any, points: Any, velocities: Any, space: Space[Any] | str, x: Any, *, nu: int = 0) -> Any:
     """Evaluate curves with given knots, points and velocities, in JAX alone.
 

@@ -15,9 +15,11 @@ from .._core import ValidationError
 from .._spaces import Space, refuse_quotients, space_named
 from ._casteljau import arrays_of
 from ._chain import Data, residual_of, step_of
+from ._precision import full_precision
 from ._registry import LIBRARY, chain_of
 
 
+@full_precision
 def fit(
     t: Any, points: Any, space: Space | str, *, bc_type: Any = "natural", steps: int = 40
 ) -> tuple[jax.Array, jax.Array]:
@@ -135,6 +137,7 @@ def _velocities(chain: Chain, given: tuple[bool, bool], steps: int, data: Data) 
 
 
 @_velocities.defjvp
+@full_precision
 def _velocities_jvp(chain: Chain, given: tuple[bool, bool], steps: int, primals: Any, tangents: Any) -> Any:
     """Differentiate F(u, data) = 0: du = −F_u⁻¹ F_data, by the same steps."""
     (data,), (change,) = primals, tangents

@@ -12,6 +12,7 @@ import numpy as np
 from .._closed_forms.divided import Divided, derivative
 from .._closed_forms.divided import logarithm as divided_logarithm
 from .._closed_forms.library import hermitian
+from ._precision import full_precision
 from ._series import arc
 
 
@@ -38,6 +39,7 @@ def _derivative(divided: Divided, a: Any, values: Any, vectors: Any, directions:
 
 
 @_derivative.defjvp
+@full_precision
 def _next(divided: Divided, primals: Any, tangents: Any) -> Any:
     a, values, vectors, directions = primals
     da, _, _, changes = tangents

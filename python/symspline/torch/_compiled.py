@@ -1,4 +1,4 @@
-"""The compiled spline as a differentiable function, on the CPU."""
+"""The compiled spline as a differentiable function."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ def curve(x: Any, t: Any, points: Any, space: Space[Any] | str, *, bc_type: Any 
     """Evaluate a spline through points, with derivatives in PyTorch.
 
     The result equals ``CubicSpline(t, points, space, ...)(x)``. First derivatives with respect to x, t, points and the
-    vectors in `bc_type` are available in reverse and forward mode. Computations use double precision; the result has
-    the precision of the points.
+    vectors in `bc_type` are available in reverse and forward mode. Computations use double precision, on the CPU; the
+    result has the precision and the device of the points.
 
     Parameters
     ----------
@@ -74,31 +74,37 @@ class _Curve(torch.autograd.Function):
     @staticmethod
     def forward(ctx: Any, x: Any, t: Any, points: Any, start: Any, end: Any, fixed: Any) -> Any:
         space, kinds, options = fixed
-        arrays = [None if a is None else a.detach().numpy() for a in (t, points, start, end)]
+        arrays = [None if a is None else _numpy(a) for a in (t, points, start, end)]
         # What is rounding beyond the last knot depends on the precision of the times.
-        at = x.detach().numpy()
+        at = _numpy(x)
         ctx.x = at if at.dtype.kind == "f" else at.astype(float)
         spline = fitted(arrays[0], arrays[1], (arrays[2], arrays[3]), space, kinds, options)
         ctx.movable = movable(spline)
-        ctx.like = [None if a is None else (a.dtype, a.shape) for a in (x, t, points, start, end)]
-        return torch.as_tensor(spline(ctx.x)).to(points.dtype)
+        ctx.like = [None if a is None else (a.dtype, a.device, a.shape) for a in (x, t, points, start, end)]
+        return torch.as_tensor(spline(ctx.x)).to(points)
 
     @staticmethod
     def backward(ctx: Any, *cotangents: Any) -> Any:
-        cotangent = cotangents[0].detach().resolve_conj().numpy()
+        cotangent = _numpy(cotangents[0])
         along, t, points, ends = ctx.movable.vjp(ctx.x, cotangent)
         return *(_tensor(a, like) for a, like in zip((along, t, points, *ends), ctx.like, strict=True)), None
 
     @staticmethod
     def jvp(ctx: Any, *changes: Any) -> Any:
-        dx, dt, points, *ends = (None if a is None else a.detach().resolve_conj().numpy() for a in changes[:5])
+        dx, dt, points, *ends = (None if a is None else _numpy(a) for a in changes[:5])
         moved = ctx.movable.jvp(ctx.x, dx, points, dt, ends)
-        return torch.as_tensor(moved).to(ctx.like[2][0])
+        dtype, device, _ = ctx.like[2]
+        return torch.as_tensor(moved).to(device, dtype)
+
+
+def _numpy(value: Any) -> Any:
+    """Return a tensor of any device as an array."""
+    return value.detach().resolve_conj().cpu().numpy()
 
 
 def _tensor(array: Any, like: Any) -> Any:
-    """Return a gradient in the type of its input."""
+    """Return a gradient in the type and on the device of its input."""
     if array is None or like is None:
         return None
-    dtype, shape = like
-    return torch.as_tensor(np.ascontiguousarray(array)).to(dtype).reshape(shape)
+    dtype, device, shape = like
+    return torch.as_tensor(np.ascontiguousarray(array)).to(device, dtype).reshape(shape)

@@ -9,6 +9,7 @@ import torch
 from .._adapters import split
 from .._arrays import short_repr
 from .._closed_forms.condition import Chain, chain_of, residual, weights
+from .._closed_forms.tridiagonal import cyclic_reduction
 from .._core import ConvergenceError, ValidationError
 from .._curves.ends import ends_in_factors
 from .._spaces import Product, Space, parts_of, refuse_quotients, space_named
@@ -234,40 +235,9 @@ def _jacobian(problem: _Problem, u: Any) -> Any:
 def _solved(jacobian: Any, rows: Any) -> Any:
     """Solve the block tridiagonal systems for the residuals of all nodes."""
     flat = rows.reshape(*jacobian.shape[:1], *jacobian.shape[2:-1], 1)
-    return cyclic_reduction(jacobian[:, 0], jacobian[:, 1], jacobian[:, 2], flat).reshape(rows.shape)
+    below, diagonal, above = jacobian.unbind(1)
+    return cyclic_reduction(torch, _blocks_solved, below, diagonal, above, flat).reshape(rows.shape)
 
 
-def cyclic_reduction(below: Any, diagonal: Any, above: Any, rows: Any) -> Any:
-    """Solve block tridiagonal systems by eliminating every second unknown, again and again.
-
-    Golub & Van Loan, *Matrix Computations* (4th edition), §4.5.4. It needs O(log n) operations on tensors, without
-    pivoting between blocks: those of the C² condition are diagonally dominant for points that are not far apart.
-
-    Parameters
-    ----------
-    below, diagonal, above : tensor, shape (n, ..., k, k)
-        Blocks; below[0] and above[-1] must be zero.
-    rows : tensor, shape (n, ..., k, 1)
-    """
-    n = len(rows)
-    if n == 1:
-        return torch.linalg.solve(diagonal, rows)
-    k = rows.shape[-2]
-    # For odd i, x_i = r − L x_{i−1} − U x_{i+1} with these three.
-    odd = torch.cat([below[1::2], above[1::2], rows[1::2]], dim=-1)
-    left, right, rest = torch.linalg.solve(diagonal[1::2], odd).split([k, k, 1], dim=-1)
-    zero = [torch.zeros_like(a[:1]) for a in (left, right, rest)]
-    # Those before and after each even i; there is none before the first, and none after the last of an odd number.
-    before = [torch.cat([z, a])[: (n + 1) // 2] for z, a in zip(zero, (left, right, rest), strict=True)]
-    after = [torch.cat([a, z])[: (n + 1) // 2] for z, a in zip(zero, (left, right, rest), strict=True)]
-    low, high = below[::2], above[::2]
-    even = cyclic_reduction(
-        -low @ before[0],
-        diagonal[::2] - low @ before[1] - high @ after[0],
-        -high @ after[1],
-        rows[::2] - low @ before[2] - high @ after[2],
-    )
-    next_even = torch.cat([even[1:], torch.zeros_like(even[:1])])[: n // 2]
-    found = rest - left @ even[: n // 2] - right @ next_even
-    pairs = torch.stack([even[: n // 2], found], dim=1).flatten(0, 1)
-    return torch.cat([pairs, even[n // 2 :]])
+def _blocks_solved(diagonal: Any, *columns: Any) -> Any:
+    return torch.linalg.solve(diagonal, torch.cat(columns, dim=-1)).split([a.shape[-1] for a in columns], dim=-1)
