@@ -141,7 +141,7 @@ def test_the_part_of_a_line_in_a_long_gap_is_light():
     spline = ss.CubicSpline(t, np.stack([t, np.sin(t)], axis=-1), "r:2")
     figure = rendered(spline.plot())
     lines = {line.get_label(): line.get_xydata() for line in figure.axes[0].lines}
-    assert "curve in a long gap, partly outside the axes" in texts_of(figure)
+    assert "curve in a long gap, where near the data" in texts_of(figure)
     light, bold = lines["_bridge"], lines["_curve"]
     x = np.linspace(0, 23, 2000)
     for line, inside in ((light, (x > 3) & (x < 20)), (bold, (x <= 3) | (x >= 20))):
@@ -175,13 +175,14 @@ def test_pictures_are_not_as_large_as_a_curve_in_a_long_gap(name):
     drawn = [np.stack(line.get_data_3d() if name.endswith("3") else line.get_data(), axis=1) for line in bridges]
     finite = np.concatenate([own[np.isfinite(own).all(axis=1)] for own in drawn])
     for node in path[[3, 4]]:
-        assert np.linalg.norm(finite - node, axis=1).min() < 1e-12
+        # In space, the part after the gap is a line of its own.
+        assert np.linalg.norm(finite - node, axis=1).min() < (0.2 if name.endswith("3") else 1e-12)
     assert ("after the first gap" in texts_of(figure)) == name.endswith("3")
 
 
 @pytest.mark.parametrize(
     ("lengths", "text"),
-    [((25.0,), "gap of 25"), ((25.0, 70.0), "gaps, up to 70"), (("20s",), "gap of 20 s"), (("3h",), "gap of 3 h")],
+    [((25.0,), "gap of 25"), ((25.0, 70.0), "gaps of up to 70"), (("20s",), "gap of 20 s"), (("3h",), "gap of 3 h")],
 )
 def test_lengths_of_gaps(lengths, text):
     steps = np.array([1.0] * 6)
@@ -192,7 +193,8 @@ def test_lengths_of_gaps(lengths, text):
         ).astype("timedelta64[ms]")
     else:
         t = np.cumsum(np.concatenate([steps, *([own, *steps] for own in lengths)]))
-    assert text in texts_of(spline_on("r:1", (len(t),), t).plot())
+    words = texts_of(spline_on("r:1", (len(t),), t).plot())
+    assert any(own.startswith(f"{text} without data, ") for own in words)
 
 
 def test_segments_have_their_own_colours_and_starts():

@@ -239,12 +239,27 @@ def test_several_curves_with_a_gap_keep_their_colours_and_move():
     moving._func(40)
 
 
-def test_how_far_a_curve_goes_in_a_gap_is_written():
+def test_graphs_show_a_curve_in_a_gap_only_where_it_stays_near_its_data():
+    """They never show rates there, which no data determine."""
     t = np.array([0.0, 1, 2, 3, 20, 21, 22, 23])
-    spline = ss.CubicSpline(t, np.sin(3 * t)[:, None], "r:1")
-    x = np.linspace(3, 20, 1000)
-    words = texts_of(rendered(spline.plot()))
-    assert f"up to {spline(x).max():.2g}" in words or f"down to {spline(x).min():.2g}".replace("-", "−") in words
+    far, near = np.sin(3 * t), 0.1 * t
+    spline = ss.CubicSpline(t, np.stack([far, near, near], axis=-1), "r:3")
+    assert np.abs(spline(np.linspace(3, 20, 50))[:, 0]).max() > 2
+    turns = np.broadcast_to(np.eye(3), (8, 3, 3))
+    figure = rendered(ss.CubicSpline(t, (turns, spline.points), "so:3 x r:3").plot())
+    assert "curve in a long gap, where near the data" in texts_of(figure)
+    assert "gap of 17 without data, rates not drawn" in texts_of(figure)
+
+    def inside(axes):
+        xy = np.concatenate([line.get_xydata() for line in axes.lines])
+        return xy[(xy[:, 0] > 3) & (xy[:, 0] < 20) & np.isfinite(xy[:, 1])]
+
+    assert not len(inside(axes_named(figure, "x₁"))) and len(inside(axes_named(figure, "x₂")))
+    assert np.abs(axes_named(figure, "x₁").get_ylim()).max() < 1.5
+    rates = [axes for axes in figure.axes if axes.get_ylabel().startswith(("speed", "acceleration"))]
+    assert len(rates) == 4
+    for axes in rates:
+        assert not len(inside(axes)) and any(line.get_gid() for line in axes.lines)
 
 
 def test_large_rotations_are_frames():

@@ -196,6 +196,7 @@ def test_dates_and_repeated_times():
     axes = axes_named(figure, "x")
     np.testing.assert_allclose(data_of(axes)[:, 0], date2num(dates), rtol=0, atol=2e-11)
     assert any(text.endswith("band 95 %, 1 long gap") for text in texts_of(figure))
+    assert any(text.endswith("without data, acceleration not drawn") for text in texts_of(figure))
 
 
 def test_data_of_frames_stand_beside_the_curve():

@@ -188,6 +188,15 @@ class Curve:
         far = np.any((positions < low - margin) | (positions > high + margin), axis=1)
         return np.where((far & self.bridges)[:, None], np.nan, positions)
 
+    def graph(self, line: Array) -> Array:
+        """Return one number per sample, NaN throughout the long gaps in which it is far from the others."""
+        near = self.near_data(line[:, None])[:, 0]
+        for start, end in self.gaps:
+            inside = (self.times > start) & (self.times < end)
+            if np.isnan(near[inside]).any():
+                near = np.where(inside, np.nan, near)
+        return near
+
     def marked(self, numbers: Callable[[Any], Array]) -> tuple[Array, Array]:
         """Apply a function to the points at the times x, one row per point, and to the given points."""
         line = numbers(self.points)
@@ -344,7 +353,8 @@ class Curve:
 
     def plot_line(self, axes: Axes, positions: Array, **look: Any) -> None:
         """Draw a line, thin and dashed in long gaps, and mark it for animations."""
-        if len(positions) == len(self.x) and self.bridges.any() and not self.faint:
+        bridged = len(positions) == len(self.x) and not self.faint
+        if bridged and np.isfinite(positions[self.bridges]).all(axis=1).any():
             # One sample on both sides connects the parts.
             near = self.bridges.copy()
             near[1:] |= self.bridges[:-1]

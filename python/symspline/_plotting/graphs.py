@@ -14,7 +14,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from .._spaces import HermitianPositiveDefinite, Space, SymmetricPositiveDefinite
-from .curves import BEYOND, DOTS, GAPS, KNOTS, LINE, TICKS, Curve, draw_graph_of, fill_quantiles, interrupted
+from .curves import DOTS, GAPS, KNOTS, LINE, TICKS, Curve, draw_graph_of, fill_quantiles, interrupted
 from .style import (
     BOTTOM,
     DISTINCT,
@@ -130,11 +130,8 @@ def draw_graph(panel: SubFigure, curves: Sequence[Curve]) -> None:
     (axes,) = timelines(panel, curves, ["x"])
     fill_quantiles(axes, curves, lambda at: at("point")[..., 0])
     for curve in curves:
-        draw_graph_of(axes, curve, *curve.marked(np.ravel))
-    if axes not in OWN_AXES:
-        _look_at_data(axes, curves, [curve.points for curve in curves])
-        for curve in curves:
-            _write_extremes(axes, curve, curve.points[:, 0])
+        line, given = curve.marked(np.ravel)
+        draw_graph_of(axes, curve, curve.graph(line), given)
 
 
 def _draw_angle(angles: Callable[[Any], Array], period: float, panel: SubFigure, curves: Sequence[Curve]) -> None:
@@ -201,23 +198,19 @@ def draw_coordinates(
         draw_numbers(panel, curves, title, names, lambda _, own: numbers(own))
         return
     made = timelines(panel, curves, names)
-    made[0].set_title(title, loc="right", color=INK, fontsize=points(9), pad=3)
+    made[0].set_title(title, loc="left", color=INK, fontsize=points(9), pad=3)
     for i, axes in enumerate(made):
         axes.margins(y=0.1)
-        drawn = []
         for curve in curves:
             line, given = curve.marked(numbers)
             size = float(np.clip(30 / np.sqrt(max(len(given), 1)), 1.5, 3))
             look: Any = {"color": INK} if curve.noise is None and curve.alone else {}
             look |= {"markersize": size}
-            draw_graph_of(axes, curve, line[:, i], given[:, i], growth(np.linalg.norm(line, axis=1)), **look)
-            drawn.append(line[:, i])
+            size_of_band = growth(np.linalg.norm(line, axis=1))
+            draw_graph_of(axes, curve, curve.graph(line[:, i]), given[:, i], size_of_band, **look)
         for own in axes.lines:
             if own.get_gid() == LINE:
                 own.set_linewidth(min(own.get_linewidth(), _NARROW))
-        _look_at_data(axes, curves, drawn)
-        for curve, line in zip(curves, drawn, strict=True):
-            _write_extremes(axes, curve, line)
 
 
 def draw_numbers(
@@ -268,7 +261,7 @@ def draw_numbers(
             if curve.has_line:
                 # Axes of the user get the names, and a legend only if the user adds one.
                 label = names[i] if curve is curves[0] and axes in OWN_AXES else LINE
-                line = _line(curve.times, values[:, i], period)
+                line = _line(curve.times, curve.graph(values[:, i]), period)
                 curve.plot_line(axes, line, linewidth=width, label=label, **look)
             positions, color = np.column_stack([curve.on_axis(curve.given_x), given[:, i]]), look["color"]
             if not curve.has_line or (curve.alone and curve.noise is None and curve.has_nodes):
@@ -277,38 +270,8 @@ def draw_numbers(
                 curve.draw_dots(axes, positions, color=color, alpha=0.4)
     if axes in OWN_AXES:
         return
-    _look_at_data(axes, curves, [values[:, named] for values, _ in drawn])
     anchor: Any = {"loc": "lower right", "bbox_to_anchor": (1, 1), "borderaxespad": 0}
     legend(axes, handles, labels, rows=rows, handlelength=1.6, **anchor)
-
-
-def _look_at_data(axes: Axes, curves: Sequence[Curve], lines: Sequence[Array]) -> None:
-    """Set the vertical limits so that lines in long gaps, which no data determine, may leave the axes."""
-    if not any(curve.bridges.any() and curve.noise is None for curve in curves):
-        return
-    others = np.concatenate([line[~curve.bridges] for curve, line in zip(curves, lines, strict=True)])
-    low, high = float(others.min()), float(others.max())
-    margin = BEYOND * (high - low)
-    bottom, top = axes.get_ylim()
-    axes.set_ylim(max(bottom, low - margin), min(top, high + margin))
-
-
-def _write_extremes(axes: Axes, curve: Curve, line: Array) -> None:
-    """Label the extreme values in long gaps of a line that leaves the axes, if there is only one curve."""
-    bottom, top = axes.get_ylim()
-    for start, end in curve.gaps if curve.alone else ():
-        (inside,) = np.nonzero((curve.times > start) & (curve.times < end) & np.isfinite(line))
-        if not len(inside):
-            continue
-        for i, words, height, va in (
-            (inside[line[inside].argmin()], "down to", 0.04, "bottom"),
-            (inside[line[inside].argmax()], "up to", 0.96, "top"),
-        ):
-            if not bottom <= line[i] <= top:
-                look: Any = {"ha": "center", "va": va, "color": INK, "fontsize": points(8), "zorder": 5}
-                look["bbox"] = {"facecolor": GAP, "edgecolor": "none", "pad": 1}
-                words = f"{words} {line[i]:.2g}".replace("-", "−")
-                axes.text((start + end) / 2, height, words, transform=axes.get_xaxis_transform(), **look)
 
 
 def _line(times: Array, values: Array, period: float) -> Array:

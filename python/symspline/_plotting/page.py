@@ -200,7 +200,7 @@ def _lengths(gaps: Array, axis: Axis) -> str:
     if axis.seconds:
         unit, name = next((unit, name) for least, unit, name in _UNITS if longest >= least)
         length = f"{longest / unit:.3g} {name}"
-    return f"gap of {length}" if len(gaps) == 1 else f"gaps, up to {length}"
+    return f"gap of {length}" if len(gaps) == 1 else f"gaps of up to {length}"
 
 
 def _explain(figure: Figure, curves: Sequence[Curve], height: float) -> None:
@@ -240,10 +240,14 @@ def _explain(figure: Figure, curves: Sequence[Curve], height: float) -> None:
     if AFTER in drawn:
         add(Line2D([], [], color=AFTER_COLOR, linewidth=2), "after the first gap")
     if BRIDGE in drawn:
-        words = "curve in a long gap" + ", partly outside the axes" * (few[0].noise is None)
+        words = "curve in a long gap" + ", where near the data" * (few[0].noise is None)
         add(Line2D([], [], color=few[0].color, linewidth=1.2, linestyle=(0, (4, 2))), words)
     if GAPS in drawn:
-        add(Patch(facecolor=GAP), _lengths(np.unique(np.concatenate([own.gaps for own in few]), axis=0), few[0].axis))
+        lengths = _lengths(np.unique(np.concatenate([own.gaps for own in few]), axis=0), few[0].axis)
+        banded = few[0].noise is not None and few[0].noise.speed is not None
+        left_out = "curve" if BRIDGE not in drawn else "acceleration" if banded else "rates"
+        between = any(len(own.breaks) for own in few)
+        add(Patch(facecolor=GAP), f"{lengths} without data" + f", {left_out} not drawn" * (not between))
     if LIMIT in drawn:
         add(Line2D([], [], color=MARK, linewidth=1, linestyle="--"), "limit")
     if FAINT in drawn:

@@ -186,17 +186,21 @@ def _draw_rate(axes: Axes, curves: Sequence[Curve], rate: Rate) -> None:
     top = rounding = 0.0
     for curve in curves:
         values = rate.values(curve.at)
+        deviation = curve.noise.speed if rate.order == 1 and curve.noise is not None else None
+        if deviation is None:
+            # Without data or a band, a smooth line would look like a measurement.
+            values = curve.outside_gaps(values[:, None])[:, 0]
         for part in curve.unbroken:
             shown = values[np.searchsorted(curve.x, part.x)]
             width = (1.8 if len(curve.marks) <= FEW_KNOTS else 1.0) if curve.alone else 1.1
             part.plot_line(axes, np.column_stack([part.times, shown]), color=part.color, linewidth=width, label=LINE)
         low, high = values, values
-        if rate.order == 1 and curve.noise is not None and curve.noise.speed is not None:
-            spread = rate.scale * NORMAL * curve.noise.speed
+        if deviation is not None:
+            spread = rate.scale * NORMAL * deviation
             low, high = values - spread, values + spread
             low = low if rate.signed else np.maximum(low, 0)
             fill_band(axes, curve, low, high)
-        drawn += [float(low.min()), float(high.max())]
+        drawn += [float(np.nanmin(low)), float(np.nanmax(high))]
         top = max(top, rate.scale * float(curve.at("speed").max()))
         # Rounding errors of points between the closest knots, which a curve at rest has.
         rounding = max(rounding, rate.scale * 1e-15 * np.abs(curve.points).max() / np.diff(curve.data.times).min())
