@@ -17,7 +17,7 @@ from .._curves.solve import DEFAULTS
 from .._spaces import Product, Space, cover_of, parts_of
 from .curves import SECOND, Axis, Batch, Curve
 from .figure import PATHS
-from .style import SPLINE, Array, colors, evenly
+from .style import SPLINE, Array, colors, evenly, named_from, round_start
 
 FEW, _OF_MANY = 5, 3
 """The largest number of curves of a batch that are all drawn with their points, and the number of larger batches."""
@@ -30,8 +30,6 @@ _SEGMENTS = ["#7b3294", "#56b4e9", "#4d4d4d", "#cc79a7", "#8a6d00", "#a6611a"]
 """Colours of segments, if they are few; other colours than those of components."""
 _SAMPLES = 1200
 """Samples of a curve with few segments."""
-_FAR = 1e3
-"""An axis counts from a number if the first time is larger than this multiple of the time span."""
 
 
 class Scatter:
@@ -68,13 +66,10 @@ def axis_of(ends: Sequence[tuple[Any, Any]], durations: bool = False, raw: bool 
             return Axis(dates=True, name="", seconds=True)
         return Axis(start=first, name=f"seconds since {first}", seconds=True)
     name = "t, seconds" if durations else "t"
-    span = float(last - first)
-    if raw or not span > 0 or abs(float(first)) < _FAR * span:
+    start = 0 if raw else round_start(first, last)
+    if not start:
         return Axis(name=name, seconds=durations)
-    unit = 10 ** int(np.ceil(np.log10(span)))
-    exact = firsts.dtype.kind in "iu"
-    start = int(first) // int(max(unit, 1)) * int(max(unit, 1)) if exact else float(np.floor(first / unit) * unit)
-    return Axis(start=start, name=f"{name} − {start if exact else f'{start:.15g}'}", seconds=durations)
+    return Axis(start=start, name=named_from(name, start), seconds=durations)
 
 
 def curves_of(

@@ -189,13 +189,8 @@ class Curve:
         return np.where((far & self.bridges)[:, None], np.nan, positions)
 
     def graph(self, line: Array) -> Array:
-        """Return one number per sample, NaN throughout the long gaps in which it is far from the others."""
-        near = self.near_data(line[:, None])[:, 0]
-        for start, end in self.gaps:
-            inside = (self.times > start) & (self.times < end)
-            if np.isnan(near[inside]).any():
-                near = np.where(inside, np.nan, near)
-        return near
+        """Return one number per sample, NaN in long gaps of a curve without a band, which no data determine."""
+        return line if self.noise is not None else self.outside_gaps(line[:, None])[:, 0]
 
     def marked(self, numbers: Callable[[Any], Array]) -> tuple[Array, Array]:
         """Apply a function to the points at the times x, one row per point, and to the given points."""

@@ -29,8 +29,10 @@ from .style import (
     Indices,
     inside,
     legend,
+    named_from,
     plain,
     points,
+    round_start,
     show_dates,
     size,
 )
@@ -197,20 +199,23 @@ def draw_coordinates(
     if not isinstance(panel, SubFigure):
         draw_numbers(panel, curves, title, names, lambda _, own: numbers(own))
         return
-    made = timelines(panel, curves, names)
+    drawn = [curve.marked(numbers) for curve in curves]
+    everything = np.concatenate([rows for pair in drawn for rows in pair])
+    starts = [round_start(*ends) for ends in zip(np.nanmin(everything, 0), np.nanmax(everything, 0), strict=True)]
+    made = timelines(panel, curves, [named_from(*own) for own in zip(names, starts, strict=True)])
     made[0].set_title(title, loc="left", color=INK, fontsize=points(9), pad=3)
     for i, axes in enumerate(made):
         axes.margins(y=0.1)
-        for curve in curves:
-            line, given = curve.marked(numbers)
+        for curve, (line, given) in zip(curves, drawn, strict=True):
             size = float(np.clip(30 / np.sqrt(max(len(given), 1)), 1.5, 3))
             look: Any = {"color": INK} if curve.noise is None and curve.alone else {}
             look |= {"markersize": size}
             size_of_band = growth(np.linalg.norm(line, axis=1))
-            draw_graph_of(axes, curve, curve.graph(line[:, i]), given[:, i], size_of_band, **look)
-        for own in axes.lines:
-            if own.get_gid() == LINE:
-                own.set_linewidth(min(own.get_linewidth(), _NARROW))
+            own = curve.graph(line[:, i] - starts[i])
+            draw_graph_of(axes, curve, own, given[:, i] - starts[i], size_of_band, **look)
+        for artist in axes.lines:
+            if artist.get_gid() == LINE:
+                artist.set_linewidth(min(artist.get_linewidth(), _NARROW))
 
 
 def draw_numbers(

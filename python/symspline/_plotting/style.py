@@ -35,6 +35,8 @@ LEFT, RIGHT, BOTTOM, TOP = 0.95, 0.6, 0.55, 0.25
 """Margins in inches, which align the time axes of several panels."""
 OWN_AXES: WeakKeyDictionary[Axes, float] = WeakKeyDictionary()
 """Axes of the user, whose look does not change, and the factor by which symbols and text in them are reduced."""
+_FAR = 1e3
+"""An axis counts from a round number if its numbers are larger than this multiple of their range."""
 _POWERS = -4, 6
 """Numbers on axes outside these powers of ten have a common power of ten."""
 _POWER = re.compile(r"(?:^1|([+−]?[\d.]+))e\+?(−?\d+)")
@@ -134,6 +136,24 @@ def plain(axes: Axes) -> None:
         axis.set_major_formatter(Numbers())
         axis.label.set(color=INK, fontsize=points(10))
         axis.offsetText.set(color=INK, fontsize=points(9))
+
+
+def round_start(first: Any, last: Any) -> Any:
+    """Return a round number below numbers that are far from zero compared to their range, and zero below others."""
+    span = float(last - first)
+    if not span > 0 or abs(float(first)) < _FAR * span:
+        return 0
+    unit = 10 ** int(np.ceil(np.log10(span)))
+    if np.asarray(first).dtype.kind in "iu":
+        return int(first) // int(max(unit, 1)) * int(max(unit, 1))
+    return float(np.floor(first / unit) * unit)
+
+
+def named_from(name: str, start: Any) -> str:
+    """Return the name of numbers that are counted from a start."""
+    if not start:
+        return name
+    return f"{name} {'−' if start > 0 else '+'} {abs(start) if isinstance(start, int) else f'{abs(start):.15g}'}"
 
 
 def show_dates(axis: Any, least: int, most: int) -> None:
