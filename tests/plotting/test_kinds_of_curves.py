@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from drawn import axes_named, lines_of, points_around, rate_axes, rendered, spline_on, texts_of
 from matplotlib.colors import to_hex
+from scipy.spatial.transform import Rotation
 
 import symspline as ss
 
@@ -178,6 +179,24 @@ def test_pictures_are_not_as_large_as_a_curve_in_a_long_gap(name):
         # In space, the part after the gap is a line of its own.
         assert np.linalg.norm(finite - node, axis=1).min() < (0.2 if name.endswith("3") else 1e-12)
     assert ("after the first gap" in texts_of(figure)) == name.endswith("3")
+
+
+def test_labels_of_seconds_name_the_minute():
+    t = np.datetime64("2026-03-01T10:00", "s") + 10 * np.arange(7)
+    axes = axes_named(rendered(spline_on("r:1", (7,), t).plot()), "acceleration")
+    labels = [label.get_text() for label in axes.get_xticklabels()]
+    assert "10:00:30" in labels and axes.xaxis.get_offset_text().get_text() == "2026-Mar-01"
+
+
+def test_many_points_do_not_hide_the_curve():
+    t = np.arange(200.0)
+    t[100:] += 60
+    turns = Rotation.from_rotvec(np.multiply.outer(np.sin(0.1 * t), [0.1, 0.2, 0.3])).as_matrix()
+    figure = rendered(ss.CubicSpline(t, turns, "so:3").plot())
+    axes = axes_named(figure, "about x₁")
+    (dots,) = [line for line in axes.lines if line.get_label() == "_given"]
+    (curve,) = [line for line in axes.lines if line.get_label() == "_curve"]
+    assert dots.get_zorder() < curve.get_zorder()
 
 
 @pytest.mark.parametrize(

@@ -39,6 +39,8 @@ from .style import (
 
 SUBSCRIPTS = str.maketrans("0123456789,", "₀₁₂₃₄₅₆₇₈₉,")
 _NAMED, _OTHERS, _IN_ROW = 12, 100, 6
+_MANY = 150
+"""A larger number of points is drawn behind the curve, which they would hide."""
 _NARROW = 1.3
 """The largest width of lines in low axes."""
 _BETWEEN = 0.3
@@ -207,9 +209,9 @@ def draw_coordinates(
     for i, axes in enumerate(made):
         axes.margins(y=0.1)
         for curve, (line, given) in zip(curves, drawn, strict=True):
-            size = float(np.clip(30 / np.sqrt(max(len(given), 1)), 1.5, 3))
+            size = float(np.clip(30 / np.sqrt(max(len(given), 1)), 1.2, 3))
             look: Any = {"color": INK} if curve.noise is None and curve.alone else {}
-            look |= {"markersize": size}
+            look |= {"markersize": size, "zorder": 1.8} if len(given) > _MANY else {"markersize": size}
             size_of_band = growth(np.linalg.norm(line, axis=1))
             own = curve.graph(line[:, i] - starts[i])
             draw_graph_of(axes, curve, own, given[:, i] - starts[i], size_of_band, **look)

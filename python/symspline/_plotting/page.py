@@ -236,7 +236,7 @@ def _explain(figure: Figure, curves: Sequence[Curve], height: float) -> None:
     if DATA_DOTS in drawn:
         add(Line2D([], [], color=DATA, **dot), "data")
     if BAND in drawn:
-        add(Patch(facecolor=few[0].color, alpha=0.22), "95 % band")
+        add(Patch(facecolor=few[0].color, alpha=0.22), "95 % band of the curve")
     if AFTER in drawn:
         add(Line2D([], [], color=AFTER_COLOR, linewidth=2), "after the first gap")
     if BRIDGE in drawn:

@@ -160,7 +160,11 @@ def show_dates(axis: Any, least: int, most: int) -> None:
     """Label an axis by at least ``least`` and at most ``most`` dates."""
     locator = DATES.AutoDateLocator(minticks=least, maxticks=most)
     axis.set_major_locator(locator)
-    axis.set_major_formatter(DATES.ConciseDateFormatter(locator))
+    formatter = DATES.ConciseDateFormatter(locator)
+    # The usual labels of seconds are numbers without the minute.
+    formatter.formats[5] = "%H:%M:%S.%f"
+    formatter.offset_formats[5] = "%Y-%b-%d"
+    axis.set_major_formatter(formatter)
 
 
 def window(positions: Array, margin: float) -> tuple[Array, float]:
