@@ -258,7 +258,9 @@ class SegmentedCurve(ComposedCurve[P], Generic[P, C]):
         return [(a[1], b[0]) for a, b in pairwise(ends) if b[0] > a[1]]
 
     def _made_of(self, radius: float | None = None) -> str:
-        return f"{len(self)} segments"
+        kind, *others = {own._kind for own in self._segments}
+        plural = f" ({kind[0].lower() if kind[1].islower() else kind[0]}{kind[1:]}s)"
+        return f"{len(self)} segments{'' if others else plural}"
 
     @property
     def _unconverged(self) -> int:

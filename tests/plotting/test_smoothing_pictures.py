@@ -65,8 +65,8 @@ def test_heading():
     assert wanted in texts_of(spline.plot())
     both = ss.make_smoothing_spline(T, (noisy("r:1"), noisy("s:2")), "r:1 x s:2")
     (one, other), (first, second) = both.df, both.sigma
-    counts = f"40 data, {one:.3g} (r:1) and {other:.3g} (sphere:2) degrees of freedom"
-    wanted = f"{counts}, noise {first:.2g} and {second:.2g}, band 95 %"
+    counts = f"40 data, {one:.3g} and {other:.3g} degrees of freedom"
+    wanted = f"{counts}, noise {first:.2g} and {second:.2g} (r:1 and sphere:2), band 95 %"
     assert wanted in texts_of(rendered(both.plot()))
 
 

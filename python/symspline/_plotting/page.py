@@ -236,11 +236,11 @@ def _explain(figure: Figure, curves: Sequence[Curve], height: float) -> None:
     if DATA_DOTS in drawn:
         add(Line2D([], [], color=DATA, **dot), "data")
     if BAND in drawn:
-        add(Patch(facecolor=few[0].color, alpha=0.22), "95 % band of the curve")
+        add(Patch(facecolor=few[0].color, alpha=0.22), "95 % band of curve")
     if AFTER in drawn:
         add(Line2D([], [], color=AFTER_COLOR, linewidth=2), "after the first gap")
     if BRIDGE in drawn:
-        words = "curve in a long gap" + ", where near the data" * (few[0].noise is None)
+        words = "curve in a gap" + ", where near the data" * (few[0].noise is None)
         add(Line2D([], [], color=few[0].color, linewidth=1.2, linestyle=(0, (4, 2))), words)
     if GAPS in drawn:
         lengths = _lengths(np.unique(np.concatenate([own.gaps for own in few]), axis=0), few[0].axis)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any, Generic, Self, overload
 
@@ -55,6 +55,8 @@ else:
 
 
 _T = TypeVar("_T")
+# The largest number of factors whose numbers are all in the title of a plot.
+_OWN_RANGES = 3
 # Rotations, whose distances are angles.
 _TURNING = (SpecialOrthogonal(2), SpecialOrthogonal(3))
 
@@ -604,12 +606,13 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
 
     def _made_of(self, radius: float | None = None) -> str:
         count = int(np.max(np.sum(self._noisy.used, axis=-1)))
-        names = [f" ({short_name(part)})" for part in smoothed_spaces(self.space)] if len(self._smoothed) > 1 else [""]
-        df = _ranges([part.report.df for part in self._smoothed], 3, names)
+        spaces = " and ".join(short_name(part) for part in smoothed_spaces(self.space))
+        factors = f" ({spaces})" if 1 < len(self._smoothed) <= _OWN_RANGES else ""
+        df = _ranges([part.report.df for part in self._smoothed], 3)
         sigma = _ranges([part.sigma * (radius or 1) for part in self._smoothed], 3 if radius else 2)
         each = " each" if self._batch else ""
         unit = " m" if radius else ""
-        return f"{count} data{each}, {df} degrees of freedom, noise {sigma}{unit}"
+        return f"{count} data{each}, {df} degrees of freedom, noise {sigma}{unit}{factors}"
 
     def _noise_beside(self, index: tuple[int, ...], x: Doubles) -> UncertaintyBand:
         noisy = self._noisy.map(itemgetter(index), ())
@@ -683,11 +686,11 @@ def radius(space: Space, level: float) -> float:
     return float(np.sqrt(_core.chi_squared(space.dim, level)))
 
 
-def _ranges(factors: list[Any], digits: int, names: Sequence[str] = ("",) * 3) -> str:
-    """Return the range of a number for every factor, with its name, or one range for all of more than three factors."""
-    if len(factors) > 3:
-        factors, names = [np.concatenate([np.ravel(values) for values in factors])], [""]
-    return " and ".join(_range(np.ravel(values), digits) + name for values, name in zip(factors, names, strict=False))
+def _ranges(factors: list[Any], digits: int) -> str:
+    """Return the range of a number for every factor, or one range for all if there are many factors."""
+    if len(factors) > _OWN_RANGES:
+        factors = [np.concatenate([np.ravel(values) for values in factors])]
+    return " and ".join(_range(np.ravel(values), digits) for values in factors)
 
 
 def _range(values: Doubles, digits: int) -> str:
