@@ -11,6 +11,7 @@ import argparse
 import os
 import sys
 from collections.abc import Callable
+from functools import partial
 from importlib.util import find_spec
 from time import perf_counter
 from typing import Any, NamedTuple
@@ -22,7 +23,7 @@ import symspline as ss
 from .data import Array
 from .machine import description
 from .tables import table
-from .timing import Effort, Result, in_unit, measure, ready
+from .timing import Effort, in_unit, measure, ready
 from .walks import walks
 
 SPACES = ("sphere:3", "so:3", "se:3", "spd:3")
@@ -152,11 +153,8 @@ def _measured(library: Library, given: Any, exact: Array, effort: Effort) -> lis
         first.append(f"{perf_counter() - start:.1f}")
         if which == "values":
             difference = _difference(found, exact)
-    results = measure(
-        {which: ready(lambda work=work: work(given), CORES) for which, work in works.items()},  # type: ignore[misc]
-        effort,
-    )
-    return [*(_milliseconds(results[which]) for which in works), " and ".join(first), difference]
+    results = measure({which: ready(partial(work, given), CORES) for which, work in works.items()}, effort)
+    return [*(in_unit(results[which], 1e-3) for which in works), " and ".join(first), difference]
 
 
 def _machine(makers: dict[str, Any]) -> dict[str, str]:
@@ -167,10 +165,6 @@ def _machine(makers: dict[str, Any]) -> dict[str, str]:
 def _difference(value: Any, exact: Array) -> str:
     array = np.asarray(value.cpu() if hasattr(value, "cpu") else value, float)
     return f"{np.abs(array - exact).max():.1e}"
-
-
-def _milliseconds(result: Result) -> str:
-    return in_unit(result, 1e-3)
 
 
 if __name__ == "__main__":

@@ -259,8 +259,7 @@ class SegmentedCurve(ComposedCurve[P], Generic[P, C]):
 
     def _made_of(self, radius: float | None = None) -> str:
         kind, *others = {own._kind for own in self._segments}
-        plural = f" ({kind[0].lower() if kind[1].islower() else kind[0]}{kind[1:]}s)"
-        return f"{len(self)} segments{'' if others else plural}"
+        return f"{len(self)} segments" if others else f"{len(self)} segments ({kind})"
 
     @property
     def _unconverged(self) -> int:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from benchmarks import data, every_space, geodesics, geometries, libraries, tables, timing
+from benchmarks import accelerators, data, every_space, geodesics, geometries, libraries, tables, timing
 from benchmarks.walks import walks
 from cases import loop_over
 
@@ -53,6 +53,21 @@ def test_libraries_compute_the_same(name, bounds):
         assert np.abs(expected).max() > 0.1
         np.testing.assert_allclose(other.numbers(theirs, x, nu), expected, atol=bound)
         assert len(other.at(theirs)(x, nu)) == len(own.at(curve)(x, nu)) == 100
+
+
+def test_times_on_a_gpu_can_be_measured(monkeypatch):
+    """On the device that there is, with a space that compiles quickly."""
+    jax = pytest.importorskip("jax")
+    monkeypatch.setattr(accelerators, "SPACES", ("r:3",))
+    before = jax.config.read("jax_enable_x64")
+    try:
+        lines = accelerators.text(2, timing.Effort(runs=1, shortest=0, longest=0)).splitlines()
+    finally:
+        jax.config.update("jax_enable_x64", before)
+    rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines if line.startswith("| r:3")]
+    assert [row[:2] for row in rows[:3]] == [["r:3, double", "core"], ["r:3, double", "JAX"], ["r:3, single", "JAX"]]
+    assert float(rows[1][-1]) < 1e-12 and 0 < float(rows[2][-1]) < 1e-4
+    assert not any("fails" in cell for row in rows for cell in row)
 
 
 SPACES = [

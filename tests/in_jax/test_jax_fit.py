@@ -183,3 +183,13 @@ def test_products_of_matrices_keep_single_precision_on_a_gpu(name):
         products = [line for line in jax.jit(function).lower(single).as_text().splitlines() if "dot_general" in line]
         assert products
         assert all("precision = [HIGHEST, HIGHEST]" in line for line in products)
+
+
+@pytest.mark.parametrize("name", ["sphere:2", "hpd:2"])
+def test_fits_by_cyclic_reduction_are_those_of_the_core(name, monkeypatch):
+    """A GPU uses it in place of LAPACK."""
+    monkeypatch.setattr(jax.lax, "platform_dependent", lambda *arrays, cpu, default: default(*arrays))
+    space, points, _ = data(name, 0.5)
+    many = np.stack([points, space.exp(points, 0.1 * space.random_tangent(np.random.default_rng(2), points))])
+    u = jax.jit(lambda t, p: fit(t, p, space)[0])(T, many)
+    np.testing.assert_allclose(u, ss.CubicSpline(T, many, space).velocities, atol=1e-11)

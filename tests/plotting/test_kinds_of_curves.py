@@ -63,7 +63,7 @@ def test_gaps_between_segments_are_shaded_and_lines_stop(name):
     else:
         segments = [spline_on(name, t=T), spline_on(name, t=T + 15)]
     figure = rendered(ss.SegmentedCurve(segments).plot())
-    assert "2 segments (C² splines), 1 gap" in texts_of(figure)
+    assert "2 segments (C² spline), 1 gap" in texts_of(figure)
     axes = rate_axes(figure)[0][0]
     (band,) = [own for own in axes.collections if own.get_label() == "gaps"]
     assert sorted(set(band.get_paths()[0].vertices[:, 0])) == [5.3, 15.0]
@@ -74,7 +74,7 @@ def test_segments_that_meet_are_not_joined_where_velocities_differ():
     second = ss.CubicSpline([1, 2], [[1.0], [5.0]], "r:1")
     whole = ss.SegmentedCurve([ss.CubicSpline([0, 1], [[0.0], [1.0]], "r:1"), second])
     figure = whole.plot()
-    assert "2 segments (C² splines), 0 gaps" in texts_of(figure)
+    assert "2 segments (C² spline), 0 gaps" in texts_of(figure)
     first, last = lines_of(axes_named(figure, "velocity"))
     np.testing.assert_allclose(first[:, 1], 1.0)
     np.testing.assert_allclose(last[:, 1], 4.0)

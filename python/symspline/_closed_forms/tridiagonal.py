@@ -1,4 +1,4 @@
-"""Tridiagonal systems without steps from node to node, which a GPU would take one after another."""
+"""Block tridiagonal systems, solved in few operations on whole arrays, which suits GPUs."""
 
 from __future__ import annotations
 

@@ -189,7 +189,10 @@ class Curve:
         return np.where((far & self.bridges)[:, None], np.nan, positions)
 
     def graph(self, line: Array) -> Array:
-        """Return one number per sample, NaN in long gaps of a curve without a band, which no data determine."""
+        """Return one number per sample, NaN in long gaps unless the curve is a smoothing spline.
+
+        No data determine an interpolating spline there, and no band shows it.
+        """
         return line if self.noise is not None else self.outside_gaps(line[:, None])[:, 0]
 
     def marked(self, numbers: Callable[[Any], Array]) -> tuple[Array, Array]:

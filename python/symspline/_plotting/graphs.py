@@ -157,7 +157,7 @@ def _draw_angle(angles: Callable[[Any], Array], period: float, panel: SubFigure,
         line, given = curve.marked(angles)
         line = unwrapped(line)
         given = given + period * np.rint((curve.closest_samples(line) - given) / period)
-        draw_graph_of(axes, curve, np.degrees(line), np.degrees(given), np.degrees(1.0))
+        draw_graph_of(axes, curve, np.degrees(curve.graph(line)), np.degrees(given), np.degrees(1.0))
 
 
 # Points of S¹ have the angle of a unit vector. Points of RP¹ and Gr(1, 2) are lines, whose angle has the period π.

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from matplotlib import rcParams
 from matplotlib.artist import Artist
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
@@ -203,9 +204,13 @@ def _lengths(gaps: Array, axis: Axis) -> str:
     return f"gap of {length}" if len(gaps) == 1 else f"gaps of up to {length}"
 
 
+def _labels(axes: Axes) -> set[object]:
+    return {artist.get_label() for artist in axes.get_children()}
+
+
 def _explain(figure: Figure, curves: Sequence[Curve], height: float) -> None:
     """Explain lines, markers and bands in one line below the heading."""
-    drawn = {artist.get_label() for axes in figure.axes for artist in axes.get_children()}
+    drawn = set().union(*(_labels(axes) for axes in figure.axes))
     few = [curve for curve in curves if not curve.faint]
     dot: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 5}
     handles: list[Artist] = []
@@ -245,7 +250,8 @@ def _explain(figure: Figure, curves: Sequence[Curve], height: float) -> None:
     if GAPS in drawn:
         lengths = _lengths(np.unique(np.concatenate([own.gaps for own in few]), axis=0), few[0].axis)
         banded = few[0].noise is not None and few[0].noise.speed is not None
-        left_out = "curve" if BRIDGE not in drawn else "acceleration" if banded else "rates"
+        graphs = any(axes.get_gid() == "time" and _labels(axes) & {DOTS, START} for axes in figure.axes)
+        left_out = "acceleration" if banded else "curve" if graphs and BRIDGE not in drawn else "rates"
         between = any(len(own.breaks) for own in few)
         add(Patch(facecolor=GAP), f"{lengths} without data" + f", {left_out} not drawn" * (not between))
     if LIMIT in drawn:

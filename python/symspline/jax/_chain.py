@@ -49,19 +49,19 @@ def step_of(chain: Chain, given: tuple[bool, bool], t: Any, p: Any) -> Any:
 
 
 def _solved(below: Any, middle: Any, above: Any, rows: Any) -> Any:
-    def in_turn(below: Any, middle: Any, above: Any, rows: Any) -> Any:
+    def lapack(below: Any, middle: Any, above: Any, rows: Any) -> Any:
         below, middle, above = (a.astype(rows.dtype) for a in (below, middle, above))
         return jax.lax.linalg.tridiagonal_solve(below, middle, above, rows)
 
-    def at_once(below: Any, middle: Any, above: Any, rows: Any) -> Any:
+    def reduction(below: Any, middle: Any, above: Any, rows: Any) -> Any:
         below, middle, above = (a[:, None, None] for a in (below, middle, above))
-        return cyclic_reduction(jnp, _divided, below, middle, above, rows[:, None, :])[:, 0]
+        return cyclic_reduction(jnp, _solve_scalars, below, middle, above, rows[:, None, :])[:, 0]
 
     # On a GPU `tridiagonal_solve` takes one column of all curves after another: 10 000 curves take seconds.
-    return jax.lax.platform_dependent(below, middle, above, rows, cpu=in_turn, default=at_once)
+    return jax.lax.platform_dependent(below, middle, above, rows, cpu=lapack, default=reduction)
 
 
-def _divided(diagonal: Any, *columns: Any) -> Any:
+def _solve_scalars(diagonal: Any, *columns: Any) -> Any:
     return [a / diagonal for a in columns]
 
 

@@ -236,8 +236,8 @@ def _solved(jacobian: Any, rows: Any) -> Any:
     """Solve the block tridiagonal systems for the residuals of all nodes."""
     flat = rows.reshape(*jacobian.shape[:1], *jacobian.shape[2:-1], 1)
     below, diagonal, above = jacobian.unbind(1)
-    return cyclic_reduction(torch, _blocks_solved, below, diagonal, above, flat).reshape(rows.shape)
+    return cyclic_reduction(torch, _solve_blocks, below, diagonal, above, flat).reshape(rows.shape)
 
 
-def _blocks_solved(diagonal: Any, *columns: Any) -> Any:
+def _solve_blocks(diagonal: Any, *columns: Any) -> Any:
     return torch.linalg.solve(diagonal, torch.cat(columns, dim=-1)).split([a.shape[-1] for a in columns], dim=-1)
