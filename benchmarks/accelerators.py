@@ -2,8 +2,8 @@
 
 python -m benchmarks.accelerators
 
-JAX computes on its default device, PyTorch with CUDA where there is a GPU. Libraries that are
-not installed are omitted.
+JAX computes on its default device, PyTorch with CUDA where there is a GPU. Libraries that are not installed are
+omitted.
 """
 
 from __future__ import annotations
