@@ -120,6 +120,7 @@ def from_core(
         what = f"{pair} {past}"
         remedy = "put a point between them" + (", or check their sign" if quaternions else "")
     elif kind == "inner-handles":
+        about_times = True
         what = f"the control points between {pair} {past}"
         remedy = f"put a point between them, or {_SUIT}"
     elif kind == "outer-handle" and limit == float("inf"):

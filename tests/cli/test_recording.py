@@ -65,6 +65,19 @@ def test_means_are_those_of_the_library(run, name):
     assert [ss.load("b.npz")] == list(ss.fit_segments(t, p, space, max_gap=9, duplicates="mean"))
 
 
+def test_a_gap_that_no_curve_bridges_is_named_with_its_remedy(run, fails):
+    rng = np.random.default_rng(0)
+    t = np.arange(100) + 1000 * (np.arange(100) > 49)
+    walk = np.cumsum(0.05 * rng.standard_normal((100, 2)), axis=0)
+    p = np.column_stack([np.cos(walk[:, :1]) * [1, 1], np.sin(walk[:, :1])])
+    p = np.column_stack([p[:, 0] * np.cos(walk[:, 1]), p[:, 1] * np.sin(walk[:, 1]), p[:, 2]])
+    write_table("a.csv", {"t": t, "x": p[:, 0], "y": p[:, 1], "z": p[:, 2]})
+    problem = fails("fit a.csv --space sphere:2 -o a.npz", 1)
+    assert "no data between time 49.0 in line 51 and time 1050.0 in line 52, a gap of 1001 median steps" in problem
+    assert problem.endswith("cut it there (--max-gap), or smooth noisy data (--smooth)")
+    assert run("fit a.csv --space sphere:2 --max-gap 100 -o a.npz")
+
+
 def test_max_gap(run, fit, fails):
     line([0, 1, 2, 12, 13, 40, 60, 61])
     out = run("fit a.csv --space r:1 --max-gap 5 -o a.npz")

@@ -165,16 +165,6 @@ def test_contours_are_misorientations():
     np.testing.assert_allclose(np.abs(angles[:, None] - sorted(labels)).min(axis=1), 0, atol=0.05)
 
 
-def test_angles_between_rotations():
-    rng = np.random.default_rng(3)
-    first = ss.SpecialOrthogonal(3).random_point(rng)
-    axis = rng.standard_normal(3)
-    axis /= np.linalg.norm(axis)
-    angle = np.array([0, 1e-9, 0.3, 2.0, np.pi - 1e-9, np.pi])
-    others = first @ ss.rotations.from_rotation_vectors(angle[:, None] * axis)
-    np.testing.assert_allclose(fields.angles_between(first, others), angle, atol=1e-15, rtol=1e-7)
-
-
 def test_colors_of_directions():
     x, y, z = np.eye(3)
     colors = fields.direction_colors(np.stack([x, y, z, -x, -z]))

@@ -158,6 +158,28 @@ def test_the_two_times_are_named(close):
     assert caught.value.node == 20
 
 
+@loop_over("space", ["sphere:2", "so:3", "se:3", "so:3 x r:3"])
+def test_a_gap_in_which_the_curve_would_go_far_away_is_named(space):
+    rng = np.random.default_rng(1)
+    t = np.sort(rng.uniform(0, 100, 100))
+    t[50:] += 1000
+    turns = np.cumsum(0.05 * rng.standard_normal((100, 3)), axis=0)
+    rotations, positions = ss.rotations.from_rotation_vectors(turns), np.cumsum(rng.standard_normal((100, 3)), axis=0)
+    points = {
+        "sphere:2": rotations[:, :, 0],
+        "so:3": rotations,
+        "se:3": np.block([[rotations, positions[..., None]], [np.zeros((100, 1, 3)), np.ones((100, 1, 1))]]),
+        "so:3 x r:3": (rotations, positions),
+    }[space]
+    with pytest.raises(ss.ConvergenceError) as caught:
+        ss.CubicSpline(t, points, space)
+    assert caught.value.node == 49
+    assert f"no data between t[49] = {t[49]} and t[50] = {t[50]}, a gap of " in str(caught.value)
+    assert "cut it there (fit_segments), or smooth noisy data (make_smoothing_spline)" in str(caught.value)
+    # The advice works.
+    assert len(ss.fit_segments(t, points, space, max_gap=100)) == 2
+
+
 def test_times_too_close_are_named_in_batches_lists_products_and_dates():
     t, points = recording(1e-6)
     good = np.linspace(0, 10, 41)

@@ -22,7 +22,7 @@ from matplotlib.transforms import Affine2D
 
 from .._spaces import Space
 from .graphs import ANGLES
-from .matrices import outlines, quaternions, rotations
+from .matrices import MATRICES, ROTATIONS, outlines
 from .sphere import bloch_vectors
 from .style import EDGE, HALO, INK, Array, size
 from .theme import KEPT
@@ -246,7 +246,8 @@ def _draw_orientations(matrices: Callable[[Any], Array], panel: SubFigure, axes:
         key.text(at[0], at[1], name, color=INK, fontsize=9, **look)
     words = "rim: −x₃\n\nlines: misorien-\ntation to the\nringed node"
     key.text(0, -1.15, words, color=INK, fontsize=9, ha="center", va="top")
-    _contours(axes, field, np.degrees(angles_between(middle[0], frames)), "°", KEPT)
+    angles = field.at_pixels(lambda points: np.degrees(ROTATIONS.distance(middle, matrices(points))))
+    _contours(axes, field, angles, "°", KEPT)
 
 
 def direction_colors(vectors: Array) -> Array:
@@ -259,14 +260,6 @@ def direction_colors(vectors: Array) -> Array:
     saturation = 0.85 * np.where(light > 0.5, 2 * (1 - light), 1.0)
     colors = hsv_to_rgb(np.nan_to_num(np.stack([hue, saturation, value], axis=-1)))
     return np.where(np.isfinite(vectors), colors, np.nan)
-
-
-def angles_between(first: Array, others: Array) -> Array:
-    """Return the angles of the rotations from a matrix to others, accurate for small angles and for half turns."""
-    # The distance of the matrices is 2√2 sin(θ/2), and the trace of their quotient is 1 + 2 cos θ.
-    half_sine = np.linalg.norm(others - first, axis=(-2, -1)) / np.sqrt(8)
-    half_cosine = np.sqrt(np.maximum(1 + np.sum(others * first, axis=(-2, -1)), 0)) / 2
-    return np.asarray(2 * np.arctan2(half_sine, half_cosine))
 
 
 # ---- positive definite matrices ----
@@ -331,9 +324,7 @@ _DRAWN: list[tuple[str, Draw]] = [
     *((names, partial(_draw_angle, angles, period)) for names, (angles, period) in ANGLES.items()),
     ("sphere:2", partial(_draw_directions, np.asarray, "angle to x₃, degrees")),
     ("cp:1 cgr:1,2", partial(_draw_directions, bloch_vectors, "Bloch vector: angle to |0⟩, degrees")),
-    ("sphere:3", partial(_draw_orientations, rotations)),
-    ("so:3", partial(_draw_orientations, np.asarray)),
-    ("su:2", partial(_draw_orientations, lambda matrices: rotations(quaternions(matrices)))),
+    *((name, partial(_draw_orientations, MATRICES[name])) for name in ("sphere:3", "so:3", "su:2")),
     ("spd:2", draw_flat_tensors),
     ("spd:3", draw_tensors),
 ]

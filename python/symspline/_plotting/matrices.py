@@ -21,8 +21,9 @@ from matplotlib.figure import SubFigure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from .._quaternions import rotation_rows
-from .._spaces import cover_of
+from .._core import convert_rotations
+from .._quaternions import matrices_of_quaternions
+from .._spaces import SpecialOrthogonal, cover_of
 from .chart import SHADOW, box, explain_frames, frame_handles, plane, shadow_colors
 from .curves import BODIES, BODY, BODY_COLOR, POSES, START, Curve
 from .graphs import draw_coordinates
@@ -30,6 +31,7 @@ from .rows import REACH, VIEW, Rows
 from .sphere import caps
 from .style import AXES, INK, Array, apart, axes_size, legend, note, points, round_below, time_colors, window
 
+ROTATIONS = SpecialOrthogonal(3)
 _LENGTH = 0.14
 """Distance in inches from the position of a body in the plane to its tip."""
 _MANY = 24
@@ -76,7 +78,8 @@ def are_graphs(curves: Sequence[Curve]) -> bool:
     if matrices is None or not all(curve.alone for curve in curves):
         return False
     first = matrices(curves[0].first_point)
-    largest = max(_turns(matrices(curve.extent), first).max() for curve in curves)
+    # Points of O(3) have one determinant along a curve.
+    largest = max(ROTATIONS.distance(np.eye(3), first.T @ matrices(curve.extent)).max() for curve in curves)
     return bool(largest < _SMALL or (largest < _LARGE and any(len(curve.gaps) for curve in curves)))
 
 
@@ -98,19 +101,9 @@ def _draw_rotation_vectors(panel: SubFigure, curves: Sequence[Curve]) -> None:
     draw_coordinates(panel, curves, names, numbers, growth, "rotation vector from the first point, rad")
 
 
-def _turns(matrices: Array, first: Array) -> Array:
-    """Return the angles in radians of rotations from a first matrix, shape (m,)."""
-    # ‖R − S‖² is 8 sin²(θ/2), and 8 for matrices of different determinants.
-    return np.asarray(2 * np.arcsin(np.minimum(np.linalg.norm(matrices - first, axis=(1, 2)) / np.sqrt(8), 1)))
-
-
 def _rotation_vectors(matrices: Array, first: Array) -> Array:
     """Return the rotation vectors of rotations from a first matrix, shape (m, 3)."""
-    steps = matrices @ first.T
-    twice = np.stack([steps[:, k - 1, k - 2] - steps[:, k - 2, k - 1] for k in range(3)], axis=-1)
-    sines = np.linalg.norm(twice, axis=1, keepdims=True) / 2
-    angles = np.arctan2(sines, (np.trace(steps, axis1=1, axis2=2)[:, None] - 1) / 2)
-    return np.asarray(twice / 2 * np.divide(angles, sines, out=np.ones_like(angles), where=sines > 0))
+    return convert_rotations(np.ascontiguousarray(matrices @ first.T), "matrix", "vector", 1e-7)[0]
 
 
 def _left_out(rows: Rows, curves: Sequence[Curve]) -> str:
@@ -118,11 +111,6 @@ def _left_out(rows: Rows, curves: Sequence[Curve]) -> str:
     return (
         f"{len(rows.rows)} of {len(curves)} curves" if rows.rows[0].name == "" and len(rows.rows) < len(curves) else ""
     )
-
-
-def rotations(quaternions: Array) -> Array:
-    """Return the rotation matrices of unit quaternions w, x, y, z; shape (..., 3, 3)."""
-    return np.moveaxis(np.array(rotation_rows(*np.moveaxis(quaternions, -1, 0))), (0, 1), (-2, -1))
 
 
 def quaternions(matrices: NDArray[Any]) -> Array:
@@ -133,10 +121,10 @@ def quaternions(matrices: NDArray[Any]) -> Array:
 
 # Points of S³ are unit quaternions, scalar first. Those of SU(2) act on R³ as rotations.
 MATRICES: dict[str, Callable[[Any], Array]] = {
-    "sphere:3": rotations,
+    "sphere:3": matrices_of_quaternions,
     "so:3": np.asarray,
     "o:3": np.asarray,
-    "su:2": lambda matrices: rotations(quaternions(matrices)),
+    "su:2": lambda matrices: matrices_of_quaternions(quaternions(matrices)),
 }
 """Matrices of rotations, shape (..., 3, 3)."""
 

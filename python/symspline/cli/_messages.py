@@ -17,11 +17,14 @@ from .._spaces.base import CLASSES
 _NAMES = {cls.__name__: name for name, cls in CLASSES.items()}
 _SPACE = re.compile(rf"\b({'|'.join(_NAMES)})\((.*?)\)")
 _ALL_SPACES = re.compile("known names are .*")
-_FOR_PYTHON = (
-    "; use space.project(x) if these are meant to be points",
-    " (np.linalg.qr gives an orthonormal basis)",
-    ", or raise max_iter",
-)
+_FOR_PYTHON = {
+    "; use space.project(x) if these are meant to be points": "",
+    " (np.linalg.qr gives an orthonormal basis)": "",
+    ", or raise max_iter": "",
+    "fit_segments": "--max-gap",
+    "make_smoothing_spline": "--smooth",
+}
+"""Advice in messages of the library, and the same for the command line."""
 
 # Messages may quote any part of a file.
 _LONGEST = 1000
@@ -53,10 +56,10 @@ def refuse(where: object, *checks: tuple[object, str]) -> None:
 
 
 def for_command_line(error: Exception) -> str:
-    """Return a message of the library without advice for Python, and with so:3 for SpecialOrthogonal(3)."""
+    """Return a message of the library with advice for the command line, and with so:3 for SpecialOrthogonal(3)."""
     message = str(error)
-    for advice in _FOR_PYTHON:
-        message = message.replace(advice, "")
+    for advice, own in _FOR_PYTHON.items():
+        message = message.replace(advice, own)
     message = _ALL_SPACES.sub("symspline info lists the names", message)
     return _SPACE.sub(lambda space: f"{_NAMES[space[1]]}:{space[2].replace(' ', '')}", message)
 
