@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._arrays import checked_flag, checked_number, short_repr
+from ._composed import SegmentedCurve
 from ._core import ValidationError
 from ._cubic import CubicSpline
 from ._estimation.along import Motion
@@ -426,7 +427,7 @@ def _step(every: Any) -> Any:
 
 @overload
 def plot(
-    spline: CubicSpline[Any, Any],
+    spline: CubicSpline[Any, Any] | SegmentedCurve[Any, Any],
     file: File | None = None,
     *,
     radius: float = EARTH_RADIUS,
@@ -437,7 +438,7 @@ def plot(
 
 @overload
 def plot(
-    spline: CubicSpline[Any, Any],
+    spline: CubicSpline[Any, Any] | SegmentedCurve[Any, Any],
     file: None = None,
     *,
     radius: float = EARTH_RADIUS,
@@ -447,7 +448,7 @@ def plot(
 
 
 def plot(
-    spline: CubicSpline[Any, Any],
+    spline: CubicSpline[Any, Any] | SegmentedCurve[Any, Any],
     file: File | None = None,
     *,
     radius: float = EARTH_RADIUS,
@@ -465,7 +466,7 @@ def plot(
 
     Parameters
     ----------
-    spline : CubicSpline
+    spline : CubicSpline or SegmentedCurve
         Curve on ``Sphere(2)``, or a batch of curves.
     file : str, path or file object, optional
         File to which the figure is saved, such as ``"track.pdf"``.
@@ -566,7 +567,7 @@ def _fitted(curves: list[tuple[Any, Any]], names: list[str], smooth: bool, optio
     return found
 
 
-def _check_globe(spline: CubicSpline[Any, Any]) -> None:
+def _check_globe(spline: CubicSpline[Any, Any] | SegmentedCurve[Any, Any]) -> None:
     check_timed(spline)
     if str(spline.space) != "sphere:2":
         raise ValidationError(f"the curve must be on Sphere(2), not on {spline.space!r}")

@@ -109,6 +109,16 @@ def test_columns_of_complex_numbers(run):
 HALVES = "t,a_re,a_im,b_re,b_im\n0,1,0,0,0\n1,0.6,0,0,0.8\n"
 
 
+def test_a_column_may_stand_on_both_sides_of_a_symmetric_matrix(run):
+    write("a.csv", "t,a,b,c\n0,1,0.1,2\n1,2,0.3,3\n3,2,0.1,1\n")
+    run("fit a.csv --space spd:2 --columns a,b,b,c -o a.npz")
+    spline = ss.load("a.npz")
+    np.testing.assert_array_equal(spline.points[1], [[2, 0.3], [0.3, 3]])
+    run("sample a.npz -n 4 --nu 0,1 -o b.csv")
+    assert list(table("b.csv")) == ["t", "a", "b", "c", "a_d1", "b_d1", "c_d1"]
+    np.testing.assert_allclose(numbers(table("b.csv"), "b")[1], spline(1.0)[0, 1:], rtol=1e-14)
+
+
 def test_bad_columns_of_complex_numbers_and_matrices(fails):
     real, empty = "a complex number where a real one belongs: a point of", HALVES.replace("0,1,0,0,0", "0,1,0,0,")
     extra = HALVES.replace("t,a", "t,x,a").replace("\n0,", "\n0,0,").replace("\n1,", "\n1,0,")

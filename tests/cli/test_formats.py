@@ -38,7 +38,12 @@ def test_formats_write_the_same(run):
     texts = table("out.csv")
     assert Path("out.CSV").read_bytes() == Path("out.csv").read_bytes()
     arrays, columns = np.load("out.npz"), parquet.read_table("out.parquet")
-    assert list(texts) == list(arrays) == columns.column_names
+    assert list(texts) == list(arrays)[:-1] == columns.column_names
+    # The dates of an NPZ file are in UTC if it says so.
+    assert arrays["time_zone"] == "UTC"
+    run("fit out.npz --lonlat -o again.npz")
+    run("sample again.npz -n 2 -o again.csv")
+    assert table("again.csv")["time"] == ["2021-08-29T00:00:00Z", "2021-08-29T18:00:00Z"]
     assert columns.schema.field("time").type.tz == "UTC"
     assert [text.removesuffix("Z") for text in texts["time"]] == arrays["time"].astype(str).tolist()
     np.testing.assert_array_equal(arrays["time"], columns["time"].to_numpy())
@@ -92,7 +97,10 @@ def test_parquet_of_all_kinds(run, fails):
     np.testing.assert_array_equal(made["b"].points, [[3, 1.5], [4, 1.5]])
     assert str(made["a"].t[1]) == "2020-01-02"
     problem = fails("fit a.parquet --space r:3 --curve id -o b.npz")
-    assert problem == "a.parquet, row 1 (counted from 0): column 'z' is empty or NaN"
+    assert (
+        problem
+        == "a.parquet, row 1 (counted from 0): column 'z' is empty or NaN; symspline fit --skipna omits such rows"
+    )
     Path("b.parquet").write_bytes(Path("a.parquet").read_bytes()[:300])
     assert fails("fit b.parquet --space r:3 -o b.npz") == "b.parquet is damaged or not a Parquet file"
 

@@ -1,6 +1,7 @@
 """Grids of points: ``symspline grid``."""
 
 import io
+import os
 import shlex
 import subprocess
 import sys
@@ -90,11 +91,36 @@ def test_splines_are_saved_and_sampled(wind, run, fails):
     run("grid spline.npz --points 5,6 -o a.npz")
     run("grid wind.npz --space s:2 --points 5,6 -o b.npz")
     a, b = arrays("a.npz"), arrays("b.npz")
-    assert list(a) == ["axis0", "axis1", "points"]
+    assert list(a) == list(b) == ["lat", "lon", "points"]
     np.testing.assert_array_equal(a["points"], b["points"])
+    # Positions are found by the names of the axes.
+    np.savez("to.npz", lat=a["lat"], lon=a["lon"])
+    run("grid spline.npz --to to.npz -o c.npz")
+    np.testing.assert_array_equal(arrays("c.npz")["points"], b["points"])
+    os.remove("c.npz")
+    np.savez("to.npz", lat=[1e6], lon=a["lon"])
+    problem = fails("grid spline.npz --to to.npz -o c.npz")
+    assert problem.startswith("the coordinate 1000000.0 is outside axis 0, which extends from ")
+    assert "pass" not in problem
     assert fails("grid spline.npz -o c.npz") == "spline.npz: this is a spline; give --to, --zoom or --points"
     assert "for which --space cannot be given" in fails("grid spline.npz --space s:2 --zoom 2 -o c.npz")
     assert fails("sample spline.npz -n 5 -o c.csv") == "spline.npz is a grid; see symspline grid --help"
+
+
+def test_axes_in_another_order_than_the_points_are_named(wind, fails):
+    found = arrays("wind.npz")
+    np.savez("b.npz", **{name: found[name] for name in ("lon", "lat", "points")})
+    problem = fails("grid b.npz --space s:2 -o c.npz")
+    assert problem == (
+        "b.npz: lon has 8 positions and lat has 6 positions, but the points have 6 x 8 nodes; give --axes lat,lon"
+    )
+
+
+def test_info_of_a_grid(wind, run):
+    out = run("info wind.npz")
+    assert out.startswith("wind.npz: arrays of different lengths, such as a grid; see symspline grid --help\n")
+    assert "  lat: 6 numbers\n" in out
+    assert "  points: 6 x 24 numbers\n" in out
 
 
 def test_missing_points_and_axes_without_names(wind, run):

@@ -94,6 +94,15 @@ def test_info_of_tables(run):
     assert "usual step 1\n" in run("info e.csv --time hours")
 
 
+def test_info_of_gaps_beside_repeated_times(run, fails):
+    write("a.csv", "t,x\n" + "".join(f"{t},{t}\n" for t in (0, 1, 2, 3, 43, 44, 45, 45)))
+    assert "1 repeated time, 1 long gap, up to 40\n" in run("info a.csv")
+    assert fails("info a.csv --time x2") == "a.csv has no column 'x2'; did you mean 'x'?"
+    np.savez("a.npz", t=np.arange(3), points=np.ones((3, 20)))
+    out = run("info a.npz")
+    assert "  points_11: 1.0 to 1.0\n  ... points_19: points has 20 columns\n" in out
+
+
 def test_info_of_curves(run, curves):
     out = run("info a.npz")
     assert out.startswith("a.npz: 1 curve on sphere:2, columns x, y, z\n  3 nodes, 0.0 to 3.0; natural ends, residual ")

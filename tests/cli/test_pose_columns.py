@@ -112,11 +112,14 @@ def test_rounded_and_invalid_quaternions(run, fails):
     write_table("a.csv", {"t": TIMES, **dict(zip(WXYZ, Q.round(6).T, strict=True))})
     run("fit a.csv --space so:3 -o a.npz")
     np.testing.assert_allclose(ss.load("a.npz").points, TURNS.as_matrix(), atol=5e-6)
+    write_table("a.csv", {"t": TIMES, **dict(zip(WXYZ, Q.round(3).T, strict=True))})
+    run("fit a.csv --space so:3 -o a.npz")
+    np.testing.assert_allclose(ss.load("a.npz").points, TURNS.as_matrix(), atol=5e-3)
     off = Q.copy()
-    off[3] *= 1.001
+    off[3] *= 1.01
     write_table("a.csv", {"t": TIMES, **dict(zip(WXYZ, off.T, strict=True))})
     problem = fails("fit a.csv --space so:3 -o b.npz")
-    assert problem.startswith("a.csv, line 5: the quaternion has length 1.001, not 1")
+    assert problem.startswith("a.csv, line 5: the quaternion has length 1.01, not 1")
 
 
 TUM = "# a comment\n" + "".join(

@@ -65,6 +65,33 @@ def test_means_are_those_of_the_library(run, name):
     assert [ss.load("b.npz")] == list(ss.fit_segments(t, p, space, max_gap=9, duplicates="mean"))
 
 
+@pytest.mark.parametrize("ending", ["csv", "npz", "parquet"])
+def test_rows_with_empty_cells_are_omitted_on_request(ending, run, fails):
+    if ending == "csv":
+        write("a.csv", "t,x,note\n0,1,\n1,,a\n2,NA,b\n,4,c\n4,nan,d\n5,9,\n6,4,e\n")
+    else:
+        write_table(f"a.{ending}", {"t": [0.0, 1, np.nan, 5, 6], "x": [1, np.nan, 3, 9, 4]})
+    problem = fails(f"fit a.{ending} --space r:1 --columns x -o b.npz")
+    assert "symspline fit --skipna omits such rows" in problem
+    out = run(f"fit a.{ending} --space r:1 --columns x --skipna -o b.npz")
+    assert f"; {4 if ending == 'csv' else 2} rows with empty cells omitted (--skipna)" in out
+    assert ss.load("b.npz") == through([0, 5, 6], [1, 9, 4])
+    write("a.csv", "t,x\n0,\n1,\n")
+    problem = fails("fit a.csv --space r:1 --columns x --skipna -o c.npz")
+    assert problem == "a.csv has no row in which x and t are all given"
+
+
+def test_lines_are_those_of_the_file_without_rows_that_are_omitted(fails):
+    write("a.csv", "t,x\n0,1\n1,\n2,5\n1.5,3\n")
+    assert fails("fit a.csv --space r:1 --skipna -o a.npz").startswith("a.csv, line 5: time 1.5 does not come")
+
+
+def test_numbers_between_semicolons_may_have_commas(run):
+    write("a.csv", "t;x\n0,0;1,5\n0,5;2,5\n1,5;3,5\n")
+    run("fit a.csv --space r:1 -o a.npz")
+    assert ss.load("a.npz") == through([0, 0.5, 1.5], [1.5, 2.5, 3.5])
+
+
 def test_a_gap_that_no_curve_bridges_is_named_with_its_remedy(run, fails):
     rng = np.random.default_rng(0)
     t = np.arange(100) + 1000 * (np.arange(100) > 49)

@@ -125,6 +125,36 @@ FAR = np.array(["300000-01-01", "300000-01-03"], "datetime64[D]")
 FINE, LONG = np.array([1, 2], "datetime64[as]"), np.array([-(2**62) - 1, 2**62 + 1], "datetime64[s]")
 
 
+@pytest.mark.parametrize(("unit", "scale"), [("ns", 10**9), ("us", 10**6), ("ms", 10**3), ("s", 1)])
+def test_numbers_since_1970(unit, scale, run, fails):
+    start = 1_717_200_000
+    write("a.csv", "stamp,x\n" + "".join(f"{(start + i) * scale},{i * i}\n" for i in range(4)))
+    advice = f"--time stamp, with --unix if it counts from 1970, or --time {'none'}"
+    assert advice in fails("fit a.csv --space r:1 -o a.npz")
+    run(f"fit a.csv --space r:1 --time stamp --unix {unit} -o a.npz")
+    spline = ss.load("a.npz")
+    assert spline.t[0] == np.datetime64("2024-06-01T00:00:00")
+    assert (np.diff(spline.t) == np.timedelta64(1, "s")).all()
+    problem = fails("sample a.npz --at a.csv -o b.csv")
+    assert problem.endswith("are dates, but these are numbers; give --unix if they count from 1970")
+    run(f"sample a.npz --at a.csv --unix {unit} -o b.csv")
+    assert table("b.csv")["x"] == ["0.0", "1.0", "4.0", "9.0"]
+    assert table("b.csv")["stamp"][1] == "2024-06-01T00:00:01.000000000Z"
+    write("c.csv", "t,x\n2020-01-01,0\n2020-01-02,1\n")
+    assert fails(f"fit c.csv --space r:1 --unix {unit} -o c.npz") == (
+        "--unix is for times that are numbers; column 't' has dates"
+    )
+
+
+def test_fractions_of_a_second_since_1970(run, fails):
+    write("a.csv", "t,x\n1717200000.25,0\n1717200001.5,1\n")
+    run("fit a.csv --space r:1 --unix s -o a.npz")
+    expected = np.array(["2024-06-01T00:00:00.25", "2024-06-01T00:00:01.5"], "datetime64[ns]")
+    np.testing.assert_array_equal(ss.load("a.npz").t, expected)
+    write("a.csv", "t,x\n1e12,0\n2e12,1\n")
+    assert "is too far from 1970" in fails("fit a.csv --space r:1 --unix s -o b.npz")
+
+
 def test_invalid_steps(fails):
     for knots, option, found in [
         (DAY, "--every=0", "larger than zero"),

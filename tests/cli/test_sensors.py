@@ -87,6 +87,7 @@ def test_attitudes_and_rates_at_different_times(run, line, options):
         f"degrees of freedom; residuals {report.sigma:.3g} times the given standard deviations\ngyro bias: {each}\n"
     )
     assert np.all(np.abs(bias.value - BIAS) < 5 * bias.std)
+    assert run("info a.npz").endswith(f"; gyro bias: {each}\n")
     if options:
         x = KNOTS[5:-5]
         plain = ss.make_smoothing_spline(POINTS, SEEN, "so:3")

@@ -26,6 +26,26 @@ def test_curves_in_one_file(run):
     assert "<svg" in Path("b.svg").read_text(encoding="utf-8")
 
 
+def test_several_recordings_that_were_cut_at_gaps(run, fails):
+    """Each time belongs to its segment, and times in gaps to none, under the names of the table."""
+    rows = [(t, "a", t / 10) for t in (0, 1, 2, 43, 44, 45)] + [(t, "b", -t) for t in (0, 1, 2)]
+    write("a.csv", "t,id,x\n" + "".join(f"{t},{name},{x}\n" for t, name, x in rows))
+    run("fit a.csv --space r:1 --columns x --curve id --max-gap 10 --extrapolate geodesic -o a.npz")
+    assert list(ss.load("a.npz")) == ["a/1", "a/2", "b"]
+    write("at.csv", "t\n44.5\n1.5\n30\n")
+    out = run("sample a.npz --curve a --at at.csv -o out.csv", notes=True)
+    assert "1 of 3 times lie in gaps between segments, and are omitted" in out
+    columns = table("out.csv")
+    assert columns["id"] == ["a/2", "a/1"]
+    np.testing.assert_allclose(numbers(columns, "t", "x"), [[44.5, 4.45], [1.5, 0.15]], atol=1e-12)
+    write("at.csv", "t,id\n44.5,a\n1.5,b\n1,a/1\n")
+    run("sample a.npz --at at.csv -o out.csv")
+    assert table("out.csv")["id"] == ["a/2", "b", "a/1"]
+    np.testing.assert_allclose(numbers(table("out.csv"), "x")[:, 0], [4.45, -1.5, 0.1], atol=1e-12)
+    run("plot a.npz --curve a -o a.svg")
+    assert fails("plot a.npz -o b.svg") == "a.npz has 2 curves; say which with --curve: a, b"
+
+
 def test_one_curve_with_a_name_is_a_collection_too(run):
     write("pair.csv", "\n".join(line for line in PAIR.splitlines() if not line.startswith("b")))
     run("fit pair.csv --space s:2 --curve id -o one.npz")

@@ -27,7 +27,17 @@ def times(run):
 
 
 def test_dates_under_a_usual_name_are_the_time(run, times):
-    names = ["timestamp", "ISO_TIME", "Date", "DateTime", "date_time", "#timestamp [ns]", "BaseDateTime", "Date (UTC)"]
+    names = [
+        "timestamp",
+        "ISO_TIME",
+        "Date",
+        "DateTime",
+        "date_time",
+        "#timestamp [ns]",
+        "BaseDateTime",
+        "Date (UTC)",
+        "header.stamp",
+    ]
     for name in [*names, "utc"]:
         assert times("", **{name: DATES}) == HOURS.astype("M8[s]").tolist()
         run("sample a.npz --every 6h -o b.csv")
@@ -61,6 +71,9 @@ def test_columns_that_may_hold_the_times_raise(fails, times):
         ({"when": ["", "2021-08-30", "2021-08-31"]}, "when"),
         ({"seen": [20210829, 20210831, 20210901]}, "seen"),
         ({"timestamp": [0, 5, 9]}, "timestamp"),
+        ({"stamp_ns": [0, 5, 9]}, "stamp_ns"),
+        ({"rosbagTimestamp": [0, 5, 9]}, "rosbagTimestamp"),
+        ({"sec": [0, 5, 9]}, "sec"),
         ({"time_ns": [0, 5, 9]}, "time_ns"),
         ({"year": [2001, 2002, 2005]}, "year"),
         ({"Date": [20210829, 20210830, 20210831]}, "Date"),

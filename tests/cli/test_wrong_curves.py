@@ -1,5 +1,7 @@
 """Tables that would silently give wrong curves raise an error or a warning."""
 
+from pathlib import Path
+
 import numpy as np
 from compare import parts
 from tabular import read_table, write
@@ -33,6 +35,32 @@ def test_equal_times_of_several_tracks_suggest_their_column_first(run, fails):
                 if order == "by time" and not options:
                     run("fit ships.csv --lonlat --curve ship -o a.npz")
                     assert len(ss.load("a.npz")) == 3
+
+
+def test_some_rows_that_occur_twice_do_not_hide_the_column(run, fails):
+    ships("by time")
+    text = Path("ships.csv").read_text()
+    write("ships.csv", text + text.splitlines()[-1] + "\n")
+    assert "; --curve ship fits one curve per ship; otherwise " in fails("fit ships.csv --lonlat -o a.npz")
+    assert "--curve ship fits one curve per ship\n" in run("info ships.csv")
+
+
+def test_tracks_without_times_are_reported(run):
+    rows = [f"{lon},{lat},{name}" for name, lat in (("ann", 50), ("bob", 10)) for lon in range(4)]
+    write("ships.csv", "lon,lat,ship\n" + "\n".join(rows) + "\n")
+    out = run("fit ships.csv --lonlat -o a.npz", notes=True)
+    assert "; no column of times: the points are at 0, 1, 2, ...\n" in out
+    assert "column 'ship' has one block of rows for each of its texts" in out
+    assert "fit each of them with --curve ship\n" in out
+    assert "--curve ship fits one curve per ship\n" in run("info ships.csv")
+    assert "no column of times" not in run("fit ships.csv --lonlat --curve ship --time none -o a.npz")
+
+
+def test_two_curves_never_share_a_file(run, fails):
+    write("a.csv", "t,id,x\n0,a/1,0\n1,a/1,1\n0,a_1,5\n1,a_1,6\n")
+    run("fit a.csv --space r:1 --columns x --curve id -o a.npz")
+    problem = fails("sample a.npz -n 2 -o 'b_{curve}.csv'")
+    assert problem == "-o b_{curve}.csv: two curves would have the file b_a_1.csv; choose one with --curve"
 
 
 def test_merged_tracks_are_reported(run):

@@ -17,6 +17,9 @@ from ._messages import Problem, refuse
 from ._streams import Source
 from ._tables import IM, RE, Array, Layout, Table, Texts
 
+_ZONE = "time_zone"
+"""The entry of an NPZ file with the time zone of its dates."""
+
 # ---- NPZ ----
 
 
@@ -43,12 +46,14 @@ def read_npz(path: Source) -> Table:
             own = {name + end: part for name, z in own.items() for end, part in ((RE, z.real), (IM, z.imag))}
         groups[key] = [*own]
         columns |= {name: Texts(own.tolist()) if own.dtype.kind == "U" else own for name, own in own.items()}
-    return Table(path, columns, groups=groups)
+    utc = _ZONE in arrays and arrays[_ZONE].shape == () and str(arrays[_ZONE]) == "UTC"
+    return Table(path, columns, groups=groups, is_utc=dict.fromkeys(columns, True) if utc else None)
 
 
 def write_npz(file: BinaryIO, columns: Mapping[str, Array], layout: Layout) -> None:
-    """Write an NPZ file with one array per column."""
-    np.savez(file, **columns)  # type: ignore[arg-type]
+    """Write an NPZ file with one array per column and, for dates in UTC, the text ``time_zone``."""
+    zone = {_ZONE: np.array("UTC")} if layout.utc and _ZONE not in columns else {}
+    np.savez(file, **columns, **zone)  # type: ignore[arg-type]
 
 
 # ---- Parquet ----

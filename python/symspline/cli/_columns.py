@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from .._spaces import Space
+from .._spaces import Space, factors_of
 from ._messages import Problem, first_duplicate, listed, refuse
 from ._points import (
     IN_BRACKETS,
@@ -19,6 +19,7 @@ from ._points import (
     count_with_quaternion,
     described,
     in_order,
+    matrix,
     points_of,
     quaternion_by_names,
 )
@@ -30,12 +31,12 @@ NUMBERED = "none"
 ORDERS = ("wxyz", "xyzw")
 _HALVES = {RE: IM, IM: RE}
 
-# Names of times without blanks and marks: "BaseDateTime", "#timestamp [ns]", "ISO_TIME".
+# Names of times without blanks and marks: "BaseDateTime", "#timestamp [ns]", "ISO_TIME", "header.stamp".
 _TIME = re.compile(
-    "(iso|utc|gmt|unix|posix|base|local)*(t|times?|timestamps?|dates?|datetime|utc|epoch)"
+    "(iso|utc|gmt|unix|posix|base|local|header|rosbag)*(t|times?|(time)?stamps?|dates?|datetime|utc|epoch)"
     "(iso|utc|gmt|unix|local)*(s|ms|us|ns|secs?|seconds?|nsec)?"
 )
-_TIME_PART = re.compile("year|month|day|doy|hours?|minutes?|seconds?|jd|mjd")
+_TIME_PART = re.compile("year|month|day|doy|hours?|minutes?|secs?|seconds?|nsecs?|nanosecs?|jd|mjd")
 # A day as one number, 20210829, in a column that is called a date, and in any other column.
 _PACKED, _PACKED_NOW = (10_000_101, 99_991_231), (19_000_101, 20_991_231)
 
@@ -67,9 +68,10 @@ def time_column(table: Table, given: str | None, others: Sequence[str | None]) -
     if not found:
         return None
     what = "hold the times" if len(found) == 1 else "all belong to the times, which stand in one column"
+    unit = ", with --unix if it counts from 1970" if found[0] in table.numeric else ""
     raise Problem(
-        f"{table.path}: {listed(found)} may {what}; say --time {found[0]}, or --time {NUMBERED} to number the points "
-        "0, 1, 2, ..."
+        f"{table.path}: {listed(found)} may {what}; say --time {found[0]}{unit}, or --time {NUMBERED} to number the "
+        "points 0, 1, 2, ..."
     )
 
 
@@ -96,25 +98,28 @@ def check_days(table: Table, name: str | None, rows: Rows) -> None:
 
 
 def column_of_names(table: Table, time: str | None, used: Sequence[str | None]) -> str | None:
-    """Return an unused column that distinguishes rows of equal times: it may hold the names of several curves.
+    """Return an unused column that may hold the names of several curves.
 
-    Each of its values occurs in two rows or more, never twice at one time.
+    Each of its values occurs in two rows or more. It distinguishes most of the rows of equal times or, if there are no
+    times, it is a text whose values have one block of rows each.
     """
-    if time is None:
-        return None
-    times = table.read([], time, None).times
+    times = np.empty(0) if time is None else table.read([], time, None).times
+    repeated = len(times) - len(np.unique(times))
     for name in table.names:
-        if name in used or name in table.dates:
+        if name in used or name in table.dates or (time is None and name in table.numeric):
             continue
         # A cell may be empty, or not hold a text.
         with suppress(Problem):
             labels = np.unique(np.array(table.labels(name)), return_inverse=True)[1]
-            if len(labels) != len(times):
+            if labels.max() == 0 or np.bincount(labels).min() < 2:
                 continue
-            order = np.lexsort((times, labels))
-            same = (np.diff(labels[order]) == 0) & (times[order][1:] == times[order][:-1])
-            if labels.max() > 0 and np.bincount(labels).min() > 1 and not same.any():
+            if time is None and np.count_nonzero(np.diff(labels)) == labels.max():
                 return name
+            if time is not None and len(labels) == len(times):
+                order = np.lexsort((times, labels))
+                same = (np.diff(labels[order]) == 0) & (times[order][1:] == times[order][:-1])
+                if not same.any() or 2 * np.count_nonzero(same) < repeated:
+                    return name
     return None
 
 
@@ -171,8 +176,10 @@ def _paired(columns: Sequence[str]) -> list[Entry]:
     for column in columns:
         both = (column[:-3] + RE, column[:-3] + IM)
         paired = column in both and set(both) <= set(columns)
-        entries.append((column[:-3], *both) if paired else (column, column))
-    return list(dict.fromkeys(entries))
+        entry = (column[:-3], *both) if paired else (column, column)
+        if not (paired and entry in entries):
+            entries.append(entry)
+    return entries
 
 
 def split_names(text: str | None) -> list[str]:
@@ -195,7 +202,9 @@ def point_columns(
     entries = [entry for group in groups for entry in _paired(group)]
     names, count = [name for name, *_ in entries], count_with_quaternion(space)
     for used in (columns, names):
-        twice = first_duplicate([*filter(None, others), *used])
+        # A column may stand on both sides of a symmetric matrix.
+        own = dict.fromkeys(used) if any(map(matrix, factors_of(space))) else used
+        twice = first_duplicate([*filter(None, others), *own])
         refuse("column ", (twice is not None, f"{twice!r} of {table.path} cannot have two meanings"))
     if len(names) == count:
         return PointColumns(table.path, space, entries, lonlat, _quaternion_columns(names, space, order))
@@ -211,10 +220,12 @@ def point_columns(
 def _lonlat(table: Table) -> list[str]:
     """The first column of each pair of names, whatever their case."""
     lower = {name.lower(): name for name in reversed(table.names)}
-    columns = [lower.get(short) or lower.get(long) for short, long in (("lon", "longitude"), ("lat", "latitude"))]
+    columns = [
+        next(filter(None, map(lower.get, names)), None) for names in (("lon", "lng", "longitude"), ("lat", "latitude"))
+    ]
     if None in columns:
         raise Problem(
-            f"{table.path}: --lonlat needs columns lon and lat, or longitude and latitude, or two --columns; "
+            f"{table.path}: --lonlat needs columns lon (or lng) and lat, or longitude and latitude, or two --columns; "
             f"there are {listed(table.names)}"
         )
     return [name for name in columns if name]

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .._archive import json_in, read
 from .._arrays import brief
@@ -53,6 +54,17 @@ class Curves:
     segmented: bool = False
     file: Source | None = None
 
+    @property
+    def recordings(self) -> dict[str, list[str]]:
+        """The names of the segments of every recording that was cut at gaps, and of every other curve itself."""
+        if self.segmented:
+            return {"": list(self.splines)}
+        found: dict[str, list[str]] = {}
+        for name in self.splines:
+            base, _, number = name.rpartition("/")
+            found.setdefault(base if self.columns.cut and number.isdecimal() else name, []).append(name)
+        return found
+
     def called(self, name: str) -> str:
         """Refer to a curve in a message."""
         return f"{'segment' if self.segmented else 'curve'} {name!r}" if self.named else "the curve"
@@ -78,9 +90,13 @@ def write_curves(path: Path, curves: Curves) -> None:
     with writing(path) as temporary:
         with open(temporary, "wb") as file:
             save(splines, file)
-        columns = np.array(json.dumps(asdict(curves.columns)))
-        with zipfile.ZipFile(temporary, "a") as archive, archive.open(f"{_COLUMNS}.npy", "w") as entry:
-            np.lib.format.write_array(entry, columns)
+        add_entry(temporary, _COLUMNS, np.array(json.dumps(asdict(curves.columns))))
+
+
+def add_entry(path: Path, name: str, array: NDArray[np.str_]) -> None:
+    """Add an entry to a file of curves or of a grid, which the library ignores."""
+    with zipfile.ZipFile(path, "a") as archive, archive.open(f"{name}.npy", "w") as entry:
+        np.lib.format.write_array(entry, array)
 
 
 def read_curves(path: Path, lonlat: bool = False) -> Curves:
@@ -129,7 +145,7 @@ def _columns(path: object, file: BinaryIO, space: Space) -> Columns:
     names, order = columns.points, columns.quaternion
     numbers = count_with_quaternion(space) if order else len(labels(space))
     texts = isinstance(names, list) and all(isinstance(name, str) for name in (*names, columns.time, columns.curve))
-    good = texts and columns.lonlat in (True, False) and columns.utc in (True, False, None)
+    good = texts and {columns.lonlat, columns.cut} <= {True, False} and columns.utc in (True, False, None)
     if good and columns.lonlat:
         good = len(names) == len(LONLAT) and space == GLOBE and order is None
     elif good:

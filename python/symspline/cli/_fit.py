@@ -9,16 +9,18 @@ The numbers of a point are in columns in the order of its array, and --columns n
 row by row, in a product one factor after the other. A complex number A has the columns A_re and A_im, which --columns
 calls A, or one column A if it is real. Points within 1e-4 of the space are projected onto it. A rotation of so:3 may
 also be a unit quaternion in columns whose names end in w, x, y and z, in any order, and a pose of se:3 or so:3 x r:3
-a position, such as tx, ty, tz, and a quaternion.
+a position, such as tx, ty, tz, and a quaternion, whose length may differ from 1 by 0.005.
 
 Without --time, the times are in the column t or time, or, if they are dates, in a column that is called time, date,
-datetime or timestamp, in the plural or with words such as iso, utc, unix, base, local, ns: ISO_TIME, "Date (UTC)".
-The command asks if another column seems to hold times. Without any, times are 0, 1, 2, ...
+datetime, stamp or timestamp, in the plural or with words such as iso, utc, unix, base, local, ns: ISO_TIME,
+"Date (UTC)". The command asks if another column seems to hold times. Without any, times are 0, 1, 2, ... Numbers in
+the column of times have no unit; with --unix ns they are nanoseconds since 1970, and become dates in UTC.
 
 CSV files name the columns in their first line; blank lines are skipped. Cells are separated by commas, semicolons or
 tabs, and between semicolons numbers may have decimal commas. In an NPZ file columns are arrays with one entry per row,
 which may be complex, or vectors or matrices; an array `points` may hold all numbers of the points. A .tum or .txt file
-is a trajectory of the TUM benchmark: time tx ty tz qx qy qz qw.
+is a trajectory of the TUM benchmark: time tx ty tz qx qy qz qw. In GPX and GeoJSON files, tracks and lines have their
+name in the column track, and points their height in the column ele. With --skipna, rows without a point are omitted.
 
 Curves pass through the points. --smooth is for noisy points: the curve passes near them, as smooth as the data
 suggest, and symspline sample also writes its standard deviation.
@@ -72,7 +74,7 @@ from ._points import GLOBE, Columns, require_globe
 from ._recordings import Recordings
 from ._sensors import Fusion, sensors_of
 from ._streams import called, check_target
-from ._times import number, option_numbers
+from ._times import UNITS, number, option_numbers
 
 _METHODS = "auto (default), quasi-newton, newton, homotopy or fixed-point"
 _ENDS = "natural (default), not-a-knot, clamped, periodic; or two of the first three with a comma, for start and end"
@@ -109,11 +111,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--from", dest="format", choices=TABLES, help="format of the table (default: as its name ends, CSV for -)")
     add("--space", metavar="S", help="such as sphere:2, so:3, spd:3, cp:1 or 'so:3 x r:3'")
     add("--time", metavar="COL", help="column of times, or none for 0, 1, 2, ...; see above for the default")
+    add("--unix", choices=UNITS, help="times are numbers that count this unit since 1970-01-01 in UTC")
     add("--columns", metavar="A,B,...", help="columns of a point (default: all other numeric columns)")
     add("--curve", metavar="COL", help="column of names: the rows with one name are one curve")
     add("--lonlat", action="store_true", help="points on sphere:2 are longitude and latitude in degrees")
     add("--quaternion", choices=ORDERS, help="order of a quaternion, if the names do not show it")
     add("--sort", action="store_true", help="put the rows of every curve in the order of their times")
+    add("--skipna", action="store_true", help="omit rows without a point or a time: empty cells, NaN, NA or null")
     add("--dedup", choices=("first", "mean"), help="keep the first of the points of one time, or their mean")
     add("--max-gap", metavar="DT", help=_MAX_GAP)
     add("--bc-type", default="natural", metavar="END", help=_ENDS)
@@ -150,24 +154,27 @@ def run(options: argparse.Namespace) -> int:
     given = split_names(options.columns)
     time = time_column(table, options.time, [curve, *given, *extra])
     points = point_columns(table, given, [time, curve, *extra], space, options.lonlat, options.quaternion)
-    rows = table.read([*points.used, *extra], time, curve, [*points.used, *extra] if sensors else [])
+    needed = [*points.used, *filter(None, [time, curve])]
+    whole, table = table, table.without_empty(needed) if options.skipna and not sensors else table
+    rows = table.read([*points.used, *extra], time, curve, [*points.used, *extra] if sensors else [], options.unix)
     check_days(table, time, rows)
     at = "times 0, 1, 2, ..." if time is None else f"times in column {time}"
     tell(f"{table.path}: {table.path.format} table, points in columns {listed(points.names)}, {at}", VERBOSE)
-    columns = Columns(points.names, time or "time", curve or "curve", options.lonlat, rows.utc, points.quaternion)
+    cut = options.max_gap is not None and curve is not None
+    columns = Columns(points.names, time or "time", curve or "curve", options.lonlat, rows.utc, points.quaternion, cut)
     if sensors and smooth:
         _fit_sensors(options, smooth, Fusion(table, rows, points, sensors), columns)
         return 0
     hint = partial(column_of_names, table, time, [time, *points.used]) if curve is None else lambda: None
     data = Recordings(table.path, rows, points.read(rows.numbers, rows.place), space, options, hint)
+    data.empty = whole.height - table.height
     _fit_points(options, smooth, data, columns)
     same = data.merged or data.repeated
-    column = hint() if same else None
+    column = hint() if same or time is None else None
     if column is not None:
-        say(
-            f"{same} rows have a time that another row has, and column {column!r} distinguishes them: if the table "
-            f"holds several tracks, fit each of them with --curve {column}"
-        )
+        what = f"{same} rows have a time that another row has, and column {column!r} distinguishes them"
+        what = what if same else f"column {column!r} has one block of rows for each of its texts"
+        say(f"{what}: if the table holds several tracks, fit each of them with --curve {column}")
     return 0
 
 
@@ -189,6 +196,8 @@ def _fit_points(options: argparse.Namespace, smooth: dict[str, Any] | None, data
     segmented = options.max_gap is not None and options.curve is None
     write_curves(options.output, Curves(dict(zip(data.groups, fitted, strict=True)), data.named, columns, segmented))
     words = f"{_summary.fitted(fitted, options.lonlat)}{data.changes()}{_summary.bridged(fitted)}"
+    if not data.has_times and options.time is None:
+        words += "; no column of times: the points are at 0, 1, 2, ..."
     tell(f"{called(options.output)}: {words}")
 
 

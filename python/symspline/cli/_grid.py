@@ -45,7 +45,9 @@ from .._disk import damage
 from .._grid import GridSpline
 from .._report import FarPointsWarning
 from .._spaces import POINT_TOL_FLOAT32
+from ._curves import add_entry
 from ._grid_files import (
+    AXIS_NAMES,
     NPZ,
     VOLUMES,
     ZARR,
@@ -149,6 +151,8 @@ def _resampled(options: argparse.Namespace, source: str, option: str | None, how
         refuse(f"{options.input}: ", (grid.spline, "this is a spline; give --to, --zoom or --points"))
         with writing(options.output) as temporary, open(temporary, "wb") as file:
             spline.save(file)
+            file.close()
+            add_entry(temporary, AXIS_NAMES, np.array(grid.names))
         return f"a spline through {' x '.join(str(len(axis)) for axis in spline.axes)} points of {spline.space}{gap}"
     x = _positions(options, option, grid.names, spline.axes)
     with Progress("sampling") as progress:

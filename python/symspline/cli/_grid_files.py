@@ -31,6 +31,8 @@ from ._tables import Array
 NPZ, ZARR = ".npz", ".zarr"
 VOLUMES = (".nii", ".nii.gz")
 _TENSORS = "spd:3"
+AXIS_NAMES = "axis_names"
+"""The entry with the names of the axes in the file of a spline."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +87,7 @@ def read_arrays(options: argparse.Namespace) -> Grid:
             arrays = read(file, lambda name: True)
         if "format" in arrays:
             file.seek(0)
-            return _spline(options, path, load(file))
+            return _spline(options, path, load(file), arrays.get(AXIS_NAMES))
     space = _space_of(options)
     several = isinstance(space, Product)
     keys = [f"points_{i}" for i in range(len(factors_of(space)))] if several else ["points"]
@@ -104,18 +106,32 @@ def read_arrays(options: argparse.Namespace) -> Grid:
     listed = ", ".join(map(repr, names))
     wrong = f": there are arrays {listed} for the axes, but the points have {count} axes; name these with --axes"
     refuse(path, (names and len(names) != count, wrong))
+    _check_sizes(path, {name: len(arrays[name]) for name in names}, points[0].shape[:count])
     axes = [arrays[name] for name in names] if names else [None] * count
     return Grid(names or _usual_names(count), axes, tuple(points) if several else points[0], space)
 
 
-def _spline(options: argparse.Namespace, path: Source, spline: Any) -> Grid:
+def _check_sizes(path: Source, sizes: dict[str, int], nodes: tuple[int, ...]) -> None:
+    """Raise `Problem` unless the arrays of the axes have as many positions as the points have nodes along them."""
+    if not sizes or tuple(sizes.values()) == nodes:
+        return
+    order = [name for n in dict.fromkeys(nodes) for name, size in sizes.items() if size == n]
+    fits = tuple(sizes[name] for name in order) == nodes
+    advice = f"; give --axes {','.join(order)}" if fits else ""
+    found = " and ".join(f"{name} has {size} positions" for name, size in sizes.items())
+    raise Problem(f"{path}: {found}, but the points have {' x '.join(map(str, nodes))} nodes{advice}")
+
+
+def _spline(options: argparse.Namespace, path: Source, spline: Any, names: Any) -> Grid:
     given = " and ".join(f"--{name}" for name in ("space", "axes") if getattr(options, name) is not None)
     refuse(
         path,
         (not isinstance(spline, GridSpline), " is a curve, not a grid; see symspline sample"),
         (given, f" is a spline, for which {given} cannot be given"),
     )
-    return Grid(_usual_names(len(spline.axes)), spline=spline)
+    count = len(spline.axes)
+    names = [str(name) for name in names] if names is not None and np.shape(names) == (count,) else _usual_names(count)
+    return Grid(names, spline=spline)
 
 
 def write_arrays(path: Path, names: Sequence[str], axes: Sequence[Array], points: Any) -> None:

@@ -26,12 +26,12 @@ from .._smoothing import SmoothingSpline
 from .._spaces import Doubles
 from .._spaces.base import CLASSES, example_of
 from .._time import time_axis_of
-from ._columns import column_of_names, time_column
+from ._columns import NUMBERED, column_of_names, time_column
 from ._curves import read_curves
 from ._formats import TABLES, endings, format_of, open_table
 from ._messages import Problem, listed, refuse
 from ._streams import Source
-from ._summary import counted, gaps_in, smoothed
+from ._summary import counted, gaps_in, parameters_of, smoothed
 from ._tables import Array, Rows, Table
 
 _LIBRARIES = {"pyarrow": "Parquet and large CSV files", "gpxpy": "GPX files", "matplotlib": "symspline plot"}
@@ -39,6 +39,8 @@ _LIBRARIES |= {"nibabel": "NIfTI files", "zarr": "Zarr stores", "shtab": "comple
 
 
 _LONGEST = 1000
+_COLUMNS = 12
+"""Columns of an array that are described."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -84,15 +86,28 @@ def _is_curve(source: Source) -> bool:
 def _table(table: Table, given: str | None) -> list[str]:
     columns = {name: own for name, own in table.columns.items() if name}
     refuse(table.path, (not columns, " has no columns"))
-    lines = [f"{table.path}: {table.path.format} table, {len(next(iter(columns.values())))} rows"]
-    lines += [f"  {name}: {_described(table.shown(name))}" for name in columns]
+    groups = {key: own for key, own in table.groups.items() if len(own) > 1}
+    if groups and len(set(map(len, columns.values()))) > 1:
+        sizes = [
+            f"  {key}: {len(columns[own[0]])}{f' x {len(own)}' * (len(own) > 1)} numbers"
+            for key, own in table.groups.items()
+        ]
+        return [f"{table.path}: arrays of different lengths, such as a grid; see symspline grid --help", *sizes]
+    lines = [f"{table.path}: {table.path.format} table, {table.height} rows"]
+    shown = [name for name in columns if not any(name in own[_COLUMNS:] for own in groups.values())]
+    lines += [f"  {name}: {_described(table.shown(name))}" for name in shown]
+    lines += [f"  ... {own[-1]}: {key} has {len(own)} columns" for key, own in groups.items() if len(own) > _COLUMNS]
+    if given not in (None, NUMBERED):
+        table.require(given)
     try:
         time = time_column(table, given, [])
         rows = table.read([], time, None) if time is not None else None
     except Problem as problem:
         return [*lines, str(problem)]
     if rows is None or time is None:
-        return [*lines, "times: no column; the points are at 0, 1, 2, ..."]
+        lines.append("times: no column; the points are at 0, 1, 2, ...")
+        names = column_of_names(table, None, [])
+        return lines if names is None else [*lines, f"--curve {names} fits one curve per {names}"]
     axis, knots = time_axis_of(rows.times)
     seconds = axis.knots(knots)
     lines.append(f"times in column {time!r}: {_times(rows, seconds)}")
@@ -125,7 +140,7 @@ def _times(rows: Rows, seconds: Doubles) -> str:
     repeats, back = int((steps == 0).sum()), int((steps < 0).sum())
     parts += [counted(repeats, "repeated time")] if repeats else []
     parts += [f"{counted(back, 'step')} back in time"] if back else []
-    parts += [gaps_in([seconds], unit)] if ahead.size == steps.size > 0 else []
+    parts += [gaps_in([np.unique(seconds)], unit)] if ahead.size and not back else []
     return ", ".join(filter(None, parts))
 
 
@@ -137,11 +152,12 @@ def _curves(path: Path) -> list[str]:
     count = len(curves.splines)
     space = next(iter(curves.splines.values())).space
     words = f"{count} segments of one recording" if curves.segmented else counted(count, "curve")
-    lines = [f"{path}: {words} on {space}, columns {listed(curves.columns.points)}"]
+    lines = [f"{curves.file}: {words} on {space}, columns {listed(curves.columns.points)}"]
     for name, spline in curves.splines.items():
-        parts = [f"{len(spline.t)} nodes, {spline.t[0]} to {spline.t[-1]}"]
+        zone = " UTC" if curves.columns.utc else ""
+        parts = [f"{len(spline.t)} nodes, {spline.t[0]} to {spline.t[-1]}{zone}"]
         if isinstance(spline, SmoothingSpline):
-            parts.append(smoothed([spline], curves.columns.lonlat))
+            parts += [smoothed([spline], curves.columns.lonlat), *parameters_of(spline)]
         else:
             ends = spline.bc_type if isinstance(spline.bc_type, str) else ", ".join(map(str, spline.bc_type))
             parts.append(f"{ends} ends, residual {spline.report.residual:.1e}")

@@ -21,6 +21,8 @@ _FOR_PYTHON = {
     "; use space.project(x) if these are meant to be points": "",
     " (np.linalg.qr gives an orthonormal basis)": "",
     ", or raise max_iter": "",
+    "such as Sphere(2) or 'sphere:2'": "such as sphere:2",
+    "; pass extrapolate=True or 'geodesic' to continue the spline there, or False for NaN": "",
     "fit_segments": "--max-gap",
     "make_smoothing_spline": "--smooth",
 }

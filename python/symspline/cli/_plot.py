@@ -15,6 +15,7 @@ import argparse
 from pathlib import Path
 
 from .. import geo
+from .._composed import SegmentedCurve
 from ._curves import read_curves
 from ._messages import Problem, alternatives, listed, refuse, tell
 from ._streams import STANDARD, called, check_target, writing
@@ -24,7 +25,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options of ``symspline plot``."""
     add = parser.add_argument
     add("curves", type=Path, metavar="CURVE", help="file of curves to read: .npz, or -")
-    add("--curve", metavar="NAME", help="which curve, if there are several")
+    add(
+        "--curve",
+        metavar="NAME",
+        help="which curve, if there are several; segments of one recording are drawn together",
+    )
     add("--lonlat", action="store_true", help="draw any curve on sphere:2 on the Earth")
     add("-o", dest="output", type=Path, metavar="PICTURE", required=True, help="picture to write, or -")
     add("--to", metavar="FORMAT", help="format of the picture, such as pdf (default: as its name ends, PNG for -)")
@@ -35,12 +40,14 @@ def run(options: argparse.Namespace) -> int:
     check_target(options.output, options.curves, binary=True)
     curves = read_curves(options.curves, options.lonlat)
     curves = curves.chosen(None if options.curve is None else [options.curve])
-    names = list(curves.splines)
-    several = f" has {len(names)} curves; say which with --curve: {listed(names)}"
-    refuse(curves.file, (len(names) > 1, several))
-    spline = curves.splines[names[0]]
+    recordings = curves.recordings
+    several = f" has {len(recordings)} curves; say which with --curve: {listed([*recordings])}"
+    refuse(curves.file, (len(recordings) > 1, several))
+    (names,) = recordings.values()
+    segments = [curves.splines[name] for name in names]
+    curve = segments[0] if len(segments) == 1 else SegmentedCurve(segments)
     try:
-        figure = geo.plot(spline) if curves.columns.lonlat else spline.plot()
+        figure = geo.plot(curve) if curves.columns.lonlat else curve.plot()
     except ImportError as error:
         raise Problem(str(error)) from None
     # A still image in a format of animations would mislead.

@@ -42,6 +42,8 @@ class Columns:
         Whether dates had a time zone, and are written with a Z. None if that is not known.
     quaternion : list of int or None
         For rotations as quaternions the column of every number of a point, position first and scalar first.
+    cut : bool
+        Whether NAME/1, NAME/2, ... are the segments of one recording, which was cut at gaps.
     """
 
     points: list[str]
@@ -50,6 +52,7 @@ class Columns:
     lonlat: bool = False
     utc: bool | None = None
     quaternion: list[int] | None = None
+    cut: bool = False
 
 
 def require_globe(space: Space) -> None:
@@ -189,7 +192,7 @@ def points_of(space: Space, numbers: Doubles, lonlat: bool, order: list[int] | N
         own = np.ascontiguousarray(numbers[:, start : start + width(factor, order is not None)])
         start += own.shape[1]
         if order and factor in (ROTATIONS, POSES):
-            rotations = rotations_in_rows(own[:, -4:], file, place, POINT_TOL_FLOAT32)
+            rotations = rotations_in_rows(own[:, -4:], file, place)
             part = join(rotations, own[:, :3]) if factor == POSES else rotations
         else:
             part = own.view(factor.dtype).reshape(len(own), *factor.point_shape)

@@ -31,19 +31,19 @@ class Recordings:
         Times and points of each curve.
     groups : dict
         Name and rows of each curve, in the order in which the curves begin.
-    named : bool
-        Whether these names have a meaning.
-    merged, alone, repeated : int
+    named, has_times : bool
+        Whether these names have a meaning, and whether there is a column of times.
+    merged, alone, repeated, empty : int
         Numbers of rows: those merged with another row of the same time, single points between gaps, which are omitted,
-        and those that share their time with another row of noisy data.
+        those that share their time with another row of noisy data, and those omitted because of empty cells.
     """
 
     def __init__(self, path: object, rows: Rows, points: Any, space: Space, options: Namespace, hint: Hint) -> None:
         """Read the curves. ``hint`` returns a column that may hold the names of several curves."""
         self._path, self._rows, self._points, self.space, self._hint = path, rows, points, space, hint
-        self._options, self._smooth = options, options.smooth
+        self._options, self._smooth, self.has_times = options, options.smooth, rows.times.size > 0
         self.named = rows.labels is not None or options.max_gap is not None
-        self.merged = self.alone = self.repeated = 0
+        self.merged = self.alone = self.repeated = self.empty = 0
         self.curves: list[tuple[Any, Any]] = []
         self.groups: dict[str, Index] = {}
         asked = next((name for name in ("sort", "dedup", "max_gap") if getattr(options, name)), "")
@@ -73,7 +73,11 @@ class Recordings:
         """Describe the rows that were merged or omitted, which the curves do not show."""
         dedup = self._options.dedup
         same = "merged with others of the same time" if dedup == "mean" else "omitted after another of their time"
-        counts = ((self.merged, f"{same} (--dedup {dedup})"), (self.alone, "alone between gaps omitted"))
+        counts = (
+            (self.empty, "with empty cells omitted (--skipna)"),
+            (self.merged, f"{same} (--dedup {dedup})"),
+            (self.alone, "alone between gaps omitted"),
+        )
         return "".join(f"; {counted(count, 'row')} {what}" for count, what in counts if count)
 
     def located(self, note: Any) -> str:
@@ -136,11 +140,11 @@ class Recordings:
             before, here = self._rows.place(int(own[i])), self._rows.place(int(own[i + 1]))
             column = self._hint()
             curves = "" if column is None else f"--curve {column} fits one curve per {column}; otherwise "
-            same = times[i + 1] == times[i]
+            same, zone = times[i + 1] == times[i], " UTC" if self._rows.utc else ""
             repair = "--dedup first or mean makes one point of them" if same else "--sort puts the rows in order"
             raise Problem(
-                f"{self._path}, {here}: time {times[i + 1]}{of} does not come after {times[i]} in {before}; times must "
-                f"{'not decrease' if self._smooth else 'increase'}; {curves}{repair}"
+                f"{self._path}, {here}: time {times[i + 1]}{zone}{of} does not come after {times[i]} in {before}; "
+                f"times must {'not decrease' if self._smooth else 'increase'}; {curves}{repair}"
             )
 
 

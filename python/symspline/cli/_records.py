@@ -15,7 +15,7 @@ from ._streams import Source
 from ._tables import Array, Layout, Table, Texts
 from ._times import EXACT
 
-_TIME, _LON, _LAT, _TRACK = "time", "lon", "lat", "track"
+_TIME, _LON, _LAT, _HEIGHT, _TRACK = "time", "lon", "lat", "ele", "track"
 # Properties of lines that hold the times of their points.
 _LINE_TIMES = ("coordTimes", "times")
 
@@ -29,7 +29,10 @@ def read_json(path: Source) -> Table:
 
 
 def read_geojson(path: Source) -> Table:
-    """Read a collection of features: points with properties, or lines with their times in ``coordTimes``."""
+    """Read a collection of features: points with properties, or lines with their times in ``coordTimes``.
+
+    The name of a line is in the column ``track``, and heights are in the column ``ele``.
+    """
     content = _json(path)
     rows: list[dict[str, Any]] = []
     try:
@@ -56,7 +59,7 @@ def read_gpx(path: Source) -> Table:
             label = f"{name}/{part}" if len(track.segments) > 1 else name
             for point in segment.points:
                 time = point.time and point.time.astimezone(UTC).isoformat()
-                own = {_TIME: time, _LON: point.longitude, _LAT: point.latitude, "ele": point.elevation}
+                own = {_TIME: time, _LON: point.longitude, _LAT: point.latitude, _HEIGHT: point.elevation}
                 rows.append({name: value for name, value in own.items() if value is not None} | {_TRACK: label})
     refuse(path, (not rows, " has no tracks with points"))
     return _table(path, rows)
@@ -103,8 +106,8 @@ def _feature(feature: Any, number: str) -> list[dict[str, Any]]:
 
 
 def _place(coordinates: Any) -> dict[str, Any]:
-    lon, lat, *_ = coordinates
-    return {_LON: lon, _LAT: lat}
+    lon, lat, *height = coordinates
+    return {_LON: lon, _LAT: lat} | ({_HEIGHT: height[0]} if height else {})
 
 
 def _gpxpy() -> Any:

@@ -33,7 +33,7 @@ times are whole multiples of the step since 1970-01-01. The first sample is at o
 last one at or before its end. Use -n for samples from the start to the end. With numbers, --every counts from the
 start.
 
-With one recording that --max-gap cut into segments, --at evaluates each time on its segment and omits times in gaps. A
+With recordings that --max-gap cut into segments, --at evaluates each time on its segment and omits times in gaps. A
 TUM trajectory is one file with all segments in the order of time. -o 'x_{curve}.csv' writes one file per curve.
 
 --at reads the column of times of the table that was fitted, or finds one as symspline fit does. If the file also has
@@ -43,6 +43,7 @@ the column of the curves' names, every row is for its curve, otherwise for all c
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping
 from itertools import chain, pairwise
 from pathlib import Path
 from typing import Any
@@ -50,6 +51,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .._cubic import CubicSpline
 from .._pose_files import TUM
 from .._smoothing import SmoothingSpline
 from .._spaces import Doubles, space_named
@@ -62,8 +64,9 @@ from ._points import Columns, quaternion_by_names
 from ._recordings import group
 from ._samples import Samples, deviations_of, samples_of
 from ._streams import called, check_inputs, check_target
+from ._summary import counted
 from ._tables import Layout, Rows, Table
-from ._times import Times, every, number, spread
+from ._times import UNITS, Times, every, number, spread
 
 _EACH = "{curve}"
 """Replaced by the name of a curve in the name of the output."""
@@ -86,6 +89,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     which.add_argument("-n", dest="number", type=number, metavar="N", help=count)
     which.add_argument("--at", type=Path, metavar="FILE", help=f"a table with times: {endings()}, or -")
     add("--curve", action="append", metavar="NAME", help="which curve; may be repeated (default: all)")
+    add("--unix", choices=UNITS, help="times of --at are numbers that count this unit since 1970-01-01 in UTC")
     add("--nu", default="0", metavar="0,1,2", help="points (0, default), velocities (1), accelerations (2)")
     add("--lonlat", action="store_true", help="write longitude and latitude of any curve on sphere:2")
     add("--digits", type=int, metavar="N", help="round the numbers to N significant digits, but not the times")
@@ -109,9 +113,14 @@ def run(options: argparse.Namespace) -> int:
     times, rows = _times(options, curves, every_curve)
     samples = _sampled(curves, times, orders, columns, form != "tum", digits)
     if _EACH in options.output.name:
-        for name in samples:
-            path = options.output.with_name(options.output.name.replace(_EACH, name.replace("/", "_")))
+        paths = [
+            options.output.with_name(options.output.name.replace(_EACH, name.replace("/", "_"))) for name in samples
+        ]
+        twice = first_duplicate([str(path).lower() for path in paths])
+        refuse(f"-o {options.output}: ", (twice, f"two curves would have the file {twice}; choose one with --curve"))
+        for path in paths:
             check_target(path, *inputs)
+        for name, path in zip(samples, paths, strict=True):
             _write(path, form, {name: times[name]}, samples, None, columns, False)
         return 0
     if form == "tum":
@@ -157,7 +166,7 @@ def _write(
     lonlat = tuple(columns.points) if columns.lonlat else None
     layout = Layout(columns.time, columns.curve if named else None, lonlat, bool(columns.utc))
     write_table(path, form, {name: column[order] for name, column in pairs}, layout)
-    tell(f"{called(path)}: {len(pairs[0][1])} rows")
+    tell(f"{called(path)}: {counted(len(pairs[0][1]), 'row')}")
 
 
 def _rounded(numbers: Doubles, digits: int) -> Doubles:
@@ -202,7 +211,7 @@ def _times(
 ) -> tuple[dict[str, Times], NDArray[np.int64] | None]:
     """Return the times of every curve, and their rows if every row of a table is for one curve."""
     if options.at is not None:
-        return _given(open_table(options.at, options.format), curves, every_curve)
+        return _given(open_table(options.at, options.format), curves, every_curve, options.unix)
     times = {name: _along(spline.t, options) for name, spline in curves.splines.items()}
     empty = f"no multiple of this step lies between the start and the end of {'any' if curves.named else 'the'} curve"
     none = not any(map(len, times.values()))
@@ -219,46 +228,48 @@ def _along(knots: Times, options: argparse.Namespace) -> Times:
     return spread(int(count), knots)
 
 
-def _given(table: Table, curves: Curves, every_curve: Curves) -> tuple[dict[str, Times], NDArray[np.int64] | None]:
+def _given(
+    table: Table, curves: Curves, every_curve: Curves, unix: str | None
+) -> tuple[dict[str, Times], NDArray[np.int64] | None]:
     path, usual, label = table.path, curves.columns.time, curves.columns.curve
     only = table.names[0] if len(table.names) == 1 else None
     time = usual if usual in table.names else only or time_column(table, None, [])
     if time is None:
         raise Problem(f"{path} has no column {usual!r} of times; {did_you_mean(usual, table.names)}")
     labelled = every_curve.named and label in table.names
-    rows = table.read([], time, label if labelled else None)
+    rows = table.read([], time, label if labelled else None, unix=unix)
+    recordings = curves.recordings
+    segments = {name: [name] for name in curves.splines} | recordings
     if labelled:
-        groups = {
-            name: own for name, own in group(rows).items() if name in curves.splines or name not in every_curve.splines
-        }
-    elif curves.segmented and curves.named:
-        groups = _by_segment(rows, curves)
+        known = {*every_curve.splines, *every_curve.recordings}
+        given = {name: own for name, own in group(rows).items() if name in segments or name not in known}
     else:
-        groups = dict.fromkeys(curves.splines, group(rows)[""])
-    for name, own in groups.items():
-        if name not in curves.splines:
-            near = did_you_mean(name, list(curves.splines))
+        given = dict.fromkeys(recordings, group(rows)[""])
+    groups: dict[str, NDArray[np.int64]] = {}
+    for name, own in given.items():
+        if name not in segments:
+            near = did_you_mean(name, list(segments))
             raise Problem(f"{path}, {rows.place(int(own[0]))}: there is no curve {name!r}; {near}")
+        groups |= _by_segment(rows, own, {part: curves.splines[part] for part in segments[name]})
+    for name, own in groups.items():
         _check_times(path, rows, own, curves, name)
     refuse(path, (not any(map(len, groups.values())), " has no times of these curves"))
-    single = labelled or curves.segmented
-    order = np.concatenate(list(groups.values())) if single else None
+    order = np.concatenate(list(groups.values())) if labelled or len(recordings) == 1 else None
     return {name: rows.times[own] for name, own in groups.items()}, order
 
 
-def _by_segment(rows: Rows, curves: Curves) -> dict[str, NDArray[np.int64]]:
-    """Return the rows of every segment; those in the gaps between segments are omitted."""
-    splines = list(curves.splines.values())
-    starts = np.array([spline.t[0] for spline in splines])
-    if rows.times.dtype.kind != starts.dtype.kind and "M" in (rows.times.dtype.kind, starts.dtype.kind):
+def _by_segment(rows: Rows, own: NDArray[np.int64], splines: Mapping[str, CubicSpline]) -> dict[str, NDArray[np.int64]]:
+    """Divide rows between the segments of a recording; those in the gaps between segments are omitted."""
+    times = rows.times[own]
+    starts, ends = (np.array([spline.t[i] for spline in splines.values()]) for i in (0, -1))
+    if times.dtype.kind != starts.dtype.kind and "M" in (times.dtype.kind, starts.dtype.kind):
         # `_check_times` describes the difference.
-        return {next(iter(curves.splines)): np.arange(len(rows.times))}
-    segment = np.maximum(np.searchsorted(starts, rows.times, "right") - 1, 0)
-    ends = np.array([spline.t[-1] for spline in splines])
-    in_gap = (rows.times > ends[segment]) & (segment < len(splines) - 1)
+        return {next(iter(splines)): own}
+    segment = np.maximum(np.searchsorted(starts, times, "right") - 1, 0)
+    in_gap = (times > ends[segment]) & (segment < len(starts) - 1)
     if in_gap.any():
         say(f"{int(in_gap.sum())} of {len(in_gap)} times lie in gaps between segments, and are omitted")
-    return {name: np.flatnonzero((segment == i) & ~in_gap) for i, name in enumerate(curves.splines)}
+    return {name: own[(segment == i) & ~in_gap] for i, name in enumerate(splines)}
 
 
 def _check_times(path: object, rows: Rows, own: NDArray[np.int64], curves: Curves, name: str) -> None:
@@ -268,7 +279,8 @@ def _check_times(path: object, rows: Rows, own: NDArray[np.int64], curves: Curve
     dates = knots.dtype.kind == "M"
     expected, found = ("dates", "numbers") if dates else ("numbers", "dates")
     these, those = ("a time zone", "none") if rows.utc else ("no time zone", "one")
-    kinds = f": the times of {curve} are {expected}, but these are {found}"
+    unix = "; give --unix if they count from 1970" if dates else ""
+    kinds = f": the times of {curve} are {expected}, but these are {found}{unix}"
     zones = f": its times have {these}, but those of {curve} have {those}: which time is meant is in doubt"
     mixed = dates and {rows.utc, curves.columns.utc} == {True, False}
     refuse(path, ((times.dtype.kind == "M") != dates, kinds), (mixed, f"{zones}; write both with a zone, or neither"))
@@ -277,7 +289,8 @@ def _check_times(path: object, rows: Rows, own: NDArray[np.int64], curves: Curve
     inside = onto_ends(times, knots, (), False)[0] if times.dtype.kind == knots.dtype.kind == "f" else times
     outside = np.flatnonzero((inside < knots[0]) | (inside > knots[-1]))
     if outside.size:
+        zone = " UTC" if curves.columns.utc else ""
         raise Problem(
-            f"{path}, {rows.place(int(own[outside[0]]))}: time {times[outside[0]]} is outside {curve}, which runs "
-            f"from {knots[0]} to {knots[-1]}; fit with --extrapolate to define the curve there"
+            f"{path}, {rows.place(int(own[outside[0]]))}: time {times[outside[0]]}{zone} is outside {curve}, which "
+            f"runs from {knots[0]} to {knots[-1]}{zone}; fit with --extrapolate to define the curve there"
         )

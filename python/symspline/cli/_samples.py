@@ -40,7 +40,8 @@ def samples_of(spline: CubicSpline, x: Any, nu: int, columns: Columns) -> Sample
     blocks = [np.ascontiguousarray(own.reshape(len(own), -1)).view(np.float64) for own in parts]
     pairs = zip(columns.points, complex_numbers(spline.space), strict=True)
     names = [name + end + part for name, two in pairs for part in ((RE, IM) if two else ("",))]
-    return list(zip(names, np.concatenate(blocks, axis=1).T, strict=True))
+    # A column may be named twice, as for both sides of a symmetric matrix.
+    return list(dict(zip(names, np.concatenate(blocks, axis=1).T, strict=True)).items())
 
 
 def _with_quaternion(spline: CubicSpline, x: Any, nu: int, parts: Sequence[Any], columns: Columns) -> Samples:

@@ -111,7 +111,11 @@ def estimated(
     ]
     for name, curve in curves.items():
         of = f" of curve {name!r}" if named else ""
-        for key, found in curve.parameters.items():
-            each = zip(found.value, found.std, strict=True)
-            lines.append(f"{key}{of}: {', '.join(f'{value:.3g} ± {std:.2g}' for value, std in each)}")
+        lines += parameters_of(curve, of)
     return lines
+
+
+def parameters_of(curve: SmoothingSpline[Any, Any], of: str = "") -> list[str]:
+    """Describe the unknowns that were estimated with a curve, such as a bias."""
+    each = {key: zip(found.value, found.std, strict=True) for key, found in curve.parameters.items()}
+    return [f"{key}{of}: {', '.join(f'{value:.3g} ± {std:.2g}' for value, std in own)}" for key, own in each.items()]

@@ -13,12 +13,15 @@ from numpy.typing import NDArray
 
 from ._messages import Problem, did_you_mean, refuse
 from ._streams import Source
-from ._times import EXACT, first_date, is_number, numbers, parse_times
+from ._times import EXACT, first_date, from_unix, is_number, numbers, parse_times
 
 Array = NDArray[Any]
 Place = Callable[[int], str]
 
 RE, IM = "_re", "_im"
+_MISSING = {"", "nan", "na", "null"}
+"""Texts of missing numbers."""
+_SKIP = "; symspline fit --skipna omits such rows"
 FIRST = 50
 """Rows that are searched for numbers and dates, as the first ones may hold units or be empty."""
 
@@ -102,6 +105,11 @@ class Texts:
         """Whether the first text that is not empty is a number."""
         return is_number(next(filter(None, self.plain(FIRST)), ""))
 
+    def rows(self, kept: NDArray[np.intp]) -> Texts:
+        """Return the texts of some rows."""
+        cells = [self._cells[i] for i in kept] if isinstance(self._cells, list) else self._cells.take(kept)
+        return Texts(cells, self._comma)
+
     def converted(self) -> NDArray[np.float64] | None:
         """Return an array of pyarrow as numbers, NaN where it is empty; None if another cell is not a number."""
         if isinstance(self._cells, list):
@@ -136,6 +144,8 @@ class Table:
         Whether a column of dates has the time zone UTC; empty if it is unknown.
     place : callable
         Describes the position of a row.
+    height : int
+        Number of rows.
     """
 
     def __init__(
@@ -149,6 +159,7 @@ class Table:
         self.path, self.columns, self.place = path, columns, place
         self.groups, self.is_utc = groups or {}, is_utc or {}
         self.names = list(columns)
+        self.height = len(next(iter(columns.values()))) if columns else 0
         self.numeric = [name for name, own in columns.items() if name and _is_numeric(own)]
         self.dates = [name for name, own in columns.items() if _holds_dates(own)]
 
@@ -184,13 +195,33 @@ class Table:
                 return self._numbers(name, True)
         return np.array(column.tolist())
 
-    def read(self, names: Sequence[str], time: str | None, label: str | None, sparse: Sequence[str] = ()) -> Rows:
+    def without_empty(self, names: Sequence[str]) -> Table:
+        """Return the rows in which none of these columns is missing."""
+        kept = np.flatnonzero(~np.any([_missing(self.columns[name]) for name in names], axis=0))
+        columns = {name: own.rows(kept) if isinstance(own, Texts) else own[kept] for name, own in self.columns.items()}
+        refuse(self.path, (not kept.size, f" has no row in which {' and '.join(names)} are all given"))
+        place = self.place
+        return Table(self.path, columns, lambda row: place(int(kept[row])), self.groups, self.is_utc)
+
+    def read(
+        self,
+        names: Sequence[str],
+        time: str | None,
+        label: str | None,
+        sparse: Sequence[str] = (),
+        unix: str | None = None,
+    ) -> Rows:
         """Read some columns as numbers, one as times and one as labels.
 
-        Cells of the columns `sparse` may be empty or NaN; they are NaN in the result.
+        Cells of the columns `sparse` may be empty or NaN; they are NaN in the result. Numeric times count the unit
+        `unix` since 1970, if it is given.
         """
         columns = [self._numbers(name, name in sparse) for name in names]
         times, utc = self._times(time) if time is not None else (np.empty(0), False)
+        if unix is not None:
+            refuse("--unix is for times that are numbers", (time is None, ", and there is no column of times"),
+                   (times.dtype.kind == "M", f"; column {time!r} has dates"))  # fmt: skip
+            times, utc = from_unix(times, unix), True
         labels = self.labels(label) if label is not None else None
         given = [*columns, *([times] if time is not None else []), *([labels] if labels is not None else [])]
         lengths = sorted(set(map(len, given)))
@@ -210,7 +241,7 @@ class Table:
         bad = np.flatnonzero(np.isinf(values) if sparse else ~np.isfinite(values))
         if bad.size:
             value = values[bad[0]]
-            found = "is empty or NaN" if np.isnan(value) else f"holds {value}, which is not a finite number"
+            found = f"is empty or NaN{_SKIP}" if np.isnan(value) else f"holds {value}, which is not a finite number"
             raise self._problem(name, int(bad[0]), found)
         return values
 
@@ -226,7 +257,7 @@ class Table:
         except ValueError:
             row = next(i for i, cell in enumerate(cells) if not is_number(cell))
             if not cells[row]:
-                raise self._problem(name, row, "is empty") from None
+                raise self._problem(name, row, f"is empty{_SKIP}") from None
             units = "; if this line holds units, remove it" if row == 0 else ""
             shown = column.tolist()[row]
             raise self._problem(name, row, f"holds {shown!r}, which is not a number{units}") from None
@@ -238,7 +269,9 @@ class Table:
             # Larger whole numbers are exact as texts only.
             if found is not None and np.abs(found).max(initial=0.0) <= EXACT:
                 return found, False
-            return parse_times(self.labels(name), lambda row, what: self._problem(name, row, what))
+            cells = self.labels(name)
+            cells = column.plain() if column.is_numeric else cells
+            return parse_times(cells, lambda row, what: self._problem(name, row, what))
         if column.dtype.kind in "iu":
             return column, False
         if column.dtype.kind != "M":
@@ -259,6 +292,13 @@ class Table:
 
     def _problem(self, name: str, row: int, found: str) -> Problem:
         return Problem(f"{self.path}, {self.place(row)}: column {name!r} {found}")
+
+
+def _missing(column: Any) -> NDArray[np.bool_]:
+    """Return which entries of a column are empty or NaN."""
+    if isinstance(column, Texts):
+        return np.array([text.lower() in _MISSING for text in column.tolist()])
+    return np.asarray(column != column)
 
 
 def _is_numeric(column: Any) -> bool:

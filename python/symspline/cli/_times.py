@@ -31,6 +31,7 @@ _DATE_LIKE = re.compile(
 _PACKED_DAY = re.compile(r"(19|20)\d\d(0[1-9]|1[0-2])(0[1-9]|[12]\d|3[01])", re.ASCII)
 _DURATION = re.compile(r"(\d+\.?\d*(?:e[+-]?\d+)?|\.\d+) ?([a-z]*)", re.IGNORECASE | re.ASCII)
 _SECOND = 10**9
+UNITS = ("s", "ms", "us", "ns")
 _NANOSECONDS = {"ns": 1, "us": 10**3, "ms": 10**6, "s": _SECOND}
 _NANOSECONDS |= {"min": 60 * _SECOND, "h": 3600 * _SECOND, "d": 24 * 3600 * _SECOND}
 EXACT = 2**53
@@ -111,6 +112,17 @@ def parse_times(cells: Sequence[str], fail: Fail) -> tuple[Times, bool]:
         i = next(i for i, cell in enumerate(cells) if not _is_date(cell))
         raise fail(i, f"holds {cells[i]!r}, which is not a date of the calendar") from None
     return times, zone == UTC_ZONE
+
+
+def from_unix(times: Times, unit: str) -> Times:
+    """Return dates in UTC for numbers that count a unit since 1970."""
+    scale = _NANOSECONDS[unit]
+    whole = times if times.dtype.kind in "iu" else np.floor(times)
+    limit = np.iinfo(np.int64).max // scale
+    far = np.flatnonzero(np.abs(whole) > limit)
+    refuse(f"--unix {unit}: ", (far.size, f"time {times[far[:1]]} is too far from 1970"))
+    fraction = np.rint((times - whole) * scale).astype(np.int64)
+    return np.asarray((whole.astype(np.int64) * scale + fraction).astype("datetime64[ns]"))
 
 
 def _numeric_times(cells: Sequence[str], fail: Fail) -> Times:
