@@ -16,6 +16,7 @@ from ._arrays import short_repr
 from ._core import ValidationError
 from ._curve import Curve
 from ._curves.composed import Affine, Joined, Retimed, TimeMap, part_of_times
+from ._curves.curve import UncertaintyBand
 from ._options import checked_extrapolate, extrapolation_mode
 from ._spaces import Doubles, Space
 from ._time import TimeAxis
@@ -269,6 +270,17 @@ class SegmentedCurve(ComposedCurve[P], Generic[P, C]):
     def _node_times(self) -> Doubles:
         pairs = zip(self._segments, self._curve.offsets, strict=True)
         return np.unique(np.concatenate([own._node_times + offset for own, offset in pairs]))
+
+    def _noise_beside(self, index: tuple[int, ...], x: Doubles) -> UncertaintyBand | None:
+        """Return the noisy data of all segments, and the bands at times x outside gaps, in increasing order."""
+        offsets = self._curve.offsets
+        parts = np.split(x, np.searchsorted(x, self._curve.starts[1:]))
+        bands = [
+            own._noise_beside(index, part - offset)
+            for own, part, offset in zip(self._segments, parts, offsets, strict=True)
+        ]
+        known = [own for own in bands if own is not None]
+        return UncertaintyBand.joined(known, offsets) if len(known) == len(bands) else None
 
     @property
     def _breaks(self) -> Doubles:

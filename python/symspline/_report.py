@@ -307,9 +307,13 @@ def combined(reports: Sequence[Report], max_step: Any, curvature: float, alterna
 
 
 def long_gaps(times: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Return which steps between the knots of one curve are far longer than most."""
+    """Return which steps between the knots of one curve are far longer than most.
+
+    The longest of n random steps, those of a Poisson process, is about log2(n) times the median; twice as long a one
+    has the probability 1/n.
+    """
     steps = np.diff(times)
-    return np.asarray(steps > _LONG * np.median(steps))
+    return np.asarray(steps > max(_LONG, 2 * np.log2(max(len(steps), 1))) * np.median(steps))
 
 
 def shaped(

@@ -6,6 +6,7 @@ curves directly.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from functools import cached_property, partial
 from typing import Any, ClassVar, NamedTuple, Self
 
@@ -389,6 +390,34 @@ class UncertaintyBand(NamedTuple):
     def times(self) -> Doubles:
         """Sorted times of all data."""
         return np.unique(np.concatenate([*self.x, self.others]))
+
+    @classmethod
+    def joined(cls, bands: Sequence[UncertaintyBand], offsets: Sequence[float]) -> UncertaintyBand:
+        """Combine the bands of curves one after the other, whose times begin at different offsets."""
+        pairs = list(zip(bands, offsets, strict=True))
+
+        def each(arrays: Callable[[UncertaintyBand, float], list[Any]]) -> list[Any]:
+            return [np.concatenate(own) for own in zip(*(arrays(*pair) for pair in pairs), strict=True)]
+
+        speeds = [own.speed for own in bands if own.speed is not None]
+        return cls(
+            each(lambda own, offset: [x + offset for x in own.x]),
+            each(lambda own, _: own.points),
+            each(lambda own, _: own.radii),
+            np.concatenate(speeds) if len(speeds) == len(bands) else None,
+            np.concatenate([own.others + offset for own, offset in pairs]),
+        )
+
+    def between(self, first: float, last: float, samples: slice) -> Self:
+        """Return the data from one time to another, and the band at some of the times."""
+        kept = [(x >= first) & (x <= last) for x in self.x]
+        return self._replace(
+            x=[x[own] for x, own in zip(self.x, kept, strict=True)],
+            points=[points[own] for points, own in zip(self.points, kept, strict=True)],
+            radii=[own[samples] for own in self.radii],
+            speed=None if self.speed is None else self.speed[samples],
+            others=self.others[(self.others >= first) & (self.others <= last)],
+        )
 
     def part(self, number: int) -> Self:
         """Return the data and the band in one factor of a product."""

@@ -17,6 +17,7 @@ from .._arrays import checked_number, short_repr, whole_number
 from .._core import ValidationError
 from .._disk import path_of, replacing
 from .._spaces import Product, cover_of, factors_of
+from .chart import origin_of
 from .curves import LINE, Curve
 from .figure import FACTORS
 from .matrices import MATRICES, outlines
@@ -175,7 +176,7 @@ def _body(panel: SubFigure, name: str, curve: Curve) -> Iterator[Update]:
     if name in MATRICES and any(isinstance(own, Quiver) for own in axes.collections):
         yield _frame_at_time(axes, MATRICES[name](curve.points), curve)
     elif name == "se:3":
-        yield _frame_in_space(axes, curve.points)
+        yield _frame_in_space(axes, curve.points, origin_of(panel, [curve], lambda poses: poses[:, :3, 3]))
     elif name in ("spd:2", "spd:3"):
         view = VIEW if name == "spd:3" else np.eye(2)
         yield _ellipse(axes, view @ curve.points @ view.T, curve)
@@ -201,13 +202,13 @@ def _frame_at_time(axes: Axes, matrices: Array, curve: Curve) -> Update:
     return update
 
 
-def _frame_in_space(axes: Any, poses: Array) -> Update:
-    """Return a function that moves a frame along a path."""
+def _frame_in_space(axes: Any, poses: Array, origin: Array) -> Update:
+    """Return a function that moves a frame along a path, which counts from an origin."""
     length = 0.2 * float(np.ptp(axes.get_xlim()))
     sticks = [axes.plot([], [], [], color=color, linewidth=3.5, zorder=9)[0] for color in AXES]
 
     def update(row: int) -> None:
-        foot = poses[row, :3, 3]
+        foot = poses[row, :3, 3] - origin
         for i, stick in enumerate(sticks):
             stick.set_data_3d(*np.stack([foot, foot + length * poses[row, :3, i]], axis=1))
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from itertools import product
 from typing import Any
@@ -33,18 +33,21 @@ from .style import (
     closest,
     inside,
     legend,
+    named_from,
     note,
     plain,
     points,
+    round_start,
     size,
     text_factor,
     window,
 )
 
 _PLANE = Hyperbolic(2)
+_ZERO: Array = np.zeros(3)
 _ORIGIN = np.array([1.0, 0.0, 0.0])
 SHADOW = "thin: shadow on the floor"
-_BESIDE, _UNDER, _ABOVE = 0.6, 0.35, 0.1
+_BESIDE, _UNDER, _ABOVE = 0.74, 0.35, 0.1
 """Margins of a box in inches, which have the labels of its axes."""
 _STEPS = np.multiply.outer(10.0 ** np.arange(-9, 3), [1, 2, 5]).ravel()
 
@@ -52,22 +55,46 @@ _STEPS = np.multiply.outer(10.0 ** np.arange(-9, 3), [1, 2, 5]).ravel()
 def draw_plane(panel: SubFigure, curves: Sequence[Curve]) -> None:
     """Draw curves in R² with equal scales."""
     axes = plane(panel)
+    origin = count_from(panel, axes, curves, np.asarray)
     for curve in curves:
-        draw_arrows(axes, curve, curve.near_data(curve.points))
-        draw_in_plane(axes, curve, np.asarray, lambda p, radii: p[:, None] + radii[:, None, None] * CIRCLE)
+        draw_arrows(axes, curve, curve.near_data(curve.points - origin))
+        rims = lambda p, radii: p[:, None] + radii[:, None, None] * CIRCLE  # noqa: E731
+        draw_in_plane(axes, curve, lambda points: np.asarray(points) - origin, rims)
 
 
 def draw_3d(panel: SubFigure, curves: Sequence[Curve]) -> None:
     """Draw curves in R³ in a box with equal scales, with their shadows on the floor."""
-    paths = [curve.near_data(curve.points) for curve in curves]
+    origin = origin_of(panel, curves, np.asarray)
+    paths = [curve.near_data(curve.points - origin) for curve in curves]
     shadows = [curve.outside_gaps(path) for curve, path in zip(curves, paths, strict=True)]
-    axes = box(panel, shadows, paths + [curve.given for curve in curves], colors=shadow_colors(curves))
-    for curve, path in zip(curves, paths, strict=True):
+    given = [curve.given - origin for curve in curves]
+    axes = box(panel, shadows, paths + given, colors=shadow_colors(curves), origin=origin)
+    for curve, path, own in zip(curves, paths, given, strict=True):
         if curve.radii is not None:
-            _draw_hose(axes, curve, curve.radii)
+            _draw_hose(axes, curve, curve.points - origin, curve.radii)
         curve.draw_line(axes, path)
-        curve.draw_dots(axes, curve.given)
+        curve.draw_dots(axes, own)
     note(panel, SHADOW)
+
+
+def origin_of(panel: Any, curves: Sequence[Curve], positions: Callable[[Any], Array]) -> Array:
+    """Return a position from which pictures count: a round number for coordinates that are far from zero.
+
+    In axes of the user it is zero, as others draw into them.
+    """
+    everything = np.concatenate([positions(own.extent) for own in curves])
+    if not isinstance(panel, SubFigure):
+        return np.zeros(everything.shape[1])
+    return np.array([round_start(*ends) for ends in zip(everything.min(axis=0), everything.max(axis=0), strict=True)])
+
+
+def count_from(panel: Any, axes: Axes, curves: Sequence[Curve], positions: Callable[[Any], Array]) -> Array:
+    """Return the position from which the axes of a plane count, which their labels name."""
+    origin = origin_of(panel, curves, positions)
+    for name, start in zip("xy", origin.tolist(), strict=True):
+        if start:
+            getattr(axes, f"set_{name}label")(named_from(f"x{'₁' if name == 'x' else '₂'}", start))
+    return origin
 
 
 def shadow_colors(curves: Sequence[Curve]) -> list[Any]:
@@ -75,10 +102,10 @@ def shadow_colors(curves: Sequence[Curve]) -> list[Any]:
     return [to_rgba(curve.color, 0.3) if curve.label and not curve.faint else GRID for curve in curves]
 
 
-def _draw_hose(axes: Any, curve: Curve, radii: Array) -> None:
-    """Draw the surface at given distances from a curve in R³."""
+def _draw_hose(axes: Any, curve: Curve, points: Array, radii: Array) -> None:
+    """Draw the surface at given distances from the points of a curve in R³."""
     discs = disc_indices(curve)[::2]
-    along = np.gradient(curve.points[discs], axis=0)
+    along = np.gradient(points[discs], axis=0)
     along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-300)
     aside = np.empty_like(along)
     last = np.eye(3)[np.abs(along[0]).argmin()]
@@ -88,7 +115,7 @@ def _draw_hose(axes: Any, curve: Curve, radii: Array) -> None:
         last = aside[i] = last / np.linalg.norm(last)
     frame = np.stack([aside, np.cross(along, aside)], axis=1)
     ring = np.concatenate([CIRCLE, CIRCLE[:1]]) @ frame * radii[discs, None, None]
-    x, y, z = np.moveaxis(curve.points[discs, None] + ring, -1, 0)
+    x, y, z = np.moveaxis(points[discs, None] + ring, -1, 0)
     look: Any = {"color": curve.color, "alpha": 0.08, "linewidth": 0, "shade": False}
     axes.plot_surface(x, y, z, rstride=1, cstride=2, antialiased=False, **look)
 
@@ -111,12 +138,13 @@ def box(
     margin: float = 0.05,
     below: float = 0.3,
     colors: Sequence[Any] = (),
+    origin: Array = _ZERO,
 ) -> Any:
     """Add a box with equal scales around lines of shape (m, 3), with their shadows in given colours on the floor.
 
     The box contains the points ``others``, too. Rows that are NaN are ignored. Its sides are longer than the extent of
     all points by ``margin`` times the longest one at both ends. It fills the panel, of which ``below`` inches at the
-    bottom stay empty.
+    bottom stay empty. The labels of the axes name the ``origin`` from which they count.
     """
     axes: Any = panel.add_axes((0, 0, 1, 1), projection="3d", facecolor="none")
     # Markers of both ends are in front of lines. Surfaces hide what is behind them.
@@ -134,7 +162,7 @@ def box(
     axes.tick_params(axis="z", pad=3)
     axes.zaxis.labelpad = 1
     factor = OWN_AXES.get(axes, 1.0)
-    for axis, number, side, name in zip("xyz", middle, sides, "₁₂₃", strict=True):
+    for axis, number, side, name, start in zip("xyz", middle, sides, "₁₂₃", origin.tolist(), strict=True):
         getattr(axes, f"set_{axis}lim")(number - side, number + side)
         # White walls with faint lines.
         wall = getattr(axes, f"{axis}axis")
@@ -143,7 +171,8 @@ def box(
         wall.line.set_color(EDGE)
         wall._axinfo["grid"].update(color=GRID, linewidth=0.6)
         wall.set_major_locator(MaxNLocator(max(1 + 2 * (factor == 1), round(5 * factor * side / sides.max()))))
-        wall.label.set(text=f"x{name}", color=INK, fontsize=points(10))
+        wall.labelpad += 5 * bool(start)
+        wall.label.set(text=named_from(f"x{name}", start), color=INK, fontsize=points(10))
     # Flat boxes are seen from farther above. Choose the direction from which the curve looks widest.
     angles = np.radians([-60, -30, 30, 60])
     right = everything[:, 1:2] * np.cos(angles) - everything[:, :1] * np.sin(angles)

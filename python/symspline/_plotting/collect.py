@@ -14,7 +14,9 @@ from .._core import ConvergenceError, CutLocusError, ValidationError
 from .._curves.ends import NATURAL
 from .._curves.fit import FitProblem, fit, read
 from .._curves.solve import DEFAULTS
+from .._input import UTC_ZONE
 from .._spaces import Product, Space, cover_of, parts_of
+from .._time import TimeAxis
 from .curves import SECOND, Axis, Batch, Curve
 from .figure import PATHS
 from .style import SPLINE, Array, colors, evenly, named_from, round_start
@@ -23,8 +25,8 @@ FEW, _OF_MANY = 5, 3
 """The largest number of curves of a batch that are all drawn with their points, and the number of larger batches."""
 MOST = 50
 """The largest number of curves of a batch that are drawn, those in the background included."""
-_FOR_QUANTILES = 200
-"""The largest number of curves along the first batch axis from which quantiles and means are computed."""
+_FOR_QUANTILES, _FOR_MEAN = 2000, 200
+"""The largest numbers of curves along the first batch axis from which quantiles and means are computed."""
 _QUANTILE_TIMES = 300
 _SEGMENTS = ["#7b3294", "#56b4e9", "#4d4d4d", "#cc79a7", "#8a6d00", "#a6611a"]
 """Colours of segments, if they are few; other colours than those of components."""
@@ -53,7 +55,7 @@ class Scatter:
         return self.points
 
 
-def axis_of(ends: Sequence[tuple[Any, Any]], durations: bool = False, raw: bool = False) -> Axis:
+def axis_of(ends: Sequence[tuple[Any, Any]], times: TimeAxis, raw: bool = False) -> Axis:
     """Return the time axis for curves with given first and last times.
 
     Numbers that are far from zero, such as seconds since 1970, are shown as differences from a round number unless
@@ -63,13 +65,13 @@ def axis_of(ends: Sequence[tuple[Any, Any]], durations: bool = False, raw: bool 
     first, last = firsts.min(), lasts.max()
     if firsts.dtype.kind == "M":
         if (last - first) / SECOND > 1e-3:
-            return Axis(dates=True, name="", seconds=True)
+            return Axis(dates=True, name="UTC" if times.zone == UTC_ZONE else "", seconds=True)
         return Axis(start=first, name=f"seconds since {first}", seconds=True)
-    name = "t, seconds" if durations else "t"
+    name = "t, seconds" if times.durations else "t"
     start = 0 if raw else round_start(first, last)
     if not start:
-        return Axis(name=name, seconds=durations)
-    return Axis(start=start, name=named_from(name, start), seconds=durations)
+        return Axis(name=name, seconds=times.durations)
+    return Axis(start=start, name=named_from(name, start), seconds=times.durations)
 
 
 def curves_of(
@@ -129,9 +131,11 @@ def _drawn(one: Any, noise_beside: Any, index: Any, axis: Axis, look: dict[str, 
     few = len(parts) <= len(_SEGMENTS)
     has_names = few and made.alone and made.color == SPLINE and made.label is None
     segments = []
+    ends = np.cumsum([0, *map(len, parts)]).tolist()
     for i, own in enumerate(parts):
         within = nodes[(nodes >= own[0]) & (nodes <= own[-1])] if has_nodes else own[:1]
-        part = replace(made, x=own, nodes=within, reference=start if i else None, has_start=few or not i)
+        beside = noise and noise.between(own[0], own[-1], slice(*ends[i : i + 2]))
+        part = replace(made, x=own, nodes=within, reference=start if i else None, has_start=few or not i, noise=beside)
         segments.append(replace(part, color=_SEGMENTS[i], label=f"segment {i}") if has_names else part)
     return replace(made, segments=tuple(segments))
 
@@ -154,7 +158,8 @@ def _mean_of(
     if batch is None:
         return None
     many = np.union1d(batch.x, data.times)
-    points = replace(batch, x=many).at("point").swapaxes(0, 1)
+    points = replace(batch, x=many).at("point")
+    points = points[evenly(len(points), _FOR_MEAN)].swapaxes(0, 1)
     try:
         means = space.mean(points)
     except (ConvergenceError, CutLocusError, ValidationError):

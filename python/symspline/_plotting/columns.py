@@ -19,7 +19,8 @@ _COLUMNS = 4
 def draw_columns(panel: SubFigure, curves: Sequence[Curve]) -> None:
     """Draw the entries of every column in one panel, in the colours of their rows; all components of large matrices."""
     n, k = curves[0].space.point_shape
-    if k > _COLUMNS or n > len(DISTINCT) or not isinstance(panel, SubFigure):
+    compared = not curves[0].alone and len(curves) > 1
+    if k > _COLUMNS or n > len(DISTINCT) or compared or not isinstance(panel, SubFigure):
         draw_components(panel, curves)
         return
     made = timelines(panel, curves, [f"column {j + 1}" for j in range(k)], top=0.35)

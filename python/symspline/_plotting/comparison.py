@@ -18,7 +18,7 @@ from .figure import finish
 from .looks import checked_color
 from .page import draw_page
 from .panels import check_axes, draw_into, has_dark_background
-from .style import DATA, DISTINCT
+from .style import DATA, DISTINCT, time_colors
 from .theme import is_dark, kept_color
 
 
@@ -44,7 +44,7 @@ def compare(
     data = [_data_of(own, space, i) if isinstance(own, tuple) else None for i, own in enumerate(items)]
     _check_times(items, data, first._time_axis)
     ends = [own.domain if given is None else given[:2] for own, given in zip(items, data, strict=True)]
-    axis = axis_of(ends, first._time_axis.durations, raw=ax is not None)
+    axis = axis_of(ends, first._time_axis, raw=ax is not None)
     drawn: list[Curve] = []
     for item, given, name, color in zip(items, data, names, chosen, strict=True):
         if given is None:
@@ -83,7 +83,8 @@ def _checked_colors(colors: Any, items: Sequence[Any], dark: bool) -> list[Any]:
                 f"colors must be a list of {len(items)} colours, one per curve, not {short_repr(colors)}"
             )
         return [kept_color(checked_color(own, f"colors[{i}]"), dark) for i, own in enumerate(colors)]
-    lines = iter(DISTINCT * len(items))
+    count = sum(not isinstance(own, tuple) for own in items)
+    lines = iter(DISTINCT if count <= len(DISTINCT) else map(tuple, time_colors(np.linspace(0, 1, count))))
     dots = iter([DATA, *DISTINCT[::-1]] * len(items))
     return [next(dots) if isinstance(own, tuple) else next(lines) for own in items]
 

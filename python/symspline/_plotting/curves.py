@@ -29,6 +29,8 @@ KNOTS, TICKS, END, AFTER = "_knots", "_ticks", "_end", "_after"
 BODY: Array = np.array([[1.0, 0.0], [-0.7, 0.55], [-0.35, 0.0], [-0.7, -0.55], [1.0, 0.0]])
 """A body in the plane that points along its first axis."""
 BODY_COLOR = "#cfe0ee"
+MANY = 150
+"""A larger number of points is drawn behind the curve, which they would hide."""
 AFTER_COLOR = "#6aa5d8"
 """Colour of curves in space after their first long gap."""
 
@@ -371,7 +373,9 @@ class Curve:
         if not self.has_line:
             size = float(np.clip(60 / np.sqrt(max(len(positions), 1)), 3, 8))
             rings: dict[str, Any] = {"color": self.color, "markersize": size, "markerfacecolor": "none", "zorder": 7}
-            axes.plot(*positions.T, "o", **rings | {"label": self.label or DATA_DOTS} | look)
+            known = {line.get_label() for line in axes.lines}
+            label = self.label if self.label and self.label not in known else DATA_DOTS
+            axes.plot(*positions.T, "o", **rings | {"label": label} | look)
             return
         if self.noise is not None:
             size = float(np.clip(25 / np.sqrt(max(len(positions), 1)), 1.5, 3.5))
@@ -381,7 +385,11 @@ class Curve:
             return
         size = float(np.clip(30 / np.sqrt(max(len(positions), 1)), 2, 6.5)) * (1 if self.alone else 0.6)
         color = INK if self.alone and self.color == SPLINE and self.label is None else self.color
-        look = {"color": color, "markersize": size, "markeredgecolor": color, "zorder": 6} | look
+        # Many points would hide the curve.
+        front = 6 if len(positions) <= MANY else 1.8
+        look = {"color": color, "markersize": size, "markeredgecolor": color, "zorder": front} | look
+        if len(positions) > MANY:
+            look |= {"color": DATA, "markeredgecolor": DATA}
         if self.has_nodes and not self.is_mean:
             axes.plot(*positions.T, "o", label=DOTS, **look)
         if self.has_start:
@@ -423,6 +431,15 @@ class Batch:
         values = self.data.evaluate(self.x, quantity, "raise", False)
         count = len(self.data.batch)
         return values.reshape(-1, *values.shape[count:])[self.valid]
+
+
+def common_gaps(curves: Sequence[Curve]) -> Array:
+    """Return starts and ends on matplotlib's axis of the times at which all curves have a gap, shape (m, 2)."""
+    found, *others = [curve.gaps for curve in curves if curve.has_line and not curve.faint] or [_NO_GAPS]
+    for gaps in others:
+        low, high = np.maximum(found[:, None, 0], gaps[:, 0]), np.minimum(found[:, None, 1], gaps[:, 1])
+        found = np.stack([low[low < high], high[low < high]], axis=1)
+    return found
 
 
 def title_on(what: str, space: Space[Any], most: int = 63) -> str:

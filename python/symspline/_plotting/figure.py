@@ -24,7 +24,7 @@ from . import chart, columns, graphs, matrices, sphere
 from .curves import Curve
 from .rates import IN_ROW
 from .shrink import shrink, small_text
-from .style import DPI, INK, points
+from .style import DPI, INK, font_factor, points
 from .theme import invert_page, is_dark, light_colors
 
 FACTORS = 6
@@ -83,7 +83,7 @@ _OTHERS = Picture(graphs.draw_components, 10.5, 3.8)
 # Spaces whose picture shows many curves of a batch.
 PATHS = {"euclidean:2", "euclidean:3", "sphere:2", "hyperbolic:2", "rp:2", "gr:1,3", "gr:2,3", "cp:1", "cgr:1,2"}
 # Spaces whose picture has symbols in rows, one row per curve.
-_IN_ROWS = {"sphere:3", "so:3", "o:3", "su:2", "spd:2", "spd:3"}
+IN_ROWS = {"sphere:3", "so:3", "o:3", "su:2", "spd:2", "spd:3"}
 # Spaces whose picture has a view that depends on the curves.
 VIEWS = {"sphere:2", "hyperbolic:2", "rp:2", "gr:1,3", "gr:2,3", "cp:1", "cgr:1,2"}
 
@@ -112,7 +112,7 @@ def draw_picture(panel: Any, space: Space, curves: Sequence[Curve]) -> None:
     name = str(cover_of(space))
     if name not in PATHS:
         curves = [curve for curve in curves if not curve.faint]
-    if name not in _IN_ROWS:
+    if name not in IN_ROWS:
         curves = [part for curve in curves for part in curve.unbroken]
     picture_of(space).draw(panel, curves)
 
@@ -145,14 +145,15 @@ def new_figure(size: tuple[float, float], show: bool) -> Figure:
 def drawing(size: tuple[float, float], show: bool = False, factor: float = 1.0) -> Iterator[Figure]:
     """Create a figure to draw into, in the colours of a light style, and adapt it to the style of the user afterwards.
 
-    Lines, symbols and text are reduced by a factor.
+    Lines, symbols and text are reduced by a factor. Figures are larger by the factor of a large font.
     """
     dark = is_dark(rcParams["figure.facecolor"])
     with light_colors(dark), small_text(factor):
         figure = new_figure(size, show)
         yield figure
-    if factor < 1:
-        shrink(figure.findobj(), factor)
+    larger = font_factor()
+    shrink(figure.findobj(), factor * larger)
+    figure.set_size_inches(larger * size[0], larger * size[1])
     if dark:
         invert_page(figure)
 

@@ -14,7 +14,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from .._spaces import HermitianPositiveDefinite, Space, SymmetricPositiveDefinite
-from .curves import DOTS, GAPS, KNOTS, LINE, TICKS, Curve, draw_graph_of, fill_quantiles, interrupted
+from .curves import DOTS, GAPS, KNOTS, LINE, TICKS, Curve, common_gaps, draw_graph_of, fill_quantiles, interrupted
 from .style import (
     BOTTOM,
     DISTINCT,
@@ -39,14 +39,17 @@ from .style import (
 
 SUBSCRIPTS = str.maketrans("0123456789,", "₀₁₂₃₄₅₆₇₈₉,")
 _NAMED, _OTHERS, _IN_ROW = 12, 100, 6
-_MANY = 150
-"""A larger number of points is drawn behind the curve, which they would hide."""
+_COMPARED = 4
+"""The largest number of components that are drawn for several curves."""
+_STYLES = ["-", "--", ":", "-.", (0, (5, 1)), (0, (1, 1))]
+_ROUNDING = 1e-9
+"""Numbers that vary by less than this part of others are constant."""
 _NARROW = 1.3
 """The largest width of lines in low axes."""
 _BETWEEN = 0.3
 """The distance between axes in inches."""
-FEW_KNOTS, _TICKS = 40, 2000
-"""The largest number of knots that have lines, and a bound for that of ticks."""
+FEW_KNOTS, _TICKS = 40, 300
+"""The largest numbers of knots that have lines, and ticks."""
 
 
 # ---- axes ----
@@ -114,12 +117,13 @@ def _mark_knots(axes: Axes, curves: Sequence[Curve]) -> None:
     look: Any = {"transform": axes.get_xaxis_transform()}
     line: Any = {"color": EDGE, "linewidth": 0.8, "linestyle": style, "zorder": 1}
     line["label"] = KNOTS if height == 1 else TICKS
-    axes.vlines(knots[:: 1 + len(knots) // _TICKS], 0, height, **look, **line)
+    if len(knots) <= _TICKS:
+        axes.vlines(knots, 0, height, **look, **line)
     _mark_gaps(axes, curves)
 
 
 def _mark_gaps(axes: Axes, curves: Sequence[Curve]) -> None:
-    gaps = np.unique(np.concatenate([curve.gaps for curve in curves]), axis=0)
+    gaps = common_gaps(curves)
     if len(gaps):
         look: Any = {"transform": axes.get_xaxis_transform(), "facecolor": GAP, "linewidth": 0, "zorder": 0.5}
         spans = [(start, end - start) for start, end in gaps.tolist()]
@@ -203,7 +207,9 @@ def draw_coordinates(
         return
     drawn = [curve.marked(numbers) for curve in curves]
     everything = np.concatenate([rows for pair in drawn for rows in pair])
-    starts = [round_start(*ends) for ends in zip(np.nanmin(everything, 0), np.nanmax(everything, 0), strict=True)]
+    lowest, highest = np.nanmin(everything, axis=0), np.nanmax(everything, axis=0)
+    largest = float((highest - lowest).max())
+    starts = [round_start(*ends) for ends in zip(lowest, highest, strict=True)]
     made = timelines(panel, curves, [named_from(*own) for own in zip(names, starts, strict=True)])
     made[0].set_title(title, loc="left", color=INK, fontsize=points(9), pad=3)
     for i, axes in enumerate(made):
@@ -211,10 +217,14 @@ def draw_coordinates(
         for curve, (line, given) in zip(curves, drawn, strict=True):
             size = float(np.clip(30 / np.sqrt(max(len(given), 1)), 1.2, 3))
             look: Any = {"color": INK} if curve.noise is None and curve.alone else {}
-            look |= {"markersize": size, "zorder": 1.8} if len(given) > _MANY else {"markersize": size}
+            look |= {"markersize": size}
             size_of_band = growth(np.linalg.norm(line, axis=1))
             own = curve.graph(line[:, i] - starts[i])
             draw_graph_of(axes, curve, own, given[:, i] - starts[i], size_of_band, **look)
+        low, high = axes.get_ylim()
+        if high - low < _ROUNDING * largest:
+            # Rounding errors of a constant would look like a curve.
+            axes.set_ylim((low + high - largest) / 2, (low + high + largest) / 2)
         for artist in axes.lines:
             if artist.get_gid() == LINE:
                 artist.set_linewidth(min(artist.get_linewidth(), _NARROW))
@@ -247,6 +257,9 @@ def draw_numbers(
     period : float
         Numbers that differ by multiples of it are equal. They are between −period / 2 and period / 2.
     """
+    if isinstance(panel, SubFigure) and not curves[0].alone and len(curves) > 1:
+        _compare_numbers(panel, curves, label, names, numbers, period)
+        return
     space = size(panel)[0] - LEFT - RIGHT
     width = 1.8 if curves[0].alone else 0.9
     drawn = [curve.marked(partial(numbers, curve.first_point)) for curve in curves]
@@ -264,10 +277,14 @@ def draw_numbers(
         if curve.has_line:
             for i in rest:
                 axes.plot(*_line(curve.times, values[:, i], period).T, color=INK, linewidth=0.4, alpha=0.4)
-        for i, look in zip(named, looks, strict=True):
+        for k, (i, look) in enumerate(zip(named, looks, strict=True)):
+            if axes in OWN_AXES and (curve.label or not curve.alone):
+                # The colour tells curves apart, and the line style numbers.
+                look = {"color": curve.color, "linestyle": _STYLES[k % len(_STYLES)]}
             if curve.has_line:
                 # Axes of the user get the names, and a legend only if the user adds one.
-                label = names[i] if curve is curves[0] and axes in OWN_AXES else LINE
+                own = f"{curve.label}: {names[i]}" if curve.label else names[i]
+                label = own if axes in OWN_AXES and (curve.label or curve is curves[0]) else LINE
                 line = _line(curve.times, curve.graph(values[:, i]), period)
                 curve.plot_line(axes, line, linewidth=width, label=label, **look)
             positions, color = np.column_stack([curve.on_axis(curve.given_x), given[:, i]]), look["color"]
@@ -279,6 +296,30 @@ def draw_numbers(
         return
     anchor: Any = {"loc": "lower right", "bbox_to_anchor": (1, 1), "borderaxespad": 0}
     legend(axes, handles, labels, rows=rows, handlelength=1.6, **anchor)
+
+
+def _compare_numbers(
+    panel: SubFigure,
+    curves: Sequence[Curve],
+    label: str,
+    names: Sequence[str],
+    numbers: Callable[[Any, Any], Array],
+    period: float,
+) -> None:
+    """Draw the numbers with the largest ranges in axes of their own, where several curves have their colours."""
+    first = curves[0].first_point
+    ranges = np.max([np.ptp(numbers(first, curve.points), axis=0) for curve in curves], axis=0)
+    kept = np.sort(np.argsort(-ranges, kind="stable")[:_COMPARED])
+
+    def few(points: Any) -> Array:
+        values = numbers(first, points)[:, kept]
+        jumps = np.abs(np.diff(values, axis=0, prepend=values[:1])) > period / 2
+        # Data are not a line.
+        return np.where(jumps, np.nan, values) if any(points is own.points for own in curves) else values
+
+    words = " ".join(label.split())
+    title = words if len(kept) == len(names) else f"{words}, {len(kept)} of {len(names)}: those with the largest ranges"
+    draw_coordinates(panel, curves, [names[i] for i in kept], few, title=title)
 
 
 def _line(times: Array, values: Array, period: float) -> Array:

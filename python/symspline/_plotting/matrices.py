@@ -24,12 +24,12 @@ from numpy.typing import NDArray
 from .._core import convert_rotations
 from .._quaternions import matrices_of_quaternions
 from .._spaces import SpecialOrthogonal, cover_of
-from .chart import SHADOW, box, explain_frames, frame_handles, plane, shadow_colors
+from .chart import SHADOW, box, count_from, explain_frames, frame_handles, origin_of, plane, shadow_colors
 from .curves import BODIES, BODY, BODY_COLOR, POSES, START, Curve
 from .graphs import draw_coordinates
 from .rows import REACH, VIEW, Rows
 from .sphere import caps
-from .style import AXES, INK, Array, apart, axes_size, legend, note, points, round_below, time_colors, window
+from .style import AXES, INK, OWN_AXES, Array, apart, axes_size, legend, note, points, round_below, time_colors, window
 
 ROTATIONS = SpecialOrthogonal(3)
 _LENGTH = 0.14
@@ -156,6 +156,10 @@ def _draw_discs(rows: Rows, row: int, times: Array, length: float, frames: Array
 def _explain(axes: Axes, more: str, width: float) -> None:
     """Draw a legend of the colours above axes of a given width in inches, with further words."""
     handles, labels = frame_handles()
+    if axes in OWN_AXES:
+        # For legends that the user adds.
+        for handle, label in zip(handles, labels, strict=True):
+            axes.plot([], [], color=handle.get_color(), linewidth=handle.get_linewidth(), label=label)
     if more:
         handles.append(Line2D([], [], linestyle="none"))
         labels.append(more)
@@ -173,22 +177,24 @@ def draw_flat_poses(panel: SubFigure, curves: Sequence[Curve]) -> None:
     the curve. Otherwise they are dots, and some of them light bodies.
     """
     axes = plane(panel)
+    origin = count_from(panel, axes, curves, lambda poses: poses[:, :2, 2])
     positions = np.concatenate([curve.extent[:, :2, 2] for curve in curves])
     unit = float(np.max(np.ptp(positions, axis=0) / axes_size(axes))) or 1.0
 
     def draw(poses: Array, label: str, **look: Any) -> None:
         if len(poses):
             turned = length * BODY[:-1] @ poses[:, :2, :2].swapaxes(1, 2)
-            bodies = list(turned + poses[:, None, :2, 2])
+            feet = poses[:, :2, 2] - origin
+            bodies = list(turned + feet[:, None])
             axes.add_collection(PolyCollection(bodies, zorder=6.6, label=label, **look))
             # Where the body is.
             dot = INK if look["facecolor"] != INK else "white"
-            axes.plot(*poses[:, :2, 2].T, "o", color=dot, markersize=1.8, zorder=6.7, label="_feet")
+            axes.plot(*feet.T, "o", color=dot, markersize=1.8, zorder=6.7, label="_feet")
 
     for curve in curves:
         length = _LENGTH * unit * (1 if curve.alone else 0.6)
         given, edge = curve.given, INK if curve.alone and curve.has_line else curve.color
-        path = curve.points[:, :2, 2]
+        path = curve.points[:, :2, 2] - origin
         curve.draw_line(axes, curve.near_data(path), linewidth=1.6)
         has_bodies = curve.noise is None and curve.has_nodes and len(_apart(given, 2 * length)) == len(given)
         if has_bodies:
@@ -198,7 +204,7 @@ def draw_flat_poses(panel: SubFigure, curves: Sequence[Curve]) -> None:
             small = float(np.clip(22 / np.sqrt(max(len(given), 1)), 1.5, 4.0))
             # The first of the given poses is a body.
             dots = replace(curve, has_start=not curve.has_nodes)
-            dots.draw_dots(axes, given[:, :2, 2], markersize=small)
+            dots.draw_dots(axes, given[:, :2, 2] - origin, markersize=small)
         way = float(np.sum(np.linalg.norm(np.diff(path, axis=0), axis=1)))
         dense = curve.noise is None and curve.has_nodes and not has_bodies
         some = _apart(given if dense else curve.points[~curve.bridges], max(4 * length, way * len(curves) / _MANY))
@@ -219,23 +225,24 @@ def _apart(poses: Array, least: float) -> Array:
 
 def draw_poses(panel: SubFigure, curves: Sequence[Curve]) -> None:
     """Draw poses of SE(3) as frames on the path. Given ones are bold."""
-    paths = [curve.near_data(curve.points[:, :3, 3]) for curve in curves]
-    given = [curve.given[:, :3, 3] for curve in curves]
+    origin = origin_of(panel, curves, lambda poses: poses[:, :3, 3])
+    paths = [curve.near_data(curve.points[:, :3, 3] - origin) for curve in curves]
+    given = [curve.given[:, :3, 3] - origin for curve in curves]
     everything = np.concatenate([*paths, *given])
     length = 0.16 * window(everything[np.isfinite(everything[:, 0])], 1.0)[1] or 0.2
     number = max(2, _MANY // len(curves))
     # The box contains the tips of all frames that are drawn.
     tips = [
-        (poses[:, :3, 3] + length * poses[:, :3, i])
+        (poses[:, :3, 3] - origin + length * poses[:, :3, i])
         for curve in curves
         for _, poses in curve.samples(number).values()
         for i in range(3)
     ]
     shadows = [curve.outside_gaps(path) for curve, path in zip(curves, paths, strict=True)]
-    axes = box(panel, shadows, paths + given + tips, 0.02, below=0.45, colors=shadow_colors(curves))
+    axes = box(panel, shadows, paths + given + tips, 0.02, 0.45, shadow_colors(curves), origin)
 
     def draw(poses: Array, length: float, **look: Any) -> None:
-        feet = poses[:, :3, 3]
+        feet = poses[:, :3, 3] - origin
         for i, color in enumerate(AXES):
             # All sticks of one colour are one line with breaks.
             sticks = np.stack([feet, feet + length * poses[:, :3, i], np.full_like(feet, np.nan)], axis=1)
@@ -249,9 +256,9 @@ def draw_poses(panel: SubFigure, curves: Sequence[Curve]) -> None:
                 continue
             draw(poses, length, linewidth=2.0 if curve.alone else 1.3)
             if curve.noise is None:
-                curve.draw_dots(axes, poses[:, :3, 3], markersize=3.5 if curve.alone else 2)
+                curve.draw_dots(axes, poses[:, :3, 3] - origin, markersize=3.5 if curve.alone else 2)
             else:
-                curve.draw_dots(axes, curve.given[:, :3, 3])
+                curve.draw_dots(axes, curve.given[:, :3, 3] - origin)
     bold = sum(len(curve.samples(number)["bold"][0]) for curve in curves)
     count = sum(len(curve.given) for curve in curves)
     name = "bold: given" if bold == count else f"bold: {bold} of {count} given"

@@ -30,21 +30,23 @@ from .curves import (
     FAINT,
     GAPS,
     KNOTS,
+    MANY,
     POSES,
     QUANTILES,
     START,
     TICKS,
     Axis,
     Curve,
+    common_gaps,
     title_on,
 )
 from .figure import FACTORS, draw_picture, drawing, finish, fitted, picture_of, picture_of_factors, shows_band
 from .panels import check_axes, draw_into, has_dark_background, next_color
 from .rates import LIMIT, columns_of, draw_rates
-from .style import BOTTOM, DATA, EDGE, GAP, INK, MARK, TOP, Array, heading, legend
+from .style import BOTTOM, DATA, EDGE, GAP, INK, MARK, TOP, Array, font_factor, heading, legend
 from .theme import is_dark, kept_color
 
-_HEAD, _RATES_WIDTH, _RATES_HEIGHT = 1.2, 5.8, 4.0
+_HEAD, _LINE, _RATES_WIDTH, _RATES_HEIGHT = 1.2, 0.2, 5.8, 4.0
 _UNITS = (172_800, 86_400, "d"), (7200, 3600, "h"), (100, 60, "min"), (0, 1, "s")
 """The least number of seconds for which a unit is used, its length in seconds, and its name."""
 _ROW = 1.5
@@ -97,7 +99,8 @@ def page_of(
     has_band = [shows_band(part) for part in parts]
     below = residuals.panels_of(curve, curves[0], has_band)
     title = title or title_on(curve._kind, space)
-    return draw_page(curves, title, words + _description(curve, curves), figsize, show, below)
+    others = int(np.prod(curve._curve.batch)) - sum(not own.faint and not own.is_mean for own in curves)
+    return draw_page(curves, title, words + _description(curve, curves), figsize, show, below, others)
 
 
 def draw_page(
@@ -107,23 +110,26 @@ def draw_page(
     figsize: tuple[float, float] | None = None,
     show: bool = False,
     below: Sequence[Any] = (),
+    others: int = 0,
 ) -> Page:
-    """Draw a heading, the picture of the space, rates and further panels."""
+    """Draw a heading, the picture of the space, rates and further panels; ``others`` curves have no points."""
     space = curves[0].space
     picture = picture_of_factors(curves) if isinstance(space, Product) else fitted(picture_of(space), curves)
     wide = picture.width > 1.5 * picture.height
     widths = [picture.width] if wide else [picture.width, _RATES_WIDTH]
     rates = any(curve.has_line for curve in curves)
-    heights = [_HEAD, picture.height]
+    head = _HEAD + _LINE * _extra_lines(curves, widths[0] if wide or not rates else sum(widths))
+    heights = [head, picture.height]
     if wide and rates:
         count = max(map(len, columns_of(space, False, FACTORS, wide)))
         heights.append(_RATES_HEIGHT if count < 3 else BOTTOM + TOP + _ROW * count)
     if below:
         heights.append(residuals.height(below))
     natural = (sum(widths) if rates or wide else widths[0], sum(heights))
-    size, factor = _layout(natural, figsize)
+    size, factor = _layout(natural, None if figsize is None else np.divide(figsize, font_factor()))
+    final = np.multiply(size, font_factor()) if figsize is None else figsize
     with drawing(size, show, factor) as figure:
-        heights = [_HEAD, *(h * (size[1] - _HEAD) / sum(heights[1:]) for h in heights[1:])]
+        heights = [head, *(h * (size[1] - head) / sum(heights[1:]) for h in heights[1:])]
         grid = figure.add_gridspec(len(heights), len(widths), width_ratios=widths, height_ratios=heights)
         heading(figure, title, words, 1 - 0.5 / size[1])
         panel = figure.add_subfigure(grid[1, 0] if wide or rates else grid[1, :])
@@ -135,13 +141,21 @@ def draw_page(
             draw_rates(figure.add_subfigure(grid[2, 0] if wide else grid[1, 1]), curves, FACTORS, wide)
         if below:
             residuals.draw(figure.add_subfigure(grid[-1, :]), curves[0], below)
-        _explain(figure, curves, 1 - 0.92 / size[1])
+        _explain(figure, curves, 1 - 0.92 / size[1], others, 0.9 * float(final[0]))
     if figsize is not None:
         figure.set_size_inches(figsize)
     return Page(figure, curves, panel)
 
 
-def _layout(natural: tuple[float, float], figsize: tuple[float, float] | None) -> tuple[tuple[float, float], float]:
+def _extra_lines(curves: Sequence[Curve], width: float) -> int:
+    """Return the number of lines that the names of curves need in a legend, beyond two."""
+    names = {own.label for curve in curves if not curve.faint for own in curve.unbroken if own.label}
+    longest = max(map(len, names), default=0)
+    columns = max(1, int(0.9 * width / (0.45 + 0.065 * longest)))
+    return max(0, -(-len(names) // columns) - 1)
+
+
+def _layout(natural: tuple[float, float], figsize: Any) -> tuple[tuple[float, float], float]:
     """Return the size in inches at which a page is laid out, and the factor by which that page is then reduced.
 
     Margins and text have fixed sizes, so that a page that is smaller than its natural size is a larger one, reduced.
@@ -155,7 +169,7 @@ def _layout(natural: tuple[float, float], figsize: tuple[float, float] | None) -
 
 
 def _axis(curve: Any, raw: bool = False) -> Any:
-    return axis_of([curve.domain], curve._time_axis.durations, raw)
+    return axis_of([curve.domain], curve._time_axis, raw)
 
 
 def _plot_into(
@@ -181,14 +195,14 @@ def _description(spline: Any, curves: Sequence[Curve]) -> str:
     if factors > FACTORS:
         words.append(f"{FACTORS} of {factors} factors")
     if spline._unconverged:
-        words.append(f"{spline._unconverged} not converged" if spline._curve.batch else "not converged")
+        words.append(f"{spline._unconverged} failed" if spline._curve.batch else "not converged")
     if curves[0].noise is not None:
         words.append("band 95 %")
     if len(curves[0].breaks):
         count = int(np.sum(curves[0].breaks[:, 1] > curves[0].breaks[:, 0]))
         words.append(f"{count} gap{'s' if count != 1 else ''}")
         return ", ".join(filter(None, words))
-    gaps = sum(len(curve.gaps) for curve in curves if not curve.faint)
+    gaps = len(common_gaps(curves))
     if gaps:
         words.append(f"{gaps} long gap{'s' if gaps > 1 else ''}")
     return ", ".join(filter(None, words))
@@ -208,8 +222,11 @@ def _labels(axes: Axes) -> set[object]:
     return {artist.get_label() for artist in axes.get_children()}
 
 
-def _explain(figure: Figure, curves: Sequence[Curve], height: float) -> None:
-    """Explain lines, markers and bands in one line below the heading."""
+def _explain(figure: Figure, curves: Sequence[Curve], height: float, others: int, width: float) -> None:
+    """Explain lines, markers and bands in lines of a given width in inches below the heading.
+
+    ``others`` curves have no points.
+    """
     drawn = set().union(*(_labels(axes) for axes in figure.axes))
     few = [curve for curve in curves if not curve.faint]
     dot: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 5}
@@ -233,12 +250,13 @@ def _explain(figure: Figure, curves: Sequence[Curve], height: float) -> None:
     if END in drawn:
         add(Line2D([], [], **dot | {"marker": "s", "color": color}), "end")
     if DOTS in drawn:
-        add(Line2D([], [], color=color, **dot), "given points")
+        many = len(few[0].knots) > MANY
+        add(Line2D([], [], color=DATA if many else color, **dot), "given points")
     if POSES in drawn:
         add(Line2D([], [], **body | {"markeredgecolor": color, "color": color}), "given poses")
     if BODIES in drawn:
         add(Line2D([], [], **body, color=BODY_COLOR), "some of the poses" if some_of_many else "poses of the curve")
-    if DATA_DOTS in drawn:
+    if DATA_DOTS in drawn and all(own.has_line for own in few):
         add(Line2D([], [], color=DATA, **dot), "data")
     if BAND in drawn:
         add(Patch(facecolor=few[0].color, alpha=0.22), "95 % band of curve")
@@ -248,7 +266,7 @@ def _explain(figure: Figure, curves: Sequence[Curve], height: float) -> None:
         words = "curve in a gap" + ", where near the data" * (few[0].noise is None)
         add(Line2D([], [], color=few[0].color, linewidth=1.2, linestyle=(0, (4, 2))), words)
     if GAPS in drawn:
-        lengths = _lengths(np.unique(np.concatenate([own.gaps for own in few]), axis=0), few[0].axis)
+        lengths = _lengths(common_gaps(few), few[0].axis)
         banded = few[0].noise is not None and few[0].noise.speed is not None
         graphs = any(axes.get_gid() == "time" and _labels(axes) & {DOTS, START} for axes in figure.axes)
         left_out = "acceleration" if banded else "curve" if graphs and BRIDGE not in drawn else "rates"
@@ -257,7 +275,9 @@ def _explain(figure: Figure, curves: Sequence[Curve], height: float) -> None:
     if LIMIT in drawn:
         add(Line2D([], [], color=MARK, linewidth=1, linestyle="--"), "limit")
     if FAINT in drawn:
-        add(Line2D([], [], color=DATA, linewidth=0.7), "single curves" if few[0].is_mean else "other curves")
+        drawn_ones = sum(own.faint for own in curves)
+        hidden = f", {drawn_ones} of {others}" if drawn_ones < others else ""
+        add(Line2D([], [], color=DATA, linewidth=0.7), ("single curves" if few[0].is_mean else "other curves") + hidden)
     if QUANTILES in drawn and few[0].batch is not None:
         add(Patch(facecolor=DATA, alpha=0.25), f"5–95 % of {int(few[0].batch.valid.sum())} curves")
     if drawn & {KNOTS, TICKS}:
@@ -266,4 +286,4 @@ def _explain(figure: Figure, curves: Sequence[Curve], height: float) -> None:
         add(Line2D([], [], color=EDGE, linewidth=1, **look), times)
     if handles:
         place: Any = {"loc": "upper left", "bbox_to_anchor": (0.03, height), "borderaxespad": 0, "borderpad": 0}
-        legend(figure, handles, labels, 0.9 * figure.get_figwidth(), handlelength=1.4, columnspacing=1.4, **place)
+        legend(figure, handles, labels, width, handlelength=1.4, columnspacing=1.4, **place)

@@ -16,7 +16,8 @@ from .._arrays import short_repr
 from .._core import ValidationError
 from .._spaces import Product, Space, cover_of
 from .curves import START, Curve
-from .figure import PATHS, VIEWS, draw_picture
+from .figure import IN_ROWS, PATHS, VIEWS, draw_picture
+from .matrices import are_graphs
 from .shrink import shrink
 from .style import BOTTOM, INK, LEFT, OWN_AXES, RIGHT, TOP, axes_size, points, text_factor
 from .theme import invert, invert_ticks, is_dark, light_colors
@@ -91,6 +92,11 @@ def draw_into(ax: Axes, curves: Sequence[Curve], title: str | None, show: bool) 
     """Draw the picture of curves into axes that `check_axes` has accepted."""
     panel = AxesPanel(ax, square=str(cover_of(curves[0].space)) in PATHS)
     before, had = set(ax.findobj()), ax.has_data()
+    if had and str(cover_of(curves[0].space)) in IN_ROWS and not are_graphs(curves):
+        raise ValidationError(
+            "ax already contains a picture, and symbols of several curves would overlap. Draw all of them in one call: "
+            "symspline.plot([first, second], ax=ax)."
+        )
     names = list(ax._axis_map)
     limits = {name: getattr(ax, f"get_{name}lim")() for name in names if had}
     figure: Any = ax.get_figure(root=True)

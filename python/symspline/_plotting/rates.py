@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import SubFigure
 
-from .._spaces import Product, Space, SpecialEuclidean, Sphere, cover_of, factors_of, short_name
+from .._spaces import Product, Space, SpecialEuclidean, Sphere, Torus, cover_of, factors_of, short_name
 from .curves import LINE, Curve, fill_band, fill_quantiles
 from .graphs import FEW_KNOTS, timelines
 from .style import EDGE, MARK, Array
@@ -71,6 +71,7 @@ _SIGNS: dict[str, Callable[[Any, Any], Array]] = {
     "gr:1,2": _of_column,
     "so:2": _of_column,
     "o:2": _of_column,
+    "torus:1": lambda p, v: v[..., 0],
     "u:1": lambda p, v: np.imag(np.conj(p) * v)[..., 0, 0],
     "spd:1": lambda p, v: v[..., 0, 0],
 }
@@ -80,7 +81,7 @@ def rates_of(space: Space[Any], seconds: bool) -> list[Rate]:
     """Return the rates of a space that is not a product."""
     own = cover_of(space)
     per = [", 1/s", ", 1/s²"] if seconds else ["", ""]
-    if isinstance(own, Sphere) or str(own) in _ANGULAR:
+    if isinstance(own, (Sphere, Torus)) or str(own) in _ANGULAR:
         per = [", rad/s", ", rad/s²"] if seconds else [", rad/t", ", rad/t²"]
     if isinstance(own, SpecialEuclidean):
         return _rates_of_poses(own, seconds)
@@ -190,16 +191,18 @@ def _draw_rate(axes: Axes, curves: Sequence[Curve], rate: Rate) -> None:
         if deviation is None:
             # Without data or a band, a smooth line would look like a measurement.
             values = curve.outside_gaps(values[:, None])[:, 0]
-        for part in curve.unbroken:
-            shown = values[np.searchsorted(curve.x, part.x)]
-            width = (1.8 if len(curve.marks) <= FEW_KNOTS else 1.0) if curve.alone else 1.1
-            part.plot_line(axes, np.column_stack([part.times, shown]), color=part.color, linewidth=width, label=LINE)
         low, high = values, values
         if deviation is not None:
             spread = rate.scale * NORMAL * deviation
             low, high = values - spread, values + spread
             low = low if rate.signed else np.maximum(low, 0)
-            fill_band(axes, curve, low, high)
+        for part in curve.unbroken:
+            at = np.searchsorted(curve.x, part.x)
+            width = (1.8 if len(curve.marks) <= FEW_KNOTS else 1.0) if curve.alone else 1.1
+            line = np.column_stack([part.times, values[at]])
+            part.plot_line(axes, line, color=part.color, linewidth=width, label=LINE)
+            if deviation is not None:
+                fill_band(axes, part, low[at], high[at])
         drawn += [float(np.nanmin(low)), float(np.nanmax(high))]
         top = max(top, rate.scale * float(curve.at("speed").max()))
         # Rounding errors of points between the closest knots, which a curve at rest has.

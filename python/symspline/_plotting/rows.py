@@ -59,6 +59,10 @@ class Row:
         even = np.searchsorted(curve.x, wanted)
         # There are no samples in gaps.
         even = np.unique(even[curve.x[even] - wanted < 0.1 * (wanted[1] - wanted[0])])
+        # Short segments have a symbol, too.
+        bounds = np.searchsorted(curve.x, [[part.x[0], part.x[-1]] for part in curve.unbroken])
+        empty = [(first + last) // 2 for first, last in bounds if not ((even >= first) & (even <= last)).any()]
+        even = np.union1d(even, np.array(empty, int))
         return curve.times[even], curve.points[even], None if curve.radii is None else curve.radii[even]
 
 
@@ -111,7 +115,7 @@ class Rows:
         look: Any = {"transform": self.axes.get_yaxis_transform(), "clip_on": False}
         left = -0.9 / self.width
         if self.axes in OWN_AXES:
-            names = [own.name or own.curve.label or "" for own in self.rows]
+            names = [": ".join(filter(None, (own.curve.label, own.name))) for own in self.rows]
             self.axes.set_yticks([-k for k in range(len(names))], names)
             self.axes.tick_params(axis="y", length=0)
             return times, symbols, radii

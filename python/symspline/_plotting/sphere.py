@@ -77,7 +77,7 @@ def _draw_scale(axes: Axes, radius: float) -> None:
     axes.plot([end - length / radius, end], [height] * 2, "|-", linewidth=1.2, markersize=6, label="_scale", **look)
     middle, above = end - length / radius / 2, height + 0.015 * (north - south)
     look |= {"ha": "center", "va": "bottom", "fontsize": points(9), "path_effects": HALO}
-    axes.text(middle, above, f"{length:g} km", **look)
+    axes.text(middle, above, f"{length:g} km" if length >= 1 else f"{1000 * length:g} m", **look)
 
 
 def _draw_locator(panel: SubFigure, frame: Axes, view: View, curves: Sequence[Curve], has_land: bool) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from textwrap import fill
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -37,7 +38,7 @@ OWN_AXES: WeakKeyDictionary[Axes, float] = WeakKeyDictionary()
 """Axes of the user, whose look does not change, and the factor by which symbols and text in them are reduced."""
 _FAR = 1e3
 """An axis counts from a round number if its numbers are larger than this multiple of their range."""
-_POWERS = -4, 6
+_POWERS = -3, 5
 """Numbers on axes outside these powers of ten have a common power of ten."""
 _POWER = re.compile(r"(?:^1|([+−]?[\d.]+))e\+?(−?\d+)")
 SUPERSCRIPTS = str.maketrans("0123456789−", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
@@ -60,9 +61,19 @@ def points(size: float) -> float:
     return size * float(rcParams["font.size"]) / 10
 
 
+def font_factor() -> float:
+    """Return how much larger than usual the default font size is, at least 1."""
+    return max(1.0, points(1))
+
+
 def heading(figure: Figure, title: str, subtitle: str, height: float) -> None:
-    """Write title and subtitle in the upper left corner."""
-    figure.text(0.03, height, title, color=INK, fontsize=points(18), weight="bold")
+    """Write title and subtitle in the upper left corner. A long title is smaller, or has several lines."""
+    # Bold letters are about 0.62 times as wide as their size, in points of 1/72 inch.
+    letters = 0.94 * figure.get_figwidth() * 72 / (0.62 * 18)
+    size = max(0.6, min(1.0, letters / len(title)))
+    title = fill(title, max(int(letters / size), 10))
+    look: Any = {"fontsize": points(18 * size), "weight": "bold", "linespacing": 1.0}
+    figure.text(0.03, height, title, color=INK, va="bottom" if "\n" in title else "baseline", **look)
     figure.text(0.03, height - 0.3 / figure.get_figheight(), subtitle, color=INK, fontsize=points(12))
 
 
@@ -75,8 +86,10 @@ def legend(
     axes: Axes | FigureBase, handles: list[Any], labels: list[str], width: float = np.inf, rows: int = 1, **look: Any
 ) -> None:
     """Add a legend without a frame, which is read row by row, in as many rows as a width in inches requires."""
-    inches = points(1) * sum(0.45 + 0.065 * len(label) for label in labels)
-    columns = -(-len(labels) // max(rows, int(np.ceil(inches / width))))
+    inches = [points(1) * (0.45 + 0.065 * len(label)) for label in labels]
+    columns = -(-len(labels) // max(rows, int(np.ceil(sum(inches) / width))))
+    if sum(inches) > width:
+        columns = max(1, min(columns, int(width / max(inches))))
     # A legend fills its columns one after the other.
     order = [i for column in range(columns) for i in range(column, len(labels), columns)]
     handles, labels = [handles[i] for i in order], [labels[i] for i in order]
