@@ -75,6 +75,14 @@ class PageLook(AxesLook, total=False):
     figsize: tuple[float, float] | None
 
 
+class GridLook(TypedDict, total=False):
+    """The options of plots of grids that create a figure."""
+
+    title: str | None
+    figsize: tuple[float, float] | None
+    show: bool
+
+
 Extrapolate = Literal["raise", "geodesic", "periodic"] | bool | None
 OnFailure = Literal["raise", "warn", "ignore"]
 Method = Literal["auto", "quasi-newton", "newton", "fixed-point", "homotopy"]

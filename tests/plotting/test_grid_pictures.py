@@ -10,6 +10,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.dates import date2num, num2date
 from matplotlib.figure import Figure
 from matplotlib.quiver import Quiver
+from matplotlib.text import Text
 from refused import raises
 
 import symspline as ss
@@ -245,6 +246,41 @@ def test_fields_without_extent(name):
     rendered(grid_on(name, points).plot())
     points[:3] = points[4:] = points[:, :2] = points[:, 3:] = np.nan
     rendered(grid_on(name, points).plot())
+
+
+@pytest.mark.parametrize("name", ["r:1", "r:2", "r:3", "sphere:2", "so:3", "spd:3", "se:3", "gr:2,5"])
+def test_grids_are_drawn_into_axes(name):
+    figure = Figure(figsize=(6, 5))
+    ax = figure.add_subplot(projection="3d" if name in ("r:3", "se:3") else None)
+    grid = grid_on(name)
+    assert grid.plot(ax=ax, title="mine") is ax
+    assert ax.get_title() == "mine" and figure.axes == [ax]
+    if name in ("r:3", "se:3"):
+        return
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("axis 0", "axis 1")
+    # The image is that of the figure of the grid, and the key to the right of it.
+    whole = axes_named(grid.plot(), "field")
+    if ax.images:
+        np.testing.assert_allclose(ax.images[0].get_extent(), whole.images[0].get_extent())
+    figure.draw_without_rendering()
+    (key,) = ax.child_axes
+    assert key.get_position().x0 >= ax.get_position().x1
+
+
+def test_options_of_figures_of_grids():
+    grid = grid_on("so:3")
+    figure = rendered(grid.plot(title="mine", figsize=(5, 4)))
+    assert figure.get_size_inches().tolist() == [5, 4] and "mine" in texts_of(figure)
+    figure.draw_without_rendering()
+    for text in figure.findobj(Text):
+        box = text.get_window_extent()
+        assert not text.get_text() or (box.x1 + box.x0) / 2 < figure.bbox.width
+    raises("figsize and ax exclude each other", grid.plot, ax=Figure().add_subplot(), figsize=(5, 4))
+    raises("ax has the projection", grid.plot, ax=Figure().add_subplot(projection="3d"))
+    one = ss.GridSpline((U,), smooth_field("sphere:2")[:, 0], "sphere:2")
+    ax = Figure().add_subplot()
+    assert one.plot(ax=ax, title="mine") is ax
+    assert one.plot(figsize=(5, 4)).get_size_inches().tolist() == [5, 4]
 
 
 def test_dense_nodes_have_no_dots_and_irregular_ones_regular_symbols():

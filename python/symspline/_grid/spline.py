@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, Unpack, overload
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from .._faults import CUT_LOCUS
 from .._options import check_on_failure, check_progress, checked_extrapolate, require_matplotlib
 from .._report import ConvergenceWarning
 from .._spaces import Array, Product, Space, cover_of, factors_of, space_named
-from .._typing import Extrapolate, File, OnFailure, P, PointsLike, Progress, TimesLike
+from .._typing import Extrapolate, File, GridLook, OnFailure, P, PointsLike, Progress, TimesLike
 from .._warnings import warn
 from .axes import GridAxis, Sites, coordinates, read_axes, sites_of
 from .compiled import CompiledGrid, Found
@@ -26,6 +26,7 @@ from .nodes import check_steps, read_nodes, validate_nodes
 from .report import GridReport
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 
@@ -403,7 +404,19 @@ class GridSpline(Generic[P]):
 
     # ---- plots ----
 
-    def plot(self, file: File | None = None) -> Figure:
+    @overload
+    def plot(self, file: File | None = None, *, ax: None = None, **look: Unpack[GridLook]) -> Figure: ...
+    @overload
+    def plot(self, file: None = None, *, ax: Axes, title: str | None = None, show: bool = False) -> Axes: ...
+    def plot(
+        self,
+        file: File | None = None,
+        *,
+        ax: Axes | None = None,
+        title: str | None = None,
+        figsize: tuple[float, float] | None = None,
+        show: bool = False,
+    ) -> Figure | Axes:
         """Plot the points over the first two axes.
 
         The picture depends on the space:
@@ -423,18 +436,23 @@ class GridSpline(Generic[P]):
         ----------
         file : str, path or file object, optional
             File to which the figure is saved, such as ``"grid.pdf"``.
+        ax : matplotlib.axes.Axes, optional
+            Axes into which the picture is drawn, with its key to the right of them. R³ and SE(3) need axes with
+            ``projection="3d"``, all other spaces ordinary ones.
+        title, figsize, show : optional
+            As for `symspline.Curve.plot`.
 
         Returns
         -------
-        matplotlib.figure.Figure
-            The figure, which you can modify or save.
+        matplotlib.figure.Figure or matplotlib.axes.Axes
+            The figure, which you can modify or save, or `ax`.
 
         Raises
         ------
         ImportError
             If Matplotlib is not installed.
         ValidationError
-            If all nodes of the section are missing, or the only axis has missing nodes.
+            If an argument is invalid, all nodes of the section are missing, or the only axis has missing nodes.
 
         Notes
         -----
@@ -448,10 +466,13 @@ class GridSpline(Generic[P]):
         >>> figure = ss.GridSpline((u, u), (u[:, None] * u)[..., None], "r:1").plot()
         """
         require_matplotlib()
-        from .._plotting import plot, plot_grid
+        from .._plotting import checked_look, plot, plot_grid
 
+        look = checked_look(file, ax, None, None, title, figsize, show) | {"ax": ax, "show": show}
+        drawn: Figure | Axes
         if len(self._axes) > 1:
-            return plot_grid(self, file)
+            drawn = plot_grid(self, file, **look)
+            return drawn
         if self.report.missing:
             raise ValidationError(
                 "the only axis of the grid has missing nodes, so that it is not one curve. Plot the curves of "
@@ -459,8 +480,8 @@ class GridSpline(Generic[P]):
             )
         bc: Any = self._axes[0].bc_type
         curve = CubicSpline(self._axes[0].t, self.points, self._space, bc_type=bc, on_failure=self._on_failure)
-        figure: Figure = plot(curve, file)
-        return figure
+        drawn = plot(curve, file, **look)
+        return drawn
 
     def _values_of(self, factor: FactorGrid, x: list[Any]) -> Array:
         """Evaluate a factor on an outer product of coordinates of the core; NaN where splines fail."""

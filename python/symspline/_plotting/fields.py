@@ -24,7 +24,7 @@ from .._spaces import Space
 from .graphs import ANGLES
 from .matrices import MATRICES, ROTATIONS, outlines
 from .sphere import bloch_vectors
-from .style import EDGE, HALO, INK, Array, size
+from .style import EDGE, HALO, INK, OWN_AXES, Array, axes_size, points, size
 from .theme import KEPT
 
 RIGHT = 1.35
@@ -110,26 +110,41 @@ def _show(axes: Axes, field: Field, values: Array, **look: Any) -> Any:
 def _show_numbers(panel: SubFigure, axes: Axes, field: Field, values: Array, label: str, **look: Any) -> Axes:
     """Draw numbers as an image with a colour bar, whose axes are returned."""
     image = _show(axes, field, values, **look)
-    left, bottom, width, height = axes.get_position().bounds
-    inch = 1 / size(panel)[0]
-    bar = panel.add_axes((left + width + 0.15 * inch, bottom + 0.04 * height, 0.14 * inch, 0.92 * height))
+    bar = _beside(panel, axes, 0.14, 0.92 * _size_of(panel, axes)[1], 0.04)
     scale = ScalarMappable(image.norm, image.cmap)
-    made: Any = panel.colorbar(scale, cax=bar)
+    made: Any = axes.figure.colorbar(scale, cax=bar)
     made.outline.set_visible(False)
-    bar.tick_params(color=EDGE, labelcolor=INK, labelsize=9)
-    bar.yaxis.offsetText.set(color=INK, fontsize=9)
-    bar.set_ylabel(label, color=INK, fontsize=10)
+    bar.tick_params(color=EDGE, labelcolor=INK, labelsize=points(9))
+    bar.yaxis.offsetText.set(color=INK, fontsize=points(9))
+    bar.set_ylabel(label, color=INK, fontsize=points(10))
     return bar
+
+
+def _size_of(panel: Any, axes: Axes) -> tuple[float, float]:
+    """Return width and height of axes in the inches of their panel."""
+    if axes in OWN_AXES:
+        return axes_size(axes)
+    bounds, whole = axes.get_position().bounds, size(panel)
+    return bounds[2] * whole[0], bounds[3] * whole[1]
+
+
+def _beside(panel: Any, axes: Axes, width: float, height: float, low: float) -> Axes:
+    """Add axes to the right of others, with a size in inches; ``low`` is a part of the height of the others."""
+    own = _size_of(panel, axes)
+    rectangle = np.array([1 + 0.15 / own[0], low, width / own[0], height / own[1]])
+    if axes in OWN_AXES:
+        return axes.inset_axes(tuple(rectangle))
+    left, bottom, across, high = axes.get_position().bounds
+    made: Axes = panel.add_axes(tuple(rectangle * [across, high, across, high] + [left, bottom, 0, 0]))
+    return made
 
 
 def _key(panel: SubFigure, axes: Axes, caption: str) -> Axes:
     """Add a square for the key of colours, with a caption above."""
-    left, bottom, width, height = axes.get_position().bounds
-    across, high = size(panel)
-    key = panel.add_axes((left + width + 0.15 / across, bottom + height - 1.5 / high, 1.05 / across, 1.05 / high))
+    key = _beside(panel, axes, 1.05, 1.05, 1 - 1.5 / _size_of(panel, axes)[1])
     key.set(xlim=(-1, 1), ylim=(-1, 1), aspect="equal")
     key.set_axis_off()
-    key.text(0, 1.15, caption, color=INK, fontsize=9, ha="center", va="bottom")
+    key.text(0, 1.15, caption, color=INK, fontsize=points(9), ha="center", va="bottom")
     return key
 
 
@@ -148,7 +163,7 @@ def _contours(axes: Axes, field: Field, values: Array, unit: str, gid: str | Non
     x, y = (left + (right - left) * (np.arange(m) + 0.5) / m), (low + (high - low) * (np.arange(n) + 0.5) / n)
     lines = axes.contour(x, y, np.ma.masked_invalid(values).T, levels, colors=INK, linewidths=0.8, alpha=0.7, zorder=3)
     lines.set_gid(gid)
-    for text in axes.clabel(lines, fmt=lambda level: f"{level:g}{unit}", fontsize=8, colors=INK):
+    for text in axes.clabel(lines, fmt=lambda level: f"{level:g}{unit}", fontsize=points(8), colors=INK):
         text.set(path_effects=HALO, gid=gid)
 
 
@@ -243,9 +258,9 @@ def _draw_orientations(matrices: Callable[[Any], Array], panel: SubFigure, axes:
     key.imshow(disc.swapaxes(0, 1), origin="lower", extent=(-1, 1, -1, 1))
     for at, name in (((0, 0), "x₃"), ((0.5, 0), "x₁"), ((0, 0.5), "x₂")):
         look: Any = {"ha": "center", "va": "center", "path_effects": HALO, "gid": KEPT}
-        key.text(at[0], at[1], name, color=INK, fontsize=9, **look)
+        key.text(at[0], at[1], name, color=INK, fontsize=points(9), **look)
     words = "rim: −x₃\n\nlines: misorien-\ntation to the\nringed node"
-    key.text(0, -1.15, words, color=INK, fontsize=9, ha="center", va="top")
+    key.text(0, -1.15, words, color=INK, fontsize=points(9), ha="center", va="top")
     angles = field.at_pixels(lambda points: np.degrees(ROTATIONS.distance(middle, matrices(points))))
     _contours(axes, field, angles, "°", KEPT)
 
@@ -302,8 +317,10 @@ def draw_tensors(panel: SubFigure, axes: Axes, field: Field) -> None:
     key = _key(panel, axes, "longest axis")
     for i, color in enumerate(np.eye(3)):
         key.barh(0.75 - 0.5 * i, 0.5, 0.3, left=-0.7, color=tuple(color), gid=KEPT)
-        key.text(0.0, 0.75 - 0.5 * i, f"x{'₁₂₃'[i]}", color=INK, fontsize=9, va="center")
-    key.text(0, -0.75, "white:\nisotropic\n\nellipses: seen\nalong x₃", color=INK, fontsize=9, ha="center", va="top")
+        key.text(0.0, 0.75 - 0.5 * i, f"x{'₁₂₃'[i]}", color=INK, fontsize=points(9), va="center")
+    key.text(
+        0, -0.75, "white:\nisotropic\n\nellipses: seen\nalong x₃", color=INK, fontsize=points(9), ha="center", va="top"
+    )
     _draw_ellipses(axes, field, gid=KEPT)
 
 

@@ -29,6 +29,8 @@ from .theme import invert_page, is_dark, light_colors
 
 FACTORS = 6
 """The largest number of factors of a product that are drawn."""
+_SMALLEST = 0.6
+"""Text is not reduced by less than this factor, unless there is no space for a page otherwise."""
 _MOVING = (".gif", ".mp4", ".apng", ".webm", ".mov", ".avi")
 
 
@@ -139,6 +141,20 @@ def new_figure(size: tuple[float, float], show: bool) -> Figure:
 
     figure: Figure = pyplot.figure(FigureClass=CurveFigure, figsize=size)
     return figure
+
+
+def layout(natural: tuple[float, float], figsize: Any) -> tuple[tuple[float, float], float]:
+    """Return the size in inches at which a page is laid out, and the factor by which that page is then reduced.
+
+    Margins and text have fixed sizes, so that a page that is smaller than its natural size is a larger one, reduced.
+    """
+    if figsize is None:
+        return natural, 1.0
+    figsize = np.divide(figsize, font_factor())
+    share = np.divide(figsize, natural)
+    factor = float(np.clip(share.min(), _SMALLEST, 1.0))
+    size = np.maximum(np.divide(figsize, factor), np.multiply(_SMALLEST, natural))
+    return (float(size[0]), float(size[1])), float(min(1.0, *np.divide(figsize, size)))
 
 
 @contextmanager

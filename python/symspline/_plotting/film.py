@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from .._core import ValidationError
 from .figure import drawing, finish
 from .rows import VIEW
-from .style import DATES, EDGE, HALO, INK, Array, heading, plain, show_dates, time_colors, window
+from .style import DATES, EDGE, HALO, INK, Array, heading, plain, points, show_dates, time_colors, window
 
 # Drawings in the strip, and in each row of the small multiples.
 _STRIP, _ROWS, _COLUMNS = 25, 2, 6
@@ -104,8 +104,8 @@ def _draw_one(axes: Axes, x: Any, drawing: Array, color: Any) -> None:
     axes.spines[:].set(color=EDGE, linewidth=0.5)
     axes.fill(*drawing.T, facecolor=(color, 0.15), edgecolor=color, linewidth=1.4)
     axes.plot(*drawing.T, "o", color=color, markersize=float(np.clip(12 / np.sqrt(len(drawing)), 1.2, 3)))
-    look: Any = {"textcoords": "offset points", "fontsize": 7, "color": INK, "path_effects": HALO}
+    look: Any = {"textcoords": "offset points", "fontsize": points(7), "color": INK, "path_effects": HALO}
     for number, at in enumerate(drawing if len(drawing) <= _NUMBERED else drawing[:1]):
         axes.annotate(str(number), at, (3, 3), **look)
     name = np.datetime_as_string(x, "m").replace("T", " ") if isinstance(x, np.datetime64) else f"t = {x:.3g}"
-    axes.text(0.03, 0.95, name, transform=axes.transAxes, va="top", fontsize=8, color=INK)
+    axes.text(0.03, 0.95, name, transform=axes.transAxes, va="top", fontsize=points(8), color=INK)

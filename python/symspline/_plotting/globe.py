@@ -12,7 +12,7 @@ from matplotlib.patches import Circle, Patch, Polygon
 
 from .._lonlat import from_lonlat, to_lonlat
 from .._spaces import Euclidean, Space
-from .style import EDGE, GRID, HALO, INK, PAPER, Array, closest
+from .style import EDGE, GRID, HALO, INK, PAPER, Array, closest, points
 
 SEA = LinearSegmentedColormap.from_list("sea", ["#c3d3de", "#dfe9ef", "#f4f8fa"])
 _CLEAR = 0.12
@@ -121,7 +121,7 @@ def label_directions(
         stick = view.flat(np.stack([0 * end, end]))
         axes.plot(*stick.T, color=INK, linewidth=0.8, alpha=0.6 * alpha, zorder=3)
         x, y = _free(view.flat(1.17 * end), view.flat(end), avoided)
-        text = axes.text(x, y, label, color=INK, fontsize=11, alpha=alpha, zorder=7)
+        text = axes.text(x, y, label, color=INK, fontsize=points(11), alpha=alpha, zorder=7)
         text.set(ha="center", va="center", path_effects=HALO)
 
 

@@ -6,13 +6,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure, SubFigure
 
 from .._core import ValidationError
 from .curves import title_on
 from .fields import RIGHT, Field, draw_field
-from .figure import FACTORS, captions, drawing, finish
-from .style import DATES, INK, Array, heading, inside, plain, points, show_dates
+from .figure import FACTORS, captions, drawing, finish, layout
+from .panels import check_axes, panel_of
+from .style import DATES, INK, OWN_AXES, Array, axes_size, heading, inside, plain, points, show_dates
 from .surfaces import draw_surface
 
 _HEAD, _LEFT, _BOTTOM, _TOP, _NAMED = 0.95, 0.85, 0.6, 0.1, 0.4
@@ -87,31 +87,49 @@ class Side(NamedTuple):
         return f"{self.name}, seconds" if self.axis.time_axis.durations else self.name
 
 
-def plot_grid(grid: Any, file: Any = None) -> Figure:
-    """Draw the figure of a grid with two or more axes, and save it if ``file`` is given. See `GridSpline.plot`."""
+def plot_grid(
+    grid: Any,
+    file: Any = None,
+    *,
+    ax: Any = None,
+    title: str | None = None,
+    figsize: tuple[float, float] | None = None,
+    show: bool = False,
+) -> Any:
+    """Draw a grid with two or more axes: a figure, or its picture into axes. See `GridSpline.plot`."""
     axes = grid._axes
     sides = _sides(axes)
     # Further axes are fixed at their middle node, so that the nodes of the section are those of the grid.
     middles = [len(axis.knots) // 2 for axis in axes[2:]]
     fixed = [axis.knots[i : i + 1] for axis, i in zip(axes[2:], middles, strict=True)]
     factors = grid._factors[:FACTORS]
+    sections = [factor.points[(slice(None), slice(None), *middles)] for factor in factors]
+    if ax is not None:
+        check_axes(ax, grid.space)
+        with panel_of(ax, False, title, show) as own:
+            inches = axes_size(ax)
+            sides = [side._replace(inches=length) for side, length in zip(sides, inches, strict=True)]
+            _draw_factor(own, grid, factors[0], sections[0], sides, fixed, (0, 0))
+        return ax
     columns = min(len(factors), 3)
     rows = -(-len(factors) // columns)
     top = _NAMED if len(factors) > 1 else _TOP
     width, height = sides[0].inches + _LEFT + RIGHT, sides[1].inches + _BOTTOM + top
     if any(str(factor.space) in _SURFACES for factor in factors):
         height = max(height, _HIGH)
-    title = title_on(grid._kind, grid.space, int(6 * columns * width))
-    with drawing((columns * width, _HEAD + rows * height)) as figure:
-        layout = figure.add_gridspec(1 + rows, columns, height_ratios=[_HEAD] + [height] * rows)
+    title = title or title_on(grid._kind, grid.space, int(6 * columns * width))
+    size, factor = layout((columns * width, _HEAD + rows * height), figsize)
+    with drawing(size, show, factor) as figure:
+        cells = figure.add_gridspec(1 + rows, columns, height_ratios=[_HEAD] + [height] * rows)
         heading(figure, title, _description(grid, middles), 1 - 0.5 / (_HEAD + rows * height))
-        for i, (factor, name) in enumerate(zip(factors, captions(grid.space), strict=False)):
-            panel = figure.add_subfigure(layout[1 + i // columns, i % columns])
-            nodes = factor.points[(slice(None), slice(None), *middles)]
-            _draw_factor(panel, grid, factor, nodes, sides, fixed, (height - sides[1].inches - top, top))
+        for i, (one, nodes, name) in enumerate(zip(factors, sections, captions(grid.space), strict=False)):
+            panel = figure.add_subfigure(cells[1 + i // columns, i % columns])
+            _draw_factor(panel, grid, one, nodes, sides, fixed, (height - sides[1].inches - top, top))
             if len(factors) > 1:
                 panel.text(_LEFT / width, 1 - 0.28 / height, name, color=INK, fontsize=points(12))
-    return finish(figure, file, False)
+    if figsize is not None:
+        figure.set_size_inches(figsize)
+    return finish(figure, file, show)
 
 
 def _sides(axes: Any) -> list[Side]:
@@ -125,7 +143,7 @@ def _sides(axes: Any) -> list[Side]:
 
 
 def _draw_factor(
-    panel: SubFigure,
+    panel: Any,
     grid: Any,
     factor: Any,
     nodes: Any,
@@ -161,13 +179,14 @@ def _draw_factor(
         return
     axes = panel.add_axes(inside(panel, _LEFT, margins[0], RIGHT, margins[1]), label="field")
     plain(axes)
-    axes.grid(visible=False)
+    if axes not in OWN_AXES:
+        axes.grid(visible=False)
     draw_field(panel, axes, field)
     _draw_nodes(axes, sides, valid)
     for side, (first, last), letter in zip(sides, ends, "xy", strict=True):
         margin = 0.06 * (last - first)
         getattr(axes, f"set_{letter}lim")(first - margin, last + margin)
-        getattr(axes, f"set_{letter}label")(side.label)
+        getattr(axes, f"set_{letter}label")(getattr(axes, f"get_{letter}label")() or side.label)
         if side.has_dates:
             show_dates(getattr(axes, f"{letter}axis"), 2, 6)
 

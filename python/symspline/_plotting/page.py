@@ -40,7 +40,17 @@ from .curves import (
     common_gaps,
     title_on,
 )
-from .figure import FACTORS, draw_picture, drawing, finish, fitted, picture_of, picture_of_factors, shows_band
+from .figure import (
+    FACTORS,
+    draw_picture,
+    drawing,
+    finish,
+    fitted,
+    layout,
+    picture_of,
+    picture_of_factors,
+    shows_band,
+)
 from .panels import check_axes, draw_into, has_dark_background, next_color
 from .rates import LIMIT, columns_of, draw_rates
 from .style import BOTTOM, DATA, EDGE, GAP, INK, MARK, TOP, Array, font_factor, heading, legend
@@ -51,8 +61,6 @@ _UNITS = (172_800, 86_400, "d"), (7200, 3600, "h"), (100, 60, "min"), (0, 1, "s"
 """The least number of seconds for which a unit is used, its length in seconds, and its name."""
 _ROW = 1.5
 """Height of a rate in inches, if there are more than two in a column."""
-_SMALLEST = 0.6
-"""Text is not reduced by less than this factor, unless there is no space for a page otherwise."""
 
 
 class Page(NamedTuple):
@@ -126,7 +134,7 @@ def draw_page(
     if below:
         heights.append(residuals.height(below))
     natural = (sum(widths) if rates or wide else widths[0], sum(heights))
-    size, factor = _layout(natural, None if figsize is None else np.divide(figsize, font_factor()))
+    size, factor = layout(natural, figsize)
     final = np.multiply(size, font_factor()) if figsize is None else figsize
     with drawing(size, show, factor) as figure:
         heights = [head, *(h * (size[1] - head) / sum(heights[1:]) for h in heights[1:])]
@@ -153,19 +161,6 @@ def _extra_lines(curves: Sequence[Curve], width: float) -> int:
     longest = max(map(len, names), default=0)
     columns = max(1, int(0.9 * width / (0.45 + 0.065 * longest)))
     return max(0, -(-len(names) // columns) - 1)
-
-
-def _layout(natural: tuple[float, float], figsize: Any) -> tuple[tuple[float, float], float]:
-    """Return the size in inches at which a page is laid out, and the factor by which that page is then reduced.
-
-    Margins and text have fixed sizes, so that a page that is smaller than its natural size is a larger one, reduced.
-    """
-    if figsize is None:
-        return natural, 1.0
-    share = np.divide(figsize, natural)
-    factor = float(np.clip(share.min(), _SMALLEST, 1.0))
-    size = np.maximum(np.divide(figsize, factor), np.multiply(_SMALLEST, natural))
-    return (float(size[0]), float(size[1])), float(min(1.0, *np.divide(figsize, size)))
 
 
 def _axis(curve: Any, raw: bool = False) -> Any:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from textwrap import fill
 from typing import Any
 
@@ -90,19 +91,28 @@ class AxesPanel:
 
 def draw_into(ax: Axes, curves: Sequence[Curve], title: str | None, show: bool) -> Axes:
     """Draw the picture of curves into axes that `check_axes` has accepted."""
-    panel = AxesPanel(ax, square=str(cover_of(curves[0].space)) in PATHS)
-    before, had = set(ax.findobj()), ax.has_data()
-    if had and str(cover_of(curves[0].space)) in IN_ROWS and not are_graphs(curves):
+    name = str(cover_of(curves[0].space))
+    if ax.has_data() and name in IN_ROWS and not are_graphs(curves):
         raise ValidationError(
             "ax already contains a picture, and symbols of several curves would overlap. Draw all of them in one call: "
             "symspline.plot([first, second], ax=ax)."
         )
+    with panel_of(ax, name in PATHS, title, show) as panel:
+        draw_picture(panel, curves[0].space, curves)
+    return ax
+
+
+@contextmanager
+def panel_of(ax: Axes, square: bool, title: str | None, show: bool) -> Iterator[AxesPanel]:
+    """Return axes of the user as a panel, and adapt what is drawn into it to their style and size."""
+    panel = AxesPanel(ax, square)
+    before, had = set(ax.findobj()), ax.has_data()
     names = list(ax._axis_map)
     limits = {name: getattr(ax, f"get_{name}lim")() for name in names if had}
     figure: Any = ax.get_figure(root=True)
     dark = has_dark_background(ax)
     with light_colors(dark):
-        draw_picture(panel, curves[0].space, curves)
+        yield panel
     for name, (low, high) in limits.items():
         # Pictures with limits of their own must not hide what was there.
         if not getattr(ax, f"get_autoscale{name}_on")():
@@ -122,7 +132,6 @@ def draw_into(ax: Axes, curves: Sequence[Curve], title: str | None, show: bool) 
         from matplotlib import pyplot
 
         pyplot.show()
-    return ax
 
 
 def has_dark_background(ax: Axes) -> bool:

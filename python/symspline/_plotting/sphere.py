@@ -200,13 +200,13 @@ class _Globe(NamedTuple):
     beside: float = 0.0
 
 
-def _draw_globe(panel: SubFigure, points: Array, look: _Globe, above: Array | None = None) -> tuple[Axes, View, bool]:
-    """Draw the part of a globe where points are, or all of it if they are not close together.
+def _draw_globe(panel: SubFigure, vectors: Array, look: _Globe, above: Array | None = None) -> tuple[Axes, View, bool]:
+    """Draw the part of a globe where vectors are, or all of it if they are not close together.
 
-    Returns the axes, the view, and whether it is a part. A whole globe is turned towards the points ``above``.
+    Returns the axes, the view, and whether it is a part. A whole globe is turned towards the vectors ``above``.
     """
-    view = View.above(*middle_of(points))
-    far = np.arctan2(np.linalg.norm(view.flat(points), axis=-1), points @ view.up).max()
+    view = View.above(*middle_of(vectors))
+    far = np.arctan2(np.linalg.norm(view.flat(vectors), axis=-1), vectors @ view.up).max()
     if 1e-7 < far < (_SMALL_WIDE if look.beside else _SMALL):
         width, height = size(panel)
         if look.beside:
@@ -214,7 +214,7 @@ def _draw_globe(panel: SubFigure, points: Array, look: _Globe, above: Array | No
         else:
             side = min(width, height)
             right, top = width - side + 0.2, height - side + 0.65
-        flat = view.flat(points)
+        flat = view.flat(vectors)
         middle, _ = window(flat, 1.0)
         ratio = (width - 0.95 - right) / (height - 0.5 - top)
         across, high = 0.61 * np.ptp(flat, axis=0)
@@ -224,14 +224,14 @@ def _draw_globe(panel: SubFigure, points: Array, look: _Globe, above: Array | No
         if np.linalg.norm(np.abs(middle) + half) < 1:
             axes = panel.add_axes(inside(panel, 0.95, 0.5, right, top))
             draw_frame(axes, view, middle, half)
-            axes.tick_params(labelsize=8)
+            axes.tick_params(labelsize=points(8))
             return axes, view, True
-    lon, lat = middle_of(points if above is None else above)
+    lon, lat = middle_of(vectors if above is None else above)
     view = View.above(lon, float(np.clip(lat, *look.lats)))
     axes = panel.add_axes(inside(panel, 0.1, look.below, look.right, 0.1))
     draw_globe(axes, view, look.spacing, look.half)
     if look.labels:
-        seen = points if above is None else above
+        seen = vectors if above is None else above
         high, low, wide = (1.1, -0.85, 1.2) if look.half else (1.22, -1.22, 1.22)
         axes.set(xlim=(-wide, wide), ylim=(low, high))
         label_directions(axes, view, look.labels, view.flat(seen))

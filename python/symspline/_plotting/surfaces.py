@@ -10,7 +10,7 @@ from matplotlib.figure import SubFigure
 
 from .chart import box, explain_frames
 from .fields import Field
-from .style import AXES, HALO, INK, Array, evenly
+from .style import AXES, HALO, INK, Array, evenly, points
 
 _LINES, _FRAMES = 80, 9
 """Points along an axis of the surface, and the largest number of frames along it."""
@@ -51,7 +51,7 @@ def _name_axes(axes: Any, lines: Array) -> None:
     """Write the names of the axes where each of them ends, if there is a value."""
     for k, at in enumerate((lines[-1, 0], lines[0, -1])):
         if np.isfinite(at).all():
-            axes.text(*at, f"  axis {k} →", color=INK, fontsize=9, path_effects=HALO, zorder=6)
+            axes.text(*at, f"  axis {k} →", color=INK, fontsize=points(9), path_effects=HALO, zorder=6)
 
 
 def _draw_frames(axes: Any, field: Field) -> None:
