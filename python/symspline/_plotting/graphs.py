@@ -279,7 +279,7 @@ def draw_numbers(
                 axes.plot(*_line(curve.times, values[:, i], period).T, color=INK, linewidth=0.4, alpha=0.4)
         for k, (i, look) in enumerate(zip(named, looks, strict=True)):
             if axes in OWN_AXES and (curve.label or not curve.alone):
-                # The colour tells curves apart, and the line style numbers.
+                # The colour distinguishes curves, and the line style numbers.
                 look = {"color": curve.color, "linestyle": _STYLES[k % len(_STYLES)]}
             if curve.has_line:
                 # Axes of the user get the names, and a legend only if the user adds one.
