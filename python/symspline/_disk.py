@@ -109,7 +109,11 @@ def replacing(path: Path) -> Iterator[Path]:
     temporary = target.with_name(f".{secrets.token_hex(8)}{target.name[-_TAIL:]}")
     # A new file has the permissions of any new file. One that replaces another gets those at the end, and until then
     # nobody else may read it.
-    os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666 if old is None else 0o600))
+    try:
+        os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666 if old is None else 0o600))
+    except OSError as error:
+        # The name of the user's file, not that of the temporary one.
+        raise type(error)(error.errno, error.strerror, str(path)) from None
     try:
         yield temporary
         with open(temporary, "rb+") as file:

@@ -56,6 +56,15 @@ def mode(path):
 
 @posix
 @writers
+def test_errors_name_the_file_of_the_user(tmp_path, name):
+    path = tmp_path / "missing" / name
+    with pytest.raises(FileNotFoundError) as error:
+        WRITERS[name](path)
+    assert error.value.filename == str(path)
+
+
+@posix
+@writers
 @pytest.mark.parametrize("own", [0o600, 0o640, 0o444])
 def test_an_existing_file_keeps_its_permissions(tmp_path, name, own):
     path = tmp_path / name

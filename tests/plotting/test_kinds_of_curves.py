@@ -40,6 +40,39 @@ def test_every_kind_of_curve_is_drawn(kind, name):
         np.testing.assert_allclose(np.abs(line[::7, 1]), norm, atol=1e-6)
 
 
+@pytest.mark.parametrize("name", ["r:2", "r:3", "sphere:2", "h:2", "cp:1"])
+def test_control_polygons(name):
+    """Control points are joined by geodesics, and the picture contains them."""
+    curve = ss.BezierCurve(ss.space(name).project(points_around(ss.space(name), np.random.default_rng(2), (4,))), name)
+    figure = rendered(curve.plot())
+    assert "control points" in texts_of(figure)
+    axes = figure.axes[0]
+    control = next(line for line in axes.lines if line.get_label() == "_control")
+    polygon = next(line for line in axes.lines if line.get_label() == "_polygon")
+    if name.startswith("r"):
+        found = np.stack(control.get_data_3d() if name == "r:3" else control.get_data(), axis=1)
+        np.testing.assert_allclose(found, curve.control_points)
+        corners = np.stack(polygon.get_data_3d() if name == "r:3" else polygon.get_data(), axis=1)[::30]
+        np.testing.assert_allclose(corners, curve.control_points[:-1])
+    (x0, x1), (y0, y1) = axes.get_xlim(), axes.get_ylim()
+    x, y = control.get_data_3d()[:2] if name == "r:3" else control.get_data()
+    seen = np.isfinite(x)
+    assert ((x >= x0) & (x <= x1) & (y >= y0) & (y <= y1))[seen].all() and seen.any()
+    assert "control points" not in texts_of(spline_on(name).plot())
+
+
+@pytest.mark.parametrize("name", ["r:3", "se:3"])
+def test_the_end_in_space_is_the_last_point(name):
+    curves = [spline_on(name), spline_on(name).restrict(0.5, 3.7)]
+    if name == "r:3":
+        curves.append(ss.BezierCurve(np.random.default_rng(0).normal(size=(4, 3)), name))
+    for curve in curves:
+        axes = curve.plot().axes[0]
+        (end,) = [line.get_data_3d() for line in axes.lines if line.get_label() == "_end"]
+        last = curve(curve.domain[1])
+        np.testing.assert_allclose(np.ravel(end), last if name == "r:3" else last[:3, 3], atol=1e-9)
+
+
 def test_notebooks_show_every_kind():
     for make in CURVES.values():
         assert "<img" in make("euclidean:2")._repr_html_()

@@ -68,10 +68,12 @@ def draw_3d(panel: SubFigure, curves: Sequence[Curve]) -> None:
     paths = [curve.near_data(curve.points - origin) for curve in curves]
     shadows = [curve.outside_gaps(path) for curve, path in zip(curves, paths, strict=True)]
     given = [curve.given - origin for curve in curves]
-    axes = box(panel, shadows, paths + given, colors=shadow_colors(curves), origin=origin)
+    control = [curve.polygon[0] - origin for curve in curves if curve.polygon is not None]
+    axes = box(panel, shadows, paths + given + control, colors=shadow_colors(curves), origin=origin)
     for curve, path, own in zip(curves, paths, given, strict=True):
         if curve.radii is not None:
             _draw_hose(axes, curve, curve.points - origin, curve.radii)
+        curve.draw_polygon(axes, lambda points: points - origin)
         curve.draw_line(axes, path)
         curve.draw_dots(axes, own)
     note(panel, SHADOW)

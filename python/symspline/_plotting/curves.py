@@ -15,6 +15,7 @@ from matplotlib.path import Path
 from numpy.typing import NDArray
 
 from .._curves.composed import AnyCurve
+from .._curves.controlled import ControlledCurve
 from .._curves.curve import UncertaintyBand
 from .._report import long_gaps
 from .._spaces import Product, Space, short_name
@@ -25,7 +26,9 @@ _NO_GAPS: Array = np.empty((0, 2))
 # Labels of artists that the legend of a page explains. Those with an underscore are not in legends of matplotlib.
 LINE, DOTS, START, DATA_DOTS, FAINT = "_curve", "_given", "_start", "_data", "_others"
 QUANTILES, BAND, BRIDGE, GAPS, POSES, BODIES = "_quantiles", "band", "_bridge", "gaps", "_poses", "_bodies"
-KNOTS, TICKS, END, AFTER = "_knots", "_ticks", "_end", "_after"
+KNOTS, TICKS, END, AFTER, CONTROL = "_knots", "_ticks", "_end", "_after", "_control"
+WITH_POLYGON = {"euclidean:2", "euclidean:3", "sphere:2", "hyperbolic:2", "cp:1"}
+"""Spaces whose picture shows the control points of a curve."""
 BODY: Array = np.array([[1.0, 0.0], [-0.7, 0.55], [-0.35, 0.0], [-0.7, -0.55], [1.0, 0.0]])
 """A body in the plane that points along its first axis."""
 BODY_COLOR = "#cfe0ee"
@@ -175,7 +178,29 @@ class Curve:
     def extent(self) -> Any:
         """All points that the picture must contain: given points, and the curve outside long gaps."""
         points = self.points[~self.bridges]
+        if self.polygon is not None:
+            points = np.concatenate([points, self.polygon[0]])
         return points if self.noise is None else np.concatenate([points, self.given])
+
+    @cached_property
+    def polygon(self) -> tuple[Any, Any] | None:
+        """Samples of the geodesics between control points, and the control points; None if there are none."""
+        if not isinstance(self.data, ControlledCurve) or self.faint or str(self.space) not in WITH_POLYGON:
+            return None
+        control = self.data.control_points
+        inner = (slice(None), None)
+        shares = np.linspace(0, 1, 30).reshape(-1, *[1] * (len(self.space.point_shape) - 1))
+        lines = self.space.geodesic(control[:-1][inner], control[1:][inner], shares)
+        return lines.reshape(-1, *self.space.point_shape), control
+
+    def draw_polygon(self, axes: Axes, positions: Callable[[Any], Array]) -> None:
+        """Draw the control polygon at positions of shape (m, 2) or (m, 3)."""
+        if self.polygon is None:
+            return
+        line, control = map(positions, self.polygon)
+        axes.plot(*line.T, color=self.color, linewidth=0.9, alpha=0.5, zorder=3.3, label="_polygon")
+        look: Any = {"color": self.color, "markerfacecolor": "white", "markersize": 5, "linestyle": "none"}
+        axes.plot(*control.T, "s", zorder=5.5, label=CONTROL, **look)
 
     def near_data(self, positions: Array) -> Array:
         """Return positions of samples, shape (m, n), NaN in long gaps where they are far from all others.
@@ -334,6 +359,7 @@ class Curve:
         """Draw a line through positions of shape (m, 2) or (m, 3)."""
         if not self.has_line:
             return
+        end = positions[-1]
         # A narrow band must remain visible beside the line.
         width = 1.4 if not self.alone else 2.4 if self.noise is None else 1.8
         # The first line of a curve has its name in legends.
@@ -350,6 +376,14 @@ class Curve:
             )
             positions = np.where(after, np.nan, positions)
         self.plot_line(axes, positions, **own | look)
+        if len(end) == 3 and self.noise is None and not self.faint:
+            # Curves in space have no arrow heads.
+            edge: Any = {"markersize": 7, "markeredgecolor": "white", "zorder": 6.6, "label": END}
+            axes.plot(*end[:, None], "s", color=self._color_of_dots, **edge)
+
+    @property
+    def _color_of_dots(self) -> Any:
+        return INK if self.alone and self.color == SPLINE and self.label is None else self.color
 
     def plot_line(self, axes: Axes, positions: Array, **look: Any) -> None:
         """Draw a line, thin and dashed in long gaps, and mark it for animations."""
@@ -384,7 +418,7 @@ class Curve:
             axes.plot(*positions.T, "o", **dots | look)
             return
         size = float(np.clip(30 / np.sqrt(max(len(positions), 1)), 2, 6.5)) * (1 if self.alone else 0.6)
-        color = INK if self.alone and self.color == SPLINE and self.label is None else self.color
+        color = self._color_of_dots
         # Many points would hide the curve.
         front = 6 if len(positions) <= MANY else 1.8
         look = {"color": color, "markersize": size, "markeredgecolor": color, "zorder": front} | look
@@ -395,10 +429,6 @@ class Curve:
         if self.has_start:
             look |= {"color": "white", "markeredgewidth": 1.4, "zorder": 6.5, "markersize": 1.3 * look["markersize"]}
             axes.plot(*positions[:1].T, "o", label=START, **look)
-        if positions.shape[1] == 3 and len(positions):
-            # Curves in space have no arrow heads.
-            look |= {"color": color, "markeredgecolor": "white", "markeredgewidth": 1.0, "zorder": 6.6}
-            axes.plot(*positions[-1:].T, "s", label=END, **look | {"markersize": max(7.0, look["markersize"])})
 
 
 @dataclass(frozen=True)
@@ -469,6 +499,7 @@ def draw_in_plane(
     if curve.radii is not None:
         discs = disc_indices(curve)
         draw_tube(axes, curve, rims(flat(curve.points[discs]), curve.radii[discs]))
+    curve.draw_polygon(axes, flat)
     curve.draw_line(axes, curve.near_data(flat(curve.points)))
     curve.draw_dots(axes, flat(curve.given))
 

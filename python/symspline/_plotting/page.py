@@ -24,6 +24,7 @@ from .curves import (
     BODY,
     BODY_COLOR,
     BRIDGE,
+    CONTROL,
     DATA_DOTS,
     DOTS,
     END,
@@ -251,6 +252,11 @@ def _explain(figure: Figure, curves: Sequence[Curve], height: float, others: int
         add(Line2D([], [], **body | {"markeredgecolor": color, "color": color}), "given poses")
     if BODIES in drawn:
         add(Line2D([], [], **body, color=BODY_COLOR), "some of the poses" if some_of_many else "poses of the curve")
+    if CONTROL in drawn:
+        add(
+            Line2D([], [], color=few[0].color, marker="s", markersize=5, markerfacecolor="white", linewidth=0.9),
+            "control points",
+        )
     if DATA_DOTS in drawn and all(own.has_line for own in few):
         add(Line2D([], [], color=DATA, **dot), "data")
     if BAND in drawn:

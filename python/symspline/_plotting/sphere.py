@@ -57,6 +57,7 @@ def draw_sphere(panel: SubFigure, curves: Sequence[Curve]) -> None:
     everything, seen = (np.concatenate([own.extent for own in curves if not (few and own.faint)]) for few in (0, 1))
     axes, view, is_part = _draw_globe(panel, everything, look, seen)
     for curve in curves:
+        curve.draw_polygon(axes, view.visible)
         _draw_on_globe(axes, view, curve, curve.points, curve.given, curve.radii)
     if radius is not None and (not is_part or np.ptp(axes.get_xlim()) > _COARSE):
         land.draw_on_globe(axes, view)
@@ -107,6 +108,7 @@ def draw_bloch(panel: SubFigure, curves: Sequence[Curve]) -> None:
     for curve in curves:
         # Angles between Bloch vectors are twice the distances of states.
         radii = None if curve.radii is None else 2 * curve.radii
+        curve.draw_polygon(axes, lambda states: view.visible(bloch_vectors(states)))
         _draw_on_globe(axes, view, curve, *curve.marked(bloch_vectors), radii)
     note(panel, "part of the Bloch sphere: longitude from x, |0⟩ is 90°N" if is_part else "Bloch sphere")
 
