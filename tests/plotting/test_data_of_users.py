@@ -155,6 +155,24 @@ def test_curves_of_components_have_their_colours(name):
         assert {to_hex(line.get_color()) for line in axes.lines if line.get_gid() == "_curve"} <= {"#ff0000", "#0000ff"}
 
 
+@pytest.mark.parametrize(
+    ("name", "shown"),
+    [
+        ("logspd:2", "x₁₁ x₁₂ x₂₂"),
+        ("siegel:1", "x₁₁ x₁₂ x₂₂"),
+        ("spd:4", "x₁₁ x₁₂ x₁₃ x₁₄ x₂₂ x₂₃ x₂₄ x₃₃ x₃₄ x₄₄"),
+        ("hpd:2", "Re x₁₁,Re x₁₂,Im x₁₂,Re x₂₂"),
+        ("aff:2", "x₁₁ x₁₂ x₁₃ x₂₁ x₂₂ x₂₃"),
+        ("r:4", "x₁ x₂ x₃ x₄"),
+        ("u:2", "Re x₁₁,Im x₁₁,Re x₁₂,Im x₁₂,Re x₂₁,Im x₂₁,Re x₂₂,Im x₂₂"),
+    ],
+)
+def test_components_that_others_determine_are_omitted(name, shown):
+    names = shown.split("," if "," in shown else " ")
+    texts = texts_of(rendered(spline_on(name).plot()))
+    assert sorted(text for text in texts if text.startswith(("x", "Re x", "Im x"))) == sorted(names)
+
+
 def test_many_curves_have_different_colours():
     curves = [ss.CubicSpline(None, np.arange(3.0)[:, None] + i, "r:1") for i in range(9)]
     labels = [f"a rather long label of run number {i}" for i in range(9)]

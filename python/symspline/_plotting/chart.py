@@ -200,7 +200,7 @@ def _fill(panel: SubFigure, axes: Any, corners: Array, below: float) -> None:
     flat = axes.transAxes.inverted().transform(axes.transData.transform(np.column_stack([x, y])))
     low, extent = flat.min(axis=0), np.ptp(flat, axis=0)
     if axes in OWN_AXES:
-        axes.set_box_aspect(axes._box_aspect, zoom=float(np.clip(0.8 / extent.max(), 1.0, 1.4)))
+        axes.set_box_aspect(axes._box_aspect, zoom=float(np.clip(0.74 / extent.max(), 1.0, 1.3)))
         return
     side = float((free / extent).min())
     left, bottom = np.array([_BESIDE, below + _UNDER]) + (free - side * extent) / 2 - side * low

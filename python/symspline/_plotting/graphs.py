@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,8 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from .._spaces import HermitianPositiveDefinite, Space, SymmetricPositiveDefinite
+from .._core import ValidationError
+from .._spaces import Space
 from .curves import DOTS, GAPS, KNOTS, LINE, TICKS, Curve, common_gaps, draw_graph_of, fill_quantiles, interrupted
 from .style import (
     BOTTOM,
@@ -389,14 +390,23 @@ def component_names(shape: tuple[int, ...], is_complex: bool) -> list[str]:
     return [f"{part} {name}" for name in names for part in ("Re", "Im")] if is_complex else names
 
 
+@lru_cache(maxsize=100)
 def independent(space: Space) -> Indices:
-    """Return the indices of the components to draw, which determine a Hermitian matrix."""
-    whole = np.ones(space.point_shape)
-    if isinstance(space, SymmetricPositiveDefinite):
-        return np.flatnonzero(np.triu(whole))
-    if isinstance(space, HermitianPositiveDefinite):
-        return np.flatnonzero(np.stack([np.triu(whole), np.triu(whole, 1)], axis=-1))
-    return np.arange(whole.size * (2 if space.dtype.kind == "c" else 1))
+    """Return the indices of the components to draw: those that are neither the same in all points nor repeated.
+
+    Symmetric matrices repeat entries, up to the sign of imaginary parts, and the last row of affine maps is constant.
+    """
+    rng = np.random.default_rng(0)
+    try:
+        columns = components(np.stack([space.random_point(rng) for _ in range(3)])).T
+    except (NotImplementedError, ValidationError):
+        return np.arange(int(np.prod(space.point_shape)) * (2 if space.dtype.kind == "c" else 1))
+    kept: list[int] = []
+    for i, own in enumerate(columns):
+        others = [sign * columns[j] for j in kept for sign in (1, -1)]
+        if np.ptp(own) > 1e-9 and not any(np.allclose(own, other, rtol=1e-9, atol=0) for other in others):
+            kept.append(i)
+    return np.array(kept, np.intp)
 
 
 def draw_torus(panel: SubFigure, curves: Sequence[Curve]) -> None:
