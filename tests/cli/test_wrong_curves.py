@@ -54,6 +54,9 @@ def test_tracks_without_times_are_reported(run):
     assert "fit each of them with --curve ship\n" in out
     assert "--curve ship fits one curve per ship\n" in run("info ships.csv")
     assert "no column of times" not in run("fit ships.csv --lonlat --curve ship --time none -o a.npz")
+    rows = [f"{lon},{lon},{quality}" for lon, quality in enumerate(("good", "bad") * 3)]
+    write("ships.csv", "lon,lat,quality\n" + "\n".join(rows) + "\n")
+    run("fit ships.csv --lonlat -o a.npz")
 
 
 def test_two_curves_never_share_a_file(run, fails):

@@ -6,6 +6,7 @@ import pandas as pd
 import pytest
 from drawn import axes_named, lines_of, rate_axes, rendered, spline_on, texts_of
 from matplotlib.colors import to_hex
+from matplotlib.dates import date2num
 from matplotlib.figure import Figure
 from refused import raises
 from scipy.spatial.transform import Rotation
@@ -41,17 +42,27 @@ def test_segments_near_noisy_points_show_their_data_and_bands(shift):
             (path,) = band.get_paths()
             first, last = path.vertices[:, 0].min(), path.vertices[:, 0].max()
             assert last - first == pytest.approx(9.5)
-            at_start = path.vertices[path.vertices[:, 0] == first][:, 1]
-            assert np.ptp(at_start) == pytest.approx(2 * 1.96 * segment.std(segment.t[0], nu=nu), rel=2e-3)
+            for edge, i in ((first, 0), (last, -1)):
+                width = np.ptp(path.vertices[path.vertices[:, 0] == edge][:, 1])
+                assert width == pytest.approx(2 * 1.96 * segment.std(segment.t[i], nu=nu), rel=2e-3)
+
+
+def test_data_of_segments_with_dates_of_their_own():
+    t = np.datetime64("2024-03-01") + np.arange(40) * np.timedelta64(6, "h")
+    y = np.sin(np.arange(40) / 3)[:, None] + 0.1 * RNG.standard_normal((40, 1))
+    parts = [ss.make_smoothing_spline(t[i], y[i], "r:1") for i in (slice(0, 15), slice(25, 40))]
+    axes = axes_named(ss.SegmentedCurve(parts).plot(), "x")
+    seen = np.concatenate([line.get_xydata() for line in axes.lines if line.get_label() == "_data"])
+    np.testing.assert_allclose(seen, np.column_stack([date2num(t), y[:, 0]])[[*range(15), *range(25, 40)]])
 
 
 def test_each_segment_has_a_frame():
-    t = np.concatenate([np.arange(0, 10, 0.5), [20, 20.2, 20.4], np.arange(30, 40, 0.5)])
+    t = np.concatenate([np.arange(0, 10, 0.5), [17.3, 17.4, 17.5], np.arange(30, 40, 0.5)])
     turns = Rotation.from_rotvec(np.stack([np.sin(t), t / 3, np.cos(t)], axis=1))
     axes = ss.fit_segments(t, turns, "so:3", max_gap=2).plot().axes[0]
     offsets = np.concatenate([np.asarray(own.get_offsets()) for own in axes.collections if hasattr(own, "get_offsets")])
     times = offsets[offsets[:, 1] == -1, 0]
-    for first, last in ((0, 9.5), (20, 20.4), (30, 39.5)):
+    for first, last in ((0, 9.5), (17.3, 17.5), (30, 39.5)):
         assert ((times >= first) & (times <= last)).any()
 
 
@@ -102,6 +113,7 @@ def test_large_coordinates_count_from_round_numbers(name):
     data = next(line for line in axes.lines if line.get_gid() == "_curve")
     data = np.stack(data.get_data_3d() if n == 3 else data.get_data(), axis=1)
     np.testing.assert_allclose(data[[0, -1]] + [692_000, 5_330_000, 0][:n], places[[0, -1], :n], atol=1e-8)
+    assert np.ptp(axes.get_ylim()) < 2 * np.ptp(places[:, 1])
     # Axes of the user have the coordinates themselves.
     ax = Figure().add_subplot(projection="3d" if n == 3 else None)
     curve.plot(ax=ax)
