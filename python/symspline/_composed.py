@@ -260,6 +260,8 @@ class SegmentedCurve(ComposedCurve[P], Generic[P, C]):
 
     def _made_of(self, radius: float | None = None) -> str:
         kind, *others = {own._kind for own in self._segments}
+        # C² spline, B-spline and Bézier curve are names.
+        kind = f"{kind[0].lower()}{kind[1:]}" if kind.startswith(("Smoothing", "Piecewise")) else kind
         return f"{len(self)} segments" if others else f"{len(self)} segments ({kind})"
 
     @property

@@ -1,6 +1,7 @@
 """Pictures of recordings with gaps, noise, time zones, large coordinates, many points and several curves."""
 
 import matplotlib
+import matplotlib.style
 import numpy as np
 import pandas as pd
 import pytest
@@ -258,3 +259,100 @@ def test_rates_of_one_angle_have_a_sign():
     (line,) = lines_of(axes)
     np.testing.assert_allclose(line[:, 1], curve(line[:, 0], 1)[:, 0], atol=1e-12)
     assert line[:, 1].min() < -0.5
+
+
+@pytest.mark.parametrize("name", ["se:2", "se:3"])
+def test_the_acceleration_of_a_pose_is_that_of_its_position(name):
+    n = int(name[-1])
+    t = np.linspace(0, 5, 12)
+    poses = np.tile(np.eye(n + 1), (12, 1, 1))
+    poses[:, :2, :2] = np.moveaxis([[np.cos(t), -np.sin(t)], [np.sin(t), np.cos(t)]], -1, 0)
+    poses[:, :n, n] = np.stack([3 * t + np.sin(t), np.cos(t), t], axis=1)[:, :n]
+    curve = ss.CubicSpline(t, poses, name)
+    (axes,) = [own for own in curve.plot().axes if own.get_ylabel().startswith("acceleration")]
+    (line,) = lines_of(axes)
+    x, h = np.linspace(0.3, 4.7, 40), 1e-3
+    x = x[np.abs(x[:, None] - t).min(axis=1) > 0.02]
+    second = np.linalg.norm((curve(x + h) - 2 * curve(x) + curve(x - h))[:, :n, n], axis=1) / h**2
+    np.testing.assert_allclose(np.interp(x, *line.T), second, atol=2e-3)
+
+
+def test_rates_of_turning_have_a_scale_of_their_own():
+    """Positions far away and in metres do not change the scale of a turning rate that is constant."""
+    t = np.arange(9.0)
+    poses = np.tile(np.eye(3), (9, 1, 1))
+    poses[:, :2, :2] = np.moveaxis([[np.cos(0.4 * t), -np.sin(0.4 * t)], [np.sin(0.4 * t), np.cos(0.4 * t)]], -1, 0)
+    poses[:, :2, 2] = np.stack([1000 * t + 512_345, 1000 * np.sin(t) + 5_412_345], axis=1)
+    figure = ss.CubicSpline(t, poses, "se:2").plot()
+    (axes,) = [own for own in figure.axes if own.get_ylabel().startswith("turning accel")]
+    assert np.abs(axes.get_ylim()).max() < 1
+
+
+def test_a_body_that_turns_on_the_spot_is_drawn_at_several_angles():
+    t = np.linspace(0, 4, 11)
+    poses = np.tile(np.eye(3), (11, 1, 1))
+    poses[:, :2, :2] = np.moveaxis([[np.cos(t), -np.sin(t)], [np.sin(t), np.cos(t)]], -1, 0)
+    axes = ss.CubicSpline(t, poses, "se:2").plot().axes[0]
+    bodies = [path for own in axes.collections if own.get_label() in ("_bodies", "_start") for path in own.get_paths()]
+    assert len(bodies) >= 6
+
+
+@pytest.mark.parametrize("name", ["sphere:3", "su:2", "cp:1"])
+def test_angles_that_are_twice_the_distances_are_explained(name):
+    figure = rendered(spline_on(name).plot())
+    assert any("twice the distances" in text for text in texts_of(figure))
+    assert rate_axes(figure)[0][0].get_ylabel() == "speed\n|γ′|, rad/t"
+
+
+def test_symbols_that_are_omitted_are_counted():
+    u = np.arange(40.0)
+    turns = Rotation.from_rotvec(np.stack([u / 15, u / 30, np.cos(u / 5)], axis=1))
+    curve = ss.CubicSpline(None, turns, "so:3")
+    ax = Figure(figsize=(5, 4)).add_subplot()
+    curve.plot(ax=ax)
+    assert ax.get_yticklabels()[0].get_text().startswith("given\n") and "of 40" in ax.get_yticklabels()[0].get_text()
+    names = ["Recursive estimate of the calibrated gimbal (run 7)", "slerp", "measured"]
+    figure = rendered(ss.plot([curve, ss.PiecewiseGeodesic(None, turns, "so:3"), (u, turns)], labels=names))
+    texts = texts_of(figure)
+    assert any(text.startswith("measured\n") and text.endswith(" of 40") for text in texts)
+    assert "Recursive\nestimate of\nthe …" in texts
+    colors = {to_hex(line.get_color()) for axes in figure.axes for line in lines_of_gid(axes)}
+    assert not colors & {"#d55e00", "#009e73", "#0072b2", "#0b559f", "#d95f0e"}
+
+
+def lines_of_gid(axes):
+    return [line for line in axes.lines if line.get_gid() == "_curve"]
+
+
+def test_lines_of_a_surface_lie_on_it():
+    u, v = np.array([0, 0.7, 1.5, 2.1, 3, 4.2]), np.array([0, 1, 1.6, 2.8, 3.5])
+    x, y = np.meshgrid(u, v, indexing="ij")
+    grid = ss.GridSpline((u, v), np.stack([x, y, np.sin(x) * np.cos(y)], axis=-1), "r:3")
+    axes = grid.plot().axes[0]
+    lines = [np.stack(line.get_data_3d(), axis=1) for line in axes.lines if line.get_label() != "nodes"]
+    points = np.concatenate(lines)
+    points = points[np.isfinite(points[:, 0])]
+    assert len(points) > 500
+    np.testing.assert_allclose(grid(points[:, :2])[:, 2], points[:, 2], atol=1e-6)
+
+
+def test_tracks_of_a_metre_are_enlarged():
+    lon, lat = 10 + 1e-6 * np.array([0, 1, 2, 3.0]), 50 + 1e-6 * np.array([0, 1, 0, 2.0])
+    figure = rendered(ss.geo.plot(ss.CubicSpline(None, ss.geo.from_lonlat(lon, lat), "sphere:2")))
+    assert any(text.endswith(" m") for text in texts_of(figure))
+
+
+def test_markers_in_the_legend_have_the_colour_of_the_curve():
+    figure = ss.CubicSpline(None, [[0, 0], [1, 1], [2, 0.0]], "r:2").plot(label="A", color="#ff0000")
+    handles = {
+        text.get_text(): handle
+        for text, handle in zip(figure.legends[0].texts, figure.legends[0].legend_handles, strict=True)
+    }
+    assert to_hex(handles["given points"].get_color()) == "#ff0000"
+
+
+def test_dark_styles_invert_the_arrows_of_the_view():
+    with matplotlib.style.context("dark_background"):
+        axes = spline_on("so:3").plot().axes[0]
+    (arrow, *_) = [own.arrow_patch for own in axes.texts if getattr(own, "arrow_patch", None) is not None]
+    assert np.mean(arrow.get_edgecolor()[:3]) > 0.5

@@ -327,12 +327,12 @@ def test_rotation_and_translation_have_panels_of_their_own():
     assert labels == [
         "turning rate\n|ω|, rad/t",
         "turning accel.\n|ω′|, rad/t²",
-        "speed\n|v|",
-        "acceleration\n|v′|",
+        "speed\n|p′|",
+        "acceleration\n|p″|",
     ]
     dates = np.datetime64("2024-01-01") + np.arange(6)
     labels = [axes.get_ylabel() for axes in spline_on("se:2", t=dates).plot().axes[1:4:2]]
-    assert labels == ["turning rate\nω, rad/s", "speed\n|v|, 1/s"]
+    assert labels == ["turning rate\nω, rad/s", "speed\n|p′|, 1/s"]
 
 
 def test_names_of_components():

@@ -15,7 +15,7 @@ from .._curves.ends import NATURAL
 from .._curves.fit import FitProblem, fit, read
 from .._curves.solve import DEFAULTS
 from .._input import UTC_ZONE
-from .._spaces import Product, Space, cover_of, parts_of
+from .._spaces import Product, Space, cover_of
 from .._time import TimeAxis
 from .curves import SECOND, Axis, Batch, Curve
 from .figure import PATHS
@@ -28,8 +28,8 @@ MOST = 50
 _FOR_QUANTILES, _FOR_MEAN = 2000, 200
 """The largest numbers of curves along the first batch axis from which quantiles and means are computed."""
 _QUANTILE_TIMES = 300
-_SEGMENTS = ["#7b3294", "#56b4e9", "#4d4d4d", "#cc79a7", "#8a6d00", "#a6611a"]
-"""Colours of segments, if they are few; other colours than those of components."""
+OTHERS = ["#7b3294", "#56b4e9", "#4d4d4d", "#cc79a7", "#8a6d00", "#a6611a"]
+"""Colours of segments, if they are few, and of curves beside frames; other colours than those of components."""
 _SAMPLES = 1200
 """Samples of a curve with few segments."""
 
@@ -128,7 +128,7 @@ def _drawn(one: Any, noise_beside: Any, index: Any, axis: Axis, look: dict[str, 
     if len(parts) < 2:
         return made
     start = made.points[0] if not isinstance(data.space, Product) else tuple(own[0] for own in made.points)
-    few = len(parts) <= len(_SEGMENTS)
+    few = len(parts) <= len(OTHERS)
     has_names = few and made.alone and made.color == SPLINE and made.label is None
     segments = []
     ends = np.cumsum([0, *map(len, parts)]).tolist()
@@ -136,7 +136,7 @@ def _drawn(one: Any, noise_beside: Any, index: Any, axis: Axis, look: dict[str, 
         within = nodes[(nodes >= own[0]) & (nodes <= own[-1])] if has_nodes else own[:1]
         beside = noise and noise.between(own[0], own[-1], slice(*ends[i : i + 2]))
         part = replace(made, x=own, nodes=within, reference=start if i else None, has_start=few or not i, noise=beside)
-        segments.append(replace(part, color=_SEGMENTS[i], label=f"segment {i}") if has_names else part)
+        segments.append(replace(part, color=OTHERS[i], label=f"segment {i}") if has_names else part)
     return replace(made, segments=tuple(segments))
 
 
@@ -220,9 +220,6 @@ def scatter_of(space: Space[Any], first: Any, times: Array, points: Any, axis: A
     return Curve(data, first, float(times[0]), times, times, axis, color, False, has_line=False, label=label)
 
 
-def finite_rows(space: Space[Any], points: Any) -> NDArray[np.bool_]:
-    """Return which points of a product or another space have no missing values."""
-    valid = [
-        np.isfinite(own.reshape(len(own), -1)).all(axis=1) for own in map(np.asarray, parts_of(points, space, "points"))
-    ]
-    return np.asarray(np.all(valid, axis=0))
+def finite_rows(parts: Sequence[NDArray[Any]]) -> NDArray[np.bool_]:
+    """Return which points have no missing values in any factor."""
+    return np.asarray(np.all([np.isfinite(own.reshape(len(own), -1)).all(axis=1) for own in parts], axis=0))

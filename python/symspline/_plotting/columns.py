@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import SubFigure
 from matplotlib.lines import Line2D
 
-from .curves import Curve
+from .curves import DOTS, Curve
 from .graphs import SUBSCRIPTS, draw_components, timelines
 from .style import DISTINCT, legend
 
@@ -31,7 +31,9 @@ def draw_columns(panel: SubFigure, curves: Sequence[Curve]) -> None:
             for i in range(n):
                 axes.plot(curve.times, line[:, i, j], color=DISTINCT[i], linewidth=width)
                 if curve.alone and (curve.has_nodes or curve.noise is not None):
-                    axes.plot(curve.on_axis(curve.given_x), given[:, i, j], "o", color=DISTINCT[i], markersize=3)
+                    axes.plot(
+                        curve.on_axis(curve.given_x), given[:, i, j], "o", color=DISTINCT[i], markersize=3, label=DOTS
+                    )
     low, high = (np.array([axes.get_ylim() for axes in made]).T[i] for i in (0, 1))
     for axes in made:
         axes.set_ylim(low.min(), high.max())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,11 +11,11 @@ from matplotlib import rcParams
 
 from .._arrays import short_repr
 from .._core import ValidationError
-from .._spaces import Product, factors_of, parts_of
+from .._spaces import Product, Space, cover_of, factors_of, parts_of
 from .._time import TimeAxis, knots_of
-from .collect import axis_of, curves_of, finite_rows, scatter_of
+from .collect import OTHERS, axis_of, curves_of, finite_rows, scatter_of
 from .curves import Curve, title_on
-from .figure import finish
+from .figure import FRAMES, finish
 from .looks import checked_color
 from .page import draw_page
 from .panels import check_axes, draw_into, has_dark_background
@@ -40,15 +41,18 @@ def compare(
         check_axes(ax, space)
     names = _checked_labels(labels, len(items))
     dark = has_dark_background(ax) if ax is not None else is_dark(rcParams["figure.facecolor"])
-    chosen = _checked_colors(colors, items, dark)
+    chosen = _checked_colors(colors, items, space, dark)
     data = [_data_of(own, space, i) if isinstance(own, tuple) else None for i, own in enumerate(items)]
     _check_times(items, data, first._time_axis)
     ends = [own.domain if given is None else given[:2] for own, given in zip(items, data, strict=True)]
     axis = axis_of(ends, first._time_axis, raw=ax is not None)
     drawn: list[Curve] = []
+    has_data = any(given is not None for given in data)
     for item, given, name, color in zip(items, data, names, chosen, strict=True):
         if given is None:
-            drawn += curves_of(item, axis, color, name, alone=False)[0]
+            own = curves_of(item, axis, color, name, alone=False)[0]
+            # Beside data, markers of starting points would be a second kind of circles.
+            drawn += [replace(curve, has_start=not has_data) for curve in own]
         else:
             start, _, times, points = given
             drawn.append(scatter_of(space, start, times, points, axis, color, name))
@@ -75,7 +79,7 @@ def _checked_labels(labels: Any, count: int) -> list[str | None]:
     return list(labels)
 
 
-def _checked_colors(colors: Any, items: Sequence[Any], dark: bool) -> list[Any]:
+def _checked_colors(colors: Any, items: Sequence[Any], space: Space[Any], dark: bool) -> list[Any]:
     """Return the colours of the user, or distinct ones for curves and grey ones for data."""
     if colors is not None:
         if isinstance(colors, str) or not isinstance(colors, Sequence) or len(colors) != len(items):
@@ -84,7 +88,9 @@ def _checked_colors(colors: Any, items: Sequence[Any], dark: bool) -> list[Any]:
             )
         return [kept_color(checked_color(own, f"colors[{i}]"), dark) for i, own in enumerate(colors)]
     count = sum(not isinstance(own, tuple) for own in items)
-    lines = iter(DISTINCT if count <= len(DISTINCT) else map(tuple, time_colors(np.linspace(0, 1, count))))
+    # Frames have colours of their own.
+    usual = OTHERS if any(str(cover_of(own)) in FRAMES for own in factors_of(space)) else DISTINCT
+    lines = iter(usual if count <= len(usual) else map(tuple, time_colors(np.linspace(0, 1, count))))
     dots = iter([DATA, *DISTINCT[::-1]] * len(items))
     return [next(dots) if isinstance(own, tuple) else next(lines) for own in items]
 
@@ -94,14 +100,15 @@ def _data_of(pair: tuple[Any, Any], space: Any, i: int) -> tuple[Any, Any, Any, 
     t, points = pair
     name = f"curves[{i}]"
     try:
-        parts = [np.asarray(own) for own in parts_of(points, space, "points")]
+        pairs = zip(factors_of(space), parts_of(points, space, "points"), strict=True)
+        parts = [factor._array(own, "points") for factor, own in pairs]
         for own, factor in zip(parts, factors_of(space), strict=True):
             if own.shape[1:] != factor.point_shape or not len(own):
                 raise ValidationError(
                     f"points have shape {own.shape}, but data on {factor!r} need shape {('n', *factor.point_shape)}"
                 )
         _, shown, times = knots_of(t, (), len(parts[0]))
-        kept = finite_rows(space, points)
+        kept = finite_rows(parts)
         if not kept.any():
             raise ValidationError("all points are missing")
         parts = [

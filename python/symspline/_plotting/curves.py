@@ -379,10 +379,11 @@ class Curve:
         if len(end) == 3 and self.noise is None and not self.faint:
             # Curves in space have no arrow heads.
             edge: Any = {"markersize": 7, "markeredgecolor": "white", "zorder": 6.6, "label": END}
-            axes.plot(*end[:, None], "s", color=self._color_of_dots, **edge)
+            axes.plot(*end[:, None], "s", color=self.color_of_dots, **edge)
 
     @property
-    def _color_of_dots(self) -> Any:
+    def color_of_dots(self) -> Any:
+        """Colour of given points: dark ones for a curve in the usual colour."""
         return INK if self.alone and self.color == SPLINE and self.label is None else self.color
 
     def plot_line(self, axes: Axes, positions: Array, **look: Any) -> None:
@@ -418,7 +419,7 @@ class Curve:
             axes.plot(*positions.T, "o", **dots | look)
             return
         size = float(np.clip(30 / np.sqrt(max(len(positions), 1)), 2, 6.5)) * (1 if self.alone else 0.6)
-        color = self._color_of_dots
+        color = self.color_of_dots
         # Many points would hide the curve.
         front = 6 if len(positions) <= MANY else 1.8
         look = {"color": color, "markersize": size, "markeredgecolor": color, "zorder": front} | look

@@ -86,6 +86,8 @@ _OTHERS = Picture(graphs.draw_components, 10.5, 3.8)
 PATHS = {"euclidean:2", "euclidean:3", "sphere:2", "hyperbolic:2", "rp:2", "gr:1,3", "gr:2,3", "cp:1", "cgr:1,2"}
 # Spaces whose picture has symbols in rows, one row per curve.
 IN_ROWS = {"sphere:3", "so:3", "o:3", "su:2", "spd:2", "spd:3"}
+FRAMES = {"sphere:3", "so:3", "o:3", "su:2", "se:3"}
+"""Spaces whose picture has frames, with a colour for every axis."""
 # Spaces whose picture has a view that depends on the curves.
 VIEWS = {"sphere:2", "hyperbolic:2", "rp:2", "gr:1,3", "gr:2,3", "cp:1", "cgr:1,2"}
 

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import SubFigure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import MaxNLocator, MultipleLocator
 from numpy.typing import NDArray
 
 from .._core import ValidationError
@@ -218,7 +218,7 @@ def draw_coordinates(
         for curve, (line, given) in zip(curves, drawn, strict=True):
             size = float(np.clip(30 / np.sqrt(max(len(given), 1)), 1.2, 3))
             look: Any = {"color": INK} if curve.noise is None and curve.alone else {}
-            look |= {"markersize": size}
+            look |= {"markersize": size} | ({"zorder": 1.8} if len(given) > FEW_KNOTS else {})
             size_of_band = growth(np.linalg.norm(line, axis=1))
             own = curve.graph(line[:, i] - starts[i])
             draw_graph_of(axes, curve, own, given[:, i] - starts[i], size_of_band, **look)
@@ -274,6 +274,8 @@ def draw_numbers(
         rest = rest[:: 1 + len(rest) // _OTHERS]
     rows = -(-len(labels) // max(1, min(_IN_ROW, int(space / 0.9))))
     (axes,) = timelines(panel, curves, [label], top=0.25 + 0.22 * rows)
+    if np.isfinite(period) and axes not in OWN_AXES:
+        axes.yaxis.set_major_locator(MultipleLocator(period / 4))
     for curve, (values, given) in zip(curves, drawn, strict=True):
         if curve.has_line:
             for i in rest:

@@ -36,6 +36,8 @@ _LENGTH = 0.14
 """Distance in inches from the position of a body in the plane to its tip."""
 _MANY = 24
 """The number of bodies of all curves, or two per curve if that is more."""
+_FAN = np.radians(30)
+"""Bodies that turn on the spot are drawn at angles of this size."""
 _SMALL = np.radians(12)
 """Rotations by less than this are graphs."""
 _LARGE = np.radians(150)
@@ -68,6 +70,8 @@ def draw_rotations(panel: SubFigure, curves: Sequence[Curve]) -> None:
             _draw_discs(rows, i, times, length, frames, radii)
             words = "discs: 95 % bands"
         _draw_arrows(rows.axes, times, -i, length * frames, light=row.name == "data")
+    if str(cover_of(curves[0].space)) in ("sphere:3", "su:2"):
+        words = "; ".join(filter(None, (words, "turns are twice the distances")))
     _explain(rows.axes, words, rows.width)
     rows.draw_view()
 
@@ -206,8 +210,9 @@ def draw_flat_poses(panel: SubFigure, curves: Sequence[Curve]) -> None:
             dots = replace(curve, has_start=not curve.has_nodes)
             dots.draw_dots(axes, given[:, :2, 2] - origin, markersize=small)
         way = float(np.sum(np.linalg.norm(np.diff(path, axis=0), axis=1)))
+        spread = _apart if way > length else _turned_apart
         dense = curve.noise is None and curve.has_nodes and not has_bodies
-        some = _apart(given if dense else curve.points[~curve.bridges], max(4 * length, way * len(curves) / _MANY))
+        some = spread(given if dense else curve.points[~curve.bridges], max(4 * length, way * len(curves) / _MANY))
         if has_bodies:
             free = np.linalg.norm(some[:, None, :2, 2] - given[:, :2, 2], axis=-1) > 2 * length
             some = some[free.all(axis=1)]
@@ -221,6 +226,12 @@ def _apart(poses: Array, least: float) -> Array:
     """Return poses, the first among them, whose distances along the path are ``least`` or more."""
     steps = np.linalg.norm(np.diff(poses[:, :2, 2], axis=0, prepend=poses[:1, :2, 2]), axis=1)
     return np.asarray(poses[apart(np.cumsum(steps), least)])
+
+
+def _turned_apart(poses: Array, _: float) -> Array:
+    """Return poses of a body that turns on the spot, the first among them, which differ by some angle."""
+    angles = np.unwrap(np.arctan2(poses[:, 1, 0], poses[:, 0, 0]))
+    return np.asarray(poses[apart(np.cumsum(np.abs(np.diff(angles, prepend=angles[:1]))), _FAN)])
 
 
 def draw_poses(panel: SubFigure, curves: Sequence[Curve]) -> None:

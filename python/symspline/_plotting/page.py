@@ -54,13 +54,13 @@ from .figure import (
 )
 from .panels import check_axes, draw_into, has_dark_background, next_color
 from .rates import LIMIT, columns_of, draw_rates
-from .style import BOTTOM, DATA, EDGE, GAP, INK, MARK, TOP, Array, font_factor, heading, legend
+from .style import BOTTOM, DATA, EDGE, GAP, MARK, TOP, Array, font_factor, heading, legend
 from .theme import is_dark, kept_color
 
 _HEAD, _LINE, _RATES_WIDTH, _RATES_HEIGHT = 1.2, 0.2, 5.8, 4.0
 _UNITS = (172_800, 86_400, "d"), (7200, 3600, "h"), (100, 60, "min"), (0, 1, "s")
 """The least number of seconds for which a unit is used, its length in seconds, and its name."""
-_ROW = 1.5
+_ROW = 1.8
 """Height of a rate in inches, if there are more than two in a column."""
 
 
@@ -237,7 +237,7 @@ def _explain(figure: Figure, curves: Sequence[Curve], height: float, others: int
         if curve.label and curve.label not in labels:
             look = {} if curve.has_line else dot | {"markerfacecolor": "none"}
             add(Line2D([], [], color=curve.color, linewidth=2, **look), curve.label)
-    color = INK if few[0].alone else DATA
+    color = few[0].color_of_dots if few[0].alone else DATA
     body: dict[str, Any] = {"linestyle": "none", "marker": BODY, "markersize": 10, "markeredgecolor": few[0].color}
     some_of_many = BODIES in drawn and POSES not in drawn and few[0].noise is None and few[0].has_nodes
     if START in drawn:

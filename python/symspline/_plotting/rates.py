@@ -21,6 +21,8 @@ IN_ROW = 3
 """The largest number of factors whose pictures are in one row."""
 # Other spaces than spheres, in which the length of a velocity is an angle per time.
 _ANGULAR = {"so:2", "so:3", "o:2", "o:3", "u:1", "rp:1", "rp:2", "gr:1,2", "gr:1,3", "gr:2,3"}
+_HALVES = {"su:2", "cp:1", "cgr:1,2"}
+"""Spaces whose distances are half of the angles that their picture shows."""
 _LONGEST = 10
 """Number of letters of a space in the label of an axis."""
 At = Callable[[str], Any]
@@ -43,6 +45,8 @@ class Rate(NamedTuple):
         Factor from the lengths of tangent vectors to the numbers.
     whole : bool
         Whether the number is the whole length of a vector, which can have a limit.
+    speed : callable
+        As ``values``, for the length of the velocity to which the number belongs.
     """
 
     label: str
@@ -51,6 +55,7 @@ class Rate(NamedTuple):
     signed: bool = False
     scale: float = 1.0
     whole: bool = True
+    speed: Callable[[At], Array] = lambda at: at("speed")
 
 
 def _turned(p: Any, v: Any) -> Array:
@@ -81,7 +86,7 @@ def rates_of(space: Space[Any], seconds: bool) -> list[Rate]:
     """Return the rates of a space that is not a product."""
     own = cover_of(space)
     per = [", 1/s", ", 1/s²"] if seconds else ["", ""]
-    if isinstance(own, (Sphere, Torus)) or str(own) in _ANGULAR:
+    if isinstance(own, (Sphere, Torus)) or str(own) in _ANGULAR or str(own) in _HALVES:
         per = [", rad/s", ", rad/s²"] if seconds else [", rad/t", ", rad/t²"]
     if isinstance(own, SpecialEuclidean):
         return _rates_of_poses(own, seconds)
@@ -105,8 +110,9 @@ def rates_of(space: Space[Any], seconds: bool) -> list[Rate]:
 def _rates_of_poses(space: SpecialEuclidean, seconds: bool) -> list[Rate]:
     """Return rates of turning and of moving, which have different units.
 
-    A tangent vector at (R, p) is (R ω̂, R v) with the twist (ω, v) in the body. Its lengths are ‖R ω̂‖/√2 = |ω| and |v|,
-    and those of the covariant acceleration are |ω′| and |v′|.
+    A tangent vector at (R, p) is (R ω̂, R v) with the twist (ω, v) in the body. The length of R ω̂ is √2 |ω|, and that of
+    its covariant derivative √2 |ω′|. The covariant derivative of p′ = R v is R v′ = p″ − Ω × p′ with the angular
+    velocity Ω in the fixed frame; the acceleration of the position is p″.
     """
     n = space.point_shape[0] - 1
     turn = ["rad/s", "rad/s²"] if seconds else ["rad/t", "rad/t²"]
@@ -117,17 +123,23 @@ def _rates_of_poses(space: SpecialEuclidean, seconds: bool) -> list[Rate]:
             return lambda at: _of_column(at("point")[..., :2, :2], at(quantity)[..., :2, :2])
         return lambda at: np.linalg.norm(at(quantity)[..., :n, :n], axis=(-2, -1)) / np.sqrt(2)
 
-    def moving(quantity: str) -> Callable[[At], Array]:
-        return lambda at: np.linalg.norm(at(quantity)[..., :n, n], axis=-1)
+    def moving(at: At) -> Array:
+        return np.asarray(np.linalg.norm(at("velocity")[..., :n, n], axis=-1))
+
+    def accelerated(at: At) -> Array:
+        rate, turns = at("velocity"), at("point")[..., :n, :n]
+        spin = rate[..., :n, :n] @ turns.swapaxes(-1, -2)
+        return np.asarray(np.linalg.norm((at("acceleration")[..., :n, n:] + spin @ rate[..., :n, n:])[..., 0], axis=-1))
 
     first, second = ("ω", "ω′") if n == 2 else ("|ω|", "|ω′|")
     rates = [
         Rate(f"turning rate\n{first}, {turn[0]}", 1, turning("velocity"), n == 2),
         Rate(f"turning accel.\n{second}, {turn[1]}", 2, turning("acceleration"), n == 2),
-        Rate(f"speed\n|v|{move[0]}", 1, moving("velocity")),
-        Rate(f"acceleration\n|v′|{move[1]}", 2, moving("acceleration")),
+        Rate(f"speed\n|p′|{move[0]}", 1, moving),
+        Rate(f"acceleration\n|p″|{move[1]}", 2, accelerated),
     ]
-    return [rate._replace(whole=False) for rate in rates]
+    speeds = (turning("velocity"), turning("velocity"), moving, moving)
+    return [rate._replace(whole=False, speed=own) for rate, own in zip(rates, speeds, strict=True)]
 
 
 def columns_of(space: Space[Any], seconds: bool, most: int, wide: bool) -> list[list[tuple[int | None, Rate]]]:
@@ -204,7 +216,7 @@ def _draw_rate(axes: Axes, curves: Sequence[Curve], rate: Rate) -> None:
             if deviation is not None:
                 fill_band(axes, part, low[at], high[at])
         drawn += [float(np.nanmin(low)), float(np.nanmax(high))]
-        top = max(top, rate.scale * float(curve.at("speed").max()))
+        top = max(top, rate.scale * float(np.abs(rate.speed(curve.at)).max()))
         # Rounding errors of points between the closest knots, which a curve at rest has.
         rounding = max(rounding, rate.scale * 1e-15 * np.abs(curve.points).max() / np.diff(curve.data.times).min())
     for limit in {curve.limits[0][rate.order - 1] for curve in curves if curve.limits and rate.whole} - {np.inf}:

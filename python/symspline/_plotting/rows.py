@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from textwrap import wrap
 from typing import Any
 
 import numpy as np
@@ -43,6 +44,16 @@ class Row:
     curve: Curve
     name: str
 
+    def count(self, width: float, reach: float) -> str:
+        """Describe how many of the given points have a symbol, if not all have."""
+        shown, given = len(self.symbols(width, reach)[0]), len(self.curve.given)
+        return f"{shown} of {given}" if self.has_given and shown < given else ""
+
+    @property
+    def has_given(self) -> bool:
+        """Whether the symbols are given points."""
+        return self.name in ("given", "data") or not self.curve.has_line
+
     def symbols(self, width: float, reach: float) -> tuple[Array, Any, Array | None]:
         """Return times on matplotlib's axis, points, and the radii of the band, for symbols that fit into the row.
 
@@ -50,7 +61,7 @@ class Row:
         points that are close together are omitted; samples of the curve are equidistant.
         """
         curve = self.curve
-        if self.name in ("given", "data") or not curve.has_line:
+        if self.has_given:
             times = curve.on_axis(curve.given_x)
             kept = apart(times, 1.1 * reach / width * (curve.times[-1] - curve.times[0]))
             return times[kept], curve.given[kept], None
@@ -115,22 +126,30 @@ class Rows:
         look: Any = {"transform": self.axes.get_yaxis_transform(), "clip_on": False}
         left = -0.9 / self.width
         if self.axes in OWN_AXES:
-            names = [": ".join(filter(None, (own.curve.label, own.name))) for own in self.rows]
+            names = [
+                "\n".join(
+                    filter(None, (": ".join(filter(None, (own.curve.label, own.name))), own.count(self.width, reach)))
+                )
+                for own in self.rows
+            ]
             self.axes.set_yticks([-k for k in range(len(names))], names)
             self.axes.tick_params(axis="y", length=0)
             return times, symbols, radii
         if not row.name and row.curve.label:
-            self.axes.text(left, -i, row.curve.label, color=row.curve.color, fontsize=points(9), va="center", **look)
+            name = "\n".join(
+                filter(
+                    None,
+                    ("\n".join(wrap(row.curve.label, 13, max_lines=3, placeholder=" …")), row.count(self.width, reach)),
+                )
+            )
+            self.axes.text(left, -i, name, color=row.curve.color, fontsize=points(9), va="center", **look)
             return times, symbols, radii
         if not row.name:
             self.axes.plot([left, left + 0.2 / self.width], [-i, -i], color=row.curve.color, linewidth=3, **look)
             return times, symbols, radii
         look |= {"color": INK, "fontsize": points(9)}
         self.axes.text(left, -i, row.name, va="bottom", **look)
-        if row.name != "curve" and len(times) < len(row.curve.given):
-            self.axes.text(
-                left, -i, f"{len(times)} of {len(row.curve.given)}", va="top", **look | {"fontsize": points(8)}
-            )
+        self.axes.text(left, -i, row.count(self.width, reach), va="top", **look | {"fontsize": points(8)})
         return times, symbols, radii
 
     def in_inches(self, times: Array, row: int) -> dict[str, Any]:

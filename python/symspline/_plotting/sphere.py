@@ -40,6 +40,7 @@ _HEIGHT = 42
 """Latitude in degrees from which the hemisphere is seen."""
 _RIM = 1e-9
 """Rounding decides the side of points that are closer to the plane of the rim."""
+_TWICE = "; angles are twice the distances of states"
 _BLOCH = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "|0⟩": (0.0, 0.0, 1.0), "|1⟩": (0.0, 0.0, -1.0)}
 _AXES = {"x₁": (1.0, 0.0, 0.0), "x₂": (0.0, 1.0, 0.0), "x₃": (0.0, 0.0, 1.0)}
 
@@ -110,7 +111,7 @@ def draw_bloch(panel: SubFigure, curves: Sequence[Curve]) -> None:
         radii = None if curve.radii is None else 2 * curve.radii
         curve.draw_polygon(axes, lambda states: view.visible(bloch_vectors(states)))
         _draw_on_globe(axes, view, curve, *curve.marked(bloch_vectors), radii)
-    note(panel, "part of the Bloch sphere: longitude from x, |0⟩ is 90°N" if is_part else "Bloch sphere")
+    note(panel, ("part of the Bloch sphere: longitude from x, |0⟩ is 90°N" if is_part else "Bloch sphere") + _TWICE)
 
 
 def bloch_vectors(states: Any) -> Array:
@@ -209,7 +210,7 @@ def _draw_globe(panel: SubFigure, vectors: Array, look: _Globe, above: Array | N
     """
     view = View.above(*middle_of(vectors))
     far = np.arctan2(np.linalg.norm(view.flat(vectors), axis=-1), vectors @ view.up).max()
-    if 1e-7 < far < (_SMALL_WIDE if look.beside else _SMALL):
+    if 1e-9 < far < (_SMALL_WIDE if look.beside else _SMALL):
         width, height = size(panel)
         if look.beside:
             right, top = look.beside, 0.15

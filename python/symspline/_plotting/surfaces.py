@@ -32,7 +32,13 @@ def draw_surface(panel: SubFigure, field: Field, nodes: Any) -> None:
     upwards = np.nansum(np.cross(np.diff(positions, axis=0)[:, 1:], np.diff(positions, axis=1)[1:])[..., 2]) > 0
     axes.plot_surface(*np.moveaxis(positions.swapaxes(0, 1) if upwards else positions, -1, 0), **look)
     symbols = _positions(field.symbols)
-    for lines in (symbols, symbols.swapaxes(0, 1)):
+    # Lines on the surface at the pixels that are closest to the symbols.
+    fine, (left, right, low, high) = _positions(field.pixels), field.extent
+    across, along = (
+        np.clip(np.rint((x - start) / (stop - start) * count - 0.5), 0, count - 1).astype(int)
+        for x, start, stop, count in zip((field.x, field.y), (left, low), (right, high), fine.shape, strict=False)
+    )
+    for lines in (fine[across], fine[:, along].swapaxes(0, 1)):
         broken = np.concatenate([lines, np.full_like(lines[:, :1], np.nan)], axis=1)
         axes.plot(*broken.reshape(-1, 3).T, color=INK, linewidth=0.5, alpha=0.45, zorder=4)
     axes.plot(*dots.T, "o", color=INK, markersize=2.2, label="nodes", zorder=5)

@@ -83,6 +83,9 @@ def invert(artists: Sequence[Artist], background: Any) -> None:
             continue
         if isinstance(artist, Text):
             artist.set_color(new(artist.get_color()))
+            arrow = getattr(artist, "arrow_patch", None)
+            if arrow is not None:
+                _change(arrow, ("facecolor", "edgecolor"), new)
         elif isinstance(artist, Line2D):
             _change(artist, ("color", "markerfacecolor", "markeredgecolor"), new)
         elif isinstance(artist, Patch):
