@@ -31,7 +31,11 @@ def test_invalid_tables(fails):
         ("t,x\n1,2\n", "r:1", "a.csv, line 2: this is the only point; a curve needs two"),
         ("1,2\n3,4\n", "r:2", "a.csv: the first line must name the columns, but holds numbers"),
         ("t,x,x\n1,2,3\n", "r:1", "a.csv: the first line names two columns 'x'"),
-        ("t,x,y\n1,a,3\n2,4,5\n", "r:2", "columns: y; say which with --columns (no numbers in the first row of x)"),
+        (
+            "t,x,y\n1,a,3\n2,4,5\n",
+            "r:2",
+            "columns: y; say which with --columns, and --time if one holds the times (no numbers in the first row",
+        ),
         ("t,x\n0,1\n1," + "9" * 5000 + "x\n", "r:1", "9999999999"),
     ]:
         write("a.csv", text)
@@ -50,7 +54,10 @@ def test_unreadable_files(fails):
     os.mkdir("folder.csv")
     assert fails("fit folder.csv --space s:2 -o a.npz") == "cannot read folder.csv: Is a directory"
     Path("latin.csv").write_bytes("t,x\n0,1\n1,2°\n".encode("latin-1"))
-    assert fails("fit latin.csv --space r:1 -o a.npz") == "latin.csv is not text in UTF-8"
+    assert (
+        fails("fit latin.csv --space r:1 -o a.npz")
+        == "latin.csv is not text in UTF-8; convert it, such as by iconv -f cp1252 -t utf-8"
+    )
     write("a.npz", "no zip")
     assert fails("check a.npz") == "a.npz is not a file of curves, such as `symspline fit` makes"
     np.savez("a.npz", x=1)

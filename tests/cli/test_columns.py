@@ -109,8 +109,10 @@ def test_columns_of_complex_numbers(run):
 HALVES = "t,a_re,a_im,b_re,b_im\n0,1,0,0,0\n1,0.6,0,0,0.8\n"
 
 
-def test_a_column_may_stand_on_both_sides_of_a_symmetric_matrix(run):
+def test_a_column_may_stand_on_both_sides_of_a_symmetric_matrix(run, fails):
     write("a.csv", "t,a,b,c\n0,1,0.1,2\n1,2,0.3,3\n3,2,0.1,1\n")
+    problem = fails("fit a.csv --space spd:2 -o a.npz")
+    assert problem.endswith("; name both sides of the matrix, such as --columns a,b,b,c for [[a, b], [b, c]]")
     run("fit a.csv --space spd:2 --columns a,b,b,c -o a.npz")
     spline = ss.load("a.npz")
     np.testing.assert_array_equal(spline.points[1], [[2, 0.3], [0.3, 3]])

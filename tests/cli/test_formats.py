@@ -136,3 +136,25 @@ def test_long_files_are_read_in_chunks(run, fails):
     assert fails("fit a.csv --space s:1 -o b.npz") == "a.csv, line 9001: column 'y' holds 'one', which is not a number"
     run("sample a.npz --every 0.5 -o b.csv")
     assert len(table("b.csv")["t"]) == 2 * n - 1
+
+
+def test_formats_of_positions_refuse_derivatives_alone(run, fails):
+    write("a.csv", TRACK)
+    run("fit a.csv --lonlat -o curve.npz")
+    for ending in ("geojson", "gpx"):
+        problem = fails(f"sample curve.npz -n 3 --nu 1 -o b.{ending}")
+        assert problem.endswith(" needs the points beside their derivatives: give --nu 0,1")
+    assert fails("sample curve.npz -n 3 --nu 0,1 -o b.gpx").startswith("GPX has positions and no derivatives; write")
+    run("sample curve.npz -n 3 --nu 0,1 -o b.geojson")
+
+
+def test_comments_above_the_names_of_columns(fails):
+    write("a.csv", "# a comment\nt,x\n0,1\n1,2\n")
+    problem = fails("fit a.csv --space r:1 -o a.npz")
+    assert problem.endswith("but the first line names 1 column; remove lines above the names, such as comments")
+
+
+def test_one_curve_has_no_name(run, fails):
+    write("a.csv", TRACK)
+    run("fit a.csv --lonlat -o curve.npz")
+    assert fails("sample curve.npz --curve foo -n 3 -o -") == "curve.npz has one curve without a name; omit --curve"

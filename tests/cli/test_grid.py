@@ -102,6 +102,9 @@ def test_splines_are_saved_and_sampled(wind, run, fails):
     problem = fails("grid spline.npz --to to.npz -o c.npz")
     assert problem.startswith("the coordinate 1000000.0 is outside axis 0, which extends from ")
     assert "pass" not in problem
+    assert run("info spline.npz").startswith(
+        "spline.npz: a spline through 6 x 8 points of sphere:2; see symspline grid"
+    )
     assert fails("grid spline.npz -o c.npz") == "spline.npz: this is a spline; give --to, --zoom or --points"
     assert "for which --space cannot be given" in fails("grid spline.npz --space s:2 --zoom 2 -o c.npz")
     assert fails("sample spline.npz -n 5 -o c.csv") == "spline.npz is a grid; see symspline grid --help"

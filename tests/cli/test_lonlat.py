@@ -35,14 +35,21 @@ def test_lonlat_by_column_names(run, fails):
     write("a.csv", "t,b,l\n0,50,7\n1,51,8\n")
     run("fit a.csv --lonlat --columns l,b -o a.npz")
     np.testing.assert_allclose(to_lonlat(ss.load("a.npz").points), [[7, 8], [50, 51]], atol=1e-13)
-    assert "--lonlat needs columns lon (or lng) and lat" in fails("fit a.csv --lonlat -o b.npz")
+    assert "--lonlat needs columns lon or lng or longitude" in fails("fit a.csv --lonlat -o b.npz")
+    write("c.csv", "t,location-lat,location-long\n0,50,7\n1,51,8\n")
+    run("fit c.csv --lonlat -o d.npz")
+    assert ss.load("d.npz") == ss.load("a.npz")
+    problem = fails("fit c.csv --lonlat --columns location-lat,location-long -o b.npz")
+    assert problem == (
+        "--columns location-lat,location-long: longitude comes first: --columns location-long,location-lat"
+    )
     assert "longitude and latitude are 2 numbers" in fails("fit a.csv --lonlat --columns l -o b.npz")
     write("c.csv", "t,Lat,Lng\n0,50,7\n1,51,8\n")
     run("fit c.csv --lonlat -o c.npz")
     assert ss.load("c.npz") == ss.load("a.npz")
     assert "is for sphere:2, not for sphere:3" in fails("fit a.csv --lonlat --space s:3 -o b.npz")
-    write("a.csv", "t,lat,lon\n0,50,7\n1,51,98\n")
-    problem = fails("fit a.csv --lonlat --columns lat,lon -o b.npz")
+    write("a.csv", "t,b,l\n0,50,7\n1,51,98\n")
+    problem = fails("fit a.csv --lonlat --columns b,l -o b.npz")
     assert problem.startswith("a.csv, line 3: latitude 98 is not between -90 and 90 degrees")
 
 

@@ -146,10 +146,38 @@ def test_numbers_since_1970(unit, scale, run, fails):
     )
 
 
+def test_seconds_and_nanoseconds_in_two_columns(run, fails):
+    write("a.csv", "sec,nsec,x\n1717200000,1,0\n1717200000,500000000,1\n1717200001,7,2\n")
+    problem = fails("fit a.csv --space r:1 --columns x -o a.npz")
+    assert "say --time sec,nsec, which adds seconds and nanoseconds since 1970, or --time none" in problem
+    run("fit a.csv --space r:1 --time sec,nsec -o a.npz")
+    expected = np.array([1717200000 * 10**9 + 1, 1717200000 * 10**9 + 5 * 10**8, 1717200001 * 10**9 + 7])
+    np.testing.assert_array_equal(ss.load("a.npz").t.astype("datetime64[ns]").astype(np.int64), expected)
+    run("sample a.npz --at a.csv --time sec,nsec -o b.csv")
+    assert table("b.csv")["time"][2] == "2024-06-01T00:00:01.000000007Z"
+    np.testing.assert_allclose(np.array(table("b.csv")["x"], float), [0, 1, 2], atol=1e-12)
+
+
+def test_a_name_of_times_needs_no_option_beside_unix(run, fails):
+    write("a.csv", "#timestamp [ns],x\n1717200000000000000,0\n1717200001000000000,1\n")
+    assert "say --time '#timestamp [ns]', with --unix" in fails("fit a.csv --space r:1 -o a.npz")
+    run("fit a.csv --space r:1 --unix ns -o a.npz")
+    assert ss.load("a.npz").t[1] == np.datetime64("2024-06-01T00:00:01")
+
+
 def test_fractions_of_a_second_since_1970(run, fails):
     write("a.csv", "t,x\n1717200000.25,0\n1717200001.5,1\n")
     run("fit a.csv --space r:1 --unix s -o a.npz")
     expected = np.array(["2024-06-01T00:00:00.25", "2024-06-01T00:00:01.5"], "datetime64[ns]")
+    np.testing.assert_array_equal(ss.load("a.npz").t, expected)
+    # Text is exact, and floating-point numbers have no digits beyond their precision.
+    write("a.csv", "t,x\n1717200000.000000001,0\n1717200000.3,1\n")
+    run("fit a.csv --space r:1 --unix s -o a.npz")
+    expected = np.array(["2024-06-01T00:00:00.000000001", "2024-06-01T00:00:00.3"], "datetime64[ns]")
+    np.testing.assert_array_equal(ss.load("a.npz").t, expected)
+    np.savez("b.npz", t=np.array([1717200000.1, 1717200000.3]), x=np.array([0.0, 1]))
+    run("fit b.npz --space r:1 --unix s -o a.npz")
+    expected = np.array(["2024-06-01T00:00:00.1", "2024-06-01T00:00:00.3"], "datetime64[ns]")
     np.testing.assert_array_equal(ss.load("a.npz").t, expected)
     write("a.csv", "t,x\n1e12,0\n2e12,1\n")
     assert "is too far from 1970" in fails("fit a.csv --space r:1 --unix s -o b.npz")

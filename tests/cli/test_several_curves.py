@@ -40,8 +40,11 @@ def test_several_recordings_that_were_cut_at_gaps(run, fails):
     np.testing.assert_allclose(numbers(columns, "t", "x"), [[44.5, 4.45], [1.5, 0.15]], atol=1e-12)
     write("at.csv", "t,id\n44.5,a\n1.5,b\n1,a/1\n")
     run("sample a.npz --at at.csv -o out.csv")
-    assert table("out.csv")["id"] == ["a/2", "b", "a/1"]
+    assert table("out.csv")["id"] == ["a", "b", "a/1"]
     np.testing.assert_allclose(numbers(table("out.csv"), "x")[:, 0], [4.45, -1.5, 0.1], atol=1e-12)
+    write("at.csv", "when,id\n44.5,a\n1.5,a\n")
+    run("sample a.npz --at at.csv --time when -o out.csv")
+    assert table("out.csv")["id"] == ["a", "a"]
     run("plot a.npz --curve a -o a.svg")
     assert fails("plot a.npz -o b.svg") == "a.npz has 2 curves; say which with --curve: a, b"
 

@@ -146,3 +146,22 @@ def test_samples_have_standard_deviations(run):
     assert [name for name in found if name.startswith("std")] == ["std", "std_d1"]
     assert np.array_equal(found["std"], np.degrees(spline.std(x)))
     assert np.array_equal(found["std_d1"], np.degrees(spline.std(x, nu=1)))
+
+
+def test_tracks_with_posteriors_of_both_kinds_are_in_one_file(run):
+    """The posterior of a track that is far from flat has matrices, and that of others numbers."""
+    rows = [
+        (t, lon, lat, name)
+        for name, last in (("A", 5), ("B", 145))
+        for t, (lon, lat) in enumerate([(1, 2), (2, 2.5), (3, 2.4), (4, 3), (last, 3.3)])
+    ]
+    write("k.csv", "t,lon,lat,id\n" + "".join(f"{t},{lon},{lat},{name}\n" for t, lon, lat, name in rows))
+    run("fit k.csv --lonlat --curve id --smooth -o m.npz")
+    found = ss.load("m.npz")
+    for name, last in (("A", 5), ("B", 145)):
+        points = ss.geo.from_lonlat([1, 2, 3, 4, last], [2, 2.5, 2.4, 3, 3.3])
+        with pytest.warns(ss.SmoothingWarning):
+            alone = ss.make_smoothing_spline(np.arange(5.0), points, "sphere:2")
+        assert found[name] == alone
+        np.testing.assert_array_equal(found[name].std([0.3, 2.2]), alone.std([0.3, 2.2]))
+    run("check m.npz")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -41,12 +42,23 @@ def noise_state(space: Space[Any], noisy: SmoothingData, smoothed: list[Smoothed
         suffix = _suffix(space, i)
         state["band" + suffix] = own.band
         if own.posterior is not None:
-            state |= {"matrix" + suffix: own.posterior.band, "turn" + suffix: own.posterior.turn}
+            state |= posterior_state(own.posterior, suffix, noisy.batch)
         if not alike:
             state["data_weights" + suffix] = precision.weights
         if precision.information is not None:
             state["data_information" + suffix] = precision.information
     return state
+
+
+def posterior_state(posterior: Posterior, suffix: str, batch: tuple[int, ...]) -> dict[str, Any]:
+    """Return the entries of a posterior.
+
+    Its blocks are numbers or matrices; rows of four numbers are the same for both, so that curves of both kinds can be
+    in one file.
+    """
+    band, turn = posterior.band, posterior.turn
+    rows, corner = math.prod(band.shape[-2:]) // 4, math.prod(turn.shape[-2:])
+    return {"matrix" + suffix: band.reshape(*batch, rows, 4), "turn" + suffix: turn.reshape(*batch, corner, 1)}
 
 
 def _suffix(space: Space, i: int) -> str:
@@ -126,11 +138,15 @@ def read_posterior(
 ) -> Posterior:
     """Return the posterior of a curve with a number of coefficients, each of m coordinates."""
     matrix, turn = state["matrix" + suffix], state["turn" + suffix]
-    size = turn.shape[-1] if closed else matrix.shape[-1] // 4
-    if size not in (1, m):
+    size = math.isqrt(math.prod(matrix.shape[-2:]) // (4 * coefficients))
+    if size not in (1, m) or math.prod(matrix.shape[-2:]) != 4 * coefficients * size**2:
         raise ValidationError(f"the matrices have shape {matrix.shape}")
-    _check("matrices", matrix, (*batch, coefficients * size, 4 * size), finite=good)
-    _check("matrices", turn, (*batch, *(2 * (size if closed else 0,))), finite=good)
+    shapes = (*batch, coefficients * size, 4 * size), (*batch, *(2 * (size if closed else 0,)))
+    if math.prod(turn.shape) != math.prod(shapes[1]):
+        raise ValidationError(f"the matrices have shape {turn.shape}")
+    matrix, turn = (own.reshape(shape) for own, shape in zip((matrix, turn), shapes, strict=True))
+    _check("matrices", matrix, shapes[0], finite=good)
+    _check("matrices", turn, shapes[1], finite=good)
     return Posterior.of(matrix, turn, size)
 
 

@@ -12,8 +12,9 @@ Where values are rounding errors themselves, as the acceleration of a geodesic i
 multiplied by h^k instead, where h is the shorter of the two segments.
 
 Lengths are those of the space and do not depend on the array that represents a line or subspace. For poses they are
-those of the rates in the body, angle and position together. A jump of the k-th derivative may be 1e-12 of the largest
-value, plus 100 eps / h^k for rounding; |p| times as much where points p have large numbers, |p|^2 times as much in
+those of the rates in the body, angle and position together. A jump of the k-th derivative may be 1.2e-11 of the largest
+value, as much as the tolerance of the fit, plus 100 eps / h^k for rounding; |p| times as much where points p have large
+numbers, |p|^2 times as much in
 hyperbolic spaces, cond(p) for positive definite matrices; on Stiefel manifolds, whose logarithms are iterative, 1e-7
 of the largest value. The check fails at larger jumps, and the exit code is 1.
 
@@ -39,7 +40,8 @@ from ._curves import read_curves
 from ._messages import Failure, listed
 
 _MEASURES = ("distance", "position", "velocity", "acceleration")
-_RELATIVE = 1e-12
+# The tolerance of the fit is a residual of 1e-12, and the jump of an acceleration is twelve times as large.
+_RELATIVE = 1.2e-11
 _OF_FUNCTIONS = 1e-7
 _ROUNDING = 100 * float(np.finfo(np.float64).eps)
 # Their metric is relative: it does not depend on the unit of the matrices.

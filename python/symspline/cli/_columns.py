@@ -7,11 +7,12 @@ import re
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from shlex import quote
 from typing import Any
 
 import numpy as np
 
-from .._spaces import Space, factors_of
+from .._spaces import LogEuclidean, Space, SymmetricPositiveDefinite, factors_of
 from ._messages import Problem, first_duplicate, listed, refuse
 from ._points import (
     IN_BRACKETS,
@@ -29,6 +30,7 @@ from ._tables import IM, RE, Array, Place, Rows, Table
 NUMBERED = "none"
 """The value of --time that numbers the points of every curve, unless a column has this name."""
 ORDERS = ("wxyz", "xyzw")
+_LON, _LAT = ("lon", "lng", "longitude", "location-long"), ("lat", "latitude", "location-lat")
 _HALVES = {RE: IM, IM: RE}
 
 # Names of times without blanks and marks: "BaseDateTime", "#timestamp [ns]", "ISO_TIME", "header.stamp".
@@ -44,7 +46,7 @@ _PACKED, _PACKED_NOW = (10_000_101, 99_991_231), (19_000_101, 20_991_231)
 # ---- times ----
 
 
-def time_column(table: Table, given: str | None, others: Sequence[str | None]) -> str | None:
+def time_column(table: Table, given: str | None, others: Sequence[str | None], unix: bool = False) -> str | None:
     """Return the column of times: the given one, or one that is called like a time; None to number the points.
 
     Raises
@@ -57,7 +59,7 @@ def time_column(table: Table, given: str | None, others: Sequence[str | None]) -
     left = [name for name in table.names if name not in others]
     usual = [name for name in left if _TIME.fullmatch(_letters(name))]
     # Numbers are accepted as times only under the two plainest names, as the unit of others is in doubt.
-    certain = [name for name in usual if name not in table.numeric or name.lower() in ("t", "time")]
+    certain = [name for name in usual if unix or name not in table.numeric or name.lower() in ("t", "time")]
     doubtful = [name for name in left if name not in certain and (name in usual or _TIME_PART.fullmatch(name.lower()))]
     if len(certain) == 1:
         # A column of dates with their time of day needs no other columns.
@@ -68,11 +70,25 @@ def time_column(table: Table, given: str | None, others: Sequence[str | None]) -
     if not found:
         return None
     what = "hold the times" if len(found) == 1 else "all belong to the times, which stand in one column"
-    unit = ", with --unix if it counts from 1970" if found[0] in table.numeric else ""
+    meant, unit = found[0], ", with --unix if it counts from 1970" if found[0] in table.numeric else ""
+    if len(found) == 2 and re.search("n(ano)?secs?$", _letters(found[1])):
+        meant, unit = ",".join(found), ", which adds seconds and nanoseconds since 1970"
     raise Problem(
-        f"{table.path}: {listed(found)} may {what}; say --time {found[0]}{unit}, or --time {NUMBERED} to number the "
-        "points 0, 1, 2, ..."
+        f"{table.path}: {listed(found)} may {what}; say --time {quote(meant)}{unit}, or --time {NUMBERED} to number "
+        "the points 0, 1, 2, ..."
     )
+
+
+def with_stamps(table: Table, given: str | None) -> tuple[Table, str | None]:
+    """Return the table with one column of dates for two columns of seconds and nanoseconds, and its name."""
+    names = split_names(given) if given is not None and given not in table.names else []
+    if len(names) != 2:
+        return table, given
+    seconds, rest = table.read([*map(table.require, names)], None, None).numbers.T.astype(np.int64)
+    columns = {name: own for name, own in table.columns.items() if name not in names}
+    time = given if "time" in columns else "time"
+    columns[time or ""] = (10**9 * seconds + rest).astype("datetime64[ns]")
+    return Table(table.path, columns, table.place, table.groups, {**table.is_utc, time or "": True}), time
 
 
 def _letters(name: str) -> str:
@@ -195,6 +211,8 @@ def point_columns(
     table: Table, given: list[str], others: list[str | None], space: Space, lonlat: bool, order: str | None
 ) -> PointColumns:
     """Return the given columns of a point, or all other columns; ``order`` is that of a quaternion."""
+    swapped = lonlat and len(given) == 2 and given[0].lower() in _LAT and given[1].lower() in _LON
+    refuse(f"--columns {','.join(given)}: ", (swapped, f"longitude comes first: --columns {','.join(given[::-1])}"))
     groups = [table.expand(name) for name in given] or [_lonlat(table) if lonlat else table.points(others)]
     columns = [column for group in groups for column in group]
     # In a real space A_re and A_im are two numbers if both are named.
@@ -220,12 +238,10 @@ def point_columns(
 def _lonlat(table: Table) -> list[str]:
     """The first column of each pair of names, whatever their case."""
     lower = {name.lower(): name for name in reversed(table.names)}
-    columns = [
-        next(filter(None, map(lower.get, names)), None) for names in (("lon", "lng", "longitude"), ("lat", "latitude"))
-    ]
+    columns = [next(filter(None, map(lower.get, names)), None) for names in (_LON, _LAT)]
     if None in columns:
         raise Problem(
-            f"{table.path}: --lonlat needs columns lon (or lng) and lat, or longitude and latitude, or two --columns; "
+            f"{table.path}: --lonlat needs columns {' or '.join(_LON)}, and {' or '.join(_LAT)}, or two --columns; "
             f"there are {listed(table.names)}"
         )
     return [name for name in columns if name]
@@ -258,7 +274,10 @@ def _check_count(
 ) -> None:
     if len(entries) == (2 if lonlat else len(complex_numbers(space))):
         return
-    advice = "" if given else "; say which with --columns"
+    symmetric = isinstance(space, (SymmetricPositiveDefinite, LogEuclidean))
+    symmetric = symmetric and 2 * len(entries) == space.point_shape[0] * (space.point_shape[0] + 1)
+    advice = "" if given else "; say which with --columns, and --time if one holds the times"
+    advice = "; name both sides of the matrix, such as --columns a,b,b,c for [[a, b], [b, c]]" if symmetric else advice
     known = {"", *table.numeric, *filter(None, others)}
     other = [name for name in table.names if name not in known]
     if other and not given:

@@ -64,7 +64,8 @@ def _columns(path: Source, mark: str, width: int) -> list[list[str]]:
             for i, row in enumerate(chunk):
                 if len(row) != width:
                     where = _place(path, mark, len(columns[0]) + i)
-                    named = f"{len(row)} cells, but the first line names {width} columns"
+                    named = f"{len(row)} cells, but the first line names {width} column{'s' * (width > 1)}"
+                    named += "; remove lines above the names, such as comments" if width == 1 else ""
                     raise Problem(f"{path}, {where}: {named}")
             for column, cells in zip(columns, zip(*chunk, strict=True), strict=True):
                 column += cells
@@ -110,7 +111,7 @@ def _rows(path: Source, mark: str) -> Iterator[tuple[Iterator[list[str]], Any]]:
         try:
             yield filter(None, reader), place
         except UnicodeDecodeError:
-            raise Problem(f"{path} is not text in UTF-8") from None
+            raise Problem(f"{path} is not text in UTF-8; convert it, such as by iconv -f cp1252 -t utf-8") from None
         except csv.Error as error:
             raise Problem(f"{path}, {place()}: {error}") from None
         finally:

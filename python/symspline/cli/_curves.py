@@ -74,6 +74,7 @@ class Curves:
         if names is None:
             return self
         splines: dict[str, CubicSpline] = {}
+        refuse(self.file, (not self.named, " has one curve without a name; omit --curve"))
         for name in names:
             # A curve that was cut at gaps has the segments NAME/1, NAME/2, ...
             found = {key: own for key, own in self.splines.items() if name in (key, key.rpartition("/")[0])}

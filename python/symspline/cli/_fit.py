@@ -66,7 +66,7 @@ from .._smoothing import SmoothingWarning
 from .._smoothing.many import smooth_many
 from .._spaces import Space, space_named
 from . import _summary
-from ._columns import ORDERS, check_days, column_of_names, point_columns, split_names, time_column
+from ._columns import ORDERS, check_days, column_of_names, point_columns, split_names, time_column, with_stamps
 from ._curves import Curves, write_curves
 from ._formats import CURVES, TABLES, endings, format_of, open_table
 from ._messages import VERBOSE, Problem, Progress, listed, refuse, say, tell
@@ -95,6 +95,10 @@ _SIGMA = (
     "known standard deviation of the noise in a coordinate: in the unit of distances, radians for rotations, degrees "
     "with --lonlat; in a product perhaps one per factor with commas"
 )
+_TIME = (
+    "column of times, none for 0, 1, 2, ..., or two columns with a comma, whole seconds and nanoseconds since 1970; "
+    "see above for the default"
+)
 _RATES = (
     "columns of angular velocities in the frame of the body, for so:3, sphere:3, se:3 and products with one of them"
 )
@@ -110,7 +114,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("input", type=Path, metavar="IN", help=f"table to read: {endings()}, or - for standard input")
     add("--from", dest="format", choices=TABLES, help="format of the table (default: as its name ends, CSV for -)")
     add("--space", metavar="S", help="such as sphere:2, so:3, spd:3, cp:1 or 'so:3 x r:3'")
-    add("--time", metavar="COL", help="column of times, or none for 0, 1, 2, ...; see above for the default")
+    add("--time", metavar="COL", help=_TIME)
     add("--unix", choices=UNITS, help="times are numbers that count this unit since 1970-01-01 in UTC")
     add("--columns", metavar="A,B,...", help="columns of a point (default: all other numeric columns)")
     add("--curve", metavar="COL", help="column of names: the rows with one name are one curve")
@@ -147,12 +151,12 @@ def run(options: argparse.Namespace) -> int:
     check_target(options.output, options.input, binary=True)
     smooth = _smoothing_options(options)
     space = _space(options.space, options.lonlat)
-    table = open_table(options.input, options.format)
+    table, options.time = with_stamps(open_table(options.input, options.format), options.time)
     sensors = sensors_of(table, options, space, smooth and smooth["sigma"])
     extra = sensors.names if sensors else []
     curve = table.require(options.curve) if options.curve is not None else None
     given = split_names(options.columns)
-    time = time_column(table, options.time, [curve, *given, *extra])
+    time = time_column(table, options.time, [curve, *given, *extra], options.unix is not None)
     points = point_columns(table, given, [time, curve, *extra], space, options.lonlat, options.quaternion)
     needed = [*points.used, *filter(None, [time, curve])]
     whole, table = table, table.without_empty(needed) if options.skipna and not sensors else table

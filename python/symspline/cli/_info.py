@@ -22,13 +22,15 @@ from pathlib import Path
 import numpy as np
 
 from .._arrays import brief
+from .._files import load
+from .._grid import GridSpline
 from .._smoothing import SmoothingSpline
 from .._spaces import Doubles
 from .._spaces.base import CLASSES, example_of
 from .._time import time_axis_of
 from ._columns import NUMBERED, column_of_names, time_column
 from ._curves import read_curves
-from ._formats import TABLES, endings, format_of, open_table
+from ._formats import CURVES, TABLES, endings, format_of, open_table
 from ._messages import Problem, listed, refuse
 from ._streams import Source
 from ._summary import counted, gaps_in, parameters_of, smoothed
@@ -148,6 +150,12 @@ def _times(rows: Rows, seconds: Doubles) -> str:
 
 
 def _curves(path: Path) -> list[str]:
+    with Source(path, CURVES[0]).open() as file:
+        found = load(file)
+    if isinstance(found, GridSpline):
+        sizes = " x ".join(str(len(axis)) for axis in found.axes)
+        ranges = [f"  axis {k}: {axis[0]} to {axis[-1]}" for k, axis in enumerate(found.axes)]
+        return [f"{path}: a spline through {sizes} points of {found.space}; see symspline grid --help", *ranges]
     curves = read_curves(path)
     count = len(curves.splines)
     space = next(iter(curves.splines.values())).space

@@ -23,6 +23,7 @@ _FOR_PYTHON = {
     ", or raise max_iter": "",
     "such as Sphere(2) or 'sphere:2'": "such as sphere:2",
     "; pass extrapolate=True or 'geodesic' to continue the spline there, or False for NaN": "",
+    "symspline.fit_segments": "--max-gap",
     "fit_segments": "--max-gap",
     "make_smoothing_spline": "--smooth",
 }

@@ -143,7 +143,7 @@ def write_json(file: BinaryIO, columns: Mapping[str, Array], layout: Layout) -> 
 
 def write_geojson(file: BinaryIO, columns: Mapping[str, Array], layout: Layout) -> None:
     """Write a collection of points, one per row and line, whose other columns are properties."""
-    lon, lat = _lonlat(layout, "GeoJSON")
+    lon, lat = _lonlat(columns, layout, "GeoJSON")
     values = _values(columns, layout)
     places = zip(values.pop(lon), values.pop(lat), strict=True)
     features = []
@@ -158,7 +158,9 @@ def write_geojson(file: BinaryIO, columns: Mapping[str, Array], layout: Layout) 
 def write_gpx(file: BinaryIO, columns: Mapping[str, Array], layout: Layout) -> None:
     """Write one track per curve."""
     gpx = _gpxpy().gpx
-    lon, lat = _lonlat(layout, "GPX")
+    lon, lat = _lonlat(columns, layout, "GPX")
+    rates = [name for name in columns if name.endswith(("_d1", "_d2"))]
+    refuse("", (rates, "GPX has positions and no derivatives; write those to a .csv, .npz or .parquet file"))
     dates = columns[layout.time]
     refuse("", (dates.dtype.kind != "M", "GPX files have dates, but the times of these curves are numbers"))
     times = dates.astype("datetime64[us]").tolist()
@@ -174,7 +176,8 @@ def write_gpx(file: BinaryIO, columns: Mapping[str, Array], layout: Layout) -> N
     file.write(whole.to_xml().encode())
 
 
-def _lonlat(layout: Layout, what: str) -> tuple[str, ...]:
+def _lonlat(columns: Mapping[str, Array], layout: Layout, what: str) -> tuple[str, ...]:
     if layout.lonlat is None:
         raise Problem(f"{what} has longitude and latitude: write it for curves on sphere:2, with --lonlat")
+    refuse("", (layout.lonlat[0] not in columns, f"{what} needs the points beside their derivatives: give --nu 0,1"))
     return layout.lonlat

@@ -56,7 +56,7 @@ from .._pose_files import TUM
 from .._smoothing import SmoothingSpline
 from .._spaces import Doubles, space_named
 from .._time import onto_ends
-from ._columns import time_column
+from ._columns import time_column, with_stamps
 from ._curves import Curves, read_curves
 from ._formats import TABLES, endings, format_of, is_binary, open_table, write_table
 from ._messages import Problem, Progress, did_you_mean, first_duplicate, refuse, say, tell
@@ -93,6 +93,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--nu", default="0", metavar="0,1,2", help="points (0, default), velocities (1), accelerations (2)")
     add("--lonlat", action="store_true", help="write longitude and latitude of any curve on sphere:2")
     add("--digits", type=int, metavar="N", help="round the numbers to N significant digits, but not the times")
+    add(
+        "--time",
+        metavar="COL",
+        help="column of times in the table of --at (default: that of the table that was fitted)",
+    )
     add("--from", dest="format", choices=TABLES, help="format of the table of --at (default: as its name ends)")
     add("--to", choices=TABLES, help="format to write (default: as the name of OUT ends, CSV for -)")
     out = f"table to write: {endings()}, or - for standard output; {_EACH} in its name makes one file per curve"
@@ -110,7 +115,7 @@ def run(options: argparse.Namespace) -> int:
     every_curve = read_curves(options.curves, options.lonlat)
     curves = every_curve.chosen(options.curve)
     columns = _tum_columns(curves, orders) if form == "tum" else curves.columns
-    times, rows = _times(options, curves, every_curve)
+    times, rows, labels = _times(options, curves, every_curve)
     samples = _sampled(curves, times, orders, columns, form != "tum", digits)
     if _EACH in options.output.name:
         paths = [
@@ -121,11 +126,11 @@ def run(options: argparse.Namespace) -> int:
         for path in paths:
             check_target(path, *inputs)
         for name, path in zip(samples, paths, strict=True):
-            _write(path, form, {name: times[name]}, samples, None, columns, False)
+            _write(path, form, {name: times[name]}, samples, None, columns, {})
         return 0
     if form == "tum":
         _check_order(curves)
-    _write(options.output, form, times, samples, rows, columns, curves.named and form != "tum")
+    _write(options.output, form, times, samples, rows, columns, labels if curves.named and form != "tum" else {})
     return 0
 
 
@@ -152,19 +157,19 @@ def _write(
     samples: dict[str, Samples],
     rows: NDArray[np.int64] | None,
     columns: Columns,
-    named: bool,
+    labels: Mapping[str, str],
 ) -> None:
-    """Write the table of some curves, in the order of ``rows``."""
+    """Write the table of some curves, in the order of ``rows``, with a column of ``labels`` if there are any."""
     pairs: list[tuple[str, NDArray[Any]]] = [(columns.time, np.concatenate(list(times.values())))]
-    if named:
-        pairs.append((columns.curve, np.repeat(list(times), [len(x) for x in times.values()])))
+    if labels:
+        pairs.append((columns.curve, np.repeat([labels[name] for name in times], [len(x) for x in times.values()])))
     for parts in zip(*(samples[name] for name in times), strict=True):
         pairs.append((parts[0][0], np.concatenate([numbers for _, numbers in parts])))
     twice = first_duplicate([name for name, _ in pairs])
     refuse("", (twice is not None, f"two columns would have the name {twice!r}; rename them"))
     order = slice(None) if rows is None else np.argsort(rows)
     lonlat = tuple(columns.points) if columns.lonlat else None
-    layout = Layout(columns.time, columns.curve if named else None, lonlat, bool(columns.utc))
+    layout = Layout(columns.time, columns.curve if labels else None, lonlat, bool(columns.utc))
     write_table(path, form, {name: column[order] for name, column in pairs}, layout)
     tell(f"{called(path)}: {counted(len(pairs[0][1]), 'row')}")
 
@@ -208,15 +213,16 @@ def _check_order(curves: Curves) -> None:
 
 def _times(
     options: argparse.Namespace, curves: Curves, every_curve: Curves
-) -> tuple[dict[str, Times], NDArray[np.int64] | None]:
-    """Return the times of every curve, and their rows if every row of a table is for one curve."""
+) -> tuple[dict[str, Times], NDArray[np.int64] | None, dict[str, str]]:
+    """Return the times of every curve, their rows if every row of a table is for one curve, and names for the table."""
     if options.at is not None:
-        return _given(open_table(options.at, options.format), curves, every_curve, options.unix)
+        table, given = with_stamps(open_table(options.at, options.format), options.time)
+        return _given(table, given, curves, every_curve, options.unix)
     times = {name: _along(spline.t, options) for name, spline in curves.splines.items()}
     empty = f"no multiple of this step lies between the start and the end of {'any' if curves.named else 'the'} curve"
     none = not any(map(len, times.values()))
     refuse(f"--every {options.every}: ", (none, f"{empty}; use a shorter step, or -n"))
-    return times, None
+    return times, None, {name: name for name in times}
 
 
 def _along(knots: Times, options: argparse.Namespace) -> Times:
@@ -229,11 +235,12 @@ def _along(knots: Times, options: argparse.Namespace) -> Times:
 
 
 def _given(
-    table: Table, curves: Curves, every_curve: Curves, unix: str | None
-) -> tuple[dict[str, Times], NDArray[np.int64] | None]:
+    table: Table, given: str | None, curves: Curves, every_curve: Curves, unix: str | None
+) -> tuple[dict[str, Times], NDArray[np.int64] | None, dict[str, str]]:
     path, usual, label = table.path, curves.columns.time, curves.columns.curve
     only = table.names[0] if len(table.names) == 1 else None
-    time = usual if usual in table.names else only or time_column(table, None, [])
+    usual_or_only = usual if usual in table.names else only
+    time = time_column(table, given, [], unix is not None) if given or not usual_or_only else usual_or_only
     if time is None:
         raise Problem(f"{path} has no column {usual!r} of times; {did_you_mean(usual, table.names)}")
     labelled = every_curve.named and label in table.names
@@ -242,20 +249,24 @@ def _given(
     segments = {name: [name] for name in curves.splines} | recordings
     if labelled:
         known = {*every_curve.splines, *every_curve.recordings}
-        given = {name: own for name, own in group(rows).items() if name in segments or name not in known}
+        asked = {name: own for name, own in group(rows).items() if name in segments or name not in known}
     else:
-        given = dict.fromkeys(recordings, group(rows)[""])
+        asked = dict.fromkeys(recordings, group(rows)[""])
     groups: dict[str, NDArray[np.int64]] = {}
-    for name, own in given.items():
+    labels: dict[str, str] = {}
+    for name, own in asked.items():
         if name not in segments:
             near = did_you_mean(name, list(segments))
             raise Problem(f"{path}, {rows.place(int(own[0]))}: there is no curve {name!r}; {near}")
-        groups |= _by_segment(rows, own, {part: curves.splines[part] for part in segments[name]})
+        parts = _by_segment(rows, own, {part: curves.splines[part] for part in segments[name]})
+        groups |= parts
+        # Segments have the name that the table gives their recording.
+        labels |= {part: name if labelled else part for part in parts}
     for name, own in groups.items():
         _check_times(path, rows, own, curves, name)
     refuse(path, (not any(map(len, groups.values())), " has no times of these curves"))
     order = np.concatenate(list(groups.values())) if labelled or len(recordings) == 1 else None
-    return {name: rows.times[own] for name, own in groups.items()}, order
+    return {name: rows.times[own] for name, own in groups.items()}, order, labels
 
 
 def _by_segment(rows: Rows, own: NDArray[np.int64], splines: Mapping[str, CubicSpline]) -> dict[str, NDArray[np.int64]]:

@@ -219,9 +219,12 @@ class Table:
         columns = [self._numbers(name, name in sparse) for name in names]
         times, utc = self._times(time) if time is not None else (np.empty(0), False)
         if unix is not None:
-            refuse("--unix is for times that are numbers", (time is None, ", and there is no column of times"),
-                   (times.dtype.kind == "M", f"; column {time!r} has dates"))  # fmt: skip
-            times, utc = from_unix(times, unix), True
+            if time is None:
+                raise Problem("--unix is for times that are numbers, and there is no column of times")
+            refuse("--unix is for times that are numbers", (times.dtype.kind == "M", f"; column {time!r} has dates"))
+            column = self.columns[time]
+            cells = column.plain() if isinstance(column, Texts) else None
+            times, utc = from_unix(times, unix, cells, lambda row: f"{self.path}, {self.place(row)}"), True
         labels = self.labels(label) if label is not None else None
         given = [*columns, *([times] if time is not None else []), *([labels] if labels is not None else [])]
         lengths = sorted(set(map(len, given)))

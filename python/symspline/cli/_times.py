@@ -114,14 +114,21 @@ def parse_times(cells: Sequence[str], fail: Fail) -> tuple[Times, bool]:
     return times, zone == UTC_ZONE
 
 
-def from_unix(times: Times, unit: str) -> Times:
-    """Return dates in UTC for numbers that count a unit since 1970."""
+def from_unix(times: Times, unit: str, cells: Sequence[str] | None, place: Callable[[int], str]) -> Times:
+    """Return dates in UTC for numbers that count a unit since 1970; fractions in the text of cells are exact."""
     scale = _NANOSECONDS[unit]
     whole = times if times.dtype.kind in "iu" else np.floor(times)
     limit = np.iinfo(np.int64).max // scale
     far = np.flatnonzero(np.abs(whole) > limit)
-    refuse(f"--unix {unit}: ", (far.size, f"time {times[far[:1]]} is too far from 1970"))
-    fraction = np.rint((times - whole) * scale).astype(np.int64)
+    if far.size:
+        raise Problem(f"{place(int(far[0]))}: --unix {unit}: time {times[far[0]]} is too far from 1970; is it in ns?")
+    if cells is not None and whole is not times:
+        with suppress(InvalidOperation):
+            exact = [int((Decimal(cell) * scale).to_integral_value()) for cell in cells]
+            return np.array(exact, np.int64).astype("datetime64[ns]")
+    # Floating-point numbers have no more digits than their spacing.
+    digits = max(0, int(-np.log10(np.spacing(np.abs(times).max(initial=1.0))))) if whole is not times else 0
+    fraction = np.rint(np.round((times - whole) * 1.0, digits) * scale).astype(np.int64)
     return np.asarray((whole.astype(np.int64) * scale + fraction).astype("datetime64[ns]"))
 
 
