@@ -126,7 +126,7 @@ def from_unix(times: Times, unit: str, cells: Sequence[str] | None, place: Calla
         with suppress(InvalidOperation):
             exact = [int((Decimal(cell) * scale).to_integral_value()) for cell in cells]
             return np.array(exact, np.int64).astype("datetime64[ns]")
-    # Floating-point numbers have no more digits than their spacing.
+    # The accuracy of floating-point numbers is their spacing.
     digits = max(0, int(-np.log10(np.spacing(np.abs(times).max(initial=1.0))))) if whole is not times else 0
     fraction = np.rint(np.round((times - whole) * 1.0, digits) * scale).astype(np.int64)
     return np.asarray((whole.astype(np.int64) * scale + fraction).astype("datetime64[ns]"))
