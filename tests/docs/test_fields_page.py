@@ -25,7 +25,7 @@ def test_the_commands_of_the_guide(tmp_path, monkeypatch, capsys):
     coords = {"lat": names["lat"], "lon": names["lon"]}
     wind = xr.DataArray(names["points"], dims=("lat", "lon", "q"), coords=coords, name="wind")
     wind.chunk(lat=7).to_zarr("wind.zarr", consolidated=False)
-    np.savez("positions.npz", axis0=[0.0, 30.0], axis1=[10.0, 20.0])
+    np.savez("positions.npz", lat=[0.0, 30.0], lon=[10.0, 20.0])
     lines = blocks(PAGE, "sh")[0].splitlines()
     for line in lines:
         code = main(shlex.split(line.removeprefix("symspline ").partition("#")[0]))
