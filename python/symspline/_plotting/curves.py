@@ -422,9 +422,9 @@ class Curve:
         color = self.color_of_dots
         # Many points would hide the curve.
         front = 6 if len(positions) <= MANY else 1.8
-        look = {"color": color, "markersize": size, "markeredgecolor": color, "zorder": front} | look
-        if len(positions) > MANY:
-            look |= {"color": DATA, "markeredgecolor": DATA}
+        look = {"color": color, "markersize": size, "zorder": front} | look
+        look |= {"color": DATA} if len(positions) > MANY else {}
+        look["markeredgecolor"] = look["color"]
         if self.has_nodes and not self.is_mean:
             axes.plot(*positions.T, "o", label=DOTS, **look)
         if self.has_start:

@@ -18,6 +18,7 @@ from .._spaces import Space
 from .curves import DOTS, GAPS, KNOTS, LINE, TICKS, Curve, common_gaps, draw_graph_of, fill_quantiles, interrupted
 from .style import (
     BOTTOM,
+    DATA,
     DISTINCT,
     EDGE,
     GAP,
@@ -217,8 +218,9 @@ def draw_coordinates(
         axes.margins(y=0.1)
         for curve, (line, given) in zip(curves, drawn, strict=True):
             size = float(np.clip(30 / np.sqrt(max(len(given), 1)), 1.2, 3))
-            look: Any = {"color": INK} if curve.noise is None and curve.alone else {}
-            look |= {"markersize": size} | ({"zorder": 1.8} if len(given) > FEW_KNOTS else {})
+            dense = len(given) > FEW_KNOTS
+            look: Any = {"color": DATA if dense else INK} if curve.noise is None and curve.alone else {}
+            look |= {"markersize": size} | ({"zorder": 1.8} if dense else {})
             size_of_band = growth(np.linalg.norm(line, axis=1))
             own = curve.graph(line[:, i] - starts[i])
             draw_graph_of(axes, curve, own, given[:, i] - starts[i], size_of_band, **look)

@@ -31,7 +31,6 @@ from .curves import (
     FAINT,
     GAPS,
     KNOTS,
-    MANY,
     POSES,
     QUANTILES,
     START,
@@ -60,8 +59,8 @@ from .theme import is_dark, kept_color
 _HEAD, _LINE, _RATES_WIDTH, _RATES_HEIGHT = 1.2, 0.2, 5.8, 4.0
 _UNITS = (172_800, 86_400, "d"), (7200, 3600, "h"), (100, 60, "min"), (0, 1, "s")
 """The least number of seconds for which a unit is used, its length in seconds, and its name."""
-_ROW = 1.8
-"""Height of a rate in inches, if there are more than two in a column."""
+_ROW, _LEAST_ROW = 1.8, 1.35
+"""Height of a rate in inches, if there are more than two in a column, and the smallest one beside a picture."""
 
 
 class Page(NamedTuple):
@@ -128,9 +127,10 @@ def draw_page(
     widths = [picture.width] if wide else [picture.width, _RATES_WIDTH]
     rates = any(curve.has_line for curve in curves)
     head = _HEAD + _LINE * _extra_lines(curves, widths[0] if wide or not rates else sum(widths))
-    heights = [head, picture.height]
+    count = max(map(len, columns_of(space, False, FACTORS, wide)))
+    beside = 0.0 if wide or not rates else BOTTOM + TOP + _LEAST_ROW * count
+    heights = [head, max(picture.height, beside)]
     if wide and rates:
-        count = max(map(len, columns_of(space, False, FACTORS, wide)))
         heights.append(_RATES_HEIGHT if count < 3 else BOTTOM + TOP + _ROW * count)
     if below:
         heights.append(residuals.height(below))
@@ -246,8 +246,8 @@ def _explain(figure: Figure, curves: Sequence[Curve], height: float, others: int
     if END in drawn:
         add(Line2D([], [], **dot | {"marker": "s", "color": color}), "end")
     if DOTS in drawn:
-        many = len(few[0].knots) > MANY
-        add(Line2D([], [], color=DATA if many else color, **dot), "given points")
+        dots = (line.get_color() for axes in figure.axes for line in axes.lines if line.get_label() == DOTS)
+        add(Line2D([], [], color=next(dots) if few[0].alone else DATA, **dot), "given points")
     if POSES in drawn:
         add(Line2D([], [], **body | {"markeredgecolor": color, "color": color}), "given poses")
     if BODIES in drawn:
