@@ -238,9 +238,9 @@ def draw_disk(panel: SubFigure, curves: Sequence[Curve]) -> None:
     for curve in curves:
         draw_arrows(axes, curve, flat(curve.points, middle))
         draw_in_plane(axes, curve, partial(flat, middle=middle), rims)
-    text = f"Poincaré disk; geodesics that cross the axes every {spacing:g}"
+    text = "part of the " * bool(half < 1) + f"Poincaré disk; grid of geodesics, {spacing:g} apart on the axes"
     if middle is not _ORIGIN:
-        text += "\nmiddle: " + "(" + ", ".join(f"{x:.4g}" for x in middle) + ")"
+        text += "\ncentred at (" + ", ".join(f"{x:.4g}" for x in middle) + ")"
     note(panel, text)
 
 

@@ -12,7 +12,7 @@ from matplotlib.patches import Circle, Patch, Polygon
 
 from .._lonlat import from_lonlat, to_lonlat
 from .._spaces import Euclidean, Space
-from .style import EDGE, GRID, HALO, INK, PAPER, Array, closest, points
+from .style import EDGE, GRID, HALO, INK, MARK, PAPER, Array, closest, points
 
 SEA = LinearSegmentedColormap.from_list("sea", ["#c3d3de", "#dfe9ef", "#f4f8fa"])
 _CLEAR = 0.12
@@ -95,7 +95,8 @@ def draw_globe(axes: Axes, view: View, spacing: int, half: bool = False) -> None
         front = front[np.isfinite(front[:, 0])]
         arc = np.radians(np.linspace(0, 180, 181))
         outline = Polygon([*zip(np.cos(arc), np.sin(arc), strict=True), *front[front[:, 0].argsort()]])
-        axes.plot(*view.hidden(rim).T, color=EDGE, linewidth=0.8, linestyle=(0, (4, 3)), zorder=2)
+        axes.plot(*view.hidden(rim).T, color=MARK, linewidth=1.2, linestyle=(0, (4, 3)), zorder=2)
+        axes.plot(*view.visible(rim).T, color=MARK, linewidth=1.4, zorder=3.1, label="_rim")
     # The brightness of a ball of radius 1 around the middle.
     x, y = np.meshgrid(np.linspace(-1, 1, 400), np.linspace(-1, 1, 400))
     light = np.sqrt(np.maximum(1 - ((x + 0.25) ** 2 + (y - 0.25) ** 2) / 1.9, 0))

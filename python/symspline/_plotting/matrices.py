@@ -273,7 +273,7 @@ def draw_poses(panel: SubFigure, curves: Sequence[Curve]) -> None:
     bold = sum(len(curve.samples(number)["bold"][0]) for curve in curves)
     count = sum(len(curve.given) for curve in curves)
     name = "bold: given" if bold == count else f"bold: {bold} of {count} given"
-    words = curves[0].legend_of(name, "bold: curve", "light: data")
+    words = curves[0].legend_of(f"{name}; light: curve", "bold: curve", "light: data")
     explain_frames(panel, axes)
     note(panel, f"{words}; {SHADOW}")
 

@@ -36,7 +36,7 @@ _FREE = 60
 """The smallest range of longitudes without curves, in degrees, that becomes the edges of a map."""
 _POLE = 60
 """Neighbouring samples are on both sides of a pole if their longitudes differ by more degrees."""
-_HEIGHT = 42
+_HEIGHT = 60
 """Latitude in degrees from which the hemisphere is seen."""
 _RIM = 1e-9
 """Rounding decides the side of points that are closer to the plane of the rim."""
@@ -143,9 +143,10 @@ def _draw_on_half(what: str, vectors: Callable[[Any], Array], panel: SubFigure, 
     words = (
         "part of the sphere: opposite points"
         if is_part
-        else "opposite points of the rim" + " (equal letters)" * crossed
+        else "opposite points of the red rim" + " (equal letters)" * crossed
     )
-    note(panel, f"{words} are the same {what}" + (";\npoints are normals" if what == "plane" else ""))
+    meaning = "the normal of a plane" if what == "plane" else "the direction of a line"
+    note(panel, f"each point is {meaning};\n{words} are the same {what}")
 
 
 # Points of RP² and Gr(1, 3) are lines. Points of Gr(2, 3) are planes, represented by their normals.
@@ -235,7 +236,7 @@ def _draw_globe(panel: SubFigure, vectors: Array, look: _Globe, above: Array | N
     draw_globe(axes, view, look.spacing, look.half)
     if look.labels:
         seen = vectors if above is None else above
-        high, low, wide = (1.1, -0.85, 1.2) if look.half else (1.22, -1.22, 1.22)
+        high, low, wide = (1.15, -1.05, 1.2) if look.half else (1.22, -1.22, 1.22)
         axes.set(xlim=(-wide, wide), ylim=(low, high))
         label_directions(axes, view, look.labels, view.flat(seen))
     return axes, view, False
