@@ -18,7 +18,8 @@ from mpl_toolkits.mplot3d import proj3d
 
 from .._spaces import Hyperbolic
 from .arrows import draw_arrows
-from .curves import CIRCLE, Curve, disc_indices, draw_in_plane
+from .bands import disc_indices, draw_in_plane
+from .curves import CIRCLE, Curve
 from .globe import centre_of
 from .style import (
     AXES,

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from .._core import ValidationError
 from .._spaces import Space
-from .curves import DOTS, GAPS, KNOTS, LINE, TICKS, Curve, common_gaps, draw_graph_of, fill_quantiles, interrupted
+from .bands import draw_graph_of, fill_quantiles
+from .curves import DOTS, GAPS, KNOTS, LINE, TICKS, Curve, common_gaps, interrupted
 from .style import (
     BOTTOM,
     DATA,

@@ -10,7 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import SubFigure
 
 from .._spaces import Product, Space, SpecialEuclidean, Sphere, Torus, cover_of, factors_of, short_name
-from .curves import LINE, Curve, fill_band, fill_quantiles
+from .bands import fill_band, fill_quantiles
+from .curves import LINE, Curve
 from .graphs import FEW_KNOTS, timelines
 from .style import EDGE, MARK, Array
 

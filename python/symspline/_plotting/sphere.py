@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from .._lonlat import from_lonlat, to_lonlat
 from . import land
 from .arrows import draw_arrows
-from .curves import CIRCLE, Curve, disc_indices, draw_tube, interrupted
+from .bands import disc_indices, draw_tube
+from .curves import CIRCLE, Curve, interrupted
 from .globe import View, degrees, draw_frame, draw_globe, label_directions, middle_of
 from .style import GRID, HALO, INK, MARK, PAPER, SPLINE, Array, inside, note, plain, points, round_below, size, window
 
