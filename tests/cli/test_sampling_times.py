@@ -155,6 +155,11 @@ def test_seconds_and_nanoseconds_in_two_columns(run, fails):
     np.testing.assert_array_equal(ss.load("a.npz").t.astype("datetime64[ns]").astype(np.int64), expected)
     run("sample a.npz --at a.csv --time sec,nsec -o b.csv")
     assert table("b.csv")["time"][2] == "2024-06-01T00:00:01.000000007Z"
+    for sec, nsec in (("1e12", "3"), ("1.5", "3"), ("1", "0.5")):
+        write("c.csv", f"sec,nsec,x\n0,0,0\n{sec},{nsec},1\n")
+        problem = fails("fit c.csv --space r:1 --time sec,nsec -o c.npz")
+        assert problem.startswith("c.csv, line 3: --time sec,nsec: the columns hold ")
+        assert problem.endswith(", which are not whole seconds since 1970 and nanoseconds")
     np.testing.assert_allclose(np.array(table("b.csv")["x"], float), [0, 1, 2], atol=1e-12)
 
 

@@ -39,6 +39,8 @@ _TIME = re.compile(
     "(iso|utc|gmt|unix|local)*(s|ms|us|ns|secs?|seconds?|nsec)?"
 )
 _TIME_PART = re.compile("year|month|day|doy|hours?|minutes?|secs?|seconds?|nsecs?|nanosecs?|jd|mjd")
+# Nanoseconds since 1970 up to this number of seconds fit into 64 bits.
+_FARTHEST = 9e9
 # A day as one number, 20210829, in a column that is called a date, and in any other column.
 _PACKED, _PACKED_NOW = (10_000_101, 99_991_231), (19_000_101, 20_991_231)
 
@@ -84,7 +86,13 @@ def with_stamps(table: Table, given: str | None) -> tuple[Table, str | None]:
     names = split_names(given) if given is not None and given not in table.names else []
     if len(names) != 2:
         return table, given
-    seconds, rest = table.read([*map(table.require, names)], None, None).numbers.T.astype(np.int64)
+    stamps = table.read([*map(table.require, names)], None, None).numbers
+    wrong = np.flatnonzero((stamps != np.floor(stamps)).any(axis=1) | (np.abs(stamps) > _FARTHEST).any(axis=1))
+    if wrong.size:
+        found = " and ".join(f"{value:.17g}" for value in stamps[wrong[0]])
+        what = "which are not whole seconds since 1970 and nanoseconds"
+        raise Problem(f"{table.path}, {table.place(int(wrong[0]))}: --time {given}: the columns hold {found}, {what}")
+    seconds, rest = stamps.T.astype(np.int64)
     columns = {name: own for name, own in table.columns.items() if name not in names}
     time = given if "time" in columns else "time"
     columns[time or ""] = (10**9 * seconds + rest).astype("datetime64[ns]")
