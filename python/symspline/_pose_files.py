@@ -81,8 +81,10 @@ def read_tum(file: Any) -> tuple[Doubles, Array]:
     return rows[:, 0].copy(), join(r, rows[:, 1:4])
 
 
-def tum_rows(file: Any) -> tuple[Doubles, Lines]:
+def tum_rows(file: Any, missing: bool = False) -> tuple[Doubles, Lines]:
     """Return the numbers of a TUM trajectory, shape (n, 8), and the lines that hold them.
+
+    Numbers may be NaN if ``missing`` is True.
 
     Raises
     ------
@@ -92,7 +94,7 @@ def tum_rows(file: Any) -> tuple[Doubles, Lines]:
         If the file cannot be read.
     """
     lines = lines_of(file)
-    return parsed(lines, TUM, f"a line of a TUM trajectory has {len(TUM)}: {' '.join(TUM)}"), lines
+    return parsed(lines, TUM, f"a line of a TUM trajectory has {len(TUM)}: {' '.join(TUM)}", missing=missing), lines
 
 
 def write_tum(file: Any, t: ArrayLike, poses: Any) -> None:
@@ -504,7 +506,14 @@ def lines_of(file: Any, name: str = "file") -> Lines:
     return Lines(_name(file), [number for number, _ in kept], [line for _, line in kept])
 
 
-def parsed(lines: Lines, columns: Sequence[str], form: str, start: int | None = None, dtype: Any = np.float64) -> Any:
+def parsed(
+    lines: Lines,
+    columns: Sequence[str],
+    form: str,
+    start: int | None = None,
+    dtype: Any = np.float64,
+    missing: bool = False,
+) -> Any:
     """Return the numbers in lines, with one column per name.
 
     Parameters
@@ -520,6 +529,8 @@ def parsed(lines: Lines, columns: Sequence[str], form: str, start: int | None = 
         they are separated by spaces and are the only ones.
     dtype : dtype
         Type of the numbers.
+    missing : bool
+        Whether numbers may be NaN.
     """
     if not lines.texts:
         raise ValidationError(f"{lines.file} is empty, it has no numbers; {form}")
@@ -542,7 +553,7 @@ def parsed(lines: Lines, columns: Sequence[str], form: str, start: int | None = 
         raise ValidationError(f"{lines.file}: {form}; {brief(error)}") from None
     if rows.shape[1] != len(columns):
         raise lines.error(0, f"{rows.shape[1]} numbers, but {form}")
-    bad = np.argwhere(~np.isfinite(rows))
+    bad = np.argwhere(np.isinf(rows) if missing else ~np.isfinite(rows))
     if len(bad):
         i, j = bad[0]
         raise lines.error(i, f"column {columns[j]!r} holds {rows[i, j]}, which is not a finite number")

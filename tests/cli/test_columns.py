@@ -106,6 +106,20 @@ def test_columns_of_complex_numbers(run):
     np.testing.assert_array_equal(ss.load("a.npz").points, np.stack([down.real, down.imag], 1))
 
 
+def test_complex_numbers_of_pandas(run, fails):
+    write("a.csv", "t,up,down\n0,(1+0j),0j\n1,(0.6-0j),0.8j\n2,(-6e-01+0j),(-0-0.8j)\n")
+    run("fit a.csv --space cp:1 --columns up,down -o a.npz")
+    run("fit a.csv --space cp:1 -o b.npz")
+    states = np.array([[1, 0], [0.6, 0.8j], [-0.6, -0.8j]])
+    assert ss.load("a.npz") == ss.load("b.npz") == ss.CubicSpline([0, 1, 2], states, "cp:1")
+    write("a.csv", "t,up,down\n0,(1+0j),0j\n1,,0.8j\n2,1,0\n")
+    assert "line 3: column 'up_re' is empty or NaN" in fails("fit a.csv --space cp:1 -o c.npz")
+    write("a.csv", "t,up,down\n0,(1+0j),0j\n1,a,0.8j\n")
+    assert "line 2: column 'up' holds '(1+0j)', which is not a number" in fails(
+        "fit a.csv --space cp:1 --columns up,down -o c.npz"
+    )
+
+
 HALVES = "t,a_re,a_im,b_re,b_im\n0,1,0,0,0\n1,0.6,0,0,0.8\n"
 
 

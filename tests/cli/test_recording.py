@@ -86,6 +86,23 @@ def test_lines_are_those_of_the_file_without_rows_that_are_omitted(fails):
     assert fails("fit a.csv --space r:1 --skipna -o a.npz").startswith("a.csv, line 5: time 1.5 does not come")
 
 
+def test_poses_that_are_not_known_are_omitted_from_a_trajectory(run, fails):
+    write("a.txt", "0 0 0 0 0 0 0 1\n1 1 0 0 nan nan nan nan\n2 2 0 0 0 0 0 1\n3 3 1 0 0 0 0 1\n")
+    problem = fails("fit a.txt --space se:3 -o a.npz")
+    assert problem == "a.txt, line 2: column 'qx' is empty or NaN; symspline fit --skipna omits such rows"
+    assert "; 1 row with empty cells omitted" in run("fit a.txt --space se:3 --skipna -o a.npz")
+    np.testing.assert_array_equal(ss.load("a.npz").t, [0, 2, 3])
+    write("a.txt", "0 0 0 0 0 0 0 1\n1 1 0 0 inf 0 0 0\n")
+    assert "line 2: column 'qx' holds inf" in fails("fit a.txt --space se:3 --skipna -o b.npz")
+
+
+def test_a_line_of_excel_names_the_separator(run):
+    for mark, comma in (";", ","), (",", "."):
+        write("a.csv", "sep=;\r\nt;x\r\n0;1,5\r\n1;2,5\r\n".replace(",", comma).replace(";", mark))
+        run("fit a.csv --space r:1 -o a.npz")
+        assert ss.load("a.npz") == through([0, 1], [1.5, 2.5])
+
+
 def test_numbers_between_semicolons_may_have_commas(run):
     write("a.csv", "t;x\n0,0;1,5\n0,5;2,5\n1,5;3,5\n")
     run("fit a.csv --space r:1 -o a.npz")

@@ -1,5 +1,6 @@
 """Times in tables, and sampling times along a curve."""
 
+import os
 from fractions import Fraction
 
 import numpy as np
@@ -155,6 +156,12 @@ def test_seconds_and_nanoseconds_in_two_columns(run, fails):
     np.testing.assert_array_equal(ss.load("a.npz").t.astype("datetime64[ns]").astype(np.int64), expected)
     run("sample a.npz --at a.csv --time sec,nsec -o b.csv")
     assert table("b.csv")["time"][2] == "2024-06-01T00:00:01.000000007Z"
+    write("c.csv", "sec,nsec,x\n0,0,1\n1,,2\n2,5,3\n")
+    assert "line 3: column 'nsec' is empty; symspline fit --skipna" in fails(
+        "fit c.csv --space r:1 --time sec,nsec -o c.npz"
+    )
+    assert "1 row with empty cells omitted" in run("fit c.csv --space r:1 --time sec,nsec --skipna -o c.npz")
+    os.remove("c.npz")
     for sec, nsec in (("1e12", "3"), ("1.5", "3"), ("1", "0.5")):
         write("c.csv", f"sec,nsec,x\n0,0,0\n{sec},{nsec},1\n")
         problem = fails("fit c.csv --space r:1 --time sec,nsec -o c.npz")

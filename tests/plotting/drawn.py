@@ -53,5 +53,10 @@ def dots_of(axes):
     return [np.where(np.isnan(far), near, far) for far, near in zip(dots[:2], dots[2:], strict=True)]
 
 
+def has_title(figure, kind, space):
+    """Whether the title names the kind of curve and the space, and perhaps what its points are."""
+    return any(text.startswith(kind) and text.endswith((f" on {space!r}", f" on {space}")) for text in texts_of(figure))
+
+
 def texts_of(figure):
     return [text.get_text() for text in figure.findobj(matplotlib.text.Text)]

@@ -6,7 +6,7 @@ import subprocess
 import matplotlib.animation
 import numpy as np
 import pytest
-from drawn import rate_axes, spline_on
+from drawn import points_around, rate_axes, spline_on
 from PIL import Image
 from refused import raises
 from test_figure import KINDS
@@ -33,6 +33,14 @@ def test_every_space_moves(name):
         (line,) = [line for line in axes.lines if line.get_gid() == "_curve"]
         assert cursor.get_xdata()[0] == line.get_xdata()[17]
         assert (dot.get_xdata()[0], dot.get_ydata()[0]) == (line.get_xdata()[17], line.get_ydata()[17])
+
+
+def test_products_with_graphs_move():
+    """Also if a factor has several panels."""
+    space, rng = ss.space("spd:4 x so:3 x se:3"), np.random.default_rng(3)
+    curve = ss.CubicSpline(None, tuple(points_around(own, rng, (6,)) for own in space.factors), space)
+    figure = at_frame(curve, 100)
+    assert len([axes for axes in figure.axes if axes.get_gid() == "time"]) >= 5
 
 
 def test_the_marker_is_on_the_curve():

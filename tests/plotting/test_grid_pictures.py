@@ -5,7 +5,7 @@ from io import BytesIO
 
 import numpy as np
 import pytest
-from drawn import axes_named, rendered, texts_of
+from drawn import axes_named, has_title, rendered, texts_of
 from matplotlib.collections import PolyCollection
 from matplotlib.dates import date2num, num2date
 from matplotlib.figure import Figure
@@ -58,7 +58,7 @@ def nodes_of(figure, label="nodes"):
 def test_every_space_is_drawn(name):
     figure = rendered(grid_on(name).plot())
     assert isinstance(figure, Figure)
-    assert f"C² grid on {ss.space(name)!r}" in texts_of(figure)
+    assert has_title(figure, "C² grid", ss.space(name))
     assert "7 × 5 nodes" in texts_of(figure)
     if name in ("r:3", "se:3"):
         return
@@ -304,7 +304,7 @@ def test_products_have_a_panel_per_factor():
     points = smooth_field("so:3"), smooth_field("r:3"), smooth_field("r:1")
     grid = ss.GridSpline((U, V), points, "so:3 x r:3 x r:1")
     figure = rendered(grid.plot())
-    assert {"so:3", "r:3", "r:1", "C² grid on so:3 x r:3 x r:1"} <= set(texts_of(figure))
+    assert {"so:3, rotations", "r:3", "r:1", "C² grid on so:3 x r:3 x r:1"} <= set(texts_of(figure))
     maps = [axes for axes in figure.axes if axes.get_label() == "field"]
     assert len(maps) == 2
     (image,) = maps[1].images

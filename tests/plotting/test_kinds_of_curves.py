@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from drawn import axes_named, lines_of, points_around, rate_axes, rendered, spline_on, texts_of
+from drawn import axes_named, has_title, lines_of, points_around, rate_axes, rendered, spline_on, texts_of
 from matplotlib.colors import to_hex
 from scipy.spatial.transform import Rotation
 
@@ -32,7 +32,7 @@ CURVES = {
 def test_every_kind_of_curve_is_drawn(kind, name):
     curve = CURVES[kind](name)
     figure = rendered(curve.plot())
-    assert f"{kind} on {curve.space!r}" in texts_of(figure)
+    assert has_title(figure, kind, curve.space)
     for axes, nu in zip([own[0] for own in rate_axes(figure)], (1, 2), strict=True):
         line = np.concatenate(lines_of(axes))
         x = line[::7, 0]

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from drawn import axes_named, lines_of, points_around, rate_axes, rendered, texts_of
+from drawn import axes_named, has_title, lines_of, points_around, rate_axes, rendered, texts_of
 from matplotlib.dates import date2num
 from matplotlib.path import Path
 from test_figure import KINDS
@@ -45,7 +45,7 @@ NAMES += ["rp:3", "ch:2", "spd:4", "u:3"]
 def test_every_space_shows_data(name):
     spline = smooth(name)
     figure = rendered(spline.plot())
-    assert f"Smoothing spline on {spline.space!r}" in texts_of(figure)
+    assert has_title(figure, "Smoothing spline", spline.space)
     speed = rate_axes(figure)[0][0]
     x, y = lines_of(speed)[0].T
     if name.startswith("se"):

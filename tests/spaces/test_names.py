@@ -112,6 +112,8 @@ def test_properties_of_spaces(space):
         (2, r"a space or its name is needed, not 2"),
         *((name, r"the parameters after the colon must be integers")
           for name in ("sphere:-1", "sphere:2.0", "gr:2.0,5", "gr:2;5", "cp:1xso:3", "sphere:٢")),
+        *((name, r"put ' x ' between the factors of a product, as in 'so:3 x r:3'$")
+          for name in ("so:3x r:3", "so:3 × r:3", "so:3*r:3")),
         ("sphere:2,3", r"'sphere:2,3': Sphere does not take 2 parameters"),
         ("gr:2", r"'gr:2': Grassmannian does not take 1 parameters"),
         ("so:2,3", r"'so:2,3': SpecialOrthogonal does not take 2 parameters"),

@@ -166,13 +166,13 @@ def _bodies(picture: SubFigure, curve: Curve) -> Iterator[Update]:
         yield from _body(picture, str(cover_of(space)), curve)
         return
     # The panels of factors follow their captions.
-    panels = [panel for panel in picture.subfigs if panel.axes]
+    panels = [panel for panel in picture.subfigs if panel.axes or panel.subfigs]
     for i, (panel, factor) in enumerate(zip(panels, factors_of(space)[:FACTORS], strict=True)):
         yield from _body(panel, str(cover_of(factor)), curve.part(i))
 
 
 def _body(panel: SubFigure, name: str, curve: Curve) -> Iterator[Update]:
-    axes = panel.axes[0]
+    axes: Any = next(iter(panel.axes), None)
     if name in MATRICES and any(isinstance(own, Quiver) for own in axes.collections):
         yield _frame_at_time(axes, MATRICES[name](curve.points), curve)
     elif name == "se:3":

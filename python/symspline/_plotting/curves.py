@@ -16,9 +16,19 @@ from .._curves.composed import AnyCurve
 from .._curves.controlled import ControlledCurve
 from .._curves.curve import UncertaintyBand
 from .._report import long_gaps
-from .._spaces import Product, Space, short_name
+from .._spaces import Product, Space, cover_of, short_name
 from .style import DATA, DATES, INK, SPLINE, Array, Indices, evenly
 
+_POINTS = {
+    "so:2 so:3": "rotations",
+    "sphere:3": "unit quaternions",
+    "se:2 se:3": "poses",
+    "rp:1 rp:2 gr:1,2 gr:1,3": "lines through the origin",
+    "gr:2,3": "planes through the origin",
+    "cp:1 cgr:1,2": "states of a qubit",
+}
+_POINTS = {name: words for names, words in _POINTS.items() for name in names.split()}
+"""What the points of a space are, for titles."""
 SECOND = np.timedelta64(1, "s")
 _NO_GAPS: Array = np.empty((0, 2))
 # Labels of artists that the legend of a page explains. Those with an underscore are not in legends of matplotlib.
@@ -124,6 +134,8 @@ class Curve:
         Whether it is the mean of a batch, without points.
     has_start : bool
         Whether a marker shows where the curve starts.
+    is_factor : bool
+        Whether it is the curve in one factor of a product space.
     """
 
     data: AnyCurve
@@ -147,6 +159,7 @@ class Curve:
     limits: tuple[tuple[float, float], ...] = ()
     is_mean: bool = False
     has_start: bool = True
+    is_factor: bool = False
 
     def on_earth(self, radius: float | None) -> Curve:
         """Return the curve with a radius of the Earth."""
@@ -335,7 +348,7 @@ class Curve:
         own: dict[str, Any] = {"noise": noise, "segments": segments, "batch": self.batch and self.batch.part(number)}
         reference = None if self.reference is None else self.reference[number]
         own["limits"] = self.limits[number : number + 1]
-        return replace(self, data=self.data.parts[number], reference=reference, **own)
+        return replace(self, is_factor=True, data=self.data.parts[number], reference=reference, **own)
 
     @property
     def unbroken(self) -> tuple[Curve, ...]:
@@ -471,12 +484,17 @@ def common_gaps(curves: Sequence[Curve]) -> Array:
     return found
 
 
+def points_of(space: Space[Any]) -> str:
+    """Return what the points of a space are, or nothing."""
+    return _POINTS.get(str(cover_of(space)), "")
+
+
 def title_on(what: str, space: Space[Any], most: int = 63) -> str:
     """Return the title of a figure. Products and long titles have the short name of the space."""
-    title = f"{what} on {space!r}"
-    if isinstance(space, Product) or len(title) > most:
-        title = f"{what} on {short_name(space)}"
-    return shorten(title, most, placeholder=" …")
+    names = [short_name(space)] if isinstance(space, Product) else [repr(space), short_name(space)]
+    kinds = [f"{what} of {words}" for words in [points_of(space)] if words] + [what]
+    titles = [f"{kind} on {name}" for kind in kinds for name in names]
+    return next((own for own in titles if len(own) <= most), shorten(titles[-1], most, placeholder=" …"))
 
 
 def interrupted(line: Array, after: Any, gaps: Any) -> Array:

@@ -21,7 +21,7 @@ from .._core import ValidationError
 from .._disk import path_of, replacing
 from .._spaces import Space, cover_of, factors_of, short_name
 from . import chart, columns, graphs, matrices, sphere
-from .curves import Curve
+from .curves import Curve, points_of
 from .rates import IN_ROW
 from .shrink import shrink, small_text
 from .style import DPI, INK, font_factor, points
@@ -66,6 +66,7 @@ _DRAWN: list[tuple[str, Callable[[Any, Sequence[Curve]], None], tuple[float, ...
     ("so:2 o:2", graphs.draw_turn, _GRAPH),
     ("sphere:3 so:3 o:3 su:2", matrices.draw_rotations, _ROWS),
     ("u:1", graphs.draw_phase, _GRAPH),
+    ("spd:1", graphs.draw_components, (10.5, 3.8)),
     ("spd:2", matrices.draw_ellipses, _ROWS),
     ("spd:3", matrices.draw_ellipsoids, _ROWS),
     ("se:2", matrices.draw_flat_poses, ()),
@@ -73,6 +74,7 @@ _DRAWN: list[tuple[str, Callable[[Any, Sequence[Curve]], None], tuple[float, ...
 ]
 _PICTURES = {name: Picture(draw, *size) for names, draw, size in _DRAWN for name in names.split()}
 _FAMILIES = dict.fromkeys(("rp", "cp", "hp", "gr", "cgr"), Picture(graphs.draw_principal_angles, 10.5, 3.8))
+_FAMILIES["spd"] = Picture(matrices.draw_covariances, 10.5, 5.2)
 _FAMILIES["stiefel"] = Picture(columns.draw_columns, 10.5, 4.6)
 _FAMILIES["torus"] = Picture(graphs.draw_torus, 10.5, 3.8)
 _FAMILIES["ch"] = Picture(graphs.draw_ratios, 10.5, 3.8)
@@ -210,8 +212,8 @@ def save(figure: Figure, file: Any) -> None:
 
 
 def captions(space: Space[Any]) -> list[str]:
-    """Return the names of the factors of a product, with their numbers if several factors are equal."""
-    names = [short_name(factor) for factor in factors_of(space)]
+    """Return names of the factors of a product, with what their points are, and numbers if several are equal."""
+    names = [", ".join(filter(None, (short_name(own), points_of(own)))) for own in factors_of(space)]
     several = max(Counter(names).values()) > 1
     return [f"factor {i}: {name}" if several else name for i, name in enumerate(names)]
 

@@ -21,12 +21,13 @@ from matplotlib.figure import SubFigure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from .._core import convert_rotations
+from .._core import CutLocusError, convert_rotations
 from .._quaternions import matrices_of_quaternions
 from .._spaces import SpecialOrthogonal, cover_of
 from .chart import SHADOW, box, count_from, explain_frames, frame_handles, origin_of, plane, shadow_colors
 from .curves import BODIES, BODY, BODY_COLOR, POSES, START, Curve
-from .graphs import draw_coordinates
+from .globe import centre_of
+from .graphs import SUBSCRIPTS, component_names, draw_components, draw_coordinates, draw_numbers
 from .rows import REACH, VIEW, Rows
 from .sphere import caps
 from .style import AXES, INK, OWN_AXES, Array, apart, axes_size, legend, note, points, round_below, time_colors, window
@@ -36,12 +37,16 @@ _LENGTH = 0.14
 """Distance in inches from the position of a body in the plane to its tip."""
 _MANY = 24
 """The number of bodies of all curves, or two per curve if that is more."""
+_FRAMES = 16
+"""The number of frames in space, and of lighter ones between them."""
+_LEAST, _BETWEEN = 12.0, 0.6
+"""Arrows are shorter than the time axis by this factor, and those of a curve than those of given points."""
 _FAN = np.radians(30)
 """Bodies that turn on the spot are drawn at angles of this size."""
 _SMALL = np.radians(12)
 """Rotations by less than this are graphs."""
 _LARGE = np.radians(150)
-"""Rotations by less than this are graphs if there are long gaps."""
+"""Rotations by less than this from the first or the middle one are graphs if there are long gaps or other factors."""
 _JUMP = np.radians(170)
 """Rotation vectors are drawn up to this length."""
 _ANGLES = np.linspace(0, 2 * np.pi, 97)
@@ -56,41 +61,63 @@ def draw_rotations(panel: SubFigure, curves: Sequence[Curve]) -> None:
 
     Discs at the tips contain the true direction of an axis with the probability of the band.
     """
-    if are_graphs(curves):
-        _draw_rotation_vectors(panel, [part for curve in curves for part in curve.unbroken])
+    reference = _reference(curves)
+    if reference is not None:
+        _draw_rotation_vectors(panel, [part for curve in curves for part in curve.unbroken], *reference)
         return
     matrices = MATRICES[str(cover_of(curves[0].space))]
     rows = Rows.of(panel, curves)
-    length = min(REACH, 0.48 * rows.height)
+    largest = min(REACH, 0.48 * rows.height, rows.width / _LEAST)
     words = _left_out(rows, curves)
     for i, row in enumerate(rows.rows):
-        times, symbols, radii = rows.symbols(i, length)
+        # Below given points, the curve has smaller frames and more of them.
+        between = row.name == "curve" and row.curve.noise is None and len(rows.rows) > 1
+        length = largest * (_BETWEEN if between else 1)
+        times, symbols, radii = rows.symbols(i, length, between)
         frames = matrices(symbols)
         if radii is not None:
             _draw_discs(rows, i, times, length, frames, radii)
             words = "discs: 95 % bands"
         _draw_arrows(rows.axes, times, -i, length * frames, light=row.name == "data")
     if str(cover_of(curves[0].space)) in ("sphere:3", "su:2"):
-        words = "; ".join(filter(None, (words, "turns are twice the distances")))
+        words = "; ".join(filter(None, (words, "as rotations, angles doubled")))
     _explain(rows.axes, words, rows.width)
     rows.draw_view()
 
 
 def are_graphs(curves: Sequence[Curve]) -> bool:
-    """Whether curves of rotations are drawn as graphs: frames would look equal, or would not show long gaps."""
+    """Whether curves are drawn as graphs of rotation vectors."""
+    return _reference(curves) is not None
+
+
+def _reference(curves: Sequence[Curve]) -> tuple[Array, str] | None:
+    """Return the rotation from which rotation vectors are measured, and its name. None if there are frames.
+
+    Frames would look equal, would not show long gaps, or have no space beside other factors of a product.
+    """
     matrices = MATRICES.get(str(cover_of(curves[0].space)))
     if matrices is None or not all(curve.alone for curve in curves):
-        return False
+        return None
     first = matrices(curves[0].first_point)
     # Points of O(3) have one determinant along a curve.
-    largest = max(ROTATIONS.distance(np.eye(3), first.T @ matrices(curve.extent)).max() for curve in curves)
-    return bool(largest < _SMALL or (largest < _LARGE and any(len(curve.gaps) for curve in curves)))
+    turned = np.concatenate([first.T @ matrices(curve.extent) for curve in curves])
+    largest = ROTATIONS.distance(np.eye(3), turned).max()
+    if largest < _SMALL:
+        return first, "first point"
+    if not any(own.is_factor or len(own.gaps) for own in curves):
+        return None
+    if largest < _LARGE:
+        return first, "first point"
+    try:
+        middle = centre_of(ROTATIONS, turned[:: 1 + len(turned) // 2000])
+    except CutLocusError:
+        return None
+    return (first @ middle, "middle rotation") if ROTATIONS.distance(middle, turned).max() < _LARGE else None
 
 
-def _draw_rotation_vectors(panel: SubFigure, curves: Sequence[Curve]) -> None:
-    """Draw the graphs of the rotation vectors of rotations from the first one."""
+def _draw_rotation_vectors(panel: SubFigure, curves: Sequence[Curve], first: Array, name: str) -> None:
+    """Draw the graphs of the rotation vectors of rotations from a given one."""
     matrices = MATRICES[str(cover_of(curves[0].space))]
-    first = matrices(curves[0].first_point)
 
     def numbers(points: Any) -> Array:
         vectors = _rotation_vectors(matrices(points), first)
@@ -102,7 +129,7 @@ def _draw_rotation_vectors(panel: SubFigure, curves: Sequence[Curve]) -> None:
         return np.asarray(1 / np.sinc(angles / 2 / np.pi))
 
     names = ["about x₁", "about x₂", "about x₃"]
-    draw_coordinates(panel, curves, names, numbers, growth, "rotation vector from the first point, rad")
+    draw_coordinates(panel, curves, names, numbers, growth, f"rotation vector from the {name}, rad")
 
 
 def _rotation_vectors(matrices: Array, first: Array) -> Array:
@@ -241,7 +268,7 @@ def draw_poses(panel: SubFigure, curves: Sequence[Curve]) -> None:
     given = [curve.given[:, :3, 3] - origin for curve in curves]
     everything = np.concatenate([*paths, *given])
     length = 0.16 * window(everything[np.isfinite(everything[:, 0])], 1.0)[1] or 0.2
-    number = max(2, _MANY // len(curves))
+    number = max(2, _FRAMES // len(curves))
     # The box contains the tips of all frames that are drawn.
     tips = [
         (poses[:, :3, 3] - origin + length * poses[:, :3, i])
@@ -260,7 +287,7 @@ def draw_poses(panel: SubFigure, curves: Sequence[Curve]) -> None:
             axes.plot(*sticks.reshape(-1, 3).T, color=color, zorder=5, **look)
 
     for curve, path in zip(curves, paths, strict=True):
-        curve.draw_line(axes, path, linewidth=1.2)
+        curve.draw_line(axes, path, linewidth=2.0 if curve.alone else 1.4)
         for group, (_, poses) in curve.samples(number).items():
             if group != "bold":
                 draw(poses, 0.8 * length, linewidth=0.8, alpha=0.55)
@@ -279,6 +306,32 @@ def draw_poses(panel: SubFigure, curves: Sequence[Curve]) -> None:
 
 
 # ---- positive definite matrices ----
+
+
+def draw_covariances(panel: SubFigure, curves: Sequence[Curve]) -> None:
+    """Draw the standard deviations and correlations of covariance matrices; components of several curves."""
+    if not isinstance(panel, SubFigure) or not (curves[0].alone or len(curves) == 1):
+        draw_components(panel, curves)
+        return
+    n = curves[0].space.point_shape[0]
+    rows, columns = np.triu_indices(n, 1)
+
+    def deviations(_: Any, points: Array) -> Array:
+        return np.sqrt(np.diagonal(points, axis1=1, axis2=2))
+
+    def correlations(_: Any, points: Array) -> Array:
+        roots = deviations(_, points)
+        return np.asarray(points[:, rows, columns] / (roots[:, rows] * roots[:, columns]))
+
+    entries = np.reshape(component_names((n, n), False), (n, n))
+    names = [f"σ{i + 1}".translate(SUBSCRIPTS) for i in range(n)]
+    pairs = [f"ρ{entry[1:]}" for entry in entries[rows, columns].tolist()]
+    panels: Any = panel.subfigures(2, 1, height_ratios=[1, 1.2])
+    upper, lower = panels
+    draw_numbers(upper, curves, "standard\ndeviations", names, deviations)
+    draw_numbers(lower, curves, "correlations", pairs, correlations)
+    (axes,) = upper.axes
+    axes.set_xlabel("")
 
 
 def outlines(matrices: Array) -> Array:

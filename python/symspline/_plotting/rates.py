@@ -24,6 +24,10 @@ IN_ROW = 3
 _ANGULAR = {"so:2", "so:3", "o:2", "o:3", "u:1", "rp:1", "rp:2", "gr:1,2", "gr:1,3", "gr:2,3"}
 _HALVES = {"su:2", "cp:1", "cgr:1,2"}
 """Spaces whose distances are half of the angles that their picture shows."""
+_SLOW = 0.01
+"""Rates that are smaller per second are per hour, day or year."""
+_LONG = (3600, "h"), (86_400, "d"), (31_557_600, "yr")
+"""Longer units of time in seconds, and their names."""
 _LONGEST = 10
 """Number of letters of a space in the label of an axis."""
 At = Callable[[str], Any]
@@ -188,10 +192,24 @@ def draw_rates(panel: SubFigure, curves: Sequence[Curve], most: int, wide: bool)
         columns = [[(None, own) for own in _rates_on_earth(radius, seconds)]]
     panels = panel.subfigures(1, len(columns), squeeze=False)[0]
     for own, group in zip(panels, columns, strict=True):
-        made = timelines(own, curves, [rate.label for _, rate in group])
-        for axes, (number, rate) in zip(made, group, strict=True):
-            parts = curves if number is None else [curve.part(number) for curve in curves]
-            _draw_rate(axes, parts, rate)
+        parts = [curves if number is None else [curve.part(number) for curve in curves] for number, _ in group]
+        rates = [rate for _, rate in group]
+        if seconds and radius is None:
+            rates = [_in_longer_units(*each) for each in zip(rates, parts, strict=True)]
+        made = timelines(own, curves, [rate.label for rate in rates])
+        for each in zip(made, parts, rates, strict=True):
+            _draw_rate(*each)
+
+
+def _in_longer_units(rate: Rate, curves: Sequence[Curve]) -> Rate:
+    """Return a rate per second, or per hour, day or year if it is small."""
+    fastest = max(float(np.max(rate.speed(curve.at))) for curve in curves)
+    if fastest >= _SLOW or fastest * max(curve.x[-1] - curve.x[0] for curve in curves) < 1e-9:
+        return rate
+    length, name = next((unit for unit in _LONG if unit[0] * fastest >= _SLOW), _LONG[-1])
+    factor = length**rate.order
+    label = rate.label.replace("/s", f"/{name}")
+    return rate._replace(label=label, scale=factor * rate.scale, values=lambda at: factor * rate.values(at))
 
 
 def _draw_rate(axes: Axes, curves: Sequence[Curve], rate: Rate) -> None:

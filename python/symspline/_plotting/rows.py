@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from textwrap import wrap
 from typing import Any
 
@@ -54,11 +55,12 @@ class Row:
         """Whether the symbols are given points."""
         return self.name in ("given", "data") or not self.curve.has_line
 
-    def symbols(self, width: float, reach: float) -> tuple[Array, Any, Array | None]:
+    def symbols(self, width: float, reach: float, below: bool = False) -> tuple[Array, Any, Array | None]:
         """Return times on matplotlib's axis, points, and the radii of the band, for symbols that fit into the row.
 
         The time axis has ``width`` inches, and symbols extend by at most ``reach`` inches to the left and right. Given
-        points that are close together are omitted; samples of the curve are equidistant.
+        points that are close together are omitted; samples of the curve are equidistant. If ``below`` is True and all
+        given points have a symbol, the curve has one below each of them, and equidistant ones between.
         """
         curve = self.curve
         if self.has_given:
@@ -67,9 +69,14 @@ class Row:
             return times[kept], curve.given[kept], None
         number = max(2, int(width / (2 * reach)) + 1)
         wanted = np.linspace(curve.x[0], curve.x[-1], number)
+        step = wanted[1] - wanted[0]
+        nodes = curve.x[curve.knots]
+        if below and np.diff(nodes).min(initial=np.inf) > 0.55 * step:
+            inner = [np.linspace(*ends, 1 + max(1, round((ends[1] - ends[0]) / step))) for ends in pairwise(nodes)]
+            wanted = np.unique(np.concatenate(inner))
         even = np.searchsorted(curve.x, wanted)
         # There are no samples in gaps.
-        even = np.unique(even[curve.x[even] - wanted < 0.1 * (wanted[1] - wanted[0])])
+        even = np.unique(even[curve.x[even] - wanted < 0.1 * step])
         # Short segments have a symbol, too.
         bounds = np.searchsorted(curve.x, [[part.x[0], part.x[-1]] for part in curve.unbroken])
         empty = [(first + last) // 2 for first, last in bounds if not ((even >= first) & (even <= last)).any()]
@@ -119,10 +126,10 @@ class Rows:
         axes.spines["left"].set_visible(False)
         return cls(axes, rows, width, high / len(rows))
 
-    def symbols(self, i: int, reach: float) -> tuple[Array, Any, Array | None]:
+    def symbols(self, i: int, reach: float, below: bool = False) -> tuple[Array, Any, Array | None]:
         """Name a row, and return its symbols, which extend by at most ``reach`` inches; see `Row.symbols`."""
         row = self.rows[i]
-        times, symbols, radii = row.symbols(self.width, reach)
+        times, symbols, radii = row.symbols(self.width, reach, below)
         look: Any = {"transform": self.axes.get_yaxis_transform(), "clip_on": False}
         left = -0.9 / self.width
         if self.axes in OWN_AXES:

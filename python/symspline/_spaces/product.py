@@ -366,7 +366,11 @@ def _named(name: str) -> Space[Any]:
         raise ValidationError(f"{short_repr(name)} is a family of spaces; {_whole(CLASSES[names[word]])}")
     values = [part.strip() for part in parameters.split(",")]
     if not all(value.isdecimal() and value.isascii() and len(value) <= _DIGITS for value in values):
-        raise ValidationError(f"{short_repr(name)}: the parameters after the colon must be integers, as in 'sphere:2'")
+        joined = re.search(r"[x×*]", parameters)
+        product = "; put ' x ' between the factors of a product, as in 'so:3 x r:3'" if joined else ""
+        raise ValidationError(
+            f"{short_repr(name)}: the parameters after the colon must be integers, as in 'sphere:2'{product}"
+        )
     cls: Any = CLASSES[names[word]]
     try:
         made: Space = cls(*map(int, values))

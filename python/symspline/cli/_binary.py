@@ -122,7 +122,7 @@ def read_tum(path: Source) -> Table:
         except UnicodeDecodeError:
             raise Problem(f"{path} is not text in UTF-8") from None
     text.name = str(path)
-    rows, lines = tum_rows(text)
+    rows, lines = tum_rows(text, missing=True)
     return Table(path, dict(zip(TUM, rows.T, strict=True)), lines.place)
 
 

@@ -81,11 +81,15 @@ def time_column(table: Table, given: str | None, others: Sequence[str | None], u
     )
 
 
-def with_stamps(table: Table, given: str | None) -> tuple[Table, str | None]:
-    """Return the table with one column of dates for two columns of seconds and nanoseconds, and its name."""
+def with_stamps(table: Table, given: str | None, skipna: bool) -> tuple[Table, str | None]:
+    """Return the table with one column of dates for two columns of seconds and nanoseconds, and its name.
+
+    Rows without one of them are omitted if ``skipna`` is True.
+    """
     names = split_names(given) if given is not None and given not in table.names else []
     if len(names) != 2:
         return table, given
+    table = table.without_empty([*map(table.require, names)]) if skipna else table
     stamps = table.read([*map(table.require, names)], None, None).numbers
     wrong = np.flatnonzero((stamps != np.floor(stamps)).any(axis=1) | (np.abs(stamps) > _FARTHEST).any(axis=1))
     if wrong.size:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
 from itertools import groupby, islice
 from typing import Any, BinaryIO
@@ -15,13 +16,16 @@ import numpy as np
 from .._core import number_lines
 from ._messages import Problem, Progress, first_duplicate, refuse
 from ._streams import Source
-from ._tables import Array, Layout, Table, Texts
+from ._tables import FIRST, IM, RE, Array, Layout, Table, Texts
 from ._times import is_number
 
 # So few rows stay in the processor's cache, which is three times faster than reading all at once.
 _CHUNK = 2000
 # Bytes from which on pyarrow saves more time than its import takes.
 _LARGE = 1_000_000
+_SEPARATOR = ["sep=", ""]
+"""The cells of a line ``sep=;``."""
+_COMPLEX = re.compile(r"\(?[-+]?[\d.e]+([-+]?\d+)?([-+][\d.e]+([-+]\d+)?)?j\)?", re.ASCII)
 _WRITTEN = 50_000
 """Rows that are written between two updates of the progress."""
 
@@ -32,7 +36,8 @@ _WRITTEN = 50_000
 def read_csv(path: Source) -> Table:
     """Read text in UTF-8 with cells separated by commas, semicolons or tabs, and names of columns in the first line.
 
-    Blank lines are skipped. Between semicolons, numbers may have a decimal comma.
+    Blank lines are skipped, and a line ``sep=;`` as well, with which Excel begins. Between semicolons, numbers may have
+    a decimal comma. Complex numbers such as ``(1+2j)``, as pandas writes them, become two columns.
     """
     with path.open() as file:
         first = next(filter(bytes.strip, file), b"")
@@ -52,7 +57,20 @@ def read_csv(path: Source) -> Table:
     )  # fmt: skip
     columns = _columns_at_once(path, mark, len(names), head_lines) or _columns(path, mark, len(names))
     found = {name: Texts(cells, mark == ";") for name, cells in zip(names, columns, strict=True) if name}
-    return Table(path, found, partial(_place, path, mark))
+    return Table(path, _with_parts(found), partial(_place, path, mark))
+
+
+def _with_parts(columns: dict[str, Texts]) -> dict[str, Any]:
+    """Return the columns, with real and imaginary parts in place of complex numbers."""
+    found: dict[str, Any] = {}
+    for name, own in columns.items():
+        first = next(filter(None, own.tolist(FIRST)), "")
+        values = None
+        if _COMPLEX.fullmatch(first):
+            with suppress(ValueError):
+                values = np.array([complex(cell or "nan") for cell in own.tolist()])
+        found |= {name: own} if values is None else {name + RE: values.real, name + IM: values.imag}
+    return found
 
 
 def _columns(path: Source, mark: str, width: int) -> list[list[str]]:
@@ -109,7 +127,7 @@ def _rows(path: Source, mark: str) -> Iterator[tuple[Iterator[list[str]], Any]]:
             return f"line {reader.line_num}"
 
         try:
-            yield filter(None, reader), place
+            yield (row for row in reader if row and row != _SEPARATOR), place
         except UnicodeDecodeError:
             raise Problem(f"{path} is not text in UTF-8; convert it, such as by iconv -f cp1252 -t utf-8") from None
         except csv.Error as error:

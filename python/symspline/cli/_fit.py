@@ -5,11 +5,12 @@ the format. Every row is a point at a time. Times are numbers, or ISO dates such
 2021-08-29T16:55:00.5+02:00, all written in the same way. Dates with Z or an offset are converted to UTC, and rates are
 per second.
 
-The numbers of a point are in columns in the order of its array, and --columns names them in that order: a matrix
-row by row, in a product one factor after the other. A complex number A has the columns A_re and A_im, which --columns
-calls A, or one column A if it is real. Points within 1e-4 of the space are projected onto it. A rotation of so:3 may
-also be a unit quaternion in columns whose names end in w, x, y and z, in any order, and a pose of se:3 or so:3 x r:3
-a position, such as tx, ty, tz, and a quaternion, whose length may differ from 1 by 0.005.
+The numbers of a point are in columns in the order of its array, and --columns names them in that order: a matrix row
+by row, in a product one factor after the other. A complex number A has the columns A_re and A_im, which --columns
+calls A, or one column A, with texts such as (1+2j) in CSV files or if it is real. Points within 1e-4 of the space are
+projected onto it. A rotation of so:3 may also be a unit quaternion in columns whose names end in w, x, y and z, in any
+order, and a pose of se:3 or so:3 x r:3 a position, such as tx, ty, tz, and a quaternion, whose length may differ from
+1 by 0.005.
 
 Without --time, the times are in the column t or time, or, if they are dates, in a column that is called time, date,
 datetime, stamp or timestamp, in the plural or with words such as iso, utc, unix, base, local, ns: ISO_TIME,
@@ -151,7 +152,8 @@ def run(options: argparse.Namespace) -> int:
     check_target(options.output, options.input, binary=True)
     smooth = _smoothing_options(options)
     space = _space(options.space, options.lonlat)
-    table, options.time = with_stamps(open_table(options.input, options.format), options.time)
+    whole = open_table(options.input, options.format)
+    table, options.time = with_stamps(whole, options.time, options.skipna)
     sensors = sensors_of(table, options, space, smooth and smooth["sigma"])
     extra = sensors.names if sensors else []
     curve = table.require(options.curve) if options.curve is not None else None
@@ -159,7 +161,7 @@ def run(options: argparse.Namespace) -> int:
     time = time_column(table, options.time, [curve, *given, *extra], options.unix is not None)
     points = point_columns(table, given, [time, curve, *extra], space, options.lonlat, options.quaternion)
     needed = [*points.used, *filter(None, [time, curve])]
-    whole, table = table, table.without_empty(needed) if options.skipna and not sensors else table
+    table = table.without_empty(needed) if options.skipna and not sensors else table
     rows = table.read([*points.used, *extra], time, curve, [*points.used, *extra] if sensors else [], options.unix)
     check_days(table, time, rows)
     at = "times 0, 1, 2, ..." if time is None else f"times in column {time}"

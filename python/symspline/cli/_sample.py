@@ -216,7 +216,7 @@ def _times(
 ) -> tuple[dict[str, Times], NDArray[np.int64] | None, dict[str, str]]:
     """Return the times of every curve, their rows if every row of a table is for one curve, and names for the table."""
     if options.at is not None:
-        table, given = with_stamps(open_table(options.at, options.format), options.time)
+        table, given = with_stamps(open_table(options.at, options.format), options.time, False)
         return _given(table, given, curves, every_curve, options.unix)
     times = {name: _along(spline.t, options) for name, spline in curves.splines.items()}
     empty = f"no multiple of this step lies between the start and the end of {'any' if curves.named else 'the'} curve"
