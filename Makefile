@@ -5,6 +5,10 @@ BIN := .venv/$(if $(filter Windows_NT,$(OS)),Scripts,bin)
 RUST := $(shell find crates -name '*.rs' -o -name Cargo.toml) Cargo.toml .cargo/config.toml
 # Wheels of all these packages exist for the usual platforms; nothing but symspline is compiled.
 INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
+# Prints the libraries that symspline and some of its extras need.
+REQUIREMENTS = $(BIN)/python -c 'import sys, tomllib; \
+	project = tomllib.load(open("pyproject.toml", "rb"))["project"]; extras = project["optional-dependencies"]; \
+	print(*project["dependencies"], *(own for name in sys.argv[1:] for own in extras[name]), sep="\n")'
 
 # Python keeps compiled modules, even where the environment forbids it. Otherwise every process compiles its imports anew,
 # which takes three times as long.
@@ -16,22 +20,22 @@ unexport MAKEFLAGS MFLAGS
 	sdist test-wheel crate crate-msrv crate-semver publish-wheels publish-crates publish-npm check-tools clean \
 	docs-check wasm test-wasm
 
-demo: .venv/built
+demo: .venv/built .venv/plot
 	$(BIN)/python examples/storms/demo.py --out demo-output
 
 # Format, lints, spelling, types, docstrings, and the laws of every space in Rust: what to run before a commit.
-check: check-rust check-types check-python
+check: check-types check-rust check-python
 
-# With --release, the crates that were compiled for the module are used again.
-check-rust: .venv/tools
+# With --release, the crates that were compiled for the module are used again. Clippy need not wait for them.
+check-rust: | check-tools
 	cargo fmt --all --check
-	cargo clippy --quiet --release --all-targets -- -D warnings
+	cargo clippy --quiet --release --all-targets --target-dir target/clippy -- -D warnings
 	cargo test --quiet --release --workspace --exclude symspline-benches
 
 check-types: .venv/tools
 	$(BIN)/mypy
 
-check-python: .venv/tools
+check-python: .venv/built .venv/tools
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/codespell *.md Makefile benchmarks crates docs examples packaging python tests
@@ -43,17 +47,17 @@ test: check
 
 # Compares with evo and geomstats, which runs with no NumPy of today, and so in an environment of its own, beside the
 # compiled module of .venv, which every Python from 3.11 on can load. Needs .5 GB; not part of `test`.
-test-oracles: .venv-oracles/built
+test-oracles: .venv/built .venv-oracles/built
 	.venv-oracles/bin/python -m pytest tests/oracles -o pythonpath='python tests' \
 		-W 'ignore:BackendImporter:ImportWarning'
 
-.venv-oracles/built: tests/oracles/requirements.txt | .venv/tools
+.venv-oracles/built: tests/oracles/requirements.txt | .venv/maturin
 	test -x .venv-oracles/bin/python || $(BIN)/python -m venv .venv-oracles
 	.venv-oracles/bin/python -m pip install --quiet --disable-pip-version-check --no-compile -r $<
 	touch $@
 
 # The adapter for PyTorch, which needs up to 5 GB and is no part of `test`.
-test-torch: .venv/tools
+test-torch: .venv/built .venv/tools
 	$(INSTALL) 'torch>=2'
 	$(BIN)/python -m pytest tests/pytorch tests/docs/test_array_api_table.py -o pythonpath='. tests docs'
 
@@ -68,17 +72,16 @@ test-aarch64:
 		--lib --tests --target aarch64-unknown-linux-musl
 
 # About ten minutes of random input on two cores; what fails is kept in .hypothesis and tried first the next time.
-fuzz: .venv/tools
+fuzz: .venv/built .venv/tools
 	$(BIN)/python -m pytest --numprocesses auto tests/fuzz --hypothesis-profile=long
 
 # Some minutes; the machine should have nothing else to do.
-bench: .venv/tools
+bench: .venv/built .venv/tools
 	$(BIN)/python -m benchmarks
 
 # The site, in build/docs: its gallery is run, and what is wrong with a page or a link to another one is an error.
-docs: .venv/tools
-	$(INSTALL) $$($(BIN)/python -c 'import tomllib; \
-		print(*tomllib.load(open("pyproject.toml", "rb"))["project"]["optional-dependencies"]["docs"])')
+docs: .venv/built .venv/tools
+	$(INSTALL) $$($(REQUIREMENTS) docs)
 	SYMSPLINE_NUM_THREADS=1 $(BIN)/python -m sphinx -j auto -W --keep-going -q -b html -d build/doctrees docs build/docs
 	$(BIN)/python docs/links.py build/docs
 
@@ -156,7 +159,7 @@ build/node/built: packaging/npm/package.json
 
 # The npm package against the Python package, and the page in Chromium (CHROMIUM=/path/to/it), for which `make wasm`
 # comes first. `make test` contains these tests, and skips them where nothing was built.
-test-wasm: .venv/tools
+test-wasm: .venv/built .venv/tools
 	cd crates/symspline-wasm && cargo fmt --check && cargo clippy --quiet --target-dir $(CURDIR)/target/wasm -- -D warnings
 	$(BIN)/python -m pytest tests/javascript -rs
 
@@ -165,17 +168,21 @@ test-wasm: .venv/tools
 	$(INSTALL) 'maturin>=1.9,<2'
 	touch $@
 
-# The compiled module, and what the demonstration needs.
-.venv/built: pyproject.toml $(RUST) | check-tools
-	test -x $(BIN)/python || $(PYTHON) -m venv .venv
-	$(INSTALL) --editable '.[plot]'
+# The compiled module alone: it takes one core for minutes, and the other libraries can be installed meanwhile.
+.venv/built: pyproject.toml $(RUST) | .venv/maturin
+	$(INSTALL) --no-deps --editable .
+	touch $@
+
+# What the demonstration needs besides.
+.venv/plot: pyproject.toml | .venv/maturin
+	$(REQUIREMENTS) plot > .venv/plot.txt
+	$(INSTALL) -r .venv/plot.txt
 	touch $@
 
 # What tests and benchmarks need besides: 1.6 GB with JAX and Pyright.
-.venv/tools: .venv/built
-	$(BIN)/python -c 'import tomllib; extras = tomllib.load(open("pyproject.toml", "rb"))["project"]["optional-dependencies"]; \
-		print(*extras["bench"], *extras["test"], sep="\n")' > .venv/requirements.txt
-	$(INSTALL) -r .venv/requirements.txt
+.venv/tools: pyproject.toml | .venv/maturin
+	$(REQUIREMENTS) bench test > .venv/tools.txt
+	$(INSTALL) -r .venv/tools.txt
 	touch $@
 
 check-tools:

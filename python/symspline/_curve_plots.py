@@ -117,14 +117,16 @@ class CurvePlots(CurveBase[P]):
         Without `ax`, a figure with several panels is created. The first panel depends on the space:
 
         - S²: a globe and a map, or an enlarged part; H²: the Poincaré disk; R¹, R² and R³: the graph or the curve.
-        - SO(3), O(3), SU(2) and S³ (unit quaternions, scalar first): rotated frames along the time axis.
+        - SO(3), O(3), SU(2) and S³ (unit quaternions, scalar first): rotated frames along the time axis. Graphs of the
+          rotation vectors, if rotations are small, have long gaps, or are a factor of a product.
         - S¹, SO(2), O(2), U(1), RP¹ and Gr(1, 2): the continuous angle against time.
         - SE(3): frames along the path of the positions; SE(2): arrow heads on it.
         - CP¹ and the complex Gr(1, 2): the Bloch sphere.
         - RP², Gr(1, 3) and Gr(2, 3): a hemisphere, with the normals of planes. A curve that leaves it through the rim
           re-enters on the opposite side.
         - Other projective spaces and Grassmannians: the principal angles to the first point.
-        - SPD(2) and SPD(3): ellipses and ellipsoids along the time axis.
+        - SPD(2) and SPD(3): ellipses and ellipsoids along the time axis; larger SPD(n), as covariance matrices: their
+          standard deviations and correlations.
         - Tori: the angles in degrees; lines break where an angle passes 180 degrees.
         - Stiefel manifolds: the components of each column against time.
         - All other spaces: the components against time, with dashed imaginary parts. If there are more than twelve,
@@ -133,7 +135,8 @@ class CurvePlots(CurveBase[P]):
         A product has one such panel per factor. The other panels show the speed |γ'| and the size |∇γ'| of the
         covariant acceleration, with one panel per factor of a product. In one dimension both have a sign. For poses,
         rates of rotation and of translation have separate panels, because their units differ. Dashed lines show the
-        limits of a curve that was retimed by a law of `time_law`.
+        limits of a curve that was retimed by a law of `time_law`. Rates that are small per second are per hour, day or
+        year.
 
         Parameters
         ----------
@@ -145,7 +148,7 @@ class CurvePlots(CurveBase[P]):
             are on the time axis.
         color : color, optional
             Colour of the curve, in any form that Matplotlib accepts. By default, the next colour of the property cycle
-            of `ax`, or a dark blue.
+            of `ax`, or a dark blue. On a page, components of a point have colours of their own.
         label : str, optional
             Name of the curve in legends.
         title : str, optional

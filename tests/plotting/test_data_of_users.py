@@ -299,7 +299,7 @@ def test_a_body_that_turns_on_the_spot_is_drawn_at_several_angles():
 @pytest.mark.parametrize("name", ["sphere:3", "su:2", "cp:1"])
 def test_angles_that_are_twice_the_distances_are_explained(name):
     figure = rendered(spline_on(name).plot())
-    assert any(text.endswith(("twice the distances of states", "angles doubled")) for text in texts_of(figure))
+    assert any(text.endswith(("twice the distances of states", "frames turn at 2|γ′|")) for text in texts_of(figure))
     assert rate_axes(figure)[0][0].get_ylabel() == "speed\n|γ′|, rad/t"
 
 

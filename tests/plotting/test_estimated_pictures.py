@@ -39,6 +39,14 @@ def attitudes(outlier=0.0, **options):
     return ss.estimate(given, 20, "so:3", penalty="jerk", **options)
 
 
+def attitudes_of(rotation):
+    """A curve of rotations and of their rates."""
+    turns = rotation(T)
+    given = measure.Points(T, SO3.exp(turns, 0.03 * SO3.random_tangent(np.random.default_rng(4), turns)), sigma=0.03)
+    slow = measure.BodyRates(S, np.tile([0.3, 0.6, 0.3], (len(S), 1)) + 0.02 * noise(len(S), 3), sigma=0.02)
+    return ss.estimate([given, slow], 20, "so:3")
+
+
 def dots(axes):
     found = [line.get_xydata() for line in axes.lines if line.get_marker() == "o"]
     return np.concatenate(found)
@@ -55,11 +63,13 @@ def test_residuals_and_band_of_rotations():
     np.testing.assert_allclose(dots(panel), np.column_stack([np.tile(S, 3), residuals.T.ravel()]))
     share = 100 * np.mean(np.abs(residuals) > 1.96)
     assert f"{share:.1f} % beyond ±1.96 (5 % expected)" in texts_of(figure)
-    # Frames along the time axis do not show the band.
-    band = axes_named(figure, "95 % band")
+    # Graphs of rotation vectors show the band, and frames along the time axis do not.
+    assert not any("95 %" in axes.get_ylabel() for axes in figure.axes)
+    far = attitudes_of(lambda t: ss.rotations.from_rotation_vectors(np.multiply.outer(t, [0.3, 0.6, 0.3])))
+    band = axes_named(rendered(far.plot()), "95 % band")
     assert band.get_ylabel() == "95 % band\nof so:3, rad"
     x, y = band.lines[0].get_data()
-    np.testing.assert_allclose(y, curve.band(x))
+    np.testing.assert_allclose(y, far.band(x))
     assert [own.get_label() for own in axes_named(figure, "speed").collections if own.get_label() == "band"]
 
 
@@ -141,9 +151,8 @@ def test_poses_have_a_band_per_part_and_residuals_per_measurement():
 def test_curves_from_files_have_bands_and_no_data(tmp_path):
     attitudes().save(tmp_path / "a.npz")
     figure = rendered(ss.load(tmp_path / "a.npz").plot())
-    assert "curve" in texts_of(figure) and "data" not in texts_of(figure)
-    labels = [axes.get_ylabel() for axes in figure.axes]
-    assert "95 % band\nof so:3, rad" in labels and not any("residual" in label for label in labels)
+    assert len(dots(figure.axes[0])) == 0 and axes_named(figure, "about x₁").collections
+    assert not any("residual" in axes.get_ylabel() for axes in figure.axes)
     plane = ss.estimate(
         [measure.Points(T, path(T), sigma=0.1), measure.Velocities(T, path(T), path(T, 1), sigma=0.1)], 8, "r:2"
     )

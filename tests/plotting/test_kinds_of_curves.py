@@ -7,6 +7,8 @@ from matplotlib.colors import to_hex
 from scipy.spatial.transform import Rotation
 
 import symspline as ss
+from symspline._plotting.collect import curves_of
+from symspline._plotting.curves import Axis
 
 NAMES = ["euclidean:1", "euclidean:2", "sphere:2", "so:3", "spd:2", "gr:2,5", "cp:1", "rp:2", "hyperbolic:2"]
 T = np.array([0.0, 1.1, 1.9, 3.2, 4.0, 5.3])
@@ -281,12 +283,12 @@ def test_batches_close_to_their_mean_show_it(name):
         texts_of(figure)
     )
     assert "given points" not in texts_of(figure) and "curve 0" not in texts_of(figure)
-    speed = axes_named(figure, "speed")
-    (line,) = lines_of(speed)
-    x = line[100:-100:50, 0]
-    step = 1e-4
-    means = [space.mean(np.moveaxis(batch(x + shift), 0, 1)) for shift in (-step, step)]
-    np.testing.assert_allclose(line[100:-100:50, 1], space.distance(*means) / (2 * step), rtol=2e-3, atol=1e-4)
+    (line,) = [line.get_xydata() for line in axes_named(figure, "speed").lines if line.get_label() == "_median"]
+    np.testing.assert_allclose(line[:, 1], np.median(batch.speed(line[:, 0]), axis=0), atol=1e-9)
+    mean = curves_of(batch, Axis())[0][0]
+    x = mean.x[100:-100:50]
+    means = space.mean(np.moveaxis(batch(x), 0, 1))
+    assert space.distance(mean.points[100:-100:50], means).max() < 1e-4
     if name in ("r:2", "r:3"):
         drawn = next(line for line in figure.axes[0].lines if line.get_label() == "mean curve")
         drawn = np.stack(drawn.get_data_3d() if name == "r:3" else drawn.get_data(), axis=1)
@@ -296,6 +298,21 @@ def test_batches_close_to_their_mean_show_it(name):
     around = np.broadcast_to(centres, points.shape)
     apart = space.exp(around, 0.05 * space.random_tangent(rng, around))
     assert {"curve 0", "other curves"} <= set(texts_of(ss.CubicSpline(None, apart, space).plot()))
+
+
+@pytest.mark.parametrize("name", ["r:1", "so:3", "spd:2", "torus:2", "spd:4", "stiefel:2,4"])
+def test_batches_close_to_their_mean_show_it_with_two_curves(name):
+    space, rng = ss.space(name), np.random.default_rng(8)
+    path = points_around(space, rng, (7,))
+    points = np.broadcast_to(path, (12, *path.shape))
+    batch = ss.CubicSpline(None, space.exp(points, 0.02 * space.random_tangent(rng, points)), space)
+    figure = rendered(batch.plot())
+    texts = texts_of(figure)
+    assert {"mean curve", "curve 0", "curve 11", "median of rates", "5–95 % of 12 curves"} <= set(texts)
+    assert "start" not in texts and "2 of 12 curves, 7 points each, natural ends" in texts
+    if name == "r:1":
+        drawn = next(line for line in figure.axes[0].lines if line.get_label() == "mean curve")
+        np.testing.assert_allclose(drawn.get_ydata(), batch(drawn.get_xdata()).mean(axis=0)[:, 0], atol=1e-9)
 
 
 @pytest.mark.parametrize("name", ["r:2", "se:2"])

@@ -5,6 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from drawn import axes_named, lines_of, rendered, spline_on, texts_of
+from matplotlib import style
 from matplotlib.collections import PolyCollection
 from matplotlib.dates import date2num
 from matplotlib.figure import Figure
@@ -33,11 +34,11 @@ def test_given_frames_and_the_curve_have_a_row_each(name):
     given, curve = (q for q in figure.axes[0].collections if hasattr(q, "U"))
     np.testing.assert_allclose(VIEW @ VIEW.T, np.eye(3), atol=1e-3)
     times = np.unique(np.round(curve.X, 2))
-    # Below every given frame is a smaller one, and between them are equidistant ones.
+    # Below every given frame is the same one, and between them are equidistant ones.
     assert set(spline.t) <= set(times) and len(times) > 8
     for ends in pairwise(spline.t):
         np.testing.assert_allclose(np.diff(times[(times >= ends[0]) & (times <= ends[1])], 2), 0, atol=0.02)
-    for row, (arrows, times, size) in enumerate(((given, spline.t, REACH), (curve, curve.X[::3], 0.6 * REACH))):
+    for row, (arrows, times, size) in enumerate(((given, spline.t, 0.38), (curve, curve.X[::3], 0.38))):
         np.testing.assert_allclose(arrows.X, np.repeat(times, 3), atol=4 / 1000)
         assert set(arrows.Y) == {-row}
         right_up = np.sort(np.hypot(arrows.U, arrows.V).reshape(-1, 3))
@@ -67,13 +68,14 @@ def test_discs_have_the_radius_of_the_band():
     """Turns by the radius of the band, about axes at right angles to an arrow, move its tip to the rim of its disc."""
     t, rng = np.linspace(0, 10, 40), np.random.default_rng(1)
     space = ss.space("so:3")
-    points = ss.rotations.from_rotation_vectors(np.multiply.outer(np.sin(t), [0.3, 0.6, 0.3]))
-    spline = ss.make_smoothing_spline(t, space.exp(points, 0.1 * space.random_tangent(rng, points)), space)
+    points = ss.rotations.from_rotation_vectors(np.multiply.outer(t, [0.3, 0.6, 0.3]))
+    noisy = space.exp(points, 0.1 * space.random_tangent(rng, points))
+    spline = ss.make_smoothing_spline(t, noisy, space, lam=1e-2)
     axes = rendered(spline.plot()).axes[0]
     discs = [c for c in axes.collections if c.get_label() == "band"]
     assert len(discs) == 3
     at = discs[0].get_offsets()[4, 0]
-    turn = np.linspace(0, 2 * np.pi, 1000)[:, None]
+    turn = np.linspace(0, 2 * np.pi, 2000)[:, None]
     for i, found in enumerate(discs):
         frame = np.roll(spline(at), -i, axis=1)
         about = np.cos(turn) * frame[:, 1] + np.sin(turn) * frame[:, 2]
@@ -232,15 +234,23 @@ def test_covariances_are_standard_deviations_and_correlations():
     figure = rendered(spline.plot())
     upper, lower = axes_named(figure, "standard"), axes_named(figure, "correlations")
     assert [text.get_text() for text in upper.get_legend().texts] == ["σ₁", "σ₂", "σ₃", "σ₄"]
-    assert {text.get_text() for text in lower.get_legend().texts} == {"ρ₁₂", "ρ₁₃", "ρ₁₄", "ρ₂₃", "ρ₂₄", "ρ₃₄"}
+    assert [text.get_text() for text in lower.get_yticklabels()] == ["ρ₁₂", "ρ₁₃", "ρ₁₄", "ρ₂₃", "ρ₂₄", "ρ₃₄"]
     line = lines_of(upper)[2]
     matrices = spline(line[:, 0])
     np.testing.assert_allclose(line[:, 1], np.sqrt(matrices[:, 2, 2]), atol=1e-12)
-    named = [line for line in lower.lines if line.get_gid() == "_curve"]
-    assert len(named) == 6
-    for line, (i, j) in zip(named, [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)], strict=True):
+    rows = [own for own in lower.collections if hasattr(own, "get_coordinates")]
+    assert len(rows) == 6 and lower.get_ylim() == (6, 0)
+    for k, (row, (i, j)) in enumerate(zip(rows, [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)], strict=True)):
         expected = matrices[:, i, j] / np.sqrt(matrices[:, i, i] * matrices[:, j, j])
-        np.testing.assert_allclose(line.get_ydata(), expected, atol=1e-12)
+        np.testing.assert_allclose(np.reshape(row.get_array(), (2, -1)), [expected, expected], atol=1e-12)
+        at = row.get_coordinates()
+        np.testing.assert_allclose(at[0, :, 0], line[:, 0])
+        assert k < at[..., 1].min() < at[..., 1].max() < k + 1
+    # Many correlations have fewer names, and no colours are inverted.
+    with style.context("dark_background"):
+        many = axes_named(rendered(spline_on("spd:9", (4,)).plot()), "correlations")
+    assert len(many.get_yticklabels()) == 12 and len(many.collections) == 36
+    assert many.collections[0].get_cmap().name == "RdBu_r"
 
 
 def test_slow_rates_have_longer_units():

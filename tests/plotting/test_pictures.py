@@ -133,7 +133,7 @@ def test_poincare_disk():
 def test_disk_moves_to_a_curve_that_is_far_away():
     far = [[np.sqrt(1 + x * x + y * y), x, y] for x, y in ((50, 20), (52, 22), (50, 25))]
     figure = rendered(ss.CubicSpline(None, far, "h:2").plot())
-    assert any("centred at (" in text for text in texts_of(figure))
+    assert any("centred at the point (" in text for text in texts_of(figure))
     assert np.abs(lines_of(figure.axes[0])[0]).max() < 0.7
 
 

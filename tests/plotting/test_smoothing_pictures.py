@@ -200,7 +200,9 @@ def test_dates_and_repeated_times():
 
 
 def test_data_of_frames_stand_beside_the_curve():
-    spline = smooth("so:3")
+    far = ss.rotations.from_rotation_vectors(np.multiply.outer(T, [0.2, 0.7, 0.1]))
+    space, rng = ss.space("so:3"), np.random.default_rng(1)
+    spline = ss.make_smoothing_spline(T, space.exp(far, 0.05 * space.random_tangent(rng, far)), space, lam=1e-3)
     figure = rendered(spline.plot())
     light, bold = (c for c in figure.axes[0].collections if hasattr(c, "U"))
     assert light.width < bold.width and set(light.X) <= set(T) and set(light.Y) == {0} and set(bold.Y) == {-1}

@@ -14,12 +14,18 @@ _HEAD = np.array([[0.09, 0.0], [-0.06, 0.065], [-0.025, 0.0], [-0.06, -0.065]])
 """Corners in inches."""
 _SHARES, _FEW_SHARES = (0.2, 0.5, 0.8), (0.3, 0.7)
 """Parts of the length at which a single curve has arrow heads, and at which several curves have them."""
+_NEAR = np.linspace(-0.1, 0.1, 21)
+"""How far they are moved away from given points."""
 
 
-def draw_arrows(axes: Axes, curve: Curve, positions: Array) -> None:
-    """Draw arrow heads on a line through positions of shape (m, 2), which may be broken by NaN, in equal scales."""
+def draw_arrows(axes: Axes, curve: Curve, positions: Array, dots: Array) -> None:
+    """Draw arrow heads on a line through positions of shape (m, 2), which may be broken by NaN, and mark its end.
+
+    The scales of both axes are equal. Arrow heads are far from ``dots``, the positions of given points.
+    """
     if curve.faint or not curve.has_line:
         return
+    curve.draw_end(axes, positions[-1:])
     steps = np.diff(positions, axis=0)
     lengths = np.linalg.norm(np.nan_to_num(steps), axis=1)
     total = np.cumsum(lengths)
@@ -27,7 +33,14 @@ def draw_arrows(axes: Axes, curve: Curve, positions: Array) -> None:
     moved = curve.at("speed").max() * (curve.x[-1] - curve.x[0])
     if moved <= 1e-12 * np.abs(curve.points).max() or not total[-1] > 0:
         return
-    at = np.searchsorted(total, np.multiply(_SHARES if curve.alone else _FEW_SHARES, total[-1]))
+    wanted = np.add.outer(_SHARES if curve.alone else _FEW_SHARES, _NEAR)
+    near = np.searchsorted(total, wanted * total[-1])
+    if curve.noise is None and np.isfinite(dots).any():
+        dots = dots[np.isfinite(dots[:, 0])]
+        free = np.linalg.norm(positions[near][..., None, :] - dots, axis=-1).min(axis=-1)
+        at = near[np.arange(len(near)), np.nan_to_num(free).argmax(axis=1)]
+    else:
+        at = near[:, len(_NEAR) // 2]
     (x, y), middles = (steps[at] / lengths[at, None]).T, (positions[at] + positions[at + 1]) / 2
     turns = np.stack([np.stack([x, y], axis=-1), np.stack([-y, x], axis=-1)], axis=1)
     look = {"offsets": middles, "offset_transform": axes.transData, "clip_on": False, "zorder": 4.5}

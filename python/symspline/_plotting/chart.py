@@ -48,7 +48,7 @@ _PLANE = Hyperbolic(2)
 _ZERO: Array = np.zeros(3)
 _ORIGIN = np.array([1.0, 0.0, 0.0])
 SHADOW = "thin: shadow on the floor"
-_BESIDE, _UNDER, _ABOVE = 0.74, 0.35, 0.1
+_BESIDE, _UNDER, _ABOVE = 0.66, 0.3, 0.1
 """Margins of a box in inches, which have the labels of its axes."""
 _STEPS = np.multiply.outer(10.0 ** np.arange(-9, 3), [1, 2, 5]).ravel()
 
@@ -58,7 +58,7 @@ def draw_plane(panel: SubFigure, curves: Sequence[Curve]) -> None:
     axes = plane(panel)
     origin = count_from(panel, axes, curves, np.asarray)
     for curve in curves:
-        draw_arrows(axes, curve, curve.near_data(curve.points - origin))
+        draw_arrows(axes, curve, curve.near_data(curve.points - origin), curve.given - origin)
         rims = lambda p, radii: p[:, None] + radii[:, None, None] * CIRCLE  # noqa: E731
         draw_in_plane(axes, curve, lambda points: np.asarray(points) - origin, rims)
 
@@ -179,7 +179,7 @@ def box(
     # Flat boxes are seen from farther above. Choose the direction from which the curve looks widest.
     angles = np.radians([-60, -30, 30, 60])
     right = everything[:, 1:2] * np.cos(angles) - everything[:, :1] * np.sin(angles)
-    elevation = float(np.interp(sides[2] / sides[:2].max(), [0.2, 1], [38, 24]))
+    elevation = float(np.interp(sides[2] / sides[:2].max(), [0.2, 1], [46, 24]))
     axes.view_init(elev=elevation, azim=(-60, -30, 30, 60)[np.std(right, axis=0).argmax()])
     axes.set_box_aspect(tuple(sides))
     _fill(panel, axes, middle + sides * np.array(list(product((-1, 1), repeat=3))), below)
@@ -237,11 +237,11 @@ def draw_disk(panel: SubFigure, curves: Sequence[Curve]) -> None:
     spacing = 0.5 if half > 1 else closest(_STEPS, 0.6 * reach)
     _draw_grid(axes, spacing)
     for curve in curves:
-        draw_arrows(axes, curve, flat(curve.points, middle))
+        draw_arrows(axes, curve, flat(curve.points, middle), flat(curve.given, middle))
         draw_in_plane(axes, curve, partial(flat, middle=middle), rims)
     text = "part of the " * bool(half < 1) + f"Poincaré disk; grid of geodesics, {spacing:g} apart on the axes"
     if middle is not _ORIGIN:
-        text += "\ncentred at (" + ", ".join(f"{x:.4g}" for x in middle) + ")"
+        text += "\ncentred at the point (" + ", ".join(f"{x:.4g}" for x in middle) + ")"
     note(panel, text)
 
 

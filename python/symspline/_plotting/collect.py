@@ -19,7 +19,7 @@ from .._spaces import Product, Space, cover_of
 from .._time import TimeAxis
 from .curves import SECOND, Axis, Batch, Curve
 from .figure import PATHS
-from .style import SPLINE, Array, colors, evenly, named_from, round_start
+from .style import DISTINCT, SPLINE, Array, colors, evenly, named_from, round_start
 
 FEW, _OF_MANY = 5, 3
 """The largest number of curves of a batch that are all drawn with their points, and the number of larger batches."""
@@ -96,17 +96,22 @@ def curves_of(
     few = drawn[evenly(len(drawn), FEW if len(drawn) <= FEW else _OF_MANY)]
     looks = dict(zip(few.tolist(), colors(len(few)), strict=True))
     made: list[Curve] = []
-    mean = _mean_of(curve, valid, axis, color, label, alone) if len(drawn) > len(few) else None
+    paths = str(cover_of(curve.space)) in PATHS
+    mean = _mean_of(curve, valid, axis, color, label, alone and paths) if len(drawn) > len(few) else None
     if mean is not None:
-        made, few, looks = [mean], drawn, {}
+        # Pictures of paths show the other curves as thin lines, and others show two of them.
+        few = drawn if paths else few[[0, -1]]
+        looks = {} if paths else dict(zip(few.tolist(), DISTINCT[1:3], strict=True))
+        made = [replace(mean, has_start=paths)]
     # Curves with points come first.
     for i in [*looks, *(i for i in drawn.tolist() if i not in looks)]:
         index = tuple(map(int, np.unravel_index(i, batch)))
         one = reduce(lambda curves, k: curves._picked(k), index, curve)
         name = label if not batch else f"curve {index[0] if len(index) == 1 else index}"
         look = {"color": color or looks.get(i), "alone": alone and len(drawn) == 1, "label": name}
+        look["has_start"] = mean is None
         made.append(_drawn(one, curve._noise_beside, index, axis, look, faint=i not in looks))
-    if looks and len(drawn) > len(few):
+    if mean is None and len(drawn) > len(few):
         made[0] = replace(made[0], batch=_batch_of(curve, made[0], valid))
     number = f"{len(few)} of {everything}" if len(few) < everything else f"{everything}"
     return made, f"{number} curves, " if batch else ""
@@ -149,7 +154,7 @@ def _mean_of(
     extent of the mean curve.
     """
     space, data, nodes = curve.space, curve._curve, curve._node_times
-    if str(cover_of(space)) not in PATHS:
+    if isinstance(space, Product):
         return None
     first, x0 = np.ravel(curve.domain[0])[0], float(data.times.flat[0])
     x = data.times.ravel()
@@ -162,8 +167,8 @@ def _mean_of(
     points = points[evenly(len(points), _FOR_MEAN)].swapaxes(0, 1)
     try:
         means = space.mean(points)
-    except (ConvergenceError, CutLocusError, ValidationError):
-        # Points of hyperbolic space that are far away are rounded off it.
+    except (ConvergenceError, CutLocusError, NotImplementedError, ValidationError):
+        # Points of hyperbolic space that are far away are rounded off it, and some spaces have no means.
         return None
     spread = np.quantile(space.distance(means[:, None], points), 0.95, axis=1)
     if np.median(spread) > 0.5 * space.distance(means[0], means).max():

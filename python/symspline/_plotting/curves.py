@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import to_rgba
 from numpy.typing import NDArray
 
 from .._curves.composed import AnyCurve
@@ -370,15 +371,17 @@ class Curve:
         """Draw a line through positions of shape (m, 2) or (m, 3)."""
         if not self.has_line:
             return
-        end = positions[-1]
         # A narrow band must remain visible beside the line.
-        width = 1.4 if not self.alone else 2.4 if self.noise is None else 1.8
+        width = 1.4 if not self.alone and not self.is_mean else 2.4 if self.noise is None else 1.8
         # The first line of a curve has its name in legends.
         known = {line.get_label() for line in axes.lines}
         label = self.label if self.label and self.label not in known and "linestyle" not in look else LINE
         own: dict[str, Any] = {"color": self.color, "linewidth": width, "zorder": 4, "label": label}
         if self.faint:
             look = look | {"linewidth": 0.8, "alpha": 0.5, "zorder": 3.2, "label": FAINT}
+        if positions.shape[1] == 3:
+            # Curves in space have no arrow heads.
+            self.draw_end(axes, positions[-1:])
         if positions.shape[1] == 3 and self.alone and self.color == SPLINE and len(self.gaps):
             # Without a time axis, the parts before and after a gap could not be distinguished.
             after = (self.times >= self.gaps[0, 1])[:, None]
@@ -387,10 +390,13 @@ class Curve:
             )
             positions = np.where(after, np.nan, positions)
         self.plot_line(axes, positions, **own | look)
-        if len(end) == 3 and self.noise is None and not self.faint:
-            # Curves in space have no arrow heads.
-            edge: Any = {"markersize": 7, "markeredgecolor": "white", "zorder": 6.6, "label": END}
-            axes.plot(*end[:, None], "s", color=self.color_of_dots, **edge)
+
+    def draw_end(self, axes: Axes, end: Array, **look: Any) -> None:
+        """Draw a square at the end of a curve, shape (1, 2) or (1, 3)."""
+        if self.noise is None and self.has_line and not self.faint:
+            size = 7 if self.alone else 5
+            own: Any = {"markersize": size, "markeredgecolor": "white", "zorder": 6.6, "label": END}
+            axes.plot(*end.T, "s", color=self.color_of_dots, **own | look)
 
     @property
     def color_of_dots(self) -> Any:
@@ -440,6 +446,8 @@ class Curve:
             axes.plot(*positions.T, "o", label=DOTS, **look)
         if self.has_start:
             look |= {"color": "white", "markeredgewidth": 1.4, "zorder": 6.5, "markersize": 1.3 * look["markersize"]}
+            # On the far side of a globe the edge alone is faint.
+            look["markeredgecolor"] = to_rgba(look["markeredgecolor"], look.pop("alpha", None))
             axes.plot(*positions[:1].T, "o", label=START, **look)
 
 

@@ -172,7 +172,9 @@ def drawing(size: tuple[float, float], show: bool = False, factor: float = 1.0) 
         figure = new_figure(size, show)
         yield figure
     larger = font_factor()
-    shrink(figure.findobj(), factor * larger)
+    if factor * larger != 1:
+        # To find all artists takes longer than to draw them.
+        shrink(figure.findobj(), factor * larger)
     figure.set_size_inches(larger * size[0], larger * size[1])
     if dark:
         invert_page(figure)

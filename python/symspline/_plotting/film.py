@@ -44,8 +44,10 @@ def plot_film(t: NDArray[Any], landmarks: Array, film: Callable[[Any], Array], f
     # Every drawing fits into a square of this size around its centre.
     size = 2.1 * max(float(np.abs(_centred(x)).max()) for x in seen)
     middle, half = window(seen[2].reshape(-1, 2), 1.25)
+    words = f"{drawings} drawings of {count} landmarks, filled; thin: between them"
+    words += "; 0: first landmark" * (count > _NUMBERED)
     with drawing((_WIDTH, _HEIGHT)) as figure:
-        heading(figure, "Morph along a C² spline of affine shapes", f"{drawings} drawings of {count} landmarks", 0.93)
+        heading(figure, "Morph along a C² spline of affine shapes", words, 0.93)
         _draw_strip(figure.add_axes((0.05, 0.58, 0.9, 0.26)), t, strip, seen[0], seen[1], size)
         for i, (x, landmarks) in enumerate(zip(multiples, seen[2], strict=True)):
             row, column = divmod(i, _COLUMNS)

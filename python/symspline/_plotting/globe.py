@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
-from matplotlib.patches import Circle, Patch, Polygon
+from matplotlib.patches import Circle
 
 from .._lonlat import from_lonlat, to_lonlat
 from .._spaces import Euclidean, Space
@@ -84,24 +84,15 @@ def middle_of(points: Array) -> tuple[float, float]:
 
 
 def draw_globe(axes: Axes, view: View, spacing: int, half: bool = False) -> None:
-    """Draw a shaded globe with a graticule, or its northern half above the rim."""
+    """Draw a shaded globe with a graticule, or its northern half, seen from above the pole."""
     axes.set_axis_off()
     axes.set(aspect="equal", xlim=(-1.06, 1.06), ylim=(-1.06, 1.06))
     steps, south = np.linspace(-180, 180, 721), 0 if half else -90
-    outline: Patch = Circle((0, 0), 1)
-    if half:
-        rim = from_lonlat(steps, 0)
-        front = view.visible(rim)
-        front = front[np.isfinite(front[:, 0])]
-        arc = np.radians(np.linspace(0, 180, 181))
-        outline = Polygon([*zip(np.cos(arc), np.sin(arc), strict=True), *front[front[:, 0].argsort()]])
-        axes.plot(*view.hidden(rim).T, color=MARK, linewidth=1.2, linestyle=(0, (4, 3)), zorder=2)
-        axes.plot(*view.visible(rim).T, color=MARK, linewidth=1.4, zorder=3.1, label="_rim")
     # The brightness of a ball of radius 1 around the middle.
     x, y = np.meshgrid(np.linspace(-1, 1, 400), np.linspace(-1, 1, 400))
     light = np.sqrt(np.maximum(1 - ((x + 0.25) ** 2 + (y - 0.25) ** 2) / 1.9, 0))
     image = axes.imshow(light, extent=(-1, 1, -1, 1), origin="lower", cmap=SEA, zorder=0)
-    outline.set(fill=False, edgecolor=EDGE, linewidth=1, zorder=3)
+    outline = Circle((0, 0), 1, fill=False, edgecolor=MARK if half else EDGE, linewidth=1.4 if half else 1, zorder=3)
     image.set_clip_path(axes.add_patch(outline))
     lines = [from_lonlat(steps, lat) for lat in range(south + spacing, 90, spacing)]
     lines += [from_lonlat(lon, np.linspace(south, 90, 721)) for lon in range(-180, 180, spacing)]
@@ -157,8 +148,8 @@ def draw_frame(axes: Axes, view: View, middle: Array, half: float | Array) -> No
     left = [view.visible(from_lonlat(lon + around * steps, y)) for y in parallels]
     for line in (*bottom, *left):
         axes.plot(*line.T, color=GRID, linewidth=0.7, zorder=2)
-    axes.set_xticks(*_ticks(bottom, meridians, "EW", south, west, east))
-    axes.set_yticks(*_ticks([line[:, ::-1] for line in left], parallels, "NS", west, south, north))
+    axes.set_xticks(*_ticks(bottom, meridians, spacing[1], "EW", south, west, east))
+    axes.set_yticks(*_ticks([line[:, ::-1] for line in left], parallels, spacing[0], "NS", west, south, north))
     axes.set(aspect="equal", xlim=(west, east), ylim=(south, north), facecolor=PAPER)
     axes.tick_params(length=0, labelcolor=INK)
 
@@ -170,23 +161,27 @@ def _multiples(step: float, low: float, high: float) -> list[float]:
 
 
 def _ticks(
-    lines: Iterable[Array], values: Iterable[float], letters: str, level: float, low: float, high: float
+    lines: Iterable[Array], values: Iterable[float], step: float, letters: str, level: float, low: float, high: float
 ) -> tuple[list[float], list[str]]:
-    """Return the positions where lines cross a level of the second coordinate, and labels that do not overlap."""
+    """Return the positions where lines cross a level of the second coordinate, and labels that do not overlap.
+
+    Values are multiples of ``step``; if their labels overlap, those of multiples of 2, 5 or more steps remain.
+    """
     found = []
     for line, value in zip(lines, values, strict=True):
         above = line[:, 1] > level
         (i,) = np.nonzero((above[1:] != above[:-1]) & np.isfinite(line[1:, 1] - line[:-1, 1]))
         share = (level - line[i, 1]) / (line[i + 1, 1] - line[i, 1])
         crossed = line[i, 0] + share * (line[i + 1, 0] - line[i, 0])
-        found += [(x, degrees(value, *letters)) for x in crossed.tolist()]
-    kept: dict[float, str] = {}
-    last = -np.inf
-    for x, label in sorted(found):
-        width = (0.02 + (0.018 * len(label) if letters == "EW" else 0.03)) * (high - low)
-        if low <= x <= high and x - last > width:
-            kept[x], last = label, x
-    return list(kept), list(kept.values())
+        found += [(x, round(value / step), degrees(value, *letters)) for x in crossed.tolist() if low <= x <= high]
+    found.sort()
+    kept = found
+    for every in (2, 5, 10, 20):
+        widths = [0.02 + (0.018 * len(label) if letters == "EW" else 0.03) for *_, label in kept[1:]]
+        if np.all(np.diff([x for x, *_ in kept]) > np.multiply(widths, high - low)):
+            break
+        kept = [own for own in found if own[1] % every == 0] or kept[:1]
+    return [x for x, *_ in kept], [label for *_, label in kept]
 
 
 def degrees(value: float, positive: str, negative: str) -> str:

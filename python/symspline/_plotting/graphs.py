@@ -49,6 +49,8 @@ _ROUNDING = 1e-9
 """Numbers that vary by less than this part of others are constant."""
 _NARROW = 1.3
 """The largest width of lines in low axes."""
+_RIGHT = 88.0
+"""Principal angles that exceed this number of degrees turn back at 90."""
 _BETWEEN = 0.3
 """The distance between axes in inches."""
 FEW_KNOTS, _TICKS = 40, 300
@@ -189,6 +191,7 @@ def draw_coordinates(
     numbers: Callable[[Any], Array] = np.asarray,
     growth: Callable[[Array], Array] = np.ones_like,
     title: str = "",
+    equal_scales: bool = False,
 ) -> None:
     """Draw a few numbers against time, each in axes of its own.
 
@@ -204,6 +207,8 @@ def draw_coordinates(
         Bounds, from the lengths of these rows, of how much the numbers differ if points have the distance 1.
     title : str
         Description of the numbers, above the axes. If the user gave axes, which show all numbers, it is their label.
+    equal_scales : bool
+        Whether all axes have the same scale.
     """
     if not isinstance(panel, SubFigure):
         draw_numbers(panel, curves, title, names, lambda _, own: numbers(own))
@@ -225,13 +230,15 @@ def draw_coordinates(
             size_of_band = growth(np.linalg.norm(line, axis=1))
             own = curve.graph(line[:, i] - starts[i])
             draw_graph_of(axes, curve, own, given[:, i] - starts[i], size_of_band, **look)
-        low, high = axes.get_ylim()
-        if high - low < _ROUNDING * largest:
-            # Rounding errors of a constant would look like a curve.
-            axes.set_ylim((low + high - largest) / 2, (low + high + largest) / 2)
         for artist in axes.lines:
             if artist.get_gid() == LINE:
                 artist.set_linewidth(min(artist.get_linewidth(), _NARROW))
+    limits = np.array([axes.get_ylim() for axes in made])
+    widest = np.ptp(limits, axis=1).max()
+    for axes, (low, high) in zip(made, limits.tolist(), strict=True):
+        # Rounding errors of a constant would look like a curve.
+        if equal_scales or high - low < _ROUNDING * largest:
+            axes.set_ylim((low + high - widest) / 2, (low + high + widest) / 2)
 
 
 def draw_numbers(
@@ -433,8 +440,16 @@ def draw_principal_angles(panel: SubFigure, curves: Sequence[Curve]) -> None:
     """Draw the principal angles to the first point, for Grassmannians and projective spaces."""
     n, k = np.reshape(curves[0].points[0], (len(curves[0].points[0]), -1)).shape
     names = [f"θ{i + 1}".translate(SUBSCRIPTS) for i in range(min(k, n - k))]
-    numbers = lambda first, points: principal_angles(points, first)[:, : len(names)]  # noqa: E731
+
+    def numbers(first: Any, points: Any) -> Array:
+        return principal_angles(points, first)[:, : len(names)]
+
     draw_numbers(panel, curves, "principal angles to\nfirst point, degrees", names, numbers)
+    largest = max(numbers(own.first_point, own.points).max() for own in curves)
+    if isinstance(panel, SubFigure) and largest > _RIGHT and len(panel.axes) == 1:
+        words = "angles between subspaces do not exceed 90°, where they turn back"
+        axes: Any = panel.axes[0]
+        axes.set_title(words, loc="left", color=INK, fontsize=points(9), pad=3)
 
 
 def principal_angles(points: NDArray[Any], first: NDArray[Any]) -> Array:

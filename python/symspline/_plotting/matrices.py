@@ -27,10 +27,27 @@ from .._spaces import SpecialOrthogonal, cover_of
 from .chart import SHADOW, box, count_from, explain_frames, frame_handles, origin_of, plane, shadow_colors
 from .curves import BODIES, BODY, BODY_COLOR, POSES, START, Curve
 from .globe import centre_of
-from .graphs import SUBSCRIPTS, component_names, draw_components, draw_coordinates, draw_numbers
+from .graphs import SUBSCRIPTS, component_names, draw_components, draw_coordinates, draw_numbers, timelines
 from .rows import REACH, VIEW, Rows
 from .sphere import caps
-from .style import AXES, INK, OWN_AXES, Array, apart, axes_size, legend, note, points, round_below, time_colors, window
+from .style import (
+    AXES,
+    INK,
+    LEFT,
+    OWN_AXES,
+    RIGHT,
+    Array,
+    apart,
+    axes_size,
+    legend,
+    note,
+    points,
+    round_below,
+    size,
+    time_colors,
+    window,
+)
+from .theme import KEPT
 
 ROTATIONS = SpecialOrthogonal(3)
 _LENGTH = 0.14
@@ -39,14 +56,16 @@ _MANY = 24
 """The number of bodies of all curves, or two per curve if that is more."""
 _FRAMES = 16
 """The number of frames in space, and of lighter ones between them."""
-_LEAST, _BETWEEN = 12.0, 0.6
-"""Arrows are shorter than the time axis by this factor, and those of a curve than those of given points."""
+_LEAST, _SHORT = 12.0, 0.38
+"""Arrows are shorter than the time axis by the first factor, and their length in inches below given ones."""
+_PAIRS = 15
+"""The largest number of correlations that have names."""
 _FAN = np.radians(30)
 """Bodies that turn on the spot are drawn at angles of this size."""
 _SMALL = np.radians(12)
 """Rotations by less than this are graphs."""
 _LARGE = np.radians(150)
-"""Rotations by less than this from the first or the middle one are graphs if there are long gaps or other factors."""
+"""Rotations by less than this from the first or the middle one are graphs if there are gaps, noise or other factors."""
 _JUMP = np.radians(170)
 """Rotation vectors are drawn up to this length."""
 _ANGLES = np.linspace(0, 2 * np.pi, 97)
@@ -67,20 +86,19 @@ def draw_rotations(panel: SubFigure, curves: Sequence[Curve]) -> None:
         return
     matrices = MATRICES[str(cover_of(curves[0].space))]
     rows = Rows.of(panel, curves)
-    largest = min(REACH, 0.48 * rows.height, rows.width / _LEAST)
+    # Below given frames there are others between them.
+    most = _SHORT if [row.name for row in rows.rows] == ["given", "curve"] else REACH
+    length = min(most, 0.48 * rows.height, rows.width / _LEAST)
     words = _left_out(rows, curves)
     for i, row in enumerate(rows.rows):
-        # Below given points, the curve has smaller frames and more of them.
-        between = row.name == "curve" and row.curve.noise is None and len(rows.rows) > 1
-        length = largest * (_BETWEEN if between else 1)
-        times, symbols, radii = rows.symbols(i, length, between)
+        times, symbols, radii = rows.symbols(i, length)
         frames = matrices(symbols)
         if radii is not None:
             _draw_discs(rows, i, times, length, frames, radii)
             words = "discs: 95 % bands"
         _draw_arrows(rows.axes, times, -i, length * frames, light=row.name == "data")
     if str(cover_of(curves[0].space)) in ("sphere:3", "su:2"):
-        words = "; ".join(filter(None, (words, "as rotations, angles doubled")))
+        words = "; ".join(filter(None, (words, "frames turn at 2|γ′|")))
     _explain(rows.axes, words, rows.width)
     rows.draw_view()
 
@@ -93,7 +111,7 @@ def are_graphs(curves: Sequence[Curve]) -> bool:
 def _reference(curves: Sequence[Curve]) -> tuple[Array, str] | None:
     """Return the rotation from which rotation vectors are measured, and its name. None if there are frames.
 
-    Frames would look equal, would not show long gaps, or have no space beside other factors of a product.
+    Frames would look equal, would not show long gaps or noisy data, or have no space beside other factors of a product.
     """
     matrices = MATRICES.get(str(cover_of(curves[0].space)))
     if matrices is None or not all(curve.alone for curve in curves):
@@ -104,7 +122,7 @@ def _reference(curves: Sequence[Curve]) -> tuple[Array, str] | None:
     largest = ROTATIONS.distance(np.eye(3), turned).max()
     if largest < _SMALL:
         return first, "first point"
-    if not any(own.is_factor or len(own.gaps) for own in curves):
+    if not any(own.is_factor or len(own.gaps) or own.noise is not None for own in curves):
         return None
     if largest < _LARGE:
         return first, "first point"
@@ -129,7 +147,8 @@ def _draw_rotation_vectors(panel: SubFigure, curves: Sequence[Curve], first: Arr
         return np.asarray(1 / np.sinc(angles / 2 / np.pi))
 
     names = ["about x₁", "about x₂", "about x₃"]
-    draw_coordinates(panel, curves, names, numbers, growth, f"rotation vector from the {name}, rad")
+    title = f"rotation vector from the {name}, rad"
+    draw_coordinates(panel, curves, names, numbers, growth, title, equal_scales=True)
 
 
 def _rotation_vectors(matrices: Array, first: Array) -> Array:
@@ -267,7 +286,7 @@ def draw_poses(panel: SubFigure, curves: Sequence[Curve]) -> None:
     paths = [curve.near_data(curve.points[:, :3, 3] - origin) for curve in curves]
     given = [curve.given[:, :3, 3] - origin for curve in curves]
     everything = np.concatenate([*paths, *given])
-    length = 0.16 * window(everything[np.isfinite(everything[:, 0])], 1.0)[1] or 0.2
+    length = 0.18 * window(everything[np.isfinite(everything[:, 0])], 1.0)[1] or 0.2
     number = max(2, _FRAMES // len(curves))
     # The box contains the tips of all frames that are drawn.
     tips = [
@@ -290,7 +309,7 @@ def draw_poses(panel: SubFigure, curves: Sequence[Curve]) -> None:
         curve.draw_line(axes, path, linewidth=2.0 if curve.alone else 1.4)
         for group, (_, poses) in curve.samples(number).items():
             if group != "bold":
-                draw(poses, 0.8 * length, linewidth=0.8, alpha=0.55)
+                draw(poses, 0.7 * length, linewidth=1.2, alpha=0.7)
                 continue
             draw(poses, length, linewidth=2.0 if curve.alone else 1.3)
             if curve.noise is None:
@@ -319,19 +338,31 @@ def draw_covariances(panel: SubFigure, curves: Sequence[Curve]) -> None:
     def deviations(_: Any, points: Array) -> Array:
         return np.sqrt(np.diagonal(points, axis1=1, axis2=2))
 
-    def correlations(_: Any, points: Array) -> Array:
-        roots = deviations(_, points)
-        return np.asarray(points[:, rows, columns] / (roots[:, rows] * roots[:, columns]))
-
-    entries = np.reshape(component_names((n, n), False), (n, n))
     names = [f"σ{i + 1}".translate(SUBSCRIPTS) for i in range(n)]
+    entries = np.reshape(component_names((n, n), False), (n, n))
     pairs = [f"ρ{entry[1:]}" for entry in entries[rows, columns].tolist()]
     panels: Any = panel.subfigures(2, 1, height_ratios=[1, 1.2])
-    upper, lower = panels
-    draw_numbers(upper, curves, "standard\ndeviations", names, deviations)
-    draw_numbers(lower, curves, "correlations", pairs, correlations)
-    (axes,) = upper.axes
-    axes.set_xlabel("")
+    draw_numbers(panels[0], curves, "standard\ndeviations", names, deviations)
+    panels[0].axes[0].set_xlabel("")
+    (axes,) = timelines(panels[1], curves, ["correlations"], marked=False)
+    axes.grid(visible=False)
+    axes.set_ylim(len(pairs), 0)
+    every = -(-len(pairs) // _PAIRS)
+    axes.set_yticks(np.arange(len(pairs))[::every] + 0.5, pairs[::every])
+    axes.tick_params(axis="y", length=0)
+    for curve in curves:
+        roots = deviations(None, curve.points)
+        shares = curve.outside_gaps(curve.points[:, rows, columns] / (roots[:, rows] * roots[:, columns]))
+        look: Any = {"cmap": "RdBu_r", "vmin": -1, "vmax": 1, "shading": "gouraud", "rasterized": True}
+        # One row of pixels per pair needs two equal rows of samples.
+        for k, share in enumerate(shares.T):
+            image = axes.pcolormesh(curve.times, [k + 0.03, k + 0.97], np.stack([share, share]), **look)
+            image.set_gid(KEPT)
+    width, _ = size(panels[1])
+    side = axes.inset_axes((1 + 0.12 / (width - LEFT - RIGHT), 0, 0.1 / (width - LEFT - RIGHT), 1))
+    bar = panel.get_figure(root=True).colorbar(image, cax=side, ticks=[-1, 0, 1])
+    bar.ax.tick_params(labelsize=points(8), length=0, labelcolor=INK)
+    bar.outline.set_visible(False)
 
 
 def outlines(matrices: Array) -> Array:

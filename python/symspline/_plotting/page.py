@@ -52,8 +52,8 @@ from .figure import (
     shows_band,
 )
 from .panels import check_axes, draw_into, has_dark_background, next_color
-from .rates import LIMIT, columns_of, draw_rates
-from .style import BOTTOM, DATA, EDGE, GAP, MARK, TOP, Array, font_factor, heading, legend
+from .rates import LIMIT, MEDIAN, columns_of, draw_rates
+from .style import BOTTOM, DATA, EDGE, GAP, INK, MARK, TOP, Array, font_factor, heading, legend
 from .theme import is_dark, kept_color
 
 _HEAD, _LINE, _RATES_WIDTH, _RATES_HEIGHT = 1.2, 0.2, 5.8, 4.0
@@ -279,6 +279,8 @@ def _explain(figure: Figure, curves: Sequence[Curve], height: float, others: int
         drawn_ones = sum(own.faint for own in curves)
         hidden = f", {drawn_ones} of {others}" if drawn_ones < others else ""
         add(Line2D([], [], color=DATA, linewidth=0.7), ("single curves" if few[0].is_mean else "other curves") + hidden)
+    if MEDIAN in drawn:
+        add(Line2D([], [], color=INK, linewidth=1.4), "median of rates")
     if QUANTILES in drawn and few[0].batch is not None:
         add(Patch(facecolor=DATA, alpha=0.25), f"5–95 % of {int(few[0].batch.valid.sum())} curves")
     if drawn & {KNOTS, TICKS}:

@@ -13,11 +13,11 @@ from .._spaces import Product, Space, SpecialEuclidean, Sphere, Torus, cover_of,
 from .bands import fill_band, fill_quantiles
 from .curves import LINE, Curve
 from .graphs import FEW_KNOTS, timelines
-from .style import EDGE, MARK, Array
+from .style import EDGE, INK, MARK, Array
 
 NORMAL = 1.96
 """Half width of the 95 % interval of a normal distribution, in standard deviations."""
-LIMIT = "_limit"
+LIMIT, MEDIAN = "_limit", "_median"
 IN_ROW = 3
 """The largest number of factors whose pictures are in one row."""
 # Other spaces than spheres, in which the length of a velocity is an angle per time.
@@ -217,6 +217,11 @@ def _draw_rate(axes: Axes, curves: Sequence[Curve], rate: Rate) -> None:
     drawn = [0.0, *fill_quantiles(axes, curves, rate.values)]
     top = rounding = 0.0
     for curve in curves:
+        if curve.is_mean and curve.batch is not None:
+            median = np.median(rate.values(curve.batch.at), axis=0)
+            axes.plot(curve.batch.times, median, color=INK, linewidth=1.4, label=MEDIAN)
+            drawn += [float(median.min()), float(median.max())]
+            continue
         values = rate.values(curve.at)
         deviation = curve.noise.speed if rate.order == 1 and curve.noise is not None else None
         if deviation is None:

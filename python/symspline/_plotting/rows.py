@@ -55,12 +55,12 @@ class Row:
         """Whether the symbols are given points."""
         return self.name in ("given", "data") or not self.curve.has_line
 
-    def symbols(self, width: float, reach: float, below: bool = False) -> tuple[Array, Any, Array | None]:
+    def symbols(self, width: float, reach: float) -> tuple[Array, Any, Array | None]:
         """Return times on matplotlib's axis, points, and the radii of the band, for symbols that fit into the row.
 
         The time axis has ``width`` inches, and symbols extend by at most ``reach`` inches to the left and right. Given
-        points that are close together are omitted; samples of the curve are equidistant. If ``below`` is True and all
-        given points have a symbol, the curve has one below each of them, and equidistant ones between.
+        points that are close together are omitted; samples of the curve are equidistant. If there is space for more
+        symbols than there are given points, the curve has one below each of them, and equidistant ones between.
         """
         curve = self.curve
         if self.has_given:
@@ -71,9 +71,11 @@ class Row:
         wanted = np.linspace(curve.x[0], curve.x[-1], number)
         step = wanted[1] - wanted[0]
         nodes = curve.x[curve.knots]
-        if below and np.diff(nodes).min(initial=np.inf) > 0.55 * step:
+        if curve.noise is None and curve.has_nodes and self.name and np.diff(nodes).min(initial=np.inf) > 0.55 * step:
             inner = [np.linspace(*ends, 1 + max(1, round((ends[1] - ends[0]) / step))) for ends in pairwise(nodes)]
-            wanted = np.unique(np.concatenate(inner))
+            if sum(map(len, inner)) >= 2.5 * len(inner):
+                # Otherwise the curve would have the given symbols again.
+                wanted = np.unique(np.concatenate(inner))
         even = np.searchsorted(curve.x, wanted)
         # There are no samples in gaps.
         even = np.unique(even[curve.x[even] - wanted < 0.1 * step])
@@ -126,10 +128,10 @@ class Rows:
         axes.spines["left"].set_visible(False)
         return cls(axes, rows, width, high / len(rows))
 
-    def symbols(self, i: int, reach: float, below: bool = False) -> tuple[Array, Any, Array | None]:
+    def symbols(self, i: int, reach: float) -> tuple[Array, Any, Array | None]:
         """Name a row, and return its symbols, which extend by at most ``reach`` inches; see `Row.symbols`."""
         row = self.rows[i]
-        times, symbols, radii = row.symbols(self.width, reach, below)
+        times, symbols, radii = row.symbols(self.width, reach)
         look: Any = {"transform": self.axes.get_yaxis_transform(), "clip_on": False}
         left = -0.9 / self.width
         if self.axes in OWN_AXES:
@@ -173,7 +175,7 @@ class Rows:
         if self.axes in OWN_AXES:
             return
         axes, inches = self.axes, np.array([1 / self.width, 1 / (self.height * len(self.rows))])
-        foot = np.array([1.0, 1.0]) + [0.05, 0.28] * inches
+        foot = np.array([1.0, 1.0]) + [0.05, 0.24] * inches
         look: Any = {"xycoords": "axes fraction", "color": INK, "ha": "center", "va": "center"}
         arrow: Any = {"arrowstyle": "-|>,head_width=0.12,head_length=0.25", "color": INK, "linewidth": 0.9}
         arrow |= {"shrinkA": 0, "shrinkB": 0}
@@ -182,4 +184,4 @@ class Rows:
                 "", tuple(foot + 0.26 * end * inches), tuple(foot), xycoords="axes fraction", arrowprops=arrow
             )
             axes.annotate(name, tuple(foot + 0.38 * end * inches), fontsize=points(8), **look)
-        axes.annotate("view", tuple(foot + [0.0, -0.3] * inches), fontsize=points(9), **look)
+        axes.annotate("view", tuple(foot + [-0.35, 0.2] * inches), fontsize=points(9), **look)

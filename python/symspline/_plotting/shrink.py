@@ -28,8 +28,6 @@ def small_text(factor: float) -> Iterator[None]:
 
 def shrink(artists: Iterable[Artist], factor: float, text: float = 1.0) -> None:
     """Multiply the sizes of lines and symbols by a factor, and those of text by another one."""
-    if factor == 1:
-        return
     for artist in artists:
         own: Any = artist
         if isinstance(artist, Line2D):

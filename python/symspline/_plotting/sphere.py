@@ -37,8 +37,6 @@ _FREE = 60
 """The smallest range of longitudes without curves, in degrees, that becomes the edges of a map."""
 _POLE = 60
 """Neighbouring samples are on both sides of a pole if their longitudes differ by more degrees."""
-_HEIGHT = 60
-"""Latitude in degrees from which the hemisphere is seen."""
 _RIM = 1e-9
 """Rounding decides the side of points that are closer to the plane of the rim."""
 _TWICE = "; angles are twice the distances of states"
@@ -55,16 +53,20 @@ def draw_sphere(panel: SubFigure, curves: Sequence[Curve]) -> None:
     width, height = size(panel)
     radius = curves[0].radius
     wide = width > 2 * height
-    look = _Globe(below=0.1, right=width - min(width, height) + 0.1, beside=_LOCATOR if wide else 0.0)
+    globe = _Globe(below=0.1, right=width - min(width, height) + 0.1, beside=_LOCATOR if wide else 0.0)
     everything, seen = (np.concatenate([own.extent for own in curves if not (few and own.faint)]) for few in (0, 1))
-    axes, view, is_part = _draw_globe(panel, everything, look, seen)
+    axes, view, is_part = _draw_globe(panel, everything, globe, seen)
     for curve in curves:
         curve.draw_polygon(axes, view.visible)
         _draw_on_globe(axes, view, curve, curve.points, curve.given, curve.radii)
-    if radius is not None and (not is_part or np.ptp(axes.get_xlim()) > _COARSE):
+    has_land = radius is not None and (not is_part or bool(np.ptp(axes.get_xlim()) > _COARSE))
+    if has_land:
         land.draw_on_globe(axes, view)
     if radius is not None and is_part:
         _draw_scale(axes, radius / 1000)
+        if not has_land:
+            look: Any = {"transform": axes.transAxes, "fontsize": points(9), "color": INK, "path_effects": HALO}
+            axes.text(0.015, 0.03, "no coastlines at this scale", zorder=7, **look)
     if wide and is_part:
         _draw_locator(panel, axes, view, curves, radius is not None)
     elif wide:
@@ -128,7 +130,7 @@ def _draw_on_half(what: str, vectors: Callable[[Any], Array], panel: SubFigure, 
     lines = [line if line[0] @ lines[0][0] >= 0 else -line for line in lines]
     if sum(np.sum(line[:, 2]) for line in lines) < 0:
         lines = [-line for line in lines]
-    look = _Globe(lats=(_HEIGHT, _HEIGHT), labels=_AXES, half=True)
+    look = _Globe(lats=(90, 90), labels=_AXES, half=True)
     above = [line * sides(line) for line in lines]
     axes, view, is_part = _draw_globe(panel, np.concatenate(lines), look, np.concatenate(above))
     crossed = False
@@ -172,7 +174,8 @@ def _draw_on_globe(axes: Axes, view: View, curve: Curve, line: Array, given: Arr
     if not curve.faint:
         curve.draw_line(axes, view.hidden(line), linewidth=1, linestyle=(0, (2, 2)), alpha=0.6)
     curve.draw_line(axes, view.visible(line))
-    draw_arrows(axes, curve, view.visible(line))
+    draw_arrows(axes, curve, view.visible(line), view.visible(given))
+    curve.draw_end(axes, view.hidden(line[-1:]), alpha=0.35)
     curve.draw_dots(axes, view.hidden(given), alpha=0.35)
     curve.draw_dots(axes, view.visible(given))
 
@@ -237,8 +240,7 @@ def _draw_globe(panel: SubFigure, vectors: Array, look: _Globe, above: Array | N
     draw_globe(axes, view, look.spacing, look.half)
     if look.labels:
         seen = vectors if above is None else above
-        high, low, wide = (1.15, -1.05, 1.2) if look.half else (1.22, -1.22, 1.22)
-        axes.set(xlim=(-wide, wide), ylim=(low, high))
+        axes.set(xlim=(-1.22, 1.22), ylim=(-1.22, 1.22))
         label_directions(axes, view, look.labels, view.flat(seen))
     return axes, view, False
 
@@ -324,7 +326,7 @@ def _draw_map(panel: SubFigure, curves: Sequence[Curve], left: float, has_land: 
         if curve.radii is not None:
             _draw_band(axes, curve, positions, curve.points @ turn, curve.radii)
         curve.draw_line(axes, broken(positions))
-        draw_arrows(axes, curve, broken(positions))
+        draw_arrows(axes, curve, broken(positions), given)
         curve.draw_dots(axes, given, clip_on=False, **{} if curve.noise else {"markersize": 4.5})
 
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from matplotlib.colors import LightSource
 from matplotlib.figure import SubFigure
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from .chart import box, explain_frames
 from .fields import Field
@@ -27,10 +28,13 @@ def draw_surface(panel: SubFigure, field: Field, nodes: Any) -> None:
     dots = _positions(nodes).reshape(-1, 3)
     dots = dots[np.isfinite(dots[:, 0])]
     axes = box(panel, [], [np.concatenate([positions[known], dots])], below=0.4)
-    look: Any = {"rstride": 1, "cstride": 1, "linewidth": 0, "color": _FACE, "antialiased": False, "lightsource": _SUN}
-    # The order of the axes decides which side of the surface is bright.
-    upwards = np.nansum(np.cross(np.diff(positions, axis=0)[:, 1:], np.diff(positions, axis=1)[1:])[..., 2]) > 0
-    axes.plot_surface(*np.moveaxis(positions.swapaxes(0, 1) if upwards else positions, -1, 0), **look)
+    areas = np.nan_to_num(np.cross(np.diff(positions, axis=0)[:, 1:], np.diff(positions, axis=1)[1:]))
+    # A surface without area has no bright side. The order of the axes decides which side that is.
+    shade = bool(np.any(areas))
+    look: Any = {"linewidths": 0, "facecolors": _FACE, "antialiaseds": False, "shade": shade, "lightsource": _SUN}
+    grid = positions if areas[..., 2].sum() > 0 else positions.swapaxes(0, 1)
+    faces = np.stack([grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]], axis=2).reshape(-1, 4, 3)
+    axes.add_collection3d(Poly3DCollection(faces[np.isfinite(faces).all(axis=(1, 2))], **look))
     symbols = _positions(field.symbols)
     # Lines on the surface at the pixels that are closest to the symbols.
     fine, (left, right, low, high) = _positions(field.pixels), field.extent
