@@ -16,7 +16,7 @@ unexport PYTHONDONTWRITEBYTECODE
 # Cargo would try to use the job server of make, which its recipes do not inherit.
 unexport MAKEFLAGS MFLAGS
 
-.PHONY: demo check check-rust check-types check-python test test-oracles test-torch test-aarch64 fuzz bench docs wheel \
+.PHONY: demo check check-lints check-rust check-types check-python test test-oracles test-torch test-aarch64 fuzz bench docs wheel \
 	sdist test-wheel crate crate-msrv crate-semver publish-wheels publish-crates publish-npm check-tools clean \
 	docs-check wasm test-wasm
 
@@ -24,12 +24,15 @@ demo: .venv/built .venv/plot
 	$(BIN)/python examples/storms/demo.py --out demo-output
 
 # Format, lints, spelling, types, docstrings, and the laws of every space in Rust: what to run before a commit.
-check: check-types check-rust check-python
+check: check-types check-lints check-rust check-python
 
-# With --release, the crates that were compiled for the module are used again. Clippy need not wait for them.
-check-rust: | check-tools
+# Clippy has its own folder, so that it does not wait for the compiled module.
+check-lints: | check-tools
 	cargo fmt --all --check
 	cargo clippy --quiet --release --all-targets --target-dir target/clippy -- -D warnings
+
+# With --release, the crates that were compiled for the module are used again.
+check-rust: .venv/built
 	cargo test --quiet --release --workspace --exclude symspline-benches
 
 check-types: .venv/tools

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from compare import parts
+from scipy.spatial.transform import Rotation
 from tabular import numbered, numbers, read_table, table, write, write_table
 
 import symspline as ss
@@ -165,3 +166,41 @@ def test_tracks_with_posteriors_of_both_kinds_are_in_one_file(run):
         assert found[name] == alone
         np.testing.assert_array_equal(found[name].std([0.3, 2.2]), alone.std([0.3, 2.2]))
     run("check m.npz")
+
+
+def test_rows_that_are_probably_outliers_are_named(run, fails):
+    rng = np.random.default_rng(3)
+    t = np.cumsum(rng.uniform(0.5, 1.5, 40))
+    t[25:] += 30
+    turns = np.stack([np.sin(0.1 * t), np.cos(0.05 * t), 0.02 * t], axis=1) + 0.01 * rng.standard_normal((40, 3))
+    turns[17] += [0, 2.5, 0]
+    q = Rotation.from_rotvec(turns).as_quat(scalar_first=True)
+    columns = {"t": t, **dict(zip(("qw", "qx", "qy", "qz"), q.T, strict=True))}
+    write_table("a.csv", columns)
+    note = "a.csv, line 19: the point is probably an outlier, "
+    out = run("fit a.csv --space so:3 -o a.npz", notes=True)
+    assert note in out and " from its neighbours, and most steps are 0." in out
+    assert "; omit outliers, or fit near the points with --smooth --robust" in out
+    size = min(ss.space("so:3").distance(ss.load("a.npz").points[17], ss.load("a.npz").points[[16, 18]]))
+    assert f"{note}{size:.3g} from its neighbours" in out
+    out = run("fit a.csv --space so:3 --smooth -o a.npz", notes=True)
+    assert note in out and " from the curve, and half of the points are within 0." in out
+    assert "--robust reduces the influence of outliers" in out
+    assert "outlier" not in run("fit a.csv --space so:3 --smooth --robust -o a.npz")
+    # A table without outliers, also with a gap or points at rest, has no such note.
+    turns[17] -= [0, 2.5, 0]
+    turns[30:] = turns[30]
+    q = Rotation.from_rotvec(turns).as_quat(scalar_first=True)
+    write_table("a.csv", {"t": t, **dict(zip(("qw", "qx", "qy", "qz"), q.T, strict=True))})
+    assert "outlier" not in run("fit a.csv --space so:3 -o a.npz")
+    assert "outlier" not in run("fit a.csv --space so:3 --smooth -o a.npz")
+
+
+def test_outliers_of_positions_on_the_earth_are_in_degrees(run):
+    lon = np.linspace(10, 12, 30)
+    lon[9] += 5
+    lon[20] -= 7
+    write_table("a.csv", {"t": np.arange(30), "lon": lon, "lat": np.zeros(30)})
+    out = run("fit a.csv --lonlat -o a.npz", notes=True)
+    assert "line 11: the point is probably an outlier (and in 1 other row), 4.93° from its neighbours" in out
+    assert "most steps are 0.069°" in out

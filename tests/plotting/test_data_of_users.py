@@ -33,7 +33,7 @@ def test_segments_near_noisy_points_show_their_data_and_bands(shift):
     seen = np.concatenate(seen)
     np.testing.assert_allclose(seen[:, 1], y[:, 0])
     np.testing.assert_allclose(np.diff(seen[:, 0]), np.diff(t))
-    assert {"data", "95 % band of curve"} <= set(texts_of(figure))
+    assert {"data", "95 % band of curve and speed"} <= set(texts_of(figure))
     assert "given points" not in texts_of(figure)
     # The bands are those of the segments, and not drawn in the gap.
     for name, nu in (("x", 0), ("velocity", 1)):
@@ -299,8 +299,12 @@ def test_a_body_that_turns_on_the_spot_is_drawn_at_several_angles():
 @pytest.mark.parametrize("name", ["sphere:3", "su:2", "cp:1"])
 def test_angles_that_are_twice_the_distances_are_explained(name):
     figure = rendered(spline_on(name).plot())
-    assert any(text.endswith(("twice the distances of states", "frames turn at 2|γ′|")) for text in texts_of(figure))
-    assert rate_axes(figure)[0][0].get_ylabel() == "speed\n|γ′|, rad/t"
+    label = rate_axes(figure)[0][0].get_ylabel()
+    if name == "cp:1":
+        assert label == "speed\n|γ′|, rad/t"
+        assert any(text.endswith("angles are twice the distances of states") for text in texts_of(figure))
+    else:
+        assert label == "speed\n|γ′| = |ω|/2, rad/t"
 
 
 def test_symbols_that_are_omitted_are_counted():

@@ -38,7 +38,7 @@ def test_given_frames_and_the_curve_have_a_row_each(name):
     assert set(spline.t) <= set(times) and len(times) > 8
     for ends in pairwise(spline.t):
         np.testing.assert_allclose(np.diff(times[(times >= ends[0]) & (times <= ends[1])], 2), 0, atol=0.02)
-    for row, (arrows, times, size) in enumerate(((given, spline.t, 0.38), (curve, curve.X[::3], 0.38))):
+    for row, (arrows, times, size) in enumerate(((given, spline.t, REACH), (curve, curve.X[::3], REACH))):
         np.testing.assert_allclose(arrows.X, np.repeat(times, 3), atol=4 / 1000)
         assert set(arrows.Y) == {-row}
         right_up = np.sort(np.hypot(arrows.U, arrows.V).reshape(-1, 3))

@@ -274,3 +274,39 @@ def test_curves_are_enlarged_if_the_frame_is_on_the_globe(size, is_part):
     if is_part:
         corners = np.abs([figure.axes[0].get_xlim(), figure.axes[0].get_ylim()]).max(axis=1)
         assert np.linalg.norm(corners) < 1
+
+
+def test_the_start_of_a_curve_around_the_globe_is_in_front():
+    rng = np.random.default_rng(5)
+    for _ in range(8):
+        lon = np.cumsum(rng.uniform(8, 17, 10)) + rng.uniform(-180, 180)
+        spline = ss.CubicSpline(None, from_lonlat(lon, 50 * np.sin(lon / 40)), "sphere:2")
+        axes = rendered(spline.plot()).axes[0]
+        starts = [line.get_xydata()[0] for line in axes.lines if line.get_label() == "_start"]
+        (start,) = [own for own in starts if np.isfinite(own).all()]
+        assert np.linalg.norm(start) < np.sqrt(1 - 0.3**2)
+
+
+@pytest.mark.parametrize("name", ["r:2", "h:2", "sphere:2", "rp:2", "cp:1"])
+def test_arrow_heads_are_away_from_points_and_the_end_is_marked(name):
+    for seed in range(4):
+        space, rng = ss.space(name), np.random.default_rng(seed)
+        points = [space.random_point(rng)]
+        for _ in range(7):
+            points.append(space.exp(points[-1], 0.25 * space.random_tangent(rng, points[-1])))
+        spline = ss.CubicSpline(None, np.array(points), space)
+        figure = rendered(spline.plot())
+        axes = figure.axes[0]
+        (heads,) = [own for own in axes.collections if own.get_label() == "_time"]
+        at = axes.transData.transform(heads.get_offsets())
+        dots = [line.get_xydata() for line in axes.lines if line.get_label() == "_given"]
+        dots = axes.transData.transform(np.concatenate(dots))
+        dots = dots[np.isfinite(dots[:, 0])]
+        line = np.concatenate([own.get_xydata() for own in axes.lines if own.get_gid() == "_curve"])
+        length = np.nansum(np.linalg.norm(np.diff(axes.transData.transform(line), axis=0), axis=1))
+        gaps = np.linalg.norm(at[:, None] - dots, axis=-1).min(axis=1)
+        # A third of the space between two of eight points, at least for all but one arrow head.
+        assert len(at) >= 2 and np.sort(gaps)[1] > length / 7 / 8
+        ends = [own.get_xydata() for own in axes.lines if own.get_label() == "_end"]
+        assert np.isfinite(np.concatenate(ends)).all(axis=1).sum() == 1
+        assert "end" in texts_of(figure)

@@ -39,8 +39,12 @@ def test_small_multiples_are_the_film(n):
     figure = rendered(morph.plot())
     strip, *multiples = figure.axes
     assert len(outlines(strip)) == 25 + 5 and len(multiples) == 12
-    assert "5 drawings of 6 landmarks" in texts_of(figure)
-    film = morph(np.linspace(0, 4, 12))
+    assert "5 drawings of 6 landmarks, filled or in bold frames; others: between them" in texts_of(figure)
+    times = np.linspace(0, 4, 12)
+    times[np.abs(np.subtract.outer(KNOTS, times)).argmin(axis=1)] = KNOTS
+    film = morph(times)
+    bold = [axes.spines["left"].get_linewidth() > 1 for axes in multiples]
+    assert bold == [x in KNOTS for x in times] and sum(bold) == 5
     for axes, drawing in zip(multiples, film, strict=True):
         (outline,) = outlines(axes)
         if n == 2:

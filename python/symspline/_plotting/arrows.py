@@ -12,10 +12,10 @@ from .style import Array
 
 _HEAD = np.array([[0.09, 0.0], [-0.06, 0.065], [-0.025, 0.0], [-0.06, -0.065]])
 """Corners in inches."""
-_SHARES, _FEW_SHARES = (0.2, 0.5, 0.8), (0.3, 0.7)
-"""Parts of the length at which a single curve has arrow heads, and at which several curves have them."""
-_NEAR = np.linspace(-0.1, 0.1, 21)
-"""How far they are moved away from given points."""
+_HEADS, _FEW_HEADS, _SHORT = 3, 2, 0.04
+"""Numbers of arrow heads of a single curve and of one of several, and the share of parts that have none."""
+_NEAR = np.linspace(-0.3, 0.3, 21)
+"""How far they are moved away from given points, as parts of the length that belongs to each."""
 
 
 def draw_arrows(axes: Axes, curve: Curve, positions: Array, dots: Array) -> None:
@@ -33,8 +33,16 @@ def draw_arrows(axes: Axes, curve: Curve, positions: Array, dots: Array) -> None
     moved = curve.at("speed").max() * (curve.x[-1] - curve.x[0])
     if moved <= 1e-12 * np.abs(curve.points).max() or not total[-1] > 0:
         return
-    wanted = np.add.outer(_SHARES if curve.alone else _FEW_SHARES, _NEAR)
-    near = np.searchsorted(total, wanted * total[-1])
+    # Every part of a line that is broken has an arrow head, unless it is very short.
+    starts = np.flatnonzero(np.diff(np.isfinite(positions[:, 0]).astype(int), prepend=0) == 1)
+    parts = np.diff(total[np.minimum(starts, len(total) - 1)], append=total[-1])
+    number = _HEADS if curve.alone else _FEW_HEADS
+    counts = [max(int(share > _SHORT), round(number * share)) for share in (parts / total[-1]).tolist()]
+    shares = [(np.arange(count) + 0.5) / max(count, 1) for count in counts]
+    first = total[np.minimum(starts, len(total) - 1)]
+    wanted = np.concatenate([own + part * share for own, part, share in zip(first, parts, shares, strict=True)])
+    reach = np.concatenate([np.full(count, part / max(count, 1)) for count, part in zip(counts, parts, strict=True)])
+    near = np.searchsorted(total, wanted[:, None] + np.multiply.outer(reach, _NEAR))
     if curve.noise is None and np.isfinite(dots).any():
         dots = dots[np.isfinite(dots[:, 0])]
         free = np.linalg.norm(positions[near][..., None, :] - dots, axis=-1).min(axis=-1)

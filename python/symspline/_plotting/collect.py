@@ -18,7 +18,7 @@ from .._input import UTC_ZONE
 from .._spaces import Product, Space, cover_of
 from .._time import TimeAxis
 from .curves import SECOND, Axis, Batch, Curve
-from .figure import PATHS
+from .figure import FRAMES, PATHS
 from .style import DISTINCT, SPLINE, Array, colors, evenly, named_from, round_start
 
 FEW, _OF_MANY = 5, 3
@@ -101,7 +101,8 @@ def curves_of(
     if mean is not None:
         # Pictures of paths show the other curves as thin lines, and others show two of them.
         few = drawn if paths else few[[0, -1]]
-        looks = {} if paths else dict(zip(few.tolist(), DISTINCT[1:3], strict=True))
+        usual = OTHERS[::4] if str(cover_of(curve.space)) in FRAMES else DISTINCT[1:]
+        looks = {} if paths else dict(zip(few.tolist(), usual, strict=False))
         made = [replace(mean, has_start=paths)]
     # Curves with points come first.
     for i in [*looks, *(i for i in drawn.tolist() if i not in looks)]:

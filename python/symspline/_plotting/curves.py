@@ -29,6 +29,7 @@ _POINTS = {
     "cp:1 cgr:1,2": "states of a qubit",
 }
 _POINTS = {name: words for names, words in _POINTS.items() for name in names.split()}
+_FAMILIES = {"spd": "positive definite matrices", "stiefel": "orthonormal frames", "gr": "subspaces"}
 """What the points of a space are, for titles."""
 SECOND = np.timedelta64(1, "s")
 _NO_GAPS: Array = np.empty((0, 2))
@@ -494,7 +495,8 @@ def common_gaps(curves: Sequence[Curve]) -> Array:
 
 def points_of(space: Space[Any]) -> str:
     """Return what the points of a space are, or nothing."""
-    return _POINTS.get(str(cover_of(space)), "")
+    name = str(cover_of(space))
+    return _POINTS.get(name) or _FAMILIES.get(name.partition(":")[0], "")
 
 
 def title_on(what: str, space: Space[Any], most: int = 63) -> str:

@@ -74,7 +74,7 @@ _DRAWN: list[tuple[str, Callable[[Any, Sequence[Curve]], None], tuple[float, ...
 ]
 _PICTURES = {name: Picture(draw, *size) for names, draw, size in _DRAWN for name in names.split()}
 _FAMILIES = dict.fromkeys(("rp", "cp", "hp", "gr", "cgr"), Picture(graphs.draw_principal_angles, 10.5, 3.8))
-_FAMILIES["spd"] = Picture(matrices.draw_covariances, 10.5, 5.2)
+_FAMILIES["spd"] = Picture(matrices.draw_covariances, 10.5, 5.8)
 _FAMILIES["stiefel"] = Picture(columns.draw_columns, 10.5, 4.6)
 _FAMILIES["torus"] = Picture(graphs.draw_torus, 10.5, 3.8)
 _FAMILIES["ch"] = Picture(graphs.draw_ratios, 10.5, 3.8)
@@ -227,14 +227,15 @@ def picture_of_factors(curves: Sequence[Curve]) -> Picture:
     width = -(-len(factors) // rows)
 
     def draw(panel: SubFigure, curves: Sequence[Curve]) -> None:
+        graphs_only = any(matrices.are_graphs([own.part(i) for own in curves]) for i in range(len(factors)))
         cells = np.asarray(panel.subfigures(2 * rows, width, height_ratios=[0.3, 4.3] * rows))
         for i, factor in enumerate(factors):
             row, column = divmod(i, width)
             caption, cell = cells[2 * row : 2 * row + 2, column]
             caption.text(0.5, 0.3, names[i], ha="center", color=INK, fontsize=points(12))
             parts = [curve.part(i) for curve in curves]
-            if str(factor) == "euclidean:3" and any(len(curve.gaps) for curve in parts):
-                # A time axis shows the gap. It is that of the rates below.
+            if str(factor) == "euclidean:3" and (graphs_only or any(len(curve.gaps) for curve in parts)):
+                # A time axis shows gaps, and how positions and rotations belong together.
                 graphs.draw_coordinates(cell, [own for part in parts for own in part.unbroken], ["x₁", "x₂", "x₃"])
             else:
                 draw_picture(cell, factor, parts)

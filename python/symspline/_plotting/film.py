@@ -39,12 +39,12 @@ def plot_film(t: NDArray[Any], landmarks: Array, film: Callable[[Any], Array], f
     drawings, count, n = landmarks.shape
     if n > 3:
         raise ValidationError(f"pictures of landmarks are made in 2 or 3 dimensions, not in {n}")
-    strip, multiples = _times(t, _STRIP), _times(t, _ROWS * _COLUMNS)
+    strip, multiples = _times(t, _STRIP), _with_given(_times(t, _ROWS * _COLUMNS), t)
     seen = [film(x) if n == 2 else film(x) @ VIEW[:2].T for x in (t, strip, multiples)]
     # Every drawing fits into a square of this size around its centre.
     size = 2.1 * max(float(np.abs(_centred(x)).max()) for x in seen)
     middle, half = window(seen[2].reshape(-1, 2), 1.25)
-    words = f"{drawings} drawings of {count} landmarks, filled; thin: between them"
+    words = f"{drawings} drawings of {count} landmarks, filled or in bold frames; others: between them"
     words += "; 0: first landmark" * (count > _NUMBERED)
     with drawing((_WIDTH, _HEIGHT)) as figure:
         heading(figure, "Morph along a C² spline of affine shapes", words, 0.93)
@@ -54,7 +54,7 @@ def plot_film(t: NDArray[Any], landmarks: Array, film: Callable[[Any], Array], f
             axes = figure.add_axes((0.03 + column * 0.157, 0.26 - row * 0.25, 0.15, 0.24), aspect="equal")
             axes.set(xticks=[], yticks=[])
             axes.set(xlim=(middle[0] - half, middle[0] + half), ylim=(middle[1] - half, middle[1] + half))
-            _draw_one(axes, x, landmarks, time_colors(i / (len(multiples) - 1)))
+            _draw_one(axes, x, landmarks, time_colors(i / (len(multiples) - 1)), bool(np.any(x == t)))
     return finish(figure, file, False)
 
 
@@ -65,6 +65,15 @@ def _times(t: NDArray[Any], number: int) -> NDArray[Any]:
         t = t.astype("datetime64[us]")
     times: NDArray[Any] = t[0] + (t[-1] - t[0]) * np.arange(number) / (number - 1)
     times[-1] = t[-1]
+    return times
+
+
+def _with_given(times: NDArray[Any], t: NDArray[Any]) -> NDArray[Any]:
+    """Return times with given ones in place of the closest ones, if they are few."""
+    t = t.astype(np.result_type(times, t))
+    places = np.abs(np.subtract.outer(t, times)).argmin(axis=1)
+    if len(np.unique(places)) == len(t):
+        times[places] = t
     return times
 
 
@@ -101,9 +110,9 @@ def _draw_strip(axes: Axes, t: NDArray[Any], strip: NDArray[Any], given: Array, 
             axes.fill(at + x, y, facecolor=(color, fill), edgecolor=color, linewidth=width, zorder=3 + bold)
 
 
-def _draw_one(axes: Axes, x: Any, drawing: Array, color: Any) -> None:
-    """Draw one drawing at its position, with the numbers of its landmarks if they are few."""
-    axes.spines[:].set(color=EDGE, linewidth=0.5)
+def _draw_one(axes: Axes, x: Any, drawing: Array, color: Any, given: bool) -> None:
+    """Draw one drawing at its position, with the numbers of its landmarks if they are few. Given ones have a frame."""
+    axes.spines[:].set(color=INK if given else EDGE, linewidth=1.4 if given else 0.5)
     axes.fill(*drawing.T, facecolor=(color, 0.15), edgecolor=color, linewidth=1.4)
     axes.plot(*drawing.T, "o", color=color, markersize=float(np.clip(12 / np.sqrt(len(drawing)), 1.2, 3)))
     look: Any = {"textcoords": "offset points", "fontsize": points(7), "color": INK, "path_effects": HALO}

@@ -17,6 +17,8 @@ from .style import EDGE, GRID, HALO, INK, MARK, PAPER, Array, closest, points
 SEA = LinearSegmentedColormap.from_list("sea", ["#c3d3de", "#dfe9ef", "#f4f8fa"])
 _CLEAR = 0.12
 """Distance of a label from curves, if the radius of the globe is 1."""
+_FRONT, _START = 0.3, 0.15
+"""Height of points that are well in front, and what it is worth if the first one is, as a part of the points."""
 _STEPS = np.append(np.multiply.outer(10.0 ** np.arange(-9, 1), [1, 2, 5]).ravel(), [10, 15, 30, 45, 90])
 
 
@@ -81,6 +83,24 @@ def middle_of(points: Array) -> tuple[float, float]:
         middle = middle / np.linalg.norm(middle) + (0.6 if normal[2] >= 0 else -0.6) * normal
     lon, lat = to_lonlat(middle)
     return float(lon), float(lat)
+
+
+def facing(points: Array, lats: tuple[float, float]) -> View:
+    """Return the view above a latitude in a range in which most points, and the first of them, are well in front.
+
+    It is close to that of `middle_of`.
+    """
+    points = np.concatenate([points[:1], points[:: 1 + len(points) // 500]])
+    lon, lat = middle_of(points)
+    best, highest = View.above(lon, float(np.clip(lat, *lats))), -np.inf
+    for aside in range(-75, 76, 15):
+        for up in range(-30, 31, 15):
+            view = View.above(lon + aside, float(np.clip(lat + up, *lats)))
+            height = points @ view.up
+            score = np.mean(height > _FRONT) + _START * (height[0] > _FRONT) - 1e-3 * np.hypot(aside, up)
+            if score > highest:
+                best, highest = view, float(score)
+    return best
 
 
 def draw_globe(axes: Axes, view: View, spacing: int, half: bool = False) -> None:

@@ -450,6 +450,8 @@ def draw_principal_angles(panel: SubFigure, curves: Sequence[Curve]) -> None:
         words = "angles between subspaces do not exceed 90°, where they turn back"
         axes: Any = panel.axes[0]
         axes.set_title(words, loc="left", color=INK, fontsize=points(9), pad=3)
+        axes.yaxis.set_major_locator(MultipleLocator(30))
+        axes.axhline(90, color=EDGE, linewidth=0.8, zorder=1)
 
 
 def principal_angles(points: NDArray[Any], first: NDArray[Any]) -> Array:

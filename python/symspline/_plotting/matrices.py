@@ -36,6 +36,7 @@ from .style import (
     LEFT,
     OWN_AXES,
     RIGHT,
+    SPLINE,
     Array,
     apart,
     axes_size,
@@ -56,8 +57,8 @@ _MANY = 24
 """The number of bodies of all curves, or two per curve if that is more."""
 _FRAMES = 16
 """The number of frames in space, and of lighter ones between them."""
-_LEAST, _SHORT = 12.0, 0.38
-"""Arrows are shorter than the time axis by the first factor, and their length in inches below given ones."""
+_LEAST, _SHORT = 12.0, 0.32
+"""Arrows are shorter than the time axis by a factor, and the smallest length in inches if there are many."""
 _PAIRS = 15
 """The largest number of correlations that have names."""
 _FAN = np.radians(30)
@@ -86,19 +87,15 @@ def draw_rotations(panel: SubFigure, curves: Sequence[Curve]) -> None:
         return
     matrices = MATRICES[str(cover_of(curves[0].space))]
     rows = Rows.of(panel, curves)
-    # Below given frames there are others between them.
-    most = _SHORT if [row.name for row in rows.rows] == ["given", "curve"] else REACH
-    length = min(most, 0.48 * rows.height, rows.width / _LEAST)
+    length = min(max(_SHORT, min(REACH, 1.2 * rows.reach_between())), 0.48 * rows.height, rows.width / _LEAST)
     words = _left_out(rows, curves)
     for i, row in enumerate(rows.rows):
-        times, symbols, radii = rows.symbols(i, length)
+        times, symbols, radii = rows.symbols(i, 0.8 * length)
         frames = matrices(symbols)
         if radii is not None:
             _draw_discs(rows, i, times, length, frames, radii)
             words = "discs: 95 % bands"
         _draw_arrows(rows.axes, times, -i, length * frames, light=row.name == "data")
-    if str(cover_of(curves[0].space)) in ("sphere:3", "su:2"):
-        words = "; ".join(filter(None, (words, "frames turn at 2|γ′|")))
     _explain(rows.axes, words, rows.width)
     rows.draw_view()
 
@@ -306,7 +303,9 @@ def draw_poses(panel: SubFigure, curves: Sequence[Curve]) -> None:
             axes.plot(*sticks.reshape(-1, 3).T, color=color, zorder=5, **look)
 
     for curve, path in zip(curves, paths, strict=True):
-        curve.draw_line(axes, path, linewidth=2.0 if curve.alone else 1.4)
+        # The usual colour is that of the third axis.
+        dark = {"color": INK} if curve.alone and curve.color == SPLINE and not len(curve.gaps) else {}
+        curve.draw_line(axes, path, linewidth=2.0 if curve.alone else 1.4, **dark)
         for group, (_, poses) in curve.samples(number).items():
             if group != "bold":
                 draw(poses, 0.7 * length, linewidth=1.2, alpha=0.7)
@@ -341,7 +340,7 @@ def draw_covariances(panel: SubFigure, curves: Sequence[Curve]) -> None:
     names = [f"σ{i + 1}".translate(SUBSCRIPTS) for i in range(n)]
     entries = np.reshape(component_names((n, n), False), (n, n))
     pairs = [f"ρ{entry[1:]}" for entry in entries[rows, columns].tolist()]
-    panels: Any = panel.subfigures(2, 1, height_ratios=[1, 1.2])
+    panels: Any = panel.subfigures(2, 1, height_ratios=[1.2, 1])
     draw_numbers(panels[0], curves, "standard\ndeviations", names, deviations)
     panels[0].axes[0].set_xlabel("")
     (axes,) = timelines(panels[1], curves, ["correlations"], marked=False)
@@ -396,7 +395,7 @@ def _draw_in_rows(view: Array, panel: SubFigure, curves: Sequence[Curve]) -> Non
     across, high = (
         np.sqrt(max(float((view[i] @ row.curve.extent @ view[i]).max()) for row in rows.rows)) for i in (0, 1)
     )
-    inches = min(REACH / across, 0.45 * rows.height / high)
+    inches = min(max(0.65 * REACH, min(REACH, rows.reach_between())) / across, 0.45 * rows.height / high)
     words = ["half axes: √eigenvalues", _left_out(rows, curves)]
     for i in range(len(rows.rows)):
         times, symbols, radii = rows.symbols(i, 1.05 * inches * across)

@@ -260,7 +260,8 @@ def _explain(figure: Figure, curves: Sequence[Curve], height: float, others: int
     if DATA_DOTS in drawn and all(own.has_line for own in few):
         add(Line2D([], [], color=DATA, **dot), "data")
     if BAND in drawn:
-        add(Patch(facecolor=few[0].color, alpha=0.22), "95 % band of curve")
+        both = few[0].noise is not None and few[0].noise.speed is not None
+        add(Patch(facecolor=few[0].color, alpha=0.22), "95 % band of curve" + " and speed" * both)
     if AFTER in drawn:
         add(Line2D([], [], color=AFTER_COLOR, linewidth=2), "after the first gap")
     if BRIDGE in drawn:

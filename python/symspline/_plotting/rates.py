@@ -28,6 +28,8 @@ _SLOW = 0.01
 """Rates that are smaller per second are per hour, day or year."""
 _LONG = (3600, "h"), (86_400, "d"), (31_557_600, "yr")
 """Longer units of time in seconds, and their names."""
+_QUATERNIONS = {"sphere:3", "su:2"}
+"""Spaces whose points turn frames, at an angular velocity ω of twice their speed."""
 _LONGEST = 10
 """Number of letters of a space in the label of an axis."""
 At = Callable[[str], Any]
@@ -93,13 +95,14 @@ def rates_of(space: Space[Any], seconds: bool) -> list[Rate]:
     per = [", 1/s", ", 1/s²"] if seconds else ["", ""]
     if isinstance(own, (Sphere, Torus)) or str(own) in _ANGULAR or str(own) in _HALVES:
         per = [", rad/s", ", rad/s²"] if seconds else [", rad/t", ", rad/t²"]
+    half = [" = |ω|/2", " = |ω′|/2"] if str(own) in _QUATERNIONS else ["", ""]
     if isinstance(own, SpecialEuclidean):
         return _rates_of_poses(own, seconds)
     sign = _SIGNS.get(str(own))
     if sign is None:
         return [
-            Rate(f"speed\n|γ′|{per[0]}", 1, lambda at: at("speed")),
-            Rate(f"acceleration\n|∇γ′|{per[1]}", 2, lambda at: at("bend")),
+            Rate(f"speed\n|γ′|{half[0]}{per[0]}", 1, lambda at: at("speed")),
+            Rate(f"acceleration\n|∇γ′|{half[1]}{per[1]}", 2, lambda at: at("bend")),
         ]
     return [
         Rate(f"velocity\nγ′{per[0]}", 1, lambda at: np.copysign(at("speed"), sign(at("point"), at("velocity"))), True),
@@ -221,7 +224,6 @@ def _draw_rate(axes: Axes, curves: Sequence[Curve], rate: Rate) -> None:
             median = np.median(rate.values(curve.batch.at), axis=0)
             axes.plot(curve.batch.times, median, color=INK, linewidth=1.4, label=MEDIAN)
             drawn += [float(median.min()), float(median.max())]
-            continue
         values = rate.values(curve.at)
         deviation = curve.noise.speed if rate.order == 1 and curve.noise is not None else None
         if deviation is None:

@@ -59,8 +59,8 @@ class Row:
         """Return times on matplotlib's axis, points, and the radii of the band, for symbols that fit into the row.
 
         The time axis has ``width`` inches, and symbols extend by at most ``reach`` inches to the left and right. Given
-        points that are close together are omitted; samples of the curve are equidistant. If there is space for more
-        symbols than there are given points, the curve has one below each of them, and equidistant ones between.
+        points that are close together are omitted; samples of the curve are equidistant. If all given points have a
+        symbol, the curve has one below each of them, and equidistant ones between.
         """
         curve = self.curve
         if self.has_given:
@@ -73,9 +73,7 @@ class Row:
         nodes = curve.x[curve.knots]
         if curve.noise is None and curve.has_nodes and self.name and np.diff(nodes).min(initial=np.inf) > 0.55 * step:
             inner = [np.linspace(*ends, 1 + max(1, round((ends[1] - ends[0]) / step))) for ends in pairwise(nodes)]
-            if sum(map(len, inner)) >= 2.5 * len(inner):
-                # Otherwise the curve would have the given symbols again.
-                wanted = np.unique(np.concatenate(inner))
+            wanted = np.unique(np.concatenate(inner))
         even = np.searchsorted(curve.x, wanted)
         # There are no samples in gaps.
         even = np.unique(even[curve.x[even] - wanted < 0.1 * step])
@@ -127,6 +125,11 @@ class Rows:
         axes.set_yticks([])
         axes.spines["left"].set_visible(False)
         return cls(axes, rows, width, high / len(rows))
+
+    def reach_between(self) -> float:
+        """Return the reach of symbols of which one fits between any two given points."""
+        row = self.rows[-1]
+        return self.width / (4.2 * len(row.curve.given)) if row.name == "curve" and row.curve.noise is None else REACH
 
     def symbols(self, i: int, reach: float) -> tuple[Array, Any, Array | None]:
         """Name a row, and return its symbols, which extend by at most ``reach`` inches; see `Row.symbols`."""

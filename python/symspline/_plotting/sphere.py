@@ -20,7 +20,7 @@ from . import land
 from .arrows import draw_arrows
 from .bands import disc_indices, draw_tube
 from .curves import CIRCLE, Curve, interrupted
-from .globe import View, degrees, draw_frame, draw_globe, label_directions, middle_of
+from .globe import View, degrees, draw_frame, draw_globe, facing, label_directions, middle_of
 from .style import GRID, HALO, INK, MARK, PAPER, SPLINE, Array, inside, note, plain, points, round_below, size, window
 
 _SMALL, _SMALL_WIDE = np.radians([25, 50])
@@ -234,8 +234,7 @@ def _draw_globe(panel: SubFigure, vectors: Array, look: _Globe, above: Array | N
             draw_frame(axes, view, middle, half)
             axes.tick_params(labelsize=points(8))
             return axes, view, True
-    lon, lat = middle_of(vectors if above is None else above)
-    view = View.above(lon, float(np.clip(lat, *look.lats)))
+    view = facing(vectors if above is None else above, look.lats)
     axes = panel.add_axes(inside(panel, 0.1, look.below, look.right, 0.1))
     draw_globe(axes, view, look.spacing, look.half)
     if look.labels:

@@ -71,6 +71,7 @@ from ._columns import ORDERS, check_days, column_of_names, point_columns, split_
 from ._curves import Curves, write_curves
 from ._formats import CURVES, TABLES, endings, format_of, open_table
 from ._messages import VERBOSE, Problem, Progress, listed, refuse, say, tell
+from ._outliers import outliers
 from ._points import GLOBE, Columns, require_globe
 from ._recordings import Recordings
 from ._sensors import Fusion, sensors_of
@@ -199,12 +200,15 @@ def _fit_sensors(options: argparse.Namespace, smooth: dict[str, Any], fusion: Fu
 def _fit_points(options: argparse.Namespace, smooth: dict[str, Any] | None, data: Recordings, columns: Columns) -> None:
     """Fit curves through the points, or near them, and write them."""
     fitted = _fitted(data, options, smooth)
+    far = outliers(data, fitted, options.lonlat) if not options.robust else ""
     segmented = options.max_gap is not None and options.curve is None
     write_curves(options.output, Curves(dict(zip(data.groups, fitted, strict=True)), data.named, columns, segmented))
     words = f"{_summary.fitted(fitted, options.lonlat)}{data.changes()}{_summary.bridged(fitted)}"
     if not data.has_times and options.time is None:
         words += "; no column of times: the points are at 0, 1, 2, ..."
     tell(f"{called(options.output)}: {words}")
+    if far:
+        say(f"{data.path}, {far}")
 
 
 def _space(name: str | None, lonlat: bool) -> Space:
@@ -233,7 +237,8 @@ def _fitted(data: Recordings, options: argparse.Namespace, smooth: dict[str, Any
                 curves: Any = [(*curve, {}) for curve in data.curves]
                 fitted = smooth_many(curves, data.space, progress=progress, **common, **smooth)
     except SymsplineError as error:
-        raise error._with_message(data.located(error)) from None
+        far = outliers(data, None, options.lonlat)
+        raise error._with_message("; ".join(filter(None, (data.located(error), far)))) from None
     for note in noted:
         say(data.located(note.message).replace(IN_PYTHON, _FOR_ROTATIONS))
     return fitted

@@ -26,6 +26,8 @@ class Recordings:
 
     Attributes
     ----------
+    path : Source
+        File of the table.
     space : Space
     curves : list of tuple
         Times and points of each curve.
@@ -40,7 +42,7 @@ class Recordings:
 
     def __init__(self, path: object, rows: Rows, points: Any, space: Space, options: Namespace, hint: Hint) -> None:
         """Read the curves. ``hint`` returns a column that may hold the names of several curves."""
-        self._path, self._rows, self._points, self.space, self._hint = path, rows, points, space, hint
+        self.path, self._rows, self._points, self.space, self._hint = path, rows, points, space, hint
         self._options, self._smooth, self.has_times = options, options.smooth, rows.times.size > 0
         self.named = rows.labels is not None or options.max_gap is not None
         self.merged = self.alone = self.repeated = self.empty = 0
@@ -80,6 +82,10 @@ class Recordings:
         )
         return "".join(f"; {counted(count, 'row')} {what}" for count, what in counts if count)
 
+    def place(self, row: int) -> str:
+        """Describe the position of a row in the file."""
+        return self._rows.place(row)
+
     def located(self, note: Any) -> str:
         """Return the message of an error or a warning with lines of the file and names instead of numbers.
 
@@ -92,13 +98,13 @@ class Recordings:
         text = str(note)
         # A message is about a node and its neighbours.
         for i in () if node is None else range(max(node - 1, 0), min(node + 2, len(own))):
-            place = self._rows.place(int(own[i]))
+            place = self.place(int(own[i]))
             text = text.replace(f"points[{i}]", f"the point in {place}")
             if i < len(times):
                 text = text.replace(f"t[{i}] = {times[i]}", f"time {times[i]} in {place}")
         if curve:
             text = text.replace(f"curve {number}", f"curve {name!r}" if self.named else "the curve")
-        return f"{self._path}: {text}" if text != str(note) else text
+        return f"{self.path}: {text}" if text != str(note) else text
 
     def _segments(self, own: Index, of: str) -> list[tuple[tuple[Any, Any], Index]]:
         """Return the curves in the rows of one name, and the rows of each."""
@@ -120,7 +126,7 @@ class Recordings:
             found = cut(times, points, self.space, gap, 2, options.dedup or "raise", used)
         except CutLocusError:
             raise Problem(
-                f"{self._path}: points{of} with one time are too far apart to have a mean; --dedup first takes the "
+                f"{self.path}: points{of} with one time are too far apart to have a mean; --dedup first takes the "
                 "first of them"
             ) from None
         self.alone += len(first) - sum(map(len, found.rows))
@@ -130,7 +136,7 @@ class Recordings:
         """Raise `Problem` unless there are two points whose times increase, or do not decrease."""
         if len(own) < 2:
             where = f", {self._rows.place(int(own[0]))}" if len(own) else ""
-            raise Problem(f"{self._path}{where}: this is the only point{of}; a curve needs two")
+            raise Problem(f"{self.path}{where}: this is the only point{of}; a curve needs two")
         if not self._rows.times.size:
             return
         times = self._rows.times[own]
@@ -143,7 +149,7 @@ class Recordings:
             same, zone = times[i + 1] == times[i], " UTC" if self._rows.utc else ""
             repair = "--dedup first or mean makes one point of them" if same else "--sort puts the rows in order"
             raise Problem(
-                f"{self._path}, {here}: time {times[i + 1]}{zone}{of} does not come after {times[i]} in {before}; "
+                f"{self.path}, {here}: time {times[i + 1]}{zone}{of} does not come after {times[i]} in {before}; "
                 f"times must {'not decrease' if self._smooth else 'increase'}; {curves}{repair}"
             )
 
