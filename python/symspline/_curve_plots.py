@@ -118,7 +118,7 @@ class CurvePlots(CurveBase[P]):
 
         - S²: a globe and a map, or an enlarged part; H²: the Poincaré disk; R¹, R² and R³: the graph or the curve.
         - SO(3), O(3), SU(2) and S³ (unit quaternions, scalar first): rotated frames along the time axis. Graphs of the
-          rotation vectors, if rotations are small, have long gaps, or are a factor of a product.
+          rotation vectors, if rotations are small, noisy, have long gaps, or are a factor of a product.
         - S¹, SO(2), O(2), U(1), RP¹ and Gr(1, 2): the continuous angle against time.
         - SE(3): frames along the path of the positions; SE(2): arrow heads on it.
         - CP¹ and the complex Gr(1, 2): the Bloch sphere.
@@ -182,8 +182,9 @@ class CurvePlots(CurveBase[P]):
         other measurement in standard deviations, and one with the radius of the 95 % band if the first panel does not
         show the band.
 
-        Of a batch of more than five curves, three are drawn with their points. Areas between the 5 % and the 95 %
-        quantile represent the others where numbers are drawn against time, and thin lines do so elsewhere.
+        Of a batch of more than five curves, three are drawn with their points, or their mean if they are close to it.
+        Areas between the 5 % and the 95 % quantile represent the others where numbers are drawn against time, and thin
+        lines do so elsewhere.
 
         Times that are far from zero, such as seconds since 1970, are shown as differences from a round number, which
         the label of the axis names.

@@ -363,7 +363,8 @@ class AffineMorph:
     def plot(self, file: File | None = None) -> Figure:
         """Plot a film strip and small multiples of the film, in the plane or in space.
 
-        Up to twelve landmarks have their numbers; of more, only the first one has.
+        Up to twelve landmarks have their numbers; of more, only the first one has. Given drawings are filled in the
+        strip, and have bold frames among the small multiples.
 
         Parameters
         ----------

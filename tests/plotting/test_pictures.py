@@ -176,7 +176,7 @@ def test_states_are_drawn_on_the_bloch_sphere(size, zoomed):
     assert not labels or labels["|0⟩"][1] > 1 > -1 > labels["|1⟩"][1]
 
 
-# Through the rim three times, and along it.
+# Farther than half around, and along a great circle.
 HALF_SPHERE = ss.Sphere(2).project(
     np.array([[1.0, 0, 1], [1, 0.5, 0.2], [0.5, 1, -0.3], [-0.5, 1, -0.2], [-1, 0, 0.3], [-1, -1, -0.4]])
 )
@@ -192,17 +192,18 @@ def planes(normals, rng):
 
 
 @pytest.mark.parametrize("name", ["rp:2", "gr:1,3", "gr:2,3"])
-@pytest.mark.parametrize("points, crossings", [(HALF_SPHERE, 3), (RIM, 0)])
-def test_no_line_jumps_across_the_half_sphere(name, points, crossings):
+@pytest.mark.parametrize("points, crosses", [(HALF_SPHERE, True), (RIM, False), (HALF_SPHERE[:4], False)])
+def test_no_line_jumps_across_the_half_sphere(name, points, crosses):
+    """The half sphere is that around the curve, which leaves it only if it is too long."""
     rng = np.random.default_rng(13)
     signs = rng.choice([-1, 1], (len(points), 1))
     made = {"rp:2": points * signs, "gr:1,3": (points * signs)[:, :, None], "gr:2,3": planes(points, rng)}
     spline = ss.CubicSpline(None, made[name], name)
     axes = rendered(spline.plot()).axes[0]
-    (far, near), (dots, _) = [line for line in lines_of(axes) if len(line) > 1000], dots_of(axes)
-    line = np.where(np.isnan(near), far, near)
+    (line,) = [line for line in lines_of(axes) if len(line) > 1000]
+    dots, _ = dots_of(axes)
     broken = np.isnan(line[:, 0])
-    assert broken.sum() == crossings
+    assert (broken.sum() > 0) == crosses
     assert np.nanmax(np.linalg.norm(np.diff(line, axis=0), axis=1)) < 0.05
     # At a break the line goes on at the opposite point.
     (gaps,) = np.nonzero(broken)
@@ -216,9 +217,10 @@ def test_crossings_of_the_rim_have_equal_letters():
     letters = {}
     for text in axes.texts:
         letters.setdefault(text.get_text(), []).append(np.array(text.get_position()))
-    assert all(len(letters[name]) == 2 for name in "abc") and "d" not in letters
-    for first, second in (letters[name] for name in "abc"):
-        # The projection of the rim is an ellipse with the middle 0.
+    names = [name for name in "abc" if name in letters]
+    gaps = [np.isnan(line[:, 0]).sum() for line in lines_of(axes) if len(line) > 1000]
+    assert len(names) == min(gaps) > 0 and all(len(letters[name]) == 2 for name in names)
+    for first, second in (letters[name] for name in names):
         np.testing.assert_allclose(first, -second, atol=1e-9)
 
 

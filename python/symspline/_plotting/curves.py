@@ -29,14 +29,14 @@ _POINTS = {
     "cp:1 cgr:1,2": "states of a qubit",
 }
 _POINTS = {name: words for names, words in _POINTS.items() for name in names.split()}
-_FAMILIES = {"spd": "positive definite matrices", "stiefel": "orthonormal frames", "gr": "subspaces"}
+_FAMILIES = {"spd": "matrices", "stiefel": "orthonormal frames", "gr": "subspaces"}
 """What the points of a space are, for titles."""
 SECOND = np.timedelta64(1, "s")
 _NO_GAPS: Array = np.empty((0, 2))
 # Labels of artists that the legend of a page explains. Those with an underscore are not in legends of matplotlib.
 LINE, DOTS, START, DATA_DOTS, FAINT = "_curve", "_given", "_start", "_data", "_others"
 QUANTILES, BAND, BRIDGE, GAPS, POSES, BODIES = "_quantiles", "band", "_bridge", "gaps", "_poses", "_bodies"
-KNOTS, TICKS, END, AFTER, CONTROL = "_knots", "_ticks", "_end", "_after", "_control"
+KNOTS, TICKS, END, AFTER, CONTROL, BEHIND = "_knots", "_ticks", "_end", "_after", "_control", "_behind"
 WITH_POLYGON = {"euclidean:2", "euclidean:3", "sphere:2", "hyperbolic:2", "cp:1"}
 """Spaces whose picture shows the control points of a curve."""
 BODY: Array = np.array([[1.0, 0.0], [-0.7, 0.55], [-0.35, 0.0], [-0.7, -0.55], [1.0, 0.0]])

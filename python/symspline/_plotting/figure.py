@@ -101,7 +101,9 @@ def picture_of(space: Space) -> Picture:
 
 
 def fitted(picture: Picture, curves: Sequence[Curve]) -> Picture:
-    """Return the picture in a panel with about the proportions of the curves, if they are in the plane."""
+    """Return the picture in a panel with the proportions of curves in the plane, or with space for three graphs."""
+    if picture.draw is matrices.draw_rotations and matrices.are_graphs(curves):
+        return picture._replace(height=4.8)
     if picture.draw not in (chart.draw_plane, matrices.draw_flat_poses):
         return picture
     points = np.concatenate([curve.extent for curve in curves])

@@ -16,7 +16,7 @@ from .rows import VIEW
 from .style import DATES, EDGE, HALO, INK, Array, heading, plain, points, show_dates, time_colors, window
 
 # Drawings in the strip, and in each row of the small multiples.
-_STRIP, _ROWS, _COLUMNS = 25, 2, 6
+_STRIP, _ROWS, _COLUMNS = 19, 2, 6
 _WIDTH, _HEIGHT = 11.4, 7.6
 _NUMBERED = 12
 """The largest number of landmarks that all have their number; of more, the first one has it."""
@@ -104,10 +104,17 @@ def _draw_strip(axes: Axes, t: NDArray[Any], strip: NDArray[Any], given: Array, 
     # These units are equally long on paper in both directions.
     upright = np.array([half, 1]) * 1.9 / size
     for times, drawings, bold in ((positions, film, False), (knots, given, True)):
-        width, fill = (1.8, 0.25) if bold else (0.7, 0.0)
+        width, fill = (1.8, 0.25) if bold else (0.5, 0.0)
         for at, (x, y) in zip(times, np.moveaxis(_centred(drawings) * upright, -1, 1), strict=True):
             color = time_colors((at - positions[0]) / span)
-            axes.fill(at + x, y, facecolor=(color, fill), edgecolor=color, linewidth=width, zorder=3 + bold)
+            axes.fill(
+                at + x,
+                y,
+                facecolor=(color, fill),
+                edgecolor=(color, 1 if bold else 0.6),
+                linewidth=width,
+                zorder=3 + bold,
+            )
 
 
 def _draw_one(axes: Axes, x: Any, drawing: Array, color: Any, given: bool) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.patches import Circle
+from numpy.typing import NDArray
 
 from .._lonlat import from_lonlat, to_lonlat
 from .._spaces import Euclidean, Space
@@ -17,6 +18,8 @@ from .style import EDGE, GRID, HALO, INK, MARK, PAPER, Array, closest, points
 SEA = LinearSegmentedColormap.from_list("sea", ["#c3d3de", "#dfe9ef", "#f4f8fa"])
 _CLEAR = 0.12
 """Distance of a label from curves, if the radius of the globe is 1."""
+_RIM = 1e-9
+"""Rounding errors of points on the rim."""
 _FRONT, _START = 0.3, 0.15
 """Height of points that are well in front, and what it is worth if the first one is, as a part of the points."""
 _STEPS = np.append(np.multiply.outer(10.0 ** np.arange(-9, 1), [1, 2, 5]).ravel(), [10, 15, 30, 45, 90])
@@ -42,11 +45,15 @@ class View:
 
     def visible(self, points: Array) -> Array:
         """Return the projection of points on the near side; NaN, which breaks a line, on the far side."""
-        return np.where((points @ self.up > 0)[..., None], self.flat(points), np.nan)
+        return np.where(self._near(points), self.flat(points), np.nan)
 
     def hidden(self, points: Array) -> Array:
         """Return the projection of points on the far side; NaN on the near side."""
-        return np.where((points @ self.up > 0)[..., None], np.nan, self.flat(points))
+        return np.where(self._near(points), np.nan, self.flat(points))
+
+    def _near(self, points: Array) -> NDArray[np.bool_]:
+        """Whether points are on the near side, which includes the rim."""
+        return np.asarray((points @ self.up > -_RIM)[..., None])
 
     def outline(self, ring: Array) -> Array:
         """Return the projection of a ring of points, with its far part moved to the horizon."""
@@ -104,18 +111,18 @@ def facing(points: Array, lats: tuple[float, float]) -> View:
 
 
 def draw_globe(axes: Axes, view: View, spacing: int, half: bool = False) -> None:
-    """Draw a shaded globe with a graticule, or its northern half, seen from above the pole."""
+    """Draw a shaded globe with a graticule, or the half of it that is seen, with a red rim."""
     axes.set_axis_off()
     axes.set(aspect="equal", xlim=(-1.06, 1.06), ylim=(-1.06, 1.06))
-    steps, south = np.linspace(-180, 180, 721), 0 if half else -90
+    steps = np.linspace(-180, 180, 721)
     # The brightness of a ball of radius 1 around the middle.
     x, y = np.meshgrid(np.linspace(-1, 1, 400), np.linspace(-1, 1, 400))
     light = np.sqrt(np.maximum(1 - ((x + 0.25) ** 2 + (y - 0.25) ** 2) / 1.9, 0))
     image = axes.imshow(light, extent=(-1, 1, -1, 1), origin="lower", cmap=SEA, zorder=0)
     outline = Circle((0, 0), 1, fill=False, edgecolor=MARK if half else EDGE, linewidth=1.4 if half else 1, zorder=3)
     image.set_clip_path(axes.add_patch(outline))
-    lines = [from_lonlat(steps, lat) for lat in range(south + spacing, 90, spacing)]
-    lines += [from_lonlat(lon, np.linspace(south, 90, 721)) for lon in range(-180, 180, spacing)]
+    lines = [from_lonlat(steps, lat) for lat in range(-90 + spacing, 90, spacing)]
+    lines += [from_lonlat(lon, np.linspace(-90, 90, 721)) for lon in range(-180, 180, spacing)]
     for line in lines:
         axes.plot(*view.visible(line).T, color=GRID, linewidth=0.6, alpha=0.7, zorder=2)
 

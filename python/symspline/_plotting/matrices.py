@@ -25,13 +25,14 @@ from .._core import CutLocusError, convert_rotations
 from .._quaternions import matrices_of_quaternions
 from .._spaces import SpecialOrthogonal, cover_of
 from .chart import SHADOW, box, count_from, explain_frames, frame_handles, origin_of, plane, shadow_colors
-from .curves import BODIES, BODY, BODY_COLOR, POSES, START, Curve
+from .curves import BODIES, BODY, BODY_COLOR, KNOTS, POSES, START, Curve
 from .globe import centre_of
-from .graphs import SUBSCRIPTS, component_names, draw_components, draw_coordinates, draw_numbers, timelines
+from .graphs import FEW_KNOTS, SUBSCRIPTS, component_names, draw_components, draw_coordinates, draw_numbers, timelines
 from .rows import REACH, VIEW, Rows
 from .sphere import caps
 from .style import (
     AXES,
+    EDGE,
     INK,
     LEFT,
     OWN_AXES,
@@ -357,6 +358,8 @@ def draw_covariances(panel: SubFigure, curves: Sequence[Curve]) -> None:
         for k, share in enumerate(shares.T):
             image = axes.pcolormesh(curve.times, [k + 0.03, k + 0.97], np.stack([share, share]), **look)
             image.set_gid(KEPT)
+        if len(curve.marks) <= FEW_KNOTS:
+            axes.vlines(curve.marks, 0, len(pairs), color=EDGE, linewidth=0.8, linestyle=(0, (1, 2)), label=KNOTS)
     width, _ = size(panels[1])
     side = axes.inset_axes((1 + 0.12 / (width - LEFT - RIGHT), 0, 0.1 / (width - LEFT - RIGHT), 1))
     bar = panel.get_figure(root=True).colorbar(image, cax=side, ticks=[-1, 0, 1])
@@ -396,7 +399,8 @@ def _draw_in_rows(view: Array, panel: SubFigure, curves: Sequence[Curve]) -> Non
         np.sqrt(max(float((view[i] @ row.curve.extent @ view[i]).max()) for row in rows.rows)) for i in (0, 1)
     )
     inches = min(max(0.65 * REACH, min(REACH, rows.reach_between())) / across, 0.45 * rows.height / high)
-    words = ["half axes: √eigenvalues", _left_out(rows, curves)]
+    arcs = "; arcs: sections through two axes" * (len(view) == 3)
+    words = [f"half axes: √eigenvalues{arcs}; colour: time", _left_out(rows, curves)]
     for i in range(len(rows.rows)):
         times, symbols, radii = rows.symbols(i, 1.05 * inches * across)
         _draw_row(rows, i, inches, times, view @ symbols @ view.T, radii)

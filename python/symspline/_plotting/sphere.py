@@ -19,7 +19,7 @@ from .._lonlat import from_lonlat, to_lonlat
 from . import land
 from .arrows import draw_arrows
 from .bands import disc_indices, draw_tube
-from .curves import CIRCLE, Curve, interrupted
+from .curves import BEHIND, CIRCLE, Curve, interrupted
 from .globe import View, degrees, draw_frame, draw_globe, facing, label_directions, middle_of
 from .style import GRID, HALO, INK, MARK, PAPER, SPLINE, Array, inside, note, plain, points, round_below, size, window
 
@@ -37,6 +37,7 @@ _FREE = 60
 """The smallest range of longitudes without curves, in degrees, that becomes the edges of a map."""
 _POLE = 60
 """Neighbouring samples are on both sides of a pole if their longitudes differ by more degrees."""
+_NORTH = np.array([0.0, 0.0, 1.0])
 _RIM = 1e-9
 """Rounding decides the side of points that are closer to the plane of the rim."""
 _TWICE = "; angles are twice the distances of states"
@@ -98,7 +99,8 @@ def _draw_locator(panel: SubFigure, frame: Axes, view: View, curves: Sequence[Cu
     frame.spines[:].set_color(MARK)
     for curve in curves:
         if curve.has_line:
-            axes.plot(*view.visible(curve.points).T, color=curve.color, linewidth=0.8, zorder=4)
+            look: Any = {"linewidth": 0.4, "zorder": 3.5} if curve.faint else {"linewidth": 0.8, "zorder": 4}
+            axes.plot(*view.visible(curve.points).T, color=curve.color, **look)
     if max(east - west, north - south) < 0.15:
         # A small frame would not be seen.
         axes.plot((west + east) / 2, (south + north) / 2, "o", color="none", markeredgecolor=MARK, **_RING)
@@ -106,7 +108,7 @@ def _draw_locator(panel: SubFigure, frame: Axes, view: View, curves: Sequence[Cu
 
 def draw_bloch(panel: SubFigure, curves: Sequence[Curve]) -> None:
     """Draw curves on CP¹: on the Bloch sphere with |0⟩ at the top or, if states are close together, on a part of it."""
-    look = _Globe(spacing=30, lats=(10, 20), labels=_BLOCH)
+    look = _Globe(spacing=30, lats=(10, 40), labels=_BLOCH)
     points = np.concatenate([bloch_vectors(curve.extent) for curve in curves])
     axes, view, is_part = _draw_globe(panel, points, look)
     for curve in curves:
@@ -130,16 +132,19 @@ def _draw_on_half(what: str, vectors: Callable[[Any], Array], panel: SubFigure, 
     lines = [line if line[0] @ lines[0][0] >= 0 else -line for line in lines]
     if sum(np.sum(line[:, 2]) for line in lines) < 0:
         lines = [-line for line in lines]
-    look = _Globe(lats=(90, 90), labels=_AXES, half=True)
-    above = [line * sides(line) for line in lines]
+    # The half sphere is that around the curves, most of which need not leave it.
+    pole = View.above(*middle_of(np.concatenate(lines))).up
+    upper = {name: np.multiply(end, 1 if np.dot(end, pole) >= 0 else -1) for name, end in _AXES.items()}
+    look = _Globe(labels=upper, half=True)
+    above = [line * sides(line, pole) for line in lines]
     axes, view, is_part = _draw_globe(panel, np.concatenate(lines), look, np.concatenate(above))
     crossed = False
     for curve, line, shown in zip(curves, lines, lines if is_part else above, strict=True):
         given = shown[curve.knots]
         if curve.noise is not None:
-            near, given = (curve.closest_samples(line) if is_part else np.array([0.0, 0.0, 1.0]), vectors(curve.given))
+            near, given = (curve.closest_samples(line) if is_part else pole, vectors(curve.given))
             given = given * np.where(np.sum(given * near, axis=1) < 0, -1.0, 1.0)[:, None]
-        whole, radii = (line, curve.radii) if is_part else (broken_at_rim(line), None)
+        whole, radii = (line, curve.radii) if is_part else (broken_at_rim(line, pole), None)
         _draw_on_globe(axes, view, curve, whole, given, radii)
         if not is_part and curve.alone:
             crossed |= _name_crossings(axes, view, whole)
@@ -171,8 +176,9 @@ def _draw_on_globe(axes: Axes, view: View, curve: Curve, line: Array, given: Arr
         rings = caps(line[discs], radii[discs])
         seen = np.max(rings @ view.up, axis=1)[:, None, None] > 0
         draw_tube(axes, curve, np.where(seen, view.outline(rings), np.nan))
-    if not curve.faint:
-        curve.draw_line(axes, view.hidden(line), linewidth=1, linestyle=(0, (2, 2)), alpha=0.6)
+    hidden = view.hidden(line)
+    if not curve.faint and np.isfinite(hidden).any():
+        curve.draw_line(axes, hidden, linewidth=1, linestyle=(0, (2, 2)), alpha=0.6, label=BEHIND)
     curve.draw_line(axes, view.visible(line))
     draw_arrows(axes, curve, view.visible(line), view.visible(given))
     curve.draw_end(axes, view.hidden(line[-1:]), alpha=0.35)
@@ -234,11 +240,11 @@ def _draw_globe(panel: SubFigure, vectors: Array, look: _Globe, above: Array | N
             draw_frame(axes, view, middle, half)
             axes.tick_params(labelsize=points(8))
             return axes, view, True
-    view = facing(vectors if above is None else above, look.lats)
+    seen = vectors if above is None else above
+    view = View.above(*middle_of(vectors)) if look.half else facing(seen, look.lats)
     axes = panel.add_axes(inside(panel, 0.1, look.below, look.right, 0.1))
     draw_globe(axes, view, look.spacing, look.half)
     if look.labels:
-        seen = vectors if above is None else above
         axes.set(xlim=(-1.22, 1.22), ylim=(-1.22, 1.22))
         label_directions(axes, view, look.labels, view.flat(seen))
     return axes, view, False
@@ -262,9 +268,10 @@ def lifted(vectors: Array) -> Array:
     return np.asarray(vectors * np.cumprod(np.append(1.0, np.where(turned, -1.0, 1.0)))[:, None])
 
 
-def sides(line: Array) -> Array:
+def sides(line: Array, pole: Array = _NORTH) -> Array:
     """Return 1 above the rim and −1 below, shape (m, 1). On the rim, the sign is that of the previous sample."""
-    return np.where(line[_last(np.abs(line[:, 2]) > _RIM), 2] < 0, -1.0, 1.0)[:, None]
+    heights = line @ pole
+    return np.where(heights[_last(np.abs(heights) > _RIM)] < 0, -1.0, 1.0)[:, None]
 
 
 def _last(known: NDArray[np.bool_]) -> NDArray[np.intp]:
@@ -273,15 +280,16 @@ def _last(known: NDArray[np.bool_]) -> NDArray[np.intp]:
     return np.where(last < 0, known.argmax(), last)
 
 
-def broken_at_rim(line: Array) -> Array:
-    """Return the curve on the upper hemisphere, broken by NaN where it crosses the rim."""
-    side = sides(line)
+def broken_at_rim(line: Array, pole: Array = _NORTH) -> Array:
+    """Return the curve on the hemisphere around a pole, broken by NaN where it crosses the rim."""
+    side = sides(line, pole)
     (crossings,) = np.nonzero(np.diff(side[:, 0]))
     gaps = []
     for i in crossings:
         before, after = line[i : i + 2] * side[i]
-        share = np.clip(before[2] / (before[2] - after[2]), 0, 1)
-        rim = (before + share * (after - before)) * [1, 1, 0]
+        share = np.clip(before @ pole / ((before - after) @ pole), 0, 1)
+        rim = before + share * (after - before)
+        rim -= (rim @ pole) * pole
         rim /= np.linalg.norm(rim)
         gaps.append([rim, np.full(3, np.nan), -rim])
     return interrupted(line * side, crossings, gaps)
