@@ -169,6 +169,8 @@ def test_labels_of_meridians_are_evenly_spaced():
             steps = np.diff(np.unwrap(values, period=360))
             np.testing.assert_allclose(steps, steps[0], rtol=1e-6)
             assert np.diff(ticks).min() > 0.6 * np.diff(ticks).max()
+            boxes = [own.get_window_extent() for own in labels]
+            assert not any(a.overlaps(b) for a, b in pairwise(boxes))
 
 
 def test_frames_without_coastlines_have_a_note():

@@ -11,6 +11,7 @@ from matplotlib.dates import date2num, num2date
 from matplotlib.figure import Figure
 from matplotlib.quiver import Quiver
 from matplotlib.text import Text
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from refused import raises
 
 import symspline as ss
@@ -426,3 +427,14 @@ def test_without_matplotlib(monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     with pytest.raises(ImportError, match=r"^plots need matplotlib.*pip install 'symspline\[plot\]'$"):
         grid_on("r:1").plot()
+
+
+@pytest.mark.parametrize("name", ["r:3", "se:3"])
+def test_faces_of_surfaces_are_not_twisted(name):
+    figure = rendered(grid_on(name).plot())
+    (surface,) = [own for own in figure.axes[0].collections if isinstance(own, Poly3DCollection)]
+    corners = np.array([path.vertices[:4] for path in surface.get_paths()])
+    ahead = np.roll(corners, -1, axis=1)
+    areas = np.abs(np.sum(corners[..., 0] * ahead[..., 1] - corners[..., 1] * ahead[..., 0], axis=1)) / 2
+    sides = np.linalg.norm(ahead - corners, axis=-1).max(axis=1)
+    assert np.median(areas / sides**2) > 0.1

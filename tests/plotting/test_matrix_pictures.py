@@ -16,6 +16,7 @@ from symspline._plotting import matrices as pictures
 from symspline._plotting.graphs import SUBSCRIPTS
 from symspline._plotting.matrices import AXES
 from symspline._plotting.rows import REACH, VIEW
+from symspline._plotting.style import INK
 
 PAULI = np.array([[[0, 1], [1, 0]], [[0, -1j], [1j, 0]], [[1, 0], [0, -1]]])
 ROTATIONS = {
@@ -227,6 +228,10 @@ def test_rotations_beside_positions_are_graphs(largest):
         middle = 0.0 if largest == 2.0 else largest / 2
         expected = np.multiply.outer([0.6, 0.0, 0.8], largest * t / 5 - middle)
         np.testing.assert_allclose(dots, expected, atol=1e-9 if largest == 2.0 else 0.03)
+        # Positions are graphs beside them.
+        assert axes_named(figure, "x₁").get_gid() == axes_named(figure, "x₃").get_gid() == "time"
+        spans = [np.ptp(axes.get_ylim()) for axes in figure.axes[:3]]
+        np.testing.assert_allclose(spans, spans[0])
 
 
 def test_covariances_are_standard_deviations_and_correlations():
@@ -365,6 +370,9 @@ def test_frames_stand_on_the_path():
     axes = rendered(spline.plot()).axes[0]
     lines = [line for line in axes.lines if line.get_linewidth() == 2.0 and line.get_color() in AXES]
     sticks = [np.stack(line.get_data_3d(), axis=1) for line in lines]
+    # The path has none of the colours of axes.
+    (path,) = [line for line in axes.lines if line.get_gid() == "_curve"]
+    assert path.get_color() == INK
     length = np.linalg.norm(sticks[0][1] - sticks[0][0])
     for i, (stick, color) in enumerate(zip(sticks, AXES, strict=True)):
         ends = stick.reshape(5, 3, 3)

@@ -224,12 +224,39 @@ def test_crossings_of_the_rim_have_equal_letters():
         np.testing.assert_allclose(first, -second, atol=1e-9)
 
 
+def test_every_part_of_a_broken_curve_has_an_arrow_head():
+    lon = np.linspace(0, 212, 9)
+    points = from_lonlat(lon, 12 * np.sin(lon / 30))
+    axes = rendered(ss.CubicSpline(None, points, "rp:2").plot()).axes[0]
+    (line,) = [line for line in lines_of(axes) if len(line) > 1000]
+    (heads,) = [own for own in axes.collections if own.get_label() == "_time"]
+    (gaps,) = np.nonzero(np.isnan(line[:, 0]))
+    parts = [part[np.isfinite(part[:, 0])] for part in np.split(line, gaps)]
+    lengths = np.array([np.linalg.norm(np.diff(part, axis=0), axis=1).sum() for part in parts])
+    shares = lengths / lengths.sum()
+    assert len(parts) == 3 and 0.04 < min(shares) < 0.16
+    for part in parts:
+        away = np.linalg.norm(part[:, None] - heads.get_offsets(), axis=-1)
+        assert away.min() < 0.01
+
+
+def test_closed_curves_have_no_end():
+    turn = np.linspace(0, 2 * np.pi, 9)
+    points = np.stack([np.cos(turn), np.sin(turn), 0.3 * np.sin(turn)], axis=1)
+    points[-1] = points[0]
+    for name, closed in (("r:3", points), ("sphere:2", ss.Sphere(2).project(points)), ("r:2", points[:, :2])):
+        texts = texts_of(rendered(ss.CubicSpline(None, closed, name, bc_type="periodic").plot()))
+        assert "start" in texts and "end" not in texts
+
+
 def test_labels_of_axes_avoid_the_curve():
     view = globe.View.above(20, 42)
     axes = rendered(ss.CubicSpline(None, HALF_SPHERE, "rp:2").plot()).axes[0]
     curve = np.concatenate([line for line in lines_of(axes) if len(line) > 1000])
     for text in axes.texts:
         if text.get_text()[0] == "x":
+            # Of both ends of an axis, that on the half sphere has the label.
+            assert text.get_alpha() == 0.9
             assert np.nanmin(np.linalg.norm(curve - text.get_position(), axis=1)) > 0.1
     # A label stays at the end of its axis if there is space.
     end = view.flat(np.array([0.0, 0.0, 1.17]))
@@ -281,8 +308,8 @@ def test_curves_are_enlarged_if_the_frame_is_on_the_globe(size, is_part):
 def test_the_start_of_a_curve_around_the_globe_is_in_front():
     rng = np.random.default_rng(5)
     for _ in range(8):
-        lon = np.cumsum(rng.uniform(8, 17, 10)) + rng.uniform(-180, 180)
-        spline = ss.CubicSpline(None, from_lonlat(lon, 50 * np.sin(lon / 40)), "sphere:2")
+        lon = np.cumsum(rng.uniform(16, 19, 10)) + rng.uniform(-180, 180)
+        spline = ss.CubicSpline(None, from_lonlat(lon, 20 * np.sin(lon / 40)), "sphere:2")
         axes = rendered(spline.plot()).axes[0]
         starts = [line.get_xydata()[0] for line in axes.lines if line.get_label() == "_start"]
         (start,) = [own for own in starts if np.isfinite(own).all()]

@@ -199,6 +199,13 @@ def test_dates_and_repeated_times():
     assert any(text.endswith("without data, acceleration not drawn") for text in texts_of(figure))
 
 
+def test_legends_say_whether_rates_have_bands():
+    assert "95 % band of curve and speed" in texts_of(smooth("r:2").plot())
+    product = ss.make_smoothing_spline(T, (noisy("so:3"), noisy("r:2")), "so:3 x r:2")
+    texts = texts_of(product.plot())
+    assert "95 % band of curve" in texts and "95 % band of curve and speed" not in texts
+
+
 def test_data_of_frames_stand_beside_the_curve():
     far = ss.rotations.from_rotation_vectors(np.multiply.outer(T, [0.2, 0.7, 0.1]))
     space, rng = ss.space("so:3"), np.random.default_rng(1)

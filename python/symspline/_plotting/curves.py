@@ -47,6 +47,8 @@ MANY = 150
 AFTER_COLOR = "#6aa5d8"
 """Colour of curves in space after their first long gap."""
 
+_CLOSED = 1e-9
+"""The largest distance of the ends of a closed curve, as a part of its largest component."""
 _SEGMENTS = 3
 """The smallest length of a gap between measurements of several kinds, in median segments."""
 BEYOND = 0.15
@@ -392,9 +394,15 @@ class Curve:
             positions = np.where(after, np.nan, positions)
         self.plot_line(axes, positions, **own | look)
 
+    @property
+    def is_closed(self) -> bool:
+        """Whether the curve ends where it began."""
+        first, last = self.points[[0, -1]]
+        return bool(np.abs(last - first).max() <= _CLOSED * np.abs(self.points).max())
+
     def draw_end(self, axes: Axes, end: Array, **look: Any) -> None:
-        """Draw a square at the end of a curve, shape (1, 2) or (1, 3)."""
-        if self.noise is None and self.has_line and not self.faint:
+        """Draw a square at the end of a curve, shape (1, 2) or (1, 3), unless it is closed."""
+        if self.noise is None and self.has_line and not self.faint and not self.is_closed:
             size = 7 if self.alone else 5
             own: Any = {"markersize": size, "markeredgecolor": "white", "zorder": 6.6, "label": END}
             axes.plot(*end.T, "s", color=self.color_of_dots, **own | look)
