@@ -118,7 +118,7 @@ class CurvePlots(CurveBase[P]):
 
         - S²: a globe and a map, or an enlarged part; H²: the Poincaré disk; R¹, R² and R³: the graph or the curve.
         - SO(3), O(3), SU(2) and S³ (unit quaternions, scalar first): rotated frames along the time axis. Graphs of the
-          rotation vectors, if rotations are small, noisy, have long gaps, or are a factor of a product.
+          rotation vectors, if rotations are small, noisy, have long gaps, or are beside other curves or factors.
         - S¹, SO(2), O(2), U(1), RP¹ and Gr(1, 2): the continuous angle against time.
         - SE(3): frames along the path of the positions; SE(2): arrow heads on it.
         - CP¹ and the complex Gr(1, 2): the Bloch sphere.

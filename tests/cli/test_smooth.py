@@ -204,3 +204,9 @@ def test_outliers_of_positions_on_the_earth_are_in_degrees(run):
     out = run("fit a.csv --lonlat -o a.npz", notes=True)
     assert "line 11: the point is probably an outlier (and in 1 other row), 4.93° from its neighbours" in out
     assert "most steps are 0.069°" in out
+
+
+def test_motions_that_are_quick_are_no_outliers(run):
+    x = np.concatenate([0.01 * np.arange(15), [5.0], 10 + 0.01 * np.arange(15)])
+    write_table("a.csv", {"t": np.arange(31), "x": x + 0.001 * np.cos(np.arange(31))})
+    assert "outlier" not in run("fit a.csv --space r:1 -o a.npz")

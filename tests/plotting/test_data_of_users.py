@@ -309,7 +309,7 @@ def test_angles_that_are_twice_the_distances_are_explained(name):
 
 def test_symbols_that_are_omitted_are_counted():
     u = np.arange(40.0)
-    turns = Rotation.from_rotvec(np.stack([u / 15, u / 30, np.cos(u / 5)], axis=1))
+    turns = Rotation.from_rotvec(np.stack([u / 6, u / 12, np.cos(u / 5)], axis=1))
     curve = ss.CubicSpline(None, turns, "so:3")
     ax = Figure(figsize=(5, 4)).add_subplot()
     curve.plot(ax=ax)

@@ -13,7 +13,7 @@ from refused import raises
 
 import symspline as ss
 from symspline import geo
-from symspline._plotting import land
+from symspline._plotting import globe, land
 from symspline._plotting.globe import View
 
 DATES = np.datetime64("2024-05-01T08:00") + np.arange(9).astype("m8[h]")
@@ -179,3 +179,12 @@ def test_frames_without_coastlines_have_a_note():
         points = geo.from_lonlat(11 + span * t / 5, 54 + 0.2 * np.sin(t))
         texts = texts_of(rendered(geo.plot(ss.CubicSpline(t, points, "sphere:2"))))
         assert texts.count("no coastlines at this scale") == words
+
+
+def test_meridians_that_are_close_have_fewer_labels():
+    lines = [np.array([[x, -1.0], [x, 1.0]]) for x in np.linspace(0, 1, 51)]
+    values = [round(10 + 0.2 * k, 9) for k in range(51)]
+    ticks, labels = globe._ticks(lines, values, 0.2, "EW", 0.0, 0.0, 1.0)
+    assert labels == [f"{lon}°E" for lon in range(10, 21)]
+    np.testing.assert_allclose(ticks, np.linspace(0, 1, 11))
+    assert len(globe._ticks(lines[::10], values[::10], 2.0, "EW", 0.0, 0.0, 1.0)[0]) == 6

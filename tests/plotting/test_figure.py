@@ -200,8 +200,8 @@ def test_product_has_a_picture_a_factor(name, shape):
         line = lines_of(axes)[0]
         norm = factor.norm(first(line[:, 0])[i], first(line[:, 0], 1)[i])
         np.testing.assert_allclose(line[:, 1], norm, atol=1e-12)
-    # Several curves have axes of their own for each of four components, and one rotation for three coordinates.
-    more = 3 * (name.count("r:4") + name.count("u:3")) if len(shape) > 1 else 2 * name.count("sphere:3")
+    # Several curves have axes of their own for each of four components, and rotations for three coordinates.
+    more = 3 * (name.count("r:4") + name.count("u:3")) * (len(shape) > 1) + 2 * name.count("sphere:3")
     assert len(figure.axes) == 3 * len(space.factors) + more
 
 

@@ -310,6 +310,15 @@ def test_batches_close_to_their_mean_show_it_with_two_curves(name):
     texts = texts_of(figure)
     assert {"mean curve", "curve 0", "curve 11", "median of rates", "5–95 % of 12 curves"} <= set(texts)
     assert "start" not in texts and "2 of 12 curves, 7 points each, natural ends" in texts
+    if name == "so:3":
+        # Rotations of several curves are graphs, with the quantiles of all of them.
+        axes = axes_named(figure, "about x₂")
+        (area,) = [own for own in axes.collections if own.get_label() == "_quantiles"]
+        t, y = area.get_paths()[0].vertices.T
+        at = np.unique(t)[100]
+        first = curves_of(batch, Axis())[0][0].first_point
+        vectors = Rotation.from_matrix(batch(at) @ first.T).as_rotvec()[:, 1]
+        np.testing.assert_allclose(np.unique(y[t == at]), np.quantile(vectors, [0.05, 0.95]), atol=1e-9)
     if name == "r:1":
         drawn = next(line for line in figure.axes[0].lines if line.get_label() == "mean curve")
         np.testing.assert_allclose(drawn.get_ydata(), batch(drawn.get_xdata()).mean(axis=0)[:, 0], atol=1e-9)

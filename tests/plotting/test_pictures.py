@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from drawn import axes_named, dots_of, lines_of, rendered, spline_on, texts_of
+from matplotlib.colors import to_rgba
 
 import symspline as ss
 from symspline import geo
@@ -339,3 +340,15 @@ def test_arrow_heads_are_away_from_points_and_the_end_is_marked(name):
         ends = [own.get_xydata() for own in axes.lines if own.get_label() == "_end"]
         assert np.isfinite(np.concatenate(ends)).all(axis=1).sum() == 1
         assert "end" in texts_of(figure)
+
+
+def test_starts_on_the_far_side_are_faint_rings():
+    """Their white face would otherwise be grey, as of a given point."""
+    turn = np.linspace(0, 2 * np.pi, 9)
+    points = np.stack([np.cos(turn), np.sin(turn), 0.2 * np.sin(2 * turn)], axis=1)
+    curves = [ss.CubicSpline(None, ss.Sphere(2).project(np.roll(points, k, axis=0)[:5]), "sphere:2") for k in (0, 4)]
+    axes = rendered(ss.plot(curves)).axes[0]
+    starts = [own for own in axes.lines if own.get_label() == "_start" and np.isfinite(own.get_xydata()).all()]
+    edges = sorted(to_rgba(own.get_markeredgecolor())[3] for own in starts)
+    assert edges == [0.35, 1.0] and all(own.get_markerfacecolor() == "white" for own in starts)
+    assert all(own.get_alpha() is None for own in starts)

@@ -11,7 +11,7 @@ from matplotlib.patches import PathPatch
 from matplotlib.path import Path
 from numpy.typing import NDArray
 
-from .curves import ALPHA, BAND, QUANTILES, Curve
+from .curves import ALPHA, BAND, QUANTILES, Batch, Curve
 from .style import DATA, Array, Indices, evenly
 
 
@@ -53,7 +53,12 @@ def fill_quantiles(
     batch = curves[0].batch
     if batch is None:
         return ()
-    low, high = np.quantile(numbers(batch.at), [0.05, 0.95], axis=0)
+    return shade_quantiles(axes, batch, numbers(batch.at))
+
+
+def shade_quantiles(axes: Axes, batch: Batch, values: Array) -> tuple[float, float]:
+    """Fill the area between the quantiles of numbers, one row per curve, and return the lowest and the highest."""
+    low, high = np.quantile(values, [0.05, 0.95], axis=0)
     axes.fill_between(batch.times, low, high, color=DATA, alpha=0.25, linewidth=0, label=QUANTILES, zorder=1.5)
     return float(low.min()), float(high.max())
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from .._core import ValidationError
 from .._spaces import Space
-from .bands import draw_graph_of, fill_quantiles
+from .bands import draw_graph_of, fill_quantiles, shade_quantiles
 from .curves import DOTS, GAPS, KNOTS, LINE, TICKS, Curve, common_gaps, interrupted
 from .style import (
     BOTTOM,
@@ -220,8 +220,14 @@ def draw_coordinates(
     starts = [round_start(*ends) for ends in zip(lowest, highest, strict=True)]
     made = timelines(panel, curves, [named_from(*own) for own in zip(names, starts, strict=True)])
     made[0].set_title(title, loc="left", color=INK, fontsize=points(9), pad=3)
+    batch = curves[0].batch
+    if batch is not None:
+        everywhere = batch.at("point")
+        many = numbers(everywhere.reshape(-1, *everywhere.shape[2:])).reshape(*everywhere.shape[:2], len(names))
     for i, axes in enumerate(made):
         axes.margins(y=0.1)
+        if batch is not None:
+            shade_quantiles(axes, batch, many[..., i] - starts[i])
         for curve, (line, given) in zip(curves, drawn, strict=True):
             size = float(np.clip(30 / np.sqrt(max(len(given), 1)), 1.2, 3))
             dense = len(given) > FEW_KNOTS

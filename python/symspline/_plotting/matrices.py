@@ -109,10 +109,11 @@ def are_graphs(curves: Sequence[Curve]) -> bool:
 def _reference(curves: Sequence[Curve]) -> tuple[Array, str] | None:
     """Return the rotation from which rotation vectors are measured, and its name. None if there are frames.
 
-    Frames would look equal, would not show long gaps or noisy data, or have no space beside other factors of a product.
+    Frames would look equal, would not show long gaps or noisy data, or have no space beside other factors of a product
+    and other curves.
     """
     matrices = MATRICES.get(str(cover_of(curves[0].space)))
-    if matrices is None or not all(curve.alone for curve in curves):
+    if matrices is None:
         return None
     first = matrices(curves[0].first_point)
     # Points of O(3) have one determinant along a curve.
@@ -120,7 +121,7 @@ def _reference(curves: Sequence[Curve]) -> tuple[Array, str] | None:
     largest = ROTATIONS.distance(np.eye(3), turned).max()
     if largest < _SMALL:
         return first, "first point"
-    if not any(own.is_factor or len(own.gaps) or own.noise is not None for own in curves):
+    if not any(own.is_factor or not own.alone or len(own.gaps) or own.noise is not None for own in curves):
         return None
     if largest < _LARGE:
         return first, "first point"
