@@ -66,18 +66,19 @@ def _factors(space: Space, points: Any, near: Any) -> list[tuple[Space, Any, Any
 def _spikes(space: Space, times: Any, points: Any) -> tuple[NDArray[np.bool_], Doubles, float]:
     """Return which points are far from both neighbours, which are closer to each other, and the usual step."""
     steps = np.asarray(space.distance(points[1:], points[:-1]))
-    around = np.asarray(space.distance(points[2:], points[:-2]))
     lengths = np.ones(len(steps))
     if times is not None:
         axis, knots = time_axis_of(times)
         lengths = np.diff(axis.knots(knots))
         lengths = np.maximum(lengths, 1e-3 * lengths.mean())
+    found = np.zeros(len(points), bool)
     if not lengths.min() > 0:
-        return np.zeros(len(points), bool), np.zeros(len(points)), 0.0
+        return found, found.astype(np.float64), 0.0
     speeds = steps / lengths
-    usual = float(np.median(speeds))
     sizes, slowest = (np.r_[0.0, np.minimum(own[1:], own[:-1]), 0.0] for own in (steps, speeds))
-    found = (slowest > _FAST * usual) & (usual > 0) & (sizes > np.r_[np.inf, around, np.inf])
+    usual = float(np.median(speeds))
+    fast = np.flatnonzero((slowest > _FAST * usual) & (usual > 0))
+    found[fast] = sizes[fast] > space.distance(points[fast + 1], points[fast - 1])
     return found, sizes, float(np.median(steps))
 
 
