@@ -14,13 +14,14 @@ from .._core import ValidationError
 from .._spaces import Product, Space, cover_of, factors_of, parts_of
 from .._time import TimeAxis, knots_of
 from .collect import OTHERS, axis_of, curves_of, finite_rows, scatter_of
-from .curves import Curve, title_on
+from .curves import Curve
 from .figure import FRAMES, finish
 from .looks import checked_color
 from .page import draw_page
 from .panels import check_axes, draw_into, has_dark_background
 from .style import DATA, DISTINCT, time_colors
 from .theme import is_dark, kept_color
+from .titles import title_on
 
 
 def compare(

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from textwrap import shorten
 from typing import Any
 
 import numpy as np
@@ -17,20 +16,9 @@ from .._curves.composed import AnyCurve
 from .._curves.controlled import ControlledCurve
 from .._curves.curve import UncertaintyBand
 from .._report import long_gaps
-from .._spaces import Product, Space, cover_of, short_name
+from .._spaces import Space
 from .style import DATA, DATES, INK, SPLINE, Array, Indices, evenly
 
-_POINTS = {
-    "so:2 so:3": "rotations",
-    "sphere:3": "unit quaternions",
-    "se:2 se:3": "poses",
-    "rp:1 rp:2 gr:1,2 gr:1,3": "lines through the origin",
-    "gr:2,3": "planes through the origin",
-    "cp:1 cgr:1,2": "states of a qubit",
-}
-_POINTS = {name: words for names, words in _POINTS.items() for name in names.split()}
-_FAMILIES = {"spd": "matrices", "stiefel": "orthonormal frames", "gr": "subspaces"}
-"""What the points of a space are, for titles."""
 SECOND = np.timedelta64(1, "s")
 _NO_GAPS: Array = np.empty((0, 2))
 # Labels of artists that the legend of a page explains. Those with an underscore are not in legends of matplotlib.
@@ -499,20 +487,6 @@ def common_gaps(curves: Sequence[Curve]) -> Array:
         low, high = np.maximum(found[:, None, 0], gaps[:, 0]), np.minimum(found[:, None, 1], gaps[:, 1])
         found = np.stack([low[low < high], high[low < high]], axis=1)
     return found
-
-
-def points_of(space: Space[Any]) -> str:
-    """Return what the points of a space are, or nothing."""
-    name = str(cover_of(space))
-    return _POINTS.get(name) or _FAMILIES.get(name.partition(":")[0], "")
-
-
-def title_on(what: str, space: Space[Any], most: int = 63) -> str:
-    """Return the title of a figure. Products and long titles have the short name of the space."""
-    names = [short_name(space)] if isinstance(space, Product) else [repr(space), short_name(space)]
-    kinds = [f"{what} of {words}" for words in [points_of(space)] if words] + [what]
-    titles = [f"{kind} on {name}" for kind in kinds for name in names]
-    return next((own for own in titles if len(own) <= most), shorten(titles[-1], most, placeholder=" …"))
 
 
 def interrupted(line: Array, after: Any, gaps: Any) -> Array:

@@ -21,11 +21,12 @@ from .._core import ValidationError
 from .._disk import path_of, replacing
 from .._spaces import Space, cover_of, factors_of, short_name
 from . import chart, columns, graphs, matrices, sphere
-from .curves import Curve, points_of
+from .curves import Curve
 from .rates import IN_ROW
 from .shrink import shrink, small_text
 from .style import DPI, INK, font_factor, points
 from .theme import invert_page, is_dark, light_colors
+from .titles import points_of
 
 FACTORS = 6
 """The largest number of factors of a product that are drawn."""

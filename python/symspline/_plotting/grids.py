@@ -8,12 +8,12 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from .._core import ValidationError
-from .curves import title_on
 from .fields import RIGHT, Field, draw_field
 from .figure import FACTORS, captions, drawing, finish, layout
 from .panels import check_axes, panel_of
 from .style import DATES, INK, OWN_AXES, Array, axes_size, heading, inside, plain, points, show_dates
 from .surfaces import draw_surface
+from .titles import title_on
 
 _HEAD, _LEFT, _BOTTOM, _TOP, _NAMED = 0.95, 0.85, 0.6, 0.1, 0.4
 """Heights and margins in inches. Panels with a name have a larger margin at the top."""

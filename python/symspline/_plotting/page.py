@@ -39,7 +39,6 @@ from .curves import (
     Axis,
     Curve,
     common_gaps,
-    title_on,
 )
 from .figure import (
     FACTORS,
@@ -56,6 +55,7 @@ from .panels import check_axes, draw_into, has_dark_background, next_color
 from .rates import LIMIT, MEDIAN, columns_of, draw_rates
 from .style import BOTTOM, DATA, EDGE, GAP, INK, MARK, TOP, Array, font_factor, heading, legend
 from .theme import is_dark, kept_color
+from .titles import title_on
 
 _HEAD, _LINE, _RATES_WIDTH, _RATES_HEIGHT = 1.2, 0.2, 5.8, 4.0
 _UNITS = (172_800, 86_400, "d"), (7200, 3600, "h"), (100, 60, "min"), (0, 1, "s")
