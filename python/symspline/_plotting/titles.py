@@ -5,7 +5,7 @@ from __future__ import annotations
 from textwrap import shorten
 from typing import Any
 
-from .._spaces import Product, Space, cover_of, short_name
+from .._spaces import Euclidean, Product, Space, cover_of, factors_of, short_name
 
 _POINTS = {
     "so:2 so:3": "rotations",
@@ -21,7 +21,10 @@ _FAMILIES = {"spd": "matrices", "stiefel": "orthonormal frames", "gr": "subspace
 
 
 def points_of(space: Space[Any]) -> str:
-    """Return what the points of a space are, or nothing."""
+    """Return what the points of a space are, or nothing. Those of R^n are vectors in a product."""
+    if isinstance(space, Product):
+        each = ["vectors" if isinstance(own, Euclidean) else points_of(own) for own in factors_of(space)]
+        return " and ".join(dict.fromkeys(each)) if all(each) else ""
     name = str(cover_of(space))
     return _POINTS.get(name) or _FAMILIES.get(name.partition(":")[0], "")
 
