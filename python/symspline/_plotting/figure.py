@@ -176,7 +176,7 @@ def drawing(size: tuple[float, float], show: bool = False, factor: float = 1.0) 
         yield figure
     larger = font_factor()
     if factor * larger != 1:
-        # To find all artists takes longer than to draw them.
+        # The search for all artists takes as long as drawing them.
         shrink(figure.findobj(), factor * larger)
     figure.set_size_inches(larger * size[0], larger * size[1])
     if dark:

@@ -21,7 +21,7 @@ _CLEAR = 0.12
 _RIM = 1e-9
 """Rounding errors of points on the rim."""
 _FRONT, _START = 0.3, 0.15
-"""Height of points that are well in front, and what it is worth if the first one is, as a part of the points."""
+"""Height above the rim of points that are well in front, and the share of points for which the first one counts."""
 _STEPS = np.append(np.multiply.outer(10.0 ** np.arange(-9, 1), [1, 2, 5]).ravel(), [10, 15, 30, 45, 90])
 
 

@@ -50,7 +50,7 @@ _ROUNDING = 1e-9
 _NARROW = 1.3
 """The largest width of lines in low axes."""
 _RIGHT = 88.0
-"""Principal angles that exceed this number of degrees turn back at 90."""
+"""Pictures of larger principal angles, in degrees, explain that they turn back at 90."""
 _BETWEEN = 0.3
 """The distance between axes in inches."""
 FEW_KNOTS, _TICKS = 40, 300
@@ -453,7 +453,7 @@ def draw_principal_angles(panel: SubFigure, curves: Sequence[Curve]) -> None:
     draw_numbers(panel, curves, "principal angles to\nfirst point, degrees", names, numbers)
     largest = max(numbers(own.first_point, own.points).max() for own in curves)
     if isinstance(panel, SubFigure) and largest > _RIGHT and len(panel.axes) == 1:
-        words = "angles between subspaces do not exceed 90°, where they turn back"
+        words = "principal angles are at most 90°; a corner there is no corner of the curve"
         axes: Any = panel.axes[0]
         axes.set_title(words, loc="left", color=INK, fontsize=points(9), pad=3)
         axes.yaxis.set_major_locator(MultipleLocator(30))

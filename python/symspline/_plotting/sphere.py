@@ -132,7 +132,7 @@ def _draw_on_half(what: str, vectors: Callable[[Any], Array], panel: SubFigure, 
     lines = [line if line[0] @ lines[0][0] >= 0 else -line for line in lines]
     if sum(np.sum(line[:, 2]) for line in lines) < 0:
         lines = [-line for line in lines]
-    # The half sphere is that around the curves, most of which need not leave it.
+    # The half sphere is centred on the curves, so that most of them do not cross its rim.
     pole = View.above(*middle_of(np.concatenate(lines))).up
     upper = {name: np.multiply(end, 1 if np.dot(end, pole) >= 0 else -1) for name, end in _AXES.items()}
     look = _Globe(labels=upper, half=True)

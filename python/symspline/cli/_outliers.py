@@ -19,9 +19,11 @@ from ._recordings import Recordings
 from ._summary import counted
 
 _FAST, _FAR = 10.0, 10.0
-"""An outlier is reached and left so many times as fast as most points, or so many times as far from a smooth curve."""
+"""Multiples of the median speed and of the median distance from a smooth curve that outliers exceed."""
+_ROUNDING = 1e-9
+"""Distances that are a smaller part of the largest component of a point are rounding errors."""
 _FEWEST = 8
-"""The smallest number of points of a curve among which outliers are looked for."""
+"""The smallest number of points of a curve that is searched for outliers."""
 
 
 def outliers(data: Recordings, curves: Sequence[CubicSpline] | None, lonlat: bool) -> str:
@@ -78,7 +80,8 @@ def _spikes(space: Space, times: Any, points: Any) -> tuple[NDArray[np.bool_], D
     sizes, slowest = (np.r_[0.0, np.minimum(own[1:], own[:-1]), 0.0] for own in (steps, speeds))
     usual = float(np.median(speeds))
     fast = np.flatnonzero((slowest > _FAST * usual) & (usual > 0))
-    found[fast] = sizes[fast] > space.distance(points[fast + 1], points[fast - 1])
+    around = space.distance(points[fast + 1], points[fast - 1])
+    found[fast] = sizes[fast] > np.maximum(around, _ROUNDING * np.abs(points).max())
     return found, sizes, float(np.median(steps))
 
 
@@ -86,4 +89,4 @@ def _far(space: Space, points: Any, near: Any) -> tuple[NDArray[np.bool_], Doubl
     """Return which points are far from a curve, their distances, and the distance within which most points are."""
     distances = np.asarray(space.distance(points, near))
     usual = float(np.median(distances))
-    return (distances > _FAR * usual) & (usual > 0), distances, usual
+    return distances > max(_FAR * usual, _ROUNDING * np.abs(points).max()), distances, usual
