@@ -144,4 +144,6 @@ def test_errors_name_the_curve():
     far[2, 1] = -far[2, 0]
     many = jax.vmap(lambda p: curve(0.5, T[0], p, SPHERE))
     raises("curve 2", many, far, error=ss.CutLocusError)
-    raises("curve 2", jax.jit(many), far, error=jax.errors.JaxRuntimeError)
+    if jax.default_backend() == "cpu":
+        # Compiled functions on a GPU may lose it.
+        raises("curve 2", jax.jit(many), far, error=jax.errors.JaxRuntimeError)

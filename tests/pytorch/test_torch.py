@@ -50,6 +50,16 @@ def test_products_batches_and_single_precision():
     assert many.grad.shape == many.shape
 
 
+def test_gradients_of_real_data_on_a_complex_space_are_real():
+    points, vector = points_of("u:2"), torch.zeros((2, 2), dtype=torch.float64, requires_grad=True)
+    (found,) = torch.autograd.grad(curve(X, T, points, "u:2", bc_type=("natural", (1, vector))).real.sum(), vector)
+    (expected,) = torch.autograd.grad(
+        curve(X, T, points, "u:2", bc_type=("natural", (1, turned := vector.to(points.dtype)))).real.sum(), turned
+    )
+    assert found.dtype == torch.float64
+    torch.testing.assert_close(found, expected.real)
+
+
 @pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a GPU")
 @pytest.mark.parametrize("name", ["sphere:2", "so:3", "u:2"])
 def test_values_and_gradients_stay_on_the_gpu(name):

@@ -107,4 +107,6 @@ def _tensor(array: Any, like: Any) -> Any:
     if array is None or like is None:
         return None
     dtype, device, shape = like
-    return torch.as_tensor(np.ascontiguousarray(array)).to(device, dtype).reshape(shape)
+    # The gradient of a real input, such as a velocity of zeros on a complex space, is real.
+    real = array if dtype.is_complex else np.real(array)
+    return torch.as_tensor(np.ascontiguousarray(real)).to(device, dtype).reshape(shape)
