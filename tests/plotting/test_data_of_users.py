@@ -301,8 +301,8 @@ def test_angles_that_are_twice_the_distances_are_explained(name):
     figure = rendered(spline_on(name).plot())
     label = rate_axes(figure)[0][0].get_ylabel()
     if name == "cp:1":
-        assert label == "speed\n|γ′|, rad/t"
-        assert any(text.endswith("angles are twice the distances of states") for text in texts_of(figure))
+        assert label == "speed\n|γ′| of states, rad/t"
+        assert any(text.endswith("angles on it are twice the distances of states") for text in texts_of(figure))
     else:
         assert label == "speed\n|γ′| = |ω|/2, rad/t"
 

@@ -3,7 +3,10 @@
 import numpy as np
 import pytest
 from drawn import axes_named, has_title, lines_of, points_around, rate_axes, rendered, spline_on, texts_of
+from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
+from mpl_toolkits.mplot3d import proj3d
 from scipy.spatial.transform import Rotation
 
 import symspline as ss
@@ -267,7 +270,7 @@ def test_segments_have_their_own_colours_and_starts():
     assert len([line for line in many.axes[0].lines if line.get_label() == "_start"]) == 1
 
 
-@pytest.mark.parametrize("name", ["r:2", "r:3", "sphere:2", "h:2", "rp:2", "cp:1"])
+@pytest.mark.parametrize("name", ["r:2", "r:3", "sphere:2", "h:2", "rp:2", "cp:1", "se:3"])
 def test_batches_close_to_their_mean_show_it(name):
     """The line of the mean is that of the Karcher means, and no curve is named."""
     space, rng = ss.space(name), np.random.default_rng(8)
@@ -283,12 +286,18 @@ def test_batches_close_to_their_mean_show_it(name):
         texts_of(figure)
     )
     assert "given points" not in texts_of(figure) and "curve 0" not in texts_of(figure)
-    (line,) = [line.get_xydata() for line in axes_named(figure, "speed").lines if line.get_label() == "_median"]
-    np.testing.assert_allclose(line[:, 1], np.median(batch.speed(line[:, 0]), axis=0), atol=1e-9)
+    # The mean is smoother than the curves, so that its speed is not among theirs.
+    ((median,), *_) = [axes_named(figure, "speed").lines]
+    line = median.get_xydata()
+    speed = batch.speed(line[:, 0])
+    if name == "se:3":
+        speed = np.linalg.norm(batch(line[:, 0], 1)[..., :3, 3], axis=-1)
+    assert median.get_label() == "_median"
+    np.testing.assert_allclose(line[:, 1], np.median(speed, axis=0), atol=1e-9)
     mean = curves_of(batch, Axis())[0][0]
     x = mean.x[100:-100:50]
     means = space.mean(np.moveaxis(batch(x), 0, 1))
-    assert space.distance(mean.points[100:-100:50], means).max() < 1e-4
+    assert space.distance(mean.points[100:-100:50], means).max() < 1e-3
     if name in ("r:2", "r:3"):
         drawn = next(line for line in figure.axes[0].lines if line.get_label() == "mean curve")
         drawn = np.stack(drawn.get_data_3d() if name == "r:3" else drawn.get_data(), axis=1)
@@ -301,15 +310,15 @@ def test_batches_close_to_their_mean_show_it(name):
 
 
 @pytest.mark.parametrize("name", ["r:1", "so:3", "spd:2", "torus:2", "spd:4", "stiefel:2,4"])
-def test_batches_close_to_their_mean_show_it_with_two_curves(name):
+def test_batches_close_to_their_mean_show_it_with_quantiles(name):
     space, rng = ss.space(name), np.random.default_rng(8)
     path = points_around(space, rng, (7,))
     points = np.broadcast_to(path, (12, *path.shape))
     batch = ss.CubicSpline(None, space.exp(points, 0.02 * space.random_tangent(rng, points)), space)
     figure = rendered(batch.plot())
     texts = texts_of(figure)
-    assert {"mean curve", "curve 0", "curve 11", "median of rates", "5–95 % of 12 curves"} <= set(texts)
-    assert "start" not in texts and "2 of 12 curves, 7 points each, natural ends" in texts
+    assert {"mean curve", "median of rates", "5–95 % of 12 curves"} <= set(texts) and "curve 0" not in texts
+    assert "start" not in texts and "12 curves, 7 points each, natural ends" in texts
     if name == "so:3":
         # Rotations of several curves are graphs, with the quantiles of all of them.
         axes = axes_named(figure, "about x₂")
@@ -319,6 +328,13 @@ def test_batches_close_to_their_mean_show_it_with_two_curves(name):
         first = curves_of(batch, Axis())[0][0].first_point
         vectors = Rotation.from_matrix(batch(at) @ first.T).as_rotvec()[:, 1]
         np.testing.assert_allclose(np.unique(y[t == at]), np.quantile(vectors, [0.05, 0.95]), atol=1e-9)
+    if name == "spd:2":
+        # The ellipses of the other curves are around those of the mean.
+        given, *others = (own for own in figure.axes[0].collections if isinstance(own, PolyCollection))
+        assert [own.get_label() for own in others] == ["_others"] * 12
+        assert len({tuple(own.get_offsets()[3]) for own in (given, *others)}) == 1
+        widths = [[np.ptp(path.vertices[:, 0]) for path in own.get_paths()] for own in (given, *others)]
+        np.testing.assert_allclose(widths[0], np.mean(widths[1:], axis=0), rtol=0.03)
     if name == "r:1":
         drawn = next(line for line in figure.axes[0].lines if line.get_label() == "mean curve")
         np.testing.assert_allclose(drawn.get_ydata(), batch(drawn.get_xdata()).mean(axis=0)[:, 0], atol=1e-9)
@@ -344,3 +360,62 @@ def test_pages_have_the_proportions_of_curves_in_the_plane(name, across, high):
     if across and high:
         shares = np.ptp(path, axis=0) / [np.ptp(picture.get_xlim()), np.ptp(picture.get_ylim())]
         assert shares.max() > 0.8 and shares.min() > 0.3
+
+
+@pytest.mark.parametrize("name", ["r:3", "se:3"])
+@pytest.mark.parametrize(
+    ("sides", "is_long"), [((9, 2, 1), True), ((-1, 9, 1), True), ((2, 1, 9), False), ((9, 8, 1), False)]
+)
+def test_long_curves_in_space_are_above_their_rates(name, sides, is_long):
+    """They run to the right, and turning and moving have a column of rates each."""
+    t = np.array([0, 0.5, 1.8, 2.0, 3.1, 4.0])
+    path = np.stack([t / 4, np.sin(t) / 2, (t / 4) ** 2], axis=1)[:, np.argsort(np.argsort(-np.abs(sides)))] * sides
+    points = path
+    if name == "se:3":
+        points = np.broadcast_to(np.eye(4), (len(t), 4, 4)).copy()
+        points[:, :3, 3] = path
+    figure = rendered(ss.CubicSpline(t, points, name).plot())
+    picture = figure.axes[0]
+    speed, bend = (axes_named(figure, word).get_window_extent() for word in ("speed", "acceleration"))
+    assert (speed.y1 < picture.get_window_extent().y0 + 0.2 * picture.get_window_extent().height) == is_long
+    assert bend.x0 == pytest.approx(speed.x0)
+    line = next(own for own in picture.lines if own.get_gid() == "_curve")
+    x, *_ = proj3d.proj_transform(*line.get_data_3d(), picture.get_proj())
+    assert x[-1] > x[0] or not is_long
+    if name == "se:3":
+        turning = axes_named(figure, "turning rate").get_window_extent()
+        assert (turning.x1 < speed.x0 and turning.y0 == pytest.approx(speed.y0)) == is_long
+
+
+def test_mean_poses_in_the_plane_have_bodies_along_the_path():
+    """Their number does not depend on that of the curves."""
+    rng, space = np.random.default_rng(8), ss.space("se:2")
+    t = np.linspace(0, 3, 8)
+    poses = Rotation.from_rotvec(np.outer(np.cos(t), [0, 0, 1])).as_matrix()
+    poses[:, :2, 2] = np.stack([2 * t, np.sin(t)], axis=1)
+    many = np.broadcast_to(poses, (20, *poses.shape))
+    figure = rendered(ss.CubicSpline(t, space.exp(many, 0.05 * space.random_tangent(rng, many)), space).plot())
+    picture = figure.axes[0]
+    (bodies,) = (own for own in picture.collections if own.get_label() == "_bodies")
+    assert len(bodies.get_paths()) > 8
+    assert sum(own.get_label() == "_others" for own in picture.lines) == 20
+    assert not {"_given", "_start"} & {own.get_label() for own in picture.lines}
+
+
+def test_numbers_in_axes_of_the_user_count_from_zero():
+    x = 5e6 + np.array([0.0, 3.0, 1.0, 7.0])
+    spline = ss.CubicSpline(None, x[:, None], "r:1")
+    ax = Figure().add_subplot()
+    spline.plot(ax=ax)
+    assert ax.lines[0].get_ydata().min() > 4e6 and ax.get_ylabel() == "x"
+    page = spline.plot().axes[0]
+    assert page.get_ylabel() == "x − 5000000" and page.lines[0].get_ydata().max() < 10
+
+
+def test_the_legend_shows_the_far_side_as_it_is_drawn():
+    turn = np.linspace(0, 5, 9)
+    figure = rendered(ss.CubicSpline(None, np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1), "sphere:2").plot())
+    line = next(own for own in figure.axes[0].lines if own.get_label() == "_behind")
+    (legend,) = figure.legends
+    handle = dict(zip([own.get_text() for own in legend.get_texts()], legend.legend_handles, strict=True))["far side"]
+    assert (handle.get_color(), handle.get_alpha()) == (line.get_color(), line.get_alpha())

@@ -146,20 +146,25 @@ def spline_product():
     return ss.CubicSpline(None, (ss.Sphere(1).from_angles(np.arange(4.0)), np.arange(4.0)[:, None]), "s:1 x r:1")
 
 
-def test_lines_of_a_torus_break_where_angles_wrap():
+def test_angles_on_a_torus_have_no_jumps():
     angles = np.column_stack([np.linspace(2, 9, 8), np.linspace(-1, 1, 8)])
     spline = ss.CubicSpline(None, (angles + np.pi) % (2 * np.pi) - np.pi, "torus:2")
     figure = rendered(spline.plot())
     axes = axes_named(figure, "angles, degrees")
-    broken, whole = (line.get_xydata() for line in axes.lines if line.get_gid() == "_curve")
-    (gap,) = np.flatnonzero(np.isnan(broken[:, 0]))
-    before, after = broken[gap - 1], broken[gap + 1]
-    assert before[1] == 180 and after[1] == -180 and before[0] == after[0]
-    # The angle x is 2 + t; interpolation between samples is exact for straight lines.
-    assert before[0] == pytest.approx(np.pi - 2, abs=1e-9)
-    assert not np.isnan(whole).any()
-    steps = np.abs(np.diff(broken[:, 1]))
-    assert np.nanmax(steps) < 5
+    for line, given in zip((own for own in axes.lines if own.get_gid() == "_curve"), angles.T, strict=True):
+        np.testing.assert_allclose(np.interp(np.arange(8), *line.get_data()), np.degrees(given), atol=1e-9)
+    for dots, given in zip((own for own in axes.lines if own.get_label() == "_given"), angles.T, strict=True):
+        np.testing.assert_allclose(dots.get_ydata(), np.degrees(given), atol=1e-9)
+    # Data are close to the first curve, and the quantiles of a batch to its mean.
+    t = np.array([1.3, 6.6])
+    both = rendered(ss.plot([spline, (t, np.array([[3.4 - 2 * np.pi, -0.5], [8.4, 0.9]]))]))
+    dots = next(line for line in axes_named(both, "x₁").lines if line.get_label() == "_data")
+    np.testing.assert_allclose(dots.get_ydata(), np.degrees([3.4, 8.4]), atol=1e-9)
+    many = spline.space.exp(spline.points, np.linspace(-0.1, 0.1, 9)[:, None, None] * [1.0, 1.0])
+    axes = axes_named(rendered(ss.CubicSpline(None, many, "torus:2").plot()), "x₁")
+    (area,) = (own for own in axes.collections if own.get_label() == "_quantiles")
+    low, high = area.get_paths()[0].get_extents().intervaly
+    assert low > np.degrees(1.9) and high < np.degrees(9.1)
     moving = spline.animate(frames=3)
     moving._draw_was_started = True
     moving._func(1000)

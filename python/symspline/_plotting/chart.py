@@ -176,11 +176,17 @@ def box(
         wall.set_major_locator(MaxNLocator(max(1 + 2 * (factor == 1), round(5 * factor * side / sides.max()))))
         wall.labelpad += 5 * bool(start)
         wall.label.set(text=named_from(f"x{name}", start), color=INK, fontsize=points(10))
-    # Flat boxes are seen from farther above. Choose the direction from which the curve looks widest.
-    angles = np.radians([-60, -30, 30, 60])
+    # Flat boxes are seen from farther above. Choose the direction from which the curve looks widest, and of two similar
+    # ones that from which it runs to the right.
+    width, height = size(panel)
+    turn = 15 if width > 1.5 * height else 30
+    azimuths = turn - 90, -turn, turn, 90 - turn
+    angles = np.radians(azimuths)
     right = everything[:, 1:2] * np.cos(angles) - everything[:, :1] * np.sin(angles)
+    first = right[: np.isfinite(lines[0][:, 0]).sum()] if lines else right
+    widths = np.std(right, axis=0) * (1 + 0.1 * np.sign(first[-1] - first[0]))
     elevation = float(np.interp(sides[2] / sides[:2].max(), [0.2, 1], [46, 24]))
-    axes.view_init(elev=elevation, azim=(-60, -30, 30, 60)[np.std(right, axis=0).argmax()])
+    axes.view_init(elev=elevation, azim=azimuths[widths.argmax()])
     axes.set_box_aspect(tuple(sides))
     _fill(panel, axes, middle + sides * np.array(list(product((-1, 1), repeat=3))), below)
     return axes

@@ -15,11 +15,10 @@ from .._curves.ends import NATURAL
 from .._curves.fit import FitProblem, fit, read
 from .._curves.solve import DEFAULTS
 from .._input import UTC_ZONE
-from .._spaces import Product, Space, cover_of
+from .._spaces import Product, Space
 from .._time import TimeAxis
 from .curves import SECOND, Axis, Batch, Curve
-from .figure import FRAMES, PATHS
-from .style import DISTINCT, SPLINE, Array, colors, evenly, named_from, round_start
+from .style import SPLINE, Array, colors, evenly, named_from, round_start
 
 FEW, _OF_MANY = 5, 3
 """The largest number of curves of a batch that are all drawn with their points, and the number of larger batches."""
@@ -96,21 +95,16 @@ def curves_of(
     few = drawn[evenly(len(drawn), FEW if len(drawn) <= FEW else _OF_MANY)]
     looks = dict(zip(few.tolist(), colors(len(few)), strict=True))
     made: list[Curve] = []
-    paths = str(cover_of(curve.space)) in PATHS
-    mean = _mean_of(curve, valid, axis, color, label, alone and paths) if len(drawn) > len(few) else None
+    mean = _mean_of(curve, valid, axis, color, label, alone) if len(drawn) > len(few) else None
     if mean is not None:
-        # Pictures of paths show the other curves as thin lines, and others show two of them.
-        few = drawn if paths else few[[0, -1]]
-        usual = OTHERS[::4] if str(cover_of(curve.space)) in FRAMES else DISTINCT[1:]
-        looks = {} if paths else dict(zip(few.tolist(), usual, strict=False))
-        made = [replace(mean, has_start=paths)]
+        # Thin lines, or quantiles, show the other curves.
+        few, looks, made = drawn, {}, [mean]
     # Curves with points come first.
     for i in [*looks, *(i for i in drawn.tolist() if i not in looks)]:
         index = tuple(map(int, np.unravel_index(i, batch)))
         one = reduce(lambda curves, k: curves._picked(k), index, curve)
         name = label if not batch else f"curve {index[0] if len(index) == 1 else index}"
         look = {"color": color or looks.get(i), "alone": alone and len(drawn) == 1, "label": name}
-        look["has_start"] = mean is None
         made.append(_drawn(one, curve._noise_beside, index, axis, look, faint=i not in looks))
     if mean is None and len(drawn) > len(few):
         made[0] = replace(made[0], batch=_batch_of(curve, made[0], valid))

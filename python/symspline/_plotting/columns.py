@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import SubFigure
 from matplotlib.lines import Line2D
 
-from .curves import DOTS, Curve
+from .curves import DOTS, Curve, are_compared
 from .graphs import SUBSCRIPTS, draw_components, timelines
 from .style import DISTINCT, legend
 
@@ -19,8 +19,7 @@ _COLUMNS = 4
 def draw_columns(panel: SubFigure, curves: Sequence[Curve]) -> None:
     """Draw the entries of every column in one panel, in the colours of their rows; all components of large matrices."""
     n, k = curves[0].space.point_shape
-    compared = not curves[0].alone and len(curves) > 1
-    if k > _COLUMNS or n > len(DISTINCT) or compared or not isinstance(panel, SubFigure):
+    if k > _COLUMNS or n > len(DISTINCT) or are_compared(curves) or not isinstance(panel, SubFigure):
         draw_components(panel, curves)
         return
     made = timelines(panel, curves, [f"column {j + 1}" for j in range(k)], top=0.35)

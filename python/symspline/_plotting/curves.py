@@ -441,7 +441,7 @@ class Curve:
         look["markeredgecolor"] = look["color"]
         if self.has_nodes and not self.is_mean:
             axes.plot(*positions.T, "o", label=DOTS, **look)
-        if self.has_start:
+        if self.has_start and axes.get_gid() != "time":
             look |= {"color": "white", "markeredgewidth": 1.4, "zorder": 6.5, "markersize": 1.3 * look["markersize"]}
             # On the far side of a globe the edge alone is faint.
             look["markeredgecolor"] = to_rgba(look["markeredgecolor"], look.pop("alpha", None))
@@ -478,6 +478,11 @@ class Batch:
         values = self.data.evaluate(self.x, quantity, "raise", False)
         count = len(self.data.batch)
         return values.reshape(-1, *values.shape[count:])[self.valid]
+
+
+def are_compared(curves: Sequence[Curve]) -> bool:
+    """Whether a figure has several curves, whose numbers need axes of their own."""
+    return curves[0].batch is not None or (len(curves) > 1 and not curves[0].alone)
 
 
 def common_gaps(curves: Sequence[Curve]) -> Array:

@@ -87,6 +87,7 @@ _BANDED |= {"rp:1", "gr:1,2", "so:2", "o:2", "u:1"}
 _OTHERS = Picture(graphs.draw_components, 10.5, 3.8)
 # Spaces whose picture shows many curves of a batch.
 PATHS = {"euclidean:2", "euclidean:3", "sphere:2", "hyperbolic:2", "rp:2", "gr:1,3", "gr:2,3", "cp:1", "cgr:1,2"}
+PATHS |= {"se:2", "se:3"}
 # Spaces whose picture has symbols in rows, one row per curve.
 IN_ROWS = {"sphere:3", "so:3", "o:3", "su:2", "spd:2", "spd:3"}
 FRAMES = {"sphere:3", "so:3", "o:3", "su:2", "se:3"}
@@ -102,13 +103,18 @@ def picture_of(space: Space) -> Picture:
 
 
 def fitted(picture: Picture, curves: Sequence[Curve]) -> Picture:
-    """Return the picture in a panel with the proportions of curves in the plane, or with space for three graphs."""
+    """Return the picture in a panel with the proportions of curves in R² or R³, or with space for three graphs."""
     if picture.draw is matrices.draw_rotations and matrices.are_graphs(curves):
         return picture._replace(height=4.8)
-    if picture.draw not in (chart.draw_plane, matrices.draw_flat_poses):
+    if picture.draw not in (chart.draw_plane, matrices.draw_flat_poses, chart.draw_3d, matrices.draw_poses):
         return picture
     points = np.concatenate([curve.extent for curve in curves])
-    across, high = np.ptp(points if points.ndim == 2 else points[:, :2, 2], axis=0)
+    extents = np.ptp(points if points.ndim == 2 else points[:, :-1, -1], axis=0)
+    if len(extents) == 3:
+        longest, *others = np.sort(extents)[::-1]
+        lies = longest > max(extents[2], _LONG * others[0])
+        return picture._replace(width=10.5, height=4.2) if lies else picture
+    across, high = extents
     if across > _LONG * high:
         return picture._replace(width=10.5, height=float(np.clip(10.5 * high / max(across, 1e-300), 1.2, 4.0)) + 1.2)
     if high > _LONG * across:

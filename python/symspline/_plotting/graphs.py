@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from .._core import ValidationError
 from .._spaces import Space
-from .bands import draw_graph_of, fill_quantiles, shade_quantiles
-from .curves import DOTS, GAPS, KNOTS, LINE, TICKS, Curve, common_gaps, interrupted
+from .bands import draw_graph_of, shade_quantiles
+from .curves import DOTS, GAPS, KNOTS, LINE, TICKS, Curve, are_compared, common_gaps
 from .style import (
     BOTTOM,
     DATA,
@@ -47,7 +47,7 @@ _COMPARED = 4
 _STYLES = ["-", "--", ":", "-.", (0, (5, 1)), (0, (1, 1))]
 _ROUNDING = 1e-9
 """Numbers that vary by less than this part of others are constant."""
-_NARROW = 1.3
+_NARROW = 1.8
 """The largest width of lines in low axes."""
 _RIGHT = 88.0
 """Pictures of larger principal angles, in degrees, explain that they turn back at 90."""
@@ -140,33 +140,14 @@ def _mark_gaps(axes: Axes, curves: Sequence[Curve]) -> None:
 
 def draw_graph(panel: SubFigure, curves: Sequence[Curve]) -> None:
     """Draw the graphs of curves in R¹."""
-    (axes,) = timelines(panel, curves, ["x"])
-    fill_quantiles(axes, curves, lambda at: at("point")[..., 0])
-    for curve in curves:
-        line, given = curve.marked(np.ravel)
-        draw_graph_of(axes, curve, curve.graph(line), given)
+    draw_coordinates(panel, curves, ["x"])
 
 
 def _draw_angle(angles: Callable[[Any], Array], period: float, panel: SubFigure, curves: Sequence[Curve]) -> None:
     """Draw an angle against time, without jumps."""
-    (axes,) = timelines(panel, curves, ["angle, degrees"])
-    middle = angles(curves[0].first_point[None])[0]
-
-    def unwrapped(line: Array) -> Array:
-        """Return angles without jumps that begin close to the first curve; the last axis is time."""
-        line = np.unwrap(line, period=period, axis=-1)
-        return np.asarray(line - period * np.rint((line[..., :1] - middle) / period))
-
-    def of_batch(at: Callable[[str], Any]) -> Array:
-        points = at("point")
-        return np.degrees(unwrapped(angles(points.reshape(-1, *points.shape[2:])).reshape(points.shape[:2])))
-
-    fill_quantiles(axes, curves, of_batch)
-    for curve in curves:
-        line, given = curve.marked(angles)
-        line = unwrapped(line)
-        given = given + period * np.rint((curve.closest_samples(line) - given) / period)
-        draw_graph_of(axes, curve, np.degrees(curve.graph(line)), np.degrees(given), np.degrees(1.0))
+    numbers = lambda points: np.degrees(angles(points))[:, None]  # noqa: E731
+    unit = lambda lengths: np.full_like(lengths, np.degrees(1.0))  # noqa: E731
+    draw_coordinates(panel, curves, ["angle, degrees"], numbers, unit, period=np.degrees(period))
 
 
 # Points of S¹ have the angle of a unit vector. Points of RP¹ and Gr(1, 2) are lines, whose angle has the period π.
@@ -192,6 +173,7 @@ def draw_coordinates(
     growth: Callable[[Array], Array] = np.ones_like,
     title: str = "",
     equal_scales: bool = False,
+    period: float = np.inf,
 ) -> None:
     """Draw a few numbers against time, each in axes of its own.
 
@@ -209,23 +191,30 @@ def draw_coordinates(
         Description of the numbers, above the axes. If the user gave axes, which show all numbers, it is their label.
     equal_scales : bool
         Whether all axes have the same scale.
+    period : float
+        Numbers that differ by multiples of it are equal. They are drawn without jumps.
     """
-    if not isinstance(panel, SubFigure):
-        draw_numbers(panel, curves, title, names, lambda _, own: numbers(own))
+    own_axes, several = not isinstance(panel, SubFigure), len(names) > 1
+    if own_axes and several:
+        draw_numbers(panel, curves, title, names, lambda _, own: numbers(own), period)
         return
-    drawn = [curve.marked(numbers) for curve in curves]
+    drawn = _without_jumps(curves, lambda _: numbers, period)
     everything = np.concatenate([rows for pair in drawn for rows in pair])
     lowest, highest = np.nanmin(everything, axis=0), np.nanmax(everything, axis=0)
     largest = float((highest - lowest).max())
-    starts = [round_start(*ends) for ends in zip(lowest, highest, strict=True)]
+    # In axes of the user, others draw too.
+    starts = [0 if own_axes else round_start(*ends) for ends in zip(lowest, highest, strict=True)]
     made = timelines(panel, curves, [named_from(*own) for own in zip(names, starts, strict=True)])
-    made[0].set_title(title, loc="left", color=INK, fontsize=points(9), pad=3)
+    if title:
+        made[0].set_title(title, loc="left", color=INK, fontsize=points(9), pad=3)
     batch = curves[0].batch
     if batch is not None:
         everywhere = batch.at("point")
         many = numbers(everywhere.reshape(-1, *everywhere.shape[2:])).reshape(*everywhere.shape[:2], len(names))
+        many = _unwrapped(many, period, drawn[0][0][0])
     for i, axes in enumerate(made):
-        axes.margins(y=0.1)
+        if several:
+            axes.margins(y=0.1)
         if batch is not None:
             shade_quantiles(axes, batch, many[..., i] - starts[i])
         for curve, (line, given) in zip(curves, drawn, strict=True):
@@ -233,18 +222,49 @@ def draw_coordinates(
             dense = len(given) > FEW_KNOTS
             look: Any = {"color": DATA if dense else INK} if curve.noise is None and curve.alone else {}
             look |= {"markersize": size} | ({"zorder": 1.8} if dense else {})
+            look = look if several else {}
             size_of_band = growth(np.linalg.norm(line, axis=1))
             own = curve.graph(line[:, i] - starts[i])
             draw_graph_of(axes, curve, own, given[:, i] - starts[i], size_of_band, **look)
         for artist in axes.lines:
-            if artist.get_gid() == LINE:
+            if several and artist.get_gid() == LINE:
                 artist.set_linewidth(min(artist.get_linewidth(), _NARROW))
     limits = np.array([axes.get_ylim() for axes in made])
     widest = np.ptp(limits, axis=1).max()
     for axes, (low, high) in zip(made, limits.tolist(), strict=True):
         # Rounding errors of a constant would look like a curve.
-        if equal_scales or high - low < _ROUNDING * largest:
+        if equal_scales or (several and high - low < _ROUNDING * largest):
             axes.set_ylim((low + high - widest) / 2, (low + high + widest) / 2)
+
+
+def _without_jumps(
+    curves: Sequence[Curve], numbers: Callable[[Curve], Callable[[Any], Array]], period: float
+) -> list[tuple[Array, Array]]:
+    """Return numbers of the samples and of the given points of every curve, without jumps by the period.
+
+    All curves begin close to the first one. Data are close to it at their times, as they are no line.
+    """
+    made: list[tuple[Array, Array]] = []
+    for curve in curves:
+        line, given = curve.marked(numbers(curve))
+        if np.isfinite(period):
+            near = made[0][0] if made else line
+            if curve.has_line:
+                line = _unwrapped(line, period, near[0])
+            else:
+                near = np.stack([np.interp(curve.times, curves[0].times, own) for own in near.T], axis=1)
+                line = line + period * np.rint((near - line) / period)
+            given = given + period * np.rint((curve.closest_samples(line) - given) / period)
+        made.append((line, given))
+    return made
+
+
+def _unwrapped(lines: Array, period: float, start: Array) -> Array:
+    """Return numbers without jumps along the second axis from the end, which is time, that begin close to a start."""
+    if np.isinf(period):
+        return lines
+    lines = np.unwrap(lines, period=period, axis=-2)
+    return np.asarray(lines - period * np.rint((lines[..., :1, :] - start) / period))
 
 
 def draw_numbers(
@@ -272,14 +292,14 @@ def draw_numbers(
     numbers : callable
         Function of the first point of a curve and of several points, with one row per point.
     period : float
-        Numbers that differ by multiples of it are equal. They are between −period / 2 and period / 2.
+        Numbers that differ by multiples of it are equal. They are drawn without jumps.
     """
-    if isinstance(panel, SubFigure) and not curves[0].alone and len(curves) > 1:
+    if isinstance(panel, SubFigure) and are_compared(curves):
         _compare_numbers(panel, curves, label, names, numbers, period)
         return
     space = size(panel)[0] - LEFT - RIGHT
     width = 1.8 if curves[0].alone else 0.9
-    drawn = [curve.marked(partial(numbers, curve.first_point)) for curve in curves]
+    drawn = _without_jumps(curves, lambda curve: partial(numbers, curve.first_point), period)
     named, rest = _choose(names, np.max([np.ptp(line, axis=0) for line, _ in drawn], axis=0))
     labels = [names[i] for i in named]
     looks = _looks(labels)
@@ -290,12 +310,10 @@ def draw_numbers(
         rest = rest[:: 1 + len(rest) // _OTHERS]
     rows = -(-len(labels) // max(1, min(_IN_ROW, int(space / 0.9))))
     (axes,) = timelines(panel, curves, [label], top=0.25 + 0.22 * rows)
-    if np.isfinite(period) and axes not in OWN_AXES:
-        axes.yaxis.set_major_locator(MultipleLocator(period / 4))
     for curve, (values, given) in zip(curves, drawn, strict=True):
         if curve.has_line:
             for i in rest:
-                axes.plot(*_line(curve.times, values[:, i], period).T, color=INK, linewidth=0.4, alpha=0.4)
+                axes.plot(curve.times, values[:, i], color=INK, linewidth=0.4, alpha=0.4)
         for k, (i, look) in enumerate(zip(named, looks, strict=True)):
             if axes in OWN_AXES and (curve.label or not curve.alone):
                 # The colour distinguishes curves, and the line style numbers.
@@ -304,7 +322,7 @@ def draw_numbers(
                 # Axes of the user get the names, and a legend only if the user adds one.
                 own = f"{curve.label}: {names[i]}" if curve.label else names[i]
                 label = own if axes in OWN_AXES and (curve.label or curve is curves[0]) else LINE
-                line = _line(curve.times, curve.graph(values[:, i]), period)
+                line = np.column_stack([curve.times, curve.graph(values[:, i])])
                 curve.plot_line(axes, line, linewidth=width, label=label, **look)
             positions, color = np.column_stack([curve.on_axis(curve.given_x), given[:, i]]), look["color"]
             if not curve.has_line or (curve.alone and curve.noise is None and curve.has_nodes):
@@ -327,31 +345,13 @@ def _compare_numbers(
 ) -> None:
     """Draw the numbers with the largest ranges in axes of their own, where several curves have their colours."""
     first = curves[0].first_point
-    ranges = np.max([np.ptp(numbers(first, curve.points), axis=0) for curve in curves], axis=0)
+    drawn = _without_jumps(curves, lambda _: partial(numbers, first), period)
+    ranges = np.max([np.ptp(line, axis=0) for line, _ in drawn], axis=0)
     kept = np.sort(np.argsort(-ranges, kind="stable")[:_COMPARED])
-
-    def few(points: Any) -> Array:
-        values = numbers(first, points)[:, kept]
-        jumps = np.abs(np.diff(values, axis=0, prepend=values[:1])) > period / 2
-        # Data are not a line.
-        return np.where(jumps, np.nan, values) if any(points is own.points for own in curves) else values
-
+    few = lambda points: numbers(first, points)[:, kept]  # noqa: E731
     words = " ".join(label.split())
     title = words if len(kept) == len(names) else f"{words}, {len(kept)} of {len(names)}: those with the largest ranges"
-    draw_coordinates(panel, curves, [names[i] for i in kept], few, title=title)
-
-
-def _line(times: Array, values: Array, period: float) -> Array:
-    """Return times and values, broken by NaN where a line leaves the period and returns on the other side."""
-    line, steps = np.column_stack([times, values]), np.diff(values)
-    (jumps,) = np.nonzero(np.abs(steps) > period / 2)
-    gaps = []
-    for i in jumps:
-        short = steps[i] - period * np.rint(steps[i] / period)
-        edge = np.copysign(period / 2, short)
-        time = times[i] + (edge - values[i]) / short * (times[i + 1] - times[i])
-        gaps.append([[time, edge], [np.nan] * 2, [time, -edge]])
-    return interrupted(line, jumps, gaps)
+    draw_coordinates(panel, curves, [names[i] for i in kept], few, title=title, period=period)
 
 
 def _choose(names: Sequence[str], ranges: Array) -> tuple[Indices, Indices]:
@@ -428,7 +428,7 @@ def independent(space: Space) -> Indices:
 
 
 def draw_torus(panel: SubFigure, curves: Sequence[Curve]) -> None:
-    """Draw angles between −180 and 180 degrees."""
+    """Draw angles in degrees, without jumps. The first ones are between −180 and 180 degrees."""
     names = component_names(curves[0].space.point_shape, False)
     degrees = lambda _, points: np.degrees(points)  # noqa: E731
     draw_numbers(panel, curves, "angles, degrees", names, degrees, 360)

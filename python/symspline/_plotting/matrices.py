@@ -25,13 +25,14 @@ from .._core import CutLocusError, convert_rotations
 from .._quaternions import matrices_of_quaternions
 from .._spaces import SpecialOrthogonal, cover_of
 from .chart import SHADOW, box, count_from, explain_frames, frame_handles, origin_of, plane, shadow_colors
-from .curves import BODIES, BODY, BODY_COLOR, KNOTS, POSES, START, Curve
+from .curves import BODIES, BODY, BODY_COLOR, FAINT, KNOTS, POSES, START, Curve, are_compared
 from .globe import centre_of
 from .graphs import FEW_KNOTS, SUBSCRIPTS, component_names, draw_components, draw_coordinates, draw_numbers, timelines
 from .rows import REACH, VIEW, Rows
 from .sphere import caps
 from .style import (
     AXES,
+    DATA,
     EDGE,
     INK,
     LEFT,
@@ -41,6 +42,7 @@ from .style import (
     Array,
     apart,
     axes_size,
+    evenly,
     legend,
     note,
     points,
@@ -60,6 +62,8 @@ _FRAMES = 16
 """The largest numbers of given frames in space, and of lighter ones between them."""
 _LEAST, _SHORT = 12.0, 0.32
 """Arrows are shorter than the time axis by a factor, and the smallest length in inches if there are many."""
+_BESIDE = 20
+"""The largest number of curves of a batch that are drawn beside their mean."""
 _PAIRS = 15
 """The largest number of correlations that have names."""
 _FAN = np.radians(30)
@@ -121,7 +125,7 @@ def _reference(curves: Sequence[Curve]) -> tuple[Array, str] | None:
     largest = ROTATIONS.distance(np.eye(3), turned).max()
     if largest < _SMALL:
         return first, "first point"
-    if not any(own.is_factor or not own.alone or len(own.gaps) or own.noise is not None for own in curves):
+    if not (are_compared(curves) or any(own.is_factor or len(own.gaps) or own.noise is not None for own in curves)):
         return None
     if largest < _LARGE:
         return first, "first point"
@@ -229,6 +233,7 @@ def draw_flat_poses(panel: SubFigure, curves: Sequence[Curve]) -> None:
     origin = count_from(panel, axes, curves, lambda poses: poses[:, :2, 2])
     positions = np.concatenate([curve.extent[:, :2, 2] for curve in curves])
     unit = float(np.max(np.ptp(positions, axis=0) / axes_size(axes))) or 1.0
+    framed = [curve for curve in curves if not curve.faint]
 
     def draw(poses: Array, label: str, **look: Any) -> None:
         if len(poses):
@@ -245,19 +250,22 @@ def draw_flat_poses(panel: SubFigure, curves: Sequence[Curve]) -> None:
         given, edge = curve.given, INK if curve.alone and curve.has_line else curve.color
         path = curve.points[:, :2, 2] - origin
         curve.draw_line(axes, curve.near_data(path), linewidth=1.6)
-        has_bodies = curve.noise is None and curve.has_nodes and len(_apart(given, 2 * length)) == len(given)
+        if curve.faint:
+            continue
+        has_nodes = curve.has_nodes and not curve.is_mean
+        has_bodies = curve.noise is None and has_nodes and len(_apart(given, 2 * length)) == len(given)
         if has_bodies:
             draw(given[1:], POSES, facecolor=edge, edgecolor=edge)
             draw(given[:1], START, facecolor="white", edgecolor=edge)
-        else:
+        elif not curve.is_mean:
             small = float(np.clip(22 / np.sqrt(max(len(given), 1)), 1.5, 4.0))
             # The first of the given poses is a body.
             dots = replace(curve, has_start=not curve.has_nodes)
             dots.draw_dots(axes, given[:, :2, 2] - origin, markersize=small)
         way = float(np.sum(np.linalg.norm(np.diff(path, axis=0), axis=1)))
         spread = _apart if way > length else _turned_apart
-        dense = curve.noise is None and curve.has_nodes and not has_bodies
-        some = spread(given if dense else curve.points[~curve.bridges], max(4 * length, way * len(curves) / _MANY))
+        dense = curve.noise is None and has_nodes and not has_bodies
+        some = spread(given if dense else curve.points[~curve.bridges], max(4 * length, way * len(framed) / _MANY))
         if has_bodies:
             free = np.linalg.norm(some[:, None, :2, 2] - given[:, :2, 2], axis=-1) > 2 * length
             some = some[free.all(axis=1)]
@@ -286,11 +294,12 @@ def draw_poses(panel: SubFigure, curves: Sequence[Curve]) -> None:
     given = [curve.given[:, :3, 3] - origin for curve in curves]
     everything = np.concatenate([*paths, *given])
     length = 0.18 * window(everything[np.isfinite(everything[:, 0])], 1.0)[1] or 0.2
-    number = max(2, _FRAMES // len(curves))
+    framed = [curve for curve in curves if not curve.faint]
+    number = max(2, _FRAMES // len(framed))
     # The box contains the tips of all frames that are drawn.
     tips = [
         (poses[:, :3, 3] - origin + length * poses[:, :3, i])
-        for curve in curves
+        for curve in framed
         for _, poses in curve.samples(number).values()
         for i in range(3)
     ]
@@ -308,6 +317,8 @@ def draw_poses(panel: SubFigure, curves: Sequence[Curve]) -> None:
         # The usual colour is that of the third axis.
         dark = {"color": INK} if curve.alone and curve.color == SPLINE and not len(curve.gaps) else {}
         curve.draw_line(axes, path, linewidth=2.0 if curve.alone else 1.4, **dark)
+        if curve.faint:
+            continue
         for group, (_, poses) in curve.samples(number).items():
             if group != "bold":
                 draw(poses, 0.7 * length, linewidth=1.2, alpha=0.7)
@@ -317,10 +328,11 @@ def draw_poses(panel: SubFigure, curves: Sequence[Curve]) -> None:
                 curve.draw_dots(axes, poses[:, :3, 3] - origin, markersize=3.5 if curve.alone else 2)
             else:
                 curve.draw_dots(axes, curve.given[:, :3, 3] - origin)
-    bold = sum(len(curve.samples(number)["bold"][0]) for curve in curves)
-    count = sum(len(curve.given) for curve in curves)
+    bold = sum(len(curve.samples(number)["bold"][0]) for curve in framed)
+    count = sum(len(curve.given) for curve in framed)
     name = "bold: given" if bold == count else f"bold: {bold} of {count} given"
     words = curves[0].legend_of(f"{name}; light: curve", "bold: curve", "light: data")
+    words = "frames: mean curve" if curves[0].is_mean else words
     explain_frames(panel, axes)
     note(panel, f"{words}; {SHADOW}")
 
@@ -330,7 +342,7 @@ def draw_poses(panel: SubFigure, curves: Sequence[Curve]) -> None:
 
 def draw_covariances(panel: SubFigure, curves: Sequence[Curve]) -> None:
     """Draw the standard deviations and correlations of covariance matrices; components of several curves."""
-    if not isinstance(panel, SubFigure) or not (curves[0].alone or len(curves) == 1):
+    if not isinstance(panel, SubFigure) or are_compared(curves):
         draw_components(panel, curves)
         return
     n = curves[0].space.point_shape[0]
@@ -407,6 +419,14 @@ def _draw_in_rows(view: Array, panel: SubFigure, curves: Sequence[Curve]) -> Non
         _draw_row(rows, i, inches, times, view @ symbols @ view.T, radii)
         if radii is not None:
             words[1] = "shaded: 95 % bands"
+        curve = rows.rows[i].curve
+        if curve.is_mean and curve.batch is not None:
+            samples = np.searchsorted(curve.batch.times, times).clip(max=len(curve.batch.x) - 1)
+            others = curve.batch.at("point")[:, samples]
+            for one in others[evenly(len(others), _BESIDE)]:
+                rings = inches * outlines(view @ one @ view.T)
+                look: Any = {"facecolors": "none", "edgecolors": DATA, "linewidths": 0.5, "label": FAINT, "zorder": 3.5}
+                rows.axes.add_collection(PolyCollection(list(rings), **look, **rows.in_inches(times, i)))
     # The scale to the right of the words is an inch wide, and the view as well.
     has_view = len(view) == 3
     text = fill("; ".join(filter(None, words)), max(14, int((rows.width - 1 - has_view) / 0.075)))

@@ -264,7 +264,7 @@ def _explain(figure: Figure, curves: Sequence[Curve], height: float, others: int
         both = few[0].noise is not None and few[0].noise.speed is not None
         add(Patch(facecolor=few[0].color, alpha=0.22), "95 % band of curve" + " and speed" * both)
     if BEHIND in drawn:
-        add(Line2D([], [], color=few[0].color, linewidth=1, linestyle=(0, (2, 2))), "far side")
+        add(Line2D([], [], color=few[0].color, linewidth=1, linestyle=(0, (2, 2)), alpha=0.6), "far side")
     if AFTER in drawn:
         add(Line2D([], [], color=AFTER_COLOR, linewidth=2), "after the first gap")
     if BRIDGE in drawn:

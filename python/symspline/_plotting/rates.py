@@ -22,7 +22,8 @@ IN_ROW = 3
 """The largest number of factors whose pictures are in one row."""
 # Other spaces than spheres, in which the length of a velocity is an angle per time.
 _ANGULAR = {"so:2", "so:3", "o:2", "o:3", "u:1", "rp:1", "rp:2", "gr:1,2", "gr:1,3", "gr:2,3"}
-_HALVES = {"su:2", "cp:1", "cgr:1,2"}
+_STATES = {"cp:1", "cgr:1,2"}
+_HALVES = {"su:2", *_STATES}
 """Spaces whose distances are half of the angles that their picture shows."""
 _SLOW = 0.01
 """Rates that are smaller per second are per hour, day or year."""
@@ -95,14 +96,14 @@ def rates_of(space: Space[Any], seconds: bool) -> list[Rate]:
     per = [", 1/s", ", 1/s²"] if seconds else ["", ""]
     if isinstance(own, (Sphere, Torus)) or str(own) in _ANGULAR or str(own) in _HALVES:
         per = [", rad/s", ", rad/s²"] if seconds else [", rad/t", ", rad/t²"]
-    half = [" = |ω|/2", " = |ω′|/2"] if str(own) in _QUATERNIONS else ["", ""]
+    more = [" = |ω|/2", " = |ω′|/2"] if str(own) in _QUATERNIONS else [" of states" * (str(own) in _STATES)] * 2
     if isinstance(own, SpecialEuclidean):
         return _rates_of_poses(own, seconds)
     sign = _SIGNS.get(str(own))
     if sign is None:
         return [
-            Rate(f"speed\n|γ′|{half[0]}{per[0]}", 1, lambda at: at("speed")),
-            Rate(f"acceleration\n|∇γ′|{half[1]}{per[1]}", 2, lambda at: at("bend")),
+            Rate(f"speed\n|γ′|{more[0]}{per[0]}", 1, lambda at: at("speed")),
+            Rate(f"acceleration\n|∇γ′|{more[1]}{per[1]}", 2, lambda at: at("bend")),
         ]
     return [
         Rate(f"velocity\nγ′{per[0]}", 1, lambda at: np.copysign(at("speed"), sign(at("point"), at("velocity"))), True),
@@ -153,20 +154,21 @@ def _rates_of_poses(space: SpecialEuclidean, seconds: bool) -> list[Rate]:
 def columns_of(space: Space[Any], seconds: bool, most: int, wide: bool) -> list[list[tuple[int | None, Rate]]]:
     """Return the rates of a space in columns, with the number of the factor of a product.
 
-    In wide figures, up to three factors have a column each, below their pictures. More of them have one for velocities
-    and one for accelerations.
+    In wide figures, turning and moving have a column each, and so have up to three factors, below their pictures. More
+    of them have one for velocities and one for accelerations.
     """
     if not isinstance(space, Product):
-        return [[(None, own) for own in rates_of(space, seconds)]]
+        rates: list[tuple[int | None, Rate]] = [(None, own) for own in rates_of(space, seconds)]
+        return [rates[:2], rates[2:]] if wide and len(rates) > 2 else [rates]
     factors = factors_of(space)
     each = [rates_of(factor, seconds) for factor in factors[:most]]
     if wide and len(each) <= IN_ROW:
-        return [[(i, own) for own in rates] for i, rates in enumerate(each)]
+        return [[(i, own) for own in group] for i, group in enumerate(each)]
     names = [_cut(short_name(factor)) for factor in factors]
     if len(set(names)) < len(names):
         names = [f"factor {i}" for i in range(len(names))]
     rows: list[tuple[int | None, Rate]] = [
-        (i, own._replace(label=f"{own.label} of {names[i]}")) for i, rates in enumerate(each) for own in rates
+        (i, own._replace(label=f"{own.label} of {names[i]}")) for i, group in enumerate(each) for own in group
     ]
     return [[row for row in rows if row[1].order == order] for order in (1, 2)] if wide else [rows]
 
@@ -220,10 +222,15 @@ def _draw_rate(axes: Axes, curves: Sequence[Curve], rate: Rate) -> None:
     drawn = [0.0, *fill_quantiles(axes, curves, rate.values)]
     top = rounding = 0.0
     for curve in curves:
+        top = max(top, rate.scale * float(np.abs(rate.speed(curve.at)).max()))
+        # Rounding errors of points between the closest knots, which a curve at rest has.
+        rounding = max(rounding, rate.scale * 1e-15 * np.abs(curve.points).max() / np.diff(curve.data.times).min())
         if curve.is_mean and curve.batch is not None:
+            # A mean of curves is smoother than they are, so that its rates are no middle of theirs.
             median = np.median(rate.values(curve.batch.at), axis=0)
-            axes.plot(curve.batch.times, median, color=INK, linewidth=1.4, label=MEDIAN)
+            axes.plot(curve.batch.times, median, color=INK, linewidth=1.8, label=MEDIAN)
             drawn += [float(median.min()), float(median.max())]
+            continue
         values = rate.values(curve.at)
         deviation = curve.noise.speed if rate.order == 1 and curve.noise is not None else None
         if deviation is None:
@@ -242,9 +249,6 @@ def _draw_rate(axes: Axes, curves: Sequence[Curve], rate: Rate) -> None:
             if deviation is not None:
                 fill_band(axes, part, low[at], high[at])
         drawn += [float(np.nanmin(low)), float(np.nanmax(high))]
-        top = max(top, rate.scale * float(np.abs(rate.speed(curve.at)).max()))
-        # Rounding errors of points between the closest knots, which a curve at rest has.
-        rounding = max(rounding, rate.scale * 1e-15 * np.abs(curve.points).max() / np.diff(curve.data.times).min())
     for limit in {curve.limits[0][rate.order - 1] for curve in curves if curve.limits and rate.whole} - {np.inf}:
         for bound in (limit, -limit) if rate.signed else (limit,):
             axes.axhline(rate.scale * bound, color=MARK, linewidth=1, linestyle="--", zorder=2, label=LIMIT)

@@ -117,7 +117,7 @@ class Rows:
         first = curves[0]
         if len(curves) == 1 and first.has_line:
             rows = [Row(first, "curve")]
-            if len(first.given) and (first.noise is not None or first.has_nodes):
+            if len(first.given) and (first.noise is not None or first.has_nodes) and not first.is_mean:
                 rows.insert(0, Row(first, "given" if first.noise is None else "data"))
         else:
             rows = [Row(curves[i], "") for i in evenly(len(curves), max(1, int(high // _LEAST)))]
@@ -160,7 +160,7 @@ class Rows:
             self.axes.plot([left, left + 0.2 / self.width], [-i, -i], color=row.curve.color, linewidth=3, **look)
             return times, symbols, radii
         look |= {"color": INK, "fontsize": points(9)}
-        self.axes.text(left, -i, row.name, va="bottom", **look)
+        self.axes.text(left, -i, "mean\ncurve" if row.curve.is_mean else row.name, va="bottom", **look)
         self.axes.text(left, -i, row.count(self.width, reach), va="top", **look | {"fontsize": points(8)})
         return times, symbols, radii
 

@@ -40,7 +40,7 @@ _POLE = 60
 _NORTH = np.array([0.0, 0.0, 1.0])
 _RIM = 1e-9
 """Rounding decides the side of points that are closer to the plane of the rim."""
-_TWICE = "; angles are twice the distances of states"
+_TWICE = "\nangles on it are twice the distances of states"
 _BLOCH = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "|0⟩": (0.0, 0.0, 1.0), "|1⟩": (0.0, 0.0, -1.0)}
 _AXES = {"x₁": (1.0, 0.0, 0.0), "x₂": (0.0, 1.0, 0.0), "x₃": (0.0, 0.0, 1.0)}
 
