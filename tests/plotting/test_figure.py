@@ -194,7 +194,8 @@ def test_product_has_a_picture_a_factor(name, shape):
     rng = np.random.default_rng(2)
     spline = ss.CubicSpline(None, tuple(points_around(s, rng, shape) for s in space.factors), space)
     figure = rendered(spline.plot())
-    assert set(name.split(" x ")) <= {text.partition(", ")[0] for text in texts_of(figure)}
+    texts = texts_of(figure)
+    assert all(any(text.startswith(repr(factor)) for text in texts) for factor in space.factors)
     first = spline[0] if len(shape) > 1 else spline
     for i, (axes, factor) in enumerate(zip(rate_axes(figure)[0], space.factors, strict=True)):
         line = lines_of(axes)[0]

@@ -305,9 +305,8 @@ def test_products_have_a_panel_per_factor():
     points = smooth_field("so:3"), smooth_field("r:3"), smooth_field("r:1")
     grid = ss.GridSpline((U, V), points, "so:3 x r:3 x r:1")
     figure = rendered(grid.plot())
-    assert {"so:3, rotations", "r:3", "r:1", "C² grid of rotations and vectors on so:3 x r:3 x r:1"} <= set(
-        texts_of(figure)
-    )
+    title = "C² grid of rotations and vectors on SpecialOrthogonal(3) × Euclidean(3) × Euclidean(1)"
+    assert {"SpecialOrthogonal(3), rotations", "Euclidean(3), vectors", title} <= set(texts_of(figure))
     maps = [axes for axes in figure.axes if axes.get_label() == "field"]
     assert len(maps) == 2
     (image,) = maps[1].images

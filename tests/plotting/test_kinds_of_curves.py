@@ -282,9 +282,9 @@ def test_batches_close_to_their_mean_show_it(name):
     points = space.exp(points, 0.03 * space.random_tangent(rng, points))
     batch = ss.CubicSpline(t, points, space)
     figure = rendered(batch.plot())
-    assert {"mean curve", "single curves", "5–95 % of 12 curves", "12 curves, 9 points each, natural ends"} <= set(
-        texts_of(figure)
-    )
+    assert {"mean curve", "single curves", "median of 12 curves", "5–95 % of 12 curves"} <= set(texts_of(figure))
+    ends = " (constant twist)" * (name == "se:3")
+    assert f"12 curves, 9 points each, natural ends{ends}" in texts_of(figure)
     assert "given points" not in texts_of(figure) and "curve 0" not in texts_of(figure)
     # The mean is smoother than the curves, so that its speed is not among theirs.
     ((median,), *_) = [axes_named(figure, "speed").lines]
@@ -317,7 +317,13 @@ def test_batches_close_to_their_mean_show_it_with_quantiles(name):
     batch = ss.CubicSpline(None, space.exp(points, 0.02 * space.random_tangent(rng, points)), space)
     figure = rendered(batch.plot())
     texts = texts_of(figure)
-    assert {"mean curve", "median of rates", "5–95 % of 12 curves"} <= set(texts) and "curve 0" not in texts
+    assert {"median of 12 curves", "5–95 % of 12 curves"} <= set(texts) and "curve 0" not in texts
+    # Ellipses have the colours of their times.
+    assert ("mean curve" in texts) == (name != "spd:2") and ("mean\ncurve" in texts) == (name == "spd:2")
+    (median,) = (line for line in axes_named(figure, "distance").lines if line.get_label() == "_median")
+    mean, (x, y) = curves_of(batch, Axis())[0][0], median.get_data()
+    middle = mean.data.evaluate(x, "point", "raise", False)
+    np.testing.assert_allclose(y, np.median(space.distance(middle, batch(x)), axis=0), atol=1e-9)
     assert "start" not in texts and "12 curves, 7 points each, natural ends" in texts
     if name == "so:3":
         # Rotations of several curves are graphs, with the quantiles of all of them.

@@ -218,7 +218,8 @@ def test_rotations_beside_positions_are_graphs(largest):
     turns = Rotation.from_rotvec(np.multiply.outer(largest * t / 5, [0.6, 0.0, 0.8])) * Rotation.from_euler("x", 0.4)
     spline = ss.CubicSpline(t, (turns.as_matrix(), np.stack([t, t**2, np.sin(t)], axis=1)), "so:3 x r:3")
     texts = texts_of(rendered(spline.plot()))
-    assert "so:3, rotations" in texts and "r:3" in texts
+    assert {"SpecialOrthogonal(3), rotations", "Euclidean(3), vectors"} <= set(texts)
+    assert "C² spline of rotations and vectors" in texts
     name = {2.0: "first point", 4.5: "middle rotation"}.get(largest)
     assert (f"rotation vector from the {name}, rad" in texts) == (name is not None)
     assert ("first axis" in texts) == (name is None)

@@ -131,15 +131,15 @@ def test_powers_and_differences_are_plain_text(limits, expected):
 def test_equal_factors_have_numbers():
     angles = tuple(ss.Sphere(1).from_angles(np.linspace(k, 2 + k, 5)) for k in range(3))
     texts = texts_of(ss.CubicSpline(None, angles, "s:1 x s:1 x s:1").plot())
-    assert [f"factor {k}: sphere:1" in texts for k in range(3)] == [True] * 3
+    assert [f"factor {k}: Sphere(1)" in texts for k in range(3)] == [True] * 3
     # Rates are below the picture of their factor.
     assert texts.count("velocity\nγ′, rad/t") == 3
     texts = texts_of(ss.CubicSpline(None, (*angles, *angles), " x ".join(["s:1"] * 6)).plot())
     assert {"velocity\nγ′, rad/t of factor 5", "acceleration\n∇γ′, rad/t² of factor 0"} <= set(texts)
     grid = ss.GridSpline((np.arange(4.0), np.arange(3.0)), (np.zeros((4, 3, 2)),) * 2, "r:2 x r:2")
-    assert "factor 1: r:2" in texts_of(grid.plot())
+    assert "factor 1: Euclidean(2), vectors" in texts_of(grid.plot())
     texts = texts_of(spline_product().plot())
-    assert "sphere:1" in texts and not any("factor" in text for text in texts)
+    assert "Sphere(1)" in texts and not any("factor" in text for text in texts)
 
 
 def spline_product():

@@ -67,7 +67,7 @@ def draw_3d(panel: SubFigure, curves: Sequence[Curve]) -> None:
     """Draw curves in R³ in a box with equal scales, with their shadows on the floor."""
     origin = origin_of(panel, curves, np.asarray)
     paths = [curve.near_data(curve.points - origin) for curve in curves]
-    shadows = [curve.outside_gaps(path) for curve, path in zip(curves, paths, strict=True)]
+    shadows = [curve.outside_gaps(path) for curve, path in zip(curves, paths, strict=True) if not curve.faint]
     given = [curve.given - origin for curve in curves]
     control = [curve.polygon[0] - origin for curve in curves if curve.polygon is not None]
     axes = box(panel, shadows, paths + given + control, colors=shadow_colors(curves), origin=origin)
@@ -102,7 +102,7 @@ def count_from(panel: Any, axes: Axes, curves: Sequence[Curve], positions: Calla
 
 def shadow_colors(curves: Sequence[Curve]) -> list[Any]:
     """Return the colours of shadows: those of named curves, and grey of others."""
-    return [to_rgba(curve.color, 0.3) if curve.label and not curve.faint else GRID for curve in curves]
+    return [to_rgba(curve.color, 0.3) if curve.label else GRID for curve in curves if not curve.faint]
 
 
 def _draw_hose(axes: Any, curve: Curve, points: Array, radii: Array) -> None:
@@ -184,7 +184,7 @@ def box(
     angles = np.radians(azimuths)
     right = everything[:, 1:2] * np.cos(angles) - everything[:, :1] * np.sin(angles)
     first = right[: np.isfinite(lines[0][:, 0]).sum()] if lines else right
-    widths = np.std(right, axis=0) * (1 + 0.1 * np.sign(first[-1] - first[0]))
+    widths = np.std(right, axis=0) * (1 + 0.3 * np.sign(first[-1] - first[0]))
     elevation = float(np.interp(sides[2] / sides[:2].max(), [0.2, 1], [46, 24]))
     axes.view_init(elev=elevation, azim=azimuths[widths.argmax()])
     axes.set_box_aspect(tuple(sides))

@@ -19,14 +19,14 @@ from matplotlib.figure import Figure, SubFigure
 from .._arrays import short_repr
 from .._core import ValidationError
 from .._disk import path_of, replacing
-from .._spaces import Space, cover_of, factors_of, short_name
+from .._spaces import Space, cover_of, factors_of
 from . import chart, columns, graphs, matrices, sphere
 from .curves import Curve
 from .rates import IN_ROW
 from .shrink import shrink, small_text
 from .style import DPI, INK, font_factor, points
 from .theme import invert_page, is_dark, light_colors
-from .titles import points_of
+from .titles import points_of_factor
 
 FACTORS = 6
 """The largest number of factors of a product that are drawn."""
@@ -224,7 +224,7 @@ def save(figure: Figure, file: Any) -> None:
 
 def captions(space: Space[Any]) -> list[str]:
     """Return names of the factors of a product, with what their points are, and numbers if several are equal."""
-    names = [", ".join(filter(None, (short_name(own), points_of(own)))) for own in factors_of(space)]
+    names = [", ".join(filter(None, (repr(own), points_of_factor(own)))) for own in factors_of(space)]
     several = max(Counter(names).values()) > 1
     return [f"factor {i}: {name}" if several else name for i, name in enumerate(names)]
 

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
-from matplotlib.colors import to_rgba
+from matplotlib.colors import to_rgba, to_rgba_array
 from matplotlib.figure import SubFigure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
@@ -38,7 +38,6 @@ from .style import (
     LEFT,
     OWN_AXES,
     RIGHT,
-    SPLINE,
     Array,
     apart,
     axes_size,
@@ -100,7 +99,11 @@ def draw_rotations(panel: SubFigure, curves: Sequence[Curve]) -> None:
         if radii is not None:
             _draw_discs(rows, i, times, length, frames, radii)
             words = "discs: 95 % bands"
-        _draw_arrows(rows.axes, times, -i, length * frames, light=row.name == "data")
+        light = np.full(len(times), row.name == "data")
+        if row.name == "curve" and row.curve.noise is None and row.curve.has_nodes:
+            # Those between the given points are lighter.
+            light = ~np.isin(times, row.curve.times[row.curve.knots])
+        _draw_arrows(rows.axes, times, -i, length * frames, np.where(light, 0.5, 1.0))
     _explain(rows.axes, words, rows.width)
     rows.draw_view()
 
@@ -182,7 +185,7 @@ MATRICES: dict[str, Callable[[Any], Array]] = {
 """Matrices of rotations, shape (..., 3, 3)."""
 
 
-def _draw_arrows(axes: Axes, times: Array, row: int, frames: Array, light: bool) -> None:
+def _draw_arrows(axes: Axes, times: Array, row: int, frames: Array, opacity: Array) -> None:
     """Draw the columns of matrices, shape (m, 3, 3), in inches. Nearer columns cover farther ones."""
     seen = VIEW @ frames
     order = np.argsort(seen[:, 2], axis=-1)
@@ -190,9 +193,11 @@ def _draw_arrows(axes: Axes, times: Array, row: int, frames: Array, light: bool)
     # Layouts would add the length of the arrows in data to their extent.
     look: Any = {"units": "inches", "scale_units": "inches", "scale": 1, "clip_on": False, "in_layout": False}
     look |= {"headwidth": 3.5, "headlength": 4.5, "headaxislength": 4.2, "zorder": 4}
-    look |= {"width": 0.018, "alpha": 0.6} if light else {"width": 0.028, "alpha": 1}
+    look["width"] = 0.028 if opacity.max() == 1 else 0.018
+    colors = to_rgba_array(np.array(AXES)[order.ravel()])
+    colors[:, 3] = np.repeat(opacity, 3)
     positions = np.repeat(times, 3), np.full(3 * len(times), row)
-    axes.quiver(*positions, right.ravel(), up.ravel(), color=np.array(AXES)[order.ravel()], **look)
+    axes.quiver(*positions, right.ravel(), up.ravel(), color=colors, **look)
 
 
 def _draw_discs(rows: Rows, row: int, times: Array, length: float, frames: Array, radii: Array) -> None:
@@ -303,7 +308,7 @@ def draw_poses(panel: SubFigure, curves: Sequence[Curve]) -> None:
         for _, poses in curve.samples(number).values()
         for i in range(3)
     ]
-    shadows = [curve.outside_gaps(path) for curve, path in zip(curves, paths, strict=True)]
+    shadows = [curve.outside_gaps(path) for curve, path in zip(curves, paths, strict=True) if not curve.faint]
     axes = box(panel, shadows, paths + given + tips, 0.02, 0.45, shadow_colors(curves), origin)
 
     def draw(poses: Array, length: float, **look: Any) -> None:
@@ -315,7 +320,7 @@ def draw_poses(panel: SubFigure, curves: Sequence[Curve]) -> None:
 
     for curve, path in zip(curves, paths, strict=True):
         # The usual colour is that of the third axis.
-        dark = {"color": INK} if curve.alone and curve.color == SPLINE and not len(curve.gaps) else {}
+        dark = {"color": INK} if curve.color_of_dots == INK and not len(curve.gaps) else {}
         curve.draw_line(axes, path, linewidth=2.0 if curve.alone else 1.4, **dark)
         if curve.faint:
             continue
@@ -330,11 +335,11 @@ def draw_poses(panel: SubFigure, curves: Sequence[Curve]) -> None:
                 curve.draw_dots(axes, curve.given[:, :3, 3] - origin)
     bold = sum(len(curve.samples(number)["bold"][0]) for curve in framed)
     count = sum(len(curve.given) for curve in framed)
-    name = "bold: given" if bold == count else f"bold: {bold} of {count} given"
-    words = curves[0].legend_of(f"{name}; light: curve", "bold: curve", "light: data")
-    words = "frames: mean curve" if curves[0].is_mean else words
+    name = "bold given ones" if bold == count else f"{bold} of {count} given ones bold"
+    words = curves[0].legend_of(f"{name}, light ones between", "bold ones of the curve", "light ones of data")
+    words = "those of the mean curve" if curves[0].is_mean else words
     explain_frames(panel, axes)
-    note(panel, f"{words}; {SHADOW}")
+    note(panel, f"frames: {words}; {SHADOW}")
 
 
 # ---- positive definite matrices ----

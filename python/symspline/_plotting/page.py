@@ -13,7 +13,7 @@ from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from .._spaces import Product, factors_of
+from .._spaces import Product, SpecialEuclidean, cover_of, factors_of
 from . import residuals
 from .collect import axis_of, curves_of
 from .curves import (
@@ -128,7 +128,7 @@ def draw_page(
     widths = [picture.width] if wide else [picture.width, _RATES_WIDTH]
     rates = any(curve.has_line for curve in curves)
     head = _HEAD + _LINE * _extra_lines(curves, widths[0] if wide or not rates else sum(widths))
-    count = max(map(len, columns_of(space, False, FACTORS, wide)))
+    count = max(map(len, columns_of(curves[0], False, FACTORS, wide)))
     beside = 0.0 if wide or not rates else BOTTOM + TOP + _LEAST_ROW * count
     heights = [head, max(picture.height, beside)]
     if wide and rates:
@@ -188,6 +188,9 @@ def _plot_into(
 def _description(spline: Any, curves: Sequence[Curve]) -> str:
     """Describe the data, the convergence of the solver, the number of curves with bands, and the number of gaps."""
     words = [spline._made_of(curves[0].radius)]
+    if isinstance(cover_of(spline.space), SpecialEuclidean):
+        # The acceleration of the position is that of a body in such a motion.
+        words[0] = words[0].replace("natural ends", "natural ends (constant twist)")
     factors = len(factors_of(spline.space))
     if factors > FACTORS:
         words.append(f"{FACTORS} of {factors} factors")
@@ -226,6 +229,7 @@ def _explain(figure: Figure, curves: Sequence[Curve], height: float, others: int
     """
     drawn = set().union(*(_labels(axes) for axes in figure.axes))
     few = [curve for curve in curves if not curve.faint]
+    count = 0 if few[0].batch is None else int(few[0].batch.valid.sum())
     dot: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 5}
     handles: list[Artist] = []
     labels: list[str] = []
@@ -235,7 +239,8 @@ def _explain(figure: Figure, curves: Sequence[Curve], height: float, others: int
         labels.append(label)
 
     for curve in (part for own in few for part in own.unbroken):
-        if curve.label and curve.label not in labels:
+        # Ellipses have the colours of times.
+        if curve.label and curve.label not in labels and (curve.label in drawn or not curve.is_mean):
             look = {} if curve.has_line else dot | {"markerfacecolor": "none"}
             add(Line2D([], [], color=curve.color, linewidth=2, **look), curve.label)
     color = few[0].color_of_dots if few[0].alone else DATA
@@ -284,9 +289,9 @@ def _explain(figure: Figure, curves: Sequence[Curve], height: float, others: int
         hidden = f", {drawn_ones} of {others}" if drawn_ones < others else ""
         add(Line2D([], [], color=DATA, linewidth=0.7), ("single curves" if few[0].is_mean else "other curves") + hidden)
     if MEDIAN in drawn:
-        add(Line2D([], [], color=INK, linewidth=1.4), "median of rates")
-    if QUANTILES in drawn and few[0].batch is not None:
-        add(Patch(facecolor=DATA, alpha=0.25), f"5–95 % of {int(few[0].batch.valid.sum())} curves")
+        add(Line2D([], [], color=INK, linewidth=1.8), f"median of {count} curves")
+    if QUANTILES in drawn:
+        add(Patch(facecolor=DATA, alpha=0.25), f"5–95 % of {count} curves")
     if drawn & {KNOTS, TICKS}:
         look = {"linestyle": ":"} if KNOTS in drawn else {"linestyle": "none", "marker": "|", "markeredgewidth": 1.6}
         times = "times of data" if few[0].noise is not None else "times of points" if few[0].has_nodes else "knots"

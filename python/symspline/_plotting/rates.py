@@ -44,7 +44,7 @@ class Rate(NamedTuple):
     label : str
         Label of the vertical axis.
     order : int
-        1 for velocities, 2 for accelerations.
+        1 for velocities, 2 for accelerations, 0 for distances.
     values : callable
         Takes a function that evaluates a quantity, and returns numbers.
     signed : bool
@@ -151,14 +151,20 @@ def _rates_of_poses(space: SpecialEuclidean, seconds: bool) -> list[Rate]:
     return [rate._replace(whole=False, speed=own) for rate, own in zip(rates, speeds, strict=True)]
 
 
-def columns_of(space: Space[Any], seconds: bool, most: int, wide: bool) -> list[list[tuple[int | None, Rate]]]:
-    """Return the rates of a space in columns, with the number of the factor of a product.
+def columns_of(curve: Curve, seconds: bool, most: int, wide: bool) -> list[list[tuple[int | None, Rate]]]:
+    """Return the rates of a curve in columns, with the number of the factor of a product.
 
     In wide figures, turning and moving have a column each, and so have up to three factors, below their pictures. More
     of them have one for velocities and one for accelerations.
     """
+    space = curve.space
+    if curve.radius is not None:
+        return [[(None, own) for own in _on_earth(curve, seconds)]]
     if not isinstance(space, Product):
         rates: list[tuple[int | None, Rate]] = [(None, own) for own in rates_of(space, seconds)]
+        if curve.is_mean and not isinstance(cover_of(space), SpecialEuclidean):
+            rates.insert(0, (None, _deviation(curve, ", rad" * ("rad" in rates[0][1].label))))
+            return [rates]
         return [rates[:2], rates[2:]] if wide and len(rates) > 2 else [rates]
     factors = factors_of(space)
     each = [rates_of(factor, seconds) for factor in factors[:most]]
@@ -178,11 +184,23 @@ def _cut(name: str) -> str:
     return name if len(name) <= _LONGEST else f"{name[: _LONGEST - 1]}…"
 
 
-def _rates_on_earth(radius: float, seconds: bool) -> list[Rate]:
-    """Return speed and acceleration on the Earth, whose radius is in metres."""
+def _deviation(mean: Curve, unit: str, scale: float = 1.0) -> Rate:
+    """Return the distances of the curves of a batch from their mean."""
+
+    def distances(at: At) -> Array:
+        assert mean.batch is not None
+        middle = mean.data.evaluate(mean.batch.x, "point", "raise", False)
+        return scale * mean.space.distance(middle, at("point"))
+
+    return Rate(f"distance\nfrom mean{unit}", 0, distances, scale=scale)
+
+
+def _on_earth(curve: Curve, seconds: bool) -> list[Rate]:
+    """Return rates on the Earth, whose radius is in metres."""
+    radius = curve.radius or 0.0
     first, second = (3.6 * radius, radius) if seconds else (radius / 1000,) * 2
     names = ("km/h", "m/s²") if seconds else ("km per unit of t", "km per unit of t²")
-    return [
+    return [_deviation(curve, ", km", radius / 1000)] * curve.is_mean + [
         Rate(f"speed\n{names[0]}", 1, lambda at: first * at("speed"), scale=first),
         Rate(f"acceleration\n{names[1]}", 2, lambda at: second * at("bend"), scale=second),
     ]
@@ -191,15 +209,13 @@ def _rates_on_earth(radius: float, seconds: bool) -> list[Rate]:
 def draw_rates(panel: SubFigure, curves: Sequence[Curve], most: int, wide: bool) -> None:
     """Draw the rates of curves in the columns of `columns_of`."""
     curves = [curve for curve in curves if curve.has_line and not curve.faint]
-    seconds, radius = curves[0].axis.seconds, curves[0].radius
-    columns = columns_of(curves[0].space, seconds, most, wide)
-    if radius is not None:
-        columns = [[(None, own) for own in _rates_on_earth(radius, seconds)]]
+    seconds = curves[0].axis.seconds
+    columns = columns_of(curves[0], seconds, most, wide)
     panels = panel.subfigures(1, len(columns), squeeze=False)[0]
     for own, group in zip(panels, columns, strict=True):
         parts = [curves if number is None else [curve.part(number) for curve in curves] for number, _ in group]
         rates = [rate for _, rate in group]
-        if seconds and radius is None:
+        if seconds and curves[0].radius is None:
             rates = [_in_longer_units(*each) for each in zip(rates, parts, strict=True)]
         made = timelines(own, curves, [rate.label for rate in rates])
         for each in zip(made, parts, rates, strict=True):
@@ -254,7 +270,7 @@ def _draw_rate(axes: Axes, curves: Sequence[Curve], rate: Rate) -> None:
             axes.axhline(rate.scale * bound, color=MARK, linewidth=1, linestyle="--", zorder=2, label=LIMIT)
             drawn.append(rate.scale * bound)
     top = top if top > rounding else 1.0
-    unit = top if rate.order == 1 else top / max(curve.x[-1] - curve.x[0] for curve in curves)
+    unit = top * max(curve.x[-1] - curve.x[0] for curve in curves) ** (1 - rate.order)
     _limit(axes, min(drawn), max(drawn), unit, rounding if rate.order == 1 else 1e-9 * unit, rate.signed)
 
 

@@ -72,7 +72,7 @@ class Row:
         step = wanted[1] - wanted[0]
         nodes = curve.x[curve.knots]
         if curve.noise is None and curve.has_nodes and self.name and np.diff(nodes).min(initial=np.inf) > 0.55 * step:
-            inner = [np.linspace(*ends, 1 + max(1, round((ends[1] - ends[0]) / step))) for ends in pairwise(nodes)]
+            inner = [np.linspace(*ends, 1 + max(1, int((ends[1] - ends[0]) / step + 0.6))) for ends in pairwise(nodes)]
             wanted = np.unique(np.concatenate(inner))
         even = np.searchsorted(curve.x, wanted)
         # There are no samples in gaps.

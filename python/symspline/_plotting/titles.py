@@ -20,18 +20,25 @@ _FAMILIES = {"spd": "matrices", "stiefel": "orthonormal frames", "gr": "subspace
 """What the points of a space are, for titles."""
 
 
+def points_of_factor(space: Space[Any]) -> str:
+    """Return what the points of a factor of a product are, or nothing."""
+    return "vectors" if isinstance(space, Euclidean) else points_of(space)
+
+
 def points_of(space: Space[Any]) -> str:
-    """Return what the points of a space are, or nothing. Those of R^n are vectors in a product."""
+    """Return what the points of a space are, or nothing."""
     if isinstance(space, Product):
-        each = ["vectors" if isinstance(own, Euclidean) else points_of(own) for own in factors_of(space)]
+        each = list(map(points_of_factor, factors_of(space)))
         return " and ".join(dict.fromkeys(each)) if all(each) else ""
     name = str(cover_of(space))
     return _POINTS.get(name) or _FAMILIES.get(name.partition(":")[0], "")
 
 
 def title_on(what: str, space: Space[Any], most: int = 63) -> str:
-    """Return the title of a figure. Products and long titles have the short name of the space."""
-    names = [short_name(space)] if isinstance(space, Product) else [repr(space), short_name(space)]
+    """Return the title of a figure. Long titles have the short name of the space; captions name factors."""
+    names = [" × ".join(map(repr, factors_of(space))), short_name(space)]
     kinds = [f"{what} of {words}" for words in [points_of(space)] if words] + [what]
     titles = [f"{kind} on {name}" for kind in kinds for name in names]
+    if isinstance(space, Product) and len(kinds) > 1:
+        titles.insert(1, kinds[0])
     return next((own for own in titles if len(own) <= most), shorten(titles[-1], most, placeholder=" …"))
