@@ -318,13 +318,14 @@ def test_batches_close_to_their_mean_show_it_with_quantiles(name):
     figure = rendered(batch.plot())
     texts = texts_of(figure)
     assert {"median of 12 curves", "5–95 % of 12 curves"} <= set(texts) and "curve 0" not in texts
+    ends = "natural ends" + ", affine-invariant metric" * name.startswith("spd")
     # Ellipses have the colours of their times.
     assert ("mean curve" in texts) == (name != "spd:2") and ("mean\ncurve" in texts) == (name == "spd:2")
     (median,) = (line for line in axes_named(figure, "distance").lines if line.get_label() == "_median")
     mean, (x, y) = curves_of(batch, Axis())[0][0], median.get_data()
     middle = mean.data.evaluate(x, "point", "raise", False)
     np.testing.assert_allclose(y, np.median(space.distance(middle, batch(x)), axis=0), atol=1e-9)
-    assert "start" not in texts and "12 curves, 7 points each, natural ends" in texts
+    assert "start" not in texts and f"12 curves, 7 points each, {ends}" in texts
     if name == "so:3":
         # Rotations of several curves are graphs, with the quantiles of all of them.
         axes = axes_named(figure, "about x₂")

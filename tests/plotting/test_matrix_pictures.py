@@ -39,14 +39,21 @@ def test_given_frames_and_the_curve_have_a_row_each(name):
     assert set(spline.t) <= set(times) and len(times) > 8
     for ends in pairwise(spline.t):
         np.testing.assert_allclose(np.diff(times[(times >= ends[0]) & (times <= ends[1])], 2), 0, atol=0.02)
-    for row, (arrows, times, size) in enumerate(((given, spline.t, REACH), (curve, curve.X[::3], REACH))):
+    # Those between are shorter and lighter.
+    shares = np.where(np.isin(np.round(curve.X[::3], 2), spline.t), 1.0, 0.75)
+    np.testing.assert_allclose(curve.get_facecolor()[::3, 3], np.where(shares < 1, 0.5, 1.0))
+    sizes = (REACH, REACH * shares[:, None])
+    for row, (arrows, times, size) in enumerate(((given, spline.t, sizes[0]), (curve, curve.X[::3], sizes[1]))):
         np.testing.assert_allclose(arrows.X, np.repeat(times, 3), atol=4 / 1000)
         assert set(arrows.Y) == {-row}
         right_up = np.sort(np.hypot(arrows.U, arrows.V).reshape(-1, 3))
         lengths = np.linalg.norm((VIEW @ ROTATIONS[name](spline(arrows.X[::3])))[:, :2], axis=1)
         np.testing.assert_allclose(right_up, size * np.sort(lengths), atol=1e-9)
     # The view is explained, and the rows are named.
-    assert {"given", "curve", "view", "x₁", "x₂", "x₃"} <= set(texts_of(figure))
+    texts = texts_of(figure)
+    assert {"given", "curve", "view", "x₁", "x₂", "x₃"} <= set(texts)
+    words = "frames: rotations by unit quaternions; " * (name in ("sphere:3", "su:2")) + "lighter: between given ones"
+    assert words in texts
 
 
 def test_rows_fit_into_narrow_panels():
@@ -203,7 +210,7 @@ def test_small_rotations_are_graphs(name, size):
     np.testing.assert_allclose(np.transpose(dots), expected, rtol=1e-6, atol=1e-9)
     # One set of axes has all of them.
     axes = spline.plot(ax=Figure().add_subplot())
-    assert axes.get_ylabel() == "rotation vector from the first point, rad"
+    assert axes.get_ylabel() == "rotation vector log(R R₀ᵀ) in rad, R₀: first point"
     dots = [line.get_ydata() for line in axes.lines if line.get_label() == "_given"]
     np.testing.assert_allclose(np.transpose(dots), expected, rtol=1e-6, atol=1e-9)
     moving = spline.animate(frames=2)
@@ -221,7 +228,7 @@ def test_rotations_beside_positions_are_graphs(largest):
     assert {"SpecialOrthogonal(3), rotations", "Euclidean(3), vectors"} <= set(texts)
     assert "C² spline of rotations and vectors" in texts
     name = {2.0: "first point", 4.5: "middle rotation"}.get(largest)
-    assert (f"rotation vector from the {name}, rad" in texts) == (name is not None)
+    assert (f"rotation vector log(R R₀ᵀ) in rad, R₀: {name}" in texts) == (name is not None)
     assert ("first axis" in texts) == (name is None)
     if name is not None:
         figure = spline.plot()
@@ -478,3 +485,23 @@ def test_rotation_vectors_are_those_of_scipy_up_to_half_a_turn():
     vectors = axes * np.array([0, 1e-9, 0.1, 1.5, 1.6, 2.5, 3.1])[:, None]
     found = pictures._rotation_vectors((Rotation.from_rotvec(vectors) * first).as_matrix(), first.as_matrix())
     np.testing.assert_allclose(found, vectors, atol=1e-12, rtol=1e-6)
+
+
+def test_poses_stand_on_their_shadows():
+    """A few given points have lines down to the floor, and lighter frames are where there is space between them."""
+    t = np.array([0, 0.1, 0.2, 2.0, 3.0])
+    poses = np.broadcast_to(np.eye(4), (5, 4, 4)).copy()
+    poses[:, :3, 3] = np.stack([4 * t, np.sin(t), t], axis=1)
+    axes = rendered(ss.CubicSpline(t, poses, "se:3").plot()).axes[0]
+    (stems,) = (line for line in axes.lines if line.get_label() == "_stems")
+    x, y, z = (np.reshape(own, (-1, 3)) for own in stems.get_data_3d())
+    np.testing.assert_allclose(np.stack([x[:, :2], y[:, :2]], axis=-1), np.repeat(poses[:, None, :2, 3], 2, axis=1))
+    np.testing.assert_allclose(z[:, :2], np.stack([poses[:, 2, 3], np.full(5, axes.get_zlim()[0])], axis=1))
+    lighter = next(line for line in axes.lines if line.get_alpha() == 0.7)
+    feet = np.stack(lighter.get_data_3d(), axis=1)[::3]
+    bold = next(line for line in axes.lines if line.get_color() == lighter.get_color() and line.get_alpha() is None)
+    length = np.linalg.norm(np.diff(np.stack(bold.get_data_3d(), axis=1)[:2], axis=0))
+    apart = np.linalg.norm(feet[:, None] - poses[:, :3, 3], axis=-1)
+    assert len(feet) > 3 and apart.min() > 1.2 * length
+    many = ss.CubicSpline(None, np.cumsum(np.random.default_rng(0).normal(size=(40, 3)), axis=0), "r:3")
+    assert not any(line.get_label() == "_stems" for line in rendered(many.plot()).axes[0].lines)

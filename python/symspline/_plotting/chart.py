@@ -50,6 +50,8 @@ _ORIGIN = np.array([1.0, 0.0, 0.0])
 SHADOW = "thin: shadow on the floor"
 _BESIDE, _UNDER, _ABOVE = 0.66, 0.3, 0.1
 """Margins of a box in inches, which have the labels of its axes."""
+_STEMS = 25
+"""The largest number of points with lines down to the floor."""
 _STEPS = np.multiply.outer(10.0 ** np.arange(-9, 3), [1, 2, 5]).ravel()
 
 
@@ -72,12 +74,21 @@ def draw_3d(panel: SubFigure, curves: Sequence[Curve]) -> None:
     control = [curve.polygon[0] - origin for curve in curves if curve.polygon is not None]
     axes = box(panel, shadows, paths + given + control, colors=shadow_colors(curves), origin=origin)
     for curve, path, own in zip(curves, paths, given, strict=True):
+        draw_stems(axes, curve, own)
         if curve.radii is not None:
             _draw_hose(axes, curve, curve.points - origin, curve.radii)
         curve.draw_polygon(axes, lambda points: points - origin)
         curve.draw_line(axes, path)
         curve.draw_dots(axes, own)
     note(panel, SHADOW)
+
+
+def draw_stems(axes: Any, curve: Curve, given: Array) -> None:
+    """Draw thin lines from a few given points down to the floor, where their shadows are."""
+    if curve.alone and curve.noise is None and len(given) <= _STEMS and not curve.is_mean:
+        feet = given * [1, 1, 0] + [0, 0, axes.get_zlim()[0]]
+        lines = np.stack([given, feet, np.full_like(given, np.nan)], axis=1).reshape(-1, 3)
+        axes.plot(*lines.T, color=GRID, linewidth=0.6, zorder=2, label="_stems")
 
 
 def origin_of(panel: Any, curves: Sequence[Curve], positions: Callable[[Any], Array]) -> Array:
@@ -179,13 +190,14 @@ def box(
     # Flat boxes are seen from farther above. Choose the direction from which the curve looks widest, and of two similar
     # ones that from which it runs to the right.
     width, height = size(panel)
-    turn = 15 if width > 1.5 * height else 30
+    wide = width > 1.5 * height
+    turn = 15 if wide else 30
     azimuths = turn - 90, -turn, turn, 90 - turn
     angles = np.radians(azimuths)
     right = everything[:, 1:2] * np.cos(angles) - everything[:, :1] * np.sin(angles)
     first = right[: np.isfinite(lines[0][:, 0]).sum()] if lines else right
     widths = np.std(right, axis=0) * (1 + 0.3 * np.sign(first[-1] - first[0]))
-    elevation = float(np.interp(sides[2] / sides[:2].max(), [0.2, 1], [46, 24]))
+    elevation = float(np.interp(sides[2] / sides[:2].max(), [0.2, 1], [28 if wide else 46, 24]))
     axes.view_init(elev=elevation, azim=azimuths[widths.argmax()])
     axes.set_box_aspect(tuple(sides))
     _fill(panel, axes, middle + sides * np.array(list(product((-1, 1), repeat=3))), below)

@@ -15,7 +15,7 @@ from .._curves.ends import NATURAL
 from .._curves.fit import FitProblem, fit, read
 from .._curves.solve import DEFAULTS
 from .._input import UTC_ZONE
-from .._spaces import Product, Space
+from .._spaces import Product, Space, SpecialEuclidean
 from .._time import TimeAxis
 from .curves import SECOND, Axis, Batch, Curve
 from .style import SPLINE, Array, colors, evenly, named_from, round_start
@@ -153,7 +153,9 @@ def _mean_of(
         return None
     first, x0 = np.ravel(curve.domain[0])[0], float(data.times.flat[0])
     x = data.times.ravel()
-    own = Curve(data, first, x0, x, nodes, axis, color or SPLINE, alone, label=label or "mean curve", is_mean=True)
+    # The usual colour is that of the third axis of frames.
+    color = color or (OTHERS[0] if isinstance(space, SpecialEuclidean) else SPLINE)
+    own = Curve(data, first, x0, x, nodes, axis, color, alone, label=label or "mean curve", is_mean=True)
     batch = _batch_of(curve, own, valid)
     if batch is None:
         return None

@@ -113,7 +113,7 @@ def fitted(picture: Picture, curves: Sequence[Curve]) -> Picture:
     if len(extents) == 3:
         longest, *others = np.sort(extents)[::-1]
         lies = longest > max(extents[2], _LONG * others[0])
-        return picture._replace(width=10.5, height=4.2) if lies else picture
+        return picture._replace(width=10.5, height=4.8) if lies else picture
     across, high = extents
     if across > _LONG * high:
         return picture._replace(width=10.5, height=float(np.clip(10.5 * high / max(across, 1e-300), 1.2, 4.0)) + 1.2)

@@ -47,8 +47,8 @@ _COMPARED = 4
 _STYLES = ["-", "--", ":", "-.", (0, (5, 1)), (0, (1, 1))]
 _ROUNDING = 1e-9
 """Numbers that vary by less than this part of others are constant."""
-_NARROW = 1.8
-"""The largest width of lines in low axes."""
+_NARROW, _BESIDE = 1.8, 1.2
+"""The largest widths of lines in low axes, and of those with quantiles beside them."""
 _RIGHT = 88.0
 """Pictures of larger principal angles, in degrees, explain that they turn back at 90."""
 _BETWEEN = 0.3
@@ -228,7 +228,7 @@ def draw_coordinates(
             draw_graph_of(axes, curve, own, given[:, i] - starts[i], size_of_band, **look)
         for artist in axes.lines:
             if several and artist.get_gid() == LINE:
-                artist.set_linewidth(min(artist.get_linewidth(), _NARROW))
+                artist.set_linewidth(min(artist.get_linewidth(), _NARROW if batch is None else _BESIDE))
     limits = np.array([axes.get_ylim() for axes in made])
     widest = np.ptp(limits, axis=1).max()
     for axes, (low, high) in zip(made, limits.tolist(), strict=True):

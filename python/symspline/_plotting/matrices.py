@@ -24,15 +24,15 @@ from numpy.typing import NDArray
 from .._core import CutLocusError, convert_rotations
 from .._quaternions import matrices_of_quaternions
 from .._spaces import SpecialOrthogonal, cover_of
-from .chart import SHADOW, box, count_from, explain_frames, frame_handles, origin_of, plane, shadow_colors
+from .chart import SHADOW, box, count_from, draw_stems, explain_frames, frame_handles, origin_of, plane, shadow_colors
 from .curves import BODIES, BODY, BODY_COLOR, FAINT, KNOTS, POSES, START, Curve, are_compared
 from .globe import centre_of
 from .graphs import FEW_KNOTS, SUBSCRIPTS, component_names, draw_components, draw_coordinates, draw_numbers, timelines
+from .rates import QUATERNIONS
 from .rows import REACH, VIEW, Rows
 from .sphere import caps
 from .style import (
     AXES,
-    DATA,
     EDGE,
     INK,
     LEFT,
@@ -103,8 +103,13 @@ def draw_rotations(panel: SubFigure, curves: Sequence[Curve]) -> None:
         if row.name == "curve" and row.curve.noise is None and row.curve.has_nodes:
             # Those between the given points are lighter.
             light = ~np.isin(times, row.curve.times[row.curve.knots])
+        frames = frames * np.where(light, 0.75, 1.0)[:, None, None]
         _draw_arrows(rows.axes, times, -i, length * frames, np.where(light, 0.5, 1.0))
-    _explain(rows.axes, words, rows.width)
+    if not words and rows.rows[-1].name == "curve" and curves[0].has_nodes:
+        words = "lighter: between given ones"
+    has_space = rows.axes not in OWN_AXES and str(cover_of(curves[0].space)) in QUATERNIONS
+    turned = "frames: rotations by unit quaternions" * has_space
+    _explain(rows.axes, "; ".join(filter(None, (turned, words))), rows.width)
     rows.draw_view()
 
 
@@ -153,7 +158,8 @@ def _draw_rotation_vectors(panel: SubFigure, curves: Sequence[Curve], first: Arr
         return np.asarray(1 / np.sinc(angles / 2 / np.pi))
 
     names = ["about x₁", "about x₂", "about x₃"]
-    title = f"rotation vector from the {name}, rad"
+    name += " of the mean curve" * curves[0].is_mean
+    title = f"rotation vector log(R R₀ᵀ) in rad, R₀: {name}"
     draw_coordinates(panel, curves, names, numbers, growth, title, equal_scales=True)
 
 
@@ -298,7 +304,7 @@ def draw_poses(panel: SubFigure, curves: Sequence[Curve]) -> None:
     paths = [curve.near_data(curve.points[:, :3, 3] - origin) for curve in curves]
     given = [curve.given[:, :3, 3] - origin for curve in curves]
     everything = np.concatenate([*paths, *given])
-    length = 0.18 * window(everything[np.isfinite(everything[:, 0])], 1.0)[1] or 0.2
+    length = 0.14 * window(everything[np.isfinite(everything[:, 0])], 1.0)[1] or 0.2
     framed = [curve for curve in curves if not curve.faint]
     number = max(2, _FRAMES // len(framed))
     # The box contains the tips of all frames that are drawn.
@@ -324,9 +330,13 @@ def draw_poses(panel: SubFigure, curves: Sequence[Curve]) -> None:
         curve.draw_line(axes, path, linewidth=2.0 if curve.alone else 1.4, **dark)
         if curve.faint:
             continue
-        for group, (_, poses) in curve.samples(number).items():
+        draw_stems(axes, curve, curve.given[:, :3, 3] - origin)
+        groups = curve.samples(number)
+        bold = groups["bold"][1][:, :3, 3]
+        for group, (_, poses) in groups.items():
             if group != "bold":
-                draw(poses, 0.7 * length, linewidth=1.2, alpha=0.7)
+                free = np.linalg.norm(poses[:, None, :3, 3] - bold, axis=-1).min(axis=1, initial=np.inf) > 1.2 * length
+                draw(poses[free & (not curve.is_mean)], 0.7 * length, linewidth=1.2, alpha=0.7)
                 continue
             draw(poses, length, linewidth=2.0 if curve.alone else 1.3)
             if curve.noise is None:
@@ -337,7 +347,7 @@ def draw_poses(panel: SubFigure, curves: Sequence[Curve]) -> None:
     count = sum(len(curve.given) for curve in framed)
     name = "bold given ones" if bold == count else f"{bold} of {count} given ones bold"
     words = curves[0].legend_of(f"{name}, light ones between", "bold ones of the curve", "light ones of data")
-    words = "those of the mean curve" if curves[0].is_mean else words
+    words = "those of the mean curve at times of points" if curves[0].is_mean else words
     explain_frames(panel, axes)
     note(panel, f"frames: {words}; {SHADOW}")
 
@@ -430,7 +440,8 @@ def _draw_in_rows(view: Array, panel: SubFigure, curves: Sequence[Curve]) -> Non
             others = curve.batch.at("point")[:, samples]
             for one in others[evenly(len(others), _BESIDE)]:
                 rings = inches * outlines(view @ one @ view.T)
-                look: Any = {"facecolors": "none", "edgecolors": DATA, "linewidths": 0.5, "label": FAINT, "zorder": 3.5}
+                look: Any = {"facecolors": "none", "edgecolors": to_rgba(INK, 0.4), "linewidths": 0.6}
+                look |= {"label": FAINT, "zorder": 3.5}
                 rows.axes.add_collection(PolyCollection(list(rings), **look, **rows.in_inches(times, i)))
     # The scale to the right of the words is an inch wide, and the view as well.
     has_view = len(view) == 3

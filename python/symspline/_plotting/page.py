@@ -191,6 +191,8 @@ def _description(spline: Any, curves: Sequence[Curve]) -> str:
     if isinstance(cover_of(spline.space), SpecialEuclidean):
         # The acceleration of the position is that of a body in such a motion.
         words[0] = words[0].replace("natural ends", "natural ends (constant twist)")
+    if str(cover_of(spline.space)).partition(":")[0] in ("spd", "hpd"):
+        words.append("affine-invariant metric")
     factors = len(factors_of(spline.space))
     if factors > FACTORS:
         words.append(f"{FACTORS} of {factors} factors")
@@ -291,7 +293,7 @@ def _explain(figure: Figure, curves: Sequence[Curve], height: float, others: int
     if MEDIAN in drawn:
         add(Line2D([], [], color=INK, linewidth=1.8), f"median of {count} curves")
     if QUANTILES in drawn:
-        add(Patch(facecolor=DATA, alpha=0.25), f"5–95 % of {count} curves")
+        add(Patch(facecolor=DATA, alpha=0.35), f"5–95 % of {count} curves")
     if drawn & {KNOTS, TICKS}:
         look = {"linestyle": ":"} if KNOTS in drawn else {"linestyle": "none", "marker": "|", "markeredgewidth": 1.6}
         times = "times of data" if few[0].noise is not None else "times of points" if few[0].has_nodes else "knots"

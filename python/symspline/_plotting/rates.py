@@ -29,7 +29,7 @@ _SLOW = 0.01
 """Rates that are smaller per second are per hour, day or year."""
 _LONG = (3600, "h"), (86_400, "d"), (31_557_600, "yr")
 """Longer units of time in seconds, and their names."""
-_QUATERNIONS = {"sphere:3", "su:2"}
+QUATERNIONS = {"sphere:3", "su:2"}
 """Spaces whose points turn frames, at an angular velocity ω of twice their speed."""
 _LONGEST = 10
 """Number of letters of a space in the label of an axis."""
@@ -96,7 +96,7 @@ def rates_of(space: Space[Any], seconds: bool) -> list[Rate]:
     per = [", 1/s", ", 1/s²"] if seconds else ["", ""]
     if isinstance(own, (Sphere, Torus)) or str(own) in _ANGULAR or str(own) in _HALVES:
         per = [", rad/s", ", rad/s²"] if seconds else [", rad/t", ", rad/t²"]
-    more = [" = |ω|/2", " = |ω′|/2"] if str(own) in _QUATERNIONS else [" of states" * (str(own) in _STATES)] * 2
+    more = [" = |ω|/2", " = |ω′|/2"] if str(own) in QUATERNIONS else [" of states" * (str(own) in _STATES)] * 2
     if isinstance(own, SpecialEuclidean):
         return _rates_of_poses(own, seconds)
     sign = _SIGNS.get(str(own))
