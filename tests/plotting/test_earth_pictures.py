@@ -188,3 +188,14 @@ def test_meridians_that_are_close_have_fewer_labels():
     assert labels == [f"{lon}°E" for lon in range(10, 21)]
     np.testing.assert_allclose(ticks, np.linspace(0, 1, 11))
     assert len(globe._ticks(lines[::10], values[::10], 2.0, "EW", 0.0, 0.0, 1.0)[0]) == 6
+
+
+def test_batches_on_the_earth_have_distances_in_km():
+    rng = np.random.default_rng(4)
+    lon, lat = 10 + np.arange(8.0), 50 + np.sin(np.arange(8.0))
+    tracks = geo.from_lonlat(lon + 0.1 * rng.normal(size=(12, 8)), lat + 0.1 * rng.normal(size=(12, 8)))
+    figure = rendered(geo.plot(ss.CubicSpline(None, tracks, "sphere:2")))
+    axes = axes_named(figure, "distance")
+    (median,) = (line for line in axes.lines if line.get_label() == "_median")
+    # The distance of two normal deviates of 11 km to the north and 7 km to the east, near a mean of twelve.
+    assert axes.get_ylabel().endswith(", km") and 5 < np.median(median.get_ydata()) < 15

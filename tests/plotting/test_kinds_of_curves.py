@@ -319,8 +319,8 @@ def test_batches_close_to_their_mean_show_it_with_quantiles(name):
     texts = texts_of(figure)
     assert {"median of 12 curves", "5–95 % of 12 curves"} <= set(texts) and "curve 0" not in texts
     ends = "natural ends" + ", affine-invariant metric" * name.startswith("spd")
-    # Ellipses have the colours of their times.
-    assert ("mean curve" in texts) == (name != "spd:2") and ("mean\ncurve" in texts) == (name == "spd:2")
+    assert "mean curve" in texts and ("mean\ncurve" in texts) == (name == "spd:2")
+    assert ("rotation vector log(R R₀ᵀ) in rad, R₀: start of the mean curve" in texts) == (name == "so:3")
     (median,) = (line for line in axes_named(figure, "distance").lines if line.get_label() == "_median")
     mean, (x, y) = curves_of(batch, Axis())[0][0], median.get_data()
     middle = mean.data.evaluate(x, "point", "raise", False)
@@ -340,6 +340,7 @@ def test_batches_close_to_their_mean_show_it_with_quantiles(name):
         given, *others = (own for own in figure.axes[0].collections if isinstance(own, PolyCollection))
         assert [own.get_label() for own in others] == ["_others"] * 12
         assert len({tuple(own.get_offsets()[3]) for own in (given, *others)}) == 1
+        assert len(np.unique(given.get_edgecolor(), axis=0)) == 1
         widths = [[np.ptp(path.vertices[:, 0]) for path in own.get_paths()] for own in (given, *others)]
         np.testing.assert_allclose(widths[0], np.mean(widths[1:], axis=0), rtol=0.03)
     if name == "r:1":

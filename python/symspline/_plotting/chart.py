@@ -88,7 +88,7 @@ def draw_stems(axes: Any, curve: Curve, given: Array) -> None:
     if curve.alone and curve.noise is None and len(given) <= _STEMS and not curve.is_mean:
         feet = given * [1, 1, 0] + [0, 0, axes.get_zlim()[0]]
         lines = np.stack([given, feet, np.full_like(given, np.nan)], axis=1).reshape(-1, 3)
-        axes.plot(*lines.T, color=GRID, linewidth=0.6, zorder=2, label="_stems")
+        axes.plot(*lines.T, color=EDGE, linewidth=0.8, linestyle=":", zorder=2, label="_stems")
 
 
 def origin_of(panel: Any, curves: Sequence[Curve], positions: Callable[[Any], Array]) -> Array:
@@ -113,7 +113,7 @@ def count_from(panel: Any, axes: Axes, curves: Sequence[Curve], positions: Calla
 
 def shadow_colors(curves: Sequence[Curve]) -> list[Any]:
     """Return the colours of shadows: those of named curves, and grey of others."""
-    return [to_rgba(curve.color, 0.3) if curve.label else GRID for curve in curves if not curve.faint]
+    return [to_rgba(curve.color, 0.3) if curve.label else EDGE for curve in curves if not curve.faint]
 
 
 def _draw_hose(axes: Any, curve: Curve, points: Array, radii: Array) -> None:

@@ -295,34 +295,23 @@ class Curve:
             return given if self.has_nodes else curve
         return f"{curve}, {data}" if len(self.noise.x[0]) else curve
 
-    def samples(self, number: int) -> dict[str, tuple[Array, Any]]:
-        """Return groups of times on matplotlib's axis and points, at which large symbols are drawn.
+    def samples(self, number: int) -> dict[str, Any]:
+        """Return at most ``number`` points at which large symbols are drawn.
 
-        The group "bold" has at most ``number`` knots; the group "between" is evenly spaced between them, outside long
-        gaps. For noisy data, the group "data" has some of the data, "bold" has the samples of the curve that are
-        closest to them, and "between" is empty.
+        The group "bold" has given points, or evenly spaced ones of curves without them. For noisy data, the group
+        "data" has some of the data, and "bold" has the samples of the curve that are closest to them.
         """
-        even = np.linspace(self.x[0], self.x[-1], number)
         if not self.has_line:
-            kept = evenly(len(self.x), number)
-            none = self.times[:0], self.points[:0]
-            return {"between": none, "bold": none, "data": (self.times[kept], self.points[kept])}
-        if self.noise is None and self.has_nodes:
-            bold = self.knots[evenly(len(self.knots), number)]
-            gap = np.abs(even[:, None] - self.x[bold]).min(axis=1)
-            between = np.unique(np.searchsorted(self.x, even[gap > 0.6 * (even[1] - even[0])]))
-            between = between[~self.bridges[between]]
-            return {name: (self.times[i], self.points[i]) for name, i in (("between", between), ("bold", bold))}
+            return {"data": self.points[evenly(len(self.x), number)]}
+        even = np.linspace(self.x[0], self.x[-1], number)
         if self.noise is None:
-            bold = np.unique(self._nearest(even))
-            return {"between": (self.times[:0], self.points[:0]), "bold": (self.times[bold], self.points[bold])}
+            some = self.knots[evenly(len(self.knots), number)] if self.has_nodes else np.unique(self._nearest(even))
+            return {"bold": self.points[some]}
         x, points = self.given_x, self.given
         if len(x):
             data = np.unique(np.abs(x[:, None] - np.linspace(x[0], x[-1], number)).argmin(axis=0))
             x, points = x[data], points[data]
-        bold = np.unique(self._nearest(x if len(x) else even))
-        groups = {"between": (self.times[:0], self.points[:0]), "bold": (self.times[bold], self.points[bold])}
-        return groups | {"data": (self.on_axis(x), points)}
+        return {"bold": self.points[np.unique(self._nearest(x if len(x) else even))], "data": points}
 
     def _nearest(self, x: Array) -> Indices:
         """Return the indices of the times x that are closest to given times."""

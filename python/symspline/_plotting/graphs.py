@@ -453,7 +453,7 @@ def draw_principal_angles(panel: SubFigure, curves: Sequence[Curve]) -> None:
     draw_numbers(panel, curves, "principal angles to\nfirst point, degrees", names, numbers)
     largest = max(numbers(own.first_point, own.points).max() for own in curves)
     if isinstance(panel, SubFigure) and largest > _RIGHT and len(panel.axes) == 1:
-        words = "principal angles are at most 90°; a corner there is no corner of the curve"
+        words = "principal angles are at most 90°: they turn back there, but the curve is smooth"
         axes: Any = panel.axes[0]
         axes.set_title(words, loc="left", color=INK, fontsize=points(9), pad=3)
         axes.yaxis.set_major_locator(MultipleLocator(30))

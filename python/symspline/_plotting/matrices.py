@@ -132,11 +132,11 @@ def _reference(curves: Sequence[Curve]) -> tuple[Array, str] | None:
     turned = np.concatenate([first.T @ matrices(curve.extent) for curve in curves])
     largest = ROTATIONS.distance(np.eye(3), turned).max()
     if largest < _SMALL:
-        return first, "first point"
+        return first, "start of the curve"
     if not (are_compared(curves) or any(own.is_factor or len(own.gaps) or own.noise is not None for own in curves)):
         return None
     if largest < _LARGE:
-        return first, "first point"
+        return first, "start of the curve"
     try:
         middle = centre_of(ROTATIONS, turned[:: 1 + len(turned) // 2000])
     except CutLocusError:
@@ -158,7 +158,7 @@ def _draw_rotation_vectors(panel: SubFigure, curves: Sequence[Curve], first: Arr
         return np.asarray(1 / np.sinc(angles / 2 / np.pi))
 
     names = ["about x₁", "about x₂", "about x₃"]
-    name += " of the mean curve" * curves[0].is_mean
+    name = name.replace("curve", "mean curve") if curves[0].is_mean else name
     title = f"rotation vector log(R R₀ᵀ) in rad, R₀: {name}"
     draw_coordinates(panel, curves, names, numbers, growth, title, equal_scales=True)
 
@@ -311,7 +311,7 @@ def draw_poses(panel: SubFigure, curves: Sequence[Curve]) -> None:
     tips = [
         (poses[:, :3, 3] - origin + length * poses[:, :3, i])
         for curve in framed
-        for _, poses in curve.samples(number).values()
+        for poses in curve.samples(number).values()
         for i in range(3)
     ]
     shadows = [curve.outside_gaps(path) for curve, path in zip(curves, paths, strict=True) if not curve.faint]
@@ -331,23 +331,20 @@ def draw_poses(panel: SubFigure, curves: Sequence[Curve]) -> None:
         if curve.faint:
             continue
         draw_stems(axes, curve, curve.given[:, :3, 3] - origin)
-        groups = curve.samples(number)
-        bold = groups["bold"][1][:, :3, 3]
-        for group, (_, poses) in groups.items():
-            if group != "bold":
-                free = np.linalg.norm(poses[:, None, :3, 3] - bold, axis=-1).min(axis=1, initial=np.inf) > 1.2 * length
-                draw(poses[free & (not curve.is_mean)], 0.7 * length, linewidth=1.2, alpha=0.7)
+        for group, poses in curve.samples(number).items():
+            if group == "data":
+                draw(poses, 0.7 * length, linewidth=1.2, alpha=0.7)
                 continue
             draw(poses, length, linewidth=2.0 if curve.alone else 1.3)
             if curve.noise is None:
                 curve.draw_dots(axes, poses[:, :3, 3] - origin, markersize=3.5 if curve.alone else 2)
             else:
                 curve.draw_dots(axes, curve.given[:, :3, 3] - origin)
-    bold = sum(len(curve.samples(number)["bold"][0]) for curve in framed)
+    shown = sum(len(curve.samples(number).get("bold", ())) for curve in framed)
     count = sum(len(curve.given) for curve in framed)
-    name = "bold given ones" if bold == count else f"{bold} of {count} given ones bold"
-    words = curves[0].legend_of(f"{name}, light ones between", "bold ones of the curve", "light ones of data")
-    words = "those of the mean curve at times of points" if curves[0].is_mean else words
+    name = "given poses" if shown == count else f"{shown} of {count} given poses"
+    words = curves[0].legend_of(name, "some poses of the curve", "lighter: data")
+    words = "mean curve at times of points" if curves[0].is_mean else words
     explain_frames(panel, axes)
     note(panel, f"frames: {words}; {SHADOW}")
 
@@ -427,8 +424,8 @@ def _draw_in_rows(view: Array, panel: SubFigure, curves: Sequence[Curve]) -> Non
         np.sqrt(max(float((view[i] @ row.curve.extent @ view[i]).max()) for row in rows.rows)) for i in (0, 1)
     )
     inches = min(max(0.65 * REACH, min(REACH, rows.reach_between())) / across, 0.45 * rows.height / high)
-    arcs = "; arcs: sections through two axes" * (len(view) == 3)
-    words = [f"half axes: √eigenvalues{arcs}; colour: time", _left_out(rows, curves)]
+    arcs = "; arcs: front halves of principal sections" * (len(view) == 3)
+    words = [f"half axes: √eigenvalues{arcs}" + "; colour: time" * (not curves[0].is_mean), _left_out(rows, curves)]
     for i in range(len(rows.rows)):
         times, symbols, radii = rows.symbols(i, 1.05 * inches * across)
         _draw_row(rows, i, inches, times, view @ symbols @ view.T, radii)
@@ -441,7 +438,7 @@ def _draw_in_rows(view: Array, panel: SubFigure, curves: Sequence[Curve]) -> Non
             for one in others[evenly(len(others), _BESIDE)]:
                 rings = inches * outlines(view @ one @ view.T)
                 look: Any = {"facecolors": "none", "edgecolors": to_rgba(INK, 0.4), "linewidths": 0.6}
-                look |= {"label": FAINT, "zorder": 3.5}
+                look |= {"label": FAINT, "zorder": 5}
                 rows.axes.add_collection(PolyCollection(list(rings), **look, **rows.in_inches(times, i)))
     # The scale to the right of the words is an inch wide, and the view as well.
     has_view = len(view) == 3
@@ -479,8 +476,8 @@ def _draw_row(rows: Rows, row: int, inches: float, times: Array, matrices: Array
     axes, name = rows.axes, rows.rows[row].name
     first, last = (edge([float(own.curve.times[i]) for own in rows.rows]) for edge, i in ((min, 0), (max, -1)))
     colors = time_colors((times - first) / (last - first))
-    if name == "data":
-        colors[:] = to_rgba(INK)
+    if name == "data" or rows.rows[row].curve.is_mean:
+        colors[:] = to_rgba(INK if name == "data" else rows.rows[row].curve.color)
     rings, look = inches * outlines(matrices), rows.in_inches(times, row)
     if radii is not None:
         scales = np.exp(radii / 2)[:, None, None]

@@ -21,9 +21,8 @@ LIMIT, MEDIAN = "_limit", "_median"
 IN_ROW = 3
 """The largest number of factors whose pictures are in one row."""
 # Other spaces than spheres, in which the length of a velocity is an angle per time.
-_ANGULAR = {"so:2", "so:3", "o:2", "o:3", "u:1", "rp:1", "rp:2", "gr:1,2", "gr:1,3", "gr:2,3"}
+_ANGULAR = {"so:2", "so:3", "o:2", "o:3", "u:1", "su:2", "rp", "cp", "hp", "gr", "cgr"}
 _STATES = {"cp:1", "cgr:1,2"}
-_HALVES = {"su:2", *_STATES}
 """Spaces whose distances are half of the angles that their picture shows."""
 _SLOW = 0.01
 """Rates that are smaller per second are per hour, day or year."""
@@ -94,7 +93,7 @@ def rates_of(space: Space[Any], seconds: bool) -> list[Rate]:
     """Return the rates of a space that is not a product."""
     own = cover_of(space)
     per = [", 1/s", ", 1/s²"] if seconds else ["", ""]
-    if isinstance(own, (Sphere, Torus)) or str(own) in _ANGULAR or str(own) in _HALVES:
+    if isinstance(own, (Sphere, Torus)) or _ANGULAR & {str(own), str(own).partition(":")[0]}:
         per = [", rad/s", ", rad/s²"] if seconds else [", rad/t", ", rad/t²"]
     more = [" = |ω|/2", " = |ω′|/2"] if str(own) in QUATERNIONS else [" of states" * (str(own) in _STATES)] * 2
     if isinstance(own, SpecialEuclidean):
@@ -259,7 +258,7 @@ def _draw_rate(axes: Axes, curves: Sequence[Curve], rate: Rate) -> None:
             low = low if rate.signed else np.maximum(low, 0)
         for part in curve.unbroken:
             at = np.searchsorted(curve.x, part.x)
-            width = (1.8 if len(curve.marks) <= FEW_KNOTS else 1.0) if curve.alone else 1.1
+            width = (1.8 if len(curve.marks) <= FEW_KNOTS or curve.noise is not None else 1.0) if curve.alone else 1.1
             line = np.column_stack([part.times, values[at]])
             part.plot_line(axes, line, color=part.color, linewidth=width, label=LINE)
             if deviation is not None:
