@@ -437,8 +437,8 @@ def _draw_in_rows(view: Array, panel: SubFigure, curves: Sequence[Curve]) -> Non
             others = curve.batch.at("point")[:, samples]
             for one in others[evenly(len(others), _BESIDE)]:
                 rings = inches * outlines(view @ one @ view.T)
-                look: Any = {"facecolors": "none", "edgecolors": to_rgba(INK, 0.4), "linewidths": 0.6}
-                look |= {"label": FAINT, "zorder": 5}
+                look: Any = {"facecolors": "none", "edgecolors": to_rgba(INK, 0.25), "linewidths": 0.6}
+                look |= {"label": FAINT, "zorder": 3.5}
                 rows.axes.add_collection(PolyCollection(list(rings), **look, **rows.in_inches(times, i)))
     # The scale to the right of the words is an inch wide, and the view as well.
     has_view = len(view) == 3

@@ -244,8 +244,6 @@ def _explain(figure: Figure, curves: Sequence[Curve], height: float, others: int
         if curve.label and curve.label not in labels:
             look = {} if curve.has_line else dot | {"markerfacecolor": "none"}
             add(Line2D([], [], color=curve.color, linewidth=2, **look), curve.label)
-    if few[0].noise is not None and few[0].label is None:
-        add(Line2D([], [], color=few[0].color, linewidth=1.8), "fitted curve")
     color = few[0].color_of_dots if few[0].alone else DATA
     body: dict[str, Any] = {"linestyle": "none", "marker": BODY, "markersize": 10, "markeredgecolor": few[0].color}
     some_of_many = BODIES in drawn and POSES not in drawn and few[0].noise is None and few[0].has_nodes
