@@ -242,7 +242,7 @@ def _without_jumps(
 ) -> list[tuple[Array, Array]]:
     """Return numbers of the samples and of the given points of every curve, without jumps by the period.
 
-    All curves begin close to the first one. Data are close to it at their times, as they are no line.
+    All curves begin close to the first one. Data are close to it at their times.
     """
     made: list[tuple[Array, Array]] = []
     for curve in curves:

@@ -105,11 +105,12 @@ def draw_rotations(panel: SubFigure, curves: Sequence[Curve]) -> None:
             light = ~np.isin(times, row.curve.times[row.curve.knots])
         frames = frames * np.where(light, 0.75, 1.0)[:, None, None]
         _draw_arrows(rows.axes, times, -i, length * frames, np.where(light, 0.5, 1.0))
-    if not words and rows.rows[-1].name == "curve" and curves[0].has_nodes:
-        words = "lighter: between given ones"
-    has_space = rows.axes not in OWN_AXES and str(cover_of(curves[0].space)) in QUATERNIONS
-    turned = "frames: rotations by unit quaternions" * has_space
-    _explain(rows.axes, "; ".join(filter(None, (turned, words))), rows.width)
+    if rows.axes not in OWN_AXES:
+        if not words and rows.rows[-1].name == "curve" and curves[0].has_nodes:
+            words = "lighter: between given ones"
+        if str(cover_of(curves[0].space)) in QUATERNIONS:
+            words = "; ".join(filter(None, ("frames: rotations by unit quaternions", words)))
+    _explain(rows.axes, words, rows.width)
     rows.draw_view()
 
 

@@ -241,7 +241,7 @@ def _draw_rate(axes: Axes, curves: Sequence[Curve], rate: Rate) -> None:
         # Rounding errors of points between the closest knots, which a curve at rest has.
         rounding = max(rounding, rate.scale * 1e-15 * np.abs(curve.points).max() / np.diff(curve.data.times).min())
         if curve.is_mean and curve.batch is not None:
-            # A mean of curves is smoother than they are, so that its rates are no middle of theirs.
+            # A mean of curves is smoother than they are, so that its rates are smaller than most of theirs.
             median = np.median(rate.values(curve.batch.at), axis=0)
             axes.plot(curve.batch.times, median, color=INK, linewidth=1.8, label=MEDIAN)
             drawn += [float(median.min()), float(median.max())]
