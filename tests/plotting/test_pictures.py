@@ -245,7 +245,9 @@ def test_closed_curves_have_no_end():
     turn = np.linspace(0, 2 * np.pi, 9)
     points = np.stack([np.cos(turn), np.sin(turn), 0.3 * np.sin(turn)], axis=1)
     points[-1] = points[0]
-    for name, closed in (("r:3", points), ("sphere:2", ss.Sphere(2).project(points)), ("r:2", points[:, :2])):
+    states = np.stack([np.cos(0.5 + 0 * turn), np.sin(0.5) * np.exp(1j * turn)], axis=1) * np.exp(0.7j * turn[:, None])
+    paths = [("r:3", points), ("sphere:2", ss.Sphere(2).project(points)), ("r:2", points[:, :2]), ("cp:1", states)]
+    for name, closed in paths:
         texts = texts_of(rendered(ss.CubicSpline(None, closed, name, bc_type="periodic").plot()))
         assert "start" in texts and "end" not in texts
 

@@ -36,7 +36,7 @@ AFTER_COLOR = "#6aa5d8"
 """Colour of curves in space after their first long gap."""
 
 _CLOSED = 1e-9
-"""The largest distance of the ends of a closed curve, as a part of its largest component."""
+"""The largest distance of the ends of a closed curve, as a part of the largest component of its points."""
 _SEGMENTS = 3
 """The smallest length of a gap between measurements of several kinds, in median segments."""
 BEYOND = 0.15
@@ -375,7 +375,8 @@ class Curve:
     def is_closed(self) -> bool:
         """Whether the curve ends where it began."""
         first, last = self.points[[0, -1]]
-        return bool(np.abs(last - first).max() <= _CLOSED * np.abs(self.points).max())
+        # States that differ in their phase are equal.
+        return bool(self.space.distance(first, last) <= _CLOSED * np.abs(self.points).max())
 
     def draw_end(self, axes: Axes, end: Array, **look: Any) -> None:
         """Draw a square at the end of a curve, shape (1, 2) or (1, 3), unless it is closed."""
