@@ -73,11 +73,19 @@ def test_maps_are_centred_on_curves(west, middle):
     lon = west + np.linspace(0, 120, 7)
     spline = ss.CubicSpline(None, from_lonlat(lon, 20 * np.sin(lon)), "sphere:2")
     plan = next(axes for axes in rendered(spline.plot()).axes if axes.get_label() == "map")
-    assert globe.degrees(middle, "E", "W") in [text.get_text() for text in plan.get_xticklabels()][3]
+    names = dict(zip(plan.get_xticks().tolist(), [text.get_text() for text in plan.get_xticklabels()], strict=True))
+    assert names[0] == globe.degrees(middle, "E", "W") and names[30] == globe.degrees(middle + 30, "E", "W")
+    # The map is a part, as long as the curve and not beyond the whole one.
+    (left, right), (south, north) = plan.get_xlim(), plan.get_ylim()
+    assert 125 < right - left < 145 and right - left == pytest.approx(2 * (north - south))
+    assert left >= -180 and right <= 180
     dots = [line.get_xydata() for line in plan.lines if line.get_label() == "_given"]
     np.testing.assert_allclose((dots[0][:, 0] + middle - lon + 180) % 360, 180, atol=1e-9)
     curve = next(line.get_xydata() for line in plan.lines if line.get_gid() == "_curve")
-    assert np.isfinite(curve).all()
+    assert np.isfinite(curve).all() and left < curve[:, 0].min() and curve[:, 0].max() < right
+    around = ss.CubicSpline(None, from_lonlat(np.linspace(-110, 110, 9), 0 * np.arange(9)), "sphere:2")
+    whole = next(axes for axes in rendered(around.plot()).axes if axes.get_label() == "map")
+    assert whole.get_xlim() == (-180, 180) and whole.get_ylim() == (-90, 90)
 
 
 @pytest.mark.parametrize("lon, lat", [(10, 50), (179.9, 0), (40, 89), (0, -89.9)])

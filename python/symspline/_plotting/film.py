@@ -44,7 +44,7 @@ def plot_film(t: NDArray[Any], landmarks: Array, film: Callable[[Any], Array], f
     # Every drawing fits into a square of this size around its centre.
     size = 2.1 * max(float(np.abs(_centred(x)).max()) for x in seen)
     middle, half = window(seen[2].reshape(-1, 2), 1.25)
-    words = f"{drawings} drawings of {count} landmarks, filled or in bold frames; others: between them"
+    words = f"{drawings} drawings of {count} landmarks, filled or in bold frames; others: between them; colour: time"
     words += "; 0: first landmark" * (count > _NUMBERED)
     with drawing((_WIDTH, _HEIGHT)) as figure:
         heading(figure, "Morph along a C² spline of affine shapes", words, 0.93)

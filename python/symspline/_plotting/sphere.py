@@ -35,6 +35,8 @@ _RING: dict[str, Any] = {"markersize": 12, "markeredgewidth": 1.4, "zorder": 6}
 _WIDEST = 1.5
 _FREE = 60
 """The smallest range of longitudes without curves, in degrees, that becomes the edges of a map."""
+_PART = 120
+"""Maps of curves in a smaller range, from the middle in degrees, are parts of the whole one."""
 _POLE = 60
 """Neighbouring samples are on both sides of a pole if their longitudes differ by more degrees."""
 _NORTH = np.array([0.0, 0.0, 1.0])
@@ -315,26 +317,35 @@ def _name_crossings(axes: Axes, view: View, broken: Array) -> bool:
 
 
 def _draw_map(panel: SubFigure, curves: Sequence[Curve], left: float, has_land: bool) -> None:
-    """Draw a map. Maps without land are centred on the curves, by a multiple of 60 degrees."""
+    """Draw a map. Without land it is centred on the curves, by a multiple of 60 degrees, and may be a part of it."""
     axes = panel.add_axes(inside(panel, left + 0.65, 0.5, 0.4, 0.2))
     plain(axes)
     middle = 0 if has_land else _middle_meridian(np.concatenate([curve.extent for curve in curves if not curve.faint]))
-    axes.set(aspect="equal", xlim=(-180, 180), ylim=(-90, 90), facecolor=PAPER, label="map")
-    axes.set_xticks(range(-180, 181, 60), [degrees(x + middle, "E", "W") for x in range(-180, 181, 60)])
-    axes.set_yticks(range(-90, 91, 30), [degrees(y, "N", "S") for y in range(-90, 91, 30)])
-    axes.set_xticks(range(-180, 181, 30), minor=True)
-    axes.grid(which="minor", color=GRID, linewidth=0.6)
-    axes.tick_params(which="minor", length=0)
+    axes.set(aspect="equal", facecolor=PAPER, label="map")
     if has_land:
         land.draw_on_map(axes)
     turn = np.stack([from_lonlat(middle, 0), from_lonlat(middle + 90, 0), [0, 0, 1]], axis=-1)
+    seen = []
     for curve in curves:
         positions, given = curve.marked(lambda points: lonlat_of(points @ turn))
+        seen += [positions, given]
         if curve.radii is not None:
             _draw_band(axes, curve, positions, curve.points @ turn, curve.radii)
         curve.draw_line(axes, broken(positions))
         draw_arrows(axes, curve, broken(positions), given)
         curve.draw_dots(axes, given, clip_on=False, **{} if curve.noise else {"markersize": 4.5})
+    everything = np.concatenate(seen)
+    # Maps are twice as wide as high.
+    half = 1.15 * float((np.ptp(everything, axis=0) / [2, 1]).max())
+    step = 30 if half < _PART and not has_land else 60
+    half = half if step == 30 else 180.0
+    lon, lat = np.clip(window(everything, 1.0)[0], [half - 180, half / 2 - 90], [180 - half, 90 - half / 2]).tolist()
+    axes.set_xticks(range(-180, 181, step), [degrees(x + middle, "E", "W") for x in range(-180, 181, step)])
+    axes.set_yticks(range(-90, 91, step // 2), [degrees(y, "N", "S") for y in range(-90, 91, step // 2)])
+    axes.set_xticks(range(-180, 181, step // 2), minor=True)
+    axes.grid(which="minor", color=GRID, linewidth=0.6)
+    axes.tick_params(which="minor", length=0)
+    axes.set(xlim=(lon - half, lon + half), ylim=(lat - half / 2, lat + half / 2))
 
 
 def _middle_meridian(points: Array) -> int:
