@@ -39,7 +39,8 @@ def test_small_multiples_are_the_film(n):
     figure = rendered(morph.plot())
     strip, *multiples = figure.axes
     assert len(outlines(strip)) == 19 + 5 and len(multiples) == 12
-    assert "5 drawings of 6 landmarks, filled or in bold frames; others: between them; colour: time" in texts_of(figure)
+    words = "5 drawings of 6 landmarks, filled or in bold frames; others: between them"
+    assert any(text.splitlines()[:1] == [words] for text in texts_of(figure))
     times = np.linspace(0, 4, 12)
     times[np.abs(np.subtract.outer(KNOTS, times)).argmin(axis=1)] = KNOTS
     film = morph(times)
@@ -55,13 +56,15 @@ def test_small_multiples_are_the_film(n):
     assert {"t = 0", "t = 4"} <= set(texts_of(figure))
 
 
-@pytest.mark.parametrize("count, numbers", [(12, 12), (13, 1), (40, 1)])
+@pytest.mark.parametrize("count, numbers", [(12, 12), (13, 0), (40, 0)])
 def test_many_landmarks_have_no_numbers(count, numbers):
     angles = 2 * np.pi * np.arange(count) / count
     ring = np.stack([np.cos(angles), np.sin(angles)], axis=-1) * (2 + np.sin(3 * angles))[:, None]
     figure = rendered(AffineMorph([0, 1, 2], np.stack([ring, 1.2 * ring + 0.1 * ring**2, ring + 1])).plot())
     for axes in figure.axes[1:]:
         assert sum(text.get_text().isdigit() for text in axes.texts) == numbers
+        white = [line.get_xydata() for line in axes.lines if line.get_color() == "white"]
+        assert len(white) == (numbers == 0) and all((own == axes.lines[0].get_xydata()[0]).all() for own in white)
 
 
 def test_the_strip_is_undistorted_and_inside():

@@ -19,7 +19,7 @@ from .style import DATES, EDGE, HALO, INK, Array, heading, plain, points, show_d
 _STRIP, _ROWS, _COLUMNS = 19, 2, 6
 _WIDTH, _HEIGHT = 11.4, 7.6
 _NUMBERED = 12
-"""The largest number of landmarks that all have their number; of more, the first one has it."""
+"""The largest number of landmarks that all have their number; of more, the first one has a white dot."""
 
 
 def plot_film(t: NDArray[Any], landmarks: Array, film: Callable[[Any], Array], file: Any = None) -> Figure:
@@ -44,8 +44,9 @@ def plot_film(t: NDArray[Any], landmarks: Array, film: Callable[[Any], Array], f
     # Every drawing fits into a square of this size around its centre.
     size = 2.1 * max(float(np.abs(_centred(x)).max()) for x in seen)
     middle, half = window(seen[2].reshape(-1, 2), 1.25)
-    words = f"{drawings} drawings of {count} landmarks, filled or in bold frames; others: between them; colour: time"
-    words += "; 0: first landmark" * (count > _NUMBERED)
+    words = f"{drawings} drawings of {count} landmarks, filled or in bold frames; others: between them\n"
+    words += "colour: time; strip: centred at their times; frames: where they are"
+    words += "; white dot: first landmark" * (count > _NUMBERED)
     with drawing((_WIDTH, _HEIGHT)) as figure:
         heading(figure, "Morph along a C² spline of affine shapes", words, 0.93)
         _draw_strip(figure.add_axes((0.05, 0.58, 0.9, 0.26)), t, strip, seen[0], seen[1], size)
@@ -122,8 +123,10 @@ def _draw_one(axes: Axes, x: Any, drawing: Array, color: Any, given: bool) -> No
     axes.spines[:].set(color=INK if given else EDGE, linewidth=1.4 if given else 0.5)
     axes.fill(*drawing.T, facecolor=(color, 0.15), edgecolor=color, linewidth=1.4)
     axes.plot(*drawing.T, "o", color=color, markersize=float(np.clip(12 / np.sqrt(len(drawing)), 1.2, 3)))
+    if len(drawing) > _NUMBERED:
+        axes.plot(*drawing[0], "o", color="white", markeredgecolor=color, markersize=4.5)
     look: Any = {"textcoords": "offset points", "fontsize": points(7), "color": INK, "path_effects": HALO}
-    for number, at in enumerate(drawing if len(drawing) <= _NUMBERED else drawing[:1]):
+    for number, at in enumerate(drawing if len(drawing) <= _NUMBERED else ()):
         axes.annotate(str(number), at, (3, 3), **look)
     name = np.datetime_as_string(x, "m").replace("T", " ") if isinstance(x, np.datetime64) else f"t = {x:.3g}"
     axes.text(0.03, 0.95, name, transform=axes.transAxes, va="top", fontsize=points(8), color=INK)
