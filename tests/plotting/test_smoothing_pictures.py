@@ -63,6 +63,10 @@ def test_heading():
     spline = smooth("r:2", weights=np.where(np.arange(40) % 4, 1.0, 0.0))
     wanted = f"30 data, {spline.df:.3g} degrees of freedom, noise {spline.sigma:.2g}, band 95 %"
     assert wanted in texts_of(spline.plot())
+    for name in ("s:2", "gr:2,4"):
+        turned = smooth(name)
+        angle = f"40 data, {turned.df:.3g} degrees of freedom, noise {turned.sigma:.2g} rad, band 95 %"
+        assert angle in texts_of(turned.plot())
     both = ss.make_smoothing_spline(T, (noisy("r:1"), noisy("s:2")), "r:1 x s:2")
     (one, other), (first, second) = both.df, both.sigma
     counts = f"40 data, {one:.3g} and {other:.3g} degrees of freedom"

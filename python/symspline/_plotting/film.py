@@ -44,12 +44,14 @@ def plot_film(t: NDArray[Any], landmarks: Array, film: Callable[[Any], Array], f
     # Every drawing fits into a square of this size around its centre.
     size = 2.1 * max(float(np.abs(_centred(x)).max()) for x in seen)
     middle, half = window(seen[2].reshape(-1, 2), 1.25)
-    words = f"{drawings} drawings of {count} landmarks, filled or in bold frames; others: between them\n"
-    words += "colour: time; strip: centred at their times; frames: where they are"
-    words += "; white dot: first landmark" * (count > _NUMBERED)
+    words = f"{drawings} given drawings of {count} landmarks, and others between them; colour: time"
     with drawing((_WIDTH, _HEIGHT)) as figure:
         heading(figure, "Morph along a C² spline of affine shapes", words, 0.93)
-        _draw_strip(figure.add_axes((0.05, 0.58, 0.9, 0.26)), t, strip, seen[0], seen[1], size)
+        _draw_strip(figure.add_axes((0.05, 0.58, 0.9, 0.24)), t, strip, seen[0], seen[1], size)
+        caption: Any = {"color": INK, "fontsize": points(9)}
+        figure.text(0.03, 0.84, "each drawing centred at its time; filled: given", **caption)
+        dot = "; white dot: first landmark" * (count > _NUMBERED)
+        figure.text(0.03, 0.51, f"the same at their positions; bold frames: given{dot}", **caption)
         for i, (x, landmarks) in enumerate(zip(multiples, seen[2], strict=True)):
             row, column = divmod(i, _COLUMNS)
             axes = figure.add_axes((0.03 + column * 0.157, 0.26 - row * 0.25, 0.15, 0.24), aspect="equal")

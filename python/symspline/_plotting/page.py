@@ -52,7 +52,7 @@ from .figure import (
     shows_band,
 )
 from .panels import check_axes, draw_into, has_dark_background, next_color
-from .rates import LIMIT, MEDIAN, columns_of, draw_rates
+from .rates import LIMIT, MEDIAN, columns_of, draw_rates, is_angular
 from .style import BOTTOM, DATA, EDGE, GAP, INK, MARK, TOP, Array, font_factor, heading, legend
 from .theme import is_dark, kept_color
 from .titles import title_on
@@ -191,6 +191,8 @@ def _description(spline: Any, curves: Sequence[Curve]) -> str:
     if isinstance(cover_of(spline.space), SpecialEuclidean):
         # The acceleration of the position is that of a body in such a motion.
         words[0] = words[0].replace("natural ends", "natural ends (constant twist)")
+    if ", noise " in words[0] and curves[0].radius is None and is_angular(spline.space):
+        words[0] += " rad"
     if str(cover_of(spline.space)).partition(":")[0] in ("spd", "hpd"):
         words.append("affine-invariant metric")
     factors = len(factors_of(spline.space))

@@ -89,11 +89,17 @@ _SIGNS: dict[str, Callable[[Any, Any], Array]] = {
 }
 
 
+def is_angular(space: Space[Any]) -> bool:
+    """Whether distances are angles."""
+    own = cover_of(space)
+    return isinstance(own, (Sphere, Torus)) or bool(_ANGULAR & {str(own), str(own).partition(":")[0]})
+
+
 def rates_of(space: Space[Any], seconds: bool) -> list[Rate]:
     """Return the rates of a space that is not a product."""
     own = cover_of(space)
     per = [", 1/s", ", 1/s²"] if seconds else ["", ""]
-    if isinstance(own, (Sphere, Torus)) or _ANGULAR & {str(own), str(own).partition(":")[0]}:
+    if is_angular(space):
         per = [", rad/s", ", rad/s²"] if seconds else [", rad/t", ", rad/t²"]
     more = [" = |ω|/2", " = |ω′|/2"] if str(own) in QUATERNIONS else [" of states" * (str(own) in _STATES)] * 2
     if isinstance(own, SpecialEuclidean):

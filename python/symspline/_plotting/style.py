@@ -74,9 +74,7 @@ def heading(figure: Figure, title: str, subtitle: str, height: float) -> None:
     title = fill(title, max(int(letters / size), 10))
     look: Any = {"fontsize": points(18 * size), "weight": "bold", "linespacing": 1.0}
     figure.text(0.03, height, title, color=INK, va="bottom" if "\n" in title else "baseline", **look)
-    # The baseline of several lines is that of the last one.
-    below = 0.3 + 0.22 * subtitle.count("\n")
-    figure.text(0.03, height - below / figure.get_figheight(), subtitle, color=INK, fontsize=points(12))
+    figure.text(0.03, height - 0.3 / figure.get_figheight(), subtitle, color=INK, fontsize=points(12))
 
 
 def note(panel: SubFigure, text: str) -> None:
