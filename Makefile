@@ -44,8 +44,9 @@ check-python: .venv/built .venv/tools
 	$(BIN)/codespell *.md Makefile benchmarks crates docs examples packaging python tests
 	$(BIN)/python -m pytest tests/test_docstrings.py tests/test_language.py
 
+# Workers on all cores with a thread of BLAS per core each would wait for each other.
 test: check
-	$(BIN)/python -m pytest --numprocesses auto --dist worksteal --doctest-modules python tests \
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --dist worksteal --doctest-modules python tests \
 		--ignore tests/test_docstrings.py --ignore tests/test_language.py
 
 # Compares with evo and geomstats, which runs with no NumPy of today, and so in an environment of its own, beside the

@@ -499,3 +499,9 @@ def test_poses_stand_on_their_shadows():
     np.testing.assert_allclose(z[:, :2], np.stack([poses[:, 2, 3], np.full(5, axes.get_zlim()[0])], axis=1))
     many = ss.CubicSpline(None, np.cumsum(np.random.default_rng(0).normal(size=(40, 3)), axis=0), "r:3")
     assert not any(line.get_label() == "_stems" for line in rendered(many.plot()).axes[0].lines)
+
+
+@pytest.mark.parametrize(("name", "metric"), [("spd:2", "affine-invariant"), ("logspd:2", "log-Euclidean")])
+def test_the_heading_names_the_metric_of_covariances(name, metric):
+    spline = ss.CubicSpline(None, np.array([1.0, 2.0, 3.0])[:, None, None] * np.eye(2), name)
+    assert f"3 points, natural ends, {metric} metric" in texts_of(spline.plot())

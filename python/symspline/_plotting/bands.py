@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -40,20 +40,6 @@ def draw_graph_of(axes: Axes, curve: Curve, line: Array, given: Array, unit: flo
         fill_band(axes, curve, line - unit * curve.radii, line + unit * curve.radii, zorder=3)
     curve.draw_line(axes, np.column_stack([curve.times, line]))
     curve.draw_dots(axes, np.column_stack([curve.on_axis(curve.given_x), given]), **dots)
-
-
-def fill_quantiles(
-    axes: Axes, curves: Sequence[Curve], numbers: Callable[[Callable[[str], Any]], Array]
-) -> tuple[float, ...]:
-    """Fill the area between the 5 % and the 95 % quantile of numbers of all curves of a batch against time.
-
-    ``numbers`` takes a function that evaluates a quantity, and returns one row per curve. Return the lowest and the
-    highest quantile, if there is a batch.
-    """
-    batch = curves[0].batch
-    if batch is None:
-        return ()
-    return shade_quantiles(axes, batch, numbers(batch.at))
 
 
 def shade_quantiles(axes: Axes, batch: Batch, values: Array) -> tuple[float, float]:

@@ -60,6 +60,8 @@ from .titles import title_on
 _HEAD, _LINE, _RATES_WIDTH, _RATES_HEIGHT = 1.2, 0.2, 5.8, 4.0
 _UNITS = (172_800, 86_400, "d"), (7200, 3600, "h"), (100, 60, "min"), (0, 1, "s")
 """The least number of seconds for which a unit is used, its length in seconds, and its name."""
+_METRICS = dict.fromkeys(("spd", "hpd", "sspd"), "affine-invariant") | {"logspd": "log-Euclidean"}
+"""Metrics of families for which several are in use."""
 _ROW, _LEAST_ROW = 1.8, 1.35
 """Height of a rate in inches, if there are more than two in a column, and the smallest one beside a picture."""
 
@@ -193,8 +195,9 @@ def _description(spline: Any, curves: Sequence[Curve]) -> str:
         words[0] = words[0].replace("natural ends", "natural ends (constant twist)")
     if ", noise " in words[0] and curves[0].radius is None and is_angular(spline.space):
         words[0] += " rad"
-    if str(cover_of(spline.space)).partition(":")[0] in ("spd", "hpd"):
-        words.append("affine-invariant metric")
+    family = str(cover_of(spline.space)).partition(":")[0]
+    if family in _METRICS:
+        words.append(f"{_METRICS[family]} metric")
     factors = len(factors_of(spline.space))
     if factors > FACTORS:
         words.append(f"{FACTORS} of {factors} factors")

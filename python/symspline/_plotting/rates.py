@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import SubFigure
 
 from .._spaces import Product, Space, SpecialEuclidean, Sphere, Torus, cover_of, factors_of, short_name
-from .bands import fill_band, fill_quantiles
+from .bands import fill_band, shade_quantiles
 from .curves import LINE, Curve
 from .graphs import FEW_KNOTS, timelines
 from .style import EDGE, INK, MARK, Array
@@ -240,16 +240,17 @@ def _in_longer_units(rate: Rate, curves: Sequence[Curve]) -> Rate:
 
 def _draw_rate(axes: Axes, curves: Sequence[Curve], rate: Rate) -> None:
     """Draw one rate. Its axis includes zero, and rounding errors of constants are not magnified."""
-    drawn = [0.0, *fill_quantiles(axes, curves, rate.values)]
+    batch = curves[0].batch
+    drawn = [0.0, *(shade_quantiles(axes, batch, rate.values(batch.at)) if batch else ())]
     top = rounding = 0.0
     for curve in curves:
         top = max(top, rate.scale * float(np.abs(rate.speed(curve.at)).max()))
         # Rounding errors of points between the closest knots, which a curve at rest has.
         rounding = max(rounding, rate.scale * 1e-15 * np.abs(curve.points).max() / np.diff(curve.data.times).min())
-        if curve.is_mean and curve.batch is not None:
+        if curve.is_mean and batch:
             # A mean of curves is smoother than they are, so that its rates are smaller than most of theirs.
-            median = np.median(rate.values(curve.batch.at), axis=0)
-            axes.plot(curve.batch.times, median, color=INK, linewidth=1.8, label=MEDIAN)
+            median = np.median(rate.values(batch.at), axis=0)
+            axes.plot(batch.times, median, color=INK, linewidth=1.8, label=MEDIAN)
             drawn += [float(median.min()), float(median.max())]
             continue
         values = rate.values(curve.at)
