@@ -295,6 +295,8 @@ def test_batches_close_to_their_mean_show_it(name):
     assert median.get_label() == "_median"
     np.testing.assert_allclose(line[:, 1], np.median(speed, axis=0), atol=1e-9)
     mean = curves_of(batch, Axis())[0][0]
+    # The third axis of frames has nearly the usual colour.
+    assert to_hex(mean.color) == ("#7b3294" if name == "se:3" else "#0b559f")
     x = mean.x[100:-100:50]
     means = space.mean(np.moveaxis(batch(x), 0, 1))
     assert space.distance(mean.points[100:-100:50], means).max() < 1e-3
