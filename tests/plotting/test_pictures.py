@@ -84,7 +84,7 @@ def test_maps_are_centred_on_curves(west, middle):
     curve = next(line.get_xydata() for line in plan.lines if line.get_gid() == "_curve")
     assert np.isfinite(curve).all() and left < curve[:, 0].min() and curve[:, 0].max() < right
     around = ss.CubicSpline(None, from_lonlat(np.linspace(-110, 110, 9), 0 * np.arange(9)), "sphere:2")
-    high = ss.CubicSpline(None, from_lonlat(np.linspace(-20, 100, 7), np.linspace(-30, 85, 7)), "sphere:2")
+    high = ss.CubicSpline(None, from_lonlat(np.linspace(-20, 100, 7), np.linspace(0, 85, 7)), "sphere:2")
     part = next(axes for axes in rendered(high.plot()).axes if axes.get_label() == "map")
     assert part.get_ylim()[1] == pytest.approx(90) and part.get_ylim()[0] > -90
     whole = next(axes for axes in rendered(around.plot()).axes if axes.get_label() == "map")
