@@ -43,7 +43,7 @@ def draw_graph_of(axes: Axes, curve: Curve, line: Array, given: Array, unit: flo
 
 
 def shade_quantiles(axes: Axes, batch: Batch, values: Array) -> tuple[float, float]:
-    """Fill the area between the quantiles of numbers, one row per curve, and return the lowest and the highest."""
+    """Fill the area between the 5 % and the 95 % quantile of numbers, one row per curve, and return its limits."""
     low, high = np.quantile(values, [0.05, 0.95], axis=0)
     axes.fill_between(batch.times, low, high, color=DATA, alpha=0.35, linewidth=0, label=QUANTILES, zorder=1.5)
     return float(low.min()), float(high.max())

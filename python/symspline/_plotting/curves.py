@@ -482,8 +482,3 @@ def common_gaps(curves: Sequence[Curve]) -> Array:
         low, high = np.maximum(found[:, None, 0], gaps[:, 0]), np.minimum(found[:, None, 1], gaps[:, 1])
         found = np.stack([low[low < high], high[low < high]], axis=1)
     return found
-
-
-def interrupted(line: Array, after: Any, gaps: Any) -> Array:
-    """Insert three rows after some of the rows of a line: its end, NaN, and where it begins again."""
-    return np.insert(line, np.repeat(after + 1, 3), np.reshape(gaps, (-1, line.shape[1])), axis=0)

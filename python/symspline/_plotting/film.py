@@ -51,7 +51,7 @@ def plot_film(t: NDArray[Any], landmarks: Array, film: Callable[[Any], Array], f
         caption: Any = {"color": INK, "fontsize": points(9)}
         figure.text(0.03, 0.84, "each drawing centred at its time; filled: given", **caption)
         dot = "; white dot: first landmark" * (count > _NUMBERED)
-        figure.text(0.03, 0.51, f"the same at their positions; bold frames: given{dot}", **caption)
+        figure.text(0.03, 0.51, f"drawings at their positions; bold frames: given{dot}", **caption)
         for i, (x, landmarks) in enumerate(zip(multiples, seen[2], strict=True)):
             row, column = divmod(i, _COLUMNS)
             axes = figure.add_axes((0.03 + column * 0.157, 0.26 - row * 0.25, 0.15, 0.24), aspect="equal")

@@ -260,7 +260,7 @@ def _without_jumps(
 
 
 def _unwrapped(lines: Array, period: float, start: Array) -> Array:
-    """Return numbers without jumps along the second axis from the end, which is time, that begin close to a start."""
+    """Return numbers that begin close to a start and do not jump in time, which is the last axis but one."""
     if np.isinf(period):
         return lines
     lines = np.unwrap(lines, period=period, axis=-2)

@@ -58,7 +58,7 @@ _LENGTH = 0.14
 _MANY = 24
 """The number of bodies of all curves, or two per curve if that is more."""
 _FRAMES = 16
-"""The largest numbers of given frames in space, and of lighter ones between them."""
+"""The largest number of frames in space, of all curves together."""
 _LEAST, _SHORT = 12.0, 0.32
 """Arrows are shorter than the time axis by a factor, and the smallest length in inches if there are many."""
 _BESIDE = 20

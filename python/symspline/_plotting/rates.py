@@ -20,7 +20,7 @@ NORMAL = 1.96
 LIMIT, MEDIAN = "_limit", "_median"
 IN_ROW = 3
 """The largest number of factors whose pictures are in one row."""
-# Other spaces than spheres, in which the length of a velocity is an angle per time.
+# Spaces and families, besides spheres and tori, in which distances are angles.
 _ANGULAR = {"so:2", "so:3", "o:2", "o:3", "u:1", "su:2", "rp", "cp", "hp", "gr", "cgr"}
 _STATES = {"cp:1", "cgr:1,2"}
 """Spaces whose distances are half of the angles that their picture shows."""
@@ -190,7 +190,7 @@ def _cut(name: str) -> str:
 
 
 def _deviation(mean: Curve, unit: str, scale: float = 1.0) -> Rate:
-    """Return the distances of the curves of a batch from their mean."""
+    """Return the number that is the distance of a curve from the mean of its batch."""
 
     def distances(at: At) -> Array:
         assert mean.batch is not None

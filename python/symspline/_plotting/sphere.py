@@ -19,7 +19,7 @@ from .._lonlat import from_lonlat, to_lonlat
 from . import land
 from .arrows import draw_arrows
 from .bands import disc_indices, draw_tube
-from .curves import BEHIND, CIRCLE, Curve, interrupted
+from .curves import BEHIND, CIRCLE, Curve
 from .globe import View, degrees, draw_frame, draw_globe, facing, label_directions, middle_of
 from .style import GRID, HALO, INK, MARK, PAPER, SPLINE, Array, inside, note, plain, points, round_below, size, window
 
@@ -294,7 +294,12 @@ def broken_at_rim(line: Array, pole: Array = _NORTH) -> Array:
         rim -= (rim @ pole) * pole
         rim /= np.linalg.norm(rim)
         gaps.append([rim, np.full(3, np.nan), -rim])
-    return interrupted(line * side, crossings, gaps)
+    return _interrupted(line * side, crossings, gaps)
+
+
+def _interrupted(line: Array, after: Any, gaps: Any) -> Array:
+    """Insert three rows after some of the rows of a line: its end, NaN, and where it begins again."""
+    return np.insert(line, np.repeat(after + 1, 3), np.reshape(gaps, (-1, line.shape[1])), axis=0)
 
 
 def _name_crossings(axes: Axes, view: View, broken: Array) -> bool:
@@ -388,7 +393,7 @@ def broken(positions: Array) -> Array:
     step = np.diff(positions[:, 0])
     short = step - 360 * np.rint(step / 360)
     (jumps,) = np.nonzero((np.abs(step) > 180) | (np.abs(short) > _POLE))
-    return interrupted(positions, jumps, [_gap(positions[i], positions[i + 1], short[i]) for i in jumps])
+    return _interrupted(positions, jumps, [_gap(positions[i], positions[i + 1], short[i]) for i in jumps])
 
 
 def _gap(before: Array, after: Array, step: float) -> Any:

@@ -35,7 +35,10 @@ def points_of(space: Space[Any]) -> str:
 
 
 def title_on(what: str, space: Space[Any], most: int = 63) -> str:
-    """Return the title of a figure. Long titles have the short name of the space; captions name factors."""
+    """Return the title of a figure, in at most ``most`` letters.
+
+    Long titles have the short name of the space, and those of products have none, because captions name the factors.
+    """
     names = [" × ".join(map(repr, factors_of(space))), short_name(space)]
     kinds = [f"{what} of {words}" for words in [points_of(space)] if words] + [what]
     titles = [f"{kind} on {name}" for kind in kinds for name in names]
