@@ -12,6 +12,7 @@ mod kernels;
 #[cfg(feature = "laws")]
 pub mod laws;
 pub mod matrix;
+pub mod memory;
 pub mod monitor;
 pub mod parallel;
 pub mod rows;

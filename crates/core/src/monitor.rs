@@ -16,10 +16,11 @@ pub struct Monitor<'a> {
 
 impl<'a> Monitor<'a> {
     /// `go_on` receives the number of finished units and returns whether to continue. It is called often, and only on
-    /// the thread that created the monitor.
+    /// the thread that created the monitor. If this thread listens to another monitor, work that one cancels is
+    /// cancelled here, too.
     pub fn new(go_on: &'a (dyn Fn(usize) -> bool + Sync)) -> Self {
         Monitor {
-            cancelled: Arc::default(),
+            cancelled: STOP.with_borrow(Clone::clone).unwrap_or_default(),
             finished: AtomicUsize::new(0),
             owner: thread::current().id(),
             go_on,

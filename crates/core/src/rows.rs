@@ -1,6 +1,6 @@
 //! Operations of a space on arrays of points and tangent vectors, eight rows at a time.
 
-use crate::monitor::Monitor;
+use crate::monitor::{Monitor, checkpoint};
 use crate::parallel;
 use crate::scalar::{LANES, Lane, few, gather, lane, scatter};
 use crate::space::{Ambient, Erased, Frame, Origin, Space, below};
@@ -216,6 +216,7 @@ fn project_block(space: &Erased, points: &mut [f64], tol: f64) -> Result<(), (us
     let len = space.point_len();
     let mut x = vec![Lane::ZERO; len];
     for (group, rows) in points.chunks_mut(LANES * len).enumerate() {
+        checkpoint();
         let last = rows.len() / len - 1;
         let at: [usize; LANES] = few(|l| l.min(last) * len);
         gather(at.map(|i| &rows[i..i + len]), &mut x);
@@ -239,6 +240,7 @@ pub fn tangent_defects(space: &Erased, points: &[f64], vectors: &[f64]) -> Vec<f
     let (mut p, mut v) = (vec![Lane::ZERO; len], vec![Lane::ZERO; len]);
     let mut defects = Vec::with_capacity(rows + LANES);
     for group in 0..rows.div_ceil(LANES) {
+        checkpoint();
         let at: [usize; LANES] = few(|l| (group * LANES + l).min(rows - 1) * len);
         gather(at.map(|i| &points[i..i + len]), &mut p);
         gather(at.map(|i| &vectors[i..i + len]), &mut v);

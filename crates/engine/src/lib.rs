@@ -21,5 +21,6 @@ pub use symspline_core::derivative;
 #[cfg(feature = "laws")]
 pub use symspline_core::laws;
 pub use symspline_core::{
-    curve, fit, matrix, monitor, parallel, rows, scalar, search, space, special, tridiagonal, validate,
+    curve, fit, matrix, memory, monitor, parallel, rows, scalar, search, space, special, tridiagonal,
+    validate,
 };

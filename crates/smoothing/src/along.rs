@@ -2,6 +2,8 @@
 
 use crate::frames::{Frames, curvature_terms, lanes_of};
 use crate::path::{Path, nearest, positions};
+use symspline_core::memory;
+use symspline_core::monitor::checkpoint;
 use symspline_core::scalar::{LANES, Lane, gather, scatter};
 use symspline_core::space::{Ambient, Erased, Origin};
 
@@ -29,6 +31,11 @@ impl<'a> Along<'a> {
     /// The frames at points of the curve at times x: m vectors each.
     pub fn frames(&self, x: &[f64], points: &[f64]) -> Vec<f64> {
         let (m, len) = (self.space.dim(), self.space.point_len());
+        memory::require(
+            (2 * x.len() + self.path.t.len()) as f64 * (m * len) as f64,
+            "the frames along the curve",
+            "Use fewer measurements, or average them",
+        );
         let near: Vec<usize> = positions(self.path.t, x).into_iter().map(nearest).collect();
         let mut out = vec![0.0; x.len() * m * len];
         let [mut p, mut q, mut v, mut way, mut there] = [(); 5].map(|_| vec![Lane::ZERO; len]);
@@ -36,6 +43,7 @@ impl<'a> Along<'a> {
         let unit = |j: usize| (0..self.path.t.len() * m).map(|i| f64::from(i % m == j)).collect::<Vec<f64>>();
         let at_knots: Vec<Vec<f64>> = (0..m).map(|j| self.frames.tangents(&unit(j))).collect();
         for group in 0..x.len().div_ceil(LANES) {
+            checkpoint();
             let at = lanes_of(group, x.len());
             gather(at.map(|i| &self.path.points[near[i] * len..][..len]), &mut p);
             gather(at.map(|i| &points[i * len..][..len]), &mut q);

@@ -119,6 +119,7 @@ impl Banded {
     pub fn sample(&self, x: &mut [Lane]) {
         let stride = self.width + 1;
         for i in (0..self.size).rev() {
+            checkpoint();
             x[i] /= self.entries[i * stride].sqrt();
             for d in 1..=self.width.min(self.size - 1 - i) {
                 let l = self.entries[(i + d) * stride + d];

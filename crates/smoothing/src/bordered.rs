@@ -5,6 +5,7 @@
 //! ```
 
 use crate::banded::Banded;
+use symspline_core::monitor::checkpoint;
 use symspline_core::scalar::Lane;
 
 /// A factored matrix.
@@ -29,6 +30,7 @@ impl Bordered {
             band.solve(size, &mut v);
         }
         for a in 0..size {
+            checkpoint();
             for b in 0..=a {
                 let rows = side.chunks_exact(size).zip(v.chunks_exact(size));
                 let entry = corner.entry(a, b);
@@ -71,12 +73,14 @@ impl Bordered {
         }
         let [w, v] = &self.sides;
         for (w, row) in w.chunks_exact(size).zip(rest.chunks_exact(columns)) {
+            checkpoint();
             for (factor, own) in w.iter().zip(first.chunks_exact_mut(columns)) {
                 own.iter_mut().zip(row).for_each(|(x, y)| *x = (-*factor).mul_add(*y, *x));
             }
         }
         self.corner.solve(columns, first);
         for (v, row) in v.chunks_exact(size).zip(rest.chunks_exact_mut(columns)) {
+            checkpoint();
             for (factor, own) in v.iter().zip(first.chunks_exact(columns)) {
                 row.iter_mut().zip(own).for_each(|(x, y)| *x = (-*factor).mul_add(*y, *x));
             }
@@ -108,11 +112,13 @@ impl Bordered {
             self.corner.solve(size, &mut corner);
             let v = &self.sides[1];
             for (row, out) in v.chunks_exact(size).zip(side.chunks_exact_mut(size)) {
+                checkpoint();
                 for (x, from) in row.iter().zip(corner.chunks_exact(size)) {
                     out.iter_mut().zip(from).for_each(|(out, c)| *out = (-*x).mul_add(*c, *out));
                 }
             }
             for i in 0..band.size {
+                checkpoint();
                 for j in i.saturating_sub(band.width)..=i {
                     let rows = v[j * size..][..size].iter().zip(&side[i * size..][..size]);
                     *band.entry(i, j) -= rows.fold(Lane::ZERO, |sum, (v, x)| v.mul_add(*x, sum));

@@ -17,8 +17,9 @@ use crate::jacobi_operator::JacobiOperator;
 use crate::linearized::{Basis, LinearProblem, Row};
 use crate::path::Position;
 use crate::problem::{Criterion, Ends, Penalty};
+use symspline_core::memory;
 use symspline_core::monitor::checkpoint;
-use symspline_core::scalar::{Lane, lane};
+use symspline_core::scalar::{LANES, Lane, lane};
 use symspline_core::space::{Erased, Origin};
 
 /// Measurements of one kind, whitened: their noise has variance one.
@@ -113,6 +114,14 @@ impl<'a> Estimation<'a> {
     ) -> Self {
         let linearized = LinearProblem::new(Basis::new(knots, ends), &[], &[], penalty);
         let m = factors.iter().map(Factor::dim).sum();
+        let (p, size) = (priors.len(), linearized.basis.count() * m);
+        // The matrix, its factors and its inverse for eight λ; at most two blocks of each exist at the same time.
+        let entries = (size * stride(m)) as f64 + 3.0 * p as f64 * (size as f64 + p as f64);
+        memory::require(
+            3.0 * LANES as f64 * entries,
+            "the linear system of the estimation",
+            "Use fewer knots, or estimate fewer constants",
+        );
         let first: Vec<usize> =
             (0..factors.len()).map(|f| factors[..f].iter().map(Factor::dim).sum()).collect();
         let jacobi: Vec<Option<JacobiOperator>> = factors
@@ -137,7 +146,6 @@ impl<'a> Estimation<'a> {
         for ((own, first), jacobi) in factors.iter().zip(&first).zip(&jacobi) {
             add_penalty(&linearized, own.dim(), *first, jacobi.as_ref(), m, &mut penalty);
         }
-        let (p, size) = (priors.len(), linearized.basis.count() * m);
         let mut pull = vec![0.0; p + size];
         priors.iter().zip(&mut pull).for_each(|((precision, off), pull)| *pull = -precision * off);
         Estimation {
@@ -168,6 +176,7 @@ impl<'a> Estimation<'a> {
         let mut rows = vec![0.0; d * wide];
         let mut at = None;
         for (k, &(segment, position)) in own.positions.iter().enumerate() {
+            checkpoint();
             let basis = &self.linearized.basis;
             let values: [Row; 3] = std::array::from_fn(|nu| {
                 if own.jacobians[nu].is_empty() { Row::default() } else { basis.row(segment, position, nu) }
@@ -302,6 +311,7 @@ impl<'a> Estimation<'a> {
             out[a] = terms.fold(Lane::ZERO, |sum, x| sum + x);
         }
         for i in 0..size {
+            checkpoint();
             for b in 0..p {
                 let term = inverse.at(p + i, b) * lane(self.side[i * p + b]);
                 out[b] += term;

@@ -9,6 +9,7 @@ use crate::information::{self, Root};
 use crate::path::{Path, Position};
 use symspline_core::derivative::{Derivative, Matrix, Of, Vector};
 use symspline_core::fit::Ends;
+use symspline_core::memory;
 use symspline_core::monitor::{Monitor, checkpoint};
 use symspline_core::parallel;
 use symspline_core::scalar::{LANES, Lane, few, lane};
@@ -65,6 +66,12 @@ pub fn step(
     threads: bool,
 ) -> Vec<f64> {
     let (m, len, n) = (space.dim(), space.point_len(), path.t.len() - 1);
+    // Derivatives of all segments, a square matrix and its factor per segment, and the tridiagonal system.
+    memory::require(
+        (n + 1) as f64 * (m * m + 16) as f64 * 140.0,
+        "smoothing by full Gauss–Newton",
+        "Pass method='linearized', use fewer knots, or smooth the data in parts",
+    );
     let derivative = Derivative::new(space, path.t, path.points, path.velocities, &ends);
     // Velocities in units of the mean knot spacing, so that all unknowns have a similar size.
     let unit = (path.t[n] - path.t[0]) / n as f64;

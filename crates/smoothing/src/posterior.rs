@@ -3,11 +3,12 @@
 use crate::banded::{Banded, stride};
 use crate::bordered::Bordered;
 use crate::cyclic::{Factored, PeriodicCorrection};
-use crate::estimation::Matrices;
 use crate::linearized::{Basis, OVERLAP, Row};
 use crate::problem::Ends;
 use crate::variance::row_at;
-use symspline_core::scalar::{Lane, lane};
+use symspline_core::memory;
+use symspline_core::monitor::checkpoint;
+use symspline_core::scalar::{LANES, Lane, lane};
 
 /// The posterior of a curve with noise of variance one.
 pub struct Posterior<'a> {
@@ -21,11 +22,16 @@ pub struct Posterior<'a> {
 }
 
 impl<'a> Posterior<'a> {
-    /// From A. `turn` is the holonomy of a closed curve, m × m numbers.
-    pub fn new(knots: &'a [f64], ends: Ends, m: usize, matrices: &Matrices, turn: &[f64]) -> Self {
+    /// From A: its band, side and corner. `turn` is the holonomy of a closed curve, m × m numbers.
+    pub fn new(knots: &'a [f64], ends: Ends, m: usize, matrices: [&[f64]; 3], turn: &[f64]) -> Self {
         let basis = Basis::new(knots, ends);
         let [band, side, corner] = matrices;
         let p = corner.len().isqrt();
+        memory::require(
+            2.0 * LANES as f64 * (band.len() + 2 * side.len() + 2 * corner.len()) as f64,
+            "the posterior distribution of the curve",
+            "Use fewer knots or parameters",
+        );
         let band = Banded::of(basis.count() * m, stride(m) - 1, |at| lane(band[at]));
         let periodic =
             basis.is_closed().then(|| PeriodicCorrection { overlap: OVERLAP, m, turn: turn.to_vec() });
@@ -43,9 +49,11 @@ impl<'a> Posterior<'a> {
     /// of the first derivative, then those of the next one.
     pub fn covariances(&self, x: &[f64], orders: &[usize]) -> Vec<f64> {
         let (m, size) = (self.m, orders.len() * self.m);
+        require_result(x.len(), size);
         let inverse = self.matrix.inverse_band();
         let mut out = Vec::with_capacity(x.len() * size * size);
         for t in x {
+            checkpoint();
             let rows: Vec<Row> = orders.iter().map(|nu| row_at(self.knots, &self.basis, *t, *nu)).collect();
             for u in 0..size {
                 for v in 0..size {
@@ -72,8 +80,10 @@ impl<'a> Posterior<'a> {
     pub fn between(&self, x: &[f64], y: &[f64]) -> Vec<f64> {
         let m = self.m;
         let at = |t: f64| row_at(self.knots, &self.basis, t, 0);
+        require_result(x.len(), m);
         let mut out = Vec::with_capacity(x.len() * m * m);
         for (x, y) in x.iter().zip(y) {
+            checkpoint();
             let (r, s) = (at(*x), at(*y));
             // Rows of coefficients, with one column per coordinate of y.
             let unit: Vec<f64> = (0..m * m).map(|at| f64::from(at / m == at % m)).collect();
@@ -109,17 +119,23 @@ impl<'a> Posterior<'a> {
         (0..columns[0].len() * m).map(|at| columns[at % m][at / m]).collect()
     }
 
-    /// The number of independent normal numbers that a sample needs.
-    pub fn freedom(&self) -> usize {
-        let repeated = self.periodic.as_ref().map_or(0, |periodic| periodic.overlap);
-        self.p + (self.basis.count() - repeated) * self.m
+    /// The number of independent normal numbers that a sample needs, for p parameters.
+    pub fn freedom(knots: &[f64], ends: Ends, m: usize, p: usize) -> usize {
+        freedom(&Basis::new(knots, ends), m, p)
     }
 
     /// Moves of the curve at its knots, m numbers each, for rows of independent normal numbers.
     pub fn samples(&self, normal: &[f64]) -> Vec<f64> {
-        let mut out = Vec::new();
         let rows = self.basis.at_knots(0);
-        for normal in normal.chunks_exact(self.freedom()) {
+        let freedom = freedom(&self.basis, self.m, self.p);
+        let size = normal.len() / freedom.max(1) * rows.len() * self.m;
+        memory::require(
+            (size + 20 * freedom) as f64,
+            "drawing samples of the curve",
+            "Draw fewer samples at a time",
+        );
+        let mut out = Vec::with_capacity(size);
+        for normal in normal.chunks_exact(freedom) {
             let mut x: Vec<Lane> = normal.iter().map(|x| lane(*x)).collect();
             self.matrix.sample(&mut x);
             let mut x: Vec<f64> = x[self.p..].iter().map(|x| x.as_array()[0]).collect();
@@ -134,4 +150,18 @@ impl<'a> Posterior<'a> {
         }
         out
     }
+}
+
+/// Memory for the covariances of `count` times, and for a copy of them.
+fn require_result(count: usize, size: usize) {
+    memory::require(
+        2.0 * count as f64 * (size as f64).powi(2),
+        "the covariances of the curve",
+        "Pass fewer times in one call",
+    );
+}
+
+fn freedom(basis: &Basis, m: usize, p: usize) -> usize {
+    let repeated = if basis.is_closed() { OVERLAP } else { 0 };
+    p + (basis.count() - repeated) * m
 }

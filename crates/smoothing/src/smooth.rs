@@ -1,5 +1,6 @@
 //! Smoothing of many curves at a time: every iteration advances all curves that have not converged.
 
+use crate::banded::stride;
 use crate::curve_fit::CurveFit;
 use crate::information;
 use crate::loss;
@@ -10,9 +11,11 @@ use crate::start::{Level, levels};
 use symspline_core::fit::{
     End, Ends as FitEnds, Method, Options as FitOptions, Problem, Report, Status, fit,
 };
+use symspline_core::memory;
 use symspline_core::monitor::Monitor;
 use symspline_core::parallel;
-use symspline_core::space::{Ambient, Erased, Origin};
+use symspline_core::scalar::LANES;
+use symspline_core::space::{Ambient, Erased, Frame, Origin};
 
 /// The maximum number of iterations of an intermediate fit. If it does not converge, a shorter step is better than
 /// more iterations ...
@@ -30,6 +33,8 @@ const PARALLEL: usize = 4096;
 
 /// Smooths curves; they are independent of each other.
 pub fn smooth(space: &Erased, data: &[Data], options: &Options, monitor: &Monitor) -> Vec<Smooth> {
+    let numbers: usize = data.iter().map(|data| size(space, data)).sum();
+    memory::require(numbers as f64, "smoothing", "Use fewer knots, or smooth the data in parts");
     let knots: Vec<Vec<f64>> = data.iter().map(|data| knots_near_data(data, options)).collect();
     let near: Vec<Data> = data.iter().zip(&knots).map(|(data, knots)| Data { knots, ..*data }).collect();
     let mut tracks: Vec<CurveFit> = solve(space, &near, options, monitor)
@@ -50,6 +55,15 @@ pub fn smooth(space: &Erased, data: &[Data], options: &Options, monitor: &Monito
         });
     }
     tracks.into_iter().map(CurveFit::finish).collect()
+}
+
+/// The number of numbers that the smoothing of a curve occupies, about: band matrices of eight λ, and several vectors
+/// per knot and per datum; without those of full Gauss–Newton.
+fn size(space: &Erased, data: &Data) -> usize {
+    let (knots, count) = (data.knots.len(), data.times.len());
+    let per_knot = 512 + 24 * space.point_len() + 2 * space.frame_len();
+    let coupled = if data.information.is_empty() { 0 } else { 3 * stride(space.dim()) * space.dim() * LANES };
+    knots * (per_knot + coupled) + count * (4 * space.point_len() + 16) + 2 * data.information.len()
 }
 
 /// The knots of the iteration. Beyond the first and the last datum, a curve with natural ends is a geodesic and needs no

@@ -5,6 +5,7 @@ use crate::cyclic::{Factored, PeriodicCorrection};
 use crate::linearized::{Basis, Row};
 use crate::path::{Position, positions};
 use crate::problem::{EndCondition, Ends};
+use symspline_core::monitor::checkpoint;
 use symspline_core::scalar::lane;
 
 const BAND: usize = WIDTH + 1;
@@ -29,6 +30,7 @@ pub fn variance(knots: &[f64], rows: &[f64], lam: f64, ends: Ends, times: &[f64]
     let inverse = Banded::of(basis.count(), WIDTH, |at| lane(rows[at]));
     let velocities = velocities_given_points(knots, ends);
     let one = |t: &f64| {
+        checkpoint();
         let ((segment, s), beyond) = position_of(knots, &basis, *t);
         let h = knots[segment + 1] - knots[segment];
         let row = row_at(knots, &basis, *t, nu);

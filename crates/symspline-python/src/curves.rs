@@ -4,6 +4,7 @@ use crate::arrays::{in_order, reserve, zeros};
 use crate::errors::{Invalid, invalid};
 use crate::space::Handle;
 use crate::validate::Names;
+use crate::watch::{is_heavy, is_long, watched};
 use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use symspline_engine::fit::{End, Ends, Problem};
@@ -307,8 +308,8 @@ pub fn check<'py>(
     require_memory_for_checks(handle, &curves)?;
     let mut own = Vec::new();
     curves.gather_points(&mut own)?;
-    let faults = py
-        .detach(|| curves.check(&mut own, point_tol, skip_invalid))
+    let heavy = is_heavy(&curves.space) || is_long(own.len());
+    let faults = watched(py, None, 1, heavy, |_| curves.check(&mut own, point_tol, skip_invalid))?
         .map_err(|fault| fault.raise(py, &curves.batch))?;
     Ok((curves.points(py, own, points.shape())?, faults))
 }

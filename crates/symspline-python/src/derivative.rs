@@ -1,17 +1,18 @@
 //! Derivatives with respect to the data, called from Python.
 
-use crate::arrays::{in_order, reserve, zeros};
+use crate::arrays::{in_order, require_memory, zeros};
 use crate::curves::{EndOf, end};
 use crate::errors::invalid;
 use crate::space::Handle;
-use crate::watch::{is_heavy, watched};
+use crate::watch::{is_heavy, is_long, watched};
 use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn};
 use pyo3::prelude::*;
 use symspline_engine::derivative::{Data, Derivative, Of};
 use symspline_engine::fit::{End, Ends};
 use symspline_engine::monitor::Monitor;
 use symspline_engine::parallel;
-use symspline_engine::space::{Ambient, Erased, Origin};
+use symspline_engine::scalar::LANES;
+use symspline_engine::space::{Ambient, Erased, Frame, Origin};
 
 type Array<'py> = PyReadonlyArrayDyn<'py, f64>;
 
@@ -81,11 +82,21 @@ impl Slices<'_> {
     }
 
     /// Raises MemoryError unless memory is available for the matrices of the curves that run at the same time: about
-    /// fifty per knot.
-    fn reserve(&self, dim: usize) -> PyResult<()> {
+    /// fifty per knot, of which each has a header.
+    fn require_memory(&self, space: &Erased) -> PyResult<()> {
         let at_once = parallel::num_threads().min(self.curves).max(1);
         let knots = self.t.len() / self.curves.max(1) * at_once;
-        reserve::<f64>(knots.saturating_mul(50 * (dim * dim + 8)) + 2 * self.points.len()).map(drop)
+        let (dim, frame) = (space.dim(), space.frame_len());
+        let numbers = knots as f64 * (50.0 * (dim * dim + 16) as f64 + (LANES * frame) as f64);
+        require_memory(numbers + 4.0 * self.points.len() as f64, || {
+            ("the derivatives of the curves".into(), "Use fewer knots, or curves on fewer threads")
+        })
+    }
+
+    /// Whether the derivatives of one curve may take long.
+    fn is_heavy(&self, space: &Erased) -> bool {
+        let own = (self.t.len() + self.x.len()) / self.curves.max(1);
+        is_heavy(space) || is_long(own.saturating_mul(space.dim().pow(2)))
     }
 
     fn times(&self, c: usize) -> &[f64] {
@@ -115,14 +126,15 @@ pub fn push<'py>(
     let len = handle.space.get().point_len();
     let (points, knots) = (in_order(&points)?, in_order(&knots)?);
     let ends = [in_order(&ends[0])?, in_order(&ends[1])?];
-    slices.reserve(handle.space.get().dim())?;
+    slices.require_memory(&handle.space.get())?;
+    let heavy = slices.is_heavy(&handle.space.get());
     let out = zeros(py, &[slices.x.len() * len])?;
     let mut write = out.readwrite();
     let result = write.as_slice_mut()?;
     if !result.is_empty() {
         let size = result.len() / slices.curves;
         let items = result.chunks_mut(size).enumerate().collect();
-        watched(py, None, slices.curves, is_heavy(&handle.space.get()), |monitor| {
+        watched(py, None, slices.curves, heavy, |monitor| {
             each(items, monitor, |c, out| {
                 let own = |array| part(array, c, slices.curves).to_vec();
                 let change = Data { points: own(points), knots: own(knots), ends: ends.map(own) };
@@ -144,10 +156,11 @@ pub fn pull<'py>(
 ) -> PyResult<[Bound<'py, PyArray1<f64>>; 4]> {
     let slices = curves.slices()?;
     let cotangent = in_order(&cotangent)?;
-    slices.reserve(handle.space.get().dim())?;
+    slices.require_memory(&handle.space.get())?;
+    let heavy = slices.is_heavy(&handle.space.get());
     let mut gradients = vec![Data::default(); slices.curves];
     let items = gradients.iter_mut().enumerate().collect();
-    watched(py, None, slices.curves, is_heavy(&handle.space.get()), |monitor| {
+    watched(py, None, slices.curves, heavy, |monitor| {
         each(items, monitor, |c, out| {
             let own = part(cotangent, c, slices.curves);
             *out = slices.derivative(&handle.space.get(), c).pull(slices.times(c), slices.of, own);

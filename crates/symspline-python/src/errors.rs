@@ -33,7 +33,9 @@ impl Invalid {
     pub fn raise(self, py: Python, batch: &[usize]) -> PyErr {
         let error = invalid(self.message);
         let fields = error.value(py);
-        let index = self.curve.map(|curve| PyTuple::new(py, index_of(curve, batch)));
+        // An empty batch has knots, but no curves.
+        let curve = self.curve.filter(|_| !batch.contains(&0));
+        let index = curve.map(|curve| PyTuple::new(py, index_of(curve, batch)));
         let set = index
             .transpose()
             .and_then(|index| fields.setattr("curve", index))
@@ -55,6 +57,7 @@ pub fn in_factor(py: Python, error: PyErr, factor: usize, factors: usize) -> PyE
 fn index_of(mut element: usize, shape: &[usize]) -> Vec<usize> {
     let mut index = Vec::with_capacity(shape.len());
     for &size in shape.iter().rev() {
+        let size = size.max(1);
         index.push(element % size);
         element /= size;
     }

@@ -1,9 +1,9 @@
 //! Estimation from measurements of any kind, called from Python.
 
-use crate::arrays::{in_order, zeros};
+use crate::arrays::{count, in_order, zeros};
 use crate::errors::invalid;
 use crate::space::Handle;
-use crate::watch::watched;
+use crate::watch::{is_long, watched};
 use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use symspline_engine::smoothing::along::Along;
@@ -88,8 +88,9 @@ pub fn frames_along<'py>(
     let slices = [&knots, &points, &x, &gammas].map(in_order);
     let [knots, points, x, gammas] = slices;
     let (knots, points, x, gammas) = (knots?, points?, x?, gammas?);
+    let heavy = is_long((points.len() + gammas.len()) * space.dim());
     let found =
-        watched(py, None, x.len(), false, |_| Along::new(&space, knots, points, &[]).frames(x, gammas))?;
+        watched(py, None, x.len(), heavy, |_| Along::new(&space, knots, points, &[]).frames(x, gammas))?;
     array(py, &[x.len(), space.dim(), space.point_len()], &found)
 }
 
@@ -103,7 +104,8 @@ pub fn curvature_along<'py>(
 ) -> PyResult<Out<'py>> {
     let space = handle.space.get();
     let (u, x) = (in_order(&velocities)?, in_order(&vectors)?);
-    let found = watched(py, None, u.len(), false, |_| Along::curvature(&space, u, x))?;
+    let found =
+        watched(py, None, u.len(), is_long(u.len() * space.dim()), |_| Along::curvature(&space, u, x))?;
     array(py, velocities.shape(), &found)
 }
 
@@ -119,8 +121,9 @@ pub fn bending<'py>(
 ) -> PyResult<[Out<'py>; 2]> {
     let space = handle.space.get();
     let (knots, points, velocities) = (in_order(&knots)?, in_order(&points)?, in_order(&velocities)?);
+    let heavy = is_long(points.len() * space.dim());
     let found =
-        watched(py, None, knots.len(), false, |_| Along::new(&space, knots, points, velocities).bending())?;
+        watched(py, None, knots.len(), heavy, |_| Along::new(&space, knots, points, velocities).bending())?;
     let shape = [knots.len(), space.dim()];
     Ok([array(py, &shape, &found.speeds)?, array(py, &shape, &found.accelerations)?])
 }
@@ -180,7 +183,10 @@ pub fn estimate<'py>(
     };
     let (known, near) = (numbers(&lams)?, numbers(&guesses)?);
     let factor_count = own.len();
-    let (found, residuals, matrices) = watched(py, None, knots.len(), false, |_| {
+    // Every λ of the search factors a banded matrix with a border.
+    let data: usize = terms.iter().map(|(x, ..)| x.len()).sum();
+    let heavy = is_long((knots.len() * m + priors.len() + data) * (m + priors.len()));
+    let (found, residuals, matrices) = watched(py, None, knots.len(), heavy, |_| {
         let mut problem = Estimation::new(knots, free_ends(penalty), penalty, own, &priors);
         for (at, size, residuals, jacobians, parameters) in &read {
             problem.add(&Measurements {
@@ -220,10 +226,37 @@ pub fn estimate<'py>(
 /// ends (None for a closed curve) and the holonomy of a closed curve.
 type Known<'py> = ([Array<'py>; 3], usize, Option<[String; 2]>, Array<'py>);
 
-fn posterior<'a>(knots: &'a [f64], known: &Known) -> PyResult<Posterior<'a>> {
-    let ([band, side, corner], m, kinds, turn) = known;
-    let matrices = [in_order(band)?.to_vec(), in_order(side)?.to_vec(), in_order(corner)?.to_vec()];
-    Ok(Posterior::new(knots, ends_named(kinds.clone())?, *m, &matrices, in_order(turn)?))
+/// The same, as slices.
+struct Slices<'a> {
+    knots: &'a [f64],
+    matrices: [&'a [f64]; 3],
+    m: usize,
+    ends: Ends,
+    turn: &'a [f64],
+}
+
+impl<'a> Slices<'a> {
+    fn new(knots: &'a Array, known: &'a Known) -> PyResult<Self> {
+        let ([band, side, corner], m, kinds, turn) = known;
+        Ok(Slices {
+            knots: in_order(knots)?,
+            matrices: [in_order(band)?, in_order(side)?, in_order(corner)?],
+            m: *m,
+            ends: ends_named(kinds.clone())?,
+            turn: in_order(turn)?,
+        })
+    }
+
+    /// Factors A.
+    fn posterior(&self) -> Posterior<'a> {
+        Posterior::new(self.knots, self.ends, self.m, self.matrices, self.turn)
+    }
+
+    /// Whether A is so large, or so many numbers are computed from it, that this may take long.
+    fn is_heavy(&self, numbers: usize) -> bool {
+        let entries: usize = self.matrices.iter().map(|x| x.len()).sum();
+        is_long(entries.saturating_mul(self.m)) || is_long(numbers)
+    }
 }
 
 /// Covariances at times x for noise of variance one: of the curve with itself at times y, or of its derivatives
@@ -237,21 +270,22 @@ pub fn posterior_covariance<'py>(
     y: Option<Array<'py>>,
     orders: Vec<usize>,
 ) -> PyResult<Out<'py>> {
-    let (knots, times) = (in_order(&knots)?, in_order(&x)?);
-    let own = posterior(knots, &known)?;
-    let size = known.1 * orders.len();
+    let (own, times) = (Slices::new(&knots, &known)?, in_order(&x)?);
+    let size = own.m * orders.len();
     let others = y.as_ref().map(in_order).transpose()?;
-    let found = watched(py, None, times.len(), false, |_| match others {
-        Some(others) => own.between(times, others),
-        None => own.covariances(times, &orders),
+    let shape = [times.len(), size, size];
+    let found = watched(py, None, times.len(), own.is_heavy(count(&shape)), |_| match others {
+        Some(others) => own.posterior().between(times, others),
+        None => own.posterior().covariances(times, &orders),
     })?;
-    array(py, &[times.len(), size, size], &found)
+    array(py, &shape, &found)
 }
 
 /// The number of independent normal numbers that a sample of the posterior needs.
 #[pyfunction]
 pub fn posterior_freedom(knots: Array, known: Known) -> PyResult<usize> {
-    Ok(posterior(in_order(&knots)?, &known)?.freedom())
+    let own = Slices::new(&knots, &known)?;
+    Ok(Posterior::freedom(own.knots, own.ends, own.m, own.matrices[2].len().isqrt()))
 }
 
 /// Moves of the curve at its knots, (samples, K, m), from independent normal numbers (samples, ...).
@@ -262,8 +296,8 @@ pub fn posterior_samples<'py>(
     known: Known<'py>,
     normal: Array<'py>,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    let (knots, numbers) = (in_order(&knots)?, in_order(&normal)?);
-    let own = posterior(knots, &known)?;
-    let found = watched(py, None, normal.shape()[0], false, |_| own.samples(numbers))?;
+    let (own, numbers) = (Slices::new(&knots, &known)?, in_order(&normal)?);
+    let heavy = own.is_heavy(numbers.len());
+    let found = watched(py, None, normal.shape()[0], heavy, |_| own.posterior().samples(numbers))?;
     Ok(PyArray1::from_vec(py, found))
 }

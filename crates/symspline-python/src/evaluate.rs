@@ -1,10 +1,10 @@
 //! Evaluation, called from Python.
 
-use crate::arrays::{in_order, unwritten, zeros};
+use crate::arrays::{count, in_order, unwritten, zeros};
 use crate::errors::{CutLocusError, format_index, invalid, number};
 use crate::space::Handle;
 use crate::validate::of_curve;
-use crate::watch::{Progress, is_heavy, watched};
+use crate::watch::{Progress, is_heavy, is_long, watched};
 use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use symspline_engine::curve::{
@@ -13,6 +13,9 @@ use symspline_engine::curve::{
 };
 use symspline_engine::monitor::Monitor;
 use symspline_engine::space::{Ambient, Erased};
+
+/// The degree from which one sample of a B-spline may take long.
+const LONG_DEGREE: usize = 100;
 
 type Array<'py> = PyReadonlyArrayDyn<'py, f64>;
 
@@ -98,9 +101,8 @@ pub fn lift_knots<'py>(
     let out = zeros(py, &[count, nodes, k, k, 2])?;
     let mut write = out.readwrite();
     let result = write.as_slice_mut()?;
-    watched(py, None, count * nodes, is_heavy(&space), |monitor| {
-        find_knots(&space, &curves, monitor, result)
-    })?;
+    let heavy = is_heavy(&space) || is_long(count * nodes);
+    watched(py, None, count * nodes, heavy, |monitor| find_knots(&space, &curves, monitor, result))?;
     drop(write);
     Ok(out)
 }
@@ -125,7 +127,8 @@ pub fn transport<'py>(
     let result = write.as_slice_mut()?;
     result.copy_from_slice(in_order(&vectors)?);
     let count = result.len() / handle.space.get().point_len().max(1);
-    watched(py, None, count, is_heavy(&handle.space.get()), |monitor| {
+    let heavy = is_heavy(&handle.space.get()) || is_long(points.len());
+    watched(py, None, count, heavy, |monitor| {
         run_transport(&handle.space.get(), &curves, times, policy, monitor, result);
     })?;
     drop(write);
@@ -166,13 +169,12 @@ fn sampled<'py>(
     let batch = &points.shape()[..points.ndim() - point_axes - 1];
     let count_axes = if per_curve { &x.shape()[batch.len()..] } else { x.shape() };
     let curves = curves_of(curve)?;
-    let count = count_axes.iter().product();
-    let times = Times { x: in_order(&x)?, count };
+    let times = Times { x: in_order(&x)?, count: count(count_axes) };
     check_times(&curves, &times, batch, x.shape(), strict)?;
 
     let space = handle.space.get();
     let mut shape = [batch, count_axes].concat();
-    let samples = shape.iter().product();
+    let samples = count(&shape);
     if quantity.is_of_body() {
         shape.push(quantity.len(&space));
     } else if !quantity.is_length() {
@@ -247,7 +249,8 @@ pub fn evaluate_bspline<'py>(
     let out = zeros(py, &shape)?;
     let mut write = out.readwrite();
     let (x, result) = (in_order(&x)?, write.as_slice_mut()?);
-    watched(py, None, result.len(), is_heavy(&handle.space.get()), |monitor| {
+    let heavy = is_heavy(&handle.space.get()) || degree > LONG_DEGREE;
+    watched(py, None, result.len(), heavy, |monitor| {
         run_bspline(&handle.space.get(), &curve, x, quantity, monitor, result);
     })?;
     drop(write);
@@ -268,9 +271,9 @@ pub fn cumulative_steps<'py>(
     let out = zeros(py, &shape)?;
     let mut write = out.readwrite();
     let (control, result) = (in_order(&control)?, write.as_slice_mut()?);
-    let done = watched(py, None, result.len(), is_heavy(&handle.space.get()), |_| {
-        run_steps(&handle.space.get(), control, count, result)
-    })?;
+    let heavy = is_heavy(&handle.space.get()) || is_long(result.len());
+    let done =
+        watched(py, None, result.len(), heavy, |_| run_steps(&handle.space.get(), control, count, result))?;
     drop(write);
     done.map_err(|(row, angle)| {
         let limit = handle.space.get().cut_angle();

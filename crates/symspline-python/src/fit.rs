@@ -4,7 +4,7 @@ use crate::arrays::{require_memory, reserve, zeros};
 use crate::curves::{Array, Curves, EndOf, Fault, require_memory_for_checks};
 use crate::errors::{in_factor, invalid};
 use crate::space::Handle;
-use crate::watch::{Progress, is_heavy, watched};
+use crate::watch::{Progress, is_heavy, is_long, watched};
 use numpy::{PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use symspline_engine::fit::{Method, Options, Report, Solver, Status, fit as solve, memory};
@@ -43,7 +43,7 @@ pub fn fit<'py>(
         require_memory_for_checks(handle, &curves)?;
         require_memory(memory(&curves.space, curves.longest(), options.method), || {
             let least = match options.method {
-                Method::Newton | Method::Homotopy => "; pass method='quasi-newton', which needs far less",
+                Method::Newton | Method::Homotopy => "Pass method='quasi-newton', which needs far less",
                 _ => "",
             };
             (
@@ -58,9 +58,11 @@ pub fn fit<'py>(
         let mut task = Task { curves, points: Vec::new(), faults: Vec::new() };
         task.curves.gather_points(&mut task.points)?;
         if let Some(point_tol) = *point_tol {
-            task.faults = py
-                .detach(|| task.curves.check(&mut task.points, point_tol, skip_invalid))
-                .map_err(|fault| in_factor(py, fault.raise(py, &task.curves.batch), i, count))?;
+            let heavy = is_heavy(&task.curves.space) || is_long(task.points.len());
+            task.faults = watched(py, None, 1, heavy, |_| {
+                task.curves.check(&mut task.points, point_tol, skip_invalid)
+            })?
+            .map_err(|fault| in_factor(py, fault.raise(py, &task.curves.batch), i, count))?;
         }
         tasks.push(task);
     }

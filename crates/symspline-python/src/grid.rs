@@ -1,6 +1,6 @@
 //! Splines over grids, called from Python.
 
-use crate::arrays::{in_order, unwritten, zeros};
+use crate::arrays::{count, in_order, unwritten, zeros};
 use crate::errors::invalid;
 use crate::evaluate::policy_named;
 use crate::space::Handle;
@@ -95,7 +95,7 @@ pub fn grid_product<'py>(
     let rows: Vec<&[f64]> = x.iter().map(in_order).collect::<PyResult<_>>()?;
     let lead: Vec<usize> = rows.iter().map(|x| x.len()).collect();
     // Points are counted once per axis.
-    let units = lead.iter().product::<usize>() * lead.len();
+    let units = count(&lead).saturating_mul(lead.len());
     evaluated(
         py,
         handle,

@@ -5,7 +5,7 @@ use crate::curves::{Array, Curves, require_memory_for_checks};
 use crate::errors::{CutLocusError, Invalid};
 use crate::space::Handle;
 use crate::validate;
-use crate::watch::{is_heavy, watched};
+use crate::watch::{is_heavy, is_long, watched};
 use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use symspline_engine::rows::{Operation, apply, tangent_defects};
@@ -28,6 +28,8 @@ pub fn hermite<'py>(
     let ends = Some([natural(), natural()]);
     let mut curves = Curves::new(handle, &t, &points, &ends, None, None)?;
     require_memory_for_checks(handle, &curves)?;
+    // Points, velocities and control points.
+    drop(reserve::<f64>(10 * points.len())?);
     let (space, len) = (curves.space, curves.space.point_len());
     let mut own = Vec::new();
     curves.gather_points(&mut own)?;
@@ -35,7 +37,8 @@ pub fn hermite<'py>(
     let mut tangent = reserve(given.len())?;
     tangent.resize(given.len(), 0.0);
     let t = in_order(&t)?;
-    let found = watched(py, None, own.len() / len, is_heavy(&space), |monitor| {
+    let heavy = is_heavy(&space) || is_long(own.len());
+    let found = watched(py, None, own.len() / len, heavy, |monitor| {
         curves.check(&mut own, point_tol, false).map_err(Handles::Invalid)?;
         // An empty batch has nothing more to check.
         let nodes = curves.longest().max(1);

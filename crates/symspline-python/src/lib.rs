@@ -19,6 +19,8 @@ mod validate;
 mod watch;
 
 use pyo3::prelude::*;
+use pyo3::types::{PyCFunction, PyDict, PyTuple};
+use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// Found in the compiled file by `symspline/_cpu.py`, without running any of its code.
 #[used]
@@ -60,44 +62,59 @@ fn num_threads() -> usize {
     symspline_engine::parallel::num_threads()
 }
 
+/// Adds a function whose panics become a RuntimeError: `except Exception` does not catch the exception that PyO3 raises
+/// otherwise.
+fn guarded(m: &Bound<'_, PyModule>, function: Bound<'_, PyCFunction>) -> PyResult<()> {
+    let py = m.py();
+    let name: String = function.getattr("__name__")?.extract()?;
+    let function = function.unbind();
+    let call = move |args: &Bound<'_, PyTuple>, kwargs: Option<&Bound<'_, PyDict>>| {
+        let py = args.py();
+        // PyO3 resumes the panic when the exception returns to Rust.
+        catch_unwind(AssertUnwindSafe(|| function.call(py, args, kwargs)))
+            .unwrap_or_else(|panic| Err(watch::exception(panic)))
+    };
+    m.add(name.as_str(), PyCFunction::new_closure(py, None, None, call)?)
+}
+
 #[pymodule]
 fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<space::Handle>()?;
-    m.add_function(wrap_pyfunction!(fit::fit, m)?)?;
-    m.add_function(wrap_pyfunction!(curves::check, m)?)?;
-    m.add_function(wrap_pyfunction!(hermite::hermite, m)?)?;
-    m.add_function(wrap_pyfunction!(derivative::push, m)?)?;
-    m.add_function(wrap_pyfunction!(derivative::pull, m)?)?;
-    m.add_function(wrap_pyfunction!(evaluate::evaluate, m)?)?;
-    m.add_function(wrap_pyfunction!(evaluate::evaluate_bspline, m)?)?;
-    m.add_function(wrap_pyfunction!(evaluate::cumulative_steps, m)?)?;
-    m.add_function(wrap_pyfunction!(evaluate::lift, m)?)?;
-    m.add_function(wrap_pyfunction!(evaluate::transport, m)?)?;
-    m.add_function(wrap_pyfunction!(evaluate::lift_knots, m)?)?;
-    m.add_function(wrap_pyfunction!(smoothing::smooth, m)?)?;
-    m.add_function(wrap_pyfunction!(smoothing::fit_cumulative, m)?)?;
-    m.add_function(wrap_pyfunction!(smoothing::smoothing_variance, m)?)?;
-    m.add_function(wrap_pyfunction!(smoothing::chi_squared, m)?)?;
-    m.add_function(wrap_pyfunction!(estimation::frames_along, m)?)?;
-    m.add_function(wrap_pyfunction!(estimation::curvature_along, m)?)?;
-    m.add_function(wrap_pyfunction!(estimation::bending, m)?)?;
-    m.add_function(wrap_pyfunction!(estimation::estimate, m)?)?;
-    m.add_function(wrap_pyfunction!(estimation::posterior_covariance, m)?)?;
-    m.add_function(wrap_pyfunction!(estimation::posterior_freedom, m)?)?;
-    m.add_function(wrap_pyfunction!(estimation::posterior_samples, m)?)?;
-    m.add_function(wrap_pyfunction!(grid::grid_rows, m)?)?;
-    m.add_function(wrap_pyfunction!(grid::grid_product, m)?)?;
-    m.add_function(wrap_pyfunction!(grid::grid_scattered, m)?)?;
-    m.add_function(wrap_pyfunction!(grid::grid_midpoint, m)?)?;
-    m.add_function(wrap_pyfunction!(stiefel::stiefel, m)?)?;
-    m.add_function(wrap_pyfunction!(search::closest, m)?)?;
-    m.add_function(wrap_pyfunction!(search::closest_on_curves, m)?)?;
-    m.add_function(wrap_pyfunction!(search::roots, m)?)?;
-    m.add_function(wrap_pyfunction!(search::time_law, m)?)?;
-    m.add_function(wrap_pyfunction!(tridiagonal::solve_tridiagonal, m)?)?;
-    m.add_function(wrap_pyfunction!(conversions::convert_rotations, m)?)?;
-    m.add_function(wrap_pyfunction!(conversions::number_lines, m)?)?;
-    m.add_function(wrap_pyfunction!(set_num_threads, m)?)?;
-    m.add_function(wrap_pyfunction!(num_threads, m)?)?;
+    guarded(m, wrap_pyfunction!(fit::fit, m)?)?;
+    guarded(m, wrap_pyfunction!(curves::check, m)?)?;
+    guarded(m, wrap_pyfunction!(hermite::hermite, m)?)?;
+    guarded(m, wrap_pyfunction!(derivative::push, m)?)?;
+    guarded(m, wrap_pyfunction!(derivative::pull, m)?)?;
+    guarded(m, wrap_pyfunction!(evaluate::evaluate, m)?)?;
+    guarded(m, wrap_pyfunction!(evaluate::evaluate_bspline, m)?)?;
+    guarded(m, wrap_pyfunction!(evaluate::cumulative_steps, m)?)?;
+    guarded(m, wrap_pyfunction!(evaluate::lift, m)?)?;
+    guarded(m, wrap_pyfunction!(evaluate::transport, m)?)?;
+    guarded(m, wrap_pyfunction!(evaluate::lift_knots, m)?)?;
+    guarded(m, wrap_pyfunction!(smoothing::smooth, m)?)?;
+    guarded(m, wrap_pyfunction!(smoothing::fit_cumulative, m)?)?;
+    guarded(m, wrap_pyfunction!(smoothing::smoothing_variance, m)?)?;
+    guarded(m, wrap_pyfunction!(smoothing::chi_squared, m)?)?;
+    guarded(m, wrap_pyfunction!(estimation::frames_along, m)?)?;
+    guarded(m, wrap_pyfunction!(estimation::curvature_along, m)?)?;
+    guarded(m, wrap_pyfunction!(estimation::bending, m)?)?;
+    guarded(m, wrap_pyfunction!(estimation::estimate, m)?)?;
+    guarded(m, wrap_pyfunction!(estimation::posterior_covariance, m)?)?;
+    guarded(m, wrap_pyfunction!(estimation::posterior_freedom, m)?)?;
+    guarded(m, wrap_pyfunction!(estimation::posterior_samples, m)?)?;
+    guarded(m, wrap_pyfunction!(grid::grid_rows, m)?)?;
+    guarded(m, wrap_pyfunction!(grid::grid_product, m)?)?;
+    guarded(m, wrap_pyfunction!(grid::grid_scattered, m)?)?;
+    guarded(m, wrap_pyfunction!(grid::grid_midpoint, m)?)?;
+    guarded(m, wrap_pyfunction!(stiefel::stiefel, m)?)?;
+    guarded(m, wrap_pyfunction!(search::closest, m)?)?;
+    guarded(m, wrap_pyfunction!(search::closest_on_curves, m)?)?;
+    guarded(m, wrap_pyfunction!(search::roots, m)?)?;
+    guarded(m, wrap_pyfunction!(search::time_law, m)?)?;
+    guarded(m, wrap_pyfunction!(tridiagonal::solve_tridiagonal, m)?)?;
+    guarded(m, wrap_pyfunction!(conversions::convert_rotations, m)?)?;
+    guarded(m, wrap_pyfunction!(conversions::number_lines, m)?)?;
+    guarded(m, wrap_pyfunction!(set_num_threads, m)?)?;
+    guarded(m, wrap_pyfunction!(num_threads, m)?)?;
     errors::register(m)
 }

@@ -3,7 +3,7 @@
 use crate::arrays::in_order;
 use crate::evaluate::curves_of;
 use crate::space::Handle;
-use crate::watch::{is_heavy, watched};
+use crate::watch::{is_heavy, is_long, watched};
 use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use symspline_engine::search::{
@@ -109,11 +109,12 @@ pub fn time_law<'py>(
         forms: [in_order(p)?, in_order(q)?, in_order(r)?],
         limits: in_order(&limits)?,
     };
-    let (largest, values) = py.detach(|| {
+    let heavy = is_long(path.h.len() * path.limits.len());
+    let (largest, values) = watched(py, None, 1, heavy, |_| {
         let (largest, following) = path.backward();
         let values = path.forward(&largest, &following, start);
         (largest[0], values)
-    });
+    })?;
     Ok((largest, PyArray1::from_vec(py, values)))
 }
 

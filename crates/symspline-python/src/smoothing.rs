@@ -6,7 +6,7 @@ use crate::errors::{CutLocusError, invalid, number};
 use crate::estimation::{criterion_named, ends_named, penalty_named};
 use crate::space::Handle;
 use crate::validate::of_curve;
-use crate::watch::{Progress, is_heavy, watched};
+use crate::watch::{Progress, is_heavy, is_long, watched};
 use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyListMethods, PyTuple, PyTupleMethods};
@@ -95,7 +95,7 @@ pub fn smooth<'py>(
     let (lam, sigma) = (in_order(&lam)?, in_order(&sigma)?);
     let matrices = information.as_ref().map_or(Ok(none), in_order)?;
     let entries = if matrices.is_empty() { 0 } else { space.dim() * space.dim() };
-    drop(reserve::<f64>(curves * count * (8 * len + 64))?);
+    drop(reserve::<f64>(p.len() + 2 * curves * n + matrices.len() + curves * count * (2 * len + 8))?);
     let data: Vec<Observations> = (0..curves)
         .map(|c| {
             let knots = &k[own(k, count, c)..][..count];
@@ -228,7 +228,9 @@ pub fn smoothing_variance<'py>(
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
     let ends = ends_named(kinds)?;
     let (knots, band, x) = (in_order(&knots)?, in_order(&band)?, in_order(&x)?);
-    Ok(PyArray1::from_vec(py, variance_at(knots, band, lam, ends, x, nu)))
+    let heavy = is_long(knots.len() + x.len());
+    let found = watched(py, None, x.len(), heavy, |_| variance_at(knots, band, lam, ends, x, nu))?;
+    Ok(PyArray1::from_vec(py, found))
 }
 
 /// The quantile of χ² with m degrees of freedom.
@@ -282,7 +284,8 @@ pub fn fit_cumulative<'py>(
     let out = zeros(py, &[batch, &[count], row].concat())?;
     let mut write = out.readwrite();
     let result = write.as_slice_mut()?;
-    let outcomes = watched(py, None, curves, is_heavy(&space), |monitor| {
+    let heavy = is_heavy(&space) || is_long(t.len() * size / curves.max(1) + count * size);
+    let outcomes = watched(py, None, curves, heavy, |monitor| {
         let mut found: Vec<Option<Result<Outcome, usize>>> = vec![None; curves];
         let items = result.chunks_mut((count * size).max(1)).zip(&mut found).enumerate().collect();
         parallel::for_each(items, curves > 1, monitor, |(c, (out, found))| {

@@ -2,7 +2,7 @@
 
 use crate::arrays::{in_order, require_memory, reserve, zeros};
 use crate::errors::{CutLocusError, format_index, invalid};
-use crate::watch::{is_heavy, watched};
+use crate::watch::{is_heavy, is_long, watched};
 use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use symspline_engine::rows::{Operation, apply, memory, project_points, tangent_defects};
@@ -95,7 +95,7 @@ impl Handle {
         let slices = inputs.iter().map(in_order).collect::<PyResult<Vec<_>>>()?;
         let t = t.as_ref().map_or(Ok(&[][..]), in_order)?;
         let len = self.space.get().point_len();
-        let rows = slices[0].len() / len;
+        let rows = slices.first().map_or(0, |first| first.len() / len);
         require_memory(memory(&self.space.get(), Some(operation)), || {
             (format!("this operation on {}", self.described()), "")
         })?;
@@ -137,7 +137,8 @@ impl Handle {
         })?;
         let mut copy = reserve(points.len())?;
         copy.extend_from_slice(points);
-        let done = py.detach(|| project_points(&self.space.get(), &mut copy, tol));
+        let heavy = is_heavy(&self.space.get()) || is_long(copy.len());
+        let done = watched(py, None, 1, heavy, |_| project_points(&self.space.get(), &mut copy, tol))?;
         done.map_err(|(row, off, why)| {
             let index = format_index(row, &shape);
             let which = match (name, shape.is_empty()) {
@@ -161,7 +162,9 @@ impl Handle {
             (format!("checking vectors on {}", self.described()), "")
         })?;
         drop(reserve::<f64>(2 * points.shape()[0])?);
-        let defects = tangent_defects(&self.space.get(), in_order(&points)?, in_order(&vectors)?);
+        let (p, v) = (in_order(&points)?, in_order(&vectors)?);
+        let heavy = is_heavy(&self.space.get()) || is_long(p.len());
+        let defects = watched(py, None, 1, heavy, |_| tangent_defects(&self.space.get(), p, v))?;
         let shape = [points.shape()[0]];
         PyArray1::from_vec(py, defects).reshape(shape).map(|a| a.to_dyn().clone())
     }

@@ -1,6 +1,7 @@
 //! Tridiagonal equations.
 
 use crate::arrays::{in_order, zeros};
+use crate::watch::{is_long, watched};
 use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use symspline_engine::tridiagonal::solve;
@@ -20,7 +21,10 @@ pub fn solve_tridiagonal<'py>(
     let (n, width) = (matrix.shape()[1], right.shape()[2]);
     let rows = in_order(&matrix)?.as_chunks::<3>().0;
     if n * width > 0 {
-        rows.chunks_exact(n).zip(result.chunks_exact_mut(n * width)).for_each(|(rows, x)| solve(rows, x));
+        let heavy = is_long(result.len());
+        watched(py, None, 1, heavy, |_| {
+            rows.chunks_exact(n).zip(result.chunks_exact_mut(n * width)).for_each(|(rows, x)| solve(rows, x));
+        })?;
     }
     drop(write);
     Ok(out)

@@ -17,7 +17,11 @@ pub struct Names<'a> {
 
 /// The phrase for a curve of a batch; empty for a single curve.
 pub fn of_curve(curve: usize, batch: &[usize]) -> String {
-    if batch.is_empty() { String::new() } else { format!(" of curve {}", format_index(curve, batch)) }
+    if batch.is_empty() || batch.contains(&0) {
+        String::new()
+    } else {
+        format!(" of curve {}", format_index(curve, batch))
+    }
 }
 
 impl Names<'_> {

@@ -1,17 +1,23 @@
 //! Ctrl-C and progress while compiled code runs without the GIL.
 
+use crate::arrays::out_of_memory;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
+use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
+use symspline_engine::memory::OutOfMemory;
 use symspline_engine::monitor::Monitor;
 use symspline_engine::space::{Ambient, Erased, Origin};
 
 /// The interval at which Python handles signals.
 const INTERVAL: Duration = Duration::from_millis(50);
+
+/// The size of the stack of a thread, in bytes.
+const STACK: f64 = (2 << 20) as f64;
 
 /// Numbers of a point, and dimensions, from which one step of the work may take long.
 const HEAVY_POINT: usize = 900;
@@ -20,6 +26,23 @@ const HEAVY_DIM: usize = 48;
 /// Whether work on a space may need to be stopped within one step.
 pub fn is_heavy(space: &Erased) -> bool {
     (space.point_len() >= HEAVY_POINT || space.dim() >= HEAVY_DIM) && space.point_shape().len() > 1
+}
+
+/// Whether sequential work on this many numbers may take so long that signals must be handled meanwhile.
+pub fn is_long(numbers: usize) -> bool {
+    numbers > 1 << 14
+}
+
+/// The exception for what a computation unwound with: a MemoryError if memory is exhausted, and a RuntimeError for any
+/// other panic.
+pub fn exception(panic: Box<dyn Any + Send>) -> PyErr {
+    let panic = match panic.downcast::<OutOfMemory>() {
+        Ok(found) => return out_of_memory(found.work, found.bytes, found.remedy),
+        Err(other) => other,
+    };
+    let what = panic.downcast_ref::<String>().map(String::as_str);
+    let what = what.or(panic.downcast_ref::<&str>().copied()).unwrap_or("no message");
+    PyRuntimeError::new_err(format!("this is an error in symspline; please report it: {what}"))
 }
 
 /// A user's function that is called with the finished and the total amount of work, of which this is one of several
@@ -71,13 +94,17 @@ pub fn watched<T: Send>(
         let owner = thread::current();
         let finished = AtomicBool::new(false);
         thread::scope(|scope| {
-            let worker = scope.spawn(|| {
+            let worker = thread::Builder::new().spawn_scoped(scope, || {
                 let _listening = monitor.listen();
                 let result = catch_unwind(AssertUnwindSafe(|| work(&monitor)));
                 finished.store(true, Ordering::Release);
                 owner.unpark();
                 result
             });
+            let worker = worker.map_err(|_| -> Box<dyn Any + Send> {
+                let remedy = "Free some memory, or end other threads";
+                Box::new(OutOfMemory { work: "a thread for the computation", bytes: STACK, remedy })
+            })?;
             while !finished.load(Ordering::Acquire) {
                 thread::park_timeout(INTERVAL / 5);
                 monitor.poll();
@@ -88,11 +115,7 @@ pub fn watched<T: Send>(
     if let Ok(Some(error)) = state.into_inner().map(|s| s.1) {
         return Err(error);
     }
-    let result = result.map_err(|panic| {
-        let what = panic.downcast_ref::<String>().map(String::as_str);
-        let what = what.or(panic.downcast_ref::<&str>().copied()).unwrap_or("no message");
-        PyRuntimeError::new_err(format!("this is an error in symspline; please report it: {what}"))
-    })?;
+    let result = result.map_err(exception)?;
     if let Some(progress) = progress {
         progress.report(py, total, total)?;
     }

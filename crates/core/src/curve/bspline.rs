@@ -5,7 +5,7 @@
 
 use super::cumulative::Factors;
 use super::data::{BSpline, Quantity};
-use crate::monitor::Monitor;
+use crate::monitor::{Monitor, checkpoint};
 use crate::parallel;
 use crate::scalar::{Dual, Jet, LANES, Lane, Scalar, few, gather, max_or_nan, scatter};
 use crate::space::{Ambient, Erased, Frame, Origin};
@@ -95,6 +95,7 @@ impl<'a, S: Scalar> Samples<'a, S> {
             return factors.evaluate(space, curve, curves, interval, times, &mut self.points[0]);
         }
         for r in 1..=degree {
+            checkpoint();
             for j in (r..=degree).rev() {
                 let from = Lane::new(few(|l| t[interval[l] + j - degree]));
                 let to = Lane::new(few(|l| t[interval[l] + j + 1 - r]));

@@ -9,7 +9,7 @@ use super::collocation::{STAGES, integrate, nodes};
 use super::data::{Curves, Outside};
 use super::locate::Locator;
 use super::sample_cursor::inside;
-use crate::monitor::Monitor;
+use crate::monitor::{Monitor, checkpoint};
 use crate::parallel;
 use crate::scalar::{Dual, LANES, Lane, dot, lane};
 use crate::space::{Ambient, Erased, Frame, Origin};
@@ -175,6 +175,7 @@ pub fn transport(
         let (near, far) = if way < 0 { (1.0, 0.0) } else { (0.0, 1.0) };
         let mut segment = first;
         loop {
+            checkpoint();
             let begin = if segment == first { a } else { near };
             let stop = if segment == last { b } else { far };
             if segment != first {

@@ -10,6 +10,7 @@ mod segment;
 mod system;
 
 use crate::fit::{End, EndKind, Ends};
+use crate::monitor::checkpoint;
 use crate::space::{Ambient, Erased, Origin};
 use bezier::Bezier;
 pub use operators::{Matrix, Vector};
@@ -18,6 +19,9 @@ use segment::Segment;
 use std::collections::BTreeMap;
 pub use system::Row;
 use system::{Change, System};
+
+/// The number of Bézier segments that are stored.
+const KEPT: usize = 256;
 
 /// The data of a curve, small changes of them, or a gradient with respect to them.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -160,6 +164,7 @@ impl<'a> Derivative<'a> {
         self.close(&mut u);
         let m = self.space.dim();
         for (&x, out) in x.iter().zip(out.chunks_mut(self.space.point_len())) {
+            checkpoint();
             let position = self.position(x);
             let (columns, by_h) = self.kept(&position, of);
             let Position { segment: i, tau } = position;
@@ -193,6 +198,7 @@ impl<'a> Derivative<'a> {
         };
         let mut u = zero();
         for (&x, cotangent) in x.iter().zip(cotangent.chunks(len)) {
+            checkpoint();
             let position = self.position(x);
             let (columns, by_h) = self.kept(&position, of);
             let Position { segment: i, tau } = position;
@@ -217,10 +223,14 @@ impl<'a> Derivative<'a> {
         self.ambient(&gradient)
     }
 
-    /// The same, with the Bézier segments stored for repeated use.
+    /// The same, with some Bézier segments stored for repeated use.
     fn kept(&mut self, position: &Position, of: Of) -> (Matrix, Vector) {
         let bezier = self.beziers.remove(&position.segment).unwrap_or_else(|| self.bezier(position.segment));
         let found = self.columns(&bezier, position, of);
+        // Times usually increase, so that few segments are in use at any time.
+        if self.beziers.len() == KEPT {
+            self.beziers.clear();
+        }
         self.beziers.insert(position.segment, bezier);
         found
     }

@@ -1,6 +1,7 @@
 //! The knots of a curve in frames that are transported along its polygon, as in the fit.
 
 use super::operators::{Few, Matrix, Vector, columns, unit};
+use crate::monitor::checkpoint;
 use crate::scalar::{Lane, lane};
 use crate::space::{Ambient, Erased, Frame, Origin};
 use smallvec::smallvec;
@@ -32,6 +33,7 @@ impl Polygon {
         let (mut nodes, mut chords) = (Vec::new(), Vec::new());
         let mut chord: Few<Lane> = smallvec![Lane::ZERO; m];
         for row in points[len..].chunks(len) {
+            checkpoint();
             let q = lanes(row);
             nodes.push(Node { p: p.clone(), frame: frame.clone() });
             space.step(&mut frame, &p, &q, &mut chord);

@@ -4,6 +4,7 @@ use super::operators::{Functions, Matrix, Vector, curvature, splat, stretch, str
 use super::polygon::Polygon;
 use super::segment::{Segment, Side};
 use crate::fit::{Blocks, EndKind, NotAKnot};
+use crate::monitor::checkpoint;
 use crate::scalar::{Dual, Lane, lane};
 use crate::space::{Erased, Origin};
 
@@ -46,7 +47,10 @@ impl System {
     pub fn new(space: &Erased, polygon: &Polygon, h: &[f64], ends: Option<[(EndKind, Vector); 2]>) -> Self {
         let (n, m) = (h.len(), space.dim());
         let segments: Vec<Segment> = (0..n)
-            .map(|i| Segment::new(space, h[i], &polygon.chords[i], [&polygon.u[i], &polygon.u[i + 1]]))
+            .map(|i| {
+                checkpoint();
+                Segment::new(space, h[i], &polygon.chords[i], [&polygon.u[i], &polygon.u[i + 1]])
+            })
             .collect();
         let closed = ends.is_none();
         let both_not_a_knot =
@@ -55,10 +59,13 @@ impl System {
         if let (true, Some(holonomy)) = (closed, &polygon.holonomy) {
             system.close(holonomy);
         }
-        let row = |i: usize| match &ends {
-            Some([first, _]) if i == 0 => system.end(space, polygon, 0, first),
-            Some([_, last]) if i == n => system.end(space, polygon, 1, last),
-            _ => system.inner(space, polygon, i),
+        let row = |i: usize| {
+            checkpoint();
+            match &ends {
+                Some([first, _]) if i == 0 => system.end(space, polygon, 0, first),
+                Some([_, last]) if i == n => system.end(space, polygon, 1, last),
+                _ => system.inner(space, polygon, i),
+            }
         };
         // One segment from a point to itself is a constant curve for all changes.
         let nodes = if !closed {

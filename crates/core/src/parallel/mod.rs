@@ -62,7 +62,7 @@ pub fn for_each<T: Send>(items: Vec<T>, long: bool, monitor: &Monitor, work: imp
                     && cores > 1
                     && let Some(pool) = pool::pool(cores)
                 {
-                    return pool::for_each(pool, cores.min(rest), items.collect(), monitor, work);
+                    return pool::for_each(&pool, cores.min(rest), items.collect(), monitor, work);
                 }
                 break;
             }

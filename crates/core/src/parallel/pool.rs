@@ -1,37 +1,46 @@
 //! The threads of [`for_each`](super::for_each).
 
 use crate::monitor::Monitor;
+use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::sync::atomic::{AtomicPtr, Ordering};
-use std::sync::{Condvar, Mutex};
+use std::sync::{Arc, Condvar, Mutex};
 use std::time::Duration;
 
-/// A pool belongs to one process: after a fork its threads do not exist, and the child creates its own pool. Pools
-/// are never freed, since other threads may be using them; there is one for every requested number of threads.
-struct Pool {
+/// The pool of a process, with its number of threads. A pool with another number of threads replaces it; the threads of
+/// the old one end when no work uses them any more.
+struct Owner {
     process: u32,
-    threads: usize,
-    pool: rayon::ThreadPool,
-    older: Option<&'static Pool>,
+    pool: Mutex<Option<(usize, Arc<ThreadPool>)>>,
 }
 
-static POOL: AtomicPtr<Pool> = AtomicPtr::new(std::ptr::null_mut());
+/// After a fork, the threads of the pool do not exist in the child, and its mutex may be locked for ever. The child
+/// therefore leaks its parent's owner and creates another one.
+static OWNER: AtomicPtr<Owner> = AtomicPtr::new(std::ptr::null_mut());
+
+fn owner() -> &'static Owner {
+    // Stored owners are leaked and therefore remain valid.
+    #[allow(unsafe_code)]
+    let found: Option<&'static Owner> = unsafe { OWNER.load(Ordering::Acquire).as_ref() };
+    let process = std::process::id();
+    if let Some(found) = found.filter(|found| found.process == process) {
+        return found;
+    }
+    let made = Box::leak(Box::new(Owner { process, pool: Mutex::default() }));
+    OWNER.store(made, Ordering::Release);
+    made
+}
 
 /// The pool with this many threads.
-pub fn pool(threads: usize) -> Option<&'static rayon::ThreadPool> {
-    // Stored pools are leaked and therefore remain valid.
-    #[allow(unsafe_code)]
-    let newest: Option<&'static Pool> = unsafe { POOL.load(Ordering::Acquire).as_ref() };
-    let mut next = newest;
-    while let Some(found) = next {
-        if found.process == std::process::id() && found.threads == threads {
-            return Some(&found.pool);
-        }
-        next = found.older;
+pub fn pool(threads: usize) -> Option<Arc<ThreadPool>> {
+    let mut current = owner().pool.lock().unwrap_or_else(|e| e.into_inner());
+    if let Some((_, pool)) = current.as_ref().filter(|(count, _)| *count == threads) {
+        return Some(pool.clone());
     }
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().ok()?;
-    let made = Box::leak(Box::new(Pool { process: std::process::id(), threads, pool, older: newest }));
-    POOL.store(made, Ordering::Release);
-    Some(&made.pool)
+    let made = Arc::new(ThreadPoolBuilder::new().num_threads(threads).build().ok()?);
+    let old = current.replace((threads, made.clone()));
+    drop(current);
+    drop(old);
+    Some(made)
 }
 
 /// Whether this is a thread of a pool.
@@ -41,7 +50,7 @@ pub fn is_member() -> bool {
 
 /// Calls `work` on every item, on the threads of a pool. Stops early if the monitor is cancelled.
 pub fn for_each<T: Send>(
-    pool: &rayon::ThreadPool,
+    pool: &ThreadPool,
     threads: usize,
     items: Vec<T>,
     monitor: &Monitor,

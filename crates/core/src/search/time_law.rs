@@ -5,6 +5,8 @@
 //! `p u² + 2 q u a + r a² ≤ A²` with `p = |∇γ'|²`, `q = ⟨∇γ', γ'⟩` and `r = |γ'|²`. On an interval of length h, u is
 //! linear and a is constant: u differs by 2 h a between its ends. The passes are those of TOPP-RA (Pham & Pham 2018).
 
+use crate::monitor::checkpoint;
+
 /// Steps of bisection for the largest u, and the part of u by which it is first reduced.
 const STEPS: usize = 10;
 const NEAR: f64 = 1e-6;
@@ -78,6 +80,7 @@ impl Path<'_> {
         let (mut largest, mut following) = (vec![0.0; count + 1], vec![0.0; count]);
         largest[count] = self.most[count];
         for k in (0..count).rev() {
+            checkpoint();
             let u = largest[k + 1];
             (following[k], largest[k]) = match self.before(k, u) {
                 Some(found) => (u, found),
@@ -113,6 +116,7 @@ impl Path<'_> {
         let mut u = start.map_or(largest[0], |start| start.min(largest[0]));
         let mut values = vec![u];
         for (k, h) in self.h.iter().enumerate() {
+            checkpoint();
             // The set of u and a within the limits is convex, so that this share of the backward pass is in it.
             let mut share = if largest[k] > 0.0 { following[k] * (u / largest[k]).min(1.0) } else { 0.0 };
             if let Some([least, most]) = self.feasible(k, u, Given::Start) {
