@@ -31,7 +31,7 @@ class BSpline(ControlledSpline[P]):
         Non-decreasing knots for n control points. A knot may repeat up to ``degree + 1`` times; the curve is less
         smooth there.
     control_points : array_like, shape (..., n, *space.point_shape)
-        Control points. Points within 1e-8 of the manifold (1e-4 for single precision) are projected onto it.
+        Control points. Rounded points are projected onto the manifold; the tolerance is that of `CubicSpline`.
     degree : int
         Degree, at least 1.
     space : Space or str

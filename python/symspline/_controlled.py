@@ -14,7 +14,7 @@ from ._curves.ends import ends_of
 from ._curves.fit import Points, validated
 from ._faults import of_index
 from ._options import quantity_of
-from ._spaces import Array, Doubles, Space, parts_of, point_tol
+from ._spaces import Array, Doubles, Space, parts_of
 from ._time import TimeAxis, onto_ends
 from ._typing import FloatArray, P
 
@@ -163,7 +163,7 @@ def control_array(value: ArrayLike, space: Space[Any], least: int) -> tuple[Doub
         raise ValidationError(
             f"control_points has shape {array.shape}; a curve needs shape (..., n, {shape}) with n >= {least}"
         )
-    return doubles, point_tol(array.dtype)
+    return doubles, space._tol(array)
 
 
 def checked_points(space: Space[Any], doubles: Doubles, tol: float) -> Array:

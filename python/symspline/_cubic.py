@@ -93,8 +93,9 @@ class CubicSpline(PiecewiseCubic[P], Generic[P, R]):
     check : bool, default True
         Whether to validate the points and end vectors. If False, the points are not projected either.
     atol : float, optional
-        Largest distance of a point from the manifold, such as 1e-5 for unit quaternions with six decimals. By
-        default 1e-8, or 1e-4 for points in single precision.
+        Largest distance of a point from the manifold. By default, the digits of the points determine it: 1e-8 in
+        double precision; 1e-4 for numbers that were in single precision, or have at most nine significant digits; and
+        the rounding error, up to 5e-3, for numbers with a few decimal places.
     where : array_like of bool, optional
         Mask over the batch. Curves where it is False are not fitted and evaluate to NaN.
     progress : callable, optional

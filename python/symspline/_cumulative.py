@@ -40,8 +40,8 @@ class CumulativeBSpline(ControlledSpline[P]):
         smooth there. None means the equidistant knots -degree, ..., n, so that the curve is defined from 0 to
         ``n - degree``.
     control_points : array_like, shape (..., n, *space.point_shape)
-        Control points. Points within 1e-8 of the group (1e-4 for single precision) are projected onto it. Leading axes
-        are batch axes. For a `Product`, a tuple with one array per factor.
+        Control points. Rounded points are projected onto the group; the tolerance is that of `CubicSpline`. Leading
+        axes are batch axes. For a `Product`, a tuple with one array per factor.
     space : Space or str
         A group or its name, such as ``"so:3"``, ``"se:3"``, ``"su:2"``, ``"gl:3"`` or ``"r:3"``, or a product of
         groups, such as ``"so:3 x r:3"``.

@@ -28,7 +28,7 @@ from ._options import (
 )
 from ._report import Report
 from ._representatives import warn_of_representatives
-from ._spaces import Array, Product, Quotient, Space, factors_of, parts_of, point_tol, space_named
+from ._spaces import Array, Product, Quotient, Space, factors_of, parts_of, space_named
 from ._time import TimeAxis, knots_of
 from ._typing import (
     AnyArray,
@@ -275,7 +275,7 @@ def read_velocities(velocities: Any, space: Space[Any], data: list[fitting.Point
         refuse(~np.isfinite(numbers), "velocities", lambda _: "is not finite")
         if part.moves is not None and isinstance(factor, Quotient):
             numbers = np.ascontiguousarray(factor._moved_by(numbers, part.moves))
-        found.append((numbers, point_tol(array.dtype)))
+        found.append((numbers, factor._tol(array)))
     return found
 
 

@@ -44,7 +44,8 @@ class PiecewiseGeodesic(PiecewiseCubic[P]):
         Extrapolation policy for times beyond the knots. None and ``"raise"`` raise `ValidationError`. True and
         ``"geodesic"`` continue the first and last segments. False gives NaN. ``"periodic"`` repeats the curve.
     atol : float, optional
-        Largest distance of a point from the manifold. By default 1e-8, or 1e-4 for points in single precision.
+        Largest distance of a point from the manifold. By default, the digits of the points determine it, as for
+        `CubicSpline`.
 
     Raises
     ------

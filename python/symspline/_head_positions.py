@@ -92,7 +92,7 @@ def read_head_pos(file: Any) -> tuple[Doubles, tuple[Array, Array]]:
             "a unit quaternion is at most 1 long. Check the order of the columns."
         )
     scalar = np.sqrt(np.maximum(1 - square, 0))
-    rotations = rotations_in_rows(np.column_stack([scalar, vector]), name, place)
+    rotations = rotations_in_rows(np.column_stack([scalar, vector]), name, place, _ROUNDED)
     return rows[:, 0].copy(), (rotations, rows[:, 4:7].copy())
 
 

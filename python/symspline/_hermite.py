@@ -44,7 +44,8 @@ class HermiteSpline(PiecewiseCubic[P]):
         the first and last segments. False gives NaN. ``"geodesic"`` continues with constant velocity. ``"periodic"``
         repeats the curve.
     atol : float, optional
-        Largest distance of a point from the manifold. By default 1e-8, or 1e-4 for points in single precision.
+        Largest distance of a point from the manifold. By default, the digits of the points determine it, as for
+        `CubicSpline`.
 
     Raises
     ------
@@ -148,7 +149,8 @@ class HermiteSpline(PiecewiseCubic[P]):
         extrapolate : {None, "raise", True, False, "geodesic", "periodic"}, default None
             Extrapolation policy, as for `HermiteSpline`.
         atol : float, optional
-            Largest distance of a point from the manifold. By default 1e-8, or 1e-4 for points in single precision.
+            Largest distance of a point from the manifold. By default, the digits of the points determine it, as for
+            `CubicSpline`.
 
         Returns
         -------

@@ -15,7 +15,7 @@ from ._arrays import as_array, brief, cast, refuse
 from ._core import ValidationError, number_lines
 from ._disk import path_of, replacing
 from ._input import times_of
-from ._spaces import Array, Doubles, SpecialEuclidean, SpecialOrthogonal
+from ._spaces import Array, Doubles, SpecialEuclidean, SpecialOrthogonal, point_tol
 from ._typing import PointsLike
 from ._validation import length, off_one
 from .convert import matrix_to_quaternion, quaternion_to_matrix
@@ -23,8 +23,6 @@ from .convert import matrix_to_quaternion, quaternion_to_matrix
 # Columns of a TUM trajectory.
 TUM = ("time", "tx", "ty", "tz", "qx", "qy", "qz", "qw")
 _SO3, _SE3 = SpecialOrthogonal(3), SpecialEuclidean(3)
-# Files have rounded numbers, some with three decimals.
-_ROUNDED = 5e-3
 # The year 5138 in seconds since 1970, and 1973 in milliseconds.
 _FAR = 1e11
 # The last second whose nanoseconds are a number of 64 bits.
@@ -201,7 +199,8 @@ def read_kitti(file: Any, times: Any = None) -> tuple[Doubles, Array]:
     rows = parsed(lines, _KITTI, "KITTI poses are lines with the twelve numbers of [R | x]").reshape(-1, 3, 4)
     r = rows[:, :, :3]
     off = off_one(r)
-    bad = ~((off <= _ROUNDED) & (np.linalg.det(r) > 0))
+    # |RᵀR − 1| is twice the distance from the rotations.
+    bad = ~((off <= 2 * point_tol(r, 9)) & (np.linalg.det(r) > 0))
     refuse(bad, f"{lines.file}: pose ", lambda i: f"has no rotation: |RᵀR - 1| is {off[i]:.1e}")
     t = np.arange(len(rows), dtype=float)
     if times is not None:
@@ -472,10 +471,10 @@ class Lines(NamedTuple):
         return ValidationError(f"{self.file}, {self.place(row)}: {found}")
 
 
-def rotations_in_rows(q: Doubles, file: object, place: Callable[[int], str], atol: float = _ROUNDED) -> Array:
+def rotations_in_rows(q: Doubles, file: object, place: Callable[[int], str], atol: float | None = None) -> Array:
     """Return the rotations of rounded quaternions, scalar first; `place` names the line of a row in messages."""
     sizes = length(q)
-    bad = np.flatnonzero(~(np.abs(sizes - 1) <= atol))
+    bad = np.flatnonzero(~(np.abs(sizes - 1) <= (point_tol(q, 4) if atol is None else atol)))
     if len(bad):
         raise ValidationError(
             f"{file}, {place(bad[0])}: the quaternion has length {sizes[bad[0]]:.6g}, not 1: are the columns in "

@@ -50,7 +50,7 @@ def _cast_numbers(value: ArrayLike, name: str, axes: int) -> tuple[Array, float]
         raise ValidationError(f"{name} must be an array of numbers, not of {array.dtype}")
     if array.ndim < axes:
         raise ValidationError(f"{name} has shape {array.shape}, but needs at least {axes} axes")
-    return cast(array, np.complex128 if array.dtype.kind == "c" else np.float64), point_tol(array.dtype)
+    return cast(array, np.complex128 if array.dtype.kind == "c" else np.float64), point_tol(array)
 
 
 def check_finite(array: Array, name: str) -> None:

@@ -706,8 +706,8 @@ def from_quaternions(quaternions: ArrayLike, *, scalar_first: bool | None = None
     scalar_first : bool
         Required. True for (w, x, y, z), False for (x, y, z, w) as in SciPy and ROS.
     atol : float, optional
-        Largest deviation of the norms from 1, such as 1e-5 for numbers of six decimal places. None means 1e-8 in double
-        precision.
+        Largest deviation of the norms from 1. By default, the digits of the numbers determine it, as for points of
+        `symspline.CubicSpline`: 1e-8 in double precision, 1e-4 for numbers of single precision or of six decimals.
 
     Returns
     -------

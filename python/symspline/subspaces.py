@@ -299,7 +299,7 @@ class OperatorSpline:
         if matrices.dtype.kind not in "biufc":
             raise ValidationError(f"operators must be an array of numbers, not of {matrices.dtype}")
         refuse(np.isinf(matrices).any(axis=(-2, -1)), "operators", lambda _: "is infinite; operators must be finite")
-        tol = point_tol(matrices.dtype)
+        tol = point_tol(matrices)
         if matrices.shape != (*array.shape[:-2], k, k):
             raise ValidationError(
                 f"operators has shape {matrices.shape}, but bases of shape {array.shape} need "
@@ -383,7 +383,7 @@ def _checked_bases(value: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
         raise ValidationError(
             f"bases must be numbers of shape (..., n, k) with k <= n, not {array.dtype} of shape {array.shape}"
         )
-    tol = point_tol(array.dtype)
+    tol = point_tol(array)
     array = cast(array, np.complex128 if array.dtype.kind == "c" else np.float64)
     present = _present(array)
     if not present.any():

@@ -244,7 +244,7 @@ def test_other_spaces_are_refused():
 
 
 def test_quaternions_that_were_rounded():
-    rounded = np.array([0.577350, 0.577350, 0.577350, 0.0])
+    rounded = np.array([1, 1, 1, 0]) * (1 + 1e-6) / np.sqrt(3)
     raises("its length is", rotations.from_quaternions, rounded, scalar_first=True)
     found = rotations.from_quaternions(rounded, scalar_first=True, atol=1e-5)
     assert np.abs(found.T @ found - np.eye(3)).max() < 1e-15

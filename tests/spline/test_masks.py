@@ -90,7 +90,7 @@ def test_errors_name_the_curve_in_the_whole_list_and_the_shape_of_masks():
     bad[2] = (None, 2 * np.eye(3))
     raises(r"points\[0\] of curve 2 is off", ss.fit_many, bad, "s:2", where=mask)
     bad[1] = (None, np.eye(3, dtype=np.float32))
-    bad[2] = (None, (1 + 1e-6) * np.eye(3))
+    bad[2] = (None, (1 + 1e-6 / 3) * np.eye(3))
     raises(r"^curve 2: points\[0\] is off", ss.fit_many, bad, "s:2", where=mask)
     raises(r"where must be a Boolean array of shape \(3,\)", ss.fit_many, bad, "s:2", where=mask[:2])
     for where in ([True], [1, 0], [True, False, True], True):

@@ -20,7 +20,7 @@ from .._arrays import as_array
 from .._core import ValidationError
 from .._faults import INVALID, Fault, of_index
 from .._report import Columns, Report, shaped
-from .._spaces import POINT_TOL, Array, Doubles, Product, Quotient, Space, cover_of, factors_of, parts_of, point_tol
+from .._spaces import Array, Doubles, Product, Quotient, Space, cover_of, factors_of, parts_of
 from .._typing import Progress
 from ..manifolds import Manifold
 from ..manifolds._checks import hermite_on_manifold
@@ -173,7 +173,7 @@ def _read(space: Space, points: Any) -> Points:
         flags, shape, axis = points.flags, points.shape, points.ndim - len(space._point_shape) - 1
         suits = axis >= 0 and points.size and shape[axis] >= 2 and shape[axis + 1 :] == space._point_shape
         if suits and flags.c_contiguous and flags.aligned:
-            return Points(points, POINT_TOL, shape[:axis], shape[axis])
+            return Points(points, space._tol(points), shape[:axis], shape[axis])
     array = points if type(points) is np.ndarray else space._array(points, "points")
     # A batch may be empty, as blocks of a selection are.
     axis = array.ndim - len(space._point_shape) - 1
@@ -187,7 +187,7 @@ def _read(space: Space, points: Any) -> Points:
         )
     if lead[-1] < 2:
         raise ValidationError("a curve needs at least two points; got one")
-    return Points(doubles, point_tol(array.dtype), lead[:-1], lead[-1])
+    return Points(doubles, space._tol(array), lead[:-1], lead[-1])
 
 
 def read_ends(bc_type: Any, space: Space[Any], batch: tuple[int, ...]) -> list[list[End] | None]:

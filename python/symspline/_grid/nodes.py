@@ -13,7 +13,7 @@ from .._curves.ends import NATURAL
 from .._curves.fit import Points, validated
 from .._report import FarPointsWarning
 from .._representatives import FAR, cut_fractions
-from .._spaces import Array, Quotient, Space, cover_of, factors_of, parts_of, point_tol
+from .._spaces import Array, Quotient, Space, cover_of, factors_of, parts_of
 from .._warnings import warn
 from .axes import GridAxis
 
@@ -28,7 +28,7 @@ def read_nodes(points: Any, space: Space[Any], dims: int) -> tuple[list[Array], 
     for factor, part in zip(factors_of(space), parts, strict=True):
         array = factor._array(part, "points")
         arrays.append(np.array(factor._numbers(factor._doubles(array, "points"))))
-        tols.append(point_tol(array.dtype))
+        tols.append(factor._tol(array))
     shapes = [a.shape[: a.ndim - len(f.point_shape)] for f, a in zip(factors_of(space), arrays, strict=True)]
     if len(set(shapes)) > 1:
         raise ValidationError(f"the factors of points have different numbers of nodes: {shapes}")

@@ -15,7 +15,7 @@ from .._arrays import checked_flag, checked_number, short_repr
 from .._core import ValidationError
 from .._curves.arc_length import ArcLength
 from .._curves.integrals import Evaluable
-from .._spaces import Array, Doubles, Space, factors_of, parts_of, point_tol
+from .._spaces import Array, Doubles, Space, factors_of, parts_of
 from .._typing import FloatArray, P, Time
 from ..manifolds import Manifold
 from .closest import ClosestPoints
@@ -270,7 +270,7 @@ def _checked(space: Space[Any], value: Any) -> Array:
             raise ValidationError(f"points are invalid: {error}") from None
         return space._numbers(doubles)
     lead = space._lead(doubles)
-    space._handle.check_points(space._rows(doubles, lead), lead, point_tol(array.dtype), "points")
+    space._handle.check_points(space._rows(doubles, lead), lead, space._tol(array), "points")
     return space._apply("project", x=space._numbers(doubles))
 
 

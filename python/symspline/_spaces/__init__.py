@@ -3,7 +3,7 @@
 """The spaces: points, tangent vectors and their geometry."""
 
 from .actions import Group
-from .base import POINT_TOL, POINT_TOL_FLOAT32, Array, Doubles, Space, point_tol
+from .base import Array, Doubles, Space
 from .groups import (
     Affine,
     ComplexGeneralLinear,
@@ -28,6 +28,7 @@ from .positive import (
 )
 from .product import Product, factors_of, parts_of, product_norm, short_name, space, space_named
 from .quotient import Quotient, cover_of, refuse_quotients
+from .rounding import POINT_TOL, point_tol
 from .statistics import Groups, karcher_mean, require_metric
 from .subspaces import (
     ComplexGrassmannian,

@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from .._arrays import as_array, cast, refuse, short_repr
 from .._core import CutLocusError, ValidationError
 from .._typing import P
-from .base import Array, Space, point_tol
+from .base import Array, Space
+from .rounding import point_tol
 
 
 def adjoint(x: Array) -> Array:
@@ -34,7 +35,7 @@ def matrices(space: Space[Any], g: ArrayLike, size: int, dtype: Any) -> tuple[Ar
         )
     infinite = ~np.isfinite(array).all(axis=(-2, -1))
     refuse(infinite, "g", lambda _: "has entries that are not finite. Pass finite numbers.")
-    return cast(array, np.dtype(dtype)), point_tol(array.dtype)
+    return cast(array, np.dtype(dtype)), point_tol(array)
 
 
 def require(space: Space[Any], defects: NDArray[np.float64], allowed: Any, what: str, remedy: str) -> None:

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from .._arrays import as_array, cast, refuse, short_repr, whole_number
 from .._core import Handle, ValidationError
 from .._typing import AnyArray, FloatArray, P
+from .rounding import point_tol
 from .statistics import Groups, geometric_median, grouped, groups_of, karcher_mean, require_metric
 
 Array = AnyArray
@@ -41,13 +42,6 @@ COMPLEX_TWINS = {
     "spd": "HermitianPositiveDefinite",
     "sphere": "ComplexProjective",
 }
-# Tolerances for the distance of points from the manifold.
-POINT_TOL, POINT_TOL_FLOAT32 = 1e-8, 1e-4
-
-
-def point_tol(dtype: np.dtype[Any]) -> float:
-    """Return the largest distance from the manifold of points with this type of numbers."""
-    return POINT_TOL_FLOAT32 if dtype in (np.float32, np.float16, np.complex64) else POINT_TOL
 
 
 class Space(Generic[P]):
@@ -458,8 +452,8 @@ class Space(Generic[P]):
         Raises
         ------
         ValidationError
-            If g does not have the required form or is not in the group, within the same tolerance as for points
-            (1e-8, or 1e-4 for float32), or if the space is a `Manifold`.
+            If g does not have the required form or is not in the group, within the same tolerance as for points,
+            or if the space is a `Manifold`.
 
         See Also
         --------
@@ -697,8 +691,8 @@ class Space(Generic[P]):
         Raises
         ------
         ValidationError
-            If an array is farther than 1e-8 (1e-4 for single precision) from the manifold. The message names its
-            index.
+            If an array is farther from the manifold than the digits of its numbers allow: 1e-8 in double precision,
+            1e-4 for numbers of single precision or of at most nine significant digits. The message names its index.
 
         See Also
         --------
@@ -711,7 +705,7 @@ class Space(Generic[P]):
         """
         array = self._doubles(p, "p")
         lead = self._lead(array)
-        self._handle.check_points(self._rows(array, lead), lead, point_tol(self._array(p, "p").dtype))
+        self._handle.check_points(self._rows(array, lead), lead, self._tol(self._array(p, "p")))
 
     def check_tangent(self, p: ArrayLike, v: ArrayLike) -> None:
         """Raise an exception unless all arrays are tangent vectors.
@@ -726,7 +720,7 @@ class Space(Generic[P]):
         Raises
         ------
         ValidationError
-            If p is not a point, or if the normal component of v exceeds 1e-8 (1e-4 for single precision). The message
+            If p is not a point, or if the normal component of v exceeds the tolerance of `check_point`. The message
             names the index.
 
         See Also
@@ -745,7 +739,7 @@ class Space(Generic[P]):
         except ValueError:
             raise ValidationError(f"p {np.shape(p)} and v {np.shape(v)} do not broadcast") from None
         defects = self._handle.tangent_defects(self._rows(points, lead), self._rows(vectors, lead))
-        tol = max(point_tol(self._array(value, name).dtype) for value, name in ((p, "p"), (v, "v")))
+        tol = max(self._tol(self._array(value, name)) for value, name in ((p, "p"), (v, "v")))
         bad = np.flatnonzero(~(defects <= tol))
         if bad.size:
             index = ",".join(map(str, np.unravel_index(bad[0], lead)))
@@ -1023,6 +1017,10 @@ class Space(Generic[P]):
     def _array(self, value: Any, name: str) -> Array:
         """Return points as an array. Subclasses accept objects of other libraries as well."""
         return as_array(value, name)
+
+    def _tol(self, array: Array) -> float:
+        """Return the largest distance of points from the manifold, by the digits of their numbers."""
+        return point_tol(array, math.prod(self._point_shape))
 
     def _conversion(self, shape: tuple[int, ...], name: str) -> str:
         """Return the part of a message that names the function for values of another shape, or an empty text."""

@@ -11,6 +11,7 @@ from .._quaternions import matrices_of_quaternions
 from .._typing import ComplexArray, FloatArray
 from .actions import DisconnectedGroup, Group
 from .base import Array
+from .rounding import point_tol
 
 
 class SpecialOrthogonal(Group[FloatArray]):
@@ -231,6 +232,11 @@ class SpecialEuclidean(Group[FloatArray]):
                 )
             value = _matrices(value)
         return super()._array(value, name)
+
+    def _tol(self, array: Array) -> float:
+        # Positions may have any digits.
+        n = self.point_shape[0] - 1
+        return point_tol(array[..., :n, :n], n * n)
 
     def _conversion(self, shape: tuple[int, ...], name: str) -> str:
         if self.point_shape != (4, 4):

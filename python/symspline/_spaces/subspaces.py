@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from .._core import ValidationError
 from .._typing import ComplexArray, FloatArray, P
 from .actions import Preserving, largest, require
-from .base import LARGE, Array, Space, point_tol
+from .base import LARGE, Array, Space
+from .rounding import point_tol
 
 # Tolerance for recognising density matrices. It only selects the text of an error message, since rows of density
 # matrices are not unit vectors.
@@ -277,7 +278,7 @@ class QuaternionicProjective(Preserving[ComplexArray]):
         # Multiplication by the quaternion j is x ↦ J x̄, and matrices of quaternions commute with it.
         j = np.kron(np.eye(self._parameters[0] + 1), [[0.0, -1.0], [1.0, 0.0]])
         remedy = "Pass a matrix of quaternions a + bi + cj + dk as blocks (a + bi, c + di; −c + di, a − bi)."
-        require(self, largest(g @ j - j @ g.conj()), point_tol(np.asarray(g).dtype), "|gJ − Jḡ|", remedy)
+        require(self, largest(g @ j - j @ g.conj()), point_tol(np.asarray(g)), "|gJ − Jḡ|", remedy)
         return g
 
     def _array(self, value: Any, name: str) -> Array:

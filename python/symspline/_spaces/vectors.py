@@ -12,6 +12,7 @@ from .._core import ValidationError
 from .._typing import FloatArray
 from .actions import Preserving, homogeneous, require
 from .base import Array, Space
+from .rounding import dtype_tol
 
 
 class Euclidean(Space[FloatArray]):
@@ -36,6 +37,10 @@ class Euclidean(Space[FloatArray]):
     """
 
     _name = "euclidean"
+
+    def _tol(self, array: Array) -> float:
+        # Numbers cannot be off the space. The tolerance remains for the ends of closed curves.
+        return dtype_tol(array.dtype)
 
     def __init__(self, n: int) -> None:
         super().__init__(n)
@@ -84,6 +89,10 @@ class Torus(Space[FloatArray]):
     """
 
     _name = "torus"
+
+    def _tol(self, array: Array) -> float:
+        # Few digits do not make an angle with many turns more precise.
+        return dtype_tol(array.dtype)
 
     def __init__(self, n: int) -> None:
         super().__init__(n)

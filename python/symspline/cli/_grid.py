@@ -44,7 +44,6 @@ from .._archive import read
 from .._disk import damage
 from .._grid import GridSpline
 from .._report import FarPointsWarning
-from .._spaces import POINT_TOL_FLOAT32
 from ._curves import add_entry
 from ._grid_files import (
     AXIS_NAMES,
@@ -166,7 +165,7 @@ def _resampled(options: argparse.Namespace, source: str, option: str | None, how
 
 def _fitted(grid: Grid, how: dict[str, Any]) -> GridSpline:
     with Progress("fitting") as progress:
-        return GridSpline(grid.axes, grid.points, grid.space, atol=POINT_TOL_FLOAT32, progress=progress, **how)
+        return GridSpline(grid.axes, grid.points, grid.space, progress=progress, **how)
 
 
 # ---- positions of the values ----

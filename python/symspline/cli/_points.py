@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from .._core import ValidationError
 from .._lonlat import from_lonlat
 from .._pose_files import join, rotations_in_rows
-from .._spaces import POINT_TOL_FLOAT32, Doubles, Product, Space, factors_of, space_named
+from .._spaces import Doubles, Product, Space, factors_of, space_named
 from ._messages import Problem, for_command_line
 from ._tables import IM, RE, Place
 
@@ -205,7 +205,7 @@ def _projected(space: Space, points: NDArray[Any], file: object, place: Place, o
     doubles = space._doubles(points, "points")
     lead = space._lead(doubles)
     try:
-        space._handle.check_points(space._rows(doubles, lead), lead, POINT_TOL_FLOAT32)
+        space._handle.check_points(space._rows(doubles, lead), lead, space._tol(points))
     except ValidationError as error:
         row, _, found = for_command_line(error).removeprefix("point ").partition(" ")
         order = f"; the columns of the table are a {matrix(space)}" if matrix(space) else ""

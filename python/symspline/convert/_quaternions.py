@@ -7,8 +7,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import checked_atol, refuse
+from .._arrays import as_array, checked_atol, refuse
 from .._core import ValidationError, convert_rotations
+from .._spaces import point_tol
 from .._validation import Array, check_finite, off_one, unchecked_numbers, unit_vectors, unmoved_by_underflow
 
 Form = Literal["matrix", "scalar first", "scalar last", "vector"]
@@ -64,8 +65,8 @@ def quaternion_to_matrix(
     scalar_first : bool
         Required. True for (w, x, y, z), False for (x, y, z, w) as in SciPy and ROS.
     atol : float, optional
-        Largest deviation of the norms from 1, such as 1e-5 for numbers of six decimal places. None means 1e-8 in double
-        precision.
+        Largest deviation of the norms from 1. By default, the digits of the numbers determine it, as for points of
+        `symspline.CubicSpline`: 1e-8 in double precision, 1e-4 for numbers of single precision or of six decimals.
 
     Returns
     -------
@@ -96,6 +97,9 @@ def converted(value: ArrayLike, name: str, form: Form, wanted: Form, atol: float
         If the numbers are not rotations within the tolerance.
     """
     x, tol = unchecked_numbers(value, name, _SHAPES[form])
+    if form == "matrix":
+        # |RᵀR − 1| is twice the distance from the rotations.
+        tol = 2 * point_tol(as_array(value, name), 9)
     tol = tol if atol is None else checked_atol(atol)
     found, valid = convert_rotations(x, form, wanted, tol)
     if not valid:

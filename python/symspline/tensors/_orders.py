@@ -104,7 +104,7 @@ def to_vectors(matrices: ArrayLike, *, order: TensorOrder) -> Array:
         raise ValidationError(f"matrices has shape {array.shape}, but needs shape (..., 3, 3)")
     with np.errstate(invalid="ignore"):
         off = largest(array - np.swapaxes(array, -1, -2))
-        bad = off > point_tol(array.dtype) * largest(array)
+        bad = off > point_tol(array) * largest(array)
         advice = "six numbers can represent symmetric matrices only"
         refuse(bad, "matrices", lambda i: f"is not symmetric: |A - Aᵀ| is {off[i]:.3e}; {advice}")
     rows, columns = np.transpose(pairs)
