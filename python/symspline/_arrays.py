@@ -21,7 +21,8 @@ def as_array(value: ArrayLike, name: str) -> NDArray[Any]:
     masked = _first_masked(value)
     if masked is not None:
         raise ValidationError(
-            f"{name}{list(masked) or ''} is masked, but masked entries have no value. Remove missing entries."
+            f"{name}{list(masked) or ''} is masked, but masked entries have no value. Remove missing entries, or pass "
+            "skipna=True to a function that has this option."
         )
     try:
         array = np.asarray(value)
@@ -32,6 +33,17 @@ def as_array(value: ArrayLike, name: str) -> NDArray[Any]:
     if array.dtype.kind == "O":
         refuse_objects(array, name)
     return array
+
+
+def filled(value: Any) -> Any:
+    """Return a value whose masked numbers and times are NaN and NaT, also within lists."""
+    if isinstance(value, np.ma.MaskedArray):
+        if value.dtype.kind in "mM":
+            return value.filled(np.array("NaT", value.dtype))
+        return (value if value.dtype.kind in "fc" else value.astype(np.float64)).filled(np.nan)
+    if isinstance(value, list) and any(issubclass(kind, np.ma.MaskedArray) for kind in set(map(type, value))):
+        return [filled(own) for own in value]
+    return value
 
 
 def _first_masked(value: Any) -> tuple[int, ...] | None:

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from ._append import joined, local_fit
 from ._archive import Entries, read_c1_nodes, read_fitted
+from ._arrays import checked_flag
 from ._core import ValidationError
 from ._curves.conditions import fit_with_conditions
 from ._curves.curve import CurveArrays, longest_step
@@ -21,6 +22,7 @@ from ._curves.ends import ends_in_factors, freeze_bc_type, split_accelerations, 
 from ._curves.fit import Fit, Problem, curve_of, fit, mask_of, moved_ends, read, read_ends
 from ._curves.integrals import alternative_energy
 from ._errors import raise_or_warn
+from ._missing import curves_without_missing, with_remedy
 from ._options import fit_options, order_of, with_atol
 from ._piecewise_cubic import PiecewiseCubic
 from ._report import Report, combined
@@ -96,6 +98,9 @@ class CubicSpline(PiecewiseCubic[P], Generic[P, R]):
         Largest distance of a point from the manifold. By default, the digits of the points determine it: 1e-8 in
         double precision; 1e-4 for numbers that were in single precision, or have at most nine significant digits; and
         the rounding error, up to 5e-3, for numbers with a few decimal places.
+    skipna : bool, default False
+        True to leave out missing samples, where the point or its time is NaN, NaT or masked. All curves of a batch
+        must lack the same samples; see `fit_many` for others.
     where : array_like of bool, optional
         Mask over the batch. Curves where it is False are not fitted and evaluate to NaN.
     progress : callable, optional
@@ -185,8 +190,11 @@ class CubicSpline(PiecewiseCubic[P], Generic[P, R]):
         atol: float | None = None,
         where: ArrayLike | None = None,
         progress: Progress | None = None,
+        skipna: bool = False,
     ) -> None:
         space = space_named(space)
+        if skipna is not False and checked_flag(skipna, "skipna"):
+            t, points = curves_without_missing(t, points, space)
         options = fit_options(method, tol, max_iter, extrapolate, on_failure, check, progress)
         conditions, accelerations = split_accelerations(bc_type)
         data = read(points, space)
@@ -208,7 +216,7 @@ class CubicSpline(PiecewiseCubic[P], Generic[P, R]):
                     problem, time_axis, shown_times, velocities, accelerations, progress
                 )
         except ValidationError as error:
-            raise time_axis.explain(error) from None
+            raise time_axis.explain(with_remedy(error, data)) from None
         self._fit = found
         super()._fill(time_axis, shown_times, found.curve, freeze_bc_type(conditions), extrapolate)
         if found.faults:

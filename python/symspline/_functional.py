@@ -8,7 +8,7 @@ from typing import Any, Unpack, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._arrays import refuse, short_repr
+from ._arrays import checked_flag, refuse, short_repr
 from ._core import ValidationError
 from ._cubic import CubicSpline
 from ._curves import fit as fitting
@@ -17,6 +17,7 @@ from ._curves.curve import CurveArrays
 from ._curves.ends import freeze_bc_type, take_batch
 from ._errors import raise_or_warn
 from ._input import in_library, library_of
+from ._missing import curves_without_missing, missing_named
 from ._options import (
     EvaluationOptions,
     check_progress,
@@ -293,6 +294,7 @@ def fit_many(
     atol: float | None = None,
     where: ArrayLike | None = None,
     progress: Progress | None = None,
+    skipna: bool = False,
 ) -> list[CubicSpline[P]]:
     """Fit curves of different lengths in one parallel call.
 
@@ -308,6 +310,8 @@ def fit_many(
         Mask over the curves. Curves where it is False are not fitted and evaluate to NaN.
     progress : callable, optional
         Function that is called from time to time with the finished and the total number of points.
+    skipna : bool, default False
+        True to leave out missing samples from each curve, where the point or its time is NaN, NaT or masked.
 
     Returns
     -------
@@ -335,6 +339,7 @@ def fit_many(
     """
     space = space_named(space)
     options = fit_options(method, tol, max_iter, extrapolate, on_failure, check, progress)
+    skip = checked_flag(skipna, "skipna")
     if not isinstance(curves, Iterable):
         raise ValidationError(f"curves must be pairs (t, points), not {short_repr(curves)}")
     pairs: list[tuple[TimesLike | None, Any]] = list(curves)
@@ -347,6 +352,8 @@ def fit_many(
     points, knots = [], []
     for number, (t, p) in enumerate(pairs):
         try:
+            if skip:
+                t, p = curves_without_missing(t, p, space)
             data = with_atol(fitting.read(p, space), atol)
             if data[0].batch:
                 raise ValidationError(f"points has shape {np.shape(p)}, but each pair must be a single curve")
@@ -360,7 +367,8 @@ def fit_many(
     problem = fitting.Problem(
         space, times, points, ends, options, bool(check), mask, skip_invalid=on_failure != "raise"
     )
-    fits, faults = fitting.fit_many(problem, progress)
+    with missing_named([part for own in points for part in own]):
+        fits, faults = fitting.fit_many(problem, progress)
     ends_kept = freeze_bc_type(bc_type)
     fitted: list[CubicSpline[P]] = [
         CubicSpline._of(time_axis, t, found.curve, take_batch(ends_kept, i, 1, space), extrapolate, found)

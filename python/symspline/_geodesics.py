@@ -8,9 +8,11 @@ from typing import Any, Self
 import numpy as np
 
 from ._archive import Entries, check_curves, read_segments
+from ._arrays import checked_flag
 from ._curves.curve import CoreCurve, CurveArrays
 from ._curves.fit import read, read_ends, validated
 from ._curves.geodesics import GeodesicCurve, joined
+from ._missing import curves_without_missing, missing_named
 from ._options import checked_extrapolate, with_atol
 from ._piecewise_cubic import PiecewiseCubic
 from ._representatives import warn_of_representatives
@@ -46,6 +48,8 @@ class PiecewiseGeodesic(PiecewiseCubic[P]):
     atol : float, optional
         Largest distance of a point from the manifold. By default, the digits of the points determine it, as for
         `CubicSpline`.
+    skipna : bool, default False
+        True to leave out missing samples, as for `CubicSpline`.
 
     Raises
     ------
@@ -104,13 +108,16 @@ class PiecewiseGeodesic(PiecewiseCubic[P]):
         *,
         extrapolate: Extrapolate = None,
         atol: float | None = None,
+        skipna: bool = False,
     ) -> None:
         space = space_named(space)
         checked_extrapolate(extrapolate)
+        if checked_flag(skipna, "skipna"):
+            t, points = curves_without_missing(t, points, space)
         data = with_atol(read(points, space), atol)
         batch, nodes = data[0].batch, data[0].nodes
         time_axis, shown_times, times = knots_of(t, batch, nodes)
-        with time_axis.explained():
+        with missing_named(data), time_axis.explained():
             valid, _ = validated(space, times, data, read_ends("natural", space, batch))
             curve = joined(space, times, valid)
         self._fill(time_axis, shown_times, curve, "natural", extrapolate)

@@ -7,10 +7,12 @@ from typing import Any, Literal, Self
 from numpy.typing import ArrayLike
 
 from ._archive import Entries, check_curves, read_segments
+from ._arrays import checked_flag
 from ._curves.curve import CurveArrays
 from ._curves.fit import Points, curve_of, hermite_data, read, read_ends, validated
 from ._curves.slopes import check_method, local_velocities
 from ._functional import read_velocities
+from ._missing import curves_without_missing, missing_named, nodes_without_missing
 from ._options import checked_extrapolate, with_atol
 from ._piecewise_cubic import PiecewiseCubic
 from ._representatives import warn_of_representatives
@@ -46,6 +48,8 @@ class HermiteSpline(PiecewiseCubic[P]):
     atol : float, optional
         Largest distance of a point from the manifold. By default, the digits of the points determine it, as for
         `CubicSpline`.
+    skipna : bool, default False
+        True to leave out missing samples, as for `CubicSpline`.
 
     Raises
     ------
@@ -101,14 +105,17 @@ class HermiteSpline(PiecewiseCubic[P]):
         *,
         extrapolate: Extrapolate = None,
         atol: float | None = None,
+        skipna: bool = False,
     ) -> None:
         space = space_named(space)
         checked_extrapolate(extrapolate)
+        if checked_flag(skipna, "skipna"):
+            t, points, velocities = nodes_without_missing(t, points, velocities, space)
         data = with_atol(read(points, space), atol)
         batch, nodes = data[0].batch, data[0].nodes
         vectors = read_velocities(velocities, space, data)
         time_axis, shown_times, times = knots_of(t, batch, nodes)
-        with time_axis.explained():
+        with missing_named(data), time_axis.explained():
             curve = _hermite(space, times, data, vectors)
         self._fill(time_axis, shown_times, curve, "natural", extrapolate)
 
@@ -122,6 +129,7 @@ class HermiteSpline(PiecewiseCubic[P]):
         method: Literal["catmull-rom", "akima", "pchip"] = "catmull-rom",
         extrapolate: Extrapolate = None,
         atol: float | None = None,
+        skipna: bool = False,
     ) -> HermiteSpline[P]:
         r"""Interpolate points by a C¹ curve that depends on neighbouring points only.
 
@@ -151,6 +159,8 @@ class HermiteSpline(PiecewiseCubic[P]):
         atol : float, optional
             Largest distance of a point from the manifold. By default, the digits of the points determine it, as for
             `CubicSpline`.
+        skipna : bool, default False
+            True to leave out missing samples, as for `CubicSpline`.
 
         Returns
         -------
@@ -209,10 +219,12 @@ class HermiteSpline(PiecewiseCubic[P]):
         space = space_named(space)
         checked_extrapolate(extrapolate)
         check_method(method)
+        if checked_flag(skipna, "skipna"):
+            t, points = curves_without_missing(t, points, space)
         data = with_atol(read(points, space), atol)
         batch, nodes = data[0].batch, data[0].nodes
         time_axis, shown_times, times = knots_of(t, batch, nodes)
-        with time_axis.explained():
+        with missing_named(data), time_axis.explained():
             valid, _ = validated(space, times, data, read_ends("natural", space, batch))
             vectors = [
                 (local_velocities(factor, times, own, method), POINT_TOL)

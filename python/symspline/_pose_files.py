@@ -6,15 +6,17 @@ import gzip
 import os
 import zlib
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any, NamedTuple
+from decimal import Decimal
+from typing import Any, Literal, NamedTuple, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._arrays import as_array, brief, cast, refuse
+from ._arrays import as_array, brief, cast, checked_flag, refuse
 from ._core import ValidationError, number_lines
 from ._disk import path_of, replacing
 from ._input import times_of
+from ._rounded_times import warn_of_rounded_times
 from ._spaces import Array, Doubles, SpecialEuclidean, SpecialOrthogonal, point_tol
 from ._typing import PointsLike
 from ._validation import length, off_one
@@ -34,17 +36,30 @@ _EUROC = "#timestamp [ns],p_x [m],p_y [m],p_z [m],q_w [],q_x [],q_y [],q_z []"
 # ---- TUM: time x y z qx qy qz qw ----
 
 
-def read_tum(file: Any) -> tuple[Doubles, Array]:
+@overload
+def read_tum(file: Any, *, skipna: bool = False, dates: Literal[False] = False) -> tuple[Doubles, Array]: ...
+
+
+@overload
+def read_tum(file: Any, *, skipna: bool = False, dates: Literal[True]) -> tuple[NDArray[np.datetime64], Array]: ...
+
+
+def read_tum(file: Any, *, skipna: bool = False, dates: bool = False) -> tuple[Array, Array]:
     """Read poses in the format of TUM's RGB-D benchmark, lines of ``time x y z qx qy qz qw``.
 
     Parameters
     ----------
     file : path or text file
         File to read. Comments begin with #. Files whose names end with .gz are decompressed.
+    skipna : bool, default False
+        True to leave out lines with NaN, which otherwise raise `ValidationError`.
+    dates : bool, default False
+        True to read times as seconds since 1970 with all their nanoseconds. In double precision they are rounded to a
+        quarter of a microsecond, which is too coarse for accelerations at 100 Hz and more.
 
     Returns
     -------
-    t : ndarray, shape (n,)
+    t : ndarray of float, or of datetime64[ns] if `dates` is True, shape (n,)
         Times in seconds, as in the file; repeated times are kept (see `symspline.fit_segments`).
     poses : ndarray, shape (n, 4, 4)
         Points of ``se:3``. Rounded quaternions are normalised.
@@ -56,6 +71,11 @@ def read_tum(file: Any) -> tuple[Doubles, Array]:
         the line.
     OSError
         If the file cannot be read.
+
+    Warns
+    -----
+    UserWarning
+        If double precision rounds the times by more than 1e-4 of the time step. Pass ``dates=True``.
 
     See Also
     --------
@@ -73,10 +93,41 @@ def read_tum(file: Any) -> tuple[Doubles, Array]:
     >>> poses[0, :3, 3].tolist()
     [1.0, 2.0, 3.0]
     """
-    rows, lines = tum_rows(file)
+    rows, lines = tum_rows(file, checked_flag(skipna, "skipna"))
+    rows, lines = _present(rows, lines)
     check_seconds(rows[:, 0], f"{lines.file}: time")
     r = rotations_in_rows(rows[:, [7, 4, 5, 6]], lines.file, lines.place)
-    return rows[:, 0].copy(), join(r, rows[:, 1:4])
+    if checked_flag(dates, "dates"):
+        t: Array = _exact_dates(lines)
+    else:
+        t = rows[:, 0].copy()
+        warn_of_rounded_times(
+            t, f"times of {lines.file}", f"Pass dates=True to read the times of {lines.file} exactly."
+        )
+    return t, join(r, rows[:, 1:4])
+
+
+def _present(rows: Doubles, lines: Lines) -> tuple[Doubles, Lines]:
+    """Return the rows without NaN, and their lines."""
+    kept = np.flatnonzero(~np.isnan(rows).any(axis=1)).tolist()
+    if len(kept) == len(rows):
+        return rows, lines
+    if not kept:
+        raise ValidationError(f"{lines.file} has no line without NaN")
+    own = Lines(lines.file, [lines.numbers[i] for i in kept], [lines.texts[i] for i in kept])
+    return rows[kept], own
+
+
+def _exact_dates(lines: Lines) -> NDArray[np.datetime64]:
+    """Return the first column, seconds since 1970, as dates with all nanoseconds."""
+    found = []
+    for row, text in enumerate(lines.texts):
+        cell = text.split()[0]
+        ns = Decimal(cell) * 10**9
+        if abs(ns) >= 2**63:
+            raise lines.error(row, f"column 'time' holds {cell}, which is not seconds within 292 years of 1970")
+        found.append(int(ns.to_integral_value()))
+    return np.array(found, np.int64).astype("datetime64[ns]")
 
 
 def tum_rows(file: Any, missing: bool = False) -> tuple[Doubles, Lines]:
@@ -156,7 +207,7 @@ def _exact_seconds(dates: Array) -> list[str]:
 # ---- KITTI: r11 r12 r13 x r21 ... ----
 
 
-def read_kitti(file: Any, times: Any = None) -> tuple[Doubles, Array]:
+def read_kitti(file: Any, times: Any = None, *, skipna: bool = False) -> tuple[Doubles, Array]:
     """Read poses in the format of KITTI's odometry benchmark, lines with the twelve numbers of [R | x].
 
     Parameters
@@ -165,6 +216,8 @@ def read_kitti(file: Any, times: Any = None) -> tuple[Doubles, Array]:
         File to read.
     times : path or text file, optional
         File of the times, ``times.txt``, with one time per line. By default the times are 0, 1, 2, ...
+    skipna : bool, default False
+        True to leave out lines with NaN, which otherwise raise `ValidationError`.
 
     Returns
     -------
@@ -196,17 +249,21 @@ def read_kitti(file: Any, times: Any = None) -> tuple[Doubles, Array]:
     [5.0, 6.0, 7.0]
     """
     lines = lines_of(file)
-    rows = parsed(lines, _KITTI, "KITTI poses are lines with the twelve numbers of [R | x]").reshape(-1, 3, 4)
+    skip = checked_flag(skipna, "skipna")
+    rows = parsed(lines, _KITTI, "KITTI poses are lines with the twelve numbers of [R | x]", missing=skip)
+    kept = ~np.isnan(rows).any(axis=1)
+    t = np.arange(len(rows), dtype=float)
+    if times is not None:
+        t = parsed(lines_of(times, "times"), ("time",), "times of KITTI are one number per line")[:, 0]
+        warn_of_rounded_times(t, f"times of {_name(times)}", "Subtract the first time before writing the file.")
+    if len(t) != len(rows):
+        raise ValidationError(f"{_name(times)} has {len(t)} times, but {lines.file} {len(rows)} poses")
+    t, rows = t[kept], rows[kept].reshape(-1, 3, 4)
     r = rows[:, :, :3]
     off = off_one(r)
     # |RᵀR − 1| is twice the distance from the rotations.
     bad = ~((off <= 2 * point_tol(r, 9)) & (np.linalg.det(r) > 0))
     refuse(bad, f"{lines.file}: pose ", lambda i: f"has no rotation: |RᵀR - 1| is {off[i]:.1e}")
-    t = np.arange(len(rows), dtype=float)
-    if times is not None:
-        t = parsed(lines_of(times, "times"), ("time",), "times of KITTI are one number per line")[:, 0]
-    if len(t) != len(rows):
-        raise ValidationError(f"{_name(times)} has {len(t)} times, but {lines.file} {len(rows)} poses")
     return t, join(_SO3.project(r), rows[:, :, 3])
 
 
@@ -240,7 +297,7 @@ def write_kitti(file: Any, poses: Any) -> None:
 # ---- EuRoC: nanoseconds, x, y, z, qw, qx, qy, qz ----
 
 
-def read_euroc(file: Any) -> tuple[NDArray[np.datetime64], Array]:
+def read_euroc(file: Any, *, skipna: bool = False) -> tuple[NDArray[np.datetime64], Array]:
     """Read poses in the format of the EuRoC data sets, lines of ``nanoseconds,x,y,z,qw,qx,qy,qz``.
 
     Further columns are ignored.
@@ -249,6 +306,8 @@ def read_euroc(file: Any) -> tuple[NDArray[np.datetime64], Array]:
     ----------
     file : path or text file
         File to read.
+    skipna : bool, default False
+        True to leave out lines with NaN, which otherwise raise `ValidationError`.
 
     Returns
     -------
@@ -283,7 +342,10 @@ def read_euroc(file: Any) -> tuple[NDArray[np.datetime64], Array]:
     lines = lines_of(file)
     # Double precision cannot represent nanoseconds since 1970.
     ns = parsed(lines, ("nanoseconds",), form, 0, dtype=np.int64)[:, 0]
-    rows = parsed(lines, ("x", "y", "z", "qw", "qx", "qy", "qz"), form, 1)
+    skip = checked_flag(skipna, "skipna")
+    rows = parsed(lines, ("x", "y", "z", "qw", "qx", "qy", "qz"), form, 1, missing=skip)
+    ns = ns[~np.isnan(rows).any(axis=1)]
+    rows, lines = _present(rows, lines)
     return ns.astype("datetime64[ns]"), join(rotations_in_rows(rows[:, 3:], lines.file, lines.place), rows[:, :3])
 
 
@@ -555,7 +617,8 @@ def parsed(
     bad = np.argwhere(np.isinf(rows) if missing else ~np.isfinite(rows))
     if len(bad):
         i, j = bad[0]
-        raise lines.error(i, f"column {columns[j]!r} holds {rows[i, j]}, which is not a finite number")
+        remedy = ". Pass skipna=True to leave out lines with NaN" if np.isnan(rows[i, j]) else ""
+        raise lines.error(i, f"column {columns[j]!r} holds {rows[i, j]}, which is not a finite number{remedy}")
     return rows
 
 

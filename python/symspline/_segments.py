@@ -8,13 +8,15 @@ from typing import Any, Literal, NamedTuple, Required, TypedDict, Unpack, overlo
 import numpy as np
 from numpy.typing import NDArray
 
-from ._arrays import as_array, checked_number, refuse, short_repr, whole_number
+from ._arrays import as_array, checked_flag, checked_number, refuse, short_repr, whole_number
 from ._composed import SegmentedCurve
 from ._core import ValidationError
 from ._cubic import CubicSpline
 from ._curves.fit import read_given
 from ._functional import fit_many
 from ._input import times_of
+from ._missing import data_without_missing, refuse_missing, without_missing
+from ._rounded_times import warn_of_rounded_times
 from ._smoothing import SmoothingReport, SmoothingSpline
 from ._smoothing.many import smooth_many
 from ._smoothing.precision import read_precision
@@ -30,6 +32,7 @@ class CutOptions(TypedDict, total=False):
     max_gap: Required[float | timedelta | np.timedelta64]
     min_points: int
     duplicates: Duplicates
+    skipna: bool
 
 
 class FitCuts(CutOptions, FitOptions, total=False):
@@ -78,6 +81,7 @@ def fit_segments(
     min_points: int = 2,
     duplicates: Duplicates = "raise",
     smooth: bool = False,
+    skipna: bool = False,
     **options: Any,
 ) -> SegmentedCurve[Any, Any]:
     """Fit a recording with gaps, one curve per segment.
@@ -104,6 +108,8 @@ def fit_segments(
         Whether the points are noisy. If True, each segment is fitted by `make_smoothing_spline`, with its own λ and
         noise level. All points with equal times then count, unless `duplicates` is ``"first"``; consecutive copies of
         a point count as one point.
+    skipna : bool, default False
+        True to leave out missing samples, where the point or its time is NaN, NaT or masked.
     **options
         Keyword arguments of `CubicSpline` or, with `smooth`, of `make_smoothing_spline`. They apply to all segments.
         ``weights`` and ``frames`` refer to all points of the recording, and ``knots`` is the number of knots of each
@@ -153,6 +159,9 @@ def fit_segments(
     space = space_named(space)
     check_smooth(smooth, duplicates, options)
     weight_options = {key: options.pop(key, None) for key in ("weights", "frames")} if smooth else {}
+    if checked_flag(skipna, "skipna"):
+        t, points, *both = data_without_missing(t, points, *map(weight_options.get, ("weights", "frames")), space)
+        weight_options = dict(zip(weight_options, both, strict=False))
     used = _used(weight_options, points, space) if smooth else None
     curves, rows, steps, gap = cut(t, points, space, max_gap, min_points, duplicates, used)
     if not curves:
@@ -249,12 +258,15 @@ def cut(
     if times.shape != (data[0].nodes,):
         raise ValidationError(f"t has shape {times.shape}, but there are {data[0].nodes} points")
     seconds = time_axis.knots(times)
+    if time_axis.plain:
+        warn_of_rounded_times(times)
     all_count = used is not None and duplicates == "raise"
     _check_order(times, seconds, "first" if all_count else duplicates)
     arrays = [
         factor._array(part, "points")
         for factor, part in zip(factors_of(space), parts_of(points, space, "points"), strict=True)
     ]
+    refuse_missing(without_missing(None, points, space)[2], used)
     # Times stay in the form in which they were given, so that the curves keep time zones and durations.
     moments = as_array(given, "t")
     rows = np.arange(len(seconds))

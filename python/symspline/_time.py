@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import ulp
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from ._arrays import as_array, cast, refuse
 from ._core import ValidationError
 from ._input import NO_ZONE, UTC_ZONE, times_of
+from ._rounded_times import warn_of_rounded_times
 from ._typing import TimesLike
 
 Doubles = NDArray[np.float64]
@@ -27,6 +29,8 @@ _SECONDS = {
 _DOUBLE = np.dtype(np.float64)
 # Rounding error of a sum or difference and of the end itself, in units in the last place.
 _ROUNDING = 4
+# Times rounded to this part of the mean step are inspected.
+_FINE = 1e-6
 _MULTIPLES = ("W", "D", "h", "m", "s")
 
 
@@ -220,8 +224,15 @@ def knots_of(t: TimesLike | None, batch: tuple[int, ...], nodes: int) -> tuple[T
     if type(t) is np.ndarray and t.dtype == np.float64 and t.shape == (nodes,):
         # The usual case takes no further function call.
         knots = t.copy()
+        first, last = knots.item(0), knots.item(nodes - 1)
+        # Nearly always the mean step shows that times are precise enough.
+        if ulp(max(abs(first), abs(last))) * nodes > _FINE * abs(last - first):
+            warn_of_rounded_times(knots)
         return _NUMBERS, knots, knots
     time_axis, shown = time_axis_of(t)
+    # Segments of a recording are checked as a whole.
+    if time_axis.plain and not isinstance(t, Moments):
+        warn_of_rounded_times(shown)
     if shown.shape != (nodes,) and shown.shape != (*batch, nodes):
         own = f" or {(*batch, nodes)}" if batch else ""
         raise ValidationError(f"t has shape {shown.shape}, but {nodes} points per curve need {(nodes,)}{own}")

@@ -141,6 +141,7 @@ class FitOptions(SolverOptions, total=False):
     check: bool
     where: ArrayLike | None
     progress: Progress | None
+    skipna: bool
 
 
 class LsqOptions(TypedDict, total=False):
@@ -160,6 +161,7 @@ class LsqOptions(TypedDict, total=False):
     atol: float | None
     where: ArrayLike | None
     progress: Progress | None
+    skipna: bool
 
 
 class ChoiceOptions(LsqOptions, total=False):

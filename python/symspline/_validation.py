@@ -14,6 +14,7 @@ from ._core import ValidationError
 from ._spaces import point_tol
 
 Array = NDArray[Any]
+REMOVE = "remove missing values"
 
 
 @contextmanager
@@ -53,9 +54,9 @@ def _cast_numbers(value: ArrayLike, name: str, axes: int) -> tuple[Array, float]
     return cast(array, np.complex128 if array.dtype.kind == "c" else np.float64), point_tol(array)
 
 
-def check_finite(array: Array, name: str) -> None:
+def check_finite(array: Array, name: str, remedy: str = REMOVE) -> None:
     """Raise ValidationError for numbers that are not finite."""
-    refuse(~np.isfinite(array), name, lambda i: f"is {array[i]}, but must be finite; remove missing values")
+    refuse(~np.isfinite(array), name, lambda i: f"is {array[i]}, but must be finite; {remedy}")
 
 
 def real_numbers(value: ArrayLike, name: str, shape: tuple[int | None, ...]) -> tuple[Array, float]:

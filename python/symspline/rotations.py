@@ -696,7 +696,9 @@ def as_quaternions(rotations: ArrayLike | Rotation, *, scalar_first: bool | None
     return converted(_given(rotations), "rotations", "matrix", quaternion_form(scalar_first))
 
 
-def from_quaternions(quaternions: ArrayLike, *, scalar_first: bool | None = None, atol: float | None = None) -> Array:
+def from_quaternions(
+    quaternions: ArrayLike, *, scalar_first: bool | None = None, atol: float | None = None, skipna: bool = False
+) -> Array:
     """Convert unit quaternions to rotations; q and −q give the same rotation.
 
     Parameters
@@ -708,6 +710,8 @@ def from_quaternions(quaternions: ArrayLike, *, scalar_first: bool | None = None
     atol : float, optional
         Largest deviation of the norms from 1. By default, the digits of the numbers determine it, as for points of
         `symspline.CubicSpline`: 1e-8 in double precision, 1e-4 for numbers of single precision or of six decimals.
+    skipna : bool, default False
+        True to return NaN for quaternions with NaN or masked numbers, which otherwise raise `ValidationError`.
 
     Returns
     -------
@@ -721,7 +725,7 @@ def from_quaternions(quaternions: ArrayLike, *, scalar_first: bool | None = None
            [0., 1., 0.],
            [0., 0., 1.]])
     """
-    return converted(quaternions, "quaternions", quaternion_form(scalar_first), "matrix", atol)
+    return converted(quaternions, "quaternions", quaternion_form(scalar_first), "matrix", atol, skipna)
 
 
 def as_rotation_vectors(rotations: ArrayLike | Rotation) -> Array:
@@ -747,13 +751,15 @@ def as_rotation_vectors(rotations: ArrayLike | Rotation) -> Array:
     return converted(_given(rotations), "rotations", "matrix", "vector")
 
 
-def from_rotation_vectors(vectors: ArrayLike) -> Array:
+def from_rotation_vectors(vectors: ArrayLike, *, skipna: bool = False) -> Array:
     """Convert rotation vectors to rotations.
 
     Parameters
     ----------
     vectors : array_like, shape (..., 3)
         Axis times angle in radians.
+    skipna : bool, default False
+        True to return NaN for vectors with NaN or masked numbers, which otherwise raise `ValidationError`.
 
     Returns
     -------
@@ -767,7 +773,7 @@ def from_rotation_vectors(vectors: ArrayLike) -> Array:
            [ 1.,  0.,  0.],
            [ 0.,  0.,  1.]])
     """
-    return converted(vectors, "vectors", "vector", "matrix")
+    return converted(vectors, "vectors", "vector", "matrix", skipna=skipna)
 
 
 def as_rotation_6d(rotations: ArrayLike | Rotation, *, order: RotationOrder | None = None) -> Array:

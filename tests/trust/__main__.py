@@ -14,7 +14,9 @@ def main(count: int, part: str) -> None:
     print("| data | recordings | wrong | wrong without a warning | refused | false alarms |")
     print("|:--|--:|--:|--:|--:|--:|")
     for module in pkgutil.iter_modules(tests.trust.__path__):
-        kinds = getattr(importlib.import_module(f"tests.trust.{module.name}"), "KINDS", {}) if module.name[0] != "_" else {}
+        kinds = (
+            getattr(importlib.import_module(f"tests.trust.{module.name}"), "KINDS", {}) if module.name[0] != "_" else {}
+        )
         for kind, outcome in kinds.items():
             if part in kind:
                 row = row_of(kind, map(outcome, range(count)))

@@ -7,7 +7,7 @@ from typing import Any, TypedDict, Unpack, overload
 
 import numpy as np
 
-from .._arrays import as_array, checked_number, short_repr, whole_number
+from .._arrays import as_array, checked_flag, checked_number, short_repr, whole_number
 from .._core import ValidationError
 from .._curve import Curve
 from .._curves.fit import FitProblem, fit, read_ends
@@ -17,6 +17,7 @@ from .._errors import raise_or_warn
 from .._faults import UNCONVERGED, Fault
 from .._input import times_of
 from .._options import check_on_failure, check_progress, checked_extrapolate
+from .._rounded_times import warn_of_rounded_times
 from .._smoothing import SmoothingReport, SmoothingSpline, SmoothingWarning, make_smoothing_spline
 from .._smoothing.factors import grouped, join, smoothed_spaces
 from .._smoothing.knots import Knots, thin_knots
@@ -49,7 +50,8 @@ from .._typing import (
 from .._validation import one_of
 from .._warnings import warn
 from ..manifolds._manifold import refuse_functions
-from .measurements import Constant, Measurement, Points
+from .measurements import SKIPNA, Constant, Measurement, Points
+from .missing import measurement_without_missing
 from .solve import Iteration, Setup, Solution, read_lams
 from .spline import EstimatedSpline, joint
 from .start import initial_points
@@ -79,6 +81,7 @@ class EstimateOptions(TypedDict, total=False):
     extrapolate: Extrapolate
     on_failure: OnFailure
     progress: Progress | None
+    skipna: bool
 
 
 @overload
@@ -115,6 +118,7 @@ def estimate(
     extrapolate: Extrapolate = None,
     on_failure: OnFailure = "raise",
     progress: Progress | None = None,
+    skipna: bool = False,
 ) -> SmoothingSpline[Any, Any]:
     r"""Fit a C² curve to measurements of any kind, such as points, rates, directions and accelerations.
 
@@ -154,6 +158,9 @@ def estimate(
         Largest number of iterations.
     extrapolate, on_failure, progress : optional
         As for `CubicSpline`; `progress` receives the number of iterations and `max_iter`.
+    skipna : bool, default False
+        True to leave out samples of each measurement that are missing, where the time or a number is NaN, NaT or
+        masked. `measurements` of the curve are those without them. A `symspline.measure.Function` has no such samples.
 
     Returns
     -------
@@ -227,6 +234,8 @@ def estimate(
             raise ValidationError(f"measurements[{i}] must be one of symspline.measure, not {short_repr(own)}")
     if not given:
         raise ValidationError("there are no measurements")
+    if checked_flag(skipna, "skipna"):
+        given = [measurement_without_missing(own) for own in given]
     one_of(penalty, "penalty", "acceleration", "jerk")
     if criterion is not None:
         one_of(criterion, "criterion", "gcv", "reml", "cp")
@@ -321,6 +330,8 @@ def _smoothed(
     def in_order(value: Any) -> Any:
         if isinstance(value, tuple):
             return tuple(in_order(own) for own in value)
+        if isinstance(value, np.ma.MaskedArray):
+            value = as_array(value, "measurements[0].y")
         array = None if value is None else np.asarray(value)
         return value if array is None or array.shape[:1] != order.shape else array[order]
 
@@ -329,7 +340,7 @@ def _smoothed(
     if not several:
         if weights is not None:
             raise ValidationError("measurements[0].sigma has one entry per point. Combine it with the weights.")
-        weights, sigma = np.asarray(sigma, np.float64) ** -2.0, 1.0
+        weights, sigma = as_array(sigma, "measurements[0].sigma").astype(np.float64) ** -2.0, 1.0
     return make_smoothing_spline(
         in_order(t),
         in_order(given.y),
@@ -362,7 +373,10 @@ def _knots(knots: Any, given: list[Measurement]) -> tuple[TimeAxis, Array, Any]:
             raise ValidationError(f"measurements[{i}].t has shape {array.shape}, but shape (n,) is needed")
         bad = np.flatnonzero(np.isnat(array) if array.dtype.kind in "Mm" else ~np.isfinite(array.astype(float)))
         if len(bad):
-            raise ValidationError(f"measurements[{i}].t[{bad[0]}] is {array[bad[0]]}, but times must be finite")
+            raise ValidationError(f"measurements[{i}].t[{bad[0]}] is {array[bad[0]]}, but times must be finite{SKIPNA}")
+        # The smoothing of points alone warns itself.
+        if len(given) > 1 or not isinstance(own, Points) or not _is_plain(own):
+            warn_of_rounded_times(np.sort(array), f"measurements[{i}].t")
         each.append(array)
     if len({array.dtype.kind in "Mm" for array in each}) > 1:
         raise ValidationError("some measurements have dates and others have numbers as times. Use one of them.")

@@ -429,12 +429,16 @@ class Function(Measurement):
         self.residual, self.nu, self.parameters = residual, order_of(nu), dict(given)
 
 
-def broadcast(value: ArrayLike, name: str, shape: tuple[int, ...]) -> Doubles:
+# Remedy in messages about missing samples.
+SKIPNA = ". Pass skipna=True to leave out missing samples."
+
+
+def broadcast(value: ArrayLike, name: str, shape: tuple[int, ...], remedy: str = "") -> Doubles:
     """Return finite real numbers of a shape to which the value broadcasts."""
     array = as_array(value, name)
     if array.dtype.kind not in "iufb":
         raise ValidationError(f"{name} must be real numbers, not {array.dtype}")
-    refuse(~np.isfinite(array), name, lambda i: f"is {array[i]}, but must be finite")
+    refuse(~np.isfinite(array), name, lambda i: f"is {array[i]}, but must be finite{remedy}")
     try:
         return np.array(np.broadcast_to(cast(array), shape))
     except ValueError:

@@ -28,6 +28,7 @@ from .._spaces.actions import Group
 from ..convert import quaternion_to_matrix
 from .along import STEP, Motion, coordinates
 from .measurements import (
+    SKIPNA,
     BodyRates,
     Constant,
     Directions,
@@ -179,7 +180,7 @@ class Term:
 
     def numbers(self, value: Any, name: str, shape: tuple[int, ...]) -> Doubles:
         """Return finite real numbers of a shape."""
-        return broadcast(value, f"{self.label}.{name}", shape)
+        return broadcast(value, f"{self.label}.{name}", shape, SKIPNA)
 
 
 class PointTerm(Term):
@@ -445,10 +446,10 @@ class Body:
     def components(self, omega: Any, name: str, n: int) -> Doubles:
         """Return components from the user's angular velocities or matrices."""
         if self.is_rotation:
-            return broadcast(_exact(omega, name, (n, 3)), name, (n, 3))
+            return broadcast(_exact(omega, name, (n, 3)), name, (n, 3), SKIPNA)
         vectors = self.space._numbers(self.space._doubles(omega, name))
         _exact(vectors, name, (n, *self.space.point_shape))
-        refuse(~self.space._where_finite(vectors), name, lambda i: "is not finite")
+        refuse(~self.space._where_finite(vectors), name, lambda i: f"is not finite{SKIPNA}")
         return self.of(vectors)
 
 
@@ -471,7 +472,11 @@ def points_on(space: Space, y: Any, n: int, name: str) -> Array:
     points = space._numbers(space._doubles(array, name))
     if points.shape != (n, *space.point_shape):
         raise ValidationError(f"{name} has shape {array.shape}, but {(n, *space.point_shape)} is needed")
-    refuse(~space._where_finite(points), name, lambda i: "is not finite. Remove this measurement.")
+    refuse(
+        ~space._where_finite(points),
+        name,
+        lambda i: "is not finite. Remove this measurement, or pass skipna=True to leave out such samples.",
+    )
     try:
         space.check_point(array)
     except ValidationError as error:

@@ -8,12 +8,13 @@ from typing import Any, Unpack, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import checked_number, short_repr, whole_number
+from .._arrays import checked_flag, checked_number, short_repr, whole_number
 from .._core import ValidationError
 from .._curves.ends import NATURAL, End, freeze_bc_type, is_closed, map_ends
 from .._curves.fit import Points, Problem, fit, mask_of
 from .._curves.solve import DEFAULTS, in_batch
 from .._errors import raise_or_warn
+from .._missing import data_without_missing, missing_named
 from .._options import check_on_failure, check_progress, checked_extrapolate
 from .._representatives import warn_of_far_data, warn_of_far_points, warn_of_signs
 from .._spaces import Product, Space, SpecialEuclidean, factors_of, space_named
@@ -105,6 +106,7 @@ def make_smoothing_spline(
     atol: float | None = None,
     where: ArrayLike | None = None,
     progress: Progress | None = None,
+    skipna: bool = False,
 ) -> SmoothingSpline[Any, Any]:
     r"""Fit a C² curve close to noisy points.
 
@@ -179,6 +181,9 @@ def make_smoothing_spline(
         ``"ignore"`` the same holds for curves with invalid points or with data at fewer than two times.
     progress : callable, optional
         Function that is called from time to time with the finished and the total number of points.
+    skipna : bool, default False
+        True to leave out missing samples, where the point or its time is NaN, NaT or masked. Curves of a batch may lack
+        different samples.
 
     Returns
     -------
@@ -263,6 +268,8 @@ def make_smoothing_spline(
     tol = checked_number(tol, "tol must be a number > 0", lambda x: 0 < x < np.inf)
     most = whole_number(max_iter, "max_iter", 1)
     options = SolverOptions(criterion, gamma, penalty, loss, method, tol, most, False)
+    if checked_flag(skipna, "skipna"):
+        t, points, weights, frames = data_without_missing(t, points, weights, frames, space)
     whole, data, of_factors = read_noisy(t, points, space, weights, frames, bc_type, atol)
     batch = whole.batch
     lams, sigmas = _in_parts(space, lam, "lam", batch, infinite=True), _in_parts(space, sigma, "sigma", batch)
@@ -277,7 +284,8 @@ def make_smoothing_spline(
         # Two points have no outliers and do not determine the noise level.
         options = options._replace(loss="linear")
     strict, mask = on_failure == "raise", mask_of(where, batch)
-    noisy, of_factors, chosen, faults = valid_curves(whole, data, of_factors, space, mask, strict)
+    with missing_named(data):
+        noisy, of_factors, chosen, faults = valid_curves(whole, data, of_factors, space, mask, strict)
     if chosen is not None:
         lams, sigmas = ([own[chosen] for own in each] for each in (lams, sigmas))
     factors = factors_of(space)

@@ -12,6 +12,7 @@ from difflib import get_close_matches
 from typing import Self
 
 from .._arrays import brief
+from .._rounded_times import REMEDY
 from .._spaces.base import CLASSES
 
 _NAMES = {cls.__name__: name for name, cls in CLASSES.items()}
@@ -26,6 +27,8 @@ _FOR_PYTHON = {
     "symspline.fit_segments": "--max-gap",
     "fit_segments": "--max-gap",
     "make_smoothing_spline": "--smooth",
+    REMEDY: "If they count from 1970, give the unit, such as --unix s.",
+    "Pass skipna=True to leave out": "--skipna omits",
 }
 """Advice in messages of the library, and the same for the command line."""
 

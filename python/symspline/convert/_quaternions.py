@@ -7,12 +7,15 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import as_array, checked_atol, refuse
+from .._arrays import as_array, checked_atol, checked_flag, filled, refuse
 from .._core import ValidationError, convert_rotations
 from .._spaces import point_tol
-from .._validation import Array, check_finite, off_one, unchecked_numbers, unit_vectors, unmoved_by_underflow
+from .._validation import REMOVE, Array, check_finite, off_one, unchecked_numbers, unit_vectors, unmoved_by_underflow
 
 Form = Literal["matrix", "scalar first", "scalar last", "vector"]
+# Forms for which callers offer `skipna`, and the remedy in messages.
+_SKIPPED = ("scalar first", "scalar last", "vector")
+_MISSING = "remove missing values, or pass skipna=True, which returns NaN for them"
 _SHAPES: dict[Form, tuple[int, ...]] = {"matrix": (3, 3), "scalar first": (4,), "scalar last": (4,), "vector": (3,)}
 
 
@@ -54,7 +57,7 @@ def matrix_to_quaternion(matrix: ArrayLike, *, scalar_first: bool | None = None)
 
 @unmoved_by_underflow()
 def quaternion_to_matrix(
-    quaternion: ArrayLike, *, scalar_first: bool | None = None, atol: float | None = None
+    quaternion: ArrayLike, *, scalar_first: bool | None = None, atol: float | None = None, skipna: bool = False
 ) -> Array:
     """Convert unit quaternions to rotation matrices.
 
@@ -67,6 +70,9 @@ def quaternion_to_matrix(
     atol : float, optional
         Largest deviation of the norms from 1. By default, the digits of the numbers determine it, as for points of
         `symspline.CubicSpline`: 1e-8 in double precision, 1e-4 for numbers of single precision or of six decimals.
+
+    skipna : bool, default False
+        True to return NaN for quaternions with NaN or masked numbers, which otherwise raise `ValidationError`.
 
     Returns
     -------
@@ -85,17 +91,23 @@ def quaternion_to_matrix(
            [ 0.96, -0.28,  0.  ],
            [ 0.  ,  0.  ,  1.  ]])
     """
-    return converted(quaternion, "quaternion", quaternion_form(scalar_first), "matrix", atol)
+    return converted(quaternion, "quaternion", quaternion_form(scalar_first), "matrix", atol, skipna)
 
 
-def converted(value: ArrayLike, name: str, form: Form, wanted: Form, atol: float | None = None) -> Array:
+def converted(
+    value: ArrayLike, name: str, form: Form, wanted: Form, atol: float | None = None, skipna: bool = False
+) -> Array:
     """Convert rotations to another form by the core; messages refer to them by `name`.
+
+    With `skipna`, rotations with missing numbers become NaN.
 
     Raises
     ------
     ValidationError
         If the numbers are not rotations within the tolerance.
     """
+    if checked_flag(skipna, "skipna"):
+        return _with_missing(filled(value), name, form, wanted, atol)
     x, tol = unchecked_numbers(value, name, _SHAPES[form])
     if form == "matrix":
         # |RᵀR − 1| is twice the distance from the rotations.
@@ -103,13 +115,28 @@ def converted(value: ArrayLike, name: str, form: Form, wanted: Form, atol: float
     tol = tol if atol is None else checked_atol(atol)
     found, valid = convert_rotations(x, form, wanted, tol)
     if not valid:
-        check_finite(x, name)
+        check_finite(x, name, _MISSING if form in _SKIPPED else REMOVE)
         if form == "matrix":
             _check_rotations(x, tol, name)
         elif form == "vector":
             _check_angles(x, found, tol, name)
         else:
             unit_vectors(x, tol, name, "a unit quaternion", "divide it by its length, or pass a larger atol")
+    return found
+
+
+def _with_missing(value: ArrayLike, name: str, form: Form, wanted: Form, atol: float | None) -> Array:
+    x = as_array(value, name)
+    axes = len(_SHAPES[form])
+    missing = np.isnan(x).any(axis=tuple(range(x.ndim - axes, x.ndim))) if x.dtype.kind == "f" else np.zeros(())
+    if x.ndim < axes or not missing.any():
+        return converted(x, name, form, wanted, atol)
+    found = np.full((*missing.shape, *_SHAPES[wanted]), np.nan)
+    # Messages have the indices of all rotations, so that the missing ones are replaced and not removed.
+    first = x[~missing][:1]
+    if len(first):
+        whole = converted(np.where(missing[(..., *[None] * axes)], first[0], x), name, form, wanted, atol)
+        found[~missing] = whole[~missing]
     return found
 
 

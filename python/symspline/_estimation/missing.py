@@ -1,0 +1,52 @@
+"""Measurements without missing samples."""
+
+from __future__ import annotations
+
+from copy import copy
+from typing import Any
+
+import numpy as np
+
+from .._arrays import as_array, filled
+from .._input import times_of
+from .._missing import Mask, rows_of
+from .measurements import Constant, Function, Measurement
+
+
+def measurement_without_missing(given: Measurement) -> Measurement:
+    """Return a measurement without the samples in which a number or the time is NaN, NaT or masked."""
+    if isinstance(given, Function):
+        return given
+    t = as_array(times_of(filled(given.t), "t")[0], "t")
+    if t.ndim != 1:
+        return given
+    present = ~np.isnan(t) if t.dtype.kind in "fmM" else np.ones(len(t), bool)
+    values = {
+        name: filled(value)
+        for name, value in vars(given).items()
+        if name != "t" and not isinstance(value, (Constant, str)) and value is not None
+    }
+    for name, value in values.items():
+        if name not in ("sigma", "weights", "frames"):
+            present = present & _present(value, len(t))
+    if present.all():
+        return given
+    found = copy(given)
+    for name, value in {"t": filled(given.t), **values}.items():
+        setattr(found, name, _rows(value, present))
+    return found
+
+
+def _present(value: Any, count: int) -> Mask:
+    if isinstance(value, tuple):
+        return np.all([_present(part, count) for part in map(filled, value)], axis=0)
+    array = np.asarray(value)
+    if array.dtype.kind not in "fc" or array.shape[:1] != (count,):
+        return np.ones(count, bool)
+    return np.asarray(~np.isnan(array).any(axis=tuple(range(1, array.ndim))))
+
+
+def _rows(value: Any, present: Mask) -> Any:
+    return (
+        tuple(_rows(filled(part), present) for part in value) if isinstance(value, tuple) else rows_of(value, present)
+    )

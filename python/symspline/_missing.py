@@ -1,0 +1,175 @@
+"""Missing samples of recordings: points with NaN or masked numbers, and times that are NaN or NaT."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ._arrays import as_array, filled
+from ._core import ValidationError
+from ._curves.fit import Points
+from ._input import times_of
+from ._spaces import Product, Space, factors_of, parts_of
+
+Mask = NDArray[np.bool_]
+# Part of the core's message about points that are not finite.
+_NOT_FINITE = "No point is close to it; correct it or remove it"
+
+
+def without_missing(t: Any, points: Any, space: Space[Any]) -> tuple[Any, Any, Mask]:
+    """Return times and points without the samples that are missing, and which samples of each curve are present.
+
+    A sample is missing if a number of its point, in any factor, or its time is NaN, NaT or masked. Samples that are
+    missing in some curves of a batch only are kept.
+
+    Returns
+    -------
+    t : array_like or None
+        Times; whole numbers if there were none.
+    points : array_like or tuple
+        Points.
+    present : ndarray of bool, shape (..., n)
+        Which samples are present, among those that were given.
+    """
+    parts = [factor._array(filled(p), "points") for factor, p in zip(*_each(points, space), strict=True)]
+    found = [_missing_points(factor, part) for factor, part in zip(factors_of(space), parts, strict=True)]
+    moments = None if t is None else as_array(times_of(filled(t), "t")[0], "t")
+    if moments is not None and moments.dtype.kind in "fmM":
+        found.append(np.isnan(moments))
+    try:
+        missing = np.any(np.broadcast_arrays(*found), axis=0)
+    except ValueError:
+        # The fit raises an error for these shapes.
+        return t, points, ~found[0]
+    if missing.ndim == 0 or not missing.any():
+        return t, points, ~missing
+    kept = ~missing.all(axis=tuple(range(missing.ndim - 1)))
+    times = np.arange(len(kept), dtype=np.float64)[kept] if t is None else rows_of(filled(t), kept)
+    return times, _rows_of_points(points, kept, space), ~missing
+
+
+def curves_without_missing(t: Any, points: Any, space: Space[Any]) -> tuple[Any, Any]:
+    """Return times and points of interpolating curves without the samples that are missing.
+
+    Raises
+    ------
+    ValidationError
+        If the curves of a batch lack different samples.
+    """
+    times, own, present = without_missing(t, points, space)
+    _check_alike(present)
+    return times, own
+
+
+def nodes_without_missing(t: Any, points: Any, velocities: Any, space: Space[Any]) -> tuple[Any, Any, Any]:
+    """Return times, points and velocities without the samples of which one of them is missing."""
+    _, vectors, moving = without_missing(None, velocities, space)
+    _, places, present = without_missing(t, points, space)
+    if moving.shape != present.shape:
+        # The fit raises an error for these shapes.
+        return t, points, velocities
+    both = present & moving
+    _check_alike(both)
+    kept = both.any(axis=tuple(range(both.ndim - 1)))
+    count = np.arange(len(kept), dtype=np.float64)
+    times = rows_of(count if t is None else filled(t), kept)
+    places, vectors = (_rows_of_points(own, kept, space) for own in (points, velocities))
+    return times, places, vectors
+
+
+def data_without_missing(
+    t: Any, points: Any, weights: Any, frames: Any, space: Space[Any]
+) -> tuple[Any, Any, Any, Any]:
+    """Return noisy data without the samples that are missing; those of some curves only have the weight zero."""
+    times, own, present = without_missing(t, points, space)
+    kept = present.any(axis=tuple(range(present.ndim - 1)))
+    if kept.all() and present.all():
+        return times, own, weights, frames
+    frames = tuple(rows_of(part, kept) for part in frames) if isinstance(frames, tuple) else rows_of(frames, kept)
+    return times, own, _weights(weights, present, kept), frames
+
+
+def _weights(weights: Any, present: Mask, kept: Mask) -> Any:
+    if isinstance(weights, tuple):
+        return tuple(_weights(own, present, kept) for own in weights)
+    if weights is None or (present | ~kept).all():
+        some = None if (present | ~kept).all() else present[..., kept].astype(np.float64)
+        return some if weights is None else rows_of(weights, kept)
+    array = as_array(weights, "weights")
+    if array.shape[-1:] == kept.shape:
+        return (array * present)[..., kept]
+    return (array * present[..., None, None])[..., kept, :, :]
+
+
+def _check_alike(present: Mask) -> None:
+    differ = np.argwhere(present.any(axis=tuple(range(present.ndim - 1))) & ~present)
+    if len(differ):
+        *curve, i = differ[0].tolist()
+        raise ValidationError(
+            f"points[{i}] of curve {','.join(map(str, curve))} is missing (NaN), but not that of all curves of the "
+            "batch, so that the curves have different lengths. Pass them to symspline.fit_many with skipna=True."
+        )
+
+
+def _rows_of_points(points: Any, kept: Mask, space: Space[Any]) -> Any:
+    own = tuple(
+        factor._array(filled(part), "points")[(..., kept, *[slice(None)] * len(factor.point_shape))]
+        for factor, part in zip(*_each(points, space), strict=True)
+    )
+    return own if isinstance(space, Product) else own[0]
+
+
+def rows_of(value: Any, kept: Mask) -> Any:
+    """Return the rows of a value that has one per sample; other values, such as one number for all, do not change."""
+    if value is None or np.ndim(value) == 0:
+        return value
+    if isinstance(value, (list, tuple)):
+        return [own for own, keep in zip(value, kept, strict=True) if keep] if len(value) == len(kept) else value
+    if not isinstance(value, np.ndarray):
+        return value[kept] if len(value) == len(kept) else value
+    if value.shape[0] == len(kept):
+        return value[kept]
+    axis = next((i for i in range(value.ndim - 1, 0, -1) if value.shape[i] == len(kept)), None)
+    return value if axis is None else np.compress(kept, value, axis=axis)
+
+
+@contextmanager
+def missing_named(data: Iterable[Points]) -> Iterator[None]:
+    """Add the remedy ``skipna=True`` to an error about points that are missing."""
+    try:
+        yield
+    except ValidationError as error:
+        raise with_remedy(error, data) from None
+
+
+def with_remedy(error: ValidationError, data: Iterable[Points]) -> ValidationError:
+    """Return the error, with the remedy ``skipna=True`` if points are missing."""
+    if _NOT_FINITE not in str(error):
+        return error
+    missing = sum(int(np.isnan(part.numbers).any(axis=-1).sum()) for part in data)
+    if not missing:
+        return error
+    return error._with_message(f"{error}. Pass skipna=True to leave out missing points (NaN).")
+
+
+def refuse_missing(present: Mask, used: Mask | None = None) -> None:
+    """Raise ValidationError for the first sample that is missing, among those that are used."""
+    gone = np.flatnonzero(~present if used is None else used & ~present)
+    if len(gone):
+        more = f" ({len(gone)} of {len(present)} points are)" if len(gone) > 1 else ""
+        raise ValidationError(f"points[{gone[0]}] is missing (NaN){more}. Pass skipna=True to leave out such points.")
+
+
+def _each(points: Any, space: Space[Any]) -> tuple[tuple[Space[Any], ...], tuple[Any, ...]]:
+    return factors_of(space), parts_of(points, space, "points")
+
+
+def _missing_points(factor: Space[Any], array: NDArray[Any]) -> Mask:
+    axes = tuple(range(max(0, array.ndim - len(factor.point_shape)), array.ndim))
+    if array.dtype.kind not in "fc":
+        return np.zeros(array.shape[: axes[0]] if axes else (), bool)
+    return np.asarray(np.isnan(array).any(axis=axes))
