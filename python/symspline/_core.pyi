@@ -159,6 +159,7 @@ def smooth(
     tol: float,
     max_iter: int,
     raise_lam: bool,
+    start: _Doubles | None,
     progress: _Progress | None,
 ) -> tuple[_Doubles, _Doubles, tuple[NDArray[Any], ...], tuple[_Doubles, _Doubles, int]]: ...
 def smoothing_variance(

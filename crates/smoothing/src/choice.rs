@@ -72,6 +72,12 @@ impl<'a> Linear<'a> {
         step
     }
 
+    /// The energy of the present curve.
+    pub fn energy(&self) -> f64 {
+        let of = |c: usize| self.linearized.energy(false, |at| lane(self.accelerations[at.1 * self.m + c]));
+        (0..self.m).fold(Lane::ZERO, |sum, c| sum + of(c)).as_array()[0]
+    }
+
     /// A for one λ.
     pub fn matrix(&self, lam: f64) -> Whole {
         self.misfit.matrix(self.linearized, self.m, self.jacobi, self.periodic, lane(lam))

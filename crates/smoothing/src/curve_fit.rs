@@ -7,12 +7,12 @@ use crate::frames::{Frames, curvature_gradient};
 use crate::gauss_newton::{self, Pull};
 use crate::information::{self, Root};
 use crate::jacobi_operator::JacobiOperator;
-use crate::linearized::{Basis, LinearProblem, OVERLAP};
+use crate::linearized::{Basis, LinearProblem, OVERLAP, Row};
 use crate::path::{Path, Position, moved, positions};
 use crate::problem::{Data, Ends, Known, Options, Penalty, Report, Smooth, State};
 use crate::progress::{Progress, larger, length};
 use crate::residuals::Residuals;
-use crate::robust::{Lam, Robust};
+use crate::robust::{AtCurve, Lam, Robust};
 use crate::variance::rows_of;
 use symspline_core::fit::Ends as FitEnds;
 use symspline_core::monitor::Monitor;
@@ -307,6 +307,8 @@ impl<'a> CurveFit<'a> {
         let band = system.inverse_band();
         let inverse = system.mean(&band);
         self.progress.note(&linear, &band, lam, 1.0);
+        let misfits = residuals.squares.iter().enumerate().map(|(k, square)| self.robust.value(*square, k));
+        self.progress.report.objective = misfits.sum::<f64>() + lam * linear.energy();
 
         let exact = !self.solved && self.progress.takes_gauss_newton(space, options.tier);
         if exact && self.strays > 0 {
@@ -347,13 +349,15 @@ impl<'a> CurveFit<'a> {
         self.known = Some(linear.matrix(lam).known());
         let taken = self.progress.report.iterations - self.progress.begun;
         let over = taken >= self.robust.most(options.max_iter);
-        if !self.robust.last() && self.progress.settled && (small || over) {
+        let left = small && self.robust.leaves(&residuals.squares);
+        if self.progress.settled && (left || (!self.robust.last() && (small || over))) {
             return self.go_on(&residuals.squares);
         }
         if self.progress.settled && small {
-            if let Some(mut whole) = whole {
+            if let (Some(mut whole), Some((factors, softness))) =
+                (whole, self.robust.pseudo(&residuals.squares))
+            {
                 // Degrees of freedom and deviations of the M-estimator are those of its pseudo-data (Cox 1983).
-                let (factors, softness) = self.robust.pseudo(&residuals.squares);
                 whole.soften(&factors, m);
                 let linear = seen_with(&whole, linear.jacobi);
                 let system = linear.factored(lane(lam / softness));
@@ -362,6 +366,8 @@ impl<'a> CurveFit<'a> {
                 self.known = Some(linear.matrix(lam / softness).known());
                 self.progress.note(&linear, &band, lam / softness, softness);
             }
+            (self.progress.report.selection, self.progress.report.rejected) =
+                (self.robust.selection, self.robust.rejected());
             self.progress.report.state =
                 if self.progress.unsettled { State::Unsettled } else { State::Converged };
             return;
@@ -450,7 +456,14 @@ impl<'a> CurveFit<'a> {
 
     /// Starts the next stage of a robust fit.
     fn go_on(&mut self, squares: &[f64]) {
-        let lam = self.robust.next(squares, self.progress.report.freedom);
+        let leverage = |(row, w): (&Row, &f64)| {
+            self.inverse.as_ref().map_or(0.0, |inverse| w * row.square(inverse).as_array()[0])
+        };
+        let leverages: Vec<f64> = self.linearized.data.iter().zip(self.data.weights).map(leverage).collect();
+        let freedom = self.progress.report.freedom;
+        let lam = self.progress.lam;
+        let at = AtCurve { times: self.data.times, squares, leverages: &leverages, freedom, lam };
+        let lam = self.robust.next(&at);
         self.progress.restart(lam);
         (self.objective, self.before, self.strays) = (f64::INFINITY, None, 0);
     }

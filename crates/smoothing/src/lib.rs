@@ -15,6 +15,7 @@
 pub mod along;
 mod banded;
 mod bordered;
+mod chain;
 pub mod chi;
 mod choice;
 mod cumulative;
@@ -43,7 +44,8 @@ pub use cumulative::{Outcome, Samples, fit_cumulative};
 pub use observations::Observations;
 pub use path::{Position, positions};
 pub use problem::{
-    Criterion, Data, EndCondition, Ends, Known, Loss, Options, Penalty, Report, Smooth, State, Tier,
+    Criterion, Data, EndCondition, Ends, Known, Loss, Options, Penalty, Report, Selection, Smooth, State,
+    Tier,
 };
 pub use smooth::smooth;
 pub use variance::variance;

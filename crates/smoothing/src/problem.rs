@@ -27,6 +27,8 @@ pub struct Data<'a> {
     /// Velocities at the ends that have [`EndCondition::Velocity`]: tangent at the first and at the last data point,
     /// from where they are transported in parallel to the ends of the curve.
     pub ends: [&'a [f64]; 2],
+    /// Points of the initial curve at the knots; empty for means of the data.
+    pub start: &'a [f64],
 }
 
 /// The solver that computes the minimum.
@@ -177,6 +179,20 @@ pub enum State {
     Undetermined,
 }
 
+/// What is known about the data that a robust loss rejects.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Selection {
+    /// The selection is final, or there is none.
+    #[default]
+    Sound,
+    /// The curve follows nearly all data, so that only gross outliers were found.
+    Interpolated,
+    /// Two selections alternate.
+    Unsettled,
+    /// Fewer than half of the data are near the curve.
+    Few,
+}
+
 /// The report of a smoothed curve.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Report {
@@ -204,6 +220,12 @@ pub struct Report {
     pub kappa: f64,
     /// Whether full Gauss–Newton was used.
     pub exact: bool,
+    /// J for times in units of the mean distance of the knots.
+    pub objective: f64,
+    /// What is known about the data that a robust loss rejects.
+    pub selection: Selection,
+    /// Their number.
+    pub rejected: usize,
 }
 
 /// A smoothed curve.

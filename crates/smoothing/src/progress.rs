@@ -4,7 +4,7 @@ use crate::banded::Banded;
 use crate::choice::Linear;
 use crate::misfit::COUPLED;
 use crate::problem::{Criterion, Penalty, Report, Tier};
-use crate::robust::{Lam, ROUGH_ROUNDS, Robust, Stage};
+use crate::robust::{Lam, Robust};
 use symspline_core::space::{Erased, Origin};
 
 /// The contraction of the linearised solver, measured or expected, from which it includes curvature in its matrix, or
@@ -98,7 +98,7 @@ impl Progress {
         match lam {
             Lam::Same => {}
             Lam::Anew => (self.settled, self.lam, self.report.rounds) = (false, None, 0),
-            Lam::Near => (self.settled, self.report.rounds) = (false, 0),
+            Lam::To(lam) => self.lam = Some(lam),
             Lam::Times(factor) => self.lam = self.lam.map(|lam| lam * factor),
         }
     }
@@ -132,15 +132,14 @@ impl Progress {
         asked: Criterion,
     ) -> f64 {
         if !self.settled {
-            let rounds = if robust.stage == Stage::Rough { ROUGH_ROUNDS } else { ROUNDS };
-            self.choose(linear, robust.criterion(asked), rounds);
+            self.choose(linear, robust.criterion(asked));
         }
         let lam = self.lam.unwrap_or(0.0);
         self.expect(space, speeds, lam);
         lam
     }
 
-    fn choose(&mut self, linear: &Linear, criterion: Criterion, rounds: usize) {
+    fn choose(&mut self, linear: &Linear, criterion: Criterion) {
         let (mut lam, mut at_bound) = linear.choose(criterion, self.lam);
         if lam < self.least {
             (lam, at_bound) = (self.least, true);
@@ -151,7 +150,7 @@ impl Progress {
         if let Some(before) = self.lam.filter(|_| self.report.rounds > ROUNDS / 2 && !at_bound) {
             lam = (lam * before).sqrt();
         }
-        self.settled = moved < SETTLED || self.report.rounds >= rounds;
+        self.settled = moved < SETTLED || self.report.rounds >= ROUNDS;
         self.unsettled = moved > UNSETTLED && self.settled;
         self.report.at_bound = at_bound;
         self.lam = Some(lam);

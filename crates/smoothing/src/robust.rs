@@ -1,34 +1,57 @@
 //! The stages of a fit with a robust loss.
 //!
-//! Choosing λ by cross-validation while outliers still influence the curve and the noise level often fails: the level
-//! and λ decrease to zero together. Therefore λ is chosen from data without outliers, and the M-estimator is computed
-//! with that λ:
+//! A redescending loss has many minima, and λ chosen while outliers act on the curve, or from a curve that leaves good
+//! data, is wrong. Therefore data are selected first, λ is chosen from these, and the M-estimator is computed with that
+//! λ:
 //!
-//! 1. *Rough*: iteratively reweighted least squares (Holland & Welsch 1977), the noise level from the median
-//!    deviation of data from their neighbours, λ by cross-validation of the weighted data in the first rounds only.
-//! 2. *Trimmed*: least squares without the data beyond the 99 % quantile of the noise, with λ by the requested
-//!    criterion; repeated with the resulting noise level until the selection of data does not change.
-//! 3. *Final*: reweighted least squares with that λ, times the mean weight, and that noise level.
+//! 1. *Rejecting*: least squares for a selection of data, which begins with a [`chain`](crate::chain). λ is chosen by
+//!    restricted maximum likelihood: cross-validation with γ > 1 forbids curves that precise data need, and such curves
+//!    seem to leave their data. The limit of a truncated loss falls from the largest residual to the noise (graduated
+//!    non-convexity, Yang et al. 2020) until the selection does not change. Residuals are *deleted* ones: those of
+//!    selected data vanish where the curve follows each of them.
+//! 2. *Chosen*: the same selection, with λ by the requested criterion.
+//! 3. *Final*: iteratively reweighted least squares (Holland & Welsch 1977) with that λ, times the mean weight, and the
+//!    noise level of the first stage. If the curve leaves selected data, λ is too large for them: a redescending loss
+//!    takes every bend for outliers then. The λ of the first stage replaces it.
 //!
-//! If λ is given, the second stage only estimates the noise from the rough curve.
+//! If the curve follows nearly all data, the noise is smaller than what the sampling shows. Then the deviations are those
+//! of interpolation, only isolated data that deviate much more than others are rejected, and the curve of the first
+//! stage is the result.
 
+use crate::chain;
 use crate::chi;
-use crate::loss;
-use crate::problem::{Criterion, Loss};
+use crate::problem::{Criterion, Loss, Selection};
 
-/// The number of rounds that choose λ in the first stage.
-pub const ROUGH_ROUNDS: usize = 6;
-/// The maximum number of iterations of the first stage, which need not converge.
-const ROUGH_STEPS: usize = 20;
 /// The maximum number of iterations of the last stage, as a multiple of the requested limit: reweighted least squares
 /// converge linearly, and slowly if a datum is near the corner of Huber's loss.
 const FINAL_STEPS: usize = 20;
 /// The steps, in standard deviations, that end the stages before the last.
 const ROUGH_TOL: f64 = 0.03;
-/// The maximum number of times that data are selected again.
-const TRIMS: usize = 4;
-/// Data beyond this quantile of the noise are excluded.
-const KEPT: f64 = 0.99;
+/// The maximum number of times that data are selected.
+const ROUNDS: usize = 30;
+/// Data beyond this quantile of the noise are rejected.
+const KEPT: f64 = 0.999;
+/// The factor of the squared limit from selection to selection.
+const FALLS: f64 = 0.25;
+/// The ratio of the degrees of freedom to the data from which the noise is smaller than what the sampling shows.
+const ALL: f64 = 0.9;
+/// The squared limit of a selection, for data that the final curve has left.
+const LEFT: f64 = 2.0;
+/// The limit for squared deviations in that case, in medians.
+const GROSS: f64 = 900.0;
+/// Deviations grow with the time between the neighbours, their squares about with this power.
+const GROWTH: i32 = 5;
+/// The numbers of data at the ends that are not rejected in that case, and of those on either side whose deviations are
+/// compared.
+const AT_ENDS: usize = 3;
+const BESIDE: usize = 2;
+const NEAR: usize = 10;
+/// The least 1 − h, which is known up to rounding errors only.
+const DELETED: f64 = 1e-6;
+/// The part of the data that must be selected for a result that can be trusted.
+const LEAST_SELECTED: f64 = 0.6;
+/// The weight of rejected data if nothing but data determines the curve.
+const TINY: f64 = 1e-9;
 
 /// The stage of a fit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -36,11 +59,25 @@ pub enum Stage {
     /// Least squares, the only stage of a fit that is not robust.
     Plain,
     /// The first stage of a robust fit.
-    Rough,
-    /// The second stage, for the n-th time.
-    Trimmed(usize),
+    Rejecting,
+    /// The second stage.
+    Chosen,
     /// The last stage.
     Final,
+}
+
+/// The data at a curve.
+pub struct AtCurve<'a> {
+    /// Times of the data.
+    pub times: &'a [f64],
+    /// Their weighted squared distances.
+    pub squares: &'a [f64],
+    /// The variances of the curve at the data, divided by those of the data.
+    pub leverages: &'a [f64],
+    /// The degrees of freedom of the curve.
+    pub freedom: f64,
+    /// Its λ.
+    pub lam: Option<f64>,
 }
 
 /// A loss function with its noise level.
@@ -49,14 +86,28 @@ pub struct Robust {
     m: usize,
     /// The present stage.
     pub stage: Stage,
+    /// What is known about the selection.
+    pub selection: Selection,
     /// The standard deviation of the noise in a coordinate.
     sigma: f64,
     /// Whether the noise level was given.
     known: bool,
-    /// Whether λ is to be chosen.
-    chooses: bool,
-    /// The data of the second stage: one if included, otherwise zero.
+    /// λ, if it is given.
+    lam: Option<f64>,
+    /// The noise that rounding of the points causes.
+    rounding: f64,
+    /// The selected data: one if included, otherwise zero.
     kept: Vec<f64>,
+    /// Whether data have a weight.
+    used: Vec<bool>,
+    /// Earlier selections.
+    seen: Vec<Vec<f64>>,
+    /// The present limit for squared residuals.
+    limit: f64,
+    /// λ of the first stage, until the last stage has used it.
+    first: Option<f64>,
+    /// Whether the last stage is least squares for the selected data.
+    truncated: bool,
 }
 
 /// How the next stage obtains λ.
@@ -65,23 +116,46 @@ pub enum Lam {
     Same,
     /// λ is chosen from its whole range.
     Anew,
-    /// λ is chosen near its present value.
-    Near,
+    /// λ is given.
+    To(f64),
     /// λ is multiplied by a number.
     Times(f64),
 }
 
 impl Robust {
-    /// For noise of about the standard deviation `sigma`.
-    pub fn new(loss: Loss, m: usize, sigma: f64, known: bool, chooses: bool) -> Self {
-        // Without deviations there are no outliers.
-        let stage = match loss {
-            Loss::Linear => Stage::Plain,
-            _ if !(sigma > 0.0) => Stage::Plain,
-            _ if known && !chooses => Stage::Final,
-            _ => Stage::Rough,
-        };
-        Robust { loss, m, stage, sigma, known, chooses, kept: Vec::new() }
+    /// Least squares.
+    pub fn plain(m: usize) -> Self {
+        Robust {
+            loss: Loss::Linear,
+            m,
+            stage: Stage::Plain,
+            selection: Selection::Sound,
+            sigma: 0.0,
+            known: false,
+            lam: None,
+            rounding: 0.0,
+            kept: Vec::new(),
+            used: Vec::new(),
+            seen: Vec::new(),
+            limit: f64::INFINITY,
+            first: None,
+            truncated: false,
+        }
+    }
+
+    /// For a first selection of the data with nonzero weights.
+    pub fn new(
+        loss: Loss,
+        m: usize,
+        sigma: Option<f64>,
+        lam: Option<f64>,
+        kept: Vec<f64>,
+        weights: &[f64],
+        rounding: f64,
+    ) -> Self {
+        let used = weights.iter().map(|w| *w > 0.0).collect();
+        let (stage, known, sigma) = (Stage::Rejecting, sigma.is_some(), sigma.unwrap_or(0.0));
+        Robust { loss, stage, sigma, known, lam, rounding, kept, used, ..Robust::plain(m) }
     }
 
     /// The residual beyond which the loss grows more slowly.
@@ -89,12 +163,19 @@ impl Robust {
         self.sigma * self.loss.corner(self.m)
     }
 
+    /// Whether the loss is that of the M-estimator, and not truncated.
+    pub fn reweighs(&self) -> bool {
+        self.stage == Stage::Final && !self.truncated
+    }
+
     /// The factors of the weights of the data, given their weighted squared distances; None for one.
     pub fn factors(&self, squares: &[f64]) -> Option<Vec<f64>> {
         match self.stage {
             Stage::Plain => None,
-            Stage::Trimmed(_) => Some(self.kept.clone()),
-            Stage::Rough | Stage::Final => Some(self.weights(squares)),
+            _ if self.reweighs() => Some(self.weights(squares)),
+            // Without a penalty, a knot whose data are all rejected needs some data.
+            _ if self.lam == Some(0.0) => Some(self.kept.iter().map(|kept| kept.max(TINY)).collect()),
+            _ => Some(self.kept.clone()),
         }
     }
 
@@ -107,41 +188,29 @@ impl Robust {
     pub fn value(&self, square: f64, datum: usize) -> f64 {
         match self.stage {
             Stage::Plain => square,
-            Stage::Trimmed(_) => self.kept[datum] * square,
-            Stage::Rough | Stage::Final => self.loss.value(square, self.corner()),
+            _ if self.reweighs() => self.loss.value(square, self.corner()),
+            _ => self.kept[datum] * square,
         }
     }
 
-    /// The pseudo-data of the M-estimator: see [`Loss::pseudo`].
-    pub fn pseudo(&self, squares: &[f64]) -> (Vec<f64>, f64) {
-        self.loss.pseudo(self.corner(), squares, self.m)
+    /// The pseudo-data of the M-estimator: see [`Loss::pseudo`]. None for a truncated loss.
+    pub fn pseudo(&self, squares: &[f64]) -> Option<(Vec<f64>, f64)> {
+        self.reweighs().then(|| self.loss.pseudo(self.corner(), squares, self.m))
     }
 
     /// How λ is chosen in this stage.
     pub fn criterion(&self, asked: Criterion) -> Criterion {
-        if self.stage == Stage::Rough { Criterion::Gcv { gamma: 1.4 } } else { asked }
+        if self.stage == Stage::Rejecting || self.truncated { Criterion::Reml } else { asked }
     }
 
     /// The step that ends the stage.
     pub fn tol(&self, asked: f64) -> f64 {
-        match self.stage {
-            Stage::Plain | Stage::Final => asked,
-            Stage::Rough | Stage::Trimmed(_) => asked.max(ROUGH_TOL),
-        }
+        if self.last() { asked } else { asked.max(ROUGH_TOL) }
     }
 
     /// The maximum number of iterations of the stage.
     pub fn most(&self, asked: usize) -> usize {
-        match self.stage {
-            Stage::Rough => asked.min(ROUGH_STEPS),
-            Stage::Final => asked.saturating_mul(FINAL_STEPS),
-            Stage::Plain | Stage::Trimmed(_) => asked,
-        }
-    }
-
-    /// Whether the rate of the steps is that of the weights, not of the solver.
-    pub fn reweighs(&self) -> bool {
-        matches!(self.stage, Stage::Rough | Stage::Final)
+        if self.reweighs() { asked.saturating_mul(FINAL_STEPS) } else { asked }
     }
 
     /// Whether this is the last stage.
@@ -149,57 +218,176 @@ impl Robust {
         matches!(self.stage, Stage::Plain | Stage::Final)
     }
 
-    /// Starts the next stage from a curve with given degrees of freedom and weighted squared distances of the data.
-    pub fn next(&mut self, squares: &[f64], freedom: f64) -> Lam {
+    /// Whether the M-estimator has left selected data, so that another stage follows.
+    pub fn leaves(&self, squares: &[f64]) -> bool {
+        if !self.reweighs() || self.lam.is_some() {
+            return false;
+        }
+        let limit = LEFT * self.sigma * self.sigma * chi::quantile(self.m, KEPT);
+        squares.iter().zip(&self.kept).any(|(square, kept)| *kept > 0.0 && *square > limit)
+    }
+
+    /// The number of data with a weight that are not selected.
+    pub fn rejected(&self) -> usize {
+        self.kept.iter().zip(&self.used).filter(|(kept, used)| **kept == 0.0 && **used).count()
+    }
+
+    /// Starts the next stage from a curve.
+    pub fn next(&mut self, at: &AtCurve) -> Lam {
         match self.stage {
-            Stage::Plain | Stage::Final => Lam::Same,
-            Stage::Rough if !self.chooses => {
-                let beside = loss::noise_beside(squares, freedom, self.m);
-                self.sigma = beside.clamp(0.5 * self.sigma, self.sigma);
-                self.stage = Stage::Final;
-                Lam::Same
-            }
-            Stage::Rough => {
-                if !self.known {
-                    let beside = loss::noise_beside(squares, freedom, self.m);
-                    self.sigma = beside.clamp(0.2 * self.sigma, self.sigma);
+            Stage::Plain => Lam::Same,
+            Stage::Rejecting => self.select(at),
+            Stage::Chosen => self.finish(at),
+            Stage::Final => match self.first.take() {
+                Some(lam) => Lam::To(lam),
+                None => {
+                    self.truncated = true;
+                    Lam::Same
                 }
-                self.kept = self.within(squares);
-                self.stage = Stage::Trimmed(1);
-                Lam::Anew
-            }
-            Stage::Trimmed(times) => {
-                if !self.known {
-                    self.sigma = self.beside_kept(squares, freedom);
-                }
-                let within = self.within(squares);
-                if times < TRIMS && within != self.kept {
-                    self.kept = within;
-                    self.stage = Stage::Trimmed(times + 1);
-                    return Lam::Near;
-                }
-                self.stage = Stage::Final;
-                let (weights, kept) = (self.weights(squares), &self.kept);
-                let sum: f64 = weights.iter().zip(kept).map(|(weight, kept)| weight * kept).sum();
-                Lam::Times(sum / kept.iter().sum::<f64>())
-            }
+            },
         }
     }
 
-    /// Ones for the data within the quantile.
-    fn within(&self, squares: &[f64]) -> Vec<f64> {
-        let limit = self.sigma * self.sigma * chi::quantile(self.m, KEPT);
-        squares.iter().map(|square| f64::from(*square <= limit)).collect()
+    /// Selects data again, or ends the first stage.
+    fn select(&mut self, at: &AtCurve) -> Lam {
+        let (anew, count) = (if self.lam.is_some() { Lam::Same } else { Lam::Anew }, self.count());
+        let squares = self.deleted(at);
+        let of_kept = |squares: &[f64]| -> Vec<f64> {
+            squares.iter().zip(&self.kept).filter(|(_, kept)| **kept > 0.0).map(|(x, _)| *x).collect()
+        };
+        let interpolated = !self.known && at.freedom > ALL * count;
+        self.selection = if interpolated { Selection::Interpolated } else { Selection::Sound };
+        let next = if interpolated {
+            self.sigma = self.scale(of_kept(&squares));
+            self.gross(&squares, at.times)
+        } else {
+            let own = of_kept(&squares);
+            let largest = own.iter().copied().fold(0.0, f64::max);
+            if !self.known {
+                self.sigma = self.scale(own);
+            }
+            let least = self.sigma * self.sigma * chi::quantile(self.m, KEPT);
+            self.limit = (FALLS * self.limit.min(largest)).max(least);
+            let within = |k: usize| f64::from(self.used[k] && squares[k] <= self.limit);
+            let found: Vec<f64> = (0..squares.len()).map(within).collect();
+            if self.limit > least && found == self.kept {
+                // Nothing lies between this limit and the next one.
+                return self.select(at);
+            }
+            found
+        };
+        let few =
+            next.iter().sum::<f64>() < LEAST_SELECTED * self.used.iter().filter(|used| **used).count() as f64;
+        let repeats = self.seen.contains(&next);
+        if next == self.kept || repeats || few || self.seen.len() >= ROUNDS {
+            if few {
+                self.selection = Selection::Few;
+            } else if self.selection == Selection::Sound && self.differs(&next) {
+                self.selection = Selection::Unsettled;
+            }
+            self.first = at.lam;
+            if self.selection == Selection::Interpolated {
+                (self.stage, self.truncated) = (Stage::Final, true);
+                return Lam::Same;
+            }
+            if self.lam.is_some() {
+                return self.finish(at);
+            }
+            self.stage = Stage::Chosen;
+            return anew;
+        }
+        let before = std::mem::replace(&mut self.kept, next);
+        self.seen.push(before);
+        anew
     }
 
-    /// The standard deviation of the noise from the residuals of the included data: normal noise within a quantile q
-    /// has the variance `P(χ²_{m+2} < q)/P(χ²_m < q)`.
-    fn beside_kept(&self, squares: &[f64], freedom: f64) -> f64 {
-        let kept = &self.kept;
-        let sum: f64 = squares.iter().zip(kept).map(|(square, kept)| square * kept).sum();
-        let left = self.m as f64 * (kept.iter().sum::<f64>() - freedom);
-        let cut = chi::distribution(self.m + 2, chi::quantile(self.m, KEPT)) / KEPT;
-        let found = (sum / left / cut).sqrt();
-        if found > 0.0 && left > 0.0 { found } else { self.sigma }
+    fn finish(&mut self, at: &AtCurve) -> Lam {
+        self.stage = Stage::Final;
+        if self.lam.is_some() {
+            return Lam::Same;
+        }
+        if self.leaves(at.squares)
+            && let Some(lam) = self.first.take()
+        {
+            return Lam::To(lam);
+        }
+        let weights = self.weights(at.squares);
+        let sum: f64 = weights.iter().zip(&self.kept).map(|(weight, kept)| weight * kept).sum();
+        Lam::Times(sum / self.count())
+    }
+
+    /// Whether another selection has not only changed near the limit.
+    fn differs(&self, next: &[f64]) -> bool {
+        /// The part of the data that are near the limit.
+        const NEAR_LIMIT: f64 = 0.02;
+        let changed = next.iter().zip(&self.kept).filter(|(a, b)| a != b).count();
+        changed as f64 > 2.0 + NEAR_LIMIT * next.len() as f64
+    }
+
+    /// The number of selected data.
+    fn count(&self) -> f64 {
+        self.kept.iter().sum()
+    }
+
+    /// The squared residuals of all data from curves without them, divided by their variance for noise of variance one.
+    fn deleted(&self, at: &AtCurve) -> Vec<f64> {
+        let one = |k: usize| {
+            let h = at.leverages[k];
+            at.squares[k] / if self.kept[k] > 0.0 { (1.0 - h).max(DELETED) } else { 1.0 + h }
+        };
+        (0..at.squares.len()).map(one).collect()
+    }
+
+    /// The standard deviation of the noise from squares of the selected data.
+    fn scale(&self, squares: Vec<f64>) -> f64 {
+        /// Rounded data may have squares that are mostly zero. Part of a higher quantile then replaces the median.
+        const HIGH: f64 = 0.8;
+        const PART: f64 = 0.25;
+        let of = |squares: Vec<f64>, share: f64| {
+            chain::quantile(squares, share).unwrap_or(0.0) / chi::quantile(self.m, share)
+        };
+        let high = PART * of(squares.clone(), HIGH);
+        of(squares, 0.5).max(high).sqrt().max(self.rounding)
+    }
+
+    /// The data without isolated ones that deviate much more than others, and with those that do not.
+    fn gross(&self, squares: &[f64], times: &[f64]) -> Vec<f64> {
+        let n = squares.len();
+        let mut next = self.kept.clone();
+        let used: Vec<usize> = (0..n).filter(|&k| self.used[k]).collect();
+        let kept: Vec<usize> = used.iter().copied().filter(|&k| self.kept[k] > 0.0).collect();
+        if kept.len() < 2 * AT_ENDS {
+            return next;
+        }
+        // The time from the selected datum before to the one behind.
+        let around = |k: usize| {
+            let (from, to) = (kept.partition_point(|&i| i < k), kept.partition_point(|&i| i <= k));
+            let (left, right) = (from.saturating_sub(1), to.min(kept.len() - 1));
+            times[kept[right]] - times[kept[left]]
+        };
+        let usual = chain::quantile(kept.iter().map(|&k| around(k)).collect(), 0.5).unwrap_or(1.0);
+        let relative = |k: usize| squares[k] / (around(k) / usual).max(1.0).powi(GROWTH);
+        let of_kept: Vec<f64> = kept.iter().map(|&k| relative(k)).collect();
+        let least = (self.rounding * self.rounding).max(chain::quantile(of_kept.clone(), 0.5).unwrap_or(0.0));
+        // The path may bend more in one part than in another.
+        let limit = |k: usize| {
+            let at = kept.partition_point(|&i| i < k);
+            let near = &of_kept[at.saturating_sub(NEAR)..(at + NEAR).min(kept.len())];
+            GROSS * chain::quantile(near.to_vec(), 0.5).unwrap_or(0.0).max(least)
+        };
+        for (place, &k) in kept.iter().enumerate() {
+            let near = &of_kept[place.saturating_sub(BESIDE)..(place + BESIDE + 1).min(kept.len())];
+            let isolated = near.iter().all(|x| *x <= of_kept[place]);
+            let inside = place >= AT_ENDS && place + AT_ENDS < kept.len();
+            if inside && isolated && of_kept[place] > limit(k) {
+                next[k] = 0.0;
+            }
+        }
+        for &k in used.iter().filter(|&&k| self.kept[k] == 0.0) {
+            if relative(k) <= limit(k) {
+                next[k] = 1.0;
+            }
+        }
+        next
     }
 }

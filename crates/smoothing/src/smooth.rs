@@ -1,9 +1,9 @@
 //! Smoothing of many curves at a time: every iteration advances all curves that have not converged.
 
 use crate::banded::stride;
+use crate::chain::chain;
 use crate::curve_fit::CurveFit;
 use crate::information;
-use crate::loss;
 use crate::path::Path;
 use crate::problem::{Data, EndCondition, Ends, Loss, Options, Penalty, Smooth, State};
 use crate::robust::Robust;
@@ -36,7 +36,13 @@ pub fn smooth(space: &Erased, data: &[Data], options: &Options, monitor: &Monito
     let numbers: usize = data.iter().map(|data| size(space, data)).sum();
     memory::require(numbers as f64, "smoothing", "Use fewer knots, or smooth the data in parts");
     let knots: Vec<Vec<f64>> = data.iter().map(|data| knots_near_data(data, options)).collect();
-    let near: Vec<Data> = data.iter().zip(&knots).map(|(data, knots)| Data { knots, ..*data }).collect();
+    let starts: Vec<Vec<f64>> =
+        data.iter().zip(&knots).map(|(data, knots)| at_knots(data, knots, space.point_len())).collect();
+    let near: Vec<Data> = data
+        .iter()
+        .zip(knots.iter().zip(&starts))
+        .map(|(data, (knots, start))| Data { knots, start, ..*data })
+        .collect();
     let mut tracks: Vec<CurveFit> = solve(space, &near, options, monitor)
         .into_iter()
         .zip(data)
@@ -82,6 +88,15 @@ fn knots_near_data(data: &Data, options: &Options) -> Vec<f64> {
     let stop = if geodesic[1] { knots.partition_point(|t| t < last) } else { knots.len() - 1 };
     let stop = stop.min(knots.len() - 1);
     if stop <= start { knots.to_vec() } else { thinned_in_gaps(&knots[start..=stop], data.times) }
+}
+
+/// The points of a given initial curve at some of the knots.
+fn at_knots(data: &Data, knots: &[f64], len: usize) -> Vec<f64> {
+    if data.start.is_empty() {
+        return Vec::new();
+    }
+    let place = |t: &f64| data.knots.partition_point(|knot| knot < t);
+    knots.iter().flat_map(|t| &data.start[place(t) * len..][..len]).copied().collect()
 }
 
 /// Knots without most of those in gaps. Two neighbours in a gap are apart by at least half of the distance to the nearest
@@ -146,7 +161,7 @@ fn solve<'a>(space: &Erased, data: &[Data<'a>], options: &Options, monitor: &Mon
     let ended = tracks.into_iter().zip(data).map(|(track, data)| {
         track.unwrap_or_else(|| {
             let points = vec![f64::NAN; data.knots.len() * len];
-            let plain = Robust::new(Loss::Linear, space.dim(), 0.0, true, true);
+            let plain = Robust::plain(space.dim());
             let mut none = CurveFit::new(*data, space.dim(), data.knots.to_vec(), points, options, plain);
             none.retreat(space, options);
             none
@@ -203,8 +218,8 @@ fn fit_all<'a>(
 struct Beginning {
     /// Means of the data, the best last.
     levels: Vec<Level>,
-    /// For a robust loss: an estimate of the standard deviation of the noise.
-    sigma: f64,
+    /// For a robust loss: the data that agree with their neighbours.
+    kept: Vec<f64>,
 }
 
 fn beginnings(
@@ -227,13 +242,15 @@ fn beginnings(
         let density = weights.iter().sum::<f64>() / period;
         let exponent = 1.0 / f64::from(options.penalty.power() + 1);
         let averaged = data.lam.map(|lam| (lam / density).powf(exponent));
+        let given = !data.start.is_empty();
         let [times, points, weights] = if options.loss == Loss::Linear {
             [data.times.to_vec(), data.points.to_vec(), weights.clone()]
         } else {
-            found.sigma = data.sigma.unwrap_or_else(|| loss::noise(space, &data));
-            loss::plausible(space, &data)
+            found.kept = chain(space, &data);
+            chosen(space, &data, &found.kept)
         };
         found.levels = match options.ends {
+            _ if given => vec![Level::of(data.knots, data.start)],
             Ends::Open(_) => levels(space, &times, &points, &weights, averaged),
             // One period before and one after, so that the initial curve closes.
             Ends::Periodic => {
@@ -246,6 +263,25 @@ fn beginnings(
         found.levels.reverse();
     });
     all
+}
+
+/// The times, points and weights of the selected data; of all data if they do not span any time.
+fn chosen(space: &Erased, data: &Data, kept: &[f64]) -> [Vec<f64>; 3] {
+    let len = space.point_len();
+    let used: Vec<usize> = (0..kept.len()).filter(|&k| kept[k] > 0.0).collect();
+    let spans = matches!((used.first(), used.last()), (Some(&a), Some(&b)) if data.times[a] < data.times[b]);
+    let used = if spans { used } else { (0..kept.len()).collect() };
+    [
+        used.iter().map(|&k| data.times[k]).collect(),
+        used.iter().flat_map(|&k| data.points[k * len..][..len].to_vec()).collect(),
+        used.iter().map(|&k| data.weights[k]).collect(),
+    ]
+}
+
+/// The standard deviation, at weight one, that rounding of the points to floating-point numbers causes.
+fn rounding(data: &Data) -> f64 {
+    let largest = |x: &[f64]| x.iter().map(|x| x.abs()).fold(0.0, f64::max);
+    largest(data.points) * f64::EPSILON * largest(data.weights).sqrt()
 }
 
 /// Initial curves for the curves without one; none if even the geodesic between the first and the last mean does not
@@ -276,8 +312,13 @@ fn start<'a>(
                 let (len, last) = (space.point_len(), points.len() - space.point_len());
                 points.copy_within(..len, last);
             }
-            let (m, own, sigma) = (space.dim(), data[*c], beginnings[*c].sigma);
-            let robust = Robust::new(options.loss, m, sigma, own.sigma.is_some(), own.lam.is_none());
+            let (m, own) = (space.dim(), data[*c]);
+            let robust = if options.loss == Loss::Linear {
+                Robust::plain(m)
+            } else {
+                let (kept, rounding) = (beginnings[*c].kept.clone(), rounding(&own));
+                Robust::new(options.loss, m, own.sigma, own.lam, kept, own.weights, rounding)
+            };
             tracks[*c] = Some(CurveFit::new(own, m, knots.to_vec(), points, options, robust));
         }
     }

@@ -61,6 +61,11 @@ pub fn levels(
 }
 
 impl Level {
+    /// Given points.
+    pub fn of(times: &[f64], points: &[f64]) -> Level {
+        Level { times: times.to_vec(), points: points.to_vec(), weights: vec![1.0; times.len()] }
+    }
+
     /// Joins neighbours that are much closer in time than others: a spline through noisy points at nearly equal times
     /// has large velocities.
     fn apart(mut self, space: &Erased) -> Level {

@@ -12,7 +12,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyListMethods, PyTuple, PyTupleMethods};
 use symspline_engine::parallel;
 use symspline_engine::smoothing::{
-    Data, Loss, Observations, Options, Outcome, Report, Samples, Smooth, State, Tier, chi,
+    Data, Loss, Observations, Options, Outcome, Report, Samples, Selection, Smooth, State, Tier, chi,
     fit_cumulative as fit, smooth as run, variance as variance_at,
 };
 use symspline_engine::space::{Ambient, Origin};
@@ -31,7 +31,7 @@ type Systems<'py> = (Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>, u
 
 /// Smooths curves. `t` and `weights` contain all data, (N,) or (..., N); `information`, (..., N, m, m), contains
 /// matrices whose mean diagonals are `weights`; `knots` is (K,) or (..., K). `lam` and `sigma` have one value per
-/// curve, and NaN requests that λ is chosen.
+/// curve, and NaN requests that λ is chosen. `start` contains initial points at the knots.
 #[pyfunction]
 pub fn smooth<'py>(
     py: Python<'py>,
@@ -52,6 +52,7 @@ pub fn smooth<'py>(
     tol: f64,
     max_iter: usize,
     raise_lam: bool,
+    start: Option<Array<'py>>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Smoothed<'py>> {
     let options = Options {
@@ -93,6 +94,7 @@ pub fn smooth<'py>(
     let own = |row: &[f64], size: usize, curve: usize| if row.len() == size { 0 } else { curve * size };
     let (t, p, w, k) = (in_order(&t)?, in_order(&points)?, in_order(&weights)?, in_order(&knots)?);
     let (lam, sigma) = (in_order(&lam)?, in_order(&sigma)?);
+    let first = start.as_ref().map_or(Ok(none), in_order)?;
     let matrices = information.as_ref().map_or(Ok(none), in_order)?;
     let entries = if matrices.is_empty() { 0 } else { space.dim() * space.dim() };
     drop(reserve::<f64>(p.len() + 2 * curves * n + matrices.len() + curves * count * (2 * len + 8))?);
@@ -121,6 +123,7 @@ pub fn smooth<'py>(
             lam: Some(lam[c]).filter(|lam| !lam.is_nan()),
             sigma: Some(sigma[c]).filter(|sigma| !sigma.is_nan()),
             ends: vectors.map(|v| if v.is_empty() { none } else { &v[c * len..][..len] }),
+            start: if first.is_empty() { none } else { &first[c * count * len..][..count * len] },
         })
         .collect();
     // One iteration factors banded matrices of three blocks for every knot.
@@ -189,7 +192,8 @@ fn gathered<'py>(
     Ok(out)
 }
 
-/// state, iterations, lam, band_lam, at_bound, freedom, sigma, step, rate, kappa, exact.
+/// state, iterations, lam, band_lam, at_bound, freedom, sigma, step, rate, kappa, exact, selection, rejected,
+/// objective.
 fn columns<'py>(py: Python<'py>, found: &[Smooth]) -> PyResult<Bound<'py, PyTuple>> {
     let reports: Vec<Report> = found.iter().map(|smooth| smooth.report).collect();
     let column = |f: fn(&Report) -> f64| PyArray1::from_iter(py, reports.iter().map(f));
@@ -206,9 +210,19 @@ fn columns<'py>(py: Python<'py>, found: &[Smooth]) -> PyResult<Bound<'py, PyTupl
     let [sigma, step, rate, kappa] =
         [column(|r| r.sigma), column(|r| r.step), column(|r| r.rate), column(|r| r.kappa)];
     let (at_bound, exact) = (flag(|r| r.at_bound), flag(|r| r.exact));
+    let selection = reports.iter().map(|r| match r.selection {
+        Selection::Sound => 0,
+        Selection::Interpolated => 1,
+        Selection::Unsettled => 2,
+        Selection::Few => 3_i64,
+    });
+    let selection = PyArray1::from_iter(py, selection);
+    let rejected = PyArray1::from_iter(py, reports.iter().map(|r| r.rejected as i64));
     let first = (PyArray1::from_iter(py, state), iterations, lam, band_lam, at_bound, freedom);
     let all = first.into_pyobject(py)?.to_list();
-    for item in (sigma, step, rate, kappa, exact).into_pyobject(py)?.iter() {
+    let objective = column(|r| r.objective);
+    let rest = (sigma, step, rate, kappa, exact, selection, rejected, objective);
+    for item in rest.into_pyobject(py)?.iter() {
         all.append(item)?;
     }
     Ok(all.to_tuple())

@@ -210,6 +210,7 @@ impl Smoothing {
             lam: self.lam,
             sigma: self.sigma,
             ends: [&[], &[]],
+            start: &[],
         };
         let ends = if self.periodic {
             engine::Ends::Periodic

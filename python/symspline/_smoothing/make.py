@@ -46,10 +46,12 @@ from .data import (
 )
 from .factors import grouped, is_several, join, parts_of_factor, smoothed_spaces, split_ends
 from .knots import Knots, has_all_times, in_gaps, knots_for, with_enough_knots
+from .outliers import warn_of_outliers
 from .regression import check_infinite, geodesic_knots, geodesic_options, is_infinite, with_infinite_lam
 from .report import SmoothingReport
 from .solve import NO_CURVE, SolverOptions, one_per_curve, smoothed
 from .spline import SmoothingSpline
+from .starts import warn_of_minima
 from .warned import warn_of_bounds, warn_of_spread
 
 
@@ -360,7 +362,16 @@ def make_smoothing_spline(
     if faults:
         raise_or_warn(sorted(faults, key=lambda fault: fault.curve), on_failure, spline)
     counts = [np.sum(own.weights > 0, axis=-1) for own in whole.precisions]
-    warn_of_bounds(space, [part.report for part in noise], [spread(np.isnan(own)) for own in lams], counts)
+    reports = [part.report for part in noise]
+    outliers = [own.outliers.map(spread) for _, own, _ in found if own.outliers is not None]
+    sound = warn_of_outliers(space, loss, outliers, reports, counts)
+    minima = [spread(own.minima).reshape(batch) for _, own, _ in found if own.minima is not None]
+    best = warn_of_minima(space, minima, reports)
+    asked = [
+        np.reshape(spread(np.isnan(own)), good.shape) & good & only
+        for own, good, only in zip(lams, sound, best, strict=True)
+    ]
+    warn_of_bounds(space, reports, asked, counts)
     warn_of_spread(space, fitted.curve, whole, [part.report.df for part in noise])
     warn_of_signs(space, [valid_data])
     if not far_data:

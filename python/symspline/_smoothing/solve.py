@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .. import _core
 from .._arrays import refuse, short_repr
@@ -17,9 +18,11 @@ from .._spaces import Array, Doubles, Space
 from .._typing import Progress
 from .data import SmoothingData
 from .knots import Knots
+from .outliers import Outliers
 from .posterior import Posterior
 from .precision import Precision
 from .report import METHODS, SmoothingReport
+from .starts import Raw, Samples, best_of_starts
 
 # Part of the message for a smoothing that ended without a curve.
 NO_CURVE = "no spline joins"
@@ -44,6 +47,10 @@ class Smoothed(NamedTuple):
     between : bool
         Whether the variance between the knots is included. It is if there is a knot at every time of the data: the
         curve is then the mean of a process. With other knots it is a spline, which has no such freedom.
+    outliers : Outliers or None
+        Outcome of the rejection of data; None once the warnings have been issued.
+    minima : ndarray of int or None
+        Whether the curves are known to be the best ones, see `best_of_starts`; None once the warnings have been issued.
     """
 
     report: SmoothingReport
@@ -52,6 +59,8 @@ class Smoothed(NamedTuple):
     sigma: Any
     between: bool
     posterior: Posterior | None = None
+    outliers: Outliers | None = None
+    minima: NDArray[np.int_] | None = None
 
     def map(self, function: Any) -> Smoothed:
         """Apply a function to all arrays, such as the selection of some curves."""
@@ -100,10 +109,16 @@ def smoothed(
     if matrices is not None:
         matrices = np.ascontiguousarray(np.broadcast_to(matrices, (*batch, *matrices.shape[-3:])))
     t, y, at = (np.ascontiguousarray(x) for x in (noisy.times, small._as_doubles(inside), knots.times))
-    found, band, columns, (matrix, turn, size) = _core.smooth(
-        small._handle, t, y, precision.weights, matrices, at, lam, sigma, ends, *options, progress
-    )
-    state, iterations, lams, band_lam, at_bound, df, noise, step, rate, _, exact, scale = (
+    weights = precision.weights
+
+    def solve(lam: Doubles, start: Doubles | None) -> Raw:
+        return Raw(
+            *_core.smooth(small._handle, t, y, weights, matrices, at, lam, sigma, ends, *options, start, progress)
+        )
+
+    samples = Samples(t, small._numbers(y), weights, at, len(small.point_shape), ends is None)
+    (found, band, columns, (matrix, turn, size)), minima = best_of_starts(small, samples, lam, solve)
+    state, iterations, lams, band_lam, at_bound, df, noise, step, rate, _, exact, selection, rejected, _, scale = (
         column.reshape(batch) if batch else column[0].item()
         for column in (*columns, np.where(np.isnan(sigma), columns[6], sigma))
     )
@@ -117,7 +132,7 @@ def smoothed(
     on_space = numbers if span is None else span.embed(numbers)
     # Coordinates in a span of lower dimension are not those of the space.
     posterior = Posterior.of(matrix, turn, size) if span is None or size == 1 else None
-    return on_space, Smoothed(report, band, band_lam, scale, between, posterior), faults
+    return on_space, Smoothed(report, band, band_lam, scale, between, posterior, Outliers(selection, rejected), minima), faults
 
 
 def _reason(

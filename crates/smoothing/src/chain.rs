@@ -1,0 +1,197 @@
+//! A selection of data without outliers that needs no curve: the cheapest chain through the data.
+//!
+//! Dynamic programming finds the subset of data that costs least. A datum that follows another one costs
+//! `(d²/(4τ))²` with the squared distance d² of the two and the scale τ of pairs so far apart in time; a datum that is
+//! left out has a fixed cost. Outliers in runs are left out if their start and their end are farther than the path moves
+//! in that time. Up to half of the data may be outliers, for τ is a low quantile.
+
+use crate::frames::lanes_of;
+use crate::problem::Data;
+use symspline_core::scalar::{LANES, Lane, gather};
+use symspline_core::space::{Ambient, Erased};
+
+/// The number of data that may separate two neighbours of the chain.
+const WINDOW: usize = 64;
+/// The cost of a datum that is left out.
+const SKIPPED: f64 = 2.0;
+/// The squared distance, in units of τ, of which the square is the cost one.
+const UNIT: f64 = 4.0;
+/// The largest cost of a pair. It is finite, for a chain must exist.
+const MOST: f64 = 1e6;
+/// The number of intervals of the time between two data in which τ is estimated.
+const BINS: usize = 40;
+/// The number of pairs that suffice for τ.
+const PAIRS: usize = 200_000;
+/// With fewer data, the distances show no scale.
+const FEW: usize = 12;
+/// The data before and after a datum that show its speed.
+const AROUND: usize = 16;
+/// The numbers of steps between pairs that show the speed. Few of them lie on both sides of the border of a run of
+/// outliers.
+const SPEED: [usize; 2] = [3, 4];
+/// The numbers of steps between more distant pairs, whose squared distances exceed those of neighbours at least by this
+/// ratio if the data move. For a steady motion it is 25, for noise and for unrelated points one.
+const DISTANT: [usize; 3] = [4, 5, 6];
+const MOVES: f64 = 8.0;
+
+/// Ones for the data of the chain, zeros for others and for data without weight.
+pub fn chain(space: &Erased, data: &Data) -> Vec<f64> {
+    let used: Vec<usize> = (0..data.times.len()).filter(|&i| data.weights[i] > 0.0).collect();
+    let mut kept = vec![0.0; data.times.len()];
+    let times: Vec<f64> = used.iter().map(|&i| data.times[i]).collect();
+    if used.len() < FEW || times[0] == times[times.len() - 1] {
+        used.iter().for_each(|&i| kept[i] = 1.0);
+        return kept;
+    }
+    let apart = |pairs: &[(usize, usize)]| squares(space, data.points, &used, pairs);
+    let window = WINDOW.min(used.len() - 1);
+    let scale = Scale::new(&times, window, apart);
+    let speeds = speeds(&times, apart);
+    let (mut costs, mut before) = (vec![0.0; used.len()], vec![None; used.len()]);
+    for i in 1..used.len() {
+        // The chain may begin here if the window reaches the first datum.
+        costs[i] = if i <= window { SKIPPED * i as f64 } else { f64::INFINITY };
+        let pairs: Vec<(usize, usize)> = (i.saturating_sub(window)..i).map(|j| (j, i)).collect();
+        for ((j, _), square) in pairs.iter().zip(apart(&pairs)) {
+            let time = times[i] - times[*j];
+            let own = scale.at(time).max(speeds[i].max(speeds[*j]) * time * time);
+            let ratio = square / (UNIT * own);
+            let cost = costs[*j] + (ratio * ratio).min(MOST) + SKIPPED * (i - j - 1) as f64;
+            if cost < costs[i] {
+                (costs[i], before[i]) = (cost, Some(*j));
+            }
+        }
+    }
+    let last = used.len() - 1;
+    let total = |i: &usize| costs[*i] + SKIPPED * (last - i) as f64;
+    let mut at = (last - window..=last).min_by(|a, b| total(a).total_cmp(&total(b)));
+    while let Some(i) = at {
+        kept[used[i]] = 1.0;
+        at = before[i];
+    }
+    kept
+}
+
+/// The squared distances of pairs of data. Beyond the cut locus they are infinite.
+fn squares(space: &Erased, points: &[f64], used: &[usize], pairs: &[(usize, usize)]) -> Vec<f64> {
+    let len = space.point_len();
+    let row = |i: usize| &points[used[i] * len..][..len];
+    let [mut p, mut q, mut v] = [(); 3].map(|_| vec![Lane::ZERO; len]);
+    let mut found = Vec::with_capacity(pairs.len());
+    for group in 0..pairs.len().div_ceil(LANES) {
+        let at = lanes_of(group, pairs.len()).map(|k| pairs[k]);
+        gather(at.map(|(i, _)| row(i)), &mut p);
+        gather(at.map(|(_, j)| row(j)), &mut q);
+        let angle = space.log(&p, &q, &mut v);
+        let apart = space.distance(&p, &q, &v, angle);
+        let own = (apart * apart).to_array();
+        found.extend(
+            own.iter().take(pairs.len() - found.len()).map(|x| if x.is_nan() { f64::INFINITY } else { *x }),
+        );
+    }
+    found
+}
+
+/// τ as a function of the time between two data.
+struct Scale {
+    /// Logarithms of times, and τ there.
+    knots: Vec<(f64, f64)>,
+}
+
+impl Scale {
+    fn new(times: &[f64], window: usize, apart: impl Fn(&[(usize, usize)]) -> Vec<f64>) -> Self {
+        let every = (times.len() * window).div_ceil(PAIRS);
+        let pairs: Vec<(usize, usize)> = (0..times.len())
+            .step_by(every)
+            .flat_map(|i| (i + 1..=(i + window).min(times.len() - 1)).map(move |j| (i, j)))
+            .filter(|&(i, j)| times[j] > times[i])
+            .collect();
+        let mut lags: Vec<(f64, f64)> =
+            pairs.iter().zip(apart(&pairs)).map(|(&(i, j), square)| (times[j] - times[i], square)).collect();
+        lags.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let steps: Vec<f64> =
+            pairs.iter().filter(|(i, j)| j - i == 1).map(|&(i, j)| times[j] - times[i]).collect();
+        let step = quantile(steps, 0.5).unwrap_or(1.0);
+        let near: Vec<(usize, usize)> = pairs.into_iter().filter(|(i, j)| j - i == 1).collect();
+        let base = low(apart(&near));
+        let mut largest = 0.0_f64;
+        let mut knots: Vec<(f64, f64)> = Vec::new();
+        let mut from = 0;
+        for bin in 1..=BINS {
+            let mut to = bin * lags.len() / BINS;
+            // Equal times belong together.
+            while to > from && to < lags.len() && lags[to].0 == lags[to - 1].0 {
+                to += 1;
+            }
+            if to <= from {
+                continue;
+            }
+            let own = &lags[from..to];
+            let time = own[own.len() / 2].0;
+            // Beyond the first step, at most that of a steady motion.
+            let steady = base * (time / step).powi(2).max(1.0);
+            largest = largest.max(low(own.iter().map(|lag| lag.1).collect()).min(steady));
+            knots.push((time.ln(), largest));
+            from = to;
+        }
+        Scale { knots }
+    }
+
+    /// τ for a time, by linear interpolation; at least the smallest positive number.
+    fn at(&self, time: f64) -> f64 {
+        let x = time.ln();
+        let after = self.knots.partition_point(|knot| knot.0 <= x);
+        let tau = match (after.checked_sub(1).map(|i| self.knots[i]), self.knots.get(after)) {
+            (Some((a, low)), Some(&(b, high))) => low + (high - low) * (x - a) / (b - a),
+            (Some((_, tau)), None) | (None, Some(&(_, tau))) => tau,
+            (None, None) => 0.0,
+        };
+        tau.max(f64::MIN_POSITIVE)
+    }
+}
+
+/// The squared speed around every datum, or zero where distances do not grow with time as those of a motion do. A
+/// recording may rest in one part and move fast in another one.
+fn speeds(times: &[f64], apart: impl Fn(&[(usize, usize)]) -> Vec<f64>) -> Vec<f64> {
+    let n = times.len();
+    // For every lag, the squared distances from the data before.
+    let column = |lag: usize| {
+        let pairs: Vec<(usize, usize)> = (lag..n).map(|i| (i - lag, i)).collect();
+        (lag, [vec![f64::NAN; lag.min(n)], apart(&pairs)].concat())
+    };
+    let (near, distant, middle) = ([1].map(column), DISTANT.map(column), SPEED.map(column));
+    let until = |last: usize| {
+        let own = last.saturating_sub(AROUND)..=last;
+        let lower = |columns: &[(usize, Vec<f64>)]| {
+            quantile(columns.iter().flat_map(|(_, squares)| squares[own.clone()].to_vec()).collect(), 0.25)
+        };
+        let speed = |(lag, squares): &(usize, Vec<f64>)| -> Vec<f64> {
+            let squared = |i: usize| squares[i] / (times[i] - times[i.saturating_sub(*lag)]).powi(2);
+            own.clone().map(squared).collect()
+        };
+        if lower(&distant)? < MOVES * lower(&near)? {
+            return None;
+        }
+        quantile(middle.iter().flat_map(speed).collect(), 0.25)
+    };
+    let found: Vec<f64> = (0..n).map(|i| until(i).unwrap_or(0.0)).collect();
+    let around = |i: usize| (0..=3).map(|k| found[(i + k * AROUND / 2).min(n - 1)]).fold(0.0, f64::max);
+    (0..n).map(around).collect()
+}
+
+/// The lower quartile of squared distances; that of the positive ones if it is zero, as for rounded data.
+fn low(squares: Vec<f64>) -> f64 {
+    let positive: Vec<f64> = squares.iter().copied().filter(|x| *x > 0.0).collect();
+    match quantile(squares, 0.25) {
+        Some(found) if found > 0.0 => found,
+        _ => quantile(positive, 0.25).unwrap_or(0.0),
+    }
+}
+
+/// A quantile of finite numbers; None if there are none.
+pub fn quantile(mut values: Vec<f64>, share: f64) -> Option<f64> {
+    values.retain(|x| x.is_finite());
+    let last = values.len().checked_sub(1)?;
+    let at = (share * last as f64).round() as usize;
+    Some(*values.select_nth_unstable_by(at, f64::total_cmp).1)
+}

@@ -1,0 +1,95 @@
+"""What is known about the data that a robust loss rejects."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._faults import of_index
+from .._spaces import Space
+from .._warnings import warn
+from .factors import is_several, smoothed_spaces
+from .report import SmoothingReport
+from .warned import SmoothingWarning
+
+# Kinds of selections that are not sound, as the core numbers them.
+_INTERPOLATED, _UNSETTLED, _FEW = 1, 2, 3
+
+
+class Outliers(NamedTuple):
+    """Outcome of the rejection of data, for each curve.
+
+    Attributes
+    ----------
+    selection : int or ndarray of int
+        Kind of the selection; 0 if it is sound, or if there is none.
+    rejected : int or ndarray of int
+        Number of data that were not selected.
+    """
+
+    selection: Any
+    rejected: Any
+
+    def map(self, function: Callable[[Any], Any]) -> Outliers:
+        """Apply a function to both arrays, such as the selection of some curves."""
+        return Outliers(function(self.selection), function(self.rejected))
+
+
+def warn_of_outliers(
+    space: Space, loss: str, each: list[Outliers], reports: list[SmoothingReport], counts: list[Any]
+) -> list[NDArray[np.bool_]]:
+    """Warn once if the outliers of a curve may be others than those that were rejected.
+
+    Parameters
+    ----------
+    each : list of Outliers
+        Outcomes in every space in which data were smoothed.
+    reports : list of SmoothingReport
+        Reports of the same.
+    counts : list of ndarray of int
+        Number of data of each curve.
+
+    Returns
+    -------
+    list of ndarray of bool
+        Whether the curves of every space are sound, so that other warnings apply.
+    """
+    sound = [np.asarray(own.selection) == 0 for own in each]
+    bad = [~good & np.asarray(report.converged) for good, report in zip(sound, reports, strict=True)]
+    total = sum(int(np.count_nonzero(own)) for own in bad)
+    for number, (own, outliers, report, count) in enumerate(zip(bad, each, reports, counts, strict=True)):
+        if not own.any():
+            continue
+        index = tuple(map(int, np.argwhere(own)[0]))
+        of = of_index(index)
+        of += f" in factor {number}, {smoothed_spaces(space)[number]!r}" if is_several(space) else ""
+        of += f" (and {total - 1} more)" if total > 1 else ""
+        kind, rejected = (int(np.asarray(one)[index]) for one in outliers)
+        df, data = float(np.asarray(report.df)[index]), int(np.broadcast_to(count, own.shape)[index])
+        warn(_message(kind, f"The smoothing{of} with loss={loss!r}", rejected, df, data), SmoothingWarning, index)
+        break
+    return sound
+
+
+def _message(kind: int, what: str, rejected: int, df: float, count: int) -> str:
+    if kind == _INTERPOLATED:
+        return (
+            f"{what} follows nearly all data ({df:.3g} degrees of freedom for {count} data): their noise is smaller "
+            f"than their sampling can show. It rejected {rejected} data that deviate far more than others, and cannot "
+            "find smaller outliers. Its standard deviations are only valid if the data are that accurate. Pass sigma= "
+            "to find smaller outliers, or more data per time."
+        )
+    if kind == _UNSETTLED:
+        return (
+            f"{what} did not find out which data are outliers: two selections lead to each other, and {rejected} of "
+            f"{count} data are rejected by the last one. Plot the residuals, and pass sigma=, or weights of 0 for the "
+            "wrong data."
+        )
+    return (
+        f"{what} rejects many data: {rejected} of {count} do not lie near the curve. If these are not outliers, the "
+        "noise varies along the recording, or the data belong to several curves. Plot the residuals, and pass sigma= "
+        "or weights=."
+    )
