@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Sequence
 from typing import Any, TypedDict, Unpack, overload
 
@@ -50,17 +51,14 @@ from .._typing import (
 from .._validation import one_of
 from .._warnings import warn
 from ..manifolds._manifold import refuse_functions
-from .measurements import SKIPNA, Constant, Measurement, Points
+from .knots import filled, first_knots, merged, shown_times
+from .measurements import SKIPNA, BodyRates, Constant, Measurement, Points, Velocities
 from .missing import measurement_without_missing
-from .solve import Iteration, Setup, Solution, read_lams
+from .search import Search, Starts, automatic, solved, warn_of_gaps, warn_of_turns
+from .solve import Setup, Solution, read_lams
 from .spline import EstimatedSpline, joint
-from .start import initial_points
 from .terms import Term, bind
 
-# Automatic knots: the first number of them, per degree of freedom, and how often they are chosen.
-_FIRST, _PER_FREEDOM, _TRIES = 60, 4, 4
-# If residuals exceed their standard deviations by the first factor, there are so many times more knots in the next try.
-_LARGE, _MORE = 1.2, 4
 # The noise may exceed the given standard deviations by this factor without a warning.
 _FACTOR = 2.0
 # Curves with the largest λ for the jerk have fewer degrees of freedom than this.
@@ -70,7 +68,7 @@ _PARABOLA = 3.5
 class EstimateOptions(TypedDict, total=False):
     """The keywords of `estimate` that do not affect the type of the result."""
 
-    penalty: SmoothingPenalty
+    penalty: SmoothingPenalty | None
     lam: Numbers | None
     criterion: Criterion | None
     gamma: float
@@ -107,7 +105,7 @@ def estimate(
     knots: TimesLike,
     space: Space[Any] | str,
     *,
-    penalty: SmoothingPenalty = "acceleration",
+    penalty: SmoothingPenalty | None = None,
     lam: Numbers | None = None,
     criterion: Criterion | None = None,
     gamma: float = 1.4,
@@ -131,13 +129,16 @@ def estimate(
     measurements : sequence of measurements
         Objects of `symspline.measure`. Each has its own times.
     knots : int, array_like or "auto"
-        Knots of the curve: their number, or an increasing array that includes all times. With ``"auto"``, their number
-        follows from the degrees of freedom of the curve. About four knots per degree of freedom are enough.
+        Knots of the curve: their number, or an increasing array that includes all times. With ``"auto"``, they are as
+        dense as the sensors can tell: intervals are halved until the residuals are those of the initial curve, and
+        until more knots do not move the estimate. For a number or ``"auto"``, gaps of the data receive further knots,
+        as close together as those beside the gap.
     space : Space or str
         A space or its name. On ``se:3``, rotations and positions are estimated, each with its own λ, and the curve is
         the spline of the space through the estimated poses.
-    penalty : {"acceleration", "jerk"}, default "acceleration"
-        The derivative whose squared integral is the penalty. Use ``"jerk"`` for vehicles and for accelerometers.
+    penalty : {"acceleration", "jerk"}, optional
+        The derivative whose squared integral is the penalty. The default is ``"jerk"`` if `BodyRates` or `Velocities`
+        are among the measurements, and ``"acceleration"`` otherwise. Use ``"jerk"`` for vehicles and accelerometers.
     lam : float or tuple, optional
         Weight λ ≥ 0 of the penalty, for products and poses also a tuple with one entry per part. None, the default,
         lets `criterion` choose λ.
@@ -151,7 +152,8 @@ def estimate(
         Loss of measurements that do not have their own. The others limit the influence of outliers, which begins where
         the given standard deviations make a residual improbable.
     start : Curve, optional
-        Initial curve on the space. By default it follows from points, rates and directions.
+        Initial curve on the space. By default it follows from rates that are integrated and aligned with the measured
+        attitudes, from points, or from directions.
     tol : float, default 1e-3
         The iteration ends when no point and no constant moves by more than this fraction of its standard deviation.
     max_iter : int, default 50
@@ -177,7 +179,9 @@ def estimate(
     Warns
     -----
     SmoothingWarning
-        If a chosen λ is at a bound, or the residuals are much larger than the given standard deviations.
+        If a chosen λ is at a bound, the residuals are much larger than the given standard deviations, two different
+        curves agree equally well with the measurements, the body turns by more than half a turn between two knots, or
+        given knots leave out a gap of the data.
 
     See Also
     --------
@@ -236,6 +240,8 @@ def estimate(
         raise ValidationError("there are no measurements")
     if checked_flag(skipna, "skipna"):
         given = [measurement_without_missing(own) for own in given]
+    if penalty is None:
+        penalty = "jerk" if any(isinstance(own, (BodyRates, Velocities)) for own in given) else "acceleration"
     one_of(penalty, "penalty", "acceleration", "jerk")
     if criterion is not None:
         one_of(criterion, "criterion", "gcv", "reml", "cp")
@@ -245,7 +251,7 @@ def estimate(
     most = whole_number(max_iter, "max_iter", 1)
     spaces = smoothed_spaces(space)
     lams = read_lams(lam, len(spaces))
-    axis, shown, automatic = _knots(knots, given)
+    axis, shown, data = _knots(knots, given)
     if len(given) == 1 and isinstance(given[0], Points) and _is_plain(given[0]) and start is None:
         return _smoothed(
             given[0],
@@ -265,41 +271,19 @@ def estimate(
         )
     terms, losses = _terms(given, axis, space, loss)
     constants = _constants(terms)
-    before = np.inf
-    while True:
-        times = axis.knots(shown)
-        _check_range(terms, times)
-        if penalty == "jerk" and len(times) < 4:
-            raise ValidationError(f"penalty='jerk' needs at least 4 knots, but there are {len(times)}")
-        setup = Setup(spaces, times, terms, losses, constants, penalty, criterion or "reml", gamma, tol, lams, most)
-        points = initial_points(setup, space, shown, start)
-        found = Iteration(setup, points, progress).run()
-        if found.failure or not automatic:
-            break
-        wanted = _PER_FREEDOM * int(np.ceil(max(report.df for report in found.reports))) + 8
-        if _misses(found, before):
-            # Too few knots for the motion: the degrees of freedom are not informative.
-            before, wanted = float(found.reports[0].sigma), max(wanted, _MORE * len(times))
-            automatic = (automatic[0] + 1, automatic[1])
-        if automatic[0] == 0 or wanted <= 1.25 * len(times) or len(times) >= len(automatic[1]):
-            break
-        automatic = (automatic[0] - 1, automatic[1])
-        shown = thin_knots(Knots(automatic[1], axis.knots(automatic[1])), wanted).t
-    return _curve(setup, found, given, space, axis, shown, policy, on_failure)
-
-
-def _misses(found: Solution, before: float) -> bool:
-    """Whether the residuals are too large and more knots may help.
-
-    Parameters
-    ----------
-    found : Solution
-        Result with the present knots.
-    before : float
-        Ratio of the residuals and the standard deviations with fewer knots.
-    """
-    sigma = float(found.reports[0].sigma)
-    return sigma > _LARGE and (any(bool(own.at_bound) for own in found.reports) or sigma < 0.95 * before)
+    times = axis.knots(shown)
+    _check_range(terms, times)
+    if penalty == "jerk" and len(times) < 4:
+        raise ValidationError(f"penalty='jerk' needs at least 4 knots, but there are {len(times)}")
+    setup = Setup(spaces, times, terms, losses, constants, penalty, criterion or "reml", gamma, tol, lams, most)
+    begin = Starts(setup, space, axis, start)
+    if isinstance(knots, str):
+        shown, setup, search = automatic(setup, begin, axis, shown, data, progress)
+    else:
+        search = solved(setup, begin, progress)
+        warn_of_turns(setup, shown)
+        warn_of_gaps(shown, times, data)
+    return _curve(setup, search, given, space, axis, shown, policy, on_failure)
 
 
 def _is_plain(points: Points) -> bool:
@@ -362,8 +346,8 @@ def _smoothed(
     )
 
 
-def _knots(knots: Any, given: list[Measurement]) -> tuple[TimeAxis, Array, Any]:
-    """Return the time axis, the knots as the user sees them, and for automatic knots all times."""
+def _knots(knots: Any, given: list[Measurement]) -> tuple[TimeAxis, Array, Doubles]:
+    """Return the time axis, the knots as the user sees them, and all times of the measurements."""
     each, zone = [], None
     for i, own in enumerate(given):
         times, own_zone = times_of(own.t, f"measurements[{i}].t")
@@ -380,21 +364,30 @@ def _knots(knots: Any, given: list[Measurement]) -> tuple[TimeAxis, Array, Any]:
         each.append(array)
     if len({array.dtype.kind in "Mm" for array in each}) > 1:
         raise ValidationError("some measurements have dates and others have numbers as times. Use one of them.")
-    automatic = isinstance(knots, str)
-    if automatic and knots != "auto":
+    if isinstance(knots, str) and knots != "auto":
         raise ValidationError(f"knots must be a number, an array or 'auto', not {short_repr(knots)}")
-    if automatic or (isinstance(knots, (int, np.integer)) and not isinstance(knots, bool)):
-        union = np.unique(np.concatenate(each))
+    union = np.unique(np.concatenate(each))
+    if isinstance(knots, str) or (isinstance(knots, (int, np.integer)) and not isinstance(knots, bool)):
         if len(union) < 2:
             raise ValidationError("the measurements have one time only. A curve needs measurements at two or more.")
         # The other measurements are compared with this zone when their times are read.
         axis, shown = time_axis_of(Moments(union, zone))
-        count = _FIRST if automatic else int(knots)
+        times = axis.knots(shown)
+        if isinstance(knots, str):
+            first = first_knots(times[0], times[-1])
+            return axis, shown_times(axis, shown, first), times[merged(times, len(times))]
+        count = int(knots)
         if count < 2:
             raise ValidationError(f"knots must be at least 2, not {count}")
-        if not automatic and count > len(union):
-            return axis, _even(shown, count), None
-        return axis, thin_knots(Knots(shown, axis.knots(shown)), count).t, (_TRIES, shown) if automatic else None
+        index = merged(times, count)
+        shown, times = shown[index], times[index]
+        if count > len(index):
+            return axis, _even(shown, count), times
+        chosen = thin_knots(Knots(shown, times), count)
+        with_gaps = filled(chosen.times, times)
+        if len(with_gaps) > len(chosen.times):
+            return axis, shown_times(axis, shown, with_gaps), times
+        return axis, chosen.t, times
     array = as_array(times_of(knots, "knots")[0], "knots")
     if array.ndim != 1 or len(array) < 2:
         raise ValidationError(f"knots has shape {array.shape}, but an increasing array of at least two is needed")
@@ -402,7 +395,11 @@ def _knots(knots: Any, given: list[Measurement]) -> tuple[TimeAxis, Array, Any]:
     back = np.flatnonzero(~(np.diff(times) > 0))
     if len(back):
         raise ValidationError(f"knots[{back[0] + 1}] is not after knots[{back[0]}], but knots must increase")
-    return axis, shown, None
+    data = np.empty(0)
+    if union.dtype.kind in "Mm" or shown.dtype.kind not in "Mm":
+        with contextlib.suppress(ValidationError):
+            data, _ = axis.at(union, (), False)
+    return axis, shown, data
 
 
 def _even(union: Array, count: int) -> Array:
@@ -456,7 +453,7 @@ def _check_range(terms: list[Term], times: Doubles) -> None:
 
 def _curve(
     setup: Setup,
-    found: Solution,
+    search: Search,
     given: list[Measurement],
     space: Space[Any],
     axis: TimeAxis,
@@ -464,6 +461,7 @@ def _curve(
     policy: Any,
     on_failure: Any,
 ) -> SmoothingSpline[Any, Any]:
+    found = search.found
     factors = factors_of(space)
     parts, ends = [], []
     for factor, own in zip(factors, grouped(space, found.points), strict=True):
@@ -496,6 +494,7 @@ def _curve(
     )
     if found.failure:
         raise_or_warn([Fault(0, UNCONVERGED, found.failure)], on_failure, curve)
+    search.warn_of_rival()
     # Parabolas have no jerk, so that the largest λ does not need a warning.
     stiff = [setup.penalty == "jerk" and report.df < _PARABOLA for report in found.reports]
     chosen = [np.asarray(np.isnan(lam) and not own) for lam, own in zip(setup.lams, stiff, strict=True)]

@@ -96,6 +96,10 @@ class Solution(NamedTuple):
         Covariance of the parameters for noise of variance one.
     residuals : list of ndarray
         Whitened residuals of each term.
+    variances : ndarray, shape (knots, m)
+        Variances of the coordinates at the knots for noise of variance one.
+    loss : float
+        Sum of the losses of all measurements and of the priors.
     failure : str
         What went wrong, or "".
     """
@@ -106,6 +110,8 @@ class Solution(NamedTuple):
     matrices: list[Doubles]
     covariance: Doubles
     residuals: list[Doubles]
+    variances: Doubles
+    loss: float
     failure: str
 
 
@@ -204,9 +210,11 @@ def fitted(setup: Setup, points: list[Array]) -> list[CoreCurve] | None:
 class Iteration:
     """The iteration of one estimate."""
 
-    def __init__(self, setup: Setup, points: list[Array], progress: Callable[[int, int], object] | None) -> None:
+    def __init__(
+        self, setup: Setup, points: list[Array], progress: Callable[[int, int], object] | None, values: Values
+    ) -> None:
         self.setup, self.points, self.progress = setup, points, progress
-        self.values: Values = {name: np.array(own.start) for name, own in setup.constants.items()}
+        self.values: Values = {name: np.array(own.start) for name, own in setup.constants.items()} | values
         self.first = np.cumsum([0, *(space.dim for space in setup.spaces)]).tolist()
         self.curves: list[Any] = []
 
@@ -245,9 +253,9 @@ class Iteration:
         for number in count(1):
             self.curves = curves
             linear = self._linearised()
-            weights, value = self._weighted(linear)
+            weights, loss = self._weighted(linear)
             found = self._solve(linear, weights, *choice.asked(size))
-            value += sum(float(lam) * energy(own, setup.penalty) for lam, own in zip(found.lams, curves, strict=True))
+            value = loss + sum(float(lam) * energy(own, setup.penalty) for lam, own in zip(found.lams, curves, strict=True))
             if self.progress is not None:
                 self.progress(number, setup.max_iter)
             if not found.determined:
@@ -291,7 +299,10 @@ class Iteration:
         ]
         covariance = np.asarray(np.linalg.pinv(found.information, hermitian=True), np.float64)
         residuals = [own.residuals for own in linear]
-        return Solution(self.points, self.values, reports, found.matrices, covariance, residuals, failure)
+        variances = found.variances[0]
+        return Solution(
+            self.points, self.values, reports, found.matrices, covariance, residuals, variances, loss, failure
+        )
 
     def _linearised(self) -> list[Linearised]:
         setup = self.setup

@@ -1,9 +1,10 @@
-"""The initial curve of an estimate: smoothed points, integrated rates, or the attitudes of seen directions."""
+"""The initial curves of an estimate: integrated rates, smoothed points, or the attitudes of seen directions."""
 
 from __future__ import annotations
 
 import warnings
-from typing import Any
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,69 +15,295 @@ from .._curve import Curve
 from .._smoothing import make_smoothing_spline
 from .._smoothing.factors import split
 from .._spaces import Array, Doubles, Euclidean, Product, Space, SpecialOrthogonal, factors_of
+from .._time import TimeAxis
 from ..convert import matrix_to_quaternion
+from .integrated_rates import Attitudes, Integral, Path, Rates
 from .rates import attitudes_at
 from .solve import Setup
-from .terms import Body, DirectionTerm, ForceTerm, PointTerm, RateTerm
+from .terms import Body, DirectionTerm, ForceTerm, InformationTerm, PointTerm, RateTerm, Term, Values, VelocityTerm
 
 _SO3 = SpecialOrthogonal(3)
+# The points of a curve at times of the core.
+PathOfPart = Callable[[Doubles], Array]
+# The largest number of knots of smoothed points.
+_MOST = 2000
+# Points at which velocities are given have this many times the standard deviation of other points.
+_BESIDE = 2.0
+# Fewer attitudes than these do not determine the bias of rates if they are wrong.
+_FEW = 3
 
 
-def initial_points(setup: Setup, space: Space[Any], shown: Array, start: Any) -> list[Array]:
-    """Return initial points at the knots in every part."""
+class Start(NamedTuple):
+    """Where an iteration begins.
+
+    Attributes
+    ----------
+    paths : list of callable
+        Functions that return the points of every part at times.
+    values : dict
+        Initial values of some parameters, by name.
+    """
+
+    paths: list[PathOfPart]
+    values: Values
+
+    def points(self, knots: Doubles) -> list[Array]:
+        """Return points at the knots in every part."""
+        return [path(knots) for path in self.paths]
+
+
+def starts(setup: Setup, space: Space[Any], axis: TimeAxis, start: Any) -> Iterator[Start]:
+    """Return initial curves, the most promising first. Each is computed when it is asked for."""
     if start is not None:
         if not isinstance(start, Curve) or start.space != space:
             raise ValidationError(f"start must be a curve on {space!r}, not {short_repr(start)}")
-        extended: Any = start
-        points = extended(shown, extrapolate="geodesic")
-        each = points if isinstance(space, Product) else (points,)
-        return [part for factor, own in zip(factors_of(space), each, strict=True) for part in split(factor, own)]
-    return [_initial(setup, part, own) for part, own in enumerate(setup.spaces)]
+        yield Start([_of_curve(start, axis, part) for part in range(len(setup.spaces))], {})
+        return
+    each = [_candidates(setup, part, own) for part, own in enumerate(setup.spaces)]
+    chosen = [own[0]() for own in each]
+    yield _joined(chosen)
+    for part, candidates in enumerate(each):
+        for candidate in candidates[1:]:
+            yield _joined([*chosen[:part], candidate(), *chosen[part + 1 :]])
 
 
-def _initial(setup: Setup, part: int, space: Space[Any]) -> Array:
-    """Return initial points of one part: smoothed points, integrated rates, or the attitudes of seen directions."""
-    knots = setup.knots
-    points = [term for term in setup.terms if isinstance(term, PointTerm) and term.parts == [part]]
-    times = np.concatenate([term.times for term in points]) if points else np.empty(0)
+def _joined(parts: list[Start]) -> Start:
+    values: Values = {}
+    for own in parts:
+        values |= own.values
+    return Start([path for own in parts for path in own.paths], values)
+
+
+def _of_curve(start: Any, axis: TimeAxis, part: int) -> PathOfPart:
+    """Return the path of one part of a curve of the user."""
+
+    def path(x: Doubles) -> Array:
+        points = start(axis.shown(x, ()), extrapolate="geodesic")
+        each = points if isinstance(start.space, Product) else (points,)
+        return [own for factor, rows in zip(factors_of(start.space), each, strict=True) for own in split(factor, rows)][
+            part
+        ]
+
+    return path
+
+
+def _candidates(setup: Setup, part: int, space: Space[Any]) -> list[Callable[[], Start]]:
+    """Return functions that compute initial curves of one part, the most promising first."""
+    points = [
+        term for term in setup.terms if isinstance(term, (PointTerm, InformationTerm)) and term.parts == [part]
+    ]
     rates = [term for term in setup.terms if isinstance(term, RateTerm) and term.parts == [part]]
     seen = [term for term in setup.terms if isinstance(term, DirectionTerm) and term.parts == [part]]
-    spread = len(np.unique(times)) > 1 and (not rates or np.ptp(times) > 0.8 * (knots[-1] - knots[0]))
-    if spread:
-        order = np.argsort(times, kind="stable")
-        y = np.concatenate([term.y for term in points])[order]
-        weights = np.concatenate([term.noise[:, 0] ** -2.0 for term in points])[order]
-        count = min(len(np.unique(times)), len(knots), 200)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            curve = make_smoothing_spline(
-                times[order],
-                y,
-                space,
-                weights=weights / weights.max(),
-                knots=count,
-                on_failure="ignore",
-                loss="linear" if all(loss == "linear" for loss in setup.losses) else "cauchy",
-            )
-        smooth = curve(knots, extrapolate="geodesic")
-        if np.isfinite(smooth).all():
-            return np.asarray(smooth)
+    found: list[Callable[[], Start]] = []
     if rates and rates[0].body.is_rotation:
+        attitudes = _attitudes(space, points, seen)
         forces = [term for term in setup.terms if isinstance(term, ForceTerm) and term.parts[0] == part]
-        vectors = [_force_vectors(setup, term) for term in forces]
-        vectors += [(np.repeat(own.times, own.seen.shape[1]), *_rows(own.reference, own.seen)) for own in seen]
-        # The rows of a rotation matrix are the fixed axes in the frame of the body.
-        vectors += [(np.repeat(own.times, 3), *_rows(np.eye(3), Body(space).matrices(own.y))) for own in points]
-        return _integrated(setup, space, rates[0], vectors)
+
+        def aligned() -> Start:
+            return _with_rates(setup, space, rates, attitudes)
+
+        def by_vectors() -> Start:
+            vectors = [_force_vectors(setup, term) for term in forces]
+            vectors += [(np.repeat(own.times, own.seen.shape[1]), *_rows(own.reference, own.seen)) for own in seen]
+            # The rows of a rotation matrix are the fixed axes in the frame of the body.
+            vectors += [
+                (np.repeat(own.times, 3), *_rows(np.eye(3), Body(space).matrices(own.y)))
+                for own in points
+            ]
+            return _integrated(setup, space, rates[0], vectors)
+
+        several = sum(len(own.attitudes.times) for own in attitudes)
+        found = [aligned] if several else []
+        if forces or (seen and several < _FEW) or not several:
+            found.insert(0 if several < _FEW else 1, by_vectors)
+    beside = [term for term in setup.terms if isinstance(term, VelocityTerm) and term.parts == [part]]
+    if beside and not isinstance(space, Euclidean):
+        found.append(lambda: _smoothed(setup, space, points, beside))
+    times = np.concatenate([term.times for term in points]) if points else np.empty(0)
+    if len(np.unique(times)) > 1:
+        found.append(lambda: _smoothed(setup, space, points, []))
+    if found:
+        return found
     if seen:
-        return _seen(setup, space, seen)
+        return [lambda: Start([lambda x: _seen(x, space, seen)], {})]
     if len(times):
-        return np.asarray(np.repeat(points[0].y[:1], len(knots), axis=0))
+        return [lambda: Start([lambda x: np.repeat(points[0].y[:1], len(x), axis=0)], {})]
     if isinstance(space, Euclidean):
-        return np.zeros((len(knots), *space.point_shape))
+        return [lambda: Start([lambda x: np.zeros((len(x), *space.point_shape))], {})]
     raise ValidationError(
         f"there is no initial curve on {space!r}: no measurement has points of it, rates or directions. Pass `start`."
     )
+
+
+# ---- points ----
+
+
+def _scales(term: PointTerm | InformationTerm) -> Doubles:
+    """Return the usual standard deviation of a coordinate of every point."""
+    if isinstance(term, PointTerm):
+        return term.noise[:, 0]
+    information = np.mean(term.roots**2, axis=-1).sum(axis=-1)
+    return np.asarray(term.noise[:, 0] / np.sqrt(np.maximum(information, np.finfo(float).tiny)))
+
+
+def _smoothed(
+    setup: Setup, space: Space[Any], points: list[PointTerm | InformationTerm], beside: list[VelocityTerm]
+) -> Start:
+    """Return smoothed points, together with those at which velocities are given."""
+    scales = [_scales(term) for term in points]
+    typical = float(np.median(np.concatenate(scales))) if scales else 1.0
+    times = np.concatenate([*(term.times for term in points), *(term.times for term in beside)])
+    y = np.concatenate([*(term.y for term in points), *(term.y for term in beside)])
+    sigma = np.concatenate([*scales, *(np.full(len(term.times), _BESIDE * typical) for term in beside)])
+    order = np.argsort(times, kind="stable")
+    count = min(len(np.unique(times)), max(len(setup.knots), 2), _MOST)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        curve: Any = make_smoothing_spline(
+            times[order],
+            y[order],
+            space,
+            weights=(sigma[order] / sigma.min()) ** -2.0,
+            knots=count,
+            on_failure="ignore",
+            loss="linear" if all(loss == "linear" for loss in setup.losses) else "cauchy",
+        )
+
+    def path(x: Doubles) -> Array:
+        found = np.asarray(curve(x, extrapolate="geodesic"))
+        return found if np.isfinite(found).all() else np.repeat(y[order][:1], len(x), axis=0)
+
+    return Start([path], {})
+
+
+# ---- rates ----
+
+
+class _Seen(NamedTuple):
+    """Measured attitudes, and the name of the offset of their times."""
+
+    attitudes: Attitudes
+    time_offset: str | None
+
+
+def _attitudes(
+    space: Space[Any], points: list[PointTerm | InformationTerm], seen: list[DirectionTerm]
+) -> list[_Seen]:
+    """Return measured attitudes, or those of several directions that are seen at the same time if there are few."""
+    found = [
+        _Seen(Attitudes(term.times, Body(space).matrices(term.y), _scales(term)), term.time_offset) for term in points
+    ]
+    if sum(len(own.attitudes.times) for own in found) >= _FEW:
+        return found
+    for term in seen:
+        profile = np.einsum("nki,nkl->nil", term.reference, term.seen)
+        sizes = np.linalg.svd(profile, compute_uv=False)
+        good = sizes[:, 1] > _RANK * sizes[:, 0]
+        if good.any():
+            sigma = np.mean(term.noise[good], axis=1)
+            found.append(_Seen(Attitudes(term.times[good], _nearest(profile[good]), sigma), term.time_offset))
+    return found
+
+
+def _with_rates(setup: Setup, space: Space[Any], rates: list[RateTerm], attitudes: list[_Seen]) -> Start:
+    """Return the integrated rates, aligned with measured attitudes, with the bias and the time offset that follow."""
+    first = max(rates, key=_coverage)
+    name, values = first.time_offset, setup.constants
+
+    def began(term_offset: str | None) -> float:
+        return 0.0 if term_offset is None else float(values[term_offset].start[0])
+
+    names = {own.time_offset for own in attitudes}
+    # Attitudes with different clocks: those with a known one, or those that are most numerous.
+    chosen = None if None in names else max(names, key=lambda one: sum(one == own.time_offset for own in attitudes))
+    own = [each.attitudes for each in attitudes if each.time_offset == chosen]
+    times = np.concatenate([each.times for each in own]) + began(chosen)
+    order = np.argsort(times, kind="stable")
+    data = Attitudes(
+        times[order],
+        np.concatenate([each.matrices for each in own])[order],
+        np.concatenate([each.sigma for each in own])[order],
+    )
+    given = _rates_of(setup, first, [term for term in rates if term is not first and term.time_offset == name])
+    given = given._replace(times=given.times + began(name))
+    low, high = float(setup.knots[0]), float(setup.knots[-1])
+    offset = None
+    if name != chosen and name is not None:
+        # Later rates are earlier attitudes.
+        offset = (0.0, float(given.times[-1]) - high, float(given.times[0]) - low)
+    elif name != chosen and chosen is not None:
+        offset = (0.0, low - float(data.times[0]), high - float(data.times[-1]))
+    if offset is not None:
+        offset = (0.0, min(offset[1], 0.0), max(offset[2], 0.0))
+    path = Path(given, data, offset)
+    found: Values = {}
+    if first.bias is not None:
+        found[first.bias] = path.bias
+    late = 0.0
+    if name != chosen and name is not None:
+        late = path.offset
+        found[name] = np.array([began(name) - late])
+    elif name != chosen and chosen is not None:
+        found[chosen] = np.array([began(chosen) + path.offset])
+    for term in rates:
+        if term.bias is not None and term.bias not in found:
+            found[term.bias] = _relative(first, term) + (path.bias if first.bias is not None else 0.0)
+    return Start([lambda x: _rotations(space, path(x + late))], found)
+
+
+def _coverage(term: RateTerm) -> float:
+    """Return the time in which there are rates."""
+    steps = np.diff(np.sort(term.times))
+    return float(np.minimum(steps, 10 * np.median(steps)).sum()) if len(steps) else 0.0
+
+
+def _relative(first: RateTerm, other: RateTerm) -> Doubles:
+    """Return the bias of one gyroscope minus that of another; zero if they have no times in common."""
+    order = np.argsort(first.times, kind="stable")
+    t = first.times[order]
+    both = (other.times >= t[0]) & (other.times <= t[-1])
+    if not both.any():
+        return np.zeros(3)
+    rates = np.stack([np.interp(other.times[both], t, row) for row in first.omega[order].T], axis=-1)
+    return np.asarray(np.median(other.omega[both] - rates, axis=0))
+
+
+def _rates_of(setup: Setup, first: RateTerm, others: list[RateTerm]) -> Rates:
+    """Return the rates of one gyroscope. Others fill the gaps that it has."""
+    times, omega = first.times, _without_spikes(setup, first)
+    for other in others:
+        known = np.unique(times)
+        place = np.clip(np.searchsorted(known, other.times), 1, max(len(known) - 1, 1))
+        usual = 10 * float(np.median(np.diff(known))) if len(known) > 1 else 0.0
+        width = known[np.minimum(place, len(known) - 1)] - known[place - 1]
+        apart = (other.times < known[0] - usual) | (other.times > known[-1] + usual) | (width > usual)
+        if apart.any():
+            bias = np.zeros(3) if other.bias is None and first.bias is None else _relative(first, other)
+            times = np.concatenate([times, other.times[apart]])
+            omega = np.concatenate([omega, _without_spikes(setup, other)[apart] - bias])
+    order = np.argsort(times, kind="stable")
+    noise = float(np.mean(first.noise))
+    if first.bias is None:
+        return Rates(times[order], omega[order], noise, np.zeros(3), None)
+    constant = setup.constants[first.bias]
+    spread = np.full(3, np.inf) if constant.sigma is None else np.array(constant.sigma)
+    return Rates(times[order], omega[order], noise, np.array(constant.start), spread)
+
+
+def _without_spikes(setup: Setup, term: RateTerm) -> Doubles:
+    """Return the rates, without single outliers if the loss is robust."""
+    loss = next(loss for own, loss in zip(setup.terms, setup.losses, strict=True) if own is term)
+    if loss == "linear" or len(term.times) < 5:
+        return term.omega
+    order = np.argsort(term.times, kind="stable")
+    omega = term.omega[order]
+    padded = np.concatenate([omega[:2], omega, omega[-2:]])
+    usual = np.median(np.lib.stride_tricks.sliding_window_view(padded, 5, axis=0), axis=-1)
+    away = np.abs(omega - usual)
+    limit = 8 * np.maximum(np.median(away, axis=0), term.noise[order])
+    found = np.empty_like(omega)
+    found[order] = np.where(away > limit, usual, omega)
+    return found
 
 
 # Vectors in the fixed frame and the same vectors in the frame of the body, at times.
@@ -84,6 +311,8 @@ _Vectors = tuple[Doubles, Doubles, Doubles]
 # The number of windows with which an initial attitude is aligned in turn, and the ratio of singular values from which
 # vectors determine a rotation.
 _WINDOWS, _RANK = 7, 1e-3
+# The smallest number of times at which the windows lie.
+_GRID = 100
 
 
 def _rows(reference: Doubles, seen: Doubles) -> tuple[Doubles, Doubles]:
@@ -110,28 +339,28 @@ def _force_vectors(setup: Setup, term: ForceTerm) -> _Vectors:
     return term.times, expected, term.f
 
 
-def _integrated(setup: Setup, space: Space[Any], rate: RateTerm, vectors: list[_Vectors]) -> Array:
+def _integrated(setup: Setup, space: Space[Any], rate: RateTerm, vectors: list[_Vectors]) -> Start:
     """Return the attitudes that follow from the rates and from vectors known in both frames.
 
     The integral of the rates is aligned with the vectors in windows that become longer, and every alignment yields a
     better bias of the rates, with which they are integrated again.
     """
-    knots = setup.knots
+    grid = setup.knots if len(setup.knots) > _GRID else np.linspace(setup.knots[0], setup.knots[-1], _GRID)
     order = np.argsort(rate.times, kind="stable")
     bias = np.zeros(3) if rate.bias is None else np.array(setup.constants[rate.bias].start)
-    at = np.arange(len(knots))
-    matrices = attitudes_at(rate.times[order], rate.omega[order] - bias, knots)
+    at = np.arange(len(grid))
+    matrices = attitudes_at(rate.times[order], rate.omega[order] - bias, grid)
     for level in range(_WINDOWS - 1 if rate.bias is not None else 0, -1, -1):
-        profile = np.zeros((len(knots), 3, 3))
+        profile = np.zeros((len(grid), 3, 3))
         for times, fixed, body in vectors:
-            index = _closest(knots, times)
+            index = _closest(grid, times)
             near = np.einsum("nij,nj->ni", matrices[index], body)
             np.add.at(profile, index, fixed[:, :, None] * near[:, None, :])
         if not level:
             break
-        half = max(1, len(knots) >> (level + 1))
+        half = max(1, len(grid) >> (level + 1))
         total = np.concatenate([np.zeros((1, 3, 3)), np.cumsum(profile, axis=0)])
-        windows = total[np.minimum(at + half + 1, len(knots))] - total[np.maximum(at - half, 0)]
+        windows = total[np.minimum(at + half + 1, len(grid))] - total[np.maximum(at - half, 0)]
         sizes = np.linalg.svd(windows, compute_uv=False)
         if not np.all(sizes[:, 1] > _RANK * sizes[:, 0]):
             continue
@@ -140,9 +369,13 @@ def _integrated(setup: Setup, space: Space[Any], rate: RateTerm, vectors: list[_
         steps = [np.swapaxes(own[:-1], -1, -2) @ own[1:] for own in (aligned, matrices)]
         spin = np.swapaxes(steps[0], -1, -2) @ _SO3.log(steps[0], steps[1])
         vector = np.stack([spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0]], axis=-1)
-        bias = bias + np.median(vector / np.diff(knots)[:, None], axis=0)
-        matrices = attitudes_at(rate.times[order], rate.omega[order] - bias, knots)
-    return _rotations(space, _nearest(profile.sum(axis=0)) @ matrices)
+        bias = bias + np.median(vector / np.diff(grid)[:, None], axis=0)
+        matrices = attitudes_at(rate.times[order], rate.omega[order] - bias, grid)
+    frame = _nearest(profile.sum(axis=0)) @ matrices[0]
+    integral = Integral(Rates(rate.times[order], rate.omega[order], 0.0, bias, None), bias)
+    before = integral.at(grid[:1])[0][0].T
+    values = {} if rate.bias is None else {rate.bias: bias}
+    return Start([lambda x: _rotations(space, frame @ before @ integral.at(x)[0])], values)
 
 
 def _closest(grid: Doubles, x: Doubles) -> NDArray[np.intp]:
@@ -150,9 +383,8 @@ def _closest(grid: Doubles, x: Doubles) -> NDArray[np.intp]:
     return np.searchsorted(0.5 * (grid[1:] + grid[:-1]), x)
 
 
-def _seen(setup: Setup, space: Space[Any], seen: list[DirectionTerm]) -> Array:
+def _seen(knots: Doubles, space: Space[Any], seen: list[DirectionTerm]) -> Array:
     """Return the attitudes at the knots from the directions seen near them (Wahba's problem)."""
-    knots = setup.knots
     profile = np.zeros((len(knots), 3, 3))
     for term in seen:
         np.add.at(profile, _closest(knots, term.times), np.einsum("nki,nkl->nil", term.reference, term.seen))
