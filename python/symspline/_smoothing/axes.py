@@ -10,8 +10,13 @@ import numpy as np
 
 from .._curves.ends import is_closed
 from .._spaces import Array, Doubles, Space
-from .common_lam import Choice, Data, LamCriterion, common_lam
+from .common_lam import Choice, Data, LamCriterion, common_lam, score_of
 from .rows import Rows, complete_variance, posterior_variance, smooth
+
+# Degrees of freedom per node along each axis of the combinations of λ that are tried.
+_PROBES = (0.4, 0.75)
+# Largest number of rounds from the best of them, and the relative change of the score that ends them.
+_ROUNDS, _ENOUGH = 4, 1e-3
 
 
 class Nodes(NamedTuple):
@@ -144,6 +149,10 @@ def smooth_axes(
     The criterion for λ is that of the surface. In a first round it is minimised along one axis after the other, each
     time with the axes before. The λ of the first axes are then too large, because the noise that the other axes would
     remove is still there. In a second round, each λ is chosen again for nodes that are smooth along all other axes.
+
+    The criterion of several λ may have more than one minimum. With few nodes per period, rows along one axis seem to be
+    noise as long as the others are, and both rounds end at a plane. The criterion is therefore also evaluated for a
+    product of λ between a plane and an interpolating surface. If one of them is better, more rounds begin there.
     """
     count = len(lams)
     start = _State(nodes.points, nodes.weights, np.ones(nodes.weights.shape))
@@ -160,23 +169,45 @@ def smooth_axes(
         progress(done, total)
         return result
 
+    def seen_from(state: _State, k: int) -> tuple[Rows, Data]:
+        data = Data(_flat(nodes.points, nodes, k), _flat(nodes.weights, nodes, k), _flat(state.scale, nodes, k)[:, 0])
+        return _rows(nodes, state, k), data
+
     def choose(state: _State, k: int) -> None:
         before = chosen.get(k)
-        data = Data(_flat(nodes.points, nodes, k), _flat(nodes.weights, nodes, k), _flat(state.scale, nodes, k)[:, 0])
-        found = common_lam(_rows(nodes, state, k), data, criterion, before.lam if before else None)
+        found = common_lam(*seen_from(state, k), criterion, before.lam if before else None)
         chosen[k] = found._replace(evaluations=found.evaluations + (before.evaluations if before else 0))
+
+    def choose_again() -> None:
+        nonlocal state
+        for k in again:
+            state = start
+            for other in order:
+                if other != k:
+                    state, *_ = passed(state, other)
+            choose(state, k)
 
     state = start
     for k in order if asked else ():
         if k in asked:
             choose(state, k)
         state, *_ = passed(state, k)
-    for k in again:
-        state = start
-        for other in order:
-            if other != k:
-                state, *_ = passed(state, other)
-        choose(state, k)
+    choose_again()
+    if len(asked) > 1:
+        best = dict(chosen)
+        probe, score = _best_probe(
+            nodes, start, chosen, asked, lambda state, k, lam: score_of(*seen_from(state, k), criterion, lam)
+        )
+        if score < best[asked[-1]].score:
+            chosen |= {k: best[k]._replace(lam=lam, score=score) for k, lam in probe.items()}
+            for _ in range(_ROUNDS):
+                total += len(again) * (count - 1)
+                before = chosen[asked[-1]].score
+                choose_again()
+                if not chosen[asked[-1]].score < before - _ENOUGH * abs(before):
+                    break
+            if not chosen[asked[-1]].score < best[asked[-1]].score:
+                chosen.update(best)
     state, found, first = start, [], None
     for k in order:
         state, own, failed = passed(state, k)
@@ -186,6 +217,55 @@ def smooth_axes(
     with np.errstate(divide="ignore", invalid="ignore"):
         variance = np.where(there, state.scale / state.weights, np.nan)
     return SmoothedNodes(np.ascontiguousarray(state.points), variance, found, first)
+
+
+def _best_probe(
+    nodes: Nodes,
+    start: _State,
+    given: dict[int, Choice],
+    asked: list[int],
+    score: Callable[[_State, int, float], float],
+) -> tuple[dict[int, float], float]:
+    """Return the best of some combinations of λ along the axes, and its score.
+
+    Parameters
+    ----------
+    given : dict
+        λ of all axes, of which those of the axes `asked` are replaced.
+    score : callable
+        Function of nodes that are smooth along all other axes, the last of the axes `asked`, and its λ.
+    """
+    last = asked[-1]
+    tried = {k: [_lam_of_df(nodes, k, df) for df in _PROBES] for k in asked}
+    best: tuple[dict[int, float], float] = ({}, np.inf)
+
+    def visit(state: _State, rest: list[int], lams: dict[int, float]) -> None:
+        nonlocal best
+        if not rest:
+            for lam in tried[last]:
+                found = score(state, last, lam)
+                if found < best[1]:
+                    best = {**lams, last: lam}, found
+            return
+        k, *rest = rest
+        for lam in tried.get(k, [given[k].lam]):
+            moved, *_ = _smooth_axis(nodes, state, k, given[k]._replace(lam=lam))
+            visit(moved, rest, {**lams, k: lam} if k in tried else lams)
+
+    visit(start, [k for k in given if k != last], {})
+    return best
+
+
+def _lam_of_df(nodes: Nodes, k: int, share: float) -> float:
+    """Return the λ for which complete rows along an axis have a given number of degrees of freedom per node."""
+    t, weight = nodes.axes[k], float(nodes.weights[nodes.weights > 0].mean())
+    unit = weight * float(np.ptp(t) / (len(t) - 1)) ** 3
+    low, high = -6.0, 12.0
+    for _ in range(12):
+        middle = 0.5 * (low + high)
+        variance = complete_variance(t, weight, 10.0**middle * unit, nodes.bc_types[k], False)
+        low, high = (middle, high) if weight * variance.mean() > share else (low, middle)
+    return float(10.0**low * unit)
 
 
 def _rows(nodes: Nodes, state: _State, k: int) -> Rows:
@@ -216,7 +296,7 @@ def _smooth_axis(
     used = rows.weights > 0
     failed = np.flatnonzero(~smoothed.converged)
     own = SmoothedAxis(
-        *choice,
+        *choice[:3],
         count=int(np.count_nonzero(used)),
         df=float(smoothed.df.sum()),
         rss=float(smoothed.rss.sum()),

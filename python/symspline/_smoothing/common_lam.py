@@ -61,11 +61,15 @@ class Data(NamedTuple):
 
 
 class Choice(NamedTuple):
-    """The chosen λ, whether it is at a bound of the search, and the number of values that were tried."""
+    """The chosen λ, whether it is at a bound of the search, the number of values that were tried, and the score.
+
+    The score of a given λ is infinite.
+    """
 
     lam: float
     at_bound: bool
     evaluations: int
+    score: float = np.inf
 
 
 class _Totals(NamedTuple):
@@ -103,8 +107,7 @@ def common_lam(rows: Rows, data: Data, criterion: LamCriterion, start: float | N
     if rows.counts.max() <= 2:
         # Such rows do not change.
         return Choice(_cube(rows), False, 0)
-    every = -(-int(rows.counts.sum()) // _NODES)
-    rows, data = rows.take(slice(None, None, every)), Data(*(own[::every] for own in data))
+    rows, data = _some(rows, data)
     seen: dict[float, _Totals] = {}
 
     def look(x: float) -> None:
@@ -139,8 +142,21 @@ def common_lam(rows: Rows, data: Data, criterion: LamCriterion, start: float | N
         at, scores = _scores(seen, criterion)
         best = int(np.argmin(scores))
     if bound or seen[at[best]].is_straight or not np.isfinite(scores[best - 1]):
-        return Choice(10.0 ** at[best], True, len(seen))
-    return Choice(10.0 ** _vertex(at[best - 1 : best + 2], scores[best - 1 : best + 2]), False, len(seen))
+        return Choice(10.0 ** at[best], True, len(seen), float(scores[best]))
+    found = 10.0 ** _vertex(at[best - 1 : best + 2], scores[best - 1 : best + 2])
+    return Choice(found, False, len(seen), float(scores[best]))
+
+
+def score_of(rows: Rows, data: Data, criterion: LamCriterion, lam: float) -> float:
+    """Return the criterion of the surface for one λ of the rows."""
+    _, scores = _scores({np.log10(lam): _totals(*_some(rows, data), lam)}, criterion)
+    return float(scores[0])
+
+
+def _some(rows: Rows, data: Data) -> tuple[Rows, Data]:
+    """Return as many of the rows as the choice of λ needs."""
+    every = -(-int(rows.counts.sum()) // _NODES)
+    return rows.take(slice(None, None, every)), Data(*(own[::every] for own in data))
 
 
 def _cube(rows: Rows) -> float:
