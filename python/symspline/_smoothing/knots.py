@@ -23,7 +23,11 @@ _PARTS, _FEW, _PART = 8, 50, 1000
 # Motion shows in the distances between data and those that follow after this number of others.
 _LAG = 5
 # Largest number of times that the knots are adapted to λ.
-_TRIES = 4
+_TRIES = 5
+# Factor of the λ for which rounding errors are negligible, after a fit that failed.
+_COARSER = 1e4
+# Part of the message for a smoothing that ended without a curve.
+NO_CURVE = "no spline joins"
 
 DfOfPart = Callable[[int, SmoothingData, "Knots"], Array]
 """Returns the degrees of freedom of curves with free ends in the smoothed space with a given number."""
@@ -124,32 +128,65 @@ def thin_knots(knots: Knots, count: int) -> Knots:
     return _picked(knots, np.unique(np.append(index[:-1], there - 1)))
 
 
-def merge_close_knots(knots: Knots, noisy: SmoothingData, lam: float | None) -> Knots:
-    """Remove knots that are too close together.
+def merge_close_knots(knots: Knots, noisy: SmoothingData, lam: float | None, power: int, coarser: float = 1.0) -> Knots:
+    """Remove knots that are too close together, or move them where curves have knots of their own.
 
-    Rounding errors of λ/h³ would otherwise exceed the weights of the data. If λ is None, a λ is assumed that has the
-    same effect as the weights for evenly distributed knots.
+    Rounding errors of λ/h³, or λ/h⁵ for the jerk, would otherwise exceed the weights of the data.
+
+    Parameters
+    ----------
+    lam : float or None
+        λ. If it is None, a λ is assumed that has the same effect as the weights for evenly distributed knots.
+    power : int
+        Power of time in λ.
+    coarser : float, default 1
+        Factor of λ, for fits that failed.
     """
     most = 1e11
     times = knots.times
-    if times.ndim > 1 or len(times) <= 16 or 0 in noisy.batch:
+    if times.shape[-1] <= 4 or 0 in noisy.batch:
         return knots
-    span = float(times[-1] - times[0])
-    mean = span / (len(times) - 1)
+    span = times[..., -1] - times[..., 0]
+    mean = span / (times.shape[-1] - 1)
     weight = max(float(np.max(np.mean(own.weights, axis=-1))) for own in noisy.precisions)
     # Units of the mean distance prevent overflow.
-    ratio = 1.0 if lam is None else lam / weight / mean / mean / mean
-    least = min(mean * (ratio / most) ** (1 / 3), span / 15)
-    if np.diff(times).min() >= least:
+    ratio = 1.0 if lam is None else lam / weight
+    for _ in range(0 if lam is None else power):
+        ratio = ratio / mean
+    least = np.minimum(mean * (coarser * ratio / most) ** (1 / power), span / 15)
+    if np.all(np.diff(times).min(axis=-1) >= least):
         return knots
-    # Index of the first knot that is far enough from each knot.
+    if times.ndim == 1:
+        return _picked(knots, _far_apart(times, float(least)))
+    shown = knots.t.copy()
+    for index in np.ndindex(times.shape[:-1]):
+        shown[index] = _moved_apart(shown[index], times[index], _far_apart(times[index], float(least[index])))
+    moved, _ = noisy.time_axis.at(shown, times.shape[:-1], True)
+    moved[..., [0, -1]] = times[..., [0, -1]]
+    return Knots(shown, moved) if np.all(np.diff(moved) > 0) else knots
+
+
+def _far_apart(times: Doubles, least: float) -> NDArray[np.intp]:
+    """Return the indices of times that are at least so far apart, the first and the last one among them."""
+    # Index of the first time that is far enough from each time.
     following = np.searchsorted(times, times + least).tolist()
     stop = int(np.searchsorted(times, times[-1] - least, side="right"))
     kept, i = [], 0
     while i < max(stop, 1):
         kept.append(i)
-        i = following[i]
-    return _picked(knots, np.array([*kept, len(times) - 1]))
+        i = max(following[i], i + 1)
+    return np.array([*kept, len(times) - 1])
+
+
+def _moved_apart(t: Array, times: Doubles, kept: NDArray[np.intp]) -> Array:
+    """Return as many knots as before: those that are kept, and others in the middle of the longest segments."""
+    own, at = t[kept].tolist() if t.dtype.kind == "f" else list(t[kept]), times[kept].tolist()
+    while len(own) < len(t):
+        i = int(np.argmax(np.diff(at)))
+        step = own[i + 1] - own[i]
+        own.insert(i + 1, own[i] + (step / 2 if t.dtype.kind == "f" else step // 2))
+        at.insert(i + 1, 0.5 * (at[i] + at[i + 1]))
+    return np.array(own, t.dtype)
 
 
 def with_enough_knots(
@@ -159,27 +196,35 @@ def with_enough_knots(
     lams: list[Any],
     run: Callable[[Knots], list[Any]],
     df_of_part: DfOfPart,
+    penalty: str,
 ) -> tuple[list[Any], Knots]:
     """Fit with as many knots as λ and the degrees of freedom require, and return the results and the knots."""
     given = all(np.isfinite(lam).all() for lam in lams)
-    at = merge_close_knots(whole, noisy, _of_all(lams) if given else None)
+    power, coarser = (3 if penalty == "acceleration" else 5), 1.0
+    at = merge_close_knots(whole, noisy, _of_all(lams) if given else None, power)
     if at.times.shape[-1] > _MANY:
-        at = thin_knots(at, max(_FIRST, _n_knots_for_df(_df_from_parts(noisy, space, df_of_part))))
+        at = thin_knots(at, max(_FIRST, _n_knots_for_df(_df_from_parts(noisy, space, df_of_part, power))))
     for tries in range(_TRIES):
         found = run(at)
         count = at.times.shape[-1]
+        if any(NO_CURVE not in fault.what for _, _, faults in found for fault in faults) and tries < _TRIES - 1:
+            coarser *= _COARSER
+            fewer = merge_close_knots(whole, noisy, _of_all(lams) if given else None, power, coarser)
+            if not np.array_equal(fewer.times, at.times) and fewer.times.shape[-1] <= count:
+                at = fewer
+                continue
         known = [np.asarray(part.report.lam) for _, part, _ in found]
-        apart = merge_close_knots(whole, noisy, _of_all(known))
+        apart = merge_close_knots(whole, noisy, _of_all(known), power, coarser)
         most = apart.times.shape[-1]
         enough = max(_n_knots_for_df(part.report.df) for _, part, _ in found)
-        if tries == _TRIES - 1 or (most > 0.8 * count and count > 0.8 * min(enough, most)):
+        if tries == _TRIES - 1 or (count >= most > 0.8 * count and count > 0.8 * min(enough, most)):
             break
         # A stiff curve needs fewer knots than it had, and a rough curve more.
         at = thin_knots(apart, max(_FIRST, 2 * enough)) if most > max(_MANY, 2 * enough) else apart
     return found, at
 
 
-def _df_from_parts(noisy: SmoothingData, space: Space, df_of_part: DfOfPart) -> float:
+def _df_from_parts(noisy: SmoothingData, space: Space, df_of_part: DfOfPart, power: int) -> float:
     """Estimate the degrees of freedom of a long recording from short parts, in which all times are knots.
 
     For few knots, the choice of λ takes fast motion for noise. The estimate is that of the liveliest part in any of the
@@ -195,7 +240,7 @@ def _df_from_parts(noisy: SmoothingData, space: Space, df_of_part: DfOfPart) -> 
             rows = noisy.rows(used[start : start + length])
             if not (rows.times[..., -1] > rows.times[..., 0]).all():
                 continue
-            excess = df_of_part(number, rows, merge_close_knots(_different(rows.t, rows.times), rows, None)) - 2
+            excess = df_of_part(number, rows, merge_close_knots(_different(rows.t, rows.times), rows, None, power)) - 2
             # The share of the recording, as `thin_knots` counts it.
             spans = [np.ptp(times, axis=-1).max() for times in (rows.times, noisy.times)]
             share = 0.5 * (length / len(used) + spans[0] / spans[1])

@@ -45,11 +45,11 @@ from .data import (
     valid_curves,
 )
 from .factors import grouped, is_several, join, parts_of_factor, smoothed_spaces, split_ends
-from .knots import Knots, has_all_times, in_gaps, knots_for, with_enough_knots
+from .knots import NO_CURVE, Knots, has_all_times, in_gaps, knots_for, with_enough_knots
 from .outliers import warn_of_outliers
 from .regression import check_infinite, geodesic_knots, geodesic_options, is_infinite, with_infinite_lam
 from .report import SmoothingReport
-from .solve import NO_CURVE, SolverOptions, one_per_curve, smoothed
+from .solve import SolverOptions, one_per_curve, smoothed
 from .spline import SmoothingSpline
 from .starts import warn_of_minima
 from .warned import warn_of_bounds, warn_of_spread
@@ -322,7 +322,7 @@ def make_smoothing_spline(
         options = geodesic_options(space, options)
         found = run(at)
     elif knots is None:
-        found, at = with_enough_knots(every, noisy, space, lams, run, df_of_part)
+        found, at = with_enough_knots(every, noisy, space, lams, run, df_of_part, penalty)
         finer = in_gaps(at, whole)
         # Knots in gaps are tried before a larger λ, which would affect the whole curve.
         if any(NO_CURVE in fault.what for _, _, own in found for fault in own):

@@ -17,15 +17,13 @@ from .._report import long_gaps
 from .._spaces import Array, Doubles, Space
 from .._typing import Progress
 from .data import SmoothingData
-from .knots import Knots
+from .knots import NO_CURVE, Knots
 from .outliers import Outliers
 from .posterior import Posterior
 from .precision import Precision
 from .report import METHODS, SmoothingReport
 from .starts import Raw, Samples, best_of_starts
 
-# Part of the message for a smoothing that ended without a curve.
-NO_CURVE = "no spline joins"
 _STATES = ("converged", "unconverged", "no curve", "undetermined", "unsettled")
 
 
@@ -47,6 +45,8 @@ class Smoothed(NamedTuple):
     between : bool
         Whether the variance between the knots is included. It is if there is a knot at every time of the data: the
         curve is then the mean of a process. With other knots it is a spline, which has no such freedom.
+    penalty : {"acceleration", "jerk"}
+        The derivative whose square was penalised.
     outliers : Outliers or None
         Outcome of the rejection of data; None once the warnings have been issued.
     minima : ndarray of int or None
@@ -59,18 +59,18 @@ class Smoothed(NamedTuple):
     sigma: Any
     between: bool
     posterior: Posterior | None = None
+    penalty: str = "acceleration"
     outliers: Outliers | None = None
     minima: NDArray[np.int_] | None = None
 
     def map(self, function: Any) -> Smoothed:
         """Apply a function to all arrays, such as the selection of some curves."""
-        return Smoothed(
-            self.report.map(function),
-            function(self.band),
-            function(self.band_lam),
-            function(self.sigma),
-            self.between,
-            self.posterior and self.posterior.map(function),
+        return self._replace(
+            report=self.report.map(function),
+            band=function(self.band),
+            band_lam=function(self.band_lam),
+            sigma=function(self.sigma),
+            posterior=self.posterior and self.posterior.map(function),
         )
 
 
@@ -132,7 +132,9 @@ def smoothed(
     on_space = numbers if span is None else span.embed(numbers)
     # Coordinates in a span of lower dimension are not those of the space.
     posterior = Posterior.of(matrix, turn, size) if span is None or size == 1 else None
-    return on_space, Smoothed(report, band, band_lam, scale, between, posterior, Outliers(selection, rejected), minima), faults
+    outliers = Outliers(selection, rejected)
+    noise = Smoothed(report, band, band_lam, scale, between, posterior, options.penalty, outliers, minima)
+    return on_space, noise, faults
 
 
 def _reason(
