@@ -25,6 +25,7 @@ pub mod estimation;
 mod frames;
 mod gauss_newton;
 mod information;
+mod integrated_wiener;
 mod jacobi_operator;
 mod linearized;
 mod loss;
@@ -41,6 +42,7 @@ mod start;
 mod variance;
 
 pub use cumulative::{Outcome, Samples, fit_cumulative};
+pub use integrated_wiener::process_variance;
 pub use observations::Observations;
 pub use path::{Position, positions};
 pub use problem::{
@@ -48,4 +50,4 @@ pub use problem::{
     Tier,
 };
 pub use smooth::smooth;
-pub use variance::variance;
+pub use variance::{inverse_of_weights, variance};

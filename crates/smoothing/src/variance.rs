@@ -2,9 +2,9 @@
 
 use crate::banded::{Banded, WIDTH};
 use crate::cyclic::{Factored, PeriodicCorrection};
-use crate::linearized::{Basis, Row};
+use crate::linearized::{Basis, LinearProblem, OVERLAP, Row};
 use crate::path::{Position, positions};
-use crate::problem::{EndCondition, Ends};
+use crate::problem::{EndCondition, Ends, Penalty};
 use symspline_core::monitor::checkpoint;
 use symspline_core::scalar::lane;
 
@@ -56,6 +56,24 @@ pub fn variance(knots: &[f64], rows: &[f64], lam: f64, ends: Ends, times: &[f64]
         known + (a * a * v(0, 0) + 2.0 * a * b * v(0, 1) + b * b * v(1, 1) + between) / lam
     };
     times.iter().map(one).collect()
+}
+
+/// The band of A⁻¹ for scalar weights and a given λ, as [`rows_of`] returns it. The data are between the knots.
+pub fn inverse_of_weights(
+    knots: &[f64],
+    times: &[f64],
+    weights: &[f64],
+    lam: f64,
+    penalty: Penalty,
+    ends: Ends,
+) -> Vec<f64> {
+    let basis = Basis::new(knots, ends);
+    let lam = lam / penalty.unit(basis.spacing);
+    let linearized = LinearProblem::new(basis, &positions(knots, times), weights, penalty);
+    let entry = |at: usize| lane(lam.mul_add(linearized.penalty[at], linearized.gram[at]));
+    let matrix = Banded::of(linearized.basis.count(), WIDTH, entry);
+    let periodic = linearized.basis.is_closed().then(|| PeriodicCorrection::plain(OVERLAP, 1));
+    rows_of(&Factored::new(matrix, periodic.as_ref()).inverse_band())
 }
 
 /// The position of a time on the curve, and the time beyond its end. Closed curves continue periodically.

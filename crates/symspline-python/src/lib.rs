@@ -94,6 +94,8 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     guarded(m, wrap_pyfunction!(smoothing::smooth, m)?)?;
     guarded(m, wrap_pyfunction!(smoothing::fit_cumulative, m)?)?;
     guarded(m, wrap_pyfunction!(smoothing::smoothing_variance, m)?)?;
+    guarded(m, wrap_pyfunction!(smoothing::process_variance, m)?)?;
+    guarded(m, wrap_pyfunction!(smoothing::smoothing_inverse, m)?)?;
     guarded(m, wrap_pyfunction!(smoothing::chi_squared, m)?)?;
     guarded(m, wrap_pyfunction!(estimation::frames_along, m)?)?;
     guarded(m, wrap_pyfunction!(estimation::curvature_along, m)?)?;

@@ -13,7 +13,8 @@ use pyo3::types::{PyListMethods, PyTuple, PyTupleMethods};
 use symspline_engine::parallel;
 use symspline_engine::smoothing::{
     Data, Loss, Observations, Options, Outcome, Report, Samples, Selection, Smooth, State, Tier, chi,
-    fit_cumulative as fit, smooth as run, variance as variance_at,
+    fit_cumulative as fit, inverse_of_weights, process_variance as process, smooth as run,
+    variance as variance_at,
 };
 use symspline_engine::space::{Ambient, Origin};
 
@@ -245,6 +246,37 @@ pub fn smoothing_variance<'py>(
     let heavy = is_long(knots.len() + x.len());
     let found = watched(py, None, x.len(), heavy, |_| variance_at(knots, band, lam, ends, x, nu))?;
     Ok(PyArray1::from_vec(py, found))
+}
+
+/// The band of A⁻¹ for numbers as weights, (coefficients · 4,).
+#[pyfunction]
+pub fn smoothing_inverse<'py>(
+    py: Python<'py>,
+    knots: Array<'py>,
+    times: Array<'py>,
+    weights: Array<'py>,
+    lam: f64,
+    penalty: &str,
+    kinds: Option<[String; 2]>,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let (penalty, ends) = (penalty_named(penalty)?, ends_named(kinds)?);
+    let (knots, times, weights) = (in_order(&knots)?, in_order(&times)?, in_order(&weights)?);
+    Ok(PyArray1::from_vec(py, inverse_of_weights(knots, times, weights, lam, penalty, ends)))
+}
+
+/// The variance of a coordinate of the process that the jerk penalises, for noise of variance one.
+#[pyfunction]
+pub fn process_variance<'py>(
+    py: Python<'py>,
+    times: Array<'py>,
+    weights: Array<'py>,
+    lam: f64,
+    period: Option<f64>,
+    x: Array<'py>,
+    nu: usize,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let (times, weights, x) = (in_order(&times)?, in_order(&weights)?, in_order(&x)?);
+    Ok(PyArray1::from_vec(py, process(times, weights, lam, period, x, nu)))
 }
 
 /// The quantile of χ² with m degrees of freedom.

@@ -22,6 +22,7 @@ from .._typing import AnyArray, AnyArrays, CovarianceOrder, FloatArray, Number, 
 from .data import SmoothingData
 from .factors import grouped, is_several, join, parts_of_factor, smoothed_spaces, split
 from .posterior import Parameter, Posterior, frames_at
+from .process import process_ratio
 from .report import SmoothingReport
 from .solve import Smoothed
 from .stored import noise_state, read_noise
@@ -208,7 +209,10 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         The variance at time t is :math:`\sigma^2 b(t)^T A^{-1} b(t)`, the posterior variance of a spline in frames
         along the curve. b(t) are the values of the B-splines, and A is the matrix of the linearised problem. If the
         knots are the times of the data, as they are by default, the variance of the curve between the knots is added,
-        as the smoothness determines it. A spline with knots of your own has no such freedom.
+        as the smoothness determines it. A spline with knots of your own has no such freedom. The random curve is
+        an integrated Wiener process, whose second or third derivative is white noise; for the jerk, the variance is
+        that of the process at all times. If weights are matrices or curvature couples the coordinates, the variance of
+        the spline is multiplied by the ratio that the two variances have for uncoupled coordinates.
 
         References
         ----------
@@ -245,8 +249,22 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
             # With λ = 0 the curve has no variance between the knots besides that of the spline.
             lam = 0.0
         knots, band, x = (np.ascontiguousarray(own) for own in (knots, part.band[index], x))
-        variance = _core.smoothing_variance(knots, band, lam, x, nu, end_kinds(self._bc_type))
+        kinds = end_kinds(self._bc_type)
+        if part.between and part.penalty == "jerk":
+            variance = _core.smoothing_variance(knots, band, 0.0, x, nu, kinds)
+            return np.asarray(sigma * np.sqrt(variance * self._ratio(part, index, x, nu)))
+        variance = _core.smoothing_variance(knots, band, lam, x, nu, kinds)
         return np.asarray(sigma * np.sqrt(variance))
+
+    def _ratio(self, part: Smoothed, index: tuple[int, ...], x: Doubles, nu: int) -> Doubles:
+        """Return the variance of the process that the jerk penalises, relative to that of the spline."""
+        number = next(i for i, own in enumerate(self._smoothed) if own is part)
+        weights, times = self._noisy.precisions[number].weights, self._noisy.times
+        own = (values[index] if values.ndim > 1 else values for values in (times, weights))
+        coupled = part.posterior is not None and part.posterior.size > 1
+        band = None if coupled else part.band[index]
+        lam = np.asarray(part.band_lam)[index].item()
+        return process_ratio(*own, self._knots_of(index), band, lam, end_kinds(self._bc_type), x, nu)
 
     @overload
     def band(self: SmoothingSpline[Any, SmoothingReport], x: TimesLike, level: float = 0.95) -> FloatArray: ...
@@ -396,16 +414,29 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         sigma = np.asarray(part.sigma)[index].item()
         found = self._posterior(part).covariance(space, knots, index, kinds, x, y, orders)
         if part.between and y is None and len(orders) == 1:
-            found += self._between(part, index, x, orders[0])[:, None, None] * np.eye(space.dim)
+            self._add_between(part, index, x, orders, found.reshape(len(x), 1, space.dim, 1, space.dim))
         return np.asarray(sigma**2 * found)
 
-    def _between(self, part: Smoothed, index: tuple[int, ...], x: Doubles, nu: int) -> Doubles:
-        """Return the variance of one curve between the knots for noise of variance one."""
+    def _add_between(
+        self, part: Smoothed, index: tuple[int, ...], x: Doubles, orders: list[int], found: Doubles
+    ) -> None:
+        """Add the variance between the knots to covariances of points and velocities, for noise of variance one.
+
+        The shape of ``found`` is ``(len(x), len(orders), m, len(orders), m)``.
+        """
         knots, kinds = self._knots_of(index), end_kinds(self._bc_type)
         lam = np.asarray(part.band_lam)[index].item()
         band = np.ascontiguousarray(part.band[index])
-        own, plain = (_core.smoothing_variance(knots, band, lam, x, nu, kinds) for lam in (lam, 0.0))
-        return np.asarray(own - plain)
+        for i, nu in enumerate(orders):
+            if nu > 1:
+                continue
+            if part.penalty == "jerk":
+                root = np.sqrt(self._ratio(part, index, x, nu))[:, None, None, None]
+                found[:, i] *= root
+                found[:, :, :, i] *= root
+                continue
+            own, plain = (_core.smoothing_variance(knots, band, each, x, nu, kinds) for each in (lam, 0.0))
+            found[:, i, :, i] += (own - plain)[:, None, None] * np.eye(found.shape[-1])
 
     def _coupled(self, parts: list[int], index: tuple[int, ...], x: Doubles, orders: list[int]) -> Doubles:
         """Return the covariance of derivatives in several parts at times x, for the propagation of errors.
@@ -426,14 +457,12 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         whole = np.zeros((len(x), count, size, count, size))
         for number, start, end in zip(parts, ends[:-1], ends[1:], strict=True):
             part, m = self._smoothed[number], int(end - start)
-            found = self._covariance(part, spaces[number], index, x, None, orders)
+            knots, kinds = self._knots_of(index), end_kinds(self._bc_type)
+            found = self._posterior(part).covariance(spaces[number], knots, index, kinds, x, None, orders)
             own = found.reshape(len(x), count, m, count, m)
-            if part.between and count > 1:
-                sigma = np.asarray(part.sigma)[index].item()
-                for i, nu in enumerate(orders):
-                    if nu < 2:
-                        added = sigma**2 * self._between(part, index, x, nu)
-                        own[:, i, :, i] += added[:, None, None] * np.eye(m)
+            if part.between:
+                self._add_between(part, index, x, orders, own)
+            own *= np.asarray(part.sigma)[index].item() ** 2
             whole[:, :, start:end, :, start:end] = own
         return whole.reshape(len(x), count * size, count * size)
 

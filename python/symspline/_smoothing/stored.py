@@ -13,6 +13,7 @@ from .._core import ValidationError
 from .._curves.curve import CurveArrays
 from .._spaces import Space, factors_of
 from .._time import TimeAxis
+from .._validation import one_of
 from .data import SmoothingData
 from .factors import is_several, smoothed_spaces
 from .posterior import Posterior
@@ -28,6 +29,8 @@ def noise_state(space: Space[Any], noisy: SmoothingData, smoothed: list[Smoothed
         "noise": [
             vars(own.report)
             | {"band_lam": own.band_lam, "scale": own.sigma, "between": own.between}
+            # Files without this entry have the default.
+            | ({} if own.penalty == "acceleration" else {"penalty": own.penalty})
             # Version 1 has no matrices.
             | ({} if own.posterior is None else {"posterior": True})
             for own in smoothed
@@ -122,6 +125,7 @@ def read_noise(
             lam, scale = (read_field(key, numbers.pop(key), batch, dtype=np.float64) for key in ("band_lam", "scale"))
             between = read_field("between", numbers.pop("between"), (), dtype=np.bool_)
             known = numbers.pop("posterior", False)
+            penalty = one_of(numbers.pop("penalty", "acceleration"), "penalty", "acceleration", "jerk")
             report = read_report(SmoothingReport, numbers, batch)
             # A closed curve repeats its first coefficients at the end.
             good = np.asarray(report.converged)
@@ -129,7 +133,7 @@ def read_noise(
             posterior = None
             if known:
                 posterior = read_posterior(state, suffix, own.dim, band.shape[-2], batch, closed, good)
-            smoothed.append(Smoothed(report, band, lam, scale, between, posterior))
+            smoothed.append(Smoothed(report, band, lam, scale, between, posterior, penalty))
     return SmoothingData(time_axis, t, times, points, precisions, batch), smoothed
 
 
