@@ -17,6 +17,7 @@ LAYERS = [
         "_arrays",
         "_config",
         "_disk",
+        "_durations",
         "_exceptions",
         "_input",
         "_lonlat",

@@ -15,6 +15,7 @@ from ._arrays import as_array, checked_number, short_repr
 from ._core import ValidationError
 from ._curve_plots import CurvePlots
 from ._curves.composed import Affine, TimeMap, part_of_times
+from ._durations import seconds_of
 from ._options import order_of
 from ._spaces import Doubles, factors_of, parts_of
 from ._time import TimeAxis
@@ -223,14 +224,14 @@ class Curve(CurvePlots[P]):
         """
         return self._reversed()
 
-    def shift(self, dt: float | timedelta | np.timedelta64) -> Curve[P]:
+    def shift(self, dt: float | str | timedelta | np.timedelta64) -> Curve[P]:
         """Return the curve at times that are later by a constant.
 
         Parameters
         ----------
-        dt : float or timedelta64
-            Time by which the curve moves. A ``timedelta`` or ``timedelta64`` if its times are dates, otherwise a
-            number. Negative values move the curve to earlier times.
+        dt : float, str or timedelta64
+            Time by which the curve moves. If its times are dates, a ``timedelta``, a ``timedelta64`` or a text such as
+            ``"3h"``, otherwise a number. Negative values move the curve to earlier times.
 
         Returns
         -------
@@ -396,9 +397,13 @@ class _Law:
 def _checked_shift(time_axis: TimeAxis, dt: Any) -> Any:
     """Return the time by which knots move, in a type that can be added to them."""
     if time_axis.dates:
+        if isinstance(dt, str):
+            dt = np.timedelta64(round(1e9 * seconds_of(dt.removeprefix("-"), "dt")), "ns") * (-1) ** dt.startswith("-")
         if not isinstance(dt, (timedelta, np.timedelta64)) or np.isnat(np.timedelta64(dt)):
-            raise ValidationError(f"the knots are dates, so dt must be a timedelta64, not {short_repr(dt)}")
-        return np.timedelta64(dt)
+            raise ValidationError(
+                f"the knots are dates, so dt must be a timedelta64 or a text such as '3h', not {short_repr(dt)}"
+            )
+        return getattr(dt, "asm8", np.timedelta64(dt))
     if isinstance(dt, np.timedelta64):
         raise ValidationError(f"the times are numbers, so dt must be a finite number, not {short_repr(dt)}")
     # Comparison is exact for integers of any size.

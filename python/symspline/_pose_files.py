@@ -17,7 +17,7 @@ from ._core import ValidationError, number_lines
 from ._disk import path_of, replacing
 from ._input import times_of
 from ._rounded_times import warn_of_rounded_times
-from ._spaces import Array, Doubles, SpecialEuclidean, SpecialOrthogonal, point_tol
+from ._spaces import Array, Doubles, SpecialEuclidean, SpecialOrthogonal, point_tol, rotations_and_positions
 from ._typing import PointsLike
 from ._validation import length, off_one
 from .convert import matrix_to_quaternion, quaternion_to_matrix
@@ -437,6 +437,11 @@ def split(poses: PointsLike) -> tuple[Array, Array]:
     positions : ndarray, shape (..., 3)
         Positions.
 
+    Raises
+    ------
+    ValidationError
+        If the last row of a pose is not (0, 0, 0, 1), as of transposed poses.
+
     See Also
     --------
     join : The inverse.
@@ -448,10 +453,7 @@ def split(poses: PointsLike) -> tuple[Array, Array]:
     >>> position.tolist()
     [0.0, 0.0, 0.0]
     """
-    g = _SE3._array(poses, "poses")
-    if g.shape[-2:] != (4, 4):
-        raise ValidationError(f"poses must have shape (..., 4, 4), not {g.shape}")
-    return g[..., :3, :3].copy(), g[..., :3, 3].copy()
+    return rotations_and_positions(poses, "poses")
 
 
 def _timed(t: ArrayLike, poses: Any) -> tuple[Array, Array]:

@@ -13,6 +13,7 @@ from ._composed import SegmentedCurve
 from ._core import ValidationError
 from ._cubic import CubicSpline
 from ._curves.fit import read_given
+from ._durations import seconds_of
 from ._functional import fit_many
 from ._input import times_of
 from ._missing import data_without_missing, refuse_missing, without_missing
@@ -29,7 +30,7 @@ from ._validation import one_of
 class CutOptions(TypedDict, total=False):
     """The keywords of `fit_segments` that cut the recording."""
 
-    max_gap: Required[float | timedelta | np.timedelta64]
+    max_gap: Required[float | str | timedelta | np.timedelta64]
     min_points: int
     duplicates: Duplicates
     skipna: bool
@@ -77,7 +78,7 @@ def fit_segments(
     points: PointsLike,
     space: Space[Any] | str,
     *,
-    max_gap: float | timedelta | np.timedelta64,
+    max_gap: float | str | timedelta | np.timedelta64,
     min_points: int = 2,
     duplicates: Duplicates = "raise",
     smooth: bool = False,
@@ -97,8 +98,9 @@ def fit_segments(
         Points. For a `Product`, a tuple with one array per factor. On ``so:3``, also a SciPy ``Rotation``.
     space : Space or str
         A space or its name, such as ``Sphere(2)`` or ``"sphere:2"``.
-    max_gap : float or timedelta64
-        Longest time between neighbours of one curve, in the unit of t (seconds for dates).
+    max_gap : float, str or timedelta64
+        Longest time between neighbours of one curve, in the unit of t (seconds for dates). For dates and durations,
+        also a text such as ``"3h"`` or ``"10min"``, with one of the units ns, us, ms, s, min, h and d.
     min_points : int, default 2
         Segments with fewer points are dropped. At least 2.
     duplicates : {"raise", "first", "mean"}, default "raise"
@@ -278,7 +280,7 @@ def cut(
         starts = np.flatnonzero(new)
         arrays = [_at_once(f, a, starts, duplicates) for f, a in zip(factors_of(space), arrays, strict=True)]
         rows, moments, seconds, new = rows[new], moments[new], seconds[new], new[new]
-    gap = _seconds(max_gap, time_axis.dates)
+    gap = _seconds(max_gap, time_axis.dates or time_axis.durations)
     cuts = np.flatnonzero(np.diff(seconds) > gap) + 1
     segments = [
         slice(a, b)
@@ -294,10 +296,9 @@ def cut(
 
 def _seconds(max_gap: Any, dates: bool) -> float:
     """Return the longest gap as the core counts times."""
-    if dates and isinstance(max_gap, (np.timedelta64, timedelta)):
-        max_gap = np.timedelta64(max_gap) / np.timedelta64(1, "s")
-    unit = " of seconds or a timedelta64" if dates else ""
-    checked_number(max_gap, f"max_gap must be a number{unit}", lambda x: not isinstance(x, np.timedelta64))
+    max_gap = seconds_of(max_gap, "max_gap", dates)
+    unit = " of seconds, a timedelta64 or a text such as '3h'" if dates else ""
+    checked_number(max_gap, f"max_gap must be a number{unit}", lambda x: x == x)
     if not max_gap > 0:
         raise ValidationError(f"max_gap must be more than 0, not {max_gap}")
     return float(max_gap)

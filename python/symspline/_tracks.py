@@ -26,6 +26,10 @@ _LAYOUTS = (
 )
 
 
+# Names of columns of times.
+_TIME_NAMES = ("time", "times", "timestamp", "date", "datetime", "date_time", "utc", "fix_time", "t")
+
+
 class Tracks(NamedTuple):
     """A table of tracks after validation.
 
@@ -121,8 +125,13 @@ def read_tracks(
                 f"interpolate has the column {name!r}, but only columns of numbers other than times, positions and "
                 "names of tracks can be interpolated"
             )
-    if time is None and not dated and (found := [own for own in frame.columns if frame[own].dtype.kind == "M"]):
+    if time is None and not dated and (found := [own for own in frame.columns if _may_be_times(own, frame[own])]):
         raise ValidationError(f"the index of frame holds no dates. Pass the column of the times: time={found[0]!r}.")
+    if time is None and not dated:
+        raise ValidationError(
+            f"the index of frame holds no dates, but {frame.index.dtype}. Pass time=, the column of the times, one of "
+            f"{', '.join(map(str, frame.columns))}."
+        )
     name = time if time is not None else frame.index.name or "time"
     stamps = frame.index.to_series(index=range(len(frame))) if time is None else frame[time].reset_index(drop=True)
     for column in keys:
@@ -148,6 +157,11 @@ def _layout(frame: pd.DataFrame, columns: tuple[str, str] | None) -> tuple[Any, 
     return lon, lat, None, None
 
 
+def _may_be_times(name: Any, values: pd.Series) -> bool:
+    """Whether a column looks like times: it holds dates, or its name is that of times."""
+    return values.dtype.kind == "M" or str(name).lower() in _TIME_NAMES
+
+
 def _dates(stamps: pd.Series, name: Any) -> pd.Series:
     """Return times as dates. Texts must be in ISO 8601, which has no ambiguous days and months."""
     import pandas as pd
@@ -161,7 +175,10 @@ def _dates(stamps: pd.Series, name: Any) -> pd.Series:
                 "pandas.to_datetime."
             ) from None
     if stamps.dtype.kind != "M":
-        raise ValidationError(f"column {name!r} must hold dates; convert strings by pandas.to_datetime")
+        raise ValidationError(
+            f"column {name!r} must hold dates, not {stamps.dtype}. Convert it by pandas.to_datetime, for numbers that "
+            "count from 1970 with its argument unit, such as unit='s'."
+        )
     return stamps
 
 

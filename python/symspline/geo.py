@@ -23,6 +23,7 @@ from ._arrays import checked_flag, checked_number, short_repr
 from ._composed import SegmentedCurve
 from ._core import ValidationError
 from ._cubic import CubicSpline
+from ._durations import seconds_of
 from ._estimation.along import Motion
 from ._estimation.uncertainty import Jacobians, check_uncertain, standard_errors
 from ._exceptions import SymsplineError
@@ -290,9 +291,9 @@ def resample(
     interpolate : str or sequence of str, optional
         Columns of numbers to interpolate linearly in time, such as depths or temperatures. Angles that pass 360°, such
         as headings, are not suitable.
-    max_gap : float or timedelta64
-        Longest gap within a curve, in seconds or as a duration; see `symspline.fit_segments`. The result has no rows
-        within gaps.
+    max_gap : float, str or timedelta64
+        Longest gap within a curve, in seconds or as a duration such as ``"3h"``; see `symspline.fit_segments`. The
+        result has no rows within gaps.
     min_points : int, default 2
         Segments with fewer points are dropped.
     duplicates : str, default "raise"
@@ -366,7 +367,7 @@ def resample(
     own_names = [*table.keys, table.name, *table.columns]
     if clash := [name for name in (*own_names, *more) if name in computed]:
         raise ValidationError(f"the column {clash[0]!r} has the name of a column of the result. Rename it.")
-    max_gap = pd.Timedelta(max_gap).to_timedelta64() if isinstance(max_gap, str) else max_gap
+    max_gap = seconds_of(max_gap, "max_gap")
     step = _step(every)
     curves: list[tuple[Any, Any]] = []
     names: list[str] = []
@@ -387,7 +388,7 @@ def resample(
         owners += [track] * len(segments)
     if not curves and len(frame):
         raise ValidationError(
-            f"every track has fewer than {min_points} positions between gaps longer than max_gap={short_repr(max_gap)} "
+            f"every track has fewer than {min_points} positions between gaps longer than max_gap={max_gap:g} "
             "seconds; increase max_gap or decrease min_points"
         )
     if not curves:

@@ -174,7 +174,8 @@ def _read(space: Space, points: Any) -> Points:
         suits = axis >= 0 and points.size and shape[axis] >= 2 and shape[axis + 1 :] == space._point_shape
         if suits and flags.c_contiguous and flags.aligned:
             return Points(points, space._tol(points), shape[:axis], shape[axis])
-    array = points if type(points) is np.ndarray else space._array(points, "points")
+    known = type(points) is np.ndarray and not isinstance(space, Quotient)
+    array = points if known else space._array(points, "points")
     # A batch may be empty, as blocks of a selection are.
     axis = array.ndim - len(space._point_shape) - 1
     if array.ndim == 0 or (array.size == 0 and (axis < 1 or array.shape[axis] == 0)):

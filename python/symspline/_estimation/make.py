@@ -31,6 +31,7 @@ from .._spaces import (
     Space,
     SpecialEuclidean,
     factors_of,
+    parts_of,
     refuse_quotients,
     space_named,
 )
@@ -314,11 +315,15 @@ def _smoothed(
     def in_order(value: Any) -> Any:
         if isinstance(value, tuple):
             return tuple(in_order(own) for own in value)
-        if isinstance(value, np.ma.MaskedArray):
-            value = as_array(value, "measurements[0].y")
         array = None if value is None else np.asarray(value)
         return value if array is None or array.shape[:1] != order.shape else array[order]
 
+    # Objects of other libraries as arrays.
+    parts = parts_of(given.y, space, "measurements[0].y")
+    each = tuple(
+        factor._array(part, "measurements[0].y") for factor, part in zip(factors_of(space), parts, strict=True)
+    )
+    y = each if isinstance(space, Product) else each[0]
     weights, sigma = given.weights, given.sigma
     several = sigma is None or isinstance(sigma, tuple) or np.ndim(sigma) == 0
     if not several:
@@ -327,7 +332,7 @@ def _smoothed(
         weights, sigma = as_array(sigma, "measurements[0].sigma").astype(np.float64) ** -2.0, 1.0
     return make_smoothing_spline(
         in_order(t),
-        in_order(given.y),
+        in_order(y),
         space,
         lam,
         weights=in_order(weights),

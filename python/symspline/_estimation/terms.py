@@ -468,7 +468,7 @@ def _of_size(constant: Any, size: int, name: str) -> Constant:
 
 def points_on(space: Space, y: Any, n: int, name: str) -> Array:
     """Return n points of a space."""
-    array = as_array(y, name)
+    array = space._array(y, name)
     points = space._numbers(space._doubles(array, name))
     if points.shape != (n, *space.point_shape):
         raise ValidationError(f"{name} has shape {array.shape}, but {(n, *space.point_shape)} is needed")
@@ -503,7 +503,8 @@ def bind(measurement: Measurement, label: str, times: Doubles, space: Space[Any]
         y: Any = measurement.y
         if isinstance(chosen, SpecialEuclidean) and not isinstance(y, tuple):
             # The positions or the rotations of poses.
-            shape = as_array(y, f"{label}.y").shape[1:]
+            y = chosen._array(y, f"{label}.y")
+            shape = y.shape[1:]
             for part in parts:
                 if shape == spaces[part].point_shape:
                     return _points(measurement, label, times, spaces[part], [part])

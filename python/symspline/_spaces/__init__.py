@@ -17,6 +17,7 @@ from .groups import (
     SpecialUnitary,
     Symplectic,
     Unitary,
+    rotations_and_positions,
 )
 from .indefinite import AntiDeSitter, DeSitter, IndefiniteGrassmannian
 from .positive import (

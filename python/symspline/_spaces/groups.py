@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from .._arrays import refuse
 from .._core import ValidationError
 from .._quaternions import matrices_of_quaternions
 from .._typing import ComplexArray, FloatArray
@@ -63,13 +64,18 @@ class SpecialOrthogonal(Group[FloatArray]):
             return ". symspline.rotations.from_quaternions converts quaternions to rotations."
         if shape[-1:] != (3,):
             return ""
-        if name in _POINTS:
+        if names_points(name):
             return ". symspline.rotations.from_rotation_vectors converts rotation vectors to rotations."
         return ". symspline.rotations.velocities(rotations, rates) converts angular velocities to tangent vectors."
 
 
-# Arguments that are points, not tangent vectors.
-_POINTS = ("points", "p", "q")
+# Rounding errors of the last row of a pose.
+_LAST_ROW = 1e-6
+
+
+def names_points(name: str) -> bool:
+    """Whether an argument with this name is points, not tangent vectors. Measurements have points `y`."""
+    return name in ("points", "p", "q") or name.endswith(".y")
 
 
 def _are_rotations(value: Any) -> bool:
@@ -248,9 +254,36 @@ class SpecialEuclidean(Group[FloatArray]):
             )
         if shape[-2:] == (3, 3):
             return ". symspline.poses.join(rotations, positions) returns poses; curves of rotations are on so:3."
-        if shape[-1:] == (6,) and name not in _POINTS:
+        if shape[-1:] == (6,) and not names_points(name):
             return ". symspline.poses.velocities(poses, twists) converts twists to tangent vectors."
         return ""
+
+
+def rotations_and_positions(poses: Any, name: str) -> tuple[Array, Array]:
+    """Split poses, shape (..., 4, 4), into rotations and positions.
+
+    Raises
+    ------
+    ValidationError
+        If the last row of a pose is not (0, 0, 0, 1).
+    """
+    g = SpecialEuclidean(3)._array(poses, name)
+    if g.shape[-2:] != (4, 4):
+        raise ValidationError(f"{name} must have shape (..., 4, 4), not {g.shape}")
+    last = g[..., 3, :]
+    # Poses in gaps of a recording are NaN.
+    wrong = ~np.isnan(last).any(axis=-1) & ~(np.abs(last - [0, 0, 0, 1]) <= _LAST_ROW).all(axis=-1)
+
+    def described(i: Any) -> str:
+        remedy = f"The last row of a pose [[R, x], [0, 1]] is (0, 0, 0, 1). Check {name}."
+        if np.allclose(g[i][:3, 3], 0) and np.isclose(last[i][3], 1):
+            remedy = f"The poses look transposed: pass np.swapaxes({name}, -1, -2)."
+        elif np.allclose(last[i][:3], 0):
+            remedy = f"Divide homogeneous matrices by their last entry: {name} / {name}[..., 3:, 3:]."
+        return f"has the last row {np.round(last[i], 6).tolist()}, not (0, 0, 0, 1). {remedy}"
+
+    refuse(np.asarray(wrong), name or "poses", described)
+    return g[..., :3, :3].copy(), g[..., :3, 3].copy()
 
 
 def _are_parts(rotations: Any, positions: Any) -> bool:

@@ -15,6 +15,7 @@ from .._arrays import short_repr
 from .._core import Handle, ValidationError
 from .._typing import AnyArray, AnyArrays, FloatArray, P, PProduct
 from .base import CLASSES, DERIVED, Space, example_of
+from .groups import names_points, rotations_and_positions
 from .statistics import Groups
 
 Tuple = tuple[Any, ...]
@@ -198,6 +199,7 @@ class Product(Space[PProduct]):
 
     def _split(self, *arguments: Any) -> list[Tuple]:
         """Return the entries of the arguments that belong to each factor."""
+        arguments = tuple(_parts_of_poses(value, self, "points") for value in arguments)
         for value in arguments:
             if not isinstance(value, (tuple, list)) or len(value) != len(self.factors):
                 raise ValidationError(f"{self!r} needs tuples of {len(self.factors)} arrays, one per factor")
@@ -214,11 +216,29 @@ def parts_of(value: Any, space: Space[Any], name: str) -> Tuple:
     if not isinstance(space, Product):
         return (value,)
     count = len(space.factors)
+    value = _parts_of_poses(value, space, name)
     if not isinstance(value, (tuple, list)) or len(value) != count:
         raise ValidationError(
             f"{name} must be a tuple of {count} arrays, one per factor of {space!r}{_conversion(value, space)}"
         )
     return tuple(value)
+
+
+def _parts_of_poses(value: Any, space: Product[Any], name: str) -> Any:
+    """Return the rotations and positions of poses on a product of ``so:3`` and ``r:3``; other values do not change.
+
+    Poses are objects of SciPy, lists of them, and matrices as on ``se:3``.
+    """
+    if isinstance(value, tuple) or sorted(factor.point_shape for factor in space.factors) != [(3,), (3, 3)]:
+        return value
+    several = isinstance(value, list) and len(value) > 0 and all(hasattr(own, "translation") for own in value)
+    matrices = isinstance(value, np.ndarray) and value.shape[-2:] == (4, 4) and names_points(name)
+    if {str(factor) for factor in space.factors} != {"so:3", "euclidean:3"} or not (
+        several or matrices or hasattr(value, "translation")
+    ):
+        return value
+    parts = dict(zip(("so:3", "euclidean:3"), rotations_and_positions(value, name), strict=True))
+    return tuple(parts[str(factor)] for factor in space.factors)
 
 
 def _conversion(value: Any, space: Product[Any]) -> str:

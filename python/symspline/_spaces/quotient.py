@@ -14,7 +14,7 @@ from .._core import CutLocusError, ValidationError
 from .._typing import P
 from .base import DERIVED, Array, Space
 from .finite_groups import Factor, FiniteGroup, Indices
-from .groups import SpecialOrthogonal, SpecialUnitary
+from .groups import SpecialOrthogonal, SpecialUnitary, names_points
 from .product import Product, factors_of, space_named
 from .unwrap import Nearest, along_path, nearest_of, over_grid
 
@@ -215,6 +215,10 @@ class Quotient(Space[P]):
         return np.asarray(off.max(axis=-1, initial=0.0) < _TOL)
 
     # ---- representatives ----
+
+    def _array(self, value: Any, name: str) -> Array:
+        array = self.cover._array(value, name)
+        return _without_phase(array) if names_points(name) and self._full_name.startswith("pu:") else array
 
     def unwrap(self, points: ArrayLike, axes: int = 1) -> P:
         """Choose representatives that are continuous along a path or over a grid.
@@ -442,6 +446,18 @@ def quotient_named(name: str) -> Quotient[Any]:
     if not right:
         return Quotient(space, left, left=True)
     return Quotient(space, right, left=left or False)
+
+
+def _without_phase(x: Array) -> Array:
+    """Return unitary matrices of determinant 1 that equal the given ones up to a phase; others do not change."""
+    if x.dtype.kind not in "fc" or x.ndim < 2 or x.shape[-1] != x.shape[-2]:
+        return x
+    with np.errstate(all="ignore"):
+        phase = np.linalg.det(x.astype(np.complex128))
+        phase = phase / np.abs(phase)
+        turned = np.isfinite(phase) & (np.abs(phase - 1) > _TOL)
+        root = np.where(turned, np.exp(-1j * np.angle(phase) / x.shape[-1]), 1.0)
+    return x * root[..., None, None] if turned.any() else x
 
 
 def _unitary_up_to_phase(name: str) -> Quotient[Any]:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._core import ValidationError
+from .._durations import NANOSECONDS, parts_of_duration
 from .._input import ISO_DATE, UTC_ZONE, shapes_of, times_of
 from ._messages import Problem, refuse
 
@@ -29,11 +30,8 @@ _DATE_LIKE = re.compile(
     re.IGNORECASE | re.ASCII,
 )
 _PACKED_DAY = re.compile(r"(19|20)\d\d(0[1-9]|1[0-2])(0[1-9]|[12]\d|3[01])", re.ASCII)
-_DURATION = re.compile(r"(\d+\.?\d*(?:e[+-]?\d+)?|\.\d+) ?([a-z]*)", re.IGNORECASE | re.ASCII)
 _SECOND = 10**9
 UNITS = ("s", "ms", "us", "ns")
-_NANOSECONDS = {"ns": 1, "us": 10**3, "ms": 10**6, "s": _SECOND}
-_NANOSECONDS |= {"min": 60 * _SECOND, "h": 3600 * _SECOND, "d": 24 * 3600 * _SECOND}
 EXACT = 2**53
 """Whole numbers up to here are exact as floating-point numbers."""
 _MOST = 10**9
@@ -116,7 +114,7 @@ def parse_times(cells: Sequence[str], fail: Fail) -> tuple[Times, bool]:
 
 def from_unix(times: Times, unit: str, cells: Sequence[str] | None, place: Callable[[int], str]) -> Times:
     """Return dates in UTC for numbers that count a unit since 1970; fractions in the text of cells are exact."""
-    scale = _NANOSECONDS[unit]
+    scale = NANOSECONDS[unit]
     whole = times if times.dtype.kind in "iu" else np.floor(times)
     limit = np.iinfo(np.int64).max // scale
     far = np.flatnonzero(np.abs(whole) > limit)
@@ -178,7 +176,7 @@ def longest_gap(text: str, dates: bool) -> float:
     count, unit = _duration(text, "--max-gap")
     if unit and not dates:
         raise Problem(f"--max-gap {text}: the times are numbers; give a gap without a unit")
-    return float(count * _NANOSECONDS[unit or "s"] / _SECOND if dates else count)
+    return float(count * NANOSECONDS[unit or "s"] / _SECOND if dates else count)
 
 
 def every(step: str, knots: Times) -> Times:
@@ -198,7 +196,7 @@ def every(step: str, knots: Times) -> Times:
         # The last sample is at the end if the step divides the curve up to rounding.
         samples = _samples((float(knots[-1]) - float(knots[0])) / length * (1 + 1e-12), step)
         return np.asarray(np.minimum(_equidistant(_decimal(knots[0]), Fraction(count), samples), knots[-1]))
-    count *= _NANOSECONDS[unit or "s"] if kind == "M" else 1
+    count *= NANOSECONDS[unit or "s"] if kind == "M" else 1
     whole = "of nanoseconds" if kind == "M" else "as the times are"
     refuse(f"--every {step}: ", (count != int(count), f"a step must be a whole number {whole}"))
     ends, jump = _in_ticks(knots, int(count)) if kind == "M" else (knots[[0, -1]], int(count))
@@ -211,10 +209,10 @@ def every(step: str, knots: Times) -> Times:
 
 def _in_ticks(knots: Times, nanoseconds: int) -> tuple[Times, int]:
     """Return the ends and a step in the coarsest unit in which both are whole numbers."""
-    unit = next(unit for unit in ("s", "ms", "us", "ns") if nanoseconds % _NANOSECONDS[unit] == 0)
+    unit = next(unit for unit in ("s", "ms", "us", "ns") if nanoseconds % NANOSECONDS[unit] == 0)
     ends = _in_unit(knots, unit)
     ticks = int(np.ones(1, f"datetime64[{unit}]").astype(ends.dtype).astype(np.int64)[0])
-    return ends, nanoseconds // _NANOSECONDS[unit] * ticks
+    return ends, nanoseconds // NANOSECONDS[unit] * ticks
 
 
 def _integers(ends: Times) -> list[int]:
@@ -286,19 +284,19 @@ def _samples(steps: float, option: str) -> int:
 
 def _duration(text: str, option: str) -> tuple[Decimal, str]:
     """Split ``"10min"`` into 10 and ``"min"``."""
-    match = _DURATION.fullmatch(text.strip())
-    if match is None or match[2].lower() not in ("", *_NANOSECONDS):
-        raise Problem(
-            f"{option} {text}: a duration is a number such as 0.5, or one with a unit such as 10min; "
-            f"units are {', '.join(_NANOSECONDS)}"
-        )
     try:
-        count = Decimal(match[1])
+        found = parts_of_duration(text)
     except InvalidOperation:
         raise Problem(f"{option} {text}: the exponent is too large") from None
+    if found is None:
+        raise Problem(
+            f"{option} {text}: a duration is a number such as 0.5, or one with a unit such as 10min; "
+            f"units are {', '.join(NANOSECONDS)}"
+        )
+    count, unit = found
     refuse(
         f"{option} {text}: ",
         (count == 0, "it must be larger than zero"),
         (abs(count.adjusted()) > _EXPONENT, f"that is too {'long' if count > 1 else 'short'}"),
     )
-    return count, match[2].lower()
+    return count, unit
