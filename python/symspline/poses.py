@@ -29,6 +29,7 @@ from ._core import ValidationError
 from ._curves.at_times import evaluated
 from ._curves.composed import AnyCurve
 from ._estimation.along import Motion
+from ._estimation.measurements import GRAVITY
 from ._estimation.uncertainty import Jacobians, check_uncertain, standard_errors
 from ._head_positions import read_head_pos, write_head_pos
 from ._pose_files import (
@@ -96,7 +97,7 @@ class Imu(NamedTuple):
     >>> still = ss.CubicSpline(None, [np.eye(4), np.eye(4)], "se:3")
     >>> gyro, specific_force = imu(still, 0.5)
     >>> gyro + 0.0, specific_force
-    (array([0., 0., 0.]), array([0.  , 0.  , 9.81]))
+    (array([0., 0., 0.]), array([0.     , 0.     , 9.80665]))
     """
 
     gyro: Array
@@ -107,7 +108,7 @@ class Imu(NamedTuple):
 def imu(
     spline: Spline,
     x: TimesLike,
-    gravity: ArrayLike = (0.0, 0.0, -9.81),
+    gravity: ArrayLike = GRAVITY,
     *,
     extrapolate: Extrapolate = None,
     per_curve: bool = False,
@@ -119,7 +120,7 @@ def imu(
 def imu(
     spline: Spline,
     x: TimesLike,
-    gravity: ArrayLike = (0.0, 0.0, -9.81),
+    gravity: ArrayLike = GRAVITY,
     *,
     extrapolate: Extrapolate = None,
     per_curve: bool = False,
@@ -130,7 +131,7 @@ def imu(
 def imu(
     spline: Spline,
     x: TimesLike,
-    gravity: ArrayLike = (0.0, 0.0, -9.81),
+    gravity: ArrayLike = GRAVITY,
     *,
     extrapolate: Extrapolate = None,
     per_curve: bool = False,
@@ -144,7 +145,7 @@ def imu(
         Curve on ``se:3``, or on a product with one ``so:3`` and one ``r:3``.
     x : array_like
         Times.
-    gravity : array_like, shape (3,), default (0.0, 0.0, -9.81)
+    gravity : array_like, shape (3,), default (0.0, 0.0, -9.80665)
         Gravity g in the world frame, in the units of positions and times; by default metres and seconds, with z
         upwards. A body at rest measures −g.
     extrapolate : bool or str, optional
@@ -193,7 +194,7 @@ def imu(
     >>> import numpy as np, symspline as ss
     >>> still = ss.CubicSpline(None, [np.eye(4), np.eye(4)], "se:3")
     >>> imu(still, 0.5).specific_force
-    array([0.  , 0.  , 9.81])
+    array([0.     , 0.     , 9.80665])
 
     Noisy poses of a body that swings, and the standard errors of its signals:
 

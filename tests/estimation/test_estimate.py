@@ -223,7 +223,7 @@ def test_one_kind_of_points_is_a_smoothing_spline():
     order = np.random.default_rng(0).permutation(len(t))
     a = ss.estimate([measure.Points(t[order], seen[order])], "auto", "so:3")
     b = ss.make_smoothing_spline(t, seen, "so:3")
-    assert np.array_equal(a(5.5), b(5.5)) and type(a) is ss.SmoothingSpline and not a.parameters
+    assert np.array_equal(a(5.5), b(5.5)) and isinstance(a, ss.SmoothingSpline) and not a.parameters
 
 
 def test_automatic_knots_and_dates():

@@ -108,7 +108,7 @@ def test_no_speed_has_no_standard_error():
 def test_speed_and_course(latitude):
     rng = np.random.default_rng(latitude == 55)
     t, y = track(rng, latitude)
-    spline = ss.make_smoothing_spline(t, y, S2, knots=uneven(rng, 3600, 14))
+    spline = ss.make_smoothing_spline(t, y, S2, knots=uneven(rng, 3600, 28))
     x = np.sort(rng.uniform(50, 3550, 25))
     many = spline.sample(rng, 2000)
     speed, std = geo.sog(spline, x, return_std=True)

@@ -83,7 +83,7 @@ def test_a_drive_round_a_circle():
     assert np.abs(poses.twist(spline, x, "world") - [0, 0, 0.5, 1, 0, 0]).max() < 1e-13
     gyro, force = poses.imu(spline, x)
     assert np.abs(gyro - [0, 0, 0.5]).max() < 1e-13
-    assert np.abs(force - [0, 0.5, 9.81]).max() < 1e-12
+    assert np.abs(force - [0, 0.5, 9.80665]).max() < 1e-12
 
 
 def test_a_sensor_that_falls_measures_nothing():
@@ -105,7 +105,7 @@ def test_a_sensor_measures_in_its_own_axes(name):
     assert np.allclose(np.einsum("nij,nj->ni", r, gyro), rate, rtol=0, atol=1e-13)
     # What turns about several axes does so in others.
     assert np.abs(gyro - rate).max() > 0.1
-    up = poses.linear_acceleration(spline, INNER) - np.array([0, 0, -9.81])
+    up = poses.linear_acceleration(spline, INNER) - np.array([0, 0, -9.80665])
     assert np.allclose(np.einsum("nij,nj->ni", r, force), up, rtol=0, atol=1e-12)
 
 

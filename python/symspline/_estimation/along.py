@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .. import _core
+from .._smoothing.posterior import coordinates
 from .._spaces import Array, Doubles, Space
 
 # Relative step of central differences: their truncation and rounding errors are then both about 1e-11.
@@ -79,20 +80,3 @@ class Motion(NamedTuple):
         if nu == 0:
             vectors = vectors - vectors.mean(axis=0)
         return STEP * (1.0 + float(np.sqrt(np.mean(np.abs(vectors) ** 2))))
-
-
-def coordinates(space: Space, p: Array, frames: Array, vectors: Array) -> Doubles:
-    """Return the coordinates of tangent vectors at p in frames, shape (n, dim)."""
-    if not np.isnan(space.curvature):
-        found = space._apply("inner", p=p[:, None], u=frames, v=np.broadcast_to(vectors[:, None], frames.shape))
-        return np.ascontiguousarray(found)
-    # Groups without a metric have frames that are not orthonormal.
-    flat, own = _flat(space, frames), _flat(space, vectors)
-    gram = flat @ np.swapaxes(flat, -1, -2)
-    return np.ascontiguousarray(np.linalg.solve(gram, flat @ own[..., None])[..., 0])
-
-
-def _flat(space: Space, vectors: Array) -> Doubles:
-    """Return vectors as rows of real numbers."""
-    doubles = space._as_doubles(np.ascontiguousarray(vectors))
-    return doubles.reshape(*vectors.shape[: vectors.ndim - len(space.point_shape)], -1)

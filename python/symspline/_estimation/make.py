@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Sequence
-from typing import Any, TypedDict, Unpack, overload
+from dataclasses import replace
+from typing import Any, TypedDict, Unpack, cast, overload
 
 import numpy as np
 
@@ -19,7 +20,7 @@ from .._faults import UNCONVERGED, Fault
 from .._input import times_of
 from .._options import check_on_failure, check_progress, checked_extrapolate
 from .._rounded_times import warn_of_rounded_times
-from .._smoothing import SmoothingReport, SmoothingSpline, SmoothingWarning, make_smoothing_spline
+from .._smoothing import SmoothingReport, SmoothingSpline, make_smoothing_spline
 from .._smoothing.factors import grouped, join, smoothed_spaces
 from .._smoothing.knots import Knots, thin_knots
 from .._smoothing.posterior import Parameter
@@ -50,18 +51,16 @@ from .._typing import (
     TimesLike,
 )
 from .._validation import one_of
-from .._warnings import warn
 from ..manifolds._manifold import refuse_functions
+from .audit import audit, unit_hints
 from .knots import filled, first_knots, merged, shown_times
 from .measurements import SKIPNA, BodyRates, Constant, Measurement, Points, Velocities
 from .missing import measurement_without_missing
 from .search import Search, Starts, automatic, solved, warn_of_gaps, warn_of_turns
 from .solve import Setup, Solution, read_lams
-from .spline import EstimatedSpline, joint
+from .spline import EstimatedSpline, PointsSpline, joint
 from .terms import Term, bind
 
-# The noise may exceed the given standard deviations by this factor without a warning.
-_FACTOR = 2.0
 # Curves with the largest λ for the jerk have fewer degrees of freedom than this.
 _PARABOLA = 3.5
 
@@ -256,19 +255,20 @@ def estimate(
     if len(given) == 1 and isinstance(given[0], Points) and _is_plain(given[0]) and start is None:
         return _smoothed(
             given[0],
+            axis,
             shown,
             knots,
             space,
-            penalty,
             lam,
-            criterion or "gcv",
-            gamma,
             loss,
-            tol,
-            most,
-            policy,
-            on_failure,
-            progress,
+            criterion=criterion or "gcv",
+            gamma=gamma,
+            penalty=penalty,
+            tol=tol,
+            max_iter=most,
+            extrapolate=policy,
+            on_failure=on_failure,
+            progress=progress,
         )
     terms, losses = _terms(given, axis, space, loss)
     constants = _constants(terms)
@@ -294,21 +294,17 @@ def _is_plain(points: Points) -> bool:
 
 def _smoothed(
     given: Points,
+    axis: TimeAxis,
     shown: Array,
     knots: Any,
     space: Space[Any],
-    penalty: Any,
     lam: Any,
-    criterion: Any,
-    gamma: float,
-    loss: Any,
-    tol: float,
-    most: int,
-    policy: Any,
-    on_failure: Any,
-    progress: Any,
-) -> SmoothingSpline[Any, Any]:
-    """Fit points only."""
+    loss: Loss,
+    **options: Any,
+) -> PointsSpline[Any]:
+    """Fit points only, as a smoothing spline whose weights are the inverse variances."""
+    # Without sigma the noise level is estimated, and the weights are relative.
+    (terms, _) = _terms([given if given.sigma is not None else given.with_sigma(1.0)], axis, space, loss)
     t, _ = times_of(given.t, "measurements[0].t")
     order = np.argsort(as_array(t, "measurements[0].t"), kind="stable")
 
@@ -320,35 +316,29 @@ def _smoothed(
 
     # Objects of other libraries as arrays.
     parts = parts_of(given.y, space, "measurements[0].y")
-    each = tuple(
+    arrays = tuple(
         factor._array(part, "measurements[0].y") for factor, part in zip(factors_of(space), parts, strict=True)
     )
-    y = each if isinstance(space, Product) else each[0]
-    weights, sigma = given.weights, given.sigma
-    several = sigma is None or isinstance(sigma, tuple) or np.ndim(sigma) == 0
-    if not several:
-        if weights is not None:
-            raise ValidationError("measurements[0].sigma has one entry per point. Combine it with the weights.")
-        weights, sigma = as_array(sigma, "measurements[0].sigma").astype(np.float64) ** -2.0, 1.0
-    return make_smoothing_spline(
+    y = arrays if isinstance(space, Product) else arrays[0]
+    weights, frames, sigma = given.weights, given.frames, None
+    if given.sigma is not None:
+        # The objective is the sum of squares of residuals in standard deviations, whose noise has variance one.
+        each = grouped(space, [cast(Any, term).precision(len(order)) for term in terms])
+        of_factors = tuple(own[0] if len(own) == 1 else tuple(own) for own in each)
+        weights, frames, sigma = of_factors if isinstance(space, Product) else of_factors[0], None, 1.0
+    found = make_smoothing_spline(
         in_order(t),
         in_order(y),
         space,
         lam,
         weights=in_order(weights),
-        frames=in_order(given.frames),
+        frames=in_order(frames),
         knots=None if isinstance(knots, str) else shown,
-        criterion=criterion,
-        gamma=gamma,
-        penalty=penalty,
         sigma=sigma,
         loss=given.loss or loss,
-        tol=tol,
-        max_iter=most,
-        extrapolate=policy,
-        on_failure=on_failure,
-        progress=progress,
+        **options,
     )
+    return PointsSpline.of(found, given, terms)
 
 
 def _knots(knots: Any, given: list[Measurement]) -> tuple[TimeAxis, Array, Doubles]:
@@ -467,6 +457,11 @@ def _curve(
     on_failure: Any,
 ) -> SmoothingSpline[Any, Any]:
     found = search.found
+    if not found.failure:
+        ratio = audit(setup, found)
+        if any(loss != "linear" for loss in setup.losses):
+            # The sum of squares of the iteration contains the weights of the loss.
+            found = found._replace(reports=[replace(report, sigma=ratio) for report in found.reports])
     factors = factors_of(space)
     parts, ends = [], []
     for factor, own in zip(factors, grouped(space, found.points), strict=True):
@@ -498,23 +493,17 @@ def _curve(
         tuple(_residuals_of(setup, found, f"measurements[{i}]") for i in range(len(given))),
     )
     if found.failure:
-        raise_or_warn([Fault(0, UNCONVERGED, found.failure)], on_failure, curve)
+        hints = unit_hints(setup.terms)
+        raise_or_warn([Fault(0, UNCONVERGED, " ".join([found.failure, *hints]))], on_failure, curve)
     search.warn_of_rival()
     # Parabolas have no jerk, so that the largest λ does not need a warning.
     stiff = [setup.penalty == "jerk" and report.df < _PARABOLA for report in found.reports]
     chosen = [np.asarray(np.isnan(lam) and not own) for lam, own in zip(setup.lams, stiff, strict=True)]
     warn_of_bounds(space, list(found.reports), chosen, [np.asarray(np.inf)] * len(setup.spaces))
-    sigma = found.reports[0].sigma
-    if sigma > _FACTOR and np.isnan(setup.lams).all():
-        warn(
-            f"The residuals are {sigma:.2g} times as large as the given standard deviations suggest. Check sigma: the "
-            "weights of the measurements and the covariance depend on it.",
-            SmoothingWarning,
-        )
     return curve
 
 
 def _residuals_of(setup: Setup, found: Solution, label: str) -> Doubles | tuple[Doubles, ...]:
     """Return the residuals of one measurement, which has one term per part of the space."""
-    own = [rows for term, rows in zip(setup.terms, found.residuals, strict=True) if term.label == label]
+    own = [rows.residuals for term, rows in zip(setup.terms, found.linearised, strict=True) if term.label == label]
     return own[0] if len(own) == 1 else tuple(own)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from copy import copy
 from typing import Any
 
 import numpy as np
@@ -151,6 +152,12 @@ class Points(Measurement):
     ) -> None:
         super().__init__(t, sigma, factor, time_offset, loss)
         self.y, self.weights, self.frames = y, weights, frames
+
+    def with_sigma(self, sigma: Numbers) -> Points:
+        """Return the same points with other standard deviations."""
+        found = copy(self)
+        found.sigma = sigma
+        return found
 
 
 class Velocities(Measurement):

@@ -121,7 +121,8 @@ def solved(setup: Setup, begin: Starts, progress: Progress | None) -> Search:
 
 def _contradicts(setup: Setup, found: Solution) -> bool:
     """Whether the residuals of a sensor are larger than its noise."""
-    for rows, loss in zip(found.residuals, setup.losses, strict=True):
+    for term, loss in zip(found.linearised, setup.losses, strict=True):
+        rows = term.residuals
         squares = np.sum(rows**2, axis=1)
         size = rows.shape[1]
         if loss == "linear":

@@ -15,6 +15,7 @@ from .._core import ValidationError
 from .._curves.curve import CoreCurve
 from .._curves.fit import FitProblem, Points, fit, read_ends
 from .._curves.solve import DEFAULTS
+from .._smoothing.audit import CORNERS
 from .._smoothing.posterior import frames_at
 from .._smoothing.report import SmoothingReport
 from .._spaces import Array, Doubles, Space
@@ -32,8 +33,6 @@ _RETREATS = 6
 _ROUNDING = 1e-5
 # Parameters are not determined if the measurements leave less than this fraction of their information.
 _SINGULAR = 1e-12
-# Quantiles of χ² at which the losses begin to grow more slowly, see `make_smoothing_spline`.
-_CORNERS = {"huber": 0.82, "cauchy": 0.95}
 
 
 class Setup(NamedTuple):
@@ -94,8 +93,10 @@ class Solution(NamedTuple):
         Band, side and corner of the matrix of the linear problem.
     covariance : ndarray, shape (p, p)
         Covariance of the parameters for noise of variance one.
-    residuals : list of ndarray
-        Whitened residuals of each term.
+    linearised : list of Linearised
+        Whitened residuals of each term, and their derivatives.
+    roots : list of ndarray or None
+        Roots of the weights of a robust loss.
     variances : ndarray, shape (knots, m)
         Variances of the coordinates at the knots for noise of variance one.
     loss : float
@@ -109,7 +110,8 @@ class Solution(NamedTuple):
     reports: list[SmoothingReport]
     matrices: list[Doubles]
     covariance: Doubles
-    residuals: list[Doubles]
+    linearised: list[Linearised]
+    roots: list[Doubles | None]
     variances: Doubles
     loss: float
     failure: str
@@ -298,10 +300,9 @@ class Iteration:
             for lam, bound, df in zip(found.lams, found.at_bound, found.df, strict=True)
         ]
         covariance = np.asarray(np.linalg.pinv(found.information, hermitian=True), np.float64)
-        residuals = [own.residuals for own in linear]
         variances = found.variances[0]
         return Solution(
-            self.points, self.values, reports, found.matrices, covariance, residuals, variances, loss, failure
+            self.points, self.values, reports, found.matrices, covariance, linear, weights, variances, loss, failure
         )
 
     def _linearised(self) -> list[Linearised]:
@@ -319,7 +320,7 @@ class Iteration:
                 weights.append(None)
                 value += float(squares.sum())
                 continue
-            corner = _core.chi_squared(own.residuals.shape[1], _CORNERS[loss])
+            corner = _core.chi_squared(own.residuals.shape[1], CORNERS[loss])
             if loss == "huber":
                 factor = np.minimum(1.0, np.sqrt(corner / np.maximum(squares, corner)))
                 value += float(np.where(squares > corner, 2 * np.sqrt(corner * squares) - corner, squares).sum())

@@ -13,6 +13,7 @@ from .._core import ValidationError
 from .._cubic import CubicSpline
 from .._curves.curve import SidePanel, UncertaintyBand
 from .._curves.ends import end_kinds
+from .._smoothing.data import SmoothingData
 from .._smoothing.factors import is_several, smoothed_spaces
 from .._smoothing.posterior import Parameter, Posterior
 from .._smoothing.report import SmoothingReport
@@ -20,7 +21,9 @@ from .._smoothing.solve import Smoothed
 from .._smoothing.spline import SmoothingSpline
 from .._spaces import Array, Doubles, Product, Space, SpecialEuclidean, factors_of, parts_of
 from .._typing import P
+from .along import Motion
 from .measurements import BodyRates, Measurement, Points, SpecificForce
+from .terms import Term
 
 
 def _are_partial(points: Points, factor: Space[Any]) -> bool:
@@ -206,3 +209,65 @@ class EstimatedSpline(SmoothingSpline[P, Any]):
         knots, parameters = self._times.shape[-1], ", ".join(self._parameters) or "no parameters"
         text = f"{knots} knots, {self._span_text}, {parameters}{self._failed_text}"
         return f"<EstimatedSpline on {self.space!r}: {text}>"
+
+
+class PointsSpline(SmoothingSpline[P, Any]):
+    """A smoothing spline that `estimate` fitted to points only, with residuals like those of an `EstimatedSpline`."""
+
+    _format = "symspline-estimate-points"
+    _measurements: tuple[Any, ...]
+    _residuals: tuple[Doubles | tuple[Doubles, ...], ...]
+
+    @classmethod
+    def of(cls, fitted: SmoothingSpline[Any, Any], given: Points, terms: list[Term]) -> Self:
+        """Return the result of `estimate` from the smoothing spline and the terms of its points.
+
+        Parameters
+        ----------
+        fitted : SmoothingSpline
+            The curve.
+        given : Points
+            The points of the user.
+        terms : list of Term
+            The same points in every part, with standard deviations of one if the user gave none.
+        """
+        found = []
+        for term in terms:
+            (part,) = term.parts
+            p, frames = fitted._frames(term.times, False)[part]
+            motion = Motion(smoothed_spaces(fitted.space)[part], 0, p, np.empty(0), np.empty(0), frames)
+            scale = 1.0 if given.sigma is not None else float(fitted._smoothed[part].sigma)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                found.append(np.asarray(term.measure([motion], {}) / term.noise / scale))
+        residuals = found[0] if len(found) == 1 else tuple(found)
+        parts = (fitted._time_axis, fitted._t, fitted._curve, fitted._bc_type, fitted._extrapolate, fitted._reports)
+        return cls._of(*parts, fitted._noisy, fitted._smoothed, (given,), (residuals,))
+
+    def _fill(self, *parts: Any) -> None:
+        *own, self._measurements, self._residuals = parts
+        super()._fill(*own)
+
+    @property
+    def measurements(self) -> tuple[Any, ...]:
+        """The points from which the curve was estimated; empty for a curve from a file."""
+        return self._measurements
+
+    @property
+    def residuals(self) -> Any:
+        """Residuals of the points in standard deviations, one array of shape (n, components) in a tuple.
+
+        On products and for poses, the entry is a tuple with one array per part. Points of weight zero are omitted. If
+        no standard deviation was given, the estimated one is used.
+        """
+        return self._residuals
+
+    @classmethod
+    def _like(cls, spline: CubicSpline[Any, Any], noisy: SmoothingData, smoothed: list[Smoothed]) -> Any:
+        # Factors and parts of the curve are smoothing splines.
+        return SmoothingSpline._like(spline, noisy, smoothed)
+
+    @classmethod
+    def _from_state(cls, state: Entries) -> Self:
+        spline = SmoothingSpline._from_state(state)
+        parts = (spline._time_axis, spline._t, spline._curve, spline._bc_type, spline._extrapolate, spline._reports)
+        return cls._of(*parts, spline._noisy, spline._smoothed, (), ())

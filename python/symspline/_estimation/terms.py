@@ -6,11 +6,14 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .._arrays import as_array, refuse
 from .._core import ValidationError
 from .._curves.fit import read
+from .._smoothing.audit import roots_of
 from .._smoothing.factors import join, parts_of_factor, smoothed_spaces, split
+from .._smoothing.posterior import coordinates
 from .._smoothing.precision import read_precision
 from .._spaces import (
     Array,
@@ -26,7 +29,7 @@ from .._spaces import (
 )
 from .._spaces.actions import Group
 from ..convert import quaternion_to_matrix
-from .along import STEP, Motion, coordinates
+from .along import STEP, Motion
 from .measurements import (
     SKIPNA,
     BodyRates,
@@ -41,6 +44,8 @@ from .measurements import (
 )
 
 _SO3, _S3, _R3 = SpecialOrthogonal(3), Sphere(3), Euclidean(3)
+# Directions whose lengths differ from those of the references by less than this part of σ are normalised.
+_NORMALISED = 0.1
 # Values of the parameters by name.
 Values = dict[str, Doubles]
 
@@ -79,6 +84,8 @@ class Term:
         Highest derivative that the residuals need.
     noise : ndarray, shape (n, d)
         Standard deviations.
+    rows : ndarray of int, shape (n,)
+        Numbers of these measurements among those of the user.
     constants : dict
         Parameters by name.
     """
@@ -89,6 +96,7 @@ class Term:
         self.label, self.given, self.times, self.parts = label, given, times, parts
         self.constants: dict[str, Constant] = {}
         self.noise: Doubles = np.empty((0, 0))
+        self.rows = np.arange(len(times))
         self.time_offset = None if given.time_offset is None else self.name(given.time_offset, "time offset")
 
     def name(self, constant: Constant, default: str) -> str:
@@ -134,6 +142,10 @@ class Term:
                 columns.append((at(step) - at(-step)) / (2 * step))
             found[name] = np.stack(columns, axis=-1)
         return found
+
+    def informative(self, residuals: Doubles) -> Doubles:
+        """Return whitened residuals for an audit; those of measurements without information are NaN."""
+        return residuals
 
     def linearised(
         self, motion_at: Callable[[Doubles, list[int], int], list[Motion]], values: Values, spacing: float
@@ -200,13 +212,21 @@ class PointTerm(Term):
         unit = np.broadcast_to(np.eye(m), (len(self.times), m, m))
         return [{self.parts[0]: unit}, {}, {}], {}
 
+    def precision(self, n: int) -> Doubles:
+        """Return the inverse variances of all n points; those of points without weight are 0."""
+        found = np.zeros(n)
+        found[self.rows] = self.noise[:, 0] ** -2.0
+        return found
+
 
 class InformationTerm(Term):
     """Points with information matrices: the residual is R log_y(γ) in a frame at y, with the matrices RᵀR."""
 
-    def __init__(self, label: str, given: Points, times: Doubles, part: int, y: Array, roots: Doubles) -> None:
+    def __init__(
+        self, label: str, given: Points, times: Doubles, part: int, y: Array, roots: Doubles, known: NDArray[np.bool_]
+    ) -> None:
         super().__init__(label, given, times, [part])
-        self.y, self.roots = y, roots
+        self.y, self.roots, self.known = y, roots, known
 
     def measure(self, motion: list[Motion], values: Values) -> Doubles:
         (own,) = motion
@@ -215,6 +235,15 @@ class InformationTerm(Term):
             "nij,nj->ni", self.roots, coordinates(own.space, self.y, own.space.frame(self.y), logs)
         )
         return result
+
+    def informative(self, residuals: Doubles) -> Doubles:
+        return np.where(self.known, residuals, np.nan)
+
+    def precision(self, n: int) -> Doubles:
+        """Return the inverse covariances of all n points; those of points without weight are 0."""
+        found = np.zeros((n, *self.roots.shape[1:]))
+        found[self.rows] = np.swapaxes(self.roots, -1, -2) @ self.roots / self.noise[..., None] ** 2
+        return found
 
 
 class VelocityTerm(Term):
@@ -299,6 +328,20 @@ class DirectionTerm(Term):
     def measure(self, motion: list[Motion], values: Values) -> Doubles:
         return (self._turned(motion[0].p) - self.seen).reshape(len(self.times), -1)
 
+    def informative(self, residuals: Doubles) -> Doubles:
+        lengths, known = (np.linalg.norm(own, axis=-1) for own in (self.seen, self.reference))
+        sigma = self.noise.reshape(self.seen.shape)[..., 0]
+        if np.any(np.abs(lengths - known) > _NORMALISED * sigma) or np.any(lengths == 0):
+            return residuals
+        # Normalised vectors have no noise along them: the plane across has two coordinates.
+        along = np.eye(3)[np.abs(self.seen).argmin(axis=-1)]
+        first = np.cross(self.seen, along)
+        first /= np.linalg.norm(first, axis=-1, keepdims=True)
+        second = np.cross(self.seen / lengths[..., None], first)
+        each = residuals.reshape(self.seen.shape)
+        flat = np.stack([(each * own).sum(axis=-1) for own in (first, second)], axis=-1)
+        return flat.reshape(len(residuals), -1)
+
     def derivatives(self, motion: list[Motion], values: Values) -> tuple[list[dict[int, Doubles]], dict[str, Doubles]]:
         # δ(Rᵀr) = −η × Rᵀr.
         (own,) = motion
@@ -373,6 +416,10 @@ class FunctionTerm(Term):
         elif result.shape != self.noise.shape:
             raise ValidationError(f"{self.label}: the number of residuals changed from {self.noise.shape[1]}")
         return result
+
+    def informative(self, residuals: Doubles) -> Doubles:
+        # Functions return 0 for samples without a measurement.
+        return np.where(residuals == 0, np.nan, residuals)
 
     def _joined(self, arrays: list[Array], corner: float) -> Any:
         """Combine the arrays of all parts into those of the space."""
@@ -587,13 +634,12 @@ def _points(given: Points, label: str, times: Doubles, space: Space[Any], parts:
             raise ValidationError(f"{label}.y has {len(rows)} points, but there are {n} times")
         good = points_on(own, rows[used], int(used.sum()), f"{label}.y")
         if information is not None:
-            values, vectors = np.linalg.eigh(information[used])
-            roots = np.sqrt(np.maximum(values, 0.0))[..., None] * np.swapaxes(vectors, -1, -2)
-            term: Term = InformationTerm(label, given, times[used], part, good, roots)
+            term: Term = InformationTerm(label, given, times[used], part, good, *roots_of(information[used]))
             term.noise = np.repeat(scale[used, None], own.dim, axis=1)
         else:
             weights = 1.0 if precisions is None else precisions[k].weights[used]
             noise = np.repeat((scale[used] / np.sqrt(weights))[:, None], own.dim, axis=1)
             term = PointTerm(label, given, times[used], part, good, noise)
+        term.rows = np.flatnonzero(used)
         terms.append(term)
     return terms

@@ -37,6 +37,7 @@ from .._typing import (
     TimesLike,
 )
 from ..manifolds._manifold import refuse_functions
+from .audited import warn_of_residuals
 from .data import (
     SmoothingData,
     checked_ends,
@@ -372,6 +373,8 @@ def make_smoothing_spline(
         for own, good, only in zip(lams, sound, best, strict=True)
     ]
     warn_of_bounds(space, reports, asked, counts)
+    are_given = [spread(np.isfinite(own)) for own in sigmas], [spread(np.isnan(own)) for own in lams]
+    warn_of_residuals(space, fitted.curve, whole, noise, *are_given, options.loss)
     warn_of_spread(space, fitted.curve, whole, [part.report.df for part in noise])
     warn_of_signs(space, [valid_data])
     if not far_data:

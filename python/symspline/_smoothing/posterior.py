@@ -131,3 +131,20 @@ def frames_at(space: Space, knots: Doubles, points: Array, x: Doubles, p: Array)
     doubles = [np.ascontiguousarray(space._as_doubles(rows)) for rows in (points, p)]
     found = _core.frames_along(space._handle, knots, doubles[0], np.ascontiguousarray(x), doubles[1])
     return space._numbers(found.reshape(len(x), space.dim, *space._doubles_shape))
+
+
+def coordinates(space: Space, p: Array, frames: Array, vectors: Array) -> Doubles:
+    """Return the coordinates of tangent vectors at p in frames, shape (n, dim)."""
+    if not np.isnan(space.curvature):
+        found = space._apply("inner", p=p[:, None], u=frames, v=np.broadcast_to(vectors[:, None], frames.shape))
+        return np.ascontiguousarray(found)
+    # Groups without a metric have frames that are not orthonormal.
+    flat, own = _flat(space, frames), _flat(space, vectors)
+    gram = flat @ np.swapaxes(flat, -1, -2)
+    return np.ascontiguousarray(np.linalg.solve(gram, flat @ own[..., None])[..., 0])
+
+
+def _flat(space: Space, vectors: Array) -> Doubles:
+    """Return vectors as rows of real numbers."""
+    doubles = space._as_doubles(np.ascontiguousarray(vectors))
+    return doubles.reshape(*vectors.shape[: vectors.ndim - len(space.point_shape)], -1)

@@ -1,0 +1,188 @@
+"""Audit of an estimate: whether each sensor agrees with its standard deviations, and what may be wrong."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import _core
+from .._curves.ends import end_kinds
+from .._smoothing import SmoothingWarning
+from .._smoothing.audit import CORNERS, Residuals, examine
+from .._smoothing.audited import DEGREES, Sensor, advice, described
+from .._smoothing.posterior import Posterior
+from .._spaces import Doubles
+from .._warnings import warn
+from .measurements import GRAVITY
+from .solve import Setup, Solution
+from .terms import ForceTerm, FunctionTerm, PointTerm, RateTerm, Term
+
+# The number of measurements of a sensor from which its mean leverage follows.
+_SAMPLE = 64
+# Distance from the centre of a prior that is improbable, in its standard deviations.
+_PRIOR = 4.0
+# The logarithm of a ratio of sizes must agree so well with that of two units.
+_SIMILAR = 0.6
+# Sensors whose times span such different intervals have different units of time, or hardly overlap.
+_SPANS = 100.0
+
+
+def audit(setup: Setup, found: Solution) -> float:
+    """Issue one warning that names the sensors and constants which do not agree with their standard deviations.
+
+    Returns
+    -------
+    float
+        Ratio of all residuals and their standard deviations, which outliers under a robust loss hardly affect.
+    """
+    sensors = examined(setup, found)
+    failed = [own for own in sensors if own.finding.failed]
+    complaints = [described(own) for own in failed] + _of_priors(setup, found)
+    if complaints:
+        remedies = unit_hints(setup.terms) or advice(failed)
+        warn(
+            "The residuals do not agree with the given standard deviations, so that the curve and its covariance may "
+            f"be wrong. {' '.join([*complaints, *remedies])}",
+            SmoothingWarning,
+        )
+    known = [(own.finding.ratio**2, own.finding.freedom) for own in sensors if np.isfinite(own.finding.ratio)]
+    freedom = sum(weight for _, weight in known)
+    return float(np.sqrt(sum(square * weight for square, weight in known) / freedom)) if freedom else float("nan")
+
+
+def examined(setup: Setup, found: Solution) -> list[Sensor]:
+    """Examine all sensors."""
+    sensors = []
+    leverages = _leverages(setup, found)
+    labels = [term.label for term in setup.terms]
+    for term, own, loss, (leverage, between) in zip(
+        setup.terms, found.linearised, setup.losses, leverages, strict=True
+    ):
+        order = np.argsort(term.times, kind="stable")
+        rows = term.informative(own.residuals)[order]
+        entries = max(1, int(np.isfinite(rows).sum()))
+        corner = np.inf if loss == "linear" else _core.chi_squared(own.residuals.shape[1], CORNERS[loss])
+        given = Residuals(rows, leverage / entries, between / entries, loss, corner, not isinstance(term, FunctionTerm))
+        name = f"{term.label} ({type(term.given).__name__})"
+        if labels.count(term.label) > 1:
+            name += f" on {' and '.join(repr(setup.spaces[part]) for part in term.parts)}"
+        sensors.append(Sensor(name, term.label, term.rows[order], examine(given)))
+    return sensors
+
+
+def _leverages(setup: Setup, found: Solution) -> list[tuple[float, float]]:
+    """Return the sum of the leverages of each term, and for points the sum of the covariances between neighbours.
+
+    The leverage of a measurement is the variance of its fitted value. That of the constants is at most their number.
+    """
+    band = found.matrices[0]
+    m = band.shape[1] // 4
+    posterior, kinds = Posterior.of(band, np.zeros((0, 0)), m), end_kinds(setup.bc_type)
+    result = []
+    for term, own, roots in zip(setup.terms, found.linearised, found.roots, strict=True):
+        orders = [nu for nu, by_part in enumerate(own.jacobians) if by_part]
+        n = len(term.times)
+        order = np.argsort(term.times, kind="stable")
+        some = np.unique(np.linspace(0, n - 1, min(n, _SAMPLE)).round().astype(int))
+        offset = 0.0 if term.time_offset is None else float(found.values[term.time_offset][0])
+        x = np.clip(term.times[order] + offset, setup.knots[0], setup.knots[-1])
+
+        def rows(
+            at: NDArray[np.intp], orders: list[int], own: Any = own, roots: Any = roots, order: Any = order
+        ) -> Any:
+            each = [_whole(setup, own.jacobians[nu], own.residuals.shape)[order[at]] for nu in orders]
+            whole = np.concatenate(each, axis=-1)
+            return whole if roots is None else whole * roots[order[at], :, None]
+
+        def covariance(at: NDArray[np.intp], orders: list[int], others: Any = None, x: Doubles = x) -> Doubles:
+            there = None if others is None else np.ascontiguousarray(x[others])
+            return posterior.coupled(setup.knots, (), kinds, np.ascontiguousarray(x[at]), there, orders, np.arange(m))
+
+        constants = sum(constant.size for constant in term.constants.values() if constant.sigma is None)
+        if not orders:
+            result.append((float(constants), 0.0))
+            continue
+        whole = rows(some, orders)
+        mean, between = float(((whole @ covariance(some, orders)) * whole).sum(axis=(1, 2)).mean()), 0.0
+        if orders == [0] and n > 1:
+            first = some[some < n - 1]
+            crossed = rows(first, [0]) @ covariance(first, [0], first + 1)
+            between = float((crossed * rows(first + 1, [0])).sum(axis=(1, 2)).mean())
+        result.append((n * mean + constants, n * between))
+    return result
+
+
+def _whole(setup: Setup, by_part: dict[int, Doubles], shape: tuple[int, ...]) -> Doubles:
+    """Return derivatives with respect to the coordinates of all parts."""
+    first = np.cumsum([0, *(space.dim for space in setup.spaces)])
+    out = np.zeros((*shape, first[-1]))
+    for part, own in by_part.items():
+        out[..., first[part] : first[part + 1]] = own
+    return out
+
+
+def _of_priors(setup: Setup, found: Solution) -> list[str]:
+    """Describe constants that are far from their priors."""
+    complaints = []
+    for name, constant in setup.constants.items():
+        if constant.sigma is None:
+            continue
+        off = (found.values[name] - constant.start) / constant.sigma
+        if np.abs(off).max() > _PRIOR:
+            complaints.append(
+                f"The constant {name!r} is {found.values[name].round(6).tolist()}, {np.abs(off).max():.2g} standard "
+                "deviations from its prior. Check the units and the frame of its measurements, or pass a larger sigma "
+                "of the constant."
+            )
+    return complaints
+
+
+def unit_hints(terms: list[Term]) -> list[str]:
+    """Describe measurements whose sizes suggest other units than those of the others."""
+    hints = []
+    spans = [float(np.ptp(term.times)) for term in terms]
+    long = int(np.argmax(spans))
+    for term, span in zip(terms, spans, strict=True):
+        if len(term.times) > 20 and span * _SPANS < spans[long]:
+            hints.append(
+                f"The times of {term.label} span {span:.3g}, and those of {terms[long].label} {spans[long]:.3g}: check "
+                "the unit of the times."
+            )
+    for term in terms:
+        if isinstance(term, RateTerm):
+            points = [own for own in terms if isinstance(own, PointTerm) and own.parts == term.parts]
+            ratio = _rates_over_steps(term, points)
+            if ratio is not None and abs(np.log(ratio / DEGREES)) < _SIMILAR:
+                hints.append(
+                    f"The rates of {term.label} are {ratio:.2g} times those of the points: pass radians instead of "
+                    "degrees per unit of time."
+                )
+        if isinstance(term, ForceTerm):
+            size, g = (float(np.median(np.linalg.norm(own, axis=-1))) for own in (term.f, term.gravity[None]))
+            if size > 0 and g > 0 and abs(np.log(size * -GRAVITY[2] / g)) < _SIMILAR:
+                hints.append(
+                    f"The specific force of {term.label} is {size:.2g}, but gravity is {g:.3g}: pass it in the units "
+                    "of `gravity` instead of multiples of g."
+                )
+    return list(dict.fromkeys(hints))
+
+
+def _rates_over_steps(term: RateTerm, points: list[PointTerm]) -> float | None:
+    """Return the ratio of the measured rates and those between neighbouring points."""
+    if not points or not term.body.is_rotation:
+        return None
+    times = np.concatenate([own.times for own in points])
+    order = np.argsort(times, kind="stable")
+    y, t = np.concatenate([own.y for own in points])[order], times[order]
+    step = np.diff(t)
+    used = step > 0
+    if not used.any():
+        return None
+    space = term.body.space
+    unit = 2.0 if space.point_shape == (4,) else 1.0
+    rates = unit * np.asarray(space._apply("distance", p=y[:-1], q=y[1:]))[used] / step[used]
+    # Longer steps turn less per time, and shorter ones have more noise.
+    expected, measured = float(np.median(rates)), float(np.median(np.linalg.norm(term.omega, axis=-1)))
+    return measured / expected if expected > 0 and measured > 0 else None

@@ -1,0 +1,324 @@
+"""Audit of the residuals of a fit: whether they are those of independent noise with the given standard deviations.
+
+Each check compares a statistic with a limit that sound data exceed about once in 10⁴ fits. Practical limits are added,
+because in long recordings deviations that do not matter are significant.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import _core
+from .._spaces import Doubles
+
+# Quantiles of χ² at which the losses begin to grow more slowly, see `make_smoothing_spline`.
+CORNERS = {"huber": 0.82, "cauchy": 0.95}
+# Relative size of a root of an information matrix that is a rounding error.
+_NOTHING = 1e-6
+# Limits of normal numbers: of the mean square, and of the autocorrelation.
+SIGNIFICANT = 4.5
+# Ratios of residuals and σ below this factor, and its inverse, do not matter. Medians, which measure the ratio under a
+# robust loss, also grow with the share of outliers.
+_RATIO, _ROBUST_RATIO = 1.1, 1.6
+# Autocorrelations below this do not matter. From the second on, a wrong σ is not the cause.
+_CORRELATED, _SMOOTH = 0.1, 0.3
+# Limit of the largest centred partial sum (Ploberger and Krämer 1992), and the part of √n that does not matter: steps
+# of a quarter of the standard deviation.
+_PARTIAL_SUM, _STEP = 2.0, 0.0625
+# Limit of the largest residual, and the probability that normal residuals of a long recording exceed it.
+_LARGEST, _PROBABILITY = 6.0, 1e-5
+# Share of the measurements that a robust loss may reject, and the multiple of its corner at which it does.
+_REJECTED, _CORNERS = 0.3, 9.0
+# Consecutive rejected measurements that are too many, and their share of all: outliers of a sensor are mostly isolated.
+_RUN, _RUN_SHARE = 8, 0.05
+# Fewer measurements, or a larger leverage, leave no residuals to examine.
+_FEWEST, _LEVERAGE = 5, 0.9
+# If a fit estimates the noise level itself: the limit of its ratio to the noise that neighbouring data show, and the
+# leverage up to which the residuals of a curve have nearly the covariance of the noise. Beyond it only outliers are
+# looked for, with a limit larger by a factor, up to the last leverage.
+_NEIGHBOURS, _MODERATE, _UNEVEN, _HIGH = 1.75, 0.3, 1.5, 0.6
+# Fewer data are not examined then. Outliers are compared with so many data on both sides.
+_FEW_DATA, _NEAR = 20, 10
+# The median of χ² with so many degrees of freedom has this share of the information about the variance.
+_EFFICIENCY = 0.37
+
+
+class Residuals(NamedTuple):
+    """Standardised residuals of a sensor, in the order of time.
+
+    Attributes
+    ----------
+    rows : ndarray, shape (n, d)
+        Residuals in standard deviations. Entries without information, such as those of directions in which an
+        information matrix is 0, are NaN.
+    leverage : float
+        Mean variance of the fitted values in units of the noise.
+    between : float
+        Mean covariance of neighbouring fitted values, in the same units.
+    loss : str
+        Loss of the sensor.
+    corner : float
+        Square of the standardised length at which the loss begins to grow more slowly; infinite for least squares.
+    exact : bool
+        Whether residuals that are too small matter. They do not for conditions that are imposed as measurements.
+    """
+
+    rows: Doubles
+    leverage: float
+    between: float = 0.0
+    loss: str = "linear"
+    corner: float = np.inf
+    exact: bool = True
+
+
+class Finding(NamedTuple):
+    """The result of the audit of one sensor.
+
+    Attributes
+    ----------
+    ratio : float
+        Ratio of the residuals and σ, 1 for a right σ; NaN if it cannot be determined.
+    freedom : float
+        Degrees of freedom of the residuals.
+    correlation : float
+        Lag-one autocorrelation, corrected for the leverage.
+    large, small, correlated : bool
+        Whether the residuals are too large, too small, or correlated.
+    step : int or None
+        Row before which the residuals change their mean.
+    outliers : ndarray of int
+        Rows with outliers under least squares, the largest first.
+    largest : float
+        The largest residual.
+    rejected : float
+        Share of the measurements that a robust loss rejects, if it is too large, else 0.
+    run : tuple of int or None
+        First and last row of too many consecutive measurements that a robust loss rejects.
+    """
+
+    ratio: float = np.nan
+    freedom: float = 0.0
+    correlation: float = 0.0
+    large: bool = False
+    small: bool = False
+    correlated: bool = False
+    step: int | None = None
+    outliers: NDArray[np.intp] = np.empty(0, np.intp)
+    largest: float = 0.0
+    rejected: float = 0.0
+    run: tuple[int, int] | None = None
+
+    @property
+    def failed(self) -> bool:
+        """Whether a check failed."""
+        found = self.large or self.small or self.correlated or self.step is not None
+        return found or bool(len(self.outliers)) or self.rejected > 0 or self.run is not None
+
+    @property
+    def smooth(self) -> bool:
+        """Whether the residuals are so correlated that a wrong σ is not their only cause."""
+        return self.correlated and self.correlation > _SMOOTH
+
+
+def roots_of(information: Doubles) -> tuple[Doubles, NDArray[np.bool_]]:
+    """Return matrices R with RᵀR = W for information matrices W, and which of their rows carry information."""
+    values, vectors = np.linalg.eigh(information)
+    roots = np.sqrt(np.maximum(values, 0.0))
+    known = roots > _NOTHING * roots.max(axis=-1, keepdims=True)
+    return roots[..., None] * np.swapaxes(vectors, -1, -2), known
+
+
+def normal_of_chi_squared(ratio: float, freedom: float) -> float:
+    """Return the normal number of a χ² divided by its degrees of freedom (Wilson and Hilferty 1931)."""
+    spread = 2.0 / (9.0 * freedom)
+    return float((np.cbrt(ratio) - (1.0 - spread)) / np.sqrt(spread))
+
+
+def median_square(squares: Doubles, d: int) -> float:
+    """Return the variance of normal residuals from the median of the squared lengths of their d components."""
+    return float(np.median(squares)) / _core.chi_squared(d, 0.5)
+
+
+def autocorrelation(rows: Doubles) -> tuple[float, int]:
+    """Return the lag-one autocorrelation of all columns, and the number of products from which it follows."""
+    products = rows[1:] * rows[:-1]
+    count = int(np.isfinite(products).sum())
+    square = float(np.nanmean(rows**2))
+    return (float(np.nansum(products)) / count / square if count and square > 0 else 0.0), count
+
+
+def largest_partial_sum(rows: Doubles) -> tuple[float, int]:
+    """Return the largest centred partial sum of a column, divided by s√n, and the row after it."""
+    known = np.isfinite(rows)
+    counts = known.sum(axis=0)
+    used = counts >= _FEWEST
+    filled = np.where(known, rows, 0.0)[:, used]
+    means = filled.sum(axis=0) / counts[used]
+    centred = np.where(known[:, used], filled - means, 0.0)
+    spread = np.sqrt((centred**2).sum(axis=0))
+    if not np.any(spread > 0):
+        return 0.0, 0
+    sums = np.abs(np.cumsum(centred, axis=0)) / np.where(spread > 0, spread, np.inf)
+    row = int(sums.max(axis=1).argmax())
+    return float(sums[row].max()), row + 1
+
+
+def largest_expected(count: int) -> float:
+    """Return the limit of the largest of independent normal residuals."""
+    return max(_LARGEST, float(np.sqrt(2 * np.log(max(count, 1) / _PROBABILITY))))
+
+
+def long_run(rejected: NDArray[np.bool_]) -> tuple[int, int] | None:
+    """Return the first and the last row of the longest run of rejected measurements if it is too long, else None."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], rejected, [False]])))
+    starts, ends = edges[::2], edges[1::2]
+    if not len(starts):
+        return None
+    longest = int((ends - starts).argmax())
+    first, last = int(starts[longest]), int(ends[longest]) - 1
+    return (first, last) if last - first + 1 > max(_RUN, _RUN_SHARE * len(rejected)) else None
+
+
+def examine(given: Residuals) -> Finding:
+    """Examine the residuals of one sensor.
+
+    Parameters
+    ----------
+    given : Residuals
+        Residuals in the order of time, and the leverage of their measurements.
+
+    Returns
+    -------
+    Finding
+        Statistics, and the checks that failed.
+    """
+    rows = given.rows
+    known = np.isfinite(rows)
+    count, used = int(known.sum()), known.any(axis=1)
+    left = 1.0 - given.leverage
+    if used.sum() < _FEWEST or left < 1.0 - _LEVERAGE:
+        return Finding()
+    squares = np.nansum(rows**2, axis=1)
+    robust = given.loss != "linear"
+    scale = median_square(squares[used], max(1, round(count / used.sum()))) / left
+    found = Finding(freedom=count * left)
+    if robust:
+        # Outliers would dominate moments.
+        square, efficiency, limit = scale, _EFFICIENCY, _ROBUST_RATIO
+        far = squares > _CORNERS * given.corner
+        share = float(np.mean(far[used]))
+        found = found._replace(rejected=share if share > _REJECTED else 0.0, run=long_run(far))
+        rows = np.where(squares[:, None] > max(1.0, scale) * given.corner, np.nan, rows)
+    else:
+        sizes = np.nanmax(np.where(known, np.abs(rows), 0.0), axis=1)
+        # If σ is too small, residuals are compared with their own scale.
+        far = np.flatnonzero(sizes > largest_expected(count) * np.sqrt(max(1.0, scale)))
+        found = found._replace(largest=float(sizes.max()), outliers=far[np.argsort(-sizes[far])])
+        inner = np.delete(rows, far, axis=0)
+        square, efficiency, limit = float(np.nanmean(inner**2)) / left, 1.0, _RATIO
+    freedom = count * left * efficiency
+    large = normal_of_chi_squared(square, freedom) > SIGNIFICANT and square > limit**2
+    # With the hat matrix H, residuals have the covariance I − H if the curve is as rough as the penalty expects, and
+    # (I − H)² if it is smoother.
+    least = square / left
+    small = given.exact and normal_of_chi_squared(least, freedom * left) < -SIGNIFICANT and least < _RATIO**-2
+    found = found._replace(ratio=float(np.sqrt(least if small else square)), large=large, small=small)
+    if np.isfinite(rows).any(axis=1).sum() < _FEWEST:
+        return found
+    correlation, products = autocorrelation(rows)
+    correlation += given.between / left
+    correlated = correlation * np.sqrt(products) > SIGNIFICANT and correlation > _CORRELATED
+    value, step = largest_partial_sum(rows)
+    jumps = value > max(_PARTIAL_SUM, _STEP * np.sqrt(len(rows)))
+    return found._replace(correlation=correlation, correlated=correlated, step=step if jumps else None)
+
+
+class SmoothingFinding(NamedTuple):
+    """The result of the audit of curves whose noise level the fit estimates, with one entry per curve.
+
+    Attributes
+    ----------
+    ratio : ndarray
+        Ratio of the residuals and the noise that neighbouring data show, if it is too large, else 1.
+    correlation : ndarray
+        Lag-one autocorrelation of the residuals, corrected for the leverage, if it is too large or too small, else 0.
+    outliers : ndarray of bool, shape (curves, n)
+        Outliers under least squares.
+    sizes : ndarray, shape (curves, n)
+        Sizes of the residuals in standard deviations.
+    """
+
+    ratio: Doubles
+    correlation: Doubles
+    outliers: NDArray[np.bool_]
+    sizes: Doubles
+
+    @property
+    def failed(self) -> NDArray[np.bool_]:
+        """Whether a check failed."""
+        return np.asarray((self.ratio > 1) | (self.correlation != 0) | self.outliers.any(axis=1))
+
+
+def examine_smoothing(rows: Doubles, neighbours: Doubles, leverage: Doubles, robust: bool) -> SmoothingFinding:
+    """Examine the residuals of smooth curves without given standard deviations.
+
+    Parameters
+    ----------
+    rows : ndarray, shape (curves, n, d)
+        Residuals for weight one, in the order of time; NaN without information.
+    neighbours : ndarray, shape (curves, n - 2)
+        Squared deviations of data from the geodesics between their neighbours, divided by the variance for unit noise;
+        NaN if there is none.
+    leverage : ndarray, shape (curves,)
+        Mean leverage of the data.
+    robust : bool
+        Whether the loss is robust.
+    """
+    known = np.isfinite(rows)
+    used = known.any(axis=2)
+    counts = used.sum(axis=1)
+    entries = known.sum(axis=(1, 2))
+    d = np.rint(entries / np.maximum(counts, 1)).astype(int)
+    chi = np.array([_core.chi_squared(max(int(own), 1), 0.5) for own in d])
+    moderate = leverage <= _MODERATE
+    left = np.where(leverage < 1, 1.0 - leverage, np.nan)
+    filled = np.where(known, rows, 0.0)
+    scale = _median(np.where(used, (filled**2).sum(axis=2), np.nan)) / chi / left
+    noise = _median(neighbours) / chi
+    # Where the residuals vanish, the curve is exact.
+    enough = (counts >= _FEW_DATA) & (leverage <= _HIGH) & (scale > 0)
+    enough &= np.isfinite(neighbours).sum(axis=1) >= _FEW_DATA // 2
+    stiff = enough & moderate & (scale > _NEIGHBOURS**2 * noise)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = np.where(stiff, np.sqrt(scale / noise), 1.0)
+        sizes = np.abs(filled).max(axis=2) / np.sqrt(np.where(scale > 0, scale, np.inf))[:, None]
+    expected = np.array([largest_expected(int(own)) for own in entries])
+    limit = expected * (1.0 + 2.0 / np.sqrt(np.maximum(counts, 1))) * np.where(moderate, 1.0, _UNEVEN)
+    far = sizes > limit[:, None]
+    inner = known & ~far[..., None]
+    pairs = inner[:, 1:] & inner[:, :-1]
+    products = np.maximum(pairs.sum(axis=(1, 2)), 1)
+    square = np.where(inner, filled**2, 0.0).sum(axis=(1, 2)) / np.maximum(inner.sum(axis=(1, 2)), 1)
+    lagged = np.where(pairs, filled[:, 1:] * filled[:, :-1], 0.0).sum(axis=(1, 2)) / products
+    correlation = lagged / np.where(square > 0, square, np.inf) + leverage
+    correlated = np.abs(correlation) > np.maximum(_CORRELATED, SIGNIFICANT / np.sqrt(products))
+    outliers = far & enough[:, None] & (not robust)
+    for curve, i in np.argwhere(outliers):
+        # Noise that varies along the curve has large residuals next to each other.
+        near = np.concatenate([sizes[curve, max(0, i - _NEAR) : i], sizes[curve, i + 1 : i + 1 + _NEAR]])
+        outliers[curve, i] = sizes[curve, i] > limit[curve] * max(1.0, float(np.median(near)))
+    return SmoothingFinding(ratio, np.where(enough & moderate & correlated, correlation, 0.0), outliers, sizes)
+
+
+def _median(values: Doubles) -> Doubles:
+    """Return the median of the finite numbers of each row; NaN if there are none."""
+    ordered = np.sort(values, axis=1)
+    count = np.isfinite(values).sum(axis=1)
+    if not values.shape[1]:
+        return np.full(len(values), np.nan)
+    middle = [np.clip((count + k) // 2, 0, values.shape[1] - 1) for k in (-1, 0)]
+    each = [np.take_along_axis(ordered, own[:, None], axis=1)[:, 0] for own in middle]
+    return np.where(count > 0, 0.5 * (each[0] + each[1]), np.nan)

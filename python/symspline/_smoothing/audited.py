@@ -1,0 +1,282 @@
+"""Audit of smoothing splines: warnings about residuals that are not those of independent noise."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import _core
+from .._curves.curve import CurveArrays
+from .._faults import of_index
+from .._spaces import Array, Doubles, Space, factors_of
+from .._warnings import warn
+from .audit import CORNERS, Finding, Residuals, SmoothingFinding, examine, examine_smoothing, roots_of
+from .data import SmoothingData, points_of
+from .factors import is_several, split
+from .posterior import coordinates
+from .solve import Smoothed
+from .warned import SmoothingWarning
+
+# Ratios of common units, and how near a ratio must be to them, as a logarithm.
+DEGREES, _UNITS, _NEAR = 180 / np.pi, {1e3: "1000, the ratio of m and mm, or of s and ms"}, 0.15
+
+
+class Sensor(NamedTuple):
+    """Data of one kind in one part of the space, and what the audit found.
+
+    Attributes
+    ----------
+    name, label : str
+        Name with the kind of data, and the name by which the user can change it.
+    numbers : ndarray of int
+        Number of each row among the data of the user.
+    finding : Finding
+        Result of the audit.
+    """
+
+    name: str
+    label: str
+    numbers: NDArray[np.intp]
+    finding: Finding
+
+
+def warn_of_residuals(
+    space: Space,
+    curve: CurveArrays,
+    noisy: SmoothingData,
+    smoothed: list[Smoothed],
+    given: list[Any],
+    chosen: list[Any],
+    loss: str,
+) -> None:
+    """Warn once if the residuals of a curve are not those of independent noise.
+
+    Parameters
+    ----------
+    space : Space
+        Space of the curves.
+    curve : CurveArrays
+        Curves.
+    noisy : SmoothingData
+        Data.
+    smoothed : list of Smoothed
+        Results in every part.
+    given, chosen : list of ndarray of bool
+        Whether the standard deviation is given, and whether λ was chosen, for each curve in every part. Without either,
+        the user has decided how closely the curve follows the data, and nothing is examined.
+    loss : str
+        Loss of all data.
+    """
+    times, batch = noisy.times, noisy.batch
+    values = [
+        x
+        for factor, part in zip(factors_of(space), curve.parts, strict=True)
+        for x in split(factor, part.evaluate(times, "point", "raise", times.ndim > 1))
+    ]
+    found: list[tuple[tuple[int, ...], str]] = []
+    for number, (x, (part, y), own) in enumerate(zip(values, points_of(noisy, space), smoothed, strict=True)):
+        known, asked, good = (np.reshape(flags, -1) for flags in (given[number], chosen[number], own.report.converged))
+        examined = np.flatnonzero(good & (known | asked))
+        if not len(examined):
+            continue
+        one = _Examined.of(part, noisy, number, x, y, own, examined)
+        of_part = f" in factor {number}, {part!r}," if is_several(space) else ""
+        for k, facts in one.complaints(known[examined], loss):
+            index = tuple(map(int, np.unravel_index(examined[k], batch)))
+            what = f"The residuals of the smoothing{of_index(index)}{of_part} are not those of independent noise: "
+            found.append((index, what + facts))
+    if found:
+        index, message = found[0]
+        more = f" This holds for {len(found) - 1} more curves or factors." if len(found) > 1 else ""
+        warn(message + more, SmoothingWarning, index)
+
+
+class _Examined(NamedTuple):
+    """Standardised residuals of some curves in one part, for weight one.
+
+    Attributes
+    ----------
+    space : Space
+        The part.
+    rows : ndarray, shape (curves, N, d)
+        Residuals; NaN without information.
+    deviations : ndarray, shape (curves, N - 2)
+        Squared deviations of data from the geodesics between their neighbours, divided by their variances.
+    leverages, sigmas : ndarray, shape (curves,)
+        Mean leverage of the data, and standard deviations.
+    """
+
+    space: Space
+    rows: Doubles
+    deviations: Doubles
+    leverages: Doubles
+    sigmas: Doubles
+
+    @classmethod
+    def of(
+        cls, space: Space, noisy: SmoothingData, number: int, x: Array, y: Array, own: Smoothed, curves: Any
+    ) -> _Examined:
+        """Return the residuals of curves with these numbers."""
+        n, shape = noisy.times.shape[-1], space.point_shape
+        x, y = (array.reshape(-1, n, *shape)[curves] for array in (x, y))
+        precision = noisy.precisions[number]
+        weights = np.broadcast_to(precision.weights, (*noisy.batch, n)).reshape(-1, n)[curves]
+        times = np.broadcast_to(noisy.times, (*noisy.batch, n)).reshape(-1, n)[curves]
+        used = (weights > 0) & space._where_finite(x) & space._where_finite(y)
+        rows = np.full((*used.shape, space.dim), np.nan)
+        at, log = x[used], space._apply("log", p=x[used], q=y[used])
+        found = coordinates(space, at, space.frame(at), log)
+        if precision.information is None:
+            rows[used] = found * np.sqrt(weights[used])[:, None]
+        else:
+            whole = np.broadcast_to(precision.information, (*noisy.batch, n, space.dim, space.dim))
+            roots, known = roots_of(whole.reshape(-1, n, space.dim, space.dim)[curves][used])
+            rows[used] = np.where(known, np.einsum("nij,nj->ni", roots, found), np.nan)
+        deviations = _deviations(space, times, y, np.where(used, weights, 0.0))
+        counts = np.maximum(used.sum(axis=1), 1)
+        df, sigma = (np.reshape(value, -1)[curves] for value in (own.report.df, own.sigma))
+        return cls(space, rows, deviations, np.minimum(df / counts, 1.0), sigma)
+
+    def complaints(self, known: NDArray[np.bool_], loss: str) -> Iterator[tuple[int, str]]:
+        """Yield the numbers of curves with failed checks, and the checks with their remedies.
+
+        Parameters
+        ----------
+        known : ndarray of bool
+            Whether the standard deviation of each curve is given.
+        loss : str
+            Loss of the data.
+        """
+        corner = np.inf if loss == "linear" else _core.chi_squared(self.space.dim, CORNERS[loss])
+        estimated = examine_smoothing(self.rows, self.deviations, self.leverages, loss != "linear")
+        for k in np.flatnonzero(known | estimated.failed).tolist():
+            if not known[k]:
+                yield k, _of_estimated(estimated, k)
+                continue
+            used = np.flatnonzero(np.isfinite(self.rows[k]).any(axis=1))
+            given = Residuals(self.rows[k][used] / self.sigmas[k], float(self.leverages[k]), 0.0, loss, corner)
+            sensor = Sensor("data", "the data", used, examine(given))
+            if sensor.finding.failed:
+                yield k, " ".join([described(sensor), *advice([sensor])])
+
+
+def _deviations(space: Space, times: Doubles, y: Array, weights: Doubles) -> Doubles:
+    """Return squared deviations of data from the geodesics between their neighbours, divided by their variances."""
+    result = np.full((len(times), max(times.shape[1] - 2, 0)), np.nan)
+    whole = times[:, 2:] - times[:, :-2]
+    inner = (whole > 0) & (weights[:, 2:] > 0) & (weights[:, 1:-1] > 0) & (weights[:, :-2] > 0)
+    s = (times[:, 1:-1] - times[:, :-2])[inner] / whole[inner]
+    before, here, after = (y[:, k : y.shape[1] - 2 + k][inner] for k in range(3))
+    v = space._apply("log", p=before, q=after)
+    middle = space._apply("exp", p=before, v=v * s.reshape(-1, *[1] * len(space.point_shape)))
+    w = [weights[:, k : y.shape[1] - 2 + k][inner] for k in range(3)]
+    variance = 1 / w[1] + s**2 / w[2] + (1 - s) ** 2 / w[0]
+    result[inner] = space._apply("distance", p=middle, q=here) ** 2 / variance
+    return result
+
+
+def _of_estimated(finding: SmoothingFinding, curve: int) -> str:
+    """Describe failed checks of data whose noise level is estimated."""
+    ratio, correlation = float(finding.ratio[curve]), float(finding.correlation[curve])
+    sizes = np.where(finding.outliers[curve], finding.sizes[curve], 0.0)
+    count, first = int(np.count_nonzero(sizes)), int(sizes.argmax())
+    facts, remedies = [], []
+    if ratio > 1:
+        facts.append(f"they are {ratio:.2g} times as large as the noise that neighbouring data show")
+    if correlation:
+        facts.append(f"neighbours have a correlation of {correlation:.2f}")
+    if ratio > 1 or correlation > 0:
+        remedies.append(
+            "The curve is too stiff, or the noise is correlated, as that of rounded or repeated data and of filters. "
+            "Compare plots of the curve and the data; pass criterion='reml', a smaller lam or more knots for a curve "
+            "that is too stiff, and do not use the bands for correlated noise."
+        )
+    if correlation < 0:
+        remedies.append(
+            "Alternating residuals show a motion that is too fast for the sampling. Check the times and units, or pass "
+            "more data per turn."
+        )
+    if count:
+        which = "one outlier" if count == 1 else f"the largest of {count} outliers"
+        facts.append(f"{which}, number {first}, is {sizes[first]:.2g} times the noise")
+        remedies.append("Pass loss='cauchy' if these are outliers.")
+    return f"{', '.join(facts)}. {' '.join(remedies)}"
+
+
+def described(sensor: Sensor) -> str:
+    """Return the checks of a sensor that failed."""
+    finding = sensor.finding
+    facts = []
+    if finding.large or finding.small:
+        facts.append(f"the residuals are {finding.ratio:.2g} times as large as sigma")
+    if finding.correlated:
+        facts.append(f"neighbouring residuals have a correlation of {finding.correlation:.2f}")
+    if finding.step is not None:
+        facts.append(f"the mean of the residuals changes at {_at(sensor, finding.step)}")
+    if len(finding.outliers):
+        count = len(finding.outliers)
+        which = "one outlier" if count == 1 else f"the largest of {count} outliers"
+        facts.append(f"{which}, {_at(sensor, int(finding.outliers[0]))}, is {finding.largest:.2g} times sigma")
+    if finding.rejected:
+        facts.append(f"the loss rejects {finding.rejected:.0%} of the measurements")
+    if finding.run:
+        first, last = finding.run
+        times = " to ".join(f"{_at(sensor, row)}" for row in finding.run)
+        facts.append(f"the loss rejects {last - first + 1} consecutive measurements, {times}")
+    return f"{sensor.name}: {', '.join(facts)}."
+
+
+def advice(sensors: list[Sensor]) -> list[str]:
+    """Return what may have caused the failed checks, and the remedies."""
+    found = []
+    outlying = [own for own in sensors if len(own.finding.outliers)]
+    if outlying:
+        found.append(f"Pass loss='cauchy' to {_labels(outlying)} if these are outliers.")
+    wrong = [own for own in sensors if own.finding.large or own.finding.small or own.finding.rejected]
+    # Effects that the measurements lack make residuals smooth, and a wrong σ does not.
+    smooth = [
+        own
+        for own in sensors
+        if own.finding.smooth or own.finding.run or (own.finding.step is not None and own not in wrong)
+    ]
+    if (
+        smooth
+        and (any(own.finding.run for own in smooth) or any(own in wrong for own in smooth) or not wrong)
+        and not outlying
+    ):
+        found.append(
+            f"Check the frame (rotated or swapped axes), the units and the times of {_labels(smooth)}, and add missing "
+            "effects, such as bias= or time_offset=. A turn in the wrong direction between two measurements needs "
+            "another `start`, and fast motion more knots."
+        )
+    for own in wrong if not outlying else []:
+        if own.finding.smooth:
+            continue
+        ratio = own.finding.ratio
+        found.append(_of_units(own, ratio) or f"Multiply sigma of {own.label} by {ratio:.2g} if it is uncertain.")
+    correlated = [own for own in sensors if own.finding.correlated and own not in wrong and own not in smooth]
+    if correlated and not found:
+        found.append(
+            f"The noise of {_labels(correlated)} is correlated, but the covariance assumes independent noise: pass a "
+            "larger sigma or fewer measurements."
+        )
+    return found
+
+
+def _labels(sensors: list[Sensor]) -> str:
+    return " and ".join(dict.fromkeys(own.label for own in sensors))
+
+
+def _at(sensor: Sensor, row: int) -> str:
+    return f"number {sensor.numbers[row]}"
+
+
+def _of_units(sensor: Sensor, ratio: float) -> str:
+    for factor, text in {DEGREES: "57.3, the ratio of degrees and radians", **_UNITS}.items():
+        for own in (ratio / factor, ratio * factor):
+            if abs(np.log(own)) < _NEAR:
+                return f"{ratio:.2g} is close to {text}: check the unit of sigma of {sensor.label}."
+    return ""
