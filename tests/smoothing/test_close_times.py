@@ -86,7 +86,7 @@ def test_least_squares_and_estimation():
     own = ss.make_lsq_spline(t, y, 7, "r:2", sigma=0.01)
     assert_same(own, ss.make_lsq_spline(merged, mean, own.t, "r:2", weights=weights, sigma=0.01), t)
     knots = np.linspace(t[0], t[-1], 25)
-    measured = ss.estimate([measure.Points(t, y, sigma=0.01)], knots, "r:2", lam=1e-3)
+    measured = ss.estimate([measure.Points(t, y, sigma=np.full(len(t), 0.01))], knots, "r:2", lam=1e-3)
     x = np.linspace(t[0], t[-1], 60)
     once = ss.estimate([measure.Points(merged, mean, sigma=0.01 / np.sqrt(weights))], knots, "r:2", lam=1e-3)
     assert np.all(np.abs(measured(x) - once(x)) < 0.05 * measured.std(x)[..., None])
