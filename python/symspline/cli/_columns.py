@@ -12,8 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from .._spaces import LogEuclidean, Space, SymmetricPositiveDefinite, factors_of
-from ._messages import Problem, first_duplicate, listed, refuse
+from .._degrees import is_degrees, look_like_degrees
+from .._spaces import LogEuclidean, Space, SymmetricPositiveDefinite, Torus, factors_of
+from ._messages import Problem, first_duplicate, listed, refuse, say
 from ._points import (
     IN_BRACKETS,
     complex_numbers,
@@ -23,6 +24,7 @@ from ._points import (
     matrix,
     points_of,
     quaternion_by_names,
+    width,
 )
 from ._streams import Source
 from ._tables import IM, RE, Array, Place, Rows, Table
@@ -157,6 +159,10 @@ Entry = tuple[str, ...]
 """One number of a point: its name and its column, or the two columns with its real and imaginary part."""
 
 
+# All but the unit in names such as heading_deg or "heading (deg)".
+_UNIT = re.compile(r".*[\[(_ ]|[\])]")
+
+
 @dataclass(frozen=True)
 class PointColumns:
     """The columns of the points of a space in a table.
@@ -170,6 +176,8 @@ class PointColumns:
         Whether points are longitude and latitude in degrees.
     quaternion : list of int or None
         The column of each number of a point whose rotation is a quaternion, as in `Columns`.
+    degrees : bool
+        Whether angles of tori are in degrees.
     """
 
     path: Source
@@ -177,6 +185,7 @@ class PointColumns:
     entries: list[Entry]
     lonlat: bool
     quaternion: list[int] | None
+    degrees: bool = False
 
     @property
     def names(self) -> list[str]:
@@ -195,7 +204,21 @@ class PointColumns:
             counts = np.array([len(columns) for _, *columns in self.entries])
             missing = np.cumsum(counts)[np.array(complex_numbers(self.space)) & (counts == 1)]
             numbers = np.insert(numbers, missing, 0.0, axis=1)
-        return points_of(self.space, numbers, self.lonlat, self.quaternion, self.path, place)
+        self._warn_of_degrees(numbers)
+        return points_of(self.space, numbers, self.lonlat, self.quaternion, self.path, place, self.degrees)
+
+    def _warn_of_degrees(self, numbers: Array) -> None:
+        """Warn if angles in radians look like degrees, by their values or the names of their columns."""
+        if self.degrees or self.quaternion or not any(isinstance(factor, Torus) for factor in factors_of(self.space)):
+            return
+        ends = np.cumsum([0, *(width(factor, False) for factor in factors_of(self.space))]).tolist()
+        for factor, start, end in zip(factors_of(self.space), ends, ends[1:], strict=False):
+            largest = look_like_degrees(factor, numbers[:, start:end])
+            named = [name for name in self.names[start:end] if is_degrees(_UNIT.sub("", name))]
+            if not isinstance(factor, Torus) or (largest is None and not named):
+                continue
+            why = f"angles up to {largest:g} look like degrees" if largest else f"the name {named[0]!r} means degrees"
+            say(f"{self.path}: {why}, but angles on {factor} are in radians; give --degrees if they are in degrees")
 
 
 def _paired(columns: Sequence[str]) -> list[Entry]:

@@ -146,7 +146,9 @@ def _columns(path: object, file: BinaryIO, space: Space) -> Columns:
     names, order = columns.points, columns.quaternion
     numbers = count_with_quaternion(space) if order else len(labels(space))
     texts = isinstance(names, list) and all(isinstance(name, str) for name in (*names, columns.time, columns.curve))
-    good = texts and {columns.lonlat, columns.cut} <= {True, False} and columns.utc in (True, False, None)
+    good = (
+        texts and {columns.lonlat, columns.cut, columns.degrees} <= {True, False} and columns.utc in (True, False, None)
+    )
     if good and columns.lonlat:
         good = len(names) == len(LONLAT) and space == GLOBE and order is None
     elif good:

@@ -7,10 +7,10 @@ per second.
 
 The numbers of a point are in columns in the order of its array, and --columns names them in that order: a matrix row
 by row, in a product one factor after the other. A complex number A has the columns A_re and A_im, which --columns
-calls A, or one column A, with texts such as (1+2j) in CSV files or if it is real. Points within 1e-4 of the space are
-projected onto it. A rotation of so:3 may also be a unit quaternion in columns whose names end in w, x, y and z, in any
-order, and a pose of se:3 or so:3 x r:3 a position, such as tx, ty, tz, and a quaternion, whose length may differ from
-1 by 0.005.
+calls A, or one column A, with texts such as (1+2j) in CSV files or if it is real. Rounded points are projected onto the
+space, within 1e-4 if they have at most nine digits. A rotation of so:3 may also be a unit quaternion in columns whose
+names end in w, x, y and z, in any order, and a pose of se:3 or so:3 x r:3 a position, such as tx, ty, tz, and a
+quaternion. Angles of torus:n are in radians, or with --degrees in degrees.
 
 Without --time, the times are in the column t or time, or, if they are dates, in a column that is called time, date,
 datetime, stamp or timestamp, in the plural or with words such as iso, utc, unix, base, local, ns: ISO_TIME,
@@ -55,6 +55,7 @@ import argparse
 import math
 import warnings
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -65,7 +66,7 @@ from .._functional import fit_many
 from .._representatives import IN_PYTHON
 from .._smoothing import SmoothingWarning
 from .._smoothing.many import smooth_many
-from .._spaces import Space, space_named
+from .._spaces import Space, Torus, factors_of, space_named
 from . import _summary
 from ._columns import ORDERS, check_days, column_of_names, point_columns, split_names, time_column, with_stamps
 from ._curves import Curves, write_curves
@@ -95,7 +96,7 @@ _CRITERION = (
 )
 _SIGMA = (
     "known standard deviation of the noise in a coordinate: in the unit of distances, radians for rotations, degrees "
-    "with --lonlat; in a product perhaps one per factor with commas"
+    "with --lonlat or --degrees; in a product perhaps one per factor with commas"
 )
 _TIME = (
     "column of times, none for 0, 1, 2, ..., or two columns with a comma, whole seconds and nanoseconds since 1970; "
@@ -121,6 +122,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--columns", metavar="A,B,...", help="columns of a point (default: all other numeric columns)")
     add("--curve", metavar="COL", help="column of names: the rows with one name are one curve")
     add("--lonlat", action="store_true", help="points on sphere:2 are longitude and latitude in degrees")
+    add("--degrees", action="store_true", help="angles of torus:n are in degrees, also in the samples of the curve")
     add("--quaternion", choices=ORDERS, help="order of a quaternion, if the names do not show it")
     add("--sort", action="store_true", help="put the rows of every curve in the order of their times")
     add("--skipna", action="store_true", help="omit rows without a point or a time: empty cells, NaN, NA or null")
@@ -151,8 +153,8 @@ def run(options: argparse.Namespace) -> int:
     """Read, fit and write."""
     format_of(options.output, None, CURVES, "a file of curves")
     check_target(options.output, options.input, binary=True)
-    smooth = _smoothing_options(options)
     space = _space(options.space, options.lonlat)
+    smooth = _smoothing_options(options, space)
     whole = open_table(options.input, options.format)
     table, options.time = with_stamps(whole, options.time, options.skipna)
     sensors = sensors_of(table, options, space, smooth and smooth["sigma"])
@@ -160,7 +162,10 @@ def run(options: argparse.Namespace) -> int:
     curve = table.require(options.curve) if options.curve is not None else None
     given = split_names(options.columns)
     time = time_column(table, options.time, [curve, *given, *extra], options.unix is not None)
+    on_torus = any(isinstance(factor, Torus) for factor in factors_of(space))
+    refuse("--degrees", (options.degrees and not on_torus, f" is for torus:n and products with it, not for {space}"))
     points = point_columns(table, given, [time, curve, *extra], space, options.lonlat, options.quaternion)
+    points = replace(points, degrees=options.degrees)
     needed = [*points.used, *filter(None, [time, curve])]
     table = table.without_empty(needed) if options.skipna and not sensors else table
     rows = table.read([*points.used, *extra], time, curve, [*points.used, *extra] if sensors else [], options.unix)
@@ -169,6 +174,7 @@ def run(options: argparse.Namespace) -> int:
     tell(f"{table.path}: {table.path.format} table, points in columns {listed(points.names)}, {at}", VERBOSE)
     cut = options.max_gap is not None and curve is not None
     columns = Columns(points.names, time or "time", curve or "curve", options.lonlat, rows.utc, points.quaternion, cut)
+    columns = replace(columns, degrees=options.degrees)
     if sensors and smooth:
         _fit_sensors(options, smooth, Fusion(table, rows, points, sensors), columns)
         return 0
@@ -203,7 +209,8 @@ def _fit_points(options: argparse.Namespace, smooth: dict[str, Any] | None, data
     far = outliers(data, fitted, options.lonlat) if not options.robust else ""
     segmented = options.max_gap is not None and options.curve is None
     write_curves(options.output, Curves(dict(zip(data.groups, fitted, strict=True)), data.named, columns, segmented))
-    words = f"{_summary.fitted(fitted, options.lonlat)}{data.changes()}{_summary.bridged(fitted)}"
+    in_degrees = options.lonlat or (options.degrees and isinstance(data.space, Torus))
+    words = f"{_summary.fitted(fitted, in_degrees)}{data.changes()}{_summary.bridged(fitted)}"
     if not data.has_times and options.time is None:
         words += "; no column of times: the points are at 0, 1, 2, ..."
     tell(f"{called(options.output)}: {words}")
@@ -251,7 +258,7 @@ def _bc_type(text: str) -> Any:
     return ends[0] if len(ends) == 1 else ends
 
 
-def _smoothing_options(options: argparse.Namespace) -> dict[str, Any] | None:
+def _smoothing_options(options: argparse.Namespace, space: Space) -> dict[str, Any] | None:
     """Return the options of `symspline.make_smoothing_spline`; None to fit curves through the points.
 
     Raises
@@ -279,7 +286,8 @@ def _smoothing_options(options: argparse.Namespace) -> dict[str, Any] | None:
     )
     lam = None if options.lam is None else option_numbers(options.lam, "--lam")
     sigma = None if options.sigma is None else option_numbers(options.sigma, "--sigma", positive=True)
-    if options.lonlat and isinstance(sigma, float):
+    angles = options.lonlat or (options.degrees and isinstance(space, Torus))
+    if angles and isinstance(sigma, float):
         sigma = math.radians(sigma)
     criterion = options.criterion or ("cp" if sigma is not None and lam is None else "gcv")
     loss, penalty = "cauchy" if options.robust else "linear", options.penalty or "acceleration"

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from .._core import ValidationError
 from .._lonlat import from_lonlat
 from .._pose_files import join, rotations_in_rows
-from .._spaces import Doubles, Product, Space, factors_of, space_named
+from .._spaces import Doubles, Product, Space, Torus, factors_of, space_named
 from ._messages import Problem, for_command_line
 from ._tables import IM, RE, Place
 
@@ -44,6 +44,8 @@ class Columns:
         For rotations as quaternions the column of every number of a point, position first and scalar first.
     cut : bool
         Whether NAME/1, NAME/2, ... are the segments of one recording, which was cut at gaps.
+    degrees : bool
+        Whether angles of tori are in degrees.
     """
 
     points: list[str]
@@ -53,6 +55,7 @@ class Columns:
     utc: bool | None = None
     quaternion: list[int] | None = None
     cut: bool = False
+    degrees: bool = False
 
 
 def require_globe(space: Space) -> None:
@@ -168,7 +171,15 @@ def quaternion_by_names(names: Sequence[str], space: Space) -> list[int] | None:
 # ---- numbers ----
 
 
-def points_of(space: Space, numbers: Doubles, lonlat: bool, order: list[int] | None, file: object, place: Place) -> Any:
+def points_of(
+    space: Space,
+    numbers: Doubles,
+    lonlat: bool,
+    order: list[int] | None,
+    file: object,
+    place: Place,
+    degrees: bool = False,
+) -> Any:
     """Return the points of all rows, projected onto the space if they are off it by rounding in a file only.
 
     Raises
@@ -196,6 +207,7 @@ def points_of(space: Space, numbers: Doubles, lonlat: bool, order: list[int] | N
             part = join(rotations, own[:, :3]) if factor == POSES else rotations
         else:
             part = own.view(factor.dtype).reshape(len(own), *factor.point_shape)
+            part = np.radians(part) if degrees and isinstance(factor, Torus) else part
         of = f"the part in {factor} of " if isinstance(space, Product) else ""
         parts.append(_projected(factor, part, file, place, of))
     return tuple(parts) if isinstance(space, Product) else parts[0]

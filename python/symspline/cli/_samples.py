@@ -11,7 +11,7 @@ import numpy as np
 from .._cubic import CubicSpline
 from .._lonlat import compass, to_lonlat
 from .._smoothing import SmoothingSpline
-from .._spaces import Doubles, factors_of, parts_of
+from .._spaces import Doubles, Torus, factors_of, parts_of
 from ..rotations import angular_acceleration, angular_velocity, quaternion
 from ._points import POSES, ROTATIONS, Columns, complex_numbers, width
 from ._tables import IM, RE
@@ -35,6 +35,9 @@ def samples_of(spline: CubicSpline, x: Any, nu: int, columns: Columns) -> Sample
         axes = zip(("east", "north"), compass(spline(x)), strict=True)
         return [(name + end, np.degrees((values * axis).sum(axis=-1))) for name, axis in axes]
     parts = parts_of(values, spline.space, "values")
+    if columns.degrees:
+        each = zip(factors_of(spline.space), parts, strict=True)
+        parts = tuple(np.degrees(own) if isinstance(factor, Torus) else own for factor, own in each)
     if columns.quaternion is not None:
         return _with_quaternion(spline, x, nu, parts, columns)
     blocks = [np.ascontiguousarray(own.reshape(len(own), -1)).view(np.float64) for own in parts]
@@ -84,7 +87,12 @@ def deviations_of(spline: SmoothingSpline, x: Any, nu: int, columns: Columns) ->
             found.append((f"{name}_position{end}", std[1]))
             name, std = f"{name}_rotation", std[0]
         if columns.quaternion is None or factor not in (ROTATIONS, POSES):
-            found.append((name + end, np.degrees(std) if columns.lonlat else std))
+            found.append(
+                (
+                    name + end,
+                    np.degrees(std) if columns.lonlat or (columns.degrees and isinstance(factor, Torus)) else std,
+                )
+            )
         elif nu:
             each = angular_velocity(spline, x, return_std=True)[1].T
             found += [(f"std_{rate}", own) for rate, own in zip(_RATES, each, strict=True)]

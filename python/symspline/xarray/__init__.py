@@ -25,6 +25,7 @@ from ._estimation import estimate
 from ._grids import resample_grid
 from ._smoothing import smooth
 from ._spec import KNOTS, bare, check_dims, rehearse, spec_of, timed_by, times_with_names
+from ._units import in_radians, in_units_of
 
 __all__ = ["estimate", "evaluate", "fit", "lift", "resample", "smooth", "speed"]
 
@@ -55,7 +56,8 @@ def fit(
     Parameters
     ----------
     da : xarray.DataArray
-        Points. Dask arrays are computed lazily.
+        Points. Dask arrays are computed lazily. Angles of `Torus` are in radians, unless the attribute ``units`` is
+        degrees, as in ``"degree"`` and ``"deg"``. They are then converted, and the attribute becomes ``"radian"``.
     space : Space or str
         Space or its name. Products are not supported: fit each factor separately.
     dim : str, default "time"
@@ -123,6 +125,7 @@ def fit(
         "atol": atol,
     }
     chosen: dict[str, Any] = {"time": time, "skipna": checked_flag(skipna, "skipna"), "on_failure": on_failure}
+    da = in_radians(da, space)
     inputs, spec, times = spec_of(da, space, dim, point_dims, where, bc_type, **chosen, **options)
     axes: list[Hashable] = [dim, *point_dims]
     dtype = spec["space"].dtype
@@ -295,9 +298,9 @@ def resample(
     Returns
     -------
     xarray.DataArray
-        Points as from `evaluate`, with name and attributes of `da`. Curves that did not converge are NaN. Batch
-        dimensions come first, then those of the grid in the order of `da`. Values on a grid that depend on neighbouring
-        points at their cut locus are NaN.
+        Points as from `evaluate`, with name, units and other attributes of `da`. Curves that did not converge are NaN.
+        Batch dimensions come first, then those of the grid in the order of `da`. Values on a grid that depend on
+        neighbouring points at their cut locus are NaN.
 
     Raises
     ------
@@ -346,6 +349,7 @@ def resample(
         raise ValidationError(f"{name} is for grids; pass to as a mapping of dimensions to positions")
     bc_type = "natural" if bc_type is None else bc_type
     chosen: dict[str, Any] = {"time": time, "skipna": checked_flag(skipna, "skipna"), "on_failure": "ignore", **options}
+    given, da = da, in_radians(da, space)
     (_, *rest), spec, knots = spec_of(da, space, dim, point_dims, where, bc_type, **chosen)
     curves = [d for d in da.dims if d not in (dim, *point_dims)]
     label = dim if knots is None else knots.name
@@ -356,7 +360,7 @@ def resample(
     inputs: Inputs = [(bare(da, dim), [KNOTS, *point_dims]), (times, axes), *rest]
     spec |= {"x_axes": len(axes), "skipna": skipna, "policy": policy}
     (values,) = apply(resampled, inputs, [[*axes, *point_dims]], [spec["space"].dtype], **spec)
-    values.attrs = dict(da.attrs)
+    values = in_units_of(values, given, spec["space"])
     return timed_by(values, times, label).rename(da.name)
 
 

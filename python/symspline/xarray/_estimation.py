@@ -20,6 +20,7 @@ from ._missing import missing
 from ._smoothing import unit_of
 from ._spec import check_dims, timed_by, times_with_names
 from ._times import times_along
+from ._units import in_radians
 
 
 def estimate(
@@ -135,6 +136,7 @@ def estimate(
     space = space_named(space)
     if not isinstance(points, xr.DataArray):
         raise ValidationError(f"points must be an xarray.DataArray, not {type(points).__name__}")
+    points = in_radians(points, space)
     check_dims(points.compute(), space, dim, point_dims)
     own = [dim, *point_dims]
     _refuse_others(points, own, "points")

@@ -15,6 +15,7 @@ from .._spaces import Array, Space, space_named
 from ._blocks import Inputs, apply
 from ._spec import KNOTS, LINE, check_names, check_whole, rehearse, times_with_names
 from ._times import times_along
+from ._units import in_radians, in_units_of
 
 # The influence of a node on a spline decays by 0.27 per node, to 2e-15 of its size.
 _HALO = 26
@@ -46,6 +47,7 @@ def resample_grid(
 ) -> xr.DataArray:
     """Return the values of splines over the dimensions in ``to``; see `resample`."""
     space = space_named(space)
+    given, da = da, in_radians(da, space)
     check_names(da, space, list(to), point_dims)
     for name in point_dims:
         check_whole(da, name, "a point needs all of its numbers")
@@ -69,7 +71,7 @@ def resample_grid(
     values = values.transpose(*batch, *(d for d in da.dims if d in to), *point_dims)
     kept = {name: c.variable for name, c in da.coords.items() if not set(c.dims) & set(to)}
     values = values.assign_coords(kept | {axis.dim: axis.x.variable for axis in axes})
-    values.attrs = dict(da.attrs)
+    values = in_units_of(values, given, space)
     single = {dim: 0 for dim, x in to.items() if np.ndim(x) == 0}
     return values.isel(single).rename(da.name)
 

@@ -22,6 +22,7 @@ from .._warnings import silenced
 from ._blocks import Inputs, apply, knots_of_block, per_curve_times
 from ._missing import missing, named_curve, of_equal_length, times_of_rows
 from ._spec import KNOTS, LINE, bare, rehearse, spec_of, timed_by, times_with_names
+from ._units import in_radians
 
 # Columns of the report of a smoothing fit, per part of the space.
 _COLUMNS: dict[str, type] = {"lam": np.float64, "df": np.float64, "sigma": np.float64, "at_bound": np.bool_}
@@ -106,6 +107,7 @@ def smooth(
     (('run', 'time', 'q'), ('run', 'time'), True)
     """
     space = space_named(space)
+    da = in_radians(da, space)
     given: dict[str, Any] = {"on_failure": "ignore", **options}
     if level is not None:
         level = checked_number(level, "level must lie between 0 and 1", lambda x: 0 < x < 1)
@@ -143,7 +145,11 @@ def smooth(
 
 def unit_of(space: Space[Any], da: xr.DataArray, name: str) -> dict[str, Any]:
     """Return the attributes of a standard deviation or radius: its units, if they are known."""
-    if name.endswith("_rotation") or isinstance(space, SpecialOrthogonal) or space._name in ("sphere", "rp", "cp"):
+    if (
+        name.endswith("_rotation")
+        or isinstance(space, SpecialOrthogonal)
+        or space._name in ("sphere", "rp", "cp", "torus")
+    ):
         return {"units": "rad"}
     return {"units": da.attrs["units"]} if space._name == "euclidean" and "units" in da.attrs else {}
 

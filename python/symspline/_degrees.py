@@ -1,0 +1,41 @@
+"""Angles in degrees where radians are expected."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ._spaces import Array, Space, Torus, factors_of, parts_of
+
+# Names of the unit in attributes of netCDF files and in brackets of column names.
+_NAMES = ("deg", "degs", "degree", "degrees", "°", "arc_degree", "arcdegree", "degree_true", "degrees_true", "degt")
+# Angles in radians rarely exceed two turns, and then they belong to a wheel, whose steps are less than half a turn.
+_TWO_TURNS = 4 * np.pi
+_SHARE = 0.1
+
+
+def is_degrees(unit: Any) -> bool:
+    """Whether the name of a unit is degrees."""
+    return str(unit).strip().lower() in _NAMES
+
+
+def look_like_degrees(space: Space[Any], points: Any) -> float | None:
+    """Return the largest angle of points on tori that seem to be in degrees, or None.
+
+    Such angles are between -180 and 360, exceed two turns if they are in radians, and jump by more than half a turn
+    from point to point, or have at most two decimals.
+    """
+    for factor, part in zip(factors_of(space), parts_of(points, space, "points"), strict=True):
+        if not isinstance(factor, Torus):
+            continue
+        x: Array = np.asarray(part, np.float64).reshape(-1, part.shape[-1])
+        x = x[np.isfinite(x).all(axis=1)]
+        size = float(np.abs(x).max(initial=0.0))
+        if not (size > _TWO_TURNS and x.min(initial=0.0) >= -180 and size <= 360):
+            continue
+        steps = np.abs(np.diff(x, axis=0))
+        jumps = np.mean(steps > np.pi) >= _SHARE if steps.size else False
+        if jumps or np.array_equal(100 * x, np.rint(100 * x)):
+            return size
+    return None
