@@ -18,6 +18,7 @@ LAYERS = [
         "_config",
         "_disk",
         "_durations",
+        "_equality",
         "_exceptions",
         "_input",
         "_lonlat",

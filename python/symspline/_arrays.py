@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
@@ -82,7 +83,14 @@ def cast(array: NDArray[Any], dtype: Any = np.float64) -> NDArray[Any]:
     if array.dtype == dtype:
         flags = array.flags
         # Arrays in memory that others laid out, such as columns of packed records, may begin anywhere.
-        return array if flags.c_contiguous and flags.aligned else np.array(array, order="C")
+        if flags.c_contiguous and flags.aligned:
+            return array
+    bytes_needed = math.prod(array.shape) * np.dtype(dtype).itemsize
+    # Broadcast arrays can have more entries than memory has addresses.
+    if bytes_needed >= 2**63:
+        raise MemoryError(
+            f"an array of shape {array.shape} needs {bytes_needed / 1e9:.3g} GB of memory. Process it in parts."
+        )
     with np.errstate(over="ignore", under="ignore", invalid="ignore"):
         return np.asarray(array, dtype=dtype, order="C")
 
@@ -96,7 +104,7 @@ def read_only(array: NDArray[Any]) -> NDArray[Any]:
 
 def whole_number(value: Any, name: str, least: int) -> int:
     """A whole number that fits into a machine word."""
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)):
+    if isinstance(value, (bool, np.timedelta64)) or not isinstance(value, (int, np.integer)):
         raise ValidationError(f"{name} must be a whole number, not {short_repr(value)}")
     if not least <= int(value) < 2**62:
         raise ValidationError(f"{name} must be at least {least} and not beyond 2**62, not {value}")
@@ -135,7 +143,8 @@ def checked_atol(atol: Any) -> float:
 
 def checked_number(value: Any, requirement: str, is_valid: Callable[[Any], bool]) -> float:
     """Return a real number, or raise ValidationError with what is required of it."""
-    number = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
+    # Durations of NumPy are whole numbers by their type.
+    number = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, (bool, np.timedelta64))
     if not number or not is_valid(value):
         raise ValidationError(f"{requirement}, not {short_repr(value)}")
     return float(value)

@@ -314,12 +314,13 @@ class SegmentedCurve(ComposedCurve[P], Generic[P, C]):
         self, points: ArrayLike | tuple[ArrayLike, ...], *, per_curve: bool = False
     ) -> tuple[Time, FloatArray | float]:
         # Points in the gaps are not defined.
-        found = [segment.closest(points, per_curve=per_curve) for segment in self]
-        times, distances = (np.stack([np.asarray(own) for own in each]) for each in zip(*found, strict=True))
-        known = np.where(np.isnan(distances), np.inf, distances)
-        nearest = np.expand_dims(np.argmin(known, axis=0), 0)
-        time, distance = (np.take_along_axis(x, nearest, axis=0)[0][()] for x in (times, distances))
-        return time, distance
+        time, distance = (np.array(own) for own in self._segments[0].closest(points, per_curve=per_curve))
+        for segment in self._segments[1:]:
+            times, distances = segment.closest(points, per_curve=per_curve)
+            nearer = np.asarray((distances < distance) | (np.isnan(distance) & ~np.isnan(distances)))
+            np.copyto(time, times, where=nearer)
+            np.copyto(distance, distances, where=nearer)
+        return time[()], distance[()]
 
     def __iter__(self) -> Iterator[C]:  # type: ignore[override]
         return iter(self._segments)
@@ -336,9 +337,9 @@ class SegmentedCurve(ComposedCurve[P], Generic[P, C]):
         sign = 1 if kind == "max" else -1
         # Where two segments meet, their ends are extrema of the whole only if both are, or if there is a jump.
         kept = np.ones(len(times), bool)
-        for t in self._meetings:
-            here = np.flatnonzero(times == t)
-            value = [np.asarray(_at(own, function, t)) for own in self._beside(t)]
+        for t, *beside in self._meetings:
+            here = np.arange(*(np.searchsorted(times, t, side) for side in ("left", "right")))
+            value = [np.asarray(_at(own, function, t)) for own in beside]
             if len(here) == 2:
                 kept[here[int(sign * values[here[0]] >= sign * values[here[1]])]] = False
             elif len(here) == 1 and not sign * values[here[0]] > sign * min(value, key=lambda x: sign * x) + _EQUAL:
@@ -350,20 +351,17 @@ class SegmentedCurve(ComposedCurve[P], Generic[P, C]):
     ) -> NDArray[Any]:
         found = [own.solve(function, value) for own in self._segments]
         jumps = []
-        for t in self._meetings:
-            left, right = (float(np.asarray(_at(own, function, t))) - value for own in self._beside(t))
+        for t, *beside in self._meetings:
+            left, right = (float(np.asarray(_at(own, function, t))) - value for own in beside)
             if left * right < 0:
                 jumps.append(np.asarray(t)[None])
         return np.unique(np.concatenate([*found, *jumps]))
 
     @property
-    def _meetings(self) -> list[Any]:
-        """Times at which a segment begins where the one before ends."""
-        return [b.domain[0] for a, b in pairwise(self._segments) if b.domain[0] == a.domain[1]]
-
-    def _beside(self, t: Any) -> list[Curve[Any]]:
-        """Return both segments that meet at a time."""
-        return [own for own in self._segments if t in own.domain]
+    def _meetings(self) -> list[tuple[Any, Curve[Any], Curve[Any]]]:
+        """Times at which a segment begins where the one before ends, with both segments."""
+        pairs = pairwise(self._segments)
+        return [(b.domain[0], a, b) for a, b in pairs if b.domain[0] == a.domain[1]]
 
     def _picked(self, index: Any) -> Self:
         return self._of_segments([own[index] for own in self._segments])

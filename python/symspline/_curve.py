@@ -26,6 +26,8 @@ _LARGEST = float(np.finfo(np.float64).max)
 _MEETING = 1e-8
 # Times at which the values of a law are compared with the domain of the curve.
 _SAMPLES = 1001
+# Rounding errors of a knot by which its times differ, if they are computed in two ways.
+_KNOT_ROUNDING = 16
 # Steps of bisection from any interval to neighbouring floating-point numbers near its middle.
 _BISECTIONS = 60
 
@@ -457,7 +459,12 @@ def _smooth_parts(law: _Law, start: float, stop: float, knots: Doubles) -> Doubl
         middle = low / 2 + high / 2
         before = law(middle) < inner
         low, high = np.where(before, middle, low), np.where(before, high, middle)
-    return np.unique(np.concatenate([times, high]))
+    # A knot of the law that lies on a knot of the curve is found twice, with different rounding errors.
+    after = np.clip(np.searchsorted(times, high), 1, len(times) - 1)
+    near = np.where(high - times[after - 1] < times[after] - high, times[after - 1], times[after])
+    same_value = np.abs(law(near) - inner) <= _KNOT_ROUNDING * np.spacing(np.abs(knots).max())
+    same_time = np.abs(near - high) <= _KNOT_ROUNDING * np.spacing(np.abs(times).max())
+    return np.unique(np.concatenate([times, high[~(same_value | same_time)]]))
 
 
 def _check_meeting(first: Curve[Any], second: Curve[Any]) -> None:

@@ -5,8 +5,12 @@ from __future__ import annotations
 import errno
 import io
 import os
+import platform
+import re
 import secrets
 import stat
+import time
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -17,6 +21,8 @@ from ._core import ValidationError
 
 # Characters of the file's own name in that of a temporary one: at most 128 bytes of the 255 that file systems allow.
 _TAIL = 32
+# Seconds after which a temporary file of another machine, or of a process that is alive, is abandoned.
+_OLD = 24 * 3600
 
 
 def path_of(file: Any, name: str = "file", *, method: str, text: bool = False) -> Path | None:
@@ -106,7 +112,8 @@ def replacing(path: Path) -> Iterator[Path]:
             raise IsADirectoryError(errno.EISDIR, "it is a folder", str(path))
         what = "it is a device, a pipe or a socket, not a regular file; pass an open file instead"
         raise OSError(errno.EINVAL, what, str(path))
-    temporary = target.with_name(f".{secrets.token_hex(8)}{target.name[-_TAIL:]}")
+    _remove_left(target)
+    temporary = target.with_name(f".{_machine()}-{os.getpid():x}-{secrets.token_hex(8)}{target.name[-_TAIL:]}")
     # A new file has the permissions of any new file. One that replaces another gets those at the end, and until then
     # nobody else may read it.
     try:
@@ -124,6 +131,34 @@ def replacing(path: Path) -> Iterator[Path]:
     finally:
         with suppress(FileNotFoundError):
             temporary.unlink()
+
+
+def _remove_left(target: Path) -> None:
+    """Remove temporary files of this name that processes left which were killed while they wrote them."""
+    name = re.compile(rf"\.([0-9a-f]{{8}})-([0-9a-f]+)-[0-9a-f]{{16}}{re.escape(target.name[-_TAIL:])}")
+    with suppress(OSError), os.scandir(target.parent) as entries:
+        for entry in entries:
+            found = name.fullmatch(entry.name)
+            with suppress(OSError):
+                if found is not None and _is_left(found[1] == _machine(), int(found[2], 16), entry.stat().st_mtime):
+                    os.unlink(entry.path)
+
+
+def _is_left(here: bool, process: int, changed: float) -> bool:
+    """Whether no process can still be writing a file: the process of this machine has ended, or the file is old."""
+    if here and os.name == "posix" and process != os.getpid():
+        try:
+            os.kill(process, 0)
+        except (ProcessLookupError, OverflowError):
+            return True
+        except OSError:
+            return False
+    return time.time() - changed > _OLD
+
+
+def _machine() -> str:
+    """Return a text that differs between machines that share a folder."""
+    return f"{zlib.crc32(platform.node().encode()):08x}"
 
 
 def _keep(temporary: Path, old: os.stat_result) -> None:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from ._arrays import as_array, whole_number
 from ._core import ValidationError
+from ._equality import same_fields
 from ._spaces import Space, parts_of, require_metric, space_named
 from ._typing import AnyArray, FloatArray, P
 
@@ -56,6 +57,12 @@ class TangentPCA(Generic[P]):
     explained_variance: FloatArray
     explained_variance_ratio: FloatArray
     scores: FloatArray
+
+    def __eq__(self, other: object) -> bool:
+        """Whether both have equal arrays."""
+        return same_fields(self, other) if isinstance(other, TangentPCA) else NotImplemented
+
+    __hash__ = None  # type: ignore[assignment]
 
     def reconstruct(self, scores: ArrayLike) -> P:
         r"""Compute the points with given coordinates.

@@ -13,6 +13,7 @@ from . import _core
 from ._arrays import as_array, cast, checked_number, read_only, refuse, short_repr, whole_number
 from ._core import ValidationError
 from ._curve import Curve
+from ._equality import same_fields
 from ._options import order_of
 from ._spaces import Array, Doubles, factors_of, parts_of, product_norm
 from ._typing import FloatArray, Number
@@ -67,6 +68,12 @@ class TimeLaw:
     rates: FloatArray
     max_speed: tuple[float, ...]
     max_acceleration: tuple[float, ...]
+
+    def __eq__(self, other: object) -> bool:
+        """Whether both have equal arrays."""
+        return same_fields(self, other) if isinstance(other, TimeLaw) else NotImplemented
+
+    __hash__ = None  # type: ignore[assignment]
 
     @property
     def duration(self) -> float:

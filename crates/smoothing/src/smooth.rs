@@ -67,7 +67,7 @@ pub fn smooth(space: &Erased, data: &[Data], options: &Options, monitor: &Monito
 /// per knot and per datum; without those of full Gauss–Newton.
 fn size(space: &Erased, data: &Data) -> usize {
     let (knots, count) = (data.knots.len(), data.times.len());
-    let per_knot = 512 + 24 * space.point_len() + 2 * space.frame_len();
+    let per_knot = 300 + 24 * space.point_len() + 2 * space.frame_len();
     let coupled = if data.information.is_empty() { 0 } else { 3 * stride(space.dim()) * space.dim() * LANES };
     knots * (per_knot + coupled) + count * (4 * space.point_len() + 16) + 2 * data.information.len()
 }

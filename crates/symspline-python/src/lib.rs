@@ -116,7 +116,8 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     guarded(m, wrap_pyfunction!(tridiagonal::solve_tridiagonal, m)?)?;
     guarded(m, wrap_pyfunction!(conversions::convert_rotations, m)?)?;
     guarded(m, wrap_pyfunction!(conversions::number_lines, m)?)?;
-    guarded(m, wrap_pyfunction!(set_num_threads, m)?)?;
-    guarded(m, wrap_pyfunction!(num_threads, m)?)?;
+    // Public functions, with their signatures.
+    m.add_function(wrap_pyfunction!(set_num_threads, m)?)?;
+    m.add_function(wrap_pyfunction!(num_threads, m)?)?;
     errors::register(m)
 }

@@ -6,7 +6,8 @@ curves of which they are made.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -137,19 +138,16 @@ class Joined:
         """Evaluate a quantity at times x; see `CoreCurve.evaluate`. Only ``"continue"`` gives zero norms in gaps."""
         _check_inside(self, x, outside, per_curve)
         shape = x.shape[len(self.batch) :] if per_curve else x.shape
-        flat = x.reshape((*self.batch, -1) if per_curve else -1)
+        flat = x.reshape((*self.batch, math.prod(shape)) if per_curve else math.prod(shape))
         number = np.clip(np.searchsorted(self.starts, flat, side="right") - 1, 0, len(self.starts) - 1)
         gap = (flat < self.starts[number]) | (flat > self.stops[number])
-        # A call without times evaluates the first section, for the type and the shape of its values.
-        used = np.unique(number) if number.size else np.zeros(1, np.intp)
         found = []
-        for done, i in enumerate(used):
-            here = number == i
-            columns = here.reshape(-1, here.shape[-1]).any(axis=0)
+        groups = list(_groups(number)) or [(0, np.zeros(0, np.intp))]
+        for done, (i, columns) in enumerate(groups):
             values = self._in_section(i, flat[..., columns], quantity, per_curve)
-            found.append((here, columns, values))
+            found.append((number[..., columns] == i, columns, values))
             if progress is not None:
-                progress(done + 1, len(used))
+                progress(done + 1, len(groups))
         missing = 0.0 if outside == "continue" and quantity in NORMS else np.nan
 
         def assembled(*values: Any) -> Any:
@@ -171,11 +169,22 @@ class Joined:
         axes, rest = (slice(None),) * len(self.batch), values[0].shape[len(self.batch) + 1 :]
         result = np.full((*self.batch, gap.shape[-1], *rest), np.nan, values[0].dtype)
         for (here, columns, _), own in zip(found, values, strict=True):
-            kept = here[..., columns]
-            kept = kept.reshape(kept.shape + (1,) * len(rest))
+            kept = here.reshape(here.shape + (1,) * len(rest))
             result[(*axes, columns)] = np.where(kept, own, result[(*axes, columns)])
         result[np.broadcast_to(gap, (*self.batch, gap.shape[-1]))] = missing
         return result
+
+
+def _groups(number: NDArray[np.intp]) -> Iterator[tuple[int, NDArray[np.intp]]]:
+    """Yield each section that occurs in an array of shape (..., m), and the columns in which it does.
+
+    The effort is that of sorting: a recording may have as many sections as times.
+    """
+    flat = number.ravel()
+    order = np.argsort(flat, kind="stable")
+    for own in np.split(order, np.flatnonzero(np.diff(flat[order])) + 1):
+        if len(own):
+            yield int(flat[own[0]]), np.unique(own % number.shape[-1])
 
 
 class Retimed:

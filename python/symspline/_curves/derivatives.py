@@ -11,13 +11,14 @@ import numpy as np
 from .. import _core
 from .._arrays import as_array, cast, short_repr
 from .._core import ValidationError
+from .._equality import same_fields
 from .._spaces import Array, Doubles, Space
 from .._time import onto_ends
 from .._typing import FloatArray, P
 from .ends import End, ends_of
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Gradient(Generic[P]):
     """Gradient of a function of a spline with respect to its data.
 
@@ -49,6 +50,12 @@ class Gradient(Generic[P]):
     points: P
     t: FloatArray
     ends: tuple[P | None, P | None]
+
+    def __eq__(self, other: object) -> bool:
+        """Whether both have equal arrays."""
+        return same_fields(self, other) if isinstance(other, Gradient) else NotImplemented
+
+    __hash__ = None  # type: ignore[assignment]
 
 
 class SampleTimes(NamedTuple):

@@ -61,6 +61,8 @@ from .solve import Setup, Solution, read_lams
 from .spline import EstimatedSpline, PointsSpline, joint
 from .terms import Term, bind
 
+# The largest number of knots. A curve with more of them would not fit into memory.
+_MOST_KNOTS = 2**32
 # Curves with the largest λ for the jerk have fewer degrees of freedom than this.
 _PARABOLA = 3.5
 
@@ -311,7 +313,7 @@ def _smoothed(
     def in_order(value: Any) -> Any:
         if isinstance(value, tuple):
             return tuple(in_order(own) for own in value)
-        array = None if value is None else np.asarray(value)
+        array = None if value is None else as_array(value, "measurements[0]")
         return value if array is None or array.shape[:1] != order.shape else array[order]
 
     # Objects of other libraries as arrays.
@@ -372,8 +374,8 @@ def _knots(knots: Any, given: list[Measurement]) -> tuple[TimeAxis, Array, Doubl
             first = first_knots(times[0], times[-1])
             return axis, shown_times(axis, shown, first), times[merged(times, len(times))]
         count = int(knots)
-        if count < 2:
-            raise ValidationError(f"knots must be at least 2, not {count}")
+        if not 2 <= count <= _MOST_KNOTS:
+            raise ValidationError(f"knots must be from 2 to {_MOST_KNOTS}, not {count}")
         index = merged(times, count)
         shown, times = shown[index], times[index]
         if count > len(index):

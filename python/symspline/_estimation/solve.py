@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
-from .._arrays import short_repr
+from .._arrays import as_array, short_repr
 from .._core import ValidationError
 from .._curves.curve import CoreCurve
 from .._curves.fit import FitProblem, Points, fit, read_ends
@@ -456,7 +456,7 @@ def read_lams(value: Any, count: int) -> NDArray[np.float64]:
     for i, own in enumerate(values):
         if own is None:
             continue
-        array = np.asarray(own)
+        array = as_array(own, "lam")
         if array.ndim or array.dtype.kind not in "iuf" or not (np.isfinite(array) and array >= 0):
             raise ValidationError(f"lam must be a number >= 0, or a tuple with one per part, not {short_repr(own)}")
         found[i] = float(array)

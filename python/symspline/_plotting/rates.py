@@ -242,11 +242,12 @@ def _draw_rate(axes: Axes, curves: Sequence[Curve], rate: Rate) -> None:
     """Draw one rate. Its axis includes zero, and rounding errors of constants are not magnified."""
     batch = curves[0].batch
     drawn = [0.0, *(shade_quantiles(axes, batch, rate.values(batch.at)) if batch else ())]
-    top = rounding = 0.0
+    top, rounding, moves = 0.0, 0.0, False
     for curve in curves:
         top = max(top, rate.scale * float(np.abs(rate.speed(curve.at)).max()))
-        # Rounding errors of points between the closest knots, which a curve at rest has.
-        rounding = max(rounding, rate.scale * 1e-15 * np.abs(curve.points).max() / np.diff(curve.data.times).min())
+        own = rate.scale * _rounding(curve)
+        moves |= bool((rate.scale * np.abs(rate.speed(curve.at)) > own).any())
+        rounding = max(rounding, float(own.max()))
         if curve.is_mean and batch:
             # A mean of curves is smoother than they are, so that its rates are smaller than most of theirs.
             median = np.median(rate.values(batch.at), axis=0)
@@ -275,9 +276,16 @@ def _draw_rate(axes: Axes, curves: Sequence[Curve], rate: Rate) -> None:
         for bound in (limit, -limit) if rate.signed else (limit,):
             axes.axhline(rate.scale * bound, color=MARK, linewidth=1, linestyle="--", zorder=2, label=LIMIT)
             drawn.append(rate.scale * bound)
-    top = top if top > rounding else 1.0
+    top, rounding = (top, 0.0) if moves else (1.0, rounding)
     unit = top * max(curve.x[-1] - curve.x[0] for curve in curves) ** (1 - rate.order)
     _limit(axes, min(drawn), max(drawn), unit, rounding if rate.order == 1 else 1e-9 * unit, rate.signed)
+
+
+def _rounding(curve: Curve) -> Array:
+    """Return the speeds that rounding errors of points between knots explain, at all times; a curve at rest has them."""
+    knots = np.asarray(curve.data.times)
+    segment = np.clip(np.searchsorted(knots, curve.x, side="right") - 1, 0, len(knots) - 2)
+    return np.asarray(1e-15 * np.abs(curve.points).max() / np.diff(knots)[segment])
 
 
 def _limit(axes: Axes, low: float, high: float, unit: float, small: float, signed: bool) -> None:

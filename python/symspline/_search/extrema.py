@@ -21,6 +21,9 @@ _DEPTH = 7
 # Part of the largest value below which the last coefficients of a polynomial and the changes of a constant are rounding
 # errors.
 _SMALL = 1e-10
+# Rounding errors by which values of a spline can deviate, relative to those of its points divided by a power of the
+# knot spacing: second differences of points have coefficients of up to 12, in several coordinates.
+_NOISE = 64 * float(np.finfo(np.float64).eps)
 # Points per interval at which the signs of the derivative are compared.
 _SIGNS = 49
 
@@ -44,27 +47,32 @@ class Intervals(NamedTuple):
         Values at the Chebyshev nodes.
     rough : ndarray of bool, shape (m,)
         Whether the polynomial does not represent the function, as next to a kink.
+    noise : ndarray, shape (m,)
+        Size of the rounding errors of the function.
     """
 
     a: Doubles
     b: Doubles
     values: Doubles
     rough: NDArray[np.bool_]
+    noise: Doubles
 
     @classmethod
-    def of(cls, f: Function, knots: Doubles) -> Self:
+    def of(cls, f: Function, knots: Doubles, noise: Doubles) -> Self:
         """Sample a function between the knots. Intervals are halved until polynomials represent it."""
         a, b, scale, done = knots[:-1], knots[1:], 0.0, []
         for depth in range(_DEPTH + 1):
             values = f(_nodes(a, b).ravel()).reshape(-1, _NODES)
             scale = max(scale, float(np.abs(values).max()))
-            rough = np.abs(values @ _TO_COEFFICIENTS[-3:].T).max(axis=-1) > _SMALL * scale
+            # Halving an interval does not remove its rounding errors.
+            rough = np.abs(values @ _TO_COEFFICIENTS[-3:].T).max(axis=-1) > np.maximum(_SMALL * scale, noise)
             kept = ~rough | (depth == _DEPTH)
-            done.append(cls(a[kept], b[kept], values[kept], rough[kept]))
+            done.append(cls(a[kept], b[kept], values[kept], rough[kept], noise[kept]))
             if kept.all():
                 break
             middle = (a + b)[rough] / 2
             a, b = (np.stack(x, axis=-1).ravel() for x in ((a[rough], middle), (middle, b[rough])))
+            noise = np.repeat(noise[rough], 2)
         each = [np.concatenate(x) for x in zip(*done, strict=True)]
         order = np.argsort(each[0])
         return cls(*(x[order] for x in each))
@@ -83,15 +91,87 @@ def _nodes(a: Doubles, b: Doubles) -> Doubles:
     return a[:, None] + (b - a)[:, None] * (_POINTS + 1) / 2
 
 
-def extrema(f: Function, knots: Doubles, sign: float) -> Doubles:
-    """Return the times of local maxima (sign 1) or minima (sign -1), including those at the ends of the domain."""
-    intervals = Intervals.of(f, knots)
+def rounding_noise(sizes: Doubles, spacing: Doubles, order: int) -> Doubles:
+    """Return the size of rounding errors of a derivative between knots.
+
+    Errors of points, ε times their size, are divided by the spacing of the knots to the power of the order. At a dense
+    sampling, the second derivative consists of them: the error is 4e-8 for unit vectors at 1 kHz.
+
+    Parameters
+    ----------
+    sizes : ndarray, shape (n,)
+        Sizes of the points at the knots.
+    spacing : ndarray, shape (n - 1,)
+        Spacing of the knots.
+    """
+    # The errors of an interval decay over the next ones, which may be longer.
+    shortest = np.minimum(spacing, np.minimum(np.append(spacing[1:], np.inf), np.append(np.inf, spacing[:-1])))
+    with np.errstate(over="ignore", divide="ignore"):
+        return np.asarray(_NOISE * np.maximum(sizes[1:], sizes[:-1]) / shortest**order)
+
+
+def extrema(f: Function, knots: Doubles, sign: float, noise: Doubles) -> Doubles:
+    """Return the times of local maxima (sign 1) or minima (sign -1), including those at the ends of the domain.
+
+    Parameters
+    ----------
+    noise : ndarray, shape (n - 1,)
+        Size of the rounding errors of the function between the knots. Extrema that they explain are omitted.
+    """
+    intervals = Intervals.of(f, knots, noise)
+    found = _candidates(f, intervals, knots, sign)
+    return _prominent(f, intervals, knots, sign, found) if noise.any() else found
+
+
+def _prominent(f: Function, intervals: Intervals, knots: Doubles, sign: float, found: Doubles) -> Doubles:
+    """Return the maxima on both sides of which the function falls by more than its rounding errors.
+
+    Of several maxima between which it does not, the largest one counts.
+    """
+    sampled = np.concatenate([knots[:1], _nodes(intervals.a, intervals.b).ravel(), knots[-1:]])
+    values = sign * np.concatenate([f(knots[:1]), intervals.values.ravel(), f(knots[-1:])])
+    allowed = np.repeat(intervals.noise, _NODES)
+    allowed = np.concatenate([allowed[:1], allowed, allowed[-1:]])
+    if np.ptp(values) <= allowed.max():
+        # A constant: all its values are largest.
+        return np.asarray(knots[[0, -1]])
+    peaks = sign * f(found)
+    # Between two maxima, only the smallest value matters.
+    starts = np.searchsorted(sampled, found)
+    ends = np.append(starts, len(sampled))
+    lows = [
+        values[a:b].min(initial=np.inf) for a, b in zip(np.append(0, ends[:-1]).tolist(), ends.tolist(), strict=True)
+    ]
+    tolerance = allowed[np.minimum(starts, len(allowed) - 1)].tolist()
+    kept: list[int] = []
+    best, low = -1, lows[0]
+    for i, (peak, after) in enumerate(zip(peaks.tolist(), lows[1:], strict=True)):
+        # `low` is the smallest value since the best maximum so far, or since the last one that was kept.
+        if best < 0:
+            if not kept or peak - low > tolerance[i]:
+                best, low = i, after
+            else:
+                low = min(low, after)
+        elif peak > peaks[best]:
+            best, low = i, after
+        else:
+            low = min(low, after)
+        if best >= 0 and peaks[best] - low > tolerance[best]:
+            kept.append(best)
+            best = -1
+    if best >= 0:
+        kept.append(best)
+    return found[kept]
+
+
+def _candidates(f: Function, intervals: Intervals, knots: Doubles, sign: float) -> Doubles:
+    """Return the times of all maxima, those of rounding errors among them."""
     scale = float(np.abs(intervals.values).max())
     slopes = sign * chebyshev.chebder(intervals.coefficients)
     tau = np.linspace(-1, 1, _SIGNS)
     values = chebyshev.chebval(tau, slopes)
     # Changes that rounding errors explain do not have a sign.
-    values[np.abs(values) <= _SMALL * scale] = 0.0
+    values[np.abs(values) <= np.maximum(_SMALL * scale, intervals.noise)[:, None]] = 0.0
     number, place = np.nonzero(values)
     if not len(number):
         return np.asarray(knots[[0, -1]])
@@ -134,12 +214,18 @@ def _refined(
     return middle, f(middle) > ends
 
 
-def crossings(f: Function, knots: Doubles, value: float) -> Doubles:
-    """Return the times at which a function crosses a value, in increasing order."""
-    intervals = Intervals.of(f, knots)
+def crossings(f: Function, knots: Doubles, value: float, noise: Doubles) -> Doubles:
+    """Return the times at which a function crosses a value, in increasing order.
+
+    Values that differ from it by less than the rounding errors `noise` between the knots do not have a sign.
+    """
+    intervals = Intervals.of(f, knots, noise)
     ends = f(knots[[0, -1]])
     times = np.concatenate([knots[:1], _nodes(intervals.a, intervals.b).ravel(), knots[-1:]])
     values = np.concatenate([ends[:1], intervals.values.ravel(), ends[1:]]) - value
+    allowed = np.concatenate([[0.0], np.repeat(intervals.noise, _NODES), [0.0]])
+    signed = (np.abs(values) > allowed) | (values == 0)
+    times, values = times[signed], values[signed]
     exact = np.flatnonzero((values == 0) & np.append(True, values[:-1] != 0))
     own = np.flatnonzero(values[:-1] * values[1:] < 0)
     interval, outer = (times[own], times[own + 1]), (values[own], values[own + 1])

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .. import _core
+from .._equality import same
 from .._spaces import Array, Doubles, Space
 from .._typing import FloatArray
 
@@ -29,6 +30,15 @@ class Parameter(NamedTuple):
     def std(self) -> FloatArray:
         """Standard deviations, shape (size,)."""
         return np.sqrt(np.diag(self.cov))
+
+    def __eq__(self, other: object) -> bool:
+        """Whether both have equal arrays."""
+        return same(tuple(self), tuple(other)) if isinstance(other, Parameter) else NotImplemented
+
+    def __ne__(self, other: object) -> bool:
+        return not self == other
+
+    __hash__ = None  # type: ignore[assignment]
 
 
 class Posterior(NamedTuple):

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from .._arrays import as_array, refuse, short_repr
 from .._core import ValidationError
 from .._disk import damage, path_of, replacing
+from .._equality import same
 from .._typing import TensorOrder
 from ._orders import Array, from_vectors, to_vectors
 
@@ -22,7 +23,7 @@ File = str | PathLike[str]
 _SYMMATRIX = 1005
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Volume:
     """Tensors of the voxels inside a mask.
 
@@ -52,7 +53,15 @@ class Volume:
     tensors: Array
     mask: NDArray[np.bool_]
     affine: NDArray[np.float64]
-    header: Any = field(default=None, compare=False, repr=False)
+    header: Any = field(default=None, repr=False)
+
+    def __eq__(self, other: object) -> bool:
+        """Whether tensors, masks and affine maps are equal; headers are not compared."""
+        if not isinstance(other, Volume):
+            return NotImplemented
+        return same((self.tensors, self.mask, self.affine), (other.tensors, other.mask, other.affine))
+
+    __hash__ = None  # type: ignore[assignment]
 
 
 def read_nifti(file: File, *, order: TensorOrder | None = None, mask: ArrayLike | File | None = None) -> Volume:

@@ -19,6 +19,8 @@ from ._orders import Array
 
 Floats = NDArray[np.float64]
 
+# NIfTI files store the number of voxels along an axis in 16 bits.
+_MOST_VOXELS = 2**15 - 1
 # Tensors that are evaluated at once: 19 MB.
 _BLOCK = 2**18
 # Affine maps in files have single precision.
@@ -202,8 +204,17 @@ def _target(volume: Volume, zoom: Any, voxel_size: Any, like: Any) -> tuple[list
     if like is not None:
         return _voxels_of(like, shape, affine)
     sizes = np.linalg.norm(affine[:3, :3], axis=0)
-    step = 1 / _three(zoom, "zoom") if zoom is not None else _three(voxel_size, "voxel_size") / sizes
+    with np.errstate(over="ignore"):
+        step = 1 / _three(zoom, "zoom") if zoom is not None else _three(voxel_size, "voxel_size") / sizes
     step[np.equal(shape, 1)] = 1.0
+    name = "zoom" if zoom is not None else "voxel_size"
+    with np.errstate(over="ignore", divide="ignore"):
+        most = (np.array(shape) - 1) / step
+    if not (most < _MOST_VOXELS).all() or not np.isfinite(step).all():
+        raise ValidationError(
+            f"{name} = {short_repr(zoom if zoom is not None else voxel_size)} gives more than {_MOST_VOXELS} voxels "
+            "along an axis. Choose larger voxels."
+        )
     counts = [math.floor((n - 1) / own + 1e-6) + 1 for n, own in zip(shape, step, strict=True)]
     positions = [np.minimum(own * np.arange(count), n - 1.0) for n, own, count in zip(shape, step, counts, strict=True)]
     return positions, affine @ np.diag([*step, 1.0])
