@@ -3,8 +3,12 @@
 import sys
 import textwrap
 
+import numpy as np
 import pytest
 from curves import run_python
+from refused import raises
+
+import symspline as ss
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="limits of memory as Linux has them")
 
@@ -101,7 +105,7 @@ def test_hostile_files_do_not_abort():
 @pytest.mark.parametrize(
     ("name", "nodes", "options", "words"),
     [
-        ("spd:100", 20, {"method": "newton"}, "pass method='quasi-newton', which needs far less"),
+        ("spd:100", 20, {"method": "newton"}, "Pass method='quasi-newton', which needs far less"),
         ("so:60", 30, {"method": "homotopy"}, "so:60"),
         ("so:60", 2, {}, None),
         ("spd:40", 12, {}, None),
@@ -126,6 +130,113 @@ def test_fits_in_many_dimensions_do_not_abort(name, nodes, options, words):
         assert words in said and "GB" in said
 
 
+def test_sizes_that_no_memory_holds_raise_memory_error():
+    """In statistics and derivatives, as in fits: the message names the size and a remedy."""
+    script = """
+    m, rng = ss.measure, np.random.default_rng(0)
+
+    def turns(n):
+        return ss.rotations.from_rotation_vectors(np.sin(np.linspace(0, 20, n))[:, None] * [0.1, 0.2, 0.3])
+
+    t = np.arange(100.0)
+    y = np.cumsum(0.1 * rng.standard_normal((100, 3)), axis=0)
+    points = m.Points(t, y, sigma=0.1)
+    many = m.Constant(30_000, sigma=1.0)
+    range_of = m.Function(t, lambda x, p: x[:, 0] - y[:, 0] + p["many"][:100], sigma=1.0, parameters={"many": many})
+    curve = ss.estimate([points, m.Velocities(t, y, 0 * y, sigma=1.0)], 20, "r:3", lam=1.0)
+    spline = ss.CubicSpline(None, turns(150_000), "so:3")
+    grid = ss.GridSpline((None,) * 3, np.zeros((3, 3, 3, 1)), "r:1")
+    line = np.linspace(0, 1, 2**22)
+    calls = {
+        "estimate": lambda: ss.estimate([points, range_of], 20, "r:3", lam=1.0),
+        "cov": lambda: curve.cov(np.linspace(0, 99, 20_000_000)),
+        "jvp": lambda: spline.jvp(0.5, np.zeros((150_000, 3, 3))),
+        "vjp": lambda: spline.vjp(0.5, np.zeros((3, 3))),
+        "smooth": lambda: ss.make_smoothing_spline(None, turns(600_000), "so:3", 1.0),
+        "newton": lambda: ss.make_smoothing_spline(None, turns(200_000), "so:3", 1.0, method="newton"),
+        "grid": lambda: grid.grid(line, line, line),
+    }
+    for name, call in calls.items():
+        try:
+            call()
+            print(name, "done")
+        except MemoryError as error:
+            print(name, "GB" in str(error) and str(error).count(". ") >= 1)
+    """
+    said = dict(line.split() for line in run(script, 200).splitlines())
+    assert len(said) == 7 and set(said.values()) == {"True"}, said
+
+
+def test_little_address_space_never_aborts():
+    """Each call, with a little less memory than it needs and with much less: it returns, or raises MemoryError."""
+    script = """
+    import os
+
+    def turns(n):
+        return ss.rotations.from_rotation_vectors(np.sin(np.linspace(0, 20, n))[:, None] * [0.1, 0.2, 0.3])
+
+    m, n = ss.measure, 1500
+    points, y = turns(n), np.cumsum(np.random.default_rng(0).standard_normal((300, 5)), axis=0)
+    t, spline = np.arange(300.0), ss.CubicSpline(None, points, "so:3")
+    data = [m.Points(t, y, sigma=0.1), m.Velocities(t, y, 0 * y, sigma=1.0)]
+    curve = ss.estimate(data, 60, "r:5", lam=1.0)
+    bezier = ss.BezierCurve(y[:, :3], "r:3")
+    calls = [
+        lambda: ss.CubicSpline(None, points, "so:3"),
+        lambda: spline.jvp(np.linspace(0, n - 1, 2000), np.zeros((n, 3, 3))),
+        lambda: spline.vjp(np.linspace(0, n - 1, 2000), np.zeros((2000, 3, 3))),
+        lambda: ss.make_smoothing_spline(None, points, "so:3", 1.0),
+        lambda: ss.estimate(data, 60, "r:5", lam=1.0),
+        lambda: curve.cov(np.linspace(0, 299, 20_000)),
+        lambda: curve.sample(np.random.default_rng(0), 1000),
+        lambda: bezier(np.linspace(0, 1, 3000)),
+        lambda: spline.closest(points[:100]),
+    ]
+    failed = []
+    for k, call in enumerate(calls):
+        for more in (1, 8, 60):
+            child = os.fork()
+            if child == 0:
+                used = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
+                resource.setrlimit(resource.RLIMIT_AS, (used + more * 10**6,) * 2)
+                try:
+                    call()
+                except MemoryError:
+                    pass
+                os._exit(0)
+            if os.waitpid(child, 0)[1]:
+                failed.append((k, more))
+    print(failed)
+    """
+    assert run(script, 200).strip() == "[]"
+
+
+def test_a_batch_without_curves_has_checked_knots():
+    for knots in ([0, 1, 1], [0, np.nan, 1]):
+        for call in (ss.CubicSpline, ss.PiecewiseGeodesic, ss.fit):
+            raises(r"t\[[12]\]", call, knots, np.zeros((0, 3, 3)), "sphere:2")
+        empty = np.zeros((0, 3, 3))
+        raises(r"t\[[12]\]", ss.HermiteSpline, knots, empty, empty, "sphere:2")
+
+
+def test_pools_of_other_sizes_end():
+    script = """
+    import threading
+
+    def count():
+        return int(next(line for line in open("/proc/self/status") if line.startswith("Threads")).split()[1])
+
+    points = ss.space("so:3").random_point(np.random.default_rng(0), (20_000,))
+    for n in [*range(2, 12)] * 3:
+        ss.set_num_threads(n)
+        ss.space("so:3").project(points)
+        ss.make_smoothing_spline(None, np.zeros((40, 300, 1)), "r:1", 1.0)
+    time.sleep(0.5)
+    print(count())
+    """
+    assert int(run(script)) < 30
+
+
 LONG_CALLS = {
     "newton": "ss.CubicSpline(None, far(ss.space('spd:14'), 40), 'spd:14', method='newton', max_iter=10**6, tol=0)",
     "homotopy": "ss.CubicSpline(None, far(ss.space('so:12'), 60), 'so:12', method='homotopy')",
@@ -140,6 +251,12 @@ LONG_CALLS = {
     "evaluate": "spline('spd:30', 4)(np.linspace(0, 3, 200_000))",
     "smooth": "ss.make_smoothing_spline(None, far(ss.space('spd:9'), 400), 'spd:9', method='newton')",
     "gl": "many(ss.space('gl:120'), 'log')",
+    "bezier": "ss.BezierCurve(far(ss.space('so:3'), 20_000), 'so:3')(0.5)",
+    "vjp of rotations": "spline('so:10', 100).vjp(np.linspace(0, 99, 20_000), np.ones((20_000, 10, 10)))",
+    "estimate": "estimated(2000, 20, constants=3000)",
+    "cov": "again(estimated(4000, 10).cov, np.linspace(0, 3999, 400_000))",
+    "sample": "again(estimated(4000, 10).sample, np.random.default_rng(0), 2000)",
+    "information": "ss.make_smoothing_spline(None, walk(2000, 100), 'r:100', 1.0, weights=units(2000, 100))",
 }
 
 
@@ -157,6 +274,28 @@ def test_long_calls_end_soon_after_a_signal(call):
     def spline(name, nodes):
         space = ss.space(name)
         return ss.CubicSpline(None, far(space, nodes), space, method="quasi-newton", on_failure="ignore")
+
+    def walk(n, dim):
+        return np.cumsum(0.1 * np.random.default_rng(0).standard_normal((n, dim)), axis=0)
+
+    def units(n, dim):
+        return np.stack([np.eye(dim)] * n)
+
+    def estimated(n, dim, constants=0):
+        m, t, y = ss.measure, np.arange(float(n)), walk(n, dim)
+        data = [m.Points(t, y, sigma=0.1), m.Velocities(t, y, 0 * y, sigma=1.0)]
+        if constants:
+            own = m.Constant(constants, sigma=1.0)
+            seen = lambda x, p: x[:, 0] - y[:, 0] + p["own"][:n]
+            data.append(m.Function(t, seen, sigma=1.0, parameters={{"own": own}}))
+        return ss.estimate(data, 200, f"r:{{dim}}", lam=1.0)
+
+    def again(function, *values):
+        # The preparation may take longer than the timer.
+        begin_to_count()
+        threading.Timer(0.5, interrupt).start()
+        while True:
+            function(*values)
 
     def one(space):
         p = far(space, 2)

@@ -9,7 +9,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
-use symspline_engine::memory::OutOfMemory;
+use symspline_engine::memory::{OutOfMemory, is_free};
 use symspline_engine::monitor::Monitor;
 use symspline_engine::space::{Ambient, Erased, Origin};
 
@@ -18,6 +18,10 @@ const INTERVAL: Duration = Duration::from_millis(50);
 
 /// The size of the stack of a thread, in bytes.
 const STACK: f64 = (2 << 20) as f64;
+
+/// The address space that a thread needs at its start, in numbers: the GNU C library reserves 64 MiB for its
+/// allocations, aligned to 64 MiB. Without it, each small allocation would take a page, or the thread could not start.
+const OF_THREAD: f64 = (144 << 17) as f64;
 
 /// Numbers of a point, and dimensions, from which one step of the work may take long.
 const HEAVY_POINT: usize = 900;
@@ -87,7 +91,8 @@ pub fn watched<T: Send>(
     };
     let monitor = Monitor::new(&go_on);
     let result = py.detach(|| {
-        if !heavy {
+        // If address space is scarce, a call that can be interrupted late is better than one that fails.
+        if !heavy || !is_free(OF_THREAD) {
             return catch_unwind(AssertUnwindSafe(|| work(&monitor)));
         }
         // One step of this work may take minutes. It runs in another thread, and this thread handles signals.

@@ -282,7 +282,7 @@ def _draw_rate(axes: Axes, curves: Sequence[Curve], rate: Rate) -> None:
 
 
 def _rounding(curve: Curve) -> Array:
-    """Return the speeds that rounding errors of points between knots explain, at all times; a curve at rest has them."""
+    """Return the speeds that rounding errors of points explain, at all times; a curve at rest has them."""
     knots = np.asarray(curve.data.times)
     segment = np.clip(np.searchsorted(knots, curve.x, side="right") - 1, 0, len(knots) - 2)
     return np.asarray(1e-15 * np.abs(curve.points).max() / np.diff(knots)[segment])

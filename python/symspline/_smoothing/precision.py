@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,6 +18,8 @@ from .factors import coordinates_in_parts, parts_of_factor, split
 
 # Relative size of the entries of a matrix or vector that count as rounding errors.
 _ROUNDING = 1e-8
+# Operations on matrices in one call of NumPy, which cannot be interrupted: some tenths of a second.
+_BLOCK = 1 << 28
 # Relative size of the eigenvalues of a matrix that the core treats as zero.
 _SINGULAR = 1e-10
 
@@ -173,11 +177,9 @@ def _with_matrices(given: ArrayLike, frames: Any, space: Space, data: Points) ->
         raise ValidationError(
             f"the dimension of {space!r} is too large for information matrices. Pass numbers as weights."
         )
-    finite = np.isfinite(matrices).all(axis=(-2, -1))
-    skew = np.abs(matrices - np.swapaxes(matrices, -1, -2)).max(axis=(-2, -1), initial=0.0)
-    _check(finite, "is not finite")
-    _check(skew <= _ROUNDING * np.abs(matrices).max(axis=(-2, -1), initial=0.0), "is not symmetric")
-    least, most = (np.linalg.eigvalsh(matrices)[..., i] for i in (0, -1))
+    _check(_of_each(matrices, lambda own: np.isfinite(own).all(axis=(-2, -1))), "is not finite")
+    _check(_of_each(matrices, _is_symmetric), "is not symmetric")
+    least, most = (_of_each(matrices, np.linalg.eigvalsh)[..., i] for i in (0, -1))
     negative = "has a negative eigenvalue, but it must be the inverse of a covariance"
     _check(least >= -_ROUNDING * np.maximum(most, 0.0), negative)
     if data.moves is not None and isinstance(space, Quotient):
@@ -186,6 +188,20 @@ def _with_matrices(given: ArrayLike, frames: Any, space: Space, data: Points) ->
         into = _inverse_frames(frames, space, data, np.any(matrices != 0, axis=(-2, -1)))
         matrices = np.swapaxes(into, -1, -2) @ matrices @ into
     return _of_matrices(matrices)
+
+
+def _is_symmetric(matrices: Doubles) -> NDArray[np.bool_]:
+    skew = np.abs(matrices - np.swapaxes(matrices, -1, -2)).max(axis=(-2, -1), initial=0.0)
+    return np.asarray(skew <= _ROUNDING * np.abs(matrices).max(axis=(-2, -1), initial=0.0))
+
+
+def _of_each(matrices: Doubles, function: Callable[[Doubles], Array]) -> Array:
+    """Return a function of matrices. Python handles signals between blocks of them."""
+    rows = matrices.reshape(math.prod(matrices.shape[:-2]), *matrices.shape[-2:])
+    block = max(1, _BLOCK // max(1, matrices.shape[-1] ** 3))
+    found = [function(rows[start : start + block]) for start in range(0, max(1, len(rows)), block)]
+    values = np.concatenate(found)
+    return values.reshape(matrices.shape[:-2] + values.shape[1:])
 
 
 def _moved_frames(frames: Any, space: Quotient[Any], data: Points, moves: Any) -> Array:

@@ -96,7 +96,8 @@ def _table(table: Table, given: str | None) -> list[str]:
         ]
         return [f"{table.path}: arrays of different lengths, such as a grid; see symspline grid --help", *sizes]
     lines = [f"{table.path}: {table.path.format} table, {table.height} rows"]
-    shown = [name for name in columns if not any(name in own[_COLUMNS:] for own in groups.values())]
+    hidden = {name for own in groups.values() for name in own[_COLUMNS:]}
+    shown = [name for name in columns if name not in hidden]
     lines += [f"  {name}: {_described(table.shown(name))}" for name in shown]
     lines += [f"  ... {own[-1]}: {key} has {len(own)} columns" for key, own in groups.items() if len(own) > _COLUMNS]
     if given not in (None, NUMBERED):

@@ -1,0 +1,52 @@
+"""What a killed process leaves, the next save of the same name removes."""
+
+import os
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+import symspline as ss
+from symspline._disk import _machine
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="processes are looked up as POSIX does")
+
+KILLED = """
+import os, sys
+from pathlib import Path
+from symspline._disk import replacing
+with replacing(Path(sys.argv[1])) as temporary:
+    temporary.write_bytes(b"half")
+    os.kill(os.getpid(), 9)
+"""
+
+
+def test_the_file_of_a_killed_save_is_removed(tmp_path):
+    curve, file, other = ss.CubicSpline(None, np.eye(3), "r:3"), tmp_path / "run.npz", tmp_path / "walk.npz"
+    for path in (file, other):
+        subprocess.run([sys.executable, "-c", KILLED, path], check=False)
+    hidden = set(os.listdir(tmp_path))
+    assert len(hidden) == 2
+    curve.save(file)
+    left = set(os.listdir(tmp_path)) - {"run.npz"}
+    assert len(left) == 1 and left < hidden and next(iter(left)).endswith("walk.npz")
+    assert ss.load(file) == curve
+
+
+def test_files_that_others_write_stay(tmp_path):
+    """Those of processes that are alive, of other machines, and of the user."""
+    file = tmp_path / "run.npz"
+    kept = [f".00000000-1-{'0' * 16}run.npz", ".notes run.npz", f".{'0' * 16}run.npz"]
+    with_parent = f".{_machine()}-{os.getppid():x}-{'0' * 16}run.npz"
+    for name in [*kept, with_parent]:
+        (tmp_path / name).touch()
+    ss.CubicSpline(None, np.eye(3), "r:3").save(file)
+    assert set(os.listdir(tmp_path)) == {*kept, with_parent, "run.npz"}
+    # Two days later.
+    old = time.time() - 2 * 86400
+    for name in [*kept, with_parent]:
+        os.utime(tmp_path / name, (old, old))
+    ss.CubicSpline(None, np.eye(3), "r:3").save(file)
+    assert set(os.listdir(tmp_path)) == {*kept[1:], "run.npz"}
