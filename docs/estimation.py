@@ -459,7 +459,7 @@ def poses_table(count: int = 6) -> str:
                     given: list[ss.measure.Measurement] = [ss.measure.Points(t, points, sigma=0.005)]
                     if kind != "poses":
                         given.append(ss.measure.BodyRates(s, gyro, sigma=0.01, bias=ss.measure.Constant(3)))
-                    curve = ss.estimate(given, 400, name)
+                    curve = ss.estimate(given, 400, name, penalty="acceleration")
                     attitudes, positions = curve_parts(curve, t)
                     found[name].append([1e3 * rms(SO3.distance(attitudes, r)), 1e3 * rms(positions - p)])
             cells = [np.sqrt(np.mean(np.square(each), axis=0)) for each in found.values()]

@@ -55,7 +55,7 @@ def test_rates_halve_the_error_of_attitudes(penalty):
 def test_iterations_do_not_depend_on_lam():
     _, t, seen, s, omega = gyro(5)
     counts = [
-        ss.estimate(fused(t, seen, s, omega), 41, "so:3", lam=lam, tol=1e-9).report.iterations
+        ss.estimate(fused(t, seen, s, omega), 41, "so:3", lam=lam, tol=1e-9, penalty="acceleration").report.iterations
         for lam in (1.0, 10.0, 1e2, 1e3)
     ]
     assert max(counts) <= 10
@@ -113,7 +113,7 @@ def test_spinning_bodies():
         omega = axis + BIAS + 0.02 * rng.standard_normal((1201, 3))
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ss.SmoothingWarning)
-            curve = ss.estimate(fused(t, seen, s, omega), np.linspace(0, 60, 121), "so:3")
+            curve = ss.estimate(fused(t, seen, s, omega), np.linspace(0, 60, 121), "so:3", penalty="acceleration")
         assert curve.report.iterations <= 8 and curve.df < 5
         assert sensors.rms(SO3.distance(curve(t), turned)) < 0.03
 

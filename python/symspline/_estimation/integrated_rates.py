@@ -1,6 +1,6 @@
 """Attitudes from measured rates: their integral, aligned robustly with measured attitudes.
 
-The bias of the rates follows from a consensus of the turns between neighbouring attitudes, so that neither several turns
+The bias of the rates follows from a consensus of the turns between neighbouring attitudes. Neither several turns
 between two attitudes nor wrong attitudes mislead it.
 
 References
@@ -13,6 +13,7 @@ Automation Letters 5 (2020).
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -26,6 +27,8 @@ _SO3 = SpecialOrthogonal(3)
 _GAP = 20.0
 # The largest number of attitudes with which biases are compared, and of intervals that propose one.
 _COMPARED, _PROPOSALS = 200, 60
+# The same numbers for the comparison of time offsets.
+_COMPARED_OFFSETS, _PROPOSED_OFFSETS = 60, 10
 # Residuals are limited to the quantile 0.999 of χ² with three degrees of freedom.
 _LIMIT = 16.27
 # Whole turns that are added to the turn between two attitudes.
@@ -38,7 +41,7 @@ _BAD = 6.0
 _LINEAR = 0.1
 # Corners of the loss of Geman and McClure, in squares of standard deviations, during the alignment.
 _CORNERS = (64.0, 16.0, 4.0, 4.0)
-# Time offsets are tried on both sides of the start, this many of them, with steps in which the body turns by this angle.
+# So many time offsets are tried on both sides of the start, with steps in which the body turns by this angle.
 _OFFSETS, _OFFSET_TURN = 20, 0.2
 
 
@@ -215,7 +218,8 @@ class _Problem:
         bias = self.rates.bias
         if self.rates.spread is None or len(attitudes.times) < 2:
             return bias
-        index = np.linspace(0, len(attitudes.times) - 1, min(len(attitudes.times), _COMPARED)).astype(int)
+        most, proposals = (_COMPARED_OFFSETS, _PROPOSED_OFFSETS) if more else (_COMPARED, _PROPOSALS)
+        index = np.linspace(0, len(attitudes.times) - 1, min(len(attitudes.times), most)).astype(int)
         some = attitudes.taken(np.unique(index))
         for number in range(3):
             pairs = self.pairs(some, bias, 1, more)
@@ -223,7 +227,7 @@ class _Problem:
                 return bias
             changes = np.zeros((1, 3))
             if number == 0:
-                changes = np.concatenate([changes, self._proposals(pairs)])
+                changes = np.concatenate([changes, self._proposals(pairs, proposals)])
             squares = np.sum(pairs.residuals(changes) ** 2, axis=-1) / pairs.variances
             best = changes[np.argmin(np.minimum(squares, _LIMIT).sum(axis=1) + self._prior(bias + changes))]
             best = self._improved(pairs, bias, best)
@@ -239,9 +243,9 @@ class _Problem:
             apart *= 2
         return bias
 
-    def _proposals(self, pairs: _Pairs) -> Doubles:
+    def _proposals(self, pairs: _Pairs, most: int) -> Doubles:
         """Return changes of the bias that explain one turn each, and one with a whole turn more or less."""
-        count = min(len(pairs.rest), _PROPOSALS)
+        count = min(len(pairs.rest), most)
         lengths = np.linalg.norm(pairs.derivatives, axis=(-2, -1))
         each = np.argsort(lengths, kind="stable")[:count]
         vectors = _log(pairs.rest[each])
@@ -265,8 +269,21 @@ class _Problem:
             change = change - np.linalg.solve(normal, right)
         return change
 
-    def aligned(self, attitudes: Attitudes, bias: Doubles, more: float = 0.0) -> tuple[Doubles, Doubles, float]:
+    def aligned(
+        self, attitudes: Attitudes, bias: Doubles, more: float = 0.0, late: float = 0.0
+    ) -> tuple[Doubles, Doubles, float, float]:
         """Align the integral with attitudes within one stretch.
+
+        Parameters
+        ----------
+        attitudes : Attitudes
+            Attitudes.
+        bias : ndarray
+            First bias.
+        more : float
+            Additional standard deviation of every attitude.
+        late : float
+            Standard deviation of a time to be found that is added to the times of the attitudes; 0 if there is none.
 
         Returns
         -------
@@ -276,8 +293,10 @@ class _Problem:
             Bias with which they agree best.
         misfit : float
             Mean of the squared residuals in standard deviations, each of them limited.
+        offset : float
+            Time that was found.
         """
-        t, r = attitudes.times, attitudes.matrices
+        t, r, offset = attitudes.times, attitudes.matrices, 0.0
         drift = self.rates.noise**2 * self.step * float(np.ptp(t))
         variances = attitudes.sigma**2 + more**2 + drift
         free = self.rates.spread is not None and len(t) > 1
@@ -296,16 +315,29 @@ class _Problem:
             weights = (corner / (corner + squares)) ** 2 / variances
             # Columns of the first attitude, turned into the body, and of the bias.
             columns = np.concatenate([_back(path), -turned if free else 0 * turned], axis=-1)
+            if late:
+                columns = np.concatenate([columns, self.rates_at(t, bias)[..., None]], axis=-1)
             normal = np.einsum("k,kji,kjl->il", weights, columns, columns)
             right = np.einsum("k,kji,kj->i", weights, columns, rest)
-            normal[3:, 3:] += np.diag(self.precision)
-            right[3:] -= self.precision * (bias - self.rates.bias)
+            normal[3:6, 3:6] += np.diag(self.precision)
+            right[3:6] -= self.precision * (bias - self.rates.bias)
+            if late:
+                normal[6, 6] += late**-2.0
+                right[6] -= offset * late**-2.0
             step = np.linalg.solve(normal, right)
             first = _exp(step[:3]) @ first
-            bias = bias + step[3:] if free else bias
+            bias = bias + step[3:6] if free else bias
+            if late:
+                offset += float(step[6])
+                t = attitudes.times + offset
         g, _ = self._since_first(t, bias)
         squares = np.sum(_log(_back(first @ g) @ r) ** 2, axis=-1) / variances
-        return first, bias, float(np.minimum(squares, _LIMIT).mean())
+        return first, bias, float(np.minimum(squares, _LIMIT).mean()), offset
+
+    def rates_at(self, t: Doubles, bias: Doubles) -> Doubles:
+        """Return the rates without a bias at times."""
+        own = self.rates
+        return np.stack([np.interp(t, own.times, row) for row in own.omega.T], axis=-1) - bias
 
     def _since_first(self, t: Doubles, bias: Doubles) -> tuple[Doubles, Doubles]:
         """Return the rotations since the first time, and minus their derivatives with respect to the bias."""
@@ -328,7 +360,13 @@ class Path:
         Mean of the squared residuals of the attitudes in standard deviations, each of them limited.
     """
 
-    def __init__(self, rates: Rates, attitudes: Attitudes, offset: tuple[float, float, float] | None = None) -> None:
+    def __init__(
+        self,
+        rates: Rates,
+        attitudes: Attitudes,
+        offset: tuple[float, float, float] | None = None,
+        smoothed: Callable[[Doubles], Doubles] | None = None,
+    ) -> None:
         """Find bias, alignment and offset.
 
         Parameters
@@ -339,11 +377,11 @@ class Path:
             Measured attitudes, at least one.
         offset : tuple of float, optional
             Start, lowest and highest value of an unknown time that is added to the times of the attitudes.
+        smoothed : callable, optional
+            Function that returns smoothed attitudes at times of attitudes. It is called for gaps of the rates.
         """
         problem = _Problem(rates)
-        self.offset = 0.0 if offset is None else offset[0]
-        if offset is not None:
-            self.offset = _best_offset(problem, attitudes, *offset)
+        self.offset = 0.0 if offset is None else _best_offset(problem, attitudes, *offset)
         attitudes = attitudes.later(self.offset)
         where = problem.stretch(attitudes.times)
         stretches = [np.flatnonzero(where == j) for j in np.unique(where[where >= 0])]
@@ -367,9 +405,12 @@ class Path:
             frame = problem.aligned(some, self.bias)[0] @ self._integral.at(some.times[:1])[0][0].T
             times += [problem.first[where[own[0]]], problem.last[where[own[0]]]]
             frames += [frame, frame]
-        for k in np.flatnonzero(where < 0):
-            times.append(attitudes.times[k])
-            frames.append(attitudes.matrices[k] @ self._integral.at(attitudes.times[k : k + 1])[0][0].T)
+        inside = np.flatnonzero(where < 0)
+        if len(inside):
+            own = attitudes.times[inside]
+            known = attitudes.matrices[inside] if smoothed is None else smoothed(own - self.offset)
+            times += list(own)
+            frames += list(known @ _back(self._integral.at(own)[0]))
         order = np.argsort(times, kind="stable")
         # Rotations C at times, with which C·G are the attitudes.
         self._nodes, self._frames = np.array(times)[order], np.stack(frames)[order]
@@ -389,36 +430,29 @@ class Path:
 
 
 def _best_offset(problem: _Problem, attitudes: Attitudes, start: float, low: float, high: float) -> float:
-    """Return the offset of the times of the attitudes with which they agree best with the rates."""
-    size = problem.size
-    if not size > 0:
+    """Return the offset of the times with which attitudes agree best with the rates."""
+    if not problem.size > 0:
         return start
+    step = _OFFSET_TURN / problem.size
+    some = np.unique(np.linspace(0, len(attitudes.times) - 1, min(len(attitudes.times), _COMPARED)).astype(int))
+    few = attitudes.taken(some)
 
-    def misfit(offset: float, width: float) -> float:
-        """Score of an offset that is known to half of a width."""
-        own = attitudes.later(offset)
-        more = 0.5 * width * size / np.sqrt(3.0)
+    def compared(offset: float, width: float) -> tuple[float, float]:
+        """Return the score of an offset that is known within a width, and the better offset that follows."""
+        own, more = few.later(offset), 0.5 * width * problem.size / np.sqrt(3.0)
         bias = problem.consensus(own, more)
         where = problem.stretch(own.times)
-        total, count = 0.0, 0
-        for j in np.unique(where[where >= 0]):
-            index = np.flatnonzero(where == j)
-            # The score has the noise of the attitudes, so that it falls towards the right offset.
-            total += problem.aligned(own.taken(index), bias, more)[2] * len(index)
-            count += len(index)
-        return total / max(count, 1)
+        stretches = [np.flatnonzero(where == j) for j in np.unique(where[where >= 0])]
+        if not stretches:
+            return np.inf, offset
+        found = [problem.aligned(own.taken(index), bias, more, width) for index in stretches]
+        counts = np.array([len(index) for index in stretches])
+        score, longest = float(np.average([each[2] for each in found], weights=counts)), int(np.argmax(counts))
+        return score, float(np.clip(offset + found[longest][3], low, high))
 
-    n = len(attitudes.times)
-    if misfit(start, 0.0) < 3 + 4 * np.sqrt(6 / n):
-        return start
-    step = _OFFSET_TURN / size
-    steps = np.arange(-_OFFSETS, _OFFSETS + 1) * step + start
-    steps = steps[(steps >= low) & (steps <= high)]
-    if not len(steps):
-        return start
-    best = float(steps[np.argmin([misfit(own, step) for own in steps])])
-    for _ in range(3):
-        tried = [own for own in (best - step / 2, best, best + step / 2) if low <= own <= high]
-        best = min(tried, key=lambda own: misfit(own, step / 2))
-        step /= 2
-    return best
+    score, found = compared(start, 4 * step)
+    if score > 3 + 4 * np.sqrt(6 / len(some)):
+        steps = np.arange(-_OFFSETS, _OFFSETS + 1) * step + start
+        tried = [compared(float(own), step) for own in steps[(steps >= low) & (steps <= high)]]
+        found = min(tried)[1] if tried else found
+    return compared(found, step / 4)[1]

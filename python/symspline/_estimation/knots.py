@@ -16,6 +16,8 @@ _FIRST, _ROUNDS = 12, 24
 _SLACK = 0.1
 # Times closer than this fraction of the mean distance of the knots are one.
 _CLOSE = 1e-6
+# Intervals of this fraction of the usual distance of the times of a sensor are not bisected.
+_CLOSEST = 1.01
 # Gaps without data are longer than this number of usual distances of the knots.
 _GAP = 2.5
 # Largest number of knots at which the start itself is compared with the sensors.
@@ -139,8 +141,10 @@ def _exceeding(knots: Doubles, times: Doubles, rows: Doubles, own: Doubles | Non
         apart = three(np.sum((rows - own) ** 2, axis=1)) / np.maximum(size * count, 1)
         # Residuals that the initial curve has as well do not ask for more knots.
         large &= apart > _SLACK
-    # Not more than about one knot per sample.
-    return np.asarray(large & (count > 3))
+    # Not more than about one knot per sample. Some samples may be very close together.
+    steps = np.diff(np.unique(times))
+    least = _CLOSEST * float(np.median(steps)) if len(steps) else np.inf
+    return np.asarray(large & (np.bincount(i, minlength=len(knots) - 1) > 1) & (np.diff(knots) > least))
 
 
 def _value(setup: Setup, start: Start, name: str) -> Doubles:

@@ -279,6 +279,7 @@ def estimate(
     if penalty == "jerk" and len(times) < 4:
         raise ValidationError(f"penalty='jerk' needs at least 4 knots, but there are {len(times)}")
     setup = Setup(spaces, times, terms, losses, constants, penalty, criterion or "reml", gamma, tol, lams, most)
+    setup = setup._replace(automatic=isinstance(knots, str))
     begin = Starts(setup, space, axis, start)
     if isinstance(knots, str):
         shown, setup, search = automatic(setup, begin, axis, shown, data, progress)
@@ -393,9 +394,9 @@ def _knots(knots: Any, given: list[Measurement]) -> tuple[TimeAxis, Array, Doubl
     if len(back):
         raise ValidationError(f"knots[{back[0] + 1}] is not after knots[{back[0]}], but knots must increase")
     data = np.empty(0)
-    if union.dtype.kind in "Mm" or shown.dtype.kind not in "Mm":
-        with contextlib.suppress(ValidationError):
-            data, _ = axis.at(union, (), False)
+    # Times that do not suit the knots are refused later, by name.
+    with contextlib.suppress(ValidationError):
+        data, _ = axis.at(union, (), False)
     return axis, shown, data
 
 
@@ -497,7 +498,7 @@ def _curve(
     if found.failure:
         hints = unit_hints(setup.terms)
         raise_or_warn([Fault(0, UNCONVERGED, " ".join([found.failure, *hints]))], on_failure, curve)
-    search.warn_of_rival()
+    search.warn_of_rival(shown)
     # Parabolas have no jerk, so that the largest λ does not need a warning.
     stiff = [setup.penalty == "jerk" and report.df < _PARABOLA for report in found.reports]
     chosen = [np.asarray(np.isnan(lam) and not own) for lam, own in zip(setup.lams, stiff, strict=True)]

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from .. import _core
 from .._core import ValidationError
+from .._exceptions import ConvergenceError, SymsplineError
 from .._smoothing import SmoothingWarning
 from .._spaces import Array, Doubles, Space
 from .._time import TimeAxis
@@ -31,6 +31,12 @@ _EQUAL, _APART = 10.0, 5.0
 _MOVED = 0.5
 # The largest number of times that all intervals are divided, and that this happens without an effect.
 _HALVINGS, _IN_VAIN = 14, 2
+# With fewer knots per datum, the motion may be too fast for them, so that dividing them has no effect yet.
+_FEW = 0.1
+_UNCONFIRMED = (
+    "The automatic knots may be too few: the residuals are larger than the given standard deviations, and with twice "
+    "as many knots the estimate does not converge. Check sigma, and pass knots."
+)
 # Intervals of given knots are gaps if they are so many times as long as usual ones.
 _GAP = 5.0
 
@@ -61,35 +67,41 @@ class Search(NamedTuple):
         The result.
     rival : float
         Distance in standard deviations to another result that is equally good; 0 if there is none.
-    place : float
-        Time at which that result is farthest away.
+    place : int
+        Number of the knot at which that result is farthest away.
     """
 
     found: Solution
     rival: float = 0.0
-    place: float = float("nan")
+    place: int = 0
 
-    def warn_of_rival(self) -> None:
+    def warn_of_rival(self, shown: Array) -> None:
         """Warn if there is another curve that is equally good."""
         if self.rival:
             warn(
                 "Two different curves agree equally well with the measurements. The other one is up to "
-                f"{self.rival:.2g} standard deviations away. Pass `start`, a Constant with sigma, or further "
-                "measurements that decide between them.",
+                f"{self.rival:.2g} standard deviations away, at {shown[self.place]}. Pass `start`, a Constant "
+                "with sigma, or further measurements that decide between them.",
                 SmoothingWarning,
             )
 
 
 def _run(setup: Setup, start: Start, progress: Progress | None) -> Solution:
     """Iterate from an initial curve."""
-    return Iteration(setup, start.points(setup.knots), progress, start.values).run()
+    try:
+        return Iteration(setup, start.points(setup.knots), progress, start.values).run()
+    except np.linalg.LinAlgError as error:
+        raise ConvergenceError(
+            f"The linear problem could not be solved ({error}). Check sigma and the units of the measurements, or pass "
+            "fewer knots."
+        ) from error
 
 
 def solved(setup: Setup, begin: Starts, progress: Progress | None) -> Search:
     """Iterate from the first initial curve, and from others if its result is not convincing; keep the best result."""
     best: Solution | None = None
-    refused: ValidationError | None = None
-    rival, place = 0.0, float("nan")
+    refused: SymsplineError | None = None
+    rival, place = 0.0, 0
     number = 0
     while best is None or best.failure or _contradicts(setup, best):
         try:
@@ -99,7 +111,7 @@ def solved(setup: Setup, begin: Starts, progress: Progress | None) -> Search:
         number += 1
         try:
             found = _run(setup, start, progress)
-        except ValidationError as error:
+        except (ValidationError, ConvergenceError) as error:
             refused = refused or error
             continue
         if best is None:
@@ -109,7 +121,7 @@ def solved(setup: Setup, begin: Starts, progress: Progress | None) -> Search:
             if not best.failure and abs(found.loss - best.loss) < _EQUAL:
                 apart, at = _distance(setup, found, best)
                 if apart > _APART:
-                    rival, place = apart, float(setup.knots[at])
+                    rival, place = apart, at
             else:
                 rival = 0.0 if better else rival
             best = found if better else best
@@ -162,29 +174,43 @@ def automatic(
     knots = filled(that_reproduce(setup, begin[0], data), data)
     most = 2 * len(data) + len(setup.knots)
     shown, now = with_knots(knots)
-    before: tuple[Setup, Search] | None = None
+    before: tuple[Array, Setup, Search] | None = None
     in_vain = 0
     for _ in range(_HALVINGS):
-        search: Search | None
+        refused: SymsplineError | None = None
         try:
             search = solved(now, begin, progress)
-        except ValidationError:
+        except (ValidationError, ConvergenceError) as error:
+            refused = error
+        if refused or search.found.failure:
+            # With more knots the numerical problem may become too difficult. The last result then remains.
+            if before is not None:
+                if _misses(before[2].found):
+                    warn(_UNCONFIRMED, SmoothingWarning)
+                return before
             if len(now.knots) > most:
-                raise
-            search = None
-        if search is not None and before is not None and not search.found.failure:
-            sigma, last = (float(own.found.reports[0].sigma) for own in (search, before[1]))
-            at_bound = any(bool(own.at_bound) for own in search.found.reports)
-            in_vain = 0 if sigma < 0.95 * last or at_bound else in_vain + 1
-            misses = sigma > _MISSES and in_vain < _IN_VAIN
-            if not misses and _moved(before[0], before[1].found, now, search.found) <= _MOVED:
                 break
-        if len(now.knots) > most:
-            break
-        before = (now, search) if search is not None and not search.found.failure else before
+        else:
+            if before is not None:
+                sigma, last = (float(own.found.reports[0].sigma) for own in (search, before[2]))
+                at_bound = any(bool(own.at_bound) for own in search.found.reports)
+                few = at_bound or len(now.knots) < _FEW * len(data)
+                in_vain = 0 if sigma < 0.95 * last or few else in_vain + 1
+                misses = _misses(search.found) and in_vain < _IN_VAIN
+                if not misses and _moved(before[1], before[2].found, now, search.found) <= _MOVED:
+                    break
+            if len(now.knots) > most:
+                break
+            before = (shown, now, search)
         shown, now = with_knots(bisected(now.knots))
-    assert search is not None
+    if refused:
+        raise refused
     return shown, now, search
+
+
+def _misses(found: Solution) -> bool:
+    """Whether the residuals are so large that there may be too few knots."""
+    return float(found.reports[0].sigma) > _MISSES
 
 
 def _moved(coarse: Setup, before: Solution, fine: Setup, found: Solution) -> float:

@@ -29,6 +29,8 @@ _SETTLED, _ROUNDS = 3e-3, 12
 _NEAR = 3.0
 # The number of times that a step is halved.
 _RETREATS = 6
+# From this ratio of a step to the one before on, steps go back and forth, and are shortened.
+_BACK = -0.3
 # The relative accuracy of the objective: a step changes it by less where the gradient is that of the linear problem.
 _ROUNDING = 1e-5
 # Parameters are not determined if the measurements leave less than this fraction of their information.
@@ -58,6 +60,8 @@ class Setup(NamedTuple):
         Given λ of each part, NaN if it is to be chosen.
     max_iter : int
         Largest number of iterations.
+    automatic : bool
+        Whether the knots are still to be chosen.
     """
 
     spaces: tuple[Space, ...]
@@ -71,6 +75,7 @@ class Setup(NamedTuple):
     tol: float
     lams: Doubles
     max_iter: int
+    automatic: bool = False
 
     @property
     def bc_type(self) -> str:
@@ -196,6 +201,35 @@ class Choice:
         self.found = np.sqrt(lams * self.found) if oscillates else lams
 
 
+class Relaxation:
+    """Shorter steps where the iteration goes back and forth.
+
+    A time offset and a lively curve depend on each other in a way that the linear problem does not contain, so that
+    steps may be twice as long as the distance to the solution. The factor is that of the secant through two steps.
+
+    References
+    ----------
+    J. Barzilai, J. M. Borwein, Two-point step size gradient methods, IMA J. Numer. Anal. 8 (1988).
+    """
+
+    def __init__(self) -> None:
+        self._last: Doubles | None = None
+        self._factor = 1.0
+
+    def factor(self, found: Linear) -> float:
+        """Return the fraction of a step that is to be taken."""
+        of_points, of_parameters = found.variances
+        step = np.concatenate([(found.step / np.sqrt(of_points)).ravel(), found.changes / np.sqrt(of_parameters)])
+        last, self._last = self._last, step
+        square = 0.0 if last is None else float(last @ last)
+        if last is None or not 0 < square < np.inf:
+            return 1.0
+        ratio = float(step @ last) / square
+        shortened = self._factor < 1.0 or ratio < _BACK
+        self._factor = float(np.clip(self._factor / (1 - ratio), 0.1, 1.0)) if shortened and ratio < 1 else 1.0
+        return self._factor
+
+
 def fitted(setup: Setup, points: list[Array]) -> list[CoreCurve] | None:
     """Return the splines through points in every part, or None if one of them does not exist."""
     curves: list[Any] = []
@@ -213,10 +247,15 @@ class Iteration:
     """The iteration of one estimate."""
 
     def __init__(
-        self, setup: Setup, points: list[Array], progress: Callable[[int, int], object] | None, values: Values
+        self,
+        setup: Setup,
+        points: list[Array],
+        progress: Callable[[int, int], object] | None,
+        values: Values | None = None,
     ) -> None:
         self.setup, self.points, self.progress = setup, points, progress
-        self.values: Values = {name: np.array(own.start) for name, own in setup.constants.items()} | values
+        self.values: Values = {name: np.array(own.start) for name, own in setup.constants.items()}
+        self.values |= values or {}
         self.first = np.cumsum([0, *(space.dim for space in setup.spaces)]).tolist()
         self.curves: list[Any] = []
 
@@ -248,7 +287,7 @@ class Iteration:
         choice = Choice(setup.lams)
         before: Step | None = None
         objective, retreats, last, rate, size = np.inf, 0, np.inf, np.nan, np.inf
-        failure = ""
+        failure, relaxation = "", Relaxation()
         curves = fitted(setup, self.points)
         if curves is None:
             raise ValidationError("No spline joins the initial points. Pass more knots, or `start`.")
@@ -257,7 +296,8 @@ class Iteration:
             linear = self._linearised()
             weights, loss = self._weighted(linear)
             found = self._solve(linear, weights, *choice.asked(size))
-            value = loss + sum(float(lam) * energy(own, setup.penalty) for lam, own in zip(found.lams, curves, strict=True))
+            energies = [energy(own, setup.penalty) for own in curves]
+            value = loss + sum(float(lam) * own for lam, own in zip(found.lams, energies, strict=True))
             if self.progress is not None:
                 self.progress(number, setup.max_iter)
             if not found.determined:
@@ -266,7 +306,14 @@ class Iteration:
                     "one of its knots. Pass fewer knots, a larger lam, or more measurements."
                 )
                 break
-            self._check_parameters(found.information)
+            if np.isfinite(found.information).all():
+                self._check_parameters(found.information)
+            if not _is_finite(found):
+                failure = (
+                    "The linear problem has no finite solution: its numbers are too different in size. Check sigma and "
+                    "the units of the measurements, or pass fewer knots."
+                )
+                break
             if choice.settled and before and value > objective * (1 + _ROUNDING) and retreats < _RETREATS:
                 # The last step was too long.
                 retreats += 1
@@ -280,7 +327,7 @@ class Iteration:
                 if choice.settled and (size <= setup.tol or longest == 0.0):
                     break
                 before = Step(self.points, self.values, self._tangents(found.step), found.changes)
-                curves = self._moved(before, 1.0)
+                curves = self._moved(before, relaxation.factor(found))
             while curves is None and retreats < _RETREATS:
                 retreats += 1
                 curves = self._moved(before, 0.5**retreats)
@@ -290,7 +337,7 @@ class Iteration:
             if number >= setup.max_iter:
                 failure = (
                     f"No convergence of the estimate: the last step is {size:.1e} standard deviations after {number} "
-                    f"iterations (tol {setup.tol:.1e}). Pass more knots, lam or a better `start`, or raise max_iter."
+                    f"iterations (tol {setup.tol:.1e}). Check sigma and the units, or pass lam or a better `start`."
                 )
                 break
         left = found.number - found.freedom
@@ -299,7 +346,9 @@ class Iteration:
             SmoothingReport("linearized", not failure, number, size, rate, float(lam), bool(bound), float(df), sigma)
             for lam, bound, df in zip(found.lams, found.at_bound, found.df, strict=True)
         ]
-        covariance = np.asarray(np.linalg.pinv(found.information, hermitian=True), np.float64)
+        covariance = np.full_like(found.information, np.nan)
+        if np.isfinite(found.information).all():
+            covariance = np.asarray(np.linalg.pinv(found.information, hermitian=True), np.float64)
         variances = found.variances[0]
         return Solution(
             self.points, self.values, reports, found.matrices, covariance, linear, weights, variances, loss, failure
@@ -438,6 +487,11 @@ def energy(curve: CoreCurve, penalty: str) -> float:
     x = (knots[:-1, None] + h[:, None] * np.array([0.5 - root, 0.5 + root])).ravel()
     squares = curve.evaluate(x, "bend", "raise", False) ** 2
     return float(np.sum(np.repeat(h / 2, 2) * squares))
+
+
+def _is_finite(found: Linear) -> bool:
+    numbers = (found.step, found.changes, found.information, *found.variances)
+    return all(bool(np.isfinite(own).all()) for own in numbers)
 
 
 def _largest(found: Linear) -> float:

@@ -20,15 +20,17 @@ from ..convert import matrix_to_quaternion
 from .integrated_rates import Attitudes, Integral, Path, Rates
 from .rates import attitudes_at
 from .solve import Setup
-from .terms import Body, DirectionTerm, ForceTerm, InformationTerm, PointTerm, RateTerm, Term, Values, VelocityTerm
+from .terms import Body, DirectionTerm, ForceTerm, InformationTerm, PointTerm, RateTerm, Values, VelocityTerm
 
 _SO3 = SpecialOrthogonal(3)
 # The points of a curve at times of the core.
 PathOfPart = Callable[[Doubles], Array]
-# The largest number of knots of smoothed points.
-_MOST = 2000
+# The largest number of knots of smoothed points, and with dense attitudes and rates, where the iteration adds the rest.
+_MOST, _MOST_WITH_RATES = 2000, 200
 # Points at which velocities are given have this many times the standard deviation of other points.
 _BESIDE = 2.0
+# Attitudes alone determine a path that turns by less than this angle from one to the next.
+_SMALL = 1.0
 # Fewer attitudes than these do not determine the bias of rates if they are wrong.
 _FEW = 3
 
@@ -89,38 +91,41 @@ def _of_curve(start: Any, axis: TimeAxis, part: int) -> PathOfPart:
 
 def _candidates(setup: Setup, part: int, space: Space[Any]) -> list[Callable[[], Start]]:
     """Return functions that compute initial curves of one part, the most promising first."""
-    points = [
-        term for term in setup.terms if isinstance(term, (PointTerm, InformationTerm)) and term.parts == [part]
-    ]
+    points = [term for term in setup.terms if isinstance(term, (PointTerm, InformationTerm)) and term.parts == [part]]
     rates = [term for term in setup.terms if isinstance(term, RateTerm) and term.parts == [part]]
     seen = [term for term in setup.terms if isinstance(term, DirectionTerm) and term.parts == [part]]
     found: list[Callable[[], Start]] = []
+    times = np.concatenate([term.times for term in points]) if points else np.empty(0)
+    spread = len(np.unique(times)) > 1
     if rates and rates[0].body.is_rotation:
         attitudes = _attitudes(space, points, seen)
         forces = [term for term in setup.terms if isinstance(term, ForceTerm) and term.parts[0] == part]
 
+        def smoothed(x: Doubles) -> Doubles:
+            return Body(space).matrices(_smoothed(setup, space, points, []).paths[0](x))
+
         def aligned() -> Start:
-            return _with_rates(setup, space, rates, attitudes)
+            found = _with_rates(setup, space, rates, attitudes, smoothed if spread else None)
+            return found._replace(paths=[_signed(found.paths[0], points)]) if space != _SO3 else found
 
         def by_vectors() -> Start:
             vectors = [_force_vectors(setup, term) for term in forces]
             vectors += [(np.repeat(own.times, own.seen.shape[1]), *_rows(own.reference, own.seen)) for own in seen]
             # The rows of a rotation matrix are the fixed axes in the frame of the body.
-            vectors += [
-                (np.repeat(own.times, 3), *_rows(np.eye(3), Body(space).matrices(own.y)))
-                for own in points
-            ]
+            vectors += [(np.repeat(own.times, 3), *_rows(np.eye(3), Body(space).matrices(own.y))) for own in points]
             return _integrated(setup, space, rates[0], vectors)
 
         several = sum(len(own.attitudes.times) for own in attitudes)
         found = [aligned] if several else []
         if forces or (seen and several < _FEW) or not several:
             found.insert(0 if several < _FEW else 1, by_vectors)
+        if spread and not setup.automatic and _are_dense(setup, points, rates):
+            # The motion between the attitudes is so small that they suffice, which takes less time.
+            return [lambda: _smoothed(setup, space, points, [], _MOST_WITH_RATES), *found]
     beside = [term for term in setup.terms if isinstance(term, VelocityTerm) and term.parts == [part]]
     if beside and not isinstance(space, Euclidean):
         found.append(lambda: _smoothed(setup, space, points, beside))
-    times = np.concatenate([term.times for term in points]) if points else np.empty(0)
-    if len(np.unique(times)) > 1:
+    if spread:
         found.append(lambda: _smoothed(setup, space, points, []))
     if found:
         return found
@@ -135,6 +140,16 @@ def _candidates(setup: Setup, part: int, space: Space[Any]) -> list[Callable[[],
     )
 
 
+def _are_dense(setup: Setup, points: list[PointTerm | InformationTerm], rates: list[RateTerm]) -> bool:
+    """Whether attitudes determine the path between them: the body turns by little from one to the next."""
+    if setup.losses.count("linear") < len(setup.losses) or any(own.time_offset for own in (*points, *rates)):
+        return False
+    times = np.unique(np.concatenate([setup.knots[[0, -1]], *(own.times for own in points)]))
+    sigma = max(float(_scales(own).max()) for own in points)
+    speed = max(float(np.linalg.norm(own.omega, axis=1).max()) for own in rates)
+    return float(np.diff(times).max()) * speed + 3 * sigma < _SMALL
+
+
 # ---- points ----
 
 
@@ -147,7 +162,11 @@ def _scales(term: PointTerm | InformationTerm) -> Doubles:
 
 
 def _smoothed(
-    setup: Setup, space: Space[Any], points: list[PointTerm | InformationTerm], beside: list[VelocityTerm]
+    setup: Setup,
+    space: Space[Any],
+    points: list[PointTerm | InformationTerm],
+    beside: list[VelocityTerm],
+    most: int = _MOST,
 ) -> Start:
     """Return smoothed points, together with those at which velocities are given."""
     scales = [_scales(term) for term in points]
@@ -156,7 +175,8 @@ def _smoothed(
     y = np.concatenate([*(term.y for term in points), *(term.y for term in beside)])
     sigma = np.concatenate([*scales, *(np.full(len(term.times), _BESIDE * typical) for term in beside)])
     order = np.argsort(times, kind="stable")
-    count = min(len(np.unique(times)), max(len(setup.knots), 2), _MOST)
+    # With automatic knots, there are only a few at first.
+    count = None if setup.automatic else min(len(np.unique(times)), max(len(setup.knots), 2), most)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         curve: Any = make_smoothing_spline(
@@ -179,6 +199,17 @@ def _smoothed(
 # ---- rates ----
 
 
+def _signed(path: PathOfPart, points: list[PointTerm | InformationTerm]) -> PathOfPart:
+    """Return a path of unit quaternions, of the sign that most of the measured ones have."""
+
+    def signed(x: Doubles) -> Array:
+        found = path(x)
+        same = [np.sign(np.sum(found[_closest(x, term.times)] * term.y, axis=1)).sum() for term in points]
+        return -found if sum(same) < 0 else found
+
+    return signed
+
+
 class _Seen(NamedTuple):
     """Measured attitudes, and the name of the offset of their times."""
 
@@ -186,9 +217,7 @@ class _Seen(NamedTuple):
     time_offset: str | None
 
 
-def _attitudes(
-    space: Space[Any], points: list[PointTerm | InformationTerm], seen: list[DirectionTerm]
-) -> list[_Seen]:
+def _attitudes(space: Space[Any], points: list[PointTerm | InformationTerm], seen: list[DirectionTerm]) -> list[_Seen]:
     """Return measured attitudes, or those of several directions that are seen at the same time if there are few."""
     found = [
         _Seen(Attitudes(term.times, Body(space).matrices(term.y), _scales(term)), term.time_offset) for term in points
@@ -205,7 +234,13 @@ def _attitudes(
     return found
 
 
-def _with_rates(setup: Setup, space: Space[Any], rates: list[RateTerm], attitudes: list[_Seen]) -> Start:
+def _with_rates(
+    setup: Setup,
+    space: Space[Any],
+    rates: list[RateTerm],
+    attitudes: list[_Seen],
+    smoothed: Callable[[Doubles], Doubles] | None,
+) -> Start:
     """Return the integrated rates, aligned with measured attitudes, with the bias and the time offset that follow."""
     first = max(rates, key=_coverage)
     name, values = first.time_offset, setup.constants
@@ -235,7 +270,7 @@ def _with_rates(setup: Setup, space: Space[Any], rates: list[RateTerm], attitude
         offset = (0.0, low - float(data.times[0]), high - float(data.times[-1]))
     if offset is not None:
         offset = (0.0, min(offset[1], 0.0), max(offset[2], 0.0))
-    path = Path(given, data, offset)
+    path = Path(given, data, offset, smoothed)
     found: Values = {}
     if first.bias is not None:
         found[first.bias] = path.bias
@@ -398,9 +433,9 @@ def _seen(knots: Doubles, space: Space[Any], seen: list[DirectionTerm]) -> Array
 
 
 def _nearest(profile: Doubles) -> Doubles:
-    """Return the rotation R with the largest trace of RᵀB."""
+    """Return the rotations R with the largest trace of RᵀB."""
     u, _, v = np.linalg.svd(profile)
-    u[:, -1] *= np.sign(np.linalg.det(u) * np.linalg.det(v)) or 1.0
+    u[..., -1] *= np.where(np.linalg.det(u) * np.linalg.det(v) < 0, -1.0, 1.0)[..., None]
     return np.asarray(u @ v)
 
 

@@ -27,12 +27,12 @@ Curves pass through the points. --smooth is for noisy points: the curve passes n
 suggest, and symspline sample also writes its standard deviation.
 
 With --smooth, the table may have angular velocities (--rates) and velocities (--velocities) next to the points, and one
-curve is fitted to all of them. Give the standard deviation of each, and use --penalty jerk for vehicles and other
-motions with smooth accelerations. Rows can be in any order, and a row may have some of
-the measurements only: the columns of the others are empty or NaN. --rates are in the frame of the body, in radians per
-unit of time (per second for dates). With --rate-bias, the constant error of a gyroscope is estimated, too. --velocities
-are those of positions, in the fixed frame; on other spaces they are tangent vectors at the point in their row, and with
---lonlat the velocities to the east and to the north in degrees of arc.
+curve is fitted to all of them. Give the standard deviation of each. --penalty is then jerk, unless you give another
+one. Rows can be in any order, and a row may have some of the measurements only: the columns of the others are empty or
+NaN. --rates are in the frame of the body, in radians per unit of time (per second for dates). With --rate-bias, the
+constant error of a gyroscope is estimated, too. --velocities are those of positions, in the fixed frame; on other
+spaces they are tangent vectors at the point in their row, and with --lonlat the velocities to the east and to the north
+in degrees of arc.
 
 examples:
   symspline fit track.csv --lonlat -o track.npz
@@ -41,9 +41,9 @@ examples:
   symspline fit states.csv --space cp:1 --columns up,down -o states.npz
   symspline fit gps.csv --lonlat --smooth -o gps.npz
   symspline fit imu.csv --smooth --space so:3 --columns qw,qx,qy,qz --sigma 0.05 --rates wx,wy,wz --rate-sigma 0.02
-      --rate-bias --penalty jerk -o attitude.npz
+      --rate-bias -o attitude.npz
   symspline fit car.csv --smooth --space r:2 --columns x,y --sigma 3 --velocities vx,vy --velocity-sigma 0.1
-      --penalty jerk -o car.npz
+      -o car.npz
 
 symspline.load reads the curve in Python. With --curve, it returns a dictionary of all curves by name, and with
 --max-gap alone a SegmentedCurve.
@@ -102,6 +102,7 @@ _TIME = (
     "column of times, none for 0, 1, 2, ..., or two columns with a comma, whole seconds and nanoseconds since 1970; "
     "see above for the default"
 )
+_PENALTY = "derivative that is kept small (default: acceleration, and jerk with --rates or --velocities)"
 _RATES = (
     "columns of angular velocities in the frame of the body, for so:3, sphere:3, se:3 and products with one of them"
 )
@@ -140,7 +141,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--lam", metavar="L", help="a number λ >= 0 instead, in a product perhaps one per factor with commas")
     add("--sigma", metavar="S", help=_SIGMA)
     add("--robust", action="store_true", help="reduce the influence of outliers (loss 'cauchy')")
-    add("--penalty", choices=("acceleration", "jerk"), help="derivative that is kept small (default: acceleration)")
+    add("--penalty", choices=("acceleration", "jerk"), help=_PENALTY)
     add = parser.add_argument_group("rates and velocities, with --smooth").add_argument
     add("--rates", metavar="A,B,C", help=_RATES)
     add("--rate-sigma", metavar="S", help="standard deviation of one of these numbers")
@@ -290,5 +291,8 @@ def _smoothing_options(options: argparse.Namespace, space: Space) -> dict[str, A
     if angles and isinstance(sigma, float):
         sigma = math.radians(sigma)
     criterion = options.criterion or ("cp" if sigma is not None and lam is None else "gcv")
-    loss, penalty = "cauchy" if options.robust else "linear", options.penalty or "acceleration"
+    loss = "cauchy" if options.robust else "linear"
+    # Measured rates and velocities ask for the jerk, as in `estimate`.
+    measured = options.rates is not None or options.velocities is not None
+    penalty = options.penalty or ("jerk" if measured else "acceleration")
     return {"criterion": criterion, "lam": lam, "sigma": sigma, "loss": loss, "penalty": penalty}

@@ -1,0 +1,283 @@
+"""Starts from integrated rates, and automatic knots: recordings in which attitudes alone mislead."""
+
+import warnings
+
+import numpy as np
+import pytest
+
+import symspline as ss
+from symspline import measure
+from symspline._estimation.solve import Iteration
+
+SO3 = ss.SpecialOrthogonal(3)
+TURN = ss.rotations.from_rotation_vectors
+
+
+def spinning(seed, degrees, end=20.0, between=2.0, sigma=0.01, noise=0.005, bias=(0.05, -0.03, 0.08)):
+    """A body that turns by an angle per second and wobbles; times do not begin at zero."""
+    rng = np.random.default_rng(seed)
+    begin = 37.5
+    fine = np.arange(begin - 1, begin + end + 1, 0.01)
+
+    def attitude(t):
+        wobble = 0.2 * np.stack([np.sin(0.9 * t), np.cos(0.7 * t), np.sin(1.3 * t + 1)], axis=-1)
+        return TURN(wobble) @ TURN(np.outer(np.radians(degrees) * t, [0.6, 0.0, 0.8]))
+
+    truth = ss.CubicSpline(fine, attitude(fine), SO3, bc_type="not-a-knot")
+    t = np.arange(begin, begin + end, between)
+    t[1:] += rng.uniform(-0.2, 0.2, len(t) - 1) * between
+    s = np.arange(begin, begin + end, 0.02)
+    seen = truth(t) @ TURN(sigma * rng.standard_normal((len(t), 3)))
+    omega = ss.rotations.angular_velocity(truth, s) + bias + noise * rng.standard_normal((len(s), 3))
+    return truth, t, seen, s, omega, np.array(bias)
+
+
+def given(t, seen, s, omega, sigma=0.01, noise=0.005, loss=None, offset=None, prior=None):
+    return [
+        measure.Points(t, seen, sigma=sigma, loss=loss),
+        measure.BodyRates(s, omega, sigma=noise, bias=measure.Constant(3, sigma=prior), time_offset=offset),
+    ]
+
+
+def check(curve, truth, bias, x, limit=5.0):
+    """Attitudes and the bias are within five standard deviations."""
+    off = ss.rotations.as_rotation_vectors(np.swapaxes(truth(x), -1, -2) @ curve(x))
+    assert np.max(np.linalg.norm(off, axis=1) / np.sqrt(3) / curve.std(x)) < limit
+    found = curve.parameters["gyro bias"]
+    assert np.all(np.abs(found.value - bias) < limit * found.std)
+
+
+@pytest.mark.parametrize("degrees", [20, 200, 300])
+@pytest.mark.parametrize("knots", [161, "auto"])
+def test_several_turns_between_attitudes(degrees, knots):
+    truth, t, seen, s, omega, bias = spinning(degrees, degrees)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        curve = ss.estimate(given(t, seen, s, omega), knots, "so:3")
+    check(curve, truth, bias, np.linspace(t[0], t[-1], 200))
+
+
+def test_a_large_bias_a_gap_and_wrong_attitudes():
+    truth, t, seen, s, omega, bias = spinning(1, 250, end=40.0, bias=(0.4, -0.3, 0.3), sigma=0.05)
+    kept = (t < 50) | (t > 60)
+    t, seen = t[kept], seen[kept].copy()
+    seen[[2, 9]] = SO3.random_point(np.random.default_rng(2), (2,))
+    curve = ss.estimate(given(t, seen, s, omega, sigma=0.05, loss="cauchy"), 401, "so:3")
+    check(curve, truth, bias, np.linspace(s[0], s[-1], 200))
+
+
+def test_attitudes_in_the_middle_only_and_quaternions():
+    truth, t, seen, s, omega, _ = spinning(3, 150)
+    some = (t > 45) & (t < 52)
+    # The signs are those of a continuous path of quaternions.
+    path = ss.convert.matrix_to_quaternion(truth(s), scalar_first=True)
+    path[1:] *= np.cumprod(np.where(np.sum(path[1:] * path[:-1], axis=1) < 0, -1.0, 1.0))[:, None]
+    quaternions = ss.convert.matrix_to_quaternion(seen[some], scalar_first=True)
+    near = path[np.searchsorted(s, t[some]).clip(max=len(s) - 1)]
+    quaternions *= -np.sign(np.sum(near * quaternions, axis=1))[:, None]
+    curve = ss.estimate(given(t[some], quaternions, s, omega), 161, "sphere:3")
+    x = np.linspace(s[0], s[-1], 100)
+    off = SO3.distance(ss.convert.quaternion_to_matrix(curve(x), scalar_first=True), truth(x))
+    # Lengths on the sphere of quaternions are half of angles.
+    assert np.max(off / np.sqrt(3) / (2 * curve.std(x))) < 6
+
+
+def test_two_gyroscopes_that_pause():
+    """The second gyroscope has a bias of its own and measures in most of the pause of the first one."""
+    truth, t, seen, s, omega, bias = spinning(4, 150, end=30.0, between=1.0)
+    first, second = (s < 47) | (s > 55), (s > 44) & (s < 54.5)
+    other = np.array([-0.1, 0.2, 0.05])
+    rates = [
+        measure.BodyRates(s[first], omega[first], sigma=0.005, bias=measure.Constant(3)),
+        measure.BodyRates(s[second], omega[second] + other, sigma=0.005, bias=measure.Constant(3, name="second")),
+    ]
+    curve = ss.estimate([measure.Points(t, seen, sigma=0.01), *rates], 301, "so:3")
+    check(curve, truth, bias, np.linspace(t[0], t[-1], 200))
+    second_bias = curve.parameters["second"]
+    assert np.all(np.abs(second_bias.value - bias - other) < 5 * second_bias.std)
+
+
+def test_stars_of_a_spinning_body():
+    truth, t, _, s, omega, bias = spinning(5, 200)
+    stars = np.array([[1.0, 0, 0], [0, 0.6, 0.8]])
+    rng = np.random.default_rng(5)
+    seen = np.einsum("ki,nij->nkj", stars, truth(t)) + 0.01 * rng.standard_normal((len(t), 2, 3))
+    gyro = given(t, truth(t), s, omega)[1]
+    curve = ss.estimate([measure.Directions(t, seen, stars, sigma=0.01), gyro], 161, "so:3")
+    check(curve, truth, bias, np.linspace(t[0], t[-1], 200))
+
+
+@pytest.mark.parametrize("late", [0.21, -0.4])
+@pytest.mark.parametrize("of_points", [False, True])
+def test_delays_of_a_spinning_body(late, of_points):
+    _, t, seen, s, omega, bias = spinning(6, 120)
+    t, seen = t[(t > s[0] + 0.5) & (t < s[-1] - 0.5)], seen[(t > s[0] + 0.5) & (t < s[-1] - 0.5)]
+    offset = measure.Constant(1)
+    gyro = measure.BodyRates(s, omega, sigma=0.005, bias=measure.Constant(3))
+    points = measure.Points(t - late, seen, sigma=0.01, time_offset=offset)
+    knots = np.linspace(s[0], s[-1], 161)
+    if not of_points:
+        gyro = measure.BodyRates(s - late, omega, sigma=0.005, bias=measure.Constant(3), time_offset=offset)
+        points = measure.Points(t, seen, sigma=0.01)
+        knots = np.linspace(s[0] - 1, s[-1] + 1, 171)
+    curve = ss.estimate([points, gyro], knots, "so:3")
+    found = curve.parameters["time offset"]
+    assert abs(found.value[0] - late) < 5 * found.std[0] and found.std[0] < 0.01
+    assert np.all(np.abs(curve.parameters["gyro bias"].value - bias) < 5 * curve.parameters["gyro bias"].std)
+
+
+@pytest.mark.parametrize("knots", [121, 201, "auto"])
+def test_delays_with_many_knots(knots):
+    rng = np.random.default_rng(40)
+    t, s = np.linspace(0, 10, 51), np.linspace(0, 10, 1001)
+    truth = ss.CubicSpline(s, TURN(np.sin(s)[:, None] * [0.2, 0.4, 0.8]), SO3)
+    seen = truth(t) @ TURN(0.03 * rng.standard_normal((51, 3)))
+    omega = ss.rotations.angular_velocity(truth, s) + [0.03, -0.02, 0.05] + 0.02 * rng.standard_normal((1001, 3))
+    k = (s > 1) & (s < 9)
+    both = given(t, seen, s[k] - 0.25, omega[k], sigma=0.03, noise=0.02, offset=measure.Constant(1))
+    curve = ss.estimate(both, knots if knots == "auto" else np.linspace(0, 10, knots), "so:3")
+    found = curve.parameters["time offset"]
+    assert abs(found.value[0] - 0.25) < 4 * found.std[0] and found.std[0] < 0.01
+    assert curve.report.iterations <= 15
+
+
+def test_velocities_join_the_start():
+    """Positions that are more than half a turn of the sphere apart."""
+    globe = ss.Sphere(2)
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        fine = np.linspace(5, 25, 801)
+        path = np.stack([np.cos(1.4 * fine), np.sin(1.4 * fine), 0.5 * np.sin(0.8 * fine)], axis=-1)
+        truth = ss.CubicSpline(fine, globe.project(path), globe, bc_type="not-a-knot")
+        t, s = np.linspace(5, 25, 9), np.sort(rng.uniform(5, 25, 300))
+        y = globe.exp(truth(s), 0.01 * globe.random_tangent(rng, truth(s)))
+        v = globe.transport(truth(s), y, truth(s, 1)) + 0.02 * globe.random_tangent(rng, y)
+        seen = globe.exp(truth(t), 0.01 * globe.random_tangent(rng, truth(t)))
+        both = [measure.Points(t, seen, sigma=0.01), measure.Velocities(s, y, v, sigma=0.02)]
+        curve = ss.estimate(both, 81, globe)
+        x = np.linspace(5, 25, 100)
+        assert np.max(globe.distance(curve(x), truth(x)) / np.sqrt(2) / curve.std(x)) < 5
+
+
+def test_the_jerk_is_the_default_where_rates_are_measured():
+    _, t, seen, s, omega, _ = spinning(7, 20)
+    both, x = given(t, seen, s, omega), np.linspace(40, 50, 7)
+    assert np.array_equal(ss.estimate(both, 41, "so:3")(x), ss.estimate(both, 41, "so:3", penalty="jerk")(x))
+    y = np.sin(t / 5)[:, None]
+    ranges = [measure.Points(t, y, sigma=0.01), measure.Function(t, lambda p: p - y, sigma=0.01)]
+    assert np.array_equal(ss.estimate(ranges, 8, "r:1")(x), ss.estimate(ranges, 8, "r:1", penalty="acceleration")(x))
+    speeds = [measure.Points(t, y, sigma=0.1), measure.Velocities(t, y, np.cos(t / 5)[:, None] / 5, sigma=0.1)]
+    assert np.array_equal(ss.estimate(speeds, 8, "r:1")(x), ss.estimate(speeds, 8, "r:1", penalty="jerk")(x))
+
+
+# ---- knots ----
+
+
+@pytest.mark.parametrize(("cycles", "least", "most"), [(1.6, 13, 60), (20, 200, 1500)])
+def test_automatic_knots_follow_the_motion(cycles, least, most):
+    rng = np.random.default_rng(3)
+    # The times of both sensors differ by rounding errors.
+    t, s = np.linspace(0, 10, 51), np.linspace(0, 10, 1001)
+    assert np.any(np.diff(np.unique(np.concatenate([t, s]))) < 1e-12)
+    fine = np.linspace(0, 10, 4001)
+    truth = ss.CubicSpline(fine, TURN(np.sin(2 * np.pi * cycles / 10 * fine)[:, None] * [0.2, 0.4, 0.8]), SO3)
+    seen = truth(t) @ TURN(0.03 * rng.standard_normal((51, 3)))
+    bias = np.array([0.03, -0.02, 0.05])
+    omega = ss.rotations.angular_velocity(truth, s) + bias + 0.02 * rng.standard_normal((1001, 3))
+    curve = ss.estimate(given(t, seen, s, omega, sigma=0.03, noise=0.02), "auto", "so:3")
+    assert least <= len(curve.t) <= most and 0.9 < curve.report.sigma < 1.1
+    check(curve, truth, bias, np.linspace(0, 10, 300))
+
+
+def integrated_walk(rng, end, n):
+    """An integral of a Wiener process, of which the acceleration penalty is the exact prior."""
+    d = np.linspace(0, end, n + 1)
+    v = np.concatenate([[0], np.cumsum(rng.standard_normal(n) * np.sqrt(d[1]))]) + rng.standard_normal()
+    return d, np.concatenate([[0], np.cumsum((v[1:] + v[:-1]) / 2 * d[1])]), v
+
+
+@pytest.mark.parametrize("knots", [60, "auto"])
+def test_bands_in_gaps(knots):
+    inside = []
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        d, x, v = integrated_walk(rng, 20, 4000)
+        t, s = np.sort(rng.uniform(0, 20, (2, 200)), axis=1)
+        t, s = t[(t < 7) | (t > 13)], s[(s < 7) | (s > 13)]
+        y = np.interp(t, d, x) + 0.1 * rng.standard_normal(len(t))
+        w = np.interp(s, d, v) + 0.2 * rng.standard_normal(len(s))
+        both = [
+            measure.Points(t, y[:, None], sigma=0.1),
+            measure.Velocities(s, np.zeros((len(s), 1)), w[:, None], sigma=0.2),
+        ]
+        curve = ss.estimate(both, knots, "r:1", penalty="acceleration")
+        gap = np.linspace(7.5, 12.5, 40)
+        inside.append(np.abs(curve(gap)[:, 0] - np.interp(gap, d, x)) < 1.96 * curve.std(gap))
+    # Without knots in the gap, the coverage is 0.3.
+    assert np.mean(inside) > 0.85
+
+
+def test_knots_of_dates_and_whole_numbers_in_gaps():
+    rng = np.random.default_rng(0)
+    t = np.concatenate([np.arange(0, 1000, 10), np.arange(2000, 3000, 10)])
+    y = np.sin(t / 200)[:, None] + 0.01 * rng.standard_normal((len(t), 1))
+    day = np.datetime64("2024-03-01T00:00:00")
+    found = []
+    for times in (t, t + 10**17, day + t.astype("m8[s]"), t.astype("m8[s]")):
+        scale = measure.Function(times, lambda p: p - y, sigma=0.01)
+        found.append(ss.estimate([measure.Points(times, y, sigma=0.01), scale], 41, "r:1"))
+        assert len(found[-1].t) == len(found[0].t) > 48
+        assert np.max(np.diff(found[-1].t) / (found[-1].t[-1] - found[-1].t[0])) < 0.03
+    x = np.array([500, 1500])
+    for own, times in zip(found[1:], (x + 10**17, day + x.astype("m8[s]"), x.astype("m8[s]")), strict=True):
+        np.testing.assert_allclose(own(times), found[0](x), atol=1e-3)
+
+
+def test_given_knots_that_leave_out_a_gap():
+    t = np.concatenate([np.linspace(0, 7, 70), np.linspace(13, 20, 70)])
+    y = np.sin(t)[:, None]
+    both = [measure.Points(t, y, sigma=0.1), measure.Velocities(t, y, np.cos(t)[:, None], sigma=0.1)]
+    place = r"no data and no knots between knots\[69\] = 7.0 and knots\[70\] = 13.0"
+    with pytest.warns(ss.SmoothingWarning, match=place):
+        ss.estimate(both, t, "r:1")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        ss.estimate(both, np.linspace(0, 20, 81), "r:1")
+
+
+def test_more_than_half_a_turn_between_knots():
+    _, t, seen, s, omega, _ = spinning(8, 300)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        ss.estimate(given(t, seen, s, omega), 21, "so:3", on_failure="ignore")
+    assert sum("measurements[1] turns the body by" in str(one.message) for one in caught) == 1
+
+
+@pytest.mark.parametrize("kind", ["not finite", "exception"])
+def test_numerical_failures_are_convergence_errors(kind, monkeypatch):
+    _, t, seen, s, omega, _ = spinning(9, 20)
+    solve = Iteration._solve
+
+    def broken(self, *arguments):
+        if kind == "exception":
+            raise np.linalg.LinAlgError("Eigenvalues did not converge")
+        found = solve(self, *arguments)
+        return found._replace(step=np.nan * found.step, information=np.nan * found.information)
+
+    monkeypatch.setattr(Iteration, "_solve", broken)
+    for knots in (31, "auto"):
+        with pytest.raises(ss.ConvergenceError, match=r"The linear problem .* Check sigma and the units"):
+            ss.estimate(given(t, seen, s, omega), knots, "so:3")
+
+
+def test_knots_at_all_times():
+    """Times of sensors that differ by rounding errors are knots 1e-16 apart."""
+    _, t, seen, s, omega, _ = spinning(10, 20)
+    t = np.linspace(t[0], t[-1], len(t))
+    knots = np.unique(np.concatenate([t, s, t + 1e-14]))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            ss.estimate(given(t, seen, s, omega), knots, "so:3", on_failure="ignore")
+        except ss.SymsplineError as error:
+            assert "Check" in str(error) or "Pass" in str(error)
