@@ -103,12 +103,12 @@ def plot(
     from ._plotting import checked_look, compare
 
     look = checked_look(file, ax, None, None, title, figsize, show)
-    items = _checked_items(curves)
+    items = checked_items(curves)
     drawn: Figure | Axes = compare(items, labels, file, colors=colors, ax=ax, show=show, **look)
     return drawn
 
 
-def _checked_items(curves: Any) -> list[Any]:
+def checked_items(curves: Any) -> list[Any]:
     if isinstance(curves, Curve):
         curves = [curves]
     if not isinstance(curves, Iterable) or isinstance(curves, (str, bytes, dict)):

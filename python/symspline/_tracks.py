@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 
 from ._arrays import short_repr
 from ._core import ValidationError
+from ._lonlat import from_lonlat
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -28,6 +30,32 @@ _LAYOUTS = (
 
 # Names of columns of times.
 _TIME_NAMES = ("time", "times", "timestamp", "date", "datetime", "date_time", "utc", "fix_time", "t")
+
+
+# Columns of numbers that identify tracks, and columns of angles in degrees.
+_NAMED = re.compile(
+    r"(?<![a-z])(id|ids|ident|mmsi|imo|animal|individual|tag|track|trip|vessel|ship|vehicle|bird|device|segment|deployment)"
+    r"(?![a-z])",
+    re.IGNORECASE,
+)
+_ANGLE = re.compile(
+    r"(?<![a-z])(heading|hdg|course|cog|cap|bearing|azimuth|direction|dir|yaw|track angle|wind from)(?![a-z])",
+    re.IGNORECASE,
+)
+# A path of several tracks is longer than the tracks by this factor.
+ZIGZAG = 2.0
+
+
+def are_angles(name: Any, values: NDArray[np.float64]) -> bool:
+    """Whether a column holds angles in degrees, such as headings, by its name and the range of its numbers."""
+    text = re.sub(r"[_.-]", " ", str(name))
+    inside = np.nanmin(values, initial=0.0) >= -180 and np.nanmax(values, initial=0.0) <= 360
+    return bool(_ANGLE.search(text)) and bool(inside)
+
+
+def _lengths(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the chords between neighbouring points."""
+    return np.asarray(np.linalg.norm(np.diff(points, axis=0), axis=1))
 
 
 class Tracks(NamedTuple):
@@ -85,10 +113,48 @@ class Tracks(NamedTuple):
         first = np.array([rows[np.argmax(known[rows])] for rows in self.rows], np.intp)
         return values.iloc[first[tracks]].reset_index(drop=True)
 
+    def mixed(self) -> Any:
+        """Return a column whose values seem to be the names of several tracks in one; None if there is none.
+
+        The path through all rows of a track is then at least twice as long as the paths through the rows of each name.
+        """
+        others = [c for c in self.frame.columns if c not in (*self.keys, *self.columns, self.name)]
+        for rows in self.rows:
+            points = from_lonlat(*(self.frame[column].to_numpy(np.float64)[rows] for column in self.columns))
+            for column in others:
+                values = self.frame[column]
+                if values.dtype.kind in "fcmMb" or (values.dtype.kind in "iu" and not _NAMED.search(str(column))):
+                    continue
+                try:
+                    codes = values.iloc[rows].factorize()[0]
+                except TypeError:
+                    continue
+                count = codes.max(initial=-1) + 1
+                if not 2 <= count <= len(rows) / 2 or (codes < 0).any():
+                    continue
+                order = np.argsort(codes, kind="stable")
+                within = _lengths(points[order])[np.diff(codes[order]) == 0].sum()
+                if _lengths(points).sum() > ZIGZAG * within:
+                    return column
+        return None
+
+    def angles(self, column: Any, track: int, x: NDArray[np.datetime64]) -> NDArray[np.float64]:
+        """Interpolate angles in degrees along the shorter arc, in [0, 360), or in (-180, 180] if one is negative."""
+        rows = self.rows[track]
+        values = self.frame[column].to_numpy(np.float64, na_value=np.nan)
+        own = values[rows]
+        own[~np.isnan(own)] = np.unwrap(own[~np.isnan(own)], period=360.0)
+        found = self._interpolated(own, rows, x) % 360
+        return np.where(found > 180, found - 360, found) if np.nanmin(values, initial=0.0) < 0 else found
+
     def linear(self, column: Any, track: int, x: NDArray[np.datetime64]) -> NDArray[np.float64]:
         """Interpolate a column linearly in time. Values at equal times are averaged, and missing ones are omitted."""
         rows = self.rows[track]
-        values = self.frame[column].to_numpy(np.float64, na_value=np.nan)[rows]
+        return self._interpolated(self.frame[column].to_numpy(np.float64, na_value=np.nan)[rows], rows, x)
+
+    def _interpolated(
+        self, values: NDArray[np.float64], rows: NDArray[np.intp], x: NDArray[np.datetime64]
+    ) -> NDArray[np.float64]:
         rows, values = rows[~np.isnan(values)], values[~np.isnan(values)]
         if not len(rows):
             return np.full(len(x), np.nan)

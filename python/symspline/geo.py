@@ -13,13 +13,14 @@ Examples
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal, Unpack, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ._arrays import checked_flag, checked_number, short_repr
+from ._compare import checked_items
 from ._composed import SegmentedCurve
 from ._core import ValidationError
 from ._cubic import CubicSpline
@@ -34,7 +35,7 @@ from ._segments import check_smooth, cut
 from ._smoothing.many import smooth_many
 from ._spaces import Sphere
 from ._timed_curve import check_timed
-from ._tracks import read_tracks
+from ._tracks import ZIGZAG, Tracks, are_angles, read_tracks
 from ._typing import AxesLook, Duplicates, File, FloatArray, PageLook, TimesLike
 from ._warnings import warn
 
@@ -53,6 +54,8 @@ def __dir__() -> list[str]:
 EARTH_RADIUS = 6_371_008.8
 """Mean radius in metres: R₁ of the ellipsoid GRS 80 (Moritz, Geodetic reference system 1980)."""
 
+_Track = CubicSpline[Any, Any] | SegmentedCurve[Any, Any]
+_Tracks = _Track | Sequence[_Track] | Mapping[str, _Track]
 # Values of the column ``quality`` of resampled tables.
 _QUALITIES = ["good", "lam at bound", "not converged"]
 
@@ -289,8 +292,9 @@ def resample(
         Columns of longitude and latitude, in degrees. By default ``("lon", "lat")``, or the columns of Movebank,
         ``("location-long", "location-lat")``.
     interpolate : str or sequence of str, optional
-        Columns of numbers to interpolate linearly in time, such as depths or temperatures. Angles that pass 360°, such
-        as headings, are not suitable.
+        Columns of numbers to interpolate linearly in time, such as depths or temperatures. Columns of angles in degrees
+        are recognised by names such as ``heading``, ``course`` or ``wind_direction``. They are interpolated along the
+        shorter arc.
     max_gap : float, str or timedelta64
         Longest gap within a curve, in seconds or as a duration such as ``"3h"``; see `symspline.fit_segments`. The
         result has no rows within gaps.
@@ -328,6 +332,12 @@ def resample(
         points, or `symspline.fit_segments` does not accept the positions or times.
     ConvergenceError, CutLocusError
         As for `CubicSpline` and `make_smoothing_spline`. The message names the track.
+
+    Warns
+    -----
+    UserWarning
+        If a track is not in the result, because it has fewer than `min_points` positions between gaps or no time of the
+        result; or if `by` is omitted and the table seems to hold several tracks.
 
     Examples
     --------
@@ -393,21 +403,59 @@ def resample(
         )
     if not curves:
         return pd.DataFrame(columns=[*own_names, *computed, *more])
+    _warn_of_merged(table, by is not None or bool(table.keys))
+    angles = [c for c in more if are_angles(c, frame[c].to_numpy(np.float64, na_value=np.nan))]
     parts = []
     for spline, owner in zip(_fitted(curves, names, smooth, options), owners, strict=True):
         x = pd.date_range(pd.Timestamp(spline.t[0]).ceil(step), pd.Timestamp(spline.t[-1]).floor(step), freq=step)
         rates = pd.DataFrame({table.name: x} | _along(spline, x.to_numpy(), table.columns, radius, smooth))
         for column in more:
-            rates[column] = table.linear(column, owner, x.to_numpy())
+            interpolated = table.angles if column in angles else table.linear
+            rates[column] = interpolated(column, owner, x.to_numpy())
         parts.append(rates)
     found = pd.concat(parts, ignore_index=True)
     tracks = np.repeat(owners, [len(part) for part in parts])
+    _warn_of_missing(table, set(owners), set(tracks.tolist()), every, min_points)
     if table.zone is not None:
         found[table.name] = found[table.name].dt.tz_localize("UTC").dt.tz_convert(table.zone)
     constant = table.constant([*own_names, *computed, *more])
     for column in (*table.keys, *constant):
         found[column] = table.first_values(column, tracks)
     return found[[*own_names, *computed, *constant, *more]]
+
+
+def _warn_of_merged(table: Tracks, named: bool) -> None:
+    """Warn if rows of several tracks are one track."""
+    column = None if named else table.mixed()
+    if column is not None:
+        warn(
+            f"the table seems to hold several tracks: the path through all rows is more than {ZIGZAG:g} times as long "
+            f"as the paths of each {column!r}. Pass by={column!r} to fit one curve per {column}, or by=[] if the "
+            "table is one track.",
+            UserWarning,
+        )
+
+
+def _warn_of_missing(table: Tracks, fitted: set[int], shown: set[int], every: Any, min_points: int) -> None:
+    """Warn about tracks without rows in the result."""
+    gone = [track for track in range(len(table.rows)) if track not in shown]
+    if not gone:
+        return
+    names = ", ".join(_reason(table, track, track in fitted, every, min_points) for track in gone[:3])
+    more = f", and {len(gone) - 3} more" if len(gone) > 3 else ""
+    count = f"{len(gone)} of {len(table.rows)} tracks are" if len(table.rows) > 1 else "the track is"
+    warn(f"{count} not in the result: {names}{more}", UserWarning)
+
+
+def _reason(table: Tracks, track: int, fitted: bool, every: Any, min_points: int) -> str:
+    rows, of = table.rows[track], table.called(track).rstrip(", ")
+    if fitted:
+        why = f"no multiple of every={short_repr(every)} lies between its first and last position"
+    elif len(rows) < min_points:
+        why = f"{len(rows)} position{'s' * (len(rows) != 1)}, but min_points={min_points}"
+    else:
+        why = f"fewer than min_points={min_points} positions between gaps longer than max_gap"
+    return f"{of} ({why})" if of else why
 
 
 def _step(every: Any) -> Any:
@@ -428,7 +476,7 @@ def _step(every: Any) -> Any:
 
 @overload
 def plot(
-    spline: CubicSpline[Any, Any] | SegmentedCurve[Any, Any],
+    spline: _Tracks,
     file: File | None = None,
     *,
     radius: float = EARTH_RADIUS,
@@ -439,7 +487,7 @@ def plot(
 
 @overload
 def plot(
-    spline: CubicSpline[Any, Any] | SegmentedCurve[Any, Any],
+    spline: _Tracks,
     file: None = None,
     *,
     radius: float = EARTH_RADIUS,
@@ -449,33 +497,36 @@ def plot(
 
 
 def plot(
-    spline: CubicSpline[Any, Any] | SegmentedCurve[Any, Any],
+    spline: _Tracks,
     file: File | None = None,
     *,
     radius: float = EARTH_RADIUS,
     ax: Axes | None = None,
-    color: str | tuple[float, ...] | None = None,
-    label: str | None = None,
+    color: str | tuple[float, ...] | Sequence[Any] | None = None,
+    label: str | Sequence[str] | None = None,
     title: str | None = None,
     figsize: tuple[float, float] | None = None,
     show: bool = False,
 ) -> Figure | Axes:
-    """Plot a track on the Earth, with land, its speed in km/h and its acceleration.
+    """Plot a track, or several, on the Earth, with land, its speed in km/h and its acceleration.
 
     Tracks that fit into a circle of 25 degrees around a point are enlarged, with a scale bar and a small globe that
     shows where they are. Longer ones are drawn on a globe and on a map.
 
     Parameters
     ----------
-    spline : CubicSpline or SegmentedCurve
-        Curve on ``Sphere(2)``, or a batch of curves.
+    spline : CubicSpline, SegmentedCurve, or a list or dict of them
+        Curve on ``Sphere(2)``, or a batch of curves. The tracks in a list have different colours, and those in a dict
+        also their keys as labels.
     file : str, path or file object, optional
         File to which the figure is saved, such as ``"track.pdf"``.
     radius : float, default EARTH_RADIUS
         Radius of the globe in metres.
     ax : matplotlib.axes.Axes, optional
         Axes into which the globe or the enlarged track is drawn, without the other panels.
-    color, label, title, figsize, show : optional
+    color, label : optional
+        As for `symspline.CubicSpline.plot`; for several tracks, lists with one entry per track.
+    title, figsize, show : optional
         As for `symspline.CubicSpline.plot`.
 
     Returns
@@ -509,11 +560,20 @@ def plot(
     >>> figure = plot(flight)
     """
     require_matplotlib()
-    from ._plotting import checked_look
+    from ._plotting import checked_look, compare
     from ._plotting import plot as draw
 
-    _check_globe(spline)
     size = checked_number(radius, "radius must be a number above 0", lambda r: 0 < r < np.inf)
+    if isinstance(spline, (list, tuple, dict)):
+        names = list(map(str, spline)) if isinstance(spline, dict) and label is None else label
+        tracks = checked_items(list(spline.values()) if isinstance(spline, dict) else spline)
+        for track in tracks:
+            if not isinstance(track, tuple):
+                _check_globe(track)
+        several = checked_look(file, ax, None, None, title, figsize, show)
+        found: Figure | Axes = compare(tracks, names, file, colors=color, ax=ax, show=show, radius=size, **several)
+        return found
+    _check_globe(spline)
     look = checked_look(file, ax, color, label, title, figsize, show)
     drawn: Figure | Axes = draw(spline, file, ax=ax, show=show, radius=size, **look)
     return drawn

@@ -34,8 +34,9 @@ def compare(
     show: bool = False,
     title: str | None = None,
     figsize: Any = None,
+    radius: float | None = None,
 ) -> Any:
-    """Draw curves and data. See `symspline.plot`."""
+    """Draw curves and data, on the Earth if its radius in metres is given. See `symspline.plot`."""
     first = next(own for own in items if not isinstance(own, tuple))
     space = first.space
     if ax is not None:
@@ -57,6 +58,7 @@ def compare(
         else:
             start, _, times, points = given
             drawn.append(scatter_of(space, start, times, points, axis, color, name))
+    drawn = [own.on_earth(radius) for own in drawn]
     # Lines are in front of data, and the first of them determines the view.
     drawn.sort(key=lambda own: not own.has_line)
     if ax is not None:
@@ -65,7 +67,7 @@ def compare(
     words = [f"{count} curve{'s' if count > 1 else ''}"]
     if count < len(drawn):
         words.append(f"{sum(len(own.x) for own in drawn if not own.has_line)} data")
-    title = title or title_on("Comparison", space)
+    title = title or ("Tracks" if radius is not None else title_on("Comparison", space))
     return finish(draw_page(drawn, title, ", ".join(words), figsize, show).figure, file, show)
 
 
