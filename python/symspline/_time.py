@@ -235,7 +235,16 @@ def knots_of(t: TimesLike | None, batch: tuple[int, ...], nodes: int) -> tuple[T
         warn_of_rounded_times(shown)
     if shown.shape != (nodes,) and shown.shape != (*batch, nodes):
         own = f" or {(*batch, nodes)}" if batch else ""
-        raise ValidationError(f"t has shape {shown.shape}, but {nodes} points per curve need {(nodes,)}{own}")
+        axis = batch.index(shown.size) if shown.ndim == 1 and shown.size in batch else None
+        first = "first axis" if axis == 0 else f"axis {axis}"
+        remedy = (
+            f". The {first} of points has this length, but the axis of times must be the last one before those of a "
+            f"point: pass np.moveaxis(points, {axis}, {len(batch)})."
+        )
+        raise ValidationError(
+            f"t has shape {shown.shape}, but {nodes} points per curve need {(nodes,)}{own}"
+            + remedy * (axis is not None)
+        )
     return time_axis, shown, time_axis.knots(shown)
 
 

@@ -33,7 +33,7 @@ _TIME_NAMES = ("time", "times", "timestamp", "date", "datetime", "date_time", "u
 
 
 # Columns of numbers that identify tracks, and columns of angles in degrees.
-_NAMED = re.compile(
+NAMED = re.compile(
     r"(?<![a-z])(id|ids|ident|mmsi|imo|animal|individual|tag|track|trip|vessel|ship|vehicle|bird|device|segment|deployment)"
     r"(?![a-z])",
     re.IGNORECASE,
@@ -123,7 +123,7 @@ class Tracks(NamedTuple):
             points = from_lonlat(*(self.frame[column].to_numpy(np.float64)[rows] for column in self.columns))
             for column in others:
                 values = self.frame[column]
-                if values.dtype.kind in "fcmMb" or (values.dtype.kind in "iu" and not _NAMED.search(str(column))):
+                if values.dtype.kind in "fcmMb" or (values.dtype.kind in "iu" and not NAMED.search(str(column))):
                     continue
                 try:
                     codes = values.iloc[rows].factorize()[0]
@@ -182,8 +182,9 @@ def read_tracks(
     more = [interpolate] if isinstance(interpolate, str) else list(interpolate)
     for name in (*keys, time, lon, lat, *more):
         if name is not None and name not in frame.columns:
+            index = ". It is a level of the index: pass frame.reset_index()." if name in frame.index.names else ""
             raise ValidationError(
-                f"column {name!r} does not exist; the columns are {', '.join(map(str, frame.columns))}"
+                f"column {name!r} does not exist; the columns are {', '.join(map(str, frame.columns))}{index}"
             )
     for name in more:
         if name in (*keys, time, lon, lat) or frame[name].dtype.kind not in "iuf":

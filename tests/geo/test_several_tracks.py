@@ -38,7 +38,7 @@ def test_merged_tracks_warn(seed):
     numbered = table.drop(columns="animal").assign(mmsi=table.animal.factorize()[0] + 211000000)
     assert "by='mmsi'" in " ".join(resampled(numbered)[1])
     for options in ({"by": "animal"}, {"by": []}):
-        assert resampled(table, **options)[1] == []
+        assert not [own for own in resampled(table, **options)[1] if "several tracks" in own]
 
 
 def test_labels_along_one_track_do_not_warn():

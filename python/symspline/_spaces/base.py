@@ -1026,6 +1026,12 @@ class Space(Generic[P]):
         """Return the part of a message that names the function for values of another shape, or an empty text."""
         return ""
 
+    def _one_number(self, shape: tuple[int, ...], name: str) -> str:
+        """Return the remedy for numbers without the axis of a point, where a point is one number."""
+        if math.prod(self._point_shape) != 1 or not shape:
+            return ""
+        return f". A point is an array of one number: pass {name}[..., {', '.join(['None'] * len(self._point_shape))}]."
+
     def _point_axes(self, array: Array) -> tuple[int, ...]:
         return tuple(range(array.ndim - len(self.point_shape), array.ndim))
 
@@ -1053,7 +1059,7 @@ class Space(Generic[P]):
         if array.shape[array.ndim - len(shape) :] != shape or array.ndim < len(shape):
             raise ValidationError(
                 f"{name} has shape {array.shape}, but {self!r} needs shape (..., {', '.join(map(str, shape))})"
-                f"{self._conversion(array.shape, name)}"
+                f"{self._conversion(array.shape, name) or self._one_number(array.shape, name)}"
             )
         return cast(array, self._dtype).view(np.float64)
 

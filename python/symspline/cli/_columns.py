@@ -13,7 +13,9 @@ from typing import Any
 import numpy as np
 
 from .._degrees import is_degrees, look_like_degrees
+from .._exceptions import SymsplineError
 from .._spaces import LogEuclidean, Space, SymmetricPositiveDefinite, Torus, factors_of
+from .._tracks import NAMED, ZIGZAG
 from ._messages import Problem, first_duplicate, listed, refuse, say
 from ._points import (
     IN_BRACKETS,
@@ -151,6 +153,35 @@ def column_of_names(table: Table, time: str | None, used: Sequence[str | None]) 
                 if not same.any() or 2 * np.count_nonzero(same) < repeated:
                     return name
     return None
+
+
+def column_of_tracks(table: Table, used: Sequence[str | None], space: Space, points: Any) -> str | None:
+    """Return an unused column whose values seem to be the names of several tracks, in rows that are one curve.
+
+    The path through all rows is then at least twice as long as the paths through the rows of each name.
+    """
+    for name in table.names:
+        if name in used or name in table.dates or (name in table.numeric and not NAMED.search(name)):
+            continue
+        # A cell may be empty, or not hold a text, and some spaces have no distances.
+        with suppress(Problem, SymsplineError):
+            labels = np.unique(np.array(table.labels(name)), return_inverse=True)[1]
+            if labels.max() == 0 or labels.max() + 1 > len(labels) / 2:
+                continue
+            order = np.argsort(labels, kind="stable")
+            own = tuple(part[order] for part in points) if isinstance(points, tuple) else points[order]
+            within = _steps(space, own)[np.diff(labels[order]) == 0]
+            if _steps(space, points).sum() > ZIGZAG * within.sum():
+                return name
+    return None
+
+
+def _steps(space: Space, points: Any) -> Array:
+    before, after = (
+        tuple(part[rows] for part in points) if isinstance(points, tuple) else points[rows]
+        for rows in (slice(-1), slice(1, None))
+    )
+    return np.asarray(space.distance(before, after))
 
 
 # ---- points ----

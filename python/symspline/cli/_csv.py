@@ -116,6 +116,10 @@ def _columns_at_once(path: Source, mark: str, width: int, head_lines: int) -> li
     return [table[name] for name in names]
 
 
+# The first bytes of text in UTF-16, which spreadsheets write.
+_UTF16 = (b"\xff\xfe", b"\xfe\xff")
+
+
 @contextmanager
 def _rows(path: Source, mark: str) -> Iterator[tuple[Iterator[list[str]], Any]]:
     """Open the file, and return its rows that are not blank, and a function that names the line of the last one."""
@@ -129,7 +133,9 @@ def _rows(path: Source, mark: str) -> Iterator[tuple[Iterator[list[str]], Any]]:
         try:
             yield (row for row in reader if row and row != _SEPARATOR), place
         except UnicodeDecodeError:
-            raise Problem(f"{path} is not text in UTF-8; convert it, such as by iconv -f cp1252 -t utf-8") from None
+            binary.seek(0)
+            encoding = "utf-16" if binary.read(2) in _UTF16 else "cp1252"
+            raise Problem(f"{path} is not text in UTF-8; convert it, such as by iconv -f {encoding} -t utf-8") from None
         except csv.Error as error:
             raise Problem(f"{path}, {place()}: {error}") from None
         finally:

@@ -67,8 +67,18 @@ from .._representatives import IN_PYTHON
 from .._smoothing import SmoothingWarning
 from .._smoothing.many import smooth_many
 from .._spaces import Space, Torus, factors_of, space_named
+from .._tracks import ZIGZAG
 from . import _summary
-from ._columns import ORDERS, check_days, column_of_names, point_columns, split_names, time_column, with_stamps
+from ._columns import (
+    ORDERS,
+    check_days,
+    column_of_names,
+    column_of_tracks,
+    point_columns,
+    split_names,
+    time_column,
+    with_stamps,
+)
 from ._curves import Curves, write_curves
 from ._formats import CURVES, TABLES, endings, format_of, open_table
 from ._messages import VERBOSE, Problem, Progress, listed, refuse, say, tell
@@ -180,7 +190,8 @@ def run(options: argparse.Namespace) -> int:
         _fit_sensors(options, smooth, Fusion(table, rows, points, sensors), columns)
         return 0
     hint = partial(column_of_names, table, time, [time, *points.used]) if curve is None else lambda: None
-    data = Recordings(table.path, rows, points.read(rows.numbers, rows.place), space, options, hint)
+    given_points = points.read(rows.numbers, rows.place)
+    data = Recordings(table.path, rows, given_points, space, options, hint)
     data.empty = whole.height - table.height
     _fit_points(options, smooth, data, columns)
     same = data.merged or data.repeated
@@ -189,6 +200,11 @@ def run(options: argparse.Namespace) -> int:
         what = f"{same} rows have a time that another row has, and column {column!r} distinguishes them"
         what = what if same else f"column {column!r} has one block of rows for each of its texts"
         say(f"{what}: if the table holds several tracks, fit each of them with --curve {column}")
+    elif curve is None and (merged := column_of_tracks(table, [time, *points.used], space, given_points)) is not None:
+        say(
+            f"{table.path}: the path through all rows is more than {ZIGZAG:g} times as long as the paths of each "
+            f"{merged!r}; if the table holds several tracks, fit each of them with --curve {merged}"
+        )
     return 0
 
 
@@ -221,7 +237,10 @@ def _fit_points(options: argparse.Namespace, smooth: dict[str, Any] | None, data
 
 def _space(name: str | None, lonlat: bool) -> Space:
     if name is None and not lonlat:
-        raise Problem("say which space the points are on with --space, such as --space sphere:2")
+        raise Problem(
+            "say which space the points are on: --lonlat for longitude and latitude, or --space, such as --space "
+            "sphere:2 for unit vectors and --space so:3 for rotations"
+        )
     space = GLOBE if name is None else space_named(name)
     if lonlat:
         require_globe(space)

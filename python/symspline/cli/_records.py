@@ -70,7 +70,8 @@ def _json(path: Source) -> Any:
         try:
             return json.load(file)
         except (ValueError, RecursionError) as error:
-            raise Problem(f"{path} is not JSON: {error}") from None
+            lines = "; for JSON lines, make one list of them, such as by jq -s ." if "Extra data" in str(error) else ""
+            raise Problem(f"{path} is not JSON: {error}{lines}") from None
 
 
 def _table(path: Source, content: Any) -> Table:
