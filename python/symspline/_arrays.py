@@ -39,9 +39,9 @@ def as_array(value: ArrayLike, name: str) -> NDArray[Any]:
 def filled(value: Any) -> Any:
     """Return a value whose masked numbers and times are NaN and NaT, also within lists."""
     if isinstance(value, np.ma.MaskedArray):
-        if value.dtype.kind in "mM":
-            return value.filled(np.array("NaT", value.dtype))
-        return (value if value.dtype.kind in "fc" else value.astype(np.float64)).filled(np.nan)
+        missing: Any = np.array("NaT", value.dtype)[()] if value.dtype.kind in "mM" else np.nan
+        numbers: Any = value if value.dtype.kind in "fcmM" else value.astype(np.float64)
+        return numbers.filled(missing)
     if isinstance(value, list) and any(issubclass(kind, np.ma.MaskedArray) for kind in set(map(type, value))):
         return [filled(own) for own in value]
     return value

@@ -236,9 +236,9 @@ def knots_of(t: TimesLike | None, batch: tuple[int, ...], nodes: int) -> tuple[T
     if shown.shape != (nodes,) and shown.shape != (*batch, nodes):
         own = f" or {(*batch, nodes)}" if batch else ""
         axis = batch.index(shown.size) if shown.ndim == 1 and shown.size in batch else None
-        first = "first axis" if axis == 0 else f"axis {axis}"
+        which = "first axis" if axis == 0 else f"axis {axis}"
         remedy = (
-            f". The {first} of points has this length, but the axis of times must be the last one before those of a "
+            f". The {which} of points has this length, but the axis of times must be the last one before those of a "
             f"point: pass np.moveaxis(points, {axis}, {len(batch)})."
         )
         raise ValidationError(

@@ -86,3 +86,20 @@ def test_problems_of_one_curve_name_it(run, fails):
     assert problem.startswith("bad.csv: the point in line 5 and the point in line 7 of curve 'b' lie at or past")
     write("bad.csv", PAIR + ",5,0,0,1\n")
     assert fails("fit bad.csv --space s:2 --curve id -o bad.npz") == "bad.csv, line 7: column 'id' is empty"
+
+
+def test_tracks_that_follow_each_other_in_one_table_warn(run):
+    rows = [f"{i},{name},{lon + i},{50 + 0.1 * i}" for i, (name, lon) in enumerate([("A", 0)] * 6 + [("B", 90)] * 6)]
+    write("a.csv", "time,trip,lon,lat\n" + "\n".join(rows) + "\n")
+    assert "fit each of them with --curve trip" in run("fit a.csv --lonlat -o a.npz", notes=True)
+    run("fit a.csv --lonlat --curve trip -o b.npz")
+    # States along one track.
+    write("c.csv", "time,state,lon,lat\n" + "\n".join(f"{i},{'ab'[i // 3 % 2]},{i},50" for i in range(12)) + "\n")
+    run("fit c.csv --lonlat -o c.npz")
+
+
+def test_heights_beside_positions(run, fails):
+    write("a.csv", "t,lon,lat,ele\n0,7,46,500\n1,7.1,46.1,900\n2,7.2,46.1,700\n")
+    assert "heights in column ele are not used" in run("fit a.csv --lonlat -o a.npz")
+    assert "--space r:1 --columns ele" in fails("fit a.csv --lonlat --space 'sphere:2 x r:1' -o b.npz")
+    run("fit a.csv --space r:1 --columns ele --time t -o c.npz")

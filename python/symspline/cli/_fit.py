@@ -116,6 +116,7 @@ _PENALTY = "derivative that is kept small (default: acceleration, and jerk with 
 _RATES = (
     "columns of angular velocities in the frame of the body, for so:3, sphere:3, se:3 and products with one of them"
 )
+_HEIGHTS = ("ele", "elevation", "alt", "altitude", "height", "height-above-ellipsoid", "height-above-msl")
 _FOR_ROTATIONS = "For rotations give --space so:3, or rp:3, where signs do not count"
 _NOISY = ("criterion", "lam", "sigma", "robust", "penalty", "rates", "rate_sigma", "rate_bias", "velocities",
           "velocity_sigma")  # fmt: skip
@@ -192,6 +193,9 @@ def run(options: argparse.Namespace) -> int:
     hint = partial(column_of_names, table, time, [time, *points.used]) if curve is None else lambda: None
     given_points = points.read(rows.numbers, rows.place)
     data = Recordings(table.path, rows, given_points, space, options, hint)
+    unused = [name for name in table.names if options.lonlat and name.lower() in _HEIGHTS and name not in needed]
+    if unused:
+        tell(f"{table.path}: heights in column {unused[0]} are not used; --space r:1 --columns {unused[0]} fits them")
     data.empty = whole.height - table.height
     _fit_points(options, smooth, data, columns)
     same = data.merged or data.repeated

@@ -61,7 +61,11 @@ class Columns:
 def require_globe(space: Space) -> None:
     """Raise `Problem` unless the points of a space have longitude and latitude."""
     if space != GLOBE:
-        raise Problem(f"--lonlat is for sphere:2, not for {space}")
+        heights = GLOBE in factors_of(space)
+        advice = (
+            "; fit the other columns by themselves, such as heights by --space r:1 --columns ele" if heights else ""
+        )
+        raise Problem(f"--lonlat is for sphere:2, not for {space}{advice}")
 
 
 # ---- names ----

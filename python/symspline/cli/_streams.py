@@ -40,7 +40,8 @@ class Source:
     def open(self) -> Iterator[BinaryIO]:
         """Open the file, which can be done more than once; compressed text is decompressed."""
         with reading(self):
-            file: BinaryIO = io.BytesIO(_standard_input()) if self.path == STANDARD else self.path.open("rb")
+            whole = _standard_input() if self.path == STANDARD else _pipe(self.path) if self.path.is_fifo() else None
+            file: BinaryIO = self.path.open("rb") if whole is None else io.BytesIO(whole)
             with file:
                 packed = file.read(len(_GZIP)) == _GZIP
                 file.seek(0)
@@ -54,6 +55,12 @@ class Source:
 @cache
 def _standard_input() -> bytes:
     return sys.stdin.buffer.read()
+
+
+@cache
+def _pipe(path: Path) -> bytes:
+    """Return the content of a pipe, such as a process substitution of a shell, which can be read once only."""
+    return path.read_bytes()
 
 
 def check_inputs(*paths: Path | None) -> None:
