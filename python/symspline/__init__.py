@@ -47,6 +47,7 @@ from ._smoothing import (  # noqa: E402
 )
 from ._spaces import (  # noqa: E402
     Affine,
+    AmbiguousMeanWarning,
     AntiDeSitter,
     ComplexGeneralLinear,
     ComplexGrassmannian,
@@ -90,6 +91,7 @@ from .manifolds import Manifold, Stiefel  # noqa: E402
 __version__ = VERSION
 __all__ = [
     "Affine",
+    "AmbiguousMeanWarning",
     "AntiDeSitter",
     "BSpline",
     "BezierCurve",

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from ._arrays import as_array, whole_number
 from ._core import ValidationError
 from ._equality import same_fields
-from ._spaces import Space, parts_of, require_metric, space_named
+from ._spaces import Product, Space, parts_of, require_metric, space_named
 from ._typing import AnyArray, FloatArray, P
 
 # Variances below this fraction of the largest one are rounding errors.
@@ -177,11 +177,12 @@ def tangent_pca(points: Any, space: Space[P] | str, *, n_components: int | None 
     count, axes = leads[0][0], leads[0][1:]
     wanted = None if n_components is None else whole_number(n_components, "n_components", 1)
     mean: Any = space.mean(_joined([np.moveaxis(x, 0, len(axes)) for x in map(_as_given, given, arrays)]))
-    vectors = list(parts_of(space.log(mean, _joined(arrays)), space, "points"))
-    gram = _gram(space, mean, vectors, vectors)
+    at, flat, arrays, back = _well_conditioned(space, mean, arrays)
+    vectors = list(parts_of(flat.log(at, _joined(arrays)), flat, "points"))
+    gram = _gram(flat, at, vectors, vectors)
     values, u = np.linalg.eigh(gram)
     values, u = values[::-1], u[:, ::-1]
-    rounding = float(np.max(8 * np.finfo(float).eps * space._rounding(mean)))
+    rounding = float(np.max(8 * np.finfo(float).eps * flat._rounding(at)))
     rank = min(count - 1, int(np.sum(values > max(_LEAST * values[0], count * rounding**2))))
     if wanted is not None and wanted > rank:
         raise ValidationError(f"n_components is {wanted}, but the samples have only {rank} components.")
@@ -189,14 +190,31 @@ def tangent_pca(points: Any, space: Space[P] | str, *, n_components: int | None 
     total = float(np.trace(gram))
     mixed = [np.tensordot((u[:, :kept] / np.sqrt(values[:kept])).T, own, 1) for own in vectors]
     # Eigenvectors of small variance are orthonormal after a second step only (Cholesky QR, twice).
-    factor = np.linalg.cholesky(_gram(space, mean, mixed, mixed))
+    factor = np.linalg.cholesky(_gram(flat, at, mixed, mixed))
     components = [
         np.linalg.solve(factor, own.reshape(kept, math.prod(own.shape[1:]))).reshape(own.shape) for own in mixed
     ]
-    scores = _gram(space, mean, vectors, components)
+    scores = _gram(flat, at, vectors, components)
     variance = np.sum(scores**2, axis=0) / (count - 1)
     ratio = variance * (count - 1) / total if total > 0 else variance
-    return TangentPCA(space, mean, _joined(components), variance, ratio, scores)
+    moved = [own(x) for own, x in zip(back, components, strict=True)]
+    return TangentPCA(space, mean, _joined(moved), variance, ratio, scores)
+
+
+def _well_conditioned(space: Space[Any], mean: Any, arrays: list[Any]) -> tuple[Any, Space[Any], list[Any], list[Any]]:
+    """Move points by isometries so that rounding errors do not depend on the units of positive definite matrices.
+
+    Returns the moved mean, the space of the moved points, these points by factor, and the maps of tangent vectors back.
+    """
+    means, spaces, moved, back = [], [], [], []
+    for own, at, x in zip(getattr(space, "factors", (space,)), parts_of(mean, space, "mean"), arrays, strict=True):
+        whitening = own._whitening_at(at)
+        spaces.append(own if whitening is None else whitening.space)
+        means.append(at if whitening is None else whitening.forward(at))
+        moved.append(x if whitening is None else whitening.forward(x))
+        back.append(np.asarray if whitening is None else whitening.back)
+    whole = spaces[0] if len(spaces) == 1 else Product(*spaces)
+    return _joined(means), whole, moved, back
 
 
 def _as_given(given: Any, array: AnyArray) -> AnyArray:

@@ -15,8 +15,10 @@ from numpy.typing import ArrayLike, NDArray
 from .._arrays import as_array, cast, refuse, short_repr, whole_number
 from .._core import Handle, ValidationError
 from .._typing import AnyArray, FloatArray, P
+from .means import geometric_median, karcher_mean
 from .rounding import point_tol
-from .statistics import Groups, geometric_median, grouped, groups_of, karcher_mean, require_metric
+from .statistics import Groups, grouped, groups_of, require_metric, take
+from .whitening import Whitening
 
 Array = AnyArray
 Doubles = FloatArray
@@ -810,9 +812,15 @@ class Space(Generic[P]):
         ValidationError
             If an array does not have the required shape, a point is not in the space, or a weight is invalid.
         CutLocusError
-            If a point reaches the cut locus of the mean.
+            If points are opposite to each other so that no mean can be computed.
         ConvergenceError
             If the points are spread too far for a mean.
+
+        Warns
+        -----
+        AmbiguousMeanWarning
+            If there is a second local minimum whose sum is at most 5 % larger and that is farther away than the
+            standard error of the mean.
 
         See Also
         --------
@@ -822,14 +830,23 @@ class Space(Generic[P]):
         Notes
         -----
         The mean minimises :math:`\sum_i w_i\, d(m, x_i)^2`. It is unique if the points are in a ball of radius less
-        than half the injectivity radius [1]_; the iteration starts at the first point. On groups without an invariant
-        metric, such as `SpecialEuclidean`, it is the point at which the weighted sum of the logarithms vanishes [2]_.
+        than half the injectivity radius [1]_. Points that are spread farther have several local minima. The mean is
+        the lowest one, whatever the order of the points: on circles, tori, plane rotations and phases exactly [3]_,
+        elsewhere the lowest end point of descents from the extrinsic mean and from the data, from the 12 data with
+        the lowest sums if there are more than 30. Points spread over the whole space may have a lower minimum that
+        these descents miss. On groups without an invariant metric, such as `SpecialEuclidean`, the mean is the point
+        at which the weighted sum of the logarithms vanishes [2]_.
+
+        Means of positive definite matrices do not depend on units: the mean of D A D is D mean(A) D to rounding
+        errors for any diagonal matrix D.
 
         References
         ----------
         .. [1] H. Karcher, Riemannian center of mass and mollifier smoothing, Comm. Pure Appl. Math. 30 (1977).
         .. [2] X. Pennec, V. Arsigny, Exponential barycenters of the canonical Cartan connection and invariant means on
            Lie groups, in: Matrix Information Geometry, Springer (2013).
+        .. [3] T. Hotz, S. Huckemann, Intrinsic means on the circle: uniqueness, locus and asymptotics, Ann. Inst.
+           Stat. Math. 67 (2015).
 
         Examples
         --------
@@ -862,9 +879,14 @@ class Space(Generic[P]):
             If an array does not have the required shape, a point is not in the space, a weight is invalid, or the
             space has no invariant, positive definite metric.
         CutLocusError
-            If a point reaches the cut locus of an iterate.
+            If points are opposite to each other so that no median can be computed.
         ConvergenceError
             If the iteration does not converge.
+
+        Warns
+        -----
+        AmbiguousMeanWarning
+            If there is a second local minimum, as for `Space.mean`.
 
         See Also
         --------
@@ -872,9 +894,11 @@ class Space(Generic[P]):
 
         Notes
         -----
-        The median minimises :math:`\sum_i w_i\, d(m, x_i)` [1]_. It is computed by Weiszfeld's algorithm. Where an
-        iterate is one of the points, the step of [2]_ either moves on or shows that this point is the median. On a
-        line the median of an even number of points is not unique, and any of the medians is returned.
+        The median minimises :math:`\sum_i w_i\, d(m, x_i)` [1]_. On circles it is computed exactly. Elsewhere it is
+        computed by Weiszfeld's algorithm, from several starts if the points are spread farther than a quarter of the
+        injectivity radius. Where an iterate is one of the points, the step of [2]_ either moves on or shows that this
+        point is the median. On a line the median of an even number of points is not unique, and any of the medians is
+        returned.
 
         References
         ----------
@@ -901,6 +925,26 @@ class Space(Generic[P]):
         # Single precision has another tolerance.
         self.check_point(kept.astype(given.dtype) if given.dtype.kind in "fc" else kept)
         return lead, groups_of(lead, kept, full)
+
+    # How `karcher_mean` and `geometric_median` treat a space.
+
+    _has_angles: ClassVar[bool] = False
+
+    def _first_means(self, groups: Groups) -> Any:
+        """Return the first start of the iteration in every group."""
+        return self.project(take(groups.points, groups.starts))
+
+    def _extrinsic_means(self, points: Array, weights: FloatArray) -> Array | None:
+        """Return minimisers of a distance in the space of arrays, which may have to be projected."""
+        return None
+
+    def _whitening(self, groups: Groups) -> Whitening | None:
+        """Return an isometry to well-conditioned points."""
+        return None
+
+    def _whitening_at(self, points: Array) -> Whitening | None:
+        """Return isometries that move points to well-conditioned ones."""
+        return None
 
     def _batched(self, rows: Any, batch: tuple[int, ...]) -> Any:
         return rows.reshape(batch + self._point_shape)

@@ -12,7 +12,9 @@ from .._quaternions import matrices_of_quaternions
 from .._typing import ComplexArray, FloatArray
 from .actions import DisconnectedGroup, Group
 from .base import Array
+from .means import karcher_mean
 from .rounding import point_tol
+from .statistics import Groups, scaled
 
 
 class SpecialOrthogonal(Group[FloatArray]):
@@ -51,6 +53,9 @@ class SpecialOrthogonal(Group[FloatArray]):
 
     _name = "so"
     _unitary = True
+
+    def _extrinsic_means(self, points: Array, weights: FloatArray) -> Array | None:
+        return np.tensordot(weights, points, 1)[None]
 
     def _array(self, value: Any, name: str) -> Array:
         return super()._array(_matrices(value) if self.point_shape == (3, 3) else value, name)
@@ -228,6 +233,20 @@ class SpecialEuclidean(Group[FloatArray]):
     """
 
     _name = "se"
+
+    def _first_means(self, groups: Groups) -> Array:
+        # The map to the rotation is a homomorphism, so that the rotation of a barycentre is one of the rotations.
+        first: Array = super()._first_means(groups)
+        n = self.point_shape[0] - 1
+        turns = np.ascontiguousarray(groups.points[:, :n, :n])
+        apart = np.linalg.norm(turns - groups.spread(first[:, :n, :n]), axis=(1, 2))
+        if apart.max() < 1:
+            # All rotations are within an eighth of a turn of each other, so that any start is good.
+            return first
+        first[:, :n, :n] = karcher_mean(SpecialOrthogonal(n), groups._replace(points=turns))
+        moved = groups.sums(scaled(groups.points[:, :n, n], groups.weights))
+        first[:, :n, n] = moved / groups.sums(groups.weights)[:, None]
+        return first
 
     def _array(self, value: Any, name: str) -> Array:
         if self.point_shape == (4, 4):

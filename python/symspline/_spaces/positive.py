@@ -11,6 +11,8 @@ from .._core import ValidationError
 from .._typing import ComplexArray, FloatArray, P
 from .actions import Congruent, adjoint, preserves, require
 from .base import Array
+from .statistics import Groups, scaled
+from .whitening import Whitening
 
 # Beyond this size, random exponents are scaled so that they do not grow with the size. Otherwise the exponential of a
 # random symmetric matrix has a condition number above e^√(8n), and from n = 200 on it is not positive definite in
@@ -20,6 +22,19 @@ _FREE_SIZE = 20
 
 class _PositiveDefinite(Congruent[P]):
     """Positive definite matrices, whose random points are exponentials of random matrices."""
+
+    # Whether congruences with any matrix are isometries of the space of all positive definite matrices.
+    _is_affine_invariant = True
+
+    def _whitening(self, groups: Groups) -> Whitening | None:
+        average = groups.sums(scaled(groups.points, groups.weights)) / groups.sums(groups.weights)[:, None, None]
+        return self._whitening_at(average)
+
+    def _whitening_at(self, points: Array) -> Whitening | None:
+        if not self._is_affine_invariant:
+            return None
+        kind = HermitianPositiveDefinite if np.iscomplexobj(points) else SymmetricPositiveDefinite
+        return Whitening(np.linalg.cholesky(points), kind(self.point_shape[0]))
 
     @property
     def _scatter_scale(self) -> float:
@@ -98,6 +113,7 @@ class LogEuclidean(_PositiveDefinite[FloatArray]):
     """
 
     _name = "logspd"
+    _is_affine_invariant = False
 
     def _reflected(self, p: Array, x: Array) -> Any:
         return _function(np.exp, 2 * _function(np.log, p) - _function(np.log, x))

@@ -120,6 +120,13 @@ class Quotient(Space[P]):
         # The class for each kind of space has no name of its own.
         pass
 
+    # Averages of representatives are not those of the points.
+    _has_angles = False
+    _first_means = Space._first_means
+    _extrinsic_means = Space._extrinsic_means
+    _whitening = Space._whitening
+    _whitening_at = Space._whitening_at
+
     # ---- the group ----
 
     @property

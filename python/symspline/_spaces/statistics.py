@@ -1,4 +1,4 @@
-"""Karcher means and geometric medians of groups of points.
+"""Groups of points, and descents to local minima of their sums of distances.
 
 Points are rows, one group after another, so that a batch is a single call and groups may differ in size.
 """
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import as_array, refuse
-from .._core import ConvergenceError, ValidationError
+from .._core import ValidationError
 
 Array = NDArray[Any]
 Floats = NDArray[np.float64]
@@ -51,7 +51,7 @@ class Groups(NamedTuple):
         if which.all():
             return self
         rows = np.repeat(which, self.counts)
-        return Groups(_take(self.points, rows), self.counts[which], self.weights[rows])
+        return Groups(take(self.points, rows), self.counts[which], self.weights[rows])
 
     def sums(self, rows: Any) -> Any:
         """Sum rows over each group."""
@@ -70,20 +70,25 @@ def _map(function: Any, *values: Any) -> Any:
     return function(*values)
 
 
-def _take(rows: Any, index: Any) -> Any:
+def take(rows: Any, index: Any) -> Any:
     return _map(lambda x: x[index], rows)
 
 
-def _scaled(rows: Any, factors: Floats) -> Any:
+def scaled(rows: Any, factors: Floats) -> Any:
     """Multiply every row by a number."""
     return _map(lambda x: x * factors.reshape(-1, *[1] * (x.ndim - 1)), rows)
 
 
-def _put(rows: Any, index: Any, values: Any) -> None:
-    def put(own: Array, value: Array) -> None:
+def joined(rows: list[Any]) -> Any:
+    """Concatenate rows of points."""
+    return _map(lambda *each: np.concatenate(each), *rows)
+
+
+def put(rows: Any, index: Any, values: Any) -> None:
+    def replace(own: Array, value: Array) -> None:
         own[index] = value
 
-    _map(put, rows, values)
+    _map(replace, rows, values)
 
 
 def grouped(points: Array, axes: int, weights: ArrayLike | None, what: str) -> tuple[tuple[int, ...], Array, Floats]:
@@ -156,82 +161,103 @@ def _size(space: Any, p: Any, v: Any) -> Floats:
     return np.asarray(np.sqrt(np.sum(np.abs(v.reshape(len(v), -1)) ** 2, axis=-1)))
 
 
-def _starts(space: Any, groups: Groups) -> Any:
-    return space.project(_take(groups.points, groups.starts))
+class Descent(NamedTuple):
+    """Local minima that descents from given starts led to, one per group.
+
+    Attributes
+    ----------
+    points : ndarray, shape (groups, *point_shape), or a tuple of these
+        The minima.
+    objective : ndarray, shape (groups,)
+        Weighted sum of the distances or of their squares, at the last but one iterate.
+    radius : ndarray, shape (groups,)
+        Largest distance of the data from there.
+    unfinished : ndarray of bool, shape (groups,)
+        Whether the iteration did not converge.
+    """
+
+    points: Any
+    objective: Floats
+    radius: Floats
+    unfinished: NDArray[np.bool_]
 
 
-def karcher_mean(space: Any, groups: Groups) -> Any:
-    """Return the Karcher mean of every group, near its first point.
+def descend_to_mean(space: Any, groups: Groups, means: Any, steps: int = _MEAN_STEPS) -> Descent:
+    """Descend to a local minimum of the mean squared distance from every start.
 
     The gradient of half the mean squared distance is the negative mean logarithm. Its descent with the inverse of a
     bound of the Hessian as step length decreases the function in every step.
     """
-    means = _starts(space, groups)
     floor = 8 * _EPS * np.asarray(space._rounding(means))
-    active = np.ones(len(groups.counts), bool)
-    last = np.full(len(groups.counts), np.inf)
-    for _ in range(_MEAN_STEPS):
-        own = groups.of(active)
-        here = means[active]
+    count = len(groups.counts)
+    state = Descent(means, np.full(count, np.inf), np.zeros(count), np.zeros(count, bool))
+    active, last = np.ones(count, bool), np.full(count, np.inf)
+    for _ in range(steps):
+        own, index = groups.of(active), np.flatnonzero(active)
+        here = take(means, index)
         at = own.spread(here)
         logs = space.log(at, own.points)
-        hessians = own.sums(own.weights * _hessians(space, _size(space, at, logs)))
-        step = _scaled(own.sums(_scaled(logs, own.weights)), 1 / hessians)
-        means[active] = space.exp(here, step)
+        lengths = _size(space, at, logs)
+        hessians = own.sums(own.weights * _hessians(space, lengths))
+        step = scaled(own.sums(scaled(logs, own.weights)), 1 / hessians)
+        put(means, index, space.exp(here, step))
         size, before, least = _size(space, here, step), last[active], floor[active]
         last[active] = size
         # Rounding errors of distant points may exceed the floor.
-        active[active] = (size > least) & ((size < before) | (size > 1e4 * least))
+        active[index] = (size > least) & ((size < before) | (size > 1e4 * least))
+        if not active[index].all():
+            _note(state, index, own, lengths, 2)
         if not active.any():
-            return means
-    raise ConvergenceError(
-        f"the mean{_of(active)} did not converge in {_MEAN_STEPS} steps: the points are spread too far. "
-        "Take the mean of points that are closer together."
-    )
+            return state
+    _note(state, index, own, lengths, 2)
+    return state._replace(unfinished=active)
 
 
-def geometric_median(space: Any, groups: Groups) -> Any:
-    """Return the geometric median of every group, by Weiszfeld's algorithm.
+def descend_to_median(space: Any, groups: Groups, medians: Any, steps: int = _MEDIAN_STEPS) -> Descent:
+    """Descend to a local minimum of the mean distance from every start, by Weiszfeld's algorithm.
 
     An iterate at a datum moves on as in Vardi & Zhang (2000), equations (2.5) and (2.6), and a datum that satisfies
     the condition of optimality is the median.
     """
-    medians = _starts(space, groups)
     count = len(groups.counts)
+    state = Descent(medians, np.full(count, np.inf), np.zeros(count), np.zeros(count, bool))
     active, tested = np.ones(count, bool), np.full(count, -1)
     last, rate = np.full(count, np.inf), np.zeros(count)
     scale = np.zeros(count)
-    for _ in range(_MEDIAN_STEPS):
+    for _ in range(steps):
         own, index = groups.of(active), np.flatnonzero(active)
-        here = _take(medians, index)
+        here = take(medians, index)
         step, size, distances = _weiszfeld(space, own, here)
         # The mean distance from the first iterate, which is a datum.
         scale[index] = np.maximum(scale[index], own.sums(own.weights * distances) / own.sums(own.weights))
         nearest = _argmin(distances, own)
-        candidates = _take(own.points, own.starts + nearest)
+        candidates = take(own.points, own.starts + nearest)
         fresh = nearest != tested[index]
         tested[index] = nearest
         optimal = np.zeros(len(index), bool)
         if fresh.any():
-            _, length, _ = _weiszfeld(space, own.of(fresh), _take(candidates, fresh))
+            _, length, _ = _weiszfeld(space, own.of(fresh), take(candidates, fresh))
             optimal[fresh] = length == 0
-        _put(medians, index, space.exp(here, step))
-        _put(medians, index[optimal], _take(candidates, optimal))
+        put(medians, index, space.exp(here, step))
+        put(medians, index[optimal], take(candidates, optimal))
         with np.errstate(all="ignore"):
             rate[index] = np.where(last[index] > 0, size / last[index], 0.0)
         last[index] = size
         floor = 8 * _EPS * np.asarray(space._rounding(here)) + _MEDIAN_TOL * scale[index]
         active[index] = ~optimal & (size > floor)
+        if not active[index].all():
+            _note(state, index, own, distances, 1)
         if not active.any():
-            return medians
+            return state
+    _note(state, index, own, distances, 1)
     error = last / (1 - np.minimum(rate, 1 - 1e-6))
-    active &= error > _MEDIAN_LIMIT * scale
-    if active.any():
-        raise ConvergenceError(
-            f"the median{_of(active)} did not converge in {_MEDIAN_STEPS} steps. Take the median of points that are "
-            "closer together, or of more points."
-        )
-    return medians
+    return state._replace(unfinished=active & (error > _MEDIAN_LIMIT * scale))
+
+
+def _note(state: Descent, index: Indices, groups: Groups, distances: Floats, power: int) -> None:
+    """Note the objective and the radius of some groups."""
+    state.objective[index] = groups.sums(groups.weights * distances**power)
+    state.radius[index] = np.maximum.reduceat(distances, groups.starts)
 
 
 def _weiszfeld(space: Any, groups: Groups, at: Any) -> tuple[Any, Floats, Floats]:
@@ -242,7 +268,7 @@ def _weiszfeld(space: Any, groups: Groups, at: Any) -> tuple[Any, Floats, Floats
     # Distances within rounding errors are zero: their directions are arbitrary.
     there = distances > 4 * _EPS * np.asarray(space._rounding(repeated))
     inverse = np.where(there, groups.weights / np.where(there, distances, 1.0), 0.0)
-    pull = groups.sums(_scaled(logs, inverse))
+    pull = groups.sums(scaled(logs, inverse))
     strength = np.asarray(space.norm(at, pull))
     held = groups.sums(np.where(there, 0.0, groups.weights))
     total = groups.sums(inverse * _hessians(space, distances))
@@ -251,7 +277,7 @@ def _weiszfeld(space: Any, groups: Groups, at: Any) -> tuple[Any, Floats, Floats
     free = (strength > held * (1 + 1e-12)) & (strength > 1e-15 * most)
     with np.errstate(all="ignore"):
         factor = np.where(free, (1 - held / strength) / total, 0.0)
-    step = _scaled(pull, factor)
+    step = scaled(pull, factor)
     return step, factor * strength, distances
 
 
@@ -262,11 +288,6 @@ def _argmin(values: Floats, groups: Groups) -> Indices:
     number = np.repeat(np.arange(len(groups.counts)), groups.counts)
     _, first = np.unique(number[found], return_index=True)
     return np.asarray(found[first] - groups.starts)
-
-
-def _of(active: NDArray[np.bool_]) -> str:
-    """Return which group of several a message is about."""
-    return f" of group {np.flatnonzero(active)[0]}" if len(active) > 1 else ""
 
 
 def require_metric(space: Any, what: str) -> None:

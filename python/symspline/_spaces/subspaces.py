@@ -16,6 +16,8 @@ from .rounding import point_tol
 # Tolerance for recognising density matrices. It only selects the text of an error message, since rows of density
 # matrices are not unit vectors.
 _NEAR = 1e-4
+# Eigenvectors of the mean projection from which a search for the mean starts.
+_EIGENVECTORS = 4
 
 
 class _Projective(Preserving[P]):
@@ -23,6 +25,11 @@ class _Projective(Preserving[P]):
 
     # The space of positive definite matrices of the same numbers.
     _definite: str
+
+    def _extrinsic_means(self, points: Array, weights: FloatArray) -> Array | None:
+        # The first eigenvectors of the mean projection.
+        scatter = np.einsum("i,ij,ik->jk", weights, points, points.conj())
+        return np.asarray(np.linalg.eigh(scatter)[1][:, ::-1].T[:_EIGENVECTORS])
 
     def _array(self, value: Any, name: str) -> Array:
         array = super()._array(value, name)
@@ -158,6 +165,11 @@ class _Subspaces(Preserving[P]):
 
     def __init__(self, k: int, n: int) -> None:
         Space.__init__(self, k, n)
+
+    def _extrinsic_means(self, points: Array, weights: FloatArray) -> Array | None:
+        # The first eigenvectors of the mean projection.
+        scatter = np.einsum("i,ijl,ikl->jk", weights, points, points.conj())
+        return np.asarray(np.linalg.eigh(scatter)[1][:, ::-1][None, :, : self._parameters[0]])
 
     def _finite(self, operation: str, t: NDArray[np.float64] | None = None, **inputs: ArrayLike) -> Any:
         k, n = self._parameters

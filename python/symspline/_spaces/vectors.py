@@ -89,6 +89,7 @@ class Torus(Space[FloatArray]):
     """
 
     _name = "torus"
+    _has_angles = True
 
     def _tol(self, array: Array) -> float:
         # Few digits do not make an angle with many turns more precise.
@@ -152,6 +153,9 @@ class Sphere(Preserving[FloatArray]):
 
     _name = "sphere"
     _linear = True
+
+    def _extrinsic_means(self, points: Array, weights: FloatArray) -> Array | None:
+        return np.tensordot(weights, points, 1)[None]
 
     def from_angles(self, angles: ArrayLike) -> FloatArray:
         """Convert angles to points of the circle, ``Sphere(1)``.

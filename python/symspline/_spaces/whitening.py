@@ -1,0 +1,46 @@
+"""Congruences that make positive definite matrices well-conditioned before an iteration.
+
+The affine-invariant metric does not change under congruences A → L⁻¹ A L⁻ᴴ, but rounding errors do: those of a matrix
+with entries in mixed units grow with its condition number. With the Cholesky factor L of the average of the data, the
+transformed matrices are as well-conditioned as the data are close to each other, whatever the units. Cholesky
+factorisation and triangular solves commute with diagonal scaling up to rounding errors.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .statistics import Array
+
+
+def _adjoint(x: Array) -> Array:
+    return np.asarray(np.swapaxes(x, -1, -2).conj())
+
+
+class Whitening(NamedTuple):
+    """Congruences of positive definite matrices.
+
+    Attributes
+    ----------
+    factor : ndarray, shape (..., n, n)
+        Lower triangular factors L, which broadcast against matrices.
+    space : SymmetricPositiveDefinite or HermitianPositiveDefinite
+        The space of the transformed matrices. The spaces of special and of symplectic matrices are totally geodesic in
+        it, so that means and medians are the same.
+    """
+
+    factor: Array
+    space: Any
+
+    def forward(self, points: Array) -> Array:
+        """Return L⁻¹ A L⁻ᴴ."""
+        half = np.linalg.solve(self.factor, points)
+        found = np.linalg.solve(self.factor, _adjoint(half))
+        return np.asarray((found + _adjoint(found)) / 2)
+
+    def back(self, points: Array) -> Array:
+        """Return L A Lᴴ."""
+        found = self.factor @ points @ _adjoint(self.factor)
+        return np.asarray((found + _adjoint(found)) / 2)
