@@ -263,7 +263,7 @@ ROWS = [
     ),
     Row(
         "Section 4.2, step 2",
-        "lift to the group, and the Hamiltonian of least change",
+        "lift to the group, and the Hamiltonian of least norm",
         "CubicSpline.lift quantum.hamiltonian quantum.propagator",
         "tests/quantum/test_hamiltonian.py::test_changes_cost_twice_the_bending_energy "
         "tests/quantum/test_propagator.py::test_it_is_unitary_and_follows_the_curve",

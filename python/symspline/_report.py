@@ -15,6 +15,11 @@ from ._typing import Number
 _LONG = 10
 
 
+# The most segments of a curve that the compiled core solves as a whole, `LONG` of `fit/mod.rs`.
+_WHOLE = 512
+# Steps, in units of the injectivity radius, from which there may be several solutions.
+_FAR, _HALF_WAY, _SLOW = 0.55, 0.4, 16
+
 # In the order of their numbers in the compiled core.
 SOLVERS = ("fixed-point", "quasi-newton", "newton", "homotopy", "trust-region")
 
@@ -61,24 +66,26 @@ class Report:
         Longest time between neighbouring points; in seconds for dates.
     curvature : float
         K of (22), the bound of the curvature of the space.
-    invariant_radius : float, ndarray or None
-        Smallest V of (38), see Notes. None where the theorem does not apply, which is normal for points far apart,
-        for unequal knots, and for end conditions other than natural ends and given velocities; NaN for such curves of
-        a batch. For a product, the root of the sum of the squares of its factors.
+    invariant_radius : float, tuple of float, ndarray or None
+        Smallest V of (38), see Notes. None where the theorem does not apply, which is normal for points far apart
+        (D + 2V must be less than the injectivity radius), for unequal knots, and for end conditions other than
+        natural ends and given velocities; NaN for such curves of a batch. For a product, one value per factor along
+        the last axis, in a tuple for a single curve, because the theorem applies to each factor separately.
     rate : float or ndarray
         Mean contraction factor of the residual per iteration.
     alternative_energy : float, ndarray or None
         Lowest bending energy of other C² curves through the points that ``method="auto"`` computed. None if there
         were none, NaN for such curves of a batch. For a product, the alternative differs in one factor.
     contraction_bound : float, ndarray or None
-        Bound α < 1 of the contraction factor of Algorithm 1, see Notes. None, or NaN in a batch, where the theorem
-        does not apply or K D > 0.26058. For a product, the largest bound of its factors.
+        Bound α < 1 of the contraction factor of Algorithm 1, see Notes. None, or NaN in a batch, where
+        `invariant_radius` is None or K D > 0.26058. For a product, the largest bound of its factors.
     guaranteed_sweeps : int, ndarray or None
         Number of sweeps of Algorithm 1 after which, by this bound, all h u/3 are within ``tol`` times
         `invariant_radius` of those of the curve. None, or NaN in a batch, if there is no bound.
     skipped : tuple of str
-        Solvers that ``method="auto"`` omitted or stopped early because they would have exceeded its budget. For a
-        batch, those of any curve.
+        Solvers that ``method="auto"`` omitted or stopped early because they would have exceeded its budget. Curves of
+        more than 512 segments are solved in sections, without the search for a solution of lower energy: if points are
+        far apart, the solvers of that search are listed here. For a batch, those of any curve.
     velocity_error : float, ndarray or None
         Bound of the distance between the velocities at the knots and those of the exact C² curve on a `Manifold`, in
         units of velocity; see :doc:`/manifolds`. inf if there is no bound, None on symmetric spaces. For a product,
@@ -98,8 +105,13 @@ class Report:
 
     Let u be the velocities and h the length of an interval. If all :math:`\lVert h u/3 \rVert \le V`, Algorithm 1
     keeps them so (Theorem 3.1). ``contraction_bound`` bounds its contraction per sweep in this region, in the norm of
-    the largest velocity. With such a bound the region contains exactly one C² curve, and Algorithm 1 converges to it
-    from zero velocities.
+    the largest velocity. With such a bound, exactly one C² spline through the points has handles no longer than V, and
+    Algorithm 1 converges to it from zero velocities. Splines with longer handles may exist however close the points
+    are: a great circle can be traversed the long way round. In a product, the handles in each factor must not be
+    longer than the V of that factor.
+
+    The theorem needs D + 2V below the injectivity radius. Otherwise the nearest of several geodesics may change, as on
+    tori, circles and projective spaces, and two splines with handles no longer than V may exist.
 
     References
     ----------
@@ -122,7 +134,7 @@ class Report:
     max_step: Number = field(metadata=FLOAT)
     max_gap: Number = field(metadata=FLOAT)
     curvature: float
-    invariant_radius: Number | None = field(metadata=_MAYBE)
+    invariant_radius: Number | tuple[float, ...] | None = field(metadata=_MAYBE)
     rate: Number = field(metadata=FLOAT)
     alternative_energy: Number | None = field(default=None, metadata=_MAYBE)
     contraction_bound: Number | None = field(default=None, metadata=_MAYBE)
@@ -147,7 +159,9 @@ class Report:
             f"longest step {_worst(self.max_step):.3g}, contraction {_worst(self.rate):.2g}"
         )
         if self.invariant_radius is not None and not np.isnan(self.invariant_radius).any():
-            text += f", control handles stay below {np.max(self.invariant_radius):.3g} (Theorem 3.1)"
+            radii = np.reshape(self.invariant_radius, (np.size(self.converged), -1)).max(axis=0)
+            each = " and ".join(f"{radius:.3g}" for radius in radii)
+            text += f", control handles stay below {each} (Theorem 3.1)"
         if self.velocity_error is not None:
             text += f", velocities within {_worst(self.velocity_error):.1e}"
         return text
@@ -296,7 +310,7 @@ def combined(reports: Sequence[Report], max_step: Any, curvature: float, alterna
         max_step=max_step,
         max_gap=largest("max_gap"),
         curvature=curvature,
-        invariant_radius=of_all("invariant_radius", root),
+        invariant_radius=_per_factor(of_all("invariant_radius", np.array)),
         rate=largest("rate"),
         alternative_energy=alternative_energy,
         contraction_bound=of_all("contraction_bound", lambda own: np.max(own, axis=0)),
@@ -304,6 +318,16 @@ def combined(reports: Sequence[Report], max_step: Any, curvature: float, alterna
         skipped=tuple(name for name in SOLVERS if name in skipped),
         velocity_error=of_all("velocity_error", root),
     )
+
+
+def _per_factor(values: Any) -> Any:
+    """Return one value per factor along the last axis; a tuple for a single curve."""
+    if values is None:
+        return None
+    last = np.moveaxis(values, 0, -1)
+    # A curve of a batch has the certificate only if every factor has it.
+    last = np.where(np.isnan(last).any(axis=-1, keepdims=True), np.nan, last)
+    return tuple(last.tolist()) if last.ndim == 1 else last
 
 
 def long_gaps(times: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -316,11 +340,12 @@ def long_gaps(times: NDArray[np.float64]) -> NDArray[np.bool_]:
     return np.asarray(steps > max(_LONG, 2 * np.log2(max(len(steps), 1))) * np.median(steps))
 
 
-def shaped(
-    columns: Columns, times: NDArray[np.float64], batch: tuple[int, ...], curvature: float, method: str
-) -> Report:
+def shaped(columns: Columns, times: NDArray[np.float64], batch: tuple[int, ...], space: Any, method: str) -> Report:
     """Return the report of curves with these knots from its columns; `method` is the requested one."""
     values: dict[str, Any] = {name: columns.row(name).reshape(batch) for name in (*INTEGERS, *NUMBERS)}
+    _certify(values, space.injectivity_radius)
+    if method == "auto" and times.shape[-1] > _WHOLE + 1:
+        values["skipped"] = values["skipped"] | _unsearched(values, space.injectivity_radius)
     values["converged"] = values["converged"].astype(bool)
     solvers, skipped = values.pop("solver"), int(np.bitwise_or.reduce(values.pop("skipped"), axis=None))
     used = SOLVERS[solvers.max()] if solvers.size else "quasi-newton" if method == "auto" else method
@@ -334,7 +359,30 @@ def shaped(
     with np.errstate(all="ignore"):
         gap = np.max(np.diff(times), axis=-1)
     max_gap = np.broadcast_to(gap, batch).copy() if batch else float(gap)
-    return Report(used, max_gap=max_gap, curvature=curvature, skipped=_skipped(skipped), **values)
+    return Report(used, max_gap=max_gap, curvature=space.curvature, skipped=_skipped(skipped), **values)
+
+
+def _unsearched(values: dict[str, Any], injectivity_radius: float) -> NDArray[np.int64]:
+    """Return the solvers of the search for the minimum-energy solution that a curve in sections did not run, as bits.
+
+    The conditions are those of `far_apart` in `fit/minimum_energy.rs`.
+    """
+    part = values["max_step"] / injectivity_radius
+    far = (part > _FAR) | ((part > _HALF_WAY) & (values["iterations"] >= _SLOW))
+    search = sum(1 << i for i, name in enumerate(SOLVERS) if name != "quasi-newton")
+    return np.where(far & values["converged"], search & ~(1 << values["solver"]), 0)
+
+
+def _certify(values: dict[str, Any], injectivity_radius: float) -> None:
+    """Drop the numbers of Theorem 3.1 where shortest geodesics in its region may not be unique.
+
+    By (37) the logarithms of the C² condition have lengths up to D + 2V. Beyond the injectivity radius they jump, and
+    the bounds of the compiled core, which come from the curvature alone, do not hold.
+    """
+    with np.errstate(invalid="ignore"):
+        known = values["max_step"] + 2 * values["invariant_radius"] < injectivity_radius
+    for name in ("invariant_radius", "contraction_bound", "guaranteed_sweeps"):
+        values[name] = np.where(known, values[name], np.nan)
 
 
 def _count(value: Any) -> Any:

@@ -112,6 +112,9 @@ def hamiltonian(spline: CubicSpline[Any, Any], x: TimesLike, *, nu: int = 0, ext
     :math:`\int \lVert H' \rVert^2 \, dt` is twice `CubicSpline.bending_energy`. For gates, :math:`H = iU'U^*` is
     unique. See also §4.2 of the paper.
 
+    Least norm does not imply least change. Other Hamiltonians of the same states may vary less: a constant one drives a
+    state along a circle of latitude of the Bloch sphere, while the one of least norm rotates with the state.
+
     References
     ----------
     .. [1] Kato, "On the adiabatic theorem of quantum mechanics", 1950.

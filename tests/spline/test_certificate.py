@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from cases import CURVED, closed_walk, loop_over, unit_tangent, walk
+from scipy.interpolate import CubicSpline
 
 import symspline as ss
 
@@ -48,9 +49,82 @@ def test_radius_is_none_for_far_steps(name, kd, rng):
 @pytest.mark.parametrize("name", ["euclidean:3", "so:2", "spd:1", "rp:1"])
 def test_radius_is_the_longest_step_in_flat_space(name, rng):
     space = ss.space(name)
-    report = ss.CubicSpline(None, walk(space, 0.7, 6, rng), space).report
+    report = ss.CubicSpline(None, walk(space, 0.5, 6, rng), space).report
     assert report.curvature == 0.0
     assert report.invariant_radius == pytest.approx(report.max_step, rel=1e-15)
+    assert report.contraction_bound == 0.5
+
+
+ZIGZAG = np.array([0, 1, 0, 1.0])
+
+
+@pytest.mark.parametrize(
+    ("space", "points"),
+    [
+        ("torus:1", lambda a: a[:, None]),
+        ("sphere:1", lambda a: np.stack([np.cos(a), np.sin(a)], -1)),
+        ("u:1", lambda a: np.exp(1j * a)[:, None, None]),
+        ("rp:1", lambda a: np.stack([np.cos(a / 2), np.sin(a / 2)], -1)),
+        ("torus:2", lambda a: np.stack([a, 0 * a], -1)),
+    ],
+    ids=str,
+)
+def test_circles_need_steps_below_a_third_of_the_injectivity_radius(space, points):
+    space = ss.space(space)
+    for angle, certified in ((0.3 * np.pi, True), (0.34 * np.pi, False), (0.9 * np.pi, False)):
+        report = ss.CubicSpline(None, points(angle * ZIGZAG), space).report
+        # One batch with a certified curve has NaN for the other one.
+        batch = ss.CubicSpline(None, np.stack([points(angle * ZIGZAG), points(0.1 * ZIGZAG)]), space).report
+        for name in ("invariant_radius", "contraction_bound", "guaranteed_sweeps"):
+            assert (getattr(report, name) is not None) == certified
+            assert np.isnan(getattr(batch, name)).tolist() == [not certified, False]
+        assert ("Theorem" in str(report)) == certified
+
+
+def natural_on_the_circle(angles, winding):
+    """Velocities of the natural spline of numbers that are these angles plus whole turns between neighbours."""
+    turns = np.concatenate([[0], np.cumsum(winding)])
+    return CubicSpline(np.arange(len(angles)), angles + 2 * np.pi * turns, bc_type="natural")(np.arange(len(angles)), 1)
+
+
+def test_two_short_splines_on_the_circle_without_a_certificate():
+    """Both have handles no longer than D, the V of flat space."""
+    a = 0.9 * np.pi * ZIGZAG
+    c, j = np.stack([np.cos(a), np.sin(a)], -1), np.stack([-np.sin(a), np.cos(a)], -1)
+    for winding in ([0, 0, 0], [0, 1, 0]):
+        u = natural_on_the_circle(a, winding)
+        assert abs(u).max() / 3 <= 0.9 * np.pi
+        curve = ss.HermiteSpline(np.arange(4.0), c, u[:, None] * j, "sphere:1")
+        sides = [curve(np.array([1, 2]) + side, nu=2) for side in (-1e-7, 1e-7)]
+        assert np.abs(curve([0.0, 3.0], nu=2)).max() < 1e-12
+        assert np.abs(sides[0] - sides[1]).max() < 1e-5
+    assert ss.CubicSpline(None, c, "sphere:1").report.contraction_bound is None
+
+
+def test_a_quotient_uses_its_own_injectivity_radius():
+    def about_z(angle):
+        return ss.rotations.from_rotation_vectors(angle * np.arange(5)[:, None] * [0, 0, 1])
+
+    cubic = ss.space("so:3/432")
+    # Turns by 0.5 one way and by π/2 − 0.5 the other way are the same points of the quotient.
+    assert np.allclose(cubic.distance(about_z(0.5), about_z(0.5 - np.pi / 2)), 0, atol=1e-7)
+    for rotations in (about_z(0.5), about_z(0.5 - np.pi / 2)):
+        assert ss.CubicSpline(None, rotations, cubic).report.contraction_bound is None
+    assert ss.CubicSpline(None, about_z(0.5), "so:3").report.contraction_bound is not None
+    near = ss.CubicSpline(None, about_z(0.1), cubic).report
+    assert near.max_step + 2 * near.invariant_radius < cubic.injectivity_radius
+    assert near.contraction_bound == ss.CubicSpline(None, about_z(0.1), "so:3").report.contraction_bound
+
+
+def test_a_product_has_a_radius_per_factor():
+    """The great circle the long way round is a second natural curve, outside the region of its factor."""
+    a = 0.05 * np.arange(5)
+    p, line = np.stack([np.cos(a), np.sin(a), 0 * a], -1), 10.0 * np.arange(5)[:, None]
+    report = ss.CubicSpline(None, (p, line), "sphere:2 x r:1").report
+    long_way = (2 * np.pi + 0.05) / 3
+    assert report.invariant_radius == (pytest.approx(0.0504, abs=1e-4), pytest.approx(10, rel=1e-12))
+    assert report.contraction_bound is not None and long_way > report.invariant_radius[0]
+    assert str(report).endswith("control handles stay below 0.0504 and 10 (Theorem 3.1)")
 
 
 @pytest.mark.parametrize("name", CURVED)
@@ -204,7 +278,7 @@ def test_a_product_has_none_where_a_factor_has_none(first, rng):
     assert ss.CubicSpline(None, (near, far), space).report.invariant_radius is None
     batch = np.stack([near, near]), np.stack([0.02 * far + far[:1], far])
     radius = ss.CubicSpline(None, (batch[0], S2.project(batch[1])), space).report.invariant_radius
-    assert np.isnan(radius).tolist() == [False, True]
+    assert np.isnan(radius).tolist() == [[False, False], [True, True]]
 
 
 def test_control_polygons_of_a_product_stay_within_the_radii(rng):
@@ -212,7 +286,7 @@ def test_control_polygons_of_a_product_stay_within_the_radii(rng):
     spaces = S2, S2, ss.Euclidean(3)
     radii = [ss.CubicSpline(None, p, s).report.invariant_radius for p, s in zip(parts, spaces, strict=True)]
     spline = ss.CubicSpline(None, tuple(parts), ss.Product(*spaces))
-    assert spline.report.invariant_radius == pytest.approx(np.linalg.norm(radii), rel=1e-15)
+    assert spline.report.invariant_radius == tuple(radii)
     assert "(Theorem 3.1)" in str(spline.report)
-    legs = np.sqrt(sum(s.norm(p, u) ** 2 for s, p, u in zip(spaces, parts, spline.velocities, strict=True))) / 3
-    assert legs.max() <= spline.report.invariant_radius
+    for s, p, u, radius in zip(spaces, parts, spline.velocities, radii, strict=True):
+        assert longest_leg(s, p, u) <= radius

@@ -27,6 +27,7 @@ from ..manifolds._checks import hermite_on_manifold
 from ..manifolds._on_manifold import OnManifold
 from .curve import CoreCurve, CurveArrays, ProductCurve, share
 from .ends import NATURAL, End, ends_in_factors, ends_of, is_closed, split_ends
+from .handles import require_short_handles
 from .reduced import ReducedCurve
 from .solve import Mask, Options, Solved, Task, solve, solve_single, without
 
@@ -120,7 +121,7 @@ class Fit(NamedTuple):
         """Return the reports in each factor."""
         times, batch = self.curve.times, self.curve.batch
         return [
-            shaped(own, times, batch, part.space.curvature, self.method)
+            shaped(own, times, batch, part.space, self.method)
             for part, own in zip(self.curve.parts, self.columns, strict=True)
         ]
 
@@ -374,7 +375,7 @@ def hermite_data(
     Raises
     ------
     ValidationError
-        If points or times are invalid, or a velocity is not tangent.
+        If points or times are invalid, or a velocity is not tangent or too fast for its segments.
     CutLocusError
         If inner control points of a segment lie at or past each other's cut locus.
     """
@@ -386,7 +387,9 @@ def hermite_data(
             return *hermite_on_manifold(task, vectors), np.full(math.prod(part.batch), np.inf)
         doubles = factor._as_doubles(vectors)
         found, tangent, longest = _core.hermite(factor._handle, times, part.numbers, doubles, part.tol, tangent_tol)
-        return factor._numbers(found), factor._numbers(tangent), longest
+        found, tangent = factor._numbers(found), factor._numbers(tangent)
+        require_short_handles(factor, times, found, tangent)
+        return found, tangent, longest
 
     return _in_factors(space, checked, list(zip(points, velocities, strict=True)))
 

@@ -191,7 +191,7 @@ def _report_of(space: Space, sections: list[Task], solved: list[Solved], method:
     reports = []
     for task, found in zip(sections, solved, strict=True):
         curves.append(curve_of(space, task.times, [(found.points, found.velocities)]))
-        reports.append(shaped(found.columns, task.times, batch, space.curvature, method))
+        reports.append(shaped(found.columns, task.times, batch, space, method))
     other = alternative_energy(curves, reports)
     if other is not None:
         whole.row("alternative_energy")[:] = np.ravel(other)

@@ -1,0 +1,58 @@
+"""The limit of given velocities: their control handles must stay inside the cut locus."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .._core import CutLocusError, ValidationError
+from .._spaces import Array, Doubles, Space
+
+# Handles shorter than this fraction of the injectivity radius need no closer look.
+_SHORT = 0.99
+# Relative difference of a handle from the logarithm of its end, beyond which the logarithm is another vector.
+_SAME = 1e-6
+
+
+def require_short_handles(space: Space[Any], times: Doubles, points: Array, velocities: Array) -> None:
+    """Raise ValidationError if a velocity is too fast for a segment next to it.
+
+    The curve is evaluated from its control points. The one at the end of a handle h u/3 past the cut locus belongs to
+    another, shorter handle, so that the curve would not have the given velocity or would lose whole turns.
+    """
+    radius = space.injectivity_radius
+    if not 0 < radius < np.inf:
+        return
+    axes = len(space.point_shape)
+    lead = points.shape[: points.ndim - axes]
+    steps = np.broadcast_to(np.diff(times), (*lead[:-1], lead[-1] - 1))
+    ends = np.zeros((*lead[:-1], 1))
+    longest = np.maximum(np.concatenate([steps, ends], -1), np.concatenate([ends, steps], -1))
+    with np.errstate(all="ignore"):
+        square = np.asarray(space._apply("inner", p=points, u=velocities, v=velocities))
+        length = longest / 3 * np.sqrt(np.maximum(square, 0))
+    for index in zip(*np.nonzero(length > _SHORT * radius), strict=True):
+        handle = longest[index] / 3 * velocities[index]
+        try:
+            again = space.log(points[index], space.exp(points[index], handle))
+            lost = np.abs(again - handle).max() > _SAME * np.abs(handle).max()
+        except CutLocusError:
+            lost = True
+        if lost:
+            _refuse(space, index, velocities[index], float(length[index]), float(longest[index]))
+
+
+def _refuse(space: Space[Any], index: tuple[Any, ...], velocity: Array, length: float, step: float) -> None:
+    *batch, node = (int(i) for i in index)
+    of = f" of curve {', '.join(map(str, batch))}" if batch else ""
+    remedy = (
+        "Use `Euclidean` and angles that count turns, or add points between."
+        if space._has_angles
+        else "Add points between, or pass slower velocities."
+    )
+    raise ValidationError(
+        f"`velocities[{node}]`{of} has speed {3 * length / step:.6g}, which is too fast for a segment of length "
+        f"{step:.6g}: its control handle, a third of the product, has length {length:.4g} and passes the cut locus. "
+        f"The curve would have another velocity there or lose whole turns. {remedy}"
+    )
