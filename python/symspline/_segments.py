@@ -18,13 +18,30 @@ from ._functional import fit_many
 from ._input import times_of
 from ._missing import data_without_missing, refuse_missing, without_missing
 from ._rounded_times import warn_of_rounded_times
+from ._report import FarPointsWarning
 from ._smoothing import SmoothingReport, SmoothingSpline
 from ._smoothing.many import smooth_many
 from ._smoothing.precision import read_precision
-from ._spaces import Array, Groups, Product, Space, SpecialEuclidean, factors_of, karcher_mean, parts_of, space_named
+from ._spaces import (
+    Array,
+    Groups,
+    Product,
+    Quotient,
+    Space,
+    SpecialEuclidean,
+    factors_of,
+    karcher_mean,
+    parts_of,
+    space_named,
+)
 from ._time import Moments, time_axis_of
 from ._typing import Duplicates, FitOptions, FloatArray, P, PointsLike, PProduct, SmoothingOptions, TimesLike
 from ._validation import one_of
+from ._warnings import warn
+from .manifolds import Manifold
+
+# Neighbours this near to each other's cut locus, as a fraction of the distance to it, have no unique geodesic.
+_AT_CUT_LOCUS = 1e-12
 
 
 class CutOptions(TypedDict, total=False):
@@ -129,6 +146,12 @@ def fit_segments(
         If the input does not meet the requirements above, or no segment has `min_points` points.
     CutLocusError, ConvergenceError
         As for `fit_many`. The attribute ``spline`` is the list of all curves.
+
+    Warns
+    -----
+    FarPointsWarning
+        If two neighbours lie at each other's cut locus, such as opposite directions. The recording is also cut between
+        them, unless `smooth` is True.
 
     See Also
     --------
@@ -281,7 +304,12 @@ def cut(
         arrays = [_at_once(f, a, starts, duplicates) for f, a in zip(factors_of(space), arrays, strict=True)]
         rows, moments, seconds, new = rows[new], moments[new], seconds[new], new[new]
     gap = _seconds(max_gap, time_axis.dates or time_axis.durations)
-    cuts = np.flatnonzero(np.diff(seconds) > gap) + 1
+    apart = np.diff(seconds) > gap
+    if used is None:
+        opposite = _opposite(space, arrays) & ~apart
+        _warn_of_opposite(opposite, rows, moments)
+        apart |= opposite
+    cuts = np.flatnonzero(apart) + 1
     segments = [
         slice(a, b)
         for a, b in zip([0, *cuts], [*cuts, len(seconds)], strict=True)
@@ -292,6 +320,32 @@ def cut(
         for own in segments
     ]
     return Cut(curves, [rows[own] for own in segments], np.diff(seconds), gap)
+
+
+def _opposite(space: Space, arrays: list[Array]) -> NDArray[np.bool_]:
+    """Return between which neighbours there is no unique shortest geodesic, in any factor."""
+    found = np.zeros(max(len(arrays[0]) - 1, 0), bool)
+    for factor, points in zip(factors_of(space), arrays, strict=True):
+        if isinstance(factor, (Manifold, Quotient)) or not np.isfinite(factor.injectivity_radius):
+            continue
+        with np.errstate(all="ignore"):
+            found |= factor._apply("cut_fraction", p=points[:-1], q=points[1:]) >= 1 - _AT_CUT_LOCUS
+    return found
+
+
+def _warn_of_opposite(opposite: NDArray[np.bool_], rows: NDArray[np.intp], moments: Any) -> None:
+    if not opposite.any():
+        return
+    i = int(np.argmax(opposite))
+    count = int(np.count_nonzero(opposite))
+    more = f" (and {count - 1} more such pairs)" if count > 1 else ""
+    warn(
+        f"`points[{rows[i]}]` and `points[{rows[i + 1]}]`, at t = {moments[i]} and {moments[i + 1]}{more}, lie at each "
+        "other's cut locus: no unique shortest geodesic joins them. The recording is divided between them. Put a point "
+        "between them to join both parts.",
+        FarPointsWarning,
+        node=int(rows[i]),
+    )
 
 
 def _seconds(max_gap: Any, dates: bool) -> float:
