@@ -57,6 +57,7 @@ def test_long_curves_name_the_solvers_that_did_not_run():
     near, far = walk(514, 0.3), walk(514, 1.8)
     report = ss.CubicSpline(None, np.stack([near, far]), "sphere:2").report
     assert report.converged.all()
-    assert report.skipped == ("fixed-point", "newton", "homotopy", "trust-region")
+    every = {"fixed-point", "newton", "homotopy", "trust-region"}
+    assert set(report.skipped) == every - {report.method}
     assert ss.CubicSpline(None, near, "sphere:2").report.skipped == ()
     assert ss.CubicSpline(None, far, "sphere:2", method="quasi-newton").report.skipped == ()

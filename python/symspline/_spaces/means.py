@@ -97,7 +97,7 @@ def _minimum_of_arrays(space: Any, groups: Groups, kind: _Kind) -> Any:
         put(points, slow, rest.points)
         found.unfinished[slow] = rest.unfinished
     results = []
-    for group in several:
+    for group in map(int, several):
         one = groups.of(np.arange(len(groups.counts)) == group)
         results.append(_global_minimum(space, one, kind, group if len(groups.counts) > 1 else None))
         _assign(points, group, results[-1].point)
@@ -165,7 +165,9 @@ def _on_torus(group: Groups, kind: _Kind) -> _Found:
     excess = [own.other_objective / own.objective - 1 if own.objective > 0 else np.inf for own in each]
     worst = int(np.argmin(excess))
     distance = (
-        float(abs(wrap(np.float64(each[worst].other_angle) - angles[worst]))) if excess[worst] < np.inf else np.inf
+        float(abs(float(wrap(np.asarray(each[worst].other_angle - angles[worst])))))
+        if excess[worst] < np.inf
+        else np.inf
     )
     total = sum(own.objective for own in each)
     return _Found(nearest, distance, excess[worst], _standard_error(total, group.weights))
@@ -181,7 +183,7 @@ def _on_circle(space: Any, group: Groups, kind: _Kind) -> _Found:
         point = space.exp(base, found.angle / scale * unit)
     distance, excess = np.inf, np.inf
     if np.isfinite(found.other_objective) and found.objective > 0:
-        distance = abs(wrap(np.float64(found.other_angle - found.angle))) / scale
+        distance = abs(float(wrap(np.asarray(found.other_angle - found.angle)))) / scale
         excess = found.other_objective / found.objective - 1
     square = circular_mean(angles, group.weights).objective
     return _Found(_near(space, group, point), distance, excess, _standard_error(square, group.weights) / scale)
@@ -195,7 +197,7 @@ def _angles(space: Any, points: Array) -> tuple[Array, Array, Floats, float]:
     error: CutLocusError | None = None
     # No datum may be opposite to the base. The golden angle misses data at regular angles.
     for turn in np.arange(12) * np.pi * (3 - np.sqrt(5)):
-        base = space.exp(start, wrap(np.float64(turn)) / scale * unit)
+        base = space.exp(start, wrap(np.asarray(turn)) / scale * unit)
         at = np.broadcast_to(base, points.shape)
         try:
             logs = space.log(at, points)
