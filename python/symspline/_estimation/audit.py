@@ -23,6 +23,8 @@ from .terms import ForceTerm, FunctionTerm, PointTerm, RateTerm, Term
 _SAMPLE = 64
 # Distance from the centre of a prior that is improbable, in its standard deviations.
 _PRIOR = 4.0
+# Distance from the minimum in standard deviations that a warning reports.
+_DISTANCE = 0.5
 # The logarithm of a ratio of sizes must agree so well with that of two units.
 _SIMILAR = 0.6
 # Sensors whose times span such different intervals have different units of time, or hardly overlap.
@@ -49,6 +51,13 @@ def audit(setup: Setup, found: Solution) -> float:
         )
     known = [(own.finding.ratio**2, own.finding.freedom) for own in sensors if np.isfinite(own.finding.ratio)]
     freedom = sum(weight for _, weight in known)
+    if found.distance > _DISTANCE:
+        warn(
+            f"The curve is {found.distance:.2g} standard deviations from the minimum of its objective, because it "
+            f"turns by up to {found.turn:.2g} rad between two knots, where the linearised problem is inaccurate. Pass "
+            "more knots.",
+            SmoothingWarning,
+        )
     return float(np.sqrt(sum(square * weight for square, weight in known) / freedom)) if freedom else float("nan")
 
 

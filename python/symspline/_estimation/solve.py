@@ -13,12 +13,13 @@ from .. import _core
 from .._arrays import as_array, short_repr
 from .._core import ValidationError
 from .._curves.curve import CoreCurve
+from .._curves.ends import end_kinds
 from .._curves.fit import FitProblem, Points, fit, read_ends
 from .._curves.solve import DEFAULTS
 from .._smoothing.audit import CORNERS
-from .._smoothing.posterior import frames_at
+from .._smoothing.posterior import Posterior, frames_at
 from .._smoothing.report import SmoothingReport
-from .._spaces import Array, Doubles, Space
+from .._spaces import Array, Doubles, Euclidean, Space
 from .along import Motion
 from .measurements import Constant
 from .terms import Linearised, Term, Values
@@ -33,6 +34,9 @@ _RETREATS = 6
 _BACK = -0.3
 # The relative accuracy of the objective: a step changes it by less where the gradient is that of the linear problem.
 _ROUNDING = 1e-5
+# From this turn between two knots on, the solution of the linear problems may differ from the minimum. It is then
+# measured by so many samples and differences of this part of a standard deviation.
+_TURN, _SAMPLES, _SMALL = 0.9, 6, 0.05
 # Parameters are not determined if the measurements leave less than this fraction of their information.
 _SINGULAR = 1e-12
 
@@ -106,6 +110,10 @@ class Solution(NamedTuple):
         Variances of the coordinates at the knots for noise of variance one.
     loss : float
         Sum of the losses of all measurements and of the priors.
+    turn : float
+        Largest distance that the curve covers between two knots, in units of the radius of curvature of its space.
+    distance : float
+        Distance from the minimum in standard deviations, 0 where the turn is too small for a difference.
     failure : str
         What went wrong, or "".
     """
@@ -119,6 +127,8 @@ class Solution(NamedTuple):
     roots: list[Doubles | None]
     variances: Doubles
     loss: float
+    turn: float
+    distance: float
     failure: str
 
 
@@ -349,15 +359,63 @@ class Iteration:
         covariance = np.full_like(found.information, np.nan)
         if np.isfinite(found.information).all():
             covariance = np.asarray(np.linalg.pinv(found.information, hermitian=True), np.float64)
-        variances = found.variances[0]
+        turn = max(_turn(space, curve) for space, curve in zip(setup.spaces, self.curves, strict=True))
+        distance = self._distance(found) if turn > _TURN and not failure else 0.0
         return Solution(
-            self.points, self.values, reports, found.matrices, covariance, linear, weights, variances, loss, failure
+            self.points,
+            self.values,
+            reports,
+            found.matrices,
+            covariance,
+            linear,
+            weights,
+            found.variances[0],
+            loss,
+            turn,
+            distance,
+            failure,
         )
 
-    def _linearised(self) -> list[Linearised]:
+    def _objective(self, lams: Doubles) -> float:
+        """Return the sum of all losses and of the penalties at the present curves."""
+        _, value = self._weighted(self._linearised(derivatives=False))
+        return value + sum(
+            float(lam) * energy(own, self.setup.penalty) for lam, own in zip(lams, self.curves, strict=True)
+        )
+
+    def _distance(self, found: Linear) -> float:
+        """Return the distance from the minimum of the objective in standard deviations, the Newton decrement.
+
+        The linear problem moves the curve by splines in frames along it. The splines through moved points differ from
+        these where the curve turns far between knots, and so does the minimum. With samples ξ of the posterior
+        N(0, A⁻¹) and the gradient g, the squared decrement gᵀA⁻¹g is the mean of (gᵀξ)².
+        """
+        setup, points, curves = self.setup, self.points, self.curves
+        band = found.matrices[0]
+        m = band.shape[1] // 4
+        posterior, kinds = Posterior.of(band, np.zeros((0, 0)), m), end_kinds(setup.bc_type)
+        joint = Euclidean(m)
+        moves = posterior.samples(joint, setup.knots, (), kinds, np.random.default_rng(0), _SAMPLES)
+        slopes = []
+        for move in moves.reshape(_SAMPLES, len(setup.knots), m):
+            step = Step(
+                points, self.values, self._tangents(move), np.zeros(sum(x.size for x in setup.constants.values()))
+            )
+            sides = []
+            for size in (_SMALL, -_SMALL):
+                moved = self._moved(step, size)
+                if moved is not None:
+                    self.curves = moved
+                    sides.append(self._objective(found.lams))
+                self.points, self.curves = points, curves
+            if len(sides) == 2:
+                slopes.append((sides[0] - sides[1]) / (4 * _SMALL))
+        return float(np.sqrt(np.mean(np.square(slopes)))) if slopes else 0.0
+
+    def _linearised(self, derivatives: bool = True) -> list[Linearised]:
         setup = self.setup
         spacing = float(setup.knots[-1] - setup.knots[0]) / (len(setup.knots) - 1)
-        return [term.linearised(self.motion_at, self.values, spacing) for term in setup.terms]
+        return [term.linearised(self.motion_at, self.values, spacing, derivatives) for term in setup.terms]
 
     def _weighted(self, linear: list[Linearised]) -> tuple[list[Doubles | None], float]:
         """Return the roots of the weights of a robust loss, and the sum of all losses."""
@@ -492,6 +550,18 @@ def energy(curve: CoreCurve, penalty: str) -> float:
 def _is_finite(found: Linear) -> bool:
     numbers = (found.step, found.changes, found.information, *found.variances)
     return all(bool(np.isfinite(own).all()) for own in numbers)
+
+
+def _turn(space: Space, curve: CoreCurve) -> float:
+    """Return the largest distance that a curve covers between two knots, in units of the radius of curvature.
+
+    Spaces without curvature have none.
+    """
+    if space.curvature == 0 or not np.isfinite(space.injectivity_radius):
+        return 0.0
+    speeds = np.linalg.norm(bending(curve)[0], axis=1) * len(curve.times[1:]) / np.ptp(curve.times)
+    steps = np.diff(curve.times)
+    return float(np.max(np.maximum(speeds[1:], speeds[:-1]) * steps)) * np.pi / space.injectivity_radius
 
 
 def _largest(found: Linear) -> float:

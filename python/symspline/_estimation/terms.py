@@ -148,7 +148,11 @@ class Term:
         return residuals
 
     def linearised(
-        self, motion_at: Callable[[Doubles, list[int], int], list[Motion]], values: Values, spacing: float
+        self,
+        motion_at: Callable[[Doubles, list[int], int], list[Motion]],
+        values: Values,
+        spacing: float,
+        derivatives: bool = True,
     ) -> Linearised:
         """Linearise the measurements.
 
@@ -160,10 +164,14 @@ class Term:
             Values of the parameters.
         spacing : float
             Mean distance of the knots.
+        derivatives : bool
+            Whether the derivatives are needed; without them only the residuals are computed.
         """
         offset = 0.0 if self.time_offset is None else float(values[self.time_offset][0])
         motion = motion_at(self.times + offset, self.parts, self.nu)
         residuals = self.measure(motion, values)
+        if not derivatives:
+            return Linearised(residuals / self.noise, [{}, {}, {}], {})
         jacobians, parameters = self.derivatives(motion, values)
         if self.time_offset is not None:
             step = STEP * spacing
