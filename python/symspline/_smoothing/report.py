@@ -42,7 +42,8 @@ class SmoothingReport:
     df : float or ndarray
         Effective degrees of freedom per coordinate: 2 for a geodesic, and the number of data for interpolation.
     sigma : float or ndarray
-        Estimated standard deviation of the noise in one coordinate, for weight one.
+        Estimated standard deviation of the noise in one coordinate, for weight one. For `estimate` with given standard
+        deviations, the ratio of the residuals and these.
 
     See Also
     --------

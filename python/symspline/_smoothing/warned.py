@@ -23,7 +23,10 @@ _SAMPLE = 1000
 
 
 class SmoothingWarning(UserWarning):
-    """Warning that the chosen λ is at a bound: the curve follows nearly all data or has no bending energy."""
+    """Warning that a statistical fit cannot be trusted.
+
+    The chosen λ is at a bound, or the residuals are not those of independent noise with the given standard deviations.
+    """
 
 
 def warn_of_bounds(space: Space, reports: list[Any], chosen: list[Any], counts: list[Any]) -> None:
