@@ -205,9 +205,9 @@ def make_smoothing_spline(
     -----
     SmoothingWarning
         If the chosen λ is at a bound: the curve follows nearly all data, has no bending energy, or is the roughest one
-        that was found. If the residuals are not those of independent noise: they are more than 1.75 times the noise that
-        neighbouring data show, neighbours are correlated, least squares met outliers, or `sigma` is wrong. With a given
-        λ, only a given `sigma` is examined.
+        that was found. If the residuals are not those of independent noise: they are more than 1.75 times the noise
+        that neighbouring data show, neighbours are correlated, least squares met outliers, or `sigma` is wrong. With a
+        given λ, only a given `sigma` is examined.
     ConvergenceWarning
         If a curve fails and `on_failure` is ``"warn"``.
     FarPointsWarning
