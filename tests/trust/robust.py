@@ -58,7 +58,11 @@ def recording(name: str, seed: int) -> tuple[Any, Any, Any, Any]:
             continue
         # The whole run is displaced alike.
         own = slice(first, first + length)
-        moved = space.transport(np.broadcast_to(points[first], points[own].shape), points[own], np.broadcast_to(direction, points[own].shape))
+        moved = space.transport(
+            np.broadcast_to(points[first], points[own].shape),
+            points[own],
+            np.broadcast_to(direction, points[own].shape),
+        )
         points[own] = space.exp(points[own], size * moved)
     return t + 3600.25, points, bad, lambda x: path(np.asarray(x) - 3600.25)
 

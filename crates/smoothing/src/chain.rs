@@ -72,6 +72,27 @@ pub fn chain(space: &Erased, data: &Data) -> Vec<f64> {
     kept
 }
 
+/// The standard deviation, at weight one, that rounding of the data causes: to floating-point numbers, or to the digits
+/// of a file if many consecutive data are the same.
+pub fn rounding(space: &Erased, data: &Data) -> f64 {
+    /// The least part of consecutive data that are the same, and that are not.
+    const SAME: f64 = 0.25;
+    const DIFFERENT: f64 = 0.05;
+    let largest = |x: &[f64]| x.iter().map(|x| x.abs()).fold(0.0, f64::max);
+    let used: Vec<usize> = (0..data.times.len()).filter(|&i| data.weights[i] > 0.0).collect();
+    let pairs: Vec<(usize, usize)> = (1..used.len()).map(|i| (i - 1, i)).collect();
+    let mut steps = squares(space, data.points, &used, &pairs);
+    steps.retain(|x| *x > 0.0);
+    let different = steps.len() as f64 / pairs.len().max(1) as f64;
+    // With half of a unit of the last digit, data that differ by one unit are kept.
+    let digits = if different > DIFFERENT && different < 1.0 - SAME {
+        0.5 * steps.into_iter().fold(f64::INFINITY, f64::min).sqrt()
+    } else {
+        0.0
+    };
+    digits.max(largest(data.points) * f64::EPSILON) * largest(data.weights).sqrt()
+}
+
 /// The squared distances of pairs of data. Beyond the cut locus they are infinite.
 fn squares(space: &Erased, points: &[f64], used: &[usize], pairs: &[(usize, usize)]) -> Vec<f64> {
     let len = space.point_len();
@@ -89,6 +110,36 @@ fn squares(space: &Erased, points: &[f64], used: &[usize], pairs: &[(usize, usiz
             own.iter().take(pairs.len() - found.len()).map(|x| if x.is_nan() { f64::INFINITY } else { *x }),
         );
     }
+    found
+}
+
+/// The squared distances of some of the data from the geodesic between the ones before and after; zero at both ends.
+///
+/// An isolated outlier is farther from there than its neighbours, whose geodesics it moves by a part of its distance.
+pub fn deviations(space: &Erased, data: &Data, chosen: &[usize]) -> Vec<f64> {
+    let (len, inner) = (space.point_len(), chosen.len().saturating_sub(2));
+    let row = |i: usize| &data.points[chosen[i] * len..][..len];
+    let share = |i: usize| {
+        let [a, b, c] = [i, i + 1, i + 2].map(|i| data.times[chosen[i]]);
+        if c > a { (b - a) / (c - a) } else { 0.5 }
+    };
+    let [mut p, mut q, mut y, mut v, mut between] = [(); 5].map(|_| vec![Lane::ZERO; len]);
+    let mut found = vec![0.0];
+    for group in 0..inner.div_ceil(LANES) {
+        let at = lanes_of(group, inner);
+        gather(at.map(row), &mut p);
+        gather(at.map(|i| row(i + 1)), &mut y);
+        gather(at.map(|i| row(i + 2)), &mut q);
+        space.log(&p, &q, &mut v);
+        space.ray(&p, &v, Lane::new(at.map(share)), &mut between);
+        let angle = space.log(&between, &y, &mut v);
+        let apart = space.distance(&between, &y, &v, angle);
+        let own = (apart * apart).to_array();
+        found.extend(
+            own.iter().take(inner + 1 - found.len()).map(|x| if x.is_nan() { f64::INFINITY } else { *x }),
+        );
+    }
+    found.resize(chosen.len(), 0.0);
     found
 }
 

@@ -1,6 +1,7 @@
 //! One curve during the iteration to the smoothing spline.
 
 use crate::banded::Banded;
+use crate::chain::deviations;
 use crate::choice::Linear;
 use crate::cyclic::PeriodicCorrection;
 use crate::frames::{Frames, curvature_gradient};
@@ -351,7 +352,7 @@ impl<'a> CurveFit<'a> {
         let over = taken >= self.robust.most(options.max_iter);
         let left = small && self.robust.leaves(&residuals.squares);
         if self.progress.settled && (left || (!self.robust.last() && (small || over))) {
-            return self.go_on(&residuals.squares);
+            return self.go_on(space, &residuals.squares);
         }
         if self.progress.settled && small {
             if let (Some(mut whole), Some((factors, softness))) =
@@ -455,14 +456,23 @@ impl<'a> CurveFit<'a> {
     }
 
     /// Starts the next stage of a robust fit.
-    fn go_on(&mut self, squares: &[f64]) {
+    fn go_on(&mut self, space: &Erased, squares: &[f64]) {
         let leverage = |(row, w): (&Row, &f64)| {
             self.inverse.as_ref().map_or(0.0, |inverse| w * row.square(inverse).as_array()[0])
         };
         let leverages: Vec<f64> = self.linearized.data.iter().zip(self.data.weights).map(leverage).collect();
         let freedom = self.progress.report.freedom;
         let lam = self.progress.lam;
-        let at = AtCurve { times: self.data.times, squares, leverages: &leverages, freedom, lam };
+        let data = self.data;
+        let deviations = |chosen: &[usize]| deviations(space, &data, chosen);
+        let at = AtCurve {
+            times: data.times,
+            squares,
+            leverages: &leverages,
+            freedom,
+            lam,
+            deviations: &deviations,
+        };
         let lam = self.robust.next(&at);
         self.progress.restart(lam);
         (self.objective, self.before, self.strays) = (f64::INFINITY, None, 0);

@@ -40,7 +40,7 @@ const LEFT: f64 = 2.0;
 /// The limit for squared deviations in that case, in medians.
 const GROSS: f64 = 900.0;
 /// Deviations grow with the time between the neighbours, their squares about with this power.
-const GROWTH: i32 = 5;
+const GROWTH: f64 = 5.0;
 /// The numbers of data at the ends that are not rejected in that case, and of those on either side whose deviations are
 /// compared.
 const AT_ENDS: usize = 3;
@@ -78,6 +78,8 @@ pub struct AtCurve<'a> {
     pub freedom: f64,
     /// Its λ.
     pub lam: Option<f64>,
+    /// The squared distances of chosen data from the geodesics between their neighbours.
+    pub deviations: &'a dyn Fn(&[usize]) -> Vec<f64>,
 }
 
 /// A loss function with its noise level.
@@ -94,7 +96,7 @@ pub struct Robust {
     known: bool,
     /// λ, if it is given.
     lam: Option<f64>,
-    /// The noise that rounding of the points causes.
+    /// The least standard deviation of the noise, which rounding of the points causes.
     rounding: f64,
     /// The selected data: one if included, otherwise zero.
     kept: Vec<f64>,
@@ -259,7 +261,7 @@ impl Robust {
         self.selection = if interpolated { Selection::Interpolated } else { Selection::Sound };
         let next = if interpolated {
             self.sigma = self.scale(of_kept(&squares));
-            self.gross(&squares, at.times)
+            self.gross(&squares, at)
         } else {
             let own = of_kept(&squares);
             let largest = own.iter().copied().fold(0.0, f64::max);
@@ -286,7 +288,9 @@ impl Robust {
                 self.selection = Selection::Unsettled;
             }
             self.first = at.lam;
-            if self.selection == Selection::Interpolated {
+            // Data without noise have no M-estimator.
+            let exact = !self.known && self.sigma <= self.rounding;
+            if self.selection == Selection::Interpolated || exact {
                 (self.stage, self.truncated) = (Stage::Final, true);
                 return Lam::Same;
             }
@@ -351,7 +355,8 @@ impl Robust {
     }
 
     /// The data without isolated ones that deviate much more than others, and with those that do not.
-    fn gross(&self, squares: &[f64], times: &[f64]) -> Vec<f64> {
+    fn gross(&self, squares: &[f64], at: &AtCurve) -> Vec<f64> {
+        let times = at.times;
         let n = squares.len();
         let mut next = self.kept.clone();
         let used: Vec<usize> = (0..n).filter(|&k| self.used[k]).collect();
@@ -359,14 +364,15 @@ impl Robust {
         if kept.len() < 2 * AT_ENDS {
             return next;
         }
-        // The time from the selected datum before to the one behind.
+        // The product of the times to the selected data before and behind, the square of one of them at an end.
         let around = |k: usize| {
             let (from, to) = (kept.partition_point(|&i| i < k), kept.partition_point(|&i| i <= k));
-            let (left, right) = (from.saturating_sub(1), to.min(kept.len() - 1));
-            times[kept[right]] - times[kept[left]]
+            let before = from.checked_sub(1).map(|i| times[k] - times[kept[i]]);
+            let behind = kept.get(to).map(|&i| times[i] - times[k]);
+            before.or(behind).unwrap_or(0.0) * behind.or(before).unwrap_or(0.0)
         };
         let usual = chain::quantile(kept.iter().map(|&k| around(k)).collect(), 0.5).unwrap_or(1.0);
-        let relative = |k: usize| squares[k] / (around(k) / usual).max(1.0).powi(GROWTH);
+        let relative = |k: usize| squares[k] / (around(k) / usual).max(1.0).powf(0.5 * GROWTH);
         let of_kept: Vec<f64> = kept.iter().map(|&k| relative(k)).collect();
         let least = (self.rounding * self.rounding).max(chain::quantile(of_kept.clone(), 0.5).unwrap_or(0.0));
         // The path may bend more in one part than in another.
@@ -375,16 +381,22 @@ impl Robust {
             let near = &of_kept[at.saturating_sub(NEAR)..(at + NEAR).min(kept.len())];
             GROSS * chain::quantile(near.to_vec(), 0.5).unwrap_or(0.0).max(least)
         };
+        // An outlier moves the curve near it, so that its neighbours seem to deviate, too, and even more beside gaps.
+        let beside = (at.deviations)(&kept);
         for (place, &k) in kept.iter().enumerate() {
-            let near = &of_kept[place.saturating_sub(BESIDE)..(place + BESIDE + 1).min(kept.len())];
-            let isolated = near.iter().all(|x| *x <= of_kept[place]);
+            let near = &beside[place.saturating_sub(BESIDE)..(place + BESIDE + 1).min(kept.len())];
+            let isolated = near.iter().all(|x| *x <= beside[place]);
             let inside = place >= AT_ENDS && place + AT_ENDS < kept.len();
             if inside && isolated && of_kept[place] > limit(k) {
                 next[k] = 0.0;
             }
         }
-        for &k in used.iter().filter(|&&k| self.kept[k] == 0.0) {
-            if relative(k) <= limit(k) {
+        // A run returns from its ends: inside it, the curve is not known.
+        let selected =
+            |place: Option<usize>| place.and_then(|i| used.get(i)).is_some_and(|&k| self.kept[k] > 0.0);
+        for (place, &k) in used.iter().enumerate() {
+            let beside_one = selected(place.checked_sub(1)) || selected(Some(place + 1));
+            if self.kept[k] == 0.0 && beside_one && relative(k) <= limit(k) {
                 next[k] = 1.0;
             }
         }

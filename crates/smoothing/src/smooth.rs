@@ -1,7 +1,7 @@
 //! Smoothing of many curves at a time: every iteration advances all curves that have not converged.
 
 use crate::banded::stride;
-use crate::chain::chain;
+use crate::chain::{chain, rounding};
 use crate::curve_fit::CurveFit;
 use crate::information;
 use crate::path::Path;
@@ -278,12 +278,6 @@ fn chosen(space: &Erased, data: &Data, kept: &[f64]) -> [Vec<f64>; 3] {
     ]
 }
 
-/// The standard deviation, at weight one, that rounding of the points to floating-point numbers causes.
-fn rounding(data: &Data) -> f64 {
-    let largest = |x: &[f64]| x.iter().map(|x| x.abs()).fold(0.0, f64::max);
-    largest(data.points) * f64::EPSILON * largest(data.weights).sqrt()
-}
-
 /// Initial curves for the curves without one; none if even the geodesic between the first and the last mean does not
 /// exist.
 fn start<'a>(
@@ -316,7 +310,7 @@ fn start<'a>(
             let robust = if options.loss == Loss::Linear {
                 Robust::plain(m)
             } else {
-                let (kept, rounding) = (beginnings[*c].kept.clone(), rounding(&own));
+                let (kept, rounding) = (beginnings[*c].kept.clone(), rounding(space, &own));
                 Robust::new(options.loss, m, own.sigma, own.lam, kept, own.weights, rounding)
             };
             tracks[*c] = Some(CurveFit::new(own, m, knots.to_vec(), points, options, robust));

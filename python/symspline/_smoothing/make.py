@@ -167,6 +167,8 @@ def make_smoothing_spline(
         knots.
     loss : {"linear", "huber", "cauchy"}, default "linear"
         Least squares, or a loss that limits the influence of outliers. Use ``"cauchy"`` for many or distant outliers.
+        λ is chosen from data without outliers. If they have so little noise that the curve follows nearly all of them,
+        the result is the curve of least squares through these data, with λ by ``"reml"``.
     method : {"auto", "linearized", "newton"}, default "auto"
         ``"linearized"`` solves the linearised problem in frames along the curve repeatedly. Its result differs from
         the minimum by about 1e-4 of the error, and by more where segments are long. ``"newton"`` is the full
@@ -175,7 +177,7 @@ def make_smoothing_spline(
     tol : float, default 1e-3
         The iteration ends when no point moves by more than this fraction of its standard deviation.
     max_iter : int, default 50
-        Largest number of iterations, each of which fits a spline. Robust losses have three stages with a limit each;
+        Largest number of iterations, each of which fits a spline. Robust losses have several stages with a limit each;
         the last of them may take 20 times as many.
     extrapolate, on_failure, atol : optional
         As for `CubicSpline`.
@@ -207,7 +209,8 @@ def make_smoothing_spline(
         If the chosen λ is at a bound: the curve follows nearly all data, has no bending energy, or is the roughest one
         that was found. If the residuals are not those of independent noise: they are more than 1.75 times the noise
         that neighbouring data show, neighbours are correlated, least squares met outliers, or `sigma` is wrong. With a
-        given λ, only a given `sigma` is examined.
+        given λ, only a given `sigma` is examined. If a robust loss may have rejected the wrong data. If another curve
+        may fit better, because the noise is large or the data turn far from one to the next.
     ConvergenceWarning
         If a curve fails and `on_failure` is ``"warn"``.
     FarPointsWarning

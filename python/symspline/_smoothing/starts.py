@@ -33,18 +33,18 @@ from .factors import is_several, smoothed_spaces
 from .report import SmoothingReport
 from .warned import SmoothingWarning
 
-# Standard deviation of the noise, divided by the injectivity radius, from which a second start is tried: 34° on a circle.
-# With less noise the first start always led to the best minimum.
+# Standard deviation of the noise, divided by the injectivity radius, from which a second start is tried: 34° on a
+# circle. With less noise the first start always led to the best minimum.
 _NOISY = 0.19
 # The same ratio from which the best minimum found may be a wrong one: 50° on a circle.
 _TOO_NOISY = 0.28
-# Median step between the data as a fraction of the way to the cut locus, from which the data are a start, unless a curve
-# was found with less noise than this part of the injectivity radius.
+# Median step between the data as a fraction of the way to the cut locus, from which the data are a start, unless a
+# curve was found with less noise than this part of the injectivity radius.
 _FAST, _SMALL = 0.6, 0.05
 # The same ratio of the noise from which the iteration may leave the right curve of fast data.
 _FAST_NOISY = 0.03
-# Objectives that differ by less than this multiple of the variance are nearly equal, and curves that differ by this part
-# of the injectivity radius are different.
+# Objectives that differ by less than this multiple of the variance are nearly equal, and curves that differ by this
+# part of the injectivity radius are different.
 _EQUAL, _OTHER = 12.0, 0.5
 # The largest number of coordinates of an embedding.
 _WIDE = 64
@@ -56,7 +56,7 @@ UNIQUE, TWO, NOISY, FAST = range(4)
 
 
 class Raw(NamedTuple):
-    """Results of the core for a batch of curves: points at the knots, the band of A⁻¹, columns of the report, and A."""
+    """Results of the core for a batch of curves: points at the knots, the band of A⁻¹, columns of the report, A."""
 
     points: Doubles
     band: Doubles
@@ -81,7 +81,9 @@ class Raw(NamedTuple):
 
         columns = tuple(map(pick, self.columns, other.columns))
         matrix, turn = map(pick, self.system[:2], other.system[:2])
-        return Raw(pick(self.points, other.points), pick(self.band, other.band), columns, (matrix, turn, self.system[2]))
+        return Raw(
+            pick(self.points, other.points), pick(self.band, other.band), columns, (matrix, turn, self.system[2])
+        )
 
 
 class Column:
@@ -91,8 +93,7 @@ class Column:
 
 
 class Samples(NamedTuple):
-    """Data of a batch of curves: times (N,) or (..., N), points (..., N, *point_shape) with `axes` axes of a point, weights,
-    and knots."""
+    """Data of a batch of curves: times (N,) or (..., N), points with `axes` axes of a point, weights, and knots."""
 
     times: Doubles
     points: Array
@@ -119,23 +120,21 @@ def best_of_starts(space: Space, data: Samples, lam: Doubles, solve: Solve) -> t
     radius = space.injectivity_radius
     if not (np.isfinite(radius) and radius > 0) or not lam.size:
         return first, kinds
-    # A curve that failed has no noise level.
-    noise = _noise(first) / radius
+    radii = radius * np.sqrt(_usual_weights(data, lam.size))
     fast = _median_steps(space, data) > _FAST
-    noisy = noise > _NOISY
+    noisy = _noise(first) > _NOISY * radii
     if not (noisy | fast).any():
         return first, kinds
     best = first
     if fast.any():
         for start in _fast_starts(space, data):
-            if not (fast & (_noise(best) > _SMALL * radius)).any():
+            if not (fast & (_noise(best) > _SMALL * radii)).any():
                 break
             other = solve(lam, start)
             chooses = np.isnan(lam)
             less = np.where(chooses, _noise(other) < 0.7 * _noise(best), _is_less(other, best))
             best = best.where(fast & other.converged & (less | ~best.converged), other)
-    noise = np.where(best.converged, _noise(best) / radius, np.inf)
-    noisy = noise > _NOISY
+    noisy = _noise(best) > _NOISY * radii
     if noisy.any():
         given = np.where(best.converged, best.columns[Column.LAM], lam)
         start = _embedded_start(space, data, given)
@@ -147,13 +146,19 @@ def best_of_starts(space: Space, data: Samples, lam: Doubles, solve: Solve) -> t
             differ = np.abs(other.columns[Column.OBJECTIVE] - best.columns[Column.OBJECTIVE])
             kinds[noisy & both & apart & (differ < _EQUAL * variance)] = TWO
             best = best.where(noisy & other.converged & (_is_less(other, best) | ~best.converged), other)
-    noise = _noise(best) / radius
-    kinds[(kinds == UNIQUE) & ~fast & (noise > _TOO_NOISY)] = NOISY
-    kinds[fast & (noise > _FAST_NOISY)] = FAST
+    kinds[(kinds == UNIQUE) & ~fast & (_noise(best) > _TOO_NOISY * radii)] = NOISY
+    kinds[fast & (_noise(best) > _FAST_NOISY * radii)] = FAST
     return best, kinds
 
 
+def _usual_weights(data: Samples, curves: int) -> Doubles:
+    """Return the median weight of every curve. The noise level is that of weight one."""
+    rows = data.weights.reshape(-1, data.weights.shape[-1])
+    return np.array([np.median(own[own > 0]) if (own > 0).any() else 1.0 for own in rows]) * np.ones(curves)
+
+
 def _noise(raw: Raw) -> Doubles:
+    """Return the noise levels, which are infinite for curves that failed."""
     return np.where(raw.converged, raw.columns[Column.SIGMA], np.inf)
 
 
@@ -218,8 +223,8 @@ def warn_of_minima(space: Space, kinds: list[Any], reports: list[SmoothingReport
 
 _MESSAGES = {
     TWO: (
-        "Two curves fit the data{of} nearly equally well (noise {noise}): they go around {space!r} in different ways. The "
-        "better one was returned. Plot it, and pass more data per time, or weights of 0 for wrong data."
+        "Two curves fit the data{of} nearly equally well (noise {noise}): they go around {space!r} in different ways. "
+        "The better one was returned. Plot it, and pass more data per time, or weights of 0 for wrong data."
     ),
     NOISY: (
         "The noise of the data{of}, {noise} in a coordinate, is so large a part of the distance to the cut locus of "
@@ -227,8 +232,8 @@ _MESSAGES = {
         "weights of 0 for wrong data. Check the units of angles."
     ),
     FAST: (
-        "The data{of} turn by more than half of the way to the cut locus of {space!r} from one to the next, and have the "
-        "noise {noise}: the curve may turn by other angles. Pass more data per time. If the angular velocity is "
+        "The data{of} turn by more than half of the way to the cut locus of {space!r} from one to the next, and have "
+        "the noise {noise}: the curve may turn by other angles. Pass more data per time. If the angular velocity is "
         "known, remove its turn from the data before."
     ),
 }
@@ -278,8 +283,8 @@ def _nearest(data: Samples) -> NDArray[np.intp]:
 def _modal_turn(space: Space, points: Array) -> tuple[Array, NDArray[np.bool_]]:
     """Return the path from the identity that turns by the most frequent step nearby, and whether in the fixed frame.
 
-    The step is taken in the moving or in the fixed frame, and in windows of several lengths: those whose remaining steps
-    are shortest.
+    The step is taken in the moving or in the fixed frame, and in windows of several lengths: those whose remaining
+    steps are shortest.
     """
     count, identity = len(points), np.eye(points.shape[-1])
     best, turn, in_fixed = np.inf, points, False
@@ -322,7 +327,7 @@ def _modes(vectors: Doubles, window: int) -> Doubles:
 
 
 def _embedded_start(space: Space, data: Samples, lam: Doubles) -> Doubles | None:
-    """Return the projection of the data that were smoothed in a Euclidean space around this one; None if it is unknown."""
+    """Return the projection of the data that were smoothed in a Euclidean space around this one, if it is known."""
     x = data.points
     if isinstance(space, Torus):
         inside = np.concatenate([np.cos(x), np.sin(x)], axis=-1)

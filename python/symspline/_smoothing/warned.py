@@ -25,7 +25,8 @@ _SAMPLE = 1000
 class SmoothingWarning(UserWarning):
     """Warning that a statistical fit cannot be trusted.
 
-    The chosen λ is at a bound, or the residuals are not those of independent noise with the given standard deviations.
+    The chosen λ is at a bound, the residuals are not those of independent noise with the given standard deviations, a
+    robust loss may have rejected the wrong data, or other curves may fit as well.
     """
 
 

@@ -1,0 +1,135 @@
+"""Robust losses where few data deviate: outliers, alone and in runs, and noise far below what the sampling shows."""
+
+import warnings
+
+import numpy as np
+import pytest
+
+import symspline as ss
+
+START = 7200.5
+
+
+def path(space, t):
+    """A smooth path over ten seconds."""
+    u = np.asarray(t) - START
+    v = np.stack([np.sin(u), np.cos(0.7 * u), 0.4 * np.sin(1.3 * u)], axis=-1)
+    if space == ss.space("so:3"):
+        return ss.rotations.from_rotation_vectors(v)
+    if space == ss.space("sphere:2"):
+        return space.exp(np.broadcast_to([0.0, 0.0, 1.0], v.shape), v * [1, 1, 0])
+    return 20 * v
+
+
+def recording(name, noise, first=(), length=1, seed=0, count=200):
+    """Times, data and which of them are outliers: runs of a length that are displaced together."""
+    rng, space = np.random.default_rng(seed), ss.space(name)
+    t = START + np.sort(rng.uniform(0, 10, count))
+    points = path(space, t)
+    points = space.exp(points, noise * space.random_tangent(rng, points))
+    bad = np.zeros(count, bool)
+    for i in first:
+        own = slice(i, i + length)
+        v = space.random_tangent(rng, points[i])
+        v *= (30 if name == "r:3" else 1.2) / space.norm(points[i], v)
+        same = np.broadcast_to(points[i], points[own].shape)
+        moved = v if length == 1 else space.transport(same, points[own], np.broadcast_to(v, same.shape))
+        points[own] = space.exp(points[own], moved)
+        bad[own] = True
+    return space, t, points, bad
+
+
+def largest(space, spline, t):
+    """The largest error between the outermost data."""
+    x = np.linspace(t[4], t[-5], 500)
+    return space.distance(spline(x), path(space, x)).max()
+
+
+@pytest.mark.parametrize("loss", ["huber", "cauchy"])
+@pytest.mark.parametrize("name", ["r:3", "so:3", "sphere:2"])
+@pytest.mark.parametrize(
+    ("noise", "first", "length"), [(1e-8, range(9, 190, 11), 1), (1e-6, (40, 120), 8), (2e-2, (40, 120), 8)]
+)
+def test_outliers_cost_nothing_where_noise_is_small(name, loss, noise, first, length):
+    space, t, points, bad = recording(name, noise, first, length)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ss.SmoothingWarning)
+        robust = ss.make_smoothing_spline(t, points, space, loss=loss)
+        # Cross-validation does not follow data that are that precise.
+        clean = ss.make_smoothing_spline(t[~bad], points[~bad], space, criterion="reml")
+    # Every outlier pulls by the corner of Huber's loss, which is a part of the noise.
+    most = 3.5 if loss == "huber" and noise > 1e-3 else 1.6
+    assert largest(space, robust, t) < most * largest(space, clean, t)
+
+
+def test_a_curve_through_nearly_all_data_says_so_once():
+    space, t, points, bad = recording("r:3", 1e-8, (30, 60, 90))
+    with pytest.warns(ss.SmoothingWarning) as caught:
+        ss.make_smoothing_spline(t, points, space, loss="cauchy")
+    assert len(caught) == 1
+    assert "It rejected 3 data" in str(caught[0].message) and "Pass sigma=" in str(caught[0].message)
+    # With the noise, nothing is unknown.
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        spline = ss.make_smoothing_spline(t, points, space, sigma=1e-8, criterion="reml", lam=1e-16, loss="cauchy")
+    assert np.all(space.distance(spline(t[bad]), points[bad]) > 1)
+
+
+def test_a_recording_that_rests_and_moves_keeps_its_motion():
+    rng, t = np.random.default_rng(3), np.arange(300) * 0.01
+    moving = np.clip(t - 1.5, 0, None)
+    truth = np.stack([np.sin(2 * moving) ** 2, 5 * moving**3, 0 * t], axis=-1)
+    points = truth + 1e-3 * rng.standard_normal(truth.shape)
+    points[[40, 41, 200, 250]] += 3
+    spline = ss.make_smoothing_spline(t, points, "r:3", loss="cauchy")
+    assert np.linalg.norm(spline(t) - truth, axis=-1).max() < 5e-3
+
+
+def test_without_outliers_the_curve_is_that_of_least_squares():
+    for name in ("r:3", "so:3"):
+        space, t, points, _ = recording(name, 0.05)
+        robust = ss.make_smoothing_spline(t, points, space, loss="huber")
+        plain = ss.make_smoothing_spline(t, points, space)
+        assert space.distance(robust(t), plain(t)).max() < 0.05
+        assert robust.sigma == pytest.approx(plain.sigma, rel=0.1)
+
+
+def test_parts_of_a_product_reject_data_of_their_own():
+    so3, t, turns, _ = recording("so:3", 0.01, (50, 90))
+    r3, _, places, bad = recording("r:3", 0.5, (20, 120))
+    both = ss.make_smoothing_spline(t, (turns, places), "so:3 x r:3", loss="cauchy")
+    alone = [ss.make_smoothing_spline(t, own, name, loss="cauchy") for own, name in ((turns, "so:3"), (places, "r:3"))]
+    for space, own, one in zip((so3, r3), both(t), alone, strict=True):
+        assert space.distance(own, one(t)).max() < 1e-9
+    batch = ss.make_smoothing_spline(t, np.stack([places, places[::-1]]), "r:3", loss="cauchy")
+    np.testing.assert_allclose(batch[0](t), alone[1](t), atol=1e-9)
+    weights = np.where(bad, 0.0, 1.0)
+    told = ss.make_smoothing_spline(t, places, "r:3", weights=weights)
+    assert r3.distance(alone[1](t), told(t)).max() < 0.5
+
+
+def test_rounded_data_that_mostly_repeat_are_no_outliers():
+    rng, t = np.random.default_rng(0), np.arange(200.0)
+    level = np.round(0.3 * rng.standard_normal(200))
+    level[70] = 40
+    assert np.mean(level == 0) > 0.8
+    spline = ss.make_smoothing_spline(t, level[:, None], "r:1", loss="cauchy")
+    assert np.abs(spline(t)).max() < 1
+    # Without any noise.
+    spline = ss.make_smoothing_spline(t, np.where(t == 70, 40.0, 2.0)[:, None], "r:1", loss="cauchy")
+    assert np.abs(spline(t) - 2).max() < 1e-9
+
+
+def test_a_knot_whose_data_are_all_rejected_has_a_point():
+    _, t, points, bad = recording("r:3", 0.1, (100,), 12)
+    spline = ss.make_lsq_spline(t, points, 24, "r:3", loss="cauchy")
+    assert spline.report.converged
+    assert np.linalg.norm(spline(t[~bad]) - path(ss.space("r:3"), t[~bad]), axis=-1).max() < 1
+
+
+def test_data_of_two_curves_are_reported():
+    _, t, points, _ = recording("r:3", 0.1)
+    points[::2] += [40.0, 0, 0]
+    points[1::20] += [40.0, 0, 0]
+    with pytest.warns(ss.SmoothingWarning, match=r"rejects many data: \d+ of 200 .* Plot the residuals"):
+        ss.make_smoothing_spline(t, points, "r:3", loss="cauchy")
