@@ -42,7 +42,7 @@ def _noisy(name: str, seed: int) -> Outcome:
     x = np.linspace(t[3], t[-4], 301)
     return outcome_of(
         lambda: _error(ss.make_smoothing_spline(t, points, space), x, path(x), space),
-        sound=noise * np.sqrt(space.dim) < _MUCH,
+        sound=bool(noise * np.sqrt(space.dim) < _MUCH),
     )
 
 
@@ -67,7 +67,7 @@ def _spin(seed: int) -> Outcome:
     return outcome_of(
         lambda: _error(ss.make_smoothing_spline(t, points, space), x, path(x), space),
         # Steps beyond 0.6 of the way to the cut locus are reported.
-        sound=step < np.radians(105),
+        sound=bool(step < np.radians(105)),
     )
 
 

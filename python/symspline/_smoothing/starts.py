@@ -180,6 +180,8 @@ def _median_steps(space: Space, data: Samples) -> Doubles:
     """Return the median step of every curve, divided by the way to the cut locus."""
     fractions = cut_fractions(space, data.points)
     rows = fractions.reshape(-1, fractions.shape[-1])
+    if data.weights.all() and np.isfinite(rows).all():
+        return np.asarray(np.median(rows, axis=-1))
     weights = np.broadcast_to(data.weights, (*data.points.shape[: fractions.ndim - 1], data.weights.shape[-1]))
     used = weights.reshape(len(rows), -1) > 0
     rows = np.where(used[:, 1:] & used[:, :-1], rows, np.nan)
