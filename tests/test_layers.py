@@ -34,7 +34,7 @@ LAYERS = [
     ],
     ["_spaces"],
     ["_closed_forms", "_curves", "manifolds"],
-    ["_degrees", "_errors", "_missing", "_options", "_plotting", "_representatives", "_validation"],
+    ["_degrees", "_errors", "_held", "_missing", "_options", "_plotting", "_representatives", "_validation"],
     ["_archive", "_search"],
     ["_curve", "_curve_base", "_curve_plots"],
     ["_controlled", "_timed_curve"],

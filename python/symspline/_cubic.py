@@ -22,6 +22,7 @@ from ._curves.ends import ends_in_factors, freeze_bc_type, split_accelerations, 
 from ._curves.fit import Fit, Problem, curve_of, fit, mask_of, moved_ends, read, read_ends
 from ._curves.integrals import alternative_energy
 from ._errors import raise_or_warn
+from ._held import warn_of_held_points
 from ._missing import curves_without_missing, with_remedy
 from ._options import fit_options, order_of, with_atol
 from ._piecewise_cubic import PiecewiseCubic
@@ -125,7 +126,7 @@ class CubicSpline(PiecewiseCubic[P], Generic[P, R]):
         If a curve fails and `on_failure` is ``"warn"``.
     UserWarning
         If two neighbouring points are within 1e-5 of each other's cut locus, or if points on ``Sphere(3)`` look like
-        unit quaternions with inconsistent signs.
+        unit quaternions with inconsistent signs. If many points are exact copies of the point before.
 
     See Also
     --------
@@ -222,6 +223,7 @@ class CubicSpline(PiecewiseCubic[P], Generic[P, R]):
         if found.faults:
             raise_or_warn(found.faults, on_failure, self)
         warn_of_representatives(space, [data], [found.curve], [found.columns])
+        warn_of_held_points(times, [own.numbers for own in data], batch)
 
     # Nodes with a prescribed velocity, where the acceleration may jump.
     _c1_nodes: tuple[int, ...] = ()

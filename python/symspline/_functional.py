@@ -16,6 +16,7 @@ from ._curves.at_times import evaluated
 from ._curves.curve import CurveArrays
 from ._curves.ends import freeze_bc_type, take_batch
 from ._errors import raise_or_warn
+from ._held import warn_of_held_points
 from ._input import in_library, library_of
 from ._missing import curves_without_missing, missing_named
 from ._options import (
@@ -378,4 +379,9 @@ def fit_many(
         raise_or_warn(faults, on_failure, fitted)
     wanted = [own if mask is None or mask[i] else None for i, own in enumerate(points)]
     warn_of_representatives(space, wanted, [found.curve for found in fits], [found.columns for found in fits])
+    any(
+        warn_of_held_points(times[i], [part.numbers for part in own], (), curve=(i,) * (len(pairs) > 1))
+        for i, own in enumerate(wanted)
+        if own is not None
+    )
     return fitted

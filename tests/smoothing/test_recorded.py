@@ -306,17 +306,16 @@ def test_the_advice_of_messages_helps():
     assert "method='newton'" not in str(caught.value)
 
 
-def test_the_advice_for_the_jerk_helps():
+def test_knots_without_data_and_the_jerk():
     space, t, noisy, weights = with_gap("r:2", 0.5, 2, n=3000)
     options = {"weights": weights, "penalty": "jerk"}
-    with pytest.raises(
-        ss.ConvergenceError, match=r"too many of the 3000 knots have .* fewer knots, for example knots=500"
-    ):
-        ss.make_smoothing_spline(t, noisy, space, **options)
-    assert ss.make_smoothing_spline(t, noisy, space, knots=500, **options).report.converged
+    # Most knots in the gap are removed, because λ/h⁵ would exceed the precision of numbers.
+    own = ss.make_smoothing_spline(t, noisy, space, **options)
+    given = ss.make_smoothing_spline(t, noisy, space, knots=500, **options)
+    assert own.report.converged and given.report.converged
+    assert np.all(np.linalg.norm(own(t) - given(t), axis=-1) < 0.2 * own.std(t))
     options["weights"] = 1.0 - weights
-    with pytest.raises(ss.ConvergenceError, match="Remove the times before the first and after the last datum"):
-        ss.make_smoothing_spline(t, noisy, space, **options)
+    assert ss.make_smoothing_spline(t, noisy, space, **options).report.converged
     assert ss.make_smoothing_spline(t[weights == 0], noisy[weights == 0], space, penalty="jerk").report.converged
     options["weights"] = np.where(np.arange(3000) < 2, 1.0, 0.0)
     with pytest.raises(ss.ConvergenceError, match="needs at least 3 data, not 2"):

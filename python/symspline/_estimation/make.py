@@ -17,10 +17,11 @@ from .._curves.fit import Points as CorePoints
 from .._curves.solve import DEFAULTS
 from .._errors import raise_or_warn
 from .._faults import UNCONVERGED, Fault
+from .._held import warn_of_held_points
 from .._input import times_of
 from .._options import check_on_failure, check_progress, checked_extrapolate
 from .._rounded_times import warn_of_rounded_times
-from .._smoothing import SmoothingReport, SmoothingSpline, make_smoothing_spline
+from .._smoothing import SmoothingReport, SmoothingSpline, SmoothingWarning, make_smoothing_spline
 from .._smoothing.factors import grouped, join, smoothed_spaces
 from .._smoothing.knots import Knots, thin_knots
 from .._smoothing.posterior import Parameter
@@ -514,6 +515,9 @@ def _curve(
         hints = unit_hints(setup.terms)
         raise_or_warn([Fault(0, UNCONVERGED, " ".join([found.failure, *hints]))], on_failure, curve)
     search.warn_of_rival(shown)
+    for i, one in enumerate(given):
+        if isinstance(one, Points) and not isinstance(one.y, tuple):
+            warn_of_held_points(np.asarray(one.t), [np.asarray(one.y)], (), SmoothingWarning, f"measurements[{i}].y")
     # Parabolas have no jerk, so that the largest λ does not need a warning.
     stiff = [setup.penalty == "jerk" and report.df < _PARABOLA for report in found.reports]
     chosen = [np.asarray(np.isnan(lam) and not own) for lam, own in zip(setup.lams, stiff, strict=True)]

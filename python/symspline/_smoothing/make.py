@@ -14,6 +14,7 @@ from .._curves.ends import NATURAL, End, freeze_bc_type, is_closed, map_ends
 from .._curves.fit import Points, Problem, fit, mask_of
 from .._curves.solve import DEFAULTS, in_batch
 from .._errors import raise_or_warn
+from .._held import warn_of_held_points
 from .._missing import data_without_missing, missing_named
 from .._options import check_on_failure, check_progress, checked_extrapolate
 from .._representatives import warn_of_far_data, warn_of_far_points, warn_of_signs
@@ -53,7 +54,7 @@ from .report import SmoothingReport
 from .solve import SolverOptions, one_per_curve, smoothed
 from .spline import SmoothingSpline
 from .starts import warn_of_minima
-from .warned import warn_of_bounds, warn_of_spread
+from .warned import SmoothingWarning, warn_of_bounds, warn_of_spread
 
 
 @overload
@@ -210,7 +211,8 @@ def make_smoothing_spline(
         that was found. If the residuals are not those of independent noise: they are more than 1.75 times the noise
         that neighbouring data show, neighbours are correlated, least squares met outliers, or `sigma` is wrong. With a
         given λ, only a given `sigma` is examined. If a robust loss may have rejected the wrong data. If another curve
-        may fit better, because the noise is large or the data turn far from one to the next.
+        may fit better, because the noise is large or the data turn far from one to the next. If many points are exact
+        copies of the point before at a later time, as a log leaves them that is faster than its sensor.
     ConvergenceWarning
         If a curve fails and `on_failure` is ``"warn"``.
     FarPointsWarning
@@ -382,6 +384,8 @@ def make_smoothing_spline(
     warn_of_residuals(space, fitted.curve, whole, noise, *are_given, options.loss)
     warn_of_spread(space, fitted.curve, whole, [part.report.df for part in noise])
     warn_of_signs(space, [valid_data])
+    if whole.used.all():
+        warn_of_held_points(whole.times, whole.points, batch, SmoothingWarning)
     if not far_data:
         warn_of_far_points([fitted.curve], [fitted.columns])
     return spline

@@ -19,6 +19,7 @@ from .._validation import one_of
 from .._warnings import warn
 from ..manifolds._manifold import refuse_functions
 from .axes import Nodes, SmoothedNodes, noise_level, smooth_axes
+from .boundaries import warn_of_boundaries
 from .common_lam import LamCriterion
 from .factors import grouped, is_several, join, smoothed_spaces, split
 from .grid_report import SmoothedPart
@@ -104,7 +105,8 @@ def make_smoothing_grid(
     Warns
     -----
     SmoothingWarning
-        If a chosen λ is at a bound: the rows follow nearly all data, or have no bending energy.
+        If a chosen λ is at a bound: the rows follow nearly all data, or have no bending energy. If many neighbouring
+        nodes are far apart compared with the nodes beside them, as at the boundary of two grains.
     ConvergenceWarning
         If a row fails and `on_failure` is ``"warn"``.
     UserWarning
@@ -209,6 +211,7 @@ def make_smoothing_grid(
     surface: SmoothingGrid[P] = SmoothingGrid._through(tuple(axes), through, space, data, w, smoothed, options)
     _handle_failures(found, surface, on_failure)
     _warn_of_bounds(space, smoothed, lams)
+    warn_of_boundaries(list(zip(spaces, arrays, strict=True)), w)
     for part, array, own, one in zip(spaces, arrays, found, smoothed, strict=True):
         _warn_of_spread(part, array, own.points, w, one.df)
     return surface
