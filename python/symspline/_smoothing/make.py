@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from .._arrays import checked_flag, checked_number, short_repr, whole_number
 from .._core import ValidationError
-from .._curves.ends import NATURAL, End, freeze_bc_type, is_closed, map_ends
+from .._curves.ends import NATURAL, End, end_kinds, freeze_bc_type, is_closed, map_ends
 from .._curves.fit import Points, Problem, fit, mask_of
 from .._curves.solve import DEFAULTS, in_batch
 from .._errors import raise_or_warn
@@ -54,6 +54,7 @@ from .report import SmoothingReport
 from .solve import SolverOptions, one_per_curve, smoothed
 from .spline import SmoothingSpline
 from .starts import warn_of_minima
+from .varying import warn_of_varying
 from .warned import SmoothingWarning, warn_of_bounds, warn_of_spread
 
 
@@ -382,6 +383,8 @@ def make_smoothing_spline(
     warn_of_bounds(space, reports, asked, counts)
     are_given = [spread(np.isfinite(own)) for own in sigmas], [spread(np.isnan(own)) for own in lams]
     warn_of_residuals(space, fitted.curve, whole, noise, *are_given, options.loss)
+    if loss == "linear" and penalty == "acceleration":
+        warn_of_varying(space, fitted.curve, whole, noise, are_given[1], end_kinds(bc_type))
     warn_of_spread(space, fitted.curve, whole, [part.report.df for part in noise])
     warn_of_signs(space, [valid_data])
     if whole.used.all():

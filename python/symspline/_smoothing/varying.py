@@ -1,0 +1,216 @@
+"""Tests whether the smoothness of a motion and its noise are the same along a curve, as one λ and one σ assume."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .. import _core
+from .._arrays import short_repr
+from .._curves.curve import CurveArrays
+from .._faults import of_index
+from .._spaces import Array, Doubles, Space, factors_of
+from .._warnings import warn
+from .data import SmoothingData
+from .factors import grouped, is_several
+from .solve import Smoothed
+from .warned import SmoothingWarning
+
+# Smallest number of data, and of degrees of freedom of the curve and of the residuals per coordinate, for the tests.
+_DATA, _FREEDOM = 100, 13
+# Least number of local degrees of freedom of a bin.
+_BIN = 6.0
+# Scores beyond which a test fails, in standard deviations of a normal distribution. Motions are not samples of the
+# process of which the curve is the mean, so that the levels are measured: of 700 recordings of constant smoothness
+# (sums of sines and Matérn-like processes; 200 to 1000 data in one and three dimensions), no score exceeds 5.1 and 2.9.
+_SMOOTHNESS, _NOISE = 6.5, 4.5
+# ∫(1 + x⁴)⁻² / ∫(1 + x⁴)⁻¹: the information per local degree of freedom.
+_RATIO = 3 / 4
+
+
+class Finding(NamedTuple):
+    """A test that failed: what varies, and the score in standard deviations beyond which it fails."""
+
+    score: float
+    message: str
+
+
+class Recording(NamedTuple):
+    """One curve in one space with its data of nonzero weight.
+
+    Attributes
+    ----------
+    t : ndarray, shape (n,)
+        Times of the data, as the user sees them.
+    times, weights, squares : ndarray, shape (n,)
+        The same as the core counts them, weights, and squared distances from the curve.
+    at, energy : ndarray, shape (k,)
+        Knots, as the core counts time, and the integrated squared acceleration until there.
+    leverage : ndarray, shape (n,)
+        Posterior variances at the data, for noise of variance one.
+    m : int
+        Number of coordinates.
+    """
+
+    t: Array
+    times: Doubles
+    weights: Doubles
+    squares: Doubles
+    at: Doubles
+    energy: Doubles
+    leverage: Doubles
+    m: int
+
+
+def findings(own: Recording) -> list[Finding]:
+    """Return the tests that failed, the clearest one first."""
+    h = own.weights * own.leverage
+    df, squares = float(h.sum()), own.weights * own.squares
+    left = len(h) - df
+    if len(h) < _DATA or min(df, left) < _FREEDOM or not np.isfinite(squares).all() or squares.sum() == 0:
+        return []
+    found = []
+    # Bins end at data. The energy of curves without bending is not part of the local degrees of freedom.
+    ends = _bins(h)
+    freedom = np.diff(np.cumsum(h)[ends], prepend=0.0) * max(df - 2, 0.0) / df
+    energy = np.diff(np.interp(_after(own.times, ends), own.at, own.energy), prepend=0.0)
+    score, place = _unequal(energy, freedom, own.m * freedom / _RATIO)
+    if score > _SMOOTHNESS:
+        faster = _interval(own.t, ends, place)
+        found.append(
+            Finding(
+                score / _SMOOTHNESS,
+                f"the motion is faster between t = {faster} than one lam for the whole recording allows. There the "
+                "curve is too smooth, and elsewhere it follows noise. Fit this part and the others separately, or pass "
+                "a smaller lam",
+            )
+        )
+    ends = _bins(1 - h)
+    freedom, information = (np.diff(np.cumsum(x)[ends], prepend=0.0) for x in (1 - h, 1 - (2 - _RATIO) * h))
+    information = own.m * freedom**2 / np.maximum(information, 1e-3 * freedom)
+    score, place = _unequal(np.diff(np.cumsum(squares)[ends], prepend=0.0), freedom, information)
+    if score > _NOISE:
+        noisier = _interval(own.t, ends, place)
+        found.append(
+            Finding(
+                score / _NOISE,
+                f"the residuals are larger between t = {noisier} than elsewhere, so that one sigma for the whole "
+                "recording is wrong. Pass weights= with the inverse variances of the data, or loss='huber' if only "
+                "some data are worse",
+            )
+        )
+    return sorted(found, reverse=True)
+
+
+def _bins(freedom: Doubles) -> Any:
+    """Return the last index of each bin, of at least `_BIN` degrees of freedom."""
+    sums = np.cumsum(freedom)
+    count = max(int(sums[-1] / _BIN), 1)
+    ends = np.searchsorted(sums, np.linspace(0, sums[-1], count + 1)[1:-1])
+    return np.unique(np.append(ends, len(freedom) - 1))
+
+
+def _after(times: Doubles, ends: Any) -> Doubles:
+    """Return the times in the middle between the last datum of each bin and the next one."""
+    following = np.minimum(ends + 1, len(times) - 1)
+    return np.asarray(0.5 * (times[ends] + times[following]))
+
+
+def _unequal(sums: Doubles, freedom: Doubles, information: Doubles) -> tuple[float, tuple[int, int]]:
+    """Test equal ratios of sums of squares to degrees of freedom.
+
+    Returns
+    -------
+    score : float
+        χ² as a normal number (Wilson & Hilferty 1931).
+    place : tuple of int
+        The run of bins with the largest ratios.
+    """
+    count = len(sums) - 1
+    if count < 1 or not sums.sum() > 0:
+        return 0.0, (0, 0)
+    variance = 2 / (9 * information)
+    z = ((sums / freedom * (freedom.sum() / sums.sum())) ** (1 / 3) - (1 - variance)) / np.sqrt(variance)
+    z -= np.sum(z * np.sqrt(information)) / np.sum(np.sqrt(information))
+    spread = 2 / (9 * count)
+    score = ((np.sum(z**2) / count) ** (1 / 3) - (1 - spread)) / np.sqrt(spread)
+    first = last = int(np.argmax(z))
+    while first > 0 and z[first - 1] > 1:
+        first -= 1
+    while last < count and z[last + 1] > 1:
+        last += 1
+    return float(score), (first, last)
+
+
+def _interval(t: Array, ends: Any, place: tuple[int, int]) -> str:
+    first = 0 if place[0] == 0 else ends[place[0] - 1] + 1
+    return f"{short_repr(t[first])} and {short_repr(t[ends[place[1]]])}"
+
+
+def warn_of_varying(
+    space: Space[Any], curve: CurveArrays, noisy: SmoothingData, smoothed: list[Smoothed], chosen: list[Any], kinds: Any
+) -> None:
+    """Warn once if the motion or its noise varies along a curve whose λ was chosen.
+
+    Parameters
+    ----------
+    curve : CurveArrays
+        The curves.
+    noisy : SmoothingData
+        The data.
+    smoothed : list of Smoothed
+        Results in every space in which data were smoothed.
+    chosen : list of ndarray of bool
+        Whether λ was chosen from the data, for each curve.
+    kinds : list of str or None
+        Kinds of the ends.
+    """
+    if noisy.times.shape[-1] < _DATA:
+        return
+    numbers = iter(range(len(smoothed)))
+    of_factors = zip(factors_of(space), curve.parts, noisy.points, grouped(space, smoothed), strict=True)
+    for factor, part, points, own in of_factors:
+        number, *more = (next(numbers) for _ in own)
+        # Poses have no acceleration that is that of their rotations and positions.
+        if more or noisy.precisions[number].information is not None:
+            continue
+        report = own[0].report
+        good = np.asarray(report.converged) & ~np.asarray(report.at_bound) & (np.asarray(report.df) > _FREEDOM)
+        failed: list[tuple[tuple[int, ...], Finding]] = []
+        for index in map(tuple, np.argwhere(good & np.reshape(chosen[number], good.shape)).tolist()):
+            alone = part.take_batch(index) if index else part
+            found = findings(_recording(factor, alone, points[index], noisy, number, own[0], index, kinds))
+            failed += [(index, found[0])] if found else []
+        if failed:
+            index, first = failed[0]
+            of = of_index(index) + (f" in factor {number}, {factor!r}" if is_several(space) else "")
+            others = f" (and of curves {', '.join(str(list(i))[1:-1] for i, _ in failed[1:9])})" if failed[1:] else ""
+            warn(f"In the data{of}{others}, {first.message}.", SmoothingWarning, index)
+            return
+
+
+def _recording(
+    space: Space[Any],
+    curve: Any,
+    points: Array,
+    noisy: SmoothingData,
+    number: int,
+    smoothed: Smoothed,
+    index: tuple[int, ...],
+    kinds: Any,
+) -> Recording:
+    t, times, weights = (
+        x[index] if x.ndim > 1 else x for x in (noisy.t, noisy.times, noisy.precisions[number].weights)
+    )
+    used = weights > 0
+    t, times, weights, points = t[used], np.ascontiguousarray(times[used]), weights[used], points[used]
+    at = curve.evaluate(times, "point", "raise", False)
+    knots = np.ascontiguousarray(curve.times)
+    # The acceleration is nearly linear between knots.
+    middle = 0.5 * (knots[1:] + knots[:-1])
+    base, acceleration = (curve.evaluate(middle, name, "raise", False) for name in ("point", "acceleration"))
+    energy = np.diff(knots) * space.norm(base, acceleration) ** 2
+    leverage = _core.smoothing_variance(knots, np.ascontiguousarray(smoothed.band[index]), 0.0, times, 0, kinds)
+    squares = space._apply("distance", p=at, q=points) ** 2
+    return Recording(t, times, weights, squares, knots, np.append(0.0, np.cumsum(energy)), leverage, space.dim)

@@ -1,0 +1,81 @@
+"""Warnings about motions and noise that vary along a recording."""
+
+import re
+import warnings
+
+import numpy as np
+import pytest
+
+import symspline as ss
+
+FASTER, NOISIER = "the motion is faster between", "the residuals are larger between"
+
+
+def recording(kind, n, m, seed):
+    """Irregular times of a minute, and noisy data of a motion with a burst, of noise with a bad part, or of neither."""
+    rng = np.random.default_rng([seed, n, m])
+    t = 500 + np.sort(rng.uniform(0, 60, n))
+    phases = rng.uniform(0, 6, (2, m))
+    y = np.sin(0.7 * t[:, None] + phases[0]) + 0.7 * np.sin(1.1 * t[:, None] + phases[1])
+    sigma = np.full(n, 0.1)
+    if kind == "burst":
+        y *= 0.3
+        y += (np.exp(-(((t - 535) / 2) ** 2)) * np.sin(7 * t))[:, None]
+    if kind == "noise":
+        sigma[(t > 520) & (t < 540)] *= 5
+    return t, y + sigma[:, None] * rng.standard_normal((n, m)), sigma
+
+
+def interval(message):
+    return [float(x) for x in re.search(r"between t = (\S+) and (\S+?)[ ,]", message).groups()]
+
+
+@pytest.mark.parametrize("m", [1, 3])
+def test_a_burst_is_named(m):
+    t, y, _ = recording("burst", 600, m, 1)
+    with pytest.warns(ss.SmoothingWarning, match=FASTER) as caught:
+        ss.make_smoothing_spline(t, y, f"r:{m}")
+    assert len(caught) == 1
+    first, last = interval(str(caught[0].message))
+    assert 528 < first < 535 < last < 542
+
+
+def test_varying_noise_is_named_and_weights_help():
+    t, y, sigma = recording("noise", 600, 3, 2)
+    with pytest.warns(ss.SmoothingWarning, match=NOISIER) as caught:
+        ss.make_smoothing_spline(t, y, "r:3")
+    first, last = interval(str(caught[0].message))
+    assert 516 < first < 524 and 536 < last < 544
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        ss.make_smoothing_spline(t, y, "r:3", weights=sigma**-2)
+
+
+def test_products_and_batches_name_the_curve():
+    t, calm, _ = recording("calm", 500, 2, 3)
+    _, y, _ = recording("burst", 500, 2, 3)
+    with pytest.warns(ss.SmoothingWarning, match=rf"of curve 1 \(and of curves 2\), {FASTER}") as caught:
+        ss.make_smoothing_spline(t, np.stack([calm, y, y]), "r:2")
+    assert caught[0].message.curve == (1,)
+    with pytest.warns(ss.SmoothingWarning, match=rf"in factor 1, .*{FASTER}"):
+        ss.make_smoothing_spline(t, (calm, y), "r:2 x r:2")
+
+
+@pytest.mark.parametrize("name", ["r:3", "sphere:2", "so:3"])
+def test_sound_recordings_do_not_warn(name):
+    space = ss.space(name)
+    base = {"sphere:2": np.array([0.0, 0.0, 1.0]), "so:3": np.eye(3)}.get(name, np.zeros(3))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for seed in range(4):
+            t, y, _ = recording("calm", 300, space.dim, seed)
+            points = space.exp(base, 0.2 * np.tensordot(y, space.frame(base), 1))
+            ss.make_smoothing_spline(t, points, space)
+
+
+def test_given_lam_and_robust_losses_are_not_tested():
+    t, y, _ = recording("burst", 300, 1, 5)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        ss.make_smoothing_spline(t, y, "r:1", 1e-2)
+        ss.make_smoothing_spline(t, y, "r:1", loss="huber")
