@@ -407,10 +407,10 @@ class Path:
             frames += [frame, frame]
         inside = np.flatnonzero(where < 0)
         if len(inside):
-            own = attitudes.times[inside]
-            known = attitudes.matrices[inside] if smoothed is None else smoothed(own - self.offset)
-            times += list(own)
-            frames += list(known @ _back(self._integral.at(own)[0]))
+            at = attitudes.times[inside]
+            known = attitudes.matrices[inside] if smoothed is None else smoothed(at - self.offset)
+            times += list(at)
+            frames += list(known @ _back(self._integral.at(at)[0]))
         order = np.argsort(times, kind="stable")
         # Rotations C at times, with which C·G are the attitudes.
         self._nodes, self._frames = np.array(times)[order], np.stack(frames)[order]

@@ -76,6 +76,7 @@ def bisected(knots: Doubles, chosen: NDArray[np.bool_] | None = None) -> Doubles
 
 def shown_times(axis: TimeAxis, ends: Array, x: Doubles) -> Array:
     """Return times of the core as the user sees them, from the first to the last of two times."""
+    found: Array
     if axis.origin is not None and not axis.dates:
         # Large whole numbers, which floating-point numbers do not represent.
         found = axis.origin + np.rint(x).astype(np.int64)
