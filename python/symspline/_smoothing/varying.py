@@ -25,6 +25,8 @@ _BIN = 6.0
 # process of which the curve is the mean, so that the levels are measured: of 700 recordings of constant smoothness
 # (sums of sines and Matérn-like processes; 200 to 1000 data in one and three dimensions), no score exceeds 5.1 and 2.9.
 _SMOOTHNESS, _NOISE = 6.5, 4.5
+# Least energy per degree of freedom in the fast part, relative to the whole curve. Waves that beat have up to 2.2.
+_FASTER = 2.8
 # ∫(1 + x⁴)⁻² / ∫(1 + x⁴)⁻¹: the information per local degree of freedom.
 _RATIO = 3 / 4
 
@@ -76,7 +78,8 @@ def findings(own: Recording) -> list[Finding]:
     freedom = np.diff(np.cumsum(h)[ends], prepend=0.0) * max(df - 2, 0.0) / df
     energy = np.diff(np.interp(_after(own.times, ends), own.at, own.energy), prepend=0.0)
     score, place = _unequal(energy, freedom, own.m * freedom / _RATIO)
-    if score > _SMOOTHNESS:
+    run = slice(place[0], place[1] + 1)
+    if score > _SMOOTHNESS and energy[run].sum() / freedom[run].sum() > _FASTER * energy.sum() / freedom.sum():
         faster = _interval(own.t, ends, place)
         found.append(
             Finding(
