@@ -109,7 +109,7 @@ pub fn fit(
             (report.status, report.residual) = (Status::Unconverged, f64::INFINITY);
         }
         if report.status == Status::Converged
-            && let Some(missed) = rounded::missed(space, problem, curve, own, report.condition)
+            && let Some(missed) = rounded::missed(space, problem, curve, own, report.condition, options.tol)
         {
             (report.status, report.residual) = (Status::Unconverged, missed);
         }

@@ -8,7 +8,7 @@ use crate::curve::Segment;
 use crate::scalar::{Dual, LANES, Lane, Scalar, few, gather, max_or_nan};
 use crate::space::{Ambient, Erased};
 
-/// The largest error that is accepted as rounding.
+/// The largest error that is accepted as rounding, unless the tolerance of the fit is larger.
 const MOST: f64 = 1e-8;
 /// Up to this condition of the chords, steps of five to seven, curves need no check.
 const SMALL: f64 = 1e3;
@@ -21,6 +21,7 @@ pub fn missed(
     curve: usize,
     velocities: &[f64],
     condition: f64,
+    tol: f64,
 ) -> Option<f64> {
     if condition <= SMALL {
         return None;
@@ -66,5 +67,5 @@ pub fn missed(
         x.to_array().into_iter().fold(0.0, |most: f64, x| if x > most || x.is_nan() { x } else { most })
     };
     let missed = most(max_or_nan(far, off)) / most(speed);
-    (!(missed <= MOST)).then_some(missed)
+    (!(missed <= MOST.max(tol))).then_some(missed)
 }
