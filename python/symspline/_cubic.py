@@ -96,11 +96,11 @@ class CubicSpline(PiecewiseCubic[P], Generic[P, R]):
     check : bool, default True
         Whether to validate the points and end vectors. If False, the points are not projected either.
     atol : float, optional
-        Largest distance of a point from the manifold. By default, the digits of the points determine it: 1e-8 in
+        Largest distance of a point from the manifold. By default, the accuracy of the points determines it: 1e-8 in
         double precision; 1e-4 for numbers that were in single precision, or have at most nine significant digits; and
         the rounding error, up to 5e-3, for numbers with a few decimal places.
     skipna : bool, default False
-        True to leave out missing samples, where the point or its time is NaN, NaT or masked. All curves of a batch
+        True to omit missing samples, where the point or its time is NaN, NaT or masked. All curves of a batch
         must lack the same samples; see `fit_many` for others.
     where : array_like of bool, optional
         Mask over the batch. Curves where it is False are not fitted and evaluate to NaN.

@@ -312,7 +312,7 @@ def fit_many(
     progress : callable, optional
         Function that is called from time to time with the finished and the total number of points.
     skipna : bool, default False
-        True to leave out missing samples from each curve, where the point or its time is NaN, NaT or masked.
+        True to omit missing samples from each curve, where the point or its time is NaN, NaT or masked.
 
     Returns
     -------

@@ -46,10 +46,10 @@ class PiecewiseGeodesic(PiecewiseCubic[P]):
         Extrapolation policy for times beyond the knots. None and ``"raise"`` raise `ValidationError`. True and
         ``"geodesic"`` continue the first and last segments. False gives NaN. ``"periodic"`` repeats the curve.
     atol : float, optional
-        Largest distance of a point from the manifold. By default, the digits of the points determine it, as for
+        Largest distance of a point from the manifold. By default, the accuracy of the points determines it, as for
         `CubicSpline`.
     skipna : bool, default False
-        True to leave out missing samples, as for `CubicSpline`.
+        True to omit missing samples, as for `CubicSpline`.
 
     Raises
     ------

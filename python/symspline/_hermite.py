@@ -46,10 +46,10 @@ class HermiteSpline(PiecewiseCubic[P]):
         the first and last segments. False gives NaN. ``"geodesic"`` continues with constant velocity. ``"periodic"``
         repeats the curve.
     atol : float, optional
-        Largest distance of a point from the manifold. By default, the digits of the points determine it, as for
+        Largest distance of a point from the manifold. By default, the accuracy of the points determines it, as for
         `CubicSpline`.
     skipna : bool, default False
-        True to leave out missing samples, as for `CubicSpline`.
+        True to omit missing samples, as for `CubicSpline`.
 
     Raises
     ------
@@ -157,10 +157,10 @@ class HermiteSpline(PiecewiseCubic[P]):
         extrapolate : {None, "raise", True, False, "geodesic", "periodic"}, default None
             Extrapolation policy, as for `HermiteSpline`.
         atol : float, optional
-            Largest distance of a point from the manifold. By default, the digits of the points determine it, as for
+            Largest distance of a point from the manifold. By default, the accuracy of the points determines it, as for
             `CubicSpline`.
         skipna : bool, default False
-            True to leave out missing samples, as for `CubicSpline`.
+            True to omit missing samples, as for `CubicSpline`.
 
         Returns
         -------

@@ -9,14 +9,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ._arrays import as_array, filled
+from ._arrays import as_array, filled, refuse
 from ._core import ValidationError
 from ._curves.fit import Points
 from ._input import times_of
 from ._spaces import Product, Space, factors_of, parts_of
 
 Mask = NDArray[np.bool_]
-# Part of the core's message about points that are not finite.
+# Parts of the core's messages about times and points that are not finite.
+_NAN_TIME = "is NaN; times must be finite"
 _NOT_FINITE = "No point is close to it; correct it or remove it"
 
 
@@ -148,12 +149,14 @@ def missing_named(data: Iterable[Points]) -> Iterator[None]:
 
 def with_remedy(error: ValidationError, data: Iterable[Points]) -> ValidationError:
     """Return the error, with the remedy ``skipna=True`` if points are missing."""
+    if _NAN_TIME in str(error):
+        return error._with_message(f"{error}. Pass skipna=True to omit missing samples.")
     if _NOT_FINITE not in str(error):
         return error
     missing = sum(int(np.isnan(part.numbers).any(axis=-1).sum()) for part in data)
     if not missing:
         return error
-    return error._with_message(f"{error}. Pass skipna=True to leave out missing points (NaN).")
+    return error._with_message(f"{error}. Pass skipna=True to omit missing points (NaN).")
 
 
 def refuse_missing(present: Mask, used: Mask | None = None) -> None:
@@ -161,7 +164,17 @@ def refuse_missing(present: Mask, used: Mask | None = None) -> None:
     gone = np.flatnonzero(~present if used is None else used & ~present)
     if len(gone):
         more = f" ({len(gone)} of {len(present)} points are)" if len(gone) > 1 else ""
-        raise ValidationError(f"points[{gone[0]}] is missing (NaN){more}. Pass skipna=True to leave out such points.")
+        raise ValidationError(f"points[{gone[0]}] is missing (NaN){more}. Pass skipna=True to omit such points.")
+
+
+def refuse_nan_times(times: NDArray[np.float64]) -> None:
+    """Raise ValidationError for the first time that is not finite."""
+
+    def described(i: Any) -> str:
+        remedy = ". Pass skipna=True to omit missing samples." if np.isnan(times[i]) else ""
+        return f"is {times[i]}; times must be finite{remedy}"
+
+    refuse(~np.isfinite(times), "t", described)
 
 
 def _each(points: Any, space: Space[Any]) -> tuple[tuple[Space[Any], ...], tuple[Any, ...]]:

@@ -52,7 +52,7 @@ def read_tum(file: Any, *, skipna: bool = False, dates: bool = False) -> tuple[A
     file : path or text file
         File to read. Comments begin with #. Files whose names end with .gz are decompressed.
     skipna : bool, default False
-        True to leave out lines with NaN, which otherwise raise `ValidationError`.
+        True to omit lines with NaN, which otherwise raise `ValidationError`.
     dates : bool, default False
         True to read times as seconds since 1970 with all their nanoseconds. In double precision they are rounded to a
         quarter of a microsecond, which is too coarse for accelerations at 100 Hz and more.
@@ -217,7 +217,7 @@ def read_kitti(file: Any, times: Any = None, *, skipna: bool = False) -> tuple[D
     times : path or text file, optional
         File of the times, ``times.txt``, with one time per line. By default the times are 0, 1, 2, ...
     skipna : bool, default False
-        True to leave out lines with NaN, which otherwise raise `ValidationError`.
+        True to omit lines with NaN, which otherwise raise `ValidationError`.
 
     Returns
     -------
@@ -307,7 +307,7 @@ def read_euroc(file: Any, *, skipna: bool = False) -> tuple[NDArray[np.datetime6
     file : path or text file
         File to read.
     skipna : bool, default False
-        True to leave out lines with NaN, which otherwise raise `ValidationError`.
+        True to omit lines with NaN, which otherwise raise `ValidationError`.
 
     Returns
     -------
@@ -619,7 +619,7 @@ def parsed(
     bad = np.argwhere(np.isinf(rows) if missing else ~np.isfinite(rows))
     if len(bad):
         i, j = bad[0]
-        remedy = ". Pass skipna=True to leave out lines with NaN" if np.isnan(rows[i, j]) else ""
+        remedy = ". Pass skipna=True to omit lines with NaN" if np.isnan(rows[i, j]) else ""
         raise lines.error(i, f"column {columns[j]!r} holds {rows[i, j]}, which is not a finite number{remedy}")
     return rows
 

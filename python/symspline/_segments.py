@@ -8,7 +8,7 @@ from typing import Any, Literal, NamedTuple, Required, TypedDict, Unpack, overlo
 import numpy as np
 from numpy.typing import NDArray
 
-from ._arrays import as_array, checked_flag, checked_number, refuse, short_repr, whole_number
+from ._arrays import as_array, checked_flag, checked_number, short_repr, whole_number
 from ._composed import SegmentedCurve
 from ._core import ValidationError
 from ._cubic import CubicSpline
@@ -16,7 +16,7 @@ from ._curves.fit import read_given
 from ._durations import seconds_of
 from ._functional import fit_many
 from ._input import times_of
-from ._missing import data_without_missing, refuse_missing, without_missing
+from ._missing import data_without_missing, refuse_missing, refuse_nan_times, without_missing
 from ._rounded_times import warn_of_rounded_times
 from ._report import FarPointsWarning
 from ._smoothing import SmoothingReport, SmoothingSpline
@@ -128,7 +128,7 @@ def fit_segments(
         noise level. All points with equal times then count, unless `duplicates` is ``"first"``; consecutive copies of
         a point count as one point.
     skipna : bool, default False
-        True to leave out missing samples, where the point or its time is NaN, NaT or masked.
+        True to omit missing samples, where the point or its time is NaN, NaT or masked.
     **options
         Keyword arguments of `CubicSpline` or, with `smooth`, of `make_smoothing_spline`. They apply to all segments.
         ``weights`` and ``frames`` refer to all points of the recording, and ``knots`` is the number of knots of each
@@ -359,7 +359,7 @@ def _seconds(max_gap: Any, dates: bool) -> float:
 
 
 def _check_order(times: NDArray[Any], seconds: NDArray[np.float64], duplicates: str) -> None:
-    refuse(~np.isfinite(seconds), "t", lambda i: f"= {times[i]} is not finite")
+    refuse_nan_times(seconds)
     steps = np.diff(seconds)
     falls = np.flatnonzero(steps < 0)
     if len(falls):

@@ -80,17 +80,17 @@ def test_invalid_arguments_raise():
     for match, changes in [
         (r"t\[1\] and t\[2\] are both 1.0 \(and 1 more such pairs\). Pass duplicates='first'", {"t": [0, 1, 1, 1, 2]}),
         (r"t\[2\] = 0.5 is before t\[1\] = 1.0. Sort", {"t": [0, 1, 0.5, 2, 3]}),
-        (r"t\[2\] = nan is not finite", {"t": [0, 1, np.nan, 2, 3]}),
+        (r"t\[2\] is nan; times must be finite", {"t": [0, 1, np.nan, 2, 3]}),
         (r"t has shape \(4,\), but there are 5 points", {"t": range(4)}),
         (
             "no segment has 3 points: 4 of 4 time steps are longer than max_gap=0.5, and the median step is 1",
             {"max_gap": 0.5, "min_points": 3},
         ),
         ("max_gap must be more than 0, not 0", {"max_gap": 0}),
-        ("max_gap must be a number, not", {"max_gap": np.timedelta64(1, "s")}),
+        ("max_gap is 1 seconds, but the times are numbers", {"max_gap": np.timedelta64(1, "s")}),
         (
-            "max_gap must be a number of seconds or a timedelta64, not '1s'",
-            {"max_gap": "1s", "t": np.arange(5).astype("M8[s]")},
+            "max_gap is '1x', which is not a duration. Pass a number of seconds, a timedelta64, or a text",
+            {"max_gap": "1x", "t": np.arange(5).astype("M8[s]")},
         ),
         ("min_points must be at least 2", {"min_points": 1}),
         ("'raise', 'first' or 'mean', not 'last'", {"duplicates": "last"}),

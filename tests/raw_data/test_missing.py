@@ -52,7 +52,7 @@ FUNCTIONS = {
 
 @pytest.mark.parametrize("name", SPACES)
 @pytest.mark.parametrize("function", FUNCTIONS)
-def test_missing_points_are_left_out(function, name):
+def test_missing_points_are_omitted(function, name):
     fit, points = FUNCTIONS[function], recording(name)
     expected = fit(T[KEPT], kept(points), name)
     x = np.linspace(T[KEPT][0], T[KEPT][-1], 30)

@@ -164,7 +164,7 @@ def estimate(
     extrapolate, on_failure, progress : optional
         As for `CubicSpline`; `progress` receives the number of iterations and `max_iter`.
     skipna : bool, default False
-        True to leave out samples of each measurement that are missing, where the time or a number is NaN, NaT or
+        True to omit samples of each measurement that are missing, where the time or a number is NaN, NaT or
         masked. `measurements` of the curve are those without them. A `symspline.measure.Function` has no such samples.
 
     Returns

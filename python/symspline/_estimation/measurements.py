@@ -437,7 +437,7 @@ class Function(Measurement):
 
 
 # Remedy in messages about missing samples.
-SKIPNA = ". Pass skipna=True to leave out missing samples."
+SKIPNA = ". Pass skipna=True to omit missing samples."
 
 
 def broadcast(value: ArrayLike, name: str, shape: tuple[int, ...], remedy: str = "") -> Doubles:

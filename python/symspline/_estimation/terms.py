@@ -530,7 +530,7 @@ def points_on(space: Space, y: Any, n: int, name: str) -> Array:
     refuse(
         ~space._where_finite(points),
         name,
-        lambda i: "is not finite. Remove this measurement, or pass skipna=True to leave out such samples.",
+        lambda i: "is not finite. Remove this measurement, or pass skipna=True to omit such samples.",
     )
     try:
         space.check_point(array)

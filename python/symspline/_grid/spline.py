@@ -62,7 +62,7 @@ class GridSpline(Generic[P]):
     check : bool, default True
         Whether to validate the points. If False, they are not projected either.
     atol : float, optional
-        Largest distance of a point from the manifold. By default, the digits of the points determine it, as for
+        Largest distance of a point from the manifold. By default, the accuracy of the points determines it, as for
         `CubicSpline`.
     progress : callable, optional
         Function that is called from time to time with the finished and the total number of nodes.

@@ -9,11 +9,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .._arrays import refuse, short_repr
+from .._arrays import short_repr
 from .._core import ValidationError
 from .._curves.ends import End, end_kinds, map_ends, split_ends
 from .._curves.fit import Points, moved_ends, read, read_ends, validated
 from .._faults import INVALID, Fault
+from .._missing import refuse_nan_times
 from .._options import with_atol
 from .._spaces import Array, Doubles, Space, factors_of
 from .._time import TimeAxis, knots_of
@@ -178,7 +179,7 @@ def valid_curves(
 
 def _times_of(t: TimesLike | None, batch: tuple[int, ...], count: int) -> tuple[TimeAxis, Array, Doubles]:
     time_axis, shown_times, times = knots_of(t, batch, count)
-    refuse(~np.isfinite(times), "t", lambda i: f"is {times[i]}; times must be finite")
+    refuse_nan_times(times)
     back = np.argwhere(np.diff(times) < 0)
     if len(back):
         *curve, i = back[0].tolist()

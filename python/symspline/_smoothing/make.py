@@ -189,7 +189,7 @@ def make_smoothing_spline(
     progress : callable, optional
         Function that is called from time to time with the finished and the total number of points.
     skipna : bool, default False
-        True to leave out missing samples, where the point or its time is NaN, NaT or masked. Curves of a batch may lack
+        True to omit missing samples, where the point or its time is NaN, NaT or masked. Curves of a batch may lack
         different samples.
 
     Returns

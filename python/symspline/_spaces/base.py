@@ -693,7 +693,7 @@ class Space(Generic[P]):
         Raises
         ------
         ValidationError
-            If an array is farther from the manifold than the digits of its numbers allow: 1e-8 in double precision,
+            If an array is farther from the manifold than the accuracy of its numbers allows: 1e-8 in double precision,
             1e-4 for numbers of single precision or of at most nine significant digits. The message names its index.
 
         See Also
@@ -1063,7 +1063,7 @@ class Space(Generic[P]):
         return as_array(value, name)
 
     def _tol(self, array: Array) -> float:
-        """Return the largest distance of points from the manifold, by the digits of their numbers."""
+        """Return the largest distance of points from the manifold, by the accuracy of their numbers."""
         return point_tol(array, math.prod(self._point_shape))
 
     def _conversion(self, shape: tuple[int, ...], name: str) -> str:

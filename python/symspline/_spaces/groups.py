@@ -259,7 +259,7 @@ class SpecialEuclidean(Group[FloatArray]):
         return super()._array(value, name)
 
     def _tol(self, array: Array) -> float:
-        # Positions may have any digits.
+        # Positions may have any accuracy.
         n = self.point_shape[0] - 1
         return point_tol(array[..., :n, :n], n * n)
 

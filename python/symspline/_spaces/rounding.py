@@ -1,4 +1,4 @@
-"""How far points may be off a manifold: the rounding of their numbers, by the digits that the numbers have."""
+"""How far points may be off a manifold: the rounding of their numbers, by their accuracy."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 # Tolerances for numbers in double precision, for numbers that went through single precision or text of up to nine
-# significant digits, and for numbers of very few digits. Nine digits identify a number in single precision.
+# significant digits, and for numbers of very few decimals. Nine decimals identify a number in single precision.
 POINT_TOL, POINT_TOL_ROUNDED, POINT_TOL_LARGEST = 1e-8, 1e-4, 5e-3
 _DIGITS = 9
 # Of large arrays some hundred points are inspected.
 _SAMPLE = 500
 # Share of numbers that decides.
 _MOST = 0.75
-# Rounding errors of products by powers of ten, in units of the last of nine digits.
+# Rounding errors of products by powers of ten, in units of the last of nine decimals.
 _ROUNDING = 2e-6
-# Numbers of single precision that were written with ten digits or more differ from single precision by less.
+# Numbers of single precision that were written with ten decimals or more differ from single precision by less.
 _NEAR_SINGLE = 1e-10
 _BITS_SINGLE = 2.0**24
 
@@ -26,7 +26,7 @@ _BITS_SINGLE = 2.0**24
 def point_tol(numbers: NDArray[Any], size: int | None = None) -> float:
     """Return the largest distance from the manifold of points that consist of these numbers.
 
-    Rounding moves a point by at most half a unit in the last digit of every number. Points in single precision are
+    Rounding moves a point by at most half a unit in the last decimal of every number. Points in single precision are
     often results of a computation in single precision, whose errors add up; they have more tolerance. Most of the
     numbers decide, so that a single wrong point does not affect the others.
 
@@ -48,7 +48,7 @@ def point_tol(numbers: NDArray[Any], size: int | None = None) -> float:
     count = numbers.size
     if numbers.dtype.kind not in "fc" or not count or numbers.itemsize < 8 or numbers.dtype == np.complex64:
         return dtype_tol(numbers.dtype)
-    # Usually these numbers have all digits, and no others are inspected.
+    # Usually these numbers are accurate, and no others are inspected.
     for i in (0, count // 2, count - 1):
         x = numbers.item(i).real
         mantissa = abs(math.frexp(x)[0]) * _BITS_SINGLE % 1.0

@@ -92,7 +92,7 @@ class Torus(Space[FloatArray]):
     _has_angles = True
 
     def _tol(self, array: Array) -> float:
-        # Few digits do not make an angle with many turns more precise.
+        # Few decimals do not make an angle with many turns more precise.
         return dtype_tol(array.dtype)
 
     def __init__(self, n: int) -> None:

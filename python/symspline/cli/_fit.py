@@ -8,9 +8,9 @@ per second.
 The numbers of a point are in columns in the order of its array, and --columns names them in that order: a matrix row
 by row, in a product one factor after the other. A complex number A has the columns A_re and A_im, which --columns
 calls A, or one column A, with texts such as (1+2j) in CSV files or if it is real. Rounded points are projected onto the
-space, within 1e-4 if they have at most nine digits. A rotation of so:3 may also be a unit quaternion in columns whose
-names end in w, x, y and z, in any order, and a pose of se:3 or so:3 x r:3 a position, such as tx, ty, tz, and a
-quaternion. Angles of torus:n are in radians, or with --degrees in degrees.
+space, within 1e-4 if they have at most nine significant digits. A rotation of so:3 may also be a unit quaternion in
+columns whose names end in w, x, y and z, in any order, and a pose of se:3 or so:3 x r:3 a position, such as tx, ty, tz,
+and a quaternion. Angles of torus:n are in radians, or with --degrees in degrees.
 
 Without --time, the times are in the column t or time, or, if they are dates, in a column that is called time, date,
 datetime, stamp or timestamp, in the plural or with words such as iso, utc, unix, base, local, ns: ISO_TIME,

@@ -28,7 +28,7 @@ _FOR_PYTHON = {
     "fit_segments": "--max-gap",
     "make_smoothing_spline": "--smooth",
     REMEDY: "If they count from 1970, give the unit, such as --unix s.",
-    "Pass skipna=True to leave out": "--skipna omits",
+    "Pass skipna=True to omit": "--skipna omits",
 }
 """Advice in messages of the library, and the same for the command line."""
 

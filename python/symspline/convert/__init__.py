@@ -3,7 +3,7 @@
 The representations are models of hyperbolic space, projectors, reflections, density matrices, quaternions,
 objects of orix, and totally geodesic submanifolds.
 
-All functions are vectorised over the leading axes. The digits of the input determine how far it may deviate, as for
+All functions are vectorised over the leading axes. The accuracy of the input determines how far it may deviate, as for
 points of `symspline.CubicSpline`: by 1e-8 in double precision, and by 1e-4 for numbers that were in single precision or
 have at most nine significant digits. Results are exact up to rounding errors.
 

@@ -68,7 +68,7 @@ def quaternion_to_matrix(
     scalar_first : bool
         Required. True for (w, x, y, z), False for (x, y, z, w) as in SciPy and ROS.
     atol : float, optional
-        Largest deviation of the norms from 1. By default, the digits of the numbers determine it, as for points of
+        Largest deviation of the norms from 1. By default, the accuracy of the numbers determines it, as for points of
         `symspline.CubicSpline`: 1e-8 in double precision, 1e-4 for numbers of single precision or of six decimals.
 
     skipna : bool, default False
