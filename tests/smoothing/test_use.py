@@ -116,6 +116,7 @@ def test_band_and_deviation_check_their_arguments():
     raises("make_smoothing_spline", ss.SmoothingSpline, error=TypeError)
 
 
+@pytest.mark.filterwarnings("ignore:The residuals of the smoothing:symspline.SmoothingWarning")
 @pytest.mark.parametrize("options", [{}, {"criterion": "reml"}, {"loss": "cauchy"}, {"criterion": "cp", "sigma": 0.1}])
 def test_between_two_knots_there_is_the_nearest_geodesic(options):
     two = ss.make_smoothing_spline([3.0, 5e6], NOISY[:2], S2, **options)

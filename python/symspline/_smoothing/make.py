@@ -381,7 +381,9 @@ def make_smoothing_spline(
         for own, good, only in zip(lams, sound, best, strict=True)
     ]
     warn_of_bounds(space, reports, asked, counts)
-    are_given = [spread(np.isfinite(own)) for own in sigmas], [spread(np.isnan(own)) for own in lams]
+    # Between two knots there is nothing to choose.
+    are_chosen = [spread(np.isnan(own) & (at.times.shape[-1] > 2)) for own in lams]
+    are_given = [spread(np.isfinite(own)) for own in sigmas], are_chosen
     warn_of_residuals(space, fitted.curve, whole, noise, *are_given, options.loss)
     if loss == "linear" and penalty == "acceleration":
         warn_of_varying(space, fitted.curve, whole, noise, are_given[1], end_kinds(bc_type))
