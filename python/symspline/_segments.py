@@ -17,8 +17,8 @@ from ._durations import seconds_of
 from ._functional import fit_many
 from ._input import times_of
 from ._missing import data_without_missing, refuse_missing, refuse_nan_times, without_missing
-from ._rounded_times import warn_of_rounded_times
 from ._report import FarPointsWarning
+from ._rounded_times import warn_of_rounded_times
 from ._smoothing import SmoothingReport, SmoothingSpline
 from ._smoothing.many import smooth_many
 from ._smoothing.precision import read_precision
