@@ -210,7 +210,10 @@ def test_bands_in_gaps(knots):
             measure.Points(t, y[:, None], sigma=0.1),
             measure.Velocities(s, np.zeros((len(s), 1)), w[:, None], sigma=0.2),
         ]
-        curve = ss.estimate(both, knots, "r:1", penalty="acceleration")
+        with warnings.catch_warnings():
+            # 60 knots are few for a path without a continuous acceleration, which the residuals show.
+            warnings.simplefilter("ignore", ss.SmoothingWarning)
+            curve = ss.estimate(both, knots, "r:1", penalty="acceleration")
         gap = np.linspace(7.5, 12.5, 40)
         inside.append(np.abs(curve(gap)[:, 0] - np.interp(gap, d, x)) < 1.96 * curve.std(gap))
     # Without knots in the gap, the coverage is 0.3.
@@ -233,7 +236,7 @@ def test_knots_of_dates_and_whole_numbers_in_gaps():
         np.testing.assert_allclose(own(times), found[0](x), atol=1e-3)
 
 
-def test_given_knots_that_leave_out_a_gap():
+def test_given_knots_without_a_gap():
     t = np.concatenate([np.linspace(0, 7, 70), np.linspace(13, 20, 70)])
     y = np.sin(t)[:, None]
     both = [measure.Points(t, y, sigma=0.1), measure.Velocities(t, y, np.cos(t)[:, None], sigma=0.1)]

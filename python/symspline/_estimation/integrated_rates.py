@@ -156,7 +156,7 @@ class _Problem:
         self.rates = rates
         t = np.unique(rates.times)
         self.step = float(np.median(np.diff(t))) if len(t) > 1 else 0.0
-        # First and last times of the stretches in which there are rates.
+        # First and last times of the segments in which there are rates.
         breaks = np.flatnonzero(np.diff(t) > _GAP * self.step)
         self.first, self.last = t[np.append(0, breaks + 1)], t[np.append(breaks, len(t) - 1)]
         self.size = float(np.sqrt(np.mean(np.sum((rates.omega - rates.bias) ** 2, axis=1))))
@@ -168,8 +168,8 @@ class _Problem:
         spread = np.full(3, np.inf) if self.rates.spread is None else self.rates.spread
         self.precision = np.minimum(spread, max(share * self.size, self.rates.noise)) ** -2.0
 
-    def stretch(self, x: Doubles) -> NDArray[np.intp]:
-        """Return the stretch of the rates in which times lie, or −1 in a gap."""
+    def segment(self, x: Doubles) -> NDArray[np.intp]:
+        """Return the segment of the rates in which times lie, or −1 in a gap."""
         j = np.clip(np.searchsorted(self.first, x, side="right") - 1, 0, len(self.first) - 1)
         near = _GAP * self.step
         # Times before the first rates belong to them if they are close.
@@ -198,7 +198,7 @@ class _Problem:
             Additional standard deviation of every attitude.
         """
         integral = self.integrate(bias)
-        t, where = attitudes.times, self.stretch(attitudes.times)
+        t, where = attitudes.times, self.segment(attitudes.times)
         i = np.arange(len(t) - apart)
         i = i[(where[i] >= 0) & (where[i] == where[i + apart]) & (t[i + apart] > t[i])]
         j = i + apart
@@ -272,7 +272,7 @@ class _Problem:
     def aligned(
         self, attitudes: Attitudes, bias: Doubles, more: float = 0.0, late: float = 0.0
     ) -> tuple[Doubles, Doubles, float, float]:
-        """Align the integral with attitudes within one stretch.
+        """Align the integral with attitudes within one segment.
 
         Parameters
         ----------
@@ -383,24 +383,24 @@ class Path:
         problem = _Problem(rates)
         self.offset = 0.0 if offset is None else _best_offset(problem, attitudes, *offset)
         attitudes = attitudes.later(self.offset)
-        where = problem.stretch(attitudes.times)
-        stretches = [np.flatnonzero(where == j) for j in np.unique(where[where >= 0])]
+        where = problem.segment(attitudes.times)
+        segments = [np.flatnonzero(where == j) for j in np.unique(where[where >= 0])]
         self.bias, self.misfit = rates.bias, np.inf
-        for share in _SHARES if stretches else ():
+        for share in _SHARES if segments else ():
             problem.limit_bias(share)
             bias = problem.consensus(attitudes)
-            found = [problem.aligned(attitudes.taken(own), bias) for own in stretches]
-            counts = np.array([len(own) for own in stretches])
+            found = [problem.aligned(attitudes.taken(own), bias) for own in segments]
+            counts = np.array([len(own) for own in segments])
             misfit = float(np.average([own[2] for own in found], weights=counts))
             if misfit < self.misfit:
                 self.bias, self.misfit = found[int(np.argmax(counts))][1], misfit
             if misfit < _BAD:
                 break
-        # All stretches have the bias of the one with the most attitudes.
+        # All segments have the bias of the one with the most attitudes.
         problem.rates = rates._replace(bias=self.bias, spread=None)
         self._integral = problem.integral = Integral(rates, self.bias)
         times, frames = [], []
-        for own in stretches:
+        for own in segments:
             some = attitudes.taken(own)
             frame = problem.aligned(some, self.bias)[0] @ self._integral.at(some.times[:1])[0][0].T
             times += [problem.first[where[own[0]]], problem.last[where[own[0]]]]
@@ -441,12 +441,12 @@ def _best_offset(problem: _Problem, attitudes: Attitudes, start: float, low: flo
         """Return the score of an offset that is known within a width, and the better offset that follows."""
         own, more = few.later(offset), 0.5 * width * problem.size / np.sqrt(3.0)
         bias = problem.consensus(own, more)
-        where = problem.stretch(own.times)
-        stretches = [np.flatnonzero(where == j) for j in np.unique(where[where >= 0])]
-        if not stretches:
+        where = problem.segment(own.times)
+        segments = [np.flatnonzero(where == j) for j in np.unique(where[where >= 0])]
+        if not segments:
             return np.inf, offset
-        found = [problem.aligned(own.taken(index), bias, more, width) for index in stretches]
-        counts = np.array([len(index) for index in stretches])
+        found = [problem.aligned(own.taken(index), bias, more, width) for index in segments]
+        counts = np.array([len(index) for index in segments])
         score, longest = float(np.average([each[2] for each in found], weights=counts)), int(np.argmax(counts))
         return score, float(np.clip(offset + found[longest][3], low, high))
 

@@ -1,4 +1,4 @@
-"""The knots of an estimate: as dense as the sensors can tell, and in gaps as dense as beside them."""
+"""The knots of an estimate: as dense as the measurements show, and in gaps as dense as beside them."""
 
 from __future__ import annotations
 

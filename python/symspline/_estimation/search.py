@@ -230,7 +230,7 @@ def _moved(coarse: Setup, before: Solution, fine: Setup, found: Solution) -> flo
 
 
 def warn_of_gaps(shown: Array, knots: Doubles, data: Doubles) -> None:
-    """Warn if given knots leave out a gap between data."""
+    """Warn if there are no given knots in a gap between data."""
     h = np.diff(knots)
     if len(h) < 4 or not len(data):
         return

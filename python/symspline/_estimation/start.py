@@ -249,7 +249,7 @@ def _with_rates(
         return 0.0 if term_offset is None else float(values[term_offset].start[0])
 
     names = {own.time_offset for own in attitudes}
-    # Attitudes with different clocks: those with a known one, or those that are most numerous.
+    # Attitudes with different offsets: those with none, or those that are most numerous.
     chosen = None if None in names else max(names, key=lambda one: sum(one == own.time_offset for own in attitudes))
     own = [each.attitudes for each in attitudes if each.time_offset == chosen]
     times = np.concatenate([each.times for each in own]) + began(chosen)
