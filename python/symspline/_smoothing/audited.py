@@ -23,6 +23,12 @@ from .warned import SmoothingWarning
 # Ratios of common units, and how near a ratio must be to them, as a logarithm.
 DEGREES, _UNITS, _NEAR = 180 / np.pi, {1e3: "1000, the ratio of m and mm, or of s and ms"}, 0.15
 
+_STIFF = (
+    "The curve is too stiff, or the noise is correlated, as that of rounded or repeated data and of filters. Compare plots "
+    "of the curve and the data; pass criterion='reml', a smaller lam or more knots for a curve that is too stiff, and do "
+    "not use the bands for correlated noise."
+)
+
 
 class Sensor(NamedTuple):
     """Data of one kind in one part of the space, and what the audit found.
@@ -160,7 +166,8 @@ class _Examined(NamedTuple):
             given = Residuals(self.rows[k][used] / self.sigmas[k], float(self.leverages[k]), 0.0, loss, corner)
             sensor = Sensor("data", "the data", used, examine(given))
             if sensor.finding.failed:
-                yield k, " ".join([described(sensor), *advice([sensor])])
+                stiff = sensor.finding.smooth or sensor.finding.step is not None
+                yield k, " ".join([described(sensor), *([_STIFF] if stiff else advice([sensor]))])
 
 
 def _deviations(space: Space, times: Doubles, y: Array, weights: Doubles) -> Doubles:
@@ -189,11 +196,7 @@ def _of_estimated(finding: SmoothingFinding, curve: int) -> str:
     if correlation:
         facts.append(f"neighbours have a correlation of {correlation:.2f}")
     if ratio > 1 or correlation > 0:
-        remedies.append(
-            "The curve is too stiff, or the noise is correlated, as that of rounded or repeated data and of filters. "
-            "Compare plots of the curve and the data; pass criterion='reml', a smaller lam or more knots for a curve "
-            "that is too stiff, and do not use the bands for correlated noise."
-        )
+        remedies.append(_STIFF)
     if correlation < 0:
         remedies.append(
             "Alternating residuals show a motion that is too fast for the sampling. Check the times and units, or pass "
