@@ -24,9 +24,9 @@ from .warned import SmoothingWarning
 DEGREES, _UNITS, _NEAR = 180 / np.pi, {1e3: "1000, the ratio of m and mm, or of s and ms"}, 0.15
 
 _STIFF = (
-    "The curve is too stiff, or the noise is correlated, as that of rounded or repeated data and of filters. Compare plots "
-    "of the curve and the data; pass criterion='reml', a smaller lam or more knots for a curve that is too stiff, and do "
-    "not use the bands for correlated noise."
+    "The curve is too stiff, or the noise is correlated, as that of rounded or repeated data and of filters. Compare "
+    "plots of the curve and the data; pass criterion='reml', a smaller lam or more knots for a stiff curve, "
+    "and do not use the bands for correlated noise."
 )
 
 
