@@ -66,7 +66,7 @@ class Raw(NamedTuple):
     @property
     def converged(self) -> NDArray[np.bool_]:
         """Whether the curves converged."""
-        return self.columns[0] == 0
+        return np.asarray(self.columns[0] == 0)
 
     def where(self, chosen: NDArray[np.bool_], other: Raw) -> Raw:
         """Return the chosen curves of the other results, and the rest of these."""
@@ -137,9 +137,9 @@ def best_of_starts(space: Space, data: Samples, lam: Doubles, solve: Solve) -> t
     noisy = _noise(best) > _NOISY * radii
     if noisy.any():
         given = np.where(best.converged, best.columns[Column.LAM], lam)
-        start = _embedded_start(space, data, given)
-        if start is not None:
-            other = solve(given, start)
+        inside = _embedded_start(space, data, given)
+        if inside is not None:
+            other = solve(given, inside)
             both = best.converged & other.converged
             apart = _apart(space, best.points, other.points) > _OTHER * radius
             variance = _noise(best) ** 2
@@ -172,8 +172,9 @@ def _apart(space: Space, p: Doubles, q: Doubles) -> Doubles:
     good = space._where_finite(a) & space._where_finite(b)
     found = np.zeros(good.shape)
     found[good] = space._apply("distance", p=a[good], q=b[good])
-    found = np.where(np.isfinite(found), found, space.injectivity_radius)
-    return np.asarray(found.reshape(-1, found.shape[-1]).max(axis=-1))
+    found[~np.isfinite(found)] = space.injectivity_radius
+    rows = found.reshape(-1, p.shape[found.ndim - 1])
+    return np.asarray(rows.max(axis=-1))
 
 
 def _median_steps(space: Space, data: Samples) -> Doubles:
@@ -354,13 +355,13 @@ def _embedded_start(space: Space, data: Samples, lam: Doubles) -> Doubles | None
 def _projected(space: Space, x: Array) -> Array:
     if isinstance(space, Torus):
         cos, sin = np.split(x, 2, axis=-1)
-        return np.arctan2(sin, cos)
+        return np.asarray(np.arctan2(sin, cos))
     if isinstance(space, Sphere):
-        return x / np.maximum(np.linalg.norm(x, axis=-1, keepdims=True), np.finfo(float).tiny)
+        return np.asarray(x / np.maximum(np.linalg.norm(x, axis=-1, keepdims=True), np.finfo(float).tiny))
     if isinstance(space, SpecialOrthogonal):
         u, _, v = np.linalg.svd(x)
         u[..., -1] *= np.sign(np.linalg.det(u) * np.linalg.det(v))[..., None]
-        return u @ v
+        return np.asarray(u @ v)
     _, vectors = np.linalg.eigh(x)
     if isinstance(space, (RealProjective, ComplexProjective)):
         return vectors[..., -1]
