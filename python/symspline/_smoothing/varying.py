@@ -24,7 +24,7 @@ _BIN = 6.0
 # Scores beyond which a test fails, in standard deviations of a normal distribution. Motions are not samples of the
 # process of which the curve is the mean, so that the levels are measured: of 700 recordings of constant smoothness
 # (sums of sines and Matérn-like processes; 200 to 1000 data in one and three dimensions), no score exceeds 5.1 and 2.9.
-_SMOOTHNESS, _NOISE = 6.5, 4.5
+_SMOOTHNESS, _NOISE = 7.0, 4.5
 # Least energy per degree of freedom in the fast part, relative to the whole curve. Waves that beat have up to 2.2.
 _FASTER = 2.8
 # ∫(1 + x⁴)⁻² / ∫(1 + x⁴)⁻¹: the information per local degree of freedom.
