@@ -131,29 +131,21 @@ def test_fits_in_many_dimensions_do_not_abort(name, nodes, options, words):
 
 
 def test_sizes_that_no_memory_holds_raise_memory_error():
-    """In statistics and derivatives, as in fits: the message names the size and a remedy."""
+    """In statistics and on grids, as in fits: the message names the size and a remedy."""
     script = """
     m, rng = ss.measure, np.random.default_rng(0)
-
-    def turns(n):
-        return ss.rotations.from_rotation_vectors(np.sin(np.linspace(0, 20, n))[:, None] * [0.1, 0.2, 0.3])
 
     t = np.arange(100.0)
     y = np.cumsum(0.1 * rng.standard_normal((100, 3)), axis=0)
     points = m.Points(t, y, sigma=0.1)
-    many = m.Constant(30_000, sigma=1.0)
+    many = m.Constant(3000, sigma=1.0)
     range_of = m.Function(t, lambda x, p: x[:, 0] - y[:, 0] + p["many"][:100], sigma=1.0, parameters={"many": many})
     curve = ss.estimate([points, m.Velocities(t, y, 0 * y, sigma=1.0)], 20, "r:3", lam=1.0)
-    spline = ss.CubicSpline(None, turns(150_000), "so:3")
     grid = ss.GridSpline((None,) * 3, np.zeros((3, 3, 3, 1)), "r:1")
     line = np.linspace(0, 1, 2**22)
     calls = {
         "estimate": lambda: ss.estimate([points, range_of], 20, "r:3", lam=1.0),
         "cov": lambda: curve.cov(np.linspace(0, 99, 20_000_000)),
-        "jvp": lambda: spline.jvp(0.5, np.zeros((150_000, 3, 3))),
-        "vjp": lambda: spline.vjp(0.5, np.zeros((3, 3))),
-        "smooth": lambda: ss.make_smoothing_spline(None, turns(600_000), "so:3", 1.0),
-        "newton": lambda: ss.make_smoothing_spline(None, turns(200_000), "so:3", 1.0, method="newton"),
         "grid": lambda: grid.grid(line, line, line),
     }
     for name, call in calls.items():
@@ -164,7 +156,7 @@ def test_sizes_that_no_memory_holds_raise_memory_error():
             print(name, "GB" in str(error) and str(error).count(". ") >= 1)
     """
     said = dict(line.split() for line in run(script, 200).splitlines())
-    assert len(said) == 7 and set(said.values()) == {"True"}, said
+    assert len(said) == 3 and set(said.values()) == {"True"}, said
 
 
 def test_little_address_space_never_aborts():
@@ -253,10 +245,6 @@ LONG_CALLS = {
     "gl": "many(ss.space('gl:120'), 'log')",
     "bezier": "ss.BezierCurve(far(ss.space('so:3'), 20_000), 'so:3')(0.5)",
     "vjp of rotations": "spline('so:10', 100).vjp(np.linspace(0, 99, 20_000), np.ones((20_000, 10, 10)))",
-    "estimate": "estimated(2000, 20, constants=3000)",
-    "cov": "again(estimated(4000, 10).cov, np.linspace(0, 3999, 400_000))",
-    "sample": "again(estimated(4000, 10).sample, np.random.default_rng(0), 2000)",
-    "information": "ss.make_smoothing_spline(None, walk(2000, 100), 'r:100', 1.0, weights=units(2000, 100))",
 }
 
 
@@ -274,28 +262,6 @@ def test_long_calls_end_soon_after_a_signal(call):
     def spline(name, nodes):
         space = ss.space(name)
         return ss.CubicSpline(None, far(space, nodes), space, method="quasi-newton", on_failure="ignore")
-
-    def walk(n, dim):
-        return np.cumsum(0.1 * np.random.default_rng(0).standard_normal((n, dim)), axis=0)
-
-    def units(n, dim):
-        return np.stack([np.eye(dim)] * n)
-
-    def estimated(n, dim, constants=0):
-        m, t, y = ss.measure, np.arange(float(n)), walk(n, dim)
-        data = [m.Points(t, y, sigma=0.1), m.Velocities(t, y, 0 * y, sigma=1.0)]
-        if constants:
-            own = m.Constant(constants, sigma=1.0)
-            seen = lambda x, p: x[:, 0] - y[:, 0] + p["own"][:n]
-            data.append(m.Function(t, seen, sigma=1.0, parameters={{"own": own}}))
-        return ss.estimate(data, 200, f"r:{{dim}}", lam=1.0)
-
-    def again(function, *values):
-        # The preparation may take longer than the timer.
-        begin_to_count()
-        threading.Timer(0.5, interrupt).start()
-        while True:
-            function(*values)
 
     def one(space):
         p = far(space, 2)
