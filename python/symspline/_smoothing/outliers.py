@@ -59,6 +59,9 @@ def warn_of_outliers(
     """
     sound = [np.asarray(own.selection) == 0 for own in each]
     bad = [~good & np.asarray(report.converged) for good, report in zip(sound, reports, strict=True)]
+    # Exact data, such as those of a body at rest, have nothing to find.
+    exact = [(np.asarray(own.rejected) == 0) & ~(np.asarray(r.sigma) > 0) for own, r in zip(each, reports, strict=True)]
+    bad = [own & ~still for own, still in zip(bad, exact, strict=True)]
     total = sum(int(np.count_nonzero(own)) for own in bad)
     for number, (own, outliers, report, count) in enumerate(zip(bad, each, reports, counts, strict=True)):
         if not own.any():
