@@ -189,9 +189,9 @@ class CubicSpline(PiecewiseCubic[P], Generic[P, R]):
         on_failure: OnFailure = "raise",
         check: bool = True,
         atol: float | None = None,
+        skipna: bool = False,
         where: ArrayLike | None = None,
         progress: Progress | None = None,
-        skipna: bool = False,
     ) -> None:
         space = space_named(space)
         if skipna is not False and checked_flag(skipna, "skipna"):
