@@ -49,7 +49,7 @@ export interface SmoothingOptions {
   knots?: Numbers | null;
   /** Standard deviation of the noise in one coordinate; by default it is estimated. */
   sigma?: number | null;
-  /** Weight of a degree of freedom in cross-validation, at least 1; default 1.4. */
+  /** Weight of a degree of freedom in cross-validation, at least 1; default 1.2. */
   gamma?: number;
   /** Loss of a residual; default `"linear"`. The others downweight outliers. */
   loss?: "linear" | "huber" | "cauchy";

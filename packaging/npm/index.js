@@ -234,7 +234,7 @@ const SMOOTHING = ["lam", "weights", "knots", "sigma", "gamma", "loss", "bcType"
 /** Fits a curve close to noisy points. */
 export function makeSmoothingSpline(t, points, space, options = {}) {
   known(options, SMOOTHING);
-  const { lam, weights, knots, sigma, gamma = 1.4, loss = "linear", bcType = "natural", extrapolate, atol = 1e-8 } = options;
+  const { lam, weights, knots, sigma, gamma = 1.2, loss = "linear", bcType = "natural", extrapolate, atol = 1e-8 } = options;
   const of = asSpace(space);
   const numbers = rows(points, of.length);
   const list = (x, argument) => (x === undefined || x === null ? undefined : vector(x, argument));

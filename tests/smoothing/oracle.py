@@ -66,7 +66,7 @@ class Dense:
         rows = self.rows(x, nu)
         return np.einsum("ij,jk,ik->i", rows, self.inverse(lam), rows)
 
-    def score(self, criterion, y, lam, gamma=1.4, sigma=None):
+    def score(self, criterion, y, lam, gamma=1.2, sigma=None):
         """What a criterion minimises."""
         n, m, df = len(self.t), y.shape[1], self.df(lam)
         rss = self.rss(y, lam) / m

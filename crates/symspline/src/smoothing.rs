@@ -84,7 +84,7 @@ impl Default for Smoothing {
     fn default() -> Self {
         Smoothing {
             criterion: Criterion::Gcv,
-            gamma: 1.4,
+            gamma: 1.2,
             loss: Loss::Linear,
             lam: None,
             sigma: None,

@@ -111,7 +111,7 @@ def estimate(
     penalty: SmoothingPenalty | None = None,
     lam: Numbers | None = None,
     criterion: Criterion | None = None,
-    gamma: float = 1.4,
+    gamma: float = 1.2,
     loss: Loss = "linear",
     start: Curve[Any] | None = None,
     tol: float = 1e-3,
@@ -149,7 +149,7 @@ def estimate(
         Criterion for λ, as for `make_smoothing_spline`. The default is ``"reml"``, and ``"gcv"`` for a single `Points`
         term. Cross-validation smooths slow effects such as biases away where sensors differ in number and accuracy,
         and the covariance does not contain that error. With ``"cp"``, the standard deviations must be right.
-    gamma : float, default 1.4
+    gamma : float, default 1.2
         Weight of a degree of freedom in ``"gcv"``.
     loss : {"linear", "huber", "cauchy"}, default "linear"
         Loss of measurements that do not have their own. The others limit the influence of outliers, which begins where
