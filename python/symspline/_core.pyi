@@ -196,6 +196,23 @@ _Known = tuple[Sequence[_Doubles], int, Sequence[str] | None, _Doubles]
 def posterior_covariance(
     knots: _Doubles, known: _Known, x: _Doubles, y: _Doubles | None, orders: Sequence[int]
 ) -> _Doubles: ...
+def coefficient_factors(
+    knots: _Doubles, kinds: Sequence[str] | None, x: _Doubles, nu: int
+) -> tuple[NDArray[np.int64], _Doubles]: ...
+
+# First coefficients, and factors of coefficients and of parameters.
+_Rows = tuple[NDArray[np.int64], _Doubles, _Doubles]
+
+def predictions_without(
+    knots: _Doubles,
+    known: _Known,
+    data: _Rows,
+    residuals: _Doubles,
+    probes: _Rows,
+    omitted: NDArray[np.int64],
+    blocks: Sequence[Sequence[int]],
+) -> tuple[_Doubles, _Doubles]: ...
+def chi_squared_ratio(m: int, n: int, probability: float) -> float: ...
 def posterior_freedom(knots: _Doubles, known: _Known) -> int: ...
 def posterior_samples(knots: _Doubles, known: _Known, normal: _Doubles) -> _Doubles: ...
 def chi_squared(m: int, probability: float) -> float: ...

@@ -41,9 +41,38 @@ pub fn distribution(m: usize, x: f64) -> f64 {
     (a * y.ln() - y - log_gamma + sum.ln()).exp().min(1.0)
 }
 
+/// The quantile of χ² with m degrees of freedom divided by an estimate of its scale, the mean square of n independent
+/// normal numbers: m times that of the F distribution, within 1 %.
+pub fn ratio_quantile(m: usize, n: usize, probability: f64) -> f64 {
+    /// The number of equally probable scales that represent their distribution.
+    const SCALES: usize = 200;
+    let part = |k: usize| quantile(n, (k as f64 + 0.5) / SCALES as f64) / n as f64;
+    let scales: Vec<f64> = (0..SCALES).map(part).collect();
+    let below = |x: f64| scales.iter().map(|scale| distribution(m, x * scale)).sum::<f64>() / SCALES as f64;
+    let mut low = quantile(m, probability);
+    let mut high = 2.0 * low;
+    while below(high) < probability {
+        (low, high) = (high, 2.0 * high);
+    }
+    while high - low > 1e-4 * high {
+        let middle = 0.5 * (low + high);
+        if below(middle) < probability { low = middle } else { high = middle }
+    }
+    0.5 * (low + high)
+}
+
 #[cfg(test)]
 mod tests {
-    use super::quantile;
+    use super::{quantile, ratio_quantile};
+
+    #[test]
+    fn quantiles_of_ratios_match_tables() {
+        // Abramowitz & Stegun, table 26.9.
+        for (m, n, wanted) in [(1, 1, 161.4), (3, 3, 9.277), (3, 12, 3.49), (2, 60, 3.15)] {
+            let found = ratio_quantile(m, n, 0.95) / m as f64;
+            assert!((found / wanted - 1.0).abs() < 0.01, "{m} {n}: {found}");
+        }
+    }
 
     #[test]
     fn quantiles_match_tables() {

@@ -5,7 +5,7 @@
 //! EᵀAE, where E repeats and transforms them. The first coefficients border the others, which are banded.
 
 use crate::banded::Banded;
-use crate::bordered::Bordered;
+use crate::bordered::{Bordered, Inverse};
 use symspline_core::scalar::{Lane, lane};
 
 /// The periodic correction of a closed curve: how its coefficients continue at its start.
@@ -138,6 +138,15 @@ impl Factored {
     /// Multiplies rows of several numbers by the inverse, in place.
     pub fn solve(&self, columns: usize, x: &mut [Lane]) {
         self.matrix.solve(columns, x);
+    }
+
+    /// The entries of the inverse in the border of parameters and inside the band; for a closed curve those of
+    /// E(EᵀAE)⁻¹Eᵀ.
+    pub fn inverse(&self) -> Inverse {
+        if self.turn.is_some() {
+            return Inverse { corner: Vec::new(), side: Vec::new(), band: self.inverse_band() };
+        }
+        self.matrix.inverse()
     }
 
     /// The band of the inverse; for a closed curve that of E(EᵀAE)⁻¹Eᵀ.

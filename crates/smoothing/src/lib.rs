@@ -23,6 +23,7 @@ mod curve_fit;
 mod cyclic;
 pub mod estimation;
 mod frames;
+pub mod gaps;
 mod gauss_newton;
 mod information;
 mod integrated_wiener;
@@ -50,4 +51,4 @@ pub use problem::{
     Tier,
 };
 pub use smooth::smooth;
-pub use variance::{inverse_of_weights, variance};
+pub use variance::{functional_at, inverse_of_weights, variance};

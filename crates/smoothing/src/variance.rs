@@ -104,6 +104,13 @@ pub fn row_at(knots: &[f64], basis: &Basis, t: f64, nu: usize) -> Row {
     row
 }
 
+/// The first coefficient and the factors of four coefficients in a derivative at given times: see [`row_at`].
+pub fn functional_at(knots: &[f64], ends: Ends, times: &[f64], nu: usize) -> Vec<(usize, [f64; 4])> {
+    let basis = Basis::new(knots, ends);
+    let of_row = |row: Row| (row.first, row.factors);
+    times.iter().map(|t| of_row(row_at(knots, &basis, *t, nu))).collect()
+}
+
 /// The band of T⁻¹, where vᵀTv is the contribution of the velocities at knots to ∫ x''²: `4(v₀² + v₀v₁ + v₁²)/h` per
 /// segment. Prescribed velocities get a negligible variance.
 fn velocities_given_points(knots: &[f64], ends: Ends) -> Banded {

@@ -7,7 +7,7 @@ use crate::watch::{is_long, watched};
 use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use symspline_engine::smoothing::along::Along;
-use symspline_engine::smoothing::estimation::{Estimation, Factor, Measurements};
+use symspline_engine::smoothing::estimation::{Estimation, Factor, Matrices, Measurements};
 use symspline_engine::smoothing::posterior::Posterior;
 use symspline_engine::smoothing::{Criterion, EndCondition, Ends, Penalty, positions};
 use symspline_engine::space::{Ambient, Origin};
@@ -224,7 +224,7 @@ pub fn estimate<'py>(
 
 /// A of one curve, and how the curve ends: the band, side and corner, the coordinates that it couples, the kinds of the
 /// ends (None for a closed curve) and the holonomy of a closed curve.
-type Known<'py> = ([Array<'py>; 3], usize, Option<[String; 2]>, Array<'py>);
+pub type Known<'py> = ([Array<'py>; 3], usize, Option<[String; 2]>, Array<'py>);
 
 /// The same, as slices.
 struct Slices<'a> {
@@ -257,6 +257,13 @@ impl<'a> Slices<'a> {
         let entries: usize = self.matrices.iter().map(|x| x.len()).sum();
         is_long(entries.saturating_mul(self.m)) || is_long(numbers)
     }
+}
+
+/// The band, side and corner of A, the coordinates that it couples, the ends and the holonomy.
+pub fn matrices_of(known: &Known) -> PyResult<(Matrices, usize, Ends, Vec<f64>)> {
+    let ([band, side, corner], m, kinds, turn) = known;
+    let matrices = [in_order(band)?.to_vec(), in_order(side)?.to_vec(), in_order(corner)?.to_vec()];
+    Ok((matrices, *m, ends_named(kinds.clone())?, in_order(turn)?.to_vec()))
 }
 
 /// Covariances at times x for noise of variance one: of the curve with itself at times y, or of its derivatives

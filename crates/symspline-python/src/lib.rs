@@ -8,6 +8,7 @@ mod errors;
 mod estimation;
 mod evaluate;
 mod fit;
+mod gaps;
 mod grid;
 mod hermite;
 mod search;
@@ -104,6 +105,9 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     guarded(m, wrap_pyfunction!(estimation::posterior_covariance, m)?)?;
     guarded(m, wrap_pyfunction!(estimation::posterior_freedom, m)?)?;
     guarded(m, wrap_pyfunction!(estimation::posterior_samples, m)?)?;
+    guarded(m, wrap_pyfunction!(gaps::coefficient_factors, m)?)?;
+    guarded(m, wrap_pyfunction!(gaps::predictions_without, m)?)?;
+    guarded(m, wrap_pyfunction!(gaps::chi_squared_ratio, m)?)?;
     guarded(m, wrap_pyfunction!(grid::grid_rows, m)?)?;
     guarded(m, wrap_pyfunction!(grid::grid_product, m)?)?;
     guarded(m, wrap_pyfunction!(grid::grid_scattered, m)?)?;

@@ -95,7 +95,10 @@ class EstimatedSpline(SmoothingSpline[P, Any]):
                 return own.t, own.y
         raise ValidationError("the curve was estimated without points. See the attribute measurements.")
 
-    def _spread(self, part: Smoothed, index: tuple[int, ...], x: Doubles, nu: int) -> Doubles:
+    def _calibration_of(self, number: int) -> None:
+        return None
+
+    def _plain_spread(self, part: Smoothed, index: tuple[int, ...], x: Doubles, nu: int) -> Doubles:
         space = smoothed_spaces(self.space)[next(i for i, own in enumerate(self._smoothed) if own is part)]
         found = self._covariance(part, space, index, np.ascontiguousarray(x), None, [nu])
         return np.asarray(np.sqrt(np.trace(found, axis1=-2, axis2=-1) / space.dim))
@@ -106,7 +109,8 @@ class EstimatedSpline(SmoothingSpline[P, Any]):
         firsts = [self._posterior(self._smoothed[number]).first for number in parts]
         rows = [first + np.arange(spaces[number].dim) for number, first in zip(parts, firsts, strict=True)]
         kinds = end_kinds(self._bc_type)
-        return posterior.coupled(self._knots_of(index), index, kinds, x, None, orders, np.concatenate(rows))
+        found = posterior.coupled(self._knots_of(index), index, kinds, x, None, orders, np.concatenate(rows))
+        return self._inflated(parts, index, x, None, orders, found)
 
     def _made_of(self, radius: float | None = None) -> str:
         counts = [f"{np.size(own.t)} {type(own).__name__}" for own in self._measurements]
@@ -117,7 +121,7 @@ class EstimatedSpline(SmoothingSpline[P, Any]):
 
     def _noise_beside(self, index: tuple[int, ...], x: Doubles) -> UncertaintyBand:
         radii = [own[-1][1] for own in self._radii(x)]
-        speed = None if is_several(self.space) else self._spread(self._smoothed[0], index, x, 1)
+        speed = None if is_several(self.space) else self._spread(0, index, x, 1)
         others = [self._times_of(own) for own in self._measurements if not isinstance(own, Points)]
         times, points = zip(*map(self._points_in, range(len(factors_of(self.space)))), strict=True)
         return UncertaintyBand(list(times), list(points), radii, speed, np.concatenate([np.empty(0), *others]))

@@ -11,11 +11,14 @@ from numpy.typing import NDArray
 from .._arrays import as_array, short_repr
 from .._core import ValidationError
 from .._input import times_of
+from .._report import long_gaps
 from .._spaces import Array, Doubles, Space
 from .data import SmoothingData, points_of
 
 # Segments longer than this fraction of the curve are divided if no curve was found without additional knots.
 _GAPS = 12
+# Largest number of parts of a long gap between data.
+_IN_GAP = 32
 # If there are more knots than the first number, the fit begins with the second number of knots or more.
 _MANY, _FIRST = 4000, 2000
 # Number of evenly distributed short parts that are fitted before, and the smallest and largest number of data of each.
@@ -289,8 +292,26 @@ def in_gaps(knots: Knots, noisy: SmoothingData) -> Knots:
     if knots.times.ndim > 1 or len(knots.times) < 3:
         return knots
     h = np.diff(knots.times)
-    parts = np.ceil(h * _GAPS / h.sum()).astype(int)
-    i = np.repeat(np.arange(len(h)), parts)
+    return _divided(knots, noisy, np.ceil(h * _GAPS / h.sum()).astype(int))
+
+
+def in_long_gaps(knots: Knots, noisy: SmoothingData) -> Knots:
+    """Add knots in long gaps as far apart as the data usually are, so that the curve there minimises the jerk.
+
+    The curve with the least mean square of its third derivative has polynomials of degree five between the data, and a
+    segment of a spline is a cubic.
+    """
+    if knots.times.ndim > 1 or len(knots.times) < 3:
+        return knots
+    h = np.diff(knots.times)
+    usual = np.median(h)
+    parts = np.where(long_gaps(knots.times), np.minimum(np.ceil(h / usual), _IN_GAP), 1).astype(int)
+    return knots if parts.max() == 1 else _divided(knots, noisy, parts)
+
+
+def _divided(knots: Knots, noisy: SmoothingData, parts: NDArray[np.intp]) -> Knots:
+    """Divide every segment into a number of equal parts."""
+    i = np.repeat(np.arange(len(parts)), parts)
     j = np.arange(len(i)) - np.repeat(np.cumsum(parts) - parts, parts)
     # Dates are divided in their own unit.
     first, step = knots.t[i], knots.t[i + 1] - knots.t[i]

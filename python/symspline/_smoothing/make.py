@@ -47,7 +47,7 @@ from .data import (
     valid_curves,
 )
 from .factors import grouped, is_several, join, parts_of_factor, smoothed_spaces, split_ends
-from .knots import NO_CURVE, Knots, has_all_times, in_gaps, knots_for, with_enough_knots
+from .knots import NO_CURVE, Knots, has_all_times, in_gaps, in_long_gaps, knots_for, with_enough_knots
 from .outliers import warn_of_outliers
 from .regression import check_infinite, geodesic_knots, geodesic_options, is_infinite, with_infinite_lam
 from .report import SmoothingReport
@@ -98,7 +98,7 @@ def make_smoothing_spline(
     frames: Numbers | None = None,
     knots: TimesLike | None = None,
     criterion: Criterion = "gcv",
-    gamma: float = 1.4,
+    gamma: float = 1.2,
     penalty: SmoothingPenalty = "acceleration",
     sigma: Numbers | None = None,
     bc_type: SmoothingBCType | None = None,
@@ -153,9 +153,10 @@ def make_smoothing_spline(
     criterion : {"gcv", "reml", "cp"}, default "gcv"
         Criterion for λ: generalised cross-validation, restricted maximum likelihood, or Mallows' C_p, which requires
         `sigma`.
-    gamma : float, default 1.4
+    gamma : float, default 1.2
         Weight of a degree of freedom in ``"gcv"``, at least 1. With 1, which is cross-validation as Craven and Wahba
-        define it, the chosen curve occasionally passes through all data.
+        define it, the chosen curve occasionally passes through all data. Larger values smooth more: 1.4 suits motion
+        along geodesics, and loses accuracy for other motion.
     penalty : {"acceleration", "jerk"}, default "acceleration"
         The derivative whose squared integral is the penalty. With ``"jerk"``, which suits motions with accelerations,
         large λ give curves of constant acceleration, and the ends are free.
@@ -302,6 +303,8 @@ def make_smoothing_spline(
     factors = factors_of(space)
     ends = [part for factor, own in zip(factors, of_factors, strict=True) for part in split_ends(factor, own)]
     every = knots_for(whole, knots)
+    if knots is None and penalty == "jerk":
+        every = in_long_gaps(every, whole)
     # A geodesic has no freedom between its knots.
     free = not geodesics and (knots is None or has_all_times(every, noisy))
 

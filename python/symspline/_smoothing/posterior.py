@@ -76,7 +76,8 @@ class Posterior(NamedTuple):
         """Apply a function to the arrays with batch axes, such as the selection of some curves."""
         return self._replace(band=function(self.band), turn=function(self.turn))
 
-    def _known(self, index: tuple[int, ...], kinds: Any) -> Any:
+    def known(self, index: tuple[int, ...], kinds: Any) -> Any:
+        """Return A of one curve and how the curve ends, as the core reads them."""
         arrays = [np.ascontiguousarray(x) for x in (self.band[index], self.side, self.corner)]
         return arrays, self.size, kinds, np.ascontiguousarray(self.turn[index])
 
@@ -118,7 +119,7 @@ class Posterior(NamedTuple):
         self, knots: Doubles, index: tuple[int, ...], kinds: Any, x: Doubles, y: Any, orders: list[int], rows: Any
     ) -> Doubles:
         """Return the same for some of the coordinates that A couples, given by their numbers `rows`."""
-        found = _core.posterior_covariance(knots, self._known(index, kinds), x, y, orders)
+        found = _core.posterior_covariance(knots, self.known(index, kinds), x, y, orders)
         count, d = len(orders), len(orders) * len(rows)
         square = found.reshape(len(x), count, self.size, count, self.size)[:, :, rows][..., rows]
         return np.ascontiguousarray(square.reshape(len(x), d, d))
@@ -127,7 +128,7 @@ class Posterior(NamedTuple):
         self, space: Space, knots: Doubles, index: tuple[int, ...], kinds: Any, rng: np.random.Generator, n: int
     ) -> Doubles:
         """Return moves of one curve at its knots, shape (n, knots, size or dim), for noise of variance one."""
-        known = self._known(index, kinds)
+        known = self.known(index, kinds)
         rows = n * space.dim if self.size == 1 else n
         normal = rng.standard_normal((rows, _core.posterior_freedom(knots, known)))
         found = _core.posterior_samples(knots, known, normal)

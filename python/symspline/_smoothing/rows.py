@@ -154,14 +154,14 @@ def posterior_variance(t: Doubles, weights: Doubles, lam: float, bc_type: Any) -
     if len(many):
         own = rows.take(many)
         with np.errstate(invalid="ignore"):
-            found = np.where(own.inside, _fit(t, own, lam).std(t) ** 2, np.inf)
+            found = np.where(own.inside, _fit(t, own, lam).std(t, calibrated=False) ** 2, np.inf)
         variance[many] = found
         # As in `smooth`, the data alone where the whole row is singular to rounding.
         for number in many[np.isnan(found).any(axis=-1) | ~(found > 0).all(axis=-1)]:
             own = rows.take([number])
             used = own.weights[0] > 0
             spline = _fit(t[used], own._replace(points=own.points[:, used], weights=own.weights[:, used]), lam)
-            variance[number, inside[number]] = spline.std(t[inside[number]]) ** 2
+            variance[number, inside[number]] = spline.std(t[inside[number]], calibrated=False) ** 2
     return variance[which.reshape(-1)]
 
 

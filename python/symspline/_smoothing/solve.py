@@ -45,8 +45,8 @@ class Smoothed(NamedTuple):
     between : bool
         Whether the variance between the knots is included. It is if there is a knot at every time of the data: the
         curve is then the mean of a process. With other knots it is a spline, which has no such freedom.
-    penalty : {"acceleration", "jerk"}
-        The derivative whose square was penalised.
+    penalty, loss : str
+        Penalty and loss of the fit.
     outliers : Outliers or None
         Outcome of the rejection of data; None once the warnings have been issued.
     minima : ndarray of int or None
@@ -60,6 +60,7 @@ class Smoothed(NamedTuple):
     between: bool
     posterior: Posterior | None = None
     penalty: str = "acceleration"
+    loss: str = "linear"
     outliers: Outliers | None = None
     minima: NDArray[np.int_] | None = None
 
@@ -133,7 +134,8 @@ def smoothed(
     # Coordinates in a span of lower dimension are not those of the space.
     posterior = Posterior.of(matrix, turn, size) if span is None or size == 1 else None
     outliers = Outliers(selection, rejected)
-    noise = Smoothed(report, band, band_lam, scale, between, posterior, options.penalty, outliers, minima)
+    options_of_fit = options.penalty, options.loss
+    noise = Smoothed(report, band, band_lam, scale, between, posterior, *options_of_fit, outliers, minima)
     return on_space, noise, faults
 
 

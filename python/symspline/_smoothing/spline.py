@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import cached_property
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any, Generic, Self, overload
 
@@ -20,12 +21,15 @@ from .._spaces import Array, Doubles, Product, Space, SpecialOrthogonal, factors
 from .._time import TimeAxis
 from .._typing import AnyArray, AnyArrays, CovarianceOrder, FloatArray, Number, P, TimesLike
 from .data import SmoothingData
+from .evidence import calibration_of
 from .factors import grouped, is_several, join, parts_of_factor, smoothed_spaces, split
+from .gaps import Calibration, Gap
 from .posterior import Parameter, Posterior, frames_at
 from .process import process_ratio
 from .report import SmoothingReport
 from .solve import Smoothed
 from .stored import noise_state, read_noise
+from .warned import warn_of_gaps
 
 if TYPE_CHECKING:
     from typing_extensions import TypeVar
@@ -96,6 +100,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
 
     _noisy: SmoothingData
     _smoothed: list[Smoothed]
+    _has_warned: bool = False
 
     def _fill(self, *parts: Any) -> None:
         """Set the state of a `CubicSpline`, the noisy data and the results of the smoothing."""
@@ -171,24 +176,109 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         residuals: P = self._in_factors(found)
         return residuals
 
-    @overload
-    def std(self: SmoothingSpline[Any, SmoothingReport], x: TimesLike, *, nu: int = 0) -> FloatArray: ...
+    @property
+    def gaps(self) -> Any:
+        """Long gaps between the data, and the times before and after them, with the factors of the bands there.
+
+        This is a list of `Gap` in the order of time, of which the first and the last one are the times before and after
+        the data, unless the curve is closed. For products and poses it is a tuple with one list per part. For a batch
+        of curves, lists are in an array of objects with the batch axes. A curve whose bands need no calibration, such
+        as one with ``lam=0`` or ``lam=numpy.inf``, has an empty list.
+
+        See Also
+        --------
+        SmoothingSpline.std : Compute the standard deviation of the curve; see its notes.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import symspline as ss
+        >>> t = np.linspace(0, 60, 600)
+        >>> t = t[(t < 25) | (t > 30)]
+        >>> y = np.sin(t) + 0.02 * np.random.default_rng(0).standard_normal(t.size)
+        >>> s = ss.make_smoothing_spline(t, y[:, None], "r:1")
+        >>> before, gap, after = s.gaps
+        >>> round(gap.start), round(gap.stop), gap.factor > 2, after.stop
+        (25, 30, True, inf)
+        """
+        found = []
+        for number in range(len(self._smoothed)):
+            own = np.empty(self._batch, object)
+            for index in np.ndindex(self._batch):
+                own[index] = self._gaps_of(number, index)
+            found.append(own[()])
+        return self._each(found)
+
+    def _gaps_of(self, number: int, index: tuple[int, ...]) -> list[Gap]:
+        known = self._calibrations[number, index]
+        if known is None:
+            return []
+        before, after = known.ends[:1], known.ends[1:]
+        axis = self._time_axis
+        for place in index:
+            axis = axis.take_batch(place)
+        every = [*before, *known.gaps, *after]
+        ends = np.array([own[:2] for own in every]).reshape(-1, 2)
+        # Dates have no infinite times.
+        times = axis.shown(np.where(np.isinf(ends), np.nan, ends), ())
+        if not axis.dates:
+            times = np.where(np.isinf(ends), ends, times)
+        return [Gap(start, stop, *own[2:]) for (start, stop), own in zip(times, every, strict=True)]
+
+    @cached_property
+    def _calibrations(self) -> dict[tuple[int, tuple[int, ...]], Calibration | None]:
+        """How the variances change in gaps, for every part and every curve."""
+        found = {}
+        for index in np.ndindex(self._batch):
+            one: SmoothingSpline[Any, Any] = self
+            for place in index:
+                one = one[place]
+            found.update({(number, index): one._calibration_of(number) for number in range(len(self._smoothed))})
+        return found
+
+    def _calibration_of(self, number: int) -> Calibration | None:
+        return calibration_of(self, number)
+
+    def _inflation(self, number: int, index: tuple[int, ...], x: Doubles, nu: int) -> Doubles:
+        """Return the factor of the standard deviation of one curve in one part at times x of the core."""
+        known = self._calibrations[number, index]
+        if known is None:
+            return np.ones(x.shape)
+        out = known.inflation(x, nu)
+        if np.any(out != 1):
+            self._warn_of_gaps()
+        return out
+
+    def _warn_of_gaps(self) -> None:
+        """Warn once of a gap for which no part of the recording shows how far the curve may be off."""
+        if self._has_warned:
+            return
+        self._has_warned = True
+        warn_of_gaps(self, self._calibrations)
 
     @overload
     def std(
-        self: SmoothingSpline[Any, tuple[SmoothingReport, ...]], x: TimesLike, *, nu: int = 0
+        self: SmoothingSpline[Any, SmoothingReport], x: TimesLike, *, nu: int = 0, calibrated: bool = True
+    ) -> FloatArray: ...
+
+    @overload
+    def std(
+        self: SmoothingSpline[Any, tuple[SmoothingReport, ...]], x: TimesLike, *, nu: int = 0, calibrated: bool = True
     ) -> tuple[FloatArray, ...]: ...
 
-    def std(self, x: TimesLike, *, nu: int = 0) -> Any:
+    def std(self, x: TimesLike, *, nu: int = 0, calibrated: bool = True) -> Any:
         r"""Compute the standard deviation of the curve in one coordinate of an orthonormal frame.
 
         Parameters
         ----------
         x : array_like of float or datetime64
-            Times, of any shape. Beyond the knots, the standard deviation is that of a curve that continues with
+            Times, of any shape. Beyond the data, the standard deviation is that of a curve that continues with
             constant velocity, or periodically if it is closed.
         nu : {0, 1}, default 0
             0 for the point, 1 for the velocity.
+        calibrated : bool, default True
+            Whether standard deviations in long gaps and beyond the data are multiplied by the factors of
+            `SmoothingSpline.gaps`. Otherwise they are those of the posterior; see the notes.
 
         Returns
         -------
@@ -214,8 +304,27 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         that of the process at all times. If weights are matrices or curvature couples the coordinates, the variance of
         the spline is multiplied by the ratio that the two variances have for uncoupled coordinates.
 
+        This posterior promises too much in long gaps: λ follows the data, and the true motion is hardly ever the
+        process with this λ. Therefore parts of the recording as long as the gap, up to 24 of them, are predicted
+        without their data, and the variance v becomes :math:`v + (k^2 - 1)(v - v_0)`. k is the factor with which the
+        errors of these predictions have the variances that they should, and :math:`v_0` is the median variance at the
+        data. This applies where the posterior variance in the middle of a gap exceeds :math:`4 v_0`, from two widths of
+        the smoother :math:`(\lambda / \rho)^{1/4}` before the gap until two behind it, with the weight ρ of the data
+        per unit of time. Velocities have the same k.
+
+        Beyond the data, the variance :math:`\sigma^2 d^3 / (3 \lambda)` of the process at the distance d is added, and
+        k follows from predictions beyond the end of parts of the recording; it is at most 20. For ``penalty="jerk"``
+        the process adds :math:`\sigma^2 d^5 / (20 \lambda) + a^2 d^4 / 4`, with the mean square a² of the
+        acceleration. Coverage is an average over time, and k an average over the recording: nothing shows whether a
+        burst of motion falls into a gap.
+
+        The factors are computed at the first call. If no part of the recording is as long as a gap, its factor is the
+        largest one of shorter parts, and a `SmoothingWarning` names it. Without any such part the result is NaN there.
+
         References
         ----------
+        S. N. Wood, On neighbourhood cross validation, arXiv 2404.16490 (2024).
+
         G. Wahba, Bayesian "confidence intervals" for the cross-validated smoothing spline, J. R. Stat. Soc. B 45
         (1983).
 
@@ -233,16 +342,21 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         times, own, per_curve = self._finite_times(x)
         batch = self._batch
         found = []
-        for part in self._smoothed:
+        for number in range(len(self._smoothed)):
             out = np.empty((*batch, *own))
             for index in np.ndindex(batch):
                 at = times[index] if per_curve else times
-                out[index] = self._spread(part, index, np.ravel(at), nu).reshape(own)
+                out[index] = self._spread(number, index, np.ravel(at), nu, calibrated).reshape(own)
             found.append(out[()])
         return self._each(found)
 
-    def _spread(self, part: Smoothed, index: tuple[int, ...], x: Doubles, nu: int) -> Doubles:
+    def _spread(self, number: int, index: tuple[int, ...], x: Doubles, nu: int, calibrated: bool = True) -> Doubles:
         """Return the standard deviation of one curve in one part at times x of the core."""
+        plain = self._plain_spread(self._smoothed[number], index, x, nu)
+        return plain * self._inflation(number, index, x, nu) if calibrated else plain
+
+    def _plain_spread(self, part: Smoothed, index: tuple[int, ...], x: Doubles, nu: int) -> Doubles:
+        """Return the same as the posterior has it."""
         knots = self._knots_of(index)
         lam, sigma = (np.asarray(value)[index].item() for value in (part.band_lam, part.sigma))
         if not part.between:
@@ -267,14 +381,20 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         return process_ratio(*own, self._knots_of(index), band, lam, end_kinds(self._bc_type), x, nu)
 
     @overload
-    def band(self: SmoothingSpline[Any, SmoothingReport], x: TimesLike, level: float = 0.95) -> FloatArray: ...
+    def band(
+        self: SmoothingSpline[Any, SmoothingReport], x: TimesLike, level: float = 0.95, *, calibrated: bool = True
+    ) -> FloatArray: ...
 
     @overload
     def band(
-        self: SmoothingSpline[Any, tuple[SmoothingReport, ...]], x: TimesLike, level: float = 0.95
+        self: SmoothingSpline[Any, tuple[SmoothingReport, ...]],
+        x: TimesLike,
+        level: float = 0.95,
+        *,
+        calibrated: bool = True,
     ) -> tuple[FloatArray, ...]: ...
 
-    def band(self, x: TimesLike, level: float = 0.95) -> Any:
+    def band(self, x: TimesLike, level: float = 0.95, *, calibrated: bool = True) -> Any:
         """Compute the radius of the ball that contains the true point with a given probability.
 
         Parameters
@@ -283,6 +403,8 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
             Times, of any shape.
         level : float, default 0.95
             Probability between 0 and 1.
+        calibrated : bool, default True
+            Whether bands in long gaps and beyond the data are calibrated, as for `std`.
 
         Returns
         -------
@@ -300,9 +422,10 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
 
         Notes
         -----
-        `level` is the coverage on average over all times. The coverage is lower in long gaps, and at end points with
-        natural conditions if the true curve has an acceleration there. The band is not valid if λ is at its bound
-        (``report.at_bound``).
+        `level` is the coverage on average over all times. The coverage is lower at end points with natural conditions
+        if the true curve has an acceleration there. The band is not valid if λ is at its bound (``report.at_bound``).
+        In long gaps and beyond the data it is as wide as predictions of other parts of the recording require; see the
+        notes of `std`.
 
         Examples
         --------
@@ -316,7 +439,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         """
         level = checked_number(level, "level must lie between 0 and 1", lambda x: 0 < x < 1)
         whole: SmoothingSpline[Any, Any] = self
-        spreads = whole.std(x)
+        spreads = whole.std(x, calibrated=calibrated)
         each = spreads if is_several(self.space) else (spreads,)
         return self._each(
             [radius(part, level) * spread for part, spread in zip(smoothed_spaces(self.space), each, strict=True)]
@@ -329,6 +452,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         y: TimesLike | None = None,
         *,
         nu: CovarianceOrder = 0,
+        calibrated: bool = True,
     ) -> FloatArray: ...
 
     @overload
@@ -338,9 +462,10 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         y: TimesLike | None = None,
         *,
         nu: CovarianceOrder = 0,
+        calibrated: bool = True,
     ) -> tuple[FloatArray, ...]: ...
 
-    def cov(self, x: TimesLike, y: TimesLike | None = None, *, nu: CovarianceOrder = 0) -> Any:
+    def cov(self, x: TimesLike, y: TimesLike | None = None, *, nu: CovarianceOrder = 0, calibrated: bool = True) -> Any:
         r"""Compute the covariance of the curve in the frames along it.
 
         Parameters
@@ -351,6 +476,9 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
             Other times of the same shape. By default, the covariance at each time of x is returned.
         nu : {0, 1, "joint"}, default 0
             0 for the point, 1 for the velocity, ``"joint"`` for both, point first. With `y` it must be 0.
+        calibrated : bool, default True
+            Whether standard deviations in long gaps and beyond the data are calibrated, as for `std`. Correlations do
+            not change.
 
         Returns
         -------
@@ -398,12 +526,16 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
             if other_shape != shape:
                 raise ValidationError(f"y has shape {other_shape}, but x has shape {shape}")
         found = []
-        for part, space in zip(self._smoothed, smoothed_spaces(self.space), strict=True):
-            size = len(orders) * space.dim
+        for number, space in enumerate(smoothed_spaces(self.space)):
+            part, size = self._smoothed[number], len(orders) * space.dim
             out = np.empty((*self._batch, *shape, size, size))
             for index in np.ndindex(self._batch):
-                at, to = (None if own is None else np.ravel(own[index] if per_curve else own) for own in (x, other))
-                out[index] = self._covariance(part, space, index, at, to, orders).reshape(*shape, size, size)
+                at = np.ravel(x[index] if per_curve else x)
+                to = None if other is None else np.ravel(other[index] if per_curve else other)
+                own = self._covariance(part, space, index, at, to, orders)
+                if calibrated:
+                    own = self._inflated([number], index, at, to, orders, own)
+                out[index] = own.reshape(*shape, size, size)
             found.append(out)
         return self._each(found)
 
@@ -416,6 +548,27 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         if part.between and y is None and len(orders) == 1:
             self._add_between(part, index, x, orders, found.reshape(len(x), 1, space.dim, 1, space.dim))
         return np.asarray(sigma**2 * found)
+
+    def _inflated(
+        self, parts: list[int], index: tuple[int, ...], x: Doubles, y: Any, orders: list[int], covariance: Doubles
+    ) -> Doubles:
+        """Multiply covariances of parts by the factors of both standard deviations.
+
+        Accelerations have the factors of velocities.
+        """
+        spaces = smoothed_spaces(self.space)
+
+        def factors(at: Doubles) -> Doubles:
+            each = [
+                np.repeat(self._inflation(number, index, at, min(nu, 1))[:, None], spaces[number].dim, axis=1)
+                for nu in orders
+                for number in parts
+            ]
+            return np.concatenate(each, axis=1)
+
+        left = factors(x)
+        right = left if y is None else factors(y)
+        return np.asarray(left[:, :, None] * covariance * right[:, None])
 
     def _add_between(
         self, part: Smoothed, index: tuple[int, ...], x: Doubles, orders: list[int], found: Doubles
@@ -464,7 +617,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
                 self._add_between(part, index, x, orders, own)
             own *= np.asarray(part.sigma)[index].item() ** 2
             whole[:, :, start:end, :, start:end] = own
-        return whole.reshape(len(x), count * size, count * size)
+        return self._inflated(parts, index, x, None, orders, whole.reshape(len(x), count * size, count * size))
 
     def _posterior(self, part: Smoothed) -> Posterior:
         if part.posterior is None:
@@ -579,7 +732,8 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         Notes
         -----
         The knots move by a sample of the normal distribution in the frames along the curve, and one batched fit joins
-        them. The variance between the knots, which `std` includes, is not part of it.
+        them. The variance between the knots, which `std` includes, is not part of it. Samples at knots near a gap are
+        scaled to the calibrated standard deviations.
 
         Examples
         --------
@@ -601,7 +755,8 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         drawn: dict[tuple[int, tuple[int, ...]], Doubles] = {}
         per_curve = self._times.ndim > 1
         parts = self._in_parts(self._times, per_curve)
-        for part, (space, whole, _) in zip(self._smoothed, parts, strict=True):
+        for number, (space, whole, _) in enumerate(parts):
+            part = self._smoothed[number]
             posterior = self._posterior(part)
             out = np.empty((n, *whole.shape), space.dtype)
             for index in np.ndindex(self._batch):
@@ -611,12 +766,13 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
                 if key not in drawn:
                     drawn[key] = posterior.samples(space, knots, index, kinds, rng, n)
                 first = posterior.first
-                own = drawn[key][..., first : first + space.dim] * np.asarray(part.sigma)[index].item()
                 points = whole[index]
                 if not space._where_finite(points).all():
                     # Curves that failed or are masked have no posterior.
                     out[(slice(None), *index)], valid[index] = np.nan, False
                     continue
+                own = drawn[key][..., first : first + space.dim] * np.asarray(part.sigma)[index].item()
+                own = own * self._inflation(number, index, knots, 0)[:, None]
                 frames = frames_at(space, knots, points, knots, points)
                 vectors = np.einsum("nkj,kj...->nk...", own, frames)
                 out[(slice(None), *index)] = space.project(space._apply("exp", p=points, v=vectors))
@@ -647,18 +803,20 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         noisy = self._noisy.map(itemgetter(index), ())
         # The parts of a pose have different units; plots show the band of the position.
         radii = [
-            radius(own[-1][0], 0.95) * self._spread(own[-1][1], index, x, 0)
-            for own in grouped(self.space, zip(smoothed_spaces(self.space), self._smoothed, strict=True))
+            radius(own[-1][1], 0.95) * self._spread(own[-1][0], index, x, 0)
+            for own in grouped(self.space, enumerate(smoothed_spaces(self.space)))
         ]
         several = is_several(self.space)
-        speed = None if several else self._spread(self._smoothed[0], index, x, 1)
+        speed = None if several else self._spread(0, index, x, 1)
         points = [own[noisy.used] for own in noisy.points]
         return UncertaintyBand([noisy.times[noisy.used]] * len(points), points, radii, speed)
 
     def _radii(self, x: Doubles) -> list[list[tuple[Space, Doubles]]]:
         """Return the parts of every factor, and the radii of their 95 % bands at times x of the core."""
-        parts = zip(smoothed_spaces(self.space), self._smoothed, strict=True)
-        return grouped(self.space, [(part, radius(part, 0.95) * self._spread(own, (), x, 0)) for part, own in parts])
+        parts = enumerate(smoothed_spaces(self.space))
+        return grouped(
+            self.space, [(part, radius(part, 0.95) * self._spread(number, (), x, 0)) for number, part in parts]
+        )
 
     def _panels_below(self, x: Doubles) -> list[SidePanel]:
         return [

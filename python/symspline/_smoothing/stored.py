@@ -29,8 +29,7 @@ def noise_state(space: Space[Any], noisy: SmoothingData, smoothed: list[Smoothed
         "noise": [
             vars(own.report)
             | {"band_lam": own.band_lam, "scale": own.sigma, "between": own.between}
-            # Files without this entry have the default.
-            | ({} if own.penalty == "acceleration" else {"penalty": own.penalty})
+            | {"penalty": own.penalty, "loss": own.loss}
             # Version 1 has no matrices.
             | ({} if own.posterior is None else {"posterior": True})
             for own in smoothed
@@ -125,7 +124,9 @@ def read_noise(
             lam, scale = (read_field(key, numbers.pop(key), batch, dtype=np.float64) for key in ("band_lam", "scale"))
             between = read_field("between", numbers.pop("between"), (), dtype=np.bool_)
             known = numbers.pop("posterior", False)
+            # Files of older versions do not name them.
             penalty = one_of(numbers.pop("penalty", "acceleration"), "penalty", "acceleration", "jerk")
+            loss = one_of(numbers.pop("loss", "linear"), "loss", "linear", "huber", "cauchy")
             report = read_report(SmoothingReport, numbers, batch)
             # A closed curve repeats its first coefficients at the end.
             good = np.asarray(report.converged)
@@ -133,7 +134,7 @@ def read_noise(
             posterior = None
             if known:
                 posterior = read_posterior(state, suffix, own.dim, band.shape[-2], batch, closed, good)
-            smoothed.append(Smoothed(report, band, lam, scale, between, posterior, penalty))
+            smoothed.append(Smoothed(report, band, lam, scale, between, posterior, penalty, loss))
     return SmoothingData(time_axis, t, times, points, precisions, batch), smoothed
 
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from .._arrays import short_repr
 from .._curves.curve import CurveArrays
 from .._faults import of_index
 from .._spaces import Array, Space, factors_of
@@ -26,7 +27,8 @@ class SmoothingWarning(UserWarning):
     """Warning that a statistical fit cannot be trusted.
 
     The chosen λ is at a bound, the residuals are not those of independent noise with the given standard deviations, a
-    robust loss may have rejected the wrong data, or other curves may fit as well.
+    robust loss may have rejected the wrong data, other curves may fit as well, or nothing shows the error of the curve
+    in a gap.
     """
 
 
@@ -150,3 +152,48 @@ def _median_distance(space: Space, x: Array, y: Array, counts: Any) -> Array:
     distances[used] = space._apply("distance", p=x[used], q=y[used])
     distances[~used.any(axis=-1)] = 0.0
     return np.asarray(np.nanmedian(distances, axis=-1))
+
+
+# ---- bands in gaps ----
+
+
+def warn_of_gaps(spline: Any, found: dict[tuple[int, tuple[int, ...]], Any]) -> None:
+    """Warn once of the longest gap for which no part of the recording shows how far its curve may be off.
+
+    Parameters
+    ----------
+    spline : SmoothingSpline
+        Curve.
+    found : dict
+        Calibrations by part and index of the curve; None for curves without any.
+    """
+    blind = [
+        (stop - start, key, place)
+        for key, known in found.items()
+        for place, (start, stop, _, blocks) in enumerate([] if known is None else known.gaps)
+        if not blocks
+    ]
+    if not blind:
+        return
+    _, (number, index), place = max(blind)
+    gap, count = spline._gaps_of(number, index)[place + len(found[number, index].ends[:1])], len(blind)
+    of = of_index(index)
+    of += f" in factor {number}, {smoothed_spaces(spline.space)[number]!r}" if is_several(spline.space) else ""
+    more = f" (and {count - 1} more gaps)" if count > 1 else ""
+    if np.isnan(gap.factor):
+        known = (
+            "No part of the recording shows how far the curve may be off there, so its standard deviation is NaN. Cut "
+            "the recording at this gap (symspline.fit_segments), or pass calibrated=False for the posterior."
+        )
+    else:
+        known = (
+            f"Its band is {gap.factor:.2g} times that of the posterior, as the longest parts of the recording require "
+            "that can be predicted from the rest. Do not rely on the curve inside: cut the recording at this gap "
+            "(symspline.fit_segments), or add data."
+        )
+    warn(
+        f"there are no data{of} between t = {short_repr(gap.start)} and {short_repr(gap.stop)}{more}, and no other "
+        f"part of the recording is as long. {known}",
+        SmoothingWarning,
+        index,
+    )

@@ -1,0 +1,262 @@
+//! What a fit would predict in parts of a recording whose data it did not have, at the same λ: the measure of how far
+//! its posterior can be trusted in gaps.
+//!
+//! At the solution, `Ac = BᵀWy` for data y with the matrix `A = BᵀWB + λΩ`. Without some of the data, of rows b and
+//! residuals r, the coefficients change by `δ = −(A − bᵀWb)⁻¹bᵀWr`, and their covariance is `(A − bᵀWb)⁻¹`. These are
+//! the deleted residuals of neighbourhood cross-validation (Wood 2024, arXiv 2404.16490), for every lane another
+//! neighbourhood. Frames along the curve make them those of a curve in any space, up to its curvature.
+
+use crate::banded::{Banded, stride};
+use crate::bordered::Bordered;
+use crate::cyclic::{Factored, PeriodicCorrection};
+use crate::estimation::Matrices;
+use crate::linearized::{Basis, OVERLAP};
+use crate::problem::Ends;
+use symspline_core::scalar::{LANES, Lane, few};
+
+/// Linear functions of the coefficients of a curve, and of parameters.
+pub struct Functionals<'a> {
+    /// The index of the first coefficient of each.
+    pub firsts: &'a [usize],
+    /// The factors of four coefficients, m numbers each.
+    pub factors: &'a [f64],
+    /// The factors of p parameters.
+    pub sides: &'a [f64],
+}
+
+/// The system of a curve: its matrix A, and the holonomy of a closed curve.
+pub struct System<'a> {
+    count: usize,
+    m: usize,
+    p: usize,
+    matrices: &'a Matrices,
+    periodic: Option<PeriodicCorrection>,
+}
+
+/// Predictions without some of the data: values and variances of linear functions, for noise of variance one.
+pub struct Predictions {
+    /// The changes by the omission, one row of columns per function.
+    pub values: Vec<f64>,
+    /// The variances; NaN where the other data do not determine the curve.
+    pub variances: Vec<f64>,
+}
+
+impl<'a> System<'a> {
+    /// For a matrix that couples m coordinates.
+    pub fn new(knots: &[f64], ends: Ends, m: usize, matrices: &'a Matrices, turn: &[f64]) -> Self {
+        let basis = Basis::new(knots, ends);
+        let periodic =
+            basis.is_closed().then(|| PeriodicCorrection { overlap: OVERLAP, m, turn: turn.to_vec() });
+        System { count: basis.count(), m, p: matrices[2].len().isqrt(), matrices, periodic }
+    }
+
+    /// Predicts `probes` without the data `omitted`, for each of several pairs of index lists. The residuals are those
+    /// of all data, `columns` numbers each; rows and residuals are divided by standard deviations.
+    pub fn without(
+        &self,
+        data: &Functionals,
+        residuals: &[f64],
+        columns: usize,
+        probes: &Functionals,
+        blocks: &[(&[usize], std::ops::Range<usize>)],
+    ) -> Predictions {
+        let total = probes.firsts.len();
+        let mut found = Predictions { values: vec![0.0; total * columns], variances: vec![f64::NAN; total] };
+        for group in blocks.chunks(LANES) {
+            self.of_lanes(data, residuals, columns, probes, group, &mut found);
+        }
+        found
+    }
+
+    fn of_lanes(
+        &self,
+        data: &Functionals,
+        residuals: &[f64],
+        columns: usize,
+        probes: &Functionals,
+        group: &[(&[usize], std::ops::Range<usize>)],
+        found: &mut Predictions,
+    ) {
+        let (m, p, width) = (self.m, self.p, 4 * self.m);
+        let size = self.count * m;
+        let rows = stride(m);
+        // Lanes without a block of their own repeat the first one.
+        let of_lane = |l: usize| group.get(l).unwrap_or(&group[0]);
+        let mut lanes: Vec<[Vec<f64>; 3]> = Vec::with_capacity(LANES);
+        let mut rights: Vec<(Vec<f64>, Vec<f64>)> = Vec::with_capacity(LANES);
+        for l in 0..LANES {
+            let mut own = self.matrices.clone();
+            let (mut right, mut border) = (vec![0.0; size * columns], vec![0.0; p * columns]);
+            for &k in of_lane(l).0 {
+                let (start, factors) = (data.firsts[k] * m, &data.factors[k * width..][..width]);
+                let side = &data.sides[k * p..][..p];
+                let residual = &residuals[k * columns..][..columns];
+                for (a, x) in factors.iter().enumerate().filter(|(_, x)| **x != 0.0) {
+                    for (b, y) in factors[..=a].iter().enumerate() {
+                        own[0][(start + a) * rows + a - b] -= x * y;
+                    }
+                    side.iter().enumerate().for_each(|(b, y)| own[1][(start + a) * p + b] -= x * y);
+                    let to = &mut right[(start + a) * columns..][..columns];
+                    to.iter_mut().zip(residual).for_each(|(to, r)| *to -= x * r);
+                }
+                for (a, x) in side.iter().enumerate() {
+                    side.iter().enumerate().for_each(|(b, y)| own[2][a * p + b] -= x * y);
+                    let to = &mut border[a * columns..][..columns];
+                    to.iter_mut().zip(residual).for_each(|(to, r)| *to -= x * r);
+                }
+            }
+            if let Some(periodic) = &self.periodic {
+                right = by_columns(&right, columns, m, |column| periodic.fold(column));
+            }
+            lanes.push(own);
+            rights.push((border, right));
+        }
+        let at = |part: usize, i: usize| Lane::new(few(|l| lanes[l][part][i]));
+        let band = Banded::of(size, rows - 1, |i| at(0, i));
+        let matrix = if self.periodic.is_some() {
+            Factored::new(band, self.periodic.as_ref())
+        } else {
+            let side = (0..size * p).map(|i| at(1, i)).collect();
+            let corner = Banded::of(p, p.saturating_sub(1), |i| {
+                let (row, d) = (i / p, i % p);
+                if d <= row { at(2, row * p + row - d) } else { Lane::ZERO }
+            });
+            Factored::open(Bordered::new(band, side, corner))
+        };
+        let mut x: Vec<Lane> = (0..p * columns).map(|i| Lane::new(few(|l| rights[l].0[i]))).collect();
+        x.extend((0..rights[0].1.len()).map(|i| Lane::new(few(|l| rights[l].1[i]))));
+        matrix.solve(columns, &mut x);
+        let inverse = matrix.inverse();
+        let pivots = matrix.least_pivot().to_array();
+        for (l, (_, probed)) in group.iter().enumerate().filter(|(l, _)| pivots[*l] > 0.0) {
+            let border: Vec<f64> = x[..p * columns].iter().map(|x| x.as_array()[l]).collect();
+            let mut solved: Vec<f64> = x[p * columns..].iter().map(|x| x.as_array()[l]).collect();
+            if let Some(periodic) = &self.periodic {
+                solved = by_columns(&solved, columns, m, |column| periodic.extend(column));
+            }
+            for k in probed.clone() {
+                let (start, factors) = (probes.firsts[k] * m, &probes.factors[k * width..][..width]);
+                let side = &probes.sides[k * p..][..p];
+                // The unknowns on which the function depends; parameters are the first.
+                let own = side.iter().enumerate().map(|(a, x)| (a, *x));
+                let own = own.chain(factors.iter().enumerate().map(|(a, x)| (p + start + a, *x)));
+                let own: Vec<(usize, f64)> = own.filter(|(_, x)| *x != 0.0).collect();
+                let value = &mut found.values[k * columns..][..columns];
+                let mut variance = 0.0;
+                for &(i, x) in &own {
+                    let row = if i < p { &border[i * columns..] } else { &solved[(i - p) * columns..] };
+                    value.iter_mut().zip(row).for_each(|(value, y)| *value += x * y);
+                    for &(j, y) in &own {
+                        variance += x * y * inverse.at(i, j).as_array()[l];
+                    }
+                }
+                found.variances[k] = variance;
+            }
+        }
+    }
+}
+
+/// Applies a function to each column of rows of numbers, m of which belong to a coefficient.
+fn by_columns(rows: &[f64], columns: usize, m: usize, change: impl Fn(&mut Vec<f64>)) -> Vec<f64> {
+    debug_assert!(rows.len() % (columns * m) == 0);
+    let changed: Vec<Vec<f64>> = (0..columns)
+        .map(|c| {
+            let mut column = rows.iter().skip(c).step_by(columns).copied().collect();
+            change(&mut column);
+            column
+        })
+        .collect();
+    (0..changed[0].len() * columns).map(|at| changed[at % columns][at / columns]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::linearized::LinearProblem;
+    use crate::path::positions;
+    use crate::problem::{EndCondition, Penalty};
+    use symspline_core::scalar::lane;
+
+    /// The coefficients and the variances at the data of a fit with weights.
+    fn fit(
+        knots: &[f64],
+        t: &[f64],
+        y: &[f64],
+        weights: &[f64],
+        lam: f64,
+        ends: Ends,
+    ) -> (Vec<f64>, Vec<f64>) {
+        let linear =
+            LinearProblem::new(Basis::new(knots, ends), &positions(knots, t), weights, Penalty::Acceleration);
+        let count = linear.basis.count();
+        let periodic = linear.basis.is_closed().then(|| PeriodicCorrection::plain(OVERLAP, 1));
+        let band = Banded::of(count, 3, |at| lane(linear.gram[at] + lam * linear.penalty[at]));
+        let matrix = Factored::new(band, periodic.as_ref());
+        let mut right = vec![0.0; count];
+        linear
+            .data
+            .iter()
+            .zip(weights.iter().zip(y))
+            .for_each(|(row, (w, y))| row.spread(&[w * y], &mut right));
+        periodic.iter().for_each(|periodic| periodic.fold(&mut right));
+        let mut x: Vec<Lane> = right.iter().map(|x| lane(*x)).collect();
+        matrix.solve(1, &mut x);
+        let mut c: Vec<f64> = x.iter().map(|x| x.as_array()[0]).collect();
+        periodic.iter().for_each(|periodic| periodic.extend(&mut c));
+        let inverse = matrix.inverse_band();
+        let values = linear.data.iter().map(|row| {
+            let mut out = [0.0];
+            row.apply(&c, &mut out);
+            out[0]
+        });
+        (values.collect(), linear.data.iter().map(|row| row.square(&inverse).as_array()[0]).collect())
+    }
+
+    #[test]
+    fn omitted_data_have_the_predictions_of_a_fit_without_them() {
+        let n = 40;
+        let knots: Vec<f64> = (0..=20).map(|i| f64::from(i) + 0.3 * (f64::from(i) * 1.7).sin()).collect();
+        let span = knots[20] - knots[0];
+        let t: Vec<f64> = (0..n).map(|i| knots[0] + span * (f64::from(i) + 0.5) / f64::from(n)).collect();
+        let y: Vec<f64> = t.iter().map(|t| (0.7 * t).sin() + 0.3 * (9.0 * t).cos()).collect();
+        let weights: Vec<f64> = t.iter().map(|t| 1.5 + t.cos()).collect();
+        let lam = 0.4;
+        for ends in [Ends::Open([EndCondition::Natural; 2]), Ends::Periodic] {
+            let (values, _) = fit(&knots, &t, &y, &weights, lam, ends);
+            let linear = LinearProblem::new(
+                Basis::new(&knots, ends),
+                &positions(&knots, &t),
+                &weights,
+                Penalty::Acceleration,
+            );
+            let band = (0..linear.gram.len()).map(|at| linear.gram[at] + lam * linear.penalty[at]).collect();
+            let matrices: Matrices = [band, Vec::new(), Vec::new()];
+            let system = System::new(&knots, ends, 1, &matrices, &[1.0]);
+            let firsts: Vec<usize> = linear.data.iter().map(|row| row.first).collect();
+            let rows = |scale: &dyn Fn(usize) -> f64| -> Vec<f64> {
+                linear
+                    .data
+                    .iter()
+                    .enumerate()
+                    .flat_map(|(k, row)| row.factors.map(|x| x * scale(k)))
+                    .collect()
+            };
+            let (weighed, plain) = (rows(&|k| weights[k].sqrt()), rows(&|_| 1.0));
+            let residuals: Vec<f64> = (0..t.len()).map(|k| weights[k].sqrt() * (y[k] - values[k])).collect();
+            // The last block continues at the start, and the second one is at an end.
+            let lists: [Vec<usize>; 3] = [(10..17).collect(), (30..40).collect(), vec![37, 38, 39, 0, 1, 2]];
+            for list in &lists {
+                let all = Functionals { firsts: &firsts, factors: &weighed, sides: &[] };
+                let probes = Functionals { firsts: &firsts, factors: &plain, sides: &[] };
+                let found = system.without(&all, &residuals, 1, &probes, &[(list, 0..t.len())]);
+                let fewer: Vec<f64> =
+                    (0..t.len()).map(|k| if list.contains(&k) { 0.0 } else { weights[k] }).collect();
+                let (again, variances) = fit(&knots, &t, &y, &fewer, lam, ends);
+                for k in 0..t.len() {
+                    assert!((values[k] + found.values[k] - again[k]).abs() < 1e-10);
+                    assert!((found.variances[k] - variances[k]).abs() < 1e-9 * variances[k].max(1.0));
+                }
+            }
+        }
+    }
+}

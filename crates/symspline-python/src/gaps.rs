@@ -1,0 +1,75 @@
+//! Predictions without some of the data, called from Python.
+
+use crate::arrays::{in_order, zeros};
+use crate::estimation::{Known, matrices_of};
+use crate::watch::watched;
+use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArray1, PyReadonlyArrayDyn};
+use pyo3::prelude::*;
+use std::ops::Range;
+use symspline_engine::smoothing::gaps::{Functionals, System};
+use symspline_engine::smoothing::{chi, functional_at};
+
+type Array<'py> = PyReadonlyArrayDyn<'py, f64>;
+type Out<'py> = Bound<'py, PyArrayDyn<f64>>;
+/// Linear functions of coefficients and parameters: first coefficients, and factors (n, 4m) and (n, p).
+type Rows<'py> = (PyReadonlyArray1<'py, i64>, Array<'py>, Array<'py>);
+
+/// The factors of four coefficients, from the first one, in a derivative of a curve at times x.
+#[pyfunction]
+pub fn coefficient_factors<'py>(
+    py: Python<'py>,
+    knots: Array<'py>,
+    kinds: Option<[String; 2]>,
+    x: Array<'py>,
+    nu: usize,
+) -> PyResult<(Bound<'py, PyArray1<i64>>, Out<'py>)> {
+    let (knots, x) = (in_order(&knots)?, in_order(&x)?);
+    let found = functional_at(knots, crate::estimation::ends_named(kinds)?, x, nu);
+    let out = zeros(py, &[x.len(), 4])?;
+    let all: Vec<f64> = found.iter().flat_map(|(_, factors)| *factors).collect();
+    out.readwrite().as_slice_mut()?.copy_from_slice(&all);
+    Ok((PyArray1::from_iter(py, found.iter().map(|(first, _)| *first as i64)), out))
+}
+
+/// Values (n, columns) and variances (n,) of the functions `probes` of one curve without some of its data. Every block
+/// is the range of its omitted data in `omitted`, and that of its probes.
+#[pyfunction]
+#[allow(clippy::too_many_arguments)]
+pub fn predictions_without<'py>(
+    py: Python<'py>,
+    knots: Array<'py>,
+    known: Known<'py>,
+    data: Rows<'py>,
+    residuals: Array<'py>,
+    probes: Rows<'py>,
+    omitted: PyReadonlyArray1<'py, i64>,
+    blocks: Vec<[usize; 4]>,
+) -> PyResult<(Out<'py>, Out<'py>)> {
+    let (matrices, m, ends, turn) = matrices_of(&known)?;
+    let system = System::new(in_order(&knots)?, ends, m, &matrices, &turn);
+    let index = |all: &PyReadonlyArray1<i64>| -> PyResult<Vec<usize>> {
+        Ok(all.as_slice()?.iter().map(|i| *i as usize).collect())
+    };
+    let (of_data, of_probes) = (index(&data.0)?, index(&probes.0)?);
+    let data = Functionals { firsts: &of_data, factors: in_order(&data.1)?, sides: in_order(&data.2)? };
+    let probes =
+        Functionals { firsts: &of_probes, factors: in_order(&probes.1)?, sides: in_order(&probes.2)? };
+    let omitted = index(&omitted)?;
+    let blocks: Vec<(&[usize], Range<usize>)> =
+        blocks.iter().map(|&[a, b, c, d]| (&omitted[a..b], c..d)).collect();
+    let residuals = in_order(&residuals)?;
+    let columns = residuals.len() / of_data.len().max(1);
+    let work = blocks.len().div_ceil(8) * matrices[0].len();
+    let found =
+        watched(py, None, work, false, |_| system.without(&data, residuals, columns, &probes, &blocks))?;
+    let (values, variances) = (zeros(py, &[of_probes.len(), columns])?, zeros(py, &[of_probes.len()])?);
+    values.readwrite().as_slice_mut()?.copy_from_slice(&found.values);
+    variances.readwrite().as_slice_mut()?.copy_from_slice(&found.variances);
+    Ok((values, variances))
+}
+
+/// The quantile of the ratio of χ² with m degrees of freedom to the mean square of n independent normal numbers.
+#[pyfunction]
+pub fn chi_squared_ratio(m: usize, n: usize, probability: f64) -> f64 {
+    chi::ratio_quantile(m, n, probability)
+}

@@ -1,0 +1,256 @@
+"""Bands in long gaps and beyond the ends hold, and are the same elsewhere."""
+
+import warnings
+
+import numpy as np
+import pytest
+from scipy.stats import chi2, f
+
+import symspline as ss
+from symspline import _core
+from symspline._smoothing import evidence as evidence_module
+from symspline._smoothing.gaps import Predicted, factor_of
+
+
+def recorded(seed=0, n=400, gaps=((132.0, 137.0),), dim=2, noise=0.02, start=100.0, span=60.0):
+    """Return irregular times, noisy points and the motion: sums of three sines."""
+    rng = np.random.default_rng(seed)
+    # Far from even, and without gaps of its own.
+    t = start + span * (np.arange(n) + rng.uniform(0.1, 0.9, n)) / n
+    for first, last in gaps:
+        t = t[(t < first) | (t > last)]
+    w = rng.uniform(0.2, 1.2, (dim, 3))
+    a, p = rng.uniform(1, 5, (dim, 3)) / (1 + 3 * w), rng.uniform(0, 6, (dim, 3))
+
+    def motion(x):
+        return (a * np.sin(np.multiply.outer(x, w) + p)).sum(axis=-1)
+
+    return t, motion(t) + noise * rng.standard_normal((len(t), dim)), motion
+
+
+def predictions(spline, left_out):
+    """Return vectors to the data from the curve without some of its data, and the variances of that curve there."""
+    own = evidence_module._evidence(spline, 0, np.arange(len(left_out)), float(spline.sigma))
+    every = np.arange(len(own.times))
+    firsts, factors = _core.coefficient_factors(own.knots, own.known[2], own.times, 0)
+    data = own.rows(every, firsts, factors)
+    residuals = own.whitened(every, own.residuals)
+    rows = len(residuals) // len(every)
+    omitted = (np.flatnonzero(left_out)[:, None] * rows + np.arange(rows)).ravel()
+    m = own.residuals.shape[1]
+    # The coordinates themselves, without roots of weights.
+    plain = own._replace(roots=np.ones(len(every)) if own.roots.ndim == 1 else np.tile(np.eye(m), (len(every), 1, 1)))
+    probes = plain.rows(every, firsts, factors)
+    blocks = [[0, len(omitted), 0, len(probes[0])]]
+    values, variances = _core.predictions_without(own.knots, own.known, data, residuals, probes, omitted, blocks)
+    sigma = float(spline.sigma)
+    errors = (own.residuals - values.reshape(len(every), -1)) * sigma
+    return errors, np.asarray(variances).reshape(len(every), -1).mean(axis=1) * sigma**2
+
+
+def matrices(rng, n, m):
+    roots = rng.standard_normal((n, m, m)) + 2 * np.eye(m)
+    return roots @ np.swapaxes(roots, 1, 2)
+
+
+@pytest.mark.parametrize("kind", ["numbers", "matrices", "jerk", "closed", "knots"])
+def test_predictions_without_data_are_those_of_fits_without_them(kind):
+    t, y, _ = recorded(seed=3, n=120, gaps=())
+    rng = np.random.default_rng(1)
+    weights = matrices(rng, len(t), 2) if kind == "matrices" else rng.uniform(0.5, 3, len(t))
+    options = {"jerk": {"penalty": "jerk"}, "closed": {"bc_type": "periodic"}, "knots": {"knots": 50}}.get(kind, {})
+    left_out = (t > 120) & (t < 124) if kind != "closed" else (t > 157) | (t < 102)
+    left_out[[0, -1]] &= kind == "closed"
+    lam = 0.01 if kind == "jerk" else 0.1
+    if kind == "closed":
+        y[-1] = y[0]
+        left_out[[0, -1]] = False
+    spline = ss.make_smoothing_spline(t, y, "r:2", lam, weights=weights, sigma=0.02, **options)
+    errors, variances = predictions(spline, left_out)
+    fewer = np.array(weights)
+    fewer[left_out] = 0
+    again = ss.make_smoothing_spline(t, y, "r:2", lam, weights=fewer, sigma=0.02, **options)
+    assert np.allclose(errors, y - again(t), atol=1e-6 if kind == "jerk" else 1e-9)
+    posterior, kinds = again._posterior(again._smoothed[0]), evidence_module.end_kinds(again._bc_type)
+    plain = posterior.covariance(again.space, again._knots_of(()), (), kinds, again._noisy.times, None, [0])
+    assert np.allclose(variances, 0.02**2 * np.trace(plain, axis1=1, axis2=2) / 2, rtol=1e-5)
+
+
+@pytest.mark.parametrize("name", ["sphere:2", "so:3", "h:2"])
+def test_predictions_on_curved_spaces_are_nearly_those_of_fits(name):
+    space = {"sphere:2": ss.Sphere(2), "so:3": ss.SpecialOrthogonal(3), "h:2": ss.Hyperbolic(2)}[name]
+    t, own, _ = recorded(seed=5, n=150, gaps=(), dim=space.dim, noise=0.0)
+    rng = np.random.default_rng(2)
+    origin = space.mean(space.random_point(rng, (3,))) if name == "h:2" else space.random_point(rng)
+    frame = space.frame(origin)
+    truth = space.exp(np.broadcast_to(origin, (len(t), *origin.shape)), np.tensordot(0.05 * own, frame, 1))
+    y = space.exp(truth, 0.01 * space.random_tangent(rng, truth))
+    left_out = (t > 120) & (t < 123)
+    spline = ss.make_smoothing_spline(t, y, space, 0.3, sigma=0.01)
+    errors, _ = predictions(spline, left_out)
+    again = ss.make_smoothing_spline(t, y, space, 0.3, sigma=0.01, weights=np.where(left_out, 0.0, 1.0))
+    wanted = space.distance(again(t), y)
+    assert np.allclose(np.linalg.norm(errors, axis=1), wanted, atol=0.05 * wanted.max())
+
+
+def test_the_factor_is_that_of_the_errors():
+    """Errors of known variance, from many blocks; and the F distribution for few of them."""
+    rng = np.random.default_rng(0)
+    v = rng.uniform(3, 40, 20_000)
+    for k in (1.0, 2.5, 8.0):
+        errors = rng.standard_normal((len(v), 3)) * np.sqrt(v + (k**2 - 1) * (v - 1) + 1)[:, None]
+        found = Predicted((errors**2).mean(axis=1), v, np.ones(len(v)), np.zeros(len(v)))
+        assert factor_of(found, 3, 1e6) == pytest.approx(k, rel=0.02)
+        few = np.sqrt(3 * f.ppf(0.95, 3, 12) / chi2.ppf(0.95, 3))
+        assert factor_of(found, 3, 4) == pytest.approx(k * few, rel=0.03)
+    assert np.isnan(factor_of(found.of(slice(2)), 3, 4))
+
+
+@pytest.mark.parametrize("options", [{}, {"criterion": "reml"}, {"penalty": "jerk"}])
+def test_bands_in_a_gap_contain_the_motion(options):
+    inside, outside, before = [], [], []
+    for seed in range(6):
+        t, y, motion = recorded(seed, n=500)
+        spline = ss.make_smoothing_spline(t, y, "r:2", **options)
+        x, far = np.linspace(132.2, 136.8, 30), np.linspace(104, 126, 50)
+        error = np.linalg.norm(spline(x) - motion(x), axis=1)
+        inside.append(np.mean(error < spline.band(x)))
+        before.append(np.mean(error < spline.band(x, calibrated=False)))
+        outside.append(np.mean(np.linalg.norm(spline(far) - motion(far), axis=1) < spline.band(far)))
+        assert np.array_equal(spline.std(far), spline.std(far, calibrated=False))
+    assert np.mean(inside) > 0.85 > 0.5 > np.mean(before) - 0.4 * ("criterion" in options)
+    assert np.mean(outside) > 0.9
+
+
+def test_bands_beyond_the_ends_contain_the_motion():
+    inside, before = [], []
+    for seed in range(8):
+        t, y, motion = recorded(seed, n=500, gaps=())
+        spline = ss.make_smoothing_spline(t, y, "r:2", extrapolate="geodesic")
+        x = np.concatenate([t[-1] + np.linspace(0.1, 3, 20), t[0] - np.linspace(0.1, 3, 20)])
+        error = np.linalg.norm(spline(x) - motion(x), axis=1)
+        inside.append(np.mean(error < spline.band(x)))
+        before.append(np.mean(error < spline.band(x, calibrated=False)))
+    assert np.mean(inside) > 0.85 and np.mean(before) < 0.2
+
+
+def test_nothing_changes_without_gaps():
+    t, y, _ = recorded(gaps=())
+    spline = ss.make_smoothing_spline(t, y, "r:2")
+    x = np.linspace(t[0], t[-1], 500)
+    before, after = spline.gaps
+    assert (before.start, before.stop, after.start, after.stop) == (-np.inf, t[0], t[-1], np.inf)
+    for nu in (0, 1):
+        assert np.array_equal(spline.std(x, nu=nu), spline.std(x, nu=nu, calibrated=False))
+        assert np.array_equal(spline.cov(x, nu=nu), spline.cov(x, nu=nu, calibrated=False))
+    assert np.array_equal(spline.band(x, 0.5), spline.band(x, 0.5, calibrated=False))
+
+
+def test_bands_beyond_the_ends_are_continuous_and_grow():
+    t, y, _ = recorded(gaps=())
+    spline = ss.make_smoothing_spline(t, y, "r:2", extrapolate="geodesic")
+    for end, sign in ((t[0], -1), (t[-1], 1)):
+        std = spline.std(end + sign * np.array([-1e-9, 1e-9, *np.geomspace(0.01, 20, 40)]))
+        assert std[1] == pytest.approx(std[0], rel=1e-3)
+        assert np.all(np.diff(std[1:]) > 0)
+
+
+def test_knots_beyond_the_data_do_not_change_the_ends():
+    t, y, _ = recorded(gaps=())
+    spline = ss.make_smoothing_spline(t, y, "r:2", extrapolate="geodesic")
+    knots = np.concatenate([t, t[-1] + np.linspace(0.5, 5, 10)])
+    longer = ss.make_smoothing_spline(t, y, "r:2", spline.lam, knots=knots, sigma=spline.sigma, extrapolate="geodesic")
+    x = t[-1] + np.linspace(0.2, 8, 30)
+    assert np.allclose(longer.std(x), spline.std(x), rtol=0.05)
+
+
+def test_factors_do_not_depend_on_units():
+    t, y, _ = recorded()
+    spline = ss.make_smoothing_spline(t, y, "r:2")
+    other = ss.make_smoothing_spline(3600 * t, 1000 * y, "r:2")
+    for one, same in zip(spline.gaps, other.gaps, strict=True):
+        assert same.factor == pytest.approx(one.factor, rel=0.02) and same.blocks == one.blocks
+        assert np.allclose([same.start, same.stop], np.multiply(3600, [one.start, one.stop]))
+
+
+def test_velocities_covariances_and_samples_have_the_same_factors():
+    t, y, _ = recorded()
+    spline = ss.make_smoothing_spline(t, y, "r:2", knots=np.union1d(t, np.linspace(132, 137, 21)))
+    x = np.array([110.0, 133, 134.5])
+    std, speed = spline.std(x), spline.std(x, nu=1)
+    assert np.allclose(spline.cov(x)[:, 0, 0], std**2) and np.allclose(spline.cov(x, nu=1)[:, 1, 1], speed**2)
+    joint = spline.cov(x, nu="joint")
+    assert np.allclose(joint[:, 0, 0], std**2, rtol=0.03) and np.linalg.eigvalsh(joint).min() > 0
+    ratio = std / spline.std(x, calibrated=False)
+    assert ratio[0] == 1 and ratio[2] > 2 and speed[2] > 1.5 * spline.std(x, nu=1, calibrated=False)[2]
+    across = spline.cov(x, x[::-1])[0, 0, 0] / spline.cov(x, x[::-1], calibrated=False)[0, 0, 0]
+    assert across == pytest.approx(ratio[0] * ratio[2])
+    drawn = spline.sample(np.random.default_rng(0), 400)(134.5)
+    assert np.std(drawn[:, 0]) == pytest.approx(std[2], rel=0.15)
+
+
+def test_products_batches_and_files_have_the_factors_of_their_curves(tmp_path):
+    t, y, _ = recorded(dim=2)
+    alone = ss.make_smoothing_spline(t, y, "r:2")
+    flat = ss.make_smoothing_spline(t, y[:, :1], "r:1")
+    space = ss.Product(ss.Euclidean(2), ss.Euclidean(1))
+    both = ss.make_smoothing_spline(t, (y, y[:, :1]), space)
+    assert both.gaps == (alone.gaps, flat.gaps)
+    batch = ss.make_smoothing_spline(t, np.stack([y, 2 * y]), "r:2")
+    assert batch.gaps.shape == (2,)
+    assert [gap.factor for gap in batch.gaps[0]] == pytest.approx([gap.factor for gap in alone.gaps], rel=1e-6)
+    x = np.linspace(130, 139, 10)
+    assert np.allclose(batch.std(x)[1], 2 * alone.std(x))
+    assert np.array_equal(batch[1].std(x), batch.std(x)[1])
+    jerk = ss.make_smoothing_spline(t, y, "r:2", penalty="jerk", loss="huber")
+    for number, spline in enumerate((alone, both, batch, jerk)):
+        ss.save(spline, tmp_path / f"{number}.npz")
+        again = ss.load(tmp_path / f"{number}.npz")
+        for one, same in zip(np.atleast_1d(spline.std(x)), np.atleast_1d(again.std(x)), strict=True):
+            assert np.array_equal(one, same)
+
+
+def test_gaps_of_dates_have_dates():
+    t, y, _ = recorded()
+    dates = np.datetime64("2024-05-01T00:00", "ms") + (1000 * t).astype("timedelta64[ms]")
+    before, gap, after = ss.make_smoothing_spline(dates, y, "r:2").gaps
+    assert np.isnat(before.start) and np.isnat(after.stop)
+    assert before.stop == dates[0] and after.start == dates[-1]
+    first = np.searchsorted(t, 134)
+    assert (gap.start, gap.stop) == (dates[first - 1], dates[first])
+
+
+def test_a_closed_curve_has_blocks_across_its_start():
+    rng = np.random.default_rng(0)
+    t = np.sort(rng.uniform(0, 60, 500))
+    t = np.concatenate([[0.0], t[(t < 3) | ((t > 8) & (t < 57))], [60.0]])
+    y = np.stack([5 * np.sin(2 * np.pi * t / 20), 3 * np.cos(2 * np.pi * t / 15)], -1)
+    y = y + 0.02 * rng.standard_normal(y.shape)
+    y[-1] = y[0]
+    spline = ss.make_smoothing_spline(t, y, "r:2", bc_type="periodic")
+    assert len(spline.gaps) == 2
+    x = np.linspace(3.2, 7.8, 20)
+    assert np.array_equal(spline.std(x + 60), spline.std(x)) or np.allclose(spline.std(x + 60), spline.std(x))
+    assert np.all(spline.std(x)[5:15] > 2 * spline.std(x, calibrated=False)[5:15])
+
+
+def test_outliers_do_not_widen_the_bands_of_a_robust_fit():
+    t, y, _ = recorded()
+    clean = ss.make_smoothing_spline(t, y, "r:2", loss="huber")
+    y[::17] += 3.0
+    spoiled = ss.make_smoothing_spline(t, y, "r:2", clean.lam, loss="huber")
+    assert spoiled.gaps[1].factor == pytest.approx(clean.gaps[1].factor, rel=0.25)
+
+
+def test_a_gap_longer_than_any_part_has_the_largest_factor_and_a_warning():
+    t, y, motion = recorded(n=600, gaps=((118.0, 142.0),))
+    spline = ss.make_smoothing_spline(t, y, "r:2")
+    with pytest.warns(ss.SmoothingWarning, match=r"no data between t = 11.* and t = 142|no data between t = 11"):
+        band = spline.band(np.linspace(119, 141, 40))
+    assert spline.gaps[1].blocks == 0 and spline.gaps[1].factor > 1
+    error = np.linalg.norm(spline(np.linspace(119, 141, 40)) - motion(np.linspace(119, 141, 40)), axis=1)
+    assert np.mean(error < band) > 0.9
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        spline.std(130.0)
+        ss.make_smoothing_spline(t, y, "r:2").std(105.0)
