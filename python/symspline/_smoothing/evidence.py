@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,9 +15,6 @@ from .factors import grouped, smoothed_spaces, split
 from .gaps import Calibration, Course, Evidence, calibrate
 from .posterior import frames_at
 
-if TYPE_CHECKING:
-    from .spline import SmoothingSpline
-
 # Largest number of numbers in the frames that are computed together.
 _TOGETHER = 1 << 22
 # Data of a robust fit beyond this quantile of the noise are outliers, as in the fit.
@@ -26,7 +23,7 @@ _KEPT = 0.99
 _CORNERS = {"huber": 0.82, "cauchy": 0.95}
 
 
-def calibration_of(spline: SmoothingSpline[Any, Any], number: int) -> Calibration | None:
+def calibration_of(spline: Any, number: int) -> Calibration | None:
     """Return how variances of one curve change in gaps, in the smoothed space with a given number.
 
     It is None for curves without an estimate of their error: interpolation, least squares without a penalty, geodesics
@@ -69,7 +66,7 @@ def calibration_of(spline: SmoothingSpline[Any, Any], number: int) -> Calibratio
     return calibrate(t, precision.weights[used], course, period, evidence)
 
 
-def _evidence(spline: SmoothingSpline[Any, Any], number: int, used: Any, sigma: float) -> Evidence:
+def _evidence(spline: Any, number: int, used: Any, sigma: float) -> Evidence:
     noisy, part = spline._noisy, spline._smoothed[number]
     space, data = points_of(noisy, spline.space)[number]
     precision = noisy.precisions[number]
@@ -120,7 +117,7 @@ def _roots(matrices: Doubles) -> Doubles:
     return np.asarray(np.sqrt(values)[:, :, None] * np.swapaxes(vectors, -1, -2))
 
 
-def _parts_at(spline: SmoothingSpline[Any, Any], number: int, t: Doubles, quantity: str) -> tuple[Any, Array, Array]:
+def _parts_at(spline: Any, number: int, t: Doubles, quantity: str) -> tuple[Any, Array, Array]:
     """Return the factor of a smoothed space, the points at its knots, and a quantity at times."""
     owners = [i for i, own in enumerate(grouped(spline.space, spline._smoothed)) for _ in own]
     factor, curve = factors_of(spline.space)[owners[number]], spline._curve.parts[owners[number]]
@@ -129,9 +126,7 @@ def _parts_at(spline: SmoothingSpline[Any, Any], number: int, t: Doubles, quanti
     return factor, split(factor, curve.points)[place], split(factor, values)[place]
 
 
-def _coordinates(
-    spline: SmoothingSpline[Any, Any], number: int, t: Doubles, quantity: str, y: Array | None = None
-) -> Doubles:
+def _coordinates(spline: Any, number: int, t: Doubles, quantity: str, y: Array | None = None) -> Doubles:
     """Return coordinates of tangent vectors at the curve: its derivatives, or the directions to points y."""
     space = smoothed_spaces(spline.space)[number]
     factor, points, vectors = _parts_at(spline, number, t, quantity)
@@ -159,7 +154,7 @@ def _of_frames(space: Space, knots: Doubles, points: Array, t: Doubles, p: Array
     return out
 
 
-def _in_frames(spline: SmoothingSpline[Any, Any], number: int, t: Doubles, y: Array, information: Doubles) -> Doubles:
+def _in_frames(spline: Any, number: int, t: Doubles, y: Array, information: Doubles) -> Doubles:
     """Return information matrices in the frames along the curve: their own frames are transported there."""
     space = smoothed_spaces(spline.space)[number]
     _, points, p = _parts_at(spline, number, t, "point")
