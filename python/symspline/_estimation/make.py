@@ -185,16 +185,10 @@ def estimate(
     Warns
     -----
     SmoothingWarning
-<<<<<<< ours
         If a chosen λ is at a bound, if the residuals of a sensor are not those of independent noise with its standard
         deviation (see Notes), if the curve is not close to the minimum because it turns far between two knots, if two
         different curves agree equally well with the measurements, if the body turns by more than half a turn between
-        two knots, or if given knots leave out a gap of the data.
-=======
-        If a chosen λ is at a bound, the residuals are much larger than the given standard deviations, two different
-        curves agree equally well with the measurements, the body turns by more than half a turn between two knots, or
-        there are no given knots in a gap of the data.
->>>>>>> theirs
+        two knots, or if there are no given knots in a gap of the data.
 
     See Also
     --------
