@@ -54,7 +54,7 @@ def warn_of_held_points(
         or times.dtype.kind not in "iufM"
         or any(own.dtype.kind not in "iufc" for own in points)
     ):
-        return
+        return False
     equal = np.broadcast_to(np.diff(times) > 0, (*batch, times.shape[-1] - 1))
     for own in points:
         rows = own.reshape(*own.shape[: axis + 1], -1)

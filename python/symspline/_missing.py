@@ -75,7 +75,7 @@ def nodes_without_missing(t: Any, points: Any, velocities: Any, space: Space[Any
         return t, points, velocities
     both = present & moving
     _check_alike(both)
-    kept = both.any(axis=tuple(range(both.ndim - 1)))
+    kept = np.asarray(both.any(axis=tuple(range(both.ndim - 1))))
     count = np.arange(len(kept), dtype=np.float64)
     times = rows_of(count if t is None else filled(t), kept)
     places, vectors = (_rows_of_points(own, kept, space) for own in (points, velocities))
@@ -87,7 +87,7 @@ def data_without_missing(
 ) -> tuple[Any, Any, Any, Any]:
     """Return noisy data without the samples that are missing; those of some curves only have the weight zero."""
     times, own, present = without_missing(t, points, space)
-    kept = present.any(axis=tuple(range(present.ndim - 1)))
+    kept = np.asarray(present.any(axis=tuple(range(present.ndim - 1))))
     if kept.all() and present.all():
         return times, own, weights, frames
     frames = tuple(rows_of(part, kept) for part in frames) if isinstance(frames, tuple) else rows_of(frames, kept)
@@ -117,10 +117,11 @@ def _check_alike(present: Mask) -> None:
 
 
 def _rows_of_points(points: Any, kept: Mask, space: Space[Any]) -> Any:
-    own = tuple(
-        factor._array(filled(part), "points")[(..., kept, *[slice(None)] * len(factor.point_shape))]
-        for factor, part in zip(*_each(points, space), strict=True)
-    )
+    def rows(factor: Space[Any], part: Any) -> Any:
+        index: Any = (..., kept, *[slice(None)] * len(factor.point_shape))
+        return factor._array(filled(part), "points")[index]
+
+    own = tuple(map(rows, *_each(points, space)))
     return own if isinstance(space, Product) else own[0]
 
 

@@ -185,8 +185,9 @@ def fit_segments(
     check_smooth(smooth, duplicates, options)
     weight_options = {key: options.pop(key, None) for key in ("weights", "frames")} if smooth else {}
     if checked_flag(skipna, "skipna"):
-        t, points, *both = data_without_missing(t, points, *map(weight_options.get, ("weights", "frames")), space)
-        weight_options = dict(zip(weight_options, both, strict=False))
+        weights, frames = (weight_options.get(key) for key in ("weights", "frames"))
+        t, points, weights, frames = data_without_missing(t, points, weights, frames, space)
+        weight_options = {"weights": weights, "frames": frames} if smooth else {}
     used = _used(weight_options, points, space) if smooth else None
     curves, rows, steps, gap = cut(t, points, space, max_gap, min_points, duplicates, used)
     if not curves:

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Literal, Unpack, overload
+from typing import TYPE_CHECKING, Any, Literal, Unpack, cast, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -573,7 +573,7 @@ def plot(
         several = checked_look(file, ax, None, None, title, figsize, show)
         found: Figure | Axes = compare(tracks, names, file, colors=color, ax=ax, show=show, radius=size, **several)
         return found
-    _check_globe(spline)
+    _check_globe(cast(Any, spline))
     look = checked_look(file, ax, color, label, title, figsize, show)
     drawn: Figure | Axes = draw(spline, file, ax=ax, show=show, radius=size, **look)
     return drawn

@@ -39,7 +39,7 @@ def measurement_without_missing(given: Measurement) -> Measurement:
 
 def _present(value: Any, count: int) -> Mask:
     if isinstance(value, tuple):
-        return np.all([_present(part, count) for part in map(filled, value)], axis=0)
+        return np.asarray(np.all([_present(part, count) for part in map(filled, value)], axis=0))
     array = np.asarray(value)
     if array.dtype.kind not in "fc" or array.shape[:1] != (count,):
         return np.ones(count, bool)

@@ -162,6 +162,8 @@ def smooth_axes(
     again = asked if count > 1 else []
     done, total = 0, count * (1 + bool(asked) + len(again)) - len(again)
 
+    state = start
+
     def passed(state: _State, k: int) -> tuple[_State, SmoothedAxis, tuple[int, ...] | None]:
         nonlocal done
         result = _smooth_axis(nodes, state, k, chosen[k])
@@ -187,7 +189,6 @@ def smooth_axes(
                     state, *_ = passed(state, other)
             choose(state, k)
 
-    state = start
     for k in order if asked else ():
         if k in asked:
             choose(state, k)

@@ -38,8 +38,6 @@ class Parameter(NamedTuple):
     def __ne__(self, other: object) -> bool:
         return not self == other
 
-    __hash__ = None  # type: ignore[assignment]
-
 
 class Posterior(NamedTuple):
     """The matrix A of the linear problem.

@@ -177,7 +177,7 @@ def _with_matrices(given: ArrayLike, frames: Any, space: Space, data: Points) ->
         raise ValidationError(
             f"the dimension of {space!r} is too large for information matrices. Pass numbers as weights."
         )
-    _check(_of_each(matrices, lambda own: np.isfinite(own).all(axis=(-2, -1))), "is not finite")
+    _check(_of_each(matrices, lambda own: np.asarray(np.isfinite(own).all(axis=(-2, -1)))), "is not finite")
     _check(_of_each(matrices, _is_symmetric), "is not symmetric")
     least, most = (_of_each(matrices, np.linalg.eigvalsh)[..., i] for i in (0, -1))
     negative = "has a negative eigenvalue, but it must be the inverse of a covariance"

@@ -374,11 +374,11 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         """Return the variance of the process that the jerk penalises, relative to that of the spline."""
         number = next(i for i, own in enumerate(self._smoothed) if own is part)
         weights, times = self._noisy.precisions[number].weights, self._noisy.times
-        own = (values[index] if values.ndim > 1 else values for values in (times, weights))
+        times, weights = (values[index] if values.ndim > 1 else values for values in (times, weights))
         coupled = part.posterior is not None and part.posterior.size > 1
         band = None if coupled else part.band[index]
         lam = np.asarray(part.band_lam)[index].item()
-        return process_ratio(*own, self._knots_of(index), band, lam, end_kinds(self._bc_type), x, nu)
+        return process_ratio(times, weights, self._knots_of(index), band, lam, end_kinds(self._bc_type), x, nu)
 
     @overload
     def band(

@@ -128,7 +128,8 @@ def converted(
 def _with_missing(value: ArrayLike, name: str, form: Form, wanted: Form, atol: float | None) -> Array:
     x = as_array(value, name)
     axes = len(_SHAPES[form])
-    missing = np.isnan(x).any(axis=tuple(range(x.ndim - axes, x.ndim))) if x.dtype.kind == "f" else np.zeros(())
+    is_missing = np.isnan(x) if x.dtype.kind == "f" else np.zeros(x.shape, bool)
+    missing = np.asarray(is_missing.any(axis=tuple(range(x.ndim - axes, x.ndim))))
     if x.ndim < axes or not missing.any():
         return converted(x, name, form, wanted, atol)
     found = np.full((*missing.shape, *_SHAPES[wanted]), np.nan)

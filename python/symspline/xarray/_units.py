@@ -23,7 +23,7 @@ def in_radians(da: Any, space: Space[Any] | str) -> Any:
     if not isinstance(da, xr.DataArray) or not isinstance(space_named(space), Torus):
         return da
     if is_degrees(da.attrs.get("units", "")):
-        return np.radians(da).assign_attrs(da.attrs | {"units": "radian"})
+        return (da * (np.pi / 180)).assign_attrs(da.attrs | {"units": "radian"})
     if "units" not in da.attrs and da.chunks is None and da.dtype.kind in "iuf" and da.ndim:
         largest = look_like_degrees(space_named(space), da.values)
         if largest is not None:
@@ -38,6 +38,6 @@ def in_radians(da: Any, space: Space[Any] | str) -> Any:
 def in_units_of(values: xr.DataArray, da: xr.DataArray, space: Space[Any]) -> xr.DataArray:
     """Return points of `space` with the attributes of `da`, angles of a torus in its units."""
     if isinstance(space, Torus) and is_degrees(da.attrs.get("units", "")):
-        values = np.degrees(values)
+        values = values * (180 / np.pi)
     values.attrs = dict(da.attrs)
     return values
