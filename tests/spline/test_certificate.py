@@ -67,7 +67,7 @@ ZIGZAG = np.array([0, 1, 0, 1.0])
         ("rp:1", lambda a: np.stack([np.cos(a / 2), np.sin(a / 2)], -1)),
         ("torus:2", lambda a: np.stack([a, 0 * a], -1)),
     ],
-    ids=str,
+    ids=["torus:1", "sphere:1", "u:1", "rp:1", "torus:2"],
 )
 def test_circles_need_steps_below_a_third_of_the_injectivity_radius(space, points):
     space = ss.space(space)
