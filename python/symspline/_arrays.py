@@ -92,7 +92,7 @@ def cast(array: NDArray[Any], dtype: Any = np.float64) -> NDArray[Any]:
             f"an array of shape {array.shape} needs {bytes_needed / 1e9:.3g} GB of memory. Process it in parts."
         )
     with np.errstate(over="ignore", under="ignore", invalid="ignore"):
-        return np.asarray(array, dtype=dtype, order="C")
+        return np.require(array, dtype, ["C", "ALIGNED"])
 
 
 def read_only(array: NDArray[Any]) -> NDArray[Any]:

@@ -30,9 +30,10 @@ def warn_of_rounded_times(times: NDArray[Any], name: str = "t", remedy: str = RE
         return
     largest = kept[np.argmax(np.abs(kept))]
     spacing = float(np.spacing(np.abs(largest)))
-    steps = np.abs(np.diff(times, axis=-1))
-    steps = steps[steps > 0]
-    step = float(np.median(steps)) if steps.size else np.inf
+    with np.errstate(over="ignore", invalid="ignore"):
+        steps = np.abs(np.diff(times, axis=-1))
+        steps = steps[(steps > 0) & (steps < np.inf)]
+        step = float(np.median(steps)) if steps.size else np.inf
     if not spacing > _COARSE * step or np.array_equal(kept, np.rint(kept)):
         return
     warn(

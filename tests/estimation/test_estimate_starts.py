@@ -238,8 +238,9 @@ def test_knots_of_dates_and_whole_numbers_in_gaps():
 
 def test_given_knots_without_a_gap():
     t = np.concatenate([np.linspace(0, 7, 70), np.linspace(13, 20, 70)])
-    y = np.sin(t)[:, None]
-    both = [measure.Points(t, y, sigma=0.1), measure.Velocities(t, y, np.cos(t)[:, None], sigma=0.1)]
+    noise = 0.1 * np.random.default_rng(0).standard_normal((2, 140, 1))
+    y = np.sin(t)[:, None] + noise[0]
+    both = [measure.Points(t, y, sigma=0.1), measure.Velocities(t, y, np.cos(t)[:, None] + noise[1], sigma=0.1)]
     place = r"no data and no knots between knots\[69\] = 7.0 and knots\[70\] = 13.0"
     with pytest.warns(ss.SmoothingWarning, match=place):
         ss.estimate(both, t, "r:1")

@@ -237,6 +237,7 @@ def test_shapes_of_batches_and_times():
         assert np.allclose(std[i], rotations.angular_velocity(turning[i], x[i], return_std=True)[1], rtol=1e-9)
 
 
+@pytest.mark.filterwarnings("ignore:there are no data:symspline.SmoothingWarning")
 def test_own_times_of_every_curve():
     rng = np.random.default_rng(7)
     t, y = track(rng, 30, 40)

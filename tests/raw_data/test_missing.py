@@ -120,6 +120,7 @@ def test_measurements_of_sensors():
     rates = np.outer(np.cos(s), [0, 0.3, 1]) + 0.01 * rng.normal(size=(60, 3))
     seen, noise = truth.as_matrix()[::6], np.full(60, 0.01) * rng.uniform(1, 2, 60)
     rates[[3, 17], 1] = np.nan
+    seen = seen @ Rotation.from_rotvec(0.01 * rng.normal(size=(10, 3))).as_matrix()
     seen[4] = np.nan
 
     def fit(i, j, **how):

@@ -7,6 +7,9 @@ from scipy.spatial.transform import Rotation
 import symspline as ss
 from symspline import measure
 
+# The standard deviations here are arbitrary, and the audit of residuals says so.
+pytestmark = pytest.mark.filterwarnings("ignore:The residuals:symspline.SmoothingWarning")
+
 CRITERIA = [{"criterion": "gcv"}, {"criterion": "reml"}, {"criterion": "cp", "sigma": 0.01}]
 
 
@@ -31,10 +34,10 @@ def recording(seed, close, line, start=100.0):
 
 def assert_same(close, merged, t):
     x = np.linspace(t[0], t[-1], 60)
-    for one, other in zip(np.atleast_2d(close.std(x)), np.atleast_2d(merged.std(x)), strict=True):
+    for one, other in zip(*(np.atleast_2d(own.std(x, calibrated=False)) for own in (close, merged)), strict=True):
         np.testing.assert_allclose(one, other, rtol=0.05)
     apart = close.space.distance(close(x), merged(x))
-    assert np.all(apart < 0.05 * merged.std(x)), np.max(apart / merged.std(x))
+    assert np.all(apart < 0.05 * merged.std(x, calibrated=False))
 
 
 @pytest.mark.filterwarnings("ignore::symspline.SmoothingWarning")

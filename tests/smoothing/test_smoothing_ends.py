@@ -146,6 +146,7 @@ def test_the_first_point_repeated_at_the_end_counts_once():
     assert apart.report.converged and np.abs(apart.points - closed.points).max() > 1e-4
 
 
+@pytest.mark.filterwarnings("ignore:The data turn by more than half:symspline.SmoothingWarning")
 @pytest.mark.parametrize("name", ["r:1", "sphere:2", "so:3"])
 @loop_over("n", [3, 4, 6, 20])
 @loop_over("repeated", [True, False])

@@ -173,8 +173,8 @@ def test_invalid_quadric_points_raise():
         ("siegel:1", [np.eye(2), np.diag([2.0, 1.0])], r"points\[1\] is off .* it is not symplectic"),
         (
             "siegel:1",
-            convert.siegel_to_positive_definite(np.array([[[1e5 + 1j]], [[1e5 + 2j]]])),
-            "condition number of 1.0e20 is too large to verify .*; move all points by one isometry",
+            convert.siegel_to_positive_definite(np.array([[[1e6 / 3 + 1j]], [[1e6 / 3 + 2j]]])),
+            "condition number of 1.2e22 is too large to verify .*; move all points by one isometry",
         ),
         # Curves through such points had values that are no numbers.
         (

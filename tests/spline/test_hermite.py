@@ -128,7 +128,7 @@ def test_an_empty_batch_and_rounded_velocities():
     assert np.abs(np.sum(curve.points * curve.velocities, axis=-1)).max() < 1e-15
     assert np.abs(curve.velocities - v).max() < 1e-15
     # Off the tangent space by what single precision may round.
-    rounded = np.array([[1e-6 / 3, 0.5, 0], [0, 0, 0.5], [0, 0, 0]])
+    rounded = np.array([[1e-6 / 3, 1 / 3, 1 / 7], [1 / 7, 0, 1 / 3], [1 / 3, 1 / 7, 0]])
     assert ss.HermiteSpline(None, np.eye(3), rounded.astype(np.float32), "sphere:2").velocities[0, 0] == 0
     with pytest.raises(ss.ValidationError, match=r"velocities\[0\] is not tangent .* \(allowed: 1e-8\)") as caught:
         ss.HermiteSpline(None, np.eye(3), rounded, "sphere:2")

@@ -34,6 +34,8 @@ _LARGEST, _PROBABILITY = 6.0, 1e-5
 _REJECTED, _CORNERS = 0.3, 9.0
 # Consecutive rejected measurements that are too many, and their share of all: outliers of a sensor are mostly isolated.
 _RUN, _RUN_SHARE = 8, 0.05
+# Residuals below this part of σ are those of data without noise.
+_EXACT = 1e-6
 # Fewer measurements, or a larger leverage, leave no residuals to examine.
 _FEWEST, _LEVERAGE = 5, 0.9
 # If a fit estimates the noise level itself: the limit of its ratio to the noise that neighbouring data show, and the
@@ -225,8 +227,10 @@ def examine(given: Residuals) -> Finding:
     # (I − H)² if it is smoother.
     least = square / left
     small = given.exact and normal_of_chi_squared(least, freedom * left) < -SIGNIFICANT and least < _RATIO**-2
+    small = small and least > _EXACT**2
     found = found._replace(ratio=float(np.sqrt(least if small else square)), large=large, small=small)
-    if np.isfinite(rows).any(axis=1).sum() < _FEWEST:
+    # Residuals that are smaller than σ contain no effect that matters.
+    if small or square < _EXACT**2 or np.isfinite(rows).any(axis=1).sum() < _FEWEST:
         return found
     correlation, products = autocorrelation(rows)
     correlation += given.between / left
@@ -288,8 +292,8 @@ def examine_smoothing(rows: Doubles, neighbours: Doubles, leverage: Doubles, rob
     filled = np.where(known, rows, 0.0)
     scale = _median(np.where(used, (filled**2).sum(axis=2), np.nan)) / chi / left
     noise = _median(neighbours) / chi
-    # Where the residuals vanish, the curve is exact.
-    enough = (counts >= _FEW_DATA) & (leverage <= _HIGH) & (scale > 0)
+    # Where the residuals vanish, the curve is exact. Neighbours that agree exactly, as rounded data do, show no noise.
+    enough = (counts >= _FEW_DATA) & (leverage <= _HIGH) & (scale > 0) & (noise > 0)
     enough &= np.isfinite(neighbours).sum(axis=1) >= _FEW_DATA // 2
     stiff = enough & moderate & (scale > _NEIGHBOURS**2 * noise)
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -278,6 +278,8 @@ def _at(sensor: Sensor, row: int) -> str:
 
 
 def _of_units(sensor: Sensor, ratio: float) -> str:
+    if not ratio > 0:
+        return ""
     for factor, text in {DEGREES: "57.3, the ratio of degrees and radians", **_UNITS}.items():
         for own in (ratio / factor, ratio * factor):
             if abs(np.log(own)) < _NEAR:

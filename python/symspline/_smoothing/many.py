@@ -60,12 +60,17 @@ def smooth_many(
         noted += [(number, note) for note in seen]
         if progress is not None:
             progress(number + 1, len(given))
-    # All curves share one warning of each category.
-    for kind in dict.fromkeys(note.category for _, note in noted):
-        first, *more = [(number, note) for number, note in noted if note.category is kind]
+    # All curves share one warning of each kind, which begins with the same words. Numbers differ between curves.
+    for kind, words in dict.fromkeys(map(_kind, (note for _, note in noted))):
+        first, *more = [(number, note) for number, note in noted if _kind(note) == (kind, words)]
         others = f" (and {len(more)} more curves)" if more else ""
         number, note = first
         warn(f"curve {number}: {note.message}{others}", kind, (number,), getattr(note.message, "node", None))
     if faults:
         raise_or_warn(faults, on_failure, found)
     return found
+
+
+def _kind(note: Any) -> tuple[type[Warning], str]:
+    words = [word for word in str(note.message).split() if not any(own.isdigit() for own in word)]
+    return note.category, " ".join(words[:4])

@@ -198,7 +198,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         >>> y = np.sin(t) + 0.02 * np.random.default_rng(0).standard_normal(t.size)
         >>> s = ss.make_smoothing_spline(t, y[:, None], "r:1")
         >>> before, gap, after = s.gaps
-        >>> round(gap.start), round(gap.stop), gap.factor > 2, after.stop
+        >>> round(gap.start), round(gap.stop), gap.factor > 2, float(after.stop)
         (25, 30, True, inf)
         """
         found = []

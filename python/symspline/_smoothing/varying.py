@@ -27,7 +27,7 @@ _BIN = 6.0
 # sines that beat on S² and SO(3) reached 9.1, which the limit of the ratio below excludes.
 _SMOOTHNESS, _NOISE = 7.0, 4.5
 # Least energy per degree of freedom in the fast part, relative to the whole curve. Waves that beat have up to 2.2.
-_FASTER = 2.8
+_FASTER = 4.0
 # ∫(1 + x⁴)⁻² / ∫(1 + x⁴)⁻¹: the information per local degree of freedom.
 _RATIO = 3 / 4
 
@@ -99,9 +99,9 @@ def findings(own: Recording) -> list[Finding]:
         found.append(
             Finding(
                 score / _NOISE,
-                f"the residuals are larger between t = {noisier} than elsewhere, so that one sigma for the whole "
-                "recording is wrong. Pass weights= with the inverse variances of the data, or loss='huber' if only "
-                "some data are worse",
+                f"the residuals are larger between t = {noisier} than elsewhere: the noise is larger there, or the curve "
+                "does not follow the motion. Pass weights= with the inverse variances of the data, loss='huber' if "
+                "only some data are worse, or a smaller lam",
             )
         )
     return sorted(found, reverse=True)

@@ -43,7 +43,7 @@ def point_tol(numbers: NDArray[Any], size: int | None = None) -> float:
     >>> point_tol(np.array([1 / 3, 2 / 3])), point_tol(np.array([0.333333, 0.666667]))
     (1e-08, 0.0001)
     >>> round(point_tol(np.array([0.424, 0.906])), 6)
-    0.00078
+    0.000707
     """
     count = numbers.size
     if numbers.dtype.kind not in "fc" or not count or numbers.itemsize < 8 or numbers.dtype == np.complex64:
