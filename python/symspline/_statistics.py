@@ -62,8 +62,6 @@ class TangentPCA(Generic[P]):
         """Whether both have equal arrays."""
         return same_fields(self, other) if isinstance(other, TangentPCA) else NotImplemented
 
-    __hash__ = None  # type: ignore[assignment]
-
     def reconstruct(self, scores: ArrayLike) -> P:
         r"""Compute the points with given coordinates.
 

@@ -73,8 +73,6 @@ class TimeLaw:
         """Whether both have equal arrays."""
         return same_fields(self, other) if isinstance(other, TimeLaw) else NotImplemented
 
-    __hash__ = None  # type: ignore[assignment]
-
     @property
     def duration(self) -> float:
         """Time of the whole traversal."""

@@ -25,12 +25,17 @@ def silenced(category: type[Warning]) -> Iterator[None]:
         _SILENT.reset(token)
 
 
+def is_silent(category: type[Warning]) -> bool:
+    """Whether warnings of this category are not issued, so that their checks are not needed."""
+    return issubclass(category, _SILENT.get())
+
+
 def warn(message: str, category: type[Warning], curve: tuple[int, ...] | None = None, node: int | None = None) -> None:
     """Issue a warning at the line that called this package.
 
     The warning has the attributes ``curve`` and ``node`` of a `SymsplineError`.
     """
-    if issubclass(category, _SILENT.get()):
+    if is_silent(category):
         return
     warning: Any = category(message)
     warning.curve, warning.node = curve, node

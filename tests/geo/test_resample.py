@@ -25,6 +25,7 @@ def ais(zone=None):
     return rows.sample(frac=1, random_state=3)
 
 
+@pytest.mark.filterwarnings("ignore:.* tracks are not in the result:UserWarning")
 @pytest.mark.parametrize("zone", [None, "Europe/Berlin"])
 def test_tracks_at_full_minutes(zone):
     found = geo.resample(ais(zone), "1min", by="mmsi", time="when", max_gap=600, duplicates="first")
@@ -128,6 +129,7 @@ def test_rows_of_curves_that_did_not_converge_are_nan(smooth):
     assert warned[0].filename == __file__
 
 
+@pytest.mark.filterwarnings("ignore:.* tracks are not in the result:UserWarning")
 def test_several_columns_tell_tracks_apart():
     table = ais().assign(trip=1)
     table = pd.concat([table, table.assign(trip=2, lat=table["lat"] + 1)])

@@ -165,10 +165,6 @@ def test_messages_name_the_conversion():
         lambda: ss.HermiteSpline(KNOTS, g, np.tile(twist, (6, 1)), "se:3"),
     ):
         raises(r"symspline\.poses\.velocities\(poses, twists\) converts twists", call)
-    split = r"symspline\.poses\.split\(poses\) returns the rotations and positions"
-    raises(split, ss.CubicSpline, KNOTS, g, "so:3 x r:3")
-    if hasattr(scipy_transform, "RigidTransform"):
-        raises(split, ss.CubicSpline, KNOTS, scipy_transform.RigidTransform.from_matrix(g), "so:3 x r:3")
 
 
 def test_invalid_twists_raise():

@@ -284,6 +284,7 @@ def test_slow_rates_have_longer_units():
             np.testing.assert_allclose(found, expected * (86_400 * days) ** power, rtol=1e-6, atol=1e-9)
 
 
+@pytest.mark.filterwarnings("ignore:there are no data:symspline.SmoothingWarning")
 def test_long_gaps_are_seen_in_graphs():
     """Rotations and positions with a gap have axes per coordinate, with a band that covers the ball of the curve's."""
     rng = np.random.default_rng(3)

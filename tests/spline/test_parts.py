@@ -82,7 +82,9 @@ def test_invalid_times_raise(rng):
     with pytest.raises(ss.ValidationError, match="knots coincide"):
         curve.shift(1e300)
     dated = ss.CubicSpline(np.arange("2024-01-01", "2024-01-06", dtype="M8[D]"), curve.points, "r:2")
-    with pytest.raises(ss.ValidationError, match="the knots are dates, so dt must be a timedelta64 or a text such as '3h', not 3"):
+    with pytest.raises(
+        ss.ValidationError, match="the knots are dates, so dt must be a timedelta64 or a text such as '3h', not 3"
+    ):
         dated.shift(3)
 
 

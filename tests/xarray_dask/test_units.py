@@ -48,5 +48,6 @@ def test_angles_that_look_like_degrees_warn():
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             call(data(units="degree"))
+            warnings.filterwarnings("ignore", "more than half of the steps")
             call(data(np.radians(DIRECTIONS)))
             call(data(units="radian"))

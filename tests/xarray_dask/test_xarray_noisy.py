@@ -188,6 +188,7 @@ def test_missing_values_and_dask():
     assert ds.sizes["time"] == 40
 
 
+@pytest.mark.filterwarnings("ignore:The residuals:symspline.SmoothingWarning")
 def test_positions_and_velocities():
     path = np.stack([np.sin(T), np.cos(T)], axis=-1)
     speed = np.stack([np.cos(S), -np.sin(S)], axis=-1)

@@ -127,6 +127,7 @@ def test_smoothed_poses_with_missing_times():
             np.testing.assert_allclose(ds["std" + ending][run], own, rtol=1e-6, atol=1e-12)
 
 
+@pytest.mark.filterwarnings("ignore:The residuals:symspline.SmoothingWarning")
 def test_one_coordinate_of_times_for_all_curves():
     """The axis has no coordinate, or a counter; the times are irregular, so a counter gives another curve."""
     times = START + np.array([0, 1, 5, 6, 9, 10]) * HOUR

@@ -21,6 +21,7 @@ mod watch;
 
 use pyo3::prelude::*;
 use pyo3::types::{PyCFunction, PyDict, PyTuple};
+use std::ffi::{CStr, CString};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// Found in the compiled file by `symspline/_cpu.py`, without running any of its code.
@@ -75,7 +76,9 @@ fn guarded(m: &Bound<'_, PyModule>, function: Bound<'_, PyCFunction>) -> PyResul
         catch_unwind(AssertUnwindSafe(|| function.call(py, args, kwargs)))
             .unwrap_or_else(|panic| Err(watch::exception(panic)))
     };
-    m.add(name.as_str(), PyCFunction::new_closure(py, None, None, call)?)
+    // Functions of a module live as long as the process.
+    let leaked: &'static CStr = Box::leak(CString::new(name.as_str())?.into_boxed_c_str());
+    m.add(name.as_str(), PyCFunction::new_closure(py, Some(leaked), None, call)?)
 }
 
 #[pymodule]

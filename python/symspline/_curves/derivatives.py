@@ -55,8 +55,6 @@ class Gradient(Generic[P]):
         """Whether both have equal arrays."""
         return same_fields(self, other) if isinstance(other, Gradient) else NotImplemented
 
-    __hash__ = None  # type: ignore[assignment]
-
 
 class SampleTimes(NamedTuple):
     """Times on the curves of a batch at which derivatives are computed.

@@ -133,7 +133,7 @@ def estimate(
         Objects of `symspline.measure`. Each has its own times.
     knots : int, array_like or "auto"
         Knots of the curve: their number, or an increasing array that includes all times. With ``"auto"``, they are as
-        dense as the sensors can tell: intervals are halved until the residuals are those of the initial curve, and
+        dense as the motion requires: intervals are halved until the residuals are those of the initial curve, and
         until more knots do not move the estimate. For a number or ``"auto"``, gaps of the data receive further knots,
         as close together as those beside the gap.
     space : Space or str
@@ -323,7 +323,7 @@ def _smoothed(
 ) -> PointsSpline[Any]:
     """Fit points only, as a smoothing spline whose weights are the inverse variances."""
     # Without sigma the noise level is estimated, and the weights are relative.
-    (terms, _) = _terms([given if given.sigma is not None else given.with_sigma(1.0)], axis, space, loss)
+    (terms, _) = _terms([given if given.sigma is not None else given._with_sigma(1.0)], axis, space, loss)
     t, _ = times_of(given.t, "measurements[0].t")
     order = np.argsort(as_array(t, "measurements[0].t"), kind="stable")
 

@@ -153,7 +153,7 @@ class Points(Measurement):
         super().__init__(t, sigma, factor, time_offset, loss)
         self.y, self.weights, self.frames = y, weights, frames
 
-    def with_sigma(self, sigma: Numbers) -> Points:
+    def _with_sigma(self, sigma: Numbers) -> Points:
         """Return the same points with other standard deviations."""
         found = copy(self)
         found.sigma = sigma

@@ -126,7 +126,7 @@ class Finding(NamedTuple):
 
 
 def roots_of(information: Doubles) -> tuple[Doubles, NDArray[np.bool_]]:
-    """Return matrices R with RᵀR = W for information matrices W, and which of their rows carry information."""
+    """Return matrices R with RᵀR = W for information matrices W, and which of their rows contain information."""
     values, vectors = np.linalg.eigh(information)
     roots = np.sqrt(np.maximum(values, 0.0))
     known = roots > _NOTHING * roots.max(axis=-1, keepdims=True)
@@ -295,7 +295,8 @@ def examine_smoothing(rows: Doubles, neighbours: Doubles, leverage: Doubles, rob
     # Where the residuals vanish, the curve is exact. Neighbours that agree exactly, as rounded data do, show no noise.
     enough = (counts >= _FEW_DATA) & (leverage <= _HIGH) & (scale > 0) & (noise > 0)
     enough &= np.isfinite(neighbours).sum(axis=1) >= _FEW_DATA // 2
-    stiff = enough & moderate & (scale > _NEIGHBOURS**2 * noise)
+    # The ratio of few data varies.
+    stiff = enough & moderate & (scale > (_NEIGHBOURS * (1 + 2 / np.sqrt(np.maximum(counts, 1)))) ** 2 * noise)
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.where(stiff, np.sqrt(scale / noise), 1.0)
         sizes = np.abs(filled).max(axis=2) / np.sqrt(np.where(scale > 0, scale, np.inf))[:, None]

@@ -105,7 +105,7 @@ class Evidence(NamedTuple):
     residuals : ndarray, shape (n, m)
         Coordinates of the vectors from the curve to the data, divided by the standard deviation of the noise.
     counts : ndarray of bool, shape (n,)
-        Whether a datum is no outlier.
+        Whether a datum is not an outlier.
     soft : ndarray, shape (n,)
         Factors of the residuals by which a robust loss differs from least squares.
     positions, velocities : ndarray, shape (n, m)

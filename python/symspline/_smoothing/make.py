@@ -37,6 +37,7 @@ from .._typing import (
     SmoothingPenalty,
     TimesLike,
 )
+from .._warnings import is_silent
 from ..manifolds._manifold import refuse_functions
 from .audited import warn_of_residuals
 from .data import (
@@ -387,9 +388,10 @@ def make_smoothing_spline(
     # Between two knots there is nothing to choose.
     are_chosen = [spread(np.isnan(own) & (at.times.shape[-1] > 2)) for own in lams]
     are_given = [spread(np.isfinite(own)) for own in sigmas], are_chosen
-    warn_of_residuals(space, fitted.curve, whole, noise, *are_given, options.loss)
-    if loss == "linear" and penalty == "acceleration":
-        warn_of_varying(space, fitted.curve, whole, noise, are_given[1], end_kinds(bc_type))
+    if not is_silent(SmoothingWarning):
+        warn_of_residuals(space, fitted.curve, whole, noise, *are_given, options.loss)
+        if loss == "linear" and penalty == "acceleration":
+            warn_of_varying(space, fitted.curve, whole, noise, are_given[1], end_kinds(bc_type))
     warn_of_spread(space, fitted.curve, whole, [part.report.df for part in noise])
     warn_of_signs(space, [valid_data])
     if whole.used.all():

@@ -177,7 +177,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         return residuals
 
     @property
-    def gaps(self) -> Any:
+    def gaps(self) -> list[Gap] | tuple[list[Gap], ...] | AnyArray | tuple[AnyArray, ...]:
         """Long gaps between the data, and the times before and after them, with the factors of the bands there.
 
         This is a list of `Gap` in the order of time, of which the first and the last one are the times before and after

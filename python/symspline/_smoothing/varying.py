@@ -99,9 +99,9 @@ def findings(own: Recording) -> list[Finding]:
         found.append(
             Finding(
                 score / _NOISE,
-                f"the residuals are larger between t = {noisier} than elsewhere: the noise is larger there, or the curve "
-                "does not follow the motion. Pass weights= with the inverse variances of the data, loss='huber' if "
-                "only some data are worse, or a smaller lam",
+                f"the residuals are larger between t = {noisier} than elsewhere: the noise is larger there, or the "
+                "curve does not follow the motion. Pass weights= with the inverse variances of the data, loss='huber' "
+                "if only some data are worse, or a smaller lam",
             )
         )
     return sorted(found, reverse=True)

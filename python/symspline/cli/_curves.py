@@ -147,7 +147,9 @@ def _columns(path: object, file: BinaryIO, space: Space) -> Columns:
     numbers = count_with_quaternion(space) if order else len(labels(space))
     texts = isinstance(names, list) and all(isinstance(name, str) for name in (*names, columns.time, columns.curve))
     good = (
-        texts and {columns.lonlat, columns.cut, columns.degrees} <= {True, False} and columns.utc in (True, False, None)
+        texts
+        and all(isinstance(own, bool) for own in (columns.lonlat, columns.cut, columns.degrees))
+        and columns.utc in (True, False, None)
     )
     if good and columns.lonlat:
         good = len(names) == len(LONLAT) and space == GLOBE and order is None

@@ -61,8 +61,6 @@ class Volume:
             return NotImplemented
         return same((self.tensors, self.mask, self.affine), (other.tensors, other.mask, other.affine))
 
-    __hash__ = None  # type: ignore[assignment]
-
 
 def read_nifti(file: File, *, order: TensorOrder | None = None, mask: ArrayLike | File | None = None) -> Volume:
     """Read diffusion tensors from a NIfTI file with six volumes.

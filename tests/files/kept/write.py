@@ -40,6 +40,7 @@ def curves():
         "geodesics": ss.PiecewiseGeodesic(DATES, POSES, "so:3 x r:3", extrapolate="geodesic"),
         "smoothing": smooth,
         "estimate": ss.estimate(MEASURED, 5, "so:3", lam=0.1),
+        "estimate_points": ss.estimate(MEASURED[:1], 5, "so:3", lam=0.1),
         "bspline": ss.BSpline([0, 0, 0, 1, 2, 2, 2], [*P, P[0]], 2, "sphere:2"),
         "cumulative": ss.CumulativeBSpline.fit(range(6), TURNS, 2, "so:3"),
         "cumulative_product": ss.CumulativeBSpline(None, (TURNS[:5], np.arange(15.0).reshape(5, 3)), "so:3 x r:3"),
@@ -83,7 +84,7 @@ def values(found):
         numbers |= {"std": plain(found.std(1.5)), "lam": found.lam}
         numbers |= {name: [plain(own.value), plain(own.std)] for name, own in found.parameters.items()}
         # Files of estimates do not hold their measurements.
-        if not found.parameters:
+        if not hasattr(found, "measurements"):
             numbers["residuals"] = plain(found.residuals)
     return numbers
 
