@@ -192,6 +192,7 @@ def test_angles_of_data_are_those_beside_the_curve():
         np.testing.assert_allclose(dots, np.column_stack([t, np.degrees(angle / half)]), atol=1e-6)
 
 
+@pytest.mark.filterwarnings("ignore:there are no data:symspline.SmoothingWarning")
 def test_dates_and_repeated_times():
     dates = np.datetime64("2024-05-01") + np.repeat(np.arange(20), 2).astype("m8[h]")
     dates[30:] += np.timedelta64(3, "D")

@@ -116,9 +116,10 @@ def estimate(
     >>> import numpy as np, xarray as xr
     >>> import symspline as ss, symspline.xarray
     >>> t, s = np.linspace(0, 5, 26), np.linspace(0, 5, 501)
-    >>> turning = ss.rotations.from_rotation_vectors(np.sin(t)[:, None] * [0.0, 0.0, 1.0])
-    >>> noise = 0.02 * np.random.default_rng(0).standard_normal((501, 3))
-    >>> omega = np.cos(s)[:, None] * [0, 0, 1] + [0.1, 0, 0] + noise
+    >>> rng = np.random.default_rng(0)
+    >>> vectors = np.sin(t)[:, None] * [0.0, 0.0, 1.0] + 0.03 * rng.standard_normal((26, 3))
+    >>> turning = ss.rotations.from_rotation_vectors(vectors)
+    >>> omega = np.cos(s)[:, None] * [0, 0, 1] + [0.1, 0, 0] + 0.02 * rng.standard_normal((501, 3))
     >>> ds = symspline.xarray.estimate(
     ...     xr.DataArray(turning, dims=("time", "row", "column"), coords={"time": t}),
     ...     "so:3",
