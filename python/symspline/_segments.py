@@ -306,7 +306,8 @@ def cut(
         rows, moments, seconds, new = rows[new], moments[new], seconds[new], new[new]
     gap = _seconds(max_gap, time_axis.dates or time_axis.durations)
     apart = np.diff(seconds) > gap
-    if used is None:
+    # Without a limit, the recording is one curve, whose fit raises an error.
+    if used is None and np.isfinite(gap):
         opposite = _opposite(space, arrays) & ~apart
         _warn_of_opposite(opposite, rows, moments)
         apart |= opposite

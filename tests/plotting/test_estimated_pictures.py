@@ -82,6 +82,7 @@ def test_outliers_are_drawn_at_the_edge():
     assert any("1 beyond the axis (triangles)" in text for text in texts_of(panel.figure))
 
 
+@pytest.mark.filterwarnings("ignore:The residuals:symspline.SmoothingWarning")
 def test_points_of_several_sensors_are_drawn():
     """Points of weight zero are not."""
     weights = np.where(np.arange(90) % 3, 1.0, 0.0)
@@ -148,6 +149,7 @@ def test_poses_have_a_band_per_part_and_residuals_per_measurement():
     assert len(x) == len(y) == 90
 
 
+@pytest.mark.filterwarnings("ignore:The residuals:symspline.SmoothingWarning")
 def test_curves_from_files_have_bands_and_no_data(tmp_path):
     attitudes().save(tmp_path / "a.npz")
     figure = rendered(ss.load(tmp_path / "a.npz").plot())

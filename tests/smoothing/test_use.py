@@ -142,6 +142,9 @@ def test_data_and_weights_whose_squares_overflow_raise():
         ss.make_smoothing_spline(T, NOISY, S2, weights=np.r_[1e300, np.ones(39)])
 
 
+@pytest.mark.filterwarnings("ignore:The noise of the data:symspline.SmoothingWarning")
+@pytest.mark.filterwarnings("ignore:The data turn by more than half:symspline.SmoothingWarning")
+@pytest.mark.filterwarnings("ignore:Two curves fit the data:symspline.SmoothingWarning")
 @pytest.mark.parametrize(("name", "seed"), [("sphere:2", 4), ("so:3", 0), ("rp:2", 4), ("sphere:2 x r:1", 4)])
 def test_data_spread_over_the_whole_space_warn(name, seed):
     space, rng = ss.space(name), np.random.default_rng(seed)
@@ -158,6 +161,8 @@ def test_data_spread_over_the_whole_space_warn(name, seed):
         ss.make_smoothing_spline(None, mixed, space, lam=1e6, weights=np.repeat([0.0, 1.0], 200))
 
 
+# On RP(2), another curve is nearly as good.
+@pytest.mark.filterwarnings("ignore:Two curves fit the data:symspline.SmoothingWarning")
 @pytest.mark.parametrize("name", ["sphere:2", "so:3", "rp:2", "so:4", "u:2"])
 def test_noise_of_half_a_radian_does_not_warn(name):
     ratios = []

@@ -31,6 +31,8 @@ _TRIES = 5
 _COARSER = 1e4
 # Part of the message for a smoothing that ended without a curve.
 NO_CURVE = "no spline joins"
+# Part of the message for a jerk that too few data determine.
+TOO_FEW = "needs at least 3 data"
 
 DfOfPart = Callable[[int, SmoothingData, "Knots"], Array]
 """Returns the degrees of freedom of curves with free ends in the smoothed space with a given number."""
@@ -210,7 +212,8 @@ def with_enough_knots(
     for tries in range(_TRIES):
         found = run(at)
         count = at.times.shape[-1]
-        if any(NO_CURVE not in fault.what for _, _, faults in found for fault in faults) and tries < _TRIES - 1:
+        faults = [fault.what for _, _, faults in found for fault in faults]
+        if any(NO_CURVE not in what and TOO_FEW not in what for what in faults) and tries < _TRIES - 1:
             coarser *= _COARSER
             fewer = merge_close_knots(whole, noisy, _of_all(lams) if given else None, power, coarser)
             if not np.array_equal(fewer.times, at.times) and fewer.times.shape[-1] <= count:

@@ -17,7 +17,7 @@ from .._report import long_gaps
 from .._spaces import Array, Doubles, Space
 from .._typing import Progress
 from .data import SmoothingData
-from .knots import NO_CURVE, Knots
+from .knots import NO_CURVE, TOO_FEW, Knots
 from .outliers import Outliers
 from .posterior import Posterior
 from .precision import Precision
@@ -159,7 +159,7 @@ def _reason(
         has_weight = weights.reshape(-1, weights.shape[-1])[number] > 0
         used = int(has_weight.sum())
         if used < 3:
-            return f"The data{{of}} do not determine the curve: penalty='jerk' needs at least 3 data, not {used}."
+            return f"The data{{of}} do not determine the curve: penalty='jerk' {TOO_FEW}, not {used}."
         if not has_weight.all():
             return (
                 f"The data{{of}} do not determine the curve: for penalty='jerk', too many of the {knots} knots have no "

@@ -36,8 +36,8 @@ from .warned import SmoothingWarning
 # Standard deviation of the noise, divided by the injectivity radius, from which a second start is tried: 34° on a
 # circle. With less noise the first start always led to the best minimum.
 _NOISY = 0.19
-# The same ratio from which the best minimum found may be a wrong one: 50° on a circle.
-_TOO_NOISY = 0.28
+# The same ratio from which the best minimum found may be a wrong one: 52° on a circle.
+_TOO_NOISY = 0.29
 # Median step between the data as a fraction of the way to the cut locus, from which the data are a start, unless a
 # curve was found with less noise than this part of the injectivity radius.
 _FAST, _SMALL = 0.6, 0.05
