@@ -75,9 +75,11 @@ test-aarch64:
 		cargo test --quiet --workspace --exclude symspline-benches --exclude symspline-python \
 		--lib --tests --target aarch64-unknown-linux-musl
 
-# About ten minutes of random input on two cores; what fails is kept in .hypothesis and tried first the next time.
+# About ten minutes of random input on two cores; what fails is kept in .hypothesis and tried first the next time. Then the
+# table of the page on trust, from few recordings.
 fuzz: .venv/built .venv/tools
 	$(BIN)/python -m pytest --numprocesses auto tests/fuzz --hypothesis-profile=long
+	$(BIN)/python -m tests.trust 20
 
 # Some minutes; the machine should have nothing else to do.
 bench: .venv/built .venv/tools
