@@ -158,7 +158,7 @@ impl<'a> System<'a> {
 
 /// Applies a function to each column of rows of numbers, m of which belong to a coefficient.
 fn by_columns(rows: &[f64], columns: usize, m: usize, change: impl Fn(&mut Vec<f64>)) -> Vec<f64> {
-    debug_assert!(rows.len() % (columns * m) == 0);
+    debug_assert!(rows.len().is_multiple_of(columns * m));
     let changed: Vec<Vec<f64>> = (0..columns)
         .map(|c| {
             let mut column = rows.iter().skip(c).step_by(columns).copied().collect();
