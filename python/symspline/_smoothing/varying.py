@@ -93,7 +93,10 @@ def findings(own: Recording) -> list[Finding]:
     ends = _bins(1 - h)
     freedom, information = (np.diff(np.cumsum(x)[ends], prepend=0.0) for x in (1 - h, 1 - (2 - _RATIO) * h))
     information = own.m * freedom**2 / np.maximum(information, 1e-3 * freedom)
-    score, place = _unequal(np.diff(np.cumsum(squares)[ends], prepend=0.0), freedom, information)
+    sums = np.diff(np.cumsum(squares)[ends], prepend=0.0)
+    # Natural ends do not follow a motion that accelerates there: the first and the last bin do not count.
+    score, (first, last) = _unequal(*(own[1:-1] for own in (sums, freedom, information)))
+    place = first + 1, last + 1
     if score > _NOISE:
         noisier = _interval(own.t, ends, place)
         found.append(
