@@ -133,3 +133,20 @@ def test_data_of_two_curves_are_reported():
     points[1::20] += [40.0, 0, 0]
     with pytest.warns(ss.SmoothingWarning, match=r"rejects many data: \d+ of 200 .* Plot the residuals"):
         ss.make_smoothing_spline(t, points, "r:3", loss="cauchy")
+
+
+@pytest.mark.parametrize("loss", ["huber", "cauchy"])
+def test_a_burst_that_a_robust_loss_rejects(loss):
+    """Consecutive data that deviate may be a motion; isolated ones are outliers."""
+    rng = np.random.default_rng(7)
+    t = 100 + np.sort(rng.uniform(0, 20, 400))
+    y = np.stack([np.sin(t / 3), np.cos(t / 4)], axis=-1) + 0.02 * rng.standard_normal((400, 2))
+    isolated = y.copy()
+    isolated[::10] += 1.5
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        ss.make_smoothing_spline(t, isolated, "r:2", loss=loss)
+    burst = y.copy()
+    burst[200:215] += [1.0, -0.5]
+    with pytest.warns(ss.SmoothingWarning, match=r"the loss rejects all data from number 200 to 214.*loss='linear'"):
+        ss.make_smoothing_spline(t, burst, "r:2", loss=loss)

@@ -34,6 +34,8 @@ _LARGEST, _PROBABILITY = 6.0, 1e-5
 _REJECTED, _CORNERS = 0.3, 9.0
 # Consecutive rejected measurements that are too many, and their share of all: outliers of a sensor are mostly isolated.
 _RUN, _RUN_SHARE = 8, 0.05
+# The same for smoothing, where every datum is a point: six in a row are rare among 15 % of isolated outliers.
+_RUN_OF_DATA, _SHARE_OF_DATA = 5, 0.02
 # Residuals below this part of σ are those of data without noise.
 _EXACT = 1e-6
 # Fewer measurements, or a larger leverage, leave no residuals to examine.
@@ -173,15 +175,15 @@ def largest_expected(count: int) -> float:
     return max(_LARGEST, float(np.sqrt(2 * np.log(max(count, 1) / _PROBABILITY))))
 
 
-def long_run(rejected: NDArray[np.bool_]) -> tuple[int, int] | None:
-    """Return the first and the last row of the longest run of rejected measurements if it is too long, else None."""
+def long_run(rejected: NDArray[np.bool_], most: float) -> tuple[int, int] | None:
+    """Return the first and the last row of the longest run of rejected measurements if it exceeds `most`, else None."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], rejected, [False]])))
     starts, ends = edges[::2], edges[1::2]
     if not len(starts):
         return None
     longest = int((ends - starts).argmax())
     first, last = int(starts[longest]), int(ends[longest]) - 1
-    return (first, last) if last - first + 1 > max(_RUN, _RUN_SHARE * len(rejected)) else None
+    return (first, last) if last - first + 1 > most else None
 
 
 def examine(given: Residuals) -> Finding:
@@ -212,7 +214,8 @@ def examine(given: Residuals) -> Finding:
         square, efficiency, limit = scale, _EFFICIENCY, _ROBUST_RATIO
         far = squares > _CORNERS * given.corner
         share = float(np.mean(far[used]))
-        found = found._replace(rejected=share if share > _REJECTED else 0.0, run=long_run(far))
+        run = long_run(far, max(_RUN, _RUN_SHARE * len(far)))
+        found = found._replace(rejected=share if share > _REJECTED else 0.0, run=run)
         rows = np.where(squares[:, None] > max(1.0, scale) * given.corner, np.nan, rows)
     else:
         sizes = np.nanmax(np.where(known, np.abs(rows), 0.0), axis=1)
@@ -253,17 +256,21 @@ class SmoothingFinding(NamedTuple):
         Outliers under least squares.
     sizes : ndarray, shape (curves, n)
         Sizes of the residuals in standard deviations.
+    runs : list of tuple of int or None
+        First and last of too many consecutive data that a robust loss rejects, for every curve.
     """
 
     ratio: Doubles
     correlation: Doubles
     outliers: NDArray[np.bool_]
     sizes: Doubles
+    runs: list[tuple[int, int] | None]
 
     @property
     def failed(self) -> NDArray[np.bool_]:
         """Whether a check failed."""
-        return np.asarray((self.ratio > 1) | (self.correlation != 0) | self.outliers.any(axis=1))
+        rejected = np.array([run is not None for run in self.runs], bool)
+        return np.asarray((self.ratio > 1) | (self.correlation != 0) | self.outliers.any(axis=1) | rejected)
 
 
 def examine_smoothing(rows: Doubles, neighbours: Doubles, leverage: Doubles, robust: bool) -> SmoothingFinding:
@@ -315,7 +322,13 @@ def examine_smoothing(rows: Doubles, neighbours: Doubles, leverage: Doubles, rob
         # Noise that varies along the curve has large residuals next to each other.
         near = np.concatenate([sizes[curve, max(0, i - _NEAR) : i], sizes[curve, i + 1 : i + 1 + _NEAR]])
         outliers[curve, i] = sizes[curve, i] > limit[curve] * max(1.0, float(np.median(near)))
-    return SmoothingFinding(ratio, np.where(enough & moderate & correlated, correlation, 0.0), outliers, sizes)
+    # A burst of motion looks like consecutive outliers.
+    runs: list[tuple[int, int] | None] = []
+    for rejected, has_weight in zip(far, np.asarray(used), strict=True):
+        numbers = np.flatnonzero(has_weight)
+        run = long_run(rejected[numbers], max(_RUN_OF_DATA, _SHARE_OF_DATA * len(numbers))) if robust else None
+        runs.append(run and (int(numbers[run[0]]), int(numbers[run[1]])))
+    return SmoothingFinding(ratio, np.where(enough & moderate & correlated, correlation, 0.0), outliers, sizes, runs)
 
 
 def _median(values: Doubles) -> Doubles:

@@ -202,6 +202,12 @@ def _of_estimated(finding: SmoothingFinding, curve: int) -> str:
             "Alternating residuals show a motion that is too fast for the sampling. Check the times and units, or pass "
             "more data per turn."
         )
+    run = finding.runs[curve]
+    if run:
+        facts.append(f"the loss rejects all data from number {run[0]} to {run[1]}")
+        remedies.append(
+            "If the motion is fast there and these data are right, pass loss='linear' or smooth this part by itself."
+        )
     if count:
         which = "one outlier" if count == 1 else f"the largest of {count} outliers"
         facts.append(f"{which}, number {first}, is {sizes[first]:.2g} times the noise")
