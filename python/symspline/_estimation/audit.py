@@ -7,10 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import _core
 from .._curves.ends import end_kinds
 from .._smoothing import SmoothingWarning
-from .._smoothing.audit import CORNERS, Residuals, examine
+from .._smoothing.audit import Residuals, corner_of, examine
 from .._smoothing.audited import DEGREES, Sensor, advice, described
 from .._smoothing.posterior import Posterior
 from .._spaces import Doubles
@@ -72,7 +71,7 @@ def examined(setup: Setup, found: Solution) -> list[Sensor]:
         order = np.argsort(term.times, kind="stable")
         rows = term.informative(own.residuals)[order]
         entries = max(1, int(np.isfinite(rows).sum()))
-        corner = np.inf if loss == "linear" else _core.chi_squared(own.residuals.shape[1], CORNERS[loss])
+        corner = corner_of(loss, own.residuals.shape[1])
         given = Residuals(rows, leverage / entries, between / entries, loss, corner, not isinstance(term, FunctionTerm))
         name = f"{term.label} ({type(term.given).__name__})"
         if labels.count(term.label) > 1:

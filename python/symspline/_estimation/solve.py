@@ -16,7 +16,7 @@ from .._curves.curve import CoreCurve
 from .._curves.ends import end_kinds
 from .._curves.fit import FitProblem, Points, fit, read_ends
 from .._curves.solve import DEFAULTS
-from .._smoothing.audit import CORNERS
+from .._smoothing.audit import corner_of
 from .._smoothing.posterior import Posterior, frames_at
 from .._smoothing.report import SmoothingReport
 from .._spaces import Array, Doubles, Euclidean, Space
@@ -427,7 +427,7 @@ class Iteration:
                 weights.append(None)
                 value += float(squares.sum())
                 continue
-            corner = _core.chi_squared(own.residuals.shape[1], CORNERS[loss])
+            corner = corner_of(loss, own.residuals.shape[1])
             if loss == "huber":
                 factor = np.minimum(1.0, np.sqrt(corner / np.maximum(squares, corner)))
                 value += float(np.where(squares > corner, 2 * np.sqrt(corner * squares) - corner, squares).sum())

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from .. import _core
 from .._spaces import Doubles
 
-# Quantiles of χ² at which the losses begin to grow more slowly, see `make_smoothing_spline`.
-CORNERS = {"huber": 0.82, "cauchy": 0.95}
+# Quantiles of χ² at which the losses begin to grow more slowly, as in `loss.rs`.
+_CORNERS = {"huber": 0.82, "cauchy": 0.95}
 # Relative size of a root of an information matrix that is a rounding error.
 _NOTHING = 1e-6
 # Limits of normal numbers: of the mean square, and of the autocorrelation.
@@ -31,7 +31,7 @@ _PARTIAL_SUM, _STEP = 2.0, 0.0625
 # Limit of the largest residual, and the probability that normal residuals of a long recording exceed it.
 _LARGEST, _PROBABILITY = 6.0, 1e-5
 # Share of the measurements that a robust loss may reject, and the multiple of its corner at which it does.
-_REJECTED, _CORNERS = 0.3, 9.0
+_REJECTED, _BEYOND = 0.3, 9.0
 # Consecutive rejected measurements that are too many, and their share of all: outliers of a sensor are mostly isolated.
 _RUN, _RUN_SHARE = 8, 0.05
 # The same for smoothing, where every datum is a point: six in a row are rare among 15 % of isolated outliers.
@@ -127,6 +127,14 @@ class Finding(NamedTuple):
         return self.correlated and self.correlation > _SMOOTH
 
 
+def corner_of(loss: str, d: int) -> float:
+    """Return the squared length of d components in standard deviations at which a loss begins to grow more slowly.
+
+    It is infinite for least squares.
+    """
+    return np.inf if loss == "linear" else _core.chi_squared(d, _CORNERS[loss])
+
+
 def roots_of(information: Doubles) -> tuple[Doubles, NDArray[np.bool_]]:
     """Return matrices R with RᵀR = W for information matrices W, and which of their rows contain information."""
     values, vectors = np.linalg.eigh(information)
@@ -212,7 +220,7 @@ def examine(given: Residuals) -> Finding:
     if robust:
         # Outliers would dominate moments.
         square, efficiency, limit = scale, _EFFICIENCY, _ROBUST_RATIO
-        far = squares > _CORNERS * given.corner
+        far = squares > _BEYOND * given.corner
         share = float(np.mean(far[used]))
         run = long_run(far, max(_RUN, _RUN_SHARE * len(far)))
         found = found._replace(rejected=share if share > _REJECTED else 0.0, run=run)

@@ -8,14 +8,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import _core
 from .._curves.curve import CurveArrays
 from .._faults import of_index
 from .._spaces import Array, Doubles, Space, factors_of
 from .._warnings import warn
-from .audit import CORNERS, Finding, Residuals, SmoothingFinding, examine, examine_smoothing, roots_of
+from .audit import Finding, Residuals, SmoothingFinding, corner_of, examine, examine_smoothing, roots_of
 from .data import SmoothingData, points_of
-from .factors import is_several, split
+from .factors import in_part, split
 from .posterior import coordinates
 from .solve import Smoothed
 from .warned import SmoothingWarning
@@ -89,7 +88,7 @@ def warn_of_residuals(
         if not len(examined):
             continue
         one = _Examined.of(part, noisy, number, x, y, own, examined)
-        of_part = f" in factor {number}, {part!r}," if is_several(space) else ""
+        of_part = in_part(space, number, ",")
         for k, facts in one.complaints(known[examined], loss):
             index = tuple(map(int, np.unravel_index(examined[k], batch)))
             what = f"The residuals of the smoothing{of_index(index)}{of_part} are not those of independent noise: "
@@ -156,7 +155,7 @@ class _Examined(NamedTuple):
         loss : str
             Loss of the data.
         """
-        corner = np.inf if loss == "linear" else _core.chi_squared(self.space.dim, CORNERS[loss])
+        corner = corner_of(loss, self.space.dim)
         estimated = examine_smoothing(self.rows, self.deviations, self.leverages, loss != "linear")
         for k in np.flatnonzero(known | estimated.failed).tolist():
             if not known[k]:

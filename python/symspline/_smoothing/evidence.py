@@ -10,17 +10,17 @@ import numpy as np
 from .. import _core
 from .._curves.ends import end_kinds, is_closed
 from .._spaces import Array, Doubles, Euclidean, Space, SpecialEuclidean, factors_of
+from .audit import corner_of
 from .data import points_of
 from .factors import grouped, smoothed_spaces, split
 from .gaps import Calibration, Course, Evidence, calibrate
 from .posterior import frames_at
+from .precision import SINGULAR
 
 # Largest number of numbers in the frames that are computed together.
 _TOGETHER = 1 << 22
 # Data of a robust fit beyond this quantile of the noise are outliers, as in the fit.
 _KEPT = 0.99
-# The quantile of the residuals beyond which a loss grows more slowly, as in the fit.
-_CORNERS = {"huber": 0.82, "cauchy": 0.95}
 
 
 def calibration_of(spline: Any, number: int) -> Calibration | None:
@@ -99,7 +99,7 @@ def _evidence(spline: Any, number: int, used: Any, sigma: float) -> Evidence:
 
 def _soft(loss: str, squares: Doubles, m: int) -> Doubles:
     """Return the factors of residuals that make them those of pseudo-data, for noise of variance one (Cox 1983)."""
-    q = squares / _core.chi_squared(m, _CORNERS[loss])
+    q = squares / corner_of(loss, m)
     if loss == "huber":
         q = np.maximum(q, 1.0)
         factors = 1 / np.sqrt(q)
@@ -113,7 +113,7 @@ def _soft(loss: str, squares: Doubles, m: int) -> Doubles:
 def _roots(matrices: Doubles) -> Doubles:
     """Return R with W = RᵀR for symmetric matrices W; directions without information have rows of zeros."""
     values, vectors = np.linalg.eigh(matrices)
-    values = np.where(values > 1e-10 * values[:, -1:], values, 0.0)
+    values = np.where(values > SINGULAR * values[:, -1:], values, 0.0)
     return np.asarray(np.sqrt(values)[:, :, None] * np.swapaxes(vectors, -1, -2))
 
 

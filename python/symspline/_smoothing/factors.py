@@ -41,6 +41,11 @@ def is_several(space: Space[Any]) -> bool:
     return isinstance(space, Product) or len(smoothed_spaces(space)) > 1
 
 
+def in_part(space: Space[Any], number: int, mark: str = "") -> str:
+    """Return " in factor ..." and a mark for one of several smoothed spaces, or an empty text."""
+    return f" in factor {number}, {smoothed_spaces(space)[number]!r}{mark}" if is_several(space) else ""
+
+
 def grouped(space: Space[Any], values: Iterable[_T]) -> list[list[_T]]:
     """Group values of the smoothed spaces by factor."""
     rest = iter(values)

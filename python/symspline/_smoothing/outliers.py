@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from .._faults import of_index
 from .._spaces import Space
 from .._warnings import warn
-from .factors import is_several, smoothed_spaces
+from .factors import in_part
 from .report import SmoothingReport
 from .warned import SmoothingWarning
 
@@ -67,8 +67,7 @@ def warn_of_outliers(
         if not own.any():
             continue
         index = tuple(map(int, np.argwhere(own)[0]))
-        of = of_index(index)
-        of += f" in factor {number}, {smoothed_spaces(space)[number]!r}" if is_several(space) else ""
+        of = of_index(index) + in_part(space, number)
         of += f" (and {total - 1} more)" if total > 1 else ""
         kind, rejected = (int(np.asarray(one)[index]) for one in outliers)
         df, data = float(np.asarray(report.df)[index]), int(np.broadcast_to(count, own.shape)[index])

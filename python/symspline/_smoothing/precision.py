@@ -21,7 +21,7 @@ _ROUNDING = 1e-8
 # Operations on matrices in one call of NumPy, which cannot be interrupted: some tenths of a second.
 _BLOCK = 1 << 28
 # Relative size of the eigenvalues of a matrix that the core treats as zero.
-_SINGULAR = 1e-10
+SINGULAR = 1e-10
 
 
 class Precision(NamedTuple):
@@ -44,7 +44,7 @@ class Precision(NamedTuple):
         if self.information is None:
             return False
         values = np.linalg.eigvalsh(self.information)
-        return bool(np.any((values[..., 0] <= _SINGULAR * values[..., -1]) & (values[..., -1] > 0)))
+        return bool(np.any((values[..., 0] <= SINGULAR * values[..., -1]) & (values[..., -1] > 0)))
 
     def map(self, function: Any) -> Precision:
         """Apply a function to the arrays that have batch axes, such as the selection of some curves."""
@@ -125,7 +125,7 @@ def _in_parts(precision: Precision, space: Space, data: Points) -> list[Precisio
         rest = np.setdiff1d(np.arange(space.dim), own)
         block = whole[..., own[:, None], own]
         cross = whole[..., own[:, None], rest]
-        others = np.linalg.pinv(whole[..., rest[:, None], rest], rcond=_SINGULAR, hermitian=True)
+        others = np.linalg.pinv(whole[..., rest[:, None], rest], rcond=SINGULAR, hermitian=True)
         found.append(_of_matrices(block - cross @ others @ np.swapaxes(cross, -1, -2)))
         first += part.dim
     return found

@@ -29,7 +29,7 @@ from .._spaces import (
     Torus,
 )
 from .._warnings import warn
-from .factors import is_several, smoothed_spaces
+from .factors import in_part, smoothed_spaces
 from .report import SmoothingReport
 from .warned import SmoothingWarning
 
@@ -89,7 +89,7 @@ class Raw(NamedTuple):
 class Column:
     """Positions of columns of the report."""
 
-    ITERATIONS, LAM, DF, SIGMA, OBJECTIVE = 1, 2, 5, 6, -1
+    LAM, SIGMA, OBJECTIVE = 2, 6, -1
 
 
 class Samples(NamedTuple):
@@ -216,7 +216,7 @@ def warn_of_minima(space: Space, kinds: list[Any], reports: list[SmoothingReport
             continue
         index = tuple(map(int, np.argwhere(own)[0]))
         part = smoothed_spaces(space)[number]
-        of = of_index(index) + (f" in factor {number}, {part!r}," if is_several(space) else "")
+        of = of_index(index) + in_part(space, number, ",")
         of += f" (and {total - 1} more)" if total > 1 else ""
         noise = f"{float(np.asarray(report.sigma)[index]):.2g}"
         warn(_MESSAGES[int(np.asarray(kind)[index])].format(of=of, noise=noise, space=part), SmoothingWarning, index)

@@ -12,7 +12,7 @@ from .._faults import of_index
 from .._spaces import Array, Space, factors_of
 from .._warnings import warn
 from .data import SmoothingData, points_of
-from .factors import is_several, smoothed_spaces, split
+from .factors import in_part, split
 
 # Ratio of the degrees of freedom to the number of data from which a curve follows nearly all data.
 _ALL = 0.9
@@ -44,7 +44,6 @@ def warn_of_bounds(space: Space, reports: list[Any], chosen: list[Any], counts: 
     counts : list of ndarray of int
         Number of data of each curve.
     """
-    spaces = smoothed_spaces(space)
     for number, (report, asked, count) in enumerate(zip(reports, chosen, counts, strict=True)):
         rough = (np.asarray(report.df) > _ALL * count) & (np.asarray(count) > 4)
         good = (np.asarray(report.at_bound) | rough) & np.asarray(report.converged)
@@ -52,8 +51,7 @@ def warn_of_bounds(space: Space, reports: list[Any], chosen: list[Any], counts: 
         if not len(found):
             continue
         index = tuple(map(int, found[0]))
-        of = of_index(index)
-        of += f" in factor {number}, {spaces[number]!r}" if is_several(space) else ""
+        of = of_index(index) + in_part(space, number)
         of += f" (and of {len(found) - 1} more curves)" if len(found) > 1 else ""
         message = _message(of, float(np.asarray(report.df)[index]), bool(rough[index]), report.is_stiff(index))
         warn(message, SmoothingWarning, index)
@@ -177,8 +175,7 @@ def warn_of_gaps(spline: Any, found: dict[tuple[int, tuple[int, ...]], Any]) -> 
         return
     _, (number, index), place = max(blind)
     gap, count = spline._gaps_of(number, index)[place + len(found[number, index].ends[:1])], len(blind)
-    of = of_index(index)
-    of += f" in factor {number}, {smoothed_spaces(spline.space)[number]!r}" if is_several(spline.space) else ""
+    of = of_index(index) + in_part(spline.space, number)
     more = f" (and {count - 1} more gaps)" if count > 1 else ""
     if np.isnan(gap.factor):
         known = (
