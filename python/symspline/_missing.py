@@ -21,6 +21,11 @@ _NAN_TIME = "is NaN; times must be finite"
 _NOT_FINITE = "No point is close to it; correct it or remove it"
 
 
+def missing_times(times: NDArray[Any]) -> Mask:
+    """Return where times are NaN or NaT."""
+    return np.isnan(times) if times.dtype.kind in "fmM" else np.zeros(times.shape, bool)
+
+
 def without_missing(t: Any, points: Any, space: Space[Any]) -> tuple[Any, Any, Mask]:
     """Return times and points without the samples that are missing, and which samples of each curve are present.
 
@@ -39,8 +44,8 @@ def without_missing(t: Any, points: Any, space: Space[Any]) -> tuple[Any, Any, M
     parts = [factor._array(filled(p), "points") for factor, p in zip(*_each(points, space), strict=True)]
     found = [_missing_points(factor, part) for factor, part in zip(factors_of(space), parts, strict=True)]
     moments = None if t is None else as_array(times_of(filled(t), "t")[0], "t")
-    if moments is not None and moments.dtype.kind in "fmM":
-        found.append(np.isnan(moments))
+    if moments is not None:
+        found.append(missing_times(moments))
     try:
         missing = np.any(np.broadcast_arrays(*found), axis=0)
     except ValueError:

@@ -73,6 +73,15 @@ def test_missing_points_are_omitted(function, name):
     raises(r"is masked.*skipna=True", fit, T, masked, name)
 
 
+@pytest.mark.parametrize("kind", [int, float])
+def test_as_many_times_as_points_that_are_present_are_refused(kind):
+    """They may belong to other points."""
+    y = np.arange(6.0)[:, None]
+    y[2] = np.nan
+    with pytest.raises(ss.ValidationError, match=r"t has shape \(5,\)"):
+        ss.CubicSpline(np.arange(5).astype(kind), y, "r:1", skipna=True)
+
+
 def test_dates_with_a_time_zone_keep_it():
     pd = pytest.importorskip("pandas")
     t = pd.date_range("2024-05-01", periods=14, freq="90s", tz="Europe/Stockholm")

@@ -9,7 +9,7 @@ import numpy as np
 
 from .._arrays import as_array, filled
 from .._input import times_of
-from .._missing import Mask, rows_of
+from .._missing import Mask, missing_times, rows_of
 from .measurements import Constant, Function, Measurement
 
 
@@ -20,7 +20,7 @@ def measurement_without_missing(given: Measurement) -> Measurement:
     t = as_array(times_of(filled(given.t), "t")[0], "t")
     if t.ndim != 1:
         return given
-    present = ~np.isnan(t) if t.dtype.kind in "fmM" else np.ones(len(t), bool)
+    present = ~missing_times(t)
     values = {
         name: filled(value)
         for name, value in vars(given).items()

@@ -13,10 +13,11 @@ from .._core import ConvergenceError, CutLocusError, ValidationError
 from .._cubic import CubicSpline
 from .._curves.at_times import call_at_times
 from .._functional import given
+from .._missing import missing_times
 from .._report import Report, columns_of
 from .._spaces import Array, Space
 from .._threads import one_thread
-from ._missing import fit_valid, missing, named_curve, of_equal_length, times_of_rows
+from ._missing import fit_valid, named_curve, of_equal_length, times_of_rows
 
 # Arrays with their core dimensions, which a block has all of.
 Inputs = list[tuple[xr.DataArray, Sequence[Hashable]]]
@@ -189,11 +190,11 @@ def _values_of_valid(
     times = times_of_rows(t, batch, nodes)
     at = np.broadcast_to(x, (*batch, *own_shape)).reshape(len(rows), *own_shape) if per_curve else x
     values = np.full((len(rows), *own_shape, *shape), np.nan, space.dtype if shape else float)
-    for curves, kept in of_equal_length(space._where_finite(rates) & ~missing(times)):
+    for curves, kept in of_equal_length(space._where_finite(rates) & ~missing_times(times)):
         chosen, knots = (curves[:, None], kept), times[curves[:, None], kept]
         here, gone = at, None
         if per_curve:
-            gone = missing(at[curves])
+            gone = missing_times(at[curves])
             here = np.where(gone, knots[:, 0].reshape(-1, *[1] * len(own_shape)), at[curves])
         try:
             found = values_at(rows[chosen], rates[chosen], here, t=knots, x_axes=len(own_shape), **options)

@@ -13,10 +13,10 @@ from .._core import ValidationError
 from .._estimation import estimate as estimate_curve
 from .._estimation.make import EstimateOptions
 from .._estimation.measurements import Measurement
+from .._missing import missing_times
 from .._smoothing.factors import is_several
 from .._spaces import Array, Euclidean, Space, space_named
 from .._typing import Numbers, TimesLike
-from ._missing import missing
 from ._smoothing import unit_of
 from ._spec import check_dims, timed_by, times_with_names
 from ._times import times_along
@@ -144,7 +144,7 @@ def estimate(
     rows = points.transpose(*own)
     times_of_points = _times(points, dim, "points", time, point_dims)
     y, at = np.asarray(rows.values), np.asarray(times_of_points.values)
-    finite = space._where_finite(space._numbers(space._doubles(y, "points"))) & ~missing(at)
+    finite = space._where_finite(space._numbers(space._doubles(y, "points"))) & ~missing_times(at)
     sigmas = sigma if isinstance(sigma, tuple) or np.ndim(sigma) == 0 else np.asarray(sigma)[finite]
     given: list[Measurement] = [measure.Points(at[finite], y[finite], sigma=sigmas)]
     components: xr.DataArray | None = None
@@ -161,7 +161,7 @@ def estimate(
         raise ValidationError("velocity_sigma belongs to velocities, but there are none. Pass velocities.")
     curve: Any = estimate_curve([*given, *measurements], knots, space, **options)
     label = times_of_points.name
-    times, axes = times_with_names(times_of_points[~missing(at)] if to is None else to, label, point_dims, [])
+    times, axes = times_with_names(times_of_points[~missing_times(at)] if to is None else to, label, point_dims, [])
     return _result(curve, space, points, times, [*axes, *point_dims], label, level, components)
 
 
@@ -203,7 +203,7 @@ def _body_rates(rates: xr.DataArray, along: str, sigma: Any, bias: bool) -> meas
     if sigma is None:
         raise ValidationError("rates need the standard deviation of a component. Pass rate_sigma.")
     omega = np.asarray(rates.transpose(along, *rest).values)
-    good = np.isfinite(omega).all(axis=1) & ~missing(times)
+    good = np.isfinite(omega).all(axis=1) & ~missing_times(times)
     constant = measure.Constant(3) if bias else None
     return measure.BodyRates(times[good], omega[good], sigma=sigma, bias=constant)
 
@@ -227,7 +227,7 @@ def _velocities(
         )
     feet = np.zeros_like(v) if flat else y
     numbers = tuple(range(1, v.ndim))
-    good = ~missing(times) & np.isfinite(v).all(axis=numbers) & np.isfinite(feet).all(axis=numbers)
+    good = ~missing_times(times) & np.isfinite(v).all(axis=numbers) & np.isfinite(feet).all(axis=numbers)
     return measure.Velocities(times[good], feet[good], v[good], sigma=sigma)
 
 

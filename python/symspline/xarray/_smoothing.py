@@ -13,6 +13,7 @@ import xarray as xr
 
 from .._arrays import checked_number
 from .._exceptions import SymsplineError
+from .._missing import missing_times
 from .._options import checked_extrapolate, extrapolation_mode
 from .._smoothing import SmoothingWarning, make_smoothing_spline
 from .._smoothing.factors import is_several
@@ -20,7 +21,7 @@ from .._spaces import Array, Space, SpecialOrthogonal, space_named
 from .._typing import SmoothOptions
 from .._warnings import silenced
 from ._blocks import Inputs, apply, knots_of_block, per_curve_times
-from ._missing import missing, named_curve, of_equal_length, times_of_rows
+from ._missing import named_curve, of_equal_length, times_of_rows
 from ._spec import KNOTS, LINE, bare, rehearse, spec_of, timed_by, times_with_names
 from ._units import in_radians
 
@@ -114,7 +115,7 @@ def smooth(
     chosen: dict[str, Any] = {"time": time, "skipna": True, "on_failure": given["on_failure"]}
     (_, *rest), spec, knots = spec_of(da, space, dim, point_dims, where, "natural", **chosen)
     own_times, t, label = "t" in spec["names"], spec["t"], dim if knots is None else knots.name
-    if knots is not None and t is not None and (gone := missing(t)).any():
+    if knots is not None and t is not None and (gone := missing_times(t)).any():
         knots, t = knots[~gone], t[~gone]
     _rehearse_options(t, da.sizes[dim] if t is None else len(t), given)
     if to is None:
@@ -200,7 +201,7 @@ def _smoothed(
     mask = np.broadcast_to(named["where"], batch).reshape(whole) if "where" in named else None
     rows = points.reshape(*whole, *points.shape[len(batch) :])
     at = x.reshape(*whole, *x.shape[len(batch) :]) if per_curve else x
-    if t is None or not missing(t).any():
+    if t is None or not missing_times(t).any():
         outputs = _smooth_rows(rows, t, at, per_curve, mask, wanted)
     else:
         outputs = _smooth_timed(rows, t, at, per_curve, mask, wanted)
@@ -223,10 +224,10 @@ def _smooth_timed(
     outputs = [np.full((len(rows), *shape), np.nan, space.dtype if i == 0 else float) for i, shape in enumerate(shapes)]
     for dtype in (*(own for own in _COLUMNS.values() for _ in range(parts)), np.bool_):
         outputs.append(np.full(len(rows), np.nan if dtype is np.float64 else False, dtype))
-    for curves, kept in of_equal_length(~missing(times)):
+    for curves, kept in of_equal_length(~missing_times(times)):
         knots, here, gone = times[curves[:, None], kept], at, None
         if per_curve:
-            gone = missing(at[curves])
+            gone = missing_times(at[curves])
             here = np.where(gone, knots[:, 0].reshape(-1, *[1] * len(own_shape)), at[curves])
         try:
             found = _smooth_rows(rows[curves[:, None], kept], knots, here, per_curve, chosen[curves], wanted)

@@ -13,9 +13,9 @@ from .._arrays import as_array, short_repr
 from .._core import ValidationError
 from .._cubic import CubicSpline
 from .._input import times_of
+from .._missing import missing_times
 from .._spaces import Array, Euclidean, Product, Space, space_named
 from ._blocks import Inputs, values_at
-from ._missing import missing
 from ._times import times_along
 
 T = TypeVar("T", xr.DataArray, xr.Dataset)
@@ -55,7 +55,7 @@ def spec_of(
     kinds, vectors = split(bc_type)
     times = times_along(da, dim, time, point_dims)
     t = None if times is None or times.ndim > 1 else np.asarray(times.values)
-    rehearsed = t[~missing(t)] if skipna and t is not None else t
+    rehearsed = t[~missing_times(t)] if skipna and t is not None else t
     if skipna and (rehearsed is None or len(rehearsed) < 2):
         rehearsed = np.arange(2.0)
     still = np.zeros((da.sizes[dim] if rehearsed is None else len(rehearsed), 1))
