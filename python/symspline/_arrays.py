@@ -150,6 +150,11 @@ def checked_number(value: Any, requirement: str, is_valid: Callable[[Any], bool]
     return float(value)
 
 
+def adjoint(x: NDArray[Any]) -> NDArray[Any]:
+    """Return conjugate transposes."""
+    return np.asarray(np.swapaxes(x, -1, -2).conj())
+
+
 def refuse(bad: NDArray[np.bool_], name: str, say: Callable[[Any], str]) -> None:
     """Raise ValidationError for the first bad entry, with the message ``say(index)``."""
     if bad.any():

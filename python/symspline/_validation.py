@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._arrays import as_array, cast, refuse, short_repr
+from ._arrays import adjoint, as_array, cast, refuse, short_repr
 from ._core import ValidationError
 from ._spaces import point_tol
 
@@ -108,11 +108,6 @@ def length(x: Array) -> Array:
     with np.errstate(over="ignore"):
         result: Array = np.hypot.reduce(x, axis=-1)
     return result
-
-
-def adjoint(x: Array) -> Array:
-    """Return conjugate transposes."""
-    return np.asarray(np.swapaxes(x, -1, -2).conj())
 
 
 def off_one(x: Array) -> Array:

@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._arrays import as_array, refuse, short_repr
+from ._arrays import adjoint, as_array, refuse, short_repr
 from ._core import ValidationError
 from ._cubic import CubicSpline
 from ._curves.curve import CurveArrays
@@ -37,7 +37,6 @@ from ._time import onto_ends
 from ._typing import Extrapolate, Number, TimesLike
 from ._validation import (
     Array,
-    adjoint,
     check_symmetric,
     largest,
     numbers,

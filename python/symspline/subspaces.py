@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._arrays import as_array, cast, checked_number, refuse, whole_number
+from ._arrays import adjoint, as_array, cast, checked_number, refuse, whole_number
 from ._core import CutLocusError, ValidationError
 from ._cubic import CubicSpline
 from ._grid import GridSpline
@@ -37,7 +37,7 @@ from ._spaces import (
     point_tol,
 )
 from ._typing import TimesLike
-from ._validation import Array, adjoint, numbers, off_one
+from ._validation import Array, numbers, off_one
 from ._warnings import warn
 
 # Numbers closer than this, in units of the largest, are equal but for rounding.

@@ -8,16 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import as_array, cast, refuse, short_repr
+from .._arrays import adjoint, as_array, cast, refuse, short_repr
 from .._core import CutLocusError, ValidationError
 from .._typing import P
 from .base import Array, Space
 from .rounding import point_tol
-
-
-def adjoint(x: Array) -> Array:
-    """Return conjugate transposes."""
-    return np.swapaxes(x.conj(), -1, -2)
 
 
 def matrices(space: Space[Any], g: ArrayLike, size: int, dtype: Any) -> tuple[Array, float]:

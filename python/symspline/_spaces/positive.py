@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from .._arrays import adjoint
 from .._core import ValidationError
 from .._typing import ComplexArray, FloatArray, P
-from .actions import Congruent, adjoint, preserves, require
+from .actions import Congruent, preserves, require
 from .base import Array
 from .statistics import Groups, scaled
 from .whitening import Whitening

@@ -12,11 +12,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from .._arrays import adjoint
 from .statistics import Array
-
-
-def _adjoint(x: Array) -> Array:
-    return np.asarray(np.swapaxes(x, -1, -2).conj())
 
 
 class Whitening(NamedTuple):
@@ -37,10 +34,10 @@ class Whitening(NamedTuple):
     def forward(self, points: Array) -> Array:
         """Return L⁻¹ A L⁻ᴴ."""
         half = np.linalg.solve(self.factor, points)
-        found = np.linalg.solve(self.factor, _adjoint(half))
-        return np.asarray((found + _adjoint(found)) / 2)
+        found = np.linalg.solve(self.factor, adjoint(half))
+        return np.asarray((found + adjoint(found)) / 2)
 
     def back(self, points: Array) -> Array:
         """Return L A Lᴴ."""
-        found = self.factor @ points @ _adjoint(self.factor)
-        return np.asarray((found + _adjoint(found)) / 2)
+        found = self.factor @ points @ adjoint(self.factor)
+        return np.asarray((found + adjoint(found)) / 2)

@@ -10,11 +10,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import refuse
+from .._arrays import adjoint, refuse
 from .._core import ValidationError
 from .._validation import (
     Array,
-    adjoint,
     check_symmetric,
     hermitian_part,
     largest,
