@@ -98,9 +98,9 @@ class EstimatedSpline(SmoothingSpline[P, Any]):
     def _calibration_of(self, number: int) -> None:
         return None
 
-    def _plain_spread(self, part: Smoothed, index: tuple[int, ...], x: Doubles, nu: int) -> Doubles:
-        space = smoothed_spaces(self.space)[next(i for i, own in enumerate(self._smoothed) if own is part)]
-        found = self._covariance(part, space, index, np.ascontiguousarray(x), None, [nu])
+    def _plain_spread(self, number: int, index: tuple[int, ...], x: Doubles, nu: int) -> Doubles:
+        space = smoothed_spaces(self.space)[number]
+        found = self._covariance(number, space, index, np.ascontiguousarray(x), None, [nu])
         return np.asarray(np.sqrt(np.trace(found, axis1=-2, axis2=-1) / space.dim))
 
     def _coupled(self, parts: list[int], index: tuple[int, ...], x: Doubles, orders: list[int]) -> Doubles:

@@ -48,7 +48,7 @@ def calibration_of(spline: Any, number: int) -> Calibration | None:
         return np.asarray(np.trace(found, axis1=1, axis2=3) / m)
 
     def variance(x: Doubles, nu: int) -> Doubles:
-        return np.asarray((spline._plain_spread(part, (), x, nu) / sigma) ** 2)
+        return np.asarray((spline._plain_spread(number, (), x, nu) / sigma) ** 2)
 
     order = 3 if part.penalty == "jerk" else 2
 

@@ -143,11 +143,26 @@ class Evidence(NamedTuple):
             return np.ascontiguousarray(self.roots[data, None] * vectors)
         return np.ascontiguousarray(np.einsum("nqc,nc->nq", self.roots[data], vectors).reshape(-1, 1))
 
-    def per_datum(self, rows: Doubles) -> Doubles:
+    def system(self) -> tuple[NDArray[np.int64], Doubles, Any, Doubles]:
+        """Return the first coefficients and their factors at all data, and the linear problem: rows and residuals."""
+        every = np.arange(len(self.times))
+        firsts, factors = _core.coefficient_factors(self.knots, self.known[2], self.times, 0)
+        residuals = self.whitened(every, self.residuals * self.soft[:, None])
+        return firsts, factors, self.rows(every, firsts, factors), residuals
+
+    def per_datum(self, data: NDArray[np.intp], rows: Doubles) -> Doubles:
         """Return means over the coordinates that each datum observes, from sums over one row or several."""
         if self.roots.ndim == 1:
             return np.asarray(rows.reshape(len(rows), -1).mean(axis=1))
-        return np.asarray(rows.reshape(-1, self.roots.shape[1]).sum(axis=1))
+        return np.asarray(rows.reshape(-1, self.roots.shape[1]).sum(axis=1) / self._observed(data))
+
+    def observed_weights(self, data: NDArray[np.intp]) -> Doubles:
+        """Return mean weights of the coordinates that each datum observes."""
+        weights = self.weights[data]
+        return weights if self.roots.ndim == 1 else weights * self.residuals.shape[1] / self._observed(data)
+
+    def _observed(self, data: NDArray[np.intp]) -> NDArray[np.intp]:
+        return np.maximum(self.roots[data].any(axis=2).sum(axis=1), 1)
 
 
 class Predicted(NamedTuple):
@@ -358,23 +373,18 @@ def calibrate(
         long = candidates[course.variance(middles, 0) > _WIDE * at_data(0)]
     spans = np.stack([whole[long], whole[long + 1]], axis=-1)
     width = width_without(apart[long])
-    gaps = gaps_with_factors(_Blocks(evidence(), spans, width, at_data(0), period), spans) if len(spans) else []
+    gaps = []
+    if len(spans):
+        factors = _factors_of_gaps(_Blocks(evidence(), spans, width, at_data(0), period), spans)
+        gaps = [(float(start), float(stop), *own) for (start, stop), own in zip(spans, factors, strict=True)]
     if closed:
         return Calibration(course, gaps, at_data, width, period=period)
     ends = float(times[0]), float(times[-1])
     return Calibration(course, gaps, at_data, width, ends, beyond=lambda: _beyond(evidence(), course, usual))
 
 
-def gaps_with_factors(blocks: _Blocks, spans: Doubles) -> list[tuple[float, float, float, int]]:
-    """Return start, stop, factor and number of blocks of every gap."""
-    factors = _factors_of_gaps(blocks, spans)
-    return [(float(start), float(stop), *own) for (start, stop), own in zip(spans, factors, strict=True)]
-
-
 def _factors_of_gaps(blocks: _Blocks, gaps: Doubles) -> list[tuple[float, int]]:
     """Return the factor and the number of blocks for every gap."""
-    if not len(gaps):
-        return []
     lengths = gaps[:, 1] - gaps[:, 0]
     shortest, longest = lengths.min(), lengths.max()
     steps = min(_LENGTHS, int(np.ceil(np.log2(longest / shortest) - 1e-9)) + 1)
@@ -418,10 +428,7 @@ class _Blocks:
         self.times = np.concatenate([t, t + period]) if self.closed else t
         self.all_gaps = np.concatenate([gaps, gaps + period]) if self.closed else gaps
         self.span = (t[0], t[0] + period) if self.closed else (t[0], t[-1])
-        self.firsts, self.factors = _core.coefficient_factors(evidence.knots, evidence.known[2], t, 0)
-        every = np.arange(len(t))
-        self.data = evidence.rows(every, self.firsts, self.factors)
-        self.residuals = evidence.whitened(every, evidence.residuals * evidence.soft[:, None])
+        self.firsts, self.factors, self.data, self.residuals = evidence.system()
 
     def factor(self, length: float) -> tuple[float, int] | None:
         """Return the factor for gaps of a length and the number of blocks, or None if there are none."""
@@ -458,8 +465,7 @@ class _Blocks:
         for start, _ in omitted:
             if start >= reached:
                 disjoint, reached = disjoint + 1, start + length
-        if len(omitted) > _BLOCKS:
-            omitted = [omitted[i] for i in np.linspace(0, len(omitted) - 1, _BLOCKS).astype(int)]
+        omitted = [omitted[i] for i in _some(len(omitted), _BLOCKS)]
         found = self._predicted([own % self.count for _, own in omitted])
         factor = factor_of(found, self.evidence.residuals.shape[1], disjoint)
         return None if np.isnan(factor) else (factor, len(omitted))
@@ -469,24 +475,18 @@ class _Blocks:
         probed = []
         for own in omitted:
             some = own[evidence.counts[own]]
-            probed.append(some[np.linspace(0, len(some) - 1, min(len(some), _PREDICTED)).astype(int)])
+            probed.append(some[_some(len(some), _PREDICTED)])
         chosen = np.concatenate(probed)
         probes = evidence.rows(chosen, self.firsts[chosen], self.factors[chosen])
         values, variances = _without(evidence, self.data, self.residuals, probes, omitted, [len(p) for p in probed])
         errors = evidence.whitened(chosen, evidence.residuals[chosen]) - values
-        observed, squares = self._observed(chosen), evidence.per_datum(errors**2)
-        v, weights = evidence.per_datum(variances), evidence.weights[chosen]
-        if evidence.roots.ndim > 1:
-            squares, v = squares / observed, v / observed
-            weights = weights * evidence.residuals.shape[1] / observed
-        return Predicted(squares, v, self.at_data * weights, np.zeros(len(chosen)))
+        squares, v = (evidence.per_datum(chosen, own) for own in (errors**2, variances))
+        return Predicted(squares, v, self.at_data * evidence.observed_weights(chosen), np.zeros(len(chosen)))
 
-    def _observed(self, chosen: NDArray[np.intp]) -> Doubles:
-        """Return the number of coordinates that data observe."""
-        roots = self.evidence.roots
-        if roots.ndim == 1:
-            return np.full(len(chosen), self.evidence.residuals.shape[1], float)
-        return np.asarray(roots[chosen].any(axis=2).sum(axis=1), float)
+
+def _some(count: int, most: int) -> NDArray[np.intp]:
+    """Return evenly distributed ones of so many indices, the first and the last among them."""
+    return np.linspace(0, count - 1, min(count, most)).astype(int)
 
 
 def _without(
@@ -514,11 +514,8 @@ def _beyond(evidence: Evidence, course: Course, usual: float) -> tuple[Doubles, 
     t, (n, m) = evidence.times, evidence.residuals.shape
     span = t[-1] - t[0]
     reach = _BEYOND * span
-    every = np.arange(n)
-    firsts, factors = _core.coefficient_factors(evidence.knots, evidence.known[2], t, 0)
+    firsts, factors, data, residuals = evidence.system()
     slopes = _core.coefficient_factors(evidence.knots, evidence.known[2], t, 1)[1]
-    data = evidence.rows(every, firsts, factors)
-    residuals = evidence.whitened(every, evidence.residuals * evidence.soft[:, None])
     omitted, counts, lines = [], [], []
     for direction in (1, -1):
         here = direction * t[::direction]
@@ -529,8 +526,8 @@ def _beyond(evidence: Evidence, course: Course, usual: float) -> tuple[Doubles, 
             if cut < max(_FEW, course.order + 1) or cut >= n:
                 continue
             ahead = np.arange(cut, stop)
-            ahead = ahead[np.linspace(0, len(ahead) - 1, min(len(ahead), _PREDICTED)).astype(int)]
-            index = every[::direction]
+            ahead = ahead[_some(len(ahead), _PREDICTED)]
+            index = np.arange(n)[::direction]
             omitted.append(index[cut:])
             at, ahead = np.full(len(ahead) + 1, index[cut - 1]), np.append(index[ahead], index[cut - 1])
             counts.append(len(ahead))
@@ -543,12 +540,8 @@ def _beyond(evidence: Evidence, course: Course, usual: float) -> tuple[Doubles, 
     values, variances = _without(evidence, data, residuals, probes, omitted, counts)
     line = evidence.positions[at] + d[:, None] * evidence.velocities[at]
     left = evidence.residuals[ahead] + evidence.positions[ahead] - line
-    squares = evidence.per_datum((evidence.whitened(ahead, left) - values) ** 2)
-    v = evidence.per_datum(variances)
-    weights = evidence.weights[ahead]
-    if evidence.roots.ndim > 1:
-        observed = np.maximum(evidence.roots[ahead].any(axis=2).sum(axis=1), 1)
-        squares, v, weights = squares / observed, v / observed, weights * m / observed
+    squares = evidence.per_datum(ahead, (evidence.whitened(ahead, left) - values) ** 2)
+    v, weights = evidence.per_datum(ahead, variances), evidence.observed_weights(ahead)
     # The last probe of every block is the end itself.
     last = np.cumsum(counts) - 1
     v0 = np.repeat(v[last] / weights[last], counts) * weights

@@ -352,12 +352,12 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
 
     def _spread(self, number: int, index: tuple[int, ...], x: Doubles, nu: int, calibrated: bool = True) -> Doubles:
         """Return the standard deviation of one curve in one part at times x of the core."""
-        plain = self._plain_spread(self._smoothed[number], index, x, nu)
+        plain = self._plain_spread(number, index, x, nu)
         return plain * self._inflation(number, index, x, nu) if calibrated else plain
 
-    def _plain_spread(self, part: Smoothed, index: tuple[int, ...], x: Doubles, nu: int) -> Doubles:
+    def _plain_spread(self, number: int, index: tuple[int, ...], x: Doubles, nu: int) -> Doubles:
         """Return the same as the posterior has it."""
-        knots = self._knots_of(index)
+        part, knots = self._smoothed[number], self._knots_of(index)
         lam, sigma = (np.asarray(value)[index].item() for value in (part.band_lam, part.sigma))
         if not part.between:
             # With λ = 0 the curve has no variance between the knots besides that of the spline.
@@ -366,13 +366,13 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         kinds = end_kinds(self._bc_type)
         if part.between and part.penalty == "jerk":
             variance = _core.smoothing_variance(knots, band, 0.0, x, nu, kinds)
-            return np.asarray(sigma * np.sqrt(variance * self._ratio(part, index, x, nu)))
+            return np.asarray(sigma * np.sqrt(variance * self._ratio(number, index, x, nu)))
         variance = _core.smoothing_variance(knots, band, lam, x, nu, kinds)
         return np.asarray(sigma * np.sqrt(variance))
 
-    def _ratio(self, part: Smoothed, index: tuple[int, ...], x: Doubles, nu: int) -> Doubles:
+    def _ratio(self, number: int, index: tuple[int, ...], x: Doubles, nu: int) -> Doubles:
         """Return the variance of the process that the jerk penalises, relative to that of the spline."""
-        number = next(i for i, own in enumerate(self._smoothed) if own is part)
+        part = self._smoothed[number]
         weights, times = self._noisy.precisions[number].weights, self._noisy.times
         times, weights = (values[index] if values.ndim > 1 else values for values in (times, weights))
         coupled = part.posterior is not None and part.posterior.size > 1
@@ -527,12 +527,12 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
                 raise ValidationError(f"y has shape {other_shape}, but x has shape {shape}")
         found = []
         for number, space in enumerate(smoothed_spaces(self.space)):
-            part, size = self._smoothed[number], len(orders) * space.dim
+            size = len(orders) * space.dim
             out = np.empty((*self._batch, *shape, size, size))
             for index in np.ndindex(self._batch):
                 at = np.ravel(x[index] if per_curve else x)
                 to = None if other is None else np.ravel(other[index] if per_curve else other)
-                own = self._covariance(part, space, index, at, to, orders)
+                own = self._covariance(number, space, index, at, to, orders)
                 if calibrated:
                     own = self._inflated([number], index, at, to, orders, own)
                 out[index] = own.reshape(*shape, size, size)
@@ -540,13 +540,13 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         return self._each(found)
 
     def _covariance(
-        self, part: Smoothed, space: Space, index: tuple[int, ...], x: Any, y: Any, orders: list[int]
+        self, number: int, space: Space, index: tuple[int, ...], x: Any, y: Any, orders: list[int]
     ) -> Doubles:
-        knots, kinds = self._knots_of(index), end_kinds(self._bc_type)
+        part, knots, kinds = self._smoothed[number], self._knots_of(index), end_kinds(self._bc_type)
         sigma = np.asarray(part.sigma)[index].item()
         found = self._posterior(part).covariance(space, knots, index, kinds, x, y, orders)
         if part.between and y is None and len(orders) == 1:
-            self._add_between(part, index, x, orders, found.reshape(len(x), 1, space.dim, 1, space.dim))
+            self._add_between(number, index, x, orders, found.reshape(len(x), 1, space.dim, 1, space.dim))
         return np.asarray(sigma**2 * found)
 
     def _inflated(
@@ -570,21 +570,19 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         right = left if y is None else factors(y)
         return np.asarray(left[:, :, None] * covariance * right[:, None])
 
-    def _add_between(
-        self, part: Smoothed, index: tuple[int, ...], x: Doubles, orders: list[int], found: Doubles
-    ) -> None:
+    def _add_between(self, number: int, index: tuple[int, ...], x: Doubles, orders: list[int], found: Doubles) -> None:
         """Add the variance between the knots to covariances of points and velocities, for noise of variance one.
 
         The shape of ``found`` is ``(len(x), len(orders), m, len(orders), m)``.
         """
-        knots, kinds = self._knots_of(index), end_kinds(self._bc_type)
+        part, knots, kinds = self._smoothed[number], self._knots_of(index), end_kinds(self._bc_type)
         lam = np.asarray(part.band_lam)[index].item()
         band = np.ascontiguousarray(part.band[index])
         for i, nu in enumerate(orders):
             if nu > 1:
                 continue
             if part.penalty == "jerk":
-                root = np.sqrt(self._ratio(part, index, x, nu))[:, None, None, None]
+                root = np.sqrt(self._ratio(number, index, x, nu))[:, None, None, None]
                 found[:, i] *= root
                 found[:, :, :, i] *= root
                 continue
@@ -614,7 +612,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
             found = self._posterior(part).covariance(spaces[number], knots, index, kinds, x, None, orders)
             own = found.reshape(len(x), count, m, count, m)
             if part.between:
-                self._add_between(part, index, x, orders, own)
+                self._add_between(number, index, x, orders, own)
             own *= np.asarray(part.sigma)[index].item() ** 2
             whole[:, :, start:end, :, start:end] = own
         return self._inflated(parts, index, x, None, orders, whole.reshape(len(x), count * size, count * size))
