@@ -94,8 +94,7 @@ def _leverages(setup: Setup, found: Solution) -> list[tuple[float, float]]:
         n = len(term.times)
         order = np.argsort(term.times, kind="stable")
         some = np.unique(np.linspace(0, n - 1, min(n, _SAMPLE)).round().astype(int))
-        offset = 0.0 if term.time_offset is None else float(found.values[term.time_offset][0])
-        x = np.clip(term.times[order] + offset, setup.knots[0], setup.knots[-1])
+        x = np.clip(term.shifted_times(found.values)[order], setup.knots[0], setup.knots[-1])
 
         def rows(
             at: NDArray[np.intp], orders: list[int], own: Any = own, roots: Any = roots, order: Any = order

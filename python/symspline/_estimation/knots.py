@@ -111,6 +111,7 @@ def that_reproduce(setup: Setup, start: Start, data: Doubles) -> Doubles:
     fine = fine[merged(fine, len(fine))]
     own = None if len(fine) > _MOST else residuals(setup._replace(knots=fine), start)
     knots = setup.knots
+    values = {name: np.array(constant.start) for name, constant in setup.constants.items()} | start.values
     for _ in range(_ROUNDS):
         found = residuals(setup._replace(knots=knots), start)
         if found is None:
@@ -118,8 +119,7 @@ def that_reproduce(setup: Setup, start: Start, data: Doubles) -> Doubles:
         else:
             bad = np.zeros(len(knots) - 1, bool)
             for k, (term, rows) in enumerate(zip(setup.terms, found, strict=True)):
-                offset = 0.0 if term.time_offset is None else float(_value(setup, start, term.time_offset)[0])
-                bad |= _exceeding(knots, term.times + offset, rows, None if own is None else own[k])
+                bad |= _exceeding(knots, term.shifted_times(values), rows, None if own is None else own[k])
         if not bad.any() or len(knots) > 2 * len(fine):
             break
         knots = bisected(knots, bad)
@@ -148,10 +148,6 @@ def _exceeding(knots: Doubles, times: Doubles, rows: Doubles, own: Doubles | Non
     return np.asarray(large & (np.bincount(i, minlength=len(knots) - 1) > 1) & (np.diff(knots) > least))
 
 
-def _value(setup: Setup, start: Start, name: str) -> Doubles:
-    return start.values.get(name, np.array(setup.constants[name].start))
-
-
 def residuals(setup: Setup, start: Start) -> list[Doubles] | None:
     """Return the residuals of all terms for the spline through an initial curve, or None if there is no spline."""
     points = start.points(setup.knots)
@@ -162,7 +158,6 @@ def residuals(setup: Setup, start: Start) -> list[Doubles] | None:
     at.curves = curves
     found = []
     for term in setup.terms:
-        offset = 0.0 if term.time_offset is None else float(at.values[term.time_offset][0])
-        x = np.clip(term.times + offset, setup.knots[0], setup.knots[-1])
+        x = np.clip(term.shifted_times(at.values), setup.knots[0], setup.knots[-1])
         found.append(term.measure(at.motion_at(x, term.parts, term.nu), at.values) / term.noise)
     return found

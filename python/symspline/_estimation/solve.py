@@ -457,8 +457,7 @@ class Iteration:
                 residuals = residuals * weight
                 jacobians = [None if x is None else np.ascontiguousarray(x * weight[..., None]) for x in jacobians]
                 parameters = None if parameters is None else np.ascontiguousarray(parameters * weight[..., None])
-            offset = 0.0 if term.time_offset is None else float(self.values[term.time_offset][0])
-            terms.append((term.times + offset, np.ascontiguousarray(residuals), jacobians, parameters))
+            terms.append((term.shifted_times(self.values), np.ascontiguousarray(residuals), jacobians, parameters))
         flat = np.ascontiguousarray(np.concatenate(priors)) if priors else np.empty((0, 2))
         found = _core.estimate(
             setup.knots, setup.penalty, factors, flat, terms, given, near, setup.criterion, setup.gamma

@@ -105,6 +105,10 @@ class Term:
         self.constants[name] = constant
         return name
 
+    def shifted_times(self, values: Values) -> Doubles:
+        """Return the times with the offset that is among the values of the parameters."""
+        return self.times + (0.0 if self.time_offset is None else float(values[self.time_offset][0]))
+
     def measure(self, motion: list[Motion], values: Values) -> Doubles:
         """Return the residuals, shape (n, d)."""
         raise NotImplementedError
@@ -167,8 +171,8 @@ class Term:
         derivatives : bool
             Whether the derivatives are needed; without them only the residuals are computed.
         """
-        offset = 0.0 if self.time_offset is None else float(values[self.time_offset][0])
-        motion = motion_at(self.times + offset, self.parts, self.nu)
+        times = self.shifted_times(values)
+        motion = motion_at(times, self.parts, self.nu)
         residuals = self.measure(motion, values)
         if not derivatives:
             return Linearised(residuals / self.noise, [{}, {}, {}], {})
@@ -176,8 +180,7 @@ class Term:
         if self.time_offset is not None:
             step = STEP * spacing
             after, before = (
-                self.measure(motion_at(self.times + offset + side, self.parts, self.nu), values)
-                for side in (step, -step)
+                self.measure(motion_at(times + side, self.parts, self.nu), values) for side in (step, -step)
             )
             parameters[self.time_offset] = ((after - before) / (2 * step))[..., None]
         each = self.noise[..., None]
