@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from .._core import CutLocusError, ValidationError
+from .._faults import of_index
 from .._spaces import Array, Doubles, Space
 
 # Handles shorter than this fraction of the injectivity radius need no closer look.
@@ -40,12 +41,12 @@ def require_short_handles(space: Space[Any], times: Doubles, points: Array, velo
         except CutLocusError:
             lost = True
         if lost:
-            _refuse(space, index, velocities[index], float(length[index]), float(longest[index]))
+            _refuse(space, index, float(length[index]), float(longest[index]))
 
 
-def _refuse(space: Space[Any], index: tuple[Any, ...], velocity: Array, length: float, step: float) -> None:
+def _refuse(space: Space[Any], index: tuple[Any, ...], length: float, step: float) -> None:
     *batch, node = (int(i) for i in index)
-    of = f" of curve {', '.join(map(str, batch))}" if batch else ""
+    of = of_index(batch)
     remedy = (
         "Use `Euclidean` and angles that count turns, or add points between."
         if space._has_angles

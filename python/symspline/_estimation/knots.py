@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from .._smoothing.knots import places
 from .._spaces import Array, Doubles
 from .._time import TimeAxis
 from .solve import Iteration, Setup, fitted
@@ -53,8 +54,7 @@ def filled(knots: Doubles, data: Doubles) -> Doubles:
     more = parts.sum() - len(h)
     if more > len(h):
         parts = np.where(gaps, np.maximum(np.ceil(parts * len(h) / more), 2.0), 1.0)
-    i = np.repeat(np.arange(len(h)), parts.astype(int))
-    j = np.arange(len(i)) - np.repeat(np.cumsum(parts) - parts, parts.astype(int))
+    i, j = places(parts.astype(int))
     return np.append(knots[i] + h[i] * (j / parts[i]), knots[-1])
 
 

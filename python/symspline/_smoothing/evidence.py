@@ -19,7 +19,7 @@ from .precision import SINGULAR
 
 # Largest number of numbers in the frames that are computed together.
 _TOGETHER = 1 << 22
-# Data of a robust fit beyond this quantile of the noise are outliers, as in the fit.
+# Data of a robust fit beyond this quantile of the noise are not compared with predictions.
 _KEPT = 0.99
 
 

@@ -162,7 +162,7 @@ class Evidence(NamedTuple):
         return weights if self.roots.ndim == 1 else weights * self.residuals.shape[1] / self._observed(data)
 
     def _observed(self, data: NDArray[np.intp]) -> NDArray[np.intp]:
-        return np.maximum(self.roots[data].any(axis=2).sum(axis=1), 1)
+        return np.asarray(np.maximum(self.roots[data].any(axis=2).sum(axis=1), 1))
 
 
 class Predicted(NamedTuple):

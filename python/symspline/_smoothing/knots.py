@@ -312,10 +312,15 @@ def in_long_gaps(knots: Knots, noisy: SmoothingData) -> Knots:
     return knots if parts.max() == 1 else _divided(knots, noisy, parts)
 
 
+def places(parts: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return the number of the segment of every part, and its number there, for numbers of parts of all segments."""
+    i = np.repeat(np.arange(len(parts)), parts)
+    return i, np.arange(len(i)) - np.repeat(np.cumsum(parts) - parts, parts)
+
+
 def _divided(knots: Knots, noisy: SmoothingData, parts: NDArray[np.intp]) -> Knots:
     """Divide every segment into a number of equal parts."""
-    i = np.repeat(np.arange(len(parts)), parts)
-    j = np.arange(len(i)) - np.repeat(np.cumsum(parts) - parts, parts)
+    i, j = places(parts)
     # Dates are divided in their own unit.
     first, step = knots.t[i], knots.t[i + 1] - knots.t[i]
     whole = step.dtype.kind in "ium"

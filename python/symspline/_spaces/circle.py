@@ -54,7 +54,7 @@ def circular_mean(angles: Floats, weights: Floats) -> Minima:
     # A candidate is a local minimum if no unrolled datum is farther than half a turn from it.
     low, high = v, np.concatenate([[v[-1]], v[:-1] + TURN])
     local = (means - low <= np.pi) & (high - means <= np.pi)
-    return _minima(means, objective, local, _standard_error(objective.min(), w))
+    return _minima(means, objective, local, standard_error(objective.min(), w))
 
 
 def circular_median(angles: Floats, weights: Floats) -> Minima:
@@ -86,7 +86,7 @@ def circular_median(angles: Floats, weights: Floats) -> Minima:
     barrier = np.minimum(np.maximum.accumulate(found), np.maximum.accumulate(found[::-1])[::-1])
     local = (np.roll(found, 1) >= found - slack) & (np.roll(found, -1) >= found - slack) & (barrier > found + slack)
     mean_square = circular_mean(v, w).objective
-    return _minima(corners, found, local, _standard_error(mean_square, w))
+    return _minima(corners, found, local, standard_error(mean_square, w))
 
 
 def _sorted(angles: Floats, weights: Floats) -> tuple[Floats, Floats]:
@@ -95,9 +95,13 @@ def _sorted(angles: Floats, weights: Floats) -> tuple[Floats, Floats]:
     return wrapped[order], weights[order]
 
 
-def _standard_error(objective: float, weights: Floats) -> float:
-    """Return the standard error of the mean: the root mean square over the root of the effective number of data."""
-    return float(np.sqrt(objective / weights.sum() * np.sum(weights**2)) / weights.sum())
+def standard_error(square_sum: float, weights: Floats) -> float:
+    """Return the standard error of the mean from the weighted sum of squared distances.
+
+    It is the root mean square over the root of the effective number of data.
+    """
+    total = weights.sum()
+    return float(np.sqrt(square_sum / total * np.sum(weights**2)) / total)
 
 
 def _minima(angles: Floats, objective: Floats, local: NDArray[np.bool_], error: float) -> Minima:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from .._core import ConvergenceError, CutLocusError, ValidationError
 from .._warnings import warn
-from .circle import Floats, Minima, circular_mean, circular_median, wrap
+from .circle import Floats, Minima, circular_mean, circular_median, standard_error, wrap
 from .statistics import Array, Descent, Groups, descend_to_mean, descend_to_median, joined, put, take
 
 # All data are starts up to this number; of more data, those with the lowest objectives.
@@ -170,7 +170,7 @@ def _on_torus(group: Groups, kind: _Kind) -> _Found:
         else np.inf
     )
     total = sum(own.objective for own in each)
-    return _Found(nearest, distance, excess[worst], _standard_error(total, group.weights))
+    return _Found(nearest, distance, excess[worst], standard_error(total, group.weights))
 
 
 def _on_circle(space: Any, group: Groups, kind: _Kind) -> _Found:
@@ -186,7 +186,7 @@ def _on_circle(space: Any, group: Groups, kind: _Kind) -> _Found:
         distance = abs(float(wrap(np.asarray(found.other_angle - found.angle)))) / scale
         excess = found.other_objective / found.objective - 1
     square = circular_mean(angles, group.weights).objective
-    return _Found(_near(space, group, point), distance, excess, _standard_error(square, group.weights) / scale)
+    return _Found(_near(space, group, point), distance, excess, standard_error(square, group.weights) / scale)
 
 
 def _angles(space: Any, points: Array) -> tuple[Array, Array, Floats, float]:
@@ -237,7 +237,7 @@ def _from_several_starts(space: Any, group: Groups, kind: _Kind, number: int | N
     point = take(found, best)
     far = _distances(space, point, found)
     square = float(np.sum(group.weights * _distances(space, point, group.points) ** 2))
-    error = _standard_error(square, group.weights)
+    error = standard_error(square, group.weights)
     apart = np.isfinite(objective) & (far > max(error, _SAME * space.injectivity_radius))
     result = _near(space, group, point)
     if not apart.any() or objective[best] == 0:
@@ -339,12 +339,6 @@ def _near(space: Any, group: Groups, point: Any) -> Any:
 
 
 # ---- messages ----
-
-
-def _standard_error(square_sum: float, weights: Floats) -> float:
-    """Return the standard error of the mean, from the weighted sum of squared distances."""
-    total = weights.sum()
-    return float(np.sqrt(square_sum / total * np.sum(weights**2)) / total)
 
 
 def _raise_unfinished(kind: _Kind, number: int | None) -> None:
