@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -51,6 +51,23 @@ def are_angles(name: Any, values: NDArray[np.float64]) -> bool:
     text = re.sub(r"[_.-]", " ", str(name))
     inside = np.nanmin(values, initial=0.0) >= -180 and np.nanmax(values, initial=0.0) <= 360
     return bool(_ANGLE.search(text)) and bool(inside)
+
+
+def are_tracks(labels: NDArray[np.intp], steps: Callable[[NDArray[np.intp]], NDArray[np.float64]]) -> bool:
+    """Whether rows with these labels, numbers from 0 on, seem to be several tracks.
+
+    Parameters
+    ----------
+    labels : ndarray
+        Label of each row.
+    steps : callable
+        Function that returns the lengths of the steps along rows, given their numbers.
+    """
+    if not 2 <= labels.max(initial=-1) + 1 <= len(labels) / 2:
+        return False
+    order = np.argsort(labels, kind="stable")
+    within = steps(order)[np.diff(labels[order]) == 0].sum()
+    return bool(steps(np.arange(len(labels))).sum() > ZIGZAG * within)
 
 
 def _lengths(points: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -129,12 +146,7 @@ class Tracks(NamedTuple):
                     codes = values.iloc[rows].factorize()[0]
                 except TypeError:
                     continue
-                count = codes.max(initial=-1) + 1
-                if not 2 <= count <= len(rows) / 2 or (codes < 0).any():
-                    continue
-                order = np.argsort(codes, kind="stable")
-                within = _lengths(points[order])[np.diff(codes[order]) == 0].sum()
-                if _lengths(points).sum() > ZIGZAG * within:
+                if (codes >= 0).all() and are_tracks(codes, lambda order, own=points: _lengths(own[order])):
                     return column
         return None
 

@@ -14,7 +14,7 @@ from .._core import ValidationError
 from .._curve import Curve
 from .._smoothing import make_smoothing_spline
 from .._smoothing.factors import split
-from .._spaces import Array, Doubles, Euclidean, Product, Space, SpecialOrthogonal, factors_of
+from .._spaces import Array, Doubles, Euclidean, Product, Space, SpecialOrthogonal, factors_of, nearest_rotations
 from .._time import TimeAxis
 from ..convert import matrix_to_quaternion
 from .integrated_rates import Attitudes, Integral, Path, Rates
@@ -230,7 +230,7 @@ def _attitudes(space: Space[Any], points: list[PointTerm | InformationTerm], see
         good = sizes[:, 1] > _RANK * sizes[:, 0]
         if good.any():
             sigma = np.mean(term.noise[good], axis=1)
-            found.append(_Seen(Attitudes(term.times[good], _nearest(profile[good]), sigma), term.time_offset))
+            found.append(_Seen(Attitudes(term.times[good], nearest_rotations(profile[good]), sigma), term.time_offset))
     return found
 
 
@@ -400,13 +400,13 @@ def _integrated(setup: Setup, space: Space[Any], rate: RateTerm, vectors: list[_
         if not np.all(sizes[:, 1] > _RANK * sizes[:, 0]):
             continue
         # The aligned attitudes turn more slowly than the integrated ones by the remaining bias.
-        aligned = np.stack([_nearest(own) for own in windows]) @ matrices
+        aligned = np.stack([nearest_rotations(own) for own in windows]) @ matrices
         steps = [np.swapaxes(own[:-1], -1, -2) @ own[1:] for own in (aligned, matrices)]
         spin = np.swapaxes(steps[0], -1, -2) @ _SO3.log(steps[0], steps[1])
         vector = np.stack([spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0]], axis=-1)
         bias = bias + np.median(vector / np.diff(grid)[:, None], axis=0)
         matrices = attitudes_at(rate.times[order], rate.omega[order] - bias, grid)
-    frame = _nearest(profile.sum(axis=0)) @ matrices[0]
+    frame = nearest_rotations(profile.sum(axis=0)) @ matrices[0]
     integral = Integral(Rates(rate.times[order], rate.omega[order], 0.0, bias, None), bias)
     before = integral.at(grid[:1])[0][0].T
     values = {} if rate.bias is None else {rate.bias: bias}
@@ -426,17 +426,10 @@ def _seen(knots: Doubles, space: Space[Any], seen: list[DirectionTerm]) -> Array
     # Attitudes of knots without two directions are those of their neighbours.
     good = np.flatnonzero(np.linalg.svd(profile, compute_uv=False)[:, 1] > 1e-6)
     if not len(good):
-        total = _nearest(profile.sum(axis=0))
+        total = nearest_rotations(profile.sum(axis=0))
         return _rotations(space, np.repeat(total[None], len(knots), axis=0))
-    found = np.stack([_nearest(own) for own in profile[good]])
+    found = np.stack([nearest_rotations(own) for own in profile[good]])
     return _rotations(space, found[_closest(good.astype(np.float64), np.arange(float(len(knots))))])
-
-
-def _nearest(profile: Doubles) -> Doubles:
-    """Return the rotations R with the largest trace of RᵀB."""
-    u, _, v = np.linalg.svd(profile)
-    u[..., -1] *= np.where(np.linalg.det(u) * np.linalg.det(v) < 0, -1.0, 1.0)[..., None]
-    return np.asarray(u @ v)
 
 
 def _rotations(space: Space[Any], matrices: Doubles) -> Array:

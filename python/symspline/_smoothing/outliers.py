@@ -8,12 +8,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .._faults import of_index
 from .._spaces import Space
 from .._warnings import warn
-from .factors import in_part
 from .report import SmoothingReport
-from .warned import SmoothingWarning
+from .warned import SmoothingWarning, first_affected
 
 # Kinds of selections that are not sound, as the core numbers them.
 _INTERPOLATED, _UNSETTLED, _FEW = 1, 2, 3
@@ -62,17 +60,12 @@ def warn_of_outliers(
     # Exact data, such as those of a body at rest, have nothing to find.
     exact = [(np.asarray(own.rejected) == 0) & ~(np.asarray(r.sigma) > 0) for own, r in zip(each, reports, strict=True)]
     bad = [own & ~still for own, still in zip(bad, exact, strict=True)]
-    total = sum(int(np.count_nonzero(own)) for own in bad)
-    for number, (own, outliers, report, count) in enumerate(zip(bad, each, reports, counts, strict=True)):
-        if not own.any():
-            continue
-        index = tuple(map(int, np.argwhere(own)[0]))
-        of = of_index(index) + in_part(space, number)
-        of += f" (and {total - 1} more)" if total > 1 else ""
-        kind, rejected = (int(np.asarray(one)[index]) for one in outliers)
-        df, data = float(np.asarray(report.df)[index]), int(np.broadcast_to(count, own.shape)[index])
+    if first := first_affected(space, bad):
+        number, index, of = first
+        kind, rejected = (int(np.asarray(one)[index]) for one in each[number])
+        df = float(np.asarray(reports[number].df)[index])
+        data = int(np.broadcast_to(counts[number], bad[number].shape)[index])
         warn(_message(kind, f"The smoothing{of} with loss={loss!r}", rejected, df, data), SmoothingWarning, index)
-        break
     return sound
 
 

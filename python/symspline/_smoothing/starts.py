@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
-from .._faults import of_index
 from .._representatives import cut_fractions
 from .._spaces import (
     Array,
@@ -27,11 +26,12 @@ from .._spaces import (
     SpecialOrthogonal,
     Sphere,
     Torus,
+    nearest_rotations,
 )
 from .._warnings import warn
-from .factors import in_part, smoothed_spaces
+from .factors import smoothed_spaces
 from .report import SmoothingReport
-from .warned import SmoothingWarning
+from .warned import SmoothingWarning, first_affected
 
 # Standard deviation of the noise, divided by the injectivity radius, from which a second start is tried: 34° on a
 # circle. With less noise the first start always led to the best minimum.
@@ -210,17 +210,11 @@ def warn_of_minima(space: Space, kinds: list[Any], reports: list[SmoothingReport
     """
     sound = [np.asarray(own) == UNIQUE for own in kinds]
     bad = [~good & np.asarray(report.converged) for good, report in zip(sound, reports, strict=True)]
-    total = sum(int(np.count_nonzero(own)) for own in bad)
-    for number, (own, kind, report) in enumerate(zip(bad, kinds, reports, strict=True)):
-        if not own.any():
-            continue
-        index = tuple(map(int, np.argwhere(own)[0]))
-        part = smoothed_spaces(space)[number]
-        of = of_index(index) + in_part(space, number, ",")
-        of += f" (and {total - 1} more)" if total > 1 else ""
-        noise = f"{float(np.asarray(report.sigma)[index]):.2g}"
-        warn(_MESSAGES[int(np.asarray(kind)[index])].format(of=of, noise=noise, space=part), SmoothingWarning, index)
-        break
+    if first := first_affected(space, bad, ","):
+        number, index, of = first
+        noise = f"{float(np.asarray(reports[number].sigma)[index]):.2g}"
+        message = _MESSAGES[int(np.asarray(kinds[number])[index])]
+        warn(message.format(of=of, noise=noise, space=smoothed_spaces(space)[number]), SmoothingWarning, index)
     return sound
 
 
@@ -359,9 +353,7 @@ def _projected(space: Space, x: Array) -> Array:
     if isinstance(space, Sphere):
         return np.asarray(x / np.maximum(np.linalg.norm(x, axis=-1, keepdims=True), np.finfo(float).tiny))
     if isinstance(space, SpecialOrthogonal):
-        u, _, v = np.linalg.svd(x)
-        u[..., -1] *= np.sign(np.linalg.det(u) * np.linalg.det(v))[..., None]
-        return np.asarray(u @ v)
+        return nearest_rotations(x)
     _, vectors = np.linalg.eigh(x)
     if isinstance(space, (RealProjective, ComplexProjective)):
         return vectors[..., -1]

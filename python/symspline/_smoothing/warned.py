@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .._arrays import short_repr
 from .._curves.curve import CurveArrays
@@ -30,6 +31,32 @@ class SmoothingWarning(UserWarning):
     robust loss may have rejected the wrong data, other curves may fit as well, or nothing shows the error of the curve
     in a gap.
     """
+
+
+def first_affected(
+    space: Space, affected: list[NDArray[np.bool_]], mark: str = ""
+) -> tuple[int, tuple[int, ...], str] | None:
+    """Return the first of the affected curves, for warnings; None if there is none.
+
+    Parameters
+    ----------
+    affected : list of ndarray of bool
+        Which curves are affected, in every space in which data were smoothed.
+    mark : str
+        Punctuation mark after the name of a factor.
+
+    Returns
+    -------
+    tuple
+        Number of the smoothed space, index of the curve, and words that name it and count the others.
+    """
+    total = sum(int(np.count_nonzero(own)) for own in affected)
+    for number, own in enumerate(affected):
+        if own.any():
+            index = tuple(map(int, np.argwhere(own)[0]))
+            more = f" (and {total - 1} more)" if total > 1 else ""
+            return number, index, of_index(index) + in_part(space, number, mark) + more
+    return None
 
 
 def warn_of_bounds(space: Space, reports: list[Any], chosen: list[Any], counts: list[Any]) -> None:

@@ -17,6 +17,7 @@ from .groups import (
     SpecialUnitary,
     Symplectic,
     Unitary,
+    nearest_rotations,
     rotations_and_positions,
 )
 from .indefinite import AntiDeSitter, DeSitter, IndefiniteGrassmannian

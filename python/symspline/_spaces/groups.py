@@ -278,6 +278,13 @@ class SpecialEuclidean(Group[FloatArray]):
         return ""
 
 
+def nearest_rotations(matrices: Array) -> Array:
+    """Return the rotations R with the largest trace of RᵀB for matrices B."""
+    u, _, v = np.linalg.svd(matrices)
+    u[..., -1] *= np.where(np.linalg.det(u) * np.linalg.det(v) < 0, -1.0, 1.0)[..., None]
+    return np.asarray(u @ v)
+
+
 def rotations_and_positions(poses: Any, name: str) -> tuple[Array, Array]:
     """Split poses, shape (..., 4, 4), into rotations and positions.
 

@@ -15,7 +15,7 @@ import numpy as np
 from .._degrees import is_degrees, look_like_degrees
 from .._exceptions import SymsplineError
 from .._spaces import LogEuclidean, Space, SymmetricPositiveDefinite, Torus, factors_of
-from .._tracks import NAMED, ZIGZAG
+from .._tracks import NAMED, are_tracks
 from ._messages import Problem, first_duplicate, listed, refuse, say
 from ._points import (
     IN_BRACKETS,
@@ -166,20 +166,15 @@ def column_of_tracks(table: Table, used: Sequence[str | None], space: Space, poi
         # A cell may be empty, or not hold a text, and some spaces have no distances.
         with suppress(Problem, SymsplineError):
             labels = np.unique(np.array(table.labels(name)), return_inverse=True)[1]
-            if labels.max() == 0 or labels.max() + 1 > len(labels) / 2:
-                continue
-            order = np.argsort(labels, kind="stable")
-            own = tuple(part[order] for part in points) if isinstance(points, tuple) else points[order]
-            within = _steps(space, own)[np.diff(labels[order]) == 0]
-            if _steps(space, points).sum() > ZIGZAG * within.sum():
+            if are_tracks(labels, lambda order: _steps(space, points, order)):
                 return name
     return None
 
 
-def _steps(space: Space, points: Any) -> Array:
+def _steps(space: Space, points: Any, order: Array) -> Array:
     before, after = (
         tuple(part[rows] for part in points) if isinstance(points, tuple) else points[rows]
-        for rows in (slice(-1), slice(1, None))
+        for rows in (order[:-1], order[1:])
     )
     return np.asarray(space.distance(before, after))
 
