@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -70,9 +71,9 @@ def are_tracks(labels: NDArray[np.intp], steps: Callable[[NDArray[np.intp]], NDA
     return bool(steps(np.arange(len(labels))).sum() > ZIGZAG * within)
 
 
-def _lengths(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the chords between neighbouring points."""
-    return np.asarray(np.linalg.norm(np.diff(points, axis=0), axis=1))
+def _lengths(points: NDArray[np.float64], order: NDArray[np.intp]) -> NDArray[np.float64]:
+    """Return the chords between neighbouring points in an order."""
+    return np.asarray(np.linalg.norm(np.diff(points[order], axis=0), axis=1))
 
 
 class Tracks(NamedTuple):
@@ -146,7 +147,7 @@ class Tracks(NamedTuple):
                     codes = values.iloc[rows].factorize()[0]
                 except TypeError:
                     continue
-                if (codes >= 0).all() and are_tracks(codes, lambda order, own=points: _lengths(own[order])):
+                if (codes >= 0).all() and are_tracks(codes, partial(_lengths, points)):
                     return column
         return None
 
