@@ -387,11 +387,11 @@ def make_smoothing_spline(
     warn_of_bounds(space, reports, asked, counts)
     # Between two knots there is nothing to choose.
     are_chosen = [spread(np.isnan(own) & (at.times.shape[-1] > 2)) for own in lams]
-    are_given = [spread(np.isfinite(own)) for own in sigmas], are_chosen
+    are_given = [spread(np.isfinite(own)) for own in sigmas]
     if not is_silent(SmoothingWarning):
-        warn_of_residuals(space, fitted.curve, whole, noise, *are_given, options.loss)
+        warn_of_residuals(space, fitted.curve, whole, noise, are_given, are_chosen, options.loss)
         if loss == "linear" and penalty == "acceleration":
-            warn_of_varying(space, fitted.curve, whole, noise, are_given[1], end_kinds(bc_type))
+            warn_of_varying(space, fitted.curve, whole, noise, are_chosen, end_kinds(bc_type))
     warn_of_spread(space, fitted.curve, whole, [part.report.df for part in noise])
     warn_of_signs(space, [valid_data])
     if whole.used.all():

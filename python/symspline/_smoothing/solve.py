@@ -48,9 +48,9 @@ class Smoothed(NamedTuple):
     penalty, loss : str
         Penalty and loss of the fit.
     outliers : Outliers or None
-        Outcome of the rejection of data; None once the warnings have been issued.
+        Outcome of the rejection of data, for warnings. Curves that a user has do not have it.
     minima : ndarray of int or None
-        Whether the curves are known to be the best ones, see `best_of_starts`; None once the warnings have been issued.
+        Whether the curves are known to be the best ones, see `best_of_starts`, likewise.
     """
 
     report: SmoothingReport
@@ -65,13 +65,15 @@ class Smoothed(NamedTuple):
     minima: NDArray[np.int_] | None = None
 
     def map(self, function: Any) -> Smoothed:
-        """Apply a function to all arrays, such as the selection of some curves."""
+        """Apply a function to all arrays, such as the selection of some curves, and omit what is for warnings only."""
         return self._replace(
             report=self.report.map(function),
             band=function(self.band),
             band_lam=function(self.band_lam),
             sigma=function(self.sigma),
             posterior=self.posterior and self.posterior.map(function),
+            outliers=None,
+            minima=None,
         )
 
 
