@@ -15,7 +15,7 @@ from .._smoothing.posterior import Posterior
 from .._spaces import Doubles
 from .._warnings import warn
 from .measurements import GRAVITY
-from .solve import Setup, Solution
+from .solve import Setup, Solution, in_columns
 from .terms import ForceTerm, FunctionTerm, PointTerm, RateTerm, Term
 
 # The number of measurements of a sensor from which its mean leverage follows.
@@ -99,7 +99,7 @@ def _leverages(setup: Setup, found: Solution) -> list[tuple[float, float]]:
         def rows(
             at: NDArray[np.intp], orders: list[int], own: Any = own, roots: Any = roots, order: Any = order
         ) -> Any:
-            each = [_whole(setup, own.jacobians[nu], own.residuals.shape)[order[at]] for nu in orders]
+            each = [in_columns(setup.spaces, own.jacobians[nu], own.residuals.shape)[order[at]] for nu in orders]
             whole = np.concatenate(each, axis=-1)
             return whole if roots is None else whole * roots[order[at], :, None]
 
@@ -119,15 +119,6 @@ def _leverages(setup: Setup, found: Solution) -> list[tuple[float, float]]:
             between = float((crossed * rows(first + 1, [0])).sum(axis=(1, 2)).mean())
         result.append((n * mean + constants, n * between))
     return result
-
-
-def _whole(setup: Setup, by_part: dict[int, Doubles], shape: tuple[int, ...]) -> Doubles:
-    """Return derivatives with respect to the coordinates of all parts."""
-    first = np.cumsum([0, *(space.dim for space in setup.spaces)])
-    out = np.zeros((*shape, first[-1]))
-    for part, own in by_part.items():
-        out[..., first[part] : first[part + 1]] = own
-    return out
 
 
 def _of_priors(setup: Setup, found: Solution) -> list[str]:

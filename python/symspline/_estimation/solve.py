@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from itertools import count
 from typing import Any, NamedTuple
 
@@ -451,7 +451,8 @@ class Iteration:
             precision = np.zeros(constant.size) if constant.sigma is None else np.asarray(constant.sigma) ** -2.0
             priors.append(np.stack([precision, off], axis=-1))
         for term, own, weight in zip(setup.terms, linear, weights, strict=True):
-            residuals, jacobians = own.residuals, [self._in_columns(x, own.residuals.shape) for x in own.jacobians]
+            residuals, shape = own.residuals, own.residuals.shape
+            jacobians = [in_columns(setup.spaces, x, shape) if x else None for x in own.jacobians]
             parameters = self._of_parameters(own)
             if weight is not None:
                 residuals = residuals * weight
@@ -463,14 +464,6 @@ class Iteration:
             setup.knots, setup.penalty, factors, flat, terms, given, near, setup.criterion, setup.gamma
         )
         return Linear(*found)
-
-    def _in_columns(self, by_part: dict[int, Doubles], shape: tuple[int, ...]) -> Doubles | None:
-        if not by_part:
-            return None
-        out = np.zeros((*shape, self.first[-1]))
-        for part, own in by_part.items():
-            out[..., self.first[part] : self.first[part + 1]] = own
-        return out
 
     def _of_parameters(self, own: Linearised) -> Doubles | None:
         if not own.parameters:
@@ -530,6 +523,15 @@ def bending(curve: CoreCurve) -> list[Doubles]:
     space = curve.space
     points, velocities = (np.ascontiguousarray(space._as_doubles(x)) for x in (curve.points, curve.velocities))
     return _core.bending(space._handle, curve.times, points, velocities)
+
+
+def in_columns(spaces: Sequence[Space], by_part: dict[int, Doubles], shape: tuple[int, ...]) -> Doubles:
+    """Return derivatives with respect to the coordinates of all parts from those by part, zero for other parts."""
+    first = np.cumsum([0, *(space.dim for space in spaces)])
+    out = np.zeros((*shape, first[-1]))
+    for part, own in by_part.items():
+        out[..., first[part] : first[part + 1]] = own
+    return out
 
 
 def energy(curve: CoreCurve, penalty: str) -> float:
