@@ -22,7 +22,7 @@ from .outliers import Outliers
 from .posterior import Posterior
 from .precision import Precision
 from .report import METHODS, SmoothingReport
-from .starts import Raw, Samples, best_of_starts
+from .starts import Column, Raw, Samples, best_of_starts
 
 _STATES = ("converged", "unconverged", "no curve", "undetermined", "unsettled")
 
@@ -123,7 +123,7 @@ def smoothed(
     (found, band, columns, (matrix, turn, size)), minima = best_of_starts(small, samples, lam, solve)
     state, iterations, lams, band_lam, at_bound, df, noise, step, rate, _, exact, selection, rejected, _, scale = (
         column.reshape(batch) if batch else column[0].item()
-        for column in (*columns, np.where(np.isnan(sigma), columns[6], sigma))
+        for column in (*columns, np.where(np.isnan(sigma), columns[Column.SIGMA], sigma))
     )
     report = SmoothingReport(METHODS[int(np.any(exact))], state == 0, iterations, step, rate, lams, at_bound, df, noise)
     numbers = small._numbers(found)
