@@ -37,7 +37,7 @@ def as_array(value: ArrayLike, name: str) -> NDArray[Any]:
 
 
 def filled(value: Any) -> Any:
-    """Return a value whose masked numbers and times are NaN and NaT, also within lists."""
+    """Replace masked numbers by NaN and masked times by NaT, also within lists."""
     if isinstance(value, np.ma.MaskedArray):
         missing: Any = np.array("NaT", value.dtype)[()] if value.dtype.kind in "mM" else np.nan
         numbers: Any = value if value.dtype.kind in "fcmM" else value.astype(np.float64)
@@ -86,7 +86,7 @@ def cast(array: NDArray[Any], dtype: Any = np.float64) -> NDArray[Any]:
         if flags.c_contiguous and flags.aligned:
             return array
     bytes_needed = math.prod(array.shape) * np.dtype(dtype).itemsize
-    # Broadcast arrays can have more entries than memory has addresses.
+    # Broadcast arrays can have more entries than fit into memory.
     if bytes_needed >= 2**63:
         raise MemoryError(
             f"an array of shape {array.shape} needs {bytes_needed / 1e9:.3g} GB of memory. Process it in parts."

@@ -359,7 +359,7 @@ class SegmentedCurve(ComposedCurve[P], Generic[P, C]):
 
     @property
     def _meetings(self) -> list[tuple[Any, Curve[Any], Curve[Any]]]:
-        """Times at which a segment begins where the one before ends, with both segments."""
+        """Times at which a segment begins where the previous one ends, with both segments."""
         pairs = pairwise(self._segments)
         return [(b.domain[0], a, b) for a, b in pairs if b.domain[0] == a.domain[1]]
 

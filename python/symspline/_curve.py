@@ -459,7 +459,7 @@ def _smooth_parts(law: _Law, start: float, stop: float, knots: Doubles) -> Doubl
         middle = low / 2 + high / 2
         before = law(middle) < inner
         low, high = np.where(before, middle, low), np.where(before, high, middle)
-    # A knot of the law that lies on a knot of the curve is found twice, with different rounding errors.
+    # If a knot of the law coincides with a knot of the curve, both are in the list, with different rounding errors.
     after = np.clip(np.searchsorted(times, high), 1, len(times) - 1)
     near = np.where(high - times[after - 1] < times[after] - high, times[after - 1], times[after])
     same_value = np.abs(law(near) - inner) <= _KNOT_ROUNDING * np.spacing(np.abs(knots).max())

@@ -1,4 +1,4 @@
-"""Angles in degrees where radians are expected."""
+"""Recognise angles in degrees where radians are expected."""
 
 from __future__ import annotations
 
@@ -8,23 +8,23 @@ import numpy as np
 
 from ._spaces import Array, Space, Torus, factors_of, parts_of
 
-# Names of the unit in attributes of netCDF files and in brackets of column names.
+# Names of the unit in attributes of netCDF files and in column names.
 _NAMES = ("deg", "degs", "degree", "degrees", "°", "arc_degree", "arcdegree", "degree_true", "degrees_true", "degt")
-# Angles in radians rarely exceed two turns, and then they belong to a wheel, whose steps are less than half a turn.
+# Angles in radians rarely exceed two turns, except those of wheels, whose steps are shorter than half a turn.
 _TWO_TURNS = 4 * np.pi
 _SHARE = 0.1
 
 
 def is_degrees(unit: Any) -> bool:
-    """Whether the name of a unit is degrees."""
+    """Whether the name of a unit means degrees."""
     return str(unit).strip().lower() in _NAMES
 
 
 def look_like_degrees(space: Space[Any], points: Any) -> float | None:
-    """Return the largest angle of points on tori that seem to be in degrees, or None.
+    """Return the largest angle if points on a torus seem to be in degrees, else None.
 
-    Such angles are between -180 and 360, exceed two turns if they are in radians, and jump by more than half a turn
-    from point to point, or have at most two decimals.
+    Angles seem to be in degrees if they are between -180 and 360, their largest size exceeds 4π, and either at least a
+    tenth of the steps exceed π or all angles have at most two decimals.
     """
     for factor, part in zip(factors_of(space), parts_of(points, space, "points"), strict=True):
         if not isinstance(factor, Torus):

@@ -21,7 +21,7 @@ from ._core import ValidationError
 
 # Characters of the file's own name in that of a temporary one: at most 128 bytes of the 255 that file systems allow.
 _TAIL = 32
-# Seconds after which a temporary file of another machine, or of a process that is alive, is abandoned.
+# Age in seconds above which a temporary file of another machine, or of a running process, counts as abandoned.
 _OLD = 24 * 3600
 
 
@@ -134,7 +134,7 @@ def replacing(path: Path) -> Iterator[Path]:
 
 
 def _remove_left(target: Path) -> None:
-    """Remove temporary files of this name that processes left which were killed while they wrote them."""
+    """Remove temporary files of this name that killed processes did not remove."""
     name = re.compile(rf"\.([0-9a-f]{{8}})-([0-9a-f]+)-[0-9a-f]{{16}}{re.escape(target.name[-_TAIL:])}")
     with suppress(OSError), os.scandir(target.parent) as entries:
         for entry in entries:

@@ -1,4 +1,4 @@
-"""Durations: texts such as "3h", and the types of Python, NumPy and pandas."""
+"""Durations: strings such as "3h", and the types of Python, NumPy and pandas."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ NANOSECONDS = {
     "ns": 1, "us": 10**3, "ms": 10**6, "s": 10**9,
     "min": 60 * 10**9, "h": 3600 * 10**9, "d": 24 * 3600 * 10**9,
 }  # fmt: skip
-# Words of pandas and of everyday use for the same units.
+# Other names of these units, in pandas and in everyday use.
 _SAME = {
     "sec": "s", "second": "s", "minute": "min", "m": "min", "t": "min", "hr": "h", "hour": "h", "day": "d",
     "l": "ms", "millisecond": "ms", "u": "us", "microsecond": "us", "n": "ns", "nanosecond": "ns",
@@ -25,9 +25,9 @@ _SAME = {
 
 
 def parts_of_duration(text: str) -> tuple[Decimal, str] | None:
-    """Split a text such as ``"10min"`` into 10 and ``"min"``, the unit ``""`` if there is none.
+    """Split a text such as ``"10min"`` into 10 and ``"min"``; without a unit, the second entry is ``""``.
 
-    The result is None if the text is not a duration. A unit may be a word in the singular or plural.
+    Return None if the text is not a duration. Units can be words in the singular or plural.
 
     Raises
     ------
@@ -48,7 +48,7 @@ def parts_of_duration(text: str) -> tuple[Decimal, str] | None:
 
 
 def seconds_of(value: Any, name: str, dates: bool = True) -> Any:
-    """Return a duration in seconds; numbers do not change.
+    """Convert a duration to seconds; numbers do not change.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def seconds_of(value: Any, name: str, dates: bool = True) -> Any:
     name : str
         Name of the argument in messages.
     dates : bool
-        Whether the times are dates or durations, so that units have a meaning.
+        Whether the times are dates or durations, so that units are allowed.
 
     Raises
     ------
@@ -71,7 +71,7 @@ def seconds_of(value: Any, name: str, dates: bool = True) -> Any:
             f"{name} is {short_repr(value)}, but the times are numbers. Pass a number in the unit of the times."
         )
     if not isinstance(value, str):
-        # Timestamps of pandas have nanoseconds, which timedelta lacks.
+        # pandas.Timedelta has nanoseconds, which its base class timedelta lacks.
         step = getattr(value, "asm8", np.timedelta64(value))
         return np.nan if np.isnat(step) else float(step / np.timedelta64(1, "s"))
     try:

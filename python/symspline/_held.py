@@ -1,4 +1,4 @@
-"""Warning about recordings in which a sensor's last point was repeated at new times (sample and hold)."""
+"""Warn about recordings in which the last point of a sensor was repeated at new times (sample and hold)."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from ._faults import of_index
 from ._spaces import Array
 from ._warnings import warn
 
-# Least number of points, and of complete runs of equal points.
+# Least number of points, and of runs of equal points that are not cut off at an end.
 _POINTS, _RUNS = 12, 5
 # Least share of copies among the points, and of runs with a copy: a body at rest is one long run.
 _COPIES, _REPEATED = 0.2, 0.2
-# Share of the runs that must not be much longer than most, and of the runs that must have a point of their own. Points
-# of low resolution return to earlier values, and stay longest where the motion turns.
+# Least share of runs that are not much longer than the median, and of runs whose point occurs in no other run. Points
+# of low resolution differ: they return to earlier values, and stay the same longest where the motion reverses.
 _REGULAR, _NEW = 0.9, 0.9
 
 
@@ -28,7 +28,7 @@ def warn_of_held_points(
     name: str = "points",
     curve: tuple[int, ...] = (),
 ) -> bool:
-    """Warn once if many points of a curve are exact copies of the one before, at a later time.
+    """Warn once if many points of a curve are exact copies of the point before, at a later time.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def warn_of_held_points(
     name : str
         Name of the points in the message.
     curve : tuple of int
-        Index of the curve among others, before that in the batch.
+        Leading indices of the curve, which precede those in the batch.
 
     Returns
     -------
@@ -68,7 +68,7 @@ def warn_of_held_points(
         of = of_index((*curve, *index))
         warn(
             f"{100 * shares[index]:.0f} % of the {name}{of} are exact copies of the point before at a later time, for "
-            f"example {name}[{i + 1}]. The sensor was probably slower than the log, which repeated its last point: the "
+            f"example {name}[{i + 1}]. The sensor was probably slower than the log, which repeated its last point. The "
             "curve has steps, and estimates of noise and velocities are wrong. Keep the first of equal points: "
             f"new = np.append(True, np.any({name}[1:] != {name}[:-1], axis={axes})); pass t[new] and {name}[new].",
             category,
@@ -80,7 +80,7 @@ def warn_of_held_points(
 
 
 def _are_held(equal: NDArray[np.bool_], points: list[Array]) -> bool:
-    """Return whether runs of equal points are as a slower sensor leaves them."""
+    """Whether the runs of equal points are like those of a log that is faster than its sensor."""
     starts = np.append(0, np.flatnonzero(~equal) + 1)
     runs: Any = np.diff(np.append(starts, len(equal) + 1))[1:-1]
     if len(runs) < _RUNS or np.mean(runs > 1) < _REPEATED:

@@ -27,19 +27,19 @@ def missing_times(times: NDArray[Any]) -> Mask:
 
 
 def without_missing(t: Any, points: Any, space: Space[Any]) -> tuple[Any, Any, Mask]:
-    """Return times and points without the samples that are missing, and which samples of each curve are present.
+    """Return times and points without missing samples, and a mask of the samples that are present in each curve.
 
-    A sample is missing if a number of its point, in any factor, or its time is NaN, NaT or masked. Samples that are
-    missing in some curves of a batch only are kept.
+    A sample is missing if its time, or a number of its point in any factor, is NaN, NaT or masked. Samples that are
+    missing only in some curves of a batch are kept.
 
     Returns
     -------
     t : array_like or None
-        Times; whole numbers if there were none.
+        Times; the indices of the samples if no times were given.
     points : array_like or tuple
         Points.
     present : ndarray of bool, shape (..., n)
-        Which samples are present, among those that were given.
+        Whether each of the given samples is present.
     """
     parts = [factor._array(filled(p), "points") for factor, p in zip(*_each(points, space), strict=True)]
     found = [_missing_points(factor, part) for factor, part in zip(factors_of(space), parts, strict=True)]
@@ -59,12 +59,12 @@ def without_missing(t: Any, points: Any, space: Space[Any]) -> tuple[Any, Any, M
 
 
 def curves_without_missing(t: Any, points: Any, space: Space[Any]) -> tuple[Any, Any]:
-    """Return times and points of interpolating curves without the samples that are missing.
+    """Return times and points of interpolating curves without missing samples.
 
     Raises
     ------
     ValidationError
-        If the curves of a batch lack different samples.
+        If different samples are missing in the curves of a batch.
     """
     times, own, present = without_missing(t, points, space)
     _check_alike(present)
@@ -72,7 +72,7 @@ def curves_without_missing(t: Any, points: Any, space: Space[Any]) -> tuple[Any,
 
 
 def nodes_without_missing(t: Any, points: Any, velocities: Any, space: Space[Any]) -> tuple[Any, Any, Any]:
-    """Return times, points and velocities without the samples of which one of them is missing."""
+    """Return times, points and velocities without samples in which any of these is missing."""
     _, vectors, moving = without_missing(None, velocities, space)
     _, places, present = without_missing(t, points, space)
     if moving.shape != present.shape:
@@ -90,7 +90,7 @@ def nodes_without_missing(t: Any, points: Any, velocities: Any, space: Space[Any
 def data_without_missing(
     t: Any, points: Any, weights: Any, frames: Any, space: Space[Any]
 ) -> tuple[Any, Any, Any, Any]:
-    """Return noisy data without the samples that are missing; those of some curves only have the weight zero."""
+    """Return noisy data without missing samples; samples missing only in some curves get the weight zero."""
     times, own, present = without_missing(t, points, space)
     kept = np.asarray(present.any(axis=tuple(range(present.ndim - 1))))
     if kept.all() and present.all():
@@ -116,8 +116,8 @@ def _check_alike(present: Mask) -> None:
     if len(differ):
         *curve, i = differ[0].tolist()
         raise ValidationError(
-            f"points[{i}] of curve {','.join(map(str, curve))} is missing (NaN), but not that of all curves of the "
-            "batch, so that the curves have different lengths. Pass them to symspline.fit_many with skipna=True."
+            f"points[{i}] of curve {','.join(map(str, curve))} is missing (NaN), but not in all curves of the batch, "
+            "so that the curves have different lengths. Pass the curves to symspline.fit_many with skipna=True."
         )
 
 

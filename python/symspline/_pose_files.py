@@ -55,7 +55,7 @@ def read_tum(file: Any, *, skipna: bool = False, dates: bool = False) -> tuple[A
         True to omit lines with NaN, which otherwise raise `ValidationError`.
     dates : bool, default False
         True to read times as seconds since 1970 with all their nanoseconds. In double precision they are rounded to a
-        quarter of a microsecond, which is too coarse for accelerations at 100 Hz and more.
+        quarter of a microsecond, which is too coarse for accelerations at 400 Hz and more.
 
     Returns
     -------
@@ -440,7 +440,7 @@ def split(poses: PointsLike) -> tuple[Array, Array]:
     Raises
     ------
     ValidationError
-        If the last row of a pose is not (0, 0, 0, 1), as of transposed poses.
+        If the last row of a pose is not (0, 0, 0, 1), as in transposed poses.
 
     See Also
     --------

@@ -17,7 +17,7 @@ _LONG = 10
 
 # The most segments of a curve that the compiled core solves as a whole, `LONG` of `fit/mod.rs`.
 _WHOLE = 512
-# Steps, in units of the injectivity radius, from which there may be several solutions.
+# Several solutions may exist if a step exceeds this fraction of the injectivity radius.
 _FAR, _HALF_WAY, _SLOW = 0.55, 0.4, 16
 
 # In the order of their numbers in the compiled core.

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ._warnings import warn
 
-# Rounding of times, as a part of the time step, that affects accelerations.
+# Rounding of times, as a fraction of the time step, beyond which accelerations are affected.
 _COARSE = 1e-4
 REMEDY = (
     "Subtract the first time before the conversion to floating-point numbers, or pass integers or datetime64[ns], "
@@ -20,8 +20,8 @@ REMEDY = (
 def warn_of_rounded_times(times: NDArray[Any], name: str = "t", remedy: str = REMEDY) -> None:
     """Warn if the spacing of floating-point numbers is more than 1e-4 of the median time step.
 
-    Whole numbers are exact. Accelerations depend on squares of time steps, so that times since 1970 in seconds, which
-    are rounded to 2.4e-7, yield wrong accelerations at 1 kHz.
+    Whole numbers are exact and cause no warning. Accelerations depend on squares of time steps. Times in seconds since
+    1970, which are rounded to 2.4e-7 s, therefore yield wrong accelerations at 1 kHz.
     """
     if times.dtype.kind != "f" or times.shape[-1:] < (2,) or not times.size:
         return
@@ -38,7 +38,7 @@ def warn_of_rounded_times(times: NDArray[Any], name: str = "t", remedy: str = RE
         return
     warn(
         f"{name} near {largest:.9g} are rounded to multiples of {spacing:.2g} by the type {times.dtype}, which is "
-        f"{spacing / step:.2g} of the time step {step:.3g}. Accelerations, and at worse ratios also velocities, are "
-        f"wrong. {remedy}",
+        f"{spacing / step:.2g} of the time step {step:.3g}. Accelerations are wrong, and with coarser rounding also "
+        f"velocities. {remedy}",
         UserWarning,
     )

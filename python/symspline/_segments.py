@@ -325,7 +325,7 @@ def cut(
 
 
 def _opposite(space: Space, arrays: list[Array]) -> NDArray[np.bool_]:
-    """Return between which neighbours there is no unique shortest geodesic, in any factor."""
+    """Return a mask of the neighbours without a unique shortest geodesic between them, in any factor."""
     found = np.zeros(max(len(arrays[0]) - 1, 0), bool)
     for factor, points in zip(factors_of(space), arrays, strict=True):
         if isinstance(factor, (Manifold, Quotient)) or not np.isfinite(factor.injectivity_radius):
@@ -343,8 +343,8 @@ def _warn_of_opposite(opposite: NDArray[np.bool_], rows: NDArray[np.intp], momen
     more = f" (and {count - 1} more such pairs)" if count > 1 else ""
     warn(
         f"`points[{rows[i]}]` and `points[{rows[i + 1]}]`, at t = {moments[i]} and {moments[i + 1]}{more}, lie at each "
-        "other's cut locus: no unique shortest geodesic joins them. The recording is divided between them. Put a point "
-        "between them to join both parts.",
+        "other's cut locus: no unique shortest geodesic joins them. The recording is divided between them. Add a point "
+        "between them to join the two parts.",
         FarPointsWarning,
         node=int(rows[i]),
     )

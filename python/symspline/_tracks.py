@@ -48,7 +48,7 @@ ZIGZAG = 2.0
 
 
 def are_angles(name: Any, values: NDArray[np.float64]) -> bool:
-    """Whether a column holds angles in degrees, such as headings, by its name and the range of its numbers."""
+    """Whether the name and the range of a column suggest angles in degrees, such as headings."""
     text = re.sub(r"[_.-]", " ", str(name))
     inside = np.nanmin(values, initial=0.0) >= -180 and np.nanmax(values, initial=0.0) <= 360
     return bool(_ANGLE.search(text)) and bool(inside)
@@ -209,8 +209,8 @@ def read_tracks(
         raise ValidationError(f"the index of frame holds no dates. Pass the column of the times: time={found[0]!r}.")
     if time is None and not dated:
         raise ValidationError(
-            f"the index of frame holds no dates, but {frame.index.dtype}. Pass time=, the column of the times, one of "
-            f"{', '.join(map(str, frame.columns))}."
+            f"the index of frame holds no dates, but {frame.index.dtype}. Pass time= with the name of the column "
+            f"of times; the columns are {', '.join(map(str, frame.columns))}."
         )
     name = time if time is not None else frame.index.name or "time"
     stamps = frame.index.to_series(index=range(len(frame))) if time is None else frame[time].reset_index(drop=True)
@@ -238,7 +238,7 @@ def _layout(frame: pd.DataFrame, columns: tuple[str, str] | None) -> tuple[Any, 
 
 
 def _may_be_times(name: Any, values: pd.Series) -> bool:
-    """Whether a column looks like times: it holds dates, or its name is that of times."""
+    """Whether a column seems to contain times: it contains dates, or has a name such as "time"."""
     return values.dtype.kind == "M" or str(name).lower() in _TIME_NAMES
 
 
@@ -251,13 +251,13 @@ def _dates(stamps: pd.Series, name: Any) -> pd.Series:
             stamps = pd.to_datetime(stamps, format="ISO8601")
         except ValueError as error:
             raise ValidationError(
-                f"column {name!r} must hold dates, or texts in ISO 8601 with one time zone: {error}. Convert it by "
+                f"column {name!r} must hold dates, or texts in ISO 8601 with one time zone: {error}. Convert it with "
                 "pandas.to_datetime."
             ) from None
     if stamps.dtype.kind != "M":
         raise ValidationError(
-            f"column {name!r} must hold dates, not {stamps.dtype}. Convert it by pandas.to_datetime, for numbers that "
-            "count from 1970 with its argument unit, such as unit='s'."
+            f"column {name!r} must hold dates, not {stamps.dtype}. Convert it with pandas.to_datetime. If its "
+            "numbers count from 1970, pass the argument unit, such as unit='s'."
         )
     return stamps
 

@@ -425,7 +425,7 @@ def resample(
 
 
 def _warn_of_merged(table: Tracks, named: bool) -> None:
-    """Warn if rows of several tracks are one track."""
+    """Warn if the rows of several tracks seem to be merged into one."""
     column = None if named else table.mixed()
     if column is not None:
         warn(
@@ -437,7 +437,7 @@ def _warn_of_merged(table: Tracks, named: bool) -> None:
 
 
 def _warn_of_missing(table: Tracks, fitted: set[int], shown: set[int], every: Any, min_points: int) -> None:
-    """Warn about tracks without rows in the result."""
+    """Warn about tracks that have no rows in the result."""
     gone = [track for track in range(len(table.rows)) if track not in shown]
     if not gone:
         return

@@ -138,7 +138,7 @@ def recording(seed, n=45, m=301):
 
 
 def spoil(points, rates, fault):
-    """Give a recording a fault."""
+    """Return a recording with a fault."""
     if fault == "rotated frame":
         points.y = points.y @ Rotation.from_euler("z", 30, degrees=True).as_matrix()
     if fault == "swapped axes":
@@ -161,9 +161,9 @@ def spoil(points, rates, fault):
 FAULTS = {
     "rotated frame": r"measurements\[0\] \(Points\): the residuals are .*correlation.*Check the frame",
     "swapped axes": r"measurements\[1\] \(BodyRates\)",
-    "jump": r"measurements\[0\] \(Points\): .*the mean of the residuals changes at number \d+",
+    "jump": r"measurements\[0\] \(Points\): .*the mean of the residuals changes at index \d+",
     "milliseconds": r"The times of measurements\[1\] span 0\.01, .*check the unit of the times",
-    "outliers": r"measurements\[0\] \(Points\).* the largest of 2 outliers, number (7|21), .*Pass loss='cauchy'",
+    "outliers": r"measurements\[0\] \(Points\).* the largest of 2 outliers, at index (7|21), .*pass loss='cauchy'",
     "late": r"measurements\[0\] \(Points\): .*Check the frame .* the times of measurements\[0\]",
     "prior": r"The constant 'gyro bias' is .* standard deviations from its prior",
     "sigma * 5": r"measurements\[0\] \(Points\): the residuals are 0\.\d+ times .*Multiply sigma",

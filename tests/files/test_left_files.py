@@ -1,4 +1,4 @@
-"""What a killed process leaves, the next save of the same name removes."""
+"""Temporary files of a killed process are removed by the next save with the same name."""
 
 import os
 import subprocess
@@ -35,8 +35,8 @@ def test_the_file_of_a_killed_save_is_removed(tmp_path):
     assert ss.load(file) == curve
 
 
-def test_files_that_others_write_stay(tmp_path):
-    """Those of processes that are alive, of other machines, and of the user."""
+def test_other_files_are_kept(tmp_path):
+    """Files of running processes, of other machines, and of the user are not removed."""
     file = tmp_path / "run.npz"
     kept = [f".00000000-1-{'0' * 16}run.npz", ".notes run.npz", f".{'0' * 16}run.npz"]
     with_parent = f".{_machine()}-{os.getppid():x}-{'0' * 16}run.npz"

@@ -160,7 +160,7 @@ def test_sizes_that_no_memory_holds_raise_memory_error():
 
 
 def test_little_address_space_never_aborts():
-    """Each call, with a little less memory than it needs and with much less: it returns, or raises MemoryError."""
+    """With a little less memory than needed or much less, each call returns or raises MemoryError."""
     script = """
     import os
 

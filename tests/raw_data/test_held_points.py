@@ -21,7 +21,7 @@ def rotations(t, seed=0):
 
 
 def held(repeats, n=120, seed=0):
-    """Times from 1000 on, and rotations that are each repeated as often as `repeats` says in turn."""
+    """Times from 1000 on, and rotations, each repeated as often as the entries of `repeats` specify in turn."""
     fresh = np.cumsum(np.resize(repeats, n)) - repeats[0]
     t = 1000 + 0.01 * np.arange(fresh[-1] + 1)
     which = np.searchsorted(fresh, np.arange(len(t)), side="right") - 1

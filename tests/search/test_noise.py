@@ -51,8 +51,8 @@ def test_points_far_from_the_origin_have_larger_errors():
     assert np.allclose(times[inside], 2 * np.pi * np.arange(1, 4), atol=0.3)
 
 
-def test_small_extrema_of_sparse_samples_stay():
-    """What is small but real counts: a ripple of 1e-7 of the speed at 10 Hz."""
+def test_small_extrema_of_sparse_samples_are_found():
+    """Small extrema that exceed rounding errors are found: a ripple of 1e-7 of the speed at 10 Hz."""
     t = np.arange(0, 20, 0.1)
     curve = ss.CubicSpline(t, (t + 1e-7 * np.sin(2 * t) / 2)[:, None], "r:1", bc_type="not-a-knot")
     times, values = curve.extrema("speed")

@@ -10,7 +10,7 @@ from scipy.special import bernoulli
 import symspline as ss
 from symspline import _core
 
-# The standard deviations here are arbitrary, and the audit of residuals says so.
+# The standard deviations here are arbitrary, which the audit of residuals reports.
 pytestmark = pytest.mark.filterwarnings("ignore:The residuals:symspline.SmoothingWarning")
 
 rng = np.random.default_rng(7)

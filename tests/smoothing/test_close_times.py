@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 import symspline as ss
 from symspline import measure
 
-# The standard deviations here are arbitrary, and the audit of residuals says so.
+# The standard deviations here are arbitrary, which the audit of residuals reports.
 pytestmark = pytest.mark.filterwarnings("ignore:The residuals:symspline.SmoothingWarning")
 
 CRITERIA = [{"criterion": "gcv"}, {"criterion": "reml"}, {"criterion": "cp", "sigma": 0.01}]

@@ -1,4 +1,4 @@
-"""Bands in long gaps and beyond the ends hold, and are the same elsewhere."""
+"""Bands are calibrated in long gaps and beyond the ends, and do not change elsewhere."""
 
 import warnings
 
@@ -11,7 +11,7 @@ from symspline import _core
 from symspline._smoothing import evidence as evidence_module
 from symspline._smoothing.gaps import Predicted, factor_of
 
-# The standard deviations here are arbitrary, and the audit of residuals says so.
+# The standard deviations here are arbitrary, which the audit of residuals reports.
 pytestmark = pytest.mark.filterwarnings("ignore:The residuals:symspline.SmoothingWarning")
 
 

@@ -55,20 +55,20 @@ def test_outliers_cost_nothing_where_noise_is_small(name, loss, noise, first, le
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ss.SmoothingWarning)
         robust = ss.make_smoothing_spline(t, points, space, loss=loss)
-        # Cross-validation does not follow data that are that precise.
+        # Cross-validation does not choose curves that follow such precise data.
         clean = ss.make_smoothing_spline(t[~bad], points[~bad], space, criterion="reml")
-    # Every outlier pulls by the corner of Huber's loss, which is a part of the noise.
+    # With Huber's loss, the influence of every outlier is limited to the corner, a fraction of the noise.
     most = 3.5 if loss == "huber" and noise > 1e-3 else 1.6
     assert largest(space, robust, t) < most * largest(space, clean, t)
 
 
-def test_a_curve_through_nearly_all_data_says_so_once():
+def test_a_curve_through_nearly_all_data_warns_once():
     space, t, points, bad = recording("r:3", 1e-8, (30, 60, 90))
     with pytest.warns(ss.SmoothingWarning) as caught:
         ss.make_smoothing_spline(t, points, space, loss="cauchy")
     assert len(caught) == 1
     assert "It rejected 3 data" in str(caught[0].message) and "Pass sigma=" in str(caught[0].message)
-    # With the noise, nothing is unknown.
+    # With a given noise level, no warning is needed.
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         spline = ss.make_smoothing_spline(t, points, space, sigma=1e-8, criterion="reml", lam=1e-16, loss="cauchy")
@@ -108,7 +108,7 @@ def test_parts_of_a_product_reject_data_of_their_own():
     assert r3.distance(alone[1](t), told(t)).max() < 0.5
 
 
-def test_rounded_data_that_mostly_repeat_are_no_outliers():
+def test_rounded_data_that_mostly_repeat_are_not_outliers():
     rng, t = np.random.default_rng(0), np.arange(200.0)
     level = np.round(0.3 * rng.standard_normal(200))
     level[70] = 40

@@ -1,4 +1,4 @@
-"""Smoothing from several starts: directions with much noise, and bodies that turn far between two data."""
+"""Smoothing from several starts: directions with much noise, and bodies that turn far between two samples."""
 
 import warnings
 

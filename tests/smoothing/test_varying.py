@@ -12,7 +12,7 @@ FASTER, NOISIER = "the motion is faster between", "the residuals are larger betw
 
 
 def recording(kind, n, m, seed):
-    """Irregular times of a minute, and noisy data of a motion with a burst, of noise with a bad part, or of neither."""
+    """Irregular times within a minute, and noisy data with a burst of motion, a part with more noise, or neither."""
     rng = np.random.default_rng([seed, n, m])
     t = 500 + np.sort(rng.uniform(0, 60, n))
     phases = rng.uniform(0, 6, (2, m))
@@ -52,13 +52,13 @@ def test_varying_noise_is_named_and_weights_help():
 
 
 def test_products_and_batches_name_the_curve():
-    t, calm, _ = recording("calm", 500, 2, 3)
+    t, steady, _ = recording("steady", 500, 2, 3)
     _, y, _ = recording("burst", 500, 2, 3)
     with pytest.warns(ss.SmoothingWarning, match=rf"of curve 1 \(and of curves 2\), {FASTER}") as caught:
-        ss.make_smoothing_spline(t, np.stack([calm, y, y]), "r:2")
+        ss.make_smoothing_spline(t, np.stack([steady, y, y]), "r:2")
     assert caught[0].message.curve == (1,)
     with pytest.warns(ss.SmoothingWarning, match=rf"in factor 1, .*{FASTER}"):
-        ss.make_smoothing_spline(t, (calm, y), "r:2 x r:2")
+        ss.make_smoothing_spline(t, (steady, y), "r:2 x r:2")
 
 
 @pytest.mark.parametrize("name", ["r:3", "sphere:2", "so:3"])
@@ -68,7 +68,7 @@ def test_sound_recordings_do_not_warn(name):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         for seed in range(4):
-            t, y, _ = recording("calm", 300, space.dim, seed)
+            t, y, _ = recording("steady", 300, space.dim, seed)
             points = space.exp(base, 0.2 * np.tensordot(y, space.frame(base), 1))
             ss.make_smoothing_spline(t, points, space)
 

@@ -1,4 +1,4 @@
-"""How far points may be off a space: one rule, by the digits of their numbers, for every function that takes them."""
+"""Tolerance for points off a manifold: one rule, by the accuracy of their numbers, in every function."""
 
 import io
 import json
@@ -57,15 +57,15 @@ def test_rounded_points_are_accepted_and_errors_are_not(name, way):
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_numbers_with_all_digits_have_the_small_tolerance(seed):
+def test_numbers_with_full_precision_have_the_small_tolerance(seed):
     rng = np.random.default_rng(seed)
     x = rng.normal(size=(rng.integers(2, 50), 3))
     assert point_tol(x) == 1e-8
-    # Also among others that have few digits.
+    # This also holds among other numbers with few digits.
     x[1:] = np.eye(3)[0]
     assert point_tol(x) == 1e-8
     assert point_tol(x.astype(np.float32)) == point_tol(x.astype(np.float32).astype(float)) == 1e-4
-    # Missing points do not count.
+    # Missing points are ignored.
     x[-1] = np.nan
     assert point_tol(x) == 1e-8
     assert point_tol(x.astype(np.float32).astype(float)) == 1e-4
@@ -107,7 +107,7 @@ def test_rotations_in_every_form(way):
         ss.rotations.from_quaternions(ss.convert.matrix_to_quaternion(m, scalar_first=True), scalar_first=True)
     )
     found.append(ss.poses.join(m, x)[:, :3, :3])
-    # The positions have all digits.
+    # The positions have full precision.
     found.append(ss.CubicSpline(None, ss.poses.join(m, x), "se:3").points[:, :3, :3])
     rows = np.concatenate([np.asarray(m, float), x[..., None]], axis=-1).reshape(20, 12).tolist()
     found.append(ss.poses.read_kitti(io.StringIO("\n".join(" ".join(map(repr, row)) for row in rows)))[1][:, :3, :3])

@@ -1,4 +1,4 @@
-"""The effort for long recordings is in proportion to their length."""
+"""The cost of long recordings is proportional to their length."""
 
 import tracemalloc
 from unittest import mock

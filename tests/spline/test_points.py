@@ -145,7 +145,7 @@ def test_rounded_points_are_taken_within_atol(name):
     space = ss.space(name)
     exact = points_on(space, 5)
     rounded = tuple(part.round(6) for part in exact) if isinstance(exact, tuple) else exact.round(6)
-    # All digits of double precision: the distance is no rounding error.
+    # The numbers have full double precision, so the distance is not a rounding error.
     third = 1 + 1e-6 / 3
     wrong = tuple(part * third for part in exact) if isinstance(exact, tuple) else exact * third
     raises("off the space", ss.CubicSpline, None, wrong, space)

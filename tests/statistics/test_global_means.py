@@ -132,7 +132,7 @@ def test_an_exactly_opposite_pair_does_not_prevent_a_mean():
 
 
 def test_poses_start_from_the_mean_rotation():
-    """Of rotations about one axis the mean does not depend on the first one."""
+    """For rotations about one axis, the mean does not depend on the first pose."""
     angles, _, rng = spread_angles(5)
     turns = ss.rotations.from_rotation_vectors(angles[:, None] * [0, 0, 1])
     poses = ss.poses.join(turns, rng.normal(size=(len(angles), 3)))

@@ -1,4 +1,4 @@
-"""What a fit of one random recording led to, and the table of many of them."""
+"""Outcomes of fits of random recordings, and rows of the table that summarises them."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def row_of(kind: str, outcomes: Iterable[Outcome]) -> Row:
     """Summarise the outcomes of one kind of data."""
     every = list(outcomes)
     results = [one for one in every if not one.refused]
-    # NaN is wrong, too.
+    # NaN counts as wrong.
     wrong = [one for one in results if not one.error <= WRONG]
     false = [one for one in results if one.sound and one.warned and one.error <= WRONG]
     share = 1 / max(len(every), 1)

@@ -1,17 +1,17 @@
-//! Memory that is reserved before long computations, because Rust aborts the process if memory is exhausted.
+//! Tests of the available memory before long computations, because Rust aborts the process if memory is exhausted.
 
 use std::panic::resume_unwind;
 
-/// Memory for this many numbers is assumed to be available.
+/// Memory for up to this many numbers is assumed to be available.
 const SMALL: f64 = (1 << 16) as f64;
 
 /// The payload with which [`require`] unwinds.
 pub struct OutOfMemory {
-    /// The computation.
+    /// A description of the computation, such as "smoothing".
     pub work: &'static str,
-    /// The memory that it needs, about.
+    /// The approximate memory that it needs.
     pub bytes: f64,
-    /// What the caller can do, as an imperative.
+    /// The remedy, as an imperative.
     pub remedy: &'static str,
 }
 
@@ -20,13 +20,13 @@ pub fn bytes(numbers: f64) -> f64 {
     numbers * size_of::<f64>() as f64
 }
 
-/// Whether memory for about this many numbers is available.
+/// Whether memory for approximately this many numbers is available.
 pub fn is_free(numbers: f64) -> bool {
     numbers <= SMALL
         || bytes(numbers) < isize::MAX as f64 && Vec::<f64>::new().try_reserve_exact(numbers as usize).is_ok()
 }
 
-/// Unwinds with [`OutOfMemory`], without a message, unless memory for about this many numbers is available.
+/// Unwinds with [`OutOfMemory`], without a message, unless memory for approximately this many numbers is available.
 pub fn require(numbers: f64, work: &'static str, remedy: &'static str) {
     if !is_free(numbers) {
         resume_unwind(Box::new(OutOfMemory { work, bytes: bytes(numbers), remedy }));

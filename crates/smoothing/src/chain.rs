@@ -1,9 +1,9 @@
-//! A selection of data without outliers that needs no curve: the cheapest chain through the data.
+//! The cheapest chain through the data, which selects data without outliers before a curve is known.
 //!
-//! Dynamic programming finds the subset of data that costs least. A datum that follows another one costs
-//! `(d²/(4τ))²` with the squared distance d² of the two and the scale τ of pairs so far apart in time; a datum that is
-//! left out has a fixed cost. Outliers in runs are left out if their start and their end are farther than the path moves
-//! in that time. Up to half of the data may be outliers, for τ is a low quantile.
+//! Dynamic programming finds the subset of data with the lowest cost. Two successive data of the chain cost
+//! `(d²/(4τ))²`, where d is their distance, and τ the scale of squared distances of pairs that are as far apart in
+//! time. An omitted datum has a fixed cost. A run of outliers is omitted if the steps at its start and its end are
+//! longer than the path moves in that time. Up to half of the data may be outliers, because τ is a low quantile.
 
 use crate::frames::lanes_of;
 use crate::problem::Data;
@@ -12,25 +12,26 @@ use symspline_core::space::{Ambient, Erased};
 
 /// The number of data that may separate two neighbours of the chain.
 const WINDOW: usize = 64;
-/// The cost of a datum that is left out.
+/// The cost of an omitted datum.
 const SKIPPED: f64 = 2.0;
-/// The squared distance, in units of τ, of which the square is the cost one.
+/// The squared distance, in units of τ, of a pair of cost one.
 const UNIT: f64 = 4.0;
-/// The largest cost of a pair. It is finite, for a chain must exist.
+/// The largest cost of a pair. It is finite, so that a chain exists.
 const MOST: f64 = 1e6;
 /// The number of intervals of the time between two data in which τ is estimated.
 const BINS: usize = 40;
 /// The number of pairs that suffice for τ.
 const PAIRS: usize = 200_000;
-/// With fewer data, the distances show no scale.
+/// Fewer data do not determine the scale, and all of them are selected.
 const FEW: usize = 12;
-/// The data before and after a datum that show its speed.
+/// The number of data before and after a datum from which its speed is estimated.
 const AROUND: usize = 16;
-/// The numbers of steps between pairs that show the speed. Few of them lie on both sides of the border of a run of
-/// outliers.
+/// The numbers of steps between the data of a pair from which the speed is estimated. They are small, so that few pairs
+/// extend across the border of a run of outliers.
 const SPEED: [usize; 2] = [3, 4];
-/// The numbers of steps between more distant pairs, whose squared distances exceed those of neighbours at least by this
-/// ratio if the data move. For a steady motion it is 25, for noise and for unrelated points one.
+/// The numbers of steps between the data of more distant pairs. If the data move, their squared distances exceed those
+/// of neighbours at least by the ratio `MOVES`. The ratio is 25 for a steady motion, and 1 for noise and unrelated
+/// points.
 const DISTANT: [usize; 3] = [4, 5, 6];
 const MOVES: f64 = 8.0;
 
@@ -72,10 +73,10 @@ pub fn chain(space: &Erased, data: &Data) -> Vec<f64> {
     kept
 }
 
-/// The standard deviation, at weight one, that rounding of the data causes: to floating-point numbers, or to the digits
-/// of a file if many consecutive data are the same.
+/// The standard deviation, at weight one, of the rounding of the data: to floating-point numbers, or to the decimals of
+/// a file if many consecutive data are equal.
 pub fn rounding(space: &Erased, data: &Data) -> f64 {
-    /// The least part of consecutive data that are the same, and that are not.
+    /// The least shares of consecutive data that are equal, and that are different.
     const SAME: f64 = 0.25;
     const DIFFERENT: f64 = 0.05;
     let largest = |x: &[f64]| x.iter().map(|x| x.abs()).fold(0.0, f64::max);
@@ -84,7 +85,7 @@ pub fn rounding(space: &Erased, data: &Data) -> f64 {
     let mut steps = squares(space, data.points, &used, &pairs);
     steps.retain(|x| *x > 0.0);
     let different = steps.len() as f64 / pairs.len().max(1) as f64;
-    // With half of a unit of the last digit, data that differ by one unit are kept.
+    // With half a unit of the last decimal, data that differ by one unit are kept.
     let digits = if different > DIFFERENT && different < 1.0 - SAME {
         0.5 * steps.into_iter().fold(f64::INFINITY, f64::min).sqrt()
     } else {
@@ -115,7 +116,8 @@ fn squares(space: &Erased, points: &[f64], used: &[usize], pairs: &[(usize, usiz
 
 /// The squared distances of some of the data from the geodesic between the ones before and after; zero at both ends.
 ///
-/// An isolated outlier is farther from there than its neighbours, whose geodesics it moves by a part of its distance.
+/// An isolated outlier is farther from its geodesic than its neighbours are from theirs, because it moves their
+/// geodesics only by a fraction of its own distance.
 pub fn deviations(space: &Erased, data: &Data, chosen: &[usize]) -> Vec<f64> {
     let (len, inner) = (space.point_len(), chosen.len().saturating_sub(2));
     let row = |i: usize| &data.points[chosen[i] * len..][..len];
@@ -170,7 +172,7 @@ impl Scale {
         let mut from = 0;
         for bin in 1..=BINS {
             let mut to = bin * lags.len() / BINS;
-            // Equal times belong together.
+            // Equal times belong to the same interval.
             while to > from && to < lags.len() && lags[to].0 == lags[to - 1].0 {
                 to += 1;
             }

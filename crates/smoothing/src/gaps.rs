@@ -1,10 +1,11 @@
-//! What a fit would predict in parts of a recording whose data it did not have, at the same λ: the measure of how far
-//! its posterior can be trusted in gaps.
+//! Predictions of a fit for parts of a recording whose data are omitted, at the same λ. Their errors show how far the
+//! posterior can be trusted in gaps.
 //!
-//! At the solution, `Ac = BᵀWy` for data y with the matrix `A = BᵀWB + λΩ`. Without some of the data, of rows b and
-//! residuals r, the coefficients change by `δ = −(A − bᵀWb)⁻¹bᵀWr`, and their covariance is `(A − bᵀWb)⁻¹`. These are
-//! the deleted residuals of neighbourhood cross-validation (Wood 2024, arXiv 2404.16490), for every lane another
-//! neighbourhood. Frames along the curve make them those of a curve in any space, up to its curvature.
+//! The coefficients c solve `Ac = BᵀWy` for data y with the matrix `A = BᵀWB + λΩ`. If data with rows b of B and
+//! residuals r are omitted, the coefficients change by `δ = −(A − bᵀWb)⁻¹bᵀWr`, and their covariance is `(A − bᵀWb)⁻¹`.
+//! The errors are the deleted residuals of neighbourhood cross-validation (Wood 2024, arXiv 2404.16490). Each lane
+//! computes another neighbourhood. On curved spaces, coordinates in frames along the curve make the problem linear up
+//! to terms of the curvature.
 
 use crate::banded::{Banded, stride};
 use crate::bordered::Bordered;
@@ -35,7 +36,7 @@ pub struct System<'a> {
 
 /// Predictions without some of the data: values and variances of linear functions, for noise of variance one.
 pub struct Predictions {
-    /// The changes by the omission, one row of columns per function.
+    /// The changes caused by the omission, one row of columns per function.
     pub values: Vec<f64>,
     /// The variances; NaN where the other data do not determine the curve.
     pub variances: Vec<f64>,
@@ -80,7 +81,7 @@ impl<'a> System<'a> {
         let (m, p, width) = (self.m, self.p, 4 * self.m);
         let size = self.count * m;
         let rows = stride(m);
-        // Lanes without a block of their own repeat the first one.
+        // Unused lanes repeat the first block.
         let of_lane = |l: usize| group.get(l).unwrap_or(&group[0]);
         let mut lanes: Vec<[Vec<f64>; 3]> = Vec::with_capacity(LANES);
         let mut rights: Vec<(Vec<f64>, Vec<f64>)> = Vec::with_capacity(LANES);
@@ -137,7 +138,7 @@ impl<'a> System<'a> {
             for k in probed.clone() {
                 let (start, factors) = (probes.firsts[k] * m, &probes.factors[k * width..][..width]);
                 let side = &probes.sides[k * p..][..p];
-                // The unknowns on which the function depends; parameters are the first.
+                // The unknowns on which the function depends. Parameters come first.
                 let own = side.iter().enumerate().map(|(a, x)| (a, *x));
                 let own = own.chain(factors.iter().enumerate().map(|(a, x)| (p + start + a, *x)));
                 let own: Vec<(usize, f64)> = own.filter(|(_, x)| *x != 0.0).collect();
@@ -243,7 +244,7 @@ mod tests {
             };
             let (weighed, plain) = (rows(&|k| weights[k].sqrt()), rows(&|_| 1.0));
             let residuals: Vec<f64> = (0..t.len()).map(|k| weights[k].sqrt() * (y[k] - values[k])).collect();
-            // The last block continues at the start, and the second one is at an end.
+            // The last block wraps around to the start, and the second one is at an end.
             let lists: [Vec<usize>; 3] = [(10..17).collect(), (30..40).collect(), vec![37, 38, 39, 0, 1, 2]];
             for list in &lists {
                 let all = Functionals { firsts: &firsts, factors: &weighed, sides: &[] };

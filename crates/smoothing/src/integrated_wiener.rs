@@ -1,9 +1,9 @@
 //! The posterior of an integrated Wiener process whose third derivative is white noise.
 //!
-//! It is the prior of the penalty ∫ x'''² (Wahba 1978): with noise of variance one, the process has the intensity 1/λ. The
-//! state of value, velocity and acceleration is Markov. The square-root information form (Paige & Saunders 1977) factors
-//! its precision by orthogonal transformations, and the covariances are sums of squares. The unknowns are the last state
-//! and the increments before it, so that times that nearly coincide do no harm.
+//! The process is the prior that belongs to the penalty ∫ x'''² (Wahba 1978). For noise of variance one, its intensity
+//! is 1/λ. The state of value, velocity and acceleration is Markov. The square-root information form (Paige & Saunders
+//! 1977) factors the precision by orthogonal transformations, and covariances are sums of squares. The unknowns are the
+//! last state and the increments before it, so that nearly equal times cause no loss of accuracy.
 
 use symspline_core::monitor::checkpoint;
 
@@ -25,9 +25,9 @@ const WHITEN: Square<ORDER> = [
 ];
 /// The variance of a coordinate at given times, for noise of variance one: of the value (`nu` = 0) or the velocity (1).
 ///
-/// Times of the data are not decreasing and lie within the period, if there is one. Outside the data of an open curve, the
-/// process continues with constant velocity. At least three data at different times are required, or two in a closed
-/// curve.
+/// Times of the data must not decrease, and must lie within the period of a closed curve. Outside the data of an open
+/// curve, the process continues with constant velocity. At least three data at different times are required, or two in
+/// a closed curve.
 pub fn process_variance(
     times: &[f64],
     weights: &[f64],
@@ -37,7 +37,7 @@ pub fn process_variance(
     nu: usize,
 ) -> Vec<f64> {
     let (first, last) = (times[0], times[times.len() - 1]);
-    // Units of time and weight in which all numbers are moderate.
+    // Scale times and weights so that all numbers are of moderate size.
     let unit = period.unwrap_or(last - first) / times.len() as f64;
     let inside = |t: f64| match period {
         Some(period) => (t - first).rem_euclid(period) / unit,
@@ -67,8 +67,8 @@ pub fn process_variance(
 
 /// The factored precision of the states.
 struct Chain {
-    /// For every state but the last: the time to the next one, and three rows for the increment until then with a triangle
-    /// in their first columns.
+    /// For every state but the last: the time to the next one, and three rows for the increment until then with a
+    /// triangle in their first columns.
     factors: Vec<(f64, [Row; ORDER])>,
     /// The rows of the last state; of a closed curve that is the first one.
     end: Vec<Row>,
@@ -84,7 +84,7 @@ impl Chain {
             (Some(next), _) => next.0 - sites[i].0,
             (None, period) => sites[0].0 + period.unwrap_or(0.0) - sites[i].0,
         };
-        // The first increment of a closed curve is not eliminated. It is the longest, whose rows are not large.
+        // The first increment of a closed curve is not eliminated. It is the longest, so that its rows are not large.
         let longest = (0..count).max_by(|a, b| step(*a).total_cmp(&step(*b))).unwrap_or(0);
         let rotated = period.map(|_| longest);
         let first = rotated.unwrap_or(0);
@@ -121,7 +121,7 @@ impl Chain {
             });
         }
         triangularise(&mut known, 0, ORDER);
-        // Too few data leave variances without a value.
+        // Too few data do not determine the variances.
         known.resize(known.len().max(ORDER), [0.0; COLUMNS]);
         Chain { factors, end: known, rotated }
     }

@@ -179,7 +179,7 @@ pub enum State {
     Undetermined,
 }
 
-/// What is known about the data that a robust loss rejects.
+/// Whether the data that a robust loss rejected can be trusted to be the outliers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Selection {
     /// The selection is final, or there is none.
@@ -189,7 +189,7 @@ pub enum Selection {
     Interpolated,
     /// Two selections alternate.
     Unsettled,
-    /// Fewer than half of the data are near the curve.
+    /// Fewer than 60 % of the data are near the curve.
     Few,
 }
 
@@ -222,9 +222,9 @@ pub struct Report {
     pub exact: bool,
     /// J for times in units of the mean distance of the knots.
     pub objective: f64,
-    /// What is known about the data that a robust loss rejects.
+    /// Whether the data that a robust loss rejected can be trusted to be the outliers.
     pub selection: Selection,
-    /// Their number.
+    /// The number of rejected data.
     pub rejected: usize,
 }
 

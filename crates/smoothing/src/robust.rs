@@ -1,22 +1,22 @@
 //! The stages of a fit with a robust loss.
 //!
-//! A redescending loss has many minima, and λ chosen while outliers act on the curve, or from a curve that leaves good
-//! data, is wrong. Therefore data are selected first, λ is chosen from these, and the M-estimator is computed with that
-//! λ:
+//! A redescending loss has many minima. λ is wrong if it is chosen while outliers affect the curve, or from a curve
+//! that rejects good data. Therefore data are selected first, λ is chosen from these, and the M-estimator is computed
+//! with that λ:
 //!
 //! 1. *Rejecting*: least squares for a selection of data, which begins with a [`chain`](crate::chain). λ is chosen by
-//!    restricted maximum likelihood: cross-validation with γ > 1 forbids curves that precise data need, and such curves
-//!    seem to leave their data. The limit of a truncated loss falls from the largest residual to the noise (graduated
-//!    non-convexity, Yang et al. 2020) until the selection does not change. Residuals are *deleted* ones: those of
-//!    selected data vanish where the curve follows each of them.
+//!    restricted maximum likelihood, because cross-validation with γ > 1 forbids the curves that precise data need, so
+//!    that good data would be rejected. The limit of a truncated loss falls from the largest residual to the noise
+//!    (graduated non-convexity, Yang et al. 2020) until the selection does not change. Residuals are *deleted* ones,
+//!    because ordinary residuals of selected data vanish where the curve follows each of them.
 //! 2. *Chosen*: the same selection, with λ by the requested criterion.
 //! 3. *Final*: iteratively reweighted least squares (Holland & Welsch 1977) with that λ, times the mean weight, and the
-//!    noise level of the first stage. If the curve leaves selected data, λ is too large for them: a redescending loss
-//!    takes every bend for outliers then. The λ of the first stage replaces it.
+//!    noise level of the first stage. If the curve rejects selected data, λ is too large for them, because a
+//!    redescending loss then treats every bend as outliers. The λ of the first stage replaces it.
 //!
-//! If the curve follows nearly all data, the noise is smaller than what the sampling shows. Then the deviations are those
-//! of interpolation, only isolated data that deviate much more than others are rejected, and the curve of the first
-//! stage is the result.
+//! If the curve follows nearly all data, the noise is too small to be estimated at this sampling rate. Deviations are
+//! then those from interpolation, and only isolated data that deviate much more than others are rejected. The curve of
+//! the first stage is the result.
 
 use crate::chain;
 use crate::chi;
@@ -33,9 +33,9 @@ const ROUNDS: usize = 30;
 const KEPT: f64 = 0.999;
 /// The factor of the squared limit from selection to selection.
 const FALLS: f64 = 0.25;
-/// The ratio of the degrees of freedom to the data from which the noise is smaller than what the sampling shows.
+/// The ratio of degrees of freedom to data above which the noise is too small to be estimated.
 const ALL: f64 = 0.9;
-/// The squared limit of a selection, for data that the final curve has left.
+/// The squared limit, relative to that of the selection, beyond which the final curve rejects selected data.
 const LEFT: f64 = 2.0;
 /// The limit for squared deviations in that case, in medians.
 const GROSS: f64 = 900.0;
@@ -48,9 +48,9 @@ const BESIDE: usize = 2;
 const NEAR: usize = 10;
 /// The least 1 − h, which is known up to rounding errors only.
 const DELETED: f64 = 1e-6;
-/// The part of the data that must be selected for a result that can be trusted.
+/// The least fraction of the data that must be selected for a result that can be trusted.
 const LEAST_SELECTED: f64 = 0.6;
-/// The weight of rejected data if nothing but data determines the curve.
+/// The weight of rejected data if there is no penalty, so that only data determine the curve.
 const TINY: f64 = 1e-9;
 
 /// The stage of a fit.
@@ -88,7 +88,7 @@ pub struct Robust {
     m: usize,
     /// The present stage.
     pub stage: Stage,
-    /// What is known about the selection.
+    /// Whether the selection can be trusted.
     pub selection: Selection,
     /// The standard deviation of the noise in a coordinate.
     sigma: f64,
@@ -220,7 +220,7 @@ impl Robust {
         matches!(self.stage, Stage::Plain | Stage::Final)
     }
 
-    /// Whether the M-estimator has left selected data, so that another stage follows.
+    /// Whether the M-estimator rejects selected data, so that another stage follows.
     pub fn leaves(&self, squares: &[f64]) -> bool {
         if !self.reweighs() || self.lam.is_some() {
             return false;
@@ -288,7 +288,7 @@ impl Robust {
                 self.selection = Selection::Unsettled;
             }
             self.first = at.lam;
-            // Data without noise have no M-estimator.
+            // The M-estimator is undefined for data without noise.
             let exact = !self.known && self.sigma <= self.rounding;
             if self.selection == Selection::Interpolated || exact {
                 (self.stage, self.truncated) = (Stage::Final, true);
@@ -322,7 +322,7 @@ impl Robust {
 
     /// Whether another selection has not only changed near the limit.
     fn differs(&self, next: &[f64]) -> bool {
-        /// The part of the data that are near the limit.
+        /// The largest fraction of the data that counts as near the limit.
         const NEAR_LIMIT: f64 = 0.02;
         let changed = next.iter().zip(&self.kept).filter(|(a, b)| a != b).count();
         changed as f64 > 2.0 + NEAR_LIMIT * next.len() as f64
@@ -354,7 +354,7 @@ impl Robust {
         of(squares, 0.5).max(high).sqrt().max(self.rounding)
     }
 
-    /// The data without isolated ones that deviate much more than others, and with those that do not.
+    /// A selection without isolated data that deviate much more than others, and with data that do not.
     fn gross(&self, squares: &[f64], at: &AtCurve) -> Vec<f64> {
         let times = at.times;
         let n = squares.len();
@@ -381,7 +381,7 @@ impl Robust {
             let near = &of_kept[at.saturating_sub(NEAR)..(at + NEAR).min(kept.len())];
             GROSS * chain::quantile(near.to_vec(), 0.5).unwrap_or(0.0).max(least)
         };
-        // An outlier moves the curve near it, so that its neighbours seem to deviate, too, and even more beside gaps.
+        // An outlier moves the curve nearby, so that its neighbours seem to deviate as well, even more so next to gaps.
         let beside = (at.deviations)(&kept);
         for (place, &k) in kept.iter().enumerate() {
             let near = &beside[place.saturating_sub(BESIDE)..(place + BESIDE + 1).min(kept.len())];
@@ -391,7 +391,7 @@ impl Robust {
                 next[k] = 0.0;
             }
         }
-        // A run returns from its ends: inside it, the curve is not known.
+        // Data of a run return only from its ends, because the curve inside the run is not known.
         let selected =
             |place: Option<usize>| place.and_then(|i| used.get(i)).is_some_and(|&k| self.kept[k] > 0.0);
         for (place, &k) in used.iter().enumerate() {

@@ -63,8 +63,8 @@ pub fn smooth(space: &Erased, data: &[Data], options: &Options, monitor: &Monito
     tracks.into_iter().map(CurveFit::finish).collect()
 }
 
-/// The number of numbers that the smoothing of a curve occupies, about: band matrices of eight λ, and several vectors
-/// per knot and per datum; without those of full Gauss–Newton.
+/// The approximate count of floating-point numbers in memory while a curve is smoothed: band matrices of eight λ, and
+/// several vectors per knot and per datum. Those of full Gauss–Newton are not included.
 fn size(space: &Erased, data: &Data) -> usize {
     let (knots, count) = (data.knots.len(), data.times.len());
     let per_knot = 300 + 24 * space.point_len() + 2 * space.frame_len();

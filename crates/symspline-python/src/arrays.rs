@@ -36,7 +36,7 @@ pub fn count(sizes: &[usize]) -> usize {
 
 /// The array that a function of NumPy makes; small arrays are always zeros.
 fn array<'py>(py: Python<'py>, shape: &[usize], function: &str) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-    // Arrays without elements have limits, too: those of the other axes.
+    // Arrays without elements have limits as well: those of the other axes.
     let nonzero: Vec<usize> = shape.iter().copied().filter(|&size| size > 0).collect();
     if count(&nonzero) <= SMALL {
         return Ok(PyArrayDyn::zeros(py, shape, false));

@@ -93,7 +93,7 @@ impl Slices<'_> {
         })
     }
 
-    /// Whether the derivatives of one curve may take long.
+    /// Whether the derivatives of one curve may take a long time.
     fn is_heavy(&self, space: &Erased) -> bool {
         let own = (self.t.len() + self.x.len()) / self.curves.max(1);
         is_heavy(space) || is_long(own.saturating_mul(space.dim().pow(2)))

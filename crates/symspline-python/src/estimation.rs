@@ -252,7 +252,7 @@ impl<'a> Slices<'a> {
         Posterior::new(self.knots, self.ends, self.m, self.matrices, self.turn)
     }
 
-    /// Whether A is so large, or so many numbers are computed from it, that this may take long.
+    /// Whether a computation with A may take a long time, because of its size or that of the result.
     fn is_heavy(&self, numbers: usize) -> bool {
         let entries: usize = self.matrices.iter().map(|x| x.len()).sum();
         is_long(entries.saturating_mul(self.m)) || is_long(numbers)

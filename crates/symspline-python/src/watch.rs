@@ -37,8 +37,8 @@ pub fn is_long(numbers: usize) -> bool {
     numbers > 1 << 14
 }
 
-/// The exception for what a computation unwound with: a MemoryError if memory is exhausted, and a RuntimeError for any
-/// other panic.
+/// The exception for the payload of a panic: a MemoryError if memory is exhausted, and a RuntimeError for any other
+/// panic.
 pub fn exception(panic: Box<dyn Any + Send>) -> PyErr {
     let panic = match panic.downcast::<OutOfMemory>() {
         Ok(found) => return out_of_memory(found.work, found.bytes, found.remedy),

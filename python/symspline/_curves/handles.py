@@ -1,4 +1,4 @@
-"""The limit of given velocities: their control handles must stay inside the cut locus."""
+"""Limit given velocities: their control handles must stay inside the cut locus."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from .._core import CutLocusError, ValidationError
 from .._faults import of_index
 from .._spaces import Array, Doubles, Space
 
-# Handles shorter than this fraction of the injectivity radius need no closer look.
+# Handles shorter than this fraction of the injectivity radius are valid without further tests.
 _SHORT = 0.99
-# Relative difference of a handle from the logarithm of its end, beyond which the logarithm is another vector.
+# Relative difference beyond which the logarithm of the end of a handle is another vector than the handle.
 _SAME = 1e-6
 
 
 def require_short_handles(space: Space[Any], times: Doubles, points: Array, velocities: Array) -> None:
     """Raise ValidationError if a velocity is too fast for a segment next to it.
 
-    The curve is evaluated from its control points. The one at the end of a handle h u/3 past the cut locus belongs to
-    another, shorter handle, so that the curve would not have the given velocity or would lose whole turns.
+    The curve is evaluated from its control points. If a handle h u/3 passes the cut locus, its control point is also
+    the end of a shorter handle. The curve would then not have the given velocity, or would lose whole turns.
     """
     radius = space.injectivity_radius
     if not 0 < radius < np.inf:
@@ -55,5 +55,5 @@ def _refuse(space: Space[Any], index: tuple[Any, ...], length: float, step: floa
     raise ValidationError(
         f"`velocities[{node}]`{of} has speed {3 * length / step:.6g}, which is too fast for a segment of length "
         f"{step:.6g}: its control handle, a third of the product, has length {length:.4g} and passes the cut locus. "
-        f"The curve would have another velocity there or lose whole turns. {remedy}"
+        f"The curve would have a different velocity there or lose whole turns. {remedy}"
     )

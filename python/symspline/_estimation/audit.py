@@ -1,4 +1,4 @@
-"""Audit of an estimate: whether each sensor agrees with its standard deviations, and what may be wrong."""
+"""Test whether each sensor of an estimate agrees with its standard deviations, and suggest causes if it does not."""
 
 from __future__ import annotations
 
@@ -18,25 +18,25 @@ from .measurements import GRAVITY
 from .solve import Setup, Solution, in_columns
 from .terms import ForceTerm, FunctionTerm, PointTerm, RateTerm, Term
 
-# The number of measurements of a sensor from which its mean leverage follows.
+# Number of measurements of a sensor in the estimate of its mean leverage.
 _SAMPLE = 64
-# Distance from the centre of a prior that is improbable, in its standard deviations.
+# Improbable distance from the centre of a prior, in standard deviations of the prior.
 _PRIOR = 4.0
-# Distance from the minimum in standard deviations that a warning reports.
+# Distance from the minimum, in standard deviations, beyond which a warning is issued.
 _DISTANCE = 0.5
-# The logarithm of a ratio of sizes must agree so well with that of two units.
+# Largest difference of the logarithm of a ratio of sizes from that of two units.
 _SIMILAR = 0.6
-# Sensors whose times span such different intervals have different units of time, or hardly overlap.
+# If the time spans of two sensors differ by this factor, their units of time differ or they hardly overlap.
 _SPANS = 100.0
 
 
 def audit(setup: Setup, found: Solution) -> float:
-    """Issue one warning that names the sensors and constants which do not agree with their standard deviations.
+    """Issue one warning that names all sensors and constants that do not agree with their standard deviations.
 
     Returns
     -------
     float
-        Ratio of all residuals and their standard deviations, which outliers under a robust loss hardly affect.
+        Ratio of all residuals to their standard deviations, hardly affected by outliers under a robust loss.
     """
     sensors = examined(setup, found)
     failed = [own for own in sensors if own.finding.failed]
@@ -52,9 +52,8 @@ def audit(setup: Setup, found: Solution) -> float:
     freedom = sum(weight for _, weight in known)
     if found.distance > _DISTANCE:
         warn(
-            f"The curve is {found.distance:.2g} standard deviations from the minimum of its objective, because it "
-            f"turns by up to {found.turn:.2g} rad between two knots, where the linearised problem is inaccurate. Pass "
-            "more knots.",
+            f"The curve is {found.distance:.2g} standard deviations from the minimum of its objective. It turns by up "
+            f"to {found.turn:.2g} rad between two knots, where the linearised problem is inaccurate. Pass more knots.",
             SmoothingWarning,
         )
     return float(np.sqrt(sum(square * weight for square, weight in known) / freedom)) if freedom else float("nan")
@@ -83,7 +82,7 @@ def examined(setup: Setup, found: Solution) -> list[Sensor]:
 def _leverages(setup: Setup, found: Solution) -> list[tuple[float, float]]:
     """Return the sum of the leverages of each term, and for points the sum of the covariances between neighbours.
 
-    The leverage of a measurement is the variance of its fitted value. That of the constants is at most their number.
+    The leverage of a measurement is the variance of its fitted value. That of all constants is at most their number.
     """
     band = found.matrices[0]
     m = band.shape[1] // 4
@@ -132,21 +131,21 @@ def _of_priors(setup: Setup, found: Solution) -> list[str]:
             complaints.append(
                 f"The constant {name!r} is {found.values[name].round(6).tolist()}, {np.abs(off).max():.2g} standard "
                 "deviations from its prior. Check the units and the frame of its measurements, or pass a larger sigma "
-                "of the constant."
+                "for the constant."
             )
     return complaints
 
 
 def unit_hints(terms: list[Term]) -> list[str]:
-    """Describe measurements whose sizes suggest other units than those of the others."""
+    """Describe measurements whose sizes suggest that their units differ from those of other measurements."""
     hints = []
     spans = [float(np.ptp(term.times)) for term in terms]
     long = int(np.argmax(spans))
     for term, span in zip(terms, spans, strict=True):
         if len(term.times) > 20 and span * _SPANS < spans[long]:
             hints.append(
-                f"The times of {term.label} span {span:.3g}, and those of {terms[long].label} {spans[long]:.3g}: check "
-                "the unit of the times."
+                f"The times of {term.label} span {span:.3g}, but those of {terms[long].label} span {spans[long]:.3g}: "
+                "check the unit of the times."
             )
     for term in terms:
         if isinstance(term, RateTerm):
@@ -154,8 +153,8 @@ def unit_hints(terms: list[Term]) -> list[str]:
             ratio = _rates_over_steps(term, points)
             if ratio is not None and abs(np.log(ratio / DEGREES)) < _SIMILAR:
                 hints.append(
-                    f"The rates of {term.label} are {ratio:.2g} times those of the points: pass radians instead of "
-                    "degrees per unit of time."
+                    f"The rates of {term.label} are {ratio:.2g} times as large as those between the points: pass "
+                    "radians instead of degrees per unit of time."
                 )
         if isinstance(term, ForceTerm):
             size, g = (float(np.median(np.linalg.norm(own, axis=-1))) for own in (term.f, term.gravity[None]))
@@ -168,7 +167,7 @@ def unit_hints(terms: list[Term]) -> list[str]:
 
 
 def _rates_over_steps(term: RateTerm, points: list[PointTerm]) -> float | None:
-    """Return the ratio of the measured rates and those between neighbouring points."""
+    """Return the ratio of the measured rates to those between neighbouring points; None if it is unknown."""
     if not points or not term.body.is_rotation:
         return None
     times = np.concatenate([own.times for own in points])
@@ -181,6 +180,6 @@ def _rates_over_steps(term: RateTerm, points: list[PointTerm]) -> float | None:
     space = term.body.space
     unit = 2.0 if space.point_shape == (4,) else 1.0
     rates = unit * np.asarray(space._apply("distance", p=y[:-1], q=y[1:]))[used] / step[used]
-    # Longer steps turn less per time, and shorter ones have more noise.
+    # The median excludes long steps, which may contain whole turns, and short ones, where noise dominates.
     expected, measured = float(np.median(rates)), float(np.median(np.linalg.norm(term.omega, axis=-1)))
     return measured / expected if expected > 0 and measured > 0 else None

@@ -1,7 +1,7 @@
-"""Attitudes from measured rates: their integral, aligned robustly with measured attitudes.
+"""Attitudes from measured rates: the integral of the rates, aligned robustly with measured attitudes.
 
-The bias of the rates follows from a consensus of the turns between neighbouring attitudes. Neither several turns
-between two attitudes nor wrong attitudes mislead it.
+The bias of the rates is estimated by consensus of the turns between neighbouring attitudes. The estimate is robust
+against several turns between two attitudes, and against wrong attitudes.
 
 References
 ----------
@@ -23,25 +23,25 @@ from .._spaces import Doubles, SpecialOrthogonal
 from .rates import attitudes_at
 
 _SO3 = SpecialOrthogonal(3)
-# Rates have a gap where their distance in time exceeds this number of usual ones.
+# Rates have a gap where a time step exceeds this number of median time steps.
 _GAP = 20.0
-# The largest number of attitudes with which biases are compared, and of intervals that propose one.
+# Largest numbers of attitudes with which biases are compared, and of intervals that propose a bias.
 _COMPARED, _PROPOSALS = 200, 60
-# The same numbers for the comparison of time offsets.
+# The same numbers when time offsets are compared.
 _COMPARED_OFFSETS, _PROPOSED_OFFSETS = 60, 10
 # Residuals are limited to the quantile 0.999 of χ² with three degrees of freedom.
 _LIMIT = 16.27
-# Whole turns that are added to the turn between two attitudes.
+# Numbers of whole turns that are added to the turn between two attitudes.
 _TURNS = (0, -1, 1)
-# A bias without a prior is small in comparison with the rates: its standard deviation is the first fraction of their
-# size. If that leaves a mean square of the residuals above `_BAD`, the second fraction is tried as well.
+# A bias without a prior is assumed to be small compared with the rates: its standard deviation is the first fraction of
+# their size. If the mean square of the residuals then exceeds `_BAD`, the second fraction is tried as well.
 _SHARES = (0.5, 0.1)
 _BAD = 6.0
 # Rates are integrated again if a new bias changes the integral by more than this angle.
 _LINEAR = 0.1
 # Corners of the loss of Geman and McClure, in squares of standard deviations, during the alignment.
 _CORNERS = (64.0, 16.0, 4.0, 4.0)
-# So many time offsets are tried on both sides of the start, with steps in which the body turns by this angle.
+# Number of time offsets on either side of the start that are tried, and the turn of the body in radians per step.
 _OFFSETS, _OFFSET_TURN = 20, 0.2
 
 
@@ -125,7 +125,7 @@ class Integral:
         s = (x - self._t[i])[:, None]
         after = np.minimum(i + 1, len(self._t) - 1)
         h = np.maximum(self._t[after] - self._t[i], np.finfo(float).tiny)[:, None]
-        # Rates are linear between their times and constant beyond them.
+        # Rates are linear between their times, and constant before the first and after the last.
         inner = np.clip(s, 0.0, h)
         turn = s * self._omega[i] + inner * (s - 0.5 * inner) / h * (self._omega[after] - self._omega[i])
         found = self._matrices[i] @ _exp(turn)
@@ -133,10 +133,10 @@ class Integral:
 
 
 class _Pairs(NamedTuple):
-    """Turns between attitudes that the integral does not contain, Rotations E, and their derivatives J.
+    """Rotations E that remain between measured turns and those of the integral, and their derivatives J.
 
-    If the bias changes by b, E changes to exp(J b) E. The variance of a component is that of both attitudes and of the
-    integrated noise of the rates.
+    If the bias changes by b, E changes to exp(J b) E. The variance of a component is the sum of those of both attitudes
+    and of the integrated noise of the rates.
     """
 
     rest: Doubles
@@ -144,7 +144,7 @@ class _Pairs(NamedTuple):
     variances: Doubles
 
     def residuals(self, b: Doubles) -> Doubles:
-        """Return rotation vectors that remain with changes of the bias, of shape (..., 3)."""
+        """Return the remaining rotation vectors after changes b of the bias, of shape (..., 3)."""
         turned = np.einsum("kij,...j->...ki", self.derivatives, b)
         return _log(_exp(turned) @ self.rest)
 
@@ -169,22 +169,22 @@ class _Problem:
         self.precision = np.minimum(spread, max(share * self.size, self.rates.noise)) ** -2.0
 
     def segment(self, x: Doubles) -> NDArray[np.intp]:
-        """Return the segment of the rates in which times lie, or −1 in a gap."""
+        """Return the number of the segment of rates that contains each time, or −1 in a gap."""
         j = np.clip(np.searchsorted(self.first, x, side="right") - 1, 0, len(self.first) - 1)
         near = _GAP * self.step
-        # Times before the first rates belong to them if they are close.
+        # Times shortly before a segment belong to it.
         ahead = np.minimum(j + 1, len(self.first) - 1)
         j = np.where((x > self.last[j] + near) & (x >= self.first[ahead] - near), ahead, j)
         return np.where((x >= self.first[j] - near) & (x <= self.last[j] + near), j, -1)
 
     def integrate(self, bias: Doubles) -> Integral:
-        """Return the integral with a bias, which is not computed again if the bias hardly differs."""
+        """Return the integral with a bias; the stored integral is reused if its bias hardly differs."""
         if float(np.abs(bias - self.integral.bias).max()) * float(np.ptp(self.rates.times)) > _LINEAR:
             self.integral = Integral(self.rates, bias)
         return self.integral
 
     def pairs(self, attitudes: Attitudes, bias: Doubles, apart: int, more: float) -> _Pairs:
-        """Return the turns between attitudes with a number of others between them.
+        """Return the turns between attitudes whose indices differ by a given number.
 
         Parameters
         ----------
@@ -234,7 +234,8 @@ class _Problem:
             bias = bias + best
             if np.abs(best).max() * float(np.diff(some.times).max()) < _LINEAR:
                 break
-        # A bias that suits neighbours may still turn the whole by much. Longer and longer turns make it precise.
+        # A small error of the bias adds up to a large turn over the recording. Turns over longer and longer intervals
+        # make the bias precise.
         apart = 2
         while apart < len(some.times):
             pairs = self.pairs(some, bias, apart, more)
@@ -244,7 +245,7 @@ class _Problem:
         return bias
 
     def _proposals(self, pairs: _Pairs, most: int) -> Doubles:
-        """Return changes of the bias that explain one turn each, and one with a whole turn more or less."""
+        """Return changes of the bias that explain single turns, also with a whole turn more or less."""
         count = min(len(pairs.rest), most)
         lengths = np.linalg.norm(pairs.derivatives, axis=(-2, -1))
         each = np.argsort(lengths, kind="stable")[:count]
@@ -302,7 +303,7 @@ class _Problem:
         free = self.rates.spread is not None and len(t) > 1
         g, _ = self._since_first(t, bias)
         each = r @ _back(g)
-        # The attitude that agrees with most others.
+        # Start from the attitude that agrees best with the others.
         some = np.unique(np.linspace(0, len(t) - 1, min(len(t), _COMPARED)).astype(int))
         apart = np.linalg.norm(_log(_back(each[some])[:, None] @ each[some][None]), axis=-1)
         wide = 2 * np.sqrt(variances[some]) + 0.1
@@ -348,7 +349,7 @@ class _Problem:
 
 
 class Path:
-    """Attitudes that follow from rates and measured attitudes.
+    """Attitudes as a function of time, from rates and measured attitudes.
 
     Attributes
     ----------
@@ -357,7 +358,7 @@ class Path:
     offset : float
         Time that was added to the times of the attitudes.
     misfit : float
-        Mean of the squared residuals of the attitudes in standard deviations, each of them limited.
+        Mean of the squared residuals of the attitudes in standard deviations, each limited to `_LIMIT`.
     """
 
     def __init__(
@@ -396,7 +397,7 @@ class Path:
                 self.bias, self.misfit = found[int(np.argmax(counts))][1], misfit
             if misfit < _BAD:
                 break
-        # All segments have the bias of the one with the most attitudes.
+        # All segments share the bias of the segment with the most attitudes.
         problem.rates = rates._replace(bias=self.bias, spread=None)
         self._integral = problem.integral = Integral(rates, self.bias)
         times, frames = [], []
@@ -430,7 +431,7 @@ class Path:
 
 
 def _best_offset(problem: _Problem, attitudes: Attitudes, start: float, low: float, high: float) -> float:
-    """Return the offset of the times with which attitudes agree best with the rates."""
+    """Return the time offset for which the attitudes agree best with the rates."""
     if not problem.size > 0:
         return start
     step = _OFFSET_TURN / problem.size
@@ -438,7 +439,7 @@ def _best_offset(problem: _Problem, attitudes: Attitudes, start: float, low: flo
     few = attitudes.taken(some)
 
     def compared(offset: float, width: float) -> tuple[float, float]:
-        """Return the score of an offset that is known within a width, and the better offset that follows."""
+        """Return the score of an offset with an uncertainty `width`, and an improved offset."""
         own, more = few.later(offset), 0.5 * width * problem.size / np.sqrt(3.0)
         bias = problem.consensus(own, more)
         where = problem.segment(own.times)

@@ -1,4 +1,4 @@
-"""The knots of an estimate: as dense as the measurements show, and in gaps as dense as beside them."""
+"""Choose the knots of an estimate: as dense as the measurements require, and in gaps as dense as next to them."""
 
 from __future__ import annotations
 
@@ -11,25 +11,25 @@ from .._time import TimeAxis
 from .solve import Iteration, Setup, fitted
 from .start import Start
 
-# The first number of equal intervals, and how often they are bisected at most.
+# Initial number of equal intervals, and the largest number of times that they are bisected.
 _FIRST, _ROUNDS = 12, 24
-# The mean square of residuals in standard deviations may exceed one by this and by three standard deviations of it.
+# The mean square of residuals in standard deviations may exceed one by this number plus three of its standard errors.
 _SLACK = 0.1
-# Times closer than this fraction of the mean distance of the knots are one.
+# Times closer than this fraction of the mean distance of the knots are merged.
 _CLOSE = 1e-6
-# Intervals of this fraction of the usual distance of the times of a sensor are not bisected.
+# Intervals shorter than this multiple of the median time step of a sensor are not bisected.
 _CLOSEST = 1.01
-# Gaps without data are longer than this number of usual distances of the knots.
+# Intervals without data are gaps if they are longer than this number of usual knot distances.
 _GAP = 2.5
-# Largest number of knots at which the start itself is compared with the sensors.
+# Largest number of knots for which the residuals of the initial curve itself are computed.
 _MOST = 200_000
 
 
 def merged(times: Doubles, count: int) -> NDArray[np.intp]:
-    """Return the indices of increasing times without those that follow another one closely, for a number of knots."""
+    """Return the indices of increasing times, omitting times too close to the one before for this number of knots."""
     least = _CLOSE * float(times[-1] - times[0]) / max(count, len(times))
     cells = np.floor((times - times[0]) / least) if least > 0 else np.arange(len(times))
-    # Two times of neighbouring cells may be close, too.
+    # Two times in neighbouring cells may also be close.
     apart = np.append(True, (np.diff(cells) > 0) & (np.diff(times) > least))
     apart[-1] = True
     index = np.flatnonzero(apart)
@@ -39,18 +39,18 @@ def merged(times: Doubles, count: int) -> NDArray[np.intp]:
 
 
 def filled(knots: Doubles, data: Doubles) -> Doubles:
-    """Return knots with others in the gaps of the data, where they are as close together as beside the gap.
+    """Add knots in the gaps of the data, as close together as next to the gap.
 
-    The uncertainty grows within a gap. One cubic cannot represent that, so that bands would be too narrow.
+    The uncertainty grows within a gap. One cubic cannot represent this, so that bands would be too narrow.
     """
     h = np.diff(knots)
-    # The longest distance of data between two knots.
+    # Longest distance without data within each interval.
     inner = np.unique(np.concatenate([knots, data]))
     widest = np.maximum.reduceat(np.diff(inner), np.searchsorted(inner, knots[:-1]))
     usual = float(np.median(h[widest <= 0.5 * h])) if np.any(widest <= 0.5 * h) else float(np.median(h))
     gaps = (widest > 0.5 * h) & (h > _GAP * usual)
     parts = np.where(gaps, np.ceil(h / usual), 1.0)
-    # Gaps do not take more knots than the data.
+    # Gaps receive at most as many knots as the rest.
     more = parts.sum() - len(h)
     if more > len(h):
         parts = np.where(gaps, np.maximum(np.ceil(parts * len(h) / more), 2.0), 1.0)
@@ -59,7 +59,7 @@ def filled(knots: Doubles, data: Doubles) -> Doubles:
 
 
 def graded(knots: Doubles) -> Doubles:
-    """Return knots with others between them, so that neighbouring distances differ by at most a factor of two."""
+    """Add knots until the lengths of neighbouring intervals differ by at most a factor of two."""
     while True:
         h = np.diff(knots)
         long = h > 2.01 * np.minimum(np.append(np.inf, h[:-1]), np.append(h[1:], np.inf))
@@ -69,16 +69,16 @@ def graded(knots: Doubles) -> Doubles:
 
 
 def bisected(knots: Doubles, chosen: NDArray[np.bool_] | None = None) -> Doubles:
-    """Return knots with the middles of all intervals, or of chosen ones."""
+    """Add the midpoints of all intervals, or of the chosen ones."""
     middles = 0.5 * (knots[1:] + knots[:-1])
     return np.sort(np.concatenate([knots, middles if chosen is None else middles[chosen]]))
 
 
 def shown_times(axis: TimeAxis, ends: Array, x: Doubles) -> Array:
-    """Return times of the core as the user sees them, from the first to the last of two times."""
+    """Convert times of the core to the form passed by the user; the first and the last one are `ends`."""
     found: Array
     if axis.origin is not None and not axis.dates:
-        # Large whole numbers, which floating-point numbers do not represent.
+        # Large integers cannot be represented as floating-point numbers.
         found = axis.origin + np.rint(x).astype(np.int64)
     else:
         found = np.array(axis.shown(x, ()))
@@ -93,10 +93,10 @@ def first_knots(begin: float, end: float) -> Doubles:
 
 
 def that_reproduce(setup: Setup, start: Start, data: Doubles) -> Doubles:
-    """Return knots with which the spline through an initial curve has the residuals of that curve.
+    """Return knots for which the spline through an initial curve has the same residuals as that curve.
 
-    Intervals are bisected in which the mean square of the residuals of a sensor, taken over three intervals, exceeds
-    one by more than three of its standard deviations, and in which it differs from that of the initial curve.
+    An interval is bisected if the mean square of the residuals of a sensor, over three intervals, exceeds one by more
+    than three standard errors, and the residuals differ from those of the initial curve.
 
     Parameters
     ----------
@@ -140,16 +140,16 @@ def _exceeding(knots: Doubles, times: Doubles, rows: Doubles, own: Doubles | Non
     large = squares > 1 + _SLACK + 3 * np.sqrt(2 / np.maximum(size * count, 1))
     if own is not None:
         apart = three(np.sum((rows - own) ** 2, axis=1)) / np.maximum(size * count, 1)
-        # Residuals that the initial curve has as well do not ask for more knots.
+        # More knots would not reduce residuals that the initial curve has as well.
         large &= apart > _SLACK
-    # Not more than about one knot per sample. Some samples may be very close together.
+    # At most about one knot per sample, by the median time step because some samples may be very close together.
     steps = np.diff(np.unique(times))
     least = _CLOSEST * float(np.median(steps)) if len(steps) else np.inf
     return np.asarray(large & (np.bincount(i, minlength=len(knots) - 1) > 1) & (np.diff(knots) > least))
 
 
 def residuals(setup: Setup, start: Start) -> list[Doubles] | None:
-    """Return the residuals of all terms for the spline through an initial curve, or None if there is no spline."""
+    """Return the residuals of all terms for the spline through an initial curve; None if it does not exist."""
     points = start.points(setup.knots)
     curves = fitted(setup, points)
     if curves is None:

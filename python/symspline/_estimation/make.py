@@ -62,7 +62,7 @@ from .solve import Setup, Solution, read_lams
 from .spline import EstimatedSpline, PointsSpline, joint
 from .terms import Term, bind
 
-# The largest number of knots. A curve with more of them would not fit into memory.
+# Largest number of knots. A curve with more knots would not fit into memory.
 _MOST_KNOTS = 2**32
 # Curves with the largest λ for the jerk have fewer degrees of freedom than this.
 _PARABOLA = 3.5
@@ -132,10 +132,10 @@ def estimate(
     measurements : sequence of measurements
         Objects of `symspline.measure`. Each has its own times.
     knots : int, array_like or "auto"
-        Knots of the curve: their number, or an increasing array that includes all times. With ``"auto"``, they are as
-        dense as the motion requires: intervals are halved until the residuals are those of the initial curve, and
-        until more knots do not move the estimate. For a number or ``"auto"``, gaps of the data receive further knots,
-        as close together as those beside the gap.
+        Knots of the curve: their number, or an increasing array whose range includes all times. With ``"auto"``, they
+        are as dense as the motion requires: intervals are halved until the residuals agree with those of the initial
+        curve, and until further knots do not change the estimate. With a number or ``"auto"``, knots are added in gaps
+        of the data, as close together as those next to the gap.
     space : Space or str
         A space or its name. On ``se:3``, rotations and positions are estimated, each with its own λ, and the curve is
         the spline of the space through the estimated poses.
@@ -155,8 +155,8 @@ def estimate(
         Loss of measurements that do not have their own. The others limit the influence of outliers, which begins where
         the given standard deviations make a residual improbable.
     start : Curve, optional
-        Initial curve on the space. By default it follows from rates that are integrated and aligned with the measured
-        attitudes, from points, or from directions.
+        Initial curve on the space. By default it is computed from rates that are integrated and aligned with the
+        measured attitudes, from points, or from directions.
     tol : float, default 1e-3
         The iteration ends when no point and no constant moves by more than this fraction of its standard deviation.
     max_iter : int, default 50
@@ -164,16 +164,16 @@ def estimate(
     extrapolate, on_failure, progress : optional
         As for `CubicSpline`; `progress` receives the number of iterations and `max_iter`.
     skipna : bool, default False
-        True to omit samples of each measurement that are missing, where the time or a number is NaN, NaT or
-        masked. `measurements` of the curve are those without them. A `symspline.measure.Function` has no such samples.
+        True to omit missing samples of each measurement, where the time or a number is NaN, NaT or masked. The
+        attribute `measurements` of the curve does not contain them. `symspline.measure.Function` is not affected.
 
     Returns
     -------
     SmoothingSpline
         The curve, with its covariance. `parameters` holds the constants, `measurements` the data, and `residuals` one
-        array per measurement in standard deviations. ``report.sigma`` is the ratio of the residuals and the given
-        standard deviations, 1 if these are right; for a single `Points` without `sigma`, it is the estimated standard
-        deviation.
+        array per measurement in standard deviations. ``report.sigma`` is the ratio of the residuals to the given
+        standard deviations, about 1 if these are right. For a single `Points` without `sigma`, it is the estimated
+        standard deviation.
 
     Raises
     ------
@@ -185,10 +185,14 @@ def estimate(
     Warns
     -----
     SmoothingWarning
-        If a chosen λ is at a bound, if the residuals of a sensor are not those of independent noise with its standard
-        deviation (see Notes), if the curve is not close to the minimum because it turns far between two knots, if two
-        different curves agree equally well with the measurements, if the body turns by more than half a turn between
-        two knots, or if there are no given knots in a gap of the data.
+        In these cases:
+
+        - A chosen λ is at a bound.
+        - The residuals of a sensor are not those of independent noise with its standard deviation (see Notes).
+        - The curve is not close to the minimum, because it turns far between two knots.
+        - Two different curves agree equally well with the measurements.
+        - The body turns by more than half a turn between two given knots.
+        - A gap in the data contains no given knots.
 
     See Also
     --------
@@ -202,14 +206,14 @@ def estimate(
     The matrix is banded, with a border of one row per constant. The covariance is that of the linear problem. It uses
     the given standard deviations; without any, the noise level is estimated.
 
-    The residuals of each measurement are examined after the fit: their mean square with the leverage, the
-    autocorrelation of neighbours, partial sums that show jumps and drifts [2]_, outliers under least squares,
-    measurements that a robust loss rejects, and constants that are far from their priors. Sound recordings fail a check
-    about once in a thousand fits. Deviations of less than 10 % from a standard deviation are not reported, and
-    measurements with fewer than five times are not examined.
+    The residuals of each measurement are examined after the fit. The checks are the mean square, corrected for the
+    leverage; the lag-one autocorrelation; partial sums, which show jumps and drifts [2]_; outliers under least squares;
+    the share rejected by a robust loss; and the distances of constants from their priors. Recordings without a fault
+    fail a check about once in a thousand fits. Standard deviations that are wrong by less than 10 % are not reported.
+    Measurements with fewer than five times are not examined.
 
-    If the curve turns by more than about one radian between two knots, the solution of the linear problems may differ
-    from the minimum. The distance is then measured in standard deviations, and reported if it exceeds one half.
+    If the curve turns by more than about one radian between two knots, the solution of the linearised problem may
+    differ from the minimum. The distance is then computed in standard deviations, and reported if it exceeds 0.5.
 
     References
     ----------
@@ -333,7 +337,7 @@ def _smoothed(
         array = None if value is None else as_array(value, "measurements[0]")
         return value if array is None or array.shape[:1] != order.shape else array[order]
 
-    # Objects of other libraries as arrays.
+    # Convert objects of other libraries to arrays.
     parts = parts_of(given.y, space, "measurements[0].y")
     arrays = tuple(
         factor._array(part, "measurements[0].y") for factor, part in zip(factors_of(space), parts, strict=True)
@@ -341,7 +345,7 @@ def _smoothed(
     y = arrays if isinstance(space, Product) else arrays[0]
     weights, frames, sigma = given.weights, given.frames, None
     if given.sigma is not None:
-        # The objective is the sum of squares of residuals in standard deviations, whose noise has variance one.
+        # The residuals in the objective are in standard deviations, so that their noise has variance one.
         each = grouped(space, [cast(Any, term).precision(len(order)) for term in terms])
         of_factors = tuple(own[0] if len(own) == 1 else tuple(own) for own in each)
         weights, frames, sigma = of_factors if isinstance(space, Product) else of_factors[0], None, 1.0
@@ -372,7 +376,7 @@ def _knots(knots: Any, given: list[Measurement]) -> tuple[TimeAxis, Array, Doubl
         bad = np.flatnonzero(np.isnat(array) if array.dtype.kind in "Mm" else ~np.isfinite(array.astype(float)))
         if len(bad):
             raise ValidationError(f"measurements[{i}].t[{bad[0]}] is {array[bad[0]]}, but times must be finite{SKIPNA}")
-        # The smoothing of points alone warns itself.
+        # For points alone, `make_smoothing_spline` issues this warning.
         if len(given) > 1 or not isinstance(own, Points) or not _is_plain(own):
             warn_of_rounded_times(np.sort(array), f"measurements[{i}].t")
         each.append(array)
@@ -410,7 +414,7 @@ def _knots(knots: Any, given: list[Measurement]) -> tuple[TimeAxis, Array, Doubl
     if len(back):
         raise ValidationError(f"knots[{back[0] + 1}] is not after knots[{back[0]}], but knots must increase")
     data = np.empty(0)
-    # Times that do not suit the knots are refused later, by name.
+    # Times that do not match the knots raise a more specific error later.
     with contextlib.suppress(ValidationError):
         data, _ = axis.at(union, (), False)
     return axis, shown, data
@@ -479,7 +483,7 @@ def _curve(
     if not found.failure:
         ratio = audit(setup, found)
         if any(loss != "linear" for loss in setup.losses):
-            # The sum of squares of the iteration contains the weights of the loss.
+            # The sum of squares in the iteration contains the weights of the robust loss.
             found = found._replace(reports=[replace(report, sigma=ratio) for report in found.reports])
     factors = factors_of(space)
     parts, ends = [], []

@@ -1,4 +1,4 @@
-"""The search for an estimate: from which initial curves, with which knots, and which of several results is kept."""
+"""The search for an estimate: try initial curves and knots, and keep the best result."""
 
 from __future__ import annotations
 
@@ -19,37 +19,37 @@ from .solve import Iteration, Setup, Solution, fitted
 from .start import Start, starts
 from .terms import RateTerm
 
-# A sensor contradicts a curve if the mean square of its residuals exceeds the first number and so many of its standard
-# deviations.
+# A sensor contradicts a curve if the mean square of its residuals exceeds the first number by more than the second
+# number of standard errors.
 _LARGE, _DEVIATIONS = 1.5, 4.0
 # Knots are divided again if the residuals exceed their standard deviations by this factor and more knots may help.
 _MISSES = 1.2
-# Two results are equally good if their losses differ by less than this; they are different if they are farther apart
-# than this number of standard deviations.
+# Two results are equally good if their losses differ by less than the first number. They are different if they are
+# farther apart than the second number of standard deviations.
 _EQUAL, _APART = 10.0, 5.0
 # Points move by more than this number of standard deviations if there are too few knots.
 _MOVED = 0.5
-# The largest number of times that all intervals are divided, and that this happens without an effect.
+# Largest number of times that all intervals are divided, and that this is repeated without an effect.
 _HALVINGS, _IN_VAIN = 14, 2
-# With fewer knots per datum, the motion may be too fast for them, so that dividing them has no effect yet.
+# With fewer knots per datum than this, the motion may be so fast that dividing intervals has no effect at first.
 _FEW = 0.1
 _UNCONFIRMED = (
     "The automatic knots may be too few: the residuals are larger than the given standard deviations, and with twice "
     "as many knots the estimate does not converge. Check sigma, and pass knots."
 )
-# Intervals of given knots are gaps if they are so many times as long as usual ones.
+# Intervals of given knots are gaps if they are longer than this number of median intervals.
 _GAP = 5.0
 
 
 class Starts:
-    """Initial curves, the most promising first. Each is computed when it is asked for, and then kept."""
+    """Initial curves in decreasing order of promise, computed on demand and stored."""
 
     def __init__(self, setup: Setup, space: Space[Any], axis: TimeAxis, start: Any) -> None:
         self._coming = starts(setup, space, axis, start)
         self._known: list[Start] = []
 
     def __getitem__(self, number: int) -> Start:
-        """Return an initial curve, or raise IndexError."""
+        """Return the initial curve with this number; raise IndexError if there are fewer."""
         while len(self._known) <= number:
             following = next(self._coming, None)
             if following is None:
@@ -59,16 +59,16 @@ class Starts:
 
 
 class Search(NamedTuple):
-    """The best result.
+    """The best result of several initial curves.
 
     Attributes
     ----------
     found : Solution
-        The result.
+        The best result.
     rival : float
-        Distance in standard deviations to another result that is equally good; 0 if there is none.
+        Distance in standard deviations to another result that is equally good, or 0.
     place : int
-        Number of the knot at which that result is farthest away.
+        Index of the knot at which that result is farthest away.
     """
 
     found: Solution
@@ -76,12 +76,12 @@ class Search(NamedTuple):
     place: int = 0
 
     def warn_of_rival(self, shown: Array) -> None:
-        """Warn if there is another curve that is equally good."""
+        """Warn if another curve is equally good."""
         if self.rival:
             warn(
                 "Two different curves agree equally well with the measurements. The other one is up to "
-                f"{self.rival:.2g} standard deviations away, at {shown[self.place]}. Pass `start`, a Constant "
-                "with sigma, or further measurements that decide between them.",
+                f"{self.rival:.2g} standard deviations away, at t = {shown[self.place]}. To decide between them, pass "
+                "`start`, a Constant with sigma, or further measurements.",
                 SmoothingWarning,
             )
 
@@ -98,7 +98,7 @@ def _run(setup: Setup, start: Start, progress: Progress | None) -> Solution:
 
 
 def solved(setup: Setup, begin: Starts, progress: Progress | None) -> Search:
-    """Iterate from the first initial curve, and from others if its result is not convincing; keep the best result."""
+    """Iterate from the first initial curve, and from further ones while a sensor contradicts the best result."""
     best: Solution | None = None
     refused: SymsplineError | None = None
     rival, place = 0.0, 0
@@ -160,8 +160,8 @@ def automatic(
 ) -> tuple[Array, Setup, Search]:
     """Choose the knots, and estimate.
 
-    The first knots reproduce the initial curve. All intervals are divided until no point moves by more than half of its
-    standard deviation, and until the residuals do not become smaller.
+    The first knots reproduce the initial curve. All intervals are then divided until no point moves by more than half
+    of its standard deviation and the residuals do not decrease.
     """
 
     def with_knots(knots: Doubles) -> tuple[Array, Setup]:
@@ -209,7 +209,7 @@ def automatic(
 
 
 def _misses(found: Solution) -> bool:
-    """Whether the residuals are so large that there may be too few knots."""
+    """Whether the residuals are so large that more knots may be needed."""
     return float(found.reports[0].sigma) > _MISSES
 
 
@@ -230,7 +230,7 @@ def _moved(coarse: Setup, before: Solution, fine: Setup, found: Solution) -> flo
 
 
 def warn_of_gaps(shown: Array, knots: Doubles, data: Doubles) -> None:
-    """Warn if there are no given knots in a gap between data."""
+    """Warn if a gap in the data contains no given knots."""
     h = np.diff(knots)
     if len(h) < 4 or not len(data):
         return
@@ -240,9 +240,9 @@ def warn_of_gaps(shown: Array, knots: Doubles, data: Doubles) -> None:
     if long.any():
         i = int(np.argmax(np.where(long, h, 0)))
         warn(
-            f"There are no data and no knots between knots[{i}] = {shown[i]} and knots[{i + 1}] = {shown[i + 1]}. One "
-            "cubic joins them, and bands are too narrow there. Add knots in this gap, as close together as beside it, "
-            "or pass their number.",
+            f"There are no data and no knots between knots[{i}] = {shown[i]} and knots[{i + 1}] = {shown[i + 1]}. The "
+            "curve is a single cubic there, and its bands are too narrow. Add knots in this gap, as close together as "
+            "next to it, or pass the number of knots.",
             SmoothingWarning,
         )
 
@@ -255,7 +255,7 @@ def warn_of_turns(setup: Setup, shown: Array) -> None:
         order = np.argsort(term.times, kind="stable")
         t, omega = term.times[order], term.omega[order]
         angles = np.concatenate([np.zeros((1, 3)), np.cumsum(0.5 * np.diff(t)[:, None] * (omega[1:] + omega[:-1]), 0)])
-        # The turn about a fixed axis is a lower bound, which noise does not affect much.
+        # The norm of the integrated rates is a lower bound of the turn, and hardly affected by noise.
         at = np.stack([np.interp(setup.knots, t, row) for row in angles.T], axis=-1)
         turns = np.linalg.norm(np.diff(at, axis=0), axis=1)
         i = int(np.argmax(turns))

@@ -30,12 +30,13 @@ _SETTLED, _ROUNDS = 3e-3, 12
 _NEAR = 3.0
 # The number of times that a step is halved.
 _RETREATS = 6
-# From this ratio of a step to the one before on, steps go back and forth, and are shortened.
+# Steps whose ratio to the one before is below this number alternate in direction and are shortened.
 _BACK = -0.3
 # The relative accuracy of the objective: a step changes it by less where the gradient is that of the linear problem.
 _ROUNDING = 1e-5
-# From this turn between two knots on, the solution of the linear problems may differ from the minimum. It is then
-# measured by so many samples and differences of this part of a standard deviation.
+# If the curve turns by more than this angle between two knots, the solution of the linear problem may differ from the
+# minimum. The difference is then estimated from this number of samples, with steps of this fraction of a standard
+# deviation.
 _TURN, _SAMPLES, _SMALL = 0.9, 6, 0.05
 # Parameters are not determined if the measurements leave less than this fraction of their information.
 _SINGULAR = 1e-12
@@ -49,7 +50,7 @@ class Setup(NamedTuple):
     spaces : tuple of Space
         The parts of the space.
     knots : ndarray
-        Knots as the core counts them.
+        Knots in the units of the core.
     terms : list of Term
         Measurements.
     losses : list of str
@@ -113,9 +114,9 @@ class Solution(NamedTuple):
     turn : float
         Largest distance that the curve covers between two knots, in units of the radius of curvature of its space.
     distance : float
-        Distance from the minimum in standard deviations, 0 where the turn is too small for a difference.
+        Distance from the minimum in standard deviations; 0 if `turn` is so small that it is not computed.
     failure : str
-        What went wrong, or "".
+        Description of a failure, or "".
     """
 
     points: list[Array]
@@ -212,10 +213,10 @@ class Choice:
 
 
 class Relaxation:
-    """Shorter steps where the iteration goes back and forth.
+    """Shorten steps while the iteration oscillates.
 
-    A time offset and a lively curve depend on each other in a way that the linear problem does not contain, so that
-    steps may be twice as long as the distance to the solution. The factor is that of the secant through two steps.
+    The linear problem does not contain the interaction of a time offset with fast motion, so that steps may be twice as
+    long as the distance to the solution. The factor is that of the secant through two steps.
 
     References
     ----------
@@ -386,8 +387,8 @@ class Iteration:
     def _distance(self, found: Linear) -> float:
         """Return the distance from the minimum of the objective in standard deviations, the Newton decrement.
 
-        The linear problem moves the curve by splines in frames along it. The splines through moved points differ from
-        these where the curve turns far between knots, and so does the minimum. With samples ξ of the posterior
+        The linear problem moves the curve by splines in frames along it. Where the curve turns far between knots, these
+        differ from the splines through the moved points, and the minima differ as well. With samples ξ of the posterior
         N(0, A⁻¹) and the gradient g, the squared decrement gᵀA⁻¹g is the mean of (gᵀξ)².
         """
         setup, points, curves = self.setup, self.points, self.curves

@@ -233,7 +233,7 @@ class PointsSpline(SmoothingSpline[P, Any]):
         given : Points
             The points of the user.
         terms : list of Term
-            The same points in every part, with standard deviations of one if the user gave none.
+            The same points in every part, with standard deviations of one if none were given.
         """
         found = []
         for term in terms:
@@ -253,7 +253,7 @@ class PointsSpline(SmoothingSpline[P, Any]):
 
     @property
     def measurements(self) -> tuple[Any, ...]:
-        """The points from which the curve was estimated; empty for a curve from a file."""
+        """Points from which the curve was estimated; empty for a curve loaded from a file."""
         return self._measurements
 
     @property

@@ -1,4 +1,4 @@
-"""The initial curves of an estimate: integrated rates, smoothed points, or the attitudes of seen directions."""
+"""Initial curves of an estimate, from integrated rates, smoothed points, or attitudes computed from directions."""
 
 from __future__ import annotations
 
@@ -23,20 +23,21 @@ from .solve import Setup
 from .terms import Body, DirectionTerm, ForceTerm, InformationTerm, PointTerm, RateTerm, Values, VelocityTerm
 
 _SO3 = SpecialOrthogonal(3)
-# The points of a curve at times of the core.
+# Function that returns points of a curve at times of the core.
 PathOfPart = Callable[[Doubles], Array]
-# The largest number of knots of smoothed points, and with dense attitudes and rates, where the iteration adds the rest.
+# Largest numbers of knots of smoothed points: in general, and with dense attitudes and rates, where the iteration adds
+# the details.
 _MOST, _MOST_WITH_RATES = 2000, 200
 # Points at which velocities are given have this many times the standard deviation of other points.
 _BESIDE = 2.0
 # Attitudes alone determine a path that turns by less than this angle from one to the next.
 _SMALL = 1.0
-# Fewer attitudes than these do not determine the bias of rates if they are wrong.
+# With fewer attitudes, wrong ones cannot be recognised, and the bias of rates is not determined.
 _FEW = 3
 
 
 class Start(NamedTuple):
-    """Where an iteration begins.
+    """Initial curve and parameters of an iteration.
 
     Attributes
     ----------
@@ -55,7 +56,7 @@ class Start(NamedTuple):
 
 
 def starts(setup: Setup, space: Space[Any], axis: TimeAxis, start: Any) -> Iterator[Start]:
-    """Return initial curves, the most promising first. Each is computed when it is asked for."""
+    """Yield initial curves in decreasing order of promise, computed on demand."""
     if start is not None:
         if not isinstance(start, Curve) or start.space != space:
             raise ValidationError(f"start must be a curve on {space!r}, not {short_repr(start)}")
@@ -77,7 +78,7 @@ def _joined(parts: list[Start]) -> Start:
 
 
 def _of_curve(start: Any, axis: TimeAxis, part: int) -> PathOfPart:
-    """Return the path of one part of a curve of the user."""
+    """Return the path of one part of a curve passed by the user."""
 
     def path(x: Doubles) -> Array:
         points = start(axis.shown(x, ()), extrapolate="geodesic")
@@ -120,7 +121,7 @@ def _candidates(setup: Setup, part: int, space: Space[Any]) -> list[Callable[[],
         if forces or (seen and several < _FEW) or not several:
             found.insert(0 if several < _FEW else 1, by_vectors)
         if spread and not setup.automatic and _are_dense(setup, points, rates):
-            # The motion between the attitudes is so small that they suffice, which takes less time.
+            # The motion between attitudes is so small that attitudes alone suffice, which is faster.
             return [lambda: _smoothed(setup, space, points, [], _MOST_WITH_RATES), *found]
     beside = [term for term in setup.terms if isinstance(term, VelocityTerm) and term.parts == [part]]
     if beside and not isinstance(space, Euclidean):
@@ -175,7 +176,7 @@ def _smoothed(
     y = np.concatenate([*(term.y for term in points), *(term.y for term in beside)])
     sigma = np.concatenate([*scales, *(np.full(len(term.times), _BESIDE * typical) for term in beside)])
     order = np.argsort(times, kind="stable")
-    # With automatic knots, there are only a few at first.
+    # Automatic knots are few at first, so they do not limit the number.
     count = None if setup.automatic else min(len(np.unique(times)), max(len(setup.knots), 2), most)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -200,7 +201,7 @@ def _smoothed(
 
 
 def _signed(path: PathOfPart, points: list[PointTerm | InformationTerm]) -> PathOfPart:
-    """Return a path of unit quaternions, of the sign that most of the measured ones have."""
+    """Return a path of unit quaternions with the sign of most of the measured ones."""
 
     def signed(x: Doubles) -> Array:
         found = path(x)
@@ -218,7 +219,7 @@ class _Seen(NamedTuple):
 
 
 def _attitudes(space: Space[Any], points: list[PointTerm | InformationTerm], seen: list[DirectionTerm]) -> list[_Seen]:
-    """Return measured attitudes, or those of several directions that are seen at the same time if there are few."""
+    """Return measured attitudes; if they are few, also attitudes computed from simultaneous directions."""
     found = [
         _Seen(Attitudes(term.times, Body(space).matrices(term.y), _scales(term)), term.time_offset) for term in points
     ]
@@ -241,7 +242,7 @@ def _with_rates(
     attitudes: list[_Seen],
     smoothed: Callable[[Doubles], Doubles] | None,
 ) -> Start:
-    """Return the integrated rates, aligned with measured attitudes, with the bias and the time offset that follow."""
+    """Return the integrated rates, aligned with measured attitudes, and estimates of the bias and the time offset."""
     first = max(rates, key=_coverage)
     name, values = first.time_offset, setup.constants
 
@@ -249,7 +250,7 @@ def _with_rates(
         return 0.0 if term_offset is None else float(values[term_offset].start[0])
 
     names = {own.time_offset for own in attitudes}
-    # Attitudes with different offsets: those with none, or those that are most numerous.
+    # Of attitudes with different time offsets, use those without an offset, or else the most numerous ones.
     chosen = None if None in names else max(names, key=lambda one: sum(one == own.time_offset for own in attitudes))
     own = [each.attitudes for each in attitudes if each.time_offset == chosen]
     times = np.concatenate([each.times for each in own]) + began(chosen)
@@ -264,7 +265,7 @@ def _with_rates(
     low, high = float(setup.knots[0]), float(setup.knots[-1])
     offset = None
     if name != chosen and name is not None:
-        # Later rates are earlier attitudes.
+        # Shifting the rates to later times is equivalent to shifting the attitudes to earlier times.
         offset = (0.0, float(given.times[-1]) - high, float(given.times[0]) - low)
     elif name != chosen and chosen is not None:
         offset = (0.0, low - float(data.times[0]), high - float(data.times[-1]))
@@ -287,13 +288,13 @@ def _with_rates(
 
 
 def _coverage(term: RateTerm) -> float:
-    """Return the time in which there are rates."""
+    """Return the total time that is covered by rates."""
     steps = np.diff(np.sort(term.times))
     return float(np.minimum(steps, 10 * np.median(steps)).sum()) if len(steps) else 0.0
 
 
 def _relative(first: RateTerm, other: RateTerm) -> Doubles:
-    """Return the bias of one gyroscope minus that of another; zero if they have no times in common."""
+    """Return the bias of `other` minus that of `first`; zero if their times do not overlap."""
     order = np.argsort(first.times, kind="stable")
     t = first.times[order]
     both = (other.times >= t[0]) & (other.times <= t[-1])
@@ -304,7 +305,7 @@ def _relative(first: RateTerm, other: RateTerm) -> Doubles:
 
 
 def _rates_of(setup: Setup, first: RateTerm, others: list[RateTerm]) -> Rates:
-    """Return the rates of one gyroscope. Others fill the gaps that it has."""
+    """Return the rates of one gyroscope, with rates of others in its gaps."""
     times, omega = first.times, _without_spikes(setup, first)
     for other in others:
         known = np.unique(times)
@@ -346,7 +347,7 @@ _Vectors = tuple[Doubles, Doubles, Doubles]
 # The number of windows with which an initial attitude is aligned in turn, and the ratio of singular values from which
 # vectors determine a rotation.
 _WINDOWS, _RANK = 7, 1e-3
-# The smallest number of times at which the windows lie.
+# Smallest number of times at which windows are placed.
 _GRID = 100
 
 

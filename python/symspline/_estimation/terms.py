@@ -44,7 +44,7 @@ from .measurements import (
 )
 
 _SO3, _S3, _R3 = SpecialOrthogonal(3), Sphere(3), Euclidean(3)
-# Directions whose lengths differ from those of the references by less than this part of σ are normalised.
+# Directions count as normalised if their lengths differ from those of the references by less than this fraction of σ.
 _NORMALISED = 0.1
 # Values of the parameters by name.
 Values = dict[str, Doubles]
@@ -85,7 +85,7 @@ class Term:
     noise : ndarray, shape (n, d)
         Standard deviations.
     rows : ndarray of int, shape (n,)
-        Numbers of these measurements among those of the user.
+        Indices of these measurements among those passed by the user.
     constants : dict
         Parameters by name.
     """
@@ -148,7 +148,7 @@ class Term:
         return found
 
     def informative(self, residuals: Doubles) -> Doubles:
-        """Return whitened residuals for an audit; those of measurements without information are NaN."""
+        """Return whitened residuals for the audit; entries without information are NaN."""
         return residuals
 
     def linearised(
@@ -169,7 +169,7 @@ class Term:
         spacing : float
             Mean distance of the knots.
         derivatives : bool
-            Whether the derivatives are needed; without them only the residuals are computed.
+            Whether to compute derivatives in addition to the residuals.
         """
         times = self.shifted_times(values)
         motion = motion_at(times, self.parts, self.nu)
@@ -344,7 +344,7 @@ class DirectionTerm(Term):
         sigma = self.noise.reshape(self.seen.shape)[..., 0]
         if np.any(np.abs(lengths - known) > _NORMALISED * sigma) or np.any(lengths == 0):
             return residuals
-        # Normalised vectors have no noise along them: the plane across has two coordinates.
+        # Normalised vectors have no noise along their direction, so that the residuals have two coordinates.
         along = np.eye(3)[np.abs(self.seen).argmin(axis=-1)]
         first = np.cross(self.seen, along)
         first /= np.linalg.norm(first, axis=-1, keepdims=True)

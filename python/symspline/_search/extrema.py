@@ -126,7 +126,7 @@ def extrema(f: Function, knots: Doubles, sign: float, noise: Doubles) -> Doubles
 def _prominent(f: Function, intervals: Intervals, knots: Doubles, sign: float, found: Doubles) -> Doubles:
     """Return the maxima on both sides of which the function falls by more than its rounding errors.
 
-    Of several maxima between which it does not, the largest one counts.
+    Of several maxima that are not separated by such a fall, only the largest one is returned.
     """
     sampled = np.concatenate([knots[:1], _nodes(intervals.a, intervals.b).ravel(), knots[-1:]])
     values = sign * np.concatenate([f(knots[:1]), intervals.values.ravel(), f(knots[-1:])])
@@ -165,7 +165,7 @@ def _prominent(f: Function, intervals: Intervals, knots: Doubles, sign: float, f
 
 
 def _candidates(f: Function, intervals: Intervals, knots: Doubles, sign: float) -> Doubles:
-    """Return the times of all maxima, those of rounding errors among them."""
+    """Return the times of all maxima, including those caused by rounding errors."""
     scale = float(np.abs(intervals.values).max())
     slopes = sign * chebyshev.chebder(intervals.coefficients)
     tau = np.linspace(-1, 1, _SIGNS)

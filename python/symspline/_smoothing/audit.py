@@ -1,7 +1,7 @@
-"""Audit of the residuals of a fit: whether they are those of independent noise with the given standard deviations.
+"""Test whether the residuals of a fit are those of independent noise with the given standard deviations.
 
-Each check compares a statistic with a limit that sound data exceed about once in 10⁴ fits. Practical limits are added,
-because in long recordings deviations that do not matter are significant.
+Each check compares a statistic with a limit that data without a fault exceed about once in 10⁴ fits. A second limit on
+the size of the effect is needed because negligible deviations are statistically significant in long recordings.
 """
 
 from __future__ import annotations
@@ -16,37 +16,38 @@ from .._spaces import Doubles
 
 # Quantiles of χ² at which the losses begin to grow more slowly, as in `loss.rs`.
 _CORNERS = {"huber": 0.82, "cauchy": 0.95}
-# Relative size of a root of an information matrix that is a rounding error.
+# Eigenvalues of a root of an information matrix below this relative size are rounding errors.
 _NOTHING = 1e-6
-# Limits of normal numbers: of the mean square, and of the autocorrelation.
+# Limit, in standard deviations, of the mean square and of the autocorrelation.
 SIGNIFICANT = 4.5
-# Ratios of residuals and σ below this factor, and its inverse, do not matter. Medians, which measure the ratio under a
-# robust loss, also grow with the share of outliers.
+# Ratios of residuals to σ between this factor and its inverse are negligible. The second factor is for robust losses,
+# where medians measure the ratio and grow with the share of outliers.
 _RATIO, _ROBUST_RATIO = 1.1, 1.6
-# Autocorrelations below this do not matter. From the second on, a wrong σ is not the cause.
+# Autocorrelations below the first number are negligible; those above the second are not caused by a wrong σ.
 _CORRELATED, _SMOOTH = 0.1, 0.3
-# Limit of the largest centred partial sum (Ploberger and Krämer 1992), and the part of √n that does not matter: steps
-# of a quarter of the standard deviation.
+# Limit of the largest centred partial sum (Ploberger and Krämer 1992), and the negligible size as a fraction of √n. It
+# corresponds to steps of a quarter of the standard deviation.
 _PARTIAL_SUM, _STEP = 2.0, 0.0625
-# Limit of the largest residual, and the probability that normal residuals of a long recording exceed it.
+# Smallest limit of the largest residual. In long recordings, normal residuals exceed the limit with this probability.
 _LARGEST, _PROBABILITY = 6.0, 1e-5
-# Share of the measurements that a robust loss may reject, and the multiple of its corner at which it does.
+# Share of the measurements that a robust loss may reject, and the multiple of its corner beyond which it rejects them.
 _REJECTED, _BEYOND = 0.3, 9.0
-# Consecutive rejected measurements that are too many, and their share of all: outliers of a sensor are mostly isolated.
+# More consecutive rejected measurements than this number, and than this share of all, are reported, because outliers of
+# a sensor are mostly isolated.
 _RUN, _RUN_SHARE = 8, 0.05
 # The same for smoothing, where every datum is a point: six in a row are rare among 15 % of isolated outliers.
 _RUN_OF_DATA, _SHARE_OF_DATA = 5, 0.02
-# Residuals below this part of σ are those of data without noise.
+# Residuals below this fraction of σ are those of data without noise.
 _EXACT = 1e-6
-# Fewer measurements, or a larger leverage, leave no residuals to examine.
+# Residuals of fewer measurements, or with a larger leverage, are not examined.
 _FEWEST, _LEVERAGE = 5, 0.9
-# If a fit estimates the noise level itself: the limit of its ratio to the noise that neighbouring data show, and the
-# leverage up to which the residuals of a curve have nearly the covariance of the noise. Beyond it only outliers are
-# looked for, with a limit larger by a factor, up to the last leverage.
+# For fits that estimate the noise level: the limit of the ratio of the residuals to the noise estimated from
+# neighbouring data, and the leverage up to which the residuals have nearly the covariance of the noise. Beyond this
+# leverage, only outliers are tested, with a limit multiplied by the third number, up to the fourth number.
 _NEIGHBOURS, _MODERATE, _UNEVEN, _HIGH = 1.75, 0.3, 1.5, 0.6
-# Fewer data are not examined then. Outliers are compared with so many data on both sides.
+# For such fits, the least number of data, and the number of data on either side with which an outlier is compared.
 _FEW_DATA, _NEAR = 20, 10
-# The median of χ² with so many degrees of freedom has this share of the information about the variance.
+# Efficiency of the median of squares as an estimate of the variance, relative to that of the mean square.
 _EFFICIENCY = 0.37
 
 
@@ -67,7 +68,7 @@ class Residuals(NamedTuple):
     corner : float
         Square of the standardised length at which the loss begins to grow more slowly; infinite for least squares.
     exact : bool
-        Whether residuals that are too small matter. They do not for conditions that are imposed as measurements.
+        Whether residuals that are too small are reported. They are expected for conditions imposed as measurements.
     """
 
     rows: Doubles
@@ -84,7 +85,7 @@ class Finding(NamedTuple):
     Attributes
     ----------
     ratio : float
-        Ratio of the residuals and σ, 1 for a right σ; NaN if it cannot be determined.
+        Ratio of the residuals to σ: 1 if σ is right, NaN if the ratio cannot be determined.
     freedom : float
         Degrees of freedom of the residuals.
     correlation : float
@@ -92,9 +93,9 @@ class Finding(NamedTuple):
     large, small, correlated : bool
         Whether the residuals are too large, too small, or correlated.
     step : int or None
-        Row before which the residuals change their mean.
+        First row after a change of the mean of the residuals.
     outliers : ndarray of int
-        Rows with outliers under least squares, the largest first.
+        Rows of outliers under least squares, in decreasing order of size.
     largest : float
         The largest residual.
     rejected : float
@@ -136,7 +137,7 @@ def corner_of(loss: str, d: int) -> float:
 
 
 def roots_of(information: Doubles) -> tuple[Doubles, NDArray[np.bool_]]:
-    """Return matrices R with RᵀR = W for information matrices W, and which of their rows contain information."""
+    """Return matrices R with RᵀR = W for information matrices W, and a mask of their rows with information."""
     values, vectors = np.linalg.eigh(information)
     roots = np.sqrt(np.maximum(values, 0.0))
     known = roots > _NOTHING * roots.max(axis=-1, keepdims=True)
@@ -144,7 +145,7 @@ def roots_of(information: Doubles) -> tuple[Doubles, NDArray[np.bool_]]:
 
 
 def normal_of_chi_squared(ratio: float, freedom: float) -> float:
-    """Return the normal number of a χ² divided by its degrees of freedom (Wilson and Hilferty 1931)."""
+    """Transform χ² divided by its degrees of freedom to a standard normal score (Wilson and Hilferty 1931)."""
     spread = 2.0 / (9.0 * freedom)
     return float((np.cbrt(ratio) - (1.0 - spread)) / np.sqrt(spread))
 
@@ -155,7 +156,7 @@ def median_square(squares: Doubles, d: int) -> float:
 
 
 def autocorrelation(rows: Doubles) -> tuple[float, int]:
-    """Return the lag-one autocorrelation of all columns, and the number of products from which it follows."""
+    """Return the lag-one autocorrelation of all columns, and the number of products in the estimate."""
     products = rows[1:] * rows[:-1]
     count = int(np.isfinite(products).sum())
     square = float(np.nanmean(rows**2))
@@ -216,20 +217,20 @@ def examine(given: Residuals) -> Finding:
     squares = np.nansum(rows**2, axis=1)
     robust = given.loss != "linear"
     scale = median_square(squares[used], max(1, round(count / used.sum()))) / left
-    found = Finding(freedom=count * left)
+    finding = Finding(freedom=count * left)
     if robust:
-        # Outliers would dominate moments.
+        # Outliers would dominate the mean square, so the median replaces it.
         square, efficiency, limit = scale, _EFFICIENCY, _ROBUST_RATIO
         far = squares > _BEYOND * given.corner
         share = float(np.mean(far[used]))
         run = long_run(far, max(_RUN, _RUN_SHARE * len(far)))
-        found = found._replace(rejected=share if share > _REJECTED else 0.0, run=run)
+        finding = finding._replace(rejected=share if share > _REJECTED else 0.0, run=run)
         rows = np.where(squares[:, None] > max(1.0, scale) * given.corner, np.nan, rows)
     else:
         sizes = np.nanmax(np.where(known, np.abs(rows), 0.0), axis=1)
-        # If σ is too small, residuals are compared with their own scale.
+        # If σ is too small, residuals are compared with their median instead.
         far = np.flatnonzero(sizes > largest_expected(count) * np.sqrt(max(1.0, scale)))
-        found = found._replace(largest=float(sizes.max()), outliers=far[np.argsort(-sizes[far])])
+        finding = finding._replace(largest=float(sizes.max()), outliers=far[np.argsort(-sizes[far])])
         inner = np.delete(rows, far, axis=0)
         square, efficiency, limit = float(np.nanmean(inner**2)) / left, 1.0, _RATIO
     freedom = count * left * efficiency
@@ -239,16 +240,16 @@ def examine(given: Residuals) -> Finding:
     least = square / left
     small = given.exact and normal_of_chi_squared(least, freedom * left) < -SIGNIFICANT and least < _RATIO**-2
     small = small and least > _EXACT**2
-    found = found._replace(ratio=float(np.sqrt(least if small else square)), large=large, small=small)
-    # Residuals that are smaller than σ contain no effect that matters.
+    finding = finding._replace(ratio=float(np.sqrt(least if small else square)), large=large, small=small)
+    # Residuals smaller than σ contain only negligible effects.
     if small or square < _EXACT**2 or np.isfinite(rows).any(axis=1).sum() < _FEWEST:
-        return found
+        return finding
     correlation, products = autocorrelation(rows)
     correlation += given.between / left
     correlated = correlation * np.sqrt(products) > SIGNIFICANT and correlation > _CORRELATED
     value, step = largest_partial_sum(rows)
     jumps = value > max(_PARTIAL_SUM, _STEP * np.sqrt(len(rows)))
-    return found._replace(correlation=correlation, correlated=correlated, step=step if jumps else None)
+    return finding._replace(correlation=correlation, correlated=correlated, step=step if jumps else None)
 
 
 class SmoothingFinding(NamedTuple):
@@ -257,7 +258,7 @@ class SmoothingFinding(NamedTuple):
     Attributes
     ----------
     ratio : ndarray
-        Ratio of the residuals and the noise that neighbouring data show, if it is too large, else 1.
+        Ratio of the residuals to the noise estimated from neighbouring data if it is too large, else 1.
     correlation : ndarray
         Lag-one autocorrelation of the residuals, corrected for the leverage, if it is too large or too small, else 0.
     outliers : ndarray of bool, shape (curves, n)
@@ -287,10 +288,10 @@ def examine_smoothing(rows: Doubles, neighbours: Doubles, leverage: Doubles, rob
     Parameters
     ----------
     rows : ndarray, shape (curves, n, d)
-        Residuals for weight one, in the order of time; NaN without information.
+        Residuals scaled to weight one, in the order of time; NaN where there is no information.
     neighbours : ndarray, shape (curves, n - 2)
-        Squared deviations of data from the geodesics between their neighbours, divided by the variance for unit noise;
-        NaN if there is none.
+        Squared deviations of data from the geodesics between their neighbours, divided by their variance for unit
+        noise; NaN where a neighbour is missing.
     leverage : ndarray, shape (curves,)
         Mean leverage of the data.
     robust : bool
@@ -307,10 +308,11 @@ def examine_smoothing(rows: Doubles, neighbours: Doubles, leverage: Doubles, rob
     filled = np.where(known, rows, 0.0)
     scale = _median(np.where(used, (filled**2).sum(axis=2), np.nan)) / chi / left
     noise = _median(neighbours) / chi
-    # Where the residuals vanish, the curve is exact. Neighbours that agree exactly, as rounded data do, show no noise.
+    # If the median residual is zero, the curve is exact. Equal neighbours, as of rounded data, contain no estimate of
+    # the noise.
     enough = (counts >= _FEW_DATA) & (leverage <= _HIGH) & (scale > 0) & (noise > 0)
     enough &= np.isfinite(neighbours).sum(axis=1) >= _FEW_DATA // 2
-    # The ratio of few data varies.
+    # The limit is larger for few data, whose ratio varies more.
     stiff = enough & moderate & (scale > (_NEIGHBOURS * (1 + 2 / np.sqrt(np.maximum(counts, 1)))) ** 2 * noise)
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.where(stiff, np.sqrt(scale / noise), 1.0)
@@ -327,7 +329,7 @@ def examine_smoothing(rows: Doubles, neighbours: Doubles, leverage: Doubles, rob
     correlated = np.abs(correlation) > np.maximum(_CORRELATED, SIGNIFICANT / np.sqrt(products))
     outliers = far & enough[:, None] & (not robust)
     for curve, i in np.argwhere(outliers):
-        # Noise that varies along the curve has large residuals next to each other.
+        # Where the noise is larger along a part of the curve, neighbouring residuals are large as well.
         near = np.concatenate([sizes[curve, max(0, i - _NEAR) : i], sizes[curve, i + 1 : i + 1 + _NEAR]])
         outliers[curve, i] = sizes[curve, i] > limit[curve] * max(1.0, float(np.median(near)))
     # A burst of motion looks like consecutive outliers.

@@ -1,4 +1,4 @@
-"""Audit of smoothing splines: warnings about residuals that are not those of independent noise."""
+"""Warn about residuals of smoothing splines that are not those of independent noise."""
 
 from __future__ import annotations
 
@@ -19,25 +19,25 @@ from .posterior import coordinates
 from .solve import Smoothed
 from .warned import SmoothingWarning
 
-# Ratios of common units, and how near a ratio must be to them, as a logarithm.
+# Ratios of common units, and the largest difference of a logarithm of a ratio from theirs.
 DEGREES, _UNITS, _NEAR = 180 / np.pi, {1e3: "1000, the ratio of m and mm, or of s and ms"}, 0.15
 
 _STIFF = (
-    "The curve is too stiff, or the noise is correlated, as that of rounded or repeated data and of filters. Compare "
-    "plots of the curve and the data; pass criterion='reml', a smaller lam or more knots for a stiff curve, "
-    "and do not use the bands for correlated noise."
+    "Either the curve is too stiff, or the noise is correlated, as in rounded, repeated or filtered data. Plot the "
+    "curve with the data. If the curve is too stiff, pass criterion='reml', a smaller lam or more knots. If the noise "
+    "is correlated, do not use the bands."
 )
 
 
 class Sensor(NamedTuple):
-    """Data of one kind in one part of the space, and what the audit found.
+    """Data of one kind in one part of the space, with the result of the audit.
 
     Attributes
     ----------
     name, label : str
-        Name with the kind of data, and the name by which the user can change it.
+        Name with the kind of data, and name of the argument.
     numbers : ndarray of int
-        Number of each row among the data of the user.
+        Index of each row among the data passed by the user.
     finding : Finding
         Result of the audit.
     """
@@ -70,8 +70,8 @@ def warn_of_residuals(
     smoothed : list of Smoothed
         Results in every part.
     given, chosen : list of ndarray of bool
-        Whether the standard deviation is given, and whether λ was chosen, for each curve in every part. Without either,
-        the user has decided how closely the curve follows the data, and nothing is examined.
+        Whether the standard deviation is given, and whether λ was chosen, for each curve in every part. Curves with
+        neither are not examined, because the user has decided how closely they follow the data.
     loss : str
         Loss of all data.
     """
@@ -100,7 +100,7 @@ def warn_of_residuals(
 
 
 class _Examined(NamedTuple):
-    """Standardised residuals of some curves in one part, for weight one.
+    """Residuals of some curves in one part, scaled to weight one.
 
     Attributes
     ----------
@@ -146,7 +146,7 @@ class _Examined(NamedTuple):
         return cls(space, rows, deviations, np.minimum(df / counts, 1.0), sigma)
 
     def complaints(self, known: NDArray[np.bool_], loss: str) -> Iterator[tuple[int, str]]:
-        """Yield the numbers of curves with failed checks, and the checks with their remedies.
+        """Yield the number of each curve with failed checks, and a text with these checks and their remedies.
 
         Parameters
         ----------
@@ -191,15 +191,15 @@ def _of_estimated(finding: SmoothingFinding, curve: int) -> str:
     count, first = int(np.count_nonzero(sizes)), int(sizes.argmax())
     facts, remedies = [], []
     if ratio > 1:
-        facts.append(f"they are {ratio:.2g} times as large as the noise that neighbouring data show")
+        facts.append(f"they are {ratio:.2g} times as large as the noise estimated from neighbouring data")
     if correlation:
-        facts.append(f"neighbours have a correlation of {correlation:.2f}")
+        facts.append(f"neighbouring residuals have a correlation of {correlation:.2f}")
     if ratio > 1 or correlation > 0:
         remedies.append(_STIFF)
     if correlation < 0:
         remedies.append(
-            "Alternating residuals show a motion that is too fast for the sampling. Check the times and units, or pass "
-            "more data per turn."
+            "Residuals of alternating sign indicate a motion that is too fast for the sampling. Check the times and "
+            "units, or sample more often."
         )
     run = finding.runs[curve]
     if run:
@@ -209,8 +209,8 @@ def _of_estimated(finding: SmoothingFinding, curve: int) -> str:
         )
     if count:
         which = "one outlier" if count == 1 else f"the largest of {count} outliers"
-        facts.append(f"{which}, number {first}, is {sizes[first]:.2g} times the noise")
-        remedies.append("Pass loss='cauchy' if these are outliers.")
+        facts.append(f"{which}, at index {first}, is {sizes[first]:.2g} times the noise")
+        remedies.append("If these are outliers, pass loss='cauchy'.")
     return f"{', '.join(facts)}. {' '.join(remedies)}"
 
 
@@ -223,63 +223,61 @@ def described(sensor: Sensor) -> str:
     if finding.correlated:
         facts.append(f"neighbouring residuals have a correlation of {finding.correlation:.2f}")
     if finding.step is not None:
-        facts.append(f"the mean of the residuals changes at {_at(sensor, finding.step)}")
+        facts.append(f"the mean of the residuals changes at index {sensor.numbers[finding.step]}")
     if len(finding.outliers):
         count = len(finding.outliers)
         which = "one outlier" if count == 1 else f"the largest of {count} outliers"
-        facts.append(f"{which}, {_at(sensor, int(finding.outliers[0]))}, is {finding.largest:.2g} times sigma")
+        facts.append(f"{which}, at index {sensor.numbers[finding.outliers[0]]}, is {finding.largest:.2g} times sigma")
     if finding.rejected:
         facts.append(f"the loss rejects {finding.rejected:.0%} of the measurements")
     if finding.run:
         first, last = finding.run
-        times = " to ".join(f"{_at(sensor, row)}" for row in finding.run)
-        facts.append(f"the loss rejects {last - first + 1} consecutive measurements, {times}")
+        where = f"from index {sensor.numbers[first]} to {sensor.numbers[last]}"
+        facts.append(f"the loss rejects {last - first + 1} consecutive measurements, {where}")
     return f"{sensor.name}: {', '.join(facts)}."
 
 
 def advice(sensors: list[Sensor]) -> list[str]:
-    """Return what may have caused the failed checks, and the remedies."""
-    found = []
-    outlying = [own for own in sensors if len(own.finding.outliers)]
+    """Return sentences with likely causes of the failed checks and remedies."""
+    texts = []
+    outlying = [sensor for sensor in sensors if len(sensor.finding.outliers)]
     if outlying:
-        found.append(f"Pass loss='cauchy' to {_labels(outlying)} if these are outliers.")
-    wrong = [own for own in sensors if own.finding.large or own.finding.small or own.finding.rejected]
-    # Effects that the measurements lack make residuals smooth, and a wrong σ does not.
+        texts.append(f"If these are outliers, pass loss='cauchy' to {_labels(outlying)}.")
+    wrong = [sensor for sensor in sensors if sensor.finding.large or sensor.finding.small or sensor.finding.rejected]
+    # Missing effects make residuals smooth; a wrong σ does not.
     smooth = [
-        own
-        for own in sensors
-        if own.finding.smooth or own.finding.run or (own.finding.step is not None and own not in wrong)
+        sensor
+        for sensor in sensors
+        if sensor.finding.smooth or sensor.finding.run or (sensor.finding.step is not None and sensor not in wrong)
     ]
     if (
         smooth
-        and (any(own.finding.run for own in smooth) or any(own in wrong for own in smooth) or not wrong)
+        and (any(sensor.finding.run for sensor in smooth) or any(sensor in wrong for sensor in smooth) or not wrong)
         and not outlying
     ):
-        found.append(
+        texts.append(
             f"Check the frame (rotated or swapped axes), the units and the times of {_labels(smooth)}, and add missing "
-            "effects, such as bias= or time_offset=. A turn in the wrong direction between two measurements needs "
-            "another `start`, and fast motion more knots."
+            "effects, such as bias= or time_offset=. If the curve turns in the wrong direction between two "
+            "measurements, pass another `start`. If the motion is fast, pass more knots."
         )
-    for own in wrong if not outlying else []:
-        if own.finding.smooth:
+    for sensor in wrong if not outlying else []:
+        if sensor.finding.smooth:
             continue
-        ratio = own.finding.ratio
-        found.append(_of_units(own, ratio) or f"Multiply sigma of {own.label} by {ratio:.2g} if it is uncertain.")
-    correlated = [own for own in sensors if own.finding.correlated and own not in wrong and own not in smooth]
-    if correlated and not found:
-        found.append(
-            f"The noise of {_labels(correlated)} is correlated, but the covariance assumes independent noise: pass a "
+        ratio = sensor.finding.ratio
+        texts.append(_of_units(sensor, ratio) or f"Multiply sigma of {sensor.label} by {ratio:.2g} if it is uncertain.")
+    correlated = [
+        sensor for sensor in sensors if sensor.finding.correlated and sensor not in wrong and sensor not in smooth
+    ]
+    if correlated and not texts:
+        texts.append(
+            f"The noise of {_labels(correlated)} is correlated, but the covariance assumes independent noise. Pass a "
             "larger sigma or fewer measurements."
         )
-    return found
+    return texts
 
 
 def _labels(sensors: list[Sensor]) -> str:
-    return " and ".join(dict.fromkeys(own.label for own in sensors))
-
-
-def _at(sensor: Sensor, row: int) -> str:
-    return f"number {sensor.numbers[row]}"
+    return " and ".join(dict.fromkeys(sensor.label for sensor in sensors))
 
 
 def _of_units(sensor: Sensor, ratio: float) -> str:

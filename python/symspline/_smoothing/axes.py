@@ -13,9 +13,9 @@ from .._spaces import Array, Doubles, Space
 from .common_lam import Choice, Data, LamCriterion, common_lam, score_of
 from .rows import Rows, complete_variance, posterior_variance, smooth
 
-# Degrees of freedom per node along each axis of the combinations of λ that are tried.
+# Degrees of freedom per node along each axis, of which all combinations are tried.
 _PROBES = (0.4, 0.75)
-# Largest number of rounds from the best of them, and the relative change of the score that ends them.
+# Largest number of rounds from the best combination, and the relative change of the score that ends them.
 _ROUNDS, _ENOUGH = 4, 1e-3
 
 
@@ -150,9 +150,10 @@ def smooth_axes(
     time with the axes before. The λ of the first axes are then too large, because the noise that the other axes would
     remove is still there. In a second round, each λ is chosen again for nodes that are smooth along all other axes.
 
-    The criterion of several λ may have more than one minimum. With few nodes per period, rows along one axis seem to be
-    noise as long as the others are, and both rounds end at a plane. The criterion is therefore also evaluated for a
-    product of λ between a plane and an interpolating surface. If one of them is better, more rounds begin there.
+    As a function of several λ, the criterion may have more than one minimum. With few nodes per period, rows along each
+    axis look like noise until the other axes are smoothed, and both rounds end at a plane. The criterion is therefore
+    also evaluated for a grid of λ between those of a plane and of an interpolating surface. If one of these is better,
+    further rounds start from it.
     """
     count = len(lams)
     start = _State(nodes.points, nodes.weights, np.ones(nodes.weights.shape))
@@ -232,9 +233,9 @@ def _best_probe(
     Parameters
     ----------
     given : dict
-        λ of all axes, of which those of the axes `asked` are replaced.
+        λ of all axes. Those of the axes `asked` are replaced.
     score : callable
-        Function of nodes that are smooth along all other axes, the last of the axes `asked`, and its λ.
+        Function of nodes smoothed along all other axes, of the last of the axes `asked`, and of its λ.
     """
     last = asked[-1]
     tried = {k: [_lam_of_df(nodes, k, df) for df in _PROBES] for k in asked}

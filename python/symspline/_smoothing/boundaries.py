@@ -1,4 +1,4 @@
-"""Warning about maps with boundaries, such as those between the grains of a crystal."""
+"""Warn about maps with boundaries, such as those between the grains of a crystal."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ from .._spaces import Array, Doubles, Space
 from .._warnings import warn
 from .warned import SmoothingWarning
 
-# A jump is a step between neighbouring nodes that is longer than this many median steps along the axis, and than this
-# many times the steps before and after it. Noise and outliers have no such steps, since the steps beside are long, too.
+# A jump is a step between neighbouring nodes that is longer than the first number of median steps along the axis, and
+# than the second number of times the steps before and after it. Noise and outliers cause no jumps, because the steps
+# next to a long step are long as well.
 _MEDIANS, _BESIDE = 8.0, 4.0
 # Least number of jumps, as a fraction of the number of nodes along a side of the map.
 _SHARE = 0.3
@@ -43,9 +44,9 @@ def warn_of_boundaries(parts: list[tuple[Space[Any], Array]], weights: Doubles) 
         nodes, distance, usual = first
         warn(
             f"the map has a boundary that the smooth surface cannot follow: {count} pairs of neighbouring nodes are "
-            f"far apart, for example points{nodes[0]} and points{nodes[1]} by {distance:.2g}, where most neighbours "
-            f"are {usual:.2g} apart. If the map has regions such as grains, label them, and smooth each region with "
-            "weights of zero at all other nodes.",
+            f"far apart, for example points{nodes[0]} and points{nodes[1]}, whose distance is {distance:.2g}. The "
+            f"median distance of neighbours is {usual:.2g}. If the map has regions such as grains, label them, and "
+            "smooth each region with weights of zero at all other nodes.",
             SmoothingWarning,
         )
         return
@@ -64,11 +65,11 @@ def _steps(space: Space[Any], points: Array, weights: Doubles, k: int) -> Double
 
 
 def _are_jumps(steps: Doubles) -> Any:
-    """Return which steps are much longer than most, and than those before and after them."""
+    """Return a mask of the steps that are much longer than the median step and than the steps next to them."""
     if steps.shape[-1] < 4 or not np.isfinite(steps).any():
         return np.zeros(steps.shape, bool)
     known = np.nan_to_num(steps, nan=0.0)
-    # The first and the last step may be due to an outlier there.
+    # The first and the last step may be long because of an outlier at the end.
     beside = np.full(steps.shape, np.inf)
     beside[..., 1:-1] = np.maximum(known[..., :-2], known[..., 2:])
     return (known > _MEDIANS * np.nanmedian(steps)) & (known > _BESIDE * beside)

@@ -154,7 +154,7 @@ def score_of(rows: Rows, data: Data, criterion: LamCriterion, lam: float) -> flo
 
 
 def _some(rows: Rows, data: Data) -> tuple[Rows, Data]:
-    """Return as many of the rows as the choice of λ needs."""
+    """Return as many rows as the choice of λ needs."""
     every = -(-int(rows.counts.sum()) // _NODES)
     return rows.take(slice(None, None, every)), Data(*(own[::every] for own in data))
 

@@ -1,4 +1,4 @@
-"""The data of a smoothed curve as the linear problem at it sees them, in coordinates of frames along it."""
+"""Data of a smoothed curve, linearised at the curve, in coordinates of frames along it."""
 
 from __future__ import annotations
 
@@ -17,17 +17,18 @@ from .gaps import Calibration, Course, Evidence, calibrate
 from .posterior import frames_at
 from .precision import SINGULAR
 
-# Largest number of numbers in the frames that are computed together.
+# Largest number of entries of the frames that are computed in one call.
 _TOGETHER = 1 << 22
-# Data of a robust fit beyond this quantile of the noise are not compared with predictions.
+# Data of a robust fit beyond this quantile of the noise do not count as evidence. The fit itself rejects data beyond
+# the quantile 0.999.
 _KEPT = 0.99
 
 
 def calibration_of(spline: Any, number: int) -> Calibration | None:
-    """Return how variances of one curve change in gaps, in the smoothed space with a given number.
+    """Return the calibration of one curve in gaps, in the smoothed space with a given number.
 
-    It is None for curves without an estimate of their error: interpolation, least squares without a penalty, geodesics
-    by choice, and curves that failed.
+    The result is None for curves without an estimate of their error: interpolating curves, least squares without a
+    penalty, geodesics with ``lam=inf``, and curves that did not converge.
     """
     part = spline._smoothed[number]
     space = smoothed_spaces(spline.space)[number]
@@ -98,7 +99,7 @@ def _evidence(spline: Any, number: int, used: Any, sigma: float) -> Evidence:
 
 
 def _soft(loss: str, squares: Doubles, m: int) -> Doubles:
-    """Return the factors of residuals that make them those of pseudo-data, for noise of variance one (Cox 1983)."""
+    """Return factors that turn residuals into those of pseudo-data, for noise of variance one (Cox 1983)."""
     q = squares / corner_of(loss, m)
     if loss == "huber":
         q = np.maximum(q, 1.0)
@@ -111,7 +112,7 @@ def _soft(loss: str, squares: Doubles, m: int) -> Doubles:
 
 
 def _roots(matrices: Doubles) -> Doubles:
-    """Return R with W = RᵀR for symmetric matrices W; directions without information have rows of zeros."""
+    """Return R with W = RᵀR for symmetric matrices W; rows of directions without information are zero."""
     values, vectors = np.linalg.eigh(matrices)
     values = np.where(values > SINGULAR * values[:, -1:], values, 0.0)
     return np.asarray(np.sqrt(values)[:, :, None] * np.swapaxes(vectors, -1, -2))
@@ -127,7 +128,7 @@ def _parts_at(spline: Any, number: int, t: Doubles, quantity: str) -> tuple[Any,
 
 
 def _coordinates(spline: Any, number: int, t: Doubles, quantity: str, y: Array | None = None) -> Doubles:
-    """Return coordinates of tangent vectors at the curve: its derivatives, or the directions to points y."""
+    """Return coordinates of tangent vectors along the curve: its derivatives, or logarithms of points y."""
     space = smoothed_spaces(spline.space)[number]
     factor, points, vectors = _parts_at(spline, number, t, quantity)
     _, _, p = _parts_at(spline, number, t, "point")
@@ -155,11 +156,11 @@ def _of_frames(space: Space, knots: Doubles, points: Array, t: Doubles, p: Array
 
 
 def _in_frames(spline: Any, number: int, t: Doubles, y: Array, information: Doubles) -> Doubles:
-    """Return information matrices in the frames along the curve: their own frames are transported there."""
+    """Return information matrices in frames along the curve, to which the frames at the data are transported."""
     space = smoothed_spaces(spline.space)[number]
     _, points, p = _parts_at(spline, number, t, "point")
     frames = np.moveaxis(space.frame(y), 1, 0)
     moved = np.stack([space._apply("transport", p=y, q=p, v=own) for own in frames], axis=1)
-    # Rows are the vectors of the frames at the data, in coordinates along the curve.
+    # Rows are the transported frame vectors, in coordinates of the frames along the curve.
     own = np.linalg.inv(_of_frames(space, spline._knots_of(()), points, t, p, moved))
     return np.asarray(own @ information @ np.swapaxes(own, 1, 2))

@@ -1,8 +1,8 @@
-"""Bands that hold in long gaps and beyond the ends: how far off is a prediction without data?
+"""Calibrate bands in long gaps and beyond the ends of the data.
 
-A posterior promises too much where there are no data: λ is the one that follows the data best, and the true motion is
-hardly ever the process whose λ it is. Predictions of the fit for parts of the recording whose data are omitted show by
-which factor its errors exceed their standard deviations, for parts as long as the gap.
+The posterior standard deviation is too small where there are no data, because λ is optimal for the data and the true
+motion is rarely a sample of the prior process. To calibrate it, parts of the recording as long as the gap are predicted
+without their data. The errors of these predictions determine a factor of the standard deviation.
 """
 
 from __future__ import annotations
@@ -17,35 +17,34 @@ from numpy.typing import NDArray
 from .. import _core
 from .._spaces import Doubles
 
-# A gap is long if the variance in its middle exceeds this multiple of the median at the data, and if it exceeds this
-# multiple of the median distance of data: sparse data have no gaps.
+# A gap is long if the variance in its middle exceeds the first multiple of the median variance at the data, and its
+# length the second multiple of the median time step, so that sparse data have no gaps.
 _WIDE, _SPARSE = 4.0, 3.0
-# Data of omitted blocks count where their variance exceeds this multiple of the median: those at the edges, where the
-# posterior is right, would hide what happens inside.
+# Omitted data count only where their variance exceeds this multiple of the median. The posterior is right at the edges
+# of a block, which would hide errors inside.
 _INSIDE = 2.0
-# The probability of the bands that the factors calibrate.
+# The coverage for which the factors are calibrated.
 _LEVEL = 0.95
-# Largest number of blocks of one length, of lengths, and of data of a block that are predicted; fewest data.
+# Largest numbers of blocks of one length, of lengths, and of predicted data per block; least number of predicted data.
 _BLOCKS, _LENGTHS, _PREDICTED, _FEW = 24, 6, 200, 3
-# Share of a recording that is predicted beyond the end of a part of it, and the largest factor there.
+# Fraction of a recording that is predicted beyond the end of a part of it, and the largest factor there.
 _BEYOND, _MOST = 1 / 3, 20.0
 
 
 class Gap(NamedTuple):
-    """A long gap between the data of a curve, or the time before the first or after the last of them.
+    """A long gap between the data of a curve, or the time before the first or after the last datum.
 
     Attributes
     ----------
     start, stop : float or datetime64
-        Times of the data at its ends. Before the data ``start`` is ``-inf``, and after the data ``stop`` is ``inf``;
-        for dates both are NaT.
+        Times of the data at its ends. Before the data, ``start`` is ``-inf``; after the data, ``stop`` is ``inf``. For
+        dates, these are NaT.
     factor : float
-        Factor of the standard deviation of the curve in its middle, apart from that at the data. It is the largest of
-        all distances before and after the data. NaN means that no part of the recording shows how far the curve may
-        be off.
+        Factor k of the standard deviation in the middle of the gap, see the notes of `SmoothingSpline.std`. Before and
+        after the data it is the largest factor of all distances. NaN if no part of the recording allows an estimate.
     blocks : int
-        Number of parts of the recording that were predicted without their data, as long as the gap. It is 0 for a gap
-        that is longer than any such part, whose factor is the largest of all shorter lengths.
+        Number of parts of the recording, as long as the gap, that were predicted without their data. It is 0 for a gap
+        that is longer than any such part. Its factor is then the largest one of all shorter lengths.
     """
 
     start: Any
@@ -55,7 +54,7 @@ class Gap(NamedTuple):
 
 
 class Course(NamedTuple):
-    """The process whose posterior a curve is.
+    """The process whose posterior mean is the curve.
 
     Attributes
     ----------
@@ -78,9 +77,9 @@ class Course(NamedTuple):
     acceleration: float
 
     def drift(self, distance: Doubles, nu: int = 0) -> Doubles:
-        """Return the variance by which the process leaves a line, or its velocity that of the line.
+        """Return the variance of the deviation of the process, or of its velocity, from a line of constant velocity.
 
-        The curve continues as a line, but a process with a penalty on its jerk has an acceleration.
+        The curve continues as such a line. A process with a penalty on its jerk also has an acceleration.
         """
         d = np.maximum(distance, 0.0)
         if self.order == 2:
@@ -90,7 +89,7 @@ class Course(NamedTuple):
 
 
 class Evidence(NamedTuple):
-    """Data of a curve, linearised at it, and divided by their standard deviations.
+    """Data of a curve, linearised at the curve and divided by their standard deviations.
 
     Attributes
     ----------
@@ -105,11 +104,11 @@ class Evidence(NamedTuple):
     residuals : ndarray, shape (n, m)
         Coordinates of the vectors from the curve to the data, divided by the standard deviation of the noise.
     counts : ndarray of bool, shape (n,)
-        Whether a datum is not an outlier.
+        Whether each datum counts; False for outliers.
     soft : ndarray, shape (n,)
-        Factors of the residuals by which a robust loss differs from least squares.
+        Factors that turn residuals into those of the pseudo-data of a robust loss; 1 for least squares.
     positions, velocities : ndarray, shape (n, m)
-        The curve itself in coordinates that frames along it define, divided likewise.
+        The curve and its velocity in coordinates of frames along the curve, divided by the same standard deviation.
     """
 
     knots: Doubles
@@ -130,7 +129,7 @@ class Evidence(NamedTuple):
         return np.asarray((self.roots**2).sum(axis=(1, 2)) / self.residuals.shape[1])
 
     def rows(self, data: NDArray[np.intp], firsts: NDArray[np.int64], factors: Doubles) -> Any:
-        """Return linear functions of the coefficients: those with these factors, multiplied by the roots."""
+        """Return linear functions of the coefficients with these factors, multiplied by the roots."""
         if self.roots.ndim == 1:
             return firsts, np.ascontiguousarray(self.roots[data, None] * factors), np.zeros((len(data), 0))
         own = np.einsum("nqc,nk->nqkc", self.roots[data], factors)
@@ -166,7 +165,7 @@ class Evidence(NamedTuple):
 
 
 class Predicted(NamedTuple):
-    """Errors of predictions without data: mean squares per coordinate, and variances, in units of the noise."""
+    """Predictions without data: squared errors and variances per coordinate in units of the noise, and distances."""
 
     squares: Doubles
     variances: Doubles
@@ -174,24 +173,26 @@ class Predicted(NamedTuple):
     distances: Doubles
 
     def of(self, chosen: Any) -> Predicted:
-        """Return some of them."""
+        """Return the chosen predictions."""
         return Predicted(*(own[chosen] for own in self))
 
 
-def factor_of(found: Predicted, m: int, disjoint: float) -> float:
+def factor_of(predictions: Predicted, m: int, disjoint: float) -> float:
     """Return the factor k ≥ 1 for which `v + (k² − 1)(v − v₀)` are the variances of predictions; NaN without any.
 
     Parameters
     ----------
-    found : Predicted
+    predictions : Predicted
         Squared errors e², variances v, and variances v₀ at data.
     m : int
         Number of coordinates.
     disjoint : float
-        Number of independent blocks. The factor is an estimate from as many, so that the F distribution replaces χ².
+        Number of disjoint blocks. As the factor is estimated from few blocks, the F distribution replaces χ².
     """
-    found = found.of(np.isfinite(found.variances) & (found.variances > _INSIDE * found.at_data))
-    e, v, excess = found.squares, found.variances, found.variances - found.at_data
+    predictions = predictions.of(
+        np.isfinite(predictions.variances) & (predictions.variances > _INSIDE * predictions.at_data)
+    )
+    e, v, excess = predictions.squares, predictions.variances, predictions.variances - predictions.at_data
     if len(e) < _FEW:
         return np.nan
 
@@ -210,8 +211,8 @@ def factor_of(found: Predicted, m: int, disjoint: float) -> float:
     plain = _core.chi_squared(m, _LEVEL)
     independent = max(1, round(min(disjoint, len(e))))
     spread = np.sqrt(_core.chi_squared_ratio(m, m * independent, _LEVEL) / plain)
-    # The factor with which the bands contain as many of the errors as they should: it protects against bursts.
-    covering = np.quantile((m * e / plain - 1 - found.at_data) / excess, _LEVEL)
+    # The factor for which the bands contain the required share of the errors. It protects against bursts.
+    covering = np.quantile((m * e / plain - 1 - predictions.at_data) / excess, _LEVEL)
     return float(max(1.0, spread * np.exp(high), np.sqrt(max(covering, 0.0))))
 
 
@@ -233,7 +234,7 @@ class Calibration:
     period : float
         Period of a closed curve; NaN for others.
     beyond : callable
-        Function that returns distances beyond the ends with factors there, shape (n, 2), and the number of predictions.
+        Function that returns distances beyond the ends with their factors, shape (n, 2), and the number of blocks.
     """
 
     def __init__(
@@ -266,7 +267,7 @@ class Calibration:
 
     @cached_property
     def _at_ends(self) -> Doubles:
-        """Variance, covariance and variance of point and velocity at the first and the last datum."""
+        """Variance of the point, its covariance with the velocity, and variance of the velocity, at both ends."""
         return np.array([self._course.line(float(end))[[0, 0, 1], [0, 1, 1]] for end in self._ends])
 
     def inflation(self, x: Doubles, nu: int) -> Doubles:
@@ -312,7 +313,7 @@ class Calibration:
         return np.asarray(np.exp(np.interp(np.log(distance), at, factors)))
 
     def _variance_beyond(self, x: Doubles, v: Doubles, nu: int) -> Doubles:
-        """Return the variance at times beyond the ends, at which that of the spline is v."""
+        """Return the variance at times beyond the ends, where the variance of the spline is v."""
         behind = x > self._ends[1]
         of_end = self._at_ends[behind.astype(int)]
         d = np.where(behind, x - self._ends[1], self._ends[0] - x)
@@ -325,7 +326,7 @@ class Calibration:
 
 
 def _ratio(more: Doubles, v: Doubles) -> Doubles:
-    """Return the ratio of standard deviations for variances, which is 1 where the smaller one vanishes."""
+    """Return the square root of the ratio of two variances, 1 where the denominator is zero."""
     out = np.ones(v.shape)
     np.sqrt(np.divide(more, v, out=out, where=~(v <= 0)), out=out)
     return out
@@ -392,13 +393,13 @@ def _factors_of_gaps(blocks: _Blocks, gaps: Doubles) -> list[tuple[float, int]]:
     known = {float(length): own for length in ladder if (own := blocks.factor(length)) is not None}
     shorter = float(shortest)
     while not known and shorter > max(2 * blocks.width, shortest / 2**_LENGTHS):
-        # There is no block as long as the shortest gap.
+        # No block is as long as the shortest gap, so shorter ones are tried.
         shorter /= 2
         own = blocks.factor(shorter)
         if own is not None:
             known[shorter] = own
     if len(known) == 1 and min(known) < shortest:
-        # The factor may still rise with the length.
+        # The factor may increase with the length, so the maximum over shorter lengths is used.
         for length in (shorter / 2, shorter / 4):
             own = blocks.factor(length) if length > blocks.width else None
             if own is not None:
@@ -448,7 +449,7 @@ class _Blocks:
         return self._of(starts[good & (inside <= 0.5 * length)], length)
 
     def any_factor(self, length: float) -> tuple[float, int]:
-        """Return the same from blocks anywhere between the first and the last datum, whose gaps may be longer."""
+        """Return the factor from blocks anywhere between the first and the last datum, including other gaps."""
         starts = np.linspace(self.span[0], self.span[1] - length, 4 * _BLOCKS)
         return self._of(starts, length) or (np.nan, 0)
 
@@ -456,7 +457,7 @@ class _Blocks:
         omitted = []
         for start in starts:
             a, b = np.searchsorted(self.times, (start, start + length), side="right")
-            # There must be data on either side.
+            # A block needs data on both sides.
             if b > a and ((a > 0 and b < len(self.times)) if not self.closed else b - a < self.count):
                 omitted.append((start, np.arange(a, b)))
         if not omitted:
@@ -492,7 +493,7 @@ def _some(count: int, most: int) -> NDArray[np.intp]:
 def _without(
     evidence: Evidence, data: Any, residuals: Doubles, probes: Any, omitted: list[Any], counts: list[int]
 ) -> tuple[Doubles, Doubles]:
-    """Return changes and variances of linear functions without some data, `counts` of them for every block."""
+    """Return changes and variances of linear functions without the omitted data; each block has `counts` functions."""
     rows = 1 if evidence.roots.ndim == 1 else evidence.roots.shape[1]
     each = [(own[:, None] * rows + np.arange(rows)).ravel() for own in omitted]
     stops = np.cumsum([len(own) for own in each])
@@ -506,10 +507,10 @@ def _without(
 
 
 def _beyond(evidence: Evidence, course: Course, usual: float) -> tuple[Doubles, int]:
-    """Return distances and factors beyond the ends, from predictions of the rest of the recording, and their number.
+    """Return distances beyond the ends with their factors, and the number of predictions.
 
-    The curve ends at a datum, and continues with constant velocity. This happens at times in the last two thirds of the
-    recording, and in the same way backwards.
+    Each prediction omits all data after a datum in the last two thirds of the recording, and continues the curve from
+    there with constant velocity. The same is done backwards in time.
     """
     t, (n, m) = evidence.times, evidence.residuals.shape
     span = t[-1] - t[0]
@@ -522,7 +523,7 @@ def _beyond(evidence: Evidence, course: Course, usual: float) -> tuple[Doubles, 
         cuts = np.linspace(here[0] + reach, here[-1] - min(2 * usual, 0.1 * span), _BLOCKS // 2)
         for cut in np.unique(np.searchsorted(here, cuts, side="right")):
             stop = int(np.searchsorted(here, here[cut - 1] + reach, side="right"))
-            # A fit needs more data than a line.
+            # The remaining data must determine more than a line.
             if cut < max(_FEW, course.order + 1) or cut >= n:
                 continue
             ahead = np.arange(cut, stop)

@@ -29,9 +29,9 @@ _LAG = 5
 _TRIES = 5
 # Factor of the λ for which rounding errors are negligible, after a fit that failed.
 _COARSER = 1e4
-# Part of the message for a smoothing that ended without a curve.
+# Part of the message for a smoothing without a result.
 NO_CURVE = "no spline joins"
-# Part of the message for a jerk that too few data determine.
+# Part of the message for too few data with penalty="jerk".
 TOO_FEW = "needs at least 3 data"
 
 DfOfPart = Callable[[int, SmoothingData, "Knots"], Array]
@@ -172,8 +172,8 @@ def merge_close_knots(knots: Knots, noisy: SmoothingData, lam: float | None, pow
 
 
 def _far_apart(times: Doubles, least: float) -> NDArray[np.intp]:
-    """Return the indices of times that are at least so far apart, the first and the last one among them."""
-    # Index of the first time that is far enough from each time.
+    """Return indices of times that are at least `least` apart, including the first and the last one."""
+    # For each time, the index of the first time that is far enough after it.
     following = np.searchsorted(times, times + least).tolist()
     stop = int(np.searchsorted(times, times[-1] - least, side="right"))
     kept, i = [], 0
@@ -184,7 +184,7 @@ def _far_apart(times: Doubles, least: float) -> NDArray[np.intp]:
 
 
 def _moved_apart(t: Array, times: Doubles, kept: NDArray[np.intp]) -> Array:
-    """Return as many knots as before: those that are kept, and others in the middle of the longest segments."""
+    """Return the knots that are kept, and new ones in the middle of the longest segments, as many as before in all."""
     own, at = t[kept].tolist() if t.dtype.kind == "f" else list(t[kept]), times[kept].tolist()
     while len(own) < len(t):
         i = int(np.argmax(np.diff(at)))
@@ -299,10 +299,10 @@ def in_gaps(knots: Knots, noisy: SmoothingData) -> Knots:
 
 
 def in_long_gaps(knots: Knots, noisy: SmoothingData) -> Knots:
-    """Add knots in long gaps as far apart as the data usually are, so that the curve there minimises the jerk.
+    """Add knots in long gaps, as far apart as the data usually are, so that the curve minimises the jerk there.
 
-    The curve with the least mean square of its third derivative has polynomials of degree five between the data, and a
-    segment of a spline is a cubic.
+    The minimiser of the integrated squared third derivative is a polynomial of degree five between data. One cubic
+    segment per gap cannot approximate it.
     """
     if knots.times.ndim > 1 or len(knots.times) < 3:
         return knots

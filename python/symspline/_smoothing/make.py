@@ -171,8 +171,8 @@ def make_smoothing_spline(
         knots.
     loss : {"linear", "huber", "cauchy"}, default "linear"
         Least squares, or a loss that limits the influence of outliers. Use ``"cauchy"`` for many or distant outliers.
-        λ is chosen from data without outliers. If they have so little noise that the curve follows nearly all of them,
-        the result is the curve of least squares through these data, with λ by ``"reml"``.
+        λ is chosen from data without outliers. If their noise is so small that the curve follows nearly all of them,
+        the result is the least-squares curve of these data, with λ chosen by ``"reml"``.
     method : {"auto", "linearized", "newton"}, default "auto"
         ``"linearized"`` solves the linearised problem in frames along the curve repeatedly. Its result differs from
         the minimum by about 1e-4 of the error, and by more where segments are long. ``"newton"`` is the full
@@ -210,12 +210,17 @@ def make_smoothing_spline(
     Warns
     -----
     SmoothingWarning
-        If the chosen λ is at a bound: the curve follows nearly all data, has no bending energy, or is the roughest one
-        that was found. If the residuals are not those of independent noise: they are more than 1.75 times the noise
-        that neighbouring data show, neighbours are correlated, least squares met outliers, or `sigma` is wrong. With a
-        given λ, only a given `sigma` is examined. If a robust loss may have rejected the wrong data. If another curve
-        may fit better, because the noise is large or the data turn far from one to the next. If many points are exact
-        copies of the point before at a later time, as a log leaves them that is faster than its sensor.
+        In these cases:
+
+        - The chosen λ is at a bound: the curve follows nearly all data, has no bending energy, or is the roughest one
+          that was found.
+        - The residuals are not those of independent noise: they are more than 1.75 times as large as the noise
+          estimated from neighbouring data, they are correlated, there are outliers under least squares, or `sigma` is
+          wrong. With a given λ, residuals are examined only if `sigma` is given.
+        - The motion or the noise varies along the recording.
+        - A robust loss may have rejected the wrong data.
+        - Another curve may fit better, because the noise is large or consecutive data are far apart.
+        - Many points are exact copies of the point before at a later time, as in a log that is faster than its sensor.
     ConvergenceWarning
         If a curve fails and `on_failure` is ``"warn"``.
     FarPointsWarning

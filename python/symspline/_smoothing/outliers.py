@@ -1,4 +1,4 @@
-"""What is known about the data that a robust loss rejects."""
+"""Warnings about the data that a robust loss rejects."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .._warnings import warn
 from .report import SmoothingReport
 from .warned import SmoothingWarning, first_affected
 
-# Kinds of selections that are not sound, as the core numbers them.
+# Kinds of selections that cannot be trusted, as numbered in `Selection` of the core.
 _INTERPOLATED, _UNSETTLED, _FEW = 1, 2, 3
 
 
@@ -23,7 +23,7 @@ class Outliers(NamedTuple):
     Attributes
     ----------
     selection : int or ndarray of int
-        Kind of the selection; 0 if it is sound, or if there is none.
+        Kind of the selection: 0 if it can be trusted or the loss is not robust.
     rejected : int or ndarray of int
         Number of data that were not selected.
     """
@@ -32,14 +32,14 @@ class Outliers(NamedTuple):
     rejected: Any
 
     def map(self, function: Callable[[Any], Any]) -> Outliers:
-        """Apply a function to both arrays, such as the selection of some curves."""
+        """Apply a function to both arrays, such as one that selects some curves."""
         return Outliers(function(self.selection), function(self.rejected))
 
 
 def warn_of_outliers(
     space: Space, loss: str, each: list[Outliers], reports: list[SmoothingReport], counts: list[Any]
 ) -> list[NDArray[np.bool_]]:
-    """Warn once if the outliers of a curve may be others than those that were rejected.
+    """Warn once if the data that were rejected from a curve may be the wrong ones.
 
     Parameters
     ----------
@@ -53,11 +53,11 @@ def warn_of_outliers(
     Returns
     -------
     list of ndarray of bool
-        Whether the curves of every space are sound, so that other warnings apply.
+        Whether the selection of each curve in every space can be trusted, so that other warnings apply.
     """
     sound = [np.asarray(own.selection) == 0 for own in each]
     bad = [~good & np.asarray(report.converged) for good, report in zip(sound, reports, strict=True)]
-    # Exact data, such as those of a body at rest, have nothing to find.
+    # Data without noise, such as those of a body at rest, contain no outliers.
     exact = [(np.asarray(own.rejected) == 0) & ~(np.asarray(r.sigma) > 0) for own, r in zip(each, reports, strict=True)]
     bad = [own & ~still for own, still in zip(bad, exact, strict=True)]
     if first := first_affected(space, bad):
@@ -75,16 +75,16 @@ def _message(kind: int, what: str, rejected: int, df: float, count: int) -> str:
             f"{what} follows nearly all data ({df:.3g} degrees of freedom for {count} data): their noise is smaller "
             f"than their sampling can show. It rejected {rejected} data that deviate far more than others, and cannot "
             "find smaller outliers. Its standard deviations are only valid if the data are that accurate. Pass sigma= "
-            "to find smaller outliers, or more data per time."
+            "to find smaller outliers, or sample more often."
         )
     if kind == _UNSETTLED:
         return (
-            f"{what} did not find out which data are outliers: two selections lead to each other, and {rejected} of "
-            f"{count} data are rejected by the last one. Plot the residuals, and pass sigma=, or weights of 0 for the "
-            "wrong data."
+            f"{what} could not determine which data are outliers: the selection alternates between two sets of data. "
+            f"The last one rejects {rejected} of {count} data. Plot the residuals, and pass sigma=, or weights of 0 "
+            "for the wrong data."
         )
     return (
-        f"{what} rejects many data: {rejected} of {count} do not lie near the curve. If these are not outliers, the "
+        f"{what} rejects many data: {rejected} of {count} data are far from the curve. If these are not outliers, the "
         "noise varies along the recording, or the data belong to several curves. Plot the residuals, and pass sigma= "
         "or weights=."
     )

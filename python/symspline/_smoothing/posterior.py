@@ -75,7 +75,7 @@ class Posterior(NamedTuple):
         return self._replace(band=function(self.band), turn=function(self.turn))
 
     def known(self, index: tuple[int, ...], kinds: Any) -> Any:
-        """Return A of one curve and how the curve ends, as the core reads them."""
+        """Return the matrix A of one curve and its end conditions, in the form that the core expects."""
         arrays = [np.ascontiguousarray(x) for x in (self.band[index], self.side, self.corner)]
         return arrays, self.size, kinds, np.ascontiguousarray(self.turn[index])
 

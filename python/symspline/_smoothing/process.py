@@ -1,4 +1,4 @@
-"""The variance of the integrated Wiener process of which a smoothed curve is the mean, if the jerk is penalised."""
+"""Variance of the integrated Wiener process whose posterior mean is a curve smoothed with a penalty on the jerk."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ def process_ratio(
 ) -> Doubles:
     """Return the variance of the process divided by that of a cubic spline with the same data and the same λ.
 
-    The mean of the process is a quintic spline. Its values at the data vary nearly as those of the cubic spline do, but
-    between the data it is stiffer than the process of which a cubic spline is the mean.
+    The posterior mean of the process is a quintic spline. At the data, its variance is nearly that of the cubic spline.
+    Between the data, the process is stiffer than the one whose mean is a cubic spline.
 
     Parameters
     ----------

@@ -50,7 +50,7 @@ class Smoothed(NamedTuple):
     outliers : Outliers or None
         Outcome of the rejection of data, for warnings. Curves that a user has do not have it.
     minima : ndarray of int or None
-        Whether the curves are known to be the best ones, see `best_of_starts`, likewise.
+        Kinds of the minima, see `best_of_starts`, likewise.
     """
 
     report: SmoothingReport

@@ -178,16 +178,16 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
 
     @property
     def gaps(self) -> list[Gap] | tuple[list[Gap], ...] | AnyArray | tuple[AnyArray, ...]:
-        """Long gaps between the data, and the times before and after them, with the factors of the bands there.
+        """Long gaps in the data, and the times before and after the data, with the factors of the bands there.
 
-        This is a list of `Gap` in the order of time, of which the first and the last one are the times before and after
-        the data, unless the curve is closed. For products and poses it is a tuple with one list per part. For a batch
-        of curves, lists are in an array of objects with the batch axes. A curve whose bands need no calibration, such
-        as one with ``lam=0`` or ``lam=numpy.inf``, has an empty list.
+        The result is a list of `Gap` in the order of time. For open curves, the first and the last entry are the times
+        before and after the data. Products and poses have a tuple with one list per part. A batch has an array of lists
+        with the batch axes. The list is empty if the curve has no estimate of its error, as with ``lam=0`` or
+        ``lam=numpy.inf``.
 
         See Also
         --------
-        SmoothingSpline.std : Compute the standard deviation of the curve; see its notes.
+        SmoothingSpline.std : Compute the standard deviation of the curve. Its notes define the factors.
 
         Examples
         --------
@@ -227,7 +227,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
 
     @cached_property
     def _calibrations(self) -> dict[tuple[int, tuple[int, ...]], Calibration | None]:
-        """How the variances change in gaps, for every part and every curve."""
+        """Calibrations of the variances in gaps, by part and index of the curve."""
         found = {}
         for index in np.ndindex(self._batch):
             one: SmoothingSpline[Any, Any] = self
@@ -240,7 +240,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         return calibration_of(self, number)
 
     def _inflation(self, number: int, index: tuple[int, ...], x: Doubles, nu: int) -> Doubles:
-        """Return the factor of the standard deviation of one curve in one part at times x of the core."""
+        """Return the factors of the standard deviation of one curve in one part, at times x of the core."""
         known = self._calibrations[number, index]
         if known is None:
             return np.ones(x.shape)
@@ -250,7 +250,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         return out
 
     def _warn_of_gaps(self) -> None:
-        """Warn once of a gap for which no part of the recording shows how far the curve may be off."""
+        """Warn once of a gap that is longer than any part of the recording from which its factor could be estimated."""
         if self._has_warned:
             return
         self._has_warned = True
@@ -277,8 +277,8 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         nu : {0, 1}, default 0
             0 for the point, 1 for the velocity.
         calibrated : bool, default True
-            Whether standard deviations in long gaps and beyond the data are multiplied by the factors of
-            `SmoothingSpline.gaps`. Otherwise they are those of the posterior; see the notes.
+            Whether standard deviations in long gaps and beyond the data are calibrated with the factors of
+            `SmoothingSpline.gaps`. False returns those of the posterior; see the notes.
 
         Returns
         -------
@@ -304,22 +304,24 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         that of the process at all times. If weights are matrices or curvature couples the coordinates, the variance of
         the spline is multiplied by the ratio that the two variances have for uncoupled coordinates.
 
-        This posterior promises too much in long gaps: λ follows the data, and the true motion is hardly ever the
-        process with this λ. Therefore parts of the recording as long as the gap, up to 24 of them, are predicted
-        without their data, and the variance v becomes :math:`v + (k^2 - 1)(v - v_0)`. k is the factor with which the
-        errors of these predictions have the variances that they should, and :math:`v_0` is the median variance at the
-        data. This applies where the posterior variance in the middle of a gap exceeds :math:`4 v_0`, from two widths of
-        the smoother :math:`(\lambda / \rho)^{1/4}` before the gap until two behind it, with the weight ρ of the data
-        per unit of time. Velocities have the same k.
+        In long gaps, the posterior standard deviation is too small, because the true motion is rarely a sample of this
+        process. It is calibrated as follows. Let v be the posterior variance, and :math:`v_0` its median at the data.
+        Up to 24 parts of the recording, as long as the gap, are predicted without their data. The variance becomes
+        :math:`v + (k^2 - 1)(v - v_0)`, where the factor k ≥ 1 is chosen such that the errors of these predictions agree
+        with their variances. A gap is long if v exceeds :math:`4 v_0` in its middle and its length exceeds three median
+        time steps and two widths of the smoother. This width is :math:`(\lambda / \rho)^{1/4}`, with the weight ρ of
+        the data per unit of time, or :math:`(\lambda / \rho)^{1/6}` for the jerk. The calibration extends up to two
+        widths beyond both ends of the gap. Velocities have the same k.
 
-        Beyond the data, the variance :math:`\sigma^2 d^3 / (3 \lambda)` of the process at the distance d is added, and
-        k follows from predictions beyond the end of parts of the recording; it is at most 20. For ``penalty="jerk"``
-        the process adds :math:`\sigma^2 d^5 / (20 \lambda) + a^2 d^4 / 4`, with the mean square a² of the
-        acceleration. Coverage is an average over time, and k an average over the recording: nothing shows whether a
-        burst of motion falls into a gap.
+        Beyond the data, at the distance d from the end, the variance :math:`\sigma^2 d^3 / (3 \lambda)` of the process
+        is added. The factor k follows from predictions beyond the end of parts of the recording, and is at most 20. For
+        ``penalty="jerk"`` the process adds :math:`\sigma^2 d^5 / (20 \lambda) + a^2 d^4 / 4`, with the mean square a²
+        of the acceleration. Since k is an average over the recording, it does not account for a burst of motion that
+        falls into a gap.
 
-        The factors are computed at the first call. If no part of the recording is as long as a gap, its factor is the
-        largest one of shorter parts, and a `SmoothingWarning` names it. Without any such part the result is NaN there.
+        The factors are computed at the first call. If no part of the recording is as long as a gap, the gap has the
+        largest factor of shorter parts, and a `SmoothingWarning` names it. If there is no such part, the result in the
+        gap is NaN.
 
         References
         ----------
@@ -356,7 +358,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         return plain * self._inflation(number, index, x, nu) if calibrated else plain
 
     def _plain_spread(self, number: int, index: tuple[int, ...], x: Doubles, nu: int) -> Doubles:
-        """Return the same as the posterior has it."""
+        """Return the standard deviation of the posterior, without calibration."""
         part, knots = self._smoothed[number], self._knots_of(index)
         lam, sigma = (np.asarray(value)[index].item() for value in (part.band_lam, part.sigma))
         if not part.between:
@@ -424,8 +426,8 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         -----
         `level` is the coverage on average over all times. The coverage is lower at end points with natural conditions
         if the true curve has an acceleration there. The band is not valid if λ is at its bound (``report.at_bound``).
-        In long gaps and beyond the data it is as wide as predictions of other parts of the recording require; see the
-        notes of `std`.
+        In long gaps and beyond the data, its width is calibrated by predictions of other parts of the recording; see
+        the notes of `std`.
 
         Examples
         --------
@@ -552,10 +554,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
     def _inflated(
         self, parts: list[int], index: tuple[int, ...], x: Doubles, y: Any, orders: list[int], covariance: Doubles
     ) -> Doubles:
-        """Multiply covariances of parts by the factors of both standard deviations.
-
-        Accelerations have the factors of velocities.
-        """
+        """Multiply covariances by the calibration factors of both times; accelerations have those of velocities."""
         spaces = smoothed_spaces(self.space)
 
         def factors(at: Doubles) -> Doubles:

@@ -1,7 +1,7 @@
-"""Further starts of the smoothing, for data whose smooth curve is one of several minima.
+"""Further starts of the smoothing, for data for which the objective has several minima.
 
-The core starts from means of neighbouring data. Where noise is a large part of the distance to the cut locus, or where
-data turn far between two samples, the iteration from there may end in another minimum than the best one.
+The core starts from means of neighbouring data. If the noise is a large fraction of the distance to the cut locus, or
+consecutive data are far apart, the iteration may end in a minimum that is not the global one.
 """
 
 from __future__ import annotations
@@ -34,21 +34,22 @@ from .report import SmoothingReport
 from .warned import SmoothingWarning, first_affected
 
 # Standard deviation of the noise, divided by the injectivity radius, from which a second start is tried: 34° on a
-# circle. With less noise the first start always led to the best minimum.
+# circle. In all experiments with less noise, the first start led to the best minimum.
 _NOISY = 0.19
 # The same ratio from which the best minimum found may be a wrong one: 52° on a circle.
 _TOO_NOISY = 0.29
-# Median step between the data as a fraction of the way to the cut locus, from which the data are a start, unless a
-# curve was found with less noise than this part of the injectivity radius.
+# Median step between the data, as a fraction of the distance to the cut locus, from which the data are a start, unless
+# the noise of the curve found is less than the second number times the injectivity radius.
 _FAST, _SMALL = 0.6, 0.05
-# The same ratio of the noise from which the iteration may leave the right curve of fast data.
+# Noise, divided by the injectivity radius, from which the curve of data with far steps may be wrong.
 _FAST_NOISY = 0.03
-# Objectives that differ by less than this multiple of the variance are nearly equal, and curves that differ by this
-# part of the injectivity radius are different.
+# Objectives that differ by less than this multiple of the variance are nearly equal. Curves are different if they are
+# farther apart than this fraction of the injectivity radius.
 _EQUAL, _OTHER = 12.0, 0.5
-# The largest number of coordinates of an embedding.
+# Largest number of coordinates of an embedding.
 _WIDE = 64
-# Windows in which the most frequent step is looked for, and the number of data up to which all of them are.
+# Lengths of the windows in which the most frequent step is determined, and the number of data up to which all of these
+# lengths are tried.
 _WINDOWS, _LONG = (11, 21, 41), 20_000
 
 # Kinds of results that may be wrong.
@@ -69,7 +70,7 @@ class Raw(NamedTuple):
         return np.asarray(self.columns[0] == 0)
 
     def where(self, chosen: NDArray[np.bool_], other: Raw) -> Raw:
-        """Return the chosen curves of the other results, and the rest of these."""
+        """Return the chosen curves from the other results, and all others from these."""
         if chosen.all() or (chosen.any() and self.system[2] != other.system[2]):
             return other
         if not chosen.any():
@@ -104,11 +105,11 @@ class Samples(NamedTuple):
 
 
 Solve = Callable[[Doubles, Doubles | None], Raw]
-"""Smooths for given λ, NaN to choose it, and initial points at the knots."""
+"""Function that smooths with given λ (NaN to choose λ) and initial points at the knots."""
 
 
 def best_of_starts(space: Space, data: Samples, lam: Doubles, solve: Solve) -> tuple[Raw, NDArray[np.int_]]:
-    """Smooth from the start of the core, and from others where that one is doubtful.
+    """Smooth from the start of the core, and from further starts where its result may not be the best.
 
     Returns
     -------
@@ -152,13 +153,13 @@ def best_of_starts(space: Space, data: Samples, lam: Doubles, solve: Solve) -> t
 
 
 def _usual_weights(data: Samples, curves: int) -> Doubles:
-    """Return the median weight of every curve. The noise level is that of weight one."""
+    """Return the median weight of every curve, because noise levels refer to weight one."""
     rows = data.weights.reshape(-1, data.weights.shape[-1])
     return np.array([np.median(own[own > 0]) if (own > 0).any() else 1.0 for own in rows]) * np.ones(curves)
 
 
 def _noise(raw: Raw) -> Doubles:
-    """Return the noise levels, which are infinite for curves that failed."""
+    """Return the noise levels, infinite for curves that did not converge."""
     return np.where(raw.converged, raw.columns[Column.SIGMA], np.inf)
 
 
@@ -178,7 +179,7 @@ def _apart(space: Space, p: Doubles, q: Doubles) -> Doubles:
 
 
 def _median_steps(space: Space, data: Samples) -> Doubles:
-    """Return the median step of every curve, divided by the way to the cut locus."""
+    """Return the median step of every curve, as a fraction of the distance to the cut locus."""
     fractions = cut_fractions(space, data.points)
     rows = fractions.reshape(-1, fractions.shape[-1])
     if data.weights.all() and np.isfinite(rows).all():
@@ -194,7 +195,7 @@ def _median_steps(space: Space, data: Samples) -> Doubles:
 
 
 def warn_of_minima(space: Space, kinds: list[Any], reports: list[SmoothingReport]) -> list[NDArray[np.bool_]]:
-    """Warn once if a curve may be another one than that of least objective.
+    """Warn once if a curve may not be the one with the least objective.
 
     Parameters
     ----------
@@ -221,26 +222,26 @@ def warn_of_minima(space: Space, kinds: list[Any], reports: list[SmoothingReport
 _MESSAGES = {
     TWO: (
         "Two curves fit the data{of} nearly equally well (noise {noise}): they go around {space!r} in different ways. "
-        "The better one was returned. Plot it, and pass more data per time, or weights of 0 for wrong data."
+        "The better one was returned. Plot it, and sample more often, or pass weights of 0 for wrong data."
     ),
     NOISY: (
-        "The noise of the data{of}, {noise} in a coordinate, is so large a part of the distance to the cut locus of "
-        "{space!r} that the curve may take a wrong way around. Plot it, and pass more data per time, a larger lam, or "
-        "weights of 0 for wrong data. Check the units of angles."
+        "The noise of the data{of}, {noise} per coordinate, is so large a part of the distance to the cut locus of "
+        "{space!r} that the curve may go around it in the wrong way. Check the units of angles. Plot the curve, and "
+        "sample more often, or pass a larger lam, or weights of 0 for wrong data."
     ),
     FAST: (
-        "The data{of} turn by more than half of the way to the cut locus of {space!r} from one to the next, and have "
-        "the noise {noise}: the curve may turn by other angles. Pass more data per time. If the angular velocity is "
-        "known, remove its turn from the data before."
+        "The data{of} turn by more than half of the distance to the cut locus of {space!r} from one to the next, and "
+        "their noise is {noise}, so that the curve may turn by wrong angles. Sample more often. If the angular "
+        "velocity is known, remove this rotation from the data first."
     ),
 }
 
 
-# ---- data that turn far between two samples ----
+# ---- consecutive data that are far apart ----
 
 
 def _fast_starts(space: Space, data: Samples) -> Iterator[Doubles]:
-    """Return the data themselves, and on rotations a slow path times one that turns by the most frequent step."""
+    """Yield the data themselves, and on rotations a slow path times a path that turns by the most frequent step."""
     near = _nearest(data)
     lead = data.points.ndim - data.axes - 1
 
@@ -280,8 +281,7 @@ def _nearest(data: Samples) -> NDArray[np.intp]:
 def _modal_turn(space: Space, points: Array) -> tuple[Array, NDArray[np.bool_]]:
     """Return the path from the identity that turns by the most frequent step nearby, and whether in the fixed frame.
 
-    The step is taken in the moving or in the fixed frame, and in windows of several lengths: those whose remaining
-    steps are shortest.
+    The frame (moving or fixed) and the length of the windows are those for which the remaining steps are shortest.
     """
     count, identity = len(points), np.eye(points.shape[-1])
     best, turn, in_fixed = np.inf, points, False
@@ -324,7 +324,7 @@ def _modes(vectors: Doubles, window: int) -> Doubles:
 
 
 def _embedded_start(space: Space, data: Samples, lam: Doubles) -> Doubles | None:
-    """Return the projection of the data that were smoothed in a Euclidean space around this one, if it is known."""
+    """Return the data smoothed in the embedding Euclidean space and projected; None without a known embedding."""
     x = data.points
     if isinstance(space, Torus):
         inside = np.concatenate([np.cos(x), np.sin(x)], axis=-1)
@@ -361,7 +361,7 @@ def _projected(space: Space, x: Array) -> Array:
 
 
 def _linear(space: Space, data: Samples, points: Doubles, lam: Doubles) -> Doubles | None:
-    """Return the points at the knots of a curve through the data by least squares, None if there is none."""
+    """Return the points at the knots of a curve that is smoothed by least squares; None if it does not exist."""
     sigma, closed = np.full(lam.size, np.nan), None if data.closed else [("natural", None)] * 2
     options = "gcv", 1.4, "acceleration", "linear", "auto", 1e-2, 50, False
     found = _core.smooth(

@@ -1,4 +1,4 @@
-"""Tests whether the smoothness of a motion and its noise are the same along a curve, as one λ and one σ assume."""
+"""Test whether the smoothness of a motion and its noise are constant along a curve, as one λ and one σ assume."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ from .warned import SmoothingWarning
 _DATA, _FREEDOM = 100, 13
 # Least number of local degrees of freedom of a bin.
 _BIN = 6.0
-# Scores beyond which a test fails, in standard deviations of a normal distribution. Motions are not samples of the
-# process of which the curve is the mean, so that the levels are measured: of 700 recordings of constant smoothness
-# (sums of five sines and Matérn-like processes, 200 to 1000 data) no score exceeds 5.1 and 2.9. Sums of three
-# sines that beat on S² and SO(3) reached 9.1, which the limit of the ratio below excludes.
+# Scores beyond which a test fails, in standard deviations of a normal distribution. The levels are empirical, because
+# motions are not samples of the prior process: in 700 recordings of constant smoothness (sums of five sines and
+# Matérn-like processes, 200 to 1000 data), no score exceeded 5.1 and 2.9. Sums of three sines that beat on S² and SO(3)
+# reached 9.1, but these are excluded by the limit of the ratio below.
 _SMOOTHNESS, _NOISE = 7.0, 4.5
-# Least energy per degree of freedom in the fast part, relative to the whole curve. Waves that beat have up to 2.2.
+# Least energy per degree of freedom in the fast part, relative to the whole curve. Waves that beat reach 2.2.
 _FASTER = 4.0
 # ∫(1 + x⁴)⁻² / ∫(1 + x⁴)⁻¹: the information per local degree of freedom.
 _RATIO = 3 / 4
 
 
 class Finding(NamedTuple):
-    """A test that failed: what varies, and the score in standard deviations beyond which it fails."""
+    """A test that failed: its score divided by the limit, and the message."""
 
     score: float
     message: str
@@ -45,11 +45,11 @@ class Recording(NamedTuple):
     Attributes
     ----------
     t : ndarray, shape (n,)
-        Times of the data, as the user sees them.
+        Times of the data in the form passed by the user.
     times, weights, squares : ndarray, shape (n,)
-        The same as the core counts them, weights, and squared distances from the curve.
+        The same times in the units of the core, weights, and squared distances from the curve.
     at, energy : ndarray, shape (k,)
-        Knots, as the core counts time, and the integrated squared acceleration until there.
+        Knots in the units of the core, and the squared acceleration integrated up to each knot.
     leverage : ndarray, shape (n,)
         Posterior variances at the data, for noise of variance one.
     m : int
@@ -66,39 +66,39 @@ class Recording(NamedTuple):
     m: int
 
 
-def findings(own: Recording) -> list[Finding]:
-    """Return the tests that failed, the clearest one first."""
-    h = own.weights * own.leverage
-    df, squares = float(h.sum()), own.weights * own.squares
+def findings(recording: Recording) -> list[Finding]:
+    """Return the tests that failed, in decreasing order of their scores."""
+    h = recording.weights * recording.leverage
+    df, squares = float(h.sum()), recording.weights * recording.squares
     left = len(h) - df
     if len(h) < _DATA or min(df, left) < _FREEDOM or not np.isfinite(squares).all() or squares.sum() == 0:
         return []
     found = []
-    # Bins end at data. The energy of curves without bending is not part of the local degrees of freedom.
+    # Bins end at data. Two degrees of freedom per coordinate belong to geodesics, which have no energy.
     ends = _bins(h)
     freedom = np.diff(np.cumsum(h)[ends], prepend=0.0) * max(df - 2, 0.0) / df
-    energy = np.diff(np.interp(_after(own.times, ends), own.at, own.energy), prepend=0.0)
-    score, place = _unequal(energy, freedom, own.m * freedom / _RATIO)
+    energy = np.diff(np.interp(_after(recording.times, ends), recording.at, recording.energy), prepend=0.0)
+    score, place = _unequal(energy, freedom, recording.m * freedom / _RATIO)
     run = slice(place[0], place[1] + 1)
     if score > _SMOOTHNESS and energy[run].sum() / freedom[run].sum() > _FASTER * energy.sum() / freedom.sum():
-        faster = _interval(own.t, ends, place)
+        faster = _interval(recording.t, ends, place)
         found.append(
             Finding(
                 score / _SMOOTHNESS,
-                f"the motion is faster between t = {faster} than one lam for the whole recording allows. There the "
-                "curve is too smooth, and elsewhere it follows noise. Fit this part and the others separately, or pass "
-                "a smaller lam",
+                f"the motion is faster between t = {faster} than one lam for the whole recording allows. The curve is "
+                "too smooth there, and follows the noise elsewhere. Fit this part and the others separately, or pass a "
+                "smaller lam",
             )
         )
     ends = _bins(1 - h)
     freedom, information = (np.diff(np.cumsum(x)[ends], prepend=0.0) for x in (1 - h, 1 - (2 - _RATIO) * h))
-    information = own.m * freedom**2 / np.maximum(information, 1e-3 * freedom)
+    information = recording.m * freedom**2 / np.maximum(information, 1e-3 * freedom)
     sums = np.diff(np.cumsum(squares)[ends], prepend=0.0)
-    # Natural ends do not follow a motion that accelerates there: the first and the last bin do not count.
-    score, (first, last) = _unequal(*(own[1:-1] for own in (sums, freedom, information)))
+    # The first and the last bin do not count, because natural ends cannot follow a motion that accelerates there.
+    score, (first, last) = _unequal(*(values[1:-1] for values in (sums, freedom, information)))
     place = first + 1, last + 1
     if score > _NOISE:
-        noisier = _interval(own.t, ends, place)
+        noisier = _interval(recording.t, ends, place)
         found.append(
             Finding(
                 score / _NOISE,
@@ -119,7 +119,7 @@ def _bins(freedom: Doubles) -> Any:
 
 
 def _after(times: Doubles, ends: Any) -> Doubles:
-    """Return the times in the middle between the last datum of each bin and the next one."""
+    """Return the times midway between the last datum of each bin and the next datum."""
     following = np.minimum(ends + 1, len(times) - 1)
     return np.asarray(0.5 * (times[ends] + times[following]))
 
@@ -130,7 +130,7 @@ def _unequal(sums: Doubles, freedom: Doubles, information: Doubles) -> tuple[flo
     Returns
     -------
     score : float
-        χ² as a normal number (Wilson & Hilferty 1931).
+        χ² transformed to a standard normal score (Wilson & Hilferty 1931).
     place : tuple of int
         The run of bins with the largest ratios.
     """
@@ -179,7 +179,7 @@ def warn_of_varying(
     of_factors = zip(factors_of(space), curve.parts, noisy.points, grouped(space, smoothed), strict=True)
     for factor, part, points, own in of_factors:
         number, *more = (next(numbers) for _ in own)
-        # Poses have no acceleration that is that of their rotations and positions.
+        # The acceleration of a pose is not that of its rotation and position.
         if more or noisy.precisions[number].information is not None:
             continue
         report = own[0].report

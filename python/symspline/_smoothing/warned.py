@@ -27,9 +27,9 @@ _SAMPLE = 1000
 class SmoothingWarning(UserWarning):
     """Warning that a statistical fit cannot be trusted.
 
-    The chosen λ is at a bound, the residuals are not those of independent noise with the given standard deviations, a
-    robust loss may have rejected the wrong data, other curves may fit as well, or nothing shows the error of the curve
-    in a gap.
+    Reasons are a chosen λ at a bound, residuals that are not those of independent noise with the given standard
+    deviations, a robust loss that may have rejected the wrong data, another curve that may fit as well, and a gap in
+    which the error of the curve cannot be estimated.
     """
 
 
@@ -183,7 +183,7 @@ def _median_distance(space: Space, x: Array, y: Array, counts: Any) -> Array:
 
 
 def warn_of_gaps(spline: Any, found: dict[tuple[int, tuple[int, ...]], Any]) -> None:
-    """Warn once of the longest gap for which no part of the recording shows how far its curve may be off.
+    """Warn once of the longest gap among those longer than any part of the recording that could be predicted.
 
     Parameters
     ----------
@@ -206,14 +206,14 @@ def warn_of_gaps(spline: Any, found: dict[tuple[int, tuple[int, ...]], Any]) -> 
     more = f" (and {count - 1} more gaps)" if count > 1 else ""
     if np.isnan(gap.factor):
         known = (
-            "No part of the recording shows how far the curve may be off there, so its standard deviation is NaN. Cut "
-            "the recording at this gap (symspline.fit_segments), or pass calibrated=False for the posterior."
+            "The error of the curve in the gap cannot be estimated, so its standard deviation is NaN there. Cut the "
+            "recording at this gap (symspline.fit_segments), or pass calibrated=False for the posterior."
         )
     else:
         known = (
-            f"Its band is {gap.factor:.2g} times that of the posterior, as the longest parts of the recording require "
-            "that can be predicted from the rest. Do not rely on the curve inside: cut the recording at this gap "
-            "(symspline.fit_segments), or add data."
+            f"The band in the gap is up to {gap.factor:.2g} times as wide as that of the posterior. This factor comes "
+            "from shorter parts of the recording and may be too small. Do not rely on the curve in the gap: cut the "
+            "recording there (symspline.fit_segments), or add data."
         )
     warn(
         f"there are no data{of} between t = {short_repr(gap.start)} and {short_repr(gap.stop)}{more}, and no other "

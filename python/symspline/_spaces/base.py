@@ -819,7 +819,7 @@ class Space(Generic[P]):
         Warns
         -----
         AmbiguousMeanWarning
-            If there is a second local minimum whose sum is at most 5 % larger and that is farther away than the
+            If there is a second local minimum whose sum is less than 5 % larger, and that is farther away than the
             standard error of the mean.
 
         See Also
@@ -830,15 +830,15 @@ class Space(Generic[P]):
         Notes
         -----
         The mean minimises :math:`\sum_i w_i\, d(m, x_i)^2`. It is unique if the points are in a ball of radius less
-        than half the injectivity radius [1]_. Points that are spread farther have several local minima. The mean is
-        the lowest one, whatever the order of the points: on circles, tori, plane rotations and phases exactly [3]_,
-        elsewhere the lowest end point of descents from the extrinsic mean and from the data, from the 12 data with
-        the lowest sums if there are more than 30. Points spread over the whole space may have a lower minimum that
-        these descents miss. On groups without an invariant metric, such as `SpecialEuclidean`, the mean is the point
-        at which the weighted sum of the logarithms vanishes [2]_.
+        than half the injectivity radius [1]_. Points that are spread farther can have several local minima. The mean
+        is then the lowest minimum found, independently of the order of the points. On circles, tori, plane rotations
+        and phases, this minimum is exact [3]_. Elsewhere it is the lowest end point of descents from the extrinsic
+        mean and from the data; of more than 30 data, from the 12 with the lowest sums. These descents can miss the
+        global minimum of points that are spread over the whole space. On groups without an invariant metric, such as
+        `SpecialEuclidean`, the mean is the point at which the weighted sum of the logarithms vanishes [2]_.
 
-        Means of positive definite matrices do not depend on units: the mean of D A D is D mean(A) D to rounding
-        errors for any diagonal matrix D.
+        Means of positive definite matrices do not depend on units: the mean of D A D is D mean(A) D, up to rounding
+        errors, for any invertible diagonal matrix D.
 
         References
         ----------
@@ -931,19 +931,19 @@ class Space(Generic[P]):
     _has_angles: ClassVar[bool] = False
 
     def _first_means(self, groups: Groups) -> Any:
-        """Return the first start of the iteration in every group."""
+        """Return the initial point of the iteration in every group."""
         return self.project(take(groups.points, groups.starts))
 
     def _extrinsic_means(self, points: Array, weights: FloatArray) -> Array | None:
-        """Return minimisers of a distance in the space of arrays, which may have to be projected."""
+        """Return minimisers of a distance in the embedding space, before their projection to the manifold."""
         return None
 
     def _whitening(self, groups: Groups) -> Whitening | None:
-        """Return an isometry to well-conditioned points."""
+        """Return isometries that make the points of each group well-conditioned; None if not needed."""
         return None
 
     def _whitening_at(self, points: Array) -> Whitening | None:
-        """Return isometries that move points to well-conditioned ones."""
+        """Return isometries that move the given points to the identity; None if not needed."""
         return None
 
     def _batched(self, rows: Any, batch: tuple[int, ...]) -> Any:
@@ -1063,7 +1063,7 @@ class Space(Generic[P]):
         return as_array(value, name)
 
     def _tol(self, array: Array) -> float:
-        """Return the largest distance of points from the manifold, by the accuracy of their numbers."""
+        """Return the tolerance for points off the manifold, from the accuracy of their numbers."""
         return point_tol(array, math.prod(self._point_shape))
 
     def _conversion(self, shape: tuple[int, ...], name: str) -> str:
@@ -1071,7 +1071,7 @@ class Space(Generic[P]):
         return ""
 
     def _one_number(self, shape: tuple[int, ...], name: str) -> str:
-        """Return the remedy for numbers without the axis of a point, where a point is one number."""
+        """Return the remedy for an array without the axes of a point, on spaces whose points are single numbers."""
         if math.prod(self._point_shape) != 1 or not shape:
             return ""
         return f". A point is an array of one number: pass {name}[..., {', '.join(['None'] * len(self._point_shape))}]."

@@ -10,19 +10,19 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 TURN = 2 * np.pi
-# Objectives whose relative difference is at most this much are equal.
+# Objectives are equal up to this relative difference.
 _EQUAL = 1e-9
 
 
 class Minima(NamedTuple):
-    """Global minimum of an objective on the circle, and the best of its other local minima.
+    """Global minimum of an objective on the circle, and the lowest of its other local minima.
 
     Attributes
     ----------
     angle, objective : float
         The global minimum.
     other_angle, other_objective : float
-        The next local minimum that is farther away than the standard error of the mean; infinite without one.
+        The lowest other local minimum farther away than the standard error of the mean; infinite if none exists.
     """
 
     angle: float
@@ -39,13 +39,13 @@ def wrap(angles: Floats) -> Floats:
 def circular_mean(angles: Floats, weights: Floats) -> Minima:
     """Minimise the weighted sum of squared distances.
 
-    Cut the circle between two neighbouring data and unroll it. The average is a candidate, and one of these candidates
-    is the mean. Sums of squares of all candidates follow from prefix sums (Hotz and Huckemann, Intrinsic means on the
-    circle, Ann. Inst. Stat. Math. 67, 2015).
+    If the circle is cut between two neighbouring data and unrolled, the average of the data is a candidate. The mean is
+    the best of the candidates for all cuts, whose sums of squares follow from prefix sums (Hotz and Huckemann,
+    Intrinsic means on the circle, Ann. Inst. Stat. Math. 67, 2015).
     """
     v, w = _sorted(angles, weights)
     total = w.sum()
-    # The k smallest data are moved up by a turn.
+    # In candidate k, the k smallest data are moved by one turn.
     moved = np.concatenate([[0], np.cumsum(w)[:-1]])
     first = (w * v).sum() + TURN * moved
     second = (w * v * v).sum() + np.concatenate([[0], np.cumsum(w * TURN * (2 * v + TURN))[:-1]])
@@ -60,7 +60,8 @@ def circular_mean(angles: Floats, weights: Floats) -> Minima:
 def circular_median(angles: Floats, weights: Floats) -> Minima:
     """Minimise the weighted sum of distances.
 
-    The objective is linear between data and antipodes of data, and concave at antipodes, so that a datum minimises it.
+    The objective is piecewise linear with corners at the data and their antipodes, and concave at the antipodes.
+    Therefore one of the data is a minimum.
     """
     v, w = _sorted(angles, weights)
     n = len(v)
@@ -76,13 +77,13 @@ def circular_median(angles: Floats, weights: Floats) -> Minima:
         left = x * (before[at] - before[low]) - (sums[at] - sums[low])
         return np.asarray(left + (sums[high] - sums[at]) - x * (before[high] - before[at]))
 
-    # Beyond the data and their antipodes the objective is linear.
+    # Between data and antipodes, the objective is linear.
     corners = np.sort(np.concatenate([v, (v - v[0] + np.pi) % TURN + v[0]])) + TURN
     found = objective(corners)
     best = int(np.argmin(found))
     corners, found = np.roll(corners, -best), np.roll(found, -best)
     slack = _EQUAL * (1 + found)
-    # Minima that are joined to the best one without a barrier belong to it.
+    # Minima without a barrier between them and the best one belong to it.
     barrier = np.minimum(np.maximum.accumulate(found), np.maximum.accumulate(found[::-1])[::-1])
     local = (np.roll(found, 1) >= found - slack) & (np.roll(found, -1) >= found - slack) & (barrier > found + slack)
     mean_square = circular_mean(v, w).objective
@@ -106,7 +107,7 @@ def standard_error(square_sum: float, weights: Floats) -> float:
 
 def _minima(angles: Floats, objective: Floats, local: NDArray[np.bool_], error: float) -> Minima:
     wrapped = wrap(angles)
-    # Of equal minima, the one with the smallest angle does not depend on the order of the data.
+    # Of equal minima, choose the one with the smallest angle, which does not depend on the order of the data.
     equal = np.flatnonzero(objective <= objective.min() * (1 + _EQUAL) + _EQUAL**2)
     best = equal[np.argmin(wrapped[equal])]
     others = local & (np.abs(wrap(wrapped - wrapped[best])) > max(error, _EQUAL))

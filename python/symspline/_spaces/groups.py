@@ -74,12 +74,12 @@ class SpecialOrthogonal(Group[FloatArray]):
         return ". symspline.rotations.velocities(rotations, rates) converts angular velocities to tangent vectors."
 
 
-# Rounding errors of the last row of a pose.
+# Tolerance for rounding errors in the last row of a pose.
 _LAST_ROW = 1e-6
 
 
 def names_points(name: str) -> bool:
-    """Whether an argument with this name is points, not tangent vectors. Measurements have points `y`."""
+    """Whether an argument with this name contains points, not tangent vectors. Measurements have points `y`."""
     return name in ("points", "p", "q") or name.endswith(".y")
 
 
@@ -235,7 +235,7 @@ class SpecialEuclidean(Group[FloatArray]):
     _name = "se"
 
     def _first_means(self, groups: Groups) -> Array:
-        # The map to the rotation is a homomorphism, so that the rotation of a barycentre is one of the rotations.
+        # The map to the rotation is a homomorphism, so that the rotation of a barycentre is a barycentre of rotations.
         first: Array = super()._first_means(groups)
         n = self.point_shape[0] - 1
         turns = np.ascontiguousarray(groups.points[:, :n, :n])

@@ -1,7 +1,7 @@
-"""Karcher means and geometric medians: global minima of sums of distances.
+"""Karcher means and geometric medians: global minima of sums of distances or squared distances.
 
-If all data lie in a ball of half the injectivity radius about a local minimum (a quarter for medians), it is the global
-one. Otherwise circles have an exact solution, and elsewhere descents from several starts are compared.
+A local minimum is the global one if all data lie in a ball about it with half of the injectivity radius (a quarter for
+medians). Otherwise, the problem is solved exactly on circles, and elsewhere descents from several starts are compared.
 """
 
 from __future__ import annotations
@@ -17,20 +17,22 @@ from .._warnings import warn
 from .circle import Floats, Minima, circular_mean, circular_median, standard_error, wrap
 from .statistics import Array, Descent, Groups, descend_to_mean, descend_to_median, joined, put, take
 
-# All data are starts up to this number; of more data, those with the lowest objectives.
+# Up to the first number of data, all are starts; of more data, the second number of those with the lowest objectives.
 _ALL, _BEST = 30, 12
-# Objectives of data are compared for so many data.
+# Largest number of data whose objectives are compared.
 _SAMPLE = 200
-# Steps of the descents that are compared. End points whose objectives exceed the lowest one by at most this fraction,
-# and that are this far apart in units of the injectivity radius, are iterated until they converge, up to a number.
+# Number of steps of the descents that are compared. End points are iterated until they converge if their objectives
+# exceed the lowest one by at most the second number, relatively, and if they are farther apart than the third number
+# times the injectivity radius. The fourth number is the largest count of such end points.
 _SHORT, _NEARLY, _APART, _FINISHED = 100, 1e-3, 1e-2, 4
-# Starts beyond a minimum lie at this fraction of the injectivity radius.
+# Distance of starts beyond a minimum, as a fraction of the injectivity radius.
 _BEYOND = 0.9
 # Rows of points that are processed at a time.
 _ROWS = 200_000
-# Two minima whose objectives differ by at most this fraction make the global one meaningless.
+# If the objectives of two minima differ by less than this fraction, the mean is ambiguous.
 _AMBIGUOUS = 0.05
-# Objectives whose relative difference is at most this much are equal; so are points this near in units of the radius.
+# Objectives are equal up to the first relative difference, and points up to the second fraction of the injectivity
+# radius.
 _EQUAL, _SAME = 1e-9, 1e-6
 
 
@@ -39,7 +41,7 @@ class AmbiguousMeanWarning(UserWarning):
 
 
 class _Kind(NamedTuple):
-    """What is minimised: the sum of the distances to this power."""
+    """Kind of centre: the minimum of the sum of distances to a given power."""
 
     name: str
     power: int
@@ -55,7 +57,7 @@ _MEDIAN = _Kind("median", 1, descend_to_median, circular_median, 0.25)
 
 
 class _Found(NamedTuple):
-    """The global minimum of a group, and the distance and relative excess of the next one, infinite without one."""
+    """Global minimum of a group, and the distance and relative excess of the next minimum (infinite if none exists)."""
 
     point: Any
     distance: float
@@ -129,7 +131,7 @@ def _descents(
 def _global_minimum(space: Any, group: Groups, kind: _Kind, number: int | None) -> _Found:
     """Return the global minimum of one group whose data are spread."""
     order = _order(group.points)
-    # From here on the order of the data is that of their coordinates, so that their given order does not matter.
+    # Sort the data by their coordinates, so that the result does not depend on the given order.
     data, weights = take(group.points, order), group.weights[order]
     group = group._replace(points=data, weights=weights)
     if space._has_angles and (kind is _MEAN or space.dim == 1):
@@ -137,7 +139,7 @@ def _global_minimum(space: Any, group: Groups, kind: _Kind, number: int | None) 
     if space.dim == 1 and np.isfinite(space.curvature) and 0 < space.injectivity_radius < np.inf:
         return _on_circle(space, group, kind)
     if not np.isfinite(space.curvature):
-        # Without a metric there is nothing to compare.
+        # Without a metric, minima cannot be compared.
         found = kind.descend(space, group, take(data, np.arange(1)))
         if found.unfinished.any():
             _raise_unfinished(kind, number)
@@ -156,10 +158,10 @@ def _order(points: Any) -> NDArray[np.intp]:
 
 
 def _on_torus(group: Groups, kind: _Kind) -> _Found:
-    """Solve for every angle; the sum of squares is that of the angles, and for one angle so is the sum of lengths."""
+    """Solve for every angle separately, which is exact for sums of squares, and for one angle also for medians."""
     each = [kind.on_circle(own, group.weights) for own in group.points.T]
     angles = np.array([own.angle for own in each])
-    # The representative near the average of the given numbers.
+    # Choose the representative nearest to the average of the given numbers.
     average = group.weights @ group.points / group.weights.sum()
     nearest = angles + 2 * np.pi * np.round((average - angles) / (2 * np.pi))
     excess = [own.other_objective / own.objective - 1 if own.objective > 0 else np.inf for own in each]
@@ -174,7 +176,7 @@ def _on_torus(group: Groups, kind: _Kind) -> _Found:
 
 
 def _on_circle(space: Any, group: Groups, kind: _Kind) -> _Found:
-    """Solve on a space that is isometric to a circle."""
+    """Solve exactly on a space that is isometric to a circle."""
     base, unit, angles, scale = _angles(space, group.points)
     found = kind.on_circle(angles, group.weights)
     if kind is _MEDIAN:
@@ -195,7 +197,7 @@ def _angles(space: Any, points: Array) -> tuple[Array, Array, Floats, float]:
     start = points[0]
     unit = space.frame(start)[0]
     error: CutLocusError | None = None
-    # No datum may be opposite to the base. The golden angle misses data at regular angles.
+    # Logarithms require a base that is not opposite to a datum. Steps of the golden angle avoid data at regular angles.
     for turn in np.arange(12) * np.pi * (3 - np.sqrt(5)):
         base = space.exp(start, wrap(np.asarray(turn)) / scale * unit)
         at = np.broadcast_to(base, points.shape)
@@ -215,7 +217,7 @@ def _angles(space: Any, points: Array) -> tuple[Array, Array, Floats, float]:
 
 
 def _from_several_starts(space: Any, group: Groups, kind: _Kind, number: int | None) -> _Found:
-    """Descend from the best data, from extrinsic means, and from beyond the lowest minimum, and keep the lowest one."""
+    """Descend from the best data, extrinsic means, and points beyond the lowest minimum; keep the lowest minimum."""
     starts = joined([_best_data(space, group, kind), *_extrinsic(space, group)])
     found, objective = _all_descents(space, group, starts, kind)
     if np.isfinite(objective).any():
@@ -225,7 +227,7 @@ def _from_several_starts(space: Any, group: Groups, kind: _Kind, number: int | N
     if not np.isfinite(objective).any():
         # Raises CutLocusError.
         kind.descend(space, group, take(starts, np.arange(1)))
-    # Only the lowest end points are worth the remaining steps.
+    # Only the lowest end points are iterated until they converge.
     for i in _lowest(space, found, objective):
         whole, failed = _descents(space, group, take(found, np.arange(i, i + 1)), kind)
         if not failed[0] and not whole.unfinished[0]:
@@ -247,7 +249,7 @@ def _from_several_starts(space: Any, group: Groups, kind: _Kind, number: int | N
 
 
 def _all_descents(space: Any, group: Groups, starts: Any, kind: _Kind) -> tuple[Any, Floats]:
-    """Return end points of short descents in one group, and their objectives, infinite at a cut locus."""
+    """Return end points of short descents in one group, and their objectives (infinite at a cut locus)."""
     count = len(group.weights)
     size = len(starts[0]) if isinstance(starts, tuple) else len(starts)
     each = []
@@ -260,7 +262,7 @@ def _all_descents(space: Any, group: Groups, starts: Any, kind: _Kind) -> tuple[
 
 
 def _lowest(space: Any, found: Any, objective: Floats) -> list[int]:
-    """Return the indices of end points that are nearly as low as the lowest one and not near each other."""
+    """Return indices of end points that are nearly as low as the lowest one and not near each other."""
     kept: list[int] = []
     for i in np.argsort(objective, kind="stable"):
         if objective[i] > objective.min() * (1 + _NEARLY) or len(kept) == _FINISHED:
@@ -274,7 +276,7 @@ def _lowest(space: Any, found: Any, objective: Floats) -> list[int]:
 def _beyond(space: Any, group: Groups, point: Any) -> Any:
     """Return starts near the cut locus of a minimum, along the direction in which the data are spread most.
 
-    Between two opposite clusters there are two minima, and descents from the data lead to the nearer one only.
+    Two opposite clusters have a minimum on either side, and descents from the data may all lead to the same one.
     """
     if isinstance(point, tuple) or not space.injectivity_radius > 0:
         return take(group.points, np.arange(1))
@@ -296,7 +298,7 @@ def _distances(space: Any, point: Any, points: Any) -> Floats:
 
 
 def _best_data(space: Any, group: Groups, kind: _Kind) -> Any:
-    """Return all data, or of many those at which a sample of the data has the lowest objectives."""
+    """Return all data; of many data, those with the lowest objectives, computed from a sample."""
     count = len(group.weights)
     if count <= _ALL:
         return _copied(group.points)
@@ -307,17 +309,17 @@ def _best_data(space: Any, group: Groups, kind: _Kind) -> Any:
 
 
 def _extrinsic(space: Any, group: Groups) -> list[Any]:
-    """Return minimisers of the distance in the space of arrays, if they are points."""
+    """Return minimisers of the distance in the embedding space, projected to the manifold where possible."""
     try:
         found = space._extrinsic_means(group.points, group.weights / group.weights.sum())
         return [] if found is None else [space.project(np.ascontiguousarray(found))]
     except (CutLocusError, ValidationError):
-        # The average of points that are spread evenly has no projection.
+        # The average of evenly spread points may have no projection.
         return []
 
 
 def _best(space: Any, group: Groups, found: Any, objective: Floats) -> int:
-    """Return the index of the lowest minimum; of equal ones, the one whose distances from the data come first."""
+    """Return the index of the lowest minimum; of equal ones, that whose distances to the data are first in order."""
     lowest = objective.min()
     equal = np.flatnonzero(objective <= lowest * (1 + _EQUAL) + _EQUAL**2)
     scale = space.injectivity_radius
@@ -344,13 +346,13 @@ def _near(space: Any, group: Groups, point: Any) -> Any:
 def _raise_unfinished(kind: _Kind, number: int | None) -> None:
     of = "" if number is None else f" of group {number}"
     raise ConvergenceError(
-        f"the {kind.name}{of} did not converge: the points are spread too far. Use points that are closer together, or "
-        "more points."
+        f"the {kind.name}{of} did not converge, because the points are spread too far. Use points that are closer "
+        "together, or more points."
     )
 
 
 def _warn_ambiguous(kind: _Kind, numbers: NDArray[np.intp] | None, results: list[_Found]) -> None:
-    """Warn once of all groups with two minima of nearly the same value."""
+    """Warn once of all groups that have two minima of nearly the same value."""
     bad = [i for i, own in enumerate(results) if own.excess < _AMBIGUOUS and own.distance > own.error]
     if not bad:
         return
@@ -359,11 +361,11 @@ def _warn_ambiguous(kind: _Kind, numbers: NDArray[np.intp] | None, results: list
     of = "" if numbers is None else f" of group {numbers[bad[0]]}{more}"
     squared = "squared " if kind is _MEAN else ""
     warn(
-        f"`points`: the {kind.name}{of} is ambiguous. A second local minimum of the sum of {squared}distances lies at "
-        f"the distance {first.distance:.3g} from the returned one, more than the standard error {first.error:.3g}, and "
-        f"its sum is only {100 * first.excess:.2g} % larger. Either single points lie opposite to the others, or the "
-        f"points are spread so far that no {kind.name} is meaningful. Remove the opposite points, divide the points "
-        "into clusters, or use `Quotient` or `RealProjective` if opposite points are equivalent.",
+        f"`points`: the {kind.name}{of} is ambiguous. The sum of {squared}distances has a second local minimum at the "
+        f"distance {first.distance:.3g} from the returned one, which exceeds the standard error {first.error:.3g}. Its "
+        f"sum is only {100 * first.excess:.2g} % larger. Either single points are opposite to the others, or the "
+        f"points are spread so far that no {kind.name} is meaningful. Remove the opposite points, or divide the points "
+        "into clusters. If opposite points are equivalent, use `Quotient` or `RealProjective`.",
         AmbiguousMeanWarning,
     )
 

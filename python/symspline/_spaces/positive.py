@@ -24,7 +24,7 @@ _FREE_SIZE = 20
 class _PositiveDefinite(Congruent[P]):
     """Positive definite matrices, whose random points are exponentials of random matrices."""
 
-    # Whether congruences with any matrix are isometries of the space of all positive definite matrices.
+    # Whether congruences with any invertible matrix are isometries of the space of all positive definite matrices.
     _is_affine_invariant = True
 
     def _whitening(self, groups: Groups) -> Whitening | None:

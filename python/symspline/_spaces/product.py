@@ -227,7 +227,7 @@ def parts_of(value: Any, space: Space[Any], name: str) -> Tuple:
 def _parts_of_poses(value: Any, space: Product[Any], name: str) -> Any:
     """Return the rotations and positions of poses on a product of ``so:3`` and ``r:3``; other values do not change.
 
-    Poses are objects of SciPy, lists of them, and matrices as on ``se:3``.
+    Poses are objects of SciPy, lists of these, or matrices as on ``se:3``.
     """
     if isinstance(value, tuple) or sorted(factor.point_shape for factor in space.factors) != [(3,), (3, 3)]:
         return value

@@ -1,4 +1,4 @@
-"""How far points may be off a manifold: the rounding of their numbers, by their accuracy."""
+"""Tolerance for points off a manifold, from the accuracy of their numbers."""
 
 from __future__ import annotations
 
@@ -8,17 +8,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-# Tolerances for numbers in double precision, for numbers that went through single precision or text of up to nine
-# significant digits, and for numbers of very few decimals. Nine decimals identify a number in single precision.
+# Tolerances for numbers in double precision, for numbers that were stored in single precision or in text with up to
+# nine significant digits, and for numbers with very few decimals. Nine significant digits identify a number in single
+# precision.
 POINT_TOL, POINT_TOL_ROUNDED, POINT_TOL_LARGEST = 1e-8, 1e-4, 5e-3
 _DIGITS = 9
-# Of large arrays some hundred points are inspected.
+# Up to this many points of large arrays are inspected.
 _SAMPLE = 500
-# Share of numbers that decides.
+# The accuracy is that of more than this share of the numbers.
 _MOST = 0.75
-# Rounding errors of products by powers of ten, in units of the last of nine decimals.
+# Tolerance of the test for whole numbers after multiplication by a power of ten.
 _ROUNDING = 2e-6
-# Numbers of single precision that were written with ten decimals or more differ from single precision by less.
+# Relative difference from single precision of such numbers that were written with ten significant digits or more.
 _NEAR_SINGLE = 1e-10
 _BITS_SINGLE = 2.0**24
 
@@ -26,16 +27,16 @@ _BITS_SINGLE = 2.0**24
 def point_tol(numbers: NDArray[Any], size: int | None = None) -> float:
     """Return the largest distance from the manifold of points that consist of these numbers.
 
-    Rounding moves a point by at most half a unit in the last decimal of every number. Points in single precision are
-    often results of a computation in single precision, whose errors add up; they have more tolerance. Most of the
-    numbers decide, so that a single wrong point does not affect the others.
+    Rounding changes every number by at most half a unit in the last decimal. The tolerance for single precision is
+    larger than its rounding error, because errors of computations in single precision add up. The majority of the
+    numbers determines the tolerance, so that a single wrong point does not affect it.
 
     Parameters
     ----------
     numbers : ndarray
-        Numbers of the points as the user gave them. Numbers that are not finite do not count.
+        Numbers of the points as passed by the user. Numbers that are not finite are ignored.
     size : int, optional
-        Count of the numbers of a point, by default the length of the last axis.
+        How many numbers a point consists of, by default the length of the last axis.
 
     Examples
     --------
@@ -48,7 +49,7 @@ def point_tol(numbers: NDArray[Any], size: int | None = None) -> float:
     count = numbers.size
     if numbers.dtype.kind not in "fc" or not count or numbers.itemsize < 8 or numbers.dtype == np.complex64:
         return dtype_tol(numbers.dtype)
-    # Usually these numbers are accurate, and no others are inspected.
+    # Usually these three numbers have full precision, and no others are inspected.
     for i in (0, count // 2, count - 1):
         x = numbers.item(i).real
         mantissa = abs(math.frexp(x)[0]) * _BITS_SINGLE % 1.0
@@ -59,7 +60,7 @@ def point_tol(numbers: NDArray[Any], size: int | None = None) -> float:
 
 
 def dtype_tol(dtype: np.dtype[Any]) -> float:
-    """Return the tolerance for all points with this type of numbers."""
+    """Return the tolerance for points with this data type."""
     if dtype == np.float16:
         return POINT_TOL_LARGEST
     return POINT_TOL_ROUNDED if dtype in (np.float32, np.complex64) else POINT_TOL

@@ -162,16 +162,16 @@ def _size(space: Any, p: Any, v: Any) -> Floats:
 
 
 class Descent(NamedTuple):
-    """Local minima that descents from given starts led to, one per group.
+    """End points of descents to local minima from given starts, one per group.
 
     Attributes
     ----------
     points : ndarray, shape (groups, *point_shape), or a tuple of these
         The minima.
     objective : ndarray, shape (groups,)
-        Weighted sum of the distances or of their squares, at the last but one iterate.
+        Weighted sum of the distances or of their squares, at the iterate before the last.
     radius : ndarray, shape (groups,)
-        Largest distance of the data from there.
+        Largest distance of the data from that iterate.
     unfinished : ndarray of bool, shape (groups,)
         Whether the iteration did not converge.
     """
@@ -255,7 +255,7 @@ def descend_to_median(space: Any, groups: Groups, medians: Any, steps: int = _ME
 
 
 def _note(state: Descent, index: Indices, groups: Groups, distances: Floats, power: int) -> None:
-    """Note the objective and the radius of some groups."""
+    """Store the objective and the radius of some groups."""
     state.objective[index] = groups.sums(groups.weights * distances**power)
     state.radius[index] = np.maximum.reduceat(distances, groups.starts)
 

@@ -39,7 +39,7 @@ class Euclidean(Space[FloatArray]):
     _name = "euclidean"
 
     def _tol(self, array: Array) -> float:
-        # Numbers cannot be off the space. The tolerance remains for the ends of closed curves.
+        # Every vector is a point. The tolerance is used for the ends of closed curves.
         return dtype_tol(array.dtype)
 
     def __init__(self, n: int) -> None:
@@ -92,7 +92,7 @@ class Torus(Space[FloatArray]):
     _has_angles = True
 
     def _tol(self, array: Array) -> float:
-        # Few decimals do not make an angle with many turns more precise.
+        # The number of decimals does not affect the tolerance of angles, which may contain many turns.
         return dtype_tol(array.dtype)
 
     def __init__(self, n: int) -> None:

@@ -1,9 +1,9 @@
 """Congruences that make positive definite matrices well-conditioned before an iteration.
 
-The affine-invariant metric does not change under congruences A → L⁻¹ A L⁻ᴴ, but rounding errors do: those of a matrix
-with entries in mixed units grow with its condition number. With the Cholesky factor L of the average of the data, the
-transformed matrices are as well-conditioned as the data are close to each other, whatever the units. Cholesky
-factorisation and triangular solves commute with diagonal scaling up to rounding errors.
+The affine-invariant metric does not change under congruences A → L⁻¹ A L⁻ᴴ, but rounding errors do: they grow with the
+condition number, which is large for matrices with entries in mixed units. If L is the Cholesky factor of the average of
+the data, the transformed matrices are close to the identity wherever the data are close to each other, independently of
+the units. Cholesky factorisation and triangular solves commute with diagonal scaling up to rounding errors.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ class Whitening(NamedTuple):
     factor : ndarray, shape (..., n, n)
         Lower triangular factors L, which broadcast against matrices.
     space : SymmetricPositiveDefinite or HermitianPositiveDefinite
-        The space of the transformed matrices. The spaces of special and of symplectic matrices are totally geodesic in
-        it, so that means and medians are the same.
+        Space of the transformed matrices. The spaces of special and of symplectic matrices are totally geodesic in it,
+        so that their means and medians are the same.
     """
 
     factor: Array

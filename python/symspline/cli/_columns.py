@@ -163,7 +163,7 @@ def column_of_tracks(table: Table, used: Sequence[str | None], space: Space, poi
     for name in table.names:
         if name in used or name in table.dates or (name in table.numeric and not NAMED.search(name)):
             continue
-        # A cell may be empty, or not hold a text, and some spaces have no distances.
+        # Cells can be empty or without text, and some spaces have no distances.
         with suppress(Problem, SymsplineError):
             labels = np.unique(np.array(table.labels(name)), return_inverse=True)[1]
             if are_tracks(labels, lambda order: _steps(space, points, order)):
@@ -185,7 +185,7 @@ Entry = tuple[str, ...]
 """One number of a point: its name and its column, or the two columns with its real and imaginary part."""
 
 
-# All but the unit in names such as heading_deg or "heading (deg)".
+# Everything except the unit in names such as heading_deg or "heading (deg)".
 _UNIT = re.compile(r".*[\[(_ ]|[\])]")
 
 

@@ -28,11 +28,11 @@ suggest, and symspline sample also writes its standard deviation.
 
 With --smooth, the table may have angular velocities (--rates) and velocities (--velocities) next to the points, and one
 curve is fitted to all of them. Give the standard deviation of each. --penalty is then jerk, unless you give another
-one. Rows can be in any order, and a row may have some of the measurements only: the columns of the others are empty or
-NaN. --rates are in the frame of the body, in radians per unit of time (per second for dates). With --rate-bias, the
-constant error of a gyroscope is estimated, too. --velocities are those of positions, in the fixed frame; on other
-spaces they are tangent vectors at the point in their row, and with --lonlat the velocities to the east and to the north
-in degrees of arc.
+one. Rows can be in any order, and a row can contain only some of the measurements; the other columns are empty or NaN.
+--rates are in the frame of the body, in radians per unit of time (per second for dates). With --rate-bias, the constant
+error of a gyroscope is estimated as well. --velocities are those of positions, in the fixed frame; on other spaces they
+are tangent vectors at the point in their row, and with --lonlat the velocities to the east and to the north in degrees
+of arc.
 
 examples:
   symspline fit track.csv --lonlat -o track.npz

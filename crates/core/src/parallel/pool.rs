@@ -13,7 +13,7 @@ struct Owner {
     pool: Mutex<Option<(usize, Arc<ThreadPool>)>>,
 }
 
-/// After a fork, the threads of the pool do not exist in the child, and its mutex may be locked for ever. The child
+/// After a fork, the threads of the pool do not exist in the child, and its mutex may be locked forever. The child
 /// therefore leaks its parent's owner and creates another one.
 static OWNER: AtomicPtr<Owner> = AtomicPtr::new(std::ptr::null_mut());
 
