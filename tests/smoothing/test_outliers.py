@@ -148,5 +148,5 @@ def test_a_burst_that_a_robust_loss_rejects(loss):
         ss.make_smoothing_spline(t, isolated, "r:2", loss=loss)
     burst = y.copy()
     burst[200:215] += [1.0, -0.5]
-    with pytest.warns(ss.SmoothingWarning, match=r"the loss rejects all data from number 200 to 214.*loss='linear'"):
+    with pytest.warns(ss.SmoothingWarning, match=r"the loss rejects all data from index 200 to 214.*loss='linear'"):
         ss.make_smoothing_spline(t, burst, "r:2", loss=loss)

@@ -203,7 +203,7 @@ def _of_estimated(finding: SmoothingFinding, curve: int) -> str:
         )
     run = finding.runs[curve]
     if run:
-        facts.append(f"the loss rejects all data from number {run[0]} to {run[1]}")
+        facts.append(f"the loss rejects all data from index {run[0]} to {run[1]}")
         remedies.append(
             "If the motion is fast there and these data are right, pass loss='linear' or smooth this part by itself."
         )

@@ -19,9 +19,8 @@ from .precision import SINGULAR
 
 # Largest number of entries of the frames that are computed in one call.
 _TOGETHER = 1 << 22
-# Data of a robust fit beyond this quantile of the noise do not count as evidence. The fit itself rejects data beyond
-# the quantile 0.999.
-_KEPT = 0.99
+# Data of a robust fit beyond this quantile of the noise do not count as evidence, as in the fit.
+_KEPT = 0.999
 
 
 def calibration_of(spline: Any, number: int) -> Calibration | None:
