@@ -95,8 +95,8 @@ class Solution(NamedTuple):
     ----------
     points : list of ndarray
         Points at the knots in every part.
-    values, variances : dict
-        Parameters by name, and their covariance for noise of variance one.
+    values : dict
+        Parameters by name.
     reports : list of SmoothingReport
         Reports of all parts.
     matrices : list of ndarray
