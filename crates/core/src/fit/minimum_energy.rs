@@ -240,7 +240,7 @@ fn other_way(space: &Erased, chain: &Chain, number: usize) -> (Vec<Lane>, Vec<La
         for node in [segment, (segment + 1) % nodes] {
             for k in 0..m {
                 let at = node * m + k;
-                there[at] = there[at] | on;
+                there[at] |= on;
                 velocities[at] = on.select(chord(segment)[k] * factors[segment], velocities[at]);
             }
         }
