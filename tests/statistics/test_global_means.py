@@ -131,6 +131,15 @@ def test_an_exactly_opposite_pair_does_not_prevent_a_mean():
         assert np.degrees(TORUS.mean(angles[order, None])) == pytest.approx(50, abs=1e-12)
 
 
+@pytest.mark.parametrize("axis", [0, 1])
+def test_one_ambiguous_angle_of_two_warns(axis):
+    """The mean of opposite angles is ambiguous, whatever the other angle is."""
+    points = np.tile([0.1, 0.101, 0.099, 0.1], (2, 1)).T
+    points[:, axis] = [0, 0.1, 3.1, 3.3]
+    with pytest.warns(ss.AmbiguousMeanWarning, match=r"second local minimum at the distance 3\.14 .* larger"):
+        ss.space("torus:2").mean(points)
+
+
 def test_poses_start_from_the_mean_rotation():
     """For rotations about one axis, the mean does not depend on the first pose."""
     angles, _, rng = spread_angles(5)
