@@ -137,6 +137,17 @@ def test_bands_beyond_the_ends_contain_the_motion():
     assert np.mean(inside) > 0.85 and np.mean(before) < 0.2
 
 
+def test_continued_cubics_warn_once_of_their_bands():
+    t, y, _ = recorded(gaps=())
+    spline = ss.make_smoothing_spline(t, y, "r:2", extrapolate=True)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        spline.band(np.linspace(t[0], t[-1], 10))
+    with pytest.warns(ss.SmoothingWarning, match="extrapolate='geodesic'") as caught:
+        spline.band(t[-1] + 1), spline.cov(t[0] - 1)
+    assert len(caught) == 1
+
+
 def test_nothing_changes_without_gaps():
     t, y, _ = recorded(gaps=())
     spline = ss.make_smoothing_spline(t, y, "r:2")

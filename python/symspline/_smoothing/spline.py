@@ -29,7 +29,7 @@ from .process import process_ratio
 from .report import SmoothingReport
 from .solve import Smoothed
 from .stored import noise_state, read_noise
-from .warned import warn_of_gaps
+from .warned import warn_of_cubics, warn_of_gaps
 
 if TYPE_CHECKING:
     from typing_extensions import TypeVar
@@ -101,6 +101,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
     _noisy: SmoothingData
     _smoothed: list[Smoothed]
     _has_warned: bool = False
+    _has_warned_of_cubics: bool = False
 
     def _fill(self, *parts: Any) -> None:
         """Set the state of a `CubicSpline`, the noisy data and the results of the smoothing."""
@@ -241,6 +242,9 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
 
     def _inflation(self, number: int, index: tuple[int, ...], x: Doubles, nu: int) -> Doubles:
         """Return the factors of the standard deviation of one curve in one part, at times x of the core."""
+        knots = self._knots_of(index)
+        if self._extrapolate is True and not is_closed(self._bc_type) and np.any((x < knots[0]) | (x > knots[-1])):
+            self._warn_of_cubics()
         known = self._calibrations[number, index]
         if known is None:
             return np.ones(x.shape)
@@ -248,6 +252,12 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         if np.any(out != 1):
             self._warn_of_gaps()
         return out
+
+    def _warn_of_cubics(self) -> None:
+        """Warn once that the curve beyond its ends is not the one whose standard deviation is known."""
+        if not self._has_warned_of_cubics:
+            self._has_warned_of_cubics = True
+            warn_of_cubics()
 
     def _warn_of_gaps(self) -> None:
         """Warn once of a gap that is longer than any part of the recording from which its factor could be estimated."""
@@ -273,7 +283,8 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         ----------
         x : array_like of float or datetime64
             Times, of any shape. Beyond the data, the standard deviation is that of a curve that continues with
-            constant velocity, or periodically if it is closed.
+            constant velocity, or periodically if it is closed. A curve with ``extrapolate=True`` continues its cubics
+            instead, and a `SmoothingWarning` says so.
         nu : {0, 1}, default 0
             0 for the point, 1 for the velocity.
         calibrated : bool, default True

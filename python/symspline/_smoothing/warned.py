@@ -182,6 +182,16 @@ def _median_distance(space: Space, x: Array, y: Array, counts: Any) -> Array:
 # ---- bands in gaps ----
 
 
+def warn_of_cubics() -> None:
+    """Warn that standard deviations beyond the ends are not those of a curve that continues its cubics."""
+    warn(
+        "extrapolate=True continues the first and the last cubic of the curve. Standard deviations and bands beyond "
+        "the ends are those of a curve that continues with constant velocity, so that they do not contain the error of "
+        "these cubics. Pass extrapolate='geodesic' to make_smoothing_spline.",
+        SmoothingWarning,
+    )
+
+
 def warn_of_gaps(spline: Any, found: dict[tuple[int, tuple[int, ...]], Any]) -> None:
     """Warn once of the longest gap among those longer than any part of the recording that could be predicted.
 
