@@ -284,7 +284,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         x : array_like of float or datetime64
             Times, of any shape. Beyond the data, the standard deviation is that of a curve that continues with
             constant velocity, or periodically if it is closed. A curve with ``extrapolate=True`` continues its cubics
-            instead, and a `SmoothingWarning` says so.
+            instead; this issues a `SmoothingWarning`.
         nu : {0, 1}, default 0
             0 for the point, 1 for the velocity.
         calibrated : bool, default True
