@@ -11,8 +11,8 @@ use super::problem::{Options, Solver};
 use super::solve::{Limits, Outcome, Workspace, solve};
 use super::{fixed_point, homotopy, trust_region};
 use crate::monitor::Monitor;
-use crate::scalar::{LANES, Lane, dot, few, lane, mask_from};
-use crate::space::{Ambient, Erased, Origin};
+use crate::scalar::{LANES, Lane, few, lane, mask_from};
+use crate::space::{Ambient, Erased};
 
 /// Points may have several curves if steps exceed this fraction of the distance to the cut locus, ...
 const FAR: f64 = 0.55;
@@ -27,12 +27,6 @@ const SAME: f64 = 1e-6;
 /// So do energies below this fraction of the square of the speed, for a curve that is a geodesic.
 const STRAIGHT: f64 = 1e-12;
 
-/// The number of segments on which the curve is tried the other way around the space, and the steps of each trial. Of 240
-/// sets of 4 to 9 points with steps of 0.45 to 0.9 of the injectivity radius on S², CP², SO(3) and Gr(2, 4), these starts
-/// lead to a curve of lower bending energy in 61; eight random starts do so in 31.
-const AROUND: usize = 8;
-const STEPS_AROUND: f64 = 40.0;
-
 /// The solvers in their order, and their starting points.
 #[derive(Clone, Copy, PartialEq)]
 enum Way {
@@ -43,8 +37,6 @@ enum Way {
     FromZero,
     FromAlgorithm1,
     FromBest,
-    /// From the best solution, which takes the other way around on one segment.
-    Around(usize),
 }
 
 const WAYS: [Way; 7] = [
@@ -64,7 +56,7 @@ impl Way {
             Way::QuasiNewton => Solver::QuasiNewton,
             Way::Homotopy => Solver::Homotopy,
             Way::Newton => Solver::Newton,
-            Way::FromZero | Way::FromAlgorithm1 | Way::FromBest | Way::Around(_) => Solver::TrustRegion,
+            Way::FromZero | Way::FromAlgorithm1 | Way::FromBest => Solver::TrustRegion,
         }
     }
 
@@ -75,7 +67,6 @@ impl Way {
             Way::QuasiNewton => [PATIENT, FEWEST_SWEEPS],
             // It stops without a limit.
             Way::Homotopy => [f64::INFINITY, FEWEST_STEPS],
-            Way::Around(_) => [costs.steps.min(STEPS_AROUND), FEWEST_STEPS],
             Way::Newton | Way::FromZero | Way::FromAlgorithm1 | Way::FromBest => [costs.steps, FEWEST_STEPS],
         }
     }
@@ -117,8 +108,7 @@ pub fn select(
     let before_homotopy = outcome.solver;
     // The result of Algorithm 1, on the lanes where it did not converge.
     let (mut sweeps_end, mut swept) = (Vec::new(), Lane::ZERO);
-    let around = if space.cut_angle().is_finite() { AROUND.min(chain.n) } else { 0 };
-    for way in WAYS.into_iter().chain((0..around).map(Way::Around)) {
+    for way in WAYS {
         if monitor.poll() {
             break;
         }
@@ -130,7 +120,6 @@ pub fn select(
                 Way::QuasiNewton => mask_from(|l| !quick[l]),
                 Way::FromAlgorithm1 => swept,
                 Way::FromBest => !settled,
-                Way::Around(_) => lanes & settled,
                 _ => lanes,
             };
         let rest = left(options, &outcome.iterations);
@@ -139,10 +128,7 @@ pub fn select(
         let afforded = ((afforded - lane(ENERGY)) * lane(1.0 / cost)).max(Lane::ZERO).floor();
         let [most, fewest] = way.iterations(costs);
         let enough = afforded.simd_ge(lane(fewest)) & mask_from(|_| cost == 1.0 || costs.fits);
-        // These trials are in addition to those of the solvers.
-        if !matches!(way, Way::Around(_)) {
-            outcome.leave_out(way.solver(), applies & !enough);
-        }
+        outcome.leave_out(way.solver(), applies & !enough);
         let on = applies & enough & rest.simd_gt(Lane::ZERO);
         if on.none() {
             continue;
@@ -160,12 +146,7 @@ pub fn select(
         let most = last.select(lane(SWEEPS_TO_RESCUE), lane(most));
         let limits = Limits { tol, max_iter: rest.min(afforded).min(most) };
         let start = |i: usize| if way == Way::FromAlgorithm1 { sweeps_end[i] } else { Lane::ZERO };
-        if let Way::Around(number) = way {
-            let (there, velocities) = other_way(space, chain, number);
-            chain.update(space, |_, u| {
-                u.iter_mut().enumerate().for_each(|(i, u)| *u = (on & there[i]).select(velocities[i], *u));
-            });
-        } else if way != Way::FromBest {
+        if way != Way::FromBest {
             chain.update(space, |_, u| {
                 u.iter_mut().enumerate().for_each(|(i, u)| *u = on.select(start(i), *u));
             });
@@ -180,7 +161,7 @@ pub fn select(
             Way::QuasiNewton | Way::Newton => {
                 solve(space, chain, ends, way.solver(), limits, !on, work, monitor)
             }
-            Way::FromZero | Way::FromAlgorithm1 | Way::FromBest | Way::Around(_) => {
+            Way::FromZero | Way::FromAlgorithm1 | Way::FromBest => {
                 trust_region::solve(space, chain, ends, limits, !on, work, monitor)
             }
         };
@@ -188,9 +169,7 @@ pub fn select(
         spent += on.select(iterations * lane(cost) + lane(ENERGY), Lane::ZERO);
         let arrived = on & mask_from(|l| found.converged[l]);
         let cut_short = on & !arrived & iterations.simd_ge(afforded) & afforded.simd_lt(most);
-        if !matches!(way, Way::Around(_)) {
-            outcome.leave_out(way.solver(), cut_short);
-        }
+        outcome.leave_out(way.solver(), cut_short);
         if way == Way::Algorithm1 {
             swept = on & !arrived;
             sweeps_end = chain.unknowns().to_vec();
@@ -214,36 +193,4 @@ pub fn select(
         (first, spent) = (now.select(first + spent, first), now.select(Lane::ZERO, spent));
     }
     outcome.alternative = second.simd_lt(infinity).select(second, lane(f64::NAN));
-}
-
-/// Velocities that traverse one segment of each lane the other way around the space, and the mask of these unknowns. The
-/// segments are those on which this takes the least speed, in order. A closed geodesic is twice as long as the way to the
-/// cut locus, so that a chord d has the counterpart d (1 − 2 c/|d|).
-fn other_way(space: &Erased, chain: &Chain, number: usize) -> (Vec<Lane>, Vec<Lane>) {
-    let (m, nodes) = (chain.m, chain.unknowns().len() / chain.m);
-    let chord = |segment: usize| &chain.chord[segment * m..][..m];
-    let factors: Vec<Lane> = (0..chain.n)
-        .map(|i| (lane(1.0) - lane(2.0 * space.cut_angle()) / space.angle(chord(i))) / chain.h[i])
-        .collect();
-    let speeds: Vec<[f64; LANES]> =
-        (0..chain.n).map(|i| (dot(chord(i), chord(i)).sqrt() * factors[i].abs()).to_array()).collect();
-    let chosen: [usize; LANES] = few(|l| {
-        let mut order: Vec<usize> = (0..chain.n).collect();
-        order.sort_by(|&i, &j| speeds[i][l].total_cmp(&speeds[j][l]));
-        order[number]
-    });
-    let (mut there, mut velocities) = (vec![Lane::ZERO; nodes * m], vec![Lane::ZERO; nodes * m]);
-    for segment in 0..chain.n {
-        // Repeated points have no direction.
-        let on = mask_from(|l| chosen[l] == segment && speeds[segment][l].is_finite());
-        // In a closed curve the last node is the first one.
-        for node in [segment, (segment + 1) % nodes] {
-            for k in 0..m {
-                let at = node * m + k;
-                there[at] |= on;
-                velocities[at] = on.select(chord(segment)[k] * factors[segment], velocities[at]);
-            }
-        }
-    }
-    (there, velocities)
 }
