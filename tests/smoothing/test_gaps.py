@@ -148,6 +148,26 @@ def test_continued_cubics_warn_once_of_their_bands():
     assert len(caught) == 1
 
 
+@pytest.mark.filterwarnings("ignore:The smoothing chose|In the data:symspline.SmoothingWarning")
+@pytest.mark.parametrize(("name", "warns"), [("sphere:2", True), ("so:3", True), ("r:3", False), ("torus:1", False)])
+def test_bands_wider_than_half_the_injectivity_radius_warn_once(name, warns):
+    """A fast oscillation, whose course in a gap of five seconds is unknown."""
+    space = ss.space(name)
+    rng = np.random.default_rng(0)
+    t = np.linspace(0, 60, 400)
+    t = t[(t < 27) | (t > 32)]
+    origin = np.zeros(space.point_shape) if name in ("r:3", "torus:1") else space.random_point(rng)
+    waves = np.sin(np.multiply.outer(t, rng.uniform(1.0, 3.0, space.dim)))
+    frame = space.frame(origin)
+    y = space.exp(np.broadcast_to(origin, (len(t), *origin.shape)), np.tensordot(0.5 * waves, frame, 1))
+    y = space.exp(y, 0.01 * space.random_tangent(rng, y))
+    spline = ss.make_smoothing_spline(t, y, space, criterion="reml")
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        spline.band(t), spline.band(np.linspace(27, 32, 20)), spline.std(29.0)
+    assert [str(own.message)[:13] for own in caught] == ["the 95 % band"] * warns
+
+
 def test_nothing_changes_without_gaps():
     t, y, _ = recorded(gaps=())
     spline = ss.make_smoothing_spline(t, y, "r:2")

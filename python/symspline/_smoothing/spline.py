@@ -29,7 +29,7 @@ from .process import process_ratio
 from .report import SmoothingReport
 from .solve import Smoothed
 from .stored import noise_state, read_noise
-from .warned import warn_of_cubics, warn_of_gaps
+from .warned import warn_of_cubics, warn_of_gaps, warn_of_wide_bands, widest_band
 
 if TYPE_CHECKING:
     from typing_extensions import TypeVar
@@ -100,8 +100,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
 
     _noisy: SmoothingData
     _smoothed: list[Smoothed]
-    _has_warned: bool = False
-    _has_warned_of_cubics: bool = False
+    _warned_of: frozenset[str] = frozenset()
 
     def _fill(self, *parts: Any) -> None:
         """Set the state of a `CubicSpline`, the noisy data and the results of the smoothing."""
@@ -244,27 +243,20 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         """Return the factors of the standard deviation of one curve in one part, at times x of the core."""
         knots = self._knots_of(index)
         if self._extrapolate is True and not is_closed(self._bc_type) and np.any((x < knots[0]) | (x > knots[-1])):
-            self._warn_of_cubics()
+            self._warn_once("cubics", warn_of_cubics)
         known = self._calibrations[number, index]
         if known is None:
             return np.ones(x.shape)
         out = known.inflation(x, nu)
         if np.any(out != 1):
-            self._warn_of_gaps()
+            self._warn_once("gaps", lambda: warn_of_gaps(self, self._calibrations))
         return out
 
-    def _warn_of_cubics(self) -> None:
-        """Warn once that the curve beyond its ends is not the one whose standard deviation is known."""
-        if not self._has_warned_of_cubics:
-            self._has_warned_of_cubics = True
-            warn_of_cubics()
-
-    def _warn_of_gaps(self) -> None:
-        """Warn once of a gap that is longer than any part of the recording from which its factor could be estimated."""
-        if self._has_warned:
-            return
-        self._has_warned = True
-        warn_of_gaps(self, self._calibrations)
+    def _warn_once(self, subject: str, warn: Callable[[], None]) -> None:
+        """Warn of a subject, unless this curve has done so before."""
+        if subject not in self._warned_of:
+            self._warned_of |= {subject}
+            warn()
 
     @overload
     def std(
@@ -366,7 +358,13 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
     def _spread(self, number: int, index: tuple[int, ...], x: Doubles, nu: int, calibrated: bool = True) -> Doubles:
         """Return the standard deviation of one curve in one part at times x of the core."""
         plain = self._plain_spread(number, index, x, nu)
-        return plain * self._inflation(number, index, x, nu) if calibrated else plain
+        if not calibrated:
+            return plain
+        spread = plain * self._inflation(number, index, x, nu)
+        wide = widest_band(smoothed_spaces(self.space)[number], spread) if nu == 0 else 0.0
+        if wide > 0.5:
+            self._warn_once("wide bands", lambda: warn_of_wide_bands(self, number, index, wide))
+        return spread
 
     def _plain_spread(self, number: int, index: tuple[int, ...], x: Doubles, nu: int) -> Doubles:
         """Return the standard deviation of the posterior, without calibration."""

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import _core
 from .._arrays import short_repr
 from .._curves.curve import CurveArrays
 from .._faults import of_index
@@ -189,6 +190,29 @@ def warn_of_cubics() -> None:
         "the ends are those of a curve that continues with constant velocity, so that they do not contain the error of "
         "these cubics. Pass extrapolate='geodesic' to make_smoothing_spline.",
         SmoothingWarning,
+    )
+
+
+def widest_band(space: Space, spread: NDArray[np.float64]) -> float:
+    """Return the radius of the widest 95 % band relative to the injectivity radius, or to π radii of curvature if less.
+
+    It is 0 on flat spaces, where computations in tangent spaces are exact.
+    """
+    if not space.curvature > 0:
+        return 0.0
+    reach = min(space.injectivity_radius, np.pi / space.curvature)
+    return float(np.nanmax(spread, initial=0.0) * np.sqrt(_core.chi_squared(space.dim, 0.95)) / reach)
+
+
+def warn_of_wide_bands(spline: Any, number: int, index: tuple[int, ...], wide: float) -> None:
+    """Warn of a band so wide that computations in tangent spaces are not valid."""
+    of = of_index(index) + in_part(spline.space, number)
+    warn(
+        f"the 95 % band{of} is up to {wide:.2g} of the injectivity radius (or of π radii of curvature) wide. Bands are "
+        "computed in tangent spaces along the curve and may be too narrow. Do not rely on this part of the curve: cut "
+        "the recording there (symspline.fit_segments), or add data.",
+        SmoothingWarning,
+        index,
     )
 
 
