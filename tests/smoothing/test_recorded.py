@@ -542,5 +542,7 @@ def test_a_curve_in_a_gap_does_not_depend_on_the_number_of_knots(name):
     few = np.delete(np.arange(len(t)), inside)
     curves = [ss.make_smoothing_spline(t[i], noisy[i], space, 1e-3, weights=weights[i]) for i in (slice(None), few)]
     difference = space.distance(curves[0](t), curves[1](t))
-    assert np.max(difference / curves[1].std(t)) < 2e-3
-    np.testing.assert_allclose(curves[0].std(t), curves[1].std(t), rtol=1e-5)
+    # Calibrated bands are so wide in this gap that they warn.
+    few, many = (curve.std(t, calibrated=False) for curve in reversed(curves))
+    assert np.max(difference / few) < 2e-3
+    np.testing.assert_allclose(many, few, rtol=1e-5)
