@@ -5,6 +5,13 @@ use std::panic::resume_unwind;
 /// Memory for up to this many numbers is assumed to be available.
 const SMALL: f64 = (1 << 16) as f64;
 
+/// The numbers that should be free before any computation, for all its small allocations together: 4 MiB.
+pub const HEADROOM: f64 = (1 << 19) as f64;
+
+/// The address space that a thread needs at its start, in numbers: the GNU C library reserves 64 MiB for its
+/// allocations, aligned to 64 MiB. Without it, each small allocation would take a page, or the thread could not start.
+pub const OF_THREAD: f64 = (144 << 17) as f64;
+
 /// The payload with which [`require`] unwinds.
 pub struct OutOfMemory {
     /// A description of the computation, such as "smoothing".

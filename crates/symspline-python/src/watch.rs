@@ -1,6 +1,6 @@
 //! Ctrl-C and progress while compiled code runs without the GIL.
 
-use crate::arrays::out_of_memory;
+use crate::arrays::{out_of_memory, require_memory};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use std::any::Any;
@@ -9,7 +9,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
-use symspline_engine::memory::{OutOfMemory, is_free};
+use symspline_engine::memory::{HEADROOM, OF_THREAD, OutOfMemory, is_free};
 use symspline_engine::monitor::Monitor;
 use symspline_engine::space::{Ambient, Erased, Origin};
 
@@ -18,10 +18,6 @@ const INTERVAL: Duration = Duration::from_millis(50);
 
 /// The size of the stack of a thread, in bytes.
 const STACK: f64 = (2 << 20) as f64;
-
-/// The address space that a thread needs at its start, in numbers: the GNU C library reserves 64 MiB for its
-/// allocations, aligned to 64 MiB. Without it, each small allocation would take a page, or the thread could not start.
-const OF_THREAD: f64 = (144 << 17) as f64;
 
 /// Numbers of a point, and dimensions, from which one step of the work may take long.
 const HEAVY_POINT: usize = 900;
@@ -69,6 +65,7 @@ impl Progress {
 
 /// Runs `work` without the GIL. From time to time signals are checked and `progress` is called with
 /// the finished and the total number of units; an exception in either stops the work. A panic is a RuntimeError.
+/// Raises MemoryError if memory is nearly exhausted.
 pub fn watched<T: Send>(
     py: Python,
     progress: Option<Progress>,
@@ -76,6 +73,7 @@ pub fn watched<T: Send>(
     heavy: bool,
     work: impl FnOnce(&Monitor) -> T + Send,
 ) -> PyResult<T> {
+    require_memory(HEADROOM, || ("this computation".into(), "Free some memory"))?;
     let state = Mutex::new((Instant::now(), None::<PyErr>));
     let go_on = |finished: usize| {
         let Ok(mut state) = state.lock() else { return false };

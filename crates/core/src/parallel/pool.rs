@@ -1,5 +1,6 @@
 //! The threads of [`for_each`](super::for_each).
 
+use crate::memory;
 use crate::monitor::Monitor;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::sync::atomic::{AtomicPtr, Ordering};
@@ -30,11 +31,14 @@ fn owner() -> &'static Owner {
     made
 }
 
-/// The pool with this many threads.
+/// The pool with this many threads; None if memory is too scarce for them.
 pub fn pool(threads: usize) -> Option<Arc<ThreadPool>> {
     let mut current = owner().pool.lock().unwrap_or_else(|e| e.into_inner());
     if let Some((_, pool)) = current.as_ref().filter(|(count, _)| *count == threads) {
         return Some(pool.clone());
+    }
+    if !memory::is_free(memory::OF_THREAD) {
+        return None;
     }
     let made = Arc::new(ThreadPoolBuilder::new().num_threads(threads).build().ok()?);
     let old = current.replace((threads, made.clone()));
