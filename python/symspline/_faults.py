@@ -10,6 +10,8 @@ import numpy as np
 from ._report import Columns
 
 _SUIT = "choose times that suit the distances"
+# Rounding errors that are accepted whatever the tolerance, `MOST` in rounded.rs.
+_ROUNDING = 1e-7
 CUT_LOCUS, UNCONVERGED, INVALID, ALMOST_CUT = "cut-locus", "unconverged", "invalid", "almost-cut"
 
 
@@ -85,6 +87,15 @@ def unconverged(number: int, columns: Columns, tol: float, more_advice: str = ""
     return Fault(number, UNCONVERGED, what, remedy, None, float(residual), tol, about_times=True)
 
 
+def imprecise(of: str, error: float, tol: float) -> tuple[str, str]:
+    """Return the problem of a curve with large rounding errors, and its remedy."""
+    what = (
+        f"rounding errors of the curve{of} are {error:.1e} of its largest speed (allowed: {max(tol, _ROUNDING):.1e}), "
+        "although its velocities are accurate"
+    )
+    return what, "put points between those that are far apart"
+
+
 def from_core(
     raw: CoreFault, columns: Columns, tol: float, quaternions: bool, names: Sequence[int] | None = None
 ) -> Fault:
@@ -116,6 +127,10 @@ def from_core(
             f"neighbours almost at the cut locus: between {pair} the angle is {value}, limit {limit}; had it been a "
             "little more, the curve would go the other way round: put a point between them"
         )
+    elif kind == "cut-locus" and limit == float("inf"):
+        own = UNCONVERGED
+        what = f"the geodesic between {pair} has no significant digits: they are too far apart for double precision"
+        remedy = "put a point between them"
     elif kind == "cut-locus":
         what = f"{pair} {past}"
         remedy = "put a point between them" + (", or check their sign" if quaternions else "")
@@ -131,6 +146,9 @@ def from_core(
         about_times = True
         what = f"{handle} passes the cut locus: angle {value}, limit {limit}"
         remedy = f"put more points there, or {_SUIT}"
+    elif kind == "imprecise":
+        own = UNCONVERGED
+        what, remedy = imprecise("{of}", value, tol)
     elif kind in ("homotopy", "overflow"):
         own, about_times = UNCONVERGED, kind == "overflow"
         longest, iterations = columns.row("max_step")[number], columns.row("iterations")[number]

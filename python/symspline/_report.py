@@ -59,7 +59,9 @@ class Report:
     iterations : int or ndarray of int
         Number of evaluations of the C² residual.
     residual : float or ndarray
-        Relative C² residual, the largest over all knots; see Notes.
+        Relative C² residual, the largest over all knots; see Notes. If rounding errors of the curve at its knots exceed
+        1e-8 and `tol`, they are given instead, relative to the largest speed. Up to 1e-7 the curve has converged;
+        between the knots, errors can be ten times as large.
     max_step : float or ndarray
         D of (21), the longest distance between neighbouring points.
     max_gap : float or ndarray

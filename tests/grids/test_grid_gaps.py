@@ -120,5 +120,28 @@ def test_a_failed_row_is_missing_for_the_next_axis():
         grid = ss.GridSpline((None, None), points, "sphere:2", on_failure="warn")
     assert not grid.report.converged
     found = grid.grid(np.linspace(0, 5, 11), np.linspace(0, 4, 9))
-    assert np.isnan(found[:, 3:6]).all()
+    # The points at the nodes of the first axis do not depend on the failed row.
+    assert np.isnan(found[1::2, 3:6]).all()
+    alone = ss.CubicSpline(None, points[1], "sphere:2", bc_type="not-a-knot")
+    np.testing.assert_allclose(found[2], alone(np.linspace(0, 4, 9)), atol=1e-14)
     assert np.isfinite(found[:, :3]).all()
+
+
+def test_values_at_nodes_do_not_depend_on_rows_that_fail():
+    """Directions of two columns that are opposite to each other half-way along the first axis."""
+    points = np.radians([[[0.0], [170]], [[0.0], [190]]])
+    grid = ss.GridSpline(([0, 1], [0, 1]), points, "torus:1")
+    np.testing.assert_allclose(np.degrees(grid((0.5, 1.0))) % 360, 180, atol=1e-12)
+    assert grid((0.5, 0.0)) == 0
+    np.testing.assert_allclose(np.degrees(grid.grid([0.5], [0, 1]))[0, :, 0] % 360, [0, 180], atol=1e-12)
+    np.testing.assert_allclose(
+        np.degrees(grid((np.array([0.5, 0.25]), np.array([1.0, 0.5]))))[:, 0] % 360, [180, 87.5], atol=1e-12
+    )
+    for at in ((0.5, 0.5), (0.5, 0.999)):
+        with pytest.raises(ss.CutLocusError, match=r"points\[0\] and points\[1\] of a row along axis 1"):
+            grid(at)
+    with pytest.raises(ss.CutLocusError):
+        grid((0.5, 1.0), nu=(0, 1))
+    loose = ss.GridSpline(([0, 1], [0, 1]), points, "torus:1", on_failure="ignore")
+    found = np.degrees(loose.grid([0.25, 0.5], [0, 0.5, 1]))[..., 0]
+    np.testing.assert_allclose(found % 360, [[0, 87.5, 175], [0, np.nan, 180]], atol=1e-12)

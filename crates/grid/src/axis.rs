@@ -80,6 +80,12 @@ impl Axis<'_> {
         (self.knots[1..n - 1].partition_point(|&t| t <= x), x)
     }
 
+    /// The node at a coordinate, if there is one.
+    pub fn node_at(&self, x: f64) -> Option<usize> {
+        let (segment, x) = self.locate(x);
+        [segment, segment + 1].into_iter().find(|&node| self.knots[node] == x)
+    }
+
     /// The policy inside one segment.
     pub fn outside_segment(&self) -> Outside {
         if self.outside == Outside::Wrap { Outside::Continue } else { self.outside }

@@ -3,7 +3,7 @@
 use crate::axis::{Axis, Condition, Run};
 use crate::grid::OPTIONS;
 use crate::summary::Summary;
-use symspline_core::fit::{End, Ends, Problem, fit};
+use symspline_core::fit::{End, Ends, Problem, Status, fit};
 use symspline_core::monitor::Monitor;
 use symspline_core::space::{Ambient, Erased};
 
@@ -55,8 +55,15 @@ impl Batch {
         group.curves.push((owner, run));
     }
 
-    /// Fits all curves.
-    pub fn fit(&mut self, space: &Erased, axis: &Axis, number: usize, monitor: &Monitor) -> Summary {
+    /// Fits all curves. The summary omits failures of rows that are not `needed`.
+    pub fn fit(
+        &mut self,
+        space: &Erased,
+        axis: &Axis,
+        number: usize,
+        needed: impl Fn(usize) -> bool,
+        monitor: &Monitor,
+    ) -> Summary {
         let mut summary = Summary::default();
         for group in &mut self.groups {
             group.velocities.resize(group.points.len(), 0.0);
@@ -69,8 +76,10 @@ impl Batch {
                 ends: ends_of(group.conditions, &rest),
             };
             let reports = fit(space, &problem, &OPTIONS, monitor, &mut group.velocities);
-            for (report, (_, run)) in reports.iter().zip(&group.curves) {
-                summary.add(number, report, |node| axis.index(run.first + node));
+            for (report, (owner, run)) in reports.iter().zip(&group.curves) {
+                if report.status == Status::Converged || needed(*owner) {
+                    summary.add(number, report, |node| axis.index(run.first + node));
+                }
             }
         }
         summary

@@ -7,7 +7,7 @@ use crate::samples::Samples;
 use crate::summary::Summary;
 use symspline_core::curve::{Curves, Quantity, Times, evaluate};
 use symspline_core::derivative::{Data, Derivative, Of};
-use symspline_core::fit::{Problem, fit};
+use symspline_core::fit::{Problem, Status, fit};
 use symspline_core::monitor::Monitor;
 use symspline_core::parallel;
 use symspline_core::space::{Ambient, Erased};
@@ -37,18 +37,25 @@ impl<'a> Along<'a> {
             Along::Own(x) => &x[row % x.len()..][..1],
         }
     }
+
+    /// Whether all coordinates of a row are those of nodes, whose points do not depend on its spline.
+    pub fn are_nodes(self, axis: &Axis, row: usize) -> bool {
+        self.of(row).iter().all(|&x| axis.node_at(x).is_some())
+    }
 }
 
 /// The number of rows with missing nodes that are processed at a time.
 const BLOCK: usize = 256;
 
 /// Computes velocities at the nodes of all rows along an axis. They are NaN at missing nodes, at isolated nodes, and in
-/// runs that cannot be fitted. `number` is that of the axis in the summary.
+/// runs that cannot be fitted. `number` is that of the axis in the summary, which omits failures of rows that are not
+/// `needed`.
 pub fn fit_rows(
     space: &Erased,
     axis: &Axis,
     number: usize,
     rows: &[f64],
+    needed: impl Fn(usize) -> bool,
     monitor: &Monitor,
     velocities: &mut [f64],
 ) -> Summary {
@@ -66,14 +73,16 @@ pub fn fit_rows(
             offsets: &offsets,
             ends: ends_of(conditions, &rest),
         };
-        for report in fit(space, &problem, &OPTIONS, monitor, velocities) {
-            summary.add(number, &report, |node| node);
+        for (row, report) in fit(space, &problem, &OPTIONS, monitor, velocities).iter().enumerate() {
+            if report.status == Status::Converged || needed(row) {
+                summary.add(number, report, |node| node);
+            }
         }
         return summary;
     }
     velocities.fill(f64::NAN);
     let size = BLOCK * n * len;
-    for (rows, velocities) in rows.chunks(size).zip(velocities.chunks_mut(size)) {
+    for (k, (rows, velocities)) in rows.chunks(size).zip(velocities.chunks_mut(size)).enumerate() {
         let mut batch = Batch::default();
         for (row, points) in rows.chunks_exact(n * len).enumerate() {
             for run in axis.runs(|node| is_valid(points, node, len)) {
@@ -82,7 +91,7 @@ pub fn fit_rows(
                 }
             }
         }
-        summary.merge(&batch.fit(space, axis, number, monitor));
+        summary.merge(&batch.fit(space, axis, number, |row| needed(k * BLOCK + row), monitor));
         for curve in batch.curves(len) {
             let row = &mut velocities[curve.owner * n * len..][..n * len];
             for (k, u) in curve.velocities.chunks_exact(len).enumerate() {
@@ -106,9 +115,39 @@ pub fn is_complete(rows: &[f64], len: usize) -> bool {
     rows.chunks_exact(len).all(|point| !point[0].is_nan())
 }
 
-/// Evaluates a quantity of all rows, row after row; NaN outside the runs of a row. `complete` states that no node is
-/// missing.
+/// Evaluates a quantity of all rows, row after row; NaN outside the runs of a row. Points at nodes need no spline.
+/// `complete` states that no node is missing.
 pub fn evaluate_rows(
+    space: &Erased,
+    axis: &Axis,
+    rows: &[f64],
+    velocities: &[f64],
+    complete: bool,
+    x: Along,
+    quantity: Quantity,
+    monitor: &Monitor,
+    out: &mut [f64],
+) {
+    evaluate_segments(space, axis, rows, velocities, complete, x, quantity, monitor, out);
+    if quantity != Quantity::Point {
+        return;
+    }
+    // Nodes of rows without a spline.
+    let (len, size) = (space.point_len(), axis.nodes() * space.point_len());
+    for (row, (points, out)) in
+        rows.chunks_exact(size).zip(out.chunks_exact_mut(x.per_row() * len)).enumerate()
+    {
+        for (out, &x) in out.chunks_exact_mut(len).zip(x.of(row)) {
+            if out[0].is_nan()
+                && let Some(node) = axis.node_at(x)
+            {
+                out.copy_from_slice(&points[node * len..(node + 1) * len]);
+            }
+        }
+    }
+}
+
+fn evaluate_segments(
     space: &Erased,
     axis: &Axis,
     rows: &[f64],

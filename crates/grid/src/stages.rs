@@ -77,7 +77,9 @@ impl Route<'_> {
             let points = first_axis_last(arrays.points, axis.nodes(), len);
             let tangents = first_axis_last(arrays.tangents, axis.nodes(), len);
             let mut velocities = vec![0.0; points.len()];
-            summary.merge(&fit_rows(&self.space, axis, k, &points, monitor, &mut velocities));
+            // Points at nodes need no spline.
+            let needed = |row| self.derivative.is_vector() || !x[k].are_nodes(axis, row);
+            summary.merge(&fit_rows(&self.space, axis, k, &points, needed, monitor, &mut velocities));
             let complete = is_complete(&points, len);
             let nodes = Nodes { points: &points, velocities: &velocities, tangents: &tangents, complete };
             arrays = self.evaluate(k, nodes, x[k], monitor);

@@ -38,7 +38,7 @@ impl Summary {
                 self.residual = self.residual.max(report.residual);
                 return;
             }
-            Status::Unconverged => Status::Unconverged,
+            Status::Unconverged | Status::Imprecise => report.status,
             Status::CutLocus { index, angle } => Status::CutLocus { index: node(index), angle },
             Status::LongHandle { index, angle } => Status::LongHandle { index: node(index), angle },
             Status::InnerHandle { index, angle } => Status::InnerHandle { index: node(index), angle },

@@ -208,7 +208,8 @@ fn fit_all<'a>(
     // Knots that nearly coincide leave a residual of rounding errors. It exceeds the tolerance, but is small compared
     // with noise.
     let fitted = |r: &Report| {
-        r.status == Status::Converged || (r.status == Status::Unconverged && r.residual < ENOUGH)
+        let failed = matches!(r.status, Status::Unconverged | Status::Imprecise);
+        r.status == Status::Converged || (failed && r.residual < ENOUGH)
     };
     reports.iter().enumerate().map(|(c, r)| fitted(r).then(|| own(c))).collect()
 }

@@ -199,8 +199,9 @@ fn fault(space: &Erased, curve: usize, report: &Report) -> Option<Fault> {
         Status::CutLocus { index, angle } => at("cut-locus", (index, angle)),
         Status::LongHandle { index, angle } => at("outer-handle", (index, angle)),
         Status::InnerHandle { index, angle } => at("inner-handles", (index, angle)),
-        Status::Unconverged => {
+        Status::Unconverged | Status::Imprecise => {
             let kind = match report.solver {
+                _ if report.status == Status::Imprecise && report.residual.is_finite() => "imprecise",
                 Solver::Homotopy if report.residual.is_infinite() => "homotopy",
                 _ if !report.residual.is_finite() => "overflow",
                 _ => "unconverged",

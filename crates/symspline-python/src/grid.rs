@@ -48,6 +48,7 @@ fn found(space: &Erased, summary: &Summary) -> Found {
             Status::CutLocus { index, angle } => ("cut-locus", Some(index), angle),
             Status::LongHandle { index, angle } => ("outer-handle", Some(index), angle),
             Status::InnerHandle { index, angle } => ("inner-handles", Some(index), angle),
+            Status::Imprecise => ("imprecise", None, fault.residual),
             _ => ("unconverged", None, fault.residual),
         };
         (fault.axis, kind, node, value, space.cut_angle(), fault.residual)
@@ -71,7 +72,7 @@ pub fn grid_rows<'py>(
     let (points, result) = (in_order(&rows)?, write.as_slice_mut()?);
     let nodes = points.len() / space.point_len();
     let summary = watched(py, Progress::whole(progress), nodes, is_heavy(&space), |monitor| {
-        grid::fit_rows(&space, &axis, 0, points, monitor, result)
+        grid::fit_rows(&space, &axis, 0, points, |_| true, monitor, result)
     })?;
     drop(write);
     Ok((out, found(&space, &summary)))

@@ -213,7 +213,7 @@ impl Error {
             Status::InnerHandle { index, angle } => {
                 Some(Error::HandleTooLong { curve, node: index, angle, limit })
             }
-            Status::Unconverged | Status::Stopped => {
+            Status::Unconverged | Status::Imprecise | Status::Stopped => {
                 Some(Error::Unconverged { curve, residual: report.residual, tol })
             }
         }

@@ -8,7 +8,7 @@ import numpy as np
 
 from .. import _core
 from .._curves.reduced import Span
-from .._faults import CUT_LOCUS, UNCONVERGED, Fault, from_core
+from .._faults import CUT_LOCUS, UNCONVERGED, Fault, from_core, imprecise
 from .._report import Columns
 from .._spaces import Array, Doubles, Space
 from .._typing import Progress
@@ -149,5 +149,7 @@ def row_fault(
     if kind == "unconverged":
         what = f"no convergence{where}: the residual is {residual:.3e}, the tolerance {tol:.0e}"
         return Fault(0, UNCONVERGED, what, "add nodes where neighbouring points are far apart", None, residual, tol)
+    if kind == "imprecise":
+        return Fault(0, UNCONVERGED, *imprecise(where, value, tol), None, value, tol)
     fault = from_core((0, kind, node, value, limit, None), Columns.empty(1), tol, False)
     return fault._replace(kind=CUT_LOCUS, what=fault.what.replace("{of}", where))

@@ -19,6 +19,8 @@ pub struct Segment<S> {
     /// Lanes in which the inner handle is too long for a ray, see
     /// [`Ambient::longest_ray`](crate::space::Ambient::longest_ray).
     long: Lane,
+    /// Those of them that are geodesics.
+    straight: Lane,
     /// See [`Covered::side`](crate::space::Covered::side).
     pub side: Lane,
     level: [Vec<S>; 3],
@@ -36,6 +38,7 @@ impl<S: Scalar> Segment<S> {
             middle: lanes(),
             rays: Default::default(),
             long: Lane::ZERO,
+            straight: Lane::ZERO,
             side: Lane::ONE,
             level: [points(), points(), points()],
         }
@@ -85,6 +88,8 @@ impl<S: Scalar> Segment<S> {
         // Most spaces have no such limit, which the compiler can see.
         if space.longest_ray().is_finite() {
             self.long = angle.simd_gt(lane(space.longest_ray()));
+            self.straight =
+                if self.long.any() { straight(space, [p0, p1], [a, b], self.long) } else { self.long };
         }
     }
 
@@ -109,17 +114,38 @@ impl<S: Scalar> Segment<S> {
         space.geodesic(y, z, t, x);
         space.geodesic(gamma, x, t, y);
         gamma.copy_from_slice(y);
+        if space.longest_ray().is_finite() && self.straight.any() {
+            between(space, &self.ends, self.straight, t, gamma);
+        }
     }
 }
 
-/// Replaces points on rays from the first control point by points on the geodesic between both.
+/// The lanes whose outer handles are a third of the geodesic between the end points, up to rounding. Control points on
+/// a long geodesic have errors that its end points do not have.
 #[cold]
 #[inline(never)]
-fn between<S: Scalar, M: Ambient>(space: &M, controls: &[Vec<Lane>; 2], lanes: Lane, t: S, y: &mut [S]) {
+fn straight<M: Ambient>(space: &M, [p, q]: [&[Lane]; 2], [a, b]: [&[Lane]; 2], lanes: Lane) -> Lane {
+    const ROUNDING: f64 = 16.0 * f64::EPSILON;
+    let mut log = vec![Lane::ZERO; p.len()];
+    let mut straight = lanes;
+    for (from, to, handle, third) in [(p, q, a, 3.0), (q, p, b, -3.0)] {
+        space.log(from, to, &mut log);
+        let size = log.iter().fold(Lane::ZERO, |most, x| most.max(x.abs()));
+        for (x, handle) in log.iter().zip(handle) {
+            straight &= (*handle * lane(third) - *x).abs().simd_le(size * lane(ROUNDING));
+        }
+    }
+    straight
+}
+
+/// Replaces points by those on the geodesic between two points.
+#[cold]
+#[inline(never)]
+fn between<S: Scalar, M: Ambient>(space: &M, ends: &[Vec<Lane>; 2], lanes: Lane, t: S, y: &mut [S]) {
     let [mut p, mut q, mut x] = [y.to_vec(), y.to_vec(), y.to_vec()];
     for i in 0..y.len() {
-        p[i] = S::constant(controls[0][i]);
-        q[i] = S::constant(controls[1][i]);
+        p[i] = S::constant(ends[0][i]);
+        q[i] = S::constant(ends[1][i]);
     }
     space.geodesic(&p, &q, t, &mut x);
     for i in 0..y.len() {

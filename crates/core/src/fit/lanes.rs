@@ -84,7 +84,8 @@ fn fit_in(
     let idle = mask_from(|l| cut[l].is_some());
     let sections_tol = if whole(0) { options.tol } else { options.tol / 4.0 };
     let options = Options { tol: sections_tol, ..*options };
-    let outcome = auto::run(space, chain, &ends, &options, idle, whole(0), work, monitor);
+    let mut outcome = auto::run(space, chain, &ends, &options, idle, whole(0), work, monitor);
+    outcome.judge(space, chain, &ends, options.tol, idle, work);
     let alternative = (outcome.alternative * chain.unit_of_energy()).to_array();
     let (residual, rate) = (outcome.residual.to_array(), outcome.rate.to_array());
     let noisy = noisy_handles(space, chain, &runs, outcome.handle);

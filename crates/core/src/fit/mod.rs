@@ -95,6 +95,10 @@ pub fn fit(
     let len = space.point_len();
     for (curve, report) in reports.iter_mut().enumerate() {
         let own = &mut velocities[problem.offsets[curve] * len..problem.offsets[curve + 1] * len];
+        if rounded::make_geodesic(space, problem, curve, report, own) && report.status == Status::Unconverged
+        {
+            (report.status, report.residual) = (Status::Converged, 0.0);
+        }
         if report.status.is_fault() {
             own.fill(f64::NAN);
         } else if matches!(problem.ends, Ends::Periodic) && problem.segments(curve) > LONG {
@@ -108,10 +112,16 @@ pub fn fit(
             // Points whose differences per unit of time exceed the largest floating-point number.
             (report.status, report.residual) = (Status::Unconverged, f64::INFINITY);
         }
-        if report.status == Status::Converged
+        // A solver that stops close to a solution may have been stopped by rounding errors.
+        let close = report.status == Status::Unconverged && report.residual <= rounded::MOST;
+        if (report.status == Status::Converged || close)
             && let Some(missed) = rounded::missed(space, problem, curve, own, report.condition, options.tol)
         {
-            (report.status, report.residual) = (Status::Unconverged, missed);
+            if !(missed <= rounded::MOST.max(options.tol)) {
+                (report.status, report.residual) = (Status::Imprecise, missed);
+            } else if !close {
+                report.residual = missed;
+            }
         }
     }
     reports

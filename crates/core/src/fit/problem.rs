@@ -124,6 +124,8 @@ pub enum Status {
     Converged,
     /// The residual is above the tolerance.
     Unconverged,
+    /// Velocities are accurate, but rounding errors of the curve exceed the tolerance; the residual is their size.
+    Imprecise,
     /// Points `index` and `index + 1` lie at or beyond each other's cut locus.
     CutLocus {
         /// Index of the first of the two points.
@@ -174,7 +176,8 @@ pub struct Report {
     pub status: Status,
     /// Residual evaluations.
     pub iterations: usize,
-    /// C² residual divided by (1/hᵢ₋₁ + 1/hᵢ), relative to the largest speed.
+    /// C² residual divided by (1/hᵢ₋₁ + 1/hᵢ), relative to the largest speed; or the rounding error of the curve at
+    /// its knots if that is larger than both the tolerance and 1e-8.
     pub residual: f64,
     /// D of (21): the longest step between neighbours.
     pub max_step: f64,

@@ -3,18 +3,50 @@
 //! On spaces that grow exponentially, velocities that are accurate to the last digit may define an inaccurate curve:
 //! the geodesics of a segment amplify rounding errors at its start by the exponential of its length.
 
-use super::problem::Problem;
+use super::problem::{End, Ends, Problem, Report};
 use crate::curve::Segment;
-use crate::scalar::{Dual, LANES, Lane, Scalar, few, gather, max_or_nan};
+use crate::scalar::{Dual, LANES, Lane, Scalar, few, gather, lane, max_or_nan};
 use crate::space::{Ambient, Erased};
 
-/// The largest error that is accepted as rounding, unless the tolerance of the fit is larger.
-const MOST: f64 = 1e-8;
+/// The largest error that is accepted as rounding, unless the tolerance of the fit is larger. Errors inside segments are
+/// up to ten times as large as those at their ends, which are measured.
+pub const MOST: f64 = 1e-7;
+/// Errors up to this size are not reported.
+const SMALLEST: f64 = 1e-8;
 /// Up to this condition of the chords, steps of five to seven, curves need no check.
 const SMALL: f64 = 1e3;
 
+/// Makes two points that are far apart, without prescribed velocity or acceleration, the ends of a geodesic. Its
+/// velocities follow from the points more accurately than from the C² condition. Returns whether the curve is one.
+pub fn make_geodesic(
+    space: &Erased,
+    problem: &Problem,
+    curve: usize,
+    report: &Report,
+    velocities: &mut [f64],
+) -> bool {
+    let free = |ends: &[End; 2]| ends.iter().all(|end| matches!(end, End::Natural | End::NotAKnot));
+    let open = matches!(&problem.ends, Ends::Open(ends) if free(ends));
+    if problem.segments(curve) != 1 || !open || report.condition <= SMALL || report.status.is_fault() {
+        return false;
+    }
+    let (len, t, first) = (space.point_len(), problem.knots(curve), problem.offsets[curve]);
+    let [p, q] = [0, 1].map(|i| {
+        let row = &problem.points[(first + i) * len..(first + i + 1) * len];
+        row.iter().map(|&x| lane(x)).collect::<Vec<_>>()
+    });
+    let mut log = vec![Lane::ZERO; len];
+    let both = velocities.chunks_exact_mut(len).zip([(&p, &q, 1.0), (&q, &p, -1.0)]);
+    for (velocity, (from, to, sign)) in both {
+        space.log(from, to, &mut log);
+        let over = sign / (t[1] - t[0]);
+        velocity.iter_mut().zip(&log).for_each(|(u, x)| *u = x.as_array()[0] * over);
+    }
+    true
+}
+
 /// The error of a curve at the ends of its segments, relative to the largest speed at a knot or between neighbours,
-/// if it exceeds rounding; `condition` is that of the chords.
+/// if it is worth reporting; `condition` is that of the chords.
 pub fn missed(
     space: &Erased,
     problem: &Problem,
@@ -67,5 +99,5 @@ pub fn missed(
         x.to_array().into_iter().fold(0.0, |most: f64, x| if x > most || x.is_nan() { x } else { most })
     };
     let missed = most(max_or_nan(far, off)) / most(speed);
-    (!(missed <= MOST.max(tol))).then_some(missed)
+    (!(missed <= SMALLEST.max(tol))).then_some(missed)
 }

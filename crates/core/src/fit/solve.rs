@@ -76,6 +76,32 @@ impl Outcome {
         }
     }
 
+    /// Accepts the iterate in the chain on lanes where every solver failed, if it is within the tolerance. A solver aims
+    /// far below the tolerance, and its best iterate may not be its last.
+    pub fn judge(
+        &mut self,
+        space: &Erased,
+        chain: &mut Chain,
+        ends: &ChainEnds,
+        tol: f64,
+        idle: Lane,
+        work: &mut Workspace,
+    ) {
+        let good = mask_from(|l| !self.converged[l] && self.fault[l].is_none());
+        let good = good & self.residual.simd_le(lane(tol)) & !idle;
+        if good.none() {
+            return;
+        }
+        // The longest handle is that of the last iterate.
+        let found = residual(space, chain, ends, &mut work.vectors);
+        let fault = long_handles(space, chain, found.handle, good);
+        self.handle = good.select(found.handle, self.handle);
+        for (l, _) in mask_bits(good).iter().enumerate().filter(|(_, on)| **on) {
+            self.fault[l] = fault[l];
+            self.converged[l] = fault[l].is_none();
+        }
+    }
+
     /// The outcome of a solver that has not started on the lanes of a mask; other lanes are settled.
     pub fn afresh(&self, on: Lane) -> Self {
         let on_lane = mask_bits(on);
