@@ -393,9 +393,9 @@ def read_array(state: Entries, name: str, space: Space) -> Array:
     return space._numbers(space._doubles(state[name], name))
 
 
-def check_curves(state: Entries, curve: CurveArrays, converged: list[Any]) -> None:
+def check_curves(state: Entries, curve: CurveArrays, converged: list[Any], gaps: bool = False) -> None:
     """Raise ValidationError if points of a file are off the space, or velocities are not tangent. Only curves that
-    failed or are masked can be NaN."""
+    failed or are masked can be NaN. With `gaps`, velocities can be NaN."""
     if not isinstance(state, Stored):
         return
     for part, good in zip(curve.parts, converged, strict=True):
@@ -405,7 +405,7 @@ def check_curves(state: Entries, curve: CurveArrays, converged: list[Any]) -> No
         with entry("points"):
             space.check_point(points[there])
         finite &= there
-        if not (finite | ~np.asarray(good)).all():
+        if not ((there if gaps else finite) | ~np.asarray(good)).all():
             raise ValidationError("entries 'points' and 'velocities' must be finite")
         off = velocities[finite] - space.project_tangent(points[finite], velocities[finite])
         allowed = 1e-8 + 100 * np.finfo(np.float64).eps * float(space._rounding(points).max(initial=1.0))

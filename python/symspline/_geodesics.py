@@ -56,13 +56,13 @@ class PiecewiseGeodesic(PiecewiseCubic[P]):
     ValidationError
         If the input does not meet the requirements above.
     CutLocusError
-        If two neighbouring points are not joined by a unique shortest geodesic.
+        If no neighbouring points are joined by a unique shortest geodesic.
 
     Warns
     -----
     FarPointsWarning
-        If a curve has at least four segments and more than half of its steps exceed 0.6 of the distance to the cut
-        locus.
+        If two neighbouring points lie at or past each other's cut locus. The curve is NaN between them. Also if a curve
+        has at least four segments and more than half of its steps exceed 0.6 of the distance to the cut locus.
     UserWarning
         If points on ``Sphere(3)`` look like unit quaternions with inconsistent signs.
 
@@ -126,7 +126,7 @@ class PiecewiseGeodesic(PiecewiseCubic[P]):
     @classmethod
     def _from_state(cls, state: Entries) -> Self:
         time_axis, knots, curve, extrapolate = read_segments(state, fitted=False)
-        check_curves(state, curve, [True] * len(curve.parts))
+        check_curves(state, curve, [True] * len(curve.parts), gaps=True)
         geodesics = joined(curve.space, curve.times, [part.points for part in curve.parts])
         return cls._of(time_axis, knots, geodesics, "natural", extrapolate)
 
@@ -143,7 +143,7 @@ class PiecewiseGeodesic(PiecewiseCubic[P]):
         -------
         ndarray or float, shape ``batch axes``
             Infinity if the velocity jumps at a knot, since no curve of finite energy has a jump. Zero for a single
-            geodesic.
+            geodesic. NaN if the curve is NaN somewhere.
 
         Examples
         --------
@@ -155,7 +155,8 @@ class PiecewiseGeodesic(PiecewiseCubic[P]):
         jumps = [
             part.jumps().max(axis=-1, initial=0.0) for part in self._curve.parts if isinstance(part, GeodesicCurve)
         ]
-        energy: FloatArray = np.where(np.max(jumps, axis=0) > _STRAIGHT, np.inf, 0.0)
+        largest = np.max(jumps, axis=0)
+        energy: FloatArray = np.where(np.isnan(largest), np.nan, np.where(largest > _STRAIGHT, np.inf, 0.0))
         return energy[()]
 
     def __repr__(self) -> str:

@@ -78,6 +78,11 @@ class HermiteSpline(PiecewiseCubic[P]):
 
     .. math:: p_i, \quad \exp_{p_i}(h u_i / 3), \quad \exp_{p_{i+1}}(-h u_{i+1} / 3), \quad p_{i+1}.
 
+    If a handle :math:`h u / 3` passes the cut locus, the curve would not have the velocity u, and `ValidationError` is
+    raised. A `Torus` is an exception: where a handle exceeds half a turn in an angle, the segment has the number of
+    turns for which the change of this angle is nearest to :math:`h (u_i + u_{i+1}) / 2`. This is the cubic with the
+    lowest bending energy.
+
     References
     ----------
     G. Bogfjellmo, K. Modin, O. Verdier, A Numerical Algorithm for C²-Splines on Symmetric Spaces, SIAM J. Numer.
@@ -172,7 +177,14 @@ class HermiteSpline(PiecewiseCubic[P]):
         ValidationError
             If the input does not meet the requirements above.
         CutLocusError
-            If two neighbouring points or control points are not joined by a unique shortest geodesic.
+            If no neighbouring points, or not all neighbouring control points, are joined by a unique shortest geodesic.
+
+        Warns
+        -----
+        FarPointsWarning
+            If some neighbouring points are not joined by a unique shortest geodesic. The velocities there are NaN, and
+            so is the curve on the segments next to these points. Other segments are those of the points on either side
+            alone.
 
         See Also
         --------
@@ -236,7 +248,7 @@ class HermiteSpline(PiecewiseCubic[P]):
     @classmethod
     def _from_state(cls, state: Entries) -> Self:
         time_axis, knots, curve, extrapolate = read_segments(state, fitted=False)
-        check_curves(state, curve, [True] * len(curve.parts))
+        check_curves(state, curve, [True] * len(curve.parts), gaps=True)
         return cls._of(time_axis, knots, curve, "natural", extrapolate)
 
     def __repr__(self) -> str:

@@ -5,6 +5,7 @@ import pytest
 from compare import each, largest_difference, off
 from curves import KNOTS, S2, THREE, every_kind, points_on
 from scipy.interpolate import Akima1DInterpolator, CubicHermiteSpline, PchipInterpolator
+from scipy.spatial.transform import Rotation
 
 import symspline as ss
 
@@ -151,4 +152,24 @@ def test_invalid_arguments_raise():
     with pytest.raises(ss.ValidationError, match="method must be one of 'catmull-rom', 'akima', 'pchip', not 'cubic'"):
         from_points(None, THREE, S2, method="cubic")
     with pytest.raises(ss.CutLocusError, match=r"points\[0\] and points\[1\]"):
-        from_points(None, [[1, 0, 0], [-1, 0, 0], [0, 1, 0]], S2)
+        from_points(None, [[1, 0, 0], [-1, 0, 0], [1, 0, 0]], S2)
+
+
+@pytest.mark.parametrize("method", ["catmull-rom", "akima", "pchip"])
+def test_an_opposite_pair_affects_the_segments_next_to_it_only(method, tmp_path):
+    first, second = points_on(S2, 6, step=0.4), points_on(S2, 5, step=0.3)
+    # The first point of the second part is opposite to the last one of the first part.
+    second = Rotation.align_vectors([-first[-1]], [second[0]])[0].apply(second)
+    second[0] = -first[-1]
+    points = np.concatenate([first, second])
+    with pytest.warns(ss.FarPointsWarning, match=r"points\[5\] and points\[6\]"):
+        curve = from_points(None, points, S2, method=method)
+    before, after = np.linspace(0, 3.9, 30), np.linspace(7, 10, 30)
+    np.testing.assert_allclose(curve(before), from_points(None, first, S2, method=method)(before), atol=1e-15)
+    np.testing.assert_allclose(curve(after), from_points(None, second, S2, method=method)(after - 6), atol=1e-15)
+    assert np.isnan(curve([4.5, 5.5, 6.5])).all()
+    curve.save(tmp_path / "a.npz")
+    np.testing.assert_array_equal(ss.load(tmp_path / "a.npz")(before), curve(before))
+    with pytest.warns(ss.FarPointsWarning, match="of curve 1"):
+        both = from_points(None, np.stack([np.roll(points, 5, axis=0), points]), S2, method=method)
+    np.testing.assert_array_equal(both(before)[1], curve(before))

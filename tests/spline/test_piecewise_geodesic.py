@@ -207,8 +207,49 @@ def test_invalid_arguments_raise():
 
 def test_points_without_a_unique_geodesic_raise():
     for match, points in [
-        (r"points\[1\] and points\[2\]: the points lie at or past", [[0, 1, 0], [1, 0, 0], [-1, 0, 0]]),
-        (r"points\[0\] and points\[1\] of curve 1: .* Put a point", [THREE, [[1, 0, 0], [-1, 0, 0], [0, 1, 0]]]),
+        (r"points\[0\] and points\[1\]: the points lie at or past", [[1, 0, 0], [-1, 0, 0], [1, 0, 0]]),
+        (r"points\[0\] and points\[1\] of curve 0: .* Put a point", [[[1, 0, 0], [-1, 0, 0]]] * 2),
     ]:
         with pytest.raises(ss.CutLocusError, match=match):
             ss.PiecewiseGeodesic(None, points, S2)
+
+
+def test_an_opposite_pair_affects_its_own_segment_only(tmp_path):
+    """Directions that are rounded to ten degrees."""
+    angles = np.radians([[10.0], [20], [30], [210], [220], [230]])
+    match = r"points\[2\] and points\[3\] lie .* NaN there.*fit_segments"
+    with pytest.warns(ss.FarPointsWarning, match=match) as caught:
+        curve = ss.PiecewiseGeodesic(None, angles, "torus:1")
+    assert caught[0].message.node == 2
+    x = np.array([0, 0.5, 1.9, 2, 2.5, 3, 4.5])
+    expected = [10, 15, 29, 30, np.nan, 210, 225]
+    turned = np.degrees(curve(x)[:, 0]) % 360
+    np.testing.assert_allclose(turned, expected, rtol=1e-14)
+    assert np.isnan(curve.length()) and np.isnan(curve.bending_energy())
+    np.testing.assert_array_equal(np.isnan(curve(x, nu=1)[:, 0]), x // 1 == 2)
+    curve.save(tmp_path / "a.npz")
+    with pytest.warns(ss.FarPointsWarning):
+        np.testing.assert_array_equal(ss.load(tmp_path / "a.npz")(x), curve(x))
+    # In a batch and in a product, other curves and factors are as they are alone.
+    near = angles / 10
+    with pytest.warns(ss.FarPointsWarning, match=r"points\[2\] and points\[3\] of curve 1 "):
+        both = ss.PiecewiseGeodesic(None, np.stack([near, angles]), "torus:1")
+    np.testing.assert_array_equal(both(x), [ss.PiecewiseGeodesic(None, near, "torus:1")(x), curve(x)])
+    np.testing.assert_array_equal(both(np.stack([x, x]), per_curve=True), both(x))
+    with pytest.warns(ss.FarPointsWarning):
+        product = ss.PiecewiseGeodesic(None, (angles, near), "torus:1 x r:1")
+    assert np.isnan(product(2.5)[0]).all() and product(2.5)[1] == near[2:4].mean()
+    np.testing.assert_array_equal(product(2.0)[0], angles[2])
+
+
+@pytest.mark.parametrize("distance", [7.0, 15, 22, 30])
+def test_long_geodesics_of_the_hyperbolic_plane(distance):
+    """Points far out on both sides of the origin: the closed form in coordinates."""
+    at = lambda s: np.stack([np.cosh(s), np.sinh(s), 0 * s], axis=-1)  # noqa: E731
+    x = np.linspace(0, 1, 41)
+    points = ss.Hyperbolic(2).project(at(np.array([-0.5, 0.5]) * distance))
+    exact = at((x - 0.5) * distance)
+    for curve in (ss.PiecewiseGeodesic(None, points, "h:2"), ss.CubicSpline(None, points, "h:2", tol=1e-5)):
+        assert (np.abs(curve(x) - exact).max(axis=-1) < 1e-12 * exact[:, 0]).all()
+        # Vectors are less accurate than points by the square of the time-like coordinate.
+        assert np.abs(curve.speed(x) / distance - 1).max() < 1e-12 + 1e-15 * exact[0, 0] ** 2

@@ -11,7 +11,8 @@ use pyo3::prelude::*;
 use symspline_engine::rows::{Operation, apply, tangent_defects};
 use symspline_engine::space::Ambient;
 
-/// Validates points and velocities, and requires a unique geodesic between the inner control points of every segment.
+/// Validates points and velocities, and requires a unique geodesic between the inner control points of every segment,
+/// except next to nodes without a velocity, which is NaN.
 /// Returns the points on the space, the tangential parts of the velocities, and the longest distance between neighbours of
 /// each curve.
 #[pyfunction]
@@ -43,7 +44,9 @@ pub fn hermite<'py>(
         // An empty batch has nothing more to check.
         let nodes = curves.longest().max(1);
         if let Some((row, part)) =
-            tangent_defects(&space, &own, given).into_iter().enumerate().find(|(_, d)| !(*d <= tangent_tol))
+            tangent_defects(&space, &own, given).into_iter().enumerate().find(|(row, d)| {
+                !(*d <= tangent_tol) && !given[row * len..(row + 1) * len].iter().all(|v| v.is_nan())
+            })
         {
             let node = row % nodes;
             let of = validate::of_curve(row / nodes, &curves.batch);
@@ -69,6 +72,13 @@ pub fn hermite<'py>(
                 handles.extend(tangent[node..node + len].iter().map(|v| v * third));
             }
             let _ = apply(&space, Operation::Exp, &[&at, &handles], &[], monitor, out);
+        }
+        let [first, second] = &mut inner;
+        for (q, r) in first.chunks_exact_mut(len).zip(second.chunks_exact_mut(len)) {
+            if q.iter().chain(&*r).any(|x| x.is_nan()) {
+                q.copy_from_slice(&own[..len]);
+                r.copy_from_slice(q);
+            }
         }
         let mut between = vec![0.0; segments * len];
         apply(&space, Operation::Log, &[&inner[0], &inner[1]], &[], monitor, &mut between)

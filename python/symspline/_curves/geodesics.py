@@ -11,7 +11,7 @@ from .._spaces import Array, Doubles, Product, Space, factors_of
 from .._typing import Progress
 from .curve import CoreCurve, CurveArrays, ProductCurve
 from .fit import kind_of
-from .slopes import geodesic_velocities
+from .slopes import geodesic_velocities, wide
 
 
 class GeodesicCurve(CoreCurve):
@@ -19,7 +19,7 @@ class GeodesicCurve(CoreCurve):
 
     They are curves of cubic segments in which every inner knot occurs twice, with the velocities before and after it.
     The segment of length zero in between is never evaluated, because a time belongs to the last segment that begins at
-    or before it.
+    or before it. Between two points that no unique geodesic joins, velocities and the curve are NaN.
 
     Attributes
     ----------
@@ -56,7 +56,20 @@ class GeodesicCurve(CoreCurve):
         progress: Progress | None = None,
         out: Array | None = None,
     ) -> Any:
-        return self._doubled.evaluate(x, quantity, outside, per_curve, progress, out)
+        values = self._doubled.evaluate(x, quantity, outside, per_curve, progress, out)
+        if quantity == "point":
+            self._write_nodes(values, x, per_curve)
+        return values
+
+    def _write_nodes(self, values: Array, x: Doubles, per_curve: bool) -> None:
+        """Write the points at which a segment without a geodesic begins."""
+        gaps = ~self.space._where_finite(self._starts)
+        for curve in np.argwhere(gaps.any(axis=-1)):
+            index = tuple(curve)
+            t, own = self.times[index] if self.times.ndim > 1 else self.times, x[index] if per_curve else x
+            nodes = np.asarray(np.searchsorted(t[:-2], own))
+            at = (t[nodes] == own) & gaps[index][nodes]
+            values[index][at] = self.points[index][nodes[at]]
 
     def lift(
         self,
@@ -76,7 +89,10 @@ class GeodesicCurve(CoreCurve):
         return np.take(self._doubled.control_points(), np.arange(0, 2 * self.times.shape[-1] - 3, 2), axis=self._axis)
 
     def jumps(self) -> Doubles:
-        """Return the norms of the jumps of the velocity at the inner knots, as parts of the speed before them."""
+        """Return the norms of the jumps of the velocity at the inner knots, as parts of the speed before them.
+
+        They are NaN at the ends of segments without a geodesic.
+        """
         before, after = (
             np.take(velocities, own, axis=self._axis)
             for velocities, own in (
@@ -87,8 +103,11 @@ class GeodesicCurve(CoreCurve):
         p = np.take(self.points, np.arange(1, self.times.shape[-1] - 1), axis=self._axis)
         if not p.size:
             return np.zeros((*self.batch, 0))
+        gaps = ~(self.space._where_finite(before) & self.space._where_finite(after))
+        before, after = (np.where(wide(gaps, self.space), 0, own) for own in (before, after))
         with np.errstate(all="ignore"):
             jumps: Doubles = np.nan_to_num(self.space.norm(p, after - before) / self.space.norm(p, before), nan=0.0)
+        jumps[gaps] = np.nan
         return jumps
 
     def take_batch(self, index: Any) -> Self:
@@ -106,7 +125,7 @@ def joined(space: Space[Any], times: Doubles, points: list[Array]) -> CurveArray
     Raises
     ------
     CutLocusError
-        If two neighbouring points lie at or past each other's cut locus.
+        If all neighbouring points lie at or past each other's cut locus.
     """
     parts = tuple(
         GeodesicCurve(factor, times, own, *geodesic_velocities(factor, times, own))

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .._core import CutLocusError, ValidationError
 from .._faults import of_index
+from .._report import FarPointsWarning
 from .._spaces import Array, Doubles, Euclidean, Space, cover_of
+from .._warnings import warn
+from ..manifolds import Manifold
 
 METHODS = ("catmull-rom", "akima", "pchip")
 # Weights of Akima's formula below this part of the largest one are rounding errors, as in SciPy.
@@ -20,6 +25,8 @@ _BEFORE, _AFTER = 1, 2
 def geodesic_velocities(space: Space[Any], times: Doubles, points: Array) -> tuple[Array, Array]:
     """Return the velocities of the geodesics between neighbouring points, at their starts and at their ends.
 
+    They are NaN, with a warning, between two points that no unique geodesic joins.
+
     Parameters
     ----------
     times : ndarray, shape (n,) or (..., n)
@@ -30,29 +37,47 @@ def geodesic_velocities(space: Space[Any], times: Doubles, points: Array) -> tup
     Raises
     ------
     CutLocusError
-        If two neighbouring points lie at or past each other's cut locus.
+        If all neighbouring points lie at or past each other's cut locus, or two of them do on a `Manifold`.
     """
     cover = cover_of(space)
     p, q = cover._neighbours(points)
-    h = _wide(np.diff(times), cover)
+    h = wide(np.diff(times), cover)
     if not p.size:
         return np.zeros_like(p), np.zeros_like(p)
     try:
         return cover.log(p, q) / h, -cover.log(q, p) / h
     except CutLocusError as error:
         lead = p.shape[: p.ndim - len(cover.point_shape)]
-        *curve, i = next(index for index in np.ndindex(lead) if not _are_joined(cover, p[index], q[index]))
-        of = of_index([int(k) for k in curve])
-        what = str(error).partition(": ")[2]
-        raise CutLocusError(f"points[{i}] and points[{i + 1}]{of}: {what}. Put a point between them.") from None
+        joined = _are_joined(cover, *(x.reshape(-1, *cover.point_shape) for x in (p, q))).reshape(lead)
+        *curve, i = (int(k) for k in np.argwhere(~joined)[0])
+        pair = f"points[{i}] and points[{i + 1}]{of_index(curve)}"
+        if isinstance(cover, Manifold) or not joined.any():
+            what = str(error).partition(": ")[2]
+            raise CutLocusError(f"{pair}: {what}. Put a point between them.") from None
+        others = np.count_nonzero(~joined) - 1
+        more = f" (and {others} more such pairs)" if others else ""
+        warn(
+            f"{pair} lie at or past each other's cut locus{more}: the geodesic between them is not unique, and the "
+            "curve is NaN there. Put a point between them, or divide the data there (fit_segments).",
+            FarPointsWarning,
+            tuple(curve),
+            i,
+        )
+        starts, ends = np.full_like(p, np.nan), np.full_like(p, np.nan)
+        p, q, h = p[joined], q[joined], np.broadcast_to(h, wide(joined, cover).shape)[joined]
+        starts[joined], ends[joined] = cover.log(p, q) / h, -cover.log(q, p) / h
+        return starts, ends
 
 
-def _are_joined(space: Space[Any], p: Array, q: Array) -> bool:
+def _are_joined(space: Space[Any], p: Array, q: Array) -> NDArray[np.bool_]:
+    """Return which rows are points with a unique geodesic between them, by bisection."""
     try:
-        space.log(p, q)
+        space.log(p, q), space.log(q, p)
     except CutLocusError:
-        return False
-    return True
+        half = len(p) // 2
+        parts = [(p[own], q[own]) for own in (slice(half), slice(half, None))]
+        return np.concatenate([_are_joined(space, *part) for part in parts]) if half else np.zeros(1, bool)
+    return np.ones(len(p), bool)
 
 
 def local_velocities(space: Space[Any], times: Doubles, points: Array, method: str) -> Array:
@@ -62,14 +87,36 @@ def local_velocities(space: Space[Any], times: Doubles, points: Array, method: s
     ----------
     method : {"catmull-rom", "akima", "pchip"}
         Formula, see `symspline.HermiteSpline.from_points`.
+
+    Returns
+    -------
+    ndarray
+        Velocities; NaN at two neighbours that no unique geodesic joins. The velocities on either side of them are
+        those of the points on this side alone.
     """
     cover = cover_of(space)
     starts, ends = geodesic_velocities(space, times, points)
-    axis = points.ndim - len(cover.point_shape) - 1
+    gaps = ~cover._where_finite(starts)
+    if not gaps.any():
+        return _local(cover, times, points, starts, ends, method)
+    result = np.full_like(points, np.nan)
+    for curve in np.ndindex(gaps.shape[:-1]):
+        t, cuts = np.broadcast_to(times, (*gaps.shape[:-1], times.shape[-1]))[curve], np.flatnonzero(gaps[curve])
+        for first, stop in pairwise([0, *(cuts + 1), len(t)]):
+            if stop - first > 1:
+                nodes, segments = slice(first, stop), slice(first, stop - 1)
+                own = points[curve][nodes], starts[curve][segments], ends[curve][segments]
+                result[curve][nodes] = _local(cover, t[nodes], *own, method)
+        result[curve][cuts] = result[curve][cuts + 1] = np.nan
+    return result
+
+
+def _local(space: Space[Any], times: Doubles, points: Array, starts: Array, ends: Array, method: str) -> Array:
+    axis = points.ndim - len(space.point_shape) - 1
     if points.shape[axis] == 2:
         # One segment is a geodesic.
         return np.concatenate([starts, ends], axis=axis)
-    slopes = _Slopes(cover, times, points, starts, ends)
+    slopes = _Slopes(space, times, points, starts, ends)
     if method == "akima":
         return slopes.akima()
     return slopes.catmull_rom() if method == "catmull-rom" else slopes.pchip()
@@ -91,7 +138,7 @@ class _Slopes:
         # The axis of nodes comes first, so that formulas are those of SciPy.
         self.points, starts, ends = (self._nodes_first(array) for array in (points, starts, ends))
         h = np.moveaxis(np.broadcast_to(np.diff(times), (*points.shape[: -1 - self.axes], len(starts))), -1, 0)
-        self.h = _wide(h, space)
+        self.h = wide(h, space)
         n = len(self.points)
         m = np.zeros((4, *self.points.shape), points.dtype)
         m[_AFTER, :-1], m[_BEFORE, 1:] = starts, ends
@@ -168,13 +215,13 @@ class _Slopes:
         if isinstance(self.space, Euclidean):
             return np.abs(v)
         p = self.points[skip : len(self.points) - skip] if at is None else at
-        return _wide(np.asarray(self.space.norm(p, v)), self.space)
+        return wide(np.asarray(self.space.norm(p, v)), self.space)
 
     def _sign(self, p: Array, v: Array, w: Array) -> Any:
         """Return numbers with the signs of inner products, or in flat space of products of components."""
         if isinstance(self.space, Euclidean):
             return np.sign(v) * np.sign(w)
-        return _wide(np.asarray(self.space.inner(p, v, w)), self.space)
+        return wide(np.asarray(self.space.inner(p, v, w)), self.space)
 
     def _nodes_first(self, array: Array) -> Array:
         return np.moveaxis(array, -1 - self.axes, 0)
@@ -189,6 +236,6 @@ def check_method(method: Any) -> None:
         raise ValidationError(f"method must be one of {', '.join(map(repr, METHODS))}, not {method!r}")
 
 
-def _wide(values: Doubles, space: Space[Any]) -> Doubles:
+def wide(values: NDArray[Any], space: Space[Any]) -> NDArray[Any]:
     """Append the axes of a point."""
     return values.reshape(values.shape + (1,) * len(space.point_shape))
