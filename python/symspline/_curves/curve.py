@@ -15,7 +15,7 @@ import numpy as np
 from .. import _core
 from .._core import ValidationError
 from .._faults import Fault
-from .._spaces import Affine, Array, Doubles, Similarity, Space, SpecialEuclidean, parts_of, product_norm
+from .._spaces import Affine, Array, Doubles, Similarity, Space, SpecialEuclidean, Torus, parts_of, product_norm
 from .._typing import Progress
 from . import derivatives
 from .derivatives import Gradient, SampleTimes, pair_of
@@ -23,6 +23,7 @@ from .ends import ends_in_factors
 from .integrals import EXACT
 from .lift import check_reach, check_start, fiber_factors, is_quotient
 from .solve import Options, Solved, Task, solve_single, validate
+from .turns import with_more_knots
 
 Tuple = tuple[Any, ...]
 NORMS = ("speed", "bend")
@@ -216,8 +217,16 @@ class CoreCurve:
     @property
     def _core_curve(self) -> tuple[_core.Handle, Doubles, Doubles, Doubles]:
         space = self.space
+        if isinstance(space, Torus) and not self._fitted:
+            return space._handle, *self._with_turns
         points, velocities = space._as_doubles(self.points), space._as_doubles(self.velocities)
         return space._handle, self.times, points, velocities
+
+    @cached_property
+    def _with_turns(self) -> tuple[Doubles, Doubles, Doubles]:
+        """Knots, points and velocities on a torus with so many knots that the core keeps whole turns."""
+        times, points, velocities = with_more_knots(self.times, self.points, self.velocities)
+        return times, np.ascontiguousarray(points), np.ascontiguousarray(velocities)
 
     def _check_times(self, x: Doubles, per_curve: bool) -> None:
         if per_curve and x.shape[: len(self.batch)] != self.batch:

@@ -20,7 +20,7 @@ from .._arrays import as_array
 from .._core import ValidationError
 from .._faults import INVALID, Fault, of_index
 from .._report import Columns, Report, shaped
-from .._spaces import Array, Doubles, Product, Quotient, Space, cover_of, factors_of, parts_of
+from .._spaces import Array, Doubles, Product, Quotient, Space, Torus, cover_of, factors_of, parts_of
 from .._typing import Progress
 from ..manifolds import Manifold
 from ..manifolds._checks import hermite_on_manifold
@@ -30,6 +30,7 @@ from .ends import NATURAL, End, ends_in_factors, ends_of, is_closed, split_ends
 from .handles import require_short_handles
 from .reduced import ReducedCurve
 from .solve import Mask, Options, Solved, Task, solve, solve_single, without
+from .turns import turns_of
 
 _T = TypeVar("_T")
 _Times = TypeVar("_Times")
@@ -386,7 +387,15 @@ def hermite_data(
             task = Task(cover_of(factor), times, part.numbers, NATURAL, part.tol)
             return *hermite_on_manifold(task, vectors), np.full(math.prod(part.batch), np.inf)
         doubles = factor._as_doubles(vectors)
-        found, tangent, longest = _core.hermite(factor._handle, times, part.numbers, doubles, part.tol, tangent_tol)
+        turns = turns_of(times, part.numbers, doubles) if isinstance(factor, Torus) else None
+        slow = doubles
+        if turns is not None:
+            # The curve between these nodes has more knots, so that its control points are not those of the segment.
+            slow = doubles.copy()
+            slow[..., :-1, :][turns.sides > 0] = slow[..., 1:, :][turns.sides > 0] = np.nan
+        found, tangent, longest = _core.hermite(factor._handle, times, part.numbers, slow, part.tol, tangent_tol)
+        if turns is not None:
+            tangent = doubles
         found, tangent = factor._numbers(found), factor._numbers(tangent)
         require_short_handles(factor, times, found, tangent)
         return found, tangent, longest

@@ -8,7 +8,8 @@ import numpy as np
 
 from .._core import CutLocusError, ValidationError
 from .._faults import of_index
-from .._spaces import Array, Doubles, Space
+from .._spaces import Array, Doubles, Space, Torus
+from .turns import LONGEST
 
 # Handles shorter than this fraction of the injectivity radius are valid without further tests.
 _SHORT = 0.99
@@ -20,11 +21,13 @@ def require_short_handles(space: Space[Any], times: Doubles, points: Array, velo
     """Raise ValidationError if a velocity is too fast for a segment next to it.
 
     The curve is evaluated from its control points. If a handle h u/3 passes the cut locus, its control point is also
-    the end of a shorter handle. The curve would then not have the given velocity, or would lose whole turns.
+    the end of a shorter handle. The curve would then not have the given velocity, or would lose whole turns. Curves on
+    a `Torus` keep up to 3000 turns per segment.
     """
     radius = space.injectivity_radius
     if not 0 < radius < np.inf:
         return
+    limit = LONGEST if isinstance(space, Torus) else _SHORT * radius
     axes = len(space.point_shape)
     lead = points.shape[: points.ndim - axes]
     steps = np.broadcast_to(np.diff(times), (*lead[:-1], lead[-1] - 1))
@@ -33,7 +36,7 @@ def require_short_handles(space: Space[Any], times: Doubles, points: Array, velo
     with np.errstate(all="ignore"):
         square = np.asarray(space._apply("inner", p=points, u=velocities, v=velocities))
         length = longest / 3 * np.sqrt(np.maximum(square, 0))
-    for index in zip(*np.nonzero(length > _SHORT * radius), strict=True):
+    for index in zip(*np.nonzero(length > limit), strict=True):
         handle = longest[index] / 3 * velocities[index]
         try:
             again = space.log(points[index], space.exp(points[index], handle))
@@ -41,19 +44,17 @@ def require_short_handles(space: Space[Any], times: Doubles, points: Array, velo
         except CutLocusError:
             lost = True
         if lost:
-            _refuse(space, index, float(length[index]), float(longest[index]))
+            after = longest[index] == np.append(steps[index[:-1]], 0.0)[index[-1]]
+            _refuse(space, index, index[-1] - (not after), float(length[index]), float(longest[index]))
 
 
-def _refuse(space: Space[Any], index: tuple[Any, ...], length: float, step: float) -> None:
+def _refuse(space: Space[Any], index: tuple[Any, ...], segment: int, length: float, step: float) -> None:
     *batch, node = (int(i) for i in index)
     of = of_index(batch)
-    remedy = (
-        "Use `Euclidean` and angles that count turns, or add points between."
-        if space._has_angles
-        else "Add points between, or pass slower velocities."
-    )
+    other = " Or use `Euclidean` and angles that count turns." if space._has_angles else ""
     raise ValidationError(
         f"`velocities[{node}]`{of} has speed {3 * length / step:.6g}, which is too fast for a segment of length "
-        f"{step:.6g}: its control handle, a third of the product, has length {length:.4g} and passes the cut locus. "
-        f"The curve would have a different velocity there or lose whole turns. {remedy}"
+        f"{step:.6g}, between t[{segment}] and t[{segment + 1}]: its control handle, a third of the product, has "
+        f"length {length:.4g} and passes the cut locus. The curve would have a different velocity or lose whole turns. "
+        f"Add knots between them, or pass slower velocities.{other}"
     )

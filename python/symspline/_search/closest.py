@@ -84,7 +84,8 @@ class ClosestPoints:
         parts = self._curve.parts
         # Distances in quotients are those of the nearest representatives.
         known = all(type(part) is CoreCurve and not isinstance(part.space, Quotient) for part in parts)
-        return parts if known else ()
+        # The factors of a product must have the same knots.
+        return parts if known and all(part._core_curve[1] is part.times for part in parts) else ()
 
     @cached_property
     def times(self) -> Doubles:

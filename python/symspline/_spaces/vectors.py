@@ -77,7 +77,7 @@ class Torus(Space[FloatArray]):
     -----
     Neighbouring points are joined the shorter way around each circle, so that a step of 200° is one of −160°. Steps of
     exactly π in any angle raise `CutLocusError`. If the joints turn by more than π between two samples, use
-    `Euclidean` and angles that count turns.
+    `Euclidean` and angles that count turns, or `HermiteSpline` with measured velocities.
 
     Examples
     --------
