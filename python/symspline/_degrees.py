@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -39,3 +40,10 @@ def look_like_degrees(space: Space[Any], points: Any) -> float | None:
         if jumps or np.array_equal(100 * x, np.rint(100 * x)):
             return size
     return None
+
+
+def with_angles(space: Space[Any], points: Any, convert: Callable[[Any], Any]) -> Any:
+    """Return points, or vectors, with the angles of tori converted from or to degrees."""
+    each = zip(factors_of(space), parts_of(points, space, "points"), strict=True)
+    found = tuple(convert(part) if isinstance(factor, Torus) else part for factor, part in each)
+    return found if isinstance(points, tuple) else found[0]

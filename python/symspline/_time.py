@@ -312,7 +312,7 @@ def _difference(array: NDArray[Any], origin: Any) -> NDArray[np.int64]:
 
 
 def _seconds(array: NDArray[Any], origin: Any, name: str) -> Doubles:
-    refuse(np.isnat(array), name, lambda _: "is NaT (not a time)")
+    _refuse_missing(array, name)
     origin = np.asarray(origin)
     fine = np.promote_types(array.dtype, origin.dtype)
     exact = [x.astype(fine) for x in (array, origin)]
@@ -327,8 +327,13 @@ def _seconds(array: NDArray[Any], origin: Any, name: str) -> Doubles:
     return np.asarray(_in_seconds(days[0] - days[1]) + (rest[0] - rest[1]), order="C")
 
 
+def _refuse_missing(array: NDArray[Any], name: str) -> None:
+    remedy = "Remove missing entries, or pass skipna=True to a function that has this option."
+    refuse(np.isnat(array), name, lambda _: f"is NaT (not a time). {remedy}")
+
+
 def _durations(array: NDArray[Any], name: str) -> Doubles:
-    refuse(np.isnat(array), name, lambda _: "is NaT (not a time)")
+    _refuse_missing(array, name)
     return _in_seconds(array)
 
 

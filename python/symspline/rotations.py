@@ -22,7 +22,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._arrays import checked_flag, refuse, short_repr
+from ._arrays import as_array, checked_flag, filled, refuse, short_repr
 from ._core import ValidationError
 from ._cubic import CubicSpline
 from ._cumulative import CumulativeBSpline
@@ -36,13 +36,15 @@ from ._estimation.rates import integrated
 from ._estimation.terms import Body
 from ._estimation.uncertainty import Jacobians, check_uncertain, standard_errors
 from ._hermite import HermiteSpline
+from ._input import times_of
+from ._missing import missing_times, refuse_nan_times
 from ._smoothing.factors import smoothed_spaces
 from ._spaces import Array, Doubles, SpecialEuclidean, SpecialOrthogonal, Sphere, cover_of
 from ._spaces.point_groups import elements, proper_symbol
 from ._time import knots_of
 from ._timed_curve import check_timed
 from ._typing import Extrapolate, Frame, RateInterpolation, RotationOrder, TimesLike
-from ._validation import length, one_of, real_numbers
+from ._validation import REMOVE, check_finite, length, one_of, real_numbers, unchecked_numbers
 from ._warnings import warn
 from .convert import matrix_to_quaternion, quaternion_to_matrix
 from .convert._quaternions import checked_order, converted, quaternion_form
@@ -534,6 +536,7 @@ def integrate(
     frame: Frame = "body",
     *,
     interpolation: RateInterpolation = "cubic",
+    skipna: bool = False,
 ) -> Array:
     r"""Compute rotations from angular velocities, such as those of a gyroscope.
 
@@ -551,6 +554,9 @@ def integrate(
         Interpolation of `omega` between the times. ``"cubic"`` is a not-a-knot spline, and the error of the rotations
         is of fourth order in the time step. With ``"linear"`` it is of second order. Use it for noisy rates with very
         uneven times.
+    skipna : bool, default False
+        True to omit missing samples, where a rate or the time is NaN, NaT or masked. The rates are interpolated across
+        them, and their rotations are NaN. `start` is then the rotation at the first time that is present.
 
     Returns
     -------
@@ -604,10 +610,13 @@ def integrate(
     """
     one_of(frame, "frame", "body", "world")
     one_of(interpolation, "interpolation", "cubic", "linear")
-    rates, _ = real_numbers(omega, "omega", (None, 3))
+    if checked_flag(skipna, "skipna"):
+        return _integrated_present(filled(t), filled(omega), start, frame, interpolation)
+    rates, _ = unchecked_numbers(omega, "omega", (None, 3))
     batch, n = rates.shape[:-2], rates.shape[-2]
     _, shown, times = knots_of(t, batch, n)
-    refuse(~np.isfinite(times), "t", lambda i: f"is {times[i]}, but times must be finite. Remove this sample.")
+    check_finite(rates, "omega", f"{REMOVE}, or pass skipna=True to omit such samples")
+    refuse_nan_times(times)
     steps = np.diff(times)
     advice = "times must increase. Sort times and rates together, and remove repeated times."
     later = shown[..., 1:]
@@ -635,6 +644,29 @@ def integrate(
         return np.asarray(first @ _integral(times, rates, interpolation))
     # The transposed equation is (Rᵀ)' = −Rᵀω.
     return np.asarray(_swapped(_integral(times, -rates, interpolation)) @ first)
+
+
+def _integrated_present(t: Any, omega: Any, start: Any, frame: Frame, interpolation: RateInterpolation) -> Array:
+    """Integrate the samples that are present in each recording. The rotations of the others are NaN."""
+    rates, _ = unchecked_numbers(omega, "omega", (None, 3))
+    present = np.asarray(~np.isnan(rates).any(axis=-1))
+    times = None if t is None else as_array(times_of(t, "t")[0], "t")
+    fits = times is None or times.shape in (present.shape, present.shape[-1:])
+    if times is not None and fits:
+        present = present & ~missing_times(times)
+    options: dict[str, Any] = {"frame": frame, "interpolation": interpolation}
+    if present.all() or not fits:
+        return integrate(t, rates, start, **options)
+    found = np.full((*present.shape, 3, 3), np.nan)
+    batch = present.shape[:-1]
+    starts = None if start is None else np.broadcast_to(_SO3._array(start, "start"), (*batch, 3, 3))
+    for i in np.ndindex(batch):
+        rows = np.flatnonzero(present[i])
+        if not len(rows):
+            continue
+        own = rows if times is None else times[i][rows] if times.ndim > 1 else times[rows]
+        found[i][rows] = integrate(own, rates[i][rows], None if starts is None else starts[i], **options)
+    return found
 
 
 def _integral(times: Doubles, rates: Array, interpolation: str) -> Array:

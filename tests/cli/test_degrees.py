@@ -52,3 +52,44 @@ def test_angles_that_look_like_degrees_warn(run, angles, head, warned):
 def test_the_option_is_for_tori(fails):
     write("a.csv", rows(DIRECTIONS))
     assert "is for torus:n" in fails("fit a.csv --space r:1 --degrees -o a.npz")
+    np.savez("a.npz", points=DIRECTIONS.reshape(4, 2, 1))
+    assert "is for torus:n" in fails("grid a.npz --space r:1 --degrees -o b.npz")
+
+
+def maps():
+    """Directions over a map that cross north, in degrees, and the angles without jumps at the middles of its cells."""
+    x, y = np.meshgrid(np.arange(5.0), np.arange(6.0), indexing="ij")
+    smooth = 340 + 9 * x + 4 * y + x * y / 3
+    middle = ss.GridSpline((None, None), smooth[..., None], "r:1").grid(np.arange(9) / 2, np.arange(11) / 2)
+    return smooth[..., None] % 360, middle
+
+
+def off_by(angles, expected):
+    return np.abs((angles - expected + 180) % 360 - 180).max()
+
+
+def test_grids_in_degrees(run):
+    given, expected = maps()
+    np.savez("a.npz", points=given)
+    run("grid a.npz --space torus:1 --degrees --zoom 2 -o b.npz")
+    assert off_by(np.load("b.npz")["points"], expected) < 1e-9
+    run("grid a.npz --space torus:1 --degrees -o s.npz")
+    assert off_by(np.degrees(ss.load("s.npz").grid(np.arange(9) / 2, np.arange(11) / 2)), expected) < 1e-9
+    run("grid s.npz --degrees --zoom 2 -o c.npz")
+    assert off_by(np.load("c.npz")["points"], expected) < 1e-9
+    said = run("grid a.npz --space torus:1 -o d.npz", notes=True)
+    assert "look like degrees" in said and "--degrees" in said
+
+
+def test_stores_in_degrees(run):
+    xr = pytest.importorskip("xarray")
+    pytest.importorskip("zarr")
+    given, expected = maps()
+    da = xr.DataArray(given, dims=("x", "y", "q"), name="direction")
+    da.to_dataset().to_zarr("a.zarr", consolidated=False)
+    da.assign_attrs(units="degrees").to_dataset().to_zarr("u.zarr", consolidated=False)
+    for name, option in (("a", "--degrees"), ("u", "")):
+        run(f"grid {name}.zarr --space torus:1 {option} --zoom 2 -o {name}b.zarr")
+        assert off_by(xr.open_zarr(f"{name}b.zarr", consolidated=False).direction.values, expected) < 1e-9
+        run(f"grid {name}.zarr --space torus:1 {option} --zoom 2 -o {name}b.npz")
+        assert off_by(np.load(f"{name}b.npz")["points"], expected) < 1e-9

@@ -166,7 +166,7 @@ def test_invalid_input_raises():
 
     for message, arguments in [
         (r"t\[2\] is 2.0 and the next time is 2.0, but times must increase", (changed(t, 3, 2.0), omega)),
-        (r"t\[1\] is nan, but times must be finite", (changed(t, 1, np.nan), omega)),
+        (r"t\[1\] is nan; times must be finite. Pass skipna=True", (changed(t, 1, np.nan), omega)),
         (r"t has shape \(4,\)", (t[:4], omega)),
         (r"omega\[2, 1\] is nan, but must be finite; remove missing values", (t, changed(omega, (2, 1), np.nan))),
         (r"omega must be real, of shape \(..., n, 3\)", (t, omega[:, :2])),

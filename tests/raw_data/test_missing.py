@@ -162,6 +162,30 @@ def test_conversions_return_nan():
         assert len(ss.CubicSpline(None, found, "so:3", skipna=True).t) == 6
 
 
+def test_integrated_rates():
+    rng = np.random.default_rng(4)
+    rates, first = rng.normal(size=(2, 14, 3)), Rotation.random(2, rng=7).as_matrix()
+    bad = rates.copy()
+    bad[1, GONE, 2] = np.nan
+    expected = ss.rotations.integrate(T[KEPT], rates[1, KEPT], first[1], "world")
+    for given in (bad, np.ma.masked_invalid(bad)):
+        found = ss.rotations.integrate(T, given, first, "world", skipna=True)
+        np.testing.assert_array_equal(found[0], ss.rotations.integrate(T, rates[0], first[0], "world"))
+        np.testing.assert_array_equal(found[1, KEPT], expected)
+        assert np.isnan(found[1, GONE]).all()
+    np.testing.assert_array_equal(
+        ss.rotations.integrate(None, bad[1], skipna=True)[KEPT],
+        ss.rotations.integrate(KEPT, rates[1, KEPT]),
+    )
+    dates = np.datetime64("2024-05-01") + (1e9 * T).astype("m8[ns]")
+    dates[GONE] = "NaT"
+    found = ss.rotations.integrate(dates, rates, skipna=True)
+    np.testing.assert_array_equal(found[:, KEPT], ss.rotations.integrate(dates[KEPT], rates[:, KEPT]))
+    raises(r"omega\[1, 0, 2\] is nan.*skipna=True", ss.rotations.integrate, T, bad)
+    raises(r"t\[0\] is NaT.*skipna=True", ss.rotations.integrate, dates, rates)
+    raises(r"t has shape \(13,\)", ss.rotations.integrate, T[:13], bad, skipna=True)
+
+
 def test_files():
     q = Rotation.random(5, rng=6).as_quat()
     rows = np.column_stack([np.arange(5.0), np.arange(15.0).reshape(5, 3), q])

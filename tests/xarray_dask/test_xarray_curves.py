@@ -213,3 +213,17 @@ def test_points_rounded_in_a_file():
     assert same(sx.evaluate(ds, X).values, plain(da, "sphere:2", atol=1e-5)(X))
     single = sx.fit(field().astype("float32"), S2, point_dims=("r",))
     assert single.converged.all() and single.points.dtype == np.float64
+
+
+@pytest.mark.parametrize("space", ["sphere:2", "so:3"])
+def test_curves_come_back_from_netcdf(space, tmp_path):
+    # SciPy writes version 3 of the format, which has no lists of texts, no Boolean values and no 64-bit integers.
+    dims = point_dims(space)
+    da = field(space)
+    ds = sx.fit(da, space, point_dims=dims, bc_type="not-a-knot")
+    ds.to_netcdf(tmp_path / "curves.nc", engine="scipy")
+    read = xr.load_dataset(tmp_path / "curves.nc", engine="scipy")
+    assert sx.evaluate(read, X).identical(sx.evaluate(ds, X))
+    smoothed = sx.smooth(da, space, point_dims=dims, std=True, lam=1.0)
+    smoothed.to_netcdf(tmp_path / "smoothed.nc", engine="scipy")
+    assert xr.load_dataset(tmp_path / "smoothed.nc", engine="scipy").points.identical(smoothed.points)

@@ -90,6 +90,7 @@ def test_invalid_datasets_raise():
     ds = sx.fit(field(), S2, point_dims=("r",))
     refused("ds is not what symspline.xarray.fit returns", lambda: sx.evaluate(ds.drop_vars("velocities"), 0.5))
     refused("it has no 'space'", lambda: sx.evaluate(ds.drop_attrs(), 0.5))
+    refused("its attribute 'point_dims' is 'r'", lambda: sx.evaluate(ds.assign_attrs(point_dims="r"), 0.5))
     refused("is not what symspline.xarray.fit returns", lambda: sx.evaluate(field(), 0.5))
     refused("'time' is cut into 10 chunks", lambda: sx.evaluate(ds.chunk(time=1), 0.5))
 

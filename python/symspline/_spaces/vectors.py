@@ -58,10 +58,10 @@ class Euclidean(Space[FloatArray]):
 class Torus(Space[FloatArray]):
     r"""The flat torus Tⁿ, whose points are n angles.
 
-    A point is an array of n angles in radians, such as the torsion angles of a molecule or the angles of the joints of
-    an arm. Angles that differ by whole turns are the same point. Input may have any number of turns, unless the
-    rounding errors of the angles exceed the tolerance of points: 4.5e7 rad at 1e-8. Points that are returned are in
-    (−π, π]. Use ``numpy.unwrap(spline(x), axis=-2)`` for angles without jumps.
+    A point is an array of n angles in radians, such as wind directions or the torsion angles of a molecule. Angles that
+    differ by whole turns are the same point. Input may have any number of turns, unless the rounding errors of the
+    angles exceed the tolerance of points: 4.5e7 rad at 1e-8. Points that are returned are in (−π, π]. Use
+    ``numpy.unwrap(spline(x), axis=-2)`` for angles without jumps.
 
     Parameters
     ----------
@@ -76,8 +76,9 @@ class Torus(Space[FloatArray]):
     Notes
     -----
     Neighbouring points are joined the shorter way around each circle, so that a step of 200° is one of −160°. Steps of
-    exactly π in any angle raise `CutLocusError`. If the joints turn by more than π between two samples, use
-    `Euclidean` and angles that count turns, or `HermiteSpline` with measured velocities.
+    exactly π in any angle raise `CutLocusError`. If angles turn by more than π between two samples, use `Euclidean` and
+    angles that count turns, or `HermiteSpline` with measured velocities. Also use `Euclidean` for joints with stops,
+    which cannot pass ±π: on a torus, a joint moves from 160° to −160° through 180°.
 
     Examples
     --------

@@ -16,7 +16,7 @@ Points that are NaN are missing. They divide rows into runs, each with a spline 
 between points along every axis are NaN. Points within 1e-4 of the space are projected onto it.
 
 Values are those of splines along the first axis, then along the second through these values, and so on. --symmetric
-takes the midpoint with those of the reverse order.
+takes the midpoint with those of the reverse order. Angles of torus:n are in radians, or with --degrees in degrees.
 
 The output has the format of the input. Without --to, --zoom and --points it is the spline itself, an NPZ file that
 symspline.load reads in Python. A file name of - means standard input or output, an NPZ file.
@@ -41,6 +41,7 @@ from typing import Any
 import numpy as np
 
 from .._archive import read
+from .._degrees import with_angles
 from .._disk import damage
 from .._grid import GridSpline
 from .._report import FarPointsWarning
@@ -76,6 +77,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("input", type=Path, metavar="IN", help="grid to read: .npz, .nii, .nii.gz or .zarr, or - for NPZ")
     add("--space", metavar="S", help="such as sphere:2, so:3 or spd:3, which is the default for NIfTI files")
     add("--axes", metavar="A,B,...", help="arrays or dimensions of the axes, in the order of the splines")
+    add("--degrees", action="store_true", help="angles of torus:n are in degrees, also in the values")
     add("--variable", metavar="NAME", help="variable of a Zarr store that has several")
     add("--order", choices=_ORDERS, help="program that wrote a NIfTI file, unless its intent is symmetric matrices")
     add("--mask", type=Path, metavar="FILE", help="NIfTI file whose nonzero voxels are read")
@@ -111,8 +113,8 @@ def run(options: argparse.Namespace) -> int:
 def _check_formats(options: argparse.Namespace, source: str, target: str, option: str | None) -> None:
     """Raise `Problem` for options of other formats, and outputs that the input cannot be written to."""
     volume, store = source in VOLUMES, source == ZARR
-    uses = {"order": volume, "mask": volume, "variable": store, "axes": not volume}
-    unused = [name for name, used in uses.items() if getattr(options, name) is not None and not used]
+    uses = {"order": volume, "mask": volume, "variable": store, "axes": not volume, "degrees": not volume}
+    unused = [name for name, used in uses.items() if getattr(options, name) not in (None, False) and not used]
     same = target == source or (volume and target in VOLUMES)
     refuse(f"--{''.join(unused[:1])} ", (unused, f"is not for {source} files"))
     refuse(
@@ -156,6 +158,7 @@ def _resampled(options: argparse.Namespace, source: str, option: str | None, how
     x = _positions(options, option, grid.names, spline.axes)
     with Progress("sampling") as progress:
         values = spline.grid(*x, progress=progress)
+    values = with_angles(spline.space, values, np.degrees) if grid.degrees else values
     write_arrays(options.output, grid.names, x, values)
     first = values[0] if isinstance(values, tuple) else values
     missing = np.isnan(first).mean() if first.size else 0.0

@@ -18,13 +18,14 @@ import numpy as np
 
 from .._archive import read
 from .._arrays import brief
+from .._degrees import is_degrees, look_like_degrees, with_angles
 from .._disk import damage
 from .._exceptions import SymsplineError
 from .._files import load
 from .._grid import GridSpline
-from .._spaces import Product, Space, factors_of, space_named
+from .._spaces import Product, Space, Torus, factors_of, space_named
 from ._columns import split_names
-from ._messages import Problem, Progress, alternatives, did_you_mean, reading, refuse
+from ._messages import Problem, Progress, alternatives, did_you_mean, reading, refuse, say
 from ._streams import STANDARD, Source, writing
 from ._tables import Array
 
@@ -48,6 +49,8 @@ class Grid:
     points : ndarray or tuple of ndarray
     space : Space, or None for a spline
     spline : GridSpline or None
+    degrees : bool
+        Whether the angles of tori were converted from degrees, and values are to be in degrees.
     """
 
     names: list[str]
@@ -55,6 +58,7 @@ class Grid:
     points: Any = None
     space: Any = None
     spline: GridSpline[Any] | None = None
+    degrees: bool = False
 
 
 def ending_of(path: Path) -> str:
@@ -67,7 +71,21 @@ def ending_of(path: Path) -> str:
 
 def _space_of(options: argparse.Namespace) -> Space[Any]:
     refuse("", (options.space is None, "say which space the points are on with --space, such as --space sphere:2"))
-    return space_named(options.space)
+    space = space_named(options.space)
+    on_torus = any(isinstance(factor, Torus) for factor in factors_of(space))
+    refuse("--degrees", (options.degrees and not on_torus, f" is for torus:n and products with it, not for {space}"))
+    return space
+
+
+def _in_radians(points: Any, space: Space[Any], options: argparse.Namespace) -> Any:
+    """Return points with angles in radians. Warn if angles look like degrees and the option is absent."""
+    if options.degrees:
+        return with_angles(space, points, np.radians)
+    largest = look_like_degrees(space, points)
+    if largest is not None:
+        why = f"angles up to {largest:g} look like degrees, but angles on {space} are in radians"
+        say(f"{options.input}: {why}; give --degrees if they are in degrees")
+    return points
 
 
 def _usual_names(count: int) -> list[str]:
@@ -108,7 +126,8 @@ def read_arrays(options: argparse.Namespace) -> Grid:
     refuse(path, (names and len(names) != count, wrong))
     _check_sizes(path, {name: len(arrays[name]) for name in names}, points[0].shape[:count])
     axes = [arrays[name] for name in names] if names else [None] * count
-    return Grid(names or _usual_names(count), axes, tuple(points) if several else points[0], space)
+    numbers = _in_radians(tuple(points) if several else points[0], space, options)
+    return Grid(names or _usual_names(count), axes, numbers, space, degrees=options.degrees)
 
 
 def _check_sizes(path: Source, sizes: dict[str, int], nodes: tuple[int, ...]) -> None:
@@ -131,7 +150,7 @@ def _spline(options: argparse.Namespace, path: Source, spline: Any, names: Any) 
     )
     count = len(spline.axes)
     names = [str(name) for name in names] if names is not None and np.shape(names) == (count,) else _usual_names(count)
-    return Grid(names, spline=spline)
+    return Grid(names, spline=spline, degrees=options.degrees)
 
 
 def write_arrays(path: Path, names: Sequence[str], axes: Sequence[Array], points: Any) -> None:
@@ -201,7 +220,11 @@ def read_store(options: argparse.Namespace) -> Grid:
     others = [name for name in array.dims if name not in (*axes, *point_dims)]
     several = f": the dimensions {', '.join(map(str, others))} are those of several grids; write them to a .zarr store"
     refuse(options.input, (others, several))
-    return Grid(axes, _nodes(array, axes), array.transpose(*axes, *point_dims).values, _space_of(options))
+    from ..xarray._units import in_radians
+
+    space, degrees = _space_of(options), is_degrees(array.attrs.get("units", ""))
+    points = in_radians(array.transpose(*axes, *point_dims).compute(), space).values
+    return Grid(axes, _nodes(array, axes), points, space, degrees=degrees)
 
 
 def resample_store(
@@ -264,7 +287,7 @@ def _opened(options: argparse.Namespace) -> tuple[Any, list[str], list[str]]:
     refuse(path, (options.variable is None and len(names) != 1, several))
     name = options.variable or names[0]
     refuse(path, (name not in names, f" has no variable {name!r}; {did_you_mean(name, names)}"))
-    array = store[name]
+    array = store[name].assign_attrs({"units": "degree"} if options.degrees else {})
     dims = [str(dim) for dim in array.dims]
     count = len(space.point_shape)
     few = f": {name!r} has the dimensions {', '.join(dims)}, but a point of {space} alone has {count}"

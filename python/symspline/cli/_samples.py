@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from .._cubic import CubicSpline
+from .._degrees import with_angles
 from .._lonlat import compass, to_lonlat
 from .._smoothing import SmoothingSpline
 from .._spaces import Doubles, Torus, factors_of, parts_of
@@ -34,10 +35,8 @@ def samples_of(spline: CubicSpline, x: Any, nu: int, columns: Columns) -> Sample
             return list(zip(columns.points, to_lonlat(values), strict=True))
         axes = zip(("east", "north"), compass(spline(x)), strict=True)
         return [(name + end, np.degrees((values * axis).sum(axis=-1))) for name, axis in axes]
+    values = with_angles(spline.space, values, np.degrees) if columns.degrees else values
     parts = parts_of(values, spline.space, "values")
-    if columns.degrees:
-        each = zip(factors_of(spline.space), parts, strict=True)
-        parts = tuple(np.degrees(own) if isinstance(factor, Torus) else own for factor, own in each)
     if columns.quaternion is not None:
         return _with_quaternion(spline, x, nu, parts, columns)
     blocks = [np.ascontiguousarray(own.reshape(len(own), -1)).view(np.float64) for own in parts]

@@ -138,7 +138,8 @@ def fit(
     ds.attrs = {
         "space": str(spec["space"]),
         "curve_dim": dim,
-        "point_dims": list(point_dims),
+        # Not a list, since netCDF of version 3 stores no lists of texts.
+        "point_dims": json.dumps(list(point_dims)),
         "bc_type": words if isinstance(words, str) else json.dumps(words),
         "extrapolate": extrapolation_mode(extrapolate, bc_type),
         "symspline": VERSION,
@@ -370,12 +371,16 @@ def _along(ds: xr.Dataset, x: Any, quantity: str, extrapolate: Any, lifted: bool
         raise ValidationError(f"ds is not what symspline.xarray.fit returns: it is {short_repr(ds)}")
     try:
         space = space_named(ds.attrs["space"])
-        dim, point_dims, policy = (ds.attrs[name] for name in ("curve_dim", "point_dims", "extrapolate"))
+        dim, names, policy = (ds.attrs[name] for name in ("curve_dim", "point_dims", "extrapolate"))
         points, velocities = ds["points"], ds["velocities"]
     except (AttributeError, KeyError) as error:
         raise ValidationError(f"ds is not what symspline.xarray.fit returns: it has no {error}") from None
-    # Some file formats make one text of a list with one.
-    point_dims = [point_dims] if isinstance(point_dims, str) else list(point_dims)
+    try:
+        point_dims = list(json.loads(names))
+    except (TypeError, ValueError):
+        raise ValidationError(
+            f"ds is not what symspline.xarray.fit returns: its attribute 'point_dims' is {short_repr(names)}"
+        ) from None
     for array in (points, velocities):
         check_dims(array, space, dim, point_dims)
     if extrapolate is not None:
