@@ -76,10 +76,12 @@ test-aarch64:
 		--lib --tests --target aarch64-unknown-linux-musl
 
 # About ten minutes of random input on two cores; what fails is kept in .hypothesis and tried first the next time. Then the
-# table of the page on trust, from few recordings.
+# About ten minutes of random input on two cores; what fails is kept in .hypothesis and tried first the next time. Then the
+# table of the page on trust, from few recordings, and the time until long calls end after Ctrl-C.
 fuzz: .venv/built .venv/tools
 	$(BIN)/python -m pytest --numprocesses auto tests/fuzz --hypothesis-profile=long
 	$(BIN)/python -m tests.trust 20
+	$(BIN)/python tests/host/interrupts.py
 
 # Some minutes; the machine should have nothing else to do.
 bench: .venv/built .venv/tools

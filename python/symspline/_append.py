@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ._arrays import as_array, short_repr, whole_number
+from ._arrays import as_array, refuse, whole_number
 from ._core import ValidationError
 from ._curves.ends import is_closed
 from ._curves.fit import Fit, FitProblem, Problem, curve_of, moved_ends, read, read_ends
@@ -90,8 +90,10 @@ def _new_times(spline: Any, t: TimesLike) -> tuple[Array, bool]:
         if np.isfinite(time[0]) and time[0] > spline._t[-1]:
             return time, True
     # Conversion validates the kind of the times and their time zone.
-    later, _ = spline._time_axis.at(t, spline._batch, spline._t.ndim > 1)
+    later, _ = spline._time_axis.at(t, spline._batch, spline._t.ndim > 1, name="t")
     array = as_array(times_of(t, "t")[0], "t")
+    # Durations are shown as seconds.
+    array = later if array.dtype.kind == "m" else array
     single = array.ndim == spline._t.ndim - 1
     if (
         array.ndim not in (spline._t.ndim - 1, spline._t.ndim)
@@ -100,11 +102,10 @@ def _new_times(spline: Any, t: TimesLike) -> tuple[Array, bool]:
         raise ValidationError(f"t has shape {array.shape}, but must be one time or the times (m,), as the knots are")
     array, later = (x[..., None] if single else x for x in (array, later))
     known = np.broadcast_to(spline._curve.times[..., -1:], (*later.shape[:-1], 1))
-    if not (np.diff(np.concatenate([known, later], axis=-1)) > 0).all():
-        raise ValidationError(
-            f"t = {short_repr(t)} must increase from the last knot on, {spline.domain[1]}. Sort the "
-            "points, or remove those that the curve already has."
-        )
+    rises = np.isfinite(later) & (np.diff(np.concatenate([known, later], axis=-1)) > 0)
+    last = f"the last knot {spline.domain[1]}" if spline._t.ndim == 1 else "the last knot of its curve"
+    advice = f"times must be finite and increase from {last} on. Sort the points, or remove those that the curve has."
+    refuse(~(rises[..., 0] if single else rises), "t", lambda i: f"is {array[(*i, 0) if single else i]}, but {advice}")
     return array, single
 
 

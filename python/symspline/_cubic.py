@@ -23,7 +23,7 @@ from ._curves.fit import Fit, Problem, curve_of, fit, mask_of, moved_ends, read,
 from ._curves.integrals import alternative_energy
 from ._errors import raise_or_warn
 from ._held import warn_of_held_points
-from ._missing import curves_without_missing, with_remedy
+from ._missing import counts_all_samples, curves_without_missing, inner_velocities_of_present, with_remedy
 from ._options import fit_options, order_of, with_atol
 from ._piecewise_cubic import PiecewiseCubic
 from ._report import Report, combined
@@ -174,6 +174,7 @@ class CubicSpline(PiecewiseCubic[P], Generic[P, R]):
     (2, 3)
     """
 
+    @counts_all_samples
     def __init__(
         self,
         t: TimesLike | None,
@@ -195,6 +196,7 @@ class CubicSpline(PiecewiseCubic[P], Generic[P, R]):
     ) -> None:
         space = space_named(space)
         if skipna is not False and checked_flag(skipna, "skipna"):
+            velocities = inner_velocities_of_present(t, points, space, velocities)
             t, points = curves_without_missing(t, points, space)
         options = fit_options(method, tol, max_iter, extrapolate, on_failure, check, progress)
         conditions, accelerations = split_accelerations(bc_type)

@@ -18,7 +18,7 @@ from ._curves.ends import freeze_bc_type, take_batch
 from ._errors import raise_or_warn
 from ._held import warn_of_held_points
 from ._input import in_library, library_of
-from ._missing import curves_without_missing, missing_named
+from ._missing import counts_all_samples, curves_without_missing, missing_named
 from ._options import (
     EvaluationOptions,
     check_progress,
@@ -281,6 +281,7 @@ def read_velocities(velocities: Any, space: Space[Any], data: list[fitting.Point
     return found
 
 
+@counts_all_samples
 def fit_many(
     curves: Iterable[tuple[TimesLike | None, PointsLike]],
     space: Space[P] | str,

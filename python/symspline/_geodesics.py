@@ -12,7 +12,7 @@ from ._arrays import checked_flag
 from ._curves.curve import CoreCurve, CurveArrays
 from ._curves.fit import read, read_ends, validated
 from ._curves.geodesics import GeodesicCurve, joined
-from ._missing import curves_without_missing, missing_named
+from ._missing import counts_all_samples, curves_without_missing, missing_named
 from ._options import checked_extrapolate, with_atol
 from ._piecewise_cubic import PiecewiseCubic
 from ._representatives import warn_of_representatives
@@ -100,6 +100,7 @@ class PiecewiseGeodesic(PiecewiseCubic[P]):
     _ends = "joined by geodesics"
     _of_velocities = False
 
+    @counts_all_samples
     def __init__(
         self,
         t: TimesLike | None,

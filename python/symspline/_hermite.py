@@ -12,7 +12,7 @@ from ._curves.curve import CurveArrays
 from ._curves.fit import Points, curve_of, hermite_data, read, read_ends, validated
 from ._curves.slopes import check_method, local_velocities
 from ._functional import read_velocities
-from ._missing import curves_without_missing, missing_named, nodes_without_missing
+from ._missing import counts_all_samples, curves_without_missing, missing_named, nodes_without_missing
 from ._options import checked_extrapolate, with_atol
 from ._piecewise_cubic import PiecewiseCubic
 from ._representatives import warn_of_representatives
@@ -101,6 +101,7 @@ class HermiteSpline(PiecewiseCubic[P]):
     _format = "symspline-hermite"
     _ends = "given velocities"
 
+    @counts_all_samples
     def __init__(
         self,
         t: TimesLike | None,
@@ -125,6 +126,7 @@ class HermiteSpline(PiecewiseCubic[P]):
         self._fill(time_axis, shown_times, curve, "natural", extrapolate)
 
     @classmethod
+    @counts_all_samples
     def from_points(
         cls,
         t: TimesLike | None,

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+import functools
+import inspect
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,13 +15,19 @@ from numpy.typing import NDArray
 from ._arrays import as_array, filled, refuse
 from ._core import ValidationError
 from ._curves.fit import Points
+from ._exceptions import SymsplineError
 from ._input import times_of
-from ._spaces import Product, Space, factors_of, parts_of
+from ._spaces import Product, Space, factors_of, parts_of, space_named
 
 Mask = NDArray[np.bool_]
 # Parts of the core's messages about times and points that are not finite.
 _NAN_TIME = "is NaN; times must be finite"
 _NOT_FINITE = "No point is close to it; correct it or remove it"
+# Samples in messages: `points[3]`, `t[0][3]` of the first curve, `measurements[0].y: point 3`.
+_SAMPLE = re.compile(r"\b(t|points|velocities|omega|measurements\[(\d+)\]\.\w+)(?:\[(\d+)\](?=\[))?(\[|: point )(\d+)")
+
+_Arguments = ParamSpec("_Arguments")
+_Result = TypeVar("_Result")
 
 
 def missing_times(times: NDArray[Any]) -> Mask:
@@ -42,7 +51,7 @@ def without_missing(t: Any, points: Any, space: Space[Any]) -> tuple[Any, Any, M
         Whether each of the given samples is present.
     """
     parts = [factor._array(filled(p), "points") for factor, p in zip(*_each(points, space), strict=True)]
-    found = [_missing_points(factor, part) for factor, part in zip(factors_of(space), parts, strict=True)]
+    found = [missing_points(factor, part) for factor, part in zip(factors_of(space), parts, strict=True)]
     moments = None if t is None else as_array(times_of(filled(t), "t")[0], "t")
     if moments is not None:
         found.append(missing_times(moments))
@@ -69,6 +78,22 @@ def curves_without_missing(t: Any, points: Any, space: Space[Any]) -> tuple[Any,
     times, own, present = without_missing(t, points, space)
     _check_alike(present)
     return times, own
+
+
+def inner_velocities_of_present(t: Any, points: Any, space: Space[Any], velocities: Any) -> Any:
+    """Return velocities at some samples, by their indices among the samples that are present."""
+    _, _, present = without_missing(t, points, space)
+    kept = np.asarray(present.any(axis=tuple(range(present.ndim - 1))))
+    if not isinstance(velocities, Mapping) or kept.all():
+        return velocities
+    place = np.where(kept, np.cumsum(kept) - 1, -1).tolist()
+    found = {}
+    for i, vector in velocities.items():
+        known = isinstance(i, (int, np.integer)) and 0 <= i < len(place)
+        if known and place[i] < 0:
+            raise ValidationError(f"velocities has the key {i}, but this point is missing (NaN). Remove the key.")
+        found[place[i] if known else i] = vector
+    return found
 
 
 def nodes_without_missing(t: Any, points: Any, velocities: Any, space: Space[Any]) -> tuple[Any, Any, Any]:
@@ -144,6 +169,58 @@ def rows_of(value: Any, kept: Mask) -> Any:
     return value if axis is None else np.compress(kept, value, axis=axis)
 
 
+def recounting(
+    rows_present: Callable[[dict[str, Any]], list[NDArray[np.intp]]],
+) -> Callable[[Callable[_Arguments, _Result]], Callable[_Arguments, _Result]]:
+    """Return a decorator for functions with `skipna`: indices in their errors then also count the missing samples.
+
+    The argument returns, from the arguments by name, the rows that are present in each recording.
+    """
+
+    def decorator(function: Callable[_Arguments, _Result]) -> Callable[_Arguments, _Result]:
+        @functools.wraps(function)
+        def counting(*args: _Arguments.args, **kwargs: _Arguments.kwargs) -> _Result:
+            try:
+                return function(*args, **kwargs)
+            except SymsplineError as error:
+                if not kwargs.get("skipna"):
+                    raise
+                given = inspect.signature(function).bind(*args, **kwargs).arguments
+                raise recounted(error, rows_present(given)) from None
+
+        return counting
+
+    return decorator
+
+
+def _rows_of_recordings(given: dict[str, Any]) -> list[NDArray[np.intp]]:
+    vectors = given.get("velocities")
+    extra = [] if vectors is None or isinstance(vectors, Mapping) else [(None, vectors)]
+    curves = given["curves"] if "curves" in given else [(given["t"], given["points"])]
+    return [_rows_present([own, *extra], given["space"]) for own in curves]
+
+
+def _rows_present(data: Iterable[tuple[Any, Any]], space: Any) -> NDArray[np.intp]:
+    """Return the indices of the samples that are present in all of several recordings with the same times."""
+    found = [without_missing(t, points, space_named(space))[2] for t, points in data]
+    return np.flatnonzero(np.all([own.any(axis=tuple(range(own.ndim - 1))) for own in found], axis=0))
+
+
+counts_all_samples = recounting(_rows_of_recordings)
+
+
+def recounted(error: SymsplineError, rows: Sequence[NDArray[np.intp]]) -> SymsplineError:
+    """Return an error about selected rows of recordings with the indices of these rows, given for each recording."""
+
+    def index(match: re.Match[str]) -> str:
+        name, measurement, curve, opening, i = match.groups()
+        own = rows[min(int(measurement or curve or (error.curve or [0])[0]), len(rows) - 1)]
+        first = "" if curve is None else f"[{curve}]"
+        return f"{name}{first}{opening}{own[int(i)] if int(i) < len(own) else i}"
+
+    return error._with_message(_SAMPLE.sub(index, str(error)))
+
+
 @contextmanager
 def missing_named(data: Iterable[Points]) -> Iterator[None]:
     """Add the remedy ``skipna=True`` to an error about points that are missing."""
@@ -187,7 +264,8 @@ def _each(points: Any, space: Space[Any]) -> tuple[tuple[Space[Any], ...], tuple
     return factors_of(space), parts_of(points, space, "points")
 
 
-def _missing_points(factor: Space[Any], array: NDArray[Any]) -> Mask:
+def missing_points(factor: Space[Any], array: NDArray[Any]) -> Mask:
+    """Return where a number of a point of a space that is not a product is NaN. Infinite numbers are not missing."""
     axes = tuple(range(max(0, array.ndim - len(factor.point_shape)), array.ndim))
     if array.dtype.kind not in "fc":
         return np.zeros(array.shape[: axes[0]] if axes else (), bool)

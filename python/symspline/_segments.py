@@ -14,9 +14,17 @@ from ._core import ValidationError
 from ._cubic import CubicSpline
 from ._curves.fit import read_given
 from ._durations import seconds_of
+from ._exceptions import SymsplineError
 from ._functional import fit_many
 from ._input import times_of
-from ._missing import data_without_missing, refuse_missing, refuse_nan_times, without_missing
+from ._missing import (
+    counts_all_samples,
+    data_without_missing,
+    recounted,
+    refuse_missing,
+    refuse_nan_times,
+    without_missing,
+)
 from ._report import FarPointsWarning
 from ._rounded_times import warn_of_rounded_times
 from ._smoothing import SmoothingReport, SmoothingSpline
@@ -90,6 +98,7 @@ def fit_segments(
 ) -> SegmentedCurve[P, CubicSpline[P]]: ...
 
 
+@counts_all_samples
 def fit_segments(
     t: TimesLike,
     points: PointsLike,
@@ -184,24 +193,28 @@ def fit_segments(
     space = space_named(space)
     check_smooth(smooth, duplicates, options)
     weight_options = {key: options.pop(key, None) for key in ("weights", "frames")} if smooth else {}
+    names = None
     if checked_flag(skipna, "skipna"):
         weights, frames = (weight_options.get(key) for key in ("weights", "frames"))
+        names = np.flatnonzero(without_missing(t, points, space)[2])
         t, points, weights, frames = data_without_missing(t, points, weights, frames, space)
         weight_options = {"weights": weights, "frames": frames} if smooth else {}
     used = _used(weight_options, points, space) if smooth else None
-    curves, rows, steps, gap = cut(t, points, space, max_gap, min_points, duplicates, used)
+    curves, rows, steps, gap = cut(t, points, space, max_gap, min_points, duplicates, used, names)
     if not curves:
         raise ValidationError(
             f"no segment has {min_points} points: {np.sum(steps > gap)} of {len(steps)} time steps are longer than "
             f"max_gap={max_gap}, and the median step is {np.median(steps) if len(steps) else 0:.3g}"
         )
-    if not smooth:
-        return SegmentedCurve(fit_many(curves, space, **options), extrapolate=_policy(options))
     own = [
         (*curve, {key: _of_rows(value, kept) for key, value in weight_options.items()})
         for curve, kept in zip(curves, rows, strict=True)
     ]
-    return SegmentedCurve(smooth_many(own, space, **options), extrapolate=_policy(options))
+    try:
+        fitted = smooth_many(own, space, **options) if smooth else fit_many(curves, space, **options)
+    except SymsplineError as error:
+        raise recounted(error, rows) from None
+    return SegmentedCurve(fitted, extrapolate=_policy(options))
 
 
 def _policy(options: dict[str, Any]) -> Any:
@@ -268,10 +281,11 @@ def cut(
     min_points: int,
     duplicates: str,
     used: NDArray[np.bool_] | None = None,
+    names: NDArray[np.intp] | None = None,
 ) -> Cut:
     """Cut a recording into the segments that `fit_segments` fits.
 
-    With `used`, only these points count, and their times may repeat.
+    With `used`, only these points count, and their times may repeat. `names` are the indices of the points in warnings.
     """
     space = space_named(space)
     least = whole_number(min_points, "min_points", 2)
@@ -309,7 +323,7 @@ def cut(
     # Without a limit, the recording is one curve, whose fit raises an error.
     if used is None and np.isfinite(gap):
         opposite = _opposite(space, arrays) & ~apart
-        _warn_of_opposite(opposite, rows, moments)
+        _warn_of_opposite(opposite, rows if names is None else names[rows], moments)
         apart |= opposite
     cuts = np.flatnonzero(apart) + 1
     segments = [

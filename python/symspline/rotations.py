@@ -37,7 +37,7 @@ from ._estimation.terms import Body
 from ._estimation.uncertainty import Jacobians, check_uncertain, standard_errors
 from ._hermite import HermiteSpline
 from ._input import times_of
-from ._missing import missing_times, refuse_nan_times
+from ._missing import missing_times, recounted, refuse_nan_times
 from ._smoothing.factors import smoothed_spaces
 from ._spaces import Array, Doubles, SpecialEuclidean, SpecialOrthogonal, Sphere, cover_of
 from ._spaces.point_groups import elements, proper_symbol
@@ -665,7 +665,10 @@ def _integrated_present(t: Any, omega: Any, start: Any, frame: Frame, interpolat
         if not len(rows):
             continue
         own = rows if times is None else times[i][rows] if times.ndim > 1 else times[rows]
-        found[i][rows] = integrate(own, rates[i][rows], None if starts is None else starts[i], **options)
+        try:
+            found[i][rows] = integrate(own, rates[i][rows], None if starts is None else starts[i], **options)
+        except ValidationError as error:
+            raise recounted(error, [rows]) from None
     return found
 
 

@@ -123,6 +123,41 @@ def test_weights_and_velocities_follow_their_points():
     assert curve == ss.HermiteSpline(T[rows], p[rows], v[rows], "sphere:2")
 
 
+def test_velocities_at_inner_points_count_all_samples():
+    p = recording("so:3")
+    v = ss.space("so:3").project_tangent(p[7], np.ones((3, 3)) / 9)
+    found = ss.CubicSpline(T, with_gaps(p), "so:3", velocities={7: v}, skipna=True)
+    assert found == ss.CubicSpline(T[KEPT], p[KEPT], "so:3", velocities={4: v})
+    raises(
+        "velocities has the key 4, but this point is missing",
+        ss.CubicSpline,
+        T,
+        with_gaps(p),
+        "so:3",
+        velocities={4: v},
+        skipna=True,
+    )
+    raises(r"velocities\[7\]", ss.CubicSpline, T, with_gaps(p), "so:3", velocities={7: 9 + v}, skipna=True)
+
+
+@pytest.mark.parametrize("function", FUNCTIONS)
+def test_errors_count_all_samples(function):
+    fit, bad = FUNCTIONS[function], with_gaps(recording("so:3"))
+    bad[9] *= 1.01
+    raises(r"point(s\[| )9\]? .*is off the space", fit, T, bad, "so:3", skipna=True)
+    times = T.copy()
+    times[7] = T[9]
+    if function != "estimate":
+        raises(
+            r"t(\[0\])?\[8\] = .* is before t(\[0\])?\[7\]",
+            fit,
+            times,
+            with_gaps(recording("so:3")),
+            "so:3",
+            skipna=True,
+        )
+
+
 def test_measurements_of_sensors():
     rng, s = np.random.default_rng(3), np.linspace(0, 6, 60)
     truth = Rotation.from_rotvec(np.outer(np.sin(s), [0, 0.3, 1]))

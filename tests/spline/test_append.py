@@ -77,9 +77,12 @@ def test_dates_and_files(rng, tmp_path):
 def test_invalid_points_raise(rng):
     spline = ss.CubicSpline(None, rng.standard_normal((5, 2)), "r:2")
     for call, message in [
-        (lambda: spline.append(4.0, [0, 0]), "must increase from the last knot on"),
-        (lambda: spline.append([5, 5], np.zeros((2, 2))), "must increase from the last knot on"),
-        (lambda: spline.append(np.nan, [0, 0]), "must increase|not finite"),
+        (
+            lambda: spline.append(4.0, [0, 0]),
+            "t is 4.0, but times must be finite and increase from the last knot 4.0 on",
+        ),
+        (lambda: spline.append([5, 5], np.zeros((2, 2))), r"t\[1\] is 5, but times must be finite and increase"),
+        (lambda: spline.append([5, np.inf], np.zeros((2, 2))), r"t\[1\] is inf, but times must be finite"),
         (lambda: spline.append([[5]], [0, 0]), "t has shape"),
         (lambda: spline.append(5, [0, 0, 0]), "points has shape"),
         (lambda: spline.append([5, 6], [[0, 0]]), "points has shape"),
@@ -100,3 +103,11 @@ def test_invalid_points_raise(rng):
     smooth = ss.make_smoothing_spline(np.arange(30.0), rng.standard_normal((30, 1)), "r:1", lam=1.0)
     with pytest.raises(ss.ValidationError, match="cannot be appended to a SmoothingSpline"):
         smooth.append(40, [0])
+
+
+def test_durations():
+    t, points = np.arange(9) * np.timedelta64(1500, "ms"), np.random.default_rng(1).standard_normal((9, 2))
+    found = (
+        ss.CubicSpline(t[:6], points[:6], "r:2").append(t[6], points[6], lag=None).append(t[7:], points[7:], lag=None)
+    )
+    assert found == ss.CubicSpline(t, points, "r:2")

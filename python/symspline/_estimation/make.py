@@ -56,7 +56,7 @@ from ..manifolds._manifold import refuse_functions
 from .audit import audit, unit_hints
 from .knots import filled, first_knots, merged, shown_times
 from .measurements import SKIPNA, BodyRates, Constant, Measurement, Points, Velocities
-from .missing import measurement_without_missing
+from .missing import counts_all_samples, measurement_without_missing
 from .search import Search, Starts, automatic, solved, warn_of_gaps, warn_of_turns
 from .solve import Setup, Solution, read_lams
 from .spline import EstimatedSpline, PointsSpline, joint
@@ -103,6 +103,7 @@ def estimate(
 ) -> SmoothingSpline[P]: ...
 
 
+@counts_all_samples
 def estimate(
     measurements: Sequence[Measurement],
     knots: TimesLike,
@@ -373,9 +374,12 @@ def _knots(knots: Any, given: list[Measurement]) -> tuple[TimeAxis, Array, Doubl
         array = as_array(times, f"measurements[{i}].t")
         if array.ndim != 1 or not len(array):
             raise ValidationError(f"measurements[{i}].t has shape {array.shape}, but shape (n,) is needed")
-        bad = np.flatnonzero(np.isnat(array) if array.dtype.kind in "Mm" else ~np.isfinite(array.astype(float)))
+        if array.dtype.kind not in "iufbMm":
+            raise ValidationError(f"measurements[{i}].t must be numbers or datetime64, not {array.dtype}")
+        bad = np.flatnonzero(~np.isfinite(array))
         if len(bad):
-            raise ValidationError(f"measurements[{i}].t[{bad[0]}] is {array[bad[0]]}, but times must be finite{SKIPNA}")
+            remedy = "" if np.isinf(array[bad[0]]) else SKIPNA
+            raise ValidationError(f"measurements[{i}].t[{bad[0]}] is {array[bad[0]]}, but times must be finite{remedy}")
         # For points alone, `make_smoothing_spline` issues this warning.
         if len(given) > 1 or not isinstance(own, Points) or not _is_plain(own):
             warn_of_rounded_times(np.sort(array), f"measurements[{i}].t")

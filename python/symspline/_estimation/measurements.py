@@ -448,7 +448,9 @@ def broadcast(value: ArrayLike, name: str, shape: tuple[int, ...], remedy: str =
     array = as_array(value, name)
     if array.dtype.kind not in "iufb":
         raise ValidationError(f"{name} must be real numbers, not {array.dtype}")
-    refuse(~np.isfinite(array), name, lambda i: f"is {array[i]}, but must be finite{remedy}")
+    refuse(
+        ~np.isfinite(array), name, lambda i: f"is {array[i]}, but must be finite{remedy if np.isnan(array[i]) else ''}"
+    )
     try:
         return np.array(np.broadcast_to(cast(array), shape))
     except ValueError:

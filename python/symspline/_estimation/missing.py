@@ -9,32 +9,42 @@ import numpy as np
 
 from .._arrays import as_array, filled
 from .._input import times_of
-from .._missing import Mask, missing_times, rows_of
+from .._missing import Mask, missing_times, recounting, rows_of
 from .measurements import Constant, Function, Measurement
 
 
 def measurement_without_missing(given: Measurement) -> Measurement:
     """Return a measurement without the samples in which a number or the time is NaN, NaT or masked."""
-    if isinstance(given, Function):
+    present = _present_in(given)
+    if present.all():
         return given
-    t = as_array(times_of(filled(given.t), "t")[0], "t")
-    if t.ndim != 1:
-        return given
-    present = ~missing_times(t)
-    values = {
+    found = copy(given)
+    for name, value in {"t": filled(given.t), **_values(given)}.items():
+        setattr(found, name, _rows(value, present))
+    return found
+
+
+def _values(given: Measurement) -> dict[str, Any]:
+    """Return the arrays of a measurement besides its times."""
+    return {
         name: filled(value)
         for name, value in vars(given).items()
         if name != "t" and not isinstance(value, (Constant, str)) and value is not None
     }
-    for name, value in values.items():
+
+
+def _present_in(given: Measurement) -> Mask:
+    t = as_array(times_of(filled(given.t), "t")[0], "t")
+    present = ~missing_times(t)
+    if isinstance(given, Function) or t.ndim != 1:
+        return np.ones_like(present)
+    for name, value in _values(given).items():
         if name not in ("sigma", "weights", "frames"):
             present = present & _present(value, len(t))
-    if present.all():
-        return given
-    found = copy(given)
-    for name, value in {"t": filled(given.t), **values}.items():
-        setattr(found, name, _rows(value, present))
-    return found
+    return present
+
+
+counts_all_samples = recounting(lambda given: [np.flatnonzero(_present_in(own)) for own in given["measurements"]])
 
 
 def _present(value: Any, count: int) -> Mask:

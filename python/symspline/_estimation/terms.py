@@ -533,7 +533,7 @@ def points_on(space: Space, y: Any, n: int, name: str) -> Array:
     refuse(
         ~space._where_finite(points),
         name,
-        lambda i: "is not finite. Remove this measurement, or pass skipna=True to omit such samples.",
+        lambda i: f"is not finite. Remove it{', or pass skipna=True' if np.isnan(points[i]).any() else ''}.",
     )
     try:
         space.check_point(array)
@@ -621,12 +621,11 @@ def _sigmas(measurement: Measurement, count: int, label: str) -> Sequence[Any]:
 
 def _points(given: Points, label: str, times: Doubles, space: Space[Any], parts: list[int]) -> list[Term]:
     n = len(times)
-    data = read(given.y, space) if n > 1 else None
     precisions = None
     if given.weights is not None:
-        if data is None:
+        if n < 2:
             raise ValidationError(f"{label}.weights needs at least two points. Pass sigma instead.")
-        precisions = read_precision(given.weights, given.frames, space, data)
+        precisions = read_precision(given.weights, given.frames, space, read(given.y, space))
     terms: list[Term] = []
     each = zip(parts, _in_parts(given.y, space, f"{label}.y"), _sigmas(given, len(parts), label), strict=True)
     spaces = [part for factor in factors_of(space) for part in parts_of_factor(factor)]

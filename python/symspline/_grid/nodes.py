@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from .._arrays import refuse
+from .._arrays import filled, refuse
 from .._core import CutLocusError, ValidationError
 from .._curves.ends import NATURAL
 from .._curves.fit import Points, validated
@@ -21,12 +21,12 @@ from .axes import GridAxis
 def read_nodes(points: Any, space: Space[Any], dims: int) -> tuple[list[Array], list[float], tuple[int, ...]]:
     """Read points in each factor, their tolerances, and the numbers of nodes of the grid.
 
-    In quotients, representatives are chosen that are continuous over the grid.
+    Masked numbers become NaN. In quotients, representatives are chosen that are continuous over the grid.
     """
     parts = parts_of(points, space, "points")
     arrays, tols = [], []
     for factor, part in zip(factors_of(space), parts, strict=True):
-        array = factor._array(part, "points")
+        array = factor._array(filled(part), "points")
         arrays.append(np.array(factor._numbers(factor._doubles(array, "points"))))
         tols.append(factor._tol(array))
     shapes = [a.shape[: a.ndim - len(f.point_shape)] for f, a in zip(factors_of(space), arrays, strict=True)]

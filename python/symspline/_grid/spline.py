@@ -42,8 +42,8 @@ class GridSpline(Generic[P]):
     axes : sequence of array_like
         Knots of each axis, strictly increasing numbers or dates. None means 0, 1, ..., n - 1.
     points : array_like, shape (n_1, ..., n_D, *point_shape)
-        Points at the nodes. For a `Product`, a tuple with one array per factor. Nodes with NaN are missing: they divide
-        a row into runs with a spline each, and values whose row has no run there are NaN.
+        Points at the nodes. For a `Product`, a tuple with one array per factor. Nodes that are NaN or masked are
+        missing: they divide a row into runs with a spline each, and values whose row has no run there are NaN.
     space : Space or str
         A space or its name, such as ``SpecialOrthogonal(3)`` or ``"so:3"``.
     bc_type : str or sequence, default "not-a-knot"

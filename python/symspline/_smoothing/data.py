@@ -183,9 +183,10 @@ def _times_of(t: TimesLike | None, batch: tuple[int, ...], count: int) -> tuple[
     back = np.argwhere(np.diff(times) < 0)
     if len(back):
         *curve, i = back[0].tolist()
+        later, earlier = shown_times[(*curve, i + 1)], shown_times[(*curve, i)]
         raise ValidationError(
-            f"t{[*curve, i + 1]} is before t{[*curve, i]}. Sort times and points together, for instance with "
-            "order = np.argsort(t)."
+            f"t{[*curve, i + 1]} = {later} is before t{[*curve, i]} = {earlier}. Sort times and points together, for "
+            "instance with order = np.argsort(t)."
         )
     if np.any(times[..., -1] / 2 - times[..., 0] / 2 > _LONGEST):
         raise ValidationError(f"t spans more than {_LONGEST:.0e}, too much for smoothing. Choose another unit of time.")

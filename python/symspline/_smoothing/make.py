@@ -15,7 +15,7 @@ from .._curves.fit import Points, Problem, fit, mask_of
 from .._curves.solve import DEFAULTS, in_batch
 from .._errors import raise_or_warn
 from .._held import warn_of_held_points
-from .._missing import data_without_missing, missing_named
+from .._missing import counts_all_samples, data_without_missing, missing_named
 from .._options import check_on_failure, check_progress, checked_extrapolate
 from .._representatives import warn_of_far_data, warn_of_far_points, warn_of_signs
 from .._spaces import Product, Space, SpecialEuclidean, factors_of, space_named
@@ -89,6 +89,7 @@ def make_smoothing_spline(
 ) -> SmoothingSpline[P]: ...
 
 
+@counts_all_samples
 def make_smoothing_spline(
     t: TimesLike | None,
     points: PointsLike,

@@ -59,8 +59,8 @@ def make_smoothing_grid(
         Coordinates of the nodes along each axis, strictly increasing numbers or dates. None means 0, 1, ...,
         n - 1.
     points : array_like, shape (n_1, ..., n_D, *space.point_shape)
-        Noisy points at the nodes. For a `Product`, a tuple with one array per factor. Nodes with NaN are missing. They
-        are filled between the data of a row, and remain NaN outside; see Notes.
+        Noisy points at the nodes. For a `Product`, a tuple with one array per factor. Nodes that are NaN or masked are
+        missing. They are filled between the data of a row, and remain NaN outside; see Notes.
     space : Space or str
         A space or its name. Points of `SpecialEuclidean` are smoothed as rotations and positions.
     lam : float or sequence, optional

@@ -128,7 +128,10 @@ class Posterior(NamedTuple):
         """Return moves of one curve at its knots, shape (n, knots, size or dim), for noise of variance one."""
         known = self.known(index, kinds)
         rows = n * space.dim if self.size == 1 else n
-        normal = rng.standard_normal((rows, _core.posterior_freedom(knots, known)))
+        normal = np.empty((rows, _core.posterior_freedom(knots, known)))
+        # The same numbers as in one call. Python handles signals between the rows.
+        for row in normal:
+            rng.standard_normal(out=row)
         found = _core.posterior_samples(knots, known, normal)
         if self.size == 1:
             return np.moveaxis(found.reshape(n, space.dim, len(knots)), 1, 2)

@@ -19,7 +19,7 @@ from .factors import coordinates_in_parts, parts_of_factor, split
 # Relative size of the entries of a matrix or vector that count as rounding errors.
 _ROUNDING = 1e-8
 # Operations on matrices in one call of NumPy, which cannot be interrupted: some tenths of a second.
-_BLOCK = 1 << 28
+_BLOCK = 1 << 26
 # Relative size of the eigenvalues of a matrix that the core treats as zero.
 SINGULAR = 1e-10
 

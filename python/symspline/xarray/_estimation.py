@@ -13,7 +13,7 @@ from .._core import ValidationError
 from .._estimation import estimate as estimate_curve
 from .._estimation.make import EstimateOptions
 from .._estimation.measurements import Measurement
-from .._missing import missing_times
+from .._missing import missing_points, missing_times
 from .._smoothing.factors import is_several
 from .._spaces import Array, Euclidean, Space, space_named
 from .._typing import Numbers, TimesLike
@@ -144,9 +144,9 @@ def estimate(
     rows = points.transpose(*own)
     times_of_points = _times(points, dim, "points", time, point_dims)
     y, at = np.asarray(rows.values), np.asarray(times_of_points.values)
-    finite = space._where_finite(space._numbers(space._doubles(y, "points"))) & ~missing_times(at)
-    sigmas = sigma if isinstance(sigma, tuple) or np.ndim(sigma) == 0 else np.asarray(sigma)[finite]
-    given: list[Measurement] = [measure.Points(at[finite], y[finite], sigma=sigmas)]
+    present = ~missing_points(space, y) & ~missing_times(at)
+    sigmas = sigma if isinstance(sigma, tuple) or np.ndim(sigma) == 0 else np.asarray(sigma)[present]
+    given: list[Measurement] = [measure.Points(at[present], y[present], sigma=sigmas)]
     components: xr.DataArray | None = None
     if rates is not None:
         along = dim if rate_dim is None else rate_dim
@@ -203,7 +203,7 @@ def _body_rates(rates: xr.DataArray, along: str, sigma: Any, bias: bool) -> meas
     if sigma is None:
         raise ValidationError("rates need the standard deviation of a component. Pass rate_sigma.")
     omega = np.asarray(rates.transpose(along, *rest).values)
-    good = np.isfinite(omega).all(axis=1) & ~missing_times(times)
+    good = ~np.isnan(omega).any(axis=1) & ~missing_times(times)
     constant = measure.Constant(3) if bias else None
     return measure.BodyRates(times[good], omega[good], sigma=sigma, bias=constant)
 
@@ -226,8 +226,7 @@ def _velocities(
             "symspline.measure.Velocities in `measurements`."
         )
     feet = np.zeros_like(v) if flat else y
-    numbers = tuple(range(1, v.ndim))
-    good = ~missing_times(times) & np.isfinite(v).all(axis=numbers) & np.isfinite(feet).all(axis=numbers)
+    good = ~(missing_times(times) | missing_points(space, v) | missing_points(space, feet))
     return measure.Velocities(times[good], feet[good], v[good], sigma=sigma)
 
 

@@ -12,7 +12,7 @@ from .._adapters import joined
 from .._core import ValidationError
 from .._cubic import CubicSpline
 from .._functional import fit_many
-from .._missing import Mask, missing_times
+from .._missing import Mask, missing_points, missing_times
 from .._report import ConvergenceWarning
 from .._spaces import Array, Space
 from .._warnings import warn
@@ -61,7 +61,7 @@ def fit_valid(
     batch, nodes = points.shape[:lead], points.shape[lead]
     rows = points.reshape(-1, nodes, *space.point_shape)
     times = times_of_rows(t, batch, nodes)
-    valid = space._where_finite(rows) & ~missing_times(times)
+    valid = ~missing_points(space, rows) & ~missing_times(times)
     mask = np.broadcast_to(named.get("where", np.True_), batch).reshape(-1)
     enough = valid.sum(axis=1) > 1
     _report_short(np.flatnonzero(mask & ~enough), valid, batch, how["on_failure"])

@@ -13,7 +13,7 @@ import xarray as xr
 
 from .._arrays import checked_number
 from .._exceptions import SymsplineError
-from .._missing import missing_times
+from .._missing import missing_points, missing_times
 from .._options import checked_extrapolate, extrapolation_mode
 from .._smoothing import SmoothingWarning, make_smoothing_spline
 from .._smoothing.factors import is_several
@@ -244,8 +244,8 @@ def _smooth_rows(rows: Array, t: Any, at: Array, per_curve: bool, mask: Array | 
     """Smooth curves whose times are all known: values, spreads, columns of the report, and convergence."""
     space = wanted.space
     whole = rows.shape[: rows.ndim - 1 - len(space.point_shape)]
-    finite = space._where_finite(rows)
-    weights = None if finite.all() else finite.astype(np.float64)
+    missing = missing_points(space, rows)
+    weights = (~missing).astype(np.float64) if missing.any() else None
     # The variable at_bound describes the curves about which a warning would be.
     with silenced(SmoothingWarning):
         curve: Any = make_smoothing_spline(t, rows, space, weights=weights, where=mask, **wanted.how)
