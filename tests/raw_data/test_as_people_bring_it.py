@@ -96,32 +96,6 @@ def test_offsets_and_orders_do_not_change_the_curve(kind):
     np.testing.assert_allclose(spline(spline.t, nu=1), plain(T, nu=1), atol=1e-5)
 
 
-def dirty(how):
-    t, points = T.copy(), P.copy()
-    if how == "repeated":
-        t[7] = t[6]
-    elif how == "unsorted":
-        t[[7, 8]] = t[[8, 7]]
-    elif how == "missing points":
-        points[5] = np.nan
-    elif how == "missing times":
-        t[5] = np.nan
-    elif how == "not normalised":
-        points[5] *= 2
-    return t, points
-
-
-@entries
-@loop_over("how", ["repeated", "unsorted", "missing points", "missing times", "not normalised"])
-def test_faults_raise_with_the_place(entry, how, capsys):
-    t, points = dirty(how)
-    with pytest.raises(ss.ValidationError) as caught:
-        entry(t, points)
-    message = str(caught.value) + capsys.readouterr().err
-    assert any(str(place) in message for place in (5, 6, 7, 8)), message
-    assert len(message) < 600
-
-
 def test_a_table_of_pandas_in_any_order():
     pd = pytest.importorskip("pandas")
     lon, lat = ss.geo.to_lonlat(P)
