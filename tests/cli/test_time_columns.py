@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from tabular import table, write_table
+from tabular import table, write, write_table
 
 import symspline as ss
 
@@ -100,3 +100,20 @@ def test_days_as_one_number_are_refused(fails, times):
     problem = fails("fit a.csv --space r:1 --time date -o a.npz")
     assert "line 2: column 'date' holds 20210829, which is a day but not a number of days; write 2021-08-29" in problem
     assert times("--time date", date=[20210829, 20210899, 20210901]) == [20210829, 20210899, 20210901]
+
+
+def test_stamps_of_ros_2(fails, run):
+    names = ["header.stamp.sec", "header.stamp.nanosec", "x"]
+    rows = "".join(f"170000000{i // 4},{i % 4 * 250_000_000},{i * i}\n" for i in range(9))
+    write("a.csv", ",".join(names) + "\n" + rows)
+    # One second alone would repeat.
+    assert "say --time header.stamp.sec,header.stamp.nanosec" in fails("fit a.csv --space r:1 -o a.npz")
+    run("fit a.csv --space r:1 --time header.stamp.sec,header.stamp.nanosec -o a.npz")
+    assert ss.load("a.npz").t[1] - ss.load("a.npz").t[0] == np.timedelta64(250, "ms")
+
+
+@pytest.mark.filterwarnings("always::UserWarning")
+def test_rounded_times_name_the_option(run):
+    t = 1.4e9 + np.arange(30) * 1e-3
+    write("a.csv", "t,x\n" + "".join(f"{own!r},{i * i}\n" for i, own in enumerate(t.tolist())))
+    assert "give the unit, such as --unix s" in run("fit a.csv --space r:1 -o a.npz", notes=True)

@@ -67,6 +67,9 @@ def time_column(table: Table, given: str | None, others: Sequence[str | None], u
     # Numbers are accepted as times only under the two plainest names, as the unit of others is in doubt.
     certain = [name for name in usual if unix or name not in table.numeric or name.lower() in ("t", "time")]
     doubtful = [name for name in left if name not in certain and (name in usual or _TIME_PART.fullmatch(name.lower()))]
+    # Stamps of ROS 2: header.stamp.sec and header.stamp.nanosec.
+    beside = [re.sub("sec$", part, name) for name in usual for part in ("nanosec", "nsec") if name.endswith(".sec")]
+    doubtful += [name for name in left if name in beside and name not in doubtful]
     if len(certain) == 1:
         # A column of dates with their time of day needs no other columns.
         is_whole = certain[0] not in table.numeric and "time" in certain[0].lower()

@@ -81,7 +81,7 @@ from ._columns import (
 )
 from ._curves import Curves, write_curves
 from ._formats import CURVES, TABLES, endings, format_of, open_table
-from ._messages import VERBOSE, Problem, Progress, listed, refuse, say, tell
+from ._messages import VERBOSE, Problem, Progress, for_command_line, listed, refuse, say, tell
 from ._outliers import outliers
 from ._points import GLOBE, Columns, require_globe
 from ._recordings import Recordings
@@ -271,7 +271,7 @@ def _fitted(data: Recordings, options: argparse.Namespace, smooth: dict[str, Any
         far = outliers(data, None, options.lonlat)
         raise error._with_message("; ".join(filter(None, (data.located(error), far)))) from None
     for note in noted:
-        say(data.located(note.message).replace(IN_PYTHON, _FOR_ROTATIONS))
+        say(for_command_line(data.located(note.message).replace(IN_PYTHON, _FOR_ROTATIONS)))
     return fitted
 
 

@@ -61,7 +61,7 @@ def refuse(where: object, *checks: tuple[object, str]) -> None:
             raise Problem(f"{where}{message}")
 
 
-def for_command_line(error: Exception) -> str:
+def for_command_line(error: object) -> str:
     """Return a message of the library with advice for the command line, and with so:3 for SpecialOrthogonal(3)."""
     message = str(error)
     for advice, own in _FOR_PYTHON.items():

@@ -19,6 +19,7 @@ _TIME, _LON, _LAT, _HEIGHT, _TRACK = "time", "lon", "lat", "ele", "track"
 # Properties of lines that hold the times of their points.
 _LINE_TIMES = ("coordTimes", "times")
 
+_KINDS = "GeoJSON must be a collection of features that are points or lines"
 
 # ---- reading ----
 
@@ -38,9 +39,9 @@ def read_geojson(path: Source) -> Table:
     try:
         features = content["features"] if content["type"] == "FeatureCollection" else [content]
         for number, feature in enumerate(features):
-            rows += _feature(feature, str(number))
+            rows += _feature(feature, str(number), path)
     except (KeyError, TypeError, ValueError, AttributeError):
-        raise Problem(f"{path}: GeoJSON must be a collection of features that are points or lines") from None
+        raise Problem(f"{path}: {_KINDS}") from None
     return _table(path, rows)
 
 
@@ -93,13 +94,14 @@ def _column(values: list[Any]) -> Any:
     return Texts(["" if value is None else str(value) for value in values])
 
 
-def _feature(feature: Any, number: str) -> list[dict[str, Any]]:
+def _feature(feature: Any, number: str, path: Source) -> list[dict[str, Any]]:
     properties = dict(feature.get("properties") or {})
     coordinates = feature["geometry"]["coordinates"]
     if feature["geometry"]["type"] == "Point":
         return [_place(coordinates) | properties]
-    if feature["geometry"]["type"] != "LineString":
-        raise ValueError
+    kind = feature["geometry"]["type"]
+    remedy = "; make one LineString of its parts" if kind == "MultiLineString" else ""
+    refuse(path, (kind != "LineString", f": {_KINDS}, not {kind}{remedy}"))
     times = next((properties.pop(name) for name in _LINE_TIMES if name in properties), None)
     label = {_TRACK: str(properties.get("name", number))}
     rows = [_place(own) | label for own in coordinates]
