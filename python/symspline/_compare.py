@@ -108,22 +108,22 @@ def plot(
     return drawn
 
 
-def checked_items(curves: Any) -> list[Any]:
+def checked_items(curves: Any, name: str = "curves") -> list[Any]:
     if isinstance(curves, Curve):
         curves = [curves]
     if not isinstance(curves, Iterable) or isinstance(curves, (str, bytes, dict)):
-        raise TypeError(f"curves must be a sequence of curves, not {short_repr(curves)}")
+        raise TypeError(f"{name} must be a sequence of curves, not {short_repr(curves)}")
     items = list(curves)
     for i, own in enumerate(items):
         is_data = isinstance(own, tuple) and len(own) == 2
         if not (isinstance(own, Curve) or is_data):
-            raise TypeError(f"curves[{i}] must be a curve or a pair (t, points), not {short_repr(own)}")
+            raise TypeError(f"{name}[{i}] must be a curve or a pair (t, points), not {short_repr(own)}")
         if isinstance(own, Curve) and own._batch:
-            raise ValidationError(f"curves[{i}] is a batch of {len(own)} curves. Pass its curves: [*batch].")
+            raise ValidationError(f"{name}[{i}] is a batch of {len(own)} curves. Pass its curves: [*batch].")
     first = next((own for own in items if isinstance(own, Curve)), None)
     if first is None:
-        raise ValidationError("curves must contain at least one curve, which determines the space")
+        raise ValidationError(f"{name} must contain at least one curve, which determines the space")
     for i, own in enumerate(items):
         if isinstance(own, Curve) and own.space != first.space:
-            raise ValidationError(f"curves[{i}] is on {own.space!r}, but the first curve is on {first.space!r}")
+            raise ValidationError(f"{name}[{i}] is on {own.space!r}, but the first curve is on {first.space!r}")
     return items

@@ -6,7 +6,7 @@ import functools
 import inspect
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
@@ -183,10 +183,14 @@ def recounting(
             try:
                 return function(*args, **kwargs)
             except SymsplineError as error:
-                if not kwargs.get("skipna"):
+                skipna = kwargs.get("skipna")
+                if not isinstance(skipna, (bool, np.bool_)) or not skipna:
                     raise
-                given = inspect.signature(function).bind(*args, **kwargs).arguments
-                raise recounted(error, rows_present(given)) from None
+                # The error may be about the arguments from which the rows would follow.
+                with suppress(Exception):
+                    given = inspect.signature(function).bind(*args, **kwargs).arguments
+                    error = recounted(error, rows_present(given))
+                raise error from None
 
         return counting
 

@@ -460,6 +460,9 @@ def _timed(t: ArrayLike, poses: Any) -> tuple[Array, Array]:
     """Return the times and the poses to write, without rows of NaN."""
     if isinstance(poses, tuple) and len(poses) == 2:
         rotations, positions = _SO3._array(poses[0], "poses"), as_array(poses[1], "poses")
+        if rotations.ndim != 3 or positions.ndim != 2 or len(rotations) != len(positions):
+            joined = checked_poses(poses)
+            return moments(t, len(joined)), joined
         missing = _missing(rotations, 2) & _missing(positions, 1)
         times = moments(t, len(missing))
         return times[~missing], checked_poses((rotations[~missing], positions[~missing]))

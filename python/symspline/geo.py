@@ -566,7 +566,7 @@ def plot(
     size = checked_number(radius, "radius must be a number above 0", lambda r: 0 < r < np.inf)
     if isinstance(spline, (list, tuple, dict)):
         names = list(map(str, spline)) if isinstance(spline, dict) and label is None else label
-        tracks = checked_items(list(spline.values()) if isinstance(spline, dict) else spline)
+        tracks = checked_items(list(spline.values()) if isinstance(spline, dict) else spline, "spline")
         for track in tracks:
             if not isinstance(track, tuple):
                 _check_globe(track)

@@ -10,9 +10,9 @@ import numpy as np
 import symspline as ss
 
 MODULES = [
-    "symspline", "symspline.convert", "symspline.geo", "symspline.manifolds", "symspline.poses", "symspline.quantum",
-    "symspline.rotations", "symspline.shapes", "symspline.subspaces", "symspline.tensors", "symspline.testing",
-    "symspline.xarray",
+    "symspline", "symspline.convert", "symspline.geo", "symspline.manifolds", "symspline.measure", "symspline.poses",
+    "symspline.quantum", "symspline.rotations", "symspline.shapes", "symspline.subspaces", "symspline.tensors",
+    "symspline.testing", "symspline.xarray",
 ]  # fmt: skip
 NEEDS = {"symspline.xarray": "xarray"}
 # They change how the process runs, or take functions that the user vouches for.
@@ -36,6 +36,13 @@ NAMES = ("sphere:2", "r:2", "so:3", "cp:1", "se:3", "spd:3", "gr:1,3", "h:2", "r
 SPACES = [ss.space(name) for name in NAMES]
 
 
+MEASURED = [
+    [ss.measure.Points(T, TURNS, sigma=0.1), ss.measure.BodyRates(T, P, sigma=0.1, bias=ss.measure.Constant(3))],
+    [ss.measure.Points(T, P, sigma=0.1)],
+    [ss.measure.Points(DAYS, TURNS, sigma=0.1)],
+]
+
+
 def objects():
     """Objects whose methods are called, by a name for messages."""
     sphere = ss.CubicSpline(T, P, "sphere:2")
@@ -51,6 +58,7 @@ def objects():
         "CubicSpline, product": ss.CubicSpline(None, (P, T[:, None]), "sphere:2 x r:1"),
         "HermiteSpline": ss.HermiteSpline(T, P, np.zeros((3, 3)), "sphere:2"),
         "SmoothingSpline": ss.make_smoothing_spline(T, P, "sphere:2", 0.1),
+        "SmoothingSpline, estimated": ss.estimate(MEASURED[0], 4, "so:3", lam=0.1),
         "BSpline": ss.BSpline([0, 0, 0, 1, 1, 1], P, 2, "sphere:2"),
         "CumulativeBSpline": ss.CumulativeBSpline([0, 0, 0, 1, 1, 1], TURNS, "so:3", degree=2),
         "BezierCurve": ss.BezierCurve(P, "sphere:2"),
@@ -173,7 +181,13 @@ def pools(things):
         "rates": [P],
         "scalar_first": [True, False],
         "quaternions": [[1.0, 0, 0, 0]],
-        "knots": [[0, 0, 0, 1, 1, 1]],
+        "knots": [[0, 0, 0, 1, 1, 1], 4],
+        "measurements": MEASURED,
+        "omega": [P],
+        "y": [P, TURNS],
+        "sigma": [0.1, None],
+        "level": [0.9],
+        "skipna": [True, False],
         "control_points": [P],
         "degree": [2],
         "landmarks": [[SQUARE, 2 * SQUARE]],

@@ -240,3 +240,10 @@ def test_files():
     assert t.tolist() == [1, 2, 4] and np.abs(again - poses).max() < 1e-15
     for read, given in ((ss.poses.read_tum, tum), (ss.poses.read_kitti, text), (ss.poses.read_euroc, euroc)):
         raises("line 1: column .* holds nan.*skipna=True", read, io.StringIO(given))
+
+
+def test_invalid_arguments_with_skipna_raise_as_without():
+    # The rows that are present follow from these arguments.
+    raises("measurements\\[0\\] must be one of symspline.measure", ss.estimate, [1], 4, "r:1", skipna=True)
+    raises("vectors must be an array of numbers", ss.rotations.from_rotation_vectors, "x", skipna=True)
+    raises("skipna must be True or False", ss.PiecewiseGeodesic, None, np.eye(3), "r:3", skipna=np.zeros(0))

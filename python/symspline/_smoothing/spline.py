@@ -11,7 +11,7 @@ import numpy as np
 
 from .. import _core
 from .._archive import Entries, read_fitted, read_times
-from .._arrays import checked_number, short_repr, whole_number
+from .._arrays import checked_flag, checked_number, short_repr, whole_number
 from .._core import ValidationError
 from .._cubic import CubicSpline
 from .._curves.curve import CurveArrays, SidePanel, UncertaintyBand
@@ -343,7 +343,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         >>> bool(0.02 < s.std(0.5) < s.std(0.0) < 0.1)
         True
         """
-        nu = order_of(nu, 1)
+        nu, calibrated = order_of(nu, 1), checked_flag(calibrated, "calibrated")
         times, own, per_curve = self._finite_times(x)
         batch = self._batch
         found = []
@@ -530,6 +530,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         orders = [0, 1] if joint else [order_of(nu, 1)]
         if y is not None and orders != [0]:
             raise ValidationError("nu must be 0 for the covariance of two times")
+        calibrated = checked_flag(calibrated, "calibrated")
         x, shape, per_curve = self._finite_times(x)
         other = None
         if y is not None:

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import as_array, checked_atol, checked_flag, filled, refuse
+from .._arrays import as_array, checked_atol, checked_flag, filled, refuse, short_repr
 from .._core import ValidationError, convert_rotations
 from .._spaces import point_tol
 from .._validation import REMOVE, Array, check_finite, off_one, unchecked_numbers, unit_vectors, unmoved_by_underflow
@@ -128,9 +128,11 @@ def converted(
 def _with_missing(value: ArrayLike, name: str, form: Form, wanted: Form, atol: float | None) -> Array:
     x = as_array(value, name)
     axes = len(_SHAPES[form])
+    if x.ndim < axes:
+        return converted(x, name, form, wanted, atol)
     is_missing = np.isnan(x) if x.dtype.kind == "f" else np.zeros(x.shape, bool)
     missing = np.asarray(is_missing.any(axis=tuple(range(x.ndim - axes, x.ndim))))
-    if x.ndim < axes or not missing.any():
+    if not missing.any():
         return converted(x, name, form, wanted, atol)
     found = np.full((*missing.shape, *_SHAPES[wanted]), np.nan)
     # Messages have the indices of all rotations, so that the missing ones are replaced and not removed.
@@ -166,5 +168,5 @@ def checked_order(scalar_first: bool | None) -> bool:
         return scalar_first
     raise ValidationError(
         "scalar_first is required, because the four numbers do not show their order: pass scalar_first=True for "
-        f"(w, x, y, z) or scalar_first=False for (x, y, z, w) as in SciPy and ROS; got {scalar_first!r}"
+        f"(w, x, y, z) or scalar_first=False for (x, y, z, w) as in SciPy and ROS; got {short_repr(scalar_first)}"
     )
