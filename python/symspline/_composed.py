@@ -247,6 +247,9 @@ class SegmentedCurve(ComposedCurve[P], Generic[P, C]):
         self._segments: tuple[C, ...] = parts[0]
         self._compose(*parts[1:])
 
+    def _in_segments(self) -> Sequence[Curve[P]]:
+        return self._segments
+
     def _of_segments(self, segments: Any) -> Self:
         """Return other segments with the same extrapolation policy."""
         policy: Any = self._extrapolate

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from datetime import timedelta
 from typing import Any, Generic
@@ -200,7 +200,10 @@ class Curve(CurvePlots[P]):
             raise TypeError(f"other must be a curve, not {short_repr(other)}")
         _check_meeting(self, other)
         merged = self._merged(other)
-        found: Curve[P] = merged if merged is not None else _archive.FORMATS["symspline-segments"]([self, other])
+        if merged is not None:
+            return merged
+        # Without nesting, the depth of curves that are joined in a loop does not grow.
+        found: Curve[P] = _archive.FORMATS["symspline-segments"]([*self._in_segments(), *other._in_segments()])
         return found
 
     def reverse(self) -> Curve[P]:
@@ -371,6 +374,10 @@ class Curve(CurvePlots[P]):
         if not (start < stop).all():
             raise ValidationError("b must be after a. Exchange a and b, or omit one of them.")
         return start, stop
+
+    def _in_segments(self) -> Sequence[Curve[P]]:
+        """Return the segments of which the curve consists."""
+        return [self]
 
     def _merged(self, other: Curve[P]) -> Curve[P] | None:
         """Return this curve and another one as one curve of cubic segments, or None if this is not possible."""

@@ -82,3 +82,16 @@ def test_sections_are_evaluated_once():
     ):
         curve(np.random.default_rng(0).uniform(*curve.domain, 1000))
     assert len(calls) == len(set(calls)) == 30
+
+
+def test_curves_that_are_joined_in_a_loop():
+    # The velocity jumps between the parts, so that they are not merged. Nested parts would exceed the recursion limit.
+    part = ss.CubicSpline([0.0, 1, 2], [[0.0], [1], [0]], "r:1")
+    whole, count = part, 300
+    for i in range(1, count):
+        whole = whole.concatenate(part.shift(2.0 * i))
+    assert len(whole) == count
+    x = np.linspace(0, 2 * count, 1001)[:-1]
+    np.testing.assert_allclose(whole(x), part(x % 2), atol=1e-12)
+    assert whole == ss.SegmentedCurve([part, *(part.shift(2.0 * i) for i in range(1, count))])
+    assert part.concatenate(part.shift(2.0).concatenate(part.shift(4.0))) == whole[:3]
