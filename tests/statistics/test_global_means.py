@@ -122,6 +122,19 @@ def test_two_minima_of_nearly_the_same_height_warn_once(name):
         space.median(near)
 
 
+def test_the_warning_names_the_second_of_three_minima():
+    """Rotations about one axis at three angles: the sum of the third minimum is 6 % larger than the lowest."""
+    counts, angles = np.array([51, 50, 45]), np.radians([0, 120, 240])
+    grid = np.linspace(0, 2 * np.pi, 100_001)
+    sums = np.sum(counts * ((grid[:, None] - angles + np.pi) % (2 * np.pi) - np.pi) ** 2, axis=1)
+    low = np.flatnonzero((sums[1:-1] < sums[:-2]) & (sums[1:-1] <= sums[2:])) + 1
+    first, second, third = np.sort(sums[low])
+    assert third > 1.05 * first
+    turns = ss.rotations.from_rotation_vectors(np.repeat(angles, counts)[:, None] * [0, 0, 1])
+    with pytest.warns(ss.AmbiguousMeanWarning, match=f"Its sum is only {100 * (second / first - 1):.2g} % larger"):
+        ss.SpecialOrthogonal(3).mean(turns)
+
+
 def test_an_exactly_opposite_pair_does_not_prevent_a_mean():
     points = np.concatenate([on_the_sphere(np.random.default_rng(6), 20, 0.2), [[0, 0, 1.0], [0, 0, -1.0]]])
     found = ss.Sphere(2).mean(points)
