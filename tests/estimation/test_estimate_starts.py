@@ -287,3 +287,29 @@ def test_knots_at_all_times():
             assert "pass fewer knots" in str(error).lower()
         else:
             assert np.isfinite(curve(t)).all()
+
+
+@pytest.mark.parametrize(("penalty", "degrees"), [("jerk", 500), ("acceleration", 60)])
+def test_the_energy_does_not_determine_the_attitude(penalty, degrees):
+    """With precise rates, the covariance is that of an initial attitude and a bias, and few iterations are needed."""
+    truth, t, _, s, omega, bias = spinning(11, degrees, end=20.0, noise=0.003)
+    sigma = 0.2
+    seen = truth(t) @ TURN(sigma * np.random.default_rng(11).standard_normal((len(t), 3)))
+    curve = ss.estimate(given(t, seen, s, omega, sigma=sigma, noise=0.003), 801, "so:3", penalty=penalty)
+    assert curve.report.iterations <= 9
+
+    def attitudes(x):
+        found = ss.CubicSpline(s, ss.rotations.integrate(s, omega - x[3:]), SO3, bc_type="not-a-knot")
+        return TURN(x[:3]) @ found(np.minimum(t, s[-1]))
+
+    at, step = np.concatenate([np.zeros(3), bias]), 1e-4
+    columns = []
+    for change in step * np.eye(6):
+        sides = [attitudes(at + sign * change) for sign in (1, -1)]
+        columns.append(ss.rotations.as_rotation_vectors(np.swapaxes(sides[1], -1, -2) @ sides[0]).ravel() / (2 * step))
+    jacobian = np.stack(columns, axis=-1)
+    covariance = sigma**2 * np.linalg.inv(jacobian.T @ jacobian)
+    # The variance along the axis of the spin; the energy contains information about the others.
+    expected = np.sqrt(np.linalg.eigvalsh(covariance[3:, 3:])[0])
+    found = np.sqrt(np.linalg.eigvalsh(curve.parameters["gyro bias"].cov)[0])
+    assert found == pytest.approx(expected, rel=0.02)

@@ -46,6 +46,9 @@ pub struct Factor<'a> {
     pub speeds: &'a [f64],
     /// The accelerations, likewise.
     pub accelerations: &'a [f64],
+    /// On a group whose moving frame the measurements refer to, the matrices of ξ ↦ [e, ξ]/2 for the vectors e of the
+    /// frames; otherwise empty.
+    pub halves: &'a [f64],
 }
 
 impl Factor<'_> {
@@ -140,6 +143,17 @@ impl<'a> Estimation<'a> {
                     return linearized.stiffness(own.accelerations, &flat, own.dim());
                 };
                 jacobi.pull(&linearized, own.accelerations)
+            })
+            .collect();
+        // The gradient of the energy does not depend on the frame.
+        let jacobi: Vec<Option<JacobiOperator>> = factors
+            .iter()
+            .zip(jacobi)
+            .map(|(own, jacobi)| match jacobi {
+                Some(jacobi) if !own.halves.is_empty() => {
+                    Some(jacobi.in_moving_frame(&linearized, own.accelerations, own.halves))
+                }
+                other => other,
             })
             .collect();
         let mut penalty = vec![0.0; linearized.basis.count() * m * stride(m)];

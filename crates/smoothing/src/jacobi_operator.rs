@@ -5,6 +5,12 @@
 //!
 //! The jerk changes by the derivative of that and by `Qξ = R(ξ, u)a = [a, [ξ, u]]`, half of which belongs to either end
 //! of a segment of length h. With the jerk as a difference of accelerations, it is as if R were `R ∓ hQ/2` there.
+//!
+//! These are changes with respect to frames that are parallel along the move. On a group, a body that is turned by ξ
+//! keeps its acceleration in its own frame, but not in a parallel frame, which turns by half as much. The energy does
+//! not depend on this, but its approximation of second order does: without the second derivative of the acceleration it
+//! contains `|[a, ξ]|²/4`, as if the energy determined the attitude. [`JacobiOperator::in_moving_frame`] adds `[a, ξ]/2`
+//! to the changes, so that they are those in the moving frame.
 
 use crate::banded::stride;
 use crate::frames::{curvature_terms, triples};
@@ -48,17 +54,54 @@ impl JacobiOperator {
                 turns.iter_mut().for_each(|turns| turns[knot * m * m..][..m * m].fill(0.0));
             }
         }
-        let mut jacobi = JacobiOperator { m, turns, penalty: vec![0.0; basis.count() * m * stride(m)] };
-        for i in 0..knots - 1 {
+        let mut jacobi = JacobiOperator { m, turns, penalty: Vec::new() };
+        jacobi.sum(linearized);
+        jacobi
+    }
+
+    /// The operator for changes in the moving frame of a group. `halves` are the matrices of ξ ↦ [e, ξ]/2 for the m
+    /// vectors e of the frame, which are the same at every knot.
+    pub fn in_moving_frame(
+        mut self,
+        linearized: &LinearProblem,
+        accelerations: &[f64],
+        halves: &[f64],
+    ) -> Self {
+        let (m, knots) = (self.m, linearized.basis.knots());
+        for (end, turns) in self.turns.iter_mut().enumerate() {
+            for (knot, turns) in turns.chunks_exact_mut(m * m).enumerate() {
+                let vector: Vec<f64> = match linearized.penalised {
+                    Penalty::Acceleration => accelerations[knot * m..][..m].to_vec(),
+                    // Half of the jerk times the length of the segment belongs to either end.
+                    Penalty::Jerk => {
+                        let other = if end == 0 { (knot + 1).min(knots - 1) } else { knot.saturating_sub(1) };
+                        (0..m)
+                            .map(|c| 0.5 * (accelerations[knot * m + c] - accelerations[other * m + c]))
+                            .collect()
+                    }
+                };
+                for (x, half) in vector.iter().zip(halves.chunks_exact(m * m)) {
+                    turns.iter_mut().zip(half).for_each(|(sum, half)| *sum = x.mul_add(*half, *sum));
+                }
+            }
+        }
+        self.sum(linearized);
+        self
+    }
+
+    /// Computes the matrix of the energy.
+    fn sum(&mut self, linearized: &LinearProblem) {
+        let basis = &linearized.basis;
+        self.penalty = vec![0.0; basis.count() * self.m * stride(self.m)];
+        for i in 0..basis.knots() - 1 {
             let (own, other) = of_segment(linearized.penalised, basis.h(i));
             let (left, right) = ((0, i), (1, i + 1));
             for (x, y, factor) in
                 [(left, left, own), (right, right, own), (left, right, other), (right, left, other)]
             {
-                jacobi.add(linearized, x, y, factor);
+                self.add(linearized, x, y, factor);
             }
         }
-        jacobi
     }
 
     /// Whether R depends on the end of a segment.

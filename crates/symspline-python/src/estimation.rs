@@ -147,14 +147,15 @@ type Solved<'py> = (
 );
 
 /// Solves the linear problem of measurements. `factors` are the space, the velocities and the accelerations of each
-/// factor, as [`bending`] returns them; `priors` (p, 2) the precision of each parameter and its distance from the
+/// factor, as [`bending`] returns them, and the matrices (m, m, m) of half the bracket, if its moving frame matters;
+/// `priors` (p, 2) the precision of each parameter and its distance from the
 /// prior mean. λ that are NaN are chosen, near the guesses that are not NaN.
 #[pyfunction]
 pub fn estimate<'py>(
     py: Python<'py>,
     knots: Array<'py>,
     penalty: &str,
-    factors: Vec<(PyRef<'py, Handle>, Array<'py>, Array<'py>)>,
+    factors: Vec<(PyRef<'py, Handle>, Array<'py>, Array<'py>, Option<Array<'py>>)>,
     priors: Array<'py>,
     terms: Vec<Term<'py>>,
     lams: Array<'py>,
@@ -170,7 +171,9 @@ pub fn estimate<'py>(
     let own = factors
         .iter()
         .zip(&spaces)
-        .map(|((_, a, b), space)| Ok(Factor { space, speeds: in_order(a)?, accelerations: in_order(b)? }))
+        .map(|((_, a, b, c), space)| {
+            Ok(Factor { space, speeds: in_order(a)?, accelerations: in_order(b)?, halves: given(c)? })
+        })
         .collect::<PyResult<Vec<_>>>()?;
     let mut read = Vec::new();
     for (x, residuals, [a, b, c], parameters) in &terms {

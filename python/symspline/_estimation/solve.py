@@ -22,7 +22,7 @@ from .._smoothing.report import SmoothingReport
 from .._spaces import Array, Doubles, Euclidean, Space
 from .along import Motion
 from .measurements import Constant
-from .terms import Linearised, Term, Values
+from .terms import Body, Linearised, Term, Values, is_compact_group
 
 # λ has converged if its logarithm changes by less than the first number; after so many rounds it is kept.
 _SETTLED, _ROUNDS = 3e-3, 12
@@ -444,9 +444,9 @@ class Iteration:
     def _solve(self, linear: list[Linearised], weights: list[Any], given: Doubles, near: Doubles) -> Linear:
         setup = self.setup
         factors, priors, terms = [], [], []
-        for space, curve in zip(setup.spaces, self.curves, strict=True):
+        for part, (space, curve) in enumerate(zip(setup.spaces, self.curves, strict=True)):
             speeds, accelerations = bending(curve)
-            factors.append((space._handle, speeds, accelerations))
+            factors.append((space._handle, speeds, accelerations, self._half_brackets(part)))
         for name, constant in setup.constants.items():
             off = self.values[name] - np.asarray(constant.start)
             precision = np.zeros(constant.size) if constant.sigma is None else np.asarray(constant.sigma) ** -2.0
@@ -454,7 +454,7 @@ class Iteration:
         for term, own, weight in zip(setup.terms, linear, weights, strict=True):
             residuals, shape = own.residuals, own.residuals.shape
             jacobians = [in_columns(setup.spaces, x, shape) if x else None for x in own.jacobians]
-            parameters = self._of_parameters(own)
+            parameters = parameter_columns(setup, own) if own.parameters else None
             if weight is not None:
                 residuals = residuals * weight
                 jacobians = [None if x is None else np.ascontiguousarray(x * weight[..., None]) for x in jacobians]
@@ -466,14 +466,12 @@ class Iteration:
         )
         return Linear(*found)
 
-    def _of_parameters(self, own: Linearised) -> Doubles | None:
-        if not own.parameters:
+    def _half_brackets(self, part: int) -> Doubles | None:
+        """Return half the brackets of the frame vectors on compact groups; they are the same at all knots."""
+        space, knots, points = self.setup.spaces[part], self.setup.knots[:1], self.points[part]
+        if not is_compact_group(space):
             return None
-        columns = [
-            own.parameters.get(name, np.zeros((*own.residuals.shape, constant.size)))
-            for name, constant in self.setup.constants.items()
-        ]
-        return np.ascontiguousarray(np.concatenate(columns, axis=-1))
+        return Body(space).half_brackets(points[0], self._frames(part, knots, points[:1])[0])
 
     def _check_parameters(self, information: Doubles) -> None:
         """Raise ValidationError if the measurements do not determine the parameters."""
@@ -533,6 +531,13 @@ def in_columns(spaces: Sequence[Space], by_part: dict[int, Doubles], shape: tupl
     for part, own in by_part.items():
         out[..., first[part] : first[part + 1]] = own
     return out
+
+
+def parameter_columns(setup: Setup, own: Linearised) -> Doubles:
+    """Return derivatives with respect to all parameters, zero for those on which a measurement does not depend."""
+    shape = own.residuals.shape
+    columns = [own.parameters.get(name, np.zeros((*shape, x.size))) for name, x in setup.constants.items()]
+    return np.ascontiguousarray(np.concatenate([np.zeros((*shape, 0)), *columns], axis=-1))
 
 
 def energy(curve: CoreCurve, penalty: str) -> float:

@@ -501,6 +501,12 @@ class Body:
         half = [0.5 * self.of(self.bracket(omega, vector)) for vector in vectors]
         return np.stack(half, axis=-1), np.stack([self.of(vector) for vector in vectors], axis=-1)
 
+    def half_brackets(self, p: Array, frame: Array) -> Doubles:
+        """Return the matrices of ξ ↦ [e, ξ]/2 for the vectors e of a frame at p, in its coordinates."""
+        at = np.repeat(p[None], len(frame), axis=0)
+        halves, vectors = self.derivatives(at, frame, np.broadcast_to(frame, (len(frame), *frame.shape)))
+        return np.ascontiguousarray(np.linalg.solve(vectors, halves))
+
     def components(self, omega: Any, name: str, n: int) -> Doubles:
         """Return components from the user's angular velocities or matrices."""
         if self.is_rotation:
@@ -594,6 +600,11 @@ def bind(measurement: Measurement, label: str, times: Doubles, space: Space[Any]
 
 def _is_group(space: Space) -> bool:
     return space == _S3 or isinstance(space, Group)
+
+
+def is_compact_group(space: Space) -> bool:
+    """Whether a space is a group whose metric is invariant on both sides."""
+    return space == _S3 or (isinstance(space, Group) and space._unitary)
 
 
 def _in_parts(value: Any, space: Space[Any], name: str) -> list[Any]:
