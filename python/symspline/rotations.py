@@ -674,7 +674,7 @@ def _integrated_present(t: Any, omega: Any, start: Any, frame: Frame, interpolat
 
 def _integral(times: Doubles, rates: Array, interpolation: str) -> Array:
     """Return the rotations that begin with the identity."""
-    return quaternion_to_matrix(np.moveaxis(integrated(times, rates, interpolation), 0, -1), scalar_first=True)
+    return quaternion_to_matrix(integrated(times, rates, interpolation), scalar_first=True)
 
 
 def _warn_of_uneven(steps: Array) -> None:

@@ -10,8 +10,7 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 import symspline as ss
-from symspline import rotations
-from symspline._estimation.rates import running_products
+from symspline import _core, rotations
 
 A, B = np.array([0.3, -1.2, 0.5]), np.array([0.9, 0.4, -0.7])
 
@@ -99,15 +98,15 @@ def test_many_samples():
     assert np.abs(still - Rotation.from_rotvec(t[:, None] * A).as_matrix()).max() < 2e-12
 
 
-@pytest.mark.parametrize("n", [1, 2, 3, 4, 5, 16, 17, 30, 101])
+@pytest.mark.parametrize("n", [1, 2, 101])
 def test_running_products_agree_with_a_loop(n):
     turns = Rotation.random(n, random_state=n)
-    q = np.roll(turns.as_quat(), 1, axis=-1).T
+    q = np.roll(turns.as_quat(), 1, axis=-1)
     expected = [turns[0]]
     for i in range(1, n):
         expected.append(expected[-1] * turns[i])
     wanted = Rotation.concatenate(expected).as_matrix()
-    found = Rotation.from_quat(np.roll(running_products(q).T, -1, axis=-1)).as_matrix()
+    found = Rotation.from_quat(np.roll(_core.quaternion_products(q), -1, axis=-1)).as_matrix()
     assert np.abs(found - wanted).max() < 1e-14
 
 

@@ -1,9 +1,9 @@
 //! Conversion of many rotations between matrices, unit quaternions and rotation vectors, eight at a time.
 
-use crate::rigid::{Quaternion, of_matrix, to_matrix};
+use crate::rigid::{Quaternion, multiply, of_matrix, to_matrix};
 use crate::rotations::{exp, log};
 use std::sync::atomic::{AtomicBool, Ordering};
-use symspline_core::monitor::Monitor;
+use symspline_core::monitor::{Monitor, checkpoint};
 use symspline_core::parallel;
 use symspline_core::scalar::{Each, LANES, Lane, dot, few, gather, lane, scatter};
 
@@ -126,4 +126,17 @@ pub fn convert(from: Form, to: Form, tol: f64, input: &[f64], monitor: &Monitor,
         }
     });
     valid.into_inner()
+}
+
+/// Replaces unit quaternions q₀, q₁, q₂, …, scalar first, by the products q₀, q₀q₁, q₀q₁q₂, …
+pub fn accumulate(quaternions: &mut [[f64; 4]]) {
+    let mut product = [Lane::ONE, Lane::ZERO, Lane::ZERO, Lane::ZERO];
+    for own in quaternions {
+        checkpoint();
+        product = multiply(product, own.map(lane));
+        // Otherwise rounding errors would accumulate in the length.
+        let inverse = Lane::ONE / dot(&product, &product).sqrt();
+        product = product.each(|x| x * inverse);
+        *own = product.map(|x| x.as_array()[0]);
+    }
 }

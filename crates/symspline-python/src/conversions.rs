@@ -1,14 +1,14 @@
 //! Rotations as matrices, quaternions and vectors, and numbers as text.
 
-use crate::arrays::{in_order, unwritten};
+use crate::arrays::{in_order, unwritten, zeros};
 use crate::errors::invalid;
-use crate::watch::watched;
+use crate::watch::{is_long, watched};
 use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use std::fmt::Write;
 use symspline_engine::monitor::Monitor;
 use symspline_engine::parallel;
-use symspline_engine::spaces::conversions::{Form, convert};
+use symspline_engine::spaces::conversions::{Form, accumulate, convert};
 
 /// Rotations in another form, with the shape of the leading axes, and whether all were finite and within `tol` of
 /// rotations. The forms are "matrix", "scalar first", "scalar last" and "vector".
@@ -35,6 +35,27 @@ pub fn convert_rotations<'py>(
     let valid = watched(py, None, 1, false, |monitor| convert(from, to, tol, input, monitor, result))?;
     drop(write);
     Ok((out, valid))
+}
+
+/// Products q₀, q₀q₁, q₀q₁q₂, … of unit quaternions, scalar first, along the last axis but one.
+#[pyfunction]
+pub fn quaternion_products<'py>(
+    py: Python<'py>,
+    quaternions: PyReadonlyArrayDyn<'py, f64>,
+) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+    let out = zeros(py, quaternions.shape())?;
+    let mut write = out.readwrite();
+    let result = write.as_slice_mut()?;
+    result.copy_from_slice(in_order(&quaternions)?);
+    let n = quaternions.shape()[quaternions.ndim() - 2];
+    if !result.is_empty() {
+        let heavy = is_long(result.len());
+        watched(py, None, 1, heavy, |_| {
+            result.as_chunks_mut::<4>().0.chunks_exact_mut(n).for_each(accumulate)
+        })?;
+    }
+    drop(write);
+    Ok(out)
 }
 
 /// Rows that one thread writes at a time.

@@ -122,6 +122,7 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     guarded(m, wrap_pyfunction!(search::time_law, m)?)?;
     guarded(m, wrap_pyfunction!(tridiagonal::solve_tridiagonal, m)?)?;
     guarded(m, wrap_pyfunction!(conversions::convert_rotations, m)?)?;
+    guarded(m, wrap_pyfunction!(conversions::quaternion_products, m)?)?;
     guarded(m, wrap_pyfunction!(conversions::number_lines, m)?)?;
     // Public functions, with their signatures.
     m.add_function(wrap_pyfunction!(set_num_threads, m)?)?;

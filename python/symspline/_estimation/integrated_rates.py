@@ -19,10 +19,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .._spaces import Doubles, SpecialOrthogonal
+from .. import _core
+from .._spaces import Doubles
 from .rates import attitudes_at
 
-_SO3 = SpecialOrthogonal(3)
 # Rates have a gap where a time step exceeds this number of median time steps.
 _GAP = 20.0
 # Largest numbers of attitudes with which biases are compared, and of intervals that propose a bias.
@@ -41,6 +41,8 @@ _BAD = 6.0
 _LINEAR = 0.1
 # Corners of the loss of Geman and McClure, in squares of standard deviations, during the alignment.
 _CORNERS = (64.0, 16.0, 4.0, 4.0)
+# Steps of the bias whose squared length in standard deviations is below this number end an iteration.
+_SMALL_STEP = 1e-4
 # Number of time offsets on either side of the start that are tried, and the turn of the body in radians per step.
 _OFFSETS, _OFFSET_TURN = 20, 0.2
 
@@ -87,17 +89,12 @@ class Attitudes(NamedTuple):
 
 def _exp(vectors: Doubles) -> Doubles:
     """Return the rotation matrices of rotation vectors."""
-    hats = np.zeros((*vectors.shape, 3))
-    x, y, z = np.moveaxis(vectors, -1, 0)
-    hats[..., 2, 1], hats[..., 0, 2], hats[..., 1, 0] = x, y, z
-    hats[..., 1, 2], hats[..., 2, 0], hats[..., 0, 1] = -x, -y, -z
-    return np.asarray(_SO3._apply("exp", p=np.broadcast_to(np.eye(3), hats.shape), v=hats))
+    return _core.convert_rotations(np.ascontiguousarray(vectors), "vector", "matrix", np.inf)[0]
 
 
 def _log(matrices: Doubles) -> Doubles:
     """Return the rotation vectors of rotation matrices."""
-    found = _SO3._apply("log", p=np.broadcast_to(np.eye(3), matrices.shape), q=np.ascontiguousarray(matrices))
-    return np.stack([found[..., 2, 1], found[..., 0, 2], found[..., 1, 0]], axis=-1)
+    return _core.convert_rotations(np.ascontiguousarray(matrices), "matrix", "vector", np.inf)[0]
 
 
 def _back(matrices: Doubles) -> Doubles:
@@ -267,7 +264,10 @@ class _Problem:
             weights = (1 + squares / _LIMIT) ** -2.0 / pairs.variances
             normal = np.einsum("k,kji,kjl->il", weights, j, j) + np.diag(self.precision)
             right = np.einsum("k,kji,kj->i", weights, j, r) + self.precision * (bias + change - self.rates.bias)
-            change = change - np.linalg.solve(normal, right)
+            step = np.linalg.solve(normal, right)
+            change = change - step
+            if step @ normal @ step < _SMALL_STEP:
+                break
         return change
 
     def aligned(
