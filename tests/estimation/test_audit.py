@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 import symspline as ss
 from symspline import measure
-from symspline._smoothing.audit import Residuals, examine
+from symspline._smoothing.audit import Residuals, corner_of, examine
 
 SO3 = sensors.SO3
 
@@ -258,6 +258,21 @@ def test_false_alarms_of_the_statistics():
         noise = rng.standard_normal((n, d))
         alarms += examine(Residuals(noise - basis @ (basis.T @ noise), p / n)).failed
     assert alarms <= 2
+
+
+@pytest.mark.parametrize(("count", "most"), [(8, 2), (60, 1), (300, 1)])
+def test_false_alarms_of_the_share_of_rejected_measurements(count, most):
+    """Each measurement is an outlier with probability 0.1. At 8 measurements, 3 outliers are not rare."""
+    rng = np.random.default_rng(count)
+    alarms = 0
+    for _ in range(1000):
+        rows = rng.standard_normal((count, 3))
+        rows[rng.random(count) < 0.1] += 100.0
+        alarms += examine(Residuals(rows, 0.0, loss="cauchy", corner=corner_of("cauchy", 3))).rejected > 0
+    assert alarms <= most
+    rows = rng.standard_normal((count, 3))
+    rows[: round(0.65 * count)] += 100.0
+    assert examine(Residuals(rows, 0.0, loss="cauchy", corner=corner_of("cauchy", 3))).rejected > 0.5
 
 
 def test_coarse_knots_are_far_from_the_minimum():

@@ -30,8 +30,9 @@ _CORRELATED, _SMOOTH = 0.1, 0.3
 _PARTIAL_SUM, _STEP = 2.0, 0.0625
 # Smallest limit of the largest residual. In long recordings, normal residuals exceed the limit with this probability.
 _LARGEST, _PROBABILITY = 6.0, 1e-5
-# Share of the measurements that a robust loss may reject, and the multiple of its corner beyond which it rejects them.
-_REJECTED, _BEYOND = 0.3, 9.0
+# Share of the measurements that a robust loss may reject, the number of its standard errors by which chance may exceed
+# it, and the multiple of the corner of the loss beyond which measurements are rejected.
+_REJECTED, _CHANCE, _BEYOND = 0.3, 2.0, 9.0
 # More consecutive rejected measurements than this number, and than this share of all, are reported, because outliers of
 # a sensor are mostly isolated.
 _RUN, _RUN_SHARE = 8, 0.05
@@ -224,7 +225,8 @@ def examine(given: Residuals) -> Finding:
         far = squares > _BEYOND * given.corner
         share = float(np.mean(far[used]))
         run = long_run(far, max(_RUN, _RUN_SHARE * len(far)))
-        finding = finding._replace(rejected=share if share > _REJECTED else 0.0, run=run)
+        most = _REJECTED + _CHANCE * np.sqrt(_REJECTED * (1 - _REJECTED) / used.sum())
+        finding = finding._replace(rejected=share if share > most else 0.0, run=run)
         rows = np.where(squares[:, None] > max(1.0, scale) * given.corner, np.nan, rows)
     else:
         sizes = np.nanmax(np.where(known, np.abs(rows), 0.0), axis=1)
