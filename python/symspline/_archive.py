@@ -40,7 +40,7 @@ TEXTS = ("format", "space", "t_unit", "data_t_unit")
 _AXIS_UNIT = re.compile(r"axis_\d{1,2}_unit")
 _JSON = (
     *("bc_type", "c1_nodes", "extrapolate", "report", "noise", "parameters", "degree", "names", "rows", "grid", "law"),
-    "plain",
+    *("plain", "gaps"),
 )
 _ARRAY = re.compile(
     r"(?:version|t|data_t|knots|axis_\d{1,2})|(?:points|velocities|control_points|data|data_weights|data_information|band|matrix|turn|side|corner|variance)"

@@ -54,6 +54,7 @@ from .._typing import (
 from .._validation import one_of
 from ..manifolds._manifold import refuse_functions
 from .audit import audit, unit_hints
+from .gaps import long_gaps
 from .knots import filled, first_knots, merged, shown_times
 from .measurements import SKIPNA, BodyRates, Constant, Measurement, Points, Velocities
 from .missing import counts_all_samples, measurement_without_missing
@@ -212,6 +213,9 @@ def estimate(
     the share rejected by a robust loss; and the distances of constants from their priors. Recordings without a fault
     fail a check about once in a thousand fits. Standard deviations that are wrong by less than 10 % are not reported.
     Measurements with fewer than five times are not examined.
+
+    In long gaps in which no sensor measures, the standard deviations are calibrated as for `SmoothingSpline.std`: parts
+    of the recording are predicted without the measurements of all sensors.
 
     If the curve turns by more than about one radian between two knots, the solution of the linearised problem may
     differ from the minimum. The distance is then computed in standard deviations, and reported if it exceeds 0.5.
@@ -518,6 +522,7 @@ def _curve(
         parameters,
         tuple(given),
         tuple(_residuals_of(setup, found, f"measurements[{i}]") for i in range(len(given))),
+        [long_gaps(setup, found, number) for number in range(len(setup.spaces))],
     )
     if found.failure:
         hints = unit_hints(setup.terms)

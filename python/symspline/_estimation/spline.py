@@ -15,6 +15,7 @@ from .._curves.curve import SidePanel, UncertaintyBand
 from .._curves.ends import end_kinds
 from .._smoothing.data import SmoothingData
 from .._smoothing.factors import is_several, smoothed_spaces
+from .._smoothing.gaps import Calibration
 from .._smoothing.posterior import Parameter, Posterior
 from .._smoothing.report import SmoothingReport
 from .._smoothing.solve import Smoothed
@@ -22,6 +23,7 @@ from .._smoothing.spline import SmoothingSpline
 from .._spaces import Array, Doubles, Product, Space, SpecialEuclidean, factors_of, parts_of
 from .._typing import P
 from .along import Motion
+from .gaps import LongGaps, read_long_gaps
 from .measurements import BodyRates, Measurement, Points, SpecificForce
 from .terms import Term
 
@@ -63,9 +65,10 @@ class EstimatedSpline(SmoothingSpline[P, Any]):
     _parameters: dict[str, Parameter]
     _measurements: tuple[Any, ...]
     _residuals: tuple[Doubles | tuple[Doubles, ...], ...]
+    _long_gaps: list[LongGaps | None]
 
     def _fill(self, *parts: Any) -> None:
-        *own, self._parameters, self._measurements, self._residuals = parts
+        *own, self._parameters, self._measurements, self._residuals, self._long_gaps = parts
         super()._fill(*own)
 
     @property
@@ -95,8 +98,9 @@ class EstimatedSpline(SmoothingSpline[P, Any]):
                 return own.t, own.y
         raise ValidationError("the curve was estimated without points. See the attribute measurements.")
 
-    def _calibration_of(self, number: int) -> None:
-        return None
+    def _calibration_of(self, number: int) -> Calibration | None:
+        gaps = self._long_gaps[number]
+        return gaps and gaps.calibration(lambda x, nu: self._plain_spread(number, (), x, nu) ** 2)
 
     def _plain_spread(self, number: int, index: tuple[int, ...], x: Doubles, nu: int) -> Doubles:
         space = smoothed_spaces(self.space)[number]
@@ -184,6 +188,7 @@ class EstimatedSpline(SmoothingSpline[P, Any]):
             "matrix": posterior.band,
             "side": posterior.side,
             "corner": posterior.corner,
+            "gaps": self._long_gaps,
         }
 
     @classmethod
@@ -207,7 +212,9 @@ class EstimatedSpline(SmoothingSpline[P, Any]):
                 report = read_report(SmoothingReport, dict(numbers), ())
                 smoothed.append(joint(report, matrix, side, corner, m, first))
                 first += space.dim
-        return cls._of(*parts, None, smoothed, parameters, (), ())
+        with entry("gaps"):
+            gaps = [read_long_gaps(own) for own in state.get("gaps", [None] * len(spaces))]
+        return cls._of(*parts, None, smoothed, parameters, (), (), gaps)
 
     def __repr__(self) -> str:
         knots, parameters = self._times.shape[-1], ", ".join(self._parameters) or "no parameters"

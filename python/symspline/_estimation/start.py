@@ -146,7 +146,7 @@ def _are_dense(setup: Setup, points: list[PointTerm | InformationTerm], rates: l
     if setup.losses.count("linear") < len(setup.losses) or any(own.time_offset for own in (*points, *rates)):
         return False
     times = np.unique(np.concatenate([setup.knots[[0, -1]], *(own.times for own in points)]))
-    sigma = max(float(_scales(own).max()) for own in points)
+    sigma = max(float(scales_of(own).max()) for own in points)
     speed = max(float(np.linalg.norm(own.omega, axis=1).max()) for own in rates)
     return float(np.diff(times).max()) * speed + 3 * sigma < _SMALL
 
@@ -154,7 +154,7 @@ def _are_dense(setup: Setup, points: list[PointTerm | InformationTerm], rates: l
 # ---- points ----
 
 
-def _scales(term: PointTerm | InformationTerm) -> Doubles:
+def scales_of(term: PointTerm | InformationTerm) -> Doubles:
     """Return the usual standard deviation of a coordinate of every point."""
     if isinstance(term, PointTerm):
         return term.noise[:, 0]
@@ -170,7 +170,7 @@ def _smoothed(
     most: int = _MOST,
 ) -> Start:
     """Return smoothed points, together with those at which velocities are given."""
-    scales = [_scales(term) for term in points]
+    scales = [scales_of(term) for term in points]
     typical = float(np.median(np.concatenate(scales))) if scales else 1.0
     times = np.concatenate([*(term.times for term in points), *(term.times for term in beside)])
     y = np.concatenate([*(term.y for term in points), *(term.y for term in beside)])
@@ -221,7 +221,7 @@ class _Seen(NamedTuple):
 def _attitudes(space: Space[Any], points: list[PointTerm | InformationTerm], seen: list[DirectionTerm]) -> list[_Seen]:
     """Return measured attitudes; if they are few, also attitudes computed from simultaneous directions."""
     found = [
-        _Seen(Attitudes(term.times, Body(space).matrices(term.y), _scales(term)), term.time_offset) for term in points
+        _Seen(Attitudes(term.times, Body(space).matrices(term.y), scales_of(term)), term.time_offset) for term in points
     ]
     if sum(len(own.attitudes.times) for own in found) >= _FEW:
         return found

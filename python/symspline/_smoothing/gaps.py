@@ -122,6 +122,16 @@ class Evidence(NamedTuple):
     velocities: Doubles
 
     @property
+    def coordinates(self) -> int:
+        """Number of coordinates of a datum."""
+        return int(self.residuals.shape[1])
+
+    @property
+    def rows_per_datum(self) -> int:
+        """Number of linear functions of the coefficients for one datum."""
+        return 1 if self.roots.ndim == 1 else int(self.roots.shape[1])
+
+    @property
     def weights(self) -> Doubles:
         """Mean weight of a coordinate of every datum."""
         if self.roots.ndim == 1:
@@ -162,6 +172,76 @@ class Evidence(NamedTuple):
 
     def _observed(self, data: NDArray[np.intp]) -> NDArray[np.intp]:
         return np.asarray(np.maximum(self.roots[data].any(axis=2).sum(axis=1), 1))
+
+
+class SensorEvidence(NamedTuple):
+    """Measurements of any kind, linearised at a curve. Points are predicted, the others are only omitted.
+
+    Attributes
+    ----------
+    knots : ndarray
+        Knots.
+    known : tuple
+        The matrix A, as the core reads it.
+    times : ndarray, shape (n,)
+        Times of the measurements, in increasing order.
+    firsts : ndarray of int, shape (n,)
+        First coefficient on which each measurement depends.
+    factors, sides : ndarray, shape (n, q, 4m) and (n, q, p)
+        Factors of four coefficients and of the parameters in q whitened rows; rows of zeros have no effect.
+    residuals : ndarray, shape (n, q)
+        Whitened measurements minus their values at the curve.
+    counts : ndarray of bool, shape (n,)
+        Whether each measurement is a point that is not an outlier.
+    weights : ndarray, shape (n,)
+        Mean weight of a coordinate of every point.
+    coordinates : int
+        Number of coordinates of a point.
+    """
+
+    knots: Doubles
+    known: Any
+    times: Doubles
+    firsts: NDArray[np.int64]
+    factors: Doubles
+    sides: Doubles
+    residuals: Doubles
+    counts: NDArray[np.bool_]
+    weights: Doubles
+    coordinates: int
+
+    @property
+    def rows_per_datum(self) -> int:
+        """Number of linear functions of the coefficients for one measurement."""
+        return int(self.factors.shape[1])
+
+    def rows(self, data: NDArray[np.intp], firsts: NDArray[np.int64], factors: Doubles) -> Any:
+        """Return linear functions of the coefficients and parameters with these factors."""
+        q = self.rows_per_datum
+        each = (np.ascontiguousarray(own.reshape(len(data) * q, -1)) for own in (factors, self.sides[data]))
+        return np.repeat(firsts, q), *each
+
+    def whitened(self, data: NDArray[np.intp], vectors: Doubles) -> Doubles:
+        """Return vectors, which are whitened, with one row per row of `rows`."""
+        return np.ascontiguousarray(vectors.reshape(-1, 1))
+
+    def system(self) -> tuple[NDArray[np.int64], Doubles, Any, Doubles]:
+        """Return the first coefficients and their factors at all data, and the linear problem: rows and residuals."""
+        every = np.arange(len(self.times))
+        return (
+            self.firsts,
+            self.factors,
+            self.rows(every, self.firsts, self.factors),
+            self.whitened(every, self.residuals),
+        )
+
+    def per_datum(self, data: NDArray[np.intp], rows: Doubles) -> Doubles:
+        """Return means over the coordinates of points, from sums over their rows."""
+        return np.asarray(rows.reshape(len(data), -1).sum(axis=1) / self.coordinates)
+
+    def observed_weights(self, data: NDArray[np.intp]) -> Doubles:
+        """Return mean weights of the coordinates of points."""
+        return self.weights[data]
 
 
 class Predicted(NamedTuple):
@@ -247,9 +327,9 @@ class Calibration:
         period: float = np.nan,
         beyond: Callable[[], tuple[Doubles, int]] | None = None,
     ) -> None:
-        self.gaps, self.width = gaps, width
+        self.gaps, self.width, self.at_data = gaps, width, cache(at_data)
         self._course, self._period, self._ends = course, period, ends
-        self._at_data, self._of_ends = cache(at_data), beyond
+        self._of_ends = beyond
 
     @property
     def ends(self) -> list[tuple[float, float, float, int]]:
@@ -278,7 +358,7 @@ class Calibration:
         near &= ~outside
         if near.any():
             v = self._course.variance(x[near], nu)
-            out[near] = _ratio(v + excess[near] * np.maximum(v - self._at_data(nu), 0.0), v)
+            out[near] = _ratio(v + excess[near] * np.maximum(v - self.at_data(nu), 0.0), v)
         if outside.any():
             v = self._course.variance(x[outside], nu)
             out[outside] = _ratio(self._variance_beyond(x[outside], v, nu), v)
@@ -333,7 +413,7 @@ def _ratio(more: Doubles, v: Doubles) -> Doubles:
 
 
 def calibrate(
-    times: Doubles, weights: Doubles, course: Course, period: float, evidence: Callable[[], Evidence]
+    times: Doubles, weights: Doubles, course: Course, period: float, evidence: Callable[[], Any], ends: bool = True
 ) -> Calibration:
     """Find the long gaps of a curve and the factors of its standard deviations in them.
 
@@ -347,6 +427,8 @@ def calibrate(
         Period of a closed curve; NaN for others.
     evidence : callable
         Function that returns the linearised data. It is called only if there are gaps, or for times beyond the data.
+    ends : bool
+        Whether variances beyond the data change as well. This needs `Evidence`.
 
     References
     ----------
@@ -378,10 +460,10 @@ def calibrate(
     if len(spans):
         factors = _factors_of_gaps(_Blocks(evidence(), spans, width, at_data(0), period), spans)
         gaps = [(float(start), float(stop), *own) for (start, stop), own in zip(spans, factors, strict=True)]
-    if closed:
+    if closed or not ends:
         return Calibration(course, gaps, at_data, width, period=period)
-    ends = float(times[0]), float(times[-1])
-    return Calibration(course, gaps, at_data, width, ends, beyond=lambda: _beyond(evidence(), course, usual))
+    outer = float(times[0]), float(times[-1])
+    return Calibration(course, gaps, at_data, width, outer, beyond=lambda: _beyond(evidence(), course, usual))
 
 
 def _factors_of_gaps(blocks: _Blocks, gaps: Doubles) -> list[tuple[float, int]]:
@@ -421,7 +503,9 @@ def _factors_of_gaps(blocks: _Blocks, gaps: Doubles) -> list[tuple[float, int]]:
 class _Blocks:
     """Parts of a recording whose data can be omitted."""
 
-    def __init__(self, evidence: Evidence, gaps: Doubles, width: float, at_data: float, period: float) -> None:
+    def __init__(
+        self, evidence: Evidence | SensorEvidence, gaps: Doubles, width: float, at_data: float, period: float
+    ) -> None:
         self.evidence, self.gaps, self.width, self.at_data = evidence, gaps, width, at_data
         t = evidence.times
         self.closed, self.count = not np.isnan(period), len(t)
@@ -468,7 +552,7 @@ class _Blocks:
                 disjoint, reached = disjoint + 1, start + length
         omitted = [omitted[i] for i in _some(len(omitted), _BLOCKS)]
         found = self._predicted([own % self.count for _, own in omitted])
-        factor = factor_of(found, self.evidence.residuals.shape[1], disjoint)
+        factor = factor_of(found, self.evidence.coordinates, disjoint)
         return None if np.isnan(factor) else (factor, len(omitted))
 
     def _predicted(self, omitted: list[NDArray[np.intp]]) -> Predicted:
@@ -491,10 +575,15 @@ def _some(count: int, most: int) -> NDArray[np.intp]:
 
 
 def _without(
-    evidence: Evidence, data: Any, residuals: Doubles, probes: Any, omitted: list[Any], counts: list[int]
+    evidence: Evidence | SensorEvidence,
+    data: Any,
+    residuals: Doubles,
+    probes: Any,
+    omitted: list[Any],
+    counts: list[int],
 ) -> tuple[Doubles, Doubles]:
     """Return changes and variances of linear functions without the omitted data; each block has `counts` functions."""
-    rows = 1 if evidence.roots.ndim == 1 else evidence.roots.shape[1]
+    rows = evidence.rows_per_datum
     each = [(own[:, None] * rows + np.arange(rows)).ravel() for own in omitted]
     stops = np.cumsum([len(own) for own in each])
     of_probes = np.cumsum(counts) * rows

@@ -181,9 +181,9 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         """Long gaps in the data, and the times before and after the data, with the factors of the bands there.
 
         The result is a list of `Gap` in the order of time. For open curves, the first and the last entry are the times
-        before and after the data. Products and poses have a tuple with one list per part. A batch has an array of lists
-        with the batch axes. The list is empty if the curve has no estimate of its error, as with ``lam=0`` or
-        ``lam=numpy.inf``.
+        before and after the data; curves of `estimate` have only gaps in which no sensor measures. Products and poses
+        have a tuple with one list per part. A batch has an array of lists with the batch axes. The list is empty if the
+        curve has no estimate of its error, as with ``lam=0`` or ``lam=numpy.inf``.
 
         See Also
         --------

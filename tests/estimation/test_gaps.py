@@ -1,0 +1,103 @@
+"""Bands of estimates in gaps in which no sensor measures."""
+
+import numpy as np
+import pytest
+
+import symspline as ss
+from symspline import measure
+from symspline._smoothing import gaps
+
+
+def recording(seed, gap, m=2, end=60.0):
+    """A smooth motion, with measured positions and velocities except in a gap."""
+    rng = np.random.default_rng(seed)
+    frequency, phase, size = rng.uniform(0.05, 0.3, (3, m)), rng.uniform(0, 6.28, (3, m)), rng.uniform(0.3, 1, (3, m))
+
+    def path(t, nu=0):
+        angle = 2 * np.pi * frequency
+        waves = np.sin(angle * np.asarray(t)[:, None, None] + phase + nu * np.pi / 2)
+        return np.sum(size * angle**nu * waves, axis=1)
+
+    t, s = np.sort(rng.uniform(0, end, (2, 300)), axis=1)
+    t, s = (x[(x < gap[0]) | (x > gap[1])] for x in (t, s))
+    y, v = path(t) + 0.02 * rng.standard_normal((len(t), m)), path(s, 1) + 0.05 * rng.standard_normal((len(s), m))
+    return path, t, y, s, v
+
+
+def given(t, y, s, v):
+    return [measure.Points(t, y, sigma=0.02), measure.Velocities(s, np.zeros(v.shape), v, sigma=0.05)]
+
+
+def test_bands_hold_in_gaps(tmp_path):
+    inside, plain = [], []
+    for seed in range(8):
+        begin = 20.0 + seed
+        path, *data = recording(seed, (begin, begin + 5))
+        curve = ss.estimate(given(*data), 120, "r:2")
+        gap = max(curve.gaps, key=lambda own: own.stop - own.start)
+        assert gap.factor > 1 and gap.blocks > 5
+        assert gap.start == pytest.approx(begin, abs=1) and gap.stop == pytest.approx(begin + 5, abs=1)
+        x = np.linspace(begin + 0.1, begin + 4.9, 40)
+        errors = np.linalg.norm(curve(x) - path(x), axis=1)
+        inside.append(errors < np.sqrt(5.991) * curve.std(x))
+        plain.append(errors < np.sqrt(5.991) * curve.std(x, calibrated=False))
+        first = min(own.start for own in curve.gaps)
+        far = np.linspace(1, first - 3, 20)
+        assert np.array_equal(curve.std(far), curve.std(far, calibrated=False))
+    assert np.mean(inside) > 0.95 > np.mean(plain)
+    curve.save(tmp_path / "curve.npz")
+    again = ss.load(tmp_path / "curve.npz")
+    assert again.gaps == curve.gaps and np.array_equal(again.std(x), curve.std(x))
+
+
+def test_predictions_are_those_of_an_estimate_without_the_data(monkeypatch):
+    """Blocks equal a new estimate with the same λ and knots, without the measurements of both sensors."""
+    _, t, y, s, v = recording(0, (25, 30), m=1)
+    calls, without = [], gaps._without
+
+    def recorded(evidence, data, residuals, probes, omitted, counts):
+        found = without(evidence, data, residuals, probes, omitted, counts)
+        calls.append((evidence, omitted, counts, found))
+        return found
+
+    monkeypatch.setattr(gaps, "_without", recorded)
+    knots = np.linspace(0, 60, 121)
+    curve = ss.estimate(given(t, y, s, v), knots, "r:1", tol=1e-9)
+    evidence, omitted, counts, (values, variances) = calls[0]
+    for block in (0, len(omitted) // 2):
+        times = evidence.times[omitted[block]]
+        kept_t, kept_s = ((x < times[0]) | (x > times[-1]) for x in (t, s))
+        other = ss.estimate(given(t[kept_t], y[kept_t], s[kept_s], v[kept_s]), knots, "r:1", lam=curve.report.lam)
+        probes = slice(sum(counts[:block]), sum(counts[: block + 1]))
+        at = times[evidence.counts[omitted[block]]]
+        assert np.array_equal(at, t[~kept_t])
+        np.testing.assert_allclose(values[probes], (other(at) - curve(at)) / 0.02, atol=1e-5)
+        expected = other.std(at, calibrated=False) ** 2 / 0.02**2
+        np.testing.assert_allclose(variances[probes], expected, rtol=1e-6)
+
+
+def test_no_gap_where_another_sensor_measures():
+    path, t, y, _, _ = recording(1, (25, 30))
+    rng = np.random.default_rng(1)
+    every = np.linspace(0, 60, 600)
+    curve = ss.estimate(given(t, y, every, path(every, 1) + 0.05 * rng.standard_normal((600, 2))), 120, "r:2")
+    assert curve.gaps == []
+
+
+def test_gaps_of_attitudes_and_rates():
+    """On rotations, with a bias and a robust loss."""
+    inside = []
+    for seed in range(4):
+        path, t, _, s, _ = recording(seed, (25, 30), m=3)
+        rng = np.random.default_rng(seed)
+        fine = np.linspace(0, 60, 1201)
+        truth = ss.CubicSpline(fine, ss.rotations.from_rotation_vectors(0.5 * path(fine)), "so:3")
+        seen = truth(t) @ ss.rotations.from_rotation_vectors(0.02 * rng.standard_normal((len(t), 3)))
+        seen[[30, 200]] = ss.SpecialOrthogonal(3).random_point(rng, (2,))
+        omega = ss.rotations.angular_velocity(truth, s) + [0.1, 0, -0.1] + 0.05 * rng.standard_normal((len(s), 3))
+        gyro = measure.BodyRates(s, omega, sigma=0.05, bias=measure.Constant(3))
+        curve = ss.estimate([measure.Points(t, seen, sigma=0.02, loss="cauchy"), gyro], 200, "so:3")
+        assert max(own.factor for own in curve.gaps) > 1.05
+        x = np.linspace(25.1, 29.9, 40)
+        inside.append(ss.SpecialOrthogonal(3).distance(curve(x), truth(x)) < np.sqrt(7.815) * curve.std(x))
+    assert np.mean(inside) > 0.85
