@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from .. import _core
 from .._spaces import Doubles
-from .rates import attitudes_at
+from .rates import integrated
 
 # Rates have a gap where a time step exceeds this number of median time steps.
 _GAP = 20.0
@@ -106,9 +106,13 @@ class Integral:
 
     def __init__(self, rates: Rates, bias: Doubles) -> None:
         self.bias = bias
-        self._t = np.unique(rates.times)
-        self._omega = np.stack([np.interp(self._t, rates.times, row) for row in rates.omega.T], axis=-1) - bias
-        self._matrices = attitudes_at(self._t, self._omega, self._t)
+        self._t, omega = rates.times, rates.omega
+        if np.any(np.diff(self._t) <= 0):
+            self._t = np.unique(rates.times)
+            omega = np.stack([np.interp(self._t, rates.times, row) for row in omega.T], axis=-1)
+        self._omega = omega - bias
+        quaternions = integrated(self._t, self._omega)
+        self._matrices = _core.convert_rotations(quaternions, "scalar first", "matrix", np.inf)[0]
         steps = 0.5 * np.diff(self._t)[:, None, None] * (self._matrices[1:] + self._matrices[:-1])
         self._sums = np.concatenate([np.zeros((1, 3, 3)), np.cumsum(steps, axis=0)])
 
@@ -157,7 +161,7 @@ class _Problem:
         breaks = np.flatnonzero(np.diff(t) > _GAP * self.step)
         self.first, self.last = t[np.append(0, breaks + 1)], t[np.append(breaks, len(t) - 1)]
         self.size = float(np.sqrt(np.mean(np.sum((rates.omega - rates.bias) ** 2, axis=1))))
-        self.integral = Integral(rates, rates.bias)
+        self.integral = self.first_integral = Integral(rates, rates.bias)
         self.limit_bias(_SHARES[0])
 
     def limit_bias(self, share: float) -> None:
@@ -175,9 +179,12 @@ class _Problem:
         return np.where((x >= self.first[j] - near) & (x <= self.last[j] + near), j, -1)
 
     def integrate(self, bias: Doubles) -> Integral:
-        """Return the integral with a bias; the stored integral is reused if its bias hardly differs."""
-        if float(np.abs(bias - self.integral.bias).max()) * float(np.ptp(self.rates.times)) > _LINEAR:
-            self.integral = Integral(self.rates, bias)
+        """Return the integral with a bias; one with nearly this bias is reused, the first one or the last one."""
+        most = _LINEAR / max(float(np.ptp(self.rates.times)), np.finfo(float).tiny)
+        for known in (self.integral, self.first_integral):
+            if float(np.abs(bias - known.bias).max()) <= most:
+                return known
+        self.integral = Integral(self.rates, bias)
         return self.integral
 
     def pairs(self, attitudes: Attitudes, bias: Doubles, apart: int, more: float) -> _Pairs:
