@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import symspline as ss
+from symspline._smoothing.varying import Recording, findings
 
 FASTER, NOISIER = "the motion is faster between", "the residuals are larger between"
 
@@ -28,6 +29,31 @@ def recording(kind, n, m, seed):
 
 def interval(message):
     return [float(x) for x in re.search(r"between t = (\S+) and (\S+?)[ ,]", message).groups()]
+
+
+@pytest.mark.parametrize(("first", "last"), [(100, 149), (0, 49), (350, 399), (175, 199)])
+def test_interval_of_a_fast_part_is_exact(first, last):
+    # With a leverage of 1/4, bins of at least 6 degrees of freedom have 25 data: 100 degrees of freedom in 16 bins.
+    index, rate = np.arange(400.0), np.ones(400)
+    rate[first : last + 1] = 40
+    edges = np.arange(401) - 0.5
+    energy = np.append(0.0, np.cumsum(rate))
+    constant = np.full(400, 0.25)
+    (found,) = findings(Recording(7 + index, index, np.ones(400), np.ones(400), edges, energy, constant, 3))
+    assert FASTER in found.message
+    assert interval(found.message) == [7 + first, 7 + last]
+
+
+def test_interval_of_larger_residuals_is_exact():
+    # 300 degrees of freedom of the residuals in 50 bins of 8 data.
+    index, squares = np.arange(400.0), np.ones(400)
+    squares[96:144] = 30
+    edges = np.arange(401) - 0.5
+    (found,) = findings(
+        Recording(7 + index, index, np.ones(400), squares, edges, 1.0 * np.arange(401), np.full(400, 0.25), 3)
+    )
+    assert NOISIER in found.message
+    assert interval(found.message) == [103, 150]
 
 
 @pytest.mark.parametrize("m", [1, 3])
