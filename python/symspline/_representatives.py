@@ -15,7 +15,7 @@ from ._curves.curve import CurveArrays
 from ._curves.fit import Points
 from ._faults import of_index
 from ._report import MAX_STEP, Columns, FarPointsWarning
-from ._spaces import Array, Doubles, Space, Sphere, Torus, Unitary, cover_of, factors_of
+from ._spaces import Array, Doubles, Euclidean, Space, Sphere, Torus, Unitary, cover_of, factors_of
 from ._warnings import warn
 from .manifolds import Manifold
 
@@ -181,6 +181,8 @@ class _Far(NamedTuple):
 
 def _count_far(space: Space[Any], points: Array) -> NDArray[np.intp]:
     """Return the number of long steps of every curve."""
+    if isinstance(space, Euclidean):
+        return np.zeros(points.shape[:-2], np.intp)
     return np.asarray(np.count_nonzero(cut_fractions(space, points) > FAR, axis=-1))
 
 

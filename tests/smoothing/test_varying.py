@@ -99,9 +99,19 @@ def test_sound_recordings_do_not_warn(name):
             ss.make_smoothing_spline(t, points, space)
 
 
-def test_given_lam_and_robust_losses_are_not_tested():
+def test_given_lam_is_not_tested():
     t, y, _ = recording("burst", 300, 1, 5)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         ss.make_smoothing_spline(t, y, "r:1", 1e-2)
-        ss.make_smoothing_spline(t, y, "r:1", loss="huber")
+
+
+def test_robust_losses_have_the_test_of_the_motion_only():
+    # Noise that varies cannot be told from outliers.
+    index, rate, squares = np.arange(400.0), np.ones(400), np.ones(400)
+    rate[100:150], squares[96:144] = 40, 30
+    energy, constant = np.append(0.0, np.cumsum(rate)), np.full(400, 0.25)
+    data = Recording(index, index, np.ones(400), squares, np.arange(401) - 0.5, energy, constant, 3)
+    assert len(findings(data)) == 2
+    (found,) = findings(data, robust=True)
+    assert FASTER in found.message and "or the curve follows outliers" in found.message

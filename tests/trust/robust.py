@@ -13,6 +13,9 @@ import symspline as ss
 
 from .outcome import Outcome, outcome_of
 
+# More consecutive outliers than this are reported.
+_BURST = 5
+
 _Path = Callable[[Any], Any]
 
 
@@ -80,8 +83,11 @@ def _outcome(name: str, loss: str, seed: int) -> Outcome:
         found = ss.make_smoothing_spline(t, points, space, loss=loss)
         return float(space.distance(found(x), path(x)).max()) / usual
 
-    # Without outliers, too, a warning says that a curve follows nearly all data.
-    return outcome_of(fit, sound=not caught)
+    # Without outliers, too, a warning says that a curve follows nearly all data. Runs of outliers are reported, because
+    # they could be bursts of motion.
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], bad, [0]])))
+    longest = max(np.diff(edges)[::2], default=0)
+    return outcome_of(fit, sound=not caught and longest <= _BURST)
 
 
 KINDS = {

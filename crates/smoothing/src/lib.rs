@@ -13,6 +13,7 @@
 //! Gauss–Newton*.
 
 pub mod along;
+pub mod audit;
 mod banded;
 mod bordered;
 mod chain;

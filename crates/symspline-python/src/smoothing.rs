@@ -11,6 +11,7 @@ use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedA
 use pyo3::prelude::*;
 use pyo3::types::{PyListMethods, PyTuple, PyTupleMethods};
 use symspline_engine::parallel;
+use symspline_engine::smoothing::audit::{Recording, ResidualStatistics, Unequal};
 use symspline_engine::smoothing::{
     Data, Loss, Observations, Options, Outcome, Report, Samples, Selection, Smooth, State, Tier, chi,
     fit_cumulative as fit, inverse_of_weights, process_variance as process, smooth as run,
@@ -283,6 +284,58 @@ pub fn process_variance<'py>(
 #[pyfunction]
 pub fn chi_squared(m: usize, probability: f64) -> f64 {
     chi::quantile(m, probability)
+}
+
+/// For every curve: two medians, the mean square, the mean product, and the number of products; the sizes.
+type OfResiduals<'py> = ([Vec<f64>; 4], Vec<usize>, Bound<'py, PyArrayDyn<f64>>);
+
+/// [`ResidualStatistics`] of residuals (curves, N, d), and deviations (curves, N - 2). `limits` and `variances` have one
+/// value per curve.
+#[pyfunction]
+pub fn residual_statistics<'py>(
+    py: Python<'py>,
+    rows: Array<'py>,
+    neighbours: Array<'py>,
+    limits: Array<'py>,
+    variances: Array<'py>,
+) -> PyResult<OfResiduals<'py>> {
+    let [curves, n, d] = [0, 1, 2].map(|axis| rows.shape()[axis]);
+    let beside = neighbours.shape()[1];
+    let (rows, neighbours) = (in_order(&rows)?, in_order(&neighbours)?);
+    let (limits, variances) = (in_order(&limits)?, in_order(&variances)?);
+    let of = |c: usize| {
+        let (own, near) = (&rows[c * n * d..][..n * d], &neighbours[c * beside..][..beside]);
+        ResidualStatistics::new(own, d, near, limits[c], variances[c])
+    };
+    let found = watched(py, None, curves, is_long(rows.len()), |_| (0..curves).map(of).collect::<Vec<_>>())?;
+    let column = |part: fn(&ResidualStatistics) -> f64| found.iter().map(part).collect();
+    let numbers =
+        [column(|x| x.medians[0]), column(|x| x.medians[1]), column(|x| x.square), column(|x| x.lagged)];
+    let out = zeros(py, &[curves, n])?;
+    let mut write = out.readwrite();
+    let sizes = write.as_slice_mut()?;
+    found.iter().zip(sizes.chunks_exact_mut(n.max(1))).for_each(|(x, row)| row.copy_from_slice(&x.sizes));
+    drop(write);
+    Ok((numbers, found.iter().map(|x| x.products).collect(), out))
+}
+
+/// The tests of constant smoothness and of constant noise for one curve: score, first and last datum, and ratio.
+#[pyfunction]
+pub fn unequal_bins(
+    times: Array<'_>,
+    leverages: Array<'_>,
+    squares: Array<'_>,
+    knots: Array<'_>,
+    energy: Array<'_>,
+    m: usize,
+    least: f64,
+) -> PyResult<[(f64, [usize; 2], f64); 2]> {
+    let [times, leverages, squares, knots, energy] =
+        [&times, &leverages, &squares, &knots, &energy].map(in_order);
+    let (times, leverages, squares, knots, energy) = (times?, leverages?, squares?, knots?, energy?);
+    let recording = Recording { times, leverages, squares, knots, energy, m };
+    let of = |Unequal { score, place, ratio }| (score, place, ratio);
+    Ok([of(recording.smoothness(least)), of(recording.noise(least))])
 }
 
 /// Control points, and of each curve whether it converged, its iterations, the last step, and the sum of squares.

@@ -151,9 +151,14 @@ def normal_of_chi_squared(ratio: float, freedom: float) -> float:
     return float((np.cbrt(ratio) - (1.0 - spread)) / np.sqrt(spread))
 
 
-def median_square(squares: Doubles, d: int) -> float:
+def median_of_chi_squared(d: float) -> float:
+    """Return the median of the squared length of d independent standard normal numbers, for d rounded to 1 or more."""
+    return _core.chi_squared(max(1, round(d)), 0.5)
+
+
+def median_square(squares: Doubles, d: float) -> float:
     """Return the variance of normal residuals from the median of the squared lengths of their d components."""
-    return float(np.median(squares)) / _core.chi_squared(d, 0.5)
+    return float(np.median(squares)) / median_of_chi_squared(d)
 
 
 def autocorrelation(rows: Doubles) -> tuple[float, int]:
@@ -217,7 +222,7 @@ def examine(given: Residuals) -> Finding:
         return Finding()
     squares = np.nansum(rows**2, axis=1)
     robust = given.loss != "linear"
-    scale = median_square(squares[used], max(1, round(count / used.sum()))) / left
+    scale = median_square(squares[used], count / used.sum()) / left
     finding = Finding(freedom=count * left)
     if robust:
         # Outliers would dominate the mean square, so the median replaces it.
@@ -301,32 +306,26 @@ def examine_smoothing(rows: Doubles, neighbours: Doubles, leverage: Doubles, rob
     """
     known = np.isfinite(rows)
     used = known.any(axis=2)
-    counts = used.sum(axis=1)
-    entries = known.sum(axis=(1, 2))
-    d = np.rint(entries / np.maximum(counts, 1)).astype(int)
-    chi = np.array([_core.chi_squared(max(int(own), 1), 0.5) for own in d])
+    counts, entries = used.sum(axis=1), known.sum(axis=(1, 2))
+    chi = np.array([median_of_chi_squared(own) for own in (entries / np.maximum(counts, 1)).tolist()])
     moderate = leverage <= _MODERATE
-    left = np.where(leverage < 1, 1.0 - leverage, np.nan)
-    filled = np.where(known, rows, 0.0)
-    scale = _median(np.where(used, (filled**2).sum(axis=2), np.nan)) / chi / left
-    noise = _median(neighbours) / chi
+    # Variances divided by medians of squared lengths.
+    variance = 1 / chi / np.where(leverage < 1, 1.0 - leverage, np.nan)
+    # The limits are larger for few data, which vary more.
+    few = 1.0 + 2.0 / np.sqrt(np.maximum(counts, 1))
+    limit = np.array([largest_expected(own) for own in entries.tolist()]) * few * np.where(moderate, 1.0, _UNEVEN)
+    columns, products, sizes = _core.residual_statistics(rows, neighbours, limit, variance)
+    lengths, deviations, square, lagged = map(np.array, columns)
+    scale, noise = lengths * variance, deviations / chi
     # If the median residual is zero, the curve is exact. Equal neighbours, as of rounded data, contain no estimate of
     # the noise.
     enough = (counts >= _FEW_DATA) & (leverage <= _HIGH) & (scale > 0) & (noise > 0)
     enough &= np.isfinite(neighbours).sum(axis=1) >= _FEW_DATA // 2
-    # The limit is larger for few data, whose ratio varies more.
-    stiff = enough & moderate & (scale > (_NEIGHBOURS * (1 + 2 / np.sqrt(np.maximum(counts, 1)))) ** 2 * noise)
+    stiff = enough & moderate & (scale > (_NEIGHBOURS * few) ** 2 * noise)
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.where(stiff, np.sqrt(scale / noise), 1.0)
-        sizes = np.abs(filled).max(axis=2) / np.sqrt(np.where(scale > 0, scale, np.inf))[:, None]
-    expected = np.array([largest_expected(int(own)) for own in entries])
-    limit = expected * (1.0 + 2.0 / np.sqrt(np.maximum(counts, 1))) * np.where(moderate, 1.0, _UNEVEN)
+        sizes = sizes / np.sqrt(np.where(scale > 0, scale, np.inf))[:, None]
     far = sizes > limit[:, None]
-    inner = known & ~far[..., None]
-    pairs = inner[:, 1:] & inner[:, :-1]
-    products = np.maximum(pairs.sum(axis=(1, 2)), 1)
-    square = np.where(inner, filled**2, 0.0).sum(axis=(1, 2)) / np.maximum(inner.sum(axis=(1, 2)), 1)
-    lagged = np.where(pairs, filled[:, 1:] * filled[:, :-1], 0.0).sum(axis=(1, 2)) / products
     correlation = lagged / np.where(square > 0, square, np.inf) + leverage
     correlated = np.abs(correlation) > np.maximum(_CORRELATED, SIGNIFICANT / np.sqrt(products))
     outliers = far & enough[:, None] & (not robust)
@@ -341,14 +340,3 @@ def examine_smoothing(rows: Doubles, neighbours: Doubles, leverage: Doubles, rob
         run = long_run(rejected[numbers], max(_RUN_OF_DATA, _SHARE_OF_DATA * len(numbers))) if robust else None
         runs.append(run and (int(numbers[run[0]]), int(numbers[run[1]])))
     return SmoothingFinding(ratio, np.where(enough & moderate & correlated, correlation, 0.0), outliers, sizes, runs)
-
-
-def _median(values: Doubles) -> Doubles:
-    """Return the median of the finite numbers of each row; NaN if there are none."""
-    ordered = np.sort(values, axis=1)
-    count = np.isfinite(values).sum(axis=1)
-    if not values.shape[1]:
-        return np.full(len(values), np.nan)
-    middle = [np.clip((count + k) // 2, 0, values.shape[1] - 1) for k in (-1, 0)]
-    each = [np.take_along_axis(ordered, own[:, None], axis=1)[:, 0] for own in middle]
-    return np.where(count > 0, 0.5 * (each[0] + each[1]), np.nan)

@@ -8,13 +8,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .._curves.curve import CurveArrays
 from .._faults import of_index
-from .._spaces import Array, Doubles, Space, factors_of
+from .._spaces import Array, Doubles, Euclidean, Space
 from .._warnings import warn
 from .audit import Finding, Residuals, SmoothingFinding, corner_of, examine, examine_smoothing, roots_of
 from .data import SmoothingData, points_of
-from .factors import in_part, split
+from .factors import in_part
 from .posterior import coordinates
 from .solve import Smoothed
 from .warned import SmoothingWarning
@@ -50,7 +49,7 @@ class Sensor(NamedTuple):
 
 def warn_of_residuals(
     space: Space,
-    curve: CurveArrays,
+    at_data: list[Array],
     noisy: SmoothingData,
     smoothed: list[Smoothed],
     given: list[Any],
@@ -63,8 +62,8 @@ def warn_of_residuals(
     ----------
     space : Space
         Space of the curves.
-    curve : CurveArrays
-        Curves.
+    at_data : list of ndarray
+        Points of the curves at the data, in every part.
     noisy : SmoothingData
         Data.
     smoothed : list of Smoothed
@@ -75,14 +74,9 @@ def warn_of_residuals(
     loss : str
         Loss of all data.
     """
-    times, batch = noisy.times, noisy.batch
-    values = [
-        x
-        for factor, part in zip(factors_of(space), curve.parts, strict=True)
-        for x in split(factor, part.evaluate(times, "point", "raise", times.ndim > 1))
-    ]
+    batch = noisy.batch
     found: list[tuple[tuple[int, ...], str]] = []
-    for number, (x, (part, y), own) in enumerate(zip(values, points_of(noisy, space), smoothed, strict=True)):
+    for number, (x, (part, y), own) in enumerate(zip(at_data, points_of(noisy, space), smoothed, strict=True)):
         known, asked, good = (np.reshape(flags, -1) for flags in (given[number], chosen[number], own.report.converged))
         examined = np.flatnonzero(good & (known | asked))
         if not len(examined):
@@ -133,7 +127,7 @@ class _Examined(NamedTuple):
         used = (weights > 0) & space._where_finite(x) & space._where_finite(y)
         rows = np.full((*used.shape, space.dim), np.nan)
         at, log = x[used], space._apply("log", p=x[used], q=y[used])
-        found = coordinates(space, at, space.frame(at), log)
+        found = log if isinstance(space, Euclidean) else coordinates(space, at, space.frame(at), log)
         if precision.information is None:
             rows[used] = found * np.sqrt(weights[used])[:, None]
         else:

@@ -47,7 +47,7 @@ from .data import (
     read_noisy,
     valid_curves,
 )
-from .factors import grouped, is_several, join, parts_of_factor, smoothed_spaces, split_ends
+from .factors import grouped, is_several, join, parts_of_factor, smoothed_spaces, split, split_ends
 from .knots import NO_CURVE, Knots, has_all_times, in_gaps, in_long_gaps, knots_for, with_enough_knots
 from .outliers import warn_of_outliers
 from .regression import check_infinite, geodesic_knots, geodesic_options, is_infinite, with_infinite_lam
@@ -394,11 +394,18 @@ def make_smoothing_spline(
     # Between two knots there is nothing to choose.
     are_chosen = [spread(np.isnan(own) & (at.times.shape[-1] > 2)) for own in lams]
     are_given = [spread(np.isfinite(own)) for own in sigmas]
+    per_curve = whole.times.ndim > 1
+    at_data = [
+        rows
+        for factor, part in zip(factors, fitted.curve.parts, strict=True)
+        for rows in split(factor, part.evaluate(whole.times, "point", "raise", per_curve))
+    ]
     if not is_silent(SmoothingWarning):
-        warn_of_residuals(space, fitted.curve, whole, noise, are_given, are_chosen, options.loss)
-        if loss == "linear" and penalty == "acceleration":
-            warn_of_varying(space, fitted.curve, whole, noise, are_chosen, end_kinds(bc_type))
-    warn_of_spread(space, fitted.curve, whole, [part.report.df for part in noise])
+        warn_of_residuals(space, at_data, whole, noise, are_given, are_chosen, options.loss)
+        if penalty == "acceleration":
+            varying = are_chosen, end_kinds(bc_type), options.loss != "linear"
+            warn_of_varying(space, fitted.curve, at_data, whole, noise, *varying)
+    warn_of_spread(space, at_data, whole, [part.report.df for part in noise])
     warn_of_signs(space, [valid_data])
     if whole.used.all():
         warn_of_held_points(whole.times, whole.points, batch, SmoothingWarning)

@@ -28,8 +28,6 @@ _BIN = 6.0
 _SMOOTHNESS, _NOISE = 7.0, 4.5
 # Least energy per degree of freedom in the fast part, relative to the whole curve. Waves that beat reach 2.2.
 _FASTER = 4.0
-# ∫(1 + x⁴)⁻² / ∫(1 + x⁴)⁻¹: the information per local degree of freedom.
-_RATIO = 3 / 4
 
 
 class Finding(NamedTuple):
@@ -66,39 +64,37 @@ class Recording(NamedTuple):
     m: int
 
 
-def findings(recording: Recording) -> list[Finding]:
-    """Return the tests that failed, in decreasing order of their scores."""
+def findings(recording: Recording, robust: bool = False) -> list[Finding]:
+    """Return the tests that failed, in decreasing order of their scores. Robust losses have no test of the noise."""
     h = recording.weights * recording.leverage
     df, squares = float(h.sum()), recording.weights * recording.squares
     left = len(h) - df
     if len(h) < _DATA or min(df, left) < _FREEDOM or not np.isfinite(squares).all() or squares.sum() == 0:
         return []
+    smoothness, noise = _core.unequal_bins(
+        recording.times, h, squares, recording.at, recording.energy, recording.m, _BIN
+    )
     found = []
-    # Bins end at data. Two degrees of freedom per coordinate belong to geodesics, which have no energy.
-    ends = _bins(h)
-    freedom = np.diff(np.cumsum(h)[ends], prepend=0.0) * max(df - 2, 0.0) / df
-    energy = np.diff(np.interp(_after(recording.times, ends), recording.at, recording.energy), prepend=0.0)
-    score, place = _unequal(energy, freedom, recording.m * freedom / _RATIO)
-    run = slice(place[0], place[1] + 1)
-    if score > _SMOOTHNESS and energy[run].sum() / freedom[run].sum() > _FASTER * energy.sum() / freedom.sum():
-        faster = _interval(recording.t, ends, place)
+    score, place, ratio = smoothness
+    if score > _SMOOTHNESS and ratio > _FASTER:
+        faster = _interval(recording.t, place)
+        # A robust loss may have selected a run of outliers.
+        remedy = (
+            ", or the curve follows outliers. Plot the data, and pass weights of 0 for outliers. If there are none, "
+            "fit this part and the others separately"
+            if robust
+            else ". The curve is too smooth there, and follows the noise elsewhere. Fit this part and the others "
+            "separately, or pass a smaller lam"
+        )
         found.append(
             Finding(
                 score / _SMOOTHNESS,
-                f"the motion is faster between t = {faster} than one lam for the whole recording allows. The curve is "
-                "too smooth there, and follows the noise elsewhere. Fit this part and the others separately, or pass a "
-                "smaller lam",
+                f"the motion is faster between t = {faster} than one lam for the whole recording allows{remedy}",
             )
         )
-    ends = _bins(1 - h)
-    freedom, information = (np.diff(np.cumsum(x)[ends], prepend=0.0) for x in (1 - h, 1 - (2 - _RATIO) * h))
-    information = recording.m * freedom**2 / np.maximum(information, 1e-3 * freedom)
-    sums = np.diff(np.cumsum(squares)[ends], prepend=0.0)
-    # The first and the last bin do not count, because natural ends cannot follow a motion that accelerates there.
-    score, (first, last) = _unequal(*(values[1:-1] for values in (sums, freedom, information)))
-    place = first + 1, last + 1
-    if score > _NOISE:
-        noisier = _interval(recording.t, ends, place)
+    score, place, _ = noise
+    if score > _NOISE and not robust:
+        noisier = _interval(recording.t, place)
         found.append(
             Finding(
                 score / _NOISE,
@@ -110,53 +106,20 @@ def findings(recording: Recording) -> list[Finding]:
     return sorted(found, reverse=True)
 
 
-def _bins(freedom: Doubles) -> Any:
-    """Return the last index of each bin, of at least `_BIN` degrees of freedom."""
-    sums = np.cumsum(freedom)
-    count = max(int(sums[-1] / _BIN), 1)
-    ends = np.searchsorted(sums, np.linspace(0, sums[-1], count + 1)[1:-1])
-    return np.unique(np.append(ends, len(freedom) - 1))
-
-
-def _after(times: Doubles, ends: Any) -> Doubles:
-    """Return the times midway between the last datum of each bin and the next datum."""
-    following = np.minimum(ends + 1, len(times) - 1)
-    return np.asarray(0.5 * (times[ends] + times[following]))
-
-
-def _unequal(sums: Doubles, freedom: Doubles, information: Doubles) -> tuple[float, tuple[int, int]]:
-    """Test equal ratios of sums of squares to degrees of freedom.
-
-    Returns
-    -------
-    score : float
-        χ² transformed to a standard normal score (Wilson & Hilferty 1931).
-    place : tuple of int
-        The run of bins with the largest ratios.
-    """
-    count = len(sums) - 1
-    if count < 1 or not sums.sum() > 0:
-        return 0.0, (0, 0)
-    variance = 2 / (9 * information)
-    z = ((sums / freedom * (freedom.sum() / sums.sum())) ** (1 / 3) - (1 - variance)) / np.sqrt(variance)
-    z -= np.sum(z * np.sqrt(information)) / np.sum(np.sqrt(information))
-    spread = 2 / (9 * count)
-    score = ((np.sum(z**2) / count) ** (1 / 3) - (1 - spread)) / np.sqrt(spread)
-    first = last = int(np.argmax(z))
-    while first > 0 and z[first - 1] > 1:
-        first -= 1
-    while last < count and z[last + 1] > 1:
-        last += 1
-    return float(score), (first, last)
-
-
-def _interval(t: Array, ends: Any, place: tuple[int, int]) -> str:
-    first = 0 if place[0] == 0 else ends[place[0] - 1] + 1
-    return f"{short_repr(t[first])} and {short_repr(t[ends[place[1]]])}"
+def _interval(t: Array, place: list[int]) -> str:
+    first, last = place
+    return f"{short_repr(t[first])} and {short_repr(t[last])}"
 
 
 def warn_of_varying(
-    space: Space[Any], curve: CurveArrays, noisy: SmoothingData, smoothed: list[Smoothed], chosen: list[Any], kinds: Any
+    space: Space[Any],
+    curve: CurveArrays,
+    at_data: list[Array],
+    noisy: SmoothingData,
+    smoothed: list[Smoothed],
+    chosen: list[Any],
+    kinds: Any,
+    robust: bool,
 ) -> None:
     """Warn once if the motion or its noise varies along a curve whose λ was chosen.
 
@@ -164,6 +127,8 @@ def warn_of_varying(
     ----------
     curve : CurveArrays
         The curves.
+    at_data : list of ndarray
+        Their points at the data, in every space in which data were smoothed.
     noisy : SmoothingData
         The data.
     smoothed : list of Smoothed
@@ -172,6 +137,8 @@ def warn_of_varying(
         Whether λ was chosen from the data, for each curve.
     kinds : list of str or None
         Kinds of the ends.
+    robust : bool
+        Whether the loss is robust.
     """
     if noisy.times.shape[-1] < _DATA:
         return
@@ -187,7 +154,8 @@ def warn_of_varying(
         failed: list[tuple[tuple[int, ...], Finding]] = []
         for index in map(tuple, np.argwhere(good & np.reshape(chosen[number], good.shape)).tolist()):
             alone = part.take_batch(index) if index else part
-            found = findings(_recording(factor, alone, points[index], noisy, number, own[0], index, kinds))
+            pairs = at_data[number][index], points[index]
+            found = findings(_recording(factor, alone, pairs, noisy, number, own[0], index, kinds), robust)
             failed += [(index, found[0])] if found else []
         if failed:
             index, first = failed[0]
@@ -200,7 +168,7 @@ def warn_of_varying(
 def _recording(
     space: Space[Any],
     curve: Any,
-    points: Array,
+    pairs: tuple[Array, Array],
     noisy: SmoothingData,
     number: int,
     smoothed: Smoothed,
@@ -211,13 +179,11 @@ def _recording(
         x[index] if x.ndim > 1 else x for x in (noisy.t, noisy.times, noisy.precisions[number].weights)
     )
     used = weights > 0
-    t, times, weights, points = t[used], np.ascontiguousarray(times[used]), weights[used], points[used]
-    at = curve.evaluate(times, "point", "raise", False)
+    t, times, weights, at, points = t[used], np.ascontiguousarray(times[used]), weights[used], *(x[used] for x in pairs)
     knots = np.ascontiguousarray(curve.times)
     # The acceleration is nearly linear between knots.
     middle = 0.5 * (knots[1:] + knots[:-1])
-    base, acceleration = (curve.evaluate(middle, name, "raise", False) for name in ("point", "acceleration"))
-    energy = np.diff(knots) * space.norm(base, acceleration) ** 2
+    energy = np.diff(knots) * curve.evaluate(middle, "bend", "raise", False) ** 2
     leverage = _core.smoothing_variance(knots, np.ascontiguousarray(smoothed.band[index]), 0.0, times, 0, kinds)
     squares = space._apply("distance", p=at, q=points) ** 2
     return Recording(t, times, weights, squares, knots, np.append(0.0, np.cumsum(energy)), leverage, space.dim)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -9,12 +10,11 @@ from numpy.typing import NDArray
 
 from .. import _core
 from .._arrays import short_repr
-from .._curves.curve import CurveArrays
 from .._faults import of_index
-from .._spaces import Array, Space, factors_of
+from .._spaces import Array, Space
 from .._warnings import warn
 from .data import SmoothingData, points_of
-from .factors import in_part, split
+from .factors import in_part
 
 # Ratio of the degrees of freedom to the number of data from which a curve follows nearly all data.
 _ALL = 0.9
@@ -111,22 +111,28 @@ def _message(of: str, df: float, rough: bool, stiff: bool) -> str:
 # ---- data that are spread over all of a compact space, so that a smooth curve has little meaning ----
 
 
-def warn_of_spread(space: Space, curve: CurveArrays, noisy: SmoothingData, dfs: list[Any]) -> None:
+def warn_of_spread(space: Space, at_data: list[Array], noisy: SmoothingData, dfs: list[Any]) -> None:
     """Warn once if data of a curve are about as far from it as random points of the space would be.
 
     The degrees of freedom with which the curve follows the data are taken into account.
+
+    Parameters
+    ----------
+    at_data : list of ndarray
+        Points of the curve at the data, in every space in which data were smoothed.
+    noisy : SmoothingData
+        Data.
+    dfs : list of ndarray
+        Degrees of freedom in the same spaces.
     """
     every = -(-noisy.times.shape[-1] // _SAMPLE)
-    at = np.ascontiguousarray(noisy.times[..., ::every])
     chosen = (slice(None),) * len(noisy.batch) + (slice(None, None, every),)
-    parts = zip(factors_of(space), curve.parts, strict=True)
-    at_curve = [x for factor, part in parts for x in split(factor, part.evaluate(at, "point", "raise", at.ndim > 1))]
-    for x, (factor, own), precision, df in zip(at_curve, points_of(noisy, space), noisy.precisions, dfs, strict=True):
+    for x, (factor, own), precision, df in zip(at_data, points_of(noisy, space), noisy.precisions, dfs, strict=True):
         expected = random_distance(factor)
         if expected is None:
             continue
         counts = np.broadcast_to(_counts(precision.weights), (*noisy.batch, noisy.times.shape[-1]))
-        found = _median_distance(factor, x, own[chosen], counts[..., ::every])
+        found = _median_distance(factor, x[chosen], own[chosen], counts[..., ::every])
         count = np.sum(counts, axis=-1)
         # A curve through all data has no residuals to compare.
         far = np.argwhere(is_far(found, expected, count, df))
@@ -143,6 +149,7 @@ def warn_of_spread(space: Space, curve: CurveArrays, noisy: SmoothingData, dfs: 
             return
 
 
+@lru_cache(maxsize=64)
 def random_distance(space: Space) -> float | None:
     """Return the median distance of random points, or None for spaces without a largest distance."""
     if not np.isfinite(space.injectivity_radius) or np.isnan(space.curvature):

@@ -1,0 +1,191 @@
+//! Statistics of the residuals of a curve, from which tests decide whether its assumptions hold.
+
+/// ∫(1 + x⁴)⁻² / ∫(1 + x⁴)⁻¹: the information per local degree of freedom.
+const RATIO: f64 = 0.75;
+
+/// Statistics of the residuals of one curve, scaled to weight one.
+pub struct ResidualStatistics {
+    /// The median of the squared lengths of the residuals, and that of the squared deviations from neighbours.
+    pub medians: [f64; 2],
+    /// The mean square of a component, and the mean product of components of neighbours, without residuals beyond the
+    /// limit.
+    pub square: f64,
+    /// See `square`.
+    pub lagged: f64,
+    /// The number of these products.
+    pub products: usize,
+    /// The largest component of every residual.
+    pub sizes: Vec<f64>,
+}
+
+impl ResidualStatistics {
+    /// For residuals with d components, which are NaN without information. `limit` is that of the largest component
+    /// relative to the standard deviation, given the square of the latter divided by the first median.
+    pub fn new(rows: &[f64], d: usize, neighbours: &[f64], limit: f64, variance: f64) -> Self {
+        let rows = || rows.chunks_exact(d.max(1));
+        let known = |row: &[f64]| row.iter().copied().filter(|x| x.is_finite()).collect::<Vec<f64>>();
+        let square = |row: &[f64]| known(row).iter().map(|x| x * x).sum::<f64>();
+        let lengths = rows().filter(|row| row.iter().any(|x| x.is_finite())).map(square).collect();
+        let medians = [lengths, neighbours.to_vec()].map(median);
+        let sizes: Vec<f64> =
+            rows().map(|row| known(row).iter().map(|x| x.abs()).fold(0.0, f64::max)).collect();
+        let most = limit * (variance * medians[0]).sqrt();
+        // A median of zero has no limit.
+        let inner = |size: &f64| !(*size > most) || medians[0] == 0.0;
+        let (mut sums, mut counts, mut before) = ([0.0; 2], [0; 2], None);
+        for (row, size) in rows().zip(&sizes) {
+            let own = inner(size).then_some(row);
+            for (c, x) in own.into_iter().flatten().enumerate().filter(|(_, x)| x.is_finite()) {
+                (sums[0], counts[0]) = (sums[0] + x * x, counts[0] + 1);
+                let earlier: Option<&[f64]> = before;
+                if let Some(y) = earlier.map(|row| row[c]).filter(|y| y.is_finite()) {
+                    (sums[1], counts[1]) = (sums[1] + x * y, counts[1] + 1);
+                }
+            }
+            before = own;
+        }
+        let mean = |k: usize| sums[k] / counts[k].max(1) as f64;
+        ResidualStatistics { medians, square: mean(0), lagged: mean(1), products: counts[1].max(1), sizes }
+    }
+}
+
+/// The median of the finite numbers; NaN if there are none.
+fn median(values: Vec<f64>) -> f64 {
+    let mut own: Vec<f64> = values.into_iter().filter(|x| x.is_finite()).collect();
+    if own.is_empty() {
+        return f64::NAN;
+    }
+    let middle = own.len() / 2;
+    let above = *own.select_nth_unstable_by(middle, f64::total_cmp).1;
+    if own.len() % 2 == 1 {
+        return above;
+    }
+    0.5 * (above + own[..middle].iter().copied().fold(f64::NEG_INFINITY, f64::max))
+}
+
+/// A test of equal ratios of sums of squares to degrees of freedom in bins of data.
+pub struct Unequal {
+    /// χ² transformed to a standard normal score (Wilson & Hilferty 1931).
+    pub score: f64,
+    /// The first and the last datum of the bins with the largest ratios.
+    pub place: [usize; 2],
+    /// The ratio in these bins, divided by the ratio of all data.
+    pub ratio: f64,
+}
+
+/// A curve with its data: what the tests of constant smoothness and constant noise depend on.
+pub struct Recording<'a> {
+    /// Times of the data.
+    pub times: &'a [f64],
+    /// Leverages of the data.
+    pub leverages: &'a [f64],
+    /// Squared residuals, scaled to weight one.
+    pub squares: &'a [f64],
+    /// Knots, and the squared acceleration integrated up to each knot.
+    pub knots: &'a [f64],
+    /// See `knots`.
+    pub energy: &'a [f64],
+    /// The number of coordinates.
+    pub m: usize,
+}
+
+impl Recording<'_> {
+    /// The test of constant smoothness, in bins of at least so many local degrees of freedom.
+    pub fn smoothness(&self, least: f64) -> Unequal {
+        let ends = bins(self.leverages, least);
+        let df: f64 = self.leverages.iter().sum();
+        // Two degrees of freedom per coordinate belong to geodesics, which have no energy.
+        let bent = (df - 2.0).max(0.0) / df;
+        let freedom: Vec<f64> = sums(self.leverages, &ends).iter().map(|x| x * bent).collect();
+        let information: Vec<f64> = freedom.iter().map(|x| self.m as f64 * x / RATIO).collect();
+        // Bins end at the times midway between their last datum and the next one.
+        let last = self.times.len() - 1;
+        let until =
+            |&end: &usize| self.energy_until(0.5 * (self.times[end] + self.times[(end + 1).min(last)]));
+        let energies: Vec<f64> = ends.iter().map(until).collect();
+        let before = [0.0].into_iter().chain(energies.iter().copied());
+        let energies: Vec<f64> = energies.iter().zip(before).map(|(x, y)| x - y).collect();
+        unequal(&energies, &freedom, &information, &ends, 0)
+    }
+
+    /// The same for the noise, and degrees of freedom of the residuals.
+    pub fn noise(&self, least: f64) -> Unequal {
+        let of = |factor: f64| self.leverages.iter().map(|h| 1.0 - factor * h).collect::<Vec<f64>>();
+        let left = of(1.0);
+        let ends = bins(&left, least);
+        let freedom = sums(&left, &ends);
+        let information = sums(&of(2.0 - RATIO), &ends);
+        let of_bin = |(f, x): (&f64, f64)| self.m as f64 * f * f / x.max(1e-3 * f);
+        let information: Vec<f64> = freedom.iter().zip(information).map(of_bin).collect();
+        // The first and the last bin do not count, because natural ends cannot follow a motion that accelerates there.
+        unequal(&sums(self.squares, &ends), &freedom, &information, &ends, 1)
+    }
+
+    fn energy_until(&self, time: f64) -> f64 {
+        let after = self.knots.partition_point(|knot| *knot <= time).clamp(1, self.knots.len() - 1);
+        let (a, b) = (self.knots[after - 1], self.knots[after]);
+        let share = ((time - a) / (b - a)).clamp(0.0, 1.0);
+        self.energy[after - 1] + share * (self.energy[after] - self.energy[after - 1])
+    }
+}
+
+/// The last datum of each bin of at least so many degrees of freedom.
+fn bins(freedom: &[f64], least: f64) -> Vec<usize> {
+    let total: f64 = freedom.iter().sum();
+    let count = ((total / least) as usize).max(1);
+    let (mut ends, mut sum) = (Vec::with_capacity(count), 0.0);
+    for (i, x) in freedom.iter().enumerate() {
+        sum += x;
+        if sum >= total * (ends.len() + 1) as f64 / count as f64 && ends.len() + 1 < count {
+            ends.push(i);
+        }
+    }
+    ends.push(freedom.len() - 1);
+    ends.dedup();
+    ends
+}
+
+/// The sums over bins.
+fn sums(values: &[f64], ends: &[usize]) -> Vec<f64> {
+    let starts = [0].into_iter().chain(ends.iter().map(|end| end + 1));
+    starts.zip(ends).map(|(start, end)| values[start..=*end].iter().sum()).collect()
+}
+
+/// The test without `margin` bins at either end.
+fn unequal(sums: &[f64], freedom: &[f64], information: &[f64], ends: &[usize], margin: usize) -> Unequal {
+    let none = Unequal { score: 0.0, place: [0, 0], ratio: 1.0 };
+    let count = sums.len();
+    if count < 2 * margin + 2 {
+        return none;
+    }
+    let own = margin..count - margin;
+    let (sums, freedom, information) = (&sums[own.clone()], &freedom[own.clone()], &information[own]);
+    let total = |x: &[f64]| x.iter().sum::<f64>();
+    if !(total(sums) > 0.0) {
+        return none;
+    }
+    let usual = total(sums) / total(freedom);
+    let score = |(k, n): (usize, &f64)| {
+        let variance = 2.0 / (9.0 * n);
+        ((sums[k] / (freedom[k] * usual)).cbrt() - (1.0 - variance)) / variance.sqrt()
+    };
+    let mut z: Vec<f64> = information.iter().enumerate().map(score).collect();
+    let roots: Vec<f64> = information.iter().map(|n| n.sqrt()).collect();
+    let mean = z.iter().zip(&roots).map(|(z, root)| z * root).sum::<f64>() / total(&roots);
+    z.iter_mut().for_each(|z| *z -= mean);
+    let degrees = (z.len() - 1) as f64;
+    let spread = 2.0 / (9.0 * degrees);
+    let squares = z.iter().map(|z| z * z).sum::<f64>();
+    let score = ((squares / degrees).cbrt() - (1.0 - spread)) / spread.sqrt();
+    let largest = (0..z.len()).max_by(|&a, &b| z[a].total_cmp(&z[b])).unwrap_or(0);
+    let (mut first, mut last) = (largest, largest);
+    while first > 0 && z[first - 1] > 1.0 {
+        first -= 1;
+    }
+    while last + 1 < z.len() && z[last + 1] > 1.0 {
+        last += 1;
+    }
+    let ratio = total(&sums[first..=last]) / total(&freedom[first..=last]) / usual;
+    let start = (first + margin).checked_sub(1).map_or(0, |bin| ends[bin] + 1);
+    Unequal { score, place: [start, ends[last + margin]], ratio }
+}
