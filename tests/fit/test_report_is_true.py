@@ -267,12 +267,14 @@ def test_rounding_of_long_steps_is_reported(name):
         converged += 1
         starts, ends = one_sided(spline, 0)
         missed = space.distance(ends, p[1:]).max() / max(space.norm(p, spline.velocities))
-        assert missed <= 2e-8, radius
+        # Errors above 1e-8 are those of the report.
+        allowed = 2 * max(1e-8, spline.report.residual)
+        assert missed <= allowed <= 2e-7, radius
         after, before = one_sided(spline, 1)
         carried = space.transport(ends[:-1], starts[1:], before[:-1])
         largest = max(space.norm(starts, after).max(), space.norm(ends, before).max())
-        assert space.norm(starts[1:], carried - after[1:]).max() <= 2e-8 * largest, radius
-    assert 5 <= converged <= 25
+        assert space.norm(starts[1:], carried - after[1:]).max() <= allowed * largest, radius
+    assert converged >= 5
 
 
 @pytest.mark.parametrize(("name", "step"), [("hyperbolic:2", 11.0), ("spd:3", 14.0)])
