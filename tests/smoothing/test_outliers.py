@@ -150,3 +150,26 @@ def test_a_burst_that_a_robust_loss_rejects(loss):
     burst[200:215] += [1.0, -0.5]
     with pytest.warns(ss.SmoothingWarning, match=r"the loss rejects all data from index 200 to 214.*loss='linear'"):
         ss.make_smoothing_spline(t, burst, "r:2", loss=loss)
+
+
+@pytest.mark.parametrize("even", [False, True])
+@pytest.mark.parametrize("name", ["r:3", "so:3", "sphere:2"])
+def test_runs_that_the_path_could_reach_are_rejected(name, even):
+    # The steps at the ends of the runs are at most six times those of the path, as in a fast part of it.
+    space, rng, n = ss.space(name), np.random.default_rng(3), 100
+    t = START + (np.linspace(0, 10, n) if even else np.sort(rng.uniform(0, 10, n)))
+    points = path(space, t)
+    points = space.exp(points, 1e-7 * space.random_tangent(rng, points))
+    bad = np.zeros(n, bool)
+    for first, length in ((20, 10), (52, 5), (80, 8)):
+        own = slice(first, first + length)
+        v = space.random_tangent(rng, points[first])
+        v *= (12 if name == "r:3" else 0.6) / space.norm(points[first], v)
+        same = np.broadcast_to(points[first], points[own].shape)
+        points[own] = space.exp(points[own], space.transport(same, points[own], np.broadcast_to(v, same.shape)))
+        bad[own] = True
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ss.SmoothingWarning)
+        robust = ss.make_smoothing_spline(t, points, space, loss="cauchy")
+        clean = ss.make_smoothing_spline(t[~bad], points[~bad], space, criterion="reml")
+    assert largest(space, robust, t) < 1.5 * largest(space, clean, t)

@@ -98,6 +98,7 @@ impl Progress {
         match lam {
             Lam::Same => {}
             Lam::Anew => (self.settled, self.lam, self.report.rounds) = (false, None, 0),
+            Lam::Near => (self.settled, self.report.rounds) = (false, 0),
             Lam::To(lam) => self.lam = Some(lam),
             Lam::Times(factor) => self.lam = self.lam.map(|lam| lam * factor),
         }

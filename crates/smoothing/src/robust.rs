@@ -11,8 +11,9 @@
 //!    because ordinary residuals of selected data vanish where the curve follows each of them.
 //! 2. *Chosen*: the same selection, with λ by the requested criterion.
 //! 3. *Final*: iteratively reweighted least squares (Holland & Welsch 1977) with that λ, times the mean weight, and the
-//!    noise level of the first stage. If the curve rejects selected data, λ is too large for them, because a
-//!    redescending loss then treats every bend as outliers. The λ of the first stage replaces it.
+//!    noise level of the second stage. If that is much larger than in the first stage, or the curve rejects selected
+//!    data, λ is too large for them, because a redescending loss then treats every bend as outliers. The λ and the noise
+//!    level of the first stage replace those of the second.
 //!
 //! If the curve follows nearly all data, the noise is too small to be estimated at this sampling rate. Deviations are
 //! then those from interpolation, and only isolated data that deviate much more than others are rejected. The curve of
@@ -37,7 +38,9 @@ const FALLS: f64 = 0.25;
 const ALL: f64 = 0.9;
 /// The squared limit, relative to that of the selection, beyond which the final curve rejects selected data.
 const LEFT: f64 = 2.0;
-/// The limit for squared deviations in that case, in medians.
+/// The ratio of the noise levels of the second and the first stage above which the curve of the second is too stiff.
+const STIFFER: f64 = 2.0;
+/// The limit for squared deviations of data whose noise is too small, in medians.
 const GROSS: f64 = 900.0;
 /// Deviations grow with the time between the neighbours, their squares about with this power.
 const GROWTH: f64 = 5.0;
@@ -100,14 +103,16 @@ pub struct Robust {
     rounding: f64,
     /// The selected data: one if included, otherwise zero.
     kept: Vec<f64>,
+    /// The first selection.
+    chain: Vec<f64>,
     /// Whether data have a weight.
     used: Vec<bool>,
     /// Earlier selections.
     seen: Vec<Vec<f64>>,
     /// The present limit for squared residuals.
     limit: f64,
-    /// λ of the first stage, until the last stage has used it.
-    first: Option<f64>,
+    /// λ and the noise level of the first stage, until the last stage has used them.
+    first: Option<(f64, f64)>,
     /// Whether the last stage is least squares for the selected data.
     truncated: bool,
 }
@@ -118,6 +123,8 @@ pub enum Lam {
     Same,
     /// λ is chosen from its whole range.
     Anew,
+    /// λ is chosen, and the search begins near the present one.
+    Near,
     /// λ is given.
     To(f64),
     /// λ is multiplied by a number.
@@ -137,6 +144,7 @@ impl Robust {
             lam: None,
             rounding: 0.0,
             kept: Vec::new(),
+            chain: Vec::new(),
             used: Vec::new(),
             seen: Vec::new(),
             limit: f64::INFINITY,
@@ -157,7 +165,8 @@ impl Robust {
     ) -> Self {
         let used = weights.iter().map(|w| *w > 0.0).collect();
         let (stage, known, sigma) = (Stage::Rejecting, sigma.is_some(), sigma.unwrap_or(0.0));
-        Robust { loss, stage, sigma, known, lam, rounding, kept, used, ..Robust::plain(m) }
+        let chain = kept.clone();
+        Robust { loss, stage, sigma, known, lam, rounding, kept, chain, used, ..Robust::plain(m) }
     }
 
     /// The residual beyond which the loss grows more slowly.
@@ -241,7 +250,10 @@ impl Robust {
             Stage::Rejecting => self.select(at),
             Stage::Chosen => self.finish(at),
             Stage::Final => match self.first.take() {
-                Some(lam) => Lam::To(lam),
+                Some((lam, sigma)) => {
+                    self.sigma = sigma;
+                    Lam::To(lam)
+                }
                 None => {
                     self.truncated = true;
                     Lam::Same
@@ -252,18 +264,15 @@ impl Robust {
 
     /// Selects data again, or ends the first stage.
     fn select(&mut self, at: &AtCurve) -> Lam {
-        let (anew, count) = (if self.lam.is_some() { Lam::Same } else { Lam::Anew }, self.count());
+        let count = self.count();
         let squares = self.deleted(at);
-        let of_kept = |squares: &[f64]| -> Vec<f64> {
-            squares.iter().zip(&self.kept).filter(|(_, kept)| **kept > 0.0).map(|(x, _)| *x).collect()
-        };
         let interpolated = !self.known && at.freedom > ALL * count;
         self.selection = if interpolated { Selection::Interpolated } else { Selection::Sound };
         let next = if interpolated {
-            self.sigma = self.scale(of_kept(&squares));
+            self.sigma = self.scale(self.of_kept(&squares));
             self.gross(&squares, at)
         } else {
-            let own = of_kept(&squares);
+            let own = self.of_kept(&squares);
             let largest = own.iter().copied().fold(0.0, f64::max);
             if !self.known {
                 self.sigma = self.scale(own);
@@ -287,7 +296,7 @@ impl Robust {
             } else if self.selection == Selection::Sound && self.differs(&next) {
                 self.selection = Selection::Unsettled;
             }
-            self.first = at.lam;
+            self.first = at.lam.map(|lam| (lam, self.sigma));
             // The M-estimator is undefined for data without noise.
             let exact = !self.known && self.sigma <= self.rounding;
             if self.selection == Selection::Interpolated || exact {
@@ -298,11 +307,11 @@ impl Robust {
                 return self.finish(at);
             }
             self.stage = Stage::Chosen;
-            return anew;
+            return Lam::Anew;
         }
         let before = std::mem::replace(&mut self.kept, next);
         self.seen.push(before);
-        anew
+        if self.lam.is_some() { Lam::Same } else { Lam::Near }
     }
 
     fn finish(&mut self, at: &AtCurve) -> Lam {
@@ -310,9 +319,15 @@ impl Robust {
         if self.lam.is_some() {
             return Lam::Same;
         }
-        if self.leaves(at.squares)
-            && let Some(lam) = self.first.take()
+        // The noise level refers to the curve: that of the first stage may follow part of the noise.
+        let first = self.sigma;
+        if !self.known {
+            self.sigma = self.scale(self.of_kept(&self.deleted(at)));
+        }
+        if (self.sigma > STIFFER * first || self.leaves(at.squares))
+            && let Some((lam, sigma)) = self.first.take()
         {
+            self.sigma = sigma;
             return Lam::To(lam);
         }
         let weights = self.weights(at.squares);
@@ -326,6 +341,10 @@ impl Robust {
         const NEAR_LIMIT: f64 = 0.02;
         let changed = next.iter().zip(&self.kept).filter(|(a, b)| a != b).count();
         changed as f64 > 2.0 + NEAR_LIMIT * next.len() as f64
+    }
+
+    fn of_kept(&self, values: &[f64]) -> Vec<f64> {
+        values.iter().zip(&self.kept).filter(|(_, kept)| **kept > 0.0).map(|(x, _)| *x).collect()
     }
 
     /// The number of selected data.
@@ -391,12 +410,13 @@ impl Robust {
                 next[k] = 0.0;
             }
         }
-        // Data of a run return only from its ends, because the curve inside the run is not known.
+        // Data of a run return only from its ends, because the curve inside the run is not known. Data that the chain
+        // omits do not agree with their neighbours.
         let selected =
             |place: Option<usize>| place.and_then(|i| used.get(i)).is_some_and(|&k| self.kept[k] > 0.0);
         for (place, &k) in used.iter().enumerate() {
             let beside_one = selected(place.checked_sub(1)) || selected(Some(place + 1));
-            if self.kept[k] == 0.0 && beside_one && relative(k) <= limit(k) {
+            if self.chain[k] > 0.0 && self.kept[k] == 0.0 && beside_one && relative(k) <= limit(k) {
                 next[k] = 1.0;
             }
         }
