@@ -84,6 +84,7 @@ def test_no_gap_where_another_sensor_measures():
     assert curve.gaps == []
 
 
+@pytest.mark.filterwarnings("ignore:the 95 % band:symspline.SmoothingWarning")
 def test_gaps_of_attitudes_and_rates():
     """On rotations, with a bias and a robust loss."""
     inside = []
