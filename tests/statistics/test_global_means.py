@@ -222,3 +222,14 @@ def test_principal_components_do_not_depend_on_units():
     assert len(found.explained_variance) == len(right.explained_variance) == 7
     np.testing.assert_allclose(found.explained_variance, right.explained_variance, rtol=1e-10)
     np.testing.assert_allclose(np.abs(found.components[0] / square), np.abs(right.components[0]), atol=1e-8)
+
+
+@pytest.mark.filterwarnings("ignore::symspline.AmbiguousMeanWarning")
+def test_rounding_errors_of_spread_directions_do_not_grow():
+    """Some directions are farther than a quarter turn from the mean, where logarithms amplify errors of its length."""
+    sphere = ss.Sphere(2)
+    for seed in range(40):
+        points = on_the_sphere(np.random.default_rng(seed), 24, 1.5)
+        mean = sphere.mean(points)
+        gradient = sphere.log(np.broadcast_to(mean, points.shape), points).mean(axis=0)
+        assert np.linalg.norm(gradient) < 1e-11 and abs(np.linalg.norm(mean) - 1) < 1e-15

@@ -227,15 +227,22 @@ def _from_several_starts(space: Any, group: Groups, kind: _Kind, number: int | N
     if not np.isfinite(objective).any():
         # Raises CutLocusError.
         kind.descend(space, group, take(starts, np.arange(1)))
+
+    def converges(i: int) -> bool:
+        whole, failed = _descents(space, group, take(found, np.arange(i, i + 1)), kind)
+        if failed[0] or whole.unfinished[0]:
+            return False
+        _assign(found, i, take(whole.points, 0))
+        objective[i] = whole.objective[0]
+        return True
+
     # Only the lowest end points are iterated until they converge.
     for i in _lowest(space, found, objective):
-        whole, failed = _descents(space, group, take(found, np.arange(i, i + 1)), kind)
-        if not failed[0] and not whole.unfinished[0]:
-            _assign(found, i, take(whole.points, 0))
-            objective[i] = whole.objective[0]
-        elif objective[i] == objective.min():
+        if not converges(i) and objective[i] == objective.min():
             _raise_unfinished(kind, number)
+    # The best one may be a neighbour of one of them.
     best = _best(space, group, found, objective)
+    converges(best)
     point = take(found, best)
     far = _distances(space, point, found)
     square = float(np.sum(group.weights * _distances(space, point, group.points) ** 2))

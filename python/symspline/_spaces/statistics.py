@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 # Limits of the iterations. Means of points close together need a few steps, medians converge linearly.
-_MEAN_STEPS, _MEDIAN_STEPS = 1000, 5000
+_STEPS = 5000
 # Accuracy of a median, relative to the mean distance of the data.
 _MEDIAN_TOL, _MEDIAN_LIMIT = 1e-12, 1e-7
 _EPS = float(np.finfo(np.float64).eps)
@@ -182,7 +182,7 @@ class Descent(NamedTuple):
     unfinished: NDArray[np.bool_]
 
 
-def descend_to_mean(space: Any, groups: Groups, means: Any, steps: int = _MEAN_STEPS) -> Descent:
+def descend_to_mean(space: Any, groups: Groups, means: Any, steps: int = _STEPS) -> Descent:
     """Descend to a local minimum of the mean squared distance from every start.
 
     The gradient of half the mean squared distance is the negative mean logarithm. Its descent with the inverse of a
@@ -199,7 +199,8 @@ def descend_to_mean(space: Any, groups: Groups, means: Any, steps: int = _MEAN_S
         logs = space.log(at, own.points)
         lengths = _size(space, at, logs)
         hessians = own.sums(own.weights * _hessians(space, lengths))
-        step = scaled(own.sums(scaled(logs, own.weights)), 1 / hessians)
+        # Without the projection, logarithms to points beyond a quarter turn amplify rounding errors of the iterate.
+        step = space.project_tangent(here, scaled(own.sums(scaled(logs, own.weights)), 1 / hessians))
         put(means, index, space.exp(here, step))
         size, before, least = _size(space, here, step), last[active], floor[active]
         last[active] = size
@@ -213,7 +214,7 @@ def descend_to_mean(space: Any, groups: Groups, means: Any, steps: int = _MEAN_S
     return state._replace(unfinished=active)
 
 
-def descend_to_median(space: Any, groups: Groups, medians: Any, steps: int = _MEDIAN_STEPS) -> Descent:
+def descend_to_median(space: Any, groups: Groups, medians: Any, steps: int = _STEPS) -> Descent:
     """Descend to a local minimum of the mean distance from every start, by Weiszfeld's algorithm.
 
     An iterate at a datum moves on as in Vardi & Zhang (2000), equations (2.5) and (2.6), and a datum that satisfies
@@ -268,7 +269,7 @@ def _weiszfeld(space: Any, groups: Groups, at: Any) -> tuple[Any, Floats, Floats
     # Distances within rounding errors are zero: their directions are arbitrary.
     there = distances > 4 * _EPS * np.asarray(space._rounding(repeated))
     inverse = np.where(there, groups.weights / np.where(there, distances, 1.0), 0.0)
-    pull = groups.sums(scaled(logs, inverse))
+    pull = space.project_tangent(at, groups.sums(scaled(logs, inverse)))
     strength = np.asarray(space.norm(at, pull))
     held = groups.sums(np.where(there, 0.0, groups.weights))
     total = groups.sums(inverse * _hessians(space, distances))
