@@ -3,7 +3,6 @@
 use crate::frames::{Frames, curvature_terms, lanes_of};
 use crate::path::{Path, nearest, positions};
 use symspline_core::memory;
-use symspline_core::monitor::checkpoint;
 use symspline_core::scalar::{LANES, Lane, gather, scatter};
 use symspline_core::space::{Ambient, Erased, Origin};
 
@@ -43,7 +42,6 @@ impl<'a> Along<'a> {
         let unit = |j: usize| (0..self.path.t.len() * m).map(|i| f64::from(i % m == j)).collect::<Vec<f64>>();
         let at_knots: Vec<Vec<f64>> = (0..m).map(|j| self.frames.tangents(&unit(j))).collect();
         for group in 0..x.len().div_ceil(LANES) {
-            checkpoint();
             let at = lanes_of(group, x.len());
             gather(at.map(|i| &self.path.points[near[i] * len..][..len]), &mut p);
             gather(at.map(|i| &points[i * len..][..len]), &mut q);

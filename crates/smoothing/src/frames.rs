@@ -6,6 +6,7 @@
 
 use crate::linearized::{LinearProblem, times_metric};
 use crate::problem::Penalty;
+use symspline_core::monitor::checkpoint;
 use symspline_core::scalar::{LANES, Lane, few, gather, scatter};
 use symspline_core::space::{Ambient, Erased, Frame, Origin};
 
@@ -43,6 +44,7 @@ impl<'a> Frames<'a> {
         gather(begin.map(point), &mut p);
         space.lift(&p, &mut frame);
         for i in 0..=run {
+            checkpoint();
             if i > 0 {
                 gather(begin.map(|k| point(k + i)), &mut q);
                 space.step(&mut frame, &p, &q, &mut chord);
@@ -225,8 +227,10 @@ pub fn triples(space: &Erased, arrays: [&[f64]; 3]) -> Vec<f64> {
     out
 }
 
-/// The members of a group of eight; missing members repeat the last one.
+/// The members of a group of eight; missing members repeat the last one. Every loop over groups calls this function, which
+/// stops if the work was cancelled.
 pub fn lanes_of(group: usize, count: usize) -> [usize; LANES] {
+    checkpoint();
     few(|l| (group * LANES + l).min(count - 1))
 }
 

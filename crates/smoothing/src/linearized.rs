@@ -8,6 +8,7 @@
 
 use crate::banded::{Banded, WIDTH};
 use crate::problem::{EndCondition, Ends, Penalty};
+use symspline_core::monitor::checkpoint;
 use symspline_core::scalar::{Lane, lane};
 
 const BAND: usize = WIDTH + 1;
@@ -252,6 +253,7 @@ pub fn times_metric(basis: &Basis, penalty: Penalty, a: &[f64], m: usize) -> Vec
 fn gram(count: usize, rows: impl Iterator<Item = (Row, Row, f64)>) -> Vec<f64> {
     let mut out = vec![0.0; count * BAND];
     for (left, right, factor) in rows {
+        checkpoint();
         for (a, x) in left.factors.iter().enumerate() {
             for (b, y) in right.factors.iter().enumerate() {
                 let (i, j) = (left.first + a, right.first + b);
@@ -325,6 +327,7 @@ impl LinearProblem {
         let mut energy = Lane::ZERO;
         let mut left = acceleration((0, 0));
         for i in 0..self.basis.knots() - 1 {
+            checkpoint();
             let right = acceleration((1, i + 1));
             let (own, other) = of_segment(self.penalised, self.basis.h(i));
             energy += (left * left + right * right) * lane(own) + left * right * lane(2.0 * other);

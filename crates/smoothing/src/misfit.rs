@@ -11,6 +11,7 @@ use crate::jacobi_operator::JacobiOperator;
 use crate::linearized::{LinearProblem, OVERLAP, Row};
 use crate::problem::Known;
 use std::borrow::Cow;
+use symspline_core::monitor::checkpoint;
 use symspline_core::scalar::{LANES, Lane, few, lane};
 
 /// Residuals at a curve, in coordinates of frames along it, and their weights.
@@ -113,6 +114,7 @@ impl<'a> Misfit<'a> {
         let mut pull = vec![0.0; linearized.basis.count() * m];
         let mut weighed = vec![0.0; m];
         for (k, row) in linearized.data.iter().enumerate() {
+            checkpoint();
             match self {
                 Misfit::Numbers { weights, residuals, .. } => {
                     let r = &residuals[k * m..][..m];
@@ -229,6 +231,7 @@ impl<'a> Misfit<'a> {
         let (stride, coupled) = (inverse.width + 1, inverse.size / linearized.basis.count());
         let mut sum = Lane::ZERO;
         for i in 0..inverse.size {
+            checkpoint();
             for j in i.saturating_sub(inverse.width)..(i + stride).min(inverse.size) {
                 sum += inverse.at(i, j) * lane(self.gram(coupled, i.max(j) * stride + i.abs_diff(j)));
             }
