@@ -209,7 +209,7 @@ CALLS = {
         "ss.make_smoothing_spline(t, y, 'r:1')",
     ),
     "make_smoothing_spline r:1": (
-        "y = np.cumsum(rng().standard_normal(300000))[:, None]",
+        "y = np.cumsum(rng().standard_normal(3000000))[:, None]",
         "ss.make_smoothing_spline(None, y, 'r:1')",
     ),
     "make_lsq_spline": ("a = noisy(300000)", "ss.make_lsq_spline(*a, 30000, 'so:3')"),
