@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import reduce
@@ -15,7 +16,7 @@ from .._curves.ends import NATURAL
 from .._curves.fit import FitProblem, fit, read
 from .._curves.solve import DEFAULTS
 from .._input import UTC_ZONE
-from .._spaces import Product, Space, SpecialEuclidean
+from .._spaces import AmbiguousMeanWarning, Product, Space, SpecialEuclidean
 from .._time import TimeAxis
 from .curves import SECOND, Axis, Batch, Curve
 from .style import SPLINE, Array, colors, evenly, named_from, round_start
@@ -163,8 +164,10 @@ def _mean_of(
     points = replace(batch, x=many).at("point")
     points = points[evenly(len(points), _FOR_MEAN)].swapaxes(0, 1)
     try:
-        means = space.mean(points)
-    except (ConvergenceError, CutLocusError, NotImplementedError, ValidationError):
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", AmbiguousMeanWarning)
+            means = space.mean(points)
+    except (AmbiguousMeanWarning, ConvergenceError, CutLocusError, NotImplementedError, ValidationError):
         # Points of hyperbolic space that are far away are rounded off it, and some spaces have no means.
         return None
     spread = np.quantile(space.distance(means[:, None], points), 0.95, axis=1)
