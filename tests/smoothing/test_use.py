@@ -6,6 +6,7 @@ from noisy import example, rms
 from refused import raises
 
 import symspline as ss
+from symspline import _core
 
 S2, T, NOISY, _ = example("sphere:2", 0.05, n=40)
 
@@ -179,3 +180,14 @@ def test_a_curve_through_all_data_does_not_warn():
         _, t, noisy, _ = example("sphere:2", 0.1, n=n)
         spline = ss.make_smoothing_spline(t, noisy, "sphere:2", 0.0)
         assert S2.distance(spline(t), noisy).max() < 1e-12
+
+
+def test_the_same_knots_are_not_fitted_again(monkeypatch):
+    """A long recording is thinned to 2000 knots, which are enough here."""
+    n, calls = 4500, []
+    smooth = _core.smooth
+    monkeypatch.setattr(_core, "smooth", lambda *args: calls.append(len(np.ravel(args[1]))) or smooth(*args))
+    t = np.linspace(0, 10, n)
+    y = np.sin(t) + 0.1 * np.random.default_rng(0).standard_normal(n)
+    ss.make_smoothing_spline(t, y[:, None], "r:1")
+    assert calls.count(n) == 1

@@ -226,7 +226,10 @@ def with_enough_knots(
         if tries == _TRIES - 1 or (count >= most > 0.8 * count and count > 0.8 * min(enough, most)):
             break
         # A stiff curve needs fewer knots than it had, and a rough curve more.
-        at = thin_knots(apart, max(_FIRST, 2 * enough)) if most > max(_MANY, 2 * enough) else apart
+        better = thin_knots(apart, max(_FIRST, 2 * enough)) if most > max(_MANY, 2 * enough) else apart
+        if np.array_equal(better.times, at.times):
+            break
+        at = better
     return found, at
 
 
