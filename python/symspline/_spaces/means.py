@@ -321,7 +321,7 @@ def _extrinsic(space: Any, group: Groups) -> list[Any]:
         found = space._extrinsic_means(group.points, group.weights / group.weights.sum())
         return [] if found is None else [space.project(np.ascontiguousarray(found))]
     except (CutLocusError, ValidationError):
-        # The average of evenly spread points may have no projection.
+        # Evenly spread points can have an average that is not near any point of the space.
         return []
 
 
