@@ -289,3 +289,11 @@ def test_a_gap_longer_than_any_part_has_the_largest_factor_and_a_warning():
         warnings.simplefilter("error")
         spline.std(130.0)
         ss.make_smoothing_spline(t, y, "r:2").std(105.0)
+
+
+@pytest.mark.filterwarnings("ignore::symspline.SmoothingWarning")
+def test_gaps_between_data_that_are_all_outliers_have_no_band():
+    """The given standard deviation is so small that no datum can show how far predictions are off."""
+    t, y, _ = recorded(n=40, noise=0.5)
+    spline = ss.make_smoothing_spline(t, y, "r:2", 0.01, loss="huber", sigma=1e-6)
+    assert np.isnan(spline.std(134.5)) and spline.std(134.5, calibrated=False) > 0

@@ -541,9 +541,11 @@ class _Blocks:
         omitted = []
         for start in starts:
             a, b = np.searchsorted(self.times, (start, start + length), side="right")
-            # A block needs data on both sides.
-            if b > a and ((a > 0 and b < len(self.times)) if not self.closed else b - a < self.count):
-                omitted.append((start, np.arange(a, b)))
+            own = np.arange(a, b) % self.count
+            # A block needs data on both sides, and a datum in it that is not an outlier.
+            beside = b - a < self.count if self.closed else a > 0 and b < len(self.times)
+            if beside and self.evidence.counts[own].any():
+                omitted.append((start, own))
         if not omitted:
             return None
         disjoint, reached = 0, -np.inf
@@ -551,7 +553,7 @@ class _Blocks:
             if start >= reached:
                 disjoint, reached = disjoint + 1, start + length
         omitted = [omitted[i] for i in _some(len(omitted), _BLOCKS)]
-        found = self._predicted([own % self.count for _, own in omitted])
+        found = self._predicted([own for _, own in omitted])
         factor = factor_of(found, self.evidence.coordinates, disjoint)
         return None if np.isnan(factor) else (factor, len(omitted))
 
