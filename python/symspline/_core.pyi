@@ -172,6 +172,9 @@ def smoothing_inverse(
 def process_variance(
     times: _Doubles, weights: _Doubles, lam: float, period: float | None, x: _Doubles, nu: int
 ) -> _Doubles: ...
+def residuals_at(
+    handle: Handle, times: _Doubles, at: _Doubles, points: _Doubles, weights: _Doubles
+) -> list[_Doubles]: ...
 def residual_statistics(
     rows: _Doubles, neighbours: _Doubles, limits: _Doubles, variances: _Doubles
 ) -> tuple[list[list[float]], list[int], _Doubles]: ...

@@ -58,7 +58,7 @@ def warn_of_held_points(
     equal = np.broadcast_to(np.diff(times) > 0, (*batch, times.shape[-1] - 1))
     for own in points:
         rows = own.reshape(*own.shape[: axis + 1], -1)
-        equal = equal & np.all(np.take(rows, range(1, rows.shape[axis]), axis) == rows[..., :-1, :], axis=-1)
+        equal = equal & np.all(rows[..., 1:, :] == rows[..., :-1, :], axis=-1)
     shares = equal.mean(axis=-1)
     for index in map(tuple, np.argwhere(shares >= _COPIES).tolist()):
         if not _are_held(equal[index], [own[index].reshape(times.shape[-1], -1) for own in points]):

@@ -1,5 +1,10 @@
 //! Statistics of the residuals of a curve, from which tests decide whether its assumptions hold.
 
+use crate::chain;
+use crate::frames::lanes_of;
+use symspline_core::scalar::{LANES, Lane, gather, scatter};
+use symspline_core::space::{Ambient, Erased, Frame, Origin};
+
 /// ∫(1 + x⁴)⁻² / ∫(1 + x⁴)⁻¹: the information per local degree of freedom.
 const RATIO: f64 = 0.75;
 
@@ -46,6 +51,57 @@ impl ResidualStatistics {
         }
         let mean = |k: usize| sums[k] / counts[k].max(1) as f64;
         ResidualStatistics { medians, square: mean(0), lagged: mean(1), products: counts[1].max(1), sizes }
+    }
+}
+
+/// The data of one curve and the points of the curve at their times.
+pub struct AtData<'a> {
+    /// Times of the data.
+    pub times: &'a [f64],
+    /// Points of the curve.
+    pub at: &'a [f64],
+    /// Data.
+    pub points: &'a [f64],
+    /// Their weights.
+    pub weights: &'a [f64],
+}
+
+impl AtData<'_> {
+    /// Coordinates of the residuals in frames at the curve, and the squared deviations of data from the geodesics between
+    /// their neighbours, divided by their variances for noise of variance one at weight one. They are NaN for data
+    /// without weight; deviations also at the ends.
+    pub fn residuals(&self, space: &Erased) -> [Vec<f64>; 2] {
+        let (n, len, m) = (self.times.len(), space.point_len(), space.dim());
+        let row = |rows: &'_ [f64], i: usize| rows[i * len..][..len].iter().all(|x| x.is_finite());
+        let used: Vec<usize> =
+            (0..n).filter(|&i| self.weights[i] > 0.0 && row(self.at, i) && row(self.points, i)).collect();
+        let [mut residuals, mut deviations] = [vec![f64::NAN; n * m], vec![f64::NAN; n]];
+        let [mut p, mut q, mut v] = [(); 3].map(|_| vec![Lane::ZERO; len]);
+        let (mut frame, mut x) = (vec![Lane::ZERO; space.frame_len()], vec![Lane::ZERO; m]);
+        let mut rows = vec![0.0; LANES * m];
+        for group in 0..used.len().div_ceil(LANES) {
+            let at = lanes_of(group, used.len()).map(|k| used[k]);
+            gather(at.map(|i| &self.at[i * len..][..len]), &mut p);
+            gather(at.map(|i| &self.points[i * len..][..len]), &mut q);
+            space.log(&p, &q, &mut v);
+            space.lift(&p, &mut frame);
+            space.coordinates(&frame, &p, &v, &mut x);
+            scatter(&x, &mut rows);
+            for (i, row) in at.iter().zip(rows.chunks_exact(m.max(1))) {
+                residuals[i * m..][..m].copy_from_slice(row);
+            }
+        }
+        let squares = chain::deviations(space, self.times, self.points, &used);
+        for (square, own) in squares[1.min(squares.len())..].iter().zip(used.windows(3)) {
+            let [a, b, c] = [0, 1, 2].map(|k| self.times[own[k]]);
+            let [before, here, after] = [0, 1, 2].map(|k| 1.0 / self.weights[own[k]]);
+            let share = (b - a) / (c - a);
+            if c > a {
+                let variance = here + share.powi(2) * after + (1.0 - share).powi(2) * before;
+                deviations[own[1]] = square / variance;
+            }
+        }
+        [residuals, deviations]
     }
 }
 

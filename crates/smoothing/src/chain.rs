@@ -24,7 +24,7 @@ const MOST: f64 = 1e6;
 /// The number of intervals of the time between two data in which τ is estimated.
 const BINS: usize = 40;
 /// The number of pairs that suffice for τ.
-const PAIRS: usize = 200_000;
+const PAIRS: usize = 16_000;
 /// Fewer data do not determine the scale, and all of them are selected.
 const FEW: usize = 12;
 /// The number of data before and after a datum from which its speed is estimated.
@@ -65,7 +65,10 @@ pub fn chain(space: &Erased, data: &Data) -> Vec<f64> {
     let mut steps = Steps::new(space, data.points, &used, &times);
     let surprise = Surprise::new(&mut steps, &first, resolution(space, data).powi(2));
     let second = cheapest(used.len(), window, |pairs, before| {
-        steps.extend(pairs[0].1 - 1, before);
+        let last = pairs[pairs.len() - 1];
+        if last.0 + 1 == last.1 {
+            steps.extend(last.0, before);
+        }
         let sharper = |pair: &(usize, usize)| {
             let (limit, rule) = surprise.expected(&steps, *pair);
             let limit = (SURPRISE * limit).max(f64::MIN_POSITIVE);
@@ -90,11 +93,23 @@ fn cheapest(
     for i in 1..count {
         // The chain may begin here if the window reaches the first datum.
         totals[i] = if i <= window { SKIPPED * i as f64 } else { f64::INFINITY };
-        let pairs: Vec<(usize, usize)> = (i.saturating_sub(window)..i).map(|j| (j, i)).collect();
-        for ((j, _), cost) in pairs.iter().zip(costs(&pairs, &before)) {
-            let total = totals[*j] + cost + SKIPPED * (i - j - 1) as f64;
-            if total < totals[i] {
-                (totals[i], before[i]) = (total, Some(*j));
+        let first = i.saturating_sub(window);
+        let mut end = i;
+        // Near data come first: few omitted ones are usually cheaper than many, whatever the step costs.
+        while end > first {
+            let pairs: Vec<(usize, usize)> =
+                (end.saturating_sub(LANES).max(first)..end).map(|j| (j, i)).collect();
+            end = pairs[0].0;
+            let without = |j: usize| totals[j] + SKIPPED * (i - j - 1) as f64;
+            if pairs.iter().all(|(j, _)| without(*j) > totals[i]) {
+                continue;
+            }
+            for ((j, _), cost) in pairs.iter().zip(costs(&pairs, &before)).rev() {
+                let total = totals[*j] + SKIPPED * (i - j - 1) as f64 + cost;
+                // Of several equally cheap chains, the one with the longest step is kept.
+                if total < totals[i] || (total == totals[i] && before[i].is_some()) {
+                    (totals[i], before[i]) = (total, Some(*j));
+                }
             }
         }
     }
@@ -314,11 +329,11 @@ fn squares(space: &Erased, points: &[f64], used: &[usize], pairs: &[(usize, usiz
 ///
 /// An isolated outlier is farther from its geodesic than its neighbours are from theirs, because it moves their
 /// geodesics only by a fraction of its own distance.
-pub fn deviations(space: &Erased, data: &Data, chosen: &[usize]) -> Vec<f64> {
+pub fn deviations(space: &Erased, times: &[f64], points: &[f64], chosen: &[usize]) -> Vec<f64> {
     let (len, inner) = (space.point_len(), chosen.len().saturating_sub(2));
-    let row = |i: usize| &data.points[chosen[i] * len..][..len];
+    let row = |i: usize| &points[chosen[i] * len..][..len];
     let share = |i: usize| {
-        let [a, b, c] = [i, i + 1, i + 2].map(|i| data.times[chosen[i]]);
+        let [a, b, c] = [i, i + 1, i + 2].map(|i| times[chosen[i]]);
         if c > a { (b - a) / (c - a) } else { 0.5 }
     };
     let [mut p, mut q, mut y, mut v, mut between] = [(); 5].map(|_| vec![Lane::ZERO; len]);

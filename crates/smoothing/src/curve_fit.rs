@@ -308,8 +308,7 @@ impl<'a> CurveFit<'a> {
         let band = system.inverse_band();
         let inverse = system.mean(&band);
         self.progress.note(&linear, &band, lam, 1.0);
-        let misfits = residuals.squares.iter().enumerate().map(|(k, square)| self.robust.value(*square, k));
-        self.progress.report.objective = misfits.sum::<f64>() + lam * linear.energy();
+        self.progress.report.objective = self.robust.misfit(&residuals.squares) + lam * linear.energy();
 
         let exact = !self.solved && self.progress.takes_gauss_newton(space, options.tier);
         if exact && self.strays > 0 {
@@ -413,8 +412,7 @@ impl<'a> CurveFit<'a> {
     fn value(&self, space: &Erased, residuals: &Residuals) -> f64 {
         let lam =
             self.progress.lam.unwrap_or(0.0) * Penalty::Acceleration.unit(self.linearized.basis.spacing);
-        let terms = residuals.squares.iter().enumerate().map(|(k, square)| self.robust.value(*square, k));
-        terms.sum::<f64>() + lam * gauss_newton::energy(space, &self.path())
+        self.robust.misfit(&residuals.squares) + lam * gauss_newton::energy(space, &self.path())
     }
 
     fn path(&self) -> Path<'_> {
@@ -464,7 +462,7 @@ impl<'a> CurveFit<'a> {
         let freedom = self.progress.report.freedom;
         let lam = self.progress.lam;
         let data = self.data;
-        let deviations = |chosen: &[usize]| deviations(space, &data, chosen);
+        let deviations = |chosen: &[usize]| deviations(space, data.times, data.points, chosen);
         let at = AtCurve {
             times: data.times,
             squares,

@@ -195,12 +195,15 @@ impl Robust {
         squares.iter().map(|square| self.loss.weight(square / (corner * corner))).collect()
     }
 
-    /// The contribution of a datum to the objective.
-    pub fn value(&self, square: f64, datum: usize) -> f64 {
+    /// The sum over the data in the objective, given their weighted squared distances.
+    pub fn misfit(&self, squares: &[f64]) -> f64 {
         match self.stage {
-            Stage::Plain => square,
-            _ if self.reweighs() => self.loss.value(square, self.corner()),
-            _ => self.kept[datum] * square,
+            Stage::Plain => squares.iter().sum(),
+            _ if self.reweighs() => {
+                let corner = self.corner();
+                squares.iter().map(|square| self.loss.value(*square, corner)).sum()
+            }
+            _ => squares.iter().zip(&self.kept).map(|(square, kept)| kept * square).sum(),
         }
     }
 

@@ -11,7 +11,7 @@ use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedA
 use pyo3::prelude::*;
 use pyo3::types::{PyListMethods, PyTuple, PyTupleMethods};
 use symspline_engine::parallel;
-use symspline_engine::smoothing::audit::{Recording, ResidualStatistics, Unequal};
+use symspline_engine::smoothing::audit::{AtData, Recording, ResidualStatistics, Unequal};
 use symspline_engine::smoothing::{
     Data, Loss, Observations, Options, Outcome, Report, Samples, Selection, Smooth, State, Tier, chi,
     fit_cumulative as fit, inverse_of_weights, process_variance as process, smooth as run,
@@ -286,10 +286,46 @@ pub fn chi_squared(m: usize, probability: f64) -> f64 {
     chi::quantile(m, probability)
 }
 
+/// Residuals (curves, N, d) at curves, in coordinates of the frames there, and deviations (curves, N) of data from their
+/// neighbours: see [`AtData::residuals`]. Times and weights are (curves, N).
+#[pyfunction]
+pub fn residuals_at<'py>(
+    py: Python<'py>,
+    handle: &Handle,
+    times: Array<'py>,
+    at: Array<'py>,
+    points: Array<'py>,
+    weights: Array<'py>,
+) -> PyResult<[Bound<'py, PyArrayDyn<f64>>; 2]> {
+    let space = handle.space.get();
+    let [curves, n] = [0, 1].map(|axis| times.shape()[axis]);
+    let (len, m) = (space.point_len(), space.dim());
+    let [times, at, points, weights] = [&times, &at, &points, &weights].map(in_order);
+    let (times, at, points, weights) = (times?, at?, points?, weights?);
+    let of = |c: usize| {
+        let [times, weights] = [times, weights].map(|rows| &rows[c * n..][..n]);
+        let [at, points] = [at, points].map(|rows| &rows[c * n * len..][..n * len]);
+        AtData { times, at, points, weights }.residuals(&space)
+    };
+    let found =
+        watched(py, None, curves, is_long(times.len() * m), |_| (0..curves).map(of).collect::<Vec<_>>())?;
+    let out = [zeros(py, &[curves, n, m])?, zeros(py, &[curves, n])?];
+    for (k, array) in out.iter().enumerate() {
+        let mut write = array.readwrite();
+        let rows = write.as_slice_mut()?;
+        let size = rows.len() / curves.max(1);
+        found
+            .iter()
+            .zip(rows.chunks_exact_mut(size.max(1)))
+            .for_each(|(own, row)| row.copy_from_slice(&own[k]));
+    }
+    Ok(out)
+}
+
 /// For every curve: two medians, the mean square, the mean product, and the number of products; the sizes.
 type OfResiduals<'py> = ([Vec<f64>; 4], Vec<usize>, Bound<'py, PyArrayDyn<f64>>);
 
-/// [`ResidualStatistics`] of residuals (curves, N, d), and deviations (curves, N - 2). `limits` and `variances` have one
+/// [`ResidualStatistics`] of residuals (curves, N, d), and deviations (curves, N). `limits` and `variances` have one
 /// value per curve.
 #[pyfunction]
 pub fn residual_statistics<'py>(

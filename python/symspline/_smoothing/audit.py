@@ -296,9 +296,9 @@ def examine_smoothing(rows: Doubles, neighbours: Doubles, leverage: Doubles, rob
     ----------
     rows : ndarray, shape (curves, n, d)
         Residuals scaled to weight one, in the order of time; NaN where there is no information.
-    neighbours : ndarray, shape (curves, n - 2)
+    neighbours : ndarray, shape (curves, n)
         Squared deviations of data from the geodesics between their neighbours, divided by their variance for unit
-        noise; NaN where a neighbour is missing.
+        noise; NaN at the ends and for data without weight.
     leverage : ndarray, shape (curves,)
         Mean leverage of the data.
     robust : bool

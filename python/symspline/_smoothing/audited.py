@@ -8,13 +8,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import _core
 from .._faults import of_index
-from .._spaces import Array, Doubles, Euclidean, Space
+from .._spaces import Array, Doubles, Space
 from .._warnings import warn
 from .audit import Finding, Residuals, SmoothingFinding, corner_of, examine, examine_smoothing, roots_of
 from .data import SmoothingData, points_of
 from .factors import in_part
-from .posterior import coordinates
 from .solve import Smoothed
 from .warned import SmoothingWarning
 
@@ -102,7 +102,7 @@ class _Examined(NamedTuple):
         The part.
     rows : ndarray, shape (curves, N, d)
         Residuals; NaN without information.
-    deviations : ndarray, shape (curves, N - 2)
+    deviations : ndarray, shape (curves, N)
         Squared deviations of data from the geodesics between their neighbours, divided by their variances.
     leverages, sigmas : ndarray, shape (curves,)
         Mean leverage of the data, and standard deviations.
@@ -120,22 +120,21 @@ class _Examined(NamedTuple):
     ) -> _Examined:
         """Return the residuals of curves with these numbers."""
         n, shape = noisy.times.shape[-1], space.point_shape
-        x, y = (array.reshape(-1, n, *shape)[curves] for array in (x, y))
         precision = noisy.precisions[number]
-        weights = np.broadcast_to(precision.weights, (*noisy.batch, n)).reshape(-1, n)[curves]
-        times = np.broadcast_to(noisy.times, (*noisy.batch, n)).reshape(-1, n)[curves]
-        used = (weights > 0) & space._where_finite(x) & space._where_finite(y)
-        rows = np.full((*used.shape, space.dim), np.nan)
-        at, log = x[used], space._apply("log", p=x[used], q=y[used])
-        found = log if isinstance(space, Euclidean) else coordinates(space, at, space.frame(at), log)
+
+        def of_curves(array: Any, axes: tuple[int, ...]) -> Array:
+            return np.broadcast_to(array, (*noisy.batch, n, *axes)).reshape(-1, n, *axes)[curves]
+
+        times, weights = of_curves(noisy.times, ()), of_curves(precision.weights, ())
+        x, y = (space._as_doubles(of_curves(points, shape)) for points in (x, y))
+        rows, deviations = _core.residuals_at(space._handle, times, x, y, weights)
         if precision.information is None:
-            rows[used] = found * np.sqrt(weights[used])[:, None]
+            rows *= np.sqrt(weights)[..., None]
         else:
-            whole = np.broadcast_to(precision.information, (*noisy.batch, n, space.dim, space.dim))
-            roots, known = roots_of(whole.reshape(-1, n, space.dim, space.dim)[curves][used])
-            rows[used] = np.where(known, np.einsum("nij,nj->ni", roots, found), np.nan)
-        deviations = _deviations(space, times, y, np.where(used, weights, 0.0))
-        counts = np.maximum(used.sum(axis=1), 1)
+            used = np.isfinite(rows).any(axis=-1)
+            roots, known = roots_of(of_curves(precision.information, (space.dim, space.dim))[used])
+            rows[used] = np.where(known, np.einsum("nij,nj->ni", roots, rows[used]), np.nan)
+        counts = np.maximum(np.isfinite(rows).any(axis=-1).sum(axis=-1), 1)
         df, sigma = (np.reshape(value, -1)[curves] for value in (own.report.df, own.sigma))
         return cls(space, rows, deviations, np.minimum(df / counts, 1.0), sigma)
 
@@ -161,21 +160,6 @@ class _Examined(NamedTuple):
             if sensor.finding.failed:
                 stiff = sensor.finding.smooth or sensor.finding.step is not None
                 yield k, " ".join([described(sensor), *([_STIFF] if stiff else advice([sensor]))])
-
-
-def _deviations(space: Space, times: Doubles, y: Array, weights: Doubles) -> Doubles:
-    """Return squared deviations of data from the geodesics between their neighbours, divided by their variances."""
-    result = np.full((len(times), max(times.shape[1] - 2, 0)), np.nan)
-    whole = times[:, 2:] - times[:, :-2]
-    inner = (whole > 0) & (weights[:, 2:] > 0) & (weights[:, 1:-1] > 0) & (weights[:, :-2] > 0)
-    s = (times[:, 1:-1] - times[:, :-2])[inner] / whole[inner]
-    before, here, after = (y[:, k : y.shape[1] - 2 + k][inner] for k in range(3))
-    v = space._apply("log", p=before, q=after)
-    middle = space._apply("exp", p=before, v=v * s.reshape(-1, *[1] * len(space.point_shape)))
-    w = [weights[:, k : y.shape[1] - 2 + k][inner] for k in range(3)]
-    variance = 1 / w[1] + s**2 / w[2] + (1 - s) ** 2 / w[0]
-    result[inner] = space._apply("distance", p=middle, q=here) ** 2 / variance
-    return result
 
 
 def _of_estimated(finding: SmoothingFinding, curve: int) -> str:

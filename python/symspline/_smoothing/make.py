@@ -342,10 +342,10 @@ def make_smoothing_spline(
         found = run(at)
     elif knots is None:
         found, at = with_enough_knots(every, noisy, space, lams, run, df_of_part, penalty)
-        finer = in_gaps(at, whole)
         # Knots in gaps are tried before a larger λ, which would affect the whole curve.
         if any(NO_CURVE in fault.what for _, _, own in found for fault in own):
-            found, at = run(finer, raise_lam=True), finer
+            at = in_gaps(at, whole)
+            found = run(at, raise_lam=True)
     else:
         found, at = run(every), every
     transported = [

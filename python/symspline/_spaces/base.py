@@ -1109,7 +1109,8 @@ class Space(Generic[P]):
 
     def _rows(self, array: NDArray[np.float64], lead: tuple[int, ...]) -> NDArray[np.float64]:
         shape = self._doubles_shape
-        return np.ascontiguousarray(np.broadcast_to(array, lead + shape).reshape(-1, math.prod(shape)))
+        rows = array if array.shape == lead + shape else np.broadcast_to(array, lead + shape)
+        return np.ascontiguousarray(rows).reshape(-1, math.prod(shape))
 
     def _lead(self, array: NDArray[np.float64]) -> tuple[int, ...]:
         """Return the axes before those of a point."""
@@ -1117,10 +1118,11 @@ class Space(Generic[P]):
 
     def _leads(self, shapes: Mapping[str, tuple[int, ...]], further: tuple[int, ...] = ()) -> tuple[int, ...]:
         """Return the broadcast leading axes of arrays of points with these shapes."""
+        leads = {shape[: len(shape) - len(self.point_shape)] for shape in shapes.values()}
+        if len(leads) == 1 and not further:
+            return leads.pop()
         try:
-            return np.broadcast_shapes(
-                *(shape[: len(shape) - len(self.point_shape)] for shape in shapes.values()), further
-            )
+            return np.broadcast_shapes(*leads, further)
         except ValueError:
             named = ", ".join(f"{name} {shape}" for name, shape in shapes.items())
             raise ValidationError(f"the leading axes do not broadcast: {named}") from None
