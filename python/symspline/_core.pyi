@@ -175,6 +175,9 @@ def process_variance(
 def residuals_at(
     handle: Handle, times: _Doubles, at: _Doubles, points: _Doubles, weights: _Doubles
 ) -> list[_Doubles]: ...
+def bypassed(
+    handle: Handle, times: _Doubles, at: _Doubles, points: _Doubles, weights: _Doubles, sizes: _Doubles
+) -> list[int] | None: ...
 def residual_statistics(
     rows: _Doubles, neighbours: _Doubles, limits: _Doubles, variances: _Doubles
 ) -> tuple[list[list[float]], list[int], _Doubles]: ...

@@ -4,8 +4,10 @@ import warnings
 
 import numpy as np
 import pytest
+from tests.trust import robust
 
 import symspline as ss
+from symspline import _core
 
 START = 7200.5
 
@@ -173,3 +175,53 @@ def test_runs_that_the_path_could_reach_are_rejected(name, even):
         robust = ss.make_smoothing_spline(t, points, space, loss="cauchy")
         clean = ss.make_smoothing_spline(t[~bad], points[~bad], space, criterion="reml")
     assert largest(space, robust, t) < 1.5 * largest(space, clean, t)
+
+
+@pytest.mark.parametrize("name", ["r:3", "so:3"])
+def test_an_outlier_in_a_gap_moves_the_curve_under_huber(name):
+    """Huber's loss bounds the force of an outlier, but in a gap nothing else holds the curve."""
+    space, rng = ss.space(name), np.random.default_rng(1)
+    t = START + np.sort(rng.uniform(0, 10, 300))
+    t = np.sort(np.append(t[np.abs(t - START - 5) > 1], START + 5))
+    points = path(space, t) if name == "so:3" else path(space, t) / 20
+    points = space.exp(points, 0.005 * space.random_tangent(rng, points))
+    alone = int(np.searchsorted(t, START + 5))
+    points[alone] = space.exp(points[alone], 0.8 * space.random_tangent(rng, points[alone]))
+    with pytest.warns(ss.SmoothingWarning, match="has an outlier that moves the curve.*cauchy"):
+        ss.make_smoothing_spline(t, points, space, loss="huber")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        ss.make_smoothing_spline(t, points, space, loss="cauchy")
+        ss.make_smoothing_spline(np.delete(t, alone), np.delete(points, alone, axis=0), space, loss="huber")
+
+
+@pytest.mark.parametrize("name", ["r:3", "so:3", "sphere:2"])
+def test_data_beside_a_part_that_a_curve_follows(name):
+    """A smooth curve that follows a run of displaced data leaves good data on both sides of it."""
+    space, t, points, _ = recording(name, 0.02, first=[70], length=10, count=160, seed=4)
+    truth, weights = path(space, t), np.ones(160)
+
+    def part(at):
+        sizes = space.distance(at, points) / 0.02
+        return _core.bypassed(space._handle, t, np.ascontiguousarray(at), points, weights, sizes)
+
+    # The curve goes from the truth to the displaced data and back within some data on both sides.
+    share = np.interp(np.arange(160), [66, 72, 77, 83], [0, 1, 1, 0])
+    shift = space.log(truth[75:76], points[75:76])
+    v = space.transport(np.broadcast_to(truth[75], truth.shape), truth, np.broadcast_to(shift, truth.shape))
+    follows = space.exp(truth, share.reshape(-1, *[1] * (v.ndim - 1)) * v)
+    first, last = part(follows)
+    assert 68 <= first <= 73 and 76 <= last <= 81
+    # The true curve is near the data on both sides, and outliers are not near any curve.
+    assert part(truth) is None
+    points[[40, 43, 44, 120, 121, 124]] = points[[140, 143, 20, 20, 21, 24]]
+    assert part(truth) is None
+
+
+def test_a_run_that_the_curve_follows():
+    space, t, points, bad, _ = ss.space("so:3"), *robust.recording("so:3", 2443)
+    with pytest.warns(ss.SmoothingWarning, match="rejects data on both sides of those from index 50 to 54"):
+        ss.make_smoothing_spline(t, points, space, loss="cauchy")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        ss.make_smoothing_spline(t[~bad], points[~bad], space, loss="cauchy")

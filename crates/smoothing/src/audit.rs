@@ -2,11 +2,20 @@
 
 use crate::chain;
 use crate::frames::lanes_of;
-use symspline_core::scalar::{LANES, Lane, gather, scatter};
+use symspline_core::scalar::{LANES, Lane, gather, lane, scatter};
 use symspline_core::space::{Ambient, Erased, Frame, Origin};
 
 /// ∫(1 + x⁴)⁻² / ∫(1 + x⁴)⁻¹: the information per local degree of freedom.
 const RATIO: f64 = 0.75;
+
+/// Sizes of residuals, in standard deviations, from which data are far from a curve, and up to which they are near it.
+const FAR: f64 = 4.0;
+const NEAR: f64 = 3.0;
+/// The number of data between parts that are far from the curve, and the number of such parts that are compared.
+const BETWEEN: usize = 30;
+const PARTS: usize = 3;
+/// The ratio of squared distances from which on a datum is near another curve.
+const NEARER: f64 = 0.1;
 
 /// Statistics of the residuals of one curve, scaled to weight one.
 pub struct ResidualStatistics {
@@ -102,6 +111,84 @@ impl AtData<'_> {
             }
         }
         [residuals, deviations]
+    }
+
+    /// The first and the last datum of a part that a robust loss may have selected wrongly, given the sizes of all
+    /// residuals in standard deviations: data before and after it are far from the curve, but near a curve without it.
+    ///
+    /// A smooth curve that follows a run of displaced data leaves the data beside them. So does one that follows a part
+    /// of a motion that is too fast for it.
+    pub fn bypassed(&self, space: &Erased, sizes: &[f64]) -> Option<[usize; 2]> {
+        let used: Vec<usize> = (0..self.times.len()).filter(|&i| self.weights[i] > 0.0).collect();
+        let size = |k: usize| sizes[used[k]];
+        // Parts of data that are far from the curve; one datum nearby does not end a part.
+        let mut parts: Vec<[usize; 2]> = Vec::new();
+        for k in (0..used.len()).filter(|&k| size(k) > FAR) {
+            match parts.last_mut().filter(|part| k - part[1] <= 2) {
+                Some(part) => part[1] = k,
+                None => parts.push([k, k]),
+            }
+        }
+        let near = |k: usize| size(k) < NEAR;
+        parts.iter().enumerate().find_map(|(number, first)| {
+            let before = (1..first[0]).rev().find(|&k| near(k) && near(k - 1))?;
+            parts[number + 1..].iter().take(PARTS).find_map(|last| {
+                let after = (last[1] + 1..used.len() - 1).find(|&k| near(k) && near(k + 1))?;
+                let inner = [first[1] + 1, last[0] - 1];
+                if inner[1] - inner[0] >= BETWEEN {
+                    return None;
+                }
+                let path = self.bridge(&used, [before - 1, after + 1])?;
+                let nearer = |k: usize| {
+                    let whole = self.distance(space, used[k], None);
+                    size(k) > FAR && self.distance(space, used[k], Some(&path)) < NEARER * whole
+                };
+                let both = [first, last].iter().all(|part| (part[0]..=part[1]).any(nearer));
+                both.then(|| inner.map(|k| used[k]))
+            })
+        })
+    }
+
+    /// Four points of the curve before and after a part, from which a cubic passes over it: half of its length before
+    /// the first of the given nodes, the two nodes, and half of its length after the second.
+    fn bridge(&self, used: &[usize], nodes: [usize; 2]) -> Option<[usize; 4]> {
+        let [from, to] = nodes.map(|k| self.times[used[k]]);
+        let half = 0.5 * (to - from);
+        let before = used[..nodes[0]].iter().rev().find(|&&i| self.times[i] <= from - half);
+        let before = before.or(used.first()).copied()?;
+        let after = used[nodes[1] + 1..].iter().find(|&&i| self.times[i] >= to + half);
+        let after = after.or(used.last()).copied()?;
+        let found = [before, used[nodes[0]], used[nodes[1]], after];
+        found.windows(2).all(|pair| self.times[pair[1]] > self.times[pair[0]]).then_some(found)
+    }
+
+    /// The squared distance of a datum from the curve, or from the cubic through four of its points in the tangent space
+    /// at the second of them.
+    fn distance(&self, space: &Erased, datum: usize, nodes: Option<&[usize; 4]>) -> f64 {
+        let len = space.point_len();
+        let row =
+            |rows: &[f64], i: usize| rows[i * len..][..len].iter().map(|x| lane(*x)).collect::<Vec<Lane>>();
+        let y = row(self.points, datum);
+        let mut v = vec![Lane::ZERO; len];
+        let mut p = row(self.at, nodes.map_or(datum, |nodes| nodes[1]));
+        if let Some(nodes) = nodes {
+            let mut whole = vec![Lane::ZERO; len];
+            for &node in nodes {
+                let ratio = |other: &usize| {
+                    (self.times[datum] - self.times[*other]) / (self.times[node] - self.times[*other])
+                };
+                let weight: f64 = nodes.iter().filter(|other| **other != node).map(ratio).product();
+                if node != nodes[1] {
+                    space.log(&p, &row(self.at, node), &mut v);
+                    whole.iter_mut().zip(&v).for_each(|(sum, v)| *sum += lane(weight) * *v);
+                }
+            }
+            let start = p.clone();
+            space.ray(&start, &whole, Lane::ONE, &mut p);
+        }
+        let angle = space.log(&p, &y, &mut v);
+        let apart = space.distance(&p, &y, &v, angle).as_array()[0];
+        if apart.is_nan() { f64::INFINITY } else { apart * apart }
     }
 }
 

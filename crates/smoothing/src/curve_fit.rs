@@ -10,7 +10,7 @@ use crate::information::{self, Root};
 use crate::jacobi_operator::JacobiOperator;
 use crate::linearized::{Basis, LinearProblem, OVERLAP, Row};
 use crate::path::{Path, Position, moved, positions};
-use crate::problem::{Data, Ends, Known, Options, Penalty, Report, Smooth, State};
+use crate::problem::{Data, Ends, Known, Options, Penalty, Report, Selection, Smooth, State};
 use crate::progress::{Progress, larger, length};
 use crate::residuals::Residuals;
 use crate::robust::{AtCurve, Lam, Robust};
@@ -365,6 +365,11 @@ impl<'a> CurveFit<'a> {
                 self.inverse = Some(system.mean(&band));
                 self.known = Some(linear.matrix(lam / softness).known());
                 self.progress.note(&linear, &band, lam / softness, softness);
+                if self.robust.selection == Selection::Sound
+                    && self.robust.is_pulled(&residuals.squares, &factors, &self.leverages())
+                {
+                    self.robust.selection = Selection::Pulled;
+                }
             }
             (self.progress.report.selection, self.progress.report.rejected) =
                 (self.robust.selection, self.robust.rejected());
@@ -453,12 +458,17 @@ impl<'a> CurveFit<'a> {
         }
     }
 
-    /// Starts the next stage of a robust fit.
-    fn go_on(&mut self, space: &Erased, squares: &[f64]) {
+    /// The variances of the curve at the data, divided by those of the data.
+    fn leverages(&self) -> Vec<f64> {
         let leverage = |(row, w): (&Row, &f64)| {
             self.inverse.as_ref().map_or(0.0, |inverse| w * row.square(inverse).as_array()[0])
         };
-        let leverages: Vec<f64> = self.linearized.data.iter().zip(self.data.weights).map(leverage).collect();
+        self.linearized.data.iter().zip(self.data.weights).map(leverage).collect()
+    }
+
+    /// Starts the next stage of a robust fit.
+    fn go_on(&mut self, space: &Erased, squares: &[f64]) {
+        let leverages = self.leverages();
         let freedom = self.progress.report.freedom;
         let lam = self.progress.lam;
         let data = self.data;

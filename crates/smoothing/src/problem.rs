@@ -191,6 +191,8 @@ pub enum Selection {
     Unsettled,
     /// Fewer than 60 % of the data are near the curve.
     Few,
+    /// An outlier moves the curve, because there are no other data nearby.
+    Pulled,
 }
 
 /// The report of a smoothed curve.

@@ -53,6 +53,10 @@ const NEAR: usize = 10;
 const DELETED: f64 = 1e-6;
 /// The least fraction of the data that must be selected for a result that can be trusted.
 const LEAST_SELECTED: f64 = 0.6;
+/// The squared residual, in corners of the loss, beyond which a datum is an outlier, and the displacement of the curve by
+/// such a datum, in standard deviations of the curve without it, that is too large.
+const OUTLYING: f64 = 9.0;
+const DISPLACED: f64 = 5.0;
 /// The weight of rejected data if there is no penalty, so that only data determine the curve.
 const TINY: f64 = 1e-9;
 
@@ -239,6 +243,17 @@ impl Robust {
         }
         let limit = LEFT * self.sigma * self.sigma * chi::quantile(self.m, KEPT);
         squares.iter().zip(&self.kept).any(|(square, kept)| *kept > 0.0 && *square > limit)
+    }
+
+    /// Whether an outlier moves the curve, given the factors of the pseudo-data and their leverages. Every loss that is
+    /// not zero lets an outlier pull the curve, which other data prevent except in gaps.
+    pub fn is_pulled(&self, squares: &[f64], factors: &[f64], leverages: &[f64]) -> bool {
+        let outlying = OUTLYING * self.corner().powi(2);
+        // Without a datum, the curve moves by h/(1 − h) times its residual, and its variance is 1/(1 − h) times as large.
+        let moves = |square: f64, factor: f64, h: f64| h / (1.0 - h).max(DELETED) * square * factor * factor;
+        squares.iter().zip(factors).zip(leverages).any(|((square, factor), h)| {
+            *square > outlying && moves(*square, *factor, *h) > (DISPLACED * self.sigma).powi(2)
+        })
     }
 
     /// The number of data with a weight that are not selected.

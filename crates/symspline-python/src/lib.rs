@@ -102,6 +102,7 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     guarded(m, wrap_pyfunction!(smoothing::smoothing_inverse, m)?)?;
     guarded(m, wrap_pyfunction!(smoothing::chi_squared, m)?)?;
     guarded(m, wrap_pyfunction!(smoothing::residuals_at, m)?)?;
+    guarded(m, wrap_pyfunction!(smoothing::bypassed, m)?)?;
     guarded(m, wrap_pyfunction!(smoothing::residual_statistics, m)?)?;
     guarded(m, wrap_pyfunction!(smoothing::unequal_bins, m)?)?;
     guarded(m, wrap_pyfunction!(estimation::frames_along, m)?)?;

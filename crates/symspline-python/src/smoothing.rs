@@ -217,6 +217,7 @@ fn columns<'py>(py: Python<'py>, found: &[Smooth]) -> PyResult<Bound<'py, PyTupl
         Selection::Interpolated => 1,
         Selection::Unsettled => 2,
         Selection::Few => 3_i64,
+        Selection::Pulled => 4,
     });
     let selection = PyArray1::from_iter(py, selection);
     let rejected = PyArray1::from_iter(py, reports.iter().map(|r| r.rejected as i64));
@@ -320,6 +321,23 @@ pub fn residuals_at<'py>(
             .for_each(|(own, row)| row.copy_from_slice(&own[k]));
     }
     Ok(out)
+}
+
+/// [`AtData::bypassed`] for one curve: times, points of the curve, data, weights, and sizes of residuals.
+#[pyfunction]
+pub fn bypassed(
+    py: Python<'_>,
+    handle: &Handle,
+    times: Array<'_>,
+    at: Array<'_>,
+    points: Array<'_>,
+    weights: Array<'_>,
+    sizes: Array<'_>,
+) -> PyResult<Option<[usize; 2]>> {
+    let space = handle.space.get();
+    let [times, at, points, weights, sizes] = [&times, &at, &points, &weights, &sizes].map(in_order);
+    let (data, sizes) = (AtData { times: times?, at: at?, points: points?, weights: weights? }, sizes?);
+    watched(py, None, 1, is_long(sizes.len()), |_| data.bypassed(&space, sizes))
 }
 
 /// For every curve: two medians, the mean square, the mean product, and the number of products; the sizes.

@@ -26,6 +26,11 @@ _STIFF = (
     "curve with the data. If the curve is too stiff, pass criterion='reml', a smaller lam or more knots. If the noise "
     "is correlated, do not use the bands."
 )
+_BYPASSED = (
+    "the loss rejects data on both sides of those from index {0} to {1}, although they are near a curve without these. "
+    "Either the data from {0} to {1} are outliers, which weights of 0 exclude, or the motion is fast there: pass "
+    "loss='linear', or smooth this part by itself."
+)
 
 
 class Sensor(NamedTuple):
@@ -100,6 +105,8 @@ class _Examined(NamedTuple):
     ----------
     space : Space
         The part.
+    data : tuple of ndarray, shape (curves, N, ...)
+        Times, points of the curves, data, and weights.
     rows : ndarray, shape (curves, N, d)
         Residuals; NaN without information.
     deviations : ndarray, shape (curves, N)
@@ -109,6 +116,7 @@ class _Examined(NamedTuple):
     """
 
     space: Space
+    data: tuple[Doubles, Doubles, Doubles, Doubles]
     rows: Doubles
     deviations: Doubles
     leverages: Doubles
@@ -123,11 +131,13 @@ class _Examined(NamedTuple):
         precision = noisy.precisions[number]
 
         def of_curves(array: Any, axes: tuple[int, ...]) -> Array:
-            return np.broadcast_to(array, (*noisy.batch, n, *axes)).reshape(-1, n, *axes)[curves]
+            rows: Array = np.broadcast_to(array, (*noisy.batch, n, *axes)).reshape(-1, n, *axes)[curves]
+            return rows
 
         times, weights = of_curves(noisy.times, ()), of_curves(precision.weights, ())
         x, y = (space._as_doubles(of_curves(points, shape)) for points in (x, y))
-        rows, deviations = _core.residuals_at(space._handle, times, x, y, weights)
+        data = times, x, y, weights
+        rows, deviations = _core.residuals_at(space._handle, *data)
         if precision.information is None:
             rows *= np.sqrt(weights)[..., None]
         else:
@@ -136,7 +146,11 @@ class _Examined(NamedTuple):
             rows[used] = np.where(known, np.einsum("nij,nj->ni", roots, rows[used]), np.nan)
         counts = np.maximum(np.isfinite(rows).any(axis=-1).sum(axis=-1), 1)
         df, sigma = (np.reshape(value, -1)[curves] for value in (own.report.df, own.sigma))
-        return cls(space, rows, deviations, np.minimum(df / counts, 1.0), sigma)
+        return cls(space, data, rows, deviations, np.minimum(df / counts, 1.0), sigma)
+
+    def _sizes(self, k: int) -> Doubles:
+        """Return the sizes of the residuals of a curve in given standard deviations, 0 without information."""
+        return np.asarray(np.abs(np.nan_to_num(self.rows[k])).max(axis=-1) / self.sigmas[k])
 
     def complaints(self, known: NDArray[np.bool_], loss: str) -> Iterator[tuple[int, str]]:
         """Yield the number of each curve with failed checks, and a text with these checks and their remedies.
@@ -148,11 +162,17 @@ class _Examined(NamedTuple):
         loss : str
             Loss of the data.
         """
-        corner = corner_of(loss, self.space.dim)
-        estimated = examine_smoothing(self.rows, self.deviations, self.leverages, loss != "linear")
-        for k in np.flatnonzero(known | estimated.failed).tolist():
+        corner, robust = corner_of(loss, self.space.dim), loss != "linear"
+        estimated = examine_smoothing(self.rows, self.deviations, self.leverages, robust)
+        for k in range(len(known)):
+            sizes = self._sizes(k) if known[k] else estimated.sizes[k]
+            times, x, y, weights = (own[k] for own in self.data)
+            if robust and (part := _core.bypassed(self.space._handle, times, x, y, weights, sizes)):
+                yield k, _BYPASSED.format(*part)
+                continue
             if not known[k]:
-                yield k, _of_estimated(estimated, k)
+                if estimated.failed[k]:
+                    yield k, _of_estimated(estimated, k)
                 continue
             used = np.flatnonzero(np.isfinite(self.rows[k]).any(axis=1))
             given = Residuals(self.rows[k][used] / self.sigmas[k], float(self.leverages[k]), 0.0, loss, corner)

@@ -219,7 +219,7 @@ def make_smoothing_spline(
           estimated from neighbouring data, they are correlated, there are outliers under least squares, or `sigma` is
           wrong. With a given λ, residuals are examined only if `sigma` is given.
         - The motion or the noise varies along the recording.
-        - A robust loss may have rejected the wrong data.
+        - A robust loss may have rejected the wrong data, or an outlier in a gap moves the curve.
         - Another curve may fit better, because the noise is large or consecutive data are far apart.
         - Many points are exact copies of the point before at a later time, as in a log that is faster than its sensor.
     ConvergenceWarning

@@ -14,7 +14,7 @@ from .report import SmoothingReport
 from .warned import SmoothingWarning, first_affected
 
 # Kinds of selections that cannot be trusted, as numbered in `Selection` of the core.
-_INTERPOLATED, _UNSETTLED, _FEW = 1, 2, 3
+_INTERPOLATED, _UNSETTLED, _FEW, _PULLED = 1, 2, 3, 4
 
 
 class Outliers(NamedTuple):
@@ -82,6 +82,11 @@ def _message(kind: int, what: str, rejected: int, df: float, count: int) -> str:
             f"{what} could not determine which data are outliers: the selection alternates between two sets of data. "
             f"The last one rejects {rejected} of {count} data. Plot the residuals, and pass sigma=, or weights of 0 "
             "for the wrong data."
+        )
+    if kind == _PULLED:
+        return (
+            f"{what} has an outlier that moves the curve by more than five standard deviations, because there are no "
+            "other data near it. Pass loss='cauchy', or weights of 0 for outliers in gaps."
         )
     return (
         f"{what} rejects many data: {rejected} of {count} data are far from the curve. If these are not outliers, the "
