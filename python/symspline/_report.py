@@ -77,8 +77,9 @@ class Report:
         Mean contraction factor of the residual per iteration.
     alternative_energy : float, ndarray or None
         Lowest bending energy of other C² curves through the points that ``method="auto"`` computed. None if there
-        were none, NaN for such curves of a batch. For a product, the alternative differs in one factor. Curves that
-        traverse a segment on a longer way around the space are not searched for.
+        were none, NaN for such curves of a batch. It is lower than that of the curve only if the other curve goes
+        around the space: one of its segments is longer than 1.7 times the distance to the cut locus. For a product,
+        the alternative differs in one factor.
     contraction_bound : float, ndarray or None
         Bound α < 1 of the contraction factor of Algorithm 1, see Notes. None, or NaN in a batch, where
         `invariant_radius` is None or K D > 0.26058. For a product, the largest bound of its factors.

@@ -307,3 +307,25 @@ def test_an_undefined_logarithm_names_its_segment():
     options = {"bc_type": ends, "method": "fixed-point", "max_iter": 1}
     with pytest.raises(ss.CutLocusError, match=r"control points between points\[1\] and points\[2\]"):
         ss.CubicSpline(None, p, S2, **options)
+
+
+def test_curves_around_the_space_are_alternatives():
+    """Which curves around the space a solver finds depends on rounding errors. The result does not."""
+    t = np.array([0.6906, 1.8647, 2.3345, 2.8122, 3.2786, 3.8183])
+    points = np.array(
+        [
+            [0.3869, 0.6955 + 0.5691j, 0.0112 - 0.2064j],
+            [0.5191, 0.4854 + 0.5625j, 0.3449 - 0.2439j],
+            [0.3494, 0.3057 - 0.6381j, -0.6043 + 0.1097j],
+            [0.4042, 0.4556 - 0.2911j, -0.6763 - 0.2947j],
+            [0.1606, -0.3606 - 0.2859j, -0.1153 + 0.8655j],
+            [0.6481, 0.1151 + 0.2498j, 0.7093 + 0.0342j],
+        ]
+    )
+    points /= np.linalg.norm(points, axis=1)[:, None]
+    lower = 0
+    for change in (0, 1e-6, -1e-6, 2e-6, 1e-5, -1e-5, 1e-4):
+        s = ss.CubicSpline(t + change * (np.arange(6) == 0), points, "cp:2")
+        assert s.bending_energy() == pytest.approx(39.28, abs=0.02)
+        lower += (s.report.alternative_energy or np.inf) < 34
+    assert lower > 0

@@ -22,6 +22,10 @@ const FAR: f64 = 0.55;
 /// step of 0.58 needed 17.
 const HALF_WAY: f64 = 0.4;
 const SLOW: usize = 16;
+/// A curve goes around the space if a segment is longer than the distance to the cut locus by this factor, as on the
+/// longer way around a sphere between points that are near each other: less than 0.3 of this distance. It is an alternative
+/// to a curve that does not, even if its energy is lower, because rounding errors determine whether a solver finds it.
+const AROUND: f64 = 1.7;
 /// Solutions whose relative difference of energies is at most this belong to the same curve.
 const SAME: f64 = 1e-6;
 /// So do energies below this fraction of the square of the speed, for a curve that is a geodesic.
@@ -97,7 +101,12 @@ pub fn select(
         return;
     }
     let infinity = lane(f64::INFINITY);
-    let energy = |chain: &mut Chain, on: Lane| on.select(bending(space, chain), infinity);
+    // Energies, and where curves go around the space; where there is no curve, every one is better.
+    let energy = |chain: &mut Chain, on: Lane| {
+        let (energy, longest) = bending(space, chain);
+        let most = lane(AROUND * space.cut_angle()) * chain.longest;
+        (on.select(energy, infinity), !on | (longest * chain.widest).simd_gt(most))
+    };
     let mut spent = Lane::ZERO;
     // Energies are computed only when there are two solutions to compare.
     let mut least = None;
@@ -174,14 +183,15 @@ pub fn select(
             swept = on & !arrived;
             sweeps_end = chain.unknowns().to_vec();
         }
-        let bends = energy(chain, arrived);
-        let known = least.unwrap_or(infinity);
+        let (bends, around) = energy(chain, arrived);
+        let (known, known_around) = least.unwrap_or((infinity, !Lane::ZERO));
         // The energies of geodesics are rounding errors.
         let rounding = lane(STRAIGHT) * chain.pace * chain.pace;
         let other = arrived & !(bends - known).abs().simd_le(lane(SAME) * bends + rounding);
-        let lower = other & bends.simd_lt(known);
-        second = lower.select(known, other.select(second.min(bends), second));
-        least = Some(lower.select(bends, known));
+        let better = (known_around & !around) | (!(around & !known_around) & bends.simd_lt(known));
+        let lower = other & better;
+        second = lower.select(second.min(known), other.select(second.min(bends), second));
+        least = Some((lower.select(bends, known), lower.select(around, known_around)));
         // A solution with a control point beyond the cut locus is spurious.
         let nearer = on
             & !settled
