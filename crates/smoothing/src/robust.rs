@@ -11,9 +11,10 @@
 //!    because ordinary residuals of selected data vanish where the curve follows each of them.
 //! 2. *Chosen*: the same selection, with λ by the requested criterion.
 //! 3. *Final*: iteratively reweighted least squares (Holland & Welsch 1977) with that λ, times the mean weight, and the
-//!    noise level of the second stage. If that is much larger than in the first stage, or the curve rejects selected
-//!    data, λ is too large for them, because a redescending loss then treats every bend as outliers. The λ and the noise
-//!    level of the first stage replace those of the second.
+//!    noise level of the second stage. If that is much larger than in the first stage, or the curve of the second stage
+//!    is far from selected data, λ is too large for them, because a redescending loss then treats every bend as outliers.
+//!    The λ and the noise level of the first stage replace those of the second. If only data at the ends are far from it,
+//!    because natural ends cannot follow an acceleration, the result is the curve of the second stage.
 //!
 //! If the curve follows nearly all data, the noise is too small to be estimated at this sampling rate. Deviations are
 //! then those from interpolation, and only isolated data that deviate much more than others are rejected. The curve of
@@ -38,6 +39,8 @@ const FALLS: f64 = 0.25;
 const ALL: f64 = 0.9;
 /// The squared limit, relative to that of the selection, beyond which the final curve rejects selected data.
 const LEFT: f64 = 2.0;
+/// The number of degrees of freedom at either end that do not count for this.
+const ENDS: usize = 3;
 /// The ratio of the noise levels of the second and the first stage above which the curve of the second is too stiff.
 const STIFFER: f64 = 2.0;
 /// The limit for squared deviations of data whose noise is too small, in medians.
@@ -117,6 +120,8 @@ pub struct Robust {
     limit: f64,
     /// λ and the noise level of the first stage, until the last stage has used them.
     first: Option<(f64, f64)>,
+    /// λ of the second stage, if its curve is near all selected data, until the last stage has used it.
+    chosen: Option<f64>,
     /// Whether the last stage is least squares for the selected data.
     truncated: bool,
 }
@@ -153,6 +158,7 @@ impl Robust {
             seen: Vec::new(),
             limit: f64::INFINITY,
             first: None,
+            chosen: None,
             truncated: false,
         }
     }
@@ -238,11 +244,30 @@ impl Robust {
 
     /// Whether the M-estimator rejects selected data, so that another stage follows.
     pub fn leaves(&self, squares: &[f64]) -> bool {
-        if !self.reweighs() || self.lam.is_some() {
-            return false;
-        }
+        self.reweighs() && self.lam.is_none() && self.left(squares).contains(&true)
+    }
+
+    /// The selected data that are far from the curve.
+    fn left(&self, squares: &[f64]) -> Vec<bool> {
         let limit = LEFT * self.sigma * self.sigma * chi::quantile(self.m, KEPT);
-        squares.iter().zip(&self.kept).any(|(square, kept)| *kept > 0.0 && *square > limit)
+        squares.iter().zip(&self.kept).map(|(square, kept)| *kept > 0.0 && *square > limit).collect()
+    }
+
+    /// Whether selected data other than those at the ends are far from the curve. Natural ends cannot follow a motion that
+    /// accelerates there, and a redescending loss then leaves one datum after the other.
+    fn leaves_inside(&self, at: &AtCurve) -> bool {
+        let left = self.left(at.squares);
+        let unit = (left.len() as f64 / at.freedom.max(1.0)).ceil() as usize;
+        let mut reaches = [ENDS * unit; 2];
+        for (end, reach) in reaches.iter_mut().enumerate() {
+            for k in 0..left.len() {
+                if k < *reach && left[if end == 0 { k } else { left.len() - 1 - k }] {
+                    *reach = (*reach).max(k + unit + 1);
+                }
+            }
+        }
+        let last = left.len().saturating_sub(reaches[1]);
+        left.get(reaches[0]..last).is_some_and(|inner| inner.contains(&true))
     }
 
     /// Whether an outlier moves the curve, given the factors of the pseudo-data and their leverages. Every loss that is
@@ -267,12 +292,17 @@ impl Robust {
             Stage::Plain => Lam::Same,
             Stage::Rejecting => self.select(at),
             Stage::Chosen => self.finish(at),
-            Stage::Final => match self.first.take() {
-                Some((lam, sigma)) => {
+            Stage::Final => match (self.chosen.take().filter(|_| !self.leaves_inside(at)), self.first.take())
+            {
+                (Some(lam), _) => {
+                    self.truncated = true;
+                    Lam::To(lam)
+                }
+                (None, Some((lam, sigma))) => {
                     self.sigma = sigma;
                     Lam::To(lam)
                 }
-                None => {
+                (None, None) => {
                     self.truncated = true;
                     Lam::Same
                 }
@@ -342,12 +372,13 @@ impl Robust {
         if !self.known {
             self.sigma = self.scale(self.of_kept(&self.deleted(at)));
         }
-        if (self.sigma > STIFFER * first || self.leaves(at.squares))
+        if (self.sigma > STIFFER * first || self.leaves_inside(at))
             && let Some((lam, sigma)) = self.first.take()
         {
             self.sigma = sigma;
             return Lam::To(lam);
         }
+        self.chosen = at.lam;
         let weights = self.weights(at.squares);
         let sum: f64 = weights.iter().zip(&self.kept).map(|(weight, kept)| weight * kept).sum();
         Lam::Times(sum / self.count())
