@@ -90,7 +90,7 @@ def test_a_recording_that_rests_and_moves_keeps_its_motion():
 
 
 def test_natural_ends_do_not_change_the_smoothing_of_a_robust_loss():
-    """Optical motion capture: 0.05 mm at 100 Hz. A motion that accelerates at its ends is not a motion with outliers."""
+    """Optical motion capture, 0.05 mm at 100 Hz: a motion that accelerates at its ends is not one with outliers."""
     t = START + np.arange(0, 20, 0.01)
     truth = path(ss.space("r:3"), t) / 20
     points = truth + 5e-5 * np.random.default_rng(2).standard_normal(truth.shape)
