@@ -16,7 +16,7 @@ unexport PYTHONDONTWRITEBYTECODE
 # Cargo would try to use the job server of make, which its recipes do not inherit.
 unexport MAKEFLAGS MFLAGS
 
-.PHONY: demo check check-lints check-rust check-types check-python test test-oracles test-torch test-aarch64 fuzz bench docs wheel \
+.PHONY: demo check check-lints check-rust check-types check-python test test-oracles test-torch test-aarch64 fuzz bench size docs wheel \
 	sdist test-wheel crate crate-msrv crate-semver publish-wheels publish-crates publish-npm check-tools clean \
 	docs-check wasm test-wasm
 
@@ -82,6 +82,10 @@ fuzz: .venv/built .venv/tools
 	$(BIN)/python -m pytest --numprocesses auto tests/fuzz --hypothesis-profile=long
 	$(BIN)/python -m tests.trust 20
 	$(BIN)/python tests/host/interrupts.py
+
+# Lines of code by room of the package, beside the aims.
+size:
+	@python3 packaging/size.py
 
 # Some minutes; the machine should have nothing else to do.
 bench: .venv/built .venv/tools

@@ -23,11 +23,11 @@ from .._report import Columns, Report, shaped
 from .._spaces import Array, Doubles, Product, Quotient, Space, Torus, cover_of, factors_of, parts_of
 from .._typing import Progress
 from ..manifolds import Manifold
-from ..manifolds._checks import hermite_on_manifold
-from ..manifolds._on_manifold import OnManifold
 from .curve import CoreCurve, CurveArrays, ProductCurve, share
 from .ends import NATURAL, End, ends_in_factors, ends_of, is_closed, split_ends
 from .handles import require_short_handles
+from .on_manifold.checks import hermite_on_manifold
+from .on_manifold.on_manifold import OnManifold
 from .reduced import ReducedCurve
 from .solve import Mask, Options, Solved, Task, solve, solve_single, without
 from .turns import turns_of

@@ -9,16 +9,16 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from .._curves.solve import Options, Solved, Task
-from .._faults import CUT_LOCUS, Fault, unconverged
-from .._report import SOLVERS, Columns
-from .._spaces import Array, Doubles
-from .._typing import Progress
-from ._certificate import velocity_errors
-from ._condition import ControlPolygon, End, Problem, control_polygons, not_a_knot
-from ._frames import frames_along
-from ._iteration import FLOOR, iterate
-from ._manifold import Manifold
+from ..._faults import CUT_LOCUS, Fault, unconverged
+from ..._report import SOLVERS, Columns
+from ..._spaces import Array, Doubles
+from ..._typing import Progress
+from ...manifolds._frames import frames_along
+from ...manifolds._manifold import Manifold
+from ..solve import Options, Solved, Task
+from .certificate import velocity_errors
+from .condition import ControlPolygon, End, Problem, control_polygons, not_a_knot
+from .iteration import FLOOR, iterate
 
 # Rounding of points in residuals of speed, for points that are so near to each other that it is more than `FLOOR`.
 _ROUNDING = 1e3 * np.finfo(float).eps

@@ -8,10 +8,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .._core import solve_tridiagonal
-from .._spaces import Array, Doubles
-from ._condition import Problem, c2_residuals, is_parabola
-from ._frames import products
+from ..._core import solve_tridiagonal
+from ..._spaces import Array, Doubles
+from ...manifolds._frames import products
+from .condition import Problem, c2_residuals, is_parabola
 
 # How many steps back are mixed.
 _DEPTH = 5

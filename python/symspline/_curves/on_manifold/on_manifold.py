@@ -9,19 +9,19 @@ from typing import Any, NamedTuple, Never
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import _core
-from .._core import ValidationError
-from .._curves.curve import NORMS, REAL, CoreCurve
-from .._curves.solve import Options, Solved, Task, solve_in_python
-from .._faults import Fault
-from .._spaces import Array, Doubles, Euclidean, Space
-from .._typing import Progress
-from ._checks import validate_on_manifold
-from ._condition import ControlPolygon, control_polygons
-from ._differences import STEPS, eighth_difference, first_derivative, second_derivative
-from ._fit import fit_of_one_length
-from ._manifold import Manifold
-from ._operations import Operations
+from ... import _core
+from ..._core import ValidationError
+from ..._faults import Fault
+from ..._spaces import Array, Doubles, Euclidean, Space
+from ..._typing import Progress
+from ...manifolds._differences import STEPS, eighth_difference, first_derivative, second_derivative
+from ...manifolds._manifold import Manifold
+from ...manifolds._operations import Operations
+from ..curve import NORMS, REAL, CoreCurve
+from ..solve import Options, Solved, Task, solve_in_python
+from .checks import validate_on_manifold
+from .condition import ControlPolygon, control_polygons
+from .fit import fit_of_one_length
 
 # Samples that are computed at a time.
 _AT_ONCE = 1 << 12

@@ -15,11 +15,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._spaces import Array, Doubles
-from ._condition import ControlPolygon, Problem, c2_residuals, c2_residuals_of, control_polygons
-from ._differences import dlog_by_differences
-from ._iteration import Tridiagonal
-from ._operations import Operations
+from ..._spaces import Array, Doubles
+from ...manifolds._differences import dlog_by_differences
+from ...manifolds._operations import Operations
+from .condition import ControlPolygon, Problem, c2_residuals, c2_residuals_of, control_polygons
+from .iteration import Tridiagonal
 
 # Terms of the Neumann series behind the first; each costs one evaluation of F.
 _TERMS = 4

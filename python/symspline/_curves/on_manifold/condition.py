@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .._spaces import Array, Doubles
-from ._operations import Operations
+from ..._spaces import Array, Doubles
+from ...manifolds._operations import Operations
 
 
 class End(NamedTuple):

@@ -8,13 +8,13 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from .._core import CutLocusError, ValidationError
-from .._curves.ends import map_ends
-from .._curves.solve import Options, Task, validate, without
-from .._faults import INVALID, Fault, of_curve
-from .._spaces import Array, Euclidean
-from ._condition import control_polygons
-from ._manifold import Manifold
+from ..._core import CutLocusError, ValidationError
+from ..._faults import INVALID, Fault, of_curve
+from ..._spaces import Array, Euclidean
+from ...manifolds._manifold import Manifold
+from ..ends import map_ends
+from ..solve import Options, Task, validate, without
+from .condition import control_polygons
 
 _METHODS = ("auto", "quasi-newton")
 

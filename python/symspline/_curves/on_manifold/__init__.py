@@ -1,0 +1,1 @@
+"""Curves on manifolds that consist of Python functions."""
