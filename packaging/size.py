@@ -1,7 +1,7 @@
 """Lines of code of the package by room, beside the aims: without docstrings, comments and blank lines.
 
-`make size` prints the table. A room is a folder of the layout that CONTRIBUTING describes, with the modules that will move
-there.
+`make size` prints the table. A room is a folder of the layout that CONTRIBUTING describes, with the modules that will
+move there.
 """
 
 import ast
@@ -16,7 +16,7 @@ PACKAGE = Path(__file__).parents[1] / "python" / "symspline"
 ROOMS = {
     "__init__, __main__": ("__init__ __main__", 120),
     "cli": ("cli", 1450),
-    "poses, rotations, geo, xarray": ("_head_positions _pose_files _tracks geo poses rotations xarray", 1450),
+    "poses, rotations, geo, xarray": ("_pose_files _tracks geo poses rotations xarray", 1450),
     "_estimation": ("_estimation", 1050),
     "_smoothing": ("_segments _smoothing", 1850),
     "jax, torch, _autodiff": ("_adapters _closed_forms jax torch", 1100),

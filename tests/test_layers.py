@@ -62,7 +62,7 @@ LAYERS = [
     ],
     ["_estimation"],
     ["_pose_files"],
-    ["_head_positions", "geo", "measure", "poses", "quantum", "rotations", "shapes", "subspaces", "tensors", "testing"],
+    ["geo", "measure", "poses", "quantum", "rotations", "shapes", "subspaces", "tensors", "testing"],
     ["cli", "xarray"],
     ["__init__", "__main__"],
 ]

@@ -19,7 +19,7 @@ from ._typing import TimesLike
 # Adjacent rows of reports that a local fit does not determine for the whole curve, those of which the largest value
 # counts, and the one of which the value of the last part counts.
 _UNKNOWN = slice(NUMBERS.index("invariant_radius"), NUMBERS.index("alternative_energy") + 1)
-_LARGEST = ("residual", "max_step", "velocity_error")
+_LARGEST = ("residual", "max_step")
 _MAXIMA = np.array([[name != "rate"] for name in NUMBERS])
 _CONVERGED = INTEGERS.index("converged")
 

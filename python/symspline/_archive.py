@@ -430,10 +430,14 @@ def _vector(plain: Any) -> Any:
     return plain if isinstance(plain, np.ndarray) else np.asarray(plain, np.float64)
 
 
+# Fields of reports in files of earlier versions.
+_FORMER = {"velocity_error"}
+
+
 def read_report(kind: type[_Report], plain: Any, batch: tuple[int, ...]) -> _Report:
     """Return a report from the values of its fields, `vars` of a report."""
     known = {own.name: own.metadata for own in fields(kind)}  # type: ignore[arg-type]
-    if unknown := set(plain) - set(known):
+    if unknown := set(plain) - set(known) - _FORMER:
         raise ValidationError(f"there is no field {short_repr(min(unknown))}")
     return kind(**{name: read_field(name, plain[name], batch, **own) for name, own in known.items()})
 

@@ -90,10 +90,6 @@ class Report:
         Solvers that ``method="auto"`` omitted or stopped early because they would have exceeded its budget. Curves of
         more than 512 segments are solved in sections, without the search for a solution of lower energy: if points are
         far apart, the solvers of that search are listed here. For a batch, those of any curve.
-    velocity_error : float, ndarray or None
-        Bound of the distance between the velocities at the knots and those of the exact C² curve on a `Manifold`, in
-        units of velocity; see :doc:`/manifolds`. inf if there is no bound, None on symmetric spaces. For a product,
-        the root of the sum of squares.
 
     See Also
     --------
@@ -144,7 +140,6 @@ class Report:
     contraction_bound: Number | None = field(default=None, metadata=_MAYBE)
     guaranteed_sweeps: Number | None = field(default=None, metadata=_MAYBE)
     skipped: tuple[str, ...] = ()
-    velocity_error: Number | None = field(default=None, metadata=_MAYBE)
 
     def __str__(self) -> str:
         converged = np.asarray(self.converged)
@@ -166,8 +161,6 @@ class Report:
             radii = np.reshape(self.invariant_radius, (np.size(self.converged), -1)).max(axis=0)
             each = " and ".join(f"{radius:.3g}" for radius in radii)
             text += f", control handles stay below {each} (Theorem 3.1)"
-        if self.velocity_error is not None:
-            text += f", velocities within {_worst(self.velocity_error):.1e}"
         return text
 
     def __repr__(self) -> str:
@@ -247,7 +240,7 @@ def _without_nan(columns: dict[str, Any]) -> dict[str, Any]:
 INTEGERS = ("converged", "iterations", "solver", "skipped")
 NUMBERS = (
     *("residual", "max_step", "rate", "invariant_radius", "contraction_bound"),
-    *("guaranteed_sweeps", "alternative_energy", "velocity_error"),
+    *("guaranteed_sweeps", "alternative_energy"),
 )
 OPTIONAL = tuple(own.name for own in fields(Report) if own.metadata.get("optional"))
 MAX_STEP = NUMBERS.index("max_step")
@@ -301,9 +294,6 @@ def combined(reports: Sequence[Report], max_step: Any, curvature: float, alterna
         each = [getattr(report, name) for report in reports]
         return None if any(one is None for one in each) else whole(np.stack(each))[()]
 
-    def root(own: Any) -> Any:
-        return np.sqrt(np.sum(np.square(own), axis=0))
-
     converged: Any = np.all(np.stack([np.asarray(report.converged) for report in reports]), axis=0)
     skipped = {name for report in reports for name in report.skipped}
     return Report(
@@ -320,7 +310,6 @@ def combined(reports: Sequence[Report], max_step: Any, curvature: float, alterna
         contraction_bound=of_all("contraction_bound", lambda own: np.max(own, axis=0)),
         guaranteed_sweeps=_count(of_all("guaranteed_sweeps", lambda own: np.max(own, axis=0))),
         skipped=tuple(name for name in SOLVERS if name in skipped),
-        velocity_error=of_all("velocity_error", root),
     )
 
 

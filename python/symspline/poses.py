@@ -31,7 +31,6 @@ from ._curves.composed import AnyCurve
 from ._estimation.along import Motion
 from ._estimation.measurements import GRAVITY
 from ._estimation.uncertainty import Jacobians, check_uncertain, standard_errors
-from ._head_positions import read_head_pos, write_head_pos
 from ._pose_files import (
     check_seconds,
     join,
@@ -60,7 +59,6 @@ __all__ = [
     "linear_acceleration",
     "linear_velocity",
     "read_euroc",
-    "read_head_pos",
     "read_kitti",
     "read_tum",
     "split",
@@ -68,7 +66,6 @@ __all__ = [
     "twist",
     "velocities",
     "write_euroc",
-    "write_head_pos",
     "write_kitti",
     "write_tum",
 ]

@@ -171,7 +171,6 @@ READERS = {
     "read_tum": ss.poses.read_tum,
     "read_kitti": ss.poses.read_kitti,
     "read_euroc": ss.poses.read_euroc,
-    "read_head_pos": ss.poses.read_head_pos,
     "read_nifti": lambda file: (pytest.importorskip("nibabel"), ss.tensors.read_nifti(file, order="fsl")),
 }
 

@@ -10,7 +10,7 @@ import symspline as ss
 
 FIELDS = [
     "method", "converged", "iterations", "residual", "max_step", "max_gap", "curvature", "invariant_radius", "rate",
-    "alternative_energy", "contraction_bound", "guaranteed_sweeps", "skipped", "velocity_error",
+    "alternative_energy", "contraction_bound", "guaranteed_sweeps", "skipped",
 ]  # fmt: skip
 
 

@@ -166,8 +166,7 @@ fn columns<'py>(py: Python<'py>, reports: &[Option<&Report>]) -> PyResult<Column
         |r| r.solver as i64,
         |r| i64::from(r.skipped.0),
     ];
-    // Only manifolds defined by functions have an error estimate of velocities.
-    const NUMBERS: [fn(&Report) -> f64; 8] = [
+    const NUMBERS: [fn(&Report) -> f64; 7] = [
         |r| r.residual,
         |r| r.max_step,
         |r| r.rate,
@@ -175,7 +174,6 @@ fn columns<'py>(py: Python<'py>, reports: &[Option<&Report>]) -> PyResult<Column
         |r| r.contraction_bound,
         |r| r.guaranteed_sweeps,
         |r| r.alternative,
-        |_| f64::NAN,
     ];
     let integer = |f: &fn(&Report) -> i64, r: &Option<&Report>| r.map_or(0, f);
     let number = |f: &fn(&Report) -> f64, r: &Option<&Report>| r.map_or(f64::NAN, f);

@@ -24,14 +24,10 @@ _EIGHTH = np.array([-56.0, 28.0, -8.0, 1.0])
 STEPS = np.concatenate([np.arange(-4.0, 0.0), np.arange(1.0, 5.0)])
 
 
-def dlog_by_differences(
-    operations: Operations, p: Array, v: Array, q: Array, w: Array, radius: float, stretch: float = 1.0
-) -> Array:
-    """The derivative of log_p at q = exp_p(v) in the direction w, by differences of order four along its geodesic;
-    ``stretch`` multiplies their steps."""
+def dlog_by_differences(operations: Operations, p: Array, v: Array, q: Array, w: Array, radius: float) -> Array:
+    """The derivative of log_p at q = exp_p(v) in the direction w, by differences of order four along its geodesic."""
     size = operations.norm(q, w)
     step = _OF_RADIUS * radius if math.isfinite(radius) else _OF_HANDLES * np.hypot(size, operations.norm(p, v))
-    step = stretch * step
     # Times along the geodesic with velocity w.
     s = np.divide(step, size, out=np.zeros_like(size), where=size > 0)
     ahead = np.multiply.outer(_PLACES, s).reshape(len(_PLACES), -1, *[1] * (w.ndim - 1))

@@ -125,11 +125,7 @@ def _handles(h: Doubles, p: Array, u: Array) -> tuple[Array, Array]:
 def c2_residuals(problem: Problem, u: Array) -> Doubles:
     """Return the C² residuals at every node as coordinates: a sixth of the jump of the acceleration, and at an end with
     not-a-knot the error of the velocity."""
-    return c2_residuals_of(problem, u, problem.operations.bends(*_handles(problem.h, problem.p, u)))
-
-
-def c2_residuals_of(problem: Problem, u: Array, bends: Array) -> Doubles:
-    """Return the same from the `bends` of the segments."""
+    bends = problem.operations.bends(*_handles(problem.h, problem.p, u))
     h = problem.h
     square = (h * h).reshape(*h.shape, *[1] * (u.ndim - 2))
     starts, stops = bends / square

@@ -16,7 +16,6 @@ from ..._typing import Progress
 from ...manifolds._frames import frames_along
 from ...manifolds._manifold import Manifold
 from ..solve import Options, Solved, Task
-from .certificate import velocity_errors
 from .condition import ControlPolygon, End, Problem, control_polygons, not_a_knot
 from .iteration import FLOOR, iterate
 
@@ -61,16 +60,12 @@ def fit_of_one_length(task: Task, options: Options, progress: Progress | None) -
         velocities[good] = found.velocities
         for name in ("converged", "iterations", "residual", "rate"):
             columns.row(name)[good] = getattr(found, name)
-        unknowns = slice(0, start.shape[1])
-        coordinates = problem.coordinates(found.velocities[:, unknowns], unknowns)
-        columns.row("velocity_error")[good] = velocity_errors(problem, coordinates, pace)
         polygon = control_polygons(operations, problem.h, problem.p, found.velocities)
         faults |= _unfit(space, polygon, good, columns, options.tol, names)
         for i in faults:
             if faults[i].kind == CUT_LOCUS:
                 velocities[i] = np.nan
                 columns.row("converged")[i], columns.row("residual")[i] = False, np.inf
-                columns.row("velocity_error")[i] = np.nan
     return Solved(points, velocities.reshape(points.shape), columns, [faults[i] for i in sorted(faults)])
 
 
