@@ -1,4 +1,4 @@
-"""Smoothing and estimation in xarray objects: the numbers are those of the functions of plain arrays."""
+"""Smoothing in xarray objects: the numbers are those of the functions of plain arrays."""
 
 import re
 
@@ -9,7 +9,6 @@ from refused import raises
 
 import symspline as ss
 import symspline.xarray as sx
-from symspline import measure
 
 RNG = np.random.default_rng(0)
 S2, SO3 = ss.Sphere(2), ss.SpecialOrthogonal(3)
@@ -130,107 +129,6 @@ def test_invalid_smoothing_raises_at_once(match, options, chunks):
 # ---- estimation ----
 
 S = np.sort(np.random.default_rng(4).uniform(0, 10, 300))
-BIAS = np.array([0.05, -0.03, 0.02])
-
-
-def attitudes(times=lambda t: t, **attrs):
-    p = SO3.exp(turning(T), 0.03 * SO3.random_tangent(np.random.default_rng(5), turning(T)))
-    return xr.DataArray(p, dims=("time", "row", "column"), coords={"time": times(T)}, attrs=attrs)
-
-
-def gyro(times=lambda t: t, units="rad/s"):
-    fine = np.linspace(0, 10, 300)
-    truth = ss.CubicSpline(fine, turning(fine), SO3, bc_type="not-a-knot")
-    omega = ss.rotations.angular_velocity(truth, S) + BIAS + 0.01 * np.random.default_rng(6).standard_normal((300, 3))
-    coords = {"sample": times(S), "axis": ["x", "y", "z"]}
-    return xr.DataArray(omega, dims=("sample", "axis"), coords=coords, attrs={"units": units})
-
-
-ROTATION = {"sigma": 0.03, "rate_sigma": 0.01, "rate_dim": "sample", "rate_bias": True, "penalty": "jerk"}
-ROTATION |= {"point_dims": ("row", "column")}
-
-
-def estimated(points, rates, knots="auto", t=T, s=S):
-    both = [
-        measure.Points(t, points, sigma=0.03),
-        measure.BodyRates(s, rates, sigma=0.01, bias=measure.Constant(3)),
-    ]
-    return ss.estimate(both, knots, "so:3", penalty="jerk")
-
-
-@pytest.mark.parametrize("times", [lambda t: t, dates])
-def test_estimates_are_those_of_the_curve(times):
-    points, rates = attitudes(times), gyro(times)
-    x = times(X)
-    ds = sx.estimate(points.transpose("column", ...), "so:3", x, rates=rates.T, level=0.9, **ROTATION)
-    curve = estimated(points.values, rates.values, t=times(T), s=times(S))
-    np.testing.assert_array_equal(ds.points, curve(x))
-    np.testing.assert_array_equal(ds["std"], curve.std(x))
-    np.testing.assert_array_equal(ds.band, curve.band(x, 0.9))
-    bias = curve.parameters["gyro bias"]
-    np.testing.assert_array_equal(ds.gyro_bias, bias.value)
-    np.testing.assert_array_equal(ds.gyro_bias_std, bias.std)
-    assert (np.abs(ds.gyro_bias - BIAS) < 5 * ds.gyro_bias_std).all()
-    assert ds.points.dims == ("time", "row", "column") and (ds.time.values == x).all()
-    assert list(ds.axis.values) == ["x", "y", "z"] and ds.gyro_bias.attrs == ds.gyro_bias_std.attrs == {
-        "units": "rad/s"
-    }
-    assert ds["std"].attrs == {"units": "rad"} and float(ds.lam) == curve.lam and ds.attrs == {"space": "so:3"}
-
-
-def test_missing_values_and_dask():
-    points, rates = attitudes(), gyro()
-    points[3], rates[7, 1], rates[100:120] = np.nan, np.nan, np.nan
-    ds = sx.estimate(points.chunk(time=10), "so:3", rates=rates.chunk(sample=50), **ROTATION)
-    kept, good = np.delete(np.arange(40), 3), np.isfinite(rates.values).all(axis=1)
-    curve = estimated(points.values[kept], rates.values[good], t=T[kept], s=S[good])
-    np.testing.assert_array_equal(ds.points, curve(T))
-    assert ds.sizes["time"] == 40
-
-
-@pytest.mark.filterwarnings("ignore:The residuals:symspline.SmoothingWarning")
-def test_positions_and_velocities():
-    path = np.stack([np.sin(T), np.cos(T)], axis=-1)
-    speed = np.stack([np.cos(S), -np.sin(S)], axis=-1)
-    points = xr.DataArray(path, dims=("time", "q"), coords={"time": T, "q": ["x", "y"]}, attrs={"units": "m"})
-    given = xr.DataArray(speed, dims=("sample", "q"), coords={"sample": S})
-    ds = sx.estimate(points, "r:2", X, sigma=0.1, velocities=given, velocity_sigma=0.1, velocity_dim="sample", knots=20)
-    both = [measure.Points(T, path, sigma=0.1), measure.Velocities(S, speed, speed, sigma=0.1)]
-    np.testing.assert_allclose(ds.points, ss.estimate(both, 20, "r:2")(X), atol=1e-12)
-    assert ds["std"].attrs == {"units": "m"} and ds.points.attrs == {"units": "m"} and list(ds.q.values) == ["x", "y"]
-    more = [measure.Function(S, lambda x: x[:, 0] - np.sin(S), sigma=0.01)]
-    assert sx.estimate(points, "r:2", 0.5, sigma=0.1, measurements=more, knots=20).points.dims == ("q",)
-
-
-@pytest.mark.parametrize(
-    ("match", "change"),
-    [
-        ("rates has the units 'deg/s', but radians are needed", {"rates": gyro(units="deg/s")}),
-        ("rates need the standard deviation of a component", {"rate_sigma": None}),
-        ("rate_sigma and rate_bias belong to rates", {"rates": None}),
-        ("'time'. Pass the name of its times", {"rate_dim": None}),
-        ("one dimension of three components", {"rates": gyro()[:, :2]}),
-        ("'sample' of rates has no coordinate", {"rates": gyro().drop_vars("sample")}),
-        ("rates must be an xarray.DataArray", {"rates": gyro().values}),
-        ("some measurements have dates and others have numbers", {"rates": gyro(dates)}),
-        ("velocity_sigma belongs to velocities", {"velocity_sigma": 1.0}),
-        ("outside the knots", {"to": [11.0]}),
-    ],
-)
-def test_invalid_estimates_raise(match, change):
-    options = {"rates": gyro(), "to": X} | ROTATION | change
-    raises(re.escape(match), lambda: sx.estimate(attitudes(), "so:3", **options))
-
-
-def test_one_curve_is_estimated():
-    several = xr.concat([attitudes(), attitudes()], "run")
-    raises(
-        "points has the dimensions run besides", sx.estimate, several, "so:3", sigma=1.0, point_dims=("row", "column")
-    )
-    raises("points must be an xarray.DataArray", sx.estimate, attitudes().values, "so:3", sigma=1.0)
-    lonely = {"sigma": 0.1, "velocities": noisy()[0, 0].rename(time="s"), "velocity_sigma": 0.1, "velocity_dim": "s"}
-    shifted = lonely | {"velocities": lonely["velocities"].assign_coords(s=T + 0.01)}
-    raises("are tangent vectors at the points", sx.estimate, noisy()[0, 0], "sphere:2", **shifted)
 
 
 def test_curves_at_a_bound_are_marked_without_a_warning():

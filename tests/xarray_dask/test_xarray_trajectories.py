@@ -151,10 +151,6 @@ def test_one_coordinate_of_times_for_all_curves():
     assert (ds.when.values == times[:-1]).all()
     smooth = ss.make_smoothing_spline(times[:-1], points[:-1], "sphere:2", lam=1e-3)
     np.testing.assert_allclose(ds["std"], smooth.std(times[:-1]), rtol=1e-9)
-    est = sx.estimate(late, "sphere:2", dim="obs", sigma=0.01, knots=4, lam=1e-3)
-    curve = ss.estimate([ss.measure.Points(times[:-1], points[:-1], sigma=0.01)], 4, "sphere:2", lam=1e-3)
-    np.testing.assert_array_equal(est["std"], curve.std(times[:-1]))
-    assert est.points.dims == ("obs", "q") and (est.when.values == times[:-1]).all()
 
 
 def test_end_vectors_of_each_trajectory():
@@ -190,8 +186,6 @@ def test_several_coordinates_in_doubt_raise():
     counted = drifters().assign_coords(obs=np.arange(OBS))
     raises("could hold the times along 'obs': 'obs' .*, 'time' ", sx.fit, counted, "sphere:2", dim="obs")
     assert sx.fit(da, "sphere:2", dim="obs", time="received", skipna=True).max_gap.max() > 3000
-    one = da.isel(traj=0)
-    raises("Pass time= to choose", sx.estimate, one, "sphere:2", dim="obs", sigma=0.1)
     raises("skipna must be", sx.fit, da, "sphere:2", dim="obs", time="time", skipna="yes")
     grid = {"to": {"obs": [0.5]}}
     raises("time and skipna are for curves along one dimension", sx.resample, da, "sphere:2", skipna=True, **grid)

@@ -21,13 +21,12 @@ from .._spaces import Space, space_named
 from .._typing import BCType, Extrapolate, Method, OnFailure, SolverOptions
 from .._version import VERSION
 from ._blocks import COLUMNS, Inputs, apply, fitted, resampled, values_at
-from ._estimation import estimate
 from ._grids import resample_grid
 from ._smoothing import smooth
 from ._spec import KNOTS, bare, check_dims, rehearse, spec_of, timed_by, times_with_names
 from ._units import in_radians, in_units_of
 
-__all__ = ["estimate", "evaluate", "fit", "lift", "resample", "smooth", "speed"]
+__all__ = ["evaluate", "fit", "lift", "resample", "smooth", "speed"]
 
 
 def __dir__() -> list[str]:

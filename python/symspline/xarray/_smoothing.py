@@ -88,7 +88,6 @@ def smooth(
 
     See Also
     --------
-    estimate : Fit a curve to points and rates.
     fit : Fit curves through the points.
 
     Notes
