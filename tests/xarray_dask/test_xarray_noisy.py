@@ -128,8 +128,6 @@ def test_invalid_smoothing_raises_at_once(match, options, chunks):
 
 # ---- estimation ----
 
-S = np.sort(np.random.default_rng(4).uniform(0, 10, 300))
-
 
 def test_curves_at_a_bound_are_marked_without_a_warning():
     """Lines of noise; warnings are errors in tests."""
