@@ -33,11 +33,7 @@ ROOMS = {
     "_curves": ("_curves _errors _held _options _representatives _search", 1750),
     "manifolds, convert": ("convert manifolds", 940),
     "_spaces": ("_spaces _statistics", 1600),
-    "_base": (
-        "_arrays _config _cpu _degrees _disk _durations _equality _exceptions _faults _input _lonlat _missing "
-        "_quaternions _report _rounded_times _threads _time _typing _validation _version _warnings",
-        1000,
-    ),
+    "_base": ("_base _cpu _degrees _missing _validation", 1000),
 }
 LAYOUT = {
     tokenize.NL,

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symspline import ValidationError
-from symspline._arrays import short_repr
+from symspline._base.arrays import short_repr
 
 _SYNOPTIC = np.timedelta64(6, "h")
 

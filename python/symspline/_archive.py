@@ -19,18 +19,18 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ._arrays import brief, short_repr
+from ._base.arrays import brief, short_repr
+from ._base.disk import path_of, replacing
+from ._base.input import NO_ZONE, UTC_ZONE
+from ._base.report import Report
+from ._base.time import Moments, TimeAxis, time_axis_of
+from ._base.version import VERSION as LIBRARY
 from ._core import ValidationError
 from ._curves.curve import CurveArrays
 from ._curves.ends import freeze_bc_type
 from ._curves.fit import curve_of, read_ends
-from ._disk import path_of, replacing
-from ._input import NO_ZONE, UTC_ZONE
 from ._options import checked_extrapolate
-from ._report import Report
 from ._spaces import Array, Product, Space, factors_of, space_named
-from ._time import Moments, TimeAxis, time_axis_of
-from ._version import VERSION as LIBRARY
 from .manifolds._manifold import refuse_functions
 
 # Raise it when the entries change, and keep reading files of all earlier versions.
@@ -95,7 +95,7 @@ def restore(state: Mapping[str, Any]) -> Any:
 
 
 def write(file: Any, state: Mapping[str, Any]) -> None:
-    """Write a state to an open file, or replace a file by its name (`_disk.replacing`)."""
+    """Write a state to an open file, or replace a file by its name (`_base.disk.replacing`)."""
     refuse_functions(
         state["space"],
         "curves are not saved (files hold no functions: pickle them, or keep t, points and velocities)",

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any, overload
 
-from ._arrays import short_repr
+from ._base.arrays import short_repr
+from ._base.typing import File
 from ._core import ValidationError
 from ._curve import Curve
 from ._options import require_matplotlib
-from ._typing import File
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

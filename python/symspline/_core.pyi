@@ -6,9 +6,9 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
-from ._exceptions import ConvergenceError as ConvergenceError
-from ._exceptions import CutLocusError as CutLocusError
-from ._exceptions import ValidationError as ValidationError
+from ._base.exceptions import ConvergenceError as ConvergenceError
+from ._base.exceptions import CutLocusError as CutLocusError
+from ._base.exceptions import ValidationError as ValidationError
 
 _Doubles = NDArray[np.float64]
 _Progress = Callable[[int, int], object]

@@ -13,7 +13,10 @@ from numpy.typing import ArrayLike
 
 from ._append import joined, local_fit
 from ._archive import Entries, read_c1_nodes, read_fitted
-from ._arrays import checked_flag
+from ._base.arrays import checked_flag
+from ._base.report import Report, combined
+from ._base.time import TimeAxis, knots_of
+from ._base.typing import BCType, CubicBCType, Extrapolate, Method, OnFailure, P, PointsLike, Progress, TimesLike
 from ._core import ValidationError
 from ._curves.conditions import fit_with_conditions
 from ._curves.curve import CurveArrays, longest_step
@@ -26,11 +29,8 @@ from ._held import warn_of_held_points
 from ._missing import counts_all_samples, curves_without_missing, inner_velocities_of_present, with_remedy
 from ._options import fit_options, order_of, with_atol
 from ._piecewise_cubic import PiecewiseCubic
-from ._report import Report, combined
 from ._representatives import warn_of_representatives
 from ._spaces import Array, Product, Quotient, Space, space_named
-from ._time import TimeAxis, knots_of
-from ._typing import BCType, CubicBCType, Extrapolate, Method, OnFailure, P, PointsLike, Progress, TimesLike
 
 if TYPE_CHECKING:
     from typing_extensions import TypeVar

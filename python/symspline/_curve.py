@@ -11,15 +11,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _archive
-from ._arrays import as_array, checked_number, short_repr
+from ._base.arrays import as_array, checked_number, short_repr
+from ._base.durations import seconds_of
+from ._base.time import TimeAxis
+from ._base.typing import P, TimesLike
 from ._core import ValidationError
 from ._curve_plots import CurvePlots
 from ._curves.composed import Affine, TimeMap, part_of_times
-from ._durations import seconds_of
 from ._options import order_of
 from ._spaces import Doubles, factors_of, parts_of
-from ._time import TimeAxis
-from ._typing import P, TimesLike
 
 _LARGEST = float(np.finfo(np.float64).max)
 # Largest distance between the points at which two curves meet, relative to large coordinates.

@@ -11,15 +11,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _archive
-from ._arrays import as_array, cast, checked_flag, refuse, short_repr
+from ._base.arrays import as_array, cast, checked_flag, refuse, short_repr
+from ._base.time import TimeAxis
+from ._base.typing import File, Number, P, Time, TimesLike
 from ._core import ValidationError
 from ._curves.arc_length import ArcLength
 from ._curves.composed import AnyCurve
 from ._curves.integrals import bending_energy, integrate
 from ._search.searchable import Searchable
 from ._spaces import Doubles
-from ._time import TimeAxis
-from ._typing import File, Number, P, Time, TimesLike
 
 # Relative rounding error of an arc length that a user computed.
 _ROUNDING = 1e-12

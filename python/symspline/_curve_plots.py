@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, ClassVar, Unpack, overload
 
 import numpy as np
 
+from ._base.typing import AxesLook, File, P, PageLook
 from ._core import ValidationError
 from ._curve_base import CurveBase
 from ._curves.curve import SidePanel, UncertaintyBand
 from ._options import require_matplotlib
 from ._spaces import Doubles
-from ._typing import AxesLook, File, P, PageLook
 
 if TYPE_CHECKING:
     from matplotlib.animation import FuncAnimation

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from ._archive import FORMATS, TEXTS, Entries, Stored, read_state, restore, write
-from ._arrays import short_repr
+from ._base.arrays import short_repr
+from ._base.disk import damage, path_of
+from ._base.typing import File
 from ._core import ValidationError
 from ._curve import Curve
-from ._disk import damage, path_of
-from ._typing import File
 
 # Entries with one value for all curves of a file.
 _SHARED = (*TEXTS, "version")

@@ -7,7 +7,9 @@ from typing import Any, Literal, Self
 from numpy.typing import ArrayLike
 
 from ._archive import Entries, check_curves, read_segments
-from ._arrays import checked_flag
+from ._base.arrays import checked_flag
+from ._base.time import TimeAxis, knots_of
+from ._base.typing import Extrapolate, P, PointsLike, TimesLike
 from ._curves.curve import CurveArrays
 from ._curves.fit import Points, curve_of, hermite_data, read, read_ends, validated
 from ._curves.slopes import check_method, local_velocities
@@ -17,8 +19,6 @@ from ._options import checked_extrapolate, with_atol
 from ._piecewise_cubic import PiecewiseCubic
 from ._representatives import warn_of_representatives
 from ._spaces import POINT_TOL, Array, Doubles, Space, factors_of, space_named
-from ._time import TimeAxis, knots_of
-from ._typing import Extrapolate, P, PointsLike, TimesLike
 
 
 class HermiteSpline(PiecewiseCubic[P]):

@@ -12,11 +12,11 @@ from typing import Any, ParamSpec, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ._arrays import as_array, filled, refuse
+from ._base.arrays import as_array, filled, refuse
+from ._base.exceptions import SymsplineError
+from ._base.input import times_of
 from ._core import ValidationError
 from ._curves.fit import Points
-from ._exceptions import SymsplineError
-from ._input import times_of
 from ._spaces import Product, Space, factors_of, parts_of, space_named
 
 Mask = NDArray[np.bool_]

@@ -10,18 +10,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _archive
-from ._arrays import as_array, read_only, short_repr
+from ._base.arrays import as_array, read_only, short_repr
+from ._base.input import times_of
+from ._base.time import TimeAxis
+from ._base.typing import BCType, Extrapolate, P, Progress, Time, TimesLike
 from ._core import ValidationError
 from ._curve import Curve, check_increasing
 from ._curves.at_times import call_at_times, evaluated
 from ._curves.curve import CurveArrays
 from ._curves.fit import curve_of
-from ._input import times_of
 from ._options import check_progress, extrapolation_mode, quantity_of
 from ._spaces import Array, Doubles, Product, Space, parts_of
-from ._time import TimeAxis
 from ._timed_curve import TimedCurve
-from ._typing import BCType, Extrapolate, P, Progress, Time, TimesLike
 
 # Relative difference of velocities that are equal up to rounding.
 _SAME = 1e-12

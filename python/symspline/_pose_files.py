@@ -12,13 +12,13 @@ from typing import Any, Literal, NamedTuple, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._arrays import as_array, brief, cast, checked_flag, refuse
+from ._base.arrays import as_array, brief, cast, checked_flag, refuse
+from ._base.disk import path_of, replacing
+from ._base.input import times_of
+from ._base.rounded_times import warn_of_rounded_times
+from ._base.typing import PointsLike
 from ._core import ValidationError, number_lines
-from ._disk import path_of, replacing
-from ._input import times_of
-from ._rounded_times import warn_of_rounded_times
 from ._spaces import Array, Doubles, SpecialEuclidean, SpecialOrthogonal, point_tol, rotations_and_positions
-from ._typing import PointsLike
 from ._validation import length, off_one
 from .convert import matrix_to_quaternion, quaternion_to_matrix
 

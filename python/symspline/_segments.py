@@ -8,15 +8,20 @@ from typing import Any, Literal, NamedTuple, Required, TypedDict, Unpack, overlo
 import numpy as np
 from numpy.typing import NDArray
 
-from ._arrays import as_array, checked_flag, checked_number, short_repr, whole_number
+from ._base.arrays import as_array, checked_flag, checked_number, short_repr, whole_number
+from ._base.durations import seconds_of
+from ._base.exceptions import SymsplineError
+from ._base.input import times_of
+from ._base.report import FarPointsWarning
+from ._base.rounded_times import warn_of_rounded_times
+from ._base.time import Moments, time_axis_of
+from ._base.typing import Duplicates, FitOptions, FloatArray, P, PointsLike, PProduct, SmoothingOptions, TimesLike
+from ._base.warnings import warn
 from ._composed import SegmentedCurve
 from ._core import ValidationError
 from ._cubic import CubicSpline
 from ._curves.fit import read_given
-from ._durations import seconds_of
-from ._exceptions import SymsplineError
 from ._functional import fit_many
-from ._input import times_of
 from ._missing import (
     counts_all_samples,
     data_without_missing,
@@ -25,8 +30,6 @@ from ._missing import (
     refuse_nan_times,
     without_missing,
 )
-from ._report import FarPointsWarning
-from ._rounded_times import warn_of_rounded_times
 from ._smoothing import SmoothingReport, SmoothingSpline
 from ._smoothing.many import smooth_many
 from ._smoothing.precision import read_precision
@@ -42,10 +45,7 @@ from ._spaces import (
     parts_of,
     space_named,
 )
-from ._time import Moments, time_axis_of
-from ._typing import Duplicates, FitOptions, FloatArray, P, PointsLike, PProduct, SmoothingOptions, TimesLike
 from ._validation import one_of
-from ._warnings import warn
 from .manifolds import Manifold
 
 # Neighbours this near to each other's cut locus, as a fraction of the distance to it, have no unique geodesic.

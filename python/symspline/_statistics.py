@@ -9,11 +9,11 @@ from typing import Any, Generic
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._arrays import as_array, whole_number
+from ._base.arrays import as_array, whole_number
+from ._base.equality import same_fields
+from ._base.typing import AnyArray, FloatArray, P
 from ._core import ValidationError
-from ._equality import same_fields
 from ._spaces import Product, Space, parts_of, require_metric, space_named
-from ._typing import AnyArray, FloatArray, P
 
 # Variances below this fraction of the largest one are rounding errors.
 _LEAST = 1e-13

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ._arrays import short_repr
+from ._base.arrays import short_repr
+from ._base.lonlat import from_lonlat
 from ._core import ValidationError
-from ._lonlat import from_lonlat
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._arrays import adjoint, as_array, cast, refuse, short_repr
+from ._base.arrays import adjoint, as_array, cast, refuse, short_repr
 from ._core import ValidationError
 from ._spaces import point_tol
 

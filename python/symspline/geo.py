@@ -19,25 +19,25 @@ from typing import TYPE_CHECKING, Any, Literal, Unpack, cast, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from ._arrays import checked_flag, checked_number, short_repr
+from ._base.arrays import checked_flag, checked_number, short_repr
+from ._base.durations import seconds_of
+from ._base.exceptions import SymsplineError
+from ._base.lonlat import compass, from_lonlat, to_lonlat
+from ._base.typing import AxesLook, Duplicates, File, FloatArray, PageLook, TimesLike
+from ._base.warnings import warn
 from ._compare import checked_items
 from ._composed import SegmentedCurve
 from ._core import ValidationError
 from ._cubic import CubicSpline
-from ._durations import seconds_of
 from ._estimation.along import Motion
 from ._estimation.uncertainty import Jacobians, check_uncertain, standard_errors
-from ._exceptions import SymsplineError
 from ._functional import fit_many
-from ._lonlat import compass, from_lonlat, to_lonlat
 from ._options import require_matplotlib
 from ._segments import check_smooth, cut
 from ._smoothing.many import smooth_many
 from ._spaces import Sphere
 from ._timed_curve import check_timed
 from ._tracks import ZIGZAG, Tracks, are_angles, read_tracks
-from ._typing import AxesLook, Duplicates, File, FloatArray, PageLook, TimesLike
-from ._warnings import warn
 
 if TYPE_CHECKING:
     import pandas as pd

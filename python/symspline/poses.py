@@ -24,7 +24,8 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._arrays import as_array, checked_flag, short_repr
+from ._base.arrays import as_array, checked_flag, short_repr
+from ._base.typing import Extrapolate, Frame, TimesLike
 from ._core import ValidationError
 from ._curves.at_times import evaluated
 from ._curves.composed import AnyCurve
@@ -44,7 +45,6 @@ from ._pose_files import (
 )
 from ._smoothing.factors import smoothed_spaces
 from ._spaces import Array, Euclidean, SpecialEuclidean, SpecialOrthogonal, cover_of
-from ._typing import Extrapolate, Frame, TimesLike
 from ._validation import one_of, real_numbers
 from .rotations import Spline, attitude, check_motion, rate_jacobians, rotation_of, turned
 from .rotations import velocities as rotation_velocities

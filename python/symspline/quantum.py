@@ -24,17 +24,17 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._arrays import adjoint, as_array, refuse, short_repr
+from ._base.arrays import adjoint, as_array, refuse, short_repr
+from ._base.input import times_of
+from ._base.time import onto_ends
+from ._base.typing import Extrapolate, Number, TimesLike
 from ._core import ValidationError
 from ._cubic import CubicSpline
 from ._curves.curve import CurveArrays
 from ._curves.reduced import span_of
-from ._input import times_of
 from ._options import order_of
 from ._piecewise_cubic import check_curve
 from ._spaces import ComplexGrassmannian, ComplexProjective, Doubles, Space, SpecialUnitary, Unitary
-from ._time import onto_ends
-from ._typing import Extrapolate, Number, TimesLike
 from ._validation import (
     Array,
     check_symmetric,

@@ -22,7 +22,11 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._arrays import as_array, checked_flag, filled, refuse, short_repr
+from ._base.arrays import as_array, checked_flag, filled, refuse, short_repr
+from ._base.input import times_of
+from ._base.time import knots_of
+from ._base.typing import Extrapolate, Frame, RateInterpolation, RotationOrder, TimesLike
+from ._base.warnings import warn
 from ._core import ValidationError
 from ._cubic import CubicSpline
 from ._cumulative import CumulativeBSpline
@@ -36,16 +40,12 @@ from ._estimation.rates import integrated
 from ._estimation.terms import Body
 from ._estimation.uncertainty import Jacobians, check_uncertain, standard_errors
 from ._hermite import HermiteSpline
-from ._input import times_of
 from ._missing import missing_times, recounted, refuse_nan_times
 from ._smoothing.factors import smoothed_spaces
 from ._spaces import Array, Doubles, SpecialEuclidean, SpecialOrthogonal, Sphere, cover_of
 from ._spaces.point_groups import elements, proper_symbol
-from ._time import knots_of
 from ._timed_curve import check_timed
-from ._typing import Extrapolate, Frame, RateInterpolation, RotationOrder, TimesLike
 from ._validation import REMOVE, check_finite, length, one_of, real_numbers, unchecked_numbers
-from ._warnings import warn
 from .convert import matrix_to_quaternion, quaternion_to_matrix
 from .convert._quaternions import checked_order, converted, quaternion_form
 

@@ -20,12 +20,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._arrays import adjoint, as_array, cast, checked_number, refuse, whole_number
+from ._base.arrays import adjoint, as_array, cast, checked_number, refuse, whole_number
+from ._base.input import times_of
+from ._base.typing import TimesLike
+from ._base.warnings import warn
 from ._core import CutLocusError, ValidationError
 from ._cubic import CubicSpline
 from ._grid import GridSpline
 from ._grid.axes import coordinates
-from ._input import times_of
 from ._piecewise_cubic import check_curve
 from ._spaces import (
     ComplexGrassmannian,
@@ -36,9 +38,7 @@ from ._spaces import (
     SymmetricPositiveDefinite,
     point_tol,
 )
-from ._typing import TimesLike
 from ._validation import Array, numbers, off_one
-from ._warnings import warn
 
 # Numbers closer than this, in units of the largest, are equal but for rounding.
 _EQUAL = 1e-12

@@ -13,7 +13,7 @@ from refused import raises
 from scipy.spatial.transform import Rotation
 
 import symspline as ss
-from symspline._report import long_gaps
+from symspline._base.report import long_gaps
 
 RNG = np.random.default_rng(0)
 UTM = np.array([692_345.0, 5_334_781.0, 520.0])

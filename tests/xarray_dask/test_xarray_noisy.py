@@ -126,9 +126,6 @@ def test_invalid_smoothing_raises_at_once(match, options, chunks):
     raises(".*" if match == "'q'" else re.escape(match), lambda: sx.smooth(noisy(chunks=chunks), S2, to, **options))
 
 
-# ---- estimation ----
-
-
 def test_curves_at_a_bound_are_marked_without_a_warning():
     """Lines of noise; warnings are errors in tests."""
     da = xr.DataArray(np.random.default_rng(0).standard_normal((20, 30, 1)), dims=("run", "time", "q"))

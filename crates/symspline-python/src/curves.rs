@@ -16,7 +16,7 @@ pub type Array<'py> = PyReadonlyArrayDyn<'py, f64>;
 pub type EndOf<'py> = (String, Option<Array<'py>>);
 
 /// A fault of one curve: its number in the batch, the kind, the node, the value there, its limit, and for invalid
-/// points a message. `_faults.py` describes the other kinds.
+/// points a message. `_base/faults.py` describes the other kinds.
 pub type Fault = (usize, &'static str, Option<usize>, f64, f64, Option<String>);
 
 /// Up to this many numbers are copied into a new array.

@@ -5,9 +5,9 @@ use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 
 // The classes are written in Python, where their fields have types and descriptions.
-import_exception!(symspline._exceptions, ValidationError);
-import_exception!(symspline._exceptions, CutLocusError);
-import_exception!(symspline._exceptions, ConvergenceError);
+import_exception!(symspline._base.exceptions, ValidationError);
+import_exception!(symspline._base.exceptions, CutLocusError);
+import_exception!(symspline._base.exceptions, ConvergenceError);
 
 pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
     let py = m.py();

@@ -155,7 +155,7 @@ fn options(method: &str, tol: f64, max_iter: Option<usize>) -> PyResult<Options>
     Ok(Options { method, tol, max_iter })
 }
 
-/// The report as two tables with a row for each field, in the order of `INTEGERS` and `NUMBERS` in _report.py, and a column
+/// The report as two tables with a row for each field, in the order of `INTEGERS` and `NUMBERS` in _base/report.py, and a column
 /// for each curve.
 type Columns<'py> = (Bound<'py, PyArrayDyn<i64>>, Bound<'py, PyArrayDyn<f64>>);
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from .._quaternions import Rows, quaternion_rows, rotation_rows
+from .._base.quaternions import Rows, quaternion_rows, rotation_rows
 from .library import Library
 from .models import Lines, Model, identity, orthonormal
 

@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .._faults import UNCONVERGED, Fault
+from .._base.faults import UNCONVERGED, Fault
+from .._base.time import TimeAxis
 from .._spaces import POINT_TOL, Array, Doubles, Euclidean, Space, cover_of, factors_of
-from .._time import TimeAxis
 from .curve import CoreCurve
 from .ends import End, map_ends
 from .fit import Fit, FitProblem, Points

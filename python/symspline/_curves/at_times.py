@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .._arrays import checked_flag
+from .._base.arrays import checked_flag
+from .._base.time import TimeAxis, onto_ends
+from .._base.typing import Progress, TimesLike
 from .._core import ValidationError
 from .._spaces import Doubles
-from .._time import TimeAxis, onto_ends
-from .._typing import Progress, TimesLike
 from .composed import AnyCurve, values_at
 from .curve import CoreCurve, ProductCurve, write_into
 

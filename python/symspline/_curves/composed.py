@@ -14,10 +14,10 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from .._arrays import refuse
+from .._base.arrays import refuse
+from .._base.typing import Progress
 from .._core import ValidationError
 from .._spaces import Doubles, Product, Space, product_norm
-from .._typing import Progress
 from .curve import NORMS, CoreCurve, ProductCurve
 from .jerk import jerk
 

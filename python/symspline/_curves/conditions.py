@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .._faults import Fault
+from .._base.faults import Fault
+from .._base.time import TimeAxis
+from .._base.typing import Progress
 from .._spaces import Array, factors_of
-from .._time import TimeAxis
-from .._typing import Progress
 from .added_knots import Knots, fit_with_knots, with_knots
 from .fit import Fit, FitProblem, fit, moved_ends, read_ends, validated
 from .sections import InnerVelocities, fit_in_sections, read_inner

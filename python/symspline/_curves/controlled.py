@@ -8,9 +8,9 @@ from typing import Any, Self
 import numpy as np
 
 from .. import _core
-from .._arrays import refuse
+from .._base.arrays import refuse
+from .._base.typing import Progress
 from .._spaces import Array, Doubles, Product, Space, factors_of, product_norm
-from .._typing import Progress
 from .curve import NORMS, REAL
 from .integrals import EXACT
 from .reduced import reduced

@@ -13,10 +13,10 @@ from typing import Any, ClassVar, NamedTuple, Self
 import numpy as np
 
 from .. import _core
+from .._base.faults import Fault
+from .._base.typing import Progress
 from .._core import ValidationError
-from .._faults import Fault
 from .._spaces import Affine, Array, Doubles, Similarity, Space, SpecialEuclidean, Torus, parts_of, product_norm
-from .._typing import Progress
 from . import derivatives
 from .derivatives import Gradient, SampleTimes, pair_of
 from .ends import ends_in_factors

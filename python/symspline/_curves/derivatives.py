@@ -9,12 +9,12 @@ from typing import Any, Generic, NamedTuple, Protocol
 import numpy as np
 
 from .. import _core
-from .._arrays import as_array, cast, short_repr
+from .._base.arrays import as_array, cast, short_repr
+from .._base.equality import same_fields
+from .._base.time import onto_ends
+from .._base.typing import FloatArray, P
 from .._core import ValidationError
-from .._equality import same_fields
 from .._spaces import Array, Doubles, Space
-from .._time import onto_ends
-from .._typing import FloatArray, P
 from .ends import End, ends_of
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from .._arrays import short_repr
+from .._base.arrays import short_repr
 from .._core import ValidationError
 from .._spaces import Doubles, Product, Space, factors_of, parts_of
 

@@ -16,12 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
-from .._arrays import as_array
+from .._base.arrays import as_array
+from .._base.faults import INVALID, Fault, of_index
+from .._base.report import Columns, Report, shaped
+from .._base.typing import Progress
 from .._core import ValidationError
-from .._faults import INVALID, Fault, of_index
-from .._report import Columns, Report, shaped
 from .._spaces import Array, Doubles, Product, Quotient, Space, Torus, cover_of, factors_of, parts_of
-from .._typing import Progress
 from ..manifolds import Manifold
 from .curve import CoreCurve, CurveArrays, ProductCurve, share
 from .ends import NATURAL, End, ends_in_factors, ends_of, is_closed, split_ends

@@ -7,8 +7,8 @@ from typing import Any, Self
 
 import numpy as np
 
+from .._base.typing import Progress
 from .._spaces import Array, Doubles, Product, Space, factors_of
-from .._typing import Progress
 from .curve import CoreCurve, CurveArrays, ProductCurve
 from .fit import kind_of
 from .slopes import geodesic_velocities, wide

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from .._base.faults import of_index
 from .._core import CutLocusError, ValidationError
-from .._faults import of_index
 from .._spaces import Array, Doubles, Space, Torus
 from .turns import LONGEST
 

@@ -8,8 +8,8 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from .._report import Report
-from .._typing import Number
+from .._base.report import Report
+from .._base.typing import Number
 
 Doubles = NDArray[np.float64]
 

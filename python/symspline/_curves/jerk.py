@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.polynomial import chebyshev
 
+from .._base.typing import Progress
 from .._spaces import Array, Doubles, Space, cover_of
-from .._typing import Progress
 from .curve import CoreCurve, CurveArrays, share
 
 # Chebyshev nodes of half a segment, on which the acceleration is interpolated.

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from .._arrays import refuse
+from .._base.arrays import refuse
 from .._core import ValidationError
 from .._spaces import Array, Doubles, Space
 

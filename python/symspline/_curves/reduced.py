@@ -13,10 +13,10 @@ from typing import Any, NamedTuple, Never
 
 import numpy as np
 
+from .._base.typing import Progress
 from .._core import ValidationError
 from .._spaces import Array, ComplexGrassmannian, Doubles, Grassmannian, Hyperbolic, Space, cover_of
 from .._spaces.base import LARGE as _LARGE
-from .._typing import Progress
 from .curve import NORMS, CoreCurve, CurveArrays
 from .ends import map_ends
 from .solve import Options, Solved, Task, solve_in_python, solve_single

@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from .._arrays import short_repr
+from .._base.arrays import short_repr
+from .._base.report import INTEGERS, Columns, shaped
+from .._base.typing import Progress
 from .._core import ValidationError
-from .._report import INTEGERS, Columns, shaped
 from .._spaces import POINT_TOL, Array, Doubles, Product, Quotient, Space, cover_of, factors_of, parts_of
-from .._typing import Progress
 from .curve import CurveArrays, share
 from .ends import End
 from .fit import Fit, FitProblem, Points, curve_of, solve_tasks, validated_tasks

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .._base.faults import of_index
+from .._base.report import FarPointsWarning
+from .._base.warnings import warn
 from .._core import CutLocusError, ValidationError
-from .._faults import of_index
-from .._report import FarPointsWarning
 from .._spaces import Array, Doubles, Euclidean, Space, cover_of
-from .._warnings import warn
 from ..manifolds import Manifold
 
 METHODS = ("catmull-rom", "akima", "pchip")

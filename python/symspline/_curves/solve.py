@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
-from .._faults import Fault, from_core
-from .._report import Columns
+from .._base.faults import Fault, from_core
+from .._base.report import Columns
+from .._base.typing import Progress
 from .._spaces import Array, Space
-from .._typing import Progress
 from .ends import End, map_ends
 
 Mask = NDArray[np.bool_]

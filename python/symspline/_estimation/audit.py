@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .._base.warnings import warn
 from .._curves.ends import end_kinds
 from .._smoothing import SmoothingWarning
 from .._smoothing.audit import Residuals, corner_of, examine
 from .._smoothing.audited import DEGREES, Sensor, advice, described
 from .._smoothing.posterior import Posterior
 from .._spaces import Doubles
-from .._warnings import warn
 from .measurements import GRAVITY
 from .solve import Setup, Solution, in_columns
 from .terms import ForceTerm, FunctionTerm, PointTerm, RateTerm, Term

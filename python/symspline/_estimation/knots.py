@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from .._base.time import TimeAxis
 from .._smoothing.knots import places
 from .._spaces import Array, Doubles
-from .._time import TimeAxis
 from .solve import Iteration, Setup, fitted
 from .start import Start
 

@@ -9,18 +9,32 @@ from typing import Any, TypedDict, Unpack, cast, overload
 
 import numpy as np
 
-from .._arrays import as_array, checked_flag, checked_number, short_repr, whole_number
+from .._base.arrays import as_array, checked_flag, checked_number, short_repr, whole_number
+from .._base.faults import UNCONVERGED, Fault
+from .._base.input import times_of
+from .._base.rounded_times import warn_of_rounded_times
+from .._base.time import Moments, TimeAxis, knots_of, time_axis_of
+from .._base.typing import (
+    Criterion,
+    Extrapolate,
+    FloatArray,
+    Loss,
+    Numbers,
+    OnFailure,
+    P,
+    PProduct,
+    Progress,
+    SmoothingPenalty,
+    TimesLike,
+)
 from .._core import ValidationError
 from .._curve import Curve
 from .._curves.fit import FitProblem, fit, read_ends
 from .._curves.fit import Points as CorePoints
 from .._curves.solve import DEFAULTS
 from .._errors import raise_or_warn
-from .._faults import UNCONVERGED, Fault
 from .._held import warn_of_held_points
-from .._input import times_of
 from .._options import check_on_failure, check_progress, checked_extrapolate
-from .._rounded_times import warn_of_rounded_times
 from .._smoothing import SmoothingReport, SmoothingSpline, SmoothingWarning, make_smoothing_spline
 from .._smoothing.factors import grouped, join, smoothed_spaces
 from .._smoothing.knots import Knots, thin_knots
@@ -36,20 +50,6 @@ from .._spaces import (
     parts_of,
     refuse_quotients,
     space_named,
-)
-from .._time import Moments, TimeAxis, knots_of, time_axis_of
-from .._typing import (
-    Criterion,
-    Extrapolate,
-    FloatArray,
-    Loss,
-    Numbers,
-    OnFailure,
-    P,
-    PProduct,
-    Progress,
-    SmoothingPenalty,
-    TimesLike,
 )
 from .._validation import one_of
 from ..manifolds._manifold import refuse_functions

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import as_array, cast, refuse, short_repr, whole_number
+from .._base.arrays import as_array, cast, refuse, short_repr, whole_number
+from .._base.typing import FloatArray, Loss, Numbers, PointsLike, TimesLike
 from .._core import ValidationError
 from .._options import order_of
 from .._spaces import Doubles
-from .._typing import FloatArray, Loss, Numbers, PointsLike, TimesLike
 from .._validation import one_of
 
 # Acceleration of free fall in m/s², the default of `SpecificForce`.

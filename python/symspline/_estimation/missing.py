@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from .._arrays import as_array, filled
-from .._input import times_of
+from .._base.arrays import as_array, filled
+from .._base.input import times_of
 from .._missing import Mask, missing_times, recounting, rows_of
 from .measurements import Constant, Function, Measurement
 

@@ -7,13 +7,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .. import _core
+from .._base.exceptions import ConvergenceError, SymsplineError
+from .._base.time import TimeAxis
+from .._base.typing import Progress
+from .._base.warnings import warn
 from .._core import ValidationError
-from .._exceptions import ConvergenceError, SymsplineError
 from .._smoothing import SmoothingWarning
 from .._spaces import Array, Doubles, Space
-from .._time import TimeAxis
-from .._typing import Progress
-from .._warnings import warn
 from .knots import bisected, filled, shown_times, that_reproduce
 from .solve import Iteration, Setup, Solution, fitted
 from .start import Start, starts

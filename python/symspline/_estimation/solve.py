@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
-from .._arrays import as_array, short_repr
+from .._base.arrays import as_array, short_repr
 from .._core import ValidationError
 from .._curves.curve import CoreCurve
 from .._curves.ends import end_kinds

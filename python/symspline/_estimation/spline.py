@@ -9,6 +9,7 @@ from typing import Any, Self
 import numpy as np
 
 from .._archive import Entries, entry, read_fitted, read_report
+from .._base.typing import P
 from .._core import ValidationError
 from .._cubic import CubicSpline
 from .._curves.curve import SidePanel, UncertaintyBand
@@ -21,7 +22,6 @@ from .._smoothing.report import SmoothingReport
 from .._smoothing.solve import Smoothed
 from .._smoothing.spline import SmoothingSpline
 from .._spaces import Array, Doubles, Product, Space, SpecialEuclidean, factors_of, parts_of
-from .._typing import P
 from .along import Motion
 from .gaps import LongGaps, read_long_gaps
 from .measurements import BodyRates, Measurement, Points, SpecificForce

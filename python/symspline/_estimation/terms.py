@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .._arrays import as_array, refuse
+from .._base.arrays import as_array, refuse
 from .._core import ValidationError
 from .._curves.fit import read
 from .._smoothing.audit import roots_of

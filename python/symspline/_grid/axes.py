@@ -6,11 +6,11 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from .._arrays import as_array, refuse, short_repr
+from .._base.arrays import as_array, refuse, short_repr
+from .._base.time import TimeAxis, time_axis_of
 from .._core import ValidationError
 from .._options import extrapolation_mode
 from .._spaces import Array, Doubles
-from .._time import TimeAxis, time_axis_of
 
 Ends = tuple[str, str] | None
 _WORDS = ("natural", "not-a-knot", "clamped")

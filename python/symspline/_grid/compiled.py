@@ -7,11 +7,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .. import _core
+from .._base.faults import CUT_LOCUS, UNCONVERGED, Fault, from_core, imprecise
+from .._base.report import Columns
+from .._base.typing import Progress
 from .._curves.reduced import Span
-from .._faults import CUT_LOCUS, UNCONVERGED, Fault, from_core, imprecise
-from .._report import Columns
 from .._spaces import Array, Doubles, Space
-from .._typing import Progress
 from .axes import GridAxis, Sites
 
 

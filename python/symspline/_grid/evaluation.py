@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from .. import _core
-from .._arrays import short_repr
+from .._base.arrays import short_repr
+from .._base.typing import Progress
 from .._core import ValidationError
 from .._curves.jerk import differentiation, transported
 from .._curves.reduced import ReducedCurve, span_of
 from .._spaces import Array, Doubles, Space
-from .._typing import Progress
 from ..manifolds import Manifold
 from .axes import GridAxis, Sites
 from .compiled import CompiledGrid, Found

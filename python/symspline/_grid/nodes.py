@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from .._arrays import filled, refuse
+from .._base.arrays import filled, refuse
+from .._base.report import FarPointsWarning
+from .._base.warnings import warn
 from .._core import CutLocusError, ValidationError
 from .._curves.ends import NATURAL
 from .._curves.fit import Points, validated
-from .._report import FarPointsWarning
 from .._representatives import FAR, cut_fractions
 from .._spaces import Array, Quotient, Space, cover_of, factors_of, parts_of
-from .._warnings import warn
 from .axes import GridAxis
 
 

@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
+from .._base.report import ConvergenceWarning, FarPointsWarning
+from .._base.typing import Extrapolate, Progress
+from .._base.warnings import silenced
 from .._core import ValidationError
 from .._cubic import CubicSpline
-from .._report import ConvergenceWarning, FarPointsWarning
 from .._spaces import Array, Doubles, Space
-from .._typing import Extrapolate, Progress
-from .._warnings import silenced
 from .axes import GridAxis, Sites
 from .compiled import Found, row_fault
 

@@ -10,15 +10,15 @@ import numpy as np
 
 from .. import _archive
 from .._archive import Entries, entry, read_array, read_space, read_times, suffix_of, times_state
-from .._arrays import checked_atol, checked_flag, short_repr, whole_number
+from .._base.arrays import checked_atol, checked_flag, short_repr, whole_number
+from .._base.faults import CUT_LOCUS
+from .._base.report import ConvergenceWarning
+from .._base.typing import Extrapolate, File, GridLook, OnFailure, P, PointsLike, Progress, TimesLike
+from .._base.warnings import warn
 from .._core import ConvergenceError, CutLocusError, ValidationError
 from .._cubic import CubicSpline
-from .._faults import CUT_LOCUS
 from .._options import check_on_failure, check_progress, checked_extrapolate, require_matplotlib
-from .._report import ConvergenceWarning
 from .._spaces import Array, Product, Space, cover_of, factors_of, space_named
-from .._typing import Extrapolate, File, GridLook, OnFailure, P, PointsLike, Progress, TimesLike
-from .._warnings import warn
 from .axes import GridAxis, Sites, coordinates, read_axes, sites_of
 from .compiled import CompiledGrid, Found
 from .evaluation import FactorGrid, order_of_each

@@ -13,9 +13,9 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import SubFigure
 from matplotlib.quiver import Quiver
 
-from .._arrays import checked_number, short_repr, whole_number
+from .._base.arrays import checked_number, short_repr, whole_number
+from .._base.disk import path_of, replacing
 from .._core import ValidationError
-from .._disk import path_of, replacing
 from .._spaces import Product, cover_of, factors_of
 from .chart import origin_of
 from .curves import LINE, Curve

@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .._base.input import UTC_ZONE
+from .._base.time import TimeAxis
 from .._core import ConvergenceError, CutLocusError, ValidationError
 from .._curves.ends import NATURAL
 from .._curves.fit import FitProblem, fit, read
 from .._curves.solve import DEFAULTS
-from .._input import UTC_ZONE
 from .._spaces import AmbiguousMeanWarning, Product, Space, SpecialEuclidean
-from .._time import TimeAxis
 from .curves import SECOND, Axis, Batch, Curve
 from .style import SPLINE, Array, colors, evenly, named_from, round_start
 

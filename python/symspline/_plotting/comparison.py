@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from matplotlib import rcParams
 
-from .._arrays import short_repr
+from .._base.arrays import short_repr
+from .._base.time import TimeAxis, knots_of
 from .._core import ValidationError
 from .._spaces import Product, Space, cover_of, factors_of, parts_of
-from .._time import TimeAxis, knots_of
 from .collect import OTHERS, axis_of, curves_of, finite_rows, scatter_of
 from .curves import Curve
 from .figure import FRAMES, finish

@@ -12,10 +12,10 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_rgba
 from numpy.typing import NDArray
 
+from .._base.report import long_gaps
 from .._curves.composed import AnyCurve
 from .._curves.controlled import ControlledCurve
 from .._curves.curve import UncertaintyBand
-from .._report import long_gaps
 from .._spaces import Space
 from .style import DATA, DATES, INK, SPLINE, Array, Indices, evenly
 

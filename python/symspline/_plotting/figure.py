@@ -16,9 +16,9 @@ import numpy as np
 from matplotlib import rcParams
 from matplotlib.figure import Figure, SubFigure
 
-from .._arrays import short_repr
+from .._base.arrays import short_repr
+from .._base.disk import path_of, replacing
 from .._core import ValidationError
-from .._disk import path_of, replacing
 from .._spaces import Space, cover_of, factors_of
 from . import chart, columns, graphs, matrices, sphere
 from .curves import Curve

@@ -11,7 +11,7 @@ from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.patches import Circle
 from numpy.typing import NDArray
 
-from .._lonlat import from_lonlat, to_lonlat
+from .._base.lonlat import from_lonlat, to_lonlat
 from .._spaces import Euclidean, Space
 from .style import EDGE, GRID, HALO, INK, MARK, PAPER, Array, closest, points
 

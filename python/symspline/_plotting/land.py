@@ -16,7 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Circle, PathPatch
 from matplotlib.path import Path as Outline
 
-from .._lonlat import from_lonlat
+from .._base.lonlat import from_lonlat
 from .globe import View
 from .style import EDGE, Array
 

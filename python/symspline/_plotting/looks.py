@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from matplotlib.colors import is_color_like
 
-from .._arrays import as_array, short_repr
+from .._base.arrays import as_array, short_repr
 from .._core import ValidationError
 
 _LARGEST = 200.0

@@ -21,8 +21,8 @@ from matplotlib.figure import SubFigure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
+from .._base.quaternions import matrices_of_quaternions
 from .._core import CutLocusError, convert_rotations
-from .._quaternions import matrices_of_quaternions
 from .._spaces import SpecialOrthogonal, cover_of
 from .chart import SHADOW, box, count_from, draw_stems, explain_frames, frame_handles, origin_of, plane, shadow_colors
 from .curves import BODIES, BODY, BODY_COLOR, FAINT, KNOTS, POSES, START, Curve, are_compared

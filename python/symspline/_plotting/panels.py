@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
-from .._arrays import short_repr
+from .._base.arrays import short_repr
 from .._core import ValidationError
 from .._spaces import Product, Space, cover_of
 from .curves import START, Curve

@@ -15,7 +15,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import SubFigure
 from numpy.typing import NDArray
 
-from .._lonlat import from_lonlat, to_lonlat
+from .._base.lonlat import from_lonlat, to_lonlat
 from . import land
 from .arrows import draw_arrows
 from .bands import disc_indices, draw_tube

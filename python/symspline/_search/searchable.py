@@ -11,13 +11,13 @@ from typing import Any, Generic, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import checked_flag, checked_number, short_repr
+from .._base.arrays import checked_flag, checked_number, short_repr
+from .._base.typing import FloatArray, P, Time
 from .._core import ValidationError
 from .._curves.arc_length import ArcLength
 from .._curves.composed import Retimed
 from .._curves.integrals import Evaluable
 from .._spaces import Array, Doubles, Space, factors_of, parts_of
-from .._typing import FloatArray, P, Time
 from ..manifolds import Manifold
 from .closest import ClosestPoints
 from .extrema import checked_values, crossings, extrema, rounding_noise

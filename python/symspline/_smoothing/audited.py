@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
-from .._faults import of_index
+from .._base.faults import of_index
+from .._base.warnings import warn
 from .._spaces import Array, Doubles, Space
-from .._warnings import warn
 from .audit import Finding, Residuals, SmoothingFinding, corner_of, examine, examine_smoothing, roots_of
 from .data import SmoothingData, points_of
 from .factors import in_part

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from .._base.warnings import warn
 from .._spaces import Array, Doubles, Space
-from .._warnings import warn
 from .warned import SmoothingWarning
 
 # A jump is a step between neighbouring nodes that is longer than the first number of median steps along the axis, and

@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from .._base.warnings import silenced
 from .._spaces import Array, Doubles
-from .._warnings import silenced
 from .make import make_smoothing_spline
 from .rows import Rows, posterior_variance, smooth
 

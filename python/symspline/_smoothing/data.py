@@ -9,16 +9,16 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .._arrays import short_repr
+from .._base.arrays import short_repr
+from .._base.faults import INVALID, Fault
+from .._base.time import TimeAxis, knots_of
+from .._base.typing import TimesLike
 from .._core import ValidationError
 from .._curves.ends import End, end_kinds, map_ends, split_ends
 from .._curves.fit import Points, moved_ends, read, read_ends, validated
-from .._faults import INVALID, Fault
 from .._missing import refuse_nan_times
 from .._options import with_atol
 from .._spaces import Array, Doubles, Space, factors_of
-from .._time import TimeAxis, knots_of
-from .._typing import TimesLike
 from .._validation import one_of
 from .factors import grouped, smoothed_spaces, split
 from .precision import Precision, read_precision

@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .._arrays import as_array, short_repr
+from .._base.arrays import as_array, short_repr
+from .._base.input import times_of
+from .._base.report import long_gaps
 from .._core import ValidationError
-from .._input import times_of
-from .._report import long_gaps
 from .._spaces import Array, Doubles, Space
 from .data import SmoothingData, points_of
 

@@ -8,18 +8,8 @@ from typing import Any, Unpack, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import checked_flag, checked_number, short_repr, whole_number
-from .._core import ValidationError
-from .._curves.ends import NATURAL, End, end_kinds, freeze_bc_type, is_closed, map_ends
-from .._curves.fit import Points, Problem, fit, mask_of
-from .._curves.solve import DEFAULTS, in_batch
-from .._errors import raise_or_warn
-from .._held import warn_of_held_points
-from .._missing import counts_all_samples, data_without_missing, missing_named
-from .._options import check_on_failure, check_progress, checked_extrapolate
-from .._representatives import warn_of_far_data, warn_of_far_points, warn_of_signs
-from .._spaces import Product, Space, SpecialEuclidean, factors_of, space_named
-from .._typing import (
+from .._base.arrays import checked_flag, checked_number, short_repr, whole_number
+from .._base.typing import (
     ChoiceOptions,
     Criterion,
     Extrapolate,
@@ -37,7 +27,17 @@ from .._typing import (
     SmoothingPenalty,
     TimesLike,
 )
-from .._warnings import is_silent
+from .._base.warnings import is_silent
+from .._core import ValidationError
+from .._curves.ends import NATURAL, End, end_kinds, freeze_bc_type, is_closed, map_ends
+from .._curves.fit import Points, Problem, fit, mask_of
+from .._curves.solve import DEFAULTS, in_batch
+from .._errors import raise_or_warn
+from .._held import warn_of_held_points
+from .._missing import counts_all_samples, data_without_missing, missing_named
+from .._options import check_on_failure, check_progress, checked_extrapolate
+from .._representatives import warn_of_far_data, warn_of_far_points, warn_of_signs
+from .._spaces import Product, Space, SpecialEuclidean, factors_of, space_named
 from ..manifolds._manifold import refuse_functions
 from .audited import warn_of_residuals
 from .data import (

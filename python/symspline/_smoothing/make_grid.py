@@ -7,16 +7,26 @@ from typing import Any
 
 import numpy as np
 
-from .._arrays import as_array, checked_atol, checked_number, refuse
+from .._base.arrays import as_array, checked_atol, checked_number, refuse
+from .._base.report import ConvergenceWarning
+from .._base.typing import (
+    Extrapolate,
+    GridCriterion,
+    Numbers,
+    OnFailure,
+    P,
+    PointsLike,
+    Progress,
+    SmoothingWord,
+    TimesLike,
+)
+from .._base.warnings import warn
 from .._core import ConvergenceError, ValidationError
 from .._grid.axes import GridAxis, read_axes
 from .._grid.nodes import read_nodes, validate_nodes
 from .._options import check_on_failure, check_progress, checked_extrapolate
-from .._report import ConvergenceWarning
 from .._spaces import Array, Doubles, Product, Space, cover_of, factors_of, space_named
-from .._typing import Extrapolate, GridCriterion, Numbers, OnFailure, P, PointsLike, Progress, SmoothingWord, TimesLike
 from .._validation import one_of
-from .._warnings import warn
 from ..manifolds._manifold import refuse_functions
 from .axes import Nodes, SmoothedNodes, noise_level, smooth_axes
 from .boundaries import warn_of_boundaries

@@ -6,13 +6,13 @@ import warnings
 from collections.abc import Iterable
 from typing import Any
 
+from .._base.faults import UNCONVERGED, Fault
+from .._base.typing import OnFailure, Progress
+from .._base.warnings import warn
 from .._core import ConvergenceError, ValidationError
 from .._errors import raise_or_warn
-from .._faults import UNCONVERGED, Fault
 from .._options import check_on_failure, check_progress
 from .._spaces import Space
-from .._typing import OnFailure, Progress
-from .._warnings import warn
 from .make import make_smoothing_spline
 from .spline import SmoothingSpline
 

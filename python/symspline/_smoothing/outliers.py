@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from .._base.warnings import warn
 from .._spaces import Space
-from .._warnings import warn
 from .report import SmoothingReport
 from .warned import SmoothingWarning, first_affected
 

@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .. import _core
-from .._equality import same
+from .._base.equality import same
+from .._base.typing import FloatArray
 from .._spaces import Array, Doubles, Space
-from .._typing import FloatArray
 
 
 class Parameter(NamedTuple):

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import as_array, cast, refuse
+from .._base.arrays import as_array, cast, refuse
 from .._core import ValidationError
 from .._curves.fit import Points
 from .._spaces import Array, Doubles, Product, Quotient, Space, factors_of

@@ -9,8 +9,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from .._report import BOOL, FLOAT, INT, mapped_columns, same_report
-from .._typing import Number
+from .._base.report import BOOL, FLOAT, INT, mapped_columns, same_report
+from .._base.typing import Number
 
 METHODS: tuple[Literal["linearized", "newton"], ...] = ("linearized", "newton")
 

@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
-from .._arrays import refuse, short_repr
+from .._base.arrays import refuse, short_repr
+from .._base.faults import UNCONVERGED, Fault
+from .._base.report import long_gaps
+from .._base.typing import Progress
 from .._core import ValidationError
 from .._curves.ends import End
 from .._curves.reduced import reduced
-from .._faults import UNCONVERGED, Fault
-from .._report import long_gaps
 from .._spaces import Array, Doubles, Space
-from .._typing import Progress
 from .data import SmoothingData
 from .knots import NO_CURVE, TOO_FEW, Knots
 from .outliers import Outliers

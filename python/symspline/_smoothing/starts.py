@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
+from .._base.warnings import warn
 from .._representatives import cut_fractions
 from .._spaces import (
     Array,
@@ -28,7 +29,6 @@ from .._spaces import (
     Torus,
     nearest_rotations,
 )
-from .._warnings import warn
 from .factors import smoothed_spaces
 from .report import SmoothingReport
 from .warned import SmoothingWarning, first_affected

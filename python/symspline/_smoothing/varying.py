@@ -7,11 +7,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .. import _core
-from .._arrays import short_repr
+from .._base.arrays import short_repr
+from .._base.faults import of_index
+from .._base.warnings import warn
 from .._curves.curve import CurveArrays
-from .._faults import of_index
 from .._spaces import Array, Doubles, Space, factors_of
-from .._warnings import warn
 from .data import SmoothingData
 from .factors import grouped, is_several
 from .solve import Smoothed

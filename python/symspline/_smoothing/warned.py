@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
-from .._arrays import short_repr
-from .._faults import of_index
+from .._base.arrays import short_repr
+from .._base.faults import of_index
+from .._base.warnings import warn
 from .._spaces import Array, Space
-from .._warnings import warn
 from .data import SmoothingData, points_of
 from .factors import in_part
 

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import adjoint, as_array, cast, refuse, short_repr
+from .._base.arrays import adjoint, as_array, cast, refuse, short_repr
+from .._base.typing import P
 from .._core import CutLocusError, ValidationError
-from .._typing import P
 from .base import Array, Space
 from .rounding import point_tol
 

@@ -9,9 +9,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from .._arrays import as_array, read_only, short_repr
+from .._base.arrays import as_array, read_only, short_repr
+from .._base.quaternions import matrices_of_quaternions
 from .._core import ValidationError
-from .._quaternions import matrices_of_quaternions
 from .base import Array, Space
 from .point_groups import elements, proper_symbol, recognised
 

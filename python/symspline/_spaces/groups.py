@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from .._arrays import refuse
+from .._base.arrays import refuse
+from .._base.quaternions import matrices_of_quaternions
+from .._base.typing import ComplexArray, FloatArray
 from .._core import ValidationError
-from .._quaternions import matrices_of_quaternions
-from .._typing import ComplexArray, FloatArray
 from .actions import DisconnectedGroup, Group
 from .base import Array
 from .means import karcher_mean

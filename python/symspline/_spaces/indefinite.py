@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import adjoint
-from .._typing import FloatArray, P
+from .._base.arrays import adjoint
+from .._base.typing import FloatArray, P
 from .actions import Preserving, matrices, preserves
 from .base import Array, Space
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .._arrays import read_only, short_repr
+from .._base.arrays import read_only, short_repr
 from .._core import ValidationError
 
 Array = NDArray[np.float64]

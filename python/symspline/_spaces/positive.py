@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from .._arrays import adjoint
+from .._base.arrays import adjoint
+from .._base.typing import ComplexArray, FloatArray, P
 from .._core import ValidationError
-from .._typing import ComplexArray, FloatArray, P
 from .actions import Congruent, preserves, require
 from .base import Array
 from .statistics import Groups, scaled

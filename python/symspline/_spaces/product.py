@@ -11,9 +11,9 @@ from typing import Any, TypeVar, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import short_repr
+from .._base.arrays import short_repr
+from .._base.typing import AnyArray, AnyArrays, FloatArray, P, PProduct
 from .._core import Handle, ValidationError
-from .._typing import AnyArray, AnyArrays, FloatArray, P, PProduct
 from .base import CLASSES, DERIVED, Space, example_of
 from .groups import names_points, rotations_and_positions
 from .statistics import Groups

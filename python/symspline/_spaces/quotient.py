@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import short_repr, whole_number
+from .._base.arrays import short_repr, whole_number
+from .._base.typing import P
 from .._core import CutLocusError, ValidationError
-from .._typing import P
 from .base import DERIVED, Array, Space
 from .finite_groups import Factor, FiniteGroup, Indices
 from .groups import SpecialOrthogonal, SpecialUnitary, names_points

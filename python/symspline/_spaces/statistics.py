@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import as_array, refuse
+from .._base.arrays import as_array, refuse
 from .._core import ValidationError
 
 Array = NDArray[Any]

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .._base.typing import ComplexArray, FloatArray, P
 from .._core import ValidationError
-from .._typing import ComplexArray, FloatArray, P
 from .actions import Preserving, largest, require
 from .base import LARGE, Array, Space
 from .rounding import point_tol

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import as_array, refuse
+from .._base.arrays import as_array, refuse
+from .._base.typing import FloatArray
 from .._core import ValidationError
-from .._typing import FloatArray
 from .actions import Preserving, homogeneous, require
 from .base import Array, Space
 from .rounding import dtype_tol

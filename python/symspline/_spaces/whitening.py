@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .._arrays import adjoint
+from .._base.arrays import adjoint
 from .statistics import Array
 
 

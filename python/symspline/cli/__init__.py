@@ -21,8 +21,8 @@ import os
 import sys
 from collections.abc import Sequence
 
-from .._exceptions import ConvergenceError, SymsplineError
-from .._version import VERSION
+from .._base.exceptions import ConvergenceError, SymsplineError
+from .._base.version import VERSION
 from . import _check, _fit, _grid, _info, _plot, _sample
 from ._help import Parser, add_completion, texts_of
 from ._messages import QUIET, USUAL, VERBOSE, Problem, for_command_line, say, set_level

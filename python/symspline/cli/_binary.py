@@ -11,7 +11,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from .._archive import read
-from .._disk import damage
+from .._base.disk import damage
 from .._pose_files import TUM, tum_rows, write_tum_rows
 from ._messages import Problem, refuse
 from ._streams import Source

@@ -30,7 +30,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .._arrays import brief
+from .._base.arrays import brief
 from .._cubic import CubicSpline
 from .._curves.ends import is_closed
 from .._pairs import segments_of

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._archive import json_in, read
-from .._arrays import brief
+from .._base.arrays import brief
 from .._composed import SegmentedCurve
 from .._cubic import CubicSpline
 from .._files import load, save

@@ -60,8 +60,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from .._base.exceptions import SymsplineError
 from .._cubic import CubicSpline
-from .._exceptions import SymsplineError
 from .._functional import fit_many
 from .._representatives import IN_PYTHON
 from .._smoothing import SmoothingWarning

@@ -17,10 +17,10 @@ from typing import Any
 import numpy as np
 
 from .._archive import read
-from .._arrays import brief
+from .._base.arrays import brief
+from .._base.disk import damage
+from .._base.exceptions import SymsplineError
 from .._degrees import is_degrees, look_like_degrees, with_angles
-from .._disk import damage
-from .._exceptions import SymsplineError
 from .._files import load
 from .._grid import GridSpline
 from .._spaces import Product, Space, Torus, factors_of, space_named

@@ -21,13 +21,13 @@ from pathlib import Path
 
 import numpy as np
 
-from .._arrays import brief
+from .._base.arrays import brief
+from .._base.time import time_axis_of
 from .._files import load
 from .._grid import GridSpline
 from .._smoothing import SmoothingSpline
 from .._spaces import Doubles
 from .._spaces.base import CLASSES, example_of
-from .._time import time_axis_of
 from ._columns import NUMBERED, column_of_names, time_column
 from ._curves import read_curves
 from ._formats import CURVES, TABLES, endings, format_of, open_table

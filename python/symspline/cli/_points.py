@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .._base.lonlat import from_lonlat
 from .._core import ValidationError
-from .._lonlat import from_lonlat
 from .._pose_files import join, rotations_in_rows
 from .._spaces import Doubles, Product, Space, Torus, factors_of, space_named
 from ._messages import Problem, for_command_line

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from .._base.lonlat import compass, to_lonlat
 from .._cubic import CubicSpline
 from .._degrees import with_angles
-from .._lonlat import compass, to_lonlat
 from .._smoothing import SmoothingSpline
 from .._spaces import Doubles, Torus, factors_of, parts_of
 from ..rotations import angular_acceleration, angular_velocity, quaternion

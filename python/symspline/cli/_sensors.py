@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 from .. import measure
+from .._base.exceptions import SymsplineError
+from .._base.lonlat import compass
 from .._estimation import estimate
 from .._estimation.measurements import Measurement
-from .._exceptions import SymsplineError
-from .._lonlat import compass
 from .._smoothing import SmoothingSpline, SmoothingWarning
 from .._spaces import Array, Doubles, Euclidean, Product, Space, factors_of, space_named
 from ._columns import PointColumns, split_names

@@ -16,7 +16,7 @@ from functools import cache
 from pathlib import Path
 from typing import BinaryIO
 
-from .._disk import replacing
+from .._base.disk import replacing
 from ._messages import Problem, reading, refuse
 
 STANDARD = Path("-")

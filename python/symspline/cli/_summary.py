@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from .._base.report import long_gaps
 from .._cubic import CubicSpline
-from .._report import long_gaps
 from .._smoothing import SmoothingReport, SmoothingSpline
 from .._smoothing.factors import is_several, smoothed_spaces
 from .._spaces import Doubles

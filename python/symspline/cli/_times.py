@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .._base.durations import NANOSECONDS, parts_of_duration
+from .._base.input import ISO_DATE, UTC_ZONE, shapes_of, times_of
 from .._core import ValidationError
-from .._durations import NANOSECONDS, parts_of_duration
-from .._input import ISO_DATE, UTC_ZONE, shapes_of, times_of
 from ._messages import Problem, refuse
 
 Times = NDArray[Any]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import adjoint, refuse
+from .._base.arrays import adjoint, refuse
 from .._core import ValidationError
 from .._validation import (
     Array,

@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 
 from .._adapters import split
-from .._arrays import short_repr
+from .._base.arrays import short_repr
 from .._closed_forms.condition import Chain, weights
 from .._core import ValidationError
 from .._spaces import Space, refuse_quotients, space_named

@@ -9,10 +9,10 @@ import jax
 import jax.numpy as jnp
 
 from .._adapters import split
-from .._arrays import short_repr
+from .._base.arrays import short_repr
+from .._base.typing import CurveOptions
 from .._core import ValidationError
 from .._spaces import Product, Space, parts_of, space_named
-from .._typing import CurveOptions
 from ._casteljau import evaluate
 from ._compiled import curve
 from ._fitting import fit

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import checked_number, short_repr, whole_number
+from .._base.arrays import checked_number, short_repr, whole_number
 from .._core import ValidationError
 from .._spaces import Array, Space, factors_of
 from ._differences import dlog_by_differences

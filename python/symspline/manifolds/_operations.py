@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .._arrays import short_repr
+from .._base.arrays import short_repr
 from .._core import CutLocusError, ValidationError
 from .._spaces import Array, Doubles
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from .._arrays import short_repr
+from .._base.arrays import short_repr
 from .._core import ValidationError, stiefel
 from .._spaces import Array, Doubles, Space
 from ._manifold import Manifold

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from .._arrays import short_repr, whole_number
+from .._base.arrays import short_repr, whole_number
 from .._core import ValidationError
 from .._spaces import Array
 from ._differences import directional_derivative, jacobian

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import as_array, refuse, short_repr
+from .._base.arrays import as_array, refuse, short_repr
+from .._base.disk import damage, path_of, replacing
+from .._base.equality import same
+from .._base.typing import TensorOrder
 from .._core import ValidationError
-from .._disk import damage, path_of, replacing
-from .._equality import same
-from .._typing import TensorOrder
 from ._orders import Array, from_vectors, to_vectors
 
 File = str | PathLike[str]

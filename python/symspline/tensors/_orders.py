@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import as_array, refuse, short_repr
+from .._base.arrays import as_array, refuse, short_repr
+from .._base.typing import TensorOrder
 from .._core import ValidationError
 from .._spaces import point_tol
-from .._typing import TensorOrder
 from .._validation import largest
 
 Array = NDArray[Any]

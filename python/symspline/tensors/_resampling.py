@@ -10,10 +10,10 @@ from typing import Any, Unpack
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import as_array, short_repr
+from .._base.arrays import as_array, short_repr
+from .._base.typing import Progress, TensorOrder, VoxelOptions
 from .._core import ValidationError
 from .._grid import GridSpline
-from .._typing import Progress, TensorOrder, VoxelOptions
 from ._nifti import File, Volume, check_volume, checked_path, image_of, read_nifti, write_nifti, written_order
 from ._orders import Array
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import torch
 
-from .._arrays import short_repr
+from .._base.arrays import short_repr
 from .._closed_forms import registry
 from .._closed_forms.casteljau import QUOTIENTS
 from .._closed_forms.models import Model

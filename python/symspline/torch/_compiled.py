@@ -8,9 +8,9 @@ import numpy as np
 import torch
 
 from .._adapters import fitted, movable, split
+from .._base.typing import CurveOptions
 from .._curves.ends import ends_in_factors
 from .._spaces import Product, Space, parts_of, space_named
-from .._typing import CurveOptions
 from ..manifolds._manifold import refuse_functions
 
 

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple, overload
 import torch
 
 from .._adapters import split
-from .._arrays import short_repr
+from .._base.arrays import short_repr
 from .._closed_forms.condition import Chain, chain_of, residual, weights
 from .._closed_forms.tridiagonal import cyclic_reduction
 from .._core import ConvergenceError, ValidationError

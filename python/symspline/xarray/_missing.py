@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._adapters import joined
+from .._base.report import ConvergenceWarning
+from .._base.warnings import warn
 from .._core import ValidationError
 from .._cubic import CubicSpline
 from .._functional import fit_many
 from .._missing import Mask, missing_points, missing_times
-from .._report import ConvergenceWarning
 from .._spaces import Array, Space
-from .._warnings import warn
 
 
 def times_of_rows(t: Array | None, batch: tuple[int, ...], nodes: int) -> Array:

@@ -11,15 +11,15 @@ from typing import Any, NamedTuple, Unpack
 import numpy as np
 import xarray as xr
 
-from .._arrays import checked_number
-from .._exceptions import SymsplineError
+from .._base.arrays import checked_number
+from .._base.exceptions import SymsplineError
+from .._base.typing import SmoothOptions
+from .._base.warnings import silenced
 from .._missing import missing_points, missing_times
 from .._options import checked_extrapolate, extrapolation_mode
 from .._smoothing import SmoothingWarning, make_smoothing_spline
 from .._smoothing.factors import is_several
 from .._spaces import Array, Space, SpecialOrthogonal, space_named
-from .._typing import SmoothOptions
-from .._warnings import silenced
 from ._blocks import Inputs, apply, knots_of_block, per_curve_times
 from ._missing import named_curve, of_equal_length, times_of_rows
 from ._spec import KNOTS, LINE, bare, rehearse, spec_of, timed_by, times_with_names

@@ -9,10 +9,10 @@ import numpy as np
 import xarray as xr
 
 from .._adapters import joined, split
-from .._arrays import as_array, short_repr
+from .._base.arrays import as_array, short_repr
+from .._base.input import times_of
 from .._core import ValidationError
 from .._cubic import CubicSpline
-from .._input import times_of
 from .._missing import missing_times
 from .._spaces import Array, Euclidean, Product, Space, space_named
 from ._blocks import Inputs, values_at

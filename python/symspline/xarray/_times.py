@@ -7,7 +7,7 @@ from typing import cast
 
 import xarray as xr
 
-from .._arrays import short_repr
+from .._base.arrays import short_repr
 from .._core import ValidationError
 
 

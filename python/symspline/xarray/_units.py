@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from .._base.warnings import warn
 from .._degrees import is_degrees, look_like_degrees
 from .._spaces import Space, Torus, space_named
-from .._warnings import warn
 
 
 def in_radians(da: Any, space: Space[Any] | str) -> Any:

@@ -1,7 +1,7 @@
 //! Theorem 3.1 in numbers: a region that Algorithm 1 does not leave, and its contraction there.
 //!
 //! `docs/convergence.md` derives both bounds. They use the curvature alone and hold only where D + 2V is less than the
-//! injectivity radius. `_report.py` checks this, because only the Python package has the radius of quotients.
+//! injectivity radius. `_base/report.py` checks this, because only the Python package has the radius of quotients.
 
 /// Spacings whose quotients differ from one by at most this much are equal.
 const EQUAL: f64 = 1e-9;

@@ -79,7 +79,7 @@ pub enum Method {
     Homotopy,
 }
 
-/// The solvers, in the order of their numbers in `SOLVERS` of `_report.py`. The report of a long curve names the one
+/// The solvers, in the order of their numbers in `SOLVERS` of `_base/report.py`. The report of a long curve names the one
 /// with the largest number among those of its parts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Solver {

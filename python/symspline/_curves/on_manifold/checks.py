@@ -8,8 +8,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from ..._base.faults import INVALID, Fault, of_curve
 from ..._core import CutLocusError, ValidationError
-from ..._faults import INVALID, Fault, of_curve
 from ..._spaces import Array, Euclidean
 from ...manifolds._manifold import Manifold
 from ..ends import map_ends

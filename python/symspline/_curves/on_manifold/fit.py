@@ -9,10 +9,10 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from ..._faults import CUT_LOCUS, Fault, unconverged
-from ..._report import SOLVERS, Columns
+from ..._base.faults import CUT_LOCUS, Fault, unconverged
+from ..._base.report import SOLVERS, Columns
+from ..._base.typing import Progress
 from ..._spaces import Array, Doubles
-from ..._typing import Progress
 from ...manifolds._frames import frames_along
 from ...manifolds._manifold import Manifold
 from ..solve import Options, Solved, Task

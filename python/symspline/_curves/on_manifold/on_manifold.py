@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ... import _core
+from ..._base.faults import Fault
+from ..._base.typing import Progress
 from ..._core import ValidationError
-from ..._faults import Fault
 from ..._spaces import Array, Doubles, Euclidean, Space
-from ..._typing import Progress
 from ...manifolds._differences import STEPS, eighth_difference, first_derivative, second_derivative
 from ...manifolds._manifold import Manifold
 from ...manifolds._operations import Operations

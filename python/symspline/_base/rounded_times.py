@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ._warnings import warn
+from .warnings import warn
 
 # Rounding of times, as a fraction of the time step, beyond which accelerations are affected.
 _COARSE = 1e-4

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._arrays import as_array, refuse
-from ._core import ValidationError
+from .._core import ValidationError
+from .arrays import as_array, refuse
 
 Array = NDArray[np.float64]
 

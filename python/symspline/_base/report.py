@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ._typing import Number
+from .typing import Number
 
 # A gap between points is long if it exceeds the median by this factor.
 _LONG = 10

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ._core import ValidationError
+from .._core import ValidationError
 
 _SIMPLE = {bool, int, float, complex, str, np.ndarray, np.float64, np.float32, np.int64, np.complex128}
 # Attributes that convert an object to an array, in the order in which messages suggest them.

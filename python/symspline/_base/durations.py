@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from ._arrays import short_repr
-from ._core import ValidationError
+from .._core import ValidationError
+from .arrays import short_repr
 
 _TEXT = re.compile(r"(\d+\.?\d*(?:e[+-]?\d+)?|\.\d+) ?([a-z]*)", re.IGNORECASE | re.ASCII)
 NANOSECONDS = {

@@ -12,11 +12,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ._arrays import as_array, cast, refuse
-from ._core import ValidationError
-from ._input import NO_ZONE, UTC_ZONE, times_of
-from ._rounded_times import warn_of_rounded_times
-from ._typing import TimesLike
+from .._core import ValidationError
+from .arrays import as_array, cast, refuse
+from .input import NO_ZONE, UTC_ZONE, times_of
+from .rounded_times import warn_of_rounded_times
+from .typing import TimesLike
 
 Doubles = NDArray[np.float64]
 

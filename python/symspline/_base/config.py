@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from . import _core, _cpu
-from ._version import VERSION
+from .. import _core, _cpu
+from .version import VERSION
 
 
 def show_config() -> None:

@@ -5,9 +5,9 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from . import _core
-from ._arrays import whole_number
-from ._core import ValidationError
+from .. import _core
+from .._core import ValidationError
+from .arrays import whole_number
 
 # More threads would only wait for each other, and operating systems limit their number.
 _MOST = 1024

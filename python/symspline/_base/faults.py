@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ._report import Columns
+from .report import Columns
 
 _SUIT = "choose times that suit the distances"
 # Rounding errors that are accepted whatever the tolerance, `MOST` in rounded.rs.

@@ -16,8 +16,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from ._arrays import brief, short_repr
-from ._core import ValidationError
+from .._core import ValidationError
+from .arrays import brief, short_repr
 
 # Characters of the file's own name in that of a temporary one: at most 128 bytes of the 255 that file systems allow.
 _TAIL = 32

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._core import ValidationError
-from ._input import refuse_objects, to_numpy
+from .._core import ValidationError
+from .input import refuse_objects, to_numpy
 
 
 def as_array(value: ArrayLike, name: str) -> NDArray[Any]:

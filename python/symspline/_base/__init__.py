@@ -1,0 +1,1 @@
+"""Input, times, errors, reports, files and settings: what all other modules use."""
