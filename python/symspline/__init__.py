@@ -22,21 +22,10 @@ from ._base.exceptions import SymsplineError  # noqa: E402
 from ._base.report import ConvergenceWarning, CumulativeReport, FarPointsWarning, Report  # noqa: E402
 from ._base.threads import set_num_threads  # noqa: E402
 from ._base.version import VERSION  # noqa: E402
-from ._bspline import BezierCurve, BSpline  # noqa: E402
-from ._compare import plot  # noqa: E402
-from ._composed import RetimedCurve, SegmentedCurve  # noqa: E402
 from ._core import ConvergenceError, CutLocusError, ValidationError, num_threads  # noqa: E402
-from ._cubic import CubicSpline  # noqa: E402
-from ._cumulative import CumulativeBSpline  # noqa: E402
-from ._curve import Curve, Derivative  # noqa: E402
 from ._curves.derivatives import Gradient  # noqa: E402
 from ._estimation import estimate  # noqa: E402
-from ._files import load, save  # noqa: E402
-from ._functional import evaluate, fit, fit_many  # noqa: E402
-from ._geodesics import PiecewiseGeodesic  # noqa: E402
 from ._grid import GridReport, GridSpline  # noqa: E402
-from ._hermite import HermiteSpline  # noqa: E402
-from ._segments import fit_segments  # noqa: E402
 from ._smoothing import (  # noqa: E402
     SmoothingGrid,
     SmoothingGridReport,
@@ -47,6 +36,7 @@ from ._smoothing import (  # noqa: E402
     make_smoothing_grid,
     make_smoothing_spline,
 )
+from ._smoothing.segments import fit_segments  # noqa: E402
 from ._spaces import (  # noqa: E402
     Affine,
     AmbiguousMeanWarning,
@@ -84,8 +74,18 @@ from ._spaces import (  # noqa: E402
     Unitary,
     space,
 )
+from ._splines.bspline import BezierCurve, BSpline  # noqa: E402
+from ._splines.compare import plot  # noqa: E402
+from ._splines.composed import RetimedCurve, SegmentedCurve  # noqa: E402
+from ._splines.cubic import CubicSpline  # noqa: E402
+from ._splines.cumulative import CumulativeBSpline  # noqa: E402
+from ._splines.curve import Curve, Derivative  # noqa: E402
+from ._splines.files import load, save  # noqa: E402
+from ._splines.functional import evaluate, fit, fit_many  # noqa: E402
+from ._splines.geodesics import PiecewiseGeodesic  # noqa: E402
+from ._splines.hermite import HermiteSpline  # noqa: E402
+from ._splines.time_law import TimeLaw, time_law  # noqa: E402
 from ._statistics import TangentPCA, tangent_pca  # noqa: E402
-from ._time_law import TimeLaw, time_law  # noqa: E402
 from .manifolds import Manifold, Stiefel  # noqa: E402
 
 __version__ = VERSION

@@ -25,18 +25,18 @@ from ._base.exceptions import SymsplineError
 from ._base.lonlat import compass, from_lonlat, to_lonlat
 from ._base.typing import AxesLook, Duplicates, File, FloatArray, PageLook, TimesLike
 from ._base.warnings import warn
-from ._compare import checked_items
-from ._composed import SegmentedCurve
 from ._core import ValidationError
-from ._cubic import CubicSpline
+from ._curves.options import require_matplotlib
 from ._estimation.along import Motion
 from ._estimation.uncertainty import Jacobians, check_uncertain, standard_errors
-from ._functional import fit_many
-from ._options import require_matplotlib
-from ._segments import check_smooth, cut
 from ._smoothing.many import smooth_many
+from ._smoothing.segments import check_smooth, cut
 from ._spaces import Sphere
-from ._timed_curve import check_timed
+from ._splines.compare import checked_items
+from ._splines.composed import SegmentedCurve
+from ._splines.cubic import CubicSpline
+from ._splines.functional import fit_many
+from ._splines.timed_curve import check_timed
 from ._tracks import ZIGZAG, Tracks, are_angles, read_tracks
 
 if TYPE_CHECKING:

@@ -29,12 +29,12 @@ from ._base.input import times_of
 from ._base.time import onto_ends
 from ._base.typing import Extrapolate, Number, TimesLike
 from ._core import ValidationError
-from ._cubic import CubicSpline
 from ._curves.curve import CurveArrays
+from ._curves.options import order_of
 from ._curves.reduced import span_of
-from ._options import order_of
-from ._piecewise_cubic import check_curve
 from ._spaces import ComplexGrassmannian, ComplexProjective, Doubles, Space, SpecialUnitary, Unitary
+from ._splines.cubic import CubicSpline
+from ._splines.piecewise_cubic import check_curve
 from ._validation import (
     Array,
     check_symmetric,

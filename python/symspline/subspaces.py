@@ -25,10 +25,8 @@ from ._base.input import times_of
 from ._base.typing import TimesLike
 from ._base.warnings import warn
 from ._core import CutLocusError, ValidationError
-from ._cubic import CubicSpline
 from ._grid import GridSpline
 from ._grid.axes import coordinates
-from ._piecewise_cubic import check_curve
 from ._spaces import (
     ComplexGrassmannian,
     Euclidean,
@@ -38,6 +36,8 @@ from ._spaces import (
     SymmetricPositiveDefinite,
     point_tol,
 )
+from ._splines.cubic import CubicSpline
+from ._splines.piecewise_cubic import check_curve
 from ._validation import Array, numbers, off_one
 
 # Numbers closer than this, in units of the largest, are equal but for rounding.

@@ -19,9 +19,9 @@ from numpy.typing import ArrayLike
 
 from ._base.arrays import checked_number, whole_number
 from ._core import ConvergenceError, CutLocusError, ValidationError
-from ._cubic import CubicSpline
-from ._pairs import segments_of
 from ._spaces import Array, Doubles, Product, Space, space_named
+from ._splines.cubic import CubicSpline
+from ._splines.pairs import segments_of
 from .manifolds import Manifold
 
 __all__ = ["Conformance", "check"]

@@ -9,7 +9,7 @@ import pytest
 from kept import write
 
 import symspline as ss
-from symspline import _archive
+from symspline._splines import archive as _archive
 
 FOLDERS = sorted(write.FOLDER.glob("version_*"))
 VALUES = {folder: json.loads((folder / "values.json").read_text("utf-8")) for folder in FOLDERS}

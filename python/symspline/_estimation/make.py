@@ -28,13 +28,12 @@ from .._base.typing import (
     TimesLike,
 )
 from .._core import ValidationError
-from .._curve import Curve
+from .._curves.failures import raise_or_warn
 from .._curves.fit import FitProblem, fit, read_ends
 from .._curves.fit import Points as CorePoints
+from .._curves.held import warn_of_held_points
+from .._curves.options import check_on_failure, check_progress, checked_extrapolate
 from .._curves.solve import DEFAULTS
-from .._errors import raise_or_warn
-from .._held import warn_of_held_points
-from .._options import check_on_failure, check_progress, checked_extrapolate
 from .._smoothing import SmoothingReport, SmoothingSpline, SmoothingWarning, make_smoothing_spline
 from .._smoothing.factors import grouped, join, smoothed_spaces
 from .._smoothing.knots import Knots, thin_knots
@@ -51,6 +50,7 @@ from .._spaces import (
     refuse_quotients,
     space_named,
 )
+from .._splines.curve import Curve
 from .._validation import one_of
 from ..manifolds._manifold import refuse_functions
 from .audit import audit, unit_hints

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from .._base.arrays import as_array, cast, refuse, short_repr, whole_number
 from .._base.typing import FloatArray, Loss, Numbers, PointsLike, TimesLike
 from .._core import ValidationError
-from .._options import order_of
+from .._curves.options import order_of
 from .._spaces import Doubles
 from .._validation import one_of
 

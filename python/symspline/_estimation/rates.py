@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from .. import _core
-from .._cubic import CubicSpline
 from .._spaces import Doubles, Euclidean
+from .._splines.cubic import CubicSpline
 from ..convert import quaternion_to_matrix
 
 

@@ -8,10 +8,8 @@ from typing import Any, Self
 
 import numpy as np
 
-from .._archive import Entries, entry, read_fitted, read_report
 from .._base.typing import P
 from .._core import ValidationError
-from .._cubic import CubicSpline
 from .._curves.curve import SidePanel, UncertaintyBand
 from .._curves.ends import end_kinds
 from .._smoothing.data import SmoothingData
@@ -22,6 +20,8 @@ from .._smoothing.report import SmoothingReport
 from .._smoothing.solve import Smoothed
 from .._smoothing.spline import SmoothingSpline
 from .._spaces import Array, Doubles, Product, Space, SpecialEuclidean, factors_of, parts_of
+from .._splines.archive import Entries, entry, read_fitted, read_report
+from .._splines.cubic import CubicSpline
 from .along import Motion
 from .gaps import LongGaps, read_long_gaps
 from .measurements import BodyRates, Measurement, Points, SpecificForce

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from .._base.arrays import short_repr
 from .._base.time import TimeAxis
 from .._core import ValidationError
-from .._curve import Curve
 from .._smoothing import make_smoothing_spline
 from .._smoothing.factors import split
 from .._spaces import Array, Doubles, Euclidean, Product, Space, SpecialOrthogonal, factors_of, nearest_rotations
+from .._splines.curve import Curve
 from ..convert import matrix_to_quaternion
 from .integrated_rates import Attitudes, Integral, Path, Rates
 from .rates import attitudes_at

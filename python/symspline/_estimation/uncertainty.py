@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from .._base.typing import TimesLike
-from .._composed import SegmentedCurve
 from .._core import ValidationError
 from .._curves.at_times import call_at_times
 from .._smoothing import SmoothingSpline
 from .._smoothing.factors import smoothed_spaces, split
 from .._spaces import Doubles, factors_of
+from .._splines.composed import SegmentedCurve
 from .along import Motion
 
 # The number of times whose covariances are in memory together.

@@ -9,7 +9,7 @@ import numpy as np
 from .._base.arrays import as_array, refuse, short_repr
 from .._base.time import TimeAxis, time_axis_of
 from .._core import ValidationError
-from .._options import extrapolation_mode
+from .._curves.options import extrapolation_mode
 from .._spaces import Array, Doubles
 
 Ends = tuple[str, str] | None

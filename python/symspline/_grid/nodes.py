@@ -13,7 +13,7 @@ from .._base.warnings import warn
 from .._core import CutLocusError, ValidationError
 from .._curves.ends import NATURAL
 from .._curves.fit import Points, validated
-from .._representatives import FAR, cut_fractions
+from .._curves.representatives import FAR, cut_fractions
 from .._spaces import Array, Quotient, Space, cover_of, factors_of, parts_of
 from .axes import GridAxis
 

@@ -14,8 +14,8 @@ from .._base.report import ConvergenceWarning, FarPointsWarning
 from .._base.typing import Extrapolate, Progress
 from .._base.warnings import silenced
 from .._core import ValidationError
-from .._cubic import CubicSpline
 from .._spaces import Array, Doubles, Space
+from .._splines.cubic import CubicSpline
 from .axes import GridAxis, Sites
 from .compiled import Found, row_fault
 

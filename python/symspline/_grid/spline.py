@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, Unpack, overload
 
 import numpy as np
 
-from .. import _archive
-from .._archive import Entries, entry, read_array, read_space, read_times, suffix_of, times_state
 from .._base.arrays import checked_atol, checked_flag, short_repr, whole_number
 from .._base.faults import CUT_LOCUS
 from .._base.report import ConvergenceWarning
 from .._base.typing import Extrapolate, File, GridLook, OnFailure, P, PointsLike, Progress, TimesLike
 from .._base.warnings import warn
 from .._core import ConvergenceError, CutLocusError, ValidationError
-from .._cubic import CubicSpline
-from .._options import check_on_failure, check_progress, checked_extrapolate, require_matplotlib
+from .._curves.options import check_on_failure, check_progress, checked_extrapolate, require_matplotlib
 from .._spaces import Array, Product, Space, cover_of, factors_of, space_named
+from .._splines import archive
+from .._splines.archive import Entries, entry, read_array, read_space, read_times, suffix_of, times_state
+from .._splines.cubic import CubicSpline
 from .axes import GridAxis, Sites, coordinates, read_axes, sites_of
 from .compiled import CompiledGrid, Found
 from .evaluation import FactorGrid, order_of_each
@@ -117,7 +117,7 @@ class GridSpline(Generic[P]):
     _on_failure: OnFailure
 
     def __init_subclass__(cls) -> None:
-        _archive.FORMATS[cls._format] = cls
+        archive.FORMATS[cls._format] = cls
 
     def __init__(
         self,
@@ -516,12 +516,12 @@ class GridSpline(Generic[P]):
         >>> ss.load(file) == surface
         True
         """
-        _archive.write(file, self._state())
+        archive.write(file, self._state())
 
     def _state(self) -> dict[str, Any]:
         state: dict[str, Any] = {
             "format": self._format,
-            "version": _archive.VERSION,
+            "version": archive.VERSION,
             "space": self._space,
             "extrapolate": self._extrapolate,
             "grid": {
@@ -569,7 +569,7 @@ class GridSpline(Generic[P]):
         return self
 
     def __reduce__(self) -> tuple[object, ...]:
-        return _archive.restore, (self._state(),)
+        return archive.restore, (self._state(),)
 
     def __eq__(self, other: object) -> bool:
         if type(other) is not type(self) or not isinstance(other, GridSpline):
@@ -589,4 +589,4 @@ class GridSpline(Generic[P]):
         return f"<{type(self).__name__} on {self._space!r}: {nodes} nodes>"
 
 
-_archive.FORMATS[GridSpline._format] = GridSpline
+archive.FORMATS[GridSpline._format] = GridSpline

@@ -14,7 +14,7 @@ from .._core import CutLocusError, ValidationError
 from .._curves.arc_length import ArcLength
 from .._curves.curve import CoreCurve, ProductCurve
 from .._curves.integrals import Evaluable
-from .._representatives import cut_fractions
+from .._curves.representatives import cut_fractions
 from .._spaces import Array, Doubles, Quotient, Space, factors_of, parts_of, product_norm
 from ..manifolds import Manifold
 

@@ -30,13 +30,13 @@ from .._base.typing import (
 from .._base.warnings import is_silent
 from .._core import ValidationError
 from .._curves.ends import NATURAL, End, end_kinds, freeze_bc_type, is_closed, map_ends
+from .._curves.failures import raise_or_warn
 from .._curves.fit import Points, Problem, fit, mask_of
+from .._curves.held import warn_of_held_points
+from .._curves.options import check_on_failure, check_progress, checked_extrapolate
+from .._curves.representatives import warn_of_far_data, warn_of_far_points, warn_of_signs
 from .._curves.solve import DEFAULTS, in_batch
-from .._errors import raise_or_warn
-from .._held import warn_of_held_points
 from .._missing import counts_all_samples, data_without_missing, missing_named
-from .._options import check_on_failure, check_progress, checked_extrapolate
-from .._representatives import warn_of_far_data, warn_of_far_points, warn_of_signs
 from .._spaces import Product, Space, SpecialEuclidean, factors_of, space_named
 from ..manifolds._manifold import refuse_functions
 from .audited import warn_of_residuals

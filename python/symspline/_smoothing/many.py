@@ -10,8 +10,8 @@ from .._base.faults import UNCONVERGED, Fault
 from .._base.typing import OnFailure, Progress
 from .._base.warnings import warn
 from .._core import ConvergenceError, ValidationError
-from .._errors import raise_or_warn
-from .._options import check_on_failure, check_progress
+from .._curves.failures import raise_or_warn
+from .._curves.options import check_on_failure, check_progress
 from .._spaces import Space
 from .make import make_smoothing_spline
 from .spline import SmoothingSpline

@@ -7,11 +7,11 @@ from typing import Any, Generic, Self
 
 import numpy as np
 
-from .._archive import Entries, entry, read_array, suffix_of
 from .._base.typing import FloatArray, P
 from .._core import ValidationError
 from .._grid import GridSpline
 from .._spaces import Array, Doubles, factors_of
+from .._splines.archive import Entries, entry, read_array, suffix_of
 from .axes import SmoothedAxis
 from .factors import is_several, smoothed_spaces
 from .grid_report import PerAxis, SmoothedPart, SmoothingGridReport

@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING, Any, Generic, Self, overload
 import numpy as np
 
 from .. import _core
-from .._archive import Entries, read_fitted, read_times
 from .._base.arrays import checked_flag, checked_number, short_repr, whole_number
 from .._base.time import TimeAxis
 from .._base.typing import AnyArray, AnyArrays, CovarianceOrder, FloatArray, Number, P, TimesLike
 from .._core import ValidationError
-from .._cubic import CubicSpline
 from .._curves.curve import CurveArrays, SidePanel, UncertaintyBand
 from .._curves.ends import end_kinds, is_closed
-from .._options import order_of
+from .._curves.options import order_of
 from .._spaces import Array, Doubles, Product, Space, SpecialOrthogonal, factors_of, short_name
+from .._splines.archive import Entries, read_fitted, read_times
+from .._splines.cubic import CubicSpline
 from .data import SmoothingData
 from .evidence import calibration_of
 from .factors import grouped, is_several, join, parts_of_factor, smoothed_spaces, split

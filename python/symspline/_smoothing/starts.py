@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from .. import _core
 from .._base.warnings import warn
-from .._representatives import cut_fractions
+from .._curves.representatives import cut_fractions
 from .._spaces import (
     Array,
     ComplexGrassmannian,

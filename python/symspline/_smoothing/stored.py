@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .._archive import Entries, Stored, entry, read_array, read_field, read_report, suffix_of, times_state
 from .._base.time import TimeAxis
 from .._core import ValidationError
 from .._curves.curve import CurveArrays
 from .._spaces import Space, factors_of
+from .._splines.archive import Entries, Stored, entry, read_array, read_field, read_report, suffix_of, times_state
 from .._validation import one_of
 from .data import SmoothingData
 from .factors import is_several, smoothed_spaces

@@ -31,10 +31,10 @@ from pathlib import Path
 import numpy as np
 
 from .._base.arrays import brief
-from .._cubic import CubicSpline
 from .._curves.ends import is_closed
-from .._pairs import segments_of
 from .._spaces import HermitianPositiveDefinite, SymmetricPositiveDefinite
+from .._splines.cubic import CubicSpline
+from .._splines.pairs import segments_of
 from ..manifolds import Manifold
 from ._curves import read_curves
 from ._messages import Failure, listed

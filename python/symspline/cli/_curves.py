@@ -14,13 +14,13 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from .._archive import json_in, read
 from .._base.arrays import brief
-from .._composed import SegmentedCurve
-from .._cubic import CubicSpline
-from .._files import load, save
 from .._grid import GridSpline
 from .._spaces import Space
+from .._splines.archive import json_in, read
+from .._splines.composed import SegmentedCurve
+from .._splines.cubic import CubicSpline
+from .._splines.files import load, save
 from ._formats import CURVES
 from ._messages import Problem, did_you_mean, refuse
 from ._points import GLOBE, LONLAT, Columns, count_with_quaternion, labels, require_globe

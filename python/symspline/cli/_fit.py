@@ -61,12 +61,12 @@ from pathlib import Path
 from typing import Any
 
 from .._base.exceptions import SymsplineError
-from .._cubic import CubicSpline
-from .._functional import fit_many
-from .._representatives import IN_PYTHON
+from .._curves.representatives import IN_PYTHON
 from .._smoothing import SmoothingWarning
 from .._smoothing.many import smooth_many
 from .._spaces import Space, Torus, factors_of, space_named
+from .._splines.cubic import CubicSpline
+from .._splines.functional import fit_many
 from .._tracks import ZIGZAG
 from . import _summary
 from ._columns import (

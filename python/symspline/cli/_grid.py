@@ -40,11 +40,11 @@ from typing import Any
 
 import numpy as np
 
-from .._archive import read
 from .._base.disk import damage
 from .._base.report import FarPointsWarning
 from .._degrees import with_angles
 from .._grid import GridSpline
+from .._splines.archive import read
 from ._curves import add_entry
 from ._grid_files import (
     AXIS_NAMES,

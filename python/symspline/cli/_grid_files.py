@@ -16,14 +16,14 @@ from typing import Any
 
 import numpy as np
 
-from .._archive import read
 from .._base.arrays import brief
 from .._base.disk import damage
 from .._base.exceptions import SymsplineError
 from .._degrees import is_degrees, look_like_degrees, with_angles
-from .._files import load
 from .._grid import GridSpline
 from .._spaces import Product, Space, Torus, factors_of, space_named
+from .._splines.archive import read
+from .._splines.files import load
 from ._columns import split_names
 from ._messages import Problem, Progress, alternatives, did_you_mean, reading, refuse, say
 from ._streams import STANDARD, Source, writing

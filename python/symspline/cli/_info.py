@@ -23,11 +23,11 @@ import numpy as np
 
 from .._base.arrays import brief
 from .._base.time import time_axis_of
-from .._files import load
 from .._grid import GridSpline
 from .._smoothing import SmoothingSpline
 from .._spaces import Doubles
 from .._spaces.base import CLASSES, example_of
+from .._splines.files import load
 from ._columns import NUMBERED, column_of_names, time_column
 from ._curves import read_curves
 from ._formats import CURVES, TABLES, endings, format_of, open_table

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from .._base.exceptions import SymsplineError
 from .._base.time import time_axis_of
-from .._cubic import CubicSpline
 from .._smoothing import SmoothingSpline
 from .._spaces import Doubles, Product, Space, factors_of
+from .._splines.cubic import CubicSpline
 from ._points import GLOBE
 from ._recordings import Recordings
 from ._summary import counted

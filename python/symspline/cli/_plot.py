@@ -15,7 +15,7 @@ import argparse
 from pathlib import Path
 
 from .. import geo
-from .._composed import SegmentedCurve
+from .._splines.composed import SegmentedCurve
 from ._curves import read_curves
 from ._messages import Problem, alternatives, listed, refuse, tell
 from ._streams import STANDARD, called, check_target, writing

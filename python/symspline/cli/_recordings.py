@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._core import CutLocusError
-from .._segments import cut
+from .._smoothing.segments import cut
 from .._spaces import Space
 from ._messages import Problem, refuse
 from ._summary import counted

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from .._base.report import long_gaps
-from .._cubic import CubicSpline
 from .._smoothing import SmoothingReport, SmoothingSpline
 from .._smoothing.factors import is_several, smoothed_spaces
 from .._spaces import Doubles
+from .._splines.cubic import CubicSpline
 
 # Residuals may exceed the given standard deviations by this factor without a note.
 _FACTOR = 2.0

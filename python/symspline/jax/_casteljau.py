@@ -10,7 +10,7 @@ import jax.numpy as jnp
 from .._closed_forms import casteljau
 from .._closed_forms.models import Model
 from .._core import ValidationError
-from .._options import order_of
+from .._curves.options import order_of
 from .._spaces import Product, Space, parts_of, refuse_quotients, space_named
 from ._precision import full_precision
 from ._registry import LIBRARY, model_of

@@ -13,7 +13,7 @@ from .._adapters import split
 from .._base.typing import CurveOptions
 from .._closed_forms.casteljau import second_fundamental_form
 from .._curves.ends import ends_in_factors
-from .._options import order_of
+from .._curves.options import order_of
 from .._spaces import Product, Space, parts_of, refuse_quotients, space_named
 from ..manifolds._manifold import refuse_functions
 from ._primitives import Fixed, fit_p, jvp_p

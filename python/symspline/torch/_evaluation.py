@@ -9,7 +9,7 @@ import torch
 from .._closed_forms import casteljau
 from .._closed_forms.models import Model
 from .._core import ValidationError
-from .._options import order_of
+from .._curves.options import order_of
 from .._spaces import Product, Space, parts_of, refuse_quotients, space_named
 from ._arrays import model_of, points_and_knots, tensor
 from ._functions import LIBRARY, along

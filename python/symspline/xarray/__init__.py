@@ -18,7 +18,7 @@ from .._base.arrays import checked_flag, short_repr
 from .._base.typing import BCType, Extrapolate, Method, OnFailure, SolverOptions
 from .._base.version import VERSION
 from .._core import ValidationError
-from .._options import checked_extrapolate, extrapolation_mode, quantity_of
+from .._curves.options import checked_extrapolate, extrapolation_mode, quantity_of
 from .._spaces import Space, space_named
 from ._blocks import COLUMNS, Inputs, apply, fitted, resampled, values_at
 from ._grids import resample_grid

@@ -12,11 +12,11 @@ from .._adapters import joined
 from .._base.report import Report, columns_of
 from .._base.threads import one_thread
 from .._core import ConvergenceError, CutLocusError, ValidationError
-from .._cubic import CubicSpline
 from .._curves.at_times import call_at_times
-from .._functional import given
 from .._missing import missing_times
 from .._spaces import Array, Space
+from .._splines.cubic import CubicSpline
+from .._splines.functional import given
 from ._missing import fit_valid, named_curve, of_equal_length, times_of_rows
 
 # Arrays with their core dimensions, which a block has all of.

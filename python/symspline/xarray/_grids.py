@@ -9,8 +9,8 @@ import numpy as np
 import xarray as xr
 
 from .._core import ValidationError
+from .._curves.options import checked_extrapolate, extrapolation_mode
 from .._grid import GridSpline
-from .._options import checked_extrapolate, extrapolation_mode
 from .._spaces import Array, Space, space_named
 from ._blocks import Inputs, apply
 from ._spec import KNOTS, LINE, check_names, check_whole, rehearse, times_with_names

@@ -12,10 +12,10 @@ from .._adapters import joined
 from .._base.report import ConvergenceWarning
 from .._base.warnings import warn
 from .._core import ValidationError
-from .._cubic import CubicSpline
-from .._functional import fit_many
 from .._missing import Mask, missing_points, missing_times
 from .._spaces import Array, Space
+from .._splines.cubic import CubicSpline
+from .._splines.functional import fit_many
 
 
 def times_of_rows(t: Array | None, batch: tuple[int, ...], nodes: int) -> Array:

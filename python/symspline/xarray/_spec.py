@@ -12,9 +12,9 @@ from .._adapters import joined, split
 from .._base.arrays import as_array, short_repr
 from .._base.input import times_of
 from .._core import ValidationError
-from .._cubic import CubicSpline
 from .._missing import missing_times
 from .._spaces import Array, Euclidean, Product, Space, space_named
+from .._splines.cubic import CubicSpline
 from ._blocks import Inputs, values_at
 from ._times import times_along
 

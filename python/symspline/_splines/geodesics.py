@@ -7,19 +7,19 @@ from typing import Any, Self
 
 import numpy as np
 
-from ._archive import Entries, check_curves, read_segments
-from ._base.arrays import checked_flag
-from ._base.time import TimeAxis, knots_of
-from ._base.typing import Extrapolate, FloatArray, Number, P, PointsLike, TimesLike
-from ._curves.curve import CoreCurve, CurveArrays
-from ._curves.fit import read, read_ends, validated
-from ._curves.geodesics import GeodesicCurve, joined
-from ._missing import counts_all_samples, curves_without_missing, missing_named
-from ._options import checked_extrapolate, with_atol
-from ._piecewise_cubic import PiecewiseCubic
-from ._representatives import warn_of_representatives
-from ._spaces import Array, Doubles, Space, space_named
-from .manifolds import Manifold
+from .._base.arrays import checked_flag
+from .._base.time import TimeAxis, knots_of
+from .._base.typing import Extrapolate, FloatArray, Number, P, PointsLike, TimesLike
+from .._curves.curve import CoreCurve, CurveArrays
+from .._curves.fit import read, read_ends, validated
+from .._curves.geodesics import GeodesicCurve, joined
+from .._curves.options import checked_extrapolate, with_atol
+from .._curves.representatives import warn_of_representatives
+from .._missing import counts_all_samples, curves_without_missing, missing_named
+from .._spaces import Array, Doubles, Space, space_named
+from ..manifolds import Manifold
+from .archive import Entries, check_curves, read_segments
+from .piecewise_cubic import PiecewiseCubic
 
 # A change of velocity below this part of the speed is a rounding error of a straight curve.
 _STRAIGHT = 1e-9

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ._base.faults import of_index
-from ._base.warnings import warn
-from ._spaces import Array
+from .._base.faults import of_index
+from .._base.warnings import warn
+from .._spaces import Array
 
 # Least number of points, and of runs of equal points that are not cut off at an end.
 _POINTS, _RUNS = 12, 5

@@ -7,12 +7,12 @@ from typing import Any, TypedDict
 
 import numpy as np
 
-from ._base.arrays import checked_atol, checked_flag, short_repr, whole_number
-from ._base.typing import Extrapolate, Progress
-from ._core import ValidationError
-from ._curves.ends import is_closed
-from ._curves.fit import Points
-from ._curves.solve import Options
+from .._base.arrays import checked_atol, checked_flag, short_repr, whole_number
+from .._base.typing import Extrapolate, Progress
+from .._core import ValidationError
+from .ends import is_closed
+from .fit import Points
+from .solve import Options
 
 _QUANTITIES = ("point", "velocity", "acceleration", "jerk")
 _RAISE = "raise"

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, ClassVar, Unpack, overload
 
 import numpy as np
 
-from ._base.typing import AxesLook, File, P, PageLook
-from ._core import ValidationError
-from ._curve_base import CurveBase
-from ._curves.curve import SidePanel, UncertaintyBand
-from ._options import require_matplotlib
-from ._spaces import Doubles
+from .._base.typing import AxesLook, File, P, PageLook
+from .._core import ValidationError
+from .._curves.curve import SidePanel, UncertaintyBand
+from .._curves.options import require_matplotlib
+from .._spaces import Doubles
+from .curve_base import CurveBase
 
 if TYPE_CHECKING:
     from matplotlib.animation import FuncAnimation
@@ -206,7 +206,7 @@ class CurvePlots(CurveBase[P]):
         >>> legend = ax.legend()
         """
         require_matplotlib()
-        from ._plotting import checked_look, plot
+        from .._plotting import checked_look, plot
 
         look = checked_look(file, ax, color, label, title, figsize, show)
         drawn: Figure | Axes = plot(self, file, ax=ax, show=show, **look)
@@ -265,7 +265,7 @@ class CurvePlots(CurveBase[P]):
         >>> animation = turn.animate("turn.gif", frames=2)  # doctest: +SKIP
         """
         require_matplotlib()
-        from ._plotting import animate, checked_look
+        from .._plotting import animate, checked_look
 
         look = checked_look(file, None, color, None, title, figsize, False)
         moving: FuncAnimation = animate(self, file, frames, fps, **look)

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any, overload
 
-from ._base.arrays import short_repr
-from ._base.typing import File
-from ._core import ValidationError
-from ._curve import Curve
-from ._options import require_matplotlib
+from .._base.arrays import short_repr
+from .._base.typing import File
+from .._core import ValidationError
+from .._curves.options import require_matplotlib
+from .curve import Curve
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -100,7 +100,7 @@ def plot(
     >>> figure = ss.plot([spline, polygon], labels=["C² spline", "geodesics"])
     """
     require_matplotlib()
-    from ._plotting import checked_look, compare
+    from .._plotting import checked_look, compare
 
     look = checked_look(file, ax, None, None, title, figsize, show)
     items = checked_items(curves)

@@ -10,16 +10,16 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from . import _archive
-from ._base.arrays import as_array, cast, checked_flag, refuse, short_repr
-from ._base.time import TimeAxis
-from ._base.typing import File, Number, P, Time, TimesLike
-from ._core import ValidationError
-from ._curves.arc_length import ArcLength
-from ._curves.composed import AnyCurve
-from ._curves.integrals import bending_energy, integrate
-from ._search.searchable import Searchable
-from ._spaces import Doubles
+from .._base.arrays import as_array, cast, checked_flag, refuse, short_repr
+from .._base.time import TimeAxis
+from .._base.typing import File, Number, P, Time, TimesLike
+from .._core import ValidationError
+from .._curves.arc_length import ArcLength
+from .._curves.composed import AnyCurve
+from .._curves.integrals import bending_energy, integrate
+from .._search.searchable import Searchable
+from .._spaces import Doubles
+from . import archive
 
 # Relative rounding error of an arc length that a user computed.
 _ROUNDING = 1e-12
@@ -35,7 +35,7 @@ class CurveBase(Searchable[P]):
 
     def __init_subclass__(cls) -> None:
         if "_format" in vars(cls):
-            _archive.FORMATS[cls._format] = cls
+            archive.FORMATS[cls._format] = cls
 
     @abstractmethod
     def __call__(self, x: ArrayLike, nu: int = 0) -> P:
@@ -387,10 +387,10 @@ class CurveBase(Searchable[P]):
         >>> ss.load(file)
         <CubicSpline on Sphere(2): 2 points, from 0 to 1, natural>
         """
-        _archive.write(file, self._state())
+        archive.write(file, self._state())
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _archive.restore, (self._state(),)
+        return archive.restore, (self._state(),)
 
     @abstractmethod
     def _state(self) -> dict[str, Any]:
@@ -398,7 +398,7 @@ class CurveBase(Searchable[P]):
 
     @classmethod
     @abstractmethod
-    def _from_state(cls, state: _archive.Entries) -> Self:
+    def _from_state(cls, state: archive.Entries) -> Self:
         """Return the curve of a state."""
 
 

@@ -9,19 +9,19 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import _archive
-from ._base.arrays import as_array, read_only, short_repr
-from ._base.input import times_of
-from ._base.time import TimeAxis
-from ._base.typing import BCType, Extrapolate, P, Progress, Time, TimesLike
-from ._core import ValidationError
-from ._curve import Curve, check_increasing
-from ._curves.at_times import call_at_times, evaluated
-from ._curves.curve import CurveArrays
-from ._curves.fit import curve_of
-from ._options import check_progress, extrapolation_mode, quantity_of
-from ._spaces import Array, Doubles, Product, Space, parts_of
-from ._timed_curve import TimedCurve
+from .._base.arrays import as_array, read_only, short_repr
+from .._base.input import times_of
+from .._base.time import TimeAxis
+from .._base.typing import BCType, Extrapolate, P, Progress, Time, TimesLike
+from .._core import ValidationError
+from .._curves.at_times import call_at_times, evaluated
+from .._curves.curve import CurveArrays
+from .._curves.fit import curve_of
+from .._curves.options import check_progress, extrapolation_mode, quantity_of
+from .._spaces import Array, Doubles, Product, Space, parts_of
+from . import archive
+from .curve import Curve, check_increasing
+from .timed_curve import TimedCurve
 
 # Relative difference of velocities that are equal up to rounding.
 _SAME = 1e-12
@@ -264,7 +264,7 @@ class PiecewiseCubic(TimedCurve[P]):
         return self._with(self._time_axis.take_batch(index), t, self._curve.take_batch(index), index)
 
     def _state(self) -> dict[str, Any]:
-        return _archive.segments_state(
+        return archive.segments_state(
             self._format, self.space, self._t, self._time_axis, self._extrapolate, self._curve
         )
 
@@ -338,9 +338,7 @@ class PiecewiseCubic(TimedCurve[P]):
     ) -> PiecewiseCubic[P]:
         """Return the curve with given points and velocities at its knots in each factor: a Hermite spline."""
         curve = curve_of(self.space, times, arrays, fitted=False)
-        found: PiecewiseCubic[P] = _archive.FORMATS["symspline-hermite"]._of(
-            time_axis, t, curve, "natural", extrapolate
-        )
+        found: PiecewiseCubic[P] = archive.FORMATS["symspline-hermite"]._of(time_axis, t, curve, "natural", extrapolate)
         return found
 
     # ---- comparison and plots ----

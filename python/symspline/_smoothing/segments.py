@@ -8,21 +8,18 @@ from typing import Any, Literal, NamedTuple, Required, TypedDict, Unpack, overlo
 import numpy as np
 from numpy.typing import NDArray
 
-from ._base.arrays import as_array, checked_flag, checked_number, short_repr, whole_number
-from ._base.durations import seconds_of
-from ._base.exceptions import SymsplineError
-from ._base.input import times_of
-from ._base.report import FarPointsWarning
-from ._base.rounded_times import warn_of_rounded_times
-from ._base.time import Moments, time_axis_of
-from ._base.typing import Duplicates, FitOptions, FloatArray, P, PointsLike, PProduct, SmoothingOptions, TimesLike
-from ._base.warnings import warn
-from ._composed import SegmentedCurve
-from ._core import ValidationError
-from ._cubic import CubicSpline
-from ._curves.fit import read_given
-from ._functional import fit_many
-from ._missing import (
+from .._base.arrays import as_array, checked_flag, checked_number, short_repr, whole_number
+from .._base.durations import seconds_of
+from .._base.exceptions import SymsplineError
+from .._base.input import times_of
+from .._base.report import FarPointsWarning
+from .._base.rounded_times import warn_of_rounded_times
+from .._base.time import Moments, time_axis_of
+from .._base.typing import Duplicates, FitOptions, FloatArray, P, PointsLike, PProduct, SmoothingOptions, TimesLike
+from .._base.warnings import warn
+from .._core import ValidationError
+from .._curves.fit import read_given
+from .._missing import (
     counts_all_samples,
     data_without_missing,
     recounted,
@@ -30,10 +27,8 @@ from ._missing import (
     refuse_nan_times,
     without_missing,
 )
-from ._smoothing import SmoothingReport, SmoothingSpline
-from ._smoothing.many import smooth_many
-from ._smoothing.precision import read_precision
-from ._spaces import (
+from .._smoothing import SmoothingReport, SmoothingSpline
+from .._spaces import (
     Array,
     Groups,
     Product,
@@ -45,8 +40,13 @@ from ._spaces import (
     parts_of,
     space_named,
 )
-from ._validation import one_of
-from .manifolds import Manifold
+from .._splines.composed import SegmentedCurve
+from .._splines.cubic import CubicSpline
+from .._splines.functional import fit_many
+from .._validation import one_of
+from ..manifolds import Manifold
+from .many import smooth_many
+from .precision import read_precision
 
 # Neighbours this near to each other's cut locus, as a fraction of the distance to it, have no unique geodesic.
 _AT_CUT_LOCUS = 1e-12

@@ -19,19 +19,19 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ._base.arrays import brief, short_repr
-from ._base.disk import path_of, replacing
-from ._base.input import NO_ZONE, UTC_ZONE
-from ._base.report import Report
-from ._base.time import Moments, TimeAxis, time_axis_of
-from ._base.version import VERSION as LIBRARY
-from ._core import ValidationError
-from ._curves.curve import CurveArrays
-from ._curves.ends import freeze_bc_type
-from ._curves.fit import curve_of, read_ends
-from ._options import checked_extrapolate
-from ._spaces import Array, Product, Space, factors_of, space_named
-from .manifolds._manifold import refuse_functions
+from .._base.arrays import brief, short_repr
+from .._base.disk import path_of, replacing
+from .._base.input import NO_ZONE, UTC_ZONE
+from .._base.report import Report
+from .._base.time import Moments, TimeAxis, time_axis_of
+from .._base.version import VERSION as LIBRARY
+from .._core import ValidationError
+from .._curves.curve import CurveArrays
+from .._curves.ends import freeze_bc_type
+from .._curves.fit import curve_of, read_ends
+from .._curves.options import checked_extrapolate
+from .._spaces import Array, Product, Space, factors_of, space_named
+from ..manifolds._manifold import refuse_functions
 
 # Raise it when the entries change, and keep reading files of all earlier versions.
 VERSION = 2

@@ -7,14 +7,14 @@ from typing import Any, Unpack, overload
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from ._base.arrays import in_single, is_single, refuse, short_repr
-from ._base.typing import AnyArray, AnyArrays, BCType, Extrapolate, FloatArray, Out, P, Progress, TimesLike
-from ._core import ValidationError
-from ._curve import Curve
-from ._curves.at_times import evaluated
-from ._curves.composed import AnyCurve
-from ._options import EvaluationOptions, check_progress, checked_extrapolate, extrapolation_mode, quantity_of
-from ._spaces import Doubles
+from .._base.arrays import in_single, is_single, refuse, short_repr
+from .._base.typing import AnyArray, AnyArrays, BCType, Extrapolate, FloatArray, Out, P, Progress, TimesLike
+from .._core import ValidationError
+from .._curves.at_times import evaluated
+from .._curves.composed import AnyCurve
+from .._curves.options import EvaluationOptions, check_progress, checked_extrapolate, extrapolation_mode, quantity_of
+from .._spaces import Doubles
+from .curve import Curve
 
 
 class TimedCurve(Curve[P]):

@@ -10,14 +10,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ._base.faults import of_index
-from ._base.report import MAX_STEP, Columns, FarPointsWarning
-from ._base.warnings import warn
-from ._core import CutLocusError
-from ._curves.curve import CurveArrays
-from ._curves.fit import Points
-from ._spaces import Array, Doubles, Euclidean, Space, Sphere, Torus, Unitary, cover_of, factors_of
-from .manifolds import Manifold
+from .._base.faults import of_index
+from .._base.report import MAX_STEP, Columns, FarPointsWarning
+from .._base.warnings import warn
+from .._core import CutLocusError
+from .._spaces import Array, Doubles, Euclidean, Space, Sphere, Torus, Unitary, cover_of, factors_of
+from ..manifolds import Manifold
+from .curve import CurveArrays
+from .fit import Points
 
 # The fraction of the cut angle from which several C² curves are common, see docs/solvers.md.
 FAR = 0.6

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from ._base.faults import CUT_LOCUS, Fault
-from ._base.report import ConvergenceWarning, long_gaps
-from ._base.warnings import warn
-from ._core import ConvergenceError, CutLocusError, ValidationError
-from ._spaces import Array, SpecialEuclidean, SpecialOrthogonal
+from .._base.faults import CUT_LOCUS, Fault
+from .._base.report import ConvergenceWarning, long_gaps
+from .._base.warnings import warn
+from .._core import ConvergenceError, CutLocusError, ValidationError
+from .._spaces import Array, SpecialEuclidean, SpecialOrthogonal
 
 # The times are considered the reason if an interval is shorter than its neighbours by this factor, and if its speed
 # exceeds the median by the same factor.

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ._cubic import CubicSpline
-from ._functional import evaluate
-from ._spaces import Array, Doubles, Space
-from .manifolds import Manifold
+from .._spaces import Array, Doubles, Space
+from ..manifolds import Manifold
+from .cubic import CubicSpline
+from .functional import evaluate
 
 
 @dataclass(frozen=True)

@@ -7,16 +7,16 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._archive import VERSION, Entries, Stored, entry, read_array, read_space
-from ._base.arrays import whole_number
-from ._base.typing import P
-from ._controlled import ControlledSpline, checked_knots, checked_points, control_array
-from ._core import ValidationError
-from ._curves.controlled import ControlledCurve
-from ._curves.fit import Points, unwrapped
-from ._representatives import warn_of_far_data
-from ._spaces import Product, Space, space_named
-from .manifolds._manifold import refuse_functions
+from .._base.arrays import whole_number
+from .._base.typing import P
+from .._core import ValidationError
+from .._curves.controlled import ControlledCurve
+from .._curves.fit import Points, unwrapped
+from .._curves.representatives import warn_of_far_data
+from .._spaces import Product, Space, space_named
+from ..manifolds._manifold import refuse_functions
+from .archive import VERSION, Entries, Stored, entry, read_array, read_space
+from .controlled import ControlledSpline, checked_knots, checked_points, control_array
 
 
 class BSpline(ControlledSpline[P]):

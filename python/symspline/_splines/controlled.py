@@ -7,16 +7,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._base.arrays import as_array, cast, refuse
-from ._base.faults import of_index
-from ._base.time import TimeAxis, onto_ends
-from ._base.typing import FloatArray, P
-from ._core import CutLocusError, ValidationError
-from ._curve import Curve
-from ._curves.ends import ends_of
-from ._curves.fit import Points, validated
-from ._options import quantity_of
-from ._spaces import Array, Doubles, Space, parts_of
+from .._base.arrays import as_array, cast, refuse
+from .._base.faults import of_index
+from .._base.time import TimeAxis, onto_ends
+from .._base.typing import FloatArray, P
+from .._core import CutLocusError, ValidationError
+from .._curves.ends import ends_of
+from .._curves.fit import Points, validated
+from .._curves.options import quantity_of
+from .._spaces import Array, Doubles, Space, parts_of
+from .curve import Curve
 
 
 class ControlledSpline(Curve[P]):

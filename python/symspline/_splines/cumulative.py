@@ -7,20 +7,20 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from . import _core
-from ._archive import VERSION, Entries, Stored, entry, read_array, read_report, read_space, suffix_of
-from ._base.arrays import as_array, cast, checked_number, refuse, short_repr, whole_number
-from ._base.report import ConvergenceWarning, CumulativeReport
-from ._base.typing import OnFailure, P, PointsLike
-from ._base.warnings import warn
-from ._controlled import ControlledSpline, checked_knots, checked_points, control_array
-from ._core import ConvergenceError, ValidationError
-from ._curves.controlled import CumulativeCurve, CumulativeProduct, cumulative_of
-from ._curves.ends import ends_of
-from ._curves.fit import Points, read_given, validated
-from ._options import check_on_failure
-from ._representatives import warn_of_far_data
-from ._spaces import Doubles, Euclidean, Group, Quotient, Space, factors_of, parts_of, space_named
+from .. import _core
+from .._base.arrays import as_array, cast, checked_number, refuse, short_repr, whole_number
+from .._base.report import ConvergenceWarning, CumulativeReport
+from .._base.typing import OnFailure, P, PointsLike
+from .._base.warnings import warn
+from .._core import ConvergenceError, ValidationError
+from .._curves.controlled import CumulativeCurve, CumulativeProduct, cumulative_of
+from .._curves.ends import ends_of
+from .._curves.fit import Points, read_given, validated
+from .._curves.options import check_on_failure
+from .._curves.representatives import warn_of_far_data
+from .._spaces import Doubles, Euclidean, Group, Quotient, Space, factors_of, parts_of, space_named
+from .archive import VERSION, Entries, Stored, entry, read_array, read_report, read_space, suffix_of
+from .controlled import ControlledSpline, checked_knots, checked_points, control_array
 
 if TYPE_CHECKING:
     pass

@@ -11,17 +11,17 @@ from typing import TYPE_CHECKING, Any, Generic, Literal, Self, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._archive import VERSION, Entries, entry, read_times, restore, times_state
-from ._base.arrays import short_repr
-from ._base.time import TimeAxis
-from ._base.typing import Extrapolate, FloatArray, P, Time
-from ._core import ValidationError
-from ._curve import Curve
-from ._curves.composed import Affine, Joined, Retimed, TimeMap, part_of_times
-from ._curves.curve import UncertaintyBand
-from ._options import checked_extrapolate, extrapolation_mode
-from ._spaces import Doubles, Space
-from ._timed_curve import TimedCurve
+from .._base.arrays import short_repr
+from .._base.time import TimeAxis
+from .._base.typing import Extrapolate, FloatArray, P, Time
+from .._core import ValidationError
+from .._curves.composed import Affine, Joined, Retimed, TimeMap, part_of_times
+from .._curves.curve import UncertaintyBand
+from .._curves.options import checked_extrapolate, extrapolation_mode
+from .._spaces import Doubles, Space
+from .archive import VERSION, Entries, entry, read_times, restore, times_state
+from .curve import Curve
+from .timed_curve import TimedCurve
 
 if TYPE_CHECKING:
     from typing_extensions import TypeVar

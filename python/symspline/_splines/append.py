@@ -6,15 +6,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ._base.arrays import as_array, refuse, whole_number
-from ._base.input import times_of
-from ._base.report import INTEGERS, NUMBERS, Columns
-from ._base.typing import TimesLike
-from ._core import ValidationError
-from ._curves.ends import is_closed
-from ._curves.fit import Fit, FitProblem, Problem, curve_of, moved_ends, read, read_ends
-from ._curves.solve import DEFAULTS
-from ._spaces import Array, Doubles, Product, Quotient, Space, factors_of, parts_of
+from .._base.arrays import as_array, refuse, whole_number
+from .._base.input import times_of
+from .._base.report import INTEGERS, NUMBERS, Columns
+from .._base.typing import TimesLike
+from .._core import ValidationError
+from .._curves.ends import is_closed
+from .._curves.fit import Fit, FitProblem, Problem, curve_of, moved_ends, read, read_ends
+from .._curves.solve import DEFAULTS
+from .._spaces import Array, Doubles, Product, Quotient, Space, factors_of, parts_of
 
 # Adjacent rows of reports that a local fit does not determine for the whole curve, those of which the largest value
 # counts, and the one of which the value of the last part counts.

@@ -8,11 +8,11 @@ from typing import Any, Unpack, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._base.arrays import checked_flag, refuse, short_repr
-from ._base.input import in_library, library_of
-from ._base.report import Report
-from ._base.time import TimeAxis, knots_of
-from ._base.typing import (
+from .._base.arrays import checked_flag, refuse, short_repr
+from .._base.input import in_library, library_of
+from .._base.report import Report
+from .._base.time import TimeAxis, knots_of
+from .._base.typing import (
     AnyArray,
     AnyArrays,
     BCType,
@@ -26,16 +26,14 @@ from ._base.typing import (
     Progress,
     TimesLike,
 )
-from ._core import ValidationError
-from ._cubic import CubicSpline
-from ._curves import fit as fitting
-from ._curves.at_times import evaluated
-from ._curves.curve import CurveArrays
-from ._curves.ends import freeze_bc_type, take_batch
-from ._errors import raise_or_warn
-from ._held import warn_of_held_points
-from ._missing import counts_all_samples, curves_without_missing, missing_named
-from ._options import (
+from .._core import ValidationError
+from .._curves import fit as fitting
+from .._curves.at_times import evaluated
+from .._curves.curve import CurveArrays
+from .._curves.ends import freeze_bc_type, take_batch
+from .._curves.failures import raise_or_warn
+from .._curves.held import warn_of_held_points
+from .._curves.options import (
     EvaluationOptions,
     check_progress,
     checked_extrapolate,
@@ -44,8 +42,10 @@ from ._options import (
     quantity_of,
     with_atol,
 )
-from ._representatives import warn_of_representatives
-from ._spaces import Array, Product, Quotient, Space, factors_of, parts_of, space_named
+from .._curves.representatives import warn_of_representatives
+from .._missing import counts_all_samples, curves_without_missing, missing_named
+from .._spaces import Array, Product, Quotient, Space, factors_of, parts_of, space_named
+from .cubic import CubicSpline
 
 # With fewer knots, all of them are read.
 _MANY = 64

@@ -11,26 +11,26 @@ from typing import TYPE_CHECKING, Any, Generic, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._append import joined, local_fit
-from ._archive import Entries, read_c1_nodes, read_fitted
-from ._base.arrays import checked_flag
-from ._base.report import Report, combined
-from ._base.time import TimeAxis, knots_of
-from ._base.typing import BCType, CubicBCType, Extrapolate, Method, OnFailure, P, PointsLike, Progress, TimesLike
-from ._core import ValidationError
-from ._curves.conditions import fit_with_conditions
-from ._curves.curve import CurveArrays, longest_step
-from ._curves.derivatives import Gradient, SampleTimes, sample_times
-from ._curves.ends import ends_in_factors, freeze_bc_type, split_accelerations, take_batch
-from ._curves.fit import Fit, Problem, curve_of, fit, mask_of, moved_ends, read, read_ends
-from ._curves.integrals import alternative_energy
-from ._errors import raise_or_warn
-from ._held import warn_of_held_points
-from ._missing import counts_all_samples, curves_without_missing, inner_velocities_of_present, with_remedy
-from ._options import fit_options, order_of, with_atol
-from ._piecewise_cubic import PiecewiseCubic
-from ._representatives import warn_of_representatives
-from ._spaces import Array, Product, Quotient, Space, space_named
+from .._base.arrays import checked_flag
+from .._base.report import Report, combined
+from .._base.time import TimeAxis, knots_of
+from .._base.typing import BCType, CubicBCType, Extrapolate, Method, OnFailure, P, PointsLike, Progress, TimesLike
+from .._core import ValidationError
+from .._curves.conditions import fit_with_conditions
+from .._curves.curve import CurveArrays, longest_step
+from .._curves.derivatives import Gradient, SampleTimes, sample_times
+from .._curves.ends import ends_in_factors, freeze_bc_type, split_accelerations, take_batch
+from .._curves.failures import raise_or_warn
+from .._curves.fit import Fit, Problem, curve_of, fit, mask_of, moved_ends, read, read_ends
+from .._curves.held import warn_of_held_points
+from .._curves.integrals import alternative_energy
+from .._curves.options import fit_options, order_of, with_atol
+from .._curves.representatives import warn_of_representatives
+from .._missing import counts_all_samples, curves_without_missing, inner_velocities_of_present, with_remedy
+from .._spaces import Array, Product, Quotient, Space, space_named
+from .append import joined, local_fit
+from .archive import Entries, read_c1_nodes, read_fitted
+from .piecewise_cubic import PiecewiseCubic
 
 if TYPE_CHECKING:
     from typing_extensions import TypeVar

@@ -10,16 +10,16 @@ from typing import Any, Generic
 import numpy as np
 from numpy.typing import ArrayLike
 
-from . import _archive
-from ._base.arrays import as_array, checked_number, short_repr
-from ._base.durations import seconds_of
-from ._base.time import TimeAxis
-from ._base.typing import P, TimesLike
-from ._core import ValidationError
-from ._curve_plots import CurvePlots
-from ._curves.composed import Affine, TimeMap, part_of_times
-from ._options import order_of
-from ._spaces import Doubles, factors_of, parts_of
+from .._base.arrays import as_array, checked_number, short_repr
+from .._base.durations import seconds_of
+from .._base.time import TimeAxis
+from .._base.typing import P, TimesLike
+from .._core import ValidationError
+from .._curves.composed import Affine, TimeMap, part_of_times
+from .._curves.options import order_of
+from .._spaces import Doubles, factors_of, parts_of
+from . import archive
+from .curve_plots import CurvePlots
 
 _LARGEST = float(np.finfo(np.float64).max)
 # Largest distance between the points at which two curves meet, relative to large coordinates.
@@ -203,7 +203,7 @@ class Curve(CurvePlots[P]):
         if merged is not None:
             return merged
         # Without nesting, the depth of curves that are joined in a loop does not grow.
-        found: Curve[P] = _archive.FORMATS["symspline-segments"]([*self._in_segments(), *other._in_segments()])
+        found: Curve[P] = archive.FORMATS["symspline-segments"]([*self._in_segments(), *other._in_segments()])
         return found
 
     def reverse(self) -> Curve[P]:
@@ -428,7 +428,7 @@ def check_increasing(times: Doubles) -> None:
 
 
 def _retimed(source: Curve[Any], time_axis: TimeAxis, law: TimeMap, times: Doubles) -> Any:
-    return _archive.FORMATS["symspline-retimed"]._of(source, time_axis, law, times)
+    return archive.FORMATS["symspline-retimed"]._of(source, time_axis, law, times)
 
 
 def _law_domain(law: Any, domain: Any) -> tuple[float, float]:

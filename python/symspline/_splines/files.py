@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from ._archive import FORMATS, TEXTS, Entries, Stored, read_state, restore, write
-from ._base.arrays import short_repr
-from ._base.disk import damage, path_of
-from ._base.typing import File
-from ._core import ValidationError
-from ._curve import Curve
+from .._base.arrays import short_repr
+from .._base.disk import damage, path_of
+from .._base.typing import File
+from .._core import ValidationError
+from .archive import FORMATS, TEXTS, Entries, Stored, read_state, restore, write
+from .curve import Curve
 
 # Entries with one value for all curves of a file.
 _SHARED = (*TEXTS, "version")
