@@ -35,14 +35,14 @@ _MULTIPLES = ("W", "D", "h", "m", "s")
 
 
 class Moments(NamedTuple):
-    """Times of the user after `_input.times_of`.
+    """Times of the user after `input.times_of`.
 
     Attributes
     ----------
     times : array_like
         Times in a type of NumPy.
     zone : str or None
-        Whether the times had a time zone; see `_input.times_of`.
+        Whether the times had a time zone; see `input.times_of`.
     """
 
     times: Any
@@ -63,7 +63,7 @@ class TimeAxis:
     dates, durations : bool
         Whether times are dates, or durations.
     zone : str or None
-        Whether dates had a time zone; see `_input.times_of`.
+        Whether dates had a time zone; see `input.times_of`.
     """
 
     origin: Any = None
