@@ -23,7 +23,7 @@ ROOMS = {
     "tensors, subspaces": ("subspaces tensors", 230),
     "_grid": ("_grid", 780),
     "quantum, shapes, testing": ("quantum shapes testing", 480),
-    "_splines": ("_splines", 1900),
+    "_splines": ("_archive _splines", 1900),
     "_plotting": ("_plotting", 1900),
     "measure": ("measure", 170),
     "_curves": ("_curves _search", 1750),

@@ -19,7 +19,7 @@ LAYERS = [
     ["_closed_forms", "_curves", "_validation"],
     ["_degrees", "_missing", "_plotting", "_search"],
     ["_splines"],
-    ["_adapters", "_grid", "_smoothing", "_statistics", "_tracks", "convert", "jax", "torch"],
+    ["_adapters", "_archive", "_grid", "_smoothing", "_statistics", "_tracks", "convert", "jax", "torch"],
     ["_estimation"],
     ["_pose_files"],
     ["geo", "measure", "poses", "quantum", "rotations", "shapes", "subspaces", "tensors", "testing"],

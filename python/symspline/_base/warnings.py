@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Any
 
-_PACKAGE = os.path.dirname(__file__)
+_PACKAGE = os.path.dirname(os.path.dirname(__file__))
 # Categories of warnings that the current call suppresses because its result describes the same.
 _SILENT: ContextVar[tuple[type[Warning], ...]] = ContextVar("silent", default=())
 

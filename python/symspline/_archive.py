@@ -1,0 +1,5 @@
+"""What pickles of earlier versions call."""
+
+from ._splines.archive import restore
+
+__all__ = ["restore"]
