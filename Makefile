@@ -83,7 +83,7 @@ fuzz: .venv/built .venv/tools
 	$(BIN)/python -m tests.trust 20
 	$(BIN)/python tests/host/interrupts.py
 
-# Lines of code by room of the package, beside the aims.
+# Lines of code by part of the package, beside the aims.
 size:
 	@python3 packaging/size.py
 

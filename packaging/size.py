@@ -1,7 +1,6 @@
-"""Lines of code of the package by room, beside the aims: without docstrings, comments and blank lines.
+"""Lines of code by part of the package, beside the aims: without docstrings, comments and blank lines.
 
-`make size` prints the table. A room is a folder of the layout that CONTRIBUTING describes, with the modules that will
-move there.
+`make size` prints the table. A part is a folder that CONTRIBUTING lists, with the modules that belong to it.
 """
 
 import ast
@@ -12,8 +11,8 @@ from pathlib import Path
 
 PACKAGE = Path(__file__).parents[1] / "python" / "symspline"
 
-# From above: the modules of each room, and its aim.
-ROOMS = {
+# From above: the modules of each part, and its aim.
+PARTS = {
     "__init__, __main__": ("__init__ __main__", 120),
     "cli": ("cli", 1450),
     "poses, rotations, geo, xarray": ("_pose_files _tracks geo poses rotations xarray", 1450),
@@ -64,11 +63,11 @@ def modules(paths):
 
 
 def main():
-    """Print the table; the exit status is 1 if a module has no room."""
+    """Print the table; the exit status is 1 if a module belongs to no part."""
     found = {path.stem for path in PACKAGE.iterdir() if path.suffix == ".py" or any(path.glob("*.py"))}
-    print("| room | files | lines | aim |\n| :-- | --: | --: | --: |")
+    print("| part | files | lines | aim |\n| :-- | --: | --: | --: |")
     totals = [0, 0, 0]
-    for room, (names, aim) in ROOMS.items():
+    for part, (names, aim) in PARTS.items():
         inside = found & set(names.split())
         found -= inside
         files = modules(
@@ -76,10 +75,10 @@ def main():
         )
         row = len(files), sum(map(lines_of_code, files)), aim
         totals = [total + own for total, own in zip(totals, row, strict=True)]
-        print(f"| {room} | {row[0]} | {row[1]} | {aim} |")
+        print(f"| {part} | {row[0]} | {row[1]} | {aim} |")
     print(f"| sum | {totals[0]} | {totals[1]} | {totals[2]} |")
     if found:
-        sys.exit(f"no room for {', '.join(sorted(found))}: add them to ROOMS in {Path(__file__).name}")
+        sys.exit(f"no part contains {', '.join(sorted(found))}: add them to PARTS in {Path(__file__).name}")
 
 
 if __name__ == "__main__":

@@ -88,11 +88,11 @@ def test_there_is_no_circle():
 
 
 def test_there_is_no_circle_of_folders():
-    rooms = {}
+    folders = {}
     for name, uses in GRAPH.items():
-        room = name.split(".")[0]
-        rooms.setdefault(room, set()).update({used.split(".")[0] for used in uses} - {room})
-    assert not in_circles(rooms)
+        folder = name.split(".")[0]
+        folders.setdefault(folder, set()).update({used.split(".")[0] for used in uses} - {folder})
+    assert not in_circles(folders)
     assert in_circles({"a": {"b"}, "b": {"a"}, "c": {"a"}, "d": set()}) == {"a": {"b"}, "b": {"a"}, "c": {"a"}}
 
 

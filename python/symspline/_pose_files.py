@@ -538,10 +538,10 @@ class Lines(NamedTuple):
         return ValidationError(f"{self.file}, {self.place(row)}: {found}")
 
 
-def rotations_in_rows(q: Doubles, file: object, place: Callable[[int], str], atol: float | None = None) -> Array:
+def rotations_in_rows(q: Doubles, file: object, place: Callable[[int], str]) -> Array:
     """Return the rotations of rounded quaternions, scalar first; `place` names the line of a row in messages."""
     sizes = length(q)
-    bad = np.flatnonzero(~(np.abs(sizes - 1) <= (point_tol(q, 4) if atol is None else atol)))
+    bad = np.flatnonzero(~(np.abs(sizes - 1) <= point_tol(q, 4)))
     if len(bad):
         raise ValidationError(
             f"{file}, {place(bad[0])}: the quaternion has length {sizes[bad[0]]:.6g}, not 1: are the columns in "

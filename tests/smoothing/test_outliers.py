@@ -234,7 +234,7 @@ def test_data_beside_a_part_that_a_curve_follows(name):
 
 def test_a_run_that_the_curve_follows():
     space, t, points, bad, _ = ss.space("so:3"), *robust.recording("so:3", 2443)
-    with pytest.warns(ss.SmoothingWarning, match="rejects data on both sides of those from index 50 to 54"):
+    with pytest.warns(ss.SmoothingWarning, match="rejects data on both sides of the part from index 50 to 54"):
         ss.make_smoothing_spline(t, points, space, loss="cauchy")
     with warnings.catch_warnings():
         warnings.simplefilter("error")

@@ -2,6 +2,7 @@
 
 use crate::chain;
 use crate::frames::lanes_of;
+use symspline_core::monitor::checkpoint;
 use symspline_core::scalar::{LANES, Lane, gather, lane, scatter};
 use symspline_core::space::{Ambient, Erased, Frame, Origin};
 
@@ -133,6 +134,7 @@ impl AtData<'_> {
         parts.iter().enumerate().find_map(|(number, first)| {
             let before = (1..first[0]).rev().find(|&k| near(k) && near(k - 1))?;
             parts[number + 1..].iter().take(PARTS).find_map(|last| {
+                checkpoint();
                 let after = (last[1] + 1..used.len() - 1).find(|&k| near(k) && near(k + 1))?;
                 let inner = [first[1] + 1, last[0] - 1];
                 if inner[1] - inner[0] >= BETWEEN {
@@ -149,8 +151,8 @@ impl AtData<'_> {
         })
     }
 
-    /// Four points of the curve before and after a part, from which a cubic passes over it: half of its length before
-    /// the first of the given nodes, the two nodes, and half of its length after the second.
+    /// Four points of the curve, from which a cubic passes over a part: the two nodes before and after it, one before them,
+    /// and one after them, half as far away as the nodes are apart.
     fn bridge(&self, used: &[usize], nodes: [usize; 2]) -> Option<[usize; 4]> {
         let [from, to] = nodes.map(|k| self.times[used[k]]);
         let half = 0.5 * (to - from);

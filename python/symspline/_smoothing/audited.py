@@ -27,9 +27,9 @@ _STIFF = (
     "is correlated, do not use the bands."
 )
 _BYPASSED = (
-    "the loss rejects data on both sides of those from index {0} to {1}, although they are near a curve without these. "
-    "Either the data from {0} to {1} are outliers, which weights of 0 exclude, or the motion is fast there: pass "
-    "loss='linear', or smooth this part by itself."
+    "the loss rejects data on both sides of the part from index {0} to {1}, but a curve without this part is near "
+    "them. If the data of this part are outliers, pass weights of 0 for them. If the motion is fast there, pass "
+    "loss='linear' or smooth this part by itself."
 )
 
 
