@@ -159,6 +159,6 @@ def unknown_names(path):
 
 def test_names_of_modules_exist():
     paths = sorted(ROOT.rglob("*.py"))
-    assert {"input.times_of", "reduced", "jax.vmap"} <= {name for path in paths for name in names_in(path)}
+    assert {"input.times_of", "on_manifold", "jax.vmap"} <= {name for path in paths for name in names_in(path)}
     assert [name for path in paths for name in unknown_names(path)] == []
     assert exists("symspline._base.input.times_of") and not exists("symspline.handed.times_of")

@@ -65,7 +65,7 @@ def layer(name):
 
 
 def test_the_graph_is_that_of_the_package():
-    assert {"_spaces.base", "_curves.curve", "_base.arrays"} <= GRAPH["_curves.reduced"] | GRAPH["_spaces.base"]
+    assert {"_spaces.rounding", "_curves.reduced", "_base.arrays"} <= GRAPH["_curves.curve"] | GRAPH["_spaces.base"]
     # An import inside a function.
     assert "_plotting" in GRAPH["_splines.curve_plots"]
 

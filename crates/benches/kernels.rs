@@ -78,7 +78,7 @@ fn evaluate_at(bencher: Bencher, quantity: Quantity, time: impl Fn(usize) -> f64
     const SAMPLES: usize = 100_000;
     let (t, points, velocities) = fitted(1000);
     let x: Vec<f64> = (0..SAMPLES).map(time).collect();
-    let curves = Curves { t: &t, nodes: 1000, points: &points, velocities: &velocities };
+    let curves = Curves { t: &t, nodes: 1000, points: &points, velocities: &velocities, before: &[] };
     let times = Times { x: &x, count: SAMPLES };
     let mut out = vec![0.0; 4 * SAMPLES];
     bencher.counter(ItemsCount::new(SAMPLES)).bench_local(|| {

@@ -29,6 +29,58 @@ class Handle:
     def check_points(self, points: _Doubles, shape: Sequence[int], tol: float, name: str | None = None) -> None: ...
     def tangent_defects(self, points: _Doubles, vectors: _Doubles) -> _Doubles: ...
 
+# Space, knots, points, velocities, and velocities before the knots if they differ.
+_FactorOfCurve = tuple[Handle, _Doubles, _Doubles, _Doubles, _Doubles | None]
+
+@final
+class Curve:
+    def __new__(cls, factors: Sequence[_FactorOfCurve]) -> Curve: ...
+    @property
+    def batch(self) -> tuple[int, ...]: ...
+    def evaluate(
+        self,
+        x: _Doubles,
+        quantity: str,
+        outside: str,
+        per_curve: bool,
+        progress: _Progress | None = None,
+        out: Sequence[_Doubles] | None = None,
+    ) -> Any: ...
+    def lift(
+        self,
+        x: _Doubles,
+        quantity: str,
+        outside: str,
+        per_curve: bool,
+        start: Sequence[_Doubles | None],
+        progress: _Progress | None = None,
+    ) -> Any: ...
+    def transport(self, times: tuple[float, float], outside: str, vectors: Sequence[_Doubles]) -> list[_Doubles]: ...
+    def closest(
+        self,
+        times: _Doubles,
+        lengths: _Doubles,
+        samples: Sequence[_Doubles],
+        targets: Sequence[_Doubles],
+        curve: NDArray[np.int64],
+    ) -> tuple[_Doubles, _Doubles]: ...
+
+# A curve of the core, or the norm of a derivative at times of shape (curves, m).
+_Norm = Curve | Callable[[_Doubles], _Doubles]
+
+@final
+class ArcLength:
+    def __new__(cls, knots: _Doubles, speed: _Norm, rtol: float) -> ArcLength: ...
+    @property
+    def times(self) -> _Doubles: ...
+    @property
+    def lengths(self) -> _Doubles: ...
+    def at(self, x: _Doubles) -> _Doubles: ...
+    def between(self, a: _Doubles, b: _Doubles) -> _Doubles: ...
+    def times_at(self, s: _Doubles) -> _Doubles: ...
+
+def integrals(knots: _Doubles, norm: _Norm, quantity: str, rtol: float) -> _Doubles: ...
+
 _Ends = Sequence[tuple[str, _Doubles | None]] | None
 # Curve, kind, node, value, limit, and what is wrong with a point.
 _Fault = tuple[int, str, int | None, float, float, str | None]
@@ -54,13 +106,6 @@ def validate(
     mask: Sequence[bool] | None = None,
     skip_invalid: bool = False,
 ) -> tuple[_Doubles, list[_Fault]]: ...
-def closest_on_curves(
-    t: _Doubles,
-    factors: Sequence[tuple[Handle, Sequence[_Doubles]]],
-    times: _Doubles,
-    lengths: _Doubles,
-    curve: NDArray[np.int64],
-) -> tuple[_Doubles, _Doubles]: ...
 def closest(
     times: _Doubles,
     lengths: _Doubles,
@@ -85,41 +130,6 @@ def solve_tridiagonal(matrix: _Doubles, right: _Doubles) -> _Doubles: ...
 def hermite(
     handle: Handle, t: _Doubles, points: _Doubles, velocities: _Doubles, point_tol: float, tangent_tol: float
 ) -> list[_Doubles]: ...
-def evaluate(
-    handle: Handle,
-    t: _Doubles,
-    points: _Doubles,
-    velocities: _Doubles,
-    x: _Doubles,
-    quantity: str,
-    outside: str,
-    per_curve: bool,
-    progress: _Progress | None = None,
-    out: _Doubles | None = None,
-) -> _Doubles: ...
-def lift(
-    handle: Handle,
-    t: _Doubles,
-    points: _Doubles,
-    velocities: _Doubles,
-    x: _Doubles,
-    quantity: str,
-    outside: str,
-    per_curve: bool,
-    knots: _Doubles,
-    start: _Doubles,
-    progress: _Progress | None = None,
-) -> _Doubles: ...
-def transport(
-    handle: Handle,
-    t: _Doubles,
-    points: _Doubles,
-    velocities: _Doubles,
-    times: tuple[float, float],
-    outside: str,
-    vectors: _Doubles,
-) -> _Doubles: ...
-def lift_knots(handle: Handle, t: _Doubles, points: _Doubles, velocities: _Doubles) -> _Doubles: ...
 def evaluate_bspline(
     handle: Handle,
     knots: _Doubles,

@@ -29,7 +29,7 @@ from ._base.input import times_of
 from ._base.time import onto_ends
 from ._base.typing import Extrapolate, Number, TimesLike
 from ._core import ValidationError
-from ._curves.curve import CurveArrays
+from ._curves.curve import CurveArrays, in_span
 from ._curves.options import order_of
 from ._curves.reduced import span_of
 from ._spaces import ComplexGrassmannian, ComplexProjective, Doubles, Space, SpecialUnitary, Unitary
@@ -415,7 +415,7 @@ def _in_span(spline: CubicSpline[Any, Any]) -> tuple[CurveArrays, Array | None]:
     if (curve.times.shape[-1] + 2) * width >= curve.space.point_shape[0]:
         return curve, None
     span = span_of(curve.space, curve.points, np.take(curve.velocities, [0, -1], axis=len(curve.batch)))
-    return span.inside(curve), span.basis
+    return in_span(curve, span), span.basis
 
 
 def _times(spline: CubicSpline[Any, Any], x: TimesLike) -> Doubles:

@@ -246,9 +246,9 @@ def test_a_panic_in_a_worker_is_an_error_within_a_second(threads):
     curves, samples = 4000, np.linspace(0, 2, 50)
     points = np.tile(np.eye(3), (curves, 1, 1))
     short = np.zeros((curves // 2, 3, 3))
-    arguments = (ss.Sphere(2)._handle, np.arange(3.0), points, short, samples, "point", "raise", False)
+    curve = _core.Curve([(ss.Sphere(2)._handle, np.arange(3.0), points, short, None)])
     for n in (1, 2):
         ss.set_num_threads(n)
         begun = time.monotonic()
-        raises("out of range", _core.evaluate, *arguments, error=RuntimeError)
+        raises("out of range", curve.evaluate, samples, "point", "raise", False, error=RuntimeError)
         assert time.monotonic() - begun < 1

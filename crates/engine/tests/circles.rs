@@ -261,8 +261,8 @@ fn the_spline_is_the_flat_one_of_the_angles() {
         let u = spline(&torus, &points, [end; 2]).unwrap();
         let rates = spline(&flat, &angles, [end; 2]).unwrap();
         assert!(difference(&u, &vector(&angles, &rates)) < 1e-13);
-        let curves = Curves { t: &KNOTS, nodes, points: &points, velocities: &u };
-        let lines = Curves { t: &KNOTS, nodes, points: &angles, velocities: &rates };
+        let curves = Curves { t: &KNOTS, nodes, points: &points, velocities: &u, before: &[] };
+        let lines = Curves { t: &KNOTS, nodes, points: &angles, velocities: &rates, before: &[] };
         let theta = values(&flat, &lines, &times, Quantity::Point);
         for (quantity, allowed) in QUANTITIES.into_iter().zip([1e-14, 1e-13, 1e-12]) {
             let expected = match quantity {
@@ -289,7 +289,7 @@ fn the_spline_is_c2_at_the_knots() {
             x.windows(2 * len).step_by(len).flatten().copied().collect()
         };
         let (t, p, v) = (twice(&KNOTS, 1), twice(&points, 4), twice(&u, 4));
-        let curves = Curves { t: &t, nodes: 2, points: &p, velocities: &v };
+        let curves = Curves { t: &t, nodes: 2, points: &p, velocities: &v, before: &[] };
         for (quantity, allowed) in QUANTITIES.into_iter().zip([1e-15, 1e-13, 1e-11]) {
             let sides = values(&torus, &curves, &Times { x: &t, count: 2 }, quantity);
             // The end of a segment, the start of the next, …

@@ -100,7 +100,13 @@ fn fitted_curves_are_c2_splines() {
             let what = format!("{name} {parameters:?}, {method:?}, {kind}");
             assert_eq!(report.status, Status::Converged, "{what}");
 
-            let curves = Curves { t: &KNOTS, nodes: KNOTS.len(), points: &points, velocities: &velocities };
+            let curves = Curves {
+                t: &KNOTS,
+                nodes: KNOTS.len(),
+                points: &points,
+                velocities: &velocities,
+                before: &[],
+            };
             let values = |quantity: Quantity, x: &[f64]| {
                 let mut out = vec![0.0; x.len() * len];
                 let times = Times { x, count: x.len() };

@@ -160,7 +160,7 @@ fn evaluate_segments(
 ) {
     let (n, len, per_row) = (axis.nodes(), space.point_len(), x.per_row());
     if complete {
-        let curves = Curves { t: axis.knots, nodes: n, points: rows, velocities };
+        let curves = Curves { t: axis.knots, nodes: n, points: rows, velocities, before: &[] };
         let own: Vec<f64> = match x {
             Along::Shared(x) => x.to_vec(),
             Along::Own(x) => x.iter().copied().cycle().take(rows.len() / (n * len)).collect(),

@@ -43,7 +43,8 @@ impl Samples {
         len: usize,
         out: &mut [f64],
     ) {
-        let curves = Curves { t: &self.t, nodes: 2, points: &self.points, velocities: &self.velocities };
+        let curves =
+            Curves { t: &self.t, nodes: 2, points: &self.points, velocities: &self.velocities, before: &[] };
         let times = Times { x: &self.x, count: 1 };
         let mut found = vec![0.0; self.owners.len() * len];
         evaluate(space, &curves, &times, quantity, outside, monitor, &mut found);

@@ -1,201 +1,21 @@
 //! Evaluation, called from Python.
 
-use crate::arrays::{count, in_order, unwritten, zeros};
+use crate::arrays::{in_order, zeros};
 use crate::errors::{CutLocusError, format_index, invalid, number};
 use crate::space::Handle;
 use crate::validate::of_curve;
-use crate::watch::{Progress, is_heavy, is_long, watched};
+use crate::watch::{is_heavy, is_long, watched};
 use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use symspline_engine::curve::{
-    BSpline, Curves, Outside, Quantity, Times, cumulative_steps as run_steps, evaluate as run,
-    evaluate_bspline as run_bspline, lift as run_lift, lift_knots as find_knots, transport as run_transport,
+    BSpline, Curves, Outside, Quantity, Times, cumulative_steps as run_steps, evaluate_bspline as run_bspline,
 };
-use symspline_engine::monitor::Monitor;
-use symspline_engine::space::{Ambient, Erased};
+use symspline_engine::space::Ambient;
 
 /// The degree from which one sample of a B-spline may take long.
 const LONG_DEGREE: usize = 100;
 
 type Array<'py> = PyReadonlyArrayDyn<'py, f64>;
-
-/// Evaluates curves. The result has the batch axes, the axes of the times of one curve and the axes of a point (or
-/// none), and is written to `out` if that is given.
-#[pyfunction]
-#[pyo3(signature = (handle, t, points, velocities, x, quantity, outside, per_curve, progress=None, out=None))]
-pub fn evaluate<'py>(
-    py: Python<'py>,
-    handle: &Handle,
-    t: Array<'py>,
-    points: Array<'py>,
-    velocities: Array<'py>,
-    x: Array<'py>,
-    quantity: &str,
-    outside: &str,
-    per_curve: bool,
-    progress: Option<Py<PyAny>>,
-    out: Option<Bound<'py, PyArrayDyn<f64>>>,
-) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-    let at = (x, outside, per_curve);
-    sampled(
-        py,
-        handle,
-        [&t, &points, &velocities],
-        at,
-        quantity,
-        progress,
-        out,
-        |space, job, monitor, out| {
-            run(space, job.curves, job.times, job.quantity, job.outside, monitor, out);
-        },
-    )
-}
-
-/// Evaluates the horizontal lift of curves on a quotient space, and its derivatives, like [`evaluate`]. `knots`
-/// contains the factors from [`lift_knots`], and `start` those of the initial representatives, (curves, k, k, 2).
-#[pyfunction]
-#[pyo3(signature = (handle, t, points, velocities, x, quantity, outside, per_curve, knots, start, progress=None))]
-pub fn lift<'py>(
-    py: Python<'py>,
-    handle: &Handle,
-    t: Array<'py>,
-    points: Array<'py>,
-    velocities: Array<'py>,
-    x: Array<'py>,
-    quantity: &str,
-    outside: &str,
-    per_curve: bool,
-    knots: Array<'py>,
-    start: Array<'py>,
-    progress: Option<Py<PyAny>>,
-) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-    let at = (x, outside, per_curve);
-    let factors = [in_order(&knots)?, in_order(&start)?];
-    sampled(
-        py,
-        handle,
-        [&t, &points, &velocities],
-        at,
-        quantity,
-        progress,
-        None,
-        |space, job, monitor, out| {
-            run_lift(space, job.curves, job.times, job.quantity, job.outside, factors, monitor, out);
-        },
-    )
-}
-
-/// The factors of the horizontal lift at the knots, (curves, knots, k, k, 2).
-#[pyfunction]
-pub fn lift_knots<'py>(
-    py: Python<'py>,
-    handle: &Handle,
-    t: Array<'py>,
-    points: Array<'py>,
-    velocities: Array<'py>,
-) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-    let space = handle.space.get();
-    let curves = curves_of([&t, &points, &velocities])?;
-    let (nodes, k) = (curves.nodes, space.fiber_rank());
-    let count = curves.points.len() / (nodes * space.point_len()).max(1);
-    let out = zeros(py, &[count, nodes, k, k, 2])?;
-    let mut write = out.readwrite();
-    let result = write.as_slice_mut()?;
-    let heavy = is_heavy(&space) || is_long(count * nodes);
-    watched(py, None, count * nodes, heavy, |monitor| find_knots(&space, &curves, monitor, result))?;
-    drop(write);
-    Ok(out)
-}
-
-/// Transports one tangent vector of every curve in parallel along the curve, from its point at one time to that at
-/// another.
-#[pyfunction]
-pub fn transport<'py>(
-    py: Python<'py>,
-    handle: &Handle,
-    t: Array<'py>,
-    points: Array<'py>,
-    velocities: Array<'py>,
-    times: [f64; 2],
-    outside: &str,
-    vectors: Array<'py>,
-) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-    let curves = curves_of([&t, &points, &velocities])?;
-    let (policy, _) = policy_named(outside)?;
-    let out = zeros(py, vectors.shape())?;
-    let mut write = out.readwrite();
-    let result = write.as_slice_mut()?;
-    result.copy_from_slice(in_order(&vectors)?);
-    let count = result.len() / handle.space.get().point_len().max(1);
-    let heavy = is_heavy(&handle.space.get()) || is_long(points.len());
-    watched(py, None, count, heavy, |monitor| {
-        run_transport(&handle.space.get(), &curves, times, policy, monitor, result);
-    })?;
-    drop(write);
-    Ok(out)
-}
-
-/// The arguments of an evaluation.
-struct Evaluation<'a> {
-    curves: &'a Curves<'a>,
-    times: &'a Times<'a>,
-    quantity: Quantity,
-    outside: Outside,
-}
-
-pub fn curves_of<'a>([t, points, velocities]: [&'a Array; 3]) -> PyResult<Curves<'a>> {
-    Ok(Curves {
-        t: in_order(t)?,
-        nodes: t.shape()[t.ndim() - 1],
-        points: in_order(points)?,
-        velocities: in_order(velocities)?,
-    })
-}
-
-/// Reads curves and times, and computes a quantity for every sample.
-fn sampled<'py>(
-    py: Python<'py>,
-    handle: &Handle,
-    curve: [&Array<'py>; 3],
-    (x, outside, per_curve): (Array<'py>, &str, bool),
-    quantity: &str,
-    progress: Option<Py<PyAny>>,
-    out: Option<Bound<'py, PyArrayDyn<f64>>>,
-    compute: impl FnOnce(&Erased, &Evaluation, &Monitor, &mut [f64]) + Send,
-) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-    let quantity = quantity_named(quantity)?;
-    let (policy, strict) = policy_named(outside)?;
-    let (point_axes, points) = (handle.point_axes(), curve[1]);
-    let batch = &points.shape()[..points.ndim() - point_axes - 1];
-    let count_axes = if per_curve { &x.shape()[batch.len()..] } else { x.shape() };
-    let curves = curves_of(curve)?;
-    let times = Times { x: in_order(&x)?, count: count(count_axes) };
-    check_times(&curves, &times, batch, x.shape(), strict)?;
-
-    let space = handle.space.get();
-    let mut shape = [batch, count_axes].concat();
-    let samples = count(&shape);
-    if quantity.is_of_body() {
-        shape.push(quantity.len(&space));
-    } else if !quantity.is_length() {
-        shape.extend_from_slice(&points.shape()[points.ndim() - point_axes..]);
-    }
-    let out = match out {
-        Some(out) => out,
-        None => unwritten(py, &shape)?,
-    };
-    let mut write = out.readwrite();
-    if write.shape() != shape {
-        return Err(invalid(format!("out has shape {:?}, but the result has {shape:?}", write.shape())));
-    }
-    let result = write.as_slice_mut()?;
-    let evaluation = Evaluation { curves: &curves, times: &times, quantity, outside: policy };
-    watched(py, Progress::whole(progress), samples, is_heavy(&space), |monitor| {
-        compute(&space, &evaluation, monitor, result)
-    })?;
-    drop(write);
-    Ok(out)
-}
 
 /// The extrapolation policy, and whether times outside the knots are an error.
 pub fn policy_named(name: &str) -> PyResult<(Outside, bool)> {
@@ -208,7 +28,7 @@ pub fn policy_named(name: &str) -> PyResult<(Outside, bool)> {
     })
 }
 
-fn quantity_named(name: &str) -> PyResult<Quantity> {
+pub fn quantity_named(name: &str) -> PyResult<Quantity> {
     Ok(match name {
         "point" => Quantity::Point,
         "velocity" => Quantity::Velocity,
@@ -286,7 +106,7 @@ pub fn cumulative_steps<'py>(
 }
 
 /// Times must be finite, and inside the knots if `strict`.
-fn check_times(
+pub fn check_times(
     curves: &Curves,
     times: &Times,
     batch: &[usize],

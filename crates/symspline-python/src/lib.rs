@@ -2,6 +2,7 @@
 
 mod arrays;
 mod conversions;
+mod curve;
 mod curves;
 mod derivative;
 mod errors;
@@ -11,6 +12,7 @@ mod fit;
 mod gaps;
 mod grid;
 mod hermite;
+mod length;
 mod search;
 mod smoothing;
 mod space;
@@ -84,17 +86,16 @@ fn guarded(m: &Bound<'_, PyModule>, function: Bound<'_, PyCFunction>) -> PyResul
 #[pymodule]
 fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<space::Handle>()?;
+    m.add_class::<curve::Curve>()?;
+    m.add_class::<length::ArcLength>()?;
+    guarded(m, wrap_pyfunction!(length::integrals, m)?)?;
     guarded(m, wrap_pyfunction!(fit::fit, m)?)?;
     guarded(m, wrap_pyfunction!(curves::check, m)?)?;
     guarded(m, wrap_pyfunction!(hermite::hermite, m)?)?;
     guarded(m, wrap_pyfunction!(derivative::push, m)?)?;
     guarded(m, wrap_pyfunction!(derivative::pull, m)?)?;
-    guarded(m, wrap_pyfunction!(evaluate::evaluate, m)?)?;
     guarded(m, wrap_pyfunction!(evaluate::evaluate_bspline, m)?)?;
     guarded(m, wrap_pyfunction!(evaluate::cumulative_steps, m)?)?;
-    guarded(m, wrap_pyfunction!(evaluate::lift, m)?)?;
-    guarded(m, wrap_pyfunction!(evaluate::transport, m)?)?;
-    guarded(m, wrap_pyfunction!(evaluate::lift_knots, m)?)?;
     guarded(m, wrap_pyfunction!(smoothing::smooth, m)?)?;
     guarded(m, wrap_pyfunction!(smoothing::fit_cumulative, m)?)?;
     guarded(m, wrap_pyfunction!(smoothing::smoothing_variance, m)?)?;
@@ -121,7 +122,6 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     guarded(m, wrap_pyfunction!(grid::grid_midpoint, m)?)?;
     guarded(m, wrap_pyfunction!(stiefel::stiefel, m)?)?;
     guarded(m, wrap_pyfunction!(search::closest, m)?)?;
-    guarded(m, wrap_pyfunction!(search::closest_on_curves, m)?)?;
     guarded(m, wrap_pyfunction!(search::roots, m)?)?;
     guarded(m, wrap_pyfunction!(search::time_law, m)?)?;
     guarded(m, wrap_pyfunction!(tridiagonal::solve_tridiagonal, m)?)?;

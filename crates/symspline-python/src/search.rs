@@ -1,57 +1,21 @@
 //! Searches along curves, called from Python.
 
 use crate::arrays::in_order;
-use crate::evaluate::curves_of;
-use crate::space::Handle;
-use crate::watch::{is_heavy, is_long, watched};
+use crate::watch::{is_long, watched};
 use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use symspline_engine::search::{
-    Bracket, Distances, Factor, Nearest, Path, Samples, closest as run, closest_on_curves as run_on_curves,
-    roots as run_roots,
+    Bracket, Distances, Nearest, Path, Samples, closest as run, roots as run_roots,
 };
 
 type Array<'py> = PyReadonlyArrayDyn<'py, f64>;
 type Numbers<'py> = Bound<'py, PyArray1<f64>>;
-/// In one factor: the space, points and velocities at the knots, points at the samples, and the targets.
-type FactorOf<'py> = (PyRef<'py, Handle>, [Array<'py>; 4]);
 
 /// Targets of a general curve that are searched together.
 const BLOCK: usize = 4096;
 
-/// The times and distances of the nearest points of curves of the core to targets. Times of samples and arc lengths
-/// have shape (curves, samples); the targets belong to curves in increasing order.
-#[pyfunction]
-pub fn closest_on_curves<'py>(
-    py: Python<'py>,
-    t: Array<'py>,
-    factors: Vec<FactorOf<'py>>,
-    times: Array<'py>,
-    lengths: Array<'py>,
-    curve: PyReadonlyArray1<'py, i64>,
-) -> PyResult<(Numbers<'py>, Numbers<'py>)> {
-    let curve = indices(&curve)?;
-    let samples = samples_of(&times, &lengths)?;
-    let own = factors
-        .iter()
-        .map(|(handle, [points, velocities, samples, targets])| {
-            Ok(Factor {
-                space: handle.space.get(),
-                curves: curves_of([&t, points, velocities])?,
-                samples: in_order(samples)?,
-                targets: in_order(targets)?,
-            })
-        })
-        .collect::<PyResult<Vec<_>>>()?;
-    let mut found = vec![Nearest { time: f64::NAN, distance: f64::NAN }; curve.len()];
-    let heavy = own.iter().any(|factor| is_heavy(&factor.space));
-    watched(py, None, curve.len(), heavy, |monitor| {
-        run_on_curves(&own, samples, &curve, monitor, &mut found);
-    })?;
-    Ok(columns(py, &found))
-}
-
-/// The same for any curves. `of_samples(target, number)` returns the distances between targets and samples, and
+/// The times and distances of the nearest points of any curves to targets, which belong to curves in increasing order. Times
+/// of samples and arc lengths have shape (curves, samples). `of_samples(target, number)` returns the distances between targets and samples, and
 /// `at(target, x)` those from the points at times x, and the derivatives of half their squares.
 #[pyfunction]
 pub fn closest<'py>(
@@ -61,7 +25,7 @@ pub fn closest<'py>(
     curve: PyReadonlyArray1<'py, i64>,
     of_samples: Bound<'py, PyAny>,
     at: Bound<'py, PyAny>,
-) -> PyResult<(Numbers<'py>, Numbers<'py>)> {
+) -> PyResult<[Numbers<'py>; 2]> {
     let curve = indices(&curve)?;
     let samples = samples_of(&times, &lengths)?;
     let mut found = Vec::with_capacity(curve.len());
@@ -155,15 +119,15 @@ fn numbers(array: &Bound<PyAny>) -> PyResult<Vec<f64>> {
     Ok(array.extract::<PyReadonlyArray1<f64>>()?.as_array().to_vec())
 }
 
-fn indices(array: &PyReadonlyArray1<i64>) -> PyResult<Vec<usize>> {
+pub fn indices(array: &PyReadonlyArray1<i64>) -> PyResult<Vec<usize>> {
     Ok(array.as_array().iter().map(|&i| i as usize).collect())
 }
 
-fn samples_of<'a>(times: &'a Array, lengths: &'a Array) -> PyResult<Samples<'a>> {
+pub fn samples_of<'a>(times: &'a Array, lengths: &'a Array) -> PyResult<Samples<'a>> {
     Ok(Samples { count: times.shape()[1], times: in_order(times)?, lengths: in_order(lengths)? })
 }
 
-fn columns<'py>(py: Python<'py>, found: &[Nearest]) -> (Numbers<'py>, Numbers<'py>) {
-    let column = |value: fn(&Nearest) -> f64| PyArray1::from_iter(py, found.iter().map(value));
-    (column(|x| x.time), column(|x| x.distance))
+pub fn columns<'py>(py: Python<'py>, found: &[Nearest]) -> [Numbers<'py>; 2] {
+    let times = PyArray1::from_iter(py, found.iter().map(|nearest| nearest.time));
+    [times, PyArray1::from_iter(py, found.iter().map(|nearest| nearest.distance))]
 }

@@ -285,6 +285,7 @@ impl<S: Space, P: Point<S>> Curves<S, P> {
                 nodes: self.offsets[c + 1] - self.offsets[c],
                 points: &self.points[range.clone()],
                 velocities: &self.velocities[range],
+                before: &[],
             };
             let inside: Vec<f64>;
             let x = match self.extrapolate {

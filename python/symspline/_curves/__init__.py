@@ -1,5 +1,5 @@
 """Curves in a space: knots, points and velocities in arrays, and fits through points.
 
-`fit` computes them. The kinds of curves are in `curve` (computed by the compiled core, and products with one curve per
-factor) and `reduced` (in the span of the points). Curves on a `Manifold` are `on_manifold.on_manifold.OnManifold`.
+`fit` computes them. Curves that the compiled core evaluates are `curve.CurveArrays`; those on a `Manifold`, and in
+products with one, are in `on_manifold`.
 """

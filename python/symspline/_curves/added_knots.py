@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from .._base.faults import UNCONVERGED, Fault
 from .._base.time import TimeAxis
 from .._spaces import POINT_TOL, Array, Doubles, Euclidean, Space, cover_of, factors_of
-from .curve import CoreCurve
+from .curve import CurveArrays, FactorArrays
 from .ends import End, map_ends
 from .fit import Fit, FitProblem, Points
 
@@ -164,13 +164,14 @@ def _flat_derivatives(problem: FitProblem, knots: Knots, solve: Solver) -> Doubl
     return np.stack(columns, axis=-1)
 
 
-def _acceleration(part: CoreCurve, end: int) -> Array:
+def _acceleration(part: CurveArrays, end: int) -> Array:
     """Return the acceleration at the first or last knot, in one factor."""
     axis, h = len(part.batch), np.diff(part.times, axis=-1)[..., -end]
     # The reversed last segment begins at the last point itself, and not at another representative of it.
     nodes, sign = ([0, 1], 1) if end == 0 else ([-1, -2], -1)
     points, velocities = (np.take(rows, nodes, axis=axis) for rows in (part.points, part.velocities))
-    segment = type(part)(part.space, np.stack([np.zeros_like(h), h], axis=-1), points, sign * velocities, False)
+    times = np.stack([np.zeros_like(h), h], axis=-1)
+    segment = CurveArrays(part.space, times, (FactorArrays(part.space, points, sign * velocities),), fitted=False)
     return np.asarray(segment.evaluate(np.zeros_like(h), "acceleration", "raise", h.ndim > 0))
 
 

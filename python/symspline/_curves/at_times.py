@@ -14,7 +14,7 @@ from .._base.typing import Progress, TimesLike
 from .._core import ValidationError
 from .._spaces import Doubles
 from .composed import AnyCurve, values_at
-from .curve import CoreCurve, ProductCurve, write_into
+from .curve import CurveArrays, write_into
 
 
 def evaluated(
@@ -30,7 +30,7 @@ def evaluated(
     """Evaluate a quantity at times as a user passes them."""
 
     def call(x: Doubles, outside: str, per_curve: bool) -> Any:
-        if out is not None and quantity != "jerk" and isinstance(curve, (CoreCurve, ProductCurve)):
+        if out is not None and quantity != "jerk" and isinstance(curve, CurveArrays):
             return curve.evaluate(x, quantity, outside, per_curve, progress, out)
         values = values_at(curve, x, quantity, outside, per_curve, progress)
         return values if out is None else write_into(out, values, curve.space)
@@ -55,7 +55,7 @@ def call_at_times(
     call : callable
         Function of times as the core counts them, a policy of the core, and `per_curve`.
     """
-    per_curve = checked_flag(per_curve, "per_curve")
+    per_curve = per_curve is not False and checked_flag(per_curve, "per_curve")
     if time_axis.plain and type(x) is float:
         # Single times are frequent, and the general conversion would cost more than the evaluation.
         times, knots = np.array(x), curve.times

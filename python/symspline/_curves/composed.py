@@ -1,6 +1,6 @@
 """Curves that are made of other curves: one after the other, or the same path at other times.
 
-They satisfy the protocol `integrals.Evaluable`, with times as numbers of the core, and have the same factors as the
+They satisfy the protocol `length.Evaluable`, with times as numbers of the core, and have the same factors as the
 curves of which they are made.
 """
 
@@ -18,7 +18,7 @@ from .._base.arrays import refuse
 from .._base.typing import Progress
 from .._core import ValidationError
 from .._spaces import Doubles, Product, Space, product_norm
-from .curve import NORMS, CoreCurve, ProductCurve
+from .curve import NORMS, CurveArrays
 from .jerk import jerk
 
 # Orders of derivatives.
@@ -135,7 +135,7 @@ class Joined:
     def evaluate(
         self, x: Doubles, quantity: str, outside: str, per_curve: bool, progress: Progress | None = None
     ) -> Any:
-        """Evaluate a quantity at times x; see `CoreCurve.evaluate`. Only ``"continue"`` gives zero norms in gaps."""
+        """Evaluate a quantity at times x; see `CurveArrays.evaluate`. Only ``"continue"`` gives zero norms in gaps."""
         _check_inside(self, x, outside, per_curve)
         shape = x.shape[len(self.batch) :] if per_curve else x.shape
         flat = x.reshape((*self.batch, math.prod(shape)) if per_curve else math.prod(shape))
@@ -221,7 +221,7 @@ class Retimed:
     def evaluate(
         self, x: Doubles, quantity: str, outside: str, per_curve: bool, progress: Progress | None = None
     ) -> Any:
-        """Evaluate a quantity at times x; see `CoreCurve.evaluate`."""
+        """Evaluate a quantity at times x; see `CurveArrays.evaluate`."""
         _check_inside(self, x, outside, per_curve)
         at = self._source_times(x, per_curve)
 
@@ -239,7 +239,7 @@ class Retimed:
         elif quantity == "bend":
             result = product_norm(tuple(_acceleration_norm(part, x, outside, per_curve) for part in self.parts))
         elif quantity == "motion":
-            # The twist, its derivative, and the point; see `CoreCurve.evaluate`.
+            # The twist, its derivative, and the point; see `CurveArrays.evaluate`.
             dim, found = self.space.dim, value("motion")
             first, second = (np.asarray(self.law(x, order))[..., None] for order in (1, 2))
             twist, change = found[..., :dim], found[..., dim : 2 * dim]
@@ -274,7 +274,7 @@ def values_at(
     curve: AnyCurve, x: Doubles, quantity: str, outside: str, per_curve: bool, progress: Progress | None = None
 ) -> Any:
     """Evaluate a quantity of a curve of any kind, also the jerk."""
-    if quantity == "jerk" and isinstance(curve, (CoreCurve, ProductCurve)):
+    if quantity == "jerk" and isinstance(curve, CurveArrays):
         return jerk(curve, x, outside, per_curve, progress)
     return curve.evaluate(x, quantity, outside, per_curve, progress)
 

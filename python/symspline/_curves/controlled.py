@@ -11,8 +11,7 @@ from .. import _core
 from .._base.arrays import refuse
 from .._base.typing import Progress
 from .._spaces import Array, Doubles, Product, Space, factors_of, product_norm
-from .curve import NORMS, REAL
-from .integrals import EXACT
+from .curve import EXACT, NORMS, REAL
 from .reduced import reduced
 
 

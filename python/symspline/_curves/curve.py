@@ -1,32 +1,41 @@
-"""Curves as arrays, in one space and in products.
+"""Curves as arrays: knots, and points and velocities in each factor of a space. The compiled core evaluates them.
 
-`ReducedCurve` and `OnManifold` are further classes of curves, for spaces in which the compiled core cannot evaluate
-curves directly.
+`on_manifold` has further classes of curves, for spaces that are made of functions.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cached_property, partial
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import Any, ClassVar, NamedTuple, Never, Self
 
 import numpy as np
 
 from .. import _core
-from .._base.faults import Fault
 from .._base.typing import Progress
 from .._core import ValidationError
-from .._spaces import Affine, Array, Doubles, Similarity, Space, SpecialEuclidean, Torus, parts_of, product_norm
+from .._spaces import (
+    Affine,
+    Array,
+    Doubles,
+    Product,
+    Similarity,
+    Space,
+    SpecialEuclidean,
+    Torus,
+    parts_of,
+    product_norm,
+)
 from . import derivatives
 from .derivatives import Gradient, SampleTimes, pair_of
 from .ends import ends_in_factors
-from .integrals import EXACT
 from .lift import check_reach, check_start, fiber_factors, is_quotient
-from .solve import Options, Solved, Task, solve_single, validate
+from .reduced import Span, span_of
 from .turns import with_more_knots
 
-Tuple = tuple[Any, ...]
 NORMS = ("speed", "bend")
+# Relative tolerance of integrals along curves whose derivatives are exact.
+EXACT = 1e-14
 # Quantities that are real numbers or vectors, not points or tangent vectors of the space.
 REAL = (*NORMS, "body velocity", "body acceleration", "motion")
 # Matrices of these spaces have a constant last row, which the core also writes for curves without a solution.
@@ -71,8 +80,33 @@ def write_into(out: Any, values: Any, space: Space[Any]) -> Any:
     return out
 
 
-class CoreCurve:
-    """Curves of a batch in a space that is not a product. Times are numbers of the compiled core.
+class FactorArrays(NamedTuple):
+    """Points and velocities of curves in a space that is not a product.
+
+    Attributes
+    ----------
+    space : Space
+    points, velocities : ndarray, shape (..., N+1, *point_shape)
+        Values at the knots; at corners the velocities after the knot.
+    before : ndarray or None
+        Velocities before the knots, for curves with corners.
+    """
+
+    space: Space[Any]
+    points: Array
+    velocities: Array
+    before: Array | None = None
+
+    def map(self, function: Callable[[Array], Array]) -> FactorArrays:
+        """Return a function of all arrays."""
+        before = None if self.before is None else function(self.before)
+        return FactorArrays(self.space, function(self.points), function(self.velocities), before)
+
+
+class CurveArrays:
+    """Curves of a batch in any space. Times are numbers of the compiled core.
+
+    In a product, points, velocities and results of methods are tuples with one entry per factor.
 
     Attributes
     ----------
@@ -80,62 +114,110 @@ class CoreCurve:
         The space of the points.
     times : ndarray, shape (N+1,) or (..., N+1)
         Knots.
-    points, velocities : ndarray, shape (..., N+1, *point_shape)
-        Values at the knots.
-    quad_rtol : float
-        Relative tolerance of integrals along the curve, not below the accuracy of its speed and acceleration.
+    factors : tuple of FactorArrays
+        Points and velocities in each factor; a space that is not a product is its only factor.
+    fitted : bool
+        Whether velocities are those of a C² curve, which lie in the span of the points and the end velocities.
     """
 
-    quad_rtol = EXACT
-    # Both kinds of curves have attributes of the same types.
-    space: Space[Any]
-    times: Doubles
-    points: Any
-    velocities: Any
-    # Whether the core computes points in the space itself, and not in a smaller one.
-    _compiled: ClassVar[bool] = True
     # Highest order of derivatives.
     max_nu: ClassVar[int] = 3
+    # Relative tolerance of integrals along the curve, not below the accuracy of its speed and acceleration.
+    quad_rtol: ClassVar[float] = EXACT
+    # Whether the core evaluates all factors.
+    is_compiled: ClassVar[bool] = True
 
-    def __init__(self, space: Space, times: Doubles, points: Array, velocities: Array, fitted: bool = True) -> None:
-        self.space, self.times, self.points, self.velocities = space, times, points, velocities
-        # Whether velocities are those of a C² curve, which lie in the span of the points and the end velocities.
-        self._fitted = fitted
-        # Read-only, in less than half the time of an assignment to `flags.writeable`.
-        points.setflags(write=False)
-        velocities.setflags(write=False)
-
-    @staticmethod
-    def suits(space: Space) -> bool:
-        """Whether this class can represent curves in a space."""
-        return True
-
-    @staticmethod
-    def solve(task: Task, options: Options, progress: Progress | None = None) -> Solved:
-        """Compute the velocities of the C² curve. The core validates the points in the same call."""
-        return solve_single(task, options, progress)
-
-    @staticmethod
-    def validate(task: Task, options: Options) -> tuple[Task, list[Fault]]:
-        """Validate a task and project its points onto the space. Return the task and the faults of skipped curves.
-
-        Raises
-        ------
-        ValidationError
-            If the task is invalid.
-        """
-        return validate(task)
+    def __init__(
+        self, space: Space[Any], times: Doubles, factors: tuple[FactorArrays, ...], fitted: bool = True
+    ) -> None:
+        self.space, self.times, self.factors, self.fitted = space, times, factors, fitted
+        for factor in factors:
+            # Read-only, in less than half the time of an assignment to `flags.writeable`.
+            factor.points.setflags(write=False)
+            factor.velocities.setflags(write=False)
+        first = factors[0]
+        self.batch: tuple[int, ...] = first.points.shape[: first.points.ndim - len(first.space._point_shape) - 1]
 
     @property
-    def batch(self) -> tuple[int, ...]:
-        """Shape of the batch axes."""
-        points: Array = self.points
-        return points.shape[: points.ndim - len(self.space._point_shape) - 1]
+    def points(self) -> Any:
+        """Points at the knots."""
+        return self._joined([factor.points for factor in self.factors])
 
     @property
-    def parts(self) -> tuple[Self]:
-        """The curve itself; a `ProductCurve` has one curve per factor."""
-        return (self,)
+    def velocities(self) -> Any:
+        """Velocities at the knots; at corners those after the knot."""
+        return self._joined([factor.velocities for factor in self.factors])
+
+    @cached_property
+    def parts(self) -> tuple[CurveArrays, ...]:
+        """One curve per factor of a product; the curve itself on other spaces."""
+        if not isinstance(self.space, Product):
+            return (self,)
+        return tuple(self._of_factor(factor) for factor in self.factors)
+
+    def _of_factor(self, factor: FactorArrays) -> CurveArrays:
+        return CurveArrays(factor.space, self.times, (factor,), self.fitted)
+
+    def _joined(self, values: Sequence[Any]) -> Any:
+        return tuple(values) if isinstance(self.space, Product) else values[0]
+
+    @property
+    def is_smooth(self) -> bool:
+        """Whether the core computes the curve in its space, with these knots, and without corners."""
+        if not self.is_compiled or any(factor.before is not None for factor in self.factors):
+            return False
+        turning = not self.fitted and any(isinstance(factor.space, Torus) for factor in self.factors)
+        return not turning and all(span is None for span in self._spans)
+
+    # ---- evaluation by the core ----
+
+    @cached_property
+    def compiled(self) -> _core.Curve:
+        """The curves as an object of the core."""
+        each = zip(self.factors, self._spans, strict=True)
+        return _core.Curve([self._core_arrays(factor, span) for factor, span in each])
+
+    @cached_property
+    def _spans(self) -> list[Span | None]:
+        """The spans of the points of factors in large spaces, in which the core computes."""
+        return [self._span_of(factor) if factor.space._is_large else None for factor in self.factors]
+
+    def _span_of(self, factor: FactorArrays) -> Span:
+        vectors = factor.velocities
+        if self.fitted:
+            vectors = np.take(vectors, [0, -1], axis=len(self.batch))
+        others = () if factor.before is None else (factor.before,)
+        return span_of(factor.space, factor.points, vectors, *others)
+
+    def _core_arrays(self, factor: FactorArrays, span: Span | None) -> Any:
+        """Return a space of the core and the arrays of a factor in it."""
+        if isinstance(factor.space, Torus) and not self.fitted and factor.before is None:
+            times, *arrays = with_more_knots(self.times, factor.points, factor.velocities)
+            return factor.space._handle, times, *map(np.ascontiguousarray, arrays), None
+        if span is not None:
+            factor = FactorArrays(span.space, *factor.map(span.coordinates)[1:])
+        return factor.space._handle, self.times, *factor.map(factor.space._as_doubles)[1:]
+
+    @cached_property
+    def _finishing(self) -> bool:
+        """Whether results of the core are not yet those of all factors."""
+        return any(
+            factor.space._complex or isinstance(factor.space, _CONSTANT_ROW) or span is not None
+            for factor, span in zip(self.factors, self._spans, strict=True)
+        )
+
+    def _finished(self, values: Any) -> Any:
+        """Return points or vectors from results of the core."""
+        if not self._finishing:
+            return values
+        results = []
+        for factor, span, doubles in zip(self.factors, self._spans, self._by_factor(values), strict=True):
+            numbers = _all_nan(factor.space, factor.space._numbers(doubles))
+            results.append(numbers if span is None else span.embed_samples(numbers, self.batch))
+        return self._joined(results)
+
+    def _by_factor(self, values: Any) -> Any:
+        return values if isinstance(self.space, Product) else (values,)
 
     def evaluate(
         self,
@@ -144,7 +226,7 @@ class CoreCurve:
         outside: str,
         per_curve: bool,
         progress: Progress | None = None,
-        out: Array | None = None,
+        out: Any = None,
     ) -> Any:
         """Evaluate a quantity at times x.
 
@@ -162,25 +244,62 @@ class CoreCurve:
             Whether the leading axes of x are the batch axes.
         progress : callable, optional
             Function to call with the numbers of finished and of all steps.
-        out : ndarray, optional
-            Array for points or vectors, which is returned.
+        out : ndarray or tuple of ndarray, optional
+            Arrays for points or vectors, which are returned.
         """
-        self._check_times(x, per_curve)
-        if out is None:
-            return self._evaluate(x, quantity, outside, per_curve, progress)
-        space = self.space
-        _check_out(out, (x.shape if per_curve else self.batch + x.shape) + space.point_shape, space.dtype)
-        if self._compiled and _can_write_into(out, space.dtype, x):
-            _core.evaluate(*self._core_curve, x, quantity, outside, per_curve, progress, space._as_doubles(out))
-            _all_nan(space, out)
-        else:
-            np.copyto(out, self._evaluate(x, quantity, outside, per_curve, progress), casting="same_kind")
-        return out
+        if per_curve and x.shape[: len(self.batch)] != self.batch:
+            self._refuse_times(x)
+        if out is not None:
+            return self._evaluate_into(out, x, quantity, outside, per_curve, progress)
+        values = self._evaluate(x, quantity, outside, per_curve, progress)
+        if quantity == "point" and self._gaps:
+            self._write_nodes(values, x, per_curve)
+        return values
 
     def _evaluate(self, x: Doubles, quantity: str, outside: str, per_curve: bool, progress: Progress | None) -> Any:
-        """Evaluate a quantity into a new array."""
-        values = _core.evaluate(*self._core_curve, x, quantity, outside, per_curve, progress)
-        return values if quantity in REAL else _all_nan(self.space, self.space._numbers(values))
+        """Evaluate a quantity into new arrays."""
+        values = self.compiled.evaluate(x, quantity, outside, per_curve, progress)
+        return values if quantity in REAL else self._finished(values)
+
+    @cached_property
+    def _gaps(self) -> list[Any]:
+        """Where segments of curves with corners are NaN in each factor, if they are; these begin with a point."""
+        if self.factors[0].before is None:
+            return []
+        gaps = [~factor.space._where_finite(factor.velocities) for factor in self.factors]
+        return gaps if any(own.any() for own in gaps) else []
+
+    def _write_nodes(self, values: Any, x: Doubles, per_curve: bool) -> None:
+        """Write the points at which a segment that is NaN begins."""
+        for factor, gaps, points in zip(self.factors, self._gaps, self._by_factor(values), strict=True):
+            for curve in np.argwhere(gaps.any(axis=-1)):
+                index = tuple(curve)
+                t, own = self.times[index] if self.times.ndim > 1 else self.times, x[index] if per_curve else x
+                nodes = np.asarray(np.searchsorted(t[:-2], own))
+                at = (t[nodes] == own) & gaps[index][nodes]
+                points[index][at] = factor.points[index][nodes[at]]
+
+    def _evaluate_into(
+        self, out: Any, x: Doubles, quantity: str, outside: str, per_curve: bool, progress: Progress | None
+    ) -> Any:
+        shape = x.shape if per_curve else self.batch + x.shape
+        arrays = parts_of(out, self.space, "out")
+        direct = self.is_compiled and not self._gaps
+        for factor, span, array in zip(self.factors, self._spans, arrays, strict=True):
+            _check_out(array, shape + factor.space.point_shape, factor.space.dtype)
+            direct &= span is None and _can_write_into(array, factor.space.dtype, x)
+        if not direct:
+            return write_into(out, self.evaluate(x, quantity, outside, per_curve, progress), self.space)
+        doubles = [factor.space._as_doubles(array) for factor, array in zip(self.factors, arrays, strict=True)]
+        self.compiled.evaluate(x, quantity, outside, per_curve, progress, doubles)
+        for factor, array in zip(self.factors, arrays, strict=True):
+            _all_nan(factor.space, array)
+        return out
+
+    def _refuse_times(self, x: Doubles) -> Never:
+        raise ValidationError(
+            f"with per_curve=True the shape of x must begin with the batch axes {self.batch}; got {x.shape}"
+        )
 
     def lift(
         self,
@@ -190,183 +309,117 @@ class CoreCurve:
         per_curve: bool,
         start: Any = None,
         progress: Progress | None = None,
-    ) -> Array:
+    ) -> Any:
         """Evaluate the horizontal lift that starts at `start`; see `symspline.CubicSpline.lift`."""
-        first = np.take(self.points, 0, axis=len(self.batch))
-        if not is_quotient(self.space):
-            if start is not None:
-                check_start(self.space, first, start)
-            return np.asarray(self.evaluate(x, quantity, outside, per_curve, progress))
-        self._check_times(x, per_curve)
-        if outside == "continue":
-            check_reach(self.times, x)
-        return self._lifted(x, quantity, outside, per_curve, fiber_factors(self.space, first, start), progress)
-
-    def _lifted(
-        self, x: Doubles, quantity: str, outside: str, per_curve: bool, start: Doubles, progress: Progress | None
-    ) -> Array:
-        curve, knots = self._core_curve, self._lift_knots
-        values = _core.lift(*curve, x, quantity, outside, per_curve, knots, start, progress)
-        return self.space._numbers(values)
-
-    @cached_property
-    def _lift_knots(self) -> Doubles:
-        """Unitary factors of the horizontal lift at the knots, computed once."""
-        return _core.lift_knots(*self._core_curve)
-
-    @property
-    def _core_curve(self) -> tuple[_core.Handle, Doubles, Doubles, Doubles]:
-        space = self.space
-        if isinstance(space, Torus) and not self._fitted:
-            return space._handle, *self._with_turns
-        points, velocities = space._as_doubles(self.points), space._as_doubles(self.velocities)
-        return space._handle, self.times, points, velocities
-
-    @cached_property
-    def _with_turns(self) -> tuple[Doubles, Doubles, Doubles]:
-        """Knots, points and velocities on a torus with so many knots that the core keeps whole turns."""
-        times, points, velocities = with_more_knots(self.times, self.points, self.velocities)
-        return times, np.ascontiguousarray(points), np.ascontiguousarray(velocities)
-
-    def _check_times(self, x: Doubles, per_curve: bool) -> None:
+        starts = [None] * len(self.factors) if start is None else parts_of(start, self.space, "start")
+        fibers: list[Doubles | None] = []
+        for factor, begin in zip(self.factors, starts, strict=True):
+            first = np.take(factor.points, 0, axis=len(self.batch))
+            lifted = is_quotient(factor.space)
+            if not lifted and begin is not None:
+                check_start(factor.space, first, begin)
+            fibers.append(fiber_factors(factor.space, first, begin) if lifted else None)
         if per_curve and x.shape[: len(self.batch)] != self.batch:
-            raise ValidationError(
-                f"with per_curve=True the shape of x must begin with the batch axes {self.batch}; got {x.shape}"
-            )
+            self._refuse_times(x)
+        if outside == "continue" and any(fiber is not None for fiber in fibers):
+            check_reach(self.times, x)
+        # Unitary factors of the lift are the same in the span of the points.
+        return self._finished(self.compiled.lift(x, quantity, outside, per_curve, fibers, progress))
 
     def transport(self, times: tuple[float, float], outside: str, v: Any) -> Any:
         """Transport one tangent vector per curve in parallel from one time to another.
 
         See `symspline.CubicSpline.transport`.
         """
-        space = self.space
-        vectors = np.ascontiguousarray(space._as_doubles(np.asarray(v, space.dtype)))
-        return space._numbers(_core.transport(*self._core_curve, times, outside, vectors))
+        given = parts_of(v, self.space, "v")
+        if any(span is not None for span in self._spans):
+            return self._joined(
+                [part._transport_in_span(times, outside, own) for part, own in zip(self.parts, given, strict=True)]
+            )
+        spaces = [factor.space for factor in self.factors]
+        vectors = [
+            np.ascontiguousarray(space._as_doubles(np.asarray(own, space.dtype)))
+            for space, own in zip(spaces, given, strict=True)
+        ]
+        moved = self.compiled.transport(times, outside, vectors)
+        return self._joined([space._numbers(own) for space, own in zip(spaces, moved, strict=True)])
+
+    def _transport_in_span(self, times: tuple[float, float], outside: str, v: Any) -> Any:
+        if not self.space._is_large:
+            return self.transport(times, outside, v)
+        # The span includes the vector, whose component outside the span of the curve is transported, too.
+        knots = len(self.batch)
+        rows = np.expand_dims(np.asarray(v, self.space.dtype), knots)
+        span = span_of(self.space, self.points, self.velocities, rows)
+        moved = in_span(self, span).transport(times, outside, np.squeeze(span.coordinates(rows), knots))
+        return np.squeeze(span.embed(np.expand_dims(moved, knots)), knots)
 
     def control_points(self) -> Any:
         """Compute the control points of the Bézier segments, shape (..., N, 4, *point_shape)."""
-        h = np.diff(self.times)
-        third = h.reshape(h.shape + (1,) * len(self.space.point_shape)) / 3
-        (p, q), (u, w) = (self.space._neighbours(x) for x in (self.points, self.velocities))
+        return self._joined([self._control_points(factor) for factor in self.factors])
+
+    def _control_points(self, factor: FactorArrays) -> Array:
+        space, h = factor.space, np.diff(self.times)
+        third = h.reshape(h.shape + (1,) * len(space.point_shape)) / 3
+        before = factor.velocities if factor.before is None else factor.before
+        (p, q), (u, _), (_, w) = (space._neighbours(own) for own in (factor.points, factor.velocities, before))
         with np.errstate(all="ignore"):
             handles = third * u, -third * w
         # Control points of curves without a solution are NaN.
-        inner = [self.space._apply("exp", p=at, v=handle) for at, handle in zip((p, q), handles, strict=True)]
+        inner = [space._apply("exp", p=at, v=handle) for at, handle in zip((p, q), handles, strict=True)]
         return np.stack([p, *inner, q], axis=len(self.batch) + 1)
+
+    # ---- derivatives with respect to the data ----
 
     def jvp(self, at: SampleTimes, bc_type: Any, points: Any, t: Any, ends: Any) -> Any:
         """Compute the change of the curve for a change of its data; see `symspline.CubicSpline.jvp`."""
-        return derivatives.jvp(self, at, bc_type, points, t, ends)
-
-    def vjp(self, at: SampleTimes, bc_type: Any, cotangent: Any) -> Gradient[Any]:
-        """Compute the gradient with respect to the data; see `symspline.CubicSpline.vjp`."""
-        return derivatives.vjp(self, at, bc_type, cotangent)
-
-    def take_batch(self, index: Any) -> Self:
-        """Return one curve or a slice of curves along the first batch axis."""
-        times = np.ascontiguousarray(self.times[index]) if self.times.ndim > 1 else self.times
-        points, velocities = (np.ascontiguousarray(x[index]) for x in (self.points, self.velocities))
-        return type(self)(self.space, times, points, velocities, self._fitted)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), (self.space, self.times, self.points, self.velocities, self._fitted)
-
-
-class ProductCurve:
-    """Curves in a product space, one per factor, with the same knots.
-
-    Points, velocities and results of methods are tuples with one entry per factor.
-    """
-
-    max_nu: ClassVar[int] = 3
-
-    def __init__(self, space: Space[Any], parts: tuple[CoreCurve, ...]) -> None:
-        self.space: Space[Any] = space
-        self.times: Doubles = parts[0].times
-        self._parts = parts
-        self.points: Any = tuple([part.points for part in parts])
-        self.velocities: Any = tuple([part.velocities for part in parts])
-
-    @property
-    def quad_rtol(self) -> float:
-        return max(part.quad_rtol for part in self._parts)
-
-    @property
-    def batch(self) -> tuple[int, ...]:
-        return self._parts[0].batch
-
-    @property
-    def parts(self) -> tuple[CoreCurve, ...]:
-        return self._parts
-
-    def evaluate(
-        self,
-        x: Doubles,
-        quantity: str,
-        outside: str,
-        per_curve: bool,
-        progress: Progress | None = None,
-        out: Any = None,
-    ) -> Any:
-        count = len(self._parts)
-        arrays = (None,) * count if out is None else parts_of(out, self.space, "out")
-        values = tuple(
-            part.evaluate(x, quantity, outside, per_curve, share(progress, i, count), one)
-            for i, (part, one) in enumerate(zip(self._parts, arrays, strict=True))
-        )
-        return np.asarray(product_norm(values)) if quantity in NORMS else values
-
-    def lift(
-        self,
-        x: Doubles,
-        quantity: str,
-        outside: str,
-        per_curve: bool,
-        start: Any = None,
-        progress: Progress | None = None,
-    ) -> Any:
-        count = len(self._parts)
-        starts = (None,) * count if start is None else parts_of(start, self.space, "start")
-        return tuple(
-            part.lift(x, quantity, outside, per_curve, one, share(progress, i, count))
-            for i, (part, one) in enumerate(zip(self._parts, starts, strict=True))
-        )
-
-    def transport(self, times: tuple[float, float], outside: str, v: Any) -> Any:
-        each = zip(self._parts, parts_of(v, self.space, "v"), strict=True)
-        return tuple(part.transport(times, outside, one) for part, one in each)
-
-    def control_points(self) -> Any:
-        return tuple(part.control_points() for part in self._parts)
-
-    def jvp(self, at: SampleTimes, bc_type: Any, points: Any, t: Any, ends: Any) -> Any:
-        count = len(self._parts)
+        self._require_derivatives()
+        count = len(self.factors)
         moved = (None,) * count if points is None else parts_of(points, self.space, "points")
         vectors = [
             (None,) * count if end is None else parts_of(end, self.space, "an end vector") for end in pair_of(ends)
         ]
         conditions = ends_in_factors(bc_type, self.space)
-        each = zip(self._parts, conditions, moved, zip(*vectors, strict=True), strict=True)
-        return tuple(part.jvp(at, bc, p, t, pair) for part, bc, p, pair in each)
+        each = zip(self.parts, conditions, moved, zip(*vectors, strict=True), strict=True)
+        return self._joined([derivatives.jvp(part, at, bc, p, t, pair) for part, bc, p, pair in each])
 
     def vjp(self, at: SampleTimes, bc_type: Any, cotangent: Any) -> Gradient[Any]:
+        """Compute the gradient with respect to the data; see `symspline.CubicSpline.vjp`."""
+        self._require_derivatives()
         cotangents = parts_of(cotangent, self.space, "cotangent")
-        each = zip(self._parts, ends_in_factors(bc_type, self.space), cotangents, strict=True)
-        parts = [part.vjp(at, bc, c) for part, bc, c in each]
-        first, last = (None if parts[0].ends[e] is None else tuple(g.ends[e] for g in parts) for e in (0, 1))
-        t = np.sum([g.t for g in parts], axis=0)
-        points: Any = tuple(g.points for g in parts)
+        each = zip(self.parts, ends_in_factors(bc_type, self.space), cotangents, strict=True)
+        gradients = [derivatives.vjp(part, at, bc, own) for part, bc, own in each]
+        if not isinstance(self.space, Product):
+            return gradients[0]
+        first, last = (None if gradients[0].ends[e] is None else tuple(g.ends[e] for g in gradients) for e in (0, 1))
+        t = np.sum([g.t for g in gradients], axis=0)
+        points: Any = tuple(g.points for g in gradients)
         return Gradient(points, t, (first, last))
 
-    def take_batch(self, index: Any) -> ProductCurve:
-        return ProductCurve(self.space, tuple(part.take_batch(index) for part in self._parts))
+    def _require_derivatives(self) -> None:
+        for factor in self.factors:
+            if factor.space._is_large:
+                raise ValidationError(
+                    f"derivatives with respect to the data are not available, because the dimension of {factor.space} "
+                    "is too large: the curve is computed in the span of its points, which motions of the points leave"
+                )
 
-    def __reduce__(self) -> Any:
-        return ProductCurve, (self.space, self._parts)
+    # ---- batches ----
+
+    def take_batch(self, index: Any) -> Self:
+        """Return one curve or a slice of curves along the first batch axis."""
+        times = np.ascontiguousarray(self.times[index]) if self.times.ndim > 1 else self.times
+        factors = tuple(factor.map(lambda array: np.ascontiguousarray(array[index])) for factor in self.factors)
+        return type(self)(self.space, times, factors, self.fitted)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.space, self.times, self.factors, self.fitted)
 
 
-CurveArrays = CoreCurve | ProductCurve
-"""Curves of a batch in any space: knots, points and velocities."""
+def in_span(curve: CurveArrays, span: Span) -> CurveArrays:
+    """Return a curve in coordinates of a span."""
+    factor = FactorArrays(span.space, *curve.factors[0].map(span.coordinates)[1:])
+    return CurveArrays(span.space, curve.times, (factor,), curve.fitted)
 
 
 _NO_TIMES: Doubles = np.empty(0)

@@ -79,9 +79,11 @@ class SplineData(Protocol):
 
     space: Space
     times: Doubles
-    points: Array
-    velocities: Array
 
+    @property
+    def points(self) -> Array: ...
+    @property
+    def velocities(self) -> Array: ...
     @property
     def batch(self) -> tuple[int, ...]: ...
 

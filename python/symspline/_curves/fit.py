@@ -1,9 +1,4 @@
-"""Fits of one curve, a batch of curves, and curves of different lengths, in any space.
-
-The class of a curve depends on the space: `CoreCurve`, `ReducedCurve` in large spaces, `OnManifold` on a manifold made
-of functions, and `ProductCurve` with one curve per factor. To add a class, derive it from `CoreCurve` and list it in
-`kind_of`.
-"""
+"""Fits of one curve, a batch of curves, and curves of different lengths, in any space."""
 
 from __future__ import annotations
 
@@ -23,13 +18,14 @@ from .._base.typing import Progress
 from .._core import ValidationError
 from .._spaces import Array, Doubles, Product, Quotient, Space, Torus, cover_of, factors_of, parts_of
 from ..manifolds import Manifold
-from .curve import CoreCurve, CurveArrays, ProductCurve, share
+from .curve import CurveArrays, FactorArrays, share
 from .ends import NATURAL, End, ends_in_factors, ends_of, is_closed, split_ends
 from .handles import require_short_handles
-from .on_manifold.checks import hermite_on_manifold
-from .on_manifold.on_manifold import OnManifold
-from .reduced import ReducedCurve
-from .solve import Mask, Options, Solved, Task, solve, solve_single, without
+from .on_manifold.checks import hermite_on_manifold, validate_on_manifold
+from .on_manifold.fit import fit_of_one_length
+from .on_manifold.on_manifold import Mixed, OnManifold
+from .reduced import solve_in_span
+from .solve import Mask, Options, Solved, Task, faults_of, solve, solve_in_python, solve_single, validate, without
 from .turns import turns_of
 
 _T = TypeVar("_T")
@@ -127,23 +123,11 @@ class Fit(NamedTuple):
         ]
 
 
-def kind_of(space: Space) -> type[CoreCurve]:
-    """Return the class of curves in a space that is not a product."""
-    known: type[CoreCurve] | None = space.__dict__.get("_curve_kind")
-    if known is None:
-        known = next((kind for kind in (OnManifold, ReducedCurve) if kind.suits(space)), CoreCurve)
-        space.__dict__["_curve_kind"] = known
-    return known
-
-
 def read(points: Any, space: Space[Any]) -> list[Points]:
     """Read points from the user in each factor, in quotients as representatives that are continuous along the curve."""
-    if not isinstance(space, (Product, Quotient)):
-        return [_read(space, points)]
-    found = read_given(points, space)
-    if not any(isinstance(factor, Quotient) for factor in factors_of(space)):
-        return found
-    return [unwrapped(*pair) for pair in zip(factors_of(space), found, strict=True)]
+    if not space._has_quotients:
+        return read_given(points, space) if isinstance(space, Product) else [_read(space, points)]
+    return [unwrapped(*pair) for pair in zip(factors_of(space), read_given(points, space), strict=True)]
 
 
 def unwrapped(space: Space[Any], part: Points) -> Points:
@@ -163,7 +147,10 @@ def read_given(points: Any, space: Space[Any]) -> list[Points]:
     if not isinstance(space, Product):
         return [_read(space, points)]
     found = _in_factors(space, _read, parts_of(points, space, "points"))
-    if len({(part.batch, part.nodes) for part in found}) > 1:
+    equal = True
+    for part in found:
+        equal &= part.nodes == found[0].nodes and part.batch == found[0].batch
+    if not equal:
         described = ", ".join(f"{part.nodes} points, batch axes {part.batch}" for part in found)
         raise ValidationError(f"the factors of points have different lengths, or their batch axes differ: {described}")
     return found
@@ -195,6 +182,8 @@ def _read(space: Space, points: Any) -> Points:
 
 def read_ends(bc_type: Any, space: Space[Any], batch: tuple[int, ...]) -> list[list[End] | None]:
     """Read end conditions in each factor."""
+    if isinstance(bc_type, str) and bc_type == "natural":
+        return [NATURAL] * (len(space.factors) if isinstance(space, Product) else 1)
     if not isinstance(space, Product):
         return [ends_of(bc_type, space, batch)]
     conditions = ends_in_factors(bc_type, space)
@@ -277,9 +266,19 @@ def curve_of(
     fitted : bool
         Whether velocities are those of a C² curve.
     """
-    factors = factors_of(space)
-    parts = [kind_of(f)(f, times, *pair, fitted) for f, pair in zip(factors, arrays, strict=True)]
-    return ProductCurve(space, tuple(parts)) if isinstance(space, Product) else parts[0]
+    factors = tuple([FactorArrays(f, *pair) for f, pair in zip(factors_of(space), arrays, strict=True)])
+    return curve_of_factors(space, times, factors, fitted)
+
+
+def curve_of_factors(
+    space: Space[Any], times: Doubles, factors: tuple[FactorArrays, ...], fitted: bool = True
+) -> CurveArrays:
+    """Return the curve with given arrays in each factor."""
+    kind: type[CurveArrays] = CurveArrays
+    for factor in factors:
+        if factor.space._in_python:
+            kind = Mixed if isinstance(space, Product) else OnManifold
+    return kind(space, times, factors, fitted)
 
 
 def mask_of(where: Any, batch: tuple[int, ...]) -> Mask | None:
@@ -295,22 +294,18 @@ def mask_of(where: Any, batch: tuple[int, ...]) -> Mask | None:
 def fit(problem: FitProblem, progress: Progress | None = None) -> Fit:
     """Fit curves with equal numbers of points."""
     space, times, points, ends, options, check, mask, skip, names = problem
-    if len(points) == 1 and kind_of(space) is CoreCurve:
-        # The core validates the points in the same call.
-        data = points[0]
-        tol = data.tol if check else None
-        own = space.cover if isinstance(space, Quotient) else space
-        task = Task(own, times, data.numbers, ends[0], tol, None, mask, check and skip, names)
-        found = solve_single(task, options, progress)
-        single = CoreCurve(space, times, found.points, found.velocities)
-        return Fit(single, [found.columns], options.method, found.faults)
-    tasks = [
-        Task(cover_of(factor), times, part.numbers, end, part.tol if check else None, None, mask, check and skip, names)
-        for factor, part, end in zip(factors_of(space), points, ends, strict=True)
-    ]
+    factors = factors_of(space)
+    # Loops take fewer calls of functions than comprehensions, and most fits are short.
+    tasks, arrays, columns = [], [], []
+    for factor, part, end in zip(factors, points, ends, strict=True):
+        cover = factor.cover if isinstance(factor, Quotient) else factor
+        tol = part.tol if check else None
+        tasks.append(Task(cover, times, part.numbers, end, tol, None, mask, check and skip, names))
     solved, faults = solve_tasks(space, tasks, options, progress)
-    curve = curve_of(space, times, [found[:2] for found in solved])
-    return Fit(curve, [found.columns for found in solved], options.method, faults)
+    for factor, found in zip(factors, solved, strict=True):
+        arrays.append(FactorArrays(factor, found.points, found.velocities))
+        columns.append(found.columns)
+    return Fit(curve_of_factors(space, times, tuple(arrays)), columns, options.method, faults)
 
 
 def fit_many(problem: ManyProblem, progress: Progress | None) -> tuple[list[Fit], list[Fault]]:
@@ -337,7 +332,7 @@ def fit_many(problem: ManyProblem, progress: Progress | None) -> tuple[list[Fit]
         return Fit(curve_of(space, times[i], arrays), columns, options.method, [])
 
     fits = [one(i, *pair) for i, pair in enumerate(pairwise(offsets))]
-    return fits, sorted(invalid + faults, key=_number)
+    return fits, sorted(invalid + faults, key=lambda fault: fault.curve)
 
 
 def validated(
@@ -403,46 +398,42 @@ def hermite_data(
     return _in_factors(space, checked, list(zip(points, velocities, strict=True)))
 
 
+def _validate(task: Task, options: Options) -> tuple[Task, list[Fault]]:
+    return validate_on_manifold(task, options) if isinstance(task.space, Manifold) else validate(task)
+
+
+def _solve(task: Task, options: Options, progress: Progress | None) -> Solved:
+    if not (task.space._in_python or task.space._is_large):
+        return solve_single(task, options, progress)
+    solver = fit_of_one_length if isinstance(task.space, Manifold) else solve_in_span
+    return solve_in_python(task, options, progress, solver)
+
+
 def solve_tasks(
     space: Space, tasks: list[Task], options: Options, progress: Progress | None
 ) -> tuple[list[Solved], list[Fault]]:
     """Validate the tasks of all factors, then solve them. Return the solutions and the faults."""
-    if all(kind_of(task.space) is CoreCurve for task in tasks):
+    compiled = True
+    for task in tasks:
+        compiled &= not (task.space._in_python or task.space._is_large)
+    if compiled:
         try:
-            solved = solve(tasks, options, progress)
+            return solve(tasks, options, progress)
         except ValidationError as error:
             number = vars(error).pop("_factor", None)
             raise (error if number is None else _in_factor(error, number, tasks[number].space)) from None
-        return solved, _faults_of(solved, [])
     tasks, invalid = validated_tasks(space, tasks, options)
-    solved = [kind_of(task.space).solve(task, options, share(progress, i, len(tasks))) for i, task in enumerate(tasks)]
-    return solved, _faults_of(solved, invalid)
+    each = [_solve(task, options, share(progress, i, len(tasks))) for i, task in enumerate(tasks)]
+    return each, faults_of(each, invalid)
 
 
 def validated_tasks(space: Space, tasks: list[Task], options: Options) -> tuple[list[Task], list[Fault]]:
     """Validate tasks and project their points. A curve that is skipped in one factor is masked in all of them."""
-    each = _in_factors(space, lambda factor, task: kind_of(factor).validate(task, options), tasks)
+    each = _in_factors(space, lambda _, task: _validate(task, options), tasks)
     found = {fault.curve: fault for _, faults in reversed(each) for fault in faults}
     faults = [found[curve] for curve in sorted(found)]
     mask = without(tasks[0].mask, faults, tasks[0].batch)
     return [task._replace(mask=mask) for task, _ in each], faults
-
-
-def _faults_of(solved: list[Solved], invalid: list[Fault]) -> list[Fault]:
-    """Return the faults of invalid curves and those of one factor, in the order of curves.
-
-    This is the first factor in which a curve failed. If there is none, it is the first factor with faults.
-    """
-    of_points = [*invalid, *(fault for found in solved for fault in found.faults if fault.kind == INVALID)]
-    # The first fault of a curve counts.
-    skipped = {fault.curve: fault for fault in reversed(of_points)}
-    others = [[fault for fault in found.faults if fault.kind != INVALID] for found in solved]
-    others = sorted(filter(None, others), key=lambda own: not any(fault.failed for fault in own))
-    return sorted([*skipped.values(), *(others[0] if others else [])], key=_number)
-
-
-def _number(fault: Fault) -> int:
-    return fault.curve
 
 
 def _in_factors(space: Space[Any], work: Callable[[Space, Any], _T], values: Sequence[Any]) -> list[_T]:
@@ -476,7 +467,7 @@ def _check_precision(problem: ManyProblem) -> list[Fault]:
             knots = np.arange(len(times[number]), dtype=float)
             task = Task(factor, knots, own[i].numbers, NATURAL, own[i].tol)
             try:
-                kind_of(factor).validate(task, _ANY)
+                _validate(task, _ANY)
             except ValidationError as error:
                 if not skip:
                     raise error._of_curve(number) from None

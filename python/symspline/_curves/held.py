@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from .._base.warnings import warn
 from .._spaces import Array
 
 # Least number of points, and of runs of equal points that are not cut off at an end.
-_POINTS, _RUNS = 12, 5
+FEWEST_HELD, _RUNS = 12, 5
 # Least share of copies among the points, and of runs with a copy: a body at rest is one long run.
 _COPIES, _REPEATED = 0.2, 0.2
 # Least share of runs that are not much longer than the median, and of runs whose point occurs in no other run. Points
@@ -48,13 +49,16 @@ def warn_of_held_points(
     bool
         Whether the warning was issued.
     """
-    axis = len(batch)
-    if (
-        times.shape[-1] < _POINTS
-        or times.dtype.kind not in "iufM"
-        or any(own.dtype.kind not in "iufc" for own in points)
-    ):
+    axis, nodes = len(batch), times.shape[-1]
+    if nodes < FEWEST_HELD or times.dtype.kind not in "iufM":
         return False
+    for own in points:
+        if own.dtype.kind not in "iufc":
+            return False
+        # Nearly always the first numbers of the points show that few are copies.
+        first = own.reshape(-1)[:: math.prod(own.shape[axis + 1 :]) or 1]
+        if np.count_nonzero(first[1:] == first[:-1]) < _COPIES * (nodes - 1):
+            return False
     equal = np.broadcast_to(np.diff(times) > 0, (*batch, times.shape[-1] - 1))
     for own in points:
         rows = own.reshape(*own.shape[: axis + 1], -1)

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from .._base.typing import Progress
-from .._spaces import Array, Doubles, Space, cover_of
-from .curve import CoreCurve, CurveArrays, share
+from .._spaces import Array, Doubles, Product, Space, cover_of
+from .curve import CurveArrays, share
 
 # Chebyshev nodes of half a segment, on which the acceleration is interpolated.
 _NODES = 16
@@ -25,11 +25,11 @@ def jerk(curve: CurveArrays, x: Doubles, outside: str, per_curve: bool, progress
     Parameters
     ----------
     curve, x, outside, per_curve, progress
-        As for `CoreCurve.evaluate`.
+        As for `CurveArrays.evaluate`.
     """
     count = len(curve.parts)
     found = [_in_factor(part, x, outside, per_curve, share(progress, i, count)) for i, part in enumerate(curve.parts)]
-    return found[0] if isinstance(curve, CoreCurve) else tuple(found)
+    return tuple(found) if isinstance(curve.space, Product) else found[0]
 
 
 def differentiation(nodes: Doubles, x: Doubles) -> Doubles:
@@ -41,7 +41,7 @@ def differentiation(nodes: Doubles, x: Doubles) -> Doubles:
     return np.asarray(derivatives @ np.linalg.inv(chebyshev.chebvander(nodes, degree)))
 
 
-def _in_factor(part: CoreCurve, x: Doubles, outside: str, per_curve: bool, progress: Progress | None) -> Array:
+def _in_factor(part: CurveArrays, x: Doubles, outside: str, per_curve: bool, progress: Progress | None) -> Array:
     space, axes = cover_of(part.space), len(part.batch)
     if (per_curve and x.ndim == axes) or not x.ndim:
         # One time per curve.
@@ -65,7 +65,7 @@ def _in_factor(part: CoreCurve, x: Doubles, outside: str, per_curve: bool, progr
     return result
 
 
-def _halves(part: CoreCurve, x: Doubles, outside: str) -> tuple[Doubles, Doubles]:
+def _halves(part: CurveArrays, x: Doubles, outside: str) -> tuple[Doubles, Doubles]:
     """Return an interval that contains each time, on which the curve is smooth: its start and its width."""
     if part.times.ndim == 1:
         return _halves_of(part.times, x, outside)

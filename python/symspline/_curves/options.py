@@ -10,7 +10,6 @@ import numpy as np
 from .._base.arrays import checked_atol, checked_flag, short_repr, whole_number
 from .._base.typing import Extrapolate, Progress
 from .._core import ValidationError
-from .ends import is_closed
 from .fit import Points
 from .solve import Options
 
@@ -36,6 +35,8 @@ class EvaluationOptions(TypedDict, total=False):
 
 def quantity_of(nu: Any, most: int = 2) -> str:
     """The name of the derivative of order `nu`. Those up to the second order are known to the core."""
+    if type(nu) is int and 0 <= nu <= most:
+        return _QUANTITIES[nu]
     return _QUANTITIES[order_of(nu, most)]
 
 
@@ -73,7 +74,8 @@ def checked_extrapolate(extrapolate: Any) -> Any:
 
 def extrapolation_mode(policy: Any, bc_type: Any) -> str:
     """Return the core's name of an extrapolation policy. Closed curves repeat unless another policy is given."""
-    return "periodic" if policy is None and is_closed(bc_type) else _EXTRAPOLATION_MODES[policy]
+    closed = isinstance(bc_type, str) and bc_type == "periodic"
+    return "periodic" if policy is None and closed else _EXTRAPOLATION_MODES[policy]
 
 
 def check_progress(progress: Any) -> None:

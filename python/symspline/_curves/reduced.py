@@ -8,18 +8,14 @@ Curves are fitted and evaluated in these coordinates, and the results are embedd
 from __future__ import annotations
 
 import math
-from functools import cached_property
-from typing import Any, NamedTuple, Never
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from .._base.typing import Progress
-from .._core import ValidationError
-from .._spaces import Array, ComplexGrassmannian, Doubles, Grassmannian, Hyperbolic, Space, cover_of
-from .._spaces.base import LARGE as _LARGE
-from .curve import NORMS, CoreCurve, CurveArrays
+from .._spaces import Array, ComplexGrassmannian, Grassmannian, Hyperbolic, Space, cover_of
 from .ends import map_ends
-from .solve import Options, Solved, Task, solve_in_python, solve_single
+from .solve import Options, Solved, Task, solve_single
 
 
 class Span(NamedTuple):
@@ -46,11 +42,6 @@ class Span(NamedTuple):
         time, columns, shape = _columns(self.space, x)
         small = np.swapaxes(self.basis.conj(), -1, -2) @ columns
         return _uncolumns(self.space, time, small, shape)
-
-    def inside(self, curve: CurveArrays) -> CoreCurve:
-        """Return a curve in the small space."""
-        points, velocities = self.coordinates(curve.points), self.coordinates(curve.velocities)
-        return CoreCurve(self.space, curve.times, points, velocities)
 
     def embed(self, x: Array) -> Array:
         """Return the points or vectors with given coordinates."""
@@ -103,64 +94,13 @@ def _uncolumns(space: Space, time: Array | None, columns: Array, shape: tuple[in
 
 def reduced(space: Space[Any], points: Array) -> tuple[Space[Any], Array, Span | None]:
     """Return the space and the points to compute with, and the span of a low-rank reduction or None."""
-    if not ReducedCurve.suits(space):
+    if not space._is_large:
         return space, points, None
     span = span_of(space, points)
     return span.space, span.coordinates(points), span
 
 
-class ReducedCurve(CoreCurve):
-    """Curves in a large space that are computed in the span of their points."""
-
-    _compiled = False
-
-    @staticmethod
-    def suits(space: Space) -> bool:
-        return space._linear and space.point_shape[0] >= _LARGE
-
-    @staticmethod
-    def solve(task: Task, options: Options, progress: Progress | None = None) -> Solved:
-        return solve_in_python(task, options, progress, _solve)
-
-    @cached_property
-    def small(self) -> tuple[Span, CoreCurve]:
-        """The span and the curves in it, computed once."""
-        vectors = self.velocities
-        if self._fitted:
-            vectors = np.take(vectors, [0, -1], axis=len(self.batch))
-        span = span_of(self.space, self.points, vectors)
-        return span, span.inside(self)
-
-    def _evaluate(self, x: Doubles, quantity: str, outside: str, per_curve: bool, progress: Progress | None) -> Any:
-        span, small = self.small
-        values = small.evaluate(x, quantity, outside, per_curve, progress)
-        return values if quantity in NORMS else span.embed_samples(values, self.batch)
-
-    def _lifted(
-        self, x: Doubles, quantity: str, outside: str, per_curve: bool, start: Doubles, progress: Progress | None
-    ) -> Array:
-        # Unitary factors of the lift are the same in the span.
-        span, small = self.small
-        return span.embed_samples(small._lifted(x, quantity, outside, per_curve, start, progress), self.batch)
-
-    def transport(self, times: tuple[float, float], outside: str, v: Any) -> Array:
-        # The span includes the vector, whose component outside the span of the curve is transported, too.
-        knots = len(self.batch)
-        rows = np.expand_dims(np.asarray(v, self.space.dtype), knots)
-        span = span_of(self.space, self.points, self.velocities, rows)
-        found = span.inside(self).transport(times, outside, np.squeeze(span.coordinates(rows), knots))
-        return np.squeeze(span.embed(np.expand_dims(found, knots)), knots)
-
-    def jvp(self, *_: Any, **__: Any) -> Never:
-        raise ValidationError(
-            f"derivatives with respect to the data are not available, because the dimension of {self.space} is too "
-            "large: the curve is computed in the span of its points, which motions of the points leave"
-        )
-
-    vjp = jvp
-
-
-def _solve(task: Task, options: Options, progress: Progress | None) -> Solved:
+def solve_in_span(task: Task, options: Options, progress: Progress | None) -> Solved:
     """Solve a task of curves with equal numbers of points in the span of the points."""
     space = task.space
     points = space._numbers(task.points)

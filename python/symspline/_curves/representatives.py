@@ -46,21 +46,15 @@ def warn_of_representatives(
     points, curves, longest_steps
         As for `warn_of_signs` and `warn_of_far_points`.
     """
-    factors = factors_of(space)
-    for each in longest_steps:
-        for factor, own in zip(factors, each, strict=True):
+    for curve, each in zip(curves, longest_steps, strict=True):
+        for (factor, *_), own in zip(curve.factors, each, strict=True):
             limit = factor.__dict__.get("_longest_near_step") or _longest_near_step(factor)
-            if _any_exceeds(own, limit):
+            longest = own.numbers[MAX_STEP] if isinstance(own, Columns) else own
+            # Operations on arrays would take longer than the rest of this module's work for one curve.
+            if longest.item() > limit if longest.size == 1 else (longest > limit).any():
                 warn_of_signs(space, points)
                 warn_of_far_points(curves, longest_steps)
                 return
-
-
-def _any_exceeds(steps: Columns | Doubles, limit: float) -> bool:
-    """Whether the longest step of any curve exceeds a limit."""
-    longest = _longest(steps)
-    # Operations on arrays would take longer than the rest of this module's work for one curve.
-    return longest.item() > limit if longest.size == 1 else bool((longest > limit).any())
 
 
 def _longest(steps: Columns | Doubles) -> Doubles:

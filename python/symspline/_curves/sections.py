@@ -18,7 +18,7 @@ from .._spaces import POINT_TOL, Array, Doubles, Product, Quotient, Space, cover
 from .curve import CurveArrays, share
 from .ends import End
 from .fit import Fit, FitProblem, Points, curve_of, solve_tasks, validated_tasks
-from .integrals import alternative_energy
+from .length import alternative_energy
 from .solve import Solved, Task
 
 InnerVelocities = dict[int, list[Doubles]]

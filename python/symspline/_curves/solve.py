@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
-from .._base.faults import Fault, from_core
+from .._base.faults import INVALID, Fault, from_core
 from .._base.report import Columns
 from .._base.typing import Progress
 from .._spaces import Array, Space
@@ -88,33 +88,45 @@ class Solved(NamedTuple):
 Solver = Callable[[Task, Options, Progress | None], Solved]
 
 
-def solve(tasks: Sequence[Task], options: Options, progress: Progress | None = None) -> list[Solved]:
-    """Validate and solve the tasks of all factors, which share knots and masks, in one call of the core."""
+def solve(
+    tasks: Sequence[Task], options: Options, progress: Progress | None = None
+) -> tuple[list[Solved], list[Fault]]:
+    """Validate and solve the tasks of all factors, which share knots and masks, in one call of the core.
+
+    Return the solutions and their faults.
+    """
     _, times, _, _, _, offsets, mask, skip, _ = tasks[0]
-    factors = [(task.space._handle, task.points, task.ends, task.tol) for task in tasks]
+    factors, solved, failed = [], [], False
+    for task in tasks:
+        factors.append((task.space._handle, task.points, task.ends, task.tol))
     each = _core.fit(factors, times, *options, offsets, None if mask is None else mask.ravel().tolist(), skip, progress)
-    return [_solved(task, options, own) for task, own in zip(tasks, each, strict=True)]
+    for task, (points, velocities, tables, raw) in zip(tasks, each, strict=True):
+        space, columns, faults = task.space, Columns(*tables), []
+        if raw:
+            failed, quaternions = True, space._name == "sphere"
+            faults = [from_core(one, columns, options.tol, quaternions, task.names) for one in raw]
+        if space._complex:
+            points, velocities = space._numbers(points), space._numbers(velocities)
+        solved.append(Solved(points, velocities, columns, faults))
+    return solved, faults_of(solved, []) if failed else []
 
 
 def solve_single(task: Task, options: Options, progress: Progress | None = None) -> Solved:
-    """Validate and solve the task of one space, as `solve` but without its loops."""
-    space, times, points, ends, tol, offsets, mask, skip, _ = task
-    factors = ((space._handle, points, ends, tol),)
-    each = _core.fit(factors, times, *options, offsets, None if mask is None else mask.ravel().tolist(), skip, progress)
-    return _solved(task, options, each[0])
+    """Validate and solve the task of one space."""
+    return solve([task], options, progress)[0][0]
 
 
-def _solved(task: Task, options: Options, found: Any) -> Solved:
-    """Return what the core found for one task."""
-    space = task.space
-    points, velocities, tables, raw = found
-    columns, faults = Columns(*tables), []
-    if raw:
-        quaternions = space._name == "sphere"
-        faults = [from_core(one, columns, options.tol, quaternions, task.names) for one in raw]
-    if space._complex:
-        points, velocities = space._numbers(points), space._numbers(velocities)
-    return Solved(points, velocities, columns, faults)
+def faults_of(solved: list[Solved], invalid: list[Fault]) -> list[Fault]:
+    """Return the faults of invalid curves and those of one factor, in the order of curves.
+
+    This is the first factor in which a curve failed. If there is none, it is the first factor with faults.
+    """
+    of_points = [*invalid, *(fault for found in solved for fault in found.faults if fault.kind == INVALID)]
+    # The first fault of a curve counts.
+    skipped = {fault.curve: fault for fault in reversed(of_points)}
+    others = [[fault for fault in found.faults if fault.kind != INVALID] for found in solved]
+    others = sorted(filter(None, others), key=lambda own: not any(fault.failed for fault in own))
+    return sorted([*skipped.values(), *(others[0] if others else [])], key=lambda fault: fault.curve)
 
 
 def validate(task: Task) -> tuple[Task, list[Fault]]:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from .. import _core
 from .._base.arrays import as_array, short_repr
 from .._core import ValidationError
-from .._curves.curve import CoreCurve
+from .._curves.curve import CurveArrays
 from .._curves.ends import end_kinds
 from .._curves.fit import FitProblem, Points, fit, read_ends
 from .._curves.solve import DEFAULTS
@@ -241,7 +241,7 @@ class Relaxation:
         return self._factor
 
 
-def fitted(setup: Setup, points: list[Array]) -> list[CoreCurve] | None:
+def fitted(setup: Setup, points: list[Array]) -> list[CurveArrays] | None:
     """Return the splines through points in every part, or None if one of them does not exist."""
     curves: list[Any] = []
     for space, rows in zip(setup.spaces, points, strict=True):
@@ -503,7 +503,7 @@ class Iteration:
             found.append(np.einsum("ij,ij...->i...", own, frames))
         return found
 
-    def _moved(self, step: Step, factor: float) -> list[CoreCurve] | None:
+    def _moved(self, step: Step, factor: float) -> list[CurveArrays] | None:
         """Move points and parameters by a part of a step, and return the new curves if there are any."""
         self.points = [
             np.asarray(space.project(space._apply("exp", p=p, v=factor * v)))
@@ -517,7 +517,7 @@ class Iteration:
         return fitted(self.setup, self.points)
 
 
-def bending(curve: CoreCurve) -> list[Doubles]:
+def bending(curve: CurveArrays) -> list[Doubles]:
     """Return velocities and accelerations at the knots in frames along the curve, in units of their mean distance."""
     space = curve.space
     points, velocities = (np.ascontiguousarray(space._as_doubles(x)) for x in (curve.points, curve.velocities))
@@ -540,7 +540,7 @@ def parameter_columns(setup: Setup, own: Linearised) -> Doubles:
     return np.ascontiguousarray(np.concatenate([np.zeros((*shape, 0)), *columns], axis=-1))
 
 
-def energy(curve: CoreCurve, penalty: str) -> float:
+def energy(curve: CurveArrays, penalty: str) -> float:
     """Return the integral of the squared acceleration or jerk, by two points per segment or from the knots."""
     knots = curve.times
     h = np.diff(knots)
@@ -559,7 +559,7 @@ def _is_finite(found: Linear) -> bool:
     return all(bool(np.isfinite(own).all()) for own in numbers)
 
 
-def _turn(space: Space, curve: CoreCurve) -> float:
+def _turn(space: Space, curve: CurveArrays) -> float:
     """Return the largest distance that a curve covers between two knots, in units of the radius of curvature.
 
     Spaces without curvature have none.

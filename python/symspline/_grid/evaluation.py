@@ -12,7 +12,7 @@ from .._base.arrays import short_repr
 from .._base.typing import Progress
 from .._core import ValidationError
 from .._curves.jerk import differentiation, transported
-from .._curves.reduced import ReducedCurve, span_of
+from .._curves.reduced import span_of
 from .._spaces import Array, Doubles, Space
 from ..manifolds import Manifold
 from .axes import GridAxis, Sites
@@ -50,7 +50,7 @@ class FactorGrid:
         if isinstance(space, Manifold):
             self.forward = ManifoldGrid(space, axes, points)
             return
-        if not ReducedCurve.suits(space):
+        if not space._is_large:
             self.forward = CompiledGrid(space, axes, points, None, velocities, progress)
             return
         flat = points.reshape(-1, *space.point_shape)

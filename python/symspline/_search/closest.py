@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 
 from .. import _core
 from .._core import CutLocusError, ValidationError
-from .._curves.arc_length import ArcLength
-from .._curves.curve import CoreCurve, ProductCurve
-from .._curves.integrals import Evaluable
+from .._curves.curve import CurveArrays
+from .._curves.length import ArcLength, Evaluable
 from .._curves.representatives import cut_fractions
 from .._spaces import Array, Doubles, Quotient, Space, factors_of, parts_of, product_norm
 from ..manifolds import Manifold
@@ -53,7 +52,7 @@ class ClosestPoints:
             Index of the curve of each point in the flattened batch, not decreasing.
         """
         times, distances = np.full((2, len(curve)), np.nan)
-        good = np.flatnonzero(np.isfinite(self._arc.lengths.reshape(self.count, -1)[curve, -1]))
+        good = np.flatnonzero(np.isfinite(self._arc.lengths[curve, -1]))
         if not good.size:
             return times, distances
         found = self._found([x[good] for x in targets], curve[good])
@@ -65,32 +64,29 @@ class ClosestPoints:
         return times, distances
 
     def _found(self, targets: list[Array], curve: Indices) -> tuple[Doubles, Doubles]:
-        parts = self._parts_of_core
-        if not parts:
+        compiled = self._compiled
+        if compiled is None:
             distances = _Distances(self, targets, curve)
             return _core.closest(self.times, self.lengths, curve, distances.of_samples, distances.at)
-        factors = []
-        for part, samples, own in zip(parts, self.points, targets, strict=True):
-            handle, t, points, velocities = part._core_curve
-            rows = (np.ascontiguousarray(part.space._as_doubles(x)) for x in (samples, own))
-            factors.append((handle, (points, velocities, *rows)))
-        return _core.closest_on_curves(t, factors, self.times, self.lengths, curve)
+        samples, points = (
+            [np.ascontiguousarray(f._as_doubles(x)) for f, x in zip(self.factors, arrays, strict=True)]
+            for arrays in (self.points, targets)
+        )
+        return compiled.closest(self.times, self.lengths, samples, points, curve)
 
     @cached_property
-    def _parts_of_core(self) -> tuple[CoreCurve, ...]:
-        """The curves in each factor, if the core can evaluate all of them and all distances."""
-        if not isinstance(self._curve, (CoreCurve, ProductCurve)):
-            return ()
-        parts = self._curve.parts
+    def _compiled(self) -> _core.Curve | None:
+        """The curve of the core, if it can compute all points and distances."""
+        curve = self._curve
+        if not isinstance(curve, CurveArrays) or not curve.is_smooth:
+            return None
         # Distances in quotients are those of the nearest representatives.
-        known = all(type(part) is CoreCurve and not isinstance(part.space, Quotient) for part in parts)
-        # The factors of a product must have the same knots.
-        return parts if known and all(part._core_curve[1] is part.times for part in parts) else ()
+        return None if any(isinstance(factor, Quotient) for factor in self.factors) else curve.compiled
 
     @cached_property
     def times(self) -> Doubles:
         """Times of the samples, shape (curves, k); they include the knots."""
-        ends = self._arc.times.reshape(self.count, -1)
+        ends = self._arc.times
         parts = np.arange(_SAMPLES) / _SAMPLES
         inner = ends[:, :-1, None] + parts * np.diff(ends)[..., None]
         return np.concatenate([inner.reshape(self.count, -1), ends[:, -1:]], axis=-1)
@@ -98,8 +94,7 @@ class ClosestPoints:
     @cached_property
     def lengths(self) -> Doubles:
         """Arc lengths up to the samples."""
-        times = np.ascontiguousarray(self.times.reshape(*self._curve.batch, -1))
-        return np.ascontiguousarray(self._arc.at(times).reshape(self.count, -1))
+        return self._arc.at(self.times)
 
     @cached_property
     def points(self) -> list[Array]:

@@ -14,9 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 from .._base.arrays import checked_flag, checked_number, short_repr
 from .._base.typing import FloatArray, P, Time
 from .._core import ValidationError
-from .._curves.arc_length import ArcLength
 from .._curves.composed import Retimed
-from .._curves.integrals import Evaluable
+from .._curves.length import ArcLength, Evaluable
 from .._spaces import Array, Doubles, Space, factors_of, parts_of
 from ..manifolds import Manifold
 from .closest import ClosestPoints

@@ -86,6 +86,12 @@ class Space(Generic[P]):
     _aliases: ClassVar[tuple[str, ...]] = ()
     # Whether points are vectors or bases of subspaces, so that curves stay in the linear span of their points.
     _linear: ClassVar[bool] = False
+    # Whether curves are computed in the span of their points, since the dimension is large.
+    _is_large: bool = False
+    # Whether the space, or a factor of a product, is a quotient.
+    _has_quotients: bool = False
+    # Whether points of the space are made of functions in Python.
+    _in_python: ClassVar[bool] = False
     _handle: Handle
     _parameters: tuple[int, ...]
     _complex: bool
@@ -111,6 +117,7 @@ class Space(Generic[P]):
         self._point_shape = tuple(self._handle.point_shape())
         if max(self._parameters, default=0) >= _MOST or math.prod(self._point_shape) >= _MOST:
             raise ValidationError(f"{self!r} is too large: one point would not fit into memory")
+        self._is_large = self._linear and self._point_shape[0] >= LARGE
         self._complex = self._handle.is_complex()
         self._dtype = np.dtype(np.complex128) if self._complex else np.dtype(np.float64)
         *first, last = self._point_shape
@@ -779,7 +786,7 @@ class Space(Generic[P]):
         >>> ss.SpecialOrthogonal(3).frame([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]).shape
         (3, 3, 3)
         """
-        if self._linear and self.point_shape[0] >= LARGE:
+        if self._is_large:
             raise ValidationError(f"the dimension of {self!r} is too large for frames")
         doubles = self._doubles(p, "p")
         at_each = np.expand_dims(doubles, len(self._lead(doubles)))
@@ -1029,7 +1036,7 @@ class Space(Generic[P]):
         np.float64(0.018)
         """
         noise = self._noise(rng, self._lead(self._doubles(p, "p")))
-        if self._linear and self.point_shape[0] >= LARGE:
+        if self._is_large:
             return self._normal_tangent(p, noise)
         return self._finite("random_tangent", p=p, noise=noise)
 

@@ -80,6 +80,7 @@ class Product(Space[PProduct]):
             raise ValidationError("a Product needs at least two factors")
         given = [factors_of(f) if isinstance(f, Space) else spaces_named(f) for f in factors]
         self.factors: tuple[Space[AnyArray], ...] = tuple(part for parts in given for part in parts)
+        self._has_quotients = any(factor._has_quotients for factor in self.factors)
 
     @property
     def point_shape(self) -> tuple[tuple[int, ...], ...]:  # type: ignore[override]

@@ -122,6 +122,7 @@ class Quotient(Space[P]):
 
     # Averages of representatives are not those of the points.
     _has_angles = False
+    _has_quotients = True
     _first_means = Space._first_means
     _extrinsic_means = Space._extrinsic_means
     _whitening = Space._whitening

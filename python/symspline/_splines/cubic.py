@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from functools import cached_property
+from operator import attrgetter
 from types import GenericAlias
 from typing import TYPE_CHECKING, Any, Generic, Self
 
@@ -22,12 +23,12 @@ from .._curves.derivatives import Gradient, SampleTimes, sample_times
 from .._curves.ends import ends_in_factors, freeze_bc_type, split_accelerations, take_batch
 from .._curves.failures import raise_or_warn
 from .._curves.fit import Fit, Problem, curve_of, fit, mask_of, moved_ends, read, read_ends
-from .._curves.held import warn_of_held_points
-from .._curves.integrals import alternative_energy
+from .._curves.held import FEWEST_HELD, warn_of_held_points
+from .._curves.length import alternative_energy
 from .._curves.options import fit_options, order_of, with_atol
 from .._curves.representatives import warn_of_representatives
 from .._missing import counts_all_samples, curves_without_missing, inner_velocities_of_present, with_remedy
-from .._spaces import Array, Product, Quotient, Space, space_named
+from .._spaces import Array, Space, space_named
 from .append import joined, local_fit
 from .archive import Entries, read_c1_nodes, read_fitted
 from .piecewise_cubic import PiecewiseCubic
@@ -199,13 +200,13 @@ class CubicSpline(PiecewiseCubic[P], Generic[P, R]):
             velocities = inner_velocities_of_present(t, points, space, velocities)
             t, points = curves_without_missing(t, points, space)
         options = fit_options(method, tol, max_iter, extrapolate, on_failure, check, progress)
-        conditions, accelerations = split_accelerations(bc_type)
+        conditions, accelerations = (bc_type, None) if isinstance(bc_type, str) else split_accelerations(bc_type)
         data = read(points, space)
         if atol is not None:
             data = with_atol(data, atol)
         batch, nodes = data[0].batch, data[0].nodes
         time_axis, shown_times, times = knots_of(t, batch, nodes)
-        if isinstance(space, (Product, Quotient)):
+        if space._has_quotients:
             conditions = moved_ends(conditions, space, data)
         ends = read_ends(conditions, space, batch)
         skip_invalid = bool(batch) and on_failure != "raise"
@@ -221,11 +222,13 @@ class CubicSpline(PiecewiseCubic[P], Generic[P, R]):
         except ValidationError as error:
             raise time_axis.explain(with_remedy(error, data)) from None
         self._fit = found
-        super()._fill(time_axis, shown_times, found.curve, freeze_bc_type(conditions), extrapolate)
+        kept: Any = conditions if isinstance(conditions, str) else freeze_bc_type(conditions)
+        super()._fill(time_axis, shown_times, found.curve, kept, extrapolate)
         if found.faults:
             raise_or_warn(found.faults, on_failure, self)
         warn_of_representatives(space, [data], [found.curve], [found.columns])
-        warn_of_held_points(times, [own.numbers for own in data], batch)
+        if nodes >= FEWEST_HELD:
+            warn_of_held_points(times, list(map(attrgetter("numbers"), data)), batch)
 
     # Nodes with a prescribed velocity, where the acceleration may jump.
     _c1_nodes: tuple[int, ...] = ()

@@ -14,9 +14,8 @@ from .._base.arrays import as_array, cast, checked_flag, refuse, short_repr
 from .._base.time import TimeAxis
 from .._base.typing import File, Number, P, Time, TimesLike
 from .._core import ValidationError
-from .._curves.arc_length import ArcLength
 from .._curves.composed import AnyCurve
-from .._curves.integrals import bending_energy, integrate
+from .._curves.length import ArcLength, bending_energy, length
 from .._search.searchable import Searchable
 from .._spaces import Doubles
 from . import archive
@@ -121,9 +120,7 @@ class CurveBase(Searchable[P]):
         """
         curve = self._curve
         if a is None and b is None:
-            return integrate(
-                curve.times, lambda x: curve.evaluate(x, "speed", "continue", True), curve.batch, curve.quad_rtol
-            )
+            return length(curve)
         ends = [
             self._domain_ends[number] if x is None else self._core_times(x, name)
             for number, (x, name) in enumerate([(a, "a"), (b, "b")])
@@ -220,7 +217,7 @@ class CurveBase(Searchable[P]):
         wanted = self._with_batch(cast(array), own, array.ndim - len(batch) * own)
         if 0 in batch:
             return self._shown_times(wanted)
-        total = self._arc.lengths[..., -1].reshape(batch + (1,) * (wanted.ndim - len(batch)))
+        total = self._arc.lengths[:, -1].reshape(batch + (1,) * (wanted.ndim - len(batch)))
         # An arc length that exceeds the length by rounding is the length, such as the last of np.linspace.
         reach = _ROUNDING * total
         wrong = ~((wanted >= -reach) & (wanted <= total + reach)) & ~np.isnan(total)
@@ -261,12 +258,10 @@ class CurveBase(Searchable[P]):
 
     def _by_columns(self, call: Callable[..., Doubles], *arrays: Doubles) -> Number:
         """Call a method of the arc length, which takes shape (*batch, m), for any number of axes of samples."""
-        batch, shape = self._batch, arrays[0].shape
+        shape = arrays[0].shape
         if 0 in shape:
             return np.zeros(shape)
-        values: Number = call(self._arc, *(np.ascontiguousarray(x.reshape(*batch, -1)) for x in arrays)).reshape(shape)[
-            ()
-        ]
+        values: Number = call(self._arc, *arrays)[()]
         return values
 
     def bending_energy(self) -> Number:

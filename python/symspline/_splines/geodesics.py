@@ -10,9 +10,9 @@ import numpy as np
 from .._base.arrays import checked_flag
 from .._base.time import TimeAxis, knots_of
 from .._base.typing import Extrapolate, FloatArray, Number, P, PointsLike, TimesLike
-from .._curves.curve import CoreCurve, CurveArrays
+from .._curves.curve import CurveArrays
 from .._curves.fit import read, read_ends, validated
-from .._curves.geodesics import GeodesicCurve, joined
+from .._curves.geodesics import joined, jumps
 from .._curves.options import checked_extrapolate, with_atol
 from .._curves.representatives import warn_of_representatives
 from .._missing import counts_all_samples, curves_without_missing, missing_named
@@ -152,11 +152,7 @@ class PiecewiseGeodesic(PiecewiseCubic[P]):
         >>> ss.PiecewiseGeodesic(None, [[0.0], [1.0], [0.0]], "r:1").bending_energy()
         np.float64(inf)
         """
-        # The curves of all factors are of this class.
-        jumps = [
-            part.jumps().max(axis=-1, initial=0.0) for part in self._curve.parts if isinstance(part, GeodesicCurve)
-        ]
-        largest = np.max(jumps, axis=0)
+        largest = np.max([own.max(axis=-1, initial=0.0) for own in jumps(self._curve)], axis=0)
         energy: FloatArray = np.where(np.isnan(largest), np.nan, np.where(largest > _STRAIGHT, np.inf, 0.0))
         return energy[()]
 
@@ -173,7 +169,7 @@ class PiecewiseGeodesic(PiecewiseCubic[P]):
         return PiecewiseGeodesic._of(time_axis, t, curve, "natural", self._extrapolate)
 
 
-def _longest_step(part: CoreCurve) -> Doubles:
+def _longest_step(part: CurveArrays) -> Doubles:
     """Return the largest distance between neighbouring points of each curve."""
     p, q = part.space._neighbours(part.points)
     if isinstance(part.space, Manifold):

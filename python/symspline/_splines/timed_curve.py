@@ -102,7 +102,8 @@ class TimedCurve(Curve[P]):
         single = dtype is not None and is_single(dtype)
         if out is not None and dtype is not None:
             raise ValidationError("dtype and out are both given. Pass one of them; the result has the type of out.")
-        quantity, where = quantity_of(nu, self._curve.max_nu), self._where(extrapolate)
+        quantity = quantity_of(nu, self._curve.max_nu)
+        where = self._extrapolation_mode if extrapolate is None else self._where(extrapolate)
         values = evaluated(self._curve, self._time_axis, x, quantity, where, per_curve, progress, out)
         return in_single(values) if single else values
 

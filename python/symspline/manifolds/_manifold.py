@@ -105,6 +105,7 @@ class Manifold(Space):
     True
     """
 
+    _in_python = True
     # What to do about two points without a unique geodesic.
     _remedy = "put a point between them"
 

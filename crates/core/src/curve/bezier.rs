@@ -48,11 +48,12 @@ impl<S: Scalar> Segment<S> {
     pub fn read(&mut self, curves: &Curves, curve: usize, segment: usize, len: usize) {
         let t = curves.knots(curve);
         let third = (t[segment + 1] - t[segment]) / 3.0;
+        let velocities = curves.one_sided();
         for e in 0..2 {
             let row = (curve * curves.nodes + segment + e) * len;
             for j in 0..len {
                 self.ends[e][j] = lane(curves.points[row + j]);
-                self.handles[e][j] = lane(curves.velocities[row + j] * third);
+                self.handles[e][j] = lane(velocities[e][row + j] * third);
             }
         }
     }

@@ -3,6 +3,7 @@
 use super::locate::Locator;
 
 /// Spline curves with equally many knots: the triple (t, p, u).
+#[derive(Clone, Copy)]
 pub struct Curves<'a> {
     /// Knots, one row per curve or one row for all curves.
     pub t: &'a [f64],
@@ -10,11 +11,14 @@ pub struct Curves<'a> {
     pub nodes: usize,
     /// Points, curve after curve.
     pub points: &'a [f64],
-    /// Velocities in the same layout.
+    /// Velocities in the same layout; at knots where the curve has a corner, those after it.
     pub velocities: &'a [f64],
+    /// Velocities before the knots, for curves with corners; otherwise empty.
+    pub before: &'a [f64],
 }
 
 /// Times to evaluate at.
+#[derive(Clone, Copy)]
 pub struct Times<'a> {
     /// The times, one row per curve or one row for all curves.
     pub x: &'a [f64],
@@ -57,6 +61,11 @@ pub enum Outside {
 }
 
 impl Curves<'_> {
+    /// Velocities at the starts and at the ends of segments, each with an entry for every knot.
+    pub(super) fn one_sided(&self) -> [&[f64]; 2] {
+        [self.velocities, if self.before.is_empty() { self.velocities } else { self.before }]
+    }
+
     pub(super) fn knots(&self, curve: usize) -> &[f64] {
         if self.t.len() == self.nodes {
             self.t

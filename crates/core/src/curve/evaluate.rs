@@ -257,10 +257,10 @@ impl Job<'_> {
     ) {
         let SampleCursor { at, h, .. } = cursor;
         let third = *h * lane(1.0 / 3.0);
-        let (p, u) = (self.curves.points, self.curves.velocities);
+        let (p, u) = (self.curves.points, self.curves.one_sided());
         for e in 0..2 {
             gather(at.map(|i| &p[i + e * len..][..len]), &mut ends[e][..len]);
-            gather(at.map(|i| &u[i + e * len..][..len]), &mut handles[e][..len]);
+            gather(at.map(|i| &u[e][i + e * len..][..len]), &mut handles[e][..len]);
             handles[e].iter_mut().for_each(|u| *u *= third);
         }
     }

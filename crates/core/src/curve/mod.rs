@@ -6,9 +6,11 @@ mod collocation;
 mod cumulative;
 pub(crate) mod data;
 mod evaluate;
+mod length;
 #[cfg(feature = "dense")]
 mod lift;
 mod locate;
+mod product;
 mod sample_cursor;
 mod transport;
 
@@ -17,6 +19,8 @@ pub use bspline::evaluate_bspline;
 pub use cumulative::{Coordinates, Multiplication, cumulative_basis, cumulative_steps};
 pub use data::{BSpline, Curves, Job, Outside, Quantity, Times};
 pub use evaluate::evaluate;
+pub use length::{ArcLength, Integrand, energies, lengths};
 #[cfg(feature = "dense")]
 pub use lift::{lift, lift_knots};
+pub use product::{Factor, evaluate_product};
 pub use transport::transport;

@@ -6,6 +6,6 @@ mod roots;
 mod time_law;
 
 pub use closest::{Distances, Nearest, Samples, closest};
-pub use on_curves::{Factor, closest_on_curves};
+pub use on_curves::{Targets, closest_on_curves};
 pub use roots::{Bracket, roots};
 pub use time_law::Path;

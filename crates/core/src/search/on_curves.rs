@@ -1,32 +1,30 @@
 //! Distances from curves of the core.
 
 use super::closest::{Distances, Nearest, Samples, closest};
-use crate::curve::{Curves, Outside, Quantity, Times, evaluate};
+use crate::curve::{Curves, Factor, Outside, Quantity, Times, evaluate};
 use crate::monitor::Monitor;
 use crate::parallel;
 use crate::scalar::{LANES, Lane, few, gather, max_or_nan};
-use crate::space::{Ambient, Erased, below};
+use crate::space::{Ambient, below};
 
 /// Targets that one thread processes at a time.
 const BLOCK: usize = 128;
 /// A factor whose speed is below this part of the whole speed is at rest.
 const REST: f64 = 1e-12;
 
-/// Curves and targets in one factor of a product; a space that is not a product is its only factor.
-pub struct Factor<'a> {
-    /// The space.
-    pub space: Erased<'a>,
+/// Targets in one factor of a product; a space that is not a product is its only factor.
+pub struct Targets<'a> {
     /// The curves, whose knots are the same in all factors.
-    pub curves: Curves<'a>,
+    pub curve: Factor<'a>,
     /// Points of the curves at the samples, curve after curve.
     pub samples: &'a [f64],
-    /// The targets.
-    pub targets: &'a [f64],
+    /// The points whose nearest points on the curves are sought.
+    pub points: &'a [f64],
 }
 
 /// Finds the nearest points of curves to targets, which belong to some curves, in increasing order.
 pub fn closest_on_curves(
-    factors: &[Factor],
+    targets: &[Targets],
     samples: Samples,
     curve: &[usize],
     monitor: &Monitor,
@@ -35,7 +33,7 @@ pub fn closest_on_curves(
     let blocks: Vec<(usize, &mut [Nearest])> = out.chunks_mut(BLOCK).enumerate().collect();
     parallel::for_each(blocks, false, monitor, |(block, out)| {
         let first = block * BLOCK;
-        let mut distances = OnCurves { factors, samples, curve, monitor };
+        let mut distances = OnCurves { targets, samples, curve, monitor };
         // An error is a cancellation, after which nobody reads the result.
         if let Ok(found) = closest(samples, first, &curve[first..][..out.len()], &mut distances) {
             out.copy_from_slice(&found);
@@ -45,7 +43,7 @@ pub fn closest_on_curves(
 }
 
 struct OnCurves<'a> {
-    factors: &'a [Factor<'a>],
+    targets: &'a [Targets<'a>],
     samples: Samples<'a>,
     curve: &'a [usize],
     monitor: &'a Monitor<'a>,
@@ -59,13 +57,13 @@ impl Distances for OnCurves<'_> {
     fn of_samples(&mut self, target: &[usize], number: &[usize]) -> Result<Vec<f64>, Cancelled> {
         self.poll()?;
         let mut result = vec![0.0; target.len()];
-        for (k, factor) in self.factors.iter().enumerate() {
-            let len = factor.space.point_len();
+        for (k, targets) in self.targets.iter().enumerate() {
+            let len = targets.curve.space.point_len();
             let row = |i: usize| self.curve[target[i]] * self.samples.count + number[i];
-            let points = |i: usize| &factor.samples[row(i) * len..][..len];
-            factor.pairs(target, points, |p, q, log, lanes, i| {
-                let angle = factor.space.log(p, q, log);
-                let own = factor.space.distance(p, q, log, angle).to_array();
+            let points = |i: usize| &targets.samples[row(i) * len..][..len];
+            targets.pairs(target, points, |p, q, log, lanes, i| {
+                let angle = targets.curve.space.log(p, q, log);
+                let own = targets.curve.space.distance(p, q, log, angle).to_array();
                 for (result, own) in result[i..].iter_mut().zip(&own[..lanes]) {
                     *result = if k == 0 { *own } else { result.hypot(*own) };
                 }
@@ -80,23 +78,24 @@ impl Distances for OnCurves<'_> {
         let count = target.len();
         let (mut distances, mut slopes) = (vec![0.0; count], vec![0.0; count]);
         let (mut parts, mut speeds) = (Vec::new(), Vec::new());
-        for (k, factor) in self.factors.iter().enumerate() {
-            let states = self.states(factor, &rows, x);
-            let len = factor.space.point_len();
-            let limit = below(factor.space.cut_angle());
+        for (k, targets) in self.targets.iter().enumerate() {
+            let states = self.states(targets, &rows, x);
+            let len = targets.curve.space.point_len();
+            let limit = below(targets.curve.space.cut_angle());
             let state = |i: usize| &states[rows.place(i) * 2 * len..][..2 * len];
             let mut own = [vec![0.0; count], vec![0.0; count]];
-            factor.pairs(target, state, |pv, q, log, lanes, i| {
+            targets.pairs(target, state, |pv, q, log, lanes, i| {
                 let (p, v) = pv.split_at(len);
-                let angle = factor.space.log(p, q, log);
-                let distance = factor.space.distance(p, q, log, angle).to_array();
-                let slope = angle.simd_lt(limit).select(-factor.space.inner(p, log, v), NAN).to_array();
+                let angle = targets.curve.space.log(p, q, log);
+                let distance = targets.curve.space.distance(p, q, log, angle).to_array();
+                let slope =
+                    angle.simd_lt(limit).select(-targets.curve.space.inner(p, log, v), NAN).to_array();
                 for l in 0..lanes {
                     distances[i + l] = if k == 0 { distance[l] } else { distances[i + l].hypot(distance[l]) };
                     own[0][i + l] = slope[l];
                 }
-                if self.factors.len() > 1 {
-                    let speed = max_or_nan(factor.space.inner(p, v, v), Lane::ZERO).sqrt().to_array();
+                if self.targets.len() > 1 {
+                    let speed = max_or_nan(targets.curve.space.inner(p, v, v), Lane::ZERO).sqrt().to_array();
                     own[1][i..i + lanes].copy_from_slice(&speed[..lanes]);
                 }
             });
@@ -142,8 +141,8 @@ impl OnCurves<'_> {
     }
 
     /// Points and velocities at times x in some layout.
-    fn states(&self, factor: &Factor, rows: &Rows, x: &[f64]) -> Vec<f64> {
-        let (curves, len) = (&factor.curves, factor.space.point_len());
+    fn states(&self, targets: &Targets, rows: &Rows, x: &[f64]) -> Vec<f64> {
+        let (curves, len) = (&targets.curve.curves, targets.curve.space.point_len());
         let part =
             |all: &'_ [f64], size: usize| rows.first * size..(rows.first + rows.curves) * size.min(all.len());
         let nodes = curves.nodes;
@@ -152,6 +151,11 @@ impl OnCurves<'_> {
             nodes,
             points: &curves.points[part(curves.points, nodes * len)],
             velocities: &curves.velocities[part(curves.velocities, nodes * len)],
+            before: if curves.before.is_empty() {
+                &[]
+            } else {
+                &curves.before[part(curves.before, nodes * len)]
+            },
         };
         let mut states = vec![0.0; rows.curves * rows.count * 2 * len];
         let mut padded = Vec::new();
@@ -163,7 +167,15 @@ impl OnCurves<'_> {
             &padded
         };
         let times = Times { x: times, count: rows.count };
-        evaluate(&factor.space, &own, &times, Quantity::State, Outside::Continue, self.monitor, &mut states);
+        evaluate(
+            &targets.curve.space,
+            &own,
+            &times,
+            Quantity::State,
+            Outside::Continue,
+            self.monitor,
+            &mut states,
+        );
         states
     }
 }
@@ -183,7 +195,7 @@ impl Rows {
     }
 }
 
-impl Factor<'_> {
+impl Targets<'_> {
     /// Calls `f` for eight pairs of rows of numbers and targets at a time, with an array for a logarithm, the number of
     /// pairs, which is smaller for the last ones, and the first of them.
     fn pairs<'a>(
@@ -192,7 +204,7 @@ impl Factor<'_> {
         rows: impl Fn(usize) -> &'a [f64],
         mut f: impl FnMut(&[Lane], &[Lane], &mut [Lane], usize, usize),
     ) {
-        let len = self.space.point_len();
+        let len = self.curve.space.point_len();
         let count = target.len();
         if count == 0 {
             return;
@@ -202,7 +214,7 @@ impl Factor<'_> {
         for first in (0..count).step_by(LANES) {
             let at: [usize; LANES] = few(|l| (first + l).min(count - 1));
             gather(at.map(&rows), &mut row);
-            gather(at.map(|i| &self.targets[target[i] * len..][..len]), &mut q);
+            gather(at.map(|i| &self.points[target[i] * len..][..len]), &mut q);
             f(&row, &q, &mut log, LANES.min(count - first), first);
         }
     }

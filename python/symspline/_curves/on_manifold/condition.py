@@ -109,9 +109,16 @@ class ControlPolygon(NamedTuple):
         return ControlPolygon(*(part[(slice(None), *index)] for part in self))
 
 
-def control_polygons(operations: Operations, h: Doubles, p: Array, u: Array) -> ControlPolygon:
-    """The control polygons of curves with points and velocities; NaN where there is no logarithm."""
+def control_polygons(
+    operations: Operations, h: Doubles, p: Array, u: Array, before: Array | None = None
+) -> ControlPolygon:
+    """The control polygons of curves with points and velocities, and those before the knots if they differ.
+
+    They are NaN where there is no logarithm.
+    """
     at, v = _handles(h, p, u)
+    if before is not None:
+        v[1] = _handles(h, p, before)[1][1]
     q = operations.exp(at, v)
     return ControlPolygon(at, v, q, operations.log(q, q[::-1]))
 

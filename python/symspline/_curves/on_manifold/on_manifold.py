@@ -10,18 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ... import _core
-from ..._base.faults import Fault
 from ..._base.typing import Progress
 from ..._core import ValidationError
-from ..._spaces import Array, Doubles, Euclidean, Space
+from ..._spaces import Array, Doubles, Euclidean, parts_of, product_norm
 from ...manifolds._differences import STEPS, eighth_difference, first_derivative, second_derivative
 from ...manifolds._manifold import Manifold
 from ...manifolds._operations import Operations
-from ..curve import NORMS, REAL, CoreCurve
-from ..solve import Options, Solved, Task, solve_in_python
-from .checks import validate_on_manifold
+from ..curve import NORMS, REAL, CurveArrays, FactorArrays, share
 from .condition import ControlPolygon, control_polygons
-from .fit import fit_of_one_length
 
 # Samples that are computed at a time.
 _AT_ONCE = 1 << 12
@@ -32,27 +28,16 @@ STEP = 1 / 64
 # smooth on that scale: de Casteljau's inner geodesics jump where their ends pass each other's cut locus. Then steps
 # are halved, this often at most.
 ROUGH, NOISE, HALVINGS = 1e-8, 1e-9, 7
+# Relative tolerance of integrals, since derivatives are differences.
+RTOL = 1e-9
 
 
-class OnManifold(CoreCurve):
+class OnManifold(CurveArrays):
     """Curves on a `Manifold`."""
 
     space: Manifold
-    # Derivatives are differences.
-    quad_rtol = 1e-9
-    _compiled = False
-
-    @staticmethod
-    def suits(space: Space) -> bool:
-        return isinstance(space, Manifold)
-
-    @staticmethod
-    def solve(task: Task, options: Options, progress: Progress | None = None) -> Solved:
-        return solve_in_python(task, options, progress, fit_of_one_length)
-
-    @staticmethod
-    def validate(task: Task, options: Options) -> tuple[Task, list[Fault]]:
-        return validate_on_manifold(task, options)
+    is_compiled = False
+    quad_rtol = RTOL
 
     def _evaluate(self, x: Doubles, quantity: str, outside: str, per_curve: bool, progress: Progress | None) -> Any:
         if quantity in REAL and quantity not in NORMS:
@@ -108,13 +93,15 @@ class OnManifold(CoreCurve):
     def _polygon(self) -> ControlPolygon:
         """Control polygons of all segments; kept from the first use on."""
         nodes, shape = self.times.shape[-1], self.space.point_shape
-        rows = [a.reshape(-1, nodes, *shape) for a in (self.points, self.velocities)]
-        return control_polygons(self.space.operations, np.diff(self._knots), rows[0], rows[1])
+        (factor,) = self.factors
+        arrays = (factor.points, factor.velocities, factor.velocities if factor.before is None else factor.before)
+        rows = [array.reshape(-1, nodes, *shape) for array in arrays]
+        return control_polygons(self.space.operations, np.diff(self._knots), *rows)
 
     def _check_domain(self, x: Doubles, outside: str, per_curve: bool) -> None:
         """Of a curve in flat space the core checks the same."""
         flat = np.zeros((*self.batch, self.times.shape[-1], 1))
-        _core.evaluate(Euclidean(1)._handle, self.times, flat, flat, x, "point", outside, per_curve, None)
+        _core.Curve([(Euclidean(1)._handle, self.times, flat, flat, None)]).evaluate(x, "point", outside, per_curve)
 
     def lift(self, *_: Any, **__: Any) -> Never:
         self._refuse("no horizontal lift is known")
@@ -129,6 +116,42 @@ class OnManifold(CoreCurve):
 
     def _refuse(self, what: str) -> Never:
         raise ValidationError(f"{what} on a manifold that is made of functions, {self.space!r}")
+
+
+class Mixed(CurveArrays):
+    """Curves in a product in which some factors, but not all, are spaces of the core."""
+
+    is_compiled = False
+    quad_rtol = RTOL
+
+    def _of_factor(self, factor: FactorArrays) -> CurveArrays:
+        kind = OnManifold if isinstance(factor.space, Manifold) else CurveArrays
+        return kind(factor.space, self.times, (factor,), self.fitted)
+
+    def _evaluate(self, x: Doubles, quantity: str, outside: str, per_curve: bool, progress: Progress | None) -> Any:
+        count = len(self.parts)
+        values = tuple(
+            part.evaluate(x, quantity, outside, per_curve, share(progress, i, count))
+            for i, part in enumerate(self.parts)
+        )
+        return np.asarray(product_norm(values)) if quantity in NORMS else values
+
+    def lift(
+        self,
+        x: Doubles,
+        quantity: str,
+        outside: str,
+        per_curve: bool,
+        start: Any = None,
+        progress: Progress | None = None,
+    ) -> Any:
+        starts = [None] * len(self.parts) if start is None else parts_of(start, self.space, "start")
+        each = zip(self.parts, starts, strict=True)
+        return tuple(part.lift(x, quantity, outside, per_curve, begin, progress) for part, begin in each)
+
+    def transport(self, times: tuple[float, float], outside: str, v: Any) -> Any:
+        each = zip(self.parts, parts_of(v, self.space, "v"), strict=True)
+        return tuple(part.transport(times, outside, own) for part, own in each)
 
 
 # ---- de Casteljau's algorithm with exp and log, and derivatives by differences ----
