@@ -5,9 +5,9 @@ import sys
 
 import numpy as np
 import pytest
+from curves import points_on
 
 import symspline as ss
-from curves import points_on
 
 # A fit takes 20 in a space, 27 in a product of two; an evaluation takes 11 in both, and a length 6.
 FIT, FIT_IN_PRODUCT, EVALUATION, LENGTH = 20, 30, 15, 10

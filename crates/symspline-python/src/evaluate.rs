@@ -33,6 +33,7 @@ pub fn quantity_named(name: &str) -> PyResult<Quantity> {
         "point" => Quantity::Point,
         "velocity" => Quantity::Velocity,
         "acceleration" => Quantity::Acceleration,
+        "jerk" => Quantity::Jerk,
         "speed" => Quantity::Speed,
         "bend" => Quantity::AccelerationNorm,
         "body velocity" => Quantity::BodyVelocity,

@@ -13,7 +13,7 @@ from .._base.time import TimeAxis, onto_ends
 from .._base.typing import Progress, TimesLike
 from .._core import ValidationError
 from .._spaces import Doubles
-from .composed import AnyCurve, values_at
+from .composed import AnyCurve
 from .curve import CurveArrays, write_into
 
 
@@ -30,9 +30,9 @@ def evaluated(
     """Evaluate a quantity at times as a user passes them."""
 
     def call(x: Doubles, outside: str, per_curve: bool) -> Any:
-        if out is not None and quantity != "jerk" and isinstance(curve, CurveArrays):
+        if out is not None and isinstance(curve, CurveArrays):
             return curve.evaluate(x, quantity, outside, per_curve, progress, out)
-        values = values_at(curve, x, quantity, outside, per_curve, progress)
+        values = curve.evaluate(x, quantity, outside, per_curve, progress)
         return values if out is None else write_into(out, values, curve.space)
 
     return call_at_times(curve, time_axis, x, per_curve, outside, call)

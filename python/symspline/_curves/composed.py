@@ -18,8 +18,7 @@ from .._base.arrays import refuse
 from .._base.typing import Progress
 from .._core import ValidationError
 from .._spaces import Doubles, Product, Space, product_norm
-from .curve import NORMS, CurveArrays
-from .jerk import jerk
+from .curve import NORMS
 
 # Orders of derivatives.
 _NU = {"point": 0, "velocity": 1, "acceleration": 2, "jerk": 3, "body velocity": 1, "body acceleration": 2}
@@ -162,7 +161,7 @@ class Joined:
         times = np.clip(x, self.starts[i], self.stops[i]) - self.offsets[i]
         # The difference can exceed the ends by rounding.
         times = np.ascontiguousarray(np.clip(times, own.times[0], own.times[-1]))
-        return values_at(own, times, quantity, "raise", per_curve)
+        return own.evaluate(times, quantity, "raise", per_curve)
 
     def _assembled(self, found: list[Any], values: Sequence[Any], gap: NDArray[np.bool_], missing: float) -> Any:
         """Return the values of all sections in one array of shape (*batch, m, ...)."""
@@ -226,7 +225,7 @@ class Retimed:
         at = self._source_times(x, per_curve)
 
         def value(name: str) -> Any:
-            return values_at(self.source, at, name, "raise", per_curve)
+            return self.source.evaluate(at, name, "raise", per_curve)
 
         if quantity == "point" or (isinstance(self.law, Affine) and quantity in NORMS):
             result = value(quantity)
@@ -268,15 +267,6 @@ class Retimed:
                 "in the domain."
             )
         return np.asarray(np.clip(times, first, last), order="C") if times.ndim == wrong.ndim else times
-
-
-def values_at(
-    curve: AnyCurve, x: Doubles, quantity: str, outside: str, per_curve: bool, progress: Progress | None = None
-) -> Any:
-    """Evaluate a quantity of a curve of any kind, also the jerk."""
-    if quantity == "jerk" and isinstance(curve, CurveArrays):
-        return jerk(curve, x, outside, per_curve, progress)
-    return curve.evaluate(x, quantity, outside, per_curve, progress)
 
 
 def ends_beside(times: Doubles, x: Doubles, batch: tuple[int, ...], per_curve: bool) -> tuple[Any, Any]:

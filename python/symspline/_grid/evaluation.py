@@ -11,7 +11,7 @@ from .. import _core
 from .._base.arrays import short_repr
 from .._base.typing import Progress
 from .._core import ValidationError
-from .._curves.jerk import differentiation, transported
+from .._curves.on_manifold.jerk import differentiation, transported
 from .._curves.reduced import span_of
 from .._spaces import Array, Doubles, Space
 from ..manifolds import Manifold

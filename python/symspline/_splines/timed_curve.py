@@ -86,8 +86,6 @@ class TimedCurve(Curve[P]):
         ValidationError
             If a time is not finite, if a time lies outside the knots and the policy does not allow it, if `out` cannot
             hold the result, or if both `out` and `dtype` are given.
-        CutLocusError
-            If `nu` is 3 and half a segment leads past the cut locus of one of its points.
 
         Notes
         -----
@@ -95,7 +93,7 @@ class TimedCurve(Curve[P]):
         Let a be the largest size of the acceleration on a segment and h the length of its interval. Errors are about
         1e-12 of a/h, and up to 1e-8 of it if the step between two points exceeds half of the distance to the cut locus.
         A `Manifold` must have a function `transport`, and errors are larger there, because accelerations are
-        differences. The jerk takes about 100 times the time of the acceleration.
+        differences. If segments have many times, the jerk takes about three times as long as the acceleration.
         """
         if progress is not None:
             check_progress(progress)

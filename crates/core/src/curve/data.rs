@@ -35,6 +35,8 @@ pub enum Quantity {
     Velocity,
     /// ∇γ'
     Acceleration,
+    /// ∇∇γ'
+    Jerk,
     /// |γ'|
     Speed,
     /// |∇γ'|
@@ -97,7 +99,9 @@ impl Quantity {
         match self {
             Quantity::Point => 0,
             Quantity::Velocity | Quantity::Speed | Quantity::BodyVelocity | Quantity::State => 1,
+            // The jerk is the derivative of accelerations.
             Quantity::Acceleration
+            | Quantity::Jerk
             | Quantity::AccelerationNorm
             | Quantity::BodyAcceleration
             | Quantity::Motion => 2,

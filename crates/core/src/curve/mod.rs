@@ -6,6 +6,7 @@ mod collocation;
 mod cumulative;
 pub(crate) mod data;
 mod evaluate;
+mod jerk;
 mod length;
 #[cfg(feature = "dense")]
 mod lift;

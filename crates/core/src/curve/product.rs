@@ -2,6 +2,7 @@
 
 use super::data::{Curves, Outside, Quantity, Times};
 use super::evaluate::evaluate;
+use super::jerk::jerk;
 use crate::monitor::Monitor;
 use crate::space::Erased;
 
@@ -26,7 +27,10 @@ pub fn evaluate_product(
 ) {
     if !quantity.is_length() {
         for (Factor { space, curves }, out) in factors.iter().zip(out) {
-            evaluate(space, curves, times, quantity, outside, monitor, out);
+            match quantity {
+                Quantity::Jerk => jerk(space, curves, times, outside, monitor, out),
+                _ => evaluate(space, curves, times, quantity, outside, monitor, out),
+            }
         }
         return;
     }

@@ -18,6 +18,7 @@ from ...manifolds._manifold import Manifold
 from ...manifolds._operations import Operations
 from ..curve import NORMS, REAL, CurveArrays, FactorArrays, share
 from .condition import ControlPolygon, control_polygons
+from .jerk import jerk
 
 # Samples that are computed at a time.
 _AT_ONCE = 1 << 12
@@ -42,6 +43,8 @@ class OnManifold(CurveArrays):
     def _evaluate(self, x: Doubles, quantity: str, outside: str, per_curve: bool, progress: Progress | None) -> Any:
         if quantity in REAL and quantity not in NORMS:
             self._refuse(f"{quantity} is that of rotations, not")
+        if quantity == "jerk":
+            return jerk(self, x, outside, per_curve, progress)
         self._check_domain(x, outside, per_curve)
         batch, space = self.batch, self.space
         count = math.prod(batch)

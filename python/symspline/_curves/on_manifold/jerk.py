@@ -1,4 +1,4 @@
-"""The covariant derivative of the acceleration, for curves of cubic segments."""
+"""The covariant derivative of the acceleration on a manifold that is made of functions."""
 
 from __future__ import annotations
 
@@ -7,29 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from .._base.typing import Progress
-from .._spaces import Array, Doubles, Product, Space, cover_of
-from .curve import CurveArrays, share
+from ..._base.typing import Progress
+from ..._spaces import Array, Doubles, Space
+from ..curve import CurveArrays
 
 # Chebyshev nodes of half a segment, on which the acceleration is interpolated.
 _NODES = 16
-
-
-def jerk(curve: CurveArrays, x: Doubles, outside: str, per_curve: bool, progress: Progress | None = None) -> Any:
-    """Compute the covariant jerk ∇∇γ' at times x, in each factor.
-
-    The acceleration is smooth on each segment. It is evaluated at Chebyshev nodes of the half of the segment that
-    contains x, transported to γ(x) along geodesics, interpolated and differentiated there. Transport along geodesics
-    and along the curve differ by terms of third order, so that this is the covariant derivative.
-
-    Parameters
-    ----------
-    curve, x, outside, per_curve, progress
-        As for `CurveArrays.evaluate`.
-    """
-    count = len(curve.parts)
-    found = [_in_factor(part, x, outside, per_curve, share(progress, i, count)) for i, part in enumerate(curve.parts)]
-    return tuple(found) if isinstance(curve.space, Product) else found[0]
 
 
 def differentiation(nodes: Doubles, x: Doubles) -> Doubles:
@@ -41,11 +24,22 @@ def differentiation(nodes: Doubles, x: Doubles) -> Doubles:
     return np.asarray(derivatives @ np.linalg.inv(chebyshev.chebvander(nodes, degree)))
 
 
-def _in_factor(part: CurveArrays, x: Doubles, outside: str, per_curve: bool, progress: Progress | None) -> Array:
-    space, axes = cover_of(part.space), len(part.batch)
+def jerk(part: CurveArrays, x: Doubles, outside: str, per_curve: bool, progress: Progress | None) -> Array:
+    """Compute the covariant jerk ∇∇γ' at times x.
+
+    The acceleration is smooth on each segment. It is evaluated at Chebyshev nodes of the half of the segment that
+    contains x, transported to γ(x) along geodesics, interpolated and differentiated there. Transport along geodesics
+    and along the curve differ by terms of third order, so that this is the covariant derivative.
+
+    Parameters
+    ----------
+    part, x, outside, per_curve, progress
+        As for `CurveArrays.evaluate`.
+    """
+    space, axes = part.space, len(part.batch)
     if (per_curve and x.ndim == axes) or not x.ndim:
         # One time per curve.
-        found = _in_factor(part, x[..., None], outside, per_curve, progress)
+        found = jerk(part, x[..., None], outside, per_curve, progress)
         return np.asarray(np.take(found, 0, axis=axes))
     # This call validates the times.
     here = part.evaluate(x, "point", outside, per_curve)
