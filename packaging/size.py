@@ -15,7 +15,7 @@ PACKAGE = Path(__file__).parents[1] / "python" / "symspline"
 PARTS = {
     "__init__, __main__": ("__init__ __main__", 120),
     "cli": ("cli", 1450),
-    "poses, rotations, geo, xarray": ("_pose_files _tracks geo poses rotations xarray", 1450),
+    "poses, rotations, geo, xarray": ("geo poses rotations xarray", 1450),
     "_estimation": ("_estimation", 1050),
     "_smoothing": ("_smoothing", 1850),
     "jax, torch, _autodiff": ("_adapters _closed_forms jax torch", 1100),
@@ -28,7 +28,7 @@ PARTS = {
     "_curves": ("_curves _search", 1750),
     "manifolds, convert": ("convert manifolds", 940),
     "_spaces": ("_spaces _statistics", 1600),
-    "_base": ("_base _cpu _degrees _missing _validation", 1000),
+    "_base": ("_base _cpu", 1000),
 }
 LAYOUT = {
     tokenize.NL,

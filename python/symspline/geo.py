@@ -12,9 +12,11 @@ Examples
 
 from __future__ import annotations
 
+import re
 import warnings
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Literal, Unpack, cast, overload
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Unpack, cast, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,7 +39,6 @@ from ._splines.composed import SegmentedCurve
 from ._splines.cubic import CubicSpline
 from ._splines.functional import fit_many
 from ._splines.timed_curve import check_timed
-from ._tracks import ZIGZAG, Tracks, are_angles, read_tracks
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -55,9 +56,25 @@ EARTH_RADIUS = 6_371_008.8
 """Mean radius in metres: R₁ of the ellipsoid GRS 80 (Moritz, Geodetic reference system 1980)."""
 
 _Track = CubicSpline[Any, Any] | SegmentedCurve[Any, Any]
-_Tracks = _Track | Sequence[_Track] | Mapping[str, _Track]
+_SeveralTracks = _Track | Sequence[_Track] | Mapping[str, _Track]
 # Values of the column ``quality`` of resampled tables.
 _QUALITIES = ["good", "lam at bound", "not converged"]
+# Names of columns of times.
+_TIME_NAMES = ("time", "times", "timestamp", "date", "datetime", "date_time", "utc", "fix_time", "t")
+
+
+# Columns of numbers that identify tracks, and columns of angles in degrees.
+NAMED = re.compile(
+    r"(?<![a-z])(id|ids|ident|mmsi|imo|animal|individual|tag|track|trip|vessel|ship|vehicle|bird|device|segment|deployment)"
+    r"(?![a-z])",
+    re.IGNORECASE,
+)
+_ANGLE = re.compile(
+    r"(?<![a-z])(heading|hdg|course|cog|cap|bearing|azimuth|direction|dir|yaw|track angle|wind from)(?![a-z])",
+    re.IGNORECASE,
+)
+# A path of several tracks is longer than the tracks by this factor.
+ZIGZAG = 2.0
 
 
 @overload
@@ -262,7 +279,7 @@ def resample(
     *,
     by: str | Sequence[str] | None = None,
     time: str | None = None,
-    columns: tuple[str, str] | None = None,
+    columns: tuple[str, str] = ("lon", "lat"),
     interpolate: str | Sequence[str] = (),
     max_gap: Any,
     min_points: int = 2,
@@ -283,14 +300,12 @@ def resample(
     every : str or pandas.Timedelta, default "1min"
         Step between the new times, which are whole multiples of it in UTC.
     by : str or sequence of str, optional
-        Column, or columns, whose values identify the tracks, such as ``"mmsi"``. None means one track, or for a table
-        of Movebank the column ``individual-local-identifier``. An empty list always means one track.
+        Column, or columns, whose values identify the tracks, such as ``"mmsi"``. By default the table is one track, and
+        a warning is issued if it seems to hold several. An empty list means one track without this warning.
     time : str, optional
-        Column of the times: dates, or texts in ISO 8601. None means the index, or for a table of Movebank whose index
-        does not hold dates the column ``timestamp``.
-    columns : tuple of str, optional
-        Columns of longitude and latitude, in degrees. By default ``("lon", "lat")``, or the columns of Movebank,
-        ``("location-long", "location-lat")``.
+        Column of the times: dates, or texts in ISO 8601. By default the index.
+    columns : tuple of str, default ("lon", "lat")
+        Columns of longitude and latitude, in degrees.
     interpolate : str or sequence of str, optional
         Columns of numbers to interpolate linearly in time, such as depths or temperatures. Columns of angles in degrees
         are recognised by names such as ``heading``, ``course`` or ``wind_direction``. They are interpolated along the
@@ -360,13 +375,21 @@ def resample(
     ...         "individual-local-identifier": "DER AN858",
     ...     }
     ... )
-    >>> hourly = resample(storks, "1h", max_gap="6h", interpolate="external-temperature")
+    >>> hourly = resample(
+    ...     storks,
+    ...     "1h",
+    ...     by="individual-local-identifier",
+    ...     time="timestamp",
+    ...     columns=("location-long", "location-lat"),
+    ...     max_gap="6h",
+    ...     interpolate="external-temperature",
+    ... )
     >>> list(hourly.columns[:3]), hourly["external-temperature"].round(2).tolist()
     (['individual-local-identifier', 'timestamp', 'location-long'], [20.1, 22.1])
     """
     import pandas as pd
 
-    table, more = read_tracks(frame, by, time, columns, interpolate)
+    table, more = _read_tracks(frame, by, time, columns, interpolate)
     check_smooth(smooth, duplicates, options)
     for option in ("weights", "frames"):
         if smooth and option in options:
@@ -404,7 +427,7 @@ def resample(
     if not curves:
         return pd.DataFrame(columns=[*own_names, *computed, *more])
     _warn_of_merged(table, by is not None or bool(table.keys))
-    angles = [c for c in more if are_angles(c, frame[c].to_numpy(np.float64, na_value=np.nan))]
+    angles = [c for c in more if _are_angles(c, frame[c].to_numpy(np.float64, na_value=np.nan))]
     parts = []
     for spline, owner in zip(_fitted(curves, names, smooth, options), owners, strict=True):
         x = pd.date_range(pd.Timestamp(spline.t[0]).ceil(step), pd.Timestamp(spline.t[-1]).floor(step), freq=step)
@@ -424,7 +447,7 @@ def resample(
     return found[[*own_names, *computed, *constant, *more]]
 
 
-def _warn_of_merged(table: Tracks, named: bool) -> None:
+def _warn_of_merged(table: _Tracks, named: bool) -> None:
     """Warn if the rows of several tracks seem to be merged into one."""
     column = None if named else table.mixed()
     if column is not None:
@@ -436,7 +459,7 @@ def _warn_of_merged(table: Tracks, named: bool) -> None:
         )
 
 
-def _warn_of_missing(table: Tracks, fitted: set[int], shown: set[int], every: Any, min_points: int) -> None:
+def _warn_of_missing(table: _Tracks, fitted: set[int], shown: set[int], every: Any, min_points: int) -> None:
     """Warn about tracks that have no rows in the result."""
     gone = [track for track in range(len(table.rows)) if track not in shown]
     if not gone:
@@ -447,7 +470,7 @@ def _warn_of_missing(table: Tracks, fitted: set[int], shown: set[int], every: An
     warn(f"{count} not in the result: {names}{more}", UserWarning)
 
 
-def _reason(table: Tracks, track: int, fitted: bool, every: Any, min_points: int) -> str:
+def _reason(table: _Tracks, track: int, fitted: bool, every: Any, min_points: int) -> str:
     rows, of = table.rows[track], table.called(track).rstrip(", ")
     if fitted:
         why = f"no multiple of every={short_repr(every)} lies between its first and last position"
@@ -476,7 +499,7 @@ def _step(every: Any) -> Any:
 
 @overload
 def plot(
-    spline: _Tracks,
+    spline: _SeveralTracks,
     file: File | None = None,
     *,
     radius: float = EARTH_RADIUS,
@@ -487,7 +510,7 @@ def plot(
 
 @overload
 def plot(
-    spline: _Tracks,
+    spline: _SeveralTracks,
     file: None = None,
     *,
     radius: float = EARTH_RADIUS,
@@ -497,7 +520,7 @@ def plot(
 
 
 def plot(
-    spline: _Tracks,
+    spline: _SeveralTracks,
     file: File | None = None,
     *,
     radius: float = EARTH_RADIUS,
@@ -632,3 +655,224 @@ def _check_globe(spline: CubicSpline[Any, Any] | SegmentedCurve[Any, Any]) -> No
     check_timed(spline)
     if str(spline.space) != "sphere:2":
         raise ValidationError(f"the curve must be on Sphere(2), not on {spline.space!r}")
+
+
+# ---- tables of tracks in pandas ----
+
+
+def _are_angles(name: Any, values: NDArray[np.float64]) -> bool:
+    """Whether the name and the range of a column suggest angles in degrees, such as headings."""
+    text = re.sub(r"[_.-]", " ", str(name))
+    inside = np.nanmin(values, initial=0.0) >= -180 and np.nanmax(values, initial=0.0) <= 360
+    return bool(_ANGLE.search(text)) and bool(inside)
+
+
+def are_tracks(labels: NDArray[np.intp], steps: Callable[[NDArray[np.intp]], NDArray[np.float64]]) -> bool:
+    """Whether rows with these labels, numbers from 0 on, seem to be several tracks.
+
+    Parameters
+    ----------
+    labels : ndarray
+        Label of each row.
+    steps : callable
+        Function that returns the lengths of the steps along rows, given their numbers.
+    """
+    if not 2 <= labels.max(initial=-1) + 1 <= len(labels) / 2:
+        return False
+    order = np.argsort(labels, kind="stable")
+    within = steps(order)[np.diff(labels[order]) == 0].sum()
+    return bool(steps(np.arange(len(labels))).sum() > ZIGZAG * within)
+
+
+def _lengths(points: NDArray[np.float64], order: NDArray[np.intp]) -> NDArray[np.float64]:
+    """Return the chords between neighbouring points in an order."""
+    return np.asarray(np.linalg.norm(np.diff(points[order], axis=0), axis=1))
+
+
+class _Tracks(NamedTuple):
+    """A table of tracks after validation.
+
+    Attributes
+    ----------
+    frame : pandas.DataFrame
+        The table.
+    keys : list
+        Columns that identify the tracks.
+    columns : tuple
+        Columns of longitude and latitude.
+    name : str
+        Name of the times in the result.
+    times : ndarray of datetime64
+        Times of all rows, in UTC if there is a time zone.
+    zone : tzinfo or None
+        Time zone of the times.
+    rows : list of ndarray
+        Rows of each track in the order of time. Tracks are in the order of their first rows.
+    """
+
+    frame: pd.DataFrame
+    keys: list[Any]
+    columns: tuple[Any, Any]
+    name: Any
+    times: NDArray[np.datetime64]
+    zone: Any
+    rows: list[NDArray[np.intp]]
+
+    def called(self, track: int) -> str:
+        """Return a name of a track for messages, such as "mmsi 211, trip 3, "; empty if there is only one."""
+        return _called(self.frame, self.keys, self.rows[track][0])
+
+    def constant(self, left_out: Sequence[Any]) -> list[Any]:
+        """Return the other columns that have at most one value per track. Missing values do not count."""
+        codes = np.empty(len(self.frame), np.intp)
+        for track, rows in enumerate(self.rows):
+            codes[rows] = track
+        found = []
+        for column in self.frame.columns:
+            # Values such as lists cannot be compared.
+            try:
+                if column not in left_out and (self.frame[column].groupby(codes).nunique() < 2).all():
+                    found.append(column)
+            except TypeError:
+                continue
+        return found
+
+    def first_values(self, column: Any, tracks: NDArray[np.intp]) -> pd.Series:
+        """Return the first value of a column that is not missing, for each of these tracks."""
+        values = self.frame[column].reset_index(drop=True)
+        known = values.notna().to_numpy()
+        first = np.array([rows[np.argmax(known[rows])] for rows in self.rows], np.intp)
+        return values.iloc[first[tracks]].reset_index(drop=True)
+
+    def mixed(self) -> Any:
+        """Return a column whose values seem to be the names of several tracks in one; None if there is none.
+
+        The path through all rows of a track is then at least twice as long as the paths through the rows of each name.
+        """
+        others = [c for c in self.frame.columns if c not in (*self.keys, *self.columns, self.name)]
+        for rows in self.rows:
+            points = from_lonlat(*(self.frame[column].to_numpy(np.float64)[rows] for column in self.columns))
+            for column in others:
+                values = self.frame[column]
+                if values.dtype.kind in "fcmMb" or (values.dtype.kind in "iu" and not NAMED.search(str(column))):
+                    continue
+                try:
+                    codes = values.iloc[rows].factorize()[0]
+                except TypeError:
+                    continue
+                if (codes >= 0).all() and are_tracks(codes, partial(_lengths, points)):
+                    return column
+        return None
+
+    def angles(self, column: Any, track: int, x: NDArray[np.datetime64]) -> NDArray[np.float64]:
+        """Interpolate angles in degrees along the shorter arc, in [0, 360), or in (-180, 180] if one is negative."""
+        rows = self.rows[track]
+        values = self.frame[column].to_numpy(np.float64, na_value=np.nan)
+        own = values[rows]
+        own[~np.isnan(own)] = np.unwrap(own[~np.isnan(own)], period=360.0)
+        found = self._interpolated(own, rows, x) % 360
+        return np.where(found > 180, found - 360, found) if np.nanmin(values, initial=0.0) < 0 else found
+
+    def linear(self, column: Any, track: int, x: NDArray[np.datetime64]) -> NDArray[np.float64]:
+        """Interpolate a column linearly in time. Values at equal times are averaged, and missing ones are omitted."""
+        rows = self.rows[track]
+        return self._interpolated(self.frame[column].to_numpy(np.float64, na_value=np.nan)[rows], rows, x)
+
+    def _interpolated(
+        self, values: NDArray[np.float64], rows: NDArray[np.intp], x: NDArray[np.datetime64]
+    ) -> NDArray[np.float64]:
+        rows, values = rows[~np.isnan(values)], values[~np.isnan(values)]
+        if not len(rows):
+            return np.full(len(x), np.nan)
+        times, inverse = np.unique(self.times[rows], return_inverse=True)
+        means = np.bincount(inverse, values) / np.bincount(inverse)
+        at, known = ((own - times[0]) / np.timedelta64(1, "s") for own in (x, times))
+        return np.asarray(np.interp(at, known, means, left=np.nan, right=np.nan))
+
+
+def _read_tracks(
+    frame: Any, by: Any, time: Any, columns: tuple[str, str], interpolate: str | Sequence[str]
+) -> tuple[_Tracks, list[Any]]:
+    """Check a table, and return its tracks and the columns to interpolate."""
+    import pandas as pd
+
+    if not isinstance(frame, pd.DataFrame):
+        raise ValidationError(f"frame must be a pandas DataFrame, not {short_repr(frame)}")
+    if twice := [name for name, again in zip(frame.columns, frame.columns.duplicated(), strict=True) if again]:
+        raise ValidationError(f"frame has two columns with the name {twice[0]!r}. Rename or drop one of them.")
+    lon, lat = columns
+    dated = isinstance(frame.index, pd.DatetimeIndex)
+    keys = [] if by is None else list(by) if isinstance(by, (list, tuple)) else [by]
+    more = [interpolate] if isinstance(interpolate, str) else list(interpolate)
+    for name in (*keys, time, lon, lat, *more):
+        if name is not None and name not in frame.columns:
+            place = ". Pass columns=(longitude, latitude) with their names." if name in (lon, lat) else ""
+            index = ". It is a level of the index: pass frame.reset_index()." if name in frame.index.names else ""
+            raise ValidationError(
+                f"column {name!r} does not exist; the columns are {', '.join(map(str, frame.columns))}{index or place}"
+            )
+    for name in more:
+        if name in (*keys, time, lon, lat) or frame[name].dtype.kind not in "iuf":
+            raise ValidationError(
+                f"interpolate has the column {name!r}, but only columns of numbers other than times, positions and "
+                "names of tracks can be interpolated"
+            )
+    if time is None and not dated and (found := [own for own in frame.columns if _may_be_times(own, frame[own])]):
+        raise ValidationError(f"the index of frame holds no dates. Pass the column of the times: time={found[0]!r}.")
+    if time is None and not dated:
+        raise ValidationError(
+            f"the index of frame holds no dates, but {frame.index.dtype}. Pass time= with the name of the column "
+            f"of times; the columns are {', '.join(map(str, frame.columns))}."
+        )
+    name = time if time is not None else frame.index.name or "time"
+    stamps = frame.index.to_series(index=range(len(frame))) if time is None else frame[time].reset_index(drop=True)
+    for column in keys:
+        _refuse_missing(frame, frame[column], column, [])
+    stamps = _dates(stamps, name)
+    for column, values in ((lon, frame[lon]), (lat, frame[lat]), (name, stamps)):
+        _refuse_missing(frame, values, column, keys)
+    zone = stamps.dt.tz
+    times = (stamps.dt.tz_convert("UTC").dt.tz_localize(None) if zone is not None else stamps).to_numpy()
+    codes = frame.groupby(keys, sort=False, observed=True).ngroup().to_numpy() if keys else np.zeros(len(frame), int)
+    order = np.lexsort((times, codes))
+    rows = np.split(order, np.flatnonzero(np.diff(codes[order])) + 1) if len(frame) else []
+    return _Tracks(frame, keys, (lon, lat), name, times, zone, rows), more
+
+
+def _may_be_times(name: Any, values: pd.Series) -> bool:
+    """Whether a column seems to contain times: it contains dates, or has a name such as "time"."""
+    return values.dtype.kind == "M" or str(name).lower() in _TIME_NAMES
+
+
+def _dates(stamps: pd.Series, name: Any) -> pd.Series:
+    """Return times as dates. Texts must be in ISO 8601, which has no ambiguous days and months."""
+    import pandas as pd
+
+    if stamps.dtype.kind != "M" and len(stamps) and pd.api.types.is_string_dtype(stamps):
+        try:
+            stamps = pd.to_datetime(stamps, format="ISO8601")
+        except ValueError as error:
+            raise ValidationError(
+                f"column {name!r} must hold dates, or texts in ISO 8601 with one time zone: {error}. Convert it with "
+                "pandas.to_datetime."
+            ) from None
+    if stamps.dtype.kind != "M":
+        raise ValidationError(
+            f"column {name!r} must hold dates, not {stamps.dtype}. Convert it with pandas.to_datetime. If its "
+            "numbers count from 1970, pass the argument unit, such as unit='s'."
+        )
+    return stamps
+
+
+def _refuse_missing(frame: pd.DataFrame, values: pd.Series, column: Any, keys: list[Any]) -> None:
+    missing = np.flatnonzero(values.isna())
+    if missing.size:
+        of = _called(frame, keys, missing[0]).rstrip(", ")
+        raise ValidationError(
+            f"{len(missing)} rows have no {column!r}, the first of them row {missing[0]}{f' ({of})' if of else ''}; "
+            f"drop them by frame.dropna(subset=[{column!r}])"
+        )
+
+
+def _called(frame: pd.DataFrame, keys: list[Any], row: int) -> str:
+    return "".join(f"{key} {frame[key].iloc[row]}, " for key in keys)

@@ -26,13 +26,16 @@ from numpy.typing import ArrayLike
 
 from ._base.arrays import as_array, checked_flag, short_repr
 from ._base.typing import Extrapolate, Frame, TimesLike
+from ._base.validation import one_of, real_numbers
 from ._core import ValidationError
 from ._curves.at_times import evaluated
 from ._curves.composed import AnyCurve
 from ._estimation.along import Motion
 from ._estimation.measurements import GRAVITY
 from ._estimation.uncertainty import Jacobians, check_uncertain, standard_errors
-from ._pose_files import (
+from ._smoothing.factors import smoothed_spaces
+from ._spaces import Array, Euclidean, SpecialEuclidean, SpecialOrthogonal, cover_of
+from .convert._pose_files import (
     check_seconds,
     join,
     read_euroc,
@@ -43,9 +46,6 @@ from ._pose_files import (
     write_kitti,
     write_tum,
 )
-from ._smoothing.factors import smoothed_spaces
-from ._spaces import Array, Euclidean, SpecialEuclidean, SpecialOrthogonal, cover_of
-from ._validation import one_of, real_numbers
 from .rotations import Spline, attitude, check_motion, rate_jacobians, rotation_of, turned
 from .rotations import velocities as rotation_velocities
 

@@ -28,14 +28,7 @@ from ._base.arrays import adjoint, as_array, refuse, short_repr
 from ._base.input import times_of
 from ._base.time import onto_ends
 from ._base.typing import Extrapolate, Number, TimesLike
-from ._core import ValidationError
-from ._curves.curve import CurveArrays, in_span
-from ._curves.options import order_of
-from ._curves.reduced import span_of
-from ._spaces import ComplexGrassmannian, ComplexProjective, Doubles, Space, SpecialUnitary, Unitary
-from ._splines.cubic import CubicSpline
-from ._splines.piecewise_cubic import check_curve
-from ._validation import (
+from ._base.validation import (
     Array,
     check_symmetric,
     largest,
@@ -46,6 +39,13 @@ from ._validation import (
     unit_vectors,
     unmoved_by_underflow,
 )
+from ._core import ValidationError
+from ._curves.curve import CurveArrays, in_span
+from ._curves.options import order_of
+from ._curves.reduced import span_of
+from ._spaces import ComplexGrassmannian, ComplexProjective, Doubles, Space, SpecialUnitary, Unitary
+from ._splines.cubic import CubicSpline
+from ._splines.piecewise_cubic import check_curve
 
 if TYPE_CHECKING:
     from qutip import QobjEvo

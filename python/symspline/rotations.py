@@ -26,6 +26,7 @@ from ._base.arrays import as_array, checked_flag, filled, refuse, short_repr
 from ._base.input import times_of
 from ._base.time import knots_of
 from ._base.typing import Extrapolate, Frame, RateInterpolation, RotationOrder, TimesLike
+from ._base.validation import REMOVE, check_finite, length, one_of, real_numbers, unchecked_numbers
 from ._base.warnings import warn
 from ._core import ValidationError
 from ._curves.at_times import evaluated
@@ -33,11 +34,11 @@ from ._curves.composed import Joined, Retimed
 from ._curves.controlled import CumulativeCurve
 from ._curves.curve import CurveArrays
 from ._curves.fit import curve_of
+from ._curves.missing import missing_times, recounted, refuse_nan_times
 from ._estimation.along import Motion
 from ._estimation.rates import integrated
 from ._estimation.terms import Body
 from ._estimation.uncertainty import Jacobians, check_uncertain, standard_errors
-from ._missing import missing_times, recounted, refuse_nan_times
 from ._smoothing.factors import smoothed_spaces
 from ._spaces import Array, Doubles, SpecialEuclidean, SpecialOrthogonal, Sphere, cover_of
 from ._spaces.point_groups import elements, proper_symbol
@@ -45,7 +46,6 @@ from ._splines.cubic import CubicSpline
 from ._splines.cumulative import CumulativeBSpline
 from ._splines.hermite import HermiteSpline
 from ._splines.timed_curve import check_timed
-from ._validation import REMOVE, check_finite, length, one_of, real_numbers, unchecked_numbers
 from .convert import matrix_to_quaternion, quaternion_to_matrix
 from .convert._quaternions import checked_order, converted, quaternion_form
 

@@ -24,11 +24,11 @@ from numpy.typing import ArrayLike, NDArray
 from ._base.arrays import as_array, read_only, refuse, short_repr
 from ._base.input import times_of
 from ._base.typing import AnyArray, BCWords, File, TimesLike
+from ._base.validation import check_orthonormal, numbers, one_of
 from ._core import ValidationError
 from ._curves.options import require_matplotlib
 from ._spaces import Euclidean, Grassmannian, SpecialOrthogonal, SymmetricPositiveDefinite
 from ._splines.cubic import CubicSpline
-from ._validation import check_orthonormal, numbers, one_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

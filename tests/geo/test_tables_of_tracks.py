@@ -9,6 +9,9 @@ from symspline import geo
 pd = pytest.importorskip("pandas")
 
 
+NAMES = {"by": "individual-local-identifier", "time": "timestamp", "columns": ("location-long", "location-lat")}
+
+
 def storks(zone=None, seed=0):
     """A download from Movebank: two animals, irregular fixes with a lost day, a sensor with gaps, rows in disorder."""
     rng, tables = np.random.default_rng(seed), []
@@ -46,9 +49,9 @@ def segments(table, name, **options):
 
 
 @pytest.mark.parametrize("smooth", [False, True])
-def test_movebank_columns_are_read_directly(smooth):
+def test_columns_of_any_name(smooth):
     table = storks()
-    found = geo.resample(table, "1h", max_gap="6h", smooth=smooth, interpolate="external-temperature")
+    found = geo.resample(table, "1h", max_gap="6h", smooth=smooth, interpolate="external-temperature", **NAMES)
     keys, errors = ["individual-local-identifier", "timestamp"], ["position_std", "sog_std", "cog_std", "lam"]
     constant = ["visible", "individual-taxon-canonical-name", "tag-local-identifier"]
     columns = [*keys, "location-long", "location-lat", "sog", "cog", *(errors if smooth else []), "quality", *constant]
@@ -88,24 +91,20 @@ def test_movebank_columns_are_read_directly(smooth):
     assert found["quality"].dtype == "category" and (found["quality"] == "good").all()
 
 
-def test_texts_underscores_and_time_zones():
+def test_texts_and_time_zones():
     table = storks()
     texts = table.assign(timestamp=table["timestamp"].dt.strftime("%Y-%m-%d %H:%M:%S.%f"))
-    expected = geo.resample(table, "1h", max_gap="6h")
-    pd.testing.assert_frame_equal(geo.resample(texts, "1h", max_gap="6h"), expected, check_dtype=False)
-    under = geo.resample(table.rename(columns=lambda name: name.replace("-", "_")), "1h", max_gap="6h")
-    assert list(under.columns) == [name.replace("-", "_") for name in expected.columns]
+    expected = geo.resample(table, "1h", max_gap="6h", **NAMES)
+    pd.testing.assert_frame_equal(geo.resample(texts, "1h", max_gap="6h", **NAMES), expected, check_dtype=False)
     # Whole hours of UTC are half hours in India.
     local = table.assign(timestamp=table["timestamp"].dt.tz_localize("UTC").dt.tz_convert("Asia/Kolkata"))
-    zoned = geo.resample(local, "1h", max_gap=np.timedelta64(6, "h"))
+    zoned = geo.resample(local, "1h", max_gap=np.timedelta64(6, "h"), **NAMES)
     assert str(zoned["timestamp"].dt.tz) == "Asia/Kolkata" and (zoned["timestamp"].dt.minute == 30).all()
     np.testing.assert_array_equal(zoned["location-lat"], expected["location-lat"])
     aware = table.assign(timestamp=table["timestamp"].dt.strftime("%Y-%m-%dT%H:%M:%S.%fZ"))
-    assert str(geo.resample(aware, "1h", max_gap="6h")["timestamp"].dt.tz) == "UTC"
-    # An index of dates comes before the column of the layout, and an empty list makes one track of all rows.
-    one = table[table["individual-local-identifier"] == "Maria"].set_index("timestamp")
-    alone = geo.resample(one, "1h", max_gap="6h", by=[])
-    assert list(alone.columns[:3]) == ["timestamp", "location-long", "location-lat"] and len(alone) > 40
+    assert str(geo.resample(aware, "1h", max_gap="6h", **NAMES)["timestamp"].dt.tz) == "UTC"
+    with pytest.raises(ss.ValidationError, match=r"'lon' does not exist.* Pass columns=\(longitude, latitude\)"):
+        geo.resample(table, "1h", time="timestamp", max_gap="6h")
 
 
 def test_other_columns_are_kept_where_they_are_constant():
@@ -150,10 +149,10 @@ def test_straight_tracks_are_marked_and_messages_name_the_track():
     lost.iloc[7, lost.columns.get_loc("location-lat")] = np.nan
     owner = lost["individual-local-identifier"].iloc[7]
     with pytest.raises(ss.ValidationError, match=rf"row 7 \(individual-local-identifier {owner}\)"):
-        geo.resample(lost, "1h", max_gap="6h")
+        geo.resample(lost, "1h", max_gap="6h", **NAMES)
     wrong = table.assign(**{"location-lat": table["location-lat"].where(table["event-id"] != 1003, 93.0)})
     with pytest.raises(ss.ValidationError, match=r"identifier Maria, rows in the order of time: lat\[3\] is 93"):
-        geo.resample(wrong, "1h", max_gap="6h")
+        geo.resample(wrong, "1h", max_gap="6h", **NAMES)
     rng = np.random.default_rng(1)
     index = pd.date_range("2026-01-01", periods=100, freq="1min")
     straight = pd.DataFrame(

@@ -27,6 +27,7 @@ from .._base.typing import (
     SmoothingPenalty,
     TimesLike,
 )
+from .._base.validation import one_of
 from .._core import ValidationError
 from .._curves.failures import raise_or_warn
 from .._curves.fit import FitProblem, fit, read_ends
@@ -51,7 +52,6 @@ from .._spaces import (
     space_named,
 )
 from .._splines.curve import Curve
-from .._validation import one_of
 from ..manifolds._manifold import refuse_functions
 from .audit import audit, unit_hints
 from .gaps import long_gaps

@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike
 
 from .._base.arrays import as_array, cast, refuse, short_repr, whole_number
 from .._base.typing import FloatArray, Loss, Numbers, PointsLike, TimesLike
+from .._base.validation import one_of
 from .._core import ValidationError
 from .._curves.options import order_of
 from .._spaces import Doubles
-from .._validation import one_of
 
 # Acceleration of free fall in m/s², the default of `SpecificForce`.
 GRAVITY = (0.0, 0.0, -9.80665)

@@ -9,7 +9,7 @@ import numpy as np
 
 from .._base.arrays import as_array, filled
 from .._base.input import times_of
-from .._missing import Mask, missing_times, recounting, rows_of
+from .._curves.missing import Mask, missing_times, recounting, rows_of
 from .measurements import Constant, Function, Measurement
 
 

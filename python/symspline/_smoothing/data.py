@@ -13,13 +13,13 @@ from .._base.arrays import short_repr
 from .._base.faults import INVALID, Fault
 from .._base.time import TimeAxis, knots_of
 from .._base.typing import TimesLike
+from .._base.validation import one_of
 from .._core import ValidationError
 from .._curves.ends import End, end_kinds, map_ends, split_ends
 from .._curves.fit import Points, moved_ends, read, read_ends, validated
+from .._curves.missing import refuse_nan_times
 from .._curves.options import with_atol
-from .._missing import refuse_nan_times
 from .._spaces import Array, Doubles, Space, factors_of
-from .._validation import one_of
 from .factors import grouped, smoothed_spaces, split
 from .precision import Precision, read_precision
 

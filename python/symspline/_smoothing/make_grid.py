@@ -20,13 +20,13 @@ from .._base.typing import (
     SmoothingWord,
     TimesLike,
 )
+from .._base.validation import one_of
 from .._base.warnings import warn
 from .._core import ConvergenceError, ValidationError
 from .._curves.options import check_on_failure, check_progress, checked_extrapolate
 from .._grid.axes import GridAxis, read_axes
 from .._grid.nodes import read_nodes, validate_nodes
 from .._spaces import Array, Doubles, Product, Space, cover_of, factors_of, space_named
-from .._validation import one_of
 from ..manifolds._manifold import refuse_functions
 from .axes import Nodes, SmoothedNodes, noise_level, smooth_axes
 from .boundaries import warn_of_boundaries

@@ -16,10 +16,11 @@ from .._base.report import FarPointsWarning
 from .._base.rounded_times import warn_of_rounded_times
 from .._base.time import Moments, time_axis_of
 from .._base.typing import Duplicates, FitOptions, FloatArray, P, PointsLike, PProduct, SmoothingOptions, TimesLike
+from .._base.validation import one_of
 from .._base.warnings import warn
 from .._core import ValidationError
 from .._curves.fit import read_given
-from .._missing import (
+from .._curves.missing import (
     counts_all_samples,
     data_without_missing,
     recounted,
@@ -43,7 +44,6 @@ from .._spaces import (
 from .._splines.composed import SegmentedCurve
 from .._splines.cubic import CubicSpline
 from .._splines.functional import fit_many
-from .._validation import one_of
 from ..manifolds import Manifold
 from .many import smooth_many
 from .precision import read_precision

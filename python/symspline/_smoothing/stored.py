@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._base.time import TimeAxis
+from .._base.validation import one_of
 from .._core import ValidationError
 from .._curves.curve import CurveArrays
 from .._spaces import Space, factors_of
 from .._splines.archive import Entries, Stored, entry, read_array, read_field, read_report, suffix_of, times_state
-from .._validation import one_of
 from .data import SmoothingData
 from .factors import is_several, smoothed_spaces
 from .posterior import Posterior

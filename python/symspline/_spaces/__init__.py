@@ -2,6 +2,7 @@
 # mypy: implicit-reexport
 """The spaces: points, tangent vectors and their geometry."""
 
+from .._base.rounding import POINT_TOL, point_tol
 from .actions import Group
 from .base import Array, Doubles, Space
 from .groups import (
@@ -31,7 +32,6 @@ from .positive import (
 )
 from .product import Product, factors_of, parts_of, product_norm, short_name, space, space_named
 from .quotient import Quotient, cover_of, refuse_quotients
-from .rounding import POINT_TOL, point_tol
 from .statistics import Groups, require_metric
 from .subspaces import (
     ComplexGrassmannian,

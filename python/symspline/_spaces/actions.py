@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._base.arrays import adjoint, as_array, cast, refuse, short_repr
+from .._base.rounding import point_tol
 from .._base.typing import P
 from .._core import CutLocusError, ValidationError
 from .base import Array, Space
-from .rounding import point_tol
 
 
 def matrices(space: Space[Any], g: ArrayLike, size: int, dtype: Any) -> tuple[Array, float]:

@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._base.arrays import as_array, cast, refuse, short_repr, whole_number
+from .._base.rounding import point_tol
 from .._base.typing import AnyArray, FloatArray, P
 from .._core import Handle, ValidationError
 from .means import geometric_median, karcher_mean
-from .rounding import point_tol
 from .statistics import Groups, grouped, groups_of, require_metric, take
 from .whitening import Whitening
 

@@ -8,12 +8,12 @@ import numpy as np
 
 from .._base.arrays import refuse
 from .._base.quaternions import matrices_of_quaternions
+from .._base.rounding import point_tol
 from .._base.typing import ComplexArray, FloatArray
 from .._core import ValidationError
 from .actions import DisconnectedGroup, Group
 from .base import Array
 from .means import karcher_mean
-from .rounding import point_tol
 from .statistics import Groups, scaled
 
 

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._base.arrays import as_array, refuse
+from .._base.rounding import dtype_tol
 from .._base.typing import FloatArray
 from .._core import ValidationError
 from .actions import Preserving, homogeneous, require
 from .base import Array, Space
-from .rounding import dtype_tol
 
 
 class Euclidean(Space[FloatArray]):

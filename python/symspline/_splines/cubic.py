@@ -25,9 +25,9 @@ from .._curves.failures import raise_or_warn
 from .._curves.fit import Fit, Problem, curve_of, fit, mask_of, moved_ends, read, read_ends
 from .._curves.held import FEWEST_HELD, warn_of_held_points
 from .._curves.length import alternative_energy
+from .._curves.missing import counts_all_samples, curves_without_missing, inner_velocities_of_present, with_remedy
 from .._curves.options import fit_options, order_of, with_atol
 from .._curves.representatives import warn_of_representatives
-from .._missing import counts_all_samples, curves_without_missing, inner_velocities_of_present, with_remedy
 from .._spaces import Array, Space, space_named
 from .append import joined, local_fit
 from .archive import Entries, read_c1_nodes, read_fitted

@@ -33,6 +33,7 @@ from .._curves.curve import CurveArrays
 from .._curves.ends import freeze_bc_type, take_batch
 from .._curves.failures import raise_or_warn
 from .._curves.held import warn_of_held_points
+from .._curves.missing import counts_all_samples, curves_without_missing, missing_named
 from .._curves.options import (
     EvaluationOptions,
     check_progress,
@@ -43,7 +44,6 @@ from .._curves.options import (
     with_atol,
 )
 from .._curves.representatives import warn_of_representatives
-from .._missing import counts_all_samples, curves_without_missing, missing_named
 from .._spaces import Array, Product, Quotient, Space, factors_of, parts_of, space_named
 from .cubic import CubicSpline
 

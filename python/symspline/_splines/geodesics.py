@@ -13,9 +13,9 @@ from .._base.typing import Extrapolate, FloatArray, Number, P, PointsLike, Times
 from .._curves.curve import CurveArrays
 from .._curves.fit import read, read_ends, validated
 from .._curves.geodesics import joined, jumps
+from .._curves.missing import counts_all_samples, curves_without_missing, missing_named
 from .._curves.options import checked_extrapolate, with_atol
 from .._curves.representatives import warn_of_representatives
-from .._missing import counts_all_samples, curves_without_missing, missing_named
 from .._spaces import Array, Doubles, Space, space_named
 from ..manifolds import Manifold
 from .archive import Entries, check_curves, read_segments

@@ -11,10 +11,10 @@ from .._base.time import TimeAxis, knots_of
 from .._base.typing import Extrapolate, P, PointsLike, TimesLike
 from .._curves.curve import CurveArrays
 from .._curves.fit import Points, curve_of, hermite_data, read, read_ends, validated
+from .._curves.missing import counts_all_samples, curves_without_missing, missing_named, nodes_without_missing
 from .._curves.options import checked_extrapolate, with_atol
 from .._curves.representatives import warn_of_representatives
 from .._curves.slopes import check_method, local_velocities
-from .._missing import counts_all_samples, curves_without_missing, missing_named, nodes_without_missing
 from .._spaces import POINT_TOL, Array, Doubles, Space, factors_of, space_named
 from .archive import Entries, check_curves, read_segments
 from .functional import read_velocities

@@ -11,8 +11,8 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from .._base.disk import damage
-from .._pose_files import TUM, tum_rows, write_tum_rows
 from .._splines.archive import read
+from ..convert._pose_files import TUM, tum_rows, write_tum_rows
 from ._messages import Problem, refuse
 from ._streams import Source
 from ._tables import IM, RE, Array, Layout, Table, Texts

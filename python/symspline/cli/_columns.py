@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from .._base.exceptions import SymsplineError
-from .._degrees import is_degrees, look_like_degrees
 from .._spaces import LogEuclidean, Space, SymmetricPositiveDefinite, Torus, factors_of
-from .._tracks import NAMED, are_tracks
+from .._spaces.degrees import is_degrees, look_like_degrees
+from ..geo import NAMED, are_tracks
 from ._messages import Problem, first_duplicate, listed, refuse, say
 from ._points import (
     IN_BRACKETS,

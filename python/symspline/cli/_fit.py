@@ -67,7 +67,7 @@ from .._smoothing.many import smooth_many
 from .._spaces import Space, Torus, factors_of, space_named
 from .._splines.cubic import CubicSpline
 from .._splines.functional import fit_many
-from .._tracks import ZIGZAG
+from ..geo import ZIGZAG
 from . import _summary
 from ._columns import (
     ORDERS,

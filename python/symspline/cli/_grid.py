@@ -42,8 +42,8 @@ import numpy as np
 
 from .._base.disk import damage
 from .._base.report import FarPointsWarning
-from .._degrees import with_angles
 from .._grid import GridSpline
+from .._spaces.degrees import with_angles
 from .._splines.archive import read
 from ._curves import add_entry
 from ._grid_files import (

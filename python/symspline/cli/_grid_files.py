@@ -19,9 +19,9 @@ import numpy as np
 from .._base.arrays import brief
 from .._base.disk import damage
 from .._base.exceptions import SymsplineError
-from .._degrees import is_degrees, look_like_degrees, with_angles
 from .._grid import GridSpline
 from .._spaces import Product, Space, Torus, factors_of, space_named
+from .._spaces.degrees import is_degrees, look_like_degrees, with_angles
 from .._splines.archive import read
 from .._splines.files import load
 from ._columns import split_names

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from .._base.lonlat import from_lonlat
 from .._core import ValidationError
-from .._pose_files import join, rotations_in_rows
 from .._spaces import Doubles, Product, Space, Torus, factors_of, space_named
+from ..convert._pose_files import join, rotations_in_rows
 from ._messages import Problem, for_command_line
 from ._tables import IM, RE, Place
 

@@ -52,10 +52,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._base.time import onto_ends
-from .._pose_files import TUM
 from .._smoothing import SmoothingSpline
 from .._spaces import Doubles, space_named
 from .._splines.cubic import CubicSpline
+from ..convert._pose_files import TUM
 from ._columns import time_column, with_stamps
 from ._curves import Curves, read_curves
 from ._formats import TABLES, endings, format_of, is_binary, open_table, write_table

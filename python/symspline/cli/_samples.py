@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from .._base.lonlat import compass, to_lonlat
-from .._degrees import with_angles
 from .._smoothing import SmoothingSpline
 from .._spaces import Doubles, Torus, factors_of, parts_of
+from .._spaces.degrees import with_angles
 from .._splines.cubic import CubicSpline
 from ..rotations import angular_acceleration, angular_velocity, quaternion
 from ._points import POSES, ROTATIONS, Columns, complex_numbers, width

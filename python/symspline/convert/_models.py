@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._base.arrays import adjoint, refuse
-from .._core import ValidationError
-from .._validation import (
+from .._base.validation import (
     Array,
     check_symmetric,
     hermitian_part,
@@ -22,6 +21,7 @@ from .._validation import (
     square_matrices,
     unmoved_by_underflow,
 )
+from .._core import ValidationError
 
 
 @unmoved_by_underflow()

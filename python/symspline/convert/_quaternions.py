@@ -8,9 +8,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._base.arrays import as_array, checked_atol, checked_flag, filled, refuse, short_repr
+from .._base.validation import (
+    REMOVE,
+    Array,
+    check_finite,
+    off_one,
+    unchecked_numbers,
+    unit_vectors,
+    unmoved_by_underflow,
+)
 from .._core import ValidationError, convert_rotations
 from .._spaces import point_tol
-from .._validation import REMOVE, Array, check_finite, off_one, unchecked_numbers, unit_vectors, unmoved_by_underflow
 
 Form = Literal["matrix", "scalar first", "scalar last", "vector"]
 # Forms for which callers offer `skipna`, and the remedy in messages.

@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._base.arrays import adjoint, refuse
-from .._core import ValidationError
-from .._validation import (
+from .._base.validation import (
     Array,
     check_orthonormal,
     check_symmetric,
@@ -20,6 +19,7 @@ from .._validation import (
     unit_vectors,
     unmoved_by_underflow,
 )
+from .._core import ValidationError
 
 # ---- projectors ----
 

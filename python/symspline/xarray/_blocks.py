@@ -13,7 +13,7 @@ from .._base.report import Report, columns_of
 from .._base.threads import one_thread
 from .._core import ConvergenceError, CutLocusError, ValidationError
 from .._curves.at_times import call_at_times
-from .._missing import missing_times
+from .._curves.missing import missing_times
 from .._spaces import Array, Space
 from .._splines.cubic import CubicSpline
 from .._splines.functional import given

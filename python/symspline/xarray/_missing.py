@@ -12,7 +12,7 @@ from .._adapters import joined
 from .._base.report import ConvergenceWarning
 from .._base.warnings import warn
 from .._core import ValidationError
-from .._missing import Mask, missing_points, missing_times
+from .._curves.missing import Mask, missing_points, missing_times
 from .._spaces import Array, Space
 from .._splines.cubic import CubicSpline
 from .._splines.functional import fit_many

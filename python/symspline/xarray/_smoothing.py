@@ -15,8 +15,8 @@ from .._base.arrays import checked_number
 from .._base.exceptions import SymsplineError
 from .._base.typing import SmoothOptions
 from .._base.warnings import silenced
+from .._curves.missing import missing_points, missing_times
 from .._curves.options import checked_extrapolate, extrapolation_mode
-from .._missing import missing_points, missing_times
 from .._smoothing import SmoothingWarning, make_smoothing_spline
 from .._smoothing.factors import is_several
 from .._spaces import Array, Space, SpecialOrthogonal, space_named

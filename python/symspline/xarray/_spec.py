@@ -12,7 +12,7 @@ from .._adapters import joined, split
 from .._base.arrays import as_array, short_repr
 from .._base.input import times_of
 from .._core import ValidationError
-from .._missing import missing_times
+from .._curves.missing import missing_times
 from .._spaces import Array, Euclidean, Product, Space, space_named
 from .._splines.cubic import CubicSpline
 from ._blocks import Inputs, values_at

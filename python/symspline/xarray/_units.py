@@ -8,8 +8,8 @@ import numpy as np
 import xarray as xr
 
 from .._base.warnings import warn
-from .._degrees import is_degrees, look_like_degrees
 from .._spaces import Space, Torus, space_named
+from .._spaces.degrees import is_degrees, look_like_degrees
 
 
 def in_radians(da: Any, space: Space[Any] | str) -> Any:

@@ -12,15 +12,15 @@ from typing import Any, Literal, NamedTuple, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._base.arrays import as_array, brief, cast, checked_flag, refuse
-from ._base.disk import path_of, replacing
-from ._base.input import times_of
-from ._base.rounded_times import warn_of_rounded_times
-from ._base.typing import PointsLike
-from ._core import ValidationError, number_lines
-from ._spaces import Array, Doubles, SpecialEuclidean, SpecialOrthogonal, point_tol, rotations_and_positions
-from ._validation import length, off_one
-from .convert import matrix_to_quaternion, quaternion_to_matrix
+from .._base.arrays import as_array, brief, cast, checked_flag, refuse
+from .._base.disk import path_of, replacing
+from .._base.input import times_of
+from .._base.rounded_times import warn_of_rounded_times
+from .._base.typing import PointsLike
+from .._base.validation import length, off_one
+from .._core import ValidationError, number_lines
+from .._spaces import Array, Doubles, SpecialEuclidean, SpecialOrthogonal, point_tol, rotations_and_positions
+from ._quaternions import matrix_to_quaternion, quaternion_to_matrix
 
 # Columns of a TUM trajectory.
 TUM = ("time", "tx", "ty", "tz", "qx", "qy", "qz", "qw")

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ._spaces import Array, Space, Torus, factors_of, parts_of
+from . import Array, Space, Torus, factors_of, parts_of
 
 # Names of the unit in attributes of netCDF files and in column names.
 _NAMES = ("deg", "degs", "degree", "degrees", "°", "arc_degree", "arcdegree", "degree_true", "degrees_true", "degt")

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._base.arrays import adjoint, as_array, cast, refuse, short_repr
-from ._core import ValidationError
-from ._spaces import point_tol
+from .._core import ValidationError
+from .arrays import adjoint, as_array, cast, refuse, short_repr
+from .rounding import point_tol
 
 Array = NDArray[Any]
 REMOVE = "remove missing values"

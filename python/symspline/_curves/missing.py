@@ -12,12 +12,12 @@ from typing import Any, ParamSpec, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ._base.arrays import as_array, filled, refuse
-from ._base.exceptions import SymsplineError
-from ._base.input import times_of
-from ._core import ValidationError
-from ._curves.fit import Points
-from ._spaces import Product, Space, factors_of, parts_of, space_named
+from .._base.arrays import as_array, filled, refuse
+from .._base.exceptions import SymsplineError
+from .._base.input import times_of
+from .._core import ValidationError
+from .._spaces import Product, Space, factors_of, parts_of, space_named
+from .fit import Points
 
 Mask = NDArray[np.bool_]
 # Parts of the core's messages about times and points that are not finite.
