@@ -123,8 +123,7 @@ compare("clean", exact)
 # depend on the unit or the frame of the tensors, needs no preparation outside the mask, and is twice continuously
 # differentiable, as tractography by integration assumes.
 #
-# For files there is one call, or one command, which keeps the units, codes and texts of the header:
-# ``symspline grid dti.nii.gz --order fsl --zoom 2 -o fine.nii.gz``.
+# For files there is one call, which keeps the units, codes and texts of the header.
 
 folder = Path(tempfile.mkdtemp())
 volume = ss.tensors.Volume(raised[mask], mask, np.diag([2.5, 2.5, 2.5, 1]))

@@ -12,7 +12,7 @@ from tabular import AXES, PAIR, TRACK, write
 import symspline as ss
 from symspline.cli import main
 
-VERBS = ("", "fit", "sample", "plot", "check", "info", "grid")
+VERBS = ("", "fit", "sample", "plot", "check", "info")
 
 
 @pytest.mark.parametrize("columns", [60, 80, 140])
@@ -30,7 +30,7 @@ def test_help_is_wrapped_at_the_width_of_the_terminal(columns, capsys, monkeypat
 
 def test_tables_in_help_have_a_hanging_indent(capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "60")
-    for verb, term in [("sample", "std "), ("sample", "std_wx, ..."), ("check", "distance"), ("grid", ".npz")]:
+    for verb, term in [("sample", "std "), ("sample", "std_wx, ..."), ("check", "distance")]:
         with pytest.raises(SystemExit):
             main([verb, "--help"])
         lines = capsys.readouterr().out.splitlines()

@@ -179,19 +179,6 @@ def test_a_recording_with_a_gap_is_one_trajectory(run, fails):
     assert fails("check a.npz --curve 3") == "a.npz has no curve '3'; there are 1, 2"
 
 
-def test_sampled_rates_can_be_fitted(run):
-    """The columns wx, wy, wz are those that ``fit --rates`` reads."""
-    write_table("a.csv", columns())
-    run("fit a.csv --space so:3 --bc-type not-a-knot -o a.npz")
-    run("sample a.npz -n 200 --nu 0,1 -o b.csv")
-    sigmas = "--sigma 0.001 --rate-sigma 0.001 --lam 1e-9"
-    run(f"fit b.csv --space so:3 --columns qw,qx,qy,qz --smooth --rates wx,wy,wz {sigmas} -o c.npz")
-    a, c, x = ss.load("a.npz"), ss.load("c.npz"), np.linspace(0.5, 4.5, 50)
-    assert a.space.distance(a(x), c(x)).max() < 1e-3
-    omega = [ss.rotations.angular_velocity(own, x) for own in (a, c)]
-    assert np.abs(omega[0] - omega[1]).max() < 2e-2
-
-
 def test_tum_of_curves_from_matrices_and_dates(run):
     t = np.array("2021-08-29", "datetime64[ns]") + np.array([0, 1_000_000_007])
     ss.CubicSpline(t, poses()[:2], "se:3").save("a.npz")

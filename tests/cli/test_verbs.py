@@ -72,7 +72,7 @@ def test_rows_without_times_are_at_whole_numbers(run):
 
 
 def test_help_has_examples_and_the_version_is_that_of_the_core(capsys):
-    for verb in ("", "fit", "sample", "plot", "check", "info", "grid"):
+    for verb in ("", "fit", "sample", "plot", "check", "info"):
         with pytest.raises(SystemExit) as end:
             main([*verb.split(), "--help"])
         assert end.value.code == 0
@@ -133,7 +133,7 @@ def test_samples_outside(run):
 
 def test_invalid_usage_fails(curves, fails):
     assert fails("ft").endswith("invalid choice: 'ft'; did you mean fit? (see symspline --help)")
-    assert "invalid choice: 'x'; choose from fit, sample, plot, check, info, grid" in fails("x")
+    assert "invalid choice: 'x'; choose from fit, sample, plot, check, info" in fails("x")
     assert fails("fit a.csv --space s:2") == "the following arguments are required: -o (see symspline fit --help)"
     problem = "unrecognized arguments: --tiem t; did you mean --time? (see symspline fit --help)"
     assert fails("fit a.csv --space s:2 --tiem t -o b.npz") == problem

@@ -5,7 +5,6 @@ example:
   symspline check track.npz
   symspline sample track.npz --every 10min -o smooth.csv
   symspline plot track.npz -o track.png
-  symspline grid dti.nii.gz --order fsl --zoom 2 -o fine.nii.gz
   symspline fit - --lonlat -o - < track.csv | symspline sample - -n 100 -o - | head
 
 See also `symspline VERB --help`, and `symspline info` for the spaces and formats of files. Exit codes: 0 success, 1 not
@@ -23,7 +22,7 @@ from collections.abc import Sequence
 
 from .._base.exceptions import ConvergenceError, SymsplineError
 from .._base.version import VERSION
-from . import _check, _fit, _grid, _info, _plot, _sample
+from . import _check, _fit, _info, _plot, _sample
 from ._help import Parser, add_completion, texts_of
 from ._messages import QUIET, USUAL, VERBOSE, Problem, for_command_line, say, set_level
 
@@ -84,7 +83,7 @@ def _parser() -> Parser:
     parser.add_argument("--version", action="version", version=f"symspline {VERSION}")
     add_completion(parser)
     verbs = parser.add_subparsers(metavar="VERB")
-    for verb in (_fit, _sample, _plot, _check, _info, _grid):
+    for verb in (_fit, _sample, _plot, _check, _info):
         texts = texts_of(verb.__doc__)
         summary = texts["description"].partition("\n")[0]
         own = verbs.add_parser(verb.__name__.rpartition("._")[2], help=summary, **texts)

@@ -113,7 +113,7 @@ def read_curves(path: Path, lonlat: bool = False) -> Curves:
         if segmented:
             found, named = {str(i): curve for i, curve in enumerate(found, 1)}, True
         for curve in found.values() if named else [found]:
-            refuse(source, (isinstance(curve, GridSpline), " is a grid; see symspline grid --help"))
+            refuse(source, (isinstance(curve, GridSpline), " is a grid; symspline.load reads it"))
             if not isinstance(curve, CubicSpline):
                 kind = type(curve).__name__
                 raise Problem(f"{source} is a {kind}, whose acceleration jumps at knots; use symspline.load")

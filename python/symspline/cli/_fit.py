@@ -26,24 +26,12 @@ name in the column track, and points their height in the column ele. With --skip
 Curves pass through the points. --smooth is for noisy points: the curve passes near them, as smooth as the data
 suggest, and symspline sample also writes its standard deviation.
 
-With --smooth, the table may have angular velocities (--rates) and velocities (--velocities) next to the points, and one
-curve is fitted to all of them. Give the standard deviation of each. --penalty is then jerk, unless you give another
-one. Rows can be in any order, and a row can contain only some of the measurements; the other columns are empty or NaN.
---rates are in the frame of the body, in radians per unit of time (per second for dates). With --rate-bias, the constant
-error of a gyroscope is estimated as well. --velocities are those of positions, in the fixed frame; on other spaces they
-are tangent vectors at the point in their row, and with --lonlat the velocities to the east and to the north in degrees
-of arc.
-
 examples:
   symspline fit track.csv --lonlat -o track.npz
   symspline fit storms.csv --lonlat --time date --curve storm -o storms.npz
   symspline fit attitude.parquet --space so:3 --columns w,x,y,z --bc-type not-a-knot -o attitude.npz
   symspline fit states.csv --space cp:1 --columns up,down -o states.npz
   symspline fit gps.csv --lonlat --smooth -o gps.npz
-  symspline fit imu.csv --smooth --space so:3 --columns qw,qx,qy,qz --sigma 0.05 --rates wx,wy,wz --rate-sigma 0.02
-      --rate-bias -o attitude.npz
-  symspline fit car.csv --smooth --space r:2 --columns x,y --sigma 3 --velocities vx,vy --velocity-sigma 0.1
-      -o car.npz
 
 symspline.load reads the curve in Python. With --curve, it returns a dictionary of all curves by name, and with
 --max-gap alone a SegmentedCurve.
@@ -85,7 +73,6 @@ from ._messages import VERBOSE, Problem, Progress, for_command_line, listed, ref
 from ._outliers import outliers
 from ._points import GLOBE, Columns, require_globe
 from ._recordings import Recordings
-from ._sensors import Fusion, sensors_of
 from ._streams import called, check_target
 from ._times import UNITS, number, option_numbers
 
@@ -100,10 +87,7 @@ _MAX_GAP = (
     "cut curves at longer gaps between neighbouring times: a number or, for dates, a duration such as 12h; the "
     "segments are curves 1, 2, ... or, with --curve, NAME/1, NAME/2, ...; single points are omitted"
 )
-_CRITERION = (
-    "how λ is chosen: gcv (default), reml, or cp, Mallows' C_p, which needs --sigma and is the default with it, "
-    "without rates and velocities"
-)
+_CRITERION = "how λ is chosen: gcv (default), reml, or cp, Mallows' C_p, which needs --sigma and is the default with it"
 _SIGMA = (
     "known standard deviation of the noise in a coordinate: in the unit of distances, radians for rotations, degrees "
     "with --lonlat or --degrees; in a product perhaps one per factor with commas"
@@ -112,14 +96,10 @@ _TIME = (
     "column of times, none for 0, 1, 2, ..., or two columns with a comma, whole seconds and nanoseconds since 1970; "
     "see above for the default"
 )
-_PENALTY = "derivative that is kept small (default: acceleration, and jerk with --rates or --velocities)"
-_RATES = (
-    "columns of angular velocities in the frame of the body, for so:3, sphere:3, se:3 and products with one of them"
-)
+_PENALTY = "derivative that is kept small (default: acceleration)"
 _HEIGHTS = ("ele", "elevation", "alt", "altitude", "height", "height-above-ellipsoid", "height-above-msl")
 _FOR_ROTATIONS = "For rotations give --space so:3, or rp:3, where signs do not count"
-_NOISY = ("criterion", "lam", "sigma", "robust", "penalty", "rates", "rate_sigma", "rate_bias", "velocities",
-          "velocity_sigma")  # fmt: skip
+_NOISY = ("criterion", "lam", "sigma", "robust", "penalty")
 """Options that need --smooth."""
 
 
@@ -153,12 +133,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--sigma", metavar="S", help=_SIGMA)
     add("--robust", action="store_true", help="reduce the influence of outliers (loss 'cauchy')")
     add("--penalty", choices=("acceleration", "jerk"), help=_PENALTY)
-    add = parser.add_argument_group("rates and velocities, with --smooth").add_argument
-    add("--rates", metavar="A,B,C", help=_RATES)
-    add("--rate-sigma", metavar="S", help="standard deviation of one of these numbers")
-    add("--rate-bias", action="store_true", help="estimate a constant that is added to the rates")
-    add("--velocities", metavar="A,B,...", help="columns of velocities; see above")
-    add("--velocity-sigma", metavar="S", help="standard deviation of one of these numbers, with --lonlat in degrees")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -169,27 +143,22 @@ def run(options: argparse.Namespace) -> int:
     smooth = _smoothing_options(options, space)
     whole = open_table(options.input, options.format)
     table, options.time = with_stamps(whole, options.time, options.skipna)
-    sensors = sensors_of(table, options, space, smooth and smooth["sigma"])
-    extra = sensors.names if sensors else []
     curve = table.require(options.curve) if options.curve is not None else None
     given = split_names(options.columns)
-    time = time_column(table, options.time, [curve, *given, *extra], options.unix is not None)
+    time = time_column(table, options.time, [curve, *given], options.unix is not None)
     on_torus = any(isinstance(factor, Torus) for factor in factors_of(space))
     refuse("--degrees", (options.degrees and not on_torus, f" is for torus:n and products with it, not for {space}"))
-    points = point_columns(table, given, [time, curve, *extra], space, options.lonlat, options.quaternion)
+    points = point_columns(table, given, [time, curve], space, options.lonlat, options.quaternion)
     points = replace(points, degrees=options.degrees)
     needed = [*points.used, *filter(None, [time, curve])]
-    table = table.without_empty(needed) if options.skipna and not sensors else table
-    rows = table.read([*points.used, *extra], time, curve, [*points.used, *extra] if sensors else [], options.unix)
+    table = table.without_empty(needed) if options.skipna else table
+    rows = table.read(points.used, time, curve, unix=options.unix)
     check_days(table, time, rows)
     at = "times 0, 1, 2, ..." if time is None else f"times in column {time}"
     tell(f"{table.path}: {table.path.format} table, points in columns {listed(points.names)}, {at}", VERBOSE)
     cut = options.max_gap is not None and curve is not None
     columns = Columns(points.names, time or "time", curve or "curve", options.lonlat, rows.utc, points.quaternion, cut)
     columns = replace(columns, degrees=options.degrees)
-    if sensors and smooth:
-        _fit_sensors(options, smooth, Fusion(table, rows, points, sensors), columns)
-        return 0
     hint = partial(column_of_names, table, time, [time, *points.used]) if curve is None else lambda: None
     given_points = points.read(rows.numbers, rows.place)
     data = Recordings(table.path, rows, given_points, space, options, hint)
@@ -210,18 +179,6 @@ def run(options: argparse.Namespace) -> int:
             f"{merged!r}; if the table holds several tracks, fit each of them with --curve {merged}"
         )
     return 0
-
-
-def _fit_sensors(options: argparse.Namespace, smooth: dict[str, Any], fusion: Fusion, columns: Columns) -> None:
-    """Fit curves to points, rates and velocities, and write them."""
-    named = options.curve is not None
-    kept = {name: smooth[name] for name in ("lam", "loss", "penalty")}
-    extrapolate = _POLICIES.get(options.extrapolate)
-    curves = fusion.fitted({**kept, "criterion": options.criterion, "extrapolate": extrapolate})
-    write_curves(options.output, Curves(curves, named, columns))
-    first, *biases = _summary.estimated(curves, named, fusion.counts, fusion.omitted)
-    for line in (f"{called(options.output)}: {first}", *biases):
-        tell(line)
 
 
 def _fit_points(options: argparse.Namespace, smooth: dict[str, Any] | None, data: Recordings, columns: Columns) -> None:
@@ -294,8 +251,6 @@ def _smoothing_options(options: argparse.Namespace, space: Space) -> dict[str, A
         option = next((name for name in _NOISY if getattr(options, name) not in (None, False)), "")
         refuse(f"--{option.replace('_', '-')}", (option, " is for noisy data; give --smooth, too"))
         return None
-    rates = options.rate_sigma is not None or options.rate_bias
-    velocities = options.velocity_sigma is not None
     through = "is for curves through the points; omit it with --smooth"
     refuse(
         "",
@@ -305,8 +260,6 @@ def _smoothing_options(options: argparse.Namespace, space: Space) -> dict[str, A
         (options.dedup == "mean", "with --smooth all points of one time count; omit --dedup mean"),
         (options.lam and options.criterion, "--lam gives λ, which --criterion would choose; omit one of them"),
         (options.criterion == "cp" and options.sigma is None, "--criterion cp needs the noise; give it with --sigma"),
-        (rates and options.rates is None, "there are no --rates, to which --rate-sigma and --rate-bias belong"),
-        (velocities and options.velocities is None, "there are no --velocities, to which --velocity-sigma belongs"),
     )
     lam = None if options.lam is None else option_numbers(options.lam, "--lam")
     sigma = None if options.sigma is None else option_numbers(options.sigma, "--sigma", positive=True)
@@ -315,7 +268,5 @@ def _smoothing_options(options: argparse.Namespace, space: Space) -> dict[str, A
         sigma = math.radians(sigma)
     criterion = options.criterion or ("cp" if sigma is not None and lam is None else "gcv")
     loss = "cauchy" if options.robust else "linear"
-    # Measured rates and velocities ask for the jerk, as in `estimate`.
-    measured = options.rates is not None or options.velocities is not None
-    penalty = options.penalty or ("jerk" if measured else "acceleration")
+    penalty = options.penalty or "acceleration"
     return {"criterion": criterion, "lam": lam, "sigma": sigma, "loss": loss, "penalty": penalty}

@@ -37,7 +37,7 @@ from ._summary import counted, gaps_in, parameters_of, smoothed
 from ._tables import Array, Rows, Table
 
 _LIBRARIES = {"pyarrow": "Parquet and large CSV files", "gpxpy": "GPX files", "matplotlib": "symspline plot"}
-_LIBRARIES |= {"nibabel": "NIfTI files", "zarr": "Zarr stores", "shtab": "completion in shells"}
+_LIBRARIES |= {"shtab": "completion in shells"}
 
 
 _LONGEST = 1000
@@ -94,7 +94,7 @@ def _table(table: Table, given: str | None) -> list[str]:
             f"  {key}: {len(columns[own[0]])}{f' x {len(own)}' * (len(own) > 1)} numbers"
             for key, own in table.groups.items()
         ]
-        return [f"{table.path}: arrays of different lengths, such as a grid; see symspline grid --help", *sizes]
+        return [f"{table.path}: arrays of different lengths, such as a grid", *sizes]
     lines = [f"{table.path}: {table.path.format} table, {table.height} rows"]
     hidden = {name for own in groups.values() for name in own[_COLUMNS:]}
     shown = [name for name in columns if name not in hidden]
@@ -156,7 +156,7 @@ def _curves(path: Path) -> list[str]:
     if isinstance(found, GridSpline):
         sizes = " x ".join(str(len(axis)) for axis in found.axes)
         ranges = [f"  axis {k}: {axis[0]} to {axis[-1]}" for k, axis in enumerate(found.axes)]
-        return [f"{path}: a spline through {sizes} points of {found.space}; see symspline grid --help", *ranges]
+        return [f"{path}: a spline through {sizes} points of {found.space}; symspline.load reads it", *ranges]
     curves = read_curves(path)
     count = len(curves.splines)
     space = next(iter(curves.splines.values())).space

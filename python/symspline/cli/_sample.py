@@ -8,7 +8,7 @@ and x0_re and x0_im for a complex number.
 --nu 1 writes the velocity, x0_d1, ... or x0_d1_re, ..., and --nu 2 the covariant acceleration, x0_d2, ..., per unit of
 time, which is a second for dates. For longitude and latitude these are east_d1, north_d1, ..., in degrees of arc. For
 unit quaternions, whose sign does not jump along a curve, they are the angular velocity wx, wy, wz in the frame of the
-body, in radians per unit of time, as symspline fit --rates reads it, and the angular acceleration wx_d1, wy_d1, wz_d1.
+body, in radians per unit of time, and the angular acceleration wx_d1, wy_d1, wz_d1.
 
 Curves fitted with --smooth have the standard error of a coordinate of the point, std, and of the velocity, std_d1, in
 the units of the columns next to them:

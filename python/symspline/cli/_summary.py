@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,8 +13,6 @@ from .._smoothing.factors import is_several, smoothed_spaces
 from .._spaces import Doubles
 from .._splines.cubic import CubicSpline
 
-# Residuals may exceed the given standard deviations by this factor without a note.
-_FACTOR = 2.0
 _ROUGH = 2.5
 """Degrees of freedom from which on a curve is not a geodesic."""
 
@@ -89,30 +87,6 @@ def _data_times(spline: CubicSpline) -> Doubles:
     if isinstance(spline, SmoothingSpline):
         return np.unique(spline._noisy.times[spline._noisy.used])
     return spline._times
-
-
-def estimated(
-    curves: Mapping[str, SmoothingSpline[Any, Any]], named: bool, counts: Sequence[int], omitted: int
-) -> list[str]:
-    """Describe curves from points, rates and velocities in one line for all, and one per bias."""
-    splines = list(curves.values())
-    kinds = zip(counts, ("points", "rates", "velocities"), strict=True)
-    given = [f"{count} {kind}" for count, kind in kinds if count]
-    near = " and ".join([*filter(None, [", ".join(given[:-1])]), given[-1]])
-    reports = _reports(splines)
-    # All spaces share one factor.
-    sizes = [report.sigma for report in reports[0][1]]
-    advice = " (check --sigma, --rate-sigma and --velocity-sigma)" if max(sizes) > _FACTOR else ""
-    rows = f"; {counted(omitted, 'row')} without measurements omitted" if omitted else ""
-    lines = [
-        f"{counted(len(curves), 'curve')} near {near} on {splines[0].space}, converged: "
-        f"{'; '.join(_chosen(name, own) for name, own in reports)}; residuals {spread(sizes)} times the given "
-        f"standard deviations{advice}{rows}"
-    ]
-    for name, curve in curves.items():
-        of = f" of curve {name!r}" if named else ""
-        lines += parameters_of(curve, of)
-    return lines
 
 
 def parameters_of(curve: SmoothingSpline[Any, Any], of: str = "") -> list[str]:
