@@ -23,7 +23,9 @@ def test_invalid_tables(fails):
         (AXES + "4,1,0,n/a\n", "s:2", "a.csv, line 5: column 'z' holds 'n/a', which is not a number"),
         (AXES + "\n\n4,1,0,\n", "s:2", "a.csv, line 7: column 'z' is empty"),
         (AXES + "4,1,0,inf\n", "s:2", "a.csv, line 5: column 'z' holds inf, which is not a finite number"),
-        (AXES + "4,1,0\n", "s:2", "a.csv, line 5: 3 cells, but the first line names 4 columns"),
+        (AXES + "4,1,0\n", "s:2", "a.csv, line 5: column 'z' is empty or NaN; symspline fit --skipna omits such"),
+        (AXES + "4,1,0,0,0\n", "s:2", "a.csv, line 5: 5 cells, but the first line names 4 columns"),
+        (AXES.replace("0,0\n", "0,0,7\n", 1), "s:2", "a.csv, line 2: 5 cells, but the first line names 4 columns"),
         (AXES + '4,1,0,"0\n', "s:2", "a.csv, line 5: unexpected end of data"),
         (AXES + "4,0,0,-1\n", "s:2", "the point in line 4 and the point in line 5 of the curve lie at or"),
         ("\n\n", "s:2", "a.csv is empty"),
@@ -105,7 +107,7 @@ def test_damaged_column_names(fails):
 def test_parquet_columns_of_other_types(fails):
     pa, parquet = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
     times, durations = map(datetime.time, (6, 7, 8)), map(datetime.timedelta, (1, 2, 3))
-    for cells in ([b"\xff\xfe", b"a", b""], [*times], [*durations], [[1.0], [2.0], [3.0]], [{"a": 1}] * 3):
+    for cells in ([b"\xff\xfe", b"a", b""], [*times], [*durations], [[1.0], [2.0], [3.0]], [{"a": 1}, {"a": 2}, {}]):
         parquet.write_table(pa.table({"x": [1.0, 2.0, 4.0], "odd": pa.array(cells)}), "a.parquet")
         for option in ["--time", "--columns", "--curve"]:
             more = "" if option == "--columns" else "--columns x"

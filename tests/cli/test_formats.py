@@ -106,6 +106,13 @@ def test_parquet_of_all_kinds(run, fails):
     assert fails("fit b.parquet --space r:3 -o b.npz") == "b.parquet is damaged or not a Parquet file"
 
 
+def test_csv_without_pandas(fails, monkeypatch):
+    write("a.csv", TRACK)
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    problem = "CSV files need pandas; install it with: pip install 'symspline[cli]'"
+    assert fails("fit a.csv --lonlat -o a.npz") == problem
+
+
 def test_parquet_without_pyarrow(curves, fails, monkeypatch):
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     assert "pip install 'symspline[parquet]'" in fails("sample a.npz -n 3 -o out.parquet")

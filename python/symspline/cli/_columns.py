@@ -6,7 +6,7 @@ import csv
 import re
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from shlex import quote
 from typing import Any
 
@@ -16,6 +16,7 @@ from .._base.exceptions import SymsplineError
 from .._spaces import LogEuclidean, Space, SymmetricPositiveDefinite, Torus, factors_of
 from .._spaces.degrees import is_degrees, look_like_degrees
 from ..geo import NAMED, are_tracks
+from ._files import Source
 from ._messages import Problem, first_duplicate, listed, refuse, say
 from ._points import (
     IN_BRACKETS,
@@ -28,7 +29,6 @@ from ._points import (
     quaternion_by_names,
     width,
 )
-from ._streams import Source
 from ._tables import IM, RE, Array, Place, Rows, Table
 
 NUMBERED = "none"
@@ -105,9 +105,9 @@ def with_stamps(table: Table, given: str | None, skipna: bool) -> tuple[Table, s
         raise Problem(f"{table.path}, {table.place(int(wrong[0]))}: --time {given}: the columns hold {found}, {what}")
     seconds, rest = stamps.T.astype(np.int64)
     columns = {name: own for name, own in table.columns.items() if name not in names}
-    time = given if "time" in columns else "time"
-    columns[time or ""] = (10**9 * seconds + rest).astype("datetime64[ns]")
-    return Table(table.path, columns, table.place, table.groups, {**table.is_utc, time or "": True}), time
+    time = given if given is not None and "time" in columns else "time"
+    columns[time] = (10**9 * seconds + rest).astype("datetime64[ns]")
+    return replace(table, columns=columns, is_utc={**table.is_utc, time: True}), time
 
 
 def _letters(name: str) -> str:
@@ -145,7 +145,7 @@ def column_of_names(table: Table, time: str | None, used: Sequence[str | None]) 
             continue
         # A cell may be empty, or not hold a text.
         with suppress(Problem):
-            labels = np.unique(np.array(table.labels(name)), return_inverse=True)[1]
+            labels = table.codes(name)
             if labels.max() == 0 or np.bincount(labels).min() < 2:
                 continue
             if time is None and np.count_nonzero(np.diff(labels)) == labels.max():
@@ -168,7 +168,7 @@ def column_of_tracks(table: Table, used: Sequence[str | None], space: Space, poi
             continue
         # Cells can be empty or without text, and some spaces have no distances.
         with suppress(Problem, SymsplineError):
-            labels = np.unique(np.array(table.labels(name)), return_inverse=True)[1]
+            labels = table.codes(name)
             if are_tracks(labels, lambda order: _steps(space, points, order)):
                 return name
     return None

@@ -21,10 +21,10 @@ from .._splines.archive import json_in, read
 from .._splines.composed import SegmentedCurve
 from .._splines.cubic import CubicSpline
 from .._splines.files import load, save
+from ._files import Source, writing
 from ._formats import CURVES
 from ._messages import Problem, did_you_mean, refuse
 from ._points import GLOBE, LONLAT, Columns, count_with_quaternion, labels, require_globe
-from ._streams import Source, writing
 
 _COLUMNS = "columns"
 """The entry of the file with the columns, which the library ignores."""

@@ -68,13 +68,13 @@ from ._columns import (
     with_stamps,
 )
 from ._curves import Curves, write_curves
+from ._files import called, check_target
 from ._formats import CURVES, TABLES, endings, format_of, open_table
 from ._messages import VERBOSE, Problem, Progress, for_command_line, listed, refuse, say, tell
 from ._outliers import outliers
 from ._points import GLOBE, Columns, require_globe
 from ._recordings import Recordings
-from ._streams import called, check_target
-from ._times import UNITS, number, option_numbers
+from ._tables import UNITS, number, option_numbers
 
 _METHODS = "auto (default), quasi-newton, newton, homotopy or fixed-point"
 _ENDS = "natural (default), not-a-knot, clamped, periodic; or two of the first three with a comma, for start and end"

@@ -30,9 +30,9 @@ from .._spaces.base import CLASSES, example_of
 from .._splines.files import load
 from ._columns import NUMBERED, column_of_names, time_column
 from ._curves import read_curves
+from ._files import Source
 from ._formats import CURVES, TABLES, endings, format_of, open_table
 from ._messages import Problem, listed, refuse
-from ._streams import Source
 from ._summary import counted, gaps_in, parameters_of, smoothed
 from ._tables import Array, Rows, Table
 

@@ -17,8 +17,8 @@ from pathlib import Path
 from .. import geo
 from .._splines.composed import SegmentedCurve
 from ._curves import read_curves
+from ._files import STANDARD, called, check_target, writing
 from ._messages import Problem, alternatives, listed, refuse, tell
-from ._streams import STANDARD, called, check_target, writing
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -58,15 +58,15 @@ from .._splines.cubic import CubicSpline
 from ..convert._pose_files import TUM
 from ._columns import time_column, with_stamps
 from ._curves import Curves, read_curves
-from ._formats import TABLES, endings, format_of, is_binary, open_table, write_table
+from ._files import called, check_inputs, check_target
+from ._formats import TABLES, Layout, endings, format_of, is_binary, open_table, write_table
 from ._messages import Problem, Progress, did_you_mean, first_duplicate, refuse, say, tell
 from ._points import Columns, quaternion_by_names
 from ._recordings import group
 from ._samples import Samples, deviations_of, samples_of
-from ._streams import called, check_inputs, check_target
 from ._summary import counted
-from ._tables import Layout, Rows, Table
-from ._times import UNITS, Times, every, number, spread
+from ._tables import UNITS, Rows, Table, number
+from ._times import Times, every, spread
 
 _EACH = "{curve}"
 """Replaced by the name of a curve in the name of the output."""

@@ -1,33 +1,86 @@
-"""Tables: columns of numbers, dates and texts, and their rows as numbers, times and labels."""
+"""Tables: columns of numbers, dates and texts in files, and the times, numbers and labels in their rows."""
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
-from itertools import islice
-from typing import Any
+from dataclasses import dataclass, field, replace
+from decimal import Decimal, InvalidOperation
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .._base.durations import NANOSECONDS
+from .._base.input import ISO_DATE, UTC_ZONE, times_of
+from .._core import ValidationError
+from ._files import Source
 from ._messages import Problem, did_you_mean, refuse
-from ._streams import Source
-from ._times import EXACT, first_date, from_unix, is_number, numbers, parse_times
 
 Array = NDArray[Any]
 Place = Callable[[int], str]
 
 RE, IM = "_re", "_im"
-_MISSING = {"", "nan", "na", "null"}
-"""Texts of missing numbers."""
+UNITS = ("s", "ms", "us", "ns")
+EXACT = 2**53
+"""Whole numbers up to here are exact as floating-point numbers."""
+MISSING = ("", "nan", "na", "null")
+"""Texts of missing numbers, in any case."""
 _SKIP = "; symspline fit --skipna omits such rows"
 FIRST = 50
 """Rows that are searched for numbers and dates, as the first ones may hold units or be empty."""
 
+# 2021-08-29, 29.8.2021, 8/29/21, 20210829T1655, 16:55, 29 Aug 2021, Aug 29, 2021
+_MONTH = r"(?:jan|feb|mar|apr|may|jun|jul|aug|sep|oct|nov|dec)[a-z]*"
+_DATE_LIKE = re.compile(
+    r"\d{4}([-/.])\d{1,2}\1\d{1,2}(?!\d)|\d{1,2}([-/.])\d{1,2}\2(?:\d{4}|\d{2})(?!\d|\.\d)|\d{8}T\d{4}|\d{1,2}:\d{2}(?!\d)"
+    rf"|\d{{1,2}}[-. ]*{_MONTH}[-. ,]*\d{{2}}|{_MONTH}[-. ]*\d{{1,2}}\b",
+    re.IGNORECASE | re.ASCII,
+)
+_PACKED_DAY = re.compile(r"(19|20)\d\d(0[1-9]|1[0-2])(0[1-9]|[12]\d|3[01])", re.ASCII)
 
-@dataclass(frozen=True)
-class Rows:
+
+# ---- cells ----
+
+
+def is_number(text: str) -> bool:
+    """Whether a text is a number, without the underscores and numerals of other scripts that Python accepts."""
+    with suppress(ValueError):
+        float(text)
+        return "_" not in text and text.strip().isascii()
+    return False
+
+
+def number(text: str) -> float:
+    """Read a number in an option."""
+    if not is_number(text):
+        raise ValueError
+    return float(text)
+
+
+def option_numbers(text: str, option: str, positive: bool = False) -> Any:
+    """Read the numbers in an option, finite and at least 0: one, or a tuple of several."""
+    cells = text.split(",")
+    refuse(f"{option} {text}: ", (not all(map(is_number, cells)), "give a number such as 0.1"))
+    values = tuple(map(float, cells))
+    bad = [value for value in values if not 0 <= value < math.inf]
+    refuse(
+        f"{option} {text}: ",
+        (bad, f"{next(iter(bad), 0):g} is not a finite number >= 0"),
+        (positive and 0 in values, "the standard deviation must be greater than 0"),
+    )
+    return values if len(values) > 1 else values[0]
+
+
+def _holds_dates(cells: Sequence[str]) -> bool:
+    """Whether the first cell that looks like a date or a number looks like a date, such as 20210829."""
+    first = next((cell for cell in cells if is_number(cell) or _DATE_LIKE.match(cell)), "")
+    return _DATE_LIKE.match(first) is not None or _PACKED_DAY.fullmatch(first) is not None
+
+
+class Rows(NamedTuple):
     """Columns that were read from a table.
 
     Attributes
@@ -50,86 +103,7 @@ class Rows:
     place: Place
 
 
-@dataclass(frozen=True)
-class Layout:
-    """The meaning of the columns that are written.
-
-    Attributes
-    ----------
-    time : str
-        Column of times.
-    curve : str or None
-        Column of the names of curves.
-    lonlat : tuple of str or None
-        Columns of longitude and latitude in degrees.
-    utc : bool
-        Whether dates are in UTC.
-    """
-
-    time: str
-    curve: str | None
-    lonlat: tuple[str, ...] | None
-    utc: bool
-
-
-class Texts:
-    """A column of text, as a list or, in large files, as an array of pyarrow.
-
-    Parameters
-    ----------
-    cells : list of str or pyarrow.ChunkedArray
-        One text per row.
-    comma : bool
-        Whether numbers may have a decimal comma.
-    """
-
-    def __init__(self, cells: Any, comma: bool = False) -> None:
-        self._cells, self._comma = cells, comma
-
-    def __len__(self) -> int:
-        """Return the number of rows."""
-        return len(self._cells)
-
-    def tolist(self, rows: int | None = None) -> list[str]:
-        """Return all texts, or those of the first rows, without blanks at their ends."""
-        cells = self._cells[:rows] if rows is not None else self._cells
-        return list(map(str.strip, cells if isinstance(cells, list) else cells.to_pylist()))
-
-    def plain(self, rows: int | None = None) -> list[str]:
-        """Return texts with decimal points, from which numbers are read."""
-        cells = self.tolist(rows)
-        return [cell.replace(",", ".") for cell in cells] if self._comma else cells
-
-    @property
-    def is_numeric(self) -> bool:
-        """Whether the first text that is not empty is a number."""
-        return is_number(next(filter(None, self.plain(FIRST)), ""))
-
-    def rows(self, kept: NDArray[np.intp]) -> Texts:
-        """Return the texts of some rows."""
-        cells = [self._cells[i] for i in kept] if isinstance(self._cells, list) else self._cells.take(kept)
-        return Texts(cells, self._comma)
-
-    def converted(self) -> NDArray[np.float64] | None:
-        """Return an array of pyarrow as numbers, NaN where it is empty; None if another cell is not a number."""
-        if isinstance(self._cells, list):
-            return None
-        import pyarrow as pa
-        from pyarrow import compute
-
-        cells = compute.utf8_trim_whitespace(self._cells)
-        if self._comma:
-            cells = compute.replace_substring(cells, ",", ".")
-        try:
-            found = compute.replace_substring_regex(cells, "^$", "nan").cast(pa.float64())
-        except pa.ArrowInvalid:
-            return None
-        # The conversion of pyarrow would import pandas.
-        chunks = [chunk for chunk in found.chunks if len(chunk)]
-        parts = [np.frombuffer(own.buffers()[1])[own.offset : own.offset + len(own)] for own in chunks]
-        return np.concatenate([np.empty(0), *parts])
-
-
+@dataclass
 class Table:
     """Named columns of a file.
 
@@ -137,37 +111,51 @@ class Table:
     ----------
     path : Source
     columns : dict
-        For every name an array of numbers or dates, or `Texts`.
+        For every name an array of numbers or dates, or texts as an array or a series of pandas.
+    place : callable
+        Describes the position of a row.
     groups : mapping
         The columns of each array of an NPZ file.
     is_utc : mapping
         Whether a column of dates has the time zone UTC; empty if it is unknown.
-    place : callable
-        Describes the position of a row.
-    height : int
-        Number of rows.
+    texts : callable or None
+        Returns the texts of a column of numbers as they stand in the file. None for files that are not text.
+    comma : bool
+        Whether numbers may have a decimal comma.
     """
 
-    def __init__(
-        self,
-        path: Source,
-        columns: dict[str, Any],
-        place: Place = "row {} (counted from 0)".format,
-        groups: Mapping[str, list[str]] | None = None,
-        is_utc: Mapping[str, bool] | None = None,
-    ) -> None:
-        self.path, self.columns, self.place = path, columns, place
-        self.groups, self.is_utc = groups or {}, is_utc or {}
-        self.names = list(columns)
-        self.height = len(next(iter(columns.values()))) if columns else 0
-        self.numeric = [name for name, own in columns.items() if name and _is_numeric(own)]
-        self.dates = [name for name, own in columns.items() if _holds_dates(own)]
+    path: Source
+    columns: dict[str, Any]
+    place: Place = "row {} (counted from 0)".format
+    groups: Mapping[str, list[str]] = field(default_factory=dict)
+    is_utc: Mapping[str, bool] = field(default_factory=dict)
+    texts: Callable[[str], list[str]] | None = None
+    comma: bool = False
+
+    def __post_init__(self) -> None:
+        """Find the columns of numbers and of dates."""
+        self.names = list(self.columns)
+        self.height = len(next(iter(self.columns.values()))) if self.columns else 0
+        self.numeric = [name for name in self.names if name and self._is_numeric(name)]
+        self.dates = [name for name in self.names if self._is_dated(name)]
+
+    def _is_numeric(self, name: str) -> bool:
+        column = self.columns[name]
+        if _is_text(column):
+            return is_number(next(filter(None, self._plain(name, FIRST)), ""))
+        return column.dtype.kind in "biu" or (column.dtype.kind == "f" and not np.isnan(column).all())
+
+    def _is_dated(self, name: str) -> bool:
+        column = self.columns[name]
+        if _is_text(column):
+            return _holds_dates(self._plain(name, FIRST))
+        whole = self.texts is not None and column.dtype.kind in "iu" and column.size
+        return column.dtype.kind in "mM" or bool(whole and _holds_dates([str(column[0])]))
 
     def require(self, name: str) -> str:
         """Return the name if there is such a column."""
-        if name not in self.names:
-            near = did_you_mean(name, [*self.groups] or self.names)
-            raise Problem(f"{self.path} has no column {name!r}; {near}")
+        near = did_you_mean(name, [*self.groups] or self.names)
+        refuse(self.path, (name not in self.names, f" has no column {name!r}; {near}"))
         return name
 
     def expand(self, name: str) -> list[str]:
@@ -181,6 +169,40 @@ class Table:
             raise Problem(f"{self.path} has a column {found[0]!r}, but no {missing!r}; a complex number needs both")
         return found or [self.require(name)]
 
+    def cells(self, name: str, rows: int | None = None) -> list[str]:
+        """Return the texts of a column, or of its first rows, without blanks at their ends; empty if missing."""
+        column = self.columns[name]
+        if _is_text(column):
+            return ["" if cell != cell else str(cell).strip() for cell in column[:rows].tolist()]
+        return self.texts(name) if self.texts is not None else column[:rows].astype(np.str_).tolist()
+
+    def _plain(self, name: str, rows: int | None = None) -> list[str]:
+        """Return the same with decimal points."""
+        cells = self.cells(name, rows)
+        return [cell.replace(",", ".") for cell in cells] if self.comma else cells
+
+    def labels(self, name: str) -> list[str]:
+        """Return a column as texts, none of which is empty."""
+        texts = self.cells(name)
+        if "" in texts:
+            raise self._problem(name, texts.index(""), "is empty")
+        return texts
+
+    def codes(self, name: str) -> NDArray[np.intp]:
+        """Return a number from 0 on for every distinct value of a column, none of which is missing."""
+        column = self.columns[name]
+        values = column if column.dtype.kind in "biu" else np.array(self.labels(name))
+        return np.asarray(np.unique(values, return_inverse=True)[1])
+
+    def without_empty(self, names: Sequence[str]) -> Table:
+        """Return the rows in which none of these columns is missing."""
+        kept = np.flatnonzero(~np.any([self.missing(name) for name in names], axis=0))
+        refuse(self.path, (not kept.size, f" has no row in which {' and '.join(names)} are all given"))
+        columns = {name: column.take(kept) for name, column in self.columns.items()}
+        place, texts = self.place, self.texts
+        left = None if texts is None else lambda name: np.array(texts(name), object)[kept].tolist()
+        return replace(self, columns=columns, place=lambda row: place(int(kept[row])), texts=left)
+
     def points(self, others: Sequence[str | None]) -> list[str]:
         """Return the columns of the points if none are named: all numeric columns but the others."""
         return self.groups.get("points") or [name for name in self.numeric if name not in others]
@@ -188,127 +210,130 @@ class Table:
     def shown(self, name: str) -> Array:
         """Return the values of a column, as numbers if they all are, to describe them."""
         column = self.columns[name]
-        if not isinstance(column, Texts):
+        if not _is_text(column):
             return np.asarray(column)
-        if column.is_numeric:
+        if name in self.numeric:
             with suppress(Problem):
-                return self._numbers(name, True)
-        return np.array(column.tolist())
+                return self._parsed(name)
+        return np.array(self.cells(name))
 
-    def without_empty(self, names: Sequence[str]) -> Table:
-        """Return the rows in which none of these columns is missing."""
-        kept = np.flatnonzero(~np.any([_missing(self.columns[name]) for name in names], axis=0))
-        columns = {name: own.rows(kept) if isinstance(own, Texts) else own[kept] for name, own in self.columns.items()}
-        refuse(self.path, (not kept.size, f" has no row in which {' and '.join(names)} are all given"))
-        place = self.place
-        return Table(self.path, columns, lambda row: place(int(kept[row])), self.groups, self.is_utc)
+    def missing(self, name: str) -> NDArray[np.bool_]:
+        """Return which entries of a column are empty or NaN."""
+        column = self.columns[name]
+        if _is_text(column):
+            return np.array([text.lower() in MISSING for text in self.cells(name)])
+        return np.asarray(column != column)
 
-    def read(
-        self,
-        names: Sequence[str],
-        time: str | None,
-        label: str | None,
-        sparse: Sequence[str] = (),
-        unix: str | None = None,
-    ) -> Rows:
+    def read(self, names: Sequence[str], time: str | None, label: str | None, unix: str | None = None) -> Rows:
         """Read some columns as numbers, one as times and one as labels.
 
-        Cells of the columns `sparse` may be empty or NaN; they are NaN in the result. Numeric times count the unit
-        `unix` since 1970, if it is given.
+        Numeric times count the unit `unix` since 1970, if it is given.
         """
-        columns = [self._numbers(name, name in sparse) for name in names]
-        times, utc = self._times(time) if time is not None else (np.empty(0), False)
-        if unix is not None:
-            if time is None:
-                raise Problem("--unix is for times that are numbers, and there is no column of times")
-            refuse("--unix is for times that are numbers", (times.dtype.kind == "M", f"; column {time!r} has dates"))
-            column = self.columns[time]
-            cells = column.plain() if isinstance(column, Texts) else None
-            times, utc = from_unix(times, unix, cells, lambda row: f"{self.path}, {self.place(row)}"), True
+        columns = [self.numbers(name) for name in names]
+        refuse("--unix", (unix and time is None, " is for times that are numbers, and there is no column of times"))
+        times, utc = self.times(time, unix) if time is not None else (np.empty(0), False)
         labels = self.labels(label) if label is not None else None
         given = [*columns, *([times] if time is not None else []), *([labels] if labels is not None else [])]
         lengths = sorted(set(map(len, given)))
         differ = f": arrays differ in length: {' and '.join(map(str, lengths))}"
         refuse(self.path, (len(lengths) > 1, differ), (lengths == [0], " has no rows"))
-        table = np.stack(columns, axis=1) if columns else np.empty((0, 0))
-        return Rows(table, times, utc, labels, self.place)
+        return Rows(np.stack(columns, axis=1) if columns else np.empty((0, 0)), times, utc, labels, self.place)
 
-    def _numbers(self, name: str, sparse: bool) -> NDArray[np.float64]:
+    def numbers(self, name: str) -> NDArray[np.float64]:
+        """Return a column of finite numbers."""
         column = self.columns[name]
-        if isinstance(column, Texts):
-            values = self._read(name, column, sparse)
+        if _is_text(column):
+            values = self._parsed(name)
         elif column.dtype.kind in "biuf":
             values = column.astype(np.float64)
         else:
             raise Problem(f"{self.path}: column {name!r} holds {column.dtype}, not numbers")
-        bad = np.flatnonzero(np.isinf(values) if sparse else ~np.isfinite(values))
+        bad = np.flatnonzero(~np.isfinite(values))
         if bad.size:
             value = values[bad[0]]
             found = f"is empty or NaN{_SKIP}" if np.isnan(value) else f"holds {value}, which is not a finite number"
             raise self._problem(name, int(bad[0]), found)
+        return np.asarray(values)
+
+    def _parsed(self, name: str) -> NDArray[np.float64]:
+        cells = self._plain(name)
+        bad = next((row for row, cell in enumerate(cells) if cell and not is_number(cell)), None)
+        if bad is not None:
+            units = "; if this line holds units, remove it" if bad == 0 else ""
+            raise self._problem(name, bad, f"holds {self.cells(name)[bad]!r}, which is not a number{units}")
+        return np.fromiter((float(cell or "nan") for cell in cells), np.float64, len(cells))
+
+    def times(self, name: str, unix: str | None = None) -> tuple[Array, bool | None]:
+        """Return a column as times, and whether they are dates in UTC, None if this is unknown."""
+        column = self.columns[name]
+        numeric = name in self.numeric or not (_is_text(column) or column.dtype.kind == "M")
+        refuse("--unix is for times that are numbers", (unix and not numeric, f"; column {name!r} has dates"))
+        if numeric:
+            times = self._counted(name)
+            return (times, False) if unix is None else (self._since_1970(name, times, unix), True)
+        if column.dtype.kind == "M":
+            if np.isnat(column).any():
+                raise self._problem(name, int(np.isnat(column).argmax()), "holds no time")
+            return column, self.is_utc.get(name)
+        return self._dates(name)
+
+    def _counted(self, name: str) -> Array:
+        """Return times that are numbers. Whole numbers that are not exact as floating-point numbers stay whole."""
+        column = self.columns[name]
+        if column.dtype.kind in "iu" and column.size:
+            return column if max(abs(int(column.min())), abs(int(column.max()))) > EXACT else column.astype(np.float64)
+        values = self.numbers(name)
+        if np.abs(values).max(initial=0.0) > EXACT:
+            with suppress(ValueError, OverflowError):
+                return np.array([int(cell) for cell in self._plain(name)], np.int64)
         return values
 
-    def _read(self, name: str, column: Texts, sparse: bool) -> NDArray[np.float64]:
-        """Return texts as numbers."""
-        found = column.converted()
-        if found is not None and (sparse or not np.isnan(found).any()):
-            return found
-        cells = column.plain()
-        cells = [cell or "nan" for cell in cells] if sparse else cells
-        try:
-            return numbers(cells)
-        except ValueError:
-            row = next(i for i, cell in enumerate(cells) if not is_number(cell))
-            if not cells[row]:
-                raise self._problem(name, row, f"is empty{_SKIP}") from None
-            units = "; if this line holds units, remove it" if row == 0 else ""
-            shown = column.tolist()[row]
-            raise self._problem(name, row, f"holds {shown!r}, which is not a number{units}") from None
+    def _since_1970(self, name: str, times: Array, unit: str) -> Array:
+        """Return dates in UTC for numbers that count a unit since 1970; fractions in a file of text are exact."""
+        scale = NANOSECONDS[unit]
+        whole = np.floor(times)
+        limit = np.iinfo(np.int64).max // scale
+        far = np.flatnonzero(np.abs(whole) > limit)
+        if far.size:
+            place = f"{self.path}, {self.place(int(far[0]))}"
+            raise Problem(f"{place}: --unix {unit}: time {times[far[0]]} is too far from 1970; is it in ns?")
+        fraction: Any = 0
+        if (whole != times).any():
+            if self.texts is not None or _is_text(self.columns[name]):
+                with suppress(InvalidOperation):
+                    exact = [int((Decimal(cell) * scale).to_integral_value()) for cell in self._plain(name)]
+                    return np.array(exact, np.int64).astype("datetime64[ns]")
+            # The accuracy of floating-point numbers is their spacing.
+            digits = max(0, int(-np.log10(np.spacing(np.abs(times).max(initial=1.0)))))
+            fraction = np.rint(np.round(times - whole, digits) * scale).astype(np.int64)
+        return np.asarray((whole.astype(np.int64) * scale + fraction).astype("datetime64[ns]"))
 
-    def _times(self, name: str) -> tuple[Array, bool | None]:
-        column = self.columns[name]
-        if isinstance(column, Texts):
-            found = column.converted() if column.is_numeric else None
-            # Larger whole numbers are exact as texts only.
-            if found is not None and np.abs(found).max(initial=0.0) <= EXACT:
-                return found, False
-            cells = self.labels(name)
-            cells = column.plain() if column.is_numeric else cells
-            return parse_times(cells, lambda row, what: self._problem(name, row, what))
-        if column.dtype.kind in "iu":
-            return column, False
-        if column.dtype.kind != "M":
-            return self._numbers(name, False), False
-        if np.isnat(column).any():
-            raise self._problem(name, int(np.isnat(column).argmax()), "holds no time")
-        return column, self.is_utc.get(name)
-
-    def labels(self, name: str) -> list[str]:
-        """Return a column as texts, none of which is empty."""
-        column = self.columns[name]
-        if isinstance(column, np.ndarray) and column.dtype.kind == "O":
-            raise Problem(f"{self.path}: column {name!r} holds {column.dtype}, not texts, numbers or times")
-        texts = column.tolist() if isinstance(column, Texts) else column.astype(np.str_).tolist()
-        if "" in texts:
-            raise self._problem(name, texts.index(""), "is empty")
-        return texts
+    def _dates(self, name: str) -> tuple[Array, bool]:
+        cells = self.labels(name)
+        with suppress(ValidationError):
+            times, zone = times_of(cells, "time")
+            if isinstance(times, np.ndarray):
+                return times, zone == UTC_ZONE
+        first = ISO_DATE.fullmatch(cells[0]) if cells else None
+        for row, cell in enumerate(cells):
+            match = ISO_DATE.fullmatch(cell)
+            if match is None:
+                advice = "not a time: write 0.5, 2021-08-29 or 2021-08-29T16:55:00Z"
+                advice += f" in all rows, as {cells[0]!r} before" if first else ""
+                raise self._problem(name, row, f"holds {cell!r}, {advice}")
+            if first and (match["zone"] is None) != (first["zone"] is None):
+                raise self._problem(
+                    name, row, f"holds {cell!r}, but {cells[0]!r} before; give all times a zone, or none"
+                )
+            with suppress(ValidationError):
+                times_of(cell, "time")
+                continue
+            raise self._problem(name, row, f"holds {cell!r}, which is not a date of the calendar")
+        raise Problem(f"{self.path}: column {name!r} has no times")
 
     def _problem(self, name: str, row: int, found: str) -> Problem:
         return Problem(f"{self.path}, {self.place(row)}: column {name!r} {found}")
 
 
-def _missing(column: Any) -> NDArray[np.bool_]:
-    """Return which entries of a column are empty or NaN."""
-    if isinstance(column, Texts):
-        return np.array([text.lower() in _MISSING for text in column.tolist()])
-    return np.asarray(column != column)
-
-
-def _is_numeric(column: Any) -> bool:
-    return column.is_numeric if isinstance(column, Texts) else column.dtype.kind in "biuf"
-
-
-def _holds_dates(column: Any) -> bool:
-    if isinstance(column, Texts):
-        return first_date(list(islice(column.plain(FIRST), FIRST)))
-    return column.dtype.kind in "Mm"
+def _is_text(column: Any) -> bool:
+    return bool(column.dtype.kind == "O")
