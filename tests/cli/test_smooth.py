@@ -113,7 +113,7 @@ def test_contradicting_options(fails):
     for line, says in [
         (
             "--smooth --bc-type not-a-knot",
-            "--bc-type not-a-knot is for curves through the points; omit it with --smooth",
+            "--bc-type is for curves through the points; omit it with --smooth",
         ),
         ("--smooth --method newton", "--method is for curves through the points; omit it with --smooth"),
         ("--smooth --tol 1e-9", "--tol is for curves through the points; omit it with --smooth"),
@@ -126,11 +126,11 @@ def test_contradicting_options(fails):
         ("--smooth --criterion gvc", "invalid choice: 'gvc'; did you mean gcv?"),
         ("--smooth --criterion cp", "--criterion cp needs the noise; give it with --sigma"),
         ("--smooth --criterion gcv --lam 2", "--lam gives λ, which --criterion would choose; omit one of them"),
-        ("--smooth --lam 1_0", "--lam 1_0: give a number such as 0.1"),
-        ("--smooth --lam=-1", "--lam -1: -1 is not a finite number >= 0"),
+        ("--smooth --lam 1_0", "argument --lam: 1_0: give a finite number >= 0, such as 0.1"),
+        ("--smooth --lam=-1", "argument --lam: -1: give a finite number >= 0"),
         ("--smooth --lam 1,2", "lam must be a number, not (1.0, 2.0)"),
-        ("--smooth --sigma small", "--sigma small: give a number such as 0.1"),
-        ("--smooth --sigma 0", "--sigma 0: the standard deviation must be greater than 0"),
+        ("--smooth --sigma small", "argument --sigma: small: give a finite number >= 0"),
+        ("--smooth --sigma 0", "argument --sigma: 0: the standard deviation must be greater than 0"),
     ]:
         assert says in fails(f"fit a.csv --lonlat -o a.npz {line}")
 

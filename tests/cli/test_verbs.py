@@ -55,8 +55,8 @@ def test_options_of_the_solver(run, fails):
     assert fails("fit axes.csv --space s:2 --method foo -o b.npz").startswith("method must be")
     assert "tol" in fails("fit axes.csv --space s:2 --tol -1 -o b.npz")
     assert "--tol" in fails("fit axes.csv --space s:2 --tol x -o b.npz")
-    assert fails("fit axes.csv --space s:2 --bc-type foo -o b.npz").startswith("--bc-type foo: give natural")
-    assert fails("fit axes.csv --space s:2 --bc-type periodic,natural -o b.npz").startswith("--bc-type")
+    assert fails("fit axes.csv --space s:2 --bc-type foo -o b.npz").startswith("argument --bc-type: foo: give natural")
+    assert fails("fit axes.csv --space s:2 --bc-type periodic,natural -o b.npz").startswith("argument --bc-type: ")
     assert fails("fit axes.csv --space s:2 --bc-type periodic -o b.npz").startswith("axes.csv: bc_type='periodic'")
 
 

@@ -3,39 +3,49 @@
 from __future__ import annotations
 
 import csv
+import math
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from itertools import count
 from shlex import quote
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .._base.exceptions import SymsplineError
-from .._spaces import LogEuclidean, Space, SymmetricPositiveDefinite, Torus, factors_of
+from .._base.lonlat import from_lonlat
+from .._core import ValidationError
+from .._spaces import (
+    Doubles,
+    LogEuclidean,
+    Product,
+    Space,
+    SymmetricPositiveDefinite,
+    Torus,
+    factors_of,
+    space_named,
+)
 from .._spaces.degrees import is_degrees, look_like_degrees
+from ..convert._pose_files import join, rotations_in_rows
 from ..geo import NAMED, are_tracks
 from ._files import Source
-from ._messages import Problem, first_duplicate, listed, refuse, say
-from ._points import (
-    IN_BRACKETS,
-    complex_numbers,
-    count_with_quaternion,
-    described,
-    in_order,
-    matrix,
-    points_of,
-    quaternion_by_names,
-    width,
-)
+from ._messages import Problem, first_duplicate, for_command_line, listed, refuse, say
 from ._tables import IM, RE, Array, Place, Rows, Table
 
+GLOBE, ROTATIONS, POSES = map(space_named, ("sphere:2", "so:3", "se:3"))
+LONLAT = ["lon", "lat"]
 NUMBERED = "none"
 """The value of --time that numbers the points of every curve, unless a column has this name."""
 ORDERS = ("wxyz", "xyzw")
 _LON, _LAT = ("lon", "lng", "longitude", "location-long"), ("lat", "latitude", "location-lat")
-_HALVES = {RE: IM, IM: RE}
+# Longitudes may start at -180 or at 0, or continue across the date line. 400 is an error, and 999 a missing value.
+_LARGEST = {"longitude": 360, "latitude": 90}
+_IN_BRACKETS = re.compile(r"[(\[].*?[)\]]")
+# Everything except the unit in names such as heading_deg or "heading (deg)".
+_UNIT = re.compile(r".*[\[(_ ]|[\])]")
 
 # Names of times without blanks and marks: "BaseDateTime", "#timestamp [ns]", "ISO_TIME", "header.stamp".
 _TIME = re.compile(
@@ -47,6 +57,38 @@ _TIME_PART = re.compile("year|month|day|doy|hours?|minutes?|secs?|seconds?|nsecs
 _FARTHEST = 9e9
 # A day as one number, 20210829, in a column that is called a date, and in any other column.
 _PACKED, _PACKED_NOW = (10_000_101, 99_991_231), (19_000_101, 20_991_231)
+
+
+@dataclass(frozen=True)
+class Columns:
+    """Names of columns, and what they hold.
+
+    Attributes
+    ----------
+    points : list of str
+        For every number of a point; for complex numbers without their endings.
+    time, curve : str
+        For times and for names of curves.
+    lonlat : bool
+        Whether points are longitude and latitude in degrees.
+    utc : bool or None
+        Whether dates had a time zone, and are written with a Z. None if that is not known.
+    quaternion : list of int or None
+        For rotations as quaternions the column of every number of a point, position first and scalar first.
+    cut : bool
+        Whether NAME/1, NAME/2, ... are the segments of one recording, which was cut at gaps.
+    degrees : bool
+        Whether angles of tori are in degrees.
+    """
+
+    points: list[str]
+    time: str = "time"
+    curve: str = "curve"
+    lonlat: bool = False
+    utc: bool | None = None
+    quaternion: list[int] | None = None
+    cut: bool = False
+    degrees: bool = False
 
 
 # ---- times ----
@@ -66,15 +108,14 @@ def time_column(table: Table, given: str | None, others: Sequence[str | None], u
     usual = [name for name in left if _TIME.fullmatch(_letters(name))]
     # Numbers are accepted as times only under the two plainest names, as the unit of others is in doubt.
     certain = [name for name in usual if unix or name not in table.numeric or name.lower() in ("t", "time")]
-    doubtful = [name for name in left if name not in certain and (name in usual or _TIME_PART.fullmatch(name.lower()))]
     # Stamps of ROS 2: header.stamp.sec and header.stamp.nanosec.
-    beside = [re.sub("sec$", part, name) for name in usual for part in ("nanosec", "nsec") if name.endswith(".sec")]
-    doubtful += [name for name in left if name in beside and name not in doubtful]
-    if len(certain) == 1:
-        # A column of dates with their time of day needs no other columns.
-        is_whole = certain[0] not in table.numeric and "time" in certain[0].lower()
-        if is_whole or not doubtful:
-            return certain[0]
+    beside = {re.sub("sec$", part, name) for name in usual for part in ("nanosec", "nsec") if name.endswith(".sec")}
+    parts = [name for name in left if name in usual or _TIME_PART.fullmatch(name.lower()) or name in beside]
+    doubtful = [name for name in parts if name not in certain]
+    # A column of dates with their time of day needs no other columns.
+    whole = len(certain) == 1 and certain[0] not in table.numeric and "time" in certain[0].lower()
+    if whole or (len(certain) == 1 and not doubtful):
+        return certain[0]
     found = [*certain, *doubtful] or [name for name in table.dates if name in left]
     if not found:
         return None
@@ -88,13 +129,17 @@ def time_column(table: Table, given: str | None, others: Sequence[str | None], u
     )
 
 
+def _letters(name: str) -> str:
+    return re.sub("[^a-z]", "", _IN_BRACKETS.sub("", name).lower())
+
+
 def with_stamps(table: Table, given: str | None, skipna: bool) -> tuple[Table, str | None]:
     """Return the table with one column of dates for two columns of seconds and nanoseconds, and its name.
 
     Rows without one of them are omitted if ``skipna`` is True.
     """
     names = split_names(given) if given is not None and given not in table.names else []
-    if len(names) != 2:
+    if given is None or len(names) != 2:
         return table, given
     table = table.without_empty([*map(table.require, names)]) if skipna else table
     stamps = table.read([*map(table.require, names)], None, None).numbers
@@ -105,13 +150,9 @@ def with_stamps(table: Table, given: str | None, skipna: bool) -> tuple[Table, s
         raise Problem(f"{table.path}, {table.place(int(wrong[0]))}: --time {given}: the columns hold {found}, {what}")
     seconds, rest = stamps.T.astype(np.int64)
     columns = {name: own for name, own in table.columns.items() if name not in names}
-    time = given if given is not None and "time" in columns else "time"
+    time = given if "time" in columns else "time"
     columns[time] = (10**9 * seconds + rest).astype("datetime64[ns]")
     return replace(table, columns=columns, is_utc={**table.is_utc, time: True}), time
-
-
-def _letters(name: str) -> str:
-    return re.sub("[^a-z]", "", IN_BRACKETS.sub("", name).lower())
 
 
 def check_days(table: Table, name: str | None, rows: Rows) -> None:
@@ -132,30 +173,30 @@ def check_days(table: Table, name: str | None, rows: Rows) -> None:
         )
 
 
+# ---- names of curves ----
+
+
 def column_of_names(table: Table, time: str | None, used: Sequence[str | None]) -> str | None:
     """Return an unused column that may hold the names of several curves.
 
     Each of its values occurs in two rows or more. It distinguishes most of the rows of equal times or, if there are no
     times, it is a text whose values have one block of rows each.
     """
-    times = np.empty(0) if time is None else table.read([], time, None).times
+    times = np.empty(0) if time is None else table.times(time)[0]
     repeated = len(times) - len(np.unique(times))
-    for name in table.names:
-        if name in used or name in table.dates or (time is None and name in table.numeric):
-            continue
-        # A cell may be empty, or not hold a text.
-        with suppress(Problem):
-            labels = table.codes(name)
-            if labels.max() == 0 or np.bincount(labels).min() < 2:
-                continue
-            if time is None and np.count_nonzero(np.diff(labels)) == labels.max():
-                return name
-            if time is not None and len(labels) == len(times):
-                order = np.lexsort((times, labels))
-                same = (np.diff(labels[order]) == 0) & (times[order][1:] == times[order][:-1])
-                if not same.any() or 2 * np.count_nonzero(same) < repeated:
-                    return name
-    return None
+
+    def fits(codes: NDArray[np.intp]) -> bool:
+        if codes.max() == 0 or np.bincount(codes).min() < 2:
+            return False
+        if time is None:
+            return bool(np.count_nonzero(np.diff(codes)) == codes.max())
+        if len(codes) != len(times):
+            return False
+        order = np.lexsort((times, codes))
+        same = (np.diff(codes[order]) == 0) & (times[order][1:] == times[order][:-1])
+        return bool(not same.any() or 2 * np.count_nonzero(same) < repeated)
+
+    return _first_of(table, [*used, *(table.numeric if time is None else [])], fits)
 
 
 def column_of_tracks(table: Table, used: Sequence[str | None], space: Space, points: Any) -> str | None:
@@ -163,33 +204,157 @@ def column_of_tracks(table: Table, used: Sequence[str | None], space: Space, poi
 
     The path through all rows is then at least twice as long as the paths through the rows of each name.
     """
+
+    def steps(order: Array) -> Array:
+        before, after = (
+            tuple(part[rows] for part in points) if isinstance(points, tuple) else points[rows]
+            for rows in (order[:-1], order[1:])
+        )
+        return np.asarray(space.distance(before, after))
+
+    unnamed = [name for name in table.numeric if not NAMED.search(name)]
+    return _first_of(table, [*used, *unnamed], lambda codes: are_tracks(codes, steps))
+
+
+def _first_of(table: Table, used: Sequence[str | None], fits: Callable[[NDArray[np.intp]], bool]) -> str | None:
     for name in table.names:
-        if name in used or name in table.dates or (name in table.numeric and not NAMED.search(name)):
-            continue
-        # Cells can be empty or without text, and some spaces have no distances.
+        # A cell may be empty, and some spaces have no distances.
         with suppress(Problem, SymsplineError):
-            labels = table.codes(name)
-            if are_tracks(labels, lambda order: _steps(space, points, order)):
+            if name not in used and name not in table.dates and fits(table.codes(name)):
                 return name
     return None
 
 
-def _steps(space: Space, points: Any, order: Array) -> Array:
-    before, after = (
-        tuple(part[rows] for part in points) if isinstance(points, tuple) else points[rows]
-        for rows in (order[:-1], order[1:])
-    )
-    return np.asarray(space.distance(before, after))
+# ---- numbers of a point ----
+
+
+def require_globe(space: Space) -> None:
+    """Raise `Problem` unless the points of a space have longitude and latitude."""
+    heights = GLOBE in factors_of(space)
+    advice = "; fit the other columns by themselves, such as heights by --space r:1 --columns ele" if heights else ""
+    refuse("--lonlat is for sphere:2, ", (space != GLOBE, f"not for {space}{advice}"))
+
+
+def complex_numbers(space: Space) -> list[bool]:
+    """For every number of a point whether it is complex."""
+    return [factor._complex for factor in factors_of(space) for _ in range(math.prod(factor.point_shape))]
+
+
+def labels(space: Space) -> list[str]:
+    """Name the numbers of a point x0, x1, … in vectors, m11, m12, … in a matrix, m1_11, … in several matrices."""
+    factors = factors_of(space)
+    several = sum(map(_is_matrix, factors)) > 1
+    names: list[str] = []
+    vectors, matrices = count(), count(1)
+    for factor in factors:
+        if _is_matrix(factor):
+            start = f"m{next(matrices)}_" if several else "m"
+            between = "_" if max(factor.point_shape) > 9 else ""
+            names += [f"{start}{i + 1}{between}{j + 1}" for i, j in np.ndindex(*factor.point_shape)]
+        else:
+            names += [f"x{next(vectors)}" for _ in range(*factor.point_shape)]
+    return names
+
+
+def _described(space: Space) -> str:
+    """Describe the numbers of a point and their order."""
+    if isinstance(space, Product):
+        parts = "; ".join(f"{factor}: {_described(factor)}" for factor in factors_of(space))
+        return f"{len(labels(space))} numbers ({parts})"
+    size = math.prod(space.point_shape)
+    text = f"{size} {'complex number' if space._complex else 'number'}{'s' if size > 1 else ''}"
+    text += f", A{RE} and A{IM} each" if space._complex else ""
+    return f"{text}, a {_matrix(space)}" if _is_matrix(space) else text
+
+
+def _matrix(space: Space) -> str:
+    """Describe a matrix in columns; empty for vectors."""
+    return f"{' x '.join(map(str, space.point_shape))} matrix row by row" if _is_matrix(space) else ""
+
+
+def _is_matrix(space: Space) -> bool:
+    return len(space.point_shape) > 1
+
+
+# ---- quaternions ----
+
+
+def count_with_quaternion(space: Space) -> int | None:
+    """Count the numbers of a point whose rotation is a quaternion; None without exactly one rotation in space."""
+    factors = factors_of(space)
+    if sum(factor in (ROTATIONS, POSES) for factor in factors) != 1 or any(factor._complex for factor in factors):
+        return None
+    return sum(width(factor, True) for factor in factors)
+
+
+def width(space: Space, quaternion: bool) -> int:
+    """Count the columns of a point of a space, not a product."""
+    if quaternion and space in (ROTATIONS, POSES):
+        return 4 if space == ROTATIONS else 7
+    return math.prod(space.point_shape) * (2 if space._complex else 1)
+
+
+def _in_order(space: Space, scalar_last: int) -> list[int]:
+    """Return `Columns.quaternion` for columns in the order of the factors, the scalar first (0) or last (1)."""
+    columns: list[int] = []
+    for factor in factors_of(space):
+        own = list(range(len(columns), len(columns) + width(factor, True)))
+        if factor in (ROTATIONS, POSES):
+            own[-4:] = np.roll(own[-4:], scalar_last).tolist()
+        columns += own
+    return columns
+
+
+def quaternion_by_names(names: Sequence[str], space: Space) -> list[int] | None:
+    """Return `Columns.quaternion` for names that end in w, x, y and z after a common beginning; None for other names.
+
+    Positions whose names end in x, y and z may also be in any order.
+    """
+    plain = [_IN_BRACKETS.sub("", name).strip().lower() for name in names]
+    scalars = [name for name in plain if name.endswith("w")]
+    quaternion = [scalars[0][:-1] + letter for letter in "wxyz"] if len(scalars) == 1 else []
+    if not quaternion or any(plain.count(name) != 1 for name in quaternion):
+        return None
+    scalar_first = [plain.index(name) for name in quaternion]
+    rest = [i for i in range(len(names)) if i not in scalar_first]
+    columns: list[int] = []
+    for factor in factors_of(space):
+        turns = factor in (ROTATIONS, POSES)
+        count = width(factor, True) - (4 if turns else 0)
+        own, rest = rest[:count], rest[count:]
+        by_letter = sorted(own, key=lambda i: plain[i][-1:])
+        if [plain[i][-1:] for i in by_letter] == [*"xyz"]:
+            own = by_letter
+        elif factor == POSES:
+            return None
+        columns += own + (scalar_first if turns else [])
+    return columns
+
+
+def _quaternion_columns(names: list[str], space: Space, order: str | None) -> list[int]:
+    """Return the column of every number of a point, where positions come first and quaternions have their scalar first.
+
+    Raises
+    ------
+    Problem
+        The names do not show which number is which, or contradict ``order``.
+    """
+    found = quaternion_by_names(names, space)
+    given = None if order is None else _in_order(space, ORDERS.index(order))
+    if given is None and found is None:
+        raise Problem(
+            f"{listed(names)} may be a quaternion{' and a position' if len(names) > 4 else ''}, but the names do not "
+            "say which number is which: call them qw, qx, qy, qz (and x, y, z), or say --quaternion wxyz or xyzw"
+        )
+    contradicts = given and found and given != found
+    refuse("--quaternion ", (contradicts, f"{order} contradicts the names {listed(names)}; omit it or rename them"))
+    return found or given or []
 
 
 # ---- points ----
 
 Entry = tuple[str, ...]
 """One number of a point: its name and its column, or the two columns with its real and imaginary part."""
-
-
-# Everything except the unit in names such as heading_deg or "heading (deg)".
-_UNIT = re.compile(r".*[\[(_ ]|[\])]")
 
 
 @dataclass(frozen=True)
@@ -226,28 +391,97 @@ class PointColumns:
         """All columns."""
         return [column for _, *columns in self.entries for column in columns]
 
-    def read(self, numbers: Array, place: Place) -> Any:
-        """Return the points in rows of these columns; ``place`` describes a row."""
-        if not (self.lonlat or self.quaternion):
+    def read(self, numbers: Doubles, place: Place) -> Any:
+        """Return the points in rows of these columns, projected onto the space if they are off it by rounding only.
+
+        Raises
+        ------
+        Problem
+            A point is farther off.
+        """
+        if self.lonlat:
+            return self._on_globe(numbers, place)
+        names = self.names
+        if self.quaternion:
+            numbers, names = numbers[:, self.quaternion], [names[i] for i in self.quaternion]
+        else:
             # Complex numbers that have one column are real.
             counts = np.array([len(columns) for _, *columns in self.entries])
             missing = np.cumsum(counts)[np.array(complex_numbers(self.space)) & (counts == 1)]
             numbers = np.insert(numbers, missing, 0.0, axis=1)
-        self._warn_of_degrees(numbers)
-        return points_of(self.space, numbers, self.lonlat, self.quaternion, self.path, place, self.degrees)
+        factors = factors_of(self.space)
+        ends = np.cumsum([0, *(width(factor, bool(self.quaternion)) for factor in factors)]).tolist()
+        parts = []
+        for factor, start, end in zip(factors, ends, ends[1:], strict=False):
+            columns = np.ascontiguousarray(numbers[:, start:end])
+            if self.quaternion and factor in (ROTATIONS, POSES):
+                rotations = rotations_in_rows(columns[:, -4:], self.path, place)
+                part = join(rotations, columns[:, :3]) if factor == POSES else rotations
+            else:
+                part = columns.view(factor.dtype).reshape(len(columns), *factor.point_shape)
+            if isinstance(factor, Torus):
+                self._warn_of_degrees(factor, part, names[start:end] if len(names) == ends[-1] else [])
+                part = np.radians(part) if self.degrees else part
+            parts.append(self._projected(factor, part, place))
+        return tuple(parts) if isinstance(self.space, Product) else parts[0]
 
-    def _warn_of_degrees(self, numbers: Array) -> None:
+    def _on_globe(self, numbers: Doubles, place: Place) -> Any:
+        for (name, largest), values in zip(_LARGEST.items(), numbers.T, strict=True):
+            wild = np.flatnonzero(np.abs(values) > largest)
+            if wild.size:
+                raise Problem(
+                    f"{self.path}, {place(int(wild[0]))}: {name} {values[wild[0]]:g} is not between -{largest} and "
+                    f"{largest} degrees; omit missing values, or say with --columns LON,LAT which is which"
+                )
+        return from_lonlat(*numbers.T)
+
+    def _warn_of_degrees(self, torus: Space, angles: Array, names: Sequence[str]) -> None:
         """Warn if angles in radians look like degrees, by their values or the names of their columns."""
-        if self.degrees or self.quaternion or not any(isinstance(factor, Torus) for factor in factors_of(self.space)):
-            return
-        ends = np.cumsum([0, *(width(factor, False) for factor in factors_of(self.space))]).tolist()
-        for factor, start, end in zip(factors_of(self.space), ends, ends[1:], strict=False):
-            largest = look_like_degrees(factor, numbers[:, start:end])
-            named = [name for name in self.names[start:end] if is_degrees(_UNIT.sub("", name))]
-            if not isinstance(factor, Torus) or (largest is None and not named):
-                continue
+        largest = look_like_degrees(torus, angles)
+        named = [name for name in names if is_degrees(_UNIT.sub("", name))]
+        if not self.degrees and (largest is not None or named):
             why = f"angles up to {largest:g} look like degrees" if largest else f"the name {named[0]!r} means degrees"
-            say(f"{self.path}: {why}, but angles on {factor} are in radians; give --degrees if they are in degrees")
+            say(f"{self.path}: {why}, but angles on {torus} are in radians; give --degrees if they are in degrees")
+
+    def _projected(self, factor: Space, points: NDArray[Any], place: Place) -> NDArray[Any]:
+        doubles = factor._doubles(points, "points")
+        lead = factor._lead(doubles)
+        try:
+            factor._handle.check_points(factor._rows(doubles, lead), lead, factor._tol(points))
+        except ValidationError as error:
+            row, _, found = for_command_line(error).removeprefix("point ").partition(" ")
+            of = f"the part in {factor} of " if isinstance(self.space, Product) else ""
+            order = f"; the columns of the table are a {_matrix(factor)}" if _is_matrix(factor) else ""
+            raise Problem(f"{self.path}: {of}the point in {place(int(row))} {found}{order}") from None
+        return factor.project(points)
+
+
+def point_columns(
+    table: Table, given: list[str], others: list[str | None], space: Space, lonlat: bool, order: str | None
+) -> PointColumns:
+    """Return the given columns of a point, or all other columns; ``order`` is that of a quaternion."""
+    swapped = lonlat and len(given) == 2 and given[0].lower() in _LAT and given[1].lower() in _LON
+    refuse(f"--columns {','.join(given)}: ", (swapped, f"longitude comes first: --columns {','.join(given[::-1])}"))
+    groups = [table.expand(name) for name in given] or [_lonlat(table) if lonlat else table.points(others)]
+    columns = [column for group in groups for column in group]
+    # In a real space A_re and A_im are two numbers if both are named.
+    groups = [columns] if any(complex_numbers(space)) else groups
+    entries = [entry for group in groups for entry in _paired(group)]
+    names, count = [name for name, *_ in entries], count_with_quaternion(space)
+    for used in (columns, names):
+        # A column may stand on both sides of a symmetric matrix.
+        own = dict.fromkeys(used) if any(map(_is_matrix, factors_of(space))) else used
+        twice = first_duplicate([*filter(None, others), *own])
+        refuse("column ", (twice is not None, f"{twice!r} of {table.path} cannot have two meanings"))
+    if len(names) == count:
+        return PointColumns(table.path, space, entries, lonlat, _quaternion_columns(names, space, order))
+    wrong = f" {order}: {listed(names) or 'no columns'} are not the {count} numbers of a quaternion in {space}"
+    none = f" is for so:3, se:3 and products with one of them, not for {space}"
+    refuse("--quaternion", (order and count is None, none), (order, wrong))
+    if not lonlat:
+        _check_halves(table, entries, space, bool(given))
+    _check_count(table, entries, others, space, lonlat, bool(given))
+    return PointColumns(table.path, space, entries, lonlat, None)
 
 
 def _paired(columns: Sequence[str]) -> list[Entry]:
@@ -269,34 +503,6 @@ def split_names(text: str | None) -> list[str]:
     except (csv.Error, ValueError):
         raise Problem(f"{text!r} is not a list of names separated by commas") from None
     return [name.strip() for name in names]
-
-
-def point_columns(
-    table: Table, given: list[str], others: list[str | None], space: Space, lonlat: bool, order: str | None
-) -> PointColumns:
-    """Return the given columns of a point, or all other columns; ``order`` is that of a quaternion."""
-    swapped = lonlat and len(given) == 2 and given[0].lower() in _LAT and given[1].lower() in _LON
-    refuse(f"--columns {','.join(given)}: ", (swapped, f"longitude comes first: --columns {','.join(given[::-1])}"))
-    groups = [table.expand(name) for name in given] or [_lonlat(table) if lonlat else table.points(others)]
-    columns = [column for group in groups for column in group]
-    # In a real space A_re and A_im are two numbers if both are named.
-    groups = [columns] if any(complex_numbers(space)) else groups
-    entries = [entry for group in groups for entry in _paired(group)]
-    names, count = [name for name, *_ in entries], count_with_quaternion(space)
-    for used in (columns, names):
-        # A column may stand on both sides of a symmetric matrix.
-        own = dict.fromkeys(used) if any(map(matrix, factors_of(space))) else used
-        twice = first_duplicate([*filter(None, others), *own])
-        refuse("column ", (twice is not None, f"{twice!r} of {table.path} cannot have two meanings"))
-    if len(names) == count:
-        return PointColumns(table.path, space, entries, lonlat, _quaternion_columns(names, space, order))
-    wrong = f" {order}: {listed(names) or 'no columns'} are not the {count} numbers of a quaternion in {space}"
-    none = f" is for so:3, se:3 and products with one of them, not for {space}"
-    refuse("--quaternion", (order and count is None, none), (order, wrong))
-    if not lonlat:
-        _check_halves(table, entries, space, bool(given))
-    _check_count(table, entries, others, space, lonlat, bool(given))
-    return PointColumns(table.path, space, entries, lonlat, None)
 
 
 def _lonlat(table: Table) -> list[str]:
@@ -321,12 +527,12 @@ def _check_halves(table: Table, entries: list[Entry], space: Space, given: bool)
         if len(columns) > 1 and not two:
             raise Problem(
                 f"{table.path}: {' and '.join(columns)} are a complex number where a real one belongs: a point of "
-                f"{space} has {described(space)}; name its columns one by one with --columns, or give a space of "
+                f"{space} has {_described(space)}; name its columns one by one with --columns, or give a space of "
                 "complex points, such as cp:1 for sphere:1"
             )
         # A column that is the real or imaginary part by its name.
-        half = columns[0][:-3] + _HALVES.get(columns[0][-3:], "")
-        if two and len(columns) == 1 and columns[0][-3:] in _HALVES:
+        half = columns[0][:-3] + {RE: IM, IM: RE}.get(columns[0][-3:], "")
+        if two and len(columns) == 1 and columns[0].endswith((RE, IM)):
             where = "in --columns" if given else "with numbers" if half in table.names else "in the table"
             raise Problem(
                 f"{table.path}: column {columns[0]!r} is half of a complex number, and there is no {half!r} {where}"
@@ -348,27 +554,7 @@ def _check_count(
         advice += f" (no numbers in the first row of {listed(other)})"
     turned = count_with_quaternion(space)
     either = f", or {turned} numbers with a quaternion" if turned else ""
-    point = "longitude and latitude are 2 numbers" if lonlat else f"a point of {space} has {described(space)}{either}"
+    point = "longitude and latitude are 2 numbers" if lonlat else f"a point of {space} has {_described(space)}{either}"
     kind = "numbers" if any(len(entry) > 2 for entry in entries) else "columns"
     found = f"{len(entries)} {kind}: {listed([name for name, *_ in entries])}" if entries else "no columns"
     raise Problem(f"{table.path}: {point}, and there are {found}{advice}")
-
-
-def _quaternion_columns(names: list[str], space: Space, order: str | None) -> list[int]:
-    """Return the column of every number of a point, where positions come first and quaternions have their scalar first.
-
-    Raises
-    ------
-    Problem
-        The names do not show which number is which, or contradict ``order``.
-    """
-    found = quaternion_by_names(names, space)
-    given = None if order is None else in_order(space, ORDERS.index(order))
-    if given is None and found is None:
-        raise Problem(
-            f"{listed(names)} may be a quaternion{' and a position' if len(names) > 4 else ''}, but the names do not "
-            "say which number is which: call them qw, qx, qy, qz (and x, y, z), or say --quaternion wxyz or xyzw"
-        )
-    if given and found and given != found:
-        raise Problem(f"--quaternion {order} contradicts the names {listed(names)}; omit it or rename them")
-    return found or given or []

@@ -1,4 +1,4 @@
-"""Files of curves, with the names that their columns had in the table."""
+"""Files of curves with the names of their columns, and samples of curves as columns."""
 
 from __future__ import annotations
 
@@ -7,24 +7,39 @@ import zipfile
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import reduce
-from operator import getitem
+from operator import getitem, itemgetter
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .._base.arrays import brief
+from .._base.lonlat import compass, to_lonlat
 from .._grid import GridSpline
-from .._spaces import Space
+from .._smoothing import SmoothingSpline
+from .._spaces import Doubles, Space, Torus, factors_of, parts_of
+from .._spaces.degrees import with_angles
 from .._splines.archive import json_in, read
 from .._splines.composed import SegmentedCurve
 from .._splines.cubic import CubicSpline
 from .._splines.files import load, save
+from ..rotations import angular_acceleration, angular_velocity, quaternion
+from ._columns import (
+    GLOBE,
+    LONLAT,
+    POSES,
+    ROTATIONS,
+    Columns,
+    complex_numbers,
+    count_with_quaternion,
+    labels,
+    require_globe,
+    width,
+)
 from ._files import Source, writing
 from ._formats import CURVES
 from ._messages import Problem, did_you_mean, refuse
-from ._points import GLOBE, LONLAT, Columns, count_with_quaternion, labels, require_globe
+from ._tables import IM, RE
 
 _COLUMNS = "columns"
 """The entry of the file with the columns, which the library ignores."""
@@ -91,13 +106,8 @@ def write_curves(path: Path, curves: Curves) -> None:
     with writing(path) as temporary:
         with open(temporary, "wb") as file:
             save(splines, file)
-        add_entry(temporary, _COLUMNS, np.array(json.dumps(asdict(curves.columns))))
-
-
-def add_entry(path: Path, name: str, array: NDArray[np.str_]) -> None:
-    """Add an entry to a file of curves or of a grid, which the library ignores."""
-    with zipfile.ZipFile(path, "a") as archive, archive.open(f"{name}.npy", "w") as entry:
-        np.lib.format.write_array(entry, array)
+        with zipfile.ZipFile(temporary, "a") as archive, archive.open(f"{_COLUMNS}.npy", "w") as entry:
+            np.lib.format.write_array(entry, np.array(json.dumps(asdict(curves.columns))))
 
 
 def read_curves(path: Path, lonlat: bool = False) -> Curves:
@@ -143,18 +153,103 @@ def _columns(path: object, file: BinaryIO, space: Space) -> Columns:
     except Exception as error:
         # Damaged files raise errors of zipfile, of its decompressors and of NumPy.
         raise Problem(f"{path} is damaged: {brief(error)}") from None
-    names, order = columns.points, columns.quaternion
-    numbers = count_with_quaternion(space) if order else len(labels(space))
-    texts = isinstance(names, list) and all(isinstance(name, str) for name in (*names, columns.time, columns.curve))
-    good = (
-        texts
-        and all(isinstance(own, bool) for own in (columns.lonlat, columns.cut, columns.degrees))
-        and columns.utc in (True, False, None)
-    )
-    if good and columns.lonlat:
-        good = len(names) == len(LONLAT) and space == GLOBE and order is None
-    elif good:
-        whole = order is None or (isinstance(order, list) and all(type(i) is int for i in order))
-        good = len(names) == numbers and whole and (order is None or sorted(order) == list(range(len(names))))
-    refuse(path, (not good, f" is damaged: its names of columns do not suit {space}"))
+    refuse(path, (not _suit(columns, space), f" is damaged: its names of columns do not suit {space}"))
     return columns
+
+
+def _suit(columns: Columns, space: Space) -> bool:
+    names, order = columns.points, columns.quaternion
+    flags = (columns.lonlat, columns.cut, columns.degrees)
+    if not isinstance(names, list) or not all(isinstance(text, str) for text in (*names, columns.time, columns.curve)):
+        return False
+    if not all(isinstance(flag, bool) for flag in flags) or columns.utc not in (True, False, None):
+        return False
+    if order is None:
+        return len(names) == len(LONLAT) and space == GLOBE if columns.lonlat else len(names) == len(labels(space))
+    whole = isinstance(order, list) and all(type(i) is int for i in order)
+    return whole and sorted(order) == list(range(len(names))) and len(names) == count_with_quaternion(space)
+
+
+# ---- samples ----
+
+_RATES = ("wx", "wy", "wz")
+"""Columns of angular velocities."""
+
+Samples = list[tuple[str, Doubles]]
+"""Names and numbers of columns."""
+
+
+def samples_of(spline: CubicSpline, x: Any, nu: int, columns: Columns) -> Samples:
+    """Return the columns of points, velocities or accelerations at times x.
+
+    The derivatives of a unit quaternion are the angular velocity and the angular acceleration in the frame of the body.
+    """
+    values, end = spline(x, nu), f"_d{nu}" if nu else ""
+    if columns.lonlat:
+        if not nu:
+            return list(zip(columns.points, to_lonlat(values), strict=True))
+        axes = zip(("east", "north"), compass(spline(x)), strict=True)
+        return [(name + end, np.degrees((values * axis).sum(axis=-1))) for name, axis in axes]
+    values = with_angles(spline.space, values, np.degrees) if columns.degrees else values
+    parts = parts_of(values, spline.space, "values")
+    if columns.quaternion is not None:
+        return _with_quaternion(spline, x, nu, parts, columns)
+    blocks = [np.ascontiguousarray(own.reshape(len(own), -1)).view(np.float64) for own in parts]
+    pairs = zip(columns.points, complex_numbers(spline.space), strict=True)
+    names = [name + end + part for name, two in pairs for part in ((RE, IM) if two else ("",))]
+    # A column may be named twice, as for both sides of a symmetric matrix.
+    return list(dict(zip(names, np.concatenate(blocks, axis=1).T, strict=True)).items())
+
+
+def _with_quaternion(spline: CubicSpline, x: Any, nu: int, parts: Sequence[Any], columns: Columns) -> Samples:
+    """Return the columns of a point whose rotation is a quaternion, in the order of the table."""
+    order = columns.quaternion or []
+    turning = (quaternion, angular_velocity, angular_acceleration)[nu]
+    options: Any = {} if nu else {"scalar_first": True}
+    found: list[tuple[int, str, Doubles]] = []
+    start = 0
+    for factor, own in zip(factors_of(spline.space), parts, strict=True):
+        count = width(factor, True)
+        at = order[start : start + count]
+        start += count
+        numbers = own[:, :3, 3] if factor == POSES else own.reshape(len(own), -1)
+        if factor in (ROTATIONS, POSES):
+            turn, at = at[-4:], at[:-4]
+            names = [columns.points[i] for i in turn] if nu == 0 else [name + ("", "_d1")[nu - 1] for name in _RATES]
+            # All rates stand where the first number of the quaternion does.
+            where = turn if nu == 0 else [min(turn)] * len(names)
+            found += zip(where, names, turning(spline, x, **options).T, strict=True)
+        end = f"_d{nu}" if nu else ""
+        found += [(i, columns.points[i] + end, column) for i, column in zip(at, numbers.T, strict=False)]
+    return [(name, column) for _, name, column in sorted(found, key=itemgetter(0))]
+
+
+def deviations_of(spline: SmoothingSpline, x: Any, nu: int, columns: Columns) -> Samples:
+    """Return the columns of standard deviations of points or velocities: one per factor, and two per pose.
+
+    They have the units of the columns next to them. A component of a unit quaternion changes half as much as the angle
+    of its rotation. Each component of an angular velocity has its own standard deviation.
+    """
+    found: Samples = []
+    if nu > 1:
+        return found
+    factors, end = factors_of(spline.space), f"_d{nu}" if nu else ""
+    stds: Sequence[Any] = parts_of(spline.std(x, nu=nu), spline.space, "std")
+    for number, (factor, std) in enumerate(zip(factors, stds, strict=True), 1):
+        name = f"std{number if len(factors) > 1 else ''}"
+        if factor._name == "se":
+            found.append((f"{name}_position{end}", std[1]))
+            name, std = f"{name}_rotation", std[0]
+        if columns.quaternion is None or factor not in (ROTATIONS, POSES):
+            found.append(
+                (
+                    name + end,
+                    np.degrees(std) if columns.lonlat or (columns.degrees and isinstance(factor, Torus)) else std,
+                )
+            )
+        elif nu:
+            each = angular_velocity(spline, x, return_std=True)[1].T
+            found += [(f"std_{rate}", own) for rate, own in zip(_RATES, each, strict=True)]
+        else:
+            found.append((name, std / 2))
+    return found

@@ -2,8 +2,8 @@
 
 A table is a CSV, NPZ, Parquet, JSON, GeoJSON or GPX file or a TUM trajectory; the ending of its name or --from selects
 the format. Every row is a point at a time. Times are numbers, or ISO dates such as 2021-08-29, 2021-08-29 16:55 or
-2021-08-29T16:55:00.5+02:00, all written in the same way. Dates with Z or an offset are converted to UTC, and rates are
-per second.
+2021-08-29T16:55:00.5+02:00, all with a time zone or all without. Dates with Z or an offset are converted to UTC, and
+rates are per second.
 
 The numbers of a point are in columns in the order of its array, and --columns names them in that order: a matrix row
 by row, in a product one factor after the other. A complex number A has the columns A_re and A_im, which --columns
@@ -44,7 +44,6 @@ import math
 import warnings
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -55,14 +54,13 @@ from .._smoothing.many import smooth_many
 from .._spaces import Space, Torus, factors_of, space_named
 from .._splines.cubic import CubicSpline
 from .._splines.functional import fit_many
-from ..geo import ZIGZAG
-from . import _summary
 from ._columns import (
+    GLOBE,
     ORDERS,
+    Columns,
     check_days,
-    column_of_names,
-    column_of_tracks,
     point_columns,
+    require_globe,
     split_names,
     time_column,
     with_stamps,
@@ -70,11 +68,10 @@ from ._columns import (
 from ._curves import Curves, write_curves
 from ._files import called, check_target
 from ._formats import CURVES, TABLES, endings, format_of, open_table
+from ._info import bridged, fitted
 from ._messages import VERBOSE, Problem, Progress, for_command_line, listed, refuse, say, tell
-from ._outliers import outliers
-from ._points import GLOBE, Columns, require_globe
-from ._recordings import Recordings
-from ._tables import UNITS, number, option_numbers
+from ._recordings import Recordings, outliers
+from ._tables import UNITS, is_number, number
 
 _METHODS = "auto (default), quasi-newton, newton, homotopy or fixed-point"
 _ENDS = "natural (default), not-a-knot, clamped, periodic; or two of the first three with a comma, for start and end"
@@ -96,11 +93,11 @@ _TIME = (
     "column of times, none for 0, 1, 2, ..., or two columns with a comma, whole seconds and nanoseconds since 1970; "
     "see above for the default"
 )
-_PENALTY = "derivative that is kept small (default: acceleration)"
 _HEIGHTS = ("ele", "elevation", "alt", "altitude", "height", "height-above-ellipsoid", "height-above-msl")
 _FOR_ROTATIONS = "For rotations give --space so:3, or rp:3, where signs do not count"
-_NOISY = ("criterion", "lam", "sigma", "robust", "penalty")
-"""Options that need --smooth."""
+# Options of the library for curves through points and for curves near them.
+_THROUGH = {"bc_type": "--bc-type", "method": "--method", "tol": "--tol"}
+_NEAR = {"criterion": "--criterion", "lam": "--lam", "sigma": "--sigma", "loss": "--robust", "penalty": "--penalty"}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -120,8 +117,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--skipna", action="store_true", help="omit rows without a point or a time: empty cells, NaN, NA or null")
     add("--dedup", choices=("first", "mean"), help="keep the first of the points of one time, or their mean")
     add("--max-gap", metavar="DT", help=_MAX_GAP)
-    add("--bc-type", default="natural", metavar="END", help=_ENDS)
-    add("--method", default="auto", metavar="M", help=_METHODS)
+    add("--bc-type", type=_ends, metavar="END", help=_ENDS)
+    add("--method", metavar="M", help=_METHODS)
     add("--tol", type=number, help="relative C² residual that counts as converged (default: 1e-12)")
     add("--extrapolate", choices=_POLICIES, help=_EXTRAPOLATE)
     out = "file of curves to write: .npz, or - for standard output"
@@ -129,144 +126,143 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument_group("noisy data").add_argument
     add("--smooth", action="store_true", help="fit curves near the points")
     add("--criterion", choices=("gcv", "cp", "reml"), help=_CRITERION)
-    add("--lam", metavar="L", help="a number λ >= 0 instead, in a product perhaps one per factor with commas")
-    add("--sigma", metavar="S", help=_SIGMA)
-    add("--robust", action="store_true", help="reduce the influence of outliers (loss 'cauchy')")
-    add("--penalty", choices=("acceleration", "jerk"), help=_PENALTY)
+    add(
+        "--lam",
+        type=_numbers,
+        metavar="L",
+        help="a number λ >= 0 instead, in a product perhaps one per factor with commas",
+    )
+    add("--sigma", type=_deviations, metavar="S", help=_SIGMA)
+    add(
+        "--robust",
+        dest="loss",
+        action="store_const",
+        const="cauchy",
+        help="reduce the influence of outliers (loss 'cauchy')",
+    )
+    add("--penalty", choices=("acceleration", "jerk"), help="derivative that is kept small (default: acceleration)")
+
+
+def _numbers(text: str) -> Any:
+    """Read finite numbers that are not negative: one, or a tuple of several."""
+    cells = text.split(",")
+    if not all(is_number(cell) and 0 <= float(cell) < math.inf for cell in cells):
+        raise argparse.ArgumentTypeError(f"{text}: give a finite number >= 0, such as 0.1")
+    return float(cells[0]) if len(cells) == 1 else tuple(map(float, cells))
+
+
+def _deviations(text: str) -> Any:
+    values = _numbers(text)
+    if 0 in (values if isinstance(values, tuple) else (values,)):
+        raise argparse.ArgumentTypeError(f"{text}: the standard deviation must be greater than 0")
+    return values
+
+
+def _ends(text: str) -> Any:
+    ends = tuple(end.strip() for end in text.split(","))
+    if ends != ("periodic",) and (len(ends) > 2 or not set(ends) <= {"natural", "not-a-knot", "clamped"}):
+        raise argparse.ArgumentTypeError(f"{text}: give {_ENDS.replace(' (default)', '')}")
+    return ends[0] if len(ends) == 1 else ends
 
 
 def run(options: argparse.Namespace) -> int:
     """Read, fit and write."""
     format_of(options.output, None, CURVES, "a file of curves")
     check_target(options.output, options.input, binary=True)
-    space = _space(options.space, options.lonlat)
-    smooth = _smoothing_options(options, space)
-    whole = open_table(options.input, options.format)
-    table, options.time = with_stamps(whole, options.time, options.skipna)
-    curve = table.require(options.curve) if options.curve is not None else None
-    given = split_names(options.columns)
-    time = time_column(table, options.time, [curve, *given], options.unix is not None)
-    on_torus = any(isinstance(factor, Torus) for factor in factors_of(space))
-    refuse("--degrees", (options.degrees and not on_torus, f" is for torus:n and products with it, not for {space}"))
-    points = point_columns(table, given, [time, curve], space, options.lonlat, options.quaternion)
-    points = replace(points, degrees=options.degrees)
-    needed = [*points.used, *filter(None, [time, curve])]
-    table = table.without_empty(needed) if options.skipna else table
-    rows = table.read(points.used, time, curve, unix=options.unix)
-    check_days(table, time, rows)
-    at = "times 0, 1, 2, ..." if time is None else f"times in column {time}"
-    tell(f"{table.path}: {table.path.format} table, points in columns {listed(points.names)}, {at}", VERBOSE)
-    cut = options.max_gap is not None and curve is not None
-    columns = Columns(points.names, time or "time", curve or "curve", options.lonlat, rows.utc, points.quaternion, cut)
-    columns = replace(columns, degrees=options.degrees)
-    hint = partial(column_of_names, table, time, [time, *points.used]) if curve is None else lambda: None
-    given_points = points.read(rows.numbers, rows.place)
-    data = Recordings(table.path, rows, given_points, space, options, hint)
-    unused = [name for name in table.names if options.lonlat and name.lower() in _HEIGHTS and name not in needed]
-    if unused:
-        tell(f"{table.path}: heights in column {unused[0]} are not used; --space r:1 --columns {unused[0]} fits them")
-    data.empty = whole.height - table.height
-    _fit_points(options, smooth, data, columns)
-    same = data.merged or data.repeated
-    column = hint() if same or time is None else None
-    if column is not None:
-        what = f"{same} rows have a time that another row has, and column {column!r} distinguishes them"
-        what = what if same else f"column {column!r} has one block of rows for each of its texts"
-        say(f"{what}: if the table holds several tracks, fit each of them with --curve {column}")
-    elif curve is None and (merged := column_of_tracks(table, [time, *points.used], space, given_points)) is not None:
-        say(
-            f"{table.path}: the path through all rows is more than {ZIGZAG:g} times as long as the paths of each "
-            f"{merged!r}; if the table holds several tracks, fit each of them with --curve {merged}"
-        )
-    return 0
-
-
-def _fit_points(options: argparse.Namespace, smooth: dict[str, Any] | None, data: Recordings, columns: Columns) -> None:
-    """Fit curves through the points, or near them, and write them."""
-    fitted = _fitted(data, options, smooth)
-    far = outliers(data, fitted, options.lonlat) if not options.robust else ""
+    space = _space(options)
+    keywords = _keywords(options, space)
+    data, columns = _read(options, space)
+    curves = _fitted(data, options, keywords)
+    far = outliers(data, curves, options.lonlat) if options.loss is None else ""
     segmented = options.max_gap is not None and options.curve is None
-    write_curves(options.output, Curves(dict(zip(data.groups, fitted, strict=True)), data.named, columns, segmented))
-    in_degrees = options.lonlat or (options.degrees and isinstance(data.space, Torus))
-    words = f"{_summary.fitted(fitted, in_degrees)}{data.changes()}{_summary.bridged(fitted)}"
+    named = dict(zip(data.groups, curves, strict=True))
+    write_curves(options.output, Curves(named, data.named, columns, segmented))
+    in_degrees = options.lonlat or (options.degrees and isinstance(space, Torus))
+    words = f"{fitted(curves, in_degrees)}{data.changes()}{bridged(curves)}"
     if not data.has_times and options.time is None:
         words += "; no column of times: the points are at 0, 1, 2, ..."
     tell(f"{called(options.output)}: {words}")
-    if far:
-        say(f"{data.path}, {far}")
+    for note in filter(None, (far and f"{data.path}, {far}", data.doubt())):
+        say(note)
+    return 0
 
 
-def _space(name: str | None, lonlat: bool) -> Space:
-    if name is None and not lonlat:
+def _space(options: argparse.Namespace) -> Space:
+    if options.space is None and not options.lonlat:
         raise Problem(
             "say which space the points are on: --lonlat for longitude and latitude, or --space, such as --space "
             "sphere:2 for unit vectors and --space so:3 for rotations"
         )
-    space = GLOBE if name is None else space_named(name)
-    if lonlat:
+    space = GLOBE if options.space is None else space_named(options.space)
+    if options.lonlat:
         require_globe(space)
+    on_torus = any(isinstance(factor, Torus) for factor in factors_of(space))
+    refuse("--degrees", (options.degrees and not on_torus, f" is for torus:n and products with it, not for {space}"))
     return space
 
 
-def _fitted(data: Recordings, options: argparse.Namespace, smooth: dict[str, Any] | None) -> Sequence[CubicSpline]:
-    """All curves, fitted in one call."""
-    common: dict[str, Any] = {"extrapolate": _POLICIES.get(options.extrapolate)}
-    if smooth is None:
-        common |= {"bc_type": _bc_type(options.bc_type), "method": options.method}
-        common |= {} if options.tol is None else {"tol": options.tol}
+def _keywords(options: argparse.Namespace, space: Space) -> dict[str, Any]:
+    """Return the arguments of `symspline.fit_many`, or of `symspline.make_smoothing_spline` with --smooth."""
+    given = {name: getattr(options, name) for name in (*_THROUGH, *_NEAR)}
+    # The defaults of the library contradict nothing.
+    given = {name: value for name, value in given.items() if value not in (None, "natural", "auto")}
+    other, remedy = _NEAR, "is for noisy data; give --smooth, too"
+    if options.smooth:
+        other, remedy = _THROUGH, "is for curves through the points; omit it with --smooth"
+    wrong = next((option for name, option in other.items() if name in given), None)
+    refuse(
+        "",
+        (wrong, f"{wrong} {remedy}"),
+        (options.smooth and options.dedup == "mean", "with --smooth all points of one time count; omit --dedup mean"),
+        ({"lam", "criterion"} <= {*given}, "--lam gives λ, which --criterion would choose; omit one of them"),
+        (options.criterion == "cp" and not options.sigma, "--criterion cp needs the noise; give it with --sigma"),
+    )
+    if "sigma" in given and "lam" not in given:
+        given.setdefault("criterion", "cp")
+    angles = options.lonlat or (options.degrees and isinstance(space, Torus))
+    if angles and isinstance(options.sigma, float):
+        given["sigma"] = math.radians(options.sigma)
+    return given | {"extrapolate": _POLICIES.get(options.extrapolate)}
+
+
+def _read(options: argparse.Namespace, space: Space) -> tuple[Recordings, Columns]:
+    """Return the curves in the table, and the names of their columns."""
+    whole = open_table(options.input, options.format)
+    table, time = with_stamps(whole, options.time, options.skipna)
+    curve = table.require(options.curve) if options.curve is not None else None
+    given = split_names(options.columns)
+    time = time_column(table, time, [curve, *given], options.unix is not None)
+    points = point_columns(table, given, [time, curve], space, options.lonlat, options.quaternion)
+    points = replace(points, degrees=options.degrees)
+    needed = [*points.used, *filter(None, [time, curve])]
+    table = table.without_empty(needed) if options.skipna else table
+    rows = table.read(points.used, time, curve, options.unix)
+    check_days(table, time, rows)
+    at = "times 0, 1, 2, ..." if time is None else f"times in column {time}"
+    tell(f"{table.path}: {table.path.format} table, points in columns {listed(points.names)}, {at}", VERBOSE)
+    data = Recordings(table, rows, time, points, options, whole.height - table.height)
+    heights = [name for name in table.names if options.lonlat and name.lower() in _HEIGHTS and name not in needed]
+    if heights:
+        tell(f"{table.path}: heights in column {heights[0]} are not used; --space r:1 --columns {heights[0]} fits them")
+    cut = options.max_gap is not None and curve is not None
+    names = points.names, time or "time", curve or "curve"
+    return data, Columns(*names, options.lonlat, rows.utc, points.quaternion, cut, options.degrees)
+
+
+def _fitted(data: Recordings, options: argparse.Namespace, keywords: dict[str, Any]) -> Sequence[CubicSpline]:
+    """Fit all curves in one call."""
     try:
         with warnings.catch_warnings(record=True) as noted, Progress("fitting") as progress:
             # The summary counts the curves whose λ is at a bound.
             warnings.simplefilter("ignore", SmoothingWarning)
-            fitted: Sequence[CubicSpline]
-            if smooth is None:
-                fitted = fit_many(data.curves, data.space, progress=progress, **common)
+            curves: Sequence[CubicSpline]
+            if options.smooth:
+                curves = smooth_many([(*curve, {}) for curve in data.curves], data.space, progress=progress, **keywords)
             else:
-                curves: Any = [(*curve, {}) for curve in data.curves]
-                fitted = smooth_many(curves, data.space, progress=progress, **common, **smooth)
+                curves = fit_many(data.curves, data.space, progress=progress, **keywords)
     except SymsplineError as error:
         far = outliers(data, None, options.lonlat)
         raise error._with_message("; ".join(filter(None, (data.located(error), far)))) from None
     for note in noted:
         say(for_command_line(data.located(note.message).replace(IN_PYTHON, _FOR_ROTATIONS)))
-    return fitted
-
-
-def _bc_type(text: str) -> Any:
-    ends = tuple(end.strip() for end in text.split(","))
-    if ends != ("periodic",) and (len(ends) > 2 or not set(ends) <= {"natural", "not-a-knot", "clamped"}):
-        raise Problem(f"--bc-type {text}: give {_ENDS.replace(' (default)', '')}")
-    return ends[0] if len(ends) == 1 else ends
-
-
-def _smoothing_options(options: argparse.Namespace, space: Space) -> dict[str, Any] | None:
-    """Return the options of `symspline.make_smoothing_spline`; None to fit curves through the points.
-
-    Raises
-    ------
-    Problem
-        Options contradict each other.
-    """
-    if not options.smooth:
-        option = next((name for name in _NOISY if getattr(options, name) not in (None, False)), "")
-        refuse(f"--{option.replace('_', '-')}", (option, " is for noisy data; give --smooth, too"))
-        return None
-    through = "is for curves through the points; omit it with --smooth"
-    refuse(
-        "",
-        (options.bc_type != "natural", f"--bc-type {options.bc_type} {through}: smoothing has natural ends"),
-        (options.tol is not None, f"--tol {through}"),
-        (options.method != "auto", f"--method {through}"),
-        (options.dedup == "mean", "with --smooth all points of one time count; omit --dedup mean"),
-        (options.lam and options.criterion, "--lam gives λ, which --criterion would choose; omit one of them"),
-        (options.criterion == "cp" and options.sigma is None, "--criterion cp needs the noise; give it with --sigma"),
-    )
-    lam = None if options.lam is None else option_numbers(options.lam, "--lam")
-    sigma = None if options.sigma is None else option_numbers(options.sigma, "--sigma", positive=True)
-    angles = options.lonlat or (options.degrees and isinstance(space, Torus))
-    if angles and isinstance(sigma, float):
-        sigma = math.radians(sigma)
-    criterion = options.criterion or ("cp" if sigma is not None and lam is None else "gcv")
-    loss = "cauchy" if options.robust else "linear"
-    penalty = options.penalty or "acceleration"
-    return {"criterion": criterion, "lam": lam, "sigma": sigma, "loss": loss, "penalty": penalty}
+    return curves

@@ -16,30 +16,36 @@ from __future__ import annotations
 
 import argparse
 import zipfile
+from collections.abc import Iterable, Sequence
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from .._base.arrays import brief
+from .._base.report import long_gaps
 from .._base.time import time_axis_of
 from .._grid import GridSpline
-from .._smoothing import SmoothingSpline
+from .._smoothing import SmoothingReport, SmoothingSpline
+from .._smoothing.factors import is_several, smoothed_spaces
 from .._spaces import Doubles
 from .._spaces.base import CLASSES, example_of
+from .._splines.cubic import CubicSpline
 from .._splines.files import load
 from ._columns import NUMBERED, column_of_names, time_column
 from ._curves import read_curves
 from ._files import Source
 from ._formats import CURVES, TABLES, endings, format_of, open_table
-from ._messages import Problem, listed, refuse
-from ._summary import counted, gaps_in, parameters_of, smoothed
+from ._messages import Problem, counted, listed, refuse
 from ._tables import Array, Rows, Table
 
-_LIBRARIES = {"pyarrow": "Parquet and large CSV files", "gpxpy": "GPX files", "matplotlib": "symspline plot"}
+_LIBRARIES = {"pandas": "CSV files", "pyarrow": "Parquet files", "gpxpy": "GPX files", "matplotlib": "symspline plot"}
 _LIBRARIES |= {"shtab": "completion in shells"}
 
 
+_ROUGH = 2.5
+"""Degrees of freedom from which on a curve is not a geodesic."""
 _LONGEST = 1000
 _COLUMNS = 12
 """Columns of an array that are described."""
@@ -166,9 +172,78 @@ def _curves(path: Path) -> list[str]:
         zone = " UTC" if curves.columns.utc else ""
         parts = [f"{len(spline.t)} nodes, {spline.t[0]} to {spline.t[-1]}{zone}"]
         if isinstance(spline, SmoothingSpline):
-            parts += [smoothed([spline], curves.columns.lonlat), *parameters_of(spline)]
+            parts += [_smoothed([spline], curves.columns.lonlat), *_parameters_of(spline)]
         else:
             ends = spline.bc_type if isinstance(spline.bc_type, str) else ", ".join(map(str, spline.bc_type))
             parts.append(f"{ends} ends, residual {spline.report.residual:.1e}")
         lines.append(f"  {f'{name}: ' if curves.named else ''}{'; '.join(parts)}")
     return lines
+
+
+# ---- descriptions of fitted curves ----
+
+
+def _spread(values: Sequence[Any]) -> str:
+    """Return the range of some numbers."""
+    least, most = f"{min(values):.3g}", f"{max(values):.3g}"
+    return least if least == most else f"{least} to {most}"
+
+
+def gaps_in(recordings: Iterable[Doubles], unit: str) -> str:
+    """Describe the steps that are far longer than most of a recording; empty if there are none."""
+    found = np.concatenate([np.diff(times)[long_gaps(times)] for times in recordings])
+    return f"{counted(found.size, 'long gap')}, up to {found.max():.6g}{unit}" if found.size else ""
+
+
+def fitted(splines: Sequence[CubicSpline], lonlat: bool) -> str:
+    """Describe curves through points, or near them."""
+    smooth = [spline for spline in splines if isinstance(spline, SmoothingSpline)]
+    points = sum(len(spline.data[0]) for spline in smooth) or sum(len(spline.t) for spline in splines)
+    where = "near" if smooth else "through"
+    words = f"{counted(len(splines), 'curve')} {where} {points} points of {splines[0].space}, converged: "
+    if smooth:
+        return words + _smoothed(smooth, lonlat)
+    reports = [spline.report for spline in splines]
+    most = "at most " if len(splines) > 1 else ""
+    iterations, residual = max(r.iterations for r in reports), max(r.residual for r in reports)
+    return f"{words}{reports[0].method}, {most}{iterations} iterations, residual {most}{residual:.1e}"
+
+
+def _smoothed(splines: Sequence[SmoothingSpline[Any, Any]], lonlat: bool) -> str:
+    """Describe λ, the degrees of freedom and the noise for every space in which the curves were smoothed."""
+    space = splines[0].space
+    several = is_several(space)
+    reports = zip(*(spline.report if several else (spline.report,) for spline in splines), strict=True)
+    names = [f"{part}: " if several else "" for part in smoothed_spaces(space)]
+    return "; ".join(_chosen(name, own, lonlat) for name, own in zip(names, reports, strict=True))
+
+
+def _chosen(name: str, reports: Sequence[SmoothingReport], lonlat: bool) -> str:
+    bound = sum(bool(report.at_bound) for report in reports)
+    at_bound = "" if not bound else " (at its bound)" if len(reports) == 1 else f" ({bound} at a bound)"
+    rough = sum(bool(report.at_bound) and report.df > _ROUGH for report in reports)
+    through = "the curve passes" if len(reports) == 1 else f"{rough} curves pass"
+    advice = f" (no noise was found: {through} through the points; give --sigma or a λ)" if rough else ""
+    noise = _spread([np.degrees(report.sigma) if lonlat else report.sigma for report in reports])
+    return (
+        f"{name}λ {_spread([report.lam for report in reports])}{at_bound}, "
+        f"{_spread([report.df for report in reports])} degrees of freedom, noise {noise}{'°' if lonlat else ''}{advice}"
+    )
+
+
+def bridged(splines: Sequence[CubicSpline]) -> str:
+    """Describe the gaps across which curves pass although nothing was measured there."""
+    gaps = gaps_in(map(_data_times, splines), " s" if splines[0].t.dtype.kind == "M" else "")
+    return f"; {gaps} (--max-gap cuts there)" if gaps else ""
+
+
+def _data_times(spline: CubicSpline) -> Doubles:
+    if isinstance(spline, SmoothingSpline):
+        return np.unique(spline._noisy.times[spline._noisy.used])
+    return spline._times
+
+
+def _parameters_of(curve: SmoothingSpline[Any, Any]) -> list[str]:
+    """Describe the unknowns that were estimated with a curve, such as a bias."""
+    each = {key: zip(found.value, found.std, strict=True) for key, found in curve.parameters.items()}
+    return [f"{key}: {', '.join(f'{value:.3g} ± {std:.2g}' for value, std in pairs)}" for key, pairs in each.items()]

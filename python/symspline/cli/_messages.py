@@ -77,6 +77,11 @@ def did_you_mean(name: str, names: Sequence[str]) -> str:
     return f"did you mean {plain[close[0]]!r}?" if close else f"there are {listed(names)}"
 
 
+def counted(count: int, what: str) -> str:
+    """Return a count with its noun, such as "2 curves"."""
+    return f"{count} {what}{'' if count == 1 else 's'}"
+
+
 def first_duplicate(names: Sequence[str]) -> str | None:
     """Return the first name that occurs more than once."""
     return next((name for name, count in Counter(names).items() if count > 1), None)

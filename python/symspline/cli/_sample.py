@@ -56,15 +56,12 @@ from .._smoothing import SmoothingSpline
 from .._spaces import Doubles, space_named
 from .._splines.cubic import CubicSpline
 from ..convert._pose_files import TUM
-from ._columns import time_column, with_stamps
-from ._curves import Curves, read_curves
+from ._columns import Columns, quaternion_by_names, time_column, with_stamps
+from ._curves import Curves, Samples, deviations_of, read_curves, samples_of
 from ._files import called, check_inputs, check_target
 from ._formats import TABLES, Layout, endings, format_of, is_binary, open_table, write_table
-from ._messages import Problem, Progress, did_you_mean, first_duplicate, refuse, say, tell
-from ._points import Columns, quaternion_by_names
+from ._messages import Problem, Progress, counted, did_you_mean, first_duplicate, refuse, say, tell
 from ._recordings import group
-from ._samples import Samples, deviations_of, samples_of
-from ._summary import counted
 from ._tables import UNITS, Rows, Table, number
 from ._times import Times, every, spread
 

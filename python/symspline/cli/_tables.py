@@ -173,7 +173,10 @@ class Table:
         """Return the texts of a column, or of its first rows, without blanks at their ends; empty if missing."""
         column = self.columns[name]
         if _is_text(column):
-            return ["" if cell != cell else str(cell).strip() for cell in column[:rows].tolist()]
+            cells = column[:rows].tolist()
+            with suppress(TypeError):
+                return list(map(str.strip, cells))
+            return ["" if cell != cell else str(cell).strip() for cell in cells]
         return self.texts(name) if self.texts is not None else column[:rows].astype(np.str_).tolist()
 
     def _plain(self, name: str, rows: int | None = None) -> list[str]:
@@ -191,8 +194,7 @@ class Table:
     def codes(self, name: str) -> NDArray[np.intp]:
         """Return a number from 0 on for every distinct value of a column, none of which is missing."""
         column = self.columns[name]
-        values = column if column.dtype.kind in "biu" else np.array(self.labels(name))
-        return np.asarray(np.unique(values, return_inverse=True)[1])
+        return codes_of(column.tolist() if column.dtype.kind in "biu" else self.labels(name))
 
     def without_empty(self, names: Sequence[str]) -> Table:
         """Return the rows in which none of these columns is missing."""
@@ -333,6 +335,12 @@ class Table:
 
     def _problem(self, name: str, row: int, found: str) -> Problem:
         return Problem(f"{self.path}, {self.place(row)}: column {name!r} {found}")
+
+
+def codes_of(labels: Sequence[Any]) -> NDArray[np.intp]:
+    """Return a number for every distinct label, in the order in which they first occur."""
+    codes = {label: code for code, label in enumerate(dict.fromkeys(labels))}
+    return np.fromiter(map(codes.__getitem__, labels), np.intp, len(labels))
 
 
 def _is_text(column: Any) -> bool:
