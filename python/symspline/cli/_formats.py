@@ -97,7 +97,8 @@ def _read_csv(path: Source) -> Table:
     columns: dict[str, Any] = {}
     for i, name in enumerate(names):
         if name:
-            columns |= _converted(name, frame[i])
+            # Words such as true are texts.
+            columns |= _converted(name, frame[i].astype(object) if frame[i].dtype.kind == "b" else frame[i])
 
     def texts(name: str) -> list[str]:
         if name not in names:
@@ -114,9 +115,9 @@ def _read_csv(path: Source) -> Table:
 
 def _converted(name: str, column: Any) -> dict[str, Any]:
     """Return a column of pandas as an array of numbers, as those of its real and imaginary parts, or as texts."""
-    if column.dtype.kind in "iufmM":
+    if column.dtype.kind in "biufmM":
         return {name: column.to_numpy()}
-    texts = column if column.dtype.kind == "O" and column.dtype != "category" else column.astype(str)
+    texts = column.astype(object) if column.dtype == "category" else column
     first = next((str(cell).strip() for cell in texts[:FIRST].tolist() if cell == cell), "")
     if _COMPLEX.fullmatch(first):
         with suppress(ValueError):

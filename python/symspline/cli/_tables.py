@@ -171,13 +171,15 @@ class Table:
 
     def cells(self, name: str, rows: int | None = None) -> list[str]:
         """Return the texts of a column, or of its first rows, without blanks at their ends; empty if missing."""
-        column = self.columns[name]
+        column = self.columns[name][:rows]
         if _is_text(column):
-            cells = column[:rows].tolist()
+            cells = column.tolist()
             with suppress(TypeError):
                 return list(map(str.strip, cells))
-            return ["" if cell != cell else str(cell).strip() for cell in cells]
-        return self.texts(name) if self.texts is not None else column[:rows].astype(np.str_).tolist()
+            # A text such as NA is missing among numbers, but may be a name.
+            if self.texts is None or rows is not None:
+                return ["" if cell != cell else str(cell).strip() for cell in cells]
+        return self.texts(name)[:rows] if self.texts is not None else column.astype(np.str_).tolist()
 
     def _plain(self, name: str, rows: int | None = None) -> list[str]:
         """Return the same with decimal points."""
