@@ -15,15 +15,19 @@ leaves an older file unchanged.
 
 from __future__ import annotations
 
+import argparse
 import io
 import os
+import re
 import sys
+import textwrap
 from collections.abc import Sequence
+from difflib import get_close_matches
+from typing import Any, NoReturn
 
 from .._base.exceptions import ConvergenceError, SymsplineError
 from .._base.version import VERSION
 from . import _check, _fit, _info, _plot, _sample
-from ._help import Parser, add_completion, texts_of
 from ._messages import QUIET, USUAL, VERBOSE, Problem, for_command_line, say, set_level
 
 __all__ = ["main"]
@@ -78,13 +82,13 @@ def _drop_output() -> None:
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-def _parser() -> Parser:
-    parser = Parser("symspline", **texts_of(__doc__))
+def _parser() -> _Parser:
+    parser = _Parser("symspline", **_texts_of(__doc__))
     parser.add_argument("--version", action="version", version=f"symspline {VERSION}")
-    add_completion(parser)
+    _add_completion(parser)
     verbs = parser.add_subparsers(metavar="VERB")
     for verb in (_fit, _sample, _plot, _check, _info):
-        texts = texts_of(verb.__doc__)
+        texts = _texts_of(verb.__doc__)
         summary = texts["description"].partition("\n")[0]
         own = verbs.add_parser(verb.__name__.rpartition("._")[2], help=summary, **texts)
         verb.add_arguments(own)
@@ -94,3 +98,104 @@ def _parser() -> Parser:
         level("-v", "--verbose", dest="level", action="store_const", const=VERBOSE, help="print more about the work")
         own.set_defaults(run=verb.run)
     return parser
+
+
+# ---- help, suggestions and completion ----
+
+_SHELLS = ("bash", "zsh")
+# The first column of a table in a help text, with the blanks after it.
+_TERM = re.compile(r" *\S+(?: \S+)* {2,}")
+
+
+class _Parser(argparse.ArgumentParser):
+    """A parser that raises `Problem` and suggests what was meant."""
+
+    def error(self, message: str) -> NoReturn:
+        """Raise `Problem`."""
+        raise Problem(f"{message} (see {self.prog} --help)")
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """Parse, and raise `Problem` for arguments that are not known."""
+        known, unknown = super().parse_known_args(args, namespace)
+        if unknown:
+            self.error(f"unrecognized arguments: {' '.join(unknown)}{self._suggestion(unknown[0])}")
+        return known, unknown
+
+    def _suggestion(self, argument: str) -> str:
+        """Return the option that was probably meant."""
+        names = [name for action in self._actions for name in action.option_strings]
+        close = get_close_matches(argument.partition("=")[0], names, 1) if argument.startswith("-") else []
+        return f"; did you mean {close[0]}?" if close else ""
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        if action.choices is None or value in action.choices:
+            return
+        names = list(action.choices)
+        close = get_close_matches(str(value), names, 1)
+        choices = f"did you mean {close[0]}?" if close else f"choose from {', '.join(names)}"
+        raise argparse.ArgumentError(action, f"invalid choice: {value!r}; {choices}")
+
+
+class _Formatter(argparse.HelpFormatter):
+    """Wraps paragraphs; the lines of examples and of tables stay apart."""
+
+    def _split_lines(self, text: str, width: int) -> list[str]:
+        return _wrapped(text, width, 0).split("\n")
+
+    def _fill_text(self, text: str, width: int, indent: str) -> str:
+        return "\n\n".join(_filled(paragraph.split("\n"), width) for paragraph in text.strip().split("\n\n"))
+
+
+def _filled(lines: Sequence[str], width: int) -> str:
+    """Wrap one paragraph: lines that are indented continue the line before them if they are indented farther."""
+    items: list[str] = []
+    indents: list[int] = []
+    for line in lines:
+        indent = len(line) - len(line.lstrip())
+        continues = items and (indent > indents[-1] or indent == indents[-1] == 0) and not items[-1].endswith(":")
+        if continues:
+            items[-1] += f" {line.strip()}"
+        else:
+            items.append(line.rstrip())
+            indents.append(indent)
+    wrapped = []
+    for item, indent in zip(items, indents, strict=True):
+        command = item.strip().startswith("symspline ")
+        term = _TERM.match(item)
+        hanging = 0 if not indent else term.end() if term else indent + 4
+        # Commands can be copied as they are.
+        wrapped.append(item if command and indent else _wrapped(item, width, hanging))
+    return "\n".join(wrapped)
+
+
+def _wrapped(item: str, width: int, hanging: int) -> str:
+    return textwrap.fill(item, width, subsequent_indent=" " * hanging, break_long_words=False, break_on_hyphens=False)
+
+
+def _texts_of(doc: str | None) -> dict[str, Any]:
+    """Return the arguments of a parser with the docstring of a module, which is absent under ``python -OO``."""
+    description, _, examples = (doc or "").partition("\nexample")
+    return {
+        "description": description,
+        "epilog": f"example{examples}",
+        "formatter_class": _Formatter,
+        "allow_abbrev": False,
+    }
+
+
+class _Completion(argparse.Action):
+    """Prints the completion of a shell, which the package shtab writes."""
+
+    def __call__(self, parser: argparse.ArgumentParser, namespace: Any, value: Any, option: str | None = None) -> None:
+        try:
+            import shtab
+        except ImportError:
+            raise Problem("completion needs shtab; install it with: pip install 'symspline[completion]'") from None
+        print(shtab.complete(parser, value))
+        parser.exit(0)
+
+
+def _add_completion(parser: argparse.ArgumentParser) -> None:
+    """Add the option that prints the completion of a shell."""
+    text = "print the completion of a shell, such as for eval in .bashrc"
+    parser.add_argument("--print-completion", action=_Completion, choices=_SHELLS, help=text)

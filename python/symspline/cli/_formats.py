@@ -9,7 +9,7 @@ import math
 import re
 import warnings
 import zipfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import suppress
 from datetime import UTC
 from importlib import import_module
@@ -29,9 +29,9 @@ from ._messages import Problem, Progress, alternatives, first_duplicate, refuse
 from ._tables import EXACT, FIRST, IM, MISSING, RE, Array, Table, is_number
 
 
-def _require(what: str, extra: str, *others: str) -> None:
-    """Raise `Problem` unless pandas and other libraries that an extra installs can be imported."""
-    for name in ("pandas", *others):
+def _require(what: str, extra: str, *libraries: str) -> None:
+    """Raise `Problem` unless the libraries that an extra installs can be imported."""
+    for name in libraries:
         try:
             import_module(name)
         except ImportError:
@@ -128,7 +128,7 @@ def _converted(name: str, column: Any) -> dict[str, Any]:
 
 def _frame(path: Source, mark: str, names: Sequence[str], head: int, **options: Any) -> Any:
     """Read the rows below the first ones by pandas; columns are numbered."""
-    _require("CSV files", "cli")
+    _require("CSV files", "cli", "pandas")
     import pandas as pd
 
     # Numbers are exact by default from this version on.
@@ -151,7 +151,7 @@ def _frame(path: Source, mark: str, names: Sequence[str], head: int, **options: 
     raise Problem(f"{path}: {problem}")
 
 
-def _rows(path: Source, mark: str) -> Iterator[tuple[int, int, list[str]]]:
+def _rows(path: Source, mark: str) -> Generator[tuple[int, int, list[str]], None, None]:
     """Yield the line, the number and the cells of every row that is not blank; blank rows are counted."""
     with path.open() as binary:
         text = io.TextIOWrapper(binary, encoding="utf-8-sig", newline="")
@@ -248,7 +248,7 @@ def _write_npz(file: BinaryIO, columns: Mapping[str, Array], layout: Layout) -> 
 
 def _read_parquet(path: Source) -> Table:
     """Read a Parquet file. Empty cells are NaN, NaT or empty texts."""
-    _require("Parquet files", "parquet", "pyarrow")
+    _require("Parquet files", "parquet", "pandas", "pyarrow")
     import pandas as pd
     from pyarrow import ArrowInvalid
 
@@ -266,7 +266,7 @@ def _read_parquet(path: Source) -> Table:
 
 def _write_parquet(file: BinaryIO, columns: Mapping[str, Array], layout: Layout) -> None:
     """Write a Parquet file; dates in UTC have this time zone."""
-    _require("Parquet files", "parquet", "pyarrow")
+    _require("Parquet files", "parquet", "pandas", "pyarrow")
     import pandas as pd
 
     frame = pd.DataFrame(columns)
@@ -423,7 +423,9 @@ def _lonlat(columns: Mapping[str, Array], layout: Layout, what: str) -> tuple[st
 
 def _read_gpx(path: Source) -> Table:
     """Read the time, longitude, latitude and height of all points of a GPX file, and the name of their track."""
-    gpxpy = _gpxpy()
+    _require("GPX files", "gpx", "gpxpy")
+    import gpxpy.gpx
+
     with path.open() as file:
         try:
             gpx = gpxpy.parse(file.read().decode("utf-8-sig"))
@@ -444,7 +446,9 @@ def _read_gpx(path: Source) -> Table:
 
 def _write_gpx(file: BinaryIO, columns: Mapping[str, Array], layout: Layout) -> None:
     """Write one track per curve."""
-    gpx = _gpxpy().gpx
+    _require("GPX files", "gpx", "gpxpy")
+    from gpxpy import gpx
+
     lon, lat = _lonlat(columns, layout, "GPX")
     rates = [name for name in columns if name.endswith(("_d1", "_d2"))]
     dates = columns[layout.time]
@@ -464,15 +468,6 @@ def _write_gpx(file: BinaryIO, columns: Mapping[str, Array], layout: Layout) -> 
             tracks[name] = segment
         tracks[name].points.append(gpx.GPXTrackPoint(y, x, time=time.replace(tzinfo=UTC)))
     file.write(whole.to_xml().encode())
-
-
-def _gpxpy() -> Any:
-    try:
-        import gpxpy
-        import gpxpy.gpx
-    except ImportError:
-        raise Problem("GPX files need gpxpy; install it with: pip install 'symspline[gpx]'") from None
-    return gpxpy
 
 
 # ---- the list of formats ----

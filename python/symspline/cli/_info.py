@@ -26,17 +26,15 @@ import numpy as np
 from .._base.arrays import brief
 from .._base.report import long_gaps
 from .._base.time import time_axis_of
-from .._grid import GridSpline
 from .._smoothing import SmoothingReport, SmoothingSpline
 from .._smoothing.factors import is_several, smoothed_spaces
 from .._spaces import Doubles
 from .._spaces.base import CLASSES, example_of
 from .._splines.cubic import CubicSpline
-from .._splines.files import load
 from ._columns import NUMBERED, column_of_names, time_column
 from ._curves import read_curves
 from ._files import Source
-from ._formats import CURVES, TABLES, endings, format_of, open_table
+from ._formats import TABLES, endings, format_of, open_table
 from ._messages import Problem, counted, listed, refuse
 from ._tables import Array, Rows, Table
 
@@ -95,12 +93,6 @@ def _table(table: Table, given: str | None) -> list[str]:
     columns = {name: own for name, own in table.columns.items() if name}
     refuse(table.path, (not columns, " has no columns"))
     groups = {key: own for key, own in table.groups.items() if len(own) > 1}
-    if groups and len(set(map(len, columns.values()))) > 1:
-        sizes = [
-            f"  {key}: {len(columns[own[0]])}{f' x {len(own)}' * (len(own) > 1)} numbers"
-            for key, own in table.groups.items()
-        ]
-        return [f"{table.path}: arrays of different lengths, such as a grid", *sizes]
     lines = [f"{table.path}: {table.path.format} table, {table.height} rows"]
     hidden = {name for own in groups.values() for name in own[_COLUMNS:]}
     shown = [name for name in columns if name not in hidden]
@@ -157,12 +149,6 @@ def _times(rows: Rows, seconds: Doubles) -> str:
 
 
 def _curves(path: Path) -> list[str]:
-    with Source(path, CURVES[0]).open() as file:
-        found = load(file)
-    if isinstance(found, GridSpline):
-        sizes = " x ".join(str(len(axis)) for axis in found.axes)
-        ranges = [f"  axis {k}: {axis[0]} to {axis[-1]}" for k, axis in enumerate(found.axes)]
-        return [f"{path}: a spline through {sizes} points of {found.space}; symspline.load reads it", *ranges]
     curves = read_curves(path)
     count = len(curves.splines)
     space = next(iter(curves.splines.values())).space

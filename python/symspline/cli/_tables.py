@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
@@ -58,20 +57,6 @@ def number(text: str) -> float:
     if not is_number(text):
         raise ValueError
     return float(text)
-
-
-def option_numbers(text: str, option: str, positive: bool = False) -> Any:
-    """Read the numbers in an option, finite and at least 0: one, or a tuple of several."""
-    cells = text.split(",")
-    refuse(f"{option} {text}: ", (not all(map(is_number, cells)), "give a number such as 0.1"))
-    values = tuple(map(float, cells))
-    bad = [value for value in values if not 0 <= value < math.inf]
-    refuse(
-        f"{option} {text}: ",
-        (bad, f"{next(iter(bad), 0):g} is not a finite number >= 0"),
-        (positive and 0 in values, "the standard deviation must be greater than 0"),
-    )
-    return values if len(values) > 1 else values[0]
 
 
 def _holds_dates(cells: Sequence[str]) -> bool:
@@ -285,7 +270,8 @@ class Table:
         """Return times that are numbers. Whole numbers that are not exact as floating-point numbers stay whole."""
         column = self.columns[name]
         if column.dtype.kind in "iu" and column.size:
-            return column if max(abs(int(column.min())), abs(int(column.max()))) > EXACT else column.astype(np.float64)
+            large = max(abs(int(column.min())), abs(int(column.max()))) > EXACT
+            return np.asarray(column if large else column.astype(np.float64))
         values = self.numbers(name)
         if np.abs(values).max(initial=0.0) > EXACT:
             with suppress(ValueError, OverflowError):
@@ -322,17 +308,15 @@ class Table:
         for row, cell in enumerate(cells):
             match = ISO_DATE.fullmatch(cell)
             if match is None:
-                advice = "not a time: write 0.5, 2021-08-29 or 2021-08-29T16:55:00Z"
-                advice += f" in all rows, as {cells[0]!r} before" if first else ""
-                raise self._problem(name, row, f"holds {cell!r}, {advice}")
-            if first and (match["zone"] is None) != (first["zone"] is None):
-                raise self._problem(
-                    name, row, f"holds {cell!r}, but {cells[0]!r} before; give all times a zone, or none"
-                )
-            with suppress(ValidationError):
-                times_of(cell, "time")
-                continue
-            raise self._problem(name, row, f"holds {cell!r}, which is not a date of the calendar")
+                what = "not a time: write 0.5, 2021-08-29 or 2021-08-29T16:55:00Z"
+            elif first is not None and (match["zone"] is None) != (first["zone"] is None):
+                what = f"but {cells[0]!r} before; give all times a time zone, or none"
+            else:
+                with suppress(ValueError):
+                    np.datetime64(match["body"])
+                    continue
+                what = "which is not a date of the calendar"
+            raise self._problem(name, row, f"holds {cell!r}, {what}")
         raise Problem(f"{self.path}: column {name!r} has no times")
 
     def _problem(self, name: str, row: int, found: str) -> Problem:
