@@ -217,4 +217,4 @@ def test_names_with_commas_and_quotes(run):
 
 
 def test_digits_are_checked(curves, fails):
-    assert fails("sample a.npz -n 3 --digits 0 -o b.csv") == "--digits 0: give a number between 1 and 17"
+    assert "--digits: 0: give a number between 1 and 17 (see" in fails("sample a.npz -n 3 --digits 0 -o b.csv")

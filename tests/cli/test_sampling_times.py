@@ -210,7 +210,7 @@ def test_invalid_steps(fails):
         (DAY, "--every=1e99999999999999999999", "exponent is too large"),
         (NUMBERS, "--every 10min", "give a step without a unit"),
         (NUMBERS, "--every 1e-300", "samples of one curve"),
-        (NUMBERS, "-n 0", "-n 0: the number of samples"),
+        (NUMBERS, "-n 0", "-n: 0: the number of samples"),
         (NUMBERS, "--every 1e350", "too long"),
         (NUMBERS, "--every 1e-350", "too short"),
         (WHOLE, "--every 0.5", "a step must be a whole number"),

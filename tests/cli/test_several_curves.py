@@ -38,10 +38,10 @@ def test_several_recordings_that_were_cut_at_gaps(run, fails):
     columns = table("out.csv")
     assert columns["id"] == ["a/2", "a/1"]
     np.testing.assert_allclose(numbers(columns, "t", "x"), [[44.5, 4.45], [1.5, 0.15]], atol=1e-12)
-    write("at.csv", "t,id\n44.5,a\n1.5,b\n1,a/1\n")
+    write("at.csv", "t,id\n44.5,a\n1.5,b\n1,a/1\n2,a\n")
     run("sample a.npz --at at.csv -o out.csv")
-    assert table("out.csv")["id"] == ["a", "b", "a/1"]
-    np.testing.assert_allclose(numbers(table("out.csv"), "x")[:, 0], [4.45, -1.5, 0.1], atol=1e-12)
+    assert table("out.csv")["id"] == ["a", "b", "a/1", "a"]
+    np.testing.assert_allclose(numbers(table("out.csv"), "x")[:, 0], [4.45, -1.5, 0.1, 0.2], atol=1e-12)
     write("at.csv", "when,id\n44.5,a\n1.5,a\n")
     run("sample a.npz --at at.csv --time when -o out.csv")
     assert table("out.csv")["id"] == ["a", "a"]

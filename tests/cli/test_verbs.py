@@ -140,7 +140,7 @@ def test_invalid_usage_fails(curves, fails):
     assert "--every -n --at is required" in fails("sample a.npz -o b.csv")
     assert "--" in fails("sample a.npz --every=-- -o b.csv")
     assert "not allowed with" in fails("sample a.npz -n 3 --every 1 -o b.csv")
-    assert fails("sample a.npz -n 3 --nu 0,3 -o b.csv").startswith("--nu 0,3: give one or more of 0, 1 and 2")
+    assert "--nu: 0,3: give one or more of 0, 1 and 2" in fails("sample a.npz -n 3 --nu 0,3 -o b.csv")
     assert fails("fit a.csv --space s:2 -o b.csv") == "b.csv: the name of a file of curves must end in .npz"
     ending = "b.xls: the name of a table must end in .csv, .tsv, .npz, .parquet, .json, .geojson, .gpx, .tum or .txt"
     assert fails("sample a.npz -n 3 -o b.xls") == ending

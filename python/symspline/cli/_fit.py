@@ -17,11 +17,12 @@ datetime, stamp or timestamp, in the plural or with words such as iso, utc, unix
 "Date (UTC)". The command asks if another column seems to hold times. Without any, times are 0, 1, 2, ... Numbers in
 the column of times have no unit; with --unix ns they are nanoseconds since 1970, and become dates in UTC.
 
-CSV files, which pandas reads, name the columns in their first line; blank lines are skipped. Cells are separated by commas, semicolons or
-tabs, and between semicolons numbers may have decimal commas. In an NPZ file columns are arrays with one entry per row,
-which may be complex, or vectors or matrices; an array `points` may hold all numbers of the points. A .tum or .txt file
-is a trajectory of the TUM benchmark: time tx ty tz qx qy qz qw. In GPX and GeoJSON files, tracks and lines have their
-name in the column track, and points their height in the column ele. With --skipna, rows without a point are omitted.
+CSV files, which pandas reads, name the columns in their first line; blank lines are skipped. Cells are separated by
+commas, semicolons or tabs, and between semicolons numbers may have decimal commas. In an NPZ file columns are arrays
+with one entry per row, which may be complex, or vectors or matrices; an array `points` may hold all numbers of the
+points. A .tum or .txt file is a trajectory of the TUM benchmark: time tx ty tz qx qy qz qw. In GPX and GeoJSON files,
+tracks and lines have their name in the column track, and points their height in the column ele. With --skipna, rows
+without a point are omitted.
 
 Curves pass through the points. --smooth is for noisy points: the curve passes near them, as smooth as the data
 suggest, and symspline sample also writes its standard deviation.

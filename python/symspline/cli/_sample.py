@@ -43,13 +43,12 @@ the column of the curves' names, every row is for its curve, otherwise for all c
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import chain, pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .._base.time import onto_ends
 from .._smoothing import SmoothingSpline
@@ -61,8 +60,8 @@ from ._curves import Curves, Samples, deviations_of, read_curves, samples_of
 from ._files import called, check_inputs, check_target
 from ._formats import TABLES, Layout, endings, format_of, is_binary, open_table, write_table
 from ._messages import Problem, Progress, counted, did_you_mean, first_duplicate, refuse, say, tell
-from ._recordings import group
-from ._tables import UNITS, Rows, Table, number
+from ._recordings import Index, group
+from ._tables import UNITS, Rows, number
 from ._times import Times, every, spread
 
 _EACH = "{curve}"
@@ -70,6 +69,24 @@ _EACH = "{curve}"
 _MOST = 10**9
 _TUM_NAMES = list(TUM[1:])
 _TUM_SPACES = [space_named(name) for name in ("se:3", "so:3 x r:3", "r:3 x so:3")]
+
+
+class _Part(NamedTuple):
+    """What is sampled of one curve.
+
+    Attributes
+    ----------
+    name, label : str
+        The curve, and what the written table calls it: segments are called like their recording.
+    times : ndarray
+    rows : ndarray or None
+        The rows of these times in the table of --at; None if its rows are not each for one curve.
+    """
+
+    name: str
+    label: str
+    times: Times
+    rows: Index | None
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -83,13 +100,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     which.add_argument("--every", metavar="DT", help=steps)
     count = "the number of equidistant samples from the start to the end"
-    which.add_argument("-n", dest="number", type=number, metavar="N", help=count)
+    which.add_argument("-n", dest="number", type=_count, metavar="N", help=count)
     which.add_argument("--at", type=Path, metavar="FILE", help=f"a table with times: {endings()}, or -")
     add("--curve", action="append", metavar="NAME", help="which curve; may be repeated (default: all)")
     add("--unix", choices=UNITS, help="times of --at are numbers that count this unit since 1970-01-01 in UTC")
-    add("--nu", default="0", metavar="0,1,2", help="points (0, default), velocities (1), accelerations (2)")
+    add(
+        "--nu",
+        type=_orders,
+        default=[0],
+        metavar="0,1,2",
+        help="points (0, default), velocities (1), accelerations (2)",
+    )
     add("--lonlat", action="store_true", help="write longitude and latitude of any curve on sphere:2")
-    add("--digits", type=int, metavar="N", help="round the numbers to N significant digits, but not the times")
+    add("--digits", type=_digits, metavar="N", help="round the numbers to N significant digits, but not the times")
     add(
         "--time",
         metavar="COL",
@@ -101,87 +124,95 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("-o", dest="output", type=Path, metavar="OUT", required=True, help=out)
 
 
-def run(options: argparse.Namespace) -> int:
-    """Evaluate, and write the table."""
-    form = format_of(options.output, options.to)
-    check_inputs(options.curves, options.at)
-    inputs = options.curves, options.at
-    check_target(options.output, *inputs, binary=is_binary(form))
-    orders, digits = _orders(options.nu), options.digits
-    refuse(f"--digits {digits}: ", (digits is not None and not 1 <= digits <= 17, "give a number between 1 and 17"))
-    every_curve = read_curves(options.curves, options.lonlat)
-    curves = every_curve.chosen(options.curve)
-    columns = _tum_columns(curves, orders) if form == "tum" else curves.columns
-    times, rows, labels = _times(options, curves, every_curve)
-    samples = _sampled(curves, times, orders, columns, form != "tum", digits)
-    if _EACH in options.output.name:
-        paths = [
-            options.output.with_name(options.output.name.replace(_EACH, name.replace("/", "_"))) for name in samples
-        ]
-        twice = first_duplicate([str(path).lower() for path in paths])
-        refuse(f"-o {options.output}: ", (twice, f"two curves would have the file {twice}; choose one with --curve"))
-        for path in paths:
-            check_target(path, *inputs)
-        for name, path in zip(samples, paths, strict=True):
-            _write(path, form, {name: times[name]}, samples, None, columns, {})
-        return 0
-    if form == "tum":
-        _check_order(curves)
-    _write(options.output, form, times, samples, rows, columns, labels if curves.named and form != "tum" else {})
-    return 0
-
-
-def _sampled(
-    curves: Curves, times: dict[str, Times], orders: list[int], columns: Columns, stds: bool, digits: int | None
-) -> dict[str, Samples]:
-    """Return the columns of every curve, with standard deviations if all curves have them and ``stds`` is True."""
-    smooth = stds and all(isinstance(spline, SmoothingSpline) for spline in curves.splines.values())
-    functions: Any = (samples_of, deviations_of) if smooth else (samples_of,)
-    samples: dict[str, Samples] = {}
-    with Progress("sampling") as progress:
-        for done, (name, x) in enumerate(times.items(), 1):
-            blocks = [function(curves.splines[name], x, nu, columns) for nu in orders for function in functions]
-            found = list(chain.from_iterable(blocks))
-            samples[name] = [(key, _rounded(own, digits)) for key, own in found] if digits else found
-            progress(done, len(times))
-    return samples
-
-
-def _write(
-    path: Path,
-    form: str,
-    times: dict[str, Times],
-    samples: dict[str, Samples],
-    rows: NDArray[np.int64] | None,
-    columns: Columns,
-    labels: Mapping[str, str],
-) -> None:
-    """Write the table of some curves, in the order of ``rows``, with a column of ``labels`` if there are any."""
-    pairs: list[tuple[str, NDArray[Any]]] = [(columns.time, np.concatenate(list(times.values())))]
-    if labels:
-        pairs.append((columns.curve, np.repeat([labels[name] for name in times], [len(x) for x in times.values()])))
-    for parts in zip(*(samples[name] for name in times), strict=True):
-        pairs.append((parts[0][0], np.concatenate([numbers for _, numbers in parts])))
-    twice = first_duplicate([name for name, _ in pairs])
-    refuse("", (twice is not None, f"two columns would have the name {twice!r}; rename them"))
-    order = slice(None) if rows is None else np.argsort(rows)
-    lonlat = tuple(columns.points) if columns.lonlat else None
-    layout = Layout(columns.time, columns.curve if labels else None, lonlat, bool(columns.utc))
-    write_table(path, form, {name: column[order] for name, column in pairs}, layout)
-    tell(f"{called(path)}: {counted(len(pairs[0][1]), 'row')}")
-
-
-def _rounded(numbers: Doubles, digits: int) -> Doubles:
-    """Round to significant digits."""
-    texts = (f"{number:.{digits - 1}e}" for number in numbers.tolist())
-    return np.fromiter(map(float, texts), np.float64, len(numbers))
+def _count(text: str) -> int:
+    count = number(text)
+    if not 1 <= count <= _MOST or count != int(count):
+        raise argparse.ArgumentTypeError(f"{text}: the number of samples must be a whole number between 1 and 10^9")
+    return int(count)
 
 
 def _orders(text: str) -> list[int]:
     orders = [part.strip() for part in text.split(",")]
     if not set(orders) <= {"0", "1", "2"} or len(set(orders)) < len(orders):
-        raise Problem(f"--nu {text}: give one or more of 0, 1 and 2, separated by commas")
+        raise argparse.ArgumentTypeError(f"{text}: give one or more of 0, 1 and 2, separated by commas")
     return list(map(int, orders))
+
+
+def _digits(text: str) -> int:
+    if text not in map(str, range(1, 18)):
+        raise argparse.ArgumentTypeError(f"{text}: give a number between 1 and 17")
+    return int(text)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Evaluate, and write the table."""
+    form, inputs = format_of(options.output, options.to), (options.curves, options.at)
+    check_inputs(*inputs)
+    check_target(options.output, *inputs, binary=is_binary(form))
+    whole = read_curves(options.curves, options.lonlat)
+    curves = whole.chosen(options.curve)
+    tum = form == "tum"
+    columns = _tum_columns(curves, options.nu) if tum else curves.columns
+    parts = _along(curves, options) if options.at is None else _given(options, curves, whole)
+    samples = _sampled(curves, parts, options, columns, not tum)
+    if _EACH not in options.output.name:
+        if tum:
+            _check_order(curves)
+        _write(options.output, form, parts, samples, columns, curves.named and not tum)
+        return 0
+    names = [options.output.name.replace(_EACH, part.name.replace("/", "_")) for part in parts]
+    paths = [options.output.with_name(name) for name in names]
+    twice = first_duplicate([str(path).lower() for path in paths])
+    refuse(f"-o {options.output}: ", (twice, f"two curves would have the file {twice}; choose one with --curve"))
+    for path in paths:
+        check_target(path, *inputs)
+    for path, part, own in zip(paths, parts, samples, strict=True):
+        _write(path, form, [part._replace(rows=None)], [own], columns, False)
+    return 0
+
+
+def _sampled(
+    curves: Curves, parts: Sequence[_Part], options: argparse.Namespace, columns: Columns, stds: bool
+) -> list[Samples]:
+    """Return the columns of every curve, with standard deviations if all curves have them and ``stds`` is True."""
+    smooth = stds and all(isinstance(spline, SmoothingSpline) for spline in curves.splines.values())
+    functions: Any = (samples_of, deviations_of) if smooth else (samples_of,)
+    samples = []
+    with Progress("sampling") as progress:
+        for done, part in enumerate(parts, 1):
+            spline = curves.splines[part.name]
+            blocks = [function(spline, part.times, nu, columns) for nu in options.nu for function in functions]
+            found = chain.from_iterable(blocks)
+            samples.append([(name, _rounded(own, options.digits)) for name, own in found])
+            progress(done, len(parts))
+    return samples
+
+
+def _rounded(numbers: Doubles, digits: int | None) -> Doubles:
+    """Round to significant digits."""
+    if digits is None:
+        return numbers
+    texts = (f"{number:.{digits - 1}e}" for number in numbers.tolist())
+    return np.fromiter(map(float, texts), np.float64, len(numbers))
+
+
+def _write(
+    path: Path, form: str, parts: Sequence[_Part], samples: Sequence[Samples], columns: Columns, named: bool
+) -> None:
+    """Write the table of some curves, in the order of their rows, with a column of their names if ``named`` is True."""
+    pairs: list[tuple[str, Any]] = [(columns.time, np.concatenate([part.times for part in parts]))]
+    if named:
+        pairs.append((columns.curve, np.repeat([part.label for part in parts], [len(part.times) for part in parts])))
+    for own in zip(*samples, strict=True):
+        pairs.append((own[0][0], np.concatenate([numbers for _, numbers in own])))
+    twice = first_duplicate([name for name, _ in pairs])
+    refuse("", (twice is not None, f"two columns would have the name {twice!r}; rename them"))
+    rows = [part.rows for part in parts if part.rows is not None]
+    order = np.argsort(np.concatenate(rows)) if rows else slice(None)
+    lonlat = tuple(columns.points) if columns.lonlat else None
+    layout = Layout(columns.time, columns.curve if named else None, lonlat, bool(columns.utc))
+    write_table(path, form, {name: column[order] for name, column in pairs}, layout)
+    tell(f"{called(path)}: {counted(len(pairs[0][1]), 'row')}")
 
 
 def _tum_columns(curves: Curves, orders: list[int]) -> Columns:
@@ -208,82 +239,67 @@ def _check_order(curves: Curves) -> None:
 # ---- times ----
 
 
-def _times(
-    options: argparse.Namespace, curves: Curves, every_curve: Curves
-) -> tuple[dict[str, Times], NDArray[np.int64] | None, dict[str, str]]:
-    """Return the times of every curve, their rows if every row of a table is for one curve, and names for the table."""
-    if options.at is not None:
-        table, given = with_stamps(open_table(options.at, options.format), options.time, False)
-        return _given(table, given, curves, every_curve, options.unix)
-    times = {name: _along(spline.t, options) for name, spline in curves.splines.items()}
+def _along(curves: Curves, options: argparse.Namespace) -> list[_Part]:
+    """Return equidistant times of every curve."""
+    parts = []
+    for name, spline in curves.splines.items():
+        times = every(options.every, spline.t) if options.every is not None else spread(options.number, spline.t)
+        parts.append(_Part(name, name, times, None))
     empty = f"no multiple of this step lies between the start and the end of {'any' if curves.named else 'the'} curve"
-    none = not any(map(len, times.values()))
+    none = not any(len(part.times) for part in parts)
     refuse(f"--every {options.every}: ", (none, f"{empty}; use a shorter step, or -n"))
-    return times, None, {name: name for name in times}
+    return parts
 
 
-def _along(knots: Times, options: argparse.Namespace) -> Times:
-    if options.every is not None:
-        return every(options.every, knots)
-    count = options.number
-    wrong = f"-n {count:g}: the number of samples must be a whole number between 1 and 10^9"
-    refuse("", (not 1 <= count <= _MOST or count != int(count), wrong))
-    return spread(int(count), knots)
-
-
-def _given(
-    table: Table, given: str | None, curves: Curves, every_curve: Curves, unix: str | None
-) -> tuple[dict[str, Times], NDArray[np.int64] | None, dict[str, str]]:
+def _given(options: argparse.Namespace, curves: Curves, whole: Curves) -> list[_Part]:
+    """Return the times in the table of --at. If it has a column of names, each row is for the curve that it names."""
+    table, time = with_stamps(open_table(options.at, options.format), options.time, False)
     path, usual, label = table.path, curves.columns.time, curves.columns.curve
-    only = table.names[0] if len(table.names) == 1 else None
-    usual_or_only = usual if usual in table.names else only
-    time = time_column(table, given, [], unix is not None) if given or not usual_or_only else usual_or_only
+    if time is None and (usual in table.names or len(table.names) == 1):
+        time = usual if usual in table.names else table.names[0]
+    time = time_column(table, time, [], options.unix is not None)
     if time is None:
         raise Problem(f"{path} has no column {usual!r} of times; {did_you_mean(usual, table.names)}")
-    labelled = every_curve.named and label in table.names
-    rows = table.read([], time, label if labelled else None, unix=unix)
+    labelled = whole.named and label in table.names
+    rows = table.read([], time, label if labelled else None, options.unix)
     recordings = curves.recordings
     segments = {name: [name] for name in curves.splines} | recordings
-    if labelled:
-        known = {*every_curve.splines, *every_curve.recordings}
-        asked = {name: own for name, own in group(rows).items() if name in segments or name not in known}
-    else:
-        asked = dict.fromkeys(recordings, group(rows)[""])
-    groups: dict[str, NDArray[np.int64]] = {}
-    labels: dict[str, str] = {}
-    for name, own in asked.items():
-        if name not in segments:
-            near = did_you_mean(name, list(segments))
-            raise Problem(f"{path}, {rows.place(int(own[0]))}: there is no curve {name!r}; {near}")
-        parts = _by_segment(rows, own, {part: curves.splines[part] for part in segments[name]})
-        groups |= parts
-        # Segments have the name that the table gives their recording.
-        labels |= {part: name if labelled else part for part in parts}
-    for name, own in groups.items():
-        _check_times(path, rows, own, curves, name)
-    refuse(path, (not any(map(len, groups.values())), " has no times of these curves"))
-    order = np.concatenate(list(groups.values())) if labelled or len(recordings) == 1 else None
-    return {name: rows.times[own] for name, own in groups.items()}, order, labels
+    known = {*whole.splines, *whole.recordings}
+    groups = group(rows) if labelled else dict.fromkeys(recordings, group(rows)[""])
+    tied = labelled or len(recordings) == 1
+    parts = []
+    for label, index in groups.items():
+        if label not in segments and label in known:
+            continue
+        if label not in segments:
+            near = did_you_mean(label, list(segments))
+            raise Problem(f"{path}, {rows.place(int(index[0]))}: there is no curve {label!r}; {near}")
+        for name, own in _by_segment(rows, index, {part: curves.splines[part] for part in segments[label]}).items():
+            _check_times(path, rows, own, curves, name)
+            if len(own):
+                parts.append(_Part(name, label if labelled else name, rows.times[own], own if tied else None))
+    refuse(path, (not parts, " has no times of these curves"))
+    return parts
 
 
-def _by_segment(rows: Rows, own: NDArray[np.int64], splines: Mapping[str, CubicSpline]) -> dict[str, NDArray[np.int64]]:
+def _by_segment(rows: Rows, index: Index, splines: Mapping[str, CubicSpline]) -> dict[str, Index]:
     """Divide rows between the segments of a recording; those in the gaps between segments are omitted."""
-    times = rows.times[own]
+    times = rows.times[index]
     starts, ends = (np.array([spline.t[i] for spline in splines.values()]) for i in (0, -1))
     if times.dtype.kind != starts.dtype.kind and "M" in (times.dtype.kind, starts.dtype.kind):
         # `_check_times` describes the difference.
-        return {next(iter(splines)): own}
+        return {next(iter(splines)): index}
     segment = np.maximum(np.searchsorted(starts, times, "right") - 1, 0)
     in_gap = (times > ends[segment]) & (segment < len(starts) - 1)
     if in_gap.any():
         say(f"{int(in_gap.sum())} of {len(in_gap)} times lie in gaps between segments, and are omitted")
-    return {name: own[(segment == i) & ~in_gap] for i, name in enumerate(splines)}
+    return {name: index[(segment == i) & ~in_gap] for i, name in enumerate(splines)}
 
 
-def _check_times(path: object, rows: Rows, own: NDArray[np.int64], curves: Curves, name: str) -> None:
+def _check_times(path: object, rows: Rows, index: Index, curves: Curves, name: str) -> None:
     """Raise `Problem` unless the curve has points at these times."""
     spline, curve = curves.splines[name], curves.called(name)
-    times, knots = rows.times[own], spline.t
+    times, knots = rows.times[index], spline.t
     dates = knots.dtype.kind == "M"
     expected, found = ("dates", "numbers") if dates else ("numbers", "dates")
     these, those = ("a time zone", "none") if rows.utc else ("no time zone", "one")
@@ -299,6 +315,6 @@ def _check_times(path: object, rows: Rows, own: NDArray[np.int64], curves: Curve
     if outside.size:
         zone = " UTC" if curves.columns.utc else ""
         raise Problem(
-            f"{path}, {rows.place(int(own[outside[0]]))}: time {times[outside[0]]}{zone} is outside {curve}, which "
+            f"{path}, {rows.place(int(index[outside[0]]))}: time {times[outside[0]]}{zone} is outside {curve}, which "
             f"runs from {knots[0]} to {knots[-1]}{zone}; fit with --extrapolate to define the curve there"
         )
