@@ -131,6 +131,13 @@ def test_csv_dialects_of_other_programs(run):
     assert ss.load("b.npz") == ss.load("a.npz")
 
 
+@pytest.mark.parametrize("names", [("NA", "EU"), ("true", "false"), ("007", "7"), ("1.0", "2.50"), ("null", '"a, b"')])
+def test_names_are_read_as_they_stand(run, names):
+    write("a.csv", "t,id,x\n" + "".join(f"{i},{name},{i * i}\n" for i in range(3) for name in names))
+    run("fit a.csv --space r:1 --columns x --curve id -o a.npz")
+    assert list(ss.load("a.npz")) == [name.strip('"') for name in names]
+
+
 def test_long_files_are_read_in_chunks(run, fails):
     n = 4500
     angle = np.arange(n) / 10

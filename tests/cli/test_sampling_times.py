@@ -92,6 +92,9 @@ def test_times_along_a_curve(along):
     assert along("--every 2d", day).tolist() == [day[0].astype("datetime64[s]").item()]
     np.testing.assert_array_equal(along("--every 0.1", np.array([0.0, 1.0])), np.arange(11) / 10)
     assert along("--every 0.3", np.array([0.0, 1.0]))[-1] == 0.9
+    # The last sample is at the end if the step divides the curve up to rounding.
+    for end in (0.3, 0.7999999999999999):
+        assert along("--every 0.1", np.array([0.0, end]))[-1] == end
     assert along("-n 3", day).astype(str).tolist()[1] == "2020-01-01T12:00:00"
     thirds = along("-n 4", np.array(["2020-01-01T00:00:00", "2020-01-01T00:00:01"], "datetime64[s]"))
     assert thirds.astype(str).tolist()[1] == "2020-01-01T00:00:00.333333"
