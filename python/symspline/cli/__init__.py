@@ -90,13 +90,13 @@ def _parser() -> _Parser:
     for verb in (_fit, _sample, _plot, _check, _info):
         texts = _texts_of(verb.__doc__)
         summary = texts["description"].partition("\n")[0]
-        own = verbs.add_parser(verb.__name__.rpartition("._")[2], help=summary, **texts)
-        verb.add_arguments(own)
-        level = own.add_mutually_exclusive_group().add_argument
+        command = verbs.add_parser(verb.__name__.rpartition("._")[2], help=summary, **texts)
+        verb.add_arguments(command)
+        level = command.add_mutually_exclusive_group().add_argument
         quiet = "print only warnings and errors, besides results"
         level("-q", "--quiet", dest="level", action="store_const", const=QUIET, default=USUAL, help=quiet)
         level("-v", "--verbose", dest="level", action="store_const", const=VERBOSE, help="print more about the work")
-        own.set_defaults(run=verb.run)
+        command.set_defaults(run=verb.run)
     return parser
 
 

@@ -149,7 +149,7 @@ def with_stamps(table: Table, given: str | None, skipna: bool) -> tuple[Table, s
         what = "which are not whole seconds since 1970 and nanoseconds"
         raise Problem(f"{table.path}, {table.place(int(wrong[0]))}: --time {given}: the columns hold {found}, {what}")
     seconds, rest = stamps.T.astype(np.int64)
-    columns = {name: own for name, own in table.columns.items() if name not in names}
+    columns = {name: column for name, column in table.columns.items() if name not in names}
     time = given if "time" in columns else "time"
     columns[time] = (10**9 * seconds + rest).astype("datetime64[ns]")
     return replace(table, columns=columns, is_utc={**table.is_utc, time: True}), time
@@ -298,10 +298,10 @@ def _in_order(space: Space, scalar_last: int) -> list[int]:
     """Return `Columns.quaternion` for columns in the order of the factors, the scalar first (0) or last (1)."""
     columns: list[int] = []
     for factor in factors_of(space):
-        own = list(range(len(columns), len(columns) + width(factor, True)))
+        numbers = list(range(len(columns), len(columns) + width(factor, True)))
         if factor in (ROTATIONS, POSES):
-            own[-4:] = np.roll(own[-4:], scalar_last).tolist()
-        columns += own
+            numbers[-4:] = np.roll(numbers[-4:], scalar_last).tolist()
+        columns += numbers
     return columns
 
 
@@ -321,13 +321,13 @@ def quaternion_by_names(names: Sequence[str], space: Space) -> list[int] | None:
     for factor in factors_of(space):
         turns = factor in (ROTATIONS, POSES)
         count = width(factor, True) - (4 if turns else 0)
-        own, rest = rest[:count], rest[count:]
-        by_letter = sorted(own, key=lambda i: plain[i][-1:])
+        numbers, rest = rest[:count], rest[count:]
+        by_letter = sorted(numbers, key=lambda i: plain[i][-1:])
         if [plain[i][-1:] for i in by_letter] == [*"xyz"]:
-            own = by_letter
+            numbers = by_letter
         elif factor == POSES:
             return None
-        columns += own + (scalar_first if turns else [])
+        columns += numbers + (scalar_first if turns else [])
     return columns
 
 
@@ -470,8 +470,8 @@ def point_columns(
     names, count = [name for name, *_ in entries], count_with_quaternion(space)
     for used in (columns, names):
         # A column may stand on both sides of a symmetric matrix.
-        own = dict.fromkeys(used) if any(map(_is_matrix, factors_of(space))) else used
-        twice = first_duplicate([*filter(None, others), *own])
+        meant = dict.fromkeys(used) if any(map(_is_matrix, factors_of(space))) else used
+        twice = first_duplicate([*filter(None, others), *meant])
         refuse("column ", (twice is not None, f"{twice!r} of {table.path} cannot have two meanings"))
     if len(names) == count:
         return PointColumns(table.path, space, entries, lonlat, _quaternion_columns(names, space, order))

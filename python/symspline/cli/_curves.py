@@ -92,7 +92,7 @@ class Curves:
         refuse(self.file, (not self.named, " has one curve without a name; omit --curve"))
         for name in names:
             # A curve that was cut at gaps has the segments NAME/1, NAME/2, ...
-            found = {key: own for key, own in self.splines.items() if name in (key, key.rpartition("/")[0])}
+            found = {key: curve for key, curve in self.splines.items() if name in (key, key.rpartition("/")[0])}
             refuse(self.file, (not found, f" has no curve {name!r}; {did_you_mean(name, list(self.splines))}"))
             splines |= found
         return replace(self, splines=splines, named=len(splines) > 1)
@@ -194,7 +194,7 @@ def samples_of(spline: CubicSpline, x: Any, nu: int, columns: Columns) -> Sample
     parts = parts_of(values, spline.space, "values")
     if columns.quaternion is not None:
         return _with_quaternion(spline, x, nu, parts, columns)
-    blocks = [np.ascontiguousarray(own.reshape(len(own), -1)).view(np.float64) for own in parts]
+    blocks = [np.ascontiguousarray(part.reshape(len(part), -1)).view(np.float64) for part in parts]
     pairs = zip(columns.points, complex_numbers(spline.space), strict=True)
     names = [name + end + part for name, two in pairs for part in ((RE, IM) if two else ("",))]
     # A column may be named twice, as for both sides of a symmetric matrix.
@@ -208,11 +208,11 @@ def _with_quaternion(spline: CubicSpline, x: Any, nu: int, parts: Sequence[Any],
     options: Any = {} if nu else {"scalar_first": True}
     found: list[tuple[int, str, Doubles]] = []
     start = 0
-    for factor, own in zip(factors_of(spline.space), parts, strict=True):
+    for factor, part in zip(factors_of(spline.space), parts, strict=True):
         count = width(factor, True)
         at = order[start : start + count]
         start += count
-        numbers = own[:, :3, 3] if factor == POSES else own.reshape(len(own), -1)
+        numbers = part[:, :3, 3] if factor == POSES else part.reshape(len(part), -1)
         if factor in (ROTATIONS, POSES):
             turn, at = at[-4:], at[:-4]
             names = [columns.points[i] for i in turn] if nu == 0 else [name + ("", "_d1")[nu - 1] for name in _RATES]
@@ -249,7 +249,7 @@ def deviations_of(spline: SmoothingSpline, x: Any, nu: int, columns: Columns) ->
             )
         elif nu:
             each = angular_velocity(spline, x, return_std=True)[1].T
-            found += [(f"std_{rate}", own) for rate, own in zip(_RATES, each, strict=True)]
+            found += [(f"std_{rate}", column) for rate, column in zip(_RATES, each, strict=True)]
         else:
             found.append((name, std / 2))
     return found

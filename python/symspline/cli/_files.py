@@ -85,7 +85,7 @@ def check_target(path: Path, *inputs: Path | None, binary: bool = False) -> None
     # The target of a symbolic link is written.
     folder = path.resolve().parent if path.is_symlink() else path.parent
     special = path.exists() and not path.is_file()
-    same = any(own is not None and own.exists() and path.exists() and path.samefile(own) for own in inputs)
+    same = any(given is not None and given.exists() and path.exists() and path.samefile(given) for given in inputs)
     refuse(
         f"cannot write {path}: ",
         (path.is_dir(), "it is a folder"),

@@ -92,7 +92,7 @@ def _read_csv(path: Source) -> Table:
         (next(rows, None) is None, " has no rows below the names of its columns"),
     )  # fmt: skip
     rows.close()
-    missing = [own for text in MISSING for own in (text, text.upper(), text.title(), text.replace("nan", "NaN"))]
+    missing = [word for text in MISSING for word in (text, text.upper(), text.title(), text.replace("nan", "NaN"))]
     frame = _frame(path, mark, names, head, keep_default_na=False, na_values=missing)
     columns: dict[str, Any] = {}
     for i, name in enumerate(names):
@@ -342,7 +342,7 @@ def _values(values: list[Any]) -> Array:
     """Return numbers as an array, and other values as texts."""
     kinds = set(map(type, values)) - {type(None)}
     # Larger whole numbers are exact as texts only.
-    if kinds and kinds <= {int, float} and all(type(own) is not int or abs(own) <= EXACT for own in values):
+    if kinds and kinds <= {int, float} and all(type(value) is not int or abs(value) <= EXACT for value in values):
         return np.array([np.nan if value is None else value for value in values], np.float64)
     return np.array(["" if value is None else str(value) for value in values], object)
 
@@ -372,7 +372,7 @@ def _feature(feature: Any, number: str, path: Source) -> list[dict[str, Any]]:
     refuse(path, (kind != "LineString", f": {_KINDS}, not {kind}{remedy}"))
     times = next((properties.pop(name) for name in _LINE_TIMES if name in properties), None)
     label = {_TRACK: str(properties.get("name", number))}
-    rows = [_position(own) | label for own in coordinates]
+    rows = [_position(place) | label for place in coordinates]
     return rows if times is None else [{_TIME: time} | row for time, row in zip(times, rows, strict=True)]
 
 
@@ -385,8 +385,8 @@ def _lists(columns: Mapping[str, Array], layout: Layout) -> dict[str, list[Any]]
     """Return columns as lists of numbers and texts; NaN becomes None."""
     return {
         # NaN is not equal to itself.
-        name: _date_texts(own, layout.utc) if own.dtype.kind == "M" else [v if v == v else None for v in own.tolist()]
-        for name, own in columns.items()
+        name: _date_texts(x, layout.utc) if x.dtype.kind == "M" else [v if v == v else None for v in x.tolist()]
+        for name, x in columns.items()
     }
 
 
@@ -403,9 +403,9 @@ def _write_geojson(file: BinaryIO, columns: Mapping[str, Array], layout: Layout)
     values = _lists(columns, layout)
     places = zip(values.pop(lon), values.pop(lat), strict=True)
     features = []
-    for place, *own in zip(places, *values.values(), strict=True):
+    for place, *others in zip(places, *values.values(), strict=True):
         geometry = {"type": "Point", "coordinates": place}
-        properties = dict(zip(values, own, strict=True))
+        properties = dict(zip(values, others, strict=True))
         features.append(json.dumps({"type": "Feature", "properties": properties, "geometry": geometry}))
     collection = ",\n".join(features)
     file.write(f'{{"type": "FeatureCollection", "features": [\n{collection}\n]}}\n'.encode())
@@ -438,8 +438,8 @@ def _read_gpx(path: Source) -> Table:
             label = f"{name}/{part}" if len(track.segments) > 1 else name
             for point in segment.points:
                 time = point.time and point.time.astimezone(UTC).isoformat()
-                own = {_TIME: time, _LON: point.longitude, _LAT: point.latitude, _HEIGHT: point.elevation}
-                rows.append({name: value for name, value in own.items() if value is not None} | {_TRACK: label})
+                row = {_TIME: time, _LON: point.longitude, _LAT: point.latitude, _HEIGHT: point.elevation}
+                rows.append({name: value for name, value in row.items() if value is not None} | {_TRACK: label})
     refuse(path, (not rows, " has no tracks with points"))
     return _table(path, rows)
 

@@ -90,14 +90,15 @@ def _is_curve(source: Source) -> bool:
 
 
 def _table(table: Table, given: str | None) -> list[str]:
-    columns = {name: own for name, own in table.columns.items() if name}
+    columns = {name: column for name, column in table.columns.items() if name}
     refuse(table.path, (not columns, " has no columns"))
-    groups = {key: own for key, own in table.groups.items() if len(own) > 1}
+    groups = {key: parts for key, parts in table.groups.items() if len(parts) > 1}
     lines = [f"{table.path}: {table.path.format} table, {table.height} rows"]
-    hidden = {name for own in groups.values() for name in own[_COLUMNS:]}
+    hidden = {name for parts in groups.values() for name in parts[_COLUMNS:]}
     shown = [name for name in columns if name not in hidden]
     lines += [f"  {name}: {_described(table.shown(name))}" for name in shown]
-    lines += [f"  ... {own[-1]}: {key} has {len(own)} columns" for key, own in groups.items() if len(own) > _COLUMNS]
+    long = {key: parts for key, parts in groups.items() if len(parts) > _COLUMNS}
+    lines += [f"  ... {parts[-1]}: {key} has {len(parts)} columns" for key, parts in long.items()]
     if given not in (None, NUMBERED):
         table.require(given)
     try:
@@ -201,7 +202,7 @@ def _smoothed(splines: Sequence[SmoothingSpline[Any, Any]], lonlat: bool) -> str
     several = is_several(space)
     reports = zip(*(spline.report if several else (spline.report,) for spline in splines), strict=True)
     names = [f"{part}: " if several else "" for part in smoothed_spaces(space)]
-    return "; ".join(_chosen(name, own, lonlat) for name, own in zip(names, reports, strict=True))
+    return "; ".join(_chosen(name, each, lonlat) for name, each in zip(names, reports, strict=True))
 
 
 def _chosen(name: str, reports: Sequence[SmoothingReport], lonlat: bool) -> str:

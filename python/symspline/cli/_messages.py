@@ -64,8 +64,8 @@ def refuse(where: object, *checks: tuple[object, str]) -> None:
 def for_command_line(error: object) -> str:
     """Return a message of the library with advice for the command line, and with so:3 for SpecialOrthogonal(3)."""
     message = str(error)
-    for advice, own in _FOR_PYTHON.items():
-        message = message.replace(advice, own)
+    for advice, same in _FOR_PYTHON.items():
+        message = message.replace(advice, same)
     message = _ALL_SPACES.sub("symspline info lists the names", message)
     return _SPACE.sub(lambda space: f"{_NAMES[space[1]]}:{space[2].replace(' ', '')}", message)
 

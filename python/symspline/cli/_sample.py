@@ -166,8 +166,8 @@ def run(options: argparse.Namespace) -> int:
     refuse(f"-o {options.output}: ", (twice, f"two curves would have the file {twice}; choose one with --curve"))
     for path in paths:
         check_target(path, *inputs)
-    for path, part, own in zip(paths, parts, samples, strict=True):
-        _write(path, form, [part._replace(rows=None)], [own], columns, False)
+    for path, part, block in zip(paths, parts, samples, strict=True):
+        _write(path, form, [part._replace(rows=None)], [block], columns, False)
     return 0
 
 
@@ -183,7 +183,7 @@ def _sampled(
             spline = curves.splines[part.name]
             blocks = [function(spline, part.times, nu, columns) for nu in options.nu for function in functions]
             found = chain.from_iterable(blocks)
-            samples.append([(name, _rounded(own, options.digits)) for name, own in found])
+            samples.append([(name, _rounded(numbers, options.digits)) for name, numbers in found])
             progress(done, len(parts))
     return samples
 
@@ -203,8 +203,8 @@ def _write(
     pairs: list[tuple[str, Any]] = [(columns.time, np.concatenate([part.times for part in parts]))]
     if named:
         pairs.append((columns.curve, np.repeat([part.label for part in parts], [len(part.times) for part in parts])))
-    for own in zip(*samples, strict=True):
-        pairs.append((own[0][0], np.concatenate([numbers for _, numbers in own])))
+    for same in zip(*samples, strict=True):
+        pairs.append((same[0][0], np.concatenate([numbers for _, numbers in same])))
     twice = first_duplicate([name for name, _ in pairs])
     refuse("", (twice is not None, f"two columns would have the name {twice!r}; rename them"))
     rows = [part.rows for part in parts if part.rows is not None]
@@ -228,8 +228,8 @@ def _tum_columns(curves: Curves, orders: list[int]) -> Columns:
 
 def _check_order(curves: Curves) -> None:
     """Raise `Problem` unless every curve begins after the end of the previous one."""
-    for (name, own), (other, following) in pairwise(curves.splines.items()):
-        if not own.t[-1] < following.t[0]:
+    for (name, curve), (other, following) in pairwise(curves.splines.items()):
+        if not curve.t[-1] < following.t[0]:
             raise Problem(
                 f"a TUM trajectory has increasing times, but {curves.called(other)} begins before the end of "
                 f"{curves.called(name)}; choose one with --curve, or write one file per curve, such as -o x_{_EACH}.txt"
@@ -274,10 +274,12 @@ def _given(options: argparse.Namespace, curves: Curves, whole: Curves) -> list[_
         if label not in segments:
             near = did_you_mean(label, list(segments))
             raise Problem(f"{path}, {rows.place(int(index[0]))}: there is no curve {label!r}; {near}")
-        for name, own in _by_segment(rows, index, {part: curves.splines[part] for part in segments[label]}).items():
-            _check_times(path, rows, own, curves, name)
-            if len(own):
-                parts.append(_Part(name, label if labelled else name, rows.times[own], own if tied else None))
+        splines = {part: curves.splines[part] for part in segments[label]}
+        for name, inside in _by_segment(rows, index, splines).items():
+            _check_times(path, rows, inside, curves, name)
+            if len(inside):
+                shown = label if labelled else name
+                parts.append(_Part(name, shown, rows.times[inside], inside if tied else None))
     refuse(path, (not parts, " has no times of these curves"))
     return parts
 
