@@ -281,9 +281,9 @@ class Table:
     def _since_1970(self, name: str, times: Array, unit: str) -> Array:
         """Return dates in UTC for numbers that count a unit since 1970; fractions in a file of text are exact."""
         scale = NANOSECONDS[unit]
-        whole = np.floor(times)
+        whole = times if times.dtype.kind in "iu" else np.floor(times)
         limit = np.iinfo(np.int64).max // scale
-        far = np.flatnonzero(np.abs(whole) > limit)
+        far = np.flatnonzero((whole > limit) | (whole < -limit))
         if far.size:
             place = f"{self.path}, {self.place(int(far[0]))}"
             raise Problem(f"{place}: --unix {unit}: time {times[far[0]]} is too far from 1970; is it in ns?")
