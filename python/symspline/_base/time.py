@@ -324,7 +324,8 @@ def _seconds(array: NDArray[Any], origin: Any, name: str) -> Doubles:
     if all(np.array_equal(e.astype(x.dtype), x) for e, x in zip(exact, (array, origin), strict=True)):
         difference = exact[0] - exact[1]
         # The difference itself may exceed the range of the finer unit.
-        if np.array_equal(exact[1] + difference, exact[0]) and np.all((difference >= np.timedelta64(0)) == (exact[0] >= exact[1])):
+        ahead = difference >= np.timedelta64(0)
+        if np.array_equal(exact[1] + difference, exact[0]) and np.all(ahead == (exact[0] >= exact[1])):
             return _in_seconds(difference)
     # The times are too far apart for the finer unit, so days and times of day are subtracted separately.
     days = [x.astype("datetime64[D]") for x in (array, origin)]
