@@ -67,6 +67,8 @@ def test_unreadable_files(fails):
     ss.CubicSpline(None, [[0], [1]], "r:1").save("a.npz")
     np.savez("a.npz", **dict(np.load("a.npz")), columns="{}")
     assert fails("check a.npz").startswith("a.npz is damaged")
+    Path("end.npz").write_bytes(b"PK\x05\x06" + b"\0" * 8 + b"\1" + b"\0" * 9)
+    assert fails("info end.npz").startswith("end.npz is damaged")
     for end in (-300, -10):
         Path("cut.npz").write_bytes(Path("a.npz").read_bytes()[:end])
         assert "cut.npz" in fails("check cut.npz") and "cut.npz" in fails("fit cut.npz --space r:1 -o c.npz")

@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 
 from .._base.arrays import brief
+from .._base.disk import damage
 from .._base.report import long_gaps
 from .._base.time import time_axis_of
 from .._smoothing import SmoothingReport, SmoothingSpline
@@ -82,7 +83,7 @@ def _installation() -> list[str]:
 
 
 def _is_curve(source: Source) -> bool:
-    with source.open() as file:
+    with source.open() as file, damage(source, "is damaged or not an NPZ file"):
         return zipfile.is_zipfile(file) and "format.npy" in zipfile.ZipFile(file).namelist()
 
 
