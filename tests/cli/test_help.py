@@ -100,6 +100,8 @@ def test_info_of_gaps_beside_repeated_times(run, fails):
     assert fails("info a.csv --time x2") == "a.csv has no column 'x2'; did you mean 'x'?"
     np.savez("a.npz", t=np.arange(3), points=np.ones((3, 20)))
     out = run("info a.npz")
+    np.savez("empty.npz", x=np.empty(0))
+    assert "  x: no values\n" in run("info empty.npz")
     assert "  points_11: 1.0 to 1.0\n  ... points_19: points has 20 columns\n" in out
 
 

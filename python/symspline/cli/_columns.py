@@ -186,7 +186,7 @@ def column_of_names(table: Table, time: str | None, used: Sequence[str | None]) 
     repeated = len(times) - len(np.unique(times))
 
     def fits(codes: NDArray[np.intp]) -> bool:
-        if codes.max() == 0 or np.bincount(codes).min() < 2:
+        if codes.max(initial=0) == 0 or np.bincount(codes).min() < 2:
             return False
         if time is None:
             return bool(np.count_nonzero(np.diff(codes)) == codes.max())
