@@ -63,7 +63,7 @@ test-oracles: .venv/built .venv-oracles/built
 # The adapter for PyTorch, which needs up to 5 GB and is no part of `test`.
 test-torch: .venv/built .venv/tools
 	$(INSTALL) 'torch>=2'
-	$(BIN)/python -m pytest tests/pytorch tests/docs/test_array_api_table.py -o pythonpath='. tests docs'
+	$(BIN)/python -m pytest tests/pytorch tests/docs/test_array_api_table.py tests/test_interface.py -o pythonpath='. tests docs'
 
 # The Rust tests on a 64-bit ARM processor, which qemu-user plays: about a quarter of an hour. The C library that comes
 # with this target, and the linker that comes with Rust, need no tools of that machine.

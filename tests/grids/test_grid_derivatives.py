@@ -97,6 +97,20 @@ def test_outer_products_have_the_same_derivatives():
         assert np.abs(outer - pairs).max() < 1e-9 * np.abs(outer).max()
 
 
+@pytest.mark.parametrize("symmetric", [False, True])
+@pytest.mark.parametrize("nu", [(0, 0), (0, 1), (2, 0), (1, 1)])
+def test_derivatives_repeat_with_the_period(nu, symmetric):
+    rng = np.random.default_rng(23)
+    axes = 0.7 + 2 * knots(rng, 9), knots(rng, 6)
+    points = rng.normal(size=(9, 6, 2))
+    points[-1] = points[0]
+    grid = ss.GridSpline(axes, points, "r:2", bc_type=("periodic", "natural"), symmetric=symmetric)
+    u, v = np.array([0.8, 1.33, 2.6]), np.array([0.2, 0.5, 0.9])
+    first = grid((u, v), nu)
+    for turns in (-1, 1, 3):
+        assert np.abs(grid((u + 2 * turns, v), nu) - first).max() < 1e-8 * np.abs(first).max()
+
+
 def test_derivatives_continue_outside():
     grid, _ = make(ss.Sphere(2))
     x = (np.array([1.05, 0.5]), np.array([0.5, -0.04]), np.array([0.5, 1.03]))

@@ -143,6 +143,17 @@ def test_constant_curves_and_the_cut_locus():
     np.testing.assert_allclose([time, distance], [1.37, np.pi], atol=1e-12)
 
 
+def test_factors_at_rest_on_the_cut_locus():
+    """The distance of one factor is π everywhere, and has no derivative: the other one decides."""
+    pole = np.array([0, 0, 1.0])
+    curve = ss.CubicSpline(None, (np.tile(pole, (4, 1)), [[0.0], [1.0], [3.0], [4.0]]), "sphere:2 x r:1")
+    # The core searches splines, Python parts of them.
+    for own in (curve, curve.restrict(0.1, 2.9)):
+        for x in np.random.default_rng(0).uniform(0.3, 3.7, 8):
+            time, distance = own.closest((-pole, [x]))
+            assert own(time)[1][0] == pytest.approx(x, abs=1e-6) and distance == pytest.approx(np.pi)
+
+
 def test_closed_curves_with_equally_near_branches():
     angles = np.linspace(0, 2 * np.pi, 9)
     loop = np.stack([np.cos(angles), np.sin(angles)], axis=-1)

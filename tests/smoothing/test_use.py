@@ -1,5 +1,7 @@
 """The interface of smoothing splines: input, output, warnings and errors."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from noisy import example, rms
@@ -75,6 +77,8 @@ def test_a_lambda_at_its_bound_warns():
         ss.make_smoothing_spline(T, (both[1], both[0]), "r:1 x r:1", criterion="reml")
     # A λ that was given is nobody's choice.
     ss.make_smoothing_spline(T, noise, "r:1", 1e12)
+    for df, is_stiff in ((2.49, True), (2.51, False)):
+        assert dataclasses.replace(stiff.report, df=df).is_stiff() == is_stiff
 
 
 def test_invalid_input_raises():

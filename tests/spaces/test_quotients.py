@@ -55,7 +55,10 @@ def test_groups_in_any_order_and_with_rounding_errors_have_the_name():
     assert ss.Quotient("so:3", group) == CUBIC
     rounded = np.round(ss.rotations.point_group("622"), 9)
     assert str(ss.Quotient("so:3", rounded)) == "so:3/622"
-    assert ss.Quotient("so:3", group, left=True) != CUBIC
+    left = ss.Quotient("so:3", group, left=True)
+    assert left != CUBIC and left.group is None and CUBIC.left_group is None
+    for found in (left.left_group, CUBIC.group):
+        assert np.linalg.norm(found[:, None] - group.as_matrix(), axis=(-2, -1)).min(axis=1).max() < 1e-14
 
 
 @pytest.mark.parametrize("left, right", [("1", "432"), ("432", "1"), ("23", "622")])

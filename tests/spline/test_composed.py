@@ -327,3 +327,12 @@ def test_a_small_jump_of_the_velocity_is_kept():
     first = ss.HermiteSpline([0, 1], [[0.0], [1.0]], [[1.0], [1.0]], "r:1")
     second = ss.HermiteSpline([1, 2], [[1.0], [2.0]], [[1.0 + 1e-9], [1.0]], "r:1")
     assert isinstance(first.concatenate(second), ss.SegmentedCurve)
+
+
+@pytest.mark.filterwarnings("ignore::symspline.ConvergenceWarning")
+def test_failed_segments_are_not_the_nearest():
+    x, y = np.eye(3)[:2]
+    failed = ss.CubicSpline([0, 1], [x, -x], "sphere:2", on_failure="ignore")
+    segments = [failed, ss.CubicSpline([2, 3], [x, y], "sphere:2"), failed.shift(4.0)]
+    time, distance = ss.SegmentedCurve(segments).closest(y)
+    assert time == pytest.approx(3) and distance == pytest.approx(0, abs=1e-7)
