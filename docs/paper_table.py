@@ -33,7 +33,7 @@ class Row(NamedTuple):
     source: str = ""
 
 
-LEMMAS = "tests/spaces/test_lemmas.py::"
+LEMMAS = "tests/paper/test_lemmas.py::"
 LAWS = "tests/spaces/test_laws.py::"
 C2 = "tests/fit/test_c2.py::test_the_curve_is_c2"
 ISOMETRY = "tests/spaces/test_actions.py::test_elements_are_isometries"

@@ -17,11 +17,15 @@
     xarray_dask  curves in xarray objects, in blocks of dask, on workers that die
     host         threads, memory, interruptions, arrays of other libraries
     typing       annotations, as type checkers read them
-    docs, bench  the code of the documentation and of the benchmarks runs
-    examples     the recipes run
-    fuzz         random input; `make fuzz` runs it at length
+    docs         the code of the documentation runs
     raw_data     recordings with gaps, duplicates, missing samples and huge offsets, through every entry point
+
+Outside the default run:
+    paper        formulas, lemmas and propositions of the paper and of the theory: `make docs`
+    examples, bench, javascript   the recipes and the benchmarks run: `make test-programs`
+    fuzz         random input: `make fuzz`
     oracles, pytorch   have environments of their own: `make test-oracles`, `make test-torch`
+    tests marked `timing`: `make timing`
 
 Shared modules: `cases` has the one list of spaces, the one list of end conditions, data on them, and decorators that
 run several values within one case of pytest; `curves` has arrays, `compare` comparisons, `refused` invalid input,
