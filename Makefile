@@ -16,7 +16,7 @@ unexport PYTHONDONTWRITEBYTECODE
 # Cargo would try to use the job server of make, which its recipes do not inherit.
 unexport MAKEFLAGS MFLAGS
 
-.PHONY: demo check check-lints check-rust check-types check-python test test-oracles test-torch test-programs timing \
+.PHONY: demo check check-lints check-rust check-types check-python test test-oracles test-torch test-programs \
 	test-aarch64 fuzz bench size docs wheel sdist test-wheel crate crate-msrv crate-semver publish-wheels publish-crates \
 	publish-npm check-tools clean docs-check wasm test-wasm
 
@@ -68,10 +68,6 @@ test-torch: .venv/built .venv/tools
 # The examples print what their pages claim, the benchmarks run, and the npm package agrees with the Python package.
 test-programs: .venv/built .venv/tools
 	$(BIN)/python -m pytest --numprocesses auto tests/examples tests/bench tests/javascript
-
-# Loose limits of time, which say little on a busy machine; one process, so that tests do not disturb each other.
-timing: .venv/built .venv/tools
-	$(BIN)/python -m pytest tests -m timing
 
 # The Rust tests on a 64-bit ARM processor, which qemu-user plays: about a quarter of an hour. The C library that comes
 # with this target, and the linker that comes with Rust, need no tools of that machine.

@@ -25,7 +25,6 @@ Outside the default run:
     examples, bench, javascript   the recipes and the benchmarks run: `make test-programs`
     fuzz         random input: `make fuzz`
     oracles, pytorch   have environments of their own: `make test-oracles`, `make test-torch`
-    tests marked `timing`: `make timing`
 
 Shared modules: `cases` has the one list of spaces, the one list of end conditions, data on them, and decorators that
 run several values within one case of pytest; `curves` has arrays, `compare` comparisons, `refused` invalid input,
