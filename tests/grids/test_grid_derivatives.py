@@ -2,14 +2,14 @@
 
 import numpy as np
 import pytest
-from cases import REPRESENTATIVE, SINGLE
+from cases import REPRESENTATIVE, SINGLE, loop_over
 from grids.grid_fields import Field, factors_of, inside, knots
 from scipy.interpolate import RectBivariateSpline
 
 import symspline as ss
 
 H = 1e-4
-NOT_PRODUCTS = [space for space in REPRESENTATIVE if not hasattr(space, "factors")]
+NOT_PRODUCTS = [space for space in REPRESENTATIVE if not hasattr(space, "factors")][1::2]
 
 
 def shifted(x, axis, h):
@@ -51,7 +51,7 @@ def test_first_derivatives_are_those_of_the_points(space):
 
 @pytest.mark.parametrize("space", NOT_PRODUCTS, ids=str)
 @pytest.mark.parametrize("symmetric", [False, True])
-@pytest.mark.parametrize("nu", [(2, 0, 0), (0, 2, 0), (0, 0, 2), (1, 1, 0), (1, 0, 1), (0, 1, 1)])
+@loop_over("nu", [(2, 0, 0), (0, 2, 0), (0, 0, 2), (1, 1, 0), (1, 0, 1), (0, 1, 1)])
 def test_second_derivatives_are_covariant(space, symmetric, nu):
     grid, x = make(space, symmetric)
     axis = nu.index(2) if 2 in nu else nu.index(1)

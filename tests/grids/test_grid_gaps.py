@@ -48,7 +48,7 @@ def test_gaps_divide_rows_into_runs(bc_type, share):
 @pytest.mark.parametrize("share", [0.0, 0.05, 0.3])
 def test_scattered_coordinates_see_the_same_gaps(bc_type, share):
     periodic = [word == "periodic" for word in ([bc_type] * 2 if isinstance(bc_type, str) else bc_type)]
-    for seed in range(4):
+    for seed in range(2):
         rng = np.random.default_rng(100 + seed)
         axes = knots(rng, rng.integers(4, 10)), knots(rng, rng.integers(4, 20))
         points = Field(SO3, seed, size=0.2).on(*axes)
