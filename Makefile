@@ -63,7 +63,7 @@ test-oracles: .venv/built .venv-oracles/built
 # The adapter for PyTorch, which needs up to 5 GB and is no part of `test`.
 test-torch: .venv/built .venv/tools
 	$(INSTALL) 'torch>=2'
-	$(BIN)/python -m pytest tests/pytorch tests/docs/test_array_api_table.py tests/test_interface.py -o pythonpath='. tests docs'
+	$(BIN)/python -m pytest tests/pytorch tests/evidence/test_array_api_table.py tests/test_interface.py -o pythonpath='. tests docs'
 
 # The examples print what their pages claim, the benchmarks run, and the npm package agrees with the Python package.
 test-programs: .venv/built .venv/tools
@@ -94,11 +94,11 @@ size:
 bench: .venv/built .venv/tools
 	$(BIN)/python -m benchmarks
 
-# The site, in build/docs: its gallery is run, and what is wrong with a page or a link to another one is an error. The
-# formulas and lemmas of its theory are checked first.
+# The site, in build/docs: its gallery is run, and what is wrong with a page or a link to another one is an error. First,
+# the formulas of the theory are checked, and small tables of the pages made.
 docs: .venv/built .venv/tools
 	$(INSTALL) $$($(REQUIREMENTS) docs)
-	$(BIN)/python -m pytest --numprocesses auto tests/paper
+	$(BIN)/python -m pytest --numprocesses auto tests/evidence
 	SYMSPLINE_NUM_THREADS=1 $(BIN)/python -m sphinx -j auto -W --keep-going -q -b html -d build/doctrees docs build/docs
 	$(BIN)/python docs/links.py build/docs
 

@@ -21,14 +21,15 @@
     raw_data     recordings with gaps, duplicates, missing samples and huge offsets, through every entry point
 
 Outside the default run:
-    paper        formulas, lemmas and propositions of the paper and of the theory: `make docs`
+    evidence     formulas of the paper and of the theory, comparisons and tables of pages: `make docs`
     examples, bench, javascript   the recipes and the benchmarks run: `make test-programs`
     fuzz         random input: `make fuzz`
     oracles, pytorch   have environments of their own: `make test-oracles`, `make test-torch`
 
 Shared modules: `cases` has the one list of spaces, the one list of end conditions, data on them, and decorators that
-run several values within one case of pytest; `curves` has arrays, `compare` comparisons, `refused` invalid input, `limited` scripts with little memory,
-`stored` files of curves and damaged copies of them.
+run several values within one case of pytest; `curves` has arrays, `compare` comparisons, `refused` invalid input,
+`limited` scripts with little memory, `pages` code and tables of the documentation, `stored` files of curves and damaged
+copies of them.
 
 A law of spaces runs as one case per family (`cases.every_family`), whatever does not depend on the formulas of a
 space on `cases.REPRESENTATIVE`. Lists that would multiply take turns instead.
