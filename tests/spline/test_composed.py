@@ -5,7 +5,7 @@ import pickle
 
 import numpy as np
 import pytest
-from compare import each
+from compare import close, each
 from curves import KNOTS, every_batch, every_kind, points_on
 from scipy.interpolate import PchipInterpolator
 
@@ -14,12 +14,6 @@ import symspline as ss
 # Neither is a knot.
 A, B = KNOTS[1] + 0.3 * (KNOTS[2] - KNOTS[1]), KNOTS[-2] + 0.6 * (KNOTS[-1] - KNOTS[-2])
 INSIDE = np.sort(np.random.default_rng(3).uniform(A, B, 23))
-
-
-def close(a, b, tol=1e-12):
-    """Whether points or vectors agree, in all factors."""
-    pairs = zip(a, b, strict=True) if isinstance(a, tuple) else [(a, b)]
-    return all(np.abs(x - y).max() <= tol * max(1, np.abs(y).max()) for x, y in pairs)
 
 
 def stored(curve):
