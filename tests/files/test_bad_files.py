@@ -297,6 +297,7 @@ def test_messages_about_collections():
         ({"rows": None}, "entry 'rows' is missing"),
         ({"rows": "[]"}, "entry 'rows' must have the numbers of rows of t, "),
         ({"rows": rows_of(t=[3, 4])}, r"entry 'rows' has \[3, 4\] for 't', which does not add up to 6 rows"),
+        ({"rows": rows_of(t=[3, 2])}, r"entry 'rows' has \[3, 2\] for 't', which does not add up to 6 rows"),
         ({"rows": rows_of(points=[2.0, 4.0])}, r"entry 'rows' has \[2\.0, 4\.0\] for 'points'"),
         ({"rows": rows_of(points=[6])}, "entry 'points' must be a list with one value for each of 2 curves"),
         ({"rows": rows_of(data=[3, 3])}, "entry 'rows' must have the numbers of rows of t, "),

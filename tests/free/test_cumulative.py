@@ -226,14 +226,6 @@ def test_files_and_pickles(name, rng):
         assert curve != ss.BSpline(curve.knots, arrays[0], 3, name)
 
 
-@pytest.mark.parametrize("name", ["so:3", "se:2", "so:3 x r:3", "gl:2"])
-def test_plots(name, rng):
-    pytest.importorskip("matplotlib")
-    arrays = tuple(control(factor, 8, rng) for factor in name.split(" x "))
-    figure = ss.CumulativeBSpline(None, arrays if len(arrays) > 1 else arrays[0], name).plot()
-    assert any("8 control points" in text.get_text() for text in figure.findobj(lambda a: hasattr(a, "get_text")))
-
-
 def test_invalid_input_raises(rng):
     points = control("so:3", 5, rng)
     make = ss.CumulativeBSpline

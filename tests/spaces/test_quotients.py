@@ -10,7 +10,6 @@ from scipy.spatial.transform import Rotation
 
 import symspline as ss
 
-EYE = np.eye(3)[None]
 NAMES = [
     *("so:3/432", "so:3/622", "432\\so:3", "432\\so:3/622", "so:3/1", "sphere:2/432", "sphere:3/[1.0,-1.0]"),
     *("pu:2", "pu:4", "u:2/[[1.0,0.0],[0.0,1.0],[-1.0,0.0],[0.0,-1.0]]", "stiefel:2,4/signs", "gl:3/23", "o:3/32"),
