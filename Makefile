@@ -16,9 +16,9 @@ unexport PYTHONDONTWRITEBYTECODE
 # Cargo would try to use the job server of make, which its recipes do not inherit.
 unexport MAKEFLAGS MFLAGS
 
-.PHONY: demo check check-lints check-rust check-types check-python test test-oracles test-torch test-aarch64 fuzz bench size docs wheel \
-	sdist test-wheel crate crate-msrv crate-semver publish-wheels publish-crates publish-npm check-tools clean \
-	docs-check wasm test-wasm
+.PHONY: demo check check-lints check-rust check-types check-python test test-oracles test-torch test-programs \
+	test-aarch64 fuzz bench size docs wheel sdist test-wheel crate crate-msrv crate-semver publish-wheels publish-crates \
+	publish-npm check-tools clean docs-check wasm test-wasm
 
 demo: .venv/built .venv/plot
 	$(BIN)/python examples/storms/demo.py --out demo-output
@@ -63,7 +63,11 @@ test-oracles: .venv/built .venv-oracles/built
 # The adapter for PyTorch, which needs up to 5 GB and is no part of `test`.
 test-torch: .venv/built .venv/tools
 	$(INSTALL) 'torch>=2'
-	$(BIN)/python -m pytest tests/pytorch tests/docs/test_array_api_table.py -o pythonpath='. tests docs'
+	$(BIN)/python -m pytest tests/pytorch tests/evidence/test_array_api_table.py tests/test_interface.py -o pythonpath='. tests docs'
+
+# The examples print what their pages claim, the benchmarks run, and the npm package agrees with the Python package.
+test-programs: .venv/built .venv/tools
+	$(BIN)/python -m pytest --numprocesses auto tests/examples tests/bench tests/javascript
 
 # The Rust tests on a 64-bit ARM processor, which qemu-user plays: about a quarter of an hour. The C library that comes
 # with this target, and the linker that comes with Rust, need no tools of that machine.
@@ -76,10 +80,9 @@ test-aarch64:
 		--lib --tests --target aarch64-unknown-linux-musl
 
 # About ten minutes of random input on two cores; what fails is kept in .hypothesis and tried first the next time. Then the
-# About ten minutes of random input on two cores; what fails is kept in .hypothesis and tried first the next time. Then the
 # table of the page on trust, from few recordings, and the time until long calls end after Ctrl-C.
 fuzz: .venv/built .venv/tools
-	$(BIN)/python -m pytest --numprocesses auto tests/fuzz --hypothesis-profile=long
+	$(BIN)/python -m pytest --numprocesses auto tests/fuzz
 	$(BIN)/python -m tests.trust 20
 	$(BIN)/python tests/host/interrupts.py
 
@@ -91,9 +94,11 @@ size:
 bench: .venv/built .venv/tools
 	$(BIN)/python -m benchmarks
 
-# The site, in build/docs: its gallery is run, and what is wrong with a page or a link to another one is an error.
+# The site, in build/docs: its gallery is run, and what is wrong with a page or a link to another one is an error. First,
+# the formulas of the theory are checked, and small tables of the pages made.
 docs: .venv/built .venv/tools
 	$(INSTALL) $$($(REQUIREMENTS) docs)
+	$(BIN)/python -m pytest --numprocesses auto tests/evidence
 	SYMSPLINE_NUM_THREADS=1 $(BIN)/python -m sphinx -j auto -W --keep-going -q -b html -d build/doctrees docs build/docs
 	$(BIN)/python docs/links.py build/docs
 
@@ -170,7 +175,7 @@ build/node/built: packaging/npm/package.json
 	touch $@
 
 # The npm package against the Python package, and the page in Chromium (CHROMIUM=/path/to/it), for which `make wasm`
-# comes first. `make test` contains these tests, and skips them where nothing was built.
+# comes first. `make test-programs` contains these tests, and skips them where nothing was built.
 test-wasm: .venv/built .venv/tools
 	cd crates/symspline-wasm && cargo fmt --check && cargo clippy --quiet --target-dir $(CURDIR)/target/wasm -- -D warnings
 	$(BIN)/python -m pytest tests/javascript -rs

@@ -33,7 +33,7 @@ class Row(NamedTuple):
     source: str = ""
 
 
-LEMMAS = "tests/spaces/test_lemmas.py::"
+LEMMAS = "tests/evidence/test_lemmas.py::"
 LAWS = "tests/spaces/test_laws.py::"
 C2 = "tests/fit/test_c2.py::test_the_curve_is_c2"
 ISOMETRY = "tests/spaces/test_actions.py::test_elements_are_isometries"
@@ -49,7 +49,7 @@ ROWS = [
         "energy that Riemannian cubics minimise",
         "CubicSpline.bending_energy",
         "tests/spline/test_lengths.py::test_length_and_energy_by_quadrature "
-        "tests/docs/test_comparisons.py::test_spline_is_close_to_the_cubic_and_bends_more",
+        "tests/evidence/test_comparisons.py::test_spline_is_close_to_the_cubic_and_bends_more",
         "comparisons.md#how-close-to-riemannian-cubics",
         source="fit/energy.rs::bending",
     ),

@@ -203,6 +203,11 @@ def by_family(cases):
 every_family = by_family(CASES)
 
 
+def some_families(*names):
+    """A law of spaces on these spaces alone: for what does not depend on their formulas."""
+    return by_family([case for case in CASES if case.name in names])
+
+
 def _families():
     """The names of every symmetric space in the library, one row per family, from the message that lists them."""
     try:

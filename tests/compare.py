@@ -21,10 +21,24 @@ def each(function, *values):
     return made if any(isinstance(value, tuple) for value in values) else made[0]
 
 
+def close(found, expected, tol=1e-12):
+    """Whether values agree in shape, type, NaN and numbers, those to a part of the largest number of the factor."""
+    for x, y in zip(parts(found), parts(expected), strict=True):
+        x, y = np.asarray(x), np.asarray(y)
+        if x.shape != y.shape or x.dtype != y.dtype:
+            return False
+        allowed = tol and tol * max(1.0, np.abs(y).max(initial=0.0, where=np.isfinite(y)))
+        if not np.allclose(x, y, rtol=0, atol=allowed, equal_nan=True):
+            return False
+    return True
+
+
 def same(a, b):
-    """Whether two values agree to the last bit, NaN included."""
-    pairs = list(zip(parts(a), parts(b), strict=True))
-    return all(np.shape(x) == np.shape(y) and np.array_equal(x, y, equal_nan=True) for x, y in pairs)
+    """Whether two values agree in shape, type and to the last bit, NaN included."""
+    return all(
+        np.shape(x) == np.shape(y) and np.result_type(x) == np.result_type(y) and np.array_equal(x, y, equal_nan=True)
+        for x, y in zip(parts(a), parts(b), strict=True)
+    )
 
 
 def largest_difference(a, b):

@@ -17,15 +17,19 @@
     xarray_dask  curves in xarray objects, in blocks of dask, on workers that die
     host         threads, memory, interruptions, arrays of other libraries
     typing       annotations, as type checkers read them
-    docs, bench  the code of the documentation and of the benchmarks runs
-    examples     the recipes run
-    fuzz         random input; `make fuzz` runs it at length
+    docs         the code of the documentation runs
     raw_data     recordings with gaps, duplicates, missing samples and huge offsets, through every entry point
+
+Outside the default run:
+    evidence     formulas of the paper and of the theory, comparisons and tables of pages: `make docs`
+    examples, bench, javascript   the recipes and the benchmarks run: `make test-programs`
+    fuzz         random input: `make fuzz`
     oracles, pytorch   have environments of their own: `make test-oracles`, `make test-torch`
 
 Shared modules: `cases` has the one list of spaces, the one list of end conditions, data on them, and decorators that
 run several values within one case of pytest; `curves` has arrays, `compare` comparisons, `refused` invalid input,
-`stored` files of curves and damaged copies of them, `truth` an independent measure of the C² condition.
+`limited` scripts with little memory, `pages` code and tables of the documentation, `stored` files of curves and damaged
+copies of them.
 
 A law of spaces runs as one case per family (`cases.every_family`), whatever does not depend on the formulas of a
 space on `cases.REPRESENTATIVE`. Lists that would multiply take turns instead.
@@ -79,14 +83,22 @@ def threads():
     ss.set_num_threads(0)
 
 
-@pytest.fixture(scope="session", autouse=True)
+PEAKS = {}
+"""The largest resident sizes so far, of this process and of its children, in kB."""
+
+
+@pytest.fixture(autouse=True)
 def memory():
-    """No test takes 2 GB. A process of JAX keeps up to two more: what it compiled for all of its tests."""
+    """No test takes 2 GB. A process of JAX keeps up to two more: what it compiled for all of its tests.
+
+    The operating system knows the largest size of all tests so far: the test that raises it has taken the memory.
+    """
     yield
     if sys.platform == "linux":
         import resource
 
         # Children that are forked begin with all that this process has.
-        most = dict.fromkeys((resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN), 4 if "jax" in sys.modules else 2)
-        for who, gigabytes in most.items():
-            assert resource.getrusage(who).ru_maxrss < gigabytes * 2**20, "the largest resident size in kB"
+        limit = (4 if "jax" in sys.modules else 2) * 2**20
+        for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN):
+            before, PEAKS[who] = PEAKS.get(who, 0), resource.getrusage(who).ru_maxrss
+            assert PEAKS[who] < limit or PEAKS[who] == before, f"the largest resident size is {PEAKS[who]} kB"

@@ -1,21 +1,16 @@
-"""The examples of ``docs/smoothing.md`` run, and the tables of ``smoothing_accuracy.md`` agree with theory."""
+"""The examples of ``docs/smoothing.md`` run."""
 
 from pathlib import Path
 
 import numpy as np
 import pytest
 import smoothing
-import smoothing_others as others
-from pages import blocks, cells, run
-
-import symspline as ss
-
-# Tables have geodesics in them.
-pytestmark = pytest.mark.filterwarnings("ignore::symspline.SmoothingWarning")
+from pages import blocks, run
 
 PAGE = Path(smoothing.__file__).with_name("smoothing.md")
 
 
+@pytest.mark.filterwarnings("ignore::symspline.SmoothingWarning")
 def test_the_examples_run():
     names = {}
     first, _, outliers, matrices, covariances = blocks(PAGE)
@@ -31,29 +26,3 @@ def test_the_examples_run():
     assert f"# {names['factor']:.2f}\n" in covariances
     variances = np.trace(names["smooth"](np.arange(200)), axis1=1, axis2=2) / 3
     assert np.mean(variances) / names["factor"] == pytest.approx(1, abs=0.02)
-
-
-def test_tables():
-    ((name, *rest),) = cells(smoothing.flat_table((20,)))[:1]
-    assert name == "20, even"
-    assert all(float(number) < 1e-10 for cell in rest for number in cell.split(","))
-    rows = cells(smoothing.iteration_table(("S²",), (0.1,), 1))
-    assert [row[0] for row in rows] == ["S²", "S², two turns"]
-    assert all(int(cell) < 10 for cell in rows[0][2:6]) and float(rows[0][6]) < 1e-3
-    assert all(int(cell) < 15 for cell in rows[1][2:6]) and float(rows[1][6]) < 2e-3
-    (row,) = cells(smoothing.choice_table(("S²",), (0.1,), 2))
-    assert row[:2] == ["S²", "0.1"] and len(row) == 11
-    # No criterion is better than the best λ.
-    assert all(1 <= float(cell) < 1.3 for cell in row[3:7])
-    (row,) = cells(smoothing.time_table((200,), 1))
-    assert row[0] == "200" and row[-1] == "200" and all(row)
-
-
-def test_other_programs_are_compared_on_the_same_data():
-    space = ss.Sphere(2)
-    t, noisy, truth = others.path(space, 50, 0.1)
-    found = others.row("none", space, t, noisy, truth, lambda: noisy)
-    assert found.error == pytest.approx(0.1 * np.sqrt(2), rel=0.2) and found.ours < 0.55 * found.error
-    assert others.HEAD.splitlines()[0].count("|") == str(found).count("|") == 7
-    straight, _, line = others.path(space, 50, 0.1, straight=True)
-    assert np.ptp(space.distance(line[1:], line[:-1])) < 1e-14 and len(straight) == 50

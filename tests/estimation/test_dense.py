@@ -65,6 +65,35 @@ def test_flat_posterior(penalty):
     assert abs(freedom[:16].sum() / 2 - curve.df) < 1e-9
 
 
+def test_a_time_offset_has_the_variance_of_least_squares():
+    """A straight line a + b t, seen by a second sensor that is late: its rows have the derivative b of the offset."""
+    rng = np.random.default_rng(1)
+    t, s = sensors.times(rng, 2, 5, 30), sensors.times(rng, 2.3, 4.7, 20)
+    y, z = (0.3 + 2 * x + noise * rng.standard_normal(len(x)) for x, noise in ((t, 0.01), (s + 0.05, 0.02)))
+    late = measure.Constant(1, name="late")
+    given = [measure.Points(t, y[:, None], sigma=0.01), measure.Points(s, z[:, None], sigma=0.02, time_offset=late)]
+    line = ss.estimate(given, [2, 5], "r:1", lam=0.0, tol=1e-10)
+    slope, offset = line(3.0, 1)[0], line.parameters["late"]
+    rows = [np.stack([1 + 0 * t, t, 0 * t], 1) / 0.01, np.stack([1 + 0 * s, s + offset.value, slope + 0 * s], 1) / 0.02]
+    rows = np.concatenate(rows)
+    assert offset.cov[0, 0] == pytest.approx(np.linalg.inv(rows.T @ rows)[2, 2], rel=1e-6)
+    left = np.concatenate([(line(t)[:, 0] - y) / 0.01, (line(s + offset.value)[:, 0] - z) / 0.02])
+    assert line.report.sigma == pytest.approx(np.sqrt(left @ left / (50 - 3)), rel=1e-6)
+
+
+def test_weights_of_points_are_inverse_variances():
+    rng = np.random.default_rng(2)
+    t, w = sensors.times(rng, 0, 5, 40), rng.uniform(0.1, 9, 40)
+    y = 0.3 / np.sqrt(w)[:, None] * rng.standard_normal((40, 2))
+    v = measure.Velocities([1.0, 4.0], np.zeros((2, 2)), np.zeros((2, 2)), sigma=0.2)
+    by_weights, by_sigma = (
+        ss.estimate([measure.Points(t, y, **noise), v], KNOTS, "r:2", lam=0.07)
+        for noise in ({"sigma": 0.3, "weights": w}, {"sigma": 0.3 / np.sqrt(w)})
+    )
+    assert np.abs(by_weights.points - by_sigma.points).max() < 1e-10
+    assert by_weights.report.sigma == pytest.approx(by_sigma.report.sigma, rel=1e-9)
+
+
 def fused(rng, n=12):
     truth = sensors.turning(5, rng, rate=0.3)
     t, s = sensors.times(rng, 0, 5, n), sensors.times(rng, 0, 5, 3 * n)

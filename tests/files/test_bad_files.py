@@ -40,19 +40,19 @@ def test_truncated_files(kind):
 
 
 @kinds
-@pytest.mark.parametrize("mask", [0x01, 0xFF])
-def test_files_with_one_bad_byte(mask, kind):
+def test_files_with_one_bad_byte(kind):
     data = stored(KINDS[kind])
-    # All of the directory, where files are told apart, and some of the numbers.
-    places = {*range(0, len(data), 5), *range(400), *range(len(data) - 1200, len(data))}
-    for i in sorted(place for place in places if 0 <= place < len(data)):
+    # Most of the directory, where files are told apart, and some of the numbers.
+    places = {*range(0, len(data), 31), *range(0, 400, 2), *range(len(data) - 1200, len(data), 4)}
+    for k, i in enumerate(sorted(place for place in places if 0 <= place < len(data))):
+        mask = (0x01, 0xFF)[k % 2]
         assert is_good_or_refused(data[:i] + bytes([data[i] ^ mask]) + data[i + 1 :], kind)
 
 
 @kinds
 def test_files_with_many_bad_bytes(kind):
     data, rng = np.frombuffer(stored(KINDS[kind]), np.uint8), np.random.default_rng(0)
-    for _ in range(500):
+    for _ in range(150):
         bad = data.copy()
         bad[rng.integers(len(bad), size=rng.integers(1, 200))] = rng.integers(256)
         assert is_good_or_refused(bad.tobytes(), kind)
@@ -297,6 +297,7 @@ def test_messages_about_collections():
         ({"rows": None}, "entry 'rows' is missing"),
         ({"rows": "[]"}, "entry 'rows' must have the numbers of rows of t, "),
         ({"rows": rows_of(t=[3, 4])}, r"entry 'rows' has \[3, 4\] for 't', which does not add up to 6 rows"),
+        ({"rows": rows_of(t=[3, 2])}, r"entry 'rows' has \[3, 2\] for 't', which does not add up to 6 rows"),
         ({"rows": rows_of(points=[2.0, 4.0])}, r"entry 'rows' has \[2\.0, 4\.0\] for 'points'"),
         ({"rows": rows_of(points=[6])}, "entry 'points' must be a list with one value for each of 2 curves"),
         ({"rows": rows_of(data=[3, 3])}, "entry 'rows' must have the numbers of rows of t, "),

@@ -134,6 +134,31 @@ def test_batches_products_and_files(rng):
         assert again == curve and np.array_equal(again.report.step, curve.report.step)
 
 
+def test_a_product_has_converged_if_all_factors_have(rng):
+    t = np.linspace(0, 1, 40)
+    turns = 2.5 * np.sin(6 * t)[:, None] * [0.3, 0.4, 1] + 0.3 * rng.normal(size=(40, 3))
+    data = {"r:1": t[:, None], "so:3": ss.rotations.from_rotation_vectors(turns)}
+    # A vector space needs one step.
+    options = {"max_iter": 2, "on_failure": "ignore"}
+    line, turning = (ss.CumulativeBSpline.fit(t, y, 6, name, **options).report for name, y in data.items())
+    assert line.converged and not turning.converged
+    both = ss.CumulativeBSpline.fit(t, tuple(data.values()), 6, " x ".join(data), **options).report
+    assert not both.converged and both.step == turning.step > line.step
+
+
+def test_the_report_has_the_length_of_the_last_step(rng):
+    """The largest coordinate of the step to the last iterate, relative to that of steps between control points."""
+    t, y, inner, _ = noisy("so:3", rng)
+    p, q = (
+        ss.CumulativeBSpline.fit(t, y, inner, "so:3", max_iter=n, on_failure="ignore").control_points for n in (1, 2)
+    )
+    step, between = (
+        np.abs(ss.rotations.as_rotation_vectors(np.swapaxes(a, 1, 2) @ b)).max() for a, b in ((p, q), (p[:-1], p[1:]))
+    )
+    report = ss.CumulativeBSpline.fit(t, y, inner, "so:3", max_iter=2, on_failure="ignore").report
+    assert 1e-6 < report.step == pytest.approx(step / between, rel=1e-6)
+
+
 def test_a_number_of_knots_and_unequal_weights_of_curves(rng):
     t, points, _, _ = noisy("so:3", rng)
     curve = ss.CumulativeBSpline.fit(t, points, 8, "so:3")

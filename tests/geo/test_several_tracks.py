@@ -4,7 +4,6 @@ import warnings
 
 import numpy as np
 import pytest
-from refused import raises
 
 import symspline as ss
 
@@ -86,27 +85,3 @@ def test_other_columns_are_not_angles():
     assert resampled(track("A", 10.0, 50.0, course=far), "10min", interpolate="course")[0].course[1] == pytest.approx(
         1755
     )
-
-
-def test_pictures_of_several_tracks():
-    plt = pytest.importorskip("matplotlib.pyplot")
-    t = np.arange(9.0)
-    tracks = [
-        ss.CubicSpline(t, ss.geo.from_lonlat(np.linspace(a, a + 20, 9), 40 + 5 * np.sin(t + a)), "sphere:2")
-        for a in (0, 10, 20)
-    ]
-    figure = ss.geo.plot(dict(zip("ABC", tracks, strict=True)))
-    texts = {
-        text.get_text()
-        for axes in figure.findobj(plt.Axes)
-        for text in axes.get_legend_handles_labels()[0]
-        if hasattr(text, "get_text")
-    }
-    words = {handle for axes in figure.findobj(plt.Axes) for handle in axes.get_legend_handles_labels()[1]} | texts
-    assert {"A", "B", "C"} <= words
-    plt.close(figure)
-    _, axes = plt.subplots()
-    assert ss.geo.plot(tracks, ax=axes, color=["r", "g", "b"]) is axes
-    plt.close("all")
-    raises("labels must be a list of 3", ss.geo.plot, tracks, label=["A"])
-    raises(r"curve must be on Sphere\(2\)", ss.geo.plot, [ss.CubicSpline(None, np.eye(4), "sphere:3")])

@@ -48,7 +48,7 @@ def test_gaps_divide_rows_into_runs(bc_type, share):
 @pytest.mark.parametrize("share", [0.0, 0.05, 0.3])
 def test_scattered_coordinates_see_the_same_gaps(bc_type, share):
     periodic = [word == "periodic" for word in ([bc_type] * 2 if isinstance(bc_type, str) else bc_type)]
-    for seed in range(4):
+    for seed in range(2):
         rng = np.random.default_rng(100 + seed)
         axes = knots(rng, rng.integers(4, 10)), knots(rng, rng.integers(4, 20))
         points = Field(SO3, seed, size=0.2).on(*axes)
@@ -79,6 +79,36 @@ def test_a_run_across_the_ends_of_a_periodic_axis_is_one_run():
     x = rng.uniform(turned[0], turned[-1], 50)
     assert np.abs(grid(x) - expected(x)).max() < 1e-13
     assert np.isnan(grid(rng.uniform(t[3] + 1e-9, t[6] - 1e-9, 9))).all()
+
+
+@pytest.mark.parametrize("symmetric", [False, True])
+@pytest.mark.parametrize("nu", [(0, 0), (1, 0), (2, 0), (1, 1)])
+def test_the_last_node_before_a_gap_belongs_to_its_run(nu, symmetric):
+    rng = np.random.default_rng(4)
+    u, v = 0.3 + knots(rng, 9), knots(rng, 6)
+    points = rng.normal(size=(9, 6, 2))
+    points[5] = np.nan
+    grid, run = (
+        ss.GridSpline((t, v), points[: len(t)], "r:2", bc_type="not-a-knot", symmetric=symmetric) for t in (u, u[:5])
+    )
+    x = (u[[4, 4]], np.array([0.2, 0.7]))
+    expected = run(x, nu)
+    assert np.abs(grid(x, nu) - expected).max() < 1e-8 * np.abs(expected).max()
+
+
+def test_periodic_axes_of_manifolds_made_of_functions_repeat():
+    space, rng = ss.Stiefel(2, 4), np.random.default_rng(0)
+    base = np.broadcast_to(space.random_point(rng), (9, 4, 4, 2))
+    points = space.exp(base, 0.2 * space.random_tangent(rng, base))
+    points[-1] = points[0]
+    points[4] = np.nan
+    axes = np.linspace(0.7, 2.7, 9), np.linspace(0, 1, 4)
+    grid = ss.GridSpline(axes, points, space, bc_type=("periodic", "natural"))
+    u, v = np.array([0.8, 1.1, 2.3, 2.6]), np.array([0.2, 0.5, 0.9, 0.1])
+    first = grid((u, v))
+    assert np.isfinite(first).all()
+    for turns in (-1, 1, 3):
+        assert np.abs(grid((u + 2 * turns, v)) - first).max() < 1e-12
 
 
 def test_an_isolated_node_has_a_point_and_no_derivative():
@@ -125,6 +155,15 @@ def test_a_failed_row_is_missing_for_the_next_axis():
     alone = ss.CubicSpline(None, points[1], "sphere:2", bc_type="not-a-knot")
     np.testing.assert_allclose(found[2], alone(np.linspace(0, 4, 9)), atol=1e-14)
     assert np.isfinite(found[:, :3]).all()
+
+
+def test_errors_of_symmetric_grids_name_the_axis():
+    """Neighbours along axis 0 are antipodal half-way along axis 1: the order of axes in which it is the last one."""
+    a = 0.5
+    points = [[[np.cos(a), np.sin(a), 0], [np.cos(a), -np.sin(a), 0]], [[-1.0, 0, 0]] * 2]
+    grid = ss.GridSpline((None, None), points, "sphere:2", symmetric=True)
+    with pytest.raises(ss.CutLocusError, match="along axis 0"):
+        grid((0.5, 0.5))
 
 
 def test_values_at_nodes_do_not_depend_on_rows_that_fail():

@@ -41,6 +41,17 @@ def test_the_grid_is_splines_along_each_axis_in_turn(space):
     assert np.max(apart(space, scattered.reshape(expected.shape), expected)) < 1e-13
 
 
+def test_the_report_has_the_largest_residual_and_the_longest_steps():
+    rng = np.random.default_rng(2)
+    axes = 0.3 + knots(rng, 8), 2 * knots(rng, 6)
+    points = Field(ss.Sphere(2), size=0.8).on(*axes)
+    report = ss.GridSpline(axes, points, "sphere:2").report
+    rows = ss.CubicSpline(axes[0], points.swapaxes(0, 1), "sphere:2", bc_type="not-a-knot")
+    assert 0 < report.residual == rows.report.residual.max()
+    along = [ss.Sphere(2).distance(p[1:], p[:-1]).max() for p in (points, points.swapaxes(0, 1))]
+    assert report.max_step == pytest.approx(along, rel=1e-14)
+
+
 @pytest.mark.parametrize(
     "bc_type", ["natural", "clamped", ("not-a-knot", "natural"), (("natural", "clamped"), "natural")]
 )

@@ -1,105 +1,15 @@
-"""No input aborts the process: huge sizes raise an error, and long calls end soon after Ctrl-C."""
+"""No input aborts the process: huge sizes raise an error, and long calls end after Ctrl-C."""
 
 import sys
-import textwrap
 
 import numpy as np
 import pytest
-from curves import run_python
+from limited import run
 from refused import raises
 
 import symspline as ss
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="limits of memory as Linux has them")
-
-LIMITED = """
-import resource
-import sys
-import time
-
-import numpy as np
-
-import symspline as ss
-
-resource.setrlimit(resource.RLIMIT_AS, (2 << 30, 2 << 30))
-refused = (ss.ValidationError, ss.CutLocusError, ss.ConvergenceError, MemoryError)
-"""
-
-
-def run(script, timeout=100):
-    """What a script prints in a process with 2 GB of address space."""
-    return run_python(LIMITED + textwrap.dedent(script), timeout=timeout, PYTHONWARNINGS="ignore")
-
-
-def test_names_of_huge_spaces_do_not_abort():
-    script = """
-    families = ["r", "torus", "sphere", "h", "rp", "cp", "ch", "hp", "so", "o", "u", "su", "spd", "sspd", "logspd",
-                "hpd", "siegel", "gl", "cgl", "sl", "sp", "aff", "sim", "lorentz"]
-    names = [f"{family}:{n}" for family in families for n in (300, 1500, 20_000, 100_000, 2**24, 10**12)]
-    names += [f"{family}:{k},{n}" for family in ("gr", "cgr", "st") for k in (2, 100) for n in (10**5, 10**9)]
-    names += ["igr:0,1,1099511627776,1", "igr:0,1,3000,3000", "se:3 x gl:100000", "sphere:2 x so:100000"]
-    made = 0
-    for name in names:
-        try:
-            space = ss.space(name)
-            made += 1
-            space.dim, repr(space), space.point_shape
-            # Small ones are other tests' matter, and what takes long can be stopped.
-            if 1500 <= max(map(int, name.replace(":", ",").replace(" x ", ",").split(",")[-1:])):
-                p = space.random_point(np.random.default_rng(0), (1,))
-                space.check_point(p)
-        except refused:
-            pass
-    print(len(names), made)
-    """
-    count, made = map(int, run(script, 300).split())
-    assert count > 150 and made > 60
-
-
-def test_hostile_files_do_not_abort():
-    """Arrays, names and sizes in NPZ files that would take more memory than there is, or are nonsense."""
-    script = """
-    import io, struct, zipfile
-
-    good = io.BytesIO()
-    ss.CubicSpline(None, np.eye(3), "sphere:2").save(good)
-    arrays = dict(np.load(io.BytesIO(good.getvalue())))
-
-    def npy(array):
-        file = io.BytesIO()
-        np.save(file, array)
-        return file.getvalue()
-
-    def header(shape, descr="<f8"):
-        text = f"{{'descr': {descr!r}, 'fortran_order': False, 'shape': {shape}, }}".ljust(117) + chr(10)
-        return b"\\x93NUMPY\\x01\\x00" + struct.pack("<H", len(text)) + text.encode()
-
-    families = ("sphere", "r", "so", "spd", "gl", "gr:1,", "x")
-    contents = [npy(np.array(f"{f}:{n}")) for f in families for n in (10**4, 10**7, 10**15, -1)]
-    contents += [npy(np.zeros(shape, kind)) for shape in [(), (0,), (2**20,), (3, 3), (1,) * 20]
-                 for kind in ("f8", "c16", "U4", "M8[s]", "i1", "?")]
-    contents += [header(shape) for shape in [(2**40,), (3, 2**33), (-5,), (2**31, 2**31, 2**31), ("a",), ()]]
-    contents += [header((4,), descr) for descr in ("|O", "<U99999999", "V1000000000", "<f2", "M8[s]", "nonsense")]
-    contents += [npy(np.full((3, 3), value)) for value in (np.nan, np.inf, 1e308, 0.0, 2**63)]
-    contents += [b"", b"no array", npy(np.zeros(0))[:30]]
-    tried = refusals = 0
-    for name in arrays:
-        for content in contents:
-            for packed in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)[: 1 + (name == "points")]:
-                file = io.BytesIO()
-                with zipfile.ZipFile(file, "w", packed) as target:
-                    for other, array in arrays.items():
-                        target.writestr(other + ".npy", content if other == name else npy(array))
-                file.seek(0)
-                tried += 1
-                try:
-                    ss.load(file)
-                except refused:
-                    refusals += 1
-    print(tried, refusals)
-    """
-    tried, refusals = map(int, run(script, 300).split())
-    assert tried > 400 and refusals > 0.9 * tried
 
 
 @pytest.mark.parametrize(
@@ -214,6 +124,7 @@ def test_a_batch_without_curves_has_checked_knots():
 def test_pools_of_other_sizes_end():
     script = """
     import threading
+    import time
 
     def count():
         return int(next(line for line in open("/proc/self/status") if line.startswith("Threads")).split()[1])
@@ -229,27 +140,18 @@ def test_pools_of_other_sizes_end():
     assert int(run(script)) < 30
 
 
+# `interrupts.py` has many more, and measures the time until they end.
 LONG_CALLS = {
-    "newton": "ss.CubicSpline(None, far(ss.space('spd:14'), 40), 'spd:14', method='newton', max_iter=10**6, tol=0)",
-    "homotopy": "ss.CubicSpline(None, far(ss.space('so:12'), 60), 'so:12', method='homotopy')",
     "fixed-point": "ss.CubicSpline(None, far(ss.space('so:9'), 300), 'so:9', method='fixed-point', tol=0)",
-    "auto": "ss.CubicSpline(None, far(ss.space('so:20'), 60), 'so:20')",
-    "vjp": "spline('so:12', 60).vjp(30.0, np.ones((12, 12)))",
-    "jvp": "spline('so:12', 60).jvp(30.0, points=np.zeros((60, 12, 12)))",
     "log": "many(ss.space('so:150'), 'log')",
-    "large log": "one(ss.space('u:280'))",
-    "geodesic": "many(ss.space('spd:120'), 'distance')",
-    "speed": "spline('spd:3', 4).speed(np.broadcast_to(0.5, 50_000_000))",
-    "evaluate": "spline('spd:30', 4)(np.linspace(0, 3, 200_000))",
+    "evaluate": "while True: spline('spd:30', 4)(np.linspace(0, 3, 200_000))",
     "smooth": "ss.make_smoothing_spline(None, far(ss.space('spd:9'), 400), 'spd:9', method='newton')",
-    "gl": "many(ss.space('gl:120'), 'log')",
-    "bezier": "ss.BezierCurve(far(ss.space('so:3'), 20_000), 'so:3')(0.5)",
-    "vjp of rotations": "spline('so:10', 100).vjp(np.linspace(0, 99, 20_000), np.ones((20_000, 10, 10)))",
 }
 
 
 @pytest.mark.parametrize("call", LONG_CALLS)
-def test_long_calls_end_soon_after_a_signal(call):
+def test_long_calls_end_after_a_signal(call):
+    """They take minutes, or do not end; the process has half a minute."""
     script = f"""
     import signal
     import threading
@@ -263,39 +165,21 @@ def test_long_calls_end_soon_after_a_signal(call):
         space = ss.space(name)
         return ss.CubicSpline(None, far(space, nodes), space, method="quasi-newton", on_failure="ignore")
 
-    def one(space):
-        p = far(space, 2)
-        begin_to_count()
-        return space.log(p[0], p[1])
-
     def many(space, name):
         p = far(space, 40)
-        begin_to_count()
         while True:
             getattr(space, name)(p, p[::-1])
 
-    sent = []
-
-    def begin_to_count():
-        sent.clear()
-
-    def interrupt():
-        sent.append(time.monotonic())
-        signal.pthread_kill(main, signal.SIGINT)
-
     main = threading.main_thread().ident
-    timer = threading.Timer(1.5, interrupt)
+    timer = threading.Timer(1.0, lambda: signal.pthread_kill(main, signal.SIGINT))
     timer.start()
     try:
         {LONG_CALLS[call]}
         timer.cancel()
-        print("done")
     except KeyboardInterrupt:
-        print(time.monotonic() - sent[-1])
+        print("interrupted")
     # Everything still works.
     assert np.array_equal(ss.CubicSpline(None, np.eye(3), "sphere:2")([0, 1, 2]), np.eye(3))
     """
-    said = run(script, 60).strip()
-    # A machine that is fast enough may finish before the signal comes. Alone on the machine all end within a second;
-    # other tests run beside this one.
-    assert said == "done" or float(said) < 5, said
+    # A machine that is fast enough may finish before the signal comes.
+    assert run(script, 30).strip() in ("interrupted", "")

@@ -3,7 +3,6 @@
 import signal
 import subprocess
 import sys
-import time
 
 import numpy as np
 import pytest
@@ -136,11 +135,10 @@ def test_ctrl_c_stops_a_long_fit(n):
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         try:
             assert process.stdout.readline() == "started\n"
-            start = time.perf_counter()
             process.send_signal(signal.SIGINT)
-            out, _ = process.communicate(timeout=10)
-            # It takes about 0.05 s; the whole fit takes minutes.
-            assert process.returncode == 0 and time.perf_counter() - start < 2
+            # The whole fit takes minutes.
+            out, _ = process.communicate(timeout=60)
+            assert process.returncode == 0
             assert out.replace("started\n", "") == "interrupted\nwell\n"
         finally:
             process.kill()

@@ -4,7 +4,6 @@ import multiprocessing
 import os
 import sys
 import threading
-import time
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -57,28 +56,23 @@ print(len(os.listdir("/proc/self/task")) - before)
 @pytest.mark.parametrize("n", [1, 2])
 def test_other_threads_run_during_a_fit(threads, n):
     ss.set_num_threads(n)
-    ticks, stop = [], threading.Event()
+    ticks, stop, p = [], threading.Event(), scattered(200_000)
 
     def tick():
         while not stop.wait(0.001):
-            ticks.append(time.perf_counter())
+            ticks.append(1)
 
     other = threading.Thread(target=tick)
     other.start()
     try:
-        size, seconds = 50_000, 0.0
-        while seconds < 0.2:
-            size *= 2
-            p = scattered(size)
-            start = time.perf_counter()
-            ss.CubicSpline(None, p, S3, method="fixed-point", max_iter=60, on_failure="ignore")
-            end = time.perf_counter()
-            seconds = end - start
+        before = len(ticks)
+        ss.CubicSpline(None, p, S3, method="fixed-point", max_iter=60, on_failure="ignore")
+        during = len(ticks) - before
     finally:
         stop.set()
         other.join()
-    # About 200 ticks fit in, fewer on a busy machine; if the lock were held, all but one or two would come later.
-    assert sum(start < t < end for t in ticks) > 4
+    # Hundreds of ticks fit in, fewer on a busy machine; if the lock were held, all but one or two would come later.
+    assert during > 4
 
 
 def work(seed):
@@ -117,8 +111,9 @@ def with_threads(call):
     return results
 
 
-@every_common
-@pytest.mark.parametrize("kind", ["long", "closed", "batch", "many"])
+@pytest.mark.parametrize(
+    ("space", "kind"), list(zip(COMMON, ["long", "closed", "batch", "many"], strict=True)), ids=str
+)
 def test_fits_do_not_depend_on_the_number_of_threads(threads, space, kind):
     if kind == "many":
         curves = [(None, points_on(space, n, step=0.4, seed=n)) for n in range(2, 60)] * 20
@@ -143,8 +138,9 @@ def test_fits_do_not_depend_on_the_number_of_threads(threads, space, kind):
         assert all(same_curve(one, other) for other in others)
 
 
-@every_common
-@pytest.mark.parametrize("quantity", [0, 1, 2, "speed", "per curve"])
+@pytest.mark.parametrize(
+    ("space", "quantity"), list(zip([*COMMON, COMMON[1]], [1, 2, "speed", 0, "per curve"], strict=True)), ids=str
+)
 def test_evaluation_does_not_depend_on_the_number_of_threads(threads, space, quantity):
     spline = ss.CubicSpline(None, points_on(space, 50, (2,), step=0.4), space)
     x = np.random.default_rng(0).uniform(0, 49, (2, 20_000))
@@ -241,7 +237,7 @@ def test_threads_do_not_wait_for_each_other():
     run_python(CROWD, timeout=60)
 
 
-def test_a_panic_in_a_worker_is_an_error_within_a_second(threads):
+def test_a_panic_in_a_worker_is_an_error(threads):
     """No call of the interface panics: this one lies to the core about the velocities it brings."""
     curves, samples = 4000, np.linspace(0, 2, 50)
     points = np.tile(np.eye(3), (curves, 1, 1))
@@ -249,6 +245,4 @@ def test_a_panic_in_a_worker_is_an_error_within_a_second(threads):
     curve = _core.Curve([(ss.Sphere(2)._handle, np.arange(3.0), points, short, None)])
     for n in (1, 2):
         ss.set_num_threads(n)
-        begun = time.monotonic()
         raises("out of range", curve.evaluate, samples, "point", "raise", False, error=RuntimeError)
-        assert time.monotonic() - begun < 1

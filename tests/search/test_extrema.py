@@ -69,6 +69,10 @@ def test_constant_speed_and_jumps():
     assert len(geodesic.solve("speed", 3.0)) == 0
     steps = ss.PiecewiseGeodesic([0.0, 1.0, 3.0], [[0.0], [2.0], [3.0]], "r:1")
     np.testing.assert_allclose(steps.solve("speed", 1.0), [1.0], atol=1e-12)
+    # A constant part at the value is one crossing.
+    line = ss.CubicSpline([1, 2, 3, 4], [[1.0], [2.0], [3.0], [4.0]], "r:1")
+    (time,) = line.solve(lambda x: np.where(x < 2, x - 2, np.where(x > 3, x - 3, 0.0)))
+    assert 2 <= time <= 3
 
 
 def test_dates():

@@ -150,6 +150,21 @@ def test_circles_have_the_speed_of_their_curvature():
     assert abs(circle.speed(x) * law(law.duration / 2, 1) - np.sqrt(3.0 * 0.5)) < 1e-3
 
 
+@pytest.mark.parametrize("name", ["rp:2", "cp:1", "gr:2,4"])
+def test_durations_do_not_depend_on_representatives(name):
+    """Velocities at a knot are those of two representatives of its point: their difference is no jump."""
+    points, a = points_on(ss.space(name), step=0.3), 1.1 * np.arange(6)
+    turns = {"rp:2": (-1.0) ** np.arange(6)[:, None], "cp:1": np.exp(1j * a)[:, None]}
+    if name in turns:
+        others = points * turns[name]
+    else:
+        others = points @ np.moveaxis(np.array([[np.cos(a), -np.sin(a)], [np.sin(a), np.cos(a)]]), -1, 0)
+    one, two = (
+        ss.time_law(ss.CubicSpline(None, p, name), max_speed=1.0, max_acceleration=2.0) for p in (points, others)
+    )
+    assert one.duration == pytest.approx(two.duration, rel=1e-4)
+
+
 def test_speeds_at_the_ends():
     line = ss.CubicSpline([0, 3], [[0.0], [2.0]], "r:1")
     law = ss.time_law(line, max_acceleration=1.0, max_speed=2.0, initial_speed=1.0, final_speed=0.5)

@@ -43,7 +43,7 @@ def test_fits_of_numbers(ends, kind, lam):
     spline = ss.make_smoothing_spline(t, y, "r:2", lam, weights=w, knots=knots, bc_type=ends, **TIGHT)
     assert np.abs(spline.points[: len(dense.gram)] - dense.fit(y, lam)).max() < 1e-6
     assert spline.df == pytest.approx(dense.df(lam), rel=1e-6)
-    assert spline.sigma == pytest.approx(dense.sigma(y, lam), rel=1e-6)
+    assert spline.sigma == spline.report.sigma == pytest.approx(dense.sigma(y, lam), rel=1e-6)
     x = np.sort(np.r_[t, 0.5 * (t[1:] + t[:-1])[np.diff(t) > 0.005]])
     for nu in (0, 1):
         if kind == "few":

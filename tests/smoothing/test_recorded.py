@@ -56,7 +56,7 @@ def test_robust_losses_at_irregular_times(name, outliers, loss):
     ratios = []
     for kind in ("uniform", "exponential", "bursts", "near copies"):
         for n in (20, 50, 150):
-            for seed in range(2):
+            for seed in (n % 7,):
                 space, t, truth, noisy, bad = recorded(name, kind, n, seed, outliers)
                 good = ~bad
                 clean = ss.make_smoothing_spline(t[good], noisy[good], space)
@@ -76,7 +76,7 @@ def test_robust_losses_converge_on_few_irregular_data(loss):
     """Reweighting converges slowly on some, and gaps between bursts may need more smoothing than was chosen."""
     for name in ("r:2", "so:3"):
         for kind in ("uniform", "bursts"):
-            for seed in range(24):
+            for seed in range(12):
                 space, t, _, noisy, _ = recorded(name, kind, 20, 100 + seed, True, sigma=0.01)
                 with warnings.catch_warnings():
                     warnings.simplefilter("ignore", ss.SmoothingWarning)
@@ -341,8 +341,10 @@ def vibration(n, cycle, rng):
 
 # The amplitude of closed curves varies.
 @pytest.mark.filterwarnings("ignore:.*the residuals are larger between:symspline.SmoothingWarning")
-@pytest.mark.parametrize("name", ["so:3", "sphere:2 x r:3"])
-@pytest.mark.parametrize("variant", ["closed", "gap", "weights", "batch"])
+@pytest.mark.parametrize(
+    ("name", "variant"),
+    [("so:3", "closed"), ("so:3", "batch"), ("sphere:2 x r:3", "gap"), ("sphere:2 x r:3", "weights")],
+)
 def test_motion_that_is_fast_for_the_length_of_a_recording_is_no_noise(name, variant):
     """18 000 data with 2600 cycles, which 2000 knots do not resolve."""
     rng = np.random.default_rng(5)
@@ -384,7 +386,7 @@ def test_no_oscillation_is_taken_for_noise(name, cycle):
     """Means of several data would be close to each other."""
     space, rng = ss.space(name), np.random.default_rng(1)
     for scale in (0.3, 1.0):
-        for n in rng.integers(100, 600, 12).tolist():
+        for n in rng.integers(100, 600, 6).tolist():
             t, angle = vibration(n, cycle, rng)
             noise = 0.05 * rng.normal(size=angle.shape)
             turns = (Rotation.from_rotvec(scale * angle) * Rotation.from_rotvec(noise)).as_matrix()

@@ -14,7 +14,6 @@ from refused import raises
 from stored import load, stored, with_arrays
 
 import symspline as ss
-from symspline.cli import main
 
 S2, T, NOISY, _ = example("sphere:2", 0.05, n=40)
 POSES = np.tile(np.eye(4), (40, 1, 1))
@@ -155,18 +154,3 @@ def test_damaged_collections_raise(changes):
     np.savez(damaged, **dict(np.load(file)) | changes)
     damaged.seek(0)
     raises("the file", ss.load, damaged)
-
-
-@pytest.mark.parametrize("name", ["batch", "product", "many"])
-def test_the_command_line_reads_smoothing_splines(name, tmp_path, capsys):
-    file = tmp_path / "smooth.npz"
-    if name == "many":
-        ss.save({"a": SAVED["one"], "b": SAVED["few knots"]}, file)
-    else:
-        SAVED[name].save(file)
-    which = {"batch": ["--curve", "1"], "many": ["--curve", "b"]}.get(name, [])
-    assert main(["check", str(file)]) == 0
-    assert main(["sample", str(file), "-n", "5", "-o", str(tmp_path / "out.csv")]) == 0
-    assert main(["plot", str(file), *which, "-o", str(tmp_path / "out.png")]) == 0
-    assert "rounding allows" in capsys.readouterr().out
-    assert (tmp_path / "out.png").stat().st_size > 1000

@@ -1,5 +1,7 @@
 """The interface of smoothing splines: input, output, warnings and errors."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from noisy import example, rms
@@ -75,6 +77,8 @@ def test_a_lambda_at_its_bound_warns():
         ss.make_smoothing_spline(T, (both[1], both[0]), "r:1 x r:1", criterion="reml")
     # A λ that was given is nobody's choice.
     ss.make_smoothing_spline(T, noise, "r:1", 1e12)
+    for df, is_stiff in ((2.49, True), (2.51, False)):
+        assert dataclasses.replace(stiff.report, df=df).is_stiff() == is_stiff
 
 
 def test_invalid_input_raises():
@@ -146,7 +150,7 @@ def test_data_and_weights_whose_squares_overflow_raise():
 @pytest.mark.filterwarnings("ignore:The noise of the data:symspline.SmoothingWarning")
 @pytest.mark.filterwarnings("ignore:The data turn by more than half:symspline.SmoothingWarning")
 @pytest.mark.filterwarnings("ignore:Two curves fit the data:symspline.SmoothingWarning")
-@pytest.mark.parametrize(("name", "seed"), [("sphere:2", 4), ("so:3", 0), ("rp:2", 4), ("sphere:2 x r:1", 4)])
+@pytest.mark.parametrize(("name", "seed"), [("sphere:2", 4), ("sphere:2 x r:1", 4)])
 def test_data_spread_over_the_whole_space_warn(name, seed):
     space, rng = ss.space(name), np.random.default_rng(seed)
     points = space.random_point(rng, 200)

@@ -14,11 +14,8 @@ import symspline as ss
 SEED = 22
 
 NAMES = [
-    *("euclidean:3", "sphere:1", "sphere:2", "sphere:4", "hyperbolic:1", "hyperbolic:2", "hyperbolic:4"),
-    *("rp:1", "rp:2", "rp:4", "cp:1", "cp:2", "cp:4"),
-    *("gr:1,2", "gr:1,4", "gr:3,4", "gr:2,4", "gr:2,5", "gr:3,5", "cgr:1,2", "cgr:1,4", "cgr:2,3", "cgr:2,4"),
-    *("so:2", "so:3", "so:4", "so:5", "o:2", "o:3", "o:4", "u:1", "u:2", "u:3", "su:2", "su:3"),
-    *("spd:1", "spd:2", "spd:3", "spd:4", "hpd:1", "hpd:2", "hpd:3"),
+    *("euclidean:3", "sphere:1", "sphere:2", "hyperbolic:2", "rp:2", "cp:1", "cp:2", "gr:1,4", "gr:2,4", "cgr:2,3"),
+    *("so:3", "so:4", "o:3", "u:2", "su:2", "su:3", "spd:1", "spd:2", "spd:3", "hpd:2"),
 ]
 every = pytest.mark.parametrize("name", NAMES)
 

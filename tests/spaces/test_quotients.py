@@ -10,7 +10,6 @@ from scipy.spatial.transform import Rotation
 
 import symspline as ss
 
-EYE = np.eye(3)[None]
 NAMES = [
     *("so:3/432", "so:3/622", "432\\so:3", "432\\so:3/622", "so:3/1", "sphere:2/432", "sphere:3/[1.0,-1.0]"),
     *("pu:2", "pu:4", "u:2/[[1.0,0.0],[0.0,1.0],[-1.0,0.0],[0.0,-1.0]]", "stiefel:2,4/signs", "gl:3/23", "o:3/32"),
@@ -55,7 +54,10 @@ def test_groups_in_any_order_and_with_rounding_errors_have_the_name():
     assert ss.Quotient("so:3", group) == CUBIC
     rounded = np.round(ss.rotations.point_group("622"), 9)
     assert str(ss.Quotient("so:3", rounded)) == "so:3/622"
-    assert ss.Quotient("so:3", group, left=True) != CUBIC
+    left = ss.Quotient("so:3", group, left=True)
+    assert left != CUBIC and left.group is None and CUBIC.left_group is None
+    for found in (left.left_group, CUBIC.group):
+        assert np.linalg.norm(found[:, None] - group.as_matrix(), axis=(-2, -1)).min(axis=1).max() < 1e-14
 
 
 @pytest.mark.parametrize("left, right", [("1", "432"), ("432", "1"), ("23", "622")])

@@ -1,9 +1,6 @@
-"""Curves through points of a totally geodesic subspace stay in it: the list of docs/totally-geodesic.md."""
+"""Siegel's half space, quaternionic lines and quadrics as totally geodesic parts of other spaces."""
 
 import numpy as np
-import pytest
-from cases import EPS, loop_over
-from curves import points_on
 from refused import raises
 
 import symspline as ss
@@ -19,65 +16,6 @@ def turned(x):
 
 def symplectic(n):
     return np.block([[np.zeros((n, n)), np.eye(n)], [-np.eye(n), np.zeros((n, n))]])
-
-
-def walk_in(step_from, start, seed=3, step=0.5):
-    """Points of a part of a space, each a step from the one before."""
-    rng = np.random.default_rng(seed)
-    p = [start]
-    for _ in range(len(KNOTS) - 1):
-        p.append(step_from(rng, p[-1], step))
-    return np.array(p)
-
-
-def expm(x):
-    values, vectors = np.linalg.eig(x)
-    return (vectors * np.exp(values)) @ np.linalg.inv(vectors)
-
-
-def compact_symplectic(rng, p, step):
-    # Sp(2): unitary with xᵀJx = J; its algebra is (A, B; −B̄, Ā) with A skew-Hermitian, B symmetric.
-    a, b = (rng.standard_normal((2, 2)) + 1j * rng.standard_normal((2, 2)) for _ in range(2))
-    a, b = (a - a.conj().T) / 2, (b + b.T) / 2
-    return p @ expm(step * np.block([[a, b], [-b.conj(), a.conj()]]) / 2)
-
-
-def symmetric_unitary(rng, p, step):
-    # U(n)/O(n) as the symmetric unitary matrices: p ↦ u p uᵀ.
-    h = rng.standard_normal((3, 3)) + 1j * rng.standard_normal((3, 3))
-    u = expm(step * (h - h.conj().T) / 4)
-    return u @ p @ u.T
-
-
-CASES = {
-    "the compact symplectic group Sp(2) in U(4)": (
-        "u:4",
-        compact_symplectic,
-        np.eye(4, dtype=complex),
-        lambda x: turned(x) @ symplectic(2) @ x - symplectic(2),
-    ),
-    "U(3)/O(3) in U(3)": ("u:3", symmetric_unitary, np.eye(3, dtype=complex), lambda x: x - turned(x)),
-}
-
-
-@pytest.mark.parametrize("name", CASES)
-@loop_over("bc_type", ["natural", "not-a-knot", "clamped", "periodic", "given"])
-def test_curves_stay(name, bc_type):
-    space, step, start, defect = CASES[name]
-    p = walk_in(step, start)
-    assert np.abs(defect(p)).max() <= 1e-13
-    if bc_type == "periodic":
-        p[-1] = p[0]
-    elif bc_type == "given":
-        # Velocities of geodesics between points of the part.
-        v = ss.space(space).log(p[[0, -1]], p[[2, -3]])
-        bc_type = ((1, v[0]), (1, -v[1]))
-    values = ss.CubicSpline(KNOTS, p, space, bc_type=bc_type)(X)
-    size = max(1.0, float(np.abs(values).max()) ** 2)
-    assert np.abs(defect(values)).max() <= 100 * EPS * size
-    # The part is not all: a curve through other points leaves it.
-    other = ss.CubicSpline(KNOTS, points_on(ss.space(space), 6, step=0.5), space)(X)
-    assert np.abs(defect(other)).max() > 1e-2
 
 
 def test_siegel_of_one_dimension_is_the_half_plane():

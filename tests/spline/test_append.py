@@ -38,6 +38,22 @@ def test_a_fixed_lag_is_near_the_fit_of_all_points(name, bc_type, rng):
     assert np.abs(spline.append(t[40:], points[40:]).velocities - whole.velocities).max() < 1e-5 * scale
 
 
+@pytest.mark.parametrize("lag", [2, 3, 5])
+def test_append_changes_the_last_lag_segments_only(lag, rng):
+    points = path(ss.Sphere(2), 12, rng)
+    before = ss.CubicSpline(None, points[:11], "sphere:2")
+    after = before.append(11.0, points[11], lag=lag)
+    kept = np.abs(after.velocities[:11] - before.velocities).max(axis=1) < 1e-13
+    assert kept.tolist() == [True] * (11 - lag) + [False] * lag
+
+
+def test_append_does_not_forget_a_failure(rng):
+    points = path(ss.Sphere(2), 30, rng)
+    poor = ss.CubicSpline(None, points[:20], "sphere:2", max_iter=1, on_failure="ignore")
+    longer = poor.append(np.arange(20.0, 30), points[20:], lag=2)
+    assert not poor.report.converged and not longer.report.converged
+
+
 @every_kind
 def test_every_space(space, rng):
     t = np.array([0.0, 0.4, 1.5, 1.9, 3.0, 3.3])

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from cases import CURVED, closed_walk, loop_over, unit_tangent, walk
-from scipy.interpolate import CubicSpline
 
 import symspline as ss
 
@@ -79,26 +78,6 @@ def test_circles_need_steps_below_a_third_of_the_injectivity_radius(space, point
             assert (getattr(report, name) is not None) == certified
             assert np.isnan(getattr(batch, name)).tolist() == [not certified, False]
         assert ("Theorem" in str(report)) == certified
-
-
-def natural_on_the_circle(angles, winding):
-    """Velocities of the natural spline of numbers that are these angles plus whole turns between neighbours."""
-    turns = np.concatenate([[0], np.cumsum(winding)])
-    return CubicSpline(np.arange(len(angles)), angles + 2 * np.pi * turns, bc_type="natural")(np.arange(len(angles)), 1)
-
-
-def test_two_short_splines_on_the_circle_without_a_certificate():
-    """Both have handles no longer than D, the V of flat space."""
-    a = 0.9 * np.pi * ZIGZAG
-    c, j = np.stack([np.cos(a), np.sin(a)], -1), np.stack([-np.sin(a), np.cos(a)], -1)
-    for winding in ([0, 0, 0], [0, 1, 0]):
-        u = natural_on_the_circle(a, winding)
-        assert abs(u).max() / 3 <= 0.9 * np.pi
-        curve = ss.HermiteSpline(np.arange(4.0), c, u[:, None] * j, "sphere:1")
-        sides = [curve(np.array([1, 2]) + side, nu=2) for side in (-1e-7, 1e-7)]
-        assert np.abs(curve([0.0, 3.0], nu=2)).max() < 1e-12
-        assert np.abs(sides[0] - sides[1]).max() < 1e-5
-    assert ss.CubicSpline(None, c, "sphere:1").report.contraction_bound is None
 
 
 def test_a_quotient_uses_its_own_injectivity_radius():
@@ -279,14 +258,3 @@ def test_a_product_has_none_where_a_factor_has_none(first, rng):
     batch = np.stack([near, near]), np.stack([0.02 * far + far[:1], far])
     radius = ss.CubicSpline(None, (batch[0], S2.project(batch[1])), space).report.invariant_radius
     assert np.isnan(radius).tolist() == [[False, False], [True, True]]
-
-
-def test_control_polygons_of_a_product_stay_within_the_radii(rng):
-    parts = [steps(S2, 0.2, rng), steps(S2, 0.1, rng), rng.normal(size=(10, 3))]
-    spaces = S2, S2, ss.Euclidean(3)
-    radii = [ss.CubicSpline(None, p, s).report.invariant_radius for p, s in zip(parts, spaces, strict=True)]
-    spline = ss.CubicSpline(None, tuple(parts), ss.Product(*spaces))
-    assert spline.report.invariant_radius == tuple(radii)
-    assert "(Theorem 3.1)" in str(spline.report)
-    for s, p, u, radius in zip(spaces, parts, spline.velocities, radii, strict=True):
-        assert longest_leg(s, p, u) <= radius

@@ -5,7 +5,7 @@ import pickle
 
 import numpy as np
 import pytest
-from compare import each
+from compare import close, each
 from curves import KNOTS, every_batch, every_kind, points_on
 from scipy.interpolate import PchipInterpolator
 
@@ -14,12 +14,6 @@ import symspline as ss
 # Neither is a knot.
 A, B = KNOTS[1] + 0.3 * (KNOTS[2] - KNOTS[1]), KNOTS[-2] + 0.6 * (KNOTS[-1] - KNOTS[-2])
 INSIDE = np.sort(np.random.default_rng(3).uniform(A, B, 23))
-
-
-def close(a, b, tol=1e-12):
-    """Whether points or vectors agree, in all factors."""
-    pairs = zip(a, b, strict=True) if isinstance(a, tuple) else [(a, b)]
-    return all(np.abs(x - y).max() <= tol * max(1, np.abs(y).max()) for x, y in pairs)
 
 
 def stored(curve):
@@ -327,3 +321,12 @@ def test_a_small_jump_of_the_velocity_is_kept():
     first = ss.HermiteSpline([0, 1], [[0.0], [1.0]], [[1.0], [1.0]], "r:1")
     second = ss.HermiteSpline([1, 2], [[1.0], [2.0]], [[1.0 + 1e-9], [1.0]], "r:1")
     assert isinstance(first.concatenate(second), ss.SegmentedCurve)
+
+
+@pytest.mark.filterwarnings("ignore::symspline.ConvergenceWarning")
+def test_failed_segments_are_not_the_nearest():
+    x, y = np.eye(3)[:2]
+    failed = ss.CubicSpline([0, 1], [x, -x], "sphere:2", on_failure="ignore")
+    segments = [failed, ss.CubicSpline([2, 3], [x, y], "sphere:2"), failed.shift(4.0)]
+    time, distance = ss.SegmentedCurve(segments).closest(y)
+    assert time == pytest.approx(3) and distance == pytest.approx(0, abs=1e-7)

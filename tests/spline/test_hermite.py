@@ -79,15 +79,6 @@ def test_dates():
     assert np.array_equal(dated.t, dates)
 
 
-@pytest.mark.parametrize("name", ["sphere:2", "se:3", "so:3 x r:3"])
-def test_plots(name, tmp_path):
-    figure = curve(ss.space(name)).plot(tmp_path / "a.png")
-    texts = [text.get_text() for text in figure.texts]
-    assert texts[0].startswith("C¹ Hermite spline ") and (" on " in texts[0] or " and " in texts[0])
-    assert "6 points, given velocities" in texts[1]
-    assert (tmp_path / "a.png").stat().st_size > 10_000
-
-
 ZERO = np.zeros((3, 3))
 
 

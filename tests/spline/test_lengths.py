@@ -86,7 +86,7 @@ far = np.stack([np.cosh(10 + 0 * a), np.sinh(10) * np.cos(a), np.sinh(10) * np.s
     ids=["geodesic", "still", "one still in a batch", "far out"],
 )
 def test_integrals_come_to_rest_at_the_rounding_floor(code):
-    run_python(f"{RESTS}\nassert {code}", timeout=3)
+    run_python(f"{RESTS}\nassert {code}", timeout=60)
 
 
 @every_kind

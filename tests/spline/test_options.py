@@ -50,22 +50,6 @@ def test_invalid_options_raise(options, match, how):
             ss.fit(None, P, S2, **options)
 
 
-def test_options_of_a_wrong_type_raise():
-    for options in [
-        {"max_iter": 1.5},
-        {"max_iter": -1},
-        {"max_iter": 10**30},
-        {"tol": "small"},
-        {"method": None},
-        {"extrapolate": np.array([1, 2])},
-        {"bc_type": (([1], [0, 0.5, 0]), "natural")},
-        {"progress": 5},
-    ]:
-        for fit, data in ((ss.CubicSpline, (None, P)), (ss.fit_many, ([(None, P)],))):
-            with pytest.raises((ss.ValidationError, TypeError), match=next(iter(options))):
-                fit(*data, S2, **options)
-
-
 def test_messages_quote_no_large_arrays():
     # NumPy would write out all of it, as no axis is long.
     wrong = np.zeros((2,) * 20)

@@ -5,18 +5,12 @@ from datetime import timedelta
 
 import numpy as np
 import pytest
-from compare import each
+from compare import close, each
 from curves import KNOTS, every_batch, every_kind, points_on
 
 import symspline as ss
 
 X = np.linspace(KNOTS[0], KNOTS[-1], 41)
-
-
-def close(a, b, tol=1e-12):
-    """Whether points or vectors agree, in all factors."""
-    pairs = zip(a, b, strict=True) if isinstance(a, tuple) else [(a, b)]
-    return all(np.abs(x - y).max() <= tol * max(1, np.abs(y).max()) for x, y in pairs)
 
 
 @every_kind

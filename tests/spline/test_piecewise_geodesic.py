@@ -177,14 +177,6 @@ def test_large_spaces_and_manifolds():
     assert np.abs(curve(1.25) - stiefel.geodesic(points[1], points[2], 0.25)).max() < 1e-9
 
 
-@pytest.mark.parametrize("name", ["sphere:2", "so:3 x r:3"])
-def test_plots(name, tmp_path):
-    space = ss.space(name)
-    figure = ss.PiecewiseGeodesic(KNOTS, points_on(space, 6, step=0.4), space).plot(tmp_path / "a.png")
-    texts = [text.get_text() for text in figure.texts]
-    assert "6 points, joined by geodesics" in texts[1]
-
-
 def test_control_points_are_on_the_geodesics():
     curve = ss.PiecewiseGeodesic(KNOTS, points_on(S2, 6, (2,), step=0.4), S2)
     control = curve.control_points

@@ -312,24 +312,6 @@ def test_files_and_pickles(name, tmp_path):
             assert all(np.array_equal(*pair) for pair in values)
 
 
-def test_pictures(data):
-    pytest.importorskip("matplotlib")
-    t, given, _ = data
-    figure = ss.CubicSpline(t, given, CUBIC).plot()
-    assert len(figure.axes) == len(ss.CubicSpline(t, CUBIC.unwrap(given), "so:3").plot().axes)
-
-
-def test_estimates_and_jax_name_unwrap(data):
-    t, given, _ = data
-    with pytest.raises(ss.ValidationError, match=r"not estimated on Quotient.*unwrap.*SpecialOrthogonal"):
-        ss.estimate([ss.measure.Points(t, given, sigma=0.01)], 5, CUBIC)
-    pytest.importorskip("jax")
-    from symspline.jax import curve
-
-    with pytest.raises(ss.ValidationError, match=r"JAX are not made on Quotient.*unwrap"):
-        curve(0.5, t, given, CUBIC)
-
-
 # ---- warnings ----
 
 

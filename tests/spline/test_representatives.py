@@ -8,7 +8,6 @@ from curves import S3, points_on
 from scipy.spatial.transform import Rotation
 
 import symspline as ss
-from symspline.cli import main
 
 SIGNS, FAR = "neighbours of opposite sign", "more than half of the steps are long"
 SO3 = ss.SpecialOrthogonal(3)
@@ -192,12 +191,3 @@ def test_long_translations_and_spaces_without_a_cut_locus_are_silent():
     ss.CubicSpline(None, poses, "se:3")
     ss.CubicSpline(None, points_on(ss.space("spd:3"), 6, step=4.0), "spd:3", on_failure="ignore")
     ss.CubicSpline(None, 1e3 * np.random.default_rng(0).standard_normal((6, 2)), "r:2")
-
-
-def test_the_command_line_notes_it(tmp_path, capsys):
-    p = np.array([[1.0, 0, 0], [-0.8, 0.6, 0]] * 4)
-    table = tmp_path / "data.csv"
-    np.savetxt(table, np.c_[np.arange(8.0), p], delimiter=",", header="t,x,y,z", comments="")
-    warnings.filterwarnings("always", message=FAR)
-    main(["fit", str(table), "--space", "sphere:2", "-o", str(tmp_path / "curve.npz")])
-    assert FAR in capsys.readouterr().err

@@ -1,7 +1,6 @@
 """Times of knots: numbers, dates, integers beyond 2⁵³, and invalid times."""
 
 from contextlib import suppress
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +10,6 @@ from curves import KNOTS, S2, THREE, points_on
 from refused import INF, NAN, TWO, P, fit_error, raises
 
 import symspline as ss
-from symspline.cli import main
 
 EPOCH = 1_700_000_000_000_000_000
 
@@ -193,15 +191,6 @@ def test_times_too_close_are_named_in_batches_lists_products_and_dates():
         raises(match, fit, error=ss.ConvergenceError)
 
 
-def test_the_command_line_names_the_lines(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    t, points = recording(1e-6)
-    np.savetxt("a.csv", np.c_[t, points], "%.17g", ",", header="t,x,y,z", comments="")
-    assert main(["fit", "a.csv", "--space", "sphere:2", "-o", "a.npz"]) == 1
-    message = capsys.readouterr().err
-    assert f"time {t[20]} in line 22 and time {t[21]} in line 23 are too close" in message
-
-
 def intervals(count=2000):
     """Ends of intervals of any length and place, and the last time that a user computes for each."""
     rng = np.random.default_rng(0)
@@ -297,34 +286,3 @@ def test_other_times_beyond_the_last_knot():
     curve = ss.BezierCurve(THREE, S2)
     assert np.array_equal(curve(1 + 2**-52), curve(1.0))
     raises("outside", curve, 1 + 10 * 2**-52)
-
-
-def test_jax():
-    jax = pytest.importorskip("jax")
-    import symspline.jax as sj
-
-    def gradient(x, t, points):
-        return jax.grad(lambda p: sj.curve(x, t, p, "sphere:2").sum())(points)
-
-    i = BEYOND[0]
-    with jax.enable_x64(True):
-        points = jax.numpy.asarray(THREE, float)
-        assert np.array_equal(gradient(LAST[i], knots(i), points), gradient(END[i], knots(i), points))
-        velocities, _ = sj.fit(knots(i), points, "sphere:2")
-        for x in (LAST[i], END[i]):
-            found = sj.evaluate(knots(i), points, velocities, "sphere:2", x)
-            np.testing.assert_allclose(found, points[-1], atol=1e-14)
-    t, single = np.array([0.0, 0.1, 0.3], np.float32), points.astype(np.float32)
-    late = np.nextafter(t[-1], np.float32(1))
-    assert np.isfinite(sj.curve(late, t, single, "sphere:2")).all()
-    assert np.isfinite(gradient(late, t, single)).all()
-
-
-def test_the_command_line(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    i = BEYOND[0]
-    np.savez("a.npz", t=knots(i), points=THREE)
-    assert main(["fit", "a.npz", "--space", "sphere:2", "-o", "curve.npz"]) == 0
-    for x, code in ((LAST[i], 0), (END[i] + 10 * UNIT[i], 2)):
-        Path("at.csv").write_text(f"t\n{float(x)!r}\n")
-        assert main(["sample", "curve.npz", "--at", "at.csv", "-o", "b.csv"]) == code

@@ -59,7 +59,6 @@ def test_circles_have_exact_means_and_medians(name, method, power):
         assert space.distance(found, again) < 1e-12
 
 
-@pytest.mark.filterwarnings("ignore::symspline.AmbiguousMeanWarning")
 def test_angles_of_a_torus_and_factors_of_a_product_are_exact():
     angles, weights, _ = spread_angles(1)
     both = np.stack([angles, angles[::-1] + 1], -1)
@@ -228,7 +227,7 @@ def test_principal_components_do_not_depend_on_units():
 def test_rounding_errors_of_spread_directions_do_not_grow():
     """Some directions are farther than a quarter turn from the mean, where logarithms amplify errors of its length."""
     sphere = ss.Sphere(2)
-    for seed in range(40):
+    for seed in range(12):
         points = on_the_sphere(np.random.default_rng(seed), 24, 1.5)
         mean = sphere.mean(points)
         gradient = sphere.log(np.broadcast_to(mean, points.shape), points).mean(axis=0)

@@ -13,10 +13,8 @@ from refused import raises
 import symspline as ss
 import symspline.xarray as sx
 
-RNG = np.random.default_rng(7)
 
-
-def uneven(n, start, rng=RNG):
+def uneven(n, start, rng):
     """Irregular nodes, with steps from 0.5 to 1.5."""
     return start + np.cumsum(rng.uniform(0.5, 1.5, n))
 
@@ -106,11 +104,11 @@ def test_the_halo_is_needed(monkeypatch):
     assert 1e-11 < abs(sx.resample(da.chunk(x=50), S2, to) - whole).max() < 1e-3
 
 
-def test_missing_points_and_masks_in_blocks():
+def test_missing_points_and_masks_in_blocks(rng):
     da = field(120, 12)
     full, mask = da.copy(deep=True), np.ones((120, 12), bool)
     mask[30:33, 4], mask[71, :], mask[:, 0] = False, False, False
-    mask[100:] = RNG.uniform(size=(20, 12)) > 0.2
+    mask[100:] = rng.uniform(size=(20, 12)) > 0.2
     da = da.where(xr.DataArray(mask, dims=("x", "y")))
     to = {"x": inner(da.x.values, 241), "y": inner(da.y.values, 25)}
     whole = sx.resample(da, S2, to)
@@ -133,8 +131,8 @@ def test_layers_that_are_masked_or_missing():
     np.testing.assert_allclose(found[1], da.transpose("level", "y", "x", "q")[1], atol=1e-14)
 
 
-def test_dates_on_an_axis():
-    hours = np.datetime64("2021-08-28", "s") + (np.cumsum(RNG.integers(1, 4, 60)) * 3600).astype("m8[s]")
+def test_dates_on_an_axis(rng):
+    hours = np.datetime64("2021-08-28", "s") + (np.cumsum(rng.integers(1, 4, 60)) * 3600).astype("m8[s]")
     y = np.arange(6.0)
     points = directions(np.arange(60), y)
     da = xr.DataArray(points, dims=("time", "y", "q"), coords={"time": hours, "y": y})
