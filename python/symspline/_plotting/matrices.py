@@ -403,8 +403,9 @@ def _draw_ellipses(panel: Panel, curves: Sequence[Curve], view: Array) -> None:
     length = round_below(0.8 / inches)
     words = [f"half axes: √eigenvalues, bar: {length:g}", "arcs: front halves of principal sections" * (len(view) == 3)]
     words += ["colour: time" * (not curves[0].is_mean), rows.words]
-    panel.explain(fill("; ".join(filter(None, words)), max(20, int((rows.width - 1.5) / 0.07))))
-    _draw_bar(rows, inches * length, 1.15 if len(view) == 3 else 0.0)
+    text = "; ".join(filter(None, words))
+    panel.explain(fill(text, max(20, int((rows.width - 1.5) / 0.07))) if panel.mine else text)
+    _draw_bar(rows, inches * length, 1.15 if len(view) == 3 and panel.mine else 0.05)
     if len(view) == 3:
         rows.draw_view()
 
@@ -425,8 +426,8 @@ def _draw_ellipses(panel: Panel, curves: Sequence[Curve], view: Array) -> None:
 
 
 def _draw_bar(rows: _Rows, length: float, right: float) -> None:
-    """Draw a bar of a length in inches above the axes, ``right`` inches from their right end."""
-    end, above = -right, 0.12
+    """Draw a bar of a length in inches above the axes, ``right`` inches from their right end; inside those of a user."""
+    end, above = -right, 0.12 if rows.panel.mine else -0.1
     tick = [[(x, above - 0.04), (x, above + 0.04)] for x in (end - length, end)]
     look: Any = {"offsets": [(1, 1)], "offset_transform": rows.axes.transAxes, "clip_on": False, "in_layout": False}
     look |= {"transform": _Inches(rows.axes), "colors": [ink()], "linewidths": 1.2}

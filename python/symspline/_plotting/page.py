@@ -97,8 +97,8 @@ def draw_page(
     columns = columns_of(curves[0], curves[0].axis.seconds, FACTORS, whole.is_wide)
     count = max(map(len, columns), default=0)
     beside, below = (0, count) if whole.is_wide else (count, 0)
-    # Cells of one grid, so that time axes one below the other are aligned. A picture has `units` of them.
-    units = lcm(*(view.rows for view, _ in pictures if view.is_time), max(beside, 1))
+    # Wide pages have cells of one grid, so that time axes one below the other are aligned. A picture has some of them.
+    units = lcm(*(view.rows for view, _ in pictures if view.is_time)) if whole.is_wide else 1
     bottom = lcm(*map(len, columns)) if below else 0
     high = max(whole.height, _LABELS + _RATE * beside)
     heights = [high / (rows * units)] * rows * units + [(_LABELS + _RATE * below) / max(bottom, 1)] * bottom
@@ -110,11 +110,17 @@ def draw_page(
         grid = GridSpec(len(heights), len(widths), body, width_ratios=widths, height_ratios=heights, **_ABOUT)
 
         def stack(top: int, height: int, left: int, width: int, number: int, projection: Any = None) -> list[Axes]:
-            """Add axes one below the other that fill some of the cells."""
+            """Add axes one below the other that fill some of the cells, or divide them."""
             step = height // number
-            starts = range(top, top + height, step)
-            cells = [grid[start : start + step, left : left + width] for start in starts]
-            return [body.add_subplot(cell, axes_class=Box if projection else None) for cell in cells]
+            if whole.is_wide and step:
+                places: Any = [grid[i : i + step, left : left + width] for i in range(top, top + height, step)]
+            else:
+                inner = grid[top : top + height, left : left + width].subgridspec(number, 1)
+                places = [inner[i, 0] for i in range(number)]
+            made = [body.add_subplot(place, axes_class=Box if projection else None) for place in places]
+            if not whole.is_wide:
+                body.align_ylabels(made)
+            return made
 
         for i, (view, drawn) in enumerate(pictures):
             row, column = divmod(i, across)
@@ -134,7 +140,8 @@ def draw_page(
         if residuals:
             place = rows * units + bottom, len(residuals), 0, len(widths)
             draw_residuals(stack(*place, len(residuals)), curves[0], residuals)
-        body.align_ylabels([axes for axes in body.axes if axes.get_gid() == "time"])
+        if whole.is_wide:
+            body.align_ylabels([axes for axes in body.axes if axes.get_gid() == "time"])
         head(figure, body, title, words, curves)
     return figure
 

@@ -120,7 +120,8 @@ def shrink(artists: Iterable[Artist], factor: float) -> None:
 def note(axes: Any, text: str) -> None:
     """Write lines below a picture."""
     size = float(rcParams["font.size"])
-    below = size * (-0.4 if not axes.axison else -1.4 if axes.name == "3d" else -2.8)
+    beside = float(axes.xaxis.label.get_fontsize())
+    below = -4 if not axes.axison else -2 * beside if axes.name == "3d" else -2.7 * beside - 8
     text = "\n".join(fill(line, max(24, int(axes_size(axes)[0] / (0.0065 * size)))) for line in text.splitlines())
     look: Any = {"xycoords": "axes fraction", "textcoords": "offset points", "ha": "center", "va": "top"}
     axes.annotate(text, (0.5, 0), (0, below), fontsize="small", **look)
