@@ -80,7 +80,7 @@ def texts_of(figure):
 ROLES = (
     *("start", "end", "given points", "given poses", "some of the poses", "poses of the curve", "control points"),
     *("data", "95 % band", "far side", "curve in a gap", "gap", "limit", "single curves", "other curves", "median"),
-    "5–95 %",
+    *("5–95 %", "shadow on the floor"),
 )
 
 

@@ -267,31 +267,6 @@ def test_the_acceleration_of_a_pose_is_that_of_its_position(name):
     np.testing.assert_allclose(np.interp(x, *line.T), second, atol=2e-3)
 
 
-def test_rates_of_turning_have_a_scale_of_their_own():
-    """Positions far away and in metres do not change the scale of a turning rate that is constant."""
-    t = np.arange(9.0)
-    poses = np.tile(np.eye(3), (9, 1, 1))
-    poses[:, :2, :2] = np.moveaxis([[np.cos(0.4 * t), -np.sin(0.4 * t)], [np.sin(0.4 * t), np.cos(0.4 * t)]], -1, 0)
-    poses[:, :2, 2] = np.stack([1000 * t + 512_345, 1000 * np.sin(t) + 5_412_345], axis=1)
-    figure = ss.CubicSpline(t, poses, "se:2").plot()
-    (axes,) = [own for own in figure.axes if own.get_ylabel().startswith("turning accel")]
-    assert np.abs(axes.get_ylim()).max() < 1
-
-
-def test_a_body_that_turns_on_the_spot_is_drawn_at_several_angles():
-    t = np.linspace(0, 4, 11)
-    poses = np.tile(np.eye(3), (11, 1, 1))
-    poses[:, :2, :2] = np.moveaxis([[np.cos(t), -np.sin(t)], [np.sin(t), np.cos(t)]], -1, 0)
-    axes = ss.CubicSpline(t, poses, "se:2").plot().axes[0]
-    bodies = [
-        path
-        for own in axes.collections
-        if role(own) in ("poses of the curve", "some of the poses", "start")
-        for path in own.get_paths()
-    ]
-    assert len(bodies) >= 6
-
-
 @pytest.mark.parametrize("name", ["sphere:3", "su:2", "cp:1"])
 def test_angles_that_are_twice_the_distances_are_explained(name):
     figure = rendered(spline_on(name).plot())

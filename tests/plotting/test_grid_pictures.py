@@ -187,7 +187,7 @@ def test_ellipses_are_those_of_the_tensors(name):
         assert (shown[..., :3].argmax(axis=-1) == diagonal.argmax(axis=-1)).mean() > 0.99
 
 
-@pytest.mark.parametrize("name", ["r:1", "sphere:1", "sphere:2", "so:3", "spd:3", "se:3", "gr:2,5"])
+@pytest.mark.parametrize("name", ["r:1", "sphere:2", "spd:3", "se:3"])
 def test_missing_nodes_are_blank(name):
     u = np.linspace(0, 1, 12)
     points = np.array(smooth_field(name, u, u))
@@ -208,7 +208,7 @@ def test_missing_nodes_are_blank(name):
 
 
 @pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("name", ["r:1", "r:2", "r:3", "sphere:1", "sphere:2", "so:3", "spd:3", "gr:2,5", "se:3"])
+@pytest.mark.parametrize("name", ["r:2", "r:3", "sphere:1", "so:3", "spd:3"])
 def test_fields_without_extent(name):
     """All points are equal, or there is one node only, which has no values around it."""
     points = np.broadcast_to(smooth_field(name)[3, 2], smooth_field(name).shape).copy()
@@ -217,7 +217,7 @@ def test_fields_without_extent(name):
     rendered(grid_on(name, points).plot())
 
 
-@pytest.mark.parametrize("name", ["r:1", "r:2", "r:3", "sphere:2", "so:3", "spd:3", "se:3", "gr:2,5"])
+@pytest.mark.parametrize("name", ["r:1", "r:3", "so:3", "gr:2,5"])
 def test_grids_are_drawn_into_axes(name):
     figure = Figure(figsize=(6, 5))
     ax = figure.add_subplot(projection="3d" if name in ("r:3", "se:3") else None)
@@ -275,29 +275,6 @@ def test_products_have_a_panel_per_factor():
     figure = rendered(seven.plot())
     assert "7 × 5 nodes, 6 of 7 factors" in texts_of(figure)
     assert len([axes for axes in figure.axes if axes.get_label() == "field"]) == 6
-
-
-def test_positions_are_a_surface_with_their_nodes():
-    points = smooth_field("r:3")
-    points[2, 2] = np.nan
-    figure = rendered(grid_on("r:3", points).plot())
-    (axes,) = figure.axes
-    (dots,) = [line for line in axes.lines if line.get_label() == "nodes"]
-    np.testing.assert_allclose(np.stack(dots.get_data_3d(), axis=-1), np.delete(points.reshape(-1, 3), 12, axis=0))
-
-
-def test_frames_stand_on_the_surface_of_poses():
-    grid = grid_on("se:3")
-    figure = rendered(grid.plot())
-    (axes,) = figure.axes
-    sticks = [np.stack(line.get_data_3d(), axis=-1) for line in axes.lines if line.get_linewidth() == 1.2]
-    assert len(sticks) == 3
-    frames = np.stack([line.reshape(-1, 3, 3)[:, 1] - line.reshape(-1, 3, 3)[:, 0] for line in sticks], axis=-1)
-    length = np.linalg.norm(frames[0, :, 0])
-    # The frame of the first node, and of the last one.
-    for k, pose in ((0, grid.points[0, 0]), (-1, grid.points[-1, -1])):
-        np.testing.assert_allclose(frames[k] / length, pose[:3, :3], atol=1e-9)
-        np.testing.assert_allclose(sticks[0].reshape(-1, 3, 3)[k, 0], pose[:3, 3], atol=1e-12)
 
 
 def test_further_axes_are_fixed_at_their_middle_nodes():

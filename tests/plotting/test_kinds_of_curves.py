@@ -5,7 +5,6 @@ import pytest
 from drawn import (
     axes_named,
     has_title,
-    legend_of,
     lines_of,
     points_around,
     rate_axes,
@@ -272,7 +271,7 @@ def test_segments_have_their_own_colours_and_starts():
     assert len([line for line in many.axes[0].lines if role(line) == "start"]) == 1
 
 
-@pytest.mark.parametrize("name", ["r:2", "r:3", "sphere:2", "h:2", "rp:2", "cp:1", "se:3"])
+@pytest.mark.parametrize("name", ["r:2", "sphere:2", "se:3"])
 def test_batches_close_to_their_mean_show_it(name):
     """The line of the mean is that of the Karcher means, and no curve is named."""
     space, rng = ss.space(name), np.random.default_rng(8)
@@ -313,7 +312,7 @@ def test_batches_close_to_their_mean_show_it(name):
     assert {"curve 0", "other curves"} <= set(texts_of(ss.CubicSpline(None, apart, space).plot()))
 
 
-@pytest.mark.parametrize("name", ["r:1", "so:3", "spd:2", "torus:2", "spd:4", "stiefel:2,4"])
+@pytest.mark.parametrize("name", ["r:1", "so:3", "spd:2", "torus:2"])
 def test_batches_close_to_their_mean_show_it_with_quantiles(name):
     space, rng = ss.space(name), np.random.default_rng(8)
     path = points_around(space, rng, (7,))
@@ -407,11 +406,3 @@ def test_numbers_in_axes_of_the_user_count_from_zero():
     assert ax.lines[0].get_ydata().min() > 4e6 and ax.get_ylabel() == "x"
     page = spline.plot().axes[0]
     assert page.get_ylabel() == "x − 5000000" and page.lines[0].get_ydata().max() < 10
-
-
-def test_the_legend_shows_the_far_side_as_it_is_drawn():
-    turn = np.linspace(0, 5, 9)
-    figure = rendered(ss.CubicSpline(None, np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1), "sphere:2").plot())
-    line = next(own for own in figure.axes[0].lines if role(own) == "far side")
-    handle = legend_of(figure)["far side"]
-    assert (handle.get_color(), handle.get_alpha()) == (line.get_color(), line.get_alpha())

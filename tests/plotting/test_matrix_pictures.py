@@ -309,7 +309,7 @@ def test_boxes_are_filled(name):
     poses[:, :3, 3] = path
     figure = rendered(ss.CubicSpline(t, poses if name == "se:3" else path, name).plot())
     axes = figure.axes[0]
-    drawn = [np.stack(line.get_data_3d(), axis=1) for line in axes.lines if line.get_label() != "_shadow"]
+    drawn = [np.stack(line.get_data_3d(), axis=1) for line in axes.lines if role(line) != "shadow on the floor"]
     points = np.concatenate(drawn)
     low, high = np.nanmin(points, axis=0), np.nanmax(points, axis=0)
     limits = np.array([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()])
@@ -318,7 +318,7 @@ def test_boxes_are_filled(name):
     # The scales of the three axes are equal.
     np.testing.assert_allclose(np.ptp(limits, axis=1) / axes._box_aspect, np.ptp(limits[0]) / axes._box_aspect[0])
     words = " ".join(texts_of(figure))
-    assert "thin: shadow on the floor" in words
+    assert "shadow on the floor" in words
     assert ("16 of 40 given" in words) == (name == "se:3")
 
 

@@ -202,7 +202,7 @@ def draw_box(
     return axes
 
 
-class Box(Axes3D):
+class Box(Axes3D):  # type: ignore[misc]
     """Axes of a box in space that fills the place which the layout of a page gives to it."""
 
     shares: Array = np.ones(2)

@@ -154,7 +154,7 @@ def plot_grid(
                 sides = [side._replace(inches=length) for side, length in zip(sides, axes_size(axes), strict=True)]
             _draw_factor(Panel([axes], mine=True), grid, factor, sides, middles)
             if len(factors) > 1:
-                axes.set_title(name, fontsize="large")
+                axes.set_title(name, loc="center", fontsize="large", weight="normal")
         head(figure, body, title, _description(grid, middles))
     return finish(figure, file, show)
 

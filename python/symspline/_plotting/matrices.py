@@ -167,7 +167,7 @@ class _Rows:
         return self.width / (4.2 * len(row.curve.given)) if row.name == "curve" and row.curve.noise is None else REACH
 
     def symbols(self, reach: float) -> list[tuple[Array, Any, Array | None]]:
-        """Name the rows, and return their symbols, which extend by at most ``reach`` inches; see `_Row.symbols`."""
+        """Name the rows, and return their symbols, which extend by at most ``reach`` inches."""
         made = [row.symbols(self.width, reach) for row in self.rows]
         names = [row.title(len(own[0]), self.panel.mine) for row, own in zip(self.rows, made, strict=True)]
         self.axes.set_yticks([-i for i in range(len(names))], names, fontsize="small")
@@ -426,7 +426,7 @@ def _draw_ellipses(panel: Panel, curves: Sequence[Curve], view: Array) -> None:
 
 
 def _draw_bar(rows: _Rows, length: float, right: float) -> None:
-    """Draw a bar of a length in inches above the axes, ``right`` inches from their right end; inside those of a user."""
+    """Draw a bar of a length in inches above the axes or inside those of a user, ``right`` inches from their end."""
     end, above = -right, 0.12 if rows.panel.mine else -0.1
     tick = [[(x, above - 0.04), (x, above + 0.04)] for x in (end - length, end)]
     look: Any = {"offsets": [(1, 1)], "offset_transform": rows.axes.transAxes, "clip_on": False, "in_layout": False}

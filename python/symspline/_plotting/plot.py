@@ -232,7 +232,7 @@ def check_axes(ax: Any, space: Space) -> None:
         )
 
 
-def _draw_into(ax: Axes, curves: Sequence[Curve], title: str | None = None, show: bool = False) -> Axes:
+def _draw_into(ax: Axes, curves: Sequence[Curve], title: str | None = None, show: bool = False) -> Any:
     """Draw the picture of curves into axes that `check_axes` has accepted."""
     view = view_of(curves)
     if ax.has_data() and (view.is_turned or view.in_rows):

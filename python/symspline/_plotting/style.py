@@ -78,8 +78,8 @@ def colors(number: int) -> list[Any]:
 
 
 def time_colors(share: Any) -> Any:
-    """Return colours from dark to light for numbers from 0 to 1."""
-    return colormaps["viridis"](0.85 * share)
+    """Return colours from dark to light for numbers from 0 to 1, which are visible on the background."""
+    return colormaps["viridis"](0.85 * share + (0.0 if np.mean(ink(0)) > 0.5 else 0.15))
 
 
 # ---- sizes ----
