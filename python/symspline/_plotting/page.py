@@ -150,15 +150,10 @@ _ABOUT: Any = {"left": 0.07, "right": 0.97, "bottom": 0.07, "top": 0.9, "hspace"
 """About the margins that the layout will find. Symbols are as large as the axes permit before it does."""
 
 
-def _caption(axes: Axes, name: str) -> None:
+def _caption(axes: Any, name: str) -> None:
     """Write the name of a factor above its picture, and above explanations that the picture has there."""
-    more = [axes.get_legend(), axes.title if not hasattr(axes, "_left_title") else axes._left_title]
-    tops = [
-        own.get_window_extent().y1
-        for own in more
-        if own is not None and not (hasattr(own, "get_text") and not own.get_text())
-    ]
-    above = 72 * (max([axes.bbox.y1, *tops]) - axes.bbox.y1) / axes.figure.dpi + 6
+    top = max(own.get_window_extent().y1 for own in (axes._left_title, axes.get_legend()) if own is not None)
+    above = 72 * (top - axes.bbox.y1) / axes.figure.dpi + 4
     look: Any = {"xycoords": "axes fraction", "textcoords": "offset points", "ha": "center", "fontsize": "large"}
     axes.annotate(name, (0.5, 1), (0, above), **look)
 

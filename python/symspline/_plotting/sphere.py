@@ -7,7 +7,7 @@ points of the rim are the same line: a curve that leaves the hemisphere there re
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -79,7 +79,7 @@ def _extent(curves: Sequence[Curve], faint: bool = True) -> Array:
 def _draw_sphere(panel: Panel, curves: Sequence[Curve]) -> None:
     """Draw curves on a globe and, if there are axes for it, on a map. Those on the Earth have land and a scale bar."""
     radius, axes = curves[0].radius, panel.axes[0]
-    globe, is_part = _draw_globe(axes, _extent(curves), _Look(small=_SMALL_ON_SPHERE), _extent(curves, faint=False))
+    globe, is_part = _draw_globe(axes, _extent(curves), _extent(curves, faint=False), _SMALL_ON_SPHERE)
     for curve in curves:
         draw_polygon(axes, curve, globe.visible)
         _draw_on_globe(axes, globe, curve, curve.points, curve.given, curve.radii)
@@ -110,9 +110,9 @@ def bloch(_: Sequence[Curve]) -> View:
     """Return the view of CP¹: the Bloch sphere with |0⟩ at the top or, if states are close together, a part of it."""
 
     def draw(panel: Panel, curves: Sequence[Curve]) -> None:
-        look = _Look(spacing=30, lats=(10, 40), labels=_BLOCH)
         (axes,) = panel.axes
-        globe, is_part = _draw_globe(axes, np.concatenate([bloch_vectors(curve.extent) for curve in curves]), look)
+        points = np.concatenate([bloch_vectors(curve.extent) for curve in curves])
+        globe, is_part = _draw_globe(axes, points, points, spacing=30, lats=(10, 40), labels=_BLOCH)
         for curve in curves:
             # Angles between Bloch vectors are twice the distances of states.
             radii = None if curve.radii is None else 2 * curve.radii
@@ -143,8 +143,7 @@ def _hemisphere(what: str, vectors: Callable[[Any], Array]) -> View:
         pole = Globe.above(*middle_of(np.concatenate(lines))).up
         upper = {name: np.multiply(end, 1 if np.dot(end, pole) >= 0 else -1) for name, end in _AXES.items()}
         above = [line * sides(line, pole) for line in lines]
-        look = _Look(labels=upper, half=True)
-        globe, is_part = _draw_globe(axes, np.concatenate(lines), look, np.concatenate(above))
+        globe, is_part = _draw_globe(axes, np.concatenate(lines), np.concatenate(above), labels=upper, half=True)
         for curve, line, shown in zip(curves, lines, lines if is_part else above, strict=True):
             given = shown[curve.knots]
             if curve.noise is not None:
@@ -190,30 +189,6 @@ def _draw_on_globe(axes: Axes, globe: Globe, curve: Curve, line: Array, given: A
     draw_dots(axes, curve, globe.hidden(given), alpha=0.35)
 
 
-class _Look(NamedTuple):
-    """The look of a whole globe, or of its northern half.
-
-    Attributes
-    ----------
-    small : float
-        The largest distance from the middle of curves that are drawn in a frame.
-    spacing : int
-        Spacing of the graticule in degrees.
-    lats : pair of float
-        Range of the latitudes from which the globe may be seen.
-    labels : dict or None
-        Labelled directions, such as "x".
-    half : bool
-        Whether only the northern half is drawn.
-    """
-
-    small: float = _SMALL
-    spacing: int = 15
-    lats: tuple[float, float] = (-90, 90)
-    labels: Any = None
-    half: bool = False
-
-
 def _frame(vectors: Array, small: float, ratio: float) -> tuple[Globe, Array, Array] | None:
     """Return globe, centre and half sides of a frame around vectors; None if they are not close together.
 
@@ -232,22 +207,47 @@ def _frame(vectors: Array, small: float, ratio: float) -> tuple[Globe, Array, Ar
     return (globe, middle, half) if np.linalg.norm(np.abs(middle) + half) < 1 else None
 
 
-def _draw_globe(axes: Axes, vectors: Array, look: _Look, above: Array | None = None) -> tuple[Globe, bool]:
+def _draw_globe(
+    axes: Axes,
+    vectors: Array,
+    seen: Array,
+    small: float = _SMALL,
+    spacing: int = 15,
+    lats: tuple[float, float] = (-90, 90),
+    labels: Any = None,
+    half: bool = False,
+) -> tuple[Globe, bool]:
     """Draw the part of a globe where vectors are, or all of it if they are not close together.
 
-    Returns the globe, and whether it is a part. A whole globe is turned towards the vectors ``above``.
+    Returns the globe, and whether it is a part. A whole globe is turned towards the vectors ``seen``.
+
+    Parameters
+    ----------
+    axes : Axes
+        Axes to draw into.
+    vectors, seen : ndarray, shape (m, 3)
+        Unit vectors of all curves, and of those towards which a whole globe is turned.
+    small : float
+        The largest distance from the middle of curves that are drawn in a frame.
+    spacing : int
+        Spacing of the graticule in degrees.
+    lats : pair of float
+        Range of the latitudes from which the globe may be seen.
+    labels : dict or None
+        Labelled directions, such as "x".
+    half : bool
+        Whether only the northern half is drawn.
     """
     width, height = axes_size(axes)
-    frame = _frame(vectors, look.small, float(np.clip(width / height, 0.5, 2.0))) or _frame(vectors, look.small, 1.0)
+    frame = _frame(vectors, small, float(np.clip(width / height, 0.5, 2.0))) or _frame(vectors, small, 1.0)
     if frame is not None:
         draw_frame(axes, *frame)
         return frame[0], True
-    seen = vectors if above is None else above
-    globe = Globe.above(*middle_of(vectors)) if look.half else facing(seen, look.lats)
-    draw_globe(axes, globe, look.spacing, look.half)
-    if look.labels:
+    globe = Globe.above(*middle_of(vectors)) if half else facing(seen, lats)
+    draw_globe(axes, globe, spacing, half)
+    if labels:
         axes.set(xlim=(-1.22, 1.22), ylim=(-1.22, 1.22))
-        label_directions(axes, globe, look.labels, globe.flat(seen))
+        label_directions(axes, globe, labels, globe.flat(seen))
     return globe, False
 
 
