@@ -20,14 +20,14 @@ from numpy.typing import NDArray
 from tracks import GLOBE, KMH, Comparison, Times, comparison, every, samples, slerp_pieces
 
 from symspline import CubicSpline
-from symspline._plotting.globe import View, degrees, draw_frame, draw_globe
-from symspline._plotting.style import DPI, EDGE, GRID, HALO, INK, SPLINE, heading, window
-from symspline._plotting.theme import invert_page
+from symspline._plotting.globe import Globe, degrees, draw_frame, draw_globe
+from symspline._plotting.style import halo, ink, spline_color, window
 from symspline.geo import from_lonlat, to_lonlat
 
 Array = NDArray[np.float64]
 
-LAND = "#e4dfd2"
+DPI = 150
+SPLINE = spline_color()
 SPEED = LinearSegmentedColormap.from_list(
     "speed", ["#7fb2d6", "#3b6fb6", "#5b3a9a", "#a3297f", "#dd4a3f", "#f7a51c"]
 )
@@ -45,20 +45,29 @@ def coastlines() -> list[Array]:
     return [from_lonlat(*np.array([row.split(",") for row in line], dtype=float).T) for line in lines]
 
 
-def _draw_land(axes: Axes, view: View) -> None:
+def _draw_land(axes: Axes, view: Globe) -> None:
     for ring in coastlines():
         if (ring @ view.up > 0).any():
-            axes.fill(*view.outline(ring).T, facecolor=LAND, linewidth=0, zorder=1)
-            axes.plot(*view.visible(ring).T, color=EDGE, linewidth=0.7, zorder=1)
+            axes.fill(*view.outline(ring).T, facecolor=ink(0.13), linewidth=0, zorder=1)
+            axes.plot(*view.visible(ring).T, color=ink(0.4), linewidth=0.7, zorder=1)
+
+
+def _head(figure: Figure, title: str, subtitle: str, height: float) -> None:
+    """Write title and subtitle in the upper left corner."""
+    figure.text(0.03, height, title, fontsize=18, weight="bold")
+    figure.text(0.03, height - 0.3 / figure.get_figheight(), subtitle, fontsize=12)
 
 
 # ---- the tracks ----
 
 NIGHT = "#14181e"
 """The background of dark pages."""
+_DARK = {"figure.facecolor": NIGHT} | dict.fromkeys(
+    ("text.color", "axes.labelcolor", "xtick.color", "xtick.labelcolor"), "#e8edf2"
+)
 
 _LON, _LAT = -62, 28
-_OVERVIEW = View.above(_LON, _LAT)
+_OVERVIEW = Globe.above(_LON, _LAT)
 # Names that fit beside their track: at its first (0) or last (-1) fix, moved by so many points.
 _NAMES = {
     "Bonnie 2022": (-1, (8, 4), "left"),
@@ -81,6 +90,11 @@ def draw_tracks(
     storms: Sequence[Storm], splines: Sequence[CubicSpline], path: Path, dark: bool = False
 ) -> None:
     """Draw all tracks on a globe, coloured by speed, on a transparent ground; for dark pages if `dark` is True."""
+    with rc_context(_DARK if dark else {}):
+        _tracks(storms, splines).savefig(path, transparent=True)
+
+
+def _tracks(storms: Sequence[Storm], splines: Sequence[CubicSpline]) -> Figure:
     figure = Figure(figsize=(13, 10.4), dpi=DPI)
     axes = figure.add_axes((0.01, 0.085, 0.98, 0.845))
     draw_globe(axes, _OVERVIEW, 15)
@@ -98,14 +112,11 @@ def draw_tracks(
         orientation="horizontal",
         extend="max",
     )
-    bar.set_label("speed of the storm, km/h", color=INK, fontsize=11)
+    bar.set_label("speed of the storm, km/h", color=ink(), fontsize=11)
     bar.outline.set_visible(False)
     title = f"{len(storms)} Atlantic storms as C² curves on the sphere"
-    heading(figure, title, "best tracks of 2021 and 2022, NOAA HURDAT2; dots: fixes", 0.955)
-    if dark:
-        with rc_context({"figure.facecolor": NIGHT}):
-            invert_page(figure)
-    figure.savefig(path, transparent=True)
+    _head(figure, title, "best tracks of 2021 and 2022, NOAA HURDAT2; dots: fixes", 0.955)
+    return figure
 
 
 def _draw_track(axes: Axes, spline: CubicSpline) -> LineCollection:
@@ -136,17 +147,17 @@ def _draw_name(axes: Axes, storm: Storm, spline: CubicSpline) -> None:
         shift,
         textcoords="offset points",
         ha=alignment,
-        color=INK,
+        color=ink(),
         fontsize=10.5,
         weight="bold",
-        path_effects=HALO,
+        path_effects=halo(),
         zorder=6,
     )
 
 
 def _label_graticule(axes: Axes) -> None:
     """Parallels at the horizon, meridians on the equator."""
-    look: dict[str, Any] = {"color": EDGE, "fontsize": 8.5, "va": "center", "zorder": 3}
+    look: dict[str, Any] = {"color": ink(0.4), "fontsize": 8.5, "va": "center", "zorder": 3}
     for lat in (0, 15, 30, 45, 60):
         limb = np.degrees(np.arccos(-np.tan(np.radians(lat)) * np.tan(np.radians(_LAT))))
         for side, ha in ((-1, "right"), (1, "left")):
@@ -164,7 +175,7 @@ def draw_three_points(spline: CubicSpline, path: Path) -> None:
     """A spline through e1, e2, e3 of S² beside the great-circle arcs between them."""
     figure = Figure(figsize=(8, 8.9), dpi=DPI)
     axes = figure.add_axes((0.02, 0.01, 0.96, 0.86))
-    view = View.above(52, 24)
+    view = Globe.above(52, 24)
     draw_globe(axes, view, 15)
     t = np.linspace(0, 2, 401)
     arcs = GLOBE.geodesic(spline.points[:-1, None], spline.points[1:, None], np.linspace(0, 1, 101))
@@ -172,7 +183,7 @@ def draw_three_points(spline: CubicSpline, path: Path) -> None:
         axes.plot(*view.flat(arc).T, "--", color=SLERP, linewidth=2, zorder=4)
     axes.plot(*view.flat(spline(t)).T, color=SPLINE, linewidth=3.4, zorder=5)
     axes.plot(*view.flat(spline(t[::20])).T, "o", color="white", markersize=3.6, markeredgewidth=0, zorder=6)
-    axes.plot(*view.flat(spline.points).T, "o", color=INK, markersize=9, zorder=7)
+    axes.plot(*view.flat(spline.points).T, "o", color=ink(), markersize=9, zorder=7)
     for i, shift in enumerate([(-14, -22), (12, -16), (-10, 14)]):
         x, y = view.flat(spline.points[i])
         axes.annotate(
@@ -180,12 +191,12 @@ def draw_three_points(spline: CubicSpline, path: Path) -> None:
             (x, y),
             shift,
             textcoords="offset points",
-            color=INK,
+            color=ink(),
             fontsize=19,
-            path_effects=HALO,
+            path_effects=halo(),
             zorder=8,
         )
-    heading(figure, "Three points on the sphere", "times 0, 1, 2, natural ends; white dots: every 0.1", 0.955)
+    _head(figure, "Three points on the sphere", "times 0, 1, 2, natural ends; white dots: every 0.1", 0.955)
     handles = [Line2D([], [], color=SPLINE, linewidth=3.4), Line2D([], [], color=SLERP, linewidth=2, ls="--")]
     labels = ["C² spline", "great-circle arcs"]
     figure.legend(
@@ -215,7 +226,7 @@ def draw_comparison(storm: Storm, spline: CubicSpline, path: Path) -> None:
     subtitle = (
         "speed, course and turn rate are continuous along the spline; the turn rate has corners at the fixes"
     )
-    heading(figure, f"What C² buys: {storm.label}", subtitle, 0.945)
+    _head(figure, f"What C² buys: {storm.label}", subtitle, 0.945)
     figure.savefig(path)
 
 
@@ -226,14 +237,14 @@ def _draw_motions(panels: Sequence[Axes], compared: Comparison) -> None:
         for axes, values in zip(panels, (motion.speed, motion.course, motion.turn), strict=True):
             axes.plot(x, values.ravel(), label=name.replace("C2", "C²"), **style)
     for axes, label in zip(panels, ("speed, km/h", "course", "turn rate to the right, °/h"), strict=True):
-        axes.set_ylabel(label, color=INK)
-        axes.grid(color=GRID, linewidth=0.6)
+        axes.set_ylabel(label, color=ink())
+        axes.grid(color=ink(0.2), linewidth=0.6)
         axes.spines[["top", "right"]].set_visible(False)
         axes.set_xticks(days, [_day(time) for time in days] if axes is panels[-1] else [])
         axes.set_xlim(x[0], x[-1])
     _name_courses(panels[1])
     note = "arcs and linear lon/lat: about 0 between the fixes,\ninfinite at them, where the course jumps"
-    panels[2].text(0.15, 0.06, note, transform=panels[2].transAxes, color=INK, fontsize=9.5)
+    panels[2].text(0.15, 0.06, note, transform=panels[2].transAxes, color=ink(), fontsize=9.5)
 
 
 def _name_courses(axes: Axes) -> None:
@@ -256,14 +267,14 @@ def _day(time: np.datetime64) -> str:
 def _draw_storm(axes: Axes, spline: CubicSpline) -> None:
     """The track from above, with the date at every midnight."""
     lon, lat = (float(value) for value in to_lonlat(spline.points.mean(axis=0)))
-    view = View.above(lon, lat)
+    view = Globe.above(lon, lat)
     line = view.flat(spline(every(np.timedelta64(10, "m"), spline.t)))
     draw_frame(axes, view, *window(line, 1.22))
     dots, arcs = view.flat(spline.points), slerp_pieces(spline)
     axes.plot(*line.T, color=SPLINE, linewidth=2.8, zorder=4)
     for arc in arcs.at(samples(arcs, 13)):
         axes.plot(*view.flat(arc).T, color=SLERP, linewidth=1.2, zorder=5)
-    axes.plot(*dots.T, "o", color=INK, markersize=4, zorder=6)
+    axes.plot(*dots.T, "o", color=ink(), markersize=4, zorder=6)
     left = view.flat(spline.velocities) @ np.array([[0, 1], [-1, 0]])
     left /= np.linalg.norm(left, axis=-1, keepdims=True)
     for i in np.flatnonzero(_midnight(spline.t)):
@@ -274,7 +285,7 @@ def _draw_storm(axes: Axes, spline: CubicSpline) -> None:
             textcoords="offset points",
             ha="center",
             va="center",
-            color=INK,
-            path_effects=HALO,
+            color=ink(),
+            path_effects=halo(),
             zorder=7,
         )

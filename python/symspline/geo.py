@@ -533,8 +533,8 @@ def plot(
 ) -> Figure | Axes:
     """Plot a track, or several, on the Earth, with land, its speed in km/h and its acceleration.
 
-    Tracks that fit into a circle of 25 degrees around a point are enlarged, with a scale bar and a small globe that
-    shows where they are. Longer ones are drawn on a globe and on a map.
+    Tracks that fit into a circle of 25 degrees around a point are enlarged, with a scale bar. Longer ones are
+    drawn on a globe and on a map.
 
     Parameters
     ----------

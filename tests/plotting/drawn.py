@@ -7,6 +7,13 @@ import numpy as np
 
 import symspline as ss
 
+VIEWS = (
+    *("euclidean:1", "euclidean:2", "euclidean:3", "euclidean:5", "sphere:1", "sphere:2", "hyperbolic:2", "rp:1"),
+    *("rp:2", "gr:2,5", "cp:1", "ch:2", "gr:2,3", "o:2", "su:2", "u:1", "spd:2", "spd:3", "spd:5", "se:2", "se:3"),
+    "stiefel:2,4",
+)
+"""One space of every view."""
+
 
 def points_around(space, rng, shape):
     """Points less than a radian or so from each other."""
@@ -30,7 +37,8 @@ def rendered(figure):
 
 def axes_named(figure, label):
     """The axes whose vertical axis has a label, or which have the name themselves."""
-    (found,) = [axes for axes in figure.axes if label in (axes.get_ylabel().split("\n")[0], axes.get_label())]
+    everything = [own for axes in figure.axes for own in (axes, *axes.child_axes)]
+    (found,) = [axes for axes in everything if label in (axes.get_ylabel().split("\n")[0], axes.get_label())]
     return found
 
 
@@ -58,5 +66,25 @@ def has_title(figure, kind, space):
     return any(text.startswith(kind) and text.endswith((f" on {space!r}", f" on {space}")) for text in texts_of(figure))
 
 
+def legend_of(figure):
+    """The legend of a page: artists by their names."""
+    (body,) = figure.subfigs
+    (legend,) = body.legends
+    return dict(zip([own.get_text() for own in legend.get_texts()], legend.legend_handles, strict=True))
+
+
 def texts_of(figure):
     return [text.get_text() for text in figure.findobj(matplotlib.text.Text)]
+
+
+ROLES = (
+    *("start", "end", "given points", "given poses", "some of the poses", "poses of the curve", "control points"),
+    *("data", "95 % band", "far side", "curve in a gap", "gap", "limit", "single curves", "other curves", "median"),
+    *("5–95 %", "shadow on the floor"),
+)
+
+
+def role(artist):
+    """What the legend of a page says of an artist, without details."""
+    label = str(artist.get_label()).removeprefix("_")
+    return next((own for own in ROLES if label.startswith(own)), label)

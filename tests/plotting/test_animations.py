@@ -6,40 +6,37 @@ import subprocess
 import matplotlib.animation
 import numpy as np
 import pytest
-from drawn import points_around, rate_axes, spline_on
+from drawn import VIEWS, points_around, rate_axes, spline_on, texts_of
 from PIL import Image
 from refused import raises
-from test_figure import KINDS
 
 import symspline as ss
 
-ONE_OF_EACH = {draw: name for name, draw in KINDS.items()}.values()
-ORANGE = "#d95f0e"
 
-
-def at_frame(curve, row):
-    """The figure of an animation at a sample of the curve."""
+def at_time(curve, x):
+    """The figure of an animation at a time, counted from the first."""
     moving = curve.animate(frames=2)
     moving._draw_was_started = True
-    moving._func(row)
+    moving._func(x)
     return moving._fig
 
 
-@pytest.mark.parametrize("name", ONE_OF_EACH)
+@pytest.mark.parametrize("name", VIEWS[::3])
 def test_every_space_moves(name):
-    figure = at_frame(spline_on(name), 17)
+    figure = at_time(spline_on(name), 0.5)
+    assert "t = 0.5" in texts_of(figure)
     for axes in rate_axes(figure)[0]:
         cursor, dot = axes.lines[-1], axes.lines[-2]
         (line,) = [line for line in axes.lines if line.get_gid() == "_curve"]
-        assert cursor.get_xdata()[0] == line.get_xdata()[17]
-        assert (dot.get_xdata()[0], dot.get_ydata()[0]) == (line.get_xdata()[17], line.get_ydata()[17])
+        assert cursor.get_xdata()[0] == 0.5
+        np.testing.assert_allclose(dot.get_xydata(), [[0.5, np.interp(0.5, *line.get_data())]], atol=1e-12)
 
 
 def test_products_with_graphs_move():
     """Also if a factor has several panels."""
     space, rng = ss.space("spd:4 x so:3 x se:3"), np.random.default_rng(3)
     curve = ss.CubicSpline(None, tuple(points_around(own, rng, (6,)) for own in space.factors), space)
-    figure = at_frame(curve, 100)
+    figure = at_time(curve, 1.0)
     assert len([axes for axes in figure.axes if axes.get_gid() == "time"]) >= 5
 
 
@@ -47,12 +44,12 @@ def test_the_marker_is_on_the_curve():
     """On the plane, on both sides of a globe, and on a map that the curve leaves on one side."""
     spline = spline_on("r:2")
     x = np.linspace(*spline.domain, 1201)
-    figure = at_frame(spline, 240)
+    figure = at_time(spline, x[240])
     dot = figure.axes[0].lines[-1]
     np.testing.assert_allclose(np.ravel(dot.get_xydata()), spline(x[240]), atol=1e-12)
     angle = np.radians(np.linspace(100, 260, 6))
     around = ss.CubicSpline(None, np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=-1), "sphere:2")
-    figure = at_frame(around, 1100)
+    figure = at_time(around, np.linspace(0, 5, 1201)[1100])
     plan = next(axes for axes in figure.axes if axes.get_label() == "map")
     lon, lat = plan.lines[-1].get_xydata()[0]
     point = around(np.linspace(0, 5, 1201)[1100])
@@ -62,7 +59,7 @@ def test_the_marker_is_on_the_curve():
 
 def test_frames_of_poses_move():
     spline = spline_on("se:3")
-    figure = at_frame(spline, 100)
+    figure = at_time(spline, np.linspace(*spline.domain, 1201)[100])
     pose = spline(np.linspace(*spline.domain, 1201)[100])
     sticks = [np.stack(line.get_data_3d(), axis=1) for line in figure.axes[0].lines[-3:]]
     for i, stick in enumerate(sticks):
@@ -73,7 +70,7 @@ def test_frames_of_poses_move():
 
 def test_gaps_are_skipped():
     segments = [spline_on("r:1", t=np.arange(6.0)), spline_on("r:1", t=20 + np.arange(6.0))]
-    at_frame(ss.SegmentedCurve(segments), 1300)
+    at_time(ss.SegmentedCurve(segments), 21.0)
 
 
 def test_files(tmp_path):

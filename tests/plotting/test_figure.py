@@ -9,51 +9,20 @@ from io import BytesIO
 
 import numpy as np
 import pytest
-from drawn import axes_named, has_title, lines_of, points_around, rate_axes, rendered, spline_on, texts_of
+from drawn import VIEWS, axes_named, has_title, lines_of, points_around, rate_axes, rendered, role, spline_on, texts_of
 from matplotlib.dates import date2num
 from matplotlib.figure import Figure
 from refused import raises
 
 import symspline as ss
-from symspline._plotting import chart, columns, graphs, matrices, sphere
-from symspline._plotting.figure import picture_of
 
-DRAWN_BY = {
-    graphs.draw_graph: "euclidean:1",
-    chart.draw_plane: "euclidean:2",
-    chart.draw_3d: "euclidean:3",
-    graphs.draw_components: "euclidean:5 sphere:15 hyperbolic:1 so:4 u:3 su:3 spd:1 hpd:2",
-    graphs.draw_circle: "sphere:1",
-    sphere.draw_sphere: "sphere:2",
-    chart.draw_disk: "hyperbolic:2",
-    graphs.draw_slope: "rp:1 gr:1,2",
-    sphere.draw_lines: "rp:2 gr:1,3",
-    graphs.draw_principal_angles: "rp:4 cp:2 gr:2,5 gr:4,5 cgr:2,3",
-    sphere.draw_bloch: "cp:1 cgr:1,2",
-    graphs.draw_ratios: "ch:2",
-    sphere.draw_normals: "gr:2,3",
-    graphs.draw_turn: "so:2 o:2",
-    matrices.draw_rotations: "sphere:3 so:3 o:3 su:2",
-    graphs.draw_phase: "u:1",
-    matrices.draw_ellipses: "spd:2",
-    matrices.draw_ellipsoids: "spd:3",
-    matrices.draw_covariances: "spd:4 spd:5",
-    matrices.draw_flat_poses: "se:2",
-    matrices.draw_poses: "se:3",
-    columns.draw_columns: "stiefel:2,4 stiefel:5,7",
-}
-KINDS = {name: draw for draw, names in DRAWN_BY.items() for name in names.split()}
-
-# Batches, of every kind of picture.
-FIRST = {draw: name for name, draw in reversed(KINDS.items())}
 SIGNED = {"euclidean:1", "sphere:1", "hyperbolic:1", "rp:1", "gr:1,2", "so:2", "o:2", "u:1", "spd:1"}
-DRAWN = [*((name, (6,)) for name in KINDS), *((name, (3, 6)) for name in FIRST.values())]
 
 
-@pytest.mark.parametrize(("name", "shape"), DRAWN, ids=str)
+@pytest.mark.parametrize(("name", "shape"), list(zip(VIEWS, [(6,), (3, 6)] * 11, strict=True)), ids=str)
 def test_every_space_is_drawn(name, shape):
+    """Alternately one curve and a batch."""
     spline = spline_on(name, shape)
-    assert picture_of(spline.space).draw is KINDS[name]
     figure = rendered(spline.plot())
     assert isinstance(figure, Figure)
     assert has_title(figure, "C² spline", spline.space)
@@ -125,7 +94,7 @@ def test_rounding_is_not_blown_up():
     spline = ss.CubicSpline(None, np.stack([np.cos(angle), np.sin(angle)], axis=-1), "sphere:1")
     ((axes,), (bend,)) = rate_axes(spline.plot())
     assert bend.get_ylim()[1] > 0.1 and axes.get_ylim()[0] < 0 < 1 < axes.get_ylim()[1]
-    for name in FIRST.values():
+    for name in VIEWS:
         point = ss.space(name).random_point(np.random.default_rng(3))
         figure = ss.CubicSpline(None, np.stack([point] * 3), name).plot()
         assert rate_axes(figure)[0][0].get_ylim()[1] > 0.5
@@ -259,7 +228,7 @@ def test_gaps_far_longer_than_the_rest_are_marked(dates):
     figure = rendered(spline_on("r:2", (11,), t=t).plot())
     assert any(text.endswith("natural ends, 2 long gaps") for text in texts_of(figure))
     for label in ("speed", "acceleration"):
-        (bands,) = [c for c in axes_named(figure, label).collections if c.get_label() == "gaps"]
+        (bands,) = [c for c in axes_named(figure, label).collections if role(c) == "gap"]
         edges = [sorted(set(path.vertices[:, 0])) for path in bands.get_paths()]
         since = date2num(t[0]) if dates else 0.0
         assert np.allclose(edges, since + np.array([[4, 18], [22, 33]]))

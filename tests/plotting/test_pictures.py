@@ -2,12 +2,10 @@
 
 import numpy as np
 import pytest
-from drawn import axes_named, dots_of, lines_of, rendered, spline_on, texts_of
-from matplotlib.colors import to_rgba
+from drawn import axes_named, dots_of, lines_of, rendered, role, spline_on, texts_of
 
 import symspline as ss
 from symspline import geo
-from symspline._plotting import chart, globe, sphere
 from symspline.geo import from_lonlat
 
 MERIDIAN = np.array([[1.0, 0, 0], [1, 0, 1], [0, 0, 1], [-1, 0, 2], [-1, 0, 0]])
@@ -27,46 +25,6 @@ def test_no_line_jumps_across_the_map(points):
     assert np.nanmax(np.abs(line), axis=0) == pytest.approx([180, 90], abs=90)
 
 
-def test_map_line_is_broken_where_it_leaves_the_map():
-    broken = sphere.broken(np.array([[170.0, 10], [-170, 20], [-160, 30]]))
-    np.testing.assert_array_equal(broken, [[170, 10], [180, 15], [np.nan] * 2, [-180, 15], [-170, 20], [-160, 30]])
-    broken = sphere.broken(np.array([[30.0, 88], [-150, 89]]))
-    np.testing.assert_array_equal(broken, [[30, 88], [30, 90], [np.nan] * 2, [-150, 90], [-150, 89]])
-
-
-def test_longitude_at_a_pole_is_that_before():
-    places = sphere.lonlat_of(from_lonlat([50, 50, 50, -130], [80, 89, 90, 89]))
-    np.testing.assert_allclose(places[:, 0], [50, 50, 50, -130])
-    places = sphere.lonlat_of(np.array([[0, 0, 1.0], [0, 0.6, 0.8]]))
-    np.testing.assert_allclose(places[:, 0], [90, 90])
-
-
-def test_globe_is_turned_towards_the_curve():
-    rng = np.random.default_rng(4)
-    for size in (1e-5, 0.1, 0.6):
-        points = ss.Sphere(2).project(from_lonlat(130, -40) + size * rng.uniform(-1, 1, (30, 3)))
-        view = globe.View.above(*globe.middle_of(points))
-        assert (points @ view.up > 0).all()
-        assert np.linalg.norm(view.flat(points), axis=-1).max() < 1.8 * size
-    equator = from_lonlat(np.arange(0, 360, 5), 0)
-    view = globe.View.above(*globe.middle_of(equator))
-    assert np.ptp(view.flat(equator), axis=0).min() > 0.5  # not seen from its edge
-
-
-def test_globe_is_turned_towards_the_few_curves_with_points():
-    """The others of a batch are all around; what is behind the globe is not drawn."""
-    rng = np.random.default_rng(1)
-    points = ss.Sphere(2).project(rng.normal(size=(41, 1, 3)) + 0.05 * rng.normal(size=(41, 6, 3)))
-    named = [0, 20, 40]
-    points[named] = ss.Sphere(2).project(from_lonlat(130, -40) + 0.2 * rng.normal(size=(3, 6, 3)))
-    axes = rendered(ss.CubicSpline(None, points, "sphere:2").plot()).axes[0]
-    seen = [line.get_xydata() for line in axes.lines if line.get_label() == "_given" and line.get_alpha() is None]
-    assert len(seen) == 3 and np.isfinite(seen).all() and np.linalg.norm(seen, axis=-1).max() < 0.8
-    others = [line for line in axes.lines if line.get_label() == "_others"]
-    assert len(others) == 38 and all(line.get_linestyle() == "-" for line in others)
-    assert min(np.isfinite(line.get_xydata()).all(axis=1).sum() for line in others) == 0
-
-
 @pytest.mark.parametrize(("west", "middle"), [(-60, 0), (100, 180), (20, 0), (160, 240), (-170, 0)])
 def test_maps_are_centred_on_curves(west, middle):
     """Only if a curve would leave the map otherwise, and by multiples of 60 degrees."""
@@ -74,12 +32,15 @@ def test_maps_are_centred_on_curves(west, middle):
     spline = ss.CubicSpline(None, from_lonlat(lon, 20 * np.sin(lon)), "sphere:2")
     plan = next(axes for axes in rendered(spline.plot()).axes if axes.get_label() == "map")
     names = dict(zip(plan.get_xticks().tolist(), [text.get_text() for text in plan.get_xticklabels()], strict=True))
-    assert names[0] == globe.degrees(middle, "E", "W") and names[30] == globe.degrees(middle + 30, "E", "W")
+    assert (
+        names[0] == {0: "0°", 180: "180°", 240: "120°W"}[middle]
+        and names[30] == {0: "30°E", 180: "150°W", 240: "90°W"}[middle]
+    )
     # The map is a part, as long as the curve and not beyond the whole one.
     (left, right), (south, north) = plan.get_xlim(), plan.get_ylim()
     assert 125 < right - left < 145 and right - left == pytest.approx(2 * (north - south))
     assert left >= -180 and right <= 180
-    dots = [line.get_xydata() for line in plan.lines if line.get_label() == "_given"]
+    dots = [line.get_xydata() for line in plan.lines if role(line) == "given points"]
     np.testing.assert_allclose((dots[0][:, 0] + middle - lon + 180) % 360, 180, atol=1e-9)
     curve = next(line.get_xydata() for line in plan.lines if line.get_gid() == "_curve")
     assert np.isfinite(curve).all() and left < curve[:, 0].min() and curve[:, 0].max() < right
@@ -102,12 +63,6 @@ def test_small_curve_is_enlarged_with_labels(lon, lat, size):
     for axis, letters in ((axes.xaxis, "°EW"), (axes.yaxis, "°NS")):
         labels = [text.get_text() for text in axis.get_ticklabels()]
         assert 1 <= len(labels) <= 12 and all(set(label) & set(letters) for label in labels)
-
-
-def test_degrees():
-    values = [-30, 0, 30, 180, -180, 190, 12.5]
-    words = ["30°W", "0°", "30°E", "180°", "180°", "170°W", "12.5°E"]
-    assert [globe.degrees(value, "E", "W") for value in values] == words
 
 
 TURN = 1.3 * np.arange(12)
@@ -133,13 +88,12 @@ def test_angle_does_not_jump():
 
 
 def test_poincare_disk():
+    """Distances from the centre are those of the hyperbolic plane."""
     plane, origin = ss.Hyperbolic(2), np.array([1.0, 0, 0])
-    p = plane.random_point(np.random.default_rng(7), 20)
-    places = chart.flat(p, origin)
-    np.testing.assert_allclose(np.linalg.norm(places, axis=-1), np.tanh(plane.distance(origin, p) / 2))
-    np.testing.assert_allclose(chart.flat(p[0], p[0]), 0, atol=1e-14)
-    moved = chart.flat(p, p[0])
-    np.testing.assert_allclose(np.linalg.norm(moved, axis=-1), np.tanh(plane.distance(p[0], p) / 2), atol=1e-7)
+    points = plane.random_point(np.random.default_rng(7), 20)
+    axes = ss.CubicSpline(None, np.concatenate([points, [origin]]), plane, on_failure="ignore").plot().axes[0]
+    (places,) = [line.get_xydata() for line in axes.lines if role(line) == "given points"]
+    np.testing.assert_allclose(np.linalg.norm(places[:-1], axis=-1), np.tanh(plane.distance(origin, points) / 2))
 
 
 def test_disk_moves_to_a_curve_that_is_far_away():
@@ -149,23 +103,10 @@ def test_disk_moves_to_a_curve_that_is_far_away():
     assert np.abs(lines_of(figure.axes[0])[0]).max() < 0.7
 
 
-BLOCH = {
-    (1, 0): (0, 0, 1),
-    (0, 1j): (0, 0, -1),
-    (0.5**0.5, 0.5**0.5): (1, 0, 0),
-    (0.5**0.5, 0.5**0.5 * 1j): (0, 1, 0),
-    (0.6, 0.8j): (0, 0.96, -0.28),
-}
-
-
-def test_bloch_vectors():
-    states = np.array(list(BLOCH))
-    vectors = sphere.bloch_vectors(states)
-    np.testing.assert_allclose(vectors, list(BLOCH.values()), atol=1e-15)
-    np.testing.assert_allclose(sphere.bloch_vectors(states[:, :, None] * np.exp(2j)), vectors, atol=1e-15)
-    p, q = ss.ComplexProjective(1).random_point(np.random.default_rng(11), (2, 20))
-    angle = np.arccos(np.sum(sphere.bloch_vectors(p) * sphere.bloch_vectors(q), axis=1))
-    np.testing.assert_allclose(angle, 2 * ss.ComplexProjective(1).distance(p, q))
+def bloch_vectors(states):
+    """The expected values of the Pauli matrices."""
+    a, b = states.T
+    return np.stack([2 * (a.conj() * b).real, 2 * (a.conj() * b).imag, np.abs(a) ** 2 - np.abs(b) ** 2], axis=-1)
 
 
 @pytest.mark.parametrize("size, zoomed", [(0.3, False), (0.03, True)])
@@ -175,13 +116,13 @@ def test_states_are_drawn_on_the_bloch_sphere(size, zoomed):
     middle = space.random_point(rng)
     points = space.exp(middle, size * space.random_tangent(rng, np.stack([middle] * 8)))
     figure = rendered(ss.CubicSpline(None, points, "cp:1").plot())
-    axes, vectors = figure.axes[0], sphere.bloch_vectors(points)
+    axes, vectors = figure.axes[0], bloch_vectors(points)
     places, first = dots_of(axes)
     view = np.linalg.lstsq(vectors, places)[0]
     np.testing.assert_allclose(vectors @ view, places, atol=1e-9)
     np.testing.assert_allclose(view.T @ view, np.eye(2), atol=1e-9)
     np.testing.assert_array_equal(first, places[:1])
-    labels = {text.get_text(): text.get_position() for text in axes.texts}
+    labels = {text.get_text(): text.get_position() for text in axes.texts if len(text.get_text()) < 4}
     assert not labels if zoomed else labels.keys() == {"|0⟩", "|1⟩", "x", "y"}
     for label, direction in {"|0⟩": 2, "x": 0, "y": 1}.items() if labels else ():
         np.testing.assert_allclose(labels[label], 1.17 * view[direction], atol=1e-9)
@@ -224,34 +165,6 @@ def test_no_line_jumps_across_the_half_sphere(name, points, crosses):
         assert np.nanmin(np.linalg.norm(line - dot, axis=1)) < 1e-12
 
 
-def test_crossings_of_the_rim_have_equal_letters():
-    axes = rendered(ss.CubicSpline(None, HALF_SPHERE, "rp:2").plot()).axes[0]
-    letters = {}
-    for text in axes.texts:
-        letters.setdefault(text.get_text(), []).append(np.array(text.get_position()))
-    names = [name for name in "abc" if name in letters]
-    gaps = [np.isnan(line[:, 0]).sum() for line in lines_of(axes) if len(line) > 1000]
-    assert len(names) == min(gaps) > 0 and all(len(letters[name]) == 2 for name in names)
-    for first, second in (letters[name] for name in names):
-        np.testing.assert_allclose(first, -second, atol=1e-9)
-
-
-def test_every_part_of_a_broken_curve_has_an_arrow_head():
-    lon = np.linspace(0, 212, 9)
-    points = from_lonlat(lon, 12 * np.sin(lon / 30))
-    axes = rendered(ss.CubicSpline(None, points, "rp:2").plot()).axes[0]
-    (line,) = [line for line in lines_of(axes) if len(line) > 1000]
-    (heads,) = [own for own in axes.collections if own.get_label() == "_time"]
-    (gaps,) = np.nonzero(np.isnan(line[:, 0]))
-    parts = [part[np.isfinite(part[:, 0])] for part in np.split(line, gaps)]
-    lengths = np.array([np.linalg.norm(np.diff(part, axis=0), axis=1).sum() for part in parts])
-    shares = lengths / lengths.sum()
-    assert len(parts) == 3 and 0.04 < min(shares) < 0.16
-    for part in parts:
-        away = np.linalg.norm(part[:, None] - heads.get_offsets(), axis=-1)
-        assert away.min() < 0.01
-
-
 def test_closed_curves_have_no_end():
     turn = np.linspace(0, 2 * np.pi, 9)
     points = np.stack([np.cos(turn), np.sin(turn), 0.3 * np.sin(turn)], axis=1)
@@ -261,22 +174,6 @@ def test_closed_curves_have_no_end():
     for name, closed in paths:
         texts = texts_of(rendered(ss.CubicSpline(None, closed, name, bc_type="periodic").plot()))
         assert "start" in texts and "end" not in texts
-
-
-def test_labels_of_axes_avoid_the_curve():
-    view = globe.View.above(20, 42)
-    axes = rendered(ss.CubicSpline(None, HALF_SPHERE, "rp:2").plot()).axes[0]
-    curve = np.concatenate([line for line in lines_of(axes) if len(line) > 1000])
-    for text in axes.texts:
-        if text.get_text()[0] == "x":
-            # Of both ends of an axis, that on the half sphere has the label.
-            assert text.get_alpha() == 0.9
-            assert np.nanmin(np.linalg.norm(curve - text.get_position(), axis=1)) > 0.1
-    # A label stays at the end of its axis if there is space.
-    end = view.flat(np.array([0.0, 0.0, 1.17]))
-    for near, stays in ((end, False), (end + 0.3, True)):
-        at = globe._free(end, view.flat(np.array([0.0, 0.0, 1.0])), near[None])
-        assert (at == end).all() == stays and np.linalg.norm(at - near) > 0.1
 
 
 @pytest.mark.parametrize("name", ["r:2", "h:2", "sphere:2", "rp:2", "cp:1"])
@@ -296,15 +193,6 @@ def test_arrow_heads_point_along_the_curve(name):
     assert not [own for own in rendered(rest.plot()).axes[0].collections if own.get_label() == "_time"]
 
 
-def test_small_curve_on_the_half_sphere_is_enlarged():
-    """Also across the rim, where nothing is broken."""
-    points = ss.Sphere(2).project(np.array([[1, 0, 0.02], [1, 0.03, -0.01], [1, 0.04, -0.05]]))
-    axes = rendered(ss.CubicSpline(None, [[1], [-1], [1]] * points, "rp:2").plot()).axes[0]
-    assert np.ptp(axes.get_xlim()) < 0.2
-    (line,) = [line for line in lines_of(axes) if len(line) > 1000 and np.isfinite(line).all()]
-    assert np.linalg.norm(np.diff(line, axis=0), axis=1).max() < 0.01
-
-
 @pytest.mark.parametrize(
     ("size", "is_part"), [((20, 20), True), ((60, 30), True), ((20, 80), False), ((120, 30), False)]
 )
@@ -312,7 +200,6 @@ def test_curves_are_enlarged_if_the_frame_is_on_the_globe(size, is_part):
     lon, lat = np.transpose([[0, 0], [0.5, 0.8], [1, 1]]) * np.reshape(size, (2, 1))
     spline = ss.CubicSpline(None, from_lonlat(lon - size[0] / 2, lat - size[1] / 2), "sphere:2")
     figure = rendered(spline.plot())
-    assert any(axes.get_label() == "locator" for axes in figure.axes) == is_part
     assert any(axes.get_label() == "map" for axes in figure.axes) != is_part
     if is_part:
         corners = np.abs([figure.axes[0].get_xlim(), figure.axes[0].get_ylim()]).max(axis=1)
@@ -325,43 +212,6 @@ def test_the_start_of_a_curve_around_the_globe_is_in_front():
         lon = np.cumsum(rng.uniform(16, 19, 10)) + rng.uniform(-180, 180)
         spline = ss.CubicSpline(None, from_lonlat(lon, 20 * np.sin(lon / 40)), "sphere:2")
         axes = rendered(spline.plot()).axes[0]
-        starts = [line.get_xydata()[0] for line in axes.lines if line.get_label() == "_start"]
+        starts = [line.get_xydata()[0] for line in axes.lines if role(line) == "start"]
         (start,) = [own for own in starts if np.isfinite(own).all()]
         assert np.linalg.norm(start) < np.sqrt(1 - 0.3**2)
-
-
-@pytest.mark.parametrize("name", ["r:2", "h:2", "sphere:2", "rp:2", "cp:1"])
-def test_arrow_heads_are_away_from_points_and_the_end_is_marked(name):
-    for seed in range(4):
-        space, rng = ss.space(name), np.random.default_rng(seed)
-        points = [space.random_point(rng)]
-        for _ in range(7):
-            points.append(space.exp(points[-1], 0.25 * space.random_tangent(rng, points[-1])))
-        spline = ss.CubicSpline(None, np.array(points), space)
-        figure = rendered(spline.plot())
-        axes = figure.axes[0]
-        (heads,) = [own for own in axes.collections if own.get_label() == "_time"]
-        at = axes.transData.transform(heads.get_offsets())
-        dots = [line.get_xydata() for line in axes.lines if line.get_label() == "_given"]
-        dots = axes.transData.transform(np.concatenate(dots))
-        dots = dots[np.isfinite(dots[:, 0])]
-        line = np.concatenate([own.get_xydata() for own in axes.lines if own.get_gid() == "_curve"])
-        length = np.nansum(np.linalg.norm(np.diff(axes.transData.transform(line), axis=0), axis=1))
-        gaps = np.linalg.norm(at[:, None] - dots, axis=-1).min(axis=1)
-        # A third of the space between two of eight points, at least for all but one arrow head.
-        assert len(at) >= 2 and np.sort(gaps)[1] > length / 7 / 8
-        ends = [own.get_xydata() for own in axes.lines if own.get_label() == "_end"]
-        assert np.isfinite(np.concatenate(ends)).all(axis=1).sum() == 1
-        assert "end" in texts_of(figure)
-
-
-def test_starts_on_the_far_side_are_faint_rings():
-    """Their white face would otherwise be grey, as of a given point."""
-    turn = np.linspace(0, 2 * np.pi, 9)
-    points = np.stack([np.cos(turn), np.sin(turn), 0.2 * np.sin(2 * turn)], axis=1)
-    curves = [ss.CubicSpline(None, ss.Sphere(2).project(np.roll(points, k, axis=0)[:5]), "sphere:2") for k in (0, 4)]
-    axes = rendered(ss.plot(curves)).axes[0]
-    starts = [own for own in axes.lines if own.get_label() == "_start" and np.isfinite(own.get_xydata()).all()]
-    edges = sorted(to_rgba(own.get_markeredgecolor())[3] for own in starts)
-    assert edges == [0.35, 1.0] and all(own.get_markerfacecolor() == "white" for own in starts)
-    assert all(own.get_alpha() is None for own in starts)

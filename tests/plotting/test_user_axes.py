@@ -4,15 +4,12 @@ import matplotlib
 import matplotlib.style
 import numpy as np
 import pytest
-from drawn import lines_of, rendered, spline_on
+from drawn import VIEWS, lines_of, rendered, spline_on
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from refused import raises
-from test_figure import KINDS
 
 import symspline as ss
-
-ONE_OF_EACH = {draw: name for name, draw in KINDS.items()}.values()
 
 
 def axes_for(name, figure=None):
@@ -20,7 +17,7 @@ def axes_for(name, figure=None):
     return (figure or Figure(figsize=(6, 5))).add_subplot(projection=projection)
 
 
-@pytest.mark.parametrize("name", ONE_OF_EACH)
+@pytest.mark.parametrize("name", VIEWS)
 def test_every_picture_is_drawn_into_axes(name):
     ax = axes_for(name)
     assert spline_on(name).plot(ax=ax, title="mine") is ax

@@ -1,15 +1,14 @@
 """Pictures of curves and grids, as `symspline.Curve.plot` and `GridSpline.plot` draw them with matplotlib.
 
-Every figure of a curve has a picture that depends on the space, and graphs of velocity and acceleration. The module
-`figure` has a table of the picture of every space, and the module `fields` one for grids; the modules that they import
-draw the pictures. The module `collect` samples curves, `comparison` draws several curves and data, and `animation`
-moves a marker along a curve.
+A page of a curve has the view of its space, and graphs of velocity and acceleration. The module `views` has a table
+with the view of every space, and the module `grid` one for grids. `curves` samples what is drawn, `lines` draws it
+along a curve, and `sphere`, `chart`, `poses`, `matrices` and `graphs` have the views. `page` lays out a page and
+explains its symbols, `plot` draws one or several curves on a page or in axes of the user, and `animation` moves a
+marker along a curve. Colours and fonts are those of the active style of matplotlib.
 """
 
 from .animation import animate
-from .comparison import compare
-from .grids import plot_grid
-from .looks import checked_look
-from .page import plot
+from .grid import plot_grid
+from .plot import checked_look, compare, plot
 
 __all__ = ["animate", "checked_look", "compare", "plot", "plot_grid"]

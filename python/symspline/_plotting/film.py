@@ -11,9 +11,10 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from .._core import ValidationError
-from .figure import drawing, finish
-from .rows import VIEW
-from .style import DATES, EDGE, HALO, INK, Array, heading, plain, points, show_dates, time_colors, window
+from .matrices import VIEW
+from .page import drawing
+from .plot import finish
+from .style import DATES, Array, halo, ink, plain, show_dates, time_colors, window
 
 # Drawings in the strip, and in each row of the small multiples.
 _STRIP, _ROWS, _COLUMNS = 19, 2, 6
@@ -45,10 +46,13 @@ def plot_film(t: NDArray[Any], landmarks: Array, film: Callable[[Any], Array], f
     size = 2.1 * max(float(np.abs(_centred(x)).max()) for x in seen)
     middle, half = window(seen[2].reshape(-1, 2), 1.25)
     words = f"{drawings} given drawings of {count} landmarks, and others between them; colour: time"
-    with drawing((_WIDTH, _HEIGHT)) as figure:
-        heading(figure, "Morph along a C² spline of affine shapes", words, 0.93)
+    with drawing((_WIDTH, _HEIGHT), None, False) as figure:
+        figure.set_layout_engine(None)
+        title = "Morph along a C² spline of affine shapes"
+        figure.text(0.03, 0.93, title, weight="bold", fontsize="xx-large")
+        figure.text(0.03, 0.93 - 0.3 / _HEIGHT, words, fontsize="large")
         _draw_strip(figure.add_axes((0.05, 0.58, 0.9, 0.24)), t, strip, seen[0], seen[1], size)
-        caption: Any = {"color": INK, "fontsize": points(9)}
+        caption: Any = {"fontsize": "small"}
         figure.text(0.03, 0.84, "each drawing centred at its time; filled: given", **caption)
         dot = "; white dot: first landmark" * (count > _NUMBERED)
         figure.text(0.03, 0.51, f"drawings at their positions; bold frames: given{dot}", **caption)
@@ -122,13 +126,13 @@ def _draw_strip(axes: Axes, t: NDArray[Any], strip: NDArray[Any], given: Array, 
 
 def _draw_one(axes: Axes, x: Any, drawing: Array, color: Any, given: bool) -> None:
     """Draw one drawing at its position, with the numbers of its landmarks if they are few. Given ones have a frame."""
-    axes.spines[:].set(color=INK if given else EDGE, linewidth=1.4 if given else 0.5)
+    axes.spines[:].set(color=ink() if given else ink(0.4), linewidth=1.4 if given else 0.5)
     axes.fill(*drawing.T, facecolor=(color, 0.15), edgecolor=color, linewidth=1.4)
     axes.plot(*drawing.T, "o", color=color, markersize=float(np.clip(12 / np.sqrt(len(drawing)), 1.2, 3)))
     if len(drawing) > _NUMBERED:
         axes.plot(*drawing[0], "o", color="white", markeredgecolor=color, markersize=4.5)
-    look: Any = {"textcoords": "offset points", "fontsize": points(7), "color": INK, "path_effects": HALO}
+    look: Any = {"textcoords": "offset points", "fontsize": "x-small", "path_effects": halo()}
     for number, at in enumerate(drawing if len(drawing) <= _NUMBERED else ()):
         axes.annotate(str(number), at, (3, 3), **look)
     name = np.datetime_as_string(x, "m").replace("T", " ") if isinstance(x, np.datetime64) else f"t = {x:.3g}"
-    axes.text(0.03, 0.95, name, transform=axes.transAxes, va="top", fontsize=points(8), color=INK)
+    axes.text(0.03, 0.95, name, transform=axes.transAxes, va="top", fontsize="small")

@@ -8,65 +8,44 @@ of the eigenvalues: one standard deviation, if the matrices are covariances.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import partial
-from textwrap import fill
-from typing import Any
+from itertools import pairwise
+from textwrap import fill, wrap
+from typing import Any, NamedTuple
 
 import numpy as np
+from matplotlib import rcParams
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import to_rgba, to_rgba_array
-from matplotlib.figure import SubFigure
-from matplotlib.lines import Line2D
+from matplotlib.transforms import Affine2DBase
 from numpy.typing import NDArray
 
 from .._base.quaternions import matrices_of_quaternions
 from .._core import CutLocusError, convert_rotations
 from .._spaces import SpecialOrthogonal, cover_of
-from .chart import SHADOW, box, count_from, draw_stems, explain_frames, frame_handles, origin_of, plane, shadow_colors
-from .curves import BODIES, BODY, BODY_COLOR, FAINT, KNOTS, POSES, START, Curve, are_compared
+from .curves import Curve, Mover, are_compared
 from .globe import centre_of
-from .graphs import FEW_KNOTS, SUBSCRIPTS, component_names, draw_components, draw_coordinates, draw_numbers, timelines
+from .graphs import Graphs, component_names, components
+from .lines import FRAME, fresh
+from .panels import FEW_KNOTS, Panel, View, mark_knots, time_axes, timeline
 from .rates import QUATERNIONS
-from .rows import REACH, VIEW, Rows
 from .sphere import caps
-from .style import (
-    AXES,
-    EDGE,
-    INK,
-    LEFT,
-    OWN_AXES,
-    RIGHT,
-    Array,
-    apart,
-    axes_size,
-    evenly,
-    legend,
-    note,
-    points,
-    round_below,
-    size,
-    time_colors,
-    window,
-)
-from .theme import KEPT
+from .style import AXES, MARK, SUBSCRIPTS, Array, apart, axes_size, evenly, ink, round_below, time_colors
 
 ROTATIONS = SpecialOrthogonal(3)
-_LENGTH = 0.14
-"""Distance in inches from the position of a body in the plane to its tip."""
-_MANY = 24
-"""The number of bodies of all curves, or two per curve if that is more."""
-_FRAMES = 16
-"""The largest number of frames in space, of all curves together."""
+VIEW = np.array([[-0.5, 0.866, 0.0], [-0.296, -0.171, 0.940], [0.814, 0.470, 0.342]])
+"""Directions to the right, up and towards the viewer, who sees the first axis point forwards and the third up."""
+REACH = 0.5
+"""The largest distance in inches by which a symbol extends to the left and right."""
+_LEAST_ROW = 0.6
+"""The smallest height of a row in inches."""
 _LEAST, _SHORT = 12.0, 0.32
 """Arrows are shorter than the time axis by a factor, and the smallest length in inches if there are many."""
 _BESIDE = 20
 """The largest number of curves of a batch that are drawn beside their mean."""
 _PAIRS = 15
 """The largest number of correlations that have names."""
-_FAN = np.radians(30)
-"""Bodies that turn on the spot are drawn at angles of this size."""
 _SMALL = np.radians(12)
 """Rotations by less than this are graphs."""
 _LARGE = np.radians(150)
@@ -77,109 +56,160 @@ _ANGLES = np.linspace(0, 2 * np.pi, 97)
 _CIRCLE = np.stack([np.cos(_ANGLES), np.sin(_ANGLES), 0 * _ANGLES], axis=-1)
 
 
+# ---- symbols in rows along a time axis ----
+
+
+class _Inches(Affine2DBase):
+    """Inches in axes of their present size, which later become longer or shorter with the height of the axes."""
+
+    def __init__(self, axes: Axes) -> None:
+        super().__init__()
+        self.box, self.height = axes.bbox, axes_size(axes)[1]
+        self.set_children(axes.bbox)
+
+    def get_matrix(self) -> Array:
+        """Return the matrix for the size that the axes have now."""
+        scale = self.box.height / self.height
+        return np.diag([scale, scale, 1.0])
+
+
+class _Row(NamedTuple):
+    """One row of symbols.
+
+    Attributes
+    ----------
+    curve : Curve
+        Curve of the row.
+    name : {"given", "data", "curve", ""}
+        Whether the row has given points, noisy data or samples of the curve; empty for one of several curves.
+    """
+
+    curve: Curve
+    name: str
+
+    @property
+    def has_given(self) -> bool:
+        """Whether the symbols are given points."""
+        return self.name in ("given", "data") or not self.curve.has_line
+
+    def symbols(self, width: float, reach: float) -> tuple[Array, Any, Array | None]:
+        """Return times on matplotlib's axis, points, and the radii of the band, for symbols that fit into the row.
+
+        The time axis has ``width`` inches, and symbols extend by at most ``reach`` inches to the left and right. Given
+        points that are close together are omitted; samples of the curve are equidistant. If all given points have a
+        symbol, the curve has one below each of them, and equidistant ones between.
+        """
+        curve = self.curve
+        if self.has_given:
+            times = curve.on_axis(curve.given_x)
+            kept = apart(times, 1.1 * reach / width * (curve.times[-1] - curve.times[0]))
+            return times[kept], curve.given[kept], None
+        number = max(2, int(width / (2 * reach)) + 1)
+        wanted = np.linspace(curve.x[0], curve.x[-1], number)
+        step = wanted[1] - wanted[0]
+        nodes = curve.x[curve.knots]
+        if curve.noise is None and curve.has_nodes and self.name and np.diff(nodes).min(initial=np.inf) > 0.55 * step:
+            inner = [np.linspace(*ends, 1 + max(1, int((ends[1] - ends[0]) / step + 0.6))) for ends in pairwise(nodes)]
+            wanted = np.unique(np.concatenate(inner))
+        even = np.searchsorted(curve.x, wanted)
+        # There are no samples in gaps.
+        even = np.unique(even[curve.x[even] - wanted < 0.1 * step])
+        # Short segments have a symbol, too.
+        bounds = np.searchsorted(curve.x, [[part.x[0], part.x[-1]] for part in curve.unbroken])
+        empty = [(first + last) // 2 for first, last in bounds if not ((even >= first) & (even <= last)).any()]
+        even = np.union1d(even, np.array(empty, int))
+        return curve.times[even], curve.points[even], None if curve.radii is None else curve.radii[even]
+
+    def title(self, shown: int, mine: bool) -> str:
+        """Return the name beside the row, with the number of given points that have a symbol, if not all have."""
+        curve, given = self.curve, len(self.curve.given)
+        name = "mean\ncurve" if curve.is_mean else self.name
+        if name and curve.label and not mine:
+            name = f"{curve.label}: {name}"
+        if not name:
+            name = "\n".join(wrap(curve.label, 13, max_lines=3, placeholder=" …")) if curve.label else "━━"
+        return name + (f"\n{shown} of {given}" if self.has_given and shown < given else "")
+
+
+class _Rows:
+    """Axes with rows of symbols; row i is at height −i.
+
+    The only curve of a figure has two rows: its given points, and the curve at equidistant times. Each of several
+    curves has one row.
+    """
+
+    def __init__(self, panel: Panel, curves: Sequence[Curve]) -> None:
+        (axes,) = time_axes(panel, curves, [""])
+        width, high = axes_size(axes)
+        if not panel.mine:
+            # Other axes have margins for the symbols at both ends.
+            start, stop = min(curve.times[0] for curve in curves), max(curve.times[-1] for curve in curves)
+            reach = min(REACH, width / 8)
+            margin = reach * (stop - start) / (width - 2 * reach)
+            axes.set_xlim(start - margin, stop + margin)
+            width -= 2 * reach
+        first = curves[0]
+        if len(curves) == 1 and first.has_line:
+            self.rows = [_Row(first, "curve")]
+            if len(first.given) and (first.noise is not None or first.has_nodes) and not first.is_mean:
+                self.rows.insert(0, _Row(first, "given" if first.noise is None else "data"))
+        else:
+            self.rows = [_Row(curves[i], "") for i in evenly(len(curves), max(1, int(high // _LEAST_ROW)))]
+        axes.set_ylim(0.5 - len(self.rows), 0.5)
+        axes.grid(visible=False, axis="y")
+        self.panel, self.axes, self.width, self.height = panel, axes, width, high / len(self.rows)
+        shown = len(self.rows), len(curves)
+        self.words = f"{shown[0]} of {shown[1]} curves" if not self.rows[0].name and shown[0] < shown[1] else ""
+
+    def reach_between(self) -> float:
+        """Return the reach of symbols of which one fits between any two given points."""
+        row = self.rows[-1]
+        return self.width / (4.2 * len(row.curve.given)) if row.name == "curve" and row.curve.noise is None else REACH
+
+    def symbols(self, reach: float) -> list[tuple[Array, Any, Array | None]]:
+        """Name the rows, and return their symbols, which extend by at most ``reach`` inches."""
+        made = [row.symbols(self.width, reach) for row in self.rows]
+        names = [row.title(len(own[0]), self.panel.mine) for row, own in zip(self.rows, made, strict=True)]
+        self.axes.set_yticks([-i for i in range(len(names))], names, fontsize="small")
+        self.axes.tick_params(axis="y", length=0)
+        if self.panel.mine:
+            for label, row in zip(self.axes.get_yticklabels(), self.rows, strict=True):
+                label.set_color(ink() if row.name else row.curve.color)
+            self.axes.spines["left"].set_visible(False)
+            # The layout leaves space for symbols at both ends of the axis.
+            self.axes.tick_params(axis="y", pad=72 * reach)
+            self.axes.annotate(".", (1, 0.5), (72 * reach, 0), **_BESIDE_AXES, alpha=0)
+        return made
+
+    def in_inches(self, times: Array, row: int) -> dict[str, Any]:
+        """Return the options of a collection with paths in inches around times in a row."""
+        return {
+            "offsets": np.column_stack([times, np.full(len(times), -row)]),
+            "offset_transform": self.axes.transData,
+            "transform": _Inches(self.axes),
+            "clip_on": False,
+        }
+
+    def draw_view(self) -> None:
+        """Draw the axes of space above the right corner, as they are seen. Axes of the user have no space for them."""
+        if not self.panel.mine:
+            return
+        axes, size = self.axes, 0.01 * rcParams["font.size"]
+        inches = 10 * size / np.array(axes_size(axes))
+        foot = np.array([1.0, 1.0]) + [-0.3, 0.16] * inches
+        look: Any = {"units": "inches", "scale_units": "inches", "angles": "uv", "in_layout": False, "clip_on": False}
+        look |= {"scale": 0.4 / size, "width": 0.14 * size, "color": ink(), "transform": axes.transAxes}
+        axes.quiver(*foot[:, None].repeat(3, 1), *VIEW[:2], **look)
+        look = {"transform": axes.transAxes, "fontsize": "x-small", "ha": "center", "va": "center"}
+        for name, end in zip(("x₁", "x₂", "x₃", "view"), (*VIEW[:2].T, np.array([-1.6, 0])), strict=True):
+            x, y = foot + 0.36 * end * inches
+            axes.text(x, y, name, **look)
+
+
+_BESIDE_AXES: Any = {"xycoords": "axes fraction", "textcoords": "offset points", "ha": "right", "va": "center"}
+
+
 # ---- rotations ----
-
-
-def draw_rotations(panel: SubFigure, curves: Sequence[Curve]) -> None:
-    """Draw the columns of rotation matrices as arrows along a time axis, or graphs of their rotation vectors.
-
-    Discs at the tips contain the true direction of an axis with the probability of the band.
-    """
-    reference = _reference(curves)
-    if reference is not None:
-        _draw_rotation_vectors(panel, [part for curve in curves for part in curve.unbroken], *reference)
-        return
-    matrices = MATRICES[str(cover_of(curves[0].space))]
-    rows = Rows.of(panel, curves)
-    length = min(max(_SHORT, min(REACH, 1.2 * rows.reach_between())), 0.48 * rows.height, rows.width / _LEAST)
-    words = _left_out(rows, curves)
-    for i, row in enumerate(rows.rows):
-        times, symbols, radii = rows.symbols(i, 0.8 * length)
-        frames = matrices(symbols)
-        if radii is not None:
-            _draw_discs(rows, i, times, length, frames, radii)
-            words = "discs: 95 % bands"
-        light = np.full(len(times), row.name == "data")
-        if row.name == "curve" and row.curve.noise is None and row.curve.has_nodes:
-            # Those between the given points are lighter.
-            light = ~np.isin(times, row.curve.times[row.curve.knots])
-        frames = frames * np.where(light, 0.75, 1.0)[:, None, None]
-        _draw_arrows(rows.axes, times, -i, length * frames, np.where(light, 0.5, 1.0))
-    if rows.axes not in OWN_AXES:
-        if not words and rows.rows[-1].name == "curve" and curves[0].has_nodes:
-            words = "lighter: between given ones"
-        if str(cover_of(curves[0].space)) in QUATERNIONS:
-            words = "; ".join(filter(None, ("frames: rotations by unit quaternions", words)))
-    _explain(rows.axes, words, rows.width)
-    rows.draw_view()
-
-
-def are_graphs(curves: Sequence[Curve]) -> bool:
-    """Whether curves are drawn as graphs of rotation vectors."""
-    return _reference(curves) is not None
-
-
-def _reference(curves: Sequence[Curve]) -> tuple[Array, str] | None:
-    """Return the rotation from which rotation vectors are measured, and its name. None if there are frames.
-
-    Frames would look equal, would not show long gaps or noisy data, or have no space beside other factors of a product
-    and other curves.
-    """
-    matrices = MATRICES.get(str(cover_of(curves[0].space)))
-    if matrices is None:
-        return None
-    first = matrices(curves[0].first_point)
-    # Points of O(3) have one determinant along a curve.
-    turned = np.concatenate([first.T @ matrices(curve.extent) for curve in curves])
-    largest = ROTATIONS.distance(np.eye(3), turned).max()
-    if largest < _SMALL:
-        return first, "start of the curve"
-    if not (are_compared(curves) or any(own.is_factor or len(own.gaps) or own.noise is not None for own in curves)):
-        return None
-    if largest < _LARGE:
-        return first, "start of the curve"
-    try:
-        middle = centre_of(ROTATIONS, turned[:: 1 + len(turned) // 2000])
-    except CutLocusError:
-        return None
-    return (first @ middle, "middle rotation") if ROTATIONS.distance(middle, turned).max() < _LARGE else None
-
-
-def _draw_rotation_vectors(panel: SubFigure, curves: Sequence[Curve], first: Array, name: str) -> None:
-    """Draw the graphs of the rotation vectors of rotations from a given one."""
-    matrices = MATRICES[str(cover_of(curves[0].space))]
-
-    def numbers(points: Any) -> Array:
-        vectors = _rotation_vectors(matrices(points), first)
-        # In long gaps the vector may jump where the angle reaches half a turn.
-        return np.where(np.linalg.norm(vectors, axis=1, keepdims=True) < _JUMP, vectors, np.nan)
-
-    def growth(angles: Array) -> Array:
-        # The largest singular value of the inverse of the left Jacobian.
-        return np.asarray(1 / np.sinc(angles / 2 / np.pi))
-
-    names = ["about x₁", "about x₂", "about x₃"]
-    name = name.replace("curve", "mean curve") if curves[0].is_mean else name
-    title = f"rotation vector log(R R₀ᵀ) in rad, R₀: {name}"
-    draw_coordinates(panel, curves, names, numbers, growth, title, equal_scales=True)
-
-
-def _rotation_vectors(matrices: Array, first: Array) -> Array:
-    """Return the rotation vectors of rotations from a first matrix, shape (m, 3)."""
-    return convert_rotations(np.ascontiguousarray(matrices @ first.T), "matrix", "vector", 1e-7)[0]
-
-
-def _left_out(rows: Rows, curves: Sequence[Curve]) -> str:
-    """Describe how many curves of a batch have a row, if not all have."""
-    return (
-        f"{len(rows.rows)} of {len(curves)} curves" if rows.rows[0].name == "" and len(rows.rows) < len(curves) else ""
-    )
-
-
-def quaternions(matrices: NDArray[Any]) -> Array:
-    """Return the unit quaternions w, x, y, z of matrices w − i(xσ₁ + yσ₂ + zσ₃) of SU(2), shape (..., 4)."""
-    a, b = matrices[..., 0, 0], matrices[..., 1, 0]
-    return np.stack([a.real, -b.imag, b.real, -a.imag], axis=-1)
 
 
 # Points of S³ are unit quaternions, scalar first. Those of SU(2) act on R³ as rotations.
@@ -192,205 +222,139 @@ MATRICES: dict[str, Callable[[Any], Array]] = {
 """Matrices of rotations, shape (..., 3, 3)."""
 
 
-def _draw_arrows(axes: Axes, times: Array, row: int, frames: Array, opacity: Array) -> None:
+def quaternions(matrices: NDArray[Any]) -> Array:
+    """Return the unit quaternions w, x, y, z of matrices w − i(xσ₁ + yσ₂ + zσ₃) of SU(2), shape (..., 4)."""
+    a, b = matrices[..., 0, 0], matrices[..., 1, 0]
+    return np.stack([a.real, -b.imag, b.real, -a.imag], axis=-1)
+
+
+def rotations(curves: Sequence[Curve]) -> View:
+    """Return the view of rotations: frames along a time axis, or graphs of rotation vectors.
+
+    Frames would look equal, would not show long gaps or noisy data, or have no space beside other factors of a product
+    and other curves.
+    """
+    curves = [curve for curve in curves if not curve.faint]
+    name = str(cover_of(curves[0].space))
+    matrices = MATRICES[name]
+    first = matrices(curves[0].first_point)
+    # Points of O(3) have one determinant along a curve.
+    turned = np.concatenate([first.T @ matrices(curve.extent) for curve in curves])
+    largest = ROTATIONS.distance(np.eye(3), turned).max()
+    start = "start of the " + "mean " * curves[0].is_mean + "curve"
+    if largest < _SMALL:
+        return _rotation_vectors(matrices, first, start)
+    if are_compared(curves) or any(own.is_factor or len(own.gaps) or own.noise is not None for own in curves):
+        if largest < _LARGE:
+            return _rotation_vectors(matrices, first, start)
+        try:
+            middle = centre_of(ROTATIONS, turned[:: 1 + len(turned) // 2000])
+        except CutLocusError:
+            pass
+        else:
+            if ROTATIONS.distance(middle, turned).max() < _LARGE:
+                return _rotation_vectors(matrices, first @ middle, "middle rotation")
+    frames = partial(_draw_rotations, matrices=matrices, name="unit quaternions" * (name in QUATERNIONS))
+    return timeline(frames, 3.6, in_rows=True)
+
+
+def _rotation_vectors(matrices: Callable[[Any], Array], first: Array, name: str) -> View:
+    """Return the view of the rotation vectors of rotations from a given one."""
+
+    def numbers(_: Any, points: Any) -> Array:
+        turned = np.ascontiguousarray(matrices(points) @ first.T)
+        vectors = convert_rotations(turned, "matrix", "vector", 1e-7)[0]
+        # In long gaps the vector may jump where the angle reaches half a turn.
+        return np.where(np.linalg.norm(vectors, axis=1, keepdims=True) < _JUMP, vectors, np.nan)
+
+    return Graphs(
+        f"rotation vector log(R R₀ᵀ) in rad, R₀: {name}",
+        ["about x₁", "about x₂", "about x₃"],
+        numbers,
+        # The largest singular value of the inverse of the left Jacobian.
+        growth=lambda angles: np.asarray(1 / np.sinc(angles / 2 / np.pi)),
+        has_title=True,
+        equal_scales=True,
+    ).view(4.8)
+
+
+def _draw_rotations(panel: Panel, curves: Sequence[Curve], matrices: Callable[[Any], Array], name: str) -> None:
+    """Draw the columns of rotation matrices as arrows along a time axis.
+
+    Discs at the tips contain the true direction of an axis with the probability of the band.
+    """
+    rows = _Rows(panel, curves)
+    length = min(max(_SHORT, min(REACH, 1.2 * rows.reach_between())), 0.48 * rows.height, rows.width / _LEAST)
+    words = [f"frames: rotations by {name}"] * bool(name) + [rows.words]
+    for i, (row, (times, symbols, radii)) in enumerate(zip(rows.rows, rows.symbols(0.8 * length), strict=True)):
+        frames = matrices(symbols)
+        if radii is not None:
+            _draw_discs(rows, i, times, length, frames, radii)
+        light = np.full(len(times), row.name == "data")
+        if row.name == "curve" and row.curve.noise is None and row.curve.has_nodes:
+            light = ~np.isin(times, row.curve.times[row.curve.knots])
+            words.append("lighter: between given ones")
+        frames = frames * np.where(light, 0.75, 1.0)[:, None, None]
+        _draw_arrows(rows.axes, times, -i, length * frames, np.where(light, 0.5, 1.0))
+    for color, axis in zip(AXES, FRAME, strict=True):
+        # For legends.
+        rows.axes.plot([], [], color=color, linewidth=2.4, label=fresh(rows.axes, axis))
+    panel.explain("; ".join(filter(None, words)))
+    rows.draw_view()
+
+    def body() -> Mover:
+        curve, row = curves[0], len(rows.rows) - 1
+        arrows = _draw_arrows(rows.axes, curve.times[:1], -row, np.eye(3)[None], np.ones(1))
+        arrows.set(zorder=9, color=AXES)
+        drawn = 1.2 * length * VIEW[:2] @ matrices(curve.points)
+
+        def move(sample: int) -> None:
+            arrows.set_offsets(np.column_stack([curve.times[sample].repeat(3), np.full(3, -row)]))
+            arrows.set_UVC(*drawn[sample])
+
+        return move
+
+    curves[0].bodies.append((curves[0].x, body))
+
+
+def _draw_arrows(axes: Axes, times: Array, row: int, frames: Array, opacity: Array) -> Any:
     """Draw the columns of matrices, shape (m, 3, 3), in inches. Nearer columns cover farther ones."""
     seen = VIEW @ frames
     order = np.argsort(seen[:, 2], axis=-1)
     right, up, _ = np.moveaxis(np.take_along_axis(seen, order[:, None], axis=-1), 1, 0)
     # Layouts would add the length of the arrows in data to their extent.
-    look: Any = {"units": "inches", "scale_units": "inches", "scale": 1, "clip_on": False, "in_layout": False}
-    look |= {"headwidth": 3.5, "headlength": 4.5, "headaxislength": 4.2, "zorder": 4}
+    look: Any = {"units": "inches", "scale_units": "height", "scale": axes_size(axes)[1], "clip_on": False}
+    look |= {"in_layout": False, "headwidth": 3.5, "headlength": 4.5, "headaxislength": 4.2, "zorder": 4}
     look["width"] = 0.028 if opacity.max() == 1 else 0.018
     colors = to_rgba_array(np.array(AXES)[order.ravel()])
     colors[:, 3] = np.repeat(opacity, 3)
     positions = np.repeat(times, 3), np.full(3 * len(times), row)
-    axes.quiver(*positions, right.ravel(), up.ravel(), color=colors, **look)
+    return axes.quiver(*positions, right.ravel(), up.ravel(), color=colors, **look)
 
 
-def _draw_discs(rows: Rows, row: int, times: Array, length: float, frames: Array, radii: Array) -> None:
+def _draw_discs(rows: _Rows, row: int, times: Array, length: float, frames: Array, radii: Array) -> None:
     """Draw the caps of angular radii ``radii`` around the columns of rotation matrices, shape (m, 3, 3).
 
     The rotations by angles up to r move a unit vector to all points of the cap of radius r around it.
     """
     for i, color in enumerate(AXES):
         rings = length * caps(frames[:, :, i], radii) @ VIEW[:2].T
-        look: Any = {"facecolors": [to_rgba(color, 0.3)], "linewidths": 0, "label": "band", "zorder": 5}
+        label = fresh(rows.axes, rows.rows[row].curve.band_name)
+        look: Any = {"facecolors": [to_rgba(color, 0.3)], "linewidths": 0, "label": label, "zorder": 5}
         rows.axes.add_collection(PolyCollection(list(rings), **look, **rows.in_inches(times, row)))
-
-
-def _explain(axes: Axes, more: str, width: float) -> None:
-    """Draw a legend of the colours above axes of a given width in inches, with further words."""
-    handles, labels = frame_handles()
-    if axes in OWN_AXES:
-        # For legends that the user adds.
-        for handle, label in zip(handles, labels, strict=True):
-            axes.plot([], [], color=handle.get_color(), linewidth=handle.get_linewidth(), label=label)
-    if more:
-        handles.append(Line2D([], [], linestyle="none"))
-        labels.append(more)
-    anchor: Any = {"loc": "lower left", "bbox_to_anchor": (0, 1), "borderaxespad": 0.2}
-    legend(axes, handles, labels, width, handlelength=1.2, columnspacing=1.2, **anchor)
-
-
-# ---- rigid motions: the path of a body, and its orientation ----
-
-
-def draw_flat_poses(panel: SubFigure, curves: Sequence[Curve]) -> None:
-    """Draw poses of SE(2) as bodies that point along their first axis.
-
-    Given poses are filled bodies if they are far enough from each other, the first one white; light bodies are along
-    the curve. Otherwise they are dots, and some of them light bodies.
-    """
-    axes = plane(panel)
-    origin = count_from(panel, axes, curves, lambda poses: poses[:, :2, 2])
-    positions = np.concatenate([curve.extent[:, :2, 2] for curve in curves])
-    unit = float(np.max(np.ptp(positions, axis=0) / axes_size(axes))) or 1.0
-    framed = [curve for curve in curves if not curve.faint]
-
-    def draw(poses: Array, label: str, **look: Any) -> None:
-        if len(poses):
-            turned = length * BODY[:-1] @ poses[:, :2, :2].swapaxes(1, 2)
-            feet = poses[:, :2, 2] - origin
-            bodies = list(turned + feet[:, None])
-            axes.add_collection(PolyCollection(bodies, zorder=6.6, label=label, **look))
-            # Where the body is.
-            dot = INK if look["facecolor"] != INK else "white"
-            axes.plot(*feet.T, "o", color=dot, markersize=1.8, zorder=6.7, label="_feet")
-
-    for curve in curves:
-        length = _LENGTH * unit * (1 if curve.alone else 0.6)
-        given, edge = curve.given, INK if curve.alone and curve.has_line else curve.color
-        path = curve.points[:, :2, 2] - origin
-        curve.draw_line(axes, curve.near_data(path), linewidth=1.6)
-        if curve.faint:
-            continue
-        has_nodes = curve.has_nodes and not curve.is_mean
-        has_bodies = curve.noise is None and has_nodes and len(_apart(given, 2 * length)) == len(given)
-        if has_bodies:
-            draw(given[1:], POSES, facecolor=edge, edgecolor=edge)
-            draw(given[:1], START, facecolor="white", edgecolor=edge)
-        elif not curve.is_mean:
-            small = float(np.clip(22 / np.sqrt(max(len(given), 1)), 1.5, 4.0))
-            # The first of the given poses is a body.
-            dots = replace(curve, has_start=not curve.has_nodes)
-            dots.draw_dots(axes, given[:, :2, 2] - origin, markersize=small)
-        way = float(np.sum(np.linalg.norm(np.diff(path, axis=0), axis=1)))
-        spread = _apart if way > length else _turned_apart
-        dense = curve.noise is None and has_nodes and not has_bodies
-        some = spread(given if dense else curve.points[~curve.bridges], max(4 * length, way * len(framed) / _MANY))
-        if has_bodies:
-            free = np.linalg.norm(some[:, None, :2, 2] - given[:, :2, 2], axis=-1) > 2 * length
-            some = some[free.all(axis=1)]
-        first = int(dense)
-        draw(some[:first], START, facecolor="white", edgecolor=curve.color, linewidth=0.8)
-        draw(some[first:], BODIES, facecolor=BODY_COLOR, edgecolor=curve.color, linewidth=0.8)
-    axes.autoscale_view()
-
-
-def _apart(poses: Array, least: float) -> Array:
-    """Return poses, the first among them, whose distances along the path are ``least`` or more."""
-    steps = np.linalg.norm(np.diff(poses[:, :2, 2], axis=0, prepend=poses[:1, :2, 2]), axis=1)
-    return np.asarray(poses[apart(np.cumsum(steps), least)])
-
-
-def _turned_apart(poses: Array, _: float) -> Array:
-    """Return poses of a body that turns on the spot, the first among them, which differ by some angle."""
-    angles = np.unwrap(np.arctan2(poses[:, 1, 0], poses[:, 0, 0]))
-    return np.asarray(poses[apart(np.cumsum(np.abs(np.diff(angles, prepend=angles[:1]))), _FAN)])
-
-
-def draw_poses(panel: SubFigure, curves: Sequence[Curve]) -> None:
-    """Draw poses of SE(3) as frames on the path. Given ones are bold."""
-    origin = origin_of(panel, curves, lambda poses: poses[:, :3, 3])
-    paths = [curve.near_data(curve.points[:, :3, 3] - origin) for curve in curves]
-    given = [curve.given[:, :3, 3] - origin for curve in curves]
-    everything = np.concatenate([*paths, *given])
-    length = 0.14 * window(everything[np.isfinite(everything[:, 0])], 1.0)[1] or 0.2
-    framed = [curve for curve in curves if not curve.faint]
-    number = max(2, _FRAMES // len(framed))
-    # The box contains the tips of all frames that are drawn.
-    tips = [
-        (poses[:, :3, 3] - origin + length * poses[:, :3, i])
-        for curve in framed
-        for poses in curve.samples(number).values()
-        for i in range(3)
-    ]
-    shadows = [curve.outside_gaps(path) for curve, path in zip(curves, paths, strict=True) if not curve.faint]
-    axes = box(panel, shadows, paths + given + tips, 0.02, 0.45, shadow_colors(curves), origin)
-
-    def draw(poses: Array, length: float, **look: Any) -> None:
-        feet = poses[:, :3, 3] - origin
-        for i, color in enumerate(AXES):
-            # All sticks of one colour are one line with breaks.
-            sticks = np.stack([feet, feet + length * poses[:, :3, i], np.full_like(feet, np.nan)], axis=1)
-            axes.plot(*sticks.reshape(-1, 3).T, color=color, zorder=5, **look)
-
-    for curve, path in zip(curves, paths, strict=True):
-        # The usual colour is that of the third axis.
-        dark = {"color": INK} if curve.color_of_dots == INK and not len(curve.gaps) else {}
-        curve.draw_line(axes, path, linewidth=2.0 if curve.alone else 1.4, **dark)
-        if curve.faint:
-            continue
-        draw_stems(axes, curve, curve.given[:, :3, 3] - origin)
-        for group, poses in curve.samples(number).items():
-            if group == "data":
-                draw(poses, 0.7 * length, linewidth=1.2, alpha=0.7)
-                continue
-            draw(poses, length, linewidth=2.0 if curve.alone else 1.3)
-            if curve.noise is None:
-                curve.draw_dots(axes, poses[:, :3, 3] - origin, markersize=3.5 if curve.alone else 2)
-            else:
-                curve.draw_dots(axes, curve.given[:, :3, 3] - origin)
-    shown = sum(len(curve.samples(number).get("bold", ())) for curve in framed)
-    count = sum(len(curve.given) for curve in framed)
-    name = "given poses" if shown == count else f"{shown} of {count} given poses"
-    words = curves[0].legend_of(name, "some poses of the curve", "lighter: data")
-    words = "mean curve at times of points" if curves[0].is_mean else words
-    explain_frames(panel, axes)
-    note(panel, f"frames: {words}; {SHADOW}")
 
 
 # ---- positive definite matrices ----
 
 
-def draw_covariances(panel: SubFigure, curves: Sequence[Curve]) -> None:
-    """Draw the standard deviations and correlations of covariance matrices; components of several curves."""
-    if not isinstance(panel, SubFigure) or are_compared(curves):
-        draw_components(panel, curves)
-        return
-    n = curves[0].space.point_shape[0]
-    rows, columns = np.triu_indices(n, 1)
+def ellipses(_: Sequence[Curve]) -> View:
+    """Return the view of positive definite matrices of order 2."""
+    return timeline(partial(_draw_ellipses, view=np.eye(2)), 3.6, in_rows=True)
 
-    def deviations(_: Any, points: Array) -> Array:
-        return np.sqrt(np.diagonal(points, axis1=1, axis2=2))
 
-    names = [f"σ{i + 1}".translate(SUBSCRIPTS) for i in range(n)]
-    entries = np.reshape(component_names((n, n), False), (n, n))
-    pairs = [f"ρ{entry[1:]}" for entry in entries[rows, columns].tolist()]
-    panels: Any = panel.subfigures(2, 1, height_ratios=[1.2, 1])
-    draw_numbers(panels[0], curves, "standard\ndeviations", names, deviations)
-    panels[0].axes[0].set_xlabel("")
-    (axes,) = timelines(panels[1], curves, ["correlations"], marked=False)
-    axes.grid(visible=False)
-    axes.set_ylim(len(pairs), 0)
-    every = -(-len(pairs) // _PAIRS)
-    axes.set_yticks(np.arange(len(pairs))[::every] + 0.5, pairs[::every])
-    axes.tick_params(axis="y", length=0)
-    for curve in curves:
-        roots = deviations(None, curve.points)
-        shares = curve.outside_gaps(curve.points[:, rows, columns] / (roots[:, rows] * roots[:, columns]))
-        look: Any = {"cmap": "RdBu_r", "vmin": -1, "vmax": 1, "shading": "gouraud", "rasterized": True}
-        # One row of pixels per pair needs two equal rows of samples.
-        for k, share in enumerate(shares.T):
-            image = axes.pcolormesh(curve.times, [k + 0.03, k + 0.97], np.stack([share, share]), **look)
-            image.set_gid(KEPT)
-        if len(curve.marks) <= FEW_KNOTS:
-            axes.vlines(curve.marks, 0, len(pairs), color=EDGE, linewidth=0.8, linestyle=(0, (1, 2)), label=KNOTS)
-    width, _ = size(panels[1])
-    side = axes.inset_axes((1 + 0.12 / (width - LEFT - RIGHT), 0, 0.1 / (width - LEFT - RIGHT), 1))
-    bar = panel.get_figure(root=True).colorbar(image, cax=side, ticks=[-1, 0, 1])
-    bar.ax.tick_params(labelsize=points(8), length=0, labelcolor=INK)
-    bar.outline.set_visible(False)
+def ellipsoids(_: Sequence[Curve]) -> View:
+    """Return the view of positive definite matrices of order 3."""
+    return timeline(partial(_draw_ellipses, view=VIEW), 3.6, in_rows=True)
 
 
 def outlines(matrices: Array) -> Array:
@@ -414,77 +378,80 @@ def _half_axes(matrices: Array) -> tuple[Array, Array]:
     return np.sqrt(np.maximum(values, 1e-16 * values[:, -1:])), vectors.swapaxes(1, 2)
 
 
-def _draw_in_rows(view: Array, panel: SubFigure, curves: Sequence[Curve]) -> None:
+def _draw_ellipses(panel: Panel, curves: Sequence[Curve], view: Array) -> None:
     """Draw rows of ellipses along the time axis, coloured by time and on the same scale. Given ones are filled.
 
     The rows of ``view`` are the directions to the right, up and, for ellipsoids, towards the viewer.
     """
-    rows = Rows.of(panel, curves)
+    rows = _Rows(panel, curves)
     # The largest horizontal and vertical half widths of the ellipses.
     across, high = (
         np.sqrt(max(float((view[i] @ row.curve.extent @ view[i]).max()) for row in rows.rows)) for i in (0, 1)
     )
     inches = min(max(0.65 * REACH, min(REACH, rows.reach_between())) / across, 0.45 * rows.height / high)
-    arcs = "; arcs: front halves of principal sections" * (len(view) == 3)
-    words = [f"half axes: √eigenvalues{arcs}" + "; colour: time" * (not curves[0].is_mean), _left_out(rows, curves)]
-    for i in range(len(rows.rows)):
-        times, symbols, radii = rows.symbols(i, 1.05 * inches * across)
+    for i, (row, (times, symbols, radii)) in enumerate(
+        zip(rows.rows, rows.symbols(1.05 * inches * across), strict=True)
+    ):
         _draw_row(rows, i, inches, times, view @ symbols @ view.T, radii)
-        if radii is not None:
-            words[1] = "shaded: 95 % bands"
-        curve = rows.rows[i].curve
-        if curve.is_mean and curve.batch is not None:
-            samples = np.searchsorted(curve.batch.times, times).clip(max=len(curve.batch.x) - 1)
-            others = curve.batch.at("point")[:, samples]
+        if row.curve.is_mean and row.curve.batch is not None:
+            batch = row.curve.batch
+            others = batch.at("point")[:, np.searchsorted(batch.times, times).clip(max=len(batch.x) - 1)]
             for one in others[evenly(len(others), _BESIDE)]:
-                rings = inches * outlines(view @ one @ view.T)
-                look: Any = {"facecolors": "none", "edgecolors": to_rgba(INK, 0.25), "linewidths": 0.6}
-                look |= {"label": FAINT, "zorder": 3.5}
-                rows.axes.add_collection(PolyCollection(list(rings), **look, **rows.in_inches(times, i)))
-    # The scale to the right of the words is an inch wide, and the view as well.
-    has_view = len(view) == 3
-    text = fill("; ".join(filter(None, words)), max(14, int((rows.width - 1 - has_view) / 0.075)))
-    rows.axes.text(0, 1.02, text, transform=rows.axes.transAxes, color=INK, fontsize=points(9), va="bottom")
-    _draw_scale(rows, inches, 1.0 * has_view)
-    if has_view:
+                look: Any = {"facecolors": "none", "edgecolors": [ink(0.7)], "alpha": 0.3, "linewidths": 0.6}
+                look |= {"label": fresh(rows.axes, "single curves"), "zorder": 3.5} | rows.in_inches(times, i)
+                rows.axes.add_collection(PolyCollection(list(inches * outlines(view @ one @ view.T)), **look))
+    length = round_below(0.8 / inches)
+    words = [f"half axes: √eigenvalues, bar: {length:g}", "arcs: front halves of principal sections" * (len(view) == 3)]
+    words += ["colour: time" * (not curves[0].is_mean), rows.words]
+    text = "; ".join(filter(None, words))
+    panel.explain(fill(text, max(20, int((rows.width - 1.5) / 0.07))) if panel.mine else text)
+    _draw_bar(rows, inches * length, 1.15 if len(view) == 3 and panel.mine else 0.05)
+    if len(view) == 3:
         rows.draw_view()
 
+    def body() -> Mover:
+        curve, row = curves[0], len(rows.rows) - 1
+        drawn = inches * outlines(view @ curve.points @ view.T)
+        look = rows.in_inches(curve.times[:1], row)
+        ellipse = PolyCollection([drawn[0]], facecolors="none", edgecolors=MARK, linewidths=2.2, zorder=9, **look)
+        rows.axes.add_collection(ellipse, autolim=False)
 
-draw_ellipses = partial(_draw_in_rows, np.eye(2))
-draw_ellipsoids = partial(_draw_in_rows, VIEW)
+        def move(sample: int) -> None:
+            ellipse.set_verts([drawn[sample]])
+            ellipse.set_offsets([[curve.times[sample], -row]])
 
+        return move
 
-def _draw_scale(rows: Rows, inches: float, right: float) -> None:
-    """Draw a bar above the axes whose length is 1, 2 or 5 times a power of ten, ``right`` inches from the corner."""
-    length = round_below(0.8 / inches)
-    # The whole width of the axes, also if symbols have a margin in them.
-    width, _ = axes_size(rows.axes)
-    end, height = 1 - right / width, 1 + 0.14 / (rows.height * len(rows.rows))
-    ends = [end - length * inches / width, end]
-    look: dict[str, Any] = {"transform": rows.axes.transAxes, "color": INK, "clip_on": False}
-    rows.axes.plot(ends, [height, height], "|-", linewidth=1.2, markersize=5, **look)
-    start = ends[0] - 0.05 / width
-    rows.axes.text(start, height, f"{length:g}", fontsize=points(9), ha="right", va="center_baseline", **look)
+    curves[0].bodies.append((curves[0].x, body))
 
 
-def _draw_row(rows: Rows, row: int, inches: float, times: Array, matrices: Array, radii: Array | None) -> None:
+def _draw_bar(rows: _Rows, length: float, right: float) -> None:
+    """Draw a bar of a length in inches above the axes or inside those of a user, ``right`` inches from their end."""
+    end, above = -right, 0.12 if rows.panel.mine else -0.1
+    tick = [[(x, above - 0.04), (x, above + 0.04)] for x in (end - length, end)]
+    look: Any = {"offsets": [(1, 1)], "offset_transform": rows.axes.transAxes, "clip_on": False, "in_layout": False}
+    look |= {"transform": _Inches(rows.axes), "colors": [ink()], "linewidths": 1.2}
+    rows.axes.add_collection(LineCollection([[(end - length, above), (end, above)], *tick], **look), autolim=False)
+
+
+def _draw_row(rows: _Rows, row: int, inches: float, times: Array, matrices: Array, radii: Array | None) -> None:
     """Draw ellipses in a row, coloured by time; those of noisy data have one colour.
 
     ``inches`` is the length of 1 on paper, as the time axis has another scale. Bands are shaded. The matrices at
     distances up to r from P in the affine-invariant metric have ellipses between those of exp(−r)P and exp(r)P, and
     touch both.
     """
-    axes, name = rows.axes, rows.rows[row].name
+    axes, name, curve = rows.axes, rows.rows[row].name, rows.rows[row].curve
     first, last = (edge([float(own.curve.times[i]) for own in rows.rows]) for edge, i in ((min, 0), (max, -1)))
     colors = time_colors((times - first) / (last - first))
-    if name == "data" or rows.rows[row].curve.is_mean:
-        colors[:] = to_rgba(INK if name == "data" else rows.rows[row].curve.color)
+    if name == "data" or curve.is_mean:
+        colors[:] = to_rgba(ink() if name == "data" else curve.color)
     rings, look = inches * outlines(matrices), rows.in_inches(times, row)
     if radii is not None:
         scales = np.exp(radii / 2)[:, None, None]
         shaded = np.concatenate([scales * rings, (rings / scales)[:, ::-1]], axis=1)
-        faces = colors * [1, 1, 1, 0.3]
-        axes.add_collection(PolyCollection(list(shaded), facecolors=faces, linewidths=0, label="band", **look))
+        shade: Any = {"facecolors": colors * [1, 1, 1, 0.3], "linewidths": 0, "label": fresh(axes, curve.band_name)}
+        axes.add_collection(PolyCollection(list(shaded), **shade, **look))
     look |= {"edgecolors": colors, "linewidths": {"given": 1.6, "data": 0.8}.get(name, 1.2), "zorder": 4}
     filled = colors * [1, 1, 1, {"given": 0.45, "": 0.25}.get(name, 0.0)]
     axes.add_collection(PolyCollection(list(rings), facecolors=filled, **look))
@@ -492,3 +459,52 @@ def _draw_row(rows: Rows, row: int, inches: float, times: Array, matrices: Array
         look["linewidths"] = 0.6 * look["linewidths"]
         for lines in inches * sections(matrices).swapaxes(0, 1):
             axes.add_collection(LineCollection(list(lines), **look))
+
+
+def covariances(curves: Sequence[Curve]) -> View:
+    """Return the view of the standard deviations and correlations of covariance matrices; components of several."""
+    whole, n = components(curves), curves[0].space.point_shape[0]
+    if are_compared(curves):
+        return whole
+    entries = np.reshape(component_names((n, n), False), (n, n))[np.triu_indices(n, 1)]
+    names = [f"σ{i + 1}".translate(SUBSCRIPTS) for i in range(n)]
+    deviations = Graphs(
+        "",
+        names,
+        lambda _, points: np.sqrt(np.diagonal(points, axis1=1, axis2=2)),
+        [("standard\ndeviations", range(n))],
+    )
+
+    def draw(panel: Panel, curves: Sequence[Curve]) -> None:
+        if not panel.mine:
+            whole.draw(panel, curves)
+            return
+        above, below = (Panel([axes], mine=True) for axes in panel.axes)
+        deviations.draw(above, curves)
+        above.axes[0].set_xlabel("")
+        _draw_correlations(below, curves, [f"ρ{entry[1:]}" for entry in entries.tolist()])
+
+    return timeline(draw, 5.8, 2)
+
+
+def _draw_correlations(panel: Panel, curves: Sequence[Curve], names: Sequence[str]) -> None:
+    """Draw the correlations of pairs as colours, one row per pair."""
+    (axes,) = time_axes(panel, curves, ["correlations"], marked=False)
+    axes.grid(visible=False)
+    axes.set_ylim(len(names), 0)
+    every = -(-len(names) // _PAIRS)
+    axes.set_yticks(np.arange(len(names))[::every] + 0.5, names[::every])
+    axes.tick_params(axis="y", length=0)
+    rows, columns = np.triu_indices(curves[0].space.point_shape[0], 1)
+    look: Any = {"cmap": "RdBu_r", "vmin": -1, "vmax": 1, "shading": "gouraud", "rasterized": True}
+    for curve in curves:
+        roots = np.sqrt(np.diagonal(curve.points, axis1=1, axis2=2))
+        shares = curve.outside_gaps(curve.points[:, rows, columns] / (roots[:, rows] * roots[:, columns]))
+        # One row of pixels per pair needs two equal rows of samples.
+        for k, share in enumerate(shares.T):
+            image = axes.pcolormesh(curve.times, [k + 0.03, k + 0.97], np.stack([share, share]), **look)
+    if len(curves[0].marks) <= FEW_KNOTS:
+        mark_knots(axes, curves)
+    bar = axes.figure.colorbar(image, cax=axes.inset_axes((1.01, 0, 0.012, 1)), ticks=[-1, 0, 1])
+    bar.ax.tick_params(labelsize="small", length=0)
+    bar.outline.set_visible(False)

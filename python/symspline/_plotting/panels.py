@@ -1,186 +1,170 @@
-"""Axes of the user in place of a panel."""
+"""Axes of one picture, the view of a space that is drawn into them, and axes with a time axis."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from textwrap import fill
-from typing import Any
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.text import Text
-from matplotlib.transforms import Bbox
+from matplotlib.ticker import MaxNLocator
 
-from .._base.arrays import short_repr
-from .._core import ValidationError
-from .._spaces import Product, Space, cover_of
-from .curves import START, Curve
-from .figure import IN_ROWS, PATHS, VIEWS, draw_picture
-from .matrices import are_graphs
-from .shrink import shrink
-from .style import BOTTOM, INK, LEFT, OWN_AXES, RIGHT, TOP, axes_size, points, text_factor
-from .theme import invert, invert_ticks, is_dark, light_colors
+from .curves import Axis, Curve, common_gaps
+from .lines import fresh
+from .style import DOTTED, GAP, Array, axes_size, ink, note, plain, show_dates
 
-_FULL, _SMALLEST = 3.2, 0.5
-"""The shorter side in inches of axes whose symbols have their full size, and the smallest factor for others."""
+FEW_KNOTS, _TICKS = 40, 300
+"""The largest numbers of knots that have lines, and ticks."""
+_UNITS = (172_800, 86_400, "d"), (7200, 3600, "h"), (100, 60, "min"), (0, 1, "s")
+"""The least number of seconds for which a unit is used, its length in seconds, and its name."""
+_WIDE = 7
+"""Width in inches of axes with more dates."""
 
 
-class AxesPanel:
-    """Existing axes with the methods of a ``SubFigure`` that pictures use.
+@dataclass(frozen=True)
+class Panel:
+    """Axes into which a picture is drawn.
 
-    A picture adds its axes and gets those of the user. The look of their frame does not change.
-
-    Parameters
+    Attributes
     ----------
-    axes : Axes
-        Axes to draw into.
-    square : bool
-        Whether the panel is as wide as high at most, so that pictures have no second part.
+    axes : list of Axes
+        As many as the view has rows on a page, or those of the user.
+    mine : bool
+        Whether they are on a page; axes of the user keep their style.
     """
 
-    def __init__(self, axes: Axes, square: bool) -> None:
-        self.axes = axes
-        figure: Any = axes.get_figure(root=True)
-        box = axes.get_window_extent()
-        # Small axes count as larger ones, reduced.
-        self.factor = float(np.clip(min(box.width, box.height) / figure.dpi / _FULL, _SMALLEST, 1.0))
-        self.dpi = self.factor * figure.dpi
-        width, height = box.width / self.dpi + LEFT + RIGHT, box.height / self.dpi + BOTTOM + TOP
-        width, height = (min(width, height),) * 2 if square else (width, height)
-        self.bbox = Bbox.from_bounds(0, 0, width * self.dpi, height * self.dpi)
-        self._used = False
-        OWN_AXES[axes] = self.factor
+    axes: list[Axes]
+    mine: bool
 
-    def add_axes(self, rectangle: Any, projection: str | None = None, **look: Any) -> Any:
-        """Return the axes of the user; further ones are insets."""
-        if self._used:
-            return self.axes.inset_axes(rectangle, projection=projection, **look)
-        wanted = projection or "rectilinear"
-        if self.axes.name != wanted:
-            kind = f"projection='{wanted}'" if projection else "no projection"
-            raise ValidationError(
-                f"ax has the projection {self.axes.name!r}, but this picture needs axes with {kind}. Create them by "
-                + (f"figure.add_subplot(projection='{wanted}')." if projection else "figure.add_subplot().")
-            )
-        self._used = True
-        # Names of axes that the user chose remain.
-        kept = {name: value for name, value in look.items() if name not in ("facecolor", "label")}
-        for name in ("xlabel", "ylabel", "zlabel"):
-            if name in kept and getattr(self.axes, f"get_{name}")():
-                del kept[name]
-        self.axes.set(**kept)
-        return self.axes
+    def explain(self, words: str) -> None:
+        """Explain symbols above axes with a time axis on a page, and below axes of the user."""
+        if words and self.mine:
+            self.axes[0].set_title(words, loc="left", fontsize="small", weight="normal", pad=3)
+        elif words:
+            note(self.axes[0], words)
 
-    def text(self, x: float, y: float, words: str, **look: Any) -> Any:
-        """Write words below the axes, in as many lines as their width requires."""
-        letters = max(20, int(axes_size(self.axes)[0] * self.factor / text_factor(self.axes) / 0.065))
-        words = "\n".join(fill(line, letters) for line in words.splitlines())
-        own: Any = {"ha": "center", "color": INK, "fontsize": points(9)} | look
-        return self.axes.annotate(
-            words,
-            (0.5, 0),
-            (0, -28 if self.axes.axison and self.axes.name != "3d" else -8),
-            xycoords="axes fraction",
-            textcoords="offset points",
-            va="top",
-            **own,
+
+class View(NamedTuple):
+    """What is drawn of the curves on a space.
+
+    Attributes
+    ----------
+    draw : callable
+        Draws curves into a panel.
+    width, height : float
+        Size in inches if the view is the only one. Speed and acceleration are beside it, or below a view that is much
+        wider than high.
+    rows : int
+        Number of axes one below the other, or side by side if they have no time axis.
+    is_time : bool
+        Whether the axes have a time axis.
+    projection : {None, "3d"}
+        Projection of the axes.
+    has_band : bool
+        Whether the view shows uncertainty bands.
+    has_many : bool
+        Whether it shows all curves of a batch.
+    in_rows : bool
+        Whether it has symbols in rows, one per curve, so that later curves would overlap them.
+    is_turned : bool
+        Whether the direction of view depends on the curves, so that later ones cannot be added.
+    """
+
+    draw: Callable[[Panel, Sequence[Curve]], None]
+    width: float = 5.2
+    height: float = 5.2
+    rows: int = 1
+    is_time: bool = False
+    projection: str | None = None
+    has_band: bool = False
+    has_many: bool = False
+    in_rows: bool = False
+    is_turned: bool = False
+
+    @property
+    def is_wide(self) -> bool:
+        """Whether speed and acceleration are below the view."""
+        return self.width > 1.5 * self.height
+
+    def draw_into(self, panel: Panel, curves: Sequence[Curve]) -> None:
+        """Draw those of the curves that the view shows."""
+        if not self.has_many:
+            curves = [curve for curve in curves if not curve.faint]
+        self.draw(panel, curves if self.in_rows else [part for curve in curves for part in curve.unbroken])
+
+
+def timeline(draw: Callable[[Panel, Sequence[Curve]], None], height: float = 3.2, rows: int = 1, **more: Any) -> View:
+    """Return a view with a time axis."""
+    return View(draw, 10.5, height, rows, is_time=True, **more)
+
+
+def time_axes(panel: Panel, curves: Sequence[Curve], labels: Sequence[str], marked: bool = True) -> list[Axes]:
+    """Give the axes of a panel the time axis of curves, and a label of the vertical axis each.
+
+    Unless `marked` is False, they show the times of the given points and long gaps.
+    """
+    axis = curves[0].axis
+    if not panel.mine:
+        (axes,) = panel.axes
+        axes.set(xlabel=axes.get_xlabel() or axis.name, ylabel=axes.get_ylabel() or labels[0])
+        if axis.dates:
+            show_dates(axes.xaxis, 3, 7)
+        _mark_gaps(axes, curves)
+        return [axes]
+    first, last = min(curve.times[0] for curve in curves), max(curve.times[-1] for curve in curves)
+    for i, (axes, label) in enumerate(zip(panel.axes, labels, strict=True)):
+        width, height = axes_size(axes)
+        is_lowest = i == len(labels) - 1
+        plain(axes)
+        axes.set_gid("time")
+        axes.grid(visible=False, axis="x")
+        axes.set_ylabel(label)
+        axes.yaxis.set_major_locator(
+            MaxNLocator(int(np.clip(height / 0.3, 4, 9)), steps=[1, 2, 2.5, 5, 10], min_n_ticks=3)
         )
+        axes.set_xlim(first - 0.01 * (last - first), last + 0.01 * (last - first))
+        if axis.dates:
+            # For some spans the locator does not find an interval between narrower limits.
+            show_dates(axes.xaxis, *((3, 10) if width > _WIDE else (2, 5)))
+        axes.set_xlabel(axis.name if is_lowest else "")
+        axes.tick_params(labelbottom=is_lowest)
+        axes.xaxis.offsetText.set_visible(is_lowest)
+        if marked:
+            mark_knots(axes, curves)
+            _mark_gaps(axes, curves)
+    return panel.axes
 
 
-def draw_into(ax: Axes, curves: Sequence[Curve], title: str | None, show: bool) -> Axes:
-    """Draw the picture of curves into axes that `check_axes` has accepted."""
-    name = str(cover_of(curves[0].space))
-    if ax.has_data() and name in IN_ROWS and not are_graphs(curves):
-        raise ValidationError(
-            "ax already contains a picture, and symbols of several curves would overlap. Draw all of them in one call: "
-            "symspline.plot([first, second], ax=ax)."
-        )
-    with panel_of(ax, name in PATHS, title, show) as panel:
-        draw_picture(panel, curves[0].space, curves)
-    return ax
+def mark_knots(axes: Axes, curves: Sequence[Curve]) -> None:
+    """Mark knots by thin lines, or by short ticks if lines would be too many. Noisy data have short ticks."""
+    knots = np.unique(np.concatenate([curve.marks for curve in curves if not curve.faint]))
+    lines = len(knots) <= FEW_KNOTS and curves[0].noise is None
+    if len(knots) <= _TICKS:
+        look: Any = {"transform": axes.get_xaxis_transform(), "color": ink(0.4), "linewidth": 0.8, "zorder": 1}
+        look |= {"linestyle": DOTTED if lines else "-", "label": fresh(axes, curves[0].name_of_marks)}
+        axes.vlines(knots, 0, 1.0 if lines else 0.04, **look)
 
 
-@contextmanager
-def panel_of(ax: Axes, square: bool, title: str | None, show: bool) -> Iterator[AxesPanel]:
-    """Return axes of the user as a panel, and adapt what is drawn into it to their style and size."""
-    panel = AxesPanel(ax, square)
-    before, had = set(ax.findobj()), ax.has_data()
-    names = list(ax._axis_map)
-    limits = {name: getattr(ax, f"get_{name}lim")() for name in names if had}
-    figure: Any = ax.get_figure(root=True)
-    dark = has_dark_background(ax)
-    with light_colors(dark):
-        yield panel
-    for name, (low, high) in limits.items():
-        # Pictures with limits of their own must not hide what was there.
-        if not getattr(ax, f"get_autoscale{name}_on")():
-            own = getattr(ax, f"get_{name}lim")()
-            getattr(ax, f"set_{name}lim")(min(low, own[0]), max(high, own[1]))
-    _name_start(ax)
-    own = _own(ax)
-    legend = {text for own in [ax.get_legend()] if own is not None for text in own.findobj(Text)}
-    shrink([artist for artist in ax.findobj() if artist not in before | own | legend], panel.factor, text_factor(ax))
-    if dark:
-        _darken(ax, before, figure.get_facecolor())
-    if title is not None:
-        # Explanations of symbols are above the axes.
-        above = ax.get_legend() is not None or any(float(np.asarray(text.get_position())[1]) > 1 for text in ax.texts)
-        ax.set_title(title, pad=26 if above else None)
-    if show:
-        from matplotlib import pyplot
-
-        pyplot.show()
+def _mark_gaps(axes: Axes, curves: Sequence[Curve]) -> None:
+    """Shade long gaps that all curves have."""
+    gaps = common_gaps(curves)
+    if not len(gaps):
+        return
+    label = f"{_lengths(gaps, curves[0].axis)} without data"
+    if not any(len(own.breaks) for own in curves):
+        banded = curves[0].noise is not None and curves[0].noise.speed is not None
+        label += f", {'acceleration' if banded else 'rates'} not drawn"
+    spans = [(start, end - start) for start, end in gaps.tolist()]
+    look: Any = {"transform": axes.get_xaxis_transform(), "facecolor": GAP, "linewidth": 0, "zorder": 0.5}
+    axes.broken_barh(spans, (0, 1), label=fresh(axes, label), **look)
 
 
-def has_dark_background(ax: Axes) -> bool:
-    """Whether axes of the user are dark."""
-    figure: Any = ax.get_figure(root=True)
-    facecolor: Any = ax.get_facecolor()
-    return is_dark(facecolor if ax.axison and facecolor[3] else figure.get_facecolor())
-
-
-def _own(ax: Any) -> set[Artist]:
-    """Return the artists of the axis of axes, which belong to the user."""
-    return {artist for own in ax._axis_map.values() for artist in own.findobj()}
-
-
-def _darken(ax: Any, before: set[Artist], background: Any) -> None:
-    """Invert new artists in axes of the user; ticks and labels have the colours of the user, except in boxes."""
-    box, kept = ax.name == "3d", _own(ax)
-    labels = [axis.label for axis in ax._axis_map.values()] if box else []
-    invert([artist for artist in ax.findobj() if artist not in before and artist not in kept] + labels, background)
-    if box:
-        invert_ticks(ax, background)
-
-
-def _name_start(ax: Axes) -> None:
-    """Name the first of the markers of starting points in legends."""
-    marks = [line for line in ax.lines if line.get_label() in (START, "start")]
-    if marks and all(line.get_label() == START for line in marks):
-        # Markers on the far side of a globe are faint.
-        next((line for line in marks if line.get_alpha() is None), marks[0]).set_label("start")
-
-
-def check_axes(ax: Any, space: Space) -> None:
-    """Raise an error unless a picture of the space can be drawn into axes."""
-    if not isinstance(ax, Axes):
-        raise TypeError(f"ax must be axes of matplotlib, not {short_repr(ax)}")
-    if isinstance(space, Product):
-        raise ValidationError(
-            f"ax is one set of axes, but a curve on {space!r} has one picture per factor. Omit ax to draw a page."
-        )
-    if str(cover_of(space)) in VIEWS and ax.has_data():
-        raise ValidationError(
-            "ax already contains a picture, and the view of this picture depends on the curves. Draw all of them in "
-            "one call: symspline.plot([first, second], ax=ax)."
-        )
-
-
-def next_color(ax: Any) -> Any:
-    """Return the next colour of the property cycle of axes."""
-    (probe,) = ax.plot(*[[]] * (3 if ax.name == "3d" else 2))
-    color = probe.get_color()
-    probe.remove()
-    return color
+def _lengths(gaps: Array, axis: Axis) -> str:
+    """Describe the lengths of gaps, given on matplotlib's axis, in seconds if the axis has a unit."""
+    longest = float(np.diff(gaps).max()) * (86_400 if axis.dates else 1)
+    length = f"{longest:.3g}"
+    if axis.seconds:
+        unit, name = next((unit, name) for least, unit, name in _UNITS if longest >= least)
+        length = f"{longest / unit:.3g} {name}"
+    return f"gap of {length}" if len(gaps) == 1 else f"gaps of up to {length}"

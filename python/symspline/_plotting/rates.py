@@ -1,4 +1,4 @@
-"""Velocities and accelerations against time: signed in one dimension, one panel per unit."""
+"""Velocities and accelerations against time, signed in one dimension, and residuals of measurements."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import SubFigure
+from matplotlib.lines import Line2D
 
+from .._curves.curve import SidePanel
 from .._spaces import Product, Space, SpecialEuclidean, Sphere, Torus, cover_of, factors_of, short_name
-from .bands import fill_band, shade_quantiles
-from .curves import LINE, Curve
-from .graphs import FEW_KNOTS, timelines
-from .style import EDGE, INK, MARK, Array
+from .curves import Curve
+from .lines import ALPHA, LINE, fill_band, fresh, plot_line, shade_quantiles
+from .panels import FEW_KNOTS, Panel, time_axes
+from .style import DATA, MARK, Array, axes_size, distinct, ink, legend
 
 NORMAL = 1.96
 """Half width of the 95 % interval of a normal distribution, in standard deviations."""
-LIMIT, MEDIAN = "_limit", "_median"
 IN_ROW = 3
 """The largest number of factors whose pictures are in one row."""
 # Spaces and families, besides spheres and tori, in which distances are angles.
@@ -30,6 +30,8 @@ _LONG = (3600, "h"), (86_400, "d"), (31_557_600, "yr")
 """Longer units of time in seconds, and their names."""
 QUATERNIONS = {"sphere:3", "su:2"}
 """Spaces whose points turn frames, at an angular velocity ω of twice their speed."""
+_LEAST = 3.6
+"""The smallest limit of residuals. Those far beyond most others are drawn at the edge."""
 _LONGEST = 10
 """Number of letters of a space in the label of an axis."""
 At = Callable[[str], Any]
@@ -211,20 +213,16 @@ def _on_earth(curve: Curve, seconds: bool) -> list[Rate]:
     ]
 
 
-def draw_rates(panel: SubFigure, curves: Sequence[Curve], most: int, wide: bool) -> None:
-    """Draw the rates of curves in the columns of `columns_of`."""
+def draw_rates(axes: list[Axes], curves: Sequence[Curve], column: Sequence[tuple[int | None, Rate]]) -> None:
+    """Draw the rates of one of the columns of `columns_of`."""
     curves = [curve for curve in curves if curve.has_line and not curve.faint]
-    seconds = curves[0].axis.seconds
-    columns = columns_of(curves[0], seconds, most, wide)
-    panels = panel.subfigures(1, len(columns), squeeze=False)[0]
-    for own, group in zip(panels, columns, strict=True):
-        parts = [curves if number is None else [curve.part(number) for curve in curves] for number, _ in group]
-        rates = [rate for _, rate in group]
-        if seconds and curves[0].radius is None:
-            rates = [_in_longer_units(*each) for each in zip(rates, parts, strict=True)]
-        made = timelines(own, curves, [rate.label for rate in rates])
-        for each in zip(made, parts, rates, strict=True):
-            _draw_rate(*each)
+    parts = [curves if number is None else [curve.part(number) for curve in curves] for number, _ in column]
+    rates = [rate for _, rate in column]
+    if curves[0].axis.seconds and curves[0].radius is None:
+        rates = [_in_longer_units(*pair) for pair in zip(rates, parts, strict=True)]
+    time_axes(Panel(axes, mine=True), curves, [rate.label for rate in rates])
+    for drawn in zip(axes, parts, rates, strict=True):
+        _draw_rate(*drawn)
 
 
 def _in_longer_units(rate: Rate, curves: Sequence[Curve]) -> Rate:
@@ -244,41 +242,47 @@ def _draw_rate(axes: Axes, curves: Sequence[Curve], rate: Rate) -> None:
     drawn = [0.0, *(shade_quantiles(axes, batch, rate.values(batch.at)) if batch else ())]
     top, rounding, moves = 0.0, 0.0, False
     for curve in curves:
-        top = max(top, rate.scale * float(np.abs(rate.speed(curve.at)).max()))
-        own = rate.scale * _rounding(curve)
-        moves |= bool((rate.scale * np.abs(rate.speed(curve.at)) > own).any())
-        rounding = max(rounding, float(own.max()))
+        speeds = rate.scale * np.abs(rate.speed(curve.at))
+        errors = rate.scale * _rounding(curve)
+        top, rounding = max(top, float(speeds.max())), max(rounding, float(errors.max()))
+        moves |= bool((speeds > errors).any())
         if curve.is_mean and batch:
             # A mean of curves is smoother than they are, so that its rates are smaller than most of theirs.
             median = np.median(rate.values(batch.at), axis=0)
-            axes.plot(batch.times, median, color=INK, linewidth=1.8, label=MEDIAN)
+            axes.plot(batch.times, median, color=ink(), linewidth=1.8, label=f"median of {batch.count} curves")
             drawn += [float(median.min()), float(median.max())]
-            continue
-        values = rate.values(curve.at)
-        deviation = curve.noise.speed if rate.order == 1 and curve.noise is not None else None
-        if deviation is None:
-            # Without data or a band, a smooth line would look like a measurement.
-            values = curve.outside_gaps(values[:, None])[:, 0]
-        low, high = values, values
-        if deviation is not None:
-            spread = rate.scale * NORMAL * deviation
-            low, high = values - spread, values + spread
-            low = low if rate.signed else np.maximum(low, 0)
-        for part in curve.unbroken:
-            at = np.searchsorted(curve.x, part.x)
-            width = (1.8 if len(curve.marks) <= FEW_KNOTS or curve.noise is not None else 1.0) if curve.alone else 1.1
-            line = np.column_stack([part.times, values[at]])
-            part.plot_line(axes, line, color=part.color, linewidth=width, label=LINE)
-            if deviation is not None:
-                fill_band(axes, part, low[at], high[at])
-        drawn += [float(np.nanmin(low)), float(np.nanmax(high))]
+        else:
+            drawn += _draw_values(axes, curve, rate)
     for limit in {curve.limits[0][rate.order - 1] for curve in curves if curve.limits and rate.whole} - {np.inf}:
         for bound in (limit, -limit) if rate.signed else (limit,):
-            axes.axhline(rate.scale * bound, color=MARK, linewidth=1, linestyle="--", zorder=2, label=LIMIT)
+            look: Any = {"color": MARK, "linewidth": 1, "linestyle": "--", "zorder": 2}
+            axes.axhline(rate.scale * bound, label=fresh(axes, "limit"), **look)
             drawn.append(rate.scale * bound)
     top, rounding = (top, 0.0) if moves else (1.0, rounding)
     unit = top * max(curve.x[-1] - curve.x[0] for curve in curves) ** (1 - rate.order)
-    _limit(axes, min(drawn), max(drawn), unit, rounding if rate.order == 1 else 1e-9 * unit, rate.signed)
+    _set_limits(axes, min(drawn), max(drawn), unit, rounding if rate.order == 1 else 1e-9 * unit, rate.signed)
+
+
+def _draw_values(axes: Axes, curve: Curve, rate: Rate) -> list[float]:
+    """Draw the rate of a curve with its band, if it has one, and return the limits."""
+    values = rate.values(curve.at)
+    deviation = curve.noise.speed if rate.order == 1 and curve.noise is not None else None
+    if deviation is None:
+        # Without data or a band, a smooth line would look like a measurement.
+        values = curve.outside_gaps(values)
+    spread = 0.0 if deviation is None else rate.scale * NORMAL * deviation
+    low, high = values - spread, values + spread
+    low = low if rate.signed or deviation is None else np.maximum(low, 0)
+    width = 1.1
+    if curve.alone:
+        width = 1.8 if len(curve.marks) <= FEW_KNOTS or curve.noise is not None else 1.0
+    for part in curve.unbroken:
+        at = np.searchsorted(curve.x, part.x)
+        line = np.column_stack([part.times, values[at]])
+        plot_line(axes, part, line, color=part.color, linewidth=width, label=LINE)
+        if deviation is not None:
+            fill_band(axes, part, low[at], high[at])
+    return [float(np.nanmin(low)), float(np.nanmax(high))]
 
 
 def _rounding(curve: Curve) -> Array:
@@ -288,11 +292,65 @@ def _rounding(curve: Curve) -> Array:
     return np.asarray(1e-15 * np.abs(curve.points).max() / np.diff(knots)[segment])
 
 
-def _limit(axes: Axes, low: float, high: float, unit: float, small: float, signed: bool) -> None:
+def _set_limits(axes: Axes, low: float, high: float, unit: float, small: float, signed: bool) -> None:
     """Set the limits of the vertical axis, those of a unit if all values are small."""
     if max(high, -low) <= small:
         low, high = (-unit if signed else 0.0), unit
     if signed:
-        axes.axhline(0.0, color=EDGE, linewidth=0.8, zorder=1)
+        axes.axhline(0.0, color=ink(0.4), linewidth=0.8, zorder=1)
     margin = 0.08 * (high - low)
     axes.set_ylim(low - margin if signed else 0.0, high + margin)
+
+
+# ---- radii of bands, and residuals ----
+
+
+def residuals_of(spline: Any, curve: Curve, has_band: Sequence[bool]) -> list[SidePanel]:
+    """Return the panels of a spline, without the bands of factors whose picture shows them; a batch has none."""
+    if not curve.alone or curve.is_mean:
+        return []
+    panels = spline._panels_below(curve.x)
+    return [own for own in panels if len(own.x) and (own.factor is None or not has_band[own.factor])]
+
+
+def draw_residuals(axes: list[Axes], curve: Curve, panels: Sequence[SidePanel]) -> None:
+    """Draw radii of bands, and residuals in standard deviations."""
+    time_axes(Panel(axes, mine=True), [curve], [own.label for own in panels], marked=False)
+    for one, own in zip(axes, panels, strict=True):
+        words = (_draw_deviations if own.factor is None else _draw_radii)(one, curve, own)
+        one.set_title(words, loc="right", fontsize="small", weight="normal", pad=3)
+
+
+def _draw_radii(axes: Axes, curve: Curve, own: SidePanel) -> str:
+    """Draw the radius of a band against time."""
+    radii = own.values[:, 0]
+    axes.fill_between(curve.times, 0, radii, color=curve.color, alpha=ALPHA, linewidth=0, label=curve.band_name)
+    axes.plot(curve.times, radii, color=curve.color, linewidth=1.2)
+    axes.set_ylim(0, 1.15 * radii.max())
+    return "radius of the ball that contains the true point with 95 % probability"
+
+
+def _draw_deviations(axes: Axes, curve: Curve, own: SidePanel) -> str:
+    """Draw residuals, and the limits between which 95 % of them should lie."""
+    times, values, sizes = curve.on_axis(own.x), own.values, np.abs(own.values)
+    top = max(_LEAST, min(1.1 * float(sizes.max()), 1.5 * float(np.quantile(sizes, 0.99))))
+    axes.set_ylim(-top, top)
+    axes.axhspan(-NORMAL, NORMAL, facecolor=curve.color, alpha=0.08, linewidth=0, zorder=0.6)
+    axes.axhline(0.0, color=ink(0.4), linewidth=0.8, zorder=1)
+    look: Any = {"linestyle": "none", "markeredgewidth": 0, "zorder": 3, "rasterized": values.size > 5000}
+    size = float(np.clip(40 / np.sqrt(values.size), 1.2, 3.5))
+    colors = distinct() if own.names else [DATA]
+    handles = []
+    for k, column in enumerate(values.T):
+        look["color"] = colors[k % len(colors)]
+        kept = np.abs(column) <= top
+        handles += axes.plot(times[kept], column[kept], marker="o", markersize=size, alpha=0.6, **look)
+        for sign, marker in ((1, "^"), (-1, "v")):
+            far = sign * column > top
+            axes.plot(times[far], np.full(int(far.sum()), 0.95 * sign * top), marker=marker, markersize=6, **look)
+    if own.names:
+        keys = [Line2D([], [], linestyle="none", marker="o", markersize=5, color=own.get_color()) for own in handles]
+        legend(axes, keys, own.names, axes_size(axes)[0], loc="lower left", bbox_to_anchor=(0, 1))
+    words = f"{100 * np.mean(sizes > NORMAL):.1f} % beyond ±{NORMAL} (5 % expected)"
+    beyond = int((sizes > top).sum())
+    return words + (f"; {beyond} beyond the axis (triangles)" if beyond else "")

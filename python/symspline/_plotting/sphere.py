@@ -7,31 +7,44 @@ points of the rim are the same line: a curve that leaves the hemisphere there re
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import SubFigure
 from numpy.typing import NDArray
 
 from .._base.lonlat import from_lonlat, to_lonlat
-from . import land
-from .arrows import draw_arrows
-from .bands import disc_indices, draw_tube
-from .curves import BEHIND, CIRCLE, Curve
-from .globe import View, degrees, draw_frame, draw_globe, facing, label_directions, middle_of
-from .style import GRID, HALO, INK, MARK, PAPER, SPLINE, Array, inside, note, plain, points, round_below, size, window
+from .curves import Curve
+from .globe import (
+    Globe,
+    degrees,
+    draw_frame,
+    draw_globe,
+    draw_land,
+    draw_land_on_map,
+    facing,
+    label_directions,
+    middle_of,
+)
+from .lines import (
+    CIRCLE,
+    FAR,
+    disc_indices,
+    draw_arrows,
+    draw_dots,
+    draw_end,
+    draw_line,
+    draw_polygon,
+    draw_tube,
+    fresh,
+)
+from .panels import Panel, View
+from .style import Array, axes_size, halo, ink, note, paper, plain, round_below, window
 
-_SMALL, _SMALL_WIDE = np.radians([25, 50])
-"""The largest distance from the middle of curves that are drawn in a frame, and in a wide one."""
-_LOCATOR = 3.9
-"""Width in inches of the column of the small globe beside a frame."""
+_SMALL, _SMALL_ON_SPHERE = np.radians([25, 50])
+"""The largest distance from the middle of curves that are drawn in a frame, and of those on S²."""
 _COARSE = np.radians(2)
 """Frames narrower than this have no land, as the coastlines are too coarse."""
-_LETTERS = "abcdefghijklmnop"
-"""Names of the points at which a curve leaves the hemisphere and returns."""
-_RING: dict[str, Any] = {"markersize": 12, "markeredgewidth": 1.4, "zorder": 6}
 _WIDEST = 1.5
 _FREE = 60
 """The smallest range of longitudes without curves, in degrees, that becomes the edges of a map."""
@@ -47,33 +60,38 @@ _BLOCH = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "|0⟩": (0.0, 0.0, 1.0), 
 _AXES = {"x₁": (1.0, 0.0, 0.0), "x₂": (0.0, 1.0, 0.0), "x₃": (0.0, 0.0, 1.0)}
 
 
-def draw_sphere(panel: SubFigure, curves: Sequence[Curve]) -> None:
-    """Draw curves on S²: on a globe and, if there is space, on a map of all longitudes and latitudes.
+# ---- the views ----
 
-    Curves that are close together are drawn in a frame, beside a globe that shows where it is. Curves on the Earth have
-    land and a scale bar.
-    """
-    width, height = size(panel)
-    radius = curves[0].radius
-    wide = width > 2 * height
-    globe = _Globe(below=0.1, right=width - min(width, height) + 0.1, beside=_LOCATOR if wide else 0.0)
-    everything, seen = (np.concatenate([own.extent for own in curves if not (few and own.faint)]) for few in (0, 1))
-    axes, view, is_part = _draw_globe(panel, everything, globe, seen)
+
+def sphere(curves: Sequence[Curve]) -> View:
+    """Return the view of curves on S²: a globe and a map of longitudes and latitudes, or a part of the globe."""
+    look: Any = {"has_band": True, "has_many": True, "is_turned": True}
+    if _frame(_extent(curves), _SMALL_ON_SPHERE, 1.0) is not None:
+        return View(_draw_sphere, **look)
+    return View(_draw_sphere, 11.4, 4.6, rows=2, **look)
+
+
+def _extent(curves: Sequence[Curve], faint: bool = True) -> Array:
+    """Return the points of all curves, or of those that have given points."""
+    return np.concatenate([own.extent for own in curves if faint or not own.faint])
+
+
+def _draw_sphere(panel: Panel, curves: Sequence[Curve]) -> None:
+    """Draw curves on a globe and, if there are axes for it, on a map. Those on the Earth have land and a scale bar."""
+    radius, axes = curves[0].radius, panel.axes[0]
+    globe, is_part = _draw_globe(axes, _extent(curves), _extent(curves, faint=False), _SMALL_ON_SPHERE)
     for curve in curves:
-        curve.draw_polygon(axes, view.visible)
-        _draw_on_globe(axes, view, curve, curve.points, curve.given, curve.radii)
+        draw_polygon(axes, curve, globe.visible)
+        _draw_on_globe(axes, globe, curve, curve.points, curve.given, curve.radii)
     has_land = radius is not None and (not is_part or bool(np.ptp(axes.get_xlim()) > _COARSE))
     if has_land:
-        land.draw_on_globe(axes, view)
+        draw_land(axes, globe)
     if radius is not None and is_part:
         _draw_scale(axes, radius / 1000)
         if not has_land:
-            look: Any = {"transform": axes.transAxes, "fontsize": points(9), "color": INK, "path_effects": HALO}
-            axes.text(0.015, 0.03, "no coastlines at this scale", zorder=7, **look)
-    if wide and is_part:
-        _draw_locator(panel, axes, view, curves, radius is not None)
-    elif wide:
-        _draw_map(panel, curves, height, radius is not None)
+            note(axes, "no coastlines at this scale")
+    for beside in panel.axes[1:]:
+        _draw_map(beside, curves, radius is not None)
 
 
 def _draw_scale(axes: Axes, radius: float) -> None:
@@ -81,44 +99,28 @@ def _draw_scale(axes: Axes, radius: float) -> None:
     (west, east), (south, north) = axes.get_xlim(), axes.get_ylim()
     length = round_below(0.25 * (east - west) * radius)
     end, height = east - 0.03 * (east - west), south + 0.06 * (north - south)
-    look: dict[str, Any] = {"color": INK, "zorder": 7}
+    look: dict[str, Any] = {"color": ink(), "zorder": 7}
     axes.plot([end - length / radius, end], [height] * 2, "|-", linewidth=1.2, markersize=6, label="_scale", **look)
     middle, above = end - length / radius / 2, height + 0.015 * (north - south)
-    look |= {"ha": "center", "va": "bottom", "fontsize": points(9), "path_effects": HALO}
+    look |= {"ha": "center", "va": "bottom", "fontsize": "small", "path_effects": halo()}
     axes.text(middle, above, f"{length:g} km" if length >= 1 else f"{1000 * length:g} m", **look)
 
 
-def _draw_locator(panel: SubFigure, frame: Axes, view: View, curves: Sequence[Curve], has_land: bool) -> None:
-    """Draw curves on a small globe to the right of a frame, with the outline of the frame."""
-    width, _ = size(panel)
-    axes = panel.add_axes(inside(panel, width - _LOCATOR + 0.3, 0.6, 0.3, 0.35), label="locator")
-    draw_globe(axes, view, 30)
-    if has_land:
-        land.draw_on_globe(axes, view)
-    (west, east), (south, north) = frame.get_xlim(), frame.get_ylim()
-    outline = np.array([[west, south], [east, south], [east, north], [west, north], [west, south]])
-    axes.plot(*outline.T, color=MARK, linewidth=1.4, zorder=6, label="_frame")
-    frame.spines[:].set_color(MARK)
-    for curve in curves:
-        if curve.has_line:
-            look: Any = {"linewidth": 0.4, "zorder": 3.5} if curve.faint else {"linewidth": 0.8, "zorder": 4}
-            axes.plot(*view.visible(curve.points).T, color=curve.color, **look)
-    if max(east - west, north - south) < 0.15:
-        # A small frame would not be seen.
-        axes.plot((west + east) / 2, (south + north) / 2, "o", color="none", markeredgecolor=MARK, **_RING)
+def bloch(_: Sequence[Curve]) -> View:
+    """Return the view of CP¹: the Bloch sphere with |0⟩ at the top or, if states are close together, a part of it."""
 
+    def draw(panel: Panel, curves: Sequence[Curve]) -> None:
+        (axes,) = panel.axes
+        points = np.concatenate([bloch_vectors(curve.extent) for curve in curves])
+        globe, is_part = _draw_globe(axes, points, points, spacing=30, lats=(10, 40), labels=_BLOCH)
+        for curve in curves:
+            # Angles between Bloch vectors are twice the distances of states.
+            radii = None if curve.radii is None else 2 * curve.radii
+            draw_polygon(axes, curve, lambda states: globe.visible(bloch_vectors(states)))
+            _draw_on_globe(axes, globe, curve, *curve.marked(bloch_vectors), radii)
+        note(axes, ("part of the Bloch sphere: longitude from x, |0⟩ is 90°N" if is_part else "Bloch sphere") + _TWICE)
 
-def draw_bloch(panel: SubFigure, curves: Sequence[Curve]) -> None:
-    """Draw curves on CP¹: on the Bloch sphere with |0⟩ at the top or, if states are close together, on a part of it."""
-    look = _Globe(spacing=30, lats=(10, 40), labels=_BLOCH)
-    points = np.concatenate([bloch_vectors(curve.extent) for curve in curves])
-    axes, view, is_part = _draw_globe(panel, points, look)
-    for curve in curves:
-        # Angles between Bloch vectors are twice the distances of states.
-        radii = None if curve.radii is None else 2 * curve.radii
-        curve.draw_polygon(axes, lambda states: view.visible(bloch_vectors(states)))
-        _draw_on_globe(axes, view, curve, *curve.marked(bloch_vectors), radii)
-    note(panel, ("part of the Bloch sphere: longitude from x, |0⟩ is 90°N" if is_part else "Bloch sphere") + _TWICE)
+    return View(draw, has_many=True, is_turned=True)
 
 
 def bloch_vectors(states: Any) -> Array:
@@ -128,46 +130,45 @@ def bloch_vectors(states: Any) -> Array:
     return np.stack([across.real, across.imag, np.abs(a) ** 2 - np.abs(b) ** 2], axis=-1)
 
 
-def _draw_on_half(what: str, vectors: Callable[[Any], Array], panel: SubFigure, curves: Sequence[Curve]) -> None:
-    """Draw lines, given by unit vectors, on the hemisphere or, if they are close together, on a part of the sphere."""
-    lines = [lifted(vectors(curve.points)) for curve in curves]
-    lines = [line if line[0] @ lines[0][0] >= 0 else -line for line in lines]
-    if sum(np.sum(line[:, 2]) for line in lines) < 0:
-        lines = [-line for line in lines]
-    # The half sphere is centred on the curves, so that most of them do not cross its rim.
-    pole = View.above(*middle_of(np.concatenate(lines))).up
-    upper = {name: np.multiply(end, 1 if np.dot(end, pole) >= 0 else -1) for name, end in _AXES.items()}
-    look = _Globe(labels=upper, half=True)
-    above = [line * sides(line, pole) for line in lines]
-    axes, view, is_part = _draw_globe(panel, np.concatenate(lines), look, np.concatenate(above))
-    crossed = False
-    for curve, line, shown in zip(curves, lines, lines if is_part else above, strict=True):
-        given = shown[curve.knots]
-        if curve.noise is not None:
-            near, given = (curve.closest_samples(line) if is_part else pole, vectors(curve.given))
-            given = given * np.where(np.sum(given * near, axis=1) < 0, -1.0, 1.0)[:, None]
-        whole, radii = (line, curve.radii) if is_part else (broken_at_rim(line, pole), None)
-        _draw_on_globe(axes, view, curve, whole, given, radii)
-        if not is_part and curve.alone:
-            crossed |= _name_crossings(axes, view, whole)
-    words = (
-        "part of the sphere: opposite points"
-        if is_part
-        else "opposite points of the red rim" + " (equal letters)" * crossed
-    )
-    meaning = "the normal of a plane" if what == "plane" else "the direction of a line"
-    note(panel, f"each point is {meaning};\n{words} are the same {what}")
+def _hemisphere(what: str, vectors: Callable[[Any], Array]) -> View:
+    """Return the view of lines, given by unit vectors: a hemisphere or, if they are close together, a part of it."""
+
+    def draw(panel: Panel, curves: Sequence[Curve]) -> None:
+        (axes,) = panel.axes
+        lines = [lifted(vectors(curve.points)) for curve in curves]
+        lines = [line if line[0] @ lines[0][0] >= 0 else -line for line in lines]
+        if sum(np.sum(line[:, 2]) for line in lines) < 0:
+            lines = [-line for line in lines]
+        # The half sphere is centred on the curves, so that most of them do not cross its rim.
+        pole = Globe.above(*middle_of(np.concatenate(lines))).up
+        upper = {name: np.multiply(end, 1 if np.dot(end, pole) >= 0 else -1) for name, end in _AXES.items()}
+        above = [line * sides(line, pole) for line in lines]
+        globe, is_part = _draw_globe(axes, np.concatenate(lines), np.concatenate(above), labels=upper, half=True)
+        for curve, line, shown in zip(curves, lines, lines if is_part else above, strict=True):
+            given = shown[curve.knots]
+            if curve.noise is not None:
+                near, given = (curve.closest_samples(line) if is_part else pole, vectors(curve.given))
+                given = given * np.where(np.sum(given * near, axis=1) < 0, -1.0, 1.0)[:, None]
+            whole, radii = (line, curve.radii) if is_part else (broken_at_rim(line, pole), None)
+            _draw_on_globe(axes, globe, curve, whole, given, radii)
+            if len(whole) > len(line):
+                curve.tracks.append((axes, curve.x, globe.flat(shown)))
+        meaning = "the normal of a plane" if what == "plane" else "the direction of a line"
+        words = "part of the sphere: opposite points" if is_part else "opposite points of the red rim"
+        note(axes, f"each point is {meaning};\n{words} are the same {what}")
+
+    return View(draw, has_many=True, is_turned=True)
 
 
 # Points of RP² and Gr(1, 3) are lines. Points of Gr(2, 3) are planes, represented by their normals.
-draw_lines = partial(_draw_on_half, "line", lambda points: points.reshape(-1, 3))
-draw_normals = partial(_draw_on_half, "plane", lambda bases: np.cross(bases[..., 0], bases[..., 1]))
+LINES = _hemisphere("line", lambda points: points.reshape(-1, 3))
+PLANES = _hemisphere("plane", lambda bases: np.cross(bases[..., 0], bases[..., 1]))
 
 
 # ---- on a globe ----
 
 
-def _draw_on_globe(axes: Axes, view: View, curve: Curve, line: Array, given: Array, radii: Array | None) -> None:
+def _draw_on_globe(axes: Axes, globe: Globe, curve: Curve, line: Array, given: Array, radii: Array | None) -> None:
     """Draw a curve on a globe, dashed on the far side.
 
     ``line`` and ``given`` are the unit vectors of samples and of given points, shape (m, 3). ``radii`` are the angular
@@ -176,25 +177,58 @@ def _draw_on_globe(axes: Axes, view: View, curve: Curve, line: Array, given: Arr
     if radii is not None:
         discs = disc_indices(curve)
         rings = caps(line[discs], radii[discs])
-        seen = np.max(rings @ view.up, axis=1)[:, None, None] > 0
-        draw_tube(axes, curve, np.where(seen, view.outline(rings), np.nan))
-    hidden = view.hidden(line)
+        seen = np.max(rings @ globe.up, axis=1)[:, None, None] > 0
+        draw_tube(axes, curve, np.where(seen, globe.outline(rings), np.nan))
+    hidden = globe.hidden(line)
+    draw_line(axes, curve, globe.visible(line))
+    draw_arrows(axes, curve, globe.visible(line), globe.visible(given))
     if not curve.faint and np.isfinite(hidden).any():
-        curve.draw_line(axes, hidden, linewidth=1, linestyle=(0, (2, 2)), alpha=0.6, label=BEHIND)
-    curve.draw_line(axes, view.visible(line))
-    draw_arrows(axes, curve, view.visible(line), view.visible(given))
-    curve.draw_end(axes, view.hidden(line[-1:]), alpha=0.35)
-    curve.draw_dots(axes, view.hidden(given), alpha=0.35)
-    curve.draw_dots(axes, view.visible(given))
+        draw_line(axes, curve, hidden, linewidth=1, linestyle=(0, (2, 2)), alpha=0.6, label=fresh(axes, FAR))
+    draw_end(axes, curve, globe.hidden(line[-1:]), alpha=0.35)
+    draw_dots(axes, curve, globe.visible(given))
+    draw_dots(axes, curve, globe.hidden(given), alpha=0.35)
 
 
-class _Globe(NamedTuple):
-    """The look of a whole globe, or of its northern half.
+def _frame(vectors: Array, small: float, ratio: float) -> tuple[Globe, Array, Array] | None:
+    """Return globe, centre and half sides of a frame around vectors; None if they are not close together.
 
-    Attributes
+    ``ratio`` is that of width and height.
+    """
+    globe = Globe.above(*middle_of(vectors))
+    flat = globe.flat(vectors)
+    far = np.arctan2(np.linalg.norm(flat, axis=-1), vectors @ globe.up).max()
+    if not 1e-9 < far < small:
+        return None
+    middle, _ = window(flat, 1.0)
+    across, high = 0.61 * np.ptp(flat, axis=0)
+    high = max(high, across / ratio)
+    half = np.array([ratio * high, high])
+    # The corners of the frame must be on the globe.
+    return (globe, middle, half) if np.linalg.norm(np.abs(middle) + half) < 1 else None
+
+
+def _draw_globe(
+    axes: Axes,
+    vectors: Array,
+    seen: Array,
+    small: float = _SMALL,
+    spacing: int = 15,
+    lats: tuple[float, float] = (-90, 90),
+    labels: Any = None,
+    half: bool = False,
+) -> tuple[Globe, bool]:
+    """Draw the part of a globe where vectors are, or all of it if they are not close together.
+
+    Returns the globe, and whether it is a part. A whole globe is turned towards the vectors ``seen``.
+
+    Parameters
     ----------
-    below, right : float
-        Margins in inches.
+    axes : Axes
+        Axes to draw into.
+    vectors, seen : ndarray, shape (m, 3)
+        Unit vectors of all curves, and of those towards which a whole globe is turned.
+    small : float
+        The largest distance from the middle of curves that are drawn in a frame.
     spacing : int
         Spacing of the graticule in degrees.
     lats : pair of float
@@ -203,53 +237,18 @@ class _Globe(NamedTuple):
         Labelled directions, such as "x".
     half : bool
         Whether only the northern half is drawn.
-    beside : float
-        Width in inches of the space to the right of a part of the globe, whose frame fills the rest.
     """
-
-    below: float = 0.35
-    right: float = 0.1
-    spacing: int = 15
-    lats: tuple[float, float] = (-90, 90)
-    labels: Any = None
-    half: bool = False
-    beside: float = 0.0
-
-
-def _draw_globe(panel: SubFigure, vectors: Array, look: _Globe, above: Array | None = None) -> tuple[Axes, View, bool]:
-    """Draw the part of a globe where vectors are, or all of it if they are not close together.
-
-    Returns the axes, the view, and whether it is a part. A whole globe is turned towards the vectors ``above``.
-    """
-    view = View.above(*middle_of(vectors))
-    far = np.arctan2(np.linalg.norm(view.flat(vectors), axis=-1), vectors @ view.up).max()
-    if 1e-9 < far < (_SMALL_WIDE if look.beside else _SMALL):
-        width, height = size(panel)
-        if look.beside:
-            right, top = look.beside, 0.15
-        else:
-            side = min(width, height)
-            right, top = width - side + 0.2, height - side + 0.65
-        flat = view.flat(vectors)
-        middle, _ = window(flat, 1.0)
-        ratio = (width - 0.95 - right) / (height - 0.5 - top)
-        across, high = 0.61 * np.ptp(flat, axis=0)
-        high = max(high, across / ratio)
-        half = np.array([ratio * high, high])
-        # The corners of the frame must be on the globe.
-        if np.linalg.norm(np.abs(middle) + half) < 1:
-            axes = panel.add_axes(inside(panel, 0.95, 0.5, right, top))
-            draw_frame(axes, view, middle, half)
-            axes.tick_params(labelsize=points(8))
-            return axes, view, True
-    seen = vectors if above is None else above
-    view = View.above(*middle_of(vectors)) if look.half else facing(seen, look.lats)
-    axes = panel.add_axes(inside(panel, 0.1, look.below, look.right, 0.1))
-    draw_globe(axes, view, look.spacing, look.half)
-    if look.labels:
+    width, height = axes_size(axes)
+    frame = _frame(vectors, small, float(np.clip(width / height, 0.5, 2.0))) or _frame(vectors, small, 1.0)
+    if frame is not None:
+        draw_frame(axes, *frame)
+        return frame[0], True
+    globe = Globe.above(*middle_of(vectors)) if half else facing(seen, lats)
+    draw_globe(axes, globe, spacing, half)
+    if labels:
         axes.set(xlim=(-1.22, 1.22), ylim=(-1.22, 1.22))
-        label_directions(axes, view, look.labels, view.flat(seen))
-    return axes, view, False
+        label_directions(axes, globe, labels, globe.flat(seen))
+    return globe, False
 
 
 def caps(points: Array, radii: Array) -> Array:
@@ -302,33 +301,16 @@ def _interrupted(line: Array, after: Any, gaps: Any) -> Array:
     return np.insert(line, np.repeat(after + 1, 3), np.reshape(gaps, (-1, line.shape[1])), axis=0)
 
 
-def _name_crossings(axes: Axes, view: View, broken: Array) -> bool:
-    """Write one letter at both points where a curve leaves the hemisphere and where it returns, if it does.
-
-    ``broken`` is the result of `broken_at_rim`.
-    """
-    (gaps,) = np.nonzero(np.isnan(broken[:, 0]))
-    flat = view.flat(broken)
-    for i, letter in zip(gaps[: len(_LETTERS)], _LETTERS, strict=False):
-        for j in (i - 1, i + 1):
-            outwards = flat[j] / max(float(np.linalg.norm(flat[j])), 1e-9)
-            x, y = (flat[j] + 0.09 * outwards).tolist()
-            text = axes.text(x, y, letter, color=SPLINE, fontsize=points(10), weight="bold", zorder=8)
-            text.set(ha="center", va="center", path_effects=HALO)
-    return bool(gaps.size)
-
-
 # ---- on the map ----
 
 
-def _draw_map(panel: SubFigure, curves: Sequence[Curve], left: float, has_land: bool) -> None:
+def _draw_map(axes: Axes, curves: Sequence[Curve], has_land: bool) -> None:
     """Draw a map. Without land it is centred on the curves, by a multiple of 60 degrees, and may be a part of it."""
-    axes = panel.add_axes(inside(panel, left + 0.65, 0.5, 0.4, 0.2))
     plain(axes)
     middle = 0 if has_land else _middle_meridian(np.concatenate([curve.extent for curve in curves if not curve.faint]))
-    axes.set(aspect="equal", facecolor=PAPER, label="map")
+    axes.set(aspect="equal", facecolor=paper(0.06), label="map")
     if has_land:
-        land.draw_on_map(axes)
+        draw_land_on_map(axes)
     turn = np.stack([from_lonlat(middle, 0), from_lonlat(middle + 90, 0), [0, 0, 1]], axis=-1)
     seen = []
     for curve in curves:
@@ -336,9 +318,12 @@ def _draw_map(panel: SubFigure, curves: Sequence[Curve], left: float, has_land: 
         seen += [positions, given]
         if curve.radii is not None:
             _draw_band(axes, curve, positions, curve.points @ turn, curve.radii)
-        curve.draw_line(axes, broken(positions))
-        draw_arrows(axes, curve, broken(positions), given)
-        curve.draw_dots(axes, given, clip_on=False, **{} if curve.noise else {"markersize": 4.5})
+        whole = broken(positions)
+        if len(whole) > len(positions):
+            curve.tracks.append((axes, curve.x, positions))
+        draw_line(axes, curve, whole)
+        draw_arrows(axes, curve, whole, given)
+        draw_dots(axes, curve, given, clip_on=False, **{} if curve.noise else {"markersize": 4.5})
     everything = np.concatenate(seen)
     # Maps are twice as wide as high.
     half = 1.15 * float((np.ptp(everything, axis=0) / [2, 1]).max())
@@ -348,7 +333,7 @@ def _draw_map(panel: SubFigure, curves: Sequence[Curve], left: float, has_land: 
     axes.set_xticks(range(-180, 181, step), [degrees(x + middle, "E", "W") for x in range(-180, 181, step)])
     axes.set_yticks(range(-90, 91, step // 2), [degrees(y, "N", "S") for y in range(-90, 91, step // 2)])
     axes.set_xticks(range(-180, 181, step // 2), minor=True)
-    axes.grid(which="minor", color=GRID, linewidth=0.6)
+    axes.grid(which="minor", color=ink(0.2), linewidth=0.6)
     axes.tick_params(which="minor", length=0)
     axes.set(xlim=(lon - half, lon + half), ylim=(lat - half / 2, lat + half / 2))
 

@@ -1,154 +1,154 @@
-"""Colours, sizes and the look of axes, which all pictures share."""
+"""Colours of the active style, sizes, numbers and dates on axes, legends and notes, which all pictures share."""
 
 from __future__ import annotations
 
-import re
+from collections.abc import Iterable, Sequence
 from textwrap import fill
 from typing import Any
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from matplotlib import colormaps, dates, rcParams
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure, FigureBase, SubFigure
+from matplotlib.collections import Collection
+from matplotlib.colors import to_rgb, to_rgba
+from matplotlib.figure import FigureBase
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 from matplotlib.patheffects import withStroke
-from matplotlib.ticker import ScalarFormatter
+from matplotlib.quiver import Quiver
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-EDGE, GRID, INK, PAPER = "#a8a18f", "#b9c8d1", "#22303a", "#eff4f7"
-SPLINE = "#0b559f"
 DATA = "#7d8f9c"
-"""Colour of noisy data if there is one curve."""
+"""Colour of noisy data if there is one curve, and of curves in the background."""
 MARK = "#c4402f"
-"""Colour of the outline of a frame on a globe."""
-GAP = "#faeee4"
+"""Colour of limits, and of the rim of a half sphere."""
+GAP: Any = ("#d95f0e", 0.1)
 """Colour of long gaps between points."""
-DISTINCT = ["#0b559f", "#d95f0e", "#009e73", "#cc79a7", "#56b4e9", "#8a6d00"]
-"""Colours that colour-blind readers can distinguish."""
 AXES = ["#d55e00", "#009e73", "#0072b2"]
 """Red, green and blue for the axes of a frame, in shades that colour-blind readers can distinguish."""
-HALO = [withStroke(linewidth=2.5, foreground="white", alpha=0.85)]
-DPI = 150
-LEFT, RIGHT, BOTTOM, TOP = 0.95, 0.6, 0.55, 0.25
-"""Margins in inches, which align the time axes of several panels."""
-OWN_AXES: WeakKeyDictionary[Axes, float] = WeakKeyDictionary()
-"""Axes of the user, whose look does not change, and the factor by which symbols and text in them are reduced."""
+DOTTED = (0, (1, 2))
+_DISTINCT = ["#d95f0e", "#009e73", "#cc79a7", "#56b4e9", "#8a6d00"]
 _FAR = 1e3
 """An axis counts from a round number if its numbers are larger than this multiple of their range."""
-_POWERS = -3, 5
-"""Numbers on axes outside these powers of ten have a common power of ten."""
-_POWER = re.compile(r"(?:^1|([+−]?[\d.]+))e\+?(−?\d+)")
-SUPERSCRIPTS = str.maketrans("0123456789−", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
+SUBSCRIPTS = str.maketrans("0123456789,", "₀₁₂₃₄₅₆₇₈₉,")
+_FULL = 3.2
+"""The shorter side in inches of axes whose symbols have their full size."""
 DATES: Any = dates
 """The module of matplotlib, which has no types."""
 
 
+# ---- colours ----
+
+
+def ink(share: float = 1.0, color: Any = None) -> tuple[float, float, float]:
+    """Return the colour of text in the active style, or another one, mixed with the background."""
+    *rgb, alpha = to_rgba(rcParams["figure.facecolor"])
+    ground = 1 - alpha * (1 - np.array(rgb))
+    red, green, blue = share * np.array(to_rgb(color or rcParams["text.color"])) + (1 - share) * ground
+    return float(red), float(green), float(blue)
+
+
+def spline_color() -> str:
+    """Return the usual colour of a curve, which is visible on the background of the active style."""
+    return "#0b559f" if np.mean(ink(0)) > 0.5 else "#56b4e9"
+
+
+def paper(share: float) -> tuple[float, float, float]:
+    """Return a bluish background."""
+    return ink(share, spline_color())
+
+
+def distinct() -> list[Any]:
+    """Return colours that colour-blind readers can distinguish."""
+    return [spline_color(), *_DISTINCT]
+
+
+def halo() -> list[Any]:
+    """Return the effect that separates text from lines behind it."""
+    return [withStroke(linewidth=2.5, foreground=ink(0), alpha=0.85)]
+
+
 def colors(number: int) -> list[Any]:
     """Return one colour per curve: the default colour for one curve, and dark to light colours for several."""
-    return [SPLINE] if number == 1 else [tuple(own) for own in time_colors(np.linspace(0, 1, number))]
+    return [spline_color()] if number == 1 else [tuple(own) for own in time_colors(np.linspace(0, 1, number))]
 
 
 def time_colors(share: Any) -> Any:
-    """Return colours from dark to light for numbers from 0 to 1."""
-    return colormaps["viridis"](0.85 * share)
+    """Return colours from dark to light for numbers from 0 to 1, which are visible on the background."""
+    return colormaps["viridis"](0.85 * share + (0.0 if np.mean(ink(0)) > 0.5 else 0.15))
 
 
-def points(size: float) -> float:
-    """Return a font size for users whose default size is not that of matplotlib."""
-    return size * float(rcParams["font.size"]) / 10
+# ---- sizes ----
 
 
 def font_factor() -> float:
     """Return how much larger than usual the default font size is, at least 1."""
-    return max(1.0, points(1))
-
-
-def heading(figure: Figure, title: str, subtitle: str, height: float) -> None:
-    """Write title and subtitle in the upper left corner. A long title is smaller, or has several lines."""
-    # Bold letters are about 0.62 times as wide as their size, in points of 1/72 inch.
-    letters = 0.94 * figure.get_figwidth() * 72 / (0.62 * 18)
-    size = max(0.6, min(1.0, letters / len(title)))
-    title = fill(title, max(int(letters / size), 10))
-    look: Any = {"fontsize": points(18 * size), "weight": "bold", "linespacing": 1.0}
-    figure.text(0.03, height, title, color=INK, va="bottom" if "\n" in title else "baseline", **look)
-    figure.text(0.03, height - 0.3 / figure.get_figheight(), subtitle, color=INK, fontsize=points(12))
-
-
-def note(panel: SubFigure, text: str) -> None:
-    """Write a line below a picture."""
-    panel.text(0.5, 0.02, text, ha="center", color=INK, fontsize=points(9))
-
-
-def legend(
-    axes: Axes | FigureBase, handles: list[Any], labels: list[str], width: float = np.inf, rows: int = 1, **look: Any
-) -> None:
-    """Add a legend without a frame, which is read row by row, in as many rows as a width in inches requires."""
-    inches = [points(1) * (0.45 + 0.065 * len(label)) for label in labels]
-    columns = -(-len(labels) // max(rows, int(np.ceil(sum(inches) / width))))
-    if sum(inches) > width:
-        columns = max(1, min(columns, int(width / max(inches))))
-    # A legend fills its columns one after the other.
-    order = [i for column in range(columns) for i in range(column, len(labels), columns)]
-    handles, labels = [handles[i] for i in order], [labels[i] for i in order]
-    size = points(9) * (text_factor(axes) if isinstance(axes, Axes) else 1.0)
-    axes.legend(handles, labels, frameon=False, labelcolor=INK, fontsize=size, ncols=columns, **look)
-
-
-def size(panel: SubFigure) -> tuple[float, float]:
-    """Return width and height in inches."""
-    return panel.bbox.width / panel.dpi, panel.bbox.height / panel.dpi
-
-
-def text_factor(axes: Axes) -> float:
-    """Return the factor by which text is reduced in axes of the user, which is legible if they are small."""
-    return max(0.75, OWN_AXES.get(axes, 1.0))
+    return max(1.0, float(rcParams["font.size"]) / 10)
 
 
 def axes_size(axes: Axes) -> tuple[float, float]:
-    """Return width and height of axes in inches, or in reduced inches for small axes of the user."""
-    figure: Any = axes.get_figure(root=True)
-    scale = figure.dpi * OWN_AXES.get(axes, 1.0)
-    return axes.bbox.width / scale, axes.bbox.height / scale
+    """Return width and height of axes in inches."""
+    box, figure = axes.get_window_extent(), axes.get_figure(root=True)
+    assert figure is not None
+    return float(box.width / figure.dpi), float(box.height / figure.dpi)
 
 
-def inside(panel: SubFigure, left: float, bottom: float, right: float, top: float) -> tuple[float, float, float, float]:
-    """Return the rectangle for ``add_axes`` with given margins in inches."""
-    width, height = size(panel)
-    return left / width, bottom / height, 1 - (left + right) / width, 1 - (bottom + top) / height
+def scale_of(axes: Axes) -> float:
+    """Return the factor by which symbols are reduced in small axes."""
+    return float(np.clip(min(axes_size(axes)) / _FULL, 0.5, 1.0))
 
 
-class Numbers(ScalarFormatter):
-    """Numbers on an axis, with a common power of ten beside it if they are large or small.
+def shrink(artists: Iterable[Artist], factor: float) -> None:
+    """Multiply the widths of lines and the sizes of markers by a factor."""
+    for artist in artists:
+        own: Any = artist
+        if isinstance(artist, Line2D):
+            own.set(markersize=factor * own.get_markersize(), markeredgewidth=factor * own.get_markeredgewidth())
+        if isinstance(artist, Quiver):
+            own.width *= factor
+        elif isinstance(artist, (Line2D, Patch, Collection)):
+            own.set_linewidth(factor * np.asarray(own.get_linewidth()))
 
-    They are plain text: parsing the usual mathematical text would take a quarter of the time to draw a page.
-    """
 
-    def __init__(self) -> None:
-        super().__init__()
-        self.set_powerlimits(_POWERS)
+# ---- text ----
 
-    def get_offset(self) -> str:
-        """Return the common power, such as "×10⁻⁸", and the number to add, such as "+5.2×10⁶"."""
-        return _POWER.sub(lambda own: f"{own[1] or ''}×10{own[2].translate(SUPERSCRIPTS)}", super().get_offset())
+
+def note(axes: Any, text: str) -> None:
+    """Write lines below a picture."""
+    size = float(rcParams["font.size"])
+    beside = float(axes.xaxis.label.get_fontsize())
+    below = -4 if not axes.axison else -2 * beside if axes.name == "3d" else -2.7 * beside - 8
+    text = "\n".join(fill(line, max(24, int(axes_size(axes)[0] / (0.0065 * size)))) for line in text.splitlines())
+    look: Any = {"xycoords": "axes fraction", "textcoords": "offset points", "ha": "center", "va": "top"}
+    axes.annotate(text, (0.5, 0), (0, below), fontsize="small", **look)
+
+
+def legend(holder: Axes | FigureBase, handles: Sequence[Any], labels: Sequence[str], width: float, **look: Any) -> None:
+    """Add a legend without a frame, which is read row by row, in as many rows as a width in inches requires."""
+    letter = 0.0065 * float(rcParams["font.size"])
+    inches = [letter * (7 + len(label)) for label in labels]
+    columns = -(-len(labels) // max(1, int(np.ceil(sum(inches) / width))))
+    while columns > 1 and sum(max(inches[i::columns]) for i in range(columns)) > width:
+        columns -= 1
+    # A legend fills its columns one after the other.
+    order = [i for column in range(columns) for i in range(column, len(labels), columns)]
+    handles, labels = [handles[i] for i in order], [labels[i] for i in order]
+    own: Any = {"frameon": False, "fontsize": "small", "borderaxespad": 0.0, "columnspacing": 1.4}
+    holder.legend(handles, labels, ncols=max(columns, 1), handlelength=1.6, **own | look)
 
 
 def plain(axes: Axes) -> None:
-    """Give axes a light look: a faint grid and no box. Axes of the user keep theirs."""
-    if axes in OWN_AXES:
-        return
-    axes.set_facecolor("none")
-    axes.grid(color=GRID, linewidth=0.6)
+    """Give axes of a page a light look: a faint grid and no box."""
+    axes.grid(color=ink(0.2), linewidth=0.6)
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
-    axes.spines[["left", "bottom"]].set_color(EDGE)
-    axes.tick_params(color=EDGE, labelcolor=INK, labelsize=points(9))
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_formatter(Numbers())
-        axis.label.set(color=INK, fontsize=points(10))
-        axis.offsetText.set(color=INK, fontsize=points(9))
+    axes.spines[["left", "bottom"]].set_color(ink(0.4))
+    axes.tick_params(color=ink(0.4), labelsize="small")
+    axes.ticklabel_format(scilimits=(-3, 5), useMathText=False)
 
 
 def round_start(first: Any, last: Any) -> Any:
@@ -178,6 +178,9 @@ def show_dates(axis: Any, least: int, most: int) -> None:
     formatter.formats[5] = "%H:%M:%S.%f"
     formatter.offset_formats[5] = "%Y-%b-%d"
     axis.set_major_formatter(formatter)
+
+
+# ---- numbers ----
 
 
 def window(positions: Array, margin: float) -> tuple[Array, float]:

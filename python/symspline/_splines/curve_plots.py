@@ -225,7 +225,7 @@ class CurvePlots(CurveBase[P]):
         """Animate the motion along the curve.
 
         The pages of `plot` are shown with a marker, or a frame for rotations and poses, that moves along the curve. A
-        vertical line marks the time in all panels with a time axis.
+        vertical line marks the time in all panels with a time axis, and the time is printed in the upper right corner.
 
         Parameters
         ----------
