@@ -29,9 +29,8 @@ from ._base.typing import Extrapolate, Frame, TimesLike
 from ._core import ValidationError
 from ._curves.at_times import evaluated
 from ._curves.composed import AnyCurve
-from ._estimation.along import Motion
 from ._estimation.measurements import GRAVITY
-from ._estimation.uncertainty import Jacobians, check_uncertain, standard_errors
+from ._estimation.uncertainty import Jacobians, Motion, check_uncertain, standard_errors
 from ._pose_files import (
     check_seconds,
     join,
