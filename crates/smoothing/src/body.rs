@@ -49,9 +49,7 @@ impl Body<'_> {
             return rows
                 .flat_map(|(p, v)| {
                     let turn = cross(&p[1..], &v[1..]);
-                    std::array::from_fn::<f64, 3, _>(|i| {
-                        2.0 * (p[0] * v[i + 1] - v[0] * p[i + 1] - turn[i])
-                    })
+                    std::array::from_fn::<f64, 3, _>(|i| 2.0 * (p[0] * v[i + 1] - v[0] * p[i + 1] - turn[i]))
                 })
                 .collect();
         }
@@ -129,9 +127,8 @@ impl Body<'_> {
             .map(|vector| self.derivatives(&at, frame, &vector.repeat(m), monitor))
             .collect();
         // Row k of the j-th column belongs to the k-th vector e and the j-th coordinate ξ.
-        let lanes = |x: &dyn Fn(usize, usize) -> f64| {
-            Matrix::<Lane, 1>::from_fn(m, m, |i, j| [Lane::splat(x(i, j))])
-        };
+        let lanes =
+            |x: &dyn Fn(usize, usize) -> f64| Matrix::<Lane, 1>::from_fn(m, m, |i, j| [Lane::splat(x(i, j))]);
         let back = inverse(&lanes(&|i, j| columns[j][1][i]));
         let mut out = Vec::with_capacity(m * m * m);
         for k in 0..m {

@@ -10,9 +10,7 @@ use crate::problem::{Criterion, EndCondition, Ends, Loss, Penalty};
 use crate::terms::{Columns, Linearised, Term};
 use symspline_core::curve::{Curves, Outside, Quantity, Times, evaluate};
 use symspline_core::fit::{Method, Options as FitOptions, Problem as Fit, Status, fit};
-use symspline_core::matrix::{Matrix, diagonalize};
 use symspline_core::monitor::{Monitor, checkpoint};
-use symspline_core::scalar::Lane;
 use symspline_core::space::{Ambient, Erased, Origin};
 
 /// λ has converged if its logarithm changes by less than the first number; after so many rounds it is kept.
@@ -184,10 +182,19 @@ impl<'a> Problem<'a> {
     /// The frames along the curve in every part.
     pub fn along<'s>(&'s self, state: &'s State) -> Vec<Along<'s>> {
         let curves = self.spaces.iter().zip(&state.points).zip(&state.velocities);
-        curves.map(|((space, points), velocities)| Along::new(space, self.knots, points, velocities)).collect()
+        curves
+            .map(|((space, points), velocities)| Along::new(space, self.knots, points, velocities))
+            .collect()
     }
 
-    fn evaluated(&self, state: &State, part: usize, x: &[f64], quantity: Quantity, monitor: &Monitor) -> Vec<f64> {
+    fn evaluated(
+        &self,
+        state: &State,
+        part: usize,
+        x: &[f64],
+        quantity: Quantity,
+        monitor: &Monitor,
+    ) -> Vec<f64> {
         let (points, velocities) = (&state.points[part], &state.velocities[part]);
         let curves = Curves { t: self.knots, nodes: self.knots.len(), points, velocities };
         let (space, times) = (&self.spaces[part], Times { x, count: x.len() });
@@ -229,18 +236,21 @@ impl<'a> Problem<'a> {
         let first = self.first();
         let columns = Columns { first: &first, parameters: self.constants.len() };
         let motion_at = |x: &[f64], part: usize, nu: usize| self.motion(state, along, x, part, nu, monitor);
-        let linearised = |term: &Term| {
-            term.linearised(&motion_at, &state.values, self.spacing(), &columns, monitor)
-        };
+        let linearised =
+            |term: &Term| term.linearised(&motion_at, &state.values, self.spacing(), &columns, monitor);
         self.terms.iter().map(linearised).collect()
     }
 
     /// The residuals of all measurements. Times beyond the knots are moved to the first or the last knot if `clipped`.
-    pub fn residuals(&'a self, state: &State, clipped: bool, monitor: &Monitor) -> Result<Vec<Linearised>, Invalid> {
+    pub fn residuals(
+        &'a self,
+        state: &State,
+        clipped: bool,
+        monitor: &Monitor,
+    ) -> Result<Vec<Linearised>, Invalid> {
         let along = self.along(state);
         let (begin, end) = (self.knots[0], self.knots[self.knots.len() - 1]);
-        let motion_at =
-            |x: &[f64], part: usize, nu: usize| self.motion(state, &along, x, part, nu, monitor);
+        let motion_at = |x: &[f64], part: usize, nu: usize| self.motion(state, &along, x, part, nu, monitor);
         let residuals = |term: &Term| {
             let mut times = term.shifted(&state.values);
             if clipped {
@@ -315,8 +325,7 @@ impl<'a> Problem<'a> {
         });
         let priors: Vec<(f64, f64)> =
             self.constants.iter().zip(&state.values).map(|(own, x)| (own.precision, x - own.mean)).collect();
-        let mut problem =
-            Estimation::new(self.knots, self.ends(), self.penalty, factors.collect(), &priors);
+        let mut problem = Estimation::new(self.knots, self.ends(), self.penalty, factors.collect(), &priors);
         for ((term, own), weights) in self.terms.iter().zip(linear).zip(weights) {
             let positions = positions(self.knots, &term.shifted(&state.values));
             let robust = (!weights.is_empty()).then(|| own.times(weights));
@@ -338,8 +347,13 @@ impl<'a> Problem<'a> {
     fn tangents(&self, along: &[Along], step: &[f64]) -> Vec<Vec<f64>> {
         let first = &self.first();
         let m = first[self.spaces.len()];
-        let own = |part: usize| step.chunks_exact(m).flat_map(move |x| &x[first[part]..first[part + 1]]).copied();
-        along.iter().enumerate().map(|(part, along)| along.tangents(&own(part).collect::<Vec<f64>>())).collect()
+        let own =
+            |part: usize| step.chunks_exact(m).flat_map(move |x| &x[first[part]..first[part + 1]]).copied();
+        along
+            .iter()
+            .enumerate()
+            .map(|(part, along)| along.tangents(&own(part).collect::<Vec<f64>>()))
+            .collect()
     }
 
     /// The largest distance that the curve covers between two knots, in units of the radius of curvature of its space.
@@ -381,11 +395,12 @@ impl<'a> Problem<'a> {
             let bending: Vec<Bending> = along.iter().map(Along::bending).collect();
             let (given, near) = choice.asked(size);
             let at = (&state, &along[..], &bending[..]);
-            let solved =
-                self.solve(at, (&linear, &weights), (&given, &near), (options.criterion, monitor));
+            let solved = self.solve(at, (&linear, &weights), (&given, &near), (options.criterion, monitor));
             let found = &solved.found;
-            let energies = bending.iter().enumerate().map(|(part, own)| self.energy(&state, part, own, monitor));
-            let value = loss + found.lams.iter().zip(energies).map(|((lam, _), energy)| lam * energy).sum::<f64>();
+            let energies =
+                bending.iter().enumerate().map(|(part, own)| self.energy(&state, part, own, monitor));
+            let value =
+                loss + found.lams.iter().zip(energies).map(|((lam, _), energy)| lam * energy).sum::<f64>();
             checkpoint();
             progress(number);
             let mut next = Next::Curve;
@@ -486,7 +501,8 @@ impl<'a> Problem<'a> {
             step.tangents = self.tangents(&self.along(&step.from), own);
             let sides = [SMALL, -SMALL].map(|size| self.moved(&step, size, monitor));
             if let [Some(after), Some(before)] = &sides {
-                let [after, before] = [self.objective(after, lams, monitor)?, self.objective(before, lams, monitor)?];
+                let [after, before] =
+                    [self.objective(after, lams, monitor)?, self.objective(before, lams, monitor)?];
                 sum += ((after - before) / (4.0 * SMALL)).powi(2);
                 count += 1.0;
             }
@@ -605,25 +621,38 @@ impl Relaxation {
     }
 }
 
-/// Whether the measurements leave hardly any information about a combination of the parameters.
+/// Whether the measurements leave hardly any information about a combination of the parameters: whether the smallest
+/// eigenvalue of the information, scaled to a unit diagonal, is below [`SINGULAR`]. Without that part of the diagonal,
+/// the matrix then has no Cholesky factor.
 fn is_singular(information: &[f64]) -> bool {
     let p = information.len().isqrt();
-    if p == 0 || !information.iter().all(|x| x.is_finite()) {
+    if !information.iter().all(|x| x.is_finite()) {
         return false;
     }
     let size: Vec<f64> = (0..p).map(|i| information[i * p + i].max(0.0).sqrt()).collect();
-    if size.contains(&0.0) {
-        return true;
+    let mut factor = vec![0.0; p * p];
+    for i in 0..p {
+        checkpoint();
+        for j in 0..=i {
+            let (before, row) = factor.split_at_mut(i * p);
+            let other = if j < i { &before[j * p..][..j] } else { &row[..j] };
+            let known: f64 = row[..j].iter().zip(other).map(|(x, y)| x * y).sum();
+            let rest = information[i * p + j] / size[i] / size[j] - known;
+            if j < i {
+                row[j] = rest / before[j * p + j];
+            } else if rest > SINGULAR {
+                row[j] = (rest - SINGULAR).sqrt();
+            } else {
+                return true;
+            }
+        }
     }
-    let scaled =
-        Matrix::<Lane, 1>::from_fn(p, p, |i, j| [Lane::splat(information[i * p + j] / size[i] / size[j])]);
-    let mut values = [scaled];
-    diagonalize(&mut values);
-    (0..p).any(|i| !(values[0][(i, i)][0].as_array()[0] > SINGULAR))
+    false
 }
 
 fn is_finite(found: &Estimate) -> bool {
-    let numbers = [&found.step, &found.parameters, &found.information, &found.variances[0], &found.variances[1]];
+    let numbers =
+        [&found.step, &found.parameters, &found.information, &found.variances[0], &found.variances[1]];
     numbers.iter().all(|own| own.iter().all(|x| x.is_finite()))
 }
 

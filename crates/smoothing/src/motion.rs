@@ -71,7 +71,8 @@ impl Motion<'_> {
     /// changes by R(ξ, γ')γ'. The result has no frames.
     pub fn moved(&self, j: usize, nu: usize, step: f64, monitor: &Monitor) -> Result<Self, BadRow> {
         let (space, vectors) = (self.space, self.vectors(j));
-        let changed = |x: &[f64], by: &[f64]| x.iter().zip(by).map(|(x, e)| x + step * e).collect::<Vec<f64>>();
+        let changed =
+            |x: &[f64], by: &[f64]| x.iter().zip(by).map(|(x, e)| x + step * e).collect::<Vec<f64>>();
         let [mut p, mut v, mut a] = [&self.p, &self.v, &self.a].map(Vec::clone);
         match nu {
             2 => a = changed(&a, &vectors),
@@ -119,7 +120,9 @@ impl Motion<'_> {
         let count = (vectors.len() / len) as f64;
         let mut mean = vec![0.0; len];
         if nu == 0 {
-            vectors.chunks_exact(len).for_each(|x| mean.iter_mut().zip(x).for_each(|(sum, x)| *sum += x / count));
+            vectors
+                .chunks_exact(len)
+                .for_each(|x| mean.iter_mut().zip(x).for_each(|(sum, x)| *sum += x / count));
         }
         let square = |x: &[f64]| x.iter().zip(&mean).map(|(x, mean)| (x - mean).powi(2)).sum::<f64>();
         let numbers = count * (len as f64) / if self.space.is_complex() { 2.0 } else { 1.0 };

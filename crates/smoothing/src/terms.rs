@@ -91,8 +91,11 @@ pub struct Term<'a> {
     pub times: &'a [f64],
     /// The parts of the space on which the residuals depend.
     pub parts: Vec<usize>,
-    /// Standard deviations of all residuals; empty for functions.
+    /// Standard deviations of all residuals, and the number of residuals of a measurement. Functions have none: they
+    /// return residuals in standard deviations.
     pub noise: &'a [f64],
+    /// See `noise`.
+    pub size: usize,
     /// The loss.
     pub loss: Loss,
     /// The parameter that is added to the times.
@@ -147,8 +150,13 @@ impl Term<'_> {
     }
 
     /// The residuals, whitened.
-    pub fn residuals(&self, motion: &[Motion], values: &[f64], monitor: &Monitor) -> Result<Residuals, BadRow> {
-        let (own, n) = (&motion[0], self.times.len().max(1));
+    pub fn residuals(
+        &self,
+        motion: &[Motion],
+        values: &[f64],
+        monitor: &Monitor,
+    ) -> Result<Residuals, BadRow> {
+        let own = &motion[0];
         let space = own.space;
         let mut found = match self.sensor {
             Sensor::Points { y } => {
@@ -176,13 +184,15 @@ impl Term<'_> {
             }
             Sensor::Force { body, f, gravity, bias, arm, unknown_arm } => {
                 let rotations = body.matrices(&own.p);
-                let free: Vec<f64> = motion[1].a.iter().zip(gravity.iter().cycle()).map(|(a, g)| a - g).collect();
+                let free: Vec<f64> =
+                    motion[1].a.iter().zip(gravity.iter().cycle()).map(|(a, g)| a - g).collect();
                 let mut read = turned(&rotations, &free);
                 let arm = unknown_arm.map_or(arm, |at| &values[at..at + 3]);
                 if !arm.is_empty() {
                     let rates = body.rates(&own.p, &own.v, monitor);
                     let changes = body.rates(&own.p, &own.a, monitor);
-                    let rows = read.chunks_exact_mut(3).zip(rates.chunks_exact(3)).zip(changes.chunks_exact(3));
+                    let rows =
+                        read.chunks_exact_mut(3).zip(rates.chunks_exact(3)).zip(changes.chunks_exact(3));
                     for ((read, omega), change) in rows {
                         let (first, second) = (cross(change, arm), cross(omega, &cross(omega, arm)));
                         (0..3).for_each(|i| read[i] += first[i] + second[i]);
@@ -193,8 +203,7 @@ impl Term<'_> {
             Sensor::Function { call, .. } => return Ok(call(motion, values)),
         };
         found.iter_mut().zip(self.noise).for_each(|(x, noise)| *x /= noise);
-        let size = found.len() / n;
-        Ok((found, size))
+        Ok((found, self.size))
     }
 
     /// The residuals and their derivatives at a motion.
@@ -247,7 +256,8 @@ impl Term<'_> {
                 for j in 0..own.space.dim() {
                     let moves = body.rates(&own.p, &own.vectors(j), monitor);
                     let each = turned.chunks_exact(size).zip(moves.chunks_exact(3));
-                    let column = each.flat_map(|(rows, eta)| rows.chunks_exact(3).flat_map(move |x| cross(x, eta)));
+                    let column =
+                        each.flat_map(|(rows, eta)| rows.chunks_exact(3).flat_map(move |x| cross(x, eta)));
                     let rows = found.jacobians[0].chunks_exact_mut(m).zip(column).enumerate();
                     rows.for_each(|(at, (row, x))| row[body_first + j] = x * whitened(at));
                 }

@@ -113,14 +113,8 @@ type TermOf<'py> = (
 
 /// A problem: the parts of the space; for those that are groups with a metric that is invariant on both sides, the array
 /// `Body::inverse`; the knots; the penalty; the means and precisions (p, 2) of the parameters; and the measurements.
-type ProblemOf<'py> = (
-    Vec<PyRef<'py, Handle>>,
-    Vec<Option<Array<'py>>>,
-    Array<'py>,
-    String,
-    Array<'py>,
-    Vec<TermOf<'py>>,
-);
+type ProblemOf<'py> =
+    (Vec<PyRef<'py, Handle>>, Vec<Option<Array<'py>>>, Array<'py>, String, Array<'py>, Vec<TermOf<'py>>);
 
 /// A call of Python that an estimate needs.
 enum Request {
@@ -142,7 +136,13 @@ struct Desk<'a> {
 impl<'a> Desk<'a> {
     fn new(call: &'a (dyn Fn(Python, Request) -> PyResult<Residuals> + Sync)) -> Self {
         let (requests, received) = channel();
-        Desk { owner: thread::current(), requests, received: Mutex::new(received), call, error: Mutex::new(None) }
+        Desk {
+            owner: thread::current(),
+            requests,
+            received: Mutex::new(received),
+            call,
+            error: Mutex::new(None),
+        }
     }
 
     /// The answer to a request. Unwinds if the call raises an exception.
@@ -188,7 +188,8 @@ fn with_problem<T: Send>(
     let (knots, penalty) = (in_order(knots)?, penalty_named(penalty)?);
     let spaces: Vec<Erased> = handles.iter().map(|handle| handle.space.get()).collect();
     let shapes: Vec<Vec<usize>> = spaces.iter().map(shape_of).collect();
-    let functions: Vec<Option<&Py<PyAny>>> = terms.iter().map(|term| term.8.as_ref().map(|own| &own.0)).collect();
+    let functions: Vec<Option<&Py<PyAny>>> =
+        terms.iter().map(|term| term.8.as_ref().map(|own| &own.0)).collect();
     let parts: Vec<&[usize]> = terms.iter().map(|term| &term.1[..]).collect();
     let call = |py: Python, request: Request| match request {
         Request::Progress(number) => {
@@ -238,14 +239,17 @@ fn with_problem<T: Send>(
             desk.ask(Request::Progress(number));
         }
     };
-    let found = watched_serving(py, None, 1, heavy, &|| desk.serve(), |monitor| work(&problem, &report, monitor));
+    let found =
+        watched_serving(py, None, 1, heavy, &|| desk.serve(), |monitor| work(&problem, &report, monitor));
     if let Ok(Some(error)) = desk.error.lock().map(|mut error| error.take()) {
         return Err(error);
     }
     match found? {
         Ok(found) => Ok(Ok(found)),
         Err(Invalid::Parameters(information)) => Ok(Err(information)),
-        Err(Invalid::Start) => Err(invalid("No spline joins the initial points. Pass more knots, or `start`.")),
+        Err(Invalid::Start) => {
+            Err(invalid("No spline joins the initial points. Pass more knots, or `start`."))
+        }
         Err(Invalid::Outside(at)) => Err(invalid(format!(
             "the time offset moves measurement {at} beyond the knots. Extend the knots beyond the measurements."
         ))),
@@ -285,11 +289,9 @@ fn read_term<'a>(
         "rates" => {
             Sensor::Rates { body: Body { space, inverse: given(1)? }, omega: given(0)?, bias: first(0) }
         }
-        "directions" => Sensor::Directions {
-            body: Body { space, inverse: &[] },
-            seen: given(0)?,
-            reference: given(1)?,
-        },
+        "directions" => {
+            Sensor::Directions { body: Body { space, inverse: &[] }, seen: given(0)?, reference: given(1)? }
+        }
         "force" => Sensor::Force {
             body: Body { space, inverse: &[] },
             f: given(0)?,
@@ -305,6 +307,7 @@ fn read_term<'a>(
         times: in_order(times)?,
         parts: parts.clone(),
         noise: in_order(noise)?,
+        size: noise.shape().get(1).copied().unwrap_or(0),
         loss: loss_named(loss)?,
         offset: *offset,
         parameters: constants.iter().flatten().map(|(first, size)| *first..first + size).collect(),
@@ -327,7 +330,7 @@ fn rows<'py>(py: Python<'py>, own: &Linearised, roots: &[f64]) -> PyResult<Rows<
     ))
 }
 
-/// The result of the iteration, as a dictionary; `_estimation/iteration.py` describes its entries.
+/// The result of the iteration, as a dictionary; `_estimation/solve.py` reads it.
 #[derive(IntoPyObject)]
 pub struct Solved<'py> {
     failure: Option<&'static str>,

@@ -171,9 +171,9 @@ class Solution(NamedTuple):
 
 def iterate(setup: Setup, points: list[Array], values: Values, progress: Progress | None) -> Solution:
     """Iterate from points at the knots until the step is small."""
-    problem, lams = setup.in_core(), setup.lams.tolist()
-    options = (setup.criterion, setup.gamma, setup.tol, setup.max_iter)
-    found = _core.estimate(problem, *setup.state(points, values), lams, *options, progress)
+    problem, (start, constants) = setup.in_core(), setup.state(points, values)
+    lams, criterion, gamma = setup.lams.tolist(), setup.criterion, setup.gamma
+    found = _core.estimate(problem, start, constants, lams, criterion, gamma, setup.tol, setup.max_iter, progress)
     if isinstance(found, np.ndarray):
         raise _undetermined(setup, found)
     failed, number, step = found["failure"], found["iterations"], found["step"]

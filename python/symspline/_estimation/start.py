@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 
 from .._base.arrays import short_repr
 from .._base.time import TimeAxis
+from .._base.warnings import silenced
 from .._core import ValidationError
 from .._smoothing import make_smoothing_spline
 from .._smoothing.factors import split
@@ -177,8 +177,7 @@ def _smoothed(
     order = np.argsort(times, kind="stable")
     # Automatic knots are few at first, so they do not limit the number.
     count = None if setup.automatic else min(len(np.unique(times)), max(len(setup.knots), 2), most)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
+    with silenced(Warning), np.errstate(all="ignore"):
         curve: Any = make_smoothing_spline(
             times[order],
             y[order],
@@ -362,8 +361,7 @@ def _force_vectors(setup: Setup, term: ForceTerm) -> _Vectors:
     if count > 5:
         order = np.argsort(times, kind="stable")
         y = np.concatenate([own.y for own in points])[order]
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
+        with silenced(Warning), np.errstate(all="ignore"):
             path = make_smoothing_spline(
                 times[order], y, "r:3", knots=min(count, 200), penalty="jerk", on_failure="ignore"
             )

@@ -350,7 +350,7 @@ class Body:
         self.space = space
         self.is_rotation = space in (_SO3, _S3)
         self.size = 3 if self.is_rotation else space.dim
-        self.inverse = np.empty(0)
+        self.inverse: Doubles = np.empty(0)
         if not self.is_rotation:
             frame = space._as_doubles(space.frame(np.eye(space.point_shape[0], dtype=space.dtype)))
             self.inverse = np.linalg.pinv(frame.reshape(self.size, -1).T)
