@@ -195,23 +195,37 @@ def unequal_bins(
     times: _Doubles, leverages: _Doubles, squares: _Doubles, knots: _Doubles, energy: _Doubles, m: int, least: float
 ) -> list[tuple[float, list[int], float]]: ...
 def frames_along(handle: Handle, knots: _Doubles, points: _Doubles, x: _Doubles, gammas: _Doubles) -> _Doubles: ...
-def curvature_along(handle: Handle, velocities: _Doubles, vectors: _Doubles) -> _Doubles: ...
-def bending(handle: Handle, knots: _Doubles, points: _Doubles, velocities: _Doubles) -> list[_Doubles]: ...
 
-# Times, whitened residuals, their derivatives by the motion, and by the parameters.
-_Term = tuple[_Doubles, _Doubles, Sequence[_Doubles | None], _Doubles | None]
+# The sensor, parts, times, standard deviations, loss, column of the time offset, arrays, columns of the parameters with
+# their numbers, and the function with its highest derivative.
+_Term = tuple[Any, ...]
+# Parts of the space, matrices of groups, knots, penalty, means and precisions of the parameters, and terms.
+_Problem = tuple[Sequence[Handle], Sequence[_Doubles | None], _Doubles, str, _Doubles, Sequence[_Term]]
+# Whitened residuals, their derivatives by the motion and by the parameters, and the roots of robust weights.
+_TermRows = tuple[_Doubles, list[_Doubles | None], _Doubles | None, _Doubles | None]
 
 def estimate(
-    knots: _Doubles,
-    penalty: str,
-    factors: Sequence[tuple[Handle, _Doubles, _Doubles, _Doubles | None]],
-    priors: _Doubles,
-    terms: Sequence[_Term],
-    lams: _Doubles,
-    guesses: _Doubles,
+    problem: _Problem,
+    points: Sequence[_Doubles],
+    values: _Doubles,
+    lams: Sequence[float],
     criterion: str,
     gamma: float,
-) -> tuple[Any, ...]: ...
+    tol: float,
+    max_iter: int,
+    progress: _Progress | None = None,
+) -> dict[str, Any] | _Doubles: ...
+def linearise(
+    problem: _Problem, points: Sequence[_Doubles], values: _Doubles, derivatives: bool
+) -> list[_TermRows] | None: ...
+def distance_from_minimum(
+    problem: _Problem,
+    points: Sequence[_Doubles],
+    values: _Doubles,
+    lams: Sequence[float],
+    band: _Doubles,
+    normal: _Doubles,
+) -> float: ...
 
 # Band, side and corner of A, the number of coupled coordinates, the kinds of the ends, and the holonomy.
 _Known = tuple[Sequence[_Doubles], int, Sequence[str] | None, _Doubles]

@@ -30,9 +30,8 @@ from ._base.validation import one_of, real_numbers
 from ._core import ValidationError
 from ._curves.at_times import evaluated
 from ._curves.composed import AnyCurve
-from ._estimation.along import Motion
 from ._estimation.measurements import GRAVITY
-from ._estimation.uncertainty import Jacobians, check_uncertain, standard_errors
+from ._estimation.uncertainty import Jacobians, Motion, check_uncertain, standard_errors
 from ._smoothing.factors import smoothed_spaces
 from ._spaces import Array, Euclidean, SpecialEuclidean, SpecialOrthogonal, cover_of
 from .convert._pose_files import (

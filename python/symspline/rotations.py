@@ -35,10 +35,8 @@ from ._curves.controlled import CumulativeCurve
 from ._curves.curve import CurveArrays
 from ._curves.fit import curve_of
 from ._curves.missing import missing_times, recounted, refuse_nan_times
-from ._estimation.along import Motion
 from ._estimation.rates import integrated
-from ._estimation.terms import Body
-from ._estimation.uncertainty import Jacobians, check_uncertain, standard_errors
+from ._estimation.uncertainty import Jacobians, Motion, check_uncertain, standard_errors
 from ._smoothing.factors import smoothed_spaces
 from ._spaces import Array, Doubles, SpecialEuclidean, SpecialOrthogonal, Sphere, cover_of
 from ._spaces.point_groups import elements, proper_symbol
@@ -252,11 +250,19 @@ def angular_velocity(
 
 def rate_jacobians(motion: Motion, part: int, frame: str) -> Jacobians:
     """Return the derivatives of the angular velocity with respect to the move of a curve and its velocity."""
-    moved, changed = Body(_SO3).derivatives(motion.p, motion.v, motion.frames)
+    omega, vectors = _vectors(motion.p, motion.v), _vectors(motion.p[:, None], motion.frames)
+    # With η = Σ ξ_j B_j, and B_j' = −[ω, B_j]/2 in parallel frames, δω = η' + [ω, η] = Σ ξ_j' B_j + ξ_j [ω, B_j]/2.
+    moved, changed = (np.swapaxes(own, -1, -2) for own in (0.5 * np.cross(omega[:, None], vectors), vectors))
     if frame == "world":
         # The rotation of the frame by η turns Rω by R(η × ω), which reverses the sign of the half.
         moved, changed = (motion.p @ own for own in (-moved, changed))
     return [{part: moved}, {part: changed}]
+
+
+def _vectors(p: Array, v: Array) -> Array:
+    """Return the rotation vectors of pᵀv for tangent vectors v at rotations p."""
+    turned = np.swapaxes(p, -1, -2) @ v
+    return np.stack([turned[..., 2, 1], turned[..., 0, 2], turned[..., 1, 0]], axis=-1)
 
 
 def angular_acceleration(

@@ -1,5 +1,7 @@
 """Motions with irregular times, and what sensors would report about them."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 import symspline as ss
@@ -48,3 +50,39 @@ def walk(space, rng, n, step=0.2):
 
 def rms(x):
     return float(np.sqrt(np.mean(np.square(x))))
+
+
+class Motion(NamedTuple):
+    """The motion of a curve in a space at n times, with frames along it."""
+
+    space: ss.Space
+    p: np.ndarray
+    v: np.ndarray
+    a: np.ndarray
+    frames: np.ndarray
+
+
+def moved(motion, j, nu, step):
+    """The motion after the derivative of order `nu` of the move has changed along the j-th vectors of the frames."""
+    space, p, v, a, frames = motion
+    vectors = frames[:, j]
+    if nu == 2:
+        return motion._replace(a=a + step * vectors)
+    if nu == 1:
+        return motion._replace(v=v + step * vectors)
+    there = space.exp(p, step * vectors)
+    turned = a + step * curvature(motion, vectors)
+    return motion._replace(p=there, v=space.transport(p, there, v), a=space.transport(p, there, turned))
+
+
+def curvature(motion, x):
+    """R(x, u)u for the velocities u: −[u, [u, x]] on groups, and K (⟨u, u⟩x − ⟨x, u⟩u) for constant curvature."""
+    space, p, u, *_ = motion
+    if space == SO3:
+        u, x = (np.swapaxes(p, -1, -2) @ own for own in (u, x))
+        inner = u @ x - x @ u
+        return -p @ (u @ inner - inner @ u) / 4
+    if isinstance(space, ss.Sphere):
+        each = (slice(None), None)
+        return (u * u).sum(-1)[each] * x - (u * x).sum(-1)[each] * u
+    return np.zeros_like(x)

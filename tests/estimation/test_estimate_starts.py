@@ -7,7 +7,6 @@ import pytest
 
 import symspline as ss
 from symspline import measure
-from symspline._estimation.solve import Iteration
 
 SO3 = ss.SpecialOrthogonal(3)
 TURN = ss.rotations.from_rotation_vectors
@@ -257,21 +256,11 @@ def test_more_than_half_a_turn_between_knots():
     assert sum("measurements[1] turns the body by" in str(one.message) for one in caught) == 1
 
 
-@pytest.mark.parametrize("kind", ["not finite", "exception"])
-def test_numerical_failures_are_convergence_errors(kind, monkeypatch):
+def test_numerical_failures_are_convergence_errors():
     _, t, seen, s, omega, _ = spinning(9, 20)
-    solve = Iteration._solve
-
-    def broken(self, *arguments):
-        if kind == "exception":
-            raise np.linalg.LinAlgError("Eigenvalues did not converge")
-        found = solve(self, *arguments)
-        return found._replace(step=np.nan * found.step, information=np.nan * found.information)
-
-    monkeypatch.setattr(Iteration, "_solve", broken)
     for knots in (31, "auto"):
-        with pytest.raises(ss.ConvergenceError, match=r"The linear problem .* Check sigma and the units"):
-            ss.estimate(given(t, seen, s, omega), knots, "so:3")
+        with np.errstate(all="ignore"), pytest.raises(ss.ConvergenceError, match=r"The linear problem .* Check sigma"):
+            ss.estimate(given(t, seen, s, omega, noise=1e-160), knots, "so:3")
 
 
 def test_knots_at_all_times():

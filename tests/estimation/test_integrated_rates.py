@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from symspline._estimation.integrated_rates import Attitudes, Integral, Rates, _Problem
+from symspline._estimation.rates import Attitudes, Integral, Rates, _Problem
 
 
 def attitudes_of(rates, bias, times):

@@ -10,7 +10,6 @@ from refused import raises
 
 import symspline as ss
 from symspline import geo, measure, poses, rotations
-from symspline._estimation.along import Motion
 
 SO3, S2, R3 = sensors.SO3, ss.Sphere(2), ss.Euclidean(3)
 GRAVITY = np.array([0, 0, -9.81])
@@ -52,12 +51,12 @@ def moving(space, rng, n=6):
     """A motion at n times with random velocities, accelerations and frames."""
     p = sensors.walk(space, rng, n)
     frames = space.frame(p)
-    return Motion(space, 0, p, 2 * space.random_tangent(rng, p), 3 * space.random_tangent(rng, p), frames)
+    return sensors.Motion(space, p, 2 * space.random_tangent(rng, p), 3 * space.random_tangent(rng, p), frames)
 
 
 def numerical(function, motion, nu, step=1e-5):
     """The derivatives of numbers with respect to a move, or the derivative of order nu of it."""
-    sides = [[function(motion.moved(j, nu, s)) for s in (step, -step)] for j in range(motion.space.dim)]
+    sides = [[function(sensors.moved(motion, j, nu, s)) for s in (step, -step)] for j in range(motion.space.dim)]
     return np.stack([(after - before) / (2 * step) for after, before in sides], axis=-1)
 
 

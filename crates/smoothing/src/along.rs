@@ -1,6 +1,6 @@
 //! Frames along a curve: those at its knots, transported along geodesics to positions nearby.
 
-use crate::frames::{Frames, curvature_terms, lanes_of};
+use crate::frames::{Frames, lanes_of};
 use crate::path::{Path, nearest, positions};
 use symspline_core::memory;
 use symspline_core::scalar::{LANES, Lane, gather, scatter};
@@ -58,9 +58,9 @@ impl<'a> Along<'a> {
         out
     }
 
-    /// R(ξ, γ')γ' for vectors ξ, in coordinates of a frame along the curve: see `curvature_terms`.
-    pub fn curvature(space: &Erased, velocities: &[f64], vectors: &[f64]) -> Vec<f64> {
-        curvature_terms(space, velocities, vectors)
+    /// The tangent vectors at all knots with given coordinates in the frames there.
+    pub fn tangents(&self, coordinates: &[f64]) -> Vec<f64> {
+        self.frames.tangents(coordinates)
     }
 
     /// The motion of the curve at its knots.

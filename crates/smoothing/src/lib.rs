@@ -15,6 +15,7 @@
 pub mod along;
 pub mod audit;
 mod banded;
+pub mod body;
 mod bordered;
 mod chain;
 pub mod chi;
@@ -28,10 +29,12 @@ pub mod gaps;
 mod gauss_newton;
 mod information;
 mod integrated_wiener;
+pub mod iteration;
 mod jacobi_operator;
 mod linearized;
 mod loss;
 mod misfit;
+pub mod motion;
 mod observations;
 mod path;
 pub mod posterior;
@@ -41,6 +44,7 @@ mod residuals;
 mod robust;
 mod smooth;
 mod start;
+pub mod terms;
 mod variance;
 
 pub use cumulative::{Outcome, Samples, fit_cumulative};

@@ -2,27 +2,27 @@
 
 use crate::arrays::{count, in_order, zeros};
 use crate::errors::invalid;
-use crate::space::Handle;
-use crate::watch::{is_long, watched};
+use crate::space::{Handle, bad_row};
+use crate::watch::{is_long, watched, watched_serving};
 use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
+use std::panic::resume_unwind;
+use std::sync::Mutex;
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::thread::{self, Thread};
+use symspline_engine::monitor::{Cancelled, Monitor};
 use symspline_engine::smoothing::along::Along;
-use symspline_engine::smoothing::estimation::{Estimation, Factor, Matrices, Measurements};
+use symspline_engine::smoothing::body::Body;
+use symspline_engine::smoothing::estimation::Matrices;
+use symspline_engine::smoothing::iteration::{Constant, Failure, Invalid, Linear, Options, Problem};
+use symspline_engine::smoothing::motion::{BadRow, Motion};
 use symspline_engine::smoothing::posterior::Posterior;
-use symspline_engine::smoothing::{Criterion, EndCondition, Ends, Penalty, positions};
-use symspline_engine::space::{Ambient, Origin};
+use symspline_engine::smoothing::terms::{Linearised, Residuals, Sensor, Term};
+use symspline_engine::smoothing::{Criterion, EndCondition, Ends, Loss, Penalty};
+use symspline_engine::space::{Ambient, Erased, Origin};
 
 type Array<'py> = PyReadonlyArrayDyn<'py, f64>;
 type Out<'py> = Bound<'py, PyArrayDyn<f64>>;
-
-/// A measurement of one kind: times, whitened residuals (n, d), their derivatives with respect to the move of the
-/// curve and its time derivatives, (n, d, m) each, and with respect to the parameters, (n, d, p).
-type Term<'py> = (Array<'py>, Array<'py>, [Option<Array<'py>>; 3], Option<Array<'py>>);
-
-/// The numbers of an array that may be omitted.
-fn given<'a>(array: &'a Option<Array>) -> PyResult<&'a [f64]> {
-    array.as_ref().map_or(Ok(&[]), in_order)
-}
 
 /// An array with the numbers of a slice.
 fn array<'py>(py: Python<'py>, shape: &[usize], numbers: &[f64]) -> PyResult<Out<'py>> {
@@ -66,12 +66,14 @@ pub fn criterion_named(name: &str, gamma: f64) -> PyResult<Criterion> {
     })
 }
 
-/// The ends of an open curve with a penalty.
-fn free_ends(penalty: Penalty) -> Ends {
-    Ends::Open(match penalty {
-        Penalty::Acceleration => [EndCondition::Natural; 2],
-        Penalty::Jerk => [EndCondition::NotAKnot; 2],
-    })
+/// The loss of this name.
+pub fn loss_named(name: &str) -> PyResult<Loss> {
+    match name {
+        "linear" => Ok(Loss::Linear),
+        "huber" => Ok(Loss::Huber),
+        "cauchy" => Ok(Loss::Cauchy),
+        _ => Err(invalid(format!("loss must be 'linear', 'huber' or 'cauchy', not {name:?}"))),
+    }
 }
 
 /// Frames along one curve at times x with the points `gammas`: (n, m, numbers of a point).
@@ -94,135 +96,381 @@ pub fn frames_along<'py>(
     array(py, &[x.len(), space.dim(), space.point_len()], &found)
 }
 
-/// R(ξ, γ')γ' for velocities γ' and vectors ξ in coordinates of frames: (n, m) each.
-#[pyfunction]
-pub fn curvature_along<'py>(
-    py: Python<'py>,
-    handle: &Handle,
-    velocities: Array<'py>,
-    vectors: Array<'py>,
-) -> PyResult<Out<'py>> {
-    let space = handle.space.get();
-    let (u, x) = (in_order(&velocities)?, in_order(&vectors)?);
-    let found =
-        watched(py, None, u.len(), is_long(u.len() * space.dim()), |_| Along::curvature(&space, u, x))?;
-    array(py, velocities.shape(), &found)
-}
-
-/// Velocities and accelerations at the knots of a curve in the frames along it, (K, m) each, in units of the mean knot
-/// spacing.
-#[pyfunction]
-pub fn bending<'py>(
-    py: Python<'py>,
-    handle: &Handle,
-    knots: Array<'py>,
-    points: Array<'py>,
-    velocities: Array<'py>,
-) -> PyResult<[Out<'py>; 2]> {
-    let space = handle.space.get();
-    let (knots, points, velocities) = (in_order(&knots)?, in_order(&points)?, in_order(&velocities)?);
-    let heavy = is_long(points.len() * space.dim());
-    let found =
-        watched(py, None, knots.len(), heavy, |_| Along::new(&space, knots, points, velocities).bending())?;
-    let shape = [knots.len(), space.dim()];
-    Ok([array(py, &shape, &found.speeds)?, array(py, &shape, &found.accelerations)?])
-}
-
-/// λ and whether it is at a bound; the step at the knots (K, m) and of the parameters (p,); their variances; degrees of
-/// freedom of each factor and of everything; the information about the parameters (p, p); whether the measurements
-/// determine the curve; the sum of squares and the number of residuals; and A.
-type Solved<'py> = (
-    Out<'py>,
-    Vec<bool>,
-    Out<'py>,
-    Out<'py>,
-    [Out<'py>; 2],
-    Out<'py>,
-    f64,
-    Out<'py>,
-    bool,
-    f64,
-    usize,
-    [Out<'py>; 3],
+/// Measurements of one kind: the sensor, the parts of the space, times, standard deviations (n, d) or none, the loss, the
+/// parameter that is added to the times, the arrays of the sensor, its other parameters (first and number), and the
+/// function of the user with the highest derivative that it needs.
+type TermOf<'py> = (
+    String,
+    Vec<usize>,
+    Array<'py>,
+    Array<'py>,
+    String,
+    Option<usize>,
+    Vec<Array<'py>>,
+    Vec<Option<(usize, usize)>>,
+    Option<(Py<PyAny>, usize)>,
 );
 
-/// Solves the linear problem of measurements. `factors` are the space, the velocities and the accelerations of each
-/// factor, as [`bending`] returns them, and the matrices (m, m, m) of half the bracket, if its moving frame matters;
-/// `priors` (p, 2) the precision of each parameter and its distance from the
-/// prior mean. λ that are NaN are chosen, near the guesses that are not NaN.
+/// A problem: the parts of the space; for those that are groups with a metric that is invariant on both sides, the array
+/// `Body::inverse`; the knots; the penalty; the means and precisions (p, 2) of the parameters; and the measurements.
+type ProblemOf<'py> =
+    (Vec<PyRef<'py, Handle>>, Vec<Option<Array<'py>>>, Array<'py>, String, Array<'py>, Vec<TermOf<'py>>);
+
+/// A call of Python that an estimate needs.
+enum Request {
+    /// The number of an iteration.
+    Progress(usize),
+    /// The function of a term: points, velocities and accelerations of its parts, and all parameters.
+    Residuals { term: usize, states: Vec<Vec<Vec<f64>>>, values: Vec<f64> },
+}
+
+/// Makes calls of Python in the thread of the user, which waits while another thread computes.
+struct Desk<'a> {
+    owner: Thread,
+    requests: Sender<(Request, Sender<Residuals>)>,
+    received: Mutex<Receiver<(Request, Sender<Residuals>)>>,
+    call: &'a (dyn Fn(Python, Request) -> PyResult<Residuals> + Sync),
+    error: Mutex<Option<PyErr>>,
+}
+
+impl<'a> Desk<'a> {
+    fn new(call: &'a (dyn Fn(Python, Request) -> PyResult<Residuals> + Sync)) -> Self {
+        let (requests, received) = channel();
+        Desk {
+            owner: thread::current(),
+            requests,
+            received: Mutex::new(received),
+            call,
+            error: Mutex::new(None),
+        }
+    }
+
+    /// The answer to a request. Unwinds if the call raises an exception.
+    fn ask(&self, request: Request) -> Residuals {
+        let answer = if thread::current().id() == self.owner.id() {
+            self.answer(request)
+        } else {
+            let (reply, answer) = channel();
+            let sent = self.requests.send((request, reply));
+            self.owner.unpark();
+            sent.ok().and_then(|()| answer.recv().ok())
+        };
+        answer.unwrap_or_else(|| resume_unwind(Box::new(Cancelled)))
+    }
+
+    fn answer(&self, request: Request) -> Option<Residuals> {
+        let found = Python::attach(|py| (self.call)(py, request));
+        found.map_err(|error| self.error.lock().map(|mut first| *first = Some(error))).ok()
+    }
+
+    /// Answers the requests of the other thread.
+    fn serve(&self) {
+        let next = || self.received.lock().ok()?.try_recv().ok();
+        while let Some((request, reply)) = next() {
+            // Without an answer the other thread stops.
+            if let Some(found) = self.answer(request) {
+                let _ = reply.send(found);
+            }
+        }
+    }
+}
+
+/// Runs work on a problem.
+fn with_problem<T: Send>(
+    py: Python,
+    given: &ProblemOf,
+    heavy: bool,
+    progress: Option<&Py<PyAny>>,
+    max_iter: usize,
+    work: impl FnOnce(&Problem, &dyn Fn(usize), &Monitor) -> Result<T, Invalid> + Send,
+) -> PyResult<Result<T, Vec<f64>>> {
+    let (handles, groups, knots, penalty, constants, terms) = given;
+    let (knots, penalty) = (in_order(knots)?, penalty_named(penalty)?);
+    let spaces: Vec<Erased> = handles.iter().map(|handle| handle.space.get()).collect();
+    let shapes: Vec<Vec<usize>> = spaces.iter().map(shape_of).collect();
+    let functions: Vec<Option<&Py<PyAny>>> =
+        terms.iter().map(|term| term.8.as_ref().map(|own| &own.0)).collect();
+    let parts: Vec<&[usize]> = terms.iter().map(|term| &term.1[..]).collect();
+    let call = |py: Python, request: Request| match request {
+        Request::Progress(number) => {
+            progress.map_or(Ok(()), |own| own.call1(py, (number, max_iter)).map(drop))?;
+            Ok((Vec::new(), 0))
+        }
+        Request::Residuals { term, states, values } => {
+            let arrays = |numbers: &Vec<Vec<f64>>| {
+                numbers.iter().zip(parts[term]).map(|(x, part)| of_points(py, &shapes[*part], x)).collect()
+            };
+            let states = states.iter().map(arrays).collect::<PyResult<Vec<Vec<Out>>>>()?;
+            let function = functions[term].ok_or_else(|| invalid("the measurement has no function"))?;
+            let found = function.call1(py, (states, array(py, &[values.len()], &values)?))?;
+            let found: Array = found.extract(py)?;
+            Ok((in_order(&found)?.to_vec(), found.shape()[1]))
+        }
+    };
+    let desk = Desk::new(&call);
+    let residuals_of = |term: usize| {
+        let desk = &desk;
+        move |motion: &[Motion], values: &[f64], order: usize| {
+            let state = |nu: usize| motion.iter().map(|own| own.derivative(nu).to_vec()).collect();
+            let states = (0..=order).map(state).collect();
+            desk.ask(Request::Residuals { term, states, values: values.to_vec() })
+        }
+    };
+    let calls: Vec<Box<dyn Fn(&[Motion], &[f64]) -> Residuals + Sync>> = terms
+        .iter()
+        .enumerate()
+        .map(|(number, term)| -> Box<dyn Fn(&[Motion], &[f64]) -> Residuals + Sync> {
+            let (order, residuals) = (term.8.as_ref().map_or(0, |own| own.1), residuals_of(number));
+            Box::new(move |motion, values| residuals(motion, values, order))
+        })
+        .collect();
+    let each = terms.iter().zip(&calls).map(|(term, call)| read_term(term, &spaces, call));
+    let read = each.collect::<PyResult<Vec<Term>>>()?;
+    let bodies = spaces.iter().zip(groups).map(|(space, inverse)| {
+        Ok(inverse.as_ref().map(in_order).transpose()?.map(|inverse| Body { space, inverse }))
+    });
+    let bodies = bodies.collect::<PyResult<Vec<_>>>()?;
+    let constants: Vec<Constant> =
+        in_order(constants)?.chunks_exact(2).map(|x| Constant { mean: x[0], precision: x[1] }).collect();
+    let problem =
+        Problem { spaces: &spaces, bodies: &bodies, knots, terms: &read, constants: &constants, penalty };
+    let report = |number: usize| {
+        if progress.is_some() {
+            desk.ask(Request::Progress(number));
+        }
+    };
+    let found =
+        watched_serving(py, None, 1, heavy, &|| desk.serve(), |monitor| work(&problem, &report, monitor));
+    if let Ok(Some(error)) = desk.error.lock().map(|mut error| error.take()) {
+        return Err(error);
+    }
+    match found? {
+        Ok(found) => Ok(Ok(found)),
+        Err(Invalid::Parameters(information)) => Ok(Err(information)),
+        Err(Invalid::Start) => {
+            Err(invalid("No spline joins the initial points. Pass more knots, or `start`."))
+        }
+        Err(Invalid::Outside(at)) => Err(invalid(format!(
+            "the time offset moves measurement {at} beyond the knots. Extend the knots beyond the measurements."
+        ))),
+        Err(Invalid::Row(BadRow { row, angle, limit })) => Err(bad_row(row, angle, limit)),
+    }
+}
+
+/// The shape of the floating-point array of a point.
+fn shape_of(space: &Erased) -> Vec<usize> {
+    let mut shape = space.point_shape();
+    if space.is_complex() {
+        shape.last_mut().into_iter().for_each(|last| *last *= 2);
+    }
+    shape
+}
+
+/// Rows of points as an array.
+fn of_points<'py>(py: Python<'py>, shape: &[usize], numbers: &[f64]) -> PyResult<Out<'py>> {
+    let len: usize = shape.iter().product();
+    array(py, &[&[numbers.len() / len.max(1)], shape].concat(), numbers)
+}
+
+/// Measurements from the arguments of Python.
+fn read_term<'a>(
+    term: &'a TermOf,
+    spaces: &'a [Erased<'a>],
+    call: &'a (dyn Fn(&[Motion], &[f64]) -> Residuals + Sync),
+) -> PyResult<Term<'a>> {
+    let (kind, parts, times, noise, loss, offset, arrays, constants, function) = term;
+    let given = |at: usize| arrays.get(at).map_or(Ok(&[][..]), in_order);
+    let first = |at: usize| constants.get(at).copied().flatten().map(|(first, _)| first);
+    let space = &spaces[parts[0]];
+    let sensor = match kind.as_str() {
+        "points" => Sensor::Points { y: given(0)? },
+        "information" => Sensor::Information { y: given(0)?, frames: given(1)?, roots: given(2)? },
+        "velocities" => Sensor::Velocities { y: given(0)?, v: given(1)?, frames: given(2)? },
+        "rates" => {
+            Sensor::Rates { body: Body { space, inverse: given(1)? }, omega: given(0)?, bias: first(0) }
+        }
+        "directions" => {
+            Sensor::Directions { body: Body { space, inverse: &[] }, seen: given(0)?, reference: given(1)? }
+        }
+        "force" => Sensor::Force {
+            body: Body { space, inverse: &[] },
+            f: given(0)?,
+            gravity: given(1)?,
+            arm: given(2)?,
+            bias: first(0),
+            unknown_arm: first(1),
+        },
+        _ => Sensor::Function { call, nu: function.as_ref().map_or(0, |own| own.1) },
+    };
+    Ok(Term {
+        sensor,
+        times: in_order(times)?,
+        parts: parts.clone(),
+        noise: in_order(noise)?,
+        size: noise.shape().get(1).copied().unwrap_or(0),
+        loss: loss_named(loss)?,
+        offset: *offset,
+        parameters: constants.iter().flatten().map(|(first, size)| *first..first + size).collect(),
+    })
+}
+
+/// Whitened residuals (n, d) of one term, their derivatives with respect to the move of the curve and its time
+/// derivatives, (n, d, m) each, and with respect to the parameters, (n, d, p), and the roots of robust weights, (n, 1).
+type Rows<'py> = (Out<'py>, Vec<Option<Out<'py>>>, Option<Out<'py>>, Option<Out<'py>>);
+
+fn rows<'py>(py: Python<'py>, own: &Linearised, roots: &[f64]) -> PyResult<Rows<'py>> {
+    let n = own.residuals.len() / own.size.max(1);
+    let given = |x: &[f64], shape: &[usize]| (!x.is_empty()).then(|| array(py, shape, x)).transpose();
+    let third = |x: &[f64]| given(x, &[n, own.size, x.len() / own.residuals.len().max(1)]);
+    Ok((
+        array(py, &[n, own.size], &own.residuals)?,
+        own.jacobians.iter().map(|x| third(x)).collect::<PyResult<_>>()?,
+        third(&own.parameters)?,
+        given(roots, &[n, 1])?,
+    ))
+}
+
+/// The result of the iteration, as a dictionary; `_estimation/solve.py` reads it.
+#[derive(IntoPyObject)]
+pub struct Solved<'py> {
+    failure: Option<&'static str>,
+    points: Vec<Out<'py>>,
+    values: Out<'py>,
+    lams: Vec<f64>,
+    at_bound: Vec<bool>,
+    df: Vec<f64>,
+    sigma: f64,
+    iterations: usize,
+    step: f64,
+    rate: f64,
+    information: Out<'py>,
+    matrices: Vec<Out<'py>>,
+    variances: Out<'py>,
+    terms: Vec<Rows<'py>>,
+    loss: f64,
+    turn: f64,
+}
+
+/// The result of the iteration, or the information about parameters that the measurements do not determine.
+#[derive(IntoPyObject)]
+pub enum Estimated<'py> {
+    Solved(Solved<'py>),
+    Singular(Out<'py>),
+}
+
+/// Estimates a curve through initial points at the knots, in every part, with initial values of the parameters. λ that
+/// are NaN are chosen.
 #[pyfunction]
+#[pyo3(signature = (problem, points, values, lams, criterion, gamma, tol, max_iter, progress=None))]
 pub fn estimate<'py>(
     py: Python<'py>,
-    knots: Array<'py>,
-    penalty: &str,
-    factors: Vec<(PyRef<'py, Handle>, Array<'py>, Array<'py>, Option<Array<'py>>)>,
-    priors: Array<'py>,
-    terms: Vec<Term<'py>>,
-    lams: Array<'py>,
-    guesses: Array<'py>,
+    problem: ProblemOf<'py>,
+    points: Vec<Array<'py>>,
+    values: Array<'py>,
+    lams: Vec<f64>,
     criterion: &str,
     gamma: f64,
-) -> PyResult<Solved<'py>> {
-    let (criterion, penalty) = (criterion_named(criterion, gamma)?, penalty_named(penalty)?);
-    let knots = in_order(&knots)?;
-    let priors: Vec<(f64, f64)> = in_order(&priors)?.chunks_exact(2).map(|x| (x[0], x[1])).collect();
-    let spaces: Vec<_> = factors.iter().map(|(handle, ..)| handle.space.get()).collect();
-    let m: usize = spaces.iter().map(Origin::dim).sum();
-    let own = factors
-        .iter()
-        .zip(&spaces)
-        .map(|((_, a, b, c), space)| {
-            Ok(Factor { space, speeds: in_order(a)?, accelerations: in_order(b)?, halves: given(c)? })
-        })
-        .collect::<PyResult<Vec<_>>>()?;
-    let mut read = Vec::new();
-    for (x, residuals, [a, b, c], parameters) in &terms {
-        let at = positions(knots, in_order(x)?);
-        let size = residuals.shape()[1];
-        read.push((at, size, in_order(residuals)?, [given(a)?, given(b)?, given(c)?], given(parameters)?));
-    }
-    let numbers = |array: &Array<'py>| -> PyResult<Vec<Option<f64>>> {
-        Ok(in_order(array)?.iter().map(|x| Some(*x).filter(|x| !x.is_nan())).collect())
-    };
-    let (known, near) = (numbers(&lams)?, numbers(&guesses)?);
-    let factor_count = own.len();
-    // Every λ of the search factors a banded matrix with a border.
-    let data: usize = terms.iter().map(|(x, ..)| x.len()).sum();
-    let heavy = is_long((knots.len() * m + priors.len() + data) * (m + priors.len()));
-    let (found, residuals, matrices) = watched(py, None, knots.len(), heavy, |_| {
-        let mut problem = Estimation::new(knots, free_ends(penalty), penalty, own, &priors);
-        for (at, size, residuals, jacobians, parameters) in &read {
-            problem.add(&Measurements {
-                positions: at,
-                residuals,
-                size: *size,
-                jacobians: *jacobians,
-                parameters,
-            });
-        }
-        let found = problem.solve(&known, &near, criterion);
-        let lams: Vec<f64> = found.lams.iter().map(|(lam, _)| *lam).collect();
-        let matrices = problem.matrices(&lams);
-        (found, problem.residuals(), matrices)
+    tol: f64,
+    max_iter: usize,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Estimated<'py>> {
+    let (points, values) = (owned(&points)?, in_order(&values)?.to_vec());
+    let lams: Vec<Option<f64>> = lams.iter().map(|x| Some(*x).filter(|x| !x.is_nan())).collect();
+    let options = Options { lams: &lams, criterion: criterion_named(criterion, gamma)?, tol, max_iter };
+    let found = with_problem(py, &problem, true, progress.as_ref(), max_iter, |problem, report, monitor| {
+        problem.solved(points, values, &options, report, monitor)
     })?;
-    let (k, p) = (knots.len(), priors.len());
-    let (lams, bounds): (Vec<f64>, Vec<bool>) = found.lams.into_iter().unzip();
-    let [at_knots, of_parameters] = &found.variances;
-    let [band, side, corner] = matrices;
-    Ok((
-        array(py, &[factor_count], &lams)?,
-        bounds,
-        array(py, &[k, m], &found.step)?,
-        array(py, &[p], &found.parameters)?,
-        [array(py, &[k, m], at_knots)?, array(py, &[p], of_parameters)?],
-        array(py, &[factor_count], &found.freedom.0)?,
-        found.freedom.1,
-        array(py, &[p, p], &found.information)?,
-        found.determined,
-        residuals.0,
-        residuals.1,
-        [array(py, &[k * m, 4 * m], &band)?, array(py, &[k * m, p], &side)?, array(py, &[p, p], &corner)?],
-    ))
+    let p = in_order(&problem.4)?.len() / 2;
+    let found = match found {
+        Ok(found) => found,
+        Err(information) => return Ok(Estimated::Singular(array(py, &[p, p], &information)?)),
+    };
+    let Linear { found: linear, squares: (squares, count), matrices: [band, side, corner] } = &found.linear;
+    let knots = in_order(&problem.2)?.len();
+    let size = linear.step.len();
+    let left = *count as f64 - linear.freedom.1;
+    let shapes = problem.0.iter().map(|handle| shape_of(&handle.space.get()));
+    Ok(Estimated::Solved(Solved {
+        failure: found.failure.map(|failure| match failure {
+            Failure::Undetermined => "undetermined",
+            Failure::Infinite => "infinite",
+            Failure::NoCurve => "no curve",
+            Failure::Unconverged => "unconverged",
+        }),
+        points: found
+            .state
+            .points
+            .iter()
+            .zip(shapes)
+            .map(|(x, shape)| of_points(py, &shape, x))
+            .collect::<PyResult<_>>()?,
+        values: array(py, &[p], &found.state.values)?,
+        lams: linear.lams.iter().map(|(lam, _)| *lam).collect(),
+        at_bound: linear.lams.iter().map(|(_, bound)| *bound).collect(),
+        df: linear.freedom.0.clone(),
+        sigma: if left > 1e-9 * *count as f64 { (squares / left).sqrt() } else { f64::NAN },
+        iterations: found.iterations,
+        step: found.step,
+        rate: found.rate,
+        information: array(py, &[p, p], &linear.information)?,
+        matrices: vec![
+            array(py, &[size, 4 * size / knots], band)?,
+            array(py, &[size, p], side)?,
+            array(py, &[p, p], corner)?,
+        ],
+        variances: array(py, &[knots, size / knots], &linear.variances[0])?,
+        terms: found.terms.iter().map(|(own, roots)| rows(py, own, roots)).collect::<PyResult<_>>()?,
+        loss: found.loss,
+        turn: found.turn,
+    }))
+}
+
+fn owned(arrays: &[Array]) -> PyResult<Vec<Vec<f64>>> {
+    arrays.iter().map(|x| Ok(in_order(x)?.to_vec())).collect()
+}
+
+/// The residuals of all terms at the spline through points, with their derivatives if `derivatives` is true; None if
+/// there is no such spline. Without derivatives, times beyond the knots are moved to the first or the last knot.
+#[pyfunction]
+pub fn linearise<'py>(
+    py: Python<'py>,
+    problem: ProblemOf<'py>,
+    points: Vec<Array<'py>>,
+    values: Array<'py>,
+    derivatives: bool,
+) -> PyResult<Option<Vec<Rows<'py>>>> {
+    let (points, values) = (owned(&points)?, in_order(&values)?.to_vec());
+    let data: usize = problem.5.iter().map(|term| term.2.len()).sum();
+    let heavy = is_long((data + in_order(&problem.2)?.len()) * 16);
+    let found = with_problem(py, &problem, heavy, None, 0, |problem, _, monitor| {
+        let Some(state) = problem.fitted(points, values, monitor) else { return Ok(None) };
+        if derivatives {
+            return problem.linearised(&state, &problem.along(&state), monitor).map(Some);
+        }
+        problem.residuals(&state, true, monitor).map(Some)
+    })?;
+    let found = found.ok().flatten();
+    found.map(|found| found.iter().map(|own| rows(py, own, &[])).collect()).transpose()
+}
+
+/// The distance of an estimate from the minimum in standard deviations, from the band of A and rows of normal numbers.
+#[pyfunction]
+pub fn distance_from_minimum<'py>(
+    py: Python<'py>,
+    problem: ProblemOf<'py>,
+    points: Vec<Array<'py>>,
+    values: Array<'py>,
+    lams: Vec<f64>,
+    band: Array<'py>,
+    normal: Array<'py>,
+) -> PyResult<f64> {
+    let (points, values) = (owned(&points)?, in_order(&values)?.to_vec());
+    let (band, normal) = (in_order(&band)?, in_order(&normal)?);
+    let found = with_problem(py, &problem, true, None, 0, |problem, _, monitor| {
+        let state = problem.fitted(points, values, monitor).ok_or(Invalid::Start)?;
+        problem.distance(state, &lams, band, normal, monitor)
+    })?;
+    Ok(found.unwrap_or(f64::NAN))
 }
 
 /// A of one curve, and how the curve ends: the band, side and corner, the coordinates that it couples, the kinds of the

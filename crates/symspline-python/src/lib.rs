@@ -107,9 +107,9 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     guarded(m, wrap_pyfunction!(smoothing::residual_statistics, m)?)?;
     guarded(m, wrap_pyfunction!(smoothing::unequal_bins, m)?)?;
     guarded(m, wrap_pyfunction!(estimation::frames_along, m)?)?;
-    guarded(m, wrap_pyfunction!(estimation::curvature_along, m)?)?;
-    guarded(m, wrap_pyfunction!(estimation::bending, m)?)?;
     guarded(m, wrap_pyfunction!(estimation::estimate, m)?)?;
+    guarded(m, wrap_pyfunction!(estimation::linearise, m)?)?;
+    guarded(m, wrap_pyfunction!(estimation::distance_from_minimum, m)?)?;
     guarded(m, wrap_pyfunction!(estimation::posterior_covariance, m)?)?;
     guarded(m, wrap_pyfunction!(estimation::posterior_freedom, m)?)?;
     guarded(m, wrap_pyfunction!(estimation::posterior_samples, m)?)?;

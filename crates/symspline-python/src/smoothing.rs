@@ -3,7 +3,7 @@
 use crate::arrays::{in_order, reserve, zeros};
 use crate::curves::EndOf;
 use crate::errors::{CutLocusError, invalid, number};
-use crate::estimation::{criterion_named, ends_named, penalty_named};
+use crate::estimation::{criterion_named, ends_named, loss_named, penalty_named};
 use crate::space::Handle;
 use crate::validate::of_curve;
 use crate::watch::{Progress, is_heavy, is_long, watched};
@@ -13,7 +13,7 @@ use pyo3::types::{PyListMethods, PyTuple, PyTupleMethods};
 use symspline_engine::parallel;
 use symspline_engine::smoothing::audit::{AtData, Recording, ResidualStatistics, Unequal};
 use symspline_engine::smoothing::{
-    Data, Loss, Observations, Options, Outcome, Report, Samples, Selection, Smooth, State, Tier, chi,
+    Data, Observations, Options, Outcome, Report, Samples, Selection, Smooth, State, Tier, chi,
     fit_cumulative as fit, inverse_of_weights, process_variance as process, smooth as run,
     variance as variance_at,
 };
@@ -60,12 +60,7 @@ pub fn smooth<'py>(
     let options = Options {
         criterion: criterion_named(criterion, gamma)?,
         penalty: penalty_named(penalty)?,
-        loss: match loss {
-            "linear" => Loss::Linear,
-            "huber" => Loss::Huber,
-            "cauchy" => Loss::Cauchy,
-            _ => return Err(invalid(format!("loss must be 'linear', 'huber' or 'cauchy', not {loss:?}"))),
-        },
+        loss: loss_named(loss)?,
         tier: match method {
             "auto" => Tier::Auto,
             "linearized" => Tier::Linearized,

@@ -106,18 +106,7 @@ impl Handle {
             apply(&self.space.get(), operation, &slices, t, monitor, result)
         })?;
         drop(write);
-        done.map_err(|(row, angle)| {
-            if angle.is_nan() {
-                return invalid(format!(
-                    "pair {row} contains a number that is not finite, or an array that is not a point of the space"
-                ));
-            }
-            let limit = self.space.get().cut_angle();
-            CutLocusError::new_err(format!(
-                "pair {row}: the points lie at or past each other's cut locus: angle {angle}, limit {limit}; \
-                 the geodesic between them is not unique"
-            ))
-        })?;
+        done.map_err(|(row, angle)| bad_row(row, angle, self.space.get().cut_angle()))?;
         Ok(out)
     }
 
@@ -168,6 +157,19 @@ impl Handle {
         let shape = [points.shape()[0]];
         PyArray1::from_vec(py, defects).reshape(shape).map(|a| a.to_dyn().clone())
     }
+}
+
+/// The exception for two points that no unique geodesic joins, or for a number that is not finite.
+pub fn bad_row(row: usize, angle: f64, limit: f64) -> PyErr {
+    if angle.is_nan() {
+        return invalid(format!(
+            "pair {row} contains a number that is not finite, or an array that is not a point of the space"
+        ));
+    }
+    CutLocusError::new_err(format!(
+        "pair {row}: the points lie at or past each other's cut locus: angle {angle}, limit {limit}; \
+         the geodesic between them is not unique"
+    ))
 }
 
 /// The message for a point that is off its space.

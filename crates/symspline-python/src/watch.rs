@@ -73,6 +73,18 @@ pub fn watched<T: Send>(
     heavy: bool,
     work: impl FnOnce(&Monitor) -> T + Send,
 ) -> PyResult<T> {
+    watched_serving(py, progress, total, heavy, &|| (), work)
+}
+
+/// The same. While heavy work runs in another thread, which may wake this one, this thread also calls `serve`.
+pub fn watched_serving<T: Send>(
+    py: Python,
+    progress: Option<Progress>,
+    total: usize,
+    heavy: bool,
+    serve: &(dyn Fn() + Sync),
+    work: impl FnOnce(&Monitor) -> T + Send,
+) -> PyResult<T> {
     require_memory(HEADROOM, || ("this computation".into(), "Free some memory"))?;
     let state = Mutex::new((Instant::now(), None::<PyErr>));
     let go_on = |finished: usize| {
@@ -110,6 +122,7 @@ pub fn watched<T: Send>(
             })?;
             while !finished.load(Ordering::Acquire) {
                 thread::park_timeout(INTERVAL / 5);
+                serve();
                 monitor.poll();
             }
             worker.join().and_then(|result| result)

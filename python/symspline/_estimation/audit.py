@@ -15,7 +15,7 @@ from .._smoothing.audited import DEGREES, Sensor, advice, described
 from .._smoothing.posterior import Posterior
 from .._spaces import Doubles
 from .measurements import GRAVITY
-from .solve import Setup, Solution, in_columns
+from .solve import Rows, Setup, Solution
 from .terms import ForceTerm, FunctionTerm, PointTerm, RateTerm, Term
 
 # Number of measurements of a sensor in the estimate of its mean leverage.
@@ -64,14 +64,13 @@ def examined(setup: Setup, found: Solution) -> list[Sensor]:
     sensors = []
     leverages = _leverages(setup, found)
     labels = [term.label for term in setup.terms]
-    for term, own, loss, (leverage, between) in zip(
-        setup.terms, found.linearised, setup.losses, leverages, strict=True
-    ):
+    for term, own, (leverage, between) in zip(setup.terms, found.rows, leverages, strict=True):
         order = np.argsort(term.times, kind="stable")
         rows = term.informative(own.residuals)[order]
         entries = max(1, int(np.isfinite(rows).sum()))
-        corner = corner_of(loss, own.residuals.shape[1])
-        given = Residuals(rows, leverage / entries, between / entries, loss, corner, not isinstance(term, FunctionTerm))
+        corner = corner_of(term.loss, own.residuals.shape[1])
+        exact = not isinstance(term, FunctionTerm)
+        given = Residuals(rows, leverage / entries, between / entries, term.loss, corner, exact)
         name = f"{term.label} ({type(term.given).__name__})"
         if labels.count(term.label) > 1:
             name += f" on {' and '.join(repr(setup.spaces[part]) for part in term.parts)}"
@@ -88,19 +87,17 @@ def _leverages(setup: Setup, found: Solution) -> list[tuple[float, float]]:
     m = band.shape[1] // 4
     posterior, kinds = Posterior.of(band, np.zeros((0, 0)), m), end_kinds(setup.bc_type)
     result = []
-    for term, own, roots in zip(setup.terms, found.linearised, found.roots, strict=True):
-        orders = [nu for nu, by_part in enumerate(own.jacobians) if by_part]
+    for term, own in zip(setup.terms, found.rows, strict=True):
+        orders = [nu for nu, jacobian in enumerate(own.jacobians) if jacobian is not None]
         n = len(term.times)
         order = np.argsort(term.times, kind="stable")
         some = np.unique(np.linspace(0, n - 1, min(n, _SAMPLE)).round().astype(int))
         x = np.clip(term.shifted_times(found.values)[order], setup.knots[0], setup.knots[-1])
 
-        def rows(
-            at: NDArray[np.intp], orders: list[int], own: Any = own, roots: Any = roots, order: Any = order
-        ) -> Any:
-            each = [in_columns(setup.spaces, own.jacobians[nu], own.residuals.shape)[order[at]] for nu in orders]
-            whole = np.concatenate(each, axis=-1)
-            return whole if roots is None else whole * roots[order[at], :, None]
+        def rows(at: NDArray[np.intp], orders: list[int], own: Rows = own, order: Any = order) -> Any:
+            each: list[Any] = [own.jacobians[nu] for nu in orders]
+            whole = np.concatenate([jacobian[order[at]] for jacobian in each], axis=-1)
+            return whole if own.roots is None else whole * own.roots[order[at], :, None]
 
         def covariance(at: NDArray[np.intp], orders: list[int], others: Any = None, x: Doubles = x) -> Doubles:
             there = None if others is None else np.ascontiguousarray(x[others])

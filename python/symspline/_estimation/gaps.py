@@ -13,7 +13,7 @@ from .._curves.ends import end_kinds
 from .._smoothing.gaps import Calibration, Course, SensorEvidence, calibrate
 from .._smoothing.posterior import Posterior
 from .._spaces import Doubles
-from .solve import Setup, Solution, in_columns, parameter_columns
+from .solve import Setup, Solution
 from .start import scales_of
 from .terms import InformationTerm, PointTerm
 
@@ -110,27 +110,27 @@ def _evidence(
     """Return the linearised measurements of a part, in the order of time."""
     kinds, size = end_kinds(setup.bc_type), sum(space.dim for space in setup.spaces)
     parameters = sum(constant.size for constant in setup.constants.values())
-    q = max(found.linearised[k].residuals.shape[1] for k in terms)
+    q = max(found.rows[k].residuals.shape[1] for k in terms)
     known = _posterior(setup, found, 0).known((), kinds)
     factors, sides, residuals, counts = [], [], [], []
     for k in terms:
-        term, own, roots, loss = setup.terms[k], found.linearised[k], found.roots[k], setup.losses[k]
+        term, own = setup.terms[k], found.rows[k]
         (n, d), dim = own.residuals.shape, setup.spaces[part].dim
         x = np.clip(term.shifted_times(found.values), setup.knots[0], setup.knots[-1])
         rows = np.zeros((n, q, 4 * size))
-        for nu, by_part in enumerate(own.jacobians):
-            if by_part:
-                columns = in_columns(setup.spaces, by_part, own.residuals.shape)
+        for nu, columns in enumerate(own.jacobians):
+            if columns is not None:
                 of_curve = _core.coefficient_factors(setup.knots, kinds, x, nu)[1]
                 rows[:, :d] += np.einsum("ndm,nk->ndkm", columns, of_curve).reshape(n, d, -1)
         of_parameters, left = np.zeros((n, q, parameters)), np.zeros((n, q))
-        of_parameters[:, :d], left[:, :d] = parameter_columns(setup, own), -own.residuals
-        scale = 1.0 if roots is None else roots
+        of_parameters[:, :d] = 0.0 if own.parameters is None else own.parameters
+        left[:, :d] = -own.residuals
+        scale = 1.0 if own.roots is None else own.roots
         factors.append(rows * np.asarray(scale)[..., None])
         sides.append(of_parameters * np.asarray(scale)[..., None])
         residuals.append(left * scale)
         near = np.ones(n, bool)
-        if loss != "linear":
+        if term.loss != "linear":
             near = np.sum(own.residuals**2, axis=1) <= _core.chi_squared(dim, _KEPT)
         counts.append(near & isinstance(term, (PointTerm, InformationTerm)))
     firsts = _core.coefficient_factors(setup.knots, kinds, times, 0)[0]

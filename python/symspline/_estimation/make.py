@@ -55,10 +55,28 @@ from .._splines.curve import Curve
 from ..manifolds._manifold import refuse_functions
 from .audit import audit, unit_hints
 from .gaps import long_gaps
-from .knots import filled, first_knots, merged, shown_times
-from .measurements import SKIPNA, BodyRates, Constant, Measurement, Points, Velocities
-from .missing import counts_all_samples, measurement_without_missing
-from .search import Search, Starts, automatic, solved, warn_of_gaps, warn_of_turns
+from .measurements import (
+    SKIPNA,
+    BodyRates,
+    Constant,
+    Measurement,
+    Points,
+    Velocities,
+    counts_all_samples,
+    measurement_without_missing,
+)
+from .search import (
+    Search,
+    Starts,
+    automatic,
+    filled,
+    first_knots,
+    merged,
+    shown_times,
+    solved,
+    warn_of_gaps,
+    warn_of_turns,
+)
 from .solve import Setup, Solution, read_lams
 from .spline import EstimatedSpline, PointsSpline, joint
 from .terms import Term, bind
@@ -297,14 +315,15 @@ def estimate(
             on_failure=on_failure,
             progress=progress,
         )
-    terms, losses = _terms(given, axis, space, loss)
+    terms = _terms(given, axis, space, loss)
     constants = _constants(terms)
     times = axis.knots(shown)
     _check_range(terms, times)
     if penalty == "jerk" and len(times) < 4:
         raise ValidationError(f"penalty='jerk' needs at least 4 knots, but there are {len(times)}")
-    setup = Setup(spaces, times, terms, losses, constants, penalty, criterion or "reml", gamma, tol, lams, most)
-    setup = setup._replace(automatic=isinstance(knots, str))
+    setup = Setup(
+        spaces, times, terms, constants, penalty, criterion or "reml", gamma, tol, lams, most, isinstance(knots, str)
+    )
     begin = Starts(setup, space, axis, start)
     if isinstance(knots, str):
         shown, setup, search = automatic(setup, begin, axis, shown, data, progress)
@@ -332,7 +351,7 @@ def _smoothed(
 ) -> PointsSpline[Any]:
     """Fit points only, as a smoothing spline whose weights are the inverse variances."""
     # Without sigma the noise level is estimated, and the weights are relative.
-    (terms, _) = _terms([given if given.sigma is not None else given._with_sigma(1.0)], axis, space, loss)
+    terms = _terms([given if given.sigma is not None else given._with_sigma(1.0)], axis, space, loss)
     t, _ = times_of(given.t, "measurements[0].t")
     order = np.argsort(as_array(t, "measurements[0].t"), kind="stable")
 
@@ -437,18 +456,16 @@ def _even(union: Array, count: int) -> Array:
     return found
 
 
-def _terms(given: list[Measurement], axis: TimeAxis, space: Space[Any], loss: str) -> tuple[list[Term], list[str]]:
-    terms, losses = [], []
+def _terms(given: list[Measurement], axis: TimeAxis, space: Space[Any], loss: Loss) -> list[Term]:
+    terms: list[Term] = []
     for i, own in enumerate(given):
         label = f"measurements[{i}]"
         try:
             times, _ = axis.at(own.t, (), False)
         except ValidationError as error:
             raise ValidationError(f"{label}.t: {error}") from None
-        for term in bind(own, label, np.ascontiguousarray(times), space):
-            terms.append(term)
-            losses.append(own.loss or loss)
-    return terms, losses
+        terms += bind(own, label, np.ascontiguousarray(times), space, loss)
+    return terms
 
 
 def _constants(terms: list[Term]) -> dict[str, Constant]:
@@ -490,7 +507,7 @@ def _curve(
     found = search.found
     if not found.failure:
         ratio = audit(setup, found)
-        if any(loss != "linear" for loss in setup.losses):
+        if not setup.least_squares:
             # The sum of squares in the iteration contains the weights of the robust loss.
             found = found._replace(reports=[replace(report, sigma=ratio) for report in found.reports])
     factors = factors_of(space)
@@ -505,11 +522,9 @@ def _curve(
     for part, report in zip(setup.spaces, found.reports, strict=True):
         smoothed.append(joint(report, band, side, corner, size, first))
         first += part.dim
-    parameters, at = {}, 0
-    for name, constant in setup.constants.items():
-        block = slice(at, at + constant.size)
-        parameters[name] = Parameter(found.values[name], found.covariance[block, block])
-        at += constant.size
+    parameters = {
+        name: Parameter(found.values[name], found.covariance[own, own]) for name, own in setup.columns.items()
+    }
     curve = EstimatedSpline._of(
         axis,
         shown,
@@ -540,5 +555,5 @@ def _curve(
 
 def _residuals_of(setup: Setup, found: Solution, label: str) -> Doubles | tuple[Doubles, ...]:
     """Return the residuals of one measurement, which has one term per part of the space."""
-    own = [rows.residuals for term, rows in zip(setup.terms, found.linearised, strict=True) if term.label == label]
+    own = [rows.residuals for term, rows in zip(setup.terms, found.rows, strict=True) if term.label == label]
     return own[0] if len(own) == 1 else tuple(own)

@@ -15,17 +15,16 @@ from .._curves.ends import end_kinds
 from .._smoothing.data import SmoothingData
 from .._smoothing.factors import is_several, smoothed_spaces
 from .._smoothing.gaps import Calibration
-from .._smoothing.posterior import Parameter, Posterior
+from .._smoothing.posterior import Parameter, Posterior, coordinates
 from .._smoothing.report import SmoothingReport
 from .._smoothing.solve import Smoothed
 from .._smoothing.spline import SmoothingSpline
 from .._spaces import Array, Doubles, Product, Space, SpecialEuclidean, factors_of, parts_of
 from .._splines.archive import Entries, entry, read_fitted, read_report
 from .._splines.cubic import CubicSpline
-from .along import Motion
 from .gaps import LongGaps, read_long_gaps
 from .measurements import BodyRates, Measurement, Points, SpecificForce
-from .terms import Term
+from .terms import InformationTerm, PointTerm, Term
 
 
 def _are_partial(points: Points, factor: Space[Any]) -> bool:
@@ -222,6 +221,15 @@ class EstimatedSpline(SmoothingSpline[P, Any]):
         return f"<EstimatedSpline on {self.space!r}: {text}>"
 
 
+def _of_points(term: Term, space: Space, p: Array, frames: Array) -> Doubles:
+    """Return the residuals of points at the points p of a curve with frames."""
+    if isinstance(term, PointTerm):
+        return -coordinates(space, p, frames, space._apply("log", p=p, q=term.y))
+    assert isinstance(term, InformationTerm)
+    logs = coordinates(space, term.y, space.frame(term.y), space._apply("log", p=term.y, q=p))
+    return np.asarray((term.roots @ logs[..., None])[..., 0])
+
+
 class PointsSpline(SmoothingSpline[P, Any]):
     """A smoothing spline that `estimate` fitted to points only, with residuals like those of an `EstimatedSpline`."""
 
@@ -246,10 +254,10 @@ class PointsSpline(SmoothingSpline[P, Any]):
         for term in terms:
             (part,) = term.parts
             p, frames = fitted._frames(term.times, False)[part]
-            motion = Motion(smoothed_spaces(fitted.space)[part], 0, p, np.empty(0), np.empty(0), frames)
+            rows = _of_points(term, smoothed_spaces(fitted.space)[part], p, frames)
             scale = 1.0 if given.sigma is not None else float(fitted._smoothed[part].sigma)
             with np.errstate(divide="ignore", invalid="ignore"):
-                found.append(np.asarray(term.measure([motion], {}) / term.noise / scale))
+                found.append(np.asarray(rows / term.noise / scale))
         residuals = found[0] if len(found) == 1 else tuple(found)
         parts = (fitted._time_axis, fitted._t, fitted._curve, fitted._bc_type, fitted._extrapolate, fitted._reports)
         return cls._of(*parts, fitted._noisy, fitted._smoothed, (given,), (residuals,))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
@@ -11,14 +10,14 @@ from numpy.typing import NDArray
 
 from .._base.arrays import short_repr
 from .._base.time import TimeAxis
+from .._base.warnings import silenced
 from .._core import ValidationError
 from .._smoothing import make_smoothing_spline
 from .._smoothing.factors import split
 from .._spaces import Array, Doubles, Euclidean, Product, Space, SpecialOrthogonal, factors_of, nearest_rotations
 from .._splines.curve import Curve
 from ..convert import matrix_to_quaternion
-from .integrated_rates import Attitudes, Integral, Path, Rates
-from .rates import attitudes_at
+from .rates import Attitudes, Integral, Path, Rates, attitudes_at
 from .solve import Setup
 from .terms import Body, DirectionTerm, ForceTerm, InformationTerm, PointTerm, RateTerm, Values, VelocityTerm
 
@@ -143,7 +142,7 @@ def _candidates(setup: Setup, part: int, space: Space[Any]) -> list[Callable[[],
 
 def _are_dense(setup: Setup, points: list[PointTerm | InformationTerm], rates: list[RateTerm]) -> bool:
     """Whether attitudes determine the path between them: the body turns by little from one to the next."""
-    if setup.losses.count("linear") < len(setup.losses) or any(own.time_offset for own in (*points, *rates)):
+    if not setup.least_squares or any(own.time_offset for own in (*points, *rates)):
         return False
     times = np.unique(np.concatenate([setup.knots[[0, -1]], *(own.times for own in points)]))
     sigma = max(float(scales_of(own).max()) for own in points)
@@ -178,8 +177,7 @@ def _smoothed(
     order = np.argsort(times, kind="stable")
     # Automatic knots are few at first, so they do not limit the number.
     count = None if setup.automatic else min(len(np.unique(times)), max(len(setup.knots), 2), most)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
+    with silenced(Warning), np.errstate(all="ignore"):
         curve: Any = make_smoothing_spline(
             times[order],
             y[order],
@@ -187,7 +185,7 @@ def _smoothed(
             weights=(sigma[order] / sigma.min()) ** -2.0,
             knots=count,
             on_failure="ignore",
-            loss="linear" if all(loss == "linear" for loss in setup.losses) else "cauchy",
+            loss="linear" if setup.least_squares else "cauchy",
         )
 
     def path(x: Doubles) -> Array:
@@ -328,8 +326,7 @@ def _rates_of(setup: Setup, first: RateTerm, others: list[RateTerm]) -> Rates:
 
 def _without_spikes(setup: Setup, term: RateTerm) -> Doubles:
     """Return the rates, without single outliers if the loss is robust."""
-    loss = next(loss for own, loss in zip(setup.terms, setup.losses, strict=True) if own is term)
-    if loss == "linear" or len(term.times) < 5:
+    if term.loss == "linear" or len(term.times) < 5:
         return term.omega
     order = np.argsort(term.times, kind="stable")
     omega = term.omega[order]
@@ -364,8 +361,7 @@ def _force_vectors(setup: Setup, term: ForceTerm) -> _Vectors:
     if count > 5:
         order = np.argsort(times, kind="stable")
         y = np.concatenate([own.y for own in points])[order]
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
+        with silenced(Warning), np.errstate(all="ignore"):
             path = make_smoothing_spline(
                 times[order], y, "r:3", knots=min(count, 200), penalty="jerk", on_failure="ignore"
             )

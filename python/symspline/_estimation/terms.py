@@ -1,19 +1,19 @@
-"""Residuals of measurements at a curve, and their derivatives."""
+"""Measurements on the parts of a space: their arrays, checked and in the form that the core reads."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .._base.arrays import as_array, refuse
+from .._base.typing import Loss
 from .._core import ValidationError
 from .._curves.fit import read
 from .._smoothing.audit import roots_of
 from .._smoothing.factors import join, parts_of_factor, smoothed_spaces, split
-from .._smoothing.posterior import coordinates
 from .._smoothing.precision import read_precision
 from .._spaces import (
     Array,
@@ -29,7 +29,6 @@ from .._spaces import (
 )
 from .._spaces.actions import Group
 from ..convert import quaternion_to_matrix
-from .along import STEP, Motion
 from .measurements import (
     SKIPNA,
     BodyRates,
@@ -50,25 +49,6 @@ _NORMALISED = 0.1
 Values = dict[str, Doubles]
 
 
-class Linearised(NamedTuple):
-    """Residuals at a curve and their derivatives, whitened: their noise has variance one.
-
-    Attributes
-    ----------
-    residuals : ndarray, shape (n, d)
-        What the sensors would read minus what they read.
-    jacobians : list
-        Derivatives with respect to the move of the curve, its velocity and its acceleration, in coordinates of the
-        frames of every part: for each order a dict from parts to arrays of shape (n, d, dim).
-    parameters : dict
-        Derivatives with respect to the parameters by name, shape (n, d, size).
-    """
-
-    residuals: Doubles
-    jacobians: list[dict[int, Doubles]]
-    parameters: dict[str, Doubles]
-
-
 class Term:
     """Measurements of one kind on the parts of a space.
 
@@ -80,24 +60,31 @@ class Term:
         Times of the core, without their unknown offset.
     parts : list of int
         Parts of the space on which the residuals depend.
-    nu : int
-        Highest derivative that the residuals need.
     noise : ndarray, shape (n, d)
         Standard deviations.
+    loss : str
+        Loss of the residuals.
     rows : ndarray of int, shape (n,)
         Indices of these measurements among those passed by the user.
     constants : dict
         Parameters by name.
+    arrays : list of ndarray
+        Arrays of the sensor as the core reads them.
+    slots : list of str or None
+        Names of the parameters of the sensor in the order of the core.
     """
 
-    nu = 0
+    sensor: ClassVar[str]
 
     def __init__(self, label: str, given: Measurement, times: Doubles, parts: list[int]) -> None:
         self.label, self.given, self.times, self.parts = label, given, times, parts
+        self.loss: Loss = given.loss or "linear"
         self.constants: dict[str, Constant] = {}
         self.noise: Doubles = np.empty((0, 0))
         self.rows = np.arange(len(times))
         self.time_offset = None if given.time_offset is None else self.name(given.time_offset, "time offset")
+        self.arrays: list[Doubles] = []
+        self.slots: list[str | None] = []
 
     def name(self, constant: Constant, default: str) -> str:
         """Register a parameter and return its name."""
@@ -109,86 +96,9 @@ class Term:
         """Return the times with the offset that is among the values of the parameters."""
         return self.times + (0.0 if self.time_offset is None else float(values[self.time_offset][0]))
 
-    def measure(self, motion: list[Motion], values: Values) -> Doubles:
-        """Return the residuals, shape (n, d)."""
-        raise NotImplementedError
-
-    def derivatives(self, motion: list[Motion], values: Values) -> tuple[list[dict[int, Doubles]], dict[str, Doubles]]:
-        """Return the derivatives of the residuals by central differences."""
-        found: list[dict[int, Doubles]] = [{}, {}, {}]
-        for i, (part, own) in enumerate(zip(self.parts, motion, strict=True)):
-            for nu in range(self.nu + 1):
-                step = own.scale(nu)
-
-                def at(j: int, size: float, i: int = i, own: Motion = own, nu: int = nu) -> Doubles:
-                    moved = [*motion[:i], own.moved(j, nu, size), *motion[i + 1 :]]
-                    return self.measure(moved, values)
-
-                columns = [(at(j, step) - at(j, -step)) / (2 * step) for j in range(own.space.dim)]
-                found[nu][part] = np.stack(columns, axis=-1)
-        return found, self.of_parameters(motion, values)
-
-    def of_parameters(self, motion: list[Motion], values: Values) -> dict[str, Doubles]:
-        """Return the derivatives with respect to the parameters by central differences."""
-        found = {}
-        for name, constant in self.constants.items():
-            if name == self.time_offset:
-                continue
-            columns = []
-            for k in range(constant.size):
-                step = STEP * (1.0 + abs(values[name][k]))
-
-                def at(size: float, name: str = name, k: int = k) -> Doubles:
-                    own = values[name].copy()
-                    own[k] += size
-                    return self.measure(motion, values | {name: own})
-
-                columns.append((at(step) - at(-step)) / (2 * step))
-            found[name] = np.stack(columns, axis=-1)
-        return found
-
     def informative(self, residuals: Doubles) -> Doubles:
         """Return whitened residuals for the audit; entries without information are NaN."""
         return residuals
-
-    def linearised(
-        self,
-        motion_at: Callable[[Doubles, list[int], int], list[Motion]],
-        values: Values,
-        spacing: float,
-        derivatives: bool = True,
-    ) -> Linearised:
-        """Linearise the measurements.
-
-        Parameters
-        ----------
-        motion_at : callable
-            Function that returns the motion at times, of some parts, with derivatives up to an order.
-        values : dict
-            Values of the parameters.
-        spacing : float
-            Mean distance of the knots.
-        derivatives : bool
-            Whether to compute derivatives in addition to the residuals.
-        """
-        times = self.shifted_times(values)
-        motion = motion_at(times, self.parts, self.nu)
-        residuals = self.measure(motion, values)
-        if not derivatives:
-            return Linearised(residuals / self.noise, [{}, {}, {}], {})
-        jacobians, parameters = self.derivatives(motion, values)
-        if self.time_offset is not None:
-            step = STEP * spacing
-            after, before = (
-                self.measure(motion_at(times + side, self.parts, self.nu), values) for side in (step, -step)
-            )
-            parameters[self.time_offset] = ((after - before) / (2 * step))[..., None]
-        each = self.noise[..., None]
-        return Linearised(
-            residuals / self.noise,
-            [{part: own / each for part, own in by_part.items()} for by_part in jacobians],
-            {name: own / each for name, own in parameters.items()},
-        )
 
     def spread(self, size: int) -> None:
         """Set the standard deviations of `size` residuals per measurement."""
@@ -205,23 +115,31 @@ class Term:
         """Return finite real numbers of a shape."""
         return broadcast(value, f"{self.label}.{name}", shape, SKIPNA)
 
+    def in_core(self, columns: dict[str, slice]) -> tuple[Any, ...]:
+        """Return the term in the form of the core, for the columns of all parameters."""
+        places = [None if name is None else (columns[name].start, self.constants[name].size) for name in self.slots]
+        offset = None if self.time_offset is None else columns[self.time_offset].start
+        function = self.function(columns)
+        # Functions return residuals in standard deviations.
+        arrays = [self.times, self.noise if function is None else np.empty(0), *self.arrays]
+        times, noise, *others = map(np.ascontiguousarray, arrays)
+        return self.sensor, self.parts, times, noise, self.loss, offset, others, places, function
+
+    def function(self, columns: dict[str, slice]) -> tuple[Callable[..., Doubles], int] | None:
+        """Return the function of the user with its highest derivative; None for sensors of the core."""
+        return None
+
 
 class PointTerm(Term):
     """Points with equal noise in all directions: the residual is −log_γ(y)."""
 
-    def __init__(self, label: str, given: Points, times: Doubles, part: int, y: Array, noise: Doubles) -> None:
+    sensor = "points"
+
+    def __init__(
+        self, label: str, given: Points, times: Doubles, part: int, space: Space, y: Array, noise: Doubles
+    ) -> None:
         super().__init__(label, given, times, [part])
-        self.y, self.noise = y, noise
-
-    def measure(self, motion: list[Motion], values: Values) -> Doubles:
-        (own,) = motion
-        return -own.coordinates(own.space._apply("log", p=own.p, q=self.y))
-
-    def derivatives(self, motion: list[Motion], values: Values) -> tuple[list[dict[int, Doubles]], dict[str, Doubles]]:
-        # The gradient of d²/2 is −log_γ(y), so that the identity yields the exact gradient.
-        m = motion[0].space.dim
-        unit = np.broadcast_to(np.eye(m), (len(self.times), m, m))
-        return [{self.parts[0]: unit}, {}, {}], {}
+        self.y, self.noise, self.arrays = y, noise, [_doubles(space, y)]
 
     def precision(self, n: int) -> Doubles:
         """Return the inverse variances of all n points; those of points without weight are 0."""
@@ -233,19 +151,23 @@ class PointTerm(Term):
 class InformationTerm(Term):
     """Points with information matrices: the residual is R log_y(γ) in a frame at y, with the matrices RᵀR."""
 
+    sensor = "information"
+
     def __init__(
-        self, label: str, given: Points, times: Doubles, part: int, y: Array, roots: Doubles, known: NDArray[np.bool_]
+        self,
+        label: str,
+        given: Points,
+        times: Doubles,
+        part: int,
+        space: Space,
+        y: Array,
+        noise: Doubles,
+        roots: Doubles,
+        known: NDArray[np.bool_],
     ) -> None:
         super().__init__(label, given, times, [part])
-        self.y, self.roots, self.known = y, roots, known
-
-    def measure(self, motion: list[Motion], values: Values) -> Doubles:
-        (own,) = motion
-        logs = own.space._apply("log", p=self.y, q=own.p)
-        result: Doubles = np.einsum(
-            "nij,nj->ni", self.roots, coordinates(own.space, self.y, own.space.frame(self.y), logs)
-        )
-        return result
+        self.y, self.noise, self.roots, self.known = y, noise, roots, known
+        self.arrays = [_doubles(space, y), _doubles(space, space.frame(y)), roots]
 
     def informative(self, residuals: Doubles) -> Doubles:
         return np.where(self.known, residuals, np.nan)
@@ -260,7 +182,7 @@ class InformationTerm(Term):
 class VelocityTerm(Term):
     """Velocities at measured points: the residual is the transported velocity minus the measured one."""
 
-    nu = 1
+    sensor = "velocities"
 
     def __init__(self, label: str, given: Velocities, times: Doubles, part: int, space: Space, y: Any, v: Any) -> None:
         super().__init__(label, given, times, [part])
@@ -272,54 +194,36 @@ class VelocityTerm(Term):
             space.check_tangent(self.y, vectors)
         except ValidationError as error:
             raise ValidationError(f"{label}.v: {error}") from None
-        self.v, self.frame = vectors, space.frame(self.y)
+        self.arrays = [_doubles(space, x) for x in (self.y, vectors, space.frame(self.y))]
         self.spread(space.dim)
-
-    def measure(self, motion: list[Motion], values: Values) -> Doubles:
-        (own,) = motion
-        there = own.space._apply("transport", p=own.p, q=self.y, v=own.v)
-        return coordinates(own.space, self.y, self.frame, there - self.v)
 
 
 class RateTerm(Term):
     """Velocities in the moving frame of a group."""
 
-    nu = 1
+    sensor = "rates"
 
     def __init__(self, label: str, given: BodyRates, times: Doubles, part: int, space: Space) -> None:
         super().__init__(label, given, times, [part])
         self.body = Body(space)
-        given_rates = self.body.components(given.omega, f"{label}.omega", len(times))
-        self.omega = given_rates
+        self.omega = self.body.components(given.omega, f"{label}.omega", len(times))
         self.spread(self.body.size)
         self.bias = None
         if given.bias is not None:
             self.bias = self.name(_of_size(given.bias, self.body.size, f"{label}.bias"), "gyro bias")
-
-    def measure(self, motion: list[Motion], values: Values) -> Doubles:
-        (own,) = motion
-        read = self.body.rates(own.p, own.v)
-        return (read if self.bias is None else read + values[self.bias]) - self.omega
-
-    def derivatives(self, motion: list[Motion], values: Values) -> tuple[list[dict[int, Doubles]], dict[str, Doubles]]:
-        (own,) = motion
-        half, first = self.body.derivatives(own.p, own.v, own.frames)
-        part = self.parts[0]
-        parameters = {}
-        if self.bias is not None:
-            size = self.body.size
-            parameters[self.bias] = np.broadcast_to(np.eye(size), (len(self.times), size, size))
-        return [{part: half}, {part: first}, {}], parameters
+        self.arrays, self.slots = [self.omega, self.body.inverse], [self.bias]
 
 
 class DirectionTerm(Term):
     """Known directions in the frame of the body: the residual is Rᵀr − s."""
 
+    sensor = "directions"
+
     def __init__(self, label: str, given: Directions, times: Doubles, part: int, space: Space) -> None:
         super().__init__(label, given, times, [part])
         if space not in (_SO3, _S3):
             raise ValidationError(f"{label} needs rotations 'so:3', 'sphere:3' or 'se:3', not {space!r}")
-        self.body, n = Body(space), len(times)
+        n = len(times)
         seen = as_array(given.seen, f"{label}.seen")
         if seen.ndim not in (2, 3) or seen.shape[-1] != 3 or seen.shape[0] != n:
             raise ValidationError(f"{label}.seen has shape {seen.shape}, but ({n}, 3) or ({n}, k, 3) is needed")
@@ -331,13 +235,7 @@ class DirectionTerm(Term):
             reference = reference[:, None]
         self.reference = self.numbers(reference, "reference", shape)
         self.spread(3 * shape[1])
-
-    def _turned(self, p: Array) -> Doubles:
-        """Return Rᵀr, shape (n, k, 3)."""
-        return np.asarray(np.einsum("nij,nki->nkj", self.body.matrices(p), self.reference))
-
-    def measure(self, motion: list[Motion], values: Values) -> Doubles:
-        return (self._turned(motion[0].p) - self.seen).reshape(len(self.times), -1)
+        self.arrays = [self.seen, self.reference]
 
     def informative(self, residuals: Doubles) -> Doubles:
         lengths, known = (np.linalg.norm(own, axis=-1) for own in (self.seen, self.reference))
@@ -353,63 +251,55 @@ class DirectionTerm(Term):
         flat = np.stack([(each * own).sum(axis=-1) for own in (first, second)], axis=-1)
         return flat.reshape(len(residuals), -1)
 
-    def derivatives(self, motion: list[Motion], values: Values) -> tuple[list[dict[int, Doubles]], dict[str, Doubles]]:
-        # δ(Rᵀr) = −η × Rᵀr.
-        (own,) = motion
-        turned = self._turned(own.p)
-        columns = [
-            np.cross(turned, self.body.rates(own.p, own.frames[:, j])[:, None]).reshape(len(self.times), -1)
-            for j in range(own.space.dim)
-        ]
-        return [{self.parts[0]: np.stack(columns, axis=-1)}, {}, {}], {}
-
 
 class ForceTerm(Term):
     """Accelerations without gravity in the frame of the body."""
 
-    nu = 2
+    sensor = "force"
 
     def __init__(self, label: str, given: SpecificForce, times: Doubles, parts: list[int]) -> None:
         super().__init__(label, given, times, parts)
         self.f = self.numbers(given.f, "f", (len(times), 3))
         self.gravity = self.numbers(given.gravity, "gravity", (3,))
-        self.bias = self.arm = None
-        self.fixed_arm: Doubles | None = None
+        bias = arm = None
+        fixed_arm = np.empty(0)
         if given.bias is not None:
-            self.bias = self.name(_of_size(given.bias, 3, f"{label}.bias"), "accelerometer bias")
+            bias = self.name(_of_size(given.bias, 3, f"{label}.bias"), "accelerometer bias")
         if isinstance(given.lever_arm, Constant):
-            self.arm = self.name(_of_size(given.lever_arm, 3, f"{label}.lever_arm"), "lever arm")
+            arm = self.name(_of_size(given.lever_arm, 3, f"{label}.lever_arm"), "lever arm")
         elif given.lever_arm is not None:
-            self.fixed_arm = self.numbers(given.lever_arm, "lever_arm", (3,))
+            fixed_arm = self.numbers(given.lever_arm, "lever_arm", (3,))
         self.spread(3)
-
-    def measure(self, motion: list[Motion], values: Values) -> Doubles:
-        turning, moving = motion
-        body = Body(turning.space)
-        read: Doubles = np.einsum("nij,ni->nj", body.matrices(turning.p), moving.a - self.gravity)
-        arm = self.fixed_arm if self.arm is None else values[self.arm]
-        if arm is not None:
-            omega, change = body.rates(turning.p, turning.v), body.rates(turning.p, turning.a)
-            read = read + np.cross(change, arm) + np.cross(omega, np.cross(omega, arm))
-        return (read if self.bias is None else read + values[self.bias]) - self.f
+        self.arrays, self.slots = [self.f, self.gravity, fixed_arm], [bias, arm]
 
 
 class FunctionTerm(Term):
     """Measurements given by a function of the user."""
 
-    def __init__(self, label: str, given: Function, times: Doubles, parts: list[int], space: Space[Any]) -> None:
-        super().__init__(label, given, times, parts)
-        self.function, self.nu, self.space = given.residual, given.nu, space
-        self.names = {key: self.name(own, key) for key, own in given.parameters.items()}
+    sensor = "function"
 
-    def measure(self, motion: list[Motion], values: Values) -> Doubles:
-        states = [
-            self._joined([(own.p, own.v, own.a)[nu] for own in motion], float(nu == 0)) for nu in range(self.nu + 1)
-        ]
-        if self.names:
-            states.append({key: values[name].copy() for key, name in self.names.items()})
+    def __init__(self, label: str, given: Function, times: Doubles, parts: list[int], spaces: Sequence[Space]) -> None:
+        super().__init__(label, given, times, parts)
+        self.residual, self.nu = given.residual, given.nu
+        # The space of the points that the function receives, and its parts.
+        self.space, *self.spaces = spaces
+        self.names = {key: self.name(own, key) for key, own in given.parameters.items()}
+        self.slots = list(self.names.values())
+
+    def function(self, columns: dict[str, slice]) -> tuple[Callable[..., Doubles], int]:
+        """Return the function that the core calls with the motion and all parameters, and its highest derivative."""
+
+        def whitened(states: list[list[Doubles]], values: Doubles) -> Doubles:
+            arguments: list[Any] = [self._joined(state, float(nu == 0)) for nu, state in enumerate(states)]
+            if self.names:
+                arguments.append({key: values[columns[name]].copy() for key, name in self.names.items()})
+            return np.ascontiguousarray(self._checked(self.residual(*arguments)) / self.noise)
+
+        return whitened, self.nu
+
+    def _checked(self, value: Any) -> Doubles:
         n = len(self.times)
-        found = np.asarray(self.function(*states))
+        found = np.asarray(value)
         if found.dtype.kind not in "iufb" or found.ndim not in (1, 2) or found.shape[0] != n:
             raise ValidationError(
                 f"{self.label}: the function returned {found.dtype} of shape {found.shape}, but real residuals of "
@@ -432,9 +322,10 @@ class FunctionTerm(Term):
         # Functions return 0 for samples without a measurement.
         return np.where(residuals == 0, np.nan, residuals)
 
-    def _joined(self, arrays: list[Array], corner: float) -> Any:
+    def _joined(self, state: list[Doubles], corner: float) -> Any:
         """Combine the arrays of all parts into those of the space."""
-        rest, found = list(arrays), []
+        rest = [space._numbers(own) for space, own in zip(self.spaces, state, strict=True)]
+        found = []
         for factor in factors_of(self.space):
             count = len(parts_of_factor(factor))
             found.append(join(factor, rest[:count], corner))
@@ -447,65 +338,26 @@ class Body:
 
     Attributes
     ----------
+    is_rotation : bool
+        Whether the components are those of an angular velocity.
     size : int
         Number of components.
+    inverse : ndarray, shape (size, numbers) or (0,)
+        Matrix that converts matrices g⁻¹g' to their coordinates in the frame at the identity; empty for rotations.
     """
 
     def __init__(self, space: Space) -> None:
         self.space = space
         self.is_rotation = space in (_SO3, _S3)
         self.size = 3 if self.is_rotation else space.dim
+        self.inverse: Doubles = np.empty(0)
         if not self.is_rotation:
-            n = space.point_shape[0]
-            self.identity = np.eye(n, dtype=space.dtype)
-            self.frame = space.frame(self.identity)
+            frame = space._as_doubles(space.frame(np.eye(space.point_shape[0], dtype=space.dtype)))
+            self.inverse = np.linalg.pinv(frame.reshape(self.size, -1).T)
 
     def matrices(self, p: Array) -> Doubles:
         """Return rotation matrices."""
         return p if self.space == _SO3 else quaternion_to_matrix(p, scalar_first=True)
-
-    def elements(self, p: Array, v: Array) -> Array:
-        """Return g⁻¹v: angular velocities, or matrices."""
-        if self.space == _SO3:
-            turned = np.swapaxes(p, -1, -2) @ v
-            return np.stack([turned[:, 2, 1], turned[:, 0, 2], turned[:, 1, 0]], axis=-1)
-        if self.space == _S3:
-            w, x = p[:, :1], p[:, 1:]
-            return np.asarray(2 * (w * v[:, 1:] - v[:, :1] * x - np.cross(x, v[:, 1:])))
-        return np.linalg.solve(p, v)
-
-    def bracket(self, a: Array, b: Array) -> Array:
-        """Return [a, b]."""
-        return np.asarray(np.cross(a, b) if self.is_rotation else a @ b - b @ a)
-
-    def of(self, element: Array) -> Doubles:
-        """Return the components of an element."""
-        if self.is_rotation:
-            return element
-        shape = (len(element), *self.frame.shape)
-        at = np.broadcast_to(self.identity, element.shape)
-        return coordinates(self.space, at, np.broadcast_to(self.frame, shape), element)
-
-    def rates(self, p: Array, v: Array) -> Doubles:
-        """Return the components of g⁻¹v."""
-        return self.of(self.elements(p, v))
-
-    def derivatives(self, p: Array, v: Array, frames: Array) -> tuple[Doubles, Doubles]:
-        """Return the derivatives of the rates with respect to the coordinates of a move, and their time derivatives.
-
-        With η = Σ ξ_j B_j, and B_j' = −[ω, B_j]/2 in parallel frames, δω = η' + [ω, η] = Σ ξ_j' B_j + ξ_j [ω, B_j]/2.
-        The columns of the second array are the B_j.
-        """
-        omega = self.elements(p, v)
-        vectors = [self.elements(p, frames[:, j]) for j in range(frames.shape[1])]
-        half = [0.5 * self.of(self.bracket(omega, vector)) for vector in vectors]
-        return np.stack(half, axis=-1), np.stack([self.of(vector) for vector in vectors], axis=-1)
-
-    def half_brackets(self, p: Array, frame: Array) -> Doubles:
-        """Return the matrices of ξ ↦ [e, ξ]/2 for the vectors e of a frame at p, in its coordinates."""
-        at = np.repeat(p[None], len(frame), axis=0)
-        halves, vectors = self.derivatives(at, frame, np.broadcast_to(frame, (len(frame), *frame.shape)))
-        return np.ascontiguousarray(np.linalg.solve(vectors, halves))
 
     def components(self, omega: Any, name: str, n: int) -> Doubles:
         """Return components from the user's angular velocities or matrices."""
@@ -514,7 +366,11 @@ class Body:
         vectors = self.space._numbers(self.space._doubles(omega, name))
         _exact(vectors, name, (n, *self.space.point_shape))
         refuse(~self.space._where_finite(vectors), name, lambda i: f"is not finite{SKIPNA}")
-        return self.of(vectors)
+        return _doubles(self.space, vectors).reshape(n, -1) @ self.inverse.T
+
+
+def _doubles(space: Space, rows: Array) -> Doubles:
+    return np.ascontiguousarray(space._as_doubles(rows))
 
 
 def _exact(value: Any, name: str, shape: tuple[int, ...]) -> Any:
@@ -548,8 +404,15 @@ def points_on(space: Space, y: Any, n: int, name: str) -> Array:
     return np.asarray(space.project(points))
 
 
-def bind(measurement: Measurement, label: str, times: Doubles, space: Space[Any]) -> list[Term]:
-    """Return the terms of a measurement on a space, after all checks."""
+def bind(measurement: Measurement, label: str, times: Doubles, space: Space[Any], loss: Loss = "linear") -> list[Term]:
+    """Return the terms of a measurement on a space, after all checks. `loss` is for measurements without their own."""
+    terms = _terms_of(measurement, label, times, space)
+    for term in terms:
+        term.loss = measurement.loss or loss
+    return terms
+
+
+def _terms_of(measurement: Measurement, label: str, times: Doubles, space: Space[Any]) -> list[Term]:
     factors = factors_of(space)
     counts = [len(parts_of_factor(factor)) for factor in factors]
     spaces = smoothed_spaces(space)
@@ -574,7 +437,7 @@ def bind(measurement: Measurement, label: str, times: Doubles, space: Space[Any]
                     return _points(measurement, label, times, spaces[part], [part])
         return _points(measurement, label, times, chosen, parts)
     if isinstance(measurement, Function):
-        return [FunctionTerm(label, measurement, times, parts, chosen)]
+        return [FunctionTerm(label, measurement, times, parts, [chosen, *own])]
     if isinstance(measurement, SpecificForce):
         turning = [part for part, each in zip(parts, own, strict=True) if each in (_SO3, _S3)]
         moving = [part for part, each in zip(parts, own, strict=True) if each == _R3]
@@ -655,12 +518,13 @@ def _points(given: Points, label: str, times: Doubles, space: Space[Any], parts:
             raise ValidationError(f"{label}.y has {len(rows)} points, but there are {n} times")
         good = points_on(own, rows[used], int(used.sum()), f"{label}.y")
         if information is not None:
-            term: Term = InformationTerm(label, given, times[used], part, good, *roots_of(information[used]))
-            term.noise = np.repeat(scale[used, None], own.dim, axis=1)
+            noise = np.repeat(scale[used, None], own.dim, axis=1)
+            roots = roots_of(information[used])
+            term: Term = InformationTerm(label, given, times[used], part, own, good, noise, *roots)
         else:
             weights = 1.0 if precisions is None else precisions[k].weights[used]
             noise = np.repeat((scale[used] / np.sqrt(weights))[:, None], own.dim, axis=1)
-            term = PointTerm(label, given, times[used], part, good, noise)
+            term = PointTerm(label, given, times[used], part, own, good, noise)
         term.rows = np.flatnonzero(used)
         terms.append(term)
     return terms

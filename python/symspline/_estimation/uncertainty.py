@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -13,15 +13,30 @@ from .._core import ValidationError
 from .._curves.at_times import call_at_times
 from .._smoothing import SmoothingSpline
 from .._smoothing.factors import smoothed_spaces, split
-from .._spaces import Doubles, factors_of
+from .._spaces import Array, Doubles, factors_of
 from .._splines.composed import SegmentedCurve
-from .along import Motion
 
 # The number of times whose covariances are in memory together.
 _TIMES = 4096
 # Derivatives of k numbers with respect to the move of a curve and its time derivatives, like those of a measurement:
 # for each order a dict from parts to arrays of shape (n, k, dim).
 Jacobians = list[dict[int, Doubles]]
+
+
+class Motion(NamedTuple):
+    """The motion of a curve in one space that is not a product, at n times.
+
+    Attributes
+    ----------
+    p, v : ndarray, shape (n, *point_shape)
+        Points and velocities.
+    frames : ndarray, shape (n, dim, *point_shape)
+        Frames along the curve.
+    """
+
+    p: Array
+    v: Array
+    frames: Array
 
 
 def check_uncertain(spline: Any) -> SmoothingSpline[Any, Any]:
@@ -103,7 +118,7 @@ def standard_errors(
 def _nothing(by_order: Jacobians, motion: Motion) -> Doubles:
     """Return derivatives of zero for a part on which nothing depends."""
     known = next(own for each in by_order for own in each.values())
-    return np.zeros((*known.shape[:-1], motion.space.dim))
+    return np.zeros((*known.shape[:-1], motion.frames.shape[1]))
 
 
 def _between_knots(
@@ -135,19 +150,10 @@ def _motions(spline: SmoothingSpline[Any, Any], times: Doubles, parts: list[int]
     for factor, curve in zip(factors_of(spline.space), spline._curve.parts, strict=True):
         velocities += split(factor, curve.evaluate(times, "velocity", "raise", per_curve))
     found = spline._frames(times, per_curve)
-    spaces, motions, first = smoothed_spaces(spline.space), [], 0
+    spaces, motions = smoothed_spaces(spline.space), []
     for part in parts:
         space, (p, frames) = spaces[part], found[part]
         shape = space.point_shape
-        motions.append(
-            Motion(
-                space,
-                first,
-                p.reshape(-1, *shape),
-                velocities[part].reshape(-1, *shape),
-                np.empty(0),
-                frames.reshape(-1, space.dim, *shape),
-            )
-        )
-        first += space.dim
+        rows = frames.reshape(-1, space.dim, *shape)
+        motions.append(Motion(p.reshape(-1, *shape), velocities[part].reshape(-1, *shape), rows))
     return motions
