@@ -43,7 +43,7 @@ from ._pose_files import (
     write_kitti,
     write_tum,
 )
-from ._smoothing.factors import smoothed_spaces
+from ._smoothing.noise import smoothed_spaces
 from ._spaces import Array, Euclidean, SpecialEuclidean, SpecialOrthogonal, cover_of
 from ._validation import one_of, real_numbers
 from .rotations import Spline, attitude, check_motion, rate_jacobians, rotation_of, turned

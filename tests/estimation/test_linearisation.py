@@ -8,7 +8,7 @@ import symspline as ss
 from symspline import measure
 from symspline._estimation.solve import Iteration, Setup
 from symspline._estimation.terms import Body, bind
-from symspline._smoothing.factors import smoothed_spaces
+from symspline._smoothing.noise import smoothed_spaces
 
 KNOTS = np.array([0, 0.7, 1.1, 2.3, 3.0, 3.9, 4.2, 5.5, 6.0])
 GROUPS = ["so:3", "sphere:3", "su:2", "so:4", "u:2", "gl:2", "aff:2", "o:3"]

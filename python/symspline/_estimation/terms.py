@@ -12,9 +12,8 @@ from .._base.arrays import as_array, refuse
 from .._core import ValidationError
 from .._curves.fit import read
 from .._smoothing.audit import roots_of
-from .._smoothing.factors import join, parts_of_factor, smoothed_spaces, split
+from .._smoothing.noise import join, parts_of_factor, read_precision, smoothed_spaces, split
 from .._smoothing.posterior import coordinates
-from .._smoothing.precision import read_precision
 from .._spaces import (
     Array,
     Doubles,

@@ -9,7 +9,7 @@ import numpy as np
 
 from .._base.report import long_gaps
 from .._smoothing import SmoothingReport, SmoothingSpline
-from .._smoothing.factors import is_several, smoothed_spaces
+from .._smoothing.noise import is_several, smoothed_spaces
 from .._spaces import Doubles
 from .._splines.cubic import CubicSpline
 
