@@ -81,6 +81,7 @@ impl AtData<'_> {
     /// their neighbours, divided by their variances for noise of variance one at weight one. They are NaN for data
     /// without weight; deviations also at the ends.
     pub fn residuals(&self, space: &Erased) -> [Vec<f64>; 2] {
+        checkpoint();
         let (n, len, m) = (self.times.len(), space.point_len(), space.dim());
         let row = |rows: &'_ [f64], i: usize| rows[i * len..][..len].iter().all(|x| x.is_finite());
         let used: Vec<usize> =
@@ -234,6 +235,7 @@ pub fn is_constant(
     [knots, energy]: [&[f64]; 2],
     m: usize,
 ) -> Option<[Unequal; 2]> {
+    checkpoint();
     let used: Vec<usize> = (0..times.len()).filter(|&i| weights[i] > 0.0).collect();
     let weighted = |x: &[f64]| used.iter().map(|&i| weights[i] * x[i]).collect::<Vec<f64>>();
     let (times, leverages, squares) =

@@ -8,6 +8,7 @@ use crate::chi;
 use crate::gaps::{Functionals, Predictions, System};
 use crate::variance::functional_at;
 use std::ops::Range;
+use symspline_core::monitor::checkpoint;
 
 /// Omitted data count only where their variance exceeds this multiple of that at data. The posterior is right at the edges
 /// of a block, which would hide errors inside.
@@ -115,6 +116,7 @@ pub fn factor_of(predictions: &[Predicted], m: usize, disjoint: f64) -> f64 {
         high = 0.0;
     }
     let plain = chi::quantile(m, LEVEL);
+    checkpoint();
     let independent = disjoint.min(count).round_ties_even().max(1.0) as usize;
     let spread = (chi::ratio_quantile(m, m * independent, LEVEL) / plain).sqrt();
     // The factor for which the bands contain the required share of the errors. It protects against bursts.
@@ -353,10 +355,8 @@ impl Gaps<'_> {
         let shortest = lengths.iter().copied().fold(f64::INFINITY, f64::min);
         let longest = lengths.iter().copied().fold(0.0, f64::max);
         let steps = LENGTHS.min(((longest / shortest).log2() - 1e-9).ceil() as usize + 1);
-        let mut ladder: Vec<f64> = evenly(shortest.log10(), longest.log10(), steps)
-            .into_iter()
-            .map(|x| 10f64.powf(x))
-            .collect();
+        let mut ladder: Vec<f64> =
+            evenly(shortest.log10(), longest.log10(), steps).into_iter().map(|x| 10f64.powf(x)).collect();
         ladder[0] = shortest;
         ladder[steps - 1] = longest;
         let known = |length: f64| self.factor(length).map(|(factor, blocks)| (length, factor, blocks));

@@ -376,14 +376,14 @@ impl Examined<'_> {
                 .map(Complaint::Bypassed)
                 .or_else(|| found.failed().then_some(Complaint::Estimated(found)));
         };
-        let sizes = || self.rows.chunks_exact(d).map(|row| largest_component(row) / sigma).collect::<Vec<f64>>();
+        let sizes =
+            || self.rows.chunks_exact(d).map(|row| largest_component(row) / sigma).collect::<Vec<f64>>();
         if let Some(part) = robust.then(|| self.data.bypassed(space, &sizes())).flatten() {
             return Some(Complaint::Bypassed(part));
         }
         let known = self.rows.chunks_exact(d).filter(|row| any_known(row));
         let rows: Vec<f64> = known.flatten().map(|x| x / sigma).collect();
-        let given =
-            Residuals { rows: &rows, d, leverage: self.leverage, between: 0.0, corner, exact: true };
+        let given = Residuals { rows: &rows, d, leverage: self.leverage, between: 0.0, corner, exact: true };
         Some(given.examine()).filter(Finding::failed).map(Complaint::Given)
     }
 }

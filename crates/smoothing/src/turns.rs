@@ -129,8 +129,10 @@ fn modes(vectors: &[f64], size: usize, window: usize) -> Vec<f64> {
             }
         }
         let (radius, centre) = centre;
-        let near: Vec<&&[f64]> =
-            (0..window).filter(|b| apart[centre * window + b] <= 2.0 * radius + 1e-12).map(|b| &rows[b]).collect();
+        let near: Vec<&&[f64]> = (0..window)
+            .filter(|b| apart[centre * window + b] <= 2.0 * radius + 1e-12)
+            .map(|b| &rows[b])
+            .collect();
         out.extend((0..size).map(|c| near.iter().map(|row| row[c]).sum::<f64>() / near.len() as f64));
     }
     out

@@ -295,9 +295,8 @@ pub fn smoothing_variance<'py>(
     let (knots, x) = (Rows::of(&knots)?, Rows::of(&x)?);
     let shape = [batch, &[x.size]].concat();
     let (band, lam) = (in_order(&band)?, in_order(&lam)?);
-    let of = |c: usize| {
-        variance_at(knots.of_curve(c), &band[c * size..][..size], lam[c], ends, x.of_curve(c), nu)
-    };
+    let of =
+        |c: usize| variance_at(knots.of_curve(c), &band[c * size..][..size], lam[c], ends, x.of_curve(c), nu);
     let heavy = is_long(curves * (knots.size + x.size));
     let found = watched(py, None, curves, heavy, |_| (0..curves).flat_map(of).collect::<Vec<f64>>())?;
     let out = zeros(py, &shape)?;
@@ -405,12 +404,8 @@ pub fn examine(
 
 /// The curve, and one of: the part that the loss bypasses; the finding for a given σ; ratio, correlation, outliers and run
 /// for an estimated σ, see [`Estimated`].
-type Complained = (
-    usize,
-    Option<[usize; 2]>,
-    Option<Found>,
-    Option<(f64, f64, (usize, usize, f64), Option<[usize; 2]>)>,
-);
+type Complained =
+    (usize, Option<[usize; 2]>, Option<Found>, Option<(f64, f64, (usize, usize, f64), Option<[usize; 2]>)>);
 
 /// Examines the residuals of curves: their data as for [`residuals_at`], residuals and deviations as it returns them,
 /// scaled to weight one, leverages, and σ, which is NaN where it is estimated. Returns the curves that failed a test.

@@ -40,6 +40,11 @@ class FarPointsWarning(UserWarning):
     """
 
 
+def columns_of(kind: type) -> dict[str, type]:
+    """Return the fields of a report that have one value per curve, and their types, in their order."""
+    return {own.name: own.metadata["dtype"] for own in fields(kind) if "dtype" in own.metadata}
+
+
 class FitReport:
     """Base of reports, dataclasses whose fields have one value per curve or describe all curves."""
 
@@ -79,7 +84,7 @@ class FitReport:
         >>> bool(curves.report.map(lambda field: field[0]).iterations == curves[0].report.iterations)
         True
         """
-        values = {own.name: getattr(self, own.name) for own in fields(self) if "dtype" in own.metadata}  # type: ignore[arg-type]
+        values = {name: getattr(self, name) for name in columns_of(type(self))}
         return self._replaced({name: value if value is None else function(value) for name, value in values.items()})
 
     def _replaced(self, columns: dict[str, Any]) -> Self:

@@ -13,11 +13,12 @@ from .._base.arrays import short_repr
 from .._base.faults import of_index
 from .._base.warnings import is_silent, warn
 from .._curves.curve import CurveArrays
+from .._curves.ends import end_kinds
 from .._spaces import Array, Doubles, Space, factors_of
-from .data import SmoothingData
-from .noise import grouped, in_part, is_several, smoothed_spaces
+from .data import Part, SmoothingData
+from .noise import distances_of, grouped, in_part, is_several, smoothed_spaces, split
 from .report import SmoothingReport, SmoothingWarning
-from .solve import FAST, NOISY, TWO, UNIQUE, Smoothed
+from .solve import FAST, NOISY, TWO, UNIQUE, Found, Smoothed
 
 # Quantiles of χ² at which the losses begin to grow more slowly, as in `loss.rs`.
 _CORNERS = {"huber": 0.82, "cauchy": 0.95}
@@ -58,6 +59,8 @@ class Fitted(NamedTuple):
         Data, and points of the curves at their times.
     smoothed : Smoothed
         Result of the smoothing.
+    converged, df : ndarray
+        Fields of its report.
     loss : str
         Loss of the data.
     chosen, given : ndarray of bool
@@ -72,6 +75,8 @@ class Fitted(NamedTuple):
     points: Array
     at: Array
     smoothed: Smoothed
+    converged: NDArray[np.bool_]
+    df: Doubles
     loss: str
     chosen: NDArray[np.bool_]
     given: NDArray[np.bool_]
@@ -79,21 +84,44 @@ class Fitted(NamedTuple):
     rejected: NDArray[np.int_]
     minimum: NDArray[np.int_]
 
-    def report(self, name: str) -> NDArray[Any]:
-        """Return a field of the report as an array with the batch axes."""
-        return np.asarray(getattr(self.smoothed.report, name))
 
-
-def audit(space: Space[Any], noisy: SmoothingData, curve: CurveArrays, fits: list[Fitted], kinds: Any) -> None:
-    """Issue at most one warning of each kind about the fits in all spaces in which data were smoothed.
+def audit(
+    spline: Any, parts: list[Part], found: list[Found], good: NDArray[np.bool_], choices: NDArray[np.bool_]
+) -> None:
+    """Issue at most one warning of each kind about smoothing splines.
 
     Parameters
     ----------
-    curve : CurveArrays
-        The curves.
-    kinds : list of str or None
-        Kinds of the ends.
+    spline : SmoothingSpline
+        The splines.
+    parts, found : list
+        Data and results in every space in which data were smoothed, with the batch axes.
+    good : ndarray of bool
+        Which curves are not masked.
+    choices : ndarray of bool
+        Which curves have a λ to choose.
     """
+    space, noisy, batch = spline.space, spline._noisy, spline._noisy.batch
+    at_data = [
+        rows
+        for factor, curve in zip(factors_of(space), spline._curve.parts, strict=True)
+        for rows in split(factor, curve.evaluate(noisy.times, "point", "raise", noisy.times.ndim > 1))
+    ]
+    fits = [
+        Fitted(
+            part.space,
+            part.points,
+            rows,
+            smoothed,
+            np.asarray(smoothed.report.converged),
+            np.asarray(smoothed.report.df),
+            part.noise.loss,
+            np.isnan(part.lam).reshape(batch) & choices,
+            np.isfinite(part.noise.sigma).reshape(batch) & good,
+            *[np.reshape(column, batch) for column in (own.selection, own.rejected, own.minima)],
+        )
+        for part, rows, smoothed, own in zip(parts, at_data, spline._smoothed, found, strict=True)
+    ]
     counts = [np.sum(noise.weights > 0, axis=-1) for noise in noisy.noise]
     _warn_of_outliers(space, fits, counts)
     _warn_of_minima(space, fits)
@@ -102,19 +130,19 @@ def audit(space: Space[Any], noisy: SmoothingData, curve: CurveArrays, fits: lis
     if not is_silent(SmoothingWarning):
         _warn_of_residuals(space, noisy, fits)
         if fits[0].smoothed.penalty == "acceleration" and noisy.times.shape[-1] >= _DATA:
-            _warn_of_varying(space, noisy, curve, fits, kinds)
+            _warn_of_varying(space, noisy, spline._curve, fits, end_kinds(spline._bc_type))
     _warn_of_spread(noisy, fits)
 
 
 def _first(space: Space, affected: list[NDArray[np.bool_]], mark: str = "") -> tuple[int, tuple[int, ...], str] | None:
     """Return the first of the affected curves: its part, its index, and words that name it and count the others."""
-    total = sum(int(np.count_nonzero(own)) for own in affected)
-    for number, own in enumerate(affected if total else ()):
-        if own.any():
-            index = tuple(map(int, np.argwhere(own)[0]))
-            more = f" (and {total - 1} more)" if total > 1 else ""
-            return number, index, of_index(index) + in_part(space, number, mark) + more
-    return None
+    counts = [int(np.count_nonzero(own)) for own in affected]
+    if not any(counts):
+        return None
+    number = counts.index(next(filter(None, counts)))
+    index = tuple(map(int, np.argwhere(affected[number])[0]))
+    more = f" (and {sum(counts) - 1} more)" if sum(counts) > 1 else ""
+    return number, index, of_index(index) + in_part(space, number, mark) + more
 
 
 # ---- data that a robust loss rejects ----
@@ -123,12 +151,15 @@ def _first(space: Space, affected: list[NDArray[np.bool_]], mark: str = "") -> t
 def _warn_of_outliers(space: Space, fits: list[Fitted], counts: list[Any]) -> None:
     """Warn if the data that were rejected from a curve may be the wrong ones."""
     # Data without noise, such as those of a body at rest, contain no outliers.
-    bad = [(f.selection != 0) & f.report("converged") & ((f.rejected != 0) | (f.report("sigma") > 0)) for f in fits]
+    bad = [
+        (fit.selection != 0) & fit.converged & ((fit.rejected != 0) | (np.asarray(fit.smoothed.report.sigma) > 0))
+        for fit in fits
+    ]
     if not (first := _first(space, bad)):
         return
     number, index, of = first
     fit = fits[number]
-    kind, rejected, df = int(fit.selection[index]), int(fit.rejected[index]), float(fit.report("df")[index])
+    kind, rejected, df = int(fit.selection[index]), int(fit.rejected[index]), float(fit.df[index])
     count = int(np.broadcast_to(counts[number], bad[number].shape)[index])
     what = f"The smoothing{of} with loss={fit.loss!r}"
     if kind == _INTERPOLATED:
@@ -163,9 +194,9 @@ def _warn_of_outliers(space: Space, fits: list[Fitted], counts: list[Any]) -> No
 
 def _warn_of_minima(space: Space, fits: list[Fitted]) -> None:
     """Warn if a curve may not be the one with the least objective."""
-    if first := _first(space, [(fit.minimum != UNIQUE) & fit.report("converged") for fit in fits], ","):
+    if first := _first(space, [(fit.minimum != UNIQUE) & fit.converged for fit in fits], ","):
         number, index, of = first
-        noise = f"{float(fits[number].report('sigma')[index]):.2g}"
+        noise = f"{float(np.asarray(fits[number].smoothed.report.sigma)[index]):.2g}"
         message = _MINIMA[int(fits[number].minimum[index])]
         warn(message.format(of=of, noise=noise, space=smoothed_spaces(space)[number]), SmoothingWarning, index)
 
@@ -267,7 +298,7 @@ class Residuals(NamedTuple):
 
 
 class Finding(NamedTuple):
-    """The result of the examination of one sensor, as `examine.rs` describes it."""
+    """The result of the examination of one sensor, as `smoothing/src/examine.rs` describes it."""
 
     ratio: float
     freedom: float
@@ -354,7 +385,7 @@ def _warn_of_residuals(space: Space, noisy: SmoothingData, fits: list[Fitted]) -
     """
     found: list[tuple[tuple[int, ...], str]] = []
     for number, fit in enumerate(fits):
-        curves = np.flatnonzero(fit.report("converged") & (fit.given | fit.chosen))
+        curves = np.flatnonzero(fit.converged & (fit.given | fit.chosen))
         of_part = in_part(space, number, ",")
         for curve, facts in _complaints(noisy, number, fit, curves) if len(curves) else ():
             index = tuple(map(int, np.unravel_index(curve, noisy.batch)))
@@ -374,8 +405,8 @@ def _complaints(noisy: SmoothingData, number: int, fit: Fitted, curves: NDArray[
         rows: Array = np.broadcast_to(array, (*noisy.batch, n, *axes)).reshape(-1, n, *axes)[curves]
         return rows
 
-    x, y = (space._as_doubles(of_curves(points, space.point_shape)) for points in (fit.at, fit.points))
-    data = [of_curves(noisy.times), x, y, of_curves(noise.weights)]
+    points = [space._as_doubles(of_curves(points, space.point_shape)) for points in (fit.at, fit.points)]
+    data = [of_curves(noisy.times), *points, of_curves(noise.weights)]
     rows, deviations = _core.residuals_at(space._handle, *data)
     if noise.information is None:
         rows *= np.sqrt(data[-1])[..., None]
@@ -384,11 +415,10 @@ def _complaints(noisy: SmoothingData, number: int, fit: Fitted, curves: NDArray[
         roots, known = roots_of(of_curves(noise.information, (space.dim, space.dim))[used])
         rows[used] = np.where(known, np.einsum("nij,nj->ni", roots, rows[used]), np.nan)
     used = np.isfinite(rows).any(axis=-1)
-    df, sigma = (np.ravel(value)[curves] for value in (fit.report("df"), fit.smoothed.sigma))
-    leverage = np.minimum(df / np.maximum(used.sum(axis=-1), 1), 1.0)
+    leverage = np.minimum(np.ravel(fit.df)[curves] / np.maximum(used.sum(axis=-1), 1), 1.0)
     loss = fit.loss
     corner = None if loss == "linear" else corner_of(loss, space.dim)
-    given = np.where(np.ravel(fit.given)[curves], sigma, np.nan)
+    given = np.where(fit.given, fit.smoothed.sigma, np.nan).ravel()[curves]
     found = _core.examine_curves(space._handle, data, rows, deviations, leverage, given, corner)
     return [(int(curves[k]), _described(np.flatnonzero(used[k]), *result)) for k, *result in found]
 
@@ -518,7 +548,7 @@ def _warn_of_varying(
         # The acceleration of a pose is not that of its rotation and position.
         if more or noise.information is not None:
             continue
-        good = fit.report("converged") & ~fit.report("at_bound") & (fit.report("df") > _FREEDOM) & fit.chosen
+        good = fit.converged & ~np.asarray(fit.smoothed.report.at_bound) & (fit.df > _FREEDOM) & fit.chosen
         curves = np.flatnonzero(good)
         if not len(curves):
             continue
@@ -600,11 +630,11 @@ def _warn_of_spread(noisy: SmoothingData, fits: list[Fitted]) -> None:
         counts = np.broadcast_to(counts, (*noisy.batch, noisy.times.shape[-1]))
         used = counts[some] & fit.space._where_finite(fit.at[some])
         distances = np.full(used.shape, np.nan)
-        distances[used] = fit.space._apply("distance", p=fit.at[some][used], q=fit.points[some][used])
+        distances[used] = distances_of(fit.space, fit.at[some][used], fit.points[some][used])
         # Curves that failed have the distance 0.
         distances[~used.any(axis=-1)] = 0.0
         found = np.asarray(np.nanmedian(distances, axis=-1))
-        far = np.argwhere(is_far(found, expected, np.sum(counts, axis=-1), fit.report("df")))
+        far = np.argwhere(is_far(found, expected, np.sum(counts, axis=-1), fit.df))
         if len(far):
             index = tuple(map(int, far[0]))
             more = f" (and {len(far) - 1} more curves)" if len(far) > 1 else ""

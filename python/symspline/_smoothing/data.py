@@ -20,7 +20,7 @@ from .._curves.options import with_atol
 from .._missing import refuse_nan_times
 from .._spaces import Array, Doubles, Space, factors_of
 from .._validation import one_of
-from .noise import Noise, grouped, per_part, read_precision, smoothed_spaces, split
+from .noise import Noise, grouped, parts_of_factor, per_part, read_precision, split
 
 # The cube of the time between the first and the last datum must not overflow.
 _LONGEST = 1e100
@@ -242,8 +242,11 @@ def _too_few(weights: Doubles, batch: tuple[int, ...], number: int) -> str:
 
 def points_of(noisy: SmoothingData, space: Space) -> list[tuple[Space, Array]]:
     """Return every space in which data are smoothed, with its points."""
-    points = [own for pair in zip(factors_of(space), noisy.points, strict=True) for own in split(*pair)]
-    return list(zip(smoothed_spaces(space), points, strict=True))
+    return [
+        pair
+        for factor, points in zip(factors_of(space), noisy.points, strict=True)
+        for pair in zip(parts_of_factor(factor), split(factor, points), strict=True)
+    ]
 
 
 class Part(NamedTuple):
@@ -273,6 +276,11 @@ class Part(NamedTuple):
     def axis(self) -> int:
         """The axis of the data among those of the points."""
         return self.points.ndim - len(self.space.point_shape) - 1
+
+    def map(self, function: Callable[[Any], Any], noise: Noise) -> Part:
+        """Apply a function to the arrays, such as one that adds masked curves, and replace the noise."""
+        ends = map_ends(self.ends, function)
+        return Part(self.space, function(self.points), noise, function(self.lam), ends)
 
     def rows(self, index: NDArray[np.intp]) -> Part:
         """Return some of the data of each curve, with natural ends."""

@@ -1,7 +1,7 @@
 """Calibrate bands in long gaps and beyond the ends of the data.
 
 The posterior standard deviation is too small where there are no data. Parts of the recording as long as the gap are
-predicted without their data, and the errors of these predictions determine a factor; see `calibrate.rs`.
+predicted without their data, and the errors of these predictions determine a factor; see `smoothing/src/calibrate.rs`.
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@ from functools import partial
 from typing import Any, Unpack, overload
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from .._base.arrays import checked_flag, checked_number, short_repr, whole_number
 from .._base.typing import (
@@ -29,9 +29,9 @@ from .._base.typing import (
     TimesLike,
 )
 from .._core import ValidationError
-from .._curves.ends import End, end_kinds, freeze_bc_type, is_closed, map_ends
+from .._curves.ends import End, freeze_bc_type, is_closed
 from .._curves.failures import raise_or_warn
-from .._curves.fit import Points, Problem, fit, mask_of
+from .._curves.fit import Fit, Points, Problem, fit, mask_of
 from .._curves.held import warn_of_held_points
 from .._curves.options import check_on_failure, check_progress, checked_extrapolate
 from .._curves.representatives import warn_of_far_data, warn_of_far_points, warn_of_signs
@@ -39,10 +39,10 @@ from .._curves.solve import DEFAULTS, in_batch
 from .._missing import counts_all_samples, data_without_missing, missing_named
 from .._spaces import Array, Doubles, Product, Space, SpecialEuclidean, factors_of, space_named
 from ..manifolds._manifold import refuse_functions
-from .audit import Fitted, audit
-from .data import Part, SmoothingData, checked_ends, parts_of, points_of, read_noisy, valid_curves
+from .audit import audit
+from .data import Part, SmoothingData, checked_ends, parts_of, read_noisy, valid_curves
 from .knots import NO_CURVE, Knots, geodesic_knots, has_all_times, in_gaps, in_long_gaps, knots_for, with_enough_knots
-from .noise import grouped, join, parts_of_factor, per_part, smoothed_spaces, split, split_ends
+from .noise import grouped, join, parts_of_factor, per_part, smoothed_spaces, split_ends
 from .report import SmoothingReport, SmoothingWarning
 from .solve import Found, Smoothed, SolverOptions, smoothed
 from .spline import SmoothingSpline
@@ -307,7 +307,7 @@ def make_smoothing_spline(
         if needs and every.times.shape[-1] < 4:
             raise ValidationError(f"{what} needs at least 4 knots, but there are {every.times.shape[-1]}. {remedy}")
     # A geodesic has no freedom between its knots.
-    geodesics = is_infinite(lams)
+    geodesics = lams[0].size > 0 and bool(np.isinf(lams).all())
     free = not geodesics and (knots is None or has_all_times(every, noisy))
 
     def run(at: Knots, raise_lam: bool = False) -> list[Found]:
@@ -332,66 +332,61 @@ def make_smoothing_spline(
     else:
         found, at = run(every), every
 
-    spread = partial(in_batch, batch, chosen)
-    transported = [transport_end_velocities(part, own.points) for part, own in zip(parts, found, strict=True)]
-    # Points of masked curves are NaN.
+    whole, good = whole._replace(points=noisy.points), np.ones(batch, bool)
     if chosen is not None:
-        found = [own.map(spread) for own in found]
-        lams, noisy = [spread(lam) for lam in lams], noisy._replace(points=[spread(own) for own in noisy.points])
-    noise = [own._replace(sigma=None) for own in whole.noise]
-    kept_data = whole._replace(points=noisy.points, noise=noise)
-    problem, conditions = [], []
-    for factor, of_points, of_ends in zip(factors, grouped(space, found), grouped(space, transported), strict=True):
-        rows = join(factor, [own.points for own in of_points])
-        problem.append(Points(np.ascontiguousarray(factor._as_doubles(rows)), 0.0, batch, at.times.shape[-1]))
-        conditions.append(_joined(factor, of_ends if chosen is None else [map_ends(one, spread) for one in of_ends]))
-    good = None if chosen is None else spread(np.ones(len(chosen), bool))
-    fitted = fit(Problem(space, at.times, problem, conditions, DEFAULTS, check=False, mask=good))
-    results = [with_infinite_lam(own.smoothed, lam, batch) for own, lam in zip(found, lams, strict=True)]
-    kept = _conditions(bc_type, conditions, space)
-    spline = SmoothingSpline._of(
-        whole.time_axis, at.t, fitted.curve, kept, policy, fitted.reports(), kept_data, results
-    )
+        # Points of masked curves are NaN.
+        spread = partial(in_batch, batch, chosen)
+        good, found = spread(good.ravel()[chosen]), [own.map(spread) for own in found]
+        whole = whole._replace(points=[spread(own) for own in noisy.points])
+        parts = [part.map(spread, noise) for part, noise in zip(parts, whole.noise, strict=True)]
+    spline, fitted = _spline_through(whole, space, parts, found, at, good, bc_type, policy)
     faults += [
         fault if chosen is None else fault._replace(curve=int(chosen[fault.curve]))
         for fault in next((own.faults for own in found if own.faults), [])
     ]
     valid_data = [
-        Points(one._as_doubles(own), 0.0, batch, whole.times.shape[-1])
-        for one, own in zip(factors, kept_data.points, strict=True)
+        Points(factor._as_doubles(own), 0.0, batch, whole.times.shape[-1])
+        for factor, own in zip(factors_of(space), spline._noisy.points, strict=True)
     ]
     # Errors that this data cause do not show the reason.
     far_data = warn_of_far_data(space, valid_data)
     if faults:
         raise_or_warn(sorted(faults, key=lambda fault: fault.curve), on_failure, spline)
-    at_data = [
-        rows
-        for factor, part in zip(factors, fitted.curve.parts, strict=True)
-        for rows in split(factor, part.evaluate(whole.times, "point", "raise", whole.times.ndim > 1))
-    ]
     # Between two knots there is nothing to choose. Masked curves are not examined.
-    unknown = good if good is not None else np.ones(batch, bool)
-    fits = [
-        Fitted(
-            *pair,
-            rows,
-            result,
-            given.loss,
-            np.isnan(lam).reshape(batch) & unknown & (at.times.shape[-1] > 2),
-            np.isfinite(given.sigma).reshape(batch) & unknown,
-            *(np.reshape(column, batch) for column in (own.selection, own.rejected, own.minima)),
-        )
-        for pair, rows, result, lam, given, own in zip(
-            points_of(kept_data, space), at_data, results, lams, whole.noise, found, strict=True
-        )
-    ]
-    audit(space, kept_data, fitted.curve, fits, end_kinds(bc_type))
+    audit(spline, parts, found, good, good & (at.times.shape[-1] > 2))
     warn_of_signs(space, [valid_data])
     if whole.used.all():
-        warn_of_held_points(whole.times, kept_data.points, batch, SmoothingWarning)
+        warn_of_held_points(whole.times, spline._noisy.points, batch, SmoothingWarning)
     if not far_data:
         warn_of_far_points([fitted.curve], [fitted.columns])
     return spline
+
+
+def _spline_through(
+    whole: SmoothingData,
+    space: Space,
+    parts: list[Part],
+    found: list[Found],
+    at: Knots,
+    good: NDArray[np.bool_],
+    bc_type: Any,
+    policy: Extrapolate,
+) -> tuple[SmoothingSpline[Any, Any], Fit]:
+    """Return the spline through smooth points, and its fit. Curves where `good` is False are masked."""
+    batch, factors = whole.batch, factors_of(space)
+    ends = [transport_end_velocities(part, own.points) for part, own in zip(parts, found, strict=True)]
+    points, conditions = [], []
+    for factor, of_points, of_ends in zip(factors, grouped(space, found), grouped(space, ends), strict=True):
+        rows = join(factor, [own.points for own in of_points])
+        points.append(Points(np.ascontiguousarray(factor._as_doubles(rows)), 0.0, batch, at.times.shape[-1]))
+        conditions.append(_joined(factor, of_ends))
+    mask = None if good.all() else good
+    fitted = fit(Problem(space, at.times, points, conditions, DEFAULTS, check=False, mask=mask))
+    noise = [own._replace(sigma=None) for own in whole.noise]
+    results = [with_infinite_lam(own.smoothed, part.lam, batch) for own, part in zip(found, parts, strict=True)]
+    noisy, kept = whole._replace(noise=noise), _conditions(bc_type, conditions, space)
+    made = whole.time_axis, at.t, fitted.curve, kept, policy, fitted.reports(), noisy, results
+    return SmoothingSpline._of(*made), fitted
 
 
 @overload
@@ -532,14 +527,9 @@ def _conditions(bc_type: Any, transported: list[list[End] | None], space: Space)
 # ---- geodesic regression: an infinite λ ----
 
 
-def is_infinite(lams: list[Doubles]) -> bool:
-    """Whether all curves are geodesics."""
-    return all(np.isinf(lam).all() and lam.size for lam in lams)
-
-
 def check_infinite(lams: list[Doubles], bc_type: Any, penalty: str) -> None:
     """Raise ValidationError if λ is infinite where the curve is not a geodesic."""
-    if not any(np.isinf(lam).any() for lam in lams):
+    if not np.isinf(lams).any():
         return
     for name, value, required in (("penalty", penalty, "acceleration"), ("bc_type", bc_type, "natural")):
         if value != required:

@@ -71,6 +71,8 @@ def in_part(space: Space[Any], number: int, mark: str = "") -> str:
 
 def grouped(space: Space[Any], values: Iterable[_T]) -> list[list[_T]]:
     """Group values of the smoothed spaces by factor."""
+    if not is_several(space):
+        return [list(values)]
     rest = iter(values)
     return [list(islice(rest, 2 if isinstance(factor, SpecialEuclidean) else 1)) for factor in factors_of(space)]
 
@@ -108,6 +110,12 @@ def split_ends(space: Space, ends: list[End] | None) -> list[list[End] | None]:
         ]
         for i, part in enumerate(parts)
     ]
+
+
+def distances_of(space: Space, p: Array, q: Array) -> Doubles:
+    """Return the distances of rows of points, without checks."""
+    doubles = [np.ascontiguousarray(space._as_doubles(np.ascontiguousarray(own))) for own in (p, q)]
+    return space._handle.apply("distance", doubles)
 
 
 def coordinates_in_parts(space: Space, points: Array) -> Array:
@@ -390,9 +398,10 @@ def per_part(space: Space, value: Any, name: str, batch: tuple[int, ...], infini
         If the value is not a number >= 0, which may be infinite if `infinite` is True, an array with one per curve, or
         for products and poses a tuple of these.
     """
-    spaces = smoothed_spaces(space)
     if not (isinstance(value, tuple) and is_several(space)):
-        return [_one_per_curve(value, name, batch, infinite)] * len(spaces)
+        count = sum(map(len, map(parts_of_factor, factors_of(space)))) if is_several(space) else 1
+        return [_one_per_curve(value, name, batch, infinite)] * count
+    spaces = smoothed_spaces(space)
     if len(value) != len(spaces):
         raise ValidationError(
             f"`{name}` has {len(value)} entries, but there are {len(spaces)} parts to smooth: "

@@ -20,7 +20,6 @@ from .._base.report import long_gaps
 from .._base.typing import Progress
 from .._core import ValidationError
 from .._curves.reduced import reduced
-from .._curves.representatives import cut_fractions
 from .._spaces import (
     Array,
     ComplexGrassmannian,
@@ -405,11 +404,12 @@ def _apart(space: Space, p: Doubles, q: Doubles) -> Doubles:
 
 def _median_steps(space: Space, data: Samples) -> Doubles:
     """Return the median step of every curve, as a fraction of the distance to the cut locus."""
-    fractions = cut_fractions(space, data.points)
-    rows = fractions.reshape(-1, fractions.shape[-1])
+    points, axis = data.points, data.points.ndim - data.axes - 1
+    neighbours = [np.ascontiguousarray(own) for own in space._neighbours(space._as_doubles(points))]
+    rows = space._handle.apply("cut_fraction", neighbours).reshape(-1, points.shape[axis] - 1)
     if data.weights.all() and np.isfinite(rows).all():
         return np.asarray(np.median(rows, axis=-1))
-    weights = np.broadcast_to(data.weights, (*data.points.shape[: fractions.ndim - 1], data.weights.shape[-1]))
+    weights = np.broadcast_to(data.weights, (*points.shape[:axis], data.weights.shape[-1]))
     used = weights.reshape(len(rows), -1) > 0
     rows = np.where(used[:, 1:] & used[:, :-1], rows, np.nan)
     known = np.isfinite(rows).any(axis=-1)

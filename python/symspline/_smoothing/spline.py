@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from functools import cached_property, partial
 from operator import itemgetter
-from typing import TYPE_CHECKING, Any, Generic, Self, overload
+from typing import TYPE_CHECKING, Any, Concatenate, Generic, ParamSpec, Self, overload
 
 import numpy as np
 
@@ -57,11 +57,33 @@ if TYPE_CHECKING:
 
         def __get__(self, spline: SmoothingSpline[Any, Any], owner: Any = None) -> Any: ...
 
+    Q = ParamSpec("Q")
+
+    class noise_method(Generic[Q]):
+        """A method that returns an array for one report, and a tuple of them for several."""
+
+        def __init__(self, method: Callable[Concatenate[Any, Q], Any]) -> None: ...
+
+        @overload
+        def __get__(
+            self, spline: SmoothingSpline[Any, SmoothingReport], owner: Any = None
+        ) -> Callable[Q, FloatArray]: ...
+
+        @overload
+        def __get__(
+            self, spline: SmoothingSpline[Any, tuple[SmoothingReport, ...]], owner: Any = None
+        ) -> Callable[Q, tuple[FloatArray, ...]]: ...
+
+        def __get__(self, spline: SmoothingSpline[Any, Any], owner: Any = None) -> Callable[Q, Any]: ...
+
 else:
     from typing import TypeVar
 
     R = TypeVar("R", covariant=True)
     noise_property = property
+
+    def noise_method(method):
+        return method
 
 
 _T = TypeVar("_T")
@@ -263,16 +285,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
             self._warned_of |= {subject}
             warn()
 
-    @overload
-    def std(
-        self: SmoothingSpline[Any, SmoothingReport], x: TimesLike, *, nu: int = 0, calibrated: bool = True
-    ) -> FloatArray: ...
-
-    @overload
-    def std(
-        self: SmoothingSpline[Any, tuple[SmoothingReport, ...]], x: TimesLike, *, nu: int = 0, calibrated: bool = True
-    ) -> tuple[FloatArray, ...]: ...
-
+    @noise_method
     def std(self, x: TimesLike, *, nu: int = 0, calibrated: bool = True) -> Any:
         r"""Compute the standard deviation of the curve in one coordinate of an orthonormal frame.
 
@@ -410,20 +423,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         lam = np.asarray(part.band_lam)[index].item()
         return process_ratio(times, weights, self._knots_of(index), band, lam, end_kinds(self._bc_type), x, nu)
 
-    @overload
-    def band(
-        self: SmoothingSpline[Any, SmoothingReport], x: TimesLike, level: float = 0.95, *, calibrated: bool = True
-    ) -> FloatArray: ...
-
-    @overload
-    def band(
-        self: SmoothingSpline[Any, tuple[SmoothingReport, ...]],
-        x: TimesLike,
-        level: float = 0.95,
-        *,
-        calibrated: bool = True,
-    ) -> tuple[FloatArray, ...]: ...
-
+    @noise_method
     def band(self, x: TimesLike, level: float = 0.95, *, calibrated: bool = True) -> Any:
         """Compute the radius of the ball that contains the true point with a given probability.
 
@@ -475,26 +475,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
             [radius(part, level) * spread for part, spread in zip(smoothed_spaces(self.space), each, strict=True)]
         )
 
-    @overload
-    def cov(
-        self: SmoothingSpline[Any, SmoothingReport],
-        x: TimesLike,
-        y: TimesLike | None = None,
-        *,
-        nu: CovarianceOrder = 0,
-        calibrated: bool = True,
-    ) -> FloatArray: ...
-
-    @overload
-    def cov(
-        self: SmoothingSpline[Any, tuple[SmoothingReport, ...]],
-        x: TimesLike,
-        y: TimesLike | None = None,
-        *,
-        nu: CovarianceOrder = 0,
-        calibrated: bool = True,
-    ) -> tuple[FloatArray, ...]: ...
-
+    @noise_method
     def cov(self, x: TimesLike, y: TimesLike | None = None, *, nu: CovarianceOrder = 0, calibrated: bool = True) -> Any:
         r"""Compute the covariance of the curve in the frames along it.
 
