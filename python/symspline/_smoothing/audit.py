@@ -131,7 +131,7 @@ def audit(
         _warn_of_residuals(space, noisy, fits)
         if fits[0].smoothed.penalty == "acceleration" and noisy.times.shape[-1] >= _DATA:
             _warn_of_varying(space, noisy, spline._curve, fits, end_kinds(spline._bc_type))
-    _warn_of_spread(noisy, fits)
+    _warn_of_spreads(noisy, fits)
 
 
 def _first(space: Space, affected: list[NDArray[np.bool_]], mark: str = "") -> tuple[int, tuple[int, ...], str] | None:
@@ -614,7 +614,7 @@ def varying(t: Array, tests: Any, robust: bool = False) -> str | None:
 # ---- data that are spread over all of a compact space, so that a smooth curve has little meaning ----
 
 
-def _warn_of_spread(noisy: SmoothingData, fits: list[Fitted]) -> None:
+def _warn_of_spreads(noisy: SmoothingData, fits: list[Fitted]) -> None:
     """Warn if data of a curve are about as far from it as random points of the space would be.
 
     The degrees of freedom with which the curve follows the data are taken into account.
@@ -622,30 +622,58 @@ def _warn_of_spread(noisy: SmoothingData, fits: list[Fitted]) -> None:
     every = -(-noisy.times.shape[-1] // _SAMPLE)
     some = (slice(None),) * len(noisy.batch) + (slice(None, None, every),)
     for fit, noise in zip(fits, noisy.noise, strict=True):
-        expected = random_distance(fit.space)
-        if expected is None:
-            continue
         # Negligible weights do not count.
         counts = noise.weights > 1e-6 * noise.weights.max(axis=-1, keepdims=True)
         counts = np.broadcast_to(counts, (*noisy.batch, noisy.times.shape[-1]))
-        used = counts[some] & fit.space._where_finite(fit.at[some])
-        distances = np.full(used.shape, np.nan)
-        distances[used] = distances_of(fit.space, fit.at[some][used], fit.points[some][used])
-        # Curves that failed have the distance 0.
-        distances[~used.any(axis=-1)] = 0.0
-        found = np.asarray(np.nanmedian(distances, axis=-1))
-        far = np.argwhere(is_far(found, expected, np.sum(counts, axis=-1), fit.df))
-        if len(far):
-            index = tuple(map(int, far[0]))
-            more = f" (and {len(far) - 1} more curves)" if len(far) > 1 else ""
-            warn(
-                f"half of the data{of_index(index)} are {found[index]:.2g} or more away from their smooth curve{more}. "
-                f"For random points of {fit.space!r} this distance is {expected:.2g}, so the curve has little meaning. "
-                "Check the units and signs of the data.",
-                UserWarning,
-                index,
-            )
+        data = fit.at[some], fit.points[some], counts[some]
+        if warn_of_spread(fit.space, *data, np.sum(counts, axis=-1), fit.df, "curve"):
             return
+
+
+def warn_of_spread(
+    space: Space, at: Array, points: Array, counts: NDArray[np.bool_], number: Any, df: Any, name: str
+) -> bool:
+    """Warn if data are about as far from a smooth fit as random points of a compact space would be.
+
+    Parameters
+    ----------
+    at, points : ndarray, shape (..., N, *point_shape)
+        Points of the fits, and data.
+    counts : ndarray of bool, shape (..., N)
+        Data that count.
+    number, df : ndarray
+        Number of all data, and degrees of freedom with which the fit follows them.
+    name : str
+        Name of a fit.
+
+    Returns
+    -------
+    bool
+        Whether a warning was issued.
+    """
+    expected = random_distance(space)
+    if expected is None:
+        return False
+    used = counts & space._where_finite(at)
+    distances = np.full(used.shape, np.nan)
+    distances[used] = distances_of(space, at[used], points[used])
+    # Fits that failed have the distance 0.
+    distances[~used.any(axis=-1)] = 0.0
+    found = np.asarray(np.nanmedian(distances, axis=-1))
+    # A fit through all data has no residuals to compare.
+    far = np.argwhere((found**2 * number > _FAR * expected**2 * (number - df)) & (number - df >= 1))
+    if not len(far):
+        return False
+    index = tuple(map(int, far[0]))
+    more = f" (and {len(far) - 1} more curves)" if len(far) > 1 else ""
+    warn(
+        f"half of the data{of_index(index)} are {found[index]:.2g} or more away from their smooth {name}{more}. For "
+        f"random points of {space!r} this distance is {expected:.2g}, so the {name} has little meaning. Check the "
+        "units and signs of the data.",
+        UserWarning,
+        index,
+    )
+    return True
 
 
 @lru_cache(maxsize=64)
@@ -655,17 +683,3 @@ def random_distance(space: Space) -> float | None:
         return None
     random = space.random_point(np.random.default_rng(0), (2, _SAMPLE))
     return float(np.median(space._apply("distance", p=random[0], q=random[1])))
-
-
-def is_far(distance: Any, expected: float, count: Any, df: Any) -> Any:
-    """Return whether data are about as far from a smooth fit as random points would be.
-
-    Parameters
-    ----------
-    distance, expected : float or ndarray
-        Median distances of the data from the fit, and of random points.
-    count, df : float or ndarray
-        Number of data, and degrees of freedom with which the fit follows them. A fit through all data has no residuals
-        to compare.
-    """
-    return (distance**2 * count > _FAR * expected**2 * (count - df)) & (count - df >= 1)

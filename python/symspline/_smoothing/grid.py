@@ -32,7 +32,7 @@ from .._spaces import Array, Doubles, Product, Space, cover_of, factors_of, spac
 from .._splines.archive import Entries, entry, read_array, suffix_of
 from .._validation import one_of
 from ..manifolds._manifold import refuse_functions
-from .audit import is_far, random_distance
+from .audit import warn_of_spread
 from .grid_rows import LamCriterion, Nodes, SmoothedAxis, SmoothedNodes, noise_level, smooth_axes
 from .noise import grouped, is_several, join, per_part, smoothed_spaces, split
 from .report import SmoothingWarning
@@ -516,7 +516,9 @@ def make_smoothing_grid(
     _warn_of_bounds(space, smoothed, lams)
     warn_of_boundaries(list(zip(spaces, arrays, strict=True)), w)
     for part, array, own, one in zip(spaces, arrays, found, smoothed, strict=True):
-        _warn_of_spread(part, array, own.points, w, one.df)
+        rows = (own.points.reshape(-1, *part.point_shape), array.reshape(-1, *part.point_shape), np.ravel(w > 0))
+        used = np.count_nonzero(rows[2] & part._where_finite(rows[0]))
+        warn_of_spread(part, *rows, used, one.df, "surface")
     return surface
 
 
@@ -633,22 +635,6 @@ def _warn_of_bounds(space: Space[Any], smoothed: list[SmoothedPart], lams: list[
                 SmoothingWarning,
             )
             return
-
-
-def _warn_of_spread(space: Space[Any], data: Array, points: Array, weights: Doubles, df: float) -> None:
-    """Warn if the data are about as far from the surface as random points of a compact space would be."""
-    expected = random_distance(space)
-    if expected is None:
-        return
-    used = (weights > 0) & space._where_finite(points)
-    distance = float(np.median(space._apply("distance", p=points[used], q=data[used])))
-    if is_far(distance, expected, np.count_nonzero(used), df):
-        warn(
-            f"half of the data are {distance:.2g} or more away from their smooth surface. For random points of "
-            f"{space!r} this distance is {expected:.2g}, so the surface has little meaning. Check the units and signs "
-            "of the data.",
-            UserWarning,
-        )
 
 
 # ---- maps with boundaries, such as those between the grains of a crystal ----

@@ -429,7 +429,7 @@ def _fast_starts(space: Space, data: Samples) -> Iterator[Doubles]:
 
     def at_knots(points: Array) -> Doubles:
         flat = points.reshape(-1, *points.shape[lead:])
-        rows = np.stack([own[index] for own, index in zip(flat, near, strict=True)])
+        rows = flat[np.arange(len(flat))[:, None], near]
         shaped = rows.reshape(*points.shape[:lead], *rows.shape[1:])
         return np.ascontiguousarray(space._as_doubles(np.ascontiguousarray(shaped)))
 
@@ -449,15 +449,14 @@ def _fast_starts(space: Space, data: Samples) -> Iterator[Doubles]:
 
 
 def _nearest(data: Samples) -> NDArray[np.intp]:
-    """Return the index of the datum nearest to each knot, one row per curve."""
-    lead = data.points.shape[: data.points.ndim - data.axes - 1]
-    times = np.broadcast_to(data.times, (*lead, data.times.shape[-1])).reshape(-1, data.times.shape[-1])
-    knots = np.broadcast_to(data.knots, (*lead, data.knots.shape[-1])).reshape(-1, data.knots.shape[-1])
-    rows = []
-    for t, at in zip(times, knots, strict=True):
-        after = np.clip(np.searchsorted(t, at), 1, len(t) - 1)
-        rows.append(np.where(at - t[after - 1] < t[after] - at, after - 1, after))
-    return np.array(rows)
+    """Return the index of the datum nearest to each knot, one row per curve, or one row if all have the same times."""
+    times, knots = (x.reshape(-1, x.shape[-1]) for x in (data.times, data.knots))
+    curves = max(len(times), len(knots))
+    each = zip(*(np.broadcast_to(x, (curves, x.shape[1])) for x in (times, knots)), strict=True)
+    after = np.stack([np.clip(np.searchsorted(t, at), 1, len(t) - 1) for t, at in each])
+    t = np.broadcast_to(times, (curves, times.shape[1]))
+    before, behind = (np.take_along_axis(t, index, axis=-1) for index in (after - 1, after))
+    return np.where(knots - before < behind - knots, after - 1, after)
 
 
 # ---- data with much noise ----
