@@ -192,7 +192,7 @@ def process_ratio(
     if not (lam > 0 and np.isfinite(lam)):
         return np.ones(len(x))
     if band is None:
-        band = _core.smoothing_inverse(knots, times, weights, lam, "jerk", kinds)
+        band = _core.smoothing_inverse(knots, times, weights, lam, "jerk", kinds).reshape(-1, 4)
     period = knots[-1] - knots[0] if kinds is None else None
     spline = _core.smoothing_variance(knots, np.ascontiguousarray(band), np.zeros(1), x, nu, kinds)
     return np.asarray(_core.process_variance(times, weights, lam, period, x, nu) / spline)
