@@ -144,7 +144,7 @@ def push(handle: Handle, curves: object, points: _Doubles, knots: _Doubles, ends
 def pull(handle: Handle, curves: object, cotangent: _Doubles) -> tuple[_Doubles, _Doubles, _Doubles, _Doubles]: ...
 
 # Space, points, weights, information matrices, λ, σ, ends and initial points at the knots.
-_Smoothable = tuple[Handle, _Doubles, _Doubles, _Doubles | None, _Doubles, _Doubles | None, _Ends, _Doubles | None]
+_Smoothable = tuple[Handle, _Doubles, _Doubles, _Doubles | None, _Doubles, _Doubles, _Ends, _Doubles | None]
 
 def smooth(
     factors: Sequence[_Smoothable],

@@ -339,7 +339,8 @@ def long_gaps(times: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 def shaped(columns: Columns, times: NDArray[np.float64], batch: tuple[int, ...], space: Any, method: str) -> Report:
     """Return the report of curves with these knots from its columns; `method` is the requested one."""
-    values: dict[str, Any] = {name: columns.row(name).reshape(batch) for name in (*INTEGERS, *NUMBERS)}
+    rows = zip((*INTEGERS, *NUMBERS), (*columns.integers, *columns.numbers), strict=True)
+    values: dict[str, Any] = {name: row.reshape(batch) for name, row in rows}
     _certify(values, space.injectivity_radius)
     if method == "auto" and times.shape[-1] > _WHOLE + 1:
         values["skipped"] = values["skipped"] | _unsearched(values, space.injectivity_radius)

@@ -382,7 +382,7 @@ def _spline_through(
         conditions.append(_joined(factor, of_ends))
     mask = None if good.all() else good
     fitted = fit(Problem(space, at.times, points, conditions, DEFAULTS, check=False, mask=mask))
-    noise = [own._replace(sigma=None) for own in whole.noise]
+    noise = [own._replace(sigma=np.empty(0)) for own in whole.noise]
     results = [with_infinite_lam(own.smoothed, part.lam, batch) for own, part in zip(found, parts, strict=True)]
     noisy, kept = whole._replace(noise=noise), _conditions(bc_type, conditions, space)
     made = whole.time_axis, at.t, fitted.curve, kept, policy, fitted.reports(), noisy, results

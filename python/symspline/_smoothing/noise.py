@@ -141,15 +141,16 @@ class Noise(NamedTuple):
         Weights; for matrices, the mean of their diagonal.
     information : ndarray or None, shape (N, m, m) or (..., N, m, m)
         Information matrices in the coordinates of ``space.frame(point)``.
-    sigma : ndarray or None, shape (curves,)
-        Standard deviation of a coordinate for weight one, NaN where it is estimated. None after the fit.
+    sigma : ndarray, shape (curves,)
+        Standard deviation of a coordinate for weight one, NaN where it is estimated. Curves that a user has do not have
+        it.
     loss : str
         Loss of the data.
     """
 
     weights: Doubles
     information: Doubles | None
-    sigma: Doubles | None = None
+    sigma: Doubles = np.empty(0)
     loss: str = "linear"
 
     @property

@@ -125,7 +125,7 @@ def read_noise(
             # Files of older versions do not name them.
             penalty = one_of(numbers.pop("penalty", "acceleration"), "penalty", "acceleration", "jerk")
             loss = one_of(numbers.pop("loss", "linear"), "loss", "linear", "huber", "cauchy")
-            noise.append(Noise(weights, information, None, loss))
+            noise.append(Noise(weights, information, loss=loss))
             report = read_report(SmoothingReport, numbers, batch)
             # A closed curve repeats its first coefficients at the end.
             good = np.asarray(report.converged)
