@@ -220,7 +220,7 @@ class Report(FitReport):
             return f"<Report of {np.size(self.converged)} curves: {self}>"
         return f"Report({', '.join(f'{own.name}={getattr(self, own.name)!r}' for own in fields(self))})"
 
-    def _replaced(self, columns: dict[str, Any]) -> Report:
+    def _replaced(self, columns: dict[str, Any]) -> Self:
         """Replace fields; those of one curve are None instead of NaN, and its number of sweeps is an integer."""
         for name in OPTIONAL:
             if np.ndim(columns[name]) == 0 and columns[name] is not None and np.isnan(columns[name]):
@@ -426,5 +426,5 @@ class CumulativeReport(FitReport):
     step: Number = field(metadata=FLOAT)
     residual_sum: Number = field(metadata=FLOAT)
 
-    def _replaced(self, columns: dict[str, Any]) -> CumulativeReport:
+    def _replaced(self, columns: dict[str, Any]) -> Self:
         return replace(self, **{name: x if np.ndim(x) else x.item() for name, x in columns.items()})

@@ -310,7 +310,7 @@ class Finding(NamedTuple):
     outliers: list[int]
     largest: float
     rejected: float
-    run: tuple[int, int] | None
+    run: list[int] | None
 
     @property
     def failed(self) -> bool:
@@ -414,13 +414,13 @@ def _complaints(noisy: SmoothingData, number: int, fit: Fitted, curves: NDArray[
         used = np.isfinite(rows).any(axis=-1)
         roots, known = roots_of(of_curves(noise.information, (space.dim, space.dim))[used])
         rows[used] = np.where(known, np.einsum("nij,nj->ni", roots, rows[used]), np.nan)
-    used = np.isfinite(rows).any(axis=-1)
-    leverage = np.minimum(np.ravel(fit.df)[curves] / np.maximum(used.sum(axis=-1), 1), 1.0)
+    observed: NDArray[np.bool_] = np.asarray(np.isfinite(rows).any(axis=-1))
+    leverage = np.minimum(np.ravel(fit.df)[curves] / np.maximum(observed.sum(axis=-1), 1), 1.0)
     loss = fit.loss
     corner = None if loss == "linear" else corner_of(loss, space.dim)
     given = np.where(fit.given, fit.smoothed.sigma, np.nan).ravel()[curves]
     found = _core.examine_curves(space._handle, data, rows, deviations, leverage, given, corner)
-    return [(int(curves[k]), _described(np.flatnonzero(used[k]), *result)) for k, *result in found]
+    return [(int(curves[k]), _described(np.flatnonzero(observed[k]), *result)) for k, *result in found]
 
 
 def _described(numbers: NDArray[np.intp], bypassed: Any, of_given: Any, of_estimated: Any) -> str:

@@ -321,7 +321,7 @@ def calibrate(
 
     def beyond() -> tuple[Doubles, int]:
         data = evidence()
-        along = data.line, course.order, course.lam, course.acceleration
+        along = data.line or [], course.order, course.lam, course.acceleration
         rungs, count = _core.end_factors(data.knots, data.known, data.linearised, along, usual)
         return np.array(rungs).reshape(-1, 2), count
 

@@ -517,8 +517,8 @@ def make_smoothing_grid(
     warn_of_boundaries(list(zip(spaces, arrays, strict=True)), w)
     for part, array, own, one in zip(spaces, arrays, found, smoothed, strict=True):
         rows = (own.points.reshape(-1, *part.point_shape), array.reshape(-1, *part.point_shape), np.ravel(w > 0))
-        used = np.count_nonzero(rows[2] & part._where_finite(rows[0]))
-        warn_of_spread(part, *rows, used, one.df, "surface")
+        count = np.count_nonzero(rows[2] & part._where_finite(rows[0]))
+        warn_of_spread(part, *rows, count, one.df, "surface")
     return surface
 
 

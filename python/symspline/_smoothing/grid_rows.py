@@ -110,7 +110,7 @@ def smooth(rows: Rows, lam: float) -> SmoothedRows:
         spline = _fit(own, lam)
         _store(found, many, spline, np.where(_lifted(own.inside, own.points), spline(own.t), np.nan))
     # Nodes without data at small distances make the matrix of a row singular to rounding. Its data alone do not.
-    for number in np.flatnonzero(~found.converged & (count < rows.weights.shape[-1])):
+    for number in np.flatnonzero(~found.converged & (count < rows.weights.shape[-1])).tolist():
         spline, inside = _fit(rows.data_of(number), lam), rows.take([number]).inside[0]
         filled = np.full_like(rows.points[[number]], np.nan)
         filled[:, inside] = spline(rows.t[inside])

@@ -543,10 +543,11 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
             found = self._covariance(number, space, index, at, to, orders)
             return self._inflated([number], index, at, to, orders, found) if calibrated else found
 
-        parts = [
-            (2 * (len(orders) * space.dim,), number, space) for number, space in enumerate(smoothed_spaces(self.space))
-        ]
-        return self._each([self._per_curve(x, per_curve, partial(covariance, *part), tail) for tail, *part in parts])
+        found = []
+        for number, space in enumerate(smoothed_spaces(self.space)):
+            tail = 2 * (len(orders) * space.dim,)
+            found.append(self._per_curve(x, per_curve, partial(covariance, number, space), tail))
+        return self._each(found)
 
     def _covariance(
         self, number: int, space: Space, index: tuple[int, ...], x: Any, y: Any, orders: list[int]
