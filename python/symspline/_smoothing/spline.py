@@ -538,16 +538,15 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
             if other_shape != shape:
                 raise ValidationError(f"y has shape {other_shape}, but x has shape {shape}")
 
-        def covariance(number: int, space: Space, index: tuple[int, ...], at: Doubles) -> Doubles:
+        def covariance(number: int, index: tuple[int, ...], at: Doubles) -> Doubles:
             to = None if other is None else np.ravel(other[index] if per_curve else other)
-            found = self._covariance(number, space, index, at, to, orders)
+            found = self._covariance(number, spaces[number], index, at, to, orders)
             return self._inflated([number], index, at, to, orders, found) if calibrated else found
 
-        found = []
-        for number, space in enumerate(smoothed_spaces(self.space)):
-            tail = 2 * (len(orders) * space.dim,)
-            found.append(self._per_curve(x, per_curve, partial(covariance, number, space), tail))
-        return self._each(found)
+        spaces = smoothed_spaces(self.space)
+        tails = [2 * (len(orders) * space.dim,) for space in spaces]
+        each = [self._per_curve(x, per_curve, partial(covariance, i), tail) for i, tail in enumerate(tails)]
+        return self._each(each)
 
     def _covariance(
         self, number: int, space: Space, index: tuple[int, ...], x: Any, y: Any, orders: list[int]
