@@ -67,7 +67,7 @@ def test_predictions_are_those_of_an_estimate_without_the_data(monkeypatch):
         other = ss.estimate(given(t[kept_t], y[kept_t], s[kept_s], v[kept_s]), knots, "r:1", lam=curve.report.lam)
         at = times[chosen]
         assert np.array_equal(at, t[~kept_t])
-        np.testing.assert_allclose(values[:, 0], (other(at) - curve(at)) / 0.02, atol=1e-5)
+        np.testing.assert_allclose(values, (other(at) - curve(at)) / 0.02, atol=1e-5)
         expected = other.std(at, calibrated=False) ** 2 / 0.02**2
         np.testing.assert_allclose(variances, expected, rtol=1e-6)
 
