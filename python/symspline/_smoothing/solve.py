@@ -243,7 +243,7 @@ def _reason(
     if state == "undetermined":
         return (
             "The data{of} do not determine the curve. With lam=0 there must be data near every knot: pass fewer "
-            "knots. Otherwise the weights differ by more than the noise of floating-point numbers: remove data "
+            "knots. Otherwise the weights differ by more than the precision of floating-point numbers: remove data "
             "with tiny weights."
         )
     lam, step, iterations = (np.ravel(x)[number] for x in (report.lam, report.step, report.iterations))
