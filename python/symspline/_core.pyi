@@ -152,16 +152,14 @@ def fit_cumulative(
 ) -> tuple[_Doubles, list[bool], list[int], list[float], list[float]]: ...
 def push(handle: Handle, curves: object, points: _Doubles, knots: _Doubles, ends: list[_Doubles]) -> _Doubles: ...
 def pull(handle: Handle, curves: object, cotangent: _Doubles) -> tuple[_Doubles, _Doubles, _Doubles, _Doubles]: ...
+
+# Space, points, weights, information matrices, λ, σ, ends and initial points at the knots.
+_Smoothable = tuple[Handle, _Doubles, _Doubles, _Doubles | None, _Doubles, _Doubles, _Ends, _Doubles | None]
+
 def smooth(
-    handle: Handle,
+    factors: Sequence[_Smoothable],
     t: _Doubles,
-    points: _Doubles,
-    weights: _Doubles,
-    information: _Doubles | None,
     knots: _Doubles,
-    lam: _Doubles,
-    sigma: _Doubles,
-    ends: Sequence[tuple[str, _Doubles | None]] | None,
     criterion: str,
     gamma: float,
     penalty: str,
@@ -170,11 +168,10 @@ def smooth(
     tol: float,
     max_iter: int,
     raise_lam: bool,
-    start: _Doubles | None,
     progress: _Progress | None,
-) -> tuple[_Doubles, _Doubles, tuple[NDArray[Any], ...], tuple[_Doubles, _Doubles, int]]: ...
+) -> list[tuple[_Doubles, _Doubles, tuple[NDArray[Any], ...], tuple[_Doubles, _Doubles, int]]]: ...
 def smoothing_variance(
-    knots: _Doubles, band: _Doubles, lam: float, x: _Doubles, nu: int, kinds: Sequence[str] | None
+    knots: _Doubles, band: _Doubles, lam: _Doubles, x: _Doubles, nu: int, kinds: Sequence[str] | None
 ) -> _Doubles: ...
 def smoothing_inverse(
     knots: _Doubles, times: _Doubles, weights: _Doubles, lam: float, penalty: str, kinds: Sequence[str] | None
@@ -185,15 +182,37 @@ def process_variance(
 def residuals_at(
     handle: Handle, times: _Doubles, at: _Doubles, points: _Doubles, weights: _Doubles
 ) -> list[_Doubles]: ...
-def bypassed(
-    handle: Handle, times: _Doubles, at: _Doubles, points: _Doubles, weights: _Doubles, sizes: _Doubles
-) -> list[int] | None: ...
-def residual_statistics(
-    rows: _Doubles, neighbours: _Doubles, limits: _Doubles, variances: _Doubles
-) -> tuple[list[list[float]], list[int], _Doubles]: ...
-def unequal_bins(
-    times: _Doubles, leverages: _Doubles, squares: _Doubles, knots: _Doubles, energy: _Doubles, m: int, least: float
-) -> list[tuple[float, list[int], float]]: ...
+
+# The fields of a `Finding`.
+_Finding = tuple[float, float, float, bool, bool, bool, int | None, list[int], float, float, list[int] | None]
+
+def examine(rows: _Doubles, leverage: float, between: float, corner: float | None, exact: bool) -> _Finding: ...
+def examine_curves(
+    handle: Handle,
+    data: Sequence[_Doubles],
+    rows: _Doubles,
+    neighbours: _Doubles,
+    leverages: _Doubles,
+    sigmas: _Doubles,
+    corner: float | None,
+) -> list[
+    tuple[
+        int,
+        list[int] | None,
+        _Finding | None,
+        tuple[float, float, tuple[int, int, float], list[int] | None] | None,
+    ]
+]: ...
+def are_constant(
+    times: _Doubles,
+    weights: _Doubles,
+    leverages: _Doubles,
+    squares: _Doubles,
+    knots: _Doubles,
+    energy: _Doubles,
+    m: int,
+) -> list[list[tuple[float, list[int], float]] | None]: ...
+def usual_turns(handle: Handle, points: _Doubles) -> tuple[_Doubles, list[bool]]: ...
 def frames_along(handle: Handle, knots: _Doubles, points: _Doubles, x: _Doubles, gammas: _Doubles) -> _Doubles: ...
 
 # The sensor, parts, times, standard deviations, loss, column of the time offset, arrays, columns of the parameters with
@@ -249,6 +268,35 @@ def predictions_without(
     omitted: NDArray[np.int64],
     blocks: Sequence[Sequence[int]],
 ) -> tuple[_Doubles, _Doubles]: ...
+
+# Times, first coefficients, factors of coefficients and parameters, residuals and errors, which data count, weights and
+# numbers of observed coordinates, and the number of coordinates.
+_Linearised = tuple[
+    _Doubles,
+    NDArray[np.int64],
+    Sequence[_Doubles],
+    Sequence[_Doubles],
+    NDArray[np.bool_],
+    Sequence[_Doubles],
+    int,
+]
+
+def gap_factors(
+    knots: _Doubles,
+    known: _Known,
+    evidence: _Linearised,
+    gaps: Sequence[Sequence[float]],
+    width: float,
+    at_data: float,
+    period: float | None,
+) -> list[tuple[float, int]]: ...
+def end_factors(
+    knots: _Doubles,
+    known: _Known,
+    evidence: _Linearised,
+    course: tuple[Sequence[_Doubles], int, float, float],
+    usual: float,
+) -> tuple[list[list[float]], int]: ...
 def chi_squared_ratio(m: int, n: int, probability: float) -> float: ...
 def posterior_freedom(knots: _Doubles, known: _Known) -> int: ...
 def posterior_samples(knots: _Doubles, known: _Known, normal: _Doubles) -> _Doubles: ...

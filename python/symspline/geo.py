@@ -30,8 +30,7 @@ from ._base.warnings import warn
 from ._core import ValidationError
 from ._curves.options import require_matplotlib
 from ._estimation.uncertainty import Jacobians, Motion, check_uncertain, standard_errors
-from ._smoothing.many import smooth_many
-from ._smoothing.segments import check_smooth, cut
+from ._smoothing.segments import check_smooth, cut, smooth_many
 from ._spaces import Sphere
 from ._splines.compare import checked_items
 from ._splines.composed import SegmentedCurve

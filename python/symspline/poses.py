@@ -32,7 +32,7 @@ from ._curves.at_times import evaluated
 from ._curves.composed import AnyCurve
 from ._estimation.measurements import GRAVITY
 from ._estimation.uncertainty import Jacobians, Motion, check_uncertain, standard_errors
-from ._smoothing.factors import smoothed_spaces
+from ._smoothing.noise import smoothed_spaces
 from ._spaces import Array, Euclidean, SpecialEuclidean, SpecialOrthogonal, cover_of
 from .convert._pose_files import (
     check_seconds,

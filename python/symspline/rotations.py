@@ -37,7 +37,7 @@ from ._curves.fit import curve_of
 from ._curves.missing import missing_times, recounted, refuse_nan_times
 from ._estimation.rates import integrated
 from ._estimation.uncertainty import Jacobians, Motion, check_uncertain, standard_errors
-from ._smoothing.factors import smoothed_spaces
+from ._smoothing.noise import smoothed_spaces
 from ._spaces import Array, Doubles, SpecialEuclidean, SpecialOrthogonal, Sphere, cover_of
 from ._spaces.point_groups import elements, proper_symbol
 from ._splines.cubic import CubicSpline

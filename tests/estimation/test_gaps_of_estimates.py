@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 import symspline as ss
-from symspline import measure
-from symspline._smoothing import gaps
+from symspline import _core, measure
 
 
 def recording(seed, gap, m=2, end=60.0):
@@ -53,27 +52,24 @@ def test_bands_hold_in_gaps(tmp_path):
 def test_predictions_are_those_of_an_estimate_without_the_data(monkeypatch):
     """Blocks equal a new estimate with the same λ and knots, without the measurements of both sensors."""
     _, t, y, s, v = recording(0, (25, 30), m=1)
-    calls, without = [], gaps._without
-
-    def recorded(evidence, data, residuals, probes, omitted, counts):
-        found = without(evidence, data, residuals, probes, omitted, counts)
-        calls.append((evidence, omitted, counts, found))
-        return found
-
-    monkeypatch.setattr(gaps, "_without", recorded)
+    calls, calibrated = [], _core.gap_factors
+    monkeypatch.setattr(_core, "gap_factors", lambda *args: calls.append(args) or calibrated(*args))
     knots = np.linspace(0, 60, 121)
     curve = ss.estimate(given(t, y, s, v), knots, "r:1", tol=1e-9)
-    evidence, omitted, counts, (values, variances) = calls[0]
-    for block in (0, len(omitted) // 2):
-        times = evidence.times[omitted[block]]
-        kept_t, kept_s = ((x < times[0]) | (x > times[-1]) for x in (t, s))
+    at_knots, known, (times, firsts, (factors, sides), (residuals, _), counts, *_), *_ = calls[0]
+    data, rows = (firsts, factors.reshape(len(times), -1), sides.reshape(len(times), -1)), residuals.reshape(-1, 1)
+    for start in (5, 40):
+        kept_t, kept_s = ((x < start) | (x > start + 5) for x in (t, s))
+        omitted = np.flatnonzero((times >= start) & (times <= start + 5))
+        chosen = omitted[counts[omitted]]
+        probes, blocks = tuple(own[chosen] for own in data), [[0, len(omitted), 0, len(chosen)]]
+        values, variances = _core.predictions_without(at_knots, known, data, rows, probes, omitted, blocks)
         other = ss.estimate(given(t[kept_t], y[kept_t], s[kept_s], v[kept_s]), knots, "r:1", lam=curve.report.lam)
-        probes = slice(sum(counts[:block]), sum(counts[: block + 1]))
-        at = times[evidence.counts[omitted[block]]]
+        at = times[chosen]
         assert np.array_equal(at, t[~kept_t])
-        np.testing.assert_allclose(values[probes], (other(at) - curve(at)) / 0.02, atol=1e-5)
+        np.testing.assert_allclose(values, (other(at) - curve(at)) / 0.02, atol=1e-5)
         expected = other.std(at, calibrated=False) ** 2 / 0.02**2
-        np.testing.assert_allclose(variances[probes], expected, rtol=1e-6)
+        np.testing.assert_allclose(variances, expected, rtol=1e-6)
 
 
 def test_no_gap_where_another_sensor_measures():

@@ -10,7 +10,7 @@ import symspline as ss
 from symspline import _core, measure
 from symspline._estimation.solve import Rows, Setup
 from symspline._estimation.terms import bind
-from symspline._smoothing.factors import smoothed_spaces
+from symspline._smoothing.noise import smoothed_spaces
 from symspline._smoothing.posterior import coordinates, frames_at
 
 KNOTS = np.array([0, 0.7, 1.1, 2.3, 3.0, 3.9, 4.2, 5.5, 6.0])

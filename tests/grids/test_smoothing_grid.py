@@ -9,7 +9,7 @@ import pytest
 from scipy.interpolate import CubicSpline, make_smoothing_spline
 
 import symspline as ss
-from symspline._smoothing import axes as smoothing_axes
+from symspline._smoothing import grid_rows
 
 LINE = ss.Euclidean(1)
 U = np.array([0.0, 0.11, 0.13, 0.3, 0.42, 0.55, 0.6, 0.81, 0.9, 1.0, 1.3])
@@ -168,7 +168,7 @@ def test_lam_of_one_axis_does_not_depend_on_the_number_of_rows_that_are_tried(rn
     u = np.linspace(0, 1, 60)
     _, y = noisy_wave(rng, u=u)
     whole = ss.make_smoothing_grid((u, V), y[..., None], LINE)
-    monkeypatch.setattr("symspline._smoothing.common_lam._NODES", 300)
+    monkeypatch.setattr("symspline._smoothing.grid_rows._NODES", 300)
     part = ss.make_smoothing_grid((u, V), y[..., None], LINE)
     np.testing.assert_allclose(np.log10(part.lam), np.log10(whole.lam), atol=0.6)
     assert part.lam != whole.lam
@@ -481,7 +481,7 @@ def test_manifolds_of_functions_and_the_constructor_raise():
 
 @pytest.mark.parametrize("on_failure", ["raise", "warn", "ignore"])
 def test_rows_that_fail(rng, monkeypatch, on_failure):
-    smooth = smoothing_axes.smooth
+    smooth = grid_rows.smooth
 
     def fail(rows, lam):
         found = smooth(rows, lam)
@@ -489,7 +489,7 @@ def test_rows_that_fail(rng, monkeypatch, on_failure):
             found.converged[4] = False
         return found
 
-    monkeypatch.setattr(smoothing_axes, "smooth", fail)
+    monkeypatch.setattr(grid_rows, "smooth", fail)
     y = noisy_wave(rng)[1][..., None]
     message = r"along axis 1 in the row points\[4, :\]"
     if on_failure == "raise":

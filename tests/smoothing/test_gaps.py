@@ -4,12 +4,11 @@ import warnings
 
 import numpy as np
 import pytest
-from scipy.stats import chi2, f
 
 import symspline as ss
 from symspline import _core
-from symspline._smoothing import evidence as evidence_module
-from symspline._smoothing.gaps import Predicted, factor_of
+from symspline._curves.ends import end_kinds
+from symspline._smoothing import gaps
 
 # The standard deviations here are arbitrary, which the audit of residuals reports.
 pytestmark = pytest.mark.filterwarnings("ignore:The residuals:symspline.SmoothingWarning")
@@ -33,22 +32,27 @@ def recorded(seed=0, n=400, gaps=((132.0, 137.0),), dim=2, noise=0.02, start=100
 
 def predictions(spline, left_out):
     """Return vectors to the data from the curve without some of its data, and the variances of that curve there."""
-    own = evidence_module._evidence(spline, 0, np.arange(len(left_out)), float(spline.sigma))
-    every = np.arange(len(own.times))
-    firsts, factors = _core.coefficient_factors(own.knots, own.known[2], own.times, 0)
-    data = own.rows(every, firsts, factors)
-    residuals = own.whitened(every, own.residuals)
-    rows = len(residuals) // len(every)
-    omitted = (np.flatnonzero(left_out)[:, None] * rows + np.arange(rows)).ravel()
-    m = own.residuals.shape[1]
+    own = gaps._evidence(spline, 0, np.arange(len(left_out)), float(spline.sigma))
+    n, rows, _ = own.factors.shape
+    roots = own.line[0]
+    m = roots.shape[2]
+
+    def flat(factors):
+        return np.repeat(own.firsts, factors.shape[1]), factors.reshape(-1, 4 * m), np.zeros((factors[..., 0].size, 0))
+
     # The coordinates themselves, without roots of weights.
-    plain = own._replace(roots=np.ones(len(every)) if own.roots.ndim == 1 else np.tile(np.eye(m), (len(every), 1, 1)))
-    probes = plain.rows(every, firsts, factors)
+    factors = _core.coefficient_factors(own.knots, own.known[2], own.times, 0)[1]
+    probes = flat(np.einsum("qc,nk->nqkc", np.eye(m), factors).reshape(n, m, -1))
+    omitted = (np.flatnonzero(left_out)[:, None] * rows + np.arange(rows)).ravel()
+    residuals = np.ascontiguousarray(own.residuals.reshape(n * rows, -1))
     blocks = [[0, len(omitted), 0, len(probes[0])]]
-    values, variances = _core.predictions_without(own.knots, own.known, data, residuals, probes, omitted, blocks)
+    values, variances = _core.predictions_without(
+        own.knots, own.known, flat(own.factors), residuals, probes, omitted, blocks
+    )
     sigma = float(spline.sigma)
-    errors = (own.residuals - values.reshape(len(every), -1)) * sigma
-    return errors, np.asarray(variances).reshape(len(every), -1).mean(axis=1) * sigma**2
+    vectors = np.linalg.solve(roots, own.residuals.reshape(n, rows, -1)).reshape(n, -1)
+    errors = (vectors - values.reshape(n, -1)) * sigma
+    return errors, np.asarray(variances).reshape(n, -1).mean(axis=1) * sigma**2
 
 
 def matrices(rng, n, m):
@@ -74,7 +78,7 @@ def test_predictions_without_data_are_those_of_fits_without_them(kind):
     fewer[left_out] = 0
     again = ss.make_smoothing_spline(t, y, "r:2", lam, weights=fewer, sigma=0.02, **options)
     assert np.allclose(errors, y - again(t), atol=1e-6 if kind == "jerk" else 1e-9)
-    posterior, kinds = again._posterior(again._smoothed[0]), evidence_module.end_kinds(again._bc_type)
+    posterior, kinds = again._posterior(again._smoothed[0]), end_kinds(again._bc_type)
     plain = posterior.covariance(again.space, again._knots_of(()), (), kinds, again._noisy.times, None, [0])
     assert np.allclose(variances, 0.02**2 * np.trace(plain, axis1=1, axis2=2) / 2, rtol=1e-5)
 
@@ -94,19 +98,6 @@ def test_predictions_on_curved_spaces_are_nearly_those_of_fits(name):
     again = ss.make_smoothing_spline(t, y, space, 0.3, sigma=0.01, weights=np.where(left_out, 0.0, 1.0))
     wanted = space.distance(again(t), y)
     assert np.allclose(np.linalg.norm(errors, axis=1), wanted, atol=0.05 * wanted.max())
-
-
-def test_the_factor_is_that_of_the_errors():
-    """Errors of known variance, from many blocks; and the F distribution for few of them."""
-    rng = np.random.default_rng(0)
-    v = rng.uniform(3, 40, 20_000)
-    for k in (1.0, 2.5, 8.0):
-        errors = rng.standard_normal((len(v), 3)) * np.sqrt(v + (k**2 - 1) * (v - 1) + 1)[:, None]
-        found = Predicted((errors**2).mean(axis=1), v, np.ones(len(v)), np.zeros(len(v)))
-        assert factor_of(found, 3, 1e6) == pytest.approx(k, rel=0.02)
-        few = np.sqrt(3 * f.ppf(0.95, 3, 12) / chi2.ppf(0.95, 3))
-        assert factor_of(found, 3, 4) == pytest.approx(k * few, rel=0.03)
-    assert np.isnan(factor_of(found.of(slice(2)), 3, 4))
 
 
 @pytest.mark.parametrize("options", [{}, {"criterion": "reml"}, {"penalty": "jerk"}])

@@ -216,8 +216,10 @@ def test_data_beside_a_part_that_a_curve_follows(name):
     truth, weights = path(space, t), np.ones(160)
 
     def part(at):
-        sizes = space.distance(at, points) / 0.02
-        return _core.bypassed(space._handle, t, np.ascontiguousarray(at), points, weights, sizes)
+        data = [np.ascontiguousarray(own)[None] for own in (t, at, points, weights)]
+        rows, unknown = space.distance(at, points)[None, :, None], np.full((1, len(t)), np.nan)
+        found = _core.examine_curves(space._handle, data, rows, unknown, np.zeros(1), np.array([0.02]), 6.0)
+        return found[0][1] if found else None
 
     # The curve goes from the truth to the displaced data and back within some data on both sides.
     share = np.interp(np.arange(160), [66, 72, 77, 83], [0, 1, 1, 0])

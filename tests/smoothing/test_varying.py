@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 import symspline as ss
-from symspline._smoothing.varying import Recording, findings
+from symspline import _core
+from symspline._smoothing.audit import varying
 
 FASTER, NOISIER = "the motion is faster between", "the residuals are larger between"
 
@@ -27,6 +28,11 @@ def recording(kind, n, m, seed):
     return t, y + sigma[:, None] * rng.standard_normal((n, m)), sigma
 
 
+def both_tests(times, squares, knots, energy, leverage, m):
+    """Results of both tests for data with weight one."""
+    return _core.are_constant(*(x[None] for x in (times, np.ones(400), leverage, squares, knots, energy)), m)[0]
+
+
 def interval(message):
     return [float(x) for x in re.search(r"between t = (\S+) and (\S+?)[ ,]", message).groups()]
 
@@ -39,9 +45,9 @@ def test_interval_of_a_fast_part_is_exact(first, last):
     edges = np.arange(401) - 0.5
     energy = np.append(0.0, np.cumsum(rate))
     constant = np.full(400, 0.25)
-    (found,) = findings(Recording(7 + index, index, np.ones(400), np.ones(400), edges, energy, constant, 3))
-    assert FASTER in found.message
-    assert interval(found.message) == [7 + first, 7 + last]
+    message = varying(7 + index, both_tests(index, np.ones(400), edges, energy, constant, 3))
+    assert FASTER in message
+    assert interval(message) == [7 + first, 7 + last]
 
 
 def test_interval_of_larger_residuals_is_exact():
@@ -49,11 +55,9 @@ def test_interval_of_larger_residuals_is_exact():
     index, squares = np.arange(400.0), np.ones(400)
     squares[96:144] = 30
     edges = np.arange(401) - 0.5
-    (found,) = findings(
-        Recording(7 + index, index, np.ones(400), squares, edges, 1.0 * np.arange(401), np.full(400, 0.25), 3)
-    )
-    assert NOISIER in found.message
-    assert interval(found.message) == [103, 150]
+    message = varying(7 + index, both_tests(index, squares, edges, 1.0 * np.arange(401), np.full(400, 0.25), 3))
+    assert NOISIER in message
+    assert interval(message) == [103, 150]
 
 
 @pytest.mark.parametrize("m", [1, 3])
@@ -111,7 +115,8 @@ def test_robust_losses_have_the_test_of_the_motion_only():
     index, rate, squares = np.arange(400.0), np.ones(400), np.ones(400)
     rate[100:150], squares[96:144] = 40, 30
     energy, constant = np.append(0.0, np.cumsum(rate)), np.full(400, 0.25)
-    data = Recording(index, index, np.ones(400), squares, np.arange(401) - 0.5, energy, constant, 3)
-    assert len(findings(data)) == 2
-    (found,) = findings(data, robust=True)
-    assert FASTER in found.message and "or the curve follows outliers" in found.message
+    both = both_tests(index, squares, np.arange(401) - 0.5, energy, constant, 3)
+    assert NOISIER in varying(index, [(0.0, [0, 0], 1.0), both[1]])
+    message = varying(index, both, robust=True)
+    assert FASTER in message and "or the curve follows outliers" in message
+    assert varying(index, [(0.0, [0, 0], 1.0), both[1]], robust=True) is None

@@ -81,6 +81,7 @@ impl AtData<'_> {
     /// their neighbours, divided by their variances for noise of variance one at weight one. They are NaN for data
     /// without weight; deviations also at the ends.
     pub fn residuals(&self, space: &Erased) -> [Vec<f64>; 2] {
+        checkpoint();
         let (n, len, m) = (self.times.len(), space.point_len(), space.dim());
         let row = |rows: &'_ [f64], i: usize| rows[i * len..][..len].iter().all(|x| x.is_finite());
         let used: Vec<usize> =
@@ -195,7 +196,7 @@ impl AtData<'_> {
 }
 
 /// The median of the finite numbers; NaN if there are none.
-fn median(values: Vec<f64>) -> f64 {
+pub fn median(values: Vec<f64>) -> f64 {
     let mut own: Vec<f64> = values.into_iter().filter(|x| x.is_finite()).collect();
     if own.is_empty() {
         return f64::NAN;
@@ -216,6 +217,39 @@ pub struct Unequal {
     pub place: [usize; 2],
     /// The ratio in these bins, divided by the ratio of all data.
     pub ratio: f64,
+}
+
+/// The smallest number of data, and of degrees of freedom of the curve and of the residuals per coordinate, for the tests.
+const DATA: usize = 100;
+const FREEDOM: f64 = 13.0;
+/// The least number of local degrees of freedom of a bin.
+const BIN: f64 = 6.0;
+
+/// The tests of constant smoothness and of constant noise for a curve with the given knots and energies, see [`Recording`],
+/// and data with weights; None if there are too few data. Leverages and squared residuals refer to weight one.
+pub fn is_constant(
+    times: &[f64],
+    weights: &[f64],
+    leverages: &[f64],
+    squares: &[f64],
+    [knots, energy]: [&[f64]; 2],
+    m: usize,
+) -> Option<[Unequal; 2]> {
+    checkpoint();
+    let used: Vec<usize> = (0..times.len()).filter(|&i| weights[i] > 0.0).collect();
+    let weighted = |x: &[f64]| used.iter().map(|&i| weights[i] * x[i]).collect::<Vec<f64>>();
+    let (times, leverages, squares) =
+        (used.iter().map(|&i| times[i]).collect::<Vec<f64>>(), weighted(leverages), weighted(squares));
+    let freedom: f64 = leverages.iter().sum();
+    let total: f64 = squares.iter().sum();
+    let enough = used.len() >= DATA && freedom >= FREEDOM && used.len() as f64 - freedom >= FREEDOM;
+    if !enough || !total.is_finite() || total == 0.0 {
+        return None;
+    }
+    let (times, leverages, squares) = (&times[..], &leverages[..], &squares[..]);
+    let recording = Recording { times, leverages, squares, knots, energy, m };
+    let of_data = |found: Unequal| Unequal { place: found.place.map(|k| used[k]), ..found };
+    Some([recording.smoothness(BIN), recording.noise(BIN)].map(of_data))
 }
 
 /// A curve with its data: what the tests of constant smoothness and constant noise depend on.

@@ -13,6 +13,7 @@ use crate::cyclic::{Factored, PeriodicCorrection};
 use crate::estimation::Matrices;
 use crate::linearized::{Basis, OVERLAP};
 use crate::problem::Ends;
+use symspline_core::monitor::checkpoint;
 use symspline_core::scalar::{LANES, Lane, few};
 
 /// Linear functions of the coefficients of a curve, and of parameters.
@@ -27,6 +28,10 @@ pub struct Functionals<'a> {
 
 /// The system of a curve: its matrix A, and the holonomy of a closed curve.
 pub struct System<'a> {
+    /// The knots of the curve, and its ends.
+    pub knots: &'a [f64],
+    /// See `knots`.
+    pub ends: Ends,
     count: usize,
     m: usize,
     p: usize,
@@ -44,11 +49,11 @@ pub struct Predictions {
 
 impl<'a> System<'a> {
     /// For a matrix that couples m coordinates.
-    pub fn new(knots: &[f64], ends: Ends, m: usize, matrices: &'a Matrices, turn: &[f64]) -> Self {
+    pub fn new(knots: &'a [f64], ends: Ends, m: usize, matrices: &'a Matrices, turn: &[f64]) -> Self {
         let basis = Basis::new(knots, ends);
         let periodic =
             basis.is_closed().then(|| PeriodicCorrection { overlap: OVERLAP, m, turn: turn.to_vec() });
-        System { count: basis.count(), m, p: matrices[2].len().isqrt(), matrices, periodic }
+        System { knots, ends, count: basis.count(), m, p: matrices[2].len().isqrt(), matrices, periodic }
     }
 
     /// Predicts `probes` without the data `omitted`, for each of several pairs of index lists. The residuals are those
@@ -64,6 +69,7 @@ impl<'a> System<'a> {
         let total = probes.firsts.len();
         let mut found = Predictions { values: vec![0.0; total * columns], variances: vec![f64::NAN; total] };
         for group in blocks.chunks(LANES) {
+            checkpoint();
             self.of_lanes(data, residuals, columns, probes, group, &mut found);
         }
         found

@@ -2,10 +2,13 @@
 
 use crate::arrays::{in_order, zeros};
 use crate::estimation::{Known, matrices_of};
-use crate::watch::watched;
-use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArray1, PyReadonlyArrayDyn};
+use crate::watch::{is_long, watched};
+use numpy::{
+    PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArray1, PyReadonlyArrayDyn, PyUntypedArrayMethods,
+};
 use pyo3::prelude::*;
 use std::ops::Range;
+use symspline_engine::smoothing::calibrate::{Calibration, Course, Evidence};
 use symspline_engine::smoothing::gaps::{Functionals, System};
 use symspline_engine::smoothing::{chi, functional_at};
 
@@ -66,6 +69,90 @@ pub fn predictions_without<'py>(
     values.readwrite().as_slice_mut()?.copy_from_slice(&found.values);
     variances.readwrite().as_slice_mut()?.copy_from_slice(&found.variances);
     Ok((values, variances))
+}
+
+/// Data linearised at a curve, see [`Evidence`]: times, first coefficients, factors of four coefficients (n, q, 4m) and of
+/// parameters (n, q, p), residuals and errors (n, q, columns), which data count, weights, and numbers of observed
+/// coordinates (n,); the number of coordinates.
+type Linearised<'py> = (
+    Array<'py>,
+    PyReadonlyArray1<'py, i64>,
+    [Array<'py>; 2],
+    [Array<'py>; 2],
+    PyReadonlyArray1<'py, bool>,
+    [Array<'py>; 2],
+    usize,
+);
+
+/// Calls a function with a calibration, on another thread if it takes long.
+fn calibrated<T: Send>(
+    py: Python,
+    knots: &Array,
+    known: &Known,
+    evidence: &Linearised,
+    period: Option<f64>,
+    work: impl FnOnce(&Calibration) -> T + Send,
+) -> PyResult<T> {
+    let (matrices, m, ends, turn) = matrices_of(known)?;
+    let system = System::new(in_order(knots)?, ends, m, &matrices, &turn);
+    let (times, firsts, [factors, sides], [residuals, errors], counts, [weights, observed], coordinates) =
+        evidence;
+    let count = factors.shape()[1];
+    let firsts = firsts.as_slice()?.iter().flat_map(|first| vec![*first as usize; count]);
+    let firsts: Vec<usize> = firsts.collect();
+    let evidence = Evidence {
+        times: in_order(times)?,
+        rows: Functionals { firsts: &firsts, factors: in_order(factors)?, sides: in_order(sides)? },
+        count,
+        residuals: in_order(residuals)?,
+        errors: in_order(errors)?,
+        counts: counts.as_slice()?,
+        weights: in_order(weights)?,
+        observed: in_order(observed)?,
+        coordinates: *coordinates,
+    };
+    let heavy = is_long(matrices[0].len());
+    watched(py, None, 1, heavy, |_| work(&Calibration { system: &system, evidence: &evidence, period }))
+}
+
+/// The factor and the number of blocks for every gap (G, 2): see [`Calibration::factors_in_gaps`].
+#[pyfunction]
+#[allow(clippy::too_many_arguments)]
+pub fn gap_factors<'py>(
+    py: Python<'py>,
+    knots: Array<'py>,
+    known: Known<'py>,
+    evidence: Linearised<'py>,
+    gaps: Vec<[f64; 2]>,
+    width: f64,
+    at_data: f64,
+    period: Option<f64>,
+) -> PyResult<Vec<(f64, usize)>> {
+    calibrated(py, &knots, &known, &evidence, period, |own| own.factors_in_gaps(&gaps, width, at_data))
+}
+
+/// Distances beyond the ends with their factors, and the number of predictions: see [`Calibration::factors_beyond`]. The
+/// course is that of a [`Course`]: roots (n, q, m), positions and velocities, order, λ and acceleration.
+#[pyfunction]
+#[allow(clippy::too_many_arguments)]
+pub fn end_factors<'py>(
+    py: Python<'py>,
+    knots: Array<'py>,
+    known: Known<'py>,
+    evidence: Linearised<'py>,
+    course: ([Array<'py>; 3], usize, f64, f64),
+    usual: f64,
+) -> PyResult<(Vec<[f64; 2]>, usize)> {
+    let ([roots, positions, velocities], order, lam, acceleration) = &course;
+    let course = Course {
+        roots: in_order(roots)?,
+        positions: in_order(positions)?,
+        velocities: in_order(velocities)?,
+        order: *order,
+        lam: *lam,
+        acceleration: *acceleration,
+    };
+    calibrated(py, &knots, &known, &evidence, None, |own| own.factors_beyond(&course, usual))
 }
 
 /// The quantile of the ratio of χ² with m degrees of freedom to the mean square of n independent normal numbers.

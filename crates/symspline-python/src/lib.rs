@@ -103,9 +103,10 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     guarded(m, wrap_pyfunction!(smoothing::smoothing_inverse, m)?)?;
     guarded(m, wrap_pyfunction!(smoothing::chi_squared, m)?)?;
     guarded(m, wrap_pyfunction!(smoothing::residuals_at, m)?)?;
-    guarded(m, wrap_pyfunction!(smoothing::bypassed, m)?)?;
-    guarded(m, wrap_pyfunction!(smoothing::residual_statistics, m)?)?;
-    guarded(m, wrap_pyfunction!(smoothing::unequal_bins, m)?)?;
+    guarded(m, wrap_pyfunction!(smoothing::examine, m)?)?;
+    guarded(m, wrap_pyfunction!(smoothing::examine_curves, m)?)?;
+    guarded(m, wrap_pyfunction!(smoothing::are_constant, m)?)?;
+    guarded(m, wrap_pyfunction!(smoothing::usual_turns, m)?)?;
     guarded(m, wrap_pyfunction!(estimation::frames_along, m)?)?;
     guarded(m, wrap_pyfunction!(estimation::estimate, m)?)?;
     guarded(m, wrap_pyfunction!(estimation::linearise, m)?)?;
@@ -115,6 +116,8 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     guarded(m, wrap_pyfunction!(estimation::posterior_samples, m)?)?;
     guarded(m, wrap_pyfunction!(gaps::coefficient_factors, m)?)?;
     guarded(m, wrap_pyfunction!(gaps::predictions_without, m)?)?;
+    guarded(m, wrap_pyfunction!(gaps::gap_factors, m)?)?;
+    guarded(m, wrap_pyfunction!(gaps::end_factors, m)?)?;
     guarded(m, wrap_pyfunction!(gaps::chi_squared_ratio, m)?)?;
     guarded(m, wrap_pyfunction!(grid::grid_rows, m)?)?;
     guarded(m, wrap_pyfunction!(grid::grid_product, m)?)?;

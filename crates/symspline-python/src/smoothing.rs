@@ -11,9 +11,11 @@ use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedA
 use pyo3::prelude::*;
 use pyo3::types::{PyListMethods, PyTuple, PyTupleMethods};
 use symspline_engine::parallel;
-use symspline_engine::smoothing::audit::{AtData, Recording, ResidualStatistics, Unequal};
+use symspline_engine::smoothing::audit::{AtData, Unequal, is_constant};
+use symspline_engine::smoothing::examine::{Complaint, Examined, Finding, Residuals};
+use symspline_engine::smoothing::turns::{Turn, usual_turn};
 use symspline_engine::smoothing::{
-    Data, Observations, Options, Outcome, Report, Samples, Selection, Smooth, State, Tier, chi,
+    Data, Ends, Loss, Observations, Options, Outcome, Report, Samples, Selection, Smooth, State, Tier, chi,
     fit_cumulative as fit, inverse_of_weights, process_variance as process, smooth as run,
     variance as variance_at,
 };
@@ -31,21 +33,29 @@ type Smoothed<'py> =
 
 type Systems<'py> = (Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>, usize);
 
-/// Smooths curves. `t` and `weights` contain all data, (N,) or (..., N); `information`, (..., N, m, m), contains
-/// matrices whose mean diagonals are `weights`; `knots` is (K,) or (..., K). `lam` and `sigma` have one value per
-/// curve, and NaN requests that λ is chosen. `start` contains initial points at the knots.
+/// One factor of a product: space, points (..., N, point), weights (N,) or (..., N), information matrices (..., N, m, m)
+/// whose mean diagonals are the weights, λ and σ with one value per curve, of which NaN requests that it is chosen, ends,
+/// and initial points at the knots.
+type Factor<'py> = (
+    PyRef<'py, Handle>,
+    Array<'py>,
+    Array<'py>,
+    Option<Array<'py>>,
+    Array<'py>,
+    Array<'py>,
+    Option<[EndOf<'py>; 2]>,
+    Option<Array<'py>>,
+);
+
+/// Smooths curves in the factors of a product. `t` contains the times of all data, (N,) or (..., N); `knots` is (K,) or
+/// (..., K).
 #[pyfunction]
+#[allow(clippy::too_many_arguments)]
 pub fn smooth<'py>(
     py: Python<'py>,
-    handle: &Handle,
+    factors: Vec<Factor<'py>>,
     t: Array<'py>,
-    points: Array<'py>,
-    weights: Array<'py>,
-    information: Option<Array<'py>>,
     knots: Array<'py>,
-    lam: Array<'py>,
-    sigma: Array<'py>,
-    ends: Option<[EndOf<'py>; 2]>,
     criterion: &str,
     gamma: f64,
     penalty: &str,
@@ -54,9 +64,8 @@ pub fn smooth<'py>(
     tol: f64,
     max_iter: usize,
     raise_lam: bool,
-    start: Option<Array<'py>>,
     progress: Option<Py<PyAny>>,
-) -> PyResult<Smoothed<'py>> {
+) -> PyResult<Vec<Smoothed<'py>>> {
     let options = Options {
         criterion: criterion_named(criterion, gamma)?,
         penalty: penalty_named(penalty)?,
@@ -74,34 +83,69 @@ pub fn smooth<'py>(
         tol,
         max_iter,
         raise_lam,
-        ends: ends_named(ends.as_ref().map(|kinds| [0, 1].map(|e| kinds[e].0.clone())))?,
+        ends: Ends::Periodic,
     };
+    let (t, knots) = (Rows::of(&t)?, Rows::of(&knots)?);
+    let parts = factors.len();
+    let each = factors.iter().enumerate().map(|(part, factor)| {
+        let call = progress.as_ref().map(|call| call.clone_ref(py));
+        smooth_factor(py, factor, t, knots, options, call.map(|call| Progress { call, part, parts }))
+    });
+    each.collect()
+}
+
+/// Numbers shared by all curves, or one row per curve.
+#[derive(Clone, Copy)]
+struct Rows<'a> {
+    numbers: &'a [f64],
+    size: usize,
+}
+
+impl<'a> Rows<'a> {
+    fn of(array: &'a Array) -> PyResult<Self> {
+        Ok(Rows { numbers: in_order(array)?, size: array.shape()[array.ndim() - 1] })
+    }
+
+    fn of_curve(self, curve: usize) -> &'a [f64] {
+        let first = if self.numbers.len() == self.size { 0 } else { curve * self.size };
+        &self.numbers[first..first + self.size]
+    }
+}
+
+fn smooth_factor<'py>(
+    py: Python<'py>,
+    (handle, points, weights, information, lam, sigma, ends, start): &Factor<'py>,
+    t: Rows,
+    knots: Rows,
+    options: Options,
+    progress: Option<Progress>,
+) -> PyResult<Smoothed<'py>> {
+    let kinds = ends.as_ref().map(|kinds| [0, 1].map(|e| kinds[e].0.clone()));
+    let options = Options { ends: ends_named(kinds)?, ..options };
     let none: &[f64] = &[];
-    let vectors: [&[f64]; 2] = match &ends {
+    let vectors: [&[f64]; 2] = match ends {
         None => [none; 2],
         Some([a, b]) => [a.1.as_ref().map_or(Ok(none), in_order)?, b.1.as_ref().map_or(Ok(none), in_order)?],
     };
     let space = handle.space.get();
     let len = space.point_len();
     let lead = points.ndim() - handle.point_axes() - 1;
-    let (n, count) = (points.shape()[lead], knots.shape()[knots.ndim() - 1]);
+    let (n, count) = (points.shape()[lead], knots.size);
     let batch = &points.shape()[..lead];
     let curves: usize = batch.iter().product();
-    // Shared by all curves, or one row per curve.
-    let own = |row: &[f64], size: usize, curve: usize| if row.len() == size { 0 } else { curve * size };
-    let (t, p, w, k) = (in_order(&t)?, in_order(&points)?, in_order(&weights)?, in_order(&knots)?);
-    let (lam, sigma) = (in_order(&lam)?, in_order(&sigma)?);
+    let (p, weights) = (in_order(points)?, Rows::of(weights)?);
+    let (lam, sigma) = (in_order(lam)?, in_order(sigma)?);
     let first = start.as_ref().map_or(Ok(none), in_order)?;
     let matrices = information.as_ref().map_or(Ok(none), in_order)?;
     let entries = if matrices.is_empty() { 0 } else { space.dim() * space.dim() };
     drop(reserve::<f64>(p.len() + 2 * curves * n + matrices.len() + curves * count * (2 * len + 8))?);
     let data: Vec<Observations> = (0..curves)
         .map(|c| {
-            let knots = &k[own(k, count, c)..][..count];
+            let knots = knots.of_curve(c);
             Observations::new(
-                &t[own(t, n, c)..][..n],
+                t.of_curve(c),
                 &p[c * n * len..][..n * len],
-                &w[own(w, n, c)..][..n],
+                weights.of_curve(c),
                 if entries == 0 { none } else { &matrices[c * n * entries..][..n * entries] },
                 len,
                 ends.is_none().then(|| knots[count - 1] - knots[0]),
@@ -116,7 +160,7 @@ pub fn smooth<'py>(
             points: &data.points,
             weights: &data.weights,
             information: &data.information,
-            knots: &k[own(k, count, c)..][..count],
+            knots: knots.of_curve(c),
             lam: Some(lam[c]).filter(|lam| !lam.is_nan()),
             sigma: Some(sigma[c]).filter(|sigma| !sigma.is_nan()),
             ends: vectors.map(|v| if v.is_empty() { none } else { &v[c * len..][..len] }),
@@ -125,9 +169,8 @@ pub fn smooth<'py>(
         .collect();
     // One iteration factors banded matrices of three blocks for every knot.
     let heavy = is_heavy(&space) || count * space.dim().pow(3) > HEAVY_FACTORS;
-    let found = watched(py, Progress::whole(progress), curves * count, heavy, |monitor| {
-        run(&space, &data, &options, monitor)
-    })?;
+    let found =
+        watched(py, progress, curves * count, heavy, |monitor| run(&space, &data, &options, monitor))?;
 
     let coefficients = count + if ends.is_none() { 2 } else { 0 };
     let shape = [batch, &[count], &points.shape()[lead + 1..]].concat();
@@ -226,23 +269,34 @@ fn columns<'py>(py: Python<'py>, found: &[Smooth]) -> PyResult<Bound<'py, PyTupl
     Ok(all.to_tuple())
 }
 
-/// Variances of a coordinate of one smoothed curve at given times, for noise of variance one. `kinds` are the kinds of
-/// the ends; None for a closed curve.
+/// Variances (..., n) of a coordinate of smoothed curves at given times, for noise of variance one. Knots (K,) and times x
+/// (n,) are shared, or have one row per curve as the bands (..., K, 4); λ has one number per curve. `kinds` are the kinds of
+/// the ends; None for closed curves.
 #[pyfunction]
+#[allow(clippy::too_many_arguments)]
 pub fn smoothing_variance<'py>(
     py: Python<'py>,
     knots: Array<'py>,
     band: Array<'py>,
-    lam: f64,
+    lam: Array<'py>,
     x: Array<'py>,
     nu: usize,
     kinds: Option<[String; 2]>,
-) -> PyResult<Bound<'py, PyArray1<f64>>> {
+) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
     let ends = ends_named(kinds)?;
-    let (knots, band, x) = (in_order(&knots)?, in_order(&band)?, in_order(&x)?);
-    let heavy = is_long(knots.len() + x.len());
-    let found = watched(py, None, x.len(), heavy, |_| variance_at(knots, band, lam, ends, x, nu))?;
-    Ok(PyArray1::from_vec(py, found))
+    let batch = &band.shape()[..band.ndim() - 2];
+    let curves: usize = batch.iter().product();
+    let size = band.shape()[band.ndim() - 2] * 4;
+    let (knots, x) = (Rows::of(&knots)?, Rows::of(&x)?);
+    let shape = [batch, &[x.size]].concat();
+    let (band, lam) = (in_order(&band)?, in_order(&lam)?);
+    let of =
+        |c: usize| variance_at(knots.of_curve(c), &band[c * size..][..size], lam[c], ends, x.of_curve(c), nu);
+    let heavy = is_long(curves * (knots.size + x.size));
+    let found = watched(py, None, curves, heavy, |_| (0..curves).flat_map(of).collect::<Vec<f64>>())?;
+    let out = zeros(py, &shape)?;
+    out.readwrite().as_slice_mut()?.copy_from_slice(&found);
+    Ok(out)
 }
 
 /// The band of A⁻¹ for numbers as weights, (coefficients · 4,).
@@ -318,73 +372,129 @@ pub fn residuals_at<'py>(
     Ok(out)
 }
 
-/// [`AtData::bypassed`] for one curve: times, points of the curve, data, weights, and sizes of residuals.
+/// The result of the examination of one sensor, see [`Finding`].
+type Found = (f64, f64, f64, bool, bool, bool, Option<usize>, Vec<usize>, f64, f64, Option<[usize; 2]>);
+
+fn found(own: Finding) -> Found {
+    let Finding { ratio, freedom, correlation, large, small, correlated, .. } = own;
+    let Finding { step, outliers, largest, rejected, run, .. } = own;
+    (ratio, freedom, correlation, large, small, correlated, step, outliers, largest, rejected, run)
+}
+
+/// Examines residuals (n, d) in standard deviations, see [`Residuals`].
 #[pyfunction]
-pub fn bypassed(
+pub fn examine(
+    py: Python<'_>,
+    rows: Array<'_>,
+    leverage: f64,
+    between: f64,
+    corner: Option<f64>,
+    exact: bool,
+) -> PyResult<Found> {
+    let d = rows.shape()[1];
+    let rows = in_order(&rows)?;
+    let given = Residuals { rows, d, leverage, between, corner, exact };
+    Ok(found(watched(py, None, 1, is_long(rows.len()), |_| given.examine())?))
+}
+
+/// The curve, and one of: the part that the loss bypasses; the finding for a given σ; ratio, correlation, outliers and run
+/// for an estimated σ, see [`Estimated`].
+type Complained =
+    (usize, Option<[usize; 2]>, Option<Found>, Option<(f64, f64, (usize, usize, f64), Option<[usize; 2]>)>);
+
+/// Examines the residuals of curves: their data as for [`residuals_at`], residuals and deviations as it returns them,
+/// scaled to weight one, leverages, and σ, which is NaN where it is estimated. Returns the curves that failed a test.
+#[pyfunction]
+#[allow(clippy::too_many_arguments)]
+pub fn examine_curves(
     py: Python<'_>,
     handle: &Handle,
-    times: Array<'_>,
-    at: Array<'_>,
-    points: Array<'_>,
-    weights: Array<'_>,
-    sizes: Array<'_>,
-) -> PyResult<Option<[usize; 2]>> {
+    data: [Array<'_>; 4],
+    rows: Array<'_>,
+    neighbours: Array<'_>,
+    leverages: Array<'_>,
+    sigmas: Array<'_>,
+    corner: Option<f64>,
+) -> PyResult<Vec<Complained>> {
     let space = handle.space.get();
-    let [times, at, points, weights, sizes] = [&times, &at, &points, &weights, &sizes].map(in_order);
-    let (data, sizes) = (AtData { times: times?, at: at?, points: points?, weights: weights? }, sizes?);
-    watched(py, None, 1, is_long(sizes.len()), |_| data.bypassed(&space, sizes))
-}
-
-/// For every curve: two medians, the mean square, the mean product, and the number of products; the sizes.
-type OfResiduals<'py> = ([Vec<f64>; 4], Vec<usize>, Bound<'py, PyArrayDyn<f64>>);
-
-/// [`ResidualStatistics`] of residuals (curves, N, d), and deviations (curves, N). `limits` and `variances` have one
-/// value per curve.
-#[pyfunction]
-pub fn residual_statistics<'py>(
-    py: Python<'py>,
-    rows: Array<'py>,
-    neighbours: Array<'py>,
-    limits: Array<'py>,
-    variances: Array<'py>,
-) -> PyResult<OfResiduals<'py>> {
     let [curves, n, d] = [0, 1, 2].map(|axis| rows.shape()[axis]);
-    let beside = neighbours.shape()[1];
-    let (rows, neighbours) = (in_order(&rows)?, in_order(&neighbours)?);
-    let (limits, variances) = (in_order(&limits)?, in_order(&variances)?);
+    let len = space.point_len();
+    let [times, at, points, weights] = data.each_ref().map(in_order);
+    let (times, at, points, weights) = (times?, at?, points?, weights?);
+    let [rows, neighbours, leverages, sigmas] = [&rows, &neighbours, &leverages, &sigmas].map(in_order);
+    let (rows, neighbours, leverages, sigmas) = (rows?, neighbours?, leverages?, sigmas?);
     let of = |c: usize| {
-        let (own, near) = (&rows[c * n * d..][..n * d], &neighbours[c * beside..][..beside]);
-        ResidualStatistics::new(own, d, near, limits[c], variances[c])
+        let [times, weights, neighbours] = [times, weights, neighbours].map(|rows| &rows[c * n..][..n]);
+        let [at, points] = [at, points].map(|rows| &rows[c * n * len..][..n * len]);
+        let rows = &rows[c * n * d..][..n * d];
+        let data = AtData { times, at, points, weights };
+        let sigma = Some(sigmas[c]).filter(|sigma| !sigma.is_nan());
+        let own = Examined { data, rows, neighbours, leverage: leverages[c], sigma };
+        own.complaint(&space, d, corner).map(|complaint| (c, complaint))
     };
-    let found = watched(py, None, curves, is_long(rows.len()), |_| (0..curves).map(of).collect::<Vec<_>>())?;
-    let column = |part: fn(&ResidualStatistics) -> f64| found.iter().map(part).collect();
-    let numbers =
-        [column(|x| x.medians[0]), column(|x| x.medians[1]), column(|x| x.square), column(|x| x.lagged)];
-    let out = zeros(py, &[curves, n])?;
-    let mut write = out.readwrite();
-    let sizes = write.as_slice_mut()?;
-    found.iter().zip(sizes.chunks_exact_mut(n.max(1))).for_each(|(x, row)| row.copy_from_slice(&x.sizes));
-    drop(write);
-    Ok((numbers, found.iter().map(|x| x.products).collect(), out))
+    let complaints = watched(py, None, curves, is_long(rows.len()), |_| {
+        (0..curves).filter_map(of).collect::<Vec<(usize, Complaint)>>()
+    })?;
+    let told = |(c, complaint)| match complaint {
+        Complaint::Bypassed(part) => (c, Some(part), None, None),
+        Complaint::Given(finding) => (c, None, Some(found(finding)), None),
+        Complaint::Estimated(own) => {
+            (c, None, None, Some((own.ratio, own.correlation, own.outliers, own.run)))
+        }
+    };
+    Ok(complaints.into_iter().map(told).collect())
 }
 
-/// The tests of constant smoothness and of constant noise for one curve: score, first and last datum, and ratio.
+/// For each curve the tests of constant smoothness and of constant noise: score, first and last datum, and ratio; None if
+/// there are too few data. All arrays are (curves, ...): see [`is_constant`].
 #[pyfunction]
-pub fn unequal_bins(
+#[allow(clippy::too_many_arguments, clippy::type_complexity)]
+pub fn are_constant(
+    py: Python<'_>,
     times: Array<'_>,
+    weights: Array<'_>,
     leverages: Array<'_>,
     squares: Array<'_>,
     knots: Array<'_>,
     energy: Array<'_>,
     m: usize,
-    least: f64,
-) -> PyResult<[(f64, [usize; 2], f64); 2]> {
-    let [times, leverages, squares, knots, energy] =
-        [&times, &leverages, &squares, &knots, &energy].map(in_order);
-    let (times, leverages, squares, knots, energy) = (times?, leverages?, squares?, knots?, energy?);
-    let recording = Recording { times, leverages, squares, knots, energy, m };
-    let of = |Unequal { score, place, ratio }| (score, place, ratio);
-    Ok([of(recording.smoothness(least)), of(recording.noise(least))])
+) -> PyResult<Vec<Option<[(f64, [usize; 2], f64); 2]>>> {
+    let (curves, n, count) = (times.shape()[0], times.shape()[1], knots.shape()[1]);
+    let [times, weights, leverages, squares] = [&times, &weights, &leverages, &squares].map(in_order);
+    let (times, weights, leverages, squares) = (times?, weights?, leverages?, squares?);
+    let (knots, energy) = (in_order(&knots)?, in_order(&energy)?);
+    let of = |c: usize| {
+        let [times, weights, leverages, squares] =
+            [times, weights, leverages, squares].map(|rows| &rows[c * n..][..n]);
+        let course = [knots, energy].map(|rows| &rows[c * count..][..count]);
+        let tests = is_constant(times, weights, leverages, squares, course, m)?;
+        Some(tests.map(|Unequal { score, place, ratio }| (score, place, ratio)))
+    };
+    watched(py, None, curves, is_long(times.len()), |_| (0..curves).map(of).collect())
+}
+
+/// Paths (curves, n, d, d) that turn by the most frequent steps of rotations, and whether in the fixed frame: see
+/// [`usual_turn`].
+#[pyfunction]
+pub fn usual_turns<'py>(
+    py: Python<'py>,
+    handle: &Handle,
+    points: Array<'py>,
+) -> PyResult<(Bound<'py, PyArrayDyn<f64>>, Vec<bool>)> {
+    let space = handle.space.get();
+    let shape = points.shape();
+    let (curves, n, d) = (shape[0], shape[1], shape[2]);
+    let numbers = in_order(&points)?;
+    let turns = watched(py, None, curves, is_long(numbers.len()), |_| {
+        let of = |c: usize| usual_turn(&space, &numbers[c * n * d * d..][..n * d * d], d);
+        (0..curves).map(of).collect::<Vec<Turn>>()
+    })?;
+    let out = zeros(py, shape)?;
+    let mut write = out.readwrite();
+    let rows = write.as_slice_mut()?.chunks_exact_mut((n * d * d).max(1));
+    turns.iter().zip(rows).for_each(|(turn, row)| row.copy_from_slice(&turn.path));
+    drop(write);
+    Ok((out, turns.iter().map(|turn| turn.fixed).collect()))
 }
 
 /// Control points, and of each curve whether it converged, its iterations, the last step, and the sum of squares.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields, replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,8 +40,59 @@ class FarPointsWarning(UserWarning):
     """
 
 
-@dataclass(frozen=True)
-class Report:
+def columns_of(kind: type) -> dict[str, type]:
+    """Return the fields of a report that have one value per curve, and their types, in their order."""
+    return {own.name: own.metadata["dtype"] for own in fields(kind) if "dtype" in own.metadata}
+
+
+class FitReport:
+    """Base of reports, dataclasses whose fields have one value per curve or describe all curves."""
+
+    def __eq__(self, other: object) -> bool:
+        """Whether both are equal, with NaN equal to NaN."""
+        if type(other) is not type(self):
+            return NotImplemented
+        each = [(mine, getattr(other, name)) for name, mine in vars(self).items()]
+        return all(
+            bool(a == b)
+            if a is None or b is None or isinstance(a, (str, tuple))
+            else np.array_equal(a, b, equal_nan=True)
+            for a, b in each
+        )
+
+    def __hash__(self) -> int:
+        return hash(tuple(vars(self).values()))
+
+    def map(self, function: Callable[[Any], Any]) -> Self:
+        """Apply a function to all fields that have one value per curve.
+
+        Parameters
+        ----------
+        function : callable
+            Function of one field, such as the selection of some curves.
+
+        Returns
+        -------
+        FitReport
+            Report with the results, of the same class.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import symspline as ss
+        >>> curves = ss.CubicSpline(None, np.zeros((3, 4, 1)), "r:1")
+        >>> bool(curves.report.map(lambda field: field[0]).iterations == curves[0].report.iterations)
+        True
+        """
+        values = {name: getattr(self, name) for name in columns_of(type(self))}
+        return self._replaced({name: value if value is None else function(value) for name, value in values.items()})
+
+    def _replaced(self, columns: dict[str, Any]) -> Self:
+        return replace(self, **columns)  # type: ignore[type-var]
+
+
+@dataclass(frozen=True, eq=False)
+class Report(FitReport):
     r"""Report of a fit.
 
     For a batch of curves, every field except ``method``, ``curvature`` and ``skipped`` is an array with the batch
@@ -169,31 +220,13 @@ class Report:
             return f"<Report of {np.size(self.converged)} curves: {self}>"
         return f"Report({', '.join(f'{own.name}={getattr(self, own.name)!r}' for own in fields(self))})"
 
-    def __eq__(self, other: object) -> bool:
-        return same_report(self, other) if isinstance(other, Report) else NotImplemented
-
-    def map(self, function: Callable[[Any], Any]) -> Report:
-        """Apply a function to all fields that have one value per curve.
-
-        Parameters
-        ----------
-        function : callable
-            Function of one field, such as the selection of some curves.
-
-        Returns
-        -------
-        Report
-            Report with the results.
-
-        Examples
-        --------
-        >>> import numpy as np
-        >>> import symspline as ss
-        >>> curves = ss.CubicSpline(None, np.zeros((3, 4, 1)), "r:1")
-        >>> bool(curves.report.map(lambda field: field[0]).iterations == curves[0].report.iterations)
-        True
-        """
-        return replace(self, **_without_nan(mapped_columns(self, function)))
+    def _replaced(self, columns: dict[str, Any]) -> Self:
+        """Replace fields; those of one curve are None instead of NaN, and its number of sweeps is an integer."""
+        for name in OPTIONAL:
+            if np.ndim(columns[name]) == 0 and columns[name] is not None and np.isnan(columns[name]):
+                columns[name] = None
+        columns["guaranteed_sweeps"] = _count(columns["guaranteed_sweeps"])
+        return replace(self, **columns)
 
 
 def _worst(values: Any) -> Any:
@@ -205,35 +238,6 @@ def _place_of_worst(values: Any) -> str:
     """Return the index of the largest value in the batch."""
     index = np.unravel_index(np.nanargmax(values), np.shape(values))
     return ", ".join(str(i) for i in index)
-
-
-def columns_of(kind: type) -> dict[str, type]:
-    """The fields of a report that have one value per curve, and their types, in their order."""
-    return {own.name: own.metadata["dtype"] for own in fields(kind) if "dtype" in own.metadata}
-
-
-def mapped_columns(report: Any, function: Callable[[Any], Any]) -> dict[str, Any]:
-    """The fields that are per curve with a function applied; None stays None."""
-    values = {name: getattr(report, name) for name in columns_of(type(report))}
-    return {name: None if value is None else function(value) for name, value in values.items()}
-
-
-def same_report(ours: Any, theirs: Any) -> bool:
-    """Whether two reports of one class are equal, with NaN equal to NaN."""
-    each = ((getattr(ours, own.name), getattr(theirs, own.name)) for own in fields(ours))
-    return all(
-        bool(a == b) if a is None or b is None or isinstance(a, (str, tuple)) else np.array_equal(a, b, equal_nan=True)
-        for a, b in each
-    )
-
-
-def _without_nan(columns: dict[str, Any]) -> dict[str, Any]:
-    """Fields of one curve with None for undefined numbers, and a whole number of sweeps; arrays stay."""
-    for name in OPTIONAL:
-        if np.ndim(columns[name]) == 0 and columns[name] is not None and np.isnan(columns[name]):
-            columns[name] = None
-    columns["guaranteed_sweeps"] = _count(columns["guaranteed_sweeps"])
-    return columns
 
 
 # The rows of the two tables of the compiled core.
@@ -335,7 +339,8 @@ def long_gaps(times: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 def shaped(columns: Columns, times: NDArray[np.float64], batch: tuple[int, ...], space: Any, method: str) -> Report:
     """Return the report of curves with these knots from its columns; `method` is the requested one."""
-    values: dict[str, Any] = {name: columns.row(name).reshape(batch) for name in (*INTEGERS, *NUMBERS)}
+    rows = zip((*INTEGERS, *NUMBERS), (*columns.integers, *columns.numbers), strict=True)
+    values: dict[str, Any] = {name: row.reshape(batch) for name, row in rows}
     _certify(values, space.injectivity_radius)
     if method == "auto" and times.shape[-1] > _WHOLE + 1:
         values["skipped"] = values["skipped"] | _unsearched(values, space.injectivity_radius)
@@ -387,8 +392,8 @@ def _skipped(bits: int) -> tuple[str, ...]:
     return tuple(name for i, name in enumerate(SOLVERS) if bits >> i & 1) if bits else ()
 
 
-@dataclass(frozen=True)
-class CumulativeReport:
+@dataclass(frozen=True, eq=False)
+class CumulativeReport(FitReport):
     """Report of a least-squares fit of a `CumulativeBSpline`.
 
     For a batch of curves, every field is an array with the batch axes.
@@ -421,7 +426,5 @@ class CumulativeReport:
     step: Number = field(metadata=FLOAT)
     residual_sum: Number = field(metadata=FLOAT)
 
-    def _picked(self, index: Any) -> CumulativeReport:
-        """Return the report of one curve, or of a slice of the batch."""
-        picked = {name: np.asarray(value)[index] for name, value in vars(self).items()}
-        return replace(self, **{name: x if x.ndim else x.item() for name, x in picked.items()})
+    def _replaced(self, columns: dict[str, Any]) -> Self:
+        return replace(self, **{name: x if np.ndim(x) else x.item() for name, x in columns.items()})

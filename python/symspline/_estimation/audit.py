@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from .._base.warnings import warn
 from .._curves.ends import end_kinds
 from .._smoothing import SmoothingWarning
-from .._smoothing.audit import Residuals, corner_of, examine
-from .._smoothing.audited import DEGREES, Sensor, advice, described
+from .._smoothing.audit import DEGREES, Residuals, Sensor, advice, corner_of, described, examine
 from .._smoothing.posterior import Posterior
 from .._spaces import Doubles
 from .measurements import GRAVITY

@@ -36,10 +36,10 @@ from .._curves.held import warn_of_held_points
 from .._curves.options import check_on_failure, check_progress, checked_extrapolate
 from .._curves.solve import DEFAULTS
 from .._smoothing import SmoothingReport, SmoothingSpline, SmoothingWarning, make_smoothing_spline
-from .._smoothing.factors import grouped, join, smoothed_spaces
+from .._smoothing.audit import warn_of_bounds
 from .._smoothing.knots import Knots, thin_knots
+from .._smoothing.noise import grouped, join, smoothed_spaces
 from .._smoothing.posterior import Parameter
-from .._smoothing.warned import warn_of_bounds
 from .._spaces import (
     Array,
     Doubles,

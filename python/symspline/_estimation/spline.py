@@ -13,8 +13,8 @@ from .._core import ValidationError
 from .._curves.curve import SidePanel, UncertaintyBand
 from .._curves.ends import end_kinds
 from .._smoothing.data import SmoothingData
-from .._smoothing.factors import is_several, smoothed_spaces
 from .._smoothing.gaps import Calibration
+from .._smoothing.noise import is_several, smoothed_spaces
 from .._smoothing.posterior import Parameter, Posterior, coordinates
 from .._smoothing.report import SmoothingReport
 from .._smoothing.solve import Smoothed

@@ -13,7 +13,7 @@ from .._base.time import TimeAxis
 from .._base.warnings import silenced
 from .._core import ValidationError
 from .._smoothing import make_smoothing_spline
-from .._smoothing.factors import split
+from .._smoothing.noise import split
 from .._spaces import Array, Doubles, Euclidean, Product, Space, SpecialOrthogonal, factors_of, nearest_rotations
 from .._splines.curve import Curve
 from ..convert import matrix_to_quaternion

@@ -13,8 +13,7 @@ from .._base.typing import Loss
 from .._core import ValidationError
 from .._curves.fit import read
 from .._smoothing.audit import roots_of
-from .._smoothing.factors import join, parts_of_factor, smoothed_spaces, split
-from .._smoothing.precision import read_precision
+from .._smoothing.noise import join, parts_of_factor, read_precision, smoothed_spaces, split
 from .._spaces import (
     Array,
     Doubles,

@@ -12,7 +12,7 @@ from .._base.typing import TimesLike
 from .._core import ValidationError
 from .._curves.at_times import call_at_times
 from .._smoothing import SmoothingSpline
-from .._smoothing.factors import smoothed_spaces, split
+from .._smoothing.noise import smoothed_spaces, split
 from .._spaces import Array, Doubles, factors_of
 from .._splines.composed import SegmentedCurve
 

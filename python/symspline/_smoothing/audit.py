@@ -1,55 +1,272 @@
-"""Test whether the residuals of a fit are those of independent noise with the given standard deviations.
-
-Each check compares a statistic with a limit that data without a fault exceed about once in 10⁴ fits. A second limit on
-the size of the effect is needed because negligible deviations are statistically significant in long recordings.
-"""
+"""Warnings about fits that cannot be trusted: residuals, outliers, the choice of λ, other minima, varying motion."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from functools import lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
-from .._spaces import Doubles
+from .._base.arrays import short_repr
+from .._base.faults import of_index
+from .._base.warnings import is_silent, warn
+from .._curves.curve import CurveArrays
+from .._curves.ends import end_kinds
+from .._spaces import Array, Doubles, Space, factors_of
+from .data import Part, SmoothingData
+from .noise import distances_of, grouped, in_part, is_several, smoothed_spaces, split
+from .report import SmoothingReport, SmoothingWarning
+from .solve import FAST, NOISY, TWO, UNIQUE, Found, Smoothed
 
 # Quantiles of χ² at which the losses begin to grow more slowly, as in `loss.rs`.
 _CORNERS = {"huber": 0.82, "cauchy": 0.95}
 # Eigenvalues of a root of an information matrix below this relative size are rounding errors.
 _NOTHING = 1e-6
-# Limit, in standard deviations, of the mean square and of the autocorrelation.
-SIGNIFICANT = 4.5
-# Ratios of residuals to σ between this factor and its inverse are negligible. The second factor is for robust losses,
-# where medians measure the ratio and grow with the share of outliers.
-_RATIO, _ROBUST_RATIO = 1.1, 1.6
-# Autocorrelations below the first number are negligible; those above the second are not caused by a wrong σ.
-_CORRELATED, _SMOOTH = 0.1, 0.3
-# Limit of the largest centred partial sum (Ploberger and Krämer 1992), and the negligible size as a fraction of √n. It
-# corresponds to steps of a quarter of the standard deviation.
-_PARTIAL_SUM, _STEP = 2.0, 0.0625
-# Smallest limit of the largest residual. In long recordings, normal residuals exceed the limit with this probability.
-_LARGEST, _PROBABILITY = 6.0, 1e-5
-# Share of the measurements that a robust loss may reject, the number of its standard errors by which chance may exceed
-# it, and the multiple of the corner of the loss beyond which measurements are rejected.
-_REJECTED, _CHANCE, _BEYOND = 0.3, 2.0, 9.0
-# More consecutive rejected measurements than this number, and than this share of all, are reported, because outliers of
-# a sensor are mostly isolated.
-_RUN, _RUN_SHARE = 8, 0.05
-# The same for smoothing, where every datum is a point: six in a row are rare among 15 % of isolated outliers.
-_RUN_OF_DATA, _SHARE_OF_DATA = 5, 0.02
-# Residuals below this fraction of σ are those of data without noise.
-_EXACT = 1e-6
-# Residuals of fewer measurements, or with a larger leverage, are not examined.
-_FEWEST, _LEVERAGE = 5, 0.9
-# For fits that estimate the noise level: the limit of the ratio of the residuals to the noise estimated from
-# neighbouring data, and the leverage up to which the residuals have nearly the covariance of the noise. Beyond this
-# leverage, only outliers are tested, with a limit multiplied by the third number, up to the fourth number.
-_NEIGHBOURS, _MODERATE, _UNEVEN, _HIGH = 1.75, 0.3, 1.5, 0.6
-# For such fits, the least number of data, and the number of data on either side with which an outlier is compared.
-_FEW_DATA, _NEAR = 20, 10
-# Efficiency of the median of squares as an estimate of the variance, relative to that of the mean square.
-_EFFICIENCY = 0.37
+# Autocorrelations above this are not caused by a wrong σ.
+_SMOOTH = 0.3
+# Ratios of common units, and the largest difference of a logarithm of a ratio from theirs.
+DEGREES, _UNITS, _NEAR = 180 / np.pi, {1e3: "1000, the ratio of m and mm, or of s and ms"}, 0.15
+# Kinds of selections by a robust loss that cannot be trusted, as numbered in `Selection` of the core.
+_INTERPOLATED, _UNSETTLED, _PULLED = 1, 2, 4
+# Ratio of the degrees of freedom to the number of data from which a curve follows nearly all data.
+_ALL = 0.9
+# Smallest number of data, and of degrees of freedom, for the tests of a varying motion, as in `audit.rs`.
+_DATA, _FREEDOM = 100, 13
+# Scores beyond which these tests fail, in standard deviations of a normal distribution. The levels are empirical,
+# because motions are not samples of the prior process: in 700 recordings of constant smoothness (sums of five sines and
+# Matérn-like processes, 200 to 1000 data), no score exceeded 5.1 and 2.9. Sums of three sines that beat on S² and SO(3)
+# reached 9.1, but these are excluded by the limit of the ratio below.
+_SMOOTHNESS, _NOISE = 7.0, 4.5
+# Least energy per degree of freedom in the fast part, relative to the whole curve. Waves that beat reach 2.2.
+_FASTER = 4.0
+# Limit of the ratio of squared distances. The ratio is below it where smoothing still recovers the curve, as with noise
+# of half a radian on S², SO(3) or RP². It is above it for random points, unless the curve follows them.
+_FAR = 0.5
+# Number of data of a curve that are enough for the check.
+_SAMPLE = 1000
+
+
+class Fitted(NamedTuple):
+    """The fit in one of the spaces in which data are smoothed. Arrays with one value per curve have the batch axes.
+
+    Attributes
+    ----------
+    space : Space
+        The space.
+    points, at : ndarray, shape (..., N, *point_shape)
+        Data, and points of the curves at their times.
+    smoothed : Smoothed
+        Result of the smoothing.
+    converged, df : ndarray
+        Fields of its report.
+    loss : str
+        Loss of the data.
+    chosen, given : ndarray of bool
+        Whether λ was chosen from the data, and whether σ is given.
+    selection, rejected : ndarray of int
+        Kind of the selection of a robust loss, which is 0 if it can be trusted, and the number of rejected data.
+    minimum : ndarray of int
+        Kind of the minimum, see `best_of_starts`.
+    """
+
+    space: Space
+    points: Array
+    at: Array
+    smoothed: Smoothed
+    converged: NDArray[np.bool_]
+    df: Doubles
+    loss: str
+    chosen: NDArray[np.bool_]
+    given: NDArray[np.bool_]
+    selection: NDArray[np.int_]
+    rejected: NDArray[np.int_]
+    minimum: NDArray[np.int_]
+
+
+def audit(
+    spline: Any, parts: list[Part], found: list[Found], good: NDArray[np.bool_], choices: NDArray[np.bool_]
+) -> None:
+    """Issue at most one warning of each kind about smoothing splines.
+
+    Parameters
+    ----------
+    spline : SmoothingSpline
+        The splines.
+    parts, found : list
+        Data and results in every space in which data were smoothed, with the batch axes.
+    good : ndarray of bool
+        Which curves are not masked.
+    choices : ndarray of bool
+        Which curves have a λ to choose.
+    """
+    space, noisy, batch = spline.space, spline._noisy, spline._noisy.batch
+    at_data = [
+        rows
+        for factor, curve in zip(factors_of(space), spline._curve.parts, strict=True)
+        for rows in split(factor, curve.evaluate(noisy.times, "point", "raise", noisy.times.ndim > 1))
+    ]
+    fits = [
+        Fitted(
+            part.space,
+            part.points,
+            rows,
+            smoothed,
+            np.asarray(smoothed.report.converged),
+            np.asarray(smoothed.report.df),
+            part.noise.loss,
+            np.isnan(part.lam).reshape(batch) & choices,
+            np.isfinite(part.noise.sigma).reshape(batch) & good,
+            *[np.reshape(column, batch) for column in (own.selection, own.rejected, own.minima)],
+        )
+        for part, rows, smoothed, own in zip(parts, at_data, spline._smoothed, found, strict=True)
+    ]
+    counts = [np.sum(noise.weights > 0, axis=-1) for noise in noisy.noise]
+    _warn_of_outliers(space, fits, counts)
+    _warn_of_minima(space, fits)
+    trusted = [fit.chosen & (fit.selection == 0) & (fit.minimum == UNIQUE) for fit in fits]
+    warn_of_bounds(space, [fit.smoothed.report for fit in fits], trusted, counts)
+    if not is_silent(SmoothingWarning):
+        _warn_of_residuals(space, noisy, fits)
+        if fits[0].smoothed.penalty == "acceleration" and noisy.times.shape[-1] >= _DATA:
+            _warn_of_varying(space, noisy, spline._curve, fits, end_kinds(spline._bc_type))
+    _warn_of_spreads(noisy, fits)
+
+
+def _first(space: Space, affected: list[NDArray[np.bool_]], mark: str = "") -> tuple[int, tuple[int, ...], str] | None:
+    """Return the first of the affected curves: its part, its index, and words that name it and count the others."""
+    counts = [int(np.count_nonzero(own)) for own in affected]
+    if not any(counts):
+        return None
+    number = counts.index(next(filter(None, counts)))
+    index = tuple(map(int, np.argwhere(affected[number])[0]))
+    more = f" (and {sum(counts) - 1} more)" if sum(counts) > 1 else ""
+    return number, index, of_index(index) + in_part(space, number, mark) + more
+
+
+# ---- data that a robust loss rejects ----
+
+
+def _warn_of_outliers(space: Space, fits: list[Fitted], counts: list[Any]) -> None:
+    """Warn if the data that were rejected from a curve may be the wrong ones."""
+    # Data without noise, such as those of a body at rest, contain no outliers.
+    bad = [
+        (fit.selection != 0) & fit.converged & ((fit.rejected != 0) | (np.asarray(fit.smoothed.report.sigma) > 0))
+        for fit in fits
+    ]
+    if not (first := _first(space, bad)):
+        return
+    number, index, of = first
+    fit = fits[number]
+    kind, rejected, df = int(fit.selection[index]), int(fit.rejected[index]), float(fit.df[index])
+    count = int(np.broadcast_to(counts[number], bad[number].shape)[index])
+    what = f"The smoothing{of} with loss={fit.loss!r}"
+    if kind == _INTERPOLATED:
+        message = (
+            f"{what} follows nearly all data ({df:.3g} degrees of freedom for {count} data): their noise is smaller "
+            f"than their sampling can show. It rejected {rejected} data that deviate far more than others, and cannot "
+            "find smaller outliers. Its standard deviations are only valid if the data are that accurate. Pass sigma= "
+            "to find smaller outliers, or sample more often."
+        )
+    elif kind == _UNSETTLED:
+        message = (
+            f"{what} could not determine which data are outliers: the selection alternates between two sets of data. "
+            f"The last one rejects {rejected} of {count} data. Plot the residuals, and pass sigma=, or weights of 0 "
+            "for the wrong data."
+        )
+    elif kind == _PULLED:
+        message = (
+            f"{what} has an outlier that moves the curve by more than five standard deviations, because there are no "
+            "other data near it. Pass loss='cauchy', or weights of 0 for outliers in gaps."
+        )
+    else:
+        message = (
+            f"{what} rejects many data: {rejected} of {count} data are far from the curve. If these are not outliers, "
+            "the noise varies along the recording, or the data belong to several curves. Plot the residuals, and pass "
+            "sigma= or weights=."
+        )
+    warn(message, SmoothingWarning, index)
+
+
+# ---- other minima ----
+
+
+def _warn_of_minima(space: Space, fits: list[Fitted]) -> None:
+    """Warn if a curve may not be the one with the least objective."""
+    if first := _first(space, [(fit.minimum != UNIQUE) & fit.converged for fit in fits], ","):
+        number, index, of = first
+        noise = f"{float(np.asarray(fits[number].smoothed.report.sigma)[index]):.2g}"
+        message = _MINIMA[int(fits[number].minimum[index])]
+        warn(message.format(of=of, noise=noise, space=smoothed_spaces(space)[number]), SmoothingWarning, index)
+
+
+_MINIMA = {
+    TWO: (
+        "Two curves fit the data{of} nearly equally well (noise {noise}): they go around {space!r} in different ways. "
+        "The better one was returned. Plot it, and sample more often, or pass weights of 0 for wrong data."
+    ),
+    NOISY: (
+        "The noise of the data{of}, {noise} per coordinate, is so large a part of the distance to the cut locus of "
+        "{space!r} that the curve may go around it in the wrong way. Check the units of angles. Plot the curve, and "
+        "sample more often, or pass a larger lam, or weights of 0 for wrong data."
+    ),
+    FAST: (
+        "The data{of} turn by more than half of the distance to the cut locus of {space!r} from one to the next, and "
+        "their noise is {noise}, so that the curve may turn by wrong angles. Sample more often. If the angular "
+        "velocity is known, remove this rotation from the data first."
+    ),
+}
+
+
+# ---- the choice of λ ----
+
+
+def warn_of_bounds(space: Space, reports: list[SmoothingReport], chosen: list[Any], counts: list[Any]) -> None:
+    """Warn once if a chosen λ is at a bound, or close to it.
+
+    Parameters
+    ----------
+    reports : list of SmoothingReport
+        Reports of every space in which data were smoothed.
+    chosen : list of ndarray of bool
+        Whether λ was chosen from the data, for each curve.
+    counts : list of ndarray of int
+        Number of data of each curve.
+    """
+    for number, (report, asked, count) in enumerate(zip(reports, chosen, counts, strict=True)):
+        rough = (np.asarray(report.df) > _ALL * count) & (np.asarray(count) > 4)
+        found = np.argwhere((np.asarray(report.at_bound) | rough) & np.asarray(report.converged) & asked)
+        if not len(found):
+            continue
+        index = tuple(map(int, found[0]))
+        of = of_index(index) + in_part(space, number)
+        of += f" (and of {len(found) - 1} more curves)" if len(found) > 1 else ""
+        if report.is_stiff(index):
+            lam = "the largest lam: the curve is a geodesic"
+            advice = (
+                "This is correct for data along a geodesic. Otherwise the true curve bends faster than the data are "
+                "sampled, or less than their noise: plot the data, and pass lam= to set the smoothness."
+            )
+        elif rough[index]:
+            lam = "a lam so small that the curve follows nearly all data"
+            advice = (
+                "Its standard deviations are only valid if the data are that accurate. Data at nearly equal times and "
+                "correlated noise cause this. Pass a larger gamma, criterion='reml', sigma= with criterion='cp', or "
+                "lam=."
+            )
+        else:
+            lam = "the smallest lam for which a curve was found"
+            advice = (
+                "With less smoothing, the curve would turn too far between two knots. Pass more knots in the gaps of "
+                "the data, or cut the recording at its gaps (symspline.fit_segments)."
+            )
+        df = float(np.asarray(report.df)[index])
+        warn(f"The smoothing{of} chose {lam} ({df:.3g} degrees of freedom). {advice}", SmoothingWarning, index)
+        return
+
+
+# ---- residuals that are not those of independent noise ----
 
 
 class Residuals(NamedTuple):
@@ -81,52 +298,49 @@ class Residuals(NamedTuple):
 
 
 class Finding(NamedTuple):
-    """The result of the audit of one sensor.
+    """The result of the examination of one sensor, as `smoothing/src/examine.rs` describes it."""
 
-    Attributes
-    ----------
-    ratio : float
-        Ratio of the residuals to σ: 1 if σ is right, NaN if the ratio cannot be determined.
-    freedom : float
-        Degrees of freedom of the residuals.
-    correlation : float
-        Lag-one autocorrelation, corrected for the leverage.
-    large, small, correlated : bool
-        Whether the residuals are too large, too small, or correlated.
-    step : int or None
-        First row after a change of the mean of the residuals.
-    outliers : ndarray of int
-        Rows of outliers under least squares, in decreasing order of size.
-    largest : float
-        The largest residual.
-    rejected : float
-        Share of the measurements that a robust loss rejects, if it is too large, else 0.
-    run : tuple of int or None
-        First and last row of too many consecutive measurements that a robust loss rejects.
-    """
-
-    ratio: float = np.nan
-    freedom: float = 0.0
-    correlation: float = 0.0
-    large: bool = False
-    small: bool = False
-    correlated: bool = False
-    step: int | None = None
-    outliers: NDArray[np.intp] = np.empty(0, np.intp)
-    largest: float = 0.0
-    rejected: float = 0.0
-    run: tuple[int, int] | None = None
+    ratio: float
+    freedom: float
+    correlation: float
+    large: bool
+    small: bool
+    correlated: bool
+    step: int | None
+    outliers: list[int]
+    largest: float
+    rejected: float
+    run: list[int] | None
 
     @property
     def failed(self) -> bool:
-        """Whether a check failed."""
+        """Whether a test failed."""
         found = self.large or self.small or self.correlated or self.step is not None
-        return found or bool(len(self.outliers)) or self.rejected > 0 or self.run is not None
+        return found or bool(self.outliers) or self.rejected > 0 or self.run is not None
 
     @property
     def smooth(self) -> bool:
         """Whether the residuals are so correlated that a wrong σ is not their only cause."""
         return self.correlated and self.correlation > _SMOOTH
+
+
+class Sensor(NamedTuple):
+    """Data of one kind in one part of the space, with the result of the examination.
+
+    Attributes
+    ----------
+    name, label : str
+        Name with the kind of data, and name of the argument.
+    numbers : ndarray of int
+        Index of each row among the data passed by the user.
+    finding : Finding
+        The result.
+    """
+
+    name: str
+    label: str
+    numbers: NDArray[np.intp]
+    finding: Finding
 
 
 def corner_of(loss: str, d: int) -> float:
@@ -145,198 +359,327 @@ def roots_of(information: Doubles) -> tuple[Doubles, NDArray[np.bool_]]:
     return roots[..., None] * np.swapaxes(vectors, -1, -2), known
 
 
-def normal_of_chi_squared(ratio: float, freedom: float) -> float:
-    """Transform χ² divided by its degrees of freedom to a standard normal score (Wilson and Hilferty 1931)."""
-    spread = 2.0 / (9.0 * freedom)
-    return float((np.cbrt(ratio) - (1.0 - spread)) / np.sqrt(spread))
-
-
-def median_of_chi_squared(d: float) -> float:
-    """Return the median of the squared length of d independent standard normal numbers, for d rounded to 1 or more."""
-    return _core.chi_squared(max(1, round(d)), 0.5)
-
-
-def median_square(squares: Doubles, d: float) -> float:
-    """Return the variance of normal residuals from the median of the squared lengths of their d components."""
-    return float(np.median(squares)) / median_of_chi_squared(d)
-
-
-def autocorrelation(rows: Doubles) -> tuple[float, int]:
-    """Return the lag-one autocorrelation of all columns, and the number of products in the estimate."""
-    products = rows[1:] * rows[:-1]
-    count = int(np.isfinite(products).sum())
-    square = float(np.nanmean(rows**2))
-    return (float(np.nansum(products)) / count / square if count and square > 0 else 0.0), count
-
-
-def largest_partial_sum(rows: Doubles) -> tuple[float, int]:
-    """Return the largest centred partial sum of a column, divided by s√n, and the row after it."""
-    known = np.isfinite(rows)
-    counts = known.sum(axis=0)
-    used = counts >= _FEWEST
-    filled = np.where(known, rows, 0.0)[:, used]
-    means = filled.sum(axis=0) / counts[used]
-    centred = np.where(known[:, used], filled - means, 0.0)
-    spread = np.sqrt((centred**2).sum(axis=0))
-    if not np.any(spread > 0):
-        return 0.0, 0
-    sums = np.abs(np.cumsum(centred, axis=0)) / np.where(spread > 0, spread, np.inf)
-    row = int(sums.max(axis=1).argmax())
-    return float(sums[row].max()), row + 1
-
-
-def largest_expected(count: int) -> float:
-    """Return the limit of the largest of independent normal residuals."""
-    return max(_LARGEST, float(np.sqrt(2 * np.log(max(count, 1) / _PROBABILITY))))
-
-
-def long_run(rejected: NDArray[np.bool_], most: float) -> tuple[int, int] | None:
-    """Return the first and the last row of the longest run of rejected measurements if it exceeds `most`, else None."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], rejected, [False]])))
-    starts, ends = edges[::2], edges[1::2]
-    if not len(starts):
-        return None
-    longest = int((ends - starts).argmax())
-    first, last = int(starts[longest]), int(ends[longest]) - 1
-    return (first, last) if last - first + 1 > most else None
-
-
 def examine(given: Residuals) -> Finding:
-    """Examine the residuals of one sensor.
+    """Examine the residuals of one sensor, which are in the order of time."""
+    corner = None if given.loss == "linear" else given.corner
+    rows = np.ascontiguousarray(given.rows)
+    return Finding(*_core.examine(rows, given.leverage, given.between, corner, given.exact))
+
+
+_STIFF = (
+    "Either the curve is too stiff, or the noise is correlated, as in rounded, repeated or filtered data. Plot the "
+    "curve with the data. If the curve is too stiff, pass criterion='reml', a smaller lam or more knots. If the noise "
+    "is correlated, do not use the bands."
+)
+_BYPASSED = (
+    "the loss rejects data on both sides of the part from index {0} to {1}, but a curve without this part is near "
+    "them. If the data of this part are outliers, pass weights of 0 for them. If the motion is fast there, pass "
+    "loss='linear' or smooth this part by itself."
+)
+
+
+def _warn_of_residuals(space: Space, noisy: SmoothingData, fits: list[Fitted]) -> None:
+    """Warn if the residuals of a curve are not those of independent noise.
+
+    Curves with given λ and estimated σ are not examined, because the user has decided how closely they follow the data.
+    """
+    found: list[tuple[tuple[int, ...], str]] = []
+    for number, fit in enumerate(fits):
+        curves = np.flatnonzero(fit.converged & (fit.given | fit.chosen))
+        of_part = in_part(space, number, ",")
+        for curve, facts in _complaints(noisy, number, fit, curves) if len(curves) else ():
+            index = tuple(map(int, np.unravel_index(curve, noisy.batch)))
+            what = f"The residuals of the smoothing{of_index(index)}{of_part} are not those of independent noise: "
+            found.append((index, what + facts))
+    if found:
+        index, message = found[0]
+        more = f" This holds for {len(found) - 1} more curves or factors." if len(found) > 1 else ""
+        warn(message + more, SmoothingWarning, index)
+
+
+def _complaints(noisy: SmoothingData, number: int, fit: Fitted, curves: NDArray[np.intp]) -> list[tuple[int, str]]:
+    """Return the curves that failed a test among the given ones, with descriptions of the tests and their remedies."""
+    space, noise, n = fit.space, noisy.noise[number], noisy.times.shape[-1]
+
+    def of_curves(array: Any, axes: tuple[int, ...] = ()) -> Array:
+        rows: Array = np.broadcast_to(array, (*noisy.batch, n, *axes)).reshape(-1, n, *axes)[curves]
+        return rows
+
+    points = [space._as_doubles(of_curves(points, space.point_shape)) for points in (fit.at, fit.points)]
+    data = [of_curves(noisy.times), *points, of_curves(noise.weights)]
+    rows, deviations = _core.residuals_at(space._handle, *data)
+    if noise.information is None:
+        rows *= np.sqrt(data[-1])[..., None]
+    else:
+        used = np.isfinite(rows).any(axis=-1)
+        roots, known = roots_of(of_curves(noise.information, (space.dim, space.dim))[used])
+        rows[used] = np.where(known, np.einsum("nij,nj->ni", roots, rows[used]), np.nan)
+    observed: NDArray[np.bool_] = np.asarray(np.isfinite(rows).any(axis=-1))
+    leverage = np.minimum(np.ravel(fit.df)[curves] / np.maximum(observed.sum(axis=-1), 1), 1.0)
+    loss = fit.loss
+    corner = None if loss == "linear" else corner_of(loss, space.dim)
+    given = np.where(fit.given, fit.smoothed.sigma, np.nan).ravel()[curves]
+    found = _core.examine_curves(space._handle, data, rows, deviations, leverage, given, corner)
+    return [(int(curves[k]), _described(np.flatnonzero(observed[k]), *result)) for k, *result in found]
+
+
+def _described(numbers: NDArray[np.intp], bypassed: Any, of_given: Any, of_estimated: Any) -> str:
+    """Describe failed tests of one curve, whose rows with information have these numbers."""
+    if bypassed:
+        return _BYPASSED.format(*bypassed)
+    if of_given:
+        sensor = Sensor("data", "the data", numbers, Finding(*of_given))
+        stiff = sensor.finding.smooth or sensor.finding.step is not None
+        return " ".join([described(sensor), *([_STIFF] if stiff else advice([sensor]))])
+    ratio, correlation, (count, first, size), run = of_estimated
+    facts, remedies = [], []
+    if ratio > 1:
+        facts.append(f"they are {ratio:.2g} times as large as the noise estimated from neighbouring data")
+    if correlation:
+        facts.append(f"neighbouring residuals have a correlation of {correlation:.2f}")
+    if ratio > 1 or correlation > 0:
+        remedies.append(_STIFF)
+    if correlation < 0:
+        remedies.append(
+            "Residuals of alternating sign indicate a motion that is too fast for the sampling. Check the times and "
+            "units, or sample more often."
+        )
+    if run:
+        facts.append(f"the loss rejects all data from index {run[0]} to {run[1]}")
+        remedies.append(
+            "If the motion is fast there and these data are right, pass loss='linear' or smooth this part by itself."
+        )
+    if count:
+        facts.append(f"{_counted(count)}, at index {first}, is {size:.2g} times the noise")
+        remedies.append("If these are outliers, pass loss='cauchy'.")
+    return f"{', '.join(facts)}. {' '.join(remedies)}"
+
+
+def _counted(count: int) -> str:
+    return "one outlier" if count == 1 else f"the largest of {count} outliers"
+
+
+def described(sensor: Sensor) -> str:
+    """Return the tests of a sensor that failed."""
+    finding = sensor.finding
+    facts = []
+    if finding.large or finding.small:
+        facts.append(f"the residuals are {finding.ratio:.2g} times as large as sigma")
+    if finding.correlated:
+        facts.append(f"neighbouring residuals have a correlation of {finding.correlation:.2f}")
+    if finding.step is not None:
+        facts.append(f"the mean of the residuals changes at index {sensor.numbers[finding.step]}")
+    if finding.outliers:
+        which, first = _counted(len(finding.outliers)), sensor.numbers[finding.outliers[0]]
+        facts.append(f"{which}, at index {first}, is {finding.largest:.2g} times sigma")
+    if finding.rejected:
+        facts.append(f"the loss rejects {finding.rejected:.0%} of the measurements")
+    if finding.run:
+        first, last = finding.run
+        where = f"from index {sensor.numbers[first]} to {sensor.numbers[last]}"
+        facts.append(f"the loss rejects {last - first + 1} consecutive measurements, {where}")
+    return f"{sensor.name}: {', '.join(facts)}."
+
+
+def advice(sensors: list[Sensor]) -> list[str]:
+    """Return sentences with likely causes of the failed tests and remedies."""
+    texts = []
+    outlying = [sensor for sensor in sensors if sensor.finding.outliers]
+    if outlying:
+        texts.append(f"If these are outliers, pass loss='cauchy' to {_labels(outlying)}.")
+    wrong = [sensor for sensor in sensors if sensor.finding.large or sensor.finding.small or sensor.finding.rejected]
+    # Missing effects make residuals smooth; a wrong σ does not.
+    smooth = [
+        sensor
+        for sensor in sensors
+        if sensor.finding.smooth or sensor.finding.run or (sensor.finding.step is not None and sensor not in wrong)
+    ]
+    if (
+        smooth
+        and (any(sensor.finding.run for sensor in smooth) or any(sensor in wrong for sensor in smooth) or not wrong)
+        and not outlying
+    ):
+        texts.append(
+            f"Check the frame (rotated or swapped axes), the units and the times of {_labels(smooth)}, and add missing "
+            "effects, such as bias= or time_offset=. If the curve turns in the wrong direction between two "
+            "measurements, pass another `start`. If the motion is fast, pass more knots."
+        )
+    for sensor in wrong if not outlying else []:
+        if sensor.finding.smooth:
+            continue
+        ratio = sensor.finding.ratio
+        texts.append(_of_units(sensor, ratio) or f"Multiply sigma of {sensor.label} by {ratio:.2g} if it is uncertain.")
+    correlated = [
+        sensor for sensor in sensors if sensor.finding.correlated and sensor not in wrong and sensor not in smooth
+    ]
+    if correlated and not texts:
+        texts.append(
+            f"The noise of {_labels(correlated)} is correlated, but the covariance assumes independent noise. Pass a "
+            "larger sigma or fewer measurements."
+        )
+    return texts
+
+
+def _labels(sensors: list[Sensor]) -> str:
+    return " and ".join(dict.fromkeys(sensor.label for sensor in sensors))
+
+
+def _of_units(sensor: Sensor, ratio: float) -> str:
+    if not ratio > 0:
+        return ""
+    for factor, text in {DEGREES: "57.3, the ratio of degrees and radians", **_UNITS}.items():
+        for own in (ratio / factor, ratio * factor):
+            if abs(np.log(own)) < _NEAR:
+                return f"{ratio:.2g} is close to {text}: check the unit of sigma of {sensor.label}."
+    return ""
+
+
+# ---- a motion or noise that varies along the recording, while λ and σ are constant ----
+
+
+def _warn_of_varying(
+    space: Space[Any], noisy: SmoothingData, curve: CurveArrays, fits: list[Fitted], kinds: Any
+) -> None:
+    """Warn if the motion or its noise varies along a curve whose λ was chosen."""
+    numbers = iter(range(len(fits)))
+    for factor, part, own in zip(factors_of(space), curve.parts, grouped(space, fits), strict=True):
+        number, *more = (next(numbers) for _ in own)
+        fit, noise = fits[number], noisy.noise[number]
+        # The acceleration of a pose is not that of its rotation and position.
+        if more or noise.information is not None:
+            continue
+        good = fit.converged & ~np.asarray(fit.smoothed.report.at_bound) & (fit.df > _FREEDOM) & fit.chosen
+        curves = np.flatnonzero(good)
+        if not len(curves):
+            continue
+
+        def rows(array: Any, chosen: Any = curves, batch: tuple[int, ...] = noisy.batch, axes: int = 1) -> Any:
+            whole = np.broadcast_to(array, (*batch, *array.shape[array.ndim - axes :]))
+            return np.ascontiguousarray(whole.reshape(-1, *array.shape[array.ndim - axes :])[chosen])
+
+        knots = rows(part.times)
+        # The acceleration is nearly linear between knots.
+        middle = 0.5 * (part.times[..., 1:] + part.times[..., :-1])
+        bend = part.evaluate(np.ascontiguousarray(middle), "bend", "raise", middle.ndim > 1)
+        energy = np.cumsum(np.diff(knots) * rows(bend) ** 2, axis=-1)
+        band, times = rows(fit.smoothed.band, axes=2), rows(noisy.times)
+        leverage = _core.smoothing_variance(knots, band, np.zeros(len(curves)), times, 0, kinds)
+        squares = np.full(fit.at.shape[: len(noisy.batch) + 1], np.nan)
+        squares[good] = factor._apply("distance", p=fit.at[good], q=fit.points[good]) ** 2
+        energy = np.concatenate([np.zeros((len(curves), 1)), energy], axis=-1)
+        tests = _core.are_constant(times, rows(noise.weights), leverage, rows(squares), knots, energy, factor.dim)
+        failed = []
+        for curve_number, found in zip(curves, tests, strict=True):
+            index = tuple(map(int, np.unravel_index(curve_number, noisy.batch)))
+            shown = noisy.t[index] if noisy.t.ndim > 1 else noisy.t
+            if found and (message := varying(shown, found, fit.loss != "linear")):
+                failed.append((index, message))
+        if failed:
+            index, message = failed[0]
+            of = of_index(index) + (f" in factor {number}, {factor!r}" if is_several(space) else "")
+            others = f" (and of curves {', '.join(str(list(i))[1:-1] for i, _ in failed[1:9])})" if failed[1:] else ""
+            warn(f"In the data{of}{others}, {message}.", SmoothingWarning, index)
+            return
+
+
+def varying(t: Array, tests: Any, robust: bool = False) -> str | None:
+    """Describe what varies along a curve, from the results of both tests. Robust losses have no test of the noise."""
+    smoothness, noise = tests
+    messages = []
+    score, (first, last), ratio = smoothness
+    if score > _SMOOTHNESS and ratio > _FASTER:
+        # A robust loss may have selected a run of outliers.
+        remedy = (
+            ", or the curve follows outliers. Plot the data, and pass weights of 0 for outliers. If there are none, "
+            "fit this part and the others separately"
+            if robust
+            else ". The curve is too smooth there, and follows the noise elsewhere. Fit this part and the others "
+            "separately, or pass a smaller lam"
+        )
+        between = f"t = {short_repr(t[first])} and {short_repr(t[last])}"
+        what = f"the motion is faster between {between} than one lam for the whole recording allows{remedy}"
+        messages.append((score / _SMOOTHNESS, what))
+    score, (first, last), _ = noise
+    if score > _NOISE and not robust:
+        between = f"t = {short_repr(t[first])} and {short_repr(t[last])}"
+        what = (
+            f"the residuals are larger between {between} than elsewhere: the noise is larger there, or the curve does "
+            "not follow the motion. Pass weights= with the inverse variances of the data, loss='huber' if only some "
+            "data are worse, or a smaller lam"
+        )
+        messages.append((score / _NOISE, what))
+    return max(messages)[1] if messages else None
+
+
+# ---- data that are spread over all of a compact space, so that a smooth curve has little meaning ----
+
+
+def _warn_of_spreads(noisy: SmoothingData, fits: list[Fitted]) -> None:
+    """Warn if data of a curve are about as far from it as random points of the space would be.
+
+    The degrees of freedom with which the curve follows the data are taken into account.
+    """
+    every = -(-noisy.times.shape[-1] // _SAMPLE)
+    some = (slice(None),) * len(noisy.batch) + (slice(None, None, every),)
+    for fit, noise in zip(fits, noisy.noise, strict=True):
+        # Negligible weights do not count.
+        counts = noise.weights > 1e-6 * noise.weights.max(axis=-1, keepdims=True)
+        counts = np.broadcast_to(counts, (*noisy.batch, noisy.times.shape[-1]))
+        data = fit.at[some], fit.points[some], counts[some]
+        if warn_of_spread(fit.space, *data, np.sum(counts, axis=-1), fit.df, "curve"):
+            return
+
+
+def warn_of_spread(
+    space: Space, at: Array, points: Array, counts: NDArray[np.bool_], number: Any, df: Any, name: str
+) -> bool:
+    """Warn if data are about as far from a smooth fit as random points of a compact space would be.
 
     Parameters
     ----------
-    given : Residuals
-        Residuals in the order of time, and the leverage of their measurements.
+    at, points : ndarray, shape (..., N, *point_shape)
+        Points of the fits, and data.
+    counts : ndarray of bool, shape (..., N)
+        Data that count.
+    number, df : ndarray
+        Number of all data, and degrees of freedom with which the fit follows them.
+    name : str
+        Name of a fit.
 
     Returns
     -------
-    Finding
-        Statistics, and the checks that failed.
+    bool
+        Whether a warning was issued.
     """
-    rows = given.rows
-    known = np.isfinite(rows)
-    count, used = int(known.sum()), known.any(axis=1)
-    left = 1.0 - given.leverage
-    if used.sum() < _FEWEST or left < 1.0 - _LEVERAGE:
-        return Finding()
-    squares = np.nansum(rows**2, axis=1)
-    robust = given.loss != "linear"
-    scale = median_square(squares[used], count / used.sum()) / left
-    finding = Finding(freedom=count * left)
-    if robust:
-        # Outliers would dominate the mean square, so the median replaces it.
-        square, efficiency, limit = scale, _EFFICIENCY, _ROBUST_RATIO
-        far = squares > _BEYOND * given.corner
-        share = float(np.mean(far[used]))
-        run = long_run(far, max(_RUN, _RUN_SHARE * len(far)))
-        most = _REJECTED + _CHANCE * np.sqrt(_REJECTED * (1 - _REJECTED) / used.sum())
-        finding = finding._replace(rejected=share if share > most else 0.0, run=run)
-        rows = np.where(squares[:, None] > max(1.0, scale) * given.corner, np.nan, rows)
-    else:
-        sizes = np.nanmax(np.where(known, np.abs(rows), 0.0), axis=1)
-        # If σ is too small, residuals are compared with their median instead.
-        far = np.flatnonzero(sizes > largest_expected(count) * np.sqrt(max(1.0, scale)))
-        finding = finding._replace(largest=float(sizes.max()), outliers=far[np.argsort(-sizes[far])])
-        inner = np.delete(rows, far, axis=0)
-        square, efficiency, limit = float(np.nanmean(inner**2)) / left, 1.0, _RATIO
-    freedom = count * left * efficiency
-    large = normal_of_chi_squared(square, freedom) > SIGNIFICANT and square > limit**2
-    # With the hat matrix H, residuals have the covariance I − H if the curve is as rough as the penalty expects, and
-    # (I − H)² if it is smoother.
-    least = square / left
-    small = given.exact and normal_of_chi_squared(least, freedom * left) < -SIGNIFICANT and least < _RATIO**-2
-    small = small and least > _EXACT**2
-    finding = finding._replace(ratio=float(np.sqrt(least if small else square)), large=large, small=small)
-    # Residuals smaller than σ contain only negligible effects.
-    if small or square < _EXACT**2 or np.isfinite(rows).any(axis=1).sum() < _FEWEST:
-        return finding
-    correlation, products = autocorrelation(rows)
-    correlation += given.between / left
-    correlated = correlation * np.sqrt(products) > SIGNIFICANT and correlation > _CORRELATED
-    value, step = largest_partial_sum(rows)
-    jumps = value > max(_PARTIAL_SUM, _STEP * np.sqrt(len(rows)))
-    return finding._replace(correlation=correlation, correlated=correlated, step=step if jumps else None)
+    expected = random_distance(space)
+    if expected is None:
+        return False
+    used = counts & space._where_finite(at)
+    distances = np.full(used.shape, np.nan)
+    distances[used] = distances_of(space, at[used], points[used])
+    # Fits that failed have the distance 0.
+    distances[~used.any(axis=-1)] = 0.0
+    found = np.asarray(np.nanmedian(distances, axis=-1))
+    # A fit through all data has no residuals to compare.
+    far = np.argwhere((found**2 * number > _FAR * expected**2 * (number - df)) & (number - df >= 1))
+    if not len(far):
+        return False
+    index = tuple(map(int, far[0]))
+    more = f" (and {len(far) - 1} more curves)" if len(far) > 1 else ""
+    warn(
+        f"half of the data{of_index(index)} are {found[index]:.2g} or more away from their smooth {name}{more}. For "
+        f"random points of {space!r} this distance is {expected:.2g}, so the {name} has little meaning. Check the "
+        "units and signs of the data.",
+        UserWarning,
+        index,
+    )
+    return True
 
 
-class SmoothingFinding(NamedTuple):
-    """The result of the audit of curves whose noise level the fit estimates, with one entry per curve.
-
-    Attributes
-    ----------
-    ratio : ndarray
-        Ratio of the residuals to the noise estimated from neighbouring data if it is too large, else 1.
-    correlation : ndarray
-        Lag-one autocorrelation of the residuals, corrected for the leverage, if it is too large or too small, else 0.
-    outliers : ndarray of bool, shape (curves, n)
-        Outliers under least squares.
-    sizes : ndarray, shape (curves, n)
-        Sizes of the residuals in standard deviations.
-    runs : list of tuple of int or None
-        First and last of too many consecutive data that a robust loss rejects, for every curve.
-    """
-
-    ratio: Doubles
-    correlation: Doubles
-    outliers: NDArray[np.bool_]
-    sizes: Doubles
-    runs: list[tuple[int, int] | None]
-
-    @property
-    def failed(self) -> NDArray[np.bool_]:
-        """Whether a check failed."""
-        rejected = np.array([run is not None for run in self.runs], bool)
-        return np.asarray((self.ratio > 1) | (self.correlation != 0) | self.outliers.any(axis=1) | rejected)
-
-
-def examine_smoothing(rows: Doubles, neighbours: Doubles, leverage: Doubles, robust: bool) -> SmoothingFinding:
-    """Examine the residuals of smooth curves without given standard deviations.
-
-    Parameters
-    ----------
-    rows : ndarray, shape (curves, n, d)
-        Residuals scaled to weight one, in the order of time; NaN where there is no information.
-    neighbours : ndarray, shape (curves, n)
-        Squared deviations of data from the geodesics between their neighbours, divided by their variance for unit
-        noise; NaN at the ends and for data without weight.
-    leverage : ndarray, shape (curves,)
-        Mean leverage of the data.
-    robust : bool
-        Whether the loss is robust.
-    """
-    known = np.isfinite(rows)
-    used = known.any(axis=2)
-    counts, entries = used.sum(axis=1), known.sum(axis=(1, 2))
-    chi = np.array([median_of_chi_squared(own) for own in (entries / np.maximum(counts, 1)).tolist()])
-    moderate = leverage <= _MODERATE
-    # Variances divided by medians of squared lengths.
-    variance = 1 / chi / np.where(leverage < 1, 1.0 - leverage, np.nan)
-    # The limits are larger for few data, which vary more.
-    few = 1.0 + 2.0 / np.sqrt(np.maximum(counts, 1))
-    limit = np.array([largest_expected(own) for own in entries.tolist()]) * few * np.where(moderate, 1.0, _UNEVEN)
-    columns, products, sizes = _core.residual_statistics(rows, neighbours, limit, variance)
-    lengths, deviations, square, lagged = map(np.array, columns)
-    scale, noise = lengths * variance, deviations / chi
-    # If the median residual is zero, the curve is exact. Equal neighbours, as of rounded data, contain no estimate of
-    # the noise.
-    enough = (counts >= _FEW_DATA) & (leverage <= _HIGH) & (scale > 0) & (noise > 0)
-    enough &= np.isfinite(neighbours).sum(axis=1) >= _FEW_DATA // 2
-    stiff = enough & moderate & (scale > (_NEIGHBOURS * few) ** 2 * noise)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ratio = np.where(stiff, np.sqrt(scale / noise), 1.0)
-        sizes = sizes / np.sqrt(np.where(scale > 0, scale, np.inf))[:, None]
-    far = sizes > limit[:, None]
-    correlation = lagged / np.where(square > 0, square, np.inf) + leverage
-    correlated = np.abs(correlation) > np.maximum(_CORRELATED, SIGNIFICANT / np.sqrt(products))
-    outliers = far & enough[:, None] & (not robust)
-    for curve, i in np.argwhere(outliers):
-        # Where the noise is larger along a part of the curve, neighbouring residuals are large as well.
-        near = np.concatenate([sizes[curve, max(0, i - _NEAR) : i], sizes[curve, i + 1 : i + 1 + _NEAR]])
-        outliers[curve, i] = sizes[curve, i] > limit[curve] * max(1.0, float(np.median(near)))
-    # A burst of motion looks like consecutive outliers.
-    runs: list[tuple[int, int] | None] = []
-    for rejected, has_weight in zip(far, np.asarray(used), strict=True):
-        numbers = np.flatnonzero(has_weight)
-        run = long_run(rejected[numbers], max(_RUN_OF_DATA, _SHARE_OF_DATA * len(numbers))) if robust else None
-        runs.append(run and (int(numbers[run[0]]), int(numbers[run[1]])))
-    return SmoothingFinding(ratio, np.where(enough & moderate & correlated, correlation, 0.0), outliers, sizes, runs)
+@lru_cache(maxsize=64)
+def random_distance(space: Space) -> float | None:
+    """Return the median distance of random points, or None for spaces without a largest distance."""
+    if not np.isfinite(space.injectivity_radius) or np.isnan(space.curvature):
+        return None
+    random = space.random_point(np.random.default_rng(0), (2, _SAMPLE))
+    return float(np.median(space._apply("distance", p=random[0], q=random[1])))

@@ -15,13 +15,12 @@ from .._base.time import TimeAxis, knots_of
 from .._base.typing import TimesLike
 from .._base.validation import one_of
 from .._core import ValidationError
-from .._curves.ends import End, end_kinds, map_ends, split_ends
+from .._curves.ends import NATURAL, End, end_kinds, map_ends, split_ends
 from .._curves.fit import Points, moved_ends, read, read_ends, validated
 from .._curves.missing import refuse_nan_times
 from .._curves.options import with_atol
 from .._spaces import Array, Doubles, Space, factors_of
-from .factors import grouped, smoothed_spaces, split
-from .precision import Precision, read_precision
+from .noise import Noise, grouped, parts_of_factor, per_part, read_precision, split
 
 # The cube of the time between the first and the last datum must not overflow.
 _LONGEST = 1e100
@@ -40,8 +39,8 @@ class SmoothingData(NamedTuple):
         The same times as the core counts them.
     points : list of ndarray
         Points on the space in every factor. Data of weight zero are replaced by others; masked curves are NaN.
-    precisions : list of Precision
-        Weights in every space in which data are smoothed.
+    noise : list of Noise
+        Noise in every space in which data are smoothed.
     batch : tuple of int
         Batch axes.
     """
@@ -50,32 +49,40 @@ class SmoothingData(NamedTuple):
     t: Array
     times: Doubles
     points: list[Array]
-    precisions: list[Precision]
+    noise: list[Noise]
     batch: tuple[int, ...]
 
     @property
     def used(self) -> NDArray[np.bool_]:
         """Which data have a nonzero weight in some factor, shape (N,) or (..., N)."""
-        return reduce(np.logical_or, [own.weights > 0 for own in self.precisions])
+        return reduce(np.logical_or, [own.weights > 0 for own in self.noise])
 
     def map(self, function: Callable[[Any], Any], batch: tuple[int, ...]) -> SmoothingData:
         """Apply a function to the arrays that have batch axes, such as the selection of some curves."""
         t, times = (x if x.ndim == 1 else function(x) for x in (self.t, self.times))
-        points, precisions = [function(own) for own in self.points], [own.map(function) for own in self.precisions]
-        return self._replace(t=t, times=times, points=points, precisions=precisions, batch=batch)
+        points, noise = [function(own) for own in self.points], [own.map(function) for own in self.noise]
+        return self._replace(t=t, times=times, points=points, noise=noise, batch=batch)
 
     def rows(self, index: NDArray[np.intp]) -> SmoothingData:
         """Return some of the data of each curve."""
         points = [np.take(own, index, axis=len(self.batch)) for own in self.points]
-        precisions = [own.rows(index) for own in self.precisions]
-        return self._replace(t=self.t[..., index], times=self.times[..., index], points=points, precisions=precisions)
+        noise = [own.rows(index) for own in self.noise]
+        return self._replace(t=self.t[..., index], times=self.times[..., index], points=points, noise=noise)
 
 
 Ends = list[list[End] | None]
 
 
 def read_noisy(
-    t: TimesLike | None, points: Any, space: Space, weights: Any, frames: Any, bc_type: Any, atol: float | None
+    t: TimesLike | None,
+    points: Any,
+    space: Space,
+    weights: Any,
+    frames: Any,
+    sigma: Any,
+    loss: Any,
+    bc_type: Any,
+    atol: float | None,
 ) -> tuple[SmoothingData, list[Points], Ends]:
     """Return the data of a user without points, the points in every factor, and the end conditions.
 
@@ -89,12 +96,16 @@ def read_noisy(
     data = with_atol(read(points, space), atol)
     batch, count = data[0].batch, data[0].nodes
     time_axis, shown_times, times = _times_of(t, batch, count)
-    precisions = read_precision(weights, frames, space, data)
+    given = read_precision(weights, frames, space, data)
     if weights is not None:
-        each = zip(data, grouped(space, precisions), strict=True)
+        each = zip(data, grouped(space, given), strict=True)
         data = [_without_missing(part, [one.weights for one in own]) for part, own in each]
     ends = read_ends(moved_ends(bc_type, space, data), space, batch)
-    return SmoothingData(time_axis, shown_times, times, [], precisions, batch), data, ends
+    sigmas = per_part(space, sigma, "sigma", batch)
+    # Two points have no outliers and do not determine the noise level.
+    loss = "linear" if count == 2 else loss
+    noise = [own._replace(sigma=sigma, loss=loss) for own, sigma in zip(given, sigmas, strict=True)]
+    return SmoothingData(time_axis, shown_times, times, [], noise, batch), data, ends
 
 
 def checked_ends(bc_type: Any, penalty: Any, method: Any) -> Any:
@@ -160,9 +171,9 @@ def valid_curves(
     noisy = noisy._replace(points=points)
     kept = np.ones(batch, bool) if mask is None else mask.copy()
     kept.flat[[fault.curve for fault in faults]] = False
-    for precision in noisy.precisions:
-        for number in np.flatnonzero(kept & ~_enough(noisy.times, precision.weights, batch)).tolist():
-            too_few = _too_few(precision.weights, batch, number)
+    for noise in noisy.noise:
+        for number in np.flatnonzero(kept & ~_enough(noisy.times, noise.weights, batch)).tolist():
+            too_few = _too_few(noise.weights, batch, number)
             if not skip:
                 raise ValidationError(too_few)
             faults.append(Fault(number, INVALID, too_few))
@@ -174,7 +185,9 @@ def valid_curves(
     def rows(array: Any) -> Any:
         return np.ascontiguousarray(array.reshape(-1, *array.shape[len(batch) :])[chosen])
 
-    return noisy.map(rows, (len(chosen),)), [map_ends(own, rows) for own in ends], chosen, faults
+    noisy = noisy.map(rows, (len(chosen),))
+    noisy = noisy._replace(noise=[own._replace(sigma=own.sigma[chosen]) for own in noisy.noise])
+    return noisy, [map_ends(own, rows) for own in ends], chosen, faults
 
 
 def _times_of(t: TimesLike | None, batch: tuple[int, ...], count: int) -> tuple[TimeAxis, Array, Doubles]:
@@ -229,5 +242,53 @@ def _too_few(weights: Doubles, batch: tuple[int, ...], number: int) -> str:
 
 def points_of(noisy: SmoothingData, space: Space) -> list[tuple[Space, Array]]:
     """Return every space in which data are smoothed, with its points."""
-    points = [own for pair in zip(factors_of(space), noisy.points, strict=True) for own in split(*pair)]
-    return list(zip(smoothed_spaces(space), points, strict=True))
+    return [
+        pair
+        for factor, points in zip(factors_of(space), noisy.points, strict=True)
+        for pair in zip(parts_of_factor(factor), split(factor, points), strict=True)
+    ]
+
+
+class Part(NamedTuple):
+    """Data in one of the spaces in which they are smoothed.
+
+    Attributes
+    ----------
+    space : Space
+        The space.
+    points : ndarray, shape (..., N, *point_shape)
+        Points.
+    noise : Noise
+        Their noise.
+    lam : ndarray, shape (curves,)
+        λ, infinite for geodesics and NaN where it is chosen.
+    ends : list of End or None
+        End conditions; None for closed curves.
+    """
+
+    space: Space
+    points: Array
+    noise: Noise
+    lam: Doubles
+    ends: list[End] | None
+
+    @property
+    def axis(self) -> int:
+        """The axis of the data among those of the points."""
+        return self.points.ndim - len(self.space.point_shape) - 1
+
+    def map(self, function: Callable[[Any], Any], noise: Noise) -> Part:
+        """Apply a function to the arrays, such as one that adds masked curves, and replace the noise."""
+        ends = map_ends(self.ends, function)
+        return Part(self.space, function(self.points), noise, function(self.lam), ends)
+
+    def rows(self, index: NDArray[np.intp]) -> Part:
+        """Return some of the data of each curve, with natural ends."""
+        points, noise = np.take(self.points, index, axis=self.axis), self.noise.rows(index)
+        return self._replace(points=points, noise=noise, ends=NATURAL)
+
+
+def parts_of(noisy: SmoothingData, space: Space, lams: list[Doubles], ends: Ends) -> list[Part]:
+    """Return the data in every space in which they are smoothed."""
+    each = zip(points_of(noisy, space), noisy.noise, lams, ends, strict=True)
+    return [Part(*pair, noise, lam, own) for pair, noise, lam, own in each]

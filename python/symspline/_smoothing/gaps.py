@@ -1,8 +1,7 @@
 """Calibrate bands in long gaps and beyond the ends of the data.
 
-The posterior standard deviation is too small where there are no data, because λ is optimal for the data and the true
-motion is rarely a sample of the prior process. To calibrate it, parts of the recording as long as the gap are predicted
-without their data. The errors of these predictions determine a factor of the standard deviation.
+The posterior standard deviation is too small where there are no data. Parts of the recording as long as the gap are
+predicted without their data, and the errors of these predictions determine a factor; see `smoothing/src/calibrate.rs`.
 """
 
 from __future__ import annotations
@@ -15,20 +14,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
-from .._spaces import Doubles
+from .._base.arrays import short_repr
+from .._base.faults import of_index
+from .._base.warnings import warn
+from .._curves.ends import end_kinds, is_closed
+from .._spaces import Array, Doubles, Euclidean, Space, SpecialEuclidean, factors_of
+from .audit import corner_of
+from .data import points_of
+from .noise import SINGULAR, grouped, in_part, smoothed_spaces, split
+from .posterior import frames_at
+from .report import SmoothingWarning
 
 # A gap is long if the variance in its middle exceeds the first multiple of the median variance at the data, and its
 # length the second multiple of the median time step, so that sparse data have no gaps.
 _WIDE, _SPARSE = 4.0, 3.0
-# Omitted data count only where their variance exceeds this multiple of the median. The posterior is right at the edges
-# of a block, which would hide errors inside.
-_INSIDE = 2.0
-# The coverage for which the factors are calibrated.
-_LEVEL = 0.95
-# Largest numbers of blocks of one length, of lengths, and of predicted data per block; least number of predicted data.
-_BLOCKS, _LENGTHS, _PREDICTED, _FEW = 24, 6, 200, 3
-# Fraction of a recording that is predicted beyond the end of a part of it, and the largest factor there.
-_BEYOND, _MOST = 1 / 3, 20.0
+# Largest number of entries of the frames that are computed in one call.
+_TOGETHER = 1 << 22
+# Data of a robust fit beyond this quantile of the noise do not count as evidence, as in the fit.
+_KEPT = 0.999
 
 
 class Gap(NamedTuple):
@@ -88,92 +91,6 @@ class Course(NamedTuple):
         return own + self.acceleration * (d**4 / 4 if nu == 0 else d**2)
 
 
-class Evidence(NamedTuple):
-    """Data of a curve, linearised at the curve and divided by their standard deviations.
-
-    Attributes
-    ----------
-    knots : ndarray
-        Knots.
-    known : tuple
-        The matrix A, as the core reads it.
-    times : ndarray, shape (n,)
-        Times of the data, in increasing order.
-    roots : ndarray, shape (n,) or (n, q, m)
-        Roots of the weights: numbers, or matrices if A couples the m coordinates.
-    residuals : ndarray, shape (n, m)
-        Coordinates of the vectors from the curve to the data, divided by the standard deviation of the noise.
-    counts : ndarray of bool, shape (n,)
-        Whether each datum counts; False for outliers.
-    soft : ndarray, shape (n,)
-        Factors that turn residuals into those of the pseudo-data of a robust loss; 1 for least squares.
-    positions, velocities : ndarray, shape (n, m)
-        The curve and its velocity in coordinates of frames along the curve, divided by the same standard deviation.
-    """
-
-    knots: Doubles
-    known: Any
-    times: Doubles
-    roots: Doubles
-    residuals: Doubles
-    counts: NDArray[np.bool_]
-    soft: Doubles
-    positions: Doubles
-    velocities: Doubles
-
-    @property
-    def coordinates(self) -> int:
-        """Number of coordinates of a datum."""
-        return int(self.residuals.shape[1])
-
-    @property
-    def rows_per_datum(self) -> int:
-        """Number of linear functions of the coefficients for one datum."""
-        return 1 if self.roots.ndim == 1 else int(self.roots.shape[1])
-
-    @property
-    def weights(self) -> Doubles:
-        """Mean weight of a coordinate of every datum."""
-        if self.roots.ndim == 1:
-            return self.roots**2
-        return np.asarray((self.roots**2).sum(axis=(1, 2)) / self.residuals.shape[1])
-
-    def rows(self, data: NDArray[np.intp], firsts: NDArray[np.int64], factors: Doubles) -> Any:
-        """Return linear functions of the coefficients with these factors, multiplied by the roots."""
-        if self.roots.ndim == 1:
-            return firsts, np.ascontiguousarray(self.roots[data, None] * factors), np.zeros((len(data), 0))
-        own = np.einsum("nqc,nk->nqkc", self.roots[data], factors)
-        q = own.shape[1]
-        return np.repeat(firsts, q), np.ascontiguousarray(own.reshape(len(data) * q, -1)), np.zeros((len(data) * q, 0))
-
-    def whitened(self, data: NDArray[np.intp], vectors: Doubles) -> Doubles:
-        """Return vectors multiplied by the roots, one row per row of `rows`."""
-        if self.roots.ndim == 1:
-            return np.ascontiguousarray(self.roots[data, None] * vectors)
-        return np.ascontiguousarray(np.einsum("nqc,nc->nq", self.roots[data], vectors).reshape(-1, 1))
-
-    def system(self) -> tuple[NDArray[np.int64], Doubles, Any, Doubles]:
-        """Return the first coefficients and their factors at all data, and the linear problem: rows and residuals."""
-        every = np.arange(len(self.times))
-        firsts, factors = _core.coefficient_factors(self.knots, self.known[2], self.times, 0)
-        residuals = self.whitened(every, self.residuals * self.soft[:, None])
-        return firsts, factors, self.rows(every, firsts, factors), residuals
-
-    def per_datum(self, data: NDArray[np.intp], rows: Doubles) -> Doubles:
-        """Return means over the coordinates that each datum observes, from sums over one row or several."""
-        if self.roots.ndim == 1:
-            return np.asarray(rows.reshape(len(rows), -1).mean(axis=1))
-        return np.asarray(rows.reshape(-1, self.roots.shape[1]).sum(axis=1) / self._observed(data))
-
-    def observed_weights(self, data: NDArray[np.intp]) -> Doubles:
-        """Return mean weights of the coordinates that each datum observes."""
-        weights = self.weights[data]
-        return weights if self.roots.ndim == 1 else weights * self.residuals.shape[1] / self._observed(data)
-
-    def _observed(self, data: NDArray[np.intp]) -> NDArray[np.intp]:
-        return np.asarray(np.maximum(self.roots[data].any(axis=2).sum(axis=1), 1))
-
-
 class SensorEvidence(NamedTuple):
     """Measurements of any kind, linearised at a curve. Points are predicted, the others are only omitted.
 
@@ -189,14 +106,21 @@ class SensorEvidence(NamedTuple):
         First coefficient on which each measurement depends.
     factors, sides : ndarray, shape (n, q, 4m) and (n, q, p)
         Factors of four coefficients and of the parameters in q whitened rows; rows of zeros have no effect.
-    residuals : ndarray, shape (n, q)
-        Whitened measurements minus their values at the curve.
+    residuals : ndarray, shape (n, q) or (n, q, columns)
+        Whitened measurements minus their values at the curve. Columns are coordinates that A does not couple.
     counts : ndarray of bool, shape (n,)
         Whether each measurement is a point that is not an outlier.
     weights : ndarray, shape (n,)
-        Mean weight of a coordinate of every point.
+        Mean weight of a coordinate that every point observes.
     coordinates : int
         Number of coordinates of a point.
+    pseudo : ndarray, optional
+        Residuals of the pseudo-data of a robust loss.
+    observed : ndarray, shape (n,), optional
+        Number of coordinates that each point observes, one if A couples none. By default all of them.
+    line : list of ndarray, optional
+        Roots of the weights (n, q, m), and the curve and its velocity at the data in coordinates of frames along the
+        curve, divided by the standard deviation of the noise.
     """
 
     knots: Doubles
@@ -209,91 +133,17 @@ class SensorEvidence(NamedTuple):
     counts: NDArray[np.bool_]
     weights: Doubles
     coordinates: int
+    pseudo: Doubles | None = None
+    observed: Doubles | None = None
+    line: list[Doubles] | None = None
 
     @property
-    def rows_per_datum(self) -> int:
-        """Number of linear functions of the coefficients for one measurement."""
-        return int(self.factors.shape[1])
-
-    def rows(self, data: NDArray[np.intp], firsts: NDArray[np.int64], factors: Doubles) -> Any:
-        """Return linear functions of the coefficients and parameters with these factors."""
-        q = self.rows_per_datum
-        each = (np.ascontiguousarray(own.reshape(len(data) * q, -1)) for own in (factors, self.sides[data]))
-        return np.repeat(firsts, q), *each
-
-    def whitened(self, data: NDArray[np.intp], vectors: Doubles) -> Doubles:
-        """Return vectors, which are whitened, with one row per row of `rows`."""
-        return np.ascontiguousarray(vectors.reshape(-1, 1))
-
-    def system(self) -> tuple[NDArray[np.int64], Doubles, Any, Doubles]:
-        """Return the first coefficients and their factors at all data, and the linear problem: rows and residuals."""
-        every = np.arange(len(self.times))
-        return (
-            self.firsts,
-            self.factors,
-            self.rows(every, self.firsts, self.factors),
-            self.whitened(every, self.residuals),
-        )
-
-    def per_datum(self, data: NDArray[np.intp], rows: Doubles) -> Doubles:
-        """Return means over the coordinates of points, from sums over their rows."""
-        return np.asarray(rows.reshape(len(data), -1).sum(axis=1) / self.coordinates)
-
-    def observed_weights(self, data: NDArray[np.intp]) -> Doubles:
-        """Return mean weights of the coordinates of points."""
-        return self.weights[data]
-
-
-class Predicted(NamedTuple):
-    """Predictions without data: squared errors and variances per coordinate in units of the noise, and distances."""
-
-    squares: Doubles
-    variances: Doubles
-    at_data: Doubles
-    distances: Doubles
-
-    def of(self, chosen: Any) -> Predicted:
-        """Return the chosen predictions."""
-        return Predicted(*(own[chosen] for own in self))
-
-
-def factor_of(predictions: Predicted, m: int, disjoint: float) -> float:
-    """Return the factor k ≥ 1 for which `v + (k² − 1)(v − v₀)` are the variances of predictions; NaN without any.
-
-    Parameters
-    ----------
-    predictions : Predicted
-        Squared errors e², variances v, and variances v₀ at data.
-    m : int
-        Number of coordinates.
-    disjoint : float
-        Number of disjoint blocks. As the factor is estimated from few blocks, the F distribution replaces χ².
-    """
-    predictions = predictions.of(
-        np.isfinite(predictions.variances) & (predictions.variances > _INSIDE * predictions.at_data)
-    )
-    e, v, excess = predictions.squares, predictions.variances, predictions.variances - predictions.at_data
-    if len(e) < _FEW:
-        return np.nan
-
-    def surplus(log_k: float) -> float:
-        return float(np.mean(e / (v + np.expm1(2 * log_k) * excess + 1)) - 1)
-
-    low, high = 0.0, 1.0
-    if surplus(low) > 0:
-        while surplus(high) > 0:
-            low, high = high, 2 * high
-        while high - low > 1e-3:
-            middle = 0.5 * (low + high)
-            low, high = (middle, high) if surplus(middle) > 0 else (low, middle)
-    else:
-        high = 0.0
-    plain = _core.chi_squared(m, _LEVEL)
-    independent = max(1, round(min(disjoint, len(e))))
-    spread = np.sqrt(_core.chi_squared_ratio(m, m * independent, _LEVEL) / plain)
-    # The factor for which the bands contain the required share of the errors. It protects against bursts.
-    covering = np.quantile((m * e / plain - 1 - predictions.at_data) / excess, _LEVEL)
-    return float(max(1.0, spread * np.exp(high), np.sqrt(max(covering, 0.0))))
+    def linearised(self) -> Any:
+        """The arrays that the core reads."""
+        observed = np.full(len(self.times), float(self.coordinates)) if self.observed is None else self.observed
+        rows, errors, pseudo = [self.factors, self.sides], self.residuals, self.pseudo
+        residuals = [np.ascontiguousarray(x) for x in (errors if pseudo is None else pseudo, errors)]
+        return self.times, self.firsts, rows, residuals, self.counts, [self.weights, observed], self.coordinates
 
 
 class Calibration:
@@ -413,7 +263,12 @@ def _ratio(more: Doubles, v: Doubles) -> Doubles:
 
 
 def calibrate(
-    times: Doubles, weights: Doubles, course: Course, period: float, evidence: Callable[[], Any], ends: bool = True
+    times: Doubles,
+    weights: Doubles,
+    course: Course,
+    period: float,
+    evidence: Callable[[], SensorEvidence],
+    ends: bool = True,
 ) -> Calibration:
     """Find the long gaps of a curve and the factors of its standard deviations in them.
 
@@ -428,7 +283,7 @@ def calibrate(
     evidence : callable
         Function that returns the linearised data. It is called only if there are gaps, or for times beyond the data.
     ends : bool
-        Whether variances beyond the data change as well. This needs `Evidence`.
+        Whether variances beyond the data change as well. This needs the `line` of the evidence.
 
     References
     ----------
@@ -458,197 +313,243 @@ def calibrate(
     width = width_without(apart[long])
     gaps = []
     if len(spans):
-        factors = _factors_of_gaps(_Blocks(evidence(), spans, width, at_data(0), period), spans)
+        data, turn = evidence(), period if closed else None
+        factors = _core.gap_factors(data.knots, data.known, data.linearised, spans.tolist(), width, at_data(0), turn)
         gaps = [(float(start), float(stop), *own) for (start, stop), own in zip(spans, factors, strict=True)]
     if closed or not ends:
         return Calibration(course, gaps, at_data, width, period=period)
+
+    def beyond() -> tuple[Doubles, int]:
+        data = evidence()
+        along = data.line or [], course.order, course.lam, course.acceleration
+        rungs, count = _core.end_factors(data.knots, data.known, data.linearised, along, usual)
+        return np.array(rungs).reshape(-1, 2), count
+
     outer = float(times[0]), float(times[-1])
-    return Calibration(course, gaps, at_data, width, outer, beyond=lambda: _beyond(evidence(), course, usual))
+    return Calibration(course, gaps, at_data, width, outer, beyond=beyond)
 
 
-def _factors_of_gaps(blocks: _Blocks, gaps: Doubles) -> list[tuple[float, int]]:
-    """Return the factor and the number of blocks for every gap."""
-    lengths = gaps[:, 1] - gaps[:, 0]
-    shortest, longest = lengths.min(), lengths.max()
-    steps = min(_LENGTHS, int(np.ceil(np.log2(longest / shortest) - 1e-9)) + 1)
-    ladder = np.geomspace(shortest, longest, steps) if steps > 1 else np.array([longest])
-    known = {float(length): own for length in ladder if (own := blocks.factor(length)) is not None}
-    shorter = float(shortest)
-    while not known and shorter > max(2 * blocks.width, shortest / 2**_LENGTHS):
-        # No block is as long as the shortest gap, so shorter ones are tried.
-        shorter /= 2
-        own = blocks.factor(shorter)
-        if own is not None:
-            known[shorter] = own
-    if len(known) == 1 and min(known) < shortest:
-        # The factor may increase with the length, so the maximum over shorter lengths is used.
-        for length in (shorter / 2, shorter / 4):
-            own = blocks.factor(length) if length > blocks.width else None
-            if own is not None:
-                known[length] = own
-    if not known:
-        return [blocks.any_factor(length) for length in lengths]
-    at = np.array(sorted(known))
-    values = np.array([known[length][0] for length in at])
-    out = []
-    for length in lengths:
-        if length > at[-1] * (1 + 1e-9):
-            out.append((float(values.max()), 0))
-        else:
-            factor = np.exp(np.interp(np.log(length), np.log(at), np.log(values)))
-            out.append((float(factor), known[float(at[np.searchsorted(at, length * (1 - 1e-9))])][1]))
+def calibration_of(spline: Any, number: int) -> Calibration | None:
+    """Return the calibration of one curve in gaps, in the smoothed space with a given number.
+
+    The result is None for curves without an estimate of their error: interpolating curves, least squares without a
+    penalty, geodesics with ``lam=inf``, and curves that did not converge.
+    """
+    part = spline._smoothed[number]
+    space = smoothed_spaces(spline.space)[number]
+    lam, sigma = (float(np.asarray(own)) for own in (part.band_lam, part.sigma))
+    known = np.isfinite(part.report.lam) and part.report.converged
+    usable = 0 < lam < np.inf and 0 < sigma < np.inf and bool(known)
+    noise, times = spline._noisy.noise[number], spline._noisy.times
+    used = noise.weights > 0
+    t = times[used]
+    if not usable or part.posterior is None or len(np.unique(t)) < 3:
+        return None
+    knots, kinds = spline._knots_of(()), end_kinds(spline._bc_type)
+    m = space.dim
+    posterior = part.posterior
+
+    def line(at: float) -> Doubles:
+        found = posterior.covariance(space, knots, (), kinds, np.array([at]), None, [0, 1])[0].reshape(2, m, 2, m)
+        return np.asarray(np.trace(found, axis1=1, axis2=3) / m)
+
+    def variance(x: Doubles, nu: int) -> Doubles:
+        return np.asarray((spline._plain_spread(number, (), x, nu) / sigma) ** 2)
+
+    order = 3 if part.penalty == "jerk" else 2
+
+    @cache
+    def evidence() -> SensorEvidence:
+        return _evidence(spline, number, np.flatnonzero(used), sigma)
+
+    acceleration = 0.0
+    if order == 3:
+        at = t[:: max(1, len(t) // 1000)]
+        vectors = _coordinates(spline, number, at, "acceleration")
+        acceleration = float(np.mean((vectors / sigma) ** 2))
+    course = Course(order, lam, variance, line, acceleration)
+    period = float(knots[-1] - knots[0]) if is_closed(spline._bc_type) else np.nan
+    return calibrate(t, noise.weights[used], course, period, evidence)
+
+
+def _evidence(spline: Any, number: int, used: Any, sigma: float) -> SensorEvidence:
+    noisy, part = spline._noisy, spline._smoothed[number]
+    space, data = points_of(noisy, spline.space)[number]
+    noise, m = noisy.noise[number], space.dim
+    t, y = noisy.times[used], data[used]
+    residuals = _coordinates(spline, number, t, "point", y) / sigma
+    velocities, accelerations = (
+        _coordinates(spline, number, t, quantity) / sigma for quantity in ("velocity", "acceleration")
+    )
+    h = np.diff(t)[:, None]
+    steps = 0.5 * h * (velocities[:-1] + velocities[1:]) + h**2 / 12 * (accelerations[:-1] - accelerations[1:])
+    positions = np.concatenate([np.zeros((1, m)), np.cumsum(steps, axis=0)])
+    weights, posterior = noise.weights[used], spline._posterior(part)
+    # If A couples no coordinates, it is that of one of them, and the others are columns.
+    size, n = posterior.size, len(t)
+    if size == 1:
+        roots, observed = np.sqrt(weights)[:, None, None], np.ones(n)
+    else:
+        matrices = np.eye(m) * weights[:, None, None]
+        if noise.information is not None:
+            matrices = _in_frames(spline, number, t, y, noise.information[used])
+        roots = _roots(matrices)
+        observed = np.maximum(roots.any(axis=2).sum(axis=1), 1.0)
+        weights = (roots**2).sum(axis=(1, 2)) / observed
+    whitened = roots @ residuals.reshape(n, size, -1)
+    squares = (whitened**2).sum(axis=(1, 2))
+    counts, pseudo = np.ones(n, bool), None
+    if noise.loss != "linear":
+        counts = squares <= _core.chi_squared(m, _KEPT)
+        pseudo = whitened * _soft(noise.loss, squares, m)[:, None, None]
+    knots, kinds = spline._knots_of(()), end_kinds(spline._bc_type)
+    firsts, factors = _core.coefficient_factors(knots, kinds, t, 0)
+    rows = np.ascontiguousarray(np.einsum("nqc,nk->nqkc", roots, factors).reshape(n, roots.shape[1], -1))
+    known, line = posterior.known((), kinds), [np.ascontiguousarray(x) for x in (roots, positions, velocities)]
+    none = np.zeros((n, roots.shape[1], 0))
+    return SensorEvidence(knots, known, t, firsts, rows, none, whitened, counts, weights, m, pseudo, observed, line)
+
+
+def _soft(loss: str, squares: Doubles, m: int) -> Doubles:
+    """Return factors that turn residuals into those of pseudo-data, for noise of variance one (Cox 1983)."""
+    q = squares / corner_of(loss, m)
+    if loss == "huber":
+        q = np.maximum(q, 1.0)
+        factors = 1 / np.sqrt(q)
+        slopes = np.where(q > 1, (m - 1) / m * factors, 1.0)
+    else:
+        factors = 1 / (1 + q)
+        slopes = factors - 2 * q * factors**2 / m
+    return np.asarray(factors / max(slopes.mean(), 0.05))
+
+
+def _roots(matrices: Doubles) -> Doubles:
+    """Return R with W = RᵀR for symmetric matrices W; rows of directions without information are zero."""
+    values, vectors = np.linalg.eigh(matrices)
+    values = np.where(values > SINGULAR * values[:, -1:], values, 0.0)
+    return np.asarray(np.sqrt(values)[:, :, None] * np.swapaxes(vectors, -1, -2))
+
+
+def _parts_at(spline: Any, number: int, t: Doubles, quantity: str) -> tuple[Any, Array, Array]:
+    """Return the factor of a smoothed space, the points at its knots, and a quantity at times."""
+    owners = [i for i, own in enumerate(grouped(spline.space, spline._smoothed)) for _ in own]
+    factor, curve = factors_of(spline.space)[owners[number]], spline._curve.parts[owners[number]]
+    place = number - owners.index(owners[number])
+    values = curve.evaluate(t, quantity, "raise", False)
+    return factor, split(factor, curve.points)[place], split(factor, values)[place]
+
+
+def _coordinates(spline: Any, number: int, t: Doubles, quantity: str, y: Array | None = None) -> Doubles:
+    """Return coordinates of tangent vectors along the curve: its derivatives, or logarithms of points y."""
+    space = smoothed_spaces(spline.space)[number]
+    factor, points, vectors = _parts_at(spline, number, t, quantity)
+    _, _, p = _parts_at(spline, number, t, "point")
+    if y is not None:
+        one = space if isinstance(factor, SpecialEuclidean) else factor
+        vectors = one._apply("log", p=p, q=y)
+    return _of_frames(space, spline._knots_of(()), points, t, p, vectors[:, None])[:, 0]
+
+
+def _of_frames(space: Space, knots: Doubles, points: Array, t: Doubles, p: Array, vectors: Array) -> Doubles:
+    """Return coordinates of vectors (n, k, *point_shape) in the frames along a curve, shape (n, k, m)."""
+    n, k, m = len(t), vectors.shape[1], space.dim
+    flat = np.asarray(space._as_doubles(np.ascontiguousarray(vectors))).reshape(n, k, -1)
+    if isinstance(space, Euclidean):
+        return flat
+    out = np.empty((n, k, m))
+    step = max(1, _TOGETHER // (m * flat.shape[-1]))
+    for first in range(0, n, step):
+        some = slice(first, first + step)
+        frames = frames_at(space, knots, points, t[some], p[some])
+        rows = np.asarray(space._as_doubles(np.ascontiguousarray(frames))).reshape(-1, m, flat.shape[-1])
+        q, r = np.linalg.qr(np.swapaxes(rows, 1, 2))
+        out[some] = np.swapaxes(np.linalg.solve(r, np.swapaxes(q, 1, 2) @ np.swapaxes(flat[some], 1, 2)), 1, 2)
     return out
 
 
-class _Blocks:
-    """Parts of a recording whose data can be omitted."""
-
-    def __init__(
-        self, evidence: Evidence | SensorEvidence, gaps: Doubles, width: float, at_data: float, period: float
-    ) -> None:
-        self.evidence, self.gaps, self.width, self.at_data = evidence, gaps, width, at_data
-        t = evidence.times
-        self.closed, self.count = not np.isnan(period), len(t)
-        # Blocks of closed curves may contain the first and the last datum.
-        self.times = np.concatenate([t, t + period]) if self.closed else t
-        self.all_gaps = np.concatenate([gaps, gaps + period]) if self.closed else gaps
-        self.span = (t[0], t[0] + period) if self.closed else (t[0], t[-1])
-        self.firsts, self.factors, self.data, self.residuals = evidence.system()
-
-    def factor(self, length: float) -> tuple[float, int] | None:
-        """Return the factor for gaps of a length and the number of blocks, or None if there are none."""
-        edge = min(2 * self.width, length)
-        first, last = self.span[0], self.span[1] - length
-        if not self.closed:
-            first, last = first + edge, last - edge
-        if last < first:
-            return None
-        starts = np.linspace(first, last, 1 + int(min(max(8 * (last - first) / length, 1), 4096)))
-        edges = np.stack([starts - edge, starts, starts + length, starts + length + edge])
-        inside = np.zeros(len(starts))
-        good = np.ones(len(starts), bool)
-        for start, stop in self.all_gaps:
-            good &= ~((edges > start) & (edges < stop)).any(axis=0)
-            inside += np.maximum(np.minimum(stop, starts + length) - np.maximum(start, starts), 0.0)
-        return self._of(starts[good & (inside <= 0.5 * length)], length)
-
-    def any_factor(self, length: float) -> tuple[float, int]:
-        """Return the factor from blocks anywhere between the first and the last datum, including other gaps."""
-        starts = np.linspace(self.span[0], self.span[1] - length, 4 * _BLOCKS)
-        return self._of(starts, length) or (np.nan, 0)
-
-    def _of(self, starts: Doubles, length: float) -> tuple[float, int] | None:
-        omitted = []
-        for start in starts:
-            a, b = np.searchsorted(self.times, (start, start + length), side="right")
-            own = np.arange(a, b) % self.count
-            # A block needs data on both sides, and a datum in it that is not an outlier.
-            beside = b - a < self.count if self.closed else a > 0 and b < len(self.times)
-            if beside and self.evidence.counts[own].any():
-                omitted.append((start, own))
-        if not omitted:
-            return None
-        disjoint, reached = 0, -np.inf
-        for start, _ in omitted:
-            if start >= reached:
-                disjoint, reached = disjoint + 1, start + length
-        omitted = [omitted[i] for i in _some(len(omitted), _BLOCKS)]
-        found = self._predicted([own for _, own in omitted])
-        factor = factor_of(found, self.evidence.coordinates, disjoint)
-        return None if np.isnan(factor) else (factor, len(omitted))
-
-    def _predicted(self, omitted: list[NDArray[np.intp]]) -> Predicted:
-        evidence = self.evidence
-        probed = []
-        for own in omitted:
-            some = own[evidence.counts[own]]
-            probed.append(some[_some(len(some), _PREDICTED)])
-        chosen = np.concatenate(probed)
-        probes = evidence.rows(chosen, self.firsts[chosen], self.factors[chosen])
-        values, variances = _without(evidence, self.data, self.residuals, probes, omitted, [len(p) for p in probed])
-        errors = evidence.whitened(chosen, evidence.residuals[chosen]) - values
-        squares, v = (evidence.per_datum(chosen, own) for own in (errors**2, variances))
-        return Predicted(squares, v, self.at_data * evidence.observed_weights(chosen), np.zeros(len(chosen)))
+def _in_frames(spline: Any, number: int, t: Doubles, y: Array, information: Doubles) -> Doubles:
+    """Return information matrices in frames along the curve, to which the frames at the data are transported."""
+    space = smoothed_spaces(spline.space)[number]
+    _, points, p = _parts_at(spline, number, t, "point")
+    frames = np.moveaxis(space.frame(y), 1, 0)
+    moved = np.stack([space._apply("transport", p=y, q=p, v=own) for own in frames], axis=1)
+    # Rows are the transported frame vectors, in coordinates of the frames along the curve.
+    own = np.linalg.inv(_of_frames(space, spline._knots_of(()), points, t, p, moved))
+    return np.asarray(own @ information @ np.swapaxes(own, 1, 2))
 
 
-def _some(count: int, most: int) -> NDArray[np.intp]:
-    """Return evenly distributed ones of so many indices, the first and the last among them."""
-    return np.linspace(0, count - 1, min(count, most)).astype(int)
+# ---- bands in gaps ----
 
 
-def _without(
-    evidence: Evidence | SensorEvidence,
-    data: Any,
-    residuals: Doubles,
-    probes: Any,
-    omitted: list[Any],
-    counts: list[int],
-) -> tuple[Doubles, Doubles]:
-    """Return changes and variances of linear functions without the omitted data; each block has `counts` functions."""
-    rows = evidence.rows_per_datum
-    each = [(own[:, None] * rows + np.arange(rows)).ravel() for own in omitted]
-    stops = np.cumsum([len(own) for own in each])
-    of_probes = np.cumsum(counts) * rows
-    blocks = [
-        [int(stop) - len(own), int(stop), int(last) - count * rows, int(last)]
-        for own, stop, last, count in zip(each, stops, of_probes, counts, strict=True)
-    ]
-    flat = np.ascontiguousarray(np.concatenate(each), np.int64)
-    return _core.predictions_without(evidence.knots, evidence.known, data, residuals, probes, flat, blocks)
+def warn_of_cubics() -> None:
+    """Warn that standard deviations beyond the ends are not those of a curve that continues its cubics."""
+    warn(
+        "extrapolate=True continues the first and the last cubic of the curve. Standard deviations and bands beyond "
+        "the ends are those of a curve that continues with constant velocity, so that they do not contain the error of "
+        "these cubics. Pass extrapolate='geodesic' to make_smoothing_spline.",
+        SmoothingWarning,
+    )
 
 
-def _beyond(evidence: Evidence, course: Course, usual: float) -> tuple[Doubles, int]:
-    """Return distances beyond the ends with their factors, and the number of predictions.
+def widest_band(space: Space, spread: NDArray[np.float64]) -> float:
+    """Return the radius of the widest 95 % band relative to the injectivity radius, or to π radii of curvature if less.
 
-    Each prediction omits all data after a datum in the last two thirds of the recording, and continues the curve from
-    there with constant velocity. The same is done backwards in time.
+    It is 0 on flat spaces, where computations in tangent spaces are exact.
     """
-    t, (n, m) = evidence.times, evidence.residuals.shape
-    span = t[-1] - t[0]
-    reach = _BEYOND * span
-    firsts, factors, data, residuals = evidence.system()
-    slopes = _core.coefficient_factors(evidence.knots, evidence.known[2], t, 1)[1]
-    omitted, counts, lines = [], [], []
-    for direction in (1, -1):
-        here = direction * t[::direction]
-        cuts = np.linspace(here[0] + reach, here[-1] - min(2 * usual, 0.1 * span), _BLOCKS // 2)
-        for cut in np.unique(np.searchsorted(here, cuts, side="right")):
-            stop = int(np.searchsorted(here, here[cut - 1] + reach, side="right"))
-            # The remaining data must determine more than a line.
-            if cut < max(_FEW, course.order + 1) or cut >= n:
-                continue
-            ahead = np.arange(cut, stop)
-            ahead = ahead[_some(len(ahead), _PREDICTED)]
-            index = np.arange(n)[::direction]
-            omitted.append(index[cut:])
-            at, ahead = np.full(len(ahead) + 1, index[cut - 1]), np.append(index[ahead], index[cut - 1])
-            counts.append(len(ahead))
-            lines.append((at, ahead))
-    if not lines:
-        return np.zeros((0, 2)), 0
-    at, ahead = (np.concatenate(own) for own in zip(*lines, strict=True))
-    d = t[ahead] - t[at]
-    probes = evidence.rows(ahead, firsts[at], factors[at] + d[:, None] * slopes[at])
-    values, variances = _without(evidence, data, residuals, probes, omitted, counts)
-    line = evidence.positions[at] + d[:, None] * evidence.velocities[at]
-    left = evidence.residuals[ahead] + evidence.positions[ahead] - line
-    squares = evidence.per_datum(ahead, (evidence.whitened(ahead, left) - values) ** 2)
-    v, weights = evidence.per_datum(ahead, variances), evidence.observed_weights(ahead)
-    # The last probe of every block is the end itself.
-    last = np.cumsum(counts) - 1
-    v0 = np.repeat(v[last] / weights[last], counts) * weights
-    found = Predicted(squares, v + weights * course.drift(np.abs(d)), v0, np.abs(d))
-    found = found.of(evidence.counts[ahead] & (found.distances > 0))
-    rungs, factors_of = [], []
-    high = reach
-    while high > max(usual, reach / 2**_LENGTHS):
-        factor = factor_of(
-            found.of((found.distances > 0.5 * high) & (found.distances <= high)),
-            m,
-            min(2 / 3 * span / high, len(lines)),
+    if not space.curvature > 0:
+        return 0.0
+    reach = min(space.injectivity_radius, np.pi / space.curvature)
+    return float(np.nanmax(spread, initial=0.0) * np.sqrt(_core.chi_squared(space.dim, 0.95)) / reach)
+
+
+def warn_of_wide_bands(spline: Any, number: int, index: tuple[int, ...], wide: float) -> None:
+    """Warn of a band so wide that computations in tangent spaces are not valid."""
+    of = of_index(index) + in_part(spline.space, number)
+    warn(
+        f"the 95 % band{of} is up to {wide:.2g} of the injectivity radius (or of π radii of curvature) wide. Bands are "
+        "computed in tangent spaces along the curve and may be too narrow. Do not rely on this part of the curve: cut "
+        "the recording there (symspline.fit_segments), or add data.",
+        SmoothingWarning,
+        index,
+    )
+
+
+def warn_of_gaps(spline: Any, found: dict[tuple[int, tuple[int, ...]], Any]) -> None:
+    """Warn once of the longest gap among those longer than any part of the recording that could be predicted.
+
+    Parameters
+    ----------
+    spline : SmoothingSpline
+        Curve.
+    found : dict
+        Calibrations by part and index of the curve; None for curves without any.
+    """
+    blind = [
+        (stop - start, key, place)
+        for key, known in found.items()
+        for place, (start, stop, _, blocks) in enumerate([] if known is None else known.gaps)
+        if not blocks
+    ]
+    if not blind:
+        return
+    _, (number, index), place = max(blind)
+    gap, count = spline._gaps_of(number, index)[place + len(found[number, index].ends[:1])], len(blind)
+    of = of_index(index) + in_part(spline.space, number)
+    more = f" (and {count - 1} more gaps)" if count > 1 else ""
+    if np.isnan(gap.factor):
+        known = (
+            "The error of the curve in the gap cannot be estimated, so its standard deviation is NaN there. Cut the "
+            "recording at this gap (symspline.fit_segments), or pass calibrated=False for the posterior."
         )
-        if not np.isnan(factor):
-            rungs.append(0.75 * high)
-            factors_of.append(min(factor, _MOST))
-        high /= 2
-    return np.array([rungs[::-1], factors_of[::-1]]).T.reshape(-1, 2), len(lines)
+    else:
+        known = (
+            f"The band in the gap is up to {gap.factor:.2g} times as wide as that of the posterior. This factor comes "
+            "from shorter parts of the recording and may be too small. Do not rely on the curve in the gap: cut the "
+            "recording there (symspline.fit_segments), or add data."
+        )
+    warn(
+        f"there are no data{of} between t = {short_repr(gap.start)} and {short_repr(gap.stop)}{more}, and no other "
+        f"part of the recording is as long. {known}",
+        SmoothingWarning,
+        index,
+    )

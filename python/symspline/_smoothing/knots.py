@@ -12,8 +12,9 @@ from .._base.arrays import as_array, short_repr
 from .._base.input import times_of
 from .._base.report import long_gaps
 from .._core import ValidationError
-from .._spaces import Array, Doubles, Space
-from .data import SmoothingData, points_of
+from .._spaces import Array, Doubles, Space, SpecialEuclidean, factors_of
+from .data import Part, SmoothingData
+from .noise import smoothed_spaces
 
 # Segments longer than this fraction of the curve are divided if no curve was found without additional knots.
 _GAPS = 12
@@ -29,13 +30,16 @@ _LAG = 5
 _TRIES = 5
 # Factor of the λ for which rounding errors are negligible, after a fit that failed.
 _COARSER = 1e4
+# Number of knots from which the length of a geodesic is determined. Two knots are joined by one geodesic if they are
+# closer than the second number times the injectivity radius; more knots are at most as far apart as the third one.
+_OF_GEODESIC, _NEAR, _STEP = 32, 0.9, 0.3
 # Part of the message for a smoothing without a result.
 NO_CURVE = "no spline joins"
 # Part of the message for too few data with penalty="jerk".
 TOO_FEW = "needs at least 3 data"
 
-DfOfPart = Callable[[int, SmoothingData, "Knots"], Array]
-"""Returns the degrees of freedom of curves with free ends in the smoothed space with a given number."""
+DfOfPart = Callable[[Part, SmoothingData, "Knots"], Array]
+"""Returns the degrees of freedom of curves through some of the data."""
 
 
 class Knots(NamedTuple):
@@ -153,7 +157,7 @@ def merge_close_knots(knots: Knots, noisy: SmoothingData, lam: float | None, pow
         return knots
     span = times[..., -1] - times[..., 0]
     mean = span / (times.shape[-1] - 1)
-    weight = max(float(np.max(np.mean(own.weights, axis=-1))) for own in noisy.precisions)
+    weight = float(max([np.max(np.mean(own.weights, axis=-1)) for own in noisy.noise]))
     # Units of the mean distance prevent overflow.
     ratio = 1.0 if lam is None else lam / weight
     for _ in range(0 if lam is None else power):
@@ -197,32 +201,32 @@ def _moved_apart(t: Array, times: Doubles, kept: NDArray[np.intp]) -> Array:
 def with_enough_knots(
     whole: Knots,
     noisy: SmoothingData,
-    space: Space,
-    lams: list[Any],
+    parts: list[Part],
     run: Callable[[Knots], list[Any]],
     df_of_part: DfOfPart,
     penalty: str,
 ) -> tuple[list[Any], Knots]:
     """Fit with as many knots as λ and the degrees of freedom require, and return the results and the knots."""
-    given = all(np.isfinite(lam).all() for lam in lams)
+    lams = np.concatenate([part.lam for part in parts])
+    given = _of_all(lams) if np.isfinite(lams).all() else None
     power, coarser = (3 if penalty == "acceleration" else 5), 1.0
-    at = merge_close_knots(whole, noisy, _of_all(lams) if given else None, power)
+    at = merge_close_knots(whole, noisy, given, power)
     if at.times.shape[-1] > _MANY:
-        at = thin_knots(at, max(_FIRST, _n_knots_for_df(_df_from_parts(noisy, space, df_of_part, power))))
+        at = thin_knots(at, max(_FIRST, _n_knots_for_df(_df_from_parts(noisy, parts, df_of_part, power))))
     for tries in range(_TRIES):
         found = run(at)
         count = at.times.shape[-1]
-        faults = [fault.what for _, _, faults in found for fault in faults]
+        faults = [fault.what for own in found for fault in own.faults]
         if any(NO_CURVE not in what and TOO_FEW not in what for what in faults) and tries < _TRIES - 1:
             coarser *= _COARSER
-            fewer = merge_close_knots(whole, noisy, _of_all(lams) if given else None, power, coarser)
+            fewer = merge_close_knots(whole, noisy, given, power, coarser)
             if not np.array_equal(fewer.times, at.times) and fewer.times.shape[-1] <= count:
                 at = fewer
                 continue
-        known = [np.asarray(part.report.lam) for _, part, _ in found]
-        apart = merge_close_knots(whole, noisy, _of_all(known), power, coarser)
+        reports = [own.smoothed.report for own in found]
+        apart = merge_close_knots(whole, noisy, _of_all([report.lam for report in reports]), power, coarser)
         most = apart.times.shape[-1]
-        enough = max(_n_knots_for_df(part.report.df) for _, part, _ in found)
+        enough = _n_knots_for_df([report.df for report in reports])
         if tries == _TRIES - 1 or (count >= most > 0.8 * count and count > 0.8 * min(enough, most)):
             break
         # A stiff curve needs fewer knots than it had, and a rough curve more.
@@ -233,23 +237,25 @@ def with_enough_knots(
     return found, at
 
 
-def _df_from_parts(noisy: SmoothingData, space: Space, df_of_part: DfOfPart, power: int) -> float:
+def _df_from_parts(noisy: SmoothingData, parts: list[Part], df_of_part: DfOfPart, power: int) -> float:
     """Estimate the degrees of freedom of a long recording from short parts, in which all times are knots.
 
     For few knots, the choice of λ takes fast motion for noise. The estimate is that of the liveliest part in any of the
     smoothed spaces, without the geodesic that each part has. It is 0 if there are too few data for parts.
     """
     densest = 0.0
-    for number, ((part, points), own) in enumerate(zip(points_of(noisy, space), noisy.precisions, strict=True)):
-        (used,) = np.nonzero((own.weights > 0).reshape(-1, own.weights.shape[-1]).all(axis=0))
+    for part in parts:
+        (used,) = np.nonzero((part.noise.weights > 0).reshape(-1, part.noise.weights.shape[-1]).all(axis=0))
         length = min(_PART, len(used) // (2 * _PARTS))
         if length < _FEW or 0 in noisy.batch:
             continue
-        for start in _starts(part, np.take(points, used, axis=len(noisy.batch)), len(noisy.batch), length):
-            rows = noisy.rows(used[start : start + length])
+        for start in _starts(part.space, np.take(part.points, used, axis=part.axis), part.axis, length):
+            index = used[start : start + length]
+            rows = noisy.rows(index)
             if not (rows.times[..., -1] > rows.times[..., 0]).all():
                 continue
-            excess = df_of_part(number, rows, merge_close_knots(_different(rows.t, rows.times), rows, None, power)) - 2
+            knots = merge_close_knots(_different(rows.t, rows.times), rows, None, power)
+            excess = df_of_part(part.rows(index), rows, knots) - 2
             # The share of the recording, as `thin_knots` counts it.
             spans = [np.ptp(times, axis=-1).max() for times in (rows.times, noisy.times)]
             share = 0.5 * (length / len(used) + spans[0] / spans[1])
@@ -272,12 +278,12 @@ def _starts(space: Space, points: Array, axis: int, length: int) -> list[int]:
     return sorted({*starts, *np.clip(liveliest, 0, total - length).tolist()})
 
 
-def _of_all(lams: list[Any]) -> float:
+def _of_all(lams: Any) -> float:
     """Return one λ from which the knots of all curves are selected.
 
     It is the smallest λ, so that the roughest curve has enough knots, but at least 1e-3 of the largest one.
     """
-    flat = np.concatenate([np.ravel(lam) for lam in lams])
+    flat = np.ravel(lams)
     flat = flat[np.isfinite(flat)]
     return float(max(flat.min(), 1e-3 * flat.max())) if flat.size else 0.0
 
@@ -336,3 +342,28 @@ def _divided(knots: Knots, noisy: SmoothingData, parts: NDArray[np.intp]) -> Kno
 
 def _picked(knots: Knots, index: NDArray[np.intp]) -> Knots:
     return Knots(knots.t[..., index], np.ascontiguousarray(knots.times[..., index]))
+
+
+def geodesic_knots(every: Knots, space: Space, run: Callable[[Knots], list[Array]]) -> Knots:
+    """Return the two knots of a geodesic, or more if it is so long that two knots do not determine it.
+
+    Poses keep all knots: rotations and positions on geodesics are not a geodesic of poses.
+
+    Parameters
+    ----------
+    every : Knots
+        The times of the data, or the knots that were given.
+    run : callable
+        Function that returns the points at given knots in every space in which data are smoothed.
+    """
+    if any(isinstance(factor, SpecialEuclidean) for factor in factors_of(space)):
+        return every
+    found = run(thin_knots(every, _OF_GEODESIC))
+    ratio = 0.0
+    for part, rows in zip(smoothed_spaces(space), found, strict=True):
+        starts, ends = part._neighbours(rows)
+        good = part._where_finite(starts) & part._where_finite(ends)
+        steps = np.zeros(good.shape)
+        steps[good] = part.distance(starts[good], ends[good])
+        ratio = max(ratio, float(np.max(steps.sum(axis=-1), initial=0.0)) / part.injectivity_radius)
+    return thin_knots(every, 2 if ratio < _NEAR else 1 + int(np.ceil(ratio / _STEP)))

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from typing import Any, Unpack, overload
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from .._base.arrays import checked_flag, checked_number, short_repr, whole_number
 from .._base.typing import (
@@ -27,36 +28,27 @@ from .._base.typing import (
     SmoothingPenalty,
     TimesLike,
 )
-from .._base.warnings import is_silent
 from .._core import ValidationError
-from .._curves.ends import NATURAL, End, end_kinds, freeze_bc_type, is_closed, map_ends
+from .._curves.ends import End, freeze_bc_type, is_closed
 from .._curves.failures import raise_or_warn
-from .._curves.fit import Points, Problem, fit, mask_of
+from .._curves.fit import Fit, Points, Problem, fit, mask_of
 from .._curves.held import warn_of_held_points
 from .._curves.missing import counts_all_samples, data_without_missing, missing_named
 from .._curves.options import check_on_failure, check_progress, checked_extrapolate
 from .._curves.representatives import warn_of_far_data, warn_of_far_points, warn_of_signs
 from .._curves.solve import DEFAULTS, in_batch
-from .._spaces import Product, Space, SpecialEuclidean, factors_of, space_named
+from .._spaces import Array, Doubles, Product, Space, SpecialEuclidean, factors_of, space_named
 from ..manifolds._manifold import refuse_functions
-from .audited import warn_of_residuals
-from .data import (
-    SmoothingData,
-    checked_ends,
-    points_of,
-    read_noisy,
-    valid_curves,
-)
-from .factors import grouped, is_several, join, parts_of_factor, smoothed_spaces, split, split_ends
-from .knots import NO_CURVE, Knots, has_all_times, in_gaps, in_long_gaps, knots_for, with_enough_knots
-from .outliers import warn_of_outliers
-from .regression import check_infinite, geodesic_knots, geodesic_options, is_infinite, with_infinite_lam
-from .report import SmoothingReport
-from .solve import SolverOptions, one_per_curve, smoothed
+from .audit import audit
+from .data import Part, SmoothingData, checked_ends, parts_of, read_noisy, valid_curves
+from .knots import NO_CURVE, Knots, geodesic_knots, has_all_times, in_gaps, in_long_gaps, knots_for, with_enough_knots
+from .noise import grouped, join, parts_of_factor, per_part, smoothed_spaces, split_ends
+from .report import SmoothingReport, SmoothingWarning
+from .solve import Found, Smoothed, SolverOptions, smoothed
 from .spline import SmoothingSpline
-from .starts import warn_of_minima
-from .varying import warn_of_varying
-from .warned import SmoothingWarning, warn_of_bounds, warn_of_spread
+
+# Largest dimension in which the full Gauss–Newton solver is used; its matrices have (2 dim)² entries.
+_LARGE = 64
 
 
 @overload
@@ -285,133 +277,116 @@ def make_smoothing_spline(
             raise ValidationError(f"{name} must be a word, not {short_repr(word)}")
     gamma = checked_number(gamma, "gamma must be a number >= 1", lambda x: 1 <= x < np.inf)
     tol = checked_number(tol, "tol must be a number > 0", lambda x: 0 < x < np.inf)
-    most = whole_number(max_iter, "max_iter", 1)
-    options = SolverOptions(criterion, gamma, penalty, loss, method, tol, most, False)
+    options = SolverOptions(criterion, gamma, penalty, method, tol, whole_number(max_iter, "max_iter", 1), False)
     if checked_flag(skipna, "skipna"):
         t, points, weights, frames = data_without_missing(t, points, weights, frames, space)
-    whole, data, of_factors = read_noisy(t, points, space, weights, frames, bc_type, atol)
+    whole, data, of_factors = read_noisy(t, points, space, weights, frames, sigma, loss, bc_type, atol)
     batch = whole.batch
-    lams, sigmas = _in_parts(space, lam, "lam", batch, infinite=True), _in_parts(space, sigma, "sigma", batch)
+    lams = per_part(space, lam, "lam", batch, infinite=True)
     check_infinite(lams, bc_type, penalty)
-    geodesics = is_infinite(lams)
-    if loss != "linear" and sigma is None and any(own.is_singular for own in whole.precisions):
+    if loss != "linear" and sigma is None and any(noise.is_singular for noise in whole.noise):
         raise ValidationError(
             f"loss={loss!r} estimates the noise level from the data, but `weights` has matrices without information in "
             "some directions. Pass sigma; it is 1 if the matrices are inverse covariances."
         )
-    if whole.times.shape[-1] == 2:
-        # Two points have no outliers and do not determine the noise level.
-        options = options._replace(loss="linear")
     strict, mask = on_failure == "raise", mask_of(where, batch)
     with missing_named(data):
         noisy, of_factors, chosen, faults = valid_curves(whole, data, of_factors, space, mask, strict)
     if chosen is not None:
-        lams, sigmas = ([own[chosen] for own in each] for each in (lams, sigmas))
+        lams = [own[chosen] for own in lams]
     factors = factors_of(space)
     ends = [part for factor, own in zip(factors, of_factors, strict=True) for part in split_ends(factor, own)]
+    parts = parts_of(noisy, space, lams, ends)
     every = knots_for(whole, knots)
     if knots is None and penalty == "jerk":
         every = in_long_gaps(every, whole)
+    for needs, what, remedy in (
+        (penalty == "jerk", "penalty='jerk'", "Pass more data, or use penalty='acceleration'."),
+        (is_closed(bc_type), "A closed curve", "Pass more data or knots."),
+    ):
+        if needs and every.times.shape[-1] < 4:
+            raise ValidationError(f"{what} needs at least 4 knots, but there are {every.times.shape[-1]}. {remedy}")
     # A geodesic has no freedom between its knots.
+    geodesics = lams[0].size > 0 and bool(np.isinf(lams).all())
     free = not geodesics and (knots is None or has_all_times(every, noisy))
 
-    def run(at: Knots, raise_lam: bool = False) -> list[Any]:
+    def run(at: Knots, raise_lam: bool = False) -> list[Found]:
         at = at.of_curves(chosen)
-        shared = noisy, at, options._replace(raise_lam=raise_lam), free, progress
-        each = zip(points_of(noisy, space), noisy.precisions, _chosen(lams, at), sigmas, ends, strict=True)
-        return [smoothed(part, own, p, lam, sigma, end, *shared) for (part, own), p, lam, sigma, end in each]
+        how = options._replace(raise_lam=raise_lam)
+        return smoothed([_with_lam(part, at) for part in parts], noisy, at, how, free, progress)
 
-    def df_of_part(i: int, rows: SmoothingData, at: Knots) -> Any:
-        part, own = points_of(rows, space)[i]
-        shared = NATURAL, rows, at, options, free, None
-        _, found, _ = smoothed(part, own, rows.precisions[i], lams[i], sigmas[i], *shared)
-        return np.ravel(found.report.df)
+    def df_of_part(part: Part, rows: SmoothingData, at: Knots) -> Any:
+        (found,) = smoothed([part], rows, at, options, free, None)
+        return np.ravel(found.smoothed.report.df)
 
-    if penalty == "jerk" and every.times.shape[-1] < 4:
-        raise ValidationError(
-            f"penalty='jerk' needs at least 4 knots, but there are {every.times.shape[-1]}. Pass more data, or use "
-            "penalty='acceleration'."
-        )
-    if is_closed(bc_type) and every.times.shape[-1] < 4:
-        raise ValidationError(
-            f"A closed curve needs at least 4 knots, but there are {every.times.shape[-1]}. Pass more data or knots."
-        )
     if geodesics:
-        at = geodesic_knots(every, space, run)
+        at = geodesic_knots(every, space, lambda at: [own.points for own in run(at)])
         options = geodesic_options(space, options)
         found = run(at)
     elif knots is None:
-        found, at = with_enough_knots(every, noisy, space, lams, run, df_of_part, penalty)
+        found, at = with_enough_knots(every, noisy, parts, run, df_of_part, penalty)
         # Knots in gaps are tried before a larger λ, which would affect the whole curve.
-        if any(NO_CURVE in fault.what for _, _, own in found for fault in own):
+        if any(NO_CURVE in fault.what for own in found for fault in own.faults):
             at = in_gaps(at, whole)
             found = run(at, raise_lam=True)
     else:
         found, at = run(every), every
-    transported = [
-        transport_end_velocities(end, part, own, curve_points, noisy)
-        for end, (part, own), (curve_points, _, _) in zip(ends, points_of(noisy, space), found, strict=True)
-    ]
-    spread = partial(in_batch, batch, chosen)
-    # Points of masked curves are NaN.
-    whole = whole._replace(points=[spread(own) for own in noisy.points])
-    parts, conditions = [], []
-    for factor, of_points, of_ends in zip(factors, grouped(space, found), grouped(space, transported), strict=True):
-        rows = join(factor, [spread(own) for own, _, _ in of_points])
-        doubles = np.ascontiguousarray(factor._as_doubles(rows))
-        parts.append(Points(doubles, 0.0, batch, at.times.shape[-1]))
-        conditions.append(_joined(factor, [map_ends(one, spread) for one in of_ends]))
-    good = None if chosen is None else spread(np.ones(len(chosen), bool))
-    fitted = fit(Problem(space, at.times, parts, conditions, DEFAULTS, check=False, mask=good))
-    noise = [
-        with_infinite_lam(part.map(spread), spread(lam), batch) for (_, part, _), lam in zip(found, lams, strict=True)
-    ]
-    kept = _conditions(bc_type, conditions, space)
-    spline = SmoothingSpline._of(whole.time_axis, at.t, fitted.curve, kept, policy, fitted.reports(), whole, noise)
+
+    whole, good = whole._replace(points=noisy.points), np.ones(batch, bool)
+    if chosen is not None:
+        # Points of masked curves are NaN.
+        spread = partial(in_batch, batch, chosen)
+        good, found = spread(good.ravel()[chosen]), [own.map(spread) for own in found]
+        whole = whole._replace(points=[spread(own) for own in noisy.points])
+        parts = [part.map(spread, noise) for part, noise in zip(parts, whole.noise, strict=True)]
+    spline, fitted = _spline_through(whole, space, parts, found, at, good, bc_type, policy)
     faults += [
         fault if chosen is None else fault._replace(curve=int(chosen[fault.curve]))
-        for fault in next((own for _, _, own in found if own), [])
+        for fault in next((own.faults for own in found if own.faults), [])
     ]
     valid_data = [
-        Points(one._as_doubles(own), 0.0, batch, whole.times.shape[-1])
-        for one, own in zip(factors, whole.points, strict=True)
+        Points(factor._as_doubles(own), 0.0, batch, whole.times.shape[-1])
+        for factor, own in zip(factors_of(space), spline._noisy.points, strict=True)
     ]
     # Errors that this data cause do not show the reason.
     far_data = warn_of_far_data(space, valid_data)
     if faults:
         raise_or_warn(sorted(faults, key=lambda fault: fault.curve), on_failure, spline)
-    counts = [np.sum(own.weights > 0, axis=-1) for own in whole.precisions]
-    reports = [part.report for part in noise]
-    outliers = [own.outliers.map(spread) for _, own, _ in found if own.outliers is not None]
-    sound = warn_of_outliers(space, loss, outliers, reports, counts)
-    minima = [spread(own.minima).reshape(batch) for _, own, _ in found if own.minima is not None]
-    best = warn_of_minima(space, minima, reports)
-    asked = [
-        np.reshape(spread(np.isnan(own)), good.shape) & good & only
-        for own, good, only in zip(lams, sound, best, strict=True)
-    ]
-    warn_of_bounds(space, reports, asked, counts)
-    # Between two knots there is nothing to choose.
-    are_chosen = [spread(np.isnan(own) & (at.times.shape[-1] > 2)) for own in lams]
-    are_given = [spread(np.isfinite(own)) for own in sigmas]
-    per_curve = whole.times.ndim > 1
-    at_data = [
-        rows
-        for factor, part in zip(factors, fitted.curve.parts, strict=True)
-        for rows in split(factor, part.evaluate(whole.times, "point", "raise", per_curve))
-    ]
-    if not is_silent(SmoothingWarning):
-        warn_of_residuals(space, at_data, whole, noise, are_given, are_chosen, options.loss)
-        if penalty == "acceleration":
-            varying = are_chosen, end_kinds(bc_type), options.loss != "linear"
-            warn_of_varying(space, fitted.curve, at_data, whole, noise, *varying)
-    warn_of_spread(space, at_data, whole, [part.report.df for part in noise])
+    # Between two knots there is nothing to choose. Masked curves are not examined.
+    audit(spline, parts, found, good, good & (at.times.shape[-1] > 2))
     warn_of_signs(space, [valid_data])
     if whole.used.all():
-        warn_of_held_points(whole.times, whole.points, batch, SmoothingWarning)
+        warn_of_held_points(whole.times, spline._noisy.points, batch, SmoothingWarning)
     if not far_data:
         warn_of_far_points([fitted.curve], [fitted.columns])
     return spline
+
+
+def _spline_through(
+    whole: SmoothingData,
+    space: Space,
+    parts: list[Part],
+    found: list[Found],
+    at: Knots,
+    good: NDArray[np.bool_],
+    bc_type: Any,
+    policy: Extrapolate,
+) -> tuple[SmoothingSpline[Any, Any], Fit]:
+    """Return the spline through smooth points, and its fit. Curves where `good` is False are masked."""
+    batch, factors = whole.batch, factors_of(space)
+    ends = [transport_end_velocities(part, own.points) for part, own in zip(parts, found, strict=True)]
+    points, conditions = [], []
+    for factor, of_points, of_ends in zip(factors, grouped(space, found), grouped(space, ends), strict=True):
+        rows = join(factor, [own.points for own in of_points])
+        points.append(Points(np.ascontiguousarray(factor._as_doubles(rows)), 0.0, batch, at.times.shape[-1]))
+        conditions.append(_joined(factor, of_ends))
+    mask = None if good.all() else good
+    fitted = fit(Problem(space, at.times, points, conditions, DEFAULTS, check=False, mask=mask))
+    noise = [own._replace(sigma=np.empty(0)) for own in whole.noise]
+    results = [with_infinite_lam(own.smoothed, part.lam, batch) for own, part in zip(found, parts, strict=True)]
+    noisy, kept = whole._replace(noise=noise), _conditions(bc_type, conditions, space)
+    made = whole.time_axis, at.t, fitted.curve, kept, policy, fitted.reports(), noisy, results
+    return SmoothingSpline._of(*made), fitted
 
 
 @overload
@@ -494,45 +469,30 @@ def make_lsq_spline(
     return make_smoothing_spline(t, points, space, 0.0, weights=weights, knots=knots, loss=loss, **options)
 
 
-def _chosen(lams: list[Any], at: Knots) -> list[Any]:
-    """Return λ, which is the cube of the interval if there are only two knots and it is not given or infinite.
+def _with_lam(part: Part, at: Knots) -> Part:
+    """Return a part with λ, which is the cube of the interval if there are only two knots, unless a λ is given.
 
     The curve is then the nearest geodesic for every λ, and there is nothing to choose.
     """
     if at.times.shape[-1] > 2:
-        return lams
+        return part
     cube = np.ravel(at.times[..., 1] - at.times[..., 0]) ** 3
-    return [np.where(np.isfinite(lam), lam, cube) for lam in lams]
+    return part._replace(lam=np.where(np.isfinite(part.lam), part.lam, cube))
 
 
-def _in_parts(space: Space, value: Any, name: str, batch: tuple[int, ...], infinite: bool = False) -> list[Any]:
-    """Return one array with a number per curve for each space in which data are smoothed."""
-    spaces = smoothed_spaces(space)
-    if is_several(space) and isinstance(value, tuple):
-        if len(value) != len(spaces):
-            raise ValidationError(
-                f"`{name}` has {len(value)} entries, but there are {len(spaces)} parts to smooth: "
-                f"{', '.join(map(repr, spaces))}. Pass one entry per part."
-            )
-        return [one_per_curve(one, name, batch, infinite) for one in value]
-    return [one_per_curve(value, name, batch, infinite)] * len(spaces)
-
-
-def transport_end_velocities(
-    ends: list[End] | None, space: Space, data: Any, points: Any, noisy: SmoothingData
-) -> list[End] | None:
+def transport_end_velocities(part: Part, curve_points: Array) -> list[End] | None:
     """Transport velocities at the first and the last datum to the ends of the curve."""
-    axis = len(noisy.batch)
+    space, axis = part.space, part.axis
     result: list[End] = []
-    for (kind, vector), index in zip(ends or [], (0, -1), strict=ends is not None):
+    for (kind, vector), index in zip(part.ends or [], (0, -1), strict=part.ends is not None):
         if vector is not None:
-            y, x = (np.take(rows, index, axis=axis) for rows in (data, points))
+            y, x = (np.take(rows, index, axis=axis) for rows in (part.points, curve_points))
             good = space._where_finite(x)
             moved = np.array(space._numbers(vector))
             moved[good] = space._apply("transport", p=y[good], q=x[good], v=moved[good])
             vector = np.ascontiguousarray(space._as_doubles(moved))
         result.append((kind, vector))
-    return None if ends is None else result
+    return None if part.ends is None else result
 
 
 def _joined(space: Space, ends: list[list[End] | None]) -> list[End] | None:
@@ -562,3 +522,41 @@ def _conditions(bc_type: Any, transported: list[list[End] | None], space: Space)
         return (1, vectors if isinstance(space, Product) else vectors[0])
 
     return freeze_bc_type((one(0), one(1)))
+
+
+# ---- geodesic regression: an infinite λ ----
+
+
+def check_infinite(lams: list[Doubles], bc_type: Any, penalty: str) -> None:
+    """Raise ValidationError if λ is infinite where the curve is not a geodesic."""
+    if not np.isinf(lams).any():
+        return
+    for name, value, required in (("penalty", penalty, "acceleration"), ("bc_type", bc_type, "natural")):
+        if value != required:
+            raise ValidationError(
+                f"lam=inf fits a geodesic, whose {name} is {required!r}, not {value!r}. Pass a finite lam, or omit "
+                f"{name}."
+            )
+
+
+def geodesic_options(space: Space, options: SolverOptions) -> SolverOptions:
+    """Return the options for a geodesic, by default those of the full Gauss–Newton solver.
+
+    The linearised solver is inaccurate for one long segment.
+    """
+    if options.method != "auto" or any(own.dim > _LARGE for own in smoothed_spaces(space)):
+        return options
+    return options._replace(method="newton")
+
+
+def with_infinite_lam(part: Smoothed, lam: Doubles, batch: tuple[int, ...]) -> Smoothed:
+    """Return the properties of a fit, whose report has the λ that was given where it is infinite."""
+    if not np.isinf(lam).any():
+        return part
+    given = lam.reshape(batch) if batch else lam[0]
+    infinite = np.isinf(given)
+    lams: Any = np.where(infinite, given, part.report.lam)
+    bound: Any = part.report.at_bound & ~infinite
+    if not batch:
+        lams, bound = float(lams), bool(bound)
+    return part._replace(report=replace(part.report, lam=lams, at_bound=bound))

@@ -1,22 +1,30 @@
-"""Reports of smoothing fits."""
+"""Reports and warnings of smoothing fits."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field, replace
-from typing import Any, Literal
+from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .._base.report import BOOL, FLOAT, INT, mapped_columns, same_report
+from .._base.report import BOOL, FLOAT, INT, FitReport
 from .._base.typing import Number
 
 METHODS: tuple[Literal["linearized", "newton"], ...] = ("linearized", "newton")
 
 
-@dataclass(frozen=True)
-class SmoothingReport:
+class SmoothingWarning(UserWarning):
+    """Warning that a statistical fit cannot be trusted.
+
+    Reasons are a chosen λ at a bound, residuals that are not those of independent noise with the given standard
+    deviations, a robust loss that may have rejected the wrong data, another curve that may fit as well, and a gap in
+    which the error of the curve cannot be estimated.
+    """
+
+
+@dataclass(frozen=True, eq=False)
+class SmoothingReport(FitReport):
     """Report of a smoothing fit in a space that is not a product.
 
     For a batch of curves, every field except ``method`` is an array with the batch axes.
@@ -102,30 +110,3 @@ class SmoothingReport:
         True
         """
         return bool(np.asarray(self.df)[index] < 2.5)
-
-    def __eq__(self, other: object) -> bool:
-        return same_report(self, other) if isinstance(other, SmoothingReport) else NotImplemented
-
-    def map(self, function: Callable[[Any], Any]) -> SmoothingReport:
-        """Apply a function to all fields that have one value per curve.
-
-        Parameters
-        ----------
-        function : callable
-            Function of one field, such as the selection of some curves.
-
-        Returns
-        -------
-        SmoothingReport
-            Report with the results.
-
-        Examples
-        --------
-        >>> import numpy as np
-        >>> import symspline as ss
-        >>> noisy = np.random.default_rng(0).standard_normal((3, 20, 1))
-        >>> curves = ss.make_smoothing_spline(None, noisy, "r:1", lam=1.0)
-        >>> curves.report.map(lambda field: field[0]) == curves[0].report
-        True
-        """
-        return replace(self, **mapped_columns(self, function))

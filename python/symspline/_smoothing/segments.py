@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Iterable
 from datetime import timedelta
 from typing import Any, Literal, NamedTuple, Required, TypedDict, Unpack, overload
 
@@ -11,14 +13,27 @@ from numpy.typing import NDArray
 from .._base.arrays import as_array, checked_flag, checked_number, short_repr, whole_number
 from .._base.durations import seconds_of
 from .._base.exceptions import SymsplineError
+from .._base.faults import UNCONVERGED, Fault
 from .._base.input import times_of
 from .._base.report import FarPointsWarning
 from .._base.rounded_times import warn_of_rounded_times
 from .._base.time import Moments, time_axis_of
-from .._base.typing import Duplicates, FitOptions, FloatArray, P, PointsLike, PProduct, SmoothingOptions, TimesLike
+from .._base.typing import (
+    Duplicates,
+    FitOptions,
+    FloatArray,
+    OnFailure,
+    P,
+    PointsLike,
+    PProduct,
+    Progress,
+    SmoothingOptions,
+    TimesLike,
+)
 from .._base.validation import one_of
 from .._base.warnings import warn
-from .._core import ValidationError
+from .._core import ConvergenceError, ValidationError
+from .._curves.failures import raise_or_warn
 from .._curves.fit import read_given
 from .._curves.missing import (
     counts_all_samples,
@@ -28,7 +43,7 @@ from .._curves.missing import (
     refuse_nan_times,
     without_missing,
 )
-from .._smoothing import SmoothingReport, SmoothingSpline
+from .._curves.options import check_on_failure, check_progress
 from .._spaces import (
     Array,
     Groups,
@@ -45,8 +60,10 @@ from .._splines.composed import SegmentedCurve
 from .._splines.cubic import CubicSpline
 from .._splines.functional import fit_many
 from ..manifolds import Manifold
-from .many import smooth_many
-from .precision import read_precision
+from .make import make_smoothing_spline
+from .noise import read_precision
+from .report import SmoothingReport
+from .spline import SmoothingSpline
 
 # Neighbours this near to each other's cut locus, as a fraction of the distance to it, have no unique geodesic.
 _AT_CUT_LOCUS = 1e-12
@@ -412,3 +429,65 @@ def _at_once(space: Space, points: Array, starts: NDArray[np.intp], duplicates: 
     kept = kept.astype(kept.dtype if kept.dtype.kind in "fc" else np.float64)
     kept[several] = means
     return kept
+
+
+# ---- smoothing splines of different lengths ----
+
+
+def smooth_many(
+    curves: Iterable[tuple[Any, Any, dict[str, Any]]],
+    space: Space[Any],
+    *,
+    on_failure: OnFailure = "raise",
+    progress: Progress | None = None,
+    **options: Any,
+) -> list[SmoothingSpline[Any, Any]]:
+    """Fit one spline per curve, each with its own λ.
+
+    Parameters
+    ----------
+    curves : iterable of tuple
+        Times, points and keyword arguments of each curve.
+    **options
+        Keyword arguments of `make_smoothing_spline` for all curves.
+
+    Raises
+    ------
+    ValidationError
+        If a curve is invalid. The message names the curve.
+    ConvergenceError
+        If a curve fails. The attribute ``spline`` is the list of all curves.
+    """
+    check_on_failure(on_failure)
+    check_progress(progress)
+    given = list(curves)
+    found: list[SmoothingSpline[Any, Any]] = []
+    faults: list[Fault] = []
+    noted: list[tuple[int, Any]] = []
+    for number, (t, points, own) in enumerate(given):
+        with warnings.catch_warnings(record=True) as seen:
+            warnings.simplefilter("always")
+            try:
+                found.append(make_smoothing_spline(t, points, space, **own, **options))
+            except ConvergenceError as error:
+                found.append(error.spline)
+                faults.append(Fault(number, UNCONVERGED, f"curve {number}: {error}", node=error.node))
+            except ValidationError as error:
+                raise error._of_curve(number) from None
+        noted += [(number, note) for note in seen]
+        if progress is not None:
+            progress(number + 1, len(given))
+    # All curves share one warning of each kind, which begins with the same words. Numbers differ between curves.
+    for kind, words in dict.fromkeys(map(_kind, (note for _, note in noted))):
+        first, *more = [(number, note) for number, note in noted if _kind(note) == (kind, words)]
+        others = f" (and {len(more)} more curves)" if more else ""
+        number, note = first
+        warn(f"curve {number}: {note.message}{others}", kind, (number,), getattr(note.message, "node", None))
+    if faults:
+        raise_or_warn(faults, on_failure, found)
+    return found
+
+
+def _kind(note: Any) -> tuple[type[Warning], str]:
+    words = [word for word in str(note.message).split() if not any(own.isdigit() for own in word)]
+    return note.category, " ".join(words[:4])

@@ -1,29 +1,64 @@
-"""Calls of the compiled core that compute the points of a smooth curve from noisy data."""
+"""Calls of the compiled core that compute the points of smooth curves from noisy data.
+
+The core starts from means of neighbouring data. If the noise is a large fraction of the distance to the cut locus, or
+consecutive data are far apart, the iteration may end in a minimum that is not the global one. Further starts are then
+tried.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
-from .._base.arrays import refuse, short_repr
+from .._base.arrays import short_repr
 from .._base.faults import UNCONVERGED, Fault
 from .._base.report import long_gaps
 from .._base.typing import Progress
 from .._core import ValidationError
-from .._curves.ends import End
 from .._curves.reduced import reduced
-from .._spaces import Array, Doubles, Space
-from .data import SmoothingData
+from .._spaces import (
+    Array,
+    ComplexGrassmannian,
+    ComplexProjective,
+    Doubles,
+    Euclidean,
+    Grassmannian,
+    RealProjective,
+    Space,
+    SpecialOrthogonal,
+    Sphere,
+    Torus,
+    nearest_rotations,
+)
+from .data import Part, SmoothingData
 from .knots import NO_CURVE, TOO_FEW, Knots
-from .outliers import Outliers
+from .noise import Noise
 from .posterior import Posterior
-from .precision import Precision
 from .report import METHODS, SmoothingReport
-from .starts import Column, Raw, Samples, best_of_starts
 
+# Standard deviation of the noise, divided by the injectivity radius, from which a second start is tried: 34° on a
+# circle. In all experiments with less noise, the first start led to the best minimum.
+_NOISY = 0.19
+# The same ratio from which the best minimum found may be a wrong one: 52° on a circle.
+_TOO_NOISY = 0.29
+# Median step between the data, as a fraction of the distance to the cut locus, from which the data are a start, unless
+# the noise of the curve found is less than the second number times the injectivity radius.
+_FAST, _SMALL = 0.6, 0.05
+# Noise, divided by the injectivity radius, from which the curve of data with far steps may be wrong.
+_FAST_NOISY = 0.03
+# Objectives that differ by less than this multiple of the variance are nearly equal. Curves are different if they are
+# farther apart than this fraction of the injectivity radius.
+_EQUAL, _OTHER = 12.0, 0.5
+# Largest number of coordinates of an embedding.
+_WIDE = 64
+
+# Kinds of results that may be wrong.
+UNIQUE, TWO, NOISY, FAST = range(4)
+# States of curves, in the order of their numbers in the core.
 _STATES = ("converged", "unconverged", "no curve", "undetermined", "unsettled")
 
 
@@ -45,12 +80,8 @@ class Smoothed(NamedTuple):
     between : bool
         Whether the variance between the knots is included. It is if there is a knot at every time of the data: the
         curve is then the mean of a process. With other knots it is a spline, which has no such freedom.
-    penalty, loss : str
-        Penalty and loss of the fit.
-    outliers : Outliers or None
-        Outcome of the rejection of data, for warnings. Curves that a user has do not have it.
-    minima : ndarray of int or None
-        Kinds of the minima, see `best_of_starts`, likewise.
+    penalty : str
+        Penalty of the fit.
     """
 
     report: SmoothingReport
@@ -60,20 +91,15 @@ class Smoothed(NamedTuple):
     between: bool
     posterior: Posterior | None = None
     penalty: str = "acceleration"
-    loss: str = "linear"
-    outliers: Outliers | None = None
-    minima: NDArray[np.int_] | None = None
 
     def map(self, function: Any) -> Smoothed:
-        """Apply a function to all arrays, such as the selection of some curves, and omit what is for warnings only."""
+        """Apply a function to all arrays, such as the selection of some curves."""
         return self._replace(
             report=self.report.map(function),
             band=function(self.band),
             band_lam=function(self.band_lam),
             sigma=function(self.sigma),
             posterior=self.posterior and self.posterior.map(function),
-            outliers=None,
-            minima=None,
         )
 
 
@@ -83,62 +109,108 @@ class SolverOptions(NamedTuple):
     criterion: str
     gamma: float
     penalty: str
-    loss: str
     method: str
     tol: float
     max_iter: int
     raise_lam: bool
 
 
+class Found(NamedTuple):
+    """Smooth curves in one space.
+
+    Attributes
+    ----------
+    points : ndarray, shape (..., K, *point_shape)
+        Points at the knots.
+    smoothed : Smoothed
+        Properties of the smoothing.
+    faults : list of Fault
+        Curves that failed.
+    selection, rejected : ndarray of int
+        Kind of the selection of a robust loss, which is 0 if it can be trusted, and the number of rejected data.
+    minima : ndarray of int
+        Kinds of the minima, see `best_of_starts`.
+    """
+
+    points: Array
+    smoothed: Smoothed
+    faults: list[Fault]
+    selection: NDArray[np.int_]
+    rejected: NDArray[np.int_]
+    minima: NDArray[np.int_]
+
+    def map(self, function: Any) -> Found:
+        """Apply a function to all arrays, such as one that adds masked curves."""
+        columns = map(function, (self.selection, self.rejected, self.minima))
+        return Found(function(self.points), self.smoothed.map(function), self.faults, *columns)
+
+
 def smoothed(
-    space: Space,
-    points: Array,
-    precision: Precision,
-    lam: Doubles,
-    sigma: Doubles,
-    ends: list[End] | None,
+    parts: list[Part],
     noisy: SmoothingData,
     knots: Knots,
     options: SolverOptions,
     between: bool,
     progress: Progress | None,
-) -> tuple[Array, Smoothed, list[Fault]]:
-    """Compute the points of smooth curves at the knots, in a space that is not a product."""
-    small, inside, span = reduced(space, points)
-    batch = noisy.batch
-    if span is not None and any(vector is not None for _, vector in ends or []):
-        raise ValidationError(f"the dimension of {space!r} is too large for end velocities. Use natural ends.")
-    matrices = precision.information
-    if matrices is not None:
-        matrices = np.ascontiguousarray(np.broadcast_to(matrices, (*batch, *matrices.shape[-3:])))
-    t, y, at = (np.ascontiguousarray(x) for x in (noisy.times, small._as_doubles(inside), knots.times))
-    weights = precision.weights
+) -> list[Found]:
+    """Compute the points of smooth curves at the knots in every space in which data are smoothed."""
+    batch, t, at = noisy.batch, np.ascontiguousarray(noisy.times), np.ascontiguousarray(knots.times)
+    how = *options[:3], parts[0].noise.loss, *options[3:], progress
+    inside, factors = [], []
+    for part in parts:
+        noise, ends, matrices = part.noise, part.ends, part.noise.information
+        small, points, span = reduced(part.space, part.points)
+        if span is not None and any(vector is not None for _, vector in ends or []):
+            raise ValidationError(f"the dimension of {part.space!r} is too large for end velocities. Use natural ends.")
+        if matrices is not None:
+            matrices = np.ascontiguousarray(np.broadcast_to(matrices, (*batch, *matrices.shape[-3:])))
+        y = np.ascontiguousarray(small._as_doubles(points))
+        inside.append((small, span))
+        factors.append((small._handle, y, noise.weights, matrices, part.lam, noise.sigma, ends, None))
+    found = []
+    for part, (small, span), factor, raw in zip(
+        parts, inside, factors, _core.smooth(factors, t, at, *how), strict=True
+    ):
 
-    def solve(lam: Doubles, start: Doubles | None) -> Raw:
-        return Raw(
-            *_core.smooth(small._handle, t, y, weights, matrices, at, lam, sigma, ends, *options, start, progress)
-        )
+        def solve(lam: Doubles, start: Doubles, factor: Any = factor) -> Raw:
+            return Raw(*_core.smooth([(*factor[:4], lam, *factor[5:7], start)], t, at, *how)[0])
 
-    samples = Samples(t, small._numbers(y), weights, at, len(small.point_shape), ends is None)
-    (found, band, columns, (matrix, turn, size)), minima = best_of_starts(small, samples, lam, solve)
-    state, iterations, lams, band_lam, at_bound, df, noise, step, rate, _, exact, selection, rejected, _, scale = (
-        column.reshape(batch) if batch else column[0].item()
-        for column in (*columns, np.where(np.isnan(sigma), columns[Column.SIGMA], sigma))
+        points = small._numbers(factor[1])
+        samples = Samples(t, points, part.noise.weights, at, len(small.point_shape), part.ends is None)
+        best, minima = best_of_starts(small, samples, part.lam, Raw(*raw), solve)
+        found.append(_found(part, noisy, options, between, small, span, best, minima))
+    return found
+
+
+def _found(
+    part: Part,
+    noisy: SmoothingData,
+    options: SolverOptions,
+    between: bool,
+    small: Space,
+    span: Any,
+    raw: Raw,
+    minima: NDArray[np.int_],
+) -> Found:
+    batch, sigma = noisy.batch, part.noise.sigma
+    columns = [*raw.columns, np.where(np.isnan(sigma), raw.columns[Column.SIGMA], sigma)]
+    shaped = [x.reshape(batch) for x in columns] if batch else [x[0].item() for x in columns]
+    state, iterations, lam, band_lam, at_bound, df, estimated, step, rate, _, exact, selection, rejected, _, scale = (
+        shaped
     )
-    report = SmoothingReport(METHODS[int(np.any(exact))], state == 0, iterations, step, rate, lams, at_bound, df, noise)
-    numbers = small._numbers(found)
+    method = METHODS[int(np.any(exact))]
+    report = SmoothingReport(method, state == 0, iterations, step, rate, lam, at_bound, df, estimated)
+    numbers, kinds = small._numbers(raw.points), raw.columns[Column.STATE]
+    count = raw.points.shape[len(batch)]
     faults = [
-        Fault(number, UNCONVERGED, _reason(_STATES[kind], number, report, options, noisy, precision, at.shape[-1]))
-        for number, kind in enumerate(np.ravel(state).tolist())
-        if kind
+        Fault(number, UNCONVERGED, _reason(_STATES[kinds[number]], number, report, options, noisy, part.noise, count))
+        for number in (np.flatnonzero(kinds).tolist() if kinds.any() else ())
     ]
-    on_space = numbers if span is None else span.embed(numbers)
+    matrix, turn, size = raw.system
     # Coordinates in a span of lower dimension are not those of the space.
     posterior = Posterior.of(matrix, turn, size) if span is None or size == 1 else None
-    outliers = Outliers(selection, rejected)
-    options_of_fit = options.penalty, options.loss
-    noise = Smoothed(report, band, band_lam, scale, between, posterior, *options_of_fit, outliers, minima)
-    return on_space, noise, faults
+    result = Smoothed(report, raw.band, band_lam, scale, between, posterior, options.penalty)
+    return Found(numbers if span is None else span.embed(numbers), result, faults, selection, rejected, minima)
 
 
 def _reason(
@@ -147,7 +219,7 @@ def _reason(
     report: SmoothingReport,
     options: SolverOptions,
     noisy: SmoothingData,
-    precision: Precision,
+    noise: Noise,
     knots: int,
 ) -> str:
     if state == "no curve":
@@ -157,7 +229,7 @@ def _reason(
             "Check units and signs of the data."
         )
     if state == "undetermined" and options.penalty == "jerk":
-        weights = np.broadcast_to(precision.weights, (*noisy.batch, precision.weights.shape[-1]))
+        weights = np.broadcast_to(noise.weights, (*noisy.batch, noise.weights.shape[-1]))
         has_weight = weights.reshape(-1, weights.shape[-1])[number] > 0
         used = int(has_weight.sum())
         if used < 3:
@@ -181,18 +253,18 @@ def _reason(
             "criterion."
         )
     other = "" if options.method == "newton" else " or pass method='newton'"
-    gap = _longest_gap(number, noisy, precision)
+    gap = _longest_gap(number, noisy, noise)
     return (
         f"No convergence of the smoothing{{of}}: the last step is {step:.1e} standard deviations after "
         f"{iterations} iterations (tol {options.tol:.1e}). {gap}Raise max_iter{other}."
     )
 
 
-def _longest_gap(number: int, noisy: SmoothingData, precision: Precision) -> str:
+def _longest_gap(number: int, noisy: SmoothingData, noise: Noise) -> str:
     """Describe the longest gap between the data of a curve, if it is far longer than most."""
     t, times, weights = (
         np.broadcast_to(own, (*noisy.batch, own.shape[-1])).reshape(-1, own.shape[-1])[number]
-        for own in (noisy.t, noisy.times, precision.weights)
+        for own in (noisy.t, noisy.times, noise.weights)
     )
     t = t[weights > 0]
     different, index = np.unique(times[weights > 0], return_index=True)
@@ -206,15 +278,231 @@ def _longest_gap(number: int, noisy: SmoothingData, precision: Precision) -> str
     )
 
 
-def one_per_curve(value: Any, name: str, batch: tuple[int, ...], infinite: bool = False) -> Doubles:
-    """Return a number >= 0 per curve, which may be infinite if `infinite` is True; NaN for None."""
-    if value is None:
-        return np.full(int(np.prod(batch)), np.nan)
-    array = np.asarray(value)
-    if array.dtype.kind not in "iuf" or array.shape not in ((), batch):
-        own = f" or an array of shape {batch}" if batch else ""
-        raise ValidationError(f"{name} must be a number{own}, not {short_repr(value)}")
-    allowed = ">= 0" if infinite else "finite and >= 0"
-    good = (array >= 0) & (infinite | np.isfinite(array))
-    refuse(~good, name, lambda i: f"must be {allowed}, not {array[i]}")
-    return np.ascontiguousarray(np.broadcast_to(array, batch), np.float64).ravel()
+# ---- several starts ----
+
+
+class Raw(NamedTuple):
+    """Results of the core for a batch of curves: points at the knots, the band of A⁻¹, columns of the report, A."""
+
+    points: Doubles
+    band: Doubles
+    columns: tuple[NDArray[Any], ...]
+    system: tuple[Doubles, Doubles, int]
+
+    @property
+    def converged(self) -> NDArray[np.bool_]:
+        """Whether the curves converged."""
+        return np.asarray(self.columns[0] == 0)
+
+    def where(self, chosen: NDArray[np.bool_], other: Raw) -> Raw:
+        """Return the chosen curves from the other results, and all others from these."""
+        if chosen.all() or (chosen.any() and self.system[2] != other.system[2]):
+            return other
+        if not chosen.any():
+            return self
+
+        def pick(own: Any, its: Any) -> Any:
+            flat = own.reshape(len(chosen), -1), its.reshape(len(chosen), -1)
+            return np.where(chosen[:, None], flat[1], flat[0]).reshape(own.shape)
+
+        columns = tuple(map(pick, self.columns, other.columns))
+        matrix, turn = map(pick, self.system[:2], other.system[:2])
+        return Raw(
+            pick(self.points, other.points), pick(self.band, other.band), columns, (matrix, turn, self.system[2])
+        )
+
+
+class Column:
+    """Positions of columns of the report."""
+
+    STATE, LAM, SIGMA, OBJECTIVE = 0, 2, 6, -1
+
+
+class Samples(NamedTuple):
+    """Data of a batch of curves: times (N,) or (..., N), points with `axes` axes of a point, weights, and knots."""
+
+    times: Doubles
+    points: Array
+    weights: Doubles
+    knots: Doubles
+    axes: int
+    closed: bool
+
+
+Solve = Callable[[Doubles, Doubles], Raw]
+"""Function that smooths with given λ (NaN to choose λ) and initial points at the knots."""
+
+
+def best_of_starts(space: Space, data: Samples, lam: Doubles, first: Raw, solve: Solve) -> tuple[Raw, NDArray[np.int_]]:
+    """Smooth from further starts where the first result, from the start of the core, may not be the best.
+
+    Returns
+    -------
+    tuple
+        The best results, and their kinds: one of `UNIQUE`, `TWO`, `NOISY`, `FAST` for each curve.
+    """
+    kinds = np.zeros(lam.size, int)
+    radius = space.injectivity_radius
+    if not (np.isfinite(radius) and radius > 0) or not lam.size:
+        return first, kinds
+    radii = radius * np.sqrt(_usual_weights(data, lam.size))
+    fast = _median_steps(space, data) > _FAST
+    noisy = _noise(first) > _NOISY * radii
+    if not (noisy | fast).any():
+        return first, kinds
+    best = first
+    if fast.any():
+        for start in _fast_starts(space, data):
+            if not (fast & (_noise(best) > _SMALL * radii)).any():
+                break
+            other = solve(lam, start)
+            chooses = np.isnan(lam)
+            less = np.where(chooses, _noise(other) < 0.7 * _noise(best), _is_less(other, best))
+            best = best.where(fast & other.converged & (less | ~best.converged), other)
+    noisy = _noise(best) > _NOISY * radii
+    if noisy.any():
+        given = np.where(best.converged, best.columns[Column.LAM], lam)
+        inside = _embedded_start(space, data, given)
+        if inside is not None:
+            other = solve(given, inside)
+            both = best.converged & other.converged
+            apart = _apart(space, best.points, other.points) > _OTHER * radius
+            variance = _noise(best) ** 2
+            differ = np.abs(other.columns[Column.OBJECTIVE] - best.columns[Column.OBJECTIVE])
+            kinds[noisy & both & apart & (differ < _EQUAL * variance)] = TWO
+            best = best.where(noisy & other.converged & (_is_less(other, best) | ~best.converged), other)
+    kinds[(kinds == UNIQUE) & ~fast & (_noise(best) > _TOO_NOISY * radii)] = NOISY
+    kinds[fast & (_noise(best) > _FAST_NOISY * radii)] = FAST
+    return best, kinds
+
+
+def _usual_weights(data: Samples, curves: int) -> Doubles:
+    """Return the median weight of every curve, because noise levels refer to weight one."""
+    rows = data.weights.reshape(-1, data.weights.shape[-1])
+    return np.nanmedian(np.where(rows > 0, rows, np.nan), axis=-1) * np.ones(curves)
+
+
+def _noise(raw: Raw) -> Doubles:
+    """Return the noise levels, infinite for curves that did not converge."""
+    return np.where(raw.converged, raw.columns[Column.SIGMA], np.inf)
+
+
+def _is_less(other: Raw, best: Raw) -> NDArray[np.bool_]:
+    return np.asarray(other.columns[Column.OBJECTIVE] < best.columns[Column.OBJECTIVE] * (1 - 1e-6))
+
+
+def _apart(space: Space, p: Doubles, q: Doubles) -> Doubles:
+    """Return the largest distance between two curves at their knots."""
+    a, b = space._numbers(p), space._numbers(q)
+    good = space._where_finite(a) & space._where_finite(b)
+    found = np.zeros(good.shape)
+    found[good] = space._apply("distance", p=a[good], q=b[good])
+    found[~np.isfinite(found)] = space.injectivity_radius
+    rows = found.reshape(-1, p.shape[found.ndim - 1])
+    return np.asarray(rows.max(axis=-1))
+
+
+def _median_steps(space: Space, data: Samples) -> Doubles:
+    """Return the median step of every curve, as a fraction of the distance to the cut locus."""
+    points, axis = data.points, data.points.ndim - data.axes - 1
+    neighbours = [np.ascontiguousarray(own) for own in space._neighbours(space._as_doubles(points))]
+    rows = space._handle.apply("cut_fraction", neighbours).reshape(-1, points.shape[axis] - 1)
+    if data.weights.all() and np.isfinite(rows).all():
+        return np.asarray(np.median(rows, axis=-1))
+    weights = np.broadcast_to(data.weights, (*points.shape[:axis], data.weights.shape[-1]))
+    used = weights.reshape(len(rows), -1) > 0
+    rows = np.where(used[:, 1:] & used[:, :-1], rows, np.nan)
+    known = np.isfinite(rows).any(axis=-1)
+    found = np.zeros(len(rows))
+    if known.any():
+        found[known] = np.nanmedian(rows[known], axis=-1)
+    return found
+
+
+# ---- consecutive data that are far apart ----
+
+
+def _fast_starts(space: Space, data: Samples) -> Iterator[Doubles]:
+    """Yield the data themselves, and on rotations a slow path times a path that turns by the most frequent step."""
+    near = _nearest(data)
+    lead = data.points.ndim - data.axes - 1
+
+    def at_knots(points: Array) -> Doubles:
+        flat = points.reshape(-1, *points.shape[lead:])
+        rows = flat[np.arange(len(flat))[:, None], near]
+        shaped = rows.reshape(*points.shape[:lead], *rows.shape[1:])
+        return np.ascontiguousarray(space._as_doubles(np.ascontiguousarray(shaped)))
+
+    yield at_knots(data.points)
+    if isinstance(space, SpecialOrthogonal):
+        flat = np.ascontiguousarray(data.points.reshape(-1, *data.points.shape[lead:]))
+        # The data are slow · turn, or turn · slow.
+        turns, in_fixed = _core.usual_turns(space._handle, flat)
+        turns, fixed = turns.reshape(data.points.shape), np.reshape(in_fixed, (*data.points.shape[:lead], 1, 1, 1))
+        back = np.swapaxes(turns, -1, -2)
+        slow = np.ascontiguousarray(np.where(fixed, back @ data.points, data.points @ back))
+        smooth = _linear(space, data, space._as_doubles(slow), np.full(len(flat), np.nan))
+        if smooth is not None:
+            found, turn = space._numbers(smooth), space._numbers(at_knots(turns))
+            whole = np.ascontiguousarray(np.where(fixed, turn @ found, found @ turn))
+            yield np.ascontiguousarray(space._as_doubles(whole))
+
+
+def _nearest(data: Samples) -> NDArray[np.intp]:
+    """Return the index of the datum nearest to each knot, one row per curve, or one row if all have the same times."""
+    times, knots = (x.reshape(-1, x.shape[-1]) for x in (data.times, data.knots))
+    curves = max(len(times), len(knots))
+    each = zip(*(np.broadcast_to(x, (curves, x.shape[1])) for x in (times, knots)), strict=True)
+    after = np.stack([np.clip(np.searchsorted(t, at), 1, len(t) - 1) for t, at in each])
+    t = np.broadcast_to(times, (curves, times.shape[1]))
+    before, behind = (np.take_along_axis(t, index, axis=-1) for index in (after - 1, after))
+    return np.where(knots - before < behind - knots, after - 1, after)
+
+
+# ---- data with much noise ----
+
+
+def _embedded_start(space: Space, data: Samples, lam: Doubles) -> Doubles | None:
+    """Return the data smoothed in the embedding Euclidean space and projected; None without a known embedding."""
+    x = data.points
+    if isinstance(space, Torus):
+        inside = np.concatenate([np.cos(x), np.sin(x)], axis=-1)
+    elif isinstance(space, (Sphere, SpecialOrthogonal)):
+        inside = x
+    elif isinstance(space, (RealProjective, ComplexProjective, Grassmannian, ComplexGrassmannian)):
+        columns = x[..., None] if isinstance(space, (RealProjective, ComplexProjective)) else x
+        inside = columns @ np.swapaxes(columns.conj(), -1, -2)
+    else:
+        return None
+    lead = x.shape[: x.ndim - len(space.point_shape)]
+    flat = np.ascontiguousarray(inside).view(np.float64).reshape(*lead, -1)
+    if flat.shape[-1] > _WIDE:
+        return None
+    found = _linear(Euclidean(flat.shape[-1]), data, np.ascontiguousarray(flat), lam)
+    if found is None:
+        return None
+    near = np.ascontiguousarray(found).view(inside.dtype).reshape(*found.shape[:-1], *inside.shape[len(lead) :])
+    return np.ascontiguousarray(space._as_doubles(np.ascontiguousarray(_projected(space, near))))
+
+
+def _projected(space: Space, x: Array) -> Array:
+    if isinstance(space, Torus):
+        cos, sin = np.split(x, 2, axis=-1)
+        return np.asarray(np.arctan2(sin, cos))
+    if isinstance(space, Sphere):
+        return np.asarray(x / np.maximum(np.linalg.norm(x, axis=-1, keepdims=True), np.finfo(float).tiny))
+    if isinstance(space, SpecialOrthogonal):
+        return nearest_rotations(x)
+    _, vectors = np.linalg.eigh(x)
+    if isinstance(space, (RealProjective, ComplexProjective)):
+        return vectors[..., -1]
+    return vectors[..., -space.point_shape[-1] :]
+
+
+def _linear(space: Space, data: Samples, points: Doubles, lam: Doubles) -> Doubles | None:
+    """Return the points at the knots of a curve that is smoothed by least squares; None if it does not exist."""
+    sigma, closed = np.full(lam.size, np.nan), None if data.closed else [("natural", None)] * 2
+    options = "gcv", 1.4, "acceleration", "linear", "auto", 1e-2, 50, False
+    factor = space._handle, points, data.weights, None, lam, sigma, closed, None
+    found = _core.smooth([factor], data.times, data.knots, *options, None)[0][0]
+    return found if np.isfinite(found).all() else None

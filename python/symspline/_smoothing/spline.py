@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import cached_property
+from functools import cached_property, partial
 from operator import itemgetter
-from typing import TYPE_CHECKING, Any, Generic, Self, overload
+from typing import TYPE_CHECKING, Any, Concatenate, Generic, ParamSpec, Self, overload
 
 import numpy as np
 
@@ -21,15 +21,20 @@ from .._spaces import Array, Doubles, Product, Space, SpecialOrthogonal, factors
 from .._splines.archive import Entries, read_fitted, read_times
 from .._splines.cubic import CubicSpline
 from .data import SmoothingData
-from .evidence import calibration_of
-from .factors import grouped, is_several, join, parts_of_factor, smoothed_spaces, split
-from .gaps import Calibration, Gap
-from .posterior import Parameter, Posterior, frames_at
-from .process import process_ratio
+from .gaps import (
+    Calibration,
+    Gap,
+    calibration_of,
+    warn_of_cubics,
+    warn_of_gaps,
+    warn_of_wide_bands,
+    widest_band,
+)
+from .noise import grouped, is_several, join, parts_of_factor, smoothed_spaces, split
+from .posterior import Parameter, Posterior, frames_at, process_ratio
 from .report import SmoothingReport
 from .solve import Smoothed
 from .stored import noise_state, read_noise
-from .warned import warn_of_cubics, warn_of_gaps, warn_of_wide_bands, widest_band
 
 if TYPE_CHECKING:
     from typing_extensions import TypeVar
@@ -52,11 +57,33 @@ if TYPE_CHECKING:
 
         def __get__(self, spline: SmoothingSpline[Any, Any], owner: Any = None) -> Any: ...
 
+    Q = ParamSpec("Q")
+
+    class noise_method(Generic[Q]):
+        """A method that returns an array for one report, and a tuple of them for several."""
+
+        def __init__(self, method: Callable[Concatenate[Any, Q], Any]) -> None: ...
+
+        @overload
+        def __get__(
+            self, spline: SmoothingSpline[Any, SmoothingReport], owner: Any = None
+        ) -> Callable[Q, FloatArray]: ...
+
+        @overload
+        def __get__(
+            self, spline: SmoothingSpline[Any, tuple[SmoothingReport, ...]], owner: Any = None
+        ) -> Callable[Q, tuple[FloatArray, ...]]: ...
+
+        def __get__(self, spline: SmoothingSpline[Any, Any], owner: Any = None) -> Callable[Q, Any]: ...
+
 else:
     from typing import TypeVar
 
     R = TypeVar("R", covariant=True)
     noise_property = property
+
+    def noise_method(method):
+        return method
 
 
 _T = TypeVar("_T")
@@ -164,10 +191,10 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         at = self._curve.evaluate(noisy.times, "point", "raise", noisy.times.ndim > 1)
         found = []
         gammas = at if isinstance(self.space, Product) else (at,)
-        for space, gamma, points, precisions in zip(
-            factors_of(self.space), gammas, noisy.points, grouped(self.space, noisy.precisions), strict=True
+        for space, gamma, points, noise in zip(
+            factors_of(self.space), gammas, noisy.points, grouped(self.space, noisy.noise), strict=True
         ):
-            counts = np.any([own.weights > 0 for own in precisions], axis=0)
+            counts = np.any([own.weights > 0 for own in noise], axis=0)
             used = np.broadcast_to(counts, (*noisy.batch, points.shape[len(noisy.batch)]))
             used = used & space._where_finite(gamma)
             vectors = np.full(points.shape, np.nan, points.dtype)
@@ -258,16 +285,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
             self._warned_of |= {subject}
             warn()
 
-    @overload
-    def std(
-        self: SmoothingSpline[Any, SmoothingReport], x: TimesLike, *, nu: int = 0, calibrated: bool = True
-    ) -> FloatArray: ...
-
-    @overload
-    def std(
-        self: SmoothingSpline[Any, tuple[SmoothingReport, ...]], x: TimesLike, *, nu: int = 0, calibrated: bool = True
-    ) -> tuple[FloatArray, ...]: ...
-
+    @noise_method
     def std(self, x: TimesLike, *, nu: int = 0, calibrated: bool = True) -> Any:
         r"""Compute the standard deviation of the curve in one coordinate of an orthonormal frame.
 
@@ -344,16 +362,32 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         True
         """
         nu, calibrated = order_of(nu, 1), checked_flag(calibrated, "calibrated")
-        times, own, per_curve = self._finite_times(x)
-        batch = self._batch
-        found = []
-        for number in range(len(self._smoothed)):
-            out = np.empty((*batch, *own))
-            for index in np.ndindex(batch):
-                at = times[index] if per_curve else times
-                out[index] = self._spread(number, index, np.ravel(at), nu, calibrated).reshape(own)
-            found.append(out[()])
-        return self._each(found)
+        times, _, per_curve = self._finite_times(x)
+        spreads = [partial(self._spread, number, nu=nu, calibrated=calibrated) for number in range(len(self._smoothed))]
+        return self._each([self._per_curve(times, per_curve, spread)[()] for spread in spreads])
+
+    def _per_curve(
+        self,
+        times: Doubles,
+        per_curve: bool,
+        value: Callable[..., Array],
+        tail: tuple[int, ...] = (),
+        dtype: Any = None,
+    ) -> Array:
+        """Return the values of a function of the index of each curve and of times of the core, with the shape of times.
+
+        Parameters
+        ----------
+        per_curve : bool
+            Whether every curve has its own times.
+        tail : tuple of int
+            Shape of one value.
+        """
+        shape = times.shape[len(self._batch) :] if per_curve else times.shape
+        out = np.empty((*self._batch, *shape, *tail), dtype)
+        for index in np.ndindex(self._batch):
+            out[index] = value(index, np.ravel(times[index] if per_curve else times)).reshape((*shape, *tail))
+        return out
 
     def _spread(self, number: int, index: tuple[int, ...], x: Doubles, nu: int, calibrated: bool = True) -> Doubles:
         """Return the standard deviation of one curve in one part at times x of the core."""
@@ -369,42 +403,27 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
     def _plain_spread(self, number: int, index: tuple[int, ...], x: Doubles, nu: int) -> Doubles:
         """Return the standard deviation of the posterior, without calibration."""
         part, knots = self._smoothed[number], self._knots_of(index)
-        lam, sigma = (np.asarray(value)[index].item() for value in (part.band_lam, part.sigma))
-        if not part.between:
-            # With λ = 0 the curve has no variance between the knots besides that of the spline.
-            lam = 0.0
-        knots, band, x = (np.ascontiguousarray(own) for own in (knots, part.band[index], x))
-        kinds = end_kinds(self._bc_type)
-        if part.between and part.penalty == "jerk":
-            variance = _core.smoothing_variance(knots, band, 0.0, x, nu, kinds)
-            return np.asarray(sigma * np.sqrt(variance * self._ratio(number, index, x, nu)))
-        variance = _core.smoothing_variance(knots, band, lam, x, nu, kinds)
+        sigma = np.asarray(part.sigma)[index]
+        # With λ = 0 the curve has no variance between the knots besides that of the spline.
+        is_jerk = part.penalty == "jerk"
+        lam = np.atleast_1d(np.asarray(part.band_lam)[index]) if part.between and not is_jerk else np.zeros(1)
+        band, x = np.ascontiguousarray(part.band[index]), np.ascontiguousarray(x)
+        variance = _core.smoothing_variance(knots, band, lam, x, nu, end_kinds(self._bc_type))
+        if part.between and is_jerk:
+            variance = variance * self._ratio(number, index, x, nu)
         return np.asarray(sigma * np.sqrt(variance))
 
     def _ratio(self, number: int, index: tuple[int, ...], x: Doubles, nu: int) -> Doubles:
         """Return the variance of the process that the jerk penalises, relative to that of the spline."""
         part = self._smoothed[number]
-        weights, times = self._noisy.precisions[number].weights, self._noisy.times
+        weights, times = self._noisy.noise[number].weights, self._noisy.times
         times, weights = (values[index] if values.ndim > 1 else values for values in (times, weights))
         coupled = part.posterior is not None and part.posterior.size > 1
         band = None if coupled else part.band[index]
         lam = np.asarray(part.band_lam)[index].item()
         return process_ratio(times, weights, self._knots_of(index), band, lam, end_kinds(self._bc_type), x, nu)
 
-    @overload
-    def band(
-        self: SmoothingSpline[Any, SmoothingReport], x: TimesLike, level: float = 0.95, *, calibrated: bool = True
-    ) -> FloatArray: ...
-
-    @overload
-    def band(
-        self: SmoothingSpline[Any, tuple[SmoothingReport, ...]],
-        x: TimesLike,
-        level: float = 0.95,
-        *,
-        calibrated: bool = True,
-    ) -> tuple[FloatArray, ...]: ...
-
+    @noise_method
     def band(self, x: TimesLike, level: float = 0.95, *, calibrated: bool = True) -> Any:
         """Compute the radius of the ball that contains the true point with a given probability.
 
@@ -456,26 +475,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
             [radius(part, level) * spread for part, spread in zip(smoothed_spaces(self.space), each, strict=True)]
         )
 
-    @overload
-    def cov(
-        self: SmoothingSpline[Any, SmoothingReport],
-        x: TimesLike,
-        y: TimesLike | None = None,
-        *,
-        nu: CovarianceOrder = 0,
-        calibrated: bool = True,
-    ) -> FloatArray: ...
-
-    @overload
-    def cov(
-        self: SmoothingSpline[Any, tuple[SmoothingReport, ...]],
-        x: TimesLike,
-        y: TimesLike | None = None,
-        *,
-        nu: CovarianceOrder = 0,
-        calibrated: bool = True,
-    ) -> tuple[FloatArray, ...]: ...
-
+    @noise_method
     def cov(self, x: TimesLike, y: TimesLike | None = None, *, nu: CovarianceOrder = 0, calibrated: bool = True) -> Any:
         r"""Compute the covariance of the curve in the frames along it.
 
@@ -537,19 +537,16 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
             other, other_shape, _ = self._finite_times(y)
             if other_shape != shape:
                 raise ValidationError(f"y has shape {other_shape}, but x has shape {shape}")
-        found = []
-        for number, space in enumerate(smoothed_spaces(self.space)):
-            size = len(orders) * space.dim
-            out = np.empty((*self._batch, *shape, size, size))
-            for index in np.ndindex(self._batch):
-                at = np.ravel(x[index] if per_curve else x)
-                to = None if other is None else np.ravel(other[index] if per_curve else other)
-                own = self._covariance(number, space, index, at, to, orders)
-                if calibrated:
-                    own = self._inflated([number], index, at, to, orders, own)
-                out[index] = own.reshape(*shape, size, size)
-            found.append(out)
-        return self._each(found)
+
+        def covariance(number: int, index: tuple[int, ...], at: Doubles) -> Doubles:
+            to = None if other is None else np.ravel(other[index] if per_curve else other)
+            found = self._covariance(number, spaces[number], index, at, to, orders)
+            return self._inflated([number], index, at, to, orders, found) if calibrated else found
+
+        spaces = smoothed_spaces(self.space)
+        tails = [2 * (len(orders) * space.dim,) for space in spaces]
+        each = [self._per_curve(x, per_curve, partial(covariance, i), tail) for i, tail in enumerate(tails)]
+        return self._each(each)
 
     def _covariance(
         self, number: int, space: Space, index: tuple[int, ...], x: Any, y: Any, orders: list[int]
@@ -585,7 +582,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         The shape of ``found`` is ``(len(x), len(orders), m, len(orders), m)``.
         """
         part, knots, kinds = self._smoothed[number], self._knots_of(index), end_kinds(self._bc_type)
-        lam = np.asarray(part.band_lam)[index].item()
+        lam = np.atleast_1d(np.asarray(part.band_lam)[index])
         band = np.ascontiguousarray(part.band[index])
         for i, nu in enumerate(orders):
             if nu > 1:
@@ -595,7 +592,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
                 found[:, i] *= root
                 found[:, :, :, i] *= root
                 continue
-            own, plain = (_core.smoothing_variance(knots, band, each, x, nu, kinds) for each in (lam, 0.0))
+            own, plain = (_core.smoothing_variance(knots, band, each, x, nu, kinds) for each in (lam, np.zeros(1)))
             found[:, i, :, i] += (own - plain)[:, None, None] * np.eye(found.shape[-1])
 
     def _coupled(self, parts: list[int], index: tuple[int, ...], x: Doubles, orders: list[int]) -> Doubles:
@@ -686,17 +683,15 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
 
     def _frames(self, times: Doubles, per_curve: bool) -> list[tuple[Array, Array]]:
         """Return points and frames along the curve in every part, at times of the core."""
-        shape = times.shape[len(self._batch) :] if per_curve else times.shape
+
+        def frames(space: Space, points: Array, p: Array, index: tuple[int, ...], at: Doubles) -> Array:
+            return frames_at(space, self._knots_of(index), points[index], at, p[index].reshape(-1, *space.point_shape))
+
         found = []
-        for space, points, p in self._in_parts(times, per_curve):
-            out = np.empty((*self._batch, *shape, space.dim, *space.point_shape), space.dtype)
-            for index in np.ndindex(self._batch):
-                at = np.ravel(times[index] if per_curve else times)
-                rows = frames_at(
-                    space, self._knots_of(index), points[index], at, p[index].reshape(-1, *space.point_shape)
-                )
-                out[index] = rows.reshape(*shape, *rows.shape[1:])
-            found.append((p, out))
+        for part in self._in_parts(times, per_curve):
+            space, _, p = part
+            tail = (space.dim, *space.point_shape)
+            found.append((p, self._per_curve(times, per_curve, partial(frames, *part), tail, space.dtype)))
         return found
 
     def _in_parts(self, times: Doubles, per_curve: bool) -> list[tuple[Space, Array, Array]]:
@@ -846,11 +841,16 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
     def _parts(self) -> tuple[SmoothingSpline[Any, Any], ...]:
         """Splines in the factors of a product."""
         noisy = self._noisy
-        precisions = grouped(self.space, noisy.precisions)
-        found = grouped(self.space, self._smoothed)
+        each = zip(
+            super()._parts,
+            noisy.points,
+            grouped(self.space, noisy.noise),
+            grouped(self.space, self._smoothed),
+            strict=True,
+        )
         return tuple(
-            self._like(part, noisy._replace(points=[points], precisions=own), noise)
-            for part, points, own, noise in zip(super()._parts, noisy.points, precisions, found, strict=True)
+            self._like(part, noisy._replace(points=[points], noise=noise), smoothed)
+            for part, points, noise, smoothed in each
         )
 
     @classmethod

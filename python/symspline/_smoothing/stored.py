@@ -15,9 +15,8 @@ from .._curves.curve import CurveArrays
 from .._spaces import Space, factors_of
 from .._splines.archive import Entries, Stored, entry, read_array, read_field, read_report, suffix_of, times_state
 from .data import SmoothingData
-from .factors import is_several, smoothed_spaces
+from .noise import Noise, is_several, smoothed_spaces
 from .posterior import Posterior
-from .precision import Precision
 from .report import SmoothingReport
 from .solve import Smoothed
 
@@ -29,26 +28,26 @@ def noise_state(space: Space[Any], noisy: SmoothingData, smoothed: list[Smoothed
         "noise": [
             vars(own.report)
             | {"band_lam": own.band_lam, "scale": own.sigma, "between": own.between}
-            | {"penalty": own.penalty, "loss": own.loss}
+            | {"penalty": own.penalty, "loss": noise.loss}
             # Version 1 has no matrices.
             | ({} if own.posterior is None else {"posterior": True})
-            for own in smoothed
+            for noise, own in zip(noisy.noise, smoothed, strict=True)
         ],
     }
-    first, *others = noisy.precisions
+    first, *others = noisy.noise
     alike = all(np.array_equal(first.weights, own.weights) for own in others)
     if alike:
         state["data_weights"] = first.weights
     state |= {"data" + suffix_of(space, i): points for i, points in enumerate(noisy.points)}
-    for i, (precision, own) in enumerate(zip(noisy.precisions, smoothed, strict=True)):
+    for i, (noise, own) in enumerate(zip(noisy.noise, smoothed, strict=True)):
         suffix = _suffix(space, i)
         state["band" + suffix] = own.band
         if own.posterior is not None:
             state |= posterior_state(own.posterior, suffix, noisy.batch)
         if not alike:
-            state["data_weights" + suffix] = precision.weights
-        if precision.information is not None:
-            state["data_information" + suffix] = precision.information
+            state["data_weights" + suffix] = noise.weights
+        if noise.information is not None:
+            state["data_information" + suffix] = noise.information
     return state
 
 
@@ -107,7 +106,7 @@ def read_noise(
         if isinstance(state, Stored):
             # Masked curves are NaN, and so are their data.
             part.space.check_point(rows[part.space._where_finite(part.points).all(axis=-1)])
-    precisions, smoothed = [], []
+    noise, smoothed = [], []
     with entry("noise"):
         for i, (own, numbers) in enumerate(zip(smoothed_spaces(space), state["noise"], strict=True)):
             suffix = _suffix(space, i)
@@ -119,7 +118,6 @@ def read_noise(
                 _check("information matrices", information, shape, batch + shape)
             if not (weights >= 0).all():
                 raise ValidationError("the weights must be numbers >= 0")
-            precisions.append(Precision(weights, information))
             band, numbers = state["band" + suffix], dict(numbers)
             lam, scale = (read_field(key, numbers.pop(key), batch, dtype=np.float64) for key in ("band_lam", "scale"))
             between = read_field("between", numbers.pop("between"), (), dtype=np.bool_)
@@ -127,6 +125,7 @@ def read_noise(
             # Files of older versions do not name them.
             penalty = one_of(numbers.pop("penalty", "acceleration"), "penalty", "acceleration", "jerk")
             loss = one_of(numbers.pop("loss", "linear"), "loss", "linear", "huber", "cauchy")
+            noise.append(Noise(weights, information, loss=loss))
             report = read_report(SmoothingReport, numbers, batch)
             # A closed curve repeats its first coefficients at the end.
             good = np.asarray(report.converged)
@@ -134,8 +133,8 @@ def read_noise(
             posterior = None
             if known:
                 posterior = read_posterior(state, suffix, own.dim, band.shape[-2], batch, closed, good)
-            smoothed.append(Smoothed(report, band, lam, scale, between, posterior, penalty, loss))
-    return SmoothingData(time_axis, t, times, points, precisions, batch), smoothed
+            smoothed.append(Smoothed(report, band, lam, scale, between, posterior, penalty))
+    return SmoothingData(time_axis, t, times, points, noise, batch), smoothed
 
 
 def read_posterior(

@@ -262,7 +262,8 @@ class CumulativeBSpline(ControlledSpline[P]):
         return self._curve.times
 
     def _picked(self, index: Any) -> Self:
-        return self._of(self._curve.take_batch(index), None if self.report is None else self.report._picked(index))
+        report = self.report and self.report.map(lambda column: column[index])
+        return self._of(self._curve.take_batch(index), report)
 
     def _state(self) -> dict[str, Any]:
         space: Space[Any] = self.space

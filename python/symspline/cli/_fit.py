@@ -51,7 +51,7 @@ from typing import Any
 from .._base.exceptions import SymsplineError
 from .._curves.representatives import IN_PYTHON
 from .._smoothing import SmoothingWarning
-from .._smoothing.many import smooth_many
+from .._smoothing.segments import smooth_many
 from .._spaces import Space, Torus, factors_of, space_named
 from .._splines.cubic import CubicSpline
 from .._splines.functional import fit_many

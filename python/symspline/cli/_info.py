@@ -28,7 +28,7 @@ from .._base.disk import damage
 from .._base.report import long_gaps
 from .._base.time import time_axis_of
 from .._smoothing import SmoothingReport, SmoothingSpline
-from .._smoothing.factors import is_several, smoothed_spaces
+from .._smoothing.noise import is_several, smoothed_spaces
 from .._spaces import Doubles
 from .._spaces.base import CLASSES, example_of
 from .._splines.cubic import CubicSpline

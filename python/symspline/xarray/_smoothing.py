@@ -18,7 +18,7 @@ from .._base.warnings import silenced
 from .._curves.missing import missing_points, missing_times
 from .._curves.options import checked_extrapolate, extrapolation_mode
 from .._smoothing import SmoothingWarning, make_smoothing_spline
-from .._smoothing.factors import is_several
+from .._smoothing.noise import is_several
 from .._spaces import Array, Space, SpecialOrthogonal, space_named
 from ._blocks import Inputs, apply, knots_of_block, per_curve_times
 from ._missing import named_curve, of_equal_length, times_of_rows

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from functools import cached_property
+from typing import Any, Generic, NamedTuple, Self
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from .._base.arrays import as_array, checked_atol, checked_number, refuse
 from .._base.report import ConvergenceWarning
 from .._base.typing import (
     Extrapolate,
+    FloatArray,
     GridCriterion,
     Numbers,
     OnFailure,
@@ -24,21 +26,312 @@ from .._base.validation import one_of
 from .._base.warnings import warn
 from .._core import ConvergenceError, ValidationError
 from .._curves.options import check_on_failure, check_progress, checked_extrapolate
+from .._grid import GridReport, GridSpline
 from .._grid.axes import GridAxis, read_axes
 from .._grid.nodes import read_nodes, validate_nodes
 from .._spaces import Array, Doubles, Product, Space, cover_of, factors_of, space_named
+from .._splines.archive import Entries, entry, read_array, suffix_of
 from ..manifolds._manifold import refuse_functions
-from .axes import Nodes, SmoothedNodes, noise_level, smooth_axes
-from .boundaries import warn_of_boundaries
-from .common_lam import LamCriterion
-from .factors import grouped, is_several, join, smoothed_spaces, split
-from .grid_report import SmoothedPart
-from .smoothing_grid import SmoothingGrid
-from .solve import one_per_curve
-from .warned import SmoothingWarning, is_far, random_distance
+from .audit import warn_of_spread
+from .grid_rows import LamCriterion, Nodes, SmoothedAxis, SmoothedNodes, noise_level, smooth_axes
+from .noise import grouped, is_several, join, per_part, smoothed_spaces, split
+from .report import SmoothingWarning
 
 # Ratio of the degrees of freedom to the number of data from which rows follow nearly all data.
 _ALL = 0.9
+# A jump is a step between neighbouring nodes that is longer than the first number of median steps along the axis, and
+# than the second number of times the steps before and after it. Noise and outliers cause no jumps, because the steps
+# next to a long step are long as well.
+_MEDIANS, _BESIDE = 8.0, 4.0
+# Least number of jumps, as a fraction of the number of nodes along a side of the map.
+_SHARE = 0.3
+# A number for each axis, or for products and poses a tuple with one number per part.
+PerAxis = tuple[float | tuple[float, ...], ...]
+
+
+class SmoothedPart(NamedTuple):
+    """Properties of the smoothing in one part of the space.
+
+    Attributes
+    ----------
+    axes : list of SmoothedAxis
+        Properties along every axis.
+    variance : ndarray, shape (n_1, ..., n_D)
+        Posterior variance at the nodes for noise of variance one.
+    df : float
+        Effective degrees of freedom of the surface per coordinate.
+    sigma : float
+        Standard deviation of the noise, given or estimated.
+    """
+
+    axes: list[SmoothedAxis]
+    variance: Doubles
+    df: float
+    sigma: float
+
+
+class SmoothingGridReport(GridReport):
+    """Report of a `SmoothingGrid`: that of a `GridSpline`, and properties of the smoothing.
+
+    Properties of the smoothing are tuples with one entry per axis, in the order in which the axes were smoothed. For a
+    `Product`, and for poses, each entry is a tuple with one number per factor or part.
+
+    See Also
+    --------
+    SmoothingGrid.report : The report of a grid.
+
+    Examples
+    --------
+    >>> import numpy as np, symspline as ss
+    >>> u, v = np.linspace(0, 1, 20), np.linspace(0, 1, 30)
+    >>> noisy = np.sin(3 * u[:, None] + v) + 0.1 * np.random.default_rng(0).standard_normal((20, 30))
+    >>> report = ss.make_smoothing_grid((u, v), noisy[..., None], "r:1").report
+    >>> report.converged, report.at_bound, round(report.sigma[0], 1)
+    (True, (False, False), 0.1)
+    """
+
+    _space: Space[Any]
+    _smoothed: list[SmoothedPart]
+
+    @property
+    def converged(self) -> bool:
+        """Whether the smoothing of all rows converged, and the splines along the first axis."""
+        return super().converged and not any(own.failed for part in self._smoothed for own in part.axes)
+
+    @property
+    def lam(self) -> PerAxis:
+        """Weight λ of the bending energy."""
+        return self._per_axis(lambda own, _: own.lam)
+
+    @property
+    def at_bound(self) -> PerAxis:
+        """Whether the chosen λ is at a bound: rows are geodesics, or pass through nearly all nodes."""
+        return self._per_axis(lambda own, _: own.at_bound)
+
+    @property
+    def evaluations(self) -> PerAxis:
+        """Number of values of λ that were tried; 0 if λ was given."""
+        return self._per_axis(lambda own, _: own.evaluations)
+
+    @property
+    def df(self) -> PerAxis:
+        """Effective degrees of freedom per coordinate, summed over all rows along the axis."""
+        return self._per_axis(lambda own, _: own.df)
+
+    @property
+    def rss(self) -> PerAxis:
+        """Weighted sum of squared distances between the nodes before and after the axis was smoothed."""
+        return self._per_axis(lambda own, _: own.rss)
+
+    @property
+    def sigma(self) -> PerAxis:
+        """Standard deviation of the noise in one coordinate, estimated from the rows along the axis.
+
+        Along the first axis it is that of the data. Along others it is that of nodes that are already smooth along the
+        axes before.
+        """
+        return self._per_axis(lambda own, dim: own.sigma(dim))
+
+    @property
+    def iterations(self) -> PerAxis:
+        """Largest number of iterations of a row."""
+        return self._per_axis(lambda own, _: own.iterations)
+
+    def _per_axis(self, value: Callable[[SmoothedAxis, int], float]) -> PerAxis:
+        dims = [space.dim for space in smoothed_spaces(self._space)]
+        of_parts = [[value(own, dim) for own in part.axes] for part, dim in zip(self._smoothed, dims, strict=True)]
+        each = zip(*of_parts, strict=True)
+        return tuple(values if is_several(self._space) else values[0] for values in each)
+
+
+class SmoothingGrid(GridSpline[P], Generic[P]):
+    """A C² surface close to noisy points on a grid.
+
+    `make_smoothing_grid` returns objects of this class; it has no public constructor. All methods of `GridSpline` are
+    available. `points` are those of the smooth surface at the nodes. Files keep the data.
+
+    For a `Product`, and for poses, `df`, `sigma` and `std` are tuples with one entry per factor or part.
+
+    See Also
+    --------
+    make_smoothing_grid : Fit a surface close to noisy points on a grid.
+    SmoothingGridReport : Report of the smoothing.
+
+    Examples
+    --------
+    >>> import numpy as np, symspline as ss
+    >>> u, v = np.linspace(0, 1, 20), np.linspace(0, 1, 30)
+    >>> noisy = np.sin(3 * u[:, None] + v) + 0.1 * np.random.default_rng(0).standard_normal((20, 30))
+    >>> ss.make_smoothing_grid((u, v), noisy[..., None], "r:1")
+    <SmoothingGrid on Euclidean(1): 20 x 30 nodes>
+    """
+
+    _format = "symspline-smoothing-grid"
+    _kind = "Smoothing grid"
+    _data: list[Array]
+    _weights: Doubles
+    _smoothed: list[SmoothedPart]
+
+    def __init__(self) -> None:
+        raise TypeError("SmoothingGrid has no public constructor. Use symspline.make_smoothing_grid.")
+
+    @classmethod
+    def _through(
+        cls,
+        axes: Any,
+        points: Any,
+        space: Any,
+        data: list[Array],
+        weights: Doubles,
+        smoothed: list[SmoothedPart],
+        options: dict[str, Any],
+    ) -> Self:
+        """Return the grid through smooth points."""
+        self = cls.__new__(cls)
+        self._data, self._weights, self._smoothed = data, weights, smoothed
+        GridSpline.__init__(self, axes, points, space, **options)
+        return self
+
+    @cached_property
+    def report(self) -> SmoothingGridReport:
+        """Report of the grid and of the smoothing.
+
+        Examples
+        --------
+        >>> import numpy as np, symspline as ss
+        >>> noisy = np.random.default_rng(0).standard_normal((8, 9, 1))
+        >>> ss.make_smoothing_grid((None, None), noisy, "r:1", lam=2.0).report.lam
+        (2.0, 2.0)
+        """
+        report = SmoothingGridReport._of(self._axes, self._factors)
+        report._space, report._smoothed = self._space, self._smoothed
+        return report
+
+    @property
+    def lam(self) -> PerAxis:
+        """Weight λ of the bending energy along each axis.
+
+        For products and poses each entry is a tuple with one number per part. `make_smoothing_grid` accepts this value
+        as its argument `lam`.
+        """
+        return self.report.lam
+
+    @property
+    def df(self) -> float | tuple[float, ...]:
+        """Effective degrees of freedom of the surface per coordinate."""
+        df: float | tuple[float, ...] = self._each([part.df for part in self._smoothed])
+        return df
+
+    @property
+    def sigma(self) -> float | tuple[float, ...]:
+        """Standard deviation of the noise of the data in one coordinate, for weight one.
+
+        This is the given value, or else the estimate ``sqrt(sum(weights * distance**2) / (dim * (N - df)))`` with the
+        distances of the N data from the surface.
+        """
+        sigma: float | tuple[float, ...] = self._each([part.sigma for part in self._smoothed])
+        return sigma
+
+    @property
+    def data(self) -> P:
+        """Points that were smoothed, shape (n_1, ..., n_D, *point_shape); NaN where they are missing."""
+        data: P = self._joined(self._data)
+        return data
+
+    @property
+    def residuals(self) -> P:
+        """Tangent vectors from the surface to the data at the nodes, shape (n_1, ..., n_D, *point_shape).
+
+        They are logarithms at the surface, and their lengths are the distances. They are NaN at nodes without data.
+        """
+        found = []
+        for factor, data in zip(self._factors, self._data, strict=True):
+            used = (self._weights > 0) & factor.space._where_finite(factor.points)
+            vectors = np.full(data.shape, np.nan, data.dtype)
+            vectors[used] = factor.space._apply("log", p=factor.points[used], q=data[used])
+            found.append(vectors)
+        residuals: P = self._joined(found)
+        return residuals
+
+    def std(self) -> FloatArray | tuple[FloatArray, ...]:
+        r"""Compute the standard deviation of the surface at its nodes, in one coordinate of an orthonormal frame.
+
+        Returns
+        -------
+        ndarray or tuple, shape (n_1, ..., n_D)
+            Standard deviations, for products and poses a tuple with one entry per part. NaN where the surface has no
+            point.
+
+        See Also
+        --------
+        SmoothingGrid.sigma : The standard deviation of the noise.
+
+        Notes
+        -----
+        With equal weights and without missing nodes, the posterior variance of a node is
+        :math:`\sigma^2 \prod_k (S_k)_{i_k i_k} / w` with the smoothing matrices :math:`S_k` of the axes. Otherwise it
+        follows from the variances along the last axis, whose weights there are those of nodes that are smooth along the
+        other axes; correlations between these nodes are not taken into account.
+
+        Examples
+        --------
+        >>> import numpy as np, symspline as ss
+        >>> u, v = np.linspace(0, 1, 20), np.linspace(0, 1, 30)
+        >>> noisy = np.sin(3 * u[:, None] + v) + 0.1 * np.random.default_rng(0).standard_normal((20, 30))
+        >>> std = ss.make_smoothing_grid((u, v), noisy[..., None], "r:1").std()
+        >>> bool(std[10, 15] < std[0, 15] < std[0, 0] < 0.1)
+        True
+        """
+        each = [part.sigma * np.sqrt(part.variance) for part in self._smoothed]
+        std: FloatArray | tuple[FloatArray, ...] = self._each(each)
+        return std
+
+    def _each(self, values: list[Any]) -> Any:
+        return tuple(values) if is_several(self._space) else values[0]
+
+    # ---- files and pickles ----
+
+    def _state(self) -> dict[str, Any]:
+        state = super()._state()
+        state["noise"] = [
+            {"axes": [vars(own) for own in part.axes], "df": part.df, "sigma": part.sigma} for part in self._smoothed
+        ]
+        state["data_weights"] = self._weights
+        state |= {"data" + suffix_of(self._space, i): own for i, own in enumerate(self._data)}
+        return state | {f"variance_{i}": part.variance for i, part in enumerate(self._smoothed)}
+
+    @classmethod
+    def _from_state(cls, state: Entries) -> Self:
+        self = super()._from_state(state)
+        grid = tuple(len(axis.knots) for axis in self._axes)
+        self._data = [
+            read_array(state, "data" + suffix_of(self._space, i), own) for i, own in enumerate(factors_of(self._space))
+        ]
+        for own, factor in zip(self._data, self._factors, strict=True):
+            if own.shape != factor.points.shape:
+                raise ValidationError(f"entry 'data': the data have shape {own.shape}")
+        self._weights = _numbers(state, "data_weights", grid)
+        with entry("noise"):
+            noise = state["noise"]
+            if len(noise) != len(smoothed_spaces(self._space)):
+                raise ValidationError("it must have one entry per part of the space")
+            self._smoothed = []
+            for i, part in enumerate(noise):
+                axes = [SmoothedAxis(**own) for own in part["axes"]]
+                if len(axes) != len(grid):
+                    raise ValidationError(f"there are {len(axes)} axes")
+                variance = _numbers(state, f"variance_{i}", grid)
+                self._smoothed.append(SmoothedPart(axes, variance, float(part["df"]), float(part["sigma"])))
+        return self
+
+
+def _numbers(state: Entries, name: str, shape: tuple[int, ...]) -> Doubles:
+    """Return an array of numbers from a file."""
+    array: Doubles = state[name]
+    with entry(name):
+        if array.dtype != np.float64 or array.shape != shape:
+            raise ValidationError(f"it is {array.dtype} of shape {array.shape}, but must have shape {shape}")
+    return array
 
 
 def make_smoothing_grid(
@@ -223,7 +516,9 @@ def make_smoothing_grid(
     _warn_of_bounds(space, smoothed, lams)
     warn_of_boundaries(list(zip(spaces, arrays, strict=True)), w)
     for part, array, own, one in zip(spaces, arrays, found, smoothed, strict=True):
-        _warn_of_spread(part, array, own.points, w, one.df)
+        rows = (own.points.reshape(-1, *part.point_shape), array.reshape(-1, *part.point_shape), np.ravel(w > 0))
+        count = np.count_nonzero(rows[2] & part._where_finite(rows[0]))
+        warn_of_spread(part, *rows, count, one.df, "surface")
     return surface
 
 
@@ -280,14 +575,7 @@ def _lams(lam: Any, dims: int, space: Space[Any]) -> list[tuple[float | None, ..
 
 def _in_parts(value: Any, name: str, space: Space[Any]) -> list[float]:
     """Return a number >= 0 for each part of the space; NaN for None."""
-    spaces = smoothed_spaces(space)
-    several = is_several(space) and isinstance(value, tuple)
-    if several and len(value) != len(spaces):
-        raise ValidationError(
-            f"{name} has {len(value)} entries, but there are {len(spaces)} parts to smooth: "
-            f"{', '.join(map(repr, spaces))}. Pass one entry per part."
-        )
-    return [float(one_per_curve(one, name, ())[0]) for one in (value if several else [value] * len(spaces))]
+    return [float(one[0]) for one in per_part(space, value, name, ())]
 
 
 def _summary(space: Space[Any], data: Array, weights: Doubles, found: SmoothedNodes, sigma: float) -> SmoothedPart:
@@ -349,17 +637,61 @@ def _warn_of_bounds(space: Space[Any], smoothed: list[SmoothedPart], lams: list[
             return
 
 
-def _warn_of_spread(space: Space[Any], data: Array, points: Array, weights: Doubles, df: float) -> None:
-    """Warn if the data are about as far from the surface as random points of a compact space would be."""
-    expected = random_distance(space)
-    if expected is None:
-        return
-    used = (weights > 0) & space._where_finite(points)
-    distance = float(np.median(space._apply("distance", p=points[used], q=data[used])))
-    if is_far(distance, expected, np.count_nonzero(used), df):
+# ---- maps with boundaries, such as those between the grains of a crystal ----
+
+
+def warn_of_boundaries(parts: list[tuple[Space[Any], Array]], weights: Doubles) -> None:
+    """Warn once if many neighbouring nodes of a map are far apart compared with the nodes beside them.
+
+    Parameters
+    ----------
+    parts : list
+        Each space with its points, of shape (n_1, ..., n_D, *point_shape).
+    weights : ndarray, shape (n_1, ..., n_D)
+        Weights; nodes of weight zero do not count.
+    """
+    for space, points in parts:
+        count, first = 0, None
+        for k in range(weights.ndim):
+            steps = _steps(space, points, weights, k)
+            jumps = np.argwhere(_are_jumps(steps))
+            count += len(jumps)
+            if first is None and len(jumps):
+                # Steps have their axis last.
+                *others, i = jumps[0].tolist()
+                nodes = [[*others[:k], j, *others[k:]] for j in (i, i + 1)]
+                first = nodes, float(steps[tuple(jumps[0])]), float(np.nanmedian(steps))
+        if first is None or count < _SHARE * weights.size ** (1 - 1 / weights.ndim):
+            continue
+        nodes, distance, usual = first
         warn(
-            f"half of the data are {distance:.2g} or more away from their smooth surface. For random points of "
-            f"{space!r} this distance is {expected:.2g}, so the surface has little meaning. Check the units and signs "
-            "of the data.",
-            UserWarning,
+            f"the map has a boundary that the smooth surface cannot follow: {count} pairs of neighbouring nodes are "
+            f"far apart, for example points{nodes[0]} and points{nodes[1]}, whose distance is {distance:.2g}. The "
+            f"median distance of neighbours is {usual:.2g}. If the map has regions such as grains, label them, and "
+            "smooth each region with weights of zero at all other nodes.",
+            SmoothingWarning,
         )
+        return
+
+
+def _steps(space: Space[Any], points: Array, weights: Doubles, k: int) -> Doubles:
+    """Return the distances of neighbours along axis k, which becomes the last one; NaN where a node is missing."""
+    axis = weights.ndim - 1
+    there, rows = np.moveaxis(weights > 0, k, axis), np.moveaxis(points, k, axis)
+    left, right = (np.take(rows, range(i, rows.shape[axis] - 1 + i), axis) for i in (0, 1))
+    good = there[..., :-1] & there[..., 1:] & space._where_finite(left) & space._where_finite(right)
+    steps = np.full(good.shape, np.nan)
+    if good.any():
+        steps[good] = space._apply("distance", p=left[good], q=right[good])
+    return steps
+
+
+def _are_jumps(steps: Doubles) -> Any:
+    """Return a mask of the steps that are much longer than the median step and than the steps next to them."""
+    if steps.shape[-1] < 4 or not np.isfinite(steps).any():
+        return np.zeros(steps.shape, bool)
+    known = np.nan_to_num(steps, nan=0.0)
+    # The first and the last step may be long because of an outlier at the end.
+    beside = np.full(steps.shape, np.inf)
+    beside[..., 1:-1] = np.maximum(known[..., :-2], known[..., 2:])
+    return (known > _MEDIANS * np.nanmedian(steps)) & (known > _BESIDE * beside)
