@@ -68,7 +68,6 @@ def objects():
         ),
         "SegmentedCurve": ss.SegmentedCurve([sphere, sphere.shift(10)]),
         "Derivative": sphere.derivative(),
-        "AffineMorph": ss.shapes.AffineMorph(T, [SQUARE, 2 * SQUARE, SQUARE + 1]),
         "GridSpline": ss.GridSpline(
             (T, None), P[[0, 1]].repeat(2, axis=0)[[0, 1, 2]][:, None] * np.ones((3, 2, 1)), "sphere:2"
         ),

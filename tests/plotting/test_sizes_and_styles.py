@@ -14,7 +14,6 @@ from test_figure import KINDS
 
 import symspline as ss
 from symspline._plotting.style import plain
-from symspline.shapes import AffineMorph
 
 ONE_OF_EACH = {draw: name for name, draw in KINDS.items()}.values()
 
@@ -232,11 +231,3 @@ def test_colours_with_a_meaning_are_not_inverted(dark):
     assert red[0] > 0.95 and red[1] < 0.6
     ellipses = axes_named(figure, "field").collections[-1]
     assert lightness(ellipses.get_edgecolor()[0][:3]) < 0.3
-
-
-def test_films_follow_dark_styles(dark):
-    square = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
-    morph = AffineMorph(None, np.stack([square, square @ [[1.5, 0.2], [0, 1]], 2 * square]))
-    figure = rendered(morph.plot())
-    assert to_rgb(figure.get_facecolor()) == (0, 0, 0)
-    assert all(lightness(text.get_color()) > 0.5 for axes in figure.axes for text in axes.texts)
