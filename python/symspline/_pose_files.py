@@ -20,7 +20,7 @@ from ._base.typing import PointsLike
 from ._core import ValidationError, number_lines
 from ._spaces import Array, Doubles, SpecialEuclidean, SpecialOrthogonal, point_tol, rotations_and_positions
 from ._validation import length, off_one
-from .convert import matrix_to_quaternion, quaternion_to_matrix
+from .convert._quaternions import matrix_to_quaternion, quaternion_to_matrix
 
 # Columns of a TUM trajectory.
 TUM = ("time", "tx", "ty", "tz", "qx", "qy", "qz", "qw")

@@ -21,7 +21,7 @@ KNOTS = np.linspace(0, END, 120)
 PHASES = np.array([0.0, 1.0, 2.0])
 TURN = ss.CubicSpline(KNOTS, ss.rotations.from_rotation_vectors(0.8 * np.sin(0.9 * KNOTS[:, None] + PHASES)), "so:3")
 SEEN = SO3.exp(TURN(POINTS), 0.03 * SO3.random_tangent(RNG, TURN(POINTS)))
-QUATERNIONS = ss.convert.matrix_to_quaternion(SEEN, scalar_first=True)
+QUATERNIONS = ss.rotations.as_quaternions(SEEN, scalar_first=True)
 OMEGA = ss.rotations.angular_velocity(TURN, RATES) + BIAS + 0.01 * RNG.standard_normal((len(RATES), 3))
 Q, W, V = ["qw", "qx", "qy", "qz"], ["wx", "wy", "wz"], ["vx", "vy"]
 OPTIONS = "--smooth --space so:3 --columns qw,qx,qy,qz --sigma 0.03 --rates wx,wy,wz --rate-sigma 0.01 --rate-bias"
@@ -55,7 +55,7 @@ def imu(**options):
 
 
 def expected(**options):
-    points = ss.convert.quaternion_to_matrix(QUATERNIONS, scalar_first=True)
+    points = ss.rotations.from_quaternions(QUATERNIONS, scalar_first=True)
     both = [
         measure.Points(POINTS, points, sigma=0.03),
         measure.BodyRates(RATES, OMEGA, sigma=0.01, bias=measure.Constant(3)),

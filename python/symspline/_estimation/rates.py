@@ -9,7 +9,7 @@ import numpy as np
 from .. import _core
 from .._spaces import Doubles, Euclidean
 from .._splines.cubic import CubicSpline
-from ..convert import quaternion_to_matrix
+from ..convert._quaternions import quaternion_to_matrix
 
 
 def integrated(t: Doubles, omega: Doubles, interpolation: str = "linear") -> Doubles:

@@ -16,7 +16,7 @@ from .._smoothing import make_smoothing_spline
 from .._smoothing.factors import split
 from .._spaces import Array, Doubles, Euclidean, Product, Space, SpecialOrthogonal, factors_of, nearest_rotations
 from .._splines.curve import Curve
-from ..convert import matrix_to_quaternion
+from ..convert._quaternions import matrix_to_quaternion
 from .integrated_rates import Attitudes, Integral, Path, Rates
 from .rates import attitudes_at
 from .solve import Setup
