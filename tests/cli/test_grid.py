@@ -5,7 +5,6 @@ import os
 import shlex
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -186,16 +185,14 @@ def test_products_have_one_array_per_factor(run):
         ("grid wind.npz --space s:2 --points 3,1 -o x.npz", "--points 3,1: give whole numbers from 2 on"),
         ("grid wind.npz --space s:2 --zoom 2 --points 3,3 -o x.npz", "argument --points: not allowed with"),
         ("grid wind.npz --space s:2 --bc-type guess -o x.npz", "--bc-type guess: give not-a-knot, natural"),
-        ("grid wind.npz --space s:2 --order fsl -o x.npz", "--order is not for .npz files"),
+        ("grid wind.npz --space s:2 --variable q -o x.npz", "--variable is not for .npz files"),
         ("grid wind.npz --space s:2 --zoom 2 -o x.zarr", "x.zarr: values of a .npz file are written to such a file"),
         (
             "grid wind.npz --space s:2 -o x.csv",
-            "x.csv: the name of a grid must end in .npz, .nii, .nii.gz or .zarr",
+            "x.csv: the name of a grid must end in .npz or .zarr",
         ),
         ("grid none.npz --space s:2 -o x.npz", "cannot read none.npz: No such file or directory"),
-        ("grid none.nii --order fsl --zoom 2 -o x.nii", "cannot read none.nii: No such file or directory"),
         ("grid none.zarr --space s:2 --zoom 2 -o x.zarr", "cannot read none.zarr: No such file or directory"),
-        ("grid dti.nii -o x.nii", "x.nii: give --to, --zoom or --points, or write the spline to an .npz file"),
         ("grid wind.npz --space s:2 --zoom 2 -o no/x.npz", "cannot write no/x.npz: there is no folder no"),
     ],
 )
@@ -225,102 +222,3 @@ def test_progress_on_a_terminal(wind, capsys, monkeypatch):
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
     assert main(shlex.split("grid wind.npz --space s:2 --zoom 3 -o b.npz")) == 0
     assert "%" in capsys.readouterr().err
-
-
-# ---- NIfTI ----
-
-
-@pytest.fixture
-def dti(run):
-    nibabel = pytest.importorskip("nibabel")
-    spd = ss.SymmetricPositiveDefinite(3)
-    mask = np.ones((5, 4, 3), bool)
-    mask[0, 0] = False
-    tensors = spd.exp(1e-3 * np.eye(3), 3e-4 * spd.random_tangent(np.random.default_rng(0), np.stack([np.eye(3)] * 57)))
-    volume = ss.tensors.Volume(tensors, mask, np.diag([2.0, 2, 3, 1]))
-    ss.tensors.write_nifti("dti.nii.gz", volume, order="fsl")
-    nibabel.save(
-        nibabel.Nifti1Image((mask & (np.arange(5) > 0)[:, None, None]).astype(np.uint8), volume.affine), "m.nii"
-    )
-    return volume
-
-
-def test_volumes_are_those_of_the_library(dti, run, fails):
-    out = run("grid dti.nii.gz --order fsl --zoom 2,2,1 --mask m.nii --bc-type natural -o fine.nii.gz")
-    ss.tensors.resample_nifti("dti.nii.gz", "b.nii.gz", order="fsl", zoom=(2, 2, 1), mask="m.nii", bc_type="natural")
-    found, expected = (ss.tensors.read_nifti(name, order="fsl") for name in ("fine.nii.gz", "b.nii.gz"))
-    np.testing.assert_array_equal(found.tensors, expected.tensors)
-    inside = len(found.tensors)
-    assert out == f"fine.nii.gz: 9 x 7 x 3 voxels, {inside} of them inside the mask, from 48 of 5 x 4 x 3\n"
-    run("grid dti.nii.gz --order fsl --points 9,7,5 -o c.nii")
-    run("grid dti.nii.gz --order fsl --zoom 2 -o d.nii")
-    run("grid dti.nii.gz --order fsl --to d.nii -o e.nii")
-    c, d, e = (ss.tensors.read_nifti(name, order="fsl") for name in ("c.nii", "d.nii", "e.nii"))
-    np.testing.assert_array_equal(c.tensors, d.tensors)
-    np.testing.assert_allclose(e.tensors, d.tensors, rtol=1e-5)
-    assert fails("grid dti.nii.gz --zoom 2 -o x.nii").startswith("order is required")
-    assert "not of r:6" in fails("grid dti.nii.gz --order fsl --space r:6 --zoom 2 -o x.nii")
-    assert fails("grid dti.nii.gz --order fsl --zoom 2 -o x.npz").startswith("x.npz: values of a .nii.gz file")
-
-
-def test_the_spline_of_a_volume(dti, run):
-    assert "a spline through 5 x 4 x 3 points of spd:3" in run("grid dti.nii.gz --order fsl -o dti.npz")
-    spline = ss.load("dti.npz")
-    np.testing.assert_array_equal(np.isfinite(spline.points).all(axis=(-2, -1)), dti.mask)
-    np.testing.assert_allclose(spline.points[dti.mask], dti.tensors, rtol=1e-12)
-    np.testing.assert_allclose(spline.grid([2], [3], [1])[0, 0, 0], spline.points[2, 3, 1], rtol=1e-9)
-
-
-# ---- Zarr ----
-
-
-@pytest.fixture
-def store(run):
-    xr, _ = pytest.importorskip("xarray"), pytest.importorskip("zarr")
-    points = np.stack([directions(0.01), directions(0.03)], axis=1)
-    coords = {"lat": LAT, "lon": LON}
-    da = xr.DataArray(points, dims=("lat", "day", "lon", "q"), coords=coords, attrs={"source": "a model"})
-    xr.Dataset({"wind": da.chunk(lat=3, day=1), "area": ("lat", LAT)}).to_zarr("wind.zarr", consolidated=False)
-    return da
-
-
-def test_stores_are_those_of_the_library(store, run, fails):
-    xr = pytest.importorskip("xarray")
-    import symspline.xarray as sx
-
-    line = "grid wind.zarr --variable wind --space s:2 --axes lat,lon"
-    out = run(f"{line} --zoom 2 --bc-type natural,not-a-knot -o fine.zarr")
-    assert out == "fine.zarr: 2 x 11 x 15 values of sphere:2\n"
-    found = xr.open_zarr("fine.zarr", consolidated=False)["wind"]
-    to = {
-        "lat": np.interp(np.arange(11) / 2, np.arange(6), LAT),
-        "lon": np.interp(np.arange(15) / 2, np.arange(8), LON),
-    }
-    expected = sx.resample(store, "sphere:2", to, bc_type={"lat": "natural"})
-    assert found.dims == ("day", "lat", "lon", "q") and found.attrs == store.attrs
-    np.testing.assert_allclose(found, expected, atol=1e-13)
-    assert fails(f"{line} --zoom 2 -o fine.zarr") == "cannot write fine.zarr: it is a folder"
-    problem = "wind.zarr: the dimensions day are those of several grids; write them to a .zarr store"
-    assert fails(f"{line} --zoom 2 -o x.npz") == problem
-    assert fails("grid wind.zarr --space s:2 --zoom 2 -o x.zarr").startswith("wind.zarr has the variables")
-    assert fails(f"{line[:-3]}lno --zoom 2 -o x.zarr") == "wind.zarr has no axis 'lno'; did you mean 'lon'?"
-
-
-def test_a_store_as_a_whole(store, run):
-    run("grid wind.zarr --variable wind --space s:2 --points 4,2,5 -o fine.npz")
-    found = arrays("fine.npz")
-    expected = ss.GridSpline((LAT, np.arange(2.0), LON), store.values, "sphere:2")
-    np.testing.assert_allclose(found["points"], expected.grid(found["lat"], found["day"], found["lon"]), atol=1e-13)
-
-
-def test_a_run_that_fails_leaves_no_store(store, fails, folder, monkeypatch):
-    # The other day is written after the damaged one has failed.
-    grid = ss.GridSpline.grid
-    monkeypatch.setattr(ss.GridSpline, "grid", lambda *args, **kwargs: time.sleep(0.3) or grid(*args, **kwargs))
-    for chunk in sorted((folder / "wind.zarr/wind/c/0/0").rglob("*")):
-        if chunk.is_file():
-            chunk.write_bytes(b"damaged")
-    problem = fails("grid wind.zarr --variable wind --space s:2 --axes lat,lon --zoom 2 -o x.zarr")
-    assert problem.startswith("wind.zarr is damaged: ")
-    time.sleep(0.6)
-    assert [path.name for path in folder.iterdir()] == ["wind.zarr"]

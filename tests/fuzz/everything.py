@@ -212,7 +212,6 @@ def pools(things):
         "progress": [None],
         "dtype": ["float32"],
         "gap": [np.timedelta64(3, "h")],
-        "volume": [ss.tensors.Volume(SPD[:1], np.ones((1, 1, 1), bool), np.eye(4))],
         "index": [0, slice(1)],
         "function": [lambda x: x],
     }

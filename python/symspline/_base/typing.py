@@ -187,17 +187,6 @@ class SmoothOptions(TypedDict, total=False):
     atol: float | None
 
 
-class VoxelOptions(TypedDict, total=False):
-    """The keywords of `symspline.tensors.resample`."""
-
-    zoom: ArrayLike | None
-    voxel_size: ArrayLike | None
-    like: Any
-    bc_type: Any
-    symmetric: bool
-    progress: Progress | None
-
-
 class SmoothingOptions(ChoiceOptions, total=False):
     """The keywords of `make_smoothing_spline`, and λ."""
 

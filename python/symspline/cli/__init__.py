@@ -5,7 +5,7 @@ example:
   symspline check track.npz
   symspline sample track.npz --every 10min -o smooth.csv
   symspline plot track.npz -o track.png
-  symspline grid dti.nii.gz --order fsl --zoom 2 -o fine.nii.gz
+  symspline grid wind.npz --space sphere:2 --zoom 2 -o fine.npz
   symspline fit - --lonlat -o - < track.csv | symspline sample - -n 100 -o - | head
 
 See also `symspline VERB --help`, and `symspline info` for the spaces and formats of files. Exit codes: 0 success, 1 not

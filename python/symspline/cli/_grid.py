@@ -1,14 +1,11 @@
 """Interpolate points on a grid over several axes, such as maps and volumes
 
-The input is an NPZ file (.npz), a NIfTI volume of diffusion tensors (.nii, .nii.gz) or a Zarr store (.zarr); the ending
-of its name selects the format.
+The input is an NPZ file (.npz) or a Zarr store (.zarr); the ending of its name selects the format.
 
   .npz   an array `points` of shape (N1, N2, ..., *shape of a point), in a product points_0, points_1, ..., one array
          per factor; and one array of increasing numbers or dates per axis, which --axes names in the order of the
          axes. By default these are all other arrays with one axis, in the order of the file. Without any, axes
          count 0, 1, 2, ... A file that this command wrote without --to, --zoom and --points is a spline.
-  .nii   six numbers per voxel; --order is that of the program that wrote them. The axes count voxels. Voxels outside
-         the mask are missing, and zero in the output. Units, codes and affine maps of the header are kept.
   .zarr  the dimensions --axes of a variable, all others of which are separate grids; the last dimensions are those of
          a point. Blocks are read, interpolated and written one by one, so that the store may be larger than memory.
 
@@ -23,7 +20,6 @@ symspline.load reads in Python. A file name of - means standard input or output,
 
 examples:
   symspline grid wind.npz --space sphere:2 --axes lat,lon --bc-type not-a-knot,periodic --zoom 2 -o fine.npz
-  symspline grid dti.nii.gz --order fsl --mask brain.nii.gz --zoom 2 -o fine.nii.gz
   symspline grid wind.zarr --space sphere:2 --variable wind --axes lat,lon --points 361,720 -o fine.zarr
   symspline grid wind.npz --space sphere:2 --axes lat,lon -o spline.npz
 """
@@ -49,15 +45,12 @@ from ._curves import add_entry
 from ._grid_files import (
     AXIS_NAMES,
     NPZ,
-    VOLUMES,
     ZARR,
     Grid,
     ending_of,
     read_arrays,
     read_store,
-    read_volume,
     resample_store,
-    resample_volume,
     write_arrays,
 )
 from ._messages import Problem, Progress, reading, refuse, say, tell
@@ -66,7 +59,6 @@ from ._tables import Array
 from ._times import is_number, spread
 
 _ENDS = ("not-a-knot", "natural", "clamped", "periodic")
-_ORDERS = ("dipy", "fsl", "mrtrix", "itk")
 _VALUES = ("to", "zoom", "points")
 _MOST = 10**9
 
@@ -74,18 +66,16 @@ _MOST = 10**9
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options of ``symspline grid``."""
     add = parser.add_argument
-    add("input", type=Path, metavar="IN", help="grid to read: .npz, .nii, .nii.gz or .zarr, or - for NPZ")
-    add("--space", metavar="S", help="such as sphere:2, so:3 or spd:3, which is the default for NIfTI files")
+    add("input", type=Path, metavar="IN", help="grid to read: .npz or .zarr, or - for NPZ")
+    add("--space", metavar="S", help="such as sphere:2, so:3 or spd:3")
     add("--axes", metavar="A,B,...", help="arrays or dimensions of the axes, in the order of the splines")
     add("--degrees", action="store_true", help="angles of torus:n are in degrees, also in the values")
     add("--variable", metavar="NAME", help="variable of a Zarr store that has several")
-    add("--order", choices=_ORDERS, help="program that wrote a NIfTI file, unless its intent is symmetric matrices")
-    add("--mask", type=Path, metavar="FILE", help="NIfTI file whose nonzero voxels are read")
     ends = f"{', '.join(_ENDS)}: one for all axes, or one per axis with commas (default: {_ENDS[0]})"
     add("--bc-type", default=_ENDS[0], metavar="END", help=ends)
     add("--symmetric", action="store_true", help="take the midpoint of both orders of the axes")
     add = parser.add_mutually_exclusive_group().add_argument
-    add("--to", type=Path, metavar="FILE", help="values at the axes in an NPZ file, or at the voxels of a NIfTI file")
+    add("--to", type=Path, metavar="FILE", help="values at the axes in an NPZ file")
     add("--zoom", metavar="Z", help="intervals between values per interval of nodes: one number, or one per axis")
     add("--points", metavar="N,M,...", help="this number of equidistant values along each axis")
     out = "file to write, in the format of IN, or .npz; - for NPZ on standard output"
@@ -95,14 +85,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Read, fit, and write values or the spline."""
     source, target = ending_of(options.input), ending_of(options.output)
-    check_target(options.output, options.input, options.to, options.mask, binary=True)
+    check_target(options.output, options.input, options.to, binary=True)
     option = next((name for name in _VALUES if getattr(options, name) is not None), None)
     _check_formats(options, source, target, option)
     how = {"bc_type": _bc_type(options.bc_type), "symmetric": options.symmetric}
     with _far_points_noted():
-        if source in VOLUMES and option:
-            done = resample_volume(options, None if option == "to" else _numbers(options, option, 3), how)
-        elif target == ZARR:
+        if target == ZARR:
             done = resample_store(options, how, lambda names, axes: _positions(options, option, names, axes))
         else:
             done = _resampled(options, source, option, how)
@@ -112,15 +100,11 @@ def run(options: argparse.Namespace) -> int:
 
 def _check_formats(options: argparse.Namespace, source: str, target: str, option: str | None) -> None:
     """Raise `Problem` for options of other formats, and outputs that the input cannot be written to."""
-    volume, store = source in VOLUMES, source == ZARR
-    uses = {"order": volume, "mask": volume, "variable": store, "axes": not volume, "degrees": not volume}
-    unused = [name for name, used in uses.items() if getattr(options, name) not in (None, False) and not used]
-    same = target == source or (volume and target in VOLUMES)
-    refuse(f"--{''.join(unused[:1])} ", (unused, f"is not for {source} files"))
+    refuse("--variable ", (options.variable is not None and source != ZARR, f"is not for {source} files"))
     refuse(
         f"{options.output}: ",
         (option is None and target != NPZ, "give --to, --zoom or --points, or write the spline to an .npz file"),
-        (option and not same and (volume or target != NPZ), f"values of a {source} file are written to such a file"),
+        (option and target not in (source, NPZ), f"values of a {source} file are written to such a file"),
     )
 
 
@@ -144,7 +128,7 @@ def _far_points_noted() -> Iterator[None]:
 
 def _resampled(options: argparse.Namespace, source: str, option: str | None, how: dict[str, Any]) -> str:
     """Write the spline, or an NPZ file of its values, and describe the result."""
-    read_grid = read_volume if source in VOLUMES else read_store if source == ZARR else read_arrays
+    read_grid = read_store if source == ZARR else read_arrays
     grid = read_grid(options)
     spline = grid.spline or _fitted(grid, how)
     gap = f", axis order gap {spline.report.axis_order_gap:.1e}"

@@ -1,4 +1,4 @@
-"""Grids of points in NPZ files, volumes of diffusion tensors in NIfTI files, and Zarr stores."""
+"""Grids of points in NPZ files and Zarr stores."""
 
 from __future__ import annotations
 
@@ -30,8 +30,6 @@ from ._streams import STANDARD, Source, writing
 from ._tables import Array
 
 NPZ, ZARR = ".npz", ".zarr"
-VOLUMES = (".nii", ".nii.gz")
-_TENSORS = "spd:3"
 AXIS_NAMES = "axis_names"
 """The entry with the names of the axes in the file of a spline."""
 
@@ -63,7 +61,7 @@ class Grid:
 
 def ending_of(path: Path) -> str:
     """Return the ending of the name of a grid, which selects the format."""
-    endings = (NPZ, *VOLUMES, ZARR)
+    endings = (NPZ, ZARR)
     found = [ending for ending in endings if path == STANDARD or path.name.lower().endswith(ending)]
     refuse(path, (not found, f": the name of a grid must end in {alternatives(endings)}"))
     return found[0]
@@ -161,56 +159,6 @@ def write_arrays(path: Path, names: Sequence[str], axes: Sequence[Array], points
         np.savez(file, **dict(zip(names, axes, strict=True)), **arrays)  # type: ignore[arg-type]
 
 
-# ---- NIfTI ----
-
-
-def read_volume(options: argparse.Namespace) -> Grid:
-    """Read the tensors of a file on a grid of voxels, NaN outside the mask."""
-    volume = _volume(options)
-    nodes = np.full((*volume.mask.shape, 3, 3), np.nan)
-    nodes[volume.mask] = volume.tensors
-    return Grid(["i", "j", "k"], [None] * 3, nodes, space_named(_TENSORS))
-
-
-def resample_volume(options: argparse.Namespace, zoom: list[float] | None, how: dict[str, Any]) -> str:
-    """Write the tensors at other voxels, those of another file if zoom is None, and describe the result."""
-    from ..tensors import resample, write_nifti
-    from ..tensors._nifti import written_order
-
-    volume = _volume(options)
-    if options.to is not None:
-        with reading(options.to), open(options.to, "rb"):
-            voxels: dict[str, Any] = {"like": options.to}
-    elif options.points is not None:
-        voxels = {"zoom": [(n - 1) / max(m - 1, 1) for n, m in zip(zoom or (), volume.mask.shape, strict=True)]}
-    else:
-        voxels = {"zoom": zoom}
-    with Progress("resampling") as progress:
-        fine = resample(volume, **voxels, **how, progress=progress)
-    write_nifti(options.output, fine, order=written_order(volume, options.order))
-    inside = f"{len(fine.tensors)} of them inside the mask"
-    return f"{_sizes(fine.mask.shape)} voxels, {inside}, from {len(volume.tensors)} of {_sizes(volume.mask.shape)}"
-
-
-def _volume(options: argparse.Namespace) -> Any:
-    from ..tensors import read_nifti
-
-    other = options.space is not None and space_named(options.space) != space_named(_TENSORS)
-    refuse(options.input, (other, f" holds diffusion tensors, points of {_TENSORS}, not of {options.space}"))
-    for path in filter(None, (options.input, options.mask)):
-        # Errors of nibabel have no name of a file.
-        with reading(path), open(path, "rb"):
-            pass
-    try:
-        return read_nifti(options.input, order=options.order, mask=options.mask)
-    except ImportError as error:
-        raise Problem(str(error)) from None
-
-
-def _sizes(numbers: Sequence[int]) -> str:
-    return " x ".join(map(str, numbers))
-
-
 # ---- Zarr, read and written block by block ----
 
 
@@ -260,7 +208,7 @@ def resample_store(
         except Exception as error:
             # Damaged chunks raise errors of their decompressors.
             raise Problem(f"{options.input} is damaged: {brief(error)}") from None
-    sizes = _sizes([made.sizes[name] for name in made.dims if name not in point_dims])
+    sizes = " x ".join(str(made.sizes[name]) for name in made.dims if name not in point_dims)
     return f"{sizes} values of {_space_of(options)}"
 
 

@@ -37,7 +37,7 @@ from ._summary import counted, gaps_in, parameters_of, smoothed
 from ._tables import Array, Rows, Table
 
 _LIBRARIES = {"pyarrow": "Parquet and large CSV files", "gpxpy": "GPX files", "matplotlib": "symspline plot"}
-_LIBRARIES |= {"nibabel": "NIfTI files", "zarr": "Zarr stores", "shtab": "completion in shells"}
+_LIBRARIES |= {"zarr": "Zarr stores", "shtab": "completion in shells"}
 
 
 _LONGEST = 1000
