@@ -10,9 +10,8 @@
 (3,)
 """
 
-from ._casteljau import evaluate
 from ._compiled import curve
-from ._fitting import fit
+from ._native import evaluate, fit
 
 __all__ = ["curve", "evaluate", "fit"]
 
