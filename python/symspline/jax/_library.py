@@ -81,7 +81,7 @@ def _fold(step: Any, start: Any, numbers: Any) -> Any:
     )[0]
 
 
-LIBRARY = Library(
+LIBRARY: Library = Library(
     name="JAX",
     module="jax",
     general=True,
