@@ -158,16 +158,6 @@ TEXTS = {
         ),
         0.4,
     ),
-    "morph": Texts(
-        (2, 0),
-        (
-            "Above: outlines that change over time. With straight lines they collapse to a thin strip; the morph "
-            "keeps their area. Below: the speed of one landmark, with a jump for straight lines.",
-            "A film strip of outlines that turn and grow from a thin ellipse to a polygon, and twelve single "
-            "pictures with numbered landmarks.",
-        ),
-        0.62,
-    ),
     "noisy_attitude": Texts(
         (1, 1),
         (

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 from comparisons.page import insert, parser, table, versions
+from manifolds_surface import surface
 from numpy.typing import NDArray
 from pymanopt.manifolds import Oblique
 
@@ -22,7 +23,7 @@ import symspline as ss
 Array = NDArray[np.float64]
 
 PAGE = Path(__file__).parent / "manifolds.md"
-PARTS = ("condition", "spaces", "sphere")
+PARTS = ("surface", "condition", "spaces", "sphere")
 STEPS = (1.2, 0.8, 0.4, 0.2, 0.1)
 POINTS = 10
 S2 = ss.Sphere(2)
@@ -33,24 +34,29 @@ S2 = ss.Sphere(2)
 
 def ellipsoid(axes: Sequence[float] = (1.0, 1.2, 0.8)) -> ss.Manifold:
     squares = np.square(axes)
-    return ss.manifolds.from_surface(
-        lambda x: np.sum(x * x / squares, axis=-1) - 1,
+    return surface(
+        lambda x: np.sum(x * x / squares, axis=1) - 1,
         lambda x: 2 * x / squares,
+        lambda x: np.broadcast_to(np.diag(2 / squares), (len(x), 3, 3)),
         3,
-        hess=lambda x: np.broadcast_to(np.diag(2 / squares), (len(x), 3, 3)),
     )
 
 
 def torus(big: float = 2.0, small: float = 0.8) -> ss.Manifold:
-    """Second derivatives are left to differences."""
+    def around(x: Array) -> Array:
+        """The nearest points of the circle in the middle."""
+        return big * x * [1, 1, 0] / np.hypot(x[:, 0], x[:, 1])[:, None]
 
-    def gradient(x: Array) -> Array:
-        s = np.hypot(x[:, 0], x[:, 1])
-        c = 2 * (s - big) / s
-        return np.stack([c * x[:, 0], c * x[:, 1], 2 * x[:, 2]], axis=-1)
+    def hessian(x: Array) -> Array:
+        circle = around(x) / big
+        tangents = np.diag([1.0, 1.0, 0.0]) - circle[:, :, None] * circle[:, None, :]
+        return 2 * (np.eye(3) - big * tangents / np.hypot(x[:, 0], x[:, 1])[:, None, None])
 
-    return ss.manifolds.from_surface(
-        lambda x: (np.hypot(x[:, 0], x[:, 1]) - big) ** 2 + x[:, 2] ** 2 - small**2, gradient, 3
+    return surface(
+        lambda x: np.sum((x - around(x)) ** 2, axis=1) - small**2,
+        lambda x: 2 * (x - around(x)),
+        hessian,
+        3,
     )
 
 
@@ -196,7 +202,7 @@ def spaces_table(step: float = 0.5, repeats: int = 3) -> str:
         "St(3, 4)": ss.Stiefel(3, 4),
         "St(3, 6)": ss.Stiefel(3, 6),
         "ellipsoid 1, 1.2, 0.8": ellipsoid(),
-        "torus 2, 0.8, differences": torus(),
+        "torus 2, 0.8": torus(),
         "pymanopt, Oblique(3, 3)": ss.manifolds.from_pymanopt(Oblique(3, 3)),
     }
     rows = []
@@ -257,7 +263,9 @@ def sphere_table(steps: Sequence[float] = STEPS) -> str:
 
 def main() -> None:
     write = parser(__doc__).parse_args().write
+    code = Path(__file__).with_name("manifolds_surface.py").read_text("utf-8")
     parts = {
+        "surface": f"```python\n{code}```",
         "condition": condition_table(),
         "spaces": f"{spaces_table()}\n\n{versions('symspline', 'pymanopt', 'numpy')}",
         "sphere": sphere_table(),

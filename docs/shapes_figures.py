@@ -92,7 +92,6 @@ def main() -> None:
     disc().savefig(folder / "shapes_disc.png", dpi=110)
     shape_spline().plot(folder / "shapes_spline.png")
     local_coordinates().savefig(folder / "shapes_coordinates.png", dpi=110)
-    ss.shapes.AffineMorph(None, CLOSED[:4]).plot(folder / "shapes_morph.png")
 
 
 if __name__ == "__main__":

@@ -21,9 +21,9 @@ from scipy.interpolate import CubicSpline
 import symspline as ss
 
 # The paper does not give its states; these are six points on the Bloch sphere.
-places = ss.geo.from_lonlat([0, 60, 100, 170, 220, 300], [60, 20, -30, -10, 40, 10])
+azimuth, polar = np.radians([[0, 60, 100, 170, 220, 300], [30, 70, 120, 100, 50, 80]])
 times = np.array([0.0, 1.0, 2.0, 3.5, 4.5, 6.0])
-kets = ss.quantum.from_bloch_vector(places)
+kets = np.stack([np.cos(polar / 2), np.exp(1j * azimuth) * np.sin(polar / 2)], axis=-1)
 phases = np.exp([0, 2j, 5j, 1j, 4j, 3j])
 x = np.linspace(0, 6, 600)
 

@@ -14,7 +14,6 @@ order of MRtrix. The brain is a phantom: white matter with fibres around the ven
 
 import tempfile
 import time
-from dataclasses import replace
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -54,11 +53,12 @@ measured = factor[..., None, None] * tensors[..., None, :, :]
 folder = Path(tempfile.mkdtemp())
 names = [folder / f"day{day:02.0f}.nii.gz" for day in days]
 for i, name in enumerate(names):
-    six = measured[:, :, :, i][..., [0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]] * mask[..., None]
+    six = ss.tensors.to_vectors(measured[:, :, :, i], order="fsl") * mask[..., None]
     nibabel.save(nibabel.Nifti1Image(six, np.diag([4.0, 4.0, 4.0, 1.0])), name)
 
-volumes = [ss.tensors.read_nifti(name, order="fsl", mask=mask) for name in names]
-matrices = np.stack([volume.tensors for volume in volumes], axis=1)
+images = [nibabel.load(name) for name in names]
+six = np.stack([image.get_fdata()[mask] for image in images], axis=1)  # voxels inside the mask, four days
+matrices = ss.tensors.from_vectors(six, order="fsl")
 
 start = time.perf_counter()
 one_by_one = np.stack([ss.CubicSpline(days, of_voxel, "spd:3")(30.0) for of_voxel in matrices])
@@ -81,7 +81,9 @@ print(
     f"bit-identical: {np.array_equal(tensors, one_by_one)}; loop {1e3 * loop:.1f} ms, batch {1e3 * together:.1f} ms"
 )
 
-ss.tensors.write_nifti(folder / "day30.nii.gz", replace(volumes[0], tensors=tensors), order="mrtrix")
+six = np.zeros((*mask.shape, 6))
+six[mask] = ss.tensors.to_vectors(tensors, order="mrtrix")
+nibabel.save(nibabel.Nifti1Image(six, images[0].affine, images[0].header), folder / "day30.nii.gz")
 
 # %%
 # The middle slice. Red fibres run to the left and right, green ones from front to back. The lesion is dark on day 7

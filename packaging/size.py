@@ -18,7 +18,7 @@ PARTS = {
     "poses, rotations, geo, xarray": ("geo poses rotations xarray", 1450),
     "_estimation": ("_estimation", 1050),
     "_smoothing": ("_smoothing", 1850),
-    "jax, torch, _autodiff": ("_adapters _closed_forms jax torch", 1100),
+    "jax, torch, _autodiff": ("_autodiff jax torch", 1100),
     "tensors, subspaces": ("subspaces tensors", 230),
     "_grid": ("_grid", 780),
     "quantum, shapes, testing": ("quantum shapes testing", 480),

@@ -12,8 +12,8 @@
     geo          positions, speed and course on a globe
     quantum      Hamiltonians, propagators, pulses, the Bloch sphere
     subspaces    reduced bases over a parameter
-    tensors      diffusion tensors in the order of each program, NIfTI files
-    shapes       affine shapes of landmarks, morphs and their pictures
+    tensors      diffusion tensors in the order of each program
+    shapes       affine shapes of landmarks, and their page
     xarray_dask  curves in xarray objects, in blocks of dask, on workers that die
     host         threads, memory, interruptions, arrays of other libraries
     typing       annotations, as type checkers read them

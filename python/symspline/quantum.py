@@ -1,4 +1,4 @@
-"""Quantum control: Hamiltonians that steer a system along a curve, pulses, propagators, the Bloch sphere.
+"""Quantum control: Hamiltonians that steer a system along a curve, pulses, propagators, geometric phases.
 
 A curve on `ComplexProjective` is a path of pure states, a curve on `ComplexGrassmannian` a path of subspaces (such as
 logical states), and a curve on `Unitary` or `SpecialUnitary` a path of gates. The module implements the second step of
@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cache
-from math import isqrt, prod
+from math import prod
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -34,10 +34,8 @@ from ._base.validation import (
     largest,
     numbers,
     one_of,
-    real_numbers,
     square_matrices,
     unit_vectors,
-    unmoved_by_underflow,
 )
 from ._core import ValidationError
 from ._curves.curve import CurveArrays, in_span
@@ -52,14 +50,10 @@ if TYPE_CHECKING:
 
 __all__ = [
     "berry_phase",
-    "bloch_vector",
-    "density",
-    "from_bloch_vector",
     "from_kets",
     "hamiltonian",
     "propagator",
     "pulses",
-    "purify",
     "qobjevo",
 ]
 
@@ -545,9 +539,8 @@ def berry_phase(spline: CubicSpline[Any, Any]) -> Number:
 
     >>> import numpy as np, symspline as ss
     >>> angle = np.linspace(0, 2 * np.pi, 65)
-    >>> across = np.sqrt(0.75) * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-    >>> circle = np.concatenate([across, np.full((65, 1), 0.5)], axis=-1)
-    >>> loop = ss.CubicSpline(angle, ss.quantum.from_bloch_vector(circle), "cp:1", bc_type="periodic")
+    >>> circle = np.stack([np.full(65, np.sqrt(0.75)), np.exp(1j * angle) / 2], axis=-1)
+    >>> loop = ss.CubicSpline(angle, circle, "cp:1", bc_type="periodic")
     >>> round(ss.quantum.berry_phase(loop) / np.pi, 4)
     np.float64(-0.5)
     """
@@ -565,120 +558,6 @@ def berry_phase(spline: CubicSpline[Any, Any]) -> Number:
     overlap = np.sum(first.conj() * lifted, axis=-1)
     phase: Number = np.angle(overlap)[()]
     return phase
-
-
-# ---- mixed states ----
-
-
-def purify(states: ArrayLike) -> Array:
-    r"""Convert density matrices along a path to pure states of a doubled system, with the Bures metric.
-
-    Parameters
-    ----------
-    states : array_like, shape (..., m, n, n)
-        Density matrices of m states: Hermitian, positive semidefinite, of trace one.
-
-    Returns
-    -------
-    ndarray, shape (..., m, n²)
-        Unit vectors, points of ``ComplexProjective(n**2 - 1)``.
-
-    Raises
-    ------
-    ValidationError
-        If a matrix is not a density matrix.
-
-    See Also
-    --------
-    density : The inverse operation.
-
-    Notes
-    -----
-    A purification of ρ is a matrix W with :math:`W W^* = \rho`. It is determined up to a unitary factor. The factor
-    of each state is chosen such that :math:`W_k^* W_{k+1}` is positive semidefinite: W is parallel along the path
-    [1]_. The distance between neighbours in projective space is then their Bures angle
-    :math:`\arccos \operatorname{tr} \lvert\sqrt{\rho_k}\sqrt{\rho_{k+1}}\rvert`. The spline through the
-    purifications is a smooth path of mixed states.
-
-    References
-    ----------
-    .. [1] A. Uhlmann, Parallel transport and "quantum holonomy" along density operators, Rep. Math. Phys. 24 (1986).
-
-    Examples
-    --------
-    >>> import numpy as np, symspline as ss
-    >>> states = [np.diag([p, 1 - p]) for p in (0.5, 0.7, 1.0)]
-    >>> path = ss.CubicSpline(None, ss.quantum.purify(states), "cp:3")
-    >>> ss.quantum.density(path(1.0)).real.round(8)
-    array([[0.7, 0. ],
-           [0. , 0.3]])
-    """
-    given, tol = square_matrices(states, "states")
-    if given.ndim < 3 or not given.shape[-3]:
-        raise ValidationError(f"states has shape {given.shape}, but must have shape (..., m, n, n) with m >= 1.")
-    given = given.astype(np.complex128)
-    refuse(np.asarray(~np.isfinite(given).all(axis=(-2, -1))), "states", lambda _: "is not finite")
-    off = np.abs(given - adjoint(given)).max(axis=(-2, -1))
-    refuse(off > tol, "states", lambda i: f"is not Hermitian: ρ − ρ* has an entry of {off[i]:.3g}")
-    values, vectors = np.linalg.eigh((given + adjoint(given)) / 2)
-    traces: Array = np.asarray(values.sum(axis=-1))
-    refuse(
-        np.asarray(np.abs(traces - 1) > tol),
-        "states",
-        lambda i: f"has the trace {traces[i]:.9g}. Divide it by its trace.",
-    )
-    refuse(
-        values[..., 0] < -tol,
-        "states",
-        lambda i: f"is not positive semidefinite: its smallest eigenvalue is {values[i][0]:.3g}",
-    )
-    roots = (vectors * np.sqrt(np.maximum(values, 0))[..., None, :]) @ adjoint(vectors)
-    for k in range(1, roots.shape[-3]):
-        u, _, v = np.linalg.svd(adjoint(roots[..., k, :, :]) @ roots[..., k - 1, :, :])
-        roots[..., k, :, :] = roots[..., k, :, :] @ u @ v
-    flat = roots.reshape(*roots.shape[:-2], -1)
-    return np.asarray(flat / np.linalg.norm(flat, axis=-1, keepdims=True))
-
-
-def density(purifications: ArrayLike) -> Array:
-    """Convert pure states of a doubled system to density matrices, by a partial trace.
-
-    Parameters
-    ----------
-    purifications : array_like, shape (..., n²)
-        Unit vectors, such as points of a curve through the result of `purify`.
-
-    Returns
-    -------
-    ndarray, shape (..., n, n)
-        Density matrices.
-
-    Raises
-    ------
-    ValidationError
-        If the number of entries is not a square, or a vector is not a unit vector.
-
-    See Also
-    --------
-    purify : The inverse operation.
-
-    Examples
-    --------
-    A Bell state is maximally mixed for either qubit:
-
-    >>> import symspline as ss
-    >>> ss.quantum.density([2**-0.5, 0, 0, 2**-0.5]).real.round(8)
-    array([[0.5, 0. ],
-           [0. , 0.5]])
-    """
-    given, tol = numbers(purifications, "purifications", 1)
-    n = isqrt(given.shape[-1])
-    if not n or n * n != given.shape[-1]:
-        raise ValidationError(f"purifications has shape {given.shape}, but must have shape (..., n²).")
-    norms = np.linalg.norm(given, axis=-1)
-    refuse(~(abs(norms - 1) <= tol), "purifications", lambda i: f"has the norm {norms[i]:.9g}. Normalise it.")
-    w = given.reshape(*given.shape[:-1], n, n)
-    return np.asarray(w @ adjoint(w))
 
 
 # ---- states ----
@@ -702,6 +581,10 @@ def from_kets(kets: Any) -> Array:
     ValidationError
         If a ket is not a column of length 1.
 
+    Notes
+    -----
+    In the other direction, ``qutip.Qobj(point)`` is the ket of a point.
+
     Examples
     --------
     >>> from_kets([[[1], [0]], [[0.6], [0.8j]]])
@@ -723,75 +606,3 @@ def _full(kets: Any) -> Any:
     if isinstance(kets, (list, tuple)) or (isinstance(kets, np.ndarray) and kets.dtype == object):
         return [_full(ket) for ket in kets]
     return kets
-
-
-@unmoved_by_underflow()
-def bloch_vector(state: ArrayLike) -> Array:
-    """Compute the points of qubit states on the Bloch sphere, the expectations of the Pauli matrices.
-
-    Distances on the Bloch sphere are twice those of ``ComplexProjective(1)``.
-
-    Parameters
-    ----------
-    state : array_like, shape (..., 2)
-        Complex unit vectors with any phase.
-
-    Returns
-    -------
-    ndarray, shape (..., 3)
-        Unit vectors: (1, 0) is mapped to (0, 0, 1), (1, 1)/√2 to (1, 0, 0), and (1, i)/√2 to (0, 1, 0).
-
-    Raises
-    ------
-    ValidationError
-        If a state does not have two components, or its length is not 1.
-
-    References
-    ----------
-    Nielsen & Chuang, "Quantum Computation and Quantum Information", section 1.2.
-
-    Examples
-    --------
-    >>> bloch_vector([0.6, 0.8j]).round(8) + 0.0
-    array([ 0.  ,  0.96, -0.28])
-    """
-    psi, tol = numbers(state, "state", 1)
-    if psi.shape[-1] != 2:
-        raise ValidationError(f"state must be of shape (..., 2), states of one qubit, not {psi.shape}")
-    a, b = np.moveaxis(unit_vectors(psi, tol, "state", "a state"), -1, 0)
-    across = 2 * a.conj() * b
-    return np.stack([across.real, across.imag, (np.abs(a) - np.abs(b)) * (np.abs(a) + np.abs(b))], axis=-1)
-
-
-@unmoved_by_underflow()
-def from_bloch_vector(vector: ArrayLike) -> Array:
-    """Convert points of the Bloch sphere to qubit states, points of ``ComplexProjective(1)``.
-
-    The phase is chosen such that the larger component is positive.
-
-    Parameters
-    ----------
-    vector : array_like, shape (..., 3)
-        Unit vectors.
-
-    Returns
-    -------
-    ndarray, shape (..., 2)
-        Unit vectors.
-
-    Raises
-    ------
-    ValidationError
-        If the length of a vector is not 1. Points inside the ball are mixed states.
-
-    Examples
-    --------
-    >>> from_bloch_vector([0.0, 0.96, -0.28]).round(8)
-    array([0. -0.6j, 0.8+0.j ])
-    """
-    v, tol = real_numbers(vector, "vector", (3,))
-    v = unit_vectors(v, tol, "vector", "a pure state")
-    up = v[..., 2] >= 0
-    large = np.sqrt((1 + np.abs(v[..., 2])) / 2)
-    small = (v[..., 0] + 1j * np.where(up, v[..., 1], -v[..., 1])) / (2 * large)
-    return np.stack([np.where(up, large, small), np.where(up, small, large)], axis=-1)

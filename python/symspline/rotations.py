@@ -44,15 +44,22 @@ from ._splines.cubic import CubicSpline
 from ._splines.cumulative import CumulativeBSpline
 from ._splines.hermite import HermiteSpline
 from ._splines.timed_curve import check_timed
-from .convert import matrix_to_quaternion, quaternion_to_matrix
-from .convert._quaternions import checked_order, converted, quaternion_form
+from .convert._quaternions import (
+    checked_order,
+    converted,
+    matrix_to_quaternion,
+    quaternion_form,
+    quaternion_to_matrix,
+)
 
 if TYPE_CHECKING:
+    from orix.quaternion import Misorientation, Orientation, Symmetry
     from scipy.spatial.transform import Rotation
 
 __all__ = [
     "angular_acceleration",
     "angular_velocity",
+    "as_orix",
     "as_quaternions",
     "as_rotation_6d",
     "as_rotation_vectors",
@@ -723,6 +730,15 @@ def as_quaternions(rotations: ArrayLike | Rotation, *, scalar_first: bool | None
     ndarray, shape (..., 4)
         Unit quaternions.
 
+    Raises
+    ------
+    ValidationError
+        If a matrix is not a rotation, or `scalar_first` is missing.
+
+    References
+    ----------
+    Shepperd, "Quaternion from rotation matrix", 1978.
+
     Examples
     --------
     >>> as_quaternions([[0, -1, 0], [1, 0, 0], [0, 0, 1]], scalar_first=False).round(8)
@@ -759,6 +775,11 @@ def from_quaternions(
     ndarray, shape (..., 3, 3)
         Points of ``so:3``.
 
+    Raises
+    ------
+    ValidationError
+        If the norm of a quaternion is not 1, or `scalar_first` is missing.
+
     Examples
     --------
     >>> from_quaternions([1, 0, 0, 0], scalar_first=True)
@@ -767,6 +788,59 @@ def from_quaternions(
            [0., 0., 1.]])
     """
     return converted(quaternions, "quaternions", quaternion_form(scalar_first), "matrix", atol, skipna)
+
+
+def as_orix(
+    rotations: ArrayLike | Rotation, symmetry: Symmetry | tuple[Symmetry, Symmetry] | None = None
+) -> Orientation | Misorientation:
+    """Convert rotations to orientations or misorientations of orix.
+
+    In the other direction, objects of orix are accepted wherever points of ``so:3`` are, and `symspline.Quotient`
+    accepts them as groups.
+
+    Parameters
+    ----------
+    rotations : array_like, shape (..., 3, 3), or scipy.spatial.transform.Rotation
+        Points of ``so:3``, such as the values of a curve on ``Quotient("so:3", orientations)``.
+    symmetry : orix.quaternion.Symmetry or pair, optional
+        The symmetry of the crystal; or for misorientations a pair, for the first and the second crystal. By default
+        there is none.
+
+    Returns
+    -------
+    orix.quaternion.Orientation or orix.quaternion.Misorientation
+        The same rotations, in the same shape.
+
+    Raises
+    ------
+    ImportError
+        If orix is not installed.
+    ValidationError
+        If a matrix is not a rotation.
+
+    See Also
+    --------
+    symspline.Quotient : Orientations up to the symmetry of a crystal.
+
+    Notes
+    -----
+    Orientations of orix map vectors of the sample to vectors of the crystal, so that symmetry multiplies their
+    matrices from the left.
+
+    Examples
+    --------
+    >>> from orix.quaternion import symmetry  # doctest: +SKIP
+    >>> as_orix([[0, -1, 0], [1, 0, 0], [0, 0, 1]], symmetry.Oh)  # doctest: +SKIP
+    Orientation () m-3m
+    [0.7071 0.     0.     0.7071]
+    """
+    quaternions = as_quaternions(rotations, scalar_first=True)
+    try:
+        from orix.quaternion import Misorientation, Orientation
+    except ImportError:
+        raise ImportError("this conversion needs orix; install it with: pip install orix") from None
+    kind = Misorientation if isinstance(symmetry, tuple) else Orientation
+    return kind(quaternions, symmetry=symmetry)
 
 
 def as_rotation_vectors(rotations: ArrayLike | Rotation) -> Array:

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from tabular import TIMES, numbers, table, write, write_table
 
 import symspline as ss
-from symspline.convert import quaternion_to_matrix
+from symspline.rotations import from_quaternions
 
 WXYZ = ["qw", "qx", "qy", "qz"]
 # More than a whole turn, so that signs of quaternions with w >= 0 jump.
@@ -20,7 +20,7 @@ PLACES = np.random.default_rng(0).normal(size=(6, 3)).cumsum(0)
 
 def poses():
     p = np.zeros((6, 4, 4))
-    p[:, :3, :3], p[:, :3, 3], p[:, 3, 3] = quaternion_to_matrix(Q, scalar_first=True), PLACES, 1
+    p[:, :3, :3], p[:, :3, 3], p[:, 3, 3] = from_quaternions(Q, scalar_first=True), PLACES, 1
     return p
 
 

@@ -9,7 +9,7 @@ from refused import raises
 from scipy.spatial.transform import Rotation
 
 import symspline as ss
-from symspline import convert
+from symspline import convert, rotations
 
 SEED = 7
 
@@ -143,11 +143,11 @@ def axes(rng):
 def test_quaternions_there_and_back(angle, scalar_first, rng):
     q = np.concatenate([np.full((52, 1), np.cos(angle / 2)), np.sin(angle / 2) * axes(rng)], axis=-1)
     given = q if scalar_first else np.roll(q, -1, axis=-1)
-    r = convert.quaternion_to_matrix(given, scalar_first=scalar_first)
+    r = rotations.from_quaternions(given, scalar_first=scalar_first)
     ss.SpecialOrthogonal(3).check_point(r)
     assert np.abs(np.swapaxes(r, -1, -2) @ r - np.eye(3)).max() <= 10 * EPS
     assert np.abs(r - Rotation.from_quat(np.roll(q, -1, axis=-1)).as_matrix()).max() <= 10 * EPS
-    back = convert.matrix_to_quaternion(r, scalar_first=scalar_first)
+    back = rotations.as_quaternions(r, scalar_first=scalar_first)
     scalar = back[:, 0 if scalar_first else 3]
     assert (scalar >= 0).all()
     # At the angle π both signs are right.
@@ -163,7 +163,7 @@ def test_quaternions_there_and_back(angle, scalar_first, rng):
 
 @loop_over("order", [None, 1, 0, "wxyz", "xyzw", np.True_])
 @pytest.mark.parametrize(
-    "call, value", [(convert.matrix_to_quaternion, np.eye(3)), (convert.quaternion_to_matrix, [1.0, 0, 0, 0])]
+    "call, value", [(rotations.as_quaternions, np.eye(3)), (rotations.from_quaternions, [1.0, 0, 0, 0])]
 )
 def test_quaternion_order_is_required(call, value, order):
     match = r"required.* scalar_first=True for \(w, x, y, z\) or scalar_first=False for \(x, y, z, w\) as in SciPy"
@@ -186,12 +186,11 @@ SINGLE = [
     (convert.density_to_state, [[0.36, 0.48], [0.48, 0.64]], {}),
     (convert.basis_to_reflection, [[0.75], [1.25]], {"negative": 1}),
     (convert.reflection_to_basis, [[-2.125, 1.875], [-1.875, 2.125]], {"negative": 1}),
-    (convert.matrix_to_quaternion, np.eye(3), {"scalar_first": True}),
-    (convert.quaternion_to_matrix, [1.0, 0.0, 0.0, 0.0], {"scalar_first": True}),
+    (rotations.as_quaternions, np.eye(3), {"scalar_first": True}),
+    (rotations.from_quaternions, [1.0, 0.0, 0.0, 0.0], {"scalar_first": True}),
 ]
-# Those of totally geodesic parts and of orix have tests of their own, in tests/spaces.
+# Those of totally geodesic parts have tests of their own, in tests/spaces.
 PARTS = {
-    "matrix_to_orix",
     *("siegel_to_positive_definite", "positive_definite_to_siegel"),
     *("quaternions_to_subspace", "subspace_to_quaternions"),
 }
@@ -199,7 +198,7 @@ each = pytest.mark.parametrize(("call", "value", "order"), SINGLE, ids=[case[0].
 
 
 def test_all_functions_are_here():
-    assert {case[0].__name__ for case in SINGLE} | PARTS == set(convert.__all__)
+    assert {case[0].__name__ for case in SINGLE} - set(rotations.__all__) | PARTS == set(convert.__all__)
 
 
 @each
@@ -241,8 +240,8 @@ def test_invalid_point_arrays_raise(call, value, order, bad):
         call(bad, **order)
 
 
-matrix_to_quaternion = partial(convert.matrix_to_quaternion, scalar_first=True)
-quaternion_to_matrix = partial(convert.quaternion_to_matrix, scalar_first=True)
+as_quaternions = partial(rotations.as_quaternions, scalar_first=True)
+from_quaternions = partial(rotations.from_quaternions, scalar_first=True)
 BAD = [
     (convert.hyperboloid_to_ball, [2.0, 0.0, 0.0], r"not on the hyperboloid.* is 2\.0, but .* is 1\.0; .*project"),
     (convert.hyperboloid_to_ball, [-1.25, 0.75, 0.0], r"not on the hyperboloid.* -1\.25"),
@@ -268,12 +267,12 @@ BAD = [
     (convert.density_to_state, np.eye(2) / 2, r"not a pure state: .* tr P² is 0\.5; only pure"),
     # Trace and purity 1, but an eigenvalue is negative.
     (convert.density_to_state, np.diag([2.0, 2.0, -1.0]) / 3, r"not a pure state: .* 4\.444e-01"),
-    (matrix_to_quaternion, 2 * np.eye(3), r"not a rotation: .* 3\.000e\+00; .*project"),
-    (matrix_to_quaternion, np.diag([1.0, 1.0, -1.0]), "reflection.*determinant is -1; swap"),
-    (matrix_to_quaternion, np.eye(2), r"of shape \(\.\.\., 3, 3\)"),
-    (matrix_to_quaternion, 1j * np.eye(3), "must be real"),
-    (quaternion_to_matrix, [0.0, 0.0, 0.0, 0.0], r"not a unit quaternion: its length is 0\.0"),
-    (quaternion_to_matrix, [1.0, 0.0, 0.0], r"of shape \(\.\.\., 4\)"),
+    (as_quaternions, 2 * np.eye(3), r"not a rotation: .* 3\.000e\+00; .*project"),
+    (as_quaternions, np.diag([1.0, 1.0, -1.0]), "reflection.*determinant is -1; swap"),
+    (as_quaternions, np.eye(2), r"of shape \(\.\.\., 3, 3\)"),
+    (as_quaternions, 1j * np.eye(3), "must be real"),
+    (from_quaternions, [0.0, 0.0, 0.0, 0.0], r"not a unit quaternion: its length is 0\.0"),
+    (from_quaternions, [1.0, 0.0, 0.0], r"of shape \(\.\.\., 4\)"),
 ]
 
 

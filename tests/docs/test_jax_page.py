@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from pages import blocks, run
 
+import symspline as ss
+
 PAGE = Path(__file__).parents[2] / "docs/jax.md"
 
 
@@ -28,9 +30,11 @@ def test_examples_run():
     run("\n".join(blocks(PAGE)).replace("jax.hessian(", "jax.grad("), PAGE, names)
     assert names["error"] < 1e-5 and np.isfinite(names["jerk"]).all()
     assert names["hessian"].shape == (5, 3) and names["figure"].axes
-    height, h = names["height"], 1e-5
-    differences = [height(1.5 + h, 0.7) - height(1.5 - h, 0.7), height(1.5, 0.7 + h) - height(1.5, 0.7 - h)]
-    np.testing.assert_allclose(names["slope"], np.array(differences) / (2 * h), atol=1e-8)
+    surface, h = names["surface"], 1e-5
+    differences = [surface(1.5 + h, 0.7) - surface(1.5 - h, 0.7), surface(1.5, 0.7 + h) - surface(1.5, 0.7 - h)]
+    np.testing.assert_allclose(names["slope"], np.array(differences)[:, 2] / (2 * h), atol=1e-8)
+    grid = ss.GridSpline((names["u"], names["v"]), names["field"], "sphere:2")
+    np.testing.assert_allclose(names["values"], grid((np.array([0.3, 1.5]), np.array([0.2, 0.7]))), atol=1e-12)
 
 
 def test_the_table_can_be_made():

@@ -16,6 +16,10 @@ def test_the_example_runs(capsys):
     assert "acceleration is continuous" in capsys.readouterr().out
 
 
+def test_the_page_shows_the_surface_of_the_tables():
+    assert manifolds.PAGE.with_name("manifolds_surface.py").read_text("utf-8") in blocks(manifolds.PAGE)
+
+
 def test_condition_table():
     """(13) leaves a jump that falls in proportion to the step; D log, and (13) on the sphere, leave none."""
     rows = cells(manifolds.condition_table((0.8, 0.4)))

@@ -170,7 +170,7 @@ def test_stars():
     single = ss.estimate(lone, np.linspace(t[0], t[-1], 30), "so:3")
     assert errors(single, truth, x)[0] < 0.05
     on_sphere = ss.estimate([measure.Directions(t, seen, stars, sigma=0.01)], 41, "sphere:3")
-    turned = ss.convert.quaternion_to_matrix(on_sphere(x), scalar_first=True)
+    turned = ss.rotations.from_quaternions(on_sphere(x), scalar_first=True)
     assert np.abs(turned - both(x)).max() < 0.01
 
 

@@ -69,14 +69,14 @@ def test_attitudes_in_the_middle_only_and_quaternions():
     truth, t, seen, s, omega, _ = spinning(3, 150)
     some = (t > 45) & (t < 52)
     # The signs are those of a continuous path of quaternions.
-    path = ss.convert.matrix_to_quaternion(truth(s), scalar_first=True)
+    path = ss.rotations.as_quaternions(truth(s), scalar_first=True)
     path[1:] *= np.cumprod(np.where(np.sum(path[1:] * path[:-1], axis=1) < 0, -1.0, 1.0))[:, None]
-    quaternions = ss.convert.matrix_to_quaternion(seen[some], scalar_first=True)
+    quaternions = ss.rotations.as_quaternions(seen[some], scalar_first=True)
     near = path[np.searchsorted(s, t[some]).clip(max=len(s) - 1)]
     quaternions *= -np.sign(np.sum(near * quaternions, axis=1))[:, None]
     curve = ss.estimate(given(t[some], quaternions, s, omega), 161, "sphere:3")
     x = np.linspace(s[0], s[-1], 100)
-    off = SO3.distance(ss.convert.quaternion_to_matrix(curve(x), scalar_first=True), truth(x))
+    off = SO3.distance(ss.rotations.from_quaternions(curve(x), scalar_first=True), truth(x))
     # Lengths on the sphere of quaternions are half of angles.
     assert np.max(off / np.sqrt(3) / (2 * curve.std(x))) < 6
 

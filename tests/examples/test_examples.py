@@ -39,7 +39,6 @@ SAYS = {
     "polar_wander": r"[5-8] degrees of freedom; 100 million years ago A95 is 2\.\d degrees",
     "noisy_camera": r"λ = 0\.04\d*, noise 0\.04\d m; λ = 0\.3\d*, noise 0\.05\d rad",
     "field_on_a_grid": r"2592 curves in 4 blocks, 2592 converged; the field turns by up to 0.2\d degrees a year",
-    "morph": "100 frames of 12 landmarks",
     "first_curve": r"lengths from 0\.\d\d to 1\.\d\d; of the spline 1 ± \de-16",
     "five_orientations": r"largest step of a component: 0\.00\d\non S³ and on SO\(3\): \de-1[3-6] apart",
     "tracking_gap": r"longest time between points: 12\.1 s",

@@ -68,7 +68,6 @@ def objects():
         ),
         "SegmentedCurve": ss.SegmentedCurve([sphere, sphere.shift(10)]),
         "Derivative": sphere.derivative(),
-        "AffineMorph": ss.shapes.AffineMorph(T, [SQUARE, 2 * SQUARE, SQUARE + 1]),
         "GridSpline": ss.GridSpline(
             (T, None), P[[0, 1]].repeat(2, axis=0)[[0, 1, 2]][:, None] * np.ones((3, 2, 1)), "sphere:2"
         ),
@@ -213,7 +212,6 @@ def pools(things):
         "progress": [None],
         "dtype": ["float32"],
         "gap": [np.timedelta64(3, "h")],
-        "volume": [ss.tensors.Volume(SPD[:1], np.ones((1, 1, 1), bool), np.eye(4))],
         "index": [0, slice(1)],
         "function": [lambda x: x],
     }

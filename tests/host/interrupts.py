@@ -101,11 +101,6 @@ def written(n):
     return path
 
 
-def volume(n):
-    tensors = np.broadcast_to(np.eye(3), (n**3, 3, 3)) * rng().uniform(1, 2, (n**3, 1, 1))
-    return ss.tensors.Volume(tensors, np.ones((n, n, n), bool), np.eye(4))
-
-
 def parts(n):
     p = walk("so:3", 10)
     c = ss.CubicSpline(None, np.concatenate([p, p[:1]]), "so:3")
@@ -264,7 +259,6 @@ CALLS = {
     "geo.resample": ("d = table_of_tracks(500000)", "ss.geo.resample(d, '1min', time='time', by='by', max_gap='1h')"),
     "read_tum": ("f = written(1000000)", "ss.poses.read_tum(f)"),
     "save": ("c = [spline('so:3', 100)] * 20000", "ss.save(c, Path(tempfile.mkdtemp()) / 'a.npz')"),
-    "tensors.resample": ("v = volume(30)", "ss.tensors.resample(v, zoom=6)"),
 }
 
 

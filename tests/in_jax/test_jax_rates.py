@@ -53,9 +53,11 @@ def test_values_are_those_of_the_spline(name, nu):
 
 @pytest.mark.parametrize(
     ("name", "nu", "dx"),
-    [(name, *one) for name in (*PLAIN, *QUOTIENTS) for one in ((1, 1.0), (2, 0.0))]
-    # What times do to points, and data alone to velocities, is asked of one space each.
-    + [("so:3", 0, 1.0), ("gr:2,5", 0, 1.0), ("spd:2", 1, 0.0)],
+    # Points, velocities and accelerations, with and without moving times, on spaces of each second fundamental form.
+    [
+        *(("so:3", 0, 1.0), ("gr:2,5", 0, 1.0), ("sphere:2", 1, 1.0), ("cp:2", 1, 1.0), ("spd:2", 1, 0.0)),
+        *(("h:2", 2, 0.0), ("se:3", 2, 0.0), ("hp:1", 2, 0.0)),
+    ],
 )
 def test_rates_differentiate_with_respect_to_data(name, nu, dx):
     """The derivative of the arrays, with their normal parts; and its transpose."""

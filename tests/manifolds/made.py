@@ -1,14 +1,10 @@
 """Manifolds for the tests, and curves on them."""
 
-from functools import partial
-
 import numpy as np
 from cases import one_sided
+from manifolds import ellipsoid
 
 import symspline as ss
-
-AXES = np.array([1.0, 1.2, 0.8])
-RADII = 2.0, 0.8
 
 
 def twin(space, **changes):
@@ -42,41 +38,8 @@ def flat(n):
     )
 
 
-def ellipsoid_equation(x):
-    return np.sum((x / AXES) ** 2, axis=-1) - 1
-
-
-def _ellipsoid_grad(x):
-    return 2 * x / AXES**2
-
-
-def _ellipsoid_hess(x):
-    return np.broadcast_to(np.diag(2 / AXES**2), (len(x), 3, 3))
-
-
-def _torus(x):
-    return (np.hypot(x[:, 0], x[:, 1]) - RADII[0]) ** 2 + x[:, 2] ** 2 - RADII[1] ** 2
-
-
-def _torus_grad(x):
-    s = np.hypot(x[:, 0], x[:, 1])
-    c = 2 * (s - RADII[0]) / s
-    return np.stack([c * x[:, 0], c * x[:, 1], 2 * x[:, 2]], axis=-1)
-
-
-def _torus_hess(x):
-    s = np.hypot(x[:, 0], x[:, 1])
-    n = np.stack([x[:, 0] / s, x[:, 1] / s, 0 * s], axis=-1)
-    around = np.diag([1.0, 1.0, 0.0])
-    c, k = 2 * (s - RADII[0]) / s, 2 * RADII[0] / s
-    return c[:, None, None] * around + k[:, None, None] * n[:, :, None] * n[:, None, :] + 2 * np.diag([0.0, 0.0, 1.0])
-
-
-# The shortest conjugate distances are π times the smallest radius of curvature.
-ellipsoid = partial(ss.manifolds.from_surface, ellipsoid_equation, _ellipsoid_grad, 3)
-torus = partial(ss.manifolds.from_surface, _torus, _torus_grad, 3)
-ELLIPSOID = ellipsoid(hess=_ellipsoid_hess)
-TORUS = torus(hess=_torus_hess)
+# The shortest conjugate distance is π times the smallest radius of curvature.
+ELLIPSOID = ellipsoid()
 
 
 def walk(space, step, n, seed, start=None):

@@ -97,6 +97,6 @@ def test_models_are_those_of_geomstats(n, distance, rng):
 def test_quaternions_are_those_of_geomstats(rng):
     group = SpecialOrthogonal(3, point_type="vector", equip=False)
     r = ss.SpecialOrthogonal(3).random_point(rng, 50)
-    ours, theirs = ss.convert.matrix_to_quaternion(r, scalar_first=True), group.quaternion_from_matrix(r)
+    ours, theirs = ss.rotations.as_quaternions(r, scalar_first=True), group.quaternion_from_matrix(r)
     assert np.minimum(np.abs(ours - theirs), np.abs(ours + theirs)).max() <= 1e-8
     assert np.abs(group.matrix_from_quaternion(ours) - r).max() <= 1e-12

@@ -15,7 +15,7 @@ SUBSCRIPTS = str.maketrans("0123456789,", "₀₁₂₃₄₅₆₇₈₉,")
 VIEW = np.array([[-0.5, 0.866, 0.0], [-0.296, -0.171, 0.940]])
 PAULI = np.array([[[0, 1], [1, 0]], [[0, -1j], [1j, 0]], [[1, 0], [0, -1]]])
 ROTATIONS = {
-    "sphere:3": lambda q: ss.convert.quaternion_to_matrix(q, scalar_first=True),
+    "sphere:3": lambda q: ss.rotations.from_quaternions(q, scalar_first=True),
     "so:3": np.array,
     "o:3": np.array,
     # U (v·σ) U* = (Rv)·σ

@@ -222,7 +222,7 @@ def test_invalid_arguments_raise(call, match):
         call()
 
 
-@pytest.mark.parametrize("module", ["", "._evaluation", "._fitting"])
+@pytest.mark.parametrize("module", ["", "._native"])
 def test_examples_of_docstrings(module):
     assert not doctest.testmod(importlib.import_module(f"symspline.torch{module}")).failed
 

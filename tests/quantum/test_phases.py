@@ -1,8 +1,8 @@
-"""Berry phases, purifications of mixed states, and propagators of many qubits."""
+"""Berry phases, and propagators of many qubits."""
 
 import numpy as np
 import pytest
-from scipy.linalg import sqrtm
+from test_propagator import PAULI
 
 import symspline as ss
 from symspline import quantum
@@ -39,7 +39,8 @@ def test_phases_are_limits_of_bargmann_invariants(n):
 
 def test_phases_of_qubits_are_half_the_solid_angle():
     curve = loop(np.random.default_rng(0), 1)
-    x = quantum.bloch_vector(curve(np.linspace(curve.t[0], curve.t[-1], 20_001)))
+    states = curve(np.linspace(curve.t[0], curve.t[-1], 20_001))
+    x = np.einsum("...a,qab,...b->...q", states.conj(), PAULI, states).real
     phase = quantum.berry_phase(curve)
     assert abs(np.angle(np.exp(1j * (phase + solid_angle(x) / 2)))) < 1e-6
     assert quantum.berry_phase(curve.reverse()) == pytest.approx(-phase)
@@ -55,52 +56,6 @@ def test_batches_of_loops_and_invalid_curves():
         quantum.berry_phase(ss.CubicSpline(None, [[1, 0], [0.6, 0.8]], "cp:1"))
     with pytest.raises(ss.ValidationError, match="ComplexProjective"):
         quantum.berry_phase(ss.CubicSpline(None, [np.eye(2), np.eye(2)], "u:2"))
-
-
-def mixed(rng, n, count, rank=None, batch=()):
-    x = rng.standard_normal((*batch, count, n, rank or n)) + 1j * rng.standard_normal((*batch, count, n, rank or n))
-    rho = x @ np.swapaxes(x.conj(), -1, -2)
-    return rho / np.trace(rho, axis1=-2, axis2=-1).real[..., None, None]
-
-
-@pytest.mark.parametrize(("n", "rank"), [(2, None), (3, None), (4, 2), (3, 1)])
-def test_distances_of_purifications_are_bures_angles(n, rank):
-    rho = mixed(np.random.default_rng(n), n, 6, rank)
-    w = quantum.purify(rho)
-    np.testing.assert_allclose(quantum.density(w), rho, atol=1e-13)
-    space = ss.ComplexProjective(n * n - 1)
-    for k in range(5):
-        root = sqrtm(rho[k])
-        fidelity = np.trace(sqrtm(root @ rho[k + 1] @ root)).real
-        assert np.cos(space.distance(w[k], w[k + 1])) == pytest.approx(fidelity, abs=1e-7)
-        # Parallel purifications: W* W' is positive semidefinite.
-        product = w[k].reshape(n, n).conj().T @ w[k + 1].reshape(n, n)
-        assert np.abs(product - product.conj().T).max() < 1e-12
-        assert np.linalg.eigvalsh(product)[0] > -1e-12
-
-
-def test_splines_of_mixed_states():
-    rho = mixed(np.random.default_rng(5), 2, 5, batch=(3,))
-    curves = ss.CubicSpline(None, quantum.purify(rho), "cp:3")
-    states = quantum.density(curves(np.linspace(0, 4, 50)))
-    np.testing.assert_allclose(np.trace(states, axis1=-2, axis2=-1), 1, atol=1e-12)
-    assert np.linalg.eigvalsh(states).min() > -1e-12
-    np.testing.assert_allclose(quantum.density(curves(2.0)), rho[:, 2], atol=1e-9)
-
-
-def test_invalid_states_raise():
-    for state, match in (
-        (np.eye(2), r"states has shape \(2, 2\)"),
-        ([np.eye(2)], r"states\[0\] has the trace 2"),
-        ([[[0.5, 1], [0, 0.5]]], r"states\[0\] is not Hermitian"),
-        ([np.diag([1.5, -0.5])], r"states\[0\] is not positive semidefinite"),
-    ):
-        with pytest.raises(ss.ValidationError, match=match):
-            quantum.purify(state)
-    with pytest.raises(ss.ValidationError, match="purifications has shape"):
-        quantum.density([1.0, 0, 0])
-    with pytest.raises(ss.ValidationError, match="purifications has the norm 2"):
-        quantum.density([2.0, 0, 0, 0])
 
 
 def test_propagators_of_ten_qubits_are_computed_in_the_span_of_the_data():

@@ -1,4 +1,4 @@
-"""Kets, the Bloch sphere, and Hamiltonians for QuTiP."""
+"""Kets, and Hamiltonians for QuTiP."""
 
 import sys
 
@@ -7,10 +7,9 @@ import pytest
 from refused import raises
 from scipy.integrate import ode
 from test_hamiltonian import curve
-from test_propagator import PAULI
 
 import symspline as ss
-from symspline.quantum import bloch_vector, from_bloch_vector, from_kets, hamiltonian, qobjevo
+from symspline.quantum import from_kets, hamiltonian, qobjevo
 
 CP1 = ss.ComplexProjective(1)
 
@@ -23,27 +22,6 @@ class Ket:
 
     def full(self):
         return np.array(self.numbers, complex).reshape(-1, 1)
-
-
-def test_expectations_of_paulis_matrices():
-    psi = CP1.random_point(np.random.default_rng(0), (4, 50))
-    expected = np.einsum("...a,qab,...b->...q", psi.conj(), PAULI, psi).real
-    assert np.abs(bloch_vector(psi) - expected).max() < 1e-15
-
-
-@pytest.mark.parametrize("size", [1e-300, 1e-12, 1e-4, 1.0])
-def test_there_and_back_also_near_the_poles(size):
-    rng = np.random.default_rng(1)
-    v = rng.standard_normal((200, 3)) * [size, size, 1]
-    v /= np.linalg.norm(v, axis=-1, keepdims=True)
-    v[:3] = [[0, 0, 1], [0, 0, -1], [1, 0, 0]]
-    psi = from_bloch_vector(v)
-    assert np.abs(np.linalg.norm(psi, axis=-1) - 1).max() < 4e-16
-    back = bloch_vector(psi)
-    assert (np.abs(back - v)[:, :2] <= 1e-15 * np.abs(v[:, :2]).max(initial=size)).all()
-    assert np.abs(back - v)[:, 2].max() < 1e-15
-    largest = np.take_along_axis(psi, np.abs(psi).argmax(axis=-1)[:, None], axis=-1)
-    assert (largest.imag == 0).all() and (largest.real > 0.7).all()
 
 
 # The second by a finite temperature.
@@ -92,9 +70,6 @@ def test_kets_are_columns():
 
 def test_invalid_states_raise():
     for match, call in [
-        (r"state must be of shape \(..., 2\)", lambda: bloch_vector([1, 0, 0])),
-        (r"state\[1\] is not a state: its length is 2.0", lambda: bloch_vector([[1, 0], [2, 0]])),
-        (r"vector is not a pure state: its length is 0.5", lambda: from_bloch_vector([0, 0, 0.5])),
         ("kets must be columns, of shape", lambda: from_kets([[1, 0], [0, 1]])),
         (r"kets\[1\] is not a state", lambda: from_kets([Ket([1, 0]), Ket([1, 1])])),
     ]:

@@ -184,7 +184,7 @@ def test_conversions_return_nan():
     r = Rotation.random(8, rng=5)
     for convert, given in (
         (lambda q, **how: ss.rotations.from_quaternions(q, scalar_first=False, **how), r.as_quat()),
-        (lambda q, **how: ss.convert.quaternion_to_matrix(q, scalar_first=False, **how), r.as_quat()),
+        (lambda q, **how: ss.rotations.from_quaternions(q, scalar_first=False, **how), r.as_quat()),
         (ss.rotations.from_rotation_vectors, r.as_rotvec()),
     ):
         given[[2, 5], 1] = np.nan

@@ -257,16 +257,16 @@ def test_to_orix(monkeypatch):
     with monkeypatch.context() as patch:
         patch.setitem(sys.modules, "orix", None)
         with pytest.raises(ImportError, match="pip install orix"):
-            ss.convert.matrix_to_orix(np.eye(3))
+            ss.rotations.as_orix(np.eye(3))
     package, module = ModuleType("orix"), ModuleType("orix.quaternion")
     module.Orientation = type("Orientation", (Orix,), {})
     module.Misorientation = type("Misorientation", (Orix,), {})
     monkeypatch.setitem(sys.modules, "orix", package)
     monkeypatch.setitem(sys.modules, "orix.quaternion", module)
     points = SO3.random_point(np.random.default_rng(9), 4)
-    found = ss.convert.matrix_to_orix(points, symmetry("432"))
+    found = ss.rotations.as_orix(points, symmetry("432"))
     assert type(found) is module.Orientation
     assert np.abs(SO3._array(found, "points") - points).max() < 1e-14
     assert str(ss.Quotient("so:3", found)) == "432\\so:3"
-    pair = ss.convert.matrix_to_orix(points, (symmetry("3"), symmetry("432")))
+    pair = ss.rotations.as_orix(points, (symmetry("3"), symmetry("432")))
     assert type(pair) is module.Misorientation

@@ -94,7 +94,7 @@ def test_rotations_in_every_form(way):
     q = WAYS[way](turns.as_quat())
     found = [
         ss.rotations.from_quaternions(q, scalar_first=False),
-        ss.convert.quaternion_to_matrix(q, scalar_first=False),
+        ss.rotations.from_quaternions(q, scalar_first=False),
     ]
     x = np.arange(60.0).reshape(20, 3) / 7
     lines = [
@@ -103,9 +103,7 @@ def test_rotations_in_every_form(way):
     ]
     found.append(ss.poses.read_tum(io.StringIO("\n".join(lines)))[1][:, :3, :3])
     m = WAYS[way](exact)
-    found.append(
-        ss.rotations.from_quaternions(ss.convert.matrix_to_quaternion(m, scalar_first=True), scalar_first=True)
-    )
+    found.append(ss.rotations.from_quaternions(ss.rotations.as_quaternions(m, scalar_first=True), scalar_first=True))
     found.append(ss.poses.join(m, x)[:, :3, :3])
     # The positions have full precision.
     found.append(ss.CubicSpline(None, ss.poses.join(m, x), "se:3").points[:, :3, :3])

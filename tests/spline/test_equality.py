@@ -25,7 +25,6 @@ MADE = {
         0.5, (np.ones(5), [own])
     ),
     "law": lambda own: ss.time_law(CURVE, max_acceleration=own),
-    "volume": lambda own: ss.tensors.Volume(own * np.eye(3)[None], np.ones((1, 1, 1), bool), np.eye(4)),
     "pca": lambda own: ss.tangent_pca(own * np.random.default_rng(0).standard_normal((6, 2)), "r:2"),
     "parameter": estimated,
 }

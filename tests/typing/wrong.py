@@ -40,7 +40,6 @@ ss.rotations.velocities(np.eye(3), v, "bodies")  # type: ignore[arg-type]
 ss.rotations.as_rotation_6d(np.eye(3), order="dipy")  # type: ignore[arg-type]
 ss.tensors.to_vectors(np.eye(3), order="rows")  # type: ignore[arg-type]
 ss.quantum.pulses(spline, t, kind="middle")  # type: ignore[arg-type]
-ss.shapes.AffineMorph(t, p, frame="last")  # type: ignore[arg-type]
 
 # ---- keywords ----
 

@@ -93,10 +93,6 @@ BCType = Literal["natural", "clamped", "not-a-knot", "periodic"] | tuple[End, En
 # A velocity and an acceleration at one end, as pairs of an order and a value.
 TwoConditions = list[tuple[int, ArrayLike]] | tuple[tuple[int, ArrayLike], tuple[int, ArrayLike]]
 CubicBCType = BCType | tuple[End | TwoConditions, End | TwoConditions]
-BCWords = (
-    Literal["natural", "clamped", "not-a-knot", "periodic"]
-    | tuple[Literal["natural", "clamped", "not-a-knot"], Literal["natural", "clamped", "not-a-knot"]]
-)
 
 SmoothingWord = Literal["natural", "clamped", "periodic"]
 SmoothingEnd = Literal["natural", "clamped"] | tuple[int, ArrayLike]
@@ -189,17 +185,6 @@ class SmoothOptions(TypedDict, total=False):
     extrapolate: Extrapolate
     on_failure: OnFailure
     atol: float | None
-
-
-class VoxelOptions(TypedDict, total=False):
-    """The keywords of `symspline.tensors.resample`."""
-
-    zoom: ArrayLike | None
-    voxel_size: ArrayLike | None
-    like: Any
-    bc_type: Any
-    symmetric: bool
-    progress: Progress | None
 
 
 class SmoothingOptions(ChoiceOptions, total=False):

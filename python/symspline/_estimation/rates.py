@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from .. import _core
 from .._spaces import Doubles, Euclidean
 from .._splines.cubic import CubicSpline
-from ..convert import quaternion_to_matrix
+from ..convert._quaternions import quaternion_to_matrix
 
 # Rates have a gap where a time step exceeds this number of median time steps.
 _GAP = 20.0

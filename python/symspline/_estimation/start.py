@@ -16,7 +16,7 @@ from .._smoothing import make_smoothing_spline
 from .._smoothing.noise import split
 from .._spaces import Array, Doubles, Euclidean, Product, Space, SpecialOrthogonal, factors_of, nearest_rotations
 from .._splines.curve import Curve
-from ..convert import matrix_to_quaternion
+from ..convert._quaternions import matrix_to_quaternion
 from .rates import Attitudes, Integral, Path, Rates, attitudes_at
 from .solve import Setup
 from .terms import Body, DirectionTerm, ForceTerm, InformationTerm, PointTerm, RateTerm, Values, VelocityTerm

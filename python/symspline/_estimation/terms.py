@@ -27,7 +27,7 @@ from .._spaces import (
     parts_of,
 )
 from .._spaces.actions import Group
-from ..convert import quaternion_to_matrix
+from ..convert._quaternions import quaternion_to_matrix
 from .measurements import (
     SKIPNA,
     BodyRates,

@@ -1,7 +1,7 @@
 """Conversions between representations of points.
 
-The representations are models of hyperbolic space, projectors, reflections, density matrices, quaternions,
-objects of orix, and totally geodesic submanifolds.
+The representations are models of hyperbolic space, projectors, reflections, density matrices, and totally geodesic
+submanifolds. `symspline.rotations` converts rotations.
 
 All functions are vectorised over the leading axes. The accuracy of the input determines how far it may deviate, as for
 points of `symspline.CubicSpline`: by 1e-8 in double precision, and by 1e-4 for numbers that were in single precision or
@@ -24,8 +24,6 @@ from ._models import (
     positive_definite_to_siegel,
     siegel_to_positive_definite,
 )
-from ._orix import matrix_to_orix
-from ._quaternions import matrix_to_quaternion, quaternion_to_matrix
 from ._subspaces import (
     basis_to_projector,
     basis_to_reflection,
@@ -47,11 +45,8 @@ __all__ = [
     "half_space_to_hyperboloid",
     "hyperboloid_to_ball",
     "hyperboloid_to_half_space",
-    "matrix_to_orix",
-    "matrix_to_quaternion",
     "positive_definite_to_siegel",
     "projector_to_basis",
-    "quaternion_to_matrix",
     "quaternions_to_subspace",
     "reflection_to_basis",
     "siegel_to_positive_definite",

@@ -28,78 +28,15 @@ _SHAPES: dict[Form, tuple[int, ...]] = {"matrix": (3, 3), "scalar first": (4,), 
 
 
 @unmoved_by_underflow()
-def matrix_to_quaternion(matrix: ArrayLike, *, scalar_first: bool | None = None) -> Array:
-    """Convert rotation matrices to unit quaternions, accurately for small angles and for angles near π.
-
-    Of the two quaternions ±q of a rotation, the result has a non-negative scalar part, so the sign may jump along a
-    curve. For curves of rotations use ``SpecialOrthogonal(3)``, where the sign does not matter.
-
-    Parameters
-    ----------
-    matrix : array_like, shape (..., 3, 3)
-        Rotations, points of ``SpecialOrthogonal(3)``.
-    scalar_first : bool
-        Required. True for (w, x, y, z), False for (x, y, z, w) as in SciPy and ROS.
-
-    Returns
-    -------
-    ndarray, shape (..., 4)
-        Unit quaternions.
-
-    Raises
-    ------
-    ValidationError
-        If a matrix is not a rotation, or `scalar_first` is missing.
-
-    References
-    ----------
-    Shepperd, "Quaternion from rotation matrix", 1978.
-
-    Examples
-    --------
-    >>> matrix_to_quaternion([[0, -1, 0], [1, 0, 0], [0, 0, 1]], scalar_first=True).round(8)
-    array([0.70710678, 0.        , 0.        , 0.70710678])
-    """
+def matrix_to_quaternion(matrix: ArrayLike, *, scalar_first: bool) -> Array:
+    """Return unit quaternions with a non-negative scalar part, so that the sign may jump along a curve."""
     return converted(matrix, "matrix", "matrix", quaternion_form(scalar_first))
 
 
 @unmoved_by_underflow()
-def quaternion_to_matrix(
-    quaternion: ArrayLike, *, scalar_first: bool | None = None, atol: float | None = None, skipna: bool = False
-) -> Array:
-    """Convert unit quaternions to rotation matrices.
-
-    Parameters
-    ----------
-    quaternion : array_like, shape (..., 4)
-        Unit quaternions.
-    scalar_first : bool
-        Required. True for (w, x, y, z), False for (x, y, z, w) as in SciPy and ROS.
-    atol : float, optional
-        Largest deviation of the norms from 1. By default, the accuracy of the numbers determines it, as for points of
-        `symspline.CubicSpline`: 1e-8 in double precision, 1e-4 for numbers of single precision or of six decimals.
-
-    skipna : bool, default False
-        True to return NaN for quaternions with NaN or masked numbers, which otherwise raise `ValidationError`.
-
-    Returns
-    -------
-    ndarray, shape (..., 3, 3)
-        Rotations, points of ``SpecialOrthogonal(3)``.
-
-    Raises
-    ------
-    ValidationError
-        If the norm of a quaternion is not 1, or `scalar_first` is missing.
-
-    Examples
-    --------
-    >>> quaternion_to_matrix([0.6, 0.0, 0.0, 0.8], scalar_first=True).round(8)
-    array([[-0.28, -0.96,  0.  ],
-           [ 0.96, -0.28,  0.  ],
-           [ 0.  ,  0.  ,  1.  ]])
-    """
-    return converted(quaternion, "quaternion", quaternion_form(scalar_first), "matrix", atol, skipna)
+def quaternion_to_matrix(quaternion: ArrayLike, *, scalar_first: bool) -> Array:
+    """Return the rotations of unit quaternions."""
+    return converted(quaternion, "quaternion", quaternion_form(scalar_first), "matrix")
 
 
 def converted(

@@ -10,12 +10,10 @@
 (3,)
 """
 
-from ._casteljau import evaluate
 from ._compiled import curve
-from ._fitting import fit
-from ._grid import grid_evaluate, grid_spline
+from ._native import evaluate, fit
 
-__all__ = ["curve", "evaluate", "fit", "grid_evaluate", "grid_spline"]
+__all__ = ["curve", "evaluate", "fit"]
 
 
 def __dir__() -> list[str]:

@@ -9,9 +9,9 @@ import jax
 import jax.numpy as jnp
 from jax.custom_derivatives import SymbolicZero
 
-from .._adapters import split
+from .._autodiff.casteljau import second_fundamental_form
+from .._autodiff.compiled import split
 from .._base.typing import CurveOptions
-from .._closed_forms.casteljau import second_fundamental_form
 from .._curves.ends import ends_in_factors
 from .._curves.options import order_of
 from .._spaces import Product, Space, parts_of, refuse_quotients, space_named

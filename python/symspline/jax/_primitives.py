@@ -18,7 +18,7 @@ from jax.core import ShapedArray
 from jax.extend.core import Primitive
 from jax.interpreters import ad, batching, mlir
 
-from .._adapters import Kinds, fitted, joined
+from .._autodiff.compiled import Kinds, fitted, joined
 from .._curves.curve import CurveArrays
 from .._curves.derivatives import sample_times
 from .._curves.fit import curve_of

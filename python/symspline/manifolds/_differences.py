@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 
@@ -54,18 +53,3 @@ def second_derivative(values: Array, step: Array) -> Array:
 def eighth_difference(values: Array) -> Array:
     """What polynomials of degree seven have none of: large where a function is not smooth on the scale of the steps."""
     return np.asarray(np.tensordot(_EIGHTH, values[4:] + values[3::-1], 1))
-
-
-def directional_derivative(g: Callable[[Array], Array], x: Array, t: Array) -> Array:
-    """The derivative of a function of rows x in the directions t, by differences of order four."""
-    size = np.linalg.norm(t, axis=1, keepdims=True)
-    step = 1e-3 * np.maximum(1.0, np.abs(x).max(axis=1, keepdims=True))
-    unit = np.divide(t, size, out=np.zeros_like(t), where=size > 0)
-    near, far = (g(x + s * step * unit) - g(x - s * step * unit) for s in (1, 2))
-    return np.asarray((8 * near - far) / (12 * step) * size)
-
-
-def jacobian(g: Callable[[Array], Array], x: Array) -> Array:
-    """The derivatives of a function of rows x in all directions, shape (rows, numbers of g, numbers of x)."""
-    units = (np.broadcast_to(unit, x.shape) for unit in np.eye(x.shape[1]))
-    return np.stack([directional_derivative(g, x, unit) for unit in units], axis=-1)

@@ -65,7 +65,6 @@ class Manifold(Space):
 
     See Also
     --------
-    symspline.manifolds.from_surface : Define a surface by an equation.
     symspline.manifolds.from_geomstats : Use a manifold of geomstats.
     symspline.manifolds.from_pymanopt : Use a manifold of pymanopt.
     symspline.testing.check : Check the functions.

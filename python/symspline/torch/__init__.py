@@ -10,7 +10,6 @@ torch.Size([2, 3])
 """
 
 from ._compiled import curve
-from ._evaluation import evaluate
-from ._fitting import fit
+from ._native import evaluate, fit
 
 __all__ = ["curve", "evaluate", "fit"]

@@ -7,7 +7,7 @@ from typing import Any, Unpack, overload
 import numpy as np
 import torch
 
-from .._adapters import fitted, movable, split
+from .._autodiff.compiled import fitted, movable, split
 from .._base.typing import CurveOptions
 from .._curves.ends import ends_in_factors
 from .._spaces import Product, Space, parts_of, space_named

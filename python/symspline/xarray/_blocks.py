@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from .._adapters import joined
+from .._autodiff.compiled import joined
 from .._base.report import Report, columns_of
 from .._base.threads import one_thread
 from .._core import ConvergenceError, CutLocusError, ValidationError

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .._adapters import joined
+from .._autodiff.compiled import joined
 from .._base.report import ConvergenceWarning
 from .._base.warnings import warn
 from .._core import ValidationError

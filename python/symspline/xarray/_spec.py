@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 import numpy as np
 import xarray as xr
 
-from .._adapters import joined, split
+from .._autodiff.compiled import joined, split
 from .._base.arrays import as_array, short_repr
 from .._base.input import times_of
 from .._core import ValidationError

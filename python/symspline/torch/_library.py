@@ -1,54 +1,52 @@
-"""Functions of a squared angle and of symmetric matrices, with derivatives also where they are singular formulas."""
+"""What the formulas of `symspline._autodiff` need of PyTorch."""
 
 from __future__ import annotations
 
 from functools import partial
-from math import factorial
 from typing import Any
 
+import numpy as np
 import torch
 
-from .._closed_forms import divided
-from .._closed_forms.library import Library, hermitian
+from .._autodiff import divided
+from .._autodiff.library import Library, hermitian
+from .._base.arrays import short_repr
+from .._core import ValidationError
+from .._spaces import Space
 
-# Series are used up to here. Both sides are smooth there, so that PyTorch differentiates them as they are.
-_STUMPFF = 1.0
-_ARC = 0.15
 
+def tensor(value: Any, name: str, like: torch.Tensor | None = None) -> torch.Tensor:
+    """Convert an argument to a tensor of real floating-point numbers.
 
-def stumpff(n: int, sign: int, z: Any) -> Any:
-    """Return Stumpff's function c_n(±z) = Σ (∓z)ᵏ / (2k + n)! for z ≥ 0 and a sign: c₀ is cos √z, or cosh √z.
+    Parameters
+    ----------
+    like : tensor, optional
+        Tensor whose precision and device the result has. By default, those of `value`; integers have the default
+        precision of PyTorch.
 
-    Stiefel & Scheifele, *Linear and Regular Celestial Mechanics* (1971), §11.
+    Raises
+    ------
+    ValidationError
+        If `value` does not consist of real numbers.
     """
-    near = z < _STUMPFF
-    series = _horner([(-sign) ** k / factorial(2 * k + n) for k in range(12)], torch.where(near, z, 0.0))
-    far = torch.where(near, _STUMPFF, z)
-    root = torch.sqrt(far)
-    cosine, sine = (torch.cos, torch.sin) if sign > 0 else (torch.cosh, torch.sinh)
-    closed = cosine(root) if n % 2 == 0 else sine(root) / root
-    for k in range(n % 2, n, 2):
-        closed = (1 / factorial(k) - closed) / (sign * far)
-    return torch.where(near, series, closed)
+    if isinstance(value, np.ndarray):
+        # PyTorch warns of arrays that are read-only, such as those of a spline, and refuses other byte orders.
+        value = np.array(value, value.dtype.newbyteorder("="))
+    try:
+        found = torch.as_tensor(value)
+    except (TypeError, ValueError, RuntimeError, OverflowError):
+        raise ValidationError(f"{name} must be a tensor of real numbers, not {short_repr(value)}") from None
+    if found.is_complex() or found.dtype == torch.bool:
+        raise ValidationError(f"{name} must be a tensor of real numbers, not of {found.dtype}")
+    if like is not None:
+        return found.to(like)
+    return found if found.is_floating_point() else found.to(torch.get_default_dtype())
 
 
-def arc(y: Any, rest: Any, sign: int) -> Any:
-    """Return φ / (sin φ cos φ) of y = sin² φ and rest = cos² φ; for sign −1 φ / (sinh φ cosh φ) of y = sinh² φ."""
-    near = y < _ARC
-    # Σ 4ᵏ k!² / (2k + 1)! yᵏ (Abramowitz & Stegun 15.1.6).
-    weights = [4.0**k * sign**k * factorial(k) ** 2 / factorial(2 * k + 1) for k in range(24)]
-    series = _horner(weights, torch.where(near, y, 0.0))
-    far, rest = torch.where(near, 0.5, y), torch.where(near, 1 - 0.5 * sign, rest)
-    root, other = torch.sqrt(far), torch.sqrt(rest)
-    angle = torch.arctan2(root, other) if sign > 0 else torch.arcsinh(root)
-    return torch.where(near, series, angle / (root * other))
-
-
-def _horner(weights: list[float], z: Any) -> Any:
-    total = torch.full_like(z, weights[-1])
-    for weight in weights[-2::-1]:
-        total = total * z + weight
-    return total
+def promoted(space: Space[Any], points: Any, *others: Any) -> tuple[torch.Tensor, ...]:
+    """Convert points, and arrays of their shape, to tensors in the precision of the points."""
+    first = tensor(points, "points")
+    return first, *(tensor(other, "velocities", first) for other in others)
 
 
 def constant(array: Any, like: Any) -> Any:
@@ -115,9 +113,6 @@ def _fold(step: Any, value: Any, numbers: Any) -> Any:
     return value
 
 
-LIBRARY = Library(torch, constant, stumpff, arc, logarithm, torch.linalg.matrix_exp, None, _solve_lower, _fold)
-
-
 def along(function: Any, x: Any) -> tuple[Any, Any]:
     """Return values of a function of times, and their derivatives with respect to these.
 
@@ -127,3 +122,27 @@ def along(function: Any, x: Any) -> tuple[Any, Any]:
     values, backward = torch.func.vjp(function, x)
     zero = torch.zeros_like(values) if isinstance(values, torch.Tensor) else tuple(map(torch.zeros_like, values))
     return values, torch.func.vjp(lambda cotangent: backward(cotangent)[0], zero)[1](torch.ones_like(x))[0]
+
+
+def search(t: Any, x: Any) -> Any:
+    """Return the number of knots up to times, both along the last axis."""
+    return torch.searchsorted(t.detach().contiguous(), x.detach().contiguous(), right=True)
+
+
+LIBRARY = Library(
+    name="PyTorch",
+    module="torch",
+    general=False,
+    xp=torch,
+    array=tensor,
+    promote=promoted,
+    constant=constant,
+    logarithm=logarithm,
+    exponential=torch.linalg.matrix_exp,
+    arcs=None,
+    solve_lower=_solve_lower,
+    fold=_fold,
+    along=along,
+    search=search,
+    take_along=torch.take_along_dim,
+)

@@ -14,6 +14,8 @@ from .motions import Poses, Rotations
 
 def model_of(lib: Library, space: Space[Any]) -> Model | None:
     """Return the model of a space, which is not a product; None if there is none."""
+    if not lib.general and (space.dtype.kind == "c" or isinstance(space, QUOTIENTS)):
+        return None
     if isinstance(space, _spaces.Euclidean):
         return Model(lib)
     if isinstance(space, _spaces.Sphere):

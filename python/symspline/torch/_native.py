@@ -1,25 +1,92 @@
-"""Fits written in PyTorch: Newton's method, and derivatives by further steps from the solution."""
+"""Fits and curves written in PyTorch: Newton's method, and derivatives by further steps from the solution."""
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, overload
+from typing import Any, overload
 
 import torch
 
-from .._adapters import split
-from .._base.arrays import short_repr
-from .._closed_forms.condition import Chain, chain_of, residual, weights
-from .._closed_forms.tridiagonal import cyclic_reduction
-from .._core import ConvergenceError, ValidationError
+from .._autodiff import curves
+from .._autodiff.condition import Problem
+from .._autodiff.tridiagonal import cyclic_reduction
+from .._core import ConvergenceError
 from .._curves.ends import ends_in_factors
-from .._spaces import Product, Space, parts_of, refuse_quotients, space_named
-from ._arrays import model_of, points_and_knots, tensor
-from ._functions import LIBRARY
+from .._spaces import Product, Space, parts_of
+from ._library import LIBRARY
 
 # Newton's method needs four to six steps where it converges.
 _MOST_STEPS = 30
 # Steps with the same Jacobian after the last one of Newton's method. Each makes derivatives of one more order exact.
 _STEPS_TO_DIFFERENTIATE = 2
+
+
+@overload
+def evaluate(t: Any, points: Any, velocities: Any, space: Space | str, x: Any, *, nu: int = 0) -> torch.Tensor: ...
+
+
+@overload
+def evaluate(
+    t: Any, points: Any, velocities: Any, space: Product, x: Any, *, nu: int = 0
+) -> tuple[torch.Tensor, ...]: ...
+
+
+def evaluate(t: Any, points: Any, velocities: Any, space: Space[Any] | str, x: Any, *, nu: int = 0) -> Any:
+    """Evaluate curves with given knots, points and velocities, in PyTorch alone.
+
+    This is `symspline.evaluate` written in PyTorch. It runs on the device and in the precision of the points, and is
+    differentiable with respect to all tensors, any number of times.
+
+    Parameters
+    ----------
+    t : tensor, shape (n,) or (..., n)
+        Strictly increasing knots, shared by all curves or one row per curve.
+    points : tensor, shape (..., n, *space.point_shape)
+        Points; for a `Product` a tuple. Leading axes are batch axes.
+    velocities : tensor, shape of points
+        Velocities, such as those of `symspline.torch.fit`.
+    space : Space or str
+        Space or its name: ``r``, ``sphere``, ``hyperbolic``, ``spd``, ``so:2``, ``so:3``, ``se:2``, ``se:3`` or
+        products of them.
+    x : tensor
+        Times, any shape. Values at times outside the knots are NaN.
+    nu : {0, 1, 2}, default 0
+        0 for points, 1 for the velocity γ', 2 for the covariant acceleration ∇γ'.
+
+    Returns
+    -------
+    tensor, shape ``(*batch axes, *x.shape, *space.point_shape)``
+        Values; for a `Product` a tuple.
+
+    Raises
+    ------
+    ValidationError
+        If the space is not supported, or shapes do not match.
+
+    See Also
+    --------
+    fit : Compute the velocities of a C² spline.
+    curve : Evaluate a spline on any space by the compiled core.
+
+    Notes
+    -----
+    Between two knots the curve is the cubic Bézier curve of geodesics, (8) of the paper. Derivatives are finite also
+    where points coincide, velocities are zero or eigenvalues repeat.
+
+    Points are first projected onto the manifold and velocities onto the tangent spaces, so derivatives are tangent as
+    well. Values are not validated, because this would wait for the device: for matrices far off the manifold and for
+    knots that do not increase, results are NaN or meaningless.
+
+    Examples
+    --------
+    >>> import torch
+    >>> from symspline.torch import evaluate
+    >>> p = torch.tensor([[1.0, 0, 0], [0, 1, 0]], requires_grad=True)
+    >>> value = evaluate([0.0, 1.0], p, torch.zeros(2, 3), "sphere:2", 0.5)
+    >>> value[0].backward()
+    >>> p.grad.shape
+    torch.Size([2, 3])
+    """
+    return curves.evaluate(LIBRARY, t, points, velocities, space, x, nu)
 
 
 @overload
@@ -88,98 +155,41 @@ def fit(t: Any, points: Any, space: Space[Any] | str, *, bc_type: Any = "natural
     >>> fit(torch.arange(3.0), torch.eye(3), "sphere:2").shape
     torch.Size([3, 3])
     """
-    space = space_named(space)
-    refuse_quotients(space, "functions of PyTorch are not made")
+    space = curves.named(LIBRARY, space)
     if isinstance(space, Product):
         each = zip(parts_of(points, space, "points"), space.factors, ends_in_factors(bc_type, space), strict=True)
         return tuple(fit(t, p, factor, bc_type=bc) for p, factor, bc in each)
-    chain = chain_of(model_of(space, "fit"))
-    if chain is None:
-        raise ValidationError(
-            f"symspline.torch.fit does not support {space}; use symspline.torch.curve, which supports every space"
-        )
-    points, knots = points_and_knots(t, points, space)
-    given, (first, last) = _ends(bc_type, points, space)
-    middle = torch.zeros_like(points[1:-1])
-    p, rows = chain.enter(points, torch.cat([first[None], middle, last[None]]))
-    problem = _Problem(chain, given, knots[1:] - knots[:-1], p, rows[0], rows[-1])
-    return chain.leave(p, _velocities(problem)).movedim(0, points.ndim - len(space.point_shape) - 1)
+    problem, leave = curves.problem_of(LIBRARY, t, points, space, bc_type)
+    return leave(_velocities(problem))
 
 
-def _ends(bc_type: Any, points: Any, space: Space) -> tuple[tuple[bool, bool], list[Any]]:
-    """Return which ends have a given velocity, and its value or zero."""
-    kinds, vectors = split(bc_type)
-    pair = (kinds, kinds) if isinstance(kinds, str) else kinds
-    if any(kind not in ("natural", "clamped", 1) for kind in pair):
-        raise ValidationError(
-            "bc_type must be 'natural', 'clamped', or a pair with one of these or (1, velocity) for either end; got "
-            f"{short_repr(bc_type)}"
-        )
-    ends = []
-    for vector, name in zip(vectors, ("start", "end"), strict=True):
-        if vector is None:
-            ends.append(torch.zeros_like(points[0]))
-            continue
-        own = tensor(vector, f"the {name} velocity", points)
-        try:
-            ends.append(own.expand(points.shape[1:]))
-        except RuntimeError:
-            raise ValidationError(
-                f"the {name} velocity has shape {tuple(own.shape)}, which does not broadcast to "
-                f"{tuple(points.shape[1:])}"
-            ) from None
-    return (pair[0] != "natural", pair[1] != "natural"), ends
+def _residual(problem: Problem, u: Any) -> Any:
+    """Return the residual, in which the normal part of u counts as such, so that the solution is tangent."""
+    tangent = problem.chain.tangent(problem.p, u)
+    middle = problem.weights()[1]
+    found = problem.residual(tangent)
+    return found + problem.chain.model.times(middle, u - tangent)
 
 
-class _Problem(NamedTuple):
-    """The C² condition of curves: lengths of intervals, nodes, and velocities at the ends, which count if given.
-
-    Nodes are along the first axis, and axes of the batch follow.
-    """
-
-    chain: Chain
-    given: tuple[bool, bool]
-    h: Any
-    p: Any
-    first: Any
-    last: Any
-
-    def detached(self) -> _Problem:
-        return self._replace(**{name: getattr(self, name).detach() for name in ("h", "p", "first", "last")})
-
-    def residual(self, u: Any) -> Any:
-        """Return the residual, in which the normal part of u counts as such, so that the solution is tangent."""
-        tangent = self.chain.tangent(self.p, u)
-        middle = weights(LIBRARY, self.given, self.h)[1]
-        found = residual(self.chain, self.given, self.h, self.p, tangent, self.first, self.last)
-        return found + self.chain.model.times(middle, u - tangent)
-
-    def expanded(self) -> _Problem:
-        """Return the problem with an axis of length 1 behind that of the nodes."""
-        return self._replace(h=self.h[:, None], p=self.p[:, None], first=self.first[None], last=self.last[None])
-
-
-def _velocities(problem: _Problem) -> Any:
+def _velocities(problem: Problem) -> Any:
     """Return velocities that are differentiable functions of the data."""
-    u, jacobian = _solution(problem.detached())
+    arrays = ("h", "p", "first", "last")
+    u, jacobian = _solution(problem._replace(**{name: getattr(problem, name).detach() for name in arrays}))
     for _ in range(_STEPS_TO_DIFFERENTIATE):
-        u = u - _solved(jacobian, problem.residual(u))
+        u = u - _solved(jacobian, _residual(problem, u))
     return u
 
 
-def _solution(problem: _Problem) -> tuple[Any, Any]:
+def _solution(problem: Problem) -> tuple[Any, Any]:
     """Return the velocities that solve a problem without derivatives, and the Jacobian there."""
-    core = problem.chain.model.axes
-    u = _start(problem)
-    middle = weights(LIBRARY, problem.given, problem.h)[1]
+    u, middle = _start(problem), problem.weights()[1]
     # In double precision 4e-11, from where a further step reaches rounding. Points that are equal up to rounding have
     # velocities of rounding.
     eps = torch.finfo(u.dtype).eps
     tol, floor = eps ** (2 / 3), 8 * eps * problem.chain.scale(problem.p) / torch.amin(problem.h, 0)
     for _ in range(_MOST_STEPS):
-        found = problem.residual(u)
-        change, size = (a.flatten(-core).norm(dim=-1) for a in (found, u))
-        good = torch.amax(change / middle, 0) <= tol * torch.amax(size, 0) + floor
+        found = _residual(problem, u)
+        good = torch.amax(problem.sizes(found) / middle, 0) <= tol * torch.amax(problem.sizes(u), 0) + floor
         jacobian = _jacobian(problem, u)
         if good.all():
             return u, jacobian
@@ -194,7 +204,7 @@ def _solution(problem: _Problem) -> tuple[Any, Any]:
     raise error
 
 
-def _start(problem: _Problem) -> Any:
+def _start(problem: Problem) -> Any:
     """Return the velocities of parabolas through three points in flat space, or given ones (Bessel's method).
 
     From zero velocities, whose handles are at the points, the Jacobian is almost singular for points π/2 apart.
@@ -210,7 +220,7 @@ def _start(problem: _Problem) -> Any:
     return torch.cat([first[None], inner, last[None]])
 
 
-def _jacobian(problem: _Problem, u: Any) -> Any:
+def _jacobian(problem: Problem, u: Any) -> Any:
     """Return the blocks below, on and above the diagonal, shape (n, 3, *batch, k, k).
 
     A residual depends on the velocities of its own node and of the next ones on either side. So the residuals of every
@@ -223,7 +233,9 @@ def _jacobian(problem: _Problem, u: Any) -> Any:
     rows = torch.nn.functional.one_hot(node % 3, 3).to(u).reshape(n, 3, *(1,) * u.ndim)
     components = torch.eye(size, dtype=u.dtype, device=u.device).reshape(size, *(1,) * len(batch), *shape)
     wide = u[:, None].expand(n, 3 * size, *u.shape[1:]).contiguous()
-    _, gradient = torch.func.vjp(problem.expanded().residual, wide)
+    expanded = problem._replace(h=problem.h[:, None], p=problem.p[:, None])
+    expanded = expanded._replace(first=problem.first[None], last=problem.last[None])
+    _, gradient = torch.func.vjp(lambda u: _residual(expanded, u), wide)
     (found,) = gradient((rows * components).flatten(1, 2).expand_as(wide))
     # By the node whose velocity moves, with a row of zeros before the first and after the last.
     found = found.reshape(n, 3, size, *batch, size).movedim(2, -2)

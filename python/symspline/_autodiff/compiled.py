@@ -6,13 +6,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ._base.arrays import cast
-from ._base.time import onto_ends
-from ._curves.curve import CurveArrays
-from ._curves.derivatives import sample_times
-from ._curves.ends import split_ends
-from ._spaces import Array, Space
-from ._splines.cubic import CubicSpline
+from .._base.arrays import cast
+from .._base.time import onto_ends
+from .._curves.curve import CurveArrays
+from .._curves.derivatives import sample_times
+from .._curves.ends import split_ends
+from .._spaces import Array, Space
+from .._splines.cubic import CubicSpline
 
 # End conditions without their vectors: a word, or a pair of words and orders.
 Kinds = str | tuple[str | int, str | int]

@@ -1,4 +1,23 @@
-"""Six numbers per tensor, in the order of each program."""
+"""Diffusion tensors: six numbers in the order of each program.
+
+Examples
+--------
+>>> import symspline as ss
+>>> t = ss.tensors.from_vectors([[2, 0, 1, 0, 0, 1], [1, 0.5, 2, 0, 0, 1]], order="dipy")
+>>> ss.tensors.to_vectors(ss.CubicSpline(None, t, "spd:3")(0.5), order="mrtrix").shape
+(6,)
+
+Fits of noisy signals sometimes have negative eigenvalues. Such tensors are not points of ``spd:3``. Raise the
+eigenvalues to a threshold well above the noise, because small eigenvalues are far from all other points of that space:
+
+>>> import numpy as np
+>>> sizes, axes = np.linalg.eigh(np.diag([1.5e-3, 4e-4, -4e-5]))
+>>> raised = np.einsum("...ij,...j,...kj->...ik", axes, np.maximum(sizes, 1e-4), axes)
+
+Alternatively, drop such voxels from the batch, or mask them by ``where=``.
+
+In the gallery, "A DTI volume on finer voxels" reads a volume in a NIfTI file and interpolates it between its voxels.
+"""
 
 from __future__ import annotations
 
@@ -7,11 +26,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._base.arrays import as_array, refuse, short_repr
-from .._base.typing import TensorOrder
-from .._base.validation import largest
-from .._core import ValidationError
-from .._spaces import point_tol
+from ._base.arrays import as_array, refuse, short_repr
+from ._base.typing import TensorOrder
+from ._base.validation import largest
+from ._core import ValidationError
+from ._spaces import point_tol
+
+__all__ = ["from_vectors", "to_vectors"]
+
+
+def __dir__() -> list[str]:
+    return __all__
+
 
 Array = NDArray[Any]
 

@@ -56,3 +56,16 @@ def logarithm(xp: Any, constant: Any, *x: Any) -> Any:
     for own in x:
         total = total / (own[..., None] + s)
     return (-1.0) ** len(x) * step * total.sum(axis=-1)
+
+
+def arc(xp: Any, constant: Any, function: Any, *y: Any) -> Any:
+    """Return divided differences of `library.Library.arc`."""
+    if len(y) == 1:
+        return function(y[0], 1 - y[0])
+    # ∫ du / (1 − y(1 − u²)) over u from 0 to 1.
+    nodes, weights = np.polynomial.legendre.leggauss(80)
+    square = constant(1 - nodes[40:] ** 2, y[0])
+    total = constant(weights[40:], y[0]) * square ** (len(y) - 1)
+    for own in y:
+        total = total / (1 - own[..., None] * square)
+    return total.sum(axis=-1)

@@ -1,4 +1,4 @@
-"""The C² condition (13) of the paper for the velocities of one spline, with any end conditions of `residual`.
+"""The C² condition (13) of the paper for the velocities of splines, with natural ends or given velocities.
 
 Nodes are along the first axis. Axes of a batch may follow.
 """
@@ -6,9 +6,9 @@ Nodes are along the first axis. Axes of a batch may follow.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
-from .library import Library, adjoint, hermitian
+from .library import adjoint, hermitian
 from .models import Curved, Model, Positive, whitened
 from .motions import Poses, Rotations, cross_matrix
 
@@ -171,39 +171,55 @@ def chain_of(model: Model | None) -> Chain | None:
     return Chain(model) if type(model) is Model else None
 
 
-def residual(chain: Chain, given: tuple[bool, bool], h: Any, p: Any, u: Any, first: Any, last: Any) -> Any:
-    """Return the residuals of the C² condition at inner nodes and of the end conditions.
+class Problem(NamedTuple):
+    """The C² condition of curves.
 
-    On unequal knots (13) has factors sinh(ad)/ad. Each residual is a velocity times its weight in `weights`.
-
-    Parameters
+    Attributes
     ----------
+    chain : Chain
+        The space.
     given : tuple of bool
         Whether the velocity is given at the start and at the end; otherwise the acceleration is zero, (20).
     h : array, shape (n - 1, ...)
         Lengths of the intervals.
-    p, u : array, shape (n, ...)
-        Nodes and velocities in the arrays of the chain.
+    p : array, shape (n, ...)
+        Nodes in the arrays of the chain.
     first, last : array
         Velocities at the ends, which count where they are given.
     """
-    times = chain.model.times
-    ahead, back = times(h / 3, u[:-1]), times(-h / 3, u[1:])
-    from_start, from_end = chain.logs(p, ahead, back)
-    after, before = times(1 / h**2, from_start - ahead), times(1 / h**2, from_end - back)
-    stack = chain.lib.xp.stack
-    right, left = chain.stretched(stack([back[:-1], ahead[1:]]), stack([after[1:], before[:-1]]))
-    start = first - u[0] if given[0] else 3 * after[0]
-    end = last - u[-1] if given[1] else -3 * before[-1]
-    return chain.lib.xp.concatenate([start[None], 3 * (right - left), end[None]])
 
+    chain: Chain
+    given: tuple[bool, bool]
+    h: Any
+    p: Any
+    first: Any
+    last: Any
 
-def weights(lib: Library, given: tuple[bool, bool], h: Any) -> tuple[Any, Any, Any]:
-    """Return the three diagonals of the condition in flat space."""
-    xp, r = lib.xp, 1 / h
-    zero, one = xp.zeros_like(r[:1]), xp.ones_like(r[:1])
-    first, last = (one if own else 2 * end for own, end in zip(given, (r[:1], r[-1:]), strict=True))
-    middle = xp.concatenate([first, 2 * (r[:-1] + r[1:]), last])
-    above = xp.concatenate([zero if given[0] else r[:1], r[1:], zero])
-    below = xp.concatenate([zero, r[:-1], zero if given[1] else r[-1:]])
-    return below, middle, above
+    def residual(self, u: Any) -> Any:
+        """Return the residuals for velocities u at inner nodes, and of the end conditions.
+
+        On unequal knots (13) has factors sinh(ad)/ad. Each residual is a velocity times its weight in `weights`.
+        """
+        chain, h, times, xp = self.chain, self.h, self.chain.model.times, self.chain.lib.xp
+        ahead, back = times(h / 3, u[:-1]), times(-h / 3, u[1:])
+        from_start, from_end = chain.logs(self.p, ahead, back)
+        after, before = times(1 / h**2, from_start - ahead), times(1 / h**2, from_end - back)
+        right, left = chain.stretched(xp.stack([back[:-1], ahead[1:]]), xp.stack([after[1:], before[:-1]]))
+        start = self.first - u[0] if self.given[0] else 3 * after[0]
+        end = self.last - u[-1] if self.given[1] else -3 * before[-1]
+        return xp.concatenate([start[None], 3 * (right - left), end[None]])
+
+    def weights(self) -> tuple[Any, Any, Any]:
+        """Return the three diagonals of the condition in flat space, shape (n, ...) of the intervals."""
+        xp, r = self.chain.lib.xp, 1 / self.h
+        zero, one = xp.zeros_like(r[:1]), xp.ones_like(r[:1])
+        first, last = (one if own else 2 * end for own, end in zip(self.given, (r[:1], r[-1:]), strict=True))
+        middle = xp.concatenate([first, 2 * (r[:-1] + r[1:]), last])
+        above = xp.concatenate([zero if self.given[0] else r[:1], r[1:], zero])
+        below = xp.concatenate([zero, r[:-1], zero if self.given[1] else r[-1:]])
+        return below, middle, above
+
+    def sizes(self, rows: Any) -> Any:
+        """Return the length of one vector per node."""
+        flat = rows.reshape(*rows.shape[: rows.ndim - self.chain.model.axes], -1)
+        return self.chain.lib.xp.sqrt((abs(flat) ** 2).sum(axis=-1))

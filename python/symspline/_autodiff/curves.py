@@ -1,0 +1,148 @@
+"""Curves with given velocities, and the C² condition for velocities: arguments of users, and values for them.
+
+Inside, nodes and times are along the first axis, and axes of the batch follow. Knots that all curves share have axes of
+length 1 there.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from .._base.arrays import short_repr
+from .._core import ValidationError
+from .._curves.options import order_of
+from .._spaces import Product, Space, parts_of, refuse_quotients, space_named
+from . import casteljau
+from .compiled import split
+from .condition import Problem, chain_of
+from .library import Library
+from .models import Model
+from .registry import model_of
+
+
+def named(lib: Library, space: Space[Any] | str) -> Space[Any]:
+    """Return the space, or raise ValidationError for a quotient."""
+    found = space_named(space)
+    refuse_quotients(found, f"functions of {lib.name} are not made")
+    return found
+
+
+def evaluate(lib: Library, t: Any, points: Any, velocities: Any, space: Space[Any] | str, x: Any, nu: int) -> Any:
+    """Evaluate curves, see `symspline.jax.evaluate` and `symspline.torch.evaluate`."""
+    nu, space = order_of(nu), named(lib, space)
+    if isinstance(space, Product):
+        parts = parts_of(points, space, "points"), parts_of(velocities, space, "velocities")
+        return tuple(evaluate(lib, t, *own, x, nu) for own in zip(*parts, space.factors, strict=True))
+    model = model_of(lib, space)
+    if model is None:
+        raise unsupported(lib, space, "evaluate")
+    points, velocities = lib.promote(space, points, velocities)
+    if velocities.shape != points.shape:
+        raise ValidationError(f"velocities has shape {tuple(velocities.shape)}, but points {tuple(points.shape)}")
+    knots, axis = _knots(lib, t, points, space), points.ndim - 1 - len(space.point_shape)
+    x = lib.array(x, "x", points.real)
+    p, v = (lib.xp.moveaxis(a, axis, 0) for a in (points, velocities))
+    found = lib.xp.moveaxis(_values(model, space, knots, p, v, x.reshape(-1), nu), 0, axis)
+    return found.reshape(*points.shape[:axis], *x.shape, *space.point_shape)
+
+
+def problem_of(lib: Library, t: Any, points: Any, space: Space[Any], bc_type: Any) -> tuple[Problem, Any]:
+    """Return the C² condition of curves, and a function that converts its solution to velocities for the user."""
+    chain = chain_of(model_of(lib, space))
+    if chain is None:
+        raise unsupported(lib, space, "fit")
+    (points,) = lib.promote(space, points)
+    knots, axis = _knots(lib, t, points, space), points.ndim - 1 - len(space.point_shape)
+    points = lib.xp.moveaxis(points, axis, 0)
+    given, (first, last) = _ends(lib, bc_type, points)
+    rows = lib.xp.concatenate([first[None], lib.xp.zeros_like(points[1:-1]), last[None]])
+    p, u = chain.enter(points, rows)
+    problem = Problem(chain, given, knots[1:] - knots[:-1], p, u[0], u[-1])
+    return problem, lambda u: lib.xp.moveaxis(chain.leave(p, u), 0, axis)
+
+
+def unsupported(lib: Library, space: Space[Any], function: str) -> ValidationError:
+    """Return the error of a space without closed forms, or without a fit."""
+    flat = ["r", "sphere"] if function == "fit" else ["r", "sphere", "hyperbolic"]
+    lines = ["rp", "cp", "gr", "cgr"] if lib.general and function != "fit" else []
+    names = [*flat, *lines, "spd", *(["hpd"] if lib.general else []), "so:2", "so:3", "se:2"]
+    return ValidationError(
+        f"symspline.{lib.module}.{function} does not support {space}, but only {', '.join(names)} and se:3; use "
+        f"symspline.{lib.module}.curve, which supports every space"
+    )
+
+
+def _knots(lib: Library, t: Any, points: Any, space: Space[Any]) -> Any:
+    """Return knots of shape (n, *batch), or (n, 1, ..., 1) if all curves have the same ones."""
+    lead = points.ndim - len(space.point_shape)
+    if lead < 1 or tuple(points.shape[lead:]) != space.point_shape or points.shape[lead - 1] < 2:
+        raise ValidationError(
+            f"points has shape {tuple(points.shape)}; a curve in {space} needs (..., n, *{space.point_shape}), n >= 2"
+        )
+    t, shape = lib.array(t, "t", points.real), tuple(points.shape[:lead])
+    if tuple(t.shape) not in (shape[-1:], shape):
+        raise ValidationError(
+            f"t has shape {tuple(t.shape)}; points of shape {tuple(points.shape)} need {shape[-1:]}, or one row per "
+            f"curve, {shape}"
+        )
+    return lib.xp.moveaxis(t.reshape(*(1,) * (lead - t.ndim), *t.shape), -1, 0)
+
+
+def _ends(lib: Library, bc_type: Any, points: Any) -> tuple[tuple[bool, bool], list[Any]]:
+    """Return which ends have a given velocity, and its value or zero."""
+    kinds, vectors = split(bc_type)
+    pair = (kinds, kinds) if isinstance(kinds, str) else kinds
+    if any(kind not in ("natural", "clamped", 1) for kind in pair):
+        raise ValidationError(
+            "bc_type must be 'natural', 'clamped', or a pair with one of these or (1, velocity) for either end; got "
+            f"{short_repr(bc_type)}"
+        )
+    ends = []
+    for vector, name in zip(vectors, ("start", "end"), strict=True):
+        own = lib.xp.zeros_like(points[0]) if vector is None else lib.array(vector, f"the {name} velocity", points)
+        try:
+            ends.append(lib.xp.broadcast_to(own, points.shape[1:]))
+        except (ValueError, RuntimeError):
+            raise ValidationError(
+                f"the {name} velocity has shape {tuple(own.shape)}, which does not broadcast to "
+                f"{tuple(points.shape[1:])}"
+            ) from None
+    return (pair[0] != "natural", pair[1] != "natural"), ends
+
+
+def _values(model: Model, space: Space[Any], t: Any, points: Any, velocities: Any, x: Any, nu: int) -> Any:
+    """Return values of shape (times, *batch, *point_shape)."""
+    lib, xp = model.lib, model.lib.xp
+    h = t[1:] - t[:-1]
+    polygons = casteljau.control(model, h, *model.to_internal(points, velocities))
+    x = xp.broadcast_to(x[(..., *(None,) * (t.ndim - 1))], (len(x), *t.shape[1:]))
+    at = xp.moveaxis(lib.search(xp.moveaxis(t, 0, -1), xp.moveaxis(x, 0, -1)), -1, 0)
+    segment = xp.clip(at - 1, 0, len(h) - 1)
+    begin, length = (lib.take_along(a, segment, 0) for a in (t, h))
+    starts, handles = (_rows(lib, a, segment) for a in polygons)
+
+    def curve(x: Any) -> Any:
+        return model.from_internal(casteljau.bezier(model, starts, handles, (x - begin) / length))
+
+    def velocity(x: Any) -> Any:
+        return lib.along(curve, x)
+
+    if nu == 0:
+        found = curve(x)
+    elif nu == 1:
+        found = casteljau.velocity(space, *velocity(x))
+    else:
+        (point, first), (_, second) = lib.along(velocity, x)
+        found = casteljau.acceleration(lib, space, point, first, second)
+    # As in `symspline._base.time.onto_ends`, a few units in the last place beyond the ends are rounding.
+    reach = 4 * xp.finfo(x.dtype).eps * xp.maximum(abs(t[0]), abs(t[-1]))
+    inside = (x >= t[0] - reach) & (x <= t[-1] + reach)
+    return xp.where(inside[(..., *(None,) * len(space.point_shape))], found, float("nan"))
+
+
+def _rows(lib: Library, polygons: Any, segment: Any) -> Any:
+    """Take segments, shape (times, *batch), of polygons of shape (3, n - 1, *batch, *point shape)."""
+    if all(size == 1 for size in segment.shape[1:]):
+        # All curves have the same knots.
+        return polygons[:, segment.reshape(-1)]
+    return lib.take_along(polygons, segment[(None, ..., *(None,) * (polygons.ndim - 1 - segment.ndim))], 1)
