@@ -352,7 +352,7 @@ class Body:
         self.inverse: Doubles = np.empty(0)
         if not self.is_rotation:
             frame = space._as_doubles(space.frame(np.eye(space.point_shape[0], dtype=space.dtype)))
-            self.inverse = np.linalg.pinv(frame.reshape(self.size, -1).T)
+            self.inverse = np.asarray(np.linalg.pinv(frame.reshape(self.size, -1).T), np.float64)
 
     def matrices(self, p: Array) -> Doubles:
         """Return rotation matrices."""

@@ -202,14 +202,15 @@ def _solved(diagonals: tuple[Any, Any, Any], rows: Any) -> Any:
         if diagonals[1].size == len(rows):
             # The knots of all curves are the same.
             columns = rows.reshape(len(rows), -1)
-            own = (a.reshape(-1).astype(rows.dtype) for a in diagonals)
-            return jax.lax.linalg.tridiagonal_solve(*own, columns).reshape(rows.shape)
-        own = (jnp.moveaxis(a, 0, -1).astype(rows.dtype) for a in diagonals)
-        return jnp.moveaxis(jax.lax.linalg.tridiagonal_solve(*own, jnp.moveaxis(rows, 0, -2)), -2, 0)
+            lower, main, upper = (a.reshape(-1).astype(rows.dtype) for a in diagonals)
+            return jax.lax.linalg.tridiagonal_solve(lower, main, upper, columns).reshape(rows.shape)
+        lower, main, upper = (jnp.moveaxis(a, 0, -1).astype(rows.dtype) for a in diagonals)
+        solved = jax.lax.linalg.tridiagonal_solve(lower, main, upper, jnp.moveaxis(rows, 0, -2))
+        return jnp.moveaxis(solved, -2, 0)
 
     def reduction(diagonals: Any, rows: Any) -> Any:
-        own = (a[..., None, None] for a in diagonals)
-        return cyclic_reduction(jnp, _solve_scalars, *own, rows[..., None, :])[..., 0, :]
+        lower, main, upper = (a[..., None, None] for a in diagonals)
+        return cyclic_reduction(jnp, _solve_scalars, lower, main, upper, rows[..., None, :])[..., 0, :]
 
     # On a GPU `tridiagonal_solve` takes one column of all curves after another: 10 000 curves take seconds.
     return jax.lax.platform_dependent(diagonals, rows, cpu=lapack, default=reduction)
