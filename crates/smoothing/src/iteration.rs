@@ -196,7 +196,7 @@ impl<'a> Problem<'a> {
         monitor: &Monitor,
     ) -> Vec<f64> {
         let (points, velocities) = (&state.points[part], &state.velocities[part]);
-        let curves = Curves { t: self.knots, nodes: self.knots.len(), points, velocities };
+        let curves = Curves { t: self.knots, nodes: self.knots.len(), points, velocities, before: &[] };
         let (space, times) = (&self.spaces[part], Times { x, count: x.len() });
         let mut out = vec![0.0; x.len() * quantity.len(space)];
         evaluate(space, &curves, &times, quantity, Outside::Continue, monitor, &mut out);
