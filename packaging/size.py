@@ -25,7 +25,7 @@ PARTS = {
     "_splines": ("_archive _splines", 1900),
     "_plotting": ("_plotting", 1900),
     "measure": ("measure", 170),
-    "_curves": ("_curves _search", 1750),
+    "_curves": ("_curves", 1750),
     "manifolds, convert": ("convert manifolds", 940),
     "_spaces": ("_spaces _statistics", 1600),
     "_base": ("_base _cpu", 1000),

@@ -9,6 +9,8 @@ The method is that of Bogfjellmo, Modin and Verdier, *A Numerical Algorithm for 
 Symmetric Spaces* (2018), extended to any knots and many end conditions.
 """
 
+# The compiled module comes first.
+# ruff: noqa: E402
 import os as _os
 from pathlib import Path as _Path
 
@@ -16,17 +18,16 @@ from . import _cpu
 
 _cpu.load(_Path(__file__).parent)
 
-from . import convert, geo, manifolds, measure, poses, quantum, rotations, shapes, subspaces, tensors, testing  # noqa: E402
-from ._base.config import show_config  # noqa: E402
-from ._base.exceptions import SymsplineError  # noqa: E402
-from ._base.report import ConvergenceWarning, CumulativeReport, FarPointsWarning, Report  # noqa: E402
-from ._base.threads import set_num_threads  # noqa: E402
-from ._base.version import VERSION  # noqa: E402
-from ._core import ConvergenceError, CutLocusError, ValidationError, num_threads  # noqa: E402
-from ._curves.derivatives import Gradient  # noqa: E402
-from ._estimation import estimate  # noqa: E402
-from ._grid import GridReport, GridSpline  # noqa: E402
-from ._smoothing import (  # noqa: E402
+from . import convert, geo, manifolds, measure, poses, quantum, rotations, shapes, subspaces, tensors, testing
+from ._base.exceptions import SymsplineError
+from ._base.report import ConvergenceWarning, CumulativeReport, FarPointsWarning, Report
+from ._base.system import set_num_threads, show_config
+from ._base.version import VERSION
+from ._core import ConvergenceError, CutLocusError, ValidationError, num_threads
+from ._curves.derivatives import Gradient
+from ._estimation import estimate
+from ._grid import GridReport, GridSpline
+from ._smoothing import (
     SmoothingGrid,
     SmoothingGridReport,
     SmoothingReport,
@@ -36,8 +37,8 @@ from ._smoothing import (  # noqa: E402
     make_smoothing_grid,
     make_smoothing_spline,
 )
-from ._smoothing.segments import fit_segments  # noqa: E402
-from ._spaces import (  # noqa: E402
+from ._smoothing.segments import fit_segments
+from ._spaces import (
     Affine,
     AmbiguousMeanWarning,
     AntiDeSitter,
@@ -74,19 +75,17 @@ from ._spaces import (  # noqa: E402
     Unitary,
     space,
 )
-from ._splines.bspline import BezierCurve, BSpline  # noqa: E402
-from ._splines.compare import plot  # noqa: E402
-from ._splines.composed import RetimedCurve, SegmentedCurve  # noqa: E402
-from ._splines.cubic import CubicSpline  # noqa: E402
-from ._splines.cumulative import CumulativeBSpline  # noqa: E402
-from ._splines.curve import Curve, Derivative  # noqa: E402
-from ._splines.files import load, save  # noqa: E402
-from ._splines.functional import evaluate, fit, fit_many  # noqa: E402
-from ._splines.geodesics import PiecewiseGeodesic  # noqa: E402
-from ._splines.hermite import HermiteSpline  # noqa: E402
-from ._splines.time_law import TimeLaw, time_law  # noqa: E402
-from ._statistics import TangentPCA, tangent_pca  # noqa: E402
-from .manifolds import Manifold, Stiefel  # noqa: E402
+from ._splines.base import Curve, Derivative
+from ._splines.bsplines import BezierCurve, BSpline, CumulativeBSpline
+from ._splines.compare import plot
+from ._splines.composed import RetimedCurve, SegmentedCurve
+from ._splines.cubic import CubicSpline
+from ._splines.files import load, save
+from ._splines.functional import evaluate, fit, fit_many
+from ._splines.hermite import HermiteSpline, PiecewiseGeodesic
+from ._splines.time_law import TimeLaw, time_law
+from ._statistics import TangentPCA, tangent_pca
+from .manifolds import Manifold, Stiefel
 
 __version__ = VERSION
 __all__ = [

@@ -9,8 +9,7 @@ from typing import Any, Generic
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._base.arrays import as_array, whole_number
-from ._base.equality import same_fields
+from ._base.arrays import as_array, same_fields, whole_number
 from ._base.typing import AnyArray, FloatArray, P
 from ._core import ValidationError
 from ._spaces import Product, Space, parts_of, require_metric, space_named

@@ -21,22 +21,22 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Unpack, cast, overlo
 import numpy as np
 from numpy.typing import NDArray
 
+from ._base.angles import compass, from_lonlat, to_lonlat
 from ._base.arrays import checked_flag, checked_number, short_repr
-from ._base.durations import seconds_of
 from ._base.exceptions import SymsplineError
-from ._base.lonlat import compass, from_lonlat, to_lonlat
+from ._base.faults import warn
+from ._base.time import seconds_of
 from ._base.typing import AxesLook, Duplicates, File, FloatArray, PageLook, TimesLike
-from ._base.warnings import warn
 from ._core import ValidationError
 from ._curves.options import require_matplotlib
 from ._estimation.uncertainty import Jacobians, Motion, check_uncertain, standard_errors
 from ._smoothing.segments import check_smooth, cut, smooth_many
 from ._spaces import Sphere
+from ._splines.base import check_timed
 from ._splines.compare import checked_items
 from ._splines.composed import SegmentedCurve
 from ._splines.cubic import CubicSpline
 from ._splines.functional import fit_many
-from ._splines.timed_curve import check_timed
 
 if TYPE_CHECKING:
     import pandas as pd

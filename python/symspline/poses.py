@@ -28,8 +28,7 @@ from ._base.arrays import as_array, checked_flag, short_repr
 from ._base.typing import Extrapolate, Frame, TimesLike
 from ._base.validation import one_of, real_numbers
 from ._core import ValidationError
-from ._curves.at_times import evaluated
-from ._curves.composed import AnyCurve
+from ._curves.composed import AnyCurve, evaluated
 from ._estimation.measurements import GRAVITY
 from ._estimation.uncertainty import Jacobians, Motion, check_uncertain, standard_errors
 from ._smoothing.noise import smoothed_spaces

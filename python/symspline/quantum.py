@@ -43,7 +43,7 @@ from ._curves.options import order_of
 from ._curves.reduced import span_of
 from ._spaces import ComplexGrassmannian, ComplexProjective, Doubles, Space, SpecialUnitary, Unitary
 from ._splines.cubic import CubicSpline
-from ._splines.piecewise_cubic import check_curve
+from ._splines.piecewise import check_curve
 
 if TYPE_CHECKING:
     from qutip import QobjEvo

@@ -23,14 +23,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ._base.arrays import as_array, checked_flag, filled, refuse, short_repr
+from ._base.faults import warn
 from ._base.input import times_of
 from ._base.time import knots_of
 from ._base.typing import Extrapolate, Frame, RateInterpolation, RotationOrder, TimesLike
 from ._base.validation import REMOVE, check_finite, length, one_of, real_numbers, unchecked_numbers
-from ._base.warnings import warn
 from ._core import ValidationError
-from ._curves.at_times import evaluated
-from ._curves.composed import Joined, Retimed
+from ._curves.composed import Joined, Retimed, evaluated
 from ._curves.controlled import CumulativeCurve
 from ._curves.curve import CurveArrays
 from ._curves.fit import curve_of
@@ -40,10 +39,10 @@ from ._estimation.uncertainty import Jacobians, Motion, check_uncertain, standar
 from ._smoothing.noise import smoothed_spaces
 from ._spaces import Array, Doubles, SpecialEuclidean, SpecialOrthogonal, Sphere, cover_of
 from ._spaces.point_groups import elements, proper_symbol
+from ._splines.base import check_timed
+from ._splines.bsplines import CumulativeBSpline
 from ._splines.cubic import CubicSpline
-from ._splines.cumulative import CumulativeBSpline
 from ._splines.hermite import HermiteSpline
-from ._splines.timed_curve import check_timed
 from .convert._quaternions import (
     checked_order,
     converted,

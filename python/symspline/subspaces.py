@@ -21,10 +21,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._base.arrays import adjoint, as_array, cast, checked_number, refuse, whole_number
+from ._base.faults import warn
 from ._base.input import times_of
 from ._base.typing import TimesLike
 from ._base.validation import Array, numbers, off_one
-from ._base.warnings import warn
 from ._core import CutLocusError, ValidationError
 from ._grid import GridSpline
 from ._grid.axes import coordinates
@@ -38,7 +38,7 @@ from ._spaces import (
     point_tol,
 )
 from ._splines.cubic import CubicSpline
-from ._splines.piecewise_cubic import check_curve
+from ._splines.piecewise import check_curve
 
 # Numbers closer than this, in units of the largest, are equal but for rounding.
 _EQUAL = 1e-12

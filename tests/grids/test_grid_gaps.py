@@ -6,7 +6,7 @@ from grids.grid_fields import Field, knots
 
 import symspline as ss
 from symspline._grid.axes import Sites
-from symspline._grid.on_manifold import ManifoldGrid
+from symspline._grid.evaluation import ManifoldGrid
 
 SO3 = ss.space("so:3")
 

@@ -8,7 +8,7 @@ from cases import unit_tangent, walk
 from refused import raises
 
 import symspline as ss
-from symspline._autodiff.tridiagonal import cyclic_reduction
+from symspline._autodiff.condition import cyclic_reduction
 from symspline.jax import curve, evaluate, fit
 
 QUICK = True

@@ -11,7 +11,7 @@ import pytest
 
 from symspline._autodiff import divided
 from symspline._autodiff.library import hermitian
-from symspline._autodiff.motions import inverse_series
+from symspline._autodiff.models import inverse_series
 from symspline.jax._library import LIBRARY
 
 QUICK = True

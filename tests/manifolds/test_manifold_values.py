@@ -5,7 +5,7 @@ import pickle
 
 import numpy as np
 import pytest
-from made import ELLIPSOID, knots, twin, walk
+from made import knots, twin, walk
 from refused import raises
 
 import symspline as ss
@@ -95,8 +95,6 @@ def test_plot(tmp_path):
 
 def test_pickles_and_files():
     assert pickle.loads(pickle.dumps(SPLINE)) == SPLINE
-    surface = ss.CubicSpline(None, [[1, 0, 0], [0, 1.2, 0]], ELLIPSOID)
-    assert pickle.loads(pickle.dumps(surface)) == surface
     made = ss.Manifold(
         exp=np.add, log=np.subtract, project_tangent=np.add, inner=np.add, point_shape=2, injectivity_radius=2
     )

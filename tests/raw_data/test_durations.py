@@ -7,7 +7,7 @@ import pytest
 from refused import raises
 
 import symspline as ss
-from symspline._base.durations import seconds_of
+from symspline._base.time import seconds_of
 
 HOURS = np.datetime64("2024-03-01T07:30") + np.array([0, 1, 2, 9, 10, 11]) * np.timedelta64(1, "h")
 Y = np.arange(6.0)[:, None]

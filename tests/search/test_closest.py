@@ -292,4 +292,4 @@ def test_all_points_are_one_call_of_the_core():
     space = ss.space("so:3")
     curve = ss.CubicSpline(None, points_on(space, 101), space)
     targets = space.random_point(np.random.default_rng(0), (1000,))
-    assert core_calls("closest_on_curves", lambda: curve.closest(targets)) == 1
+    assert core_calls("closest", lambda: curve.closest(targets)) == 1

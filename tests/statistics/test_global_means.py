@@ -59,6 +59,7 @@ def test_circles_have_exact_means_and_medians(name, method, power):
         assert space.distance(found, again) < 1e-12
 
 
+@pytest.mark.filterwarnings("ignore::symspline.AmbiguousMeanWarning")
 def test_angles_of_a_torus_and_factors_of_a_product_are_exact():
     angles, weights, _ = spread_angles(1)
     both = np.stack([angles, angles[::-1] + 1], -1)

@@ -15,7 +15,7 @@ use symspline_engine::smoothing::audit::{AtData, Unequal, is_constant};
 use symspline_engine::smoothing::examine::{Complaint, Examined, Finding, Residuals};
 use symspline_engine::smoothing::turns::{Turn, usual_turn};
 use symspline_engine::smoothing::{
-    Data, Ends, Loss, Observations, Options, Outcome, Report, Samples, Selection, Smooth, State, Tier, chi,
+    Data, Ends, Observations, Options, Outcome, Report, Samples, Selection, Smooth, State, Tier, chi,
     fit_cumulative as fit, inverse_of_weights, process_variance as process, smooth as run,
     variance as variance_at,
 };

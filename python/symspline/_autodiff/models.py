@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from .._base.angles import Rows, quaternion_rows, rotation_rows
 from .library import Library, adjoint, hermitian
 
 
@@ -183,3 +184,170 @@ def whitened(lib: Library, root: Any, x: Any) -> Any:
     """L⁻¹ x L⁻* for a Hermitian x."""
     left = lib.solve_lower(root, x)
     return hermitian(adjoint(lib.solve_lower(root, adjoint(left))))
+
+
+# ---- geodesics of rotations and rigid motions, by unit quaternions (scalar first) of either sign ----
+
+
+class Rotations(Lines):
+    """Rotations of space or of the plane as unit quaternions up to their sign: half an angle is a distance there."""
+
+    def __init__(self, lib: Library, size: int) -> None:
+        super().__init__(lib)
+        self.size = size
+
+    def to_internal(self, points: Any, velocities: Any) -> tuple[Any, Any]:
+        quaternion, turn = _motion_of(self.lib, points, velocities)
+        return quaternion, product(self.lib, quaternion, _imaginary(self.lib, 0.5 * turn))
+
+    def from_internal(self, points: Any) -> Any:
+        return matrix_of(self.lib, points)[..., : self.size, : self.size]
+
+    def velocities_from_internal(self, points: Any, velocities: Any) -> Any:
+        turn = 2 * product(self.lib, _conjugate(self.lib, points), velocities)[..., 1:]
+        moved = matrix_of(self.lib, points) @ cross_matrix(self.lib, turn)
+        return moved[..., : self.size, : self.size]
+
+
+class Poses(Model):
+    """Rigid motions, seven numbers: a unit quaternion of the rotation, and the translation. A velocity is the twist of
+    the body, six numbers: angular velocity and velocity. Geodesics are screw motions (Murray, Li & Sastry 1994, §2.3).
+    """
+
+    def __init__(self, lib: Library, size: int) -> None:
+        super().__init__(lib)
+        self.size = size
+
+    def to_internal(self, points: Any, velocities: Any) -> tuple[Any, Any]:
+        n, xp = self.size, self.lib.xp
+        quaternion, turn = _motion_of(self.lib, points[..., :n, :n], velocities[..., :n, :n])
+        place, ahead = points[..., :n, n], velocities[..., :n, n]
+        if n == 2:
+            place, ahead = (xp.concatenate([x, xp.zeros_like(x[..., :1])], axis=-1) for x in (place, ahead))
+        pose = xp.concatenate([quaternion, place], axis=-1)
+        return pose, xp.concatenate([turn, turned(self.lib, _conjugate(self.lib, quaternion), ahead)], axis=-1)
+
+    def from_internal(self, points: Any) -> Any:
+        top = self._top(matrix_of(self.lib, points[..., :4]), points[..., 4:])
+        last = identity(self.lib, top)[self.size :]
+        return self.lib.xp.concatenate([top, self.lib.xp.zeros_like(top[..., :1, :]) + last], axis=-2)
+
+    def velocities_from_internal(self, points: Any, velocities: Any) -> Any:
+        quaternion = points[..., :4]
+        spin = matrix_of(self.lib, quaternion) @ cross_matrix(self.lib, velocities[..., :3])
+        top = self._top(spin, turned(self.lib, quaternion, velocities[..., 3:]))
+        return self.lib.xp.concatenate([top, self.lib.xp.zeros_like(top[..., :1, :])], axis=-2)
+
+    def _top(self, matrix: Any, column: Any) -> Any:
+        """Return the rows of a pose, or of its velocity, except the last."""
+        n = self.size
+        return self.lib.xp.concatenate([matrix[..., :n, :n], column[..., :n, None]], axis=-1)
+
+    def exp(self, p: Any, v: Any) -> Any:
+        xp, stumpff, cross = self.lib.xp, self.lib.stumpff, self.lib.xp.linalg.cross
+        quaternion, place = p[..., :4], p[..., 4:]
+        turn, ahead = v[..., :3], v[..., 3:]
+        z = (turn * turn).sum(axis=-1, keepdims=True)
+        # V(ω)v = v + (1 − cos θ)/θ² ω×v + (θ − sin θ)/θ³ ω×(ω×v)
+        across = cross(turn, ahead)
+        moved = ahead + stumpff(2, 1, z) * across + stumpff(3, 1, z) * cross(turn, across)
+        step = xp.concatenate([1 - 0.125 * z * stumpff(1, 1, z / 16) ** 2, 0.5 * stumpff(1, 1, z / 4) * turn], axis=-1)
+        return xp.concatenate(
+            [product(self.lib, quaternion, step), place + turned(self.lib, quaternion, moved)], axis=-1
+        )
+
+    def log(self, p: Any, q: Any) -> Any:
+        xp, cross = self.lib.xp, self.lib.xp.linalg.cross
+        back = _conjugate(self.lib, p[..., :4])
+        step = product(self.lib, back, q[..., :4])
+        scalar, vector = step[..., :1], step[..., 1:]
+        y = (vector * vector).sum(axis=-1, keepdims=True)
+        turn = 2 * self.lib.arc(y, scalar * scalar, 1) * scalar * vector
+        apart = turned(self.lib, back, q[..., 4:] - p[..., 4:])
+        z = (turn * turn).sum(axis=-1, keepdims=True)
+        across = cross(turn, apart)
+        ahead = apart - 0.5 * across + inverse_series(self.lib, z) * cross(turn, across)
+        return xp.concatenate([turn, ahead], axis=-1)
+
+
+def inverse_series(lib: Library, z: Any) -> Any:
+    """(1 − φ cot φ) / z for z = 4φ² < 4π²: the factor of ω×(ω×v) in the inverse of V(ω) = ∫ exp(sω) ds."""
+    u = z / 4
+    return (lib.stumpff(2, 1, u) - lib.stumpff(3, 1, u)) / (4 * lib.stumpff(1, 1, u))
+
+
+def product(lib: Library, p: Any, q: Any) -> Any:
+    """Return the product of quaternions."""
+    a, u, b, v = p[..., :1], p[..., 1:], q[..., :1], q[..., 1:]
+    scalar = a * b - (u * v).sum(axis=-1, keepdims=True)
+    return lib.xp.concatenate([scalar, a * v + b * u + lib.xp.linalg.cross(u, v)], axis=-1)
+
+
+def turned(lib: Library, quaternion: Any, vector: Any) -> Any:
+    """Return vectors turned by unit quaternions."""
+    a, u = quaternion[..., :1], quaternion[..., 1:]
+    twice = 2 * lib.xp.linalg.cross(u, vector)
+    return vector + a * twice + lib.xp.linalg.cross(u, twice)
+
+
+def matrix_of(lib: Library, quaternion: Any) -> Any:
+    """Return the rotation matrices of unit quaternions."""
+    return _matrices(lib, rotation_rows(*lib.xp.moveaxis(quaternion, -1, 0)))
+
+
+def _matrices(lib: Library, rows: Rows) -> Any:
+    return lib.xp.stack([lib.xp.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def quaternion_of(lib: Library, matrix: Any) -> Any:
+    """Return a unit quaternion of rotation matrices; NaN for reflections.
+
+    The longest of the four rows of 4qqᵀ is far from zero (Shepperd 1978).
+    """
+    xp = lib.xp
+    rows = quaternion_rows(matrix)
+    longest = xp.argmax(xp.stack([rows[i][i] for i in range(4)], axis=-1), axis=-1)[..., None]
+    first, *others = (xp.stack(row, axis=-1) for row in rows)
+    row = first
+    for i, other in enumerate(others, 1):
+        row = xp.where(longest == i, other, row)
+    found = row / xp.sqrt((row * row).sum(axis=-1, keepdims=True))
+    return xp.where(xp.linalg.det(matrix)[..., None] > 0, found, float("nan"))
+
+
+def axis_of(lib: Library, matrix: Any) -> Any:
+    """Return the vector ω of the skew part of matrices [ω]×."""
+    skew = 0.5 * (matrix - matrix.swapaxes(-1, -2))
+    return lib.xp.stack([skew[..., 2, 1], skew[..., 0, 2], skew[..., 1, 0]], axis=-1)
+
+
+def cross_matrix(lib: Library, vector: Any) -> Any:
+    """Return the matrices [ω]× of vectors ω."""
+    x, y, z = (vector[..., i] for i in range(3))
+    zero = lib.xp.zeros_like(x)
+    return _matrices(lib, ((zero, -z, y), (z, zero, -x), (-y, x, zero)))
+
+
+def _imaginary(lib: Library, vector: Any) -> Any:
+    return lib.xp.concatenate([lib.xp.zeros_like(vector[..., :1]), vector], axis=-1)
+
+
+def _conjugate(lib: Library, quaternion: Any) -> Any:
+    return lib.xp.concatenate([quaternion[..., :1], -quaternion[..., 1:]], axis=-1)
+
+
+def _motion_of(lib: Library, matrices: Any, velocities: Any) -> tuple[Any, Any]:
+    """Unit quaternions of rotations of the plane or of space, and their angular velocities in the body."""
+    matrices = orthonormal(lib, matrices)
+    turn = matrices.swapaxes(-1, -2) @ velocities
+    if matrices.shape[-1] == 2:
+        # Rotations of the plane turn about the third axis of space.
+        matrices, turn = _about_third(lib, matrices, 1.0), _about_third(lib, turn, 0.0)
+    return quaternion_of(lib, matrices), axis_of(lib, turn)
+
+
+def _about_third(lib: Library, matrix: Any, corner: float) -> Any:
+    """Return matrices of size 2 with a third row and column, which are zero except for the corner."""
+    (a, b), (c, d) = ([matrix[..., i, j] for j in range(2)] for i in range(2))
+    zero = lib.xp.zeros_like(a)
+    return _matrices(lib, ((a, b, zero), (c, d, zero), (zero, zero, zero + corner)))

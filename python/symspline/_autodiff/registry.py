@@ -8,8 +8,7 @@ from .. import _spaces
 from .._spaces import Space
 from .casteljau import QUOTIENTS
 from .library import Library
-from .models import Curved, Lines, Model, Planes, Positive
-from .motions import Poses, Rotations
+from .models import Curved, Lines, Model, Planes, Poses, Positive, Rotations
 
 
 def model_of(lib: Library, space: Space[Any]) -> Model | None:

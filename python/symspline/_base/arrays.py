@@ -160,3 +160,28 @@ def refuse(bad: NDArray[np.bool_], name: str, say: Callable[[Any], str]) -> None
     if bad.any():
         index = tuple(np.argwhere(bad)[0].tolist())
         raise ValidationError(f"{name}{list(index) or ''} {say(index)}")
+
+
+# ---- equality of objects that contain arrays ----
+
+
+def same(first: Any, second: Any) -> bool:
+    """Whether two values are equal. Arrays are compared as a whole, and missing numbers are equal.
+
+    Examples
+    --------
+    >>> same((np.zeros(2), None), (np.zeros(2), None))
+    True
+    """
+    if isinstance(first, np.ndarray) or isinstance(second, np.ndarray):
+        a, b = np.asarray(first), np.asarray(second)
+        kinds = a.dtype.kind + b.dtype.kind
+        return a.shape == b.shape and bool(np.array_equal(a, b, equal_nan=set(kinds) <= set("fcmM")))
+    if isinstance(first, tuple) and isinstance(second, tuple):
+        return len(first) == len(second) and all(map(same, first, second))
+    return bool(first == second)
+
+
+def same_fields(first: Any, second: Any) -> bool:
+    """Whether two objects of one class have equal attributes."""
+    return same(tuple(vars(first).values()), tuple(vars(second).values()))

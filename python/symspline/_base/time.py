@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from datetime import timedelta
+from decimal import Decimal
 from functools import cached_property
 from math import ulp
 from typing import Any, NamedTuple
@@ -13,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._core import ValidationError
-from .arrays import as_array, cast, refuse
+from .arrays import as_array, cast, refuse, short_repr
+from .faults import warn
 from .input import NO_ZONE, UTC_ZONE, times_of
-from .rounded_times import warn_of_rounded_times
 from .typing import TimesLike
 
 Doubles = NDArray[np.float64]
@@ -350,3 +353,116 @@ def _in_seconds(difference: Any) -> Doubles:
     ticks = np.asarray(difference).astype(np.int64).astype(np.float64) * step
     # Division by a power of ten rounds once. Multiplication by 1e-9, which is itself rounded, would round twice.
     return np.asarray(ticks * _SECONDS[unit] if unit in _MULTIPLES else ticks / _SECONDS[unit], order="C")
+
+
+# ---- durations: strings such as "3h", and the types of Python, NumPy and pandas ----
+
+_TEXT = re.compile(r"(\d+\.?\d*(?:e[+-]?\d+)?|\.\d+) ?([a-z]*)", re.IGNORECASE | re.ASCII)
+NANOSECONDS = {
+    "ns": 1, "us": 10**3, "ms": 10**6, "s": 10**9,
+    "min": 60 * 10**9, "h": 3600 * 10**9, "d": 24 * 3600 * 10**9,
+}  # fmt: skip
+# Other names of these units, in pandas and in everyday use.
+_SAME = {
+    "sec": "s", "second": "s", "minute": "min", "m": "min", "t": "min", "hr": "h", "hour": "h", "day": "d",
+    "l": "ms", "millisecond": "ms", "u": "us", "microsecond": "us", "n": "ns", "nanosecond": "ns",
+}  # fmt: skip
+
+
+def parts_of_duration(text: str) -> tuple[Decimal, str] | None:
+    """Split a text such as ``"10min"`` into 10 and ``"min"``; without a unit, the second entry is ``""``.
+
+    Return None if the text is not a duration. Units can be words in the singular or plural.
+
+    Raises
+    ------
+    decimal.InvalidOperation
+        If an exponent is too large.
+
+    Examples
+    --------
+    >>> parts_of_duration("2 hours"), parts_of_duration("soon")
+    ((Decimal('2'), 'h'), None)
+    """
+    match = _TEXT.fullmatch(text.strip())
+    if match is None:
+        return None
+    unit = match[2].lower()
+    unit = unit if unit in NANOSECONDS else _SAME.get(unit, _SAME.get(unit.removesuffix("s"), unit))
+    return (Decimal(match[1]), unit) if unit in ("", *NANOSECONDS) else None
+
+
+def seconds_of(value: Any, name: str, dates: bool = True) -> Any:
+    """Convert a duration to seconds; numbers do not change.
+
+    Parameters
+    ----------
+    value : object
+        A text, ``timedelta``, ``timedelta64``, ``pandas.Timedelta``, or anything else, which is returned.
+    name : str
+        Name of the argument in messages.
+    dates : bool
+        Whether the times are dates or durations, so that units are allowed.
+
+    Raises
+    ------
+    ValidationError
+        If a text is not a duration, or the times are numbers without a unit.
+    """
+    if not isinstance(value, (str, timedelta, np.timedelta64)):
+        return value
+    if not dates:
+        raise ValidationError(
+            f"{name} is {short_repr(value)}, but the times are numbers. Pass a number in the unit of the times."
+        )
+    if not isinstance(value, str):
+        # pandas.Timedelta has nanoseconds, which its base class timedelta lacks.
+        step = getattr(value, "asm8", np.timedelta64(value))
+        return np.nan if np.isnat(step) else float(step / np.timedelta64(1, "s"))
+    try:
+        found = parts_of_duration(value)
+    except ArithmeticError:
+        found = None
+    if found is None or not found[1]:
+        raise ValidationError(
+            f"{name} is {short_repr(value)}, which is not a duration. Pass a number of seconds, a timedelta64, or a "
+            f"text with a unit, such as '3h' or '10min'; units are {', '.join(NANOSECONDS)}."
+        )
+    return float(found[0] * NANOSECONDS[found[1]] / NANOSECONDS["s"])
+
+
+# ---- times whose spacing in double precision is coarse ----
+
+# Rounding of times, as a fraction of the time step, beyond which accelerations are affected.
+_COARSE = 1e-4
+REMEDY = (
+    "Subtract the first time before the conversion to floating-point numbers, or pass integers or datetime64[ns], "
+    "which are exact."
+)
+
+
+def warn_of_rounded_times(times: NDArray[Any], name: str = "t", remedy: str = REMEDY) -> None:
+    """Warn if the spacing of floating-point numbers is more than 1e-4 of the median time step.
+
+    Whole numbers are exact and cause no warning. Accelerations depend on squares of time steps. Times in seconds since
+    1970, which are rounded to 2.4e-7 s, therefore yield wrong accelerations at 1 kHz.
+    """
+    if times.dtype.kind != "f" or times.shape[-1:] < (2,) or not times.size:
+        return
+    kept = times[np.isfinite(times)]
+    if not kept.size:
+        return
+    largest = kept[np.argmax(np.abs(kept))]
+    spacing = float(np.spacing(np.abs(largest)))
+    with np.errstate(over="ignore", invalid="ignore"):
+        steps = np.abs(np.diff(times, axis=-1))
+        steps = steps[(steps > 0) & (steps < np.inf)]
+        step = float(np.median(steps)) if steps.size else np.inf
+    if not spacing > _COARSE * step or np.array_equal(kept, np.rint(kept)):
+        return
+    warn(
+        f"{name} near {largest:.9g} are rounded to multiples of {spacing:.2g} by the type {times.dtype}, which is "
+        f"{spacing / step:.2g} of the time step {step:.3g}. Accelerations are wrong, and with coarser rounding also "
+        f"velocities. {remedy}",
+        UserWarning,
+    )

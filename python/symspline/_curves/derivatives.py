@@ -9,8 +9,7 @@ from typing import Any, Generic, NamedTuple, Protocol
 import numpy as np
 
 from .. import _core
-from .._base.arrays import as_array, cast, short_repr
-from .._base.equality import same_fields
+from .._base.arrays import as_array, cast, same_fields, short_repr
 from .._base.time import onto_ends
 from .._base.typing import FloatArray, P
 from .._core import ValidationError

@@ -20,13 +20,12 @@ from .._spaces import Array, Doubles, Product, Quotient, Space, Torus, cover_of,
 from ..manifolds import Manifold
 from .curve import CurveArrays, FactorArrays, share
 from .ends import NATURAL, End, ends_in_factors, ends_of, is_closed, split_ends
-from .handles import require_short_handles
+from .handles import require_short_handles, turns_of
 from .on_manifold.checks import hermite_on_manifold, validate_on_manifold
 from .on_manifold.fit import fit_of_one_length
 from .on_manifold.on_manifold import Mixed, OnManifold
 from .reduced import solve_in_span
 from .solve import Mask, Options, Solved, Task, faults_of, solve, solve_in_python, solve_single, validate, without
-from .turns import turns_of
 
 _T = TypeVar("_T")
 _Times = TypeVar("_Times")

@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .._base.faults import of_index
+from .._base.faults import of_index, warn
 from .._base.report import FarPointsWarning
-from .._base.warnings import warn
 from .._core import CutLocusError, ValidationError
-from .._spaces import Array, Doubles, Euclidean, Space, cover_of
+from .._spaces import Array, Doubles, Euclidean, Space, cover_of, factors_of
 from ..manifolds import Manifold
+from .curve import CurveArrays, FactorArrays
+from .fit import curve_of_factors
 
 METHODS = ("catmull-rom", "akima", "pchip")
 # Weights of Akima's formula below this part of the largest one are rounding errors, as in SciPy.
@@ -239,3 +240,50 @@ def check_method(method: Any) -> None:
 def wide(values: NDArray[Any], space: Space[Any]) -> NDArray[Any]:
     """Append the axes of a point."""
     return values.reshape(values.shape + (1,) * len(space.point_shape))
+
+
+# ---- curves of geodesics between neighbouring points, as arrays ----
+
+
+def jumps(curve: CurveArrays) -> list[Doubles]:
+    """Return the norms of the jumps of the velocity at the inner knots in each factor, as parts of the speed before.
+
+    They are NaN at the ends of segments without a geodesic.
+    """
+    return [_jumps(factor) for factor in curve.factors]
+
+
+def _jumps(factor: FactorArrays) -> Doubles:
+    space = factor.space
+    inner: Any = (..., slice(1, -1), *[slice(None)] * len(space.point_shape))
+    assert factor.before is not None
+    p, before, after = (array[inner] for array in (factor.points, factor.before, factor.velocities))
+    if not p.size:
+        return np.zeros(p.shape[: p.ndim - len(space.point_shape)])
+    gaps = ~(space._where_finite(before) & space._where_finite(after))
+    before, after = (np.where(wide(gaps, space), 0, own) for own in (before, after))
+    with np.errstate(all="ignore"):
+        jumps: Doubles = np.nan_to_num(space.norm(p, after - before) / space.norm(p, before), nan=0.0)
+    jumps[gaps] = np.nan
+    return jumps
+
+
+def joined(space: Space[Any], times: Doubles, points: list[Array]) -> CurveArrays:
+    """Return the curve of geodesics between neighbouring points, given in each factor.
+
+    It is a curve of cubic segments with corners at the knots. Between two points that no unique geodesic joins,
+    velocities and the curve are NaN.
+
+    Raises
+    ------
+    CutLocusError
+        If all neighbouring points lie at or past each other's cut locus.
+    """
+    factors = []
+    for factor, own in zip(factors_of(space), points, strict=True):
+        starts, ends = geodesic_velocities(factor, times, own)
+        axis = own.ndim - len(factor.point_shape) - 1
+        first, last = np.take(starts, [0], axis=axis), np.take(ends, [-1], axis=axis)
+        after, before = np.concatenate([starts, last], axis=axis), np.concatenate([first, ends], axis=axis)
+        factors.append(FactorArrays(factor, own, after, before))
+    return curve_of_factors(space, times, tuple(factors), fitted=False)

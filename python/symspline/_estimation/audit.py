@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .._base.warnings import warn
+from .._base.faults import warn
 from .._curves.ends import end_kinds
 from .._smoothing import SmoothingWarning
 from .._smoothing.audit import DEGREES, Residuals, Sensor, advice, corner_of, described, examine

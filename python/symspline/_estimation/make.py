@@ -12,8 +12,7 @@ import numpy as np
 from .._base.arrays import as_array, checked_flag, checked_number, short_repr, whole_number
 from .._base.faults import UNCONVERGED, Fault
 from .._base.input import times_of
-from .._base.rounded_times import warn_of_rounded_times
-from .._base.time import Moments, TimeAxis, knots_of, time_axis_of
+from .._base.time import Moments, TimeAxis, knots_of, time_axis_of, warn_of_rounded_times
 from .._base.typing import (
     Criterion,
     Extrapolate,
@@ -29,10 +28,9 @@ from .._base.typing import (
 )
 from .._base.validation import one_of
 from .._core import ValidationError
-from .._curves.failures import raise_or_warn
+from .._curves.failures import raise_or_warn, warn_of_held_points
 from .._curves.fit import FitProblem, fit, read_ends
 from .._curves.fit import Points as CorePoints
-from .._curves.held import warn_of_held_points
 from .._curves.options import check_on_failure, check_progress, checked_extrapolate
 from .._curves.solve import DEFAULTS
 from .._smoothing import SmoothingReport, SmoothingSpline, SmoothingWarning, make_smoothing_spline
@@ -51,7 +49,7 @@ from .._spaces import (
     refuse_quotients,
     space_named,
 )
-from .._splines.curve import Curve
+from .._splines.base import Curve
 from ..manifolds._manifold import refuse_functions
 from .audit import audit, unit_hints
 from .gaps import long_gaps

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from .. import _core
 from .._base.exceptions import ConvergenceError, SymsplineError
+from .._base.faults import warn
 from .._base.time import TimeAxis
 from .._base.typing import Progress
-from .._base.warnings import warn
 from .._core import ValidationError
 from .._smoothing import SmoothingWarning
 from .._smoothing.knots import places

@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._base.arrays import short_repr
+from .._base.faults import silenced
 from .._base.time import TimeAxis
-from .._base.warnings import silenced
 from .._core import ValidationError
 from .._smoothing import make_smoothing_spline
 from .._smoothing.noise import split
 from .._spaces import Array, Doubles, Euclidean, Product, Space, SpecialOrthogonal, factors_of, nearest_rotations
-from .._splines.curve import Curve
+from .._splines.base import Curve
 from ..convert._quaternions import matrix_to_quaternion
 from .rates import Attitudes, Integral, Path, Rates, attitudes_at
 from .solve import Setup

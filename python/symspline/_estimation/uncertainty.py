@@ -10,7 +10,7 @@ import numpy as np
 
 from .._base.typing import TimesLike
 from .._core import ValidationError
-from .._curves.at_times import call_at_times
+from .._curves.composed import call_at_times
 from .._smoothing import SmoothingSpline
 from .._smoothing.noise import smoothed_spaces, split
 from .._spaces import Array, Doubles, factors_of

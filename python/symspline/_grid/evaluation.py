@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any
+from itertools import groupby
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from .. import _core
 from .._base.arrays import short_repr
-from .._base.typing import Progress
+from .._base.faults import CUT_LOCUS, UNCONVERGED, Fault, from_core, imprecise, silenced
+from .._base.report import Columns, ConvergenceWarning, FarPointsWarning
+from .._base.typing import Extrapolate, Progress
 from .._core import ValidationError
 from .._curves.on_manifold.jerk import differentiation, transported
-from .._curves.reduced import span_of
+from .._curves.reduced import Span, span_of
 from .._spaces import Array, Doubles, Space
+from .._splines.cubic import CubicSpline
 from ..manifolds import Manifold
 from .axes import GridAxis, Sites
-from .compiled import CompiledGrid, Found
-from .on_manifold import ManifoldGrid
 
 # Chebyshev nodes of a segment, on which a derivative is interpolated to be differentiated once more.
 _NODES = 12
@@ -206,3 +208,269 @@ def _midpoint(
     derivative = np.full(shape, np.nan, space.dtype)
     derivative[valid] = space._numbers(moved)
     return out, derivative
+
+
+# ---- grids in spaces of the compiled core ----
+
+
+class Found(NamedTuple):
+    """What the fits of many rows report together.
+
+    Attributes
+    ----------
+    failed : int
+        Number of rows that failed.
+    fault : Fault or None
+        The fault of the first of them.
+    residual : float
+        Largest residual of the others.
+    """
+
+    failed: int = 0
+    fault: Fault | None = None
+    residual: float = 0.0
+
+    def merged(self, other: Found) -> Found:
+        """Return both reports as one."""
+        residual = max(self.residual, other.residual)
+        return Found(self.failed + other.failed, self.fault or other.fault, residual)
+
+
+class _Arrays(NamedTuple):
+    """Arrays of a grid for the core: points and velocities as rows along axis 0, which comes last."""
+
+    axes: list[tuple[Doubles, list[str] | None, str]]
+    points: Doubles
+    velocities: Doubles
+
+
+class CompiledGrid:
+    """Nodes of a grid in a space of the core, with the splines along its first axis.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n_1, ..., n_D, *point_shape)
+        Points on the space; NaN for missing nodes.
+    span : Span or None
+        Span of a low-rank reduction, in which points and velocities are coordinates.
+    velocities : ndarray, optional
+        Velocities along the first axis. By default they are computed.
+    order : {1, -1}
+        Whether the axes are in the order of the user, for messages.
+    """
+
+    def __init__(
+        self,
+        space: Space[Any],
+        axes: list[GridAxis],
+        points: Array,
+        span: Span | None,
+        velocities: Array | None = None,
+        progress: Progress | None = None,
+        order: int = 1,
+    ) -> None:
+        self.space, self.axes, self.span, self._order = space, axes, span, order
+        self.points = points
+        self.found = Found()
+        self._rows = self._in_rows(points)
+        if velocities is None:
+            own, summary = _core.grid_rows(space._handle, self._axis(0, "continue"), self._rows, progress)
+            self._velocities, self.found = own, self._read(summary)
+        else:
+            self._velocities = self._in_rows(velocities)
+
+    @property
+    def velocities(self) -> Array:
+        """Velocities at the nodes along the first axis, in the order of the axes."""
+        return np.moveaxis(self.space._numbers(self._velocities), len(self.axes) - 1, 0)
+
+    def backwards(self) -> CompiledGrid:
+        """Return the grid with the order of axes reversed."""
+        dims = len(self.axes)
+        order = (*range(dims)[::-1], *range(dims, self.points.ndim))
+        points = np.ascontiguousarray(self.points.transpose(order))
+        return CompiledGrid(self.space, self.axes[::-1], points, self.span, order=-self._order)
+
+    def run(
+        self, sites: Sites, along: int | None, last: int, progress: Progress | None
+    ) -> tuple[Array, Array | None, Found]:
+        """Evaluate points, and a derivative there.
+
+        Parameters
+        ----------
+        along : int or None
+            Axis before the last one along which the first derivative is taken.
+        last : {0, 1, 2}
+            Order of the derivative along the last axis; at most 1 together with `along`.
+
+        Returns
+        -------
+        tuple
+            Points, the derivative or None, and the report of the fits.
+        """
+        axes = [self._axis(k, mode) for k, mode in enumerate(sites.modes)]
+        arrays = _Arrays(axes, self._rows, self._velocities)
+        if sites.outer:
+            points, vectors, summary = _core.grid_product(self.space._handle, arrays, sites.x, along, last, progress)
+        else:
+            x = np.ascontiguousarray(np.stack(sites.x, axis=-1))
+            points, vectors, summary = _core.grid_scattered(self.space._handle, arrays, x, along, last, progress)
+        return self._shown(points), None if vectors is None else self._shown(vectors), self._read(summary)
+
+    def _axis(self, k: int, mode: str) -> tuple[Doubles, list[str] | None, str]:
+        axis = self.axes[k]
+        return axis.knots, None if axis.ends is None else list(axis.ends), mode
+
+    def _in_rows(self, array: Array) -> Doubles:
+        """Move the first axis behind the others."""
+        return self.space._as_doubles(np.ascontiguousarray(np.moveaxis(array, 0, len(self.axes) - 1)))
+
+    def _shown(self, doubles: Doubles) -> Array:
+        """Return results of the core as points or vectors of the user's space."""
+        numbers = self.space._numbers(doubles)
+        return numbers if self.span is None else self.span.embed_samples(numbers, ())
+
+    def _read(self, summary: Any) -> Found:
+        failed, first, residual, *_ = summary
+        if first is None:
+            return Found(0, None, residual)
+        axis, kind, node, value, limit, own = first
+        number = axis if self._order > 0 else len(self.axes) - 1 - axis
+        return Found(failed, row_fault(number, kind, node, value, limit, own), residual)
+
+
+def row_fault(
+    axis: int, kind: str, node: int | None, value: float, limit: float, residual: float, tol: float = 1e-12
+) -> Fault:
+    """Return the fault of a row along an axis."""
+    where = f" of a row along axis {axis}"
+    if kind == "unconverged":
+        what = f"no convergence{where}: the residual is {residual:.3e}, the tolerance {tol:.0e}"
+        return Fault(0, UNCONVERGED, what, "add nodes where neighbouring points are far apart", None, residual, tol)
+    if kind == "imprecise":
+        return Fault(0, UNCONVERGED, *imprecise(where, value, tol), None, value, tol)
+    fault = from_core((0, kind, node, value, limit, None), Columns.empty(1), tol, False)
+    return fault._replace(kind=CUT_LOCUS, what=fault.what.replace("{of}", where))
+
+
+# ---- grids on manifolds that are made of functions, row by row in Python ----
+
+_POLICIES: dict[str, Extrapolate] = {"continue": True, "geodesic": "geodesic", "periodic": "periodic"}
+
+
+class ManifoldGrid:
+    """Nodes of a grid on a `Manifold`; see `CompiledGrid`."""
+
+    span = None
+
+    def __init__(self, space: Space[Any], axes: list[GridAxis], points: Array) -> None:
+        self.space, self.axes, self.points = space, axes, points
+        self.found = Found()
+
+    def backwards(self) -> ManifoldGrid:
+        """Return the grid with the order of axes reversed."""
+        dims = len(self.axes)
+        order = (*range(dims)[::-1], *range(dims, self.points.ndim))
+        return ManifoldGrid(self.space, self.axes[::-1], self.points.transpose(order))
+
+    def run(
+        self, sites: Sites, along: int | None, last: int, progress: Progress | None
+    ) -> tuple[Array, Array | None, Found]:
+        """Evaluate points, and a derivative there; see `CompiledGrid.run`."""
+        if along is not None:
+            raise ValidationError(
+                f"derivatives along axis {along} need the sensitivity of splines to their points, which is not "
+                f"available on {self.space!r}. Differentiate along the last axis, or reorder the axes."
+            )
+        if not sites.outer:
+            return self._scattered(sites, last, progress)
+        found, nodes, vectors = Found(), self.points, None
+        for k, (axis, x, mode) in enumerate(zip(self.axes, sites.x, sites.modes, strict=True)):
+            rows = np.moveaxis(nodes, k, len(self.axes) - 1)
+            orders = [0, last] if k + 1 == len(self.axes) and last else [0]
+            *_, values = evaluated = [self._row_values(axis, rows, x, mode, nu, k) for nu in orders]
+            nodes = np.moveaxis(evaluated[0][0], len(self.axes) - 1, k)
+            vectors = np.moveaxis(values[0], len(self.axes) - 1, k) if len(orders) > 1 else None
+            found = found.merged(evaluated[0][1])
+            if progress:
+                progress(k + 1, len(self.axes))
+        return nodes, vectors, found
+
+    def _scattered(self, sites: Sites, last: int, progress: Progress | None) -> tuple[Array, Array | None, Found]:
+        """Evaluate scattered coordinates one at a time."""
+        count = len(sites.x[0])
+        points = np.full((count, *self.space.point_shape), np.nan, self.space.dtype)
+        vectors = points.copy() if last else None
+        found = Found()
+        for i in range(count):
+            one = Sites([x[i : i + 1] for x in sites.x], True, sites.modes)
+            p, v, own = self.run(one, None, last, None)
+            points[i] = p.reshape(self.space.point_shape)
+            if vectors is not None and v is not None:
+                vectors[i] = v.reshape(self.space.point_shape)
+            found = found.merged(own)
+            if progress:
+                progress(i + 1, count)
+        return points, vectors, found
+
+    def _row_values(
+        self, axis: GridAxis, rows: Array, x: Doubles, mode: str, nu: int, number: int
+    ) -> tuple[Array, Found]:
+        """Evaluate all rows at the same coordinates; NaN outside the runs of a row."""
+        shape, lead = self.space.point_shape, rows.shape[: len(self.axes) - 1]
+        flat = rows.reshape(-1, len(axis.knots), *shape)
+        out = np.full((len(flat), len(x), *shape), np.nan, self.space.dtype)
+        if mode == "periodic":
+            start, period = axis.knots[0], axis.knots[-1] - axis.knots[0]
+            x = np.where((x < start) | (x > axis.knots[-1]), start + (x - start) % period, x)
+        valid = self.space._where_finite(flat)
+        found = Found()
+        order = sorted(range(len(flat)), key=lambda row: valid[row].tobytes())
+        for _, same in groupby(order, key=lambda row: valid[row].tobytes()):
+            own = np.array(list(same))
+            for first, stop in _runs(valid[own[0]]):
+                inside = (x >= axis.knots[first]) & (x <= axis.knots[stop - 1])
+                if stop == len(axis.knots):
+                    inside |= x > axis.knots[-1]
+                if first == 0:
+                    inside |= x < axis.knots[0]
+                if stop - first == 1:
+                    if nu == 0:
+                        out[np.ix_(own, x == axis.knots[first])] = flat[own, first][:, None]
+                    continue
+                whole = stop - first == len(axis.knots)
+                bc: Any = axis.bc_type if whole else _beside_gaps(axis, first, stop)
+                points = np.ascontiguousarray(flat[own, first:stop])
+                with silenced(ConvergenceWarning), silenced(FarPointsWarning):
+                    spline = CubicSpline(
+                        axis.knots[first:stop], points, self.space, bc_type=bc, check=False, on_failure="ignore"
+                    )
+                out[np.ix_(own, inside)] = spline(x[inside], nu, extrapolate=_POLICIES[mode])
+                found = found.merged(_found(spline, number))
+        return out.reshape(*lead, len(x), *shape), found
+
+
+def _runs(valid: Any) -> list[tuple[int, int]]:
+    """Return the first node and the end of every run of valid nodes."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], valid, [False]]).astype(int)))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+
+
+def _beside_gaps(axis: GridAxis, first: int, stop: int) -> tuple[str, str]:
+    """Return the end conditions of a run: natural on natural axes, and otherwise not-a-knot beside a gap."""
+    ends = axis.ends or ("not-a-knot", "not-a-knot")
+    at_end = first == 0, stop == len(axis.knots)
+    start, end = (
+        "not-a-knot" if word == "clamped" and not there else word for word, there in zip(ends, at_end, strict=True)
+    )
+    return start, end
+
+
+def _found(spline: CubicSpline[Any], number: int) -> Found:
+    report = spline.report
+    failed = ~np.atleast_1d(np.asarray(report.converged))
+    residuals = np.atleast_1d(np.asarray(report.residual, np.float64))
+    if not failed.any():
+        return Found(0, None, float(residuals.max(initial=0.0)))
+    first = float(residuals[failed][0])
+    return Found(int(failed.sum()), row_fault(number, "unconverged", None, first, np.nan, first), 0.0)

@@ -9,8 +9,7 @@ import numpy as np
 
 from .._spaces import product_norm
 from .axes import GridAxis, Sites
-from .compiled import Found
-from .evaluation import FactorGrid
+from .evaluation import FactorGrid, Found
 
 # The number of cell centres at which the two orders of axes are compared.
 _COMPARED = 4096

@@ -9,20 +9,17 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, Unpack, overload
 import numpy as np
 
 from .._base.arrays import checked_atol, checked_flag, short_repr, whole_number
-from .._base.faults import CUT_LOCUS
+from .._base.faults import CUT_LOCUS, warn
 from .._base.report import ConvergenceWarning
 from .._base.typing import Extrapolate, File, GridLook, OnFailure, P, PointsLike, Progress, TimesLike
-from .._base.warnings import warn
 from .._core import ConvergenceError, CutLocusError, ValidationError
 from .._curves.options import check_on_failure, check_progress, checked_extrapolate, require_matplotlib
 from .._spaces import Array, Product, Space, cover_of, factors_of, space_named
 from .._splines import archive
 from .._splines.archive import Entries, entry, read_array, read_space, read_times, suffix_of, times_state
 from .._splines.cubic import CubicSpline
-from .axes import GridAxis, Sites, coordinates, read_axes, sites_of
-from .compiled import CompiledGrid, Found
-from .evaluation import FactorGrid, order_of_each
-from .nodes import check_steps, read_nodes, validate_nodes
+from .axes import GridAxis, Sites, check_steps, coordinates, read_axes, read_nodes, sites_of, validate_nodes
+from .evaluation import CompiledGrid, FactorGrid, Found, order_of_each
 from .report import GridReport
 
 if TYPE_CHECKING:

@@ -21,7 +21,7 @@ from matplotlib.patches import Circle, PathPatch
 from matplotlib.path import Path as Outline
 from numpy.typing import NDArray
 
-from .._base.lonlat import from_lonlat, to_lonlat
+from .._base.angles import from_lonlat, to_lonlat
 from .._spaces import Euclidean, Space
 from .style import MARK, Array, closest, halo, ink, paper
 

@@ -21,7 +21,7 @@ from matplotlib.colors import to_rgba, to_rgba_array
 from matplotlib.transforms import Affine2DBase
 from numpy.typing import NDArray
 
-from .._base.quaternions import matrices_of_quaternions
+from .._base.angles import matrices_of_quaternions
 from .._core import CutLocusError, convert_rotations
 from .._spaces import SpecialOrthogonal, cover_of
 from .curves import Curve, Mover, are_compared

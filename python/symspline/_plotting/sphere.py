@@ -13,7 +13,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from .._base.lonlat import from_lonlat, to_lonlat
+from .._base.angles import from_lonlat, to_lonlat
 from .curves import Curve
 from .globe import (
     Globe,

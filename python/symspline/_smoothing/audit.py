@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from .. import _core
 from .._base.arrays import short_repr
-from .._base.faults import of_index
-from .._base.warnings import is_silent, warn
+from .._base.faults import is_silent, of_index, warn
 from .._curves.curve import CurveArrays
 from .._curves.ends import end_kinds
 from .._spaces import Array, Doubles, Space, factors_of

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from .. import _core
 from .._base.arrays import short_repr
-from .._base.faults import of_index
-from .._base.warnings import warn
+from .._base.faults import of_index, warn
 from .._curves.ends import end_kinds, is_closed
 from .._spaces import Array, Doubles, Euclidean, Space, SpecialEuclidean, factors_of
 from .audit import corner_of

@@ -9,6 +9,7 @@ from typing import Any, Generic, NamedTuple, Self
 import numpy as np
 
 from .._base.arrays import as_array, checked_atol, checked_number, refuse
+from .._base.faults import warn
 from .._base.report import ConvergenceWarning
 from .._base.typing import (
     Extrapolate,
@@ -23,12 +24,10 @@ from .._base.typing import (
     TimesLike,
 )
 from .._base.validation import one_of
-from .._base.warnings import warn
 from .._core import ConvergenceError, ValidationError
 from .._curves.options import check_on_failure, check_progress, checked_extrapolate
 from .._grid import GridReport, GridSpline
-from .._grid.axes import GridAxis, read_axes
-from .._grid.nodes import read_nodes, validate_nodes
+from .._grid.axes import GridAxis, read_axes, read_nodes, validate_nodes
 from .._spaces import Array, Doubles, Product, Space, cover_of, factors_of, space_named
 from .._splines.archive import Entries, entry, read_array, suffix_of
 from ..manifolds._manifold import refuse_functions

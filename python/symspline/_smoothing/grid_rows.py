@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .._base.warnings import silenced
+from .._base.faults import silenced
 from .._curves.ends import end_kinds, is_closed
 from .._spaces import Array, Doubles, Euclidean, Space
 from .make import make_smoothing_spline

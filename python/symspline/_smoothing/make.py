@@ -30,12 +30,10 @@ from .._base.typing import (
 )
 from .._core import ValidationError
 from .._curves.ends import End, freeze_bc_type, is_closed
-from .._curves.failures import raise_or_warn
+from .._curves.failures import raise_or_warn, warn_of_far_data, warn_of_far_points, warn_of_held_points, warn_of_signs
 from .._curves.fit import Fit, Points, Problem, fit, mask_of
-from .._curves.held import warn_of_held_points
 from .._curves.missing import counts_all_samples, data_without_missing, missing_named
 from .._curves.options import check_on_failure, check_progress, checked_extrapolate
-from .._curves.representatives import warn_of_far_data, warn_of_far_points, warn_of_signs
 from .._curves.solve import DEFAULTS, in_batch
 from .._spaces import Array, Doubles, Product, Space, SpecialEuclidean, factors_of, space_named
 from ..manifolds._manifold import refuse_functions

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .. import _core
-from .._base.equality import same
+from .._base.arrays import same
 from .._base.typing import FloatArray
 from .._spaces import Array, Doubles, Space
 

@@ -11,13 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._base.arrays import as_array, checked_flag, checked_number, short_repr, whole_number
-from .._base.durations import seconds_of
 from .._base.exceptions import SymsplineError
-from .._base.faults import UNCONVERGED, Fault
+from .._base.faults import UNCONVERGED, Fault, warn
 from .._base.input import times_of
 from .._base.report import FarPointsWarning
-from .._base.rounded_times import warn_of_rounded_times
-from .._base.time import Moments, time_axis_of
+from .._base.time import Moments, seconds_of, time_axis_of, warn_of_rounded_times
 from .._base.typing import (
     Duplicates,
     FitOptions,
@@ -31,7 +29,6 @@ from .._base.typing import (
     TimesLike,
 )
 from .._base.validation import one_of
-from .._base.warnings import warn
 from .._core import ConvergenceError, ValidationError
 from .._curves.failures import raise_or_warn
 from .._curves.fit import read_given

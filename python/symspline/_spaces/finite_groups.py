@@ -9,8 +9,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from .._base.angles import matrices_of_quaternions
 from .._base.arrays import as_array, read_only, short_repr
-from .._base.quaternions import matrices_of_quaternions
 from .._core import ValidationError
 from .base import Array, Space
 from .point_groups import elements, proper_symbol, recognised

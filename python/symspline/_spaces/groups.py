@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from .._base.angles import matrices_of_quaternions
 from .._base.arrays import refuse
-from .._base.quaternions import matrices_of_quaternions
 from .._base.rounding import point_tol
 from .._base.typing import ComplexArray, FloatArray
 from .._core import ValidationError

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .._base.warnings import warn
+from .._base.faults import warn
 from .._core import ConvergenceError, CutLocusError, ValidationError
 from .circle import Floats, Minima, circular_mean, circular_median, standard_error, wrap
 from .statistics import Array, Descent, Groups, descend_to_mean, descend_to_median, joined, put, take

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .._base.warnings import warn
+from .._base.faults import warn
 from .base import Array
 from .finite_groups import FiniteGroup, Indices
 

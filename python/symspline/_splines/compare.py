@@ -9,7 +9,7 @@ from .._base.arrays import short_repr
 from .._base.typing import File
 from .._core import ValidationError
 from .._curves.options import require_matplotlib
-from .curve import Curve
+from .base import Curve
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -20,8 +20,7 @@ from .._curves.curve import UncertaintyBand
 from .._curves.options import checked_extrapolate, extrapolation_mode
 from .._spaces import Doubles, Space
 from .archive import VERSION, Entries, entry, read_times, restore, times_state
-from .curve import Curve
-from .timed_curve import TimedCurve
+from .base import Curve, TimedCurve
 
 if TYPE_CHECKING:
     from typing_extensions import TypeVar

@@ -13,7 +13,7 @@ from .._base.disk import damage, path_of
 from .._base.typing import File
 from .._core import ValidationError
 from .archive import FORMATS, TEXTS, Entries, Stored, read_state, restore, write
-from .curve import Curve
+from .base import Curve
 
 # Entries with one value for all curves of a file.
 _SHARED = (*TEXTS, "version")

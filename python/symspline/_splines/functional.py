@@ -28,11 +28,10 @@ from .._base.typing import (
 )
 from .._core import ValidationError
 from .._curves import fit as fitting
-from .._curves.at_times import evaluated
+from .._curves.composed import evaluated
 from .._curves.curve import CurveArrays
 from .._curves.ends import freeze_bc_type, take_batch
-from .._curves.failures import raise_or_warn
-from .._curves.held import warn_of_held_points
+from .._curves.failures import raise_or_warn, warn_of_held_points, warn_of_representatives
 from .._curves.missing import counts_all_samples, curves_without_missing, missing_named
 from .._curves.options import (
     EvaluationOptions,
@@ -43,7 +42,6 @@ from .._curves.options import (
     quantity_of,
     with_atol,
 )
-from .._curves.representatives import warn_of_representatives
 from .._spaces import Array, Product, Quotient, Space, factors_of, parts_of, space_named
 from .cubic import CubicSpline
 

@@ -10,13 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import _core
-from .._base.arrays import as_array, cast, checked_number, read_only, refuse, short_repr, whole_number
-from .._base.equality import same_fields
+from .._base.arrays import as_array, cast, checked_number, read_only, refuse, same_fields, short_repr, whole_number
 from .._base.typing import FloatArray, Number
 from .._core import ValidationError
 from .._curves.options import order_of
 from .._spaces import Array, Doubles, factors_of, parts_of, product_norm
-from .curve import Curve
+from .base import Curve
 
 # Velocities before and after a knot that differ by more than this part jump.
 _JUMP = 1e-6

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .._base.angles import from_lonlat
 from .._base.exceptions import SymsplineError
-from .._base.lonlat import from_lonlat
 from .._core import ValidationError
 from .._spaces import (
     Doubles,

@@ -13,8 +13,8 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
+from .._base.angles import compass, to_lonlat
 from .._base.arrays import brief
-from .._base.lonlat import compass, to_lonlat
 from .._grid import GridSpline
 from .._smoothing import SmoothingSpline
 from .._spaces import Doubles, Space, Torus, factors_of, parts_of

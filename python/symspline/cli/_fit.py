@@ -49,7 +49,7 @@ from pathlib import Path
 from typing import Any
 
 from .._base.exceptions import SymsplineError
-from .._curves.representatives import IN_PYTHON
+from .._curves.failures import IN_PYTHON
 from .._smoothing import SmoothingWarning
 from .._smoothing.segments import smooth_many
 from .._spaces import Space, Torus, factors_of, space_named

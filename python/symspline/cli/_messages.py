@@ -12,7 +12,7 @@ from difflib import get_close_matches
 from typing import Self
 
 from .._base.arrays import brief
-from .._base.rounded_times import REMEDY
+from .._base.time import REMEDY
 from .._spaces.base import CLASSES
 
 _NAMES = {cls.__name__: name for name, cls in CLASSES.items()}

@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .._base.durations import NANOSECONDS
 from .._base.input import ISO_DATE, UTC_ZONE, times_of
+from .._base.time import NANOSECONDS
 from .._core import ValidationError
 from ._files import Source
 from ._messages import Problem, did_you_mean, refuse

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .._base.durations import NANOSECONDS, parts_of_duration
+from .._base.time import NANOSECONDS, parts_of_duration
 from ._messages import Problem, refuse
 from ._tables import EXACT, UNITS
 

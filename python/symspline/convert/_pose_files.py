@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from .._base.arrays import as_array, brief, cast, checked_flag, refuse
 from .._base.disk import path_of, replacing
 from .._base.input import times_of
-from .._base.rounded_times import warn_of_rounded_times
+from .._base.time import warn_of_rounded_times
 from .._base.typing import PointsLike
 from .._base.validation import length, off_one
 from .._core import ValidationError, number_lines

@@ -10,10 +10,9 @@ import jax
 import jax.numpy as jnp
 
 from .._autodiff import curves
-from .._autodiff.condition import Chain, PoseChain, PositiveChain, Problem, SphereChain
+from .._autodiff.condition import Chain, PoseChain, PositiveChain, Problem, SphereChain, cyclic_reduction
 from .._autodiff.library import adjoint
-from .._autodiff.motions import turned
-from .._autodiff.tridiagonal import cyclic_reduction
+from .._autodiff.models import turned
 from .._base.arrays import short_repr
 from .._core import ValidationError
 from .._spaces import Product, Space

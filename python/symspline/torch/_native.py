@@ -7,8 +7,7 @@ from typing import Any, overload
 import torch
 
 from .._autodiff import curves
-from .._autodiff.condition import Problem
-from .._autodiff.tridiagonal import cyclic_reduction
+from .._autodiff.condition import Problem, cyclic_reduction
 from .._core import ConvergenceError
 from .._curves.ends import ends_in_factors
 from .._spaces import Product, Space, parts_of

@@ -22,9 +22,9 @@ from .._curves.options import checked_extrapolate, extrapolation_mode, quantity_
 from .._spaces import Space, space_named
 from ._blocks import COLUMNS, Inputs, apply, fitted, resampled, values_at
 from ._grids import resample_grid
+from ._labels import in_radians, in_units_of
 from ._smoothing import smooth
 from ._spec import KNOTS, bare, check_dims, rehearse, spec_of, timed_by, times_with_names
-from ._units import in_radians, in_units_of
 
 __all__ = ["evaluate", "fit", "lift", "resample", "smooth", "speed"]
 

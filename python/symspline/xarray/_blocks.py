@@ -10,14 +10,14 @@ import xarray as xr
 
 from .._autodiff.compiled import joined
 from .._base.report import Report, columns_of
-from .._base.threads import one_thread
+from .._base.system import one_thread
 from .._core import ConvergenceError, CutLocusError, ValidationError
-from .._curves.at_times import call_at_times
+from .._curves.composed import call_at_times
 from .._curves.missing import missing_times
 from .._spaces import Array, Space
 from .._splines.cubic import CubicSpline
 from .._splines.functional import given
-from ._missing import fit_valid, named_curve, of_equal_length, times_of_rows
+from ._labels import fit_valid, named_curve, of_equal_length, times_of_rows
 
 # Arrays with their core dimensions, which a block has all of.
 Inputs = list[tuple[xr.DataArray, Sequence[Hashable]]]

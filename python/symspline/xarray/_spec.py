@@ -16,7 +16,7 @@ from .._curves.missing import missing_times
 from .._spaces import Array, Euclidean, Product, Space, space_named
 from .._splines.cubic import CubicSpline
 from ._blocks import Inputs, values_at
-from ._times import times_along
+from ._labels import times_along
 
 T = TypeVar("T", xr.DataArray, xr.Dataset)
 

@@ -1,4 +1,4 @@
-"""Cumulative B-spline curves on Lie groups."""
+"""The base class of curves that are given by knots, control points and a degree."""
 
 from __future__ import annotations
 
@@ -9,18 +9,399 @@ from numpy.typing import ArrayLike
 
 from .. import _core
 from .._base.arrays import as_array, cast, checked_number, refuse, short_repr, whole_number
+from .._base.faults import of_index, warn
 from .._base.report import ConvergenceWarning, CumulativeReport
-from .._base.typing import OnFailure, P, PointsLike
-from .._base.warnings import warn
-from .._core import ConvergenceError, ValidationError
-from .._curves.controlled import CumulativeCurve, CumulativeProduct, cumulative_of
+from .._base.time import TimeAxis, onto_ends
+from .._base.typing import FloatArray, OnFailure, P, PointsLike
+from .._core import ConvergenceError, CutLocusError, ValidationError
+from .._curves.controlled import ControlledCurve, CumulativeCurve, CumulativeProduct, cumulative_of
 from .._curves.ends import ends_of
-from .._curves.fit import Points, read_given, validated
-from .._curves.options import check_on_failure
-from .._curves.representatives import warn_of_far_data
-from .._spaces import Doubles, Euclidean, Group, Quotient, Space, factors_of, parts_of, space_named
+from .._curves.failures import warn_of_far_data
+from .._curves.fit import Points, read_given, unwrapped, validated
+from .._curves.options import check_on_failure, quantity_of
+from .._spaces import Array, Doubles, Euclidean, Group, Product, Quotient, Space, factors_of, parts_of, space_named
+from ..manifolds._manifold import refuse_functions
 from .archive import VERSION, Entries, Stored, entry, read_array, read_report, read_space, suffix_of
-from .controlled import ControlledSpline, checked_knots, checked_points, control_array
+from .base import Curve
+
+
+class ControlledSpline(Curve[P]):
+    """Base class of B-spline curves."""
+
+    _curve: Any
+    _time_axis = TimeAxis()
+
+    def __call__(self, x: ArrayLike, nu: int = 0) -> P:
+        """Evaluate the curve or its derivatives.
+
+        Parameters
+        ----------
+        x : array_like
+            Times between ``knots[degree]`` and ``knots[-degree - 1]``, of any shape and in any order.
+        nu : {0, 1, 2}, default 0
+            Order of the derivative: 0 for points, 1 for the velocity, 2 for the covariant acceleration.
+
+        Returns
+        -------
+        ndarray or tuple of ndarray, shape ``(*batch axes, *x.shape, *point_shape)``
+            Points or tangent vectors. For a `Product`, a tuple with one array per factor.
+
+        Raises
+        ------
+        ValidationError
+            If a time is not finite or lies outside the domain of the curve.
+        """
+        values: P = self._curve.evaluate(self._core_times(x)[0], quantity_of(nu))
+        return values
+
+    def speed(self, x: ArrayLike) -> FloatArray:
+        """Compute the speed of the curve.
+
+        Parameters
+        ----------
+        x : array_like
+            Times in the domain of the curve, of any shape and in any order.
+
+        Returns
+        -------
+        ndarray, shape ``(*batch axes, *x.shape)``
+            The norm of the velocity.
+
+        Raises
+        ------
+        ValidationError
+            If a time is not finite or lies outside the domain of the curve.
+
+        Examples
+        --------
+        >>> import symspline as ss
+        >>> line = ss.BSpline([0, 0, 2, 2], [[0.0], [3.0]], 1, "r:1")
+        >>> line.speed([0.5, 1.0])
+        array([1.5, 1.5])
+        """
+        speeds: FloatArray = self._curve.evaluate(self._core_times(x)[0], "speed")[()]
+        return speeds
+
+    def _core_times(self, x: Any, name: str = "x", per_curve: bool = False) -> tuple[Doubles, bool]:
+        times = as_array(x, name)
+        if times.dtype.kind not in "biuf":
+            raise ValidationError(f"{name} must be real numbers, not {times.dtype}")
+        batch = self._batch
+        if per_curve and times.shape[: len(batch)] != batch:
+            raise ValidationError(
+                f"with per_curve=True the shape of {name} must begin with the batch axes {batch}; got {times.shape}"
+            )
+        start, end = self.domain
+        times, _ = onto_ends(cast(times), np.array([start, end]), (), False, times.dtype)
+        outside = ~((times >= start) & (times <= end))
+
+        def say(i: Any) -> str:
+            where = f"outside the domain [{start}, {end}] of the curve" if np.isfinite(times[i]) else "not finite"
+            return f"= {times[i]} is {where}"
+
+        refuse(outside, name, say)
+        return times, per_curve
+
+    def _shown_times(self, x: Doubles) -> Doubles:
+        return x
+
+    @property
+    def domain(self) -> tuple[float, float]:
+        """First and last time of the curve."""
+        return float(self.knots[self.degree]), float(self.knots[-self.degree - 1])
+
+    @property
+    def knots(self) -> Doubles:
+        """Knots, shape (n + degree + 1,)."""
+        knots: Doubles = self._curve.knots
+        return knots
+
+    @property
+    def control_points(self) -> P:
+        """Control points, shape (..., n, *point_shape)."""
+        points: P = self._curve.control_points
+        return points
+
+    @property
+    def degree(self) -> int:
+        """Degree of the curve."""
+        degree: int = self._curve.degree
+        return degree
+
+    @property
+    def space(self) -> Space[P]:
+        """Space of the curve."""
+        space: Space[P] = self._curve.space
+        return space
+
+    def _fill(self, *parts: Any) -> None:
+        (self._curve,) = parts
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, ControlledSpline):
+            return NotImplemented
+        return (
+            type(self._curve) is type(other._curve)
+            and self.space == other.space
+            and self.degree == other.degree
+            and np.array_equal(self.knots, other.knots)
+            and all(
+                np.array_equal(*pair)
+                for pair in zip(*(parts_of(c.control_points, c.space, "") for c in (self, other)), strict=True)
+            )
+        )
+
+    def _made_of(self, radius: float | None = None) -> str:
+        return f"{self.knots.size - self.degree - 1} control points, degree {self.degree}"
+
+    def __repr__(self) -> str:
+        count = self.knots.size - self.degree - 1
+        what = f"{self._batch_text}{count} control points, degree {self.degree}, {self._span_text}"
+        return f"<{type(self).__name__} on {self.space!r}: {what}>"
+
+
+def control_array(value: ArrayLike, space: Space[Any], least: int) -> tuple[Doubles, float]:
+    """Return control points as floating-point numbers of the core, and their tolerance."""
+    array = space._array(value, "control_points")
+    doubles = space._doubles(array, "control_points") if array.ndim > len(space.point_shape) else None
+    if doubles is None or array.size == 0 or space._lead(doubles)[-1] < least:
+        shape = ", ".join(map(str, space.point_shape))
+        raise ValidationError(
+            f"control_points has shape {array.shape}; a curve needs shape (..., n, {shape}) with n >= {least}"
+        )
+    return doubles, space._tol(array)
+
+
+def checked_points(space: Space[Any], doubles: Doubles, tol: float) -> Array:
+    """Project control points onto the space.
+
+    Raises
+    ------
+    ValidationError
+        If a control point is not on the space.
+    CutLocusError
+        If two neighbouring control points are not joined by a unique shortest geodesic.
+    """
+    *batch, count = space._lead(doubles)
+    data, ends = Points(doubles, tol, tuple(batch), count), ends_of("natural", space, tuple(batch))
+    try:
+        (points,), _ = validated(space, np.arange(count, dtype=np.float64), [data], [ends])
+    except ValidationError as error:
+        raise ValidationError(str(error).replace("points[", "control_points[")) from None
+    p, q = space._neighbours(points)
+    try:
+        space._apply("log", p=p, q=q)
+    except CutLocusError as error:
+        row, _, why = str(error).removeprefix("pair ").partition(": the points ")
+        *curve, i = map(int, np.unravel_index(int(row), (*batch, count - 1)))
+        raise CutLocusError(f"control_points[{i}] and control_points[{i + 1}]{of_index(curve)} {why}") from None
+    return points
+
+
+def checked_knots(knots: ArrayLike, count: int, degree: int) -> Doubles:
+    """Return a copy of the knots of a B-spline with `count` control points after validation."""
+    array = as_array(knots, "knots")
+    if array.ndim != 1 or array.dtype.kind not in "biuf":
+        raise ValidationError(
+            f"knots must be a one-dimensional array of real numbers, not {array.dtype} of shape {array.shape}"
+        )
+    needed = count + degree + 1
+    if count <= degree:
+        raise ValidationError(f"degree {degree} needs at least {degree + 1} control points, got {count}")
+    if array.size != needed:
+        raise ValidationError(f"{count} control points of degree {degree} need {needed} knots, got {array.size}")
+    result = cast(array.copy())
+    refuse(~np.isfinite(result), "knots", lambda _: "is not finite")
+    falls = np.flatnonzero(result[1:] < result[:-1])
+    if falls.size:
+        raise ValidationError(f"knots[{falls[0] + 1}] = {result[falls[0] + 1]} is before knots[{falls[0]}]")
+    if not np.isfinite(float(result[-1]) - float(result[0])):
+        raise ValidationError("knots span more than the floating-point range")
+    times, repeats = np.unique(result, return_counts=True)
+    if repeats.max() > degree + 1:
+        most = np.argmax(repeats)
+        raise ValidationError(
+            f"knots repeat {times[most]} {repeats[most]} times; with degree {degree} a knot may repeat at most "
+            f"{degree + 1} times"
+        )
+    if not result[degree] < result[count]:
+        raise ValidationError(f"the domain of the curve is empty: knots[{degree}] and knots[{count}] are equal")
+    return result
+
+
+# ---- bézier and B-spline curves, which approximate their control points without interpolating them ----
+
+
+class BSpline(ControlledSpline[P]):
+    """Construct a B-spline curve from control points.
+
+    The curve is evaluated by de Boor's algorithm with geodesics in place of straight lines. On a Euclidean space the
+    result equals SciPy's ``BSpline``. Leading axes of the control points are batch axes.
+
+    Parameters
+    ----------
+    knots : array_like, shape (n + degree + 1,)
+        Non-decreasing knots for n control points. A knot may repeat up to ``degree + 1`` times; the curve is less
+        smooth there.
+    control_points : array_like, shape (..., n, *space.point_shape)
+        Control points. Rounded points are projected onto the manifold; the tolerance is that of `CubicSpline`.
+    degree : int
+        Degree, at least 1.
+    space : Space or str
+        A space or its name. Products and manifolds made of functions are not supported.
+
+    Raises
+    ------
+    ValidationError
+        If the input does not meet the requirements above.
+    CutLocusError
+        If two neighbouring control points are not joined by a unique shortest geodesic.
+
+    Warns
+    -----
+    FarPointsWarning
+        If there are at least five control points and more than half of the steps between them exceed 0.6 of the
+        distance to the cut locus.
+
+    See Also
+    --------
+    BezierCurve : Construct a Bézier curve of any degree.
+    CubicSpline : Interpolate points by a C² curve.
+
+    Notes
+    -----
+    On a curved space the curve is C¹ at simple knots, as long as the degree is at least two. Higher derivatives may
+    jump at interior knots. There, the derivatives from the right are returned, and at the end of the curve those from
+    the left.
+
+    The methods ``transport`` and ``lift`` of `CubicSpline` are absent: they follow a curve through cubic Bézier
+    segments, of which a B-spline on a curved space does not consist.
+
+    References
+    ----------
+    T. Popiel, L. Noakes, Bézier curves and C² interpolation in Riemannian manifolds, J. Approx. Theory 148 (2007).
+
+    Examples
+    --------
+    >>> import symspline as ss
+    >>> corner = ss.BSpline([0, 0, 0, 1, 1, 1], [[1, 0, 0], [0, 1, 0], [0, 0, 1]], 2, ss.Sphere(2))
+    >>> corner(0.5).round(8)
+    array([0.40824829, 0.81649658, 0.40824829])
+    """
+
+    _format = "symspline-bspline"
+    _kind = "B-spline"
+    _curve: ControlledCurve
+
+    def __init__(self, knots: ArrayLike, control_points: ArrayLike, degree: int, space: Space[P] | str) -> None:
+        space = _factor(space)
+        degree = whole_number(degree, "degree", 1)
+        doubles, tol = control_array(control_points, space, 2)
+        knots = checked_knots(knots, space._lead(doubles)[-1], degree)
+        *batch, count = space._lead(doubles)
+        data = unwrapped(space, Points(doubles, tol, tuple(batch), count))
+        self._fill(ControlledCurve(space, knots, checked_points(space, data.numbers, tol), degree))
+        warn_of_far_data(space, [data])
+
+    def _picked(self, index: Any) -> Self:
+        control = np.ascontiguousarray(self.control_points[index])
+        return self._of(ControlledCurve(self.space, self.knots, control, self.degree))
+
+    def _state(self) -> dict[str, Any]:
+        head = {"format": self._format, "version": VERSION, "space": self.space}
+        return head | {"knots": self.knots, "control_points": self.control_points, "degree": self.degree}
+
+    @classmethod
+    def _from_state(cls, state: Entries) -> Self:
+        space, degree = _factor(read_space(state)), state["degree"]
+        control, knots = read_array(state, "control_points", space), state["knots"]
+        if isinstance(state, Stored):
+            with entry("control_points"):
+                # They keep the values that they had after projection.
+                checked_points(space, *control_array(control, space, 2))
+            with entry("degree"):
+                degree = whole_number(degree, "degree", 1)
+            with entry("knots"):
+                knots = checked_knots(knots, space._lead(space._doubles(control, "control_points"))[-1], degree)
+        return cls._of(ControlledCurve(space, knots, control, degree))
+
+
+class BezierCurve(BSpline[P]):
+    r"""Construct a Bézier curve of any degree, for times from 0 to 1.
+
+    The curve is evaluated by de Casteljau's algorithm with geodesics in place of straight lines. The degree is the
+    number of control points minus one.
+
+    Parameters
+    ----------
+    control_points : array_like, shape (..., degree + 1, *space.point_shape)
+        Control points, at least two per curve. Leading axes are batch axes.
+    space : Space or str
+        A space or its name. Products and manifolds made of functions are not supported.
+
+    Raises
+    ------
+    ValidationError
+        If the input does not meet the requirements above.
+    CutLocusError
+        If two neighbouring control points are not joined by a unique shortest geodesic.
+
+    See Also
+    --------
+    BSpline : Construct a B-spline curve from control points.
+
+    Notes
+    -----
+    A segment of a `CubicSpline` is a Bézier curve of degree three, equation (8) of the paper:
+
+    .. math:: \gamma(t) = [\,[\,[p_0, q_0]_t, [q_0, q_1]_t\,]_t, [\,[q_0, q_1]_t, [q_1, p_1]_t\,]_t\,]_t,
+
+    where :math:`[p, q]_t` is the geodesic from p to q.
+
+    References
+    ----------
+    G. Bogfjellmo, K. Modin, O. Verdier, A Numerical Algorithm for C²-Splines on Symmetric Spaces, SIAM J. Numer.
+    Anal. 56 (2018), equation (8).
+
+    Examples
+    --------
+    >>> import symspline as ss
+    >>> curve = ss.BezierCurve([[1, 0, 0], [0, 1, 0], [0, 0, 1]], ss.Sphere(2))
+    >>> curve(0.5).round(8)
+    array([0.40824829, 0.81649658, 0.40824829])
+    >>> curve(0, nu=1).round(8) + 0.0
+    array([0.        , 3.14159265, 0.        ])
+    """
+
+    _format = "symspline-bezier"
+    _kind = "Bézier curve"
+
+    def __init__(self, control_points: ArrayLike, space: Space[P] | str) -> None:
+        space = _factor(space)
+        count = space._lead(control_array(control_points, space, 2)[0])[-1]
+        super().__init__([0.0] * count + [1.0] * count, control_points, count - 1, space)
+
+    @classmethod
+    def _from_state(cls, state: Entries) -> Self:
+        curve = super()._from_state(state)
+        count = curve.degree + 1
+        if curve.knots.tolist() != [0.0] * count + [1.0] * count:
+            raise ValidationError("entry 'knots' must be zeros and ones, as many of either as there are points")
+        return curve
+
+
+def _factor(space: Space[P] | str) -> Space[P]:
+    """Return the space, which must not be a product."""
+    space = space_named(space)
+    if isinstance(space, Product):
+        raise ValidationError(
+            "B-spline and Bézier curves are not defined on a Product. Make one curve for each factor."
+        )
+    refuse_functions(space, "B-spline and Bézier curves are not made")
+    return space
+
+
+# ---- cumulative B-spline curves on Lie groups ----
 
 if TYPE_CHECKING:
     pass

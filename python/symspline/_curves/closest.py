@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from .. import _core
 from .._core import CutLocusError, ValidationError
-from .._curves.curve import CurveArrays
-from .._curves.length import ArcLength, Evaluable
-from .._curves.representatives import cut_fractions
 from .._spaces import Array, Doubles, Quotient, Space, factors_of, parts_of, product_norm
 from ..manifolds import Manifold
+from .curve import CurveArrays
+from .failures import cut_fractions
+from .length import ArcLength, Evaluable
 
 Indices = NDArray[np.int64]
 

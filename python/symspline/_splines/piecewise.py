@@ -14,14 +14,13 @@ from .._base.input import times_of
 from .._base.time import TimeAxis
 from .._base.typing import BCType, Extrapolate, P, Progress, Time, TimesLike
 from .._core import ValidationError
-from .._curves.at_times import call_at_times, evaluated
+from .._curves.composed import call_at_times, evaluated
 from .._curves.curve import CurveArrays
 from .._curves.fit import curve_of
 from .._curves.options import check_progress, extrapolation_mode, quantity_of
 from .._spaces import Array, Doubles, Product, Space, parts_of
 from . import archive
-from .curve import Curve, check_increasing
-from .timed_curve import TimedCurve
+from .base import Curve, TimedCurve, check_increasing
 
 # Relative difference of velocities that are equal up to rounding.
 _SAME = 1e-12

@@ -14,12 +14,12 @@ from numpy.typing import ArrayLike, NDArray
 from .._base.arrays import checked_flag, checked_number, short_repr
 from .._base.typing import FloatArray, P, Time
 from .._core import ValidationError
+from .._curves.closest import ClosestPoints
 from .._curves.composed import Retimed
+from .._curves.extrema import checked_values, crossings, extrema, rounding_noise
 from .._curves.length import ArcLength, Evaluable
 from .._spaces import Array, Doubles, Space, factors_of, parts_of
 from ..manifolds import Manifold
-from .closest import ClosestPoints
-from .extrema import checked_values, crossings, extrema, rounding_noise
 
 # Names of quantities in the core.
 _QUANTITIES = {"speed": "speed", "acceleration": "bend"}
