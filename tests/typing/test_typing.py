@@ -1,7 +1,7 @@
 """Type checkers infer the types of `right.py`, reject the calls of `wrong.py`, and see no Any in public results."""
 
 import functools
-import importlib
+import importlib.util
 import importlib.util
 import inspect
 import os
@@ -72,6 +72,8 @@ def public_functions():
     found = {}
     for module in interface.MODULES:
         name = ".".join(filter(None, ["symspline", module]))
+        if module == "torch" and not importlib.util.find_spec("torch"):
+            continue
         imported = importlib.import_module(name)
         for public in imported.__all__:
             thing = getattr(imported, public)
