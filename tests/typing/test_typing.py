@@ -2,7 +2,6 @@
 
 import functools
 import importlib.util
-import importlib.util
 import inspect
 import os
 import re

@@ -291,7 +291,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
             warn()
 
     @noise_method
-    def std(self, x: TimesLike, *, nu: int = 0, calibrated: bool = True) -> Any:
+    def std(self, x: TimesLike, *, nu: int = 0, calibrated: bool = True) -> FloatArray | tuple[FloatArray, ...]:
         r"""Compute the standard deviation of the curve in one coordinate of an orthonormal frame.
 
         Parameters
@@ -429,7 +429,9 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         return process_ratio(times, weights, self._knots_of(index), band, lam, end_kinds(self._bc_type), x, nu)
 
     @noise_method
-    def band(self, x: TimesLike, level: float = 0.95, *, calibrated: bool = True) -> Any:
+    def band(
+        self, x: TimesLike, level: float = 0.95, *, calibrated: bool = True
+    ) -> FloatArray | tuple[FloatArray, ...]:
         """Compute the radius of the ball that contains the true point with a given probability.
 
         Parameters
@@ -481,7 +483,9 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         )
 
     @noise_method
-    def cov(self, x: TimesLike, y: TimesLike | None = None, *, nu: CovarianceOrder = 0, calibrated: bool = True) -> Any:
+    def cov(
+        self, x: TimesLike, y: TimesLike | None = None, *, nu: CovarianceOrder = 0, calibrated: bool = True
+    ) -> FloatArray | tuple[FloatArray, ...]:
         r"""Compute the covariance of the curve in the frames along it.
 
         Parameters
