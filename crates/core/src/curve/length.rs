@@ -7,20 +7,10 @@ use super::data::Times;
 /// The number of positive nodes of the Gauss–Legendre rule, which is applied to an interval and to its halves.
 const PAIRS: usize = 5;
 /// Its nodes and weights on [−1, 1]; the others are symmetric.
-const NODES: [f64; PAIRS] = [
-    0.148874338981631211,
-    0.433395394129247191,
-    0.679409568299024406,
-    0.865063366688984511,
-    0.973906528517171720,
-];
-const WEIGHTS: [f64; PAIRS] = [
-    0.295524224714752870,
-    0.269266719309996355,
-    0.219086362515982044,
-    0.149451349150580593,
-    0.066671344308688138,
-];
+const NODES: [f64; PAIRS] =
+    [0.14887433898163122, 0.4333953941292472, 0.6794095682990244, 0.8650633666889845, 0.9739065285171717];
+const WEIGHTS: [f64; PAIRS] =
+    [0.29552422471475287, 0.26926671930999635, 0.21908636251598204, 0.1494513491505806, 0.06667134430868814];
 /// Rounds in which the error may fail to halve, before it counts as a rounding error.
 const PATIENCE: usize = 5;
 /// Values that are computed in one call.
