@@ -327,7 +327,7 @@ impl Term<'_> {
     /// Linearises the measurements. `motion_at` returns the motion of a part at times, with derivatives up to an order.
     pub fn linearised<'m, E: From<BadRow>>(
         &self,
-        motion_at: &dyn Fn(&[f64], usize, usize) -> Result<Motion<'m>, E>,
+        motion_at: &MotionAt<'_, 'm, E>,
         values: &[f64],
         spacing: f64,
         columns: &Columns,
@@ -353,7 +353,7 @@ impl Term<'_> {
     /// The residuals only.
     pub fn residuals_at<'m, E: From<BadRow>>(
         &self,
-        motion_at: &dyn Fn(&[f64], usize, usize) -> Result<Motion<'m>, E>,
+        motion_at: &MotionAt<'_, 'm, E>,
         values: &[f64],
         times: &[f64],
         monitor: &Monitor,
@@ -363,6 +363,9 @@ impl Term<'_> {
         Ok(Linearised { size, residuals, ..Linearised::default() })
     }
 }
+
+/// The motion of a part at times, with derivatives up to an order.
+pub type MotionAt<'a, 'm, E> = dyn Fn(&[f64], usize, usize) -> Result<Motion<'m>, E> + 'a;
 
 impl Linearised {
     /// Sets the column of parameter k of p from residuals on both sides.

@@ -216,10 +216,10 @@ fn with_problem<T: Send>(
             desk.ask(Request::Residuals { term, states, values: values.to_vec() })
         }
     };
-    let calls: Vec<Box<dyn Fn(&[Motion], &[f64]) -> Residuals + Sync>> = terms
+    let calls: Vec<Box<ResidualsOf<'_>>> = terms
         .iter()
         .enumerate()
-        .map(|(number, term)| -> Box<dyn Fn(&[Motion], &[f64]) -> Residuals + Sync> {
+        .map(|(number, term)| -> Box<ResidualsOf<'_>> {
             let (order, residuals) = (term.8.as_ref().map_or(0, |own| own.1), residuals_of(number));
             Box::new(move |motion, values| residuals(motion, values, order))
         })
@@ -351,8 +351,12 @@ pub struct Solved<'py> {
     turn: f64,
 }
 
+/// Residuals of a term, from the motion of its parts and values of the parameters.
+type ResidualsOf<'a> = dyn Fn(&[Motion], &[f64]) -> Residuals + Sync + 'a;
+
 /// The result of the iteration, or the information about parameters that the measurements do not determine.
 #[derive(IntoPyObject)]
+#[allow(clippy::large_enum_variant, reason = "there is one per call")]
 pub enum Estimated<'py> {
     Solved(Solved<'py>),
     Singular(Out<'py>),
