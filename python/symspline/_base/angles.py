@@ -1,4 +1,4 @@
-"""Conversions between rotation matrices and unit quaternions, as formulas for numbers and for NumPy or JAX arrays."""
+"""Rotation matrices and unit quaternions, and longitudes and latitudes as points of S²."""
 
 from __future__ import annotations
 

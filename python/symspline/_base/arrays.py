@@ -1,4 +1,4 @@
-"""Arrays as a user gives them."""
+"""Arrays as a user gives them, and equality of objects that contain arrays."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Faults of fitted curves. The messages for every kind of fault are in this module only."""
+"""Faults of fitted curves, with the messages for every kind, and warnings at the line that called the package."""
 
 from __future__ import annotations
 

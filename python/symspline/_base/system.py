@@ -1,4 +1,4 @@
-"""The number of threads of parallel work."""
+"""Threads of parallel work, and information about the installation."""
 
 import os
 import platform

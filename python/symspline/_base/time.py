@@ -1,4 +1,4 @@
-"""Conversion between times of the user and floating-point numbers of the core."""
+"""Times of the user, also dates and durations, as floating-point numbers of the core."""
 
 from __future__ import annotations
 

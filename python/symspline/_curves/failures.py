@@ -1,4 +1,4 @@
-"""Errors and warnings about curves that failed, or that are close to a cut locus."""
+"""Errors and warnings about curves that failed, far points, signs of quaternions and repeated points."""
 
 from __future__ import annotations
 
@@ -362,7 +362,7 @@ def cut_fractions(space: Space[Any], points: Array) -> Doubles:
     return result
 
 
-# ---- warn about recordings in which the last point of a sensor was repeated at new times (sample and hold) ----
+# ---- recordings in which the last point of a sensor was repeated at new times (sample and hold) ----
 
 # Least number of points, and of runs of equal points that are not cut off at an end.
 FEWEST_HELD, _RUNS = 12, 5

@@ -1,4 +1,4 @@
-"""Limit given velocities: their control handles must stay inside the cut locus."""
+"""Limits of given velocities: handles inside the cut locus, and whole turns on a torus."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Velocities at the knots of curves through points, from geodesics between neighbouring points."""
+"""Velocities from geodesics between neighbouring points, and the curves of these geodesics."""
 
 from __future__ import annotations
 

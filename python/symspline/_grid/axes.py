@@ -1,4 +1,4 @@
-"""The axes of a grid, and coordinates to evaluate at."""
+"""The axes of a grid, coordinates to evaluate at, and the points at its nodes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Values and derivatives of grids in one factor of a space."""
+"""Values and derivatives of grids in one factor of a space, by the core or by functions in Python."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Smoothing splines, the results of smoothing fits."""
+"""Smoothing splines, the results of smoothing fits, and their state in files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Evaluation, lengths, batches and files of all curves."""
+"""The base classes of all curves: evaluation, lengths, batches, plots, parts and copies at other times."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The base class of curves that are given by knots, control points and a degree."""
+"""Bézier curves, B-splines, and cumulative B-splines on Lie groups."""
 
 from __future__ import annotations
 
@@ -229,7 +229,7 @@ def checked_knots(knots: ArrayLike, count: int, degree: int) -> Doubles:
     return result
 
 
-# ---- bézier and B-spline curves, which approximate their control points without interpolating them ----
+# ---- Bézier and B-spline curves, which approximate their control points without interpolating them ----
 
 
 class BSpline(ControlledSpline[P]):

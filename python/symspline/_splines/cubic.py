@@ -1,4 +1,4 @@
-"""C² cubic splines through points."""
+"""C² cubic splines through points, and further points at their end."""
 
 from __future__ import annotations
 

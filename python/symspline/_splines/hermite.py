@@ -1,4 +1,4 @@
-"""Cubic Hermite splines: curves through points with given velocities."""
+"""Cubic Hermite splines, and curves of geodesics between neighbouring points."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The coordinate that holds the times of points in an xarray object."""
+"""Coordinates of times, units of angles, and missing samples in xarray objects."""
 
 from __future__ import annotations
 
