@@ -42,7 +42,7 @@ def test_truncated_files(kind):
 @kinds
 def test_files_with_one_bad_byte(kind):
     data = stored(KINDS[kind])
-    # Most of the directory, where files are told apart, and some of the numbers.
+    # Most of the directory, which says where each array is, and some of the numbers.
     places = {*range(0, len(data), 31), *range(0, 400, 2), *range(len(data) - 1200, len(data), 4)}
     for k, i in enumerate(sorted(place for place in places if 0 <= place < len(data))):
         mask = (0x01, 0xFF)[k % 2]
