@@ -40,34 +40,6 @@ def test_products_with_graphs_move():
     assert len([axes for axes in figure.axes if axes.get_gid() == "time"]) >= 5
 
 
-def test_the_marker_is_on_the_curve():
-    """On the plane, on both sides of a globe, and on a map that the curve leaves on one side."""
-    spline = spline_on("r:2")
-    x = np.linspace(*spline.domain, 1201)
-    figure = at_time(spline, x[240])
-    dot = figure.axes[0].lines[-1]
-    np.testing.assert_allclose(np.ravel(dot.get_xydata()), spline(x[240]), atol=1e-12)
-    angle = np.radians(np.linspace(100, 260, 6))
-    around = ss.CubicSpline(None, np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=-1), "sphere:2")
-    figure = at_time(around, np.linspace(0, 5, 1201)[1100])
-    plan = next(axes for axes in figure.axes if axes.get_label() == "map")
-    lon, lat = plan.lines[-1].get_xydata()[0]
-    point = around(np.linspace(0, 5, 1201)[1100])
-    # The map is centred on the curve, at 180°.
-    assert lon == pytest.approx(np.degrees(np.arctan2(-point[1], -point[0]))) and lat == pytest.approx(0)
-
-
-def test_frames_of_poses_move():
-    spline = spline_on("se:3")
-    figure = at_time(spline, np.linspace(*spline.domain, 1201)[100])
-    pose = spline(np.linspace(*spline.domain, 1201)[100])
-    sticks = [np.stack(line.get_data_3d(), axis=1) for line in figure.axes[0].lines[-3:]]
-    for i, stick in enumerate(sticks):
-        np.testing.assert_allclose(stick[0], pose[:3, 3], atol=1e-12)
-        along = stick[1] - stick[0]
-        np.testing.assert_allclose(along / np.linalg.norm(along), pose[:3, i], atol=1e-12)
-
-
 def test_gaps_are_skipped():
     segments = [spline_on("r:1", t=np.arange(6.0)), spline_on("r:1", t=20 + np.arange(6.0))]
     at_time(ss.SegmentedCurve(segments), 21.0)

@@ -1,19 +1,14 @@
 """Pictures of recordings with gaps, noise, time zones, large coordinates, many points and several curves."""
 
-import matplotlib
-import matplotlib.style
 import numpy as np
 import pandas as pd
 import pytest
-from drawn import axes_named, legend_of, lines_of, rate_axes, rendered, role, spline_on, texts_of
-from matplotlib.colors import to_hex
+from drawn import axes_named, lines_of, rate_axes, rendered, role, spline_on, texts_of
 from matplotlib.dates import date2num
 from matplotlib.figure import Figure
 from refused import raises
-from scipy.spatial.transform import Rotation
 
 import symspline as ss
-from symspline._base.report import long_gaps
 
 RNG = np.random.default_rng(0)
 UTM = np.array([692_345.0, 5_334_781.0, 520.0])
@@ -55,27 +50,6 @@ def test_data_of_segments_with_dates_of_their_own():
     axes = axes_named(ss.SegmentedCurve(parts).plot(), "x")
     seen = np.concatenate([line.get_xydata() for line in axes.lines if role(line) == "data"])
     np.testing.assert_allclose(seen, np.column_stack([date2num(t), y[:, 0]])[[*range(15), *range(25, 40)]])
-
-
-def test_each_segment_has_a_frame():
-    t = np.concatenate([np.arange(0, 10, 0.5), [17.3, 17.4, 17.5], np.arange(30, 40, 0.5)])
-    turns = Rotation.from_rotvec(np.stack([np.sin(t), t / 3, np.cos(t)], axis=1))
-    axes = ss.fit_segments(t, turns, "so:3", max_gap=2).plot().axes[0]
-    offsets = np.concatenate([np.asarray(own.get_offsets()) for own in axes.collections if hasattr(own, "get_offsets")])
-    times = offsets[offsets[:, 1] == -1, 0]
-    for first, last in ((0, 9.5), (17.3, 17.5), (30, 39.5)):
-        assert ((times >= first) & (times <= last)).any()
-
-
-def test_random_times_have_no_long_gaps():
-    """The longest of n random steps is about log2(n) times the median."""
-    rng = np.random.default_rng(5)
-    found = [long_gaps(np.cumsum(rng.exponential(size=n))).sum() for n in (100, 1000, 10_000) for _ in range(20)]
-    assert np.sum(found) < 5
-    t = np.arange(1000.0)
-    t[600:] += 30
-    assert np.flatnonzero(long_gaps(t)).tolist() == [599]
-    assert np.flatnonzero(long_gaps(np.array([0, 1, 2, 13.5, 14, 15]))).tolist() == [2]
 
 
 def test_gaps_are_those_of_all_curves():
@@ -121,42 +95,7 @@ def test_large_coordinates_count_from_round_numbers(name):
     assert ax.get_xlim()[0] > 600_000
 
 
-def test_a_moving_frame_counts_from_the_same_number():
-    poses = np.tile(np.eye(4), (5, 1, 1))
-    poses[:, :3, 3] = UTM + np.arange(5)[:, None] * [10, 20, 1]
-    moving = ss.CubicSpline(None, poses, "se:3").animate(frames=3)
-    moving._draw_frame(0)
-    moving._draw_was_started = True
-    axes = moving._fig.axes[0]
-    sticks = [line.get_data_3d() for line in axes.lines if line.get_linewidth() == 3.5]
-    assert len(sticks) == 3 and all(abs(x[0] - 45) < 1e-6 and abs(y[0] - 81) < 1e-6 for x, y, _ in sticks)
-
-
-def test_rounding_errors_of_a_constant_component_are_not_magnified():
-    t = np.concatenate([np.arange(0, 10, 0.5), np.arange(30, 40, 0.5)])
-    turns = Rotation.from_rotvec(np.stack([np.sin(t / 3), t / 40, 0 * t], axis=1))
-    figure = ss.CubicSpline(t, turns, "so:3").plot()
-    low, high = axes_named(figure, "about x₃").get_ylim()
-    assert high - low > 0.5
-
-
 # ---- several curves ----
-
-
-def test_a_batch_says_how_many_curves_it_shows():
-    batch = ss.CubicSpline(None, np.cumsum(RNG.standard_normal((300, 12, 2)), axis=1), "r:2")
-    texts = texts_of(rendered(batch.plot()))
-    assert {"other curves, 47 of 297", "5–95 % of 300 curves"} <= set(texts)
-
-
-@pytest.mark.parametrize("name", ["torus:2", "gr:2,4", "stiefel:2,4", "spd:5"])
-def test_curves_of_components_have_their_colours(name):
-    curve = spline_on(name)
-    figure = rendered(ss.plot([curve, curve.reverse()], labels=["a", "b"], colors=["#ff0000", "#0000ff"]))
-    components = [axes for axes in figure.axes if axes.get_ylabel()[:1] in "xθ"]
-    assert len(components) == (2 if name in ("torus:2", "gr:2,4") else 4)
-    for axes in components:
-        assert {to_hex(line.get_color()) for line in axes.lines if line.get_gid() == "_curve"} <= {"#ff0000", "#0000ff"}
 
 
 @pytest.mark.parametrize(
@@ -174,18 +113,6 @@ def test_components_that_others_determine_are_omitted(name, shown):
     names = shown.split("," if "," in shown else " ")
     texts = texts_of(rendered(spline_on(name).plot()))
     assert sorted(text for text in texts if text.startswith(("x", "Re x", "Im x"))) == sorted(names)
-
-
-def test_many_curves_have_different_colours():
-    curves = [ss.CubicSpline(None, np.arange(3.0)[:, None] + i, "r:1") for i in range(9)]
-    labels = [f"a rather long label of run number {i}" for i in range(9)]
-    figure = rendered(ss.plot(curves, labels=labels, title="A very long title " * 6))
-    assert len({to_hex(line.get_color()) for line in figure.axes[0].lines if line.get_gid() == "_curve"}) == 9
-    figure.draw_without_rendering()
-    for text in figure.findobj(matplotlib.text.Text):
-        if text.get_text().startswith(("a rather", "A very")):
-            box = text.get_window_extent()
-            assert box.x1 < figure.bbox.width and box.y1 < figure.bbox.height
 
 
 def test_labels_and_colours_in_axes_of_the_user_distinguish_curves():
@@ -223,23 +150,6 @@ def test_data_have_one_entry_in_legends():
 # ---- fonts and rates ----
 
 
-@pytest.mark.parametrize("size", [16])
-@pytest.mark.parametrize("name", ["sphere:2", "se:2", "so:3", "r:3", "spd:2"])
-def test_pages_grow_with_the_font(name, size):
-    usual = spline_on(name).plot()
-    with matplotlib.rc_context({"font.size": size}):
-        figure = spline_on(name).plot()
-        np.testing.assert_allclose(figure.get_size_inches(), usual.get_size_inches() * size / 10)
-        figure.draw_without_rendering()
-        for axes in figure.axes:
-            for label in (axes.xaxis.label, axes.yaxis.label):
-                box = label.get_window_extent()
-                assert not label.get_text() or (box.x0 >= 0 and box.y0 >= 0)
-        assert spline_on(name).plot(figsize=(8, 6)).get_size_inches().tolist() == [8, 6]
-    label = rate_axes(figure)[0][0].yaxis.label if rate_axes(figure)[0] else figure.axes[-1].yaxis.label
-    assert label.get_fontsize() == pytest.approx(size)
-
-
 def test_rates_of_one_angle_have_a_sign():
     t = np.linspace(0, 6, 20)
     curve = ss.CubicSpline(t, np.sin(t)[:, None], "torus:1")
@@ -251,22 +161,6 @@ def test_rates_of_one_angle_have_a_sign():
     assert line[:, 1].min() < -0.5
 
 
-@pytest.mark.parametrize("name", ["se:2", "se:3"])
-def test_the_acceleration_of_a_pose_is_that_of_its_position(name):
-    n = int(name[-1])
-    t = np.linspace(0, 5, 12)
-    poses = np.tile(np.eye(n + 1), (12, 1, 1))
-    poses[:, :2, :2] = np.moveaxis([[np.cos(t), -np.sin(t)], [np.sin(t), np.cos(t)]], -1, 0)
-    poses[:, :n, n] = np.stack([3 * t + np.sin(t), np.cos(t), t], axis=1)[:, :n]
-    curve = ss.CubicSpline(t, poses, name)
-    (axes,) = [own for own in curve.plot().axes if own.get_ylabel().startswith("acceleration")]
-    (line,) = lines_of(axes)
-    x, h = np.linspace(0.3, 4.7, 40), 1e-3
-    x = x[np.abs(x[:, None] - t).min(axis=1) > 0.02]
-    second = np.linalg.norm((curve(x + h) - 2 * curve(x) + curve(x - h))[:, :n, n], axis=1) / h**2
-    np.testing.assert_allclose(np.interp(x, *line.T), second, atol=2e-3)
-
-
 @pytest.mark.parametrize("name", ["sphere:3", "su:2", "cp:1"])
 def test_angles_that_are_twice_the_distances_are_explained(name):
     figure = rendered(spline_on(name).plot())
@@ -276,34 +170,3 @@ def test_angles_that_are_twice_the_distances_are_explained(name):
         assert any(text.endswith("angles on it are twice the distances of states") for text in texts_of(figure))
     else:
         assert label == "speed\n|γ′| = |ω|/2, rad/t"
-
-
-def test_symbols_that_are_omitted_are_counted():
-    u = np.arange(40.0)
-    turns = Rotation.from_rotvec(np.stack([u / 6, u / 12, np.cos(u / 5)], axis=1))
-    curve = ss.CubicSpline(None, turns, "so:3")
-    ax = Figure(figsize=(5, 4)).add_subplot()
-    curve.plot(ax=ax)
-    assert ax.get_yticklabels()[0].get_text().startswith("given\n") and "of 40" in ax.get_yticklabels()[0].get_text()
-    names = ["Recursive estimate of the calibrated gimbal (run 7)", "slerp", "measured"]
-    figure = rendered(ss.plot([curve, ss.PiecewiseGeodesic(None, turns, "so:3"), (u, turns)], labels=names))
-    texts = texts_of(figure)
-    assert any(text.startswith("measured\n") and text.endswith(" of 40") for text in texts)
-    assert "Recursive\nestimate of\nthe …" in texts
-    colors = {to_hex(line.get_color()) for axes in figure.axes for line in lines_of_gid(axes)}
-    assert not colors & {"#d55e00", "#009e73", "#0072b2", "#0b559f", "#d95f0e"}
-
-
-def lines_of_gid(axes):
-    return [line for line in axes.lines if line.get_gid() == "_curve"]
-
-
-def test_tracks_of_a_metre_are_enlarged():
-    lon, lat = 10 + 1e-6 * np.array([0, 1, 2, 3.0]), 50 + 1e-6 * np.array([0, 1, 0, 2.0])
-    figure = rendered(ss.geo.plot(ss.CubicSpline(None, ss.geo.from_lonlat(lon, lat), "sphere:2")))
-    assert any(text.endswith(" m") for text in texts_of(figure))
-
-
-def test_markers_in_the_legend_have_the_colour_of_the_curve():
-    figure = ss.CubicSpline(None, [[0, 0], [1, 1], [2, 0.0]], "r:2").plot(label="A", color="#ff0000")
-    assert to_hex(legend_of(figure)["given points"].get_color()) == "#ff0000"

@@ -59,13 +59,6 @@ def land_of(axes):
     return [own for own in axes.get_children() if isinstance(own, PathPatch) and own.get_label() == "_land"]
 
 
-def test_whole_globe_has_land_on_both_maps():
-    figure = rendered(geo.plot(ss.CubicSpline(None, FLIGHT, "sphere:2")))
-    globe, chart = figure.axes[0], axes_named(figure, "map")
-    assert len(land_of(globe)) == len(land_of(chart)) == 1
-    assert not land_of(rendered(ss.CubicSpline(None, FLIGHT, "sphere:2").plot()).axes[0])
-
-
 @pytest.mark.parametrize("size, has_land, length", [(12.0, True, "200 km"), (0.01, False, "200 m")])
 def test_local_tracks_are_enlarged(size, has_land, length):
     figure = rendered(geo.plot(track(5, 40, size)))
@@ -136,31 +129,6 @@ def test_other_curves_are_refused(tmp_path):
     raises("radius must be a number above 0", geo.plot, track(5, 40, 2.0), radius=-1.0)
     geo.plot(track(5, 40, 2.0), tmp_path / "track.svg")
     assert (tmp_path / "track.svg").read_text("utf-8").startswith("<?xml")
-
-
-def test_labels_of_meridians_are_evenly_spaced():
-    for lon, span in ((11.2, 1.2), (-75.0, 0.7), (179.6, 3.0), (0.02, 0.05)):
-        t = np.arange(9.0)
-        points = geo.from_lonlat(lon + span * t / 8, 54 + 0.3 * span * np.sin(t))
-        figure = rendered(geo.plot(ss.CubicSpline(t, points, "sphere:2")))
-        axes = figure.axes[0]
-        for ticks, labels in ((axes.get_xticks(), axes.get_xticklabels()), (axes.get_yticks(), axes.get_yticklabels())):
-            words = [own.get_text() for own in labels]
-            assert 2 <= len(words) <= 9
-            values = [float(word.rstrip("°EWSN")) * (-1 if word[-1] in "WS" else 1) for word in words]
-            steps = np.diff(np.unwrap(values, period=360))
-            np.testing.assert_allclose(steps, steps[0], rtol=1e-6)
-            assert np.diff(ticks).min() > 0.6 * np.diff(ticks).max()
-            boxes = [own.get_window_extent() for own in labels]
-            assert not any(a.overlaps(b) for a, b in pairwise(boxes))
-
-
-def test_frames_without_coastlines_have_a_note():
-    t = np.arange(6.0)
-    for span, words in ((0.5, 1), (30.0, 0)):
-        points = geo.from_lonlat(11 + span * t / 5, 54 + 0.2 * np.sin(t))
-        texts = texts_of(rendered(geo.plot(ss.CubicSpline(t, points, "sphere:2"))))
-        assert texts.count("no coastlines at this scale") == words
 
 
 def test_batches_on_the_earth_have_distances_in_km():

@@ -73,15 +73,6 @@ def test_residuals_and_band_of_rotations():
     assert [own.get_label() for own in axes_named(figure, "speed").collections if role(own) == "95 % band"]
 
 
-def test_outliers_are_drawn_at_the_edge():
-    curve = attitudes(1.0, loss="cauchy")
-    panel = axes_named(rendered(curve.plot()), "BodyRates")
-    triangles = [line for line in panel.lines if line.get_marker() in "^v" and len(line.get_xdata())]
-    assert [line.get_xdata().tolist() for line in triangles] == [[S[10]]]
-    assert panel.get_ylim()[1] < 8 and np.abs(curve.residuals[1]).max() > 30
-    assert any("1 beyond the axis (triangles)" in text for text in texts_of(panel.figure))
-
-
 @pytest.mark.filterwarnings("ignore:The residuals:symspline.SmoothingWarning")
 def test_points_of_several_sensors_are_drawn():
     """Points of weight zero are not."""
@@ -107,17 +98,6 @@ def test_points_of_several_sensors_are_drawn():
     # The picture of the plane shows the band.
     assert [label for label in labels if "residual" in label] == ["Velocities\nresidual / σ", "Function\nresidual / σ"]
     assert not any("95 %" in label for label in labels)
-
-
-def test_time_offsets_move_points():
-    offset = measure.Constant(1, sigma=1.0)
-    late = measure.Points(T[2:-2] - 0.3, path(T[2:-2]) + 0.01 * noise(26, 2), sigma=0.01, time_offset=offset)
-    exact = measure.Points(S, path(S) + 0.01 * noise(90, 2, seed=1), sigma=0.01)
-    curve = ss.estimate([exact, late], 20, "r:2")
-    x, _ = curve._points_in(0)
-    moved = T[2:-2] - 0.3 + curve.parameters["time offset"].value[0]
-    np.testing.assert_allclose(x, np.sort(np.concatenate([S, moved])))
-    rendered(curve.plot())
 
 
 @pytest.mark.parametrize("dates", [False, True])
@@ -162,29 +142,3 @@ def test_curves_from_files_have_bands_and_no_data(tmp_path):
     )
     plane.save(tmp_path / "b.npz")
     assert len(dots(rendered(ss.load(tmp_path / "b.npz").plot()).axes[0])) == 0
-
-
-def test_curves_without_points():
-    beacons = np.array([[3.0, 0], [0, 3], [-3, -3]])
-
-    def ranges(x):
-        return np.linalg.norm(x[:, None] - beacons, axis=-1)
-
-    measured = ranges(path(S)) + 0.02 * noise(90, 3)
-    curve = ss.estimate([measure.Function(S, lambda x: ranges(x) - measured, sigma=0.02)], 12, "r:2")
-    figure = rendered(curve.plot())
-    assert len(dots(figure.axes[0])) == 0 and len(dots(axes_named(figure, "Function"))) == 270
-
-
-@pytest.mark.parametrize("name", ["s:2", "r:3", "spd:2"])
-def test_every_kind_of_picture(name):
-    space = ss.space(name)
-    rng = np.random.default_rng(0)
-    middle = space.random_point(rng)
-    nodes = space.exp(middle, 0.3 * space.random_tangent(rng, np.broadcast_to(middle, (5, *space.point_shape))))
-    truth = ss.CubicSpline(np.linspace(0, 10, 5), nodes, space)
-    y = space.exp(truth(T), 0.03 * space.random_tangent(rng, truth(T)))
-    v = space.transport(truth(T), y, truth(T, 1)) + 0.05 * space.random_tangent(rng, y)
-    given = [measure.Points(T, y, sigma=0.03), measure.Velocities(T, y, v, sigma=0.05)]
-    axes = axes_named(rendered(ss.estimate(given, 12, name).plot()), "Velocities")
-    assert axes.get_legend() is None and len(dots(axes)) == 30 * space.dim

@@ -74,20 +74,6 @@ def check_rates_of_poses(figure, space, curves):
             np.testing.assert_allclose(other[200:-200:50, 1], moved, atol=1e-4)
 
 
-def test_knots_are_marked():
-    t = [0.0, 0.5, 2.0, 3.5]
-    figure = spline_on("r:2", (4,), t).plot()
-    for label in ("speed", "acceleration"):
-        # No gaps are marked.
-        (marks,) = axes_named(figure, label).collections
-        np.testing.assert_array_equal([path[0, 0] for path in marks.get_segments()], t)
-    # Many of them are marked at the bottom, and not if they would fill it.
-    (marks,) = axes_named(spline_on("r:2", (300,)).plot(), "speed").collections
-    assert len(marks.get_segments()) == 300
-    assert marks.get_segments()[0][1, 1] < 0.1
-    assert not axes_named(spline_on("r:2", (301,)).plot(), "speed").collections
-
-
 def test_rounding_is_not_blown_up():
     """A great circle at constant speed has acceleration 0, whatever the rounding; a point at rest has no speed."""
     angle = np.arange(5)

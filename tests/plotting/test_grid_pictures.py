@@ -1,8 +1,5 @@
 """Pictures of grids: the content of images, symbols and nodes, of missing nodes, sections and dates."""
 
-import sys
-from io import BytesIO
-
 import numpy as np
 import pytest
 from drawn import axes_named, has_title, rendered, texts_of
@@ -10,7 +7,6 @@ from matplotlib.collections import PolyCollection
 from matplotlib.dates import date2num, num2date
 from matplotlib.figure import Figure
 from matplotlib.quiver import Quiver
-from matplotlib.text import Text
 from refused import raises
 
 import symspline as ss
@@ -115,43 +111,6 @@ def test_arrows_are_directions_over_the_polar_angle():
     np.testing.assert_allclose(np.cos(np.radians(shown)), np.abs(found[..., 0]) ** 2 - np.abs(found[..., 1]) ** 2)
 
 
-def test_vectors_of_the_plane():
-    grid = grid_on("r:2")
-    figure = rendered(grid.plot())
-    x, y, shown = image_of(figure)
-    np.testing.assert_allclose(shown, np.linalg.norm(grid.grid(x, y), axis=-1))
-    (arrows,) = [each for each in axes_named(figure, "field").collections if isinstance(each, Quiver)]
-    np.testing.assert_allclose(np.stack([arrows.U, arrows.V], axis=-1), grid(arrows.XY), atol=1e-9)
-    # No arrow is longer than the distance of neighbours.
-    assert np.hypot(arrows.U, arrows.V).max() / arrows.scale <= 0.36
-
-
-@pytest.mark.parametrize("name", ["so:3", "sphere:3", "su:2"])
-def test_orientation_maps_show_the_axis_that_moves_most(name):
-    """The first axis moves least under turns about it, and the image of another one has the colour."""
-    turns = np.sin(U)[:, None, None] * V[:, None] * [1.3, 0.05, 0.02] + [0.1, 0.2, 0.3]
-    matrices = ss.rotations.from_rotation_vectors(turns)
-    quaternion = np.concatenate(
-        [
-            np.cos(np.linalg.norm(turns, axis=-1, keepdims=True) / 2),
-            turns * np.sinc(np.linalg.norm(turns, axis=-1, keepdims=True) / 2 / np.pi) / 2,
-        ],
-        axis=-1,
-    )
-    w, a, b, c = np.moveaxis(quaternion, -1, 0)
-    spins = np.stack([w - 1j * c, -1j * a - b, -1j * a + b, w + 1j * c], axis=-1).reshape(*w.shape, 2, 2)
-    figure = rendered(grid_on(name, {"so:3": matrices, "sphere:3": quaternion, "su:2": spins}[name]).plot())
-    x, y, shown = image_of(figure)
-    (caption,) = [text for text in texts_of(figure) if text.startswith("direction of the")]
-    number = ["first", "second", "third"].index(caption.split("\n")[1].split()[0])
-    assert number > 0
-    frames = ss.GridSpline((U, V), matrices, "so:3").grid(x, y)
-    # White for the third axis, dark opposite to it, and hues around them.
-    up = frames[..., 2, number]
-    light = shown[..., :3].mean(axis=-1)
-    assert np.corrcoef(up.ravel(), light.ravel())[0, 1] > 0.8 and (shown[..., 3] == 1).all()
-
-
 def test_contours_are_misorientations():
     grid = grid_on("so:3")
     figure = rendered(grid.plot())
@@ -215,50 +174,6 @@ def test_fields_without_extent(name):
     rendered(grid_on(name, points).plot())
     points[:3] = points[4:] = points[:, :2] = points[:, 3:] = np.nan
     rendered(grid_on(name, points).plot())
-
-
-@pytest.mark.parametrize("name", ["r:1", "r:3", "so:3", "gr:2,5"])
-def test_grids_are_drawn_into_axes(name):
-    figure = Figure(figsize=(6, 5))
-    ax = figure.add_subplot(projection="3d" if name in ("r:3", "se:3") else None)
-    grid = grid_on(name)
-    assert grid.plot(ax=ax, title="mine") is ax
-    assert ax.get_title() == "mine" and figure.axes == [ax]
-    if name in ("r:3", "se:3"):
-        return
-    assert (ax.get_xlabel(), ax.get_ylabel()) == ("axis 0", "axis 1")
-    # The image is that of the figure of the grid, and the key to the right of it.
-    whole = axes_named(grid.plot(), "field")
-    if ax.images:
-        np.testing.assert_allclose(ax.images[0].get_extent(), whole.images[0].get_extent())
-    figure.draw_without_rendering()
-    (key,) = ax.child_axes
-    assert key.get_position().x0 >= ax.get_position().x1
-
-
-def test_options_of_figures_of_grids():
-    grid = grid_on("so:3")
-    figure = rendered(grid.plot(title="mine", figsize=(5, 4)))
-    assert figure.get_size_inches().tolist() == [5, 4] and "mine" in texts_of(figure)
-    figure.draw_without_rendering()
-    for text in figure.findobj(Text):
-        box = text.get_window_extent()
-        assert not text.get_text() or (box.x1 + box.x0) / 2 < figure.bbox.width
-    raises("figsize and ax exclude each other", grid.plot, ax=Figure().add_subplot(), figsize=(5, 4))
-    raises("ax has the projection", grid.plot, ax=Figure().add_subplot(projection="3d"))
-    one = ss.GridSpline((U,), smooth_field("sphere:2")[:, 0], "sphere:2")
-    ax = Figure().add_subplot()
-    assert one.plot(ax=ax, title="mine") is ax
-    assert one.plot(figsize=(5, 4)).get_size_inches().tolist() == [5, 4]
-
-
-def test_smoothing_grids_show_their_nodes():
-    noisy = smooth_field("r:1") + 0.1 * np.random.default_rng(8).standard_normal((7, 5, 1))
-    grid = ss.make_smoothing_grid((U, V), noisy, "r:1", lam=0.1)
-    figure = rendered(grid.plot())
-    assert "Smoothing grid on Euclidean(1)" in texts_of(figure)
-    x, y, shown = image_of(figure)
-    np.testing.assert_allclose(shown, grid.grid(x, y)[..., 0], atol=1e-12)
 
 
 def test_products_have_a_panel_per_factor():
@@ -325,15 +240,6 @@ def test_one_axis_gives_the_figure_of_the_curve():
     raises("the only axis of the grid has missing nodes", ss.GridSpline((U,), points, "sphere:2").plot)
 
 
-def test_scales_are_equal_unless_one_axis_is_much_longer():
-    for v, equal in ((V, True), (1000 * V, False)):
-        figure = rendered(grid_on("r:1", axes=(U, v)).plot())
-        axes = axes_named(figure, "field")
-        box = axes.get_window_extent()
-        ratio = (box.height / np.ptp(axes.get_ylim())) / (box.width / np.ptp(axes.get_xlim()))
-        assert (abs(ratio - 1) < 0.02) == equal
-
-
 def test_failed_rows_are_blank():
     """The picture has no values that depend on a row that meets a cut locus."""
     u = np.arange(6.0)
@@ -346,15 +252,13 @@ def test_failed_rows_are_blank():
     assert 0.1 < np.ma.getmaskarray(shown).mean() < 0.9
 
 
-def test_the_figure_is_saved(tmp_path):
-    grid = grid_on("r:1")
-    path, file = tmp_path / "grid.pdf", BytesIO()
-    assert isinstance(grid.plot(path), Figure) and path.read_bytes().startswith(b"%PDF")
-    grid.plot(file)
-    assert file.getvalue().startswith(b"\x89PNG")
-
-
-def test_without_matplotlib(monkeypatch):
-    monkeypatch.setitem(sys.modules, "matplotlib", None)
-    with pytest.raises(ImportError, match=r"^plots need matplotlib.*pip install 'symspline\[plot\]'$"):
-        grid_on("r:1").plot()
+def test_grids_are_drawn_into_axes_and_files(tmp_path):
+    grid = grid_on("so:3")
+    ax = Figure(figsize=(6, 5)).add_subplot()
+    assert grid.plot(ax=ax, title="mine") is ax and ax.get_title() == "mine"
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("axis 0", "axis 1")
+    assert grid.plot(figsize=(5, 4)).get_size_inches().tolist() == [5, 4]
+    raises("figsize and ax exclude each other", grid.plot, ax=ax, figsize=(5, 4))
+    raises("ax has the projection", grid.plot, ax=Figure().add_subplot(projection="3d"))
+    grid.plot(tmp_path / "grid.pdf")
+    assert (tmp_path / "grid.pdf").read_bytes().startswith(b"%PDF")

@@ -10,40 +10,8 @@ from scipy.spatial.transform import Rotation
 
 import symspline as ss
 
-SUBSCRIPTS = str.maketrans("0123456789,", "₀₁₂₃₄₅₆₇₈₉,")
 # Directions to the right and up, as the view explains them.
 VIEW = np.array([[-0.5, 0.866, 0.0], [-0.296, -0.171, 0.940]])
-PAULI = np.array([[[0, 1], [1, 0]], [[0, -1j], [1j, 0]], [[1, 0], [0, -1]]])
-ROTATIONS = {
-    "sphere:3": lambda q: ss.rotations.from_quaternions(q, scalar_first=True),
-    "so:3": np.array,
-    "o:3": np.array,
-    # U (v·σ) U* = (Rv)·σ
-    "su:2": lambda u: np.einsum("iab,mbc,jcd,mad->mij", PAULI, u, PAULI, u.conj()).real / 2,
-}
-
-
-@pytest.mark.parametrize("name", ROTATIONS)
-def test_given_frames_and_the_curve_have_a_row_each(name):
-    spline = spline_on(name, (4,), [0, 1, 2.5, 4])
-    figure = rendered(spline.plot())
-    given, curve = (q for q in figure.axes[0].collections if hasattr(q, "U") and len(q.X) > 3)
-    np.testing.assert_array_equal(np.unique(given.X), spline.t)
-    # Below every given frame is the same one, and there are more between.
-    assert set(spline.t) < set(np.round(curve.X, 2)) and (set(given.Y), set(curve.Y)) == ({0}, {-1})
-    for arrows in (given, curve):
-        matrices = ROTATIONS[name](spline(arrows.X[::3]))
-        # The arrows of a matrix are a projection of its columns.
-        arrows = np.stack([arrows.U, arrows.V]).reshape(2, -1, 3)
-        kept = np.isin(np.round(curve.X[::3], 2), spline.t) if arrows.shape[1] > 4 else np.full(4, True)
-        lengths = np.sort(np.linalg.norm(VIEW @ matrices, axis=1))[kept]
-        drawn = np.sort(np.linalg.norm(arrows, axis=0))[kept]
-        np.testing.assert_allclose(drawn / lengths, drawn[0, 0] / lengths[0, 0], rtol=1e-3)
-    # The view is explained, and the rows are named.
-    texts = texts_of(figure)
-    assert {"given", "curve", "view", "x₁", "x₂", "x₃"} <= set(texts)
-    words = "frames: rotations by unit quaternions; " * (name in ("sphere:3", "su:2")) + "lighter: between given ones"
-    assert words in texts
 
 
 @pytest.mark.parametrize("name", ["rp:4", "cp:2", "gr:2,5", "gr:4,5", "cgr:2,3", "cgr:2,5"])
@@ -90,20 +58,6 @@ def test_ellipses_are_drawn_to_scale(name):
     np.testing.assert_allclose(found, unit * roots, rtol=1e-2)
 
 
-def test_bodies_of_the_plane_point_along_their_first_axis():
-    spline = spline_on("se:2", (5,))
-    figure = rendered(spline.plot())
-    first, given, between = figure.axes[0].collections
-    paths = [path.vertices for path in (*first.get_paths(), *given.get_paths())]
-    assert len(between.get_paths()) > 5 and len(paths) == 5
-    assert {"given poses", "poses of the curve", "start"} <= set(texts_of(figure))
-    for path, pose in zip(paths, spline.points, strict=True):
-        tip = (path[0] - pose[:2, 2]) / np.linalg.norm(path[0] - pose[:2, 2])
-        np.testing.assert_allclose(tip, pose[:2, 0])
-        left = path[1] - path[3]
-        assert left @ pose[:2, 1] == pytest.approx(np.linalg.norm(left))
-
-
 @pytest.mark.parametrize(("name", "size"), [("so:3", 0.05), ("so:3", 1e-7), ("sphere:3", 0.02), ("su:2", 0.02)])
 def test_small_rotations_are_graphs(name, size):
     """Frames would look equal. The graphs, one per axis of space, begin at zero."""
@@ -132,30 +86,6 @@ def test_small_rotations_are_graphs(name, size):
     moving = spline.animate(frames=2)
     moving._draw_was_started = True
     moving._func(0.5)
-
-
-@pytest.mark.parametrize("largest", [2.0, 4.5, 8.0])
-def test_rotations_beside_positions_are_graphs(largest):
-    """They are counted from the first rotation, or from the middle one if that is too far; frames show all others."""
-    t = np.array([0.0, 0.7, 2, 3, 3.5, 5])
-    turns = Rotation.from_rotvec(np.multiply.outer(largest * t / 5, [0.6, 0.0, 0.8])) * Rotation.from_euler("x", 0.4)
-    spline = ss.CubicSpline(t, (turns.as_matrix(), np.stack([t, t**2, np.sin(t)], axis=1)), "so:3 x r:3")
-    texts = texts_of(rendered(spline.plot()))
-    assert {"SpecialOrthogonal(3), rotations", "Euclidean(3), vectors"} <= set(texts)
-    assert "C² spline of rotations and vectors" in texts
-    name = {2.0: "start of the curve", 4.5: "middle rotation"}.get(largest)
-    assert (f"rotation vector log(R R₀ᵀ) in rad, R₀: {name}" in texts) == (name is not None)
-    assert ("first axis" in texts) == (name is None)
-    if name is not None:
-        figure = spline.plot()
-        dots = [line.get_ydata() for axes in figure.axes[:3] for line in axes.lines if role(line) == "given points"]
-        middle = 0.0 if largest == 2.0 else largest / 2
-        expected = np.multiply.outer([0.6, 0.0, 0.8], largest * t / 5 - middle)
-        np.testing.assert_allclose(dots, expected, atol=1e-9 if largest == 2.0 else 0.03)
-        # Positions are graphs beside them.
-        assert axes_named(figure, "x₁").get_gid() == axes_named(figure, "x₃").get_gid() == "time"
-        spans = [np.ptp(axes.get_ylim()) for axes in figure.axes[:3]]
-        np.testing.assert_allclose(spans, spans[0])
 
 
 def test_covariances_are_standard_deviations_and_correlations():
@@ -226,19 +156,6 @@ def test_long_gaps_are_seen_in_graphs():
             assert drawn.min() < inside.min() and inside.max() < drawn.max()
 
 
-def test_several_curves_with_a_gap_keep_their_colours_and_move():
-    t = np.array([0.0, 1, 2, 3, 20, 21, 22, 23])
-    turns = Rotation.from_rotvec(np.multiply.outer(np.sin(t), [0.3, 0.2, 0.5])).as_matrix()
-    curves = [ss.CubicSpline(t, (turns, k * np.stack([t, t**2, t], axis=-1)), "so:3 x r:3") for k in (1, 2)]
-    figure = rendered(ss.plot(curves, labels=["one", "two"]))
-    axes = axes_named(figure, "x₁")
-    colors = {line.get_color() for line in axes.lines if role(line) == "given points"}
-    assert len(colors) == 2
-    moving = curves[0].animate(frames=3)
-    moving._draw_was_started = True
-    moving._func(1.5)
-
-
 def test_graphs_show_nothing_in_a_gap_that_no_data_determine():
     t = np.array([0.0, 1, 2, 3, 20, 21, 22, 23])
     points = np.stack([np.sin(3 * t), 0.1 * t, 5e5 + t], axis=-1)
@@ -281,13 +198,6 @@ def test_numbers_far_from_zero_are_differences_from_a_round_number():
     assert axes_named(figure, "x₃")
 
 
-def test_large_rotations_are_frames():
-    """A turn, also one that ends where it began, and matrices of different determinants."""
-    angles = np.linspace(0, 2 * np.pi, 9)
-    turn = ss.CubicSpline(None, Rotation.from_rotvec(angles[:, None] * [0, 0, 1]).as_matrix(), "so:3")
-    assert "first axis" in texts_of(turn.plot())
-
-
 def test_frames_stand_on_the_path():
     spline = spline_on("se:3", (5,))
     axes = rendered(spline.plot()).axes[0]
@@ -298,28 +208,6 @@ def test_frames_stand_on_the_path():
         ends = stick.reshape(5, 3, 3)
         np.testing.assert_allclose(ends[:, 0], spline.points[:, :3, 3])
         np.testing.assert_allclose(ends[:, 1] - ends[:, 0], length * spline.points[:, :3, i])
-
-
-@pytest.mark.parametrize("name", ["se:3", "r:3"])
-def test_boxes_are_filled(name):
-    """The box contains the curve and the frames, and is not much larger, also if the path is flat."""
-    t = np.linspace(0, 6, 40)
-    path = np.stack([8 * np.cos(0.8 * t), 5 * np.sin(0.8 * t), 0.1 * t], axis=-1)
-    poses = np.broadcast_to(np.eye(4), (40, 4, 4)).copy()
-    poses[:, :3, 3] = path
-    figure = rendered(ss.CubicSpline(t, poses if name == "se:3" else path, name).plot())
-    axes = figure.axes[0]
-    drawn = [np.stack(line.get_data_3d(), axis=1) for line in axes.lines if role(line) != "shadow on the floor"]
-    points = np.concatenate(drawn)
-    low, high = np.nanmin(points, axis=0), np.nanmax(points, axis=0)
-    limits = np.array([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()])
-    assert (low > limits[:, 0]).all() and (high < limits[:, 1]).all()
-    assert (np.ptp(limits, axis=1) < np.maximum(1.25 * (high - low), 0.35 * (high - low)[0])).all()
-    # The scales of the three axes are equal.
-    np.testing.assert_allclose(np.ptp(limits, axis=1) / axes._box_aspect, np.ptp(limits[0]) / axes._box_aspect[0])
-    words = " ".join(texts_of(figure))
-    assert "shadow on the floor" in words
-    assert ("16 of 40 given" in words) == (name == "se:3")
 
 
 def test_rotation_and_translation_have_panels_of_their_own():
@@ -344,21 +232,6 @@ def test_names_of_components():
         figure = spline_on(name).plot()
         (legend,) = [axes.get_legend() for axes in figure.axes if axes.get_legend()]
         assert {text.get_text().replace(" ", "_") for text in legend.texts} == set(words.split())
-
-
-@pytest.mark.parametrize(("name", "shape"), [("sphere:15", (16,)), ("so:10", (10, 10)), ("u:5", (5, 5))])
-def test_components_with_the_largest_ranges_have_names(name, shape):
-    spline = spline_on(name)
-    axes = axes_named(spline.plot(), "components")
-    found = {text.get_text() for text in axes.get_legend().texts}
-    values = spline(np.linspace(*spline.domain, 1000)).reshape(1000, -1)
-    is_complex = np.iscomplexobj(values)
-    ranges = np.maximum(np.ptp(values.real, axis=0), np.ptp(values.imag, axis=0))
-    comma = "," if max(shape) > 9 else ""
-    names = ["x" + comma.join(str(i + 1) for i in index).translate(SUBSCRIPTS) for index in np.ndindex(shape)]
-    largest = [names[i] for i in np.argsort(-ranges)[: 6 if is_complex else 12]]
-    expected = [f"{part} {own}" for own in largest for part in ("Re", "Im")] if is_complex else largest
-    assert found == {*expected, f"{(2 if is_complex else 1) * len(names) - 12} others"}
 
 
 def test_columns_of_frames_have_a_panel_each():
@@ -392,3 +265,15 @@ def test_imaginary_parts_are_dashed():
 def test_the_heading_names_the_metric_of_covariances(name, metric):
     spline = ss.CubicSpline(None, np.array([1.0, 2.0, 3.0])[:, None, None] * np.eye(2), name)
     assert f"3 points, natural ends, {metric} metric" in texts_of(spline.plot())
+
+
+def test_given_frames_and_the_curve_have_a_row_each():
+    """The arrows of a rotation are the projections of its columns."""
+    spline = spline_on("so:3", (4,), [0, 1, 2.5, 4])
+    figure = rendered(spline.plot())
+    given, curve = (own for own in figure.axes[0].collections if hasattr(own, "U") and len(own.X) > 3)
+    np.testing.assert_array_equal(np.unique(given.X), spline.t)
+    assert (set(given.Y), set(curve.Y)) == ({0}, {-1}) and {"given", "curve", "view"} <= set(texts_of(figure))
+    arrows = np.stack([given.U, given.V]).reshape(2, -1, 3)
+    lengths, drawn = np.linalg.norm(VIEW @ spline.points, axis=1), np.linalg.norm(arrows, axis=0)
+    np.testing.assert_allclose(np.sort(drawn) / drawn.max(), np.sort(lengths) / lengths.max(), rtol=2e-3)

@@ -1,89 +1,16 @@
 """Pictures in small axes and on small pages, dark styles, and the space that boxes fill."""
 
-import warnings
-from itertools import product
-
 import matplotlib.style
 import numpy as np
 import pytest
-from drawn import VIEWS, axes_named, rate_axes, rendered, role, spline_on, texts_of
-from matplotlib.colors import to_rgb
-from matplotlib.figure import Figure
-from matplotlib.transforms import Bbox
-from mpl_toolkits.mplot3d import proj3d
+from drawn import axes_named, rate_axes, rendered, role, texts_of
 
 import symspline as ss
-
-
-def widest(axes):
-    return max(line.get_linewidth() for line in axes.lines if line.get_gid() == "_curve")
-
 
 # ---- small axes and pages ----
 
 
-@pytest.mark.parametrize("name", VIEWS[::2])
-def test_small_axes_can_be_laid_out(name):
-    """The layout of matplotlib succeeds, and nothing is far outside the axes."""
-    figure = Figure(figsize=(3, 2.4), layout="constrained")
-    axes = figure.add_subplot(projection="3d" if name in ("euclidean:3", "se:3") else None)
-    spline_on(name).plot(ax=axes, title="small")
-    with warnings.catch_warnings():
-        # A layout that fails issues a warning.
-        warnings.simplefilter("error")
-        rendered(figure)
-    box, page = axes.get_tightbbox(), figure.bbox
-    # Boxes in three dimensions have labels that layouts do not know exactly.
-    most = 30 if axes.name == "3d" else 15
-    assert page.x0 - most < box.x0 < box.x1 < page.x1 + most and page.y0 - most < box.y0 < box.y1 < page.y1 + most
-
-
-def test_lines_are_thinner_in_small_axes():
-    large, small = (Figure(figsize=size).add_subplot() for size in ((8, 6), (2, 2)))
-    for axes in (large, small):
-        spline_on("r:2").plot(ax=axes)
-    assert widest(small) < 0.7 * widest(large) == pytest.approx(0.7 * 2.4)
-
-
-@pytest.mark.parametrize(
-    ("name", "size"),
-    [("so:3", (6, 4)), ("se:3", (5, 6)), ("sphere:2", (6, 4)), ("spd:5", (5, 6)), ("gr:2,3", (3.4, 2.6))],
-)
-def test_small_pages_keep_their_text_inside(name, size):
-    figure = rendered(spline_on(name).plot(figsize=size))
-    assert tuple(figure.get_size_inches()) == size
-    for text in figure.findobj(matplotlib.text.Text):
-        if text.get_text() and text.get_visible() and "axis" not in str(text.get_gid()):
-            box = text.get_window_extent()
-            centre = (box.x0 + box.x1) / 2, (box.y0 + box.y1) / 2
-            inside = figure.bbox.contains(*centre)
-            assert inside or text.axes is None or text.axes.name == "3d", (text.get_text(), box)
-    label = rate_axes(figure)[0][0].yaxis.label
-    # The page would be 11 inches wide or wider.
-    assert label.get_fontsize() < 8
-
-
-def test_large_pages_keep_the_size_of_text():
-    figure = spline_on("so:3").plot(figsize=(20, 15))
-    assert rate_axes(figure)[0][0].yaxis.label.get_fontsize() == pytest.approx(10)
-
-
 # ---- boxes ----
-
-
-@pytest.mark.parametrize("shape", [(1, 1, 1), (5, 1, 0.5), (1, 1, 8)])
-def test_boxes_fill_their_panel(shape):
-    points = np.random.default_rng(3).normal(size=(12, 3)) * shape
-    figure = rendered(ss.CubicSpline(None, points, "r:3").plot())
-    axes = figure.axes[0]
-    limits = [axes.get_xlim(), axes.get_ylim(), axes.get_zlim()]
-    x, y, _ = proj3d.proj_transform(*np.array(list(product(*limits))).T, axes.get_proj())
-    corners = axes.transData.transform(np.column_stack([x, y]))
-    place = axes.get_position(original=True)
-    panel = Bbox.from_bounds(*(place.bounds * np.tile(figure.bbox.size, 2)))
-    share = np.ptp(corners, axis=0) / [panel.width, panel.height]
-    assert share.max() > 0.7 and share.max() < 1
-    assert panel.contains(*corners.min(axis=0)) and panel.contains(*corners.max(axis=0))
 
 
 # ---- numbers on axes, factors and limits ----
@@ -158,25 +85,7 @@ def test_noise_on_the_earth_is_in_metres():
 # ---- dark styles ----
 
 
-def lightness(color):
-    return np.mean(to_rgb(color))
-
-
 @pytest.fixture
 def dark():
     with matplotlib.style.context("dark_background"):
         yield
-
-
-@pytest.mark.parametrize("name", ["so:3", "sphere:2", "se:3"])
-def test_grids_follow_dark_styles(name, dark):
-    space, rng = ss.space(name), np.random.default_rng(1)
-    middle = space.random_point(rng)
-    around = np.broadcast_to(middle, (5, 4, *space.point_shape))
-    points = space.project(space.exp(middle, 0.2 * space.random_tangent(rng, around)))
-    figure = rendered(ss.GridSpline((np.arange(5.0), np.arange(4.0)), points, space).plot())
-    assert to_rgb(figure.get_facecolor()) == (0, 0, 0)
-    assert all(lightness(text.get_color()) > 0.5 for text in figure.texts)
-    for axes in figure.axes:
-        for own in (axes.xaxis, axes.yaxis):
-            assert all(lightness(tick.get_color()) > 0.5 for tick in own.get_ticklabels())

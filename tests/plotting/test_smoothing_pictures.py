@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from drawn import axes_named, has_title, lines_of, points_around, rate_axes, rendered, role, texts_of
 from matplotlib.dates import date2num
-from matplotlib.path import Path
 
 import symspline as ss
 
@@ -79,14 +78,6 @@ def test_data_are_drawn_and_not_knots():
     np.testing.assert_array_equal([path[0, 0] for path in marks.get_segments()], T[weights > 0])
 
 
-def test_few_of_many_curves_have_data():
-    figure = rendered(smooth("r:2", curves=12).plot())
-    (heading,) = [text for text in texts_of(figure) if "degrees of freedom" in text]
-    assert heading.startswith("3 of 12 curves, 40 data each, ") and heading.endswith("band 95 %")
-    assert len(bands_of(figure.axes[0])) == len(bands_of(axes_named(figure, "speed"))) == 3
-    assert len(data_of(figure.axes[0])) == 3 * 40
-
-
 def test_products_lack_a_speed_band():
     both = ss.make_smoothing_spline(T, (noisy("r:1"), noisy("s:2")), "r:1 x s:2")
     figure = rendered(both.plot())
@@ -105,46 +96,6 @@ def test_band_of_a_graph():
     radius = spline.band(x[10])
     assert path.contains_points([[x[10], y[10] + 0.98 * radius], [x[10], y[10] - 0.98 * radius]]).all()
     assert not path.contains_points([[x[10], y[10] + 1.02 * radius], [x[10], y[10] - 1.02 * radius]]).any()
-
-
-def covered(band, places):
-    """Which places are filled: where the polygons go round more than not."""
-    polygons = band.get_path().to_polygons(closed_only=False)
-    return np.any([Path(polygon).contains_points(places) for polygon in polygons], axis=0)
-
-
-def test_band_of_a_path():
-    """What is nearer to the curve than the radius is filled, and nothing beyond."""
-    spline = smooth("r:2")
-    (band,) = bands_of(rendered(spline.plot()).axes[0])
-    fine = np.linspace(0, 10, 4001)
-    places = np.random.default_rng(0).uniform(-0.3, 0.3, (500, 2)) + spline(np.linspace(0, 10, 500))
-    reach = np.linalg.norm(places[:, None] - spline(fine), axis=2) / spline.band(fine)
-    inside = reach.min(axis=1)
-    assert (inside < 0.98).sum() > 50 and covered(band, places[inside < 0.98]).all()
-    assert (inside > 1.001).sum() > 50 and not covered(band, places[inside > 1.001]).any()
-
-
-@pytest.mark.filterwarnings("ignore::symspline.SmoothingWarning")
-def test_the_band_stays_on_the_globe_and_on_the_map():
-    """Also around a pole, across the date line and beyond the horizon."""
-    t = np.linspace(0, 2 * np.pi, 60)
-    circle = np.stack([np.cos(t), 0.1 * np.sin(2 * t), np.sin(t)], axis=-1)
-    rng, space = np.random.default_rng(1), ss.Sphere(2)
-    points = space.project(circle)
-    spline = ss.make_smoothing_spline(t, space.exp(points, 0.1 * space.random_tangent(rng, points)), space)
-    figure = rendered(spline.plot())
-    globe, chart = figure.axes[0], axes_named(figure, "map")
-    for axes, most in ((globe, 1.0), (chart, 360)):
-        for band in bands_of(axes):
-            vertices = band.get_path().vertices
-            assert np.isfinite(vertices).all() and np.abs(vertices).max() < most + 1e-9
-    (_,), (band,) = bands_of(globe), bands_of(chart)
-    # No piece of it goes across the map.
-    assert max(np.ptp(polygon[:, 0]) for polygon in band.get_path().to_polygons()) <= 180
-    # It goes on at the date line.
-    edge = covered(band, np.column_stack([np.repeat([-179.9, 179.9], 179), np.tile(np.arange(-89, 90), 2)]))
-    assert edge.any() and (edge[:179] == edge[179:]).mean() > 0.93
 
 
 @pytest.mark.filterwarnings("ignore::symspline.SmoothingWarning")

@@ -55,14 +55,6 @@ def test_colours_and_legends():
         assert low <= x.min() and x.max() <= high
 
 
-def test_limits_of_boxes_contain_all_curves():
-    ax = axes_for("se:3")
-    curves = [ss.CubicSpline(None, shift + np.eye(3), "r:3") for shift in (0, 50, -20)]
-    for curve in curves:
-        curve.plot(ax=ax)
-    assert ax.get_xlim()[0] < -20 and ax.get_xlim()[1] > 50
-
-
 def test_times_and_frames_of_the_user_stay():
     ax = axes_for("r:1")
     ax.set_xlabel("hours")
@@ -96,44 +88,6 @@ def test_title_colour_label_and_size_of_a_page():
     texts = [text.get_text() for text in figure.findobj(matplotlib.text.Text)]
     assert {"A drive", "car", "start", "given points"} <= set(texts)
     assert {line.get_color() for axes in figure.axes for line in axes.lines if line.get_gid()} == {"tab:green"}
-
-
-def test_small_pages_are_scaled():
-    figure = rendered(spline_on("so:3").plot(figsize=(2, 1)))
-    assert figure.get_size_inches().tolist() == [2, 1]
-
-
-def luminance(color):
-    return matplotlib.colors.to_rgb(color) @ np.array([0.3, 0.6, 0.1])
-
-
-@pytest.mark.parametrize("name", ["euclidean:2", "sphere:2", "euclidean:3", "so:3", "hyperbolic:2"])
-def test_dark_styles(name):
-    with matplotlib.style.context("dark_background"):
-        page = rendered(spline_on(name).plot())
-        ax = axes_for(name)
-        spline_on(name).plot(ax=ax, color="tab:olive")
-        rendered(ax.get_figure())
-    assert luminance(page.get_facecolor()[:3]) < 0.1
-    for text in page.findobj(matplotlib.text.Text):
-        assert not text.get_text() or luminance(text.get_color()) > 0.5
-    for axes in (*page.axes, ax):
-        for line in axes.lines:
-            if line.get_gid() == "_curve":
-                assert luminance(line.get_color()) > 0.3
-    # The colour of the user remains.
-    own = [line for line in ax.lines if line.get_gid() == "_curve"]
-    assert all(to_hex(line.get_color()) == to_hex("tab:olive") for line in own)
-
-
-def test_font_sizes_follow_the_user():
-    def size(figure):
-        (text,) = [own for own in figure.findobj(matplotlib.text.Text) if own.get_text().startswith("C² spline")]
-        return text.get_fontsize()
-
-    usual = size(spline_on("r:2").plot())
-    with matplotlib.rc_context({"font.size": 15}):
-        assert size(spline_on("r:2").plot()) == pytest.approx(1.5 * usual)
 
 
 def test_windows_use_pyplot(monkeypatch):
