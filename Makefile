@@ -17,7 +17,7 @@ unexport PYTHONDONTWRITEBYTECODE
 unexport MAKEFLAGS MFLAGS
 
 .PHONY: demo check check-lints check-rust check-types check-python test test-oracles test-torch test-programs \
-	test-aarch64 fuzz bench size docs wheel sdist test-wheel crate crate-msrv crate-semver publish-wheels publish-crates \
+	test-aarch64 test-timing fuzz bench size docs wheel sdist test-wheel crate crate-msrv crate-semver publish-wheels publish-crates \
 	publish-npm check-tools clean docs-check wasm test-wasm
 
 demo: .venv/built .venv/plot
@@ -80,11 +80,15 @@ test-aarch64:
 		--lib --tests --target aarch64-unknown-linux-musl
 
 # About ten minutes of random input on two cores; what fails is kept in .hypothesis and tried first the next time. Then the
-# table of the page on trust, from few recordings, and the time until long calls end after Ctrl-C.
+# table of the page on trust, from few recordings.
 fuzz: .venv/built .venv/tools
 	$(BIN)/python -m pytest --numprocesses auto tests/fuzz
 	$(BIN)/python -m tests.trust 20
-	$(BIN)/python tests/host/interrupts.py
+
+# What depends on the time or the memory that the machine has left: one test at a time, on an idle machine.
+test-timing: .venv/built .venv/tools
+	$(BIN)/python -m pytest tests/timing
+	$(BIN)/python tests/timing/interrupts.py
 
 # Lines of code by part of the package, beside the aims.
 size:

@@ -15,7 +15,7 @@
     tensors      diffusion tensors in the order of each program
     shapes       affine shapes of landmarks, and their page
     xarray_dask  curves in xarray objects, in blocks of dask, on workers that die
-    host         threads, memory, interruptions, arrays of other libraries
+    host         threads, memory, progress, arrays of other libraries
     typing       annotations, as type checkers read them
     docs         the code of the documentation runs
     raw_data     recordings with gaps, duplicates, missing samples and huge offsets, through every entry point
@@ -24,6 +24,7 @@ Outside the default run:
     evidence     formulas of the paper and of the theory, comparisons and tables of pages: `make docs`
     examples, bench, javascript   the recipes and the benchmarks run: `make test-programs`
     fuzz         random input: `make fuzz`
+    timing       what depends on the time or the memory that the machine has left: `make test-timing`
     oracles, pytorch   have environments of their own: `make test-oracles`, `make test-torch`
 
 Shared modules: `cases` has the one list of spaces, the one list of end conditions, data on them, and decorators that

@@ -13,8 +13,8 @@ from tabular import TIMES, assert_same_columns, numbered, numbers, read_table, t
 import symspline as ss
 from symspline.cli import main
 
-# Every space in one format, and every format with a third of the spaces.
-ENDINGS = dict(zip(map(str, SPACES), cycle(["csv", "npz", "parquet"]), strict=False))
+# A third of the spaces, and every format with a third of them.
+ENDINGS = dict(zip(map(str, SPACES[::3]), cycle(["csv", "npz", "parquet"]), strict=False))
 
 
 @pytest.mark.parametrize("name, ending", ENDINGS.items())
@@ -37,7 +37,7 @@ def test_tables_of_every_space(run, name, ending):
     run("check again.npz")
 
 
-@pytest.mark.parametrize("name", [str(space) for space in SPACES[::3]])
+@pytest.mark.parametrize("name", [str(space) for space in SPACES[1::6]])
 def test_many_curves_of_every_space(run, name):
     space, p = ss.space(name), points_on(ss.space(name), step=0.4)
     columns = {"t": np.array([*"001122"], float), **numbered(p)}
@@ -72,17 +72,6 @@ def test_names_of_curves_that_were_made_in_python(run):
     run("sample a.npz -n 2 -o b.csv")
     names = list(table("b.csv"))
     assert (names[1], names[2], names[11], names[121]) == ("m1_1", "m1_2", "m1_11", "m11_11")
-
-
-def test_arrays_of_matrices_and_of_complex_numbers(run):
-    p = points_on(ss.space("so:3 x cp:1"), step=0.4)
-    spline = ss.CubicSpline(TIMES, p, "so:3 x cp:1")
-    np.savez("a.npz", psi=p[1], when=TIMES, R=p[0])
-    run("fit a.npz --space 'so:3 x cp:1' --time when --columns R,psi -o b.npz")
-    assert same_curve(ss.load("b.npz"), spline)
-    np.savez("a.npz", points=p[0], t=TIMES, R=p[0])
-    run("fit a.npz --space so:3 -o b.npz")
-    assert same_curve(ss.load("b.npz"), ss.CubicSpline(TIMES, p[0], "so:3"))
 
 
 def test_columns_of_complex_numbers(run):

@@ -12,33 +12,6 @@ from tabular import AXES, PAIR, TRACK, write
 import symspline as ss
 from symspline.cli import main
 
-VERBS = ("", "fit", "sample", "plot", "check", "info")
-
-
-@pytest.mark.parametrize("columns", [60, 80, 140])
-def test_help_is_wrapped_at_the_width_of_the_terminal(columns, capsys, monkeypatch):
-    monkeypatch.setenv("COLUMNS", str(columns))
-    for verb in VERBS:
-        with pytest.raises(SystemExit):
-            main([*verb.split(), "--help"])
-        lines = capsys.readouterr().out.partition("\n\n")[2].splitlines()
-        # Commands are not broken, so that they can be copied.
-        text = [line for line in lines if not line.startswith("  symspline ") and "{" not in line]
-        assert max(map(len, text)) < columns, max(text, key=len)
-        assert columns > 100 or max(map(len, text)) > columns - 15
-
-
-def test_tables_in_help_have_a_hanging_indent(capsys, monkeypatch):
-    monkeypatch.setenv("COLUMNS", "60")
-    for verb, term in [("sample", "std "), ("sample", "std_wx, ..."), ("check", "distance")]:
-        with pytest.raises(SystemExit):
-            main([verb, "--help"])
-        lines = capsys.readouterr().out.splitlines()
-        first = next(i for i, line in enumerate(lines) if line.startswith(f"  {term}"))
-        start = len(lines[first]) - len(lines[first][2 + len(term) :].lstrip())
-        assert lines[first + 1].startswith(" " * start) and lines[first + 1][start] != " "
-        assert not any(line.endswith("not-a-") for line in lines)
-
 
 def test_without_arguments_help_is_printed(capsys):
     assert main([]) == 0
@@ -92,17 +65,6 @@ def test_info_of_tables(run):
     write("e.csv", "hours,x\n0,1\n1,2\n")
     assert "hours may hold the times; say --time hours" in run("info e.csv")
     assert "usual step 1\n" in run("info e.csv --time hours")
-
-
-def test_info_of_gaps_beside_repeated_times(run, fails):
-    write("a.csv", "t,x\n" + "".join(f"{t},{t}\n" for t in (0, 1, 2, 3, 43, 44, 45, 45)))
-    assert "1 repeated time, 1 long gap, up to 40\n" in run("info a.csv")
-    assert fails("info a.csv --time x2") == "a.csv has no column 'x2'; did you mean 'x'?"
-    np.savez("a.npz", t=np.arange(3), points=np.ones((3, 20)))
-    out = run("info a.npz")
-    np.savez("empty.npz", x=np.empty(0))
-    assert "  x: no values\n" in run("info empty.npz")
-    assert "  points_11: 1.0 to 1.0\n  ... points_19: points has 20 columns\n" in out
 
 
 def test_info_of_curves(run, curves):

@@ -63,16 +63,6 @@ def test_lonlat_of_a_curve_that_was_made_in_python(run, fails):
     assert fails("sample c.npz -n 3 --lonlat -o b.csv") == "--lonlat is for sphere:2, not for euclidean:1"
 
 
-def test_longitudes_go_once_around_at_most(run, fails):
-    for lon in (-360, 360, 0):
-        write("a.csv", f"t,lon,lat\n0,{lon},1\n1,{lon / 1.1},2\n")
-        run("fit a.csv --lonlat -o a.npz")
-    for lon in (400, -361, 9999, -9999):
-        write("a.csv", f"t,lon,lat\n0,5,1\n1,{lon},2\n")
-        problem = fails("fit a.csv --lonlat -o b.npz")
-        assert f"a.csv, line 3: longitude {lon} is not between -360 and 360 degrees" in problem
-
-
 def test_tracks_are_drawn_on_the_earth(run, fails):
     write("a.csv", TRACK)
     run("fit a.csv --lonlat -o a.npz")

@@ -69,15 +69,6 @@ def test_closed_pipe(curves):
     assert process.returncode == 141
 
 
-@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
-def test_output_into_a_full_disk(curves):
-    with open("/dev/full", "w") as full:
-        line = [sys.executable, "-m", "symspline", "check", "a.npz"]
-        done = subprocess.run(line, stdout=full, stderr=subprocess.PIPE, text=True, timeout=20)
-    problem = "symspline: cannot write the output: No space left on device\n"
-    assert (done.returncode, done.stderr) == (2, problem)
-
-
 def test_not_enough_memory(curves, fails, monkeypatch):
     def too_much(*_):
         raise MemoryError

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tabular import AXES, PAIR, TRACK, numbers, table, write
+from tabular import AXES, TRACK, numbers, table, write
 
 import symspline as ss
 
@@ -45,16 +45,6 @@ def test_results_are_alone_on_standard_output():
     ]:
         done = process(line, fitted.stdout)
         assert (done.returncode, done.stderr) == (0, b"") and done.stdout.startswith(start)
-
-
-def test_messages_name_standard_input(run):
-    write("pair.csv", PAIR)
-    run("fit pair.csv --space s:2 --curve id -o pair.npz")
-    curves = Path("pair.npz").read_bytes()
-    done = process("plot - -o x.png", curves)
-    assert done.stderr == b"symspline: standard input has 2 curves; say which with --curve: a, b\n"
-    done = process("sample - -n 3 --curve c -o x.csv", curves)
-    assert done.stderr == b"symspline: standard input has no curve 'c'; there are a, b\n"
 
 
 def test_a_failure_writes_nothing_to_standard_output():
@@ -207,14 +197,3 @@ def test_numbers_in_text_read_back_equal(run):
     run("sample a.npz --at at.csv --digits 4 -o b.csv")
     assert [f"{float(text):.3e}" for text in table("b.csv")["x0"]] == [f"{value:.3e}" for value in x[:, 0]]
     assert np.array_equal(numbers(table("b.csv"), "x0")[:, 0], [float(f"{value:.3e}") for value in x[:, 0]])
-
-
-def test_names_with_commas_and_quotes(run):
-    write("a.csv", PAIR.replace("a,", '"a, ""A""",'))
-    run("fit a.csv --space s:2 --curve id -o a.npz")
-    run("sample a.npz -n 2 -o b.csv")
-    assert table("b.csv")["id"] == ['a, "A"'] * 2 + ["b"] * 2
-
-
-def test_digits_are_checked(curves, fails):
-    assert "--digits: 0: give a number between 1 and 17 (see" in fails("sample a.npz -n 3 --digits 0 -o b.csv")

@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from curves import points_on
-from tabular import numbered, table, write, write_table
+from tabular import table, write, write_table
 
 import symspline as ss
 
@@ -56,15 +55,6 @@ def test_dedup(run, fit, fails):
     assert problem.startswith("a.csv: points with one time are too far apart to have a mean; --dedup first")
 
 
-@pytest.mark.parametrize("name", ["s:2", "cp:2", "spd:3", "s:2 x so:3"])
-def test_means_are_those_of_the_library(run, name):
-    space, p = ss.space(name), points_on(ss.space(name), n=9, step=0.4)
-    t = np.array([0.0, 1, 1, 1, 1, 2, 3, 3, 4])
-    write_table("a.npz", {"t": t, **numbered(p)})
-    run(f"fit a.npz --space '{name}' --dedup mean -o b.npz")
-    assert [ss.load("b.npz")] == list(ss.fit_segments(t, p, space, max_gap=9, duplicates="mean"))
-
-
 @pytest.mark.parametrize("ending", ["csv", "npz", "parquet"])
 def test_rows_with_empty_cells_are_omitted_on_request(ending, run, fails):
     if ending == "csv":
@@ -79,11 +69,6 @@ def test_rows_with_empty_cells_are_omitted_on_request(ending, run, fails):
     write("a.csv", "t,x\n0,\n1,\n")
     problem = fails("fit a.csv --space r:1 --columns x --skipna -o c.npz")
     assert problem == "a.csv has no row in which x and t are all given"
-
-
-def test_lines_are_those_of_the_file_without_rows_that_are_omitted(fails):
-    write("a.csv", "t,x\n0,1\n1,\n2,5\n1.5,3\n")
-    assert fails("fit a.csv --space r:1 --skipna -o a.npz").startswith("a.csv, line 5: time 1.5 does not come")
 
 
 def test_poses_that_are_not_known_are_omitted_from_a_trajectory(run, fails):
@@ -101,12 +86,6 @@ def test_a_line_of_excel_names_the_separator(run):
         write("a.csv", "sep=;\r\nt;x\r\n0;1,5\r\n1;2,5\r\n".replace(",", comma).replace(";", mark))
         run("fit a.csv --space r:1 -o a.npz")
         assert ss.load("a.npz") == through([0, 1], [1.5, 2.5])
-
-
-def test_numbers_between_semicolons_may_have_commas(run):
-    write("a.csv", "t;x\n0,0;1,5\n0,5;2,5\n1,5;3,5\n")
-    run("fit a.csv --space r:1 -o a.npz")
-    assert ss.load("a.npz") == through([0, 0.5, 1.5], [1.5, 2.5, 3.5])
 
 
 def test_a_gap_that_no_curve_bridges_is_named_with_its_remedy(run, fails):

@@ -49,15 +49,6 @@ def test_several_recordings_that_were_cut_at_gaps(run, fails):
     assert fails("plot a.npz -o b.svg") == "a.npz has 2 curves; say which with --curve: a, b"
 
 
-def test_one_curve_with_a_name_is_a_collection_too(run):
-    write("pair.csv", "\n".join(line for line in PAIR.splitlines() if not line.startswith("b")))
-    run("fit pair.csv --space s:2 --curve id -o one.npz")
-    assert list(ss.load("one.npz")) == ["a"]
-    run("sample one.npz -n 2 -o out.csv")
-    assert table("out.csv")["id"] == ["a", "a"]
-    run("plot one.npz -o one.png")
-
-
 def test_a_batch_made_in_python(run):
     p = np.stack([np.eye(3), np.eye(3)[::-1]])
     ss.CubicSpline(None, p, "s:2").save("batch.npz")

@@ -135,11 +135,6 @@ def test_contradicting_options(fails):
         assert says in fails(f"fit a.csv --lonlat -o a.npz {line}")
 
 
-def test_a_bad_point_is_named_by_its_line(fails):
-    write("b.csv", "id,t,x,y,z\n" + "".join(f"{'ab'[i > 2]},{i},1,0,{'0' if i != 4 else '2'}\n" for i in range(7)))
-    assert "line 6" in fails("fit b.csv --space sphere:2 --curve id --smooth -o b.npz")
-
-
 def test_samples_have_standard_deviations(run):
     run("fit a.csv --lonlat --smooth -o a.npz")
     spline = ss.load("a.npz")
@@ -197,22 +192,6 @@ def test_rows_that_are_probably_outliers_are_named(run, fails):
     write_table("a.csv", {"t": t, **dict(zip(("qw", "qx", "qy", "qz"), q.T, strict=True))})
     assert "outlier" not in run("fit a.csv --space so:3 -o a.npz")
     assert "outlier" not in run("fit a.csv --space so:3 --smooth -o a.npz")
-
-
-def test_outliers_of_positions_on_the_earth_are_in_degrees(run):
-    lon = np.linspace(10, 12, 30)
-    lon[9] += 5
-    lon[20] -= 7
-    write_table("a.csv", {"t": np.arange(30), "lon": lon, "lat": np.zeros(30)})
-    out = run("fit a.csv --lonlat -o a.npz", notes=True)
-    assert "line 11: the point is probably an outlier (and in 1 other row), 4.93° from its neighbours" in out
-    assert "most steps are 0.069°" in out
-
-
-def test_motions_that_are_quick_are_no_outliers(run):
-    x = np.concatenate([0.01 * np.arange(15), [5.0], 10 + 0.01 * np.arange(15)])
-    write_table("a.csv", {"t": np.arange(31), "x": x + 0.001 * np.cos(np.arange(31))})
-    assert "outlier" not in run("fit a.csv --space r:1 -o a.npz")
 
 
 def test_rounding_errors_are_no_outliers(run):

@@ -102,16 +102,6 @@ def test_days_as_one_number_are_refused(fails, times):
     assert times("--time date", date=[20210829, 20210899, 20210901]) == [20210829, 20210899, 20210901]
 
 
-def test_stamps_of_ros_2(fails, run):
-    names = ["header.stamp.sec", "header.stamp.nanosec", "x"]
-    rows = "".join(f"170000000{i // 4},{i % 4 * 250_000_000},{i * i}\n" for i in range(9))
-    write("a.csv", ",".join(names) + "\n" + rows)
-    # One second alone would repeat.
-    assert "say --time header.stamp.sec,header.stamp.nanosec" in fails("fit a.csv --space r:1 -o a.npz")
-    run("fit a.csv --space r:1 --time header.stamp.sec,header.stamp.nanosec -o a.npz")
-    assert ss.load("a.npz").t[1] - ss.load("a.npz").t[0] == np.timedelta64(250, "ms")
-
-
 @pytest.mark.filterwarnings("always::UserWarning")
 def test_rounded_times_name_the_option(run):
     t = 1.4e9 + np.arange(30) * 1e-3

@@ -1,7 +1,6 @@
 """The commands of the command line and their usage errors."""
 
 import re
-import shlex
 import subprocess
 import sys
 from functools import partial
@@ -118,19 +117,6 @@ def test_samples_at_given_times(run, fails):
     assert "are numbers, but these are dates" in fails("sample pair.npz --at at.csv -o x.csv")
 
 
-def test_samples_outside(run):
-    write("axes.csv", AXES)
-    write("at.csv", "t\n-1\n4\n")
-    run("fit axes.csv --space s:2 --extrapolate continue -o axes.npz")
-    run("sample axes.npz --at at.csv -o out.csv")
-    spline = ss.CubicSpline([0, 1, 3], np.eye(3), "s:2", extrapolate=True)
-    np.testing.assert_array_equal(numbers(table("out.csv"), *"xyz"), spline([-1, 4]))
-    write("ring.csv", AXES + "4,1,0,0\n")
-    run("fit ring.csv --space s:2 --bc-type periodic -o ring.npz")
-    run("sample ring.npz --at at.csv -o out.csv")
-    run("check ring.npz")
-
-
 def test_invalid_usage_fails(curves, fails):
     assert fails("ft").endswith("invalid choice: 'ft'; did you mean fit? (see symspline --help)")
     assert "invalid choice: 'x'; choose from fit, sample, plot, check, info" in fails("x")
@@ -166,10 +152,3 @@ def test_points_are_moved_onto_the_space_by_rounding_only(run, fails):
     problem = fails("fit a.csv --space s:1 -o b.npz")
     assert problem.startswith("a.csv: the point in line 2 is off the space by 1.000e-3")
     assert "1e-4" in problem and "space.project" not in problem
-
-
-def test_invalid_lists_of_names(fails):
-    for names in ["\n0", "a\nb", '"a\n']:
-        Path("points.csv").write_text("t,x\n0,1\n1,2\n")
-        line = shlex.join(["fit", "points.csv", "--space", "r:1", "--columns", names, "-o", "curve.npz"])
-        assert "list of names" in fails(line) or "no column" in fails(line)

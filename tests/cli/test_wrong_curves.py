@@ -1,7 +1,5 @@
 """Tables that would silently give wrong curves raise an error or a warning."""
 
-from pathlib import Path
-
 import numpy as np
 from compare import parts
 from tabular import read_table, write
@@ -37,14 +35,6 @@ def test_equal_times_of_several_tracks_suggest_their_column_first(run, fails):
                     assert len(ss.load("a.npz")) == 3
 
 
-def test_some_rows_that_occur_twice_do_not_hide_the_column(run, fails):
-    ships("by time")
-    text = Path("ships.csv").read_text()
-    write("ships.csv", text + text.splitlines()[-1] + "\n")
-    assert "; --curve ship fits one curve per ship; otherwise " in fails("fit ships.csv --lonlat -o a.npz")
-    assert "--curve ship fits one curve per ship\n" in run("info ships.csv")
-
-
 def test_tracks_without_times_are_reported(run):
     rows = [f"{lon},{lat},{name}" for name, lat in (("ann", 50), ("bob", 10)) for lon in range(4)]
     write("ships.csv", "lon,lat,ship\n" + "\n".join(rows) + "\n")
@@ -73,21 +63,9 @@ def test_merged_tracks_are_reported(run):
     assert "column 'ship' distinguishes them" in out and "--curve ship" in out
 
 
-def test_tracks_smoothed_as_one_are_reported(run):
-    ships("by time")
-    assert "fit each of them with --curve ship" in run("fit ships.csv --lonlat -o a.npz --smooth", notes=True)
-
-
 def test_columns_that_do_not_tell_rows_apart_are_not_suggested(fails):
     write("a.csv", "t,x,note\n0,0,a\n1,1,b\n1,2,b\n2,3,a\n")
     assert "--curve" not in fails("fit a.csv --space r:1 --columns x -o a.npz")
-
-
-def test_long_gaps_are_reported(run):
-    write("a.csv", "t,x\n" + "".join(f"{t},{t}\n" for t in [*range(20), 80, 81, 82]))
-    assert "; 1 long gap, up to 61 (--max-gap cuts there)" in run("fit a.csv --space r:1 -o a.npz")
-    assert "long gap" not in run("fit a.csv --space r:1 --max-gap 10 -o a.npz")
-    assert "; 1 long gap, up to 61 " in run("fit a.csv --space r:1 -o a.npz --smooth --lam 0.1")
 
 
 def test_deviations_are_in_the_units_of_the_columns(run):

@@ -4,11 +4,9 @@ from math import factorial
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 from scipy.special import bernoulli
 
 import symspline as ss
-from symspline import _core
 
 # The standard deviations here are arbitrary, which the audit of residuals reports.
 pytestmark = pytest.mark.filterwarnings("ignore:The residuals:symspline.SmoothingWarning")
@@ -111,33 +109,9 @@ def test_std_of_products_batches_and_files(tmp_path):
         assert np.array_equal(batch[i].std(x, calibrated=False), batch.std(x, calibrated=False)[i])
 
 
-@pytest.mark.parametrize("loss", ["linear", "huber"])
-def test_std_on_rotations(loss):
-    t = RANDOM
-    own = np.random.default_rng(5)
-    vectors = 0.4 * np.sin(t[:, None] * [1.0, 1.7, 0.6]) + 0.02 * own.standard_normal((60, 3))
-    s = ss.make_smoothing_spline(
-        t, Rotation.from_rotvec(vectors).as_matrix(), "so:3", penalty="jerk", sigma=0.02, loss=loss
-    )
-    x = np.linspace(t[0], t[-1], 99)
-    exact = 0.02 * exact_std(t, np.ones(60), s._smoothed[0].band_lam, 3, x)
-    np.testing.assert_allclose(s.std(x, calibrated=False), exact, rtol=0.02)
-
-
 def test_information_matrices_scale_the_variance_of_the_process():
     t, x = GAP, np.linspace(GAP[0], GAP[-1], 99)
     y = np.stack([noisy(t), noisy(t, 2)], axis=1)
     w = np.broadcast_to(4 * np.eye(2), (60, 2, 2))
     s = ss.make_smoothing_spline(t, y, "r:2", 1e-3, weights=w, penalty="jerk", sigma=1.0)
     np.testing.assert_allclose(s.std(x, calibrated=False), exact_std(t, np.full(60, 4.0), 1e-3, 3, x), rtol=2e-3)
-
-
-def test_times_that_nearly_coincide():
-    """Two data at almost the same time are one datum with both weights."""
-    t = np.sort(np.r_[RANDOM, RANDOM[20] + 1e-13, RANDOM[40] + 1e-9])
-    weights = np.ones(60)
-    weights[[20, 40]] = 2
-    x = np.linspace(-2, 4, 50)
-    for period in (None, 9.0):
-        close = _core.process_variance(t, np.ones(62), 0.1, period, x, 0)
-        np.testing.assert_allclose(close, _core.process_variance(RANDOM, weights, 0.1, period, x, 0), rtol=1e-6)

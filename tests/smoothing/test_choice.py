@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from noisy import beside, both_solvers, rms, truth
+from noisy import beside, rms, truth
 
 import symspline as ss
 
@@ -62,32 +62,6 @@ def test_robust_curves_of_numbers_are_where_their_loss_is_least(loss):
         assert bend > 0 and abs(slope / bend) < 1e-6
 
 
-TURNS = np.linspace(0, 4 * np.pi, 200)
-CIRCLE = np.stack([np.cos(TURNS), np.sin(TURNS), 0 * TURNS], -1)
-
-
-@pytest.mark.filterwarnings("ignore::symspline.SmoothingWarning")
-@pytest.mark.parametrize(
-    ("criterion", "gamma", "most"), [("gcv", 1.0, 1.2), ("gcv", 1.4, 1.1), ("reml", 1.4, 1.1), ("cp", 1.4, 1.2)]
-)
-def test_geodesic_motion_is_seen_to_be_geodesic(criterion, gamma, most):
-    """Two turns of a great circle: errors are hardly larger than that of the best geodesic."""
-    sphere = ss.Sphere(2)
-    noisy = np.array([beside(sphere, CIRCLE, 0.1, seed) for seed in range(12)])
-    chosen = ss.make_smoothing_spline(TURNS, noisy, sphere, criterion=criterion, gamma=gamma, sigma=0.1)
-    straight = ss.make_smoothing_spline(TURNS, noisy, sphere, 1e5)
-    assert np.all(chosen.report.converged) and np.max(chosen.report.iterations) <= 8
-    assert rms(sphere, chosen(TURNS), CIRCLE).mean() < most * rms(sphere, straight(TURNS), CIRCLE).mean()
-
-
-@pytest.mark.parametrize("lam", [1.0, 1e2, 1e4, 1e8])
-def test_both_solvers_find_stiff_curves(lam):
-    sphere = ss.Sphere(2)
-    flat, exact = both_solvers(TURNS, beside(sphere, CIRCLE, 0.1), sphere, lam)
-    assert max(flat.report.iterations, exact.report.iterations) <= 10
-    assert rms(sphere, flat(TURNS), exact(TURNS)) < 2e-3 * rms(sphere, exact(TURNS), CIRCLE)
-
-
 @pytest.mark.parametrize(
     ("name", "length", "lam"),
     [("sphere:2", 4.0, 0.1), ("so:3", 5.0, 1.0), ("hyperbolic:2", 3.0, 0.1)],
@@ -115,43 +89,6 @@ def test_degrees_of_freedom_are_the_trace_of_the_influence(name, length, lam):
     # The flat matrix has the curvature at knots only: an error of second order in their distance.
     found = ss.make_smoothing_spline(t, data, space, lam).df
     assert found == pytest.approx(np.sum(followed) / space.dim, rel=6e-4)
-
-
-@pytest.mark.parametrize("loss", ["huber", "cauchy"])
-def test_both_solvers_reject_outliers(loss):
-    space, _, noisy = batch("so:3", 0.1)
-    dirty = noisy[0]
-    dirty[5::9] = space.exp(dirty[5::9], 1.2 * space.random_tangent(np.random.default_rng(1), dirty[5::9]))
-    flat, exact = both_solvers(T, dirty, space, 0.3, loss=loss, sigma=0.1, tol=1e-6)
-    assert rms(space, flat.points, exact.points) < 5e-3 * exact.std(T).max()
-
-
-@pytest.mark.filterwarnings("ignore::symspline.SmoothingWarning")
-@pytest.mark.parametrize("ratio", [3, 30])
-@pytest.mark.parametrize("criterion", ["gcv", "reml"])
-def test_light_data_say_how_stiff_a_curve_is(ratio, criterion):
-    """A geodesic whose second half is noisier: the mean weight would be that of the first one."""
-    sphere, t = ss.Sphere(2), np.linspace(0, 1, 80)
-    truth = np.stack([np.cos(9 * t), np.sin(9 * t), 0 * t], -1)
-    deviations = np.where(t < 0.5, 0.01, 0.01 * ratio)
-    for seed in range(3):
-        rng = np.random.default_rng(seed)
-        noisy = sphere.exp(truth, deviations[:, None] * sphere.random_tangent(rng, truth))
-        data = {"t": t, "points": noisy, "space": sphere, "weights": 1 / deviations**2}
-        auto, newton = (
-            ss.make_smoothing_spline(**data, criterion=criterion, method=method) for method in ("auto", "newton")
-        )
-        assert auto.report.converged and newton.report.converged and auto.df == pytest.approx(newton.df, rel=0.02)
-
-
-def test_many_dimensions_are_coupled_too():
-    space, rng = ss.space("gr:4,8"), np.random.default_rng(1)
-    t, p = np.linspace(0, 1, 40), space.random_point(rng)
-    v = space.random_tangent(rng, p)
-    truth = space.exp(p, np.multiply.outer(2.5 * t / space.norm(p, v), v))
-    noisy = space.exp(truth, 0.02 * space.random_tangent(rng, truth))
-    spline = ss.make_smoothing_spline(t, noisy, space, 10.0)
-    assert spline.report.method == "linearized" and spline.df == pytest.approx(2.0, abs=0.05)
 
 
 def test_knots_of_a_batch_are_enough_for_its_roughest_curve():

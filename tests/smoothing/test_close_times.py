@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 import symspline as ss
 from symspline import measure
@@ -68,20 +67,6 @@ def test_batch_with_own_times(penalty):
         x = np.linspace(t[i, 0], t[i, -1], 60)
         limit = 0.05 if penalty == "acceleration" else 1.0
         assert np.all(np.linalg.norm(batch[i](x) - alone(x), axis=-1) < limit * alone.std(x))
-
-
-@pytest.mark.filterwarnings("ignore::symspline.SmoothingWarning")
-def test_rotations():
-    t, y, merged, mean, weights = recording(5, 1e-8, False)
-
-    def rotations(v):
-        return Rotation.from_rotvec(0.3 * np.c_[v, v[:, 0]]).as_matrix()
-
-    own = ss.make_smoothing_spline(t, rotations(y), "so:3", penalty="jerk")
-    other = ss.make_smoothing_spline(
-        merged, rotations(mean), "so:3", own.lam, weights=weights, penalty="jerk", sigma=own.sigma
-    )
-    assert_same(own, other, t)
 
 
 def test_least_squares_and_estimation():

@@ -60,22 +60,6 @@ def test_numbers_solve_the_equations_of_a_dense_matrix(lam):
     assert spline.std(t) == pytest.approx(spline.sigma * np.sqrt(variances), rel=1e-9)
 
 
-# In SE(n) lengths are those in frames of the curve for numbers, of the data for matrices.
-@pytest.mark.parametrize("name", ["r:3", "sphere:2", "hyperbolic:2", "so:3", "spd:2", "cp:2", "gr:2,5"])
-def test_multiples_of_one_are_numbers(name):
-    space, t, noisy, _ = example(name, 0.1, n=30)
-    w = np.random.default_rng(0).uniform(0.3, 3, 30)
-    information = w[:, None, None] * np.eye(space.dim)
-    for options in ({"criterion": "gcv"}, {"criterion": "reml"}, {"lam": 0.1, "method": "newton"}):
-        one, other = (
-            ss.make_smoothing_spline(t, noisy, space, weights=weights, **options, **TIGHT)
-            for weights in (w, information)
-        )
-        assert other.lam == pytest.approx(one.lam, rel=1e-5)
-        assert other.df == pytest.approx(one.df, rel=1e-5)
-        assert space.distance(other.points, one.points).max() < 1e-7
-
-
 @every
 def test_information_matrices_refer_to_frames(name):
     """Any basis does; and a curve does not know which."""
@@ -148,22 +132,6 @@ def test_batches_are_single_curves():
         assert np.array_equal(alone.points, together.points[k]) and alone.lam == together.lam[k]
     shared = ss.make_smoothing_spline(t, batch, space, weights=w[0])
     assert np.array_equal(shared.points[0], together.points[0])
-
-
-def test_knots_and_gaps():
-    rng = np.random.default_rng(7)
-    space = ss.Sphere(2)
-    t = np.sort(rng.choice(np.linspace(0, 10, 60), 90))
-    curve = truth(space)
-    w = matrices(rng, 90, 2)
-    w[20:30] = 0
-    noisy = scattered(space, curve(t), w + 1e-9 * np.eye(2), 0.03, rng)
-    noisy[20:30] = np.nan
-    whole = ss.make_smoothing_spline(t, noisy, space, weights=w, knots=20, **TIGHT)
-    assert whole.report.converged and np.isnan(whole.residuals[20:30]).all()
-    used = np.r_[:20, 30:90]
-    rest = ss.make_smoothing_spline(t[used], noisy[used], space, weights=w[used], knots=whole.t, **TIGHT)
-    assert space.distance(rest.points, whole.points).max() < 1e-12
 
 
 def test_closed_curves():

@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from cases import loop_over
-from noisy import TIGHT, acceleration_energy, beside, both_solvers, distance_to_minimum, example, rms
+from noisy import TIGHT, acceleration_energy, beside, distance_to_minimum, example
 
 import symspline as ss
 
@@ -42,13 +41,6 @@ def test_given_velocities(name, far):
     free = ss.make_smoothing_spline(t, noisy, space, still.lam)
     assert still.std(0.0) < free.std(0.0) and still.std(0.0, nu=1) < 1e-3 * free.std(0.0, nu=1)
     assert still.std(5.0) == pytest.approx(free.std(5.0), rel=0.1)
-
-
-def test_gauss_newton_keeps_given_velocities():
-    space, t, noisy, _ = example("sphere:2", 0.05, n=20, segments=3)
-    start = 0.2 * space.random_tangent(np.random.default_rng(1), noisy[0])
-    flat, exact = both_solvers(t, noisy, space, 0.3, bc_type=((1, start), "natural"), tol=1e-5)
-    assert space.distance(flat.points, exact.points).max() < 1e-4
 
 
 def ring(name, n, sigma=0.05):
@@ -91,39 +83,6 @@ def test_closed_curves(name, far):
     assert chosen.std(12.5) == pytest.approx(chosen.std(2.5))
 
 
-@pytest.mark.parametrize("name", ["r:2", "sphere:1", "sphere:2", "so:3", "spd:2", "gr:2,5", "cp:2"])
-def test_gauss_newton_fits_closed_curves(name):
-    space, t, noisy, _ = ring(name, 20)
-    # A datum where the curve ends, too, which is not the first one again.
-    t, noisy = np.append(t, 10.0), np.append(noisy, beside(space, noisy[:1], 0.05), axis=0)
-    knots = np.r_[0:8:1.0, 8.5, 10.0]
-    flat, exact = both_solvers(t, noisy, space, 0.3, knots=knots, bc_type="periodic", **TIGHT)
-    assert exact.report.iterations <= 20
-    # Few knots far apart: the estimating equation is off by more than usual.
-    assert space.distance(flat.points, exact.points).max() < 0.3 * exact.sigma
-    assert flatness(space, t, noisy, exact, 0.3, lambda _: "periodic", True) < 1e-8
-
-
-def test_orbits_are_closed_curves_too():
-    """Round the sphere nearly along a great circle: curvature is in the matrix, and the holonomy in its corner."""
-    space, t = ss.Sphere(2), np.linspace(0, 10, 161)[:-1]
-    angle = 2 * np.pi * t / 10
-    truth = np.stack([np.cos(angle), np.sin(angle), 0.05 * np.sin(2 * angle)], axis=-1)
-    truth /= np.linalg.norm(truth, axis=-1, keepdims=True)
-    noisy = beside(space, truth, 0.05)
-    options = {"knots": np.linspace(0, 10, 41), "bc_type": "periodic"}
-    for lam in (100.0, 1000.0):
-        flat, exact = both_solvers(t, noisy, space, lam, **options, **TIGHT)
-        assert exact.report.iterations <= 12
-        assert flatness(space, t, noisy, exact, lam, lambda _: "periodic", True) < 1e-7
-        assert rms(space, flat(t), exact(t)) < 0.02 * rms(space, exact(t), truth)
-        # The circles of other centres cost hardly any energy, and one around the axis none that is shorter.
-        assert exact.df > 1 and flat.df > 1
-    chosen = ss.make_smoothing_spline(t, noisy, space, **options)
-    assert chosen.report.converged
-    assert np.sqrt(np.mean(space.distance(chosen(t), truth) ** 2)) < 0.02
-
-
 def test_the_first_point_repeated_at_the_end_counts_once():
     # Cross-validation would take the two for data without noise, and the curve through all data for the best.
     t = np.linspace(0, 1, 101)
@@ -144,19 +103,3 @@ def test_the_first_point_repeated_at_the_end_counts_once():
     noisy[-1] = beside(space, truth[:1], 0.05, 7)[0]
     apart = ss.make_smoothing_spline(t, noisy, space, **options)
     assert apart.report.converged and np.abs(apart.points - closed.points).max() > 1e-4
-
-
-@pytest.mark.filterwarnings("ignore:The data turn by more than half:symspline.SmoothingWarning")
-@pytest.mark.parametrize("name", ["r:1", "sphere:2", "so:3"])
-@loop_over("n", [3, 4, 6, 20])
-@loop_over("repeated", [True, False])
-def test_closed_curves_through_all_data(name, n, repeated):
-    space, t, noisy, _ = ring(name, n)
-    knots = np.append(t, 10.0)
-    if repeated:
-        t, noisy = knots, np.append(noisy, noisy[:1], axis=0)
-    for lam in (0.0, 1e-4, 1.0):
-        spline = ss.make_smoothing_spline(t, noisy, space, lam, knots=knots, bc_type="periodic")
-        assert spline.report.converged
-        if lam == 0:
-            assert space.distance(spline(t), noisy).max() <= 1e-10

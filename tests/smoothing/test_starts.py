@@ -44,32 +44,6 @@ def test_noise_that_hides_the_turns_is_reported(name):
         ss.make_smoothing_spline(None, points, space, 100.0)
 
 
-@pytest.mark.parametrize("degrees", [126, 170])
-def test_bodies_that_turn_far_between_data(degrees):
-    rng, t = np.random.default_rng(degrees), 5 + 0.01 * np.arange(80)
-    axis = np.array([0.2, 0.3, 1.0]) / np.linalg.norm([0.2, 0.3, 1.0])
-    around, so3 = ss.rotations.from_rotation_vectors, ss.SpecialOrthogonal(3)
-    truth = around(np.outer(np.radians(degrees) * np.arange(80), axis))
-    noisy = so3.exp(truth, 0.01 * so3.random_tangent(rng, truth))
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        spline = ss.make_smoothing_spline(t, noisy, so3)
-    assert so3.distance(spline(t), truth).max() < 0.03
-    assert spline.sigma == pytest.approx(0.01, rel=0.2)
-    # The truth is a geodesic.
-    known = ("half of the steps are long", "correct for data along a geodesic")
-    assert all(any(words in str(one.message) for words in known) for one in caught)
-
-
-def test_weights_are_not_noise():
-    rng, t = np.random.default_rng(0), np.linspace(0, 5, 60)
-    y = np.sin(t) + 0.01 * rng.standard_normal(60)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        spline = ss.make_smoothing_spline(t, y[:, None], "torus:1", weights=np.full(60, 1e4))
-    assert spline.sigma == pytest.approx(1, rel=0.3)
-
-
 def test_one_doubtful_curve_of_a_batch_changes_no_other():
     rng, t = np.random.default_rng(1), np.linspace(0, 10, 100)
     angles = np.sin(t) + np.array([0.1, 0.75])[:, None] * rng.standard_normal((2, 100))

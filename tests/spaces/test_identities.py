@@ -124,13 +124,6 @@ def posing(source, target, part):
     return Identity(source, target, 1.0, lambda p: pose(**{part: p}), df)
 
 
-def quadric_plane(z):
-    """|z₀|² + |z₁|² and 2 z̄₀z₁, as Hopf's map of CP¹."""
-    a, b = np.moveaxis(z, -1, 0)
-    c = 2 * a.conj() * b
-    return np.stack([np.abs(a) ** 2 + np.abs(b) ** 2, c.real, c.imag], axis=-1)
-
-
 def reflection(signs, square=1):
     """The map from vectors or bases to the reflections 2P − 1, for a form with signs and the square of points in it."""
 
@@ -164,46 +157,22 @@ def complementary(family, k, n):
 ROOT = np.sqrt(2)
 IDENTITIES = [
     linear("gr:1,5", "rp:4", 1.0, lambda y: y[..., 0]),
-    linear("cgr:1,3", "cp:2", 1.0, lambda y: y[..., 0]),
     # The Bloch sphere has radius ½.
     quadratic("cp:1", "sphere:2", 2.0, bloch),
     # A rotation turns by twice the angle of its quaternion.
     quadratic("rp:3", "so:3", 2.0, rotation),
-    quadratic("sphere:3", "so:3", 2.0, rotation),
-    quadratic("sphere:3", "o:3", 2.0, rotation),
-    linear("sphere:3", "rp:3", 1.0, lambda q: q),
     linear("sphere:3", "su:2", ROOT, quaternion_in_su2),
-    linear("sphere:3", "u:2", ROOT, quaternion_in_su2),
     linear("u:1", "sphere:1", 1.0, lambda z: np.stack([z[..., 0, 0].real, z[..., 0, 0].imag], axis=-1)),
     linear("sphere:1", "so:2", 1.0, turn_in_plane),
-    quadratic(
-        "rp:1",
-        "sphere:1",
-        2.0,
-        lambda x: np.stack([x[..., 0] ** 2 - x[..., 1] ** 2, 2 * x[..., 0] * x[..., 1]], axis=-1),
-    ),
     Identity("spd:1", "euclidean:1", 1.0, lambda p: np.log(p[..., 0]), lambda p, v, fp: v[..., 0] / p[..., 0]),
-    Identity(
-        "hyperbolic:1", "euclidean:1", 1.0, lambda x: np.arcsinh(x[..., 1:]), lambda x, v, fp: v[..., 1:] / x[..., :1]
-    ),
     linear("hyperbolic:2", "spd:2", ROOT, minkowski_in_hermitian),
     linear("hyperbolic:3", "hpd:2", ROOT, minkowski_in_hermitian),
-    complementary("gr", 1, 4),
     complementary("gr", 2, 5),
-    complementary("cgr", 1, 3),
     complementary("cgr", 2, 5),
     as_complex("rp:3", "cp:3"),
-    as_complex("gr:2,5", "cgr:2,5"),
     as_complex("spd:3", "hpd:3"),
-    # ½ tr becomes tr.
-    as_complex("so:4", "u:4", ROOT),
-    as_complex("so:4", "su:4", ROOT),
-    posing("euclidean:3", "se:3", "place"),
     posing("euclidean:2", "se:2", "place"),
     posing("so:3", "se:3", "rotation"),
-    posing("so:2", "se:2", "rotation"),
-    quadratic("ch:1", "hyperbolic:2", 2.0, quadric_plane),
-    as_complex("hyperbolic:3", "ch:3"),
     # The line of z becomes the matrix J + 2zz* of U(1, 2).
     quadratic("ch:2", "hpd:3", 2 * ROOT, lambda z: np.diag([-1.0, 1, 1]) + 2 * z[..., None] * z[..., None, :].conj()),
     quadratic("gr:2,5", "o:5", 2.0, reflection([1.0] * 5)),
@@ -212,13 +181,10 @@ IDENTITIES = [
     part_of("hp:2", "cgr:2,6", 1.0),
     # Without a metric: a form that is not definite, and groups.
     linear("sphere:2", "ds:3", None, lambda x: np.insert(x, 0, 0.0, axis=-1)),
-    linear("hyperbolic:1", "ds:2", None, lambda x: np.stack([x[..., 1], x[..., 0], 0 * x[..., 0]], axis=-1)),
     linear("hyperbolic:2", "ads:3", None, lambda x: np.insert(x, 1, 0.0, axis=-1)),
     quadratic("ds:2", "igr:0,1,1,2", None, reflection([-1.0, 1, 1])),
     quadratic("ads:3", "igr:1,0,2,2", None, reflection([-1.0, -1, 1, 1], -1)),
-    quadratic("gr:2,4", "igr:0,2,0,4", None, reflection([1.0] * 4)),
-    *(part_of(*pair) for pair in (("se:3", "gl:4"), ("se:2", "aff:2"), ("so:3", "gl:3"), ("u:2", "cgl:2"))),
-    *(part_of(*pair) for pair in (("aff:2", "gl:3"), ("sim:3", "gl:4"), ("sl:3", "gl:3"), ("sp:4", "gl:4"))),
+    *(part_of(*pair) for pair in (("se:3", "gl:4"), ("se:2", "aff:2"), ("u:2", "cgl:2"), ("sim:3", "gl:4"))),
     part_of("lorentz:3", "gl:4"),
     Identity("gl:1", "euclidean:1", None, lambda p: np.log(p[..., 0]), lambda p, v, fp: v[..., 0] / p[..., 0]),
 ]
@@ -252,7 +218,7 @@ def test_geometry_agrees(case, length, rng):
         assert np.abs(a - b).max() <= 4 * allowed
 
 
-@pytest.mark.parametrize("case", IDENTITIES[::4], ids=lambda case: f"{case.source}={case.target}")
+@pytest.mark.parametrize("case", IDENTITIES[::3], ids=lambda case: f"{case.source}={case.target}")
 @loop_over(
     "step, ends", [(1e-6, "natural"), (0.1, "not-a-knot"), (0.1, "velocity"), (0.7, "periodic"), (0.7, "acceleration")]
 )
@@ -283,42 +249,6 @@ def test_splines_agree(case, ends, step, rng):
             assert np.abs(case.scale * here.norm(y, v) - there.norm(fy, w)).max() <= 10**nu * allowed
         mapped = plain_vector(there, image, case.df(y, v, image))
         assert np.abs(mapped - plain_vector(there, fy, w)).max() <= 10**nu * allowed
-
-
-def quaternion_product(a, b):
-    return np.stack(
-        [
-            a[..., 0] * b[..., 0] - np.sum(a[..., 1:] * b[..., 1:], axis=-1),
-            *np.moveaxis(a[..., :1] * b[..., 1:] + b[..., :1] * a[..., 1:] + np.cross(a[..., 1:], b[..., 1:]), -1, 0),
-        ],
-        axis=-1,
-    )
-
-
-def turn_in_four(a, b):
-    """The rotation q → a q b̄ of R⁴."""
-    b = b * [1, -1, -1, -1]
-    images = [quaternion_product(quaternion_product(a, e), b) for e in np.eye(4)]
-    return np.stack(np.broadcast_arrays(*images), axis=-1)
-
-
-@pytest.mark.parametrize("ends", ["natural", "not-a-knot"])
-def test_so4_is_two_quaternions(ends, rng):
-    space, product = ss.SpecialOrthogonal(4), ss.Product(ss.Sphere(3), ss.Sphere(3))
-    a, b = walk(ss.Sphere(3), 0.5, 12, rng), walk(ss.Sphere(3), 0.7, 12, rng)
-    p = turn_in_four(a, b)
-    # The angles of the rotation are the sum and the difference of those of the quaternions.
-    angles = np.hypot(ss.Sphere(3).distance(a[1:], a[:-1]), ss.Sphere(3).distance(b[1:], b[:-1]))
-    assert np.abs(space.distance(p[1:], p[:-1]) - np.sqrt(2) * angles).max() <= 20 * EPS
-    t = np.cumsum(rng.uniform(0.7, 1.3, 12))
-    one, other = (
-        ss.CubicSpline(t, points, where, bc_type=ends, tol=0.0) for points, where in ((p, space), ((a, b), product))
-    )
-    x = np.linspace(t[0], t[-1], 80)
-    assert np.abs(one(x) - turn_in_four(*other(x))).max() <= 50 * EPS
-    for nu in (1, 2):
-        norm = np.sqrt(2) * product.norm(other(x), other(x, nu))
-        assert np.abs(space.norm(one(x), one(x, nu)) - norm).max() <= 1000 * EPS
 
 
 def test_rotations_have_two_quaternions(rng):

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scipy.interpolate import CubicHermiteSpline, CubicSpline, make_smoothing_spline
+from scipy.interpolate import CubicSpline
 from scipy.linalg import expm, expm_frechet
 
 import symspline as ss
@@ -67,40 +67,6 @@ def test_operations_are_those_of_logarithms():
     weights = rng.uniform(size=12)
     mean = expm(np.average(a, axis=0, weights=weights))
     np.testing.assert_allclose(space.mean(p, weights), mean, rtol=1e-10, atol=1e-12 * np.abs(mean).max())
-
-
-def test_hermite_splines_smoothing_grids_and_products():
-    rng = np.random.default_rng(6)
-    t, p = tensors(rng, 2, 12, spread=0.3)
-    y, x = logs(p), np.linspace(0, 1, 30)
-    x = t[0] + x * np.ptp(t)
-    rates = rng.standard_normal(y.shape)
-    rates = rates + np.swapaxes(rates, 1, 2)
-    v = np.stack([expm_frechet(a, b, compute_expm=False) for a, b in zip(y, rates, strict=True)])
-    hermite = ss.HermiteSpline(t, p, v, "logspd:2")
-    expected = exps(CubicHermiteSpline(t, y, rates)(x))
-    np.testing.assert_allclose(hermite(x), expected, atol=1e-11 * np.abs(expected).max())
-    smooth = ss.make_smoothing_spline(t, p, "logspd:2", lam=0.3)
-    expected = exps(make_smoothing_spline(t, y, lam=0.3)(x))
-    np.testing.assert_allclose(smooth(x), expected, atol=1e-8 * np.abs(expected).max())
-    rows = np.stack([p, 2 * p, 3 * p])
-    grid = ss.GridSpline((None, t), rows, "logspd:2", bc_type="natural")
-    natural = CubicSpline(t, logs(rows.reshape(-1, 2, 2)).reshape(3, 12, 2, 2), axis=1, bc_type="natural")(x)
-    lines = CubicSpline(np.arange(3), natural, axis=0, bc_type="natural")(0.7)
-    np.testing.assert_allclose(grid((np.full(30, 0.7), x)), exps(lines), atol=1e-9 * np.abs(p).max())
-    product = ss.CubicSpline(t, (p, y[:, 0]), "logspd:2 x r:2")
-    np.testing.assert_allclose(product(x)[0], ss.CubicSpline(t, p, "logspd:2")(x), rtol=1e-12)
-
-
-def test_it_differs_from_the_affine_invariant_metric_where_tensors_do_not_commute():
-    rng = np.random.default_rng(7)
-    t, p = tensors(rng, 3, 6, spread=0.4)
-    x = np.linspace(t[0], t[-1], 20)
-    flat, curved = (ss.CubicSpline(t, p, name)(x) for name in ("logspd:3", "spd:3"))
-    assert np.abs(flat - curved).max() > 1e-3 * np.abs(p).max()
-    diagonal = p * np.eye(3)
-    flat, curved = (ss.CubicSpline(t, diagonal, name)(x) for name in ("logspd:3", "spd:3"))
-    np.testing.assert_allclose(flat, curved, rtol=1e-11, atol=1e-14)
 
 
 def test_the_group_is_that_of_similarities():

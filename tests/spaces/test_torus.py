@@ -34,14 +34,6 @@ def test_splines_are_those_of_unwrapped_angles(bc_type):
     assert spline.length() == pytest.approx(ss.CubicSpline(t, angles, "r:3", bc_type=bc_type).length())
 
 
-def test_wrapped_and_unwrapped_input_give_the_same_curve():
-    t, angles = joints(np.random.default_rng(1))
-    wrapped = np.angle(np.exp(1j * angles))
-    x = np.linspace(t[0], t[-1], 200)
-    one, other = (ss.CubicSpline(t, a, TORUS) for a in (angles, wrapped))
-    assert np.abs(TORUS.log(one(x), other(x))).max() < 1e-12
-
-
 def test_closed_curves_may_turn():
     t = np.arange(9.0)
     angles = np.stack([2 * np.pi * t / 8, 0.3 * np.sin(2 * np.pi * t / 8)], axis=-1)
@@ -91,17 +83,6 @@ def test_random_angles_are_uniform():
     for k in (1, 2, 3):
         assert np.abs(np.exp(1j * k * angles).mean(axis=0)).max() < 0.02
     assert is_wrapped(angles)
-
-
-def test_smoothing_and_means_of_angles():
-    rng = np.random.default_rng(4)
-    t, angles = joints(rng, step=0.5)
-    smooth = ss.make_smoothing_spline(t, angles, TORUS, lam=1.0)
-    flat = ss.make_smoothing_spline(t, angles, "r:3", lam=1.0)
-    assert np.abs(TORUS.log(smooth(t), flat(t))).max() < 1e-10
-    line = ss.make_smoothing_spline(t, np.outer(t, [1, -1, 0.5]), TORUS, lam=np.inf)
-    np.testing.assert_allclose(line(t, nu=1), np.broadcast_to([1, -1, 0.5], (40, 3)), atol=1e-9)
-    np.testing.assert_allclose(np.degrees(ss.Torus(1).mean(np.radians([[170.0], [-160]]))), [-175])
 
 
 def test_angles_of_the_circle():

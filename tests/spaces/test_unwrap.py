@@ -98,15 +98,6 @@ def test_a_point_between_two_representatives_is_named():
     CUBIC.unwrap(ss.rotations.from_rotation_vectors(np.radians([[0, 0, 0], [0, 0, 42]])))
 
 
-def test_fixed_points_are_not_ambiguous():
-    sphere = ss.Quotient("sphere:2", "4")
-    points = ss.Sphere(2).project([[0.4, 0.2, 1], [0.1, 0.05, 1], [0, 0, 1]])
-    assert np.abs(sphere.unwrap(points) - points).max() < 1e-15
-    # From the axis, all representatives are equally near.
-    with pytest.warns(UserWarning, match=r"points\[1\] has two"):
-        sphere.unwrap(points[::-1])
-
-
 # ---- grids ----
 
 
@@ -160,12 +151,6 @@ def test_each_part_of_a_masked_map_keeps_its_first_point():
         moved = np.swapaxes(expected, -1, -2) @ own
         assert np.abs(moved - moved[0, 0]).max() < 1e-13
     assert np.array_equal(np.isnan(found), np.isnan(given))
-
-
-def test_batches_of_maps():
-    rng = np.random.default_rng(5)
-    given = at_random(CUBIC, np.stack([field((9, 8), rng), field((9, 8), rng)]), rng)
-    assert np.array_equal(CUBIC.unwrap(given, axes=2)[1], CUBIC.unwrap(given[1], axes=2))
 
 
 def directors(n, charge, hole=0):

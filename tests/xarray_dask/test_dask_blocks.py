@@ -73,15 +73,6 @@ def test_blocks_are_those_of_the_points():
         assert same(values.values, sx.evaluate(ds.compute(), x).values)
 
 
-def test_end_vectors_in_blocks():
-    da = field()
-    start = S2.random_tangent(np.random.default_rng(0), da.values[:, :, 0])
-    start = xr.DataArray(start, dims=("lat", "lon", "r"))
-    whole = sx.fit(da, S2, point_dims=("r",), bc_type=((1, start), "not-a-knot"))
-    parts = sx.fit(da.chunk(lat=1, lon=4), S2, point_dims=("r",), bc_type=((1, start.chunk(lon=3)), "not-a-knot"))
-    assert same(whole.velocities.values, parts.velocities.values)
-
-
 def test_a_failure_says_that_it_counts_in_its_block():
     da = field()
     da[1, 5, 3] = np.nan
@@ -95,24 +86,6 @@ def test_a_failure_says_that_it_counts_in_its_block():
         ds.compute(scheduler="synchronous")
     sent = pickle.loads(pickle.dumps(caught.value))
     assert type(sent) is ss.CutLocusError and sent.spline is None and sent.__notes__
-
-
-def test_blocks_use_one_thread_each(threads):
-    seen = []
-
-    def exp(p, v):
-        seen.append(ss.num_threads())
-        return S2.exp(p, v)
-
-    space = ss.Manifold(
-        exp=exp, log=S2.log, project_tangent=S2.project_tangent, inner=S2.inner, project=S2.project, point_shape=(3,)
-    )
-    x = S2.geodesic([1, 0, 0], [0, 1, 0], np.linspace(0, 1, 5))
-    ss.set_num_threads(3)
-    ds = sx.fit(xr.DataArray(x, dims=("time", "r")).expand_dims(curve=6).chunk(curve=2), space, point_dims=("r",))
-    seen.clear()
-    ds.compute(scheduler="threads", num_workers=2)
-    assert set(seen) == {1} and ss.num_threads() == 3
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="counts threads in /proc")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from compare import same
-from curves import S2, points_on
+from curves import S2
 from fields import KNOTS, LAT, LON, field, numbers, point_dims
 
 import symspline as ss
@@ -90,16 +90,6 @@ def test_knots_without_a_coordinate_are_counted():
     assert same(sx.evaluate(ds, [0.5, 7.5]).values, expected([0.5, 7.5]))
 
 
-def test_one_curve_and_one_time():
-    da = field().isel(lat=1, lon=2)
-    ds = sx.fit(da, S2, point_dims=("r",))
-    assert ds.converged.ndim == 0 and bool(ds.converged)
-    value = sx.evaluate(ds, 1.25)
-    assert value.dims == ("r",) and float(value.time) == 1.25
-    assert same(value.values, plain(field(), "sphere:2")(1.25)[1, 2])
-    assert sx.speed(ds, 1.25).shape == ()
-
-
 @pytest.mark.parametrize(
     "dims", [("run", "sample"), ("lon", "sample"), ("sample", "lat", "lon"), ("lat",), ("time", "lon")]
 )
@@ -172,18 +162,6 @@ def test_end_vectors_by_name():
     assert ds.attrs["bc_type"] == "[1, 2]"
 
 
-def test_one_vector_for_all_curves():
-    p = np.array(points_on(S2, 5, (3,)))
-    p[:, 0] = [0, 0, 1]
-    da = xr.DataArray(p, dims=("curve", "time", "q"))
-    v = np.array([0.3, 0.1, 0])
-    expected = ss.CubicSpline(None, p, S2, bc_type=((1, v), "not-a-knot"))
-    ds = sx.fit(da, S2, bc_type=((1, v), "not-a-knot"))
-    assert same(ds.velocities.values, expected.velocities)
-    along = sx.fit(da, S2, bc_type=((1, xr.DataArray(v, dims="q")), "not-a-knot"))
-    assert same(along.velocities.values, expected.velocities)
-
-
 def test_beyond_the_knots():
     da = field()
     da = xr.concat([da, da.isel(time=[0]).assign_coords(time=[15.0])], "time")
@@ -204,15 +182,6 @@ def test_the_holonomy_of_closed_curves():
     spline = ss.CubicSpline(None, p[None], "cp:1", bc_type="periodic")
     x = np.linspace(0, 6, 13)
     assert same(sx.lift(ds, x).values, spline.lift(x)) and same(sx.lift(ds, x, nu=1).values, spline.lift(x, nu=1))
-
-
-def test_points_rounded_in_a_file():
-    da = field().round(6)
-    ds = sx.fit(da, S2, point_dims=("r",), atol=1e-5)
-    assert ds.converged.all()
-    assert same(sx.evaluate(ds, X).values, plain(da, "sphere:2", atol=1e-5)(X))
-    single = sx.fit(field().astype("float32"), S2, point_dims=("r",))
-    assert single.converged.all() and single.points.dtype == np.float64
 
 
 @pytest.mark.parametrize("space", ["sphere:2", "so:3"])

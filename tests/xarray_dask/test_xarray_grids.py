@@ -95,15 +95,6 @@ def test_blocks_agree_with_the_whole(bc_type, noise):
     assert 0 < abs(blocks - whole).max() < 1e-12
 
 
-def test_the_halo_is_needed(monkeypatch):
-    """A narrower halo is not exact, so that the comparison above does measure it."""
-    da = field(150, 5)[:, :, :1]
-    to = {"x": inner(da.x.values, 99), "y": da.y.values[1:3]}
-    whole = sx.resample(da, S2, to)
-    monkeypatch.setattr("symspline.xarray._grids._HALO", 8)
-    assert 1e-11 < abs(sx.resample(da.chunk(x=50), S2, to) - whole).max() < 1e-3
-
-
 def test_missing_points_and_masks_in_blocks(rng):
     da = field(120, 12)
     full, mask = da.copy(deep=True), np.ones((120, 12), bool)
@@ -121,14 +112,6 @@ def test_missing_points_and_masks_in_blocks(rng):
     ):
         assert same(found.isnull().values, missing.values)
         assert abs(found - whole).max() < 1e-12
-
-
-def test_layers_that_are_masked_or_missing():
-    da = field()
-    to = {"x": da.x.values, "y": da.y.values}
-    found = sx.resample(da, S2, to, where=xr.DataArray([False, True], dims="level"))
-    assert found[0].isnull().all()
-    np.testing.assert_allclose(found[1], da.transpose("level", "y", "x", "q")[1], atol=1e-14)
 
 
 def test_dates_on_an_axis(rng):
@@ -153,15 +136,6 @@ def test_one_dimension_and_single_positions():
     point = sx.resample(da, S2, {"x": 0.5, "y": da.y.values[2:4]})
     assert point.dims == ("level", "y", "q") and float(point.x) == 0.5
     assert same(point.values, sx.resample(da, S2, {"x": [0.5], "y": da.y.values[2:4]}).isel(x=0).values)
-
-
-def test_axes_without_coordinates_count_from_the_start():
-    da = field(90, 8).drop_vars(["x", "y"])
-    to = {"x": np.linspace(0, 89, 50), "y": [0, 0.5, 7]}
-    whole = sx.resample(da, S2, to)
-    grid = ss.GridSpline((None, None), da.isel(level=0).transpose("x", "y", "q").values, S2)
-    assert same(whole.isel(level=0).transpose("x", "y", "q").values, grid.grid(*to.values()))
-    assert 0 < abs(sx.resample(da.chunk(x=30), S2, to) - whole).max() < 1e-12
 
 
 def test_periodic_axes_are_not_split():
@@ -228,13 +202,6 @@ def test_from_store_to_store_without_reading_everything(tmp_path):
     np.testing.assert_allclose(first, back.isel(level=0, x=slice(0, 80)), atol=1e-15)
 
 
-def test_schedulers_agree():
-    da = field(60, 8).chunk(x=30, level=1)
-    made = sx.resample(da, S2, {"x": inner(da.x.values, 20), "y": da.y.values})
-    whole = made.compute(scheduler="synchronous")
-    assert same(made.compute(scheduler="threads", num_workers=2).values, whole.values)
-
-
 @pytest.mark.parametrize(
     "match, to, options",
     [
@@ -272,15 +239,6 @@ def test_points_at_their_cut_locus_warn_and_are_missing():
         found = sx.resample(da, S2, to)
     assert 0 < found.isnull().mean() < 0.5
     raises("cut locus", sx.resample, da, S2, to, on_failure="raise", error=ss.CutLocusError)
-
-
-def test_points_off_the_space_raise_in_their_block():
-    da = field(60, 8)
-    da[3, :, 0, 50] *= 1.1
-    made = sx.resample(da.chunk(x=10), S2, {"x": inner(da.x.values, 119), "y": da.y.values})
-    made.isel(x=slice(0, 20)).compute(scheduler="synchronous")
-    with pytest.raises(ss.ValidationError, match="1e-8"):
-        made.compute(scheduler="synchronous")
 
 
 def test_points_must_not_be_split():

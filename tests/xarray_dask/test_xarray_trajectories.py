@@ -154,26 +154,6 @@ def test_one_coordinate_of_times_for_all_curves():
     np.testing.assert_allclose(ds["std"], smooth.std(times[:-1]), rtol=1e-9)
 
 
-def test_end_vectors_of_each_trajectory(rng):
-    da = drifters().transpose("traj", "obs", "q").isel(traj=[0, 2])
-    speed = xr.DataArray(S2.random_tangent(rng, da.values[:, 0]), dims=("traj", "q"), coords={"traj": ["a", "c"]})
-    ends = ((1, 1e-5 * speed), "natural")
-    ds = sx.fit(da, "sphere:2", dim="obs", skipna=True, bc_type=ends)
-    for i, name in enumerate("ac"):
-        spline = alone(da, name, bc_type=((1, 1e-5 * speed.values[i]), "natural"))
-        rate = sx.evaluate(ds.sel(traj=[name]), spline.t[1:3], nu=1)[0]
-        np.testing.assert_allclose(rate, spline(spline.t[1:3], nu=1), rtol=1e-12)
-
-
-def test_results_survive_files(tmp_path):
-    pytest.importorskip("zarr")
-    ds = sx.fit(drifters({"traj": 2}).assign_coords(traj=np.arange(4)), "sphere:2", dim="obs", skipna=True)
-    ds.to_zarr(tmp_path / "a.zarr", consolidated=False)
-    back = xr.open_zarr(tmp_path / "a.zarr", consolidated=False)
-    xr.testing.assert_allclose(sx.evaluate(back, back.time).compute(), sx.evaluate(ds, ds.time).compute())
-    raises("has no coordinate 'time' of times", sx.evaluate, back.drop_vars("time"), 0.5)
-
-
 def test_several_coordinates_in_doubt_raise():
     da = drifters().assign_coords(received=("obs", START + np.arange(OBS) * HOUR))
     found = (

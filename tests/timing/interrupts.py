@@ -1,4 +1,4 @@
-"""Measure how soon long calls end after Ctrl-C: python tests/host/interrupts.py [part of a name].
+"""Measure how soon long calls end after Ctrl-C: python tests/timing/interrupts.py [part of a name].
 
 Each call takes several seconds if nothing interrupts it. A timer sends a signal after half a second, and the table
 shows the time until `KeyboardInterrupt` is raised. The script fails if this takes longer than a second. The signal
