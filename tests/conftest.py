@@ -7,7 +7,7 @@
     derivatives  with respect to the data
     in_jax       the compiled spline as a function in JAX, and splines written in JAX
     free         `BSpline`, `BezierCurve` and `CumulativeBSpline`
-    files, convert, cli, plotting, demo
+    files, convert, cli, plotting
     manifolds    curves on manifolds made of functions, Stiefel manifolds, surfaces; the public suite of laws
     geo          positions, speed and course on a globe
     quantum      Hamiltonians, propagators, pulses, the Bloch sphere

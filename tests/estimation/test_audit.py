@@ -11,7 +11,6 @@ from scipy.spatial.transform import Rotation
 
 import symspline as ss
 from symspline import measure
-from symspline._smoothing.audit import Residuals, corner_of, examine
 
 SO3 = sensors.SO3
 
@@ -240,60 +239,3 @@ def test_directions_without_noise_along_them_and_singular_matrices_are_sound():
         measure.Points(t, path(t) + rng.standard_normal((120, 3)), sigma=1),
     ]
     ss.estimate(given, np.linspace(0, 10, 31), "r:3")
-
-
-def test_few_measurements_are_not_examined():
-    given = Residuals(np.full((4, 3), 100.0), 0.1)
-    assert not examine(given).failed and examine(given._replace(rows=np.full((5, 3), 100.0))).failed
-    assert not examine(Residuals(np.full((50, 1), 100.0), 0.95)).failed
-
-
-def test_false_alarms_of_the_statistics():
-    """Normal residuals of any number and leverage: the projections of noise off random subspaces."""
-    rng = np.random.default_rng(8)
-    alarms = 0
-    for _ in range(2000):
-        n, d, p = int(rng.integers(5, 200)), int(rng.integers(1, 4)), int(rng.integers(0, 3))
-        basis, _ = np.linalg.qr(rng.standard_normal((n, p)))
-        noise = rng.standard_normal((n, d))
-        alarms += examine(Residuals(noise - basis @ (basis.T @ noise), p / n)).failed
-    assert alarms <= 2
-
-
-@pytest.mark.parametrize(("count", "most"), [(8, 2), (60, 1), (300, 1)])
-def test_false_alarms_of_the_share_of_rejected_measurements(count, most):
-    """Each measurement is an outlier with probability 0.1. At 8 measurements, 3 outliers are not rare."""
-    rng = np.random.default_rng(count)
-    alarms = 0
-    for _ in range(1000):
-        rows = rng.standard_normal((count, 3))
-        rows[rng.random(count) < 0.1] += 100.0
-        alarms += examine(Residuals(rows, 0.0, loss="cauchy", corner=corner_of("cauchy", 3))).rejected > 0
-    assert alarms <= most
-    rows = rng.standard_normal((count, 3))
-    rows[: round(0.65 * count)] += 100.0
-    assert examine(Residuals(rows, 0.0, loss="cauchy", corner=corner_of("cauchy", 3))).rejected > 0.5
-
-
-def test_coarse_knots_are_far_from_the_minimum():
-    """Two radians between knots: the solution of the linear problems is not the minimum."""
-    rng = np.random.default_rng(9)
-    t = np.linspace(0, 10, 201)
-    spin = Rotation.from_rotvec(np.outer(t, [0, 0, 2.2])) * Rotation.from_rotvec(
-        np.stack([0.5 * np.sin(0.9 * t), 0.3 * np.cos(t), 0 * t], -1)
-    )
-    seen = (spin * Rotation.from_rotvec(0.05 * rng.standard_normal((201, 3)))).as_matrix()
-    omega = (spin[:-1].inv() * spin[1:]).as_rotvec() / 0.05 + 0.03 * rng.standard_normal((200, 3))
-    given = [measure.Points(t, seen, sigma=0.05), measure.BodyRates(t[:-1] + 0.025, omega, sigma=0.03)]
-    for count in (12, 41):
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always")
-            ss.estimate(given, np.linspace(0, 10, count), "so:3", lam=0.6, penalty="jerk")
-        said = [str(own.message) for own in caught if "standard deviations from the minimum" in str(own.message)]
-        assert len(said) == (count == 12) and all("Pass more knots" in own for own in said)
-
-
-def test_gravity_of_simulated_and_measured_forces_is_one_number():
-    still = ss.CubicSpline(None, (np.stack([np.eye(3)] * 2), np.zeros((2, 3))), "so:3 x r:3")
-    force = ss.poses.imu(still, 0.5).specific_force
-    assert np.array_equal(force, -np.asarray(measure.SpecificForce([0.0], force[None], sigma=1).gravity))

@@ -81,31 +81,6 @@ def test_attitudes_in_the_middle_only_and_quaternions():
     assert np.max(off / np.sqrt(3) / (2 * curve.std(x))) < 6
 
 
-def test_two_gyroscopes_that_pause():
-    """The second gyroscope has a bias of its own and measures in most of the pause of the first one."""
-    truth, t, seen, s, omega, bias = spinning(4, 150, end=30.0, between=1.0)
-    first, second = (s < 47) | (s > 55), (s > 44) & (s < 54.5)
-    other = np.array([-0.1, 0.2, 0.05])
-    rates = [
-        measure.BodyRates(s[first], omega[first], sigma=0.005, bias=measure.Constant(3)),
-        measure.BodyRates(s[second], omega[second] + other, sigma=0.005, bias=measure.Constant(3, name="second")),
-    ]
-    curve = ss.estimate([measure.Points(t, seen, sigma=0.01), *rates], 301, "so:3")
-    check(curve, truth, bias, np.linspace(t[0], t[-1], 200))
-    second_bias = curve.parameters["second"]
-    assert np.all(np.abs(second_bias.value - bias - other) < 5 * second_bias.std)
-
-
-def test_stars_of_a_spinning_body():
-    truth, t, _, s, omega, bias = spinning(5, 200)
-    stars = np.array([[1.0, 0, 0], [0, 0.6, 0.8]])
-    rng = np.random.default_rng(5)
-    seen = np.einsum("ki,nij->nkj", stars, truth(t)) + 0.01 * rng.standard_normal((len(t), 2, 3))
-    gyro = given(t, truth(t), s, omega)[1]
-    curve = ss.estimate([measure.Directions(t, seen, stars, sigma=0.01), gyro], 161, "so:3")
-    check(curve, truth, bias, np.linspace(t[0], t[-1], 200))
-
-
 @pytest.mark.parametrize("late", [0.21, -0.4])
 @pytest.mark.parametrize("of_points", [False, True])
 def test_delays_of_a_spinning_body(late, of_points):
@@ -123,21 +98,6 @@ def test_delays_of_a_spinning_body(late, of_points):
     found = curve.parameters["time offset"]
     assert abs(found.value[0] - late) < 5 * found.std[0] and found.std[0] < 0.01
     assert np.all(np.abs(curve.parameters["gyro bias"].value - bias) < 5 * curve.parameters["gyro bias"].std)
-
-
-@pytest.mark.parametrize("knots", [121, 201, "auto"])
-def test_delays_with_many_knots(knots):
-    rng = np.random.default_rng(40)
-    t, s = np.linspace(0, 10, 51), np.linspace(0, 10, 1001)
-    truth = ss.CubicSpline(s, TURN(np.sin(s)[:, None] * [0.2, 0.4, 0.8]), SO3)
-    seen = truth(t) @ TURN(0.03 * rng.standard_normal((51, 3)))
-    omega = ss.rotations.angular_velocity(truth, s) + [0.03, -0.02, 0.05] + 0.02 * rng.standard_normal((1001, 3))
-    k = (s > 1) & (s < 9)
-    both = given(t, seen, s[k] - 0.25, omega[k], sigma=0.03, noise=0.02, offset=measure.Constant(1))
-    curve = ss.estimate(both, knots if knots == "auto" else np.linspace(0, 10, knots), "so:3")
-    found = curve.parameters["time offset"]
-    assert abs(found.value[0] - 0.25) < 4 * found.std[0] and found.std[0] < 0.01
-    assert curve.report.iterations <= 15
 
 
 def test_velocities_join_the_start():
@@ -217,43 +177,6 @@ def test_bands_in_gaps(knots):
         inside.append(np.abs(curve(gap)[:, 0] - np.interp(gap, d, x)) < 1.96 * curve.std(gap))
     # Without knots in the gap, the coverage is 0.3.
     assert np.mean(inside) > 0.85
-
-
-def test_knots_of_dates_and_whole_numbers_in_gaps():
-    rng = np.random.default_rng(0)
-    t = np.concatenate([np.arange(0, 1000, 10), np.arange(2000, 3000, 10)])
-    y = np.sin(t / 200)[:, None] + 0.01 * rng.standard_normal((len(t), 1))
-    day = np.datetime64("2024-03-01T00:00:00")
-    found = []
-    for times in (t, t + 10**17, day + t.astype("m8[s]"), t.astype("m8[s]")):
-        scale = measure.Function(times, lambda p: p - y, sigma=0.01)
-        found.append(ss.estimate([measure.Points(times, y, sigma=0.01), scale], 41, "r:1"))
-        assert len(found[-1].t) == len(found[0].t) > 48
-        assert np.max(np.diff(found[-1].t) / (found[-1].t[-1] - found[-1].t[0])) < 0.03
-    x = np.array([500, 1500])
-    for own, times in zip(found[1:], (x + 10**17, day + x.astype("m8[s]"), x.astype("m8[s]")), strict=True):
-        np.testing.assert_allclose(own(times), found[0](x), atol=1e-3)
-
-
-def test_given_knots_without_a_gap():
-    t = np.concatenate([np.linspace(0, 7, 70), np.linspace(13, 20, 70)])
-    noise = 0.1 * np.random.default_rng(0).standard_normal((2, 140, 1))
-    y = np.sin(t)[:, None] + noise[0]
-    both = [measure.Points(t, y, sigma=0.1), measure.Velocities(t, y, np.cos(t)[:, None] + noise[1], sigma=0.1)]
-    place = r"no data and no knots between knots\[69\] = 7.0 and knots\[70\] = 13.0"
-    with pytest.warns(ss.SmoothingWarning, match=place):
-        ss.estimate(both, t, "r:1")
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        ss.estimate(both, np.linspace(0, 20, 81), "r:1")
-
-
-def test_more_than_half_a_turn_between_knots():
-    _, t, seen, s, omega, _ = spinning(8, 300)
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        ss.estimate(given(t, seen, s, omega), 21, "so:3", on_failure="ignore")
-    assert sum("measurements[1] turns the body by" in str(one.message) for one in caught) == 1
 
 
 def test_numerical_failures_are_convergence_errors():

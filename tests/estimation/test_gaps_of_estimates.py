@@ -27,28 +27,6 @@ def given(t, y, s, v):
     return [measure.Points(t, y, sigma=0.02), measure.Velocities(s, np.zeros(v.shape), v, sigma=0.05)]
 
 
-def test_bands_hold_in_gaps(tmp_path):
-    inside, plain = [], []
-    for seed in range(8):
-        begin = 20.0 + seed
-        path, *data = recording(seed, (begin, begin + 5))
-        curve = ss.estimate(given(*data), 120, "r:2")
-        gap = max(curve.gaps, key=lambda own: own.stop - own.start)
-        assert gap.factor > 1 and gap.blocks > 5
-        assert gap.start == pytest.approx(begin, abs=1) and gap.stop == pytest.approx(begin + 5, abs=1)
-        x = np.linspace(begin + 0.1, begin + 4.9, 40)
-        errors = np.linalg.norm(curve(x) - path(x), axis=1)
-        inside.append(errors < np.sqrt(5.991) * curve.std(x))
-        plain.append(errors < np.sqrt(5.991) * curve.std(x, calibrated=False))
-        first = min(own.start for own in curve.gaps)
-        far = np.linspace(1, first - 3, 20)
-        assert np.array_equal(curve.std(far), curve.std(far, calibrated=False))
-    assert np.mean(inside) > 0.95 > np.mean(plain)
-    curve.save(tmp_path / "curve.npz")
-    again = ss.load(tmp_path / "curve.npz")
-    assert again.gaps == curve.gaps and np.array_equal(again.std(x), curve.std(x))
-
-
 def test_predictions_are_those_of_an_estimate_without_the_data(monkeypatch):
     """Blocks equal a new estimate with the same λ and knots, without the measurements of both sensors."""
     _, t, y, s, v = recording(0, (25, 30), m=1)

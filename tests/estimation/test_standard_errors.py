@@ -181,16 +181,6 @@ def test_inertial_signals(space, force):
     agree(many.specific_force, std.specific_force, each=0.15 if space == "se:3" else 0.1)
 
 
-def test_accelerometers_correlate_attitude_and_acceleration():
-    """The specific force is known better than its parts: the sum of independent errors would be far too large."""
-    rng = np.random.default_rng(4)
-    spline = fused(rng, "so:3 x r:3")
-    x = np.linspace(1, 9, 30)
-    _, std = poses.imu(spline, x, return_std=True)
-    tilt = np.sqrt(np.trace(spline.cov(x)[0], axis1=-2, axis2=-1) / 3)
-    assert sensors.rms(std.specific_force) < 0.5 * 9.81 * sensors.rms(tilt)
-
-
 # ---- use ----
 
 

@@ -4,15 +4,12 @@ import numpy as np
 import pytest
 from cases import (
     EPS,
-    QUADRICS,
     QUOTIENTS,
     apart,
-    base_point,
     by_differences,
     condition,
     every_family,
     loop_over,
-    unit_tangent,
     walk,
 )
 from curves import clamped
@@ -109,23 +106,6 @@ def test_a_cubic_is_a_segment_of_the_spline(case, rng):
 
 
 @every_family
-@every_degree
-def test_control_points_on_a_geodesic(case, degree, rng):
-    space = case.space
-    p = base_point(space, rng)
-    q = space.exp(p, unit_tangent(space, p, rng))
-    points = space.geodesic(p, q, np.linspace(0, 1, degree + 1))
-    curve = ss.BezierCurve(points, space)
-    x = np.linspace(0, 1, 7)
-    allowed = 100 * EPS * condition(space, points)
-    assert apart(space, curve(x), space.geodesic(p, q, x)) <= allowed
-    if not isinstance(space, QUADRICS):
-        # There the size of a vector is that of its numbers.
-        assert np.abs(curve.speed(x) - 1.0).max() <= 30 * allowed
-    assert np.abs(curve(x, nu=2)).max() <= 300 * allowed
-
-
-@every_family
 @loop_over("degree", [2, 3, 5])
 def test_derivatives_agree_with_differences(case, degree, rng):
     curve = ss.BSpline(clamped([0.7, 1.9], degree), walk(case.space, 0.4, degree + 3, rng), degree, case.space)
@@ -148,22 +128,6 @@ def test_the_array_of_a_point_does_not_matter(name, rng):
     assert apart(space, one(x), two(x)) <= 100 * EPS
     for nu in (1, 2):
         assert np.abs(one(x, nu) - here(space, one(x), two(x), two(x, nu))).max() <= 1e-11
-
-
-@every_family
-@loop_over(("degree", "times"), [(2, 1), (3, 1), (3, 2), (5, 1), (5, 4)])
-def test_curves_are_c1(case, degree, times, rng):
-    """At knots that are repeated less often than the degree."""
-    space = case.space
-    interior = [0.8, *[1.5] * times, 2.1]
-    points = walk(space, 0.4, len(interior) + degree + 1, rng)
-    curve = ss.BSpline(clamped(interior, degree), points, degree, space)
-    back = backwards(curve)
-    x = np.array([0.8, 1.5, 2.1])
-    allowed = 100 * EPS * condition(space, points)
-    assert apart(space, curve(x), back(-x)) <= allowed
-    jump = curve(x, nu=1) + here(space, curve(x), back(-x), back(-x, nu=1))
-    assert np.abs(jump).max() <= 30 * degree * allowed
 
 
 @every_family

@@ -101,14 +101,6 @@ def test_length_and_energy_of_flat_curves(rng):
         assert (length, energy) == pytest.approx(tuple(expected), rel=1e-9)
 
 
-def test_a_great_circle_has_its_length():
-    half = ss.BezierCurve([[1, 0, 0], [0, 1, 0]], "sphere:2")
-    assert half.length() == pytest.approx(np.pi / 2, rel=1e-14)
-    assert half.bending_energy() == pytest.approx(0, abs=1e-20)
-    big = np.eye(400)[:3]
-    assert ss.BezierCurve(big, "sphere:399").length() == pytest.approx(ss.BezierCurve(np.eye(3), "s:2").length())
-
-
 def test_invalid_knots_and_degrees_raise():
     for knots, degree, match in [
         (CLAMPED[1:], 2, r"3 control points of degree 2 need 6 knots, got 5"),

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from refused import raises
 
 import symspline as ss
 from symspline import geo
@@ -148,8 +149,7 @@ def test_straight_tracks_are_marked_and_messages_name_the_track():
     lost = table.copy()
     lost.iloc[7, lost.columns.get_loc("location-lat")] = np.nan
     owner = lost["individual-local-identifier"].iloc[7]
-    with pytest.raises(ss.ValidationError, match=rf"row 7 \(individual-local-identifier {owner}\)"):
-        geo.resample(lost, "1h", max_gap="6h", **NAMES)
+    raises(rf"row 7 \(individual-local-identifier {owner}\)", lambda: geo.resample(lost, "1h", max_gap="6h", **NAMES))
     wrong = table.assign(**{"location-lat": table["location-lat"].where(table["event-id"] != 1003, 93.0)})
     with pytest.raises(ss.ValidationError, match=r"identifier Maria, rows in the order of time: lat\[3\] is 93"):
         geo.resample(wrong, "1h", max_gap="6h", **NAMES)

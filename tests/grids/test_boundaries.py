@@ -4,7 +4,6 @@ import warnings
 
 import numpy as np
 import pytest
-from scipy.ndimage import label
 from scipy.spatial.transform import Rotation
 
 import symspline as ss
@@ -34,23 +33,6 @@ def test_a_map_of_two_grains_warns(noise):
     with pytest.warns(ss.SmoothingWarning, match=BOUNDARY) as caught:
         ss.make_smoothing_grid((None, None), noisy, CUBIC, lam=1.0)
     assert sum(BOUNDARY in str(one.message) for one in caught) == 1
-
-
-@pytest.mark.filterwarnings("ignore::symspline.SmoothingWarning")
-def test_grain_by_grain():
-    """The recipe of the guide: a grain is where neighbours are close to each other."""
-    truth, noisy, second = grain_map(2)
-    close = [CUBIC.distance(noisy[1:], noisy[:-1]) < 0.15, CUBIC.distance(noisy[:, 1:], noisy[:, :-1]) < 0.15]
-    # Nodes at even places of a finer lattice, and the steps between them.
-    lattice = np.zeros([2 * n - 1 for n in noisy.shape[:2]], bool)
-    lattice[::2, ::2], lattice[1::2, ::2], lattice[::2, 1::2] = True, *close
-    grains = label(lattice)[0][::2, ::2]
-    assert len(np.unique(grains[second])) == len(np.unique(grains[~second])) == 1
-    smooth = np.empty_like(noisy)
-    for grain in np.unique(grains):
-        own = ss.make_smoothing_grid((None, None), noisy, CUBIC, weights=np.where(grains == grain, 1.0, 0.0))
-        smooth[grains == grain] = own.points[grains == grain]
-    assert np.degrees(CUBIC.distance(smooth, truth)).max() < 2.5
 
 
 @pytest.mark.parametrize("space", ["r:1", "sphere:2", "spd:2"])

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from cases import REPRESENTATIVE, SINGLE, SPACES
 from grids.grid_fields import Field, apart, inside, knots
+from refused import raises
 from scipy.interpolate import RectBivariateSpline, make_interp_spline
 
 import symspline as ss
@@ -101,16 +102,6 @@ def test_the_error_has_order_four(space):
         axes = np.linspace(0, 1, n) ** 1.1, np.linspace(0, 1, n)
         errors.append(np.max(apart(space, ss.GridSpline(axes, field.on(*axes), space)(x), truth)))
     assert np.log2(errors[0] / errors[1]) > 3.7 or errors[1] < 1e-12
-
-
-@pytest.mark.parametrize("space", ["so:3", "sphere:2", "spd:3"])
-def test_the_order_of_axes_matters_with_order_eight(space):
-    field, gaps = Field(ss.space(space), size=0.6), []
-    for n in (6, 11, 21):
-        axes = np.linspace(0, 1, n), np.linspace(0, 1, n)
-        gaps.append(ss.GridSpline(axes, field.on(*axes), space).report.axis_order_gap)
-    assert np.log2(gaps[0] / gaps[1]) > 5.5
-    assert np.log2(gaps[1] / gaps[2]) > 6.5
 
 
 @pytest.mark.parametrize("space", REPRESENTATIVE, ids=str)
@@ -223,5 +214,4 @@ def test_manifolds_of_functions_have_grids():
     expected = ss.CubicSpline(axes[1], rows.swapaxes(0, 1), grid.space, bc_type="not-a-knot")(x[1])
     assert np.abs(grid.grid(*x) - expected).max() < 1e-12
     assert np.abs(grid(x) - expected[np.arange(3), np.arange(3)]).max() < 1e-12
-    with pytest.raises(ss.ValidationError, match="along axis 0"):
-        grid(x, (1, 0))
+    raises("along axis 0", grid, x, (1, 0))

@@ -6,6 +6,7 @@ import warnings
 
 import numpy as np
 import pytest
+from refused import raises
 from scipy.interpolate import CubicSpline, make_smoothing_spline
 
 import symspline as ss
@@ -164,32 +165,6 @@ def test_one_lam_can_be_given(rng):
     assert ss.make_smoothing_grid((U, V), y[..., None], LINE, lam=2.0).lam == (2.0, 2.0)
 
 
-def test_lam_of_one_axis_does_not_depend_on_the_number_of_rows_that_are_tried(rng, monkeypatch):
-    u = np.linspace(0, 1, 60)
-    _, y = noisy_wave(rng, u=u)
-    whole = ss.make_smoothing_grid((u, V), y[..., None], LINE)
-    monkeypatch.setattr("symspline._smoothing.grid_rows._NODES", 300)
-    part = ss.make_smoothing_grid((u, V), y[..., None], LINE)
-    np.testing.assert_allclose(np.log10(part.lam), np.log10(whole.lam), atol=0.6)
-    assert part.lam != whole.lam
-
-
-def test_orientations_come_out_more_accurate_than_with_one_axis_alone(rng):
-    t = np.linspace(0, 1, 41)
-    truth, space = turns(t, t), ss.space("so:3")
-    noisy = space.exp(truth, np.deg2rad(0.8) / np.sqrt(3) * space.random_tangent(rng, truth))
-    grid = ss.make_smoothing_grid((t, t), noisy, space)
-    rows = ss.make_smoothing_spline(t, noisy, space)(t)
-    error, of_rows = (np.rad2deg(space.distance(own, truth)).mean() for own in (grid.points, rows))
-    assert error < 0.14
-    assert error < 0.6 * of_rows
-    assert grid.sigma == pytest.approx(np.deg2rad(0.8) / np.sqrt(3), rel=0.05)
-    assert grid.report.converged
-    # A section and the values at the nodes are those of a GridSpline through the points.
-    spline = ss.GridSpline((t, t), grid.points, space, bc_type="natural")
-    np.testing.assert_allclose(grid((0.33, 0.47)), spline((0.33, 0.47)), atol=1e-12)
-
-
 # Some of the surfaces are geodesic along one axis.
 @pytest.mark.filterwarnings("ignore::symspline.SmoothingWarning")
 @pytest.mark.parametrize("name", ["r:1", "sphere:2", "so:3"])
@@ -280,17 +255,6 @@ def test_weights_along_later_axes_are_inverse_variances(rng):
         s = np.linalg.inv(np.diag(own) + lam[1] * energy_matrix(V))
         np.testing.assert_allclose(grid.points[i, :, 0], s @ (own * half[i]), atol=1e-9)
         np.testing.assert_allclose(grid.std()[i] ** 2, complete[i] * np.diag(s), rtol=1e-6)
-
-
-def test_weights_improve_the_surface(rng):
-    u, v = np.linspace(0, 1, 25), np.linspace(0, 2, 20)
-    weights = 10 ** rng.uniform(-2, 1, (25, 20))
-    truth = wave(u, v)
-    y = (truth + 0.05 / np.sqrt(weights) * rng.standard_normal(truth.shape))[..., None]
-    weighted, plain = (ss.make_smoothing_grid((u, v), y, LINE, weights=own) for own in (weights, None))
-    errors = [np.sqrt(np.mean((own.points[..., 0] - truth) ** 2)) for own in (weighted, plain)]
-    assert errors[0] < 0.5 * errors[1]
-    assert weighted.sigma == pytest.approx(0.05, rel=0.15)
 
 
 # ---- axes, spaces, products ----
@@ -429,8 +393,7 @@ def test_damaged_files_raise(rng, name, value):
     damaged = io.BytesIO()
     np.savez(damaged, **entries)
     damaged.seek(0)
-    with pytest.raises(ss.ValidationError, match=name.split("_")[0]):
-        ss.load(damaged)
+    raises(name.split("_")[0], ss.load, damaged)
 
 
 # ---- errors and warnings ----
@@ -468,15 +431,14 @@ ONES = np.ones((11, 13, 1))
 def test_invalid_input_raises(change, message):
     given = {"axes": (U, V), "points": ONES, "space": "r:1"} | change
     axes, points, space = (given.pop(name) for name in ("axes", "points", "space"))
-    with pytest.raises(ss.ValidationError, match=message):
-        ss.make_smoothing_grid(axes, points, space, **given)
+    raises(message, lambda: ss.make_smoothing_grid(axes, points, space, **given))
 
 
 def test_manifolds_of_functions_and_the_constructor_raise():
-    with pytest.raises(ss.ValidationError, match="smoothing grids are not made"):
-        ss.make_smoothing_grid((None, None), np.ones((4, 4, 5, 2)), ss.Stiefel(2, 5))
-    with pytest.raises(TypeError, match="make_smoothing_grid"):
-        ss.SmoothingGrid()
+    raises(
+        "smoothing grids are not made", ss.make_smoothing_grid, (None, None), np.ones((4, 4, 5, 2)), ss.Stiefel(2, 5)
+    )
+    raises("make_smoothing_grid", ss.SmoothingGrid, error=TypeError)
 
 
 @pytest.mark.parametrize("on_failure", ["raise", "warn", "ignore"])

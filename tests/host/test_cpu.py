@@ -11,6 +11,7 @@ from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
 
 import pytest
+from refused import raises
 
 import symspline as ss
 from symspline import _core, _cpu
@@ -79,8 +80,7 @@ def test_the_module_that_suits_the_processor_is_chosen(folder_with, files, own, 
     ],
 )
 def test_missing_and_unsupported_modules_raise(folder_with, files, own, asked, message):
-    with pytest.raises(ImportError, match=message):
-        _cpu.load(folder_with(files, own, asked))
+    raises(message, _cpu.load, folder_with(files, own, asked), error=ImportError)
 
 
 @needs_v3

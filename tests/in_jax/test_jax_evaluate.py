@@ -95,8 +95,7 @@ def test_outside_the_knots_and_off_the_space_is_nan():
 
 def test_invalid_arguments_raise():
     p = np.eye(3)[:2]
-    with pytest.raises(ss.ValidationError, match="does not support u:2"):
-        evaluate([0, 1], np.stack([np.eye(2)] * 2), np.zeros((2, 2, 2)), "u:2", 0.5)
+    raises("does not support u:2", evaluate, [0, 1], np.stack([np.eye(2)] * 2), np.zeros((2, 2, 2)), "u:2", 0.5)
     raises(r"velocities has shape \(1, 3\)", evaluate, [0, 1], p, p[:1], "sphere:2", 0.5)
     raises(r"t has shape \(3,\)", evaluate, [0, 1, 2], p, p, "sphere:2", 0.5)
     raises(r"points has shape \(2, 3\)", evaluate, [0, 1], p, p, "sphere:3", 0.5)

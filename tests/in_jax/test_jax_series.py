@@ -10,11 +10,8 @@ import numpy as np
 import pytest
 
 from symspline._autodiff import divided
-from symspline._autodiff.library import hermitian
 from symspline._autodiff.models import inverse_series
 from symspline.jax._library import LIBRARY
-
-QUICK = True
 
 
 @pytest.fixture(autouse=True)
@@ -86,25 +83,3 @@ def test_divided_differences(name):
                 column = [(column[i + 1] - column[i]) / (x[i + j] - x[i]) for i in range(len(column) - 1)]
             found = differences(*(jnp.array(float(a)) for a in x))
             np.testing.assert_allclose(float(found), float(column[0]), rtol=5e-14)
-
-
-def symmetric(seed):
-    a = np.random.default_rng(seed).standard_normal((3, 3))
-    return a + a.T
-
-
-def test_the_logarithm_inverts_the_exponential_in_two_directions():
-    """Second mixed derivatives, where two of three eigenvalues are equal and matrices do not commute."""
-    g, h = symmetric(1), symmetric(2)
-    base = jnp.diag(jnp.array([0.3, 0.3, -1.0]))
-
-    def both(s, t):
-        a = base + s * g + t * h + s * t * (g @ g)
-        return LIBRARY.logarithm(jax.scipy.linalg.expm(a)) - a
-
-    mixed = jax.jit(jax.jacfwd(jax.jacfwd(both, 0), 1))(0.0, 0.0)
-    np.testing.assert_allclose(mixed, np.zeros((3, 3)), atol=2e-13)
-    gradient = jax.jit(jax.grad(lambda a: jnp.trace(LIBRARY.logarithm(hermitian(a)))))(
-        jnp.diag(jnp.array([2.0, 2.0, 5.0]))
-    )
-    np.testing.assert_allclose(gradient, np.diag([0.5, 0.5, 0.2]), atol=1e-15)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from cases import loop_over
-from made import jump, twin, walk
+from made import twin, walk
 from pymanopt import manifolds
 from refused import raises
 from scipy.linalg import expm
@@ -137,25 +137,6 @@ def test_rotations_have_velocities_in_the_lie_algebra():
     flat = ss.CubicSpline(None, turns[:, None], "r:1")
     assert np.abs(spline.velocities[:, 1, 0] - flat.velocities[:, 0]).max() <= 1e-11
     assert np.abs(spline.velocities + np.swapaxes(spline.velocities, 1, 2)).max() <= 1e-15
-
-
-def test_hyperbolic_space_as_a_ball():
-    """Its arrays are no submanifold, and its metric depends on the point."""
-    space = from_pymanopt(manifolds.PoincareBall(2))
-    p = 0.5 * walk(ss.Sphere(2), 0.3, 6, 2)[:, :2]
-    spline = ss.CubicSpline(None, p, space)
-    hyperboloid = ss.CubicSpline(None, ss.convert.ball_to_hyperboloid(p), "h:2")
-    x = np.linspace(0, 5, 11)
-    assert np.abs(ss.convert.hyperboloid_to_ball(hyperboloid(x)) - spline(x)).max() <= 1e-10
-    assert jump(spline) <= 1e-8
-
-
-def test_the_state_of_random_numbers_is_left_alone():
-    np.random.seed(5)  # noqa: NPY002
-    expected = np.random.standard_normal()  # noqa: NPY002
-    np.random.seed(5)  # noqa: NPY002
-    from_pymanopt(manifolds.Sphere(3))
-    assert np.random.standard_normal() == expected  # noqa: NPY002
 
 
 def test_adapters_are_values_and_invalid_ones_raise():

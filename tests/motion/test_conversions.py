@@ -4,6 +4,7 @@ import io
 
 import numpy as np
 import pytest
+from refused import raises
 from scipy.spatial.transform import Rotation
 
 import symspline as ss
@@ -85,18 +86,6 @@ def test_other_layouts_and_types(rng):
     assert np.array_equal(rotations.as_quaternions(np.eye(3, dtype=int), scalar_first=True), [1, 0, 0, 0])
 
 
-def test_input_does_not_change(rng):
-    v = rng.standard_normal((20, 3))
-    m = rotations.from_rotation_vectors(v)
-    q = rotations.as_quaternions(m, scalar_first=True)
-    kept = v.copy(), m.copy(), q.copy()
-    rotations.from_rotation_vectors(v)
-    rotations.as_rotation_vectors(m)
-    rotations.from_quaternions(q, scalar_first=True)
-    assert all(map(np.array_equal, kept, (v, m, q)))
-    assert not np.shares_memory(rotations.from_quaternions(q, scalar_first=True), q)
-
-
 def test_tolerance_of_quaternions():
     rounded = np.array([[0.7071, 0.7071, 0, 0], [0.5, 0.5, 0.5, 0.5]]) / (1 + 1e-6 / 3)
     with pytest.raises(
@@ -123,16 +112,14 @@ def test_one_bad_matrix_among_many_raises(row, bad, message):
     m = np.tile(np.eye(3), (1031, 1, 1))
     m[row] = bad
     for call in (rotations.as_rotation_vectors, lambda m: rotations.as_quaternions(m, scalar_first=True)):
-        with pytest.raises(ss.ValidationError, match=rf"rotations\[{row}.*{message.removeprefix(', ')}"):
-            call(m)
+        raises(rf"rotations\[{row}.*{message.removeprefix(', ')}", call, m)
 
 
 @pytest.mark.parametrize("value, message", [(np.nan, "is nan"), (-np.inf, "is -inf"), (1e200, "angles must be small")])
 def test_vectors_without_a_rotation_raise(value, message):
     v = np.zeros((11, 3))
     v[10, 1] = value
-    with pytest.raises(ss.ValidationError, match=rf"vectors\[10.*{message}"):
-        rotations.from_rotation_vectors(v)
+    raises(rf"vectors\[10.*{message}", rotations.from_rotation_vectors, v)
 
 
 def test_rotation_agrees_with_the_curve(rng):

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from curves import core_calls
 from refused import raises
-from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 import symspline as ss
@@ -47,18 +46,6 @@ def test_order_with_irregular_steps(frame, interpolation, order, largest):
     assert errors[-1] < largest
 
 
-def test_agrees_with_an_ode_solver():
-    def omega(t):
-        return np.stack([np.sin(3 * t), np.cos(2 * t) ** 2, 0.5 * t], axis=-1)
-
-    def derivative(t, r):
-        return (r.reshape(3, 3) @ rotations._hat(omega(t))).ravel()
-
-    t = uneven(2000, end=4.0)
-    exact = solve_ivp(derivative, (0, 4), np.eye(3).ravel(), "DOP853", t, rtol=1e-12, atol=1e-13).y.T.reshape(-1, 3, 3)
-    assert np.abs(rotations.integrate(t, omega(t)) - exact).max() < 3e-11
-
-
 def test_rates_of_a_curve_give_the_curve_back():
     t = uneven(400)
     spline = ss.CubicSpline(t, precession(t), "so:3", bc_type="not-a-knot")
@@ -71,14 +58,6 @@ def test_constant_rates_are_exact():
     t = uneven(50, end=100.0)
     found = rotations.integrate(t, np.broadcast_to(A, (50, 3)))
     assert np.abs(found - Rotation.from_rotvec(t[:, None] * A).as_matrix()).max() < 1e-13
-
-
-def test_few_samples():
-    start = precession(np.array([0.7]))[0]
-    assert np.abs(rotations.integrate([5.0], [A], start) - start).max() < 1e-15
-    for n, largest in ((2, 2e-3), (3, 1e-4), (4, 1e-5)):
-        t = np.linspace(0, 0.2, n)
-        assert np.abs(rotations.integrate(t, rate(t)) - precession(t)).max() < largest
 
 
 def test_many_samples():
@@ -137,18 +116,6 @@ def test_dates_count_in_seconds():
     expected = rotations.integrate(t, rate(t))
     assert np.abs(rotations.integrate(dates, rate(t)) - expected).max() < 1e-13
     assert np.abs(rotations.integrate(None, 0.1 * rate(t)) - expected).max() < 1e-13
-
-
-def test_noise_at_uneven_times():
-    """A warning names the remedy, which keeps the error of noisy rates at σ√(ht)."""
-    rng = np.random.default_rng(0)
-    t = np.sort(rng.uniform(0, 100, 10_001))
-    omega = 0.05 * rng.standard_normal((10_001, 3))
-    with pytest.warns(UserWarning, match=r'differ by a factor of more than 100.*interpolation="linear"'):
-        cubic = rotations.integrate(t, omega)
-    linear = rotations.integrate(t, omega, interpolation="linear")
-    angle = [np.linalg.norm(rotations.as_rotation_vectors(own[-1])) for own in (linear, cubic)]
-    assert angle[0] < 3 * 0.05 * np.sqrt(0.01 * 100) * np.sqrt(3) and angle[1] > 3 * angle[0]
 
 
 def test_invalid_input_raises():

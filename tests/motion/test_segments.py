@@ -5,7 +5,6 @@ import pytest
 from compare import each, factors, largest_difference, parts
 from curves import every_kind, points_on
 from refused import raises
-from scipy.spatial.transform import Rotation
 
 import symspline as ss
 
@@ -49,15 +48,6 @@ def test_times_close_together_are_not_one():
     assert len(found.t) == 3
 
 
-@pytest.mark.parametrize("dtype", ["f4", "i8"])
-def test_means_in_other_numbers(dtype):
-    points = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 1, 0]], dtype)
-    (found,) = ss.fit_segments([0, 1, 1, 2], points, "sphere:2", max_gap=2, duplicates="mean")
-    assert np.abs(found.points - [[1, 0, 0], [0, 0.5**0.5, 0.5**0.5], [0, 1, 0]]).max() < (
-        1e-7 if dtype == "f4" else 1e-15
-    )
-
-
 def test_dates():
     t = np.datetime64("2024-01-01T00:00:00.000000001") + (1e9 * T).astype("m8[ns]")
     p = points_on(ss.Sphere(2), len(T))
@@ -65,15 +55,6 @@ def test_dates():
     for gap in longest:
         pieces = ss.fit_segments(t, p, "sphere:2", max_gap=gap)
         assert [len(piece.t) for piece in pieces] == [4, 3, 2] and pieces[1].t[0] == t[4]
-
-
-def test_what_scipy_and_lists_hold():
-    r = Rotation.from_matrix(points_on(ss.SpecialOrthogonal(3), len(T)))
-    x = points_on(ss.Euclidean(3), len(T))
-    for points, space in ((r, "so:3"), (list(r), "so:3"), ((r, x.tolist()), "so:3 x r:3")):
-        pieces = ss.fit_segments(T, points, space, max_gap=2, duplicates="mean")
-        plain = (r.as_matrix(), x) if space != "so:3" else r.as_matrix()
-        assert pieces == ss.fit_segments(T, plain, space, max_gap=2)
 
 
 def test_invalid_arguments_raise():
@@ -139,17 +120,6 @@ def test_weights_go_with_their_points_and_none_makes_a_pause():
     for piece in pieces:
         own = np.isin(t, piece.data[0])
         assert piece == ss.make_smoothing_spline(t[own], p[own], space, 0.1, weights=weights[own])
-
-
-def test_noisy_points_of_one_time_all_count():
-    t, y = np.array([0.0, 1, 1, 2, 3, 9, 9]), np.array([[0.0], [1], [2], [3], [4], [5], [6]])
-    (piece,) = ss.fit_segments(t, y, "r:1", max_gap=2, smooth=True, lam=1.0)
-    assert piece == ss.make_smoothing_spline(t[:5], y[:5], "r:1", 1.0) and len(piece.t) == 4
-    (first,) = ss.fit_segments(
-        t, y, "r:1", max_gap=2, smooth=True, lam=1.0, duplicates="first", weights=np.arange(1, 8)
-    )
-    kept = [0, 1, 3, 4]
-    assert first == ss.make_smoothing_spline(t[kept], y[kept], "r:1", 1.0, weights=[1, 2, 4, 5])
 
 
 def test_failed_noisy_segments_are_all_kept():

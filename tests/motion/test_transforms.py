@@ -80,22 +80,6 @@ def test_transforms_restore_their_points():
     assert np.abs(poses.transform(product, KNOTS).as_matrix() - given.as_matrix()).max() < 1e-14
 
 
-def test_objects_with_several_axes_are_batches():
-    kind = rigid_transform()
-    several_axes()
-    g = points_on(ss.space("se:3"), 6, (2,))
-    turns = Rotation.from_matrix(g[..., :3, :3])
-    rigid = kind.from_components(g[..., :3, 3], turns)
-    assert rigid.shape == (2, 6)
-    for given, array, name in ((rigid, g, "se:3"), (turns, g[..., :3, :3], "so:3")):
-        spline = ss.CubicSpline(KNOTS, given, name)
-        plain = ss.CubicSpline(KNOTS, array, name)
-        assert np.abs(spline(X) - plain(X)).max() < 1e-13
-    pair = ss.CubicSpline(KNOTS, (turns, g[..., :3, 3]), "so:3 x r:3")
-    assert rotations.rotation(pair, X).shape == (2, 2, 3)
-    assert rotations.as_quaternions(turns, scalar_first=True).shape == (2, 6, 4)
-
-
 def test_values_that_are_nan_raise():
     rigid_transform()
     raises(r"value at index \[0\] is NaN", poses.transform, curve("se:3"), [-1.0], extrapolate=False)

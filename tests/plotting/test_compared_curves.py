@@ -71,5 +71,4 @@ def test_what_cannot_be_compared_raises():
     dates = np.datetime64("2024-01-01") + np.arange(6)
     raises(r"curves\[1\] has dates as times", ss.plot, [spline, spline_on("r:2", t=dates)])
     for wrong in (3, "sphere:2", [spline, 3]):
-        with pytest.raises(TypeError, match=r"^curves"):
-            ss.plot(wrong)
+        raises(r"^curves", ss.plot, wrong, error=TypeError)

@@ -184,8 +184,7 @@ def test_notebooks_show_a_small_picture_and_the_text(monkeypatch):
 
 def test_without_matplotlib(monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
-    with pytest.raises(ImportError, match=r"^plots need matplotlib.*pip install 'symspline\[plot\]'$"):
-        spline_on("r:2").plot()
+    raises(r"^plots need matplotlib.*pip install 'symspline\[plot\]'$", spline_on("r:2").plot, error=ImportError)
 
 
 def test_nothing_global_is_touched(tmp_path):

@@ -31,8 +31,7 @@ def test_the_projection_is_checked():
     raises(r"needs axes with projection='3d'", spline_on("r:3").plot, ax=flat)
     raises(r"needs axes with no projection", spline_on("r:2").plot, ax=solid)
     raises("one picture per factor", spline_on_product().plot, ax=flat)
-    with pytest.raises(TypeError, match=r"^ax must be axes of matplotlib"):
-        spline_on("r:2").plot(ax="left")
+    raises(r"^ax must be axes of matplotlib", spline_on("r:2").plot, ax="left", error=TypeError)
 
 
 def spline_on_product():
@@ -78,8 +77,7 @@ def test_invalid_options():
     raises("figsize and ax exclude each other", plot, figsize=(5, 4), ax=axes_for("r:2"))
     raises("file and ax exclude each other", plot, "a.png", ax=axes_for("r:2"))
     for name in ("label", "title", "show"):
-        with pytest.raises(TypeError, match=f"^{name} must be"):
-            plot(**{name: 3})
+        raises(f"^{name} must be", plot, **{name: 3}, error=TypeError)
 
 
 def test_title_colour_label_and_size_of_a_page():

@@ -1,7 +1,5 @@
 """Propagators and pulses: where they bring the states."""
 
-import tracemalloc
-
 import numpy as np
 import pytest
 from curves import points_on
@@ -75,21 +73,6 @@ def test_batches(name):
     t = np.stack([KNOTS, np.linspace(0, 5, 6)])
     own = ss.CubicSpline(t, spline.points[0, :2], spline.space)
     assert np.abs(propagator(own, X)[1] - propagator(own[1], X)).max() < 1e-13
-
-
-def test_products_of_many_steps_stay_unitary():
-    """Rounding of hundreds of factors does not add up."""
-    spline = ss.CubicSpline(None, points_on(ss.ComplexProjective(1), 200, step=0.5), "cp:1")
-    assert off_one(propagator(spline, np.linspace(0, 199, 50))) < 1e-15
-
-
-def test_steps_are_short_enough_for_the_fastest_of_a_batch():
-    space = ss.ComplexProjective(2)
-    both = ss.CubicSpline(None, np.stack([points_on(space, 6, step=step) for step in (0.01, 1.2)]), space)
-    x = np.linspace(0, 5, 11)
-    for u, spline in zip(propagator(both, x), both, strict=True):
-        assert np.abs(u - propagator(spline, x)).max() < 1e-14
-        assert reaches(spline, u, x) < 1e-13
 
 
 def test_the_adiabatic_phase_of_a_circle_of_latitude():
@@ -203,16 +186,3 @@ def test_in_the_span_of_the_points_it_is_the_same(name, ends):
         assert np.abs(propagator(spline[i], x) - u[i]).max() < 4e-15
         assert reaches(spline[i], u[i], x) < 1e-13
     assert off_one(u) < 4e-15
-
-
-def test_eight_qubits_are_quick():
-    """In all 256 dimensions eight stages are systems of 2048 equations, and gigabytes."""
-    rng = np.random.default_rng(5)
-    states = rng.standard_normal((4, 256)) + 1j * rng.standard_normal((4, 256))
-    spline = ss.CubicSpline(None, states / np.linalg.norm(states, axis=1)[:, None], "cp:255")
-    tracemalloc.start()
-    u = propagator(spline, [0.5, 3.0])
-    most = tracemalloc.get_traced_memory()[1]
-    tracemalloc.stop()
-    assert most < 2e7
-    assert off_one(u) < 4e-15 and reaches(spline, u, np.array([0.5, 3.0])) < 1e-13

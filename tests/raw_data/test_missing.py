@@ -78,8 +78,7 @@ def test_as_many_times_as_points_that_are_present_are_refused(kind):
     """They may belong to other points."""
     y = np.arange(6.0)[:, None]
     y[2] = np.nan
-    with pytest.raises(ss.ValidationError, match=r"t has shape \(5,\)"):
-        ss.CubicSpline(np.arange(5).astype(kind), y, "r:1", skipna=True)
+    raises(r"t has shape \(5,\)", ss.CubicSpline, np.arange(5).astype(kind), y, "r:1", skipna=True)
 
 
 def test_dates_with_a_time_zone_keep_it():

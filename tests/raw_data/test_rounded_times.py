@@ -74,9 +74,3 @@ def test_the_limit_is_a_part_of_the_time_step(rate, warned):
         warnings.simplefilter("always")
         ss.CubicSpline(ns / 1e9, x, "r:3")
     assert bool(caught) == warned
-
-
-def test_whole_numbers_are_exact():
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        ss.CubicSpline(1e15 + np.arange(20.0), np.zeros((20, 1)), "r:1")

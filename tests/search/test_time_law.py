@@ -139,17 +139,6 @@ def test_geodesics_have_trapezoids(length):
     assert abs(law.duration / expected - 1) < 1e-5
 
 
-def test_circles_have_the_speed_of_their_curvature():
-    """|a|² = s̈² + κ² ṡ⁴: without a limit of the speed, it is √(A/κ) far from the ends."""
-    angles = np.linspace(0, 6 * np.pi, 200)
-    circle = ss.CubicSpline(
-        angles, 0.5 * np.stack([np.cos(angles), np.sin(angles)], axis=-1), "r:2", bc_type="not-a-knot"
-    )
-    law = ss.time_law(circle, max_acceleration=3.0)
-    x = law(law.duration / 2)
-    assert abs(circle.speed(x) * law(law.duration / 2, 1) - np.sqrt(3.0 * 0.5)) < 1e-3
-
-
 @pytest.mark.parametrize("name", ["rp:2", "cp:1", "gr:2,4"])
 def test_durations_do_not_depend_on_representatives(name):
     """Velocities at a knot are those of two representatives of its point: their difference is no jump."""

@@ -152,8 +152,7 @@ def test_control_points_that_are_too_far_apart(name):
     at, limit = REACH[name]
     good, bad = np.array([at(0), at(0.4), at(0.8)]), np.array([at(0), at(0.4), at(0.4 + limit)])
     lie = rf"lie at or past .*cut locus: angle {LIMIT[limit]}, limit {LIMIT[limit]}"
-    with pytest.raises(ss.CutLocusError, match=rf"control_points\[1\] and control_points\[2\] {lie}"):
-        ss.BezierCurve(bad, name)
+    raises(rf"control_points\[1\] and control_points\[2\] {lie}", ss.BezierCurve, bad, name, error=ss.CutLocusError)
     for batch, curve in ((np.stack([good, bad]), "1"), (np.stack([[good, good], [bad, good]]), "1,0")):
         match = rf"control_points\[1\] and control_points\[2\] of curve {curve} {lie}"
         raises(match, ss.BSpline, CLAMPED, batch, 2, name, error=ss.CutLocusError)

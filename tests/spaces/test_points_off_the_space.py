@@ -139,8 +139,7 @@ def test_points_off_the_space():
 
 def test_error_names_the_point_of_a_batch():
     fit_error(r"points\[2\] of curve 1 is off the space by 5\.000e-1", points=changed((1, 2), [0, 0, 1.5], TWO))
-    with pytest.raises(ss.ValidationError, match=r"points\[1\] of curve 1 is off the space"):
-        ss.fit_many([(None, P), (None, changed(1, [0, 2, 0])[:2])], S2)
+    raises(r"points\[1\] of curve 1 is off the space", ss.fit_many, [(None, P), (None, changed(1, [0, 2, 0])[:2])], S2)
 
 
 @pytest.mark.parametrize("dtype, tol", [("f8", "1e-8"), ("f4", "1e-4")])

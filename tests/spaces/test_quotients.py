@@ -6,6 +6,7 @@ import pickle
 import numpy as np
 import pytest
 from crystals import CUBIC, SO3, at_random, brute_distance, noisy, path
+from refused import raises
 from scipy.spatial.transform import Rotation
 
 import symspline as ss
@@ -140,10 +141,8 @@ def _closest(p, q):
 
 
 def test_invalid_points_have_no_mean():
-    with pytest.raises(ss.ValidationError, match="at least one point"):
-        CUBIC.mean(np.zeros((0, 3, 3)))
-    with pytest.raises(ss.ValidationError, match="finite"):
-        CUBIC.mean(np.full((2, 3, 3), np.nan))
+    raises("at least one point", CUBIC.mean, np.zeros((0, 3, 3)))
+    raises("finite", CUBIC.mean, np.full((2, 3, 3), np.nan))
 
 
 # ---- groups ----
@@ -156,8 +155,7 @@ def test_groups_that_are_not_closed_name_the_pair():
     i, j = (int(part.split("]")[0]) for part in str(caught.value).split("group[")[1:3])
     products = group[i] @ group[j] - group[:-1]
     assert np.abs(products).max(axis=(-2, -1)).min() > 0.1
-    with pytest.raises(ss.ValidationError, match=r"`group\[1\] \* group\[1\]`"):
-        ss.Quotient("su:3", [1, np.exp(2j * np.pi / 3)])
+    raises(r"`group\[1\] \* group\[1\]`", ss.Quotient, "su:3", [1, np.exp(2j * np.pi / 3)])
 
 
 @pytest.mark.parametrize(
@@ -185,8 +183,7 @@ def test_invalid_groups_raise(space, group, left, message):
     if message is None:
         ss.Quotient(space, group, left=left)
         return
-    with pytest.raises(ss.ValidationError, match=message):
-        ss.Quotient(space, group, left=left)
+    raises(message, ss.Quotient, space, group, left=left)
 
 
 @pytest.mark.parametrize(
@@ -246,8 +243,7 @@ def test_orix_misorientations_have_two_symmetries():
 
 
 def test_improper_rotations_are_not_points():
-    with pytest.raises(ss.ValidationError, match=r"rotation \[1\] is improper"):
-        CUBIC.distance(Orix(np.eye(4)[:2], improper=np.array([0, 1])), np.eye(3))
+    raises(r"rotation \[1\] is improper", CUBIC.distance, Orix(np.eye(4)[:2], improper=np.array([0, 1])), np.eye(3))
 
 
 def test_to_orix(monkeypatch):
@@ -256,8 +252,7 @@ def test_to_orix(monkeypatch):
 
     with monkeypatch.context() as patch:
         patch.setitem(sys.modules, "orix", None)
-        with pytest.raises(ImportError, match="pip install orix"):
-            ss.rotations.as_orix(np.eye(3))
+        raises("pip install orix", ss.rotations.as_orix, np.eye(3), error=ImportError)
     package, module = ModuleType("orix"), ModuleType("orix.quaternion")
     module.Orientation = type("Orientation", (Orix,), {})
     module.Misorientation = type("Misorientation", (Orix,), {})

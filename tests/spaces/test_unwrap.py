@@ -5,6 +5,7 @@ import warnings
 import numpy as np
 import pytest
 from crystals import CUBIC, SO3, at_random, noisy, path
+from refused import raises
 
 import symspline as ss
 
@@ -202,5 +203,4 @@ def test_open_loops_around_missing_nodes_are_named():
     ],
 )
 def test_invalid_points_raise(points, axes, message):
-    with pytest.raises(ss.ValidationError, match=message):
-        CUBIC.unwrap(points, axes=axes)
+    raises(message, CUBIC.unwrap, points, axes=axes)

@@ -5,6 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from curves import KNOTS, every_batch, every_kind, points_on
+from refused import raises
 from scipy.integrate import quad
 
 import symspline as ss
@@ -44,18 +45,6 @@ def test_arc_length_is_the_integral_of_the_speed(rng):
     assert curve.length(t[3], t[30]) == pytest.approx(curve.arc_length(t[30]) - curve.arc_length(t[3]), rel=1e-13)
     assert curve.length(b=t[5]) + curve.length(t[5]) == pytest.approx(curve.length(), rel=1e-14)
     assert curve.length(t[7], t[7]) == 0
-
-
-def test_samples_at_equal_arc_lengths_are_equidistant(rng):
-    # Points of an irregular recording of a motion along a great circle, which are in order.
-    angle = np.sort(rng.uniform(0, 3, 30))
-    curve = ss.CubicSpline(
-        np.cumsum(rng.uniform(0.5, 1.5, 30)), np.stack([np.cos(angle), np.sin(angle), 0 * angle], 1), S2
-    )
-    points = curve(curve.at_length(np.linspace(0, curve.length(), 500)))
-    steps = S2.distance(points[:-1], points[1:])
-    # The curve may turn: steps are at most as long as the arcs.
-    assert steps.max() == pytest.approx(curve.length() / 499, rel=1e-9)
 
 
 @pytest.mark.parametrize("scale", [1e-150, 1e-6, 1, 1e150])
@@ -146,28 +135,15 @@ def test_empty_input(rng):
 def test_invalid_input_raises(rng):
     curve = ss.CubicSpline(None, walk(rng, 2, n=5), S2)
     one = curve[0]
-    with pytest.raises(
-        ss.ValidationError, match=r"s\[1\] = 99.0 is not an arc length of the curve: it must be between"
-    ):
-        one.at_length([0.0, 99.0])
+    raises(r"s\[1\] = 99.0 is not an arc length of the curve: it must be between", one.at_length, [0.0, 99.0])
     for s in (-1.0, np.nan, np.inf):
-        with pytest.raises(ss.ValidationError, match="is not an arc length"):
-            one.at_length(s)
-    with pytest.raises(ss.ValidationError, match="s must be real numbers"):
-        one.at_length([1j])
-    with pytest.raises(ss.ValidationError, match=r"the shape of s must begin with the batch axes \(2,\)"):
-        curve.at_length([0.0, 0.1, 0.2], per_curve=True)
-    with pytest.raises(ss.ValidationError, match=r"the shape of x must begin with the batch axes \(2,\)"):
-        curve.arc_length([0.0, 0.1, 0.2], per_curve=True)
-    with pytest.raises(ss.ValidationError, match=r"x\[1\] = 4.5 is outside the knots \[0.0, 4.0\]"):
-        one.arc_length([0, 4.5])
-    with pytest.raises(ss.ValidationError, match=r"a = -1\.0 is outside the knots"):
-        one.length(-1)
-    with pytest.raises(ss.ValidationError, match="b is before a"):
-        one.length(2, 1)
-    with pytest.raises(ss.ValidationError, match="do not broadcast"):
-        one.length([0, 1], [1, 2, 3])
-    with pytest.raises(ss.ValidationError, match="b must be numbers"):
-        one.length(b=np.datetime64("2020-01-01"))
-    with pytest.raises(ss.ValidationError, match="outside the domain"):
-        ss.BezierCurve([[0.0], [1.0]], "r:1").length(b=2)
+        raises("is not an arc length", one.at_length, s)
+    raises("s must be real numbers", one.at_length, [1j])
+    raises(r"the shape of s must begin with the batch axes \(2,\)", curve.at_length, [0.0, 0.1, 0.2], per_curve=True)
+    raises(r"the shape of x must begin with the batch axes \(2,\)", curve.arc_length, [0.0, 0.1, 0.2], per_curve=True)
+    raises(r"x\[1\] = 4.5 is outside the knots \[0.0, 4.0\]", one.arc_length, [0, 4.5])
+    raises(r"a = -1\.0 is outside the knots", one.length, -1)
+    raises("b is before a", one.length, 2, 1)
+    raises("do not broadcast", one.length, [0, 1], [1, 2, 3])
+    raises("b must be numbers", one.length, b=np.datetime64("2020-01-01"))
+    raises("outside the domain", ss.BezierCurve([[0.0], [1.0]], "r:1").length, b=2)

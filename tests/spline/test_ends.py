@@ -5,7 +5,7 @@ import pytest
 from cases import loop_over, unit_tangent, walk
 from compare import each, same, same_curve, vectors_off
 from curves import KNOTS, S2, at_node, every_kind, points_on, tangents_at
-from refused import INF, NAN, TWO, P, fit_error, points, raises
+from refused import INF, NAN, TWO, P, fit_error, raises
 
 import symspline as ss
 
@@ -122,15 +122,6 @@ def test_curves_that_are_not_closed():
     fit_error(r"the first and the last point of curve 1 are", None, [closed, [*P, P[1]]], bc_type="periodic")
 
 
-def test_shapes_in_messages_are_those_that_were_given():
-    """A complex number is two numbers of the core."""
-    space, p = ss.space("u:2"), points("u:2")
-    with pytest.raises(ss.ValidationError, match=r"has shape \(3, 2, 2\), which does not broadcast to \(2, 2\)"):
-        ss.CubicSpline(None, p, space, bc_type=((1, np.zeros((3, 2, 2))), "natural"))
-    for call in (space.log, space.check_tangent):
-        raises(r"\(4, 2, 2\).*\(3, 2, 2\)", call, p, p[:3])
-
-
 @pytest.mark.parametrize("h, largest", [(1.0, r"9\.42477\d"), (0.5, r"18\.8495\d*")])
 def test_too_fast_end_velocities(h, largest):
     t = [0, h, 2, 3 - h / 2, 3 + h / 2]
@@ -138,15 +129,6 @@ def test_too_fast_end_velocities(h, largest):
     match = rf"velocity has speed 20\.0+, too fast for its segment of length {h:g}: .*must stay below {largest}"
     fit_error("the start " + match, t, p, bc_type=((1, [0, 20, 0]), "natural"))
     fit_error("the end " + match, t, p, bc_type=("natural", (1, [-20, 0, 0])))
-
-
-def test_the_largest_end_velocity():
-    limit = 3 * np.pi
-    fit_error("too fast", points=P[:2], bc_type=((1, [0, limit * (1 + 1e-15), 0]), "natural"))
-    # Whether a slower one has a curve is another question.
-    ss.CubicSpline(None, P, S2, bc_type=((1, [0, limit * 0.99, 0]), "natural"), on_failure="ignore")
-    # Without a cut locus there is no limit.
-    ss.CubicSpline(None, P, "r:3", bc_type=((1, [1e6, 0, 0]), "natural"))
 
 
 @pytest.mark.parametrize(
@@ -174,5 +156,6 @@ def test_end_velocities_are_too_fast_from_the_cut_locus_on(name, angles, most, r
     v = space.project_tangent(p[0], v)
     # The leg is a third of the velocity.
     ss.CubicSpline(None, p, space, bc_type=((1, 3 * 0.98 * most * v), "natural"), on_failure="ignore")
-    with pytest.raises(ss.ValidationError, match="too fast"):
-        ss.CubicSpline(None, p, space, bc_type=((1, 3 * 1.02 * most * v), "natural"), on_failure="ignore")
+    raises(
+        "too fast", ss.CubicSpline, None, p, space, bc_type=((1, 3 * 1.02 * most * v), "natural"), on_failure="ignore"
+    )

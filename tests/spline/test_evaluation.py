@@ -49,13 +49,6 @@ def test_any_order_of_times(space):
         assert same(flat, sorted_ones)
 
 
-def test_many_times_equal_one_by_one():
-    spline = ss.CubicSpline(KNOTS, points_on(S2, 6), S2)
-    x = np.linspace(0, 4.5, 37)
-    for nu in range(3):
-        assert same(spline(x, nu=nu), np.array([spline(y, nu=nu) for y in x]))
-
-
 @every_kind
 def test_velocity_and_speed(space):
     spline = ss.CubicSpline(KNOTS, points_on(space, batch=(2,), step=0.5), space)

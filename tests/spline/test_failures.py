@@ -1,7 +1,6 @@
 """Failing curves: errors, warnings, and the other curves of a batch."""
 
 import pickle
-import re
 import warnings
 
 import numpy as np
@@ -100,18 +99,6 @@ def test_kinds_of_errors():
     assert issubclass(ss.ConvergenceWarning, UserWarning)
 
 
-def test_nan_curves_warn_of_nothing():
-    p = np.array([[1.0, 0, 0], [-1, 0, 0], [0, 1, 0]])
-    with warnings.catch_warnings(), np.errstate(all="raise"):
-        warnings.simplefilter("error")
-        spline = ss.CubicSpline(None, [p, np.roll(p, 1, axis=0)[[0, 1, 0]]], S2, on_failure="ignore")
-        for nu in range(3):
-            assert np.isnan(spline([0.5, 1.5], nu=nu)[0]).all()
-        assert np.isnan(spline.length()[0]) and np.isnan(spline.bending_energy()[0])
-        assert np.isnan(spline.control_points[0, 0, 1]).all()
-        assert "1 of 2" in str(spline.report)
-
-
 def test_overflowing_control_polygons_raise():
     for name, p, v, length, part in [
         ("spd:2", [np.eye(2), np.diag([2.0, 0.5])], [np.diag([45.0, -45.0]), None], 21.2, 2 / 3),
@@ -179,16 +166,6 @@ def test_within_a_hundred_thousandth(name):
         ss.CubicSpline(None, points(1 - 8e-6), space)
 
 
-def test_the_warning_says_where_and_why():
-    _, said = warned(lambda: ss.CubicSpline(None, rotations(20, 179.9999, 30), "so:3"))
-    head, angle, tail = re.split(r"([\d.]+)(?=, limit)", said)
-    assert head == f"{BEGIN}: between points[1] and points[2] the angle is "
-    assert float(angle) == pytest.approx(np.radians(179.9999), rel=1e-14)
-    assert tail == (
-        f", limit {np.pi}; had it been a little more, the curve would go the other way round: put a point between them"
-    )
-
-
 def test_curves_of_a_batch():
     good, almost, bad = rotations(20, 30), rotations(20, 179.9999), rotations(180, 30)
     batch = np.stack([[good, almost], [almost, good]])
@@ -205,14 +182,6 @@ def test_curves_of_a_batch():
     curves, said = warned(lambda: ss.CubicSpline(None, np.stack([bad, almost]), "so:3", on_failure="ignore"))
     assert "of curve 1 the" in said
     assert curves.report.converged.tolist() == [False, True]
-
-
-def test_any_factor_of_a_product():
-    almost, flat = rotations(20, 179.9999), np.zeros((3, 2))
-    opposite = np.array([[1.0, 0, 0], [-1, 0, 0], [0, 1, 0]])
-    warned(lambda: ss.CubicSpline(None, (flat, almost), "r:2 x so:3"))
-    with pytest.raises(ss.CutLocusError, match="lie at or past"):
-        silent(lambda: ss.CubicSpline(None, (almost, opposite), "so:3 x sphere:2"))
 
 
 @pytest.mark.parametrize("bc_type", ["natural", "periodic"])

@@ -3,16 +3,10 @@
 import numpy as np
 import pytest
 from compare import each, parts, pick, same, same_curve
-from curves import KNOTS, S2, THREE, at_node, every_batch, every_common, every_kind, points_on, tangents_at, with_ends
+from curves import KNOTS, S2, at_node, every_batch, every_common, every_kind, points_on, tangents_at, with_ends
 from refused import P, raises
 
 import symspline as ss
-
-
-def test_evaluate_over_dates():
-    spline = ss.CubicSpline(np.datetime64("2024-01-01T00", "h") + np.array([0, 1, 3]), THREE, S2)
-    x = spline.t[0] + np.timedelta64(90, "m")
-    assert same(ss.evaluate(spline.t, spline.points, spline.velocities, S2, x, nu=1), spline(x, nu=1))
 
 
 @every_common
@@ -28,12 +22,6 @@ def test_fit_many_equals_one_at_a_time(space):
             alone = ss.CubicSpline(t, p, space, bc_type=bc_type, extrapolate=True)
             assert type(spline) is type(alone) and same_curve(spline, alone)
             assert (spline.bc_type, spline.extrapolate) == (bc_type, True)
-
-
-def test_fit_many_of_closed_curves_and_of_dates():
-    closed = [(None, [*THREE, THREE[0]]), (np.datetime64("2024-01-01") + np.arange(4), [*THREE, THREE[0]])]
-    for spline, (t, p) in zip(ss.fit_many(closed, S2, bc_type="periodic"), closed, strict=True):
-        assert same_curve(spline, ss.CubicSpline(t, p, S2, bc_type="periodic"))
 
 
 @every_kind
@@ -87,13 +75,6 @@ def test_values_are_bit_identical_to_those_of_all_nodes(name, nu):
         every = ss.evaluate(t.tolist(), points, velocities, space, x, nu=nu)
         for own, expected in zip(parts(few), parts(every), strict=True):
             np.testing.assert_array_equal(own, expected)
-
-
-def test_a_batch_is_cut_along_its_knots():
-    t, points, velocities, space = nodes("sphere:2")
-    two = [np.stack([own, own[::-1]]) for own in (points, velocities)]
-    values = ss.evaluate(t, *two, space, t[40] + 0.1)
-    np.testing.assert_array_equal(values[0], ss.evaluate(t, points, velocities, space, t[40] + 0.1))
 
 
 def test_invalid_knots_raise_wherever_they_are():

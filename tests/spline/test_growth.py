@@ -6,7 +6,6 @@ from unittest import mock
 import numpy as np
 
 import symspline as ss
-from symspline._curves import composed
 
 
 def recording(count):
@@ -52,14 +51,6 @@ def test_values_are_those_of_the_segments():
         assert np.array_equal(found[i], single(x[i]), equal_nan=True)
 
 
-def test_no_times():
-    for curve in (recording(2), meeting(2)):
-        assert curve([]).shape == (0, 3) and curve.speed([]).shape == (0,)
-        assert curve(np.zeros((2, 0))).shape == (2, 0, 3)
-    batch = ss.CubicSpline(np.arange(3.0), np.zeros((2, 3, 1)), "r:1")
-    assert ss.SegmentedCurve([batch, batch.shift(4.0)])([]).shape == (2, 0, 1)
-
-
 def test_every_segment_is_visited_a_fixed_number_of_times():
     """Extrema and crossings compare the values of both segments at each meeting only."""
 
@@ -72,26 +63,3 @@ def test_every_segment_is_visited_a_fixed_number_of_times():
         return len(calls)
 
     assert domains(80) < 2.5 * domains(40)
-
-
-def test_sections_are_evaluated_once():
-    curve, calls = recording(30), []
-    own = composed.Joined._in_section
-    with mock.patch.object(
-        composed.Joined, "_in_section", lambda self, *args: calls.append(args[0]) or own(self, *args)
-    ):
-        curve(np.random.default_rng(0).uniform(*curve.domain, 1000))
-    assert len(calls) == len(set(calls)) == 30
-
-
-def test_curves_that_are_joined_in_a_loop():
-    # The velocity jumps between the parts, so that they are not merged. Nested parts would exceed the recursion limit.
-    part = ss.CubicSpline([0.0, 1, 2], [[0.0], [1], [0]], "r:1")
-    whole, count = part, 300
-    for i in range(1, count):
-        whole = whole.concatenate(part.shift(2.0 * i))
-    assert len(whole) == count
-    x = np.linspace(0, 2 * count, 1001)[:-1]
-    np.testing.assert_allclose(whole(x), part(x % 2), atol=1e-12)
-    assert whole == ss.SegmentedCurve([part, *(part.shift(2.0 * i) for i in range(1, count))])
-    assert part.concatenate(part.shift(2.0).concatenate(part.shift(4.0))) == whole[:3]

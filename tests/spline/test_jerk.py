@@ -44,21 +44,6 @@ def test_flat_space_is_scipys():
         assert np.abs(ss.CubicSpline(t, y, "r:2")(x, nu=3) - expected).max() < 1e-9 * np.abs(expected).max()
 
 
-def test_rotations_about_one_axis():
-    t = np.array([0, 0.7, 1, 2.5, 3])
-    angles = np.array([0, 0.8, 0.3, 1.1, 0.9])
-    curve = ss.CubicSpline(t, ss.SpecialOrthogonal(3).exp(np.eye(3), about_z(angles)), "so:3")
-    x = np.array([0.0, 0.3, 0.7, 2.2, 3.0])
-    jerk = np.swapaxes(curve(x), -1, -2) @ curve(x, nu=3)
-    assert np.abs(jerk - about_z(CubicSpline(t, angles, bc_type="natural")(x, 3))).max() < 1e-10
-
-
-def about_z(angles):
-    vectors = np.zeros((len(angles), 3, 3))
-    vectors[:, 1, 0], vectors[:, 0, 1] = angles, -angles
-    return vectors
-
-
 def test_jerk_is_continuous_from_the_right():
     curve = ss.CubicSpline(KNOTS, points_on(S2, 6, step=0.4), S2)
     at, before, after = (curve(KNOTS[1:-1] + shift, nu=3) for shift in (0, -1e-9, 1e-9))
@@ -120,19 +105,3 @@ def test_other_curves(dated):
     plain = ss.HermiteSpline.from_points(KNOTS, points, S2)
     assert np.abs(local(x, nu=3) - differences(plain, np.array([1.2]))[0]).max() < 1e-9
     assert all(np.isfinite(own).all() for own in parts(local(t, nu=3)))
-
-
-def test_missing_curves_are_nan():
-    curves = ss.CubicSpline(None, [THREE, THREE], S2, where=[True, False])
-    jerk = curves([0.5, 1.5], nu=3)
-    assert np.isfinite(jerk[0]).all()
-    assert np.isnan(jerk[1]).all()
-
-
-def test_large_spaces():
-    rng = np.random.default_rng(3)
-    small = points_on(S2, 6, step=0.4)
-    basis = np.linalg.qr(rng.standard_normal((400, 3)))[0]
-    large = ss.CubicSpline(KNOTS, small @ basis.T, "sphere:399")
-    plain = ss.CubicSpline(KNOTS, small, S2)
-    assert np.abs(large(X, nu=3) - plain(X, nu=3) @ basis.T).max() < 1e-10

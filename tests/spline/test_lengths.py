@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from cases import EPS
 from compare import each, found, off, pick, same, shaped
-from curves import KNOTS, S2, at_node, bezier, every_batch, every_common, every_kind, points_on, run_python, tangents_at
+from curves import KNOTS, at_node, bezier, every_batch, every_common, every_kind, points_on, run_python, tangents_at
 from numpy.polynomial import Polynomial
 
 import symspline as ss
@@ -55,13 +55,6 @@ def test_length_speed_and_energy_in_closed_form(space, theta):
     assert spline.length() == pytest.approx(theta(1.5) - theta(0), rel=1e-13)
     if bend != Polynomial([0]):
         assert spline.bending_energy() == pytest.approx((bend**2).integ()(1.5), rel=1e-12)
-
-
-def test_length_of_a_curve_that_turns():
-    # θ = t(1 − t) goes to 1/4 and back: |θ'| has a kink.
-    spline = on_a_geodesic(S2, Polynomial([0, 1, -1]), np.array([0.0, 1.0]))
-    assert spline.length() == pytest.approx(0.5, rel=1e-13)
-    assert spline.bending_energy() == pytest.approx(4, rel=1e-12)
 
 
 RESTS = """

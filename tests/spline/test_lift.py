@@ -93,32 +93,6 @@ def test_lift_does_not_depend_on_representatives(name, rng):
             np.testing.assert_allclose(b.lift(x, points[0], nu=nu), expected, rtol=0, atol=3e-13 * size)
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_one_time_is_as_among_many(name, rng):
-    space, points = points_of(name, rng)
-    spline = ss.CubicSpline(KNOTS, points, space)
-    x = rng.uniform(0, KNOTS[-1], 3000)
-    many = spline.lift(x)
-    for i in (0, 17, 2047, 2048, 2999):
-        assert same(spline.lift(x[i]), many[i])
-    assert same(spline.lift(x.reshape(30, 100)), many.reshape(30, 100, *space.point_shape))
-
-
-@pytest.mark.parametrize("step", [0.9, 0.99, 0.999])
-@pytest.mark.parametrize("name", ["cp:1", "gr:2,5", "cgr:2,4"])
-def test_near_the_cut_locus(name, step, rng):
-    """Neighbours nearly π/2 apart: representatives turn fast between them."""
-    space, points = points_of(name, rng, step * np.pi / 2)
-    spline = ss.CubicSpline(None, points, space)
-    x = np.linspace(0, len(points) - 1, 400)
-    lifted, moving = spline.lift(x), spline.lift(x, nu=1)
-    assert np.abs(inner(space, lifted, lifted) - np.eye(wide(space, lifted).shape[-1])).max() < 1e-13
-    other = ss.CubicSpline(None, turned(space, points, rng), space)
-    # Rounding near the cut locus is larger by one over the distance to it.
-    np.testing.assert_allclose(other.lift(x, points[0]), lifted, rtol=0, atol=1e-12 / (1 - step))
-    assert np.abs(inner(space, lifted, moving)).max() < 1e-12 * np.abs(moving).max()
-
-
 def test_the_holonomy_of_a_closed_curve_is_half_the_enclosed_area():
     """Berry's phase on CP¹, −Ω/2, of a curve along a circle of latitude; then round again."""
     t = np.linspace(0, 1, 41)
@@ -210,9 +184,3 @@ def test_a_lift_is_followed_so_far_and_no_further():
     assert np.isfinite(spline.lift([-99.0, 99.0])).all()
     raises(r"x\[1\] = 102.0 is more than 100 lengths of the last segment", spline.lift, [0.5, 102.0])
     raises("outside the knots", ss.CubicSpline(None, [[1, 0], [0.6, 0.8j]], "cp:1").lift, 1.5)
-
-
-def test_curves_that_were_not_found_are_nan():
-    spline = ss.CubicSpline(None, [[[1, 0], [0, 1]], [[1, 0], [0.6, 0.8]]], "cp:1", on_failure="ignore")
-    found = spline.lift([0.0, 0.5])
-    assert np.isnan(found[0]).all() and np.isfinite(found[1]).all()

@@ -51,15 +51,6 @@ def test_flat_space_is_scipys(method, n, size):
     assert np.abs(ours / size - expected / (1 if method == "catmull-rom" else size)).max() < 1e-11
 
 
-@every_method
-def test_batches_are_single_curves(method):
-    t, y = recorded(9, 1.0)
-    times, points = np.stack([t, 2 * t + 1, t**2]), np.stack([y, y[::-1], np.roll(y, 3, axis=0)])
-    curves = from_points(times, points, "r:3", method=method)
-    for i, curve in enumerate(curves):
-        assert curve == from_points(times[i], points[i], "r:3", method=method)
-
-
 @every_kind
 @every_method
 def test_points_and_neighbours_determine_the_curve(space, method):
@@ -90,28 +81,6 @@ def test_points_on_a_geodesic_stay_on_it(name, method):
     assert space.distance(from_points(t, points, space, method=method)(x), expected).max() < 1e-7
 
 
-@every_method
-def test_isometries_move_the_curve(method):
-    rng = np.random.default_rng(7)
-    turn = ss.SpecialOrthogonal(3).random_point(rng)
-    points = points_on(S2, 8, step=0.5)
-    t = np.cumsum(rng.uniform(0.1, 2, 8))
-    x = np.linspace(t[0], t[-1], 50)
-    here, there = (from_points(t, p, S2, method=method)(x) for p in (points, points @ turn.T))
-    assert np.abs(here @ turn.T - there).max() < 1e-13
-
-
-@every_method
-def test_small_data_on_a_sphere_are_flat(method):
-    # The error of the tangent plane is of second order. Data in one direction, where all definitions agree.
-    t, y = recorded(12, 1.0)
-    small = 1e-4 * y[:, :1] / np.abs(y[:, 0]).max()
-    flat = from_points(t, small, "r:1", method=method)
-    points = np.hstack([np.sqrt(1 - small**2), small, 0 * small])
-    x = np.linspace(t[0], t[-1], 77)
-    assert np.abs(from_points(t, points, S2, method=method)(x)[:, 1:2] - flat(x)).max() < 1e-11
-
-
 def test_catmull_rom_on_a_sphere():
     # At the middle point, the mean of the velocities of both geodesics, weighted by the other intervals.
     curve = from_points([0, 1, 3], THREE, S2)
@@ -128,15 +97,6 @@ def test_pchip_stops_where_the_curve_turns_back():
     # At a right angle, the harmonic mean of both speeds times the cosine of 45 degrees.
     corner = from_points(None, THREE, S2, method="pchip")
     assert np.allclose(corner.velocities[1], np.pi / 2 * np.array([-1, 0, 1]) / 2)
-
-
-def test_akima_does_not_overshoot_beside_a_straight_part():
-    # Points at rest, then a geodesic.
-    s = np.array([0, 0, 0, 0, 0.3, 0.6, 0.9])
-    points = S2.geodesic(THREE[0], THREE[1], s)
-    akima, spline = from_points(None, points, S2, method="akima"), ss.CubicSpline(None, points, S2)
-    assert akima.speed(np.linspace(0, 2, 30)).max() < 1e-12
-    assert spline.speed(1.5) > 0.01
 
 
 def test_dates_and_quotients():

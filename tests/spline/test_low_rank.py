@@ -103,18 +103,6 @@ def test_velocities_outside_the_span_of_the_points(name, rng):
     embed.agree(ours, [ss.evaluate(t, p, u, embed.small, x, nu=nu) for nu in range(3)], 10)
 
 
-@pytest.mark.parametrize("name", list(SMALL)[::3])
-def test_few_and_many_points(name, rng):
-    """Two points, points that stay where they are, and more points than dimensions."""
-    embed = Embedded(name, rng)
-    p = walk(embed.small, 0.4, 120, rng)
-    for points in (p[:2], p[[0, 0, 0]], p[[0, 1, 0, 1]], p):
-        there = ss.CubicSpline(None, points, embed.small)
-        here = ss.CubicSpline(None, embed(points), embed.space)
-        embed.check(here, there, factor=10)
-        embed.check(here, there, 0.5, 10)
-
-
 @every_space
 def test_curves_with_control_points(name, rng):
     embed = Embedded(name, rng)

@@ -1,7 +1,6 @@
 """Masks: curves of a batch that are not fitted, and curves with invalid points."""
 
 import tracemalloc
-import warnings
 
 import numpy as np
 import pytest
@@ -30,22 +29,6 @@ def test_unmasked_curves_equal_those_of_the_whole_batch(name, own_times):
     np.testing.assert_array_equal(some.report.residual[mask], whole.report.residual[mask])
     none = ss.CubicSpline(t, p, space, where=np.zeros((2, 3), bool))
     assert all(np.isnan(part).all() for part in parts(none(X))) and not none.report.converged.any()
-
-
-@pytest.mark.parametrize("name, value", [("sphere:2", np.nan), ("spd:3", -1.0), ("spd:3", np.nan)])
-def test_a_bad_sensor_stops_no_other(name, value):
-    p = points_on(ss.space(name), 4, (50,), step=0.4)
-    good = ss.CubicSpline(None, p, name)
-    p[17, 2], p[30, 0] = value * np.ones_like(p[17, 2]), value * p[30, 0]
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        some = ss.CubicSpline(None, p, name, on_failure="ignore")
-    keep = np.delete(np.arange(50), [17, 30])
-    assert np.array_equal(some.velocities[keep], good.velocities[keep])
-    assert np.isnan(some(X)[[17, 30]]).all() and np.count_nonzero(some.report.converged) == 48
-    with pytest.warns(ss.ConvergenceWarning, match=r"points\[2\] of curve 17 is (off|not).*and 1 more curves failed"):
-        ss.CubicSpline(None, p, name, on_failure="warn")
-    raises(r"points\[2\] of curve 17", ss.CubicSpline, None, p, name)
 
 
 def test_errors_and_times_name_the_curve_in_the_whole_batch():

@@ -6,7 +6,7 @@ import pickle
 import numpy as np
 import pytest
 from cases import loop_over, walk
-from compare import each, same, vectors_off
+from compare import same, vectors_off
 from curves import S2, at_node, every_kind, tangents_at
 from refused import raises
 from scipy.interpolate import CubicSpline as FlatSpline
@@ -78,29 +78,6 @@ def test_velocities_hold_and_the_curve_is_c2_elsewhere(space, rng):
                 assert sizes[[1, 4]].max() > 1e-3
                 sizes[[1, 4]] = 0
             assert sizes.max() < 1e-6 if isinstance(part.space, ss.Manifold) else sizes.max() < 1e-9
-
-
-@every_kind
-def test_sections_equal_separate_curves(space, rng):
-    p = nine_points(space, rng)
-    v = tangents_at(space, at_node(space, p, 4))
-    spline = ss.CubicSpline(T, p, space, velocities={4: v})
-    parts = [each(lambda a, s=s: a[s], p) for s in (slice(0, 5), slice(4, None))]
-    first = ss.CubicSpline(T[:5], parts[0], space, bc_type=("natural", (1, v)))
-    second = ss.CubicSpline(T[4:], parts[1], space, bc_type=((1, v), "natural"))
-    for one, x in ((first, np.linspace(0, T[4], 9)[:-1]), (second, np.linspace(T[4], T[-1], 9))):
-        difference = each(lambda a, b: np.abs(a - b).max(), spline(x), one(x))
-        assert np.max(difference) < 1e-12
-
-
-def test_the_velocities_of_all_inner_points_give_a_hermite_spline(rng):
-    p = nine_points(S2, rng)
-    v = tangents_at(S2, p)
-    spline = ss.CubicSpline(
-        T, p, S2, bc_type=((1, v[0]), (1, v[-1])), velocities={i: v[i] for i in range(1, len(T) - 1)}
-    )
-    x = np.linspace(0, T[-1], 50)
-    assert np.abs(spline(x) - ss.HermiteSpline(T, p, v, S2)(x)).max() < 1e-14
 
 
 def test_curves_of_a_batch_are_those_alone(rng):
@@ -218,14 +195,6 @@ def test_flat_curves_equal_the_dense_solution(rng):
     x = np.linspace(T[0], T[-1], 100)
     for nu in range(3):
         assert np.abs(spline(x, nu) - dense(x, nu)).max() < 1e-11
-
-
-def test_cubics_are_reproduced():
-    f = np.polynomial.Polynomial([1.0, -2.0, 0.5, 0.7])
-    y = f(T)[:, None]
-    spline = ss.CubicSpline(T, y, "r:1", bc_type=([(1, [f.deriv()(0)]), (2, [f.deriv(2)(0)])], "not-a-knot"))
-    x = np.linspace(0, T[-1], 100)
-    assert np.abs(spline(x)[:, 0] - f(x)).max() < 1e-12
 
 
 def test_the_curve_is_stable_where_an_initial_value_problem_is_not():

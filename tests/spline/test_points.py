@@ -4,7 +4,7 @@ import pickle
 
 import numpy as np
 import pytest
-from cases import COMMON, EPS, loop_over, walk
+from cases import COMMON, EPS, loop_over
 from compare import each, found, largest_difference, off, parts, same, same_curve, shaped
 from curves import KNOTS, S2, THREE, at_node, every_common, every_kind, points_on, tangents_at
 from refused import P, fit_error, points, raises
@@ -191,14 +191,3 @@ def test_points_a_hair_apart_are_as_in_flat_space(space, size, bc_type):
     # Curvature counts with size³; what is left is the rounding of points.
     assert largest_difference(spline(x), p + flat(x)) < 20 * EPS
     assert largest_difference(spline(x, nu=1), flat(x, 1)) < 200 * EPS
-
-
-@loop_over("ends", ["periodic", "clamped"])
-@pytest.mark.parametrize("name", ["r:2", "sphere:2", "so:3", "su:2", "spd:2", "gr:2,5", "hyperbolic:2"])
-def test_there_and_back_stands_still_at_every_knot(name, ends, rng):
-    """All velocities are rounding errors then, and so is their defect."""
-    space = ss.space(name)
-    for step in (1e-3, 0.3, 1.0):
-        p = walk(space, step, 2, rng)[[0, 1, 0]]
-        report = ss.CubicSpline(None, p, space, bc_type=ends).report
-        assert report.converged and report.residual <= 1e-12

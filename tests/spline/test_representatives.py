@@ -10,7 +10,6 @@ from scipy.spatial.transform import Rotation
 import symspline as ss
 
 SIGNS, FAR = "neighbours of opposite sign", "more than half of the steps are long"
-SO3 = ss.SpecialOrthogonal(3)
 # The 24 rotations of a cube.
 CUBE = Rotation.create_group("O").as_matrix()
 
@@ -112,13 +111,6 @@ def test_a_little_more_than_half_a_turn_warns():
             ss.CubicSpline(None, [[1, 0, 0, 0], [np.cos(angle), np.sin(angle), 0, 0]], S3)
 
 
-def test_other_motions_do_not_warn():
-    turns = ss.rotations.from_quaternions(flipped(4), scalar_first=True)
-    for space, points in ((S3, -motion()), (S3, np.eye(4)[:3]), ("rp:3", flipped(4)), ("so:3", turns)):
-        ss.CubicSpline(None, points, space)
-    ss.CubicSpline(None, points_on(ss.Sphere(2), 4, step=1.8), "sphere:2", on_failure="ignore")
-
-
 @pytest.mark.parametrize("space, points", [("so:3", orientations()), ("u:2", gates(1)), ("so:4", modes())])
 def test_data_in_representations_that_do_not_fit_warn(space, points):
     with pytest.warns(ss.FarPointsWarning, match="of 11 steps .* nearest to the previous"):
@@ -131,19 +123,6 @@ def test_degrees_on_a_torus_warn():
     with pytest.warns(ss.FarPointsWarning, match="Angles must be in radians"):
         ss.CubicSpline(None, degrees, "torus:1")
     ss.CubicSpline(None, np.radians(degrees), "torus:1")
-
-
-def test_the_nearest_representative_is_silent():
-    points = orientations()
-    for i in range(1, len(points)):
-        points[i] = min(points[i] @ CUBE, key=lambda q: SO3.distance(points[i - 1], q))
-    ss.CubicSpline(None, points, "so:3")
-
-
-def test_a_warning_counts_the_curves():
-    points = np.stack([smooth("so:3"), orientations(1), orientations(2)])
-    with pytest.warns(ss.FarPointsWarning, match=r"of curve 1 \(and of 1 more curves\)"):
-        ss.CubicSpline(None, points, "so:3", on_failure="ignore")
 
 
 def on_plane(angles):

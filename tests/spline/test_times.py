@@ -44,16 +44,6 @@ def test_epoch_nanoseconds_lose_nothing(dtype):
     assert same(spline(t[1], nu=1), reference(1, nu=1))
 
 
-@pytest.mark.parametrize("kind, unit", [("int", 1), ("date", 1e-9)])
-def test_epoch_nanoseconds_lose_nothing_in_every_row(kind, unit):
-    p, small = points_on(S2, 4, (2,)), np.array([0, 1, 3, 4])
-    t = np.stack([small, EPOCH + small])
-    t = t.astype("M8[ns]") if kind == "date" else t
-    spline, reference = ss.CubicSpline(t, p, S2), ss.CubicSpline(small * unit, p, S2)
-    assert np.array_equal(spline.t, t)
-    np.testing.assert_allclose(spline.velocities, reference.velocities, atol=1e-14 * reference.velocities.max())
-
-
 UNITS = {"ns": 1e-9, "us": 1e-6, "ms": 1e-3, "s": 1.0, "m": 60.0, "h": 3600.0, "D": 86400.0, "W": 604800.0}
 
 
@@ -262,12 +252,6 @@ def test_rounding_beyond_knots_of_their_own():
     assert np.array_equal(
         ends.transport(0, late, v), [ends[0].transport(0, 0.3, v[0]), ends[1].transport(0, late, v[1])]
     )
-
-
-def test_times_beyond_knots_of_their_own_need_the_batch_axes():
-    curves = ss.CubicSpline([[0.0, 1, 2], [1.0, 2, 3]], [np.eye(3)] * 2, "sphere:2")
-    with pytest.raises(ss.ValidationError, match=r"must begin with the batch axes \(2,\); got \(3, 5\)"):
-        curves(np.full((3, 5), 9.0), per_curve=True)
 
 
 def test_times_in_single_precision_have_its_rounding():

@@ -112,11 +112,9 @@ def test_a_batch_is_a_sequence(kind, space):
         x = [0.3, 1.0]
         assert same(batch[index](x), pick(batch(x), index))
     for index in (3, -4):
-        with pytest.raises(IndexError, match="there are 3 curves"):
-            batch[index]
+        raises("there are 3 curves", batch.__getitem__, index, error=IndexError)
     for index in ("0", 0.0, (0, 1), None):
-        with pytest.raises(TypeError, match="integer or a slice"):
-            batch[index]
+        raises("integer or a slice", batch.__getitem__, index, error=TypeError)
     for use in (len, iter, lambda curve: curve[0]):
         raises("batch", use, one, error=TypeError)
     assert one
@@ -136,27 +134,12 @@ def test_picked_splines_are_those_of_their_points(space):
     assert found(start) == found(batch[2][1].bc_type[0][1])
 
 
-def test_own_times_are_picked_with_the_curve():
-    t = np.array([[0.0, 1, 2], [5, 7, 8]])
-    spline = ss.CubicSpline(t, [THREE, THREE], S2)
-    assert same(spline[1].t, t[1])
-    assert same(spline[1](6.5), spline([[1.0], [6.5]], per_curve=True)[1, 0])
-    dates = ss.CubicSpline(t.astype("M8[s]"), [THREE, THREE], S2)
-    assert same(dates[1](np.datetime64(7, "s")), dates[1].points[1])
-
-
 @pytest.mark.parametrize("shape", [(2, 3), (3,), (1, 3)], ids=str)
 def test_picked_curves_keep_their_end_conditions(shape):
     v = np.broadcast_to([0, 0.1, 0.2], shape)
     spline = ss.CubicSpline(None, [THREE, THREE], S2, bc_type=((1, v), (2, np.zeros(shape))))
     for some in (spline[1], spline[:1]):
         assert same_curve(ss.CubicSpline(some.t, some.points, S2, bc_type=some.bc_type), some)
-
-
-def test_a_slice_may_be_empty():
-    none = ss.CubicSpline(None, [THREE, THREE], S2)[2:]
-    assert len(none) == 0 and none(0.5).shape == (0, 3) and "0 curves" in repr(none)
-    assert str(none.report).startswith("no curves") and none.length().shape == (0,)
 
 
 @pytest.mark.parametrize("name", ["s:2", "so:3", "cp:2", "gr:2,400", "s:2 x r:1"])

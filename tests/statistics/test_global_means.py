@@ -144,15 +144,6 @@ def test_an_exactly_opposite_pair_does_not_prevent_a_mean():
         assert np.degrees(TORUS.mean(angles[order, None])) == pytest.approx(50, abs=1e-12)
 
 
-@pytest.mark.parametrize("axis", [0, 1])
-def test_one_ambiguous_angle_of_two_warns(axis):
-    """The mean of opposite angles is ambiguous, whatever the other angle is."""
-    points = np.tile([0.1, 0.101, 0.099, 0.1], (2, 1)).T
-    points[:, axis] = [0, 0.1, 3.1, 3.3]
-    with pytest.warns(ss.AmbiguousMeanWarning, match=r"second local minimum at the distance 3\.14 .* larger"):
-        ss.space("torus:2").mean(points)
-
-
 def test_poses_start_from_the_mean_rotation():
     """For rotations about one axis, the mean does not depend on the first pose."""
     angles, _, rng = spread_angles(5)
@@ -198,30 +189,6 @@ def test_means_of_matrices_do_not_depend_on_units(method, exponent):
         if method == "mean":
             logs = space.log(np.broadcast_to(right, points.shape), points)
             assert np.abs(np.tensordot(weights, logs, 1)).max() < 1e-10
-
-
-@pytest.mark.parametrize("name", ["sspd:3", "siegel:2"])
-def test_special_and_symplectic_matrices_in_mixed_units(name):
-    rng = np.random.default_rng(7)
-    space = ss.space(name)
-    at = np.repeat(space.random_point(rng)[None], 9, 0)
-    points = space.exp(at, 0.4 * space.random_tangent(rng, at))
-    d = np.array([1e6, 1.0, 1e-6]) if name == "sspd:3" else np.array([1e6, 1e-2, 1e-6, 1e2])
-    square = np.outer(d, d)
-    for compute in (space.mean, space.median):
-        assert space.distance(compute(points * square) / square, compute(points)) < 1e-12
-
-
-def test_principal_components_do_not_depend_on_units():
-    rng = np.random.default_rng(8)
-    space = ss.space("spd:3 x r:1")
-    points, numbers = definite(rng, 12, 3), rng.normal(size=(12, 1))
-    square = np.outer(*[scales(rng, 8, 3)] * 2)
-    right = ss.tangent_pca((points, numbers), space)
-    found = ss.tangent_pca((points * square, numbers), space)
-    assert len(found.explained_variance) == len(right.explained_variance) == 7
-    np.testing.assert_allclose(found.explained_variance, right.explained_variance, rtol=1e-10)
-    np.testing.assert_allclose(np.abs(found.components[0] / square), np.abs(right.components[0]), atol=1e-8)
 
 
 @pytest.mark.filterwarnings("ignore::symspline.AmbiguousMeanWarning")

@@ -33,7 +33,6 @@ BASES = from_snapshots([[snapshots(nu, c) for c in DRIFT] for nu in DIFFUSION], 
 # Bases as other programs return them: with random signs and rotations.
 MIXED = BASES @ np.linalg.qr(np.random.default_rng(0).standard_normal((5, 4, K, K)))[0]
 GRID = ss.GridSpline((DIFFUSION, DRIFT), MIXED, f"gr:{K},{N}")
-SPACE = ss.Grassmannian(K, N)
 
 
 def random_bases(shape, n, k, field=float, seed=0):
@@ -117,12 +116,6 @@ def test_operators_are_those_of_the_subspaces():
     assert np.abs(rows - found[[0, 2], [0, 1]]).max() < 1e-9
 
 
-def test_operators_do_not_depend_on_the_bases_of_the_data():
-    other = ss.GridSpline((DIFFUSION, DRIFT), BASES, SPACE)
-    found = reduced_operator(GRID, operator, MU, start=BASES[0, 0])
-    assert np.abs(reduced_operator(other, operator, MU, start=BASES[0, 0]) - found).max() < 1e-9 * np.abs(found).max()
-
-
 @pytest.mark.parametrize("axis", [0, 1])
 def test_operators_vary_smoothly(axis):
     """Value and two derivatives from both sides of a knot."""
@@ -138,42 +131,6 @@ def test_operators_vary_smoothly(axis):
     size = np.abs(sides[0][0]).max()
     for order, tol in enumerate((1e-12, 1e-9, 1e-8)):
         assert np.abs(sides[0][order] - sides[1][order]).max() < tol * size
-
-
-def test_reduced_models_are_accurate_between_the_nodes():
-    """With the basis of the simulation at the same parameters the error is of the same size."""
-    start = np.exp(-50 * (PLACES - 0.4) ** 2)
-
-    def error(basis, small, truth):
-        values, vectors = np.linalg.eig(small)
-        modes = np.linalg.solve(vectors, basis.T @ start)
-        path = basis @ ((vectors * modes) @ np.exp(np.outer(values, TIMES))).real
-        return np.linalg.norm(path - truth) / np.linalg.norm(truth)
-
-    for nu, c in ((0.55, 1.1), (1.0, 4.0)):
-        truth = snapshots(nu, c)
-        own = from_snapshots(truth, K)
-        basis = align(GRID((nu, c)), MIXED[2, 1])
-        small = reduced_operator(GRID, operator, (nu, c))
-        best = error(own, own.T @ operator(nu, c) @ own, truth)
-        assert error(basis, small, truth) < 1.1 * best
-        assert SPACE.distance(own, basis) < 0.01
-
-
-def test_very_long_bases():
-    """Of 100 000 numbers, with a sparse operator."""
-    n = 100_000
-    z = np.linspace(0, 1, n)
-    u, v = np.linspace(0, 1, 4), np.linspace(0, 1, 3)
-    waves = np.arange(1, 4)
-    raw = np.sin(np.pi * waves * z[:, None] ** (1 + 0.3 * u[:, None, None, None] + 0.1 * v[:, None, None]))
-    bases = np.linalg.qr(raw)[0]
-    grid = ss.GridSpline((u, v), bases, ss.Grassmannian(3, n))
-    weights = 1 + z**2
-    found = reduced_operator(grid, diags_array([weights], offsets=[0]).tocsr(), (0.4, 0.6))
-    truth = np.linalg.qr(np.sin(np.pi * waves * z[:, None] ** (1 + 0.12 + 0.06)))[0]
-    expected = np.linalg.eigvalsh(truth.T @ (weights[:, None] * truth))
-    assert np.abs(np.linalg.eigvalsh(found) - expected).max() < 1e-3
 
 
 # ---- operators known at the nodes only ----
