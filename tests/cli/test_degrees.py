@@ -43,7 +43,7 @@ def test_angles_in_degrees(run):
         (np.linspace(-3, 3, 8) + 1 / 3, "t,degree_of_freedom", ""),
     ],
 )
-def test_angles_that_look_like_degrees_warn(run, angles, head, warned):
+def test_angles_of_tables_that_look_like_degrees_warn(run, angles, head, warned):
     write("a.csv", rows(angles, head))
     said = run("fit a.csv --space torus:1 -o a.npz", notes=bool(warned))
     assert warned in said and ("--degrees" in said) == bool(warned)

@@ -65,7 +65,7 @@ def test_derivatives_of_quaternions_are_angular_velocities(run):
 
 
 @pytest.mark.parametrize("space", ["se:3", "so:3 x r:3", "r:3 x so:3"])
-def test_poses(run, space):
+def test_poses_of_columns(run, space):
     write_table("a.csv", columns(ty=PLACES[:, 1], tx=PLACES[:, 0], tz=PLACES[:, 2]))
     run(f"fit a.csv --space '{space}' -o a.npz")
     spline = ss.load("a.npz")

@@ -14,7 +14,7 @@ def dated(cells):
     write("a.csv", "time,x\n" + "".join(f"{cell},{i}\n" for i, cell in enumerate(cells)))
 
 
-def test_dates(run):
+def test_dates_of_tables(run):
     for cells, t in [
         (["2020-01-01", "2020-02-29"], ["2020-01-01", "2020-02-29"]),
         (["2020-01-01 12:00", "2020-02-29T06:30"], ["2020-01-01T12:00", "2020-02-29T06:30"]),
@@ -243,7 +243,7 @@ def test_dates_are_aligned_as_those_of_resample(along):
             assert found[0] >= knots[0] and found[-1] <= knots[-1]
 
 
-def test_times_with_and_without_a_zone_do_not_mix(run, fails):
+def test_times_of_tables_with_and_without_a_zone_do_not_mix(run, fails):
     for zone, other in [("", "+05:00"), ("Z", ""), ("+01:00", "")]:
         dated([f"2021-08-{day}T00:00{zone}" for day in (28, 29, 30)])
         run("fit a.csv --space r:1 -o a.npz")

@@ -86,7 +86,8 @@ def test_segments_and_several_curves(run):
 
 
 def poses():
-    turning = ss.rotations.from_rotation_vectors(0.02 * RNG.standard_normal((60, 3)) + [[0, 0, 1]])
+    noise = 0.02 * np.random.default_rng(1).standard_normal((60, 3))
+    turning = ss.rotations.from_rotation_vectors(noise + np.array([0, 0, 1]))
     return turning, np.stack([T, LON, LAT], axis=-1)
 
 

@@ -277,5 +277,5 @@ BAD = [
 
 
 @pytest.mark.parametrize(("call", "value", "message"), BAD)
-def test_invalid_points_raise(call, value, message):
+def test_invalid_points_of_conversions_raise(call, value, message):
     raises(message, call, value)

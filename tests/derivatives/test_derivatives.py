@@ -151,7 +151,7 @@ def test_products_and_dates():
     assert np.isclose(sum(np.sum(m) for m in moved), right, rtol=1e-12)
 
 
-def test_invalid_arguments_raise():
+def test_invalid_arguments_of_derivatives_raise():
     spline = ss.CubicSpline(None, walk(ss.Sphere(2), 0.5, 4, np.random.default_rng(12)), "sphere:2")
     for change, match in [
         ({"x": 9.0}, r"x\[0\] = 9.0 is outside the knots \[0.0, 3.0\]"),

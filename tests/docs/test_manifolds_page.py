@@ -8,7 +8,7 @@ from pages import blocks, cells, run
 import symspline as ss
 
 
-def test_the_example_runs(capsys):
+def test_the_example_of_the_manifolds_page_runs(capsys):
     names = {}
     for block in blocks(manifolds.PAGE):
         run(block, manifolds.PAGE, names)

@@ -195,7 +195,7 @@ def test_degrees_for_radians_are_named():
 
 @pytest.mark.parametrize("loss", ["linear", "huber", "cauchy"])
 @pytest.mark.parametrize("penalty", ["acceleration", "jerk"])
-def test_sound_recordings_do_not_warn(loss, penalty):
+def test_sound_recordings_of_estimates_do_not_warn(loss, penalty):
     # Warnings are errors in tests.
     for seed in range(10, 14):
         truth, given = recording(seed)

@@ -159,7 +159,7 @@ def test_course_and_speed():
     assert sensors.rms(globe.distance(curve(x), truth(x))) < 0.8 * sensors.rms(globe.distance(plain(x), truth(x)))
 
 
-def test_time_offset():
+def test_time_offset_of_estimates():
     """The delay between the recordings of two sensors."""
     _, t, seen, s, omega = gyro(6, rates=800)
     late = 0.25

@@ -241,7 +241,7 @@ def test_own_times_of_every_curve():
     assert np.allclose(std, geo.cog(plain, plain.t[5:9], return_std=True)[1], rtol=1e-6)
 
 
-def test_beyond_the_knots():
+def test_beyond_the_knots_of_standard_errors():
     rng = np.random.default_rng(8)
     # Not from 0, so that periods are counted from the first knot.
     angle = np.linspace(1.3, 1.3 + 2 * np.pi, 41)

@@ -124,7 +124,7 @@ ARRAYS = dict(np.load(io.BytesIO(stored())))
 
 
 @pytest.mark.parametrize("name", ARRAYS)
-def test_files_with_a_missing_array(name):
+def test_files_of_curves_with_a_missing_array(name):
     raises(name if name != "format" else "not a symspline curve", load, with_arrays(**{name: None}))
 
 
@@ -132,7 +132,7 @@ def report_with(**changes):
     return json.dumps([json.loads(str(ARRAYS["report"]))[0] | changes])
 
 
-def test_files_with_a_wrong_array():
+def test_files_of_curves_with_a_wrong_array():
     for changes in [
         {"version": "one"},
         {"space": "sphere:3"},

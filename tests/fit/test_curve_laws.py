@@ -64,7 +64,7 @@ def test_reversing_time_reverses_the_curve(case, rng):
 
 
 @every_family
-def test_derivatives_agree_with_differences(case, rng):
+def test_derivatives_of_splines_agree_with_differences(case, rng):
     space = case.space
     p = walk(space, 0.8, 7, rng)
     t = knots("random", len(p), rng)
@@ -119,7 +119,7 @@ def test_a_smooth_curve_is_recovered(case, ends, order):
 
 
 @some_families("sphere:2", "cp:2", "so:3", "gr:2,5")
-def test_batches_are_bit_identical_to_single_curves(case, rng):
+def test_batches_of_splines_are_bit_identical_to_single_curves(case, rng):
     space = case.space
     # Of long steps every way to a curve is tried, which takes its time where there are many dimensions.
     longest = 1.5 if space.dim <= 4 else 0.8
@@ -143,7 +143,7 @@ def test_batches_are_bit_identical_to_single_curves(case, rng):
 
 @pytest.mark.parametrize("ends", ENDS)
 @loop_over("n", [2, 3, 4, 5, 17])
-def test_flat_space_is_scipy(ends, n, rng):
+def test_flat_space_of_splines_is_scipy(ends, n, rng):
     space = ss.Euclidean(3)
     t = np.cumsum(rng.uniform(0.2, 2, n))
     p = rng.standard_normal((n, 3))

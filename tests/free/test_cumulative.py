@@ -76,7 +76,7 @@ def test_degree_three_is_twice_continuously_differentiable(name, rng):
 
 
 @pytest.mark.parametrize("degree", [1, 2, 3, 4, 5])
-def test_vectors_are_those_of_scipy(degree, rng):
+def test_vectors_of_cumulative_splines_are_those_of_scipy(degree, rng):
     for knots in (clamped([0.4, 0.5, 2.0], degree), clamped([0.7, 0.7, 1.9], degree), np.arange(12.0) ** 1.3):
         points = rng.normal(size=(len(knots) - degree - 1, 2))
         curve, wanted = ss.CumulativeBSpline(knots, points, "r:2", degree=degree), BSpline(knots, points, degree)
@@ -173,7 +173,7 @@ def test_rates_and_inertial_measurements(rng):
 
 
 @pytest.mark.parametrize("name", ["so:3", "u:2", "so:3 x r:3", "su:2"])
-def test_files_and_pickles(name, rng):
+def test_files_and_pickles_of_cumulative_splines(name, rng):
     factors = name.split(" x ")
     arrays = tuple(control(factor, 8, rng) for factor in factors)
     curve = ss.CumulativeBSpline(None, arrays if len(arrays) > 1 else arrays[0], name)
@@ -189,7 +189,7 @@ def test_files_and_pickles(name, rng):
         assert curve != ss.BSpline(curve.knots, arrays[0], 3, name)
 
 
-def test_invalid_input_raises(rng):
+def test_invalid_input_of_cumulative_splines_raises(rng):
     points = control("so:3", 5, rng)
     make = ss.CumulativeBSpline
     raises("not a group", make, None, np.eye(3), "sphere:2")

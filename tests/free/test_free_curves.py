@@ -60,7 +60,7 @@ def some_knots(kind, degree):
 
 @loop_over("kind", [*INTERIOR, "not clamped", "one end"])
 @every_degree
-def test_flat_space_is_scipy(kind, degree, rng):
+def test_flat_space_of_free_curves_is_scipy(kind, degree, rng):
     if kind == "double" and degree == 1:
         return
     if kind == "not clamped":

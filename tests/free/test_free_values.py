@@ -16,7 +16,7 @@ SEED = 2007
 
 @every_family
 @loop_over("batch", [(), (2, 3)])
-def test_batches(case, batch, rng):
+def test_batches_of_free_curves(case, batch, rng):
     space = case.space
     points = np.array([walk(space, 0.4, 5, rng) for _ in range(math.prod(batch))])
     points = points.reshape(*batch, 5, *space.point_shape)
@@ -150,7 +150,7 @@ def test_invalid_knots_and_degrees_raise():
     ],
     ids=lambda x: None if isinstance(x, str) else str(np.shape(x)) if not isinstance(x, list) else "list",
 )
-def test_control_points(kind, points, match):
+def test_control_points_of_free_curves(kind, points, match):
     with pytest.raises(ss.ValidationError, match=match):
         ss.BSpline(CLAMPED, points, 2, "sphere:2") if kind == "BSpline" else ss.BezierCurve(points, "sphere:2")
 

@@ -68,7 +68,7 @@ def test_at_rest_at_a_pole_and_due_north():
     assert sog(track, 0.5) == pytest.approx(np.radians(6_371_008.8), rel=1e-14)
 
 
-def test_batches():
+def test_batches_of_tracks():
     points = np.stack([from_lonlat(LON, LAT), from_lonlat(LON[::-1], LAT)[:, [1, 2, 0]]])
     spline = ss.CubicSpline(None, points, S2)
     x = np.linspace(0, 6, 5)

@@ -43,7 +43,7 @@ OFF = np.where(np.arange(30).reshape(6, 5, 1, 1) == 13, 1.1, 1.0) * POINTS
         ((AXES, (POINTS, POINTS[:5, :, 0]), "so:3 x r:3", {}), "different numbers of nodes"),
     ],
 )
-def test_invalid_grids_raise(arguments, message):
+def test_invalid_grid_splines_raise(arguments, message):
     axes, points, space, options = arguments
     raises(message, lambda: ss.GridSpline(axes, points, space, **options))
 
@@ -98,7 +98,7 @@ def test_extrapolation_follows_the_policy():
     assert np.abs(GRID((1.0 + 1e-16, 0.5)) - end).max() < 1e-15
 
 
-def test_dates_on_an_axis():
+def test_dates_on_an_axis_of_a_grid_spline():
     dates = np.datetime64("2024-03-30T12") + np.array([0, 5, 13, 24, 30, 47]) * np.timedelta64(1, "h")
     hours = (dates - dates[0]) / np.timedelta64(1, "h")
     grid = ss.GridSpline((dates, AXES[1]), POINTS, "so:3")
@@ -156,7 +156,7 @@ def test_files_and_pickles_hold_the_grid(space, options, tmp_path):
             assert np.array_equal(own, expected)
 
 
-def test_damaged_files_raise():
+def test_damaged_files_of_grids_raise():
     file = io.BytesIO()
     GRID.save(file)
     file.seek(0)

@@ -260,7 +260,7 @@ def test_weights_along_later_axes_are_inverse_variances(rng):
 # ---- axes, spaces, products ----
 
 
-def test_dates_count_in_seconds(rng):
+def test_dates_of_smoothing_grids_count_in_seconds(rng):
     _, y = noisy_wave(rng)
     hours = np.arange(13) * np.timedelta64(1, "h")
     dates = np.datetime64("2024-02-28T12:00") + hours
@@ -347,7 +347,7 @@ def test_equivalent_orientations_give_the_same_surface(rng):
 
 @pytest.mark.filterwarnings("ignore::symspline.SmoothingWarning")
 @pytest.mark.parametrize("kind", ["mask", "poses", "dates"])
-def test_files_and_pickles(rng, kind):
+def test_files_and_pickles_of_smoothing_grids(rng, kind):
     axes, space, y = (U, V), "r:1", noisy_wave(rng)[1][..., None]
     if kind == "mask":
         y[:3, :4] = np.nan
@@ -428,7 +428,7 @@ ONES = np.ones((11, 13, 1))
         ({"points": ONES[:3], "axes": (U[:3], V), "bc_type": "periodic"}, "axis 0 is periodic and needs at least 4"),
     ],
 )
-def test_invalid_input_raises(change, message):
+def test_invalid_input_of_smoothing_grids_raises(change, message):
     given = {"axes": (U, V), "points": ONES, "space": "r:1"} | change
     axes, points, space = (given.pop(name) for name in ("axes", "points", "space"))
     raises(message, lambda: ss.make_smoothing_grid(axes, points, space, **given))

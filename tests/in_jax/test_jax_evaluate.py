@@ -93,7 +93,7 @@ def test_outside_the_knots_and_off_the_space_is_nan():
     assert np.isnan(jax.jit(lambda p: evaluate([0.0, 1.0], p, 0 * p, "so:3", 0.5))(mirror)).all()
 
 
-def test_invalid_arguments_raise():
+def test_invalid_arguments_of_jax_evaluation_raise():
     p = np.eye(3)[:2]
     raises("does not support u:2", evaluate, [0, 1], np.stack([np.eye(2)] * 2), np.zeros((2, 2, 2)), "u:2", 0.5)
     raises(r"velocities has shape \(1, 3\)", evaluate, [0, 1], p, p[:1], "sphere:2", 0.5)

@@ -130,7 +130,7 @@ def test_a_curve_that_stands_still_has_a_gradient():
     np.testing.assert_array_equal(gradient, np.zeros((4, 3)))
 
 
-def test_invalid_arguments_raise():
+def test_invalid_arguments_of_jax_fits_raise():
     for space, options, match in [
         ("h:2", {}, "does not support"),
         ("sphere:2", {"bc_type": "periodic"}, "bc_type must be 'natural'"),

@@ -117,7 +117,7 @@ def test_symmetric_spaces_give_the_same_curve(name, ends):
 
 @pytest.mark.parametrize("ends", ["natural", "clamped", "not-a-knot", "periodic", "velocity", "acceleration", "mixed"])
 @loop_over("n", [2, 3, 4, 5, 9])
-def test_flat_space_is_scipy(ends, n):
+def test_flat_space_of_curves_on_manifolds_is_scipy(ends, n):
     space, rng = flat(3), np.random.default_rng(8)
     t, p = knots("unequal", n, 9), rng.standard_normal((n, 3))
     if ends == "periodic":

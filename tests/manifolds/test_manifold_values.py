@@ -21,7 +21,7 @@ def batch():
     return np.stack([walk(SPACE, 0.5, 6, seed) for seed in range(3)])
 
 
-def test_a_batch_is_its_curves():
+def test_a_batch_of_manifolds_is_its_curves():
     t = np.stack([knots("unequal", 6, seed) for seed in range(3)])
     curves = ss.CubicSpline(t, batch(), SPACE)
     x = [0.3, 2.2, 3.9]
@@ -53,7 +53,7 @@ def test_control_points_and_lengths():
     assert SPLINE.bending_energy() == pytest.approx(np.sum(bend**2 * weights * h) / 2, rel=1e-8)
 
 
-def test_outside_the_knots():
+def test_outside_the_knots_of_manifolds():
     end = SPLINE.t[-1]
     raises(r"x\[1\] = 9 is outside the knots", SPLINE, [1.0, 9.0])
     onward = SPLINE([-0.5, end + 0.5], extrapolate="geodesic")
@@ -103,7 +103,7 @@ def test_missing_operations_raise():
         raises(what, call, ss.CubicSpline(None, POINTS, NAMELESS))
 
 
-def test_invalid_points_raise():
+def test_invalid_points_of_manifolds_raise():
     for index, value, error, what in [
         ((2, 0, 0), POINTS[2, 0, 0] + 0.1, ss.ValidationError, r"points\[2\]{} is off the space by"),
         ((3, 1, 1), np.nan, ss.ValidationError, r"points\[3\]{} is off the space: it is not finite"),

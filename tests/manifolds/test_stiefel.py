@@ -101,12 +101,12 @@ def test_derivatives_by_formulas_are_those_by_differences(outside):
             space.check_tangent(curve(x, extrapolate=outside), found)
 
 
-def test_invalid_sizes_raise():
+def test_invalid_sizes_of_stiefel_manifolds_raise():
     for arguments in [(2, 2), (5, 2), (0, 3), (-1, 3), (1.5, 3), (True, 3)]:
         raises("Stiefel", ss.Stiefel, *arguments)
 
 
-def test_names():
+def test_names_of_stiefel_manifolds():
     assert ss.space("stiefel:2,5") == ss.space("st:2,5") == ss.Stiefel(2, 5) != ss.Stiefel(2, 6)
     assert str(ss.Stiefel(2, 5)) == "stiefel:2,5" and repr(ss.Stiefel(2, 5)) == "Stiefel(2, 5)"
     assert ss.Stiefel(2, 5).dim == 7 and ss.Stiefel(2, 5).point_shape == (5, 2)

@@ -86,7 +86,7 @@ def test_running_products_agree_with_a_loop(n):
 
 
 @pytest.mark.parametrize("frame", ["body", "world"])
-def test_batches(frame):
+def test_batches_of_integrated_rates(frame):
     rng = np.random.default_rng(3)
     t, omega = np.sort(rng.uniform(0, 5, (2, 3, 30)), axis=-1), rng.standard_normal((2, 3, 30, 3))
     starts = Rotation.random(3, random_state=1).as_matrix()
@@ -118,7 +118,7 @@ def test_dates_count_in_seconds():
     assert np.abs(rotations.integrate(None, 0.1 * rate(t)) - expected).max() < 1e-13
 
 
-def test_invalid_input_raises():
+def test_invalid_input_of_integrated_rates_raises():
     t, omega = np.arange(5.0), np.ones((5, 3))
 
     def changed(array, index, value):

@@ -45,7 +45,7 @@ JOIN = r"points is a pair of rotations and positions, but .* symspline\.poses\.j
         (VELOCITIES, lambda: ss.SpecialOrthogonal(3).exp(R[0], [0, 0, 1])),
     ],
 )
-def test_messages_name_the_conversion(message, call):
+def test_messages_about_points_name_the_conversion(message, call):
     raises(message, call)
 
 

@@ -151,7 +151,7 @@ def test_quaternions_follow_the_curve_and_not_its_chord():
     assert np.abs(rotations.from_quaternions(q, scalar_first=True) - spline(x)).max() < 1e-14
 
 
-def test_dates():
+def test_dates_of_rotations():
     dates = np.array(["2020-01-01T00:00:00", "2020-01-01T00:00:02"], "M8[s]")
     spline = ss.CubicSpline(dates, rotations.from_rotation_vectors([[0, 0, 0], [0, 0, 1]]), "so:3")
     assert np.allclose(rotations.angular_velocity(spline, dates), [0, 0, 0.5], rtol=1e-14)
@@ -196,7 +196,7 @@ def test_six_numbers(order, entries):
     assert ((second * b).sum(-1) > 0).all() and np.abs((third * b).sum(-1)).max() < 1e-14
 
 
-def test_invalid_arguments_raise():
+def test_invalid_arguments_of_rotations_raise():
     for call, match in [
         (lambda s: rotations.angular_velocity(s, 0.5, "inertial"), "'body' or 'world', not 'inertial'"),
         (lambda s: rotations.quaternion(s, 0.5), "scalar_first"),

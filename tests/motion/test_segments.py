@@ -48,7 +48,7 @@ def test_times_close_together_are_not_one():
     assert len(found.t) == 3
 
 
-def test_dates():
+def test_dates_of_segments():
     t = np.datetime64("2024-01-01T00:00:00.000000001") + (1e9 * T).astype("m8[ns]")
     p = points_on(ss.Sphere(2), len(T))
     longest = [np.timedelta64(2, "s"), np.timedelta64(2000, "ms").item(), 2, 2.0, np.float32(2)]
@@ -57,7 +57,7 @@ def test_dates():
         assert [len(piece.t) for piece in pieces] == [4, 3, 2] and pieces[1].t[0] == t[4]
 
 
-def test_invalid_arguments_raise():
+def test_invalid_arguments_of_segments_raise():
     for match, changes in [
         (r"t\[1\] and t\[2\] are both 1.0 \(and 1 more such pairs\). Pass duplicates='first'", {"t": [0, 1, 1, 1, 2]}),
         (r"t\[2\] = 0.5 is before t\[1\] = 1.0. Sort", {"t": [0, 1, 0.5, 2, 3]}),

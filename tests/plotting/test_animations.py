@@ -45,7 +45,7 @@ def test_gaps_are_skipped():
     at_time(ss.SegmentedCurve(segments), 21.0)
 
 
-def test_files(tmp_path):
+def test_files_of_animations(tmp_path):
     path = tmp_path / "a.gif"
     spline_on("r:1").animate(path, frames=3, fps=10)
     with Image.open(path) as image:

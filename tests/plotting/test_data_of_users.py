@@ -10,7 +10,6 @@ from refused import raises
 
 import symspline as ss
 
-RNG = np.random.default_rng(0)
 UTM = np.array([692_345.0, 5_334_781.0, 520.0])
 
 
@@ -18,9 +17,9 @@ UTM = np.array([692_345.0, 5_334_781.0, 520.0])
 
 
 @pytest.mark.parametrize("shift", [0.0, 1000.0])
-def test_segments_near_noisy_points_show_their_data_and_bands(shift):
+def test_segments_near_noisy_points_show_their_data_and_bands(shift, rng):
     t = np.append(np.arange(0, 10, 0.5), np.arange(30, 40, 0.5)) + shift
-    y = np.sin(t / 3)[:, None] + 0.3 * RNG.standard_normal((40, 1))
+    y = np.sin(t / 3)[:, None] + 0.3 * rng.standard_normal((40, 1))
     curve = ss.fit_segments(t, y, "r:1", max_gap=2, smooth=True)
     figure = rendered(curve.plot())
     axes = axes_named(figure, "x")
@@ -43,9 +42,9 @@ def test_segments_near_noisy_points_show_their_data_and_bands(shift):
                 assert width == pytest.approx(2 * 1.96 * segment.std(segment.t[i], nu=nu), rel=2e-3)
 
 
-def test_data_of_segments_with_dates_of_their_own():
+def test_data_of_segments_with_dates_of_their_own(rng):
     t = np.datetime64("2024-03-01") + np.arange(40) * np.timedelta64(6, "h")
-    y = np.sin(np.arange(40) / 3)[:, None] + 0.1 * RNG.standard_normal((40, 1))
+    y = np.sin(np.arange(40) / 3)[:, None] + 0.1 * rng.standard_normal((40, 1))
     parts = [ss.make_smoothing_spline(t[i], y[i], "r:1") for i in (slice(0, 15), slice(25, 40))]
     axes = axes_named(ss.SegmentedCurve(parts).plot(), "x")
     seen = np.concatenate([line.get_xydata() for line in axes.lines if role(line) == "data"])
@@ -136,13 +135,13 @@ def test_symbols_are_not_drawn_over_others(name):
     raises("ax already contains a picture, and symbols of several curves would overlap", spline_on(name).plot, ax=ax)
 
 
-def test_data_have_one_entry_in_legends():
+def test_data_have_one_entry_in_legends(rng):
     ax = Figure().add_subplot()
     curve = spline_on("sphere:2")
     ss.plot([curve, (curve.t, curve.points)], labels=["a", "b"], ax=ax)
     assert ax.get_legend_handles_labels()[1].count("b") == 1
     t = np.arange(30.0)
-    noisy = np.sin(t)[:, None] + 0.1 * RNG.standard_normal((30, 1))
+    noisy = np.sin(t)[:, None] + 0.1 * rng.standard_normal((30, 1))
     figure = rendered(ss.plot([ss.make_smoothing_spline(t, noisy, "r:1"), (t, noisy)], labels=["fit", "data"]))
     assert texts_of(figure).count("data") == 1
 

@@ -20,7 +20,7 @@ SIGNED = {"euclidean:1", "sphere:1", "hyperbolic:1", "rp:1", "gr:1,2", "so:2", "
 
 
 @pytest.mark.parametrize(("name", "shape"), list(zip(VIEWS, [(6,), (3, 6)] * 11, strict=True)), ids=str)
-def test_every_space_is_drawn(name, shape):
+def test_every_space_has_figures(name, shape):
     """Alternately one curve and a batch."""
     spline = spline_on(name, shape)
     figure = rendered(spline.plot())
@@ -111,7 +111,7 @@ def test_the_heading_counts_curves():
     "name, unit, step",
     [("r:1", "us", 500), ("r:2", "s", 3), ("r:1", "m", 70), ("r:2", "h", 10), ("r:1", "D", 1), ("r:2", "D", 300)],
 )
-def test_dates(name, unit, step):
+def test_dates_of_figures(name, unit, step):
     t = np.datetime64("2024-02-27", unit) + step * np.array([0, 1, 2, 4, 5]).astype(f"timedelta64[{unit}]")
     figure = rendered(spline_on(name, (5,), t).plot())
     ((axes,), _) = rate_axes(figure)

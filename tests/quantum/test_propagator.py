@@ -64,7 +64,7 @@ def test_one_time_alone_is_as_among_many(name):
 
 
 @pytest.mark.parametrize("name", ["cp:2", "su:2"])
-def test_batches(name):
+def test_batches_of_propagators(name):
     spline = curve(name, batch=(2, 3))
     u = propagator(spline, X)
     for i, j in np.ndindex(2, 3):

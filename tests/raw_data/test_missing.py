@@ -91,7 +91,7 @@ def test_dates_with_a_time_zone_keep_it():
         np.testing.assert_array_equal(curve(t[3]), bad[3])
 
 
-def test_batches():
+def test_batches_of_recordings():
     p = np.stack([recording("so:3"), recording("so:3")[::-1]])
     same = p.copy()
     same[:, GONE] = np.nan

@@ -170,7 +170,7 @@ def test_manifolds_of_functions():
 
 
 @pytest.mark.parametrize("own_knots", [False, True])
-def test_batches(own_knots):
+def test_batches_of_nearest_points(own_knots):
     space = ss.space("so:3")
     points = points_on(space, 6, (2, 3))
     t = np.cumsum(np.random.default_rng(1).uniform(0.5, 2, (2, 3, 6)), axis=-1) if own_knots else None
@@ -224,7 +224,7 @@ def test_spaces_without_a_metric_raise(name):
     raises("has no invariant metric", curve.closest, points_on(space, 1, step=0.2))
 
 
-def test_invalid_points_raise():
+def test_invalid_points_to_search_from_raise():
     curve = ss.CubicSpline(None, points_on(ss.space("sphere:2"), 4), "sphere:2")
     raises(r"points\[1\] is off the space", curve.closest, [[1, 0, 0], [1, 1, 0]])
     raises("points is off the space", curve.closest, [1, 1, 0])

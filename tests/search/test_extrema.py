@@ -75,7 +75,7 @@ def test_constant_speed_and_jumps():
     assert 2 <= time <= 3
 
 
-def test_dates():
+def test_dates_of_extrema():
     t = np.datetime64("2026-03-01T12:00") + np.arange(3) * np.timedelta64(1, "h")
     curve = ss.CubicSpline(t, [[0.0], [1.0], [0.0]], "r:1")
     times, values = curve.extrema(lambda x: curve(x)[..., 0])
@@ -89,7 +89,7 @@ def test_bezier_curves():
     np.testing.assert_allclose(curve.solve(lambda x: curve(x)[..., 1], 0.75), [0.25, 0.75], atol=1e-12)
 
 
-def test_invalid_input_raises():
+def test_invalid_input_of_extrema_raises():
     curve = ss.CubicSpline(None, [[0.0], [1.0], [0.0]], "r:1")
     raises("kind must be 'max' or 'min'", curve.extrema, kind="both")
     raises("function must be 'speed'", curve.extrema, "jerk")

@@ -186,7 +186,7 @@ def test_velocities_that_vanish():
     assert abs(law.duration / (2 * trapezoid(1.0, 10.0, 2.0)) - 1) < 0.02
 
 
-def test_dates():
+def test_dates_of_time_laws():
     t = np.datetime64("2026-03-01T12:00") + np.arange(3) * np.timedelta64(1, "h")
     curve = ss.CubicSpline(t, [[0.0], [3600.0], [7200.0]], "r:1")
     law = ss.time_law(curve, max_speed=2.0, max_acceleration=1.0)
@@ -208,7 +208,7 @@ def test_retimed_curves_keep_the_limits():
     raises("curve is not finite in its whole domain", ss.time_law, pair, max_acceleration=1.0)
 
 
-def test_invalid_input_raises():
+def test_invalid_input_of_time_laws_raises():
     curve = ss.CubicSpline(*joints(4, 5, 2), "r:2")
     pair = ss.CubicSpline(None, points_on(ss.space("so:3 x r:3"), 4), "so:3 x r:3")
     raises("curve must be a curve", ss.time_law, 3, max_acceleration=1.0)

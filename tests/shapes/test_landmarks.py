@@ -50,7 +50,7 @@ def test_kernels_are_the_other_way_to_say_it():
 
 
 @pytest.mark.parametrize("base", [None, 0, 5])
-def test_there_and_back(base):
+def test_there_and_back_of_shapes(base):
     x = drawings(4, n=3)
     shapes = from_landmarks(x, base=base)
     assert np.abs(to_landmarks(shapes, x, base=base) - x).max() < 1e-14

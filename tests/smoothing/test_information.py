@@ -120,7 +120,7 @@ def test_each_of_two_sensors_knows_one_direction():
     assert rms(space, robust(t), points) < 0.014
 
 
-def test_batches_are_single_curves():
+def test_batches_of_information_matrices_are_single_curves():
     rng = np.random.default_rng(6)
     space = ss.space("so:3")
     t = np.linspace(0, 10, 25)
@@ -134,7 +134,7 @@ def test_batches_are_single_curves():
     assert np.array_equal(shared.points[0], together.points[0])
 
 
-def test_closed_curves():
+def test_closed_curves_of_information_matrices():
     rng = np.random.default_rng(8)
     space = ss.Sphere(2)
     t = np.linspace(0, 1, 41)

@@ -13,7 +13,7 @@ from symspline import _core
 S2, T, NOISY, _ = example("sphere:2", 0.05, n=40)
 
 
-def test_dates():
+def test_dates_of_smoothing_splines():
     dates = np.datetime64("2024-03-01") + (T * 60).astype("timedelta64[s]")
     spline = ss.make_smoothing_spline(dates, NOISY, S2)
     seconds = (dates - dates[0]) / np.timedelta64(1, "s")
@@ -81,7 +81,7 @@ def test_a_lambda_at_its_bound_warns():
         assert dataclasses.replace(stiff.report, df=df).is_stiff() == is_stiff
 
 
-def test_invalid_input_raises():
+def test_invalid_input_of_smoothing_splines_raises():
     for change, message in [
         ({"t": T[::-1]}, r"t\[1\] = 9.7\d* is before t\[0\] = 10"),
         ({"t": 1e101 * T}, r"t spans more than 1e\+100, too much for smoothing"),

@@ -202,5 +202,5 @@ def test_open_loops_around_missing_nodes_are_named():
         (np.zeros((3, 2)), 1, "needs shape"),
     ],
 )
-def test_invalid_points_raise(points, axes, message):
+def test_invalid_points_to_unwrap_raise(points, axes, message):
     raises(message, CUBIC.unwrap, points, axes=axes)

@@ -91,7 +91,7 @@ def test_dates_and_files(rng, tmp_path):
     assert np.abs(later.velocities - own.velocities).max() < 1e-13
 
 
-def test_invalid_points_raise(rng):
+def test_invalid_points_to_append_raise(rng):
     spline = ss.CubicSpline(None, rng.standard_normal((5, 2)), "r:2")
     for call, message in [
         (

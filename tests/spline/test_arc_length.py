@@ -67,7 +67,7 @@ def test_a_curve_that_rests_and_turns_back():
     assert still.length(0, 1) == 0 and still.at_length(0) == 0
 
 
-def test_dates(rng):
+def test_dates_of_arc_lengths(rng):
     t = np.datetime64("2024-02-28T23:59", "s") + np.cumsum(rng.integers(1, 90, 40))
     points = walk(rng)
     seconds = (t - t[0]).astype(float)
@@ -112,7 +112,7 @@ def test_curves_that_failed_are_missing(rng):
     assert np.isnat(dated.at_length(0.0)).tolist() == [False, True, False]
 
 
-def test_curves_with_control_points(rng):
+def test_curves_with_control_points_of_arc_lengths(rng):
     points = walk(rng, 2, n=6)
     for curve in (
         ss.BezierCurve(points, S2),
@@ -132,7 +132,7 @@ def test_empty_input(rng):
     assert none.length(0, 1).shape == (0,) and none.at_length([0.0]).shape == (0, 1) == none.arc_length([0.0]).shape
 
 
-def test_invalid_input_raises(rng):
+def test_invalid_input_of_arc_lengths_raises(rng):
     curve = ss.CubicSpline(None, walk(rng, 2, n=5), S2)
     one = curve[0]
     raises(r"s\[1\] = 99.0 is not an arc length of the curve: it must be between", one.at_length, [0.0, 99.0])

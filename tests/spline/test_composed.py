@@ -90,7 +90,7 @@ def test_other_kinds_of_curves(rng):
     raises("nu must be 0, 1 or 2, not 3", bezier.restrict(0.2, 0.9), 0.5, 3)
 
 
-def test_batches_with_their_own_knots(rng):
+def test_batches_of_composed_curves_with_their_own_knots(rng):
     t = np.cumsum(rng.uniform(0.5, 2, (3, 6)), axis=-1)
     curves = ss.CubicSpline(t, np.cumsum(rng.standard_normal((3, 6, 2)), axis=1), "r:2")
     a, b = t[:, 0].max() + 0.01, t[:, -1].min() - 0.01
@@ -103,7 +103,7 @@ def test_batches_with_their_own_knots(rng):
     assert stored(part) == part
 
 
-def test_dates(rng):
+def test_dates_of_composed_curves(rng):
     hours = np.datetime64("2026-03-01T00", "h") + np.array([0, 5, 6, 30, 31, 47])
     points = ss.Sphere(2).project(rng.standard_normal((6, 3)) * 0.3 + [1, 0, 0])
     curve = ss.CubicSpline(hours, points, "sphere:2")
@@ -205,7 +205,7 @@ def test_derivatives_are_functions():
     raises("nu must be", velocity, 0.5, 3)
 
 
-def test_invalid_arguments_raise(rng):
+def test_invalid_arguments_of_composed_curves_raise(rng):
     curve = ss.CubicSpline(None, rng.standard_normal((5, 2)), "r:2")
     other = ss.CubicSpline([4, 5], rng.standard_normal((2, 2)), "r:2")
     raises(r"other begins at 0\.0, but the curve ends at 4\.0", curve.concatenate, curve)

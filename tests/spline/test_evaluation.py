@@ -60,7 +60,7 @@ def test_velocity_and_speed(space):
     assert np.allclose(spline.speed(x), space.norm(y, v), rtol=1e-13, atol=0)
 
 
-def test_invalid_times_raise():
+def test_invalid_times_of_evaluation_raise():
     spline = ss.CubicSpline(None, P, S2)
     for x, match in [
         (NAN, r"x is NaN; times must be finite"),

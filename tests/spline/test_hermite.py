@@ -17,7 +17,7 @@ def curve(space, batch=(), **options):
     return ss.HermiteSpline(KNOTS, p, tangents_at(space, p), space, **options)
 
 
-def test_flat_space_is_scipys():
+def test_flat_space_of_hermite_splines_is_scipys():
     rng = np.random.default_rng(0)
     p, v = rng.standard_normal((2, 6, 3))
     ours, scipy = ss.HermiteSpline(KNOTS, p, v, "r:3"), CubicHermiteSpline(KNOTS, p, v)
@@ -66,7 +66,7 @@ def test_hermite_spline_has_the_given_points_and_velocities(space):
 ZERO = np.zeros((3, 3))
 
 
-def test_invalid_arguments_raise():
+def test_invalid_arguments_of_hermite_splines_raise():
     for match, changes in [
         (r"velocities has shape \(2, 3\), but points \(3, 3\)", {"velocities": np.zeros((2, 3))}),
         (r"velocities\[1, 2\] is not finite", {"velocities": [[0, 0, 0], [0, 0, np.inf], [0, 0, 0]]}),

@@ -35,7 +35,7 @@ def test_jerk_is_the_derivative_of_the_acceleration(space):
     assert np.abs(curve(X, nu=3) - expected).max() < 1e-9 * max(1, np.abs(expected).max())
 
 
-def test_flat_space_is_scipys():
+def test_flat_space_of_the_jerk_is_scipys():
     rng = np.random.default_rng(0)
     for unit in (1.0, 1e-6, 1e5):
         t, y = unit * np.cumsum(rng.uniform(0.1, 2, 9)), rng.standard_normal((9, 2))
@@ -76,7 +76,7 @@ def test_products_batches_and_own_times():
     raises("out has shape", curves, [1.5], nu=3, out=out)
 
 
-def test_outside_the_knots():
+def test_outside_the_knots_of_the_jerk():
     points = points_on(S2, 6, step=0.4)
     curve = ss.CubicSpline(KNOTS, points, S2)
     raises("outside", curve, 5.0, nu=3)

@@ -142,7 +142,7 @@ def test_spaces_with_unique_arrays_are_evaluated():
         raises("away from the nearest", spline.lift, x, points[1])
 
 
-def test_batches_products_and_large_spaces(rng):
+def test_batches_products_and_large_spaces_of_lifts(rng):
     space, points = points_of("cp:2", rng)
     both = np.stack([points, turned(space, points, rng)])
     knots = np.stack([KNOTS, 2 * KNOTS])

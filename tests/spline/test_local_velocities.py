@@ -40,7 +40,7 @@ def catmull_rom(t, y):
 @every_method
 @pytest.mark.parametrize("n", [2, 3, 4, 5, 40])
 @pytest.mark.parametrize("size", [1.0, 1e-200, 1e150])
-def test_flat_space_is_scipys(method, n, size):
+def test_flat_space_of_local_velocities_is_scipys(method, n, size):
     if method == "akima" and n == 2:
         pytest.skip("SciPy needs three points")
     t, y = recorded(n, size)
@@ -108,7 +108,7 @@ def test_dates_and_quotients():
     assert np.abs(dated(dates[0] + np.timedelta64(1300, "ms")) - plain(1.3)).max() < 1e-14
 
 
-def test_invalid_arguments_raise():
+def test_invalid_arguments_of_local_velocities_raise():
     with pytest.raises(ss.ValidationError, match="method must be one of 'catmull-rom', 'akima', 'pchip', not 'cubic'"):
         from_points(None, THREE, S2, method="cubic")
     with pytest.raises(ss.CutLocusError, match=r"points\[0\] and points\[1\]"):

@@ -234,7 +234,7 @@ def test_dates_and_large_integers():
     assert np.abs(spline(ticks[0], 2) - 1e-12).max() < 1e-20
 
 
-def test_files_and_pickles(rng):
+def test_files_and_pickles_of_more_conditions(rng):
     p = nine_points(S2, rng)
     v, a = (tangents_at(S2, p[0], seed=s) for s in (1, 2))
     spline = ss.CubicSpline(T, p, S2, bc_type=([(1, v), (2, a)], "natural"), velocities={4: tangents_at(S2, p[4])})

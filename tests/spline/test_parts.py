@@ -64,7 +64,7 @@ def test_batches_with_their_own_knots(rng):
     assert curves.restrict().length() == pytest.approx(curves.length())
 
 
-def test_invalid_times_raise(rng):
+def test_invalid_times_of_parts_raise(rng):
     curve = ss.CubicSpline(None, rng.standard_normal((5, 2)), "r:2")
     raises(r"b = 9\.0 is outside the knots", curve.restrict, 0, 9)
     raises("b must be after a", curve.restrict, 3, 3)

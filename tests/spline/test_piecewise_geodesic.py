@@ -91,7 +91,7 @@ def test_flat_space_is_linear_interpolation():
     assert np.allclose(curve(np.nextafter(t[1:], 0), nu=1)[:, 0], slopes, rtol=1e-12)
 
 
-def test_outside_the_knots():
+def test_outside_the_knots_of_piecewise_geodesics():
     curve = ss.PiecewiseGeodesic([0, 1, 3], THREE, S2)
     raises("outside", curve, 3.5)
     further = S2.geodesic(THREE[1], THREE[2], 1.25)
@@ -113,7 +113,7 @@ def test_bending_energy_is_infinite_at_kinks():
 
 
 @pytest.mark.parametrize("name", ["sphere:2", "so:3 x r:3", "cp:2"])
-def test_files_and_pickles(name):
+def test_files_and_pickles_of_piecewise_geodesics(name):
     space = ss.space(name)
     dates = np.datetime64("2024-05-01") + (1e3 * KNOTS).astype("m8[ms]")
     curve = ss.PiecewiseGeodesic(dates, points_on(space, 6, (2,), step=0.4), space, extrapolate="geodesic")
@@ -161,7 +161,7 @@ def test_large_spaces_and_manifolds():
     assert np.abs(curve(1.25) - stiefel.geodesic(points[1], points[2], 0.25)).max() < 1e-9
 
 
-def test_invalid_arguments_raise():
+def test_invalid_arguments_of_piecewise_geodesics_raise():
     for match, changes in [
         ("the space by", {"points": 2 * np.eye(3)}),
         (r"t\[1\]", {"t": [0, 0, 1]}),

@@ -231,7 +231,7 @@ def in_factors(value):
 
 
 @pytest.mark.parametrize("name", ["so:3/432", "432\\so:3/622", "so:3/432 x r:2", "pu:2", "sphere:2/[1.0,-1.0]"])
-def test_files_and_pickles(name, tmp_path):
+def test_files_and_pickles_of_quotients(name, tmp_path):
     space, rng = ss.space(name), np.random.default_rng(14)
     factors = space.factors if isinstance(space, ss.Product) else (space,)
     points = []

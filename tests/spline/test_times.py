@@ -79,7 +79,7 @@ def test_units_of_dates_may_differ():
     assert same(spline(np.datetime64("2000-01-01", "ns")), spline(np.datetime64("2000-01-01", "D")))
 
 
-def test_invalid_times_raise():
+def test_invalid_times_of_knots_raise():
     for t, match in [
         ([], r"t is empty; a curve needs at least two points"),
         ([0, 1], r"t has shape \(2,\), but 3 points per curve need \(3,\)"),

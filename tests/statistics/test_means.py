@@ -134,7 +134,7 @@ def test_points_of_weight_zero_may_be_nan():
 
 
 @pytest.mark.parametrize("method", ["mean", "median"])
-def test_invalid_arguments_name_the_argument(method):
+def test_invalid_arguments_of_means_name_the_argument(method):
     average = getattr(ss.Sphere(2), method)
     points = np.eye(3)
     raises("at least one point", average, points[0])

@@ -72,7 +72,7 @@ def test_invalid_fits_raise(match, change, options, chunks):
     ],
 )
 @loop_over("chunks", [None, {"lat": 1}])
-def test_invalid_times_raise(match, x, options, chunks):
+def test_invalid_times_of_arrays_with_names_raise(match, x, options, chunks):
     da = field(chunks=chunks)
     ds = sx.fit(da, S2, point_dims=("r",))
     for call in (sx.evaluate, sx.speed, sx.lift):
