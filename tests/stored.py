@@ -20,6 +20,14 @@ def load(data):
     return ss.load(io.BytesIO(data))
 
 
+def restored(curve):
+    """The curve, or the collection of curves, after it was saved and loaded."""
+    file = io.BytesIO()
+    curve.save(file) if hasattr(curve, "save") else ss.save(curve, file)
+    file.seek(0)
+    return ss.load(file)
+
+
 def with_arrays(spline=None, **changes):
     """A well-formed file with some arrays replaced, or taken out."""
     arrays = dict(np.load(io.BytesIO(stored(spline)))) | changes

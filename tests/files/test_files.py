@@ -10,15 +10,11 @@ import pytest
 from compare import parts, same, same_curve
 from curves import KNOTS, S2, THREE, at_node, every_kind, failing, points_on, tangents_at
 from refused import raises
-from stored import load, stored, with_arrays
+from stored import load, restored, stored, with_arrays
 
 import symspline as ss
 
 EPOCH = 1_700_000_000_000_000_000
-
-
-def round_trip(spline):
-    return load(stored(spline))
 
 
 def saved_curves():
@@ -72,7 +68,7 @@ ALL = SAVED | {f"velocities, {name}": spline for name, spline in HERMITES.items(
 @pytest.mark.parametrize("name", ALL)
 def test_files_keep_everything(name):
     spline = ALL[name]
-    read = round_trip(spline)
+    read = restored(spline)
     assert type(read) is type(spline) and read == spline and repr(read) == repr(spline)
     assert read.t.dtype == spline.t.dtype and read.space == spline.space and same(read.velocities, spline.velocities)
     assert read.extrapolate == spline.extrapolate
@@ -91,7 +87,7 @@ def test_files_keep_everything(name):
 def test_files_and_pickles_keep_durations():
     spline = ss.CubicSpline(np.array([0, 1000, 3000], "m8[ms]"), THREE, S2)
     half = np.timedelta64(500, "ms")
-    for made in (spline, round_trip(spline), pickle.loads(pickle.dumps(spline))):
+    for made in (spline, restored(spline), pickle.loads(pickle.dumps(spline))):
         assert same(made(half), spline(0.5)) and made.t.tolist() == [0.0, 1.0, 3.0]
 
 
@@ -147,34 +143,26 @@ def test_damaged_files_of_given_velocities_raise():
 @every_kind
 def test_many_curves_in_one_file(space):
     curves = {str(n): ss.CubicSpline(None, points_on(space, n, step=0.5), space) for n in (2, 5, 3)}
-    read = collection(curves)
+    read = restored(curves)
     assert list(read) == list(curves)
     assert all(same_curve(read[name], curves[name]) for name in curves)
 
 
-def collection(curves):
-    """Curves saved into one file and read again."""
-    file = io.BytesIO()
-    ss.save(curves, file)
-    file.seek(0)
-    return ss.load(file)
-
-
 def test_collections_keep_names_and_end_conditions():
     one, other = ss.fit_many([(None, np.eye(3)), ([1, 2], np.eye(3)[:2])], "s:2", bc_type="not-a-knot")
-    loaded = collection({"": one, "b\0é": other})
+    loaded = restored({"": one, "b\0é": other})
     assert loaded == {"": one, "b\0é": other}
     assert loaded[""].report == one.report and loaded[""].bc_type == "not-a-knot"
     v = (np.array([0.0, 1, 0]), np.array([2.0]))
     both = ss.CubicSpline(None, (np.eye(3), np.eye(3)[:, :1]), "s:2 x r:1", bc_type=((1, v), "natural"))
-    assert collection({"p": both, "q": both})["q"] == both
+    assert restored({"p": both, "q": both})["q"] == both
     pair = dict(zip("ab", ss.fit_many([(None, np.eye(3))] * 2, "s:2", where=[True, False]), strict=True))
-    assert collection(pair) == pair
+    assert restored(pair) == pair
 
 
 def test_collections_of_any_class():
     curves = {"a": HERMITES["one"], "b": HERMITES["one"]}
-    assert collection(curves) == curves
+    assert restored(curves) == curves
 
 
 def test_invalid_collections_raise(tmp_path):

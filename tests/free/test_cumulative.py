@@ -1,6 +1,5 @@
 """`CumulativeBSpline` as a curve: its definition, smoothness, derivatives, batches, products, files and errors."""
 
-import io
 import itertools
 import pickle
 import warnings
@@ -13,6 +12,7 @@ from refused import raises
 from scipy.interpolate import BSpline
 from scipy.linalg import expm, logm
 from scipy.spatial.transform import Rotation
+from stored import restored
 
 import symspline as ss
 
@@ -177,10 +177,7 @@ def test_files_and_pickles_of_cumulative_splines(name, rng):
     factors = name.split(" x ")
     arrays = tuple(control(factor, 8, rng) for factor in factors)
     curve = ss.CumulativeBSpline(None, arrays if len(arrays) > 1 else arrays[0], name)
-    file = io.BytesIO()
-    curve.save(file)
-    file.seek(0)
-    for again in (ss.load(file), pickle.loads(pickle.dumps(curve))):
+    for again in (restored(curve), pickle.loads(pickle.dumps(curve))):
         assert again == curve and type(again) is ss.CumulativeBSpline and again.report is None
         values = again(1.3), curve(1.3)
         assert all(np.array_equal(*pair) for pair in zip(*values, strict=True))

@@ -1,12 +1,11 @@
 """`CumulativeBSpline.fit`: the least-squares curve, its minimality, weights, batches, reports and errors."""
 
-import io
-
 import numpy as np
 import pytest
 from cases import walk
 from refused import raises
 from scipy.interpolate import make_lsq_spline
+from stored import restored
 
 import symspline as ss
 
@@ -119,10 +118,7 @@ def test_batches_products_and_files(rng):
     flat = ss.CumulativeBSpline.fit(t, path, inner, "r:3")
     assert product.report.residual_sum == pytest.approx(flat.report.residual_sum + alone[0].report.residual_sum)
     for curve in (both, product):
-        file = io.BytesIO()
-        curve.save(file)
-        file.seek(0)
-        again = ss.load(file)
+        again = restored(curve)
         assert again == curve and np.array_equal(again.report.step, curve.report.step)
 
 

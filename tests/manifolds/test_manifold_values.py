@@ -1,12 +1,12 @@
 """The interface of curves on manifolds made of functions, and its errors."""
 
-import io
 import pickle
 
 import numpy as np
 import pytest
 from made import knots, twin, walk
 from refused import raises
+from stored import restored
 
 import symspline as ss
 
@@ -81,10 +81,7 @@ def test_pickles_and_files():
         exp=np.add, log=np.subtract, project_tangent=np.add, inner=np.add, point_shape=2, injectivity_radius=2
     )
     assert pickle.loads(pickle.dumps(made)) == made
-    file = io.BytesIO()
-    SPLINE.save(file)
-    file.seek(0)
-    assert ss.load(file) == SPLINE
+    assert restored(SPLINE) == SPLINE
 
 
 def test_missing_operations_raise():

@@ -11,7 +11,7 @@ import pytest
 from compare import parts, same
 from noisy import example
 from refused import raises
-from stored import load, stored, with_arrays
+from stored import load, restored, stored, with_arrays
 
 import symspline as ss
 
@@ -91,10 +91,7 @@ def test_zones_are_kept():
 def test_many_smoothing_splines_in_one_file():
     for names in (["one", "few knots", "robust"], ["dates"], ["product"], ["zones"], ["closed", "closed too"]):
         curves = {name: SAVED[name] for name in names}
-        file = io.BytesIO()
-        ss.save(curves, file)
-        file.seek(0)
-        read = ss.load(file)
+        read = restored(curves)
         assert list(read) == names
         for name in names:
             assert_same(read[name], curves[name])

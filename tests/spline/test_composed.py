@@ -9,20 +9,13 @@ from compare import close, each
 from curves import KNOTS, every_batch, every_kind, points_on
 from refused import raises
 from scipy.interpolate import PchipInterpolator
+from stored import restored
 
 import symspline as ss
 
 # Neither is a knot.
 A, B = KNOTS[1] + 0.3 * (KNOTS[2] - KNOTS[1]), KNOTS[-2] + 0.6 * (KNOTS[-1] - KNOTS[-2])
 INSIDE = np.sort(np.random.default_rng(3).uniform(A, B, 23))
-
-
-def stored(curve):
-    """A curve after it was saved and loaded."""
-    file = io.BytesIO()
-    curve.save(file)
-    file.seek(0)
-    return ss.load(file)
 
 
 @every_kind
@@ -81,7 +74,7 @@ def test_other_kinds_of_curves(rng):
         assert isinstance(joined, ss.SegmentedCurve)
         assert joined.length() == pytest.approx(2 * part.length(), rel=1e-12)
         for own in (part, back, later, joined):
-            again = stored(own)
+            again = restored(own)
             assert again == own == pickle.loads(pickle.dumps(own))
             assert close(again(np.mean(own.domain), 1), own(np.mean(own.domain), 1), 0)
             assert again != part.restrict(b=(a + b) / 2)
@@ -100,7 +93,7 @@ def test_batches_of_composed_curves_with_their_own_knots(rng):
     assert part.arc_length(x).shape == (3, 7)
     for i in range(3):
         assert close(part[i](x), curves[i](x), 0)
-    assert stored(part) == part
+    assert restored(part) == part
 
 
 def test_dates_of_composed_curves(rng):
@@ -115,8 +108,8 @@ def test_dates_of_composed_curves(rng):
     x = half + np.arange(0, 28 * 60, 97) * np.timedelta64(1, "m")
     assert close(part(x), curve(x)) and close(later(x + np.timedelta64(1, "D"), 1), curve(x, 1))
     for own in (part, later, part.reverse()):
-        assert stored(own) == own
-        assert close(stored(own)(own.domain[0]), own(own.domain[0]), 0)
+        assert restored(own) == own
+        assert close(restored(own)(own.domain[0]), own(own.domain[0]), 0)
     raises("dt must be a timedelta64", part.shift, 3.0)
     # A time law counts seconds since the start.
     slow = curve.retime(PchipInterpolator([0, 10], [0, 47 * 3600.0]))
@@ -147,7 +140,7 @@ def test_segments_are_a_function_of_time(rng):
     assert [type(own).__name__ for own in part] == ["HermiteSpline", "RetimedCurve"]
     assert np.isnan(found(t[-1] + 1, extrapolate=False)[0]).all()
     for own in (found, part, found.shift(-7)):
-        assert stored(own) == own == pickle.loads(pickle.dumps(own))
+        assert restored(own) == own == pickle.loads(pickle.dumps(own))
     for call in (ss.rotations.angular_velocity, ss.rotations.angular_acceleration):
         np.testing.assert_allclose(
             call(found, x), np.where((x < 25)[:, None], *(call(own, x, extrapolate=False) for own in found))

@@ -4,7 +4,6 @@ PyTorch and QuTiP need not be there: stand-ins do what the library looks at, as 
 test_pandas.
 """
 
-import io
 import pickle
 from datetime import UTC, date, datetime, timedelta, timezone
 from decimal import Decimal
@@ -14,6 +13,7 @@ import pytest
 from curves import S2, run_python
 from refused import raises
 from scipy.spatial.transform import Rotation
+from stored import restored
 
 import symspline as ss
 
@@ -123,10 +123,7 @@ KINDS = {
 @pytest.mark.parametrize("kind", KINDS)
 def test_time_zones_are_kept(zone, kind):
     spline = KINDS[kind]([datetime(2026, 1, 1, hour, tzinfo=zone) for hour in (0, 6, 12)])
-    file = io.BytesIO()
-    spline.save(file)
-    file.seek(0)
-    for curve in (spline, ss.load(file), pickle.loads(pickle.dumps(spline))):
+    for curve in (spline, restored(spline), pickle.loads(pickle.dumps(spline))):
         middle = datetime(2026, 1, 1, 6, tzinfo=zone)
         utc = middle.astimezone(UTC).replace(tzinfo=None) if zone else middle
         # NumPy's dates have no zone: they are those of ``t``, UTC.

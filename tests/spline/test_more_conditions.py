@@ -1,6 +1,5 @@
 """Velocities at inner points, and a velocity with an acceleration at one end."""
 
-import io
 import pickle
 
 import numpy as np
@@ -11,6 +10,7 @@ from curves import S2, at_node, every_kind, tangents_at
 from refused import raises
 from scipy.interpolate import CubicSpline as FlatSpline
 from scipy.interpolate import make_interp_spline
+from stored import restored
 
 import symspline as ss
 from symspline._splines.jumps import segments_of
@@ -238,10 +238,7 @@ def test_files_and_pickles_of_more_conditions(rng):
     p = nine_points(S2, rng)
     v, a = (tangents_at(S2, p[0], seed=s) for s in (1, 2))
     spline = ss.CubicSpline(T, p, S2, bc_type=([(1, v), (2, a)], "natural"), velocities={4: tangents_at(S2, p[4])})
-    file = io.BytesIO()
-    spline.save(file)
-    file.seek(0)
-    for found in (ss.load(file), pickle.loads(pickle.dumps(spline))):
+    for found in (restored(spline), pickle.loads(pickle.dumps(spline))):
         assert found == spline and found._c1_nodes == (5,)
         raises("not available", found.jvp, 1.0)
     # The command `symspline check` allows jumps of the acceleration at these nodes only.

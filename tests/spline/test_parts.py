@@ -1,6 +1,5 @@
 """Parts of curves between knots, reversed curves, and curves at later times."""
 
-import io
 from datetime import timedelta
 
 import numpy as np
@@ -8,6 +7,7 @@ import pytest
 from compare import close, each
 from curves import KNOTS, every_batch, every_kind, points_on
 from refused import raises
+from stored import restored
 
 import symspline as ss
 
@@ -46,10 +46,7 @@ def test_dates_and_policies(rng):
     assert close(curve.reverse()(days), curve(days[::-1]))
     part = curve.restrict(b=days[3])
     assert part.domain == (days[0], days[3]) and part.extrapolate is None
-    file = io.BytesIO()
-    part.save(file)
-    file.seek(0)
-    assert ss.load(file) == part
+    assert restored(part) == part
     assert curve.shift(np.timedelta64(0, "s")).restrict(days[1]).length() == pytest.approx(curve.length(days[1]))
 
 

@@ -1,7 +1,6 @@
 """Curves of every class as values: copies, comparison, sequences of curves, and how they print."""
 
 import copy
-import io
 import pickle
 
 import numpy as np
@@ -10,6 +9,7 @@ from cases import COMMON, loop_over
 from compare import found, parts, pick, same, same_curve, shaped
 from curves import KNOTS, S2, THREE, at_node, every_common, points_on, tangents_at, with_ends
 from refused import raises
+from stored import restored
 
 import symspline as ss
 
@@ -50,15 +50,8 @@ def same_values(one, other):
     return all(same(one(x, nu), other(x, nu)) for nu in range(3))
 
 
-def saved_and_loaded(curve):
-    file = io.BytesIO()
-    curve.save(file)
-    file.seek(0)
-    return ss.load(file)
-
-
 COPIES = {
-    "file": saved_and_loaded,
+    "file": restored,
     "pickle": lambda curve: pickle.loads(pickle.dumps(curve)),
     "copy": copy.copy,
     "deepcopy": copy.deepcopy,
