@@ -27,7 +27,7 @@ def holes(rng, shape, share, periodic):
 @pytest.mark.parametrize("share", [0.05, 0.2, 0.5])
 def test_gaps_divide_rows_into_runs(bc_type, share):
     """The compiled loops against those for manifolds, which fit each run by itself."""
-    for seed in range(8):
+    for seed in range(3):
         rng = np.random.default_rng(seed)
         axes = knots(rng, rng.integers(3, 9)), knots(rng, rng.integers(2, 9))
         points = Field(SO3, seed, size=0.2).on(*axes)
@@ -49,7 +49,7 @@ def test_gaps_divide_rows_into_runs(bc_type, share):
 @pytest.mark.parametrize("share", [0.0, 0.05, 0.3])
 def test_scattered_coordinates_see_the_same_gaps(bc_type, share):
     periodic = [word == "periodic" for word in ([bc_type] * 2 if isinstance(bc_type, str) else bc_type)]
-    for seed in range(2):
+    for seed in range(1):
         rng = np.random.default_rng(100 + seed)
         axes = knots(rng, rng.integers(4, 10)), knots(rng, rng.integers(4, 20))
         points = Field(SO3, seed, size=0.2).on(*axes)

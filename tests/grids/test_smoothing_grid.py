@@ -168,21 +168,17 @@ def test_one_lam_can_be_given(rng):
 
 # Some of the surfaces are geodesic along one axis.
 @pytest.mark.filterwarnings("ignore::symspline.SmoothingWarning")
-@pytest.mark.parametrize("name", ["r:1", "sphere:2", "so:3"])
-def test_standard_deviations_cover_the_truth(rng, name):
+def test_standard_deviations_cover_the_truth(rng):
+    """On a curved space; on flat ones they are exact, see above."""
     u, v = np.linspace(0, 1, 12), np.linspace(0, 1, 14)
-    space = ss.space(name)
     x, y = np.meshgrid(u, v, indexing="ij")
-    if name == "r:1":
-        truth = wave(2 * u, 2 * v)[..., None]
-    else:
-        truth = turns(u, v) if name == "so:3" else space.project(np.stack([np.sin(2 * x), y, 1 + x * y], axis=-1))
+    space = ss.Sphere(2)
+    truth = space.project(np.stack([np.sin(2 * x), y, 1 + x * y], axis=-1))
     inside = []
-    for _ in range(8 if name == "r:1" else 3):
+    for _ in range(3):
         noisy = space.exp(truth, 0.08 * space.random_tangent(rng, truth))
         grid = ss.make_smoothing_grid((u, v), noisy, space)
-        radius = {1: 1.960, 2: 2.448, 3: 2.795}[space.dim]
-        inside.append(space.distance(grid.points, truth) < radius * grid.std())
+        inside.append(space.distance(grid.points, truth) < 2.448 * grid.std())
     assert 0.9 < np.mean(inside) < 0.995
 
 

@@ -6,11 +6,9 @@ import subprocess
 import matplotlib.animation
 import numpy as np
 import pytest
-from drawn import VIEWS, points_around, rate_axes, spline_on, texts_of
+from drawn import VIEWS, rate_axes, spline_on, texts_of
 from PIL import Image
 from refused import raises
-
-import symspline as ss
 
 
 def at_time(curve, x):
@@ -30,19 +28,6 @@ def test_every_space_moves(name):
         (line,) = [line for line in axes.lines if line.get_gid() == "_curve"]
         assert cursor.get_xdata()[0] == 0.5
         np.testing.assert_allclose(dot.get_xydata(), [[0.5, np.interp(0.5, *line.get_data())]], atol=1e-12)
-
-
-def test_products_with_graphs_move():
-    """Also if a factor has several panels."""
-    space, rng = ss.space("spd:4 x so:3 x se:3"), np.random.default_rng(3)
-    curve = ss.CubicSpline(None, tuple(points_around(own, rng, (6,)) for own in space.factors), space)
-    figure = at_time(curve, 1.0)
-    assert len([axes for axes in figure.axes if axes.get_gid() == "time"]) >= 5
-
-
-def test_gaps_are_skipped():
-    segments = [spline_on("r:1", t=np.arange(6.0)), spline_on("r:1", t=20 + np.arange(6.0))]
-    at_time(ss.SegmentedCurve(segments), 21.0)
 
 
 def test_files_of_animations(tmp_path):

@@ -74,18 +74,6 @@ def check_rates_of_poses(figure, space, curves):
             np.testing.assert_allclose(other[200:-200:50, 1], moved, atol=1e-4)
 
 
-def test_rounding_is_not_blown_up():
-    """A great circle at constant speed has acceleration 0, whatever the rounding; a point at rest has no speed."""
-    angle = np.arange(5)
-    spline = ss.CubicSpline(None, np.stack([np.cos(angle), np.sin(angle)], axis=-1), "sphere:1")
-    ((axes,), (bend,)) = rate_axes(spline.plot())
-    assert bend.get_ylim()[1] > 0.1 and axes.get_ylim()[0] < 0 < 1 < axes.get_ylim()[1]
-    for name in VIEWS:
-        point = ss.space(name).random_point(np.random.default_rng(3))
-        figure = ss.CubicSpline(None, np.stack([point] * 3), name).plot()
-        assert rate_axes(figure)[0][0].get_ylim()[1] > 0.5
-
-
 def test_the_heading_counts_curves():
     figure = spline_on("r:2", (7, 10, 4)).plot()
     assert len(lines_of(axes_named(figure, "speed"))) == 3

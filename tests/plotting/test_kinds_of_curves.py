@@ -13,7 +13,6 @@ from drawn import (
     spline_on,
     texts_of,
 )
-from matplotlib.figure import Figure
 
 import symspline as ss
 
@@ -130,16 +129,6 @@ def test_lengths_of_gaps(lengths, text):
         t = np.cumsum(np.concatenate([steps, *([own, *steps] for own in lengths)]))
     words = texts_of(spline_on("r:1", (len(t),), t).plot())
     assert any(own.startswith(f"{text} without data, ") for own in words)
-
-
-def test_numbers_in_axes_of_the_user_count_from_zero():
-    x = 5e6 + np.array([0.0, 3.0, 1.0, 7.0])
-    spline = ss.CubicSpline(None, x[:, None], "r:1")
-    ax = Figure().add_subplot()
-    spline.plot(ax=ax)
-    assert ax.lines[0].get_ydata().min() > 4e6 and ax.get_ylabel() == "x"
-    page = spline.plot().axes[0]
-    assert page.get_ylabel() == "x − 5000000" and page.lines[0].get_ydata().max() < 10
 
 
 @pytest.mark.parametrize("name", ["euclidean:1", "sphere:1"])

@@ -128,34 +128,6 @@ def test_slow_rates_have_longer_units():
             np.testing.assert_allclose(found, expected * (86_400 * days) ** power, rtol=1e-6, atol=1e-9)
 
 
-@pytest.mark.filterwarnings("ignore:there are no data:symspline.SmoothingWarning")
-def test_long_gaps_are_seen_in_graphs():
-    """Rotations and positions with a gap have axes per coordinate, with a band that covers the ball of the curve's."""
-    rng = np.random.default_rng(3)
-    t = np.concatenate([np.linspace(0, 4, 40), np.linspace(9, 12, 30)])
-    turns = Rotation.from_rotvec(np.multiply.outer(np.sin(t / 3), [0.9, -1.2, 0.7]) + 0.05 * rng.normal(size=(70, 3)))
-    path = np.stack([t, np.cos(t), 100 * t], axis=-1) + 0.1 * rng.normal(size=(70, 3))
-    curve = ss.make_smoothing_spline(t, (turns.as_matrix(), path), "so:3 x r:3")
-    figure = rendered(curve.plot())
-    labels = [axes.get_ylabel() for axes in figure.axes]
-    assert labels[:6] == [*(f"about x{i}" for i in "₁₂₃"), "x₁", "x₂", "x₃"]
-    assert not any("95 %" in label for label in labels)
-    first = Rotation.from_matrix(curve.points[0][0])
-    ball = rng.normal(size=(2000, 3))
-    ball *= 0.999 / np.linalg.norm(ball, axis=1, keepdims=True)
-    for number, axes in enumerate(figure.axes[:6]):
-        (band,) = [own for own in axes.collections if role(own) == "95 % band"]
-        corners = band.get_paths()[0].vertices
-        for x in (1.0, 3.7, 6.5, 10.0):
-            x = corners[np.abs(corners[:, 0] - x).argmin(), 0]
-            turn, place = curve(x)
-            around = Rotation.from_matrix(turn) * Rotation.from_rotvec(curve.band(x)[0] * ball)
-            vectors = (around * first.inv()).as_rotvec()
-            inside = np.hstack([vectors, place + curve.band(x)[1] * ball])[:, number]
-            drawn = corners[corners[:, 0] == x, 1]
-            assert drawn.min() < inside.min() and inside.max() < drawn.max()
-
-
 def test_graphs_show_nothing_in_a_gap_that_no_data_determine():
     t = np.array([0.0, 1, 2, 3, 20, 21, 22, 23])
     points = np.stack([np.sin(3 * t), 0.1 * t, 5e5 + t], axis=-1)
@@ -223,17 +195,6 @@ def test_rotation_and_translation_have_panels_of_their_own():
     assert labels == ["turning rate\nω, rad/h", "speed\n|p′|, 1/h"]
 
 
-def test_names_of_components():
-    for name, words in [
-        ("euclidean:5", "x₁ x₂ x₃ x₄ x₅"),
-        # Components that follow from others are left out.
-        ("hpd:2", "Re_x₁₁ Re_x₁₂ Im_x₁₂ Re_x₂₂"),
-    ]:
-        figure = spline_on(name).plot()
-        (legend,) = [axes.get_legend() for axes in figure.axes if axes.get_legend()]
-        assert {text.get_text().replace(" ", "_") for text in legend.texts} == set(words.split())
-
-
 def test_columns_of_frames_have_a_panel_each():
     spline = spline_on("stiefel:2,4")
     figure = rendered(spline.plot())
@@ -247,18 +208,6 @@ def test_columns_of_frames_have_a_panel_each():
         np.testing.assert_allclose(dots, spline.points[:, :, j], atol=1e-12)
     assert [text.get_text() for text in panels[0].get_legend().texts] == ["x₁", "x₂", "x₃", "x₄"]
     assert axes_named(spline_on("stiefel:5,7").plot(), "components")
-
-
-def test_imaginary_parts_are_dashed():
-    spline = spline_on("u:2")
-    axes = axes_named(spline.plot(), "components")
-    lines = [line for line in axes.lines if len(line.get_xdata()) > 1000]
-    assert [line.get_linestyle() for line in lines] == ["-", "--"] * 4
-    assert [line.get_color() for line in lines[::2]] == [line.get_color() for line in lines[1::2]]
-    entries = spline(lines[0].get_xdata()).reshape(-1, 4)
-    for i in range(4):
-        drawn = lines[2 * i].get_ydata() + 1j * lines[2 * i + 1].get_ydata()
-        np.testing.assert_allclose(drawn, entries[:, i], atol=1e-12)
 
 
 @pytest.mark.parametrize(("name", "metric"), [("spd:2", "affine-invariant"), ("logspd:2", "log-Euclidean")])

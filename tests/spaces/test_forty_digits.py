@@ -46,8 +46,8 @@ def compare(space, geometry, p, v, x, scale=1.0, size=1.0, log_size=1.0):
     assert abs(space.distance(p, q) - float(geometry.distance(exact_p, exact_q)) * scale) <= allowed
 
 
-LENGTHS = [1e-12, 1e-8, 1e-4, 0.1, 0.6, 1.5]
-GAPS = [0.5, 1e-2, 1e-4, 1e-8, 1e-12, 1e-14]
+LENGTHS = [1e-12, 1e-4, 0.6, 1.5]
+GAPS = [0.5, 1e-4, 1e-8, 1e-14]
 
 
 @loop_over("length", [*LENGTHS, 3.0, *(np.pi - np.array(GAPS))])
@@ -60,7 +60,7 @@ def test_sphere(n, length, rng):
 
 
 @loop_over("length", [*LENGTHS, 2.5])
-@pytest.mark.parametrize("name", ["u:2", "u:3", "su:3", "so:3", "so:4", "so:5", "o:4"])
+@pytest.mark.parametrize("name", ["u:3", "su:3", "so:3", "so:5", "o:4"])
 def test_groups(name, length, rng):
     space = ss.space(name)
     p, x = space.random_point(rng, 2)
@@ -93,12 +93,8 @@ def test_unitary_near_pi(gap, rest, rng):
     compare(space, Unitary(), p, space.project_tangent(p, v), x)
 
 
-ROTATIONS = [
-    (n, rest, gap) for n, rest in ((3, []), (4, [0.3]), (4, [2.0]), (5, [0.3]), (8, [0.3, 0.1, 2.0])) for gap in GAPS
-]
-
-
-@pytest.mark.parametrize(("n", "rest", "gap"), ROTATIONS)
+@loop_over("gap", GAPS)
+@pytest.mark.parametrize(("n", "rest"), [(3, []), (4, [0.3]), (4, [2.0]), (5, [0.3]), (8, [0.3, 0.1, 2.0])])
 def test_rotations_near_pi(n, rest, gap, rng):
     space = ss.SpecialOrthogonal(n)
     p, x, turn = space.random_point(rng, 3)
@@ -121,7 +117,7 @@ def test_special_unitary_past_pi(gap, rng):
 
 
 @loop_over("length", LENGTHS)
-@pytest.mark.parametrize("name", ["gr:2,4", "gr:3,4", "gr:2,6", "cgr:2,4", "cgr:1,3"])
+@pytest.mark.parametrize("name", ["gr:3,4", "gr:2,6", "cgr:2,4"])
 def test_subspaces(name, length, rng):
     space = ss.space(name)
     p, x = space.random_point(rng, 2)
@@ -139,8 +135,8 @@ def test_subspaces_near_a_right_angle(name, gap, rng):
     compare(space, Subspaces(), p, v, x, log_size=1 / gap if name[0] == "c" else 1.0)
 
 
-@loop_over("condition", [1.0, 1e4, 1e8, 1e12])
-@loop_over("length", [1e-8, 1e-4, 0.1, 1.0, 4.0])
+@loop_over("condition", [1.0, 1e6, 1e12])
+@loop_over("length", [1e-8, 0.1, 4.0])
 @pytest.mark.parametrize("name", ["spd:3", "hpd:3"])
 def test_positive_definite(name, length, condition, rng):
     space = ss.space(name)

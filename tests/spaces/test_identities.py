@@ -192,7 +192,7 @@ every = pytest.mark.parametrize("case", IDENTITIES, ids=lambda case: f"{case.sou
 
 
 @every
-@loop_over("length", [1e-12, 1e-8, 1e-4, 1e-2, 0.3, 1.2])
+@loop_over("length", [1e-12, 1e-4, 0.3, 1.2])
 def test_geometry_agrees(case, length, rng):
     here, there = ss.space(case.source), ss.space(case.target)
     for _ in range(3):
@@ -272,7 +272,7 @@ def gauges(space, n, rng):
     return np.linalg.qr(noise).Q
 
 
-@pytest.mark.parametrize("name", ["rp:3", "cp:3", "hp:2", "gr:2,5", "cgr:2,4", "gr:4,5", "cgr:1,2"])
+@pytest.mark.parametrize("name", ["rp:3", "cp:3", "hp:2", "gr:2,5", "cgr:2,4"])
 @loop_over("ends", ["natural", "not-a-knot", "periodic", "velocity", "acceleration"])
 @loop_over("method", ["fixed-point", "quasi-newton"])
 def test_representatives_do_not_matter(name, ends, method, rng):
@@ -281,7 +281,7 @@ def test_representatives_do_not_matter(name, ends, method, rng):
     def multiply(x, g):
         return x * g if len(space.point_shape) == 1 else x @ g
 
-    for step in (1e-6, 0.1, 0.7, 1.1):
+    for step in (1e-6, 0.7, 1.1):
         p = (closed_walk if ends == "periodic" else walk)(space, step, 14, rng)
         g = gauges(space, len(p), rng)
         moved = multiply(p, g)
