@@ -204,3 +204,9 @@ def test_rounding_errors_are_no_outliers(run):
     line[13] += 1e-12
     write_table("a.csv", {"t": np.arange(40), "x": line})
     assert "outlier" not in run("fit a.csv --space r:1 --smooth --lam 1e9 -o a.npz", notes=False)
+
+
+def test_motions_that_are_quick_are_no_outliers(run):
+    x = np.concatenate([0.01 * np.arange(15), [5.0], 10 + 0.01 * np.arange(15)])
+    write_table("a.csv", {"t": np.arange(31), "x": x + 0.001 * np.cos(np.arange(31))})
+    assert "outlier" not in run("fit a.csv --space r:1 -o a.npz")
