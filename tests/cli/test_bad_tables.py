@@ -117,3 +117,15 @@ def test_numbers_in_unusual_notation_are_refused(run, fails, cell):
     write("a.csv", "t,x\n0,1\n1, 2.5 \n")
     run("fit a.csv --space r:1 -o a.npz")
     assert "1_0" in fails("sample a.npz -n 1_0 -o b.csv")
+
+
+def test_entries_that_claim_another_compression(fails):
+    ss.CubicSpline(None, np.eye(3), "s:2").save("curve.npz")
+    np.savez("table.npz", t=[0.0, 1, 2], x=[0.0, 1, 0])
+    for file, entry, line in [("curve", b"points.npy", "check"), ("table", b"x.npy", "fit --space r:1 -o c.npz")]:
+        for method in [8, 12, 14, 99]:
+            data = bytearray(Path(f"{file}.npz").read_bytes())
+            # Names end the headers of entries, and their lines in the list of all at the end of the file.
+            data[data.index(entry) - 30 + 8] = data[data.rindex(entry) - 46 + 10] = method
+            Path("bad.npz").write_bytes(data)
+            assert "bad.npz" in fails(f"{line} bad.npz")

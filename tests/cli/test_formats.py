@@ -173,3 +173,9 @@ def test_lines_in_several_parts_raise(fails):
     parts = {"type": "MultiLineString", "coordinates": [[[178, 10], [179, 11]], [[-179, 12], [-178, 13]]]}
     write("a.geojson", json.dumps({"type": "Feature", "properties": {}, "geometry": parts}))
     assert "not MultiLineString; make one LineString of its parts" in fails("fit a.geojson --lonlat -o a.npz")
+
+
+def test_one_curve_has_no_name(run, fails):
+    write("a.csv", TRACK)
+    run("fit a.csv --lonlat -o curve.npz")
+    assert fails("sample curve.npz --curve foo -n 3 -o -") == "curve.npz has one curve without a name; omit --curve"

@@ -197,3 +197,7 @@ def test_numbers_in_text_read_back_equal(run):
     run("sample a.npz --at at.csv --digits 4 -o b.csv")
     assert [f"{float(text):.3e}" for text in table("b.csv")["x0"]] == [f"{value:.3e}" for value in x[:, 0]]
     assert np.array_equal(numbers(table("b.csv"), "x0")[:, 0], [float(f"{value:.3e}") for value in x[:, 0]])
+
+
+def test_digits_are_checked(curves, fails):
+    assert "--digits: 0: give a number between 1 and 17 (see" in fails("sample a.npz -n 3 --digits 0 -o b.csv")

@@ -205,3 +205,12 @@ def test_curves_that_do_not_fit_a_tum_trajectory(run, fails):
     t = np.array(["1960-01-01", "2020-01-01"], "datetime64[s]")
     ss.CubicSpline(t, p[:2], "se:3").save("a.npz")
     assert "counted from 1970 on" in fails("sample a.npz -n 3 -o b.tum")
+
+
+def test_tum_of_curves_from_matrices_and_dates(run):
+    t = np.array("2021-08-29", "datetime64[ns]") + np.array([0, 1_000_000_007])
+    ss.CubicSpline(t, poses()[:2], "se:3").save("a.npz")
+    write("t.csv", "t\n" + "".join(f"{time}\n" for time in t))
+    run("sample a.npz --at t.csv -o a.tum")
+    lines = Path("a.tum").read_text().splitlines()
+    assert lines[1].split()[0] == "1630195200.000000000" and lines[2].split()[0] == "1630195201.000000007"

@@ -7,6 +7,7 @@ import subprocess
 import sys
 from io import BytesIO
 
+import matplotlib
 import numpy as np
 import pytest
 from drawn import VIEWS, axes_named, has_title, lines_of, points_around, rate_axes, rendered, role, spline_on, texts_of
@@ -205,3 +206,23 @@ def test_gaps_far_longer_than_the_rest_are_marked(dates):
         edges = [sorted(set(path.vertices[:, 0])) for path in bands.get_paths()]
         since = date2num(t[0]) if dates else 0.0
         assert np.allclose(edges, since + np.array([[4, 18], [22, 33]]))
+
+
+def test_points_at_rest_and_constant_speed():
+    """Rounding errors are not magnified: axes of what is constant have a usual range."""
+    angle = np.arange(5)
+    spline = ss.CubicSpline(None, np.stack([np.cos(angle), np.sin(angle)], axis=-1), "sphere:1")
+    ((axes,), (bend,)) = rate_axes(spline.plot())
+    assert bend.get_ylim()[1] > 0.1 and axes.get_ylim()[0] < 0 < 1 < axes.get_ylim()[1]
+    for name in ("euclidean:2", "sphere:2", "so:3", "spd:2", "se:2"):
+        point = ss.space(name).random_point(np.random.default_rng(3))
+        figure = rendered(ss.CubicSpline(None, np.stack([point] * 3), name).plot())
+        assert rate_axes(figure)[0][0].get_ylim()[1] > 0.5
+
+
+@pytest.mark.parametrize("name", ["sphere:2", "so:3"])
+def test_pages_grow_with_the_font(name):
+    usual = spline_on(name).plot()
+    with matplotlib.rc_context({"font.size": 16}):
+        np.testing.assert_allclose(spline_on(name).plot().get_size_inches(), 1.6 * usual.get_size_inches())
+        assert spline_on(name).plot(figsize=(8, 6)).get_size_inches().tolist() == [8, 6]

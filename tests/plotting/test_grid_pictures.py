@@ -236,6 +236,8 @@ def test_one_axis_gives_the_figure_of_the_curve():
     figure = rendered(ss.GridSpline((U,), points, "sphere:2").plot())
     assert "C² spline on Sphere(2)" in texts_of(figure) and "7 points, not-a-knot ends" in texts_of(figure)
     assert axes_named(figure, "speed")
+    one, ax = ss.GridSpline((U,), points, "sphere:2"), Figure().add_subplot()
+    assert one.plot(ax=ax, title="mine") is ax and one.plot(figsize=(5, 4)).get_size_inches().tolist() == [5, 4]
     points[3] = np.nan
     raises("the only axis of the grid has missing nodes", ss.GridSpline((U,), points, "sphere:2").plot)
 

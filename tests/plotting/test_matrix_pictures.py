@@ -226,3 +226,27 @@ def test_given_frames_and_the_curve_have_a_row_each():
     arrows = np.stack([given.U, given.V]).reshape(2, -1, 3)
     lengths, drawn = np.linalg.norm(VIEW @ spline.points, axis=1), np.linalg.norm(arrows, axis=0)
     np.testing.assert_allclose(np.sort(drawn) / drawn.max(), np.sort(lengths) / lengths.max(), rtol=2e-3)
+
+
+@pytest.mark.parametrize("largest", [2.0, 4.5, 8.0])
+def test_rotations_beside_positions_are_graphs(largest):
+    """They are counted from the first rotation, or from the middle one if that is too far; frames show all others."""
+    t = np.array([0.0, 0.7, 2, 3, 3.5, 5])
+    turns = Rotation.from_rotvec(np.multiply.outer(largest * t / 5, [0.6, 0.0, 0.8])) * Rotation.from_euler("x", 0.4)
+    spline = ss.CubicSpline(t, (turns.as_matrix(), np.stack([t, t**2, np.sin(t)], axis=1)), "so:3 x r:3")
+    texts = texts_of(rendered(spline.plot()))
+    assert {"SpecialOrthogonal(3), rotations", "Euclidean(3), vectors"} <= set(texts)
+    assert "C² spline of rotations and vectors" in texts
+    name = {2.0: "start of the curve", 4.5: "middle rotation"}.get(largest)
+    assert (f"rotation vector log(R R₀ᵀ) in rad, R₀: {name}" in texts) == (name is not None)
+    assert ("first axis" in texts) == (name is None)
+    if name is not None:
+        figure = spline.plot()
+        dots = [line.get_ydata() for axes in figure.axes[:3] for line in axes.lines if role(line) == "given points"]
+        middle = 0.0 if largest == 2.0 else largest / 2
+        expected = np.multiply.outer([0.6, 0.0, 0.8], largest * t / 5 - middle)
+        np.testing.assert_allclose(dots, expected, atol=1e-9 if largest == 2.0 else 0.03)
+        # Positions are graphs beside them.
+        assert axes_named(figure, "x₁").get_gid() == axes_named(figure, "x₃").get_gid() == "time"
+        spans = [np.ptp(axes.get_ylim()) for axes in figure.axes[:3]]
+        np.testing.assert_allclose(spans, spans[0])
