@@ -180,7 +180,7 @@ ROWS = [
         "Remark 2.3, (14), (15)",
         "differences in Euclidean space",
         "CubicSpline",
-        "tests/fit/test_curve_laws.py::test_flat_space_is_scipy",
+        "tests/fit/test_curve_laws.py::test_flat_space_of_splines_is_scipy",
         "theory/c2_condition.md theorem.md",
     ),
     Row(
@@ -236,7 +236,7 @@ ROWS = [
         "Theorem 3.1",
         "linear convergence of Algorithm 1",
         "Report.invariant_radius Report.contraction_bound",
-        f"{CERTIFICATE}test_algorithm_1_stays_within",
+        "tests/evidence/test_theorem_3_1.py::test_algorithm_1_stays_within",
         "theory/convergence.md convergence.md",
         source="fit/certificate.rs::invariant_radius fit/certificate.rs::contraction_bound",
     ),
@@ -251,7 +251,7 @@ ROWS = [
         "Section 4.1, compact groups",
         "the structure (G × G)/G of any compact group",
         "SpecialOrthogonal SpecialUnitary Unitary",
-        "tests/spaces/test_identities.py::test_so4_is_two_quaternions",
+        "tests/evidence/test_so4.py::test_so4_is_two_quaternions",
         "totally-geodesic.md",
     ),
     Row(
@@ -399,7 +399,7 @@ ROWS = [
         "Proposition C.1",
         "invariant region",
         "Report.invariant_radius",
-        f"{CERTIFICATE}test_algorithm_1_stays_within",
+        "tests/evidence/test_theorem_3_1.py::test_algorithm_1_stays_within",
         f"theory/convergence.md {REGION}",
     ),
     Row(

@@ -157,3 +157,22 @@ def test_functions_may_return_arrays_that_cannot_be_written_to(ends):
     bc = ends_on(ends, ST52, p)
     curves = [ss.CubicSpline(None, p, one, bc_type=bc) for one in (ST52, space)]
     assert np.abs(curves[0](1.3) - curves[1](1.3)).max() <= 1e-9
+
+
+def pulled_back(p, q, w):
+    """E_p(−v) in place of D log, on Stiefel manifolds: then the condition is (13) of the paper."""
+    v = ST52.log(p, q)
+    a = np.swapaxes(p, -1, -2) @ v
+    half = v - p @ a / 2
+    omega = half @ np.swapaxes(p, -1, -2) - p @ np.swapaxes(half, -1, -2)
+    return ss.SpecialOrthogonal(5).exp(np.eye(5), -omega) @ w
+
+
+def test_equation_13_is_not_enough():
+    """The paper's outlook expects (13) to hold on reductive spaces. It has a solution, which is not C²."""
+    p = walk(ST52, 0.8, 8, 11)
+    space = ss.Manifold(**ST52.functions._asdict() | {"dlog": pulled_back}, point_shape=(5, 2))
+    wrong = ss.CubicSpline(None, p, space)
+    assert wrong.report.residual <= 1e-12
+    assert jump(wrong) > 0.02
+    assert jump(ss.CubicSpline(None, p, ST52)) < 1e-10

@@ -66,13 +66,6 @@ def has_title(figure, kind, space):
     return any(text.startswith(kind) and text.endswith((f" on {space!r}", f" on {space}")) for text in texts_of(figure))
 
 
-def legend_of(figure):
-    """The legend of a page: artists by their names."""
-    (body,) = figure.subfigs
-    (legend,) = body.legends
-    return dict(zip([own.get_text() for own in legend.get_texts()], legend.legend_handles, strict=True))
-
-
 def texts_of(figure):
     return [text.get_text() for text in figure.findobj(matplotlib.text.Text)]
 

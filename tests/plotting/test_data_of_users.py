@@ -4,9 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from drawn import axes_named, lines_of, rate_axes, rendered, role, spline_on, texts_of
-from matplotlib.dates import date2num
 from matplotlib.figure import Figure
-from refused import raises
 
 import symspline as ss
 
@@ -40,27 +38,6 @@ def test_segments_near_noisy_points_show_their_data_and_bands(shift, rng):
             for edge, i in ((first, 0), (last, -1)):
                 width = np.ptp(path.vertices[path.vertices[:, 0] == edge][:, 1])
                 assert width == pytest.approx(2 * 1.96 * segment.std(segment.t[i], nu=nu), rel=2e-3)
-
-
-def test_data_of_segments_with_dates_of_their_own(rng):
-    t = np.datetime64("2024-03-01") + np.arange(40) * np.timedelta64(6, "h")
-    y = np.sin(np.arange(40) / 3)[:, None] + 0.1 * rng.standard_normal((40, 1))
-    parts = [ss.make_smoothing_spline(t[i], y[i], "r:1") for i in (slice(0, 15), slice(25, 40))]
-    axes = axes_named(ss.SegmentedCurve(parts).plot(), "x")
-    seen = np.concatenate([line.get_xydata() for line in axes.lines if role(line) == "data"])
-    np.testing.assert_allclose(seen, np.column_stack([date2num(t), y[:, 0]])[[*range(15), *range(25, 40)]])
-
-
-def test_gaps_are_those_of_all_curves():
-    t = np.arange(100.0)
-    some = np.concatenate([t[:20], t[60:]])
-    whole, part = (ss.CubicSpline(x, np.sin(x / 5)[:, None], "r:1") for x in (t, some))
-    figure = rendered(ss.plot([whole, part], labels=["a", "b"]))
-    assert not any("without data" in text for text in texts_of(figure))
-    assert not [own for axes in figure.axes for own in axes.collections if role(own) == "gap"]
-    other = ss.CubicSpline(np.delete(t, range(15, 50)), np.delete(t, range(15, 50))[:, None], "r:1")
-    figure = rendered(ss.plot([part, other]))
-    assert any(text.startswith("gap of 31 without data") for text in texts_of(figure))
 
 
 def test_dates_with_a_time_zone_are_in_utc():
@@ -123,16 +100,6 @@ def test_labels_and_colours_in_axes_of_the_user_distinguish_curves():
     assert labels == ["A: x₁", "A: x₂", "B: x₁", "B: x₂"]
     assert [own.get_color() for own in handles] == ["red", "red", "blue", "blue"]
     assert handles[0].get_linestyle() != handles[1].get_linestyle()
-
-
-@pytest.mark.parametrize("name", ["so:3", "spd:2"])
-def test_symbols_are_not_drawn_over_others(name):
-    ax = Figure().add_subplot()
-    spline_on(name).plot(ax=ax, label="A")
-    assert [own.get_text() for own in ax.get_yticklabels()] == ["A: given", "A: curve"]
-    if name == "so:3":
-        assert ax.get_legend_handles_labels()[1] == ["first axis", "second axis", "third axis"]
-    raises("ax already contains a picture, and symbols of several curves would overlap", spline_on(name).plot, ax=ax)
 
 
 def test_data_have_one_entry_in_legends(rng):

@@ -51,11 +51,6 @@ def test_every_kind_of_curve_is_drawn(kind, name):
         np.testing.assert_allclose(np.abs(line[::7, 1]), norm, atol=1e-6)
 
 
-def test_notebooks_show_every_kind():
-    for make in CURVES.values():
-        assert "<img" in make("euclidean:2")._repr_html_()
-
-
 def test_given_points_of_a_part_are_those_of_the_whole():
     """The ends of a part are not given points; those between are."""
     part = spline_on("r:2", t=T).restrict(0.5, 3.5)
@@ -105,13 +100,6 @@ def test_times_far_from_zero_are_differences_from_a_round_number(t, name, ends):
     axes = axes_named(rendered(spline_on("r:2", t=t).plot()), "acceleration")
     assert axes.get_xlabel() == name and axes.xaxis.get_offset_text().get_text() == ""
     np.testing.assert_allclose(lines_of(axes)[0][[0, -1], 0], ends, atol=1e-6)
-
-
-def test_curves_with_their_own_times_have_no_quantiles():
-    t = T + np.linspace(0, 1, 12)[:, None]
-    figure = rendered(spline_on("r:1", (12, 6), t).plot())
-    assert not any("5–95 %" in text for text in texts_of(figure))
-    assert len(lines_of(figure.axes[0])) == 3
 
 
 @pytest.mark.parametrize(

@@ -144,32 +144,6 @@ def test_graphs_show_nothing_in_a_gap_that_no_data_determine():
     assert np.abs(axes_named(figure, "x₁").get_ylim()).max() < 1.5
 
 
-def test_legends_of_gaps_are_true():
-    """Ellipses are drawn in a gap, and angles of a circle are not."""
-    t = np.array([0.0, 1, 2, 3, 20, 21, 22, 23])
-    matrices = np.array([np.diag([1 + 0.1 * x, 2.0]) for x in t])
-    figure = rendered(ss.CubicSpline(t, matrices, "spd:2").plot())
-    assert "gap of 17 without data, rates not drawn" in texts_of(figure)
-    circle = np.stack([np.cos(0.1 * t), np.sin(0.1 * t)], axis=-1)
-    figure = rendered(ss.CubicSpline(t, circle, "sphere:1").plot())
-    assert "gap of 17 without data, rates not drawn" in texts_of(figure)
-    x, y = np.concatenate([line.get_xydata() for line in axes_named(figure, "angle, degrees").lines]).T
-    assert not np.any((x > 3) & (x < 20) & np.isfinite(y))
-
-
-def test_numbers_far_from_zero_are_differences_from_a_round_number():
-    t = np.arange(6.0)
-    points = np.stack([5e5 + t, -5e6 - t, t], axis=-1)
-    turns = np.broadcast_to(np.eye(3), (6, 3, 3))
-    t[3:] += 30
-    figure = rendered(ss.CubicSpline(t, (turns, points), "so:3 x r:3").plot())
-    for name, start in (("x₁ − 500000", 5e5), ("x₂ + 5000010", -5000010)):
-        axes = axes_named(figure, name)
-        (dots,) = [line for line in axes.lines if role(line) == "given points"]
-        np.testing.assert_allclose(dots.get_ydata(), points[:, 0 if start > 0 else 1] - start)
-    assert axes_named(figure, "x₃")
-
-
 def test_frames_stand_on_the_path():
     spline = spline_on("se:3", (5,))
     axes = rendered(spline.plot()).axes[0]

@@ -1,10 +1,12 @@
 """The Hamiltonian of a curve: it drives the states, no smaller one does, and it is as smooth as the velocity."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from curves import points_on
 from refused import raises
-from scipy.integrate import solve_ivp
+from scipy.integrate import quad_vec, solve_ivp
 
 import symspline as ss
 from symspline.quantum import hamiltonian
@@ -109,3 +111,14 @@ def test_spaces_without_hamiltonian_raise():
     raises(r"Sphere\(2\) does not define a Hamiltonian; use Compl", hamiltonian, sphere, 0.5)
     for nu in (2, True, -1, "1", None):
         raises("nu must be 0 or 1, not", hamiltonian, curve("cp:1"), 0.5, nu=nu)
+
+
+@pytest.mark.parametrize("name", STATES)
+def test_changes_cost_twice_the_bending_energy(name):
+    spline = curve(name)
+
+    def power(t):
+        return np.sum(np.abs(hamiltonian(spline, t, nu=1)) ** 2)
+
+    total = sum(quad_vec(power, a, b, epsrel=1e-12)[0] for a, b in pairwise(KNOTS))
+    assert total == pytest.approx(2 * spline.bending_energy(), rel=1e-11)

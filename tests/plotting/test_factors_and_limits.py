@@ -1,19 +1,10 @@
-"""Pictures in small axes and on small pages, dark styles, and the space that boxes fill."""
+"""Products with equal factors, angles of tori, limits of time laws, and noise on the Earth."""
 
-import matplotlib.style
 import numpy as np
 import pytest
 from drawn import axes_named, rate_axes, rendered, role, texts_of
 
 import symspline as ss
-
-# ---- small axes and pages ----
-
-
-# ---- boxes ----
-
-
-# ---- numbers on axes, factors and limits ----
 
 
 def test_equal_factors_have_numbers():
@@ -80,12 +71,3 @@ def test_noise_on_the_earth_is_in_metres():
     spline = ss.make_smoothing_spline(np.arange(40.0), ss.geo.from_lonlat(lon, lat), "sphere:2")
     (words,) = [text for text in texts_of(ss.geo.plot(spline)) if "noise" in text]
     assert float(words.split("noise ")[1].split(" m")[0]) == pytest.approx(6371008.8 * float(spline.sigma), rel=0.01)
-
-
-# ---- dark styles ----
-
-
-@pytest.fixture
-def dark():
-    with matplotlib.style.context("dark_background"):
-        yield
