@@ -19,6 +19,7 @@ def test_without_arguments_help_is_printed(capsys):
     assert out.startswith("usage: symspline") and "  fit " in out and not err
 
 
+@pytest.mark.slow
 def test_completion():
     pytest.importorskip("shtab")
     line = [sys.executable, "-m", "symspline", "--print-completion"]

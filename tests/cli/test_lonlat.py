@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 from tabular import FIXES, TRACK, numbers, table, write
 
 import symspline as ss
@@ -63,6 +64,7 @@ def test_lonlat_of_a_curve_that_was_made_in_python(run, fails):
     assert fails("sample c.npz -n 3 --lonlat -o b.csv") == "--lonlat is for sphere:2, not for euclidean:1"
 
 
+@pytest.mark.slow
 def test_tracks_are_drawn_on_the_earth(run, fails):
     write("a.csv", TRACK)
     run("fit a.csv --lonlat -o a.npz")

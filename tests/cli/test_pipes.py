@@ -20,6 +20,7 @@ def process(line, given=b"", **options):
     return subprocess.run(command, input=given, capture_output=True, timeout=60, **options)
 
 
+@pytest.mark.slow
 def test_a_pipe_of_two_commands():
     fitted = process("fit - --space s:2 -o -", AXES.encode())
     assert fitted.returncode == 0
@@ -34,6 +35,7 @@ def test_a_pipe_of_two_commands():
     np.testing.assert_array_equal(found[:, 1:], ss.load("a.npz")(found[:, 0]))
 
 
+@pytest.mark.slow
 def test_results_are_alone_on_standard_output():
     fitted = process("fit - --from csv --space s:2 -o - -q", AXES.encode())
     assert fitted.stderr == b""

@@ -47,6 +47,7 @@ def assert_transpose(spline, change, x, rng, orders=(0, 1, 2)):
         spline.space.check_tangent(spline.points, gradient.points)
 
 
+@pytest.mark.slow
 @grouped("case, end", EACH | FURTHER)
 def test_derivatives_match_finite_differences(case, end):
     rng = np.random.default_rng(5)
@@ -64,6 +65,7 @@ def test_the_gradient_is_the_transpose(case, end):
     assert_transpose(ss.CubicSpline(t, points, space, bc_type=bc), change, x, rng)
 
 
+@pytest.mark.slow
 def test_flat_derivatives_match_scipy():
     """The curve is linear in points there: a column of a jvp is a cardinal spline."""
     scipy = pytest.importorskip("scipy.interpolate")

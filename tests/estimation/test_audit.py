@@ -180,6 +180,7 @@ def test_faults_are_found_and_named(fault):
     assert len([own for own in caught if "do not agree" in str(own.message)]) == 1
 
 
+@pytest.mark.slow
 def test_degrees_for_radians_are_named():
     truth, (points, rates) = recording(4)
     rates.omega = np.degrees(rates.omega)

@@ -56,6 +56,7 @@ def inertial(s, omega, force, **options):
     ]
 
 
+@pytest.mark.slow
 def test_position_and_imu():
     """Attitude and both biases from positions and an IMU; `se:3` gives what the product gives."""
     turn, path, bias, s, g, omega, force, y = imu(0)
@@ -94,6 +95,7 @@ def test_spinning_bodies():
         assert sensors.rms(SO3.distance(curve(t), turned)) < 0.03
 
 
+@pytest.mark.slow
 def test_unknown_attitude_and_large_bias_of_the_gyro():
     """The initial attitude follows from accelerations, although the integral of the rates drifts by several radians."""
     for seed in (31, 32, 33):

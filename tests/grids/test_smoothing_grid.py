@@ -167,6 +167,7 @@ def test_one_lam_can_be_given(rng):
 
 
 # Some of the surfaces are geodesic along one axis.
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::symspline.SmoothingWarning")
 def test_standard_deviations_cover_the_truth(rng):
     """On a curved space; on flat ones they are exact, see above."""
@@ -290,6 +291,7 @@ def test_spaces(rng, name):
     assert isinstance(grid.lam[0], float)
 
 
+@pytest.mark.slow
 def test_poses_are_smoothed_as_rotations_and_positions(rng):
     u, v = np.linspace(0, 1, 8), np.linspace(0, 1, 9)
     poses = np.zeros((8, 9, 4, 4))
@@ -460,6 +462,7 @@ def test_rows_that_fail(rng, monkeypatch, on_failure):
     assert np.isfinite(grid.points).all()
 
 
+@pytest.mark.slow
 def test_lam_at_a_bound_warns():
     line = (U[:, None] + np.sin(V))[..., None]
     with pytest.warns(ss.SmoothingWarning, match="along axis 0 chose a lam so large that rows are geodesics"):

@@ -75,6 +75,7 @@ def check_rates_of_poses(figure, space, curves):
             np.testing.assert_allclose(other[200:-200:50, 1], moved, atol=1e-4)
 
 
+@pytest.mark.slow
 def test_the_heading_counts_curves():
     figure = spline_on("r:2", (7, 10, 4)).plot()
     assert len(lines_of(axes_named(figure, "speed"))) == 3
@@ -131,6 +132,7 @@ def test_dates_of_every_curve_and_whole_numbers():
     np.testing.assert_array_equal(lines_of(axes)[0][[0, -1], 0], [0, 3e9])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", [(5,), (3, 5)], ids=["one curve", "batch"])
 @pytest.mark.parametrize("name", ["sphere:2 x h:2", "sphere:2 x sphere:3 x h:2 x r:4", "cp:1 x gr:2,3 x spd:3 x u:3"])
 def test_product_has_a_picture_a_factor(name, shape):
@@ -150,6 +152,7 @@ def test_product_has_a_picture_a_factor(name, shape):
     assert len(figure.axes) == 3 * len(space.factors) + more
 
 
+@pytest.mark.slow
 def test_figure_is_saved(tmp_path):
     spline = spline_on("r:2")
     for suffix, start in (("png", b"\x89PNG"), ("pdf", b"%PDF"), ("svg", b"<?xml")):
@@ -176,6 +179,7 @@ def test_without_matplotlib(monkeypatch):
     raises(r"^plots need matplotlib.*pip install 'symspline\[plot\]'$", spline_on("r:2").plot, error=ImportError)
 
 
+@pytest.mark.slow
 def test_nothing_global_is_touched(tmp_path):
     code = """
 import sys, warnings

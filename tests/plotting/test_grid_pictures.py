@@ -161,6 +161,7 @@ def test_fields_without_extent(name):
     rendered(grid_on(name, points).plot())
 
 
+@pytest.mark.slow
 def test_products_have_a_panel_per_factor():
     points = smooth_field("so:3"), smooth_field("r:3"), smooth_field("r:1")
     grid = ss.GridSpline((U, V), points, "so:3 x r:3 x r:1")

@@ -88,6 +88,7 @@ def test_small_rotations_are_graphs(name, size):
     moving._func(0.5)
 
 
+@pytest.mark.slow
 def test_covariances_are_standard_deviations_and_correlations():
     spline = spline_on("spd:4", (5,))
     figure = rendered(spline.plot())

@@ -118,6 +118,7 @@ def test_no_line_jumps_across_the_half_sphere(name, points, crosses):
         assert np.nanmin(np.linalg.norm(line - dot, axis=1)) < 1e-12
 
 
+@pytest.mark.slow
 def test_closed_curves_have_no_end():
     turn = np.linspace(0, 2 * np.pi, 9)
     points = np.stack([np.cos(turn), np.sin(turn), 0.3 * np.sin(turn)], axis=1)

@@ -49,6 +49,7 @@ def recorded(name, kind, n, seed, outliers, sigma=0.05):
     return space, t, truth, noisy, bad
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "loss"), [("r:2", "huber"), ("sphere:2", "cauchy"), ("so:3", "huber")])
 @pytest.mark.parametrize("outliers", [False, True])
 def test_robust_losses_at_irregular_times(name, outliers, loss):
@@ -289,6 +290,7 @@ def vibration(n, cycle, rng):
 
 
 # The amplitude of closed curves varies.
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:.*the residuals are larger between:symspline.SmoothingWarning")
 @pytest.mark.parametrize(
     ("name", "variant"),
@@ -430,6 +432,7 @@ def with_gap(name, missing, seed, n=1500):
     return space, t, noisy, weights
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("missing", "name"), [(0.1, "se:3"), (0.1, "r:2"), (0.3, "sphere:2"), (0.6, "so:3"), (0.6, "se:3")]
 )

@@ -59,6 +59,7 @@ def test_sphere(n, length, rng):
     compare(space, Sphere(), p, length * unit_tangent(space, p, rng), x)
 
 
+@pytest.mark.slow
 @loop_over("length", [*LENGTHS, 2.5])
 @pytest.mark.parametrize("name", ["u:3", "su:3", "so:3", "so:5", "o:4"])
 def test_groups(name, length, rng):
@@ -135,6 +136,7 @@ def test_subspaces_near_a_right_angle(name, gap, rng):
     compare(space, Subspaces(), p, v, x, log_size=1 / gap if name[0] == "c" else 1.0)
 
 
+@pytest.mark.slow
 @loop_over("condition", [1.0, 1e6, 1e12])
 @loop_over("length", [1e-8, 0.1, 4.0])
 @pytest.mark.parametrize("name", ["spd:3", "hpd:3"])

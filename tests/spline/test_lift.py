@@ -93,36 +93,6 @@ def test_lift_does_not_depend_on_representatives(name, rng):
             np.testing.assert_allclose(b.lift(x, points[0], nu=nu), expected, rtol=0, atol=3e-13 * size)
 
 
-def test_the_holonomy_of_a_closed_curve_is_half_the_enclosed_area():
-    """Berry's phase on CP¹, −Ω/2, of a curve along a circle of latitude; then round again."""
-    t = np.linspace(0, 1, 41)
-    polar = 1.1
-    kets = np.stack([np.full(41, np.cos(polar / 2)), np.sin(polar / 2) * np.exp(2j * np.pi * t)], axis=-1)
-    spline = ss.CubicSpline(t, kets, "cp:1", bc_type="periodic")
-    # The area inside the curve itself, which is a circle but for 1e-6: ∫ (1 − z) dφ over its Bloch vectors.
-    x = (np.arange(4000) + 0.5) / 4000
-    ket, rate = spline(x), spline(x, nu=1)
-    vector, moving = bloch(ket, ket), 2 * bloch(ket, rate)
-    area = np.mean((1 - vector[2]) * (vector[0] * moving[1] - vector[1] * moving[0]) / (1 - vector[2] ** 2))
-    assert area == pytest.approx(2 * np.pi * (1 - np.cos(polar)), abs=1e-5)
-    for turns in (1, 2, -1, 7):
-        phase = np.vdot(kets[0], spline.lift(float(turns)))
-        assert phase == pytest.approx(np.exp(-0.5j * turns * area), abs=1e-12)
-        assert np.vdot(kets[0], spline.lift(turns + 1e-9)) == pytest.approx(phase, abs=1e-8)
-
-
-def bloch(a, b):
-    """Re ⟨a|σ|b⟩"""
-    a = a.conj()
-    return np.real(
-        [
-            a[..., 0] * b[..., 1] + a[..., 1] * b[..., 0],
-            -1j * a[..., 0] * b[..., 1] + 1j * a[..., 1] * b[..., 0],
-            a[..., 0] * b[..., 0] - a[..., 1] * b[..., 1],
-        ]
-    )
-
-
 def test_a_line_field_of_half_turns_comes_back_with_the_other_sign():
     angle = np.linspace(0, np.pi, 9)
     spline = ss.CubicSpline(None, np.stack([np.cos(angle), np.sin(angle)], axis=-1), "rp:1", bc_type="periodic")
