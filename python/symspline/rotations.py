@@ -38,7 +38,7 @@ from ._estimation.rates import integrated
 from ._estimation.uncertainty import Jacobians, Motion, check_uncertain, standard_errors
 from ._smoothing.noise import smoothed_spaces
 from ._spaces import Array, Doubles, SpecialEuclidean, SpecialOrthogonal, Sphere, cover_of
-from ._spaces.point_groups import elements, proper_symbol
+from ._spaces.finite_groups import elements, proper_symbol
 from ._splines.base import check_timed
 from ._splines.bsplines import CumulativeBSpline
 from ._splines.cubic import CubicSpline

@@ -79,7 +79,7 @@ def test_not_enough_memory(curves, fails, monkeypatch):
 
 def test_progress_on_a_terminal(curves, capsys, monkeypatch):
     monkeypatch.setattr("symspline.cli._messages._WAIT", 0)
-    monkeypatch.setattr("symspline.cli._formats._WRITTEN", 2000)
+    monkeypatch.setattr("symspline.cli._tables._WRITTEN", 2000)
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
     assert main(shlex.split("sample a.npz -n 5000 -o b.csv")) == 0
     shown = capsys.readouterr().err

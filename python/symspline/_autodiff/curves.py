@@ -8,16 +8,15 @@ from __future__ import annotations
 
 from typing import Any
 
+from .. import _spaces
 from .._base.arrays import short_repr
 from .._core import ValidationError
 from .._curves.options import order_of
 from .._spaces import Product, Space, parts_of, refuse_quotients, space_named
-from . import casteljau
 from .compiled import split
 from .condition import Problem, chain_of
-from .library import Library
-from .models import Model
-from .registry import model_of
+from .library import Library, adjoint
+from .models import QUOTIENTS, Model, model_of
 
 
 def named(lib: Library, space: Space[Any] | str) -> Space[Any]:
@@ -114,7 +113,7 @@ def _values(model: Model, space: Space[Any], t: Any, points: Any, velocities: An
     """Return values of shape (times, *batch, *point_shape)."""
     lib, xp = model.lib, model.lib.xp
     h = t[1:] - t[:-1]
-    polygons = casteljau.control(model, h, *model.to_internal(points, velocities))
+    polygons = _control(model, h, *model.to_internal(points, velocities))
     x = xp.broadcast_to(x[(..., *(None,) * (t.ndim - 1))], (len(x), *t.shape[1:]))
     at = xp.moveaxis(lib.search(xp.moveaxis(t, 0, -1), xp.moveaxis(x, 0, -1)), -1, 0)
     segment = xp.clip(at - 1, 0, len(h) - 1)
@@ -122,7 +121,7 @@ def _values(model: Model, space: Space[Any], t: Any, points: Any, velocities: An
     starts, handles = (_rows(lib, a, segment) for a in polygons)
 
     def curve(x: Any) -> Any:
-        return model.from_internal(casteljau.bezier(model, starts, handles, (x - begin) / length))
+        return model.from_internal(_bezier(model, starts, handles, (x - begin) / length))
 
     def velocity(x: Any) -> Any:
         return lib.along(curve, x)
@@ -130,10 +129,10 @@ def _values(model: Model, space: Space[Any], t: Any, points: Any, velocities: An
     if nu == 0:
         found = curve(x)
     elif nu == 1:
-        found = casteljau.velocity(space, *velocity(x))
+        found = _velocity(space, *velocity(x))
     else:
         (point, first), (_, second) = lib.along(velocity, x)
-        found = casteljau.acceleration(lib, space, point, first, second)
+        found = _acceleration(lib, space, point, first, second)
     # As in `symspline._base.time.onto_ends`, a few units in the last place beyond the ends are rounding.
     reach = 4 * xp.finfo(x.dtype).eps * xp.maximum(abs(t[0]), abs(t[-1]))
     inside = (x >= t[0] - reach) & (x <= t[-1] + reach)
@@ -146,3 +145,87 @@ def _rows(lib: Library, polygons: Any, segment: Any) -> Any:
         # All curves have the same knots.
         return polygons[:, segment.reshape(-1)]
     return lib.take_along(polygons, segment[(None, ..., *(None,) * (polygons.ndim - 1 - segment.ndim))], 1)
+
+
+# ---- de Casteljau's algorithm for cubic Bézier curves of geodesics, (8) of the paper, and covariant derivatives ----
+
+_COLUMN = (_spaces.Sphere, _spaces.RealProjective, _spaces.ComplexProjective)
+_COLUMNS = (_spaces.Grassmannian, _spaces.ComplexGrassmannian, _spaces.QuaternionicProjective)
+_LORENTZ = (_spaces.Hyperbolic, _spaces.ComplexHyperbolic)
+
+
+def _control(model: Model, h: Any, points: Any, velocities: Any) -> tuple[Any, Any]:
+    """Return the starts of the three geodesics of every control polygon, and their velocities.
+
+    The first geodesic leads from the first point to the first handle, the second joins the handles, and the third leads
+    from the last point to the second handle. The geodesics of one stage are one computation, because JAX compiles each
+    computation.
+    """
+    stack = model.lib.xp.stack
+    p, q = points[:-1], points[1:]
+    handles = stack([model.times(h / 3, velocities[:-1]), model.times(-h / 3, velocities[1:])])
+    inner = model.exp(stack([p, q]), handles)
+    return stack([p, inner[0], q]), stack([handles[0], model.log(inner[0], inner[1]), handles[1]])
+
+
+def _bezier(model: Model, starts: Any, handles: Any, s: Any) -> Any:
+    """Evaluate curves at s between 0 and 1, with control polygons as `_control` returns them."""
+    stack = model.lib.xp.stack
+    a, b, c = model.exp(starts, model.times(stack([s, s, 1 - s]), handles))
+    left, right = model.between(stack([a, b]), stack([b, c]), s)
+    return model.between(left, right, s)
+
+
+def _velocity(space: Space, point: Any, first: Any) -> Any:
+    """Return the velocity of a curve from the derivative of its arrays."""
+    return _horizontal(space, point, first) if isinstance(space, QUOTIENTS) else first
+
+
+def _acceleration(lib: Library, space: Space, point: Any, first: Any, second: Any) -> Any:
+    """Return the covariant acceleration of a curve from the derivatives of its arrays."""
+    if isinstance(space, QUOTIENTS):
+        return _horizontal(space, point, first, second)
+    return second - second_fundamental_form(lib.xp, space, point, first, first)
+
+
+def _horizontal(space: Space, y: Any, first: Any, second: Any = None) -> Any:
+    """Return (I − YY*)Y', or the acceleration (I − YY*)(Y'' − 2Y'(Y*Y')), for any representatives Y of a curve."""
+    if len(space.point_shape) == 1:
+        columns = (None if a is None else a[..., None] for a in (y, first, second))
+        return _horizontal_columns(*columns)[..., 0]
+    return _horizontal_columns(y, first, second)
+
+
+def _horizontal_columns(y: Any, first: Any, second: Any) -> Any:
+    change = first if second is None else second - 2 * first @ (adjoint(y) @ first)
+    return change - y @ (adjoint(y) @ change)
+
+
+def second_fundamental_form(xp: Any, space: Space, point: Any, vector: Any, motion: Any) -> Any:
+    """Return the derivative of a field of tangent vectors as arrays, minus its covariant derivative.
+
+    Of unit vectors, and of k orthonormal columns X, it is −X Ẋ*V, which keeps X*V = 0 (minus the second fundamental
+    form). A field gΩ on a group has the covariant derivative g(Ω' + ½[ω, Ω]) where g moves by gω, and the array
+    g(Ω' + ωΩ) as derivative: that is ½g(ωΩ + Ωω) more, or ½(ġ g⁻¹V + V g⁻¹ġ); the same holds for positive definite
+    matrices, whose covariant acceleration is γ'' − γ'γ⁻¹γ'.
+
+    Parameters
+    ----------
+    point : array, shape (..., *point_shape)
+        The point γ.
+    vector : array
+        The field at γ.
+    motion : array
+        The velocity of γ. The result is linear in it.
+    """
+    if isinstance(space, _spaces.Euclidean):
+        return xp.zeros_like(motion)
+    if isinstance(space, _COLUMN):
+        return -point * (motion.conj() * vector).sum(axis=-1, keepdims=True)
+    if isinstance(space, _LORENTZ):
+        products = motion.conj() * vector
+        return point * (products[..., 1:].sum(axis=-1, keepdims=True) - products[..., :1])
+    if isinstance(space, _COLUMNS):
+        return -point @ (adjoint(motion) @ vector)
+    inverse = xp.linalg.inv(point)
+    return 0.5 * (motion @ inverse @ vector + vector @ inverse @ motion)

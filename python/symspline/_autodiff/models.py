@@ -10,8 +10,18 @@ from typing import Any
 
 import numpy as np
 
+from .. import _spaces
 from .._base.angles import Rows, quaternion_rows, rotation_rows
+from .._spaces import Space
 from .library import Library, adjoint, hermitian
+
+QUOTIENTS = (
+    _spaces.RealProjective,
+    _spaces.ComplexProjective,
+    _spaces.Grassmannian,
+    _spaces.ComplexGrassmannian,
+)
+"""Spaces whose points have many representatives."""
 
 
 class Model:
@@ -351,3 +361,27 @@ def _about_third(lib: Library, matrix: Any, corner: float) -> Any:
     (a, b), (c, d) = ([matrix[..., i, j] for j in range(2)] for i in range(2))
     zero = lib.xp.zeros_like(a)
     return _matrices(lib, ((a, b, zero), (c, d, zero), (zero, zero, zero + corner)))
+
+
+# ---- the models of spaces ----
+
+
+def model_of(lib: Library, space: Space[Any]) -> Model | None:
+    """Return the model of a space, which is not a product; None if there is none."""
+    if not lib.general and (space.dtype.kind == "c" or isinstance(space, QUOTIENTS)):
+        return None
+    if isinstance(space, _spaces.Euclidean):
+        return Model(lib)
+    if isinstance(space, _spaces.Sphere):
+        return Curved(lib, 1)
+    if isinstance(space, _spaces.Hyperbolic):
+        return Curved(lib, -1)
+    if isinstance(space, QUOTIENTS):
+        return Lines(lib) if len(space.point_shape) == 1 else Planes(lib)
+    if isinstance(space, (_spaces.SymmetricPositiveDefinite, _spaces.HermitianPositiveDefinite)):
+        return Positive(lib)
+    if isinstance(space, _spaces.SpecialOrthogonal) and space.point_shape[0] in (2, 3):
+        return Rotations(lib, space.point_shape[0])
+    if isinstance(space, _spaces.SpecialEuclidean):
+        return Poses(lib, space.point_shape[0] - 1)
+    return None

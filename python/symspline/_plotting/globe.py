@@ -1,4 +1,7 @@
-"""A globe seen from far away with its graticule, an enlarged part of it, and the land of the Earth.
+"""Views of a globe: curves on S², states of a qubit, and lines and planes through the origin of R³.
+
+A line through the origin meets the upper hemisphere in one point, and a plane is represented by its normal. Opposite
+points of the rim are the same line: a curve that leaves the hemisphere there returns on the other side.
 
 The file ``land.npz`` has the 128 rings of ``ne_110m_land`` of Natural Earth (https://www.naturalearthdata.com), which
 is in the public domain: coastlines at 1:110 million and the shore of the Caspian Sea. The array ``points`` has
@@ -8,7 +11,7 @@ first. Rings are counterclockwise, and the Caspian Sea is clockwise. Equal neigh
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -23,7 +26,22 @@ from numpy.typing import NDArray
 
 from .._base.angles import from_lonlat, to_lonlat
 from .._spaces import Euclidean, Space
-from .style import MARK, Array, closest, halo, ink, paper
+from .curves import Curve
+from .panels import (
+    CIRCLE,
+    FAR,
+    Panel,
+    View,
+    disc_indices,
+    draw_arrows,
+    draw_dots,
+    draw_end,
+    draw_line,
+    draw_polygon,
+    draw_tube,
+    fresh,
+)
+from .style import MARK, Array, axes_size, closest, halo, ink, note, paper, plain, round_below, window
 
 LAND = 0.13
 """Share of the colour of text in that of land."""
@@ -296,3 +314,351 @@ def draw_land_on_map(axes: Axes) -> None:
     whole = Outline.make_compound_path(*map(Outline, rings()))
     look: Any = {"facecolor": ink(LAND), "edgecolor": ink(0.4), "linewidth": 0.4, "zorder": 0.5, "label": "_land"}
     axes.add_artist(PathPatch(whole, **look))
+
+
+_SMALL, _SMALL_ON_SPHERE = np.radians([25, 50])
+"""The largest distance from the middle of curves that are drawn in a frame, and of those on S²."""
+_COARSE = np.radians(2)
+"""Frames narrower than this have no land, as the coastlines are too coarse."""
+_WIDEST = 1.5
+_FREE = 60
+"""The smallest range of longitudes without curves, in degrees, that becomes the edges of a map."""
+_PART = 120
+"""Maps of curves in a smaller range, from the middle in degrees, are parts of the whole one."""
+_POLE = 60
+"""Neighbouring samples are on both sides of a pole if their longitudes differ by more degrees."""
+_NORTH = np.array([0.0, 0.0, 1.0])
+_TWICE = "\nangles on it are twice the distances of states"
+_BLOCH = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "|0⟩": (0.0, 0.0, 1.0), "|1⟩": (0.0, 0.0, -1.0)}
+_AXES = {"x₁": (1.0, 0.0, 0.0), "x₂": (0.0, 1.0, 0.0), "x₃": (0.0, 0.0, 1.0)}
+
+
+# ---- the views ----
+
+
+def sphere(curves: Sequence[Curve]) -> View:
+    """Return the view of curves on S²: a globe and a map of longitudes and latitudes, or a part of the globe."""
+    look: Any = {"has_band": True, "has_many": True, "is_turned": True}
+    if _frame(_extent(curves), _SMALL_ON_SPHERE, 1.0) is not None:
+        return View(_draw_sphere, **look)
+    return View(_draw_sphere, 11.4, 4.6, rows=2, **look)
+
+
+def _extent(curves: Sequence[Curve], faint: bool = True) -> Array:
+    """Return the points of all curves, or of those that have given points."""
+    return np.concatenate([own.extent for own in curves if faint or not own.faint])
+
+
+def _draw_sphere(panel: Panel, curves: Sequence[Curve]) -> None:
+    """Draw curves on a globe and, if there are axes for it, on a map. Those on the Earth have land and a scale bar."""
+    radius, axes = curves[0].radius, panel.axes[0]
+    globe, is_part = _draw_globe(axes, _extent(curves), _extent(curves, faint=False), _SMALL_ON_SPHERE)
+    for curve in curves:
+        draw_polygon(axes, curve, globe.visible)
+        _draw_on_globe(axes, globe, curve, curve.points, curve.given, curve.radii)
+    has_land = radius is not None and (not is_part or bool(np.ptp(axes.get_xlim()) > _COARSE))
+    if has_land:
+        draw_land(axes, globe)
+    if radius is not None and is_part:
+        _draw_scale(axes, radius / 1000)
+        if not has_land:
+            note(axes, "no coastlines at this scale")
+    for beside in panel.axes[1:]:
+        _draw_map(beside, curves, radius is not None)
+
+
+def _draw_scale(axes: Axes, radius: float) -> None:
+    """Draw a bar in the lower right corner of a frame, whose length is 1, 2 or 5 times a power of ten in km."""
+    (west, east), (south, north) = axes.get_xlim(), axes.get_ylim()
+    length = round_below(0.25 * (east - west) * radius)
+    end, height = east - 0.03 * (east - west), south + 0.06 * (north - south)
+    look: dict[str, Any] = {"color": ink(), "zorder": 7}
+    axes.plot([end - length / radius, end], [height] * 2, "|-", linewidth=1.2, markersize=6, label="_scale", **look)
+    middle, above = end - length / radius / 2, height + 0.015 * (north - south)
+    look |= {"ha": "center", "va": "bottom", "fontsize": "small", "path_effects": halo()}
+    axes.text(middle, above, f"{length:g} km" if length >= 1 else f"{1000 * length:g} m", **look)
+
+
+def bloch(_: Sequence[Curve]) -> View:
+    """Return the view of CP¹: the Bloch sphere with |0⟩ at the top or, if states are close together, a part of it."""
+
+    def draw(panel: Panel, curves: Sequence[Curve]) -> None:
+        (axes,) = panel.axes
+        points = np.concatenate([bloch_vectors(curve.extent) for curve in curves])
+        globe, is_part = _draw_globe(axes, points, points, spacing=30, lats=(10, 40), labels=_BLOCH)
+        for curve in curves:
+            # Angles between Bloch vectors are twice the distances of states.
+            radii = None if curve.radii is None else 2 * curve.radii
+            draw_polygon(axes, curve, lambda states: globe.visible(bloch_vectors(states)))
+            _draw_on_globe(axes, globe, curve, *curve.marked(bloch_vectors), radii)
+        note(axes, ("part of the Bloch sphere: longitude from x, |0⟩ is 90°N" if is_part else "Bloch sphere") + _TWICE)
+
+    return View(draw, has_many=True, is_turned=True)
+
+
+def bloch_vectors(states: Any) -> Array:
+    """Return the unit vectors of states of shape (m, 2) or (m, 2, 1). They do not depend on the phase."""
+    a, b = states.reshape(-1, 2).T
+    across = 2 * a.conj() * b
+    return np.stack([across.real, across.imag, np.abs(a) ** 2 - np.abs(b) ** 2], axis=-1)
+
+
+def _hemisphere(what: str, vectors: Callable[[Any], Array]) -> View:
+    """Return the view of lines, given by unit vectors: a hemisphere or, if they are close together, a part of it."""
+
+    def draw(panel: Panel, curves: Sequence[Curve]) -> None:
+        (axes,) = panel.axes
+        lines = [lifted(vectors(curve.points)) for curve in curves]
+        lines = [line if line[0] @ lines[0][0] >= 0 else -line for line in lines]
+        if sum(np.sum(line[:, 2]) for line in lines) < 0:
+            lines = [-line for line in lines]
+        # The half sphere is centred on the curves, so that most of them do not cross its rim.
+        pole = Globe.above(*middle_of(np.concatenate(lines))).up
+        upper = {name: np.multiply(end, 1 if np.dot(end, pole) >= 0 else -1) for name, end in _AXES.items()}
+        above = [line * sides(line, pole) for line in lines]
+        globe, is_part = _draw_globe(axes, np.concatenate(lines), np.concatenate(above), labels=upper, half=True)
+        for curve, line, shown in zip(curves, lines, lines if is_part else above, strict=True):
+            given = shown[curve.knots]
+            if curve.noise is not None:
+                near, given = (curve.closest_samples(line) if is_part else pole, vectors(curve.given))
+                given = given * np.where(np.sum(given * near, axis=1) < 0, -1.0, 1.0)[:, None]
+            whole, radii = (line, curve.radii) if is_part else (broken_at_rim(line, pole), None)
+            _draw_on_globe(axes, globe, curve, whole, given, radii)
+            if len(whole) > len(line):
+                curve.tracks.append((axes, curve.x, globe.flat(shown)))
+        meaning = "the normal of a plane" if what == "plane" else "the direction of a line"
+        words = "part of the sphere: opposite points" if is_part else "opposite points of the red rim"
+        note(axes, f"each point is {meaning};\n{words} are the same {what}")
+
+    return View(draw, has_many=True, is_turned=True)
+
+
+# Points of RP² and Gr(1, 3) are lines. Points of Gr(2, 3) are planes, represented by their normals.
+LINES = _hemisphere("line", lambda points: points.reshape(-1, 3))
+PLANES = _hemisphere("plane", lambda bases: np.cross(bases[..., 0], bases[..., 1]))
+
+
+# ---- on a globe ----
+
+
+def _draw_on_globe(axes: Axes, globe: Globe, curve: Curve, line: Array, given: Array, radii: Array | None) -> None:
+    """Draw a curve on a globe, dashed on the far side.
+
+    ``line`` and ``given`` are the unit vectors of samples and of given points, shape (m, 3). ``radii`` are the angular
+    radii of a band at the samples.
+    """
+    if radii is not None:
+        discs = disc_indices(curve)
+        rings = caps(line[discs], radii[discs])
+        seen = np.max(rings @ globe.up, axis=1)[:, None, None] > 0
+        draw_tube(axes, curve, np.where(seen, globe.outline(rings), np.nan))
+    hidden = globe.hidden(line)
+    draw_line(axes, curve, globe.visible(line))
+    draw_arrows(axes, curve, globe.visible(line), globe.visible(given))
+    if not curve.faint and np.isfinite(hidden).any():
+        draw_line(axes, curve, hidden, linewidth=1, linestyle=(0, (2, 2)), alpha=0.6, label=fresh(axes, FAR))
+    draw_end(axes, curve, globe.hidden(line[-1:]), alpha=0.35)
+    draw_dots(axes, curve, globe.visible(given))
+    draw_dots(axes, curve, globe.hidden(given), alpha=0.35)
+
+
+def _frame(vectors: Array, small: float, ratio: float) -> tuple[Globe, Array, Array] | None:
+    """Return globe, centre and half sides of a frame around vectors; None if they are not close together.
+
+    ``ratio`` is that of width and height.
+    """
+    globe = Globe.above(*middle_of(vectors))
+    flat = globe.flat(vectors)
+    far = np.arctan2(np.linalg.norm(flat, axis=-1), vectors @ globe.up).max()
+    if not 1e-9 < far < small:
+        return None
+    middle, _ = window(flat, 1.0)
+    across, high = 0.61 * np.ptp(flat, axis=0)
+    high = max(high, across / ratio)
+    half = np.array([ratio * high, high])
+    # The corners of the frame must be on the globe.
+    return (globe, middle, half) if np.linalg.norm(np.abs(middle) + half) < 1 else None
+
+
+def _draw_globe(
+    axes: Axes,
+    vectors: Array,
+    seen: Array,
+    small: float = _SMALL,
+    spacing: int = 15,
+    lats: tuple[float, float] = (-90, 90),
+    labels: Any = None,
+    half: bool = False,
+) -> tuple[Globe, bool]:
+    """Draw the part of a globe where vectors are, or all of it if they are not close together.
+
+    Returns the globe, and whether it is a part. A whole globe is turned towards the vectors ``seen``.
+
+    Parameters
+    ----------
+    axes : Axes
+        Axes to draw into.
+    vectors, seen : ndarray, shape (m, 3)
+        Unit vectors of all curves, and of those towards which a whole globe is turned.
+    small : float
+        The largest distance from the middle of curves that are drawn in a frame.
+    spacing : int
+        Spacing of the graticule in degrees.
+    lats : pair of float
+        Range of the latitudes from which the globe may be seen.
+    labels : dict or None
+        Labelled directions, such as "x".
+    half : bool
+        Whether only the northern half is drawn.
+    """
+    width, height = axes_size(axes)
+    frame = _frame(vectors, small, float(np.clip(width / height, 0.5, 2.0))) or _frame(vectors, small, 1.0)
+    if frame is not None:
+        draw_frame(axes, *frame)
+        return frame[0], True
+    globe = Globe.above(*middle_of(vectors)) if half else facing(seen, lats)
+    draw_globe(axes, globe, spacing, half)
+    if labels:
+        axes.set(xlim=(-1.22, 1.22), ylim=(-1.22, 1.22))
+        label_directions(axes, globe, labels, globe.flat(seen))
+    return globe, False
+
+
+def caps(points: Array, radii: Array) -> Array:
+    """Return the rims of spherical caps around points, shape (m, k, 3)."""
+    radii = np.minimum(radii, _WIDEST)[:, None, None]
+    aside = np.cross(points, np.eye(3)[np.abs(points).argmin(axis=1)])
+    aside /= np.linalg.norm(aside, axis=1, keepdims=True)
+    frame = np.stack([aside, np.cross(points, aside)], axis=1)
+    return np.asarray(np.cos(radii) * points[:, None] + np.sin(radii) * (CIRCLE @ frame))
+
+
+# ---- on the hemisphere ----
+
+
+def lifted(vectors: Array) -> Array:
+    """Choose the signs of unit vectors ±x along a curve, shape (m, 3), so that they do not jump."""
+    turned = np.sum(vectors[1:] * vectors[:-1], axis=1) < 0
+    return np.asarray(vectors * np.cumprod(np.append(1.0, np.where(turned, -1.0, 1.0)))[:, None])
+
+
+def sides(line: Array, pole: Array = _NORTH) -> Array:
+    """Return 1 above the rim and −1 below, shape (m, 1). On the rim, the sign is that of the previous sample."""
+    heights = line @ pole
+    return np.where(heights[_last(np.abs(heights) > _RIM)] < 0, -1.0, 1.0)[:, None]
+
+
+def _last(known: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """Return for every sample the last known sample up to it, or the first known one."""
+    last = np.maximum.accumulate(np.where(known, np.arange(len(known)), -1))
+    return np.where(last < 0, known.argmax(), last)
+
+
+def broken_at_rim(line: Array, pole: Array = _NORTH) -> Array:
+    """Return the curve on the hemisphere around a pole, broken by NaN where it crosses the rim."""
+    side = sides(line, pole)
+    (crossings,) = np.nonzero(np.diff(side[:, 0]))
+    gaps = []
+    for i in crossings:
+        before, after = line[i : i + 2] * side[i]
+        share = np.clip(before @ pole / ((before - after) @ pole), 0, 1)
+        rim = before + share * (after - before)
+        rim -= (rim @ pole) * pole
+        rim /= np.linalg.norm(rim)
+        gaps.append([rim, np.full(3, np.nan), -rim])
+    return _interrupted(line * side, crossings, gaps)
+
+
+def _interrupted(line: Array, after: Any, gaps: Any) -> Array:
+    """Insert three rows after some of the rows of a line: its end, NaN, and where it begins again."""
+    return np.insert(line, np.repeat(after + 1, 3), np.reshape(gaps, (-1, line.shape[1])), axis=0)
+
+
+# ---- on the map ----
+
+
+def _draw_map(axes: Axes, curves: Sequence[Curve], has_land: bool) -> None:
+    """Draw a map. Without land it is centred on the curves, by a multiple of 60 degrees, and may be a part of it."""
+    plain(axes)
+    middle = 0 if has_land else _middle_meridian(np.concatenate([curve.extent for curve in curves if not curve.faint]))
+    axes.set(aspect="equal", facecolor=paper(0.06), label="map")
+    if has_land:
+        draw_land_on_map(axes)
+    turn = np.stack([from_lonlat(middle, 0), from_lonlat(middle + 90, 0), [0, 0, 1]], axis=-1)
+    seen = []
+    for curve in curves:
+        positions, given = curve.marked(lambda points: lonlat_of(points @ turn))
+        seen += [positions, given]
+        if curve.radii is not None:
+            _draw_band(axes, curve, positions, curve.points @ turn, curve.radii)
+        whole = broken(positions)
+        if len(whole) > len(positions):
+            curve.tracks.append((axes, curve.x, positions))
+        draw_line(axes, curve, whole)
+        draw_arrows(axes, curve, whole, given)
+        draw_dots(axes, curve, given, clip_on=False, **{} if curve.noise else {"markersize": 4.5})
+    everything = np.concatenate(seen)
+    # Maps are twice as wide as high.
+    half = 1.15 * float((np.ptp(everything, axis=0) / [2, 1]).max())
+    step = 30 if half < _PART and not has_land else 60
+    half = half if step == 30 else 180.0
+    lon, lat = np.clip(window(everything, 1.0)[0], [half - 180, half / 2 - 90], [180 - half, 90 - half / 2]).tolist()
+    axes.set_xticks(range(-180, 181, step), [degrees(x + middle, "E", "W") for x in range(-180, 181, step)])
+    axes.set_yticks(range(-90, 91, step // 2), [degrees(y, "N", "S") for y in range(-90, 91, step // 2)])
+    axes.set_xticks(range(-180, 181, step // 2), minor=True)
+    axes.grid(which="minor", color=ink(0.2), linewidth=0.6)
+    axes.tick_params(which="minor", length=0)
+    axes.set(xlim=(lon - half, lon + half), ylim=(lat - half / 2, lat + half / 2))
+
+
+def _middle_meridian(points: Array) -> int:
+    """Return the longitude of the middle of a map that a curve does not leave, or else 0."""
+    lon = np.sort(to_lonlat(points)[0])
+    steps = np.diff(lon, append=lon[0] + 360)
+    widest = int(steps.argmax())
+    edge = lon[widest] + steps[widest] / 2
+    if steps[widest] < _FREE or lon[widest] + steps[widest] >= 180 >= lon[widest]:
+        return 0
+    return int(60 * np.rint((edge + 180) / 60)) % 360
+
+
+def _draw_band(axes: Axes, curve: Curve, positions: Array, points: Array, radii: Array) -> None:
+    """Draw the band on the map, on both sides of the date line. Caps around a pole have no rim there."""
+    discs = disc_indices(curve)
+    lon, lat = to_lonlat(caps(points[discs], radii[discs]))
+    middle = np.unwrap(positions[discs, 0], period=360)[:, None]
+    lon = middle + (lon - middle + 180) % 360 - 180
+    lon[np.ptp(lon, axis=1) > 180] = np.nan
+    windings = np.unique(np.rint(middle / 360))
+    # All copies are one polygon, so that overlaps are filled once. Copies beyond the map are omitted.
+    copies = []
+    for winding in np.arange(windings[0] - 1, windings[-1] + 2):
+        moved = lon - 360 * winding
+        seen = (moved.max(axis=1) > -180) & (moved.min(axis=1) < 180)
+        ring = np.where(seen[:, None, None], np.stack([moved, lat], axis=-1), np.nan)
+        copies += [ring, np.full_like(ring[:1], np.nan)]
+    draw_tube(axes, curve, np.concatenate(copies))
+
+
+def lonlat_of(points: Array) -> Array:
+    """Return longitude and latitude of samples of a curve, shape (m, 2). At a pole, keep the previous longitude."""
+    lon, lat = to_lonlat(points)
+    return np.column_stack([lon[_last(np.hypot(points[:, 0], points[:, 1]) > 1e-9)], lat])
+
+
+def broken(positions: Array) -> Array:
+    """Break a line of longitudes and latitudes, by NaN, at the date line and at the poles."""
+    step = np.diff(positions[:, 0])
+    short = step - 360 * np.rint(step / 360)
+    (jumps,) = np.nonzero((np.abs(step) > 180) | (np.abs(short) > _POLE))
+    return _interrupted(positions, jumps, [_gap(positions[i], positions[i + 1], short[i]) for i in jumps])
+
+
+def _gap(before: Array, after: Array, step: float) -> Any:
+    """Return the points where a line to the east, ``step`` degrees long, leaves and enters the map; NaN between."""
+    if abs(step) > _POLE:
+        pole = np.copysign(90, before[1])
+        return [[before[0], pole], [np.nan] * 2, [after[0], pole]]
+    edge = np.copysign(180, step)
+    lat = before[1] + (edge - before[0]) / step * (after[1] - before[1])
+    return [[edge, lat], [np.nan] * 2, [-edge, lat]]

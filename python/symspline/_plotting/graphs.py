@@ -16,8 +16,20 @@ from numpy.typing import NDArray
 from .._core import ValidationError
 from .._spaces import Space
 from .curves import Curve, are_compared
-from .lines import DOTS, LINE, draw_dots, draw_graph_of, fresh, plot_line, shade_quantiles
-from .panels import FEW_KNOTS, Panel, View, time_axes, timeline
+from .panels import (
+    DOTS,
+    FEW_KNOTS,
+    LINE,
+    Panel,
+    View,
+    draw_dots,
+    draw_graph_of,
+    fresh,
+    plot_line,
+    shade_quantiles,
+    time_axes,
+    timeline,
+)
 from .style import DATA, SUBSCRIPTS, Array, Indices, axes_size, distinct, ink, legend, named_from, round_start
 
 _Drawn = Sequence[tuple[Array, Array]]

@@ -26,12 +26,11 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from .._core import ValidationError
 from .._spaces import Space
 from .chart import Box, draw_box, draw_frames, name_axis
+from .globe import bloch_vectors
 from .graphs import ANGLES
 from .matrices import MATRICES, ROTATIONS, outlines
-from .page import drawing, head
 from .panels import Panel
-from .plot import check_axes, draw_picture_into, finish
-from .sphere import bloch_vectors
+from .plot import check_axes, draw_picture_into, drawing, finish, head
 from .style import DATES, Array, axes_size, evenly, ink, paper, plain, show_dates
 from .views import FACTORS, captions, title_on
 

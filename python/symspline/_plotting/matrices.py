@@ -25,12 +25,10 @@ from .._base.angles import matrices_of_quaternions
 from .._core import CutLocusError, convert_rotations
 from .._spaces import SpecialOrthogonal, cover_of
 from .curves import Curve, Mover, are_compared
-from .globe import centre_of
+from .globe import caps, centre_of
 from .graphs import Graphs, component_names, components
-from .lines import FRAME, fresh
-from .panels import FEW_KNOTS, Panel, View, mark_knots, time_axes, timeline
+from .panels import FEW_KNOTS, FRAME, Panel, View, fresh, mark_knots, time_axes, timeline
 from .rates import QUATERNIONS
-from .sphere import caps
 from .style import AXES, MARK, SUBSCRIPTS, Array, apart, axes_size, evenly, ink, round_below, time_colors
 
 ROTATIONS = SpecialOrthogonal(3)

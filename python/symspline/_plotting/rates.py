@@ -12,8 +12,7 @@ from matplotlib.lines import Line2D
 from .._curves.curve import SidePanel
 from .._spaces import Product, Space, SpecialEuclidean, Sphere, Torus, cover_of, factors_of, short_name
 from .curves import Curve
-from .lines import ALPHA, LINE, fill_band, fresh, plot_line, shade_quantiles
-from .panels import FEW_KNOTS, Panel, time_axes
+from .panels import ALPHA, FEW_KNOTS, LINE, Panel, fill_band, fresh, plot_line, shade_quantiles, time_axes
 from .style import DATA, MARK, Array, axes_size, distinct, ink, legend
 
 NORMAL = 1.96

@@ -13,7 +13,7 @@ from textwrap import shorten
 from typing import Any
 
 from .._spaces import Euclidean, Product, Space, cover_of, factors_of, short_name
-from . import chart, graphs, matrices, poses, sphere
+from . import chart, globe, graphs, matrices
 from .curves import Curve
 from .panels import View
 
@@ -30,13 +30,13 @@ _VIEWS: list[tuple[str, _Views, str]] = [
     ("euclidean:2", partial(chart.plane, has_band=True), ""),
     ("euclidean:3", partial(chart.solid, has_band=True), ""),
     ("sphere:1", lambda _: _angles["sphere:1"], ""),
-    ("sphere:2", sphere.sphere, ""),
+    ("sphere:2", globe.sphere, ""),
     ("sphere:3", matrices.rotations, "unit quaternions"),
     ("hyperbolic:2", chart.disk, ""),
     ("rp:1 gr:1,2", lambda _: _angles["rp:1 gr:1,2"], _LINES),
-    ("rp:2 gr:1,3", lambda _: sphere.LINES, _LINES),
-    ("gr:2,3", lambda _: sphere.PLANES, "planes through the origin"),
-    ("cp:1 cgr:1,2", sphere.bloch, _STATES),
+    ("rp:2 gr:1,3", lambda _: globe.LINES, _LINES),
+    ("gr:2,3", lambda _: globe.PLANES, "planes through the origin"),
+    ("cp:1 cgr:1,2", globe.bloch, _STATES),
     ("so:2", lambda _: _angles["so:2 o:2"], "rotations"),
     ("o:2", lambda _: _angles["so:2 o:2"], ""),
     ("so:3", matrices.rotations, "rotations"),
@@ -45,8 +45,8 @@ _VIEWS: list[tuple[str, _Views, str]] = [
     ("spd:1", graphs.components, "matrices"),
     ("spd:2", matrices.ellipses, "matrices"),
     ("spd:3", matrices.ellipsoids, "matrices"),
-    ("se:2", poses.in_plane, "poses"),
-    ("se:3", poses.in_space, "poses"),
+    ("se:2", chart.in_plane, "poses"),
+    ("se:3", chart.in_space, "poses"),
 ]
 _FAMILIES: dict[str, tuple[_Views, str]] = {
     **dict.fromkeys(("rp", "cp", "hp", "cgr"), (graphs.angles_to_first, "")),

@@ -22,7 +22,6 @@ from .groups import (
     rotations_and_positions,
 )
 from .indefinite import AntiDeSitter, DeSitter, IndefiniteGrassmannian
-from .means import AmbiguousMeanWarning, karcher_mean
 from .positive import (
     HermitianPositiveDefinite,
     LogEuclidean,
@@ -32,7 +31,7 @@ from .positive import (
 )
 from .product import Product, factors_of, parts_of, product_norm, short_name, space, space_named
 from .quotient import Quotient, cover_of, refuse_quotients
-from .statistics import Groups, require_metric
+from .statistics import AmbiguousMeanWarning, Groups, karcher_mean, require_metric
 from .subspaces import (
     ComplexGrassmannian,
     ComplexHyperbolic,

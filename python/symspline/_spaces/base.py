@@ -16,9 +16,7 @@ from .._base.arrays import as_array, cast, refuse, short_repr, whole_number
 from .._base.rounding import point_tol
 from .._base.typing import AnyArray, FloatArray, P
 from .._core import Handle, ValidationError
-from .means import geometric_median, karcher_mean
-from .statistics import Groups, grouped, groups_of, require_metric, take
-from .whitening import Whitening
+from .statistics import Groups, Whitening, geometric_median, grouped, groups_of, karcher_mean, require_metric, take
 
 Array = AnyArray
 Doubles = FloatArray

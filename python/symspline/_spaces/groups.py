@@ -13,8 +13,7 @@ from .._base.typing import ComplexArray, FloatArray
 from .._core import ValidationError
 from .actions import DisconnectedGroup, Group
 from .base import Array
-from .means import karcher_mean
-from .statistics import Groups, scaled
+from .statistics import Groups, karcher_mean, scaled
 
 
 class SpecialOrthogonal(Group[FloatArray]):

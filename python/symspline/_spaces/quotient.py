@@ -13,10 +13,9 @@ from .._base.arrays import short_repr, whole_number
 from .._base.typing import P
 from .._core import CutLocusError, ValidationError
 from .base import DERIVED, Array, Space
-from .finite_groups import Factor, FiniteGroup, Indices
+from .finite_groups import Factor, FiniteGroup, Indices, Nearest, along_path, nearest_of, over_grid
 from .groups import SpecialOrthogonal, SpecialUnitary, names_points
 from .product import Product, factors_of, space_named
-from .unwrap import Nearest, along_path, nearest_of, over_grid
 
 # Values that a space computes on demand from its own name or radius.
 _CACHED = ("_text", "_curve_kind", "_longest_near_step")

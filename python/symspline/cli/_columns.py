@@ -31,8 +31,7 @@ from .._spaces import (
 from .._spaces.degrees import is_degrees, look_like_degrees
 from ..convert._pose_files import join, rotations_in_rows
 from ..geo import NAMED, are_tracks
-from ._files import Source
-from ._messages import Problem, first_duplicate, for_command_line, listed, refuse, say
+from ._messages import Problem, Source, first_duplicate, for_command_line, listed, refuse, say
 from ._tables import IM, RE, Array, Place, Rows, Table
 
 GLOBE, ROTATIONS, POSES = map(space_named, ("sphere:2", "so:3", "se:3"))

@@ -36,10 +36,8 @@ from ._columns import (
     require_globe,
     width,
 )
-from ._files import Source, writing
-from ._formats import CURVES
-from ._messages import Problem, did_you_mean, refuse
-from ._tables import IM, RE
+from ._messages import Problem, Source, did_you_mean, refuse, writing
+from ._tables import CURVES, IM, RE
 
 _COLUMNS = "columns"
 """The entry of the file with the columns, which the library ignores."""

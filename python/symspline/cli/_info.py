@@ -34,10 +34,8 @@ from .._spaces.base import CLASSES, example_of
 from .._splines.cubic import CubicSpline
 from ._columns import NUMBERED, column_of_names, time_column
 from ._curves import read_curves
-from ._files import Source
-from ._formats import TABLES, endings, format_of, open_table
-from ._messages import Problem, counted, listed, refuse
-from ._tables import Array, Rows, Table
+from ._messages import Problem, Source, counted, listed, refuse
+from ._tables import TABLES, Array, Rows, Table, endings, format_of, open_table
 
 _LIBRARIES = {"pandas": "CSV files", "pyarrow": "Parquet files", "gpxpy": "GPX files", "matplotlib": "symspline plot"}
 _LIBRARIES |= {"shtab": "completion in shells"}

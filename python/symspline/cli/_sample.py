@@ -57,11 +57,21 @@ from .._splines.cubic import CubicSpline
 from ..convert._pose_files import TUM
 from ._columns import Columns, quaternion_by_names, time_column, with_stamps
 from ._curves import Curves, Samples, deviations_of, read_curves, samples_of
-from ._files import called, check_inputs, check_target
-from ._formats import TABLES, Layout, endings, format_of, is_binary, open_table, write_table
-from ._messages import Problem, Progress, counted, did_you_mean, first_duplicate, refuse, say, tell
-from ._recordings import Index, group
-from ._tables import UNITS, Rows, number
+from ._fit import Index, group
+from ._messages import (
+    Problem,
+    Progress,
+    called,
+    check_inputs,
+    check_target,
+    counted,
+    did_you_mean,
+    first_duplicate,
+    refuse,
+    say,
+    tell,
+)
+from ._tables import TABLES, UNITS, Layout, Rows, endings, format_of, is_binary, number, open_table, write_table
 from ._times import Times, every, spread
 
 _EACH = "{curve}"

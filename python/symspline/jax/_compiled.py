@@ -9,8 +9,8 @@ import jax
 import jax.numpy as jnp
 from jax.custom_derivatives import SymbolicZero
 
-from .._autodiff.casteljau import second_fundamental_form
 from .._autodiff.compiled import split
+from .._autodiff.curves import second_fundamental_form
 from .._base.typing import CurveOptions
 from .._curves.ends import ends_in_factors
 from .._curves.options import order_of

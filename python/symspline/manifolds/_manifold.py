@@ -12,9 +12,7 @@ from numpy.typing import ArrayLike
 from .._base.arrays import checked_number, short_repr, whole_number
 from .._core import ValidationError
 from .._spaces import Array, Space, factors_of
-from ._differences import dlog_by_differences
-from ._frames import basis_at
-from ._operations import Function, Functions, Operations, described
+from ._operations import Function, Functions, Operations, basis_at, described, dlog_by_differences
 
 _NEEDED = ("exp", "log", "project_tangent", "inner")
 

@@ -20,11 +20,24 @@ from .._base.version import VERSION
 from .._core import ValidationError
 from .._curves.options import checked_extrapolate, extrapolation_mode, quantity_of
 from .._spaces import Space, space_named
-from ._blocks import COLUMNS, Inputs, apply, fitted, resampled, values_at
 from ._grids import resample_grid
 from ._labels import in_radians, in_units_of
 from ._smoothing import smooth
-from ._spec import KNOTS, bare, check_dims, rehearse, spec_of, timed_by, times_with_names
+from ._spec import (
+    COLUMNS,
+    KNOTS,
+    Inputs,
+    apply,
+    bare,
+    check_dims,
+    fitted,
+    rehearse,
+    resampled,
+    spec_of,
+    timed_by,
+    times_with_names,
+    values_at,
+)
 
 __all__ = ["evaluate", "fit", "lift", "resample", "smooth", "speed"]
 

@@ -20,9 +20,20 @@ from .._curves.options import checked_extrapolate, extrapolation_mode
 from .._smoothing import SmoothingWarning, make_smoothing_spline
 from .._smoothing.noise import is_several
 from .._spaces import Array, Space, SpecialOrthogonal, space_named
-from ._blocks import Inputs, apply, knots_of_block, per_curve_times
 from ._labels import in_radians, named_curve, of_equal_length, times_of_rows
-from ._spec import KNOTS, LINE, bare, rehearse, spec_of, timed_by, times_with_names
+from ._spec import (
+    KNOTS,
+    LINE,
+    Inputs,
+    apply,
+    bare,
+    knots_of_block,
+    per_curve_times,
+    rehearse,
+    spec_of,
+    timed_by,
+    times_with_names,
+)
 
 # Columns of the report of a smoothing fit, per part of the space.
 _COLUMNS: dict[str, type] = {"lam": np.float64, "df": np.float64, "sigma": np.float64, "at_bound": np.bool_}
