@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from ._base.arrays import as_array, same_fields, whole_number
 from ._base.typing import AnyArray, FloatArray, P
 from ._core import ValidationError
-from ._spaces import Product, Space, parts_of, require_metric, space_named
+from ._spaces import AnySpace, Product, Space, parts_of, require_metric, space_named
 
 # Variances below this fraction of the largest one are rounding errors.
 _LEAST = 1e-13
@@ -198,7 +198,7 @@ def tangent_pca(points: Any, space: Space[P] | str, *, n_components: int | None 
     return TangentPCA(space, mean, _joined(moved), variance, ratio, scores)
 
 
-def _well_conditioned(space: Space[Any], mean: Any, arrays: list[Any]) -> tuple[Any, Space[Any], list[Any], list[Any]]:
+def _well_conditioned(space: AnySpace, mean: Any, arrays: list[Any]) -> tuple[Any, AnySpace, list[Any], list[Any]]:
     """Move points by isometries so that rounding errors do not depend on the units of positive definite matrices.
 
     Returns the moved mean, the space of the moved points, these points by factor, and the maps of tangent vectors back.
@@ -225,7 +225,7 @@ def _joined(parts: list[Any]) -> Any:
     return parts[0] if len(parts) == 1 else tuple(parts)
 
 
-def _gram(space: Space[Any], mean: Any, u: list[Any], v: list[Any]) -> FloatArray:
+def _gram(space: AnySpace, mean: Any, u: list[Any], v: list[Any]) -> FloatArray:
     """Return the inner products of samples of tangent vectors, the means over all axes."""
     if not len(u[0]) or not len(v[0]):
         return np.zeros((len(u[0]), len(v[0])))

@@ -29,11 +29,11 @@ from ._core import CutLocusError, ValidationError
 from ._grid import GridSpline
 from ._grid.axes import coordinates
 from ._spaces import (
+    AnySpace,
     ComplexGrassmannian,
     Euclidean,
     Grassmannian,
     HermitianPositiveDefinite,
-    Space,
     SymmetricPositiveDefinite,
     point_tol,
 )
@@ -312,7 +312,7 @@ class OperatorSpline:
         self._size = k
         if _are_positive(matrices, tol):
             points = (matrices + adjoint(matrices)) / 2
-            space: Space[Any] = (HermitianPositiveDefinite if self._complex else SymmetricPositiveDefinite)(k)
+            space: AnySpace = (HermitianPositiveDefinite if self._complex else SymmetricPositiveDefinite)(k)
         else:
             points = matrices.reshape(*matrices.shape[:-2], k * k)
             points = np.concatenate([points.real, points.imag], axis=-1) if self._complex else points
@@ -360,7 +360,7 @@ class OperatorSpline:
 
 def _subspaces_of(spline: CubicSpline[Any, Any] | GridSpline[Any]) -> tuple[int, ...]:
     """Return n and k of a curve or grid of subspaces."""
-    space: Space[Any] = spline.space
+    space: AnySpace = spline.space
     batch = isinstance(spline, CubicSpline) and spline._batch
     if not isinstance(space, (Grassmannian, ComplexGrassmannian)) or batch:
         raise ValidationError(f"spline must be one curve or a grid on a Grassmannian, not {spline!r}")

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 
 from ._base.arrays import checked_number, whole_number
 from ._core import ConvergenceError, CutLocusError, ValidationError
-from ._spaces import Array, Doubles, Product, Space, space_named
+from ._spaces import AnySpace, Array, Doubles, Product, Space, space_named
 from ._splines.cubic import CubicSpline
 from ._splines.jumps import segments_of
 from .manifolds import Manifold
@@ -82,7 +82,7 @@ class Conformance:
 
 
 def check(
-    space: Space[Any] | str,
+    space: AnySpace | str,
     *,
     point: ArrayLike | None = None,
     length: float | None = None,

@@ -12,21 +12,23 @@ from .. import _spaces
 from .._base.arrays import short_repr
 from .._core import ValidationError
 from .._curves.options import order_of
-from .._spaces import Product, Space, parts_of, refuse_quotients, space_named
+from .._spaces import AnySpace, Product, Space, parts_of, refuse_quotients, space_named
 from .compiled import split
 from .condition import Problem, chain_of
-from .library import Library, adjoint
+from .library import Library, Tensor, adjoint
 from .models import QUOTIENTS, Model, model_of
 
 
-def named(lib: Library, space: Space[Any] | str) -> Space[Any]:
+def named(lib: Library, space: AnySpace | str) -> AnySpace:
     """Return the space, or raise ValidationError for a quotient."""
     found = space_named(space)
     refuse_quotients(found, f"functions of {lib.name} are not made")
     return found
 
 
-def evaluate(lib: Library, t: Any, points: Any, velocities: Any, space: Space[Any] | str, x: Any, nu: int) -> Any:
+def evaluate(
+    lib: Library, t: Tensor, points: Tensor, velocities: Tensor, space: AnySpace | str, x: Tensor, nu: int
+) -> Tensor:
     """Evaluate curves, see `symspline.jax.evaluate` and `symspline.torch.evaluate`."""
     nu, space = order_of(nu), named(lib, space)
     if isinstance(space, Product):
@@ -45,7 +47,7 @@ def evaluate(lib: Library, t: Any, points: Any, velocities: Any, space: Space[An
     return found.reshape(*points.shape[:axis], *x.shape, *space.point_shape)
 
 
-def problem_of(lib: Library, t: Any, points: Any, space: Space[Any], bc_type: Any) -> tuple[Problem, Any]:
+def problem_of(lib: Library, t: Tensor, points: Tensor, space: AnySpace, bc_type: Any) -> tuple[Problem, Any]:
     """Return the C² condition of curves, and a function that converts its solution to velocities for the user."""
     chain = chain_of(model_of(lib, space))
     if chain is None:
@@ -60,7 +62,7 @@ def problem_of(lib: Library, t: Any, points: Any, space: Space[Any], bc_type: An
     return problem, lambda u: lib.xp.moveaxis(chain.leave(p, u), 0, axis)
 
 
-def unsupported(lib: Library, space: Space[Any], function: str) -> ValidationError:
+def unsupported(lib: Library, space: AnySpace, function: str) -> ValidationError:
     """Return the error of a space without closed forms, or without a fit."""
     flat = ["r", "sphere"] if function == "fit" else ["r", "sphere", "hyperbolic"]
     lines = ["rp", "cp", "gr", "cgr"] if lib.general and function != "fit" else []
@@ -71,7 +73,7 @@ def unsupported(lib: Library, space: Space[Any], function: str) -> ValidationErr
     )
 
 
-def _knots(lib: Library, t: Any, points: Any, space: Space[Any]) -> Any:
+def _knots(lib: Library, t: Tensor, points: Tensor, space: AnySpace) -> Tensor:
     """Return knots of shape (n, *batch), or (n, 1, ..., 1) if all curves have the same ones."""
     lead = points.ndim - len(space.point_shape)
     if lead < 1 or tuple(points.shape[lead:]) != space.point_shape or points.shape[lead - 1] < 2:
@@ -87,7 +89,7 @@ def _knots(lib: Library, t: Any, points: Any, space: Space[Any]) -> Any:
     return lib.xp.moveaxis(t.reshape(*(1,) * (lead - t.ndim), *t.shape), -1, 0)
 
 
-def _ends(lib: Library, bc_type: Any, points: Any) -> tuple[tuple[bool, bool], list[Any]]:
+def _ends(lib: Library, bc_type: Any, points: Tensor) -> tuple[tuple[bool, bool], list[Any]]:
     """Return which ends have a given velocity, and its value or zero."""
     kinds, vectors = split(bc_type)
     pair = (kinds, kinds) if isinstance(kinds, str) else kinds
@@ -109,7 +111,7 @@ def _ends(lib: Library, bc_type: Any, points: Any) -> tuple[tuple[bool, bool], l
     return (pair[0] != "natural", pair[1] != "natural"), ends
 
 
-def _values(model: Model, space: Space[Any], t: Any, points: Any, velocities: Any, x: Any, nu: int) -> Any:
+def _values(model: Model, space: AnySpace, t: Tensor, points: Tensor, velocities: Tensor, x: Tensor, nu: int) -> Tensor:
     """Return values of shape (times, *batch, *point_shape)."""
     lib, xp = model.lib, model.lib.xp
     h = t[1:] - t[:-1]
@@ -120,10 +122,10 @@ def _values(model: Model, space: Space[Any], t: Any, points: Any, velocities: An
     begin, length = (lib.take_along(a, segment, 0) for a in (t, h))
     starts, handles = (_rows(lib, a, segment) for a in polygons)
 
-    def curve(x: Any) -> Any:
+    def curve(x: Tensor) -> Tensor:
         return model.from_internal(_bezier(model, starts, handles, (x - begin) / length))
 
-    def velocity(x: Any) -> Any:
+    def velocity(x: Tensor) -> Tensor:
         return lib.along(curve, x)
 
     if nu == 0:
@@ -139,7 +141,7 @@ def _values(model: Model, space: Space[Any], t: Any, points: Any, velocities: An
     return xp.where(inside[(..., *(None,) * len(space.point_shape))], found, float("nan"))
 
 
-def _rows(lib: Library, polygons: Any, segment: Any) -> Any:
+def _rows(lib: Library, polygons: Tensor, segment: Tensor) -> Tensor:
     """Take segments, shape (times, *batch), of polygons of shape (3, n - 1, *batch, *point shape)."""
     if all(size == 1 for size in segment.shape[1:]):
         # All curves have the same knots.
@@ -154,7 +156,7 @@ _COLUMNS = (_spaces.Grassmannian, _spaces.ComplexGrassmannian, _spaces.Quaternio
 _LORENTZ = (_spaces.Hyperbolic, _spaces.ComplexHyperbolic)
 
 
-def _control(model: Model, h: Any, points: Any, velocities: Any) -> tuple[Any, Any]:
+def _control(model: Model, h: Tensor, points: Tensor, velocities: Tensor) -> tuple[Tensor, Tensor]:
     """Return the starts of the three geodesics of every control polygon, and their velocities.
 
     The first geodesic leads from the first point to the first handle, the second joins the handles, and the third leads
@@ -168,7 +170,7 @@ def _control(model: Model, h: Any, points: Any, velocities: Any) -> tuple[Any, A
     return stack([p, inner[0], q]), stack([handles[0], model.log(inner[0], inner[1]), handles[1]])
 
 
-def _bezier(model: Model, starts: Any, handles: Any, s: Any) -> Any:
+def _bezier(model: Model, starts: Tensor, handles: Tensor, s: Tensor) -> Tensor:
     """Evaluate curves at s between 0 and 1, with control polygons as `_control` returns them."""
     stack = model.lib.xp.stack
     a, b, c = model.exp(starts, model.times(stack([s, s, 1 - s]), handles))
@@ -176,19 +178,19 @@ def _bezier(model: Model, starts: Any, handles: Any, s: Any) -> Any:
     return model.between(left, right, s)
 
 
-def _velocity(space: Space, point: Any, first: Any) -> Any:
+def _velocity(space: Space, point: Tensor, first: Tensor) -> Tensor:
     """Return the velocity of a curve from the derivative of its arrays."""
     return _horizontal(space, point, first) if isinstance(space, QUOTIENTS) else first
 
 
-def _acceleration(lib: Library, space: Space, point: Any, first: Any, second: Any) -> Any:
+def _acceleration(lib: Library, space: Space, point: Tensor, first: Tensor, second: Tensor) -> Tensor:
     """Return the covariant acceleration of a curve from the derivatives of its arrays."""
     if isinstance(space, QUOTIENTS):
         return _horizontal(space, point, first, second)
     return second - second_fundamental_form(lib.xp, space, point, first, first)
 
 
-def _horizontal(space: Space, y: Any, first: Any, second: Any = None) -> Any:
+def _horizontal(space: Space, y: Tensor, first: Tensor, second: Tensor = None) -> Tensor:
     """Return (I − YY*)Y', or the acceleration (I − YY*)(Y'' − 2Y'(Y*Y')), for any representatives Y of a curve."""
     if len(space.point_shape) == 1:
         columns = (None if a is None else a[..., None] for a in (y, first, second))
@@ -196,12 +198,12 @@ def _horizontal(space: Space, y: Any, first: Any, second: Any = None) -> Any:
     return _horizontal_columns(y, first, second)
 
 
-def _horizontal_columns(y: Any, first: Any, second: Any) -> Any:
+def _horizontal_columns(y: Tensor, first: Tensor, second: Tensor) -> Tensor:
     change = first if second is None else second - 2 * first @ (adjoint(y) @ first)
     return change - y @ (adjoint(y) @ change)
 
 
-def second_fundamental_form(xp: Any, space: Space, point: Any, vector: Any, motion: Any) -> Any:
+def second_fundamental_form(xp: Any, space: Space, point: Tensor, vector: Tensor, motion: Tensor) -> Tensor:
     """Return the derivative of a field of tangent vectors as arrays, minus its covariant derivative.
 
     Of unit vectors, and of k orthonormal columns X, it is −X Ẋ*V, which keeps X*V = 0 (minus the second fundamental

@@ -16,6 +16,10 @@ _STUMPFF, _STUMPFF_TERMS = 4.0, 22
 _ARC, _ARC_TERMS = 0.3, 46
 
 
+Tensor = Any
+"""An array of JAX or of PyTorch."""
+
+
 @dataclass(frozen=True)
 class Library:
     """Functions of a library of arrays.
@@ -55,19 +59,19 @@ class Library:
     module: str
     general: bool
     xp: Any
-    array: Callable[[Any, str, Any], Any]
-    promote: Callable[..., tuple[Any, ...]]
-    constant: Callable[[Any, Any], Any]
-    logarithm: Callable[[Any], Any]
-    exponential: Callable[[Any], Any]
-    arcs: Callable[[Any], Any] | None
-    solve_lower: Callable[[Any, Any], Any]
-    fold: Callable[[Callable[[Any, Any], Any], Any, list[float]], Any]
-    along: Callable[[Callable[[Any], Any], Any], tuple[Any, Any]]
-    search: Callable[[Any, Any], Any]
-    take_along: Callable[[Any, Any, int], Any]
+    array: Callable[[object, str, Tensor], Tensor]
+    promote: Callable[..., tuple[Tensor, ...]]
+    constant: Callable[[Tensor, Tensor], Tensor]
+    logarithm: Callable[[Tensor], Tensor]
+    exponential: Callable[[Tensor], Tensor]
+    arcs: Callable[[Tensor], Tensor] | None
+    solve_lower: Callable[[Tensor, Tensor], Tensor]
+    fold: Callable[[Callable[[Tensor, Tensor], Tensor], Any, list[float]], Any]
+    along: Callable[[Callable[[Tensor], Tensor], Tensor], tuple[Tensor, Tensor]]
+    search: Callable[[Tensor, Tensor], Tensor]
+    take_along: Callable[[Tensor, Tensor, int], Tensor]
 
-    def stumpff(self, n: int, sign: int, z: Any) -> Any:
+    def stumpff(self, n: int, sign: int, z: Tensor) -> Tensor:
         """Return Stumpff's function c_n(±z) = Σ (∓z)ᵏ / (2k + n)! for z ≥ 0 and a sign.
 
         c₀ is cos √z, or cosh √z for sign −1, and c₁ is sin √z / √z. Stiefel & Scheifele, *Linear and Regular Celestial
@@ -84,7 +88,7 @@ class Library:
             closed = (1 / factorial(k) - closed) / (sign * far)
         return xp.where(near, series, closed)
 
-    def arc(self, y: Any, rest: Any, sign: int = 1) -> Any:
+    def arc(self, y: Tensor, rest: Tensor, sign: int = 1) -> Tensor:
         """Return φ / (sin φ cos φ) of y = sin² φ and rest = cos² φ; for sign −1 φ / (sinh φ cosh φ) of y = sinh² φ."""
         xp, near = self.xp, y < _ARC
         # Σ 4ᵏ k!² / (2k + 1)! yᵏ (Abramowitz & Stegun 15.1.6).
@@ -95,19 +99,19 @@ class Library:
         angle = xp.arctan2(root, other) if sign > 0 else xp.arcsinh(root)
         return xp.where(near, series, angle / (root * other))
 
-    def _horner(self, weights: list[float], z: Any) -> Any:
+    def _horner(self, weights: list[float], z: Tensor) -> Tensor:
         total = self.xp.full_like(z, weights[-1])
         for weight in weights[-2::-1]:
             total = total * z + weight
         return total
 
 
-def adjoint(a: Any) -> Any:
+def adjoint(a: Tensor) -> Tensor:
     """Return the conjugate transpose of matrices."""
     return a.swapaxes(-1, -2).conj()
 
 
-def hermitian(a: Any) -> Any:
+def hermitian(a: Tensor) -> Tensor:
     """Return the Hermitian part of matrices."""
     return 0.5 * (a + adjoint(a))
 
@@ -119,10 +123,10 @@ def hermitian(a: Any) -> Any:
 # higher order, and eigenvectors are never differentiated.
 
 # Divided differences between some numbers, arrays that broadcast; of one number the function.
-Divided = Callable[..., Any]
+Divided = Callable[..., Tensor]
 
 
-def matrix_derivative(xp: Any, divided: Divided, values: Any, vectors: Any, directions: Any) -> Any:
+def matrix_derivative(xp: Any, divided: Divided, values: Tensor, vectors: Tensor, directions: Tensor) -> Tensor:
     """Return the derivative of order k in k directions at a matrix with these eigenvalues and eigenvectors.
 
     With directions H, in the basis of eigenvectors it is Σ f[λ_i, λ_j, …, λ_l] H_ij … H_ml, over all orders of the
@@ -142,7 +146,7 @@ def matrix_derivative(xp: Any, divided: Divided, values: Any, vectors: Any, dire
     return vectors @ total @ adjoint(vectors)
 
 
-def divided_logarithm(xp: Any, constant: Any, *x: Any) -> Any:
+def divided_logarithm(xp: Any, constant: Tensor, *x: Tensor) -> Tensor:
     """Return divided differences of log."""
     if len(x) == 1:
         return xp.log(x[0])
@@ -161,7 +165,7 @@ def divided_logarithm(xp: Any, constant: Any, *x: Any) -> Any:
     return (-1.0) ** len(x) * step * total.sum(axis=-1)
 
 
-def divided_arc(xp: Any, constant: Any, function: Any, *y: Any) -> Any:
+def divided_arc(xp: Any, constant: Tensor, function: Any, *y: Tensor) -> Tensor:
     """Return divided differences of `Library.arc`."""
     if len(y) == 1:
         return function(y[0], 1 - y[0])

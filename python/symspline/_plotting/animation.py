@@ -12,10 +12,11 @@ from matplotlib.axes import Axes
 
 from .._base.arrays import checked_number, short_repr, whole_number
 from .._base.disk import path_of, replacing
+from .._base.typing import FloatArray, Look
 from .._core import ValidationError
 from .curves import Curve
 from .plot import page_of
-from .style import DATES, MARK, Array, ink
+from .style import DATES, MARK, ink
 
 _DPI = 80
 _MOST_FRAMES = 10_000
@@ -93,10 +94,10 @@ def _updates(figures: list[Axes], curve: Curve) -> Iterator[_Update]:
         yield lambda time, move=move, x=x: move(min(int(np.searchsorted(x, time)), len(x) - 1))  # type: ignore[misc]
 
 
-def _marker(axes: Any, x: Array, positions: Array) -> _Update:
+def _marker(axes: Any, x: FloatArray, positions: FloatArray) -> _Update:
     """Return a function that moves a marker to the position at a time, or hides it outside a segment."""
     nowhere = np.full((positions.shape[1], 1), np.nan)
-    look: Any = {"marker": "o", "markersize": 9, "color": MARK, "markeredgecolor": ink(0), "linestyle": "none"}
+    look: Look = {"marker": "o", "markersize": 9, "color": MARK, "markeredgecolor": ink(0), "linestyle": "none"}
     (dot,) = axes.plot(*nowhere, zorder=8, **look)
 
     def update(time: float) -> None:

@@ -11,7 +11,7 @@ first. Rings are counterclockwise, and the Caspian Sea is clockwise. Equal neigh
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -25,6 +25,7 @@ from matplotlib.path import Path as Outline
 from numpy.typing import NDArray
 
 from .._base.angles import from_lonlat, to_lonlat
+from .._base.typing import AnyArray, FloatArray, Look
 from .._spaces import Euclidean, Space
 from .curves import Curve
 from .panels import (
@@ -41,7 +42,7 @@ from .panels import (
     draw_tube,
     fresh,
 )
-from .style import MARK, Array, axes_size, closest, halo, ink, note, paper, plain, round_below, window
+from .style import MARK, Numbers, axes_size, closest, halo, ink, note, paper, plain, round_below, window
 
 LAND = 0.13
 """Share of the colour of text in that of land."""
@@ -60,9 +61,9 @@ _STEPS = np.append(np.multiply.outer(10.0 ** np.arange(-9, 1), [1, 2, 5]).ravel(
 class Globe:
     """A globe seen from far above a position, by unit vectors to the east, to the north and up."""
 
-    east: Array
-    north: Array
-    up: Array
+    east: FloatArray
+    north: FloatArray
+    up: FloatArray
 
     @classmethod
     def above(cls, lon: float, lat: float) -> Globe:
@@ -70,30 +71,30 @@ class Globe:
         east, up = from_lonlat(lon + 90, 0), from_lonlat(lon, lat)
         return cls(east, np.cross(up, east), up)
 
-    def flat(self, points: Array) -> Array:
+    def flat(self, points: FloatArray) -> FloatArray:
         """Return the orthographic projection, shape (..., 2)."""
         return np.stack([points @ self.east, points @ self.north], axis=-1)
 
-    def visible(self, points: Array) -> Array:
+    def visible(self, points: FloatArray) -> FloatArray:
         """Return the projection of points on the near side; NaN, which breaks a line, on the far side."""
         return np.where(self._near(points), self.flat(points), np.nan)
 
-    def hidden(self, points: Array) -> Array:
+    def hidden(self, points: FloatArray) -> FloatArray:
         """Return the projection of points on the far side; NaN on the near side."""
         return np.where(self._near(points), np.nan, self.flat(points))
 
-    def _near(self, points: Array) -> NDArray[np.bool_]:
+    def _near(self, points: FloatArray) -> NDArray[np.bool_]:
         """Whether points are on the near side, which includes the rim."""
         return np.asarray((points @ self.up > -_RIM)[..., None])
 
-    def outline(self, ring: Array) -> Array:
+    def outline(self, ring: FloatArray) -> FloatArray:
         """Return the projection of a ring of points, with its far part moved to the horizon."""
         flat = self.flat(ring)
         horizon = flat / np.linalg.norm(flat, axis=-1, keepdims=True)
         return np.where((ring @ self.up > 0)[..., None], flat, horizon)
 
 
-def centre_of(space: Space, points: Array) -> Array:
+def centre_of(space: Space, points: FloatArray) -> FloatArray:
     """Return the centre of the smallest ball around points of a space.
 
     The steps towards the farthest point become shorter, as in Bădoiu and Clarkson, Smaller core-sets for balls (2003).
@@ -104,7 +105,7 @@ def centre_of(space: Space, points: Array) -> Array:
     return np.asarray(centre)
 
 
-def middle_of(points: Array) -> tuple[float, float]:
+def middle_of(points: FloatArray) -> tuple[float, float]:
     """Return longitude and latitude of a position above which points, shape (m, 3), are seen well.
 
     It is the centre of the smallest circle around the points, or their mean if they do not fit into a hemisphere. If
@@ -123,7 +124,7 @@ def middle_of(points: Array) -> tuple[float, float]:
     return float(lon), float(lat)
 
 
-def facing(points: Array, lats: tuple[float, float]) -> Globe:
+def facing(points: FloatArray, lats: tuple[float, float]) -> Globe:
     """Return the globe above a latitude in a range in which most points, and the first of them, are well in front.
 
     It is close to that of `middle_of`.
@@ -151,7 +152,7 @@ def draw_globe(axes: Axes, globe: Globe, spacing: int, half: bool = False) -> No
     light = np.sqrt(np.maximum(1 - ((x + 0.25) ** 2 + (y - 0.25) ** 2) / 1.9, 0))
     sea = LinearSegmentedColormap.from_list("sea", [paper(0.25), paper(0.13), paper(0.05)])
     image = axes.imshow(light, extent=(-1, 1, -1, 1), origin="lower", cmap=sea, zorder=0)
-    edge: Any = {"edgecolor": MARK, "linewidth": 1.4} if half else {"edgecolor": ink(0.4), "linewidth": 1}
+    edge: Look = {"edgecolor": MARK, "linewidth": 1.4} if half else {"edgecolor": ink(0.4), "linewidth": 1}
     image.set_clip_path(axes.add_patch(Circle((0, 0), 1, fill=False, zorder=3, **edge)))
     lines = [from_lonlat(steps, lat) for lat in range(-90 + spacing, 90, spacing)]
     lines += [from_lonlat(lon, np.linspace(-90, 90, 721)) for lon in range(-180, 180, spacing)]
@@ -160,7 +161,7 @@ def draw_globe(axes: Axes, globe: Globe, spacing: int, half: bool = False) -> No
 
 
 def label_directions(
-    axes: Axes, globe: Globe, directions: Mapping[str, tuple[float, float, float]], avoided: Array
+    axes: Axes, globe: Globe, directions: Mapping[str, tuple[float, float, float]], avoided: FloatArray
 ) -> None:
     """Draw labelled half axes from the centre of a ball. Those on the far side are faint.
 
@@ -172,11 +173,11 @@ def label_directions(
         stick = globe.flat(np.stack([0 * end, end]))
         axes.plot(*stick.T, color=ink(), linewidth=0.8, alpha=0.6 * alpha, zorder=3)
         x, y = _free(globe.flat(1.17 * end), globe.flat(end), avoided)
-        look: Any = {"ha": "center", "va": "center", "path_effects": halo()}
+        look: Look = {"ha": "center", "va": "center", "path_effects": halo()}
         axes.text(x, y, label, alpha=alpha, zorder=7, **look)
 
 
-def _free(wanted: Array, tip: Array, avoided: Array) -> Array:
+def _free(wanted: FloatArray, tip: FloatArray, avoided: FloatArray) -> FloatArray:
     """Return a position of a label that is not too close to others, or the best one around a tip."""
     angles = np.linspace(0, 2 * np.pi, 16, endpoint=False)
     around = tip + 0.17 * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
@@ -186,7 +187,7 @@ def _free(wanted: Array, tip: Array, avoided: Array) -> Array:
     return np.asarray(candidates[0 if closest[0] > _CLEAR else closest.argmax()])
 
 
-def draw_frame(axes: Axes, globe: Globe, middle: Array, half: float | Array) -> None:
+def draw_frame(axes: Axes, globe: Globe, middle: FloatArray, half: float | FloatArray) -> None:
     """Draw a frame with a graticule, which has labels on the left and at the bottom.
 
     ``middle`` is the centre of the frame in the projection, and ``half`` half of its width and height. One number is
@@ -220,7 +221,13 @@ def _multiples(step: float, low: float, high: float) -> list[float]:
 
 
 def _ticks(
-    lines: Iterable[Array], values: Iterable[float], step: float, letters: str, level: float, low: float, high: float
+    lines: Iterable[FloatArray],
+    values: Iterable[float],
+    step: float,
+    letters: str,
+    level: float,
+    low: float,
+    high: float,
 ) -> tuple[list[float], list[str]]:
     """Return the positions where lines cross a level of the second coordinate, and labels that do not overlap.
 
@@ -253,14 +260,14 @@ def degrees(value: float, positive: str, negative: str) -> str:
 
 
 @cache
-def rings() -> tuple[Array, ...]:
+def rings() -> tuple[FloatArray, ...]:
     """Return the rings of the land in degrees, shape (m, 2) each, with equal first and last rows."""
     with np.load(Path(__file__).with_name("land.npz")) as file:
         return tuple(np.split(file["points"] / 100, file["starts"]))
 
 
 @cache
-def _coasts() -> tuple[tuple[Array, Array], ...]:
+def _coasts() -> tuple[tuple[FloatArray, FloatArray], ...]:
     """Return the rings as unit vectors, and again with NaN where they follow the date line or the south pole."""
     found = []
     for ring in rings():
@@ -283,20 +290,20 @@ def draw_land(axes: Axes, globe: Globe) -> None:
             # which this circle compensates.
             outlines.append(Outline.unit_circle())
     if outlines:
-        look: Any = {"facecolor": ink(LAND), "linewidth": 0, "zorder": 1, "label": "_land"}
+        look: Look = {"facecolor": ink(LAND), "linewidth": 0, "zorder": 1, "label": "_land"}
         land = axes.add_artist(PathPatch(Outline.make_compound_path(*outlines), **look))
         land.set_clip_path(Circle((0, 0), 1, transform=axes.transData))
     broken = [np.concatenate([line, np.full((1, 3), np.nan)]) for _, line in _coasts()]
     axes.plot(*globe.visible(np.concatenate(broken)).T, color=ink(0.4), linewidth=0.5, zorder=1.5, label="_coastline")
 
 
-def _azimuth_steps(points: Array, globe: Globe) -> Array:
+def _azimuth_steps(points: FloatArray, globe: Globe) -> FloatArray:
     """Return the steps of the azimuth along a ring as seen by the viewer, in (−π, π]."""
     azimuth = np.arctan2(points @ globe.north, points @ globe.east)
     return np.asarray((np.diff(azimuth) + np.pi) % (2 * np.pi) - np.pi)
 
 
-def _outline(points: Array, steps: Array, globe: Globe) -> Array:
+def _outline(points: FloatArray, steps: FloatArray, globe: Globe) -> FloatArray:
     """Return the projection of a ring with its far part moved to the horizon, and arcs instead of long chords there."""
     flat = globe.outline(points)
     hidden = points @ globe.up <= 0
@@ -312,7 +319,7 @@ def _outline(points: Array, steps: Array, globe: Globe) -> Array:
 def draw_land_on_map(axes: Axes) -> None:
     """Draw the land on a map of all longitudes and latitudes."""
     whole = Outline.make_compound_path(*map(Outline, rings()))
-    look: Any = {"facecolor": ink(LAND), "edgecolor": ink(0.4), "linewidth": 0.4, "zorder": 0.5, "label": "_land"}
+    look: Look = {"facecolor": ink(LAND), "edgecolor": ink(0.4), "linewidth": 0.4, "zorder": 0.5, "label": "_land"}
     axes.add_artist(PathPatch(whole, **look))
 
 
@@ -338,13 +345,13 @@ _AXES = {"x₁": (1.0, 0.0, 0.0), "x₂": (0.0, 1.0, 0.0), "x₃": (0.0, 0.0, 1.
 
 def sphere(curves: Sequence[Curve]) -> View:
     """Return the view of curves on S²: a globe and a map of longitudes and latitudes, or a part of the globe."""
-    look: Any = {"has_band": True, "has_many": True, "is_turned": True}
+    look: Look = {"has_band": True, "has_many": True, "is_turned": True}
     if _frame(_extent(curves), _SMALL_ON_SPHERE, 1.0) is not None:
         return View(_draw_sphere, **look)
     return View(_draw_sphere, 11.4, 4.6, rows=2, **look)
 
 
-def _extent(curves: Sequence[Curve], faint: bool = True) -> Array:
+def _extent(curves: Sequence[Curve], faint: bool = True) -> FloatArray:
     """Return the points of all curves, or of those that have given points."""
     return np.concatenate([own.extent for own in curves if faint or not own.faint])
 
@@ -372,38 +379,37 @@ def _draw_scale(axes: Axes, radius: float) -> None:
     (west, east), (south, north) = axes.get_xlim(), axes.get_ylim()
     length = round_below(0.25 * (east - west) * radius)
     end, height = east - 0.03 * (east - west), south + 0.06 * (north - south)
-    look: dict[str, Any] = {"color": ink(), "zorder": 7}
+    look: Look = {"color": ink(), "zorder": 7}
     axes.plot([end - length / radius, end], [height] * 2, "|-", linewidth=1.2, markersize=6, label="_scale", **look)
     middle, above = end - length / radius / 2, height + 0.015 * (north - south)
     look |= {"ha": "center", "va": "bottom", "fontsize": "small", "path_effects": halo()}
     axes.text(middle, above, f"{length:g} km" if length >= 1 else f"{1000 * length:g} m", **look)
 
 
-def bloch(_: Sequence[Curve]) -> View:
-    """Return the view of CP¹: the Bloch sphere with |0⟩ at the top or, if states are close together, a part of it."""
-
-    def draw(panel: Panel, curves: Sequence[Curve]) -> None:
-        (axes,) = panel.axes
-        points = np.concatenate([bloch_vectors(curve.extent) for curve in curves])
-        globe, is_part = _draw_globe(axes, points, points, spacing=30, lats=(10, 40), labels=_BLOCH)
-        for curve in curves:
-            # Angles between Bloch vectors are twice the distances of states.
-            radii = None if curve.radii is None else 2 * curve.radii
-            draw_polygon(axes, curve, lambda states: globe.visible(bloch_vectors(states)))
-            _draw_on_globe(axes, globe, curve, *curve.marked(bloch_vectors), radii)
-        note(axes, ("part of the Bloch sphere: longitude from x, |0⟩ is 90°N" if is_part else "Bloch sphere") + _TWICE)
-
-    return View(draw, has_many=True, is_turned=True)
+def _draw_bloch(panel: Panel, curves: Sequence[Curve]) -> None:
+    """Draw states of CP¹ on the Bloch sphere with |0⟩ at the top or, if they are close together, on a part of it."""
+    (axes,) = panel.axes
+    points = np.concatenate([bloch_vectors(curve.extent) for curve in curves])
+    globe, is_part = _draw_globe(axes, points, points, spacing=30, lats=(10, 40), labels=_BLOCH)
+    for curve in curves:
+        # Angles between Bloch vectors are twice the distances of states.
+        radii = None if curve.radii is None else 2 * curve.radii
+        draw_polygon(axes, curve, lambda states: globe.visible(bloch_vectors(states)))
+        _draw_on_globe(axes, globe, curve, *curve.marked(bloch_vectors), radii)
+    note(axes, ("part of the Bloch sphere: longitude from x, |0⟩ is 90°N" if is_part else "Bloch sphere") + _TWICE)
 
 
-def bloch_vectors(states: Any) -> Array:
+BLOCH = View(_draw_bloch, has_many=True, is_turned=True)
+
+
+def bloch_vectors(states: AnyArray) -> FloatArray:
     """Return the unit vectors of states of shape (m, 2) or (m, 2, 1). They do not depend on the phase."""
     a, b = states.reshape(-1, 2).T
     across = 2 * a.conj() * b
     return np.stack([across.real, across.imag, np.abs(a) ** 2 - np.abs(b) ** 2], axis=-1)
 
 
-def _hemisphere(what: str, vectors: Callable[[Any], Array]) -> View:
+def _hemisphere(what: str, vectors: Numbers) -> View:
     """Return the view of lines, given by unit vectors: a hemisphere or, if they are close together, a part of it."""
 
     def draw(panel: Panel, curves: Sequence[Curve]) -> None:
@@ -441,7 +447,9 @@ PLANES = _hemisphere("plane", lambda bases: np.cross(bases[..., 0], bases[..., 1
 # ---- on a globe ----
 
 
-def _draw_on_globe(axes: Axes, globe: Globe, curve: Curve, line: Array, given: Array, radii: Array | None) -> None:
+def _draw_on_globe(
+    axes: Axes, globe: Globe, curve: Curve, line: FloatArray, given: FloatArray, radii: FloatArray | None
+) -> None:
     """Draw a curve on a globe, dashed on the far side.
 
     ``line`` and ``given`` are the unit vectors of samples and of given points, shape (m, 3). ``radii`` are the angular
@@ -462,7 +470,7 @@ def _draw_on_globe(axes: Axes, globe: Globe, curve: Curve, line: Array, given: A
     draw_dots(axes, curve, globe.hidden(given), alpha=0.35)
 
 
-def _frame(vectors: Array, small: float, ratio: float) -> tuple[Globe, Array, Array] | None:
+def _frame(vectors: FloatArray, small: float, ratio: float) -> tuple[Globe, FloatArray, FloatArray] | None:
     """Return globe, centre and half sides of a frame around vectors; None if they are not close together.
 
     ``ratio`` is that of width and height.
@@ -482,8 +490,8 @@ def _frame(vectors: Array, small: float, ratio: float) -> tuple[Globe, Array, Ar
 
 def _draw_globe(
     axes: Axes,
-    vectors: Array,
-    seen: Array,
+    vectors: FloatArray,
+    seen: FloatArray,
     small: float = _SMALL,
     spacing: int = 15,
     lats: tuple[float, float] = (-90, 90),
@@ -524,7 +532,7 @@ def _draw_globe(
     return globe, False
 
 
-def caps(points: Array, radii: Array) -> Array:
+def caps(points: FloatArray, radii: FloatArray) -> FloatArray:
     """Return the rims of spherical caps around points, shape (m, k, 3)."""
     radii = np.minimum(radii, _WIDEST)[:, None, None]
     aside = np.cross(points, np.eye(3)[np.abs(points).argmin(axis=1)])
@@ -536,13 +544,13 @@ def caps(points: Array, radii: Array) -> Array:
 # ---- on the hemisphere ----
 
 
-def lifted(vectors: Array) -> Array:
+def lifted(vectors: FloatArray) -> FloatArray:
     """Choose the signs of unit vectors ±x along a curve, shape (m, 3), so that they do not jump."""
     turned = np.sum(vectors[1:] * vectors[:-1], axis=1) < 0
     return np.asarray(vectors * np.cumprod(np.append(1.0, np.where(turned, -1.0, 1.0)))[:, None])
 
 
-def sides(line: Array, pole: Array = _NORTH) -> Array:
+def sides(line: FloatArray, pole: FloatArray = _NORTH) -> FloatArray:
     """Return 1 above the rim and −1 below, shape (m, 1). On the rim, the sign is that of the previous sample."""
     heights = line @ pole
     return np.where(heights[_last(np.abs(heights) > _RIM)] < 0, -1.0, 1.0)[:, None]
@@ -554,7 +562,7 @@ def _last(known: NDArray[np.bool_]) -> NDArray[np.intp]:
     return np.where(last < 0, known.argmax(), last)
 
 
-def broken_at_rim(line: Array, pole: Array = _NORTH) -> Array:
+def broken_at_rim(line: FloatArray, pole: FloatArray = _NORTH) -> FloatArray:
     """Return the curve on the hemisphere around a pole, broken by NaN where it crosses the rim."""
     side = sides(line, pole)
     (crossings,) = np.nonzero(np.diff(side[:, 0]))
@@ -569,7 +577,7 @@ def broken_at_rim(line: Array, pole: Array = _NORTH) -> Array:
     return _interrupted(line * side, crossings, gaps)
 
 
-def _interrupted(line: Array, after: Any, gaps: Any) -> Array:
+def _interrupted(line: FloatArray, after: Any, gaps: Any) -> FloatArray:
     """Insert three rows after some of the rows of a line: its end, NaN, and where it begins again."""
     return np.insert(line, np.repeat(after + 1, 3), np.reshape(gaps, (-1, line.shape[1])), axis=0)
 
@@ -611,7 +619,7 @@ def _draw_map(axes: Axes, curves: Sequence[Curve], has_land: bool) -> None:
     axes.set(xlim=(lon - half, lon + half), ylim=(lat - half / 2, lat + half / 2))
 
 
-def _middle_meridian(points: Array) -> int:
+def _middle_meridian(points: FloatArray) -> int:
     """Return the longitude of the middle of a map that a curve does not leave, or else 0."""
     lon = np.sort(to_lonlat(points)[0])
     steps = np.diff(lon, append=lon[0] + 360)
@@ -622,7 +630,7 @@ def _middle_meridian(points: Array) -> int:
     return int(60 * np.rint((edge + 180) / 60)) % 360
 
 
-def _draw_band(axes: Axes, curve: Curve, positions: Array, points: Array, radii: Array) -> None:
+def _draw_band(axes: Axes, curve: Curve, positions: FloatArray, points: FloatArray, radii: FloatArray) -> None:
     """Draw the band on the map, on both sides of the date line. Caps around a pole have no rim there."""
     discs = disc_indices(curve)
     lon, lat = to_lonlat(caps(points[discs], radii[discs]))
@@ -640,13 +648,13 @@ def _draw_band(axes: Axes, curve: Curve, positions: Array, points: Array, radii:
     draw_tube(axes, curve, np.concatenate(copies))
 
 
-def lonlat_of(points: Array) -> Array:
+def lonlat_of(points: FloatArray) -> FloatArray:
     """Return longitude and latitude of samples of a curve, shape (m, 2). At a pole, keep the previous longitude."""
     lon, lat = to_lonlat(points)
     return np.column_stack([lon[_last(np.hypot(points[:, 0], points[:, 1]) > 1e-9)], lat])
 
 
-def broken(positions: Array) -> Array:
+def broken(positions: FloatArray) -> FloatArray:
     """Break a line of longitudes and latitudes, by NaN, at the date line and at the poles."""
     step = np.diff(positions[:, 0])
     short = step - 360 * np.rint(step / 360)
@@ -654,7 +662,7 @@ def broken(positions: Array) -> Array:
     return _interrupted(positions, jumps, [_gap(positions[i], positions[i + 1], short[i]) for i in jumps])
 
 
-def _gap(before: Array, after: Array, step: float) -> Any:
+def _gap(before: FloatArray, after: FloatArray, step: float) -> Any:
     """Return the points where a line to the east, ``step`` degrees long, leaves and enters the map; NaN between."""
     if abs(step) > _POLE:
         pole = np.copysign(90, before[1])

@@ -11,8 +11,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MultipleLocator
-from numpy.typing import NDArray
 
+from .._base.typing import AnyArray, FloatArray, Look
 from .._core import ValidationError
 from .._spaces import Space
 from .curves import Curve, are_compared
@@ -30,9 +30,9 @@ from .panels import (
     time_axes,
     timeline,
 )
-from .style import DATA, SUBSCRIPTS, Array, Indices, axes_size, distinct, ink, legend, named_from, round_start
+from .style import DATA, SUBSCRIPTS, Indices, Numbers, axes_size, distinct, ink, legend, named_from, round_start
 
-_Drawn = Sequence[tuple[Array, Array]]
+_Drawn = Sequence[tuple[FloatArray, FloatArray]]
 """Numbers of the samples of each curve, and of its given points."""
 _NAMED, _OTHERS = 12, 100
 """The largest numbers of components with a name, and of others."""
@@ -79,9 +79,9 @@ class Graphs:
 
     label: str
     names: Sequence[str]
-    numbers: Callable[[Any, Any], Array]
+    numbers: Callable[[Any, Any], FloatArray]
     groups: Sequence[tuple[str, Sequence[int]]] = ()
-    growth: Callable[[Array], Array] | None = None
+    growth: Callable[[FloatArray], FloatArray] | None = None
     period: float = np.inf
     has_title: bool = False
     equal_scales: bool = False
@@ -120,7 +120,7 @@ class Graphs:
             shade_quantiles(axes, batch, many[..., number] - start)
         for curve, (line, given) in zip(curves, drawn, strict=True):
             dense = len(given) > FEW_KNOTS
-            look: Any = {"color": DATA if dense else ink()} if curve.noise is None and curve.alone else {}
+            look: Look = {"color": DATA if dense else ink()} if curve.noise is None and curve.alone else {}
             look |= {"markersize": float(np.clip(30 / np.sqrt(max(len(given), 1)), 1.2, 3))}
             look |= {"zorder": 1.8} if dense else {}
             values = curve.graph(line[:, number] - start)
@@ -187,13 +187,13 @@ def _start(drawn: _Drawn, number: int) -> Any:
 
 
 def _without_jumps(
-    curves: Sequence[Curve], numbers: Callable[[Curve], Callable[[Any], Array]], period: float
-) -> list[tuple[Array, Array]]:
+    curves: Sequence[Curve], numbers: Callable[[Curve], Numbers], period: float
+) -> list[tuple[FloatArray, FloatArray]]:
     """Return numbers of the samples and of the given points of every curve, without jumps by the period.
 
     All curves begin close to the first one. Data are close to it at their times.
     """
-    made: list[tuple[Array, Array]] = []
+    made: list[tuple[FloatArray, FloatArray]] = []
     for curve in curves:
         line, given = curve.marked(numbers(curve))
         if np.isfinite(period):
@@ -208,7 +208,7 @@ def _without_jumps(
     return made
 
 
-def _unwrapped(lines: Array, period: float, start: Array) -> Array:
+def _unwrapped(lines: FloatArray, period: float, start: FloatArray) -> FloatArray:
     """Return numbers that begin close to a start and do not jump in time, which is the last axis but one."""
     if np.isinf(period):
         return lines
@@ -216,7 +216,7 @@ def _unwrapped(lines: Array, period: float, start: Array) -> Array:
     return np.asarray(lines - period * np.rint((lines[..., :1, :] - start) / period))
 
 
-def _choose(names: Sequence[str], ranges: Array, numbers: Sequence[int]) -> tuple[list[int], list[int]]:
+def _choose(names: Sequence[str], ranges: FloatArray, numbers: Sequence[int]) -> tuple[list[int], list[int]]:
     """Return the numbers with names, and the others. Real and imaginary parts stay together."""
     if len(numbers) <= _NAMED:
         return list(numbers), []
@@ -235,7 +235,7 @@ def _choose(names: Sequence[str], ranges: Array, numbers: Sequence[int]) -> tupl
     return named, sorted(set(numbers) - set(named))
 
 
-def _looks(names: Sequence[str]) -> list[dict[str, Any]]:
+def _looks(names: Sequence[str]) -> list[Look]:
     """Return colour and line style of every number. An imaginary part is dashed in the colour of its real part."""
     is_complex = any(name.startswith("Im ") for name in names)
     made, entry = [], -1
@@ -249,7 +249,7 @@ def _looks(names: Sequence[str]) -> list[dict[str, Any]]:
 
 # Points of S¹ have the angle of a unit vector. Points of RP¹ and Gr(1, 2) are lines, whose angle has the period π.
 # Points of SO(2) and O(2) have the angle of the first axis, and points of U(1) their phase.
-ANGLES: dict[str, tuple[Callable[[Any], Array], float]] = {
+ANGLES: dict[str, tuple[Numbers, float]] = {
     "sphere:1": (lambda points: np.arctan2(points[:, 1], points[:, 0]), 2 * np.pi),
     "rp:1 gr:1,2": (lambda lines: np.arctan2(lines[:, 1], lines[:, 0]).ravel(), np.pi),
     "so:2 o:2": (lambda matrices: np.arctan2(matrices[:, 1, 0], matrices[:, 0, 0]), 2 * np.pi),
@@ -258,7 +258,7 @@ ANGLES: dict[str, tuple[Callable[[Any], Array], float]] = {
 """The angle of points, and its period."""
 
 
-def angle(angles: Callable[[Any], Array], period: float) -> View:
+def angle(angles: Numbers, period: float) -> View:
     """Return the view of an angle against time, without jumps."""
     graph = Graphs(
         "",
@@ -279,7 +279,7 @@ def _several(
     curves: Sequence[Curve],
     label: str,
     names: Sequence[str],
-    numbers: Callable[[Any, Any], Array],
+    numbers: Callable[[Any, Any], FloatArray],
     period: float = np.inf,
 ) -> View:
     """Return the view of several numbers in the same axes.
@@ -313,7 +313,7 @@ def components(curves: Sequence[Curve]) -> View:
     return _several(curves, "components", [names[i] for i in kept], lambda _, points: real_numbers(points)[:, kept])
 
 
-def real_numbers(points: NDArray[Any]) -> Array:
+def real_numbers(points: AnyArray) -> FloatArray:
     """Return one row per point, in which the real and imaginary parts of complex numbers alternate."""
     flat = np.ascontiguousarray(points.reshape(len(points), -1))
     return flat.view(np.float64) if np.iscomplexobj(flat) else flat
@@ -365,7 +365,7 @@ def angles_to_first(curves: Sequence[Curve]) -> View:
     n, k = np.reshape(curves[0].points[0], (len(curves[0].points[0]), -1)).shape
     names = [f"θ{i + 1}".translate(SUBSCRIPTS) for i in range(min(k, n - k))]
 
-    def numbers(first: Any, points: Any) -> Array:
+    def numbers(first: Any, points: AnyArray) -> FloatArray:
         return principal_angles(points, first)[:, : len(names)]
 
     view = _several(curves, "principal angles to\nfirst point, degrees", names, numbers)
@@ -381,7 +381,7 @@ def angles_to_first(curves: Sequence[Curve]) -> View:
     return view._replace(draw=draw)
 
 
-def principal_angles(points: NDArray[Any], first: NDArray[Any]) -> Array:
+def principal_angles(points: AnyArray, first: AnyArray) -> FloatArray:
     """Return the principal angles between a subspace and others in degrees, the largest first; shape (m, k).
 
     The sines are accurate for small angles, and the cosines for large ones.

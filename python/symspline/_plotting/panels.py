@@ -19,8 +19,9 @@ from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import Affine2D
 from numpy.typing import NDArray
 
+from .._base.typing import FloatArray, Look
 from .curves import Axis, Batch, Curve, common_gaps
-from .style import DATA, DOTTED, GAP, Array, Indices, axes_size, evenly, ink, note, plain, scale_of, show_dates
+from .style import DATA, DOTTED, GAP, Indices, Numbers, axes_size, evenly, ink, note, plain, scale_of, show_dates
 
 FEW_KNOTS, _TICKS = 40, 300
 """The largest numbers of knots that have lines, and ticks."""
@@ -149,7 +150,7 @@ def mark_knots(axes: Axes, curves: Sequence[Curve]) -> None:
     knots = np.unique(np.concatenate([curve.marks for curve in curves if not curve.faint]))
     lines = len(knots) <= FEW_KNOTS and curves[0].noise is None
     if len(knots) <= _TICKS:
-        look: Any = {"transform": axes.get_xaxis_transform(), "color": ink(0.4), "linewidth": 0.8, "zorder": 1}
+        look: Look = {"transform": axes.get_xaxis_transform(), "color": ink(0.4), "linewidth": 0.8, "zorder": 1}
         look |= {"linestyle": DOTTED if lines else "-", "label": fresh(axes, curves[0].name_of_marks)}
         axes.vlines(knots, 0, 1.0 if lines else 0.04, **look)
 
@@ -164,11 +165,11 @@ def _mark_gaps(axes: Axes, curves: Sequence[Curve]) -> None:
         banded = curves[0].noise is not None and curves[0].noise.speed is not None
         label += f", {'acceleration' if banded else 'rates'} not drawn"
     spans = [(start, end - start) for start, end in gaps.tolist()]
-    look: Any = {"transform": axes.get_xaxis_transform(), "facecolor": GAP, "linewidth": 0, "zorder": 0.5}
+    look: Look = {"transform": axes.get_xaxis_transform(), "facecolor": GAP, "linewidth": 0, "zorder": 0.5}
     axes.broken_barh(spans, (0, 1), label=fresh(axes, label), **look)
 
 
-def _lengths(gaps: Array, axis: Axis) -> str:
+def _lengths(gaps: FloatArray, axis: Axis) -> str:
     """Describe the lengths of gaps, given on matplotlib's axis, in seconds if the axis has a unit."""
     longest = float(np.diff(gaps).max()) * (86_400 if axis.dates else 1)
     length = f"{longest:.3g}"
@@ -197,7 +198,7 @@ _AFTER_COLOR = "#6aa5d8"
 MANY = 150
 """A larger number of points is drawn behind the curve, which they would hide."""
 _ANGLES = np.linspace(0, 2 * np.pi, 24, endpoint=False)
-CIRCLE: Array = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=-1)
+CIRCLE: FloatArray = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=-1)
 """Positions on the unit circle."""
 _HEAD = np.array([[0.09, 0.0], [-0.06, 0.065], [-0.025, 0.0], [-0.06, -0.065]])
 """Corners of an arrow head in inches."""
@@ -215,7 +216,7 @@ def fresh(axes: Any, label: str) -> str:
 # ---- lines and points ----
 
 
-def draw_line(axes: Axes, curve: Curve, positions: Array, **look: Any) -> None:
+def draw_line(axes: Axes, curve: Curve, positions: FloatArray, **look: Any) -> None:
     """Draw a line through positions of shape (m, 2) or (m, 3)."""
     if not curve.has_line:
         return
@@ -237,7 +238,7 @@ def draw_line(axes: Axes, curve: Curve, positions: Array, **look: Any) -> None:
     plot_line(axes, curve, positions, **look)
 
 
-def plot_line(axes: Axes, curve: Curve, positions: Array, **look: Any) -> None:
+def plot_line(axes: Axes, curve: Curve, positions: FloatArray, **look: Any) -> None:
     """Draw a line, thin and dashed in long gaps."""
     if len(positions) == len(curve.x) and not curve.faint:
         curve.tracks.append((axes, curve.x, positions))
@@ -255,19 +256,19 @@ def plot_line(axes: Axes, curve: Curve, positions: Array, **look: Any) -> None:
     line.set_gid(LINE)
 
 
-def draw_end(axes: Axes, curve: Curve, end: Array, **look: Any) -> None:
+def draw_end(axes: Axes, curve: Curve, end: FloatArray, **look: Any) -> None:
     """Draw a square at the end of a curve, shape (1, 2) or (1, 3), unless it is closed."""
     if curve.noise is None and curve.has_line and not curve.faint and not curve.is_closed:
-        own: Any = {"markersize": 7 if curve.alone else 5, "markeredgecolor": ink(0), "zorder": 6.6}
+        own: Look = {"markersize": 7 if curve.alone else 5, "markeredgecolor": ink(0), "zorder": 6.6}
         axes.plot(*end.T, "s", color=curve.color_of_dots, label=fresh(axes, END), **own | look)
 
 
-def draw_dots(axes: Axes, curve: Curve, positions: Array, **look: Any) -> None:
+def draw_dots(axes: Axes, curve: Curve, positions: FloatArray, **look: Any) -> None:
     """Draw given points, shape (N+1, 2) or (N+1, 3). The first is hollow; noisy data are small and light."""
     if curve.faint:
         return
     count = max(len(positions), 1)
-    dots: Any = {"linestyle": "none", "marker": "o"}
+    dots: Look = {"linestyle": "none", "marker": "o"}
     if not curve.has_line:
         look = {"markersize": float(np.clip(60 / np.sqrt(count), 3, 8)), "markerfacecolor": "none", "zorder": 7} | look
         axes.plot(*positions.T, color=curve.color, label=fresh(axes, curve.label or "data"), **dots | look)
@@ -294,17 +295,17 @@ def draw_dots(axes: Axes, curve: Curve, positions: Array, **look: Any) -> None:
         axes.plot(*positions[:1].T, label=fresh(axes, START), **dots | look)
 
 
-def draw_polygon(axes: Axes, curve: Curve, positions: Callable[[Any], Array]) -> None:
+def draw_polygon(axes: Axes, curve: Curve, positions: Numbers) -> None:
     """Draw the control polygon at positions of shape (m, 2) or (m, 3)."""
     if curve.polygon is None:
         return
     line, control = map(positions, curve.polygon)
     axes.plot(*line.T, color=curve.color, linewidth=0.9, alpha=0.5, zorder=3.3)
-    look: Any = {"color": curve.color, "markerfacecolor": ink(0), "markersize": 5, "linestyle": "none"}
+    look: Look = {"color": curve.color, "markerfacecolor": ink(0), "markersize": 5, "linestyle": "none"}
     axes.plot(*control.T, marker="s", zorder=5.5, label=fresh(axes, "control points"), **look)
 
 
-def draw_arrows(axes: Axes, curve: Curve, positions: Array, dots: Array) -> None:
+def draw_arrows(axes: Axes, curve: Curve, positions: FloatArray, dots: FloatArray) -> None:
     """Draw arrow heads on a line through positions of shape (m, 2), which may be broken by NaN, and mark its end.
 
     The scales of both axes are equal. Arrow heads are far from ``dots``, the positions of given points.
@@ -337,7 +338,7 @@ def draw_arrows(axes: Axes, curve: Curve, positions: Array, dots: Array) -> None
     (x, y), middles = (steps[at] / lengths[at, None]).T, (positions[at] + positions[at + 1]) / 2
     turns = np.stack([np.stack([x, y], axis=-1), np.stack([-y, x], axis=-1)], axis=1)
     scale = Affine2D().scale(scale_of(axes) * (1.0 if curve.alone else 0.8)) + axes.figure.dpi_scale_trans
-    look: Any = {"offsets": middles, "offset_transform": axes.transData, "clip_on": False, "zorder": 4.5}
+    look: Look = {"offsets": middles, "offset_transform": axes.transData, "clip_on": False, "zorder": 4.5}
     axes.add_collection(
         PolyCollection(list(_HEAD @ turns), facecolor=curve.color, linewidth=0, transform=scale, label="_time", **look)
     )
@@ -347,7 +348,7 @@ def draw_arrows(axes: Axes, curve: Curve, positions: Array, dots: Array) -> None
 
 
 def draw_in_plane(
-    axes: Axes, curve: Curve, flat: Callable[[Any], Array], rims: Callable[[Array, Array], Array]
+    axes: Axes, curve: Curve, flat: Numbers, rims: Callable[[FloatArray, FloatArray], FloatArray]
 ) -> None:
     """Draw a curve in a map of a surface, with its band and its points.
 
@@ -364,7 +365,9 @@ def draw_in_plane(
     draw_dots(axes, curve, given)
 
 
-def draw_graph_of(axes: Axes, curve: Curve, line: Array, given: Array, unit: Array | None, **dots: Any) -> None:
+def draw_graph_of(
+    axes: Axes, curve: Curve, line: FloatArray, given: FloatArray, unit: FloatArray | None, **dots: Any
+) -> None:
     """Draw numbers against time with their band, and those of the given points.
 
     Radii are multiplied by ``unit``; None means that there is no band. Further arguments are the look of given points.
@@ -375,7 +378,7 @@ def draw_graph_of(axes: Axes, curve: Curve, line: Array, given: Array, unit: Arr
     draw_dots(axes, curve, np.column_stack([curve.on_axis(curve.given_x), given]), **dots)
 
 
-def shade_quantiles(axes: Axes, batch: Batch, values: Array) -> list[float]:
+def shade_quantiles(axes: Axes, batch: Batch, values: FloatArray) -> list[float]:
     """Fill the area between the 5 % and the 95 % quantile of numbers, one row per curve, and return its limits."""
     low, high = np.quantile(values, [0.05, 0.95], axis=0)
     label = fresh(axes, f"5–95 % of {batch.count} curves")
@@ -383,9 +386,9 @@ def shade_quantiles(axes: Axes, batch: Batch, values: Array) -> list[float]:
     return [float(low.min()), float(high.max())]
 
 
-def fill_band(axes: Axes, curve: Curve, low: Array, high: Array) -> None:
+def fill_band(axes: Axes, curve: Curve, low: FloatArray, high: FloatArray) -> None:
     """Draw a band against time."""
-    look: Any = {"color": curve.color, "alpha": ALPHA, "linewidth": 0, "zorder": 3}
+    look: Look = {"color": curve.color, "alpha": ALPHA, "linewidth": 0, "zorder": 3}
     axes.fill_between(curve.times, low, high, label=fresh(axes, curve.band_name), **look)
 
 
@@ -394,7 +397,7 @@ def disc_indices(curve: Curve) -> Indices:
     return evenly(len(curve.x), 500)
 
 
-def draw_tube(axes: Axes, curve: Curve, rings: Array) -> None:
+def draw_tube(axes: Axes, curve: Curve, rings: FloatArray) -> None:
     """Fill discs along a curve, and the areas between neighbouring discs.
 
     ``rings`` are the rims of the discs, shape (m, k, 2). They are NaN where a disc is missing.
@@ -410,17 +413,17 @@ def draw_tube(axes: Axes, curve: Curve, rings: Array) -> None:
     path = Path.make_compound_path(*map(Path.make_compound_path_from_polys, polygons))
     # ``add_patch`` would compute the extent of every side in a slow loop.
     axes.update_datalim(rings[good].reshape(-1, 2))
-    look: Any = {"facecolor": curve.color, "alpha": ALPHA, "linewidth": 0, "zorder": 3}
+    look: Look = {"facecolor": curve.color, "alpha": ALPHA, "linewidth": 0, "zorder": 3}
     axes.add_artist(PathPatch(path, label=curve.band_name, **look))
 
 
-def _turned_left(rings: Array) -> Array:
+def _turned_left(rings: FloatArray) -> FloatArray:
     x, y = np.moveaxis(rings - rings.mean(axis=1, keepdims=True), -1, 0)
     area = np.sum(x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1), axis=1)
     return np.where((area < 0)[:, None, None], rings[:, ::-1], rings)
 
 
-def _between(first: Array, second: Array) -> Array:
+def _between(first: FloatArray, second: FloatArray) -> FloatArray:
     """Return the quadrangles that touch two neighbouring discs on both sides."""
     along = second.mean(axis=1) - first.mean(axis=1)
     corners = []

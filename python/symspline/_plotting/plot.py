@@ -17,12 +17,14 @@ from matplotlib.colors import is_color_like
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.gridspec import GridSpec
 from matplotlib.lines import Line2D
+from matplotlib.typing import ColorType
 
 from .._base.arrays import as_array, short_repr
 from .._base.disk import path_of, replacing
 from .._base.time import TimeAxis, knots_of
+from .._base.typing import Look
 from .._core import ValidationError
-from .._spaces import Product, Space, SpecialEuclidean, cover_of, factors_of, parts_of
+from .._spaces import AnySpace, Product, Space, SpecialEuclidean, cover_of, factors_of, parts_of
 from .chart import Box
 from .curves import OTHERS, Axis, Curve, common_gaps, curves_of, scatter_of
 from .panels import FRAME, LEGEND, START, Panel, View
@@ -46,7 +48,7 @@ def plot(
     *,
     ax: Any = None,
     show: bool = False,
-    color: Any = None,
+    color: ColorType | None = None,
     label: str | None = None,
     radius: float | None = None,
     **look: Any,
@@ -61,7 +63,7 @@ def plot(
 
 def page_of(
     curve: Any,
-    color: Any = None,
+    color: ColorType | None = None,
     label: str | None = None,
     radius: float | None = None,
     title: str | None = None,
@@ -168,7 +170,7 @@ def _checked_labels(labels: Any, count: int) -> list[str | None]:
     return list(labels)
 
 
-def _checked_colors(colors: Any, items: Sequence[Any], space: Space[Any]) -> list[Any]:
+def _checked_colors(colors: Any, items: Sequence[Any], space: AnySpace) -> list[Any]:
     """Return the colours of the user, or distinct ones for curves and grey ones for data."""
     if colors is not None:
         if isinstance(colors, str) or not isinstance(colors, Sequence) or len(colors) != len(items):
@@ -333,7 +335,7 @@ def save(figure: Figure, file: Any) -> None:
         figure.savefig(temporary, format=ending)
 
 
-def checked_look(file: Any, ax: Any, color: Any, label: Any, title: Any, figsize: Any, show: Any) -> dict[str, Any]:
+def checked_look(file: Any, ax: Any, color: ColorType, label: Any, title: Any, figsize: Any, show: Any) -> Look:
     """Return the options that were given as keyword arguments of the function that draws.
 
     Raises
@@ -343,7 +345,7 @@ def checked_look(file: Any, ax: Any, color: Any, label: Any, title: Any, figsize
     """
     if not isinstance(show, bool):
         raise TypeError(f"show must be True or False, not {short_repr(show)}")
-    look: dict[str, Any] = {}
+    look: Look = {}
     if color is not None:
         look["color"] = _checked_color(color, "color")
     for name, text in (("label", label), ("title", title)):
@@ -360,7 +362,7 @@ def checked_look(file: Any, ax: Any, color: Any, label: Any, title: Any, figsize
     return look
 
 
-def _checked_color(color: Any, name: str) -> Any:
+def _checked_color(color: ColorType, name: str) -> Any:
     """Return a colour in any form that matplotlib accepts."""
     try:
         valid = is_color_like(color)
@@ -422,7 +424,7 @@ def drawing(natural: tuple[float, float], figsize: Any, show: bool) -> Iterator[
     size = np.multiply(natural, larger) if figsize is None else np.asarray(figsize, float)
     share = float((size / np.multiply(natural, larger)).min())
     factor = min(1.0, max(share, min(_SMALLEST, 1.4 * share)))
-    look: Any = {"figsize": tuple(size.tolist()), "layout": "constrained"}
+    look: Look = {"figsize": tuple(size.tolist()), "layout": "constrained"}
     with rc_context({name: factor * rcParams[name] for name in _TEXT}):
         if show:
             from matplotlib import pyplot
@@ -505,7 +507,7 @@ def draw_page(
     return figure
 
 
-_ABOUT: Any = {"left": 0.07, "right": 0.97, "bottom": 0.07, "top": 0.9, "hspace": 0.04, "wspace": 0.06}
+_ABOUT: Look = {"left": 0.07, "right": 0.97, "bottom": 0.07, "top": 0.9, "hspace": 0.04, "wspace": 0.06}
 """About the margins that the layout will find. Symbols are as large as the axes permit before it does."""
 
 
@@ -513,7 +515,7 @@ def _caption(axes: Any, name: str) -> None:
     """Write the name of a factor above its picture, and above explanations that the picture has there."""
     top = max(own.get_window_extent().y1 for own in (axes._left_title, axes.get_legend()) if own is not None)
     above = 72 * (top - axes.bbox.y1) / axes.figure.dpi + 4
-    look: Any = {"xycoords": "axes fraction", "textcoords": "offset points", "ha": "center", "fontsize": "large"}
+    look: Look = {"xycoords": "axes fraction", "textcoords": "offset points", "ha": "center", "fontsize": "large"}
     axes.annotate(name, (0.5, 1), (0, above), **look)
 
 
@@ -525,10 +527,10 @@ def head(figure: Figure, body: SubFigure, title: str, words: str, curves: Sequen
     size = max(0.6, min(1.0, letters / len(title)))
     title = fill(title, max(int(letters / size), 10))
     figure.suptitle(title, x=0.01, ha="left", weight="bold", fontsize=1.7 * size * font, linespacing=1.0)
-    named: dict[str, Any] = {}
+    named: Look = {}
     for curve in (part for own in curves if not own.faint for part in own.unbroken):
         if curve.label:
-            look: Any = {} if curve.has_line else {"linestyle": "none", "marker": "o", "markerfacecolor": "none"}
+            look: Look = {} if curve.has_line else {"linestyle": "none", "marker": "o", "markerfacecolor": "none"}
             named.setdefault(curve.label, Line2D([], [], color=curve.color, linewidth=2, **look))
     for axes in body.axes:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):

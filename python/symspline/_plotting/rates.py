@@ -9,11 +9,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
+from .._base.typing import FloatArray, Look
 from .._curves.curve import SidePanel
-from .._spaces import Product, Space, SpecialEuclidean, Sphere, Torus, cover_of, factors_of, short_name
+from .._spaces import AnySpace, Product, SpecialEuclidean, Sphere, Torus, cover_of, factors_of, short_name
 from .curves import Curve
 from .panels import ALPHA, FEW_KNOTS, LINE, Panel, fill_band, fresh, plot_line, shade_quantiles, time_axes
-from .style import DATA, MARK, Array, axes_size, distinct, ink, legend
+from .style import DATA, MARK, axes_size, distinct, ink, legend
 
 NORMAL = 1.96
 """Half width of the 95 % interval of a normal distribution, in standard deviations."""
@@ -59,24 +60,24 @@ class Rate(NamedTuple):
 
     label: str
     order: int
-    values: Callable[[At], Array]
+    values: Callable[[At], FloatArray]
     signed: bool = False
     scale: float = 1.0
     whole: bool = True
-    speed: Callable[[At], Array] = lambda at: at("speed")
+    speed: Callable[[At], FloatArray] = lambda at: at("speed")
 
 
-def _turned(p: Any, v: Any) -> Array:
+def _turned(p: Any, v: Any) -> FloatArray:
     """Return the component of a vector along the direction in which the angle of a unit vector increases."""
     return np.asarray(p[..., 0] * v[..., 1] - p[..., 1] * v[..., 0])
 
 
-def _of_column(p: Any, v: Any) -> Array:
+def _of_column(p: Any, v: Any) -> FloatArray:
     return _turned(p[..., 0], v[..., 0])
 
 
 # Spaces of dimension one: a number with the sign of a velocity or an acceleration v at p.
-_SIGNS: dict[str, Callable[[Any, Any], Array]] = {
+_SIGNS: dict[str, Callable[[Any, Any], FloatArray]] = {
     "euclidean:1": lambda p, v: v[..., 0],
     "sphere:1": _turned,
     "hyperbolic:1": lambda p, v: v[..., 1],
@@ -90,13 +91,13 @@ _SIGNS: dict[str, Callable[[Any, Any], Array]] = {
 }
 
 
-def is_angular(space: Space[Any]) -> bool:
+def is_angular(space: AnySpace) -> bool:
     """Whether distances are angles."""
     own = cover_of(space)
     return isinstance(own, (Sphere, Torus)) or bool(_ANGULAR & {str(own), str(own).partition(":")[0]})
 
 
-def rates_of(space: Space[Any], seconds: bool) -> list[Rate]:
+def rates_of(space: AnySpace, seconds: bool) -> list[Rate]:
     """Return the rates of a space that is not a product."""
     own = cover_of(space)
     per = [", 1/s", ", 1/s²"] if seconds else ["", ""]
@@ -133,15 +134,15 @@ def _rates_of_poses(space: SpecialEuclidean, seconds: bool) -> list[Rate]:
     turn = ["rad/s", "rad/s²"] if seconds else ["rad/t", "rad/t²"]
     move = [", 1/s", ", 1/s²"] if seconds else ["", ""]
 
-    def turning(quantity: str) -> Callable[[At], Array]:
+    def turning(quantity: str) -> Callable[[At], FloatArray]:
         if n == 2:
             return lambda at: _of_column(at("point")[..., :2, :2], at(quantity)[..., :2, :2])
         return lambda at: np.linalg.norm(at(quantity)[..., :n, :n], axis=(-2, -1)) / np.sqrt(2)
 
-    def moving(at: At) -> Array:
+    def moving(at: At) -> FloatArray:
         return np.asarray(np.linalg.norm(at("velocity")[..., :n, n], axis=-1))
 
-    def accelerated(at: At) -> Array:
+    def accelerated(at: At) -> FloatArray:
         rate, turns = at("velocity"), at("point")[..., :n, :n]
         spin = rate[..., :n, :n] @ turns.swapaxes(-1, -2)
         return np.asarray(np.linalg.norm((at("acceleration")[..., :n, n:] + spin @ rate[..., :n, n:])[..., 0], axis=-1))
@@ -193,7 +194,7 @@ def _cut(name: str) -> str:
 def _deviation(mean: Curve, unit: str, scale: float = 1.0) -> Rate:
     """Return the number that is the distance of a curve from the mean of its batch."""
 
-    def distances(at: At) -> Array:
+    def distances(at: At) -> FloatArray:
         assert mean.batch is not None
         middle = mean.data.evaluate(mean.batch.x, "point", "raise", False)
         return scale * mean.space.distance(middle, at("point"))
@@ -254,7 +255,7 @@ def _draw_rate(axes: Axes, curves: Sequence[Curve], rate: Rate) -> None:
             drawn += _draw_values(axes, curve, rate)
     for limit in {curve.limits[0][rate.order - 1] for curve in curves if curve.limits and rate.whole} - {np.inf}:
         for bound in (limit, -limit) if rate.signed else (limit,):
-            look: Any = {"color": MARK, "linewidth": 1, "linestyle": "--", "zorder": 2}
+            look: Look = {"color": MARK, "linewidth": 1, "linestyle": "--", "zorder": 2}
             axes.axhline(rate.scale * bound, label=fresh(axes, "limit"), **look)
             drawn.append(rate.scale * bound)
     top, rounding = (top, 0.0) if moves else (1.0, rounding)
@@ -284,7 +285,7 @@ def _draw_values(axes: Axes, curve: Curve, rate: Rate) -> list[float]:
     return [float(np.nanmin(low)), float(np.nanmax(high))]
 
 
-def _rounding(curve: Curve) -> Array:
+def _rounding(curve: Curve) -> FloatArray:
     """Return the speeds that rounding errors of points explain, at all times; a curve at rest has them."""
     knots = np.asarray(curve.data.times)
     segment = np.clip(np.searchsorted(knots, curve.x, side="right") - 1, 0, len(knots) - 2)
@@ -336,7 +337,7 @@ def _draw_deviations(axes: Axes, curve: Curve, own: SidePanel) -> str:
     axes.set_ylim(-top, top)
     axes.axhspan(-NORMAL, NORMAL, facecolor=curve.color, alpha=0.08, linewidth=0, zorder=0.6)
     axes.axhline(0.0, color=ink(0.4), linewidth=0.8, zorder=1)
-    look: Any = {"linestyle": "none", "markeredgewidth": 0, "zorder": 3, "rasterized": values.size > 5000}
+    look: Look = {"linestyle": "none", "markeredgewidth": 0, "zorder": 3, "rasterized": values.size > 5000}
     size = float(np.clip(40 / np.sqrt(values.size), 1.2, 3.5))
     colors = distinct() if own.names else [DATA]
     handles = []

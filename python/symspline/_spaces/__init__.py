@@ -4,7 +4,7 @@
 
 from .._base.rounding import POINT_TOL, point_tol
 from .actions import Group
-from .base import Array, Doubles, Space
+from .base import AnySpace, Array, Doubles, Space
 from .groups import (
     Affine,
     ComplexGeneralLinear,
@@ -41,3 +41,42 @@ from .subspaces import (
     RealProjective,
 )
 from .vectors import Euclidean, Hyperbolic, Sphere, Torus
+
+# What `symspline` exports.
+__all__ = [
+    "Affine",
+    "AmbiguousMeanWarning",
+    "AntiDeSitter",
+    "ComplexGeneralLinear",
+    "ComplexGrassmannian",
+    "ComplexHyperbolic",
+    "ComplexProjective",
+    "DeSitter",
+    "Euclidean",
+    "GeneralLinear",
+    "Grassmannian",
+    "HermitianPositiveDefinite",
+    "Hyperbolic",
+    "IndefiniteGrassmannian",
+    "LogEuclidean",
+    "Lorentz",
+    "Orthogonal",
+    "Product",
+    "QuaternionicProjective",
+    "Quotient",
+    "RealProjective",
+    "Siegel",
+    "Similarity",
+    "Space",
+    "SpecialEuclidean",
+    "SpecialLinear",
+    "SpecialOrthogonal",
+    "SpecialPositiveDefinite",
+    "SpecialUnitary",
+    "Sphere",
+    "SymmetricPositiveDefinite",
+    "Symplectic",
+    "Torus",
+    "Unitary",
+    "space",
+]

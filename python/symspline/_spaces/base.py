@@ -30,9 +30,9 @@ _MOST = 2**40
 
 
 # The classes of all spaces except products, by name.
-CLASSES: dict[str, type[Space[Any]]] = {}
+CLASSES: dict[str, type[AnySpace]] = {}
 # Functions that read names of spaces derived from others, by a text that only such names contain.
-DERIVED: dict[str, Callable[[str], Space[Any]]] = {}
+DERIVED: dict[str, Callable[[str], AnySpace]] = {}
 # Complex counterparts of real spaces, for the message about complex points.
 COMPLEX_TWINS = {
     "rp": "ComplexProjective",
@@ -1172,18 +1172,22 @@ class Space(Generic[P]):
             cls.__init__ = _taking_numbers(cls, cls.__init__)  # type: ignore[method-assign]
 
 
-def example_of(cls: type[Space[Any]]) -> str:
+AnySpace = Space[Any]
+"""A space whose points may have any type, such as a product."""
+
+
+def example_of(cls: type[AnySpace]) -> str:
     """Return an example of a space of this class, as a constructor call and as a name."""
     numbers = {"gr": "2, 4", "cgr": "2, 4", "stiefel": "2, 4", "igr": "0, 1, 1, 2"}.get(cls._name, "2")
     return f"{cls.__name__}({numbers}) or '{cls._name}:{numbers.replace(' ', '')}'"
 
 
-def _taking_numbers(cls: type[Space[Any]], init: Callable[..., None]) -> Callable[..., None]:
+def _taking_numbers(cls: type[AnySpace], init: Callable[..., None]) -> Callable[..., None]:
     """Wrap a constructor so that a wrong number of arguments raises an error that names the parameters."""
     names = [*signature(init).parameters][1:]
 
     @wraps(init)
-    def checked(self: Space[Any], *numbers: Any, **named: Any) -> None:
+    def checked(self: AnySpace, *numbers: Any, **named: Any) -> None:
         # A check in advance would take longer than the constructor.
         try:
             init(self, *numbers, **named)

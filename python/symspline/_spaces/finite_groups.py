@@ -19,7 +19,7 @@ from .._base.arrays import as_array, read_only, short_repr
 from .._base.faults import warn
 from .._base.typing import FloatArray
 from .._core import ValidationError
-from .base import Array, Space
+from .base import AnySpace, Array
 
 # ---- the point groups of crystals, by their symbols ----
 
@@ -143,7 +143,7 @@ class Factor:
         The group as a text: a symbol, ``"signs"`` or the elements as JSON.
     """
 
-    def __init__(self, space: Space[Any], group: Any, side: Side) -> None:
+    def __init__(self, space: AnySpace, group: Any, side: Side) -> None:
         shape = space.point_shape
         # A vector is a row on the right, and a column on the left, of a matrix.
         size = shape[0] if side == "left" else shape[-1]
@@ -206,7 +206,7 @@ class FiniteGroup:
         return x if self.right is None else self.right.move(x, self._of_right[index], axes)
 
 
-def _read(space: Space[Any], group: Any, size: int) -> tuple[Array, str]:
+def _read(space: AnySpace, group: Any, size: int) -> tuple[Array, str]:
     """Return the elements of a group and its name."""
     if isinstance(group, str):
         return _named(space, group, size)
@@ -231,7 +231,7 @@ def _read(space: Space[Any], group: Any, size: int) -> tuple[Array, str]:
     return (elements(symbol), symbol) if symbol else (array, _as_text(array))
 
 
-def _named(space: Space[Any], name: str, size: int) -> tuple[Array, str]:
+def _named(space: AnySpace, name: str, size: int) -> tuple[Array, str]:
     if name.startswith("["):
         try:
             numbers: Array = np.array(json.loads(name), np.float64)

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from .._base.arrays import short_repr
 from .._base.typing import AnyArray, AnyArrays, FloatArray, P, PProduct
 from .._core import Handle, ValidationError
-from .base import CLASSES, DERIVED, Space, example_of
+from .base import CLASSES, DERIVED, AnySpace, Space, example_of
 from .groups import names_points, rotations_and_positions
 from .statistics import Groups
 
@@ -73,9 +73,9 @@ class Product(Space[PProduct]):
         self: Product[tuple[_A, _B, _C, _D]], a: Space[_A], b: Space[_B], c: Space[_C], d: Space[_D], /
     ) -> None: ...
     @overload
-    def __init__(self: Product[AnyArrays], *factors: Space[Any] | str) -> None: ...
+    def __init__(self: Product[AnyArrays], *factors: AnySpace | str) -> None: ...
 
-    def __init__(self, *factors: Space[Any] | str) -> None:
+    def __init__(self, *factors: AnySpace | str) -> None:
         if len(factors) < 2:
             raise ValidationError("a Product needs at least two factors")
         given = [factors_of(f) if isinstance(f, Space) else spaces_named(f) for f in factors]
@@ -207,12 +207,12 @@ class Product(Space[PProduct]):
         return list(zip(*arguments, strict=True))
 
 
-def factors_of(space: Space[Any]) -> tuple[Space[AnyArray], ...]:
+def factors_of(space: AnySpace) -> tuple[Space[AnyArray], ...]:
     """Return the factors of a product, or the space itself in a tuple."""
     return space.factors if isinstance(space, Product) else (space,)
 
 
-def parts_of(value: Any, space: Space[Any], name: str) -> Tuple:
+def parts_of(value: Any, space: AnySpace, name: str) -> Tuple:
     """Return the entries of a value that belong to each factor; in a space that is not a product, the value itself."""
     if not isinstance(space, Product):
         return (value,)
@@ -274,7 +274,7 @@ def space(name: str) -> Space: ...
 def space(name: str | Space[P]) -> Space[P]: ...
 
 
-def space(name: str | Space[Any]) -> Space[Any]:
+def space(name: str | AnySpace) -> AnySpace:
     """Return the space with a name.
 
     Parameters
@@ -313,7 +313,7 @@ def space(name: str | Space[Any]) -> Space[Any]:
 space_named = space
 
 
-def short_name(space: Space[Any]) -> str:
+def short_name(space: AnySpace) -> str:
     """Return the shortest name that `symspline.space` accepts, such as "so:3 x r:3"."""
     return str(space).replace("euclidean:", "r:").replace("hyperbolic:", "h:")
 
@@ -330,7 +330,7 @@ def spaces_named(name: Any) -> list[Space]:
 
 
 @lru_cache
-def _space_of(name: str) -> Space[Any]:
+def _space_of(name: str) -> AnySpace:
     """Return the space with a name. Spaces do not change, and to create one takes longer than a fit of few points."""
     factors = spaces_named(name)
     return factors[0] if len(factors) == 1 else Product(*factors)
@@ -368,7 +368,7 @@ def _whole(cls: Any) -> str:
     return f"give its dimension, such as {example_of(cls)}"
 
 
-def _named(name: str) -> Space[Any]:
+def _named(name: str) -> AnySpace:
     for mark, read in DERIVED.items():
         if mark in name:
             return read(name)

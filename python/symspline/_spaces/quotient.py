@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from .._base.arrays import short_repr, whole_number
 from .._base.typing import P
 from .._core import CutLocusError, ValidationError
-from .base import DERIVED, Array, Space
+from .base import DERIVED, AnySpace, Array, Space
 from .finite_groups import Factor, FiniteGroup, Indices, Nearest, along_path, nearest_of, over_grid
 from .groups import SpecialOrthogonal, SpecialUnitary, names_points
 from .product import Product, factors_of, space_named
@@ -356,7 +356,7 @@ class Quotient(Space[P]):
         return _restored, (self.cover, left, right)
 
 
-def _restored(cover: Space[Any], left: Array | None, right: Array | None) -> Quotient[Any]:
+def _restored(cover: AnySpace, left: Array | None, right: Array | None) -> Quotient[Any]:
     """Return the quotient that a pickle describes."""
     if right is None:
         return Quotient(cover, left, left=True)
@@ -371,12 +371,12 @@ def _class_of(kind: type[Any]) -> type[Any]:
     return _CLASSES[kind]
 
 
-def cover_of(space: Space[Any]) -> Space[Any]:
+def cover_of(space: AnySpace) -> AnySpace:
     """Return the space of representatives of a quotient; any other space is returned unchanged."""
     return space.cover if isinstance(space, Quotient) else space
 
 
-def refuse_quotients(space: Space[Any], what: str) -> None:
+def refuse_quotients(space: AnySpace, what: str) -> None:
     """Raise ValidationError if the space or a factor of it is a quotient."""
     for factor in factors_of(space):
         if isinstance(factor, Quotient):
@@ -386,7 +386,7 @@ def refuse_quotients(space: Space[Any], what: str) -> None:
             )
 
 
-def _factors(cover: Space[Any], group: Any, left: Any) -> tuple[Factor | None, Factor | None]:
+def _factors(cover: AnySpace, group: Any, left: Any) -> tuple[Factor | None, Factor | None]:
     """Return the groups that multiply from the left and from the right."""
     if isinstance(left, (bool, np.bool_)):
         symmetry = getattr(group, "symmetry", None)
@@ -402,7 +402,7 @@ def _factors(cover: Space[Any], group: Any, left: Any) -> tuple[Factor | None, F
     return Factor(cover, left, "left"), Factor(cover, group, "right")
 
 
-def _is_phases(cover: Space[Any], group: Factor) -> bool:
+def _is_phases(cover: AnySpace, group: Factor) -> bool:
     """Whether a group consists of all n-th roots of unity, on SU(n)."""
     n = cover.point_shape[0]
     if not isinstance(cover, SpecialUnitary) or group.elements.shape != (n,):
@@ -417,7 +417,7 @@ def _shown(group: Factor) -> str:
     return group.name if len(group.name) < 40 else f"<{len(group.elements)} elements>"
 
 
-def _check_isometries(cover: Space[Any], group: FiniteGroup) -> None:
+def _check_isometries(cover: AnySpace, group: FiniteGroup) -> None:
     """Raise ValidationError unless all transformations map the space to itself isometrically, at a random geodesic."""
     rng = np.random.default_rng(0)
     try:

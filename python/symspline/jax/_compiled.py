@@ -14,7 +14,7 @@ from .._autodiff.curves import second_fundamental_form
 from .._base.typing import CurveOptions
 from .._curves.ends import ends_in_factors
 from .._curves.options import order_of
-from .._spaces import Product, Space, parts_of, refuse_quotients, space_named
+from .._spaces import AnySpace, Product, Space, parts_of, refuse_quotients, space_named
 from ..manifolds._manifold import refuse_functions
 from ._primitives import Fixed, fit_p, jvp_p
 
@@ -34,7 +34,7 @@ def curve(
 
 
 def curve(
-    x: Any, t: Any, points: Any, space: Space[Any] | str, *, nu: int = 0, bc_type: Any = "natural", **options: Any
+    x: Any, t: Any, points: Any, space: AnySpace | str, *, nu: int = 0, bc_type: Any = "natural", **options: Any
 ) -> Any:
     """Evaluate a spline through points by the compiled core, with derivatives in JAX.
 

@@ -10,7 +10,7 @@ import torch
 from .._autodiff.compiled import fitted, movable, split
 from .._base.typing import CurveOptions
 from .._curves.ends import ends_in_factors
-from .._spaces import Product, Space, parts_of, space_named
+from .._spaces import AnySpace, Product, Space, parts_of, space_named
 from ..manifolds._manifold import refuse_functions
 
 
@@ -22,7 +22,7 @@ def curve(x: Any, t: Any, points: Any, space: Space | str, **options: Unpack[Cur
 def curve(x: Any, t: Any, points: Any, space: Product, **options: Unpack[CurveOptions]) -> tuple[torch.Tensor, ...]: ...
 
 
-def curve(x: Any, t: Any, points: Any, space: Space[Any] | str, *, bc_type: Any = "natural", **options: Any) -> Any:
+def curve(x: Any, t: Any, points: Any, space: AnySpace | str, *, bc_type: Any = "natural", **options: Any) -> Any:
     """Evaluate a spline through points, with derivatives in PyTorch.
 
     The result equals ``CubicSpline(t, points, space, ...)(x)``. First derivatives with respect to x, t, points and the

@@ -13,11 +13,11 @@ import torch
 
 from .._autodiff import curves
 from .._autodiff.condition import Problem, cyclic_reduction
-from .._autodiff.library import Library, divided_logarithm, hermitian, matrix_derivative
+from .._autodiff.library import Library, Tensor, divided_logarithm, hermitian, matrix_derivative
 from .._base.arrays import short_repr
 from .._core import ConvergenceError, ValidationError
 from .._curves.ends import ends_in_factors
-from .._spaces import Product, Space, parts_of
+from .._spaces import AnySpace, Product, Space, parts_of
 
 
 def tensor(value: Any, name: str, like: torch.Tensor | None = None) -> torch.Tensor:
@@ -48,13 +48,13 @@ def tensor(value: Any, name: str, like: torch.Tensor | None = None) -> torch.Ten
     return found if found.is_floating_point() else found.to(torch.get_default_dtype())
 
 
-def promoted(space: Space[Any], points: Any, *others: Any) -> tuple[torch.Tensor, ...]:
+def promoted(space: AnySpace, points: Tensor, *others: Tensor) -> tuple[torch.Tensor, ...]:
     """Convert points, and arrays of their shape, to tensors in the precision of the points."""
     first = tensor(points, "points")
     return first, *(tensor(other, "velocities", first) for other in others)
 
 
-def constant(array: Any, like: Any) -> Any:
+def constant(array: Tensor, like: Any) -> Tensor:
     """Return an array of NumPy as a tensor, in the precision and on the device of another one."""
     return torch.as_tensor(array, dtype=like.dtype, device=like.device)
 
@@ -72,17 +72,17 @@ class _Logarithm(torch.autograd.Function):
     generate_vmap_rule = True
 
     @staticmethod
-    def forward(a: Any, *directions: Any) -> Any:
+    def forward(a: Tensor, *directions: Tensor) -> Tensor:
         values, vectors = torch.linalg.eigh(a)
         return matrix_derivative(torch, _divided_logarithm, values, vectors, directions)
 
     @staticmethod
-    def setup_context(ctx: Any, inputs: Any, output: Any) -> None:
+    def setup_context(ctx: Any, inputs: Tensor, output: Tensor) -> None:
         ctx.save_for_backward(*inputs)
         ctx.save_for_forward(*inputs)
 
     @staticmethod
-    def backward(ctx: Any, *cotangents: Any) -> Any:
+    def backward(ctx: Any, *cotangents: Tensor) -> Tensor:
         a, *directions = ctx.saved_tensors
         along = hermitian(cotangents[0])
         found: list[Any] = [_Logarithm.apply(a, *directions, along) if ctx.needs_input_grad[0] else None]
@@ -92,7 +92,7 @@ class _Logarithm(torch.autograd.Function):
         return tuple(found)
 
     @staticmethod
-    def jvp(ctx: Any, *changes: Any) -> Any:
+    def jvp(ctx: Any, *changes: Tensor) -> Tensor:
         a, *directions = ctx.saved_tensors
         moved = None
         for i, change in enumerate(changes):
@@ -103,22 +103,22 @@ class _Logarithm(torch.autograd.Function):
         return moved
 
 
-def logarithm(a: Any) -> Any:
+def logarithm(a: Tensor) -> Tensor:
     """Return log of positive definite matrices, shape (..., n, n)."""
     return _Logarithm.apply(hermitian(a))
 
 
-def _solve_lower(root: Any, x: Any) -> Any:
+def _solve_lower(root: Tensor, x: Tensor) -> Tensor:
     return torch.linalg.solve_triangular(root, x, upper=False)
 
 
-def _fold(step: Any, value: Any, numbers: Any) -> Any:
+def _fold(step: Any, value: Any, numbers: Tensor) -> Tensor:
     for number in numbers:
         value = step(value, number)
     return value
 
 
-def along(function: Any, x: Any) -> tuple[Any, Any]:
+def along(function: Any, x: Tensor) -> tuple[Tensor, Tensor]:
     """Return values of a function of times, and their derivatives with respect to these.
 
     The derivative in forward mode is that of the derivative in reverse mode with respect to the cotangent, which
@@ -129,7 +129,7 @@ def along(function: Any, x: Any) -> tuple[Any, Any]:
     return values, torch.func.vjp(lambda cotangent: backward(cotangent)[0], zero)[1](torch.ones_like(x))[0]
 
 
-def search(t: Any, x: Any) -> Any:
+def search(t: Tensor, x: Tensor) -> Tensor:
     """Return the number of knots up to times, both along the last axis."""
     return torch.searchsorted(t.detach().contiguous(), x.detach().contiguous(), right=True)
 
@@ -171,7 +171,7 @@ def evaluate(
 ) -> tuple[torch.Tensor, ...]: ...
 
 
-def evaluate(t: Any, points: Any, velocities: Any, space: Space[Any] | str, x: Any, *, nu: int = 0) -> Any:
+def evaluate(t: Any, points: Any, velocities: Any, space: AnySpace | str, x: Any, *, nu: int = 0) -> Tensor:
     """Evaluate curves with given knots, points and velocities, in PyTorch alone.
 
     This is `symspline.evaluate` written in PyTorch. It runs on the device and in the precision of the points, and is
@@ -238,7 +238,7 @@ def fit(t: Any, points: Any, space: Space | str, *, bc_type: Any = "natural") ->
 def fit(t: Any, points: Any, space: Product, *, bc_type: Any = "natural") -> tuple[torch.Tensor, ...]: ...
 
 
-def fit(t: Any, points: Any, space: Space[Any] | str, *, bc_type: Any = "natural") -> Any:
+def fit(t: Any, points: Any, space: AnySpace | str, *, bc_type: Any = "natural") -> Tensor:
     """Compute the velocities of C² splines through points, in PyTorch alone.
 
     This is `symspline.fit` written in PyTorch. It runs on the device and in the precision of the points. First and
@@ -304,7 +304,7 @@ def fit(t: Any, points: Any, space: Space[Any] | str, *, bc_type: Any = "natural
     return leave(_velocities(problem))
 
 
-def _residual(problem: Problem, u: Any) -> Any:
+def _residual(problem: Problem, u: Tensor) -> Tensor:
     """Return the residual, in which the normal part of u counts as such, so that the solution is tangent."""
     tangent = problem.chain.tangent(problem.p, u)
     middle = problem.weights()[1]
@@ -312,7 +312,7 @@ def _residual(problem: Problem, u: Any) -> Any:
     return found + problem.chain.model.times(middle, u - tangent)
 
 
-def _velocities(problem: Problem) -> Any:
+def _velocities(problem: Problem) -> Tensor:
     """Return velocities that are differentiable functions of the data."""
     arrays = ("h", "p", "first", "last")
     u, jacobian = _solution(problem._replace(**{name: getattr(problem, name).detach() for name in arrays}))
@@ -321,7 +321,7 @@ def _velocities(problem: Problem) -> Any:
     return u
 
 
-def _solution(problem: Problem) -> tuple[Any, Any]:
+def _solution(problem: Problem) -> tuple[Tensor, Tensor]:
     """Return the velocities that solve a problem without derivatives, and the Jacobian there."""
     u, middle = _start(problem), problem.weights()[1]
     # In double precision 4e-11, from where a further step reaches rounding. Points that are equal up to rounding have
@@ -345,7 +345,7 @@ def _solution(problem: Problem) -> tuple[Any, Any]:
     raise error
 
 
-def _start(problem: Problem) -> Any:
+def _start(problem: Problem) -> Tensor:
     """Return the velocities of parabolas through three points in flat space, or given ones (Bessel's method).
 
     From zero velocities, whose handles are at the points, the Jacobian is almost singular for points π/2 apart.
@@ -361,7 +361,7 @@ def _start(problem: Problem) -> Any:
     return torch.cat([first[None], inner, last[None]])
 
 
-def _jacobian(problem: Problem, u: Any) -> Any:
+def _jacobian(problem: Problem, u: Tensor) -> Tensor:
     """Return the blocks below, on and above the diagonal, shape (n, 3, *batch, k, k).
 
     A residual depends on the velocities of its own node and of the next ones on either side. So the residuals of every
@@ -385,12 +385,12 @@ def _jacobian(problem: Problem, u: Any) -> Any:
     return torch.cat([zero, found, zero])[moving, (node % 3)[:, None]]
 
 
-def _solved(jacobian: Any, rows: Any) -> Any:
+def _solved(jacobian: Tensor, rows: Tensor) -> Tensor:
     """Solve the block tridiagonal systems for the residuals of all nodes."""
     flat = rows.reshape(*jacobian.shape[:1], *jacobian.shape[2:-1], 1)
     below, diagonal, above = jacobian.unbind(1)
     return cyclic_reduction(torch, _solve_blocks, below, diagonal, above, flat).reshape(rows.shape)
 
 
-def _solve_blocks(diagonal: Any, *columns: Any) -> Any:
+def _solve_blocks(diagonal: Tensor, *columns: Tensor) -> Tensor:
     return torch.linalg.solve(diagonal, torch.cat(columns, dim=-1)).split([a.shape[-1] for a in columns], dim=-1)

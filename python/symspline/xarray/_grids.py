@@ -11,7 +11,7 @@ import xarray as xr
 from .._core import ValidationError
 from .._curves.options import checked_extrapolate, extrapolation_mode
 from .._grid import GridSpline
-from .._spaces import Array, Space, space_named
+from .._spaces import AnySpace, Array, space_named
 from ._labels import in_radians, in_units_of, times_along
 from ._spec import KNOTS, LINE, Inputs, apply, check_names, check_whole, rehearse, times_with_names
 
@@ -34,7 +34,7 @@ class _Axis(NamedTuple):
 
 def resample_grid(
     da: xr.DataArray,
-    space: Space[Any] | str,
+    space: AnySpace | str,
     to: Mapping[str, Any],
     *,
     point_dims: Sequence[str],
@@ -154,7 +154,7 @@ def _joined(
 
 
 def _gridded(
-    points: Array, *x: Array, space: Space[Any], how: dict[str, Any], nodes: list[Array | None], offsets: list[int]
+    points: Array, *x: Array, space: AnySpace, how: dict[str, Any], nodes: list[Array | None], offsets: list[int]
 ) -> Array:
     """Values of the splines of a block, one per batch index."""
     first = points.ndim - len(space.point_shape) - len(nodes)

@@ -15,7 +15,7 @@ from .._base.faults import warn
 from .._base.report import ConvergenceWarning
 from .._core import ValidationError
 from .._curves.missing import Mask, missing_points, missing_times
-from .._spaces import Array, Space, Torus, space_named
+from .._spaces import AnySpace, Array, Torus, space_named
 from .._spaces.degrees import is_degrees, look_like_degrees
 from .._splines.cubic import CubicSpline
 from .._splines.functional import fit_many
@@ -79,7 +79,7 @@ def _are_times(name: Hashable, coordinate: xr.DataArray) -> bool:
 # ---- angles in degrees, by the attribute ``units`` of an array ----
 
 
-def in_radians(da: Any, space: Space[Any] | str) -> Any:
+def in_radians(da: Any, space: AnySpace | str) -> Any:
     """Return points with the angles of a torus in radians, by their attribute ``units``; others do not change.
 
     Warns
@@ -102,7 +102,7 @@ def in_radians(da: Any, space: Space[Any] | str) -> Any:
     return da
 
 
-def in_units_of(values: xr.DataArray, da: xr.DataArray, space: Space[Any]) -> xr.DataArray:
+def in_units_of(values: xr.DataArray, da: xr.DataArray, space: AnySpace) -> xr.DataArray:
     """Return points of `space` with the attributes of `da`, angles of a torus in its units."""
     if isinstance(space, Torus) and is_degrees(da.attrs.get("units", "")):
         values = values * (180 / np.pi)
@@ -141,7 +141,7 @@ def of_equal_length(valid: Mask) -> Iterator[tuple[NDArray[np.intp], NDArray[np.
 
 
 def fit_valid(
-    points: Array, t: Array | None, named: dict[str, Array], space: Space[Any], kinds: Any, how: dict[str, Any]
+    points: Array, t: Array | None, named: dict[str, Array], space: AnySpace, kinds: Any, how: dict[str, Any]
 ) -> tuple[Array, Array, list[CubicSpline[Any]]]:
     """Fit each curve of a block to its valid samples.
 

@@ -19,7 +19,7 @@ from .._curves.missing import missing_points, missing_times
 from .._curves.options import checked_extrapolate, extrapolation_mode
 from .._smoothing import SmoothingWarning, make_smoothing_spline
 from .._smoothing.noise import is_several
-from .._spaces import Array, Space, SpecialOrthogonal, space_named
+from .._spaces import AnySpace, Array, SpecialOrthogonal, space_named
 from ._labels import in_radians, named_curve, of_equal_length, times_of_rows
 from ._spec import (
     KNOTS,
@@ -41,7 +41,7 @@ _COLUMNS: dict[str, type] = {"lam": np.float64, "df": np.float64, "sigma": np.fl
 
 def smooth(
     da: xr.DataArray,
-    space: Space[Any] | str,
+    space: AnySpace | str,
     to: Any = None,
     *,
     dim: str = "time",
@@ -153,7 +153,7 @@ def smooth(
     return timed
 
 
-def unit_of(space: Space[Any], da: xr.DataArray, name: str) -> dict[str, Any]:
+def unit_of(space: AnySpace, da: xr.DataArray, name: str) -> dict[str, Any]:
     """Return the attributes of a standard deviation or radius: its units, if they are known."""
     if (
         name.endswith("_rotation")
@@ -181,7 +181,7 @@ def _rehearse_options(t: Any, count: int, given: dict[str, Any]) -> None:
 class _Wanted(NamedTuple):
     """What is fitted and evaluated in every block."""
 
-    space: Space[Any]
+    space: AnySpace
     how: dict[str, Any]
     spreads: list[tuple[str, tuple[float, ...]]]
     """Methods of the curve and their arguments."""
@@ -191,7 +191,7 @@ def _smoothed(
     points: Array,
     x: Array,
     *rest: Array,
-    space: Space[Any],
+    space: AnySpace,
     t: Any,
     names: list[str],
     how: dict[str, Any],

@@ -16,7 +16,7 @@ from .._base.system import one_thread
 from .._core import ConvergenceError, CutLocusError, ValidationError
 from .._curves.composed import call_at_times
 from .._curves.missing import missing_times
-from .._spaces import Array, Euclidean, Product, Space, space_named
+from .._spaces import AnySpace, Array, Euclidean, Product, Space, space_named
 from .._splines.cubic import CubicSpline
 from .._splines.functional import given
 from ._labels import fit_valid, named_curve, of_equal_length, times_along, times_of_rows
@@ -31,7 +31,7 @@ KNOTS = "symspline_knots"
 
 def spec_of(
     da: xr.DataArray,
-    space: Space[Any] | str,
+    space: AnySpace | str,
     dim: str,
     point_dims: Sequence[str],
     where: xr.DataArray | None,
