@@ -17,8 +17,6 @@ from .finite_groups import Factor, FiniteGroup, Indices, Nearest, along_path, ne
 from .groups import SpecialOrthogonal, SpecialUnitary, names_points
 from .product import Product, factors_of, space_named
 
-# Values that a space computes on demand from its own name or radius.
-_CACHED = ("_text", "_curve_kind", "_longest_near_step")
 # Operations on two points, of which the second one is replaced by its representative nearest to the first.
 _OF_PAIRS = ("distance", "log", "geodesic", "transport")
 # Classes of quotients by the class of their spaces.
@@ -111,7 +109,7 @@ class Quotient(Space[P]):
 
     def __init__(self, space: Space[P] | str, group: Any, *, left: Any = False) -> None:
         self.cover = space_named(space)
-        self.__dict__.update({key: value for key, value in vars(self.cover).items() if key not in _CACHED})
+        vars(self).update(vars(self.cover))
         self._group = FiniteGroup(*_factors(self.cover, group, left))
         _check_isometries(self.cover, self._group)
 

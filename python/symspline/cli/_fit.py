@@ -54,7 +54,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._base.exceptions import SymsplineError
-from .._base.time import time_axis_of
+from .._base.time import NANOSECONDS, time_axis_of
 from .._core import CutLocusError
 from .._curves.failures import IN_PYTHON
 from .._smoothing import SmoothingSpline, SmoothingWarning
@@ -86,14 +86,26 @@ from ._messages import (
     called,
     check_target,
     counted,
-    for_command_line,
     listed,
+    printed_warnings,
     refuse,
     say,
     tell,
 )
-from ._tables import CURVES, TABLES, UNITS, Rows, Table, codes_of, endings, format_of, is_number, number, open_table
-from ._times import longest_gap
+from ._tables import (
+    CURVES,
+    TABLES,
+    UNITS,
+    Rows,
+    Table,
+    codes_of,
+    duration,
+    endings,
+    format_of,
+    is_number,
+    number,
+    open_table,
+)
 
 _METHODS = "auto (default), quasi-newton, newton, homotopy or fixed-point"
 _ENDS = "natural (default), not-a-knot, clamped, periodic; or two of the first three with a comma, for start and end"
@@ -273,8 +285,12 @@ def _read(options: argparse.Namespace, space: Space) -> tuple[Recordings, Column
 
 def _fitted(data: Recordings, options: argparse.Namespace, keywords: dict[str, Any]) -> Sequence[CubicSpline]:
     """Fit all curves in one call."""
+
+    def text(note: object) -> str:
+        return data.located(note).replace(IN_PYTHON, _FOR_ROTATIONS)
+
     try:
-        with warnings.catch_warnings(record=True) as noted, Progress("fitting") as progress:
+        with printed_warnings(text), Progress("fitting") as progress:
             # The summary counts the curves whose λ is at a bound.
             warnings.simplefilter("ignore", SmoothingWarning)
             curves: Sequence[CubicSpline]
@@ -285,8 +301,6 @@ def _fitted(data: Recordings, options: argparse.Namespace, keywords: dict[str, A
     except SymsplineError as error:
         far = outliers(data, None, options.lonlat)
         raise error._with_message("; ".join(filter(None, (data.located(error), far)))) from None
-    for note in noted:
-        say(for_command_line(data.located(note.message).replace(IN_PYTHON, _FOR_ROTATIONS)))
     return curves
 
 
@@ -381,7 +395,13 @@ class Recordings:
         points = tuple(part[index] for part in given) if isinstance(given, tuple) else given[index]
         if times is None or (options.dedup is None and options.max_gap is None):
             return [((times, points), index)]
-        gap = np.inf if options.max_gap is None else longest_gap(options.max_gap, times.dtype.kind == "M")
+        gap = np.inf
+        if options.max_gap is not None:
+            count, unit = duration(options.max_gap, "--max-gap")
+            dates = times.dtype.kind == "M"
+            wrong = f"--max-gap {options.max_gap}: the times are numbers; give a gap without a unit"
+            refuse("", (unit and not dates, wrong))
+            gap = float(count * NANOSECONDS[unit or "s"] / NANOSECONDS["s"] if dates else count)
         used = np.ones(len(index), bool) if smooth else None
         try:
             found = cut(times, points, self.space, gap, 2, options.dedup or "raise", used)

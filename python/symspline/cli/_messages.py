@@ -10,9 +10,10 @@ import shutil
 import sys
 import tempfile
 import time
+import warnings
 import zlib
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -132,6 +133,15 @@ def tell(message: object, level: int = USUAL) -> None:
 def say(message: object) -> None:
     """Print one line on stderr."""
     print("symspline:", brief(message, _LONGEST), file=sys.stderr)
+
+
+@contextmanager
+def printed_warnings(text: Callable[[object], str] = str) -> Iterator[None]:
+    """Print warnings of the library as messages, after the work; ``text`` returns the message of a warning."""
+    with warnings.catch_warnings(record=True) as caught:
+        yield
+    for warning in caught:
+        say(for_command_line(text(warning.message)))
 
 
 class Progress:

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from .._base.arrays import brief
 from .._base.disk import damage
 from .._base.input import ISO_DATE, UTC_ZONE, times_of
-from .._base.time import NANOSECONDS
+from .._base.time import NANOSECONDS, parts_of_duration
 from .._core import ValidationError, number_lines
 from .._splines.archive import read
 from ..convert._pose_files import TUM, tum_rows, write_tum_rows
@@ -70,6 +70,30 @@ def number(text: str) -> float:
     if not is_number(text):
         raise ValueError
     return float(text)
+
+
+# Exponents of floating-point numbers are smaller.
+_EXPONENT = 400
+
+
+def duration(text: str, option: str) -> tuple[Decimal, str]:
+    """Split ``"10min"`` into 10 and ``"min"``."""
+    try:
+        found = parts_of_duration(text)
+    except InvalidOperation:
+        raise Problem(f"{option} {text}: the exponent is too large") from None
+    if found is None:
+        raise Problem(
+            f"{option} {text}: a duration is a number such as 0.5, or one with a unit such as 10min; "
+            f"units are {', '.join(NANOSECONDS)}"
+        )
+    count, unit = found
+    refuse(
+        f"{option} {text}: ",
+        (count == 0, "it must be larger than zero"),
+        (abs(count.adjusted()) > _EXPONENT, f"that is too {'long' if count > 1 else 'short'}"),
+    )
+    return count, unit
 
 
 def _holds_dates(cells: Sequence[str]) -> bool:
