@@ -8,6 +8,7 @@ architecture, have ``_core`` only; in a checkout it is built for the processor o
 import ctypes
 import os
 import sys
+from importlib import import_module
 from importlib.machinery import EXTENSION_SUFFIXES, ExtensionFileLoader
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
@@ -36,7 +37,7 @@ def built_for(file: Path) -> str:
 def _has(level: str) -> bool:
     """Whether NumPy finds that the processor has a level; True if it does not report that."""
     try:
-        from numpy._core._multiarray_umath import __cpu_features__ as features
+        features = import_module("numpy._core._multiarray_umath").__cpu_features__
     except ImportError:
         return True
     known = [features[name] for name in _FEATURES[level] if name in features]
@@ -88,8 +89,8 @@ def _choose(folder: Path) -> tuple[Path | None, str]:
         return None, "the only one here"
     if asked == "plain":
         return None, "SYMSPLINE_CPU=plain"
-    own, levels = _level(plain), list(LEVELS)
-    runs = [level for level in modules if levels.index(level) <= levels.index(own)]
+    best, levels = _level(plain), list(LEVELS)
+    runs = [level for level in modules if levels.index(level) <= levels.index(best)]
     if asked and asked not in modules:
         raise ImportError(f"SYMSPLINE_CPU={asked} cannot be done: there is no compiled module for {LEVELS[asked]} here")
     if asked and asked not in runs:
@@ -99,7 +100,7 @@ def _choose(folder: Path) -> tuple[Path | None, str]:
     level = asked or runs[-1]
     if level == "plain":
         return None, "the processor lacks x86-64-v3"
-    return modules[level], f"SYMSPLINE_CPU={level}" if asked else f"the processor has {LEVELS[own]}"
+    return modules[level], f"SYMSPLINE_CPU={level}" if asked else f"the processor has {LEVELS[best]}"
 
 
 def load(folder: Path) -> None:

@@ -229,9 +229,9 @@ def reduced_operator(
     if constant:
         return _reduced(bases, _check_operator(operator, n))
     flat = bases.reshape(-1, *bases.shape[-2:])
-    each = zip(flat, *(own.ravel() for own in parameters), strict=True)
-    found = [_reduced(basis, _check_operator(operator(*mu), n)) for basis, *mu in each]
-    return np.reshape(found, (*bases.shape[:-2], *[bases.shape[-1]] * 2))
+    rows = zip(flat, *(parameter.ravel() for parameter in parameters), strict=True)
+    matrices = [_reduced(basis, _check_operator(operator(*mu), n)) for basis, *mu in rows]
+    return np.reshape(matrices, (*bases.shape[:-2], *[bases.shape[-1]] * 2))
 
 
 class OperatorSpline:
@@ -369,11 +369,13 @@ def _subspaces_of(spline: CubicSpline[Any, Any] | GridSpline[Any]) -> tuple[int,
 
 def _grid_bases(spline: GridSpline[Any], x: Any, start: ArrayLike | None) -> tuple[Array, list[Array]]:
     """Return aligned bases at parameters, and the parameters of each axis for every basis."""
-    own, shape, outer = coordinates(spline._axes, x, False)
-    parameters = np.meshgrid(*own, indexing="ij") if outer else own
+    axes, shape, outer = coordinates(spline._axes, x, False)
+    parameters = np.meshgrid(*axes, indexing="ij") if outer else axes
     values: Array = spline(x)
     reference = _reference(spline.points, _present(spline.points), start)
-    return values @ _rotations(values, _present(values), reference), [each.reshape(shape) for each in parameters]
+    return values @ _rotations(values, _present(values), reference), [
+        parameter.reshape(shape) for parameter in parameters
+    ]
 
 
 def _checked_bases(value: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
@@ -424,8 +426,8 @@ def _rotations(bases: Array, present: NDArray[np.bool_], reference: Array) -> Ar
     k = reference.shape[-1]
     overlaps = adjoint(bases[present]) @ reference
     left, cosines, right = np.linalg.svd(overlaps)
-    found = np.full((*present.shape, k, k), np.nan, dtype=overlaps.dtype)
-    found[present] = left @ right
+    turns = np.full((*present.shape, k, k), np.nan, dtype=overlaps.dtype)
+    turns[present] = left @ right
     smallest = np.ones(present.shape)
     smallest[present] = cosines[..., -1]
     index = np.unravel_index(np.argmin(smallest), smallest.shape)
@@ -442,7 +444,7 @@ def _rotations(bases: Array, present: NDArray[np.bool_], reference: Array) -> Ar
             f"vary fast close to 90°. {remedy}",
             UserWarning,
         )
-    return found
+    return turns
 
 
 def _are_positive(matrices: Array, tol: float) -> bool:

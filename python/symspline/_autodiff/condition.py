@@ -212,7 +212,7 @@ class Problem(NamedTuple):
         """Return the three diagonals of the condition in flat space, shape (n, ...) of the intervals."""
         xp, r = self.chain.lib.xp, 1 / self.h
         zero, one = xp.zeros_like(r[:1]), xp.ones_like(r[:1])
-        first, last = (one if own else 2 * end for own, end in zip(self.given, (r[:1], r[-1:]), strict=True))
+        first, last = (one if fixed else 2 * end for fixed, end in zip(self.given, (r[:1], r[-1:]), strict=True))
         middle = xp.concatenate([first, 2 * (r[:-1] + r[1:]), last])
         above = xp.concatenate([zero if self.given[0] else r[:1], r[1:], zero])
         below = xp.concatenate([zero, r[:-1], zero if self.given[1] else r[-1:]])
@@ -266,6 +266,6 @@ def cyclic_reduction(
         rows[::2] - low @ before[2] - high @ after[2],
     )
     next_even = xp.concatenate([even[1:], xp.zeros_like(even[:1])])[: n // 2]
-    found = rest - left @ even[: n // 2] - right @ next_even
-    pairs = xp.stack([even[: n // 2], found], 1).reshape(2 * (n // 2), *even.shape[1:])
+    uneven = rest - left @ even[: n // 2] - right @ next_even
+    pairs = xp.stack([even[: n // 2], uneven], 1).reshape(2 * (n // 2), *even.shape[1:])
     return xp.concatenate([pairs, even[n // 2 :]])

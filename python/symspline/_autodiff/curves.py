@@ -21,9 +21,9 @@ from .models import QUOTIENTS, Model, model_of
 
 def named(lib: Library, space: AnySpace | str) -> AnySpace:
     """Return the space, or raise ValidationError for a quotient."""
-    found = space_named(space)
-    refuse_quotients(found, f"functions of {lib.name} are not made")
-    return found
+    whole = space_named(space)
+    refuse_quotients(whole, f"functions of {lib.name} are not made")
+    return whole
 
 
 def evaluate(
@@ -33,7 +33,7 @@ def evaluate(
     nu, space = order_of(nu), named(lib, space)
     if isinstance(space, Product):
         parts = parts_of(points, space, "points"), parts_of(velocities, space, "velocities")
-        return tuple(evaluate(lib, t, *own, x, nu) for own in zip(*parts, space.factors, strict=True))
+        return tuple(evaluate(lib, t, *part, x, nu) for part in zip(*parts, space.factors, strict=True))
     model = model_of(lib, space)
     if model is None:
         raise unsupported(lib, space, "evaluate")
@@ -43,8 +43,8 @@ def evaluate(
     knots, axis = _knots(lib, t, points, space), points.ndim - 1 - len(space.point_shape)
     x = lib.array(x, "x", points.real)
     p, v = (lib.xp.moveaxis(a, axis, 0) for a in (points, velocities))
-    found = lib.xp.moveaxis(_values(model, space, knots, p, v, x.reshape(-1), nu), 0, axis)
-    return found.reshape(*points.shape[:axis], *x.shape, *space.point_shape)
+    values = lib.xp.moveaxis(_values(model, space, knots, p, v, x.reshape(-1), nu), 0, axis)
+    return values.reshape(*points.shape[:axis], *x.shape, *space.point_shape)
 
 
 def problem_of(lib: Library, t: Tensor, points: Tensor, space: AnySpace, bc_type: Any) -> tuple[Problem, Any]:
@@ -100,12 +100,12 @@ def _ends(lib: Library, bc_type: Any, points: Tensor) -> tuple[tuple[bool, bool]
         )
     ends = []
     for vector, name in zip(vectors, ("start", "end"), strict=True):
-        own = lib.xp.zeros_like(points[0]) if vector is None else lib.array(vector, f"the {name} velocity", points)
+        velocity = lib.xp.zeros_like(points[0]) if vector is None else lib.array(vector, f"the {name} velocity", points)
         try:
-            ends.append(lib.xp.broadcast_to(own, points.shape[1:]))
+            ends.append(lib.xp.broadcast_to(velocity, points.shape[1:]))
         except (ValueError, RuntimeError):
             raise ValidationError(
-                f"the {name} velocity has shape {tuple(own.shape)}, which does not broadcast to "
+                f"the {name} velocity has shape {tuple(velocity.shape)}, which does not broadcast to "
                 f"{tuple(points.shape[1:])}"
             ) from None
     return (pair[0] != "natural", pair[1] != "natural"), ends
@@ -129,16 +129,16 @@ def _values(model: Model, space: AnySpace, t: Tensor, points: Tensor, velocities
         return lib.along(curve, x)
 
     if nu == 0:
-        found = curve(x)
+        values = curve(x)
     elif nu == 1:
-        found = _velocity(space, *velocity(x))
+        values = _velocity(space, *velocity(x))
     else:
         (point, first), (_, second) = lib.along(velocity, x)
-        found = _acceleration(lib, space, point, first, second)
+        values = _acceleration(lib, space, point, first, second)
     # As in `symspline._base.time.onto_ends`, a few units in the last place beyond the ends are rounding.
     reach = 4 * xp.finfo(x.dtype).eps * xp.maximum(abs(t[0]), abs(t[-1]))
     inside = (x >= t[0] - reach) & (x <= t[-1] + reach)
-    return xp.where(inside[(..., *(None,) * len(space.point_shape))], found, float("nan"))
+    return xp.where(inside[(..., *(None,) * len(space.point_shape))], values, float("nan"))
 
 
 def _rows(lib: Library, polygons: Tensor, segment: Tensor) -> Tensor:

@@ -134,8 +134,8 @@ def matrix_derivative(xp: Any, divided: Divided, values: Tensor, vectors: Tensor
     """
     k, n = len(directions), values.shape[-1]
     # λ along an axis of its own for each of the k + 1 indices.
-    own = [values.reshape(*values.shape[:-1], *(n if i == j else 1 for j in range(k + 1))) for i in range(k + 1)]
-    weights = divided(*own)
+    along = [values.reshape(*values.shape[:-1], *(n if i == j else 1 for j in range(k + 1))) for i in range(k + 1)]
+    weights = divided(*along)
     if not directions:
         return (vectors * weights[..., None, :]) @ adjoint(vectors)
     turned = [adjoint(vectors) @ h @ vectors for h in directions]
@@ -157,11 +157,11 @@ def divided_logarithm(xp: Any, constant: Tensor, *x: Tensor) -> Tensor:
         return 2 * slope / (x[0] + x[1])
     # ∓ ∫ Π 1/(x_i + s) ds over all s > 0, by the trapezoidal rule in log s, whose error is exp(−2π²/step).
     step = 0.5
-    mean = xp.exp(sum(xp.log(own) for own in x) / len(x))
+    mean = xp.exp(sum(xp.log(argument) for argument in x) / len(x))
     s = mean[..., None] * constant(np.exp(step * np.arange(-90, 91)), mean)
     total = s
-    for own in x:
-        total = total / (own[..., None] + s)
+    for argument in x:
+        total = total / (argument[..., None] + s)
     return (-1.0) ** len(x) * step * total.sum(axis=-1)
 
 
@@ -173,6 +173,6 @@ def divided_arc(xp: Any, constant: Tensor, function: Any, *y: Tensor) -> Tensor:
     nodes, weights = np.polynomial.legendre.leggauss(80)
     square = constant(1 - nodes[40:] ** 2, y[0])
     total = constant(weights[40:], y[0]) * square ** (len(y) - 1)
-    for own in y:
-        total = total / (1 - own[..., None] * square)
+    for argument in y:
+        total = total / (1 - argument[..., None] * square)
     return total.sum(axis=-1)

@@ -321,8 +321,8 @@ def quaternion_of(lib: Library, matrix: Tensor) -> Tensor:
     row = first
     for i, other in enumerate(others, 1):
         row = xp.where(longest == i, other, row)
-    found = row / xp.sqrt((row * row).sum(axis=-1, keepdims=True))
-    return xp.where(xp.linalg.det(matrix)[..., None] > 0, found, float("nan"))
+    unit = row / xp.sqrt((row * row).sum(axis=-1, keepdims=True))
+    return xp.where(xp.linalg.det(matrix)[..., None] > 0, unit, float("nan"))
 
 
 def axis_of(lib: Library, matrix: Tensor) -> Tensor:

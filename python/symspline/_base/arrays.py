@@ -43,15 +43,15 @@ def filled(value: Any) -> Any:
         numbers: Any = value if value.dtype.kind in "fcmM" else value.astype(np.float64)
         return numbers.filled(missing)
     if isinstance(value, list) and any(issubclass(kind, np.ma.MaskedArray) for kind in set(map(type, value))):
-        return [filled(own) for own in value]
+        return [filled(entry) for entry in value]
     return value
 
 
 def _first_masked(value: Any) -> tuple[int, ...] | None:
     """The index of the first masked number of an array, or of a list of arrays."""
     if isinstance(value, np.ma.MaskedArray):
-        found = np.argwhere(np.ma.getmaskarray(value))
-        return tuple(found[0].tolist()) if len(found) else None
+        masked = np.argwhere(np.ma.getmaskarray(value))
+        return tuple(masked[0].tolist()) if len(masked) else None
     if isinstance(value, (list, tuple)) and any(issubclass(kind, np.ma.MaskedArray) for kind in set(map(type, value))):
         for i, row in enumerate(value):
             index = _first_masked(row)

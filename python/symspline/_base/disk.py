@@ -70,7 +70,7 @@ def path_of(file: Any, name: str = "file", *, method: str, text: bool = False) -
 
 
 @contextmanager
-def damage(file: object, found: str) -> Iterator[None]:
+def damage(file: object, problem: str) -> Iterator[None]:
     """Raise ValidationError with the name of a file for errors in reading what it holds.
 
     Damaged files cause errors of zipfile, of its decompressors, of NumPy, of JSON and of other libraries. They are
@@ -83,7 +83,7 @@ def damage(file: object, found: str) -> Iterator[None]:
     except ValidationError as error:
         raise ValidationError(f"{file}: {error}") from None
     except Exception as error:
-        raise ValidationError(f"{file} {found}: {brief(error)}") from None
+        raise ValidationError(f"{file} {problem}: {brief(error)}") from None
 
 
 @contextmanager
@@ -138,9 +138,9 @@ def _remove_left(target: Path) -> None:
     name = re.compile(rf"\.([0-9a-f]{{8}})-([0-9a-f]+)-[0-9a-f]{{16}}{re.escape(target.name[-_TAIL:])}")
     with suppress(OSError), os.scandir(target.parent) as entries:
         for entry in entries:
-            found = name.fullmatch(entry.name)
+            match = name.fullmatch(entry.name)
             with suppress(OSError):
-                if found is not None and _is_left(found[1] == _machine(), int(found[2], 16), entry.stat().st_mtime):
+                if match is not None and _is_left(match[1] == _machine(), int(match[2], 16), entry.stat().st_mtime):
                     os.unlink(entry.path)
 
 

@@ -34,15 +34,15 @@ def animate(curve: Any, file: Any = None, frames: int = 60, fps: float = 15, **l
     if curve._batch:
         raise ValidationError(f"this is a batch of {len(curve)} curves. Animate one of them: curves[0].animate(...).")
     path = None if file is None else _checked_path(file)
-    figure, (own,) = page_of(curve, **look)
+    figure, (drawn,) = page_of(curve, **look)
     # Frames at equal distances in time, without those in gaps.
-    even = np.linspace(own.x[0], own.x[-1], frames)
-    times = own.x[np.unique(np.clip(np.searchsorted(own.x, even), 0, len(own.x) - 1))]
-    updates = list(_updates(figure.axes, own))
+    even = np.linspace(drawn.x[0], drawn.x[-1], frames)
+    times = drawn.x[np.unique(np.clip(np.searchsorted(drawn.x, even), 0, len(drawn.x) - 1))]
+    updates = list(_updates(figure.axes, drawn))
     clock = figure.text(0.99, 0.99, "", ha="right", va="top", fontsize="large")
 
     def update(x: float) -> list[Any]:
-        clock.set_text(_time(own, x))
+        clock.set_text(_time(drawn, x))
         for one in updates:
             one(x)
         return []

@@ -103,7 +103,7 @@ def origin_of(panel: Panel, curves: Sequence[Curve], positions: Numbers) -> Floa
 
     In axes of the user it is zero, as others draw into them.
     """
-    everything = np.concatenate([positions(own.extent) for own in curves])
+    everything = np.concatenate([positions(curve.extent) for curve in curves])
     if not panel.mine:
         return np.zeros(everything.shape[1])
     return np.array([round_start(*ends) for ends in zip(everything.min(axis=0), everything.max(axis=0), strict=True)])
@@ -484,5 +484,5 @@ def _words(first: Curve, groups: Sequence[Look], framed: Sequence[Curve]) -> str
         return "some poses of the curve" + ", lighter: data" * bool(len(first.noise.x[0]))
     if not first.has_nodes:
         return "some poses of the curve"
-    shown, count = sum(len(own.get("bold", ())) for own in groups), sum(len(own.given) for own in framed)
+    shown, count = sum(len(entry.get("bold", ())) for entry in groups), sum(len(entry.given) for entry in framed)
     return "given poses" if shown == count else f"{shown} of {count} given poses"

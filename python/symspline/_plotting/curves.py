@@ -203,7 +203,7 @@ class Curve:
             is_factor=True,
             data=self.data.parts[number],
             noise=self.noise and self.noise.part(number),
-            segments=tuple(own.part(number) for own in self.segments),
+            segments=tuple(segment.part(number) for segment in self.segments),
             reference=None if self.reference is None else self.reference[number],
             batch=self.batch and self.batch.part(number),
             limits=self.limits[number : number + 1],
@@ -211,7 +211,9 @@ class Curve:
 
     def on_earth(self, radius: float | None) -> Curve:
         """Return the curve with a radius of the Earth."""
-        return replace(self, radius=radius, segments=tuple(replace(own, radius=radius) for own in self.segments))
+        return replace(
+            self, radius=radius, segments=tuple(replace(segment, radius=radius) for segment in self.segments)
+        )
 
     # ---- points ----
 
@@ -508,21 +510,23 @@ def _drawn(one: Any, noise_beside: Any, index: Any, axis: Axis, look: Look, fain
     made = Curve(data, first, x0, x, nodes, axis, **look)
     if len(parts) < 2:
         return made
-    start = made.points[0] if not isinstance(data.space, Product) else tuple(own[0] for own in made.points)
+    start = made.points[0] if not isinstance(data.space, Product) else tuple(times[0] for times in made.points)
     few = len(parts) <= len(OTHERS)
     segments = []
     ends = np.cumsum([0, *map(len, parts)]).tolist()
-    for i, own in enumerate(parts):
-        within = nodes[(nodes >= own[0]) & (nodes <= own[-1])] if has_nodes else own[:1]
-        beside = noise and noise.between(own[0], own[-1], slice(*ends[i : i + 2]))
-        part = replace(made, x=own, nodes=within, reference=start if i else None, has_start=few or not i, noise=beside)
+    for i, times in enumerate(parts):
+        within = nodes[(nodes >= times[0]) & (nodes <= times[-1])] if has_nodes else times[:1]
+        beside = noise and noise.between(times[0], times[-1], slice(*ends[i : i + 2]))
+        part = replace(
+            made, x=times, nodes=within, reference=start if i else None, has_start=few or not i, noise=beside
+        )
         named = few and made.usual
         segments.append(replace(part, color=OTHERS[i], label=f"segment {i}", usual=False) if named else part)
     return replace(made, segments=tuple(segments))
 
 
 def _mean_of(
-    curve: Any, valid: NDArray[np.bool_], axis: Axis, color: ColorType, label: str | None, alone: bool
+    curve: Any, valid: NDArray[np.bool_], axis: Axis, color: ColorType | None, label: str | None, alone: bool
 ) -> Curve | None:
     """Return the curve through the Karcher means of a batch, or None if the batch is not close to it.
 
@@ -536,8 +540,8 @@ def _mean_of(
     x = data.times.ravel()
     # The usual colour is that of the third axis of frames.
     color = color or (OTHERS[0] if isinstance(space, SpecialEuclidean) else spline_color())
-    own = Curve(data, first, x0, x, nodes, axis, color, alone, label=label or "mean curve", is_mean=True)
-    batch = _batch_of(curve, own, valid)
+    mean = Curve(data, first, x0, x, nodes, axis, color, alone, label=label or "mean curve", is_mean=True)
+    batch = _batch_of(curve, mean, valid)
     if batch is None:
         return None
     many = np.union1d(batch.x, data.times)
@@ -555,7 +559,7 @@ def _mean_of(
         return None
     x, _ = samples(data.times, _NO_GAPS)
     problem = FitProblem(space, many, read(means, space), [NATURAL], DEFAULTS)
-    return replace(own, data=fit(problem).curve, x=x, batch=batch)
+    return replace(mean, data=fit(problem).curve, x=x, batch=batch)
 
 
 def _batch_of(curve: Any, first: Curve, valid: NDArray[np.bool_]) -> Batch | None:
@@ -583,10 +587,10 @@ def samples(times: FloatArray, breaks: FloatArray) -> tuple[FloatArray, list[Flo
     bounds = [times[0], *np.ravel(breaks), times[-1]]
     made = []
     for i, (start, stop) in enumerate(zip(bounds[::2], bounds[1::2], strict=True)):
-        own = times[(times >= start) & (times <= stop)]
+        knots = times[(times >= start) & (times <= stop)]
         # A curve that meets the next one there has the values of the next one.
         last = np.nextafter(stop, start) if 2 * i + 2 < len(bounds) and bounds[2 * i + 2] == stop else stop
-        made.append(np.append(_divided(own)[:-1], last))
+        made.append(np.append(_divided(knots)[:-1], last))
     return np.concatenate(made), made
 
 

@@ -233,20 +233,20 @@ def _ticks(
 
     Values are multiples of ``step``; if their labels overlap, those of multiples of 2, 5 or more steps remain.
     """
-    found = []
+    marks = []
     for line, value in zip(lines, values, strict=True):
         above = line[:, 1] > level
         (i,) = np.nonzero((above[1:] != above[:-1]) & np.isfinite(line[1:, 1] - line[:-1, 1]))
         share = (level - line[i, 1]) / (line[i + 1, 1] - line[i, 1])
         crossed = line[i, 0] + share * (line[i + 1, 0] - line[i, 0])
-        found += [(x, round(value / step), degrees(value, *letters)) for x in crossed.tolist() if low <= x <= high]
-    found.sort()
-    kept = found
+        marks += [(x, round(value / step), degrees(value, *letters)) for x in crossed.tolist() if low <= x <= high]
+    marks.sort()
+    kept = marks
     for every in (2, 5, 10, 20):
         widths = [0.02 + (0.018 * len(label) if letters == "EW" else 0.03) for *_, label in kept[1:]]
         if np.all(np.diff([x for x, *_ in kept]) > np.multiply(widths, high - low)):
             break
-        kept = [own for own in found if own[1] % every == 0] or kept[:1]
+        kept = [mark for mark in marks if mark[1] % every == 0] or kept[:1]
     return [x for x, *_ in kept], [label for *_, label in kept]
 
 
@@ -269,12 +269,12 @@ def rings() -> tuple[FloatArray, ...]:
 @cache
 def _coasts() -> tuple[tuple[FloatArray, FloatArray], ...]:
     """Return the rings as unit vectors, and again with NaN where they follow the date line or the south pole."""
-    found = []
+    coasts = []
     for ring in rings():
         points = from_lonlat(*ring.T)
         edge = (np.abs(ring[:, 0]) == 180) | (ring[:, 1] == -90)
-        found.append((points, np.insert(points, np.flatnonzero(edge[1:] & edge[:-1]) + 1, np.nan, axis=0)))
-    return tuple(found)
+        coasts.append((points, np.insert(points, np.flatnonzero(edge[1:] & edge[:-1]) + 1, np.nan, axis=0)))
+    return tuple(coasts)
 
 
 def draw_land(axes: Axes, globe: Globe) -> None:
@@ -353,7 +353,7 @@ def sphere(curves: Sequence[Curve]) -> View:
 
 def _extent(curves: Sequence[Curve], faint: bool = True) -> FloatArray:
     """Return the points of all curves, or of those that have given points."""
-    return np.concatenate([own.extent for own in curves if faint or not own.faint])
+    return np.concatenate([curve.extent for curve in curves if faint or not curve.faint])
 
 
 def _draw_sphere(panel: Panel, curves: Sequence[Curve]) -> None:

@@ -96,7 +96,9 @@ class Graphs:
         groups = self.groups or [(name, [i]) for i, name in enumerate(self.names)]
         if not panel.mine and len(self.names) > 1:
             groups = [(self.label, range(len(self.names)))]
-        starts = [_start(drawn, i) if panel.mine and len(own) == 1 else 0 for _, own in groups for i in own[:1]]
+        starts = [
+            _start(drawn, i) if panel.mine and len(members) == 1 else 0 for _, members in groups for i in members[:1]
+        ]
         labels = [named_from(label, start) for (label, _), start in zip(groups, starts, strict=True)]
         made = time_axes(panel, curves, labels)
         if self.has_title and panel.mine:
@@ -170,7 +172,9 @@ class Graphs:
         """Give several axes the same scale if they must have it, and do not magnify rounding errors of constants."""
         if len(made) == 1:
             return
-        largest = max(np.ptp(rows[np.isfinite(rows[:, 0])], axis=0).max() for own in drawn for rows in own if len(rows))
+        largest = max(
+            np.ptp(rows[np.isfinite(rows[:, 0])], axis=0).max() for pair in drawn for rows in pair if len(rows)
+        )
         limits = np.array([axes.get_ylim() for axes in made])
         widest = np.ptp(limits, axis=1).max()
         for axes, (low, high) in zip(made, limits.tolist(), strict=True):
@@ -182,7 +186,7 @@ class Graphs:
 
 def _start(drawn: _Drawn, number: int) -> Any:
     """Return the round number from which a number is counted if it is far from zero."""
-    values = np.concatenate([rows[:, number] for own in drawn for rows in own])
+    values = np.concatenate([rows[:, number] for pair in drawn for rows in pair])
     return round_start(np.nanmin(values), np.nanmax(values))
 
 
@@ -201,7 +205,7 @@ def _without_jumps(
             if curve.has_line:
                 line = _unwrapped(line, period, near[0])
             else:
-                near = np.stack([np.interp(curve.times, curves[0].times, own) for own in near.T], axis=1)
+                near = np.stack([np.interp(curve.times, curves[0].times, column) for column in near.T], axis=1)
                 line = line + period * np.rint((near - line) / period)
             given = given + period * np.rint((curve.closest_samples(line) - given) / period)
         made.append((line, given))
@@ -226,12 +230,12 @@ def _choose(names: Sequence[str], ranges: FloatArray, numbers: Sequence[int]) ->
             groups[-1].append(i)
         else:
             groups.append([i])
-    groups.sort(key=lambda own: -ranges[own].max())
+    groups.sort(key=lambda group: -ranges[group].max())
     named: list[int] = []
-    for own in groups:
-        if len(named) + len(own) > _NAMED:
+    for group in groups:
+        if len(named) + len(group) > _NAMED:
             break
-        named += own
+        named += group
     return named, sorted(set(numbers) - set(named))
 
 
@@ -290,7 +294,7 @@ def _several(
     if not are_compared(curves):
         return whole.view()
     first = curves[0].first_point
-    drawn = [numbers(first, own.points) for curve in curves if not curve.faint for own in curve.unbroken]
+    drawn = [numbers(first, part.points) for curve in curves if not curve.faint for part in curve.unbroken]
     drawn = drawn if np.isinf(period) else [np.unwrap(line, period=period, axis=0) for line in drawn]
     ranges = np.max([np.ptp(line, axis=0) for line in drawn], axis=0)
     kept = np.sort(np.argsort(-ranges, kind="stable")[:_COMPARED])
@@ -339,9 +343,9 @@ def independent(space: Space) -> Indices:
     except (NotImplementedError, ValidationError):
         return np.arange(int(np.prod(space.point_shape)) * (2 if space.dtype.kind == "c" else 1))
     kept: list[int] = []
-    for i, own in enumerate(columns):
+    for i, column in enumerate(columns):
         others = [sign * columns[j] for j in kept for sign in (1, -1)]
-        if np.ptp(own) > 1e-9 and not any(np.allclose(own, other, rtol=1e-9, atol=0) for other in others):
+        if np.ptp(column) > 1e-9 and not any(np.allclose(column, other, rtol=1e-9, atol=0) for other in others):
             kept.append(i)
     return np.array(kept, np.intp)
 
@@ -372,7 +376,7 @@ def angles_to_first(curves: Sequence[Curve]) -> View:
 
     def draw(panel: Panel, curves: Sequence[Curve]) -> None:
         view.draw(panel, curves)
-        largest = max(numbers(own.first_point, own.points).max() for own in curves)
+        largest = max(numbers(curve.first_point, curve.points).max() for curve in curves)
         if panel.mine and largest > _RIGHT and view.rows == 1:
             panel.explain("principal angles are at most 90°: they turn back there, but the curve is smooth")
             panel.axes[0].yaxis.set_major_locator(MultipleLocator(30))

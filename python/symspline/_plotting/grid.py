@@ -141,7 +141,7 @@ def plot_grid(
     columns = min(len(factors), 3)
     rows = -(-len(factors) // columns)
     width = sides[0].inches + _LEFT + _KEY
-    height = max([sides[1].inches] + [_SIDE for own in factors if str(own.space) in _SURFACES]) + _BOTTOM
+    height = max([sides[1].inches] + [_SIDE for part in factors if str(part.space) in _SURFACES]) + _BOTTOM
     height += _NAMED * (len(factors) > 1)
     title = title or title_on(grid._kind, grid.space, int(6 * columns * width))
     with drawing((columns * width, _HEAD + rows * height), figsize, show) as figure:

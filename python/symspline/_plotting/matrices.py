@@ -167,7 +167,7 @@ class _Rows:
     def symbols(self, reach: float) -> list[tuple[FloatArray, Any, FloatArray | None]]:
         """Name the rows, and return their symbols, which extend by at most ``reach`` inches."""
         made = [row.symbols(self.width, reach) for row in self.rows]
-        names = [row.title(len(own[0]), self.panel.mine) for row, own in zip(self.rows, made, strict=True)]
+        names = [row.title(len(symbols[0]), self.panel.mine) for row, symbols in zip(self.rows, made, strict=True)]
         self.axes.set_yticks([-i for i in range(len(names))], names, fontsize="small")
         self.axes.tick_params(axis="y", length=0)
         if self.panel.mine:
@@ -242,7 +242,7 @@ def rotations(curves: Sequence[Curve]) -> View:
     start = "start of the " + "mean " * curves[0].is_mean + "curve"
     if largest < _SMALL:
         return _rotation_vectors(matrices, first, start)
-    if are_compared(curves) or any(own.is_factor or len(own.gaps) or own.noise is not None for own in curves):
+    if are_compared(curves) or any(curve.is_factor or len(curve.gaps) or curve.noise is not None for curve in curves):
         if largest < _LARGE:
             return _rotation_vectors(matrices, first, start)
         try:
@@ -436,7 +436,7 @@ def _draw_row(
     touch both.
     """
     axes, name, curve = rows.axes, rows.rows[row].name, rows.rows[row].curve
-    first, last = (edge([float(own.curve.times[i]) for own in rows.rows]) for edge, i in ((min, 0), (max, -1)))
+    first, last = (edge([float(line.curve.times[i]) for line in rows.rows]) for edge, i in ((min, 0), (max, -1)))
     colors = time_colors((times - first) / (last - first))
     if name == "data" or curve.is_mean:
         colors[:] = to_rgba(ink() if name == "data" else curve.color)

@@ -161,7 +161,7 @@ def _mark_gaps(axes: Axes, curves: Sequence[Curve]) -> None:
     if not len(gaps):
         return
     label = f"{_lengths(gaps, curves[0].axis)} without data"
-    if not any(len(own.breaks) for own in curves):
+    if not any(len(curve.breaks) for curve in curves):
         banded = curves[0].noise is not None and curves[0].noise.speed is not None
         label += f", {'acceleration' if banded else 'rates'} not drawn"
     spans = [(start, end - start) for start, end in gaps.tolist()]
@@ -210,7 +210,7 @@ _NEAR = np.linspace(-0.3, 0.3, 21)
 
 def fresh(axes: Any, label: str) -> str:
     """Return the label of an artist, which legends ignore if other axes of its kind have it already."""
-    return f"_{label}" if any(own.get_label() == label for own in (*axes.lines, *axes.collections)) else label
+    return f"_{label}" if any(artist.get_label() == label for artist in (*axes.lines, *axes.collections)) else label
 
 
 # ---- lines and points ----
@@ -259,8 +259,8 @@ def plot_line(axes: Axes, curve: Curve, positions: FloatArray, **look: Any) -> N
 def draw_end(axes: Axes, curve: Curve, end: FloatArray, **look: Any) -> None:
     """Draw a square at the end of a curve, shape (1, 2) or (1, 3), unless it is closed."""
     if curve.noise is None and curve.has_line and not curve.faint and not curve.is_closed:
-        own: Look = {"markersize": 7 if curve.alone else 5, "markeredgecolor": ink(0), "zorder": 6.6}
-        axes.plot(*end.T, "s", color=curve.color_of_dots, label=fresh(axes, END), **own | look)
+        usual: Look = {"markersize": 7 if curve.alone else 5, "markeredgecolor": ink(0), "zorder": 6.6}
+        axes.plot(*end.T, "s", color=curve.color_of_dots, label=fresh(axes, END), **usual | look)
 
 
 def draw_dots(axes: Axes, curve: Curve, positions: FloatArray, **look: Any) -> None:
@@ -327,7 +327,7 @@ def draw_arrows(axes: Axes, curve: Curve, positions: FloatArray, dots: FloatArra
     number = _HEADS if curve.alone else _FEW_HEADS
     counts = [max(int(share > _SHORT), round(number * share)) for share in (parts / total[-1]).tolist()]
     shares = [(np.arange(count) + 0.5) / max(count, 1) for count in counts]
-    wanted = np.concatenate([own + part * share for own, part, share in zip(first, parts, shares, strict=True)])
+    wanted = np.concatenate([start + part * share for start, part, share in zip(first, parts, shares, strict=True)])
     reach = np.concatenate([np.full(count, part / max(count, 1)) for count, part in zip(counts, parts, strict=True)])
     near = np.searchsorted(total, wanted[:, None] + np.multiply.outer(reach, _NEAR))
     at = near[:, len(_NEAR) // 2]

@@ -58,7 +58,7 @@ def plot(
         return finish(page_of(curve, color, label, radius, show=show, **look)[0], file, show)
     check_axes(ax, curve.space)
     curves, _ = curves_of(curve, _axis(curve, raw=True), color or _next_color(ax), label)
-    return _draw_into(ax, [own.on_earth(radius) for own in curves], show=show, **look)
+    return _draw_into(ax, [part.on_earth(radius) for part in curves], show=show, **look)
 
 
 def page_of(
@@ -72,7 +72,7 @@ def page_of(
 ) -> tuple[Figure, list[Curve]]:
     """Return the page of a curve, and the curves that it shows."""
     curves, words = curves_of(curve, _axis(curve), color, label)
-    curves = [own.on_earth(radius) for own in curves]
+    curves = [part.on_earth(radius) for part in curves]
     space = curve.space
     views = views_of_factors(curves[:1]) if isinstance(space, Product) else [(view_of(curves[:1]), curves)]
     residuals = residuals_of(curve, curves[0], [view.has_band for view, _ in views])
@@ -126,35 +126,35 @@ def compare(
     radius: float | None = None,
 ) -> Any:
     """Draw curves and data, on the Earth if its radius in metres is given. See `symspline.plot`."""
-    first = next(own for own in items if not isinstance(own, tuple))
+    first = next(item for item in items if not isinstance(item, tuple))
     space = first.space
     if ax is not None:
         check_axes(ax, space)
     names = _checked_labels(labels, len(items))
     chosen = _checked_colors(colors, items, space)
-    data = [_data_of(own, space, i) if isinstance(own, tuple) else None for i, own in enumerate(items)]
+    data = [_data_of(item, space, i) if isinstance(item, tuple) else None for i, item in enumerate(items)]
     _check_times(items, data, first._time_axis)
-    ends = [own.domain if given is None else given[:2] for own, given in zip(items, data, strict=True)]
+    ends = [item.domain if given is None else given[:2] for item, given in zip(items, data, strict=True)]
     axis = Axis.of(ends, first._time_axis, raw=ax is not None)
     drawn: list[Curve] = []
     has_data = any(given is not None for given in data)
     for item, given, name, color in zip(items, data, names, chosen, strict=True):
         if given is None:
-            own = curves_of(item, axis, color, name, alone=False)[0]
+            made, _ = curves_of(item, axis, color, name, alone=False)
             # Beside data, markers of starting points would be a second kind of circles.
-            drawn += [replace(curve, has_start=not has_data) for curve in own]
+            drawn += [replace(curve, has_start=not has_data) for curve in made]
         else:
             start, _, times, points = given
             drawn.append(scatter_of(space, start, times, points, axis, color, name))
-    drawn = [own.on_earth(radius) for own in drawn]
+    drawn = [curve.on_earth(radius) for curve in drawn]
     # Lines are in front of data, and the first of them determines the view.
-    drawn.sort(key=lambda own: not own.has_line)
+    drawn.sort(key=lambda curve: not curve.has_line)
     if ax is not None:
         return _draw_into(ax, drawn, title, show)
-    count = sum(own.has_line for own in drawn)
+    count = sum(curve.has_line for curve in drawn)
     words = [f"{count} curve{'s' if count > 1 else ''}"]
     if count < len(drawn):
-        words.append(f"{sum(len(own.x) for own in drawn if not own.has_line)} data")
+        words.append(f"{sum(len(curve.x) for curve in drawn if not curve.has_line)} data")
     title = title or ("Tracks" if radius is not None else title_on("Comparison", space))
     return finish(draw_page(drawn, title, ", ".join(words), figsize, show), file, show)
 
@@ -164,9 +164,9 @@ def _checked_labels(labels: Any, count: int) -> list[str | None]:
         return [None] * count
     if isinstance(labels, str) or not isinstance(labels, Sequence) or len(labels) != count:
         raise ValidationError(f"labels must be a list of {count} strings, one per curve, not {short_repr(labels)}")
-    for i, own in enumerate(labels):
-        if own is not None and not isinstance(own, str):
-            raise TypeError(f"labels[{i}] must be a string, not {short_repr(own)}")
+    for i, label in enumerate(labels):
+        if label is not None and not isinstance(label, str):
+            raise TypeError(f"labels[{i}] must be a string, not {short_repr(label)}")
     return list(labels)
 
 
@@ -177,13 +177,13 @@ def _checked_colors(colors: Any, items: Sequence[Any], space: AnySpace) -> list[
             raise ValidationError(
                 f"colors must be a list of {len(items)} colours, one per curve, not {short_repr(colors)}"
             )
-        return [_checked_color(own, f"colors[{i}]") for i, own in enumerate(colors)]
-    count = sum(not isinstance(own, tuple) for own in items)
+        return [_checked_color(value, f"colors[{i}]") for i, value in enumerate(colors)]
+    count = sum(not isinstance(value, tuple) for value in items)
     # Frames have colours of their own.
-    usual = OTHERS if any(str(cover_of(own)) in FRAMES for own in factors_of(space)) else distinct()
+    usual = OTHERS if any(str(cover_of(value)) in FRAMES for value in factors_of(space)) else distinct()
     lines = iter(usual if count <= len(usual) else map(tuple, time_colors(np.linspace(0, 1, count))))
     dots = iter([DATA, *distinct()[::-1]] * len(items))
-    return [next(dots) if isinstance(own, tuple) else next(lines) for own in items]
+    return [next(dots) if isinstance(value, tuple) else next(lines) for value in items]
 
 
 def _data_of(pair: tuple[Any, Any], space: Any, i: int) -> tuple[Any, Any, Any, Any]:
@@ -192,25 +192,26 @@ def _data_of(pair: tuple[Any, Any], space: Any, i: int) -> tuple[Any, Any, Any, 
     name = f"curves[{i}]"
     try:
         pairs = zip(factors_of(space), parts_of(points, space, "points"), strict=True)
-        parts = [factor._array(own, "points") for factor, own in pairs]
-        for own, factor in zip(parts, factors_of(space), strict=True):
-            if own.shape[1:] != factor.point_shape or not len(own):
+        parts = [factor._array(part, "points") for factor, part in pairs]
+        for part, factor in zip(parts, factors_of(space), strict=True):
+            if part.shape[1:] != factor.point_shape or not len(part):
                 raise ValidationError(
-                    f"points have shape {own.shape}, but data on {factor!r} need shape {('n', *factor.point_shape)}"
+                    f"points have shape {part.shape}, but data on {factor!r} need shape {('n', *factor.point_shape)}"
                 )
         _, shown, times = knots_of(t, (), len(parts[0]))
-        kept = np.all([np.isfinite(own.reshape(len(own), -1)).all(axis=1) for own in parts], axis=0)
+        kept = np.all([np.isfinite(part.reshape(len(part), -1)).all(axis=1) for part in parts], axis=0)
         if not kept.any():
             raise ValidationError("all points are missing")
         parts = [
-            factor.project(own[kept].astype(factor.dtype)) for own, factor in zip(parts, factors_of(space), strict=True)
+            factor.project(part[kept].astype(factor.dtype))
+            for part, factor in zip(parts, factors_of(space), strict=True)
         ]
     except ValidationError as error:
         raise ValidationError(f"{name}: {error}") from None
     if not np.isfinite(times).all():
         raise ValidationError(f"{name}: t must be finite")
     order = np.argsort(times[kept], kind="stable")
-    parts = [own[order] for own in parts]
+    parts = [part[order] for part in parts]
     shown, times = shown[kept][order], times[kept][order]
     return shown[0], shown[-1], times, tuple(parts) if isinstance(space, Product) else parts[0]
 
@@ -273,11 +274,11 @@ def draw_picture_into(
     for name, (low, high) in limits.items():
         # Pictures with limits of their own must not hide what was there.
         if not getattr(ax, f"get_autoscale{name}_on")():
-            own = getattr(ax, f"get_{name}lim")()
-            getattr(ax, f"set_{name}lim")(min(low, own[0]), max(high, own[1]))
+            ends = getattr(ax, f"get_{name}lim")()
+            getattr(ax, f"set_{name}lim")(min(low, ends[0]), max(high, ends[1]))
     new = [artist for artist in ax.get_children() if artist not in before]
     shrink(new, factor)
-    hidden = tuple(own for own in LEGEND if own not in (START, *FRAME))
+    hidden = tuple(ends for ends in LEGEND if ends not in (START, *FRAME))
     for artist in new:
         # Legends of the user have the names of curves.
         if str(artist.get_label()).startswith(hidden):
@@ -319,7 +320,7 @@ def save(figure: Figure, file: Any) -> None:
     if path is None:
         figure.savefig(file)
         return
-    known = sorted(set(figure.canvas.get_supported_filetypes()) - {own[1:] for own in _MOVING})
+    known = sorted(set(figure.canvas.get_supported_filetypes()) - {suffix[1:] for suffix in _MOVING})
     ending = path.suffix[1:].lower()
     if not ending:
         ending = figure.canvas.get_default_filetype()
@@ -335,7 +336,9 @@ def save(figure: Figure, file: Any) -> None:
         figure.savefig(temporary, format=ending)
 
 
-def checked_look(file: Any, ax: Any, color: ColorType, label: Any, title: Any, figsize: Any, show: Any) -> Look:
+def checked_look(
+    file: object, ax: object, color: object, label: object, title: object, figsize: object, show: object
+) -> Look:
     """Return the options that were given as keyword arguments of the function that draws.
 
     Raises
@@ -362,7 +365,7 @@ def checked_look(file: Any, ax: Any, color: ColorType, label: Any, title: Any, f
     return look
 
 
-def _checked_color(color: ColorType, name: str) -> Any:
+def _checked_color(color: Any, name: str) -> ColorType:
     """Return a colour in any form that matplotlib accepts."""
     try:
         valid = is_color_like(color)
@@ -400,7 +403,7 @@ _TEXT: Any = (
     "font.size",
     "axes.labelpad",
     "axes.titlepad",
-    *(f"{x}tick.major.{own}" for x in "xy" for own in ("pad", "size")),
+    *(f"{x}tick.major.{name}" for x in "xy" for name in ("pad", "size")),
 )
 
 
@@ -513,7 +516,7 @@ _ABOUT: Look = {"left": 0.07, "right": 0.97, "bottom": 0.07, "top": 0.9, "hspace
 
 def _caption(axes: Any, name: str) -> None:
     """Write the name of a factor above its picture, and above explanations that the picture has there."""
-    top = max(own.get_window_extent().y1 for own in (axes._left_title, axes.get_legend()) if own is not None)
+    top = max(artist.get_window_extent().y1 for artist in (axes._left_title, axes.get_legend()) if artist is not None)
     above = 72 * (top - axes.bbox.y1) / axes.figure.dpi + 4
     look: Look = {"xycoords": "axes fraction", "textcoords": "offset points", "ha": "center", "fontsize": "large"}
     axes.annotate(name, (0.5, 1), (0, above), **look)
@@ -528,7 +531,7 @@ def head(figure: Figure, body: SubFigure, title: str, words: str, curves: Sequen
     title = fill(title, max(int(letters / size), 10))
     figure.suptitle(title, x=0.01, ha="left", weight="bold", fontsize=1.7 * size * font, linespacing=1.0)
     named: Look = {}
-    for curve in (part for own in curves if not own.faint for part in own.unbroken):
+    for curve in (part for whole in curves if not whole.faint for part in whole.unbroken):
         if curve.label:
             look: Look = {} if curve.has_line else {"linestyle": "none", "marker": "o", "markerfacecolor": "none"}
             named.setdefault(curve.label, Line2D([], [], color=curve.color, linewidth=2, **look))

@@ -78,7 +78,7 @@ def halo() -> list[AbstractPathEffect]:
 
 def colors(number: int) -> list[ColorType]:
     """Return one colour per curve: the default colour for one curve, and dark to light colours for several."""
-    return [spline_color()] if number == 1 else [tuple(own) for own in time_colors(np.linspace(0, 1, number))]
+    return [spline_color()] if number == 1 else [tuple(color) for color in time_colors(np.linspace(0, 1, number))]
 
 
 def time_colors(share: Any) -> Any:
@@ -109,13 +109,13 @@ def scale_of(axes: Axes) -> float:
 def shrink(artists: Iterable[Artist], factor: float) -> None:
     """Multiply the widths of lines and the sizes of markers by a factor."""
     for artist in artists:
-        own: Any = artist
+        shape: Any = artist
         if isinstance(artist, Line2D):
-            own.set(markersize=factor * own.get_markersize(), markeredgewidth=factor * own.get_markeredgewidth())
+            shape.set(markersize=factor * shape.get_markersize(), markeredgewidth=factor * shape.get_markeredgewidth())
         if isinstance(artist, Quiver):
-            own.width *= factor
+            shape.width *= factor
         elif isinstance(artist, (Line2D, Patch, Collection)):
-            own.set_linewidth(factor * np.asarray(own.get_linewidth()))
+            shape.set_linewidth(factor * np.asarray(shape.get_linewidth()))
 
 
 # ---- text ----
@@ -141,8 +141,8 @@ def legend(holder: Axes | FigureBase, handles: Sequence[Any], labels: Sequence[s
     # A legend fills its columns one after the other.
     order = [i for column in range(columns) for i in range(column, len(labels), columns)]
     handles, labels = [handles[i] for i in order], [labels[i] for i in order]
-    own: Look = {"frameon": False, "fontsize": "small", "borderaxespad": 0.0, "columnspacing": 1.4}
-    holder.legend(handles, labels, ncols=max(columns, 1), handlelength=1.6, **own | look)
+    usual: Look = {"frameon": False, "fontsize": "small", "borderaxespad": 0.0, "columnspacing": 1.4}
+    holder.legend(handles, labels, ncols=max(columns, 1), handlelength=1.6, **usual | look)
 
 
 def plain(axes: Axes) -> None:

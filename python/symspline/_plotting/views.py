@@ -22,7 +22,7 @@ FRAMES = {"sphere:3", "so:3", "o:3", "su:2", "se:3"}
 """Spaces whose view has frames, with a colour for every axis."""
 _Views = View | Callable[[Sequence[Curve]], View]
 _LINES, _STATES = "lines through the origin", "states of a qubit"
-_angles = {names: graphs.angle(*own) for names, own in graphs.ANGLES.items()}
+_angles = {names: graphs.angle(*data) for names, data in graphs.ANGLES.items()}
 # Spaces, their view, and what their points are.
 _VIEWS: list[tuple[str, _Views, str]] = [
     ("euclidean:1", graphs.coordinates(["x"]), ""),
@@ -75,10 +75,10 @@ def views_of_factors(curves: Sequence[Curve]) -> list[tuple[View, list[Curve]]]:
     parts = [[curve.part(i) for curve in curves] for i in range(len(factors))]
     views = list(map(view_of, parts))
     vectors = any(
-        str(cover_of(own)) in matrices.MATRICES and not view.in_rows for own, view in zip(factors, views, strict=True)
+        str(cover_of(part)) in matrices.MATRICES and not view.in_rows for part, view in zip(factors, views, strict=True)
     )
-    for i, own in enumerate(parts):
-        if str(factors[i]) == "euclidean:3" and (vectors or any(len(curve.gaps) for curve in own)):
+    for i, part in enumerate(parts):
+        if str(factors[i]) == "euclidean:3" and (vectors or any(len(curve.gaps) for curve in part)):
             # A time axis shows gaps, and how positions and rotations belong together.
             views[i] = graphs.coordinates(["x₁", "x₂", "x₃"])
         if not views[i].is_time:
@@ -92,7 +92,7 @@ def views_of_factors(curves: Sequence[Curve]) -> list[tuple[View, list[Curve]]]:
 
 def captions(space: AnySpace) -> list[str]:
     """Return names of the factors of a product, with what their points are, and numbers if several are equal."""
-    names = [", ".join(filter(None, (repr(own), _points_of_factor(own)))) for own in factors_of(space)]
+    names = [", ".join(filter(None, (repr(factor), _points_of_factor(factor)))) for factor in factors_of(space)]
     several = max(Counter(names).values()) > 1
     return [f"factor {i}: {name}" if several else name for i, name in enumerate(names)]
 
@@ -106,7 +106,7 @@ def title_on(what: str, space: AnySpace, most: int = 63) -> str:
 
     Long titles have the short name of the space, and those of products have none, because captions name the factors.
     """
-    words = [_points_of_factor(own) for own in factors_of(space)]
+    words = [_points_of_factor(text) for text in factors_of(space)]
     points = _entry(space)[1]
     if isinstance(space, Product):
         points = " and ".join(dict.fromkeys(words)) if all(words) else ""
@@ -115,4 +115,4 @@ def title_on(what: str, space: AnySpace, most: int = 63) -> str:
     titles = [f"{kind} on {name}" for kind in kinds for name in names]
     if isinstance(space, Product) and len(kinds) > 1:
         titles.insert(1, kinds[0])
-    return next((own for own in titles if len(own) <= most), shorten(titles[-1], most, placeholder=" …"))
+    return next((text for text in titles if len(text) <= most), shorten(titles[-1], most, placeholder=" …"))

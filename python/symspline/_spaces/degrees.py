@@ -45,6 +45,6 @@ def look_like_degrees(space: AnySpace, points: Any) -> float | None:
 
 def with_angles(space: AnySpace, points: Any, convert: Callable[[Any], Any]) -> Any:
     """Return points, or vectors, with the angles of tori converted from or to degrees."""
-    each = zip(factors_of(space), parts_of(points, space, "points"), strict=True)
-    found = tuple(convert(part) if isinstance(factor, Torus) else part for factor, part in each)
-    return found if isinstance(points, tuple) else found[0]
+    pairs = zip(factors_of(space), parts_of(points, space, "points"), strict=True)
+    converted = tuple(convert(part) if isinstance(factor, Torus) else part for factor, part in pairs)
+    return converted if isinstance(points, tuple) else converted[0]

@@ -74,7 +74,7 @@ def proper_symbol(symbol: object) -> str:
     """
     if isinstance(symbol, str) and symbol in _PROPER:
         return _PROPER[symbol]
-    known = ", ".join(f"{own} or {aliases[0]}" for own, aliases in _ALIASES.items())
+    known = ", ".join(f"{name} or {aliases[0]}" for name, aliases in _ALIASES.items())
     laue = ", ".join(aliases[1] for aliases in _ALIASES.values())
     raise ValidationError(
         f"{short_repr(symbol)} is not the symbol of a point group. Pass one of the proper point groups {known}, or "
@@ -85,14 +85,14 @@ def proper_symbol(symbol: object) -> str:
 @lru_cache
 def elements(symbol: str) -> FloatArray:
     """Return the rotations of a proper point group, the identity first. The array is read-only."""
-    found = [np.eye(3)]
-    for one in found:
+    rotations = [np.eye(3)]
+    for one in rotations:
         for generator in _GENERATORS[symbol]:
             made = one @ np.asarray(generator)
             made = _ENTRIES[np.abs(made[..., None] - _ENTRIES).argmin(axis=-1)]
-            if not any(np.array_equal(made, known) for known in found):
-                found.append(made)
-    return read_only(np.array(found))
+            if not any(np.array_equal(made, known) for known in rotations):
+                rotations.append(made)
+    return read_only(np.array(rotations))
 
 
 def recognised(group: NDArray[Any]) -> str | None:
@@ -100,9 +100,9 @@ def recognised(group: NDArray[Any]) -> str | None:
     if group.shape[1:] != (3, 3) or group.dtype.kind != "f":
         return None
     for symbol in _GENERATORS:
-        own = elements(symbol)
-        if len(own) == len(group):
-            off = np.abs(group[:, None] - own).max(axis=(-2, -1))
+        rotations = elements(symbol)
+        if len(rotations) == len(group):
+            off = np.abs(group[:, None] - rotations).max(axis=(-2, -1))
             if off.min(axis=0).max() < 1e-8 and off.min(axis=1).max() < 1e-8:
                 return symbol
     return None
@@ -197,7 +197,7 @@ class FiniteGroup:
     def described(self, index: int) -> tuple[Array, ...]:
         """Return the elements from the left and the right of which a transformation consists."""
         both = ((self.left, self._of_left), (self.right, self._of_right))
-        return tuple(factor.elements[own[index]] for factor, own in both if factor is not None)
+        return tuple(factor.elements[of_factor[index]] for factor, of_factor in both if factor is not None)
 
     def move(self, x: Array, index: Any, axes: int) -> Array:
         """Apply the transformations with some indices to points or tangent vectors with `axes` axes each."""
@@ -248,7 +248,7 @@ def _named(space: AnySpace, name: str, size: int) -> tuple[Array, str]:
                 f"the group of all signs of {size} columns has 2**{size} elements. Pass the elements that you need as "
                 "an array, or fit a Grassmannian, where signs of columns do not matter."
             )
-        return np.array([np.diag(own) for own in product([1.0, -1.0], repeat=size)]).astype(space.dtype), SIGNS
+        return np.array([np.diag(signs) for signs in product([1.0, -1.0], repeat=size)]).astype(space.dtype), SIGNS
     symbol = proper_symbol(name)
     if size != 3:
         raise ValidationError(
@@ -274,9 +274,9 @@ def matrices_of(group: Any) -> Any:
         return group.as_matrix()
     if not hasattr(group, "improper"):
         return group
-    found = matrices_of_quaternions(group.data).reshape(-1, 3, 3)
-    same = np.abs(found[:, None] - found).max(axis=(-2, -1)) < _TOL
-    return found[~np.tril(same, -1).any(axis=1)]
+    matrices = matrices_of_quaternions(group.data).reshape(-1, 3, 3)
+    same = np.abs(matrices[:, None] - matrices).max(axis=(-2, -1)) < _TOL
+    return matrices[~np.tril(same, -1).any(axis=1)]
 
 
 def _table(array: Array) -> Indices:
@@ -394,10 +394,10 @@ def along_path(group: FiniteGroup, points: Array, finite: NDArray[np.bool_], com
     joined[..., 1:] = finite[..., 1:] & (before >= 0)
     node = np.nonzero(joined)
     previous = (*node[:-1], before[(*node[:-1], node[-1] - 1)])
-    found = compare(points[previous], points[node])
+    nearest = compare(points[previous], points[node])
     total = np.full(finite.shape, group.identity)
-    total[node] = found.moves
-    _warn_ambiguous(found, [node[-1], previous[-1]], node[:-1], 1)
+    total[node] = nearest.moves
+    _warn_ambiguous(nearest, [node[-1], previous[-1]], node[:-1], 1)
     # Prefix products of all steps, in logarithmically many passes.
     shift = 1
     while shift < count:
@@ -416,22 +416,22 @@ def over_grid(group: FiniteGroup, points: Array, finite: NDArray[np.bool_], comp
     rows = points.reshape(finite.size, *points.shape[finite.ndim :])
     pairs, steps = [], []
     for axis in range(finite.ndim):
-        u, v = (np.moveaxis(numbers, axis, 0)[own].ravel() for own in (slice(-1), slice(1, None)))
+        u, v = (np.moveaxis(numbers, axis, 0)[part].ravel() for part in (slice(-1), slice(1, None)))
         both = finite.flat[u] & finite.flat[v]
         u, v = u[both], v[both]
         pairs.append((u, v))
         steps.append(compare(rows[u], rows[v]))
-    u, v = (np.concatenate([own[i] for own in pairs]) for i in (0, 1))
-    found = Nearest(*(np.concatenate(each) for each in zip(*steps, strict=True)))
-    total, tree = _spanning_tree(group, finite.size, u, v, found)
-    in_tree = Nearest(found.moves[tree], found.distance[tree], found.ambiguous[tree])
-    nodes = [np.stack(np.unravel_index(own[tree], shape), axis=-1) for own in (v, u)]
+    u, v = (np.concatenate([part[i] for part in pairs]) for i in (0, 1))
+    nearest = Nearest(*(np.concatenate(arrays) for arrays in zip(*steps, strict=True)))
+    total, tree = _spanning_tree(group, finite.size, u, v, nearest)
+    in_tree = Nearest(nearest.moves[tree], nearest.distance[tree], nearest.ambiguous[tree])
+    nodes = [np.stack(np.unravel_index(part[tree], shape), axis=-1) for part in (v, u)]
     _warn_ambiguous(in_tree, nodes, (), finite.ndim)
-    open_edges = np.flatnonzero(group.table[total[u], found.moves] != total[v])
+    open_edges = np.flatnonzero(group.table[total[u], nearest.moves] != total[v])
     if open_edges.size:
         own_u, own_v = u[open_edges], v[open_edges]
         axes = rows.ndim - 1
-        moved = group.move(rows[own_v], group.table[total[own_u], found.moves[open_edges]], axes)
+        moved = group.move(rows[own_v], group.table[total[own_u], nearest.moves[open_edges]], axes)
         off = np.abs(moved - group.move(rows[own_v], total[own_v], axes)).reshape(open_edges.size, -1).max(axis=-1)
         open_edges = open_edges[off > _ZERO]
     if open_edges.size:
@@ -465,9 +465,9 @@ def _spanning_tree(group: FiniteGroup, count: int, u: Indices, v: Indices, steps
         rank = np.full(count, -1)
         position = np.arange(edges.size)
         for ends in (of_u, of_v):
-            own = np.full(count, -1)
-            own[ends] = position
-            np.maximum(rank, own, out=rank)
+            positions = np.full(count, -1)
+            positions[ends] = position
+            np.maximum(rank, positions, out=rank)
         active = np.flatnonzero(rank >= 0)
         best = edges[rank[active]]
         a, b = root[u[best]], root[v[best]]
@@ -492,19 +492,19 @@ def _spanning_tree(group: FiniteGroup, count: int, u: Indices, v: Indices, steps
     return total, np.concatenate(tree) if tree else np.zeros(0, np.intp)
 
 
-def _warn_ambiguous(found: Nearest, nodes: list[Indices], batch: tuple[Indices, ...], axes: int) -> None:
+def _warn_ambiguous(nearest: Nearest, nodes: list[Indices], batch: tuple[Indices, ...], axes: int) -> None:
     """Warn if two representatives of a node are nearly equally near to the node before it."""
-    some = np.flatnonzero(found.ambiguous)
+    some = np.flatnonzero(nearest.ambiguous)
     if not some.size:
         return
     i = some[0]
-    node, before = (tuple(np.atleast_1d(own[i]).tolist()) for own in nodes)
-    curve = tuple(int(own[i]) for own in batch)
+    node, before = (tuple(np.atleast_1d(index[i]).tolist()) for index in nodes)
+    curve = tuple(int(index[i]) for index in batch)
     more = f" (and {some.size - 1} more nodes)" if some.size > 1 else ""
-    name, other = (f"points[{', '.join(map(str, (*curve, *own)))}]" for own in (node, before))
+    name, other = (f"points[{', '.join(map(str, (*curve, *index)))}]" for index in (node, before))
     warn(
         f"two representatives are nearly equally near: {name}{more} has two representatives whose distances from "
-        f"{other} differ by less than {_CLOSE:.0%}. The nearest one, at a distance of {found.distance[i]:.3g}, was "
+        f"{other} differ by less than {_CLOSE:.0%}. The nearest one, at a distance of {nearest.distance[i]:.3g}, was "
         "chosen, but the other one may be meant. Use samples that are closer together, or smooth the data first.",
         UserWarning,
         curve,
@@ -526,7 +526,7 @@ def _warn_open(
         count, kind = len(loops), "squares of four neighbours"
     else:
         # The loop surrounds missing nodes.
-        both = (np.stack(np.unravel_index(own, shape), axis=-1).tolist() for own in edges)
+        both = (np.stack(np.unravel_index(ends, shape), axis=-1).tolist() for ends in edges)
         what = [f"{tuple(a)} – {tuple(b)}" for a, b in list(zip(*both, strict=True))[:_SHOWN]]
         count, kind = len(edges[0]), "loops around missing nodes, through the neighbours"
     named = "; ".join(what) + ("; …" if count > _SHOWN else "")
@@ -545,24 +545,24 @@ def _open_squares(
     """Return the squares of four neighbours, in order around the square, whose steps do not return to the start."""
     total = int(np.prod(shape))
     index = []
-    for (u, _), own in zip(pairs, steps, strict=True):
+    for (u, _), entry in zip(pairs, steps, strict=True):
         full = np.full(total, -1)
-        full[u] = own.moves
+        full[u] = entry.moves
         index.append(full.reshape(shape))
     numbers = np.arange(total).reshape(shape)
     loops = []
     for a, b in combinations(range(len(shape)), 2):
 
         def corner(array: Any, i: int, j: int, a: int = a, b: int = b) -> Any:
-            own: list[slice] = [slice(None)] * len(shape)
-            own[a], own[b] = (slice(-1), slice(1, None))[i], (slice(-1), slice(1, None))[j]
-            return array[tuple(own)]
+            index: list[slice] = [slice(None)] * len(shape)
+            index[a], index[b] = (slice(-1), slice(1, None))[i], (slice(-1), slice(1, None))[j]
+            return array[tuple(index)]
 
         along_a, then_b = corner(index[a], 0, 0), corner(index[b], 1, 0)
         along_b, then_a = corner(index[b], 0, 0), corner(index[a], 0, 1)
         known = (along_a >= 0) & (then_b >= 0) & (along_b >= 0) & (then_a >= 0)
         is_open = known & (group.table[along_a, then_b] != group.table[along_b, then_a])
-        around = [corner(numbers, *own)[is_open] for own in ((0, 0), (1, 0), (1, 1), (0, 1))]
-        each = [np.stack(np.unravel_index(own, shape), axis=-1).tolist() for own in around]
-        loops += [tuple(map(tuple, loop)) for loop in zip(*each, strict=True)]
+        around = [corner(numbers, *entry)[is_open] for entry in ((0, 0), (1, 0), (1, 1), (0, 1))]
+        corners = [np.stack(np.unravel_index(entry, shape), axis=-1).tolist() for entry in around]
+        loops += [tuple(map(tuple, loop)) for loop in zip(*corners, strict=True)]
     return loops

@@ -314,8 +314,8 @@ def rotations_and_positions(poses: Any, name: str) -> tuple[Array, Array]:
 def _are_parts(rotations: Any, positions: Any) -> bool:
     """Whether the first of two values looks like rotations or quaternions, and the second like positions."""
     first, second = _shape(rotations), _shape(positions)
-    found = _are_rotations(rotations) or first[-2:] == (3, 3) or first[-1:] == (4,)
-    return found and second[-1:] == (3,)
+    turns = _are_rotations(rotations) or first[-2:] == (3, 3) or first[-1:] == (4,)
+    return turns and second[-1:] == (3,)
 
 
 def _shape(value: Any) -> tuple[int, ...]:

@@ -167,35 +167,35 @@ class Product(Space[PProduct]):
         return self._each("mean", points, (weights,) * len(self.factors))
 
     def _samples(self, points: Any, weights: Any, what: str) -> tuple[tuple[int, ...], Groups]:
-        each = [
-            factor._samples(own, weights, what)
-            for factor, (own,) in zip(self.factors, self._split(points), strict=True)
+        groups_of = [
+            factor._samples(part, weights, what)
+            for factor, (part,) in zip(self.factors, self._split(points), strict=True)
         ]
-        leads = [lead for lead, _ in each]
+        leads = [lead for lead, _ in groups_of]
         if any(lead != leads[0] for lead in leads):
             raise ValidationError(
                 f"the factors of `points` have the leading axes {leads}. Pass as many points for each factor."
             )
-        _, first = each[0]
-        return leads[0], first._replace(points=tuple(groups.points for _, groups in each))
+        _, first = groups_of[0]
+        return leads[0], first._replace(points=tuple(groups.points for _, groups in groups_of))
 
     def _batched(self, rows: Tuple, batch: tuple[int, ...]) -> Tuple:
-        return tuple(factor._batched(own, batch) for factor, own in zip(self.factors, rows, strict=True))
+        return tuple(factor._batched(part, batch) for factor, part in zip(self.factors, rows, strict=True))
 
     def _finite(self, operation: str, t: NDArray[np.float64] | None = None, **inputs: Any) -> Any:
-        each = tuple(
+        results = tuple(
             factor._finite(operation, t, **dict(zip(inputs, part, strict=True)))
             for factor, part in zip(self.factors, self._split(*inputs.values()), strict=True)
         )
         if operation == "distance":
-            return product_norm(each)
-        return sum(each) if operation == "inner" else each
+            return product_norm(results)
+        return sum(results) if operation == "inner" else results
 
     def _each(self, method: str, *arguments: Any) -> PProduct:
         """Call a method of every factor with the entries of the arguments that belong to it."""
         parts = zip(self.factors, self._split(*arguments), strict=True)
-        each: Any = tuple(getattr(factor, method)(*part) for factor, part in parts)
-        result: PProduct = each
+        results: Any = tuple(getattr(factor, method)(*part) for factor, part in parts)
+        result: PProduct = results
         return result
 
     def _split(self, *arguments: Any) -> list[Tuple]:
@@ -232,7 +232,7 @@ def _parts_of_poses(value: Any, space: Product[Any], name: str) -> Any:
     """
     if isinstance(value, tuple) or sorted(factor.point_shape for factor in space.factors) != [(3,), (3, 3)]:
         return value
-    several = isinstance(value, list) and len(value) > 0 and all(hasattr(own, "translation") for own in value)
+    several = isinstance(value, list) and len(value) > 0 and all(hasattr(entry, "translation") for entry in value)
     matrices = isinstance(value, np.ndarray) and value.shape[-2:] == (4, 4) and names_points(name)
     if {str(factor) for factor in space.factors} != {"so:3", "euclidean:3"} or not (
         several or matrices or hasattr(value, "translation")
@@ -355,7 +355,7 @@ def _guess(word: str, parameters: str, names: dict[str, str]) -> str:
     glued = re.fullmatch(r"([a-z_ -]+)\(?(\d[\d, ]*)\)?", word)
     if glued is not None and not parameters:
         word, parameters = glued[1], glued[2]
-    meant = {cls.__name__.lower(): own for own, cls in CLASSES.items()} | {name: name for name in names}
+    meant = {cls.__name__.lower(): short for short, cls in CLASSES.items()} | {name: name for name in names}
     close = get_close_matches(re.sub("[-_ ]", "", word), meant, 1, 0.7)
     colon = ":" if parameters else ""
     return f"did you mean {short_repr(meant[close[0]] + colon + parameters.strip())}? " if close else ""

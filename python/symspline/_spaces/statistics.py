@@ -92,15 +92,17 @@ def circular_median(angles: Floats, weights: Floats) -> Minima:
 
     # Between data and antipodes, the objective is linear.
     corners = np.sort(np.concatenate([v, (v - v[0] + np.pi) % TURN + v[0]])) + TURN
-    found = objective(corners)
-    best = int(np.argmin(found))
-    corners, found = np.roll(corners, -best), np.roll(found, -best)
-    slack = _EQUAL * (1 + found)
+    values = objective(corners)
+    best = int(np.argmin(values))
+    corners, values = np.roll(corners, -best), np.roll(values, -best)
+    slack = _EQUAL * (1 + values)
     # Minima without a barrier between them and the best one belong to it.
-    barrier = np.minimum(np.maximum.accumulate(found), np.maximum.accumulate(found[::-1])[::-1])
-    local = (np.roll(found, 1) >= found - slack) & (np.roll(found, -1) >= found - slack) & (barrier > found + slack)
+    barrier = np.minimum(np.maximum.accumulate(values), np.maximum.accumulate(values[::-1])[::-1])
+    local = (
+        (np.roll(values, 1) >= values - slack) & (np.roll(values, -1) >= values - slack) & (barrier > values + slack)
+    )
     mean_square = circular_mean(v, w).objective
-    return _minima(corners, found, local, standard_error(mean_square, w))
+    return _minima(corners, values, local, standard_error(mean_square, w))
 
 
 def _sorted(angles: Floats, weights: Floats) -> tuple[Floats, Floats]:
@@ -157,13 +159,13 @@ class Whitening(NamedTuple):
     def forward(self, points: Array) -> Array:
         """Return L⁻¹ A L⁻ᴴ."""
         half = np.linalg.solve(self.factor, points)
-        found = np.linalg.solve(self.factor, adjoint(half))
-        return np.asarray((found + adjoint(found)) / 2)
+        moved = np.linalg.solve(self.factor, adjoint(half))
+        return np.asarray((moved + adjoint(moved)) / 2)
 
     def back(self, points: Array) -> Array:
         """Return L A Lᴴ."""
-        found = self.factor @ points @ adjoint(self.factor)
-        return np.asarray((found + adjoint(found)) / 2)
+        moved = self.factor @ points @ adjoint(self.factor)
+        return np.asarray((moved + adjoint(moved)) / 2)
 
 
 # ---- groups of points, and descents to local minima of their sums of distances ----
@@ -217,7 +219,7 @@ class Groups(NamedTuple):
 def _map(function: Any, *values: Any) -> Any:
     """Apply a function to arrays, or to the entries of tuples of arrays."""
     if isinstance(values[0], tuple):
-        return tuple(function(*each) for each in zip(*values, strict=True))
+        return tuple(function(*arrays) for arrays in zip(*values, strict=True))
     return function(*values)
 
 
@@ -232,12 +234,12 @@ def scaled(rows: Any, factors: Floats) -> Any:
 
 def joined(rows: list[Any]) -> Any:
     """Concatenate rows of points."""
-    return _map(lambda *each: np.concatenate(each), *rows)
+    return _map(lambda *arrays: np.concatenate(arrays), *rows)
 
 
 def put(rows: Any, index: Any, values: Any) -> None:
-    def replace(own: Array, value: Array) -> None:
-        own[index] = value
+    def replace(array: Array, value: Array) -> None:
+        array[index] = value
 
     _map(replace, rows, values)
 
@@ -344,24 +346,24 @@ def descend_to_mean(space: Any, groups: Groups, means: Any, steps: int = _STEPS)
     state = Descent(means, np.full(count, np.inf), np.zeros(count), np.zeros(count, bool))
     active, last = np.ones(count, bool), np.full(count, np.inf)
     for _ in range(steps):
-        own, index = groups.of(active), np.flatnonzero(active)
+        some, index = groups.of(active), np.flatnonzero(active)
         here = take(means, index)
-        at = own.spread(here)
-        logs = space.log(at, own.points)
+        at = some.spread(here)
+        logs = space.log(at, some.points)
         lengths = _size(space, at, logs)
-        hessians = own.sums(own.weights * _hessians(space, lengths))
+        hessians = some.sums(some.weights * _hessians(space, lengths))
         # Without the projection, logarithms to points beyond a quarter turn amplify rounding errors of the iterate.
-        step = space.project_tangent(here, scaled(own.sums(scaled(logs, own.weights)), 1 / hessians))
+        step = space.project_tangent(here, scaled(some.sums(scaled(logs, some.weights)), 1 / hessians))
         put(means, index, space.exp(here, step))
         size, before, least = _size(space, here, step), last[active], floor[active]
         last[active] = size
         # Rounding errors of distant points may exceed the floor.
         active[index] = (size > least) & ((size < before) | (size > 1e4 * least))
         if not active[index].all():
-            _note(state, index, own, lengths, 2)
+            _note(state, index, some, lengths, 2)
         if not active.any():
             return state
-    _note(state, index, own, lengths, 2)
+    _note(state, index, some, lengths, 2)
     return state._replace(unfinished=active)
 
 
@@ -377,18 +379,18 @@ def descend_to_median(space: Any, groups: Groups, medians: Any, steps: int = _ST
     last, rate = np.full(count, np.inf), np.zeros(count)
     scale = np.zeros(count)
     for _ in range(steps):
-        own, index = groups.of(active), np.flatnonzero(active)
+        some, index = groups.of(active), np.flatnonzero(active)
         here = take(medians, index)
-        step, size, distances = _weiszfeld(space, own, here)
+        step, size, distances = _weiszfeld(space, some, here)
         # The mean distance from the first iterate, which is a datum.
-        scale[index] = np.maximum(scale[index], own.sums(own.weights * distances) / own.sums(own.weights))
-        nearest = _argmin(distances, own)
-        candidates = take(own.points, own.starts + nearest)
+        scale[index] = np.maximum(scale[index], some.sums(some.weights * distances) / some.sums(some.weights))
+        nearest = _argmin(distances, some)
+        candidates = take(some.points, some.starts + nearest)
         fresh = nearest != tested[index]
         tested[index] = nearest
         optimal = np.zeros(len(index), bool)
         if fresh.any():
-            _, length, _ = _weiszfeld(space, own.of(fresh), take(candidates, fresh))
+            _, length, _ = _weiszfeld(space, some.of(fresh), take(candidates, fresh))
             optimal[fresh] = length == 0
         put(medians, index, space.exp(here, step))
         put(medians, index[optimal], take(candidates, optimal))
@@ -398,10 +400,10 @@ def descend_to_median(space: Any, groups: Groups, medians: Any, steps: int = _ST
         floor = 8 * _EPS * np.asarray(space._rounding(here)) + _MEDIAN_TOL * scale[index]
         active[index] = ~optimal & (size > floor)
         if not active[index].all():
-            _note(state, index, own, distances, 1)
+            _note(state, index, some, distances, 1)
         if not active.any():
             return state
-    _note(state, index, own, distances, 1)
+    _note(state, index, some, distances, 1)
     error = last / (1 - np.minimum(rate, 1 - 1e-6))
     return state._replace(unfinished=active & (error > _MEDIAN_LIMIT * scale))
 
@@ -436,10 +438,10 @@ def _weiszfeld(space: Any, groups: Groups, at: Any) -> tuple[Any, Floats, Floats
 def _argmin(values: Floats, groups: Groups) -> Indices:
     """Return the index of the smallest value in every group."""
     least = groups.spread(np.minimum.reduceat(values, groups.starts))
-    found = np.flatnonzero(values == least)
+    hits = np.flatnonzero(values == least)
     number = np.repeat(np.arange(len(groups.counts)), groups.counts)
-    _, first = np.unique(number[found], return_index=True)
-    return np.asarray(found[first] - groups.starts)
+    _, first = np.unique(number[hits], return_index=True)
+    return np.asarray(hits[first] - groups.starts)
 
 
 def require_metric(space: Any, what: str) -> None:
@@ -519,32 +521,32 @@ def _minimum(space: Any, groups: Groups, kind: _Kind) -> Any:
     if whitening is None:
         return _minimum_of_arrays(space, groups, kind)
     rows = whitening._replace(factor=groups.spread(whitening.factor))
-    own = groups._replace(points=rows.forward(groups.points))
-    return whitening.back(_minimum_of_arrays(whitening.space, own, kind))
+    moved = groups._replace(points=rows.forward(groups.points))
+    return whitening.back(_minimum_of_arrays(whitening.space, moved, kind))
 
 
 def _minimum_of_arrays(space: Any, groups: Groups, kind: _Kind) -> Any:
     starts = space._first_means(groups)
-    found, failed = _descents(space, groups, starts, kind, (_SHORT,))
+    descent, failed = _descents(space, groups, starts, kind, (_SHORT,))
     if np.isfinite(space.curvature):
         # A ball of radius 0 contains its centre only.
-        outside = failed | ((found.radius >= kind.convex * space.injectivity_radius) & (found.radius > 0))
+        outside = failed | ((descent.radius >= kind.convex * space.injectivity_radius) & (descent.radius > 0))
     else:
         outside = failed
-    points, several = found.points, np.flatnonzero(outside)
-    slow = found.unfinished & ~outside
+    points, several = descent.points, np.flatnonzero(outside)
+    slow = descent.unfinished & ~outside
     if slow.any():
         rest = kind.descend(space, groups.of(slow), take(points, slow))
         put(points, slow, rest.points)
-        found.unfinished[slow] = rest.unfinished
+        descent.unfinished[slow] = rest.unfinished
     results = []
     for group in map(int, several):
         one = groups.of(np.arange(len(groups.counts)) == group)
         results.append(_global_minimum(space, one, kind, group if len(groups.counts) > 1 else None))
         _assign(points, group, results[-1].point)
-    found.unfinished[several] = False
-    if found.unfinished.any():
-        _raise_unfinished(kind, np.flatnonzero(found.unfinished)[0] if len(groups.counts) > 1 else None)
+    descent.unfinished[several] = False
+    if descent.unfinished.any():
+        _raise_unfinished(kind, np.flatnonzero(descent.unfinished)[0] if len(groups.counts) > 1 else None)
     _warn_ambiguous(kind, several if len(groups.counts) > 1 else None, results)
     return points
 
@@ -561,10 +563,10 @@ def _descents(
             nothing = np.zeros(1, bool)
             return Descent(_copied(starts), np.full(1, np.inf), np.full(1, np.inf), nothing), ~nothing
     halves = np.arange(count) < count // 2, np.arange(count) >= count // 2
-    each = [_descents(space, groups.of(half), take(starts, half), kind, steps) for half in halves]
-    points = joined([found.points for found, _ in each])
-    numbers = [np.concatenate(own) for own in zip(*(found[1:] for found, _ in each), strict=True)]
-    return Descent(points, *numbers), np.concatenate([failed for _, failed in each])
+    parts = [_descents(space, groups.of(half), take(starts, half), kind, steps) for half in halves]
+    points = joined([descent.points for descent, _ in parts])
+    numbers = [np.concatenate(arrays) for arrays in zip(*(descent[1:] for descent, _ in parts), strict=True)]
+    return Descent(points, *numbers), np.concatenate([failed for _, failed in parts])
 
 
 def _global_minimum(space: Any, group: Groups, kind: _Kind, number: int | None) -> _Found:
@@ -579,10 +581,10 @@ def _global_minimum(space: Any, group: Groups, kind: _Kind, number: int | None) 
         return _on_circle(space, group, kind)
     if not np.isfinite(space.curvature):
         # Without a metric, minima cannot be compared.
-        found = kind.descend(space, group, take(data, np.arange(1)))
-        if found.unfinished.any():
+        descent = kind.descend(space, group, take(data, np.arange(1)))
+        if descent.unfinished.any():
             _raise_unfinished(kind, number)
-        return _Found(take(found.points, 0), np.inf, np.inf, 0.0)
+        return _Found(take(descent.points, 0), np.inf, np.inf, 0.0)
     return _from_several_starts(space, group, kind, number)
 
 
@@ -598,34 +600,34 @@ def _order(points: Any) -> NDArray[np.intp]:
 
 def _on_torus(group: Groups, kind: _Kind) -> _Found:
     """Solve for every angle separately, which is exact for sums of squares, and for one angle also for medians."""
-    each = [kind.on_circle(own, group.weights) for own in group.points.T]
-    angles = np.array([own.angle for own in each])
+    minima = [kind.on_circle(column, group.weights) for column in group.points.T]
+    angles = np.array([one.angle for one in minima])
     # Choose the representative nearest to the average of the given numbers.
     average = group.weights @ group.points / group.weights.sum()
     nearest = angles + 2 * np.pi * np.round((average - angles) / (2 * np.pi))
-    excess = [own.other_objective / own.objective - 1 if own.objective > 0 else np.inf for own in each]
+    excess = [one.other_objective / one.objective - 1 if one.objective > 0 else np.inf for one in minima]
     worst = int(np.argmin(excess))
     distance = (
-        float(abs(float(wrap(np.asarray(each[worst].other_angle - angles[worst])))))
+        float(abs(float(wrap(np.asarray(minima[worst].other_angle - angles[worst])))))
         if excess[worst] < np.inf
         else np.inf
     )
-    total = sum(own.objective for own in each)
+    total = sum(one.objective for one in minima)
     return _Found(nearest, distance, excess[worst], standard_error(total, group.weights))
 
 
 def _on_circle(space: Any, group: Groups, kind: _Kind) -> _Found:
     """Solve exactly on a space that is isometric to a circle."""
     base, unit, angles, scale = _angles(space, group.points)
-    found = kind.on_circle(angles, group.weights)
+    minima = kind.on_circle(angles, group.weights)
     if kind is _MEDIAN:
-        point = group.points[np.argmin(np.abs(wrap(angles - found.angle)))]
+        point = group.points[np.argmin(np.abs(wrap(angles - minima.angle)))]
     else:
-        point = space.exp(base, found.angle / scale * unit)
+        point = space.exp(base, minima.angle / scale * unit)
     distance, excess = np.inf, np.inf
-    if np.isfinite(found.other_objective) and found.objective > 0:
-        distance = abs(float(wrap(np.asarray(found.other_angle - found.angle)))) / scale
-        excess = found.other_objective / found.objective - 1
+    if np.isfinite(minima.other_objective) and minima.objective > 0:
+        distance = abs(float(wrap(np.asarray(minima.other_angle - minima.angle)))) / scale
+        excess = minima.other_objective / minima.objective - 1
     square = circular_mean(angles, group.weights).objective
     return _Found(_near(space, group, point), distance, excess, standard_error(square, group.weights) / scale)
 
@@ -642,8 +644,8 @@ def _angles(space: Any, points: Array) -> tuple[Array, Array, Floats, float]:
         at = np.broadcast_to(base, points.shape)
         try:
             logs = space.log(at, points)
-        except CutLocusError as found:
-            error = error or found
+        except CutLocusError as failure:
+            error = error or failure
             continue
         here = space.frame(base)[0]
         angles = scale * np.asarray(space.inner(at, np.broadcast_to(here, logs.shape), logs))
@@ -658,32 +660,32 @@ def _angles(space: Any, points: Array) -> tuple[Array, Array, Floats, float]:
 def _from_several_starts(space: Any, group: Groups, kind: _Kind, number: int | None) -> _Found:
     """Descend from the best data, extrinsic means, and points beyond the lowest minimum; keep the lowest minimum."""
     starts = joined([_best_data(space, group, kind), *_extrinsic(space, group)])
-    found, objective = _all_descents(space, group, starts, kind)
+    ends, objective = _all_descents(space, group, starts, kind)
     if np.isfinite(objective).any():
-        lowest = take(found, _best(space, group, found, objective))
+        lowest = take(ends, _best(space, group, ends, objective))
         more, values = _all_descents(space, group, _beyond(space, group, lowest), kind)
-        found, objective = joined([found, more]), np.append(objective, values)
+        ends, objective = joined([ends, more]), np.append(objective, values)
     if not np.isfinite(objective).any():
         # Raises CutLocusError.
         kind.descend(space, group, take(starts, np.arange(1)))
 
     def converges(i: int) -> bool:
-        whole, failed = _descents(space, group, take(found, np.arange(i, i + 1)), kind)
+        whole, failed = _descents(space, group, take(ends, np.arange(i, i + 1)), kind)
         if failed[0] or whole.unfinished[0]:
             return False
-        _assign(found, i, take(whole.points, 0))
+        _assign(ends, i, take(whole.points, 0))
         objective[i] = whole.objective[0]
         return True
 
     # Only the lowest end points are iterated until they converge.
-    for i in _lowest(space, found, objective):
+    for i in _lowest(space, ends, objective):
         if not converges(i) and objective[i] == objective.min():
             _raise_unfinished(kind, number)
     # The best one may be a neighbour of one of them.
-    best = _best(space, group, found, objective)
+    best = _best(space, group, ends, objective)
     converges(best)
-    point = take(found, best)
-    far = _distances(space, point, found)
+    point = take(ends, best)
+    far = _distances(space, point, ends)
     square = float(np.sum(group.weights * _distances(space, point, group.points) ** 2))
     error = standard_error(square, group.weights)
     apart = np.isfinite(objective) & (far > max(error, _SAME * space.injectivity_radius))
@@ -698,22 +700,22 @@ def _all_descents(space: Any, group: Groups, starts: Any, kind: _Kind) -> tuple[
     """Return end points of short descents in one group, and their objectives (infinite at a cut locus)."""
     count = len(group.weights)
     size = len(starts[0]) if isinstance(starts, tuple) else len(starts)
-    each = []
+    parts = []
     for some in np.array_split(np.arange(size), max(1, -(-size * count // _ROWS))):
         rows = np.tile(np.arange(count), len(some))
         repeated = Groups(take(group.points, rows), np.full(len(some), count), np.tile(group.weights, len(some)))
-        each.append(_descents(space, repeated, take(starts, some), kind, (_SHORT,)))
-    objective = np.concatenate([np.where(failed, np.inf, own.objective) for own, failed in each])
-    return joined([own.points for own, _ in each]), objective
+        parts.append(_descents(space, repeated, take(starts, some), kind, (_SHORT,)))
+    objective = np.concatenate([np.where(failed, np.inf, descent.objective) for descent, failed in parts])
+    return joined([descent.points for descent, _ in parts]), objective
 
 
-def _lowest(space: Any, found: Any, objective: Floats) -> list[int]:
+def _lowest(space: Any, ends: Any, objective: Floats) -> list[int]:
     """Return indices of end points that are nearly as low as the lowest one and not near each other."""
     kept: list[int] = []
     for i in np.argsort(objective, kind="stable"):
         if objective[i] > objective.min() * (1 + _NEARLY) or len(kept) == _FINISHED:
             break
-        others = [float(_distances(space, take(found, i), take(found, np.arange(k, k + 1)))[0]) for k in kept]
+        others = [float(_distances(space, take(ends, i), take(ends, np.arange(k, k + 1)))[0]) for k in kept]
         if all(other > _APART * space.injectivity_radius for other in others):
             kept.append(int(i))
     return kept
@@ -757,21 +759,21 @@ def _best_data(space: Any, group: Groups, kind: _Kind) -> Any:
 def _extrinsic(space: Any, group: Groups) -> list[Any]:
     """Return minimisers of the distance in the embedding space, projected to the manifold where possible."""
     try:
-        found = space._extrinsic_means(group.points, group.weights / group.weights.sum())
-        return [] if found is None else [space.project(np.ascontiguousarray(found))]
+        starts = space._extrinsic_means(group.points, group.weights / group.weights.sum())
+        return [] if starts is None else [space.project(np.ascontiguousarray(starts))]
     except (CutLocusError, ValidationError):
         # Evenly spread points can have an average that is not near any point of the space.
         return []
 
 
-def _best(space: Any, group: Groups, found: Any, objective: Floats) -> int:
+def _best(space: Any, group: Groups, ends: Any, objective: Floats) -> int:
     """Return the index of the lowest minimum; of equal ones, that whose distances to the data are first in order."""
     lowest = objective.min()
     equal = np.flatnonzero(objective <= lowest * (1 + _EQUAL) + _EQUAL**2)
     scale = space.injectivity_radius
     if len(equal) == 1 or not scale > 0:
         return int(equal[0])
-    keys = [np.round(_distances(space, take(found, i), group.points) / (_SAME * scale)) for i in equal]
+    keys = [np.round(_distances(space, take(ends, i), group.points) / (_SAME * scale)) for i in equal]
     return int(equal[np.lexsort(np.array(keys).T[::-1])[0]])
 
 
@@ -779,11 +781,11 @@ def _near(space: Any, group: Groups, point: Any) -> Any:
     """Return the representative of a point near the first datum."""
     first = take(group.points, 0)
     try:
-        found = space.exp(first, space.log(first, point))
+        moved = space.exp(first, space.log(first, point))
     except (CutLocusError, ValidationError):
         return point
-    arrays = zip(*(x if isinstance(x, tuple) else (x,) for x in (found, point)), strict=True)
-    return point if all(np.abs(a - b).max() < _SAME for a, b in arrays) else found
+    arrays = zip(*(x if isinstance(x, tuple) else (x,) for x in (moved, point)), strict=True)
+    return point if all(np.abs(a - b).max() < _SAME for a, b in arrays) else moved
 
 
 # ---- messages ----
@@ -799,7 +801,7 @@ def _raise_unfinished(kind: _Kind, number: int | None) -> None:
 
 def _warn_ambiguous(kind: _Kind, numbers: NDArray[np.intp] | None, results: list[_Found]) -> None:
     """Warn once of all groups that have two minima of nearly the same value."""
-    bad = [i for i, own in enumerate(results) if own.excess < _AMBIGUOUS and own.distance > own.error]
+    bad = [i for i, result in enumerate(results) if result.excess < _AMBIGUOUS and result.distance > result.error]
     if not bad:
         return
     first = results[bad[0]]
@@ -822,7 +824,7 @@ def _copied(points: Any) -> Any:
 
 def _assign(points: Any, index: int, value: Any) -> None:
     if isinstance(points, tuple):
-        for own, new in zip(points, value, strict=True):
-            own[index] = new
+        for array, new in zip(points, value, strict=True):
+            array[index] = new
     else:
         points[index] = value

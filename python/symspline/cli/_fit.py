@@ -404,12 +404,12 @@ class Recordings:
             gap = float(count * NANOSECONDS[unit or "s"] / NANOSECONDS["s"] if dates else count)
         used = np.ones(len(index), bool) if smooth else None
         try:
-            found = cut(times, points, self.space, gap, 2, options.dedup or "raise", used)
+            divided = cut(times, points, self.space, gap, 2, options.dedup or "raise", used)
         except CutLocusError:
             far = f"points{of} with one time are too far apart to have a mean; --dedup first takes the first of them"
             raise Problem(f"{self.path}: {far}") from None
-        self.alone += len(first) - sum(map(len, found.rows))
-        return [(curve, index[kept]) for curve, kept in zip(found.curves, found.rows, strict=True)]
+        self.alone += len(first) - sum(map(len, divided.rows))
+        return [(curve, index[kept]) for curve, kept in zip(divided.curves, divided.rows, strict=True)]
 
     def _check(self, index: Index, of: str) -> None:
         """Raise `Problem` unless there are two points whose times increase, or do not decrease."""
@@ -500,7 +500,7 @@ def outliers(data: Recordings, curves: Sequence[CubicSpline] | None, lonlat: boo
     ``curves`` are those that were fitted, or None if the fit failed. Points are compared with a smooth curve, or with
     their neighbours.
     """
-    found: list[tuple[int, float, float]] = []
+    spikes: list[tuple[int, float, float]] = []
     smooth = curves if curves is not None and isinstance(curves[0], SmoothingSpline) else None
     for i, (index, (times, points)) in enumerate(zip(data.groups.values(), data.curves, strict=True)):
         if len(index) < _FEWEST:
@@ -513,10 +513,10 @@ def outliers(data: Recordings, curves: Sequence[CubicSpline] | None, lonlat: boo
             beside = [None] * len(parts) if near is None else near if several else (near,)
             for space, part, curve in zip(factors_of(data.space), parts, beside, strict=True):
                 far, sizes, usual = _spikes(space, times, part) if curve is None else _far(space, part, curve)
-                found += [(int(index[k]), float(sizes[k]), usual) for k in np.flatnonzero(far)]
-    if not found:
+                spikes += [(int(index[k]), float(sizes[k]), usual) for k in np.flatnonzero(far)]
+    if not spikes:
         return ""
-    row, *lengths = found[0]
+    row, *lengths = spikes[0]
     scale, unit = (180 / np.pi, "°") if lonlat and data.space == GLOBE else (1.0, "")
     size, usual_size = (f"{scale * length:.3g}{unit}" for length in lengths)
     where = f"{size} from its neighbours, and most steps are {usual_size}"
@@ -524,7 +524,7 @@ def outliers(data: Recordings, curves: Sequence[CubicSpline] | None, lonlat: boo
     if smooth is not None:
         where = f"{size} from the curve, and half of the points are within {usual_size}"
         remedy = "--robust reduces the influence of outliers"
-    rest = len({k for k, *_ in found}) - 1
+    rest = len({k for k, *_ in spikes}) - 1
     others = f" (and in {counted(rest, 'other row')})" if rest else ""
     return f"{data.place(row)}: the point is probably an outlier{others}, {where}; {remedy}"
 
@@ -537,16 +537,16 @@ def _spikes(space: Space, times: Any, points: Any) -> tuple[NDArray[np.bool_], D
         axis, knots = time_axis_of(times)
         lengths = np.diff(axis.knots(knots))
         lengths = np.maximum(lengths, 1e-3 * lengths.mean())
-    found = np.zeros(len(points), bool)
+    is_spike = np.zeros(len(points), bool)
     if not lengths.min() > 0:
-        return found, found.astype(np.float64), 0.0
+        return is_spike, is_spike.astype(np.float64), 0.0
     speeds = steps / lengths
     sizes, slowest = (np.r_[0.0, np.minimum(both[1:], both[:-1]), 0.0] for both in (steps, speeds))
     usual = float(np.median(speeds))
     fast = np.flatnonzero((slowest > _FAST * usual) & (usual > 0))
     around = space.distance(points[fast + 1], points[fast - 1])
-    found[fast] = sizes[fast] > np.maximum(around, _ROUNDING * np.abs(points).max())
-    return found, sizes, float(np.median(steps))
+    is_spike[fast] = sizes[fast] > np.maximum(around, _ROUNDING * np.abs(points).max())
+    return is_spike, sizes, float(np.median(steps))
 
 
 def _far(space: Space, points: Any, near: Any) -> tuple[NDArray[np.bool_], Doubles, float]:

@@ -210,8 +210,8 @@ def _sampled(
         for done, part in enumerate(parts, 1):
             spline = curves.splines[part.name]
             blocks = [function(spline, part.times, nu, columns) for nu in options.nu for function in functions]
-            found = chain.from_iterable(blocks)
-            samples.append([(name, _rounded(numbers, options.digits)) for name, numbers in found])
+            pairs = chain.from_iterable(blocks)
+            samples.append([(name, _rounded(numbers, options.digits)) for name, numbers in pairs])
             progress(done, len(parts))
     return samples
 
@@ -331,10 +331,10 @@ def _check_times(path: object, rows: Rows, index: Index, curves: Curves, name: s
     spline, curve = curves.splines[name], curves.called(name)
     times, knots = rows.times[index], spline.t
     dates = knots.dtype.kind == "M"
-    expected, found = ("dates", "numbers") if dates else ("numbers", "dates")
+    expected, given = ("dates", "numbers") if dates else ("numbers", "dates")
     these, those = ("a time zone", "none") if rows.utc else ("no time zone", "one")
     unix = "; give --unix if they count from 1970" if dates else ""
-    kinds = f": the times of {curve} are {expected}, but these are {found}{unix}"
+    kinds = f": the times of {curve} are {expected}, but these are {given}{unix}"
     zones = f": its times have {these}, but those of {curve} have {those}: which time is meant is in doubt"
     mixed = dates and {rows.utc, curves.columns.utc} == {True, False}
     refuse(path, ((times.dtype.kind == "M") != dates, kinds), (mixed, f"{zones}; write both with a zone, or neither"))
@@ -390,8 +390,8 @@ def _in_ticks(knots: Times, nanoseconds: int) -> tuple[Times, int]:
 
 
 def _integers(ends: Times) -> list[int]:
-    found: list[int] = ends.astype(np.int64 if ends.dtype.kind == "M" else ends.dtype).tolist()
-    return found
+    numbers: list[int] = ends.astype(np.int64 if ends.dtype.kind == "M" else ends.dtype).tolist()
+    return numbers
 
 
 def spread(count: int, knots: Times) -> Times:

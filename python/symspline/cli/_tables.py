@@ -79,15 +79,15 @@ _EXPONENT = 400
 def duration(text: str, option: str) -> tuple[Decimal, str]:
     """Split ``"10min"`` into 10 and ``"min"``."""
     try:
-        found = parts_of_duration(text)
+        parts = parts_of_duration(text)
     except InvalidOperation:
         raise Problem(f"{option} {text}: the exponent is too large") from None
-    if found is None:
+    if parts is None:
         raise Problem(
             f"{option} {text}: a duration is a number such as 0.5, or one with a unit such as 10min; "
             f"units are {', '.join(NANOSECONDS)}"
         )
-    count, unit = found
+    count, unit = parts
     refuse(
         f"{option} {text}: ",
         (count == 0, "it must be larger than zero"),
@@ -185,11 +185,11 @@ class Table:
         if name in self.groups or name in self.names:
             return self.groups.get(name, [name])
         both = [name + RE, name + IM]
-        found = [part for part in both if part in self.names]
-        if len(found) == 1:
-            missing = both[found == both[:1]]
-            raise Problem(f"{self.path} has a column {found[0]!r}, but no {missing!r}; a complex number needs both")
-        return found or [self.require(name)]
+        present = [part for part in both if part in self.names]
+        if len(present) == 1:
+            missing = both[present == both[:1]]
+            raise Problem(f"{self.path} has a column {present[0]!r}, but no {missing!r}; a complex number needs both")
+        return present or [self.require(name)]
 
     def cells(self, name: str, rows: int | None = None) -> list[str]:
         """Return the texts of a column, or of its first rows, without blanks at their ends; empty if missing."""
@@ -277,8 +277,8 @@ class Table:
         bad = np.flatnonzero(~np.isfinite(values))
         if bad.size:
             value = values[bad[0]]
-            found = f"is empty or NaN{_SKIP}" if np.isnan(value) else f"holds {value}, which is not a finite number"
-            raise self._problem(name, int(bad[0]), found)
+            problem = f"is empty or NaN{_SKIP}" if np.isnan(value) else f"holds {value}, which is not a finite number"
+            raise self._problem(name, int(bad[0]), problem)
         return np.asarray(values)
 
     def _parsed(self, name: str) -> NDArray[np.float64]:
@@ -356,8 +356,8 @@ class Table:
             raise self._problem(name, row, f"holds {cell!r}, {what}")
         raise Problem(f"{self.path}: column {name!r} has no times")
 
-    def _problem(self, name: str, row: int, found: str) -> Problem:
-        return Problem(f"{self.path}, {self.place(row)}: column {name!r} {found}")
+    def _problem(self, name: str, row: int, problem: str) -> Problem:
+        return Problem(f"{self.path}, {self.place(row)}: column {name!r} {problem}")
 
 
 def codes_of(labels: Sequence[Any]) -> NDArray[np.intp]:

@@ -114,20 +114,20 @@ def _present(rows: Doubles, lines: Lines) -> tuple[Doubles, Lines]:
         return rows, lines
     if not kept:
         raise ValidationError(f"{lines.file} has no line without NaN")
-    own = Lines(lines.file, [lines.numbers[i] for i in kept], [lines.texts[i] for i in kept])
-    return rows[kept], own
+    rest = Lines(lines.file, [lines.numbers[i] for i in kept], [lines.texts[i] for i in kept])
+    return rows[kept], rest
 
 
 def _exact_dates(lines: Lines) -> NDArray[np.datetime64]:
     """Return the first column, seconds since 1970, as dates with all nanoseconds."""
-    found = []
+    counts = []
     for row, text in enumerate(lines.texts):
         cell = text.split()[0]
         ns = Decimal(cell) * 10**9
         if abs(ns) >= 2**63:
             raise lines.error(row, f"column 'time' holds {cell}, which is not seconds within 292 years of 1970")
-        found.append(int(ns.to_integral_value()))
-    return np.array(found, np.int64).astype("datetime64[ns]")
+        counts.append(int(ns.to_integral_value()))
+    return np.array(counts, np.int64).astype("datetime64[ns]")
 
 
 def tum_rows(file: Any, missing: bool = False) -> tuple[Doubles, Lines]:
@@ -533,9 +533,9 @@ class Lines(NamedTuple):
         """Name the line of a row: "line 7"."""
         return f"line {self.numbers[row]}"
 
-    def error(self, row: int, found: str) -> ValidationError:
+    def error(self, row: int, problem: str) -> ValidationError:
         """Return the error of a row."""
-        return ValidationError(f"{self.file}, {self.place(row)}: {found}")
+        return ValidationError(f"{self.file}, {self.place(row)}: {problem}")
 
 
 def rotations_in_rows(q: Doubles, file: object, place: Callable[[int], str]) -> Array:
@@ -600,17 +600,17 @@ def parsed(
     """
     if not lines.texts:
         raise ValidationError(f"{lines.file} is empty, it has no numbers; {form}")
-    separator, own = (None, slice(None)) if start is None else (",", slice(start, start + len(columns)))
-    used = None if start is None else range(own.start, own.stop)
+    separator, span = (None, slice(None)) if start is None else (",", slice(start, start + len(columns)))
+    used = None if start is None else range(span.start, span.stop)
     try:
         rows = np.loadtxt(lines.texts, dtype, delimiter=separator, usecols=used, ndmin=2)
     except ValueError as error:
         # The first line that is wrong.
         for i, text in enumerate(lines.texts):
             cells = text.partition("#")[0].split(separator)
-            if len(cells[own]) != len(columns):
+            if len(cells[span]) != len(columns):
                 raise lines.error(i, f"{len(cells)} numbers, but {form}") from None
-            for column, cell in zip(columns, cells[own], strict=True):
+            for column, cell in zip(columns, cells[span], strict=True):
                 try:
                     dtype(cell)
                 except ValueError:

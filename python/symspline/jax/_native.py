@@ -41,9 +41,9 @@ def full_precision(function: Callable[_P, _T]) -> Callable[_P, _T]:
 
 def promoted(space: Space, *arrays: Tensor) -> tuple[jax.Array, ...]:
     """Convert points, and arrays of their shape, to one precision."""
-    found = [jnp.asarray(array) for array in arrays]
-    kind = jnp.result_type(*found, jnp.complex64 if space.dtype.kind == "c" else jnp.float32)
-    return tuple(array.astype(kind) for array in found)
+    converted = [jnp.asarray(array) for array in arrays]
+    kind = jnp.result_type(*converted, jnp.complex64 if space.dtype.kind == "c" else jnp.float32)
+    return tuple(array.astype(kind) for array in converted)
 
 
 def _constant(array: Tensor, like: Any) -> Tensor:

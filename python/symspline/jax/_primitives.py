@@ -77,12 +77,12 @@ class Layout(NamedTuple):
 
     def sample_times(self, x: Any) -> tuple[Any, bool]:
         """Times, and whether every curve has its own."""
-        own, shared, lead = self._own, self._shared, len(self.curves)
-        x = np.transpose(x, (*own, *shared, *range(lead, x.ndim)))
-        if all(self.times[i] == 1 for i in own):
-            return x.reshape(x.shape[len(own) :]), False
-        x = x.reshape(*x.shape[: len(own)], *(1,) * len(self.batch), *x.shape[len(own) :])
-        curves = [self.curves[i] for i in own]
+        of_curves, shared, lead = self._own, self._shared, len(self.curves)
+        x = np.transpose(x, (*of_curves, *shared, *range(lead, x.ndim)))
+        if all(self.times[i] == 1 for i in of_curves):
+            return x.reshape(x.shape[len(of_curves) :]), False
+        x = x.reshape(*x.shape[: len(of_curves)], *(1,) * len(self.batch), *x.shape[len(of_curves) :])
+        curves = [self.curves[i] for i in of_curves]
         return np.broadcast_to(x, (*curves, *self.batch, *x.shape[len(curves) + len(self.batch) :])), True
 
     def outward(self, values: Any) -> Any:
@@ -138,9 +138,9 @@ def _fit(x: Any, t: Any, points: Any, *vectors: Any, fixed: Fixed, lead: int, or
     data = layout.knots(t), layout.data(points, core + 1)
     spline = fitted(*data, ends, fixed.space, fixed.kinds, dict(fixed.options))
     at, per_curve = layout.sample_times(x)
-    found = [layout.outward(spline(at, nu, per_curve=per_curve)) for nu in orders]
+    values = [layout.outward(spline(at, nu, per_curve=per_curve)) for nu in orders]
     solved = spline._solved().velocities.reshape(*layout.curves, *points.shape[lead:])
-    return tuple(np.asarray(a, points.dtype) for a in (*found, solved))
+    return tuple(np.asarray(a, points.dtype) for a in (*values, solved))
 
 
 def _layout(fixed: Fixed, lead: int, x: Any, data: Any, *changes: Shape) -> Layout:
@@ -182,13 +182,13 @@ def _jvp(change: Any, x: Any, *data: Any, fixed: Fixed, lead: int, nu: int, movi
     layout = _layout(fixed, lead, x, data, change.shape[:lead])
     curve, at, bc_type = _moved(fixed, layout, nu, x, data)
     sizes = [math.prod(a.shape[lead:]) * moves for a, moves in zip(data, moving, strict=False)]
-    each = zip(np.split(change, np.cumsum(sizes)[:-1], axis=-1), data, _cores(fixed, data), moving, strict=False)
+    rows = zip(np.split(change, np.cumsum(sizes)[:-1], axis=-1), data, _cores(fixed, data), moving, strict=False)
     knots, steps, *ends = (
-        layout.data(_like(own, array).reshape(*change.shape[:lead], *array.shape[lead:]), core) if moves else None
-        for own, array, core, moves in each
+        layout.data(_like(part, array).reshape(*change.shape[:lead], *array.shape[lead:]), core) if moves else None
+        for part, array, core, moves in rows
     )
-    found = curve.jvp(at, bc_type, steps, knots, _ends(fixed.kinds, ends))
-    return np.asarray(layout.outward(found), data[1].dtype)
+    moved = curve.jvp(at, bc_type, steps, knots, _ends(fixed.kinds, ends))
+    return np.asarray(layout.outward(moved), data[1].dtype)
 
 
 def _vjp_shape(_: Any, x: Any, *data: Any, lead: int, moving: Any, kept: Shape, **__: Any) -> Any:
@@ -205,8 +205,8 @@ def _vjp(cotangent: Any, x: Any, *data: Any, fixed: Fixed, lead: int, nu: int, m
     layout = _layout(fixed, lead, x, data, kept)
     curve, at, bc_type = _moved(fixed, layout, nu, x, data)
     wide = np.broadcast_to(cotangent, (*layout.full, *cotangent.shape[lead:]))
-    found = curve.vjp(at, bc_type, np.conj(layout.inward(wide)))
-    parts = (found.t, found.points, *(end for end in found.ends if end is not None))
+    gradient = curve.vjp(at, bc_type, np.conj(layout.inward(wide)))
+    parts = (gradient.t, gradient.points, *(end for end in gradient.ends if end is not None))
     rows = [
         layout.gradient(np.conj(part), core, kept, array.shape[lead:]).reshape(*kept, -1)
         for part, core, array, moves in zip(parts, _cores(fixed, data), data, moving, strict=False)
@@ -226,10 +226,10 @@ def _moved(fixed: Fixed, layout: Layout, nu: int, x: Any, data: Any) -> tuple[Cu
     space, core = fixed.space, len(fixed.space.point_shape)
     t, points, *vectors, velocities = data
     points = space.project(np.ascontiguousarray(layout.data(points, core + 1)))
-    found = np.array(layout.data(velocities, core + 1), points.dtype)
+    rates = np.array(layout.data(velocities, core + 1), points.dtype)
     knots = np.array(layout.data(t, 1), np.float64)
     at, per_curve = layout.sample_times(np.asarray(x))
-    curve = curve_of(space, knots, [(points, found)])
+    curve = curve_of(space, knots, [(points, rates)])
     batch = points.shape[: points.ndim - core - 1]
     bc_type = joined(fixed.kinds, _ends(fixed.kinds, [layout.data(v, core) for v in vectors]))
     return curve, sample_times(knots, batch, at, per_curve, nu), bc_type
@@ -275,13 +275,13 @@ def _mapped(primitive: Any, arguments: Any, axes: Any, *, lead: int, **fixed: An
     moved = [jnp.expand_dims(a, 0) if i is None else jnp.moveaxis(a, i, 0) for a, i in pairs]
     if primitive is vjp_p:
         fixed["kept"] = (next(a.shape[i] for a, i in pairs if i is not None), *fixed["kept"])
-    found = primitive.bind(*moved, lead=lead + 1, **fixed)
+    results = primitive.bind(*moved, lead=lead + 1, **fixed)
     if primitive is not fit_p:
-        return found, 0
+        return results, 0
     if any(axis is not None for axis in axes[1:]):
-        return found, (0,) * len(found)
+        return results, (0,) * len(results)
     # Only times differ: there is one curve.
-    *values, velocities = found
+    *values, velocities = results
     return (*values, jnp.squeeze(velocities, 0)), (*(0 for _ in values), None)
 
 

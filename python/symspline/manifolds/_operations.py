@@ -47,14 +47,14 @@ class Operations:
 
     def log(self, p: Array, q: Array) -> Array:
         """NaN where there is no logarithm."""
-        found = self._applied("log", partial(rows_or_nan, self._function("log")), (p, q))
+        logs = self._applied("log", partial(rows_or_nan, self._function("log")), (p, q))
         # Formulas that divide by the distance are undefined at equal points.
         same = (p == q).all(axis=self.space._point_axes(p))
         if same.any():
             # A copy: logarithms of other libraries may be read-only arrays.
-            found = found.copy()
-            found[same] = 0.0
-        return found
+            logs = logs.copy()
+            logs[same] = 0.0
+        return logs
 
     def project_tangent(self, p: Array, v: Array) -> Array:
         return self._call("project_tangent", p, v)
@@ -127,18 +127,18 @@ class Operations:
     ) -> Array:
         """Call a function, and check the shape and the type of its result."""
         with np.errstate(all="ignore"):
-            found = np.asarray(function(*rows))
+            values = np.asarray(function(*rows))
         wanted = (len(rows[0]), *shape)
-        if found.shape != wanted:
+        if values.shape != wanted:
             raise ValidationError(
-                f"the function {name} of {self.space!r} gave an array of shape {found.shape} for {wanted[0]} points; "
+                f"the function {name} of {self.space!r} gave an array of shape {values.shape} for {wanted[0]} points; "
                 f"{wanted} is needed"
             )
-        if found.dtype.kind not in ("iuf" if dtype == np.float64 else "iufc"):
+        if values.dtype.kind not in ("iuf" if dtype == np.float64 else "iufc"):
             raise ValidationError(
-                f"the function {name} of {self.space!r} gave numbers of type {found.dtype}; {dtype} is needed"
+                f"the function {name} of {self.space!r} gave numbers of type {values.dtype}; {dtype} is needed"
             )
-        return np.ascontiguousarray(found, dtype)
+        return np.ascontiguousarray(values, dtype)
 
     def _function(self, name: str) -> Callable[..., Any]:
         function: Callable[..., Any] | None = getattr(self.space.functions, name)
@@ -176,18 +176,18 @@ class Operations:
             "scatter": self.project,
             "random_tangent": self.project_tangent,
         }
-        found = work[operation](*points) if operation in work else self._call(operation, *points)
-        return np.asarray(found if found.ndim == 1 else self.space._as_doubles(found).reshape(len(found), -1))
+        values = work[operation](*points) if operation in work else self._call(operation, *points)
+        return np.asarray(values if values.ndim == 1 else self.space._as_doubles(values).reshape(len(values), -1))
 
     def _log(self, p: Array, q: Array) -> Array:
-        found = self.log(p, q)
-        bad = np.flatnonzero(~np.isfinite(found.reshape(len(found), -1)).all(axis=1))
+        logs = self.log(p, q)
+        bad = np.flatnonzero(~np.isfinite(logs.reshape(len(logs), -1)).all(axis=1))
         if bad.size:
             raise CutLocusError(
                 f"pair {bad[0]}: the points lie at or past each other's cut locus: the function log of "
                 f"{self.space!r} is not finite there"
             )
-        return found
+        return logs
 
     def check_points(self, points: Doubles, shape: Any, tol: float) -> None:
         """Raise unless every row is a point within ``tol``; ``shape`` is how the rows were laid out."""
@@ -230,11 +230,11 @@ def rows_or_nan(log: Function, p: Array, q: Array, errors: tuple[type[Exception]
     try:
         return np.asarray(log(p, q))
     except errors:
-        found = np.full(q.shape, np.nan, q.dtype)
+        logs = np.full(q.shape, np.nan, q.dtype)
     for i in range(len(q)):
         with suppress(*errors):
-            found[i] = log(p[i : i + 1], q[i : i + 1])[0]
-    return found
+            logs[i] = log(p[i : i + 1], q[i : i + 1])[0]
+    return logs
 
 
 def described(value: Any) -> str:

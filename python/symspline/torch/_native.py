@@ -38,14 +38,14 @@ def tensor(value: Any, name: str, like: torch.Tensor | None = None) -> torch.Ten
         # PyTorch warns of arrays that are read-only, such as those of a spline, and refuses other byte orders.
         value = np.array(value, value.dtype.newbyteorder("="))
     try:
-        found = torch.as_tensor(value)
+        converted = torch.as_tensor(value)
     except (TypeError, ValueError, RuntimeError, OverflowError):
         raise ValidationError(f"{name} must be a tensor of real numbers, not {short_repr(value)}") from None
-    if found.is_complex() or found.dtype == torch.bool:
-        raise ValidationError(f"{name} must be a tensor of real numbers, not of {found.dtype}")
+    if converted.is_complex() or converted.dtype == torch.bool:
+        raise ValidationError(f"{name} must be a tensor of real numbers, not of {converted.dtype}")
     if like is not None:
-        return found.to(like)
-    return found if found.is_floating_point() else found.to(torch.get_default_dtype())
+        return converted.to(like)
+    return converted if converted.is_floating_point() else converted.to(torch.get_default_dtype())
 
 
 def promoted(space: AnySpace, points: Tensor, *others: Tensor) -> tuple[torch.Tensor, ...]:
@@ -85,11 +85,11 @@ class _Logarithm(torch.autograd.Function):
     def backward(ctx: Any, *cotangents: Tensor) -> Tensor:
         a, *directions = ctx.saved_tensors
         along = hermitian(cotangents[0])
-        found: list[Any] = [_Logarithm.apply(a, *directions, along) if ctx.needs_input_grad[0] else None]
+        gradients: list[Any] = [_Logarithm.apply(a, *directions, along) if ctx.needs_input_grad[0] else None]
         for i in range(len(directions)):
             others = (*directions[:i], along, *directions[i + 1 :])
-            found.append(_Logarithm.apply(a, *others) if ctx.needs_input_grad[i + 1] else None)
-        return tuple(found)
+            gradients.append(_Logarithm.apply(a, *others) if ctx.needs_input_grad[i + 1] else None)
+        return tuple(gradients)
 
     @staticmethod
     def jvp(ctx: Any, *changes: Tensor) -> Tensor:
@@ -97,8 +97,8 @@ class _Logarithm(torch.autograd.Function):
         moved = None
         for i, change in enumerate(changes):
             if change is not None:
-                own = (*directions, change) if i == 0 else (*directions[: i - 1], change, *directions[i:])
-                part = _Logarithm.apply(a, *own)
+                changed = (*directions, change) if i == 0 else (*directions[: i - 1], change, *directions[i:])
+                part = _Logarithm.apply(a, *changed)
                 moved = part if moved is None else moved + part
         return moved
 
@@ -298,8 +298,8 @@ def fit(t: Any, points: Any, space: AnySpace | str, *, bc_type: Any = "natural")
     """
     space = curves.named(LIBRARY, space)
     if isinstance(space, Product):
-        each = zip(parts_of(points, space, "points"), space.factors, ends_in_factors(bc_type, space), strict=True)
-        return tuple(fit(t, p, factor, bc_type=bc) for p, factor, bc in each)
+        factors = zip(parts_of(points, space, "points"), space.factors, ends_in_factors(bc_type, space), strict=True)
+        return tuple(fit(t, p, factor, bc_type=bc) for p, factor, bc in factors)
     problem, leave = curves.problem_of(LIBRARY, t, points, space, bc_type)
     return leave(_velocities(problem))
 
@@ -308,8 +308,8 @@ def _residual(problem: Problem, u: Tensor) -> Tensor:
     """Return the residual, in which the normal part of u counts as such, so that the solution is tangent."""
     tangent = problem.chain.tangent(problem.p, u)
     middle = problem.weights()[1]
-    found = problem.residual(tangent)
-    return found + problem.chain.model.times(middle, u - tangent)
+    normal = problem.residual(tangent)
+    return normal + problem.chain.model.times(middle, u - tangent)
 
 
 def _velocities(problem: Problem) -> Tensor:
@@ -329,12 +329,12 @@ def _solution(problem: Problem) -> tuple[Tensor, Tensor]:
     eps = torch.finfo(u.dtype).eps
     tol, floor = eps ** (2 / 3), 8 * eps * problem.chain.scale(problem.p) / torch.amin(problem.h, 0)
     for _ in range(_MOST_STEPS):
-        found = _residual(problem, u)
-        good = torch.amax(problem.sizes(found) / middle, 0) <= tol * torch.amax(problem.sizes(u), 0) + floor
+        residual = _residual(problem, u)
+        good = torch.amax(problem.sizes(residual) / middle, 0) <= tol * torch.amax(problem.sizes(u), 0) + floor
         jacobian = _jacobian(problem, u)
         if good.all():
             return u, jacobian
-        u = u - _solved(jacobian, found)
+        u = u - _solved(jacobian, residual)
     index = tuple(int(i) for i in (~good).nonzero()[0])
     where = f" of curve {index}" if index else ""
     error = ConvergenceError(
@@ -377,12 +377,12 @@ def _jacobian(problem: Problem, u: Tensor) -> Tensor:
     expanded = problem._replace(h=problem.h[:, None], p=problem.p[:, None])
     expanded = expanded._replace(first=problem.first[None], last=problem.last[None])
     _, gradient = torch.func.vjp(lambda u: _residual(expanded, u), wide)
-    (found,) = gradient((rows * components).flatten(1, 2).expand_as(wide))
+    (blocks,) = gradient((rows * components).flatten(1, 2).expand_as(wide))
     # By the node whose velocity moves, with a row of zeros before the first and after the last.
-    found = found.reshape(n, 3, size, *batch, size).movedim(2, -2)
-    zero = torch.zeros_like(found[:1])
+    blocks = blocks.reshape(n, 3, size, *batch, size).movedim(2, -2)
+    zero = torch.zeros_like(blocks[:1])
     moving = node[:, None] + torch.arange(3, device=u.device)
-    return torch.cat([zero, found, zero])[moving, (node % 3)[:, None]]
+    return torch.cat([zero, blocks, zero])[moving, (node % 3)[:, None]]
 
 
 def _solved(jacobian: Tensor, rows: Tensor) -> Tensor:

@@ -400,9 +400,9 @@ def _along(ds: xr.Dataset, x: Any, quantity: str, extrapolate: Any, lifted: bool
     knots = _knots(ds, dim)
     label, skipna = (dim if knots is None else knots.name), bool(ds.attrs.get("skipna", 0))
     times, axes = times_with_names(x, label, point_dims, [d for d in points.dims if d not in (dim, *point_dims)])
-    own: list[Hashable] = [KNOTS, *point_dims]
+    core: list[Hashable] = [KNOTS, *point_dims]
     shape = [] if quantity == "speed" else point_dims
-    inputs: Inputs = [(bare(points, dim), own), (bare(velocities, dim), own), (times, axes)]
+    inputs: Inputs = [(bare(points, dim), core), (bare(velocities, dim), core), (times, axes)]
     fixed: dict[str, Any] = {"space": space, "t": None, "quantity": quantity, "policy": policy, "skipna": skipna}
     if knots is not None and knots.ndim > 1:
         inputs.append((bare(knots, dim), [KNOTS]))

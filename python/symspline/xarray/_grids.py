@@ -92,12 +92,12 @@ def _mask(where: Any, da: xr.DataArray, point_dims: Sequence[str]) -> xr.DataArr
 
 def _axis(da: xr.DataArray, dim: str, x: Any, point_dims: Sequence[str], policy: str, ends: Any) -> _Axis:
     """Check the positions along one dimension, and divide them into blocks."""
-    own = None if dim in da.coords else times_along(da, dim, None, point_dims, f"Make one the coordinate of {dim!r}")
-    if own is not None:
+    times = None if dim in da.coords else times_along(da, dim, None, point_dims, f"Make one the coordinate of {dim!r}")
+    if times is not None:
         raise ValidationError(
-            f"{dim!r} has no own coordinate, but {own.name!r} with dimensions {own.dims} looks like times. Pass "
-            f"da.swap_dims({{{dim!r}: {own.name!r}}}) with to={{{own.name!r}: ...}}, or da.drop_vars({own.name!r}) "
-            "for the nodes 0, 1, 2, ..."
+            f"{dim!r} has no own coordinate, but {times.name!r} with dimensions {times.dims} looks like times. Pass "
+            f"da.swap_dims({{{dim!r}: {times.name!r}}}) with to={{{times.name!r}: ...}}, or "
+            f"da.drop_vars({times.name!r}) for the nodes 0, 1, 2, ..."
         )
     nodes, count = (da[dim].values if dim in da.coords else None), da.sizes[dim]
     given, _ = times_with_names(x, dim, point_dims, [])
@@ -119,7 +119,7 @@ def _axis(da: xr.DataArray, dim: str, x: Any, point_dims: Sequence[str], policy:
     outputs = [slice(start, min(start + step, at.size)) for start in range(0, at.size, step)] or [slice(0, 0)]
     whole = ends == "periodic" or policy == "periodic"
     positions = np.arange(count) if nodes is None else nodes
-    windows = [slice(None) if whole or len(cuts) == 1 else _window(positions, at.values[own]) for own in outputs]
+    windows = [slice(None) if whole or len(cuts) == 1 else _window(positions, at.values[span]) for span in outputs]
     return _Axis(dim, nodes, at, list(zip(outputs, windows, strict=True)))
 
 
@@ -127,7 +127,7 @@ def _window(nodes: Array, x: Array) -> slice:
     """Return the nodes around positions, with a halo on either side."""
     first = int(np.searchsorted(nodes, x.min(), "right")) - 1
     last = int(np.searchsorted(nodes, x.max(), "left"))
-    first, last = (min(max(own, 0), len(nodes) - 2) for own in (first, last))
+    first, last = (min(max(index, 0), len(nodes) - 2) for index in (first, last))
     return slice(max(first - _HALO, 0), last + _HALO + 1)
 
 
@@ -145,7 +145,7 @@ def _joined(
         part = part.chunk(dict.fromkeys(windows, -1))
     names = {axis.dim: f"{KNOTS}_{axis.dim}" for axis in axes}
     inputs: Inputs = [(part.rename(names), [*names.values(), *point_dims])]
-    inputs += [(axis.x[own], [axis.dim]) for axis, (own, _) in zip(axes, chosen, strict=True)]
+    inputs += [(axis.x[span], [axis.dim]) for axis, (span, _) in zip(axes, chosen, strict=True)]
     nodes = [None if axis.nodes is None else axis.nodes[windows[axis.dim]] for axis in axes]
     offsets = [windows[axis.dim].start or 0 for axis in axes]
     core: list[Hashable] = [*names, *point_dims]
@@ -161,8 +161,8 @@ def _gridded(
     sizes = points.shape[first : first + len(nodes)]
     # Nodes without a coordinate are counted from the start of the array.
     axes = [
-        offset + np.arange(n, dtype=np.float64) if own is None else own
-        for own, offset, n in zip(nodes, offsets, sizes, strict=True)
+        offset + np.arange(n, dtype=np.float64) if positions is None else positions
+        for positions, offset, n in zip(nodes, offsets, sizes, strict=True)
     ]
     values = np.full((*points.shape[:first], *map(len, x), *space.point_shape), np.nan, space.dtype)
     for index in np.ndindex(points.shape[:first]):

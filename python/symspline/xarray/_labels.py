@@ -51,14 +51,14 @@ def times_along(
                 f"{short_repr(time)}. Such coordinates are: {names}."
             )
         return cast(xr.DataArray, da.coords[time])
-    own = dim in da.coords
+    has_own = dim in da.coords
     others = [name for name in along if name != dim and _are_times(name, da.coords[name])]
-    if own and (not others or _are_times(dim, da.coords[dim])):
+    if has_own and (not others or _are_times(dim, da.coords[dim])):
         return cast(xr.DataArray, da.coords[dim])
     if not others:
         return None
-    if own or len(others) > 1:
-        named = [dim] * own + others
+    if has_own or len(others) > 1:
+        named = [dim] * has_own + others
         names = ", ".join(f"{name!r} with dimensions {da.coords[name].dims}" for name in named)
         raise ValidationError(f"several coordinates could hold the times along {dim!r}: {names}. {remedy}.")
     return cast(xr.DataArray, da.coords[others[0]])
@@ -162,18 +162,19 @@ def fit_valid(
     _report_short(np.flatnonzero(mask & ~enough), valid, batch, how["on_failure"])
     # Curves that are too short are masked. Their times must increase nevertheless.
     pairs = [
-        (times[i][own], rows[i][own]) if enough[i] else (np.arange(2.0), rows[i][[0, 0]]) for i, own in enumerate(valid)
+        (times[i][samples], rows[i][samples]) if enough[i] else (np.arange(2.0), rows[i][[0, 0]])
+        for i, samples in enumerate(valid)
     ]
     start, end = (named[name].reshape(-1, *space.point_shape) if name in named else None for name in ("start", "end"))
     try:
         splines = fit_many(pairs, space, bc_type=joined(kinds, (start, end)), where=mask & enough, **how)
     except ValidationError as error:
         raise named_curve(error, batch, np.arange(len(rows))) from None
-    found = np.full((2, *rows.shape), np.nan, space.dtype)
+    arrays = np.full((2, *rows.shape), np.nan, space.dtype)
     for i, spline in enumerate(splines):
         if enough[i]:
-            found[0, i, valid[i]], found[1, i, valid[i]] = spline.points, spline.velocities
-    return found[0].reshape(points.shape), found[1].reshape(points.shape), splines
+            arrays[0, i, valid[i]], arrays[1, i, valid[i]] = spline.points, spline.velocities
+    return arrays[0].reshape(points.shape), arrays[1].reshape(points.shape), splines
 
 
 def _report_short(short: NDArray[np.intp], valid: Mask, batch: tuple[int, ...], on_failure: str) -> None:

@@ -144,8 +144,8 @@ def smooth(
     dtypes: list[Any] = [space.dtype, *(np.float64 for _ in spreads)]
     dtypes += [dtype for dtype in _COLUMNS.values() for _ in endings] + [np.bool_]
     fixed = {"space": space, "t": spec["t"], "names": spec["names"], "how": given, "std": std, "level": level}
-    found = apply(_smoothed, inputs, dims, dtypes, x_axes=len(axes), **fixed)
-    ds = xr.Dataset(dict(zip(["points", *spreads, *columns, "converged"], found, strict=True)))
+    variables = apply(_smoothed, inputs, dims, dtypes, x_axes=len(axes), **fixed)
+    ds = xr.Dataset(dict(zip(["points", *spreads, *columns, "converged"], variables, strict=True)))
     ds["points"].attrs = dict(da.attrs)
     for name in spreads:
         ds[name].attrs = unit_of(space, da, name)
@@ -214,7 +214,7 @@ def _smoothed(
         outputs = _smooth_rows(rows, t, at, per_curve, mask, wanted)
     else:
         outputs = _smooth_timed(rows, t, at, per_curve, mask, wanted)
-    return tuple(np.asarray(own if batch else own[0]) for own in outputs)
+    return tuple(np.asarray(output if batch else output[0]) for output in outputs)
 
 
 def _smooth_timed(
@@ -231,7 +231,7 @@ def _smooth_timed(
     parts = 2 if is_several(space) else 1
     shapes = [(*own_shape, *space.point_shape), *[own_shape] * (len(wanted.spreads) * parts)]
     outputs = [np.full((len(rows), *shape), np.nan, space.dtype if i == 0 else float) for i, shape in enumerate(shapes)]
-    for dtype in (*(own for own in _COLUMNS.values() for _ in range(parts)), np.bool_):
+    for dtype in (*(part for part in _COLUMNS.values() for _ in range(parts)), np.bool_):
         outputs.append(np.full(len(rows), np.nan if dtype is np.float64 else False, dtype))
     for curves, kept in of_equal_length(~missing_times(times)):
         knots, here, gone = times[curves[:, None], kept], at, None
@@ -239,14 +239,14 @@ def _smooth_timed(
             gone = missing_times(at[curves])
             here = np.where(gone, knots[:, 0].reshape(-1, *[1] * len(own_shape)), at[curves])
         try:
-            found = _smooth_rows(rows[curves[:, None], kept], knots, here, per_curve, chosen[curves], wanted)
+            parts_of_curves = _smooth_rows(rows[curves[:, None], kept], knots, here, per_curve, chosen[curves], wanted)
         except SymsplineError as error:
             raise named_curve(error, whole, curves) from None
-        for i, (output, own) in enumerate(zip(outputs, found, strict=True)):
+        for i, (output, part) in enumerate(zip(outputs, parts_of_curves, strict=True)):
             if gone is not None and i < len(shapes):
-                own[gone] = np.nan
-            output[curves] = own
-    return [own.reshape(*whole, *own.shape[1:]) for own in outputs]
+                part[gone] = np.nan
+            output[curves] = part
+    return [part.reshape(*whole, *part.shape[1:]) for part in outputs]
 
 
 def _smooth_rows(rows: Array, t: Any, at: Array, per_curve: bool, mask: Array | None, wanted: _Wanted) -> list[Array]:
@@ -260,22 +260,22 @@ def _smooth_rows(rows: Array, t: Any, at: Array, per_curve: bool, mask: Array | 
         curve: Any = make_smoothing_spline(t, rows, space, weights=weights, where=mask, **wanted.how)
     several = is_several(space)
     reports = curve.report if several else (curve.report,)
-    converged = np.all([np.asarray(own.converged) for own in reports], axis=0)
+    converged = np.all([np.asarray(entry.converged) for entry in reports], axis=0)
     values = curve(at, per_curve=per_curve)
-    each: list[Array] = []
+    spreads: list[Array] = []
     for name, arguments in wanted.spreads:
         if per_curve:
             rows_of = [getattr(reduce(getitem, i, curve), name)(at[i], *arguments) for i in np.ndindex(whole)]
-            pairs = [own if several else (own,) for own in rows_of]
-            each += [np.reshape(part, at.shape) for part in zip(*pairs, strict=True)]
+            pairs = [entry if several else (entry,) for entry in rows_of]
+            spreads += [np.reshape(part, at.shape) for part in zip(*pairs, strict=True)]
         else:
-            found = getattr(curve, name)(at, *arguments)
-            each += found if several else [found]
+            spread = getattr(curve, name)(at, *arguments)
+            spreads += spread if several else [spread]
     columns: list[Array] = []
     for name in ("lam", "df", "sigma"):
         numbers = getattr(curve, name)
-        columns += [np.broadcast_to(own, whole) for own in (numbers if several else (numbers,))]
-    columns += [np.asarray(own.at_bound) for own in reports]
-    for own in (values, *each):
-        own[~converged] = np.nan
-    return [values, *each, *columns, converged]
+        columns += [np.broadcast_to(entry, whole) for entry in (numbers if several else (numbers,))]
+    columns += [np.asarray(entry.at_bound) for entry in reports]
+    for entry in (values, *spreads):
+        entry[~converged] = np.nan
+    return [values, *spreads, *columns, converged]

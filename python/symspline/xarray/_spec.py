@@ -63,9 +63,9 @@ def spec_of(
         rehearsed = np.arange(2.0)
     still = np.zeros((da.sizes[dim] if rehearsed is None else len(rehearsed), 1))
     CubicSpline(rehearsed, still, LINE, bc_type=joined(kinds, (np.zeros(1), np.zeros(1))), **options)
-    own = [dim, *point_dims]
-    curves = [d for d in da.dims if d not in own]
-    inputs: Inputs = [(da, own)]
+    core = [dim, *point_dims]
+    curves = [d for d in da.dims if d not in core]
+    inputs: Inputs = [(da, core)]
     names = []
     if times is not None and t is None:
         check_whole(times, dim, "a curve needs all of its times")
@@ -108,10 +108,10 @@ def check_names(da: xr.DataArray, space: Space, dims: Sequence[str], point_dims:
     if len({*dims, *point_dims}) < len(dims) + len(point_dims):
         named = f"dim {dims[0]!r}" if len(dims) == 1 else f"to {tuple(dims)}"
         raise ValidationError(f"{named} and point_dims {tuple(point_dims)} name a dimension twice")
-    found = tuple(da.sizes[name] for name in point_dims)
-    if found != space.point_shape:
+    sizes = tuple(da.sizes[name] for name in point_dims)
+    if sizes != space.point_shape:
         raise ValidationError(
-            f"{tuple(point_dims)} have sizes {found}, but a point of {space} has shape {space.point_shape}"
+            f"{tuple(point_dims)} have sizes {sizes}, but a point of {space} has shape {space.point_shape}"
         )
 
 
@@ -196,7 +196,7 @@ def apply(
     kwargs["function"] = function
     # A worker of dask is one of many and uses one thread; other arrays are computed by all threads.
     kwargs["alone"] = any(array.chunks is not None for array in arrays)
-    found = xr.apply_ufunc(
+    result = xr.apply_ufunc(
         _block,
         *arrays,
         input_core_dims=[core for _, core in inputs],
@@ -209,7 +209,7 @@ def apply(
         keep_attrs="override",
         kwargs=kwargs,
     )
-    outputs: tuple[xr.DataArray, ...] = found if isinstance(found, tuple) else (found,)
+    outputs: tuple[xr.DataArray, ...] = result if isinstance(result, tuple) else (result,)
     for output in outputs:
         output.attrs = {}
     return outputs
@@ -258,29 +258,29 @@ def fitted(
     """Points, velocities and the columns of the report of a block."""
     if not skipna:
         spline = spline_of(points, rest, space, t, kinds, names, how)
-        found, velocities, reports = spline.points, spline.velocities, [spline.report]
+        nodes, velocities, reports = spline.points, spline.velocities, [spline.report]
     else:
         named = dict(zip(names, rest, strict=True))
         batch = points.shape[: points.ndim - 1 - len(space.point_shape)]
         knots = knots_of_block(t, named, batch)
-        found, velocities, splines = fit_valid(points, knots, named, space, kinds, how)
+        nodes, velocities, splines = fit_valid(points, knots, named, space, kinds, how)
         reports = [spline.report for spline in splines]
     columns: list[Array] = []
     for name, dtype in COLUMNS.items():
-        values = [getattr(own, name) for own in reports]
+        values = [getattr(report, name) for report in reports]
         column: Array = np.asarray([np.nan if value is None else value for value in values], dtype)
         columns.append(column.reshape(batch) if skipna else column[0])
-    return found, velocities, *(np.broadcast_to(c, columns[0].shape) for c in columns)
+    return nodes, velocities, *(np.broadcast_to(c, columns[0].shape) for c in columns)
 
 
 def resampled(points: Array, x: Array, *rest: Array, x_axes: int, skipna: bool, policy: str, **options: Any) -> Array:
     """Values of the splines of a block."""
     if skipna:
-        found, velocities, *columns = fitted(points, *rest, skipna=True, **options)
+        nodes, velocities, *columns = fitted(points, *rest, skipna=True, **options)
         named = dict(zip(options["names"], rest, strict=True))
         t = knots_of_block(options["t"], named, points.shape[: points.ndim - 1 - len(options["space"].point_shape)])
         fixed: dict[str, Any] = {"space": options["space"], "quantity": "point", "policy": policy}
-        values = values_at(found, velocities, x, t=t, x_axes=x_axes, skipna=True, **fixed)
+        values = values_at(nodes, velocities, x, t=t, x_axes=x_axes, skipna=True, **fixed)
         values[~columns[list(COLUMNS).index("converged")]] = np.nan
         return values
     spline = spline_of(points, rest, **options)
@@ -325,13 +325,13 @@ def values_at(
         return np.full(batch + x.shape[x.ndim - x_axes :] + shape, np.nan, space.dtype if shape else float)
     time_axis, curve = given(t, points, velocities, space)
     method = curve.lift if lifted else curve.evaluate
-    found = call_at_times(
-        curve, time_axis, x, per_curve, policy, lambda x, outside, own: method(x, quantity, outside, own)
+    result = call_at_times(
+        curve, time_axis, x, per_curve, policy, lambda x, outside, per_row: method(x, quantity, outside, per_row)
     )
     if everyone:
-        return np.asarray(found)
-    values = np.full(batch + found.shape[1:], np.nan, found.dtype)
-    values[good] = found
+        return np.asarray(result)
+    values = np.full(batch + result.shape[1:], np.nan, result.dtype)
+    values[good] = result
     return values
 
 
@@ -348,7 +348,7 @@ def _values_of_valid(
     space = options["space"]
     nodes, shape = points.shape[len(batch)], () if options["quantity"] == "speed" else space.point_shape
     own_shape = x.shape[len(batch) :] if per_curve else x.shape
-    rows, rates = (own.reshape(-1, nodes, *space.point_shape) for own in (points, velocities))
+    rows, rates = (array.reshape(-1, nodes, *space.point_shape) for array in (points, velocities))
     times = times_of_rows(t, batch, nodes)
     at = np.broadcast_to(x, (*batch, *own_shape)).reshape(len(rows), *own_shape) if per_curve else x
     values = np.full((len(rows), *own_shape, *shape), np.nan, space.dtype if shape else float)
@@ -359,12 +359,12 @@ def _values_of_valid(
             gone = missing_times(at[curves])
             here = np.where(gone, knots[:, 0].reshape(-1, *[1] * len(own_shape)), at[curves])
         try:
-            found = values_at(rows[chosen], rates[chosen], here, t=knots, x_axes=len(own_shape), **options)
+            part = values_at(rows[chosen], rates[chosen], here, t=knots, x_axes=len(own_shape), **options)
         except ValidationError as error:
             raise named_curve(error, batch, curves) from None
         if gone is not None:
-            found[gone] = np.nan
-        values[curves] = found
+            part[gone] = np.nan
+        values[curves] = part
     return values.reshape(*batch, *own_shape, *shape)
 
 
