@@ -33,10 +33,10 @@ from . import (
     tensors,
     testing,
 )
+from ._base import VERSION
 from ._base.exceptions import SymsplineError
 from ._base.report import ConvergenceWarning, CumulativeReport, FarPointsWarning, Report
 from ._base.system import set_num_threads, show_config
-from ._base.version import VERSION
 from ._core import ConvergenceError, CutLocusError, ValidationError, num_threads
 from ._curves.derivatives import Gradient
 from ._estimation import estimate

@@ -24,9 +24,8 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._base.arrays import as_array, checked_flag, short_repr
+from ._base.arrays import as_array, checked_flag, one_of, real_numbers, short_repr
 from ._base.typing import Extrapolate, Frame, TimesLike
-from ._base.validation import one_of, real_numbers
 from ._core import ValidationError
 from ._curves.composed import AnyCurve, evaluated
 from ._estimation.measurements import GRAVITY

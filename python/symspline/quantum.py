@@ -24,19 +24,22 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._base.arrays import adjoint, as_array, refuse, short_repr
-from ._base.input import times_of
-from ._base.time import onto_ends
-from ._base.typing import Extrapolate, Number, TimesLike
-from ._base.validation import (
+from ._base.arrays import (
     Array,
+    adjoint,
+    as_array,
     check_symmetric,
     largest,
     numbers,
     one_of,
+    refuse,
+    short_repr,
     square_matrices,
     unit_vectors,
 )
+from ._base.input import times_of
+from ._base.time import onto_ends
+from ._base.typing import Extrapolate, Number, TimesLike
 from ._core import ValidationError
 from ._curves.curve import CurveArrays, in_span
 from ._curves.options import order_of

@@ -22,12 +22,23 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._base.arrays import as_array, checked_flag, filled, refuse, short_repr
+from ._base.arrays import (
+    REMOVE,
+    as_array,
+    check_finite,
+    checked_flag,
+    filled,
+    length,
+    one_of,
+    real_numbers,
+    refuse,
+    short_repr,
+    unchecked_numbers,
+)
 from ._base.faults import warn
 from ._base.input import times_of
 from ._base.time import knots_of
 from ._base.typing import Extrapolate, Frame, RateInterpolation, RotationOrder, TimesLike
-from ._base.validation import REMOVE, check_finite, length, one_of, real_numbers, unchecked_numbers
 from ._core import ValidationError
 from ._curves.composed import Joined, Retimed, evaluated
 from ._curves.controlled import CumulativeCurve

@@ -20,11 +20,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._base.arrays import adjoint, as_array, cast, checked_number, refuse, whole_number
+from ._base.arrays import Array, adjoint, as_array, cast, checked_number, numbers, off_one, refuse, whole_number
 from ._base.faults import warn
 from ._base.input import times_of
 from ._base.typing import TimesLike
-from ._base.validation import Array, numbers, off_one
 from ._core import CutLocusError, ValidationError
 from ._grid import GridSpline
 from ._grid.axes import coordinates

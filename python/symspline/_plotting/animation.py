@@ -11,7 +11,7 @@ from matplotlib.animation import FuncAnimation, writers
 from matplotlib.axes import Axes
 
 from .._base.arrays import checked_number, short_repr, whole_number
-from .._base.disk import path_of, replacing
+from .._base.system import path_of, replacing
 from .._base.typing import FloatArray, Look
 from .._core import ValidationError
 from .curves import Curve

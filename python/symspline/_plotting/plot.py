@@ -20,7 +20,7 @@ from matplotlib.lines import Line2D
 from matplotlib.typing import ColorType
 
 from .._base.arrays import as_array, short_repr
-from .._base.disk import path_of, replacing
+from .._base.system import path_of, replacing
 from .._base.time import TimeAxis, knots_of
 from .._base.typing import Look
 from .._core import ValidationError

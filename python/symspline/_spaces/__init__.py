@@ -2,7 +2,7 @@
 # mypy: implicit-reexport
 """The spaces: points, tangent vectors and their geometry."""
 
-from .._base.rounding import POINT_TOL, point_tol
+from .._base.arrays import POINT_TOL, point_tol
 from .actions import Group
 from .base import AnySpace, Array, Doubles, Space
 from .groups import (

@@ -12,8 +12,7 @@ from typing import Any, ClassVar, Generic, Literal, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._base.arrays import as_array, cast, refuse, short_repr, whole_number
-from .._base.rounding import point_tol
+from .._base.arrays import as_array, cast, point_tol, refuse, short_repr, whole_number
 from .._base.typing import AnyArray, FloatArray, P
 from .._core import Handle, ValidationError
 from .statistics import Groups, Whitening, geometric_median, grouped, groups_of, karcher_mean, require_metric, take
@@ -528,14 +527,14 @@ class Space(Generic[P]):
 
     # The classes in `actions` define these methods for `symmetry` and `act`.
 
-    def _reflected(self, p: Array, x: Array) -> Any:
+    def _reflected(self, p: Array, x: Array) -> Array:
         raise self._not_symmetric("geodesic symmetries")
 
     def _element(self, g: Any) -> Any:
         """Return the argument of `act` as checked arrays."""
         raise self._not_symmetric("group")
 
-    def _moved(self, g: Any, x: Array) -> Any:
+    def _moved(self, g: Any, x: Array) -> Array:
         raise self._not_symmetric("group")
 
     def _not_symmetric(self, what: str) -> ValidationError:

@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 
 from .._base.angles import matrices_of_quaternions
-from .._base.arrays import refuse
-from .._base.rounding import point_tol
+from .._base.arrays import point_tol, refuse
 from .._base.typing import ComplexArray, FloatArray
 from .._core import ValidationError
 from .actions import DisconnectedGroup, Group

@@ -16,6 +16,10 @@ from .._base.faults import warn
 from .._core import ConvergenceError, CutLocusError, ValidationError
 
 Array = NDArray[Any]
+# Points or vectors, one per row; those of a product are a tuple of arrays.
+Rows = Any
+# A `Space`, which is defined in terms of this module.
+Geometry = Any
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
@@ -154,7 +158,7 @@ class Whitening(NamedTuple):
     """
 
     factor: Array
-    space: Any
+    space: Geometry
 
     def forward(self, points: Array) -> Array:
         """Return L⁻¹ A L⁻ᴴ."""
@@ -190,7 +194,7 @@ class Groups(NamedTuple):
         Positive weights.
     """
 
-    points: Any
+    points: Rows
     counts: Indices
     weights: Floats
 
@@ -206,38 +210,38 @@ class Groups(NamedTuple):
         rows = np.repeat(which, self.counts)
         return Groups(take(self.points, rows), self.counts[which], self.weights[rows])
 
-    def sums(self, rows: Any) -> Any:
+    def sums(self, rows: Rows) -> Rows:
         """Sum rows over each group."""
         starts = self.starts
         return _map(lambda x: np.add.reduceat(x, starts, axis=0), rows)
 
-    def spread(self, rows: Any) -> Any:
+    def spread(self, rows: Rows) -> Rows:
         """Repeat one row per group for all points of the group."""
         return _map(lambda x: np.repeat(x, self.counts, axis=0), rows)
 
 
-def _map(function: Any, *values: Any) -> Any:
+def _map(function: Any, *values: Rows) -> Rows:
     """Apply a function to arrays, or to the entries of tuples of arrays."""
     if isinstance(values[0], tuple):
         return tuple(function(*arrays) for arrays in zip(*values, strict=True))
     return function(*values)
 
 
-def take(rows: Any, index: Any) -> Any:
+def take(rows: Rows, index: Any) -> Rows:
     return _map(lambda x: x[index], rows)
 
 
-def scaled(rows: Any, factors: Floats) -> Any:
+def scaled(rows: Rows, factors: Floats) -> Rows:
     """Multiply every row by a number."""
     return _map(lambda x: x * factors.reshape(-1, *[1] * (x.ndim - 1)), rows)
 
 
-def joined(rows: list[Any]) -> Any:
+def joined(rows: list[Rows]) -> Rows:
     """Concatenate rows of points."""
     return _map(lambda *arrays: np.concatenate(arrays), *rows)
 
 
-def put(rows: Any, index: Any, values: Any) -> None:
+def put(rows: Rows, index: Any, values: Rows) -> None:
     def replace(array: Array, value: Array) -> None:
         array[index] = value
 
@@ -294,7 +298,7 @@ def groups_of(lead: tuple[int, ...], points: Array, weights: Floats) -> Groups:
     return Groups(rows, used.sum(axis=-1), weights.reshape(-1)[used.ravel()])
 
 
-def _hessians(space: Any, lengths: Floats) -> Floats:
+def _hessians(space: Geometry, lengths: Floats) -> Floats:
     """Return bounds of the Hessians of half the squared distances.
 
     The Hessian of d²/2 is at most K d coth(K d) where sectional curvatures are at least −K² (Karcher 1977, equation
@@ -307,7 +311,7 @@ def _hessians(space: Any, lengths: Floats) -> Floats:
     return np.where(x > 1e-4, x / np.tanh(np.maximum(x, 1e-4)), 1.0)
 
 
-def _size(space: Any, p: Any, v: Any) -> Floats:
+def _size(space: Geometry, p: Rows, v: Rows) -> Floats:
     """Return lengths of tangent vectors; without a metric, those of their arrays."""
     if np.isfinite(space.curvature):
         return np.asarray(space.norm(p, v))
@@ -329,13 +333,13 @@ class Descent(NamedTuple):
         Whether the iteration did not converge.
     """
 
-    points: Any
+    points: Rows
     objective: Floats
     radius: Floats
     unfinished: NDArray[np.bool_]
 
 
-def descend_to_mean(space: Any, groups: Groups, means: Any, steps: int = _STEPS) -> Descent:
+def descend_to_mean(space: Geometry, groups: Groups, means: Rows, steps: int = _STEPS) -> Descent:
     """Descend to a local minimum of the mean squared distance from every start.
 
     The gradient of half the mean squared distance is the negative mean logarithm. Its descent with the inverse of a
@@ -367,7 +371,7 @@ def descend_to_mean(space: Any, groups: Groups, means: Any, steps: int = _STEPS)
     return state._replace(unfinished=active)
 
 
-def descend_to_median(space: Any, groups: Groups, medians: Any, steps: int = _STEPS) -> Descent:
+def descend_to_median(space: Geometry, groups: Groups, medians: Rows, steps: int = _STEPS) -> Descent:
     """Descend to a local minimum of the mean distance from every start, by Weiszfeld's algorithm.
 
     An iterate at a datum moves on as in Vardi & Zhang (2000), equations (2.5) and (2.6), and a datum that satisfies
@@ -414,7 +418,7 @@ def _note(state: Descent, index: Indices, groups: Groups, distances: Floats, pow
     state.radius[index] = np.maximum.reduceat(distances, groups.starts)
 
 
-def _weiszfeld(space: Any, groups: Groups, at: Any) -> tuple[Any, Floats, Floats]:
+def _weiszfeld(space: Geometry, groups: Groups, at: Rows) -> tuple[Rows, Floats, Floats]:
     """Return the steps of Weiszfeld's algorithm, their lengths, and the distances of the points."""
     repeated = groups.spread(at)
     logs = space.log(repeated, groups.points)
@@ -444,7 +448,7 @@ def _argmin(values: Floats, groups: Groups) -> Indices:
     return np.asarray(hits[first] - groups.starts)
 
 
-def require_metric(space: Any, what: str) -> None:
+def require_metric(space: Geometry, what: str) -> None:
     """Raise ValidationError for spaces without an invariant, positive definite metric."""
     if not np.isfinite(space.curvature):
         raise ValidationError(
@@ -500,23 +504,23 @@ _MEDIAN = _Kind("median", 1, descend_to_median, circular_median, 0.25)
 class _Found(NamedTuple):
     """Global minimum of a group, and the distance and relative excess of the next minimum (infinite if none exists)."""
 
-    point: Any
+    point: Rows
     distance: float
     excess: float
     error: float
 
 
-def karcher_mean(space: Any, groups: Groups) -> Any:
+def karcher_mean(space: Geometry, groups: Groups) -> Rows:
     """Return the Karcher mean of every group, and warn where another minimum is nearly as low."""
     return _minimum(space, groups, _MEAN)
 
 
-def geometric_median(space: Any, groups: Groups) -> Any:
+def geometric_median(space: Geometry, groups: Groups) -> Rows:
     """Return the geometric median of every group, and warn where another minimum is nearly as low."""
     return _minimum(space, groups, _MEDIAN)
 
 
-def _minimum(space: Any, groups: Groups, kind: _Kind) -> Any:
+def _minimum(space: Geometry, groups: Groups, kind: _Kind) -> Rows:
     whitening = space._whitening(groups)
     if whitening is None:
         return _minimum_of_arrays(space, groups, kind)
@@ -525,7 +529,7 @@ def _minimum(space: Any, groups: Groups, kind: _Kind) -> Any:
     return whitening.back(_minimum_of_arrays(whitening.space, moved, kind))
 
 
-def _minimum_of_arrays(space: Any, groups: Groups, kind: _Kind) -> Any:
+def _minimum_of_arrays(space: Geometry, groups: Groups, kind: _Kind) -> Rows:
     starts = space._first_means(groups)
     descent, failed = _descents(space, groups, starts, kind, (_SHORT,))
     if np.isfinite(space.curvature):
@@ -552,7 +556,7 @@ def _minimum_of_arrays(space: Any, groups: Groups, kind: _Kind) -> Any:
 
 
 def _descents(
-    space: Any, groups: Groups, starts: Any, kind: _Kind, steps: tuple[int, ...] = ()
+    space: Geometry, groups: Groups, starts: Rows, kind: _Kind, steps: tuple[int, ...] = ()
 ) -> tuple[Descent, NDArray[np.bool_]]:
     """Descend in every group, and return which descents met a cut locus."""
     count = len(groups.counts)
@@ -569,7 +573,7 @@ def _descents(
     return Descent(points, *numbers), np.concatenate([failed for _, failed in parts])
 
 
-def _global_minimum(space: Any, group: Groups, kind: _Kind, number: int | None) -> _Found:
+def _global_minimum(space: Geometry, group: Groups, kind: _Kind, number: int | None) -> _Found:
     """Return the global minimum of one group whose data are spread."""
     order = _order(group.points)
     # Sort the data by their coordinates, so that the result does not depend on the given order.
@@ -588,7 +592,7 @@ def _global_minimum(space: Any, group: Groups, kind: _Kind, number: int | None) 
     return _from_several_starts(space, group, kind, number)
 
 
-def _order(points: Any) -> NDArray[np.intp]:
+def _order(points: Rows) -> NDArray[np.intp]:
     """Return the lexicographic order of points."""
     arrays = points if isinstance(points, tuple) else (points,)
     rows = [np.ascontiguousarray(x).reshape(len(x), -1).view(np.float64) for x in arrays]
@@ -616,7 +620,7 @@ def _on_torus(group: Groups, kind: _Kind) -> _Found:
     return _Found(nearest, distance, excess[worst], standard_error(total, group.weights))
 
 
-def _on_circle(space: Any, group: Groups, kind: _Kind) -> _Found:
+def _on_circle(space: Geometry, group: Groups, kind: _Kind) -> _Found:
     """Solve exactly on a space that is isometric to a circle."""
     base, unit, angles, scale = _angles(space, group.points)
     minima = kind.on_circle(angles, group.weights)
@@ -632,7 +636,7 @@ def _on_circle(space: Any, group: Groups, kind: _Kind) -> _Found:
     return _Found(_near(space, group, point), distance, excess, standard_error(square, group.weights) / scale)
 
 
-def _angles(space: Any, points: Array) -> tuple[Array, Array, Floats, float]:
+def _angles(space: Geometry, points: Array) -> tuple[Array, Array, Floats, float]:
     """Return a base point, a unit vector there, the angles of points from it, and the angle per unit of length."""
     scale = np.pi / space.injectivity_radius
     start = points[0]
@@ -657,7 +661,7 @@ def _angles(space: Any, points: Array) -> tuple[Array, Array, Floats, float]:
 # ---- several starts ----
 
 
-def _from_several_starts(space: Any, group: Groups, kind: _Kind, number: int | None) -> _Found:
+def _from_several_starts(space: Geometry, group: Groups, kind: _Kind, number: int | None) -> _Found:
     """Descend from the best data, extrinsic means, and points beyond the lowest minimum; keep the lowest minimum."""
     starts = joined([_best_data(space, group, kind), *_extrinsic(space, group)])
     ends, objective = _all_descents(space, group, starts, kind)
@@ -696,7 +700,7 @@ def _from_several_starts(space: Any, group: Groups, kind: _Kind, number: int | N
     return _Found(result, float(far[other]), float(objective[other] / objective[best] - 1), error)
 
 
-def _all_descents(space: Any, group: Groups, starts: Any, kind: _Kind) -> tuple[Any, Floats]:
+def _all_descents(space: Geometry, group: Groups, starts: Rows, kind: _Kind) -> tuple[Rows, Floats]:
     """Return end points of short descents in one group, and their objectives (infinite at a cut locus)."""
     count = len(group.weights)
     size = len(starts[0]) if isinstance(starts, tuple) else len(starts)
@@ -709,7 +713,7 @@ def _all_descents(space: Any, group: Groups, starts: Any, kind: _Kind) -> tuple[
     return joined([descent.points for descent, _ in parts]), objective
 
 
-def _lowest(space: Any, ends: Any, objective: Floats) -> list[int]:
+def _lowest(space: Geometry, ends: Rows, objective: Floats) -> list[int]:
     """Return indices of end points that are nearly as low as the lowest one and not near each other."""
     kept: list[int] = []
     for i in np.argsort(objective, kind="stable"):
@@ -721,7 +725,7 @@ def _lowest(space: Any, ends: Any, objective: Floats) -> list[int]:
     return kept
 
 
-def _beyond(space: Any, group: Groups, point: Any) -> Any:
+def _beyond(space: Geometry, group: Groups, point: Rows) -> Rows:
     """Return starts near the cut locus of a minimum, along the direction in which the data are spread most.
 
     Two opposite clusters have a minimum on either side, and descents from the data may all lead to the same one.
@@ -738,14 +742,14 @@ def _beyond(space: Any, group: Groups, point: Any) -> Any:
         return take(group.points, np.arange(1))
 
 
-def _distances(space: Any, point: Any, points: Any) -> Floats:
+def _distances(space: Geometry, point: Rows, points: Rows) -> Floats:
     """Return the distances of points from one point."""
     count = len(points[0]) if isinstance(points, tuple) else len(points)
     one = tuple(np.broadcast_to(x, (count, *x.shape)) for x in point) if isinstance(point, tuple) else point
     return np.asarray(space.distance(one, points))
 
 
-def _best_data(space: Any, group: Groups, kind: _Kind) -> Any:
+def _best_data(space: Geometry, group: Groups, kind: _Kind) -> Rows:
     """Return all data; of many data, those with the lowest objectives, computed from a sample."""
     count = len(group.weights)
     if count <= _ALL:
@@ -756,7 +760,7 @@ def _best_data(space: Any, group: Groups, kind: _Kind) -> Any:
     return take(data, np.argsort(objective, kind="stable")[:_BEST])
 
 
-def _extrinsic(space: Any, group: Groups) -> list[Any]:
+def _extrinsic(space: Geometry, group: Groups) -> list[Rows]:
     """Return minimisers of the distance in the embedding space, projected to the manifold where possible."""
     try:
         starts = space._extrinsic_means(group.points, group.weights / group.weights.sum())
@@ -766,7 +770,7 @@ def _extrinsic(space: Any, group: Groups) -> list[Any]:
         return []
 
 
-def _best(space: Any, group: Groups, ends: Any, objective: Floats) -> int:
+def _best(space: Geometry, group: Groups, ends: Rows, objective: Floats) -> int:
     """Return the index of the lowest minimum; of equal ones, that whose distances to the data are first in order."""
     lowest = objective.min()
     equal = np.flatnonzero(objective <= lowest * (1 + _EQUAL) + _EQUAL**2)
@@ -777,7 +781,7 @@ def _best(space: Any, group: Groups, ends: Any, objective: Floats) -> int:
     return int(equal[np.lexsort(np.array(keys).T[::-1])[0]])
 
 
-def _near(space: Any, group: Groups, point: Any) -> Any:
+def _near(space: Geometry, group: Groups, point: Rows) -> Rows:
     """Return the representative of a point near the first datum."""
     first = take(group.points, 0)
     try:
@@ -818,11 +822,11 @@ def _warn_ambiguous(kind: _Kind, numbers: NDArray[np.intp] | None, results: list
     )
 
 
-def _copied(points: Any) -> Any:
+def _copied(points: Rows) -> Rows:
     return tuple(x.copy() for x in points) if isinstance(points, tuple) else points.copy()
 
 
-def _assign(points: Any, index: int, value: Any) -> None:
+def _assign(points: Rows, index: int, value: Rows) -> None:
     if isinstance(points, tuple):
         for array, new in zip(points, value, strict=True):
             array[index] = new

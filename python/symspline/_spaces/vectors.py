@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._base.arrays import as_array, refuse
-from .._base.rounding import dtype_tol
+from .._base.arrays import as_array, dtype_tol, refuse
 from .._base.typing import FloatArray
 from .._core import ValidationError
 from .actions import Preserving, homogeneous, require
@@ -45,13 +44,13 @@ class Euclidean(Space[FloatArray]):
     def __init__(self, n: int) -> None:
         super().__init__(n)
 
-    def _reflected(self, p: Array, x: Array) -> Any:
+    def _reflected(self, p: Array, x: Array) -> Array:
         return 2 * p - x
 
     def _element(self, g: Any) -> Any:
         return homogeneous(self, g, self.dim)
 
-    def _moved(self, g: Array, x: Array) -> Any:
+    def _moved(self, g: Array, x: Array) -> Array:
         return (g[..., :-1, :-1] @ x[..., None])[..., 0] + g[..., :-1, -1]
 
 
@@ -99,7 +98,7 @@ class Torus(Space[FloatArray]):
     def __init__(self, n: int) -> None:
         super().__init__(n)
 
-    def _reflected(self, p: Array, x: Array) -> Any:
+    def _reflected(self, p: Array, x: Array) -> Array:
         return 2 * p - x
 
     def _element(self, g: Any) -> Any:
@@ -114,7 +113,7 @@ class Torus(Space[FloatArray]):
         )
         return g
 
-    def _moved(self, g: Array, x: Array) -> Any:
+    def _moved(self, g: Array, x: Array) -> Array:
         return (g[..., :-1, :-1] @ x[..., None])[..., 0] + g[..., :-1, -1]
 
 

@@ -25,8 +25,8 @@ from collections.abc import Sequence
 from difflib import get_close_matches
 from typing import Any, NoReturn
 
+from .._base import VERSION
 from .._base.exceptions import ConvergenceError, SymsplineError
-from .._base.version import VERSION
 from . import _check, _fit, _info, _plot, _sample
 from ._messages import QUIET, USUAL, VERBOSE, Problem, for_command_line, printed_warnings, say, set_level
 

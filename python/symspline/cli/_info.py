@@ -24,8 +24,8 @@ from typing import Any
 import numpy as np
 
 from .._base.arrays import brief
-from .._base.disk import damage
 from .._base.report import long_gaps
+from .._base.system import damage
 from .._base.time import time_axis_of
 from .._smoothing import SmoothingReport, SmoothingSpline
 from .._smoothing.noise import is_several, smoothed_spaces

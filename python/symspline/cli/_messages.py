@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import BinaryIO, Self
 
 from .._base.arrays import brief
-from .._base.disk import replacing
+from .._base.system import replacing
 from .._base.time import REMEDY
 from .._spaces.base import CLASSES
 

@@ -23,8 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._base.arrays import brief
-from .._base.disk import damage
 from .._base.input import ISO_DATE, UTC_ZONE, times_of
+from .._base.system import damage
 from .._base.time import NANOSECONDS, parts_of_duration
 from .._core import ValidationError, number_lines
 from .._splines.archive import read

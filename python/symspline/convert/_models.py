@@ -10,9 +10,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._base.arrays import adjoint, refuse
-from .._base.validation import (
+from .._base.arrays import (
     Array,
+    adjoint,
     check_orthonormal,
     check_symmetric,
     hermitian_part,
@@ -20,6 +20,7 @@ from .._base.validation import (
     length,
     numbers,
     real_numbers,
+    refuse,
     square_matrices,
     unit_vectors,
     unmoved_by_underflow,

@@ -7,12 +7,17 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._base.arrays import as_array, checked_atol, checked_flag, filled, refuse, short_repr
-from .._base.validation import (
+from .._base.arrays import (
     REMOVE,
     Array,
+    as_array,
     check_finite,
+    checked_atol,
+    checked_flag,
+    filled,
     off_one,
+    refuse,
+    short_repr,
     unchecked_numbers,
     unit_vectors,
     unmoved_by_underflow,

@@ -14,9 +14,9 @@ from typing import Any, Unpack
 import numpy as np
 import xarray as xr
 
+from .._base import VERSION
 from .._base.arrays import checked_flag, short_repr
 from .._base.typing import BCType, Extrapolate, Method, OnFailure, SolverOptions
-from .._base.version import VERSION
 from .._core import ValidationError
 from .._curves.options import checked_extrapolate, extrapolation_mode, quantity_of
 from .._spaces import Space, space_named
