@@ -47,6 +47,16 @@ class Minima(NamedTuple):
     other_angle: float
     other_objective: float
 
+    @property
+    def excess(self) -> float:
+        """Relative difference of both objectives; infinite if there is no other minimum."""
+        return self.other_objective / self.objective - 1 if self.objective > 0 else np.inf
+
+    @property
+    def apart(self) -> float:
+        """Distance of both minima; infinite if there is no other one."""
+        return abs(float(wrap(np.asarray(self.other_angle - self.angle)))) if self.excess < np.inf else np.inf
+
 
 def wrap(angles: Floats) -> Floats:
     """Return angles in [−π, π)."""
@@ -547,7 +557,7 @@ def _minimum_of_arrays(space: Geometry, groups: Groups, kind: _Kind) -> Rows:
     for group in map(int, several):
         one = groups.of(np.arange(len(groups.counts)) == group)
         results.append(_global_minimum(space, one, kind, group if len(groups.counts) > 1 else None))
-        _assign(points, group, results[-1].point)
+        put(points, group, results[-1].point)
     descent.unfinished[several] = False
     if descent.unfinished.any():
         _raise_unfinished(kind, np.flatnonzero(descent.unfinished)[0] if len(groups.counts) > 1 else None)
@@ -561,11 +571,11 @@ def _descents(
     """Descend in every group, and return which descents met a cut locus."""
     count = len(groups.counts)
     try:
-        return kind.descend(space, groups, _copied(starts), *steps), np.zeros(count, bool)
+        return kind.descend(space, groups, _map(np.copy, starts), *steps), np.zeros(count, bool)
     except CutLocusError:
         if count == 1:
             nothing = np.zeros(1, bool)
-            return Descent(_copied(starts), np.full(1, np.inf), np.full(1, np.inf), nothing), ~nothing
+            return Descent(_map(np.copy, starts), np.full(1, np.inf), np.full(1, np.inf), nothing), ~nothing
     halves = np.arange(count) < count // 2, np.arange(count) >= count // 2
     parts = [_descents(space, groups.of(half), take(starts, half), kind, steps) for half in halves]
     points = joined([descent.points for descent, _ in parts])
@@ -609,15 +619,9 @@ def _on_torus(group: Groups, kind: _Kind) -> _Found:
     # Choose the representative nearest to the average of the given numbers.
     average = group.weights @ group.points / group.weights.sum()
     nearest = angles + 2 * np.pi * np.round((average - angles) / (2 * np.pi))
-    excess = [one.other_objective / one.objective - 1 if one.objective > 0 else np.inf for one in minima]
-    worst = int(np.argmin(excess))
-    distance = (
-        float(abs(float(wrap(np.asarray(minima[worst].other_angle - angles[worst])))))
-        if excess[worst] < np.inf
-        else np.inf
-    )
+    worst = min(minima, key=lambda one: one.excess)
     total = sum(one.objective for one in minima)
-    return _Found(nearest, distance, excess[worst], standard_error(total, group.weights))
+    return _Found(nearest, worst.apart, worst.excess, standard_error(total, group.weights))
 
 
 def _on_circle(space: Geometry, group: Groups, kind: _Kind) -> _Found:
@@ -628,12 +632,8 @@ def _on_circle(space: Geometry, group: Groups, kind: _Kind) -> _Found:
         point = group.points[np.argmin(np.abs(wrap(angles - minima.angle)))]
     else:
         point = space.exp(base, minima.angle / scale * unit)
-    distance, excess = np.inf, np.inf
-    if np.isfinite(minima.other_objective) and minima.objective > 0:
-        distance = abs(float(wrap(np.asarray(minima.other_angle - minima.angle)))) / scale
-        excess = minima.other_objective / minima.objective - 1
-    square = circular_mean(angles, group.weights).objective
-    return _Found(_near(space, group, point), distance, excess, standard_error(square, group.weights) / scale)
+    error = standard_error(circular_mean(angles, group.weights).objective, group.weights)
+    return _Found(_near(space, group, point), minima.apart / scale, minima.excess, error / scale)
 
 
 def _angles(space: Geometry, points: Array) -> tuple[Array, Array, Floats, float]:
@@ -677,7 +677,7 @@ def _from_several_starts(space: Geometry, group: Groups, kind: _Kind, number: in
         whole, failed = _descents(space, group, take(ends, np.arange(i, i + 1)), kind)
         if failed[0] or whole.unfinished[0]:
             return False
-        _assign(ends, i, take(whole.points, 0))
+        put(ends, i, take(whole.points, 0))
         objective[i] = whole.objective[0]
         return True
 
@@ -689,8 +689,8 @@ def _from_several_starts(space: Geometry, group: Groups, kind: _Kind, number: in
     best = _best(space, group, ends, objective)
     converges(best)
     point = take(ends, best)
-    far = _distances(space, point, ends)
-    square = float(np.sum(group.weights * _distances(space, point, group.points) ** 2))
+    far = space.distance(point, ends)
+    square = float(np.sum(group.weights * space.distance(point, group.points) ** 2))
     error = standard_error(square, group.weights)
     apart = np.isfinite(objective) & (far > max(error, _SAME * space.injectivity_radius))
     result = _near(space, group, point)
@@ -719,7 +719,7 @@ def _lowest(space: Geometry, ends: Rows, objective: Floats) -> list[int]:
     for i in np.argsort(objective, kind="stable"):
         if objective[i] > objective.min() * (1 + _NEARLY) or len(kept) == _FINISHED:
             break
-        others = [float(_distances(space, take(ends, i), take(ends, np.arange(k, k + 1)))[0]) for k in kept]
+        others = [float(space.distance(take(ends, i), take(ends, np.arange(k, k + 1)))[0]) for k in kept]
         if all(other > _APART * space.injectivity_radius for other in others):
             kept.append(int(i))
     return kept
@@ -742,21 +742,14 @@ def _beyond(space: Geometry, group: Groups, point: Rows) -> Rows:
         return take(group.points, np.arange(1))
 
 
-def _distances(space: Geometry, point: Rows, points: Rows) -> Floats:
-    """Return the distances of points from one point."""
-    count = len(points[0]) if isinstance(points, tuple) else len(points)
-    one = tuple(np.broadcast_to(x, (count, *x.shape)) for x in point) if isinstance(point, tuple) else point
-    return np.asarray(space.distance(one, points))
-
-
 def _best_data(space: Geometry, group: Groups, kind: _Kind) -> Rows:
     """Return all data; of many data, those with the lowest objectives, computed from a sample."""
     count = len(group.weights)
     if count <= _ALL:
-        return _copied(group.points)
+        return _map(np.copy, group.points)
     sample = np.unique(np.linspace(0, count - 1, min(count, _SAMPLE)).round().astype(np.intp))
     data, weights = take(group.points, sample), group.weights[sample]
-    objective = np.array([weights @ _distances(space, take(data, i), data) ** kind.power for i in range(len(sample))])
+    objective = np.array([weights @ space.distance(take(data, i), data) ** kind.power for i in range(len(sample))])
     return take(data, np.argsort(objective, kind="stable")[:_BEST])
 
 
@@ -777,7 +770,7 @@ def _best(space: Geometry, group: Groups, ends: Rows, objective: Floats) -> int:
     scale = space.injectivity_radius
     if len(equal) == 1 or not scale > 0:
         return int(equal[0])
-    keys = [np.round(_distances(space, take(ends, i), group.points) / (_SAME * scale)) for i in equal]
+    keys = [np.round(space.distance(take(ends, i), group.points) / (_SAME * scale)) for i in equal]
     return int(equal[np.lexsort(np.array(keys).T[::-1])[0]])
 
 
@@ -820,15 +813,3 @@ def _warn_ambiguous(kind: _Kind, numbers: NDArray[np.intp] | None, results: list
         "into clusters. If opposite points are equivalent, use `Quotient` or `RealProjective`.",
         AmbiguousMeanWarning,
     )
-
-
-def _copied(points: Rows) -> Rows:
-    return tuple(x.copy() for x in points) if isinstance(points, tuple) else points.copy()
-
-
-def _assign(points: Rows, index: int, value: Rows) -> None:
-    if isinstance(points, tuple):
-        for array, new in zip(points, value, strict=True):
-            array[index] = new
-    else:
-        points[index] = value

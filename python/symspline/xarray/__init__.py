@@ -21,7 +21,6 @@ from .._core import ValidationError
 from .._curves.options import checked_extrapolate, extrapolation_mode, quantity_of
 from .._spaces import Space, space_named
 from ._grids import resample_grid
-from ._labels import in_radians, in_units_of
 from ._smoothing import smooth
 from ._spec import (
     COLUMNS,
@@ -31,6 +30,8 @@ from ._spec import (
     bare,
     check_dims,
     fitted,
+    in_radians,
+    in_units_of,
     rehearse,
     resampled,
     spec_of,

@@ -12,8 +12,19 @@ from .._core import ValidationError
 from .._curves.options import checked_extrapolate, extrapolation_mode
 from .._grid import GridSpline
 from .._spaces import AnySpace, Array, space_named
-from ._labels import in_radians, in_units_of, times_along
-from ._spec import KNOTS, LINE, Inputs, apply, check_names, check_whole, rehearse, times_with_names
+from ._spec import (
+    KNOTS,
+    LINE,
+    Inputs,
+    apply,
+    check_names,
+    check_whole,
+    in_radians,
+    in_units_of,
+    rehearse,
+    times_along,
+    times_with_names,
+)
 
 # The influence of a node on a spline decays by 0.27 per node, to 2e-15 of its size.
 _HALO = 26

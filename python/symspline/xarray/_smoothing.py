@@ -20,18 +20,21 @@ from .._curves.options import checked_extrapolate, extrapolation_mode
 from .._smoothing import SmoothingWarning, make_smoothing_spline
 from .._smoothing.noise import is_several
 from .._spaces import AnySpace, Array, SpecialOrthogonal, space_named
-from ._labels import in_radians, named_curve, of_equal_length, times_of_rows
 from ._spec import (
     KNOTS,
     LINE,
     Inputs,
     apply,
     bare,
+    in_radians,
     knots_of_block,
+    named_curve,
+    of_equal_length,
     per_curve_times,
     rehearse,
     spec_of,
     timed_by,
+    times_of_rows,
     times_with_names,
 )
 
