@@ -457,31 +457,23 @@ def split(poses: PointsLike) -> tuple[Array, Array]:
 
 def _timed(t: ArrayLike, poses: Any) -> tuple[Array, Array]:
     """Return the times and the poses to write, without rows of NaN."""
-    if isinstance(poses, tuple) and len(poses) == 2:
-        rotations, positions = _SO3._array(poses[0], "poses"), as_array(poses[1], "poses")
-        if rotations.ndim != 3 or positions.ndim != 2 or len(rotations) != len(positions):
-            joined = checked_poses(poses)
-            return moments(t, len(joined)), joined
-        missing = _missing(rotations, 2) & _missing(positions, 1)
-        times = moments(t, len(missing))
-        return times[~missing], checked_poses((rotations[~missing], positions[~missing]))
-    array = _SE3._array(poses, "poses")
-    # The last row of a pose is constant.
-    missing = _missing(array[..., :3, :], 2) if array.ndim == 3 else np.zeros(array.shape[:1], bool)
+    array = _joined(poses)
+    missing = np.zeros(array.shape[:1], bool)
+    if array.ndim == 3 and array.dtype.kind == "f":
+        # The last row of a pose is constant.
+        missing = np.isnan(array[:, :3]).all(axis=(1, 2))
     times = moments(t, len(missing))
     return times[~missing], checked_poses(array[~missing])
 
 
-def _missing(array: Array, axes: int) -> NDArray[np.bool_]:
-    """Return which rows are NaN in all their numbers."""
-    if array.dtype.kind != "f" or array.ndim != axes + 1:
-        return np.zeros(array.shape[:1], bool)
-    return np.asarray(np.isnan(array).all(axis=tuple(range(1, axes + 1))))
+def _joined(poses: Any) -> Array:
+    """Return poses as matrices, also those that are given as rotations and positions."""
+    return join(*poses) if isinstance(poses, tuple) and len(poses) == 2 else _SE3._array(poses, "poses")
 
 
 def checked_poses(poses: Any) -> Array:
     """Poses to write, shape (n, 4, 4)."""
-    g = join(*poses) if isinstance(poses, tuple) and len(poses) == 2 else _SE3._array(poses, "poses")
+    g = _joined(poses)
     _SE3.check_point(g)
     if g.ndim != 3:
         raise ValidationError(f"a file holds poses of shape (n, 4, 4), not {g.shape}")

@@ -236,11 +236,7 @@ def _smooth_timed(
     outputs = [np.full((len(rows), *shape), np.nan, space.dtype if i == 0 else float) for i, shape in enumerate(shapes)]
     for dtype in (*(part for part in _COLUMNS.values() for _ in range(parts)), np.bool_):
         outputs.append(np.full(len(rows), np.nan if dtype is np.float64 else False, dtype))
-    for curves, kept in of_equal_length(~missing_times(times)):
-        knots, here, gone = times[curves[:, None], kept], at, None
-        if per_curve:
-            gone = missing_times(at[curves])
-            here = np.where(gone, knots[:, 0].reshape(-1, *[1] * len(own_shape)), at[curves])
+    for curves, kept, knots, here, gone in of_equal_length(~missing_times(times), times, at, per_curve):
         try:
             parts_of_curves = _smooth_rows(rows[curves[:, None], kept], knots, here, per_curve, chosen[curves], wanted)
         except SymsplineError as error:

@@ -122,13 +122,17 @@ def times_of_rows(t: Array | None, batch: tuple[int, ...], nodes: int) -> Array:
     return np.broadcast_to(t, (*batch, nodes)).reshape(-1, nodes)
 
 
-def of_equal_length(valid: Mask) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
+def of_equal_length(
+    valid: Mask, times: Array, at: Array, per_curve: bool
+) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp], Array, Array, Mask | None]]:
     """Group curves by their number of valid samples.
 
     Parameters
     ----------
-    valid : ndarray of bool, shape (curves, nodes)
-        Valid samples.
+    valid, times : ndarray, shape (curves, nodes)
+        Valid samples, and the times of all samples.
+    at : ndarray
+        Sampling times, with the curves along the first axis if `per_curve` is True.
 
     Yields
     ------
@@ -136,11 +140,22 @@ def of_equal_length(valid: Mask) -> Iterator[tuple[NDArray[np.intp], NDArray[np.
         Curves with the same number m of valid samples, at least two.
     nodes : ndarray of int, shape (k, m)
         The valid samples of each of them.
+    knots : ndarray, shape (k, m)
+        Their times.
+    at : ndarray
+        Sampling times of these curves, any ones where they are missing.
+    gone : ndarray of bool or None
+        Missing sampling times; None if all curves share them.
     """
     counts = valid.sum(axis=1)
     for count in np.unique(counts[counts > 1]):
         curves = np.flatnonzero(counts == count)
-        yield curves, np.nonzero(valid[curves])[1].reshape(len(curves), count)
+        nodes = np.nonzero(valid[curves])[1].reshape(len(curves), count)
+        knots, here, gone = times[curves[:, None], nodes], at, None
+        if per_curve:
+            gone = missing_times(at[curves])
+            here = np.where(gone, knots[:, 0].reshape(-1, *[1] * (at.ndim - 1)), at[curves])
+        yield curves, nodes, knots, here, gone
 
 
 def fit_valid(
@@ -543,12 +558,9 @@ def _values_of_valid(
     times = times_of_rows(t, batch, nodes)
     at = np.broadcast_to(x, (*batch, *own_shape)).reshape(len(rows), *own_shape) if per_curve else x
     values = np.full((len(rows), *own_shape, *shape), np.nan, space.dtype if shape else float)
-    for curves, kept in of_equal_length(space._where_finite(rates) & ~missing_times(times)):
-        chosen, knots = (curves[:, None], kept), times[curves[:, None], kept]
-        here, gone = at, None
-        if per_curve:
-            gone = missing_times(at[curves])
-            here = np.where(gone, knots[:, 0].reshape(-1, *[1] * len(own_shape)), at[curves])
+    valid = space._where_finite(rates) & ~missing_times(times)
+    for curves, kept, knots, here, gone in of_equal_length(valid, times, at, per_curve):
+        chosen = curves[:, None], kept
         try:
             part = values_at(rows[chosen], rates[chosen], here, t=knots, x_axes=len(own_shape), **options)
         except ValidationError as error:
