@@ -70,7 +70,7 @@ class Preserving(Space[P]):
         signs[list(self._negative)] = -1.0
         return signs
 
-    def _reflected(self, p: Array, x: Array) -> Array:
+    def _reflected(self, p: Array, x: Array) -> Any:
         # 2P − 1 with the projection P = p (p*Jp)⁻¹ p*J onto p; p*Jp is 1, −1 or the unit matrix.
         if len(self.point_shape) == 1:
             dual = p.conj() * self._signs()
@@ -88,7 +88,7 @@ class Preserving(Space[P]):
         preserves(self, g, np.diag(self._signs()), tol, remedy)
         return g
 
-    def _moved(self, g: Array, x: Array) -> Array:
+    def _moved(self, g: Array, x: Array) -> Any:
         return (g @ x[..., None])[..., 0] if len(self.point_shape) == 1 else g @ x
 
 
@@ -98,7 +98,7 @@ class Congruent(Space[P]):
     def __init__(self, n: int) -> None:
         super().__init__(n)
 
-    def _reflected(self, p: Array, x: Array) -> Array:
+    def _reflected(self, p: Array, x: Array) -> Any:
         # p x⁻¹ p by Cholesky factors, which remains accurate for matrices with entries of very different size.
         y = np.linalg.solve(np.linalg.cholesky(x), p)
         return adjoint(y) @ y
@@ -113,7 +113,7 @@ class Congruent(Space[P]):
     def _require_subgroup(self, g: Array, tol: float) -> None:
         """Raise ValidationError unless g is in the group. GL(n) requires no more than an invertible matrix."""
 
-    def _moved(self, g: Array, x: Array) -> Array:
+    def _moved(self, g: Array, x: Array) -> Any:
         return g @ x @ adjoint(g)
 
 
@@ -129,7 +129,7 @@ class Group(Space[P]):
     def _inverse_times(self, x: Array, y: Array) -> Any:
         return adjoint(x) @ y if self._unitary else np.linalg.solve(x, y)
 
-    def _reflected(self, p: Array, x: Array) -> Array:
+    def _reflected(self, p: Array, x: Array) -> Any:
         return p @ self._inverse_times(x, p)
 
     def _element(self, g: Any) -> Any:
@@ -148,7 +148,7 @@ class Group(Space[P]):
         a, b = (self._numbers(self._doubles(element, f"g[{i}]")) for i, element in enumerate(g))
         return a, b
 
-    def _moved(self, g: tuple[Array, Array], x: Array) -> Array:
+    def _moved(self, g: tuple[Array, Array], x: Array) -> Any:
         a, b = g
         # x b⁻¹ = (b⁻* x*)*.
         return a @ (x @ adjoint(b) if self._unitary else adjoint(np.linalg.solve(adjoint(b), adjoint(x))))

@@ -115,7 +115,7 @@ class LogEuclidean(_PositiveDefinite[FloatArray]):
     _name = "logspd"
     _is_affine_invariant = False
 
-    def _reflected(self, p: Array, x: Array) -> Array:
+    def _reflected(self, p: Array, x: Array) -> Any:
         return _function(np.exp, 2 * _function(np.log, p) - _function(np.log, x))
 
     def _require_subgroup(self, g: Array, tol: float) -> None:
