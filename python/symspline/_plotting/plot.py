@@ -365,7 +365,7 @@ def checked_look(
     return look
 
 
-def _checked_color(color: Any, name: str) -> ColorType:
+def _checked_color(color: Any, name: str) -> Any:
     """Return a colour in any form that matplotlib accepts."""
     try:
         valid = is_color_like(color)

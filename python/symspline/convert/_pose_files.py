@@ -458,10 +458,10 @@ def split(poses: PointsLike) -> tuple[Array, Array]:
 def _timed(t: ArrayLike, poses: Any) -> tuple[Array, Array]:
     """Return the times and the poses to write, without rows of NaN."""
     array = _joined(poses)
-    missing = np.zeros(array.shape[:1], bool)
+    missing: NDArray[np.bool_] = np.zeros(array.shape[:1], bool)
     if array.ndim == 3 and array.dtype.kind == "f":
         # The last row of a pose is constant.
-        missing = np.isnan(array[:, :3]).all(axis=(1, 2))
+        missing = np.asarray(np.isnan(array[:, :3]).all(axis=(1, 2)))
     times = moments(t, len(missing))
     return times[~missing], checked_poses(array[~missing])
 
