@@ -64,7 +64,7 @@ def layer(name):
 
 
 def test_the_graph_is_that_of_the_package():
-    assert {"_base.rounding", "_curves.reduced", "_base.arrays"} <= GRAPH["_curves.curve"] | GRAPH["_spaces.base"]
+    assert {"_curves.reduced", "_base.arrays"} <= GRAPH["_curves.curve"] | GRAPH["_spaces.base"]
     # An import inside a function.
     assert "_plotting" in GRAPH["_splines.base"]
 

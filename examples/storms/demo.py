@@ -20,7 +20,7 @@ from hurdat import Storm, read_sample
 from tracks import GLOBE, Positions, Summary, comparison, fit_tracks, hourly, summary
 
 from symspline import CubicSpline
-from symspline._base.disk import replacing
+from symspline._base.system import replacing
 
 _GAP = np.timedelta64(1, "h")
 """Extra fixes closer to another fix are left out. Rounding to 0.1 degree makes an error of 11.1/√12 =

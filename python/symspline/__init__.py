@@ -18,63 +18,32 @@ from . import _cpu
 
 _cpu.load(_Path(__file__).parent)
 
-from . import convert, geo, manifolds, measure, poses, quantum, rotations, shapes, subspaces, tensors, testing
+from . import (
+    _smoothing,
+    _spaces,
+    convert,
+    geo,
+    manifolds,
+    measure,
+    poses,
+    quantum,
+    rotations,
+    shapes,
+    subspaces,
+    tensors,
+    testing,
+)
+from ._base import VERSION
 from ._base.exceptions import SymsplineError
 from ._base.report import ConvergenceWarning, CumulativeReport, FarPointsWarning, Report
 from ._base.system import set_num_threads, show_config
-from ._base.version import VERSION
 from ._core import ConvergenceError, CutLocusError, ValidationError, num_threads
 from ._curves.derivatives import Gradient
 from ._estimation import estimate
 from ._grid import GridReport, GridSpline
-from ._smoothing import (
-    SmoothingGrid,
-    SmoothingGridReport,
-    SmoothingReport,
-    SmoothingSpline,
-    SmoothingWarning,
-    make_lsq_spline,
-    make_smoothing_grid,
-    make_smoothing_spline,
-)
+from ._smoothing import *  # noqa: F403
 from ._smoothing.segments import fit_segments
-from ._spaces import (
-    Affine,
-    AmbiguousMeanWarning,
-    AntiDeSitter,
-    ComplexGeneralLinear,
-    ComplexGrassmannian,
-    ComplexHyperbolic,
-    ComplexProjective,
-    DeSitter,
-    Euclidean,
-    GeneralLinear,
-    Grassmannian,
-    HermitianPositiveDefinite,
-    Hyperbolic,
-    IndefiniteGrassmannian,
-    LogEuclidean,
-    Lorentz,
-    Orthogonal,
-    Product,
-    QuaternionicProjective,
-    Quotient,
-    RealProjective,
-    Siegel,
-    Similarity,
-    Space,
-    SpecialEuclidean,
-    SpecialLinear,
-    SpecialOrthogonal,
-    SpecialPositiveDefinite,
-    SpecialUnitary,
-    Sphere,
-    SymmetricPositiveDefinite,
-    Symplectic,
-    Torus,
-    Unitary,
-    space,
-)
+from ._spaces import *  # noqa: F403
 from ._splines.base import Curve, Derivative
 from ._splines.bsplines import BezierCurve, BSpline, CumulativeBSpline
 from ._splines.compare import plot
@@ -89,15 +58,8 @@ from .manifolds import Manifold, Stiefel
 
 __version__ = VERSION
 __all__ = [
-    "Affine",
-    "AmbiguousMeanWarning",
-    "AntiDeSitter",
     "BSpline",
     "BezierCurve",
-    "ComplexGeneralLinear",
-    "ComplexGrassmannian",
-    "ComplexHyperbolic",
-    "ComplexProjective",
     "ConvergenceError",
     "ConvergenceWarning",
     "CubicSpline",
@@ -105,53 +67,21 @@ __all__ = [
     "CumulativeReport",
     "Curve",
     "CutLocusError",
-    "DeSitter",
     "Derivative",
-    "Euclidean",
     "FarPointsWarning",
-    "GeneralLinear",
     "Gradient",
-    "Grassmannian",
     "GridReport",
     "GridSpline",
     "HermiteSpline",
-    "HermitianPositiveDefinite",
-    "Hyperbolic",
-    "IndefiniteGrassmannian",
-    "LogEuclidean",
-    "Lorentz",
     "Manifold",
-    "Orthogonal",
     "PiecewiseGeodesic",
-    "Product",
-    "QuaternionicProjective",
-    "Quotient",
-    "RealProjective",
     "Report",
     "RetimedCurve",
     "SegmentedCurve",
-    "Siegel",
-    "Similarity",
-    "SmoothingGrid",
-    "SmoothingGridReport",
-    "SmoothingReport",
-    "SmoothingSpline",
-    "SmoothingWarning",
-    "Space",
-    "SpecialEuclidean",
-    "SpecialLinear",
-    "SpecialOrthogonal",
-    "SpecialPositiveDefinite",
-    "SpecialUnitary",
-    "Sphere",
     "Stiefel",
-    "SymmetricPositiveDefinite",
-    "Symplectic",
     "SymsplineError",
     "TangentPCA",
     "TimeLaw",
-    "Torus",
-    "Unitary",
     "ValidationError",
     "convert",
     "estimate",
@@ -161,9 +91,6 @@ __all__ = [
     "fit_segments",
     "geo",
     "load",
-    "make_lsq_spline",
-    "make_smoothing_grid",
-    "make_smoothing_spline",
     "manifolds",
     "measure",
     "num_threads",
@@ -175,13 +102,14 @@ __all__ = [
     "set_num_threads",
     "shapes",
     "show_config",
-    "space",
     "subspaces",
     "tangent_pca",
     "tensors",
     "testing",
     "time_law",
 ]
+__all__ += _smoothing.__all__
+__all__ += _spaces.__all__
 
 if _threads := _os.environ.get("SYMSPLINE_NUM_THREADS"):
     if not (_threads.isascii() and _threads.isdecimal()) or len(_threads) > 9:

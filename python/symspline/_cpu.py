@@ -7,8 +7,8 @@ architecture, have ``_core`` only; in a checkout it is built for the processor o
 
 import ctypes
 import os
-import platform
 import sys
+from importlib import import_module
 from importlib.machinery import EXTENSION_SUFFIXES, ExtensionFileLoader
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
@@ -16,13 +16,8 @@ from pathlib import Path
 LEVELS = {"plain": "any processor", "v3": "x86-64-v3", "v4": "x86-64-v4"}
 """What ``SYMSPLINE_CPU`` may be, and the processors for which such a module is built; slowest first."""
 _INSTRUCTIONS = {"v3": "AVX2 and FMA", "v4": "AVX-512"}
-_V3 = {"avx2", "fma", "bmi1", "bmi2", "f16c", "movbe"}
-_FLAGS = {"v3": _V3, "v4": _V3 | {"avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl"}}
-"""Flags of Linux."""
-_SYSCTL = {"v3": (b"hw.optional.avx2_0", b"hw.optional.fma"), "v4": (b"hw.optional.avx512f", b"hw.optional.avx512vl")}
-"""Names of macOS."""
-_FEATURES = {"v3": 40, "v4": 41}
-"""PF_AVX2_INSTRUCTIONS_AVAILABLE and PF_AVX512F_INSTRUCTIONS_AVAILABLE of Windows."""
+# Features that NumPy reports, by its names for groups of them and for single ones.
+_FEATURES = {"v3": ("X86_V3", "AVX2"), "v4": ("X86_V4", "AVX512_SKX")}
 
 # What `load` did, for `show_config`.
 reason = ""
@@ -40,31 +35,13 @@ def built_for(file: Path) -> str:
 
 
 def _has(level: str) -> bool:
-    """Whether the operating system reports that the processor has a level; True if it is unknown."""
-    if platform.machine().lower() not in ("x86_64", "amd64"):
-        return True
+    """Whether NumPy finds that the processor has a level; True if it does not report that."""
     try:
-        if sys.platform == "linux":
-            with open("/proc/cpuinfo", encoding="ascii", errors="replace") as file:
-                flags = next((line for line in file if line.startswith("flags")), "")
-            return not flags or set(flags.split()) >= _FLAGS[level]
-        if sys.platform == "darwin":
-            return all(_sysctl(name) != 0 for name in _SYSCTL[level])
-        if sys.platform == "win32":
-            return bool(ctypes.windll.kernel32.IsProcessorFeaturePresent(_FEATURES[level]))
-    except OSError:
-        pass
-    return True
-
-
-def _sysctl(name: bytes) -> int | None:
-    """A number that macOS reports for the processor; None if it does not report this one."""
-    value, size = ctypes.c_int(0), ctypes.c_size_t(ctypes.sizeof(ctypes.c_int))
-    # man 3 sysctl; the C library is part of every process.
-    ask = ctypes.CDLL(None).sysctlbyname
-    if ask(name, ctypes.byref(value), ctypes.byref(size), None, ctypes.c_size_t(0)) != 0:
-        return None
-    return value.value
+        features = import_module("numpy._core._multiarray_umath").__cpu_features__
+    except ImportError:
+        return True
+    known = [features[name] for name in _FEATURES[level] if name in features]
+    return not known or any(known)
 
 
 def _level(plain: Path) -> str:
@@ -86,7 +63,7 @@ def _find(folder: Path, level: str) -> Path | None:
 def check(folder: Path) -> None:
     """Raise ImportError if the compiled module in ``folder`` needs what the processor lacks."""
     file = _find(folder, "plain")
-    level = "plain" if not file or all(map(_has, _FLAGS)) else built_for(file)
+    level = "plain" if not file or all(map(_has, _FEATURES)) else built_for(file)
     if level != "plain" and not _has(level):
         raise ImportError(
             f"symspline was built for processors with {_INSTRUCTIONS[level]} ({LEVELS[level]}), which this one lacks. "
@@ -112,8 +89,8 @@ def _choose(folder: Path) -> tuple[Path | None, str]:
         return None, "the only one here"
     if asked == "plain":
         return None, "SYMSPLINE_CPU=plain"
-    own, levels = _level(plain), list(LEVELS)
-    runs = [level for level in modules if levels.index(level) <= levels.index(own)]
+    best, levels = _level(plain), list(LEVELS)
+    runs = [level for level in modules if levels.index(level) <= levels.index(best)]
     if asked and asked not in modules:
         raise ImportError(f"SYMSPLINE_CPU={asked} cannot be done: there is no compiled module for {LEVELS[asked]} here")
     if asked and asked not in runs:
@@ -123,7 +100,7 @@ def _choose(folder: Path) -> tuple[Path | None, str]:
     level = asked or runs[-1]
     if level == "plain":
         return None, "the processor lacks x86-64-v3"
-    return modules[level], f"SYMSPLINE_CPU={level}" if asked else f"the processor has {LEVELS[own]}"
+    return modules[level], f"SYMSPLINE_CPU={level}" if asked else f"the processor has {LEVELS[best]}"
 
 
 def load(folder: Path) -> None:

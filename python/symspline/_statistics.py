@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from ._base.arrays import as_array, same_fields, whole_number
 from ._base.typing import AnyArray, FloatArray, P
 from ._core import ValidationError
-from ._spaces import Product, Space, parts_of, require_metric, space_named
+from ._spaces import AnySpace, Product, Space, parts_of, require_metric, space_named
 
 # Variances below this fraction of the largest one are rounding errors.
 _LEAST = 1e-13
@@ -98,7 +98,10 @@ class TangentPCA(Generic[P]):
                 f"not of shape {given.shape} and type {given.dtype}."
             )
         given = given.astype(np.float64)
-        vectors = [np.tensordot(given, own[: given.shape[-1]], 1) for own in parts_of(self.components, self.space, "")]
+        vectors = [
+            np.tensordot(given, component[: given.shape[-1]], 1)
+            for component in parts_of(self.components, self.space, "")
+        ]
         moved: P = self.space.exp(self.mean, _joined(vectors))
         return moved
 
@@ -164,8 +167,8 @@ def tangent_pca(points: Any, space: Space[P] | str, *, n_components: int | None 
     require_metric(space, "tangent PCA")
     given = parts_of(points, space, "points")
     factors = getattr(space, "factors", (space,))
-    arrays = [own._numbers(own._doubles(x, "points")) for own, x in zip(factors, given, strict=True)]
-    leads = [x.shape[: x.ndim - len(own.point_shape)] for own, x in zip(factors, arrays, strict=True)]
+    arrays = [part._numbers(part._doubles(x, "points")) for part, x in zip(factors, given, strict=True)]
+    leads = [x.shape[: x.ndim - len(part.point_shape)] for part, x in zip(factors, arrays, strict=True)]
     if any(lead != leads[0] for lead in leads) or len(leads[0]) < 1 or leads[0][0] < 2:
         raise ValidationError(
             f"points has the leading axes {leads[0] if len(leads) == 1 else leads}, but at least two samples are "
@@ -185,28 +188,28 @@ def tangent_pca(points: Any, space: Space[P] | str, *, n_components: int | None 
         raise ValidationError(f"n_components is {wanted}, but the samples have only {rank} components.")
     kept = rank if wanted is None else wanted
     total = float(np.trace(gram))
-    mixed = [np.tensordot((u[:, :kept] / np.sqrt(values[:kept])).T, own, 1) for own in vectors]
+    mixed = [np.tensordot((u[:, :kept] / np.sqrt(values[:kept])).T, part, 1) for part in vectors]
     # Eigenvectors of small variance are orthonormal after a second step only (Cholesky QR, twice).
     factor = np.linalg.cholesky(_gram(flat, at, mixed, mixed))
     components = [
-        np.linalg.solve(factor, own.reshape(kept, math.prod(own.shape[1:]))).reshape(own.shape) for own in mixed
+        np.linalg.solve(factor, part.reshape(kept, math.prod(part.shape[1:]))).reshape(part.shape) for part in mixed
     ]
     scores = _gram(flat, at, vectors, components)
     variance = np.sum(scores**2, axis=0) / (count - 1)
     ratio = variance * (count - 1) / total if total > 0 else variance
-    moved = [own(x) for own, x in zip(back, components, strict=True)]
+    moved = [part(x) for part, x in zip(back, components, strict=True)]
     return TangentPCA(space, mean, _joined(moved), variance, ratio, scores)
 
 
-def _well_conditioned(space: Space[Any], mean: Any, arrays: list[Any]) -> tuple[Any, Space[Any], list[Any], list[Any]]:
+def _well_conditioned(space: AnySpace, mean: Any, arrays: list[Any]) -> tuple[Any, AnySpace, list[Any], list[Any]]:
     """Move points by isometries so that rounding errors do not depend on the units of positive definite matrices.
 
     Returns the moved mean, the space of the moved points, these points by factor, and the maps of tangent vectors back.
     """
     means, spaces, moved, back = [], [], [], []
-    for own, at, x in zip(getattr(space, "factors", (space,)), parts_of(mean, space, "mean"), arrays, strict=True):
-        whitening = own._whitening_at(at)
-        spaces.append(own if whitening is None else whitening.space)
+    for factor, at, x in zip(getattr(space, "factors", (space,)), parts_of(mean, space, "mean"), arrays, strict=True):
+        whitening = factor._whitening_at(at)
+        spaces.append(factor if whitening is None else whitening.space)
         means.append(at if whitening is None else whitening.forward(at))
         moved.append(x if whitening is None else whitening.forward(x))
         back.append(np.asarray if whitening is None else whitening.back)
@@ -225,7 +228,7 @@ def _joined(parts: list[Any]) -> Any:
     return parts[0] if len(parts) == 1 else tuple(parts)
 
 
-def _gram(space: Space[Any], mean: Any, u: list[Any], v: list[Any]) -> FloatArray:
+def _gram(space: AnySpace, mean: Any, u: list[Any], v: list[Any]) -> FloatArray:
     """Return the inner products of samples of tangent vectors, the means over all axes."""
     if not len(u[0]) or not len(v[0]):
         return np.zeros((len(u[0]), len(v[0])))

@@ -240,8 +240,8 @@ def cog(
 
 def _standard_errors(spline: Any, x: TimesLike, jacobians: Any) -> FloatArray:
     errors = standard_errors(check_uncertain(spline), x, [0], jacobians, spline._where(None))
-    found: FloatArray = errors[..., 0][()]
-    return found
+    std: FloatArray = errors[..., 0][()]
+    return std
 
 
 def _directions(v: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -254,21 +254,21 @@ def _directions(v: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 def _speeds(motions: list[Motion]) -> Jacobians:
     """Return the derivatives of the speed on the unit sphere."""
-    (own,) = motions
-    _, ahead = _directions(own.v)
-    return [{}, {0: np.einsum("ni,nji->nj", ahead, own.frames)[:, None]}]
+    (motion,) = motions
+    _, ahead = _directions(motion.v)
+    return [{}, {0: np.einsum("ni,nji->nj", ahead, motion.frames)[:, None]}]
 
 
 def _courses(motions: list[Motion]) -> Jacobians:
     """Return the derivatives of the course in radians."""
-    (own,) = motions
-    speed, ahead = _directions(own.v)
-    right = np.cross(ahead, own.p) / speed
-    east, north = compass(own.p)
+    (motion,) = motions
+    speed, ahead = _directions(motion.v)
+    right = np.cross(ahead, motion.p) / speed
+    east, north = compass(motion.p)
     # The last component of north is the cosine of the latitude. At a pole the course has no derivative.
     cosine = np.where(north[:, 2:] > 0, north[:, 2:], np.nan)
-    convergence = own.p[:, 2:] / cosine * east
-    return [{0: np.einsum("ni,nji->nj", side, own.frames)[:, None]} for side in (convergence, right)]
+    convergence = motion.p[:, 2:] / cosine * east
+    return [{0: np.einsum("ni,nji->nj", side, motion.frames)[:, None]} for side in (convergence, right)]
 
 
 def resample(
@@ -434,15 +434,15 @@ def resample(
             interpolated = table.angles if column in angles else table.linear
             rates[column] = interpolated(column, owner, x.to_numpy())
         parts.append(rates)
-    found = pd.concat(parts, ignore_index=True)
+    result = pd.concat(parts, ignore_index=True)
     tracks = np.repeat(owners, [len(part) for part in parts])
     _warn_of_missing(table, set(owners), set(tracks.tolist()), every, min_points)
     if table.zone is not None:
-        found[table.name] = found[table.name].dt.tz_localize("UTC").dt.tz_convert(table.zone)
+        result[table.name] = result[table.name].dt.tz_localize("UTC").dt.tz_convert(table.zone)
     constant = table.constant([*own_names, *computed, *more])
     for column in (*table.keys, *constant):
-        found[column] = table.first_values(column, tracks)
-    return found[[*own_names, *computed, *constant, *more]]
+        result[column] = table.first_values(column, tracks)
+    return result[[*own_names, *computed, *constant, *more]]
 
 
 def _warn_of_merged(table: _Tracks, named: bool) -> None:
@@ -592,8 +592,8 @@ def plot(
             if not isinstance(track, tuple):
                 _check_globe(track)
         several = checked_look(file, ax, None, None, title, figsize, show)
-        found: Figure | Axes = compare(tracks, names, file, colors=color, ax=ax, show=show, radius=size, **several)
-        return found
+        compared: Figure | Axes = compare(tracks, names, file, colors=color, ax=ax, show=show, radius=size, **several)
+        return compared
     _check_globe(cast(Any, spline))
     look = checked_look(file, ax, color, label, title, figsize, show)
     drawn: Figure | Axes = draw(spline, file, ax=ax, show=show, radius=size, **look)
@@ -629,24 +629,24 @@ def _fitted(curves: list[tuple[Any, Any]], names: list[str], smooth: bool, optio
     if not curves:
         return []
 
-    def renamed(found: Any) -> str:
-        curve = getattr(found, "curve", None)
-        return str(found).replace(f"curve {curve[0]}", names[curve[0]]) if curve else str(found)
+    def renamed(note: Any) -> str:
+        curve = getattr(note, "curve", None)
+        return str(note).replace(f"curve {curve[0]}", names[curve[0]]) if curve else str(note)
 
     caught: list[warnings.WarningMessage] = []
     try:
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             if smooth:
-                found: Any = smooth_many([(*curve, {}) for curve in curves], Sphere(2), **options)
+                splines: Any = smooth_many([(*curve, {}) for curve in curves], Sphere(2), **options)
             else:
-                found = fit_many(curves, Sphere(2), **options)
+                splines = fit_many(curves, Sphere(2), **options)
     except SymsplineError as error:
         raise error._with_message(renamed(error)) from None
     for warning in caught:
         note = warning.message
         warn(renamed(note), warning.category, getattr(note, "curve", None), getattr(note, "node", None))
-    return found
+    return splines
 
 
 def _check_globe(spline: CubicSpline[Any, Any] | SegmentedCurve[Any, Any]) -> None:
@@ -725,15 +725,15 @@ class _Tracks(NamedTuple):
         codes = np.empty(len(self.frame), np.intp)
         for track, rows in enumerate(self.rows):
             codes[rows] = track
-        found = []
+        names = []
         for column in self.frame.columns:
             # Values such as lists cannot be compared.
             try:
                 if column not in left_out and (self.frame[column].groupby(codes).nunique() < 2).all():
-                    found.append(column)
+                    names.append(column)
             except TypeError:
                 continue
-        return found
+        return names
 
     def first_values(self, column: Any, tracks: NDArray[np.intp]) -> pd.Series:
         """Return the first value of a column that is not missing, for each of these tracks."""
@@ -766,10 +766,10 @@ class _Tracks(NamedTuple):
         """Interpolate angles in degrees along the shorter arc, in [0, 360), or in (-180, 180] if one is negative."""
         rows = self.rows[track]
         values = self.frame[column].to_numpy(np.float64, na_value=np.nan)
-        own = values[rows]
-        own[~np.isnan(own)] = np.unwrap(own[~np.isnan(own)], period=360.0)
-        found = self._interpolated(own, rows, x) % 360
-        return np.where(found > 180, found - 360, found) if np.nanmin(values, initial=0.0) < 0 else found
+        numbers = values[rows]
+        numbers[~np.isnan(numbers)] = np.unwrap(numbers[~np.isnan(numbers)], period=360.0)
+        degrees = self._interpolated(numbers, rows, x) % 360
+        return np.where(degrees > 180, degrees - 360, degrees) if np.nanmin(values, initial=0.0) < 0 else degrees
 
     def linear(self, column: Any, track: int, x: NDArray[np.datetime64]) -> NDArray[np.float64]:
         """Interpolate a column linearly in time. Values at equal times are averaged, and missing ones are omitted."""
@@ -784,7 +784,7 @@ class _Tracks(NamedTuple):
             return np.full(len(x), np.nan)
         times, inverse = np.unique(self.times[rows], return_inverse=True)
         means = np.bincount(inverse, values) / np.bincount(inverse)
-        at, known = ((own - times[0]) / np.timedelta64(1, "s") for own in (x, times))
+        at, known = ((moments - times[0]) / np.timedelta64(1, "s") for moments in (x, times))
         return np.asarray(np.interp(at, known, means, left=np.nan, right=np.nan))
 
 
@@ -815,8 +815,12 @@ def _read_tracks(
                 f"interpolate has the column {name!r}, but only columns of numbers other than times, positions and "
                 "names of tracks can be interpolated"
             )
-    if time is None and not dated and (found := [own for own in frame.columns if _may_be_times(own, frame[own])]):
-        raise ValidationError(f"the index of frame holds no dates. Pass the column of the times: time={found[0]!r}.")
+    if (
+        time is None
+        and not dated
+        and (likely := [column for column in frame.columns if _may_be_times(column, frame[column])])
+    ):
+        raise ValidationError(f"the index of frame holds no dates. Pass the column of the times: time={likely[0]!r}.")
     if time is None and not dated:
         raise ValidationError(
             f"the index of frame holds no dates, but {frame.index.dtype}. Pass time= with the name of the column "

@@ -24,9 +24,8 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._base.arrays import as_array, checked_flag, short_repr
+from ._base.arrays import as_array, checked_flag, one_of, real_numbers, short_repr
 from ._base.typing import Extrapolate, Frame, TimesLike
-from ._base.validation import one_of, real_numbers
 from ._core import ValidationError
 from ._curves.composed import AnyCurve, evaluated
 from ._estimation.measurements import GRAVITY
@@ -208,17 +207,17 @@ def imu(
         raise ValidationError(f"gravity must be three numbers, a vector in the world, not {short_repr(gravity)}")
     check_seconds(np.asarray(spline.domain), "t")
     motion = _Motion(spline, x, "body", extrapolate, per_curve)
-    found = Imu(motion.turning, motion.in_frame(motion.position("acceleration") - g))
+    signals = Imu(motion.turning, motion.in_frame(motion.position("acceleration") - g))
     if not checked_flag(return_std, "return_std"):
-        return found
-    own = check_uncertain(spline)
-    spaces = smoothed_spaces(own.space)
+        return signals
+    curve = check_uncertain(spline)
+    spaces = smoothed_spaces(curve.space)
     parts = [spaces.index(_SO3), spaces.index(_R3)]
-    force = found.specific_force.reshape(-1, 3)
+    force = signals.specific_force.reshape(-1, 3)
 
     def jacobians(motions: list[Motion]) -> Jacobians:
         turning, moving = motions
-        moved, changed = (each[parts[0]] for each in rate_jacobians(turning, parts[0], "body"))
+        moved, changed = (by_part[parts[0]] for by_part in rate_jacobians(turning, parts[0], "body"))
         none = np.zeros_like(moved)
         tilted = np.cross(force[:, None], np.swapaxes(changed, -1, -2))
         accelerated = np.swapaxes(moving.frames @ turning.p, -1, -2)
@@ -228,8 +227,8 @@ def imu(
             {parts[1]: np.concatenate([np.zeros_like(accelerated), accelerated], axis=1)},
         ]
 
-    std = standard_errors(own, x, parts, jacobians, own._where(extrapolate), per_curve)
-    return found, Imu(std[..., :3], std[..., 3:])
+    std = standard_errors(curve, x, parts, jacobians, curve._where(extrapolate), per_curve)
+    return signals, Imu(std[..., :3], std[..., 3:])
 
 
 def twist(
@@ -397,8 +396,8 @@ def transform(
             "transform returns a SciPy RigidTransform; install SciPy 1.16 or newer with: pip install 'scipy>=1.16'"
         ) from None
     motion = _Motion(spline, x, "world", extrapolate, per_curve)
-    found: RigidTransform = RigidTransform.from_components(motion.position("point"), rotation_of(motion.rotation))
-    return found
+    motions: RigidTransform = RigidTransform.from_components(motion.position("point"), rotation_of(motion.rotation))
+    return motions
 
 
 def linear_velocity(
@@ -486,13 +485,13 @@ class _Motion:
         self._in_body = one_of(frame, "frame", "body", "world") == "body"
         self._attitude = attitude(spline)
         parts: Any = spline._curve.parts
-        found = [part for part in parts if cover_of(part.space) in (_SE3, _R3)]
-        if len(found) != 1:
+        moving = [part for part in parts if cover_of(part.space) in (_SE3, _R3)]
+        if len(moving) != 1:
             raise ValidationError(
                 f"the curve must be on se:3, or on a product with one so:3 and one r:3, not on {spline.space}"
             )
-        self._position = found[0]
-        self._is_se3 = cover_of(found[0].space) == _SE3
+        self._position = moving[0]
+        self._is_se3 = cover_of(moving[0].space) == _SE3
         self._time_axis, self._x = spline._time_axis, x
         self._where, self._per_curve = spline._where(extrapolate), per_curve
 

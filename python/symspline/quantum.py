@@ -24,19 +24,22 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._base.arrays import adjoint, as_array, refuse, short_repr
-from ._base.input import times_of
-from ._base.time import onto_ends
-from ._base.typing import Extrapolate, Number, TimesLike
-from ._base.validation import (
+from ._base.arrays import (
     Array,
+    adjoint,
+    as_array,
     check_symmetric,
     largest,
     numbers,
     one_of,
+    refuse,
+    short_repr,
     square_matrices,
     unit_vectors,
 )
+from ._base.input import times_of
+from ._base.time import onto_ends
+from ._base.typing import Extrapolate, Number, TimesLike
 from ._core import ValidationError
 from ._curves.curve import CurveArrays, in_span
 from ._curves.options import order_of
@@ -316,8 +319,8 @@ def _coefficients(h: Array, basis: Array) -> Array:
     flat = h.reshape(-1, *h.shape[-2:])
     columns = _as_columns(basis)
     wanted = _as_columns(flat)
-    found = np.linalg.lstsq(columns, wanted, rcond=None)[0]
-    left = (wanted - columns @ found).T.copy().view(complex).reshape(h.shape)
+    solution = np.linalg.lstsq(columns, wanted, rcond=None)[0]
+    left = (wanted - columns @ solution).T.copy().view(complex).reshape(h.shape)
     size, most = np.sqrt(np.sum(np.abs(left) ** 2, axis=(-2, -1))), np.abs(left)
     # Spectral norms of pulses are speeds, so the remainder is compared with the largest norm of all pulses.
     allowed = 1e-9 * max(float(np.linalg.norm(flat, axis=(-2, -1)).max(initial=0)), np.finfo(float).tiny)
@@ -330,7 +333,7 @@ def _coefficients(h: Array, basis: Array) -> Array:
         )
 
     refuse(~(size <= allowed), "pulse", say)
-    return found.T.reshape(*h.shape[:-2], len(basis))
+    return solution.T.reshape(*h.shape[:-2], len(basis))
 
 
 # ---- propagators ----
@@ -388,7 +391,7 @@ def propagator(spline: CubicSpline[Any, Any], x: TimesLike) -> Array:
     edges = _edges(curve).reshape(curves, -1)
     at_edges = _products(_steps(curve, edges[:, :-1], np.diff(edges)))
     flat = np.broadcast_to(times.ravel(), (curves, times.size))
-    place = np.stack([np.searchsorted(own, times.ravel(), "right") for own in edges[:, :-1]]) - 1
+    place = np.stack([np.searchsorted(edge, times.ravel(), "right") for edge in edges[:, :-1]]) - 1
     start = np.take_along_axis(edges, place, axis=1)
     result = _steps(curve, start, flat - start) @ np.take_along_axis(at_edges, place[..., None, None], axis=1)
     result = _unitary(result)

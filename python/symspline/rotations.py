@@ -22,12 +22,23 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._base.arrays import as_array, checked_flag, filled, refuse, short_repr
+from ._base.arrays import (
+    REMOVE,
+    as_array,
+    check_finite,
+    checked_flag,
+    filled,
+    length,
+    one_of,
+    real_numbers,
+    refuse,
+    short_repr,
+    unchecked_numbers,
+)
 from ._base.faults import warn
 from ._base.input import times_of
 from ._base.time import knots_of
 from ._base.typing import Extrapolate, Frame, RateInterpolation, RotationOrder, TimesLike
-from ._base.validation import REMOVE, check_finite, length, one_of, real_numbers, unchecked_numbers
 from ._core import ValidationError
 from ._curves.composed import Joined, Retimed, evaluated
 from ._curves.controlled import CumulativeCurve
@@ -38,7 +49,7 @@ from ._estimation.rates import integrated
 from ._estimation.uncertainty import Jacobians, Motion, check_uncertain, standard_errors
 from ._smoothing.noise import smoothed_spaces
 from ._spaces import Array, Doubles, SpecialEuclidean, SpecialOrthogonal, Sphere, cover_of
-from ._spaces.point_groups import elements, proper_symbol
+from ._spaces.finite_groups import elements, proper_symbol
 from ._splines.base import check_timed
 from ._splines.bsplines import CumulativeBSpline
 from ._splines.cubic import CubicSpline
@@ -143,8 +154,8 @@ def rotation_of(matrices: Array) -> Rotation:
             "fitted, or its time is outside the knots. Use spline(x), or remove these values"
         )
     # The conversion of matrices by SciPy orthogonalises them, which takes ten times as long.
-    found: Rotation = Rotation.from_quat(matrix_to_quaternion(matrices, scalar_first=False))
-    return found
+    turns: Rotation = Rotation.from_quat(matrix_to_quaternion(matrices, scalar_first=False))
+    return turns
 
 
 @overload
@@ -245,23 +256,23 @@ def angular_velocity(
     omega = _rate(spline, x, "velocity", frame, extrapolate, per_curve)
     if not checked_flag(return_std, "return_std"):
         return omega
-    own = check_uncertain(spline)
-    part = smoothed_spaces(own.space).index(_SO3)
+    curve = check_uncertain(spline)
+    part = smoothed_spaces(curve.space).index(_SO3)
 
     def jacobians(motions: list[Motion]) -> Jacobians:
         return rate_jacobians(motions[0], part, frame)
 
-    return omega, standard_errors(own, x, [part], jacobians, own._where(extrapolate), per_curve)
+    return omega, standard_errors(curve, x, [part], jacobians, curve._where(extrapolate), per_curve)
 
 
 def rate_jacobians(motion: Motion, part: int, frame: str) -> Jacobians:
     """Return the derivatives of the angular velocity with respect to the move of a curve and its velocity."""
     omega, vectors = _vectors(motion.p, motion.v), _vectors(motion.p[:, None], motion.frames)
     # With η = Σ ξ_j B_j, and B_j' = −[ω, B_j]/2 in parallel frames, δω = η' + [ω, η] = Σ ξ_j' B_j + ξ_j [ω, B_j]/2.
-    moved, changed = (np.swapaxes(own, -1, -2) for own in (0.5 * np.cross(omega[:, None], vectors), vectors))
+    moved, changed = (np.swapaxes(array, -1, -2) for array in (0.5 * np.cross(omega[:, None], vectors), vectors))
     if frame == "world":
         # The rotation of the frame by η turns Rω by R(η × ω), which reverses the sign of the half.
-        moved, changed = (motion.p @ own for own in (-moved, changed))
+        moved, changed = (motion.p @ array for array in (-moved, changed))
     return [{part: moved}, {part: changed}]
 
 
@@ -413,13 +424,13 @@ def attitude(spline: Spline) -> Any:
         If the curve does not contain exactly one rotation.
     """
     check_motion(spline)
-    found = [part for part in spline._curve.parts if cover_of(part.space) in (_SO3, _SE3)]
-    if len(found) != 1:
+    turning = [part for part in spline._curve.parts if cover_of(part.space) in (_SO3, _SE3)]
+    if len(turning) != 1:
         raise ValidationError(
             f"the curve must be on so:3, se:3, or a product with one of them, not on {spline.space}; to convert "
             "quaternions to points of so:3, use symspline.rotations.from_quaternions"
         )
-    return _rotations_of(found[0])
+    return _rotations_of(turning[0])
 
 
 def _rotations_of(curve: Any) -> Any:
@@ -497,19 +508,19 @@ def _lift(curve: Any) -> Any:
 def _without_jumps(curve: Joined) -> Joined:
     """Return a curve on S³ with signs such that each section begins near the end of the one before."""
     sections = [curve.sections[0]]
-    for own in curve.sections[1:]:
-        times = np.asarray(sections[-1].times[-1]), np.asarray(own.times[0])
+    for section in curve.sections[1:]:
+        times = np.asarray(sections[-1].times[-1]), np.asarray(section.times[0])
         end, start = (
-            each.evaluate(x, "point", "raise", False) for each, x in zip((sections[-1], own), times, strict=True)
+            part.evaluate(x, "point", "raise", False) for part, x in zip((sections[-1], section), times, strict=True)
         )
-        sections.append(_multiplied(own, np.where(_dot(end, start) < 0, -1.0, 1.0)))
+        sections.append(_multiplied(section, np.where(_dot(end, start) < 0, -1.0, 1.0)))
     return Joined(sections, curve.offsets)
 
 
 def _multiplied(curve: Any, sign: Any) -> Any:
     """Return a curve on S³ multiplied by 1 or -1, one number per curve."""
     if isinstance(curve, (Joined, Retimed)):
-        return curve.map(lambda own: _multiplied(own, sign))
+        return curve.map(lambda section: _multiplied(section, sign))
     factor = np.asarray(sign)[..., None, None]
     return _above(curve, factor * curve.points, factor * curve.velocities)
 
@@ -530,10 +541,10 @@ def quaternion_velocity(q: Array, omega: Array) -> Array:
 def _wrapped(curve: CurveArrays, times: Doubles, per_curve: bool) -> tuple[Doubles, Doubles]:
     """Move times into the knots by whole periods, and return them with the number of periods."""
     batch = curve.batch
-    own = times.shape[len(batch) :] if per_curve else times.shape
-    times = np.broadcast_to(times, batch + own)
+    axes = times.shape[len(batch) :] if per_curve else times.shape
+    times = np.broadcast_to(times, batch + axes)
     knots = np.broadcast_to(curve.times, (*batch, curve.times.shape[-1]))
-    start, end = (knots[..., i].reshape(batch + (1,) * len(own)) for i in (0, -1))
+    start, end = (knots[..., i].reshape(batch + (1,) * len(axes)) for i in (0, -1))
     turns = np.floor((times - start) / (end - start))
     return np.clip(times - turns * (end - start), start, end), turns
 
@@ -669,19 +680,19 @@ def _integrated_present(t: Any, omega: Any, start: Any, frame: Frame, interpolat
     options: dict[str, Any] = {"frame": frame, "interpolation": interpolation}
     if present.all() or not fits:
         return integrate(t, rates, start, **options)
-    found = np.full((*present.shape, 3, 3), np.nan)
+    turned = np.full((*present.shape, 3, 3), np.nan)
     batch = present.shape[:-1]
     starts = None if start is None else np.broadcast_to(_SO3._array(start, "start"), (*batch, 3, 3))
     for i in np.ndindex(batch):
         rows = np.flatnonzero(present[i])
         if not len(rows):
             continue
-        own = rows if times is None else times[i][rows] if times.ndim > 1 else times[rows]
+        chosen = rows if times is None else times[i][rows] if times.ndim > 1 else times[rows]
         try:
-            found[i][rows] = integrate(own, rates[i][rows], None if starts is None else starts[i], **options)
+            turned[i][rows] = integrate(chosen, rates[i][rows], None if starts is None else starts[i], **options)
         except ValidationError as error:
             raise recounted(error, [rows]) from None
-    return found
+    return turned
 
 
 def _integral(times: Doubles, rates: Array, interpolation: str) -> Array:

@@ -21,8 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._base.arrays import refuse, short_repr
-from ._base.validation import check_orthonormal, numbers
+from ._base.arrays import check_orthonormal, numbers, refuse, short_repr
 from ._core import ValidationError
 
 __all__ = ["from_landmarks", "to_landmarks"]

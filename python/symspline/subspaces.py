@@ -20,20 +20,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._base.arrays import adjoint, as_array, cast, checked_number, refuse, whole_number
+from ._base.arrays import Array, adjoint, as_array, cast, checked_number, numbers, off_one, refuse, whole_number
 from ._base.faults import warn
 from ._base.input import times_of
 from ._base.typing import TimesLike
-from ._base.validation import Array, numbers, off_one
 from ._core import CutLocusError, ValidationError
 from ._grid import GridSpline
 from ._grid.axes import coordinates
 from ._spaces import (
+    AnySpace,
     ComplexGrassmannian,
     Euclidean,
     Grassmannian,
     HermitianPositiveDefinite,
-    Space,
     SymmetricPositiveDefinite,
     point_tol,
 )
@@ -229,9 +228,9 @@ def reduced_operator(
     if constant:
         return _reduced(bases, _check_operator(operator, n))
     flat = bases.reshape(-1, *bases.shape[-2:])
-    each = zip(flat, *(own.ravel() for own in parameters), strict=True)
-    found = [_reduced(basis, _check_operator(operator(*mu), n)) for basis, *mu in each]
-    return np.reshape(found, (*bases.shape[:-2], *[bases.shape[-1]] * 2))
+    rows = zip(flat, *(parameter.ravel() for parameter in parameters), strict=True)
+    matrices = [_reduced(basis, _check_operator(operator(*mu), n)) for basis, *mu in rows]
+    return np.reshape(matrices, (*bases.shape[:-2], *[bases.shape[-1]] * 2))
 
 
 class OperatorSpline:
@@ -312,7 +311,7 @@ class OperatorSpline:
         self._size = k
         if _are_positive(matrices, tol):
             points = (matrices + adjoint(matrices)) / 2
-            space: Space[Any] = (HermitianPositiveDefinite if self._complex else SymmetricPositiveDefinite)(k)
+            space: AnySpace = (HermitianPositiveDefinite if self._complex else SymmetricPositiveDefinite)(k)
         else:
             points = matrices.reshape(*matrices.shape[:-2], k * k)
             points = np.concatenate([points.real, points.imag], axis=-1) if self._complex else points
@@ -360,7 +359,7 @@ class OperatorSpline:
 
 def _subspaces_of(spline: CubicSpline[Any, Any] | GridSpline[Any]) -> tuple[int, ...]:
     """Return n and k of a curve or grid of subspaces."""
-    space: Space[Any] = spline.space
+    space: AnySpace = spline.space
     batch = isinstance(spline, CubicSpline) and spline._batch
     if not isinstance(space, (Grassmannian, ComplexGrassmannian)) or batch:
         raise ValidationError(f"spline must be one curve or a grid on a Grassmannian, not {spline!r}")
@@ -369,11 +368,13 @@ def _subspaces_of(spline: CubicSpline[Any, Any] | GridSpline[Any]) -> tuple[int,
 
 def _grid_bases(spline: GridSpline[Any], x: Any, start: ArrayLike | None) -> tuple[Array, list[Array]]:
     """Return aligned bases at parameters, and the parameters of each axis for every basis."""
-    own, shape, outer = coordinates(spline._axes, x, False)
-    parameters = np.meshgrid(*own, indexing="ij") if outer else own
+    axes, shape, outer = coordinates(spline._axes, x, False)
+    parameters = np.meshgrid(*axes, indexing="ij") if outer else axes
     values: Array = spline(x)
     reference = _reference(spline.points, _present(spline.points), start)
-    return values @ _rotations(values, _present(values), reference), [each.reshape(shape) for each in parameters]
+    return values @ _rotations(values, _present(values), reference), [
+        parameter.reshape(shape) for parameter in parameters
+    ]
 
 
 def _checked_bases(value: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
@@ -424,8 +425,8 @@ def _rotations(bases: Array, present: NDArray[np.bool_], reference: Array) -> Ar
     k = reference.shape[-1]
     overlaps = adjoint(bases[present]) @ reference
     left, cosines, right = np.linalg.svd(overlaps)
-    found = np.full((*present.shape, k, k), np.nan, dtype=overlaps.dtype)
-    found[present] = left @ right
+    turns = np.full((*present.shape, k, k), np.nan, dtype=overlaps.dtype)
+    turns[present] = left @ right
     smallest = np.ones(present.shape)
     smallest[present] = cosines[..., -1]
     index = np.unravel_index(np.argmin(smallest), smallest.shape)
@@ -442,7 +443,7 @@ def _rotations(bases: Array, present: NDArray[np.bool_], reference: Array) -> Ar
             f"vary fast close to 90°. {remedy}",
             UserWarning,
         )
-    return found
+    return turns
 
 
 def _are_positive(matrices: Array, tol: float) -> bool:

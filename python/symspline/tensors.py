@@ -26,9 +26,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._base.arrays import as_array, refuse, short_repr
+from ._base.arrays import as_array, largest, refuse, short_repr
 from ._base.typing import TensorOrder
-from ._base.validation import largest
 from ._core import ValidationError
 from ._spaces import point_tol
 

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 
 from ._base.arrays import checked_number, whole_number
 from ._core import ConvergenceError, CutLocusError, ValidationError
-from ._spaces import Array, Doubles, Product, Space, space_named
+from ._spaces import AnySpace, Array, Doubles, Product, Space, space_named
 from ._splines.cubic import CubicSpline
 from ._splines.jumps import segments_of
 from .manifolds import Manifold
@@ -82,7 +82,7 @@ class Conformance:
 
 
 def check(
-    space: Space[Any] | str,
+    space: AnySpace | str,
     *,
     point: ArrayLike | None = None,
     length: float | None = None,
@@ -148,21 +148,21 @@ def check(
         space.check_point(point)
         base = np.asarray(point, space.dtype)
     longest = min(0.5, space.injectivity_radius / 2) if length is None else length
-    found = Conformance(space)
+    result = Conformance(space)
     rounding = float(np.max(space._rounding(base)))
     sample = _Sample(space, base, longest, max(tol, 1e-14 * rounding), rng)
-    _operations(found, sample)
+    _operations(result, sample)
     # K is NaN where no metric belongs to a group, and of manifolds made of functions.
     if isinstance(space, Manifold) or not np.isnan(space.curvature):
-        _metric(found, sample)
+        _metric(result, sample)
     if isinstance(space, Manifold):
-        _derivative(found, sample)
+        _derivative(result, sample)
     try:
-        _smoothness(found, sample)
-        _order(found, sample)
+        _smoothness(result, sample)
+        _order(result, sample)
     except (ConvergenceError, CutLocusError) as error:
         raise AssertionError(f"{space!r} breaks the law that near points have splines: {error}") from error
-    return found
+    return result
 
 
 class _Sample:
@@ -193,41 +193,41 @@ class _Sample:
         return np.asarray(np.abs(x).max(axis=axes))
 
 
-def _operations(found: Conformance, s: _Sample) -> None:
+def _operations(result: Conformance, s: _Sample) -> None:
     space = s.space
     logs = space.log(s.p, s.q)
     # Of short steps rounding of the points is what is left.
-    found._add("log inverts exp", s.size(logs - s.v) / np.maximum(1.0, s.lengths), s.tol)
-    found._add("exp inverts log", space.distance(space.exp(s.p, logs), s.q), s.tol)
+    result._add("log inverts exp", s.size(logs - s.v) / np.maximum(1.0, s.lengths), s.tol)
+    result._add("exp inverts log", space.distance(space.exp(s.p, logs), s.q), s.tol)
     space.check_point(s.q)
     noise = s.rng.standard_normal(s.p.shape).astype(space.dtype)
     tangent = space.project_tangent(s.p, noise)
-    found._add("project_tangent is a projection", s.size(space.project_tangent(s.p, tangent) - tangent), s.tol)
-    found._add("log is tangent", s.size(space.project_tangent(s.p, logs) - logs), s.tol)
+    result._add("project_tangent is a projection", s.size(space.project_tangent(s.p, tangent) - tangent), s.tol)
+    result._add("log is tangent", s.size(space.project_tangent(s.p, logs) - logs), s.tol)
     half = space.exp(s.p, s.v / 2)
-    found._add(
+    result._add(
         "geodesics run at constant speed", s.size(2 * space.log(s.p, half) - logs) / np.maximum(1.0, s.lengths), s.tol
     )
     onward = -space.log(half, s.p)
-    found._add("geodesics go on as geodesics", s.space.distance(space.exp(half, onward), s.q), s.tol)
+    result._add("geodesics go on as geodesics", s.space.distance(space.exp(half, onward), s.q), s.tol)
 
 
-def _metric(found: Conformance, s: _Sample) -> None:
+def _metric(result: Conformance, s: _Sample) -> None:
     space = s.space
     a, b, c = (s.tangents(s.p) for _ in range(3))
-    found._add("inner is symmetric", np.abs(space.inner(s.p, a, b) - space.inner(s.p, b, a)), s.tol)
+    result._add("inner is symmetric", np.abs(space.inner(s.p, a, b) - space.inner(s.p, b, a)), s.tol)
     both = space.inner(s.p, a + 2 * b, c) - space.inner(s.p, a, c) - 2 * space.inner(s.p, b, c)
-    found._add("inner is bilinear", np.abs(both), s.tol)
-    found._add("inner is positive", np.maximum(0.0, -space.inner(s.p, a, a)), 0.0)
+    result._add("inner is bilinear", np.abs(both), s.tol)
+    result._add("inner is positive", np.maximum(0.0, -space.inner(s.p, a, a)), 0.0)
     there, back = space.distance(s.p, s.q), space.distance(s.q, s.p)
-    found._add("distance is symmetric", np.abs(there - back), s.tol)
-    found._add("distance is the length of log", np.abs(there - s.lengths), s.tol)
+    result._add("distance is symmetric", np.abs(there - back), s.tol)
+    result._add("distance is the length of log", np.abs(there - s.lengths), s.tol)
 
     # Of the half square of distance, whose gradient at q is minus the logarithm.
     w = s.tangents(s.q)
     slope = _slope(lambda h: space.distance(s.p, space.exp(s.q, h * w)) ** 2 / 2, _STEP)
     expected = -space.inner(s.q, space.log(s.q, s.p), w)
-    found._add("distance has its first variation", np.abs(slope - expected), _allowed(s))
+    result._add("distance has its first variation", np.abs(slope - expected), _allowed(s))
 
 
 def _slope(function: Callable[[float], Array], step: float) -> Array:
@@ -240,12 +240,12 @@ def _allowed(s: _Sample) -> float:
     return max(_DIFFERENCES / min(1.0, s.longest) ** 2, 10 * s.tol / _STEP)
 
 
-def _derivative(found: Conformance, s: _Sample) -> None:
+def _derivative(result: Conformance, s: _Sample) -> None:
     space = s.space
     assert isinstance(space, Manifold)
     w = s.tangents(s.q)
     slope = _slope(lambda h: space.log(s.p, space.exp(s.q, h * w)), _STEP * min(1.0, 2 * s.longest))
-    found._add("dlog is the derivative of log", s.size(space.dlog(s.p, s.q, w) - slope), _allowed(s))
+    result._add("dlog is the derivative of log", s.size(space.dlog(s.p, s.q, w) - slope), _allowed(s))
 
 
 def _walk(s: _Sample) -> Array:
@@ -260,7 +260,7 @@ def _walk(s: _Sample) -> Array:
     return np.array(p)
 
 
-def _smoothness(found: Conformance, s: _Sample) -> None:
+def _smoothness(result: Conformance, s: _Sample) -> None:
     space, p = s.space, _walk(s)
     offs: list[Any] = []
     largest = np.zeros(3)
@@ -270,16 +270,16 @@ def _smoothness(found: Conformance, s: _Sample) -> None:
             offs.append(s.space.distance(spline(t), p).max())
             jumps = [segments_of(spline).jumps(nu) for nu in range(3)]
             # A straight walk has no acceleration, so that jumps are relative to the length of a step at least.
-            sizes = (1.0, *(max(own.largest, s.longest) for own in jumps[1:]))
-            largest = np.maximum(largest, np.divide([own.size.max() for own in jumps], sizes))
+            sizes = (1.0, *(max(jump.largest, s.longest) for jump in jumps[1:]))
+            largest = np.maximum(largest, np.divide([jump.size.max() for jump in jumps], sizes))
     value, velocity, acceleration = largest
-    found._add("splines interpolate", offs, s.tol)
-    found._add("splines are continuous", value, s.tol)
-    found._add("velocity is continuous", velocity, 100 * s.tol)
-    found._add("acceleration is continuous", acceleration, _BENT * s.tol)
+    result._add("splines interpolate", offs, s.tol)
+    result._add("splines are continuous", value, s.tol)
+    result._add("velocity is continuous", velocity, 100 * s.tol)
+    result._add("acceleration is continuous", acceleration, _BENT * s.tol)
 
 
-def _order(found: Conformance, s: _Sample) -> None:
+def _order(result: Conformance, s: _Sample) -> None:
     """Check the order of convergence of curves with not-a-knot ends through points of a smooth curve."""
     space = s.space
     axes = [s.tangents(s.base) for _ in range(3)]
@@ -292,7 +292,7 @@ def _order(found: Conformance, s: _Sample) -> None:
     errors = [_error(space, curve, n) for n in (16, 32)]
     # Where an error is rounding there is nothing to measure.
     order = np.log2(errors[0] / errors[1]) if errors[1] > 1e3 * s.tol * s.longest else 4.0
-    found._add("the order of not-a-knot is four", abs(order - 4.0), 0.6)
+    result._add("the order of not-a-knot is four", abs(order - 4.0), 0.6)
 
 
 def _error(space: Space, curve: Callable[[Doubles], Array], n: int) -> float:

@@ -11,7 +11,9 @@ from pathlib import Path
 import pytest
 from tabular import AXES, write
 
+from symspline._base.faults import warn
 from symspline.cli import main
+from symspline.cli._curves import read_curves
 
 
 def test_pictures_without_matplotlib(curves, fails, monkeypatch):
@@ -77,9 +79,21 @@ def test_not_enough_memory(curves, fails, monkeypatch):
     assert fails("sample a.npz -n 3 -o b.csv") == "there is not enough memory for this"
 
 
+@pytest.mark.filterwarnings("default:too steep")
+@pytest.mark.parametrize("line", ["sample a.npz -n 3 -o b.csv", "check a.npz", "info a.npz"])
+def test_warnings_of_the_library_are_messages(curves, run, monkeypatch, line):
+    def warned(*arguments):
+        warn("too steep", UserWarning)
+        return read_curves(*arguments)
+
+    for verb in ("sample", "check", "info"):
+        monkeypatch.setattr(f"symspline.cli._{verb}.read_curves", warned)
+    assert run(line, notes=True).endswith("symspline: too steep\n")
+
+
 def test_progress_on_a_terminal(curves, capsys, monkeypatch):
     monkeypatch.setattr("symspline.cli._messages._WAIT", 0)
-    monkeypatch.setattr("symspline.cli._formats._WRITTEN", 2000)
+    monkeypatch.setattr("symspline.cli._tables._WRITTEN", 2000)
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
     assert main(shlex.split("sample a.npz -n 5000 -o b.csv")) == 0
     shown = capsys.readouterr().err

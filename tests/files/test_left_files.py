@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 import symspline as ss
-from symspline._base.disk import _machine
+from symspline._base.system import _machine
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="processes are looked up as POSIX does")
 
 KILLED = """
 import os, sys
 from pathlib import Path
-from symspline._base.disk import replacing
+from symspline._base.system import replacing
 with replacing(Path(sys.argv[1])) as temporary:
     temporary.write_bytes(b"half")
     os.kill(os.getpid(), 9)

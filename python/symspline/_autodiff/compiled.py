@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,9 +17,11 @@ from .._splines.cubic import CubicSpline
 
 # End conditions without their vectors: a word, or a pair of words and orders.
 Kinds = str | tuple[str | int, str | int]
+# The vectors in them, None where there is none.
+Ends = tuple[Array | None, Array | None]
 
 
-def split(bc_type: Any) -> tuple[Kinds, tuple[Any, Any]]:
+def split(bc_type: Any) -> tuple[Kinds, tuple[object, object]]:
     """End conditions as something to hash, and the vectors in them (None where there is none)."""
     if isinstance(bc_type, str):
         return bc_type, (None, None)
@@ -26,16 +29,14 @@ def split(bc_type: Any) -> tuple[Kinds, tuple[Any, Any]]:
     return (first, last), (a, b)
 
 
-def joined(kinds: Kinds, vectors: tuple[Any, Any]) -> Any:
+def joined(kinds: Kinds, vectors: tuple[object, object]) -> Any:
     """The inverse of `split`."""
     if isinstance(kinds, str):
         return kinds
     return tuple(kind if isinstance(kind, str) else (kind, vector) for kind, vector in zip(kinds, vectors, strict=True))
 
 
-def fitted(
-    t: Any, points: Any, vectors: tuple[Any, Any], space: Space, kinds: Kinds, options: dict[str, Any]
-) -> CubicSpline:
+def fitted(t: Array, points: Array, vectors: Ends, space: Space, kinds: Kinds, options: dict[str, Any]) -> CubicSpline:
     """The spline through the points of the space beside the given ones: numbers that an optimiser or a
     finite difference makes are a little off it."""
     projected = space.project(points)
@@ -53,7 +54,9 @@ class Movable(NamedTuple):
     curve: CurveArrays
     bc_type: Any
 
-    def jvp(self, x: Array, dx: Any, points: Any, t: Any, ends: Any) -> Array:
+    def jvp(
+        self, x: Array, dx: Array | None, points: Array | None, t: Array | None, ends: Sequence[Array | None]
+    ) -> Array:
         """How the curve at times x moves, with these times and with its data."""
         at = sample_times(self.curve.times, self.curve.batch, x, False, 0)
         moved: Array = self.curve.jvp(at, self.bc_type, points, t, ends)
@@ -62,7 +65,7 @@ class Movable(NamedTuple):
         moved += self._velocity(x) * dx.reshape(dx.shape + (1,) * len(self.curve.space.point_shape))
         return moved
 
-    def vjp(self, x: Array, cotangent: Array) -> tuple[Array, Array, Array, tuple[Any, Any]]:
+    def vjp(self, x: Array, cotangent: Array) -> tuple[Array, Array, Array, Ends]:
         """The transpose: gradients with respect to x, t, points and the vectors at the ends."""
         at = sample_times(self.curve.times, self.curve.batch, x, False, 0)
         gradient = self.curve.vjp(at, self.bc_type, cotangent)

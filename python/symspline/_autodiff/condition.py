@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from .library import adjoint, hermitian
+from .library import Tensor, adjoint, hermitian
 from .models import Curved, Model, Poses, Positive, Rotations, cross_matrix, whitened
 
 # Terms of the series of sinh(ad)/ad. The last is below rounding for handles up to 20 long; a handle has about a third
@@ -23,27 +23,27 @@ class Chain:
         self.model = model
         self.lib = model.lib
 
-    def enter(self, points: Any, velocities: Any) -> tuple[Any, Any]:
+    def enter(self, points: Tensor, velocities: Tensor) -> tuple[Tensor, Tensor]:
         """Return nodes and velocities in the arrays of the chain from those of the user."""
         return self.model.to_internal(points, velocities)
 
-    def leave(self, p: Any, u: Any) -> Any:
+    def leave(self, p: Tensor, u: Tensor) -> Tensor:
         """Return velocities as the arrays of the user."""
         return self.model.velocities_from_internal(p, u)
 
-    def scale(self, p: Any) -> Any:
+    def scale(self, p: Tensor) -> Tensor:
         """Return the largest number of every curve whose rounding is in the logarithms."""
         return self.lib.xp.amax(abs(p), (0, -1))
 
-    def tangent(self, p: Any, u: Any) -> Any:
+    def tangent(self, p: Tensor, u: Tensor) -> Tensor:
         """Return the nearest tangent vectors at p."""
         return u
 
-    def normal_change(self, p: Any, u: Any, dp: Any) -> Any:
+    def normal_change(self, p: Tensor, u: Tensor, dp: Tensor) -> Tensor:
         """Return the normal part of the change of tangent vectors u whose points move by dp."""
         return self.lib.xp.zeros_like(u)
 
-    def logs(self, p: Any, ahead: Any, back: Any) -> tuple[Any, Any]:
+    def logs(self, p: Tensor, ahead: Tensor, back: Tensor) -> tuple[Tensor, Tensor]:
         """Return the vectors from inner handle to inner handle, transported to the outer points.
 
         On a group, transport along the geodesic exp(sa) is Ad(exp(−sa/2)) in the frame of the body. Back from
@@ -56,13 +56,13 @@ class Chain:
         first, last = log(exp(ends, 0.5 * handles), exp(others, -0.5 * handles))
         return first, last
 
-    def stretched(self, v: Any, w: Any) -> Any:
+    def stretched(self, v: Tensor, w: Tensor) -> Tensor:
         """Return sinh(ad_v)/ad_v of w."""
         divisors = [2.0 * k * (2 * k + 1) for k in range(_TERMS, 0, -1)]
         curvature = self.curvature(v)
         return self.lib.fold(lambda total, divisor: w + curvature(total) / divisor, w, divisors)
 
-    def curvature(self, v: Any) -> Callable[[Any], Any]:
+    def curvature(self, v: Tensor) -> Callable[[Tensor], Tensor]:
         """Return the map from w to ad_v² w, which is −R(w, v)v. On a group ad_v is ½[v, ·]."""
         return lambda w: 0 * w
 
@@ -74,7 +74,7 @@ class SphereChain(Chain):
         super().__init__(model)
         self.sphere = model if isinstance(model, Curved) else Curved(model.lib, 1)
 
-    def enter(self, points: Any, velocities: Any) -> tuple[Any, Any]:
+    def enter(self, points: Tensor, velocities: Tensor) -> tuple[Tensor, Tensor]:
         p, u = self.model.to_internal(points, velocities)
         if isinstance(self.model, Rotations) and len(p) > 1:
             # Of both signs of a quaternion the one nearer to that before.
@@ -85,13 +85,13 @@ class SphereChain(Chain):
             p, u = along * p, along * u
         return p, u
 
-    def tangent(self, p: Any, u: Any) -> Any:
+    def tangent(self, p: Tensor, u: Tensor) -> Tensor:
         return u - self.sphere.inner(p, u) * p
 
-    def normal_change(self, p: Any, u: Any, dp: Any) -> Any:
+    def normal_change(self, p: Tensor, u: Tensor, dp: Tensor) -> Tensor:
         return -self.sphere.inner(u, dp) * p
 
-    def logs(self, p: Any, ahead: Any, back: Any) -> tuple[Any, Any]:
+    def logs(self, p: Tensor, ahead: Tensor, back: Tensor) -> tuple[Tensor, Tensor]:
         exp, log, stack = self.sphere.exp, self.sphere.log, self.lib.xp.stack
         ends = stack([p[:-1], p[1:]])
         left, right = exp(ends, stack([ahead, back]))
@@ -99,12 +99,12 @@ class SphereChain(Chain):
         first, last = self._transported(starts, ends, log(starts, others))
         return first, last
 
-    def _transported(self, a: Any, b: Any, v: Any) -> Any:
+    def _transported(self, a: Tensor, b: Tensor, v: Tensor) -> Tensor:
         """Transport tangent vectors at a in parallel along geodesics to b."""
         inner = self.sphere.inner
         return v - inner(v, b) / (1 + inner(a, b)) * (a + b)
 
-    def stretched(self, v: Any, w: Any) -> Any:
+    def stretched(self, v: Tensor, w: Tensor) -> Tensor:
         """Across v by sin|v|/|v|, and along v as it is."""
         z = self.sphere.inner(v, v)
         return self.lib.stumpff(1, 1, z) * w + self.lib.stumpff(3, 1, z) * self.sphere.inner(v, w) * v
@@ -113,7 +113,7 @@ class SphereChain(Chain):
 class PoseChain(Chain):
     """Rigid motions and twists of the body."""
 
-    def curvature(self, v: Any) -> Callable[[Any], Any]:
+    def curvature(self, v: Tensor) -> Callable[[Tensor], Tensor]:
         # [(ω, v), (ω', v')] = (ω × ω', ω × v' + v × ω')
         concatenate = self.lib.xp.concatenate
         turn, ahead = cross_matrix(self.lib, v[..., :3]), cross_matrix(self.lib, v[..., 3:])
@@ -126,20 +126,20 @@ class PoseChain(Chain):
 class PositiveChain(Chain):
     """Positive definite matrices as Cholesky factors L, and velocities L⁻¹ V L⁻*."""
 
-    def enter(self, points: Any, velocities: Any) -> tuple[Any, Any]:
+    def enter(self, points: Tensor, velocities: Tensor) -> tuple[Tensor, Tensor]:
         root = self.lib.xp.linalg.cholesky(hermitian(points))
         return root, whitened(self.lib, root, velocities)
 
-    def leave(self, p: Any, u: Any) -> Any:
+    def leave(self, p: Tensor, u: Tensor) -> Tensor:
         return p @ u @ adjoint(p)
 
-    def scale(self, p: Any) -> Any:
+    def scale(self, p: Tensor) -> Tensor:
         return self.lib.xp.ones_like(p[0, ..., 0, 0])
 
-    def tangent(self, p: Any, u: Any) -> Any:
+    def tangent(self, p: Tensor, u: Tensor) -> Tensor:
         return hermitian(u)
 
-    def logs(self, p: Any, ahead: Any, back: Any) -> tuple[Any, Any]:
+    def logs(self, p: Tensor, ahead: Tensor, back: Tensor) -> tuple[Tensor, Tensor]:
         """In the frame L of a point the handle is exp(a), and exp(−a/2) · exp(−a/2) transports back from it.
 
         With X = exp(−a/2) L_p⁻¹ L_q exp(b/2), the vector at p is log XX*, and that at q is −log X*X.
@@ -149,10 +149,10 @@ class PositiveChain(Chain):
         first, last = self.lib.logarithm(self.lib.xp.stack([x @ adjoint(x), adjoint(x) @ x]))
         return first, -last
 
-    def curvature(self, v: Any) -> Callable[[Any], Any]:
+    def curvature(self, v: Tensor) -> Callable[[Tensor], Tensor]:
         half = 0.5 * v
 
-        def twice(w: Any) -> Any:
+        def twice(w: Tensor) -> Tensor:
             inner = half @ w - w @ half
             return half @ inner - inner @ half
 
@@ -189,12 +189,12 @@ class Problem(NamedTuple):
 
     chain: Chain
     given: tuple[bool, bool]
-    h: Any
-    p: Any
-    first: Any
-    last: Any
+    h: Tensor
+    p: Tensor
+    first: Tensor
+    last: Tensor
 
-    def residual(self, u: Any) -> Any:
+    def residual(self, u: Tensor) -> Tensor:
         """Return the residuals for velocities u at inner nodes, and of the end conditions.
 
         On unequal knots (13) has factors sinh(ad)/ad. Each residual is a velocity times its weight in `weights`.
@@ -208,17 +208,17 @@ class Problem(NamedTuple):
         end = self.last - u[-1] if self.given[1] else -3 * before[-1]
         return xp.concatenate([start[None], 3 * (right - left), end[None]])
 
-    def weights(self) -> tuple[Any, Any, Any]:
+    def weights(self) -> tuple[Tensor, Tensor, Tensor]:
         """Return the three diagonals of the condition in flat space, shape (n, ...) of the intervals."""
         xp, r = self.chain.lib.xp, 1 / self.h
         zero, one = xp.zeros_like(r[:1]), xp.ones_like(r[:1])
-        first, last = (one if own else 2 * end for own, end in zip(self.given, (r[:1], r[-1:]), strict=True))
+        first, last = (one if fixed else 2 * end for fixed, end in zip(self.given, (r[:1], r[-1:]), strict=True))
         middle = xp.concatenate([first, 2 * (r[:-1] + r[1:]), last])
         above = xp.concatenate([zero if self.given[0] else r[:1], r[1:], zero])
         below = xp.concatenate([zero, r[:-1], zero if self.given[1] else r[-1:]])
         return below, middle, above
 
-    def sizes(self, rows: Any) -> Any:
+    def sizes(self, rows: Tensor) -> Tensor:
         """Return the length of one vector per node."""
         flat = rows.reshape(*rows.shape[: rows.ndim - self.chain.model.axes], -1)
         return self.chain.lib.xp.sqrt((abs(flat) ** 2).sum(axis=-1))
@@ -227,7 +227,9 @@ class Problem(NamedTuple):
 # ---- block tridiagonal systems, solved in few operations on whole arrays, which suits GPUs ----
 
 
-def cyclic_reduction(xp: Any, solve: Callable[..., Any], below: Any, diagonal: Any, above: Any, rows: Any) -> Any:
+def cyclic_reduction(
+    xp: Any, solve: Callable[..., Tensor], below: Tensor, diagonal: Tensor, above: Tensor, rows: Tensor
+) -> Tensor:
     """Solve block tridiagonal systems by eliminating every second unknown, again and again.
 
     Golub & Van Loan, *Matrix Computations* (4th edition), §4.5.4. It needs O(log n) operations on arrays, without
@@ -264,6 +266,6 @@ def cyclic_reduction(xp: Any, solve: Callable[..., Any], below: Any, diagonal: A
         rows[::2] - low @ before[2] - high @ after[2],
     )
     next_even = xp.concatenate([even[1:], xp.zeros_like(even[:1])])[: n // 2]
-    found = rest - left @ even[: n // 2] - right @ next_even
-    pairs = xp.stack([even[: n // 2], found], 1).reshape(2 * (n // 2), *even.shape[1:])
+    uneven = rest - left @ even[: n // 2] - right @ next_even
+    pairs = xp.stack([even[: n // 2], uneven], 1).reshape(2 * (n // 2), *even.shape[1:])
     return xp.concatenate([pairs, even[n // 2 :]])

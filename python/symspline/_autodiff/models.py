@@ -10,8 +10,18 @@ from typing import Any
 
 import numpy as np
 
+from .. import _spaces
 from .._base.angles import Rows, quaternion_rows, rotation_rows
-from .library import Library, adjoint, hermitian
+from .._spaces import AnySpace
+from .library import Library, Tensor, adjoint, hermitian
+
+QUOTIENTS = (
+    _spaces.RealProjective,
+    _spaces.ComplexProjective,
+    _spaces.Grassmannian,
+    _spaces.ComplexGrassmannian,
+)
+"""Spaces whose points have many representatives."""
 
 
 class Model:
@@ -22,31 +32,31 @@ class Model:
     def __init__(self, lib: Library) -> None:
         self.lib = lib
 
-    def to_internal(self, points: Any, velocities: Any) -> tuple[Any, Any]:
+    def to_internal(self, points: Tensor, velocities: Tensor) -> tuple[Tensor, Tensor]:
         """Return the nearest points of the space, and the nearest tangent vectors there."""
         return points, velocities
 
-    def from_internal(self, points: Any) -> Any:
+    def from_internal(self, points: Tensor) -> Tensor:
         """Return points as the arrays of the user."""
         return points
 
-    def velocities_from_internal(self, points: Any, velocities: Any) -> Any:
+    def velocities_from_internal(self, points: Tensor, velocities: Tensor) -> Tensor:
         """Return velocities at internal points as the arrays of the user."""
         return velocities
 
-    def exp(self, p: Any, v: Any) -> Any:
+    def exp(self, p: Tensor, v: Tensor) -> Tensor:
         """Return the geodesic from p with velocity v at time 1."""
         return p + v
 
-    def log(self, p: Any, q: Any) -> Any:
+    def log(self, p: Tensor, q: Tensor) -> Tensor:
         """Return the inverse of `exp`."""
         return q - p
 
-    def between(self, p: Any, q: Any, t: Any) -> Any:
+    def between(self, p: Tensor, q: Tensor, t: Tensor) -> Tensor:
         """Return the geodesic from p to q at time t."""
         return self.exp(p, self.times(t, self.log(p, q)))
 
-    def times(self, t: Any, v: Any) -> Any:
+    def times(self, t: Tensor, v: Tensor) -> Tensor:
         """Multiply vectors by one factor each."""
         return t[(..., *(None,) * self.axes)] * v
 
@@ -58,22 +68,22 @@ class Curved(Model):
         super().__init__(lib)
         self.sign = sign
 
-    def inner(self, u: Any, v: Any) -> Any:
+    def inner(self, u: Tensor, v: Tensor) -> Tensor:
         """Return the product in which points have length one, with an axis of its own."""
         products = u * v
         if self.sign > 0:
             return products.sum(axis=-1, keepdims=True)
         return products[..., 1:].sum(axis=-1, keepdims=True) - products[..., :1]
 
-    def to_internal(self, points: Any, velocities: Any) -> tuple[Any, Any]:
+    def to_internal(self, points: Tensor, velocities: Tensor) -> tuple[Tensor, Tensor]:
         points = points / self.lib.xp.sqrt(self.sign * self.inner(points, points))
         return points, velocities - self.sign * self.inner(points, velocities) * points
 
-    def exp(self, p: Any, v: Any) -> Any:
+    def exp(self, p: Tensor, v: Tensor) -> Tensor:
         z = self.inner(v, v)
         return self.lib.stumpff(0, self.sign, z) * p + self.lib.stumpff(1, self.sign, z) * v
 
-    def log(self, p: Any, q: Any) -> Any:
+    def log(self, p: Tensor, q: Tensor) -> Tensor:
         d, s = q - p, q + p
         y = 0.25 * self.inner(d, d)
         return self.lib.arc(y, 0.25 * self.sign * self.inner(s, s), self.sign) * (d + 2 * self.sign * y * p)
@@ -82,22 +92,22 @@ class Curved(Model):
 class Lines(Model):
     """Unit vectors up to a phase or a sign."""
 
-    def to_internal(self, points: Any, velocities: Any) -> tuple[Any, Any]:
+    def to_internal(self, points: Tensor, velocities: Tensor) -> tuple[Tensor, Tensor]:
         points = points / self.lib.xp.sqrt(_product(points, points).real)
         return points, velocities - points * _product(points, velocities)
 
-    def exp(self, p: Any, v: Any) -> Any:
+    def exp(self, p: Tensor, v: Tensor) -> Tensor:
         z = _product(v, v).real
         return self.lib.stumpff(0, 1, z) * p + self.lib.stumpff(1, 1, z) * v
 
-    def log(self, p: Any, q: Any) -> Any:
+    def log(self, p: Tensor, q: Tensor) -> Tensor:
         overlap = _product(p, q)
         beside = q - p * overlap
         y = _product(beside, beside).real
         return self.lib.arc(y, _product(overlap, overlap).real, 1) * overlap.conj() * beside
 
 
-def _product(u: Any, v: Any) -> Any:
+def _product(u: Tensor, v: Tensor) -> Tensor:
     return (u.conj() * v).sum(axis=-1, keepdims=True)
 
 
@@ -116,15 +126,15 @@ class Planes(Model):
 
     axes = 2
 
-    def to_internal(self, points: Any, velocities: Any) -> tuple[Any, Any]:
+    def to_internal(self, points: Tensor, velocities: Tensor) -> tuple[Tensor, Tensor]:
         points = orthonormal(self.lib, points)
         return points, velocities - points @ (adjoint(points) @ velocities)
 
-    def exp(self, p: Any, v: Any) -> Any:
+    def exp(self, p: Tensor, v: Tensor) -> Tensor:
         cosine, sine = _trigonometric(self.lib, adjoint(v) @ v)
         return p @ cosine + v @ sine
 
-    def log(self, p: Any, q: Any) -> Any:
+    def log(self, p: Tensor, q: Tensor) -> Tensor:
         assert self.lib.arcs is not None
         overlap = adjoint(p) @ q
         beside = q - p @ overlap
@@ -136,29 +146,29 @@ class Positive(Model):
 
     axes = 2
 
-    def to_internal(self, points: Any, velocities: Any) -> tuple[Any, Any]:
+    def to_internal(self, points: Tensor, velocities: Tensor) -> tuple[Tensor, Tensor]:
         return hermitian(points), hermitian(velocities)
 
-    def exp(self, p: Any, v: Any) -> Any:
+    def exp(self, p: Tensor, v: Tensor) -> Tensor:
         root = self.lib.xp.linalg.cholesky(p)
         return root @ self.lib.exponential(whitened(self.lib, root, v)) @ adjoint(root)
 
-    def log(self, p: Any, q: Any) -> Any:
+    def log(self, p: Tensor, q: Tensor) -> Tensor:
         root = self.lib.xp.linalg.cholesky(p)
         return root @ self.lib.logarithm(whitened(self.lib, root, q)) @ adjoint(root)
 
-    def between(self, p: Any, q: Any, t: Any) -> Any:
+    def between(self, p: Tensor, q: Tensor, t: Tensor) -> Tensor:
         root = self.lib.xp.linalg.cholesky(p)
         step = self.lib.logarithm(whitened(self.lib, root, q))
         return root @ self.lib.exponential(self.times(t, step)) @ adjoint(root)
 
 
-def identity(lib: Library, like: Any) -> Any:
+def identity(lib: Library, like: Any) -> Tensor:
     """Return the identity matrix of the size of the last axis."""
     return lib.constant(np.eye(like.shape[-1]), like)
 
 
-def orthonormal(lib: Library, columns: Any) -> Any:
+def orthonormal(lib: Library, columns: Tensor) -> Tensor:
     """Return the nearest orthonormal columns; NaN where the given ones are too far off for the iteration."""
     one = identity(lib, columns)
     for _ in range(_STEPS):
@@ -167,7 +177,7 @@ def orthonormal(lib: Library, columns: Any) -> Any:
     return lib.xp.where(off < 1e-5, columns, float("nan"))
 
 
-def _trigonometric(lib: Library, square: Any) -> tuple[Any, Any]:
+def _trigonometric(lib: Library, square: Tensor) -> tuple[Tensor, Tensor]:
     """cos √z and sin √z / √z of Hermitian matrices z without negative eigenvalues."""
     one = identity(lib, square)
     z = square / 4**_HALVINGS
@@ -180,7 +190,7 @@ def _trigonometric(lib: Library, square: Any) -> tuple[Any, Any]:
     return cosine, sine
 
 
-def whitened(lib: Library, root: Any, x: Any) -> Any:
+def whitened(lib: Library, root: Tensor, x: Tensor) -> Tensor:
     """L⁻¹ x L⁻* for a Hermitian x."""
     left = lib.solve_lower(root, x)
     return hermitian(adjoint(lib.solve_lower(root, adjoint(left))))
@@ -196,14 +206,14 @@ class Rotations(Lines):
         super().__init__(lib)
         self.size = size
 
-    def to_internal(self, points: Any, velocities: Any) -> tuple[Any, Any]:
+    def to_internal(self, points: Tensor, velocities: Tensor) -> tuple[Tensor, Tensor]:
         quaternion, turn = _motion_of(self.lib, points, velocities)
         return quaternion, product(self.lib, quaternion, _imaginary(self.lib, 0.5 * turn))
 
-    def from_internal(self, points: Any) -> Any:
+    def from_internal(self, points: Tensor) -> Tensor:
         return matrix_of(self.lib, points)[..., : self.size, : self.size]
 
-    def velocities_from_internal(self, points: Any, velocities: Any) -> Any:
+    def velocities_from_internal(self, points: Tensor, velocities: Tensor) -> Tensor:
         turn = 2 * product(self.lib, _conjugate(self.lib, points), velocities)[..., 1:]
         moved = matrix_of(self.lib, points) @ cross_matrix(self.lib, turn)
         return moved[..., : self.size, : self.size]
@@ -218,7 +228,7 @@ class Poses(Model):
         super().__init__(lib)
         self.size = size
 
-    def to_internal(self, points: Any, velocities: Any) -> tuple[Any, Any]:
+    def to_internal(self, points: Tensor, velocities: Tensor) -> tuple[Tensor, Tensor]:
         n, xp = self.size, self.lib.xp
         quaternion, turn = _motion_of(self.lib, points[..., :n, :n], velocities[..., :n, :n])
         place, ahead = points[..., :n, n], velocities[..., :n, n]
@@ -227,23 +237,23 @@ class Poses(Model):
         pose = xp.concatenate([quaternion, place], axis=-1)
         return pose, xp.concatenate([turn, turned(self.lib, _conjugate(self.lib, quaternion), ahead)], axis=-1)
 
-    def from_internal(self, points: Any) -> Any:
+    def from_internal(self, points: Tensor) -> Tensor:
         top = self._top(matrix_of(self.lib, points[..., :4]), points[..., 4:])
         last = identity(self.lib, top)[self.size :]
         return self.lib.xp.concatenate([top, self.lib.xp.zeros_like(top[..., :1, :]) + last], axis=-2)
 
-    def velocities_from_internal(self, points: Any, velocities: Any) -> Any:
+    def velocities_from_internal(self, points: Tensor, velocities: Tensor) -> Tensor:
         quaternion = points[..., :4]
         spin = matrix_of(self.lib, quaternion) @ cross_matrix(self.lib, velocities[..., :3])
         top = self._top(spin, turned(self.lib, quaternion, velocities[..., 3:]))
         return self.lib.xp.concatenate([top, self.lib.xp.zeros_like(top[..., :1, :])], axis=-2)
 
-    def _top(self, matrix: Any, column: Any) -> Any:
+    def _top(self, matrix: Tensor, column: Tensor) -> Tensor:
         """Return the rows of a pose, or of its velocity, except the last."""
         n = self.size
         return self.lib.xp.concatenate([matrix[..., :n, :n], column[..., :n, None]], axis=-1)
 
-    def exp(self, p: Any, v: Any) -> Any:
+    def exp(self, p: Tensor, v: Tensor) -> Tensor:
         xp, stumpff, cross = self.lib.xp, self.lib.stumpff, self.lib.xp.linalg.cross
         quaternion, place = p[..., :4], p[..., 4:]
         turn, ahead = v[..., :3], v[..., 3:]
@@ -256,7 +266,7 @@ class Poses(Model):
             [product(self.lib, quaternion, step), place + turned(self.lib, quaternion, moved)], axis=-1
         )
 
-    def log(self, p: Any, q: Any) -> Any:
+    def log(self, p: Tensor, q: Tensor) -> Tensor:
         xp, cross = self.lib.xp, self.lib.xp.linalg.cross
         back = _conjugate(self.lib, p[..., :4])
         step = product(self.lib, back, q[..., :4])
@@ -270,36 +280,36 @@ class Poses(Model):
         return xp.concatenate([turn, ahead], axis=-1)
 
 
-def inverse_series(lib: Library, z: Any) -> Any:
+def inverse_series(lib: Library, z: Tensor) -> Tensor:
     """(1 − φ cot φ) / z for z = 4φ² < 4π²: the factor of ω×(ω×v) in the inverse of V(ω) = ∫ exp(sω) ds."""
     u = z / 4
     return (lib.stumpff(2, 1, u) - lib.stumpff(3, 1, u)) / (4 * lib.stumpff(1, 1, u))
 
 
-def product(lib: Library, p: Any, q: Any) -> Any:
+def product(lib: Library, p: Tensor, q: Tensor) -> Tensor:
     """Return the product of quaternions."""
     a, u, b, v = p[..., :1], p[..., 1:], q[..., :1], q[..., 1:]
     scalar = a * b - (u * v).sum(axis=-1, keepdims=True)
     return lib.xp.concatenate([scalar, a * v + b * u + lib.xp.linalg.cross(u, v)], axis=-1)
 
 
-def turned(lib: Library, quaternion: Any, vector: Any) -> Any:
+def turned(lib: Library, quaternion: Tensor, vector: Tensor) -> Tensor:
     """Return vectors turned by unit quaternions."""
     a, u = quaternion[..., :1], quaternion[..., 1:]
     twice = 2 * lib.xp.linalg.cross(u, vector)
     return vector + a * twice + lib.xp.linalg.cross(u, twice)
 
 
-def matrix_of(lib: Library, quaternion: Any) -> Any:
+def matrix_of(lib: Library, quaternion: Tensor) -> Tensor:
     """Return the rotation matrices of unit quaternions."""
     return _matrices(lib, rotation_rows(*lib.xp.moveaxis(quaternion, -1, 0)))
 
 
-def _matrices(lib: Library, rows: Rows) -> Any:
+def _matrices(lib: Library, rows: Rows) -> Tensor:
     return lib.xp.stack([lib.xp.stack(row, axis=-1) for row in rows], axis=-2)
 
 
-def quaternion_of(lib: Library, matrix: Any) -> Any:
+def quaternion_of(lib: Library, matrix: Tensor) -> Tensor:
     """Return a unit quaternion of rotation matrices; NaN for reflections.
 
     The longest of the four rows of 4qqᵀ is far from zero (Shepperd 1978).
@@ -311,32 +321,32 @@ def quaternion_of(lib: Library, matrix: Any) -> Any:
     row = first
     for i, other in enumerate(others, 1):
         row = xp.where(longest == i, other, row)
-    found = row / xp.sqrt((row * row).sum(axis=-1, keepdims=True))
-    return xp.where(xp.linalg.det(matrix)[..., None] > 0, found, float("nan"))
+    unit = row / xp.sqrt((row * row).sum(axis=-1, keepdims=True))
+    return xp.where(xp.linalg.det(matrix)[..., None] > 0, unit, float("nan"))
 
 
-def axis_of(lib: Library, matrix: Any) -> Any:
+def axis_of(lib: Library, matrix: Tensor) -> Tensor:
     """Return the vector ω of the skew part of matrices [ω]×."""
     skew = 0.5 * (matrix - matrix.swapaxes(-1, -2))
     return lib.xp.stack([skew[..., 2, 1], skew[..., 0, 2], skew[..., 1, 0]], axis=-1)
 
 
-def cross_matrix(lib: Library, vector: Any) -> Any:
+def cross_matrix(lib: Library, vector: Tensor) -> Tensor:
     """Return the matrices [ω]× of vectors ω."""
     x, y, z = (vector[..., i] for i in range(3))
     zero = lib.xp.zeros_like(x)
     return _matrices(lib, ((zero, -z, y), (z, zero, -x), (-y, x, zero)))
 
 
-def _imaginary(lib: Library, vector: Any) -> Any:
+def _imaginary(lib: Library, vector: Tensor) -> Tensor:
     return lib.xp.concatenate([lib.xp.zeros_like(vector[..., :1]), vector], axis=-1)
 
 
-def _conjugate(lib: Library, quaternion: Any) -> Any:
+def _conjugate(lib: Library, quaternion: Tensor) -> Tensor:
     return lib.xp.concatenate([quaternion[..., :1], -quaternion[..., 1:]], axis=-1)
 
 
-def _motion_of(lib: Library, matrices: Any, velocities: Any) -> tuple[Any, Any]:
+def _motion_of(lib: Library, matrices: Tensor, velocities: Tensor) -> tuple[Tensor, Tensor]:
     """Unit quaternions of rotations of the plane or of space, and their angular velocities in the body."""
     matrices = orthonormal(lib, matrices)
     turn = matrices.swapaxes(-1, -2) @ velocities
@@ -346,8 +356,32 @@ def _motion_of(lib: Library, matrices: Any, velocities: Any) -> tuple[Any, Any]:
     return quaternion_of(lib, matrices), axis_of(lib, turn)
 
 
-def _about_third(lib: Library, matrix: Any, corner: float) -> Any:
+def _about_third(lib: Library, matrix: Tensor, corner: float) -> Tensor:
     """Return matrices of size 2 with a third row and column, which are zero except for the corner."""
     (a, b), (c, d) = ([matrix[..., i, j] for j in range(2)] for i in range(2))
     zero = lib.xp.zeros_like(a)
     return _matrices(lib, ((a, b, zero), (c, d, zero), (zero, zero, zero + corner)))
+
+
+# ---- the models of spaces ----
+
+
+def model_of(lib: Library, space: AnySpace) -> Model | None:
+    """Return the model of a space, which is not a product; None if there is none."""
+    if not lib.general and (space.dtype.kind == "c" or isinstance(space, QUOTIENTS)):
+        return None
+    if isinstance(space, _spaces.Euclidean):
+        return Model(lib)
+    if isinstance(space, _spaces.Sphere):
+        return Curved(lib, 1)
+    if isinstance(space, _spaces.Hyperbolic):
+        return Curved(lib, -1)
+    if isinstance(space, QUOTIENTS):
+        return Lines(lib) if len(space.point_shape) == 1 else Planes(lib)
+    if isinstance(space, (_spaces.SymmetricPositiveDefinite, _spaces.HermitianPositiveDefinite)):
+        return Positive(lib)
+    if isinstance(space, _spaces.SpecialOrthogonal) and space.point_shape[0] in (2, 3):
+        return Rotations(lib, space.point_shape[0])
+    if isinstance(space, _spaces.SpecialEuclidean):
+        return Poses(lib, space.point_shape[0] - 1)
+    return None

@@ -1,1 +1,4 @@
-"""Input, times, errors, reports, files and settings: what all other modules use."""
+"""Input, times, errors, reports, files and settings, on which everything else builds."""
+
+# As in Cargo.toml.
+VERSION = "0.1.0"

@@ -1,10 +1,10 @@
-"""Arrays as a user gives them, and equality of objects that contain arrays."""
+"""Arrays as a user gives them: their conversion, validation, tolerances and equality."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from typing import Any
 
 import numpy as np
@@ -43,15 +43,15 @@ def filled(value: Any) -> Any:
         numbers: Any = value if value.dtype.kind in "fcmM" else value.astype(np.float64)
         return numbers.filled(missing)
     if isinstance(value, list) and any(issubclass(kind, np.ma.MaskedArray) for kind in set(map(type, value))):
-        return [filled(own) for own in value]
+        return [filled(entry) for entry in value]
     return value
 
 
 def _first_masked(value: Any) -> tuple[int, ...] | None:
     """The index of the first masked number of an array, or of a list of arrays."""
     if isinstance(value, np.ma.MaskedArray):
-        found = np.argwhere(np.ma.getmaskarray(value))
-        return tuple(found[0].tolist()) if len(found) else None
+        masked = np.argwhere(np.ma.getmaskarray(value))
+        return tuple(masked[0].tolist()) if len(masked) else None
     if isinstance(value, (list, tuple)) and any(issubclass(kind, np.ma.MaskedArray) for kind in set(map(type, value))):
         for i, row in enumerate(value):
             index = _first_masked(row)
@@ -185,3 +185,221 @@ def same(first: Any, second: Any) -> bool:
 def same_fields(first: Any, second: Any) -> bool:
     """Whether two objects of one class have equal attributes."""
     return same(tuple(vars(first).values()), tuple(vars(second).values()))
+
+
+# ---- tolerance for points off a manifold, from the accuracy of their numbers ----
+
+# Tolerances for numbers in double precision, for numbers that were stored in single precision or in text with up to
+# nine significant digits, and for numbers with very few decimals. Nine significant digits identify a number in single
+# precision.
+POINT_TOL, POINT_TOL_ROUNDED, POINT_TOL_LARGEST = 1e-8, 1e-4, 5e-3
+_DIGITS = 9
+# Up to this many points of large arrays are inspected.
+_SAMPLE = 500
+# The accuracy is that of more than this share of the numbers.
+_MOST = 0.75
+# Tolerance of the test for whole numbers after multiplication by a power of ten.
+_ROUNDING = 2e-6
+# Relative difference from single precision of such numbers that were written with ten significant digits or more.
+_NEAR_SINGLE = 1e-10
+_BITS_SINGLE = 2.0**24
+
+
+def point_tol(numbers: NDArray[Any], size: int | None = None) -> float:
+    """Return the largest distance from the manifold of points that consist of these numbers.
+
+    Rounding changes every number by at most half a unit in the last decimal. The tolerance for single precision is
+    larger than its rounding error, because errors of computations in single precision add up. The majority of the
+    numbers determines the tolerance, so that a single wrong point does not affect it.
+
+    Parameters
+    ----------
+    numbers : ndarray
+        Numbers of the points as passed by the user. Numbers that are not finite are ignored.
+    size : int, optional
+        How many numbers a point consists of, by default the length of the last axis.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> point_tol(np.array([1 / 3, 2 / 3])), point_tol(np.array([0.333333, 0.666667]))
+    (1e-08, 0.0001)
+    >>> round(point_tol(np.array([0.424, 0.906])), 6)
+    0.000707
+    """
+    count = numbers.size
+    if numbers.dtype.kind not in "fc" or not count or numbers.itemsize < 8 or numbers.dtype == np.complex64:
+        return dtype_tol(numbers.dtype)
+    # Usually these three numbers have full precision, and no others are inspected.
+    for i in (0, count // 2, count - 1):
+        x = numbers.item(i).real
+        mantissa = abs(math.frexp(x)[0]) * _BITS_SINGLE % 1.0
+        margin = _NEAR_SINGLE * _BITS_SINGLE
+        if float(f"{x:.{_DIGITS}g}") == x or not margin < mantissa < 1 - margin:
+            return _tol_of_rounded(numbers, size or (numbers.shape[-1] if numbers.ndim else 1))
+    return POINT_TOL
+
+
+def dtype_tol(dtype: np.dtype[Any]) -> float:
+    """Return the tolerance for points with this data type."""
+    if dtype == np.float16:
+        return POINT_TOL_LARGEST
+    return POINT_TOL_ROUNDED if dtype in (np.float32, np.complex64) else POINT_TOL
+
+
+def _tol_of_rounded(numbers: NDArray[Any], size: int) -> float:
+    rows = numbers.reshape(-1, size)
+    rows = rows[:: len(rows) // _SAMPLE + 1]
+    if rows.dtype.kind == "c":
+        rows = np.concatenate([rows.real, rows.imag], axis=1)
+    with np.errstate(all="ignore"):
+        rows = np.abs(rows.astype(np.float64))
+        sizes = rows.max(axis=1)
+        used = np.isfinite(sizes) & (sizes > 0)
+        # Whole numbers are exact.
+        x = rows[used][~_are_whole(rows[used])]
+        single = np.abs(x - x.astype(np.float32)) <= _NEAR_SINGLE * x
+        rounded = single | _are_whole(x * 10.0 ** (_DIGITS - 1 - np.floor(np.log10(x))))
+        if np.count_nonzero(rounded) <= _MOST * len(x):
+            return POINT_TOL
+        decimals = next((d for d in range(1, _DIGITS) if np.mean(_are_whole(x * 10.0**d)) > _MOST), _DIGITS)
+        rounding = 0.5 * math.sqrt(rows.shape[1]) * 10.0**-decimals / max(1.0, sizes[used].min())
+    return float(min(max(POINT_TOL_ROUNDED, rounding), POINT_TOL_LARGEST))
+
+
+def _are_whole(x: NDArray[np.float64]) -> NDArray[np.bool_]:
+    return np.asarray(np.abs(x - np.rint(x)) <= _ROUNDING)
+
+
+# ---- validation of arrays of numbers, vectors and matrices, and of words ----
+
+Array = NDArray[Any]
+REMOVE = "remove missing values"
+
+
+@contextmanager
+def unmoved_by_underflow() -> Iterator[None]:
+    """Let numbers too small for double precision become zero, whatever NumPy's error settings."""
+    with np.errstate(under="ignore"):
+        yield
+
+
+def one_of(value: Any, name: str, *choices: str) -> str:
+    """Return a word, or raise ValidationError if it is not one of the choices."""
+    if not isinstance(value, str) or value not in choices:
+        listed = ", ".join(map(repr, choices[:-1]))
+        raise ValidationError(f"{name} must be {listed} or {choices[-1]!r}, not {short_repr(value)}")
+    return value
+
+
+def numbers(value: ArrayLike, name: str, axes: int) -> tuple[Array, float]:
+    """Return a real or complex array in double precision, and the tolerance for its points.
+
+    Examples
+    --------
+    >>> numbers([1, 2], "x", 1)
+    (array([1., 2.]), 1e-08)
+    """
+    array, tol = _cast_numbers(value, name, axes)
+    check_finite(array, name)
+    return array.copy(), tol
+
+
+def _cast_numbers(value: ArrayLike, name: str, axes: int) -> tuple[Array, float]:
+    array = as_array(value, name)
+    if array.dtype.kind not in "biufc":
+        raise ValidationError(f"{name} must be an array of numbers, not of {array.dtype}")
+    if array.ndim < axes:
+        raise ValidationError(f"{name} has shape {array.shape}, but needs at least {axes} axes")
+    return cast(array, np.complex128 if array.dtype.kind == "c" else np.float64), point_tol(array)
+
+
+def check_finite(array: Array, name: str, remedy: str = REMOVE) -> None:
+    """Raise ValidationError for numbers that are not finite."""
+    refuse(~np.isfinite(array), name, lambda i: f"is {array[i]}, but must be finite; {remedy}")
+
+
+def real_numbers(value: ArrayLike, name: str, shape: tuple[int | None, ...]) -> tuple[Array, float]:
+    """Return the same for real numbers with the given last axes; None allows any length except 0."""
+    array, tol = numbers(value, name, len(shape))
+    _check_real(array, name, shape)
+    return array, tol
+
+
+def unchecked_numbers(value: ArrayLike, name: str, shape: tuple[int | None, ...]) -> tuple[Array, float]:
+    """Return the same for real numbers that may be infinite or NaN; the array may be `value` itself."""
+    array, tol = _cast_numbers(value, name, len(shape))
+    _check_real(array, name, shape)
+    return array, tol
+
+
+def _check_real(array: Array, name: str, shape: tuple[int | None, ...]) -> None:
+    last = array.shape[array.ndim - len(shape) :]
+    fits = all(n == m or (m is None and n > 0) for n, m in zip(last, shape, strict=True))
+    if array.dtype.kind == "c" or not fits:
+        wanted = ", ".join("n" if m is None else str(m) for m in shape)
+        kind = "complex" if array.dtype.kind == "c" else "real"
+        raise ValidationError(f"{name} must be real, of shape (..., {wanted}), not {kind} of shape {array.shape}")
+
+
+def square_matrices(value: ArrayLike, name: str) -> tuple[Array, float]:
+    """Return the same for square matrices, real or complex."""
+    array, tol = numbers(value, name, 2)
+    if array.shape[-1] != array.shape[-2] or array.shape[-1] == 0:
+        raise ValidationError(f"{name} must be square matrices, of shape (..., n, n), not {array.shape}")
+    return array, tol
+
+
+def unit_vectors(x: Array, tol: float, name: str, what: str, advice: str = "divide it by its length") -> Array:
+    """Normalise unit vectors.
+
+    Raises
+    ------
+    ValidationError
+        If the length of a vector is not 1.
+    """
+    lengths = length(np.abs(x))
+    refuse(~(np.abs(lengths - 1) <= tol), name, lambda i: f"is not {what}: its length is {lengths[i]}, not 1; {advice}")
+    return x / lengths[..., None]
+
+
+def length(x: Array) -> Array:
+    """Return |x| of real vectors without intermediate overflow, shape of the leading axes."""
+    with np.errstate(over="ignore"):
+        result: Array = np.hypot.reduce(x, axis=-1)
+    return result
+
+
+def off_one(x: Array) -> Array:
+    """Return the deviation of columns from orthonormal: the largest entry of |X*X − 1| of every matrix."""
+    # Of input that is far off.
+    with np.errstate(over="ignore", invalid="ignore"):
+        return largest(adjoint(x) @ x - np.eye(x.shape[-1]))
+
+
+def largest(x: Array) -> Array:
+    """Return the largest entry of every matrix by magnitude."""
+    result: Array = np.abs(x).max(axis=(-2, -1))
+    return result
+
+
+def hermitian_part(x: Array) -> Array:
+    """Return (X + X*) / 2."""
+    return np.asarray((x + adjoint(x)) / 2)
+
+
+def check_symmetric(x: Array, allowed: Any, name: str, kind: str = "symmetric", advice: str = "") -> None:
+    """Raise ValidationError for matrices whose entries differ by more than is allowed from those across the diagonal.
+
+    For the kind "Hermitian", the entries across the diagonal must be complex conjugates.
+    """
+    # Input that is far off may overflow.
+    with np.errstate(over="ignore", invalid="ignore"):
+        off = largest(x - (adjoint(x) if kind == "Hermitian" else np.swapaxes(x, -1, -2)))
+    refuse(~(off <= allowed), name, lambda i: f"is not {kind}: entries differ by {off[i]:.3e}{advice}")
+
+
+def check_orthonormal(x: Array, tol: float, name: str, advice: str) -> None:
+    """Raise ValidationError for matrices whose columns are not orthonormal."""
+    off = off_one(x)
+    refuse(~(off <= tol), name, lambda i: f"does not have orthonormal columns: |X*X - 1| is {off[i]:.3e}; {advice}")

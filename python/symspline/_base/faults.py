@@ -120,20 +120,20 @@ def from_core(
     number, kind, node, value, limit, why = raw
     if kind == "invalid":
         return Fault(number, INVALID, str(why), "", node, value, limit)
-    own, about_times = CUT_LOCUS, False
+    category, about_times = CUT_LOCUS, False
     following = (node or 0) + 1
     if names is not None and node is not None:
         node, following = names[node], names[min(following, len(names) - 1)]
     handle, pair = f"the control handle at points[{node}]{{of}}", f"points[{node}] and points[{following}]{{of}}"
     past = f"lie at or past each other's cut locus: angle {value}, limit {limit}"
     if kind == "almost-cut":
-        own, remedy = ALMOST_CUT, ""
+        category, remedy = ALMOST_CUT, ""
         what = (
             f"neighbours almost at the cut locus: between {pair} the angle is {value}, limit {limit}; had it been a "
             "little more, the curve would go the other way round: put a point between them"
         )
     elif kind == "cut-locus" and limit == float("inf"):
-        own = UNCONVERGED
+        category = UNCONVERGED
         what = f"the geodesic between {pair} has no significant digits: they are too far apart for double precision"
         remedy = "put a point between them"
     elif kind == "cut-locus":
@@ -144,7 +144,7 @@ def from_core(
         what = f"the control points between {pair} {past}"
         remedy = f"put a point between them, or {_SUIT}"
     elif kind == "outer-handle" and limit == float("inf"):
-        own, about_times = UNCONVERGED, True
+        category, about_times = UNCONVERGED, True
         what = f"{handle} has length {value:.1f}, too long for floating-point numbers"
         remedy = f"{_SUIT}: the segments next to it differ too much in length"
     elif kind == "outer-handle":
@@ -152,17 +152,17 @@ def from_core(
         what = f"{handle} passes the cut locus: angle {value}, limit {limit}"
         remedy = f"put more points there, or {_SUIT}"
     elif kind == "imprecise":
-        own = UNCONVERGED
+        category = UNCONVERGED
         what, remedy = imprecise("{of}", value, tol)
     elif kind in ("homotopy", "overflow"):
-        own, about_times = UNCONVERGED, kind == "overflow"
+        category, about_times = UNCONVERGED, kind == "overflow"
         longest, iterations = columns.row("max_step")[number], columns.row("iterations")[number]
         why = "numbers exceeded the floating-point range" if about_times else "the homotopy did not reach these points"
         what = f"no convergence{{of}}: after {iterations} iterations {why} (longest step {_length(longest)})"
         remedy = f"{'' if about_times else 'try another method, '}put more points where steps are long, or {_SUIT}"
     else:
         return unconverged(number, columns, tol)
-    return Fault(number, own, what, remedy, node, value, limit, about_times)
+    return Fault(number, category, what, remedy, node, value, limit, about_times)
 
 
 def _length(x: Any) -> str:

@@ -105,10 +105,10 @@ def refuse_objects(array: NDArray[Any], name: str) -> None:
     i = next((i for i, entry in enumerate(flat) if not isinstance(entry, (int, float, complex))), None)
     if i is None:
         raise ValidationError(f"{name} must be an array of numbers, not of object; pass {name}.astype(float)")
-    found = flat[i]
+    entry = flat[i]
     where = name + _index(i, array)
-    kind = f"{type(found).__module__}.{type(found).__qualname__}".removeprefix("builtins.")
-    how = next((c for c in _CONVERSIONS if hasattr(found, c)), None)
+    kind = f"{type(entry).__module__}.{type(entry).__qualname__}".removeprefix("builtins.")
+    how = next((c for c in _CONVERSIONS if hasattr(entry, c)), None)
     call = "" if how in ("magnitude", "datetime64") else "()"
     advice = f"pass its .{how}{call}" if how else "leave it out, or convert it to numbers"
     raise ValidationError(f"{where} must be an array of numbers, not of object: it is a {kind}; {advice}")
@@ -205,7 +205,7 @@ def _moments_of_texts(cells: list[str]) -> tuple[NDArray[Any], bool] | None:
         return None
     of_cell = np.array([numbers[shape] for shape in shapes])
     texts = np.array(cells)
-    found = []
+    groups = []
     for number, match in enumerate(matches):
         assert match is not None
         codes = texts[of_cell == number].view(np.uint32).reshape(-1, texts.itemsize // 4)
@@ -216,9 +216,9 @@ def _moments_of_texts(cells: list[str]) -> tuple[NDArray[Any], bool] | None:
         if match["zone"] is not None:
             names, of_row = np.unique(_column(codes, match.span("zone")), return_inverse=True)
             moments = moments - np.array([minutes_of(zone) for zone in names.tolist()], "timedelta64[m]")[of_row]
-        found.append(moments)
-    result = np.empty(len(cells), np.result_type(*found))
-    for number, moments in enumerate(found):
+        groups.append(moments)
+    result = np.empty(len(cells), np.result_type(*groups))
+    for number, moments in enumerate(groups):
         result[of_cell == number] = moments
     return result, zoned == {True}
 

@@ -42,7 +42,7 @@ class FarPointsWarning(UserWarning):
 
 def columns_of(kind: type) -> dict[str, type]:
     """Return the fields of a report that have one value per curve, and their types, in their order."""
-    return {own.name: own.metadata["dtype"] for own in fields(kind) if "dtype" in own.metadata}
+    return {entry.name: entry.metadata["dtype"] for entry in fields(kind) if "dtype" in entry.metadata}
 
 
 class FitReport:
@@ -52,12 +52,12 @@ class FitReport:
         """Whether both are equal, with NaN equal to NaN."""
         if type(other) is not type(self):
             return NotImplemented
-        each = [(mine, getattr(other, name)) for name, mine in vars(self).items()]
+        pairs = [(mine, getattr(other, name)) for name, mine in vars(self).items()]
         return all(
             bool(a == b)
             if a is None or b is None or isinstance(a, (str, tuple))
             else np.array_equal(a, b, equal_nan=True)
-            for a, b in each
+            for a, b in pairs
         )
 
     def __hash__(self) -> int:
@@ -210,15 +210,15 @@ class Report(FitReport):
         )
         if self.invariant_radius is not None and not np.isnan(self.invariant_radius).any():
             radii = np.reshape(self.invariant_radius, (np.size(self.converged), -1)).max(axis=0)
-            each = " and ".join(f"{radius:.3g}" for radius in radii)
-            text += f", control handles stay below {each} (Theorem 3.1)"
+            limits = " and ".join(f"{radius:.3g}" for radius in radii)
+            text += f", control handles stay below {limits} (Theorem 3.1)"
         return text
 
     def __repr__(self) -> str:
         if np.ndim(self.converged):
             # The fields of a batch are long arrays.
             return f"<Report of {np.size(self.converged)} curves: {self}>"
-        return f"Report({', '.join(f'{own.name}={getattr(self, own.name)!r}' for own in fields(self))})"
+        return f"Report({', '.join(f'{entry.name}={getattr(self, entry.name)!r}' for entry in fields(self))})"
 
     def _replaced(self, columns: dict[str, Any]) -> Self:
         """Replace fields; those of one curve are None instead of NaN, and its number of sweeps is an integer."""
@@ -246,7 +246,7 @@ NUMBERS = (
     *("residual", "max_step", "rate", "invariant_radius", "contraction_bound"),
     *("guaranteed_sweeps", "alternative_energy"),
 )
-OPTIONAL = tuple(own.name for own in fields(Report) if own.metadata.get("optional"))
+OPTIONAL = tuple(entry.name for entry in fields(Report) if entry.metadata.get("optional"))
 MAX_STEP = NUMBERS.index("max_step")
 
 
@@ -295,8 +295,8 @@ def combined(reports: Sequence[Report], max_step: Any, curvature: float, alterna
 
     def of_all(name: str, whole: Any) -> Any:
         # Theorem 3.1 applies to each factor separately, and to the product only if it applies to all of them.
-        each = [getattr(report, name) for report in reports]
-        return None if any(one is None for one in each) else whole(np.stack(each))[()]
+        values = [getattr(report, name) for report in reports]
+        return None if any(one is None for one in values) else whole(np.stack(values))[()]
 
     converged: Any = np.all(np.stack([np.asarray(report.converged) for report in reports]), axis=0)
     skipped = {name for report in reports for name in report.skipped}
@@ -311,8 +311,8 @@ def combined(reports: Sequence[Report], max_step: Any, curvature: float, alterna
         invariant_radius=_per_factor(of_all("invariant_radius", np.array)),
         rate=largest("rate"),
         alternative_energy=alternative_energy,
-        contraction_bound=of_all("contraction_bound", lambda own: np.max(own, axis=0)),
-        guaranteed_sweeps=_count(of_all("guaranteed_sweeps", lambda own: np.max(own, axis=0))),
+        contraction_bound=of_all("contraction_bound", lambda bounds: np.max(bounds, axis=0)),
+        guaranteed_sweeps=_count(of_all("guaranteed_sweeps", lambda bounds: np.max(bounds, axis=0))),
         skipped=tuple(name for name in SOLVERS if name in skipped),
     )
 

@@ -1,19 +1,182 @@
-"""Threads of parallel work, and information about the installation."""
+"""Files that arguments name, threads of parallel work, and information about the installation."""
 
+from __future__ import annotations
+
+import errno
+import io
 import os
 import platform
+import re
+import secrets
+import stat
 import sys
 import threading
+import time
+import zlib
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from .. import _core, _cpu
 from .._core import ValidationError
-from .arrays import whole_number
-from .version import VERSION
+from . import VERSION
+from .arrays import brief, short_repr, whole_number
+
+# Characters of the file's own name in that of a temporary one: at most 128 bytes of the 255 that file systems allow.
+_TAIL = 32
+# Age in seconds above which a temporary file of another machine, or of a running process, counts as abandoned.
+_OLD = 24 * 3600
+
+
+def path_of(file: Any, name: str = "file", *, method: str, text: bool = False) -> Path | None:
+    """The path that an argument names, or None if it is an open file.
+
+    Numbers are refused: Python opens 0, 1 and 2 as the standard streams.
+
+    Parameters
+    ----------
+    file : path or open file
+        The argument.
+    name : str
+        What the caller calls the argument.
+    method : {"read", "write"}
+        What an open file must have.
+    text : bool
+        Whether an open file must be open as text.
+
+    Raises
+    ------
+    TypeError
+        The argument is neither.
+    ValidationError
+        It is a text that cannot be the name of a file.
+    """
+    if callable(getattr(file, method, None)):
+        if isinstance(file, (io.RawIOBase, io.BufferedIOBase) if text else io.TextIOBase):
+            mode = "as text, without 'b' in its mode" if text else "in binary mode, with 'b'"
+            raise TypeError(f"{name} must be open {mode}; pass its name, or open it so")
+        return None
+    if not isinstance(file, (str, os.PathLike)):
+        raise TypeError(f"{name} must be a path or an open file with a method {method}, not {short_repr(file)}")
+    path = os.fspath(file)
+    if not isinstance(path, str):
+        raise TypeError(f"{name} must be a path of text, not {short_repr(path)}")
+    if not path:
+        raise ValidationError(f"{name} is an empty text, which names no file")
+    try:
+        os.fsencode(path)
+    except UnicodeEncodeError:
+        raise ValidationError(f"{name} = {short_repr(path)} is not the name of a file: it is not Unicode") from None
+    if "\0" in path:
+        raise ValidationError(f"{name} = {short_repr(path)} is not the name of a file: it holds a null character")
+    return Path(path)
+
+
+@contextmanager
+def damage(file: object, problem: str) -> Iterator[None]:
+    """Raise ValidationError with the name of a file for errors in reading what it holds.
+
+    Damaged files cause errors of zipfile, of its decompressors, of NumPy, of JSON and of other libraries. They are
+    described by ``found``, such as "is damaged".
+    """
+    try:
+        yield
+    except (OSError, MemoryError, ImportError):
+        raise
+    except ValidationError as error:
+        raise ValidationError(f"{file}: {error}") from None
+    except Exception as error:
+        raise ValidationError(f"{file} {problem}: {brief(error)}") from None
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """Write a file as a whole: a context whose value is a temporary path, which takes the place of ``path``.
+
+    The temporary file lies in the same folder and has the same ending. If the body fails it is removed, and an
+    existing file stays as it was. If the body succeeds, its data are flushed to disk before it is renamed. An existing
+    file keeps its permissions and, where the system allows that, its owner. Of a symbolic link the target is
+    replaced.
+
+    Raises
+    ------
+    OSError
+        ``path`` is a folder, a device, a pipe or a socket, or cannot be written.
+    """
+    # Raises for links that go in circles; a link to nothing becomes a file where it points.
+    with suppress(FileNotFoundError):
+        os.stat(path)
+    target = Path(os.path.realpath(path))
+    old: os.stat_result | None = None
+    with suppress(FileNotFoundError):
+        old = os.stat(target)
+    if old is not None and not stat.S_ISREG(old.st_mode):
+        if stat.S_ISDIR(old.st_mode):
+            raise IsADirectoryError(errno.EISDIR, "it is a folder", str(path))
+        what = "it is a device, a pipe or a socket, not a regular file; pass an open file instead"
+        raise OSError(errno.EINVAL, what, str(path))
+    _remove_left(target)
+    temporary = target.with_name(f".{_machine()}-{os.getpid():x}-{secrets.token_hex(8)}{target.name[-_TAIL:]}")
+    # A new file has the permissions of any new file. One that replaces another gets those at the end, and until then
+    # nobody else may read it.
+    try:
+        os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666 if old is None else 0o600))
+    except OSError as error:
+        # The name of the user's file, not that of the temporary one.
+        raise type(error)(error.errno, error.strerror, str(path)) from None
+    try:
+        yield temporary
+        with open(temporary, "rb+") as file:
+            os.fsync(file.fileno())
+        if old is not None:
+            _keep(temporary, old)
+        temporary.replace(target)
+    finally:
+        with suppress(FileNotFoundError):
+            temporary.unlink()
+
+
+def _remove_left(target: Path) -> None:
+    """Remove temporary files of this name that killed processes did not remove."""
+    name = re.compile(rf"\.([0-9a-f]{{8}})-([0-9a-f]+)-[0-9a-f]{{16}}{re.escape(target.name[-_TAIL:])}")
+    with suppress(OSError), os.scandir(target.parent) as entries:
+        for entry in entries:
+            match = name.fullmatch(entry.name)
+            with suppress(OSError):
+                if match is not None and _is_left(match[1] == _machine(), int(match[2], 16), entry.stat().st_mtime):
+                    os.unlink(entry.path)
+
+
+def _is_left(here: bool, process: int, changed: float) -> bool:
+    """Whether no process can still be writing a file: the process of this machine has ended, or the file is old."""
+    if here and os.name == "posix" and process != os.getpid():
+        try:
+            os.kill(process, 0)
+        except (ProcessLookupError, OverflowError):
+            return True
+        except OSError:
+            return False
+    return time.time() - changed > _OLD
+
+
+def _machine() -> str:
+    """Return a text that differs between machines that share a folder."""
+    return f"{zlib.crc32(platform.node().encode()):08x}"
+
+
+def _keep(temporary: Path, old: os.stat_result) -> None:
+    """Keep owner and permissions of the file that is replaced."""
+    new = os.stat(temporary)
+    if hasattr(os, "chown") and (new.st_uid, new.st_gid) != (old.st_uid, old.st_gid):
+        with suppress(OSError):
+            os.chown(temporary, old.st_uid, old.st_gid)
+    os.chmod(temporary, stat.S_IMODE(old.st_mode))
+
+
+# ---- threads of parallel work ----
 
 # More threads would only wait for each other, and operating systems limit their number.
 _MOST = 1024

@@ -127,9 +127,9 @@ class TimeAxis:
             times = self._doubles(array, self.origin, name)
         else:
             # Times of each curve are differences from its own first knot.
-            own = array.shape[len(batch) :] if per_curve else array.shape
-            origin = self.origin.reshape(batch + (1,) * len(own))
-            times, per_curve = self._doubles(np.broadcast_to(array, batch + own), origin, name), True
+            axes = array.shape[len(batch) :] if per_curve else array.shape
+            origin = self.origin.reshape(batch + (1,) * len(axes))
+            times, per_curve = self._doubles(np.broadcast_to(array, batch + axes), origin, name), True
         if knots is None or array.dtype.kind != "f":
             return times, per_curve
         return onto_ends(times, knots, batch, per_curve, array.dtype, 0.0 if self.dates else self.origin)
@@ -242,7 +242,7 @@ def knots_of(t: TimesLike | None, batch: tuple[int, ...], nodes: int) -> tuple[T
     if time_axis.plain and not isinstance(t, Moments):
         warn_of_rounded_times(shown)
     if shown.shape != (nodes,) and shown.shape != (*batch, nodes):
-        own = f" or {(*batch, nodes)}" if batch else ""
+        rows = f" or {(*batch, nodes)}" if batch else ""
         axis = batch.index(shown.size) if shown.ndim == 1 and shown.size in batch else None
         which = "first axis" if axis == 0 else f"axis {axis}"
         remedy = (
@@ -250,7 +250,7 @@ def knots_of(t: TimesLike | None, batch: tuple[int, ...], nodes: int) -> tuple[T
             f"point: pass np.moveaxis(points, {axis}, {len(batch)})."
         )
         raise ValidationError(
-            f"t has shape {shown.shape}, but {nodes} points per curve need {(nodes,)}{own}"
+            f"t has shape {shown.shape}, but {nodes} points per curve need {(nodes,)}{rows}"
             + remedy * (axis is not None)
         )
     return time_axis, shown, time_axis.knots(shown)
@@ -290,13 +290,13 @@ def onto_ends(
     ends = knots[..., 0], knots[..., -1]
     if not (x.size and knots.size) or (x.min() >= ends[0].max() and x.max() <= ends[1].min()):
         return x, per_curve
-    own = x.shape[len(batch) :] if per_curve else x.shape
+    axes = x.shape[len(batch) :] if per_curve else x.shape
     if per_curve and x.shape[: len(batch)] != batch:
         # The evaluation raises an error for this shape.
         return x, per_curve
     if knots.ndim > 1:
-        first, last = (end.reshape(batch + (1,) * len(own)) for end in ends)
-        shift = np.reshape(origin, batch + (1,) * len(own)) if np.ndim(origin) else origin
+        first, last = (end.reshape(batch + (1,) * len(axes)) for end in ends)
+        shift = np.reshape(origin, batch + (1,) * len(axes)) if np.ndim(origin) else origin
     else:
         (first, last), shift = ends, origin
     size = np.maximum(np.abs(first), np.abs(last))
@@ -309,8 +309,8 @@ def onto_ends(
         before, behind = (x < first) & (x >= first - reach), (x > last) & (x <= last + reach)
     if not (before.any() or behind.any()):
         return x, per_curve
-    found = np.where(before, first, np.where(behind, last, x))
-    return np.asarray(found, order="C"), per_curve or found.ndim > x.ndim
+    moved = np.where(before, first, np.where(behind, last, x))
+    return np.asarray(moved, order="C"), per_curve or moved.ndim > x.ndim
 
 
 def _difference(array: NDArray[Any], origin: Any) -> NDArray[np.int64]:
@@ -420,15 +420,15 @@ def seconds_of(value: Any, name: str, dates: bool = True) -> Any:
         step = getattr(value, "asm8", np.timedelta64(value))
         return np.nan if np.isnat(step) else float(step / np.timedelta64(1, "s"))
     try:
-        found = parts_of_duration(value)
+        parts = parts_of_duration(value)
     except ArithmeticError:
-        found = None
-    if found is None or not found[1]:
+        parts = None
+    if parts is None or not parts[1]:
         raise ValidationError(
             f"{name} is {short_repr(value)}, which is not a duration. Pass a number of seconds, a timedelta64, or a "
             f"text with a unit, such as '3h' or '10min'; units are {', '.join(NANOSECONDS)}."
         )
-    return float(found[0] * NANOSECONDS[found[1]] / NANOSECONDS["s"])
+    return float(parts[0] * NANOSECONDS[parts[1]] / NANOSECONDS["s"])
 
 
 # ---- times whose spacing in double precision is coarse ----

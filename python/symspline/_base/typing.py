@@ -60,6 +60,10 @@ File = str | PathLike[str] | IO[bytes]
 Color = str | tuple[float, ...]
 
 
+# Options of artists of matplotlib.
+Look = dict[str, Any]
+
+
 class AxesLook(TypedDict, total=False):
     """The options of plots into existing axes."""
 
@@ -140,12 +144,10 @@ class FitOptions(SolverOptions, total=False):
     skipna: bool
 
 
-class LsqOptions(TypedDict, total=False):
-    """The keywords of `make_lsq_spline`."""
+class SmoothingSolver(TypedDict, total=False):
+    """The keywords that all functions for smoothing splines have."""
 
-    weights: Numbers | None
     loss: Loss
-    frames: Numbers | None
     penalty: SmoothingPenalty
     sigma: Numbers | None
     bc_type: SmoothingBCType | None
@@ -155,6 +157,13 @@ class LsqOptions(TypedDict, total=False):
     extrapolate: Extrapolate
     on_failure: OnFailure
     atol: float | None
+
+
+class LsqOptions(SmoothingSolver, total=False):
+    """The keywords of `make_lsq_spline`."""
+
+    weights: Numbers | None
+    frames: Numbers | None
     where: ArrayLike | None
     progress: Progress | None
     skipna: bool
@@ -168,23 +177,13 @@ class ChoiceOptions(LsqOptions, total=False):
     gamma: float
 
 
-class SmoothOptions(TypedDict, total=False):
+class SmoothOptions(SmoothingSolver, total=False):
     """The keywords of `symspline.xarray.smooth` that it passes to `make_smoothing_spline`."""
 
     lam: Numbers | None
     knots: TimesLike | None
     criterion: Criterion
     gamma: float
-    penalty: SmoothingPenalty
-    sigma: Numbers | None
-    bc_type: SmoothingBCType | None
-    loss: Loss
-    method: SmoothingMethod
-    tol: float
-    max_iter: int
-    extrapolate: Extrapolate
-    on_failure: OnFailure
-    atol: float | None
 
 
 class SmoothingOptions(ChoiceOptions, total=False):

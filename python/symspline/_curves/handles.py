@@ -9,7 +9,7 @@ import numpy as np
 from .._base.faults import of_index
 from .._core import CutLocusError, ValidationError
 from .._spaces import Array, Doubles, Space, Torus
-from .._spaces.circle import TURN, wrap
+from .._spaces.statistics import TURN, wrap
 
 # Handles shorter than this fraction of the injectivity radius are valid without further tests.
 _SHORT = 0.99

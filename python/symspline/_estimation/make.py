@@ -9,7 +9,7 @@ from typing import Any, TypedDict, Unpack, cast, overload
 
 import numpy as np
 
-from .._base.arrays import as_array, checked_flag, checked_number, short_repr, whole_number
+from .._base.arrays import as_array, checked_flag, checked_number, one_of, short_repr, whole_number
 from .._base.faults import UNCONVERGED, Fault
 from .._base.input import times_of
 from .._base.time import Moments, TimeAxis, knots_of, time_axis_of, warn_of_rounded_times
@@ -26,7 +26,6 @@ from .._base.typing import (
     SmoothingPenalty,
     TimesLike,
 )
-from .._base.validation import one_of
 from .._core import ValidationError
 from .._curves.failures import raise_or_warn, warn_of_held_points
 from .._curves.fit import FitProblem, fit, read_ends

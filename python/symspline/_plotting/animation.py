@@ -11,11 +11,12 @@ from matplotlib.animation import FuncAnimation, writers
 from matplotlib.axes import Axes
 
 from .._base.arrays import checked_number, short_repr, whole_number
-from .._base.disk import path_of, replacing
+from .._base.system import path_of, replacing
+from .._base.typing import FloatArray, Look
 from .._core import ValidationError
 from .curves import Curve
 from .plot import page_of
-from .style import DATES, MARK, Array, ink
+from .style import DATES, MARK, ink
 
 _DPI = 80
 _MOST_FRAMES = 10_000
@@ -33,15 +34,15 @@ def animate(curve: Any, file: Any = None, frames: int = 60, fps: float = 15, **l
     if curve._batch:
         raise ValidationError(f"this is a batch of {len(curve)} curves. Animate one of them: curves[0].animate(...).")
     path = None if file is None else _checked_path(file)
-    figure, (own,) = page_of(curve, **look)
+    figure, (drawn,) = page_of(curve, **look)
     # Frames at equal distances in time, without those in gaps.
-    even = np.linspace(own.x[0], own.x[-1], frames)
-    times = own.x[np.unique(np.clip(np.searchsorted(own.x, even), 0, len(own.x) - 1))]
-    updates = list(_updates(figure.axes, own))
+    even = np.linspace(drawn.x[0], drawn.x[-1], frames)
+    times = drawn.x[np.unique(np.clip(np.searchsorted(drawn.x, even), 0, len(drawn.x) - 1))]
+    updates = list(_updates(figure.axes, drawn))
     clock = figure.text(0.99, 0.99, "", ha="right", va="top", fontsize="large")
 
     def update(x: float) -> list[Any]:
-        clock.set_text(_time(own, x))
+        clock.set_text(_time(drawn, x))
         for one in updates:
             one(x)
         return []
@@ -93,10 +94,10 @@ def _updates(figures: list[Axes], curve: Curve) -> Iterator[_Update]:
         yield lambda time, move=move, x=x: move(min(int(np.searchsorted(x, time)), len(x) - 1))  # type: ignore[misc]
 
 
-def _marker(axes: Any, x: Array, positions: Array) -> _Update:
+def _marker(axes: Any, x: FloatArray, positions: FloatArray) -> _Update:
     """Return a function that moves a marker to the position at a time, or hides it outside a segment."""
     nowhere = np.full((positions.shape[1], 1), np.nan)
-    look: Any = {"marker": "o", "markersize": 9, "color": MARK, "markeredgecolor": ink(0), "linestyle": "none"}
+    look: Look = {"marker": "o", "markersize": 9, "color": MARK, "markeredgecolor": ink(0), "linestyle": "none"}
     (dot,) = axes.plot(*nowhere, zorder=8, **look)
 
     def update(time: float) -> None:

@@ -1,29 +1,57 @@
-"""Curves in R² and R³, and in the hyperbolic plane, drawn in the Poincaré disk."""
+"""Curves in R² and R³, paths of rigid motions, and the hyperbolic plane, drawn in the Poincaré disk."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from itertools import product
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_rgba
 from matplotlib.patches import Circle
 from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import Bbox, TransformedBbox
 from mpl_toolkits.mplot3d import Axes3D, proj3d
 
+from .._base.typing import FloatArray, Look
 from .._spaces import Hyperbolic
-from .curves import Curve
+from .curves import Curve, Mover
 from .globe import centre_of
-from .lines import CIRCLE, FRAME, SHADOW, disc_indices, draw_dots, draw_in_plane, draw_line, draw_polygon, fresh
-from .panels import Panel, View
-from .style import AXES, Array, closest, halo, ink, named_from, note, paper, plain, round_start, scale_of, window
+from .panels import (
+    CIRCLE,
+    FRAME,
+    SHADOW,
+    START,
+    Panel,
+    View,
+    disc_indices,
+    draw_dots,
+    draw_in_plane,
+    draw_line,
+    draw_polygon,
+    fresh,
+)
+from .style import (
+    AXES,
+    Numbers,
+    apart,
+    axes_size,
+    closest,
+    halo,
+    ink,
+    named_from,
+    note,
+    paper,
+    plain,
+    round_start,
+    scale_of,
+    window,
+)
 
-Positions = Callable[[Any], Array]
-"""Takes points, and returns their positions, shape (m, 2) or (m, 3)."""
 _PLANE = Hyperbolic(2)
 _ORIGIN = np.array([1.0, 0.0, 0.0])
 _STEMS = 25
@@ -38,7 +66,7 @@ _FILLED, _ZOOM = 0.76, 1.4
 # ---- the plane ----
 
 
-def plane(curves: Sequence[Curve], positions: Positions = np.asarray, draw: Any = None, **look: Any) -> View:
+def plane(curves: Sequence[Curve], positions: Numbers = np.asarray, draw: Any = None, **look: Any) -> View:
     """Return the view of curves in the plane with equal scales, with the proportions of the curves."""
     view = View(draw or _draw_plane, has_many=True, **look)
     across, high = np.ptp(np.concatenate([positions(curve.extent) for curve in curves]), axis=0)
@@ -57,7 +85,7 @@ def _draw_plane(panel: Panel, curves: Sequence[Curve]) -> None:
         draw_in_plane(axes, curve, lambda points: np.asarray(points) - origin, rims)
 
 
-def plane_axes(panel: Panel, curves: Sequence[Curve], positions: Positions) -> tuple[Axes, Array]:
+def plane_axes(panel: Panel, curves: Sequence[Curve], positions: Numbers) -> tuple[Axes, FloatArray]:
     """Return axes with equal scales, and the position from which they count, which their labels name."""
     (axes,) = panel.axes
     origin = origin_of(panel, curves, positions)
@@ -70,12 +98,12 @@ def plane_axes(panel: Panel, curves: Sequence[Curve], positions: Positions) -> t
     return axes, origin
 
 
-def origin_of(panel: Panel, curves: Sequence[Curve], positions: Positions) -> Array:
+def origin_of(panel: Panel, curves: Sequence[Curve], positions: Numbers) -> FloatArray:
     """Return a position from which pictures count: a round number for coordinates that are far from zero.
 
     In axes of the user it is zero, as others draw into them.
     """
-    everything = np.concatenate([positions(own.extent) for own in curves])
+    everything = np.concatenate([positions(curve.extent) for curve in curves])
     if not panel.mine:
         return np.zeros(everything.shape[1])
     return np.array([round_start(*ends) for ends in zip(everything.min(axis=0), everything.max(axis=0), strict=True)])
@@ -84,7 +112,7 @@ def origin_of(panel: Panel, curves: Sequence[Curve], positions: Positions) -> Ar
 # ---- space ----
 
 
-def solid(curves: Sequence[Curve], positions: Positions = np.asarray, draw: Any = None, **look: Any) -> View:
+def solid(curves: Sequence[Curve], positions: Numbers = np.asarray, draw: Any = None, **look: Any) -> View:
     """Return the view of curves in R³ in a box with equal scales, which is wide for curves that are long and flat."""
     view = View(draw or _draw_space, 5.8, 5.4, projection="3d", has_many=True, **look)
     extents = np.ptp(np.concatenate([positions(curve.extent) for curve in curves]), axis=0)
@@ -95,7 +123,7 @@ def solid(curves: Sequence[Curve], positions: Positions = np.asarray, draw: Any 
 def _draw_space(panel: Panel, curves: Sequence[Curve]) -> None:
     """Draw curves in R³, with their shadows on the floor."""
     origin = origin_of(panel, curves, np.asarray)
-    place: Positions = lambda points: np.asarray(points) - origin  # noqa: E731
+    place: Numbers = lambda points: np.asarray(points) - origin  # noqa: E731
     control = [place(curve.polygon[0]) for curve in curves if curve.polygon is not None]
     axes = box_around(panel, curves, place, origin, control)
     for curve in curves:
@@ -110,7 +138,7 @@ def _draw_space(panel: Panel, curves: Sequence[Curve]) -> None:
 
 
 def box_around(
-    panel: Panel, curves: Sequence[Curve], positions: Positions, origin: Array, more: Sequence[Array] = ()
+    panel: Panel, curves: Sequence[Curve], positions: Numbers, origin: FloatArray, more: Sequence[FloatArray] = ()
 ) -> Any:
     """Draw a box around curves, with their shadows on the floor in the colours of named curves, and in grey."""
     paths = [curve.near_data(positions(curve.points)) for curve in curves]
@@ -123,7 +151,7 @@ def box_around(
     return draw_box(panel, shadows, [*paths, *given, *more], origin)
 
 
-def draw_stems(axes: Any, curve: Curve, given: Array) -> None:
+def draw_stems(axes: Any, curve: Curve, given: FloatArray) -> None:
     """Draw thin lines from a few given points down to the floor, where their shadows are."""
     if curve.alone and curve.noise is None and len(given) <= _STEMS and not curve.is_mean:
         feet = given * [1, 1, 0] + [0, 0, axes.get_zlim()[0]]
@@ -131,7 +159,7 @@ def draw_stems(axes: Any, curve: Curve, given: Array) -> None:
         axes.plot(*lines.T, color=ink(0.4), linewidth=0.8, linestyle=":", zorder=2, label="_stems")
 
 
-def _draw_hose(axes: Any, curve: Curve, points: Array, radii: Array) -> None:
+def _draw_hose(axes: Any, curve: Curve, points: FloatArray, radii: FloatArray) -> None:
     """Draw the surface at given distances from the points of a curve in R³."""
     discs = disc_indices(curve)[::2]
     along = np.gradient(points[discs], axis=0)
@@ -145,21 +173,20 @@ def _draw_hose(axes: Any, curve: Curve, points: Array, radii: Array) -> None:
     frame = np.stack([aside, np.cross(along, aside)], axis=1)
     ring = np.concatenate([CIRCLE, CIRCLE[:1]]) @ frame * radii[discs, None, None]
     x, y, z = np.moveaxis(points[discs, None] + ring, -1, 0)
-    look: Any = {"color": curve.color, "alpha": 0.08, "linewidth": 0, "shade": False}
+    look: Look = {"color": curve.color, "alpha": 0.08, "linewidth": 0, "shade": False}
     axes.plot_surface(x, y, z, rstride=1, cstride=2, antialiased=False, **look)
 
 
 def draw_box(
     panel: Panel,
-    shadows: Sequence[tuple[Array, Any]],
-    others: Sequence[Array],
-    origin: Array,
-    margin: float = 0.05,
+    shadows: Sequence[tuple[FloatArray, Any]],
+    others: Sequence[FloatArray],
+    origin: FloatArray,
 ) -> Any:
     """Draw a box with equal scales around points of shape (m, 3), with lines in given colours on its floor.
 
-    Rows that are NaN are ignored. The sides are longer than the extent of all points by ``margin`` times the longest
-    one at both ends. The labels of the axes name the ``origin`` from which they count.
+    Rows that are NaN are ignored. The sides are longer than the extent of all points by a part of the longest one at
+    both ends. The labels of the axes name the ``origin`` from which they count.
     """
     axes: Any = panel.axes[0]
     # Markers of both ends are in front of lines. Surfaces hide what is behind them.
@@ -169,9 +196,9 @@ def draw_box(
     middle, half = window(everything, 1.0)
     half = half or 1.0
     # No side is shorter than a fifth of the longest one.
-    sides = np.maximum(np.ptp(everything, axis=0) / 2 + 2 * margin * half, 0.2 * half)
+    sides = np.maximum(np.ptp(everything, axis=0) / 2 + 0.1 * half, 0.2 * half)
     for line, color in shadows:
-        look: Any = {"color": color, "linewidth": 1.2, "zorder": 2, "label": fresh(axes, SHADOW)}
+        look: Look = {"color": color, "linewidth": 1.2, "zorder": 2, "label": fresh(axes, SHADOW)}
         axes.plot(*line.T[:2], np.full(len(line), middle[2] - sides[2]), **look)
     axes.set_facecolor("none")
     axes.tick_params(labelsize="small", pad=0)
@@ -205,7 +232,7 @@ def draw_box(
 class Box(Axes3D):  # type: ignore[misc]
     """Axes of a box in space that fills the place which the layout of a page gives to it."""
 
-    shares: Array = np.ones(2)
+    shares: FloatArray = np.ones(2)
     """Width and height of the box as parts of the square into which it is projected."""
 
     def apply_aspect(self, position: Any = None) -> None:
@@ -222,7 +249,7 @@ class Box(Axes3D):  # type: ignore[misc]
         return TransformedBbox(place, self.get_figure().transSubfigure).frozen()
 
 
-def _fill(axes: Any, sides: Array, corners: Array) -> None:
+def _fill(axes: Any, sides: FloatArray, corners: FloatArray) -> None:
     """Enlarge a box in its axes, where there is space."""
     axes.set_box_aspect(tuple(sides))
     x, y, _ = proj3d.proj_transform(*corners.T, axes.get_proj())
@@ -233,9 +260,9 @@ def _fill(axes: Any, sides: Array, corners: Array) -> None:
         axes.set_box_aspect(tuple(sides), zoom=float(np.clip(_FILLED / np.ptp(flat, axis=0).max(), 1.0, _ZOOM)))
 
 
-def draw_frames(axes: Any, poses: Array, length: float, origin: Array, **look: Any) -> list[Any]:
+def draw_frames(axes: Any, poses: FloatArray, length: float, origin: FloatArray, **look: Any) -> list[Any]:
     """Draw the columns of the rotations of poses of SE(3) as sticks, and return one line per column."""
-    feet = poses[:, :3, 3] - origin
+    feet = positions_of(poses) - origin
     lines = []
     for i, (color, name) in enumerate(zip(AXES, FRAME, strict=True)):
         # All sticks of one colour are one line with breaks.
@@ -244,17 +271,12 @@ def draw_frames(axes: Any, poses: Array, length: float, origin: Array, **look: A
     return lines
 
 
-def name_axis(axes: Any, at: Array, text: str) -> None:
+def name_axis(axes: Any, at: FloatArray, text: str) -> None:
     """Write the name of an axis beside a position in space."""
     axes.text(*at, text, fontsize="small", path_effects=halo(), zorder=6)
 
 
 # ---- the hyperbolic plane ----
-
-
-def disk(_: Sequence[Curve]) -> View:
-    """Return the view of the hyperbolic plane."""
-    return View(_draw_disk, has_band=True, has_many=True, is_turned=True)
 
 
 def _draw_disk(panel: Panel, curves: Sequence[Curve]) -> None:
@@ -277,13 +299,16 @@ def _draw_disk(panel: Panel, curves: Sequence[Curve]) -> None:
     note(axes, text)
 
 
-def flat(points: Array, middle: Array) -> Array:
+DISK = View(_draw_disk, has_band=True, has_many=True, is_turned=True)
+
+
+def flat(points: FloatArray, middle: FloatArray) -> FloatArray:
     """Return the positions of points in the disk with a given middle, shape (..., 2)."""
     moved = _PLANE.transvection(middle, _PLANE.log(middle, _ORIGIN), points)
     return np.asarray(moved[..., 1:] / (1 + moved[..., :1]))
 
 
-def rims(positions: Array, radii: Array) -> Array:
+def rims(positions: FloatArray, radii: FloatArray) -> FloatArray:
     """Return the rims of hyperbolic discs around positions in the disk, shape (m, k, 2).
 
     They are circles around the middle, moved by Möbius transformations.
@@ -294,7 +319,7 @@ def rims(positions: Array, radii: Array) -> Array:
     return np.stack([moved.real, moved.imag], axis=-1)
 
 
-def _middle(points: Array) -> tuple[Array, float]:
+def _middle(points: FloatArray) -> tuple[FloatArray, float]:
     """Return the middle of the disk, and its distance to the farthest point.
 
     The middle is the centre of the smallest circle around the points, unless they lie around (1, 0, 0).
@@ -313,6 +338,151 @@ def _draw_grid(axes: Axes, spacing: float) -> None:
         aside = np.cosh(along) * np.sinh(number * spacing)
         line = np.column_stack([np.cosh(along) * np.cosh(number * spacing), aside, np.sinh(along)])
         upright = flat(line, _ORIGIN)
-        look: dict[str, Any] = {"color": ink(0.2), "linewidth": 0.6 if number else 0.9, "zorder": 1}
+        look: Look = {"color": ink(0.2), "linewidth": 0.6 if number else 0.9, "zorder": 1}
         axes.plot(*upright.T, **look)
         axes.plot(*upright[:, ::-1].T, **look)
+
+
+# ---- rigid motions: the path of a body, and its orientation along the path ----
+
+_BODY: FloatArray = np.array([[1.0, 0.0], [-0.7, 0.55], [-0.35, 0.0], [-0.7, -0.55]])
+"""A body in the plane that points along its first axis."""
+_LENGTH = 0.14
+"""Distance in inches from the position of a body in the plane to its tip."""
+_MANY = 24
+"""The number of bodies of all curves, or two per curve if that is more."""
+_FRAMES = 16
+"""The largest number of frames in space, of all curves together."""
+_FAN = np.radians(30)
+"""Bodies that turn on the spot are drawn at angles of this size."""
+
+
+def positions_of(poses: FloatArray) -> FloatArray:
+    """Return the positions of poses of SE(n)."""
+    return poses[..., :-1, -1]
+
+
+def draw_bodies(panel: Panel, curves: Sequence[Curve]) -> None:
+    """Draw poses of SE(2) as bodies.
+
+    Given poses are filled bodies if they are far enough from each other, the first one hollow; light bodies are along
+    the curve. Otherwise they are dots, and some of them light bodies.
+    """
+    axes, origin = plane_axes(panel, curves, positions_of)
+    positions = np.concatenate([positions_of(curve.extent) for curve in curves])
+    unit = float(np.max(np.ptp(positions, axis=0) / axes_size(axes))) or 1.0
+    framed = [curve for curve in curves if not curve.faint]
+    light = paper(0.2)
+
+    def draw(poses: FloatArray, label: str, **look: Any) -> None:
+        if len(poses):
+            feet = positions_of(poses) - origin
+            bodies = length * _BODY @ poses[:, :2, :2].swapaxes(1, 2) + feet[:, None]
+            axes.add_collection(PolyCollection(list(bodies), zorder=6.6, label=fresh(axes, label), **look))
+            # Where the body is.
+            color = ink(0) if look["facecolor"] == ink() else ink()
+            axes.plot(*feet.T, "o", color=color, markersize=1.8, zorder=6.7, label="_feet")
+
+    for curve in curves:
+        length = _LENGTH * scale_of(axes) * unit * (1 if curve.alone else 0.6)
+        given, edge = curve.given, ink() if curve.alone and curve.has_line else curve.color
+        path = positions_of(curve.points) - origin
+        draw_line(axes, curve, curve.near_data(path), linewidth=1.6)
+        if curve.faint:
+            continue
+        has_nodes = curve.has_nodes and not curve.is_mean
+        has_bodies = curve.noise is None and has_nodes and len(_apart(given, 2 * length)) == len(given)
+        if has_bodies:
+            draw(given[:1], START, facecolor=ink(0), edgecolor=edge)
+            draw(given[1:], "given poses", facecolor=edge, edgecolor=edge)
+        elif not curve.is_mean:
+            small = float(np.clip(22 / np.sqrt(max(len(given), 1)), 1.5, 4.0))
+            # The first of the given poses is a body.
+            dots = replace(curve, has_start=not curve.has_nodes)
+            draw_dots(axes, dots, positions_of(given) - origin, markersize=small)
+        way = float(np.sum(np.linalg.norm(np.diff(path, axis=0), axis=1)))
+        spread = _apart if way > length else _turned_apart
+        dense = curve.noise is None and has_nodes and not has_bodies
+        some = spread(given if dense else curve.points[~curve.bridges], max(4 * length, way * len(framed) / _MANY))
+        if has_bodies:
+            free = np.linalg.norm(positions_of(some)[:, None] - positions_of(given), axis=-1) > 2 * length
+            some = some[free.all(axis=1)]
+        first, look = int(dense), {"edgecolor": curve.color, "linewidth": 0.8}
+        draw(some[:first], START, facecolor=ink(0), **look)
+        draw(some[first:], "some of the poses" if dense else "poses of the curve", facecolor=light, **look)
+    axes.autoscale_view()
+
+
+def _apart(poses: FloatArray, least: float) -> FloatArray:
+    """Return poses, the first among them, whose distances along the path are ``least`` or more."""
+    steps = np.linalg.norm(np.diff(positions_of(poses), axis=0, prepend=positions_of(poses[:1])), axis=1)
+    return np.asarray(poses[apart(np.cumsum(steps), least)])
+
+
+def _turned_apart(poses: FloatArray, _: float) -> FloatArray:
+    """Return poses of a body that turns on the spot, the first among them, which differ by some angle."""
+    angles = np.unwrap(np.arctan2(poses[:, 1, 0], poses[:, 0, 0]))
+    return np.asarray(poses[apart(np.cumsum(np.abs(np.diff(angles, prepend=angles[:1]))), _FAN)])
+
+
+def draw_on_path(panel: Panel, curves: Sequence[Curve]) -> None:
+    """Draw poses of SE(3) as frames on the path. Given ones are bold."""
+    origin = origin_of(panel, curves, positions_of)
+    place: Numbers = lambda poses: positions_of(poses) - origin  # noqa: E731
+    everything = np.concatenate([place(curve.extent) for curve in curves])
+    length = 0.14 * window(everything, 1.0)[1] or 0.2
+    framed = [curve for curve in curves if not curve.faint]
+    number = max(2, _FRAMES // len(framed))
+    some = {id(curve): curve.samples(number) for curve in framed}
+    # The box contains the tips of all frames that are drawn.
+    drawn = [poses for groups in some.values() for poses in groups.values()]
+    tips = [place(poses) + length * poses[:, :3, i] for poses in drawn for i in range(3)]
+    axes = box_around(panel, curves, place, origin, tips)
+    for curve in curves:
+        # The usual colour is that of the third axis.
+        dark = {"color": ink()} if curve.usual and not len(curve.gaps) else {}
+        path = curve.near_data(place(curve.points))
+        draw_line(axes, curve, path, **{"linewidth": 2.0 if curve.alone else 1.4} | dark)
+        if curve.faint:
+            continue
+        draw_stems(axes, curve, place(curve.given))
+        for group, poses in some[id(curve)].items():
+            if group == "data":
+                draw_frames(axes, poses, 0.7 * length, origin, linewidth=1.2, alpha=0.7)
+                continue
+            draw_frames(axes, poses, length, origin, linewidth=2.0 if curve.alone else 1.3)
+            if curve.noise is None:
+                draw_dots(axes, curve, place(poses), markersize=3.5 if curve.alone else 2)
+            else:
+                draw_dots(axes, curve, place(curve.given))
+    words = f"frames: {_words(curves[0], list(some.values()), framed)}"
+    if panel.mine:
+        axes.plot([], [], [], linestyle="none", label=words)
+    else:
+        note(axes, f"{words}; thin: {SHADOW}")
+
+    def body() -> Mover:
+        poses = np.concatenate([curve.points for curve in curves])
+        sticks = draw_frames(axes, poses[:1], 0.2 * float(np.ptp(axes.get_xlim())), origin, linewidth=3.5, zorder=9)
+
+        def move(sample: int) -> None:
+            length = 0.2 * float(np.ptp(axes.get_xlim()))
+            foot = place(poses[sample : sample + 1])[0]
+            for i, stick in enumerate(sticks):
+                stick.set_data_3d(*np.stack([foot, foot + length * poses[sample, :3, i]], axis=1))
+
+        return move
+
+    curves[0].bodies.append((np.concatenate([curve.x for curve in curves]), body))
+
+
+def _words(first: Curve, groups: Sequence[Look], framed: Sequence[Curve]) -> str:
+    """Describe which poses have frames."""
+    if first.is_mean:
+        return "mean curve at times of points"
+    if first.noise is not None:
+        return "some poses of the curve" + ", lighter: data" * bool(len(first.noise.x[0]))
+    if not first.has_nodes:
+        return "some poses of the curve"
+    shown, count = sum(len(entry.get("bold", ())) for entry in groups), sum(len(entry.given) for entry in framed)
+    return "given poses" if shown == count else f"{shown} of {count} given poses"

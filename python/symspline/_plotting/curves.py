@@ -10,11 +10,13 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.typing import ColorType
 from numpy.typing import NDArray
 
 from .._base.input import UTC_ZONE
 from .._base.report import long_gaps
 from .._base.time import TimeAxis
+from .._base.typing import AnyArray, FloatArray, Look
 from .._core import ConvergenceError, CutLocusError, ValidationError
 from .._curves.composed import AnyCurve
 from .._curves.controlled import ControlledCurve
@@ -22,8 +24,8 @@ from .._curves.curve import UncertaintyBand
 from .._curves.ends import NATURAL
 from .._curves.fit import FitProblem, fit, read
 from .._curves.solve import DEFAULTS
-from .._spaces import AmbiguousMeanWarning, Product, Space, SpecialEuclidean
-from .style import DATA, DATES, Array, Indices, colors, evenly, ink, named_from, round_start, spline_color
+from .._spaces import AmbiguousMeanWarning, AnySpace, Product, Space, SpecialEuclidean
+from .style import DATA, DATES, Indices, Numbers, colors, evenly, ink, named_from, round_start, spline_color
 
 SECOND = np.timedelta64(1, "s")
 FEW, _OF_MANY = 5, 3
@@ -45,7 +47,7 @@ _CLOSED = 1e-9
 """The largest distance of the ends of a closed curve, as a part of the largest component of its points."""
 _SEGMENTS = 3
 """The smallest length of a gap between measurements of several kinds, in median segments."""
-_NO_GAPS: Array = np.empty((0, 2))
+_NO_GAPS: FloatArray = np.empty((0, 2))
 Mover = Callable[[int], None]
 """Moves a body to the point of a curve at one of its samples."""
 
@@ -88,7 +90,7 @@ class Axis:
         start = 0 if raw else round_start(first, last)
         return cls(start=start or None, name=named_from(name, start), seconds=times.durations)
 
-    def positions(self, first: Any, since: Array) -> Array:
+    def positions(self, first: Any, since: FloatArray) -> FloatArray:
         """Return the positions of times, given as differences from a first time."""
         if self.dates:
             return np.asarray(DATES.date2num(first + np.rint(1e6 * since).astype("timedelta64[us]")))
@@ -159,10 +161,10 @@ class Curve:
     data: AnyCurve
     first: Any
     x0: float
-    x: Array
-    nodes: Array
+    x: FloatArray
+    nodes: FloatArray
     axis: Axis
-    color: Any
+    color: ColorType
     alone: bool
     usual: bool = False
     noise: UncertaintyBand | None = None
@@ -170,7 +172,7 @@ class Curve:
     has_line: bool = True
     faint: bool = False
     label: str | None = None
-    breaks: Array = field(default_factory=lambda: _NO_GAPS)
+    breaks: FloatArray = field(default_factory=lambda: _NO_GAPS)
     segments: tuple[Curve, ...] = ()
     reference: Any = None
     batch: Batch | None = None
@@ -179,8 +181,8 @@ class Curve:
     is_mean: bool = False
     has_start: bool = True
     is_factor: bool = False
-    tracks: list[tuple[Axes, Array, Array]] = field(default_factory=list)
-    bodies: list[tuple[Array, Callable[[], Mover]]] = field(default_factory=list)
+    tracks: list[tuple[Axes, FloatArray, FloatArray]] = field(default_factory=list)
+    bodies: list[tuple[FloatArray, Callable[[], Mover]]] = field(default_factory=list)
 
     # ---- parts ----
 
@@ -201,7 +203,7 @@ class Curve:
             is_factor=True,
             data=self.data.parts[number],
             noise=self.noise and self.noise.part(number),
-            segments=tuple(own.part(number) for own in self.segments),
+            segments=tuple(segment.part(number) for segment in self.segments),
             reference=None if self.reference is None else self.reference[number],
             batch=self.batch and self.batch.part(number),
             limits=self.limits[number : number + 1],
@@ -209,7 +211,9 @@ class Curve:
 
     def on_earth(self, radius: float | None) -> Curve:
         """Return the curve with a radius of the Earth."""
-        return replace(self, radius=radius, segments=tuple(replace(own, radius=radius) for own in self.segments))
+        return replace(
+            self, radius=radius, segments=tuple(replace(segment, radius=radius) for segment in self.segments)
+        )
 
     # ---- points ----
 
@@ -238,11 +242,11 @@ class Curve:
         return self.points[self.knots] if self.noise is None else self.noise.points[0]
 
     @property
-    def given_x(self) -> Array:
+    def given_x(self) -> FloatArray:
         """Times of the given points on the time axis of the core."""
         return self.x[self.knots] if self.noise is None else self.noise.x[0]
 
-    def marked(self, numbers: Callable[[Any], Array]) -> tuple[Array, Array]:
+    def marked(self, numbers: Numbers) -> tuple[FloatArray, FloatArray]:
         """Apply a function to the points at the times x, one row per point, and to the given points."""
         line = numbers(self.points)
         if self.noise is None:
@@ -250,7 +254,7 @@ class Curve:
         return line, numbers(self.given) if len(self.given) else line[:0]
 
     @property
-    def radii(self) -> Array | None:
+    def radii(self) -> FloatArray | None:
         """Radii of the band at the times x; None if no band is drawn."""
         return self.noise.radii[0] if self.noise is not None else None
 
@@ -290,7 +294,7 @@ class Curve:
         """Colour of given points: that of text for a curve in the usual colour."""
         return ink() if self.usual else self.color
 
-    def samples(self, number: int) -> dict[str, Any]:
+    def samples(self, number: int) -> Look:
         """Return at most ``number`` points at which large symbols are drawn.
 
         The group "bold" has given points, or evenly spaced ones of curves without them. For noisy data, the group
@@ -308,28 +312,28 @@ class Curve:
             x, points = x[data], points[data]
         return {"bold": self.points[np.unique(self._nearest(x if len(x) else even))], "data": points}
 
-    def _nearest(self, x: Array) -> Indices:
+    def _nearest(self, x: FloatArray) -> Indices:
         """Return the indices of the times x that are closest to given times."""
         after = np.clip(np.searchsorted(self.x, x), 1, len(self.x) - 1)
         return np.where(x - self.x[after - 1] < self.x[after] - x, after - 1, after)
 
-    def closest_samples(self, line: Array) -> Array:
+    def closest_samples(self, line: FloatArray) -> FloatArray:
         """Return the rows of samples of the curve that are closest in time to the given points."""
         return line[self._nearest(self.given_x)]
 
     # ---- times ----
 
-    def on_axis(self, x: Array) -> Array:
+    def on_axis(self, x: FloatArray) -> FloatArray:
         """Return the positions of times on matplotlib's axis."""
         return self.axis.positions(self.first, x - self.x0)
 
     @cached_property
-    def times(self) -> Array:
+    def times(self) -> FloatArray:
         """Positions of the times x on matplotlib's axis."""
         return self.on_axis(self.x)
 
     @cached_property
-    def marks(self) -> Array:
+    def marks(self) -> FloatArray:
         """Times of all given points on matplotlib's axis, also of data that are not drawn.
 
         If there are none, they are the times between which the curve is smooth.
@@ -344,7 +348,7 @@ class Curve:
         return "times of data" if self.noise is not None else "times of points" if self.has_nodes else "knots"
 
     @cached_property
-    def gaps(self) -> Array:
+    def gaps(self) -> FloatArray:
         """Starts and ends of gaps on matplotlib's axis, shape (m, 2).
 
         They are the gaps between segments or, in one curve, those between data that are far longer than most. If
@@ -367,18 +371,18 @@ class Curve:
         after = np.searchsorted(np.ravel(self.gaps), self.times) % 2 == 1
         return np.asarray(after & ~np.isin(self.times, self.gaps))
 
-    def outside_gaps(self, values: Array) -> Array:
+    def outside_gaps(self, values: FloatArray) -> FloatArray:
         """Return values at the times x, NaN in long gaps."""
         return np.where(self.bridges.reshape(-1, *[1] * (values.ndim - 1)), np.nan, values)
 
-    def graph(self, line: Array) -> Array:
+    def graph(self, line: FloatArray) -> FloatArray:
         """Return one number per sample, NaN in long gaps unless the curve is a smoothing spline.
 
         No data determine an interpolating spline there, and no band shows it.
         """
         return line if self.noise is not None else self.outside_gaps(line)
 
-    def near_data(self, positions: Array) -> Array:
+    def near_data(self, positions: FloatArray) -> FloatArray:
         """Return positions of samples, shape (m, n), NaN in long gaps where they are far from all others.
 
         Bands show how far a smoothing spline may be from its data in a gap.
@@ -410,8 +414,8 @@ class Batch:
 
     data: AnyCurve
     valid: NDArray[np.bool_]
-    x: Array
-    times: Array
+    x: FloatArray
+    times: FloatArray
 
     def part(self, number: int) -> Batch:
         """Return the curves in one factor of a product space."""
@@ -434,7 +438,7 @@ def are_compared(curves: Sequence[Curve]) -> bool:
     return curves[0].batch is not None or (len(curves) > 1 and not curves[0].alone)
 
 
-def common_gaps(curves: Sequence[Curve]) -> Array:
+def common_gaps(curves: Sequence[Curve]) -> FloatArray:
     """Return starts and ends on matplotlib's axis of the times at which all curves have a gap, shape (m, 2)."""
     common, *others = [curve.gaps for curve in curves if curve.has_line and not curve.faint] or [_NO_GAPS]
     for gaps in others:
@@ -447,7 +451,7 @@ def common_gaps(curves: Sequence[Curve]) -> Array:
 
 
 def curves_of(
-    curve: Any, axis: Axis, color: Any = None, label: str | None = None, alone: bool = True
+    curve: Any, axis: Axis, color: ColorType | None = None, label: str | None = None, alone: bool = True
 ) -> tuple[list[Curve], str]:
     """Return the curves to draw, and a description of them. The first has the batch, if there are many.
 
@@ -491,7 +495,7 @@ def curves_of(
     return made, f"{number} curves, " if batch else ""
 
 
-def _drawn(one: Any, noise_beside: Any, index: Any, axis: Axis, look: dict[str, Any], faint: bool) -> Curve:
+def _drawn(one: Any, noise_beside: Any, index: Any, axis: Axis, look: Look, faint: bool) -> Curve:
     """Return one curve with its samples."""
     data = one._curve
     nodes, breaks = one._node_times, one._breaks
@@ -506,21 +510,23 @@ def _drawn(one: Any, noise_beside: Any, index: Any, axis: Axis, look: dict[str, 
     made = Curve(data, first, x0, x, nodes, axis, **look)
     if len(parts) < 2:
         return made
-    start = made.points[0] if not isinstance(data.space, Product) else tuple(own[0] for own in made.points)
+    start = made.points[0] if not isinstance(data.space, Product) else tuple(times[0] for times in made.points)
     few = len(parts) <= len(OTHERS)
     segments = []
     ends = np.cumsum([0, *map(len, parts)]).tolist()
-    for i, own in enumerate(parts):
-        within = nodes[(nodes >= own[0]) & (nodes <= own[-1])] if has_nodes else own[:1]
-        beside = noise and noise.between(own[0], own[-1], slice(*ends[i : i + 2]))
-        part = replace(made, x=own, nodes=within, reference=start if i else None, has_start=few or not i, noise=beside)
+    for i, times in enumerate(parts):
+        within = nodes[(nodes >= times[0]) & (nodes <= times[-1])] if has_nodes else times[:1]
+        beside = noise and noise.between(times[0], times[-1], slice(*ends[i : i + 2]))
+        part = replace(
+            made, x=times, nodes=within, reference=start if i else None, has_start=few or not i, noise=beside
+        )
         named = few and made.usual
         segments.append(replace(part, color=OTHERS[i], label=f"segment {i}", usual=False) if named else part)
     return replace(made, segments=tuple(segments))
 
 
 def _mean_of(
-    curve: Any, valid: NDArray[np.bool_], axis: Axis, color: Any, label: str | None, alone: bool
+    curve: Any, valid: NDArray[np.bool_], axis: Axis, color: ColorType | None, label: str | None, alone: bool
 ) -> Curve | None:
     """Return the curve through the Karcher means of a batch, or None if the batch is not close to it.
 
@@ -534,8 +540,8 @@ def _mean_of(
     x = data.times.ravel()
     # The usual colour is that of the third axis of frames.
     color = color or (OTHERS[0] if isinstance(space, SpecialEuclidean) else spline_color())
-    own = Curve(data, first, x0, x, nodes, axis, color, alone, label=label or "mean curve", is_mean=True)
-    batch = _batch_of(curve, own, valid)
+    mean = Curve(data, first, x0, x, nodes, axis, color, alone, label=label or "mean curve", is_mean=True)
+    batch = _batch_of(curve, mean, valid)
     if batch is None:
         return None
     many = np.union1d(batch.x, data.times)
@@ -553,7 +559,7 @@ def _mean_of(
         return None
     x, _ = samples(data.times, _NO_GAPS)
     problem = FitProblem(space, many, read(means, space), [NATURAL], DEFAULTS)
-    return replace(own, data=fit(problem).curve, x=x, batch=batch)
+    return replace(mean, data=fit(problem).curve, x=x, batch=batch)
 
 
 def _batch_of(curve: Any, first: Curve, valid: NDArray[np.bool_]) -> Batch | None:
@@ -573,7 +579,7 @@ def _finite(data: Any) -> NDArray[np.bool_]:
     return np.asarray(np.isfinite(data.evaluate(np.ascontiguousarray(start), "speed", "raise", True))).ravel()
 
 
-def samples(times: Array, breaks: Array) -> tuple[Array, list[Array]]:
+def samples(times: FloatArray, breaks: FloatArray) -> tuple[FloatArray, list[FloatArray]]:
     """Return sampling times, and those of each part between breaks.
 
     They divide every interval evenly, with more of them in long intervals.
@@ -581,14 +587,14 @@ def samples(times: Array, breaks: Array) -> tuple[Array, list[Array]]:
     bounds = [times[0], *np.ravel(breaks), times[-1]]
     made = []
     for i, (start, stop) in enumerate(zip(bounds[::2], bounds[1::2], strict=True)):
-        own = times[(times >= start) & (times <= stop)]
+        knots = times[(times >= start) & (times <= stop)]
         # A curve that meets the next one there has the values of the next one.
         last = np.nextafter(stop, start) if 2 * i + 2 < len(bounds) and bounds[2 * i + 2] == stop else stop
-        made.append(np.append(_divided(own)[:-1], last))
+        made.append(np.append(_divided(knots)[:-1], last))
     return np.concatenate(made), made
 
 
-def _divided(knots: Array) -> Array:
+def _divided(knots: FloatArray) -> FloatArray:
     segments, lengths = len(knots) - 1, np.diff(knots)
     least = max(_SAMPLES // segments, 16 if segments <= 10_000 else 1)
     numbers = np.maximum(least, np.ceil(_SAMPLES * lengths / np.ptp(knots))).astype(int)
@@ -603,7 +609,7 @@ def _divided(knots: Array) -> Array:
 class _Scatter:
     """Points at given times, with the interface of curves; evaluated at these times only."""
 
-    def __init__(self, space: Space[Any], times: Array, points: Any) -> None:
+    def __init__(self, space: AnySpace, times: FloatArray, points: AnyArray) -> None:
         self.space, self.times, self.points = space, times, points
         self.batch: tuple[int, ...] = ()
         self.quad_rtol, self.max_nu = 0.0, 0
@@ -616,12 +622,14 @@ class _Scatter:
         pairs = zip(self.space.factors, self.points, strict=True)
         return tuple(_Scatter(factor, self.times, points) for factor, points in pairs)
 
-    def evaluate(self, x: Array, quantity: str, outside: str, per_curve: bool, progress: Any = None) -> Any:
+    def evaluate(self, x: FloatArray, quantity: str, outside: str, per_curve: bool, progress: Any = None) -> Any:
         """Return the points."""
         return self.points
 
 
-def scatter_of(space: Space[Any], first: Any, times: Array, points: Any, axis: Axis, color: Any, label: Any) -> Curve:
+def scatter_of(
+    space: AnySpace, first: Any, times: FloatArray, points: AnyArray, axis: Axis, color: ColorType, label: Any
+) -> Curve:
     """Return data as a curve without a line. Times must not decrease."""
     data = _Scatter(space, times, points)
     return Curve(data, first, float(times[0]), times, times, axis, color, False, has_line=False, label=label)

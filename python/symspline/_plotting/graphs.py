@@ -11,16 +11,28 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MultipleLocator
-from numpy.typing import NDArray
 
+from .._base.typing import AnyArray, FloatArray, Look
 from .._core import ValidationError
 from .._spaces import Space
 from .curves import Curve, are_compared
-from .lines import DOTS, LINE, draw_dots, draw_graph_of, fresh, plot_line, shade_quantiles
-from .panels import FEW_KNOTS, Panel, View, time_axes, timeline
-from .style import DATA, SUBSCRIPTS, Array, Indices, axes_size, distinct, ink, legend, named_from, round_start
+from .panels import (
+    DOTS,
+    FEW_KNOTS,
+    LINE,
+    Panel,
+    View,
+    draw_dots,
+    draw_graph_of,
+    fresh,
+    plot_line,
+    shade_quantiles,
+    time_axes,
+    timeline,
+)
+from .style import DATA, SUBSCRIPTS, Indices, Numbers, axes_size, distinct, ink, legend, named_from, round_start
 
-_Drawn = Sequence[tuple[Array, Array]]
+_Drawn = Sequence[tuple[FloatArray, FloatArray]]
 """Numbers of the samples of each curve, and of its given points."""
 _NAMED, _OTHERS = 12, 100
 """The largest numbers of components with a name, and of others."""
@@ -67,9 +79,9 @@ class Graphs:
 
     label: str
     names: Sequence[str]
-    numbers: Callable[[Any, Any], Array]
+    numbers: Callable[[Any, Any], FloatArray]
     groups: Sequence[tuple[str, Sequence[int]]] = ()
-    growth: Callable[[Array], Array] | None = None
+    growth: Callable[[FloatArray], FloatArray] | None = None
     period: float = np.inf
     has_title: bool = False
     equal_scales: bool = False
@@ -84,7 +96,9 @@ class Graphs:
         groups = self.groups or [(name, [i]) for i, name in enumerate(self.names)]
         if not panel.mine and len(self.names) > 1:
             groups = [(self.label, range(len(self.names)))]
-        starts = [_start(drawn, i) if panel.mine and len(own) == 1 else 0 for _, own in groups for i in own[:1]]
+        starts = [
+            _start(drawn, i) if panel.mine and len(members) == 1 else 0 for _, members in groups for i in members[:1]
+        ]
         labels = [named_from(label, start) for (label, _), start in zip(groups, starts, strict=True)]
         made = time_axes(panel, curves, labels)
         if self.has_title and panel.mine:
@@ -108,7 +122,7 @@ class Graphs:
             shade_quantiles(axes, batch, many[..., number] - start)
         for curve, (line, given) in zip(curves, drawn, strict=True):
             dense = len(given) > FEW_KNOTS
-            look: Any = {"color": DATA if dense else ink()} if curve.noise is None and curve.alone else {}
+            look: Look = {"color": DATA if dense else ink()} if curve.noise is None and curve.alone else {}
             look |= {"markersize": float(np.clip(30 / np.sqrt(max(len(given), 1)), 1.2, 3))}
             look |= {"zorder": 1.8} if dense else {}
             values = curve.graph(line[:, number] - start)
@@ -158,7 +172,9 @@ class Graphs:
         """Give several axes the same scale if they must have it, and do not magnify rounding errors of constants."""
         if len(made) == 1:
             return
-        largest = max(np.ptp(rows[np.isfinite(rows[:, 0])], axis=0).max() for own in drawn for rows in own if len(rows))
+        largest = max(
+            np.ptp(rows[np.isfinite(rows[:, 0])], axis=0).max() for pair in drawn for rows in pair if len(rows)
+        )
         limits = np.array([axes.get_ylim() for axes in made])
         widest = np.ptp(limits, axis=1).max()
         for axes, (low, high) in zip(made, limits.tolist(), strict=True):
@@ -170,18 +186,18 @@ class Graphs:
 
 def _start(drawn: _Drawn, number: int) -> Any:
     """Return the round number from which a number is counted if it is far from zero."""
-    values = np.concatenate([rows[:, number] for own in drawn for rows in own])
+    values = np.concatenate([rows[:, number] for pair in drawn for rows in pair])
     return round_start(np.nanmin(values), np.nanmax(values))
 
 
 def _without_jumps(
-    curves: Sequence[Curve], numbers: Callable[[Curve], Callable[[Any], Array]], period: float
-) -> list[tuple[Array, Array]]:
+    curves: Sequence[Curve], numbers: Callable[[Curve], Numbers], period: float
+) -> list[tuple[FloatArray, FloatArray]]:
     """Return numbers of the samples and of the given points of every curve, without jumps by the period.
 
     All curves begin close to the first one. Data are close to it at their times.
     """
-    made: list[tuple[Array, Array]] = []
+    made: list[tuple[FloatArray, FloatArray]] = []
     for curve in curves:
         line, given = curve.marked(numbers(curve))
         if np.isfinite(period):
@@ -189,14 +205,14 @@ def _without_jumps(
             if curve.has_line:
                 line = _unwrapped(line, period, near[0])
             else:
-                near = np.stack([np.interp(curve.times, curves[0].times, own) for own in near.T], axis=1)
+                near = np.stack([np.interp(curve.times, curves[0].times, column) for column in near.T], axis=1)
                 line = line + period * np.rint((near - line) / period)
             given = given + period * np.rint((curve.closest_samples(line) - given) / period)
         made.append((line, given))
     return made
 
 
-def _unwrapped(lines: Array, period: float, start: Array) -> Array:
+def _unwrapped(lines: FloatArray, period: float, start: FloatArray) -> FloatArray:
     """Return numbers that begin close to a start and do not jump in time, which is the last axis but one."""
     if np.isinf(period):
         return lines
@@ -204,7 +220,7 @@ def _unwrapped(lines: Array, period: float, start: Array) -> Array:
     return np.asarray(lines - period * np.rint((lines[..., :1, :] - start) / period))
 
 
-def _choose(names: Sequence[str], ranges: Array, numbers: Sequence[int]) -> tuple[list[int], list[int]]:
+def _choose(names: Sequence[str], ranges: FloatArray, numbers: Sequence[int]) -> tuple[list[int], list[int]]:
     """Return the numbers with names, and the others. Real and imaginary parts stay together."""
     if len(numbers) <= _NAMED:
         return list(numbers), []
@@ -214,16 +230,16 @@ def _choose(names: Sequence[str], ranges: Array, numbers: Sequence[int]) -> tupl
             groups[-1].append(i)
         else:
             groups.append([i])
-    groups.sort(key=lambda own: -ranges[own].max())
+    groups.sort(key=lambda group: -ranges[group].max())
     named: list[int] = []
-    for own in groups:
-        if len(named) + len(own) > _NAMED:
+    for group in groups:
+        if len(named) + len(group) > _NAMED:
             break
-        named += own
+        named += group
     return named, sorted(set(numbers) - set(named))
 
 
-def _looks(names: Sequence[str]) -> list[dict[str, Any]]:
+def _looks(names: Sequence[str]) -> list[Look]:
     """Return colour and line style of every number. An imaginary part is dashed in the colour of its real part."""
     is_complex = any(name.startswith("Im ") for name in names)
     made, entry = [], -1
@@ -237,7 +253,7 @@ def _looks(names: Sequence[str]) -> list[dict[str, Any]]:
 
 # Points of S¹ have the angle of a unit vector. Points of RP¹ and Gr(1, 2) are lines, whose angle has the period π.
 # Points of SO(2) and O(2) have the angle of the first axis, and points of U(1) their phase.
-ANGLES: dict[str, tuple[Callable[[Any], Array], float]] = {
+ANGLES: dict[str, tuple[Numbers, float]] = {
     "sphere:1": (lambda points: np.arctan2(points[:, 1], points[:, 0]), 2 * np.pi),
     "rp:1 gr:1,2": (lambda lines: np.arctan2(lines[:, 1], lines[:, 0]).ravel(), np.pi),
     "so:2 o:2": (lambda matrices: np.arctan2(matrices[:, 1, 0], matrices[:, 0, 0]), 2 * np.pi),
@@ -246,7 +262,7 @@ ANGLES: dict[str, tuple[Callable[[Any], Array], float]] = {
 """The angle of points, and its period."""
 
 
-def angle(angles: Callable[[Any], Array], period: float) -> View:
+def angle(angles: Numbers, period: float) -> View:
     """Return the view of an angle against time, without jumps."""
     graph = Graphs(
         "",
@@ -267,7 +283,7 @@ def _several(
     curves: Sequence[Curve],
     label: str,
     names: Sequence[str],
-    numbers: Callable[[Any, Any], Array],
+    numbers: Callable[[Any, Any], FloatArray],
     period: float = np.inf,
 ) -> View:
     """Return the view of several numbers in the same axes.
@@ -278,7 +294,7 @@ def _several(
     if not are_compared(curves):
         return whole.view()
     first = curves[0].first_point
-    drawn = [numbers(first, own.points) for curve in curves if not curve.faint for own in curve.unbroken]
+    drawn = [numbers(first, part.points) for curve in curves if not curve.faint for part in curve.unbroken]
     drawn = drawn if np.isinf(period) else [np.unwrap(line, period=period, axis=0) for line in drawn]
     ranges = np.max([np.ptp(line, axis=0) for line in drawn], axis=0)
     kept = np.sort(np.argsort(-ranges, kind="stable")[:_COMPARED])
@@ -301,7 +317,7 @@ def components(curves: Sequence[Curve]) -> View:
     return _several(curves, "components", [names[i] for i in kept], lambda _, points: real_numbers(points)[:, kept])
 
 
-def real_numbers(points: NDArray[Any]) -> Array:
+def real_numbers(points: AnyArray) -> FloatArray:
     """Return one row per point, in which the real and imaginary parts of complex numbers alternate."""
     flat = np.ascontiguousarray(points.reshape(len(points), -1))
     return flat.view(np.float64) if np.iscomplexobj(flat) else flat
@@ -327,9 +343,9 @@ def independent(space: Space) -> Indices:
     except (NotImplementedError, ValidationError):
         return np.arange(int(np.prod(space.point_shape)) * (2 if space.dtype.kind == "c" else 1))
     kept: list[int] = []
-    for i, own in enumerate(columns):
+    for i, column in enumerate(columns):
         others = [sign * columns[j] for j in kept for sign in (1, -1)]
-        if np.ptp(own) > 1e-9 and not any(np.allclose(own, other, rtol=1e-9, atol=0) for other in others):
+        if np.ptp(column) > 1e-9 and not any(np.allclose(column, other, rtol=1e-9, atol=0) for other in others):
             kept.append(i)
     return np.array(kept, np.intp)
 
@@ -353,14 +369,14 @@ def angles_to_first(curves: Sequence[Curve]) -> View:
     n, k = np.reshape(curves[0].points[0], (len(curves[0].points[0]), -1)).shape
     names = [f"θ{i + 1}".translate(SUBSCRIPTS) for i in range(min(k, n - k))]
 
-    def numbers(first: Any, points: Any) -> Array:
+    def numbers(first: Any, points: AnyArray) -> FloatArray:
         return principal_angles(points, first)[:, : len(names)]
 
     view = _several(curves, "principal angles to\nfirst point, degrees", names, numbers)
 
     def draw(panel: Panel, curves: Sequence[Curve]) -> None:
         view.draw(panel, curves)
-        largest = max(numbers(own.first_point, own.points).max() for own in curves)
+        largest = max(numbers(curve.first_point, curve.points).max() for curve in curves)
         if panel.mine and largest > _RIGHT and view.rows == 1:
             panel.explain("principal angles are at most 90°: they turn back there, but the curve is smooth")
             panel.axes[0].yaxis.set_major_locator(MultipleLocator(30))
@@ -369,7 +385,7 @@ def angles_to_first(curves: Sequence[Curve]) -> View:
     return view._replace(draw=draw)
 
 
-def principal_angles(points: NDArray[Any], first: NDArray[Any]) -> Array:
+def principal_angles(points: AnyArray, first: AnyArray) -> FloatArray:
     """Return the principal angles between a subspace and others in degrees, the largest first; shape (m, k).
 
     The sines are accurate for small angles, and the cosines for large ones.

@@ -23,16 +23,16 @@ from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import Affine2D
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
+from .._base.typing import AnyArray, FloatArray, Look
 from .._core import ValidationError
-from .._spaces import Space
-from .chart import Box, draw_box, draw_frames, name_axis
+from .._spaces import AnySpace
+from .chart import Box, draw_box, draw_frames, name_axis, positions_of
+from .globe import bloch_vectors
 from .graphs import ANGLES
 from .matrices import MATRICES, ROTATIONS, outlines
-from .page import drawing, head
 from .panels import Panel
-from .plot import check_axes, draw_picture_into, finish
-from .sphere import bloch_vectors
-from .style import DATES, Array, axes_size, evenly, ink, paper, plain, show_dates
+from .plot import check_axes, draw_picture_into, drawing, finish, head
+from .style import DATES, Numbers, axes_size, evenly, ink, paper, plain, show_dates
 from .views import FACTORS, captions, title_on
 
 _HEAD, _LEFT, _BOTTOM, _NAMED, _KEY = 0.95, 0.85, 0.6, 0.4, 1.35
@@ -88,12 +88,12 @@ class _Side(NamedTuple):
         """Whether the axis shows dates, which matplotlib resolves to a microsecond."""
         return bool(self.axis.time_axis.dates and self.axis.knots[-1] - self.axis.knots[0] > 1e-3)
 
-    def pixels(self, most: int) -> Array:
+    def pixels(self, most: int) -> FloatArray:
         """Return the coordinates of the centres of pixels."""
         first, last = self.ends
         return first + (last - first) * (np.arange(most) + 0.5) / most
 
-    def symbols(self) -> Array:
+    def symbols(self) -> FloatArray:
         """Return the coordinates of symbols: those of the nodes if there is space, or evenly spaced ones."""
         knots = self.axis.knots
         shortest = self.inches * np.diff(knots).min() / (knots[-1] - knots[0])
@@ -103,7 +103,7 @@ class _Side(NamedTuple):
             return np.asarray(np.interp(counts, np.arange(len(knots)), knots))
         return np.linspace(*self.ends, int(self.inches / _GAP) + 1)
 
-    def on_axis(self, x: Array) -> Array:
+    def on_axis(self, x: FloatArray) -> FloatArray:
         """Return the positions of coordinates on matplotlib's axis."""
         origin = self.axis.time_axis.origin
         if self.has_dates:
@@ -141,7 +141,7 @@ def plot_grid(
     columns = min(len(factors), 3)
     rows = -(-len(factors) // columns)
     width = sides[0].inches + _LEFT + _KEY
-    height = max([sides[1].inches] + [_SIDE for own in factors if str(own.space) in _SURFACES]) + _BOTTOM
+    height = max([sides[1].inches] + [_SIDE for part in factors if str(part.space) in _SURFACES]) + _BOTTOM
     height += _NAMED * (len(factors) > 1)
     title = title or title_on(grid._kind, grid.space, int(6 * columns * width))
     with drawing((columns * width, _HEAD + rows * height), figsize, show) as figure:
@@ -220,7 +220,7 @@ def _draw_nodes(axes: Axes, sides: list[_Side], valid: Any) -> None:
     spacing = min(side.inches / (len(side.axis.knots) - 1) for side in sides)
     if spacing >= _DENSE:
         i, j = np.nonzero(valid)
-        look: Any = {"color": _DARK, "markeredgecolor": "white", "markeredgewidth": 0.4, "clip_on": False, "zorder": 2}
+        look: Look = {"color": _DARK, "markeredgecolor": "white", "markeredgewidth": 0.4, "clip_on": False, "zorder": 2}
         axes.plot(x[i], y[j], "o", markersize=float(np.clip(14 * spacing, 1.2, 3.6)), label="nodes", **look)
 
 
@@ -275,17 +275,17 @@ class Field:
         Distance between neighbouring symbols in inches.
     """
 
-    space: Space[Any]
+    space: AnySpace
     pixels: Any
-    x: Array
-    y: Array
+    x: FloatArray
+    y: FloatArray
     symbols: Any
     reference: Any
     ring: tuple[float, float]
     extent: tuple[float, float, float, float]
     gap: float
 
-    def at_pixels(self, function: Callable[[Any], Array]) -> Array:
+    def at_pixels(self, function: Numbers) -> FloatArray:
         """Apply a function of points, one row per point, to the pixels; NaN where nodes are missing."""
         valid = self.space._where_finite(self.pixels)
         values = function(self.pixels[valid])
@@ -293,7 +293,7 @@ class Field:
         out[valid] = values
         return out
 
-    def at_symbols(self, function: Callable[[Any], Array]) -> tuple[Array, Array]:
+    def at_symbols(self, function: Numbers) -> tuple[FloatArray, FloatArray]:
         """Return the positions of the symbols that have points, shape (k, 2), and a function of the points."""
         valid = self.space._where_finite(self.symbols)
         positions = np.stack(np.meshgrid(self.x, self.y, indexing="ij"), axis=-1)
@@ -306,7 +306,7 @@ _Draw = Callable[[Axes, Field], None]
 # ---- images and their keys ----
 
 
-def _show(axes: Axes, field: Field, values: Array, **look: Any) -> Any:
+def _show(axes: Axes, field: Field, values: FloatArray, **look: Any) -> Any:
     """Draw numbers, shape (m, n), or colours, shape (m, n, 3), as an image that is blank where points are missing."""
     if values.ndim > 2:
         shown: Any = np.nan_to_num(np.concatenate([values, np.isfinite(values[..., :1])], axis=-1))
@@ -318,7 +318,7 @@ def _show(axes: Axes, field: Field, values: Array, **look: Any) -> Any:
     )
 
 
-def _show_numbers(axes: Axes, field: Field, values: Array, label: str, **look: Any) -> Axes:
+def _show_numbers(axes: Axes, field: Field, values: FloatArray, label: str, **look: Any) -> Axes:
     """Draw numbers as an image with a colour bar, whose axes are returned."""
     image = _show(axes, field, values, **look)
     bar = axes.inset_axes((1.03, 0.04, 0.03, 0.92))
@@ -341,9 +341,9 @@ def _key(axes: Axes, caption: str, words: str) -> Axes:
     return key
 
 
-def _contours(axes: Axes, field: Field, values: Array, unit: str) -> None:
+def _contours(axes: Axes, field: Field, values: FloatArray, unit: str) -> None:
     """Draw labelled contour lines of distances to the node in the middle, and a ring around this node."""
-    look: Any = {"color": "none", "markersize": 9, "clip_on": False, "zorder": 5}
+    look: Look = {"color": "none", "markersize": 9, "clip_on": False, "zorder": 5}
     axes.plot(*field.ring, "o", markeredgecolor="white", markeredgewidth=3, **look)
     axes.plot(*field.ring, "o", markeredgecolor=_DARK, markeredgewidth=1.4, label="ringed node", **look)
     if not np.isfinite(values).any() or np.nanmax(values) <= 0:
@@ -376,7 +376,7 @@ def _draw_number(axes: Axes, field: Field) -> None:
     _show_numbers(axes, field, field.at_pixels(lambda points: points[:, 0]), "x")
 
 
-def _draw_angle(angles: Callable[[Any], Array], period: float, axes: Axes, field: Field) -> None:
+def _draw_angle(angles: Numbers, period: float, axes: Axes, field: Field) -> None:
     """Draw an angle by its hue, or by colours for the range of the angles if they are close together."""
     middle = float(angles(field.reference[None])[0])
     turned = field.at_pixels(angles) - middle
@@ -386,7 +386,7 @@ def _draw_angle(angles: Callable[[Any], Array], period: float, axes: Axes, field
         return
     around = np.degrees((middle + turned + period / 2) % period - period / 2)
     half = np.degrees(period / 2)
-    look: Any = {"cmap": "twilight", "vmin": -half, "vmax": half}
+    look: Look = {"cmap": "twilight", "vmin": -half, "vmax": half}
     bar = _show_numbers(axes, field, around, "angle, degrees", **look)
     bar.set_yticks(np.linspace(-half, half, 5))
 
@@ -394,10 +394,10 @@ def _draw_angle(angles: Callable[[Any], Array], period: float, axes: Axes, field
 # ---- arrows ----
 
 
-def _draw_arrows(axes: Axes, field: Field, vectors: Callable[[Any], Array], longest: float) -> None:
+def _draw_arrows(axes: Axes, field: Field, vectors: Numbers, longest: float) -> None:
     """Draw vectors, shape (k, 2), as arrows around their positions. The longest one fits between symbols."""
     positions, arrows = field.at_symbols(vectors)
-    look: Any = {"units": "inches", "scale_units": "inches", "angles": "uv", "pivot": "mid", "clip_on": False}
+    look: Look = {"units": "inches", "scale_units": "inches", "angles": "uv", "pivot": "mid", "clip_on": False}
     look |= {
         "width": 0.022,
         "headwidth": 4,
@@ -417,10 +417,10 @@ def _draw_vectors(axes: Axes, field: Field) -> None:
     _draw_arrows(axes, field, np.asarray, float(np.nanmax(lengths, initial=0)))
 
 
-def _draw_directions(vectors: Callable[[Any], Array], words: str, axes: Axes, field: Field) -> None:
+def _draw_directions(vectors: Numbers, words: str, axes: Axes, field: Field) -> None:
     """Draw unit vectors: arrows of the first two coordinates, over an image of the angle to the third axis."""
 
-    def polar(points: Any) -> Array:
+    def polar(points: AnyArray) -> FloatArray:
         x, y, z = vectors(points).T
         return np.asarray(np.degrees(np.arctan2(np.hypot(x, y), z)))
 
@@ -431,7 +431,7 @@ def _draw_directions(vectors: Callable[[Any], Array], words: str, axes: Axes, fi
 # ---- orientations ----
 
 
-def _draw_orientations(matrices: Callable[[Any], Array], axes: Axes, field: Field) -> None:
+def _draw_orientations(matrices: Numbers, axes: Axes, field: Field) -> None:
     """Draw rotations as an orientation map: the colour is the direction of the axis that moves most.
 
     Contour lines of the misorientation to the node that has a ring show the rest of the rotation.
@@ -452,13 +452,13 @@ def _draw_orientations(matrices: Callable[[Any], Array], axes: Axes, field: Fiel
     disc = np.concatenate([disc, (radius <= 1)[..., None]], axis=-1)
     key.imshow(disc.swapaxes(0, 1), origin="lower", extent=(-1, 1, -1, 1))
     for at, name in (((0, 0), "x₃"), ((0.5, 0), "x₁"), ((0, 0.5), "x₂")):
-        look: Any = {"ha": "center", "va": "center", "path_effects": _GLOW}
+        look: Look = {"ha": "center", "va": "center", "path_effects": _GLOW}
         key.text(at[0], at[1], name, color=_DARK, fontsize="small", **look)
     angles = field.at_pixels(lambda points: np.degrees(ROTATIONS.distance(middle, matrices(points))))
     _contours(axes, field, angles, "°")
 
 
-def direction_colors(vectors: Array) -> Array:
+def direction_colors(vectors: FloatArray) -> FloatArray:
     """Return colours of unit vectors: white for the third axis, dark opposite to it, and hues around them."""
     x, y, z = np.moveaxis(vectors, -1, 0)
     hue = np.arctan2(y, x) / (2 * np.pi) % 1
@@ -473,7 +473,7 @@ def direction_colors(vectors: Array) -> Array:
 # ---- positive definite matrices ----
 
 
-def anisotropy(matrices: Array) -> Array:
+def anisotropy(matrices: FloatArray) -> FloatArray:
     """Return the fractional anisotropy of positive definite matrices: 0 for a multiple of the identity, at most 1."""
     n = matrices.shape[-1]
     middle = np.trace(matrices, axis1=-2, axis2=-1)[..., None, None] / n * np.eye(n)
@@ -486,7 +486,7 @@ def _draw_ellipses(axes: Axes, field: Field) -> None:
     positions, blocks = field.at_symbols(lambda points: points[:, :2, :2])
     rings = outlines(blocks)
     inches = 0.46 * field.gap / (np.abs(rings).max(initial=0) or 1.0)
-    look: Any = {
+    look: Look = {
         "offsets": positions,
         "offset_transform": axes.transData,
         "transform": Affine2D().scale(inches) + axes.figure.dpi_scale_trans,
@@ -514,7 +514,7 @@ def _draw_tensors(axes: Axes, field: Field) -> None:
     _draw_ellipses(axes, field)
 
 
-def tensor_colors(matrices: Array) -> Array:
+def tensor_colors(matrices: FloatArray) -> FloatArray:
     """Return colours of tensors: the longest axis in red, green and blue, paler for less anisotropy.
 
     The usual colours of diffusion tensors jump where the two longest axes are equally long. These are continuous,
@@ -530,23 +530,30 @@ def tensor_colors(matrices: Array) -> Array:
 
 def _draw_surface(panel: Panel, field: Field, nodes: Any) -> None:
     """Draw positions of R³, or poses of SE(3) with their frames, and the nodes as dots. Missing areas are blank."""
-    positions = _positions(field.pixels)
+    place = positions_of if field.pixels.ndim > 3 else np.asarray
+    positions = place(field.pixels)
     i, j = (evenly(size, _LINES) for size in positions.shape[:2])
     positions = positions[np.ix_(i, j)]
     known = np.isfinite(positions[..., 0])
-    dots = _positions(nodes).reshape(-1, 3)
+    dots = place(nodes).reshape(-1, 3)
     dots = dots[np.isfinite(dots[:, 0])]
     axes = draw_box(panel, [], [positions[known], dots], np.zeros(3))
     areas = np.nan_to_num(np.cross(np.diff(positions, axis=0)[:, 1:], np.diff(positions, axis=1)[1:]))
     # A surface without area has no bright side. The order of the axes decides which side that is.
     shade = bool(np.any(areas))
-    look: Any = {"linewidths": 0, "facecolors": paper(0.15), "antialiaseds": False, "shade": shade, "lightsource": _SUN}
+    look: Look = {
+        "linewidths": 0,
+        "facecolors": paper(0.15),
+        "antialiaseds": False,
+        "shade": shade,
+        "lightsource": _SUN,
+    }
     grid = positions if areas[..., 2].sum() > 0 else positions.swapaxes(0, 1)
     faces = np.stack([grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]], axis=2).reshape(-1, 4, 3)
     axes.add_collection3d(Poly3DCollection(faces[np.isfinite(faces).all(axis=(1, 2))], **look))
-    symbols = _positions(field.symbols)
+    symbols = place(field.symbols)
     # Lines on the surface at the pixels that are closest to the symbols.
-    fine, (left, right, low, high) = _positions(field.pixels), field.extent
+    fine, (left, right, low, high) = place(field.pixels), field.extent
     across, along = (
         np.clip(np.rint((x - start) / (stop - start) * count - 0.5), 0, count - 1).astype(int)
         for x, start, stop, count in zip((field.x, field.y), (left, low), (right, high), fine.shape, strict=False)
@@ -562,11 +569,6 @@ def _draw_surface(panel: Panel, field: Field, nodes: Any) -> None:
         poses = field.symbols[np.ix_(*(evenly(size, _FRAMES) for size in field.symbols.shape[:2]))].reshape(-1, 4, 4)
         poses = poses[np.isfinite(poses[:, 0, 0])]
         draw_frames(axes, poses, 0.07 * float(np.ptp(axes.get_xlim())), np.zeros(3), linewidth=1.2)
-
-
-def _positions(points: Any) -> Array:
-    """Return the positions of points of R³ or poses."""
-    return np.asarray(points if points.shape[-2:] != (4, 4) else points[..., :3, 3])
 
 
 _DRAWN: list[tuple[str, _Draw]] = [

@@ -7,7 +7,7 @@ of the eigenvalues: one standard deviation, if the matrices are covariances.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from itertools import pairwise
 from textwrap import fill, wrap
@@ -19,19 +19,17 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import to_rgba, to_rgba_array
 from matplotlib.transforms import Affine2DBase
-from numpy.typing import NDArray
 
 from .._base.angles import matrices_of_quaternions
+from .._base.typing import AnyArray, FloatArray, Look
 from .._core import CutLocusError, convert_rotations
 from .._spaces import SpecialOrthogonal, cover_of
 from .curves import Curve, Mover, are_compared
-from .globe import centre_of
+from .globe import caps, centre_of
 from .graphs import Graphs, component_names, components
-from .lines import FRAME, fresh
-from .panels import FEW_KNOTS, Panel, View, mark_knots, time_axes, timeline
+from .panels import FEW_KNOTS, FRAME, Panel, View, fresh, mark_knots, time_axes, timeline
 from .rates import QUATERNIONS
-from .sphere import caps
-from .style import AXES, MARK, SUBSCRIPTS, Array, apart, axes_size, evenly, ink, round_below, time_colors
+from .style import AXES, MARK, SUBSCRIPTS, Numbers, apart, axes_size, evenly, ink, round_below, time_colors
 
 ROTATIONS = SpecialOrthogonal(3)
 VIEW = np.array([[-0.5, 0.866, 0.0], [-0.296, -0.171, 0.940], [0.814, 0.470, 0.342]])
@@ -67,7 +65,7 @@ class _Inches(Affine2DBase):
         self.box, self.height = axes.bbox, axes_size(axes)[1]
         self.set_children(axes.bbox)
 
-    def get_matrix(self) -> Array:
+    def get_matrix(self) -> FloatArray:
         """Return the matrix for the size that the axes have now."""
         scale = self.box.height / self.height
         return np.diag([scale, scale, 1.0])
@@ -92,7 +90,7 @@ class _Row(NamedTuple):
         """Whether the symbols are given points."""
         return self.name in ("given", "data") or not self.curve.has_line
 
-    def symbols(self, width: float, reach: float) -> tuple[Array, Any, Array | None]:
+    def symbols(self, width: float, reach: float) -> tuple[FloatArray, Any, FloatArray | None]:
         """Return times on matplotlib's axis, points, and the radii of the band, for symbols that fit into the row.
 
         The time axis has ``width`` inches, and symbols extend by at most ``reach`` inches to the left and right. Given
@@ -166,10 +164,10 @@ class _Rows:
         row = self.rows[-1]
         return self.width / (4.2 * len(row.curve.given)) if row.name == "curve" and row.curve.noise is None else REACH
 
-    def symbols(self, reach: float) -> list[tuple[Array, Any, Array | None]]:
+    def symbols(self, reach: float) -> list[tuple[FloatArray, Any, FloatArray | None]]:
         """Name the rows, and return their symbols, which extend by at most ``reach`` inches."""
         made = [row.symbols(self.width, reach) for row in self.rows]
-        names = [row.title(len(own[0]), self.panel.mine) for row, own in zip(self.rows, made, strict=True)]
+        names = [row.title(len(symbols[0]), self.panel.mine) for row, symbols in zip(self.rows, made, strict=True)]
         self.axes.set_yticks([-i for i in range(len(names))], names, fontsize="small")
         self.axes.tick_params(axis="y", length=0)
         if self.panel.mine:
@@ -181,7 +179,7 @@ class _Rows:
             self.axes.annotate(".", (1, 0.5), (72 * reach, 0), **_BESIDE_AXES, alpha=0)
         return made
 
-    def in_inches(self, times: Array, row: int) -> dict[str, Any]:
+    def in_inches(self, times: FloatArray, row: int) -> Look:
         """Return the options of a collection with paths in inches around times in a row."""
         return {
             "offsets": np.column_stack([times, np.full(len(times), -row)]),
@@ -197,7 +195,7 @@ class _Rows:
         axes, size = self.axes, 0.01 * rcParams["font.size"]
         inches = 10 * size / np.array(axes_size(axes))
         foot = np.array([1.0, 1.0]) + [-0.3, 0.16] * inches
-        look: Any = {"units": "inches", "scale_units": "inches", "angles": "uv", "in_layout": False, "clip_on": False}
+        look: Look = {"units": "inches", "scale_units": "inches", "angles": "uv", "in_layout": False, "clip_on": False}
         look |= {"scale": 0.4 / size, "width": 0.14 * size, "color": ink(), "transform": axes.transAxes}
         axes.quiver(*foot[:, None].repeat(3, 1), *VIEW[:2], **look)
         look = {"transform": axes.transAxes, "fontsize": "x-small", "ha": "center", "va": "center"}
@@ -206,14 +204,14 @@ class _Rows:
             axes.text(x, y, name, **look)
 
 
-_BESIDE_AXES: Any = {"xycoords": "axes fraction", "textcoords": "offset points", "ha": "right", "va": "center"}
+_BESIDE_AXES: Look = {"xycoords": "axes fraction", "textcoords": "offset points", "ha": "right", "va": "center"}
 
 
 # ---- rotations ----
 
 
 # Points of S³ are unit quaternions, scalar first. Those of SU(2) act on R³ as rotations.
-MATRICES: dict[str, Callable[[Any], Array]] = {
+MATRICES: dict[str, Numbers] = {
     "sphere:3": matrices_of_quaternions,
     "so:3": np.asarray,
     "o:3": np.asarray,
@@ -222,7 +220,7 @@ MATRICES: dict[str, Callable[[Any], Array]] = {
 """Matrices of rotations, shape (..., 3, 3)."""
 
 
-def quaternions(matrices: NDArray[Any]) -> Array:
+def quaternions(matrices: AnyArray) -> FloatArray:
     """Return the unit quaternions w, x, y, z of matrices w − i(xσ₁ + yσ₂ + zσ₃) of SU(2), shape (..., 4)."""
     a, b = matrices[..., 0, 0], matrices[..., 1, 0]
     return np.stack([a.real, -b.imag, b.real, -a.imag], axis=-1)
@@ -244,7 +242,7 @@ def rotations(curves: Sequence[Curve]) -> View:
     start = "start of the " + "mean " * curves[0].is_mean + "curve"
     if largest < _SMALL:
         return _rotation_vectors(matrices, first, start)
-    if are_compared(curves) or any(own.is_factor or len(own.gaps) or own.noise is not None for own in curves):
+    if are_compared(curves) or any(curve.is_factor or len(curve.gaps) or curve.noise is not None for curve in curves):
         if largest < _LARGE:
             return _rotation_vectors(matrices, first, start)
         try:
@@ -258,10 +256,10 @@ def rotations(curves: Sequence[Curve]) -> View:
     return timeline(frames, 3.6, in_rows=True)
 
 
-def _rotation_vectors(matrices: Callable[[Any], Array], first: Array, name: str) -> View:
+def _rotation_vectors(matrices: Numbers, first: FloatArray, name: str) -> View:
     """Return the view of the rotation vectors of rotations from a given one."""
 
-    def numbers(_: Any, points: Any) -> Array:
+    def numbers(_: Any, points: AnyArray) -> FloatArray:
         turned = np.ascontiguousarray(matrices(points) @ first.T)
         vectors = convert_rotations(turned, "matrix", "vector", 1e-7)[0]
         # In long gaps the vector may jump where the angle reaches half a turn.
@@ -278,7 +276,7 @@ def _rotation_vectors(matrices: Callable[[Any], Array], first: Array, name: str)
     ).view(4.8)
 
 
-def _draw_rotations(panel: Panel, curves: Sequence[Curve], matrices: Callable[[Any], Array], name: str) -> None:
+def _draw_rotations(panel: Panel, curves: Sequence[Curve], matrices: Numbers, name: str) -> None:
     """Draw the columns of rotation matrices as arrows along a time axis.
 
     Discs at the tips contain the true direction of an axis with the probability of the band.
@@ -317,13 +315,13 @@ def _draw_rotations(panel: Panel, curves: Sequence[Curve], matrices: Callable[[A
     curves[0].bodies.append((curves[0].x, body))
 
 
-def _draw_arrows(axes: Axes, times: Array, row: int, frames: Array, opacity: Array) -> Any:
+def _draw_arrows(axes: Axes, times: FloatArray, row: int, frames: FloatArray, opacity: FloatArray) -> Any:
     """Draw the columns of matrices, shape (m, 3, 3), in inches. Nearer columns cover farther ones."""
     seen = VIEW @ frames
     order = np.argsort(seen[:, 2], axis=-1)
     right, up, _ = np.moveaxis(np.take_along_axis(seen, order[:, None], axis=-1), 1, 0)
     # Layouts would add the length of the arrows in data to their extent.
-    look: Any = {"units": "inches", "scale_units": "height", "scale": axes_size(axes)[1], "clip_on": False}
+    look: Look = {"units": "inches", "scale_units": "height", "scale": axes_size(axes)[1], "clip_on": False}
     look |= {"in_layout": False, "headwidth": 3.5, "headlength": 4.5, "headaxislength": 4.2, "zorder": 4}
     look["width"] = 0.028 if opacity.max() == 1 else 0.018
     colors = to_rgba_array(np.array(AXES)[order.ravel()])
@@ -332,7 +330,7 @@ def _draw_arrows(axes: Axes, times: Array, row: int, frames: Array, opacity: Arr
     return axes.quiver(*positions, right.ravel(), up.ravel(), color=colors, **look)
 
 
-def _draw_discs(rows: _Rows, row: int, times: Array, length: float, frames: Array, radii: Array) -> None:
+def _draw_discs(rows: _Rows, row: int, times: FloatArray, length: float, frames: FloatArray, radii: FloatArray) -> None:
     """Draw the caps of angular radii ``radii`` around the columns of rotation matrices, shape (m, 3, 3).
 
     The rotations by angles up to r move a unit vector to all points of the cap of radius r around it.
@@ -340,30 +338,20 @@ def _draw_discs(rows: _Rows, row: int, times: Array, length: float, frames: Arra
     for i, color in enumerate(AXES):
         rings = length * caps(frames[:, :, i], radii) @ VIEW[:2].T
         label = fresh(rows.axes, rows.rows[row].curve.band_name)
-        look: Any = {"facecolors": [to_rgba(color, 0.3)], "linewidths": 0, "label": label, "zorder": 5}
+        look: Look = {"facecolors": [to_rgba(color, 0.3)], "linewidths": 0, "label": label, "zorder": 5}
         rows.axes.add_collection(PolyCollection(list(rings), **look, **rows.in_inches(times, row)))
 
 
 # ---- positive definite matrices ----
 
 
-def ellipses(_: Sequence[Curve]) -> View:
-    """Return the view of positive definite matrices of order 2."""
-    return timeline(partial(_draw_ellipses, view=np.eye(2)), 3.6, in_rows=True)
-
-
-def ellipsoids(_: Sequence[Curve]) -> View:
-    """Return the view of positive definite matrices of order 3."""
-    return timeline(partial(_draw_ellipses, view=VIEW), 3.6, in_rows=True)
-
-
-def outlines(matrices: Array) -> Array:
+def outlines(matrices: FloatArray) -> FloatArray:
     """Return the ellipses of matrices or the outlines of ellipsoids, shape (m, 97, 2)."""
     roots, axes = _half_axes(matrices[:, :2, :2])
     return np.asarray(_CIRCLE[:, :2] * roots[:, None] @ axes)
 
 
-def sections(matrices: Array) -> Array:
+def sections(matrices: FloatArray) -> FloatArray:
     """Return the near halves of the sections through two semi-axes, shape (m, 3, 97, 2); the far halves are NaN."""
     roots, axes = (array[:, None] for array in _half_axes(matrices))
     rings = np.stack([np.roll(_CIRCLE[:, [1, 0, 2]], i + 1, axis=1) for i in range(3)])
@@ -371,14 +359,14 @@ def sections(matrices: Array) -> Array:
     return np.asarray(np.where(normals[..., 2:] > 0, (rings * roots[..., None, :] @ axes)[..., :2], np.nan))
 
 
-def _half_axes(matrices: Array) -> tuple[Array, Array]:
+def _half_axes(matrices: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the square roots of the eigenvalues, and the eigenvectors in rows."""
     values, vectors = np.linalg.eigh(matrices)
     # Rounding can make an eigenvalue 0 or negative.
     return np.sqrt(np.maximum(values, 1e-16 * values[:, -1:])), vectors.swapaxes(1, 2)
 
 
-def _draw_ellipses(panel: Panel, curves: Sequence[Curve], view: Array) -> None:
+def _draw_ellipses(panel: Panel, curves: Sequence[Curve], view: FloatArray) -> None:
     """Draw rows of ellipses along the time axis, coloured by time and on the same scale. Given ones are filled.
 
     The rows of ``view`` are the directions to the right, up and, for ellipsoids, towards the viewer.
@@ -397,7 +385,7 @@ def _draw_ellipses(panel: Panel, curves: Sequence[Curve], view: Array) -> None:
             batch = row.curve.batch
             others = batch.at("point")[:, np.searchsorted(batch.times, times).clip(max=len(batch.x) - 1)]
             for one in others[evenly(len(others), _BESIDE)]:
-                look: Any = {"facecolors": "none", "edgecolors": [ink(0.7)], "alpha": 0.3, "linewidths": 0.6}
+                look: Look = {"facecolors": "none", "edgecolors": [ink(0.7)], "alpha": 0.3, "linewidths": 0.6}
                 look |= {"label": fresh(rows.axes, "single curves"), "zorder": 3.5} | rows.in_inches(times, i)
                 rows.axes.add_collection(PolyCollection(list(inches * outlines(view @ one @ view.T)), **look))
     length = round_below(0.8 / inches)
@@ -425,16 +413,22 @@ def _draw_ellipses(panel: Panel, curves: Sequence[Curve], view: Array) -> None:
     curves[0].bodies.append((curves[0].x, body))
 
 
+ELLIPSES, ELLIPSOIDS = (timeline(partial(_draw_ellipses, view=view), 3.6, in_rows=True) for view in (np.eye(2), VIEW))
+"""The views of positive definite matrices of order 2 and 3."""
+
+
 def _draw_bar(rows: _Rows, length: float, right: float) -> None:
     """Draw a bar of a length in inches above the axes or inside those of a user, ``right`` inches from their end."""
     end, above = -right, 0.12 if rows.panel.mine else -0.1
     tick = [[(x, above - 0.04), (x, above + 0.04)] for x in (end - length, end)]
-    look: Any = {"offsets": [(1, 1)], "offset_transform": rows.axes.transAxes, "clip_on": False, "in_layout": False}
+    look: Look = {"offsets": [(1, 1)], "offset_transform": rows.axes.transAxes, "clip_on": False, "in_layout": False}
     look |= {"transform": _Inches(rows.axes), "colors": [ink()], "linewidths": 1.2}
     rows.axes.add_collection(LineCollection([[(end - length, above), (end, above)], *tick], **look), autolim=False)
 
 
-def _draw_row(rows: _Rows, row: int, inches: float, times: Array, matrices: Array, radii: Array | None) -> None:
+def _draw_row(
+    rows: _Rows, row: int, inches: float, times: FloatArray, matrices: FloatArray, radii: FloatArray | None
+) -> None:
     """Draw ellipses in a row, coloured by time; those of noisy data have one colour.
 
     ``inches`` is the length of 1 on paper, as the time axis has another scale. Bands are shaded. The matrices at
@@ -442,7 +436,7 @@ def _draw_row(rows: _Rows, row: int, inches: float, times: Array, matrices: Arra
     touch both.
     """
     axes, name, curve = rows.axes, rows.rows[row].name, rows.rows[row].curve
-    first, last = (edge([float(own.curve.times[i]) for own in rows.rows]) for edge, i in ((min, 0), (max, -1)))
+    first, last = (edge([float(line.curve.times[i]) for line in rows.rows]) for edge, i in ((min, 0), (max, -1)))
     colors = time_colors((times - first) / (last - first))
     if name == "data" or curve.is_mean:
         colors[:] = to_rgba(ink() if name == "data" else curve.color)
@@ -450,7 +444,7 @@ def _draw_row(rows: _Rows, row: int, inches: float, times: Array, matrices: Arra
     if radii is not None:
         scales = np.exp(radii / 2)[:, None, None]
         shaded = np.concatenate([scales * rings, (rings / scales)[:, ::-1]], axis=1)
-        shade: Any = {"facecolors": colors * [1, 1, 1, 0.3], "linewidths": 0, "label": fresh(axes, curve.band_name)}
+        shade: Look = {"facecolors": colors * [1, 1, 1, 0.3], "linewidths": 0, "label": fresh(axes, curve.band_name)}
         axes.add_collection(PolyCollection(list(shaded), **shade, **look))
     look |= {"edgecolors": colors, "linewidths": {"given": 1.6, "data": 0.8}.get(name, 1.2), "zorder": 4}
     filled = colors * [1, 1, 1, {"given": 0.45, "": 0.25}.get(name, 0.0)]
@@ -496,7 +490,7 @@ def _draw_correlations(panel: Panel, curves: Sequence[Curve], names: Sequence[st
     axes.set_yticks(np.arange(len(names))[::every] + 0.5, names[::every])
     axes.tick_params(axis="y", length=0)
     rows, columns = np.triu_indices(curves[0].space.point_shape[0], 1)
-    look: Any = {"cmap": "RdBu_r", "vmin": -1, "vmax": 1, "shading": "gouraud", "rasterized": True}
+    look: Look = {"cmap": "RdBu_r", "vmin": -1, "vmax": 1, "shading": "gouraud", "rasterized": True}
     for curve in curves:
         roots = np.sqrt(np.diagonal(curve.points, axis1=1, axis2=2))
         shares = curve.outside_gaps(curve.points[:, rows, columns] / (roots[:, rows] * roots[:, columns]))

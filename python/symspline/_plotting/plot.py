@@ -1,29 +1,36 @@
-"""Plots of one curve, and of several curves and data: a page, or one picture in axes of the user."""
+"""Plots of one curve, and of several curves and data: the page, or one picture in axes of the user."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
+from io import BytesIO
+from math import lcm
+from textwrap import fill
 from typing import Any
 
 import numpy as np
 from matplotlib import rc_context, rcParams
 from matplotlib.axes import Axes
 from matplotlib.colors import is_color_like
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, SubFigure
+from matplotlib.gridspec import GridSpec
+from matplotlib.lines import Line2D
+from matplotlib.typing import ColorType
 
 from .._base.arrays import as_array, short_repr
-from .._base.disk import path_of, replacing
+from .._base.system import path_of, replacing
 from .._base.time import TimeAxis, knots_of
+from .._base.typing import Look
 from .._core import ValidationError
-from .._spaces import Product, Space, SpecialEuclidean, cover_of, factors_of, parts_of
+from .._spaces import AnySpace, Product, Space, SpecialEuclidean, cover_of, factors_of, parts_of
+from .chart import Box
 from .curves import OTHERS, Axis, Curve, common_gaps, curves_of, scatter_of
-from .lines import FRAME, LEGEND, START
-from .page import draw_page
-from .panels import Panel
-from .rates import is_angular, residuals_of
-from .style import DATA, distinct, scale_of, shrink, time_colors
-from .views import FACTORS, FRAMES, title_on, view_of, views_of_factors
+from .panels import FRAME, LEGEND, START, Panel, View
+from .rates import IN_ROW, columns_of, draw_rates, draw_residuals, is_angular, residuals_of
+from .style import DATA, distinct, font_factor, legend, scale_of, shrink, time_colors
+from .views import FACTORS, FRAMES, captions, title_on, view_of, views_of_factors
 
 _LARGEST = 200.0
 """The largest side of a figure in inches."""
@@ -41,7 +48,7 @@ def plot(
     *,
     ax: Any = None,
     show: bool = False,
-    color: Any = None,
+    color: ColorType | None = None,
     label: str | None = None,
     radius: float | None = None,
     **look: Any,
@@ -51,12 +58,12 @@ def plot(
         return finish(page_of(curve, color, label, radius, show=show, **look)[0], file, show)
     check_axes(ax, curve.space)
     curves, _ = curves_of(curve, _axis(curve, raw=True), color or _next_color(ax), label)
-    return _draw_into(ax, [own.on_earth(radius) for own in curves], show=show, **look)
+    return _draw_into(ax, [part.on_earth(radius) for part in curves], show=show, **look)
 
 
 def page_of(
     curve: Any,
-    color: Any = None,
+    color: ColorType | None = None,
     label: str | None = None,
     radius: float | None = None,
     title: str | None = None,
@@ -65,7 +72,7 @@ def page_of(
 ) -> tuple[Figure, list[Curve]]:
     """Return the page of a curve, and the curves that it shows."""
     curves, words = curves_of(curve, _axis(curve), color, label)
-    curves = [own.on_earth(radius) for own in curves]
+    curves = [part.on_earth(radius) for part in curves]
     space = curve.space
     views = views_of_factors(curves[:1]) if isinstance(space, Product) else [(view_of(curves[:1]), curves)]
     residuals = residuals_of(curve, curves[0], [view.has_band for view, _ in views])
@@ -119,35 +126,35 @@ def compare(
     radius: float | None = None,
 ) -> Any:
     """Draw curves and data, on the Earth if its radius in metres is given. See `symspline.plot`."""
-    first = next(own for own in items if not isinstance(own, tuple))
+    first = next(item for item in items if not isinstance(item, tuple))
     space = first.space
     if ax is not None:
         check_axes(ax, space)
     names = _checked_labels(labels, len(items))
     chosen = _checked_colors(colors, items, space)
-    data = [_data_of(own, space, i) if isinstance(own, tuple) else None for i, own in enumerate(items)]
+    data = [_data_of(item, space, i) if isinstance(item, tuple) else None for i, item in enumerate(items)]
     _check_times(items, data, first._time_axis)
-    ends = [own.domain if given is None else given[:2] for own, given in zip(items, data, strict=True)]
+    ends = [item.domain if given is None else given[:2] for item, given in zip(items, data, strict=True)]
     axis = Axis.of(ends, first._time_axis, raw=ax is not None)
     drawn: list[Curve] = []
     has_data = any(given is not None for given in data)
     for item, given, name, color in zip(items, data, names, chosen, strict=True):
         if given is None:
-            own = curves_of(item, axis, color, name, alone=False)[0]
+            made, _ = curves_of(item, axis, color, name, alone=False)
             # Beside data, markers of starting points would be a second kind of circles.
-            drawn += [replace(curve, has_start=not has_data) for curve in own]
+            drawn += [replace(curve, has_start=not has_data) for curve in made]
         else:
             start, _, times, points = given
             drawn.append(scatter_of(space, start, times, points, axis, color, name))
-    drawn = [own.on_earth(radius) for own in drawn]
+    drawn = [curve.on_earth(radius) for curve in drawn]
     # Lines are in front of data, and the first of them determines the view.
-    drawn.sort(key=lambda own: not own.has_line)
+    drawn.sort(key=lambda curve: not curve.has_line)
     if ax is not None:
         return _draw_into(ax, drawn, title, show)
-    count = sum(own.has_line for own in drawn)
+    count = sum(curve.has_line for curve in drawn)
     words = [f"{count} curve{'s' if count > 1 else ''}"]
     if count < len(drawn):
-        words.append(f"{sum(len(own.x) for own in drawn if not own.has_line)} data")
+        words.append(f"{sum(len(curve.x) for curve in drawn if not curve.has_line)} data")
     title = title or ("Tracks" if radius is not None else title_on("Comparison", space))
     return finish(draw_page(drawn, title, ", ".join(words), figsize, show), file, show)
 
@@ -157,26 +164,26 @@ def _checked_labels(labels: Any, count: int) -> list[str | None]:
         return [None] * count
     if isinstance(labels, str) or not isinstance(labels, Sequence) or len(labels) != count:
         raise ValidationError(f"labels must be a list of {count} strings, one per curve, not {short_repr(labels)}")
-    for i, own in enumerate(labels):
-        if own is not None and not isinstance(own, str):
-            raise TypeError(f"labels[{i}] must be a string, not {short_repr(own)}")
+    for i, label in enumerate(labels):
+        if label is not None and not isinstance(label, str):
+            raise TypeError(f"labels[{i}] must be a string, not {short_repr(label)}")
     return list(labels)
 
 
-def _checked_colors(colors: Any, items: Sequence[Any], space: Space[Any]) -> list[Any]:
+def _checked_colors(colors: Any, items: Sequence[Any], space: AnySpace) -> list[Any]:
     """Return the colours of the user, or distinct ones for curves and grey ones for data."""
     if colors is not None:
         if isinstance(colors, str) or not isinstance(colors, Sequence) or len(colors) != len(items):
             raise ValidationError(
                 f"colors must be a list of {len(items)} colours, one per curve, not {short_repr(colors)}"
             )
-        return [_checked_color(own, f"colors[{i}]") for i, own in enumerate(colors)]
-    count = sum(not isinstance(own, tuple) for own in items)
+        return [_checked_color(value, f"colors[{i}]") for i, value in enumerate(colors)]
+    count = sum(not isinstance(value, tuple) for value in items)
     # Frames have colours of their own.
-    usual = OTHERS if any(str(cover_of(own)) in FRAMES for own in factors_of(space)) else distinct()
+    usual = OTHERS if any(str(cover_of(value)) in FRAMES for value in factors_of(space)) else distinct()
     lines = iter(usual if count <= len(usual) else map(tuple, time_colors(np.linspace(0, 1, count))))
     dots = iter([DATA, *distinct()[::-1]] * len(items))
-    return [next(dots) if isinstance(own, tuple) else next(lines) for own in items]
+    return [next(dots) if isinstance(value, tuple) else next(lines) for value in items]
 
 
 def _data_of(pair: tuple[Any, Any], space: Any, i: int) -> tuple[Any, Any, Any, Any]:
@@ -185,25 +192,26 @@ def _data_of(pair: tuple[Any, Any], space: Any, i: int) -> tuple[Any, Any, Any, 
     name = f"curves[{i}]"
     try:
         pairs = zip(factors_of(space), parts_of(points, space, "points"), strict=True)
-        parts = [factor._array(own, "points") for factor, own in pairs]
-        for own, factor in zip(parts, factors_of(space), strict=True):
-            if own.shape[1:] != factor.point_shape or not len(own):
+        parts = [factor._array(part, "points") for factor, part in pairs]
+        for part, factor in zip(parts, factors_of(space), strict=True):
+            if part.shape[1:] != factor.point_shape or not len(part):
                 raise ValidationError(
-                    f"points have shape {own.shape}, but data on {factor!r} need shape {('n', *factor.point_shape)}"
+                    f"points have shape {part.shape}, but data on {factor!r} need shape {('n', *factor.point_shape)}"
                 )
         _, shown, times = knots_of(t, (), len(parts[0]))
-        kept = np.all([np.isfinite(own.reshape(len(own), -1)).all(axis=1) for own in parts], axis=0)
+        kept = np.all([np.isfinite(part.reshape(len(part), -1)).all(axis=1) for part in parts], axis=0)
         if not kept.any():
             raise ValidationError("all points are missing")
         parts = [
-            factor.project(own[kept].astype(factor.dtype)) for own, factor in zip(parts, factors_of(space), strict=True)
+            factor.project(part[kept].astype(factor.dtype))
+            for part, factor in zip(parts, factors_of(space), strict=True)
         ]
     except ValidationError as error:
         raise ValidationError(f"{name}: {error}") from None
     if not np.isfinite(times).all():
         raise ValidationError(f"{name}: t must be finite")
     order = np.argsort(times[kept], kind="stable")
-    parts = [own[order] for own in parts]
+    parts = [part[order] for part in parts]
     shown, times = shown[kept][order], times[kept][order]
     return shown[0], shown[-1], times, tuple(parts) if isinstance(space, Product) else parts[0]
 
@@ -266,11 +274,11 @@ def draw_picture_into(
     for name, (low, high) in limits.items():
         # Pictures with limits of their own must not hide what was there.
         if not getattr(ax, f"get_autoscale{name}_on")():
-            own = getattr(ax, f"get_{name}lim")()
-            getattr(ax, f"set_{name}lim")(min(low, own[0]), max(high, own[1]))
+            ends = getattr(ax, f"get_{name}lim")()
+            getattr(ax, f"set_{name}lim")(min(low, ends[0]), max(high, ends[1]))
     new = [artist for artist in ax.get_children() if artist not in before]
     shrink(new, factor)
-    hidden = tuple(own for own in LEGEND if own not in (START, *FRAME))
+    hidden = tuple(ends for ends in LEGEND if ends not in (START, *FRAME))
     for artist in new:
         # Legends of the user have the names of curves.
         if str(artist.get_label()).startswith(hidden):
@@ -312,7 +320,7 @@ def save(figure: Figure, file: Any) -> None:
     if path is None:
         figure.savefig(file)
         return
-    known = sorted(set(figure.canvas.get_supported_filetypes()) - {own[1:] for own in _MOVING})
+    known = sorted(set(figure.canvas.get_supported_filetypes()) - {suffix[1:] for suffix in _MOVING})
     ending = path.suffix[1:].lower()
     if not ending:
         ending = figure.canvas.get_default_filetype()
@@ -328,7 +336,9 @@ def save(figure: Figure, file: Any) -> None:
         figure.savefig(temporary, format=ending)
 
 
-def checked_look(file: Any, ax: Any, color: Any, label: Any, title: Any, figsize: Any, show: Any) -> dict[str, Any]:
+def checked_look(
+    file: object, ax: object, color: object, label: object, title: object, figsize: object, show: object
+) -> Look:
     """Return the options that were given as keyword arguments of the function that draws.
 
     Raises
@@ -338,7 +348,7 @@ def checked_look(file: Any, ax: Any, color: Any, label: Any, title: Any, figsize
     """
     if not isinstance(show, bool):
         raise TypeError(f"show must be True or False, not {short_repr(show)}")
-    look: dict[str, Any] = {}
+    look: Look = {}
     if color is not None:
         look["color"] = _checked_color(color, "color")
     for name, text in (("label", label), ("title", title)):
@@ -375,3 +385,168 @@ def _checked_size(figsize: Any) -> tuple[float, float]:
             f"{short_repr(figsize)}"
         )
     return float(size[0]), float(size[1])
+
+
+# ---- the page of curves: a heading, pictures of the space, and velocity and acceleration against time ----
+
+_DPI = 150
+_HEAD = 1.0
+_RATES_WIDTH, _RATE, _RESIDUAL, _LABELS = 5.8, 1.6, 1.35, 0.8
+"""Width of rates beside a picture, heights of a rate and of a panel of residuals, and that of the labels of times."""
+_CELL = 4.8, 4.6
+"""Width and height of a factor of a product."""
+_MAP = 4.6, 6.8
+"""Widths of a globe and of the map beside it."""
+_SMALLEST = 0.6
+"""Text is not reduced by less than this factor, unless there is no space for a page otherwise."""
+_TEXT: Any = (
+    "font.size",
+    "axes.labelpad",
+    "axes.titlepad",
+    *(f"{x}tick.major.{name}" for x in "xy" for name in ("pad", "size")),
+)
+
+
+class CurveFigure(Figure):
+    """A figure that notebooks show although it does not belong to pyplot."""
+
+    def _repr_png_(self) -> bytes:
+        buffer = BytesIO()
+        self.savefig(buffer, format="png")
+        return buffer.getvalue()
+
+
+@contextmanager
+def drawing(natural: tuple[float, float], figsize: Any, show: bool) -> Iterator[Figure]:
+    """Create a figure to draw into, which belongs to pyplot only if a window opens.
+
+    Lines, symbols and text are reduced if the figure is smaller than its natural size, in inches. That size is larger
+    for users with a large font.
+    """
+    larger = font_factor()
+    size = np.multiply(natural, larger) if figsize is None else np.asarray(figsize, float)
+    share = float((size / np.multiply(natural, larger)).min())
+    factor = min(1.0, max(share, min(_SMALLEST, 1.4 * share)))
+    look: Look = {"figsize": tuple(size.tolist()), "layout": "constrained"}
+    with rc_context({name: factor * rcParams[name] for name in _TEXT}):
+        if show:
+            from matplotlib import pyplot
+
+            figure: Figure = pyplot.figure(FigureClass=CurveFigure, **look)
+        else:
+            figure = CurveFigure(dpi=_DPI, **look)
+        yield figure
+    if factor * larger != 1:
+        shrink(figure.findobj(), factor * larger)
+
+
+def draw_page(
+    curves: list[Curve],
+    title: str,
+    words: str,
+    figsize: tuple[float, float] | None = None,
+    show: bool = False,
+    residuals: Sequence[Any] = (),
+) -> Figure:
+    """Draw a heading, the pictures of the space, rates, and residuals."""
+    space = curves[0].space
+    if isinstance(space, Product):
+        pictures, names = views_of_factors(curves), captions(space)
+        rows = 1 if len(pictures) <= IN_ROW else 2
+        across = -(-len(pictures) // rows)
+        whole = View(pictures[0][0].draw, _CELL[0] * across, _CELL[1] * rows)
+    else:
+        whole = view_of(curves)
+        pictures, names, rows, across = [(whole, curves)], [], 1, 1
+    columns = columns_of(curves[0], curves[0].axis.seconds, FACTORS, whole.is_wide)
+    count = max(map(len, columns), default=0)
+    beside, below = (0, count) if whole.is_wide else (count, 0)
+    # Wide pages have cells of one grid, so that time axes one below the other are aligned. A picture has some of them.
+    units = lcm(*(view.rows for view, _ in pictures if view.is_time)) if whole.is_wide else 1
+    bottom = lcm(*map(len, columns)) if below else 0
+    high = max(whole.height, _LABELS + _RATE * beside)
+    heights = [high / (rows * units)] * rows * units + [(_LABELS + _RATE * below) / max(bottom, 1)] * bottom
+    heights += [_RESIDUAL] * len(residuals)
+    cells = lcm(across, len(columns)) if below else across
+    widths = [whole.width / cells] * cells + [_RATES_WIDTH] * bool(beside)
+    with drawing((sum(widths), _HEAD + sum(heights)), figsize, show) as figure:
+        body: Any = figure.subfigures()
+        grid = GridSpec(len(heights), len(widths), body, width_ratios=widths, height_ratios=heights, **_ABOUT)
+
+        def stack(top: int, height: int, left: int, width: int, number: int, projection: Any = None) -> list[Axes]:
+            """Add axes one below the other that fill some of the cells, or divide them."""
+            step = height // number
+            if whole.is_wide and step:
+                places: Any = [grid[i : i + step, left : left + width] for i in range(top, top + height, step)]
+            else:
+                inner = grid[top : top + height, left : left + width].subgridspec(number, 1)
+                places = [inner[i, 0] for i in range(number)]
+            made = [body.add_subplot(place, axes_class=Box if projection else None) for place in places]
+            if not whole.is_wide:
+                body.align_ylabels(made)
+            return made
+
+        for i, (view, drawn) in enumerate(pictures):
+            row, column = divmod(i, across)
+            place = row * units, units, column * cells // across, cells // across
+            if view.rows > 1 and not view.is_time:
+                inner = grid[:units, :cells].subgridspec(1, view.rows, width_ratios=_MAP)
+                axes = [body.add_subplot(inner[0, k]) for k in range(view.rows)]
+            else:
+                axes = stack(*place, view.rows, view.projection)
+            view.draw_into(Panel(axes, mine=True), drawn)
+            if names:
+                _caption(axes[0], names[i])
+        for k, group in enumerate(columns):
+            width = cells // len(columns)
+            place = (rows * units, bottom, k * width, width) if below else (0, rows * units, cells, 1)
+            draw_rates(stack(*place, len(group)), curves, group)
+        if residuals:
+            place = rows * units + bottom, len(residuals), 0, len(widths)
+            draw_residuals(stack(*place, len(residuals)), curves[0], residuals)
+        if whole.is_wide:
+            body.align_ylabels([axes for axes in body.axes if axes.get_gid() == "time"])
+        head(figure, body, title, words, curves)
+    return figure
+
+
+_ABOUT: Look = {"left": 0.07, "right": 0.97, "bottom": 0.07, "top": 0.9, "hspace": 0.04, "wspace": 0.06}
+"""About the margins that the layout will find. Symbols are as large as the axes permit before it does."""
+
+
+def _caption(axes: Any, name: str) -> None:
+    """Write the name of a factor above its picture, and above explanations that the picture has there."""
+    top = max(artist.get_window_extent().y1 for artist in (axes._left_title, axes.get_legend()) if artist is not None)
+    above = 72 * (top - axes.bbox.y1) / axes.figure.dpi + 4
+    look: Look = {"xycoords": "axes fraction", "textcoords": "offset points", "ha": "center", "fontsize": "large"}
+    axes.annotate(name, (0.5, 1), (0, above), **look)
+
+
+def head(figure: Figure, body: SubFigure, title: str, words: str, curves: Sequence[Curve] = ()) -> None:
+    """Write the title and a description, and explain lines, markers and bands."""
+    width, font = figure.get_figwidth(), float(rcParams["font.size"])
+    # Bold letters are about 0.62 times as wide as their size, in points of 1/72 inch.
+    letters = 0.94 * width * 72 / (0.62 * 1.7 * font)
+    size = max(0.6, min(1.0, letters / len(title)))
+    title = fill(title, max(int(letters / size), 10))
+    figure.suptitle(title, x=0.01, ha="left", weight="bold", fontsize=1.7 * size * font, linespacing=1.0)
+    named: Look = {}
+    for curve in (part for whole in curves if not whole.faint for part in whole.unbroken):
+        if curve.label:
+            look: Look = {} if curve.has_line else {"linestyle": "none", "marker": "o", "markerfacecolor": "none"}
+            named.setdefault(curve.label, Line2D([], [], color=curve.color, linewidth=2, **look))
+    for axes in body.axes:
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+            named.setdefault(label, handle)
+    order = sorted(named, key=_rank)
+    words = fill(words, max(20, int(0.94 * width * 72 / (0.53 * 1.2 * font))))
+    look = {"loc": "outside upper left", "title": words, "title_fontsize": "large", "alignment": "left"}
+    legend(body, [named[label] for label in order], order, 0.94 * width, **look)
+    for key in body.legends[0].legend_handles:
+        if isinstance(key, Line2D) and key.get_marker() not in ("", "None"):
+            key.set_markersize(5)
+
+
+def _rank(label: str) -> int:
+    """Return the place of a label in the legend. Names of curves come first."""
+    return next((i for i, start in enumerate(LEGEND) if label.startswith(start)), -1)

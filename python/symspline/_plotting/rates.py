@@ -9,12 +9,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
+from .._base.typing import FloatArray, Look
 from .._curves.curve import SidePanel
-from .._spaces import Product, Space, SpecialEuclidean, Sphere, Torus, cover_of, factors_of, short_name
+from .._spaces import AnySpace, Product, SpecialEuclidean, Sphere, Torus, cover_of, factors_of, short_name
 from .curves import Curve
-from .lines import ALPHA, LINE, fill_band, fresh, plot_line, shade_quantiles
-from .panels import FEW_KNOTS, Panel, time_axes
-from .style import DATA, MARK, Array, axes_size, distinct, ink, legend
+from .panels import ALPHA, FEW_KNOTS, LINE, Panel, fill_band, fresh, plot_line, shade_quantiles, time_axes
+from .style import DATA, MARK, axes_size, distinct, ink, legend
 
 NORMAL = 1.96
 """Half width of the 95 % interval of a normal distribution, in standard deviations."""
@@ -60,24 +60,24 @@ class Rate(NamedTuple):
 
     label: str
     order: int
-    values: Callable[[At], Array]
+    values: Callable[[At], FloatArray]
     signed: bool = False
     scale: float = 1.0
     whole: bool = True
-    speed: Callable[[At], Array] = lambda at: at("speed")
+    speed: Callable[[At], FloatArray] = lambda at: at("speed")
 
 
-def _turned(p: Any, v: Any) -> Array:
+def _turned(p: Any, v: Any) -> FloatArray:
     """Return the component of a vector along the direction in which the angle of a unit vector increases."""
     return np.asarray(p[..., 0] * v[..., 1] - p[..., 1] * v[..., 0])
 
 
-def _of_column(p: Any, v: Any) -> Array:
+def _of_column(p: Any, v: Any) -> FloatArray:
     return _turned(p[..., 0], v[..., 0])
 
 
 # Spaces of dimension one: a number with the sign of a velocity or an acceleration v at p.
-_SIGNS: dict[str, Callable[[Any, Any], Array]] = {
+_SIGNS: dict[str, Callable[[Any, Any], FloatArray]] = {
     "euclidean:1": lambda p, v: v[..., 0],
     "sphere:1": _turned,
     "hyperbolic:1": lambda p, v: v[..., 1],
@@ -91,22 +91,22 @@ _SIGNS: dict[str, Callable[[Any, Any], Array]] = {
 }
 
 
-def is_angular(space: Space[Any]) -> bool:
+def is_angular(space: AnySpace) -> bool:
     """Whether distances are angles."""
-    own = cover_of(space)
-    return isinstance(own, (Sphere, Torus)) or bool(_ANGULAR & {str(own), str(own).partition(":")[0]})
+    cover = cover_of(space)
+    return isinstance(cover, (Sphere, Torus)) or bool(_ANGULAR & {str(cover), str(cover).partition(":")[0]})
 
 
-def rates_of(space: Space[Any], seconds: bool) -> list[Rate]:
+def rates_of(space: AnySpace, seconds: bool) -> list[Rate]:
     """Return the rates of a space that is not a product."""
-    own = cover_of(space)
+    cover = cover_of(space)
     per = [", 1/s", ", 1/s²"] if seconds else ["", ""]
     if is_angular(space):
         per = [", rad/s", ", rad/s²"] if seconds else [", rad/t", ", rad/t²"]
-    more = [" = |ω|/2", " = |ω′|/2"] if str(own) in QUATERNIONS else [" of states" * (str(own) in _STATES)] * 2
-    if isinstance(own, SpecialEuclidean):
-        return _rates_of_poses(own, seconds)
-    sign = _SIGNS.get(str(own))
+    more = [" = |ω|/2", " = |ω′|/2"] if str(cover) in QUATERNIONS else [" of states" * (str(cover) in _STATES)] * 2
+    if isinstance(cover, SpecialEuclidean):
+        return _rates_of_poses(cover, seconds)
+    sign = _SIGNS.get(str(cover))
     if sign is None:
         return [
             Rate(f"speed\n|γ′|{more[0]}{per[0]}", 1, lambda at: at("speed")),
@@ -134,15 +134,15 @@ def _rates_of_poses(space: SpecialEuclidean, seconds: bool) -> list[Rate]:
     turn = ["rad/s", "rad/s²"] if seconds else ["rad/t", "rad/t²"]
     move = [", 1/s", ", 1/s²"] if seconds else ["", ""]
 
-    def turning(quantity: str) -> Callable[[At], Array]:
+    def turning(quantity: str) -> Callable[[At], FloatArray]:
         if n == 2:
             return lambda at: _of_column(at("point")[..., :2, :2], at(quantity)[..., :2, :2])
         return lambda at: np.linalg.norm(at(quantity)[..., :n, :n], axis=(-2, -1)) / np.sqrt(2)
 
-    def moving(at: At) -> Array:
+    def moving(at: At) -> FloatArray:
         return np.asarray(np.linalg.norm(at("velocity")[..., :n, n], axis=-1))
 
-    def accelerated(at: At) -> Array:
+    def accelerated(at: At) -> FloatArray:
         rate, turns = at("velocity"), at("point")[..., :n, :n]
         spin = rate[..., :n, :n] @ turns.swapaxes(-1, -2)
         return np.asarray(np.linalg.norm((at("acceleration")[..., :n, n:] + spin @ rate[..., :n, n:])[..., 0], axis=-1))
@@ -155,7 +155,7 @@ def _rates_of_poses(space: SpecialEuclidean, seconds: bool) -> list[Rate]:
         Rate(f"acceleration\n|p″|{move[1]}", 2, accelerated),
     ]
     speeds = (turning("velocity"), turning("velocity"), moving, moving)
-    return [rate._replace(whole=False, speed=own) for rate, own in zip(rates, speeds, strict=True)]
+    return [rate._replace(whole=False, speed=speed) for rate, speed in zip(rates, speeds, strict=True)]
 
 
 def columns_of(curve: Curve, seconds: bool, most: int, wide: bool) -> list[list[tuple[int | None, Rate]]]:
@@ -166,22 +166,22 @@ def columns_of(curve: Curve, seconds: bool, most: int, wide: bool) -> list[list[
     """
     space = curve.space
     if curve.radius is not None:
-        return [[(None, own) for own in _on_earth(curve, seconds)]]
+        return [[(None, rate) for rate in _on_earth(curve, seconds)]]
     if not isinstance(space, Product):
-        rates: list[tuple[int | None, Rate]] = [(None, own) for own in rates_of(space, seconds)]
+        rates: list[tuple[int | None, Rate]] = [(None, rate) for rate in rates_of(space, seconds)]
         if curve.is_mean and not isinstance(cover_of(space), SpecialEuclidean):
             rates.insert(0, (None, _deviation(curve, ", rad" * ("rad" in rates[0][1].label))))
             return [rates]
         return [rates[:2], rates[2:]] if wide and len(rates) > 2 else [rates]
     factors = factors_of(space)
-    each = [rates_of(factor, seconds) for factor in factors[:most]]
-    if wide and len(each) <= IN_ROW:
-        return [[(i, own) for own in group] for i, group in enumerate(each)]
+    by_factor = [rates_of(factor, seconds) for factor in factors[:most]]
+    if wide and len(by_factor) <= IN_ROW:
+        return [[(i, rate) for rate in group] for i, group in enumerate(by_factor)]
     names = [_cut(short_name(factor)) for factor in factors]
     if len(set(names)) < len(names):
         names = [f"factor {i}" for i in range(len(names))]
     rows: list[tuple[int | None, Rate]] = [
-        (i, own._replace(label=f"{own.label} of {names[i]}")) for i, group in enumerate(each) for own in group
+        (i, rate._replace(label=f"{rate.label} of {names[i]}")) for i, group in enumerate(by_factor) for rate in group
     ]
     return [[row for row in rows if row[1].order == order] for order in (1, 2)] if wide else [rows]
 
@@ -194,7 +194,7 @@ def _cut(name: str) -> str:
 def _deviation(mean: Curve, unit: str, scale: float = 1.0) -> Rate:
     """Return the number that is the distance of a curve from the mean of its batch."""
 
-    def distances(at: At) -> Array:
+    def distances(at: At) -> FloatArray:
         assert mean.batch is not None
         middle = mean.data.evaluate(mean.batch.x, "point", "raise", False)
         return scale * mean.space.distance(middle, at("point"))
@@ -255,7 +255,7 @@ def _draw_rate(axes: Axes, curves: Sequence[Curve], rate: Rate) -> None:
             drawn += _draw_values(axes, curve, rate)
     for limit in {curve.limits[0][rate.order - 1] for curve in curves if curve.limits and rate.whole} - {np.inf}:
         for bound in (limit, -limit) if rate.signed else (limit,):
-            look: Any = {"color": MARK, "linewidth": 1, "linestyle": "--", "zorder": 2}
+            look: Look = {"color": MARK, "linewidth": 1, "linestyle": "--", "zorder": 2}
             axes.axhline(rate.scale * bound, label=fresh(axes, "limit"), **look)
             drawn.append(rate.scale * bound)
     top, rounding = (top, 0.0) if moves else (1.0, rounding)
@@ -285,7 +285,7 @@ def _draw_values(axes: Axes, curve: Curve, rate: Rate) -> list[float]:
     return [float(np.nanmin(low)), float(np.nanmax(high))]
 
 
-def _rounding(curve: Curve) -> Array:
+def _rounding(curve: Curve) -> FloatArray:
     """Return the speeds that rounding errors of points explain, at all times; a curve at rest has them."""
     knots = np.asarray(curve.data.times)
     segment = np.clip(np.searchsorted(knots, curve.x, side="right") - 1, 0, len(knots) - 2)
@@ -310,36 +310,36 @@ def residuals_of(spline: Any, curve: Curve, has_band: Sequence[bool]) -> list[Si
     if not curve.alone or curve.is_mean:
         return []
     panels = spline._panels_below(curve.x)
-    return [own for own in panels if len(own.x) and (own.factor is None or not has_band[own.factor])]
+    return [panel for panel in panels if len(panel.x) and (panel.factor is None or not has_band[panel.factor])]
 
 
 def draw_residuals(axes: list[Axes], curve: Curve, panels: Sequence[SidePanel]) -> None:
     """Draw radii of bands, and residuals in standard deviations."""
-    time_axes(Panel(axes, mine=True), [curve], [own.label for own in panels], marked=False)
-    for one, own in zip(axes, panels, strict=True):
-        words = (_draw_deviations if own.factor is None else _draw_radii)(one, curve, own)
+    time_axes(Panel(axes, mine=True), [curve], [panel.label for panel in panels], marked=False)
+    for one, panel in zip(axes, panels, strict=True):
+        words = (_draw_deviations if panel.factor is None else _draw_radii)(one, curve, panel)
         one.set_title(words, loc="right", fontsize="small", weight="normal", pad=3)
 
 
-def _draw_radii(axes: Axes, curve: Curve, own: SidePanel) -> str:
+def _draw_radii(axes: Axes, curve: Curve, panel: SidePanel) -> str:
     """Draw the radius of a band against time."""
-    radii = own.values[:, 0]
+    radii = panel.values[:, 0]
     axes.fill_between(curve.times, 0, radii, color=curve.color, alpha=ALPHA, linewidth=0, label=curve.band_name)
     axes.plot(curve.times, radii, color=curve.color, linewidth=1.2)
     axes.set_ylim(0, 1.15 * radii.max())
     return "radius of the ball that contains the true point with 95 % probability"
 
 
-def _draw_deviations(axes: Axes, curve: Curve, own: SidePanel) -> str:
+def _draw_deviations(axes: Axes, curve: Curve, panel: SidePanel) -> str:
     """Draw residuals, and the limits between which 95 % of them should lie."""
-    times, values, sizes = curve.on_axis(own.x), own.values, np.abs(own.values)
+    times, values, sizes = curve.on_axis(panel.x), panel.values, np.abs(panel.values)
     top = max(_LEAST, min(1.1 * float(sizes.max()), 1.5 * float(np.quantile(sizes, 0.99))))
     axes.set_ylim(-top, top)
     axes.axhspan(-NORMAL, NORMAL, facecolor=curve.color, alpha=0.08, linewidth=0, zorder=0.6)
     axes.axhline(0.0, color=ink(0.4), linewidth=0.8, zorder=1)
-    look: Any = {"linestyle": "none", "markeredgewidth": 0, "zorder": 3, "rasterized": values.size > 5000}
+    look: Look = {"linestyle": "none", "markeredgewidth": 0, "zorder": 3, "rasterized": values.size > 5000}
     size = float(np.clip(40 / np.sqrt(values.size), 1.2, 3.5))
-    colors = distinct() if own.names else [DATA]
+    colors = distinct() if panel.names else [DATA]
     handles = []
     for k, column in enumerate(values.T):
         look["color"] = colors[k % len(colors)]
@@ -348,9 +348,11 @@ def _draw_deviations(axes: Axes, curve: Curve, own: SidePanel) -> str:
         for sign, marker in ((1, "^"), (-1, "v")):
             far = sign * column > top
             axes.plot(times[far], np.full(int(far.sum()), 0.95 * sign * top), marker=marker, markersize=6, **look)
-    if own.names:
-        keys = [Line2D([], [], linestyle="none", marker="o", markersize=5, color=own.get_color()) for own in handles]
-        legend(axes, keys, own.names, axes_size(axes)[0], loc="lower left", bbox_to_anchor=(0, 1))
+    if panel.names:
+        keys = [
+            Line2D([], [], linestyle="none", marker="o", markersize=5, color=panel.get_color()) for panel in handles
+        ]
+        legend(axes, keys, panel.names, axes_size(axes)[0], loc="lower left", bbox_to_anchor=(0, 1))
     words = f"{100 * np.mean(sizes > NORMAL):.1f} % beyond ±{NORMAL} (5 % expected)"
     beyond = int((sizes > top).sum())
     return words + (f"; {beyond} beyond the axis (triangles)" if beyond else "")

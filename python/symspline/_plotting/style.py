@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from textwrap import fill
 from typing import Any
 
@@ -15,18 +15,22 @@ from matplotlib.colors import to_rgb, to_rgba
 from matplotlib.figure import FigureBase
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.patheffects import withStroke
+from matplotlib.patheffects import AbstractPathEffect, withStroke
 from matplotlib.quiver import Quiver
+from matplotlib.typing import ColorType
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from .._base.typing import AnyArray, FloatArray, Look
+
 Indices = NDArray[np.intp]
+Numbers = Callable[[AnyArray], FloatArray]
+"""Takes points, and returns numbers or positions, one row per point."""
 
 DATA = "#7d8f9c"
 """Colour of noisy data if there is one curve, and of curves in the background."""
 MARK = "#c4402f"
 """Colour of limits, and of the rim of a half sphere."""
-GAP: Any = ("#d95f0e", 0.1)
+GAP: ColorType = ("#d95f0e", 0.1)
 """Colour of long gaps between points."""
 AXES = ["#d55e00", "#009e73", "#0072b2"]
 """Red, green and blue for the axes of a frame, in shades that colour-blind readers can distinguish."""
@@ -44,7 +48,7 @@ DATES: Any = dates
 # ---- colours ----
 
 
-def ink(share: float = 1.0, color: Any = None) -> tuple[float, float, float]:
+def ink(share: float = 1.0, color: ColorType | None = None) -> tuple[float, float, float]:
     """Return the colour of text in the active style, or another one, mixed with the background."""
     *rgb, alpha = to_rgba(rcParams["figure.facecolor"])
     ground = 1 - alpha * (1 - np.array(rgb))
@@ -62,19 +66,19 @@ def paper(share: float) -> tuple[float, float, float]:
     return ink(share, spline_color())
 
 
-def distinct() -> list[Any]:
+def distinct() -> list[ColorType]:
     """Return colours that colour-blind readers can distinguish."""
     return [spline_color(), *_DISTINCT]
 
 
-def halo() -> list[Any]:
+def halo() -> list[AbstractPathEffect]:
     """Return the effect that separates text from lines behind it."""
     return [withStroke(linewidth=2.5, foreground=ink(0), alpha=0.85)]
 
 
-def colors(number: int) -> list[Any]:
+def colors(number: int) -> list[ColorType]:
     """Return one colour per curve: the default colour for one curve, and dark to light colours for several."""
-    return [spline_color()] if number == 1 else [tuple(own) for own in time_colors(np.linspace(0, 1, number))]
+    return [spline_color()] if number == 1 else [tuple(color) for color in time_colors(np.linspace(0, 1, number))]
 
 
 def time_colors(share: Any) -> Any:
@@ -105,13 +109,13 @@ def scale_of(axes: Axes) -> float:
 def shrink(artists: Iterable[Artist], factor: float) -> None:
     """Multiply the widths of lines and the sizes of markers by a factor."""
     for artist in artists:
-        own: Any = artist
+        shape: Any = artist
         if isinstance(artist, Line2D):
-            own.set(markersize=factor * own.get_markersize(), markeredgewidth=factor * own.get_markeredgewidth())
+            shape.set(markersize=factor * shape.get_markersize(), markeredgewidth=factor * shape.get_markeredgewidth())
         if isinstance(artist, Quiver):
-            own.width *= factor
+            shape.width *= factor
         elif isinstance(artist, (Line2D, Patch, Collection)):
-            own.set_linewidth(factor * np.asarray(own.get_linewidth()))
+            shape.set_linewidth(factor * np.asarray(shape.get_linewidth()))
 
 
 # ---- text ----
@@ -123,7 +127,7 @@ def note(axes: Any, text: str) -> None:
     beside = float(axes.xaxis.label.get_fontsize())
     below = -4 if not axes.axison else -2 * beside if axes.name == "3d" else -2.7 * beside - 8
     text = "\n".join(fill(line, max(24, int(axes_size(axes)[0] / (0.0065 * size)))) for line in text.splitlines())
-    look: Any = {"xycoords": "axes fraction", "textcoords": "offset points", "ha": "center", "va": "top"}
+    look: Look = {"xycoords": "axes fraction", "textcoords": "offset points", "ha": "center", "va": "top"}
     axes.annotate(text, (0.5, 0), (0, below), fontsize="small", **look)
 
 
@@ -137,8 +141,8 @@ def legend(holder: Axes | FigureBase, handles: Sequence[Any], labels: Sequence[s
     # A legend fills its columns one after the other.
     order = [i for column in range(columns) for i in range(column, len(labels), columns)]
     handles, labels = [handles[i] for i in order], [labels[i] for i in order]
-    own: Any = {"frameon": False, "fontsize": "small", "borderaxespad": 0.0, "columnspacing": 1.4}
-    holder.legend(handles, labels, ncols=max(columns, 1), handlelength=1.6, **own | look)
+    usual: Look = {"frameon": False, "fontsize": "small", "borderaxespad": 0.0, "columnspacing": 1.4}
+    holder.legend(handles, labels, ncols=max(columns, 1), handlelength=1.6, **usual | look)
 
 
 def plain(axes: Axes) -> None:
@@ -183,7 +187,7 @@ def show_dates(axis: Any, least: int, most: int) -> None:
 # ---- numbers ----
 
 
-def window(positions: Array, margin: float) -> tuple[Array, float]:
+def window(positions: FloatArray, margin: float) -> tuple[FloatArray, float]:
     """Return centre and half width of the square, or cube, around positions of shape (m, n)."""
     low, high = positions.min(axis=0), positions.max(axis=0)
     return (low + high) / 2, margin * float((high - low).max()) / 2
@@ -194,7 +198,7 @@ def evenly(count: int, most: int) -> Indices:
     return np.unique(np.linspace(0, count - 1, min(count, most)).astype(int))
 
 
-def apart(values: Array, least: float) -> Indices:
+def apart(values: FloatArray, least: float) -> Indices:
     """Return the indices of increasing values, the first among them, whose distances are ``least`` or more."""
     kept = [0] if len(values) else []
     for i, value in enumerate(values):

@@ -1,7 +1,7 @@
 """The view of every space, and what its points are called.
 
-To give a new space its view, write a function that returns a `View`, and add a line to `_VIEWS`, or to `_FAMILIES` for
-spaces of all sizes.
+To give a new space its view, make a `View`, or a function of the curves that returns one, and add a line to `_VIEWS`,
+or to `_FAMILIES` for spaces of all sizes.
 """
 
 from __future__ import annotations
@@ -10,10 +10,9 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from functools import partial
 from textwrap import shorten
-from typing import Any
 
-from .._spaces import Euclidean, Product, Space, cover_of, factors_of, short_name
-from . import chart, graphs, matrices, poses, sphere
+from .._spaces import AnySpace, Euclidean, Product, cover_of, factors_of, short_name
+from . import chart, globe, graphs, matrices
 from .curves import Curve
 from .panels import View
 
@@ -21,32 +20,32 @@ FACTORS = 6
 """The largest number of factors of a product that are drawn."""
 FRAMES = {"sphere:3", "so:3", "o:3", "su:2", "se:3"}
 """Spaces whose view has frames, with a colour for every axis."""
-_Views = Callable[[Sequence[Curve]], View]
+_Views = View | Callable[[Sequence[Curve]], View]
 _LINES, _STATES = "lines through the origin", "states of a qubit"
-_angles = {names: graphs.angle(*own) for names, own in graphs.ANGLES.items()}
+_angles = {names: graphs.angle(*data) for names, data in graphs.ANGLES.items()}
 # Spaces, their view, and what their points are.
 _VIEWS: list[tuple[str, _Views, str]] = [
-    ("euclidean:1", lambda _: graphs.coordinates(["x"]), ""),
+    ("euclidean:1", graphs.coordinates(["x"]), ""),
     ("euclidean:2", partial(chart.plane, has_band=True), ""),
     ("euclidean:3", partial(chart.solid, has_band=True), ""),
-    ("sphere:1", lambda _: _angles["sphere:1"], ""),
-    ("sphere:2", sphere.sphere, ""),
+    ("sphere:1", _angles["sphere:1"], ""),
+    ("sphere:2", globe.sphere, ""),
     ("sphere:3", matrices.rotations, "unit quaternions"),
-    ("hyperbolic:2", chart.disk, ""),
-    ("rp:1 gr:1,2", lambda _: _angles["rp:1 gr:1,2"], _LINES),
-    ("rp:2 gr:1,3", lambda _: sphere.LINES, _LINES),
-    ("gr:2,3", lambda _: sphere.PLANES, "planes through the origin"),
-    ("cp:1 cgr:1,2", sphere.bloch, _STATES),
-    ("so:2", lambda _: _angles["so:2 o:2"], "rotations"),
-    ("o:2", lambda _: _angles["so:2 o:2"], ""),
+    ("hyperbolic:2", chart.DISK, ""),
+    ("rp:1 gr:1,2", _angles["rp:1 gr:1,2"], _LINES),
+    ("rp:2 gr:1,3", globe.LINES, _LINES),
+    ("gr:2,3", globe.PLANES, "planes through the origin"),
+    ("cp:1 cgr:1,2", globe.BLOCH, _STATES),
+    ("so:2", _angles["so:2 o:2"], "rotations"),
+    ("o:2", _angles["so:2 o:2"], ""),
     ("so:3", matrices.rotations, "rotations"),
     ("o:3 su:2", matrices.rotations, ""),
-    ("u:1", lambda _: _angles["u:1"], ""),
+    ("u:1", _angles["u:1"], ""),
     ("spd:1", graphs.components, "matrices"),
-    ("spd:2", matrices.ellipses, "matrices"),
-    ("spd:3", matrices.ellipsoids, "matrices"),
-    ("se:2", poses.in_plane, "poses"),
-    ("se:3", poses.in_space, "poses"),
+    ("spd:2", matrices.ELLIPSES, "matrices"),
+    ("spd:3", matrices.ELLIPSOIDS, "matrices"),
+    ("se:2", partial(chart.plane, positions=chart.positions_of, draw=chart.draw_bodies), "poses"),
+    ("se:3", partial(chart.solid, positions=chart.positions_of, draw=chart.draw_on_path), "poses"),
 ]
 _FAMILIES: dict[str, tuple[_Views, str]] = {
     **dict.fromkeys(("rp", "cp", "hp", "cgr"), (graphs.angles_to_first, "")),
@@ -59,14 +58,15 @@ _FAMILIES: dict[str, tuple[_Views, str]] = {
 _BY_NAME = {name: (view, points) for names, view, points in _VIEWS for name in names.split()}
 
 
-def _entry(space: Space[Any]) -> tuple[_Views, str]:
+def _entry(space: AnySpace) -> tuple[_Views, str]:
     name = str(cover_of(space))
     return _BY_NAME.get(name) or _FAMILIES.get(name.partition(":")[0], (graphs.components, ""))
 
 
 def view_of(curves: Sequence[Curve]) -> View:
     """Return the view of curves on a space that is not a product; graphs of the components if there is no other."""
-    return _entry(curves[0].space)[0](curves)
+    view = _entry(curves[0].space)[0]
+    return view if isinstance(view, View) else view(curves)
 
 
 def views_of_factors(curves: Sequence[Curve]) -> list[tuple[View, list[Curve]]]:
@@ -75,10 +75,10 @@ def views_of_factors(curves: Sequence[Curve]) -> list[tuple[View, list[Curve]]]:
     parts = [[curve.part(i) for curve in curves] for i in range(len(factors))]
     views = list(map(view_of, parts))
     vectors = any(
-        str(cover_of(own)) in matrices.MATRICES and not view.in_rows for own, view in zip(factors, views, strict=True)
+        str(cover_of(part)) in matrices.MATRICES and not view.in_rows for part, view in zip(factors, views, strict=True)
     )
-    for i, own in enumerate(parts):
-        if str(factors[i]) == "euclidean:3" and (vectors or any(len(curve.gaps) for curve in own)):
+    for i, part in enumerate(parts):
+        if str(factors[i]) == "euclidean:3" and (vectors or any(len(curve.gaps) for curve in part)):
             # A time axis shows gaps, and how positions and rotations belong together.
             views[i] = graphs.coordinates(["x₁", "x₂", "x₃"])
         if not views[i].is_time:
@@ -90,23 +90,23 @@ def views_of_factors(curves: Sequence[Curve]) -> list[tuple[View, list[Curve]]]:
 # ---- titles ----
 
 
-def captions(space: Space[Any]) -> list[str]:
+def captions(space: AnySpace) -> list[str]:
     """Return names of the factors of a product, with what their points are, and numbers if several are equal."""
-    names = [", ".join(filter(None, (repr(own), _points_of_factor(own)))) for own in factors_of(space)]
+    names = [", ".join(filter(None, (repr(factor), _points_of_factor(factor)))) for factor in factors_of(space)]
     several = max(Counter(names).values()) > 1
     return [f"factor {i}: {name}" if several else name for i, name in enumerate(names)]
 
 
-def _points_of_factor(space: Space[Any]) -> str:
+def _points_of_factor(space: AnySpace) -> str:
     return "vectors" if isinstance(space, Euclidean) else _entry(space)[1]
 
 
-def title_on(what: str, space: Space[Any], most: int = 63) -> str:
+def title_on(what: str, space: AnySpace, most: int = 63) -> str:
     """Return the title of a figure, in at most ``most`` letters.
 
     Long titles have the short name of the space, and those of products have none, because captions name the factors.
     """
-    words = [_points_of_factor(own) for own in factors_of(space)]
+    words = [_points_of_factor(text) for text in factors_of(space)]
     points = _entry(space)[1]
     if isinstance(space, Product):
         points = " and ".join(dict.fromkeys(words)) if all(words) else ""
@@ -115,4 +115,4 @@ def title_on(what: str, space: Space[Any], most: int = 63) -> str:
     titles = [f"{kind} on {name}" for kind in kinds for name in names]
     if isinstance(space, Product) and len(kinds) > 1:
         titles.insert(1, kinds[0])
-    return next((own for own in titles if len(own) <= most), shorten(titles[-1], most, placeholder=" …"))
+    return next((text for text in titles if len(text) <= most), shorten(titles[-1], most, placeholder=" …"))

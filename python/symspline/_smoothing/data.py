@@ -9,11 +9,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .._base.arrays import short_repr
+from .._base.arrays import one_of, short_repr
 from .._base.faults import INVALID, Fault
 from .._base.time import TimeAxis, knots_of
 from .._base.typing import TimesLike
-from .._base.validation import one_of
 from .._core import ValidationError
 from .._curves.ends import NATURAL, End, end_kinds, map_ends, split_ends
 from .._curves.fit import Points, moved_ends, read, read_ends, validated

@@ -8,7 +8,7 @@ from typing import Any, Generic, NamedTuple, Self
 
 import numpy as np
 
-from .._base.arrays import as_array, checked_atol, checked_number, refuse
+from .._base.arrays import as_array, checked_atol, checked_number, one_of, refuse
 from .._base.faults import warn
 from .._base.report import ConvergenceWarning
 from .._base.typing import (
@@ -23,7 +23,6 @@ from .._base.typing import (
     SmoothingWord,
     TimesLike,
 )
-from .._base.validation import one_of
 from .._core import ConvergenceError, ValidationError
 from .._curves.options import check_on_failure, check_progress, checked_extrapolate
 from .._grid import GridReport, GridSpline

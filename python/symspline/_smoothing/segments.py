@@ -10,7 +10,7 @@ from typing import Any, Literal, NamedTuple, Required, TypedDict, Unpack, overlo
 import numpy as np
 from numpy.typing import NDArray
 
-from .._base.arrays import as_array, checked_flag, checked_number, short_repr, whole_number
+from .._base.arrays import as_array, checked_flag, checked_number, one_of, short_repr, whole_number
 from .._base.exceptions import SymsplineError
 from .._base.faults import UNCONVERGED, Fault, warn
 from .._base.input import times_of
@@ -28,7 +28,6 @@ from .._base.typing import (
     SmoothingOptions,
     TimesLike,
 )
-from .._base.validation import one_of
 from .._core import ConvergenceError, ValidationError
 from .._curves.failures import raise_or_warn
 from .._curves.fit import read_given

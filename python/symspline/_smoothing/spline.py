@@ -12,10 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
-from .._base.arrays import checked_flag, checked_number, short_repr, whole_number
+from .._base.arrays import checked_flag, checked_number, one_of, short_repr, whole_number
 from .._base.time import TimeAxis
 from .._base.typing import AnyArray, AnyArrays, CovarianceOrder, FloatArray, Number, P, TimesLike
-from .._base.validation import one_of
 from .._core import ValidationError
 from .._curves.curve import CurveArrays, SidePanel, UncertaintyBand
 from .._curves.ends import end_kinds, is_closed

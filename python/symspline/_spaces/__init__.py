@@ -2,9 +2,9 @@
 # mypy: implicit-reexport
 """The spaces: points, tangent vectors and their geometry."""
 
-from .._base.rounding import POINT_TOL, point_tol
+from .._base.arrays import POINT_TOL, point_tol
 from .actions import Group
-from .base import Array, Doubles, Space
+from .base import AnySpace, Array, Doubles, Space
 from .groups import (
     Affine,
     ComplexGeneralLinear,
@@ -22,7 +22,6 @@ from .groups import (
     rotations_and_positions,
 )
 from .indefinite import AntiDeSitter, DeSitter, IndefiniteGrassmannian
-from .means import AmbiguousMeanWarning, karcher_mean
 from .positive import (
     HermitianPositiveDefinite,
     LogEuclidean,
@@ -32,7 +31,7 @@ from .positive import (
 )
 from .product import Product, factors_of, parts_of, product_norm, short_name, space, space_named
 from .quotient import Quotient, cover_of, refuse_quotients
-from .statistics import Groups, require_metric
+from .statistics import AmbiguousMeanWarning, Groups, karcher_mean, require_metric
 from .subspaces import (
     ComplexGrassmannian,
     ComplexHyperbolic,
@@ -42,3 +41,42 @@ from .subspaces import (
     RealProjective,
 )
 from .vectors import Euclidean, Hyperbolic, Sphere, Torus
+
+# What `symspline` exports.
+__all__ = [
+    "Affine",
+    "AmbiguousMeanWarning",
+    "AntiDeSitter",
+    "ComplexGeneralLinear",
+    "ComplexGrassmannian",
+    "ComplexHyperbolic",
+    "ComplexProjective",
+    "DeSitter",
+    "Euclidean",
+    "GeneralLinear",
+    "Grassmannian",
+    "HermitianPositiveDefinite",
+    "Hyperbolic",
+    "IndefiniteGrassmannian",
+    "LogEuclidean",
+    "Lorentz",
+    "Orthogonal",
+    "Product",
+    "QuaternionicProjective",
+    "Quotient",
+    "RealProjective",
+    "Siegel",
+    "Similarity",
+    "Space",
+    "SpecialEuclidean",
+    "SpecialLinear",
+    "SpecialOrthogonal",
+    "SpecialPositiveDefinite",
+    "SpecialUnitary",
+    "Sphere",
+    "SymmetricPositiveDefinite",
+    "Symplectic",
+    "Torus",
+    "Unitary",
+    "space",
+]

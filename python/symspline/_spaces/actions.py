@@ -8,14 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._base.arrays import adjoint, as_array, cast, refuse, short_repr
-from .._base.rounding import point_tol
+from .._base.arrays import adjoint, as_array, cast, point_tol, refuse, short_repr
 from .._base.typing import P
 from .._core import CutLocusError, ValidationError
-from .base import Array, Space
+from .base import AnySpace, Array, Space
 
 
-def matrices(space: Space[Any], g: ArrayLike, size: int, dtype: Any) -> tuple[Array, float]:
+def matrices(space: AnySpace, g: ArrayLike, size: int, dtype: Any) -> tuple[Array, float]:
     """Return the argument `g` of `Space.act` as square matrices, and the tolerance for its type."""
     array = as_array(g, "g")
     if array.dtype.kind not in ("biufc" if np.dtype(dtype).kind == "c" else "biuf"):
@@ -33,7 +32,7 @@ def matrices(space: Space[Any], g: ArrayLike, size: int, dtype: Any) -> tuple[Ar
     return cast(array, np.dtype(dtype)), point_tol(array)
 
 
-def require(space: Space[Any], defects: NDArray[np.float64], allowed: Any, what: str, remedy: str) -> None:
+def require(space: AnySpace, defects: NDArray[np.float64], allowed: Any, what: str, remedy: str) -> None:
     """Raise ValidationError for the first matrix whose deviation exceeds the limit."""
     limits = np.broadcast_to(allowed, defects.shape)
     refuse(
@@ -49,7 +48,7 @@ def largest(x: Array) -> NDArray[np.float64]:
     return sizes
 
 
-def preserves(space: Space[Any], g: Array, form: Array, tol: float, remedy: str) -> None:
+def preserves(space: AnySpace, g: Array, form: Array, tol: float, remedy: str) -> None:
     """Raise ValidationError unless g*Jg = J for the form J, to a tolerance relative to the squared size of g."""
     defects = largest(adjoint(g) @ form @ g - form)
     star = "*" if np.iscomplexobj(g) else "ᵀ"
@@ -155,7 +154,7 @@ class Group(Space[P]):
         return a @ (x @ adjoint(b) if self._unitary else adjoint(np.linalg.solve(adjoint(b), adjoint(x))))
 
 
-def homogeneous(space: Space[Any], g: Any, dim: int) -> Array:
+def homogeneous(space: AnySpace, g: Any, dim: int) -> Array:
     """Return isometries of Euclidean space as homogeneous matrices (A, b; 0, 1)."""
     array, tol = matrices(space, g, dim + 1, np.float64)
     remedy = "Pass [[A, b], [0, 1]] with an orthogonal matrix A and a vector b."

@@ -12,13 +12,10 @@ from typing import Any, ClassVar, Generic, Literal, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._base.arrays import as_array, cast, refuse, short_repr, whole_number
-from .._base.rounding import point_tol
+from .._base.arrays import as_array, cast, point_tol, refuse, short_repr, whole_number
 from .._base.typing import AnyArray, FloatArray, P
 from .._core import Handle, ValidationError
-from .means import geometric_median, karcher_mean
-from .statistics import Groups, grouped, groups_of, require_metric, take
-from .whitening import Whitening
+from .statistics import Groups, Whitening, geometric_median, grouped, groups_of, karcher_mean, require_metric, take
 
 Array = AnyArray
 Doubles = FloatArray
@@ -32,9 +29,9 @@ _MOST = 2**40
 
 
 # The classes of all spaces except products, by name.
-CLASSES: dict[str, type[Space[Any]]] = {}
+CLASSES: dict[str, type[AnySpace]] = {}
 # Functions that read names of spaces derived from others, by a text that only such names contain.
-DERIVED: dict[str, Callable[[str], Space[Any]]] = {}
+DERIVED: dict[str, Callable[[str], AnySpace]] = {}
 # Complex counterparts of real spaces, for the message about complex points.
 COMPLEX_TWINS = {
     "rp": "ComplexProjective",
@@ -530,14 +527,14 @@ class Space(Generic[P]):
 
     # The classes in `actions` define these methods for `symmetry` and `act`.
 
-    def _reflected(self, p: Array, x: Array) -> Any:
+    def _reflected(self, p: Array, x: Array) -> Array:
         raise self._not_symmetric("geodesic symmetries")
 
     def _element(self, g: Any) -> Any:
         """Return the argument of `act` as checked arrays."""
         raise self._not_symmetric("group")
 
-    def _moved(self, g: Any, x: Array) -> Any:
+    def _moved(self, g: Any, x: Array) -> Array:
         raise self._not_symmetric("group")
 
     def _not_symmetric(self, what: str) -> ValidationError:
@@ -1174,18 +1171,22 @@ class Space(Generic[P]):
             cls.__init__ = _taking_numbers(cls, cls.__init__)  # type: ignore[method-assign]
 
 
-def example_of(cls: type[Space[Any]]) -> str:
+AnySpace = Space[Any]
+"""A space whose points may have any type, such as a product."""
+
+
+def example_of(cls: type[AnySpace]) -> str:
     """Return an example of a space of this class, as a constructor call and as a name."""
     numbers = {"gr": "2, 4", "cgr": "2, 4", "stiefel": "2, 4", "igr": "0, 1, 1, 2"}.get(cls._name, "2")
     return f"{cls.__name__}({numbers}) or '{cls._name}:{numbers.replace(' ', '')}'"
 
 
-def _taking_numbers(cls: type[Space[Any]], init: Callable[..., None]) -> Callable[..., None]:
+def _taking_numbers(cls: type[AnySpace], init: Callable[..., None]) -> Callable[..., None]:
     """Wrap a constructor so that a wrong number of arguments raises an error that names the parameters."""
     names = [*signature(init).parameters][1:]
 
     @wraps(init)
-    def checked(self: Space[Any], *numbers: Any, **named: Any) -> None:
+    def checked(self: AnySpace, *numbers: Any, **named: Any) -> None:
         # A check in advance would take longer than the constructor.
         try:
             init(self, *numbers, **named)

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from . import Array, Space, Torus, factors_of, parts_of
+from . import Array, Torus, factors_of, parts_of
+from .base import AnySpace
 
 # Names of the unit in attributes of netCDF files and in column names.
 _NAMES = ("deg", "degs", "degree", "degrees", "°", "arc_degree", "arcdegree", "degree_true", "degrees_true", "degt")
@@ -21,7 +22,7 @@ def is_degrees(unit: Any) -> bool:
     return str(unit).strip().lower() in _NAMES
 
 
-def look_like_degrees(space: Space[Any], points: Any) -> float | None:
+def look_like_degrees(space: AnySpace, points: Any) -> float | None:
     """Return the largest angle if points on a torus seem to be in degrees, else None.
 
     Angles seem to be in degrees if they are between -180 and 360, their largest size exceeds 4π, and either at least a
@@ -42,8 +43,8 @@ def look_like_degrees(space: Space[Any], points: Any) -> float | None:
     return None
 
 
-def with_angles(space: Space[Any], points: Any, convert: Callable[[Any], Any]) -> Any:
+def with_angles(space: AnySpace, points: Any, convert: Callable[[Any], Any]) -> Any:
     """Return points, or vectors, with the angles of tori converted from or to degrees."""
-    each = zip(factors_of(space), parts_of(points, space, "points"), strict=True)
-    found = tuple(convert(part) if isinstance(factor, Torus) else part for factor, part in each)
-    return found if isinstance(points, tuple) else found[0]
+    pairs = zip(factors_of(space), parts_of(points, space, "points"), strict=True)
+    converted = tuple(convert(part) if isinstance(factor, Torus) else part for factor, part in pairs)
+    return converted if isinstance(points, tuple) else converted[0]

@@ -7,14 +7,12 @@ from typing import Any
 import numpy as np
 
 from .._base.angles import matrices_of_quaternions
-from .._base.arrays import refuse
-from .._base.rounding import point_tol
+from .._base.arrays import point_tol, refuse
 from .._base.typing import ComplexArray, FloatArray
 from .._core import ValidationError
 from .actions import DisconnectedGroup, Group
 from .base import Array
-from .means import karcher_mean
-from .statistics import Groups, scaled
+from .statistics import Groups, karcher_mean, scaled
 
 
 class SpecialOrthogonal(Group[FloatArray]):
@@ -315,8 +313,8 @@ def rotations_and_positions(poses: Any, name: str) -> tuple[Array, Array]:
 def _are_parts(rotations: Any, positions: Any) -> bool:
     """Whether the first of two values looks like rotations or quaternions, and the second like positions."""
     first, second = _shape(rotations), _shape(positions)
-    found = _are_rotations(rotations) or first[-2:] == (3, 3) or first[-1:] == (4,)
-    return found and second[-1:] == (3,)
+    turns = _are_rotations(rotations) or first[-2:] == (3, 3) or first[-1:] == (4,)
+    return turns and second[-1:] == (3,)
 
 
 def _shape(value: Any) -> tuple[int, ...]:

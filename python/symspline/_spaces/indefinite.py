@@ -217,7 +217,7 @@ class IndefiniteGrassmannian(Indefinite[FloatArray]):
     def __init__(self, a: int, b: int, p: int, q: int) -> None:
         super().__init__(a, b, p, q)
 
-    def _reflected(self, p: Array, x: Array) -> Any:
+    def _reflected(self, p: Array, x: Array) -> Array:
         return p @ x @ p
 
     def _element(self, g: Any) -> Any:
@@ -227,7 +227,7 @@ class IndefiniteGrassmannian(Indefinite[FloatArray]):
         preserves(self, array, form, tol, "Pass a matrix with gᵀJg = J, J = diag(−1, …, −1, 1, …, 1).")
         return array
 
-    def _moved(self, g: Array, x: Array) -> Any:
+    def _moved(self, g: Array, x: Array) -> Array:
         # g x g⁻¹.
         return adjoint(np.linalg.solve(adjoint(g), adjoint(g @ x)))
 

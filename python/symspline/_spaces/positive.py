@@ -12,8 +12,7 @@ from .._base.typing import ComplexArray, FloatArray, P
 from .._core import ValidationError
 from .actions import Congruent, preserves, require
 from .base import Array
-from .statistics import Groups, scaled
-from .whitening import Whitening
+from .statistics import Groups, Whitening, scaled
 
 # Beyond this size, random exponents are scaled so that they do not grow with the size. Otherwise the exponential of a
 # random symmetric matrix has a condition number above e^√(8n), and from n = 200 on it is not positive definite in

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from .._base.arrays import short_repr
 from .._base.typing import AnyArray, AnyArrays, FloatArray, P, PProduct
 from .._core import Handle, ValidationError
-from .base import CLASSES, DERIVED, Space, example_of
+from .base import CLASSES, DERIVED, AnySpace, Space, example_of
 from .groups import names_points, rotations_and_positions
 from .statistics import Groups
 
@@ -73,9 +73,9 @@ class Product(Space[PProduct]):
         self: Product[tuple[_A, _B, _C, _D]], a: Space[_A], b: Space[_B], c: Space[_C], d: Space[_D], /
     ) -> None: ...
     @overload
-    def __init__(self: Product[AnyArrays], *factors: Space[Any] | str) -> None: ...
+    def __init__(self: Product[AnyArrays], *factors: AnySpace | str) -> None: ...
 
-    def __init__(self, *factors: Space[Any] | str) -> None:
+    def __init__(self, *factors: AnySpace | str) -> None:
         if len(factors) < 2:
             raise ValidationError("a Product needs at least two factors")
         given = [factors_of(f) if isinstance(f, Space) else spaces_named(f) for f in factors]
@@ -167,35 +167,35 @@ class Product(Space[PProduct]):
         return self._each("mean", points, (weights,) * len(self.factors))
 
     def _samples(self, points: Any, weights: Any, what: str) -> tuple[tuple[int, ...], Groups]:
-        each = [
-            factor._samples(own, weights, what)
-            for factor, (own,) in zip(self.factors, self._split(points), strict=True)
+        groups_of = [
+            factor._samples(part, weights, what)
+            for factor, (part,) in zip(self.factors, self._split(points), strict=True)
         ]
-        leads = [lead for lead, _ in each]
+        leads = [lead for lead, _ in groups_of]
         if any(lead != leads[0] for lead in leads):
             raise ValidationError(
                 f"the factors of `points` have the leading axes {leads}. Pass as many points for each factor."
             )
-        _, first = each[0]
-        return leads[0], first._replace(points=tuple(groups.points for _, groups in each))
+        _, first = groups_of[0]
+        return leads[0], first._replace(points=tuple(groups.points for _, groups in groups_of))
 
     def _batched(self, rows: Tuple, batch: tuple[int, ...]) -> Tuple:
-        return tuple(factor._batched(own, batch) for factor, own in zip(self.factors, rows, strict=True))
+        return tuple(factor._batched(part, batch) for factor, part in zip(self.factors, rows, strict=True))
 
     def _finite(self, operation: str, t: NDArray[np.float64] | None = None, **inputs: Any) -> Any:
-        each = tuple(
+        results = tuple(
             factor._finite(operation, t, **dict(zip(inputs, part, strict=True)))
             for factor, part in zip(self.factors, self._split(*inputs.values()), strict=True)
         )
         if operation == "distance":
-            return product_norm(each)
-        return sum(each) if operation == "inner" else each
+            return product_norm(results)
+        return sum(results) if operation == "inner" else results
 
     def _each(self, method: str, *arguments: Any) -> PProduct:
         """Call a method of every factor with the entries of the arguments that belong to it."""
         parts = zip(self.factors, self._split(*arguments), strict=True)
-        each: Any = tuple(getattr(factor, method)(*part) for factor, part in parts)
-        result: PProduct = each
+        results: Any = tuple(getattr(factor, method)(*part) for factor, part in parts)
+        result: PProduct = results
         return result
 
     def _split(self, *arguments: Any) -> list[Tuple]:
@@ -207,12 +207,12 @@ class Product(Space[PProduct]):
         return list(zip(*arguments, strict=True))
 
 
-def factors_of(space: Space[Any]) -> tuple[Space[AnyArray], ...]:
+def factors_of(space: AnySpace) -> tuple[Space[AnyArray], ...]:
     """Return the factors of a product, or the space itself in a tuple."""
     return space.factors if isinstance(space, Product) else (space,)
 
 
-def parts_of(value: Any, space: Space[Any], name: str) -> Tuple:
+def parts_of(value: Any, space: AnySpace, name: str) -> Tuple:
     """Return the entries of a value that belong to each factor; in a space that is not a product, the value itself."""
     if not isinstance(space, Product):
         return (value,)
@@ -232,7 +232,7 @@ def _parts_of_poses(value: Any, space: Product[Any], name: str) -> Any:
     """
     if isinstance(value, tuple) or sorted(factor.point_shape for factor in space.factors) != [(3,), (3, 3)]:
         return value
-    several = isinstance(value, list) and len(value) > 0 and all(hasattr(own, "translation") for own in value)
+    several = isinstance(value, list) and len(value) > 0 and all(hasattr(entry, "translation") for entry in value)
     matrices = isinstance(value, np.ndarray) and value.shape[-2:] == (4, 4) and names_points(name)
     if {str(factor) for factor in space.factors} != {"so:3", "euclidean:3"} or not (
         several or matrices or hasattr(value, "translation")
@@ -274,7 +274,7 @@ def space(name: str) -> Space: ...
 def space(name: str | Space[P]) -> Space[P]: ...
 
 
-def space(name: str | Space[Any]) -> Space[Any]:
+def space(name: str | AnySpace) -> AnySpace:
     """Return the space with a name.
 
     Parameters
@@ -313,7 +313,7 @@ def space(name: str | Space[Any]) -> Space[Any]:
 space_named = space
 
 
-def short_name(space: Space[Any]) -> str:
+def short_name(space: AnySpace) -> str:
     """Return the shortest name that `symspline.space` accepts, such as "so:3 x r:3"."""
     return str(space).replace("euclidean:", "r:").replace("hyperbolic:", "h:")
 
@@ -330,7 +330,7 @@ def spaces_named(name: Any) -> list[Space]:
 
 
 @lru_cache
-def _space_of(name: str) -> Space[Any]:
+def _space_of(name: str) -> AnySpace:
     """Return the space with a name. Spaces do not change, and to create one takes longer than a fit of few points."""
     factors = spaces_named(name)
     return factors[0] if len(factors) == 1 else Product(*factors)
@@ -355,7 +355,7 @@ def _guess(word: str, parameters: str, names: dict[str, str]) -> str:
     glued = re.fullmatch(r"([a-z_ -]+)\(?(\d[\d, ]*)\)?", word)
     if glued is not None and not parameters:
         word, parameters = glued[1], glued[2]
-    meant = {cls.__name__.lower(): own for own, cls in CLASSES.items()} | {name: name for name in names}
+    meant = {cls.__name__.lower(): short for short, cls in CLASSES.items()} | {name: name for name in names}
     close = get_close_matches(re.sub("[-_ ]", "", word), meant, 1, 0.7)
     colon = ":" if parameters else ""
     return f"did you mean {short_repr(meant[close[0]] + colon + parameters.strip())}? " if close else ""
@@ -368,7 +368,7 @@ def _whole(cls: Any) -> str:
     return f"give its dimension, such as {example_of(cls)}"
 
 
-def _named(name: str) -> Space[Any]:
+def _named(name: str) -> AnySpace:
     for mark, read in DERIVED.items():
         if mark in name:
             return read(name)

@@ -12,14 +12,11 @@ from numpy.typing import ArrayLike, NDArray
 from .._base.arrays import short_repr, whole_number
 from .._base.typing import P
 from .._core import CutLocusError, ValidationError
-from .base import DERIVED, Array, Space
-from .finite_groups import Factor, FiniteGroup, Indices
+from .base import DERIVED, AnySpace, Array, Space
+from .finite_groups import Factor, FiniteGroup, Indices, Nearest, along_path, nearest_of, over_grid
 from .groups import SpecialOrthogonal, SpecialUnitary, names_points
 from .product import Product, factors_of, space_named
-from .unwrap import Nearest, along_path, nearest_of, over_grid
 
-# Values that a space computes on demand from its own name or radius.
-_CACHED = ("_text", "_curve_kind", "_longest_near_step")
 # Operations on two points, of which the second one is replaced by its representative nearest to the first.
 _OF_PAIRS = ("distance", "log", "geodesic", "transport")
 # Classes of quotients by the class of their spaces.
@@ -112,7 +109,7 @@ class Quotient(Space[P]):
 
     def __init__(self, space: Space[P] | str, group: Any, *, left: Any = False) -> None:
         self.cover = space_named(space)
-        self.__dict__.update({key: value for key, value in vars(self.cover).items() if key not in _CACHED})
+        vars(self).update(vars(self.cover))
         self._group = FiniteGroup(*_factors(self.cover, group, left))
         _check_isometries(self.cover, self._group)
 
@@ -160,8 +157,8 @@ class Quotient(Space[P]):
         except ValidationError:
             # A manifold without `project` has no random points.
             return 0.0
-        each = [self._lengths(points, self._moved_by(points, np.full(4, own))) for own in others]
-        nearest = np.minimum(np.min(each, axis=0), 2 * radius)
+        lengths = [self._lengths(points, self._moved_by(points, np.full(4, index))) for index in others]
+        nearest = np.minimum(np.min(lengths, axis=0), 2 * radius)
         return min(radius, float(nearest.min()) / 2) if np.ptp(nearest) < 1e-6 else 0.0
 
     def _moved_by(self, x: Array, index: Any) -> Array:
@@ -173,11 +170,11 @@ class Quotient(Space[P]):
         functions = getattr(self.cover, "functions", None)
         with np.errstate(all="ignore"):
             if functions is None:
-                found = self.cover._apply("distance", p=p, q=q)
+                lengths = self.cover._apply("distance", p=p, q=q)
             else:
                 v = functions.log(p, q)
-                found = np.sqrt(np.asarray(functions.inner(p, v, v)))
-        return np.where(np.isfinite(found), found, np.inf)
+                lengths = np.sqrt(np.asarray(functions.inner(p, v, v)))
+        return np.where(np.isfinite(lengths), lengths, np.inf)
 
     @cached_property
     def _products(self) -> NDArray[np.float64] | None:
@@ -185,15 +182,15 @@ class Quotient(Space[P]):
         if not isinstance(self.cover, SpecialOrthogonal) or self._point_shape != (3, 3):
             return None
         units = np.eye(9).reshape(9, 3, 3)
-        each = [self._moved_by(units, np.full(9, i)).reshape(9, 9).T for i in range(self._group.size)]
-        return np.stack(each, axis=-1).reshape(81, -1)
+        maps = [self._moved_by(units, np.full(9, i)).reshape(9, 9).T for i in range(self._group.size)]
+        return np.stack(maps, axis=-1).reshape(81, -1)
 
     def _nearest(self, p: Array, q: Array) -> Nearest:
         """Return the transformations that bring points q nearest to points p, of shape (m, *point_shape)."""
         size = self._group.size * max(1, math.prod(self._doubles_shape))
         rows = max(1, _BLOCK // size)
-        found = [self._nearest_of_few(p[i : i + rows], q[i : i + rows]) for i in range(0, max(len(p), 1), rows)]
-        return Nearest(*(np.concatenate(each) for each in zip(*found, strict=True)))
+        blocks = [self._nearest_of_few(p[i : i + rows], q[i : i + rows]) for i in range(0, max(len(p), 1), rows)]
+        return Nearest(*(np.concatenate(arrays) for arrays in zip(*blocks, strict=True)))
 
     def _nearest_of_few(self, p: Array, q: Array) -> Nearest:
         count = self._group.size
@@ -202,12 +199,12 @@ class Quotient(Space[P]):
             outer = (p.reshape(-1, 9, 1) * q.reshape(-1, 1, 9)).reshape(-1, 81)
             distances = np.arccos(np.clip((outer @ self._products - 1) / 2, -1, 1))
         else:
-            each = np.tile(np.arange(count), len(q))
-            moved = self._moved_by(np.repeat(q, count, axis=0), each)
+            index = np.tile(np.arange(count), len(q))
+            moved = self._moved_by(np.repeat(q, count, axis=0), index)
             distances = self._lengths(np.repeat(p, count, axis=0), moved).reshape(len(q), count)
-        found = nearest_of(distances, lambda rows, i, j: self._are_equal(q[rows], i, j))
+        nearest = nearest_of(distances, lambda rows, i, j: self._are_equal(q[rows], i, j))
         # Traces do not give small angles accurately.
-        return found if self._products is None else found._replace(distance=self._after(p, q, found.moves))
+        return nearest if self._products is None else nearest._replace(distance=self._after(p, q, nearest.moves))
 
     def _after(self, p: Array, q: Array, index: Indices) -> NDArray[np.float64]:
         return self._lengths(p, self._moved_by(q, index))
@@ -215,8 +212,8 @@ class Quotient(Space[P]):
     def _moved_like(self, given: Array, points: Array, vectors: Array) -> Array:
         """Apply to vectors at points the transformations that move the points to equivalent given ones."""
         shape = self._point_shape
-        found = self._nearest(given.reshape(-1, *shape), points.reshape(-1, *shape))
-        return self._moved_by(vectors, found.moves.reshape(given.shape[: given.ndim - len(shape)]))
+        nearest = self._nearest(given.reshape(-1, *shape), points.reshape(-1, *shape))
+        return self._moved_by(vectors, nearest.moves.reshape(given.shape[: given.ndim - len(shape)]))
 
     def _are_equal(self, x: Array, i: Indices, j: Indices) -> NDArray[np.bool_]:
         off = np.abs(self._moved_by(x, i) - self._moved_by(x, j)).reshape(len(x), -1)
@@ -303,23 +300,23 @@ class Quotient(Space[P]):
         a, b = (self._numbers(self._doubles(x, name)) for x, name in ((p, "p"), (q, "q")))
         lead = self._leads({"p": a.shape, "q": b.shape})
         first, second = (np.broadcast_to(x, lead + self._point_shape).reshape(-1, *self._point_shape) for x in (a, b))
-        found = self._nearest(first, second)
-        return self._moved_by(second, found.moves).reshape(lead + self._point_shape), found
+        nearest = self._nearest(first, second)
+        return self._moved_by(second, nearest.moves).reshape(lead + self._point_shape), nearest
 
     # ---- geometry ----
 
     def _finite(self, operation: str, t: NDArray[np.float64] | None = None, **inputs: Any) -> Any:
         if operation not in _OF_PAIRS:
             return self.cover._finite(operation, t, **inputs)
-        nearest, found = self._nearer(inputs["p"], inputs["q"])
+        nearest, moves = self._nearer(inputs["p"], inputs["q"])
         lead = nearest.shape[: nearest.ndim - len(self._point_shape)]
         if operation == "distance":
-            return self._require_finite(operation, found.distance.reshape(lead)[()])
+            return self._require_finite(operation, moves.distance.reshape(lead)[()])
         result: Any = self.cover._finite(operation, t, **(inputs | {"q": nearest}))
         if operation != "transport":
             return result
         # Transported vectors are tangent at the given representative of q, not at the nearest one.
-        back = self._group.inverse[found.moves].reshape(lead)
+        back = self._group.inverse[moves.moves].reshape(lead)
         return self._moved_by(result, np.broadcast_to(back, result.shape[: result.ndim - len(self._point_shape)]))
 
     def symmetry(self, p: ArrayLike, x: ArrayLike) -> P:
@@ -341,7 +338,7 @@ class Quotient(Space[P]):
     def __repr__(self) -> str:
         if self._full_name.startswith("pu:"):
             return f"space({self._full_name!r})"
-        left, right = (None if own is None else _shown(own) for own in (self._group.left, self._group.right))
+        left, right = (None if factor is None else _shown(factor) for factor in (self._group.left, self._group.right))
         if right is None:
             return f"Quotient({self.cover!r}, {left}, left=True)"
         return f"Quotient({self.cover!r}, {right}{'' if left is None else f', left={left}'})"
@@ -353,11 +350,11 @@ class Quotient(Space[P]):
         return hash((self.cover, self._full_name))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        left, right = (None if own is None else own.elements for own in (self._group.left, self._group.right))
+        left, right = (None if factor is None else factor.elements for factor in (self._group.left, self._group.right))
         return _restored, (self.cover, left, right)
 
 
-def _restored(cover: Space[Any], left: Array | None, right: Array | None) -> Quotient[Any]:
+def _restored(cover: AnySpace, left: Array | None, right: Array | None) -> Quotient[Any]:
     """Return the quotient that a pickle describes."""
     if right is None:
         return Quotient(cover, left, left=True)
@@ -367,17 +364,17 @@ def _restored(cover: Space[Any], left: Array | None, right: Array | None) -> Quo
 def _class_of(kind: type[Any]) -> type[Any]:
     """Return the class of quotients of spaces of some class, the same one each time."""
     if kind not in _CLASSES:
-        own = {"__module__": __name__, "__doc__": Quotient.__doc__}
-        _CLASSES.setdefault(kind, type("Quotient", (Quotient, kind), own))
+        members = {"__module__": __name__, "__doc__": Quotient.__doc__}
+        _CLASSES.setdefault(kind, type("Quotient", (Quotient, kind), members))
     return _CLASSES[kind]
 
 
-def cover_of(space: Space[Any]) -> Space[Any]:
+def cover_of(space: AnySpace) -> AnySpace:
     """Return the space of representatives of a quotient; any other space is returned unchanged."""
     return space.cover if isinstance(space, Quotient) else space
 
 
-def refuse_quotients(space: Space[Any], what: str) -> None:
+def refuse_quotients(space: AnySpace, what: str) -> None:
     """Raise ValidationError if the space or a factor of it is a quotient."""
     for factor in factors_of(space):
         if isinstance(factor, Quotient):
@@ -387,13 +384,13 @@ def refuse_quotients(space: Space[Any], what: str) -> None:
             )
 
 
-def _factors(cover: Space[Any], group: Any, left: Any) -> tuple[Factor | None, Factor | None]:
+def _factors(cover: AnySpace, group: Any, left: Any) -> tuple[Factor | None, Factor | None]:
     """Return the groups that multiply from the left and from the right."""
     if isinstance(left, (bool, np.bool_)):
         symmetry = getattr(group, "symmetry", None)
         if symmetry is None:
-            own = Factor(cover, group, "left" if left else "right")
-            return (own, None) if left else (None, own)
+            factor = Factor(cover, group, "left" if left else "right")
+            return (factor, None) if left else (None, factor)
         # Orientations of orix map vectors of the sample to vectors of the crystal, so that symmetry acts on the left.
         # A misorientation maps vectors of the first crystal to vectors of the second.
         if not isinstance(symmetry, tuple):
@@ -403,7 +400,7 @@ def _factors(cover: Space[Any], group: Any, left: Any) -> tuple[Factor | None, F
     return Factor(cover, left, "left"), Factor(cover, group, "right")
 
 
-def _is_phases(cover: Space[Any], group: Factor) -> bool:
+def _is_phases(cover: AnySpace, group: Factor) -> bool:
     """Whether a group consists of all n-th roots of unity, on SU(n)."""
     n = cover.point_shape[0]
     if not isinstance(cover, SpecialUnitary) or group.elements.shape != (n,):
@@ -418,7 +415,7 @@ def _shown(group: Factor) -> str:
     return group.name if len(group.name) < 40 else f"<{len(group.elements)} elements>"
 
 
-def _check_isometries(cover: Space[Any], group: FiniteGroup) -> None:
+def _check_isometries(cover: AnySpace, group: FiniteGroup) -> None:
     """Raise ValidationError unless all transformations map the space to itself isometrically, at a random geodesic."""
     rng = np.random.default_rng(0)
     try:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._base.rounding import point_tol
+from .._base.arrays import point_tol
 from .._base.typing import ComplexArray, FloatArray, P
 from .._core import ValidationError
 from .actions import Preserving, largest, require

@@ -7,15 +7,35 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._base.arrays import as_array, refuse
-from .._base.rounding import dtype_tol
+from .._base.arrays import as_array, dtype_tol, refuse
 from .._base.typing import FloatArray
 from .._core import ValidationError
 from .actions import Preserving, homogeneous, require
 from .base import Array, Space
 
 
-class Euclidean(Space[FloatArray]):
+class _Flat(Space[FloatArray]):
+    """Vectors that are added."""
+
+    def __init__(self, n: int) -> None:
+        super().__init__(n)
+
+    def _tol(self, array: Array) -> float:
+        # Every vector is a point. The tolerance is used for the ends of closed curves. It does not depend on the number
+        # of decimals, because angles may contain many turns.
+        return dtype_tol(array.dtype)
+
+    def _reflected(self, p: Array, x: Array) -> Array:
+        return 2 * p - x
+
+    def _element(self, g: Any) -> Any:
+        return homogeneous(self, g, self.dim)
+
+    def _moved(self, g: Array, x: Array) -> Array:
+        return (g[..., :-1, :-1] @ x[..., None])[..., 0] + g[..., :-1, -1]
+
+
+class Euclidean(_Flat):
     """Euclidean space ℝⁿ.
 
     A point is an array of n numbers. Splines are the classical cubic splines.
@@ -38,24 +58,8 @@ class Euclidean(Space[FloatArray]):
 
     _name = "euclidean"
 
-    def _tol(self, array: Array) -> float:
-        # Every vector is a point. The tolerance is used for the ends of closed curves.
-        return dtype_tol(array.dtype)
 
-    def __init__(self, n: int) -> None:
-        super().__init__(n)
-
-    def _reflected(self, p: Array, x: Array) -> Any:
-        return 2 * p - x
-
-    def _element(self, g: Any) -> Any:
-        return homogeneous(self, g, self.dim)
-
-    def _moved(self, g: Array, x: Array) -> Any:
-        return (g[..., :-1, :-1] @ x[..., None])[..., 0] + g[..., :-1, -1]
-
-
-class Torus(Space[FloatArray]):
+class Torus(_Flat):
     r"""The flat torus Tⁿ, whose points are n angles.
 
     A point is an array of n angles in radians, such as wind directions or the torsion angles of a molecule. Angles that
@@ -92,18 +96,8 @@ class Torus(Space[FloatArray]):
     _name = "torus"
     _has_angles = True
 
-    def _tol(self, array: Array) -> float:
-        # The number of decimals does not affect the tolerance of angles, which may contain many turns.
-        return dtype_tol(array.dtype)
-
-    def __init__(self, n: int) -> None:
-        super().__init__(n)
-
-    def _reflected(self, p: Array, x: Array) -> Any:
-        return 2 * p - x
-
     def _element(self, g: Any) -> Any:
-        g = homogeneous(self, g, self.dim)
+        g = super()._element(g)
         linear = g[..., :-1, :-1]
         require(
             self,
@@ -113,9 +107,6 @@ class Torus(Space[FloatArray]):
             "Pass [[A, b], [0, 1]] with a signed permutation A of the angles and angles b.",
         )
         return g
-
-    def _moved(self, g: Array, x: Array) -> Any:
-        return (g[..., :-1, :-1] @ x[..., None])[..., 0] + g[..., :-1, -1]
 
 
 class Sphere(Preserving[FloatArray]):

@@ -19,12 +19,12 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from .._base import VERSION as LIBRARY
 from .._base.arrays import brief, short_repr
-from .._base.disk import path_of, replacing
 from .._base.input import NO_ZONE, UTC_ZONE
 from .._base.report import Report
+from .._base.system import path_of, replacing
 from .._base.time import Moments, TimeAxis, time_axis_of
-from .._base.version import VERSION as LIBRARY
 from .._core import ValidationError
 from .._curves.curve import CurveArrays
 from .._curves.ends import freeze_bc_type
@@ -95,7 +95,7 @@ def restore(state: Mapping[str, Any]) -> Any:
 
 
 def write(file: Any, state: Mapping[str, Any]) -> None:
-    """Write a state to an open file, or replace a file by its name (`_base.disk.replacing`)."""
+    """Write a state to an open file, or replace a file by its name (`_base.system.replacing`)."""
     refuse_functions(
         state["space"],
         "curves are not saved (files hold no functions: pickle them, or keep t, points and velocities)",

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from .._base.arrays import short_repr
-from .._base.disk import damage, path_of
+from .._base.system import damage, path_of
 from .._base.typing import File
 from .._core import ValidationError
 from .archive import FORMATS, TEXTS, Entries, Stored, read_state, restore, write

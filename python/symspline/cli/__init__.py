@@ -25,10 +25,10 @@ from collections.abc import Sequence
 from difflib import get_close_matches
 from typing import Any, NoReturn
 
+from .._base import VERSION
 from .._base.exceptions import ConvergenceError, SymsplineError
-from .._base.version import VERSION
 from . import _check, _fit, _info, _plot, _sample
-from ._messages import QUIET, USUAL, VERBOSE, Problem, for_command_line, say, set_level
+from ._messages import QUIET, USUAL, VERBOSE, Problem, for_command_line, printed_warnings, say, set_level
 
 __all__ = ["main"]
 
@@ -52,7 +52,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             [] in (value if isinstance(value, list) else [value]) or value == [] for value in vars(options).values()
         ):
             raise Problem("an option has the value --, which has no meaning here")
-        code: int = options.run(options)
+        with printed_warnings():
+            code: int = options.run(options)
         print(end="", flush=True)
         return code
     except BrokenPipeError:

@@ -31,8 +31,7 @@ from .._spaces import (
 from .._spaces.degrees import is_degrees, look_like_degrees
 from ..convert._pose_files import join, rotations_in_rows
 from ..geo import NAMED, are_tracks
-from ._files import Source
-from ._messages import Problem, first_duplicate, for_command_line, listed, refuse, say
+from ._messages import Problem, Source, first_duplicate, for_command_line, listed, refuse, say
 from ._tables import IM, RE, Array, Place, Rows, Table
 
 GLOBE, ROTATIONS, POSES = map(space_named, ("sphere:2", "so:3", "se:3"))
@@ -116,15 +115,15 @@ def time_column(table: Table, given: str | None, others: Sequence[str | None], u
     whole = len(certain) == 1 and certain[0] not in table.numeric and "time" in certain[0].lower()
     if whole or (len(certain) == 1 and not doubtful):
         return certain[0]
-    found = [*certain, *doubtful] or [name for name in table.dates if name in left]
-    if not found:
+    likely = [*certain, *doubtful] or [name for name in table.dates if name in left]
+    if not likely:
         return None
-    what = "hold the times" if len(found) == 1 else "all belong to the times, which stand in one column"
-    meant, unit = found[0], ", with --unix if it counts from 1970" if found[0] in table.numeric else ""
-    if len(found) == 2 and re.search("n(ano)?secs?$", _letters(found[1])):
-        meant, unit = ",".join(found), ", which adds seconds and nanoseconds since 1970"
+    what = "hold the times" if len(likely) == 1 else "all belong to the times, which stand in one column"
+    meant, unit = likely[0], ", with --unix if it counts from 1970" if likely[0] in table.numeric else ""
+    if len(likely) == 2 and re.search("n(ano)?secs?$", _letters(likely[1])):
+        meant, unit = ",".join(likely), ", which adds seconds and nanoseconds since 1970"
     raise Problem(
-        f"{table.path}: {listed(found)} may {what}; say --time {quote(meant)}{unit}, or --time {NUMBERED} to number "
+        f"{table.path}: {listed(likely)} may {what}; say --time {quote(meant)}{unit}, or --time {NUMBERED} to number "
         "the points 0, 1, 2, ..."
     )
 
@@ -145,9 +144,9 @@ def with_stamps(table: Table, given: str | None, skipna: bool) -> tuple[Table, s
     stamps = table.read([*map(table.require, names)], None, None).numbers
     wrong = np.flatnonzero((stamps != np.floor(stamps)).any(axis=1) | (np.abs(stamps) > _FARTHEST).any(axis=1))
     if wrong.size:
-        found = " and ".join(f"{value:.17g}" for value in stamps[wrong[0]])
+        cells = " and ".join(f"{value:.17g}" for value in stamps[wrong[0]])
         what = "which are not whole seconds since 1970 and nanoseconds"
-        raise Problem(f"{table.path}, {table.place(int(wrong[0]))}: --time {given}: the columns hold {found}, {what}")
+        raise Problem(f"{table.path}, {table.place(int(wrong[0]))}: --time {given}: the columns hold {cells}, {what}")
     seconds, rest = stamps.T.astype(np.int64)
     columns = {name: column for name, column in table.columns.items() if name not in names}
     time = given if "time" in columns else "time"
@@ -339,16 +338,16 @@ def _quaternion_columns(names: list[str], space: Space, order: str | None) -> li
     Problem
         The names do not show which number is which, or contradict ``order``.
     """
-    found = quaternion_by_names(names, space)
+    named = quaternion_by_names(names, space)
     given = None if order is None else _in_order(space, ORDERS.index(order))
-    if given is None and found is None:
+    if given is None and named is None:
         raise Problem(
             f"{listed(names)} may be a quaternion{' and a position' if len(names) > 4 else ''}, but the names do not "
             "say which number is which: call them qw, qx, qy, qz (and x, y, z), or say --quaternion wxyz or xyzw"
         )
-    contradicts = given and found and given != found
+    contradicts = given and named and given != named
     refuse("--quaternion ", (contradicts, f"{order} contradicts the names {listed(names)}; omit it or rename them"))
-    return found or given or []
+    return named or given or []
 
 
 # ---- points ----
@@ -449,10 +448,10 @@ class PointColumns:
         try:
             factor._handle.check_points(factor._rows(doubles, lead), lead, factor._tol(points))
         except ValidationError as error:
-            row, _, found = for_command_line(error).removeprefix("point ").partition(" ")
+            row, _, problem = for_command_line(error).removeprefix("point ").partition(" ")
             of = f"the part in {factor} of " if isinstance(self.space, Product) else ""
             order = f"; the columns of the table are a {_matrix(factor)}" if _is_matrix(factor) else ""
-            raise Problem(f"{self.path}: {of}the point in {place(int(row))} {found}{order}") from None
+            raise Problem(f"{self.path}: {of}the point in {place(int(row))} {problem}{order}") from None
         return factor.project(points)
 
 
@@ -556,5 +555,5 @@ def _check_count(
     either = f", or {turned} numbers with a quaternion" if turned else ""
     point = "longitude and latitude are 2 numbers" if lonlat else f"a point of {space} has {_described(space)}{either}"
     kind = "numbers" if any(len(entry) > 2 for entry in entries) else "columns"
-    found = f"{len(entries)} {kind}: {listed([name for name, *_ in entries])}" if entries else "no columns"
-    raise Problem(f"{table.path}: {point}, and there are {found}{advice}")
+    present = f"{len(entries)} {kind}: {listed([name for name, *_ in entries])}" if entries else "no columns"
+    raise Problem(f"{table.path}: {point}, and there are {present}{advice}")

@@ -36,10 +36,8 @@ from ._columns import (
     require_globe,
     width,
 )
-from ._files import Source, writing
-from ._formats import CURVES
-from ._messages import Problem, did_you_mean, refuse
-from ._tables import IM, RE
+from ._messages import Problem, Source, did_you_mean, refuse, writing
+from ._tables import CURVES, IM, RE
 
 _COLUMNS = "columns"
 """The entry of the file with the columns, which the library ignores."""
@@ -74,11 +72,11 @@ class Curves:
         """The names of the segments of every recording that was cut at gaps, and of every other curve itself."""
         if self.segmented:
             return {"": list(self.splines)}
-        found: dict[str, list[str]] = {}
+        recordings: dict[str, list[str]] = {}
         for name in self.splines:
             base, _, number = name.rpartition("/")
-            found.setdefault(base if self.columns.cut and number.isdecimal() else name, []).append(name)
-        return found
+            recordings.setdefault(base if self.columns.cut and number.isdecimal() else name, []).append(name)
+        return recordings
 
     def called(self, name: str) -> str:
         """Refer to a curve in a message."""
@@ -92,9 +90,9 @@ class Curves:
         refuse(self.file, (not self.named, " has one curve without a name; omit --curve"))
         for name in names:
             # A curve that was cut at gaps has the segments NAME/1, NAME/2, ...
-            found = {key: curve for key, curve in self.splines.items() if name in (key, key.rpartition("/")[0])}
-            refuse(self.file, (not found, f" has no curve {name!r}; {did_you_mean(name, list(self.splines))}"))
-            splines |= found
+            matching = {key: curve for key, curve in self.splines.items() if name in (key, key.rpartition("/")[0])}
+            refuse(self.file, (not matching, f" has no curve {name!r}; {did_you_mean(name, list(self.splines))}"))
+            splines |= matching
         return replace(self, splines=splines, named=len(splines) > 1)
 
 
@@ -117,22 +115,22 @@ def read_curves(path: Path, lonlat: bool = False) -> Curves:
         if not zipfile.is_zipfile(file):
             raise Problem(f"{source} is not a file of curves, such as `symspline fit` makes")
         file.seek(0)
-        found = load(file)
-        named = isinstance(found, dict)
-        segmented = isinstance(found, SegmentedCurve)
+        content = load(file)
+        named = isinstance(content, dict)
+        segmented = isinstance(content, SegmentedCurve)
         if segmented:
-            found, named = {str(i): curve for i, curve in enumerate(found, 1)}, True
-        for curve in found.values() if named else [found]:
+            content, named = {str(i): curve for i, curve in enumerate(content, 1)}, True
+        for curve in content.values() if named else [content]:
             refuse(source, (isinstance(curve, GridSpline), " is a grid; symspline.load reads it"))
             if not isinstance(curve, CubicSpline):
                 kind = type(curve).__name__
                 raise Problem(f"{source} is a {kind}, whose acceleration jumps at knots; use symspline.load")
         if named:
-            splines = found
+            splines = content
         else:
             # The curves of a batch are named by their indices.
-            indices = np.ndindex(found._batch)
-            splines = {",".join(map(str, index)): reduce(getitem, index, found) for index in indices}
+            indices = np.ndindex(content._batch)
+            splines = {",".join(map(str, index)): reduce(getitem, index, content) for index in indices}
             named = len(splines) > 1
         space = next(iter(splines.values())).space
         if lonlat:
@@ -206,7 +204,7 @@ def _with_quaternion(spline: CubicSpline, x: Any, nu: int, parts: Sequence[Any],
     order = columns.quaternion or []
     turning = (quaternion, angular_velocity, angular_acceleration)[nu]
     options: Any = {} if nu else {"scalar_first": True}
-    found: list[tuple[int, str, Doubles]] = []
+    placed: list[tuple[int, str, Doubles]] = []
     start = 0
     for factor, part in zip(factors_of(spline.space), parts, strict=True):
         count = width(factor, True)
@@ -218,10 +216,10 @@ def _with_quaternion(spline: CubicSpline, x: Any, nu: int, parts: Sequence[Any],
             names = [columns.points[i] for i in turn] if nu == 0 else [name + ("", "_d1")[nu - 1] for name in _RATES]
             # All rates stand where the first number of the quaternion does.
             where = turn if nu == 0 else [min(turn)] * len(names)
-            found += zip(where, names, turning(spline, x, **options).T, strict=True)
+            placed += zip(where, names, turning(spline, x, **options).T, strict=True)
         end = f"_d{nu}" if nu else ""
-        found += [(i, columns.points[i] + end, column) for i, column in zip(at, numbers.T, strict=False)]
-    return [(name, column) for _, name, column in sorted(found, key=itemgetter(0))]
+        placed += [(i, columns.points[i] + end, column) for i, column in zip(at, numbers.T, strict=False)]
+    return [(name, column) for _, name, column in sorted(placed, key=itemgetter(0))]
 
 
 def deviations_of(spline: SmoothingSpline, x: Any, nu: int, columns: Columns) -> Samples:
@@ -230,26 +228,26 @@ def deviations_of(spline: SmoothingSpline, x: Any, nu: int, columns: Columns) ->
     They have the units of the columns next to them. A component of a unit quaternion changes half as much as the angle
     of its rotation. Each component of an angular velocity has its own standard deviation.
     """
-    found: Samples = []
+    samples: Samples = []
     if nu > 1:
-        return found
+        return samples
     factors, end = factors_of(spline.space), f"_d{nu}" if nu else ""
     stds: Sequence[Any] = parts_of(spline.std(x, nu=nu), spline.space, "std")
     for number, (factor, std) in enumerate(zip(factors, stds, strict=True), 1):
         name = f"std{number if len(factors) > 1 else ''}"
         if factor._name == "se":
-            found.append((f"{name}_position{end}", std[1]))
+            samples.append((f"{name}_position{end}", std[1]))
             name, std = f"{name}_rotation", std[0]
         if columns.quaternion is None or factor not in (ROTATIONS, POSES):
-            found.append(
+            samples.append(
                 (
                     name + end,
                     np.degrees(std) if columns.lonlat or (columns.degrees and isinstance(factor, Torus)) else std,
                 )
             )
         elif nu:
-            each = angular_velocity(spline, x, return_std=True)[1].T
-            found += [(f"std_{rate}", column) for rate, column in zip(_RATES, each, strict=True)]
+            deviations = angular_velocity(spline, x, return_std=True)[1].T
+            samples += [(f"std_{rate}", column) for rate, column in zip(_RATES, deviations, strict=True)]
         else:
-            found.append((name, std / 2))
-    return found
+            samples.append((name, std / 2))
+    return samples

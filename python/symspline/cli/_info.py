@@ -24,8 +24,8 @@ from typing import Any
 import numpy as np
 
 from .._base.arrays import brief
-from .._base.disk import damage
 from .._base.report import long_gaps
+from .._base.system import damage
 from .._base.time import time_axis_of
 from .._smoothing import SmoothingReport, SmoothingSpline
 from .._smoothing.noise import is_several, smoothed_spaces
@@ -34,10 +34,8 @@ from .._spaces.base import CLASSES, example_of
 from .._splines.cubic import CubicSpline
 from ._columns import NUMBERED, column_of_names, time_column
 from ._curves import read_curves
-from ._files import Source
-from ._formats import TABLES, endings, format_of, open_table
-from ._messages import Problem, counted, listed, refuse
-from ._tables import Array, Rows, Table
+from ._messages import Problem, Source, counted, listed, refuse
+from ._tables import TABLES, Array, Rows, Table, endings, format_of, open_table
 
 _LIBRARIES = {"pandas": "CSV files", "pyarrow": "Parquet files", "gpxpy": "GPX files", "matplotlib": "symspline plot"}
 _LIBRARIES |= {"shtab": "completion in shells"}
@@ -125,9 +123,9 @@ def _described(values: Array) -> str:
         missing = cells.count("")
         shown = f"{counted(len(texts), 'distinct text')}: {', '.join(texts[:3])}{', ...' if len(texts) > 3 else ''}"
     else:
-        found = values[values == values]
-        missing = len(values) - len(found)
-        shown = f"{found.min()} to {found.max()}" if len(found) else ""
+        known = values[values == values]
+        missing = len(values) - len(known)
+        shown = f"{known.min()} to {known.max()}" if len(known) else ""
     if missing == len(values):
         return "no values"
     return f"{shown}{f', {missing} missing' if missing else ''}"
@@ -179,8 +177,8 @@ def _spread(values: Sequence[Any]) -> str:
 
 def gaps_in(recordings: Iterable[Doubles], unit: str) -> str:
     """Describe the steps that are far longer than most of a recording; empty if there are none."""
-    found = np.concatenate([np.diff(times)[long_gaps(times)] for times in recordings])
-    return f"{counted(found.size, 'long gap')}, up to {found.max():.6g}{unit}" if found.size else ""
+    gaps = np.concatenate([np.diff(times)[long_gaps(times)] for times in recordings])
+    return f"{counted(gaps.size, 'long gap')}, up to {gaps.max():.6g}{unit}" if gaps.size else ""
 
 
 def fitted(splines: Sequence[CubicSpline], lonlat: bool) -> str:
@@ -203,7 +201,7 @@ def _smoothed(splines: Sequence[SmoothingSpline[Any, Any]], lonlat: bool) -> str
     several = is_several(space)
     reports = zip(*(spline.report if several else (spline.report,) for spline in splines), strict=True)
     names = [f"{part}: " if several else "" for part in smoothed_spaces(space)]
-    return "; ".join(_chosen(name, each, lonlat) for name, each in zip(names, reports, strict=True))
+    return "; ".join(_chosen(name, of_space, lonlat) for name, of_space in zip(names, reports, strict=True))
 
 
 def _chosen(name: str, reports: Sequence[SmoothingReport], lonlat: bool) -> str:
@@ -233,5 +231,5 @@ def _data_times(spline: CubicSpline) -> Doubles:
 
 def _parameters_of(curve: SmoothingSpline[Any, Any]) -> list[str]:
     """Describe the unknowns that were estimated with a curve, such as a bias."""
-    each = {key: zip(found.value, found.std, strict=True) for key, found in curve.parameters.items()}
-    return [f"{key}: {', '.join(f'{value:.3g} ± {std:.2g}' for value, std in pairs)}" for key, pairs in each.items()]
+    numbers = {key: zip(estimate.value, estimate.std, strict=True) for key, estimate in curve.parameters.items()}
+    return [f"{key}: {', '.join(f'{value:.3g} ± {std:.2g}' for value, std in pairs)}" for key, pairs in numbers.items()]

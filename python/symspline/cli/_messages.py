@@ -1,17 +1,28 @@
-"""Messages, errors and progress of the command line."""
+"""Messages, errors and progress of the command line, files and standard streams."""
 
 from __future__ import annotations
 
+import gzip
+import io
+import os
 import re
+import shutil
 import sys
+import tempfile
 import time
+import warnings
+import zlib
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from difflib import get_close_matches
-from typing import Self
+from functools import cache
+from pathlib import Path
+from typing import BinaryIO, Self
 
 from .._base.arrays import brief
+from .._base.system import replacing
 from .._base.time import REMEDY
 from .._spaces.base import CLASSES
 
@@ -124,6 +135,15 @@ def say(message: object) -> None:
     print("symspline:", brief(message, _LONGEST), file=sys.stderr)
 
 
+@contextmanager
+def printed_warnings(text: Callable[[object], str] = str) -> Iterator[None]:
+    """Print warnings of the library as messages, after the work; ``text`` returns the message of a warning."""
+    with warnings.catch_warnings(record=True) as caught:
+        yield
+    for warning in caught:
+        say(for_command_line(text(warning.message)))
+
+
 class Progress:
     """Update one line on stderr if it is a terminal, and clear it at the end; with ``-v``, print the time taken.
 
@@ -152,3 +172,108 @@ class Progress:
         if self._width:
             print("\r" + " " * self._width, end="\r", file=sys.stderr, flush=True)
         tell(f"{self._work} took {time.monotonic() - self._start:.2f} s", VERBOSE)
+
+
+# ---- files and standard streams, and compressed text ----
+
+STANDARD = Path("-")
+"""The name of standard input or output on the command line."""
+
+_GZIP = b"\x1f\x8b"
+
+
+@dataclass(frozen=True)
+class Source:
+    """A file to read, or standard input."""
+
+    path: Path
+    format: str
+
+    def __str__(self) -> str:
+        """Return its name for messages."""
+        return "standard input" if self.path == STANDARD else str(self.path)
+
+    @contextmanager
+    def open(self) -> Iterator[BinaryIO]:
+        """Open the file, which can be done more than once; compressed text is decompressed."""
+        with reading(self):
+            whole = _standard_input() if self.path == STANDARD else _pipe(self.path) if self.path.is_fifo() else None
+            file: BinaryIO = self.path.open("rb") if whole is None else io.BytesIO(whole)
+            with file:
+                packed = file.read(len(_GZIP)) == _GZIP
+                file.seek(0)
+                try:
+                    unpacked = io.BytesIO(gzip.decompress(file.read())) if packed else file
+                except (EOFError, zlib.error, gzip.BadGzipFile):
+                    raise Problem(f"{self} is damaged: it cannot be decompressed") from None
+                yield unpacked
+
+
+@cache
+def _standard_input() -> bytes:
+    return sys.stdin.buffer.read()
+
+
+@cache
+def _pipe(path: Path) -> bytes:
+    """Return the content of a pipe, such as a process substitution of a shell, which can be read once only."""
+    return path.read_bytes()
+
+
+def check_inputs(*paths: Path | None) -> None:
+    """Raise `Problem` if standard input is to be read twice."""
+    refuse("", (paths.count(STANDARD) > 1, "standard input (-) can be read for one of the files only"))
+
+
+def called(output: Path) -> str:
+    """Return the name of an output for messages."""
+    return "standard output" if output == STANDARD else str(output)
+
+
+def check_target(path: Path, *inputs: Path | None, binary: bool = False) -> None:
+    """Raise `Problem` before any work is done if the output file cannot be written, or is an input."""
+    if path == STANDARD:
+        refuse(
+            "standard output ",
+            (not hasattr(sys.stdout, "buffer"), "does not take bytes here; give the name of a file"),
+            (binary and sys.stdout.isatty(), "is a terminal, to which binary data are not written; redirect it"),
+        )
+        return
+    # The target of a symbolic link is written.
+    folder = path.resolve().parent if path.is_symlink() else path.parent
+    special = path.exists() and not path.is_file()
+    same = any(given is not None and given.exists() and path.exists() and path.samefile(given) for given in inputs)
+    refuse(
+        f"cannot write {path}: ",
+        (path.is_dir(), "it is a folder"),
+        (special, "it is a device, a pipe or a socket; give the name of a regular file, or - for standard output"),
+        (not folder.is_dir(), f"there is no folder {folder}"),
+        (not os.access(folder, os.W_OK), f"no permission to write into {folder}"),
+        (same, "it is an input; give the output another name"),
+    )
+
+
+@contextmanager
+def writing(path: Path) -> Iterator[Path]:
+    """Yield a temporary file that replaces ``path``, or is copied to standard output, if the body succeeds."""
+    if path != STANDARD:
+        with reading(path, "write"), replacing(path) as temporary:
+            yield temporary
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        temporary = Path(folder, "output")
+        yield temporary
+        with open(temporary, "rb") as file:
+            shutil.copyfileobj(file, sys.stdout.buffer)
+
+
+@contextmanager
+def written(path: Path) -> Iterator[BinaryIO]:
+    """Open a file to write in binary mode; it is compressed if its name ends in .gz."""
+    with writing(path) as temporary, open(temporary, "wb") as file:
+        if path.suffix.lower() != ".gz":
+            yield file
+            return
+        # Without a date, equal tables have equal files.
+        with gzip.GzipFile("", "wb", 6, file, mtime=0) as packed:
+            yield packed  # type: ignore[misc]

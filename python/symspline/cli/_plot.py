@@ -17,8 +17,7 @@ from pathlib import Path
 from .. import geo
 from .._splines.composed import SegmentedCurve
 from ._curves import read_curves
-from ._files import STANDARD, called, check_target, writing
-from ._messages import Problem, alternatives, listed, refuse, tell
+from ._messages import STANDARD, Problem, alternatives, called, check_target, listed, refuse, tell, writing
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -43,30 +43,58 @@ the column of the curves' names, every row is for its curve, otherwise for all c
 from __future__ import annotations
 
 import argparse
+import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from fractions import Fraction
 from itertools import chain, pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from .._base.time import onto_ends
+from .._base.time import NANOSECONDS, onto_ends
 from .._smoothing import SmoothingSpline
 from .._spaces import Doubles, space_named
 from .._splines.cubic import CubicSpline
 from ..convert._pose_files import TUM
 from ._columns import Columns, quaternion_by_names, time_column, with_stamps
 from ._curves import Curves, Samples, deviations_of, read_curves, samples_of
-from ._files import called, check_inputs, check_target
-from ._formats import TABLES, Layout, endings, format_of, is_binary, open_table, write_table
-from ._messages import Problem, Progress, counted, did_you_mean, first_duplicate, refuse, say, tell
-from ._recordings import Index, group
-from ._tables import UNITS, Rows, number
-from ._times import Times, every, spread
+from ._fit import Index, group
+from ._messages import (
+    Problem,
+    Progress,
+    called,
+    check_inputs,
+    check_target,
+    counted,
+    did_you_mean,
+    first_duplicate,
+    refuse,
+    say,
+    tell,
+)
+from ._tables import (
+    EXACT,
+    TABLES,
+    UNITS,
+    Layout,
+    Rows,
+    duration,
+    endings,
+    format_of,
+    is_binary,
+    number,
+    open_table,
+    write_table,
+)
 
 _EACH = "{curve}"
 """Replaced by the name of a curve in the name of the output."""
 _MOST = 10**9
+"""The largest number of samples of one curve."""
+Times = NDArray[Any]
 _TUM_NAMES = list(TUM[1:])
 _TUM_SPACES = [space_named(name) for name in ("se:3", "so:3 x r:3", "r:3 x so:3")]
 
@@ -182,8 +210,8 @@ def _sampled(
         for done, part in enumerate(parts, 1):
             spline = curves.splines[part.name]
             blocks = [function(spline, part.times, nu, columns) for nu in options.nu for function in functions]
-            found = chain.from_iterable(blocks)
-            samples.append([(name, _rounded(numbers, options.digits)) for name, numbers in found])
+            pairs = chain.from_iterable(blocks)
+            samples.append([(name, _rounded(numbers, options.digits)) for name, numbers in pairs])
             progress(done, len(parts))
     return samples
 
@@ -303,10 +331,10 @@ def _check_times(path: object, rows: Rows, index: Index, curves: Curves, name: s
     spline, curve = curves.splines[name], curves.called(name)
     times, knots = rows.times[index], spline.t
     dates = knots.dtype.kind == "M"
-    expected, found = ("dates", "numbers") if dates else ("numbers", "dates")
+    expected, given = ("dates", "numbers") if dates else ("numbers", "dates")
     these, those = ("a time zone", "none") if rows.utc else ("no time zone", "one")
     unix = "; give --unix if they count from 1970" if dates else ""
-    kinds = f": the times of {curve} are {expected}, but these are {found}{unix}"
+    kinds = f": the times of {curve} are {expected}, but these are {given}{unix}"
     zones = f": its times have {these}, but those of {curve} have {those}: which time is meant is in doubt"
     mixed = dates and {rows.utc, curves.columns.utc} == {True, False}
     refuse(path, ((times.dtype.kind == "M") != dates, kinds), (mixed, f"{zones}; write both with a zone, or neither"))
@@ -320,3 +348,109 @@ def _check_times(path: object, rows: Rows, index: Index, curves: Curves, name: s
             f"{path}, {rows.place(int(index[outside[0]]))}: time {times[outside[0]]}{zone} is outside {curve}, which "
             f"runs from {knots[0]} to {knots[-1]}{zone}; fit with --extrapolate to define the curve there"
         )
+
+
+# ---- sampling times along a curve ----
+
+
+def every(step: str, knots: Times) -> Times:
+    """Return times from the first to the last knot, one per step.
+
+    Dates are whole multiples of the step since 1970-01-01 in UTC, as those of `symspline.geo.resample`. Numbers start
+    at the first knot.
+    """
+    count, unit = duration(step, "--every")
+    kind = knots.dtype.kind
+    if unit and kind != "M":
+        raise Problem(f"--every {step}: the times of this curve are numbers; give a step without a unit")
+    if kind == "f":
+        length = float(count)
+        if not 0 < length < float("inf"):
+            raise Problem(f"--every {step}: that is too {'long' if length else 'short'}")
+        # The last sample is at the end if the step divides the curve up to rounding.
+        samples = _samples((float(knots[-1]) - float(knots[0])) / length * (1 + 1e-12), step)
+        return np.asarray(np.minimum(_equidistant(_decimal(knots[0]), Fraction(count), samples), knots[-1]))
+    count *= NANOSECONDS[unit or "s"] if kind == "M" else 1
+    whole = "of nanoseconds" if kind == "M" else "as the times are"
+    refuse(f"--every {step}: ", (count != int(count), f"a step must be a whole number {whole}"))
+    ends, jump = _in_ticks(knots, int(count)) if kind == "M" else (knots[[0, -1]], int(count))
+    first, last = _integers(ends)
+    start = -(-first // jump) * jump if kind == "M" else first
+    samples = _samples((last - start) // jump, step) if start <= last else 0
+    # A step that is longer than the time between the ends may not fit into 64 bits.
+    return _after(start, np.uint64(min(jump, last - first)) * np.arange(samples, dtype=np.uint64), ends.dtype)
+
+
+def _in_ticks(knots: Times, nanoseconds: int) -> tuple[Times, int]:
+    """Return the ends and a step in the coarsest unit in which both are whole numbers."""
+    unit = next(unit for unit in UNITS if nanoseconds % NANOSECONDS[unit] == 0)
+    ends = _in_unit(knots, unit)
+    ticks = int(np.ones(1, f"datetime64[{unit}]").astype(ends.dtype).astype(np.int64)[0])
+    return ends, nanoseconds // NANOSECONDS[unit] * ticks
+
+
+def _integers(ends: Times) -> list[int]:
+    numbers: list[int] = ends.astype(np.int64 if ends.dtype.kind == "M" else ends.dtype).tolist()
+    return numbers
+
+
+def spread(count: int, knots: Times) -> Times:
+    """Return equidistant times from the first to the last knot, dates to a microsecond."""
+    if knots.dtype.kind == "f":
+        first, last = _decimal(knots[0]), _decimal(knots[-1])
+        return _equidistant(first, (last - first) / max(count - 1, 1), count)
+    dates = knots.dtype.kind == "M"
+    ends = _in_unit(knots, "us") if dates else knots[[0, -1]]
+    start, stop = _integers(ends)
+    steps = np.rint(np.linspace(0, stop - start, count)[: count - 1]).astype(np.uint64)
+    times = _after(start, np.append(steps, np.uint64(stop - start if count > 1 else 0)), ends.dtype)
+    return _coarsest(times) if dates else times
+
+
+def _decimal(time: Any) -> Fraction:
+    """Return the shortest decimal number that reads back as a floating-point number."""
+    return Fraction(repr(float(time)))
+
+
+def _equidistant(first: Fraction, step: Fraction, count: int) -> NDArray[np.float64]:
+    """Return the numbers ``first + i step`` for i < count, each rounded once from its exact value."""
+    scale = math.lcm(first.denominator, step.denominator)
+    start, jump = int(first * scale), int(step * scale)
+    if max(abs(start) + abs(jump) * count, scale) <= EXACT:
+        # All of these integers are exact as floating-point numbers.
+        return np.asarray((start + jump * np.arange(count)) / scale)
+    return np.fromiter(((start + jump * i) / scale for i in range(count)), np.float64, count)
+
+
+def _after(start: int, steps: NDArray[np.uint64], dtype: Any) -> Times:
+    """Return a start plus whole numbers. The sum is exact, as it is computed modulo 2**64."""
+    return np.asarray((np.uint64(start % 2**64) + steps).astype(np.int64).astype(dtype))
+
+
+def _in_unit(knots: Times, unit: Any) -> Times:
+    """Return the first and the last date in a unit or a finer one."""
+    ends = knots[[0, -1]]
+    with suppress(OverflowError):
+        fine = ends.astype(np.promote_types(knots.dtype, f"datetime64[{unit}]"))
+        # NumPy does not report all overflows.
+        if (fine.astype(knots.dtype) == ends).all():
+            return fine
+    tick = np.timedelta64(1, unit)
+    raise Problem(f"the dates from {ends[0]} to {ends[1]} cannot be counted in units of {tick}")
+
+
+def _coarsest(dates: Times) -> Times:
+    """Return the dates in the coarsest unit from seconds on that represents them exactly."""
+    for unit in ("s", "ms", "us"):
+        # Dates in attoseconds cannot be converted to seconds.
+        with suppress(OverflowError):
+            coarse = dates.astype(f"datetime64[{unit}]")
+            if (coarse == dates).all():
+                return coarse
+    return dates
+
+
+def _samples(steps: float, option: str) -> int:
+    if steps >= _MOST:
+        raise Problem(f"--every {option}: that makes {float(steps):.1e} samples of one curve")
+    return int(steps) + 1

@@ -1,22 +1,35 @@
-"""Tables: columns of numbers, dates and texts in files, and the times, numbers and labels in their rows."""
+"""Tables in files: their formats, their columns of numbers, dates and texts, and the times and labels in their rows."""
 
 from __future__ import annotations
 
+import csv
+import io
+import json
+import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+import warnings
+import zipfile
+from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from datetime import UTC
 from decimal import Decimal, InvalidOperation
-from typing import Any, NamedTuple
+from importlib import import_module
+from itertools import islice
+from pathlib import Path, PurePath
+from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .._base.arrays import brief
 from .._base.input import ISO_DATE, UTC_ZONE, times_of
-from .._base.time import NANOSECONDS
-from .._core import ValidationError
-from ._files import Source
-from ._messages import Problem, did_you_mean, refuse
+from .._base.system import damage
+from .._base.time import NANOSECONDS, parts_of_duration
+from .._core import ValidationError, number_lines
+from .._splines.archive import read
+from ..convert._pose_files import TUM, tum_rows, write_tum_rows
+from ._messages import STANDARD, Problem, Progress, Source, alternatives, did_you_mean, first_duplicate, refuse, written
 
 Array = NDArray[Any]
 Place = Callable[[int], str]
@@ -57,6 +70,30 @@ def number(text: str) -> float:
     if not is_number(text):
         raise ValueError
     return float(text)
+
+
+# Exponents of floating-point numbers are smaller.
+_EXPONENT = 400
+
+
+def duration(text: str, option: str) -> tuple[Decimal, str]:
+    """Split ``"10min"`` into 10 and ``"min"``."""
+    try:
+        parts = parts_of_duration(text)
+    except InvalidOperation:
+        raise Problem(f"{option} {text}: the exponent is too large") from None
+    if parts is None:
+        raise Problem(
+            f"{option} {text}: a duration is a number such as 0.5, or one with a unit such as 10min; "
+            f"units are {', '.join(NANOSECONDS)}"
+        )
+    count, unit = parts
+    refuse(
+        f"{option} {text}: ",
+        (count == 0, "it must be larger than zero"),
+        (abs(count.adjusted()) > _EXPONENT, f"that is too {'long' if count > 1 else 'short'}"),
+    )
+    return count, unit
 
 
 def _holds_dates(cells: Sequence[str]) -> bool:
@@ -148,11 +185,11 @@ class Table:
         if name in self.groups or name in self.names:
             return self.groups.get(name, [name])
         both = [name + RE, name + IM]
-        found = [part for part in both if part in self.names]
-        if len(found) == 1:
-            missing = both[found == both[:1]]
-            raise Problem(f"{self.path} has a column {found[0]!r}, but no {missing!r}; a complex number needs both")
-        return found or [self.require(name)]
+        present = [part for part in both if part in self.names]
+        if len(present) == 1:
+            missing = both[present == both[:1]]
+            raise Problem(f"{self.path} has a column {present[0]!r}, but no {missing!r}; a complex number needs both")
+        return present or [self.require(name)]
 
     def cells(self, name: str, rows: int | None = None) -> list[str]:
         """Return the texts of a column, or of its first rows, without blanks at their ends; empty if missing."""
@@ -240,8 +277,8 @@ class Table:
         bad = np.flatnonzero(~np.isfinite(values))
         if bad.size:
             value = values[bad[0]]
-            found = f"is empty or NaN{_SKIP}" if np.isnan(value) else f"holds {value}, which is not a finite number"
-            raise self._problem(name, int(bad[0]), found)
+            problem = f"is empty or NaN{_SKIP}" if np.isnan(value) else f"holds {value}, which is not a finite number"
+            raise self._problem(name, int(bad[0]), problem)
         return np.asarray(values)
 
     def _parsed(self, name: str) -> NDArray[np.float64]:
@@ -319,8 +356,8 @@ class Table:
             raise self._problem(name, row, f"holds {cell!r}, {what}")
         raise Problem(f"{self.path}: column {name!r} has no times")
 
-    def _problem(self, name: str, row: int, found: str) -> Problem:
-        return Problem(f"{self.path}, {self.place(row)}: column {name!r} {found}")
+    def _problem(self, name: str, row: int, problem: str) -> Problem:
+        return Problem(f"{self.path}, {self.place(row)}: column {name!r} {problem}")
 
 
 def codes_of(labels: Sequence[Any]) -> NDArray[np.intp]:
@@ -331,3 +368,505 @@ def codes_of(labels: Sequence[Any]) -> NDArray[np.intp]:
 
 def _is_text(column: Any) -> bool:
     return bool(column.dtype.kind == "O")
+
+
+# ---- formats ----
+
+
+def _require(what: str, extra: str, *libraries: str) -> None:
+    """Raise `Problem` unless the libraries that an extra installs can be imported."""
+    for name in libraries:
+        try:
+            import_module(name)
+        except ImportError:
+            raise Problem(f"{what} need {name}; install it with: pip install 'symspline[{extra}]'") from None
+
+
+class Layout(NamedTuple):
+    """The meaning of the columns that are written.
+
+    Attributes
+    ----------
+    time : str
+        Column of times.
+    curve : str or None
+        Column of the names of curves.
+    lonlat : tuple of str or None
+        Columns of longitude and latitude in degrees.
+    utc : bool
+        Whether dates are in UTC.
+    """
+
+    time: str
+    curve: str | None
+    lonlat: tuple[str, ...] | None
+    utc: bool
+
+
+# ---- CSV ----
+
+# The cells of a line ``sep=;``, with which Excel begins.
+_SEPARATOR = ["sep=", ""]
+_COMPLEX = re.compile(r"\(?[-+]?[\d.e]+([-+]?\d+)?([-+][\d.e]+([-+]\d+)?)?j\)?", re.ASCII)
+# The first bytes of text in UTF-16, which spreadsheets write.
+_UTF16 = (b"\xff\xfe", b"\xfe\xff")
+_WRITTEN = 50_000
+"""Rows that are written between two updates of the progress."""
+
+
+def _read_csv(path: Source) -> Table:
+    """Read text in UTF-8 with cells separated by commas, semicolons or tabs, and names of columns in the first line.
+
+    Blank lines are skipped, and a line ``sep=;`` as well. Between semicolons, numbers may have a decimal comma. Complex
+    numbers such as ``(1+2j)``, as pandas writes them, become two columns.
+    """
+    with path.open() as file:
+        first = next(filter(bytes.strip, file), b"")
+    mark = max(",;\t", key=lambda mark: first.count(mark.encode()))
+    rows = _rows(path, mark)
+    _, head, names = next(rows, (0, 0, []))
+    names = [name.strip() for name in names]
+    twice = first_duplicate([name for name in names if name])
+    refuse(
+        path,
+        (not names, " is empty"),
+        (all(is_number(name.replace(",", ".")) for name in names), ": the first line must name the columns, but "
+         "holds numbers"),
+        (twice is not None, f": the first line names two columns {twice!r}"),
+        (next(rows, None) is None, " has no rows below the names of its columns"),
+    )  # fmt: skip
+    rows.close()
+    missing = [word for text in MISSING for word in (text, text.upper(), text.title(), text.replace("nan", "NaN"))]
+    frame = _frame(path, mark, names, head, keep_default_na=False, na_values=missing)
+    columns: dict[str, Any] = {}
+    for i, name in enumerate(names):
+        if name:
+            # Words such as true are texts.
+            columns |= _converted(name, frame[i].astype(object) if frame[i].dtype.kind == "b" else frame[i])
+
+    def texts(name: str) -> list[str]:
+        if name not in names:
+            return list(map(str, columns[name].tolist()))
+        i = names.index(name)
+        cells = _frame(path, mark, names, head, usecols=[i], dtype=str, na_filter=False)[i]
+        return list(map(str.strip, cells.tolist()))
+
+    def place(row: int) -> str:
+        return f"line {next(islice(_rows(path, mark), row + 1, None))[0]}"
+
+    return Table(path, columns, place, texts=texts, comma=mark == ";")
+
+
+def _converted(name: str, column: Any) -> dict[str, Any]:
+    """Return a column of pandas as an array of numbers, as those of its real and imaginary parts, or as texts."""
+    if column.dtype.kind in "biufmM":
+        return {name: column.to_numpy()}
+    texts = column.astype(object) if column.dtype == "category" else column
+    first = next((str(cell).strip() for cell in texts[:FIRST].tolist() if cell == cell), "")
+    if _COMPLEX.fullmatch(first):
+        with suppress(ValueError):
+            values = np.array([complex("nan" if cell != cell else cell.strip()) for cell in texts.tolist()])
+            return {name + RE: values.real, name + IM: values.imag}
+    return {name: texts}
+
+
+def _frame(path: Source, mark: str, names: Sequence[str], head: int, **options: Any) -> Any:
+    """Read the rows below the first ones by pandas; columns are numbered."""
+    _require("CSV files", "cli", "pandas")
+    import pandas as pd
+
+    # Numbers are exact by default from this version on.
+    exact = {} if tuple(map(int, pd.__version__.split(".")[:2])) >= (3, 1) else {"float_precision": "round_trip"}
+    with path.open() as file, Progress("reading"), warnings.catch_warnings():
+        # It would omit further cells of a line.
+        warnings.simplefilter("error", pd.errors.ParserWarning)
+        try:
+            return pd.read_csv(
+                file, sep=mark, header=None, names=range(len(names)), index_col=False, skiprows=head,
+                skipinitialspace=True, low_memory=False, **exact, **options
+            )  # fmt: skip
+        except (pd.errors.ParserError, pd.errors.ParserWarning, UnicodeDecodeError) as error:
+            problem = brief(error)
+    for line, _, row in islice(_rows(path, mark), 1, None):
+        if len(row) > len(names):
+            named = f"{len(row)} cells, but the first line names {len(names)} column{'s' * (len(names) > 1)}"
+            named += "; remove lines above the names, such as comments" if len(names) == 1 else ""
+            raise Problem(f"{path}, line {line}: {named}")
+    raise Problem(f"{path}: {problem}")
+
+
+def _rows(path: Source, mark: str) -> Generator[tuple[int, int, list[str]], None, None]:
+    """Yield the line, the number and the cells of every row that is not blank; blank rows are counted."""
+    with path.open() as binary:
+        text = io.TextIOWrapper(binary, encoding="utf-8-sig", newline="")
+        reader = csv.reader(text, delimiter=mark, skipinitialspace=True, strict=True)
+        try:
+            for number, row in enumerate(reader, 1):
+                if row != _SEPARATOR and (len(row) > 1 or "".join(row).strip()):
+                    yield reader.line_num, number, row
+        except UnicodeDecodeError:
+            binary.seek(0)
+            encoding = "utf-16" if binary.read(2) in _UTF16 else "cp1252"
+            raise Problem(f"{path} is not text in UTF-8; convert it, such as by iconv -f {encoding} -t utf-8") from None
+        except csv.Error as error:
+            raise Problem(f"{path}, line {reader.line_num}: {error}") from None
+        finally:
+            text.detach()
+
+
+def _write_csv(file: BinaryIO, columns: Mapping[str, Array], layout: Layout) -> None:
+    """Write numbers as the shortest text that reads back equal, and dates in ISO 8601."""
+    file.write(_line(columns))
+    total = max(map(len, columns.values()))
+    with Progress("writing") as progress:
+        for start in range(0, total, _WRITTEN):
+            progress(start, total)
+            cells = [_cells(values[start : start + _WRITTEN], layout.utc) for values in columns.values()]
+            file.write("".join(f"{','.join(row)}\n" for row in zip(*cells, strict=True)).encode())
+
+
+def _cells(values: Array, utc: bool) -> list[str]:
+    if values.dtype.kind == "M":
+        return _date_texts(values, utc)
+    if values.dtype.kind == "f":
+        return number_lines(values[:, None], ",").splitlines()
+    if values.dtype.kind == "U":
+        quoted = {text: _line([text]).decode().removesuffix("\n") for text in np.unique(values).tolist()}
+        return [quoted[text] for text in values.tolist()]
+    return list(map(str, values.tolist()))
+
+
+def _date_texts(dates: Array, utc: bool) -> list[str]:
+    """Return dates in ISO 8601, with a Z if they are in UTC."""
+    return [text + "Z" * utc for text in np.datetime_as_string(dates).tolist()]
+
+
+def _line(cells: Any) -> bytes:
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerow(cells)
+    return text.getvalue().encode()
+
+
+# ---- NPZ ----
+
+_ZONE = "time_zone"
+"""The entry of an NPZ file with the time zone of its dates."""
+
+
+def _read_npz(path: Source) -> Table:
+    """Read an NPZ file, whose arrays have one entry per row.
+
+    The entries of an array ``a`` with more axes are the columns ``a_0``, ``a_1``, … row by row; complex numbers are
+    two columns ``a_0_re`` and ``a_0_im``.
+    """
+    columns: dict[str, Any] = {}
+    groups: dict[str, list[str]] = {}
+    with path.open() as file:
+        refuse(path, (not zipfile.is_zipfile(file), " is not an NPZ file"))
+        file.seek(0)
+        with damage(path, "is damaged, or holds other objects than numbers"):
+            arrays = read(file, lambda name: True)
+    refuse(path, ("format" in arrays, " is a curve that was fitted already, not a table"))
+    for key, array in arrays.items():
+        if not array.ndim or array.dtype.kind not in "biufcMmU":
+            continue
+        entries = array.reshape(len(array), math.prod(array.shape[1:])).T
+        entries = entries.astype(object) if array.dtype.kind == "U" else entries
+        parts = {key if array.ndim == 1 else f"{key}_{i}": entry for i, entry in enumerate(entries)}
+        if array.dtype.kind == "c":
+            parts = {name + end: part for name, z in parts.items() for end, part in ((RE, z.real), (IM, z.imag))}
+        groups[key] = [*parts]
+        columns |= parts
+    utc = _ZONE in arrays and arrays[_ZONE].shape == () and str(arrays[_ZONE]) == "UTC"
+    return Table(path, columns, groups=groups, is_utc=dict.fromkeys(columns, True) if utc else {})
+
+
+def _write_npz(file: BinaryIO, columns: Mapping[str, Array], layout: Layout) -> None:
+    """Write an NPZ file with one array per column and, for dates in UTC, the text ``time_zone``."""
+    zone = {_ZONE: np.array("UTC")} if layout.utc and _ZONE not in columns else {}
+    np.savez(file, **columns, **zone)  # type: ignore[arg-type]
+
+
+# ---- Parquet ----
+
+
+def _read_parquet(path: Source) -> Table:
+    """Read a Parquet file. Empty cells are NaN, NaT or empty texts."""
+    _require("Parquet files", "parquet", "pandas", "pyarrow")
+    import pandas as pd
+    from pyarrow import ArrowInvalid
+
+    with path.open() as file:
+        try:
+            frame = pd.read_parquet(file)
+        except ArrowInvalid:
+            raise Problem(f"{path} is damaged or not a Parquet file") from None
+    zones = {name: getattr(frame[name].dtype, "tz", None) is not None for name in frame}
+    columns: dict[str, Any] = {}
+    for name, zoned in zones.items():
+        columns |= _converted(name, frame[name].dt.tz_convert(None) if zoned else frame[name])
+    return Table(path, columns, is_utc=zones)
+
+
+def _write_parquet(file: BinaryIO, columns: Mapping[str, Array], layout: Layout) -> None:
+    """Write a Parquet file; dates in UTC have this time zone."""
+    _require("Parquet files", "parquet", "pandas", "pyarrow")
+    import pandas as pd
+
+    frame = pd.DataFrame(columns)
+    for name in [name for name in columns if layout.utc and columns[name].dtype.kind == "M"]:
+        frame[name] = frame[name].dt.tz_localize("UTC")
+    frame.to_parquet(file, index=False)
+
+
+# ---- TUM ----
+
+
+class _Named(io.StringIO):
+    """Text with the name that messages give it."""
+
+    name = ""
+
+
+def _read_tum(path: Source) -> Table:
+    """Read a trajectory of the TUM RGB-D benchmark: lines of time, position and quaternion, its scalar last."""
+    with path.open() as file:
+        try:
+            text = _Named(file.read().decode("utf-8-sig"))
+        except UnicodeDecodeError:
+            raise Problem(f"{path} is not text in UTF-8") from None
+    text.name = str(path)
+    rows, lines = tum_rows(text, missing=True)
+    return Table(path, dict(zip(TUM, rows.T, strict=True)), lines.place)
+
+
+def _write_tum(file: BinaryIO, columns: Mapping[str, Array], layout: Layout) -> None:
+    """Write a TUM trajectory. The columns are the time, the position and the quaternion."""
+    time, *pose = columns.values()
+    if time.dtype.kind == "M" and (time < np.datetime64(0, "s")).any():
+        raise Problem("times of a TUM trajectory are counted from 1970 on; these dates are earlier")
+    text = io.TextIOWrapper(file, "utf-8", newline="\n")
+    write_tum_rows(text, time, np.stack(pose, axis=1), f"# timestamp {' '.join(TUM[1:])}")
+    text.detach()
+
+
+# ---- JSON and GeoJSON ----
+
+_TIME, _LON, _LAT, _HEIGHT, _TRACK = "time", "lon", "lat", "ele", "track"
+# Properties of lines that hold the times of their points.
+_LINE_TIMES = ("coordTimes", "times")
+_KINDS = "GeoJSON must be a collection of features that are points or lines"
+
+
+def _read_json(path: Source) -> Table:
+    """Read a list of objects with one value per column, or an object with one list per column."""
+    return _table(path, _json(path))
+
+
+def _json(path: Source) -> Any:
+    with path.open() as file:
+        try:
+            return json.load(file)
+        except (ValueError, RecursionError) as error:
+            lines = "; for JSON lines, make one list of them, such as by jq -s ." if "Extra data" in str(error) else ""
+            raise Problem(f"{path} is not JSON: {error}{lines}") from None
+
+
+def _table(path: Source, content: Any) -> Table:
+    if isinstance(content, dict) and content and all(isinstance(values, list) for values in content.values()):
+        return Table(path, {name: _values(values) for name, values in content.items()})
+    shape = " is not a table: give a list of objects, one per row, or an object of lists, one per column"
+    rows = isinstance(content, list) and content and all(isinstance(row, dict) for row in content)
+    refuse(path, (not rows, shape))
+    names = dict.fromkeys(name for row in content for name in row)
+    return Table(path, {name: _values([row.get(name) for row in content]) for name in names})
+
+
+def _values(values: list[Any]) -> Array:
+    """Return numbers as an array, and other values as texts."""
+    kinds = set(map(type, values)) - {type(None)}
+    # Larger whole numbers are exact as texts only.
+    if kinds and kinds <= {int, float} and all(type(value) is not int or abs(value) <= EXACT for value in values):
+        return np.array([np.nan if value is None else value for value in values], np.float64)
+    return np.array(["" if value is None else str(value) for value in values], object)
+
+
+def _read_geojson(path: Source) -> Table:
+    """Read a collection of features: points with properties, or lines with their times in ``coordTimes``.
+
+    The name of a line is in the column ``track``, and heights are in the column ``ele``.
+    """
+    content = _json(path)
+    rows: list[dict[str, Any]] = []
+    try:
+        features = content["features"] if content["type"] == "FeatureCollection" else [content]
+        for number, feature in enumerate(features):
+            rows += _feature(feature, str(number), path)
+    except (KeyError, TypeError, ValueError, AttributeError):
+        raise Problem(f"{path}: {_KINDS}") from None
+    return _table(path, rows)
+
+
+def _feature(feature: Any, number: str, path: Source) -> list[dict[str, Any]]:
+    properties = dict(feature.get("properties") or {})
+    coordinates, kind = feature["geometry"]["coordinates"], feature["geometry"]["type"]
+    if kind == "Point":
+        return [_position(coordinates) | properties]
+    remedy = "; make one LineString of its parts" if kind == "MultiLineString" else ""
+    refuse(path, (kind != "LineString", f": {_KINDS}, not {kind}{remedy}"))
+    times = next((properties.pop(name) for name in _LINE_TIMES if name in properties), None)
+    label = {_TRACK: str(properties.get("name", number))}
+    rows = [_position(place) | label for place in coordinates]
+    return rows if times is None else [{_TIME: time} | row for time, row in zip(times, rows, strict=True)]
+
+
+def _position(coordinates: Any) -> dict[str, Any]:
+    lon, lat, *height = coordinates
+    return {_LON: lon, _LAT: lat} | ({_HEIGHT: height[0]} if height else {})
+
+
+def _lists(columns: Mapping[str, Array], layout: Layout) -> dict[str, list[Any]]:
+    """Return columns as lists of numbers and texts; NaN becomes None."""
+    return {
+        # NaN is not equal to itself.
+        name: _date_texts(x, layout.utc) if x.dtype.kind == "M" else [v if v == v else None for v in x.tolist()]
+        for name, x in columns.items()
+    }
+
+
+def _write_json(file: BinaryIO, columns: Mapping[str, Array], layout: Layout) -> None:
+    """Write a list of objects, one per row and line."""
+    rows = zip(*_lists(columns, layout).values(), strict=True)
+    lines = ",\n".join(json.dumps(dict(zip(columns, row, strict=True)), ensure_ascii=False) for row in rows)
+    file.write(f"[\n{lines}\n]\n".encode())
+
+
+def _write_geojson(file: BinaryIO, columns: Mapping[str, Array], layout: Layout) -> None:
+    """Write a collection of points, one per row and line, whose other columns are properties."""
+    lon, lat = _lonlat(columns, layout, "GeoJSON")
+    values = _lists(columns, layout)
+    places = zip(values.pop(lon), values.pop(lat), strict=True)
+    features = []
+    for place, *others in zip(places, *values.values(), strict=True):
+        geometry = {"type": "Point", "coordinates": place}
+        properties = dict(zip(values, others, strict=True))
+        features.append(json.dumps({"type": "Feature", "properties": properties, "geometry": geometry}))
+    collection = ",\n".join(features)
+    file.write(f'{{"type": "FeatureCollection", "features": [\n{collection}\n]}}\n'.encode())
+
+
+def _lonlat(columns: Mapping[str, Array], layout: Layout, what: str) -> tuple[str, ...]:
+    if layout.lonlat is None:
+        raise Problem(f"{what} has longitude and latitude: write it for curves on sphere:2, with --lonlat")
+    refuse("", (layout.lonlat[0] not in columns, f"{what} needs the points beside their derivatives: give --nu 0,1"))
+    return layout.lonlat
+
+
+# ---- GPX ----
+
+
+def _read_gpx(path: Source) -> Table:
+    """Read the time, longitude, latitude and height of all points of a GPX file, and the name of their track."""
+    _require("GPX files", "gpx", "gpxpy")
+    import gpxpy.gpx
+
+    with path.open() as file:
+        try:
+            gpx = gpxpy.parse(file.read().decode("utf-8-sig"))
+        except (UnicodeDecodeError, ValueError, gpxpy.gpx.GPXException) as error:
+            raise Problem(f"{path} is damaged or not a GPX file: {error}") from None
+    rows: list[dict[str, Any]] = []
+    for number, track in enumerate(gpx.tracks, 1):
+        for part, segment in enumerate(track.segments, 1):
+            name = track.name or str(number)
+            label = f"{name}/{part}" if len(track.segments) > 1 else name
+            for point in segment.points:
+                time = point.time and point.time.astimezone(UTC).isoformat()
+                row = {_TIME: time, _LON: point.longitude, _LAT: point.latitude, _HEIGHT: point.elevation}
+                rows.append({name: value for name, value in row.items() if value is not None} | {_TRACK: label})
+    refuse(path, (not rows, " has no tracks with points"))
+    return _table(path, rows)
+
+
+def _write_gpx(file: BinaryIO, columns: Mapping[str, Array], layout: Layout) -> None:
+    """Write one track per curve."""
+    _require("GPX files", "gpx", "gpxpy")
+    from gpxpy import gpx
+
+    lon, lat = _lonlat(columns, layout, "GPX")
+    rates = [name for name in columns if name.endswith(("_d1", "_d2"))]
+    dates = columns[layout.time]
+    refuse(
+        "",
+        (rates, "GPX has positions and no derivatives; write those to a .csv, .npz or .parquet file"),
+        (dates.dtype.kind != "M", "GPX files have dates, but the times of these curves are numbers"),
+    )
+    times = dates.astype("datetime64[us]").tolist()
+    names = columns[layout.curve].tolist() if layout.curve is not None else [None] * len(times)
+    whole, tracks = gpx.GPX(), {}
+    for name, time, x, y in zip(names, times, columns[lon].tolist(), columns[lat].tolist(), strict=True):
+        if name not in tracks:
+            track, segment = gpx.GPXTrack(name=name), gpx.GPXTrackSegment()
+            track.segments.append(segment)
+            whole.tracks.append(track)
+            tracks[name] = segment
+        tracks[name].points.append(gpx.GPXTrackPoint(y, x, time=time.replace(tzinfo=UTC)))
+    file.write(whole.to_xml().encode())
+
+
+# ---- the list of formats ----
+
+
+class _Format(NamedTuple):
+    read: Callable[[Source], Table]
+    write: Callable[[BinaryIO, Mapping[str, Array], Layout], None]
+    endings: tuple[str, ...]
+    text: bool = True
+
+
+_FORMATS = {
+    "csv": _Format(_read_csv, _write_csv, ("csv", "tsv")),
+    "npz": _Format(_read_npz, _write_npz, ("npz",), False),
+    "parquet": _Format(_read_parquet, _write_parquet, ("parquet",), False),
+    "json": _Format(_read_json, _write_json, ("json",)),
+    "geojson": _Format(_read_geojson, _write_geojson, ("geojson",)),
+    "gpx": _Format(_read_gpx, _write_gpx, ("gpx",)),
+    "tum": _Format(_read_tum, _write_tum, ("tum", "txt")),
+}
+TABLES = tuple(_FORMATS)
+CURVES = ("npz",)
+
+
+def format_of(path: Path, given: str | None, known: Sequence[str] = TABLES, what: str = "a table") -> str:
+    """Return the format of a file: the given one, that of its ending, or the first one for a standard stream."""
+    if given is not None or path == STANDARD:
+        return given or known[0]
+    name = PurePath(path.name.lower())
+    unpacked = PurePath(name.stem) if name.suffix == ".gz" else name
+    formats = {f".{end}": form for form in known for end in _FORMATS[form].endings}
+    form = formats.get(unpacked.suffix, "")
+    wrong = not form or (unpacked != name and is_binary(form))
+    refuse(path, (wrong, f": the name of {what} must end in {alternatives([*formats])}"))
+    return form
+
+
+def is_binary(form: str) -> bool:
+    """Whether files of this format are not text."""
+    return not _FORMATS[form].text
+
+
+def endings() -> str:
+    """List the endings of names of tables for a help text."""
+    return ", ".join(f".{end}" for form in _FORMATS.values() for end in form.endings)
+
+
+def open_table(path: Path, given: str | None = None) -> Table:
+    """Read the table in a file whose format is the given one or that of its ending."""
+    source = Source(path, format_of(path, given))
+    return _FORMATS[source.format].read(source)
+
+
+def write_table(path: Path, form: str, columns: Mapping[str, Array], layout: Layout) -> None:
+    """Write columns of equal length to a file."""
+    with written(path) as file:
+        _FORMATS[form].write(file, columns, layout)

@@ -17,20 +17,18 @@ array([0.76159416])
 from ._models import (
     ball_to_half_space,
     ball_to_hyperboloid,
+    basis_to_projector,
+    basis_to_reflection,
+    density_to_state,
     half_space_to_ball,
     half_space_to_hyperboloid,
     hyperboloid_to_ball,
     hyperboloid_to_half_space,
     positive_definite_to_siegel,
-    siegel_to_positive_definite,
-)
-from ._subspaces import (
-    basis_to_projector,
-    basis_to_reflection,
-    density_to_state,
     projector_to_basis,
     quaternions_to_subspace,
     reflection_to_basis,
+    siegel_to_positive_definite,
     state_to_density,
     subspace_to_quaternions,
 )

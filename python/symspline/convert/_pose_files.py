@@ -12,12 +12,11 @@ from typing import Any, Literal, NamedTuple, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._base.arrays import as_array, brief, cast, checked_flag, refuse
-from .._base.disk import path_of, replacing
+from .._base.arrays import as_array, brief, cast, checked_flag, length, off_one, refuse
 from .._base.input import times_of
+from .._base.system import path_of, replacing
 from .._base.time import warn_of_rounded_times
 from .._base.typing import PointsLike
-from .._base.validation import length, off_one
 from .._core import ValidationError, number_lines
 from .._spaces import Array, Doubles, SpecialEuclidean, SpecialOrthogonal, point_tol, rotations_and_positions
 from ._quaternions import matrix_to_quaternion, quaternion_to_matrix
@@ -114,20 +113,20 @@ def _present(rows: Doubles, lines: Lines) -> tuple[Doubles, Lines]:
         return rows, lines
     if not kept:
         raise ValidationError(f"{lines.file} has no line without NaN")
-    own = Lines(lines.file, [lines.numbers[i] for i in kept], [lines.texts[i] for i in kept])
-    return rows[kept], own
+    rest = Lines(lines.file, [lines.numbers[i] for i in kept], [lines.texts[i] for i in kept])
+    return rows[kept], rest
 
 
 def _exact_dates(lines: Lines) -> NDArray[np.datetime64]:
     """Return the first column, seconds since 1970, as dates with all nanoseconds."""
-    found = []
+    counts = []
     for row, text in enumerate(lines.texts):
         cell = text.split()[0]
         ns = Decimal(cell) * 10**9
         if abs(ns) >= 2**63:
             raise lines.error(row, f"column 'time' holds {cell}, which is not seconds within 292 years of 1970")
-        found.append(int(ns.to_integral_value()))
-    return np.array(found, np.int64).astype("datetime64[ns]")
+        counts.append(int(ns.to_integral_value()))
+    return np.array(counts, np.int64).astype("datetime64[ns]")
 
 
 def tum_rows(file: Any, missing: bool = False) -> tuple[Doubles, Lines]:
@@ -458,31 +457,23 @@ def split(poses: PointsLike) -> tuple[Array, Array]:
 
 def _timed(t: ArrayLike, poses: Any) -> tuple[Array, Array]:
     """Return the times and the poses to write, without rows of NaN."""
-    if isinstance(poses, tuple) and len(poses) == 2:
-        rotations, positions = _SO3._array(poses[0], "poses"), as_array(poses[1], "poses")
-        if rotations.ndim != 3 or positions.ndim != 2 or len(rotations) != len(positions):
-            joined = checked_poses(poses)
-            return moments(t, len(joined)), joined
-        missing = _missing(rotations, 2) & _missing(positions, 1)
-        times = moments(t, len(missing))
-        return times[~missing], checked_poses((rotations[~missing], positions[~missing]))
-    array = _SE3._array(poses, "poses")
-    # The last row of a pose is constant.
-    missing = _missing(array[..., :3, :], 2) if array.ndim == 3 else np.zeros(array.shape[:1], bool)
+    array = _joined(poses)
+    missing: NDArray[np.bool_] = np.zeros(array.shape[:1], bool)
+    if array.ndim == 3 and array.dtype.kind == "f":
+        # The last row of a pose is constant.
+        missing = np.asarray(np.isnan(array[:, :3]).all(axis=(1, 2)))
     times = moments(t, len(missing))
     return times[~missing], checked_poses(array[~missing])
 
 
-def _missing(array: Array, axes: int) -> NDArray[np.bool_]:
-    """Return which rows are NaN in all their numbers."""
-    if array.dtype.kind != "f" or array.ndim != axes + 1:
-        return np.zeros(array.shape[:1], bool)
-    return np.asarray(np.isnan(array).all(axis=tuple(range(1, axes + 1))))
+def _joined(poses: Any) -> Array:
+    """Return poses as matrices, also those that are given as rotations and positions."""
+    return join(*poses) if isinstance(poses, tuple) and len(poses) == 2 else _SE3._array(poses, "poses")
 
 
 def checked_poses(poses: Any) -> Array:
     """Poses to write, shape (n, 4, 4)."""
-    g = join(*poses) if isinstance(poses, tuple) and len(poses) == 2 else _SE3._array(poses, "poses")
+    g = _joined(poses)
     _SE3.check_point(g)
     if g.ndim != 3:
         raise ValidationError(f"a file holds poses of shape (n, 4, 4), not {g.shape}")
@@ -533,9 +524,9 @@ class Lines(NamedTuple):
         """Name the line of a row: "line 7"."""
         return f"line {self.numbers[row]}"
 
-    def error(self, row: int, found: str) -> ValidationError:
+    def error(self, row: int, problem: str) -> ValidationError:
         """Return the error of a row."""
-        return ValidationError(f"{self.file}, {self.place(row)}: {found}")
+        return ValidationError(f"{self.file}, {self.place(row)}: {problem}")
 
 
 def rotations_in_rows(q: Doubles, file: object, place: Callable[[int], str]) -> Array:
@@ -600,17 +591,17 @@ def parsed(
     """
     if not lines.texts:
         raise ValidationError(f"{lines.file} is empty, it has no numbers; {form}")
-    separator, own = (None, slice(None)) if start is None else (",", slice(start, start + len(columns)))
-    used = None if start is None else range(own.start, own.stop)
+    separator, span = (None, slice(None)) if start is None else (",", slice(start, start + len(columns)))
+    used = None if start is None else range(span.start, span.stop)
     try:
         rows = np.loadtxt(lines.texts, dtype, delimiter=separator, usecols=used, ndmin=2)
     except ValueError as error:
         # The first line that is wrong.
         for i, text in enumerate(lines.texts):
             cells = text.partition("#")[0].split(separator)
-            if len(cells[own]) != len(columns):
+            if len(cells[span]) != len(columns):
                 raise lines.error(i, f"{len(cells)} numbers, but {form}") from None
-            for column, cell in zip(columns, cells[own], strict=True):
+            for column, cell in zip(columns, cells[span], strict=True):
                 try:
                     dtype(cell)
                 except ValueError:

@@ -7,12 +7,17 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._base.arrays import as_array, checked_atol, checked_flag, filled, refuse, short_repr
-from .._base.validation import (
+from .._base.arrays import (
     REMOVE,
     Array,
+    as_array,
     check_finite,
+    checked_atol,
+    checked_flag,
+    filled,
     off_one,
+    refuse,
+    short_repr,
     unchecked_numbers,
     unit_vectors,
     unmoved_by_underflow,
@@ -58,16 +63,16 @@ def converted(
         # |RᵀR − 1| is twice the distance from the rotations.
         tol = 2 * point_tol(as_array(value, name), 9)
     tol = tol if atol is None else checked_atol(atol)
-    found, valid = convert_rotations(x, form, wanted, tol)
+    result, valid = convert_rotations(x, form, wanted, tol)
     if not valid:
         check_finite(x, name, _MISSING if form in _SKIPPED else REMOVE)
         if form == "matrix":
             _check_rotations(x, tol, name)
         elif form == "vector":
-            _check_angles(x, found, tol, name)
+            _check_angles(x, result, tol, name)
         else:
             unit_vectors(x, tol, name, "a unit quaternion", "divide it by its length, or pass a larger atol")
-    return found
+    return result
 
 
 def _with_missing(value: ArrayLike, name: str, form: Form, wanted: Form, atol: float | None) -> Array:
@@ -79,17 +84,17 @@ def _with_missing(value: ArrayLike, name: str, form: Form, wanted: Form, atol: f
     missing = np.asarray(is_missing.any(axis=tuple(range(x.ndim - axes, x.ndim))))
     if not missing.any():
         return converted(x, name, form, wanted, atol)
-    found = np.full((*missing.shape, *_SHAPES[wanted]), np.nan)
+    result = np.full((*missing.shape, *_SHAPES[wanted]), np.nan)
     # Messages have the indices of all rotations, so that the missing ones are replaced and not removed.
     first = x[~missing][:1]
     if len(first):
         whole = converted(np.where(missing[(..., *[None] * axes)], first[0], x), name, form, wanted, atol)
-        found[~missing] = whole[~missing]
-    return found
+        result[~missing] = whole[~missing]
+    return result
 
 
-def _check_angles(v: Array, found: Array, tol: float, name: str) -> None:
-    good = off_one(found) <= tol
+def _check_angles(v: Array, turns: Array, tol: float, name: str) -> None:
+    good = off_one(turns) <= tol
     refuse(~good, name, lambda i: f"is {v[i]}, but angles must be small enough for sine and cosine; reduce them")
 
 

@@ -9,12 +9,12 @@ import jax
 import jax.numpy as jnp
 from jax.custom_derivatives import SymbolicZero
 
-from .._autodiff.casteljau import second_fundamental_form
 from .._autodiff.compiled import split
+from .._autodiff.curves import second_fundamental_form
 from .._base.typing import CurveOptions
 from .._curves.ends import ends_in_factors
 from .._curves.options import order_of
-from .._spaces import Product, Space, parts_of, refuse_quotients, space_named
+from .._spaces import AnySpace, Product, Space, parts_of, refuse_quotients, space_named
 from ..manifolds._manifold import refuse_functions
 from ._primitives import Fixed, fit_p, jvp_p
 
@@ -34,7 +34,7 @@ def curve(
 
 
 def curve(
-    x: Any, t: Any, points: Any, space: Space[Any] | str, *, nu: int = 0, bc_type: Any = "natural", **options: Any
+    x: Any, t: Any, points: Any, space: AnySpace | str, *, nu: int = 0, bc_type: Any = "natural", **options: Any
 ) -> Any:
     """Evaluate a spline through points by the compiled core, with derivatives in JAX.
 
@@ -94,8 +94,8 @@ def curve(
     refuse_quotients(space, "functions of JAX are not made")
     refuse_functions(space, "derivatives with respect to the data are not made")
     if isinstance(space, Product):
-        each = zip(parts_of(points, space, "points"), space.factors, ends_in_factors(bc_type, space), strict=True)
-        return tuple(curve(x, t, p, factor, nu=nu, bc_type=bc, **options) for p, factor, bc in each)
+        factors = zip(parts_of(points, space, "points"), space.factors, ends_in_factors(bc_type, space), strict=True)
+        return tuple(curve(x, t, p, factor, nu=nu, bc_type=bc, **options) for p, factor, bc in factors)
     kinds, given = split(bc_type)
     points = jnp.asarray(points)
     points = points.astype(jnp.result_type(points, jnp.complex64 if space.dtype.kind == "c" else jnp.float32))
@@ -121,13 +121,13 @@ def _curve_jvp(fixed: Fixed, nu: int, primals: Any, tangents: Any) -> Any:
             "∇γ' is not differentiated in x, which would be a third derivative; symspline.jax.evaluate has it"
         )
     orders = tuple(range(nu + in_time + 1))
-    *found, velocities = fit_p.bind(*primals, fixed=fixed, lead=0, orders=orders)
-    point, value = found[0], found[nu]
+    *values, velocities = fit_p.bind(*primals, fixed=fixed, lead=0, orders=orders)
+    point, value = values[0], values[nu]
     moved = jnp.zeros_like(value)
     if in_time:
-        ahead = found[nu + 1]
+        ahead = values[nu + 1]
         if nu:
-            ahead += second_fundamental_form(jnp, fixed.space, point, value, found[1])
+            ahead += second_fundamental_form(jnp, fixed.space, point, value, values[1])
         moved += ahead * jnp.expand_dims(dx, tuple(range(-len(fixed.space.point_shape), 0)))
     if any(moving):
         # One vector: its transpose is asked for as a whole.

@@ -1,22 +1,115 @@
-"""Fits and curves written in JAX: many curves of equal length, a fixed number of quasi-Newton steps."""
+"""Fits and curves written in JAX: many curves of equal length, a fixed number of quasi-Newton steps.
+
+`LIBRARY` has what the formulas of `symspline._autodiff` need of JAX.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
-from typing import Any, overload
+from functools import partial, wraps
+from typing import Any, ParamSpec, TypeVar, overload
 
 import jax
 import jax.numpy as jnp
+from jax.scipy.linalg import expm, solve_triangular
 
 from .._autodiff import curves
 from .._autodiff.condition import Chain, PoseChain, PositiveChain, Problem, SphereChain, cyclic_reduction
-from .._autodiff.library import adjoint
+from .._autodiff.library import Library, Tensor, adjoint, divided_arc, divided_logarithm, hermitian, matrix_derivative
 from .._autodiff.models import turned
 from .._base.arrays import short_repr
 from .._core import ValidationError
-from .._spaces import Product, Space
-from ._library import LIBRARY, full_precision
+from .._spaces import AnySpace, Product, Space
+
+_P = ParamSpec("_P")
+_T = TypeVar("_T")
+
+
+def full_precision(function: Callable[_P, _T]) -> Callable[_P, _T]:
+    """Decorate a function that multiplies matrices.
+
+    On a GPU, JAX rounds single-precision factors to 10 bits (TF32) by default, which leaves errors of 1e-3 in a curve.
+    """
+
+    @wraps(function)
+    def wrapped(*args: _P.args, **kwargs: _P.kwargs) -> _T:
+        with jax.default_matmul_precision("highest"):
+            return function(*args, **kwargs)
+
+    return wrapped
+
+
+def promoted(space: Space, *arrays: Tensor) -> tuple[jax.Array, ...]:
+    """Convert points, and arrays of their shape, to one precision."""
+    converted = [jnp.asarray(array) for array in arrays]
+    kind = jnp.result_type(*converted, jnp.complex64 if space.dtype.kind == "c" else jnp.float32)
+    return tuple(array.astype(kind) for array in converted)
+
+
+def _constant(array: Tensor, like: Any) -> Tensor:
+    return jnp.asarray(array, like.dtype)
+
+
+# ---- functions of Hermitian matrices, with derivatives of any order ----
+
+
+def _of_matrix(function: Callable[..., Tensor], a: Tensor) -> Tensor:
+    """Return the function, given by its divided differences, of Hermitian matrices."""
+    a = hermitian(a)
+    values, vectors = jnp.linalg.eigh(jax.lax.stop_gradient(a))
+    return _derivative(function, a, values, vectors, ())
+
+
+@partial(jax.custom_jvp, nondiff_argnums=(0,))
+def _derivative(
+    function: Callable[..., Tensor], a: Tensor, values: Tensor, vectors: Tensor, directions: Tensor
+) -> Tensor:
+    """The derivative of order k in k directions, at a matrix with these eigenvalues and eigenvectors."""
+    return matrix_derivative(jnp, function, values, vectors, directions)
+
+
+@_derivative.defjvp
+@full_precision
+def _next(function: Callable[..., Tensor], primals: Tensor, tangents: Tensor) -> Tensor:
+    a, values, vectors, directions = primals
+    da, _, _, changes = tangents
+    call = partial(_derivative, function, a, values, vectors)
+    moved = call((*directions, da))
+    for i, change in enumerate(changes):
+        moved += call((*directions[:i], change, *directions[i + 1 :]))
+    return call(directions), moved
+
+
+# ---- the library ----
+
+
+def _fold(step: Any, start: Tensor, numbers: Tensor) -> Tensor:
+    # One compiled step, where a loop of Python would compile as many as there are numbers.
+    return jax.lax.scan(
+        lambda value, number: (step(value, number), None), start, jnp.asarray(numbers, start.real.dtype)
+    )[0]
+
+
+LIBRARY: Library = Library(
+    name="JAX",
+    module="jax",
+    general=True,
+    xp=jnp,
+    array=lambda value, name, like: jnp.asarray(value, like.dtype),
+    promote=promoted,
+    constant=_constant,
+    logarithm=partial(_of_matrix, partial(divided_logarithm, jnp, _constant)),
+    exponential=expm,
+    arcs=partial(_of_matrix, lambda *y: divided_arc(jnp, _constant, LIBRARY.arc, *y)),
+    solve_lower=partial(solve_triangular, lower=True),
+    fold=_fold,
+    along=lambda function, x: jax.jvp(function, (x,), (jnp.ones_like(x),)),
+    search=jnp.vectorize(partial(jnp.searchsorted, side="right"), signature="(n),(m)->(m)"),
+    take_along=jnp.take_along_axis,
+)
+
+
+# ---- fits and curves ----
 
 
 @overload
@@ -28,7 +121,7 @@ def evaluate(t: Any, points: Any, velocities: Any, space: Product, x: Any, *, nu
 
 
 @full_precision
-def evaluate(t: Any, points: Any, velocities: Any, space: Space[Any] | str, x: Any, *, nu: int = 0) -> Any:
+def evaluate(t: Any, points: Any, velocities: Any, space: AnySpace | str, x: Any, *, nu: int = 0) -> Tensor:
     """Evaluate curves with given knots, points and velocities, in JAX alone.
 
     This is `symspline.evaluate` written in JAX. It runs on the device of JAX and has derivatives of any order, in
@@ -145,11 +238,11 @@ def fit(
 
 
 @partial(jax.custom_jvp, nondiff_argnums=(0, 1, 2))
-def _velocities(chain: Chain, given: tuple[bool, bool], steps: int, data: Any) -> Any:
+def _velocities(chain: Chain, given: tuple[bool, bool], steps: int, data: Tensor) -> Tensor:
     problem = Problem(chain, given, *data)
     step = _step_of(problem)
 
-    def further(u: Any, _: Any) -> Any:
+    def further(u: Tensor, _: Any) -> Tensor:
         return u + step(problem.residual(u)), None
 
     start = jnp.zeros((len(problem.p), *problem.first.shape), problem.first.dtype)
@@ -158,7 +251,7 @@ def _velocities(chain: Chain, given: tuple[bool, bool], steps: int, data: Any) -
 
 @_velocities.defjvp
 @full_precision
-def _velocities_jvp(chain: Chain, given: tuple[bool, bool], steps: int, primals: Any, tangents: Any) -> Any:
+def _velocities_jvp(chain: Chain, given: tuple[bool, bool], steps: int, primals: Tensor, tangents: Tensor) -> Tensor:
     """Differentiate F(u, data) = 0: du = −F_u⁻¹ F_data, by the same steps."""
     (data,), (change,) = primals, tangents
     u = _velocities(chain, given, steps, data)
@@ -169,14 +262,14 @@ def _velocities_jvp(chain: Chain, given: tuple[bool, bool], steps: int, primals:
     _, linear = jax.linearize(problem.residual, u)
     step = _step_of(problem)
 
-    def further(du: Any, _: Any) -> Any:
+    def further(du: Tensor, _: Any) -> Tensor:
         return du + step(linear(du) + ahead), None
 
     du = jax.lax.scan(further, jnp.zeros_like(u), None, length=steps)[0]
     return u, du + normal
 
 
-def _step_of(problem: Problem) -> Callable[[Any], Any]:
+def _step_of(problem: Problem) -> Callable[[Tensor], Tensor]:
     """Return the quasi-Newton step from residuals to velocities.
 
     The step solves a tridiagonal system in frames that are transported in parallel from node to node. The choice of
@@ -186,7 +279,7 @@ def _step_of(problem: Problem) -> Callable[[Any], Any]:
     diagonals = still.weights()
     to_first, from_first = _transport(problem.chain, jax.lax.stop_gradient(problem.p))
 
-    def step(rows: Any) -> Any:
+    def step(rows: Tensor) -> Tensor:
         moved = to_first(rows)
         flat = moved.reshape(*moved.shape[: moved.ndim - problem.chain.model.axes], -1)
         return from_first(_solved(diagonals, flat).reshape(moved.shape))
@@ -194,10 +287,10 @@ def _step_of(problem: Problem) -> Callable[[Any], Any]:
     return step
 
 
-def _solved(diagonals: tuple[Any, Any, Any], rows: Any) -> Any:
+def _solved(diagonals: tuple[Tensor, Tensor, Tensor], rows: Tensor) -> Tensor:
     """Solve tridiagonal systems for rows of shape (n, *batch, k)."""
 
-    def lapack(diagonals: Any, rows: Any) -> Any:
+    def lapack(diagonals: Tensor, rows: Tensor) -> Tensor:
         if diagonals[1].size == len(rows):
             # The knots of all curves are the same.
             columns = rows.reshape(len(rows), -1)
@@ -207,7 +300,7 @@ def _solved(diagonals: tuple[Any, Any, Any], rows: Any) -> Any:
         solved = jax.lax.linalg.tridiagonal_solve(lower, main, upper, jnp.moveaxis(rows, 0, -2))
         return jnp.moveaxis(solved, -2, 0)
 
-    def reduction(diagonals: Any, rows: Any) -> Any:
+    def reduction(diagonals: Tensor, rows: Tensor) -> Tensor:
         lower, main, upper = (a[..., None, None] for a in diagonals)
         return cyclic_reduction(jnp, _solve_scalars, lower, main, upper, rows[..., None, :])[..., 0, :]
 
@@ -215,11 +308,11 @@ def _solved(diagonals: tuple[Any, Any, Any], rows: Any) -> Any:
     return jax.lax.platform_dependent(diagonals, rows, cpu=lapack, default=reduction)
 
 
-def _solve_scalars(diagonal: Any, *columns: Any) -> Any:
+def _solve_scalars(diagonal: Tensor, *columns: Tensor) -> Tensor:
     return [a / diagonal for a in columns]
 
 
-def _transport(chain: Chain, p: Any) -> tuple[Callable[[Any], Any], Callable[[Any], Any]]:
+def _transport(chain: Chain, p: Tensor) -> tuple[Callable[[Tensor], Tensor], Callable[[Tensor], Tensor]]:
     """Return the parallel transport of vectors along the nodes to the first one, and its inverse."""
     if isinstance(chain, SphereChain):
         frames = _rotations(p)
@@ -238,17 +331,17 @@ def _transport(chain: Chain, p: Any) -> tuple[Callable[[Any], Any], Callable[[An
     return lambda v: v, lambda v: v
 
 
-def _times(matrices: Any, vectors: Any) -> Any:
+def _times(matrices: Tensor, vectors: Tensor) -> Tensor:
     return (matrices @ vectors[..., None])[..., 0]
 
 
-def _products(steps: Any) -> Any:
+def _products(steps: Tensor) -> Tensor:
     """Return the products of matrices from the first node to each node."""
     one = jnp.broadcast_to(jnp.eye(steps.shape[-1], dtype=steps.dtype), steps[:1].shape)
     return jax.lax.associative_scan(lambda x, y: y @ x, jnp.concatenate([one, steps]))
 
 
-def _rotations(p: Any) -> Any:
+def _rotations(p: Tensor) -> Tensor:
     """Return the rotations that transport tangent vectors at the first point along the polygon to each point."""
     a, b = p[:-1], p[1:]
     s = a + b
@@ -257,12 +350,12 @@ def _rotations(p: Any) -> Any:
     return _products(jnp.eye(p.shape[-1], dtype=p.dtype) - outer + 2 * b[..., :, None] * a[..., None, :])
 
 
-def _at_rest(p: Any) -> Any:
+def _at_rest(p: Tensor) -> Tensor:
     """Return poses without rotation and translation."""
     return jnp.zeros_like(p).at[..., 0].set(1.0)
 
 
-def _adjoint_columns(chain: Chain, poses: Any) -> Any:
+def _adjoint_columns(chain: Chain, poses: Tensor) -> Tensor:
     """Return the matrices of Ad, which maps the twist (ω, v) to (Rω, Rv + x × Rω)."""
     quaternion, place = poses[..., None, :4], poses[..., None, 4:]
     twists = jnp.eye(6, dtype=poses.dtype)

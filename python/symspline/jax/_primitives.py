@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -19,11 +19,98 @@ from jax.extend.core import Primitive
 from jax.interpreters import ad, batching, mlir
 
 from .._autodiff.compiled import Kinds, fitted, joined
+from .._autodiff.library import Tensor
 from .._curves.curve import CurveArrays
 from .._curves.derivatives import sample_times
 from .._curves.fit import curve_of
 from .._spaces import Space
-from ._layout import Layout, Shape
+
+Shape = tuple[int, ...]
+
+
+class Layout(NamedTuple):
+    """Where arrays of the core have the axes of `jax.vmap`.
+
+    Those along which curves differ stand before the batch axes of the points. Along the others all times belong to
+    the same curves, so that they are axes of the times.
+
+    Attributes:
+        curves: sizes of the axes along which curves differ, 1 along the others.
+        times: sizes of the axes along which times differ, 1 along the others.
+        batch: batch axes of the points passed to `symspline.jax.curve`.
+    """
+
+    curves: Shape
+    times: Shape
+    batch: Shape
+
+    @property
+    def full(self) -> Shape:
+        """Sizes of all axes of `jax.vmap`."""
+        return np.broadcast_shapes(self.curves, self.times)
+
+    @property
+    def _own(self) -> list[int]:
+        return [i for i, size in enumerate(self.curves) if size != 1]
+
+    @property
+    def _shared(self) -> list[int]:
+        return [i for i, size in enumerate(self.curves) if size == 1]
+
+    def data(self, array: Tensor, core: int) -> Tensor:
+        """Points, vectors or knots, one for every curve.
+
+        Args:
+            core: the number of axes behind the batch axes, of which there may be none.
+        """
+        lead = len(self.curves)
+        missing = len(self.batch) - (array.ndim - lead - core)
+        padded = array.reshape(*array.shape[:lead], *(1,) * missing, *array.shape[lead:])
+        full = np.broadcast_to(padded, (*self.curves, *self.batch, *padded.shape[lead + len(self.batch) :]))
+        return np.squeeze(full, axis=tuple(self._shared))
+
+    def knots(self, t: Tensor) -> Tensor:
+        """Knots, one row that all curves share where they do."""
+        lead = len(self.curves)
+        if t.ndim == lead + 1 and all(size == 1 for size in t.shape[:lead]):
+            return t.reshape(-1)
+        return self.data(t, 1)
+
+    def sample_times(self, x: Tensor) -> tuple[Any, bool]:
+        """Times, and whether every curve has its own."""
+        of_curves, shared, lead = self._own, self._shared, len(self.curves)
+        x = np.transpose(x, (*of_curves, *shared, *range(lead, x.ndim)))
+        if all(self.times[i] == 1 for i in of_curves):
+            return x.reshape(x.shape[len(of_curves) :]), False
+        x = x.reshape(*x.shape[: len(of_curves)], *(1,) * len(self.batch), *x.shape[len(of_curves) :])
+        curves = [self.curves[i] for i in of_curves]
+        return np.broadcast_to(x, (*curves, *self.batch, *x.shape[len(curves) + len(self.batch) :])), True
+
+    def outward(self, values: Tensor) -> Tensor:
+        """Values of the core with the axes of `jax.vmap` in front."""
+        return np.transpose(values, np.argsort(self._order(values.ndim)))
+
+    def inward(self, cotangent: Tensor) -> Tensor:
+        """The inverse of `outward`."""
+        return np.transpose(cotangent, self._order(cotangent.ndim))
+
+    def _order(self, axes: int) -> list[int]:
+        lead = len(self.curves)
+        behind = lead + len(self.batch)
+        return [*self._own, *range(lead, behind), *self._shared, *range(behind, axes)]
+
+    def gradient(self, array: Tensor, core: int, kept: Shape, shape: Shape) -> Tensor:
+        """The transpose of `data`: an array per curve, summed along the axes that curves share.
+
+        Args:
+            kept: sizes of the axes of `jax.vmap` that the sum keeps.
+            shape: of the array without those axes.
+        """
+        array = np.expand_dims(array, tuple(self._shared))
+        missing = len(self.batch) + core - len(shape)
+        wanted = (*kept, *(1,) * missing, *shape)
+        axes = tuple(i for i, (n, m) in enumerate(zip(array.shape, wanted, strict=True)) if n != m)
+        return array.sum(axis=axes, keepdims=True).reshape(*kept, *shape)
 
 
 @dataclass(frozen=True)
@@ -38,13 +125,13 @@ class Fixed:
 # ---- the spline ----
 
 
-def _fit_shapes(x: Any, *data: Any, fixed: Fixed, lead: int, orders: Shape) -> Any:
+def _fit_shapes(x: Tensor, *data: Tensor, fixed: Fixed, lead: int, orders: Shape) -> Tensor:
     layout, points = _layout(fixed, lead, x, data), data[1]
     values = _values(fixed, lead, layout, x, points)
     return (*(values for _ in orders), ShapedArray((*layout.curves, *points.shape[lead:]), points.dtype))
 
 
-def _fit(x: Any, t: Any, points: Any, *vectors: Any, fixed: Fixed, lead: int, orders: Shape) -> Any:
+def _fit(x: Tensor, t: Tensor, points: Tensor, *vectors: Tensor, fixed: Fixed, lead: int, orders: Shape) -> Tensor:
     """The curves at x, γ and its derivatives of the given orders, and the velocities at the knots from which
     derivatives in the data are made."""
     layout, core = _layout(fixed, lead, x, (t, points, *vectors)), len(fixed.space.point_shape)
@@ -52,12 +139,12 @@ def _fit(x: Any, t: Any, points: Any, *vectors: Any, fixed: Fixed, lead: int, or
     data = layout.knots(t), layout.data(points, core + 1)
     spline = fitted(*data, ends, fixed.space, fixed.kinds, dict(fixed.options))
     at, per_curve = layout.sample_times(x)
-    found = [layout.outward(spline(at, nu, per_curve=per_curve)) for nu in orders]
+    values = [layout.outward(spline(at, nu, per_curve=per_curve)) for nu in orders]
     solved = spline._solved().velocities.reshape(*layout.curves, *points.shape[lead:])
-    return tuple(np.asarray(a, points.dtype) for a in (*found, solved))
+    return tuple(np.asarray(a, points.dtype) for a in (*values, solved))
 
 
-def _layout(fixed: Fixed, lead: int, x: Any, data: Any, *changes: Shape) -> Layout:
+def _layout(fixed: Fixed, lead: int, x: Tensor, data: Tensor, *changes: Shape) -> Layout:
     """The axes of times and data: of t, points, vectors and, where derivatives are made, velocities."""
     points = data[1]
     curves = np.broadcast_shapes(*(a.shape[:lead] for a in data), *changes)
@@ -65,12 +152,12 @@ def _layout(fixed: Fixed, lead: int, x: Any, data: Any, *changes: Shape) -> Layo
     return Layout(curves, x.shape[:lead], batch)
 
 
-def _values(fixed: Fixed, lead: int, layout: Layout, x: Any, points: Any) -> ShapedArray:
+def _values(fixed: Fixed, lead: int, layout: Layout, x: Tensor, points: Tensor) -> ShapedArray:
     shape = (*layout.full, *layout.batch, *x.shape[lead:], *fixed.space.point_shape)
     return ShapedArray(shape, points.dtype)
 
 
-def _ends(kinds: Kinds, vectors: Any) -> tuple[Any, Any]:
+def _ends(kinds: Kinds, vectors: Tensor) -> tuple[Any, Any]:
     """Vectors for both ends, None where none is given."""
     left = iter(vectors)
     first, last = (
@@ -82,11 +169,13 @@ def _ends(kinds: Kinds, vectors: Any) -> tuple[Any, Any]:
 # ---- its sensitivity to its data ----
 
 
-def _jvp_shape(change: Any, x: Any, *data: Any, fixed: Fixed, lead: int, **_: Any) -> Any:
+def _jvp_shape(change: Tensor, x: Tensor, *data: Tensor, fixed: Fixed, lead: int, **_: Any) -> Tensor:
     return _values(fixed, lead, _layout(fixed, lead, x, data, change.shape[:lead]), x, data[1])
 
 
-def _jvp(change: Any, x: Any, *data: Any, fixed: Fixed, lead: int, nu: int, moving: tuple[bool, ...]) -> Any:
+def _jvp(
+    change: Tensor, x: Tensor, *data: Tensor, fixed: Fixed, lead: int, nu: int, moving: tuple[bool, ...]
+) -> Tensor:
     """The change of γ, or of a derivative of it seen from the moving point, with the data.
 
     Args:
@@ -96,21 +185,23 @@ def _jvp(change: Any, x: Any, *data: Any, fixed: Fixed, lead: int, nu: int, movi
     layout = _layout(fixed, lead, x, data, change.shape[:lead])
     curve, at, bc_type = _moved(fixed, layout, nu, x, data)
     sizes = [math.prod(a.shape[lead:]) * moves for a, moves in zip(data, moving, strict=False)]
-    each = zip(np.split(change, np.cumsum(sizes)[:-1], axis=-1), data, _cores(fixed, data), moving, strict=False)
+    rows = zip(np.split(change, np.cumsum(sizes)[:-1], axis=-1), data, _cores(fixed, data), moving, strict=False)
     knots, steps, *ends = (
-        layout.data(_like(own, array).reshape(*change.shape[:lead], *array.shape[lead:]), core) if moves else None
-        for own, array, core, moves in each
+        layout.data(_like(part, array).reshape(*change.shape[:lead], *array.shape[lead:]), core) if moves else None
+        for part, array, core, moves in rows
     )
-    found = curve.jvp(at, bc_type, steps, knots, _ends(fixed.kinds, ends))
-    return np.asarray(layout.outward(found), data[1].dtype)
+    moved = curve.jvp(at, bc_type, steps, knots, _ends(fixed.kinds, ends))
+    return np.asarray(layout.outward(moved), data[1].dtype)
 
 
-def _vjp_shape(_: Any, x: Any, *data: Any, lead: int, moving: Any, kept: Shape, **__: Any) -> Any:
+def _vjp_shape(_: Any, x: Tensor, *data: Tensor, lead: int, moving: Any, kept: Shape, **__: Any) -> Tensor:
     sizes = (math.prod(a.shape[lead:]) for a, moves in zip(data, moving, strict=False) if moves)
     return ShapedArray((*kept, sum(sizes)), data[1].dtype)
 
 
-def _vjp(cotangent: Any, x: Any, *data: Any, fixed: Fixed, lead: int, nu: int, moving: Any, kept: Shape) -> Any:
+def _vjp(
+    cotangent: Tensor, x: Tensor, *data: Tensor, fixed: Fixed, lead: int, nu: int, moving: Any, kept: Shape
+) -> Tensor:
     """The transpose. JAX pairs complex numbers without conjugation.
 
     Args:
@@ -119,8 +210,8 @@ def _vjp(cotangent: Any, x: Any, *data: Any, fixed: Fixed, lead: int, nu: int, m
     layout = _layout(fixed, lead, x, data, kept)
     curve, at, bc_type = _moved(fixed, layout, nu, x, data)
     wide = np.broadcast_to(cotangent, (*layout.full, *cotangent.shape[lead:]))
-    found = curve.vjp(at, bc_type, np.conj(layout.inward(wide)))
-    parts = (found.t, found.points, *(end for end in found.ends if end is not None))
+    gradient = curve.vjp(at, bc_type, np.conj(layout.inward(wide)))
+    parts = (gradient.t, gradient.points, *(end for end in gradient.ends if end is not None))
     rows = [
         layout.gradient(np.conj(part), core, kept, array.shape[lead:]).reshape(*kept, -1)
         for part, core, array, moves in zip(parts, _cores(fixed, data), data, moving, strict=False)
@@ -129,27 +220,27 @@ def _vjp(cotangent: Any, x: Any, *data: Any, fixed: Fixed, lead: int, nu: int, m
     return np.concatenate(rows, axis=-1).astype(data[1].dtype)
 
 
-def _cores(fixed: Fixed, data: Any) -> list[int]:
+def _cores(fixed: Fixed, data: Tensor) -> list[int]:
     """How many axes knots, points and vectors have behind those of a batch."""
     core = len(fixed.space.point_shape)
     return [1, core + 1, *(core for _ in data[2:])]
 
 
-def _moved(fixed: Fixed, layout: Layout, nu: int, x: Any, data: Any) -> tuple[CurveArrays, Any, Any]:
+def _moved(fixed: Fixed, layout: Layout, nu: int, x: Tensor, data: Tensor) -> tuple[CurveArrays, Any, Any]:
     """Return curves with fitted velocities, sampling times, and their end conditions."""
     space, core = fixed.space, len(fixed.space.point_shape)
     t, points, *vectors, velocities = data
     points = space.project(np.ascontiguousarray(layout.data(points, core + 1)))
-    found = np.array(layout.data(velocities, core + 1), points.dtype)
+    rates = np.array(layout.data(velocities, core + 1), points.dtype)
     knots = np.array(layout.data(t, 1), np.float64)
     at, per_curve = layout.sample_times(np.asarray(x))
-    curve = curve_of(space, knots, [(points, found)])
+    curve = curve_of(space, knots, [(points, rates)])
     batch = points.shape[: points.ndim - core - 1]
     bc_type = joined(fixed.kinds, _ends(fixed.kinds, [layout.data(v, core) for v in vectors]))
     return curve, sample_times(knots, batch, at, per_curve, nu), bc_type
 
 
-def _like(change: Any, array: Any) -> Any:
+def _like(change: Tensor, array: Tensor) -> Tensor:
     """Changes of real arrays are real."""
     return change if np.iscomplexobj(array) else change.real
 
@@ -157,16 +248,16 @@ def _like(change: Any, array: Any) -> Any:
 # ---- rules of JAX for these primitives ----
 
 
-def _primitive(name: str, call: Any, shapes: Any, multiple: bool = False) -> Any:
+def _primitive(name: str, call: Any, shapes: Any, multiple: bool = False) -> Tensor:
     """A primitive that is one call of the core."""
     primitive = Primitive(name)
     primitive.multiple_results = multiple
 
-    def now(*arguments: Any, **fixed: Any) -> Any:
+    def now(*arguments: Tensor, **fixed: Any) -> Tensor:
         return jax.tree.map(jnp.asarray, call(*map(np.asarray, arguments), **fixed))
 
-    def later(*arguments: Any, **fixed: Any) -> Any:
-        def back(*arrays: Any) -> Any:
+    def later(*arguments: Tensor, **fixed: Any) -> Tensor:
+        def back(*arrays: Tensor) -> Tensor:
             return call(*map(np.asarray, arrays), **fixed)
 
         made = jax.tree.map(lambda a: jax.ShapeDtypeStruct(a.shape, a.dtype), shapes(*arguments, **fixed))
@@ -183,23 +274,23 @@ jvp_p = _primitive("symspline_jvp", _jvp, _jvp_shape)
 vjp_p = _primitive("symspline_vjp", _vjp, _vjp_shape)
 
 
-def _mapped(primitive: Any, arguments: Any, axes: Any, *, lead: int, **fixed: Any) -> Any:
+def _mapped(primitive: Any, arguments: Tensor, axes: Any, *, lead: int, **fixed: Any) -> Tensor:
     """The rule of `jax.vmap`: one more axis in front of every argument, of size one where there is none."""
     pairs = list(zip(arguments, axes, strict=True))
     moved = [jnp.expand_dims(a, 0) if i is None else jnp.moveaxis(a, i, 0) for a, i in pairs]
     if primitive is vjp_p:
         fixed["kept"] = (next(a.shape[i] for a, i in pairs if i is not None), *fixed["kept"])
-    found = primitive.bind(*moved, lead=lead + 1, **fixed)
+    results = primitive.bind(*moved, lead=lead + 1, **fixed)
     if primitive is not fit_p:
-        return found, 0
+        return results, 0
     if any(axis is not None for axis in axes[1:]):
-        return found, (0,) * len(found)
+        return results, (0,) * len(results)
     # Only times differ: there is one curve.
-    *values, velocities = found
+    *values, velocities = results
     return (*values, jnp.squeeze(velocities, 0)), (*(0 for _ in values), None)
 
 
-def _second(*_: Any, **__: Any) -> Any:
+def _second(*_: Any, **__: Any) -> Tensor:
     raise NotImplementedError(
         "symspline.jax.curve has derivatives of first order; symspline.jax.fit and symspline.jax.evaluate have those "
         "of any order"
@@ -211,7 +302,7 @@ for primitive in (fit_p, jvp_p, vjp_p):
     ad.primitive_jvps[primitive] = _second
 
 
-def _transpose(cotangent: Any, change: Any, *data: Any, lead: int, **fixed: Any) -> Any:
+def _transpose(cotangent: Tensor, change: Tensor, *data: Tensor, lead: int, **fixed: Any) -> Tensor:
     kept = change.aval.shape[:lead]
     return [vjp_p.bind(cotangent, *data, lead=lead, kept=kept, **fixed), *(None for _ in data)]
 

@@ -116,8 +116,8 @@ def from_pymanopt(manifold: Any, *, injectivity_radius: float | None = None) -> 
 def _has(manifold: Any, name: str) -> bool:
     """Whether a manifold of pymanopt overrides a method of its base class."""
     bases = [cls for cls in type(manifold).__mro__ if cls.__module__ == "pymanopt.manifolds.manifold"]
-    found = getattr(type(manifold), name, None)
-    return found is not None and found is not getattr(bases[-1], name, None)
+    method = getattr(type(manifold), name, None)
+    return method is not None and method is not getattr(bases[-1], name, None)
 
 
 @dataclass(frozen=True)
@@ -128,8 +128,8 @@ class _PointLast:
     real: bool = False
 
     def __call__(self, p: Array, *vectors: Array) -> Any:
-        found = self.function(*vectors, p)
-        return np.real(found) if self.real else found
+        value = self.function(*vectors, p)
+        return np.real(value) if self.real else value
 
 
 @dataclass(frozen=True)
@@ -140,5 +140,5 @@ class _OneByOne:
     real: bool = False
 
     def __call__(self, *inputs: Array) -> Array:
-        found = np.array([self.function(*row) for row in zip(*inputs, strict=True)])
-        return found.real if self.real else found
+        values = np.array([self.function(*row) for row in zip(*inputs, strict=True)])
+        return values.real if self.real else values

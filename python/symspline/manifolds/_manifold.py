@@ -11,10 +11,8 @@ from numpy.typing import ArrayLike
 
 from .._base.arrays import checked_number, short_repr, whole_number
 from .._core import ValidationError
-from .._spaces import Array, Space, factors_of
-from ._differences import dlog_by_differences
-from ._frames import basis_at
-from ._operations import Function, Functions, Operations, described
+from .._spaces import AnySpace, Array, Space, factors_of
+from ._operations import Function, Functions, Operations, basis_at, described, dlog_by_differences
 
 _NEEDED = ("exp", "log", "project_tangent", "inner")
 
@@ -321,7 +319,7 @@ def _radius(value: Any) -> float:
     return math.inf if value is None else checked_number(value, requirement, lambda x: x > 0)
 
 
-def refuse_functions(space: Space[Any], what: str, named: bool = False) -> None:
+def refuse_functions(space: AnySpace, what: str, named: bool = False) -> None:
     """Raise ValidationError if the space or a factor of it is a manifold made of functions.
 
     With `named`, the manifolds of the library, which have a name, are accepted.

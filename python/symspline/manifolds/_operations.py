@@ -1,4 +1,4 @@
-"""The functions of a manifold as the table of operations that every space has."""
+"""The functions of a manifold as the table of operations that every space has, their derivatives, and frames."""
 
 from __future__ import annotations
 
@@ -47,14 +47,14 @@ class Operations:
 
     def log(self, p: Array, q: Array) -> Array:
         """NaN where there is no logarithm."""
-        found = self._applied("log", partial(rows_or_nan, self._function("log")), (p, q))
+        logs = self._applied("log", partial(rows_or_nan, self._function("log")), (p, q))
         # Formulas that divide by the distance are undefined at equal points.
         same = (p == q).all(axis=self.space._point_axes(p))
         if same.any():
             # A copy: logarithms of other libraries may be read-only arrays.
-            found = found.copy()
-            found[same] = 0.0
-        return found
+            logs = logs.copy()
+            logs[same] = 0.0
+        return logs
 
     def project_tangent(self, p: Array, v: Array) -> Array:
         return self._call("project_tangent", p, v)
@@ -127,18 +127,18 @@ class Operations:
     ) -> Array:
         """Call a function, and check the shape and the type of its result."""
         with np.errstate(all="ignore"):
-            found = np.asarray(function(*rows))
+            values = np.asarray(function(*rows))
         wanted = (len(rows[0]), *shape)
-        if found.shape != wanted:
+        if values.shape != wanted:
             raise ValidationError(
-                f"the function {name} of {self.space!r} gave an array of shape {found.shape} for {wanted[0]} points; "
+                f"the function {name} of {self.space!r} gave an array of shape {values.shape} for {wanted[0]} points; "
                 f"{wanted} is needed"
             )
-        if found.dtype.kind not in ("iuf" if dtype == np.float64 else "iufc"):
+        if values.dtype.kind not in ("iuf" if dtype == np.float64 else "iufc"):
             raise ValidationError(
-                f"the function {name} of {self.space!r} gave numbers of type {found.dtype}; {dtype} is needed"
+                f"the function {name} of {self.space!r} gave numbers of type {values.dtype}; {dtype} is needed"
             )
-        return np.ascontiguousarray(found, dtype)
+        return np.ascontiguousarray(values, dtype)
 
     def _function(self, name: str) -> Callable[..., Any]:
         function: Callable[..., Any] | None = getattr(self.space.functions, name)
@@ -176,18 +176,18 @@ class Operations:
             "scatter": self.project,
             "random_tangent": self.project_tangent,
         }
-        found = work[operation](*points) if operation in work else self._call(operation, *points)
-        return np.asarray(found if found.ndim == 1 else self.space._as_doubles(found).reshape(len(found), -1))
+        values = work[operation](*points) if operation in work else self._call(operation, *points)
+        return np.asarray(values if values.ndim == 1 else self.space._as_doubles(values).reshape(len(values), -1))
 
     def _log(self, p: Array, q: Array) -> Array:
-        found = self.log(p, q)
-        bad = np.flatnonzero(~np.isfinite(found.reshape(len(found), -1)).all(axis=1))
+        logs = self.log(p, q)
+        bad = np.flatnonzero(~np.isfinite(logs.reshape(len(logs), -1)).all(axis=1))
         if bad.size:
             raise CutLocusError(
                 f"pair {bad[0]}: the points lie at or past each other's cut locus: the function log of "
                 f"{self.space!r} is not finite there"
             )
-        return found
+        return logs
 
     def check_points(self, points: Doubles, shape: Any, tol: float) -> None:
         """Raise unless every row is a point within ``tol``; ``shape`` is how the rows were laid out."""
@@ -230,13 +230,159 @@ def rows_or_nan(log: Function, p: Array, q: Array, errors: tuple[type[Exception]
     try:
         return np.asarray(log(p, q))
     except errors:
-        found = np.full(q.shape, np.nan, q.dtype)
+        logs = np.full(q.shape, np.nan, q.dtype)
     for i in range(len(q)):
         with suppress(*errors):
-            found[i] = log(p[i : i + 1], q[i : i + 1])[0]
-    return found
+            logs[i] = log(p[i : i + 1], q[i : i + 1])[0]
+    return logs
 
 
 def described(value: Any) -> str:
     """A function in the name of a manifold."""
     return str(getattr(value, "__qualname__", None) or short_repr(value))
+
+
+# ---- derivatives by differences: of the logarithm, and of curves ----
+
+# Steps along the geodesic at q, as parts of the injectivity radius, or of the distance of p and q and the length of
+# the direction: where errors of order four are as large as those of rounding.
+_OF_RADIUS = 5e-4
+_OF_HANDLES = 4e-3
+_PLACES = np.array([-2.0, -1.0, 1.0, 2.0])
+_WEIGHTS = np.array([1.0, -8.0, 8.0, -1.0]) / 12.0
+
+# Of order eight: weights of the values at 1, 2, 3, 4 steps; behind them they are minus and plus the same.
+_FIRST = np.array([4 / 5, -1 / 5, 4 / 105, -1 / 280])
+_SECOND = np.array([8 / 5, -1 / 5, 8 / 315, -1 / 560])
+_EIGHTH = np.array([-56.0, 28.0, -8.0, 1.0])
+STEPS = np.concatenate([np.arange(-4.0, 0.0), np.arange(1.0, 5.0)])
+
+
+def dlog_by_differences(operations: Operations, p: Array, v: Array, q: Array, w: Array, radius: float) -> Array:
+    """The derivative of log_p at q = exp_p(v) in the direction w, by differences of order four along its geodesic."""
+    size = operations.norm(q, w)
+    step = _OF_RADIUS * radius if math.isfinite(radius) else _OF_HANDLES * np.hypot(size, operations.norm(p, v))
+    # Times along the geodesic with velocity w.
+    s = np.divide(step, size, out=np.zeros_like(size), where=size > 0)
+    ahead = np.multiply.outer(_PLACES, s).reshape(len(_PLACES), -1, *[1] * (w.ndim - 1))
+    shape = (len(_PLACES), *p.shape)
+    x = operations.exp(np.broadcast_to(q, shape), ahead * w)
+    logs = operations.log(np.broadcast_to(p, shape), x)
+    inverse = np.divide(1.0, s, out=np.zeros_like(s), where=s > 0).reshape(-1, *[1] * (w.ndim - 1))
+    # Differences of logarithms, not of the products, so that what they share cancels at once.
+    return np.asarray(np.tensordot(_WEIGHTS, logs, 1) * inverse)
+
+
+def first_derivative(values: Array, step: Array) -> Array:
+    """The derivative of a function by its values at `STEPS`, which come first."""
+    odd = values[4:] - values[3::-1]
+    return np.asarray(np.tensordot(_FIRST, odd, 1) / step)
+
+
+def second_derivative(values: Array, step: Array) -> Array:
+    """The second derivative of a function that is zero in the middle."""
+    even = values[4:] + values[3::-1]
+    return np.asarray(np.tensordot(_SECOND, even, 1) / step / step)
+
+
+def eighth_difference(values: Array) -> Array:
+    """What polynomials of degree seven have none of: large where a function is not smooth on the scale of the steps."""
+    return np.asarray(np.tensordot(_EIGHTH, values[4:] + values[3::-1], 1))
+
+
+# ---- orthonormal frames along the points, in which all neighbours are related by the identity ----
+
+# Vectors at different points can then be added as if space were flat, which is what makes the tridiagonal matrix of the
+# flat spline a good approximation of the derivative of the C² condition. Nothing but the speed of the solver depends on
+# the frames.
+
+# Squared lengths, relative to the longest, below which vectors are not independent.
+_RANK = 1e-8
+# Numbers that are worked on at a time.
+_AT_ONCE = 1 << 22
+
+
+def basis_at(operations: Operations, p: Array) -> Array:
+    """Orthonormal tangent vectors at points: shape (..., dim, numbers of a point).
+
+    They are made of the projections of all arrays with a single 1 (and i).
+
+    Raises:
+        ValidationError: projections and products are not those of tangent spaces of one dimension.
+    """
+    space = operations.space
+    shape = space.point_shape
+    rows = p.reshape(-1, *shape)
+    units = np.eye(rows[0].size).reshape(-1, *shape) if len(rows) else np.empty((0, *shape))
+    if space._complex:
+        units = np.concatenate([units, 1j * units])
+    pairs = len(rows), len(units), *shape
+    points = np.broadcast_to(rows[:, None], pairs)
+    vectors = operations.project_tangent(points, np.broadcast_to(units.astype(space.dtype), pairs))
+    gram = products(operations, points[:, 0], vectors, vectors)
+    if not np.isfinite(gram).all():
+        index = int(np.argwhere(~np.isfinite(gram))[0, 0])
+        raise ValidationError(f"inner or project_tangent of {space!r} is not finite at points[{index}]")
+    values, turned = np.linalg.eigh((gram + np.swapaxes(gram, -1, -2)) / 2)
+    large = values > _RANK * np.abs(values).max(axis=1, keepdims=True)
+    dims = np.count_nonzero(large, axis=1)
+    if len(dims) and (dims.min() == 0 or (dims != dims[0]).any()):
+        raise ValidationError(
+            f"project_tangent and inner of {space!r} give tangent spaces of {sorted(set(dims.tolist()))} dimensions; "
+            "inner must be positive, and all tangent spaces have one dimension"
+        )
+    dim = int(dims[0]) if len(dims) else 0
+    values, turned = values[:, -dim:], turned[:, :, -dim:]
+    flat = vectors.reshape(*vectors.shape[:2], -1)
+    frames = np.swapaxes(turned / np.sqrt(values)[:, None, :], -1, -2) @ flat
+    return np.asarray(frames).reshape(*p.shape[: p.ndim - len(shape)], dim, -1)
+
+
+def products(operations: Operations, p: Array, a: Array, b: Array) -> Array:
+    """All inner products of two rows of tangent vectors: p of shape (m, ...), a and b (m, rows, ...)."""
+    m, shape = len(p), operations.space.point_shape
+    result = np.empty((m, a.shape[1], b.shape[1]))
+    pairs = a.shape[1] * b.shape[1] * math.prod(shape)
+    for some in np.array_split(np.arange(m), max(1, min(m, math.ceil(m * pairs / _AT_ONCE)))):
+        full = len(some), a.shape[1], b.shape[1], *shape
+        expanded = [
+            p[some].reshape(-1, 1, 1, *shape),
+            a[some].reshape(-1, a.shape[1], 1, *shape),
+            b[some].reshape(-1, 1, b.shape[1], *shape),
+        ]
+        result[some] = operations.inner(*(np.broadcast_to(x, full) for x in expanded))
+    return result
+
+
+def frames_along(operations: Operations, p: Array) -> Array:
+    """Frames at the points of curves, p of shape (curves, nodes, ...), each transported from the one before.
+
+    Returns:
+        Shape (curves, nodes, dim, numbers of a point).
+    """
+    space = operations.space
+    curves, nodes = p.shape[:2]
+    basis = basis_at(operations, p)
+    dim = basis.shape[2]
+    tangents = basis.reshape(curves, nodes, dim, *space.point_shape)
+    shape = (curves, nodes - 1, dim, *space.point_shape)
+    here, there = (np.broadcast_to(x[:, :, None], shape) for x in (p[:, :-1], p[:, 1:]))
+    if space.functions.transport is None:
+        transported = operations.project_tangent(there, tangents[:, :-1])
+    else:
+        transported = operations.transport(here, there, tangents[:, :-1])
+    at = p[:, 1:].reshape(-1, *space.point_shape)
+    maps = products(
+        operations,
+        at,
+        transported.reshape(-1, dim, *space.point_shape),
+        tangents[:, 1:].reshape(-1, dim, *space.point_shape),
+    ).reshape(curves, nodes - 1, dim, dim)
+    # The rotation nearest to the map between tangent spaces: transport is one, projection nearly.
+    u, _, v = np.linalg.svd(np.where(np.isfinite(maps), maps, np.eye(dim)))
+    turns = u @ v
+    total = np.empty((curves, nodes, dim, dim))
+    total[:, 0] = np.eye(dim)
+    for i in range(nodes - 1):
+        np.matmul(total[:, i], turns[:, i], out=total[:, i + 1])
+    return np.asarray(total @ basis)

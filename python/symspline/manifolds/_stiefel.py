@@ -135,8 +135,8 @@ class _Compiled(Operations):
         return super()._applied(name, function, inputs) if name == "project" else np.asarray(function(*inputs))
 
     def bends(self, p: Array, v: Array) -> Array:
-        found = _run(self.space, "bends", p[0], v[0], p[1], v[1])
-        return found.reshape(*p.shape[1:3], 2, *p.shape[3:]).transpose(2, 0, 1, 3, 4)
+        values = _run(self.space, "bends", p[0], v[0], p[1], v[1])
+        return values.reshape(*p.shape[1:3], 2, *p.shape[3:]).transpose(2, 0, 1, 3, 4)
 
     def forms(self, p: Array, frames: Array) -> Array:
         half = frames.reshape(*frames.shape[:-1], *p.shape[-2:]) / 2
@@ -145,8 +145,8 @@ class _Compiled(Operations):
 
     def curve(self, order: int, tau: Doubles, p: Array, v: Array, q: Array, w: Array) -> tuple[Array, ...]:
         operation = ("point", "velocity", "acceleration")[order]
-        found = _run(self.space, operation, p[0], v[0], q[0], w[0], p[1], v[1], tau)
-        parts = found.reshape(len(tau), 1 if order == 0 else 2, *p.shape[-2:])
+        values = _run(self.space, operation, p[0], v[0], q[0], w[0], p[1], v[1], tau)
+        parts = values.reshape(len(tau), 1 if order == 0 else 2, *p.shape[-2:])
         return tuple(np.ascontiguousarray(parts[:, i]) for i in range(parts.shape[1]))
 
 
@@ -169,9 +169,9 @@ def _project(x: Array) -> Array:
     gram = _transposed(x) @ x
     off = np.abs(gram - np.eye(x.shape[-1])).max(axis=(-2, -1))
     # One step of Newton and Schulz (Higham, Functions of Matrices, 2008, section 8.3) squares the distance.
-    found = 1.5 * x - 0.5 * (x @ gram)
+    nearest = 1.5 * x - 0.5 * (x @ gram)
     far = ~(off <= 1e-8)
     if far.any():
         u, _, v = np.linalg.svd(x[far], full_matrices=False)
-        found[far] = u @ v
-    return np.asarray(found)
+        nearest[far] = u @ v
+    return np.asarray(nearest)

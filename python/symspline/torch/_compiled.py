@@ -10,7 +10,7 @@ import torch
 from .._autodiff.compiled import fitted, movable, split
 from .._base.typing import CurveOptions
 from .._curves.ends import ends_in_factors
-from .._spaces import Product, Space, parts_of, space_named
+from .._spaces import AnySpace, Product, Space, parts_of, space_named
 from ..manifolds._manifold import refuse_functions
 
 
@@ -22,7 +22,7 @@ def curve(x: Any, t: Any, points: Any, space: Space | str, **options: Unpack[Cur
 def curve(x: Any, t: Any, points: Any, space: Product, **options: Unpack[CurveOptions]) -> tuple[torch.Tensor, ...]: ...
 
 
-def curve(x: Any, t: Any, points: Any, space: Space[Any] | str, *, bc_type: Any = "natural", **options: Any) -> Any:
+def curve(x: Any, t: Any, points: Any, space: AnySpace | str, *, bc_type: Any = "natural", **options: Any) -> Any:
     """Evaluate a spline through points, with derivatives in PyTorch.
 
     The result equals ``CubicSpline(t, points, space, ...)(x)``. First derivatives with respect to x, t, points and the
@@ -61,8 +61,8 @@ def curve(x: Any, t: Any, points: Any, space: Space[Any] | str, *, bc_type: Any 
     space = space_named(space)
     refuse_functions(space, "derivatives with respect to the data are not available")
     if isinstance(space, Product):
-        each = zip(parts_of(points, space, "points"), space.factors, ends_in_factors(bc_type, space), strict=True)
-        return tuple(curve(x, t, p, factor, bc_type=bc, **options) for p, factor, bc in each)
+        factors = zip(parts_of(points, space, "points"), space.factors, ends_in_factors(bc_type, space), strict=True)
+        return tuple(curve(x, t, p, factor, bc_type=bc, **options) for p, factor, bc in factors)
     kinds, vectors = split(bc_type)
     points = torch.as_tensor(points)
     x, t = torch.as_tensor(x), torch.as_tensor(t)
@@ -74,7 +74,7 @@ class _Curve(torch.autograd.Function):
     @staticmethod
     def forward(ctx: Any, x: Any, t: Any, points: Any, start: Any, end: Any, fixed: Any) -> Any:
         space, kinds, options = fixed
-        arrays = [None if a is None else _numpy(a) for a in (t, points, start, end)]
+        arrays: list[Any] = [None if a is None else _numpy(a) for a in (t, points, start, end)]
         # What is rounding beyond the last knot depends on the precision of the times.
         at = _numpy(x)
         ctx.x = at if at.dtype.kind == "f" else at.astype(float)

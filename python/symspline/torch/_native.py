@@ -1,17 +1,159 @@
-"""Fits and curves written in PyTorch: Newton's method, and derivatives by further steps from the solution."""
+"""Fits and curves written in PyTorch: Newton's method, and derivatives by further steps from the solution.
+
+`LIBRARY` has what the formulas of `symspline._autodiff` need of PyTorch.
+"""
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any, overload
 
+import numpy as np
 import torch
 
 from .._autodiff import curves
 from .._autodiff.condition import Problem, cyclic_reduction
-from .._core import ConvergenceError
+from .._autodiff.library import Library, Tensor, divided_logarithm, hermitian, matrix_derivative
+from .._base.arrays import short_repr
+from .._core import ConvergenceError, ValidationError
 from .._curves.ends import ends_in_factors
-from .._spaces import Product, Space, parts_of
-from ._library import LIBRARY
+from .._spaces import AnySpace, Product, Space, parts_of
+
+
+def tensor(value: Any, name: str, like: torch.Tensor | None = None) -> torch.Tensor:
+    """Convert an argument to a tensor of real floating-point numbers.
+
+    Parameters
+    ----------
+    like : tensor, optional
+        Tensor whose precision and device the result has. By default, those of `value`; integers have the default
+        precision of PyTorch.
+
+    Raises
+    ------
+    ValidationError
+        If `value` does not consist of real numbers.
+    """
+    if isinstance(value, np.ndarray):
+        # PyTorch warns of arrays that are read-only, such as those of a spline, and refuses other byte orders.
+        value = np.array(value, value.dtype.newbyteorder("="))
+    try:
+        converted = torch.as_tensor(value)
+    except (TypeError, ValueError, RuntimeError, OverflowError):
+        raise ValidationError(f"{name} must be a tensor of real numbers, not {short_repr(value)}") from None
+    if converted.is_complex() or converted.dtype == torch.bool:
+        raise ValidationError(f"{name} must be a tensor of real numbers, not of {converted.dtype}")
+    if like is not None:
+        return converted.to(like)
+    return converted if converted.is_floating_point() else converted.to(torch.get_default_dtype())
+
+
+def promoted(space: AnySpace, points: Tensor, *others: Tensor) -> tuple[torch.Tensor, ...]:
+    """Convert points, and arrays of their shape, to tensors in the precision of the points."""
+    first = tensor(points, "points")
+    return first, *(tensor(other, "velocities", first) for other in others)
+
+
+def constant(array: Tensor, like: Any) -> Tensor:
+    """Return an array of NumPy as a tensor, in the precision and on the device of another one."""
+    return torch.as_tensor(array, dtype=like.dtype, device=like.device)
+
+
+_divided_logarithm = partial(divided_logarithm, torch, constant)
+
+
+class _Logarithm(torch.autograd.Function):
+    """The derivative of order k of log A, a symmetric matrix, in k symmetric directions.
+
+    It is symmetric in all directions, and in the direction that a cotangent adds, because log is the gradient of
+    tr(A log A − A). So its derivatives in reverse and in forward mode are derivatives of order k + 1.
+    """
+
+    generate_vmap_rule = True
+
+    @staticmethod
+    def forward(a: Tensor, *directions: Tensor) -> Tensor:
+        values, vectors = torch.linalg.eigh(a)
+        return matrix_derivative(torch, _divided_logarithm, values, vectors, directions)
+
+    @staticmethod
+    def setup_context(ctx: Any, inputs: Tensor, output: Tensor) -> None:
+        ctx.save_for_backward(*inputs)
+        ctx.save_for_forward(*inputs)
+
+    @staticmethod
+    def backward(ctx: Any, *cotangents: Tensor) -> Tensor:
+        a, *directions = ctx.saved_tensors
+        along = hermitian(cotangents[0])
+        gradients: list[Any] = [_Logarithm.apply(a, *directions, along) if ctx.needs_input_grad[0] else None]
+        for i in range(len(directions)):
+            others = (*directions[:i], along, *directions[i + 1 :])
+            gradients.append(_Logarithm.apply(a, *others) if ctx.needs_input_grad[i + 1] else None)
+        return tuple(gradients)
+
+    @staticmethod
+    def jvp(ctx: Any, *changes: Tensor) -> Tensor:
+        a, *directions = ctx.saved_tensors
+        moved = None
+        for i, change in enumerate(changes):
+            if change is not None:
+                changed = (*directions, change) if i == 0 else (*directions[: i - 1], change, *directions[i:])
+                part = _Logarithm.apply(a, *changed)
+                moved = part if moved is None else moved + part
+        return moved
+
+
+def logarithm(a: Tensor) -> Tensor:
+    """Return log of positive definite matrices, shape (..., n, n)."""
+    return _Logarithm.apply(hermitian(a))
+
+
+def _solve_lower(root: Tensor, x: Tensor) -> Tensor:
+    return torch.linalg.solve_triangular(root, x, upper=False)
+
+
+def _fold(step: Any, value: Any, numbers: Tensor) -> Tensor:
+    for number in numbers:
+        value = step(value, number)
+    return value
+
+
+def along(function: Any, x: Tensor) -> tuple[Tensor, Tensor]:
+    """Return values of a function of times, and their derivatives with respect to these.
+
+    The derivative in forward mode is that of the derivative in reverse mode with respect to the cotangent, which
+    PyTorch computes faster than by dual numbers.
+    """
+    values, backward = torch.func.vjp(function, x)
+    zero = torch.zeros_like(values) if isinstance(values, torch.Tensor) else tuple(map(torch.zeros_like, values))
+    return values, torch.func.vjp(lambda cotangent: backward(cotangent)[0], zero)[1](torch.ones_like(x))[0]
+
+
+def search(t: Tensor, x: Tensor) -> Tensor:
+    """Return the number of knots up to times, both along the last axis."""
+    return torch.searchsorted(t.detach().contiguous(), x.detach().contiguous(), right=True)
+
+
+LIBRARY = Library(
+    name="PyTorch",
+    module="torch",
+    general=False,
+    xp=torch,
+    array=tensor,
+    promote=promoted,
+    constant=constant,
+    logarithm=logarithm,
+    exponential=torch.linalg.matrix_exp,
+    arcs=None,
+    solve_lower=_solve_lower,
+    fold=_fold,
+    along=along,
+    search=search,
+    take_along=torch.take_along_dim,
+)
+
+
+# ---- fits and curves ----
 
 # Newton's method needs four to six steps where it converges.
 _MOST_STEPS = 30
@@ -29,7 +171,7 @@ def evaluate(
 ) -> tuple[torch.Tensor, ...]: ...
 
 
-def evaluate(t: Any, points: Any, velocities: Any, space: Space[Any] | str, x: Any, *, nu: int = 0) -> Any:
+def evaluate(t: Any, points: Any, velocities: Any, space: AnySpace | str, x: Any, *, nu: int = 0) -> Tensor:
     """Evaluate curves with given knots, points and velocities, in PyTorch alone.
 
     This is `symspline.evaluate` written in PyTorch. It runs on the device and in the precision of the points, and is
@@ -96,7 +238,7 @@ def fit(t: Any, points: Any, space: Space | str, *, bc_type: Any = "natural") ->
 def fit(t: Any, points: Any, space: Product, *, bc_type: Any = "natural") -> tuple[torch.Tensor, ...]: ...
 
 
-def fit(t: Any, points: Any, space: Space[Any] | str, *, bc_type: Any = "natural") -> Any:
+def fit(t: Any, points: Any, space: AnySpace | str, *, bc_type: Any = "natural") -> Tensor:
     """Compute the velocities of C² splines through points, in PyTorch alone.
 
     This is `symspline.fit` written in PyTorch. It runs on the device and in the precision of the points. First and
@@ -156,21 +298,21 @@ def fit(t: Any, points: Any, space: Space[Any] | str, *, bc_type: Any = "natural
     """
     space = curves.named(LIBRARY, space)
     if isinstance(space, Product):
-        each = zip(parts_of(points, space, "points"), space.factors, ends_in_factors(bc_type, space), strict=True)
-        return tuple(fit(t, p, factor, bc_type=bc) for p, factor, bc in each)
+        factors = zip(parts_of(points, space, "points"), space.factors, ends_in_factors(bc_type, space), strict=True)
+        return tuple(fit(t, p, factor, bc_type=bc) for p, factor, bc in factors)
     problem, leave = curves.problem_of(LIBRARY, t, points, space, bc_type)
     return leave(_velocities(problem))
 
 
-def _residual(problem: Problem, u: Any) -> Any:
+def _residual(problem: Problem, u: Tensor) -> Tensor:
     """Return the residual, in which the normal part of u counts as such, so that the solution is tangent."""
     tangent = problem.chain.tangent(problem.p, u)
     middle = problem.weights()[1]
-    found = problem.residual(tangent)
-    return found + problem.chain.model.times(middle, u - tangent)
+    normal = problem.residual(tangent)
+    return normal + problem.chain.model.times(middle, u - tangent)
 
 
-def _velocities(problem: Problem) -> Any:
+def _velocities(problem: Problem) -> Tensor:
     """Return velocities that are differentiable functions of the data."""
     arrays = ("h", "p", "first", "last")
     u, jacobian = _solution(problem._replace(**{name: getattr(problem, name).detach() for name in arrays}))
@@ -179,7 +321,7 @@ def _velocities(problem: Problem) -> Any:
     return u
 
 
-def _solution(problem: Problem) -> tuple[Any, Any]:
+def _solution(problem: Problem) -> tuple[Tensor, Tensor]:
     """Return the velocities that solve a problem without derivatives, and the Jacobian there."""
     u, middle = _start(problem), problem.weights()[1]
     # In double precision 4e-11, from where a further step reaches rounding. Points that are equal up to rounding have
@@ -187,12 +329,12 @@ def _solution(problem: Problem) -> tuple[Any, Any]:
     eps = torch.finfo(u.dtype).eps
     tol, floor = eps ** (2 / 3), 8 * eps * problem.chain.scale(problem.p) / torch.amin(problem.h, 0)
     for _ in range(_MOST_STEPS):
-        found = _residual(problem, u)
-        good = torch.amax(problem.sizes(found) / middle, 0) <= tol * torch.amax(problem.sizes(u), 0) + floor
+        residual = _residual(problem, u)
+        good = torch.amax(problem.sizes(residual) / middle, 0) <= tol * torch.amax(problem.sizes(u), 0) + floor
         jacobian = _jacobian(problem, u)
         if good.all():
             return u, jacobian
-        u = u - _solved(jacobian, found)
+        u = u - _solved(jacobian, residual)
     index = tuple(int(i) for i in (~good).nonzero()[0])
     where = f" of curve {index}" if index else ""
     error = ConvergenceError(
@@ -203,7 +345,7 @@ def _solution(problem: Problem) -> tuple[Any, Any]:
     raise error
 
 
-def _start(problem: Problem) -> Any:
+def _start(problem: Problem) -> Tensor:
     """Return the velocities of parabolas through three points in flat space, or given ones (Bessel's method).
 
     From zero velocities, whose handles are at the points, the Jacobian is almost singular for points π/2 apart.
@@ -219,7 +361,7 @@ def _start(problem: Problem) -> Any:
     return torch.cat([first[None], inner, last[None]])
 
 
-def _jacobian(problem: Problem, u: Any) -> Any:
+def _jacobian(problem: Problem, u: Tensor) -> Tensor:
     """Return the blocks below, on and above the diagonal, shape (n, 3, *batch, k, k).
 
     A residual depends on the velocities of its own node and of the next ones on either side. So the residuals of every
@@ -235,20 +377,20 @@ def _jacobian(problem: Problem, u: Any) -> Any:
     expanded = problem._replace(h=problem.h[:, None], p=problem.p[:, None])
     expanded = expanded._replace(first=problem.first[None], last=problem.last[None])
     _, gradient = torch.func.vjp(lambda u: _residual(expanded, u), wide)
-    (found,) = gradient((rows * components).flatten(1, 2).expand_as(wide))
+    (blocks,) = gradient((rows * components).flatten(1, 2).expand_as(wide))
     # By the node whose velocity moves, with a row of zeros before the first and after the last.
-    found = found.reshape(n, 3, size, *batch, size).movedim(2, -2)
-    zero = torch.zeros_like(found[:1])
+    blocks = blocks.reshape(n, 3, size, *batch, size).movedim(2, -2)
+    zero = torch.zeros_like(blocks[:1])
     moving = node[:, None] + torch.arange(3, device=u.device)
-    return torch.cat([zero, found, zero])[moving, (node % 3)[:, None]]
+    return torch.cat([zero, blocks, zero])[moving, (node % 3)[:, None]]
 
 
-def _solved(jacobian: Any, rows: Any) -> Any:
+def _solved(jacobian: Tensor, rows: Tensor) -> Tensor:
     """Solve the block tridiagonal systems for the residuals of all nodes."""
     flat = rows.reshape(*jacobian.shape[:1], *jacobian.shape[2:-1], 1)
     below, diagonal, above = jacobian.unbind(1)
     return cyclic_reduction(torch, _solve_blocks, below, diagonal, above, flat).reshape(rows.shape)
 
 
-def _solve_blocks(diagonal: Any, *columns: Any) -> Any:
+def _solve_blocks(diagonal: Tensor, *columns: Tensor) -> Tensor:
     return torch.linalg.solve(diagonal, torch.cat(columns, dim=-1)).split([a.shape[-1] for a in columns], dim=-1)

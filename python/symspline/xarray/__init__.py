@@ -14,17 +14,31 @@ from typing import Any, Unpack
 import numpy as np
 import xarray as xr
 
+from .._base import VERSION
 from .._base.arrays import checked_flag, short_repr
 from .._base.typing import BCType, Extrapolate, Method, OnFailure, SolverOptions
-from .._base.version import VERSION
 from .._core import ValidationError
 from .._curves.options import checked_extrapolate, extrapolation_mode, quantity_of
 from .._spaces import Space, space_named
-from ._blocks import COLUMNS, Inputs, apply, fitted, resampled, values_at
 from ._grids import resample_grid
-from ._labels import in_radians, in_units_of
 from ._smoothing import smooth
-from ._spec import KNOTS, bare, check_dims, rehearse, spec_of, timed_by, times_with_names
+from ._spec import (
+    COLUMNS,
+    KNOTS,
+    Inputs,
+    apply,
+    bare,
+    check_dims,
+    fitted,
+    in_radians,
+    in_units_of,
+    rehearse,
+    resampled,
+    spec_of,
+    timed_by,
+    times_with_names,
+    values_at,
+)
 
 __all__ = ["evaluate", "fit", "lift", "resample", "smooth", "speed"]
 
@@ -387,9 +401,9 @@ def _along(ds: xr.Dataset, x: Any, quantity: str, extrapolate: Any, lifted: bool
     knots = _knots(ds, dim)
     label, skipna = (dim if knots is None else knots.name), bool(ds.attrs.get("skipna", 0))
     times, axes = times_with_names(x, label, point_dims, [d for d in points.dims if d not in (dim, *point_dims)])
-    own: list[Hashable] = [KNOTS, *point_dims]
+    core: list[Hashable] = [KNOTS, *point_dims]
     shape = [] if quantity == "speed" else point_dims
-    inputs: Inputs = [(bare(points, dim), own), (bare(velocities, dim), own), (times, axes)]
+    inputs: Inputs = [(bare(points, dim), core), (bare(velocities, dim), core), (times, axes)]
     fixed: dict[str, Any] = {"space": space, "t": None, "quantity": quantity, "policy": policy, "skipna": skipna}
     if knots is not None and knots.ndim > 1:
         inputs.append((bare(knots, dim), [KNOTS]))

@@ -11,10 +11,20 @@ import xarray as xr
 from .._core import ValidationError
 from .._curves.options import checked_extrapolate, extrapolation_mode
 from .._grid import GridSpline
-from .._spaces import Array, Space, space_named
-from ._blocks import Inputs, apply
-from ._labels import in_radians, in_units_of, times_along
-from ._spec import KNOTS, LINE, check_names, check_whole, rehearse, times_with_names
+from .._spaces import AnySpace, Array, space_named
+from ._spec import (
+    KNOTS,
+    LINE,
+    Inputs,
+    apply,
+    check_names,
+    check_whole,
+    in_radians,
+    in_units_of,
+    rehearse,
+    times_along,
+    times_with_names,
+)
 
 # The influence of a node on a spline decays by 0.27 per node, to 2e-15 of its size.
 _HALO = 26
@@ -35,7 +45,7 @@ class _Axis(NamedTuple):
 
 def resample_grid(
     da: xr.DataArray,
-    space: Space[Any] | str,
+    space: AnySpace | str,
     to: Mapping[str, Any],
     *,
     point_dims: Sequence[str],
@@ -93,12 +103,12 @@ def _mask(where: Any, da: xr.DataArray, point_dims: Sequence[str]) -> xr.DataArr
 
 def _axis(da: xr.DataArray, dim: str, x: Any, point_dims: Sequence[str], policy: str, ends: Any) -> _Axis:
     """Check the positions along one dimension, and divide them into blocks."""
-    own = None if dim in da.coords else times_along(da, dim, None, point_dims, f"Make one the coordinate of {dim!r}")
-    if own is not None:
+    times = None if dim in da.coords else times_along(da, dim, None, point_dims, f"Make one the coordinate of {dim!r}")
+    if times is not None:
         raise ValidationError(
-            f"{dim!r} has no own coordinate, but {own.name!r} with dimensions {own.dims} looks like times. Pass "
-            f"da.swap_dims({{{dim!r}: {own.name!r}}}) with to={{{own.name!r}: ...}}, or da.drop_vars({own.name!r}) "
-            "for the nodes 0, 1, 2, ..."
+            f"{dim!r} has no own coordinate, but {times.name!r} with dimensions {times.dims} looks like times. Pass "
+            f"da.swap_dims({{{dim!r}: {times.name!r}}}) with to={{{times.name!r}: ...}}, or "
+            f"da.drop_vars({times.name!r}) for the nodes 0, 1, 2, ..."
         )
     nodes, count = (da[dim].values if dim in da.coords else None), da.sizes[dim]
     given, _ = times_with_names(x, dim, point_dims, [])
@@ -120,7 +130,7 @@ def _axis(da: xr.DataArray, dim: str, x: Any, point_dims: Sequence[str], policy:
     outputs = [slice(start, min(start + step, at.size)) for start in range(0, at.size, step)] or [slice(0, 0)]
     whole = ends == "periodic" or policy == "periodic"
     positions = np.arange(count) if nodes is None else nodes
-    windows = [slice(None) if whole or len(cuts) == 1 else _window(positions, at.values[own]) for own in outputs]
+    windows = [slice(None) if whole or len(cuts) == 1 else _window(positions, at.values[span]) for span in outputs]
     return _Axis(dim, nodes, at, list(zip(outputs, windows, strict=True)))
 
 
@@ -128,7 +138,7 @@ def _window(nodes: Array, x: Array) -> slice:
     """Return the nodes around positions, with a halo on either side."""
     first = int(np.searchsorted(nodes, x.min(), "right")) - 1
     last = int(np.searchsorted(nodes, x.max(), "left"))
-    first, last = (min(max(own, 0), len(nodes) - 2) for own in (first, last))
+    first, last = (min(max(index, 0), len(nodes) - 2) for index in (first, last))
     return slice(max(first - _HALO, 0), last + _HALO + 1)
 
 
@@ -146,7 +156,7 @@ def _joined(
         part = part.chunk(dict.fromkeys(windows, -1))
     names = {axis.dim: f"{KNOTS}_{axis.dim}" for axis in axes}
     inputs: Inputs = [(part.rename(names), [*names.values(), *point_dims])]
-    inputs += [(axis.x[own], [axis.dim]) for axis, (own, _) in zip(axes, chosen, strict=True)]
+    inputs += [(axis.x[span], [axis.dim]) for axis, (span, _) in zip(axes, chosen, strict=True)]
     nodes = [None if axis.nodes is None else axis.nodes[windows[axis.dim]] for axis in axes]
     offsets = [windows[axis.dim].start or 0 for axis in axes]
     core: list[Hashable] = [*names, *point_dims]
@@ -155,15 +165,15 @@ def _joined(
 
 
 def _gridded(
-    points: Array, *x: Array, space: Space[Any], how: dict[str, Any], nodes: list[Array | None], offsets: list[int]
+    points: Array, *x: Array, space: AnySpace, how: dict[str, Any], nodes: list[Array | None], offsets: list[int]
 ) -> Array:
     """Values of the splines of a block, one per batch index."""
     first = points.ndim - len(space.point_shape) - len(nodes)
     sizes = points.shape[first : first + len(nodes)]
     # Nodes without a coordinate are counted from the start of the array.
     axes = [
-        offset + np.arange(n, dtype=np.float64) if own is None else own
-        for own, offset, n in zip(nodes, offsets, sizes, strict=True)
+        offset + np.arange(n, dtype=np.float64) if positions is None else positions
+        for positions, offset, n in zip(nodes, offsets, sizes, strict=True)
     ]
     values = np.full((*points.shape[:first], *map(len, x), *space.point_shape), np.nan, space.dtype)
     for index in np.ndindex(points.shape[:first]):

@@ -19,10 +19,24 @@ from .._curves.missing import missing_points, missing_times
 from .._curves.options import checked_extrapolate, extrapolation_mode
 from .._smoothing import SmoothingWarning, make_smoothing_spline
 from .._smoothing.noise import is_several
-from .._spaces import Array, Space, SpecialOrthogonal, space_named
-from ._blocks import Inputs, apply, knots_of_block, per_curve_times
-from ._labels import in_radians, named_curve, of_equal_length, times_of_rows
-from ._spec import KNOTS, LINE, bare, rehearse, spec_of, timed_by, times_with_names
+from .._spaces import AnySpace, Array, SpecialOrthogonal, space_named
+from ._spec import (
+    KNOTS,
+    LINE,
+    Inputs,
+    apply,
+    bare,
+    in_radians,
+    knots_of_block,
+    named_curve,
+    of_equal_length,
+    per_curve_times,
+    rehearse,
+    spec_of,
+    timed_by,
+    times_of_rows,
+    times_with_names,
+)
 
 # Columns of the report of a smoothing fit, per part of the space.
 _COLUMNS: dict[str, type] = {"lam": np.float64, "df": np.float64, "sigma": np.float64, "at_bound": np.bool_}
@@ -30,7 +44,7 @@ _COLUMNS: dict[str, type] = {"lam": np.float64, "df": np.float64, "sigma": np.fl
 
 def smooth(
     da: xr.DataArray,
-    space: Space[Any] | str,
+    space: AnySpace | str,
     to: Any = None,
     *,
     dim: str = "time",
@@ -133,8 +147,8 @@ def smooth(
     dtypes: list[Any] = [space.dtype, *(np.float64 for _ in spreads)]
     dtypes += [dtype for dtype in _COLUMNS.values() for _ in endings] + [np.bool_]
     fixed = {"space": space, "t": spec["t"], "names": spec["names"], "how": given, "std": std, "level": level}
-    found = apply(_smoothed, inputs, dims, dtypes, x_axes=len(axes), **fixed)
-    ds = xr.Dataset(dict(zip(["points", *spreads, *columns, "converged"], found, strict=True)))
+    variables = apply(_smoothed, inputs, dims, dtypes, x_axes=len(axes), **fixed)
+    ds = xr.Dataset(dict(zip(["points", *spreads, *columns, "converged"], variables, strict=True)))
     ds["points"].attrs = dict(da.attrs)
     for name in spreads:
         ds[name].attrs = unit_of(space, da, name)
@@ -142,7 +156,7 @@ def smooth(
     return timed
 
 
-def unit_of(space: Space[Any], da: xr.DataArray, name: str) -> dict[str, Any]:
+def unit_of(space: AnySpace, da: xr.DataArray, name: str) -> dict[str, Any]:
     """Return the attributes of a standard deviation or radius: its units, if they are known."""
     if (
         name.endswith("_rotation")
@@ -170,7 +184,7 @@ def _rehearse_options(t: Any, count: int, given: dict[str, Any]) -> None:
 class _Wanted(NamedTuple):
     """What is fitted and evaluated in every block."""
 
-    space: Space[Any]
+    space: AnySpace
     how: dict[str, Any]
     spreads: list[tuple[str, tuple[float, ...]]]
     """Methods of the curve and their arguments."""
@@ -180,7 +194,7 @@ def _smoothed(
     points: Array,
     x: Array,
     *rest: Array,
-    space: Space[Any],
+    space: AnySpace,
     t: Any,
     names: list[str],
     how: dict[str, Any],
@@ -203,7 +217,7 @@ def _smoothed(
         outputs = _smooth_rows(rows, t, at, per_curve, mask, wanted)
     else:
         outputs = _smooth_timed(rows, t, at, per_curve, mask, wanted)
-    return tuple(np.asarray(own if batch else own[0]) for own in outputs)
+    return tuple(np.asarray(output if batch else output[0]) for output in outputs)
 
 
 def _smooth_timed(
@@ -220,22 +234,18 @@ def _smooth_timed(
     parts = 2 if is_several(space) else 1
     shapes = [(*own_shape, *space.point_shape), *[own_shape] * (len(wanted.spreads) * parts)]
     outputs = [np.full((len(rows), *shape), np.nan, space.dtype if i == 0 else float) for i, shape in enumerate(shapes)]
-    for dtype in (*(own for own in _COLUMNS.values() for _ in range(parts)), np.bool_):
+    for dtype in (*(part for part in _COLUMNS.values() for _ in range(parts)), np.bool_):
         outputs.append(np.full(len(rows), np.nan if dtype is np.float64 else False, dtype))
-    for curves, kept in of_equal_length(~missing_times(times)):
-        knots, here, gone = times[curves[:, None], kept], at, None
-        if per_curve:
-            gone = missing_times(at[curves])
-            here = np.where(gone, knots[:, 0].reshape(-1, *[1] * len(own_shape)), at[curves])
+    for curves, kept, knots, here, gone in of_equal_length(~missing_times(times), times, at, per_curve):
         try:
-            found = _smooth_rows(rows[curves[:, None], kept], knots, here, per_curve, chosen[curves], wanted)
+            parts_of_curves = _smooth_rows(rows[curves[:, None], kept], knots, here, per_curve, chosen[curves], wanted)
         except SymsplineError as error:
             raise named_curve(error, whole, curves) from None
-        for i, (output, own) in enumerate(zip(outputs, found, strict=True)):
+        for i, (output, part) in enumerate(zip(outputs, parts_of_curves, strict=True)):
             if gone is not None and i < len(shapes):
-                own[gone] = np.nan
-            output[curves] = own
-    return [own.reshape(*whole, *own.shape[1:]) for own in outputs]
+                part[gone] = np.nan
+            output[curves] = part
+    return [part.reshape(*whole, *part.shape[1:]) for part in outputs]
 
 
 def _smooth_rows(rows: Array, t: Any, at: Array, per_curve: bool, mask: Array | None, wanted: _Wanted) -> list[Array]:
@@ -249,22 +259,22 @@ def _smooth_rows(rows: Array, t: Any, at: Array, per_curve: bool, mask: Array | 
         curve: Any = make_smoothing_spline(t, rows, space, weights=weights, where=mask, **wanted.how)
     several = is_several(space)
     reports = curve.report if several else (curve.report,)
-    converged = np.all([np.asarray(own.converged) for own in reports], axis=0)
+    converged = np.all([np.asarray(entry.converged) for entry in reports], axis=0)
     values = curve(at, per_curve=per_curve)
-    each: list[Array] = []
+    spreads: list[Array] = []
     for name, arguments in wanted.spreads:
         if per_curve:
             rows_of = [getattr(reduce(getitem, i, curve), name)(at[i], *arguments) for i in np.ndindex(whole)]
-            pairs = [own if several else (own,) for own in rows_of]
-            each += [np.reshape(part, at.shape) for part in zip(*pairs, strict=True)]
+            pairs = [entry if several else (entry,) for entry in rows_of]
+            spreads += [np.reshape(part, at.shape) for part in zip(*pairs, strict=True)]
         else:
-            found = getattr(curve, name)(at, *arguments)
-            each += found if several else [found]
+            spread = getattr(curve, name)(at, *arguments)
+            spreads += spread if several else [spread]
     columns: list[Array] = []
     for name in ("lam", "df", "sigma"):
         numbers = getattr(curve, name)
-        columns += [np.broadcast_to(own, whole) for own in (numbers if several else (numbers,))]
-    columns += [np.asarray(own.at_bound) for own in reports]
-    for own in (values, *each):
-        own[~converged] = np.nan
-    return [values, *each, *columns, converged]
+        columns += [np.broadcast_to(entry, whole) for entry in (numbers if several else (numbers,))]
+    columns += [np.asarray(entry.at_bound) for entry in reports]
+    for entry in (values, *spreads):
+        entry[~converged] = np.nan
+    return [values, *spreads, *columns, converged]

@@ -13,8 +13,8 @@ from ..._base.faults import CUT_LOCUS, Fault, unconverged
 from ..._base.report import SOLVERS, Columns
 from ..._base.typing import Progress
 from ..._spaces import Array, Doubles
-from ...manifolds._frames import frames_along
 from ...manifolds._manifold import Manifold
+from ...manifolds._operations import frames_along
 from ..solve import Options, Solved, Task
 from .condition import ControlPolygon, End, Problem, control_polygons, not_a_knot
 from .iteration import FLOOR, iterate

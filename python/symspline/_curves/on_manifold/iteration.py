@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..._core import solve_tridiagonal
 from ..._spaces import Array, Doubles
-from ...manifolds._frames import products
+from ...manifolds._operations import products
 from .condition import Problem, c2_residuals, is_parabola
 
 # How many steps back are mixed.

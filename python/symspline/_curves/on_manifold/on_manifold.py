@@ -13,9 +13,8 @@ from ... import _core
 from ..._base.typing import Progress
 from ..._core import ValidationError
 from ..._spaces import Array, Doubles, Euclidean, parts_of, product_norm
-from ...manifolds._differences import STEPS, eighth_difference, first_derivative, second_derivative
 from ...manifolds._manifold import Manifold
-from ...manifolds._operations import Operations
+from ...manifolds._operations import STEPS, Operations, eighth_difference, first_derivative, second_derivative
 from ..curve import NORMS, REAL, CurveArrays, FactorArrays, share
 from .condition import ControlPolygon, control_polygons
 from .jerk import jerk
