@@ -77,11 +77,7 @@ ZIGZAG = 2.0
 
 @overload
 def sog(
-    spline: CubicSpline[Any, Any],
-    x: TimesLike,
-    *,
-    radius: float = EARTH_RADIUS,
-    return_std: Literal[False] = False,
+    spline: CubicSpline[Any, Any], x: TimesLike, *, radius: float = EARTH_RADIUS, return_std: Literal[False] = False
 ) -> FloatArray: ...
 
 
@@ -508,12 +504,7 @@ def plot(
 
 @overload
 def plot(
-    spline: _SeveralTracks,
-    file: None = None,
-    *,
-    radius: float = EARTH_RADIUS,
-    ax: Axes,
-    **look: Unpack[AxesLook],
+    spline: _SeveralTracks, file: None = None, *, radius: float = EARTH_RADIUS, ax: Axes, **look: Unpack[AxesLook]
 ) -> Axes: ...
 
 

@@ -51,14 +51,7 @@ from ._splines.piecewise import check_curve
 if TYPE_CHECKING:
     from qutip import QobjEvo
 
-__all__ = [
-    "berry_phase",
-    "from_kets",
-    "hamiltonian",
-    "propagator",
-    "pulses",
-    "qobjevo",
-]
+__all__ = ["berry_phase", "from_kets", "hamiltonian", "propagator", "pulses", "qobjevo"]
 
 
 def __dir__() -> list[str]:

@@ -54,13 +54,7 @@ from ._splines.base import check_timed
 from ._splines.bsplines import CumulativeBSpline
 from ._splines.cubic import CubicSpline
 from ._splines.hermite import HermiteSpline
-from .convert._quaternions import (
-    checked_order,
-    converted,
-    matrix_to_quaternion,
-    quaternion_form,
-    quaternion_to_matrix,
-)
+from .convert._quaternions import checked_order, converted, matrix_to_quaternion, quaternion_form, quaternion_to_matrix
 
 if TYPE_CHECKING:
     from orix.quaternion import Misorientation, Orientation, Symmetry

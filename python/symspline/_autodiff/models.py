@@ -15,12 +15,7 @@ from .._base.angles import Rows, quaternion_rows, rotation_rows
 from .._spaces import AnySpace
 from .library import Library, Tensor, adjoint, hermitian
 
-QUOTIENTS = (
-    _spaces.RealProjective,
-    _spaces.ComplexProjective,
-    _spaces.Grassmannian,
-    _spaces.ComplexGrassmannian,
-)
+QUOTIENTS = (_spaces.RealProjective, _spaces.ComplexProjective, _spaces.Grassmannian, _spaces.ComplexGrassmannian)
 """Spaces whose points have many representatives."""
 
 

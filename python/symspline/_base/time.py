@@ -84,12 +84,7 @@ class TimeAxis:
         return self._doubles(knots, self.origin, "t")
 
     def at(
-        self,
-        x: TimesLike,
-        batch: tuple[int, ...],
-        per_curve: bool,
-        knots: Doubles | None = None,
-        name: str = "x",
+        self, x: TimesLike, batch: tuple[int, ...], per_curve: bool, knots: Doubles | None = None, name: str = "x"
     ) -> tuple[Doubles, bool]:
         """Convert sampling times to numbers of the core, and return whether each curve then has its own times.
 

@@ -178,10 +178,7 @@ def _draw_hose(axes: Any, curve: Curve, points: FloatArray, radii: FloatArray) -
 
 
 def draw_box(
-    panel: Panel,
-    shadows: Sequence[tuple[FloatArray, Any]],
-    others: Sequence[FloatArray],
-    origin: FloatArray,
+    panel: Panel, shadows: Sequence[tuple[FloatArray, Any]], others: Sequence[FloatArray], origin: FloatArray
 ) -> Any:
     """Draw a box with equal scales around points of shape (m, 3), with lines in given colours on its floor.
 

@@ -18,16 +18,7 @@ from numpy.typing import NDArray
 from .._base.angles import from_lonlat
 from .._base.exceptions import SymsplineError
 from .._core import ValidationError
-from .._spaces import (
-    Doubles,
-    LogEuclidean,
-    Product,
-    Space,
-    SymmetricPositiveDefinite,
-    Torus,
-    factors_of,
-    space_named,
-)
+from .._spaces import Doubles, LogEuclidean, Product, Space, SymmetricPositiveDefinite, Torus, factors_of, space_named
 from .._spaces.degrees import is_degrees, look_like_degrees
 from ..convert._pose_files import join, rotations_in_rows
 from ..geo import NAMED, are_tracks
