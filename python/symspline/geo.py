@@ -601,10 +601,8 @@ def _along(
     values: dict[Any, Any] = {columns[0]: lon, columns[1]: lat}
     quality = "good"
     if smooth:
-        (speed, speed_std), (course, course_std) = (
-            sog(spline, at, radius=radius, return_std=True),
-            cog(spline, at, return_std=True),
-        )
+        speed, speed_std = sog(spline, at, radius=radius, return_std=True)
+        course, course_std = cog(spline, at, return_std=True)
         values |= {"sog": speed, "cog": course, "position_std": radius * spline.std(at)}
         values |= {"sog_std": speed_std, "cog_std": course_std, "lam": spline.lam}
         quality = "lam at bound" if spline.report.at_bound else quality

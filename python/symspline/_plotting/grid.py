@@ -398,16 +398,9 @@ def _draw_arrows(axes: Axes, field: Field, vectors: Numbers, longest: float) -> 
     """Draw vectors, shape (k, 2), as arrows around their positions. The longest one fits between symbols."""
     positions, arrows = field.at_symbols(vectors)
     look: Look = {"units": "inches", "scale_units": "inches", "angles": "uv", "pivot": "mid", "clip_on": False}
-    look |= {
-        "width": 0.022,
-        "headwidth": 4,
-        "headlength": 5,
-        "headaxislength": 4.5,
-        "minlength": 0.5,
-        "in_layout": False,
-    }
+    look |= {"width": 0.022, "headwidth": 4, "headlength": 5, "headaxislength": 4.5, "minlength": 0.5}
     scale = (longest or 1.0) / (0.9 * field.gap)
-    axes.quiver(*positions.T, *arrows.T, color=_DARK, scale=scale, zorder=4, **look)
+    axes.quiver(*positions.T, *arrows.T, color=_DARK, scale=scale, zorder=4, in_layout=False, **look)
 
 
 def _draw_vectors(axes: Axes, field: Field) -> None:
@@ -540,14 +533,8 @@ def _draw_surface(panel: Panel, field: Field, nodes: Any) -> None:
     axes = draw_box(panel, [], [positions[known], dots], np.zeros(3))
     areas = np.nan_to_num(np.cross(np.diff(positions, axis=0)[:, 1:], np.diff(positions, axis=1)[1:]))
     # A surface without area has no bright side. The order of the axes decides which side that is.
-    shade = bool(np.any(areas))
-    look: Look = {
-        "linewidths": 0,
-        "facecolors": paper(0.15),
-        "antialiaseds": False,
-        "shade": shade,
-        "lightsource": _SUN,
-    }
+    look: Look = {"linewidths": 0, "facecolors": paper(0.15), "antialiaseds": False, "lightsource": _SUN}
+    look["shade"] = bool(np.any(areas))
     grid = positions if areas[..., 2].sum() > 0 else positions.swapaxes(0, 1)
     faces = np.stack([grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]], axis=2).reshape(-1, 4, 3)
     axes.add_collection3d(Poly3DCollection(faces[np.isfinite(faces).all(axis=(1, 2))], **look))

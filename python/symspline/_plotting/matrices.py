@@ -462,12 +462,8 @@ def covariances(curves: Sequence[Curve]) -> View:
         return whole
     entries = np.reshape(component_names((n, n), False), (n, n))[np.triu_indices(n, 1)]
     names = [f"σ{i + 1}".translate(SUBSCRIPTS) for i in range(n)]
-    deviations = Graphs(
-        "",
-        names,
-        lambda _, points: np.sqrt(np.diagonal(points, axis1=1, axis2=2)),
-        [("standard\ndeviations", range(n))],
-    )
+    roots = lambda _, points: np.sqrt(np.diagonal(points, axis1=1, axis2=2))  # noqa: E731
+    deviations = Graphs("", names, roots, [("standard\ndeviations", range(n))])
 
     def draw(panel: Panel, curves: Sequence[Curve]) -> None:
         if not panel.mine:

@@ -274,11 +274,8 @@ def draw_dots(axes: Axes, curve: Curve, positions: FloatArray, **look: Any) -> N
         axes.plot(*positions.T, color=curve.color, label=fresh(axes, curve.label or "data"), **dots | look)
         return
     if curve.noise is not None:
-        look = {
-            "markersize": float(np.clip(25 / np.sqrt(count), 1.5, 3.5)),
-            "alpha": 0.75 if curve.alone else 0.4,
-        } | look
-        look = {"color": DATA if curve.alone else curve.color, "markeredgewidth": 0, "zorder": 3.5} | look
+        dots |= {"markersize": float(np.clip(25 / np.sqrt(count), 1.5, 3.5)), "alpha": 0.75 if curve.alone else 0.4}
+        dots |= {"color": DATA if curve.alone else curve.color, "markeredgewidth": 0, "zorder": 3.5}
         axes.plot(*positions.T, label=fresh(axes, "data"), **dots | look)
         return
     size = float(np.clip(30 / np.sqrt(count), 2, 6.5)) * (1 if curve.alone else 0.6)

@@ -244,11 +244,8 @@ def _draw_into(ax: Axes, curves: Sequence[Curve], title: str | None = None, show
     """Draw the picture of curves into axes that `check_axes` has accepted."""
     view = view_of(curves)
     if ax.has_data() and (view.is_turned or view.in_rows):
-        why = (
-            "the view of this picture depends on the curves"
-            if view.is_turned
-            else "symbols of several curves would overlap"
-        )
+        why = "symbols of several curves would overlap"
+        why = "the view of this picture depends on the curves" if view.is_turned else why
         raise ValidationError(
             f"ax already contains a picture, and {why}. Draw all of them in one call: "
             "symspline.plot([first, second], ax=ax)."
@@ -399,12 +396,8 @@ _MAP = 4.6, 6.8
 """Widths of a globe and of the map beside it."""
 _SMALLEST = 0.6
 """Text is not reduced by less than this factor, unless there is no space for a page otherwise."""
-_TEXT: Any = (
-    "font.size",
-    "axes.labelpad",
-    "axes.titlepad",
-    *(f"{x}tick.major.{name}" for x in "xy" for name in ("pad", "size")),
-)
+_TICKS = [f"{x}tick.major.{name}" for x in "xy" for name in ("pad", "size")]
+_TEXT: Any = ("font.size", "axes.labelpad", "axes.titlepad", *_TICKS)
 
 
 class CurveFigure(Figure):

@@ -239,12 +239,8 @@ def deviations_of(spline: SmoothingSpline, x: Any, nu: int, columns: Columns) ->
             samples.append((f"{name}_position{end}", std[1]))
             name, std = f"{name}_rotation", std[0]
         if columns.quaternion is None or factor not in (ROTATIONS, POSES):
-            samples.append(
-                (
-                    name + end,
-                    np.degrees(std) if columns.lonlat or (columns.degrees and isinstance(factor, Torus)) else std,
-                )
-            )
+            in_degrees = columns.lonlat or (columns.degrees and isinstance(factor, Torus))
+            samples.append((name + end, np.degrees(std) if in_degrees else std))
         elif nu:
             deviations = angular_velocity(spline, x, return_std=True)[1].T
             samples += [(f"std_{rate}", column) for rate, column in zip(_RATES, deviations, strict=True)]

@@ -119,6 +119,7 @@ _MAX_GAP = (
     "segments are curves 1, 2, ... or, with --curve, NAME/1, NAME/2, ...; single points are omitted"
 )
 _CRITERION = "how λ is chosen: gcv (default), reml, or cp, Mallows' C_p, which needs --sigma and is the default with it"
+_LAM = "a number λ >= 0 instead, in a product perhaps one per factor with commas"
 _SIGMA = (
     "known standard deviation of the noise in a coordinate: in the unit of distances, radians for rotations, degrees "
     "with --lonlat or --degrees; in a product perhaps one per factor with commas"
@@ -160,20 +161,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument_group("noisy data").add_argument
     add("--smooth", action="store_true", help="fit curves near the points")
     add("--criterion", choices=("gcv", "cp", "reml"), help=_CRITERION)
-    add(
-        "--lam",
-        type=_numbers,
-        metavar="L",
-        help="a number λ >= 0 instead, in a product perhaps one per factor with commas",
-    )
+    add("--lam", type=_numbers, metavar="L", help=_LAM)
     add("--sigma", type=_deviations, metavar="S", help=_SIGMA)
-    add(
-        "--robust",
-        dest="loss",
-        action="store_const",
-        const="cauchy",
-        help="reduce the influence of outliers (loss 'cauchy')",
-    )
+    robust = "reduce the influence of outliers (loss 'cauchy')"
+    add("--robust", dest="loss", action="store_const", const="cauchy", help=robust)
     add("--penalty", choices=("acceleration", "jerk"), help="derivative that is kept small (default: acceleration)")
 
 
@@ -446,13 +437,11 @@ class Recordings:
             return f"{what}: if the table holds several tracks, fit each of them with --curve {column}"
         if self._rows.labels is None:
             column = column_of_tracks(self._table, self._used, self.space, self._points)
+        if column is None:
+            return ""
         return (
-            ""
-            if column is None
-            else (
-                f"{self.path}: the path through all rows is more than {ZIGZAG:g} times as long as the paths of each "
-                f"{column!r}; if the table holds several tracks, fit each of them with --curve {column}"
-            )
+            f"{self.path}: the path through all rows is more than {ZIGZAG:g} times as long as the paths of each "
+            f"{column!r}; if the table holds several tracks, fit each of them with --curve {column}"
         )
 
     def changes(self) -> str:

@@ -24,11 +24,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options of ``symspline plot``."""
     add = parser.add_argument
     add("curves", type=Path, metavar="CURVE", help="file of curves to read: .npz, or -")
-    add(
-        "--curve",
-        metavar="NAME",
-        help="which curve, if there are several; segments of one recording are drawn together",
-    )
+    which = "which curve, if there are several; segments of one recording are drawn together"
+    add("--curve", metavar="NAME", help=which)
     add("--lonlat", action="store_true", help="draw any curve on sphere:2 on the Earth")
     add("-o", dest="output", type=Path, metavar="PICTURE", required=True, help="picture to write, or -")
     add("--to", metavar="FORMAT", help="format of the picture, such as pdf (default: as its name ends, PNG for -)")
@@ -52,13 +49,10 @@ def run(options: argparse.Namespace) -> int:
     # A still image in a format of animations would mislead.
     known = sorted(set(figure.canvas.get_supported_filetypes()) - {"gif", "apng"})
     form = options.to or ("png" if options.output == STANDARD else options.output.suffix[1:].lower())
-    refuse(
-        options.output,
-        (form not in known, f": the name of a picture must end in {alternatives([f'.{end}' for end in known])}"),
-    )
+    endings = alternatives([f".{end}" for end in known])
+    refuse(options.output, (form not in known, f": the name of a picture must end in {endings}"))
     with writing(options.output) as temporary:
         figure.savefig(temporary, format=form)
-    tell(
-        f"{called(options.output)}: a picture of {'the curve' if options.curve is None else f'curve {options.curve!r}'}"
-    )
+    what = "the curve" if options.curve is None else f"curve {options.curve!r}"
+    tell(f"{called(options.output)}: a picture of {what}")
     return 0

@@ -132,20 +132,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     which.add_argument("--at", type=Path, metavar="FILE", help=f"a table with times: {endings()}, or -")
     add("--curve", action="append", metavar="NAME", help="which curve; may be repeated (default: all)")
     add("--unix", choices=UNITS, help="times of --at are numbers that count this unit since 1970-01-01 in UTC")
-    add(
-        "--nu",
-        type=_orders,
-        default=[0],
-        metavar="0,1,2",
-        help="points (0, default), velocities (1), accelerations (2)",
-    )
+    orders = "points (0, default), velocities (1), accelerations (2)"
+    add("--nu", type=_orders, default=[0], metavar="0,1,2", help=orders)
     add("--lonlat", action="store_true", help="write longitude and latitude of any curve on sphere:2")
     add("--digits", type=_digits, metavar="N", help="round the numbers to N significant digits, but not the times")
-    add(
-        "--time",
-        metavar="COL",
-        help="column of times in the table of --at (default: that of the table that was fitted)",
-    )
+    time = "column of times in the table of --at (default: that of the table that was fitted)"
+    add("--time", metavar="COL", help=time)
     add("--from", dest="format", choices=TABLES, help="format of the table of --at (default: as its name ends)")
     add("--to", choices=TABLES, help="format to write (default: as the name of OUT ends, CSV for -)")
     out = f"table to write: {endings()}, or - for standard output; {_EACH} in its name makes one file per curve"

@@ -130,16 +130,10 @@ def fit(
     array([[0.65 ,   nan],
            [  nan, 0.707]])
     """
-    options: dict[str, Any] = {
-        "method": method,
-        "tol": tol,
-        "max_iter": max_iter,
-        "extrapolate": extrapolate,
-        "atol": atol,
-    }
-    chosen: dict[str, Any] = {"time": time, "skipna": checked_flag(skipna, "skipna"), "on_failure": on_failure}
+    options: dict[str, Any] = {"method": method, "tol": tol, "max_iter": max_iter, "extrapolate": extrapolate}
+    options |= {"atol": atol, "on_failure": on_failure, "time": time, "skipna": checked_flag(skipna, "skipna")}
     da = in_radians(da, space)
-    inputs, spec, times = spec_of(da, space, dim, point_dims, where, bc_type, **chosen, **options)
+    inputs, spec, times = spec_of(da, space, dim, point_dims, where, bc_type, **options)
     axes: list[Hashable] = [dim, *point_dims]
     dtype = spec["space"].dtype
     variables = apply(
