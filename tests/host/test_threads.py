@@ -159,9 +159,9 @@ def test_a_forked_process_works(threads):
         children = [context.Process(target=in_child, args=(queue,)) for _ in range(2)]
         for child in children:
             child.start()
-        found = [queue.get(timeout=20) for _ in children]
+        found = [queue.get(timeout=60) for _ in children]
         for child in children:
-            child.join(20)
+            child.join(60)
             assert child.exitcode == 0
         assert all(map(same, found[0], expected.value)) and all(map(same, found[1], expected.value))
         in_child(expected)
