@@ -94,7 +94,7 @@ def with_threads(call):
 )
 def test_fits_do_not_depend_on_the_number_of_threads(threads, space, kind):
     if kind == "many":
-        curves = [(None, points_on(space, n, step=0.4, seed=n)) for n in range(2, 60)] * 20
+        curves = [(None, points_on(space, n, step=0.4, seed=n)) for n in range(2, 60)] * 5
 
         def fit():
             return ss.fit_many(curves, space)
