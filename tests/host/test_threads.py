@@ -94,7 +94,7 @@ def with_threads(call):
 )
 def test_fits_do_not_depend_on_the_number_of_threads(threads, space, kind):
     if kind == "many":
-        curves = [(None, points_on(space, n, step=0.4, seed=n)) for n in range(2, 60)] * 20
+        curves = [(None, points_on(space, n, step=0.4, seed=n)) for n in range(2, 60)] * 5
 
         def fit():
             return ss.fit_many(curves, space)
@@ -159,9 +159,9 @@ def test_a_forked_process_works(threads):
         children = [context.Process(target=in_child, args=(queue,)) for _ in range(2)]
         for child in children:
             child.start()
-        found = [queue.get(timeout=20) for _ in children]
+        found = [queue.get(timeout=60) for _ in children]
         for child in children:
-            child.join(20)
+            child.join(60)
             assert child.exitcode == 0
         assert all(map(same, found[0], expected.value)) and all(map(same, found[1], expected.value))
         in_child(expected)
