@@ -13,7 +13,7 @@ from .._smoothing import SmoothingWarning
 from .._smoothing.audit import DEGREES, Residuals, Sensor, advice, corner_of, described, examine
 from .._smoothing.posterior import Posterior
 from .._spaces import Doubles
-from .measurements import GRAVITY
+from ..measure import GRAVITY
 from .solve import Rows, Setup, Solution
 from .terms import ForceTerm, FunctionTerm, PointTerm, RateTerm, Term
 

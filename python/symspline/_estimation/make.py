@@ -50,9 +50,7 @@ from .._spaces import (
 )
 from .._splines.base import Curve
 from ..manifolds._manifold import refuse_functions
-from .audit import audit, unit_hints
-from .gaps import long_gaps
-from .measurements import (
+from ..measure import (
     SKIPNA,
     BodyRates,
     Constant,
@@ -62,6 +60,8 @@ from .measurements import (
     counts_all_samples,
     measurement_without_missing,
 )
+from .audit import audit, unit_hints
+from .gaps import long_gaps
 from .search import (
     Search,
     Starts,

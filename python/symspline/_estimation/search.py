@@ -16,7 +16,7 @@ from .._core import ValidationError
 from .._smoothing import SmoothingWarning
 from .._smoothing.knots import places
 from .._spaces import Array, Doubles, Space
-from .measurements import Points
+from ..measure import Points
 from .solve import Setup, Solution, iterate, residuals
 from .start import Start, starts
 from .terms import PointTerm, RateTerm

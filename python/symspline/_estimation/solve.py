@@ -12,7 +12,7 @@ from .._base.typing import Progress
 from .._core import ValidationError
 from .._smoothing.report import SmoothingReport
 from .._spaces import Array, Doubles, Space
-from .measurements import Constant
+from ..measure import Constant
 from .terms import Body, Term, Values, is_compact_group
 
 # If the curve turns by more than this angle between two knots, the solution of the linear problem may differ from the

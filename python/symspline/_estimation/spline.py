@@ -22,8 +22,8 @@ from .._smoothing.spline import SmoothingSpline
 from .._spaces import Array, Doubles, Product, Space, SpecialEuclidean, factors_of, parts_of
 from .._splines.archive import Entries, entry, read_fitted, read_report
 from .._splines.cubic import CubicSpline
+from ..measure import BodyRates, Measurement, Points, SpecificForce
 from .gaps import LongGaps, read_long_gaps
-from .measurements import BodyRates, Measurement, Points, SpecificForce
 from .terms import InformationTerm, PointTerm, Term
 
 

@@ -28,7 +28,7 @@ from .._spaces import (
 )
 from .._spaces.actions import Group
 from ..convert._quaternions import quaternion_to_matrix
-from .measurements import (
+from ..measure import (
     SKIPNA,
     BodyRates,
     Constant,
