@@ -11,11 +11,10 @@ from .._base.faults import warn
 from .._curves.ends import end_kinds
 from .._smoothing import SmoothingWarning
 from .._smoothing.audit import DEGREES, Residuals, Sensor, advice, corner_of, described, examine
-from .._smoothing.posterior import Posterior
+from .._smoothing.report import Posterior
 from .._spaces import Doubles
 from ..measure import GRAVITY
-from .solve import Rows, Setup, Solution
-from .terms import ForceTerm, FunctionTerm, PointTerm, RateTerm, Term
+from .problem import ForceTerm, FunctionTerm, PointTerm, RateTerm, Rows, Setup, Solution, Term
 
 # Number of measurements of a sensor in the estimate of its mean leverage.
 _SAMPLE = 64

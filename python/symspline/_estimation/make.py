@@ -34,9 +34,9 @@ from .._curves.options import check_on_failure, check_progress, checked_extrapol
 from .._curves.solve import DEFAULTS
 from .._smoothing import SmoothingReport, SmoothingSpline, SmoothingWarning, make_smoothing_spline
 from .._smoothing.audit import warn_of_bounds
-from .._smoothing.knots import Knots, thin_knots
 from .._smoothing.noise import grouped, join, smoothed_spaces
-from .._smoothing.posterior import Parameter
+from .._smoothing.report import Parameter
+from .._smoothing.solve import Knots, thin_knots
 from .._spaces import (
     Array,
     Doubles,
@@ -61,7 +61,7 @@ from ..measure import (
     measurement_without_missing,
 )
 from .audit import audit, unit_hints
-from .gaps import long_gaps
+from .problem import Setup, Solution, Term, bind, read_lams
 from .search import (
     Search,
     Starts,
@@ -74,9 +74,7 @@ from .search import (
     warn_of_gaps,
     warn_of_turns,
 )
-from .solve import Setup, Solution, read_lams
-from .spline import EstimatedSpline, PointsSpline, joint
-from .terms import Term, bind
+from .spline import EstimatedSpline, PointsSpline, joint, long_gaps
 
 # Largest number of knots. A curve with more knots would not fit into memory.
 _MOST_KNOTS = 2**32

@@ -14,8 +14,7 @@ from .._base.faults import is_silent, of_index, warn
 from .._curves.curve import CurveArrays
 from .._curves.ends import end_kinds
 from .._spaces import Array, Doubles, Space, factors_of
-from .data import Part, SmoothingData
-from .noise import distances_of, grouped, in_part, is_several, smoothed_spaces, split
+from .noise import Part, SmoothingData, distances_of, grouped, in_part, is_several, smoothed_spaces, split
 from .report import SmoothingReport, SmoothingWarning
 from .solve import FAST, NOISY, TWO, UNIQUE, Found, Smoothed
 

@@ -19,10 +19,8 @@ from .._base.faults import of_index, warn
 from .._curves.ends import end_kinds, is_closed
 from .._spaces import Array, Doubles, Euclidean, Space, SpecialEuclidean, factors_of
 from .audit import corner_of
-from .data import points_of
-from .noise import SINGULAR, grouped, in_part, smoothed_spaces, split
-from .posterior import frames_at
-from .report import SmoothingWarning
+from .noise import SINGULAR, grouped, in_part, points_of, smoothed_spaces, split
+from .report import SmoothingWarning, frames_at
 
 # A gap is long if the variance in its middle exceeds the first multiple of the median variance at the data, and its
 # length the second multiple of the median time step, so that sparse data have no gaps.

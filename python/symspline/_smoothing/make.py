@@ -38,11 +38,35 @@ from .._curves.solve import DEFAULTS, in_batch
 from .._spaces import Array, Doubles, Product, Space, SpecialEuclidean, factors_of, space_named
 from ..manifolds._manifold import refuse_functions
 from .audit import audit
-from .data import Part, SmoothingData, checked_ends, parts_of, read_noisy, valid_curves
-from .knots import NO_CURVE, Knots, geodesic_knots, has_all_times, in_gaps, in_long_gaps, knots_for, with_enough_knots
-from .noise import grouped, join, parts_of_factor, per_part, smoothed_spaces, split_ends
+from .noise import (
+    Part,
+    SmoothingData,
+    checked_ends,
+    grouped,
+    join,
+    parts_of,
+    parts_of_factor,
+    per_part,
+    read_noisy,
+    smoothed_spaces,
+    split_end_vectors,
+    valid_curves,
+)
 from .report import SmoothingReport, SmoothingWarning
-from .solve import Found, Smoothed, SolverOptions, smoothed
+from .solve import (
+    NO_CURVE,
+    Found,
+    Knots,
+    Smoothed,
+    SolverOptions,
+    geodesic_knots,
+    has_all_times,
+    in_gaps,
+    in_long_gaps,
+    knots_for,
+    smoothed,
+    with_enough_knots,
+)
 from .spline import SmoothingSpline
 
 # Largest dimension in which the full Gauss–Newton solver is used; its matrices have (2 dim)² entries.
@@ -293,7 +317,7 @@ def make_smoothing_spline(
     if chosen is not None:
         lams = [own[chosen] for own in lams]
     factors = factors_of(space)
-    ends = [part for factor, own in zip(factors, of_factors, strict=True) for part in split_ends(factor, own)]
+    ends = [part for factor, own in zip(factors, of_factors, strict=True) for part in split_end_vectors(factor, own)]
     parts = parts_of(noisy, space, lams, ends)
     every = knots_for(whole, knots)
     if knots is None and penalty == "jerk":

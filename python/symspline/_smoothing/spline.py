@@ -33,11 +33,9 @@ from .._splines.archive import (
     times_state,
 )
 from .._splines.cubic import CubicSpline
-from .data import SmoothingData
 from .gaps import Calibration, Gap, calibration_of, warn_of_cubics, warn_of_gaps, warn_of_wide_bands, widest_band
-from .noise import Noise, grouped, is_several, join, parts_of_factor, smoothed_spaces, split
-from .posterior import Parameter, Posterior, frames_at, process_ratio
-from .report import SmoothingReport
+from .noise import Noise, SmoothingData, grouped, is_several, join, parts_of_factor, smoothed_spaces, split
+from .report import Parameter, Posterior, SmoothingReport, frames_at, process_ratio
 from .solve import Smoothed
 
 if TYPE_CHECKING:
