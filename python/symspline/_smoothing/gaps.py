@@ -6,7 +6,7 @@ predicted without their data, and the errors of these predictions determine a fa
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache, cached_property
 from typing import Any, NamedTuple
 
@@ -19,7 +19,7 @@ from .._base.faults import of_index, warn
 from .._curves.ends import end_kinds, is_closed
 from .._spaces import Array, Doubles, Euclidean, Space, SpecialEuclidean, factors_of
 from .audit import corner_of
-from .noise import SINGULAR, grouped, in_part, points_of, smoothed_spaces, split
+from .noise import SINGULAR, grouped, in_part, smoothed_spaces, split
 from .report import SmoothingWarning, frames_at
 
 # A gap is long if the variance in its middle exceeds the first multiple of the median variance at the data, and its
@@ -371,7 +371,7 @@ def calibration_of(spline: Any, number: int) -> Calibration | None:
 
 def _evidence(spline: Any, number: int, used: Any, sigma: float) -> SensorEvidence:
     noisy, part = spline._noisy, spline._smoothed[number]
-    space, data = points_of(noisy, spline.space)[number]
+    space, data = smoothed_spaces(spline.space)[number], _in_part(spline.space, noisy.points, number)
     noise, m = noisy.noise[number], space.dim
     t, y = noisy.times[used], data[used]
     residuals = _coordinates(spline, number, t, "point", y) / sigma
@@ -425,6 +425,11 @@ def _roots(matrices: Doubles) -> Doubles:
     values, vectors = np.linalg.eigh(matrices)
     values = np.where(values > SINGULAR * values[:, -1:], values, 0.0)
     return np.asarray(np.sqrt(values)[:, :, None] * np.swapaxes(vectors, -1, -2))
+
+
+def _in_part(space: Space[Any], arrays: Sequence[Array], number: int) -> Array:
+    """Return the arrays of one smoothed space from those of all factors."""
+    return [rows for pair in zip(factors_of(space), arrays, strict=True) for rows in split(*pair)][number]
 
 
 def _parts_at(spline: Any, number: int, t: Doubles, quantity: str) -> tuple[Any, Array, Array]:

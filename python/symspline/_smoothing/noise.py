@@ -14,7 +14,7 @@ from itertools import islice
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from .._base.arrays import as_array, cast, refuse, short_repr
 from .._base.faults import INVALID, Fault
@@ -63,7 +63,10 @@ def smoothed_spaces(space: Space[Any]) -> tuple[Space, ...]:
 
     They are the factors of the space, with rotations and positions in place of poses.
     """
-    return tuple(part for factor in factors_of(space) for part in parts_of_factor(factor))
+    found: list[Space] = []
+    for factor in factors_of(space):
+        found += parts_of_factor(factor)
+    return tuple(found)
 
 
 def is_several(space: Space[Any]) -> bool:
@@ -194,6 +197,8 @@ def read_precision(weights: Any, frames: Any, space: Space, data: list[Points]) 
         Tangent vectors to which matrices refer, m at every point, shape (..., N, m, *point_shape). For a product, a
         tuple. None means ``space.frame``.
     """
+    if weights is None and frames is None:
+        return [Noise(np.ones(data[0].nodes), None)] * len(smoothed_spaces(space))
     factors, several = factors_of(space), isinstance(space, Product)
     own = _per_part(weights, "weights", len(factors), several and isinstance(weights, tuple))
     own_frames = _per_part(frames, "frames", len(factors), several and frames is not None)
@@ -227,7 +232,7 @@ def _in_factor(space: Space, given: Any, frames: Any, data: Points) -> Noise:
                 "`frames` is given, but `weights` are numbers, which do not refer to frames. Omit `frames`, or pass "
                 "information matrices."
             )
-        return Noise(_checked_weights(given, data, shape), None)
+        return Noise(np.ones(data.nodes) if array is None else _checked_weights(array, data, shape), None)
     return _with_matrices(array, frames, space, data)
 
 
@@ -263,11 +268,9 @@ def _per_part(value: Any, name: str, count: int, is_split: bool) -> list[Any]:
     return list(value)
 
 
-def _checked_weights(weights: ArrayLike | None, data: Points, matrix: tuple[int, ...]) -> Doubles:
+def _checked_weights(weights: Array, data: Points, matrix: tuple[int, ...]) -> Doubles:
     """Return weights, one per point. Matrices of the other shape are accepted as well, but elsewhere."""
     batch, count = data.batch, data.nodes
-    if weights is None:
-        return np.ones(count)
     found = _numbers(weights)
     if found.shape not in ((count,), (*batch, count)):
         own = f" or {(*batch, count)}" if batch else ""
@@ -280,14 +283,13 @@ def _checked_weights(weights: ArrayLike | None, data: Points, matrix: tuple[int,
     return found
 
 
-def _numbers(weights: ArrayLike) -> Doubles:
-    array = as_array(weights, "weights")
+def _numbers(array: Array) -> Doubles:
     if array.dtype.kind not in "iufb":
         raise ValidationError(f"weights must be numbers, not {array.dtype}")
     return cast(array)
 
 
-def _with_matrices(given: ArrayLike, frames: Any, space: Space, data: Points) -> Noise:
+def _with_matrices(given: Array, frames: Any, space: Space, data: Points) -> Noise:
     matrices, m = _numbers(given), space.dim
     batch, count = data.batch, data.nodes
     if matrices.shape not in ((count, m, m), (*batch, count, m, m)):
@@ -406,29 +408,27 @@ def per_part(space: Space, value: Any, name: str, batch: tuple[int, ...], infini
         If the value is not a number >= 0, which may be infinite if `infinite` is True, an array with one per curve, or
         for products and poses a tuple of these.
     """
-    if not (isinstance(value, tuple) and is_several(space)):
-        count = sum(map(len, map(parts_of_factor, factors_of(space)))) if is_several(space) else 1
-        return [_one_per_curve(value, name, batch, infinite)] * count
     spaces = smoothed_spaces(space)
-    if len(value) != len(spaces):
-        raise ValidationError(
-            f"`{name}` has {len(value)} entries, but there are {len(spaces)} parts to smooth: "
-            f"{', '.join(map(repr, spaces))}. Pass one entry per part."
-        )
-    return [_one_per_curve(one, name, batch, infinite) for one in value]
-
-
-def _one_per_curve(value: Any, name: str, batch: tuple[int, ...], infinite: bool = False) -> Doubles:
-    if value is None:
-        return np.full(int(np.prod(batch)), np.nan)
-    array = np.asarray(value)
-    if array.dtype.kind not in "iuf" or array.shape not in ((), batch):
-        own = f" or an array of shape {batch}" if batch else ""
-        raise ValidationError(f"{name} must be a number{own}, not {short_repr(value)}")
-    allowed = ">= 0" if infinite else "finite and >= 0"
-    good = (array >= 0) & (infinite | np.isfinite(array))
-    refuse(~good, name, lambda i: f"must be {allowed}, not {array[i]}")
-    return np.ascontiguousarray(np.broadcast_to(array, batch), np.float64).ravel()
+    values = [value] * len(spaces)
+    if isinstance(value, tuple) and is_several(space):
+        if len(value) != len(spaces):
+            raise ValidationError(
+                f"`{name}` has {len(value)} entries, but there are {len(spaces)} parts to smooth: "
+                f"{', '.join(map(repr, spaces))}. Pass one entry per part."
+            )
+        values = list(value)
+    arrays: list[Doubles] = []
+    for one in values:
+        array = np.asarray(np.nan if one is None else one)
+        if array.dtype.kind not in "iuf" or array.shape not in ((), batch):
+            others = f" or an array of shape {batch}" if batch else ""
+            raise ValidationError(f"{name} must be a number{others}, not {short_repr(one)}")
+        if one is not None:
+            allowed = ">= 0" if infinite else "finite and >= 0"
+            bad = ~((array >= 0) & (infinite | np.isfinite(array)))
+            refuse(bad, name, lambda i, array=array, allowed=allowed: f"must be {allowed}, not {array[i]}")
+        arrays.append(np.ascontiguousarray(np.broadcast_to(array, batch), np.float64).ravel())
+    return arrays
 
 
 # ---- data ----
@@ -504,14 +504,29 @@ def read_noisy(
     ValidationError
         If another argument is invalid.
     """
-    data = with_atol(read(points, space), atol)
+    data = read(points, space)
+    if atol is not None:
+        data = with_atol(data, atol)
     batch, count = data[0].batch, data[0].nodes
-    time_axis, shown_times, times = _times_of(t, batch, count)
+    time_axis, shown_times, times = knots_of(t, batch, count)
+    refuse_nan_times(times)
+    back = np.argwhere(np.diff(times) < 0)
+    if len(back):
+        *curve, i = back[0].tolist()
+        later, earlier = shown_times[(*curve, i + 1)], shown_times[(*curve, i)]
+        raise ValidationError(
+            f"t{[*curve, i + 1]} = {later} is before t{[*curve, i]} = {earlier}. Sort times and points together, for "
+            "instance with order = np.argsort(t)."
+        )
+    if np.any(times[..., -1] / 2 - times[..., 0] / 2 > _LONGEST):
+        raise ValidationError(f"t spans more than {_LONGEST:.0e}, too much for smoothing. Choose another unit of time.")
     given = read_precision(weights, frames, space, data)
     if weights is not None:
         each = zip(data, grouped(space, given), strict=True)
         data = [_without_missing(part, [one.weights for one in own]) for part, own in each]
-    ends = read_ends(moved_ends(bc_type, space, data), space, batch)
+    if space._has_quotients:
+        bc_type = moved_ends(bc_type, space, data)
+    ends = read_ends(bc_type, space, batch)
     sigmas = per_part(space, sigma, "sigma", batch)
     # Two points have no outliers and do not determine the noise level.
     loss = "linear" if count == 2 else loss
@@ -575,10 +590,7 @@ def valid_curves(
     # Only points are checked here. Times may repeat, knots need not be times of the data, and the ends of a closed
     # curve are noisy and differ.
     plain = np.arange(data[0].nodes, dtype=np.float64)
-    natural = read_ends("natural", space, batch)
-    points, faults = validated(
-        space, plain, data, [own or other for own, other in zip(ends, natural, strict=True)], skip, mask
-    )
+    points, faults = validated(space, plain, data, [own or NATURAL for own in ends], skip, mask)
     noisy = noisy._replace(points=points)
     kept = np.ones(batch, bool) if mask is None else mask.copy()
     kept.flat[[fault.curve for fault in faults]] = False
@@ -599,22 +611,6 @@ def valid_curves(
     noisy = noisy.map(rows, (len(chosen),))
     noisy = noisy._replace(noise=[own._replace(sigma=own.sigma[chosen]) for own in noisy.noise])
     return noisy, [map_ends(own, rows) for own in ends], chosen, faults
-
-
-def _times_of(t: TimesLike | None, batch: tuple[int, ...], count: int) -> tuple[TimeAxis, Array, Doubles]:
-    time_axis, shown_times, times = knots_of(t, batch, count)
-    refuse_nan_times(times)
-    back = np.argwhere(np.diff(times) < 0)
-    if len(back):
-        *curve, i = back[0].tolist()
-        later, earlier = shown_times[(*curve, i + 1)], shown_times[(*curve, i)]
-        raise ValidationError(
-            f"t{[*curve, i + 1]} = {later} is before t{[*curve, i]} = {earlier}. Sort times and points together, for "
-            "instance with order = np.argsort(t)."
-        )
-    if np.any(times[..., -1] / 2 - times[..., 0] / 2 > _LONGEST):
-        raise ValidationError(f"t spans more than {_LONGEST:.0e}, too much for smoothing. Choose another unit of time.")
-    return time_axis, shown_times, times
 
 
 def _without_missing(part: Points, weights: list[Doubles]) -> Points:
@@ -649,15 +645,6 @@ def _too_few(weights: Doubles, batch: tuple[int, ...], number: int) -> str:
     if not np.any(own > 0):
         return f"All weights of the data{of} are 0. A curve needs points at two or more times."
     return f"The data{of} have one time only. A curve needs points at two or more times."
-
-
-def points_of(noisy: SmoothingData, space: Space) -> list[tuple[Space, Array]]:
-    """Return every space in which data are smoothed, with its points."""
-    return [
-        pair
-        for factor, points in zip(factors_of(space), noisy.points, strict=True)
-        for pair in zip(parts_of_factor(factor), split(factor, points), strict=True)
-    ]
 
 
 class Part(NamedTuple):
@@ -700,6 +687,12 @@ class Part(NamedTuple):
 
 
 def parts_of(noisy: SmoothingData, space: Space, lams: list[Doubles], ends: Ends) -> list[Part]:
-    """Return the data in every space in which they are smoothed."""
-    each = zip(points_of(noisy, space), noisy.noise, lams, ends, strict=True)
-    return [Part(*pair, noise, lam, own) for pair, noise, lam, own in each]
+    """Return the data in every space in which they are smoothed, with their λ and the end conditions of the factors."""
+    spaces: list[Space] = []
+    arrays: list[Array] = []
+    conditions: list[list[End] | None] = []
+    for factor, points, of_factor in zip(factors_of(space), noisy.points, ends, strict=True):
+        spaces += parts_of_factor(factor)
+        arrays += split(factor, points)
+        conditions += split_end_vectors(factor, of_factor)
+    return list(map(Part, spaces, arrays, noisy.noise, lams, conditions))

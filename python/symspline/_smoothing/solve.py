@@ -57,10 +57,11 @@ _COARSER = 1e4
 # Number of knots from which the length of a geodesic is determined. Two knots are joined by one geodesic if they are
 # closer than the second number times the injectivity radius; more knots are at most as far apart as the third one.
 _OF_GEODESIC, _NEAR, _STEP = 32, 0.9, 0.3
-# Part of the message for a smoothing without a result.
-NO_CURVE = "no spline joins"
-# Part of the message for too few data with penalty="jerk".
-TOO_FEW = "needs at least 3 data"
+# States of curves, as the core numbers them: converged, not converged, no spline joins the points, the data do not
+# determine the curve, the choice of λ does not converge.
+CONVERGED, UNSOLVED, NO_CURVE, UNDETERMINED, UNSETTLED = range(5)
+# Smallest number of data with a penalty on the jerk.
+_FEWEST = 3
 
 DfOfPart = Callable[[Part, SmoothingData, "Knots"], Array]
 """Returns the degrees of freedom of curves through some of the data."""
@@ -226,10 +227,10 @@ def with_enough_knots(
     whole: Knots,
     noisy: SmoothingData,
     parts: list[Part],
-    run: Callable[[Knots], list[Any]],
+    run: Callable[[Knots], list[Found]],
     df_of_part: DfOfPart,
     penalty: str,
-) -> tuple[list[Any], Knots]:
+) -> tuple[list[Found], Knots]:
     """Fit with as many knots as λ and the degrees of freedom require, and return the results and the knots."""
     lams = np.concatenate([part.lam for part in parts])
     given = _of_all(lams) if np.isfinite(lams).all() else None
@@ -240,8 +241,7 @@ def with_enough_knots(
     for tries in range(_TRIES):
         found = run(at)
         count = at.times.shape[-1]
-        faults = [fault.what for own in found for fault in own.faults]
-        if any(NO_CURVE not in what and TOO_FEW not in what for what in faults) and tries < _TRIES - 1:
+        if tries < _TRIES - 1 and any(map(_may_settle, found, parts)):
             coarser *= _COARSER
             fewer = merge_close_knots(whole, noisy, given, power, coarser)
             if not np.array_equal(fewer.times, at.times) and fewer.times.shape[-1] <= count:
@@ -259,6 +259,14 @@ def with_enough_knots(
             break
         at = better
     return found, at
+
+
+def _may_settle(found: Found, part: Part) -> bool:
+    """Whether a curve failed that may converge with fewer knots."""
+    failed = (found.states != CONVERGED) & (found.states != NO_CURVE)
+    if failed.any() and found.smoothed.penalty == "jerk":
+        failed &= (found.states != UNDETERMINED) | (np.sum(part.noise.weights > 0, axis=-1).ravel() >= _FEWEST)
+    return bool(failed.any())
 
 
 def _df_from_parts(noisy: SmoothingData, parts: list[Part], df_of_part: DfOfPart, power: int) -> float:
@@ -413,8 +421,6 @@ _WIDE = 64
 
 # Kinds of results that may be wrong.
 UNIQUE, TWO, NOISY, FAST = range(4)
-# States of curves, in the order of their numbers in the core.
-_STATES = ("converged", "unconverged", "no curve", "undetermined", "unsettled")
 
 
 class Smoothed(NamedTuple):
@@ -479,8 +485,8 @@ class Found(NamedTuple):
         Points at the knots.
     smoothed : Smoothed
         Properties of the smoothing.
-    faults : list of Fault
-        Curves that failed.
+    states : ndarray of int, shape (curves,)
+        States of the curves, `CONVERGED` or one of the failures.
     selection, rejected : ndarray of int
         Kind of the selection of a robust loss, which is 0 if it can be trusted, and the number of rejected data.
     minima : ndarray of int
@@ -489,7 +495,7 @@ class Found(NamedTuple):
 
     points: Array
     smoothed: Smoothed
-    faults: list[Fault]
+    states: NDArray[np.int_]
     selection: NDArray[np.int_]
     rejected: NDArray[np.int_]
     minima: NDArray[np.int_]
@@ -497,7 +503,7 @@ class Found(NamedTuple):
     def map(self, function: Any) -> Found:
         """Apply a function to all arrays, such as one that adds masked curves."""
         columns = map(function, (self.selection, self.rejected, self.minima))
-        return Found(function(self.points), self.smoothed.map(function), self.faults, *columns)
+        return Found(function(self.points), self.smoothed.map(function), self.states, *columns)
 
 
 def smoothed(
@@ -528,11 +534,11 @@ def smoothed(
     ):
 
         def solve(lam: Doubles, start: Doubles, factor: Any = factor) -> Raw:
-            return Raw(*_core.smooth([(*factor[:4], lam, *factor[5:7], start)], t, at, *how)[0])
+            return Raw.of(_core.smooth([(*factor[:4], lam, *factor[5:7], start)], t, at, *how)[0])
 
         points = small._numbers(factor[1])
         samples = Samples(t, points, part.noise.weights, at, len(small.point_shape), part.ends is None)
-        best, minima = best_of_starts(small, samples, part.lam, Raw(*raw), solve)
+        best, minima = best_of_starts(small, samples, part.lam, Raw.of(raw), solve)
         found.append(_found(part, noisy, options, between, small, span, best, minima))
     return found
 
@@ -548,61 +554,64 @@ def _found(
     minima: NDArray[np.int_],
 ) -> Found:
     batch, sigma = noisy.batch, part.noise.sigma
-    columns = [*raw.columns, np.where(np.isnan(sigma), raw.columns[Column.SIGMA], sigma)]
+    columns = [*raw.columns, np.where(np.isnan(sigma), raw.columns.sigma, sigma)]
     shaped = [x.reshape(batch) for x in columns] if batch else [x[0].item() for x in columns]
-    state, iterations, lam, band_lam, at_bound, df, estimated, step, rate, _, exact, selection, rejected, _, scale = (
-        shaped
-    )
+    state, iterations, lam, band_lam, at_bound, df, estimated, step, rate, _, exact, _, _, _, scale = shaped
+    kinds = [x.reshape(batch) for x in (raw.columns.selection, raw.columns.rejected, minima)]
     method = METHODS[int(np.any(exact))]
     report = SmoothingReport(method, state == 0, iterations, step, rate, lam, at_bound, df, estimated)
-    numbers, kinds = small._numbers(raw.points), raw.columns[Column.STATE]
-    count = raw.points.shape[len(batch)]
-    faults = [
-        Fault(number, UNCONVERGED, _reason(_STATES[kinds[number]], number, report, options, noisy, part.noise, count))
-        for number in (np.flatnonzero(kinds).tolist() if kinds.any() else ())
-    ]
+    numbers = small._numbers(raw.points)
     matrix, turn, size = raw.system
     # Coordinates in a span of lower dimension are not those of the space.
     posterior = Posterior.of(matrix, turn, size) if span is None or size == 1 else None
     result = Smoothed(report, raw.band, band_lam, scale, between, posterior, options.penalty)
-    return Found(numbers if span is None else span.embed(numbers), result, faults, selection, rejected, minima)
+    return Found(numbers if span is None else span.embed(numbers), result, raw.columns.state, *kinds)
 
 
-def _reason(
-    state: str,
-    number: int,
-    report: SmoothingReport,
-    options: SolverOptions,
-    noisy: SmoothingData,
-    noise: Noise,
-    knots: int,
-) -> str:
-    if state == "no curve":
+def faults_of(
+    parts: list[Part], found: list[Found], noisy: SmoothingData, knots: int, options: SolverOptions
+) -> list[Fault]:
+    """Return the faults of the curves that failed, with their messages, in the first part in which some failed."""
+    for part, own in zip(parts, found, strict=True):
+        if own.states.any():
+            return [
+                Fault(number, UNCONVERGED, _reason(own, number, part.noise, noisy, knots, options))
+                for number in np.flatnonzero(own.states).tolist()
+            ]
+    return []
+
+
+def _reason(found: Found, number: int, noise: Noise, noisy: SmoothingData, knots: int, options: SolverOptions) -> str:
+    """Return the message about a curve that failed."""
+    state, report = found.states[number], found.smoothed.report
+    if state == NO_CURVE:
         return (
-            f"The smoothing{{of}} led to points that {NO_CURVE}: the curve turns too far between two knots. Pass more "
+            "The smoothing{of} led to points that no spline joins: the curve turns too far between two knots. Pass more "
             "knots in the gaps of the data, a larger lam, or cut the recording at its gaps (symspline.fit_segments). "
             "Check units and signs of the data."
         )
-    if state == "undetermined" and options.penalty == "jerk":
+    if state == UNDETERMINED and options.penalty == "jerk":
         weights = np.broadcast_to(noise.weights, (*noisy.batch, noise.weights.shape[-1]))
         has_weight = weights.reshape(-1, weights.shape[-1])[number] > 0
         used = int(has_weight.sum())
-        if used < 3:
-            return f"The data{{of}} do not determine the curve: penalty='jerk' {TOO_FEW}, not {used}."
+        if used < _FEWEST:
+            return (
+                f"The data{{of}} do not determine the curve: penalty='jerk' needs at least {_FEWEST} data, not {used}."
+            )
         if not has_weight.all():
             return (
                 f"The data{{of}} do not determine the curve: for penalty='jerk', too many of the {knots} knots have no "
                 "data near them. Remove the times before the first and after the last datum with a nonzero weight. If "
                 f"there is a gap between the data, pass fewer knots, for example knots={max(knots // 6, 10)}."
             )
-    if state == "undetermined":
+    if state == UNDETERMINED:
         return (
             "The data{of} do not determine the curve. With lam=0 there must be data near every knot: pass fewer "
             "knots. Otherwise the weights differ by more than the precision of floating-point numbers: remove data "
             "with tiny weights."
         )
     lam, step, iterations = (np.ravel(x)[number] for x in (report.lam, report.step, report.iterations))
-    if state == "unsettled":
+    if state == UNSETTLED:
         return (
             f"The choice of lam{{of}} did not converge; its last value is {lam:.3g}. Pass this lam, or another "
             "criterion."
@@ -636,18 +645,43 @@ def _longest_gap(number: int, noisy: SmoothingData, noise: Noise) -> str:
 # ---- several starts ----
 
 
+class Columns(NamedTuple):
+    """Properties of curves, one number per curve, in the order of the core."""
+
+    state: NDArray[np.int_]
+    iterations: NDArray[np.int_]
+    lam: Doubles
+    band_lam: Doubles
+    at_bound: NDArray[np.bool_]
+    df: Doubles
+    sigma: Doubles
+    step: Doubles
+    rate: Doubles
+    kappa: Doubles
+    exact: NDArray[np.bool_]
+    selection: NDArray[np.int_]
+    rejected: NDArray[np.int_]
+    objective: Doubles
+
+
 class Raw(NamedTuple):
     """Results of the core for a batch of curves: points at the knots, the band of A⁻¹, columns of the report, A."""
 
     points: Doubles
     band: Doubles
-    columns: tuple[NDArray[Any], ...]
+    columns: Columns
     system: tuple[Doubles, Doubles, int]
+
+    @classmethod
+    def of(cls, result: tuple[Doubles, Doubles, tuple[NDArray[Any], ...], tuple[Doubles, Doubles, int]]) -> Raw:
+        """Return the results of one call of the core."""
+        points, band, columns, system = result
+        return cls(points, band, Columns(*columns), system)
 
     @property
     def converged(self) -> NDArray[np.bool_]:
         """Whether the curves converged."""
-        return np.asarray(self.columns[0] == 0)
+        return np.asarray(self.columns.state == CONVERGED)
 
     def where(self, chosen: NDArray[np.bool_], other: Raw) -> Raw:
         """Return the chosen curves from the other results, and all others from these."""
@@ -660,17 +694,11 @@ class Raw(NamedTuple):
             flat = own.reshape(len(chosen), -1), its.reshape(len(chosen), -1)
             return np.where(chosen[:, None], flat[1], flat[0]).reshape(own.shape)
 
-        columns = tuple(map(pick, self.columns, other.columns))
+        columns = Columns(*map(pick, self.columns, other.columns))
         matrix, turn = map(pick, self.system[:2], other.system[:2])
         return Raw(
             pick(self.points, other.points), pick(self.band, other.band), columns, (matrix, turn, self.system[2])
         )
-
-
-class Column:
-    """Positions of columns of the report."""
-
-    STATE, LAM, SIGMA, OBJECTIVE = 0, 2, 6, -1
 
 
 class Samples(NamedTuple):
@@ -716,14 +744,14 @@ def best_of_starts(space: Space, data: Samples, lam: Doubles, first: Raw, solve:
             best = best.where(fast & other.converged & (less | ~best.converged), other)
     noisy = _noise(best) > _NOISY * radii
     if noisy.any():
-        given = np.where(best.converged, best.columns[Column.LAM], lam)
+        given = np.where(best.converged, best.columns.lam, lam)
         inside = _embedded_start(space, data, given)
         if inside is not None:
             other = solve(given, inside)
             both = best.converged & other.converged
             apart = _apart(space, best.points, other.points) > _OTHER * radius
             variance = _noise(best) ** 2
-            differ = np.abs(other.columns[Column.OBJECTIVE] - best.columns[Column.OBJECTIVE])
+            differ = np.abs(other.columns.objective - best.columns.objective)
             kinds[noisy & both & apart & (differ < _EQUAL * variance)] = TWO
             best = best.where(noisy & other.converged & (_is_less(other, best) | ~best.converged), other)
     kinds[(kinds == UNIQUE) & ~fast & (_noise(best) > _TOO_NOISY * radii)] = NOISY
@@ -739,11 +767,11 @@ def _usual_weights(data: Samples, curves: int) -> Doubles:
 
 def _noise(raw: Raw) -> Doubles:
     """Return the noise levels, infinite for curves that did not converge."""
-    return np.where(raw.converged, raw.columns[Column.SIGMA], np.inf)
+    return np.where(raw.converged, raw.columns.sigma, np.inf)
 
 
 def _is_less(other: Raw, best: Raw) -> NDArray[np.bool_]:
-    return np.asarray(other.columns[Column.OBJECTIVE] < best.columns[Column.OBJECTIVE] * (1 - 1e-6))
+    return np.asarray(other.columns.objective < best.columns.objective * (1 - 1e-6))
 
 
 def _apart(space: Space, p: Doubles, q: Doubles) -> Doubles:
