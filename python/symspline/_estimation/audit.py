@@ -144,7 +144,9 @@ def unit_hints(terms: list[Term]) -> list[str]:
             )
     for term in terms:
         if isinstance(term, RateTerm):
-            points = [own for own in terms if isinstance(own, PointTerm) and own.parts == term.parts]
+            points = [
+                own for own in terms if isinstance(own, PointTerm) and own.roots is None and own.parts == term.parts
+            ]
             ratio = _rates_over_steps(term, points)
             if ratio is not None and abs(np.log(ratio / DEGREES)) < _SIMILAR:
                 hints.append(

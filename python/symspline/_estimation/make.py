@@ -34,7 +34,7 @@ from .._curves.options import check_on_failure, check_progress, checked_extrapol
 from .._curves.solve import DEFAULTS
 from .._smoothing import SmoothingReport, SmoothingSpline, SmoothingWarning, make_smoothing_spline
 from .._smoothing.audit import warn_of_bounds
-from .._smoothing.noise import grouped, join, smoothed_spaces
+from .._smoothing.noise import grouped, join, per_part, smoothed_spaces
 from .._smoothing.report import Parameter
 from .._smoothing.solve import Knots, thin_knots
 from .._spaces import (
@@ -61,7 +61,7 @@ from ..measure import (
     measurement_without_missing,
 )
 from .audit import audit, unit_hints
-from .problem import Setup, Solution, Term, bind, read_lams
+from .problem import Setup, Solution, Term, bind
 from .search import (
     Search,
     Starts,
@@ -290,7 +290,7 @@ def estimate(
     tol = checked_number(tol, "tol must be a number > 0", lambda x: 0 < x < np.inf)
     most = whole_number(max_iter, "max_iter", 1)
     spaces = smoothed_spaces(space)
-    lams = read_lams(lam, len(spaces))
+    lams = np.concatenate(per_part(space, lam, "lam", ()))
     axis, shown, data = _knots(knots, given)
     if len(given) == 1 and isinstance(given[0], Points) and _is_plain(given[0]) and start is None:
         return _smoothed(

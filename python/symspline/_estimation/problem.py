@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, ClassVar, NamedTuple
+from copy import copy
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
-from .._base.arrays import as_array, refuse, short_repr
+from .._base.arrays import as_array, refuse
 from .._base.typing import Loss, Progress
 from .._core import ValidationError
 from .._curves.fit import read
 from .._smoothing.audit import roots_of
 from .._smoothing.noise import join, parts_of_factor, read_precision, smoothed_spaces, split
-from .._smoothing.report import SmoothingReport
+from .._smoothing.report import SmoothingReport, coordinates
 from .._spaces import (
     Array,
     Doubles,
@@ -75,7 +78,7 @@ class Term:
         Names of the parameters of the sensor in the order of the core.
     """
 
-    sensor: ClassVar[str]
+    sensor: str
 
     def __init__(self, label: str, given: Measurement, times: Doubles, parts: list[int]) -> None:
         self.label, self.given, self.times, self.parts = label, given, times, parts
@@ -132,27 +135,17 @@ class Term:
 
 
 class PointTerm(Term):
-    """Points with equal noise in all directions: the residual is −log_γ(y)."""
+    """Points. The residual is −log_γ(y), or R log_y(γ) in a frame at y for information matrices RᵀR.
 
-    sensor = "points"
-
-    def __init__(
-        self, label: str, given: Points, times: Doubles, part: int, space: Space, y: Array, noise: Doubles
-    ) -> None:
-        super().__init__(label, given, times, [part])
-        self.y, self.noise, self.arrays = y, noise, [_doubles(space, y)]
-
-    def precision(self, n: int) -> Doubles:
-        """Return the inverse variances of all n points; those of points without weight are 0."""
-        found = np.zeros(n)
-        found[self.rows] = self.noise[:, 0] ** -2.0
-        return found
-
-
-class InformationTerm(Term):
-    """Points with information matrices: the residual is R log_y(γ) in a frame at y, with the matrices RᵀR."""
-
-    sensor = "information"
+    Attributes
+    ----------
+    y : ndarray, shape (n, *point_shape)
+        Points.
+    roots : ndarray, shape (n, m, m), or None
+        Matrices R; None for equal noise in all directions.
+    known : ndarray of bool, shape (n, m), or None
+        Which of their rows have information.
+    """
 
     def __init__(
         self,
@@ -163,21 +156,42 @@ class InformationTerm(Term):
         space: Space,
         y: Array,
         noise: Doubles,
-        roots: Doubles,
-        known: NDArray[np.bool_],
+        roots: Doubles | None = None,
+        known: NDArray[np.bool_] | None = None,
     ) -> None:
         super().__init__(label, given, times, [part])
         self.y, self.noise, self.roots, self.known = y, noise, roots, known
-        self.arrays = [_doubles(space, y), _doubles(space, space.frame(y)), roots]
+        self.sensor = "points" if roots is None else "information"
+        self.arrays = [_doubles(space, y)]
+        if roots is not None:
+            self.arrays += [_doubles(space, space.frame(y)), roots]
+
+    @property
+    def scales(self) -> Doubles:
+        """Usual standard deviation of a coordinate of every point."""
+        if self.roots is None:
+            return self.noise[:, 0]
+        information = np.mean(self.roots**2, axis=-1).sum(axis=-1)
+        return np.asarray(self.noise[:, 0] / np.sqrt(np.maximum(information, np.finfo(float).tiny)))
 
     def informative(self, residuals: Doubles) -> Doubles:
-        return np.where(self.known, residuals, np.nan)
+        return residuals if self.known is None else np.where(self.known, residuals, np.nan)
 
     def precision(self, n: int) -> Doubles:
-        """Return the inverse covariances of all n points; those of points without weight are 0."""
-        found = np.zeros((n, *self.roots.shape[1:]))
-        found[self.rows] = np.swapaxes(self.roots, -1, -2) @ self.roots / self.noise[..., None] ** 2
-        return found
+        """Return the inverse variances or covariances of all n points; those of points without weight are 0."""
+        own = self.noise[:, 0] ** -2.0
+        if self.roots is not None:
+            own = np.swapaxes(self.roots, -1, -2) @ self.roots / self.noise[..., None] ** 2
+        whole = np.zeros((n, *own.shape[1:]))
+        whole[self.rows] = own
+        return whole
+
+    def residuals_at(self, space: Space, p: Array, frames: Array) -> Doubles:
+        """Return the residuals at the points p of a curve with frames, before they are divided by σ."""
+        if self.roots is None:
+            return -coordinates(space, p, frames, space._apply("log", p=p, q=self.y))
+        logs = coordinates(space, self.y, space.frame(self.y), space._apply("log", p=self.y, q=p))
+        return np.asarray((self.roots @ logs[..., None])[..., 0])
 
 
 class VelocityTerm(Term):
@@ -518,14 +532,12 @@ def _points(given: Points, label: str, times: Doubles, space: Space[Any], parts:
         if rows.shape[:1] != (n,):
             raise ValidationError(f"{label}.y has {len(rows)} points, but there are {n} times")
         good = points_on(own, rows[used], int(used.sum()), f"{label}.y")
-        if information is not None:
-            noise = np.repeat(scale[used, None], own.dim, axis=1)
-            roots = roots_of(information[used])
-            term: Term = InformationTerm(label, given, times[used], part, own, good, noise, *roots)
-        else:
-            weights = 1.0 if precisions is None else precisions[k].weights[used]
-            noise = np.repeat((scale[used] / np.sqrt(weights))[:, None], own.dim, axis=1)
-            term = PointTerm(label, given, times[used], part, own, good, noise)
+        scale = scale[used]
+        roots = () if information is None else roots_of(information[used])
+        if information is None and precisions is not None:
+            scale = scale / np.sqrt(precisions[k].weights[used])
+        noise = np.repeat(scale[:, None], own.dim, axis=1)
+        term = PointTerm(label, given, times[used], part, own, good, noise, *roots)
         term.rows = np.flatnonzero(used)
         terms.append(term)
     return terms
@@ -547,7 +559,8 @@ _FAILURES = {
 }
 
 
-class Setup(NamedTuple):
+@dataclass
+class Setup:
     """The problem and the options of an estimate.
 
     Attributes
@@ -589,38 +602,50 @@ class Setup(NamedTuple):
         """End conditions of the curves."""
         return "natural" if self.penalty == "acceleration" else "not-a-knot"
 
-    @property
+    def with_knots(self, knots: Doubles) -> Setup:
+        """Return the same problem for other knots."""
+        other = copy(self)
+        other.knots = knots
+        return other
+
+    @cached_property
     def columns(self) -> dict[str, slice]:
         """Columns of the parameters by name, in the order of the core."""
-        stops = np.cumsum([constant.size for constant in self.constants.values()]).tolist()
-        sizes = {name: constant.size for name, constant in self.constants.items()}
-        return {name: slice(stop - size, stop) for (name, size), stop in zip(sizes.items(), stops, strict=True)}
+        columns, start = {}, 0
+        for name, constant in self.constants.items():
+            columns[name] = slice(start, start + constant.size)
+            start += constant.size
+        return columns
 
-    @property
+    @cached_property
     def least_squares(self) -> bool:
         """Whether no loss is robust."""
         return all(term.loss == "linear" for term in self.terms)
 
     def state(self, points: list[Array], values: Values) -> tuple[list[Doubles], Doubles]:
         """Return points and values of parameters in the form of the core; missing values are those of the start."""
-        doubles = [
-            np.ascontiguousarray(space._as_doubles(rows)) for space, rows in zip(self.spaces, points, strict=True)
-        ]
+        doubles = list(map(_doubles, self.spaces, points))
         each = [values.get(name, constant.start) for name, constant in self.constants.items()]
         return doubles, np.concatenate([np.empty(0), *each])
 
     def in_core(self) -> tuple[Any, ...]:
         """Return the problem in the form of the core."""
-        columns, priors = self.columns, [np.empty((0, 2))]
+        handles, groups, priors, terms = self._arrays
+        return handles, groups, self.knots, self.penalty, priors, terms
+
+    @cached_property
+    def _arrays(self) -> tuple[list[Any], list[Doubles | None], Doubles, list[tuple[Any, ...]]]:
+        """The part of `in_core` that does not depend on the knots."""
+        priors = [np.empty((0, 2))]
         for constant in self.constants.values():
             precision = np.zeros(constant.size) if constant.sigma is None else constant.sigma**-2.0
             priors.append(np.stack([constant.start, precision], axis=-1))
-        handles = [space._handle for space in self.spaces]
-        groups = [
-            np.ascontiguousarray(Body(space).inverse) if is_compact_group(space) else None for space in self.spaces
-        ]
-        terms = [term.in_core(columns) for term in self.terms]
-        return handles, groups, self.knots, self.penalty, np.concatenate(priors), terms
+        handles: list[Any] = []
+        groups: list[Doubles | None] = []
+        for space in self.spaces:
+            handles.append(space._handle)
+            groups.append(np.ascontiguousarray(Body(space).inverse) if is_compact_group(space) else None)
+        return handles, groups, np.concatenate(priors), [term.in_core(self.columns) for term in self.terms]
 
 
 class Rows(NamedTuple):
@@ -742,19 +767,3 @@ def _undetermined(setup: Setup, information: Doubles) -> ValidationError:
         f"The measurements do not determine {' and '.join(map(repr, described))} in the direction {described}. Pass "
         "a Constant with sigma, which is a prior, or measurements that depend on it."
     )
-
-
-def read_lams(value: Any, count: int) -> Doubles:
-    """Return λ of each part; NaN if it is to be chosen."""
-    values = value if isinstance(value, tuple) else (value,) * count
-    if len(values) != count:
-        raise ValidationError(f"lam has {len(values)} entries, but there are {count} parts. Pass one entry per part.")
-    found = np.full(count, np.nan)
-    for i, own in enumerate(values):
-        if own is None:
-            continue
-        array = as_array(own, "lam")
-        if array.ndim or array.dtype.kind not in "iuf" or not (np.isfinite(array) and array >= 0):
-            raise ValidationError(f"lam must be a number >= 0, or a tuple with one per part, not {short_repr(own)}")
-        found[i] = float(array)
-    return found

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,7 +27,6 @@ from .problem import (
     Body,
     DirectionTerm,
     ForceTerm,
-    InformationTerm,
     PointTerm,
     RateTerm,
     Setup,
@@ -108,7 +108,7 @@ def _of_curve(start: Any, axis: TimeAxis, part: int) -> PathOfPart:
 
 def _candidates(setup: Setup, part: int, space: Space[Any]) -> list[Callable[[], Start]]:
     """Return functions that compute initial curves of one part, the most promising first."""
-    points = [term for term in setup.terms if isinstance(term, (PointTerm, InformationTerm)) and term.parts == [part]]
+    points = [term for term in setup.terms if isinstance(term, PointTerm) and term.parts == [part]]
     rates = [term for term in setup.terms if isinstance(term, RateTerm) and term.parts == [part]]
     seen = [term for term in setup.terms if isinstance(term, DirectionTerm) and term.parts == [part]]
     found: list[Callable[[], Start]] = []
@@ -157,12 +157,12 @@ def _candidates(setup: Setup, part: int, space: Space[Any]) -> list[Callable[[],
     )
 
 
-def _are_dense(setup: Setup, points: list[PointTerm | InformationTerm], rates: list[RateTerm]) -> bool:
+def _are_dense(setup: Setup, points: list[PointTerm], rates: list[RateTerm]) -> bool:
     """Whether attitudes determine the path between them: the body turns by little from one to the next."""
     if not setup.least_squares or any(own.time_offset for own in (*points, *rates)):
         return False
     times = np.unique(np.concatenate([setup.knots[[0, -1]], *(own.times for own in points)]))
-    sigma = max(float(scales_of(own).max()) for own in points)
+    sigma = max(float(term.scales.max()) for term in points)
     speed = max(float(np.linalg.norm(own.omega, axis=1).max()) for own in rates)
     return float(np.diff(times).max()) * speed + 3 * sigma < _SMALL
 
@@ -170,23 +170,15 @@ def _are_dense(setup: Setup, points: list[PointTerm | InformationTerm], rates: l
 # ---- points ----
 
 
-def scales_of(term: PointTerm | InformationTerm) -> Doubles:
-    """Return the usual standard deviation of a coordinate of every point."""
-    if isinstance(term, PointTerm):
-        return term.noise[:, 0]
-    information = np.mean(term.roots**2, axis=-1).sum(axis=-1)
-    return np.asarray(term.noise[:, 0] / np.sqrt(np.maximum(information, np.finfo(float).tiny)))
-
-
 def _smoothed(
     setup: Setup,
     space: Space[Any],
-    points: list[PointTerm | InformationTerm],
+    points: list[PointTerm],
     beside: list[VelocityTerm],
     most: int = _MOST,
 ) -> Start:
     """Return smoothed points, together with those at which velocities are given."""
-    scales = [scales_of(term) for term in points]
+    scales = [term.scales for term in points]
     typical = float(np.median(np.concatenate(scales))) if scales else 1.0
     times = np.concatenate([*(term.times for term in points), *(term.times for term in beside)])
     y = np.concatenate([*(term.y for term in points), *(term.y for term in beside)])
@@ -215,7 +207,7 @@ def _smoothed(
 # ---- rates ----
 
 
-def _signed(path: PathOfPart, points: list[PointTerm | InformationTerm]) -> PathOfPart:
+def _signed(path: PathOfPart, points: list[PointTerm]) -> PathOfPart:
     """Return a path of unit quaternions with the sign of most of the measured ones."""
 
     def signed(x: Doubles) -> Array:
@@ -233,10 +225,10 @@ class _Seen(NamedTuple):
     time_offset: str | None
 
 
-def _attitudes(space: Space[Any], points: list[PointTerm | InformationTerm], seen: list[DirectionTerm]) -> list[_Seen]:
+def _attitudes(space: Space[Any], points: list[PointTerm], seen: list[DirectionTerm]) -> list[_Seen]:
     """Return measured attitudes; if they are few, also attitudes computed from simultaneous directions."""
     found = [
-        _Seen(Attitudes(term.times, Body(space).matrices(term.y), scales_of(term)), term.time_offset) for term in points
+        _Seen(Attitudes(term.times, Body(space).matrices(term.y), term.scales), term.time_offset) for term in points
     ]
     if sum(len(own.attitudes.times) for own in found) >= _FEW:
         return found
@@ -371,7 +363,9 @@ def _rows(reference: Doubles, seen: Doubles) -> tuple[Doubles, Doubles]:
 
 def _force_vectors(setup: Setup, term: ForceTerm) -> _Vectors:
     """Return the accelerations without gravity that follow from measured positions, and the specific forces."""
-    points = [own for own in setup.terms if isinstance(own, PointTerm) and own.parts == [term.parts[1]]]
+    points = [
+        own for own in setup.terms if isinstance(own, PointTerm) and own.roots is None and own.parts == [term.parts[1]]
+    ]
     times = np.concatenate([own.times for own in points]) if points else np.empty(0)
     expected = np.tile(-term.gravity, (len(term.times), 1))
     count = len(np.unique(times))
@@ -607,7 +601,7 @@ def automatic(
         times = axis.knots(shown)
         later = np.append(True, np.diff(times) > 0)
         later[-1] = True
-        return shown[later], setup._replace(knots=times[later])
+        return shown[later], setup.with_knots(times[later])
 
     knots = filled(that_reproduce(setup, begin[0], data), data)
     most = 2 * len(data) + len(setup.knots)
@@ -660,7 +654,7 @@ def _moved(coarse: Setup, before: Solution, fine: Setup, found: Solution) -> flo
         PointTerm("", Points(x, y, sigma=1.0), x, part, space, y, np.ones((len(x), space.dim)))
         for part, (space, y) in each
     ]
-    apart = residuals(coarse._replace(terms=points), before.points, before.values)
+    apart = residuals(replace(coarse, terms=points), before.points, before.values)
     if apart is None:
         return float("inf")
     squares = sum((rows**2).sum(axis=1) for rows in apart)
@@ -754,13 +748,11 @@ def that_reproduce(setup: Setup, start: Start, data: Doubles) -> Doubles:
     """
     fine = np.unique(np.concatenate([setup.knots, data]))
     fine = fine[merged(fine, len(fine))]
-    own = (
-        None if len(fine) > _MOST_COMPARED else residuals(setup._replace(knots=fine), start.points(fine), start.values)
-    )
+    own = None if len(fine) > _MOST_COMPARED else residuals(setup.with_knots(fine), start.points(fine), start.values)
     knots = setup.knots
     values = {name: np.array(constant.start) for name, constant in setup.constants.items()} | start.values
     for _ in range(_ROUNDS):
-        found = residuals(setup._replace(knots=knots), start.points(knots), start.values)
+        found = residuals(setup.with_knots(knots), start.points(knots), start.values)
         if found is None:
             bad = np.diff(knots) > 0
         else:

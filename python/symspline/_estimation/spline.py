@@ -16,15 +16,14 @@ from .._curves.curve import SidePanel, UncertaintyBand
 from .._curves.ends import end_kinds
 from .._smoothing.gaps import Calibration, Course, SensorEvidence, calibrate
 from .._smoothing.noise import SmoothingData, is_several, smoothed_spaces
-from .._smoothing.report import Parameter, Posterior, SmoothingReport, coordinates
+from .._smoothing.report import Parameter, Posterior, SmoothingReport
 from .._smoothing.solve import Smoothed
 from .._smoothing.spline import SmoothingSpline
 from .._spaces import Array, Doubles, Product, Space, SpecialEuclidean, factors_of, parts_of
 from .._splines.archive import Entries, entry, read_fitted, read_report
 from .._splines.cubic import CubicSpline
 from ..measure import BodyRates, Measurement, Points, SpecificForce
-from .problem import InformationTerm, PointTerm, Setup, Solution, Term
-from .search import scales_of
+from .problem import PointTerm, Setup, Solution
 
 # Points beyond this quantile of the noise are not predicted if the loss is robust.
 _KEPT = 0.999
@@ -70,7 +69,7 @@ def _course(order: int, lam: float, variance: Variance) -> Course:
 def long_gaps(setup: Setup, found: Solution, part: int) -> LongGaps | None:
     """Return the long gaps of a part, or None if there are none or the part has no points that can be predicted."""
     terms = [k for k, term in enumerate(setup.terms) if part in term.parts]
-    points = [k for k in terms if isinstance(setup.terms[k], (PointTerm, InformationTerm))]
+    points = [k for k in terms if isinstance(setup.terms[k], PointTerm)]
     lam = float(found.reports[part].lam)
     if found.failure or not points or not 0 < lam < np.inf:
         return None
@@ -103,8 +102,8 @@ def _posterior(setup: Setup, found: Solution, first: int) -> Posterior:
 
 def _weights(setup: Setup, k: int) -> Doubles:
     term = setup.terms[k]
-    assert isinstance(term, (PointTerm, InformationTerm))
-    return np.asarray(scales_of(term) ** -2.0)
+    assert isinstance(term, PointTerm)
+    return np.asarray(term.scales**-2.0)
 
 
 def _evidence(
@@ -141,7 +140,7 @@ def _evidence(
         near = np.ones(n, bool)
         if term.loss != "linear":
             near = np.sum(own.residuals**2, axis=1) <= _core.chi_squared(dim, _KEPT)
-        counts.append(near & isinstance(term, (PointTerm, InformationTerm)))
+        counts.append(near & isinstance(term, PointTerm))
     firsts = _core.coefficient_factors(setup.knots, kinds, times, 0)[0]
     return SensorEvidence(
         setup.knots,
@@ -354,15 +353,6 @@ class EstimatedSpline(SmoothingSpline[P, Any]):
         return f"<EstimatedSpline on {self.space!r}: {text}>"
 
 
-def _of_points(term: Term, space: Space, p: Array, frames: Array) -> Doubles:
-    """Return the residuals of points at the points p of a curve with frames."""
-    if isinstance(term, PointTerm):
-        return -coordinates(space, p, frames, space._apply("log", p=p, q=term.y))
-    assert isinstance(term, InformationTerm)
-    logs = coordinates(space, term.y, space.frame(term.y), space._apply("log", p=term.y, q=p))
-    return np.asarray((term.roots @ logs[..., None])[..., 0])
-
-
 class PointsSpline(SmoothingSpline[P, Any]):
     """A smoothing spline that `estimate` fitted to points only, with residuals like those of an `EstimatedSpline`."""
 
@@ -371,7 +361,7 @@ class PointsSpline(SmoothingSpline[P, Any]):
     _residuals: tuple[Doubles | tuple[Doubles, ...], ...]
 
     @classmethod
-    def of(cls, fitted: SmoothingSpline[Any, Any], given: Points, terms: list[Term]) -> Self:
+    def of(cls, fitted: SmoothingSpline[Any, Any], given: Points, terms: list[PointTerm]) -> Self:
         """Return the result of `estimate` from the smoothing spline and the terms of its points.
 
         Parameters
@@ -380,14 +370,14 @@ class PointsSpline(SmoothingSpline[P, Any]):
             The curve.
         given : Points
             The points of the user.
-        terms : list of Term
+        terms : list of PointTerm
             The same points in every part, with standard deviations of one if none were given.
         """
         found = []
         for term in terms:
             (part,) = term.parts
             p, frames = fitted._frames(term.times, False)[part]
-            rows = _of_points(term, smoothed_spaces(fitted.space)[part], p, frames)
+            rows = term.residuals_at(smoothed_spaces(fitted.space)[part], p, frames)
             scale = 1.0 if given.sigma is not None else float(fitted._smoothed[part].sigma)
             with np.errstate(divide="ignore", invalid="ignore"):
                 found.append(np.asarray(rows / term.noise / scale))

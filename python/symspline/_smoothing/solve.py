@@ -586,9 +586,9 @@ def _reason(found: Found, number: int, noise: Noise, noisy: SmoothingData, knots
     state, report = found.states[number], found.smoothed.report
     if state == NO_CURVE:
         return (
-            "The smoothing{of} led to points that no spline joins: the curve turns too far between two knots. Pass more "
-            "knots in the gaps of the data, a larger lam, or cut the recording at its gaps (symspline.fit_segments). "
-            "Check units and signs of the data."
+            "The smoothing{of} led to points that no spline joins: the curve turns too far between two knots. Pass "
+            "more knots in the gaps of the data, a larger lam, or cut the recording at its gaps "
+            "(symspline.fit_segments). Check units and signs of the data."
         )
     if state == UNDETERMINED and options.penalty == "jerk":
         weights = np.broadcast_to(noise.weights, (*noisy.batch, noise.weights.shape[-1]))
