@@ -290,7 +290,7 @@ def estimate(
     tol = checked_number(tol, "tol must be a number > 0", lambda x: 0 < x < np.inf)
     most = whole_number(max_iter, "max_iter", 1)
     spaces = smoothed_spaces(space)
-    lams = np.concatenate(per_part(space, lam, "lam", ()))
+    lams = np.concatenate(per_part(space, spaces, lam, "lam", ()))
     axis, shown, data = _knots(knots, given)
     if len(given) == 1 and isinstance(given[0], Points) and _is_plain(given[0]) and start is None:
         return _smoothed(

@@ -55,6 +55,8 @@ class Fitted(NamedTuple):
         Data.
     result : Found
         Smooth curves.
+    report : SmoothingReport
+        Report for the user, in which an infinite λ is the one that was given.
     at : ndarray, shape (..., N, *point_shape)
         Points of the curves at the times of the data.
     converged : ndarray of bool
@@ -65,15 +67,11 @@ class Fitted(NamedTuple):
 
     part: Part
     result: Found
+    report: SmoothingReport
     at: Array
     converged: NDArray[np.bool_]
     chosen: NDArray[np.bool_]
     given: NDArray[np.bool_]
-
-    @property
-    def report(self) -> SmoothingReport:
-        """Report of the smoothing, for the spline of the user: an infinite λ is the one that was given."""
-        return self.result.smoothed.report
 
 
 def audit(
@@ -100,17 +98,22 @@ def audit(
     at_data: list[Array] = []
     for factor, curve in zip(factors_of(space), spline._curve.parts, strict=True):
         at_data += split(factor, curve.evaluate(noisy.times, "point", "raise", noisy.times.ndim > 1))
-    fits, reports, trusted, counts = [], [], [], []
+    fits, reports, trusted, counts, selected, unique = [], [], [], [], True, True
     for part, result, rows, smoothed in zip(parts, results, at_data, spline._smoothed, strict=True):
-        converged = np.asarray(smoothed.report.converged)
+        report = smoothed.report
+        converged = np.asarray(report.converged)
         chosen = np.isnan(part.lam).reshape(batch) & choices
         given = np.isfinite(part.noise.sigma).reshape(batch) & good
-        fits.append(Fitted(part, result._replace(smoothed=smoothed), rows, converged, chosen, given))
-        reports.append(smoothed.report)
+        fits.append(Fitted(part, result, report, rows, converged, chosen, given))
+        reports.append(report)
+        selected &= not result.selection.any()
+        unique &= not result.minima.any()
         trusted.append(chosen & (result.selection == 0) & (result.minima == UNIQUE))
         counts.append(np.sum(part.noise.weights > 0, axis=-1))
-    _warn_of_outliers(space, fits, counts)
-    _warn_of_minima(space, fits)
+    if not selected:
+        _warn_of_outliers(space, fits, counts)
+    if not unique:
+        _warn_of_minima(space, fits)
     warn_of_bounds(space, reports, trusted, counts)
     if not is_silent(SmoothingWarning):
         _warn_of_residuals(space, noisy, fits)

@@ -1249,7 +1249,7 @@ def _lams(lam: Any, dims: int, space: Space[Any]) -> list[tuple[float | None, ..
 
 def _in_parts(value: Any, name: str, space: Space[Any]) -> list[float]:
     """Return a number >= 0 for each part of the space; NaN for None."""
-    return [float(one[0]) for one in per_part(space, value, name, ())]
+    return [float(one[0]) for one in per_part(space, smoothed_spaces(space), value, name, ())]
 
 
 def _summary(space: Space[Any], data: Array, weights: Doubles, found: SmoothedNodes, sigma: float) -> SmoothedPart:

@@ -305,7 +305,7 @@ def make_smoothing_spline(
         t, points, weights, frames = data_without_missing(t, points, weights, frames, space)
     whole, data, of_factors = read_noisy(t, points, space, weights, frames, sigma, loss, bc_type, atol)
     batch = whole.batch
-    lams = per_part(space, lam, "lam", batch, infinite=True)
+    lams = per_part(space, smoothed_spaces(space), lam, "lam", batch, infinite=True)
     if np.isinf(lams).any():
         for name, value, required in (("penalty", penalty, "acceleration"), ("bc_type", bc_type, "natural")):
             if value != required:
@@ -353,7 +353,7 @@ def make_smoothing_spline(
     elif knots is None:
         found, at = with_enough_knots(every, noisy, parts, run, df_of_part, penalty)
         # Knots in gaps are tried before a larger λ, which would affect the whole curve.
-        if any((own.states == NO_CURVE).any() for own in found):
+        if NO_CURVE in np.concatenate([own.states for own in found]):
             at = in_gaps(at, whole)
             found = run(at, raise_lam=True)
     else:

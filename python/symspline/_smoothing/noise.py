@@ -197,8 +197,6 @@ def read_precision(weights: Any, frames: Any, space: Space, data: list[Points]) 
         Tangent vectors to which matrices refer, m at every point, shape (..., N, m, *point_shape). For a product, a
         tuple. None means ``space.frame``.
     """
-    if weights is None and frames is None:
-        return [Noise(np.ones(data[0].nodes), None)] * len(smoothed_spaces(space))
     factors, several = factors_of(space), isinstance(space, Product)
     own = _per_part(weights, "weights", len(factors), several and isinstance(weights, tuple))
     own_frames = _per_part(frames, "frames", len(factors), several and frames is not None)
@@ -399,8 +397,10 @@ def _inverse_frames(frames: Any, space: Space, data: Points, used: Any) -> Doubl
 # ---- numbers per curve ----
 
 
-def per_part(space: Space, value: Any, name: str, batch: tuple[int, ...], infinite: bool = False) -> list[Doubles]:
-    """Return one array with a number per curve for each space in which data are smoothed; NaN for None.
+def per_part(
+    space: Space, spaces: tuple[Space, ...], value: Any, name: str, batch: tuple[int, ...], infinite: bool = False
+) -> list[Doubles]:
+    """Return one array with a number per curve for each of the smoothed spaces; NaN for None.
 
     Raises
     ------
@@ -408,8 +408,7 @@ def per_part(space: Space, value: Any, name: str, batch: tuple[int, ...], infini
         If the value is not a number >= 0, which may be infinite if `infinite` is True, an array with one per curve, or
         for products and poses a tuple of these.
     """
-    spaces = smoothed_spaces(space)
-    values = [value] * len(spaces)
+    values = [value]
     if isinstance(value, tuple) and is_several(space):
         if len(value) != len(spaces):
             raise ValidationError(
@@ -428,7 +427,7 @@ def per_part(space: Space, value: Any, name: str, batch: tuple[int, ...], infini
             bad = ~((array >= 0) & (infinite | np.isfinite(array)))
             refuse(bad, name, lambda i, array=array, allowed=allowed: f"must be {allowed}, not {array[i]}")
         arrays.append(np.ascontiguousarray(np.broadcast_to(array, batch), np.float64).ravel())
-    return arrays
+    return arrays if len(arrays) == len(spaces) else arrays * len(spaces)
 
 
 # ---- data ----
@@ -520,17 +519,20 @@ def read_noisy(
         )
     if np.any(times[..., -1] / 2 - times[..., 0] / 2 > _LONGEST):
         raise ValidationError(f"t spans more than {_LONGEST:.0e}, too much for smoothing. Choose another unit of time.")
-    given = read_precision(weights, frames, space, data)
+    spaces = smoothed_spaces(space)
+    given = [Noise(np.ones(count), None)] * len(spaces)
+    if weights is not None or frames is not None:
+        given = read_precision(weights, frames, space, data)
     if weights is not None:
         each = zip(data, grouped(space, given), strict=True)
         data = [_without_missing(part, [one.weights for one in own]) for part, own in each]
     if space._has_quotients:
         bc_type = moved_ends(bc_type, space, data)
     ends = read_ends(bc_type, space, batch)
-    sigmas = per_part(space, sigma, "sigma", batch)
+    sigmas = per_part(space, spaces, sigma, "sigma", batch)
     # Two points have no outliers and do not determine the noise level.
     loss = "linear" if count == 2 else loss
-    noise = [own._replace(sigma=sigma, loss=loss) for own, sigma in zip(given, sigmas, strict=True)]
+    noise = [Noise(*own[:2], *rest) for own, *rest in zip(given, sigmas, [loss] * len(spaces), strict=True)]
     return SmoothingData(time_axis, shown_times, times, [], noise, batch), data, ends
 
 

@@ -247,10 +247,9 @@ def with_enough_knots(
             if not np.array_equal(fewer.times, at.times) and fewer.times.shape[-1] <= count:
                 at = fewer
                 continue
-        reports = [own.smoothed.report for own in found]
-        apart = merge_close_knots(whole, noisy, _of_all([report.lam for report in reports]), power, coarser)
-        most = apart.times.shape[-1]
-        enough = _n_knots_for_df([report.df for report in reports])
+        lams, dfs = np.array([(own.smoothed.report.lam, own.smoothed.report.df) for own in found]).swapaxes(0, 1)
+        apart = merge_close_knots(whole, noisy, _of_all(lams), power, coarser)
+        most, enough = apart.times.shape[-1], _n_knots_for_df(dfs)
         if tries == _TRIES - 1 or (count >= most > 0.8 * count and count > 0.8 * min(enough, most)):
             break
         # A stiff curve needs fewer knots than it had, and a rough curve more.
