@@ -81,10 +81,9 @@ def _leverages(setup: Setup, found: Solution) -> list[tuple[float, float]]:
 
     The leverage of a measurement is the variance of its fitted value. That of all constants is at most their number.
     """
-    band = found.matrices[0]
-    m = band.shape[1] // 4
-    posterior, kinds = Posterior.of(band, np.zeros((0, 0)), m), end_kinds(setup.bc_type)
-    result = []
+    # The leverage is that of the curve for known parameters.
+    posterior, kinds = Posterior.of(*found.posterior[:3]), end_kinds(setup.bc_type)
+    m, result = posterior.size, []
     for term, own in zip(setup.terms, found.rows, strict=True):
         orders = [nu for nu, jacobian in enumerate(own.jacobians) if jacobian is not None]
         n = len(term.times)

@@ -74,7 +74,7 @@ from .search import (
     warn_of_gaps,
     warn_of_turns,
 )
-from .spline import EstimatedSpline, PointsSpline, joint, long_gaps
+from .spline import EstimatedSpline, PointsSpline, in_parts, long_gaps
 
 # Largest number of knots. A curve with more knots would not fit into memory.
 _MOST_KNOTS = 2**32
@@ -512,11 +512,6 @@ def _curve(
         parts.append(CorePoints(doubles, 0.0, (), len(setup.knots)))
         ends.append(read_ends(setup.bc_type, factor, ())[0])
     through = fit(FitProblem(space, setup.knots, parts, ends, DEFAULTS, check=False))
-    band, side, corner = found.matrices
-    size, first, smoothed = sum(own.dim for own in setup.spaces), 0, []
-    for part, report in zip(setup.spaces, found.reports, strict=True):
-        smoothed.append(joint(report, band, side, corner, size, first))
-        first += part.dim
     parameters = {
         name: Parameter(found.values[name], found.covariance[own, own]) for name, own in setup.columns.items()
     }
@@ -528,7 +523,7 @@ def _curve(
         policy,
         through.reports(),
         None,
-        smoothed,
+        in_parts(found.posterior, found.reports, setup.spaces),
         parameters,
         tuple(given),
         tuple(_residuals_of(setup, found, f"measurements[{i}]") for i in range(len(given))),

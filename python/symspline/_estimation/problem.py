@@ -18,7 +18,7 @@ from .._core import ValidationError
 from .._curves.fit import read
 from .._smoothing.audit import roots_of
 from .._smoothing.noise import join, parts_of_factor, read_precision, smoothed_spaces, split
-from .._smoothing.report import SmoothingReport, coordinates
+from .._smoothing.report import Posterior, SmoothingReport, coordinates
 from .._spaces import (
     Array,
     Doubles,
@@ -681,8 +681,8 @@ class Solution(NamedTuple):
         Parameters by name.
     reports : list of SmoothingReport
         Reports of all parts.
-    matrices : list of ndarray
-        Band, side and corner of the matrix of the linear problem.
+    posterior : Posterior
+        The matrix of the linear problem, which couples the coordinates of all parts and the parameters.
     covariance : ndarray, shape (p, p)
         Covariance of the parameters for noise of variance one.
     rows : list of Rows
@@ -702,7 +702,7 @@ class Solution(NamedTuple):
     points: list[Array]
     values: Values
     reports: list[SmoothingReport]
-    matrices: list[Doubles]
+    posterior: Posterior
     covariance: Doubles
     rows: list[Rows]
     variances: Doubles
@@ -727,17 +727,15 @@ def iterate(setup: Setup, points: list[Array], values: Values, progress: Progres
     information, covariance = found["information"], np.full_like(found["information"], np.nan)
     if np.isfinite(information).all():
         covariance = np.asarray(np.linalg.pinv(information, hermitian=True), np.float64)
-    distance = 0.0
+    distance, (band, side, corner) = 0.0, found["matrices"]
     if failed is None and found["turn"] > _TURN:
         normal = np.random.default_rng(0).standard_normal((_SAMPLES, found["variances"].size))
-        distance = _core.distance_from_minimum(
-            problem, found["points"], found["values"], found["lams"], found["matrices"][0], normal
-        )
+        distance = _core.distance_from_minimum(problem, found["points"], found["values"], found["lams"], band, normal)
     return Solution(
         [space._numbers(rows) for space, rows in zip(setup.spaces, found["points"], strict=True)],
         {name: found["values"][own] for name, own in setup.columns.items()},
         reports,
-        found["matrices"],
+        Posterior(band, np.zeros((0, 0)), sum(space.dim for space in setup.spaces), side, corner),
         covariance,
         [Rows(*rows) for rows in found["terms"]],
         found["variances"],

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, NamedTuple, Self
 
@@ -69,19 +69,22 @@ def _course(order: int, lam: float, variance: Variance) -> Course:
 def long_gaps(setup: Setup, found: Solution, part: int) -> LongGaps | None:
     """Return the long gaps of a part, or None if there are none or the part has no points that can be predicted."""
     terms = [k for k, term in enumerate(setup.terms) if part in term.parts]
-    points = [k for k in terms if isinstance(setup.terms[k], PointTerm)]
+    has_points = any(isinstance(setup.terms[k], PointTerm) for k in terms)
     lam = float(found.reports[part].lam)
-    if found.failure or not points or not 0 < lam < np.inf:
+    if found.failure or not has_points or not 0 < lam < np.inf:
         return None
     each = [np.clip(setup.terms[k].shifted_times(found.values), setup.knots[0], setup.knots[-1]) for k in terms]
-    weights = [_weights(setup, k) if k in points else np.zeros(len(x)) for k, x in zip(terms, each, strict=True)]
+    weights = [
+        term.scales**-2.0 if isinstance(term, PointTerm) else np.zeros(len(x))
+        for term, x in zip((setup.terms[k] for k in terms), each, strict=True)
+    ]
     order = np.argsort(np.concatenate(each), kind="stable")
     times, weight = np.concatenate(each)[order], np.concatenate(weights)[order]
     if not np.ptp(times) > 0:
         return None
 
     space, kinds = setup.spaces[part], end_kinds(setup.bc_type)
-    posterior = _posterior(setup, found, sum(own.dim for own in setup.spaces[:part]))
+    posterior = found.posterior._replace(first=sum(own.dim for own in setup.spaces[:part]))
 
     def evidence() -> SensorEvidence:
         return _evidence(setup, found, part, terms, order, times, weight)
@@ -95,17 +98,6 @@ def long_gaps(setup: Setup, found: Solution, part: int) -> LongGaps | None:
     return LongGaps(result.gaps, result.width, (result.at_data(0), result.at_data(1))) if result.gaps else None
 
 
-def _posterior(setup: Setup, found: Solution, first: int) -> Posterior:
-    band, side, corner = found.matrices
-    return Posterior(band, np.zeros((0, 0)), sum(space.dim for space in setup.spaces), side, corner, first)
-
-
-def _weights(setup: Setup, k: int) -> Doubles:
-    term = setup.terms[k]
-    assert isinstance(term, PointTerm)
-    return np.asarray(term.scales**-2.0)
-
-
 def _evidence(
     setup: Setup,
     found: Solution,
@@ -116,10 +108,10 @@ def _evidence(
     weights: Doubles,
 ) -> SensorEvidence:
     """Return the linearised measurements of a part, in the order of time."""
-    kinds, size = end_kinds(setup.bc_type), sum(space.dim for space in setup.spaces)
+    kinds, size = end_kinds(setup.bc_type), found.posterior.size
     parameters = sum(constant.size for constant in setup.constants.values())
     q = max(found.rows[k].residuals.shape[1] for k in terms)
-    known = _posterior(setup, found, 0).known((), kinds)
+    known = found.posterior.known((), kinds)
     factors, sides, residuals, counts = [], [], [], []
     for k in terms:
         term, own = setup.terms[k], found.rows[k]
@@ -166,13 +158,17 @@ def _are_partial(points: Points, factor: Space[Any]) -> bool:
     return partial and np.shape(y)[1:] != factor.point_shape
 
 
-def joint(report: SmoothingReport, band: Doubles, side: Doubles, corner: Doubles, size: int, first: int) -> Smoothed:
-    """Return the result in one part, whose coordinates begin with number `first` of all coordinates.
+def in_parts(posterior: Posterior, reports: Sequence[SmoothingReport], spaces: Sequence[Space]) -> list[Smoothed]:
+    """Return the result in each part.
 
     Given standard deviations are trusted, as with ``absolute_sigma`` of SciPy's ``curve_fit``.
     """
-    posterior = Posterior(band, np.zeros((0, 0)), size, side, corner, first)
-    return Smoothed(report, np.zeros((0, 4)), report.lam, 1.0, False, posterior)
+    first, results = 0, []
+    for report, space in zip(reports, spaces, strict=True):
+        own = posterior._replace(first=first)
+        results.append(Smoothed(report, np.zeros((0, 4)), report.lam, 1.0, False, own))
+        first += space.dim
+    return results
 
 
 def _each(value: Any) -> tuple[Any, ...]:
@@ -255,7 +251,7 @@ class EstimatedSpline(SmoothingSpline[P, Any]):
     # ---- plots ----
 
     def _noise_beside(self, index: tuple[int, ...], x: Doubles) -> UncertaintyBand:
-        radii = [own[-1][1] for own in self._radii(x)]
+        radii = [own[-1][1] for own in self._radii(index, x)]
         speed = None if is_several(self.space) else self._spread(0, index, x, 1)
         others = [self._times_of(own) for own in self._measurements if not isinstance(own, Points)]
         times, points = zip(*map(self._points_in, range(len(factors_of(self.space)))), strict=True)
@@ -337,12 +333,9 @@ class EstimatedSpline(SmoothingSpline[P, Any]):
                 own.cov.shape != 2 * own.value.shape for own in parameters.values()
             ):
                 raise ValidationError("the matrices do not match the parameters and knots")
-        smoothed, first = [], 0
         with entry("noise"):
-            for space, numbers in zip(spaces, state["noise"], strict=True):
-                report = read_report(SmoothingReport, dict(numbers), ())
-                smoothed.append(joint(report, matrix, side, corner, m, first))
-                first += space.dim
+            reports = [read_report(SmoothingReport, dict(numbers), ()) for numbers in state["noise"]]
+            smoothed = in_parts(Posterior(matrix, np.zeros((0, 0)), m, side, corner), reports, spaces)
         with entry("gaps"):
             gaps = [read_long_gaps(own) for own in state.get("gaps", [None] * len(spaces))]
         return cls._of(*parts, None, smoothed, parameters, (), (), gaps)

@@ -810,26 +810,22 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
     def _noise_beside(self, index: tuple[int, ...], x: Doubles) -> UncertaintyBand:
         noisy = self._noisy.map(itemgetter(index), ())
         # The parts of a pose have different units; plots show the band of the position.
-        radii = [
-            radius(own[-1][1], 0.95) * self._spread(own[-1][0], index, x, 0)
-            for own in grouped(self.space, enumerate(smoothed_spaces(self.space)))
-        ]
-        several = is_several(self.space)
-        speed = None if several else self._spread(0, index, x, 1)
-        points = [own[noisy.used] for own in noisy.points]
+        radii = [of_factor[-1][1] for of_factor in self._radii(index, x)]
+        speed = None if is_several(self.space) else self._spread(0, index, x, 1)
+        points = [rows[noisy.used] for rows in noisy.points]
         return UncertaintyBand([noisy.times[noisy.used]] * len(points), points, radii, speed)
 
-    def _radii(self, x: Doubles) -> list[list[tuple[Space, Doubles]]]:
+    def _radii(self, index: tuple[int, ...], x: Doubles) -> list[list[tuple[Space, Doubles]]]:
         """Return the parts of every factor, and the radii of their 95 % bands at times x of the core."""
         parts = enumerate(smoothed_spaces(self.space))
         return grouped(
-            self.space, [(part, radius(part, 0.95) * self._spread(number, (), x, 0)) for number, part in parts]
+            self.space, [(part, radius(part, 0.95) * self._spread(number, index, x, 0)) for number, part in parts]
         )
 
     def _panels_below(self, x: Doubles) -> list[SidePanel]:
         return [
             SidePanel(f"95 % band\nof {part}{', rad' if part in _TURNING else ''}", x, values[:, None], factor=number)
-            for number, own in enumerate([] if self._batch else self._radii(x))
+            for number, own in enumerate([] if self._batch else self._radii((), x))
             for part, values in own
         ]
 
