@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -220,7 +220,7 @@ class RateTerm(Term):
 
     def __init__(self, label: str, given: BodyRates, times: Doubles, part: int, space: Space) -> None:
         super().__init__(label, given, times, [part])
-        self.body = Body(space)
+        self.body = body_of(space)
         self.omega = self.body.components(given.omega, f"{label}.omega", len(times))
         self.spread(self.body.size)
         self.bias = None
@@ -382,6 +382,12 @@ class Body:
         _exact(vectors, name, (n, *self.space.point_shape))
         refuse(~self.space._where_finite(vectors), name, lambda i: f"is not finite{SKIPNA}")
         return _doubles(self.space, vectors).reshape(n, -1) @ self.inverse.T
+
+
+@cache
+def body_of(space: Space) -> Body:
+    """Return the body that turns as a curve on a space does."""
+    return Body(space)
 
 
 def _doubles(space: Space, rows: Array) -> Doubles:
@@ -604,6 +610,8 @@ class Setup:
 
     def with_knots(self, knots: Doubles) -> Setup:
         """Return the same problem for other knots."""
+        # Both have the same arrays.
+        _ = self._arrays
         other = copy(self)
         other.knots = knots
         return other
@@ -644,7 +652,7 @@ class Setup:
         groups: list[Doubles | None] = []
         for space in self.spaces:
             handles.append(space._handle)
-            groups.append(np.ascontiguousarray(Body(space).inverse) if is_compact_group(space) else None)
+            groups.append(np.ascontiguousarray(body_of(space).inverse) if is_compact_group(space) else None)
         return handles, groups, np.concatenate(priors), [term.in_core(self.columns) for term in self.terms]
 
 

@@ -24,7 +24,6 @@ from .._splines.base import Curve
 from ..convert._quaternions import matrix_to_quaternion
 from ..measure import Points
 from .problem import (
-    Body,
     DirectionTerm,
     ForceTerm,
     PointTerm,
@@ -33,6 +32,7 @@ from .problem import (
     Solution,
     Values,
     VelocityTerm,
+    body_of,
     iterate,
     residuals,
 )
@@ -119,7 +119,7 @@ def _candidates(setup: Setup, part: int, space: Space[Any]) -> list[Callable[[],
         forces = [term for term in setup.terms if isinstance(term, ForceTerm) and term.parts[0] == part]
 
         def smoothed(x: Doubles) -> Doubles:
-            return Body(space).matrices(_smoothed(setup, space, points, []).paths[0](x))
+            return body_of(space).matrices(_smoothed(setup, space, points, []).paths[0](x))
 
         def aligned() -> Start:
             found = _with_rates(setup, space, rates, attitudes, smoothed if spread else None)
@@ -129,7 +129,7 @@ def _candidates(setup: Setup, part: int, space: Space[Any]) -> list[Callable[[],
             vectors = [_force_vectors(setup, term) for term in forces]
             vectors += [(np.repeat(own.times, own.seen.shape[1]), *_rows(own.reference, own.seen)) for own in seen]
             # The rows of a rotation matrix are the fixed axes in the frame of the body.
-            vectors += [(np.repeat(own.times, 3), *_rows(np.eye(3), Body(space).matrices(own.y))) for own in points]
+            vectors += [(np.repeat(own.times, 3), *_rows(np.eye(3), body_of(space).matrices(own.y))) for own in points]
             return _integrated(setup, space, rates[0], vectors)
 
         several = sum(len(own.attitudes.times) for own in attitudes)
@@ -228,7 +228,7 @@ class _Seen(NamedTuple):
 def _attitudes(space: Space[Any], points: list[PointTerm], seen: list[DirectionTerm]) -> list[_Seen]:
     """Return measured attitudes; if they are few, also attitudes computed from simultaneous directions."""
     found = [
-        _Seen(Attitudes(term.times, Body(space).matrices(term.y), term.scales), term.time_offset) for term in points
+        _Seen(Attitudes(term.times, body_of(space).matrices(term.y), term.scales), term.time_offset) for term in points
     ]
     if sum(len(own.attitudes.times) for own in found) >= _FEW:
         return found
@@ -442,7 +442,7 @@ def _seen(knots: Doubles, space: Space[Any], seen: list[DirectionTerm]) -> Array
 
 def _rotations(space: Space[Any], matrices: Doubles) -> Array:
     if isinstance(space, SpecialOrthogonal):
-        return np.asarray(space.project(matrices))
+        return np.asarray(space._handle.apply("project", [np.ascontiguousarray(matrices)]).reshape(matrices.shape))
     quaternions = matrix_to_quaternion(matrices, scalar_first=True)
     signs = np.cumprod([1.0, *np.where(np.sum(quaternions[1:] * quaternions[:-1], axis=-1) < 0, -1.0, 1.0)])
     return np.asarray(signs[:, None] * quaternions)
