@@ -46,15 +46,16 @@ def audit(setup: Setup, found: Solution) -> float:
             f"be wrong. {' '.join([*complaints, *remedies])}",
             SmoothingWarning,
         )
-    known = [(own.finding.ratio**2, own.finding.freedom) for own in sensors if np.isfinite(own.finding.ratio)]
-    freedom = sum(weight for _, weight in known)
+    known = [(own.finding.ratio, own.finding.freedom) for own in sensors if np.isfinite(own.finding.ratio)]
+    ratios, freedoms = np.array(known).reshape(-1, 2).T
+    freedom = freedoms.sum()
     if found.distance > _DISTANCE:
         warn(
             f"The curve is {found.distance:.2g} standard deviations from the minimum of its objective. It turns by up "
             f"to {found.turn:.2g} rad between two knots, where the linearised problem is inaccurate. Pass more knots.",
             SmoothingWarning,
         )
-    return float(np.sqrt(sum(square * weight for square, weight in known) / freedom)) if freedom else float("nan")
+    return float(np.sqrt((ratios**2 * freedoms).sum() / freedom)) if freedom else float("nan")
 
 
 def examined(setup: Setup, found: Solution) -> list[Sensor]:

@@ -17,7 +17,7 @@ from .._base.typing import Loss, Progress
 from .._core import ValidationError
 from .._curves.fit import read
 from .._smoothing.audit import roots_of
-from .._smoothing.noise import join, parts_of_factor, read_precision, smoothed_spaces, split
+from .._smoothing.noise import grouped, join, parts_of_factor, read_precision, smoothed_spaces, split
 from .._smoothing.report import Posterior, SmoothingReport, coordinates
 from .._spaces import (
     Array,
@@ -434,18 +434,15 @@ def bind(measurement: Measurement, label: str, times: Doubles, space: Space[Any]
 
 
 def _terms_of(measurement: Measurement, label: str, times: Doubles, space: Space[Any]) -> list[Term]:
-    factors = factors_of(space)
-    counts = [len(parts_of_factor(factor)) for factor in factors]
-    spaces = smoothed_spaces(space)
-    chosen: Space[Any] = space
+    spaces, chosen = smoothed_spaces(space), space
     parts = list(range(len(spaces)))
-    if measurement.factor is not None:
-        number = measurement.factor
+    number = measurement.factor
+    if number is not None:
+        factors = factors_of(space)
         if isinstance(number, bool) or not isinstance(number, (int, np.integer)) or not 0 <= number < len(factors):
             raise ValidationError(f"{label}.factor must be a factor of {space!r}, 0 to {len(factors) - 1}")
         chosen = factors[number]
-        first = sum(counts[:number])
-        parts = list(range(first, first + counts[number]))
+        parts = grouped(space, parts)[number]
     own = [spaces[part] for part in parts]
     if isinstance(measurement, Points):
         y: Any = measurement.y
@@ -455,8 +452,8 @@ def _terms_of(measurement: Measurement, label: str, times: Doubles, space: Space
             shape = y.shape[1:]
             for part in parts:
                 if shape == spaces[part].point_shape:
-                    return _points(measurement, label, times, spaces[part], [part])
-        return _points(measurement, label, times, chosen, parts)
+                    return _points(measurement, label, times, spaces[part], {part: spaces[part]})
+        return _points(measurement, label, times, chosen, dict(zip(parts, own, strict=True)))
     if isinstance(measurement, Function):
         return [FunctionTerm(label, measurement, times, parts, [chosen, *own])]
     if isinstance(measurement, SpecificForce):
@@ -514,7 +511,8 @@ def _sigmas(measurement: Measurement, count: int, label: str) -> Sequence[Any]:
     return sigma
 
 
-def _points(given: Points, label: str, times: Doubles, space: Space[Any], parts: list[int]) -> list[Term]:
+def _points(given: Points, label: str, times: Doubles, space: Space[Any], parts: dict[int, Space]) -> list[Term]:
+    """Return the terms of points of a space with these parts, by their numbers."""
     n = len(times)
     precisions = None
     if given.weights is not None:
@@ -522,9 +520,8 @@ def _points(given: Points, label: str, times: Doubles, space: Space[Any], parts:
             raise ValidationError(f"{label}.weights needs at least two points. Pass sigma instead.")
         precisions = read_precision(given.weights, given.frames, space, read(given.y, space))
     terms: list[Term] = []
-    each = zip(parts, _in_parts(given.y, space, f"{label}.y"), _sigmas(given, len(parts), label), strict=True)
-    spaces = [part for factor in factors_of(space) for part in parts_of_factor(factor)]
-    for k, ((part, y, sigma), own) in enumerate(zip(each, spaces, strict=True)):
+    arrays, sigmas = _in_parts(given.y, space, f"{label}.y"), _sigmas(given, len(parts), label)
+    for k, ((part, own), y, sigma) in enumerate(zip(parts.items(), arrays, sigmas, strict=True)):
         information = None if precisions is None else precisions[k].information
         if sigma is None:
             if information is None:

@@ -159,12 +159,12 @@ def _candidates(setup: Setup, part: int, space: Space[Any]) -> list[Callable[[],
 
 def _are_dense(setup: Setup, points: list[PointTerm], rates: list[RateTerm]) -> bool:
     """Whether attitudes determine the path between them: the body turns by little from one to the next."""
-    if not setup.least_squares or any(own.time_offset for own in (*points, *rates)):
+    if not setup.least_squares or {term.time_offset for term in (*points, *rates)} != {None}:
         return False
-    times = np.unique(np.concatenate([setup.knots[[0, -1]], *(own.times for own in points)]))
-    sigma = max(float(term.scales.max()) for term in points)
-    speed = max(float(np.linalg.norm(own.omega, axis=1).max()) for own in rates)
-    return float(np.diff(times).max()) * speed + 3 * sigma < _SMALL
+    times = np.unique(np.concatenate([setup.knots[[0, -1]], *[term.times for term in points]]))
+    sigma = np.concatenate([term.scales for term in points]).max()
+    speed = np.linalg.norm(np.concatenate([term.omega for term in rates]), axis=1).max()
+    return bool(np.diff(times).max() * speed + 3 * sigma < _SMALL)
 
 
 # ---- points ----
@@ -180,9 +180,9 @@ def _smoothed(
     """Return smoothed points, together with those at which velocities are given."""
     scales = [term.scales for term in points]
     typical = float(np.median(np.concatenate(scales))) if scales else 1.0
-    times = np.concatenate([*(term.times for term in points), *(term.times for term in beside)])
-    y = np.concatenate([*(term.y for term in points), *(term.y for term in beside)])
-    sigma = np.concatenate([*scales, *(np.full(len(term.times), _BESIDE * typical) for term in beside)])
+    both = [*points, *beside]
+    times, y = np.concatenate([term.times for term in both]), np.concatenate([term.y for term in both])
+    sigma = np.concatenate([*scales, *[np.full(len(term.times), _BESIDE * typical) for term in beside]])
     order = np.argsort(times, kind="stable")
     # Automatic knots are few at first, so they do not limit the number.
     count = None if setup.automatic else min(len(np.unique(times)), max(len(setup.knots), 2), most)

@@ -69,14 +69,15 @@ def _course(order: int, lam: float, variance: Variance) -> Course:
 def long_gaps(setup: Setup, found: Solution, part: int) -> LongGaps | None:
     """Return the long gaps of a part, or None if there are none or the part has no points that can be predicted."""
     terms = [k for k, term in enumerate(setup.terms) if part in term.parts]
-    has_points = any(isinstance(setup.terms[k], PointTerm) for k in terms)
+    own = [setup.terms[k] for k in terms]
+    has_points = PointTerm in map(type, own)
     lam = float(found.reports[part].lam)
     if found.failure or not has_points or not 0 < lam < np.inf:
         return None
-    each = [np.clip(setup.terms[k].shifted_times(found.values), setup.knots[0], setup.knots[-1]) for k in terms]
+    each = [np.clip(term.shifted_times(found.values), setup.knots[0], setup.knots[-1]) for term in own]
     weights = [
         term.scales**-2.0 if isinstance(term, PointTerm) else np.zeros(len(x))
-        for term, x in zip((setup.terms[k] for k in terms), each, strict=True)
+        for term, x in zip(own, each, strict=True)
     ]
     order = np.argsort(np.concatenate(each), kind="stable")
     times, weight = np.concatenate(each)[order], np.concatenate(weights)[order]
