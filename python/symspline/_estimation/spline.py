@@ -134,7 +134,7 @@ def _evidence(
         if term.loss != "linear":
             near = np.sum(own.residuals**2, axis=1) <= _core.chi_squared(dim, _KEPT)
         counts.append(near & isinstance(term, PointTerm))
-    firsts = _core.coefficient_factors(setup.knots, kinds, times, 0)[0]
+    firsts, whitened = _core.coefficient_factors(setup.knots, kinds, times, 0)[0], np.concatenate(residuals)[order]
     return SensorEvidence(
         setup.knots,
         known,
@@ -142,10 +142,13 @@ def _evidence(
         firsts,
         np.concatenate(factors)[order],
         np.concatenate(sides)[order],
-        np.concatenate(residuals)[order],
+        whitened,
         np.concatenate(counts)[order],
         weights,
         setup.spaces[part].dim,
+        pseudo=whitened,
+        observed=np.full(len(times), float(setup.spaces[part].dim)),
+        line=[],
     )
 
 
@@ -232,7 +235,7 @@ class EstimatedSpline(SmoothingSpline[P, Any]):
 
     def _plain_spread(self, number: int, index: tuple[int, ...], x: Doubles, nu: int) -> Doubles:
         space = smoothed_spaces(self.space)[number]
-        found = self._covariance(number, space, index, np.ascontiguousarray(x), None, [nu])
+        found = self._covariance(number, index, np.ascontiguousarray(x), None, [nu], False)
         return np.asarray(np.sqrt(np.trace(found, axis1=-2, axis2=-1) / space.dim))
 
     def _coupled(self, parts: list[int], index: tuple[int, ...], x: Doubles, orders: list[int]) -> Doubles:
