@@ -61,7 +61,7 @@ from ..measure import (
     measurement_without_missing,
 )
 from .audit import audit, unit_hints
-from .problem import Setup, Solution, Term, bind
+from .problem import PointTerm, Setup, Solution, Term, bind
 from .search import (
     Search,
     Starts,
@@ -346,7 +346,8 @@ def _smoothed(
 ) -> PointsSpline[Any]:
     """Fit points only, as a smoothing spline whose weights are the inverse variances."""
     # Without sigma the noise level is estimated, and the weights are relative.
-    terms = _terms([given if given.sigma is not None else given._with_sigma(1.0)], axis, space, loss)
+    weighted = given if given.sigma is not None else given._with_sigma(1.0)
+    terms = cast(list[PointTerm], _terms([weighted], axis, space, loss))
     t, _ = times_of(given.t, "measurements[0].t")
     order = np.argsort(as_array(t, "measurements[0].t"), kind="stable")
 
@@ -365,7 +366,7 @@ def _smoothed(
     weights, frames, sigma = given.weights, given.frames, None
     if given.sigma is not None:
         # The residuals in the objective are in standard deviations, so that their noise has variance one.
-        each = grouped(space, [cast(Any, term).precision(len(order)) for term in terms])
+        each = grouped(space, [term.precision(len(order)) for term in terms])
         of_factors = tuple(own[0] if len(own) == 1 else tuple(own) for own in each)
         weights, frames, sigma = of_factors if isinstance(space, Product) else of_factors[0], None, 1.0
     found = make_smoothing_spline(

@@ -416,18 +416,20 @@ def per_part(
                 f"{', '.join(map(repr, spaces))}. Pass one entry per part."
             )
         values = list(value)
-    arrays: list[Doubles] = []
-    for one in values:
-        array = np.asarray(np.nan if one is None else one)
-        if array.dtype.kind not in "iuf" or array.shape not in ((), batch):
-            others = f" or an array of shape {batch}" if batch else ""
-            raise ValidationError(f"{name} must be a number{others}, not {short_repr(one)}")
-        if one is not None:
-            allowed = ">= 0" if infinite else "finite and >= 0"
-            bad = ~((array >= 0) & (infinite | np.isfinite(array)))
-            refuse(bad, name, lambda i, array=array, allowed=allowed: f"must be {allowed}, not {array[i]}")
-        arrays.append(np.ascontiguousarray(np.broadcast_to(array, batch), np.float64).ravel())
+    arrays = [_one_per_curve(one, name, batch, infinite) for one in values]
     return arrays if len(arrays) == len(spaces) else arrays * len(spaces)
+
+
+def _one_per_curve(value: Any, name: str, batch: tuple[int, ...], infinite: bool) -> Doubles:
+    if value is None:
+        return np.full(math.prod(batch), np.nan)
+    array = np.asarray(value)
+    if array.dtype.kind not in "iuf" or array.shape not in ((), batch):
+        others = f" or an array of shape {batch}" if batch else ""
+        raise ValidationError(f"{name} must be a number{others}, not {short_repr(value)}")
+    allowed = ">= 0" if infinite else "finite and >= 0"
+    refuse(~((array >= 0) & (infinite | np.isfinite(array))), name, lambda i: f"must be {allowed}, not {array[i]}")
+    return np.ascontiguousarray(np.broadcast_to(array, batch), np.float64).ravel()
 
 
 # ---- data ----
