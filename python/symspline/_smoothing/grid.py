@@ -453,6 +453,50 @@ class Nodes(NamedTuple):
     space: Space[Any]
     bc_types: tuple[Any, ...]
 
+    def along(self, array: NDArray[Any], k: int) -> NDArray[Any]:
+        """Return the rows along axis k of an array with the axes of the grid."""
+        last = len(self.axes) - 1
+        moved = np.moveaxis(array, k, last)
+        return np.ascontiguousarray(moved.reshape(-1, *moved.shape[last:]))
+
+    def rows(self, state: Data, k: int) -> Rows:
+        """Return the rows along axis k after some axes were smoothed."""
+        points, weights = self.along(state.points, k), self.along(state.weights, k)
+        return Rows(self.axes[k], points, weights, self.space, self.bc_types[k])
+
+    def smoothed(self, state: Data, k: int, choice: Choice) -> tuple[Data, SmoothedAxis, tuple[int, ...] | None]:
+        """Smooth the rows along axis k.
+
+        Return the new state, the properties of the smoothing, and the axis and the index of the first row that failed.
+        """
+        shape = state.weights.shape
+        others, t, bc_type = shape[:k] + shape[k + 1 :], self.axes[k], self.bc_types[k]
+
+        def unflat(rows: NDArray[Any]) -> NDArray[Any]:
+            return np.moveaxis(rows.reshape(*others, *rows.shape[1:]), len(others), k)
+
+        rows = self.rows(state, k)
+        result = smooth(rows, choice.lam)
+        used, failed = rows.weights > 0, np.flatnonzero(~result.converged)
+        properties = SmoothedAxis(
+            *choice[:3],
+            count=int(np.count_nonzero(used)),
+            df=float(result.df.sum()),
+            rss=float(result.rss.sum()),
+            iterations=int(result.iterations.max(initial=0)),
+            failed=len(failed),
+        )
+        repeats = is_closed(bc_type) and not used[:, -1].any()
+        mean = float(rows.weights[used].mean())
+        per_node = mean * complete_variance(t, mean, choice.lam, bc_type, repeats)
+        at_nodes = posterior_variance(t, rows.weights, choice.lam, bc_type)
+        points = unflat(result.points)
+        weights = np.where(self.space._where_finite(points), unflat(per_node / at_nodes), 0.0)
+        along = np.ones(len(shape), int)
+        along[k] = len(t)
+        first = (k, *map(int, np.unravel_index(failed[0], others or (1,)))) if len(failed) else None
+        return Data(points, weights, state.scale * per_node.reshape(along)), properties, first
+
 
 @dataclass(frozen=True)
 class SmoothedAxis:
@@ -488,25 +532,25 @@ class SmoothedAxis:
         return noise_level(self.rss, self.count, self.df, dim)
 
 
-class SmoothedNodes(NamedTuple):
-    """Smoothed nodes of a grid.
+class SmoothedPart(NamedTuple):
+    """Properties of the smoothing in one part of the space.
 
     Attributes
     ----------
-    points : ndarray, shape (n_1, ..., n_D, *point_shape)
-        Points of the surface; NaN where rows do not have data on both sides.
-    variance : ndarray, shape (n_1, ..., n_D)
-        Posterior variance of one coordinate for noise of variance one; NaN where points are NaN.
     axes : list of SmoothedAxis
-        Properties of the smoothing along every axis.
-    failed : tuple of int or None
-        Axis of the first row that did not converge, and the index of this row among those along the axis.
+        Properties along every axis.
+    variance : ndarray, shape (n_1, ..., n_D)
+        Posterior variance at the nodes for noise of variance one.
+    df : float
+        Effective degrees of freedom of the surface per coordinate.
+    sigma : float
+        Standard deviation of the noise, given or estimated.
     """
 
-    points: Array
-    variance: Doubles
     axes: list[SmoothedAxis]
-    failed: tuple[int, ...] | None
+    variance: Doubles
+    df: float
+    sigma: float
 
 
 def noise_level(rss: float, count: float, df: float, dim: int) -> float:
@@ -519,16 +563,28 @@ def smooth_axes(
     nodes: Nodes,
     lams: tuple[float | None, ...],
     criterion: LamCriterion,
+    sigma: float,
     progress: Callable[[int, int], object],
-) -> SmoothedNodes:
+) -> tuple[Array, SmoothedPart, tuple[int, ...] | None]:
     r"""Smooth the rows along the first axis, then the rows of the smooth nodes along the second axis, and so on.
 
     Parameters
     ----------
     lams : tuple of float or None
         λ along every axis. None chooses it by the criterion.
+    sigma : float
+        Standard deviation of the noise; NaN estimates it.
     progress : callable
         Function that is called with the finished and the total number of passes.
+
+    Returns
+    -------
+    points : ndarray, shape (n_1, ..., n_D, *point_shape)
+        Points of the surface; NaN where rows do not have data on both sides.
+    part : SmoothedPart
+        Properties of the smoothing.
+    failed : tuple of int or None
+        Axis of the first row that did not converge, and the index of this row among those along the axis.
 
     Notes
     -----
@@ -559,14 +615,14 @@ def smooth_axes(
 
     def passed(state: Data, k: int) -> tuple[Data, SmoothedAxis, tuple[int, ...] | None]:
         nonlocal done
-        result = _smooth_axis(nodes, state, k, chosen[k])
+        result = nodes.smoothed(state, k, chosen[k])
         done += 1
         progress(done, total)
         return result
 
     def seen_from(state: Data, k: int) -> tuple[Rows, Data]:
-        data = Data(_flat(nodes.points, nodes, k), _flat(nodes.weights, nodes, k), _flat(state.scale, nodes, k)[:, 0])
-        return _rows(nodes, state, k), data
+        data = Data(nodes.along(nodes.points, k), nodes.along(nodes.weights, k), nodes.along(state.scale, k)[:, 0])
+        return nodes.rows(state, k), data
 
     def choose(state: Data, k: int) -> None:
         before = chosen.get(k)
@@ -610,7 +666,13 @@ def smooth_axes(
     there = nodes.space._where_finite(state.points)
     with np.errstate(divide="ignore", invalid="ignore"):
         variance = np.where(there, state.scale / state.weights, np.nan)
-    return SmoothedNodes(np.ascontiguousarray(state.points), variance, found, first)
+    used = (nodes.weights > 0) & there
+    weights = nodes.weights[used]
+    distances = nodes.space._apply("distance", p=state.points[used], q=nodes.points[used])
+    df = float(np.sum(weights * variance[used]))
+    if np.isnan(sigma):
+        sigma = noise_level(float(np.sum(weights * distances**2)), weights.size, df, nodes.space.dim)
+    return np.ascontiguousarray(state.points), SmoothedPart(found, variance, df, sigma), first
 
 
 def _best_probe(
@@ -643,7 +705,7 @@ def _best_probe(
             return
         k, *rest = rest
         for lam in tried.get(k, [given[k].lam]):
-            moved, *_ = _smooth_axis(nodes, state, k, given[k]._replace(lam=lam))
+            moved, *_ = nodes.smoothed(state, k, given[k]._replace(lam=lam))
             visit(moved, rest, {**lams, k: lam} if k in tried else lams)
 
     visit(start, [k for k in given if k != last], {})
@@ -662,53 +724,6 @@ def _lam_of_df(nodes: Nodes, k: int, share: float) -> float:
     return float(10.0**low * unit)
 
 
-def _rows(nodes: Nodes, state: Data, k: int) -> Rows:
-    """Return the rows along axis k."""
-    points, weights = (_flat(own, nodes, k) for own in (state.points, state.weights))
-    return Rows(nodes.axes[k], points, weights, nodes.space, nodes.bc_types[k])
-
-
-def _flat(array: Any, nodes: Nodes, k: int) -> Any:
-    """Return the rows along axis k of an array with the axes of the grid."""
-    last = len(nodes.axes) - 1
-    moved = np.moveaxis(array, k, last)
-    return np.ascontiguousarray(moved.reshape(-1, *moved.shape[last:]))
-
-
-def _smooth_axis(
-    nodes: Nodes, state: Data, k: int, choice: Choice
-) -> tuple[Data, SmoothedAxis, tuple[int, ...] | None]:
-    """Smooth the rows along axis k. Return the new state, the properties of the smoothing, and the first failed row."""
-    shape = state.weights.shape
-    others, t, bc_type = shape[:k] + shape[k + 1 :], nodes.axes[k], nodes.bc_types[k]
-
-    def unflat(rows: Any) -> Any:
-        return np.moveaxis(rows.reshape(*others, *rows.shape[1:]), len(others), k)
-
-    rows = _rows(nodes, state, k)
-    smoothed = smooth(rows, choice.lam)
-    used = rows.weights > 0
-    failed = np.flatnonzero(~smoothed.converged)
-    own = SmoothedAxis(
-        *choice[:3],
-        count=int(np.count_nonzero(used)),
-        df=float(smoothed.df.sum()),
-        rss=float(smoothed.rss.sum()),
-        iterations=int(smoothed.iterations.max(initial=0)),
-        failed=len(failed),
-    )
-    repeats = is_closed(bc_type) and not used[:, -1].any()
-    mean = float(rows.weights[used].mean())
-    per_node = mean * complete_variance(t, mean, choice.lam, bc_type, repeats)
-    at_nodes = posterior_variance(t, rows.weights, choice.lam, bc_type)
-    points = unflat(smoothed.points)
-    weights = np.where(nodes.space._where_finite(points), unflat(per_node / at_nodes), 0.0)
-    along = np.ones(len(shape), int)
-    along[k] = len(t)
-    first = (k, *map(int, np.unravel_index(failed[0], others or (1,)))) if len(failed) else None
-    return Data(points, weights, state.scale * per_node.reshape(along)), own, first
-
-
 # ---- the surface ----
 
 # Ratio of the degrees of freedom to the number of data from which rows follow nearly all data.
@@ -721,27 +736,6 @@ _MEDIANS, _BESIDE = 8.0, 4.0
 _SHARE = 0.3
 # A number for each axis, or for products and poses a tuple with one number per part.
 PerAxis = tuple[float | tuple[float, ...], ...]
-
-
-class SmoothedPart(NamedTuple):
-    """Properties of the smoothing in one part of the space.
-
-    Attributes
-    ----------
-    axes : list of SmoothedAxis
-        Properties along every axis.
-    variance : ndarray, shape (n_1, ..., n_D)
-        Posterior variance at the nodes for noise of variance one.
-    df : float
-        Effective degrees of freedom of the surface per coordinate.
-    sigma : float
-        Standard deviation of the noise, given or estimated.
-    """
-
-    axes: list[SmoothedAxis]
-    variance: Doubles
-    df: float
-    sigma: float
 
 
 class SmoothingGridReport(GridReport):
@@ -1159,7 +1153,7 @@ def make_smoothing_grid(
     # Representatives in quotients are continuous over the grid, so that they are smoothed in the covering space.
     spaces = tuple(map(cover_of, smoothed_spaces(space)))
     arrays = [own for pair in zip(factors_of(space), data, strict=True) for own in split(*pair)]
-    size, found = int(np.prod(shape)), []
+    size, found, smoothed, failed = int(np.prod(shape)), [], [], None
     for i, (part, array) in enumerate(zip(spaces, arrays, strict=True)):
 
         def advance(done: int, total: int, i: int = i) -> None:
@@ -1169,16 +1163,12 @@ def make_smoothing_grid(
         used = np.where((w > 0).reshape(*shape, *[1] * len(part.point_shape)), array, np.nan)
         nodes = Nodes(tuple(axis.knots for axis in own_axes), used, w, part, bc_types)
         rule = LamCriterion(1.0, sigmas[i]) if chosen_by == "cp" else LamCriterion(gamma, None)
-        found.append(smooth_axes(nodes, lams[i], rule, advance))
+        smooth_points, properties, first = smooth_axes(nodes, lams[i], rule, sigmas[i], advance)
+        found.append(smooth_points)
+        smoothed.append(properties)
+        failed = failed or first
 
-    smoothed = [
-        _summary(part, array, w, one, sigma)
-        for part, array, one, sigma in zip(spaces, arrays, found, sigmas, strict=True)
-    ]
-    joined = [
-        join(factor, rows)
-        for factor, rows in zip(factors_of(space), grouped(space, [o.points for o in found]), strict=True)
-    ]
+    joined = list(map(join, factors_of(space), grouped(space, found)))
     through: Any = tuple(joined) if isinstance(space, Product) else joined[0]
     options = {
         "bc_type": tuple(axis.bc_type for axis in own_axes),
@@ -1186,11 +1176,12 @@ def make_smoothing_grid(
         "on_failure": on_failure,
     }
     surface: SmoothingGrid[P] = SmoothingGrid._through(tuple(axes), through, space, data, w, smoothed, options)
-    _handle_failures(found, surface, on_failure)
+    if failed and on_failure != "ignore":
+        _raise_or_warn(failed, surface, on_failure)
     _warn_of_bounds(space, smoothed, lams)
     warn_of_boundaries(list(zip(spaces, arrays, strict=True)), w)
     for part, array, own, one in zip(spaces, arrays, found, smoothed, strict=True):
-        rows = (own.points.reshape(-1, *part.point_shape), array.reshape(-1, *part.point_shape), np.ravel(w > 0))
+        rows = (own.reshape(-1, *part.point_shape), array.reshape(-1, *part.point_shape), np.ravel(w > 0))
         count = np.count_nonzero(rows[2] & part._where_finite(rows[0]))
         warn_of_spread(part, *rows, count, one.df, "surface")
     return surface
@@ -1252,24 +1243,11 @@ def _in_parts(value: Any, name: str, space: Space[Any]) -> list[float]:
     return [float(one[0]) for one in per_part(space, smoothed_spaces(space), value, name, ())]
 
 
-def _summary(space: Space[Any], data: Array, weights: Doubles, found: SmoothedNodes, sigma: float) -> SmoothedPart:
-    """Return the properties of the surface in one part of the space."""
-    used = (weights > 0) & space._where_finite(found.points)
-    distances = space._apply("distance", p=found.points[used], q=data[used])
-    df = float(np.sum(weights[used] * found.variance[used]))
-    rss = float(np.sum(weights[used] * distances**2))
-    estimated = noise_level(rss, int(np.count_nonzero(used)), df, space.dim)
-    return SmoothedPart(found.axes, found.variance, df, estimated if np.isnan(sigma) else sigma)
-
-
-def _handle_failures(found: list[SmoothedNodes], surface: SmoothingGrid[Any], on_failure: str) -> None:
-    """Raise an error or warn about rows that did not converge."""
-    first = next((own.failed for own in found if own.failed), None)
-    if first is None or on_failure == "ignore":
-        return
+def _raise_or_warn(first: tuple[int, ...], surface: SmoothingGrid[Any], on_failure: str) -> None:
+    """Raise an error or warn about rows that did not converge; `first` is the axis and the index of the first one."""
     k, *others = first
     row = ", ".join(map(str, [*others[:k], ":", *others[k:]] if len(surface.axes) > 1 else [":"]))
-    failed = sum(axis.failed for own in found for axis in own.axes)
+    failed = sum(axis.failed for part in surface._smoothed for axis in part.axes)
     message = (
         f"No convergence of the smoothing along axis {k} in the row points[{row}]"
         + (f" (and in {failed - 1} more rows)" if failed > 1 else "")
