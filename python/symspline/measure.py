@@ -20,10 +20,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._base.arrays import as_array, cast, filled, refuse, short_repr, whole_number
+from ._base.arrays import as_array, cast, filled, one_of, refuse, short_repr, whole_number
 from ._base.input import times_of
 from ._base.typing import FloatArray, Loss, Numbers, PointsLike, TimesLike
-from ._base.validation import one_of
 from ._core import ValidationError
 from ._curves.missing import Mask, missing_times, recounting, rows_of
 from ._curves.options import order_of

@@ -6,7 +6,9 @@ import warnings
 
 import numpy as np
 import pytest
+from refused import raises
 from scipy.interpolate import CubicSpline, make_smoothing_spline
+from stored import restored
 
 import symspline as ss
 from symspline._smoothing import grid as smoothing_grid
@@ -164,49 +166,20 @@ def test_one_lam_can_be_given(rng):
     assert ss.make_smoothing_grid((U, V), y[..., None], LINE, lam=2.0).lam == (2.0, 2.0)
 
 
-def test_lam_of_one_axis_does_not_depend_on_the_number_of_rows_that_are_tried(rng, monkeypatch):
-    u = np.linspace(0, 1, 60)
-    _, y = noisy_wave(rng, u=u)
-    whole = ss.make_smoothing_grid((u, V), y[..., None], LINE)
-    monkeypatch.setattr("symspline._smoothing.grid._NODES", 300)
-    part = ss.make_smoothing_grid((u, V), y[..., None], LINE)
-    np.testing.assert_allclose(np.log10(part.lam), np.log10(whole.lam), atol=0.6)
-    assert part.lam != whole.lam
-
-
-def test_orientations_come_out_more_accurate_than_with_one_axis_alone(rng):
-    t = np.linspace(0, 1, 41)
-    truth, space = turns(t, t), ss.space("so:3")
-    noisy = space.exp(truth, np.deg2rad(0.8) / np.sqrt(3) * space.random_tangent(rng, truth))
-    grid = ss.make_smoothing_grid((t, t), noisy, space)
-    rows = ss.make_smoothing_spline(t, noisy, space)(t)
-    error, of_rows = (np.rad2deg(space.distance(own, truth)).mean() for own in (grid.points, rows))
-    assert error < 0.14
-    assert error < 0.6 * of_rows
-    assert grid.sigma == pytest.approx(np.deg2rad(0.8) / np.sqrt(3), rel=0.05)
-    assert grid.report.converged
-    # A section and the values at the nodes are those of a GridSpline through the points.
-    spline = ss.GridSpline((t, t), grid.points, space, bc_type="natural")
-    np.testing.assert_allclose(grid((0.33, 0.47)), spline((0.33, 0.47)), atol=1e-12)
-
-
 # Some of the surfaces are geodesic along one axis.
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::symspline.SmoothingWarning")
-@pytest.mark.parametrize("name", ["r:1", "sphere:2", "so:3"])
-def test_standard_deviations_cover_the_truth(rng, name):
+def test_standard_deviations_cover_the_truth(rng):
+    """On a curved space; on flat ones they are exact, see above."""
     u, v = np.linspace(0, 1, 12), np.linspace(0, 1, 14)
-    space = ss.space(name)
     x, y = np.meshgrid(u, v, indexing="ij")
-    if name == "r:1":
-        truth = wave(2 * u, 2 * v)[..., None]
-    else:
-        truth = turns(u, v) if name == "so:3" else space.project(np.stack([np.sin(2 * x), y, 1 + x * y], axis=-1))
+    space = ss.Sphere(2)
+    truth = space.project(np.stack([np.sin(2 * x), y, 1 + x * y], axis=-1))
     inside = []
-    for _ in range(8 if name == "r:1" else 3):
+    for _ in range(3):
         noisy = space.exp(truth, 0.08 * space.random_tangent(rng, truth))
         grid = ss.make_smoothing_grid((u, v), noisy, space)
-        radius = {1: 1.960, 2: 2.448, 3: 2.795}[space.dim]
-        inside.append(space.distance(grid.points, truth) < radius * grid.std())
+        inside.append(space.distance(grid.points, truth) < 2.448 * grid.std())
     assert 0.9 < np.mean(inside) < 0.995
 
 
@@ -282,21 +255,10 @@ def test_weights_along_later_axes_are_inverse_variances(rng):
         np.testing.assert_allclose(grid.std()[i] ** 2, complete[i] * np.diag(s), rtol=1e-6)
 
 
-def test_weights_improve_the_surface(rng):
-    u, v = np.linspace(0, 1, 25), np.linspace(0, 2, 20)
-    weights = 10 ** rng.uniform(-2, 1, (25, 20))
-    truth = wave(u, v)
-    y = (truth + 0.05 / np.sqrt(weights) * rng.standard_normal(truth.shape))[..., None]
-    weighted, plain = (ss.make_smoothing_grid((u, v), y, LINE, weights=own) for own in (weights, None))
-    errors = [np.sqrt(np.mean((own.points[..., 0] - truth) ** 2)) for own in (weighted, plain)]
-    assert errors[0] < 0.5 * errors[1]
-    assert weighted.sigma == pytest.approx(0.05, rel=0.15)
-
-
 # ---- axes, spaces, products ----
 
 
-def test_dates_count_in_seconds(rng):
+def test_dates_of_smoothing_grids_count_in_seconds(rng):
     _, y = noisy_wave(rng)
     hours = np.arange(13) * np.timedelta64(1, "h")
     dates = np.datetime64("2024-02-28T12:00") + hours
@@ -329,6 +291,7 @@ def test_spaces(rng, name):
     assert isinstance(grid.lam[0], float)
 
 
+@pytest.mark.slow
 def test_poses_are_smoothed_as_rotations_and_positions(rng):
     u, v = np.linspace(0, 1, 8), np.linspace(0, 1, 9)
     poses = np.zeros((8, 9, 4, 4))
@@ -383,7 +346,7 @@ def test_equivalent_orientations_give_the_same_surface(rng):
 
 @pytest.mark.filterwarnings("ignore::symspline.SmoothingWarning")
 @pytest.mark.parametrize("kind", ["mask", "poses", "dates"])
-def test_files_and_pickles(rng, kind):
+def test_files_and_pickles_of_smoothing_grids(rng, kind):
     axes, space, y = (U, V), "r:1", noisy_wave(rng)[1][..., None]
     if kind == "mask":
         y[:3, :4] = np.nan
@@ -397,10 +360,7 @@ def test_files_and_pickles(rng, kind):
         y[..., 3, 3] = 1
         y[..., :3, 3] += 0.1 * rng.standard_normal((11, 13, 3))
     grid = ss.make_smoothing_grid(axes, y, space)
-    file = io.BytesIO()
-    grid.save(file)
-    file.seek(0)
-    for other in (ss.load(file), pickle.loads(pickle.dumps(grid))):
+    for other in (restored(grid), pickle.loads(pickle.dumps(grid))):
         assert other == grid
         assert isinstance(other, ss.SmoothingGrid)
         assert other.lam == grid.lam
@@ -429,8 +389,7 @@ def test_damaged_files_raise(rng, name, value):
     damaged = io.BytesIO()
     np.savez(damaged, **entries)
     damaged.seek(0)
-    with pytest.raises(ss.ValidationError, match=name.split("_")[0]):
-        ss.load(damaged)
+    raises(name.split("_")[0], ss.load, damaged)
 
 
 # ---- errors and warnings ----
@@ -465,18 +424,17 @@ ONES = np.ones((11, 13, 1))
         ({"points": ONES[:3], "axes": (U[:3], V), "bc_type": "periodic"}, "axis 0 is periodic and needs at least 4"),
     ],
 )
-def test_invalid_input_raises(change, message):
+def test_invalid_input_of_smoothing_grids_raises(change, message):
     given = {"axes": (U, V), "points": ONES, "space": "r:1"} | change
     axes, points, space = (given.pop(name) for name in ("axes", "points", "space"))
-    with pytest.raises(ss.ValidationError, match=message):
-        ss.make_smoothing_grid(axes, points, space, **given)
+    raises(message, lambda: ss.make_smoothing_grid(axes, points, space, **given))
 
 
 def test_manifolds_of_functions_and_the_constructor_raise():
-    with pytest.raises(ss.ValidationError, match="smoothing grids are not made"):
-        ss.make_smoothing_grid((None, None), np.ones((4, 4, 5, 2)), ss.Stiefel(2, 5))
-    with pytest.raises(TypeError, match="make_smoothing_grid"):
-        ss.SmoothingGrid()
+    raises(
+        "smoothing grids are not made", ss.make_smoothing_grid, (None, None), np.ones((4, 4, 5, 2)), ss.Stiefel(2, 5)
+    )
+    raises("make_smoothing_grid", ss.SmoothingGrid, error=TypeError)
 
 
 @pytest.mark.parametrize("on_failure", ["raise", "warn", "ignore"])
@@ -504,6 +462,7 @@ def test_rows_that_fail(rng, monkeypatch, on_failure):
     assert np.isfinite(grid.points).all()
 
 
+@pytest.mark.slow
 def test_lam_at_a_bound_warns():
     line = (U[:, None] + np.sin(V))[..., None]
     with pytest.warns(ss.SmoothingWarning, match="along axis 0 chose a lam so large that rows are geodesics"):

@@ -93,8 +93,8 @@ def _leverages(setup: Setup, found: Solution) -> list[tuple[float, float]]:
         x = np.clip(term.shifted_times(found.values)[order], setup.knots[0], setup.knots[-1])
 
         def rows(at: NDArray[np.intp], orders: list[int], own: Rows = own, order: Any = order) -> Any:
-            each: list[Any] = [own.jacobians[nu] for nu in orders]
-            whole = np.concatenate([jacobian[order[at]] for jacobian in each], axis=-1)
+            jacobians: list[Any] = own.jacobians
+            whole = np.concatenate([jacobians[nu][order[at]] for nu in orders], axis=-1)
             return whole if own.roots is None else whole * own.roots[order[at], :, None]
 
         def covariance(at: NDArray[np.intp], orders: list[int], others: Any = None, x: Doubles = x) -> Doubles:

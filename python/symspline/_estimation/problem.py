@@ -390,6 +390,12 @@ def body_of(space: Space) -> Body:
     return Body(space)
 
 
+def projected(space: Space, points: Array) -> Array:
+    """Return the points of a space that are closest to the given ones, without checks."""
+    rows = _doubles(space, points)
+    return space._numbers(space._handle.apply("project", [rows]).reshape(rows.shape))
+
+
 def _doubles(space: Space, rows: Array) -> Doubles:
     return np.ascontiguousarray(space._as_doubles(rows))
 
@@ -422,7 +428,7 @@ def points_on(space: Space, y: Any, n: int, name: str) -> Array:
         space.check_point(array)
     except ValidationError as error:
         raise ValidationError(f"{name}: {error}") from None
-    return np.asarray(space.project(points))
+    return projected(space, points)
 
 
 def bind(measurement: Measurement, label: str, times: Doubles, space: Space[Any], loss: Loss = "linear") -> list[Term]:

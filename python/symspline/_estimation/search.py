@@ -34,6 +34,7 @@ from .problem import (
     VelocityTerm,
     body_of,
     iterate,
+    projected,
     residuals,
 )
 from .rates import Attitudes, Integral, Path, Rates, attitudes_at
@@ -442,7 +443,7 @@ def _seen(knots: Doubles, space: Space[Any], seen: list[DirectionTerm]) -> Array
 
 def _rotations(space: Space[Any], matrices: Doubles) -> Array:
     if isinstance(space, SpecialOrthogonal):
-        return np.asarray(space._handle.apply("project", [np.ascontiguousarray(matrices)]).reshape(matrices.shape))
+        return projected(space, matrices)
     quaternions = matrix_to_quaternion(matrices, scalar_first=True)
     signs = np.cumprod([1.0, *np.where(np.sum(quaternions[1:] * quaternions[:-1], axis=-1) < 0, -1.0, 1.0)])
     return np.asarray(signs[:, None] * quaternions)

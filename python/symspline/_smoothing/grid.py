@@ -10,7 +10,7 @@ from typing import Any, Generic, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from .._base.arrays import as_array, checked_atol, checked_number, refuse
+from .._base.arrays import as_array, checked_atol, checked_number, one_of, refuse
 from .._base.faults import silenced, warn
 from .._base.report import ConvergenceWarning
 from .._base.typing import (
@@ -25,7 +25,6 @@ from .._base.typing import (
     SmoothingWord,
     TimesLike,
 )
-from .._base.validation import one_of
 from .._core import ConvergenceError, ValidationError
 from .._curves.ends import end_kinds, is_closed
 from .._curves.options import check_on_failure, check_progress, checked_extrapolate

@@ -16,11 +16,10 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from .._base.arrays import as_array, cast, refuse, short_repr
+from .._base.arrays import as_array, cast, one_of, refuse, short_repr
 from .._base.faults import INVALID, Fault
 from .._base.time import TimeAxis, knots_of
 from .._base.typing import TimesLike
-from .._base.validation import one_of
 from .._core import ValidationError
 from .._curves.ends import NATURAL, End, end_kinds, map_ends, split_ends
 from .._curves.fit import Points, moved_ends, read, read_ends, validated
@@ -35,7 +34,6 @@ from .._spaces import (
     Space,
     SpecialEuclidean,
     SpecialOrthogonal,
-    cover_of,
     factors_of,
 )
 from .._spaces.base import LARGE
@@ -55,7 +53,7 @@ def parts_of_factor(space: Space) -> tuple[Space, ...]:
         n = space.point_shape[0] - 1
         return SpecialOrthogonal(n), Euclidean(n)
     # Data of quotients are smoothed as representatives that are continuous along the curve.
-    return (cover_of(space),)
+    return (space.cover if isinstance(space, Quotient) else space,)
 
 
 def smoothed_spaces(space: Space[Any]) -> tuple[Space, ...]:
@@ -63,10 +61,9 @@ def smoothed_spaces(space: Space[Any]) -> tuple[Space, ...]:
 
     They are the factors of the space, with rotations and positions in place of poses.
     """
-    found: list[Space] = []
-    for factor in factors_of(space):
-        found += parts_of_factor(factor)
-    return tuple(found)
+    if not isinstance(space, Product):
+        return parts_of_factor(space)
+    return tuple([part for factor in space.factors for part in parts_of_factor(factor)])
 
 
 def is_several(space: Space[Any]) -> bool:
