@@ -20,8 +20,9 @@ LAYERS = [
     ["_plotting"],
     ["_splines"],
     ["_archive", "_autodiff", "_grid", "_smoothing", "_statistics", "convert", "jax", "torch"],
+    ["measure"],
     ["_estimation"],
-    ["geo", "measure", "poses", "quantum", "rotations", "shapes", "subspaces", "tensors", "testing"],
+    ["geo", "poses", "quantum", "rotations", "shapes", "subspaces", "tensors", "testing"],
     ["cli", "xarray"],
     ["__init__", "__main__"],
 ]

@@ -28,7 +28,6 @@ from ._base.arrays import as_array, checked_flag, one_of, real_numbers, short_re
 from ._base.typing import Extrapolate, Frame, TimesLike
 from ._core import ValidationError
 from ._curves.composed import AnyCurve, evaluated
-from ._estimation.measurements import GRAVITY
 from ._estimation.uncertainty import Jacobians, Motion, check_uncertain, standard_errors
 from ._smoothing.noise import smoothed_spaces
 from ._spaces import Array, Euclidean, SpecialEuclidean, SpecialOrthogonal, cover_of
@@ -43,6 +42,7 @@ from .convert._pose_files import (
     write_kitti,
     write_tum,
 )
+from .measure import GRAVITY
 from .rotations import Spline, attitude, check_motion, rate_jacobians, rotation_of, turned
 from .rotations import velocities as rotation_velocities
 

@@ -8,10 +8,9 @@ import sensors
 
 import symspline as ss
 from symspline import _core, measure
-from symspline._estimation.solve import Rows, Setup
-from symspline._estimation.terms import bind
+from symspline._estimation.problem import Rows, Setup, bind
 from symspline._smoothing.noise import smoothed_spaces
-from symspline._smoothing.posterior import coordinates, frames_at
+from symspline._smoothing.report import coordinates, frames_at
 
 KNOTS = np.array([0, 0.7, 1.1, 2.3, 3.0, 3.9, 4.2, 5.5, 6.0])
 GROUPS = ["so:3", "sphere:3", "su:2", "so:4", "u:2", "gl:2", "aff:2", "o:3"]

@@ -11,7 +11,7 @@ from scipy.interpolate import CubicSpline, make_smoothing_spline
 from stored import restored
 
 import symspline as ss
-from symspline._smoothing import grid_rows
+from symspline._smoothing import grid as smoothing_grid
 
 LINE = ss.Euclidean(1)
 U = np.array([0.0, 0.11, 0.13, 0.3, 0.42, 0.55, 0.6, 0.81, 0.9, 1.0, 1.3])
@@ -439,7 +439,7 @@ def test_manifolds_of_functions_and_the_constructor_raise():
 
 @pytest.mark.parametrize("on_failure", ["raise", "warn", "ignore"])
 def test_rows_that_fail(rng, monkeypatch, on_failure):
-    smooth = grid_rows.smooth
+    smooth = smoothing_grid.smooth
 
     def fail(rows, lam):
         found = smooth(rows, lam)
@@ -447,7 +447,7 @@ def test_rows_that_fail(rng, monkeypatch, on_failure):
             found.converged[4] = False
         return found
 
-    monkeypatch.setattr(grid_rows, "smooth", fail)
+    monkeypatch.setattr(smoothing_grid, "smooth", fail)
     y = noisy_wave(rng)[1][..., None]
     message = r"along axis 1 in the row points\[4, :\]"
     if on_failure == "raise":

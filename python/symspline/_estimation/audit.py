@@ -11,11 +11,10 @@ from .._base.faults import warn
 from .._curves.ends import end_kinds
 from .._smoothing import SmoothingWarning
 from .._smoothing.audit import DEGREES, Residuals, Sensor, advice, corner_of, described, examine
-from .._smoothing.posterior import Posterior
+from .._smoothing.report import Posterior
 from .._spaces import Doubles
-from .measurements import GRAVITY
-from .solve import Rows, Setup, Solution
-from .terms import ForceTerm, FunctionTerm, PointTerm, RateTerm, Term
+from ..measure import GRAVITY
+from .problem import ForceTerm, FunctionTerm, PointTerm, RateTerm, Rows, Setup, Solution, Term
 
 # Number of measurements of a sensor in the estimate of its mean leverage.
 _SAMPLE = 64
@@ -47,15 +46,16 @@ def audit(setup: Setup, found: Solution) -> float:
             f"be wrong. {' '.join([*complaints, *remedies])}",
             SmoothingWarning,
         )
-    known = [(own.finding.ratio**2, own.finding.freedom) for own in sensors if np.isfinite(own.finding.ratio)]
-    freedom = sum(weight for _, weight in known)
+    known = [(own.finding.ratio, own.finding.freedom) for own in sensors if np.isfinite(own.finding.ratio)]
+    ratios, freedoms = np.array(known).reshape(-1, 2).T
+    freedom = freedoms.sum()
     if found.distance > _DISTANCE:
         warn(
             f"The curve is {found.distance:.2g} standard deviations from the minimum of its objective. It turns by up "
             f"to {found.turn:.2g} rad between two knots, where the linearised problem is inaccurate. Pass more knots.",
             SmoothingWarning,
         )
-    return float(np.sqrt(sum(square * weight for square, weight in known) / freedom)) if freedom else float("nan")
+    return float(np.sqrt((ratios**2 * freedoms).sum() / freedom)) if freedom else float("nan")
 
 
 def examined(setup: Setup, found: Solution) -> list[Sensor]:
@@ -82,10 +82,9 @@ def _leverages(setup: Setup, found: Solution) -> list[tuple[float, float]]:
 
     The leverage of a measurement is the variance of its fitted value. That of all constants is at most their number.
     """
-    band = found.matrices[0]
-    m = band.shape[1] // 4
-    posterior, kinds = Posterior.of(band, np.zeros((0, 0)), m), end_kinds(setup.bc_type)
-    result = []
+    # The leverage is that of the curve for known parameters.
+    posterior, kinds = Posterior.of(*found.posterior[:3]), end_kinds(setup.bc_type)
+    m, result = posterior.size, []
     for term, own in zip(setup.terms, found.rows, strict=True):
         orders = [nu for nu, jacobian in enumerate(own.jacobians) if jacobian is not None]
         n = len(term.times)
@@ -94,8 +93,8 @@ def _leverages(setup: Setup, found: Solution) -> list[tuple[float, float]]:
         x = np.clip(term.shifted_times(found.values)[order], setup.knots[0], setup.knots[-1])
 
         def rows(at: NDArray[np.intp], orders: list[int], own: Rows = own, order: Any = order) -> Any:
-            each: list[Any] = [own.jacobians[nu] for nu in orders]
-            whole = np.concatenate([jacobian[order[at]] for jacobian in each], axis=-1)
+            jacobians: list[Any] = own.jacobians
+            whole = np.concatenate([jacobians[nu][order[at]] for nu in orders], axis=-1)
             return whole if own.roots is None else whole * own.roots[order[at], :, None]
 
         def covariance(at: NDArray[np.intp], orders: list[int], others: Any = None, x: Doubles = x) -> Doubles:
@@ -145,7 +144,9 @@ def unit_hints(terms: list[Term]) -> list[str]:
             )
     for term in terms:
         if isinstance(term, RateTerm):
-            points = [own for own in terms if isinstance(own, PointTerm) and own.parts == term.parts]
+            points = [
+                own for own in terms if isinstance(own, PointTerm) and own.roots is None and own.parts == term.parts
+            ]
             ratio = _rates_over_steps(term, points)
             if ratio is not None and abs(np.log(ratio / DEGREES)) < _SIMILAR:
                 hints.append(

@@ -34,9 +34,9 @@ from .._curves.options import check_on_failure, check_progress, checked_extrapol
 from .._curves.solve import DEFAULTS
 from .._smoothing import SmoothingReport, SmoothingSpline, SmoothingWarning, make_smoothing_spline
 from .._smoothing.audit import warn_of_bounds
-from .._smoothing.knots import Knots, thin_knots
-from .._smoothing.noise import grouped, join, smoothed_spaces
-from .._smoothing.posterior import Parameter
+from .._smoothing.noise import grouped, join, per_part, smoothed_spaces
+from .._smoothing.report import Parameter
+from .._smoothing.solve import Knots, thin_knots
 from .._spaces import (
     Array,
     Doubles,
@@ -50,9 +50,7 @@ from .._spaces import (
 )
 from .._splines.base import Curve
 from ..manifolds._manifold import refuse_functions
-from .audit import audit, unit_hints
-from .gaps import long_gaps
-from .measurements import (
+from ..measure import (
     SKIPNA,
     BodyRates,
     Constant,
@@ -62,6 +60,8 @@ from .measurements import (
     counts_all_samples,
     measurement_without_missing,
 )
+from .audit import audit, unit_hints
+from .problem import PointTerm, Setup, Solution, Term, bind
 from .search import (
     Search,
     Starts,
@@ -74,9 +74,7 @@ from .search import (
     warn_of_gaps,
     warn_of_turns,
 )
-from .solve import Setup, Solution, read_lams
-from .spline import EstimatedSpline, PointsSpline, joint
-from .terms import Term, bind
+from .spline import EstimatedSpline, PointsSpline, in_parts, long_gaps
 
 # Largest number of knots. A curve with more knots would not fit into memory.
 _MOST_KNOTS = 2**32
@@ -292,7 +290,7 @@ def estimate(
     tol = checked_number(tol, "tol must be a number > 0", lambda x: 0 < x < np.inf)
     most = whole_number(max_iter, "max_iter", 1)
     spaces = smoothed_spaces(space)
-    lams = read_lams(lam, len(spaces))
+    lams = np.concatenate(per_part(space, spaces, lam, "lam", ()))
     axis, shown, data = _knots(knots, given)
     if len(given) == 1 and isinstance(given[0], Points) and _is_plain(given[0]) and start is None:
         return _smoothed(
@@ -348,7 +346,8 @@ def _smoothed(
 ) -> PointsSpline[Any]:
     """Fit points only, as a smoothing spline whose weights are the inverse variances."""
     # Without sigma the noise level is estimated, and the weights are relative.
-    terms = _terms([given if given.sigma is not None else given._with_sigma(1.0)], axis, space, loss)
+    weighted = given if given.sigma is not None else given._with_sigma(1.0)
+    terms = cast(list[PointTerm], _terms([weighted], axis, space, loss))
     t, _ = times_of(given.t, "measurements[0].t")
     order = np.argsort(as_array(t, "measurements[0].t"), kind="stable")
 
@@ -367,7 +366,7 @@ def _smoothed(
     weights, frames, sigma = given.weights, given.frames, None
     if given.sigma is not None:
         # The residuals in the objective are in standard deviations, so that their noise has variance one.
-        each = grouped(space, [cast(Any, term).precision(len(order)) for term in terms])
+        each = grouped(space, [term.precision(len(order)) for term in terms])
         of_factors = tuple(own[0] if len(own) == 1 else tuple(own) for own in each)
         weights, frames, sigma = of_factors if isinstance(space, Product) else of_factors[0], None, 1.0
     found = make_smoothing_spline(
@@ -514,11 +513,6 @@ def _curve(
         parts.append(CorePoints(doubles, 0.0, (), len(setup.knots)))
         ends.append(read_ends(setup.bc_type, factor, ())[0])
     through = fit(FitProblem(space, setup.knots, parts, ends, DEFAULTS, check=False))
-    band, side, corner = found.matrices
-    size, first, smoothed = sum(own.dim for own in setup.spaces), 0, []
-    for part, report in zip(setup.spaces, found.reports, strict=True):
-        smoothed.append(joint(report, band, side, corner, size, first))
-        first += part.dim
     parameters = {
         name: Parameter(found.values[name], found.covariance[own, own]) for name, own in setup.columns.items()
     }
@@ -530,7 +524,7 @@ def _curve(
         policy,
         through.reports(),
         None,
-        smoothed,
+        in_parts(found.posterior, found.reports, setup.spaces),
         parameters,
         tuple(given),
         tuple(_residuals_of(setup, found, f"measurements[{i}]") for i in range(len(given))),

@@ -152,10 +152,6 @@ def _log(matrices: Doubles) -> Doubles:
     return _core.convert_rotations(np.ascontiguousarray(matrices), "matrix", "vector", np.inf)[0]
 
 
-def _back(matrices: Doubles) -> Doubles:
-    return np.swapaxes(matrices, -1, -2)
-
-
 class Integral:
     """The integral of rates with a bias, and its derivative with respect to the bias."""
 
@@ -262,8 +258,10 @@ class _Problem:
         i = i[(where[i] >= 0) & (where[i] == where[i + apart]) & (t[i + apart] > t[i])]
         j = i + apart
         g, sums = integral.at(t)
-        derivatives = _back(g[j]) @ (sums[j] - sums[i])
-        turned = _back(_back(g[i]) @ g[j]) @ (_back(attitudes.matrices[i]) @ attitudes.matrices[j])
+        derivatives = g[j].swapaxes(-1, -2) @ (sums[j] - sums[i])
+        turned = (g[i].swapaxes(-1, -2) @ g[j]).swapaxes(-1, -2) @ (
+            attitudes.matrices[i].swapaxes(-1, -2) @ attitudes.matrices[j]
+        )
         change = np.einsum("kij,j->ki", derivatives, bias - integral.bias)
         variances = attitudes.sigma[i] ** 2 + attitudes.sigma[j] ** 2 + 2 * more**2
         variances = variances + self.rates.noise**2 * self.step * (t[j] - t[i])
@@ -364,20 +362,20 @@ class _Problem:
         variances = attitudes.sigma**2 + more**2 + drift
         free = self.rates.spread is not None and len(t) > 1
         g, _ = self._since_first(t, bias)
-        each = r @ _back(g)
+        each = r @ g.swapaxes(-1, -2)
         # Start from the attitude that agrees best with the others.
         some = np.unique(np.linspace(0, len(t) - 1, min(len(t), _COMPARED)).astype(int))
-        apart = np.linalg.norm(_log(_back(each[some])[:, None] @ each[some][None]), axis=-1)
+        apart = np.linalg.norm(_log(each[some].swapaxes(-1, -2)[:, None] @ each[some][None]), axis=-1)
         wide = 2 * np.sqrt(variances[some]) + 0.1
         first = each[some[np.minimum(apart / wide, 3).sum(axis=1).argmin()]]
         for corner in _CORNERS:
             g, turned = self._since_first(t, bias)
             path = first @ g
-            rest = _log(_back(path) @ r)
+            rest = _log(path.swapaxes(-1, -2) @ r)
             squares = np.sum(rest**2, axis=-1) / (3 * variances)
             weights = (corner / (corner + squares)) ** 2 / variances
             # Columns of the first attitude, turned into the body, and of the bias.
-            columns = np.concatenate([_back(path), -turned if free else 0 * turned], axis=-1)
+            columns = np.concatenate([path.swapaxes(-1, -2), -turned if free else 0 * turned], axis=-1)
             if late:
                 columns = np.concatenate([columns, self.rates_at(t, bias)[..., None]], axis=-1)
             normal = np.einsum("k,kji,kjl->il", weights, columns, columns)
@@ -394,7 +392,7 @@ class _Problem:
                 offset += float(step[6])
                 t = attitudes.times + offset
         g, _ = self._since_first(t, bias)
-        squares = np.sum(_log(_back(first @ g) @ r) ** 2, axis=-1) / variances
+        squares = np.sum(_log((first @ g).swapaxes(-1, -2) @ r) ** 2, axis=-1) / variances
         return first, bias, float(np.minimum(squares, _LIMIT).mean()), offset
 
     def rates_at(self, t: Doubles, bias: Doubles) -> Doubles:
@@ -406,7 +404,7 @@ class _Problem:
         """Return the rotations since the first time, and minus their derivatives with respect to the bias."""
         integral = self.integrate(bias)
         g, sums = integral.at(t)
-        turned = _back(g) @ (sums - sums[:1])
+        turned = g.swapaxes(-1, -2) @ (sums - sums[:1])
         return g[0].T @ g @ _exp(-np.einsum("kil,l->ki", turned, bias - integral.bias)), turned
 
 
@@ -473,7 +471,7 @@ class Path:
             at = attitudes.times[inside]
             known = attitudes.matrices[inside] if smoothed is None else smoothed(at - self.offset)
             times += list(at)
-            frames += list(known @ _back(self._integral.at(at)[0]))
+            frames += list(known @ self._integral.at(at)[0].swapaxes(-1, -2))
         order = np.argsort(times, kind="stable")
         # Rotations C at times, with which C·G are the attitudes.
         self._nodes, self._frames = np.array(times)[order], np.stack(frames)[order]
@@ -488,7 +486,7 @@ class Path:
         share = np.clip((x - nodes[i]) / np.where(h > 0, h, 1.0), 0.0, 1.0)
         share = share * share * (3 - 2 * share)
         # In a gap of the rates, the frames of both sides are joined by the shortest turn in the frame of the body.
-        turns = _log(_back(g) @ _back(frames[i]) @ frames[after] @ g)
+        turns = _log(g.swapaxes(-1, -2) @ frames[i].swapaxes(-1, -2) @ frames[after] @ g)
         return np.asarray(frames[i] @ g @ _exp(share[:, None] * turns))
 
 

@@ -1,30 +1,158 @@
-"""Estimated curves."""
+"""Estimated curves, and the long gaps in which no sensor measures them."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
+from .. import _core
 from .._base.typing import P
 from .._core import ValidationError
 from .._curves.curve import SidePanel, UncertaintyBand
 from .._curves.ends import end_kinds
-from .._smoothing.data import SmoothingData
-from .._smoothing.gaps import Calibration
-from .._smoothing.noise import is_several, smoothed_spaces
-from .._smoothing.posterior import Parameter, Posterior, coordinates
-from .._smoothing.report import SmoothingReport
+from .._smoothing.gaps import Calibration, Course, SensorEvidence, calibrate
+from .._smoothing.noise import SmoothingData, is_several, smoothed_spaces
+from .._smoothing.report import Parameter, Posterior, SmoothingReport
 from .._smoothing.solve import Smoothed
 from .._smoothing.spline import SmoothingSpline
 from .._spaces import Array, Doubles, Product, Space, SpecialEuclidean, factors_of, parts_of
 from .._splines.archive import Entries, entry, read_fitted, read_report
 from .._splines.cubic import CubicSpline
-from .gaps import LongGaps, read_long_gaps
-from .measurements import BodyRates, Measurement, Points, SpecificForce
-from .terms import InformationTerm, PointTerm, Term
+from ..measure import BodyRates, Measurement, Points, SpecificForce
+from .problem import PointTerm, Setup, Solution
+
+# Points beyond this quantile of the noise are not predicted if the loss is robust.
+_KEPT = 0.999
+# Variance of a coordinate at times, of points (0) or velocities (1).
+Variance = Callable[[Doubles, int], Doubles]
+
+
+class LongGaps(NamedTuple):
+    """Gaps of one part of a curve.
+
+    Attributes
+    ----------
+    gaps : list of tuple
+        Start, stop, factor and number of blocks, as in `Calibration`.
+    width : float
+        Width of the smoother.
+    at_data : tuple of float
+        Median variance of points and of velocities at the data.
+    """
+
+    gaps: list[tuple[float, float, float, int]]
+    width: float
+    at_data: tuple[float, float]
+
+    def calibration(self, variance: Variance) -> Calibration:
+        """Return the calibration of the bands. The bands in gaps depend on the process by its variance only."""
+        return Calibration(_course(0, np.nan, variance), self.gaps, lambda nu: self.at_data[nu], self.width)
+
+
+def read_long_gaps(entry: Any) -> LongGaps | None:
+    """Return the gaps of one part from the entry of a file."""
+    if entry is None:
+        return None
+    gaps, width, at_data = entry
+    each = [(float(start), float(stop), float(factor), int(blocks)) for start, stop, factor, blocks in gaps]
+    return LongGaps(each, float(width), (float(at_data[0]), float(at_data[1])))
+
+
+def _course(order: int, lam: float, variance: Variance) -> Course:
+    return Course(order, lam, variance, lambda _: np.zeros((2, 2)), 0.0)
+
+
+def long_gaps(setup: Setup, found: Solution, part: int) -> LongGaps | None:
+    """Return the long gaps of a part, or None if there are none or the part has no points that can be predicted."""
+    terms = [k for k, term in enumerate(setup.terms) if part in term.parts]
+    own = [setup.terms[k] for k in terms]
+    has_points = PointTerm in map(type, own)
+    lam = float(found.reports[part].lam)
+    if found.failure or not has_points or not 0 < lam < np.inf:
+        return None
+    each = [np.clip(term.shifted_times(found.values), setup.knots[0], setup.knots[-1]) for term in own]
+    weights = [
+        term.scales**-2.0 if isinstance(term, PointTerm) else np.zeros(len(x))
+        for term, x in zip(own, each, strict=True)
+    ]
+    order = np.argsort(np.concatenate(each), kind="stable")
+    times, weight = np.concatenate(each)[order], np.concatenate(weights)[order]
+    if not np.ptp(times) > 0:
+        return None
+
+    space, kinds = setup.spaces[part], end_kinds(setup.bc_type)
+    posterior = found.posterior._replace(first=sum(own.dim for own in setup.spaces[:part]))
+
+    def evidence() -> SensorEvidence:
+        return _evidence(setup, found, part, terms, order, times, weight)
+
+    def variance(x: Doubles, nu: int) -> Doubles:
+        whole = posterior.covariance(space, setup.knots, (), kinds, np.ascontiguousarray(x), None, [nu])
+        return np.asarray(np.trace(whole, axis1=1, axis2=2) / space.dim)
+
+    course = _course(3 if setup.penalty == "jerk" else 2, lam, variance)
+    result = calibrate(times, weight, course, np.nan, evidence, ends=False)
+    return LongGaps(result.gaps, result.width, (result.at_data(0), result.at_data(1))) if result.gaps else None
+
+
+def _evidence(
+    setup: Setup,
+    found: Solution,
+    part: int,
+    terms: list[int],
+    order: NDArray[np.intp],
+    times: Doubles,
+    weights: Doubles,
+) -> SensorEvidence:
+    """Return the linearised measurements of a part, in the order of time."""
+    kinds, size = end_kinds(setup.bc_type), found.posterior.size
+    parameters = sum(constant.size for constant in setup.constants.values())
+    q = max(found.rows[k].residuals.shape[1] for k in terms)
+    known = found.posterior.known((), kinds)
+    factors, sides, residuals, counts = [], [], [], []
+    for k in terms:
+        term, own = setup.terms[k], found.rows[k]
+        (n, d), dim = own.residuals.shape, setup.spaces[part].dim
+        x = np.clip(term.shifted_times(found.values), setup.knots[0], setup.knots[-1])
+        rows = np.zeros((n, q, 4 * size))
+        for nu, columns in enumerate(own.jacobians):
+            if columns is not None:
+                of_curve = _core.coefficient_factors(setup.knots, kinds, x, nu)[1]
+                rows[:, :d] += np.einsum("ndm,nk->ndkm", columns, of_curve).reshape(n, d, -1)
+        of_parameters, left = np.zeros((n, q, parameters)), np.zeros((n, q))
+        of_parameters[:, :d] = 0.0 if own.parameters is None else own.parameters
+        left[:, :d] = -own.residuals
+        scale = 1.0 if own.roots is None else own.roots
+        factors.append(rows * np.asarray(scale)[..., None])
+        sides.append(of_parameters * np.asarray(scale)[..., None])
+        residuals.append(left * scale)
+        near = np.ones(n, bool)
+        if term.loss != "linear":
+            near = np.sum(own.residuals**2, axis=1) <= _core.chi_squared(dim, _KEPT)
+        counts.append(near & isinstance(term, PointTerm))
+    firsts, whitened = _core.coefficient_factors(setup.knots, kinds, times, 0)[0], np.concatenate(residuals)[order]
+    return SensorEvidence(
+        setup.knots,
+        known,
+        times,
+        firsts,
+        np.concatenate(factors)[order],
+        np.concatenate(sides)[order],
+        whitened,
+        np.concatenate(counts)[order],
+        weights,
+        setup.spaces[part].dim,
+        pseudo=whitened,
+        observed=np.full(len(times), float(setup.spaces[part].dim)),
+        line=[],
+    )
+
+
+# ---- curves ----
 
 
 def _are_partial(points: Points, factor: Space[Any]) -> bool:
@@ -34,13 +162,17 @@ def _are_partial(points: Points, factor: Space[Any]) -> bool:
     return partial and np.shape(y)[1:] != factor.point_shape
 
 
-def joint(report: SmoothingReport, band: Doubles, side: Doubles, corner: Doubles, size: int, first: int) -> Smoothed:
-    """Return the result in one part, whose coordinates begin with number `first` of all coordinates.
+def in_parts(posterior: Posterior, reports: Sequence[SmoothingReport], spaces: Sequence[Space]) -> list[Smoothed]:
+    """Return the result in each part.
 
     Given standard deviations are trusted, as with ``absolute_sigma`` of SciPy's ``curve_fit``.
     """
-    posterior = Posterior(band, np.zeros((0, 0)), size, side, corner, first)
-    return Smoothed(report, np.zeros((0, 4)), report.lam, 1.0, False, posterior)
+    first, results = 0, []
+    for report, space in zip(reports, spaces, strict=True):
+        own = posterior._replace(first=first)
+        results.append(Smoothed(report, np.zeros((0, 4)), report.lam, 1.0, False, own))
+        first += space.dim
+    return results
 
 
 def _each(value: Any) -> tuple[Any, ...]:
@@ -103,7 +235,7 @@ class EstimatedSpline(SmoothingSpline[P, Any]):
 
     def _plain_spread(self, number: int, index: tuple[int, ...], x: Doubles, nu: int) -> Doubles:
         space = smoothed_spaces(self.space)[number]
-        found = self._covariance(number, space, index, np.ascontiguousarray(x), None, [nu])
+        found = self._covariance(number, index, np.ascontiguousarray(x), None, [nu], False)
         return np.asarray(np.sqrt(np.trace(found, axis1=-2, axis2=-1) / space.dim))
 
     def _coupled(self, parts: list[int], index: tuple[int, ...], x: Doubles, orders: list[int]) -> Doubles:
@@ -123,7 +255,7 @@ class EstimatedSpline(SmoothingSpline[P, Any]):
     # ---- plots ----
 
     def _noise_beside(self, index: tuple[int, ...], x: Doubles) -> UncertaintyBand:
-        radii = [own[-1][1] for own in self._radii(x)]
+        radii = [own[-1][1] for own in self._radii(index, x)]
         speed = None if is_several(self.space) else self._spread(0, index, x, 1)
         others = [self._times_of(own) for own in self._measurements if not isinstance(own, Points)]
         times, points = zip(*map(self._points_in, range(len(factors_of(self.space)))), strict=True)
@@ -205,12 +337,9 @@ class EstimatedSpline(SmoothingSpline[P, Any]):
                 own.cov.shape != 2 * own.value.shape for own in parameters.values()
             ):
                 raise ValidationError("the matrices do not match the parameters and knots")
-        smoothed, first = [], 0
         with entry("noise"):
-            for space, numbers in zip(spaces, state["noise"], strict=True):
-                report = read_report(SmoothingReport, dict(numbers), ())
-                smoothed.append(joint(report, matrix, side, corner, m, first))
-                first += space.dim
+            reports = [read_report(SmoothingReport, dict(numbers), ()) for numbers in state["noise"]]
+            smoothed = in_parts(Posterior(matrix, np.zeros((0, 0)), m, side, corner), reports, spaces)
         with entry("gaps"):
             gaps = [read_long_gaps(own) for own in state.get("gaps", [None] * len(spaces))]
         return cls._of(*parts, None, smoothed, parameters, (), (), gaps)
@@ -221,15 +350,6 @@ class EstimatedSpline(SmoothingSpline[P, Any]):
         return f"<EstimatedSpline on {self.space!r}: {text}>"
 
 
-def _of_points(term: Term, space: Space, p: Array, frames: Array) -> Doubles:
-    """Return the residuals of points at the points p of a curve with frames."""
-    if isinstance(term, PointTerm):
-        return -coordinates(space, p, frames, space._apply("log", p=p, q=term.y))
-    assert isinstance(term, InformationTerm)
-    logs = coordinates(space, term.y, space.frame(term.y), space._apply("log", p=term.y, q=p))
-    return np.asarray((term.roots @ logs[..., None])[..., 0])
-
-
 class PointsSpline(SmoothingSpline[P, Any]):
     """A smoothing spline that `estimate` fitted to points only, with residuals like those of an `EstimatedSpline`."""
 
@@ -238,7 +358,7 @@ class PointsSpline(SmoothingSpline[P, Any]):
     _residuals: tuple[Doubles | tuple[Doubles, ...], ...]
 
     @classmethod
-    def of(cls, fitted: SmoothingSpline[Any, Any], given: Points, terms: list[Term]) -> Self:
+    def of(cls, fitted: SmoothingSpline[Any, Any], given: Points, terms: list[PointTerm]) -> Self:
         """Return the result of `estimate` from the smoothing spline and the terms of its points.
 
         Parameters
@@ -247,14 +367,14 @@ class PointsSpline(SmoothingSpline[P, Any]):
             The curve.
         given : Points
             The points of the user.
-        terms : list of Term
+        terms : list of PointTerm
             The same points in every part, with standard deviations of one if none were given.
         """
         found = []
         for term in terms:
             (part,) = term.parts
             p, frames = fitted._frames(term.times, False)[part]
-            rows = _of_points(term, smoothed_spaces(fitted.space)[part], p, frames)
+            rows = term.residuals_at(smoothed_spaces(fitted.space)[part], p, frames)
             scale = 1.0 if given.sigma is not None else float(fitted._smoothed[part].sigma)
             with np.errstate(divide="ignore", invalid="ignore"):
                 found.append(np.asarray(rows / term.noise / scale))

@@ -14,10 +14,9 @@ from .._base.faults import is_silent, of_index, warn
 from .._curves.curve import CurveArrays
 from .._curves.ends import end_kinds
 from .._spaces import Array, Doubles, Space, factors_of
-from .data import Part, SmoothingData
-from .noise import distances_of, grouped, in_part, is_several, smoothed_spaces, split
+from .noise import Part, SmoothingData, distances_of, grouped, in_part, is_several, smoothed_spaces, split
 from .report import SmoothingReport, SmoothingWarning
-from .solve import FAST, NOISY, TWO, UNIQUE, Found, Smoothed
+from .solve import FAST, NOISY, TWO, UNIQUE, Found
 
 # Quantiles of χ² at which the losses begin to grow more slowly, as in `loss.rs`.
 _CORNERS = {"huber": 0.82, "cauchy": 0.95}
@@ -52,40 +51,35 @@ class Fitted(NamedTuple):
 
     Attributes
     ----------
-    space : Space
-        The space.
-    points, at : ndarray, shape (..., N, *point_shape)
-        Data, and points of the curves at their times.
-    smoothed : Smoothed
-        Result of the smoothing.
-    converged, df : ndarray
-        Fields of its report.
-    loss : str
-        Loss of the data.
+    part : Part
+        Data.
+    result : Found
+        Smooth curves.
+    report : SmoothingReport
+        Report for the user, in which an infinite λ is the one that was given.
+    at : ndarray, shape (..., N, *point_shape)
+        Points of the curves at the times of the data.
+    converged : ndarray of bool
+        Whether the curves converged.
     chosen, given : ndarray of bool
         Whether λ was chosen from the data, and whether σ is given.
-    selection, rejected : ndarray of int
-        Kind of the selection of a robust loss, which is 0 if it can be trusted, and the number of rejected data.
-    minimum : ndarray of int
-        Kind of the minimum, see `best_of_starts`.
     """
 
-    space: Space
-    points: Array
+    part: Part
+    result: Found
+    report: SmoothingReport
     at: Array
-    smoothed: Smoothed
     converged: NDArray[np.bool_]
-    df: Doubles
-    loss: str
     chosen: NDArray[np.bool_]
     given: NDArray[np.bool_]
-    selection: NDArray[np.int_]
-    rejected: NDArray[np.int_]
-    minimum: NDArray[np.int_]
 
 
 def audit(
-    spline: Any, parts: list[Part], found: list[Found], good: NDArray[np.bool_], choices: NDArray[np.bool_]
+    spline: Any,
+    parts: list[Part],
+    results: list[Found],
+    good: NDArray[np.bool_],
+    choices: NDArray[np.bool_],
 ) -> None:
     """Issue at most one warning of each kind about smoothing splines.
 
@@ -93,7 +87,7 @@ def audit(
     ----------
     spline : SmoothingSpline
         The splines.
-    parts, found : list
+    parts, results : list
         Data and results in every space in which data were smoothed, with the batch axes.
     good : ndarray of bool
         Which curves are not masked.
@@ -101,34 +95,29 @@ def audit(
         Which curves have a λ to choose.
     """
     space, noisy, batch = spline.space, spline._noisy, spline._noisy.batch
-    at_data = [
-        rows
-        for factor, curve in zip(factors_of(space), spline._curve.parts, strict=True)
-        for rows in split(factor, curve.evaluate(noisy.times, "point", "raise", noisy.times.ndim > 1))
-    ]
-    fits = [
-        Fitted(
-            part.space,
-            part.points,
-            rows,
-            smoothed,
-            np.asarray(smoothed.report.converged),
-            np.asarray(smoothed.report.df),
-            part.noise.loss,
-            np.isnan(part.lam).reshape(batch) & choices,
-            np.isfinite(part.noise.sigma).reshape(batch) & good,
-            *[np.reshape(column, batch) for column in (own.selection, own.rejected, own.minima)],
-        )
-        for part, rows, smoothed, own in zip(parts, at_data, spline._smoothed, found, strict=True)
-    ]
-    counts = [np.sum(noise.weights > 0, axis=-1) for noise in noisy.noise]
-    _warn_of_outliers(space, fits, counts)
-    _warn_of_minima(space, fits)
-    trusted = [fit.chosen & (fit.selection == 0) & (fit.minimum == UNIQUE) for fit in fits]
-    warn_of_bounds(space, [fit.smoothed.report for fit in fits], trusted, counts)
+    at_data: list[Array] = []
+    for factor, curve in zip(factors_of(space), spline._curve.parts, strict=True):
+        at_data += split(factor, curve.evaluate(noisy.times, "point", "raise", noisy.times.ndim > 1))
+    fits, reports, trusted, counts, selected, unique = [], [], [], [], True, True
+    for part, result, rows, smoothed in zip(parts, results, at_data, spline._smoothed, strict=True):
+        report = smoothed.report
+        converged = np.asarray(report.converged)
+        chosen = np.isnan(part.lam).reshape(batch) & choices
+        given = np.isfinite(part.noise.sigma).reshape(batch) & good
+        fits.append(Fitted(part, result, report, rows, converged, chosen, given))
+        reports.append(report)
+        selected &= not result.selection.any()
+        unique &= not result.minima.any()
+        trusted.append(chosen & (result.selection == 0) & (result.minima == UNIQUE))
+        counts.append(np.sum(part.noise.weights > 0, axis=-1))
+    if not selected:
+        _warn_of_outliers(space, fits, counts)
+    if not unique:
+        _warn_of_minima(space, fits)
+    warn_of_bounds(space, reports, trusted, counts)
     if not is_silent(SmoothingWarning):
         _warn_of_residuals(space, noisy, fits)
-        if fits[0].smoothed.penalty == "acceleration" and noisy.times.shape[-1] >= _DATA:
+        if fits[0].result.smoothed.penalty == "acceleration" and noisy.times.shape[-1] >= _DATA:
             _warn_of_varying(space, noisy, spline._curve, fits, end_kinds(spline._bc_type))
     _warn_of_spreads(noisy, fits)
 
@@ -151,16 +140,17 @@ def _warn_of_outliers(space: Space, fits: list[Fitted], counts: list[Any]) -> No
     """Warn if the data that were rejected from a curve may be the wrong ones."""
     # Data without noise, such as those of a body at rest, contain no outliers.
     bad = [
-        (fit.selection != 0) & fit.converged & ((fit.rejected != 0) | (np.asarray(fit.smoothed.report.sigma) > 0))
+        (fit.result.selection != 0) & fit.converged & ((fit.result.rejected != 0) | (np.asarray(fit.report.sigma) > 0))
         for fit in fits
     ]
     if not (first := _first(space, bad)):
         return
     number, index, of = first
     fit = fits[number]
-    kind, rejected, df = int(fit.selection[index]), int(fit.rejected[index]), float(fit.df[index])
+    kind, rejected = int(fit.result.selection[index]), int(fit.result.rejected[index])
+    df = float(np.asarray(fit.report.df)[index])
     count = int(np.broadcast_to(counts[number], bad[number].shape)[index])
-    what = f"The smoothing{of} with loss={fit.loss!r}"
+    what = f"The smoothing{of} with loss={fit.part.noise.loss!r}"
     if kind == _INTERPOLATED:
         message = (
             f"{what} follows nearly all data ({df:.3g} degrees of freedom for {count} data): their noise is smaller "
@@ -193,10 +183,10 @@ def _warn_of_outliers(space: Space, fits: list[Fitted], counts: list[Any]) -> No
 
 def _warn_of_minima(space: Space, fits: list[Fitted]) -> None:
     """Warn if a curve may not be the one with the least objective."""
-    if first := _first(space, [(fit.minimum != UNIQUE) & fit.converged for fit in fits], ","):
+    if first := _first(space, [(fit.result.minima != UNIQUE) & fit.converged for fit in fits], ","):
         number, index, of = first
-        noise = f"{float(np.asarray(fits[number].smoothed.report.sigma)[index]):.2g}"
-        message = _MINIMA[int(fits[number].minimum[index])]
+        noise = f"{float(np.asarray(fits[number].report.sigma)[index]):.2g}"
+        message = _MINIMA[int(fits[number].result.minima[index])]
         warn(message.format(of=of, noise=noise, space=smoothed_spaces(space)[number]), SmoothingWarning, index)
 
 
@@ -398,13 +388,13 @@ def _warn_of_residuals(space: Space, noisy: SmoothingData, fits: list[Fitted]) -
 
 def _complaints(noisy: SmoothingData, number: int, fit: Fitted, curves: NDArray[np.intp]) -> list[tuple[int, str]]:
     """Return the curves that failed a test among the given ones, with descriptions of the tests and their remedies."""
-    space, noise, n = fit.space, noisy.noise[number], noisy.times.shape[-1]
+    space, noise, n = fit.part.space, noisy.noise[number], noisy.times.shape[-1]
 
     def of_curves(array: Any, axes: tuple[int, ...] = ()) -> Array:
         rows: Array = np.broadcast_to(array, (*noisy.batch, n, *axes)).reshape(-1, n, *axes)[curves]
         return rows
 
-    points = [space._as_doubles(of_curves(points, space.point_shape)) for points in (fit.at, fit.points)]
+    points = [space._as_doubles(of_curves(points, space.point_shape)) for points in (fit.at, fit.part.points)]
     data = [of_curves(noisy.times), *points, of_curves(noise.weights)]
     rows, deviations = _core.residuals_at(space._handle, *data)
     if noise.information is None:
@@ -414,10 +404,10 @@ def _complaints(noisy: SmoothingData, number: int, fit: Fitted, curves: NDArray[
         roots, known = roots_of(of_curves(noise.information, (space.dim, space.dim))[used])
         rows[used] = np.where(known, np.einsum("nij,nj->ni", roots, rows[used]), np.nan)
     observed: NDArray[np.bool_] = np.asarray(np.isfinite(rows).any(axis=-1))
-    leverage = np.minimum(np.ravel(fit.df)[curves] / np.maximum(observed.sum(axis=-1), 1), 1.0)
-    loss = fit.loss
+    leverage = np.minimum(np.ravel(fit.report.df)[curves] / np.maximum(observed.sum(axis=-1), 1), 1.0)
+    loss = fit.part.noise.loss
     corner = None if loss == "linear" else corner_of(loss, space.dim)
-    given = np.where(fit.given, fit.smoothed.sigma, np.nan).ravel()[curves]
+    given = np.where(fit.given, fit.result.smoothed.sigma, np.nan).ravel()[curves]
     found = _core.examine_curves(space._handle, data, rows, deviations, leverage, given, corner)
     return [(int(curves[k]), _described(np.flatnonzero(observed[k]), *result)) for k, *result in found]
 
@@ -547,7 +537,8 @@ def _warn_of_varying(
         # The acceleration of a pose is not that of its rotation and position.
         if more or noise.information is not None:
             continue
-        good = fit.converged & ~np.asarray(fit.smoothed.report.at_bound) & (fit.df > _FREEDOM) & fit.chosen
+        df = np.asarray(fit.report.df)
+        good = fit.converged & ~np.asarray(fit.report.at_bound) & (df > _FREEDOM) & fit.chosen
         curves = np.flatnonzero(good)
         if not len(curves):
             continue
@@ -561,17 +552,17 @@ def _warn_of_varying(
         middle = 0.5 * (part.times[..., 1:] + part.times[..., :-1])
         bend = part.evaluate(np.ascontiguousarray(middle), "bend", "raise", middle.ndim > 1)
         energy = np.cumsum(np.diff(knots) * rows(bend) ** 2, axis=-1)
-        band, times = rows(fit.smoothed.band, axes=2), rows(noisy.times)
+        band, times = rows(fit.result.smoothed.band, axes=2), rows(noisy.times)
         leverage = _core.smoothing_variance(knots, band, np.zeros(len(curves)), times, 0, kinds)
         squares = np.full(fit.at.shape[: len(noisy.batch) + 1], np.nan)
-        squares[good] = factor._apply("distance", p=fit.at[good], q=fit.points[good]) ** 2
+        squares[good] = factor._apply("distance", p=fit.at[good], q=fit.part.points[good]) ** 2
         energy = np.concatenate([np.zeros((len(curves), 1)), energy], axis=-1)
         tests = _core.are_constant(times, rows(noise.weights), leverage, rows(squares), knots, energy, factor.dim)
         failed = []
         for curve_number, found in zip(curves, tests, strict=True):
             index = tuple(map(int, np.unravel_index(curve_number, noisy.batch)))
             shown = noisy.t[index] if noisy.t.ndim > 1 else noisy.t
-            if found and (message := varying(shown, found, fit.loss != "linear")):
+            if found and (message := varying(shown, found, fit.part.noise.loss != "linear")):
                 failed.append((index, message))
         if failed:
             index, message = failed[0]
@@ -624,8 +615,8 @@ def _warn_of_spreads(noisy: SmoothingData, fits: list[Fitted]) -> None:
         # Negligible weights do not count.
         counts = noise.weights > 1e-6 * noise.weights.max(axis=-1, keepdims=True)
         counts = np.broadcast_to(counts, (*noisy.batch, noisy.times.shape[-1]))
-        data = fit.at[some], fit.points[some], counts[some]
-        if warn_of_spread(fit.space, *data, np.sum(counts, axis=-1), fit.df, "curve"):
+        data = fit.at[some], fit.part.points[some], counts[some]
+        if warn_of_spread(fit.part.space, *data, np.sum(counts, axis=-1), np.asarray(fit.report.df), "curve"):
             return
 
 

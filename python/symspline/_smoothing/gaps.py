@@ -6,7 +6,8 @@ predicted without their data, and the errors of these predictions determine a fa
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import Any, NamedTuple
 
@@ -19,10 +20,8 @@ from .._base.faults import of_index, warn
 from .._curves.ends import end_kinds, is_closed
 from .._spaces import Array, Doubles, Euclidean, Space, SpecialEuclidean, factors_of
 from .audit import corner_of
-from .data import points_of
 from .noise import SINGULAR, grouped, in_part, smoothed_spaces, split
-from .posterior import frames_at
-from .report import SmoothingWarning
+from .report import SmoothingWarning, frames_at
 
 # A gap is long if the variance in its middle exceeds the first multiple of the median variance at the data, and its
 # length the second multiple of the median time step, so that sparse data have no gaps.
@@ -113,13 +112,13 @@ class SensorEvidence(NamedTuple):
         Mean weight of a coordinate that every point observes.
     coordinates : int
         Number of coordinates of a point.
-    pseudo : ndarray, optional
-        Residuals of the pseudo-data of a robust loss.
-    observed : ndarray, shape (n,), optional
-        Number of coordinates that each point observes, one if A couples none. By default all of them.
-    line : list of ndarray, optional
+    pseudo : ndarray
+        Residuals of the pseudo-data of a robust loss; the same residuals for least squares.
+    observed : ndarray, shape (n,)
+        Number of coordinates that each point observes, one if A couples none.
+    line : list of ndarray
         Roots of the weights (n, q, m), and the curve and its velocity at the data in coordinates of frames along the
-        curve, divided by the standard deviation of the noise.
+        curve, divided by the standard deviation of the noise. It is only needed beyond the data.
     """
 
     knots: Doubles
@@ -132,23 +131,23 @@ class SensorEvidence(NamedTuple):
     counts: NDArray[np.bool_]
     weights: Doubles
     coordinates: int
-    pseudo: Doubles | None = None
-    observed: Doubles | None = None
-    line: list[Doubles] | None = None
+    pseudo: Doubles
+    observed: Doubles
+    line: list[Doubles]
 
     @property
     def linearised(self) -> Any:
         """The arrays that the core reads."""
-        observed = np.full(len(self.times), float(self.coordinates)) if self.observed is None else self.observed
-        rows, errors, pseudo = [self.factors, self.sides], self.residuals, self.pseudo
-        residuals = [np.ascontiguousarray(x) for x in (errors if pseudo is None else pseudo, errors)]
-        return self.times, self.firsts, rows, residuals, self.counts, [self.weights, observed], self.coordinates
+        residuals = [np.ascontiguousarray(rows) for rows in (self.pseudo, self.residuals)]
+        of_points = self.counts, [self.weights, self.observed], self.coordinates
+        return self.times, self.firsts, [self.factors, self.sides], residuals, *of_points
 
 
+@dataclass(frozen=True, eq=False)
 class Calibration:
     """How the variances of a curve change in gaps and beyond its data.
 
-    Parameters
+    Attributes
     ----------
     course : Course
         The process.
@@ -158,67 +157,62 @@ class Calibration:
         Function that returns the median variance at the data, of points (0) or velocities (1).
     width : float
         Width h of the smoother.
-    ends : tuple of float
+    outer : tuple of float
         Times of the first and the last datum; infinite if variances beyond them do not change.
     period : float
         Period of a closed curve; NaN for others.
-    beyond : callable
+    beyond : callable or None
         Function that returns distances beyond the ends with their factors, shape (n, 2), and the number of blocks.
     """
 
-    def __init__(
-        self,
-        course: Course,
-        gaps: list[tuple[float, float, float, int]],
-        at_data: Callable[[int], float],
-        width: float,
-        ends: tuple[float, float] = (-np.inf, np.inf),
-        period: float = np.nan,
-        beyond: Callable[[], tuple[Doubles, int]] | None = None,
-    ) -> None:
-        self.gaps, self.width, self.at_data = gaps, width, cache(at_data)
-        self._course, self._period, self._ends = course, period, ends
-        self._of_ends = beyond
+    course: Course
+    gaps: list[tuple[float, float, float, int]]
+    at_data: Callable[[int], float]
+    width: float
+    outer: tuple[float, float] = (-np.inf, np.inf)
+    period: float = np.nan
+    beyond: Callable[[], tuple[Doubles, int]] | None = None
 
     @property
     def ends(self) -> list[tuple[float, float, float, int]]:
         """The times before the first and after the last datum, with the largest factor and the number of blocks."""
-        if self._of_ends is None:
+        if self.beyond is None:
             return []
         rungs, blocks = self._beyond
         largest = float(rungs[:, 1].max()) if len(rungs) else np.nan
-        first, last = self._ends
+        first, last = self.outer
         return [(-np.inf, first, largest, blocks), (last, np.inf, largest, blocks)]
 
     @cached_property
     def _beyond(self) -> tuple[Doubles, int]:
-        return self._of_ends() if self._of_ends else (np.zeros((0, 2)), 0)
+        return self.beyond() if self.beyond else (np.zeros((0, 2)), 0)
 
     @cached_property
     def _at_ends(self) -> Doubles:
         """Variance of the point, its covariance with the velocity, and variance of the velocity, at both ends."""
-        return np.array([self._course.line(float(end))[[0, 0, 1], [0, 1, 1]] for end in self._ends])
+        return np.array([self.course.line(float(end))[[0, 0, 1], [0, 1, 1]] for end in self.outer])
 
     def inflation(self, x: Doubles, nu: int) -> Doubles:
         """Return the factors of standard deviations at times x: exactly 1 away from gaps and between the ends."""
         out = np.ones(x.shape)
         near, excess = self._in_gaps(x)
-        outside = (x < self._ends[0]) | (x > self._ends[1])
+        outside = (x < self.outer[0]) | (x > self.outer[1])
         near &= ~outside
         if near.any():
-            v = self._course.variance(x[near], nu)
+            v = self.course.variance(x[near], nu)
             out[near] = _ratio(v + excess[near] * np.maximum(v - self.at_data(nu), 0.0), v)
         if outside.any():
-            v = self._course.variance(x[outside], nu)
+            v = self.course.variance(x[outside], nu)
             out[outside] = _ratio(self._variance_beyond(x[outside], v, nu), v)
         return out
 
     def _in_gaps(self, x: Doubles) -> tuple[NDArray[np.bool_], Doubles]:
         """Return whether times are near gaps, and k² − 1 there, which decreases to zero between h and 2h from a gap."""
         excess, undetermined = np.zeros(x.shape), np.zeros(x.shape, bool)
-        turns = [0.0] if np.isnan(self._period) else [-self._period, 0.0, self._period]
-        if turns[1:]:
-            x = self._start_of_period + np.mod(x - self._start_of_period, self._period)
+        turns = [0.0]
+        if self.gaps and not np.isnan(self.period):
+            turns, first = [-self.period, 0.0, self.period], self.gaps[0][0]
+            x = first + np.mod(x - first, self.period)
         for start, stop, factor, _ in self.gaps:
             for turn in turns:
                 away = np.maximum(np.maximum(start + turn - x, x - stop - turn), 0.0)
@@ -228,10 +222,6 @@ class Calibration:
                 excess = np.maximum(excess, (factor**2 - 1) * np.clip(2.0 - away / self.width, 0.0, 1.0))
         excess[undetermined] = np.nan
         return undetermined | (excess > 0), excess
-
-    @property
-    def _start_of_period(self) -> float:
-        return self.gaps[0][0] if self.gaps else 0.0
 
     def _factors_beyond(self, distance: Doubles) -> Doubles:
         """Return the factors at distances from the ends."""
@@ -243,14 +233,14 @@ class Calibration:
 
     def _variance_beyond(self, x: Doubles, v: Doubles, nu: int) -> Doubles:
         """Return the variance at times beyond the ends, where the variance of the spline is v."""
-        behind = x > self._ends[1]
+        behind = x > self.outer[1]
         of_end = self._at_ends[behind.astype(int)]
-        d = np.where(behind, x - self._ends[1], self._ends[0] - x)
+        d = np.where(behind, x - self.outer[1], self.outer[0] - x)
         # Backwards in time, the velocity has the opposite sign.
         sign = np.where(behind, 1.0, -1.0)
         here = of_end[:, 2 * nu]
         line = here + (2 * sign * d * of_end[:, 1] + d**2 * of_end[:, 2] if nu == 0 else 0.0)
-        process = np.maximum(v, line + self._course.drift(d, nu))
+        process = np.maximum(v, line + self.course.drift(d, nu))
         return np.asarray(process + (self._factors_beyond(d) ** 2 - 1) * np.maximum(process - here, 0.0))
 
 
@@ -320,7 +310,7 @@ def calibrate(
 
     def beyond() -> tuple[Doubles, int]:
         data = evidence()
-        along = data.line or [], course.order, course.lam, course.acceleration
+        along = data.line, course.order, course.lam, course.acceleration
         rungs, count = _core.end_factors(data.knots, data.known, data.linearised, along, usual)
         return np.array(rungs).reshape(-1, 2), count
 
@@ -373,7 +363,7 @@ def calibration_of(spline: Any, number: int) -> Calibration | None:
 
 def _evidence(spline: Any, number: int, used: Any, sigma: float) -> SensorEvidence:
     noisy, part = spline._noisy, spline._smoothed[number]
-    space, data = points_of(noisy, spline.space)[number]
+    space, data = smoothed_spaces(spline.space)[number], _in_part(spline.space, noisy.points, number)
     noise, m = noisy.noise[number], space.dim
     t, y = noisy.times[used], data[used]
     residuals = _coordinates(spline, number, t, "point", y) / sigma
@@ -397,7 +387,7 @@ def _evidence(spline: Any, number: int, used: Any, sigma: float) -> SensorEviden
         weights = (roots**2).sum(axis=(1, 2)) / observed
     whitened = roots @ residuals.reshape(n, size, -1)
     squares = (whitened**2).sum(axis=(1, 2))
-    counts, pseudo = np.ones(n, bool), None
+    counts, pseudo = np.ones(n, bool), whitened
     if noise.loss != "linear":
         counts = squares <= _core.chi_squared(m, _KEPT)
         pseudo = whitened * _soft(noise.loss, squares, m)[:, None, None]
@@ -427,6 +417,11 @@ def _roots(matrices: Doubles) -> Doubles:
     values, vectors = np.linalg.eigh(matrices)
     values = np.where(values > SINGULAR * values[:, -1:], values, 0.0)
     return np.asarray(np.sqrt(values)[:, :, None] * np.swapaxes(vectors, -1, -2))
+
+
+def _in_part(space: Space[Any], arrays: Sequence[Array], number: int) -> Array:
+    """Return the arrays of one smoothed space from those of all factors."""
+    return [rows for pair in zip(factors_of(space), arrays, strict=True) for rows in split(*pair)][number]
 
 
 def _parts_at(spline: Any, number: int, t: Doubles, quantity: str) -> tuple[Any, Array, Array]:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._base.arrays import checked_flag, checked_number, short_repr, whole_number
+from .._base.faults import is_silent
 from .._base.typing import (
     ChoiceOptions,
     Criterion,
@@ -29,7 +30,7 @@ from .._base.typing import (
     TimesLike,
 )
 from .._core import ValidationError
-from .._curves.ends import End, freeze_bc_type, is_closed
+from .._curves.ends import NATURAL, End, freeze_bc_type, is_closed
 from .._curves.failures import raise_or_warn, warn_of_far_data, warn_of_far_points, warn_of_held_points, warn_of_signs
 from .._curves.fit import Fit, Points, Problem, fit, mask_of
 from .._curves.missing import counts_all_samples, data_without_missing, missing_named
@@ -38,11 +39,35 @@ from .._curves.solve import DEFAULTS, in_batch
 from .._spaces import Array, Doubles, Product, Space, SpecialEuclidean, factors_of, space_named
 from ..manifolds._manifold import refuse_functions
 from .audit import audit
-from .data import Part, SmoothingData, checked_ends, parts_of, read_noisy, valid_curves
-from .knots import NO_CURVE, Knots, geodesic_knots, has_all_times, in_gaps, in_long_gaps, knots_for, with_enough_knots
-from .noise import grouped, join, parts_of_factor, per_part, smoothed_spaces, split_ends
+from .noise import (
+    Part,
+    SmoothingData,
+    checked_ends,
+    grouped,
+    join,
+    parts_of,
+    parts_of_factor,
+    per_part,
+    read_noisy,
+    smoothed_spaces,
+    valid_curves,
+)
 from .report import SmoothingReport, SmoothingWarning
-from .solve import Found, Smoothed, SolverOptions, smoothed
+from .solve import (
+    NO_CURVE,
+    Found,
+    Knots,
+    Smoothed,
+    SolverOptions,
+    faults_of,
+    geodesic_knots,
+    has_all_times,
+    in_gaps,
+    in_long_gaps,
+    knots_for,
+    smoothed,
+    with_enough_knots,
+)
 from .spline import SmoothingSpline
 
 # Largest dimension in which the full Gauss–Newton solver is used; its matrices have (2 dim)² entries.
@@ -280,8 +305,14 @@ def make_smoothing_spline(
         t, points, weights, frames = data_without_missing(t, points, weights, frames, space)
     whole, data, of_factors = read_noisy(t, points, space, weights, frames, sigma, loss, bc_type, atol)
     batch = whole.batch
-    lams = per_part(space, lam, "lam", batch, infinite=True)
-    check_infinite(lams, bc_type, penalty)
+    lams = per_part(space, smoothed_spaces(space), lam, "lam", batch, infinite=True)
+    if np.isinf(lams).any():
+        for name, value, required in (("penalty", penalty, "acceleration"), ("bc_type", bc_type, "natural")):
+            if value != required:
+                raise ValidationError(
+                    f"lam=inf fits a geodesic, whose {name} is {required!r}, not {value!r}. Pass a finite lam, or omit "
+                    f"{name}."
+                )
     if loss != "linear" and sigma is None and any(noise.is_singular for noise in whole.noise):
         raise ValidationError(
             f"loss={loss!r} estimates the noise level from the data, but `weights` has matrices without information in "
@@ -292,9 +323,7 @@ def make_smoothing_spline(
         noisy, of_factors, chosen, faults = valid_curves(whole, data, of_factors, space, mask, strict)
     if chosen is not None:
         lams = [own[chosen] for own in lams]
-    factors = factors_of(space)
-    ends = [part for factor, own in zip(factors, of_factors, strict=True) for part in split_ends(factor, own)]
-    parts = parts_of(noisy, space, lams, ends)
+    parts = parts_of(noisy, space, lams, of_factors)
     every = knots_for(whole, knots)
     if knots is None and penalty == "jerk":
         every = in_long_gaps(every, whole)
@@ -324,12 +353,13 @@ def make_smoothing_spline(
     elif knots is None:
         found, at = with_enough_knots(every, noisy, parts, run, df_of_part, penalty)
         # Knots in gaps are tried before a larger λ, which would affect the whole curve.
-        if any(NO_CURVE in fault.what for own in found for fault in own.faults):
+        if NO_CURVE in np.concatenate([own.states for own in found]):
             at = in_gaps(at, whole)
             found = run(at, raise_lam=True)
     else:
         found, at = run(every), every
 
+    failed = faults_of(parts, found, noisy, at.times.shape[-1], options)
     whole, good = whole._replace(points=noisy.points), np.ones(batch, bool)
     if chosen is not None:
         # Points of masked curves are NaN.
@@ -338,18 +368,18 @@ def make_smoothing_spline(
         whole = whole._replace(points=[spread(own) for own in noisy.points])
         parts = [part.map(spread, noise) for part, noise in zip(parts, whole.noise, strict=True)]
     spline, fitted = _spline_through(whole, space, parts, found, at, good, bc_type, policy)
-    faults += [
-        fault if chosen is None else fault._replace(curve=int(chosen[fault.curve]))
-        for fault in next((own.faults for own in found if own.faults), [])
-    ]
+    faults += [fault if chosen is None else fault._replace(curve=int(chosen[fault.curve])) for fault in failed]
     valid_data = [
         Points(factor._as_doubles(own), 0.0, batch, whole.times.shape[-1])
         for factor, own in zip(factors_of(space), spline._noisy.points, strict=True)
     ]
     # Errors that this data cause do not show the reason.
-    far_data = warn_of_far_data(space, valid_data)
+    silent = is_silent(UserWarning)
+    far_data = not silent and warn_of_far_data(space, valid_data)
     if faults:
         raise_or_warn(sorted(faults, key=lambda fault: fault.curve), on_failure, spline)
+    if silent:
+        return spline
     # Between two knots there is nothing to choose. Masked curves are not examined.
     audit(spline, parts, found, good, good & (at.times.shape[-1] > 2))
     warn_of_signs(space, [valid_data])
@@ -371,17 +401,21 @@ def _spline_through(
     policy: Extrapolate,
 ) -> tuple[SmoothingSpline[Any, Any], Fit]:
     """Return the spline through smooth points, and its fit. Curves where `good` is False are masked."""
-    batch, factors = whole.batch, factors_of(space)
-    ends = [transport_end_velocities(part, own.points) for part, own in zip(parts, found, strict=True)]
-    points, conditions = [], []
-    for factor, of_points, of_ends in zip(factors, grouped(space, found), grouped(space, ends), strict=True):
-        rows = join(factor, [own.points for own in of_points])
-        points.append(Points(np.ascontiguousarray(factor._as_doubles(rows)), 0.0, batch, at.times.shape[-1]))
-        conditions.append(_joined(factor, of_ends))
+    batch, count, results = whole.batch, at.times.shape[-1], []
+    points: list[Points] = []
+    conditions: list[list[End] | None] = []
+    for factor, of_factor in zip(factors_of(space), grouped(space, zip(parts, found, strict=True)), strict=True):
+        rows, ends = [], []
+        for part, own in of_factor:
+            rows.append(own.points)
+            ends.append(transport_end_velocities(part, own.points))
+            results.append(with_infinite_lam(own.smoothed, part.lam, batch))
+        doubles = np.ascontiguousarray(factor._as_doubles(join(factor, rows)))
+        points.append(Points(doubles, 0.0, batch, count))
+        conditions.append(_joined(factor, ends))
     mask = None if good.all() else good
     fitted = fit(Problem(space, at.times, points, conditions, DEFAULTS, check=False, mask=mask))
     noise = [own._replace(sigma=np.empty(0)) for own in whole.noise]
-    results = [with_infinite_lam(own.smoothed, part.lam, batch) for own, part in zip(found, parts, strict=True)]
     noisy, kept = whole._replace(noise=noise), _conditions(bc_type, conditions, space)
     made = whole.time_axis, at.t, fitted.curve, kept, policy, fitted.reports(), noisy, results
     return SmoothingSpline._of(*made), fitted
@@ -480,9 +514,11 @@ def _with_lam(part: Part, at: Knots) -> Part:
 
 def transport_end_velocities(part: Part, curve_points: Array) -> list[End] | None:
     """Transport velocities at the first and the last datum to the ends of the curve."""
+    if part.ends is None or part.ends is NATURAL:
+        return part.ends
     space, axis = part.space, part.axis
     result: list[End] = []
-    for (kind, vector), index in zip(part.ends or [], (0, -1), strict=part.ends is not None):
+    for (kind, vector), index in zip(part.ends, (0, -1), strict=True):
         if vector is not None:
             y, x = (np.take(rows, index, axis=axis) for rows in (part.points, curve_points))
             good = space._where_finite(x)
@@ -490,12 +526,12 @@ def transport_end_velocities(part: Part, curve_points: Array) -> list[End] | Non
             moved[good] = space._apply("transport", p=y[good], q=x[good], v=moved[good])
             vector = np.ascontiguousarray(space._as_doubles(moved))
         result.append((kind, vector))
-    return None if part.ends is None else result
+    return result
 
 
 def _joined(space: Space, ends: list[list[End] | None]) -> list[End] | None:
     """Combine the end conditions of the parts of a factor."""
-    if ends[0] is None or len(ends) == 1:
+    if ends[0] is None or len(ends) == 1 or ends[0] is NATURAL:
         return ends[0]
     joined: list[End] = []
     for each in zip(*[own or [] for own in ends], strict=True):
@@ -523,18 +559,6 @@ def _conditions(bc_type: Any, transported: list[list[End] | None], space: Space)
 
 
 # ---- geodesic regression: an infinite λ ----
-
-
-def check_infinite(lams: list[Doubles], bc_type: Any, penalty: str) -> None:
-    """Raise ValidationError if λ is infinite where the curve is not a geodesic."""
-    if not np.isinf(lams).any():
-        return
-    for name, value, required in (("penalty", penalty, "acceleration"), ("bc_type", bc_type, "natural")):
-        if value != required:
-            raise ValidationError(
-                f"lam=inf fits a geodesic, whose {name} is {required!r}, not {value!r}. Pass a finite lam, or omit "
-                f"{name}."
-            )
 
 
 def geodesic_options(space: Space, options: SolverOptions) -> SolverOptions:

@@ -1,15 +1,18 @@
-"""Reports and warnings of smoothing fits."""
+"""Reports of smoothing fits, their warnings, and the posterior distribution of the curve, in frames along it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import _core
+from .._base.arrays import same
 from .._base.report import BOOL, FLOAT, INT, FitReport
-from .._base.typing import Number
+from .._base.typing import FloatArray, Number
+from .._spaces import Array, Doubles, Space
 
 METHODS: tuple[Literal["linearized", "newton"], ...] = ("linearized", "newton")
 
@@ -110,3 +113,192 @@ class SmoothingReport(FitReport):
         True
         """
         return bool(np.asarray(self.df)[index] < 2.5)
+
+
+# ---- posterior ----
+
+
+class Parameter(NamedTuple):
+    """An estimated constant.
+
+    Attributes
+    ----------
+    value : ndarray, shape (size,)
+        Estimate.
+    cov : ndarray, shape (size, size)
+        Covariance.
+    """
+
+    value: FloatArray
+    cov: FloatArray
+
+    @property
+    def std(self) -> FloatArray:
+        """Standard deviations, shape (size,)."""
+        return np.sqrt(np.diag(self.cov))
+
+    def __eq__(self, other: object) -> bool:
+        """Whether both have equal arrays."""
+        return same(tuple(self), tuple(other)) if isinstance(other, Parameter) else NotImplemented
+
+    def __ne__(self, other: object) -> bool:
+        return not self == other
+
+
+class Posterior(NamedTuple):
+    """The matrix A of the linear problem.
+
+    Its inverse is the covariance of the coefficients for noise of variance one.
+
+    Attributes
+    ----------
+    band : ndarray, shape (..., coefficients · size, 4 size)
+        Its band: the entries (i, i − d).
+    turn : ndarray, shape (..., size, size) or (..., 0, 0)
+        Holonomy of a closed curve.
+    size : int
+        Number of coordinates that A couples: 1 if it is the same for every coordinate.
+    side, corner : ndarray, shape (coefficients · size, p) and (p, p)
+        Rows and columns of the parameters.
+    first : int
+        Number of the first of the coordinates of the space among the coupled ones.
+    """
+
+    band: Doubles
+    turn: Doubles
+    size: int
+    side: Doubles
+    corner: Doubles
+    first: int = 0
+
+    @classmethod
+    def of(cls, band: Doubles, turn: Doubles, size: int) -> Posterior:
+        """Return the posterior of a curve without parameters."""
+        return cls(band, turn, size, np.zeros((band.shape[-2], 0)), np.zeros((0, 0)))
+
+    def map(self, function: Any) -> Posterior:
+        """Apply a function to the arrays with batch axes, such as the selection of some curves."""
+        return self._replace(band=function(self.band), turn=function(self.turn))
+
+    def known(self, index: tuple[int, ...], kinds: Any) -> Any:
+        """Return the matrix A of one curve and its end conditions, in the form that the core expects."""
+        arrays = [np.ascontiguousarray(x) for x in (self.band[index], self.side, self.corner)]
+        return arrays, self.size, kinds, np.ascontiguousarray(self.turn[index])
+
+    def covariance(
+        self, space: Space, knots: Doubles, index: tuple[int, ...], kinds: Any, x: Doubles, y: Any, orders: list[int]
+    ) -> Doubles:
+        """Return covariances of one curve at times x for noise of variance one.
+
+        Parameters
+        ----------
+        space : Space
+            The space of the coordinates.
+        knots : ndarray
+            Knots of the curve.
+        index : tuple of int
+            Index of the curve in the batch.
+        kinds : list of str or None
+            Kinds of the ends.
+        x, y : ndarray
+            Times; y is None for the covariance of derivatives at the same time.
+        orders : list of int
+            Orders of the derivatives.
+
+        Returns
+        -------
+        ndarray, shape (n, d, d)
+            Covariances, with d = ``len(orders) * space.dim``.
+        """
+        count, m = len(orders), space.dim
+        if self.size == 1 and m > 1:
+            found = self.coupled(knots, index, kinds, x, y, orders, np.arange(1))
+            whole = np.zeros((len(x), count, m, count, m))
+            each = np.arange(m)
+            whole[:, :, each, :, each] = found
+            return whole.reshape(len(x), count * m, count * m)
+        return self.coupled(knots, index, kinds, x, y, orders, np.arange(self.first, self.first + m))
+
+    def coupled(
+        self, knots: Doubles, index: tuple[int, ...], kinds: Any, x: Doubles, y: Any, orders: list[int], rows: Any
+    ) -> Doubles:
+        """Return the same for some of the coordinates that A couples, given by their numbers `rows`."""
+        found = _core.posterior_covariance(knots, self.known(index, kinds), x, y, orders)
+        count, d = len(orders), len(orders) * len(rows)
+        square = found.reshape(len(x), count, self.size, count, self.size)[:, :, rows][..., rows]
+        return np.ascontiguousarray(square.reshape(len(x), d, d))
+
+    def samples(
+        self, space: Space, knots: Doubles, index: tuple[int, ...], kinds: Any, rng: np.random.Generator, n: int
+    ) -> Doubles:
+        """Return moves of one curve at its knots, shape (n, knots, size or dim), for noise of variance one."""
+        known = self.known(index, kinds)
+        rows = n * space.dim if self.size == 1 else n
+        normal = np.empty((rows, _core.posterior_freedom(knots, known)))
+        # The same numbers as in one call. Python handles signals between the rows.
+        for row in normal:
+            rng.standard_normal(out=row)
+        found = _core.posterior_samples(knots, known, normal)
+        if self.size == 1:
+            return np.moveaxis(found.reshape(n, space.dim, len(knots)), 1, 2)
+        return found.reshape(n, len(knots), self.size)
+
+
+def frames_at(space: Space, knots: Doubles, points: Array, x: Doubles, p: Array) -> Array:
+    """Return frames along a curve at the points p for the times x, shape (n, dim, *point_shape)."""
+    doubles = [np.ascontiguousarray(space._as_doubles(rows)) for rows in (points, p)]
+    found = _core.frames_along(space._handle, knots, doubles[0], np.ascontiguousarray(x), doubles[1])
+    return space._numbers(found.reshape(len(x), space.dim, *space._doubles_shape))
+
+
+def coordinates(space: Space, p: Array, frames: Array, vectors: Array) -> Doubles:
+    """Return the coordinates of tangent vectors at p in frames, shape (n, dim)."""
+    if not np.isnan(space.curvature):
+        found = space._apply("inner", p=p[:, None], u=frames, v=np.broadcast_to(vectors[:, None], frames.shape))
+        return np.ascontiguousarray(found)
+    # Groups without a metric have frames that are not orthonormal.
+    flat, own = _flat(space, frames), _flat(space, vectors)
+    gram = flat @ np.swapaxes(flat, -1, -2)
+    return np.ascontiguousarray(np.linalg.solve(gram, flat @ own[..., None])[..., 0])
+
+
+def _flat(space: Space, vectors: Array) -> Doubles:
+    """Return vectors as rows of real numbers."""
+    doubles = space._as_doubles(np.ascontiguousarray(vectors))
+    return doubles.reshape(*vectors.shape[: vectors.ndim - len(space.point_shape)], -1)
+
+
+def process_ratio(
+    times: Doubles, weights: Doubles, knots: Doubles, band: Doubles | None, lam: float, kinds: Any, x: Doubles, nu: int
+) -> Doubles:
+    """Return the variance of the process divided by that of a cubic spline with the same data and the same λ.
+
+    The posterior mean of the process is a quintic spline. At the data, its variance is nearly that of the cubic spline.
+    Between the data, the process is stiffer than the one whose mean is a cubic spline.
+
+    Parameters
+    ----------
+    times, weights : ndarray, shape (N,)
+        Times and weights of the data.
+    knots : ndarray
+        Knots of the cubic spline.
+    band : ndarray or None
+        Band of A⁻¹. None if coordinates are coupled; the ratio is then that of uncoupled coordinates.
+    lam : float
+        Weight of the penalty.
+    kinds : list of str or None
+        Kinds of the ends; None for a closed curve.
+    x : ndarray, shape (n,)
+        Times.
+    nu : {0, 1}
+        0 for the point, 1 for the velocity.
+    """
+    used = weights > 0
+    times, weights, knots, x = (np.ascontiguousarray(own) for own in (times[used], weights[used], knots, x))
+    if not (lam > 0 and np.isfinite(lam)):
+        return np.ones(len(x))
+    if band is None:
+        band = _core.smoothing_inverse(knots, times, weights, lam, "jerk", kinds).reshape(-1, 4)
+    period = knots[-1] - knots[0] if kinds is None else None
+    spline = _core.smoothing_variance(knots, np.ascontiguousarray(band), np.zeros(1), x, nu, kinds)
+    return np.asarray(_core.process_variance(times, weights, lam, period, x, nu) / spline)

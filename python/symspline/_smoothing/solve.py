@@ -1,8 +1,8 @@
-"""Calls of the compiled core that compute the points of smooth curves from noisy data.
+"""Points of smooth curves at their knots: the choice of the knots, and calls of the compiled core.
 
-The core starts from means of neighbouring data. If the noise is a large fraction of the distance to the cut locus, or
-consecutive data are far apart, the iteration may end in a minimum that is not the global one. Further starts are then
-tried.
+The knots are those of the user, or as many as the degrees of freedom require. The core starts from means of
+neighbouring data. If the noise is a large fraction of the distance to the cut locus, or consecutive data are far apart,
+the iteration may end in a minimum that is not the global one. Further starts are then tried.
 """
 
 from __future__ import annotations
@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
-from .._base.arrays import short_repr
+from .._base.arrays import as_array, short_repr
 from .._base.faults import UNCONVERGED, Fault
+from .._base.input import times_of
 from .._base.report import long_gaps
 from .._base.typing import Progress
 from .._core import ValidationError
@@ -29,16 +30,377 @@ from .._spaces import (
     Grassmannian,
     RealProjective,
     Space,
+    SpecialEuclidean,
     SpecialOrthogonal,
     Sphere,
     Torus,
+    factors_of,
     nearest_rotations,
 )
-from .data import Part, SmoothingData
-from .knots import NO_CURVE, TOO_FEW, Knots
-from .noise import Noise
-from .posterior import Posterior
-from .report import METHODS, SmoothingReport
+from .noise import Noise, Part, SmoothingData, smoothed_spaces
+from .report import METHODS, Posterior, SmoothingReport
+
+# Segments longer than this fraction of the curve are divided if no curve was found without additional knots.
+_GAPS = 12
+# Largest number of parts of a long gap between data.
+_IN_GAP = 32
+# If there are more knots than the first number, the fit begins with the second number of knots or more.
+_MANY, _FIRST = 4000, 2000
+# Number of evenly distributed short parts that are fitted before, and the smallest and largest number of data of each.
+_PARTS, _FEW, _PART = 8, 50, 1000
+# Motion shows in the distances between data and those that follow after this number of others.
+_LAG = 5
+# Largest number of times that the knots are adapted to λ.
+_TRIES = 5
+# Factor of the λ for which rounding errors are negligible, after a fit that failed.
+_COARSER = 1e4
+# Number of knots from which the length of a geodesic is determined. Two knots are joined by one geodesic if they are
+# closer than the second number times the injectivity radius; more knots are at most as far apart as the third one.
+_OF_GEODESIC, _NEAR, _STEP = 32, 0.9, 0.3
+# States of curves, as the core numbers them: converged, not converged, no spline joins the points, the data do not
+# determine the curve, the choice of λ does not converge.
+CONVERGED, UNSOLVED, NO_CURVE, UNDETERMINED, UNSETTLED = range(5)
+# Smallest number of data with a penalty on the jerk.
+_FEWEST = 3
+
+DfOfPart = Callable[[Part, SmoothingData, "Knots"], Array]
+"""Returns the degrees of freedom of curves through some of the data."""
+
+
+class Knots(NamedTuple):
+    """Knots as the user sees them, and as the core counts them; shape (K,) or (..., K)."""
+
+    t: Array
+    times: Doubles
+
+    def of_curves(self, chosen: NDArray[np.intp] | None) -> Knots:
+        """Return the knots of some curves of a batch; None selects all curves."""
+        if chosen is None or self.times.ndim == 1:
+            return self
+        t, times = (x.reshape(-1, x.shape[-1])[chosen] for x in (self.t, self.times))
+        return Knots(t, np.ascontiguousarray(times))
+
+
+def knots_for(noisy: SmoothingData, knots: Any) -> Knots:
+    """Return the knots of a curve from the argument `knots`: None, their number, or the knots themselves."""
+    t, times = noisy.t, noisy.times
+    if isinstance(knots, (int, np.integer)) and not isinstance(knots, bool):
+        return thin_knots(_different(t, times), int(knots))
+    if knots is None:
+        return _different(t, times)
+    if isinstance(knots, (str, bool)):
+        raise ValidationError(f"knots must be None, a number of knots, or an array of them, not {short_repr(knots)}")
+    given = as_array(times_of(knots, "knots")[0], "knots")
+    if given.ndim != 1:
+        raise ValidationError(
+            f"knots has shape {given.shape}, but must have shape (K,). All curves have the same knots."
+        )
+    found, _ = noisy.time_axis.at(knots, noisy.batch, False)
+    if found.shape[-1:] < (2,):
+        raise ValidationError("knots must have at least two entries")
+    if not np.all(np.diff(found) > 0):
+        index = int(np.argwhere(~(np.diff(found) > 0))[0][-1])
+        raise ValidationError(f"knots[{index + 1}] is not after knots[{index}], but knots must increase")
+    ends = np.stack([found[..., 0], found[..., -1]], axis=-1)
+    data_ends = np.stack([times[..., 0], times[..., -1]], axis=-1)
+    size = np.abs(data_ends).max(axis=-1, keepdims=True)
+    if noisy.time_axis.origin is not None and not noisy.time_axis.dates:
+        size = size + np.abs(np.asarray(noisy.time_axis.origin, np.float64))[..., None]
+    # The last knot of linspace may be a few units in the last place before the last datum.
+    beside = (ends != data_ends) & (np.abs(ends - data_ends) <= 4 * np.spacing(size))
+    if beside.any():
+        found = np.broadcast_to(
+            found, (*np.broadcast_shapes(found.shape[:-1], ends.shape[:-1]), found.shape[-1])
+        ).copy()
+        found[..., [0, -1]] = np.where(beside, data_ends, ends)
+    if np.any(found[..., 0] > times[..., 0]) or np.any(found[..., -1] < times[..., -1]):
+        raise ValidationError("knots must reach from the first to the last time of the data")
+    if noisy.time_axis.dates:
+        given = given.astype(np.promote_types(given.dtype, t.dtype))
+    elif noisy.time_axis.plain:
+        given = found
+    # Curves with an origin of time of their own have one row of knots each.
+    return Knots(np.broadcast_to(given, found.shape).copy(), found)
+
+
+def has_all_times(knots: Knots, noisy: SmoothingData) -> bool:
+    """Whether there is a knot at every time of data with a nonzero weight."""
+    used = np.broadcast_to(noisy.used, (*noisy.batch, noisy.times.shape[-1]))
+    if noisy.times.ndim == 1:
+        used = np.logical_or.reduce(used.reshape(-1, used.shape[-1]))
+    if knots.times.ndim == 1 and noisy.times.ndim == 1:
+        return bool(np.isin(noisy.times[used], knots.times).all())
+    return bool(np.all([np.isin(t[u], k).all() for t, u, k in zip(noisy.times, used, knots.times, strict=True)]))
+
+
+def _different(t: Array, times: Doubles) -> Knots:
+    if times.ndim == 1:
+        _, index = np.unique(times, return_index=True)
+        return Knots(t[index], times[index])
+    if np.any(np.diff(times) == 0):
+        raise ValidationError(
+            "times repeat, and each curve has its own times. Pass knots, which apply to all curves, or smooth the "
+            "curves one by one."
+        )
+    return Knots(t, times)
+
+
+def thin_knots(knots: Knots, count: int) -> Knots:
+    """Select a number of knots, distributed evenly in the mean of index and time.
+
+    Neither crowded nor sparse parts then receive too few.
+    """
+    there = knots.times.shape[-1]
+    if count < 2:
+        raise ValidationError(f"knots must be at least 2, not {count}")
+    if count >= there:
+        return knots
+    place = np.linspace(0, 1, there)
+    if knots.times.ndim == 1:
+        place = 0.5 * (place + (knots.times - knots.times[0]) / np.ptp(knots.times))
+    index = np.searchsorted(place, np.linspace(0, 1, count) * (1 - 1e-12))
+    return _picked(knots, np.unique(np.append(index[:-1], there - 1)))
+
+
+def merge_close_knots(knots: Knots, noisy: SmoothingData, lam: float | None, power: int, coarser: float = 1.0) -> Knots:
+    """Remove knots that are too close together, or move them where curves have knots of their own.
+
+    Rounding errors of λ/h³, or λ/h⁵ for the jerk, would otherwise exceed the weights of the data.
+
+    Parameters
+    ----------
+    lam : float or None
+        λ. If it is None, a λ is assumed that has the same effect as the weights for evenly distributed knots.
+    power : int
+        Power of time in λ.
+    coarser : float, default 1
+        Factor of λ, for fits that failed.
+    """
+    most = 1e11
+    times = knots.times
+    if times.shape[-1] <= 4 or 0 in noisy.batch:
+        return knots
+    span = times[..., -1] - times[..., 0]
+    mean = span / (times.shape[-1] - 1)
+    weight = float(max([np.max(np.mean(own.weights, axis=-1)) for own in noisy.noise]))
+    # Units of the mean distance prevent overflow.
+    ratio = 1.0 if lam is None else lam / weight
+    for _ in range(0 if lam is None else power):
+        ratio = ratio / mean
+    least = np.minimum(mean * (coarser * ratio / most) ** (1 / power), span / 15)
+    if np.all(np.diff(times).min(axis=-1) >= least):
+        return knots
+    if times.ndim == 1:
+        return _picked(knots, _far_apart(times, float(least)))
+    shown = knots.t.copy()
+    for index in np.ndindex(times.shape[:-1]):
+        shown[index] = _moved_apart(shown[index], times[index], _far_apart(times[index], float(least[index])))
+    moved, _ = noisy.time_axis.at(shown, times.shape[:-1], True)
+    moved[..., [0, -1]] = times[..., [0, -1]]
+    return Knots(shown, moved) if np.all(np.diff(moved) > 0) else knots
+
+
+def _far_apart(times: Doubles, least: float) -> NDArray[np.intp]:
+    """Return indices of times that are at least `least` apart, including the first and the last one."""
+    # For each time, the index of the first time that is far enough after it.
+    following = np.searchsorted(times, times + least).tolist()
+    stop = int(np.searchsorted(times, times[-1] - least, side="right"))
+    kept, i = [], 0
+    while i < max(stop, 1):
+        kept.append(i)
+        i = max(following[i], i + 1)
+    return np.array([*kept, len(times) - 1])
+
+
+def _moved_apart(t: Array, times: Doubles, kept: NDArray[np.intp]) -> Array:
+    """Return the knots that are kept, and new ones in the middle of the longest segments, as many as before in all."""
+    own, at = t[kept].tolist() if t.dtype.kind == "f" else list(t[kept]), times[kept].tolist()
+    while len(own) < len(t):
+        i = int(np.argmax(np.diff(at)))
+        step = own[i + 1] - own[i]
+        own.insert(i + 1, own[i] + (step / 2 if t.dtype.kind == "f" else step // 2))
+        at.insert(i + 1, 0.5 * (at[i] + at[i + 1]))
+    return np.array(own, t.dtype)
+
+
+def with_enough_knots(
+    whole: Knots,
+    noisy: SmoothingData,
+    parts: list[Part],
+    run: Callable[[Knots], list[Found]],
+    df_of_part: DfOfPart,
+    penalty: str,
+) -> tuple[list[Found], Knots]:
+    """Fit with as many knots as λ and the degrees of freedom require, and return the results and the knots."""
+    lams = np.concatenate([part.lam for part in parts])
+    given = _of_all(lams) if np.isfinite(lams).all() else None
+    power, coarser = (3 if penalty == "acceleration" else 5), 1.0
+    at = merge_close_knots(whole, noisy, given, power)
+    if at.times.shape[-1] > _MANY:
+        at = thin_knots(at, max(_FIRST, _n_knots_for_df(_df_from_parts(noisy, parts, df_of_part, power))))
+    for tries in range(_TRIES):
+        found = run(at)
+        count = at.times.shape[-1]
+        if tries < _TRIES - 1 and any(map(_may_settle, found, parts)):
+            coarser *= _COARSER
+            fewer = merge_close_knots(whole, noisy, given, power, coarser)
+            if not np.array_equal(fewer.times, at.times) and fewer.times.shape[-1] <= count:
+                at = fewer
+                continue
+        lams, dfs = np.array([(own.smoothed.report.lam, own.smoothed.report.df) for own in found]).swapaxes(0, 1)
+        apart = merge_close_knots(whole, noisy, _of_all(lams), power, coarser)
+        most, enough = apart.times.shape[-1], _n_knots_for_df(dfs)
+        if tries == _TRIES - 1 or (count >= most > 0.8 * count and count > 0.8 * min(enough, most)):
+            break
+        # A stiff curve needs fewer knots than it had, and a rough curve more.
+        better = thin_knots(apart, max(_FIRST, 2 * enough)) if most > max(_MANY, 2 * enough) else apart
+        if np.array_equal(better.times, at.times):
+            break
+        at = better
+    return found, at
+
+
+def _may_settle(found: Found, part: Part) -> bool:
+    """Whether a curve failed that may converge with fewer knots."""
+    failed = (found.states != CONVERGED) & (found.states != NO_CURVE)
+    if failed.any() and found.smoothed.penalty == "jerk":
+        failed &= (found.states != UNDETERMINED) | (np.sum(part.noise.weights > 0, axis=-1).ravel() >= _FEWEST)
+    return bool(failed.any())
+
+
+def _df_from_parts(noisy: SmoothingData, parts: list[Part], df_of_part: DfOfPart, power: int) -> float:
+    """Estimate the degrees of freedom of a long recording from short parts, in which all times are knots.
+
+    For few knots, the choice of λ takes fast motion for noise. The estimate is that of the liveliest part in any of the
+    smoothed spaces, without the geodesic that each part has. It is 0 if there are too few data for parts.
+    """
+    densest = 0.0
+    for part in parts:
+        (used,) = np.nonzero((part.noise.weights > 0).reshape(-1, part.noise.weights.shape[-1]).all(axis=0))
+        length = min(_PART, len(used) // (2 * _PARTS))
+        if length < _FEW or 0 in noisy.batch:
+            continue
+        for start in _starts(part.space, np.take(part.points, used, axis=part.axis), part.axis, length):
+            index = used[start : start + length]
+            rows = noisy.rows(index)
+            if not (rows.times[..., -1] > rows.times[..., 0]).all():
+                continue
+            knots = merge_close_knots(_different(rows.t, rows.times), rows, None, power)
+            excess = df_of_part(part.rows(index), rows, knots) - 2
+            # The share of the recording, as `thin_knots` counts it.
+            spans = [np.ptp(times, axis=-1).max() for times in (rows.times, noisy.times)]
+            share = 0.5 * (length / len(used) + spans[0] / spans[1])
+            densest = float(np.max(excess / share, initial=densest, where=np.isfinite(excess)))
+    return densest
+
+
+def _starts(space: Space, points: Array, axis: int, length: int) -> list[int]:
+    """Return where parts of a recording begin: evenly distributed ones, and those in which the data move most.
+
+    ``axis`` is that of the data among the axes of the points.
+    """
+    total, size = points.shape[axis], length // 4
+    starts = np.linspace(0, total - length, _PARTS).astype(int).tolist()
+    count = (total - _LAG) // size
+    first, second = (points[(slice(None),) * axis + (slice(i, i + count * size),)] for i in (0, _LAG))
+    # Outliers do not change the median.
+    motion = np.median(space.distance(first, second).reshape(-1, count, size), axis=-1).max(axis=0)
+    liveliest = np.argsort(motion)[-_PARTS // 2 :] * size + size // 2 - length // 2
+    return sorted({*starts, *np.clip(liveliest, 0, total - length).tolist()})
+
+
+def _of_all(lams: Any) -> float:
+    """Return one λ from which the knots of all curves are selected.
+
+    It is the smallest λ, so that the roughest curve has enough knots, but at least 1e-3 of the largest one.
+    """
+    flat = np.ravel(lams)
+    flat = flat[np.isfinite(flat)]
+    return float(max(flat.min(), 1e-3 * flat.max())) if flat.size else 0.0
+
+
+def _n_knots_for_df(df: Any) -> int:
+    """Return a number of knots that is enough for these degrees of freedom.
+
+    Three times as many knots would already lose nothing.
+    """
+    return 4 * int(np.ceil(np.max(df, initial=2.0, where=np.isfinite(df)))) + 8
+
+
+def in_gaps(knots: Knots, noisy: SmoothingData) -> Knots:
+    """Add knots in long gaps.
+
+    Between two points far apart, the curve of the space may turn faster than one segment can.
+    """
+    if knots.times.ndim > 1 or len(knots.times) < 3:
+        return knots
+    h = np.diff(knots.times)
+    return _divided(knots, noisy, np.ceil(h * _GAPS / h.sum()).astype(int))
+
+
+def in_long_gaps(knots: Knots, noisy: SmoothingData) -> Knots:
+    """Add knots in long gaps, as far apart as the data usually are, so that the curve minimises the jerk there.
+
+    The minimiser of the integrated squared third derivative is a polynomial of degree five between data. One cubic
+    segment per gap cannot approximate it.
+    """
+    if knots.times.ndim > 1 or len(knots.times) < 3:
+        return knots
+    h = np.diff(knots.times)
+    usual = np.median(h)
+    parts = np.where(long_gaps(knots.times), np.minimum(np.ceil(h / usual), _IN_GAP), 1).astype(int)
+    return knots if parts.max() == 1 else _divided(knots, noisy, parts)
+
+
+def places(parts: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return the number of the segment of every part, and its number there, for numbers of parts of all segments."""
+    i = np.repeat(np.arange(len(parts)), parts)
+    return i, np.arange(len(i)) - np.repeat(np.cumsum(parts) - parts, parts)
+
+
+def _divided(knots: Knots, noisy: SmoothingData, parts: NDArray[np.intp]) -> Knots:
+    """Divide every segment into a number of equal parts."""
+    i, j = places(parts)
+    # Dates are divided in their own unit.
+    first, step = knots.t[i], knots.t[i + 1] - knots.t[i]
+    whole = step.dtype.kind in "ium"
+    shown_times = np.append(first + (step * j // parts[i] if whole else step * (j / parts[i])), knots.t[-1:])
+    times, _ = noisy.time_axis.at(shown_times, (), False)
+    inner = np.flatnonzero(j == 0)
+    times[inner], times[-1] = knots.times[:-1], knots.times[-1]
+    return Knots(shown_times, times) if np.all(np.diff(times) > 0) else knots
+
+
+def _picked(knots: Knots, index: NDArray[np.intp]) -> Knots:
+    return Knots(knots.t[..., index], np.ascontiguousarray(knots.times[..., index]))
+
+
+def geodesic_knots(every: Knots, space: Space, run: Callable[[Knots], list[Array]]) -> Knots:
+    """Return the two knots of a geodesic, or more if it is so long that two knots do not determine it.
+
+    Poses keep all knots: rotations and positions on geodesics are not a geodesic of poses.
+
+    Parameters
+    ----------
+    every : Knots
+        The times of the data, or the knots that were given.
+    run : callable
+        Function that returns the points at given knots in every space in which data are smoothed.
+    """
+    if any(isinstance(factor, SpecialEuclidean) for factor in factors_of(space)):
+        return every
+    found = run(thin_knots(every, _OF_GEODESIC))
+    ratio = 0.0
+    for part, rows in zip(smoothed_spaces(space), found, strict=True):
+        starts, ends = part._neighbours(rows)
+        good = part._where_finite(starts) & part._where_finite(ends)
+        steps = np.zeros(good.shape)
+        steps[good] = part.distance(starts[good], ends[good])
+        ratio = max(ratio, float(np.max(steps.sum(axis=-1), initial=0.0)) / part.injectivity_radius)
+    return thin_knots(every, 2 if ratio < _NEAR else 1 + int(np.ceil(ratio / _STEP)))
+
+
+# ---- calls of the core ----
 
 # Standard deviation of the noise, divided by the injectivity radius, from which a second start is tried: 34° on a
 # circle. In all experiments with less noise, the first start led to the best minimum.
@@ -58,8 +420,6 @@ _WIDE = 64
 
 # Kinds of results that may be wrong.
 UNIQUE, TWO, NOISY, FAST = range(4)
-# States of curves, in the order of their numbers in the core.
-_STATES = ("converged", "unconverged", "no curve", "undetermined", "unsettled")
 
 
 class Smoothed(NamedTuple):
@@ -124,8 +484,8 @@ class Found(NamedTuple):
         Points at the knots.
     smoothed : Smoothed
         Properties of the smoothing.
-    faults : list of Fault
-        Curves that failed.
+    states : ndarray of int, shape (curves,)
+        States of the curves, `CONVERGED` or one of the failures.
     selection, rejected : ndarray of int
         Kind of the selection of a robust loss, which is 0 if it can be trusted, and the number of rejected data.
     minima : ndarray of int
@@ -134,7 +494,7 @@ class Found(NamedTuple):
 
     points: Array
     smoothed: Smoothed
-    faults: list[Fault]
+    states: NDArray[np.int_]
     selection: NDArray[np.int_]
     rejected: NDArray[np.int_]
     minima: NDArray[np.int_]
@@ -142,7 +502,7 @@ class Found(NamedTuple):
     def map(self, function: Any) -> Found:
         """Apply a function to all arrays, such as one that adds masked curves."""
         columns = map(function, (self.selection, self.rejected, self.minima))
-        return Found(function(self.points), self.smoothed.map(function), self.faults, *columns)
+        return Found(function(self.points), self.smoothed.map(function), self.states, *columns)
 
 
 def smoothed(
@@ -173,11 +533,11 @@ def smoothed(
     ):
 
         def solve(lam: Doubles, start: Doubles, factor: Any = factor) -> Raw:
-            return Raw(*_core.smooth([(*factor[:4], lam, *factor[5:7], start)], t, at, *how)[0])
+            return Raw.of(_core.smooth([(*factor[:4], lam, *factor[5:7], start)], t, at, *how)[0])
 
         points = small._numbers(factor[1])
         samples = Samples(t, points, part.noise.weights, at, len(small.point_shape), part.ends is None)
-        best, minima = best_of_starts(small, samples, part.lam, Raw(*raw), solve)
+        best, minima = best_of_starts(small, samples, part.lam, Raw.of(raw), solve)
         found.append(_found(part, noisy, options, between, small, span, best, minima))
     return found
 
@@ -193,61 +553,64 @@ def _found(
     minima: NDArray[np.int_],
 ) -> Found:
     batch, sigma = noisy.batch, part.noise.sigma
-    columns = [*raw.columns, np.where(np.isnan(sigma), raw.columns[Column.SIGMA], sigma)]
+    columns = [*raw.columns, np.where(np.isnan(sigma), raw.columns.sigma, sigma)]
     shaped = [x.reshape(batch) for x in columns] if batch else [x[0].item() for x in columns]
-    state, iterations, lam, band_lam, at_bound, df, estimated, step, rate, _, exact, selection, rejected, _, scale = (
-        shaped
-    )
+    state, iterations, lam, band_lam, at_bound, df, estimated, step, rate, _, exact, _, _, _, scale = shaped
+    kinds = [x.reshape(batch) for x in (raw.columns.selection, raw.columns.rejected, minima)]
     method = METHODS[int(np.any(exact))]
     report = SmoothingReport(method, state == 0, iterations, step, rate, lam, at_bound, df, estimated)
-    numbers, kinds = small._numbers(raw.points), raw.columns[Column.STATE]
-    count = raw.points.shape[len(batch)]
-    faults = [
-        Fault(number, UNCONVERGED, _reason(_STATES[kinds[number]], number, report, options, noisy, part.noise, count))
-        for number in (np.flatnonzero(kinds).tolist() if kinds.any() else ())
-    ]
+    numbers = small._numbers(raw.points)
     matrix, turn, size = raw.system
     # Coordinates in a span of lower dimension are not those of the space.
     posterior = Posterior.of(matrix, turn, size) if span is None or size == 1 else None
     result = Smoothed(report, raw.band, band_lam, scale, between, posterior, options.penalty)
-    return Found(numbers if span is None else span.embed(numbers), result, faults, selection, rejected, minima)
+    return Found(numbers if span is None else span.embed(numbers), result, raw.columns.state, *kinds)
 
 
-def _reason(
-    state: str,
-    number: int,
-    report: SmoothingReport,
-    options: SolverOptions,
-    noisy: SmoothingData,
-    noise: Noise,
-    knots: int,
-) -> str:
-    if state == "no curve":
+def faults_of(
+    parts: list[Part], found: list[Found], noisy: SmoothingData, knots: int, options: SolverOptions
+) -> list[Fault]:
+    """Return the faults of the curves that failed, with their messages, in the first part in which some failed."""
+    for part, own in zip(parts, found, strict=True):
+        if own.states.any():
+            return [
+                Fault(number, UNCONVERGED, _reason(own, number, part.noise, noisy, knots, options))
+                for number in np.flatnonzero(own.states).tolist()
+            ]
+    return []
+
+
+def _reason(found: Found, number: int, noise: Noise, noisy: SmoothingData, knots: int, options: SolverOptions) -> str:
+    """Return the message about a curve that failed."""
+    state, report = found.states[number], found.smoothed.report
+    if state == NO_CURVE:
         return (
-            f"The smoothing{{of}} led to points that {NO_CURVE}: the curve turns too far between two knots. Pass more "
-            "knots in the gaps of the data, a larger lam, or cut the recording at its gaps (symspline.fit_segments). "
-            "Check units and signs of the data."
+            "The smoothing{of} led to points that no spline joins: the curve turns too far between two knots. Pass "
+            "more knots in the gaps of the data, a larger lam, or cut the recording at its gaps "
+            "(symspline.fit_segments). Check units and signs of the data."
         )
-    if state == "undetermined" and options.penalty == "jerk":
+    if state == UNDETERMINED and options.penalty == "jerk":
         weights = np.broadcast_to(noise.weights, (*noisy.batch, noise.weights.shape[-1]))
         has_weight = weights.reshape(-1, weights.shape[-1])[number] > 0
         used = int(has_weight.sum())
-        if used < 3:
-            return f"The data{{of}} do not determine the curve: penalty='jerk' {TOO_FEW}, not {used}."
+        if used < _FEWEST:
+            return (
+                f"The data{{of}} do not determine the curve: penalty='jerk' needs at least {_FEWEST} data, not {used}."
+            )
         if not has_weight.all():
             return (
                 f"The data{{of}} do not determine the curve: for penalty='jerk', too many of the {knots} knots have no "
                 "data near them. Remove the times before the first and after the last datum with a nonzero weight. If "
                 f"there is a gap between the data, pass fewer knots, for example knots={max(knots // 6, 10)}."
             )
-    if state == "undetermined":
+    if state == UNDETERMINED:
         return (
             "The data{of} do not determine the curve. With lam=0 there must be data near every knot: pass fewer "
             "knots. Otherwise the weights differ by more than the precision of floating-point numbers: remove data "
             "with tiny weights."
         )
     lam, step, iterations = (np.ravel(x)[number] for x in (report.lam, report.step, report.iterations))
-    if state == "unsettled":
+    if state == UNSETTLED:
         return (
             f"The choice of lam{{of}} did not converge; its last value is {lam:.3g}. Pass this lam, or another "
             "criterion."
@@ -281,18 +644,43 @@ def _longest_gap(number: int, noisy: SmoothingData, noise: Noise) -> str:
 # ---- several starts ----
 
 
+class Columns(NamedTuple):
+    """Properties of curves, one number per curve, in the order of the core."""
+
+    state: NDArray[np.int_]
+    iterations: NDArray[np.int_]
+    lam: Doubles
+    band_lam: Doubles
+    at_bound: NDArray[np.bool_]
+    df: Doubles
+    sigma: Doubles
+    step: Doubles
+    rate: Doubles
+    kappa: Doubles
+    exact: NDArray[np.bool_]
+    selection: NDArray[np.int_]
+    rejected: NDArray[np.int_]
+    objective: Doubles
+
+
 class Raw(NamedTuple):
     """Results of the core for a batch of curves: points at the knots, the band of A⁻¹, columns of the report, A."""
 
     points: Doubles
     band: Doubles
-    columns: tuple[NDArray[Any], ...]
+    columns: Columns
     system: tuple[Doubles, Doubles, int]
+
+    @classmethod
+    def of(cls, result: tuple[Doubles, Doubles, tuple[NDArray[Any], ...], tuple[Doubles, Doubles, int]]) -> Raw:
+        """Return the results of one call of the core."""
+        points, band, columns, system = result
+        return cls(points, band, Columns(*columns), system)
 
     @property
     def converged(self) -> NDArray[np.bool_]:
         """Whether the curves converged."""
-        return np.asarray(self.columns[0] == 0)
+        return np.asarray(self.columns.state == CONVERGED)
 
     def where(self, chosen: NDArray[np.bool_], other: Raw) -> Raw:
         """Return the chosen curves from the other results, and all others from these."""
@@ -305,17 +693,11 @@ class Raw(NamedTuple):
             flat = own.reshape(len(chosen), -1), its.reshape(len(chosen), -1)
             return np.where(chosen[:, None], flat[1], flat[0]).reshape(own.shape)
 
-        columns = tuple(map(pick, self.columns, other.columns))
+        columns = Columns(*map(pick, self.columns, other.columns))
         matrix, turn = map(pick, self.system[:2], other.system[:2])
         return Raw(
             pick(self.points, other.points), pick(self.band, other.band), columns, (matrix, turn, self.system[2])
         )
-
-
-class Column:
-    """Positions of columns of the report."""
-
-    STATE, LAM, SIGMA, OBJECTIVE = 0, 2, 6, -1
 
 
 class Samples(NamedTuple):
@@ -361,14 +743,14 @@ def best_of_starts(space: Space, data: Samples, lam: Doubles, first: Raw, solve:
             best = best.where(fast & other.converged & (less | ~best.converged), other)
     noisy = _noise(best) > _NOISY * radii
     if noisy.any():
-        given = np.where(best.converged, best.columns[Column.LAM], lam)
+        given = np.where(best.converged, best.columns.lam, lam)
         inside = _embedded_start(space, data, given)
         if inside is not None:
             other = solve(given, inside)
             both = best.converged & other.converged
             apart = _apart(space, best.points, other.points) > _OTHER * radius
             variance = _noise(best) ** 2
-            differ = np.abs(other.columns[Column.OBJECTIVE] - best.columns[Column.OBJECTIVE])
+            differ = np.abs(other.columns.objective - best.columns.objective)
             kinds[noisy & both & apart & (differ < _EQUAL * variance)] = TWO
             best = best.where(noisy & other.converged & (_is_less(other, best) | ~best.converged), other)
     kinds[(kinds == UNIQUE) & ~fast & (_noise(best) > _TOO_NOISY * radii)] = NOISY
@@ -384,11 +766,11 @@ def _usual_weights(data: Samples, curves: int) -> Doubles:
 
 def _noise(raw: Raw) -> Doubles:
     """Return the noise levels, infinite for curves that did not converge."""
-    return np.where(raw.converged, raw.columns[Column.SIGMA], np.inf)
+    return np.where(raw.converged, raw.columns.sigma, np.inf)
 
 
 def _is_less(other: Raw, best: Raw) -> NDArray[np.bool_]:
-    return np.asarray(other.columns[Column.OBJECTIVE] < best.columns[Column.OBJECTIVE] * (1 - 1e-6))
+    return np.asarray(other.columns.objective < best.columns.objective * (1 - 1e-6))
 
 
 def _apart(space: Space, p: Doubles, q: Doubles) -> Doubles:

@@ -33,11 +33,9 @@ from .._splines.archive import (
     times_state,
 )
 from .._splines.cubic import CubicSpline
-from .data import SmoothingData
 from .gaps import Calibration, Gap, calibration_of, warn_of_cubics, warn_of_gaps, warn_of_wide_bands, widest_band
-from .noise import Noise, grouped, is_several, join, parts_of_factor, smoothed_spaces, split
-from .posterior import Parameter, Posterior, frames_at, process_ratio
-from .report import SmoothingReport
+from .noise import Noise, SmoothingData, grouped, is_several, join, parts_of_factor, smoothed_spaces, split
+from .report import Parameter, Posterior, SmoothingReport, frames_at, process_ratio
 from .solve import Smoothed
 
 if TYPE_CHECKING:
@@ -548,23 +546,23 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
 
         def covariance(number: int, index: tuple[int, ...], at: Doubles) -> Doubles:
             to = None if other is None else np.ravel(other[index] if per_curve else other)
-            found = self._covariance(number, spaces[number], index, at, to, orders)
+            found = self._covariance(number, index, at, to, orders, to is None and len(orders) == 1)
             return self._inflated([number], index, at, to, orders, found) if calibrated else found
 
-        spaces = smoothed_spaces(self.space)
-        tails = [2 * (len(orders) * space.dim,) for space in spaces]
+        tails = [2 * (len(orders) * space.dim,) for space in smoothed_spaces(self.space)]
         each = [self._per_curve(x, per_curve, partial(covariance, i), tail) for i, tail in enumerate(tails)]
         return self._each(each)
 
     def _covariance(
-        self, number: int, space: Space, index: tuple[int, ...], x: Any, y: Any, orders: list[int]
+        self, number: int, index: tuple[int, ...], x: Any, y: Any, orders: list[int], between: bool
     ) -> Doubles:
-        part, knots, kinds = self._smoothed[number], self._knots_of(index), end_kinds(self._bc_type)
-        sigma = np.asarray(part.sigma)[index].item()
-        found = self._posterior(part).covariance(space, knots, index, kinds, x, y, orders)
-        if part.between and y is None and len(orders) == 1:
-            self._add_between(number, index, x, orders, found.reshape(len(x), 1, space.dim, 1, space.dim))
-        return np.asarray(sigma**2 * found)
+        # With `between`, points and velocities include their variances between the knots.
+        part, space, kinds = self._smoothed[number], smoothed_spaces(self.space)[number], end_kinds(self._bc_type)
+        whole = self._posterior(part).covariance(space, self._knots_of(index), index, kinds, x, y, orders)
+        if between and part.between:
+            shape = len(orders), space.dim
+            self._add_between(number, index, x, orders, whole.reshape(len(x), *shape, *shape))
+        return np.asarray(np.asarray(part.sigma)[index].item() ** 2 * whole)
 
     def _inflated(
         self, parts: list[int], index: tuple[int, ...], x: Doubles, y: Any, orders: list[int], covariance: Doubles
@@ -621,14 +619,9 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         count, size = len(orders), int(ends[-1])
         whole = np.zeros((len(x), count, size, count, size))
         for number, start, end in zip(parts, ends[:-1], ends[1:], strict=True):
-            part, m = self._smoothed[number], int(end - start)
-            knots, kinds = self._knots_of(index), end_kinds(self._bc_type)
-            found = self._posterior(part).covariance(spaces[number], knots, index, kinds, x, None, orders)
-            own = found.reshape(len(x), count, m, count, m)
-            if part.between:
-                self._add_between(number, index, x, orders, own)
-            own *= np.asarray(part.sigma)[index].item() ** 2
-            whole[:, :, start:end, :, start:end] = own
+            shape = len(x), count, int(end - start), count, int(end - start)
+            own = self._covariance(number, index, x, None, orders, True)
+            whole[:, :, start:end, :, start:end] = own.reshape(shape)
         return self._inflated(parts, index, x, None, orders, whole.reshape(len(x), count * size, count * size))
 
     def _posterior(self, part: Smoothed) -> Posterior:
@@ -812,26 +805,22 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
     def _noise_beside(self, index: tuple[int, ...], x: Doubles) -> UncertaintyBand:
         noisy = self._noisy.map(itemgetter(index), ())
         # The parts of a pose have different units; plots show the band of the position.
-        radii = [
-            radius(own[-1][1], 0.95) * self._spread(own[-1][0], index, x, 0)
-            for own in grouped(self.space, enumerate(smoothed_spaces(self.space)))
-        ]
-        several = is_several(self.space)
-        speed = None if several else self._spread(0, index, x, 1)
-        points = [own[noisy.used] for own in noisy.points]
+        radii = [of_factor[-1][1] for of_factor in self._radii(index, x)]
+        speed = None if is_several(self.space) else self._spread(0, index, x, 1)
+        points = [rows[noisy.used] for rows in noisy.points]
         return UncertaintyBand([noisy.times[noisy.used]] * len(points), points, radii, speed)
 
-    def _radii(self, x: Doubles) -> list[list[tuple[Space, Doubles]]]:
+    def _radii(self, index: tuple[int, ...], x: Doubles) -> list[list[tuple[Space, Doubles]]]:
         """Return the parts of every factor, and the radii of their 95 % bands at times x of the core."""
         parts = enumerate(smoothed_spaces(self.space))
         return grouped(
-            self.space, [(part, radius(part, 0.95) * self._spread(number, (), x, 0)) for number, part in parts]
+            self.space, [(part, radius(part, 0.95) * self._spread(number, index, x, 0)) for number, part in parts]
         )
 
     def _panels_below(self, x: Doubles) -> list[SidePanel]:
         return [
             SidePanel(f"95 % band\nof {part}{', rad' if part in _TURNING else ''}", x, values[:, None], factor=number)
-            for number, own in enumerate([] if self._batch else self._radii(x))
+            for number, own in enumerate([] if self._batch else self._radii((), x))
             for part, values in own
         ]
 

@@ -1,19 +1,24 @@
-"""Measurements on the parts of a space: their arrays, checked and in the form that the core reads."""
+"""Measurements on the parts of a space, and the problem of an estimate, in the form that the core reads."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, ClassVar
+from copy import copy
+from dataclasses import dataclass
+from functools import cache, cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import _core
 from .._base.arrays import as_array, refuse
-from .._base.typing import Loss
+from .._base.typing import Loss, Progress
 from .._core import ValidationError
 from .._curves.fit import read
 from .._smoothing.audit import roots_of
-from .._smoothing.noise import join, parts_of_factor, read_precision, smoothed_spaces, split
+from .._smoothing.noise import grouped, join, parts_of_factor, read_precision, smoothed_spaces, split
+from .._smoothing.report import Posterior, SmoothingReport, coordinates
 from .._spaces import (
     Array,
     Doubles,
@@ -28,7 +33,7 @@ from .._spaces import (
 )
 from .._spaces.actions import Group
 from ..convert._quaternions import quaternion_to_matrix
-from .measurements import (
+from ..measure import (
     SKIPNA,
     BodyRates,
     Constant,
@@ -73,7 +78,7 @@ class Term:
         Names of the parameters of the sensor in the order of the core.
     """
 
-    sensor: ClassVar[str]
+    sensor: str
 
     def __init__(self, label: str, given: Measurement, times: Doubles, parts: list[int]) -> None:
         self.label, self.given, self.times, self.parts = label, given, times, parts
@@ -130,27 +135,17 @@ class Term:
 
 
 class PointTerm(Term):
-    """Points with equal noise in all directions: the residual is −log_γ(y)."""
+    """Points. The residual is −log_γ(y), or R log_y(γ) in a frame at y for information matrices RᵀR.
 
-    sensor = "points"
-
-    def __init__(
-        self, label: str, given: Points, times: Doubles, part: int, space: Space, y: Array, noise: Doubles
-    ) -> None:
-        super().__init__(label, given, times, [part])
-        self.y, self.noise, self.arrays = y, noise, [_doubles(space, y)]
-
-    def precision(self, n: int) -> Doubles:
-        """Return the inverse variances of all n points; those of points without weight are 0."""
-        found = np.zeros(n)
-        found[self.rows] = self.noise[:, 0] ** -2.0
-        return found
-
-
-class InformationTerm(Term):
-    """Points with information matrices: the residual is R log_y(γ) in a frame at y, with the matrices RᵀR."""
-
-    sensor = "information"
+    Attributes
+    ----------
+    y : ndarray, shape (n, *point_shape)
+        Points.
+    roots : ndarray, shape (n, m, m), or None
+        Matrices R; None for equal noise in all directions.
+    known : ndarray of bool, shape (n, m), or None
+        Which of their rows have information.
+    """
 
     def __init__(
         self,
@@ -161,21 +156,42 @@ class InformationTerm(Term):
         space: Space,
         y: Array,
         noise: Doubles,
-        roots: Doubles,
-        known: NDArray[np.bool_],
+        roots: Doubles | None = None,
+        known: NDArray[np.bool_] | None = None,
     ) -> None:
         super().__init__(label, given, times, [part])
         self.y, self.noise, self.roots, self.known = y, noise, roots, known
-        self.arrays = [_doubles(space, y), _doubles(space, space.frame(y)), roots]
+        self.sensor = "points" if roots is None else "information"
+        self.arrays = [_doubles(space, y)]
+        if roots is not None:
+            self.arrays += [_doubles(space, space.frame(y)), roots]
+
+    @property
+    def scales(self) -> Doubles:
+        """Usual standard deviation of a coordinate of every point."""
+        if self.roots is None:
+            return self.noise[:, 0]
+        information = np.mean(self.roots**2, axis=-1).sum(axis=-1)
+        return np.asarray(self.noise[:, 0] / np.sqrt(np.maximum(information, np.finfo(float).tiny)))
 
     def informative(self, residuals: Doubles) -> Doubles:
-        return np.where(self.known, residuals, np.nan)
+        return residuals if self.known is None else np.where(self.known, residuals, np.nan)
 
     def precision(self, n: int) -> Doubles:
-        """Return the inverse covariances of all n points; those of points without weight are 0."""
-        found = np.zeros((n, *self.roots.shape[1:]))
-        found[self.rows] = np.swapaxes(self.roots, -1, -2) @ self.roots / self.noise[..., None] ** 2
-        return found
+        """Return the inverse variances or covariances of all n points; those of points without weight are 0."""
+        own = self.noise[:, 0] ** -2.0
+        if self.roots is not None:
+            own = np.swapaxes(self.roots, -1, -2) @ self.roots / self.noise[..., None] ** 2
+        whole = np.zeros((n, *own.shape[1:]))
+        whole[self.rows] = own
+        return whole
+
+    def residuals_at(self, space: Space, p: Array, frames: Array) -> Doubles:
+        """Return the residuals at the points p of a curve with frames, before they are divided by σ."""
+        if self.roots is None:
+            return -coordinates(space, p, frames, space._apply("log", p=p, q=self.y))
+        logs = coordinates(space, self.y, space.frame(self.y), space._apply("log", p=self.y, q=p))
+        return np.asarray((self.roots @ logs[..., None])[..., 0])
 
 
 class VelocityTerm(Term):
@@ -204,7 +220,7 @@ class RateTerm(Term):
 
     def __init__(self, label: str, given: BodyRates, times: Doubles, part: int, space: Space) -> None:
         super().__init__(label, given, times, [part])
-        self.body = Body(space)
+        self.body = body_of(space)
         self.omega = self.body.components(given.omega, f"{label}.omega", len(times))
         self.spread(self.body.size)
         self.bias = None
@@ -368,6 +384,18 @@ class Body:
         return _doubles(self.space, vectors).reshape(n, -1) @ self.inverse.T
 
 
+@cache
+def body_of(space: Space) -> Body:
+    """Return the body that turns as a curve on a space does."""
+    return Body(space)
+
+
+def projected(space: Space, points: Array) -> Array:
+    """Return the points of a space that are closest to the given ones, without checks."""
+    rows = _doubles(space, points)
+    return space._numbers(space._handle.apply("project", [rows]).reshape(rows.shape))
+
+
 def _doubles(space: Space, rows: Array) -> Doubles:
     return np.ascontiguousarray(space._as_doubles(rows))
 
@@ -400,7 +428,7 @@ def points_on(space: Space, y: Any, n: int, name: str) -> Array:
         space.check_point(array)
     except ValidationError as error:
         raise ValidationError(f"{name}: {error}") from None
-    return np.asarray(space.project(points))
+    return projected(space, points)
 
 
 def bind(measurement: Measurement, label: str, times: Doubles, space: Space[Any], loss: Loss = "linear") -> list[Term]:
@@ -412,18 +440,15 @@ def bind(measurement: Measurement, label: str, times: Doubles, space: Space[Any]
 
 
 def _terms_of(measurement: Measurement, label: str, times: Doubles, space: Space[Any]) -> list[Term]:
-    factors = factors_of(space)
-    counts = [len(parts_of_factor(factor)) for factor in factors]
-    spaces = smoothed_spaces(space)
-    chosen: Space[Any] = space
+    spaces, chosen = smoothed_spaces(space), space
     parts = list(range(len(spaces)))
-    if measurement.factor is not None:
-        number = measurement.factor
+    number = measurement.factor
+    if number is not None:
+        factors = factors_of(space)
         if isinstance(number, bool) or not isinstance(number, (int, np.integer)) or not 0 <= number < len(factors):
             raise ValidationError(f"{label}.factor must be a factor of {space!r}, 0 to {len(factors) - 1}")
         chosen = factors[number]
-        first = sum(counts[:number])
-        parts = list(range(first, first + counts[number]))
+        parts = grouped(space, parts)[number]
     own = [spaces[part] for part in parts]
     if isinstance(measurement, Points):
         y: Any = measurement.y
@@ -433,8 +458,8 @@ def _terms_of(measurement: Measurement, label: str, times: Doubles, space: Space
             shape = y.shape[1:]
             for part in parts:
                 if shape == spaces[part].point_shape:
-                    return _points(measurement, label, times, spaces[part], [part])
-        return _points(measurement, label, times, chosen, parts)
+                    return _points(measurement, label, times, spaces[part], {part: spaces[part]})
+        return _points(measurement, label, times, chosen, dict(zip(parts, own, strict=True)))
     if isinstance(measurement, Function):
         return [FunctionTerm(label, measurement, times, parts, [chosen, *own])]
     if isinstance(measurement, SpecificForce):
@@ -492,7 +517,8 @@ def _sigmas(measurement: Measurement, count: int, label: str) -> Sequence[Any]:
     return sigma
 
 
-def _points(given: Points, label: str, times: Doubles, space: Space[Any], parts: list[int]) -> list[Term]:
+def _points(given: Points, label: str, times: Doubles, space: Space[Any], parts: dict[int, Space]) -> list[Term]:
+    """Return the terms of points of a space with these parts, by their numbers."""
     n = len(times)
     precisions = None
     if given.weights is not None:
@@ -500,9 +526,8 @@ def _points(given: Points, label: str, times: Doubles, space: Space[Any], parts:
             raise ValidationError(f"{label}.weights needs at least two points. Pass sigma instead.")
         precisions = read_precision(given.weights, given.frames, space, read(given.y, space))
     terms: list[Term] = []
-    each = zip(parts, _in_parts(given.y, space, f"{label}.y"), _sigmas(given, len(parts), label), strict=True)
-    spaces = [part for factor in factors_of(space) for part in parts_of_factor(factor)]
-    for k, ((part, y, sigma), own) in enumerate(zip(each, spaces, strict=True)):
+    arrays, sigmas = _in_parts(given.y, space, f"{label}.y"), _sigmas(given, len(parts), label)
+    for k, ((part, own), y, sigma) in enumerate(zip(parts.items(), arrays, sigmas, strict=True)):
         information = None if precisions is None else precisions[k].information
         if sigma is None:
             if information is None:
@@ -516,14 +541,238 @@ def _points(given: Points, label: str, times: Doubles, space: Space[Any], parts:
         if rows.shape[:1] != (n,):
             raise ValidationError(f"{label}.y has {len(rows)} points, but there are {n} times")
         good = points_on(own, rows[used], int(used.sum()), f"{label}.y")
-        if information is not None:
-            noise = np.repeat(scale[used, None], own.dim, axis=1)
-            roots = roots_of(information[used])
-            term: Term = InformationTerm(label, given, times[used], part, own, good, noise, *roots)
-        else:
-            weights = 1.0 if precisions is None else precisions[k].weights[used]
-            noise = np.repeat((scale[used] / np.sqrt(weights))[:, None], own.dim, axis=1)
-            term = PointTerm(label, given, times[used], part, own, good, noise)
+        scale = scale[used]
+        roots = () if information is None else roots_of(information[used])
+        if information is None and precisions is not None:
+            scale = scale / np.sqrt(precisions[k].weights[used])
+        noise = np.repeat(scale[:, None], own.dim, axis=1)
+        term = PointTerm(label, given, times[used], part, own, good, noise, *roots)
         term.rows = np.flatnonzero(used)
         terms.append(term)
     return terms
+
+
+# ---- the problem and its solution ----
+
+# If the curve turns by more than this angle between two knots, the solution of the linear problem may differ from the
+# minimum. The difference is then estimated from this number of samples.
+_TURN, _SAMPLES = 0.9, 6
+_FAILURES = {
+    "undetermined": "The measurements do not determine the curve: no measurement depends on one of its factors, or on "
+    "one of its knots. Pass fewer knots, a larger lam, or more measurements.",
+    "infinite": "The linear problem has no finite solution: its numbers are too different in size. Check sigma and the "
+    "units of the measurements, or pass fewer knots.",
+    "no curve": "No spline joins the points of the next iteration. Pass more knots, or a larger lam.",
+    "unconverged": "No convergence of the estimate: the last step is {step:.1e} standard deviations after {number} "
+    "iterations (tol {tol:.1e}). Check sigma and the units, or pass lam or a better `start`.",
+}
+
+
+@dataclass
+class Setup:
+    """The problem and the options of an estimate.
+
+    Attributes
+    ----------
+    spaces : tuple of Space
+        The parts of the space.
+    knots : ndarray
+        Knots in the units of the core.
+    terms : list of Term
+        Measurements.
+    constants : dict
+        Parameters by name.
+    penalty, criterion : str
+        Options.
+    gamma, tol : float
+        Options.
+    lams : ndarray
+        Given λ of each part, NaN if it is to be chosen.
+    max_iter : int
+        Largest number of iterations.
+    automatic : bool
+        Whether the knots are still to be chosen.
+    """
+
+    spaces: tuple[Space, ...]
+    knots: Doubles
+    terms: list[Term]
+    constants: dict[str, Constant]
+    penalty: str
+    criterion: str
+    gamma: float
+    tol: float
+    lams: Doubles
+    max_iter: int
+    automatic: bool = False
+
+    @property
+    def bc_type(self) -> str:
+        """End conditions of the curves."""
+        return "natural" if self.penalty == "acceleration" else "not-a-knot"
+
+    def with_knots(self, knots: Doubles) -> Setup:
+        """Return the same problem for other knots."""
+        # Both have the same arrays.
+        _ = self._arrays
+        other = copy(self)
+        other.knots = knots
+        return other
+
+    @cached_property
+    def columns(self) -> dict[str, slice]:
+        """Columns of the parameters by name, in the order of the core."""
+        columns, start = {}, 0
+        for name, constant in self.constants.items():
+            columns[name] = slice(start, start + constant.size)
+            start += constant.size
+        return columns
+
+    @cached_property
+    def least_squares(self) -> bool:
+        """Whether no loss is robust."""
+        return all(term.loss == "linear" for term in self.terms)
+
+    def state(self, points: list[Array], values: Values) -> tuple[list[Doubles], Doubles]:
+        """Return points and values of parameters in the form of the core; missing values are those of the start."""
+        doubles = list(map(_doubles, self.spaces, points))
+        each = [values.get(name, constant.start) for name, constant in self.constants.items()]
+        return doubles, np.concatenate([np.empty(0), *each])
+
+    def in_core(self) -> tuple[Any, ...]:
+        """Return the problem in the form of the core."""
+        handles, groups, priors, terms = self._arrays
+        return handles, groups, self.knots, self.penalty, priors, terms
+
+    @cached_property
+    def _arrays(self) -> tuple[list[Any], list[Doubles | None], Doubles, list[tuple[Any, ...]]]:
+        """The part of `in_core` that does not depend on the knots."""
+        priors = [np.empty((0, 2))]
+        for constant in self.constants.values():
+            precision = np.zeros(constant.size) if constant.sigma is None else constant.sigma**-2.0
+            priors.append(np.stack([constant.start, precision], axis=-1))
+        handles: list[Any] = []
+        groups: list[Doubles | None] = []
+        for space in self.spaces:
+            handles.append(space._handle)
+            groups.append(np.ascontiguousarray(body_of(space).inverse) if is_compact_group(space) else None)
+        return handles, groups, np.concatenate(priors), [term.in_core(self.columns) for term in self.terms]
+
+
+class Rows(NamedTuple):
+    """Whitened residuals of one term, and their derivatives.
+
+    Attributes
+    ----------
+    residuals : ndarray, shape (n, d)
+        What the sensors would read minus what they read, in standard deviations.
+    jacobians : list of ndarray or None, shape (n, d, m)
+        Derivatives with respect to the move of the curve, its velocity and its acceleration, in coordinates of the
+        frames of all parts; None where they vanish.
+    parameters : ndarray or None, shape (n, d, p)
+        Derivatives with respect to all parameters.
+    roots : ndarray or None, shape (n, 1)
+        Roots of the weights of a robust loss.
+    """
+
+    residuals: Doubles
+    jacobians: list[Doubles | None]
+    parameters: Doubles | None
+    roots: Doubles | None
+
+
+class Solution(NamedTuple):
+    """The result of the iteration.
+
+    Attributes
+    ----------
+    points : list of ndarray
+        Points at the knots in every part.
+    values : dict
+        Parameters by name.
+    reports : list of SmoothingReport
+        Reports of all parts.
+    posterior : Posterior
+        The matrix of the linear problem, which couples the coordinates of all parts and the parameters.
+    covariance : ndarray, shape (p, p)
+        Covariance of the parameters for noise of variance one.
+    rows : list of Rows
+        Residuals of each term.
+    variances : ndarray, shape (knots, m)
+        Variances of the coordinates at the knots for noise of variance one.
+    loss : float
+        Sum of the losses of all measurements and of the priors.
+    turn : float
+        Largest distance that the curve covers between two knots, in units of the radius of curvature of its space.
+    distance : float
+        Distance from the minimum in standard deviations; 0 if `turn` is so small that it is not computed.
+    failure : str
+        Description of a failure, or "".
+    """
+
+    points: list[Array]
+    values: Values
+    reports: list[SmoothingReport]
+    posterior: Posterior
+    covariance: Doubles
+    rows: list[Rows]
+    variances: Doubles
+    loss: float
+    turn: float
+    distance: float
+    failure: str
+
+
+def iterate(setup: Setup, points: list[Array], values: Values, progress: Progress | None) -> Solution:
+    """Iterate from points at the knots until the step is small."""
+    problem, (start, constants) = setup.in_core(), setup.state(points, values)
+    lams, criterion, gamma = setup.lams.tolist(), setup.criterion, setup.gamma
+    found = _core.estimate(problem, start, constants, lams, criterion, gamma, setup.tol, setup.max_iter, progress)
+    if isinstance(found, np.ndarray):
+        raise _undetermined(setup, found)
+    failed, number, step = found["failure"], found["iterations"], found["step"]
+    reports = [
+        SmoothingReport("linearized", failed is None, number, step, found["rate"], lam, bound, df, found["sigma"])
+        for lam, bound, df in zip(found["lams"], found["at_bound"], found["df"], strict=True)
+    ]
+    information, covariance = found["information"], np.full_like(found["information"], np.nan)
+    if np.isfinite(information).all():
+        covariance = np.asarray(np.linalg.pinv(information, hermitian=True), np.float64)
+    distance, (band, side, corner) = 0.0, found["matrices"]
+    if failed is None and found["turn"] > _TURN:
+        normal = np.random.default_rng(0).standard_normal((_SAMPLES, found["variances"].size))
+        distance = _core.distance_from_minimum(problem, found["points"], found["values"], found["lams"], band, normal)
+    return Solution(
+        [space._numbers(rows) for space, rows in zip(setup.spaces, found["points"], strict=True)],
+        {name: found["values"][own] for name, own in setup.columns.items()},
+        reports,
+        Posterior(band, np.zeros((0, 0)), sum(space.dim for space in setup.spaces), side, corner),
+        covariance,
+        [Rows(*rows) for rows in found["terms"]],
+        found["variances"],
+        found["loss"],
+        found["turn"],
+        distance,
+        "" if failed is None else _FAILURES[failed].format(step=step, number=number, tol=setup.tol),
+    )
+
+
+def residuals(setup: Setup, points: list[Array], values: Values) -> list[Doubles] | None:
+    """Return the residuals of all terms for the spline through points at the knots; None if it does not exist."""
+    found = _core.linearise(setup.in_core(), *setup.state(points, values), False)
+    return None if found is None else [Rows(*rows).residuals for rows in found]
+
+
+def _undetermined(setup: Setup, information: Doubles) -> ValidationError:
+    """Return the error that names the parameters that the measurements do not determine."""
+    size = np.sqrt(np.maximum(np.diag(information), 0.0))
+    unit = np.where(size > 0, size, 1.0)
+    vectors = np.linalg.eigh(information / unit / unit[:, None])[1]
+    vector = vectors[:, 0] / unit if np.all(size > 0) else (size == 0).astype(float)
+    vector = vector / vector[np.abs(vector).argmax()]
+    parts = {name: vector[own] for name, own in setup.columns.items()}
+    described = {name: np.round(own, 3).tolist() for name, own in parts.items() if np.abs(own).max() > 1e-3}
+    return ValidationError(
+        f"The measurements do not determine {' and '.join(map(repr, described))} in the direction {described}. Pass "
+        "a Constant with sigma, which is a prior, or measurements that depend on it."
+    )
