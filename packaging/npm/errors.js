@@ -2,9 +2,9 @@
 
 /** Base class of all errors of symspline. */
 export class SymsplineError extends Error {
-  constructor(message, { argument = null, index = null, value = null, limit = null } = {}) {
+  constructor(message, { argument = null, index = null, value = null, limit = null, factor = null } = {}) {
     super(message);
-    Object.assign(this, { argument, index, value, limit });
+    Object.assign(this, { argument, index, value, limit, factor });
   }
 }
 
@@ -31,8 +31,18 @@ export function checked(call) {
   } catch (fault) {
     const Class = CLASSES[fault?.kind];
     if (!Class) throw fault;
-    const { message, argument, index, value, limit } = fault;
+    const { message, argument, index, value, limit, factor } = fault;
     fault.free();
-    throw new Class(message, { argument: argument ?? null, index: index ?? null, value: value ?? null, limit: limit ?? null });
+    throw new Class(message, { argument, index, value, limit, factor });
+  }
+}
+
+/** Calls a function for one factor of a product, whose exceptions name the factor. */
+export function inFactor(factor, name, call) {
+  try {
+    return call();
+  } catch (error) {
+    if (!(error instanceof SymsplineError)) throw error;
+    throw new error.constructor(`factor ${factor}, ${name}: ${error.message}`, { ...error, factor });
   }
 }

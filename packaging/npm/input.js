@@ -1,6 +1,6 @@
 // Arguments as users write them, for the compiled module.
 
-import { ValidationError } from "./errors.js";
+import { inFactor, ValidationError } from "./errors.js";
 
 const isArray = (x) => Array.isArray(x) || (ArrayBuffer.isView(x) && !(x instanceof DataView));
 
@@ -46,8 +46,54 @@ export function row(x, length, argument, index = null) {
   return numbers;
 }
 
+/** Calls a function for each factor of a space. Exceptions name the factor of a product. */
+export function forFactors({ factors }, call) {
+  if (factors.length === 1) return [call(factors[0], 0)];
+  return factors.map((factor, k) => inFactor(k, factor.name, () => call(factor, k)));
+}
+
+/** Calls a function for each factor of a space, with the entry of an argument that belongs to it. */
+export function inFactors(x, space, argument, call) {
+  const count = space.factors.length;
+  if (count > 1 && (!Array.isArray(x) || x.length !== count)) {
+    const message = `${argument} must be an array of ${count} arrays, one per factor of the space`;
+    throw new ValidationError(message, { argument, value: x?.length ?? null, limit: count });
+  }
+  return forFactors(space, (factor, k) => call(count > 1 ? x[k] : x, factor));
+}
+
+/** One array with the numbers of each point in the first factor, then those in the second one, and so on. */
+function joined(parts, space) {
+  if (parts.length === 1) return parts[0];
+  const count = parts[0].length / space.factors[0].length;
+  const numbers = new Float64Array(count * space.length);
+  let start = 0;
+  for (const [k, { length }] of space.factors.entries()) {
+    for (let i = 0; i < count; i += 1) numbers.set(parts[k].slice(i * length, (i + 1) * length), i * space.length + start);
+    start += length;
+  }
+  return numbers;
+}
+
+/** The numbers of one tangent vector, in all factors. */
+export function joinedRow(x, space, argument, index) {
+  const parts = inFactors(x, space, argument, (part, factor) => row(part, factor.length, argument, index));
+  return Float64Array.from(joined(parts, space));
+}
+
+/** The numbers of points, in all factors. */
+export function joinedRows(points, space) {
+  const parts = inFactors(points, space, "points", (part, factor) => rows(part, factor.length));
+  const counts = parts.map((part, k) => part.length / space.factors[k].length);
+  if (counts.some((count) => count !== counts[0])) {
+    const message = `the factors of points have different lengths: ${counts.join(", ")}. Pass as many points for each factor`;
+    throw new ValidationError(message, { argument: "points" });
+  }
+  return joined(parts, space);
+}
+
 /** Points: an array of points, or a Float64Array of all their numbers. */
-export function rows(points, length, argument = "points") {
+function rows(points, length, argument = "points") {
   if (points instanceof Float64Array) {
     if (points.length % length === 0) return points;
     const message = `${argument} has ${points.length} numbers, which is not a multiple of ${length}, the length of a point`;
@@ -61,10 +107,14 @@ export function rows(points, length, argument = "points") {
   return numbers;
 }
 
-/** A number, or undefined for an omitted one. */
-export function optional(x, argument) {
-  if (x === undefined || x === null) return undefined;
-  return number(x, argument);
+/** Numbers for all factors of a space or for each of them, NaN for an omitted one. */
+export function perFactor(x, argument, { factors }) {
+  const values = factors.length > 1 && isArray(x) ? x : [x];
+  return Float64Array.from(values, (value) => {
+    if (value === undefined || value === null) return NaN;
+    if (!Number.isNaN(value)) return number(value, argument);
+    throw new ValidationError(`${argument} must be a number, not NaN`, { argument, value });
+  });
 }
 
 /** A number. */

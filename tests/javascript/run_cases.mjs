@@ -8,7 +8,8 @@ const [folder, file] = process.argv.slice(2);
 const symspline = await import(pathToFileURL(`${folder}/index.js`));
 await symspline.init();
 
-const rows = (found) => found.map((row) => [...row]);
+/** Results as nested arrays: of a product, one per factor. */
+const plain = (found) => (ArrayBuffer.isView(found) ? [...found] : Array.isArray(found) ? found.map(plain) : found);
 
 function number(x) {
   return typeof x === "string" ? Number(x) : x;
@@ -23,31 +24,35 @@ function revive(x) {
 const KINDS = {
   spline({ t, points, space, options = {}, x }) {
     const spline = new symspline.CubicSpline(revive(t), revive(points), space, revive(options));
-    const into = spline.evaluateInto(x, new Float64Array(x.length * spline.space.length), 1);
+    const outs = spline.space.factors.map(({ length }) => new Float64Array(x.length * length));
     return {
-      values: [0, 1, 2].map((nu) => rows(spline.evaluate(x, nu))),
-      into: [...into],
-      velocities: rows(spline.velocities),
-      controlPoints: spline.controlPoints.map(rows),
+      values: [0, 1, 2].map((nu) => plain(spline.evaluate(x, nu))),
+      into: plain(spline.evaluateInto(x, outs.length === 1 ? outs[0] : outs, 1)),
+      one: plain(spline.evaluate(x[1])),
+      points: plain(spline.points),
+      velocities: plain(spline.velocities),
+      controlPoints: plain(spline.controlPoints),
       report: spline.report,
     };
   },
   smooth({ t, points, space, options = {}, x }) {
     const smooth = symspline.makeSmoothingSpline(t, points, space, options);
     const { lam, df, sigma } = smooth;
-    return { values: rows(smooth.evaluate(x)), std: [...smooth.std(x)], band: [...smooth.band(x, 0.9)], lam, df, sigma };
+    const [std, band] = [smooth.std(x), smooth.band(x, 0.9)].map(plain);
+    return { values: plain(smooth.evaluate(x)), std, band, one: smooth.std(x[1]), lam, df, sigma };
   },
   space({ space, p, q, v, t }) {
     const on = new symspline.Space(space);
     return {
-      exp: [...on.exp(p, v)], log: [...on.log(p, q)], distance: on.distance(p, q), inner: on.inner(p, v, v),
-      project: [...on.project(p)], geodesic: rows(on.geodesic(p, q, t)), dim: on.dim, shape: on.pointShape,
-      radius: String(on.injectivityRadius),
+      exp: plain(on.exp(p, v)), log: plain(on.log(p, q)), distance: on.distance(p, q), inner: on.inner(p, v, v),
+      norm: on.norm(p, v), project: plain(on.project(p)), geodesic: plain(on.geodesic(p, q, t)),
+      middle: plain(on.geodesic(p, q, 0.5)), dim: on.dim, shape: on.pointShape, radius: String(on.injectivityRadius),
+      factors: on.factors.map(({ name }) => name),
     };
   },
   evaluate({ x, nu, options = {} }) {
     const square = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
-    return { values: rows(new symspline.CubicSpline(null, square, "sphere:2", options).evaluate(revive(x), nu)) };
+    return { values: plain(new symspline.CubicSpline(null, square, "sphere:2", options).evaluate(revive(x), nu)) };
   },
 };
 
@@ -56,8 +61,8 @@ function run(entry) {
     return KINDS[entry.kind](entry);
   } catch (error) {
     if (!(error instanceof symspline.SymsplineError)) throw error;
-    const { name, message, argument, index, value, limit } = error;
-    return { error: name, message, argument, index, value, limit };
+    const { name, message, argument, index, value, limit, factor } = error;
+    return { error: name, message, argument, index, value, limit, factor };
   }
 }
 

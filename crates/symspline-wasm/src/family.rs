@@ -2,7 +2,7 @@
 
 use std::fmt;
 use std::sync::Arc;
-use symspline::{Error, Point};
+use symspline::{Error, Factor, Point, Product};
 use symspline_engine::space::{Erased, Kernels, Made, table};
 use symspline_engine::spaces::{
     Euclidean, Hyperbolic, PositiveDefinite, Rotations, SpecialEuclidean, Sphere,
@@ -35,19 +35,29 @@ pub struct Family {
     table: Arc<dyn Kernels>,
 }
 
+/// The spaces that a name lists, such as `"so:3"` and `"r:3"` in `"so:3 x r:3"`.
+pub fn factors(name: &str) -> Result<Product<Family>, String> {
+    name.split(" x ").map(Family::new).collect::<Result<_, _>>().map(Product)
+}
+
 impl Family {
-    /// The space with a name and a size.
-    pub fn new(name: &str, sizes: &[usize]) -> Result<Self, String> {
-        let Some((names, make)) = ENTRIES.iter().find(|(names, _)| names.contains(&name)) else {
+    /// The space with a name and a size, such as `"so:3"`.
+    pub fn new(name: &str) -> Result<Self, String> {
+        let name = name.trim().to_lowercase();
+        let (word, size) = name.split_once(':').unwrap_or((&name, ""));
+        let Some((names, make)) = ENTRIES.iter().find(|(names, _)| names.contains(&word)) else {
             return Err(format!(
-                "unknown space {name:?}; the JavaScript package contains {}",
+                "unknown space {word:?}; the JavaScript package contains {}",
                 names().collect::<Vec<_>>().join(", ")
             ));
         };
-        match sizes {
-            &[size] if size <= LARGEST => Ok(Family { name: names[0], size, table: make(size)? }),
-            [size] => Err(format!("{name}:{size} is too large; sizes up to {LARGEST} are allowed")),
-            _ => Err(format!("{name} takes one size, such as {name}:3, but {} were given", sizes.len())),
+        match size.trim().parse() {
+            Ok(size) if size <= LARGEST => Ok(Family { name: names[0], size, table: make(size)? }),
+            Ok(_) => Err(format!("{name} is too large; sizes up to {LARGEST} are allowed")),
+            Err(_) => Err(format!(
+                "{word} takes one size, a whole number, such as {word}:3, but the space is {name:?}. Put \" x \" \
+                 between the factors of a product, as in \"so:3 x r:3\""
+            )),
         }
     }
 
@@ -68,7 +78,7 @@ impl fmt::Debug for Family {
     }
 }
 
-impl symspline::Space for Family {
+impl Factor for Family {
     fn table(&self) -> Result<Arc<dyn Kernels>, Error> {
         Ok(self.table.clone())
     }

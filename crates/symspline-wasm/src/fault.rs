@@ -12,6 +12,7 @@ pub struct Fault {
     index: Option<usize>,
     value: Option<f64>,
     limit: Option<f64>,
+    factor: Option<usize>,
 }
 
 #[wasm_bindgen]
@@ -40,6 +41,12 @@ impl Fault {
         self.index
     }
 
+    /// The factor of a product that the error is about.
+    #[wasm_bindgen(getter)]
+    pub fn factor(&self) -> Option<usize> {
+        self.factor
+    }
+
     /// The number that was found.
     #[wasm_bindgen(getter)]
     pub fn value(&self) -> Option<f64> {
@@ -56,13 +63,14 @@ impl Fault {
 impl Fault {
     /// Invalid input.
     pub fn invalid(argument: &'static str, index: Option<usize>, message: String) -> Self {
-        Fault { kind: "validation", message, argument: Some(argument), index, value: None, limit: None }
+        let argument = Some(argument);
+        Fault { kind: "validation", message, argument, index, value: None, limit: None, factor: None }
     }
 
     /// Two points without a unique shortest geodesic.
     pub fn cut_locus(argument: &'static str, index: usize, angle: f64, limit: f64, message: String) -> Self {
-        let (index, value, limit) = (Some(index), Some(angle), Some(limit));
-        Fault { kind: "cut-locus", message, argument: Some(argument), index, value, limit }
+        let fault = Fault::invalid(argument, Some(index), message);
+        Fault { kind: "cut-locus", ..fault.with_value(angle).with_limit(limit) }
     }
 
     fn with_value(self, value: f64) -> Self {
@@ -76,6 +84,11 @@ impl Fault {
 
 impl From<Error> for Fault {
     fn from(error: Error) -> Self {
+        if let Error::InFactor { factor, space, error } = error {
+            let fault = Fault::from(*error);
+            let message = format!("factor {factor}, {space}: {}", fault.message);
+            return Fault { message, factor: Some(factor), ..fault };
+        }
         // There is one curve only, which the message need not name.
         let full = error.to_string();
         let message =
@@ -87,10 +100,16 @@ impl From<Error> for Fault {
                 invalid("points", None).with_value(points as f64).with_limit(2.0)
             }
             Error::LengthMismatch { what, expected, found, .. } => {
-                let argument = if what == "weights" { "weights" } else { "t" };
+                let argument = match what {
+                    "weights" => "weights",
+                    "values of lam" => "lam",
+                    "values of sigma" => "sigma",
+                    _ => "t",
+                };
                 invalid(argument, None).with_value(found as f64).with_limit(expected as f64)
             }
-            Error::PointLength { node, expected, found, .. } => {
+            Error::PointLength { node, expected, found, .. }
+            | Error::FactorCount { node, expected, found, .. } => {
                 invalid("points", Some(node)).with_value(found as f64).with_limit(expected as f64)
             }
             Error::TimeNotFinite { node, time, .. } => invalid("t", Some(node)).with_value(time),
@@ -112,15 +131,8 @@ impl From<Error> for Fault {
                 Fault::cut_locus("points", node, angle, limit, message.into())
             }
             Error::Unconverged { residual, tol, .. } => {
-                let (value, limit) = (Some(residual), Some(tol));
-                Fault {
-                    kind: "convergence",
-                    message: message.into(),
-                    argument: None,
-                    index: None,
-                    value,
-                    limit,
-                }
+                let fault = invalid("points", None).with_value(residual).with_limit(tol);
+                Fault { kind: "convergence", argument: None, ..fault }
             }
             Error::NotSmoothed { .. } => {
                 Fault { kind: "convergence", argument: None, ..invalid("points", None) }

@@ -7,16 +7,16 @@ use symspline_engine::rows::{Operation, apply};
 use symspline_engine::space::{Ambient, Origin};
 use wasm_bindgen::prelude::*;
 
-/// A space by its name.
+/// A space that is not a product, by its name.
 #[wasm_bindgen]
 pub struct Space(Family);
 
 #[wasm_bindgen]
 impl Space {
-    /// The space with a name and sizes, such as `"sphere"` and `[2]`.
+    /// The space with a name, such as `"sphere:2"`.
     #[wasm_bindgen(constructor)]
-    pub fn new(name: &str, sizes: &[usize]) -> Result<Space, Fault> {
-        Family::new(name, sizes).map(Space).map_err(|why| Fault::invalid("space", None, why))
+    pub fn new(name: &str) -> Result<Space, Fault> {
+        Family::new(name).map(Space).map_err(|why| Fault::invalid("space", None, why))
     }
 
     /// All names, separated by spaces.

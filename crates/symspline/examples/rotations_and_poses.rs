@@ -31,6 +31,20 @@ fn main() -> Result<(), Error> {
     assert!((twist.linear - Vector3::new(0.0, 3.0, 0.0)).norm() < 1e-11);
     assert!((path.at(0.7).translation.vector.y - 2.1).abs() < 1e-12);
 
+    // A rotation and a position with a curve each: a product.
+    let parts =
+        times.map(|t| (UnitQuaternion::from_axis_angle(&axis, 0.8 * t), Vector3::new(3.0 * t, t * t, 0.0)));
+    let apart = CubicSpline::new((So3, Euclidean::<3>), &times, &parts)?;
+    let (rotation, position) = apart.at(0.7);
+    println!(
+        "angle {:.6}, position {:.6?}, speed {:.6}",
+        rotation.angle(),
+        position.as_slice(),
+        apart.speed(0.7)
+    );
+    assert!((position - Vector3::new(2.1, 0.49, 0.0)).norm() < 1e-12);
+    assert!((apart.speed(0.7) - (0.64_f64 + 9.0 + 1.96).sqrt()).abs() < 1e-12);
+
     // Opposite directions have no unique geodesic.
     let directions = [Vector3::x(), -Vector3::x(), Vector3::y(), Vector3::z(), Vector3::x()];
     match CubicSpline::new(Sphere::<3>, &times, &directions) {

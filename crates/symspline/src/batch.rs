@@ -8,7 +8,6 @@ use crate::samples::Samples;
 use crate::space::Space;
 use crate::spline::{CubicSpline, Report};
 use symspline_engine::curve::Quantity;
-use symspline_engine::fit;
 
 impl<S: Space, P: Point<S>> Builder<S, P> {
     /// Fits many curves whose points are at the same times, on all cores.
@@ -17,7 +16,8 @@ impl<S: Space, P: Point<S>> Builder<S, P> {
     /// As [`fit`](Builder::fit); the error names the first curve that fails.
     pub fn fit_shared(&self, times: &[f64], curves: &[impl AsRef<[P]>]) -> Result<Batch<S, P>, Error> {
         let points: Vec<&[P]> = curves.iter().map(AsRef::as_ref).collect();
-        Batch::of(Curves::fit(self, &[times], &points, true)?)
+        let (curves, reports) = Curves::fit(self, &[times], &points, true)?;
+        Ok(Batch { curves, reports })
     }
 
     /// Fits many curves, each with times and points of its own, on all cores.
@@ -27,7 +27,8 @@ impl<S: Space, P: Point<S>> Builder<S, P> {
     pub fn fit_each(&self, curves: &[(impl AsRef<[f64]>, impl AsRef<[P]>)]) -> Result<Batch<S, P>, Error> {
         let times: Vec<&[f64]> = curves.iter().map(|(t, _)| t.as_ref()).collect();
         let points: Vec<&[P]> = curves.iter().map(|(_, p)| p.as_ref()).collect();
-        Batch::of(Curves::fit(self, &times, &points, false)?)
+        let (curves, reports) = Curves::fit(self, &times, &points, false)?;
+        Ok(Batch { curves, reports })
     }
 }
 
@@ -54,10 +55,6 @@ pub struct Batch<S: Space, P: Point<S>> {
 }
 
 impl<S: Space, P: Point<S>> Batch<S, P> {
-    pub(crate) fn of((curves, reports): (Curves<S, P>, Vec<fit::Report>)) -> Result<Self, Error> {
-        Ok(Batch { curves, reports: reports.iter().map(Report::new).collect() })
-    }
-
     /// Fits curves whose points are at the same times.
     ///
     /// # Errors

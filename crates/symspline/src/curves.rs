@@ -1,18 +1,21 @@
-//! Fitted curves as lists of numbers: validation, fit and evaluation.
+//! Fitted curves as lists of numbers in each factor of their space: validation, fit and evaluation.
 
 use crate::error::Error;
 use crate::options::{Builder, End, Ends, Extrapolate, Method};
-use crate::point::{Point, Row};
+use crate::point::{Point, Rows};
 use crate::samples::Samples;
 use crate::space::{Space, Table};
+use crate::spline::Report;
 use std::fmt;
 use std::marker::PhantomData;
+use std::ops::Range;
 use std::sync::Arc;
-use symspline_engine::curve::{self, Quantity, Times};
-use symspline_engine::fit::{self, Options, Problem, Report};
+use symspline_engine::curve::{self, Quantity, Times, evaluate_product};
+use symspline_engine::fit::{self, Options, Problem};
 use symspline_engine::monitor::Monitor;
 #[cfg(feature = "serde")]
 use symspline_engine::rows::tangent_defects;
+use symspline_engine::rows::{Operation, apply};
 use symspline_engine::space::{Ambient, Erased};
 use symspline_engine::validate::validate;
 
@@ -22,27 +25,33 @@ const ROUNDING: f64 = 4.0;
 /// Curves on a space, in the layout of the engine.
 pub struct Curves<S, P> {
     pub space: S,
-    table: Table,
+    factors: Arc<[Factor]>,
     /// Knots: one row for all curves, or those of each curve one after the other.
     t: Arc<[f64]>,
     shared: bool,
     /// The number of nodes before each curve, and finally of all.
     offsets: Arc<[usize]>,
-    points: Arc<[f64]>,
-    velocities: Arc<[f64]>,
     extrapolate: Extrapolate,
     point: PhantomData<fn() -> P>,
 }
+
+/// The curves in one factor.
+struct Factor {
+    table: Table,
+    points: Vec<f64>,
+    velocities: Vec<f64>,
+}
+
+/// Reports of the fits, by factor and curve.
+pub type Reports = Vec<Vec<fit::Report>>;
 
 impl<S: Clone, P> Clone for Curves<S, P> {
     fn clone(&self) -> Self {
         Curves {
             space: self.space.clone(),
-            table: self.table.clone(),
+            factors: self.factors.clone(),
             t: self.t.clone(),
             offsets: self.offsets.clone(),
-            points: self.points.clone(),
-            velocities: self.velocities.clone(),
             ..*self
         }
     }
@@ -55,17 +64,52 @@ impl<S: fmt::Debug, P> fmt::Debug for Curves<S, P> {
     }
 }
 
-/// The points of curves, one after the other, and the offsets of the curves.
-pub fn rows<S: Space, P: Point<S>>(len: usize, curves: &[&[P]]) -> Result<(Vec<f64>, Vec<usize>), Error> {
-    let mut rows = Vec::with_capacity(len * curves.iter().map(|c| c.len()).sum::<usize>());
+impl Factor {
+    fn space(&self) -> Erased<'_> {
+        Erased(&*self.table)
+    }
+
+    /// The numbers of some nodes.
+    fn range(&self, nodes: &Range<usize>) -> Range<usize> {
+        let len = self.space().point_len();
+        nodes.start * len..nodes.end * len
+    }
+}
+
+/// The operations of the factors of a space.
+pub fn tables(space: &impl Space) -> Result<Vec<Table>, Error> {
+    let factors = space.factors();
+    if factors.is_empty() {
+        return Err(Error::InvalidSpace { reason: "a product needs at least one factor".into() });
+    }
+    let table = |(i, factor): (usize, &&dyn crate::space::Factor)| {
+        factor.table().map_err(|error| error.in_factor(space, i))
+    };
+    factors.iter().enumerate().map(table).collect()
+}
+
+/// The points of curves in each factor, one after the other, and the offsets of the curves.
+pub fn rows<S: Space, P: Point<S>>(
+    space: &S,
+    tables: &[Table],
+    curves: &[&[P]],
+) -> Result<(Vec<Vec<f64>>, Vec<usize>), Error> {
+    let nodes: usize = curves.iter().map(|points| points.len()).sum();
+    let lens: Vec<usize> = tables.iter().map(|table| Erased(&**table).point_len()).collect();
+    let mut rows: Vec<Vec<f64>> = lens.iter().map(|len| Vec::with_capacity(len * nodes)).collect();
     let mut offsets = vec![0];
     for (curve, points) in curves.iter().enumerate() {
         for (node, point) in points.iter().enumerate() {
-            let before = rows.len();
-            point.write(&mut rows);
-            let found = rows.len() - before;
-            if found != len {
-                return Err(Error::PointLength { curve, node, expected: len, found });
+            let (expected, found) = (rows.len(), point.write_rows(&mut rows));
+            if found != expected {
+                return Err(Error::FactorCount { curve, node, expected, found });
+            }
+            for (factor, (row, &expected)) in rows.iter().zip(&lens).enumerate() {
+                let found = row.len() - (offsets[curve] + node) * expected;
+                if found != expected {
+                    let error = Error::PointLength { curve, node, expected, found };
+                    return Err(error.in_factor(space, factor));
+                }
             }
         }
         if points.len() < 2 {
@@ -74,6 +118,19 @@ pub fn rows<S: Space, P: Point<S>>(len: usize, curves: &[&[P]]) -> Result<(Vec<f
         offsets.push(offsets[curve] + points.len());
     }
     Ok((rows, offsets))
+}
+
+/// Values from their numbers in each factor.
+pub fn read<V: Rows>(arrays: &[impl AsRef<[f64]>], count: usize) -> impl Iterator<Item = V> {
+    let mut rows = Vec::with_capacity(arrays.len());
+    (0..count).map(move |i| {
+        rows.clear();
+        rows.extend(arrays.iter().map(|array| {
+            let len = array.as_ref().len() / count;
+            &array.as_ref()[i * len..][..len]
+        }));
+        V::read_rows(&rows)
+    })
 }
 
 impl<S: Space, P: Point<S>> Curves<S, P> {
@@ -96,8 +153,8 @@ impl<S: Space, P: Point<S>> Curves<S, P> {
         if points.is_empty() {
             return Err(Error::LengthMismatch { curve: 0, what: "curves", expected: 1, found: 0 });
         }
-        let table = builder.space.table()?;
-        let (rows, offsets) = rows::<S, P>(Erased(&*table).point_len(), points)?;
+        let tables = tables(&builder.space)?;
+        let (rows, offsets) = rows(&builder.space, &tables, points)?;
         for (curve, own) in points.iter().enumerate() {
             let (expected, found) = (own.len(), times[if shared { 0 } else { curve }].len());
             if found != expected {
@@ -105,37 +162,43 @@ impl<S: Space, P: Point<S>> Curves<S, P> {
             }
         }
         let t = times.concat();
-        let (curves, reports) = Self::through(builder, table, t, shared, rows, offsets)?;
-        let space = curves.table();
-        let error = |(curve, report)| Error::of_fit(curve, report, &space, tol);
-        match reports.iter().enumerate().find_map(error) {
+        let (curves, reports) = Self::through(builder, tables, t, shared, rows, offsets)?;
+        match curves.failure(&reports, tol) {
             Some(error) => Err(error),
-            None => Ok((curves, reports)),
+            None => {
+                let reports = curves.reports(&reports);
+                Ok((curves, reports))
+            }
         }
     }
 
-    /// The curves through the numbers of their points, of which some may not exist: see the reports.
+    /// The curves through the numbers of their points in each factor, of which some may not exist: see the reports.
     pub fn through(
         builder: &Builder<S, P>,
-        table: Table,
+        tables: Vec<Table>,
         t: Vec<f64>,
         shared: bool,
-        rows: Vec<f64>,
+        rows: Vec<Vec<f64>>,
         offsets: Vec<usize>,
-    ) -> Result<(Self, Vec<Report>), Error> {
-        let space = Erased(&*table);
-        let vectors = end_vectors(builder, space.point_len(), &rows, &offsets)?;
-        let ends = match &builder.ends {
+    ) -> Result<(Self, Reports), Error> {
+        let vectors = end_vectors(builder, &tables, &rows, &offsets)?;
+        let ends = |factor: usize| match &builder.ends {
             Ends::Periodic => fit::Ends::Periodic,
             Ends::Open(ends) => fit::Ends::Open([0, 1].map(|e| match ends[e] {
                 End::Natural => fit::End::Natural,
                 End::NotAKnot => fit::End::NotAKnot,
-                End::Velocity(_) => fit::End::Velocity(&vectors[e]),
-                End::Acceleration(_) => fit::End::Acceleration(&vectors[e]),
+                End::Velocity(_) => fit::End::Velocity(&vectors[e][factor]),
+                End::Acceleration(_) => fit::End::Acceleration(&vectors[e][factor]),
             })),
         };
-        let problem = Problem { t: &t, shared, points: &rows, offsets: &offsets, ends };
-        let points = validate(&space, &problem, builder.point_tol).map_err(Error::of_input)?;
+        let mut factors = Vec::with_capacity(tables.len());
+        // All factors are validated before the first one is solved.
+        for (i, (table, rows)) in tables.into_iter().zip(rows).enumerate() {
+            let problem = Problem { t: &t, shared, points: &rows, offsets: &offsets, ends: ends(i) };
+            let points = validate(&Erased(&*table), &problem, builder.point_tol)
+                .map_err(|invalid| Error::of_input(invalid).in_factor(&builder.space, i))?;
+            factors.push(Factor { table, velocities: vec![0.0; points.len()], points });
+        }
         let method = match builder.method {
             Method::Auto => fit::Method::Auto,
             Method::FixedPoint => fit::Method::FixedPoint,
@@ -143,69 +206,114 @@ impl<S: Space, P: Point<S>> Curves<S, P> {
             Method::Newton => fit::Method::Newton,
             Method::Homotopy => fit::Method::Homotopy,
         };
-        let mut velocities = vec![0.0; points.len()];
         let go_on = |_| true;
         let options = Options { method, tol: builder.tol, max_iter: builder.max_iter };
-        let problem = Problem { points: &points, ..problem };
-        let reports = fit::fit(&space, &problem, &options, &Monitor::new(&go_on), &mut velocities);
-        Ok((Curves::new(builder, table, t, shared, offsets, points, velocities), reports))
+        let solve = |(i, Factor { table, points, velocities }): (usize, &mut Factor)| {
+            let problem = Problem { t: &t, shared, points, offsets: &offsets, ends: ends(i) };
+            fit::fit(&Erased(&**table), &problem, &options, &Monitor::new(&go_on), velocities)
+        };
+        let reports = factors.iter_mut().enumerate().map(solve).collect();
+        Ok((Curves::new(builder, factors, t, shared, offsets), reports))
     }
 
-    /// One curve from a file, after validation.
+    /// The error of the first curve that does not exist.
+    pub fn failure(&self, reports: &Reports, tol: f64) -> Option<Error> {
+        let in_factor = |curve: usize, i: usize| {
+            let error = Error::of_fit(curve, &reports[i][curve], &self.factors[i].space(), tol)?;
+            Some(error.in_factor(&self.space, i))
+        };
+        (0..self.count()).find_map(|curve| (0..reports.len()).find_map(|i| in_factor(curve, i)))
+    }
+
+    /// The report of each curve. A product has the worst of its factors, and distances in the product.
+    pub fn reports(&self, reports: &Reports) -> Vec<Report> {
+        if let [reports] = &reports[..] {
+            return reports.iter().map(|report| Report::new([report], report.max_step)).collect();
+        }
+        let nodes = self.offsets[self.count()];
+        let mut steps = vec![0.0_f64; nodes - 1];
+        let (mut part, go_on) = (vec![0.0; nodes - 1], |_| true);
+        for factor in &*self.factors {
+            let (space, points) = (factor.space(), &factor.points);
+            let (first, second) =
+                (&points[factor.range(&(0..nodes - 1))], &points[factor.range(&(1..nodes))]);
+            // It is defined for all points.
+            let _ =
+                apply(&space, Operation::Distance, &[first, second], &[], &Monitor::new(&go_on), &mut part);
+            steps.iter_mut().zip(&part).for_each(|(step, part)| *step = step.hypot(*part));
+        }
+        let longest = |curve: usize| {
+            let nodes = self.nodes(curve);
+            steps[nodes.start..nodes.end - 1].iter().copied().fold(0.0, f64::max)
+        };
+        let report = |curve| Report::new(reports.iter().map(|factor| &factor[curve]), longest(curve));
+        (0..self.count()).map(report).collect()
+    }
+
+    /// One curve from a file, after validation. Points and velocities are those of the first factor, then those of the
+    /// second one, and so on.
     #[cfg(feature = "serde")]
     pub fn stored(
         builder: &Builder<S, P>,
         t: Vec<f64>,
-        points: Vec<f64>,
-        velocities: Vec<f64>,
+        points: &[f64],
+        velocities: &[f64],
     ) -> Result<Self, Error> {
-        let table = builder.space.table()?;
-        let space = Erased(&*table);
-        let (nodes, len) = (t.len(), space.point_len());
+        let (tables, nodes) = (tables(&builder.space)?, t.len());
         if nodes < 2 {
             return Err(Error::TooFewPoints { curve: 0, points: nodes });
         }
-        for (what, row) in [("numbers of points", &points), ("numbers of velocities", &velocities)] {
-            let (expected, found) = (nodes * len, row.len());
+        let expected = tables.iter().map(|table| nodes * Erased(&**table).point_len()).sum();
+        for (what, row) in [("numbers of points", points), ("numbers of velocities", velocities)] {
+            let found = row.len();
             if found != expected {
                 return Err(Error::LengthMismatch { curve: 0, what, expected, found });
             }
         }
-        let ends = fit::Ends::Open([fit::End::Natural; 2]);
-        let problem = Problem { t: &t, shared: true, points: &points, offsets: &[0, nodes], ends };
-        let points = validate(&space, &problem, builder.point_tol).map_err(Error::of_input)?;
-        let defects = tangent_defects(&space, &points, &velocities);
-        if let Some(node) = defects.iter().position(|d| !(*d <= builder.point_tol)) {
-            let condition = "its velocity is not tangent".into();
-            return Err(Error::OffSpace { curve: 0, node, distance: defects[node], condition });
+        let (mut factors, mut first) = (Vec::with_capacity(tables.len()), 0);
+        for (i, table) in tables.into_iter().enumerate() {
+            let space = Erased(&*table);
+            let range = first..first + nodes * space.point_len();
+            first = range.end;
+            let (points, velocities) = (&points[range.clone()], velocities[range].to_vec());
+            let ends = fit::Ends::Open([fit::End::Natural; 2]);
+            let problem = Problem { t: &t, shared: true, points, offsets: &[0, nodes], ends };
+            let points = validate(&space, &problem, builder.point_tol)
+                .map_err(|invalid| Error::of_input(invalid).in_factor(&builder.space, i))?;
+            let defects = tangent_defects(&space, &points, &velocities);
+            if let Some(node) = defects.iter().position(|d| !(*d <= builder.point_tol)) {
+                let condition = "its velocity is not tangent".into();
+                let error = Error::OffSpace { curve: 0, node, distance: defects[node], condition };
+                return Err(error.in_factor(&builder.space, i));
+            }
+            factors.push(Factor { table, points, velocities });
         }
-        Ok(Curves::new(builder, table, t, true, vec![0, nodes], points, velocities))
+        Ok(Curves::new(builder, factors, t, true, vec![0, nodes]))
     }
 
-    /// The numbers of the velocities of a curve at its knots.
+    /// The numbers of the points and of the velocities of one curve, as [`Curves::stored`] reads them.
     #[cfg(feature = "serde")]
-    pub fn velocity_rows(&self, curve: usize) -> &[f64] {
-        &self.velocities[self.range(curve)]
+    pub fn to_store(&self) -> [Vec<f64>; 2] {
+        let nodes = self.nodes(0);
+        let all = |rows: fn(&Factor) -> &[f64]| {
+            self.factors.iter().flat_map(|factor| &rows(factor)[factor.range(&nodes)]).copied().collect()
+        };
+        [all(|factor| &factor.points), all(|factor| &factor.velocities)]
     }
 
-    /// Curves with given velocities.
-    pub fn new(
+    fn new(
         builder: &Builder<S, P>,
-        table: Table,
+        factors: Vec<Factor>,
         t: Vec<f64>,
         shared: bool,
         offsets: Vec<usize>,
-        points: Vec<f64>,
-        velocities: Vec<f64>,
     ) -> Self {
         Curves {
             space: builder.space.clone(),
-            table,
+            factors: factors.into(),
             t: t.into(),
             shared,
             offsets: offsets.into(),
-            points: points.into(),
-            velocities: velocities.into(),
             extrapolate: builder.extrapolate,
             point: PhantomData,
         }
@@ -218,7 +326,7 @@ impl<S: Space, P: Point<S>> Curves<S, P> {
 
     /// The knots of a curve.
     pub fn knots(&self, curve: usize) -> &[f64] {
-        if self.shared { &self.t } else { &self.t[self.offsets[curve]..self.offsets[curve + 1]] }
+        if self.shared { &self.t } else { &self.t[self.nodes(curve)] }
     }
 
     /// First and last knot of a curve.
@@ -227,80 +335,85 @@ impl<S: Space, P: Point<S>> Curves<S, P> {
         (t[0], t[t.len() - 1])
     }
 
-    /// The operations of the space.
-    pub fn table(&self) -> Erased<'_> {
-        Erased(&*self.table)
+    /// The nodes of a curve among those of all curves.
+    fn nodes(&self, curve: usize) -> Range<usize> {
+        self.offsets[curve]..self.offsets[curve + 1]
     }
 
-    /// The numbers of the points of a curve.
-    pub fn point_rows(&self, curve: usize) -> &[f64] {
-        &self.points[self.range(curve)]
-    }
-
-    fn range(&self, curve: usize) -> std::ops::Range<usize> {
-        let len = self.table().point_len();
-        self.offsets[curve] * len..self.offsets[curve + 1] * len
+    /// The points of a curve in each factor.
+    fn points(&self, curve: usize) -> Vec<&[f64]> {
+        let nodes = self.nodes(curve);
+        self.factors.iter().map(|factor| &factor.points[factor.range(&nodes)]).collect()
     }
 
     /// The points of a curve.
     pub fn at_knots(&self, curve: usize) -> Vec<P> {
-        self.point_rows(curve).chunks(self.table().point_len()).map(P::read).collect()
+        read(&self.points(curve), self.nodes(curve).len()).collect()
     }
 
     /// The velocities of a curve at its knots.
     pub fn velocities_at_knots(&self, curve: usize) -> Vec<P::Tangent> {
-        self.read_tangents(self.point_rows(curve), &self.velocities[self.range(curve)])
+        let nodes = self.nodes(curve);
+        let velocities: Vec<&[f64]> =
+            self.factors.iter().map(|factor| &factor.velocities[factor.range(&nodes)]).collect();
+        self.read_tangents(&self.points(curve), &velocities, nodes.len())
     }
 
     /// One of the curves.
     pub fn one(&self, curve: usize) -> Self {
-        let range = self.range(curve);
+        let nodes = self.nodes(curve);
+        let part = |factor: &Factor| Factor {
+            table: factor.table.clone(),
+            points: factor.points[factor.range(&nodes)].to_vec(),
+            velocities: factor.velocities[factor.range(&nodes)].to_vec(),
+        };
         Curves {
             space: self.space.clone(),
-            table: self.table.clone(),
+            factors: self.factors.iter().map(part).collect(),
             t: self.knots(curve).into(),
             shared: true,
-            offsets: [0, self.offsets[curve + 1] - self.offsets[curve]].into(),
-            points: self.points[range.clone()].into(),
-            velocities: self.velocities[range].into(),
+            offsets: [0, nodes.len()].into(),
             extrapolate: self.extrapolate,
             point: PhantomData,
         }
     }
 
-    /// The numbers of a quantity at times of all curves, curve by curve.
-    pub fn evaluate(&self, times: &[f64], quantity: Quantity) -> Result<Vec<f64>, Error> {
-        let space = self.table();
-        let size = quantity.len(&space);
-        let mut out = vec![0.0; self.count() * times.len() * size];
-        let nodes = self.offsets[1];
-        let equal = self.offsets.windows(2).all(|pair| pair[1] - pair[0] == nodes);
-        let mut rest = &mut out[..];
+    /// The numbers of a quantity at times of all curves, curve by curve: one array per factor, or one for lengths.
+    pub fn evaluate(&self, times: &[f64], quantity: Quantity) -> Result<Vec<Vec<f64>>, Error> {
+        let results = if quantity.is_length() { 1 } else { self.factors.len() };
+        let factors = &self.factors[..results];
+        let sizes: Vec<usize> = factors.iter().map(|f| times.len() * quantity.len(&f.space())).collect();
+        let mut out: Vec<Vec<f64>> = sizes.iter().map(|size| vec![0.0; self.count() * size]).collect();
+        let equal = self.offsets.windows(2).all(|pair| pair[1] - pair[0] == self.offsets[1]);
         // Curves with equally many knots are evaluated together.
-        for c in 0..if equal { 1 } else { self.count() } {
-            let whole = 0..self.points.len();
-            let range = if equal { whole } else { self.range(c) };
-            let curves = curve::Curves {
-                t: if equal { &self.t } else { self.knots(c) },
-                nodes: self.offsets[c + 1] - self.offsets[c],
-                points: &self.points[range.clone()],
-                velocities: &self.velocities[range],
-                before: &[],
-            };
+        let together = if equal { self.count() } else { 1 };
+        for first in (0..self.count()).step_by(together) {
+            let nodes = self.offsets[first]..self.offsets[first + together];
+            let mut factors = Vec::with_capacity(self.factors.len());
+            for factor in &*self.factors {
+                let curves = curve::Curves {
+                    t: if equal { &self.t } else { self.knots(first) },
+                    nodes: nodes.len() / together,
+                    points: &factor.points[factor.range(&nodes)],
+                    velocities: &factor.velocities[factor.range(&nodes)],
+                    before: &[],
+                };
+                factors.push(curve::Factor { space: factor.space(), curves });
+            }
             let inside: Vec<f64>;
             let x = match self.extrapolate {
                 Extrapolate::Error => {
-                    inside = self.inside(if equal { 0..self.count() } else { c..c + 1 }, times)?;
+                    inside = self.inside(first..first + together, times)?;
                     &inside
                 }
-                _ => finite(times, self.domain(c))?,
+                _ => finite(times, self.domain(first))?,
             };
-            let own;
-            (own, rest) =
-                if equal { (rest, [].as_mut_slice()) } else { rest.split_at_mut(times.len() * size) };
             let (times, go_on) = (Times { x, count: times.len() }, |_| true);
+            let rows = out.iter_mut().zip(&sizes);
+            let mut rows: Vec<&mut [f64]> =
+                rows.map(|(out, size)| &mut out[first * size..(first + together) * size]).collect();
             let outside = self.extrapolate.policy();
-            curve::evaluate(&space, &curves, &times, quantity, outside, &Monitor::new(&go_on), own);
+            evaluate_product(&factors, &times, quantity, outside, &Monitor::new(&go_on), &mut rows);
         }
         Ok(out)
     }
@@ -308,11 +421,11 @@ impl<S: Space, P: Point<S>> Curves<S, P> {
     /// Points at times of all curves.
     pub fn sample(&self, times: &[f64]) -> Result<Samples<P>, Error> {
         let rows = self.evaluate(times, Quantity::Point)?;
-        Ok(Samples::read(&rows, self.table().point_len(), times.len()))
+        Ok(Samples::read(&rows, self.count(), times.len()))
     }
 
     /// Times that are inside the knots of some curves, up to rounding.
-    fn inside(&self, mut curves: std::ops::Range<usize>, times: &[f64]) -> Result<Vec<f64>, Error> {
+    fn inside(&self, mut curves: Range<usize>, times: &[f64]) -> Result<Vec<f64>, Error> {
         if self.shared {
             curves.end = curves.start + 1;
         }
@@ -332,18 +445,28 @@ impl<S: Space, P: Point<S>> Curves<S, P> {
     /// Velocities or accelerations at times of all curves.
     pub fn tangents(&self, times: &[f64], quantity: Quantity) -> Result<Vec<P::Tangent>, Error> {
         let ambient = self.evaluate(times, quantity)?;
-        Ok(self.read_tangents(&self.evaluate(times, Quantity::Point)?, &ambient))
+        let points = self.evaluate(times, Quantity::Point)?;
+        Ok(self.read_tangents(&points, &ambient, self.count() * times.len()))
     }
 
-    fn read_tangents(&self, points: &[f64], ambient: &[f64]) -> Vec<P::Tangent> {
-        let len = self.table().point_len();
-        let mut row = Vec::with_capacity(len);
-        let read = |(p, v)| {
-            row.clear();
-            self.space.write_velocity(p, v, &mut row);
-            P::Tangent::read(&row)
-        };
-        points.chunks(len).zip(ambient.chunks(len)).map(read).collect()
+    /// Tangent vectors from their ambient arrays in each factor.
+    fn read_tangents(
+        &self,
+        points: &[impl AsRef<[f64]>],
+        ambient: &[impl AsRef<[f64]>],
+        count: usize,
+    ) -> Vec<P::Tangent> {
+        let mut vectors = Vec::with_capacity(ambient.len());
+        for (i, factor) in self.space.factors().iter().enumerate() {
+            let len = self.factors[i].space().point_len();
+            let (points, ambient) = (points[i].as_ref(), ambient[i].as_ref());
+            let mut rows = Vec::with_capacity(ambient.len());
+            for (point, vector) in points.chunks_exact(len).zip(ambient.chunks_exact(len)) {
+                factor.write_velocity(point, vector, &mut rows);
+            }
+            vectors.push(rows);
+        }
+        read(&vectors, count).collect()
     }
 }
 
@@ -355,26 +478,33 @@ fn finite(times: &[f64], (start, end): (f64, f64)) -> Result<&[f64], Error> {
     }
 }
 
-/// The ambient arrays of the vectors at both ends of every curve.
+/// The ambient arrays of the vectors at both ends of every curve, in each factor.
 fn end_vectors<S: Space, P: Point<S>>(
     builder: &Builder<S, P>,
-    len: usize,
-    points: &[f64],
+    tables: &[Table],
+    points: &[Vec<f64>],
     offsets: &[usize],
-) -> Result<[Vec<f64>; 2], Error> {
-    let mut out = [Vec::new(), Vec::new()];
+) -> Result<[Vec<Vec<f64>>; 2], Error> {
+    let mut out = [0, 1].map(|_| vec![Vec::new(); tables.len()]);
     let Ends::Open(ends) = &builder.ends else { return Ok(out) };
     for (e, (end, out)) in ends.iter().zip(&mut out).enumerate() {
         let (End::Velocity(vector) | End::Acceleration(vector)) = end else { continue };
-        let mut row = Vec::new();
-        vector.write(&mut row);
-        for (curve, pair) in offsets.windows(2).enumerate() {
-            let node = if e == 0 { pair[0] } else { pair[1] - 1 };
-            let before = out.len();
-            builder.space.write_ambient(&points[node * len..(node + 1) * len], &row, out);
-            let found = out.len() - before;
-            if found != len {
-                return Err(Error::PointLength { curve, node: node - pair[0], expected: len, found });
+        let node = |pair: &[usize]| if e == 0 { pair[0] } else { pair[1] - 1 };
+        let mut rows = vec![Vec::new(); tables.len()];
+        let (expected, found) = (rows.len(), vector.write_rows(&mut rows));
+        if found != expected {
+            return Err(Error::FactorCount { curve: 0, node: node(offsets), expected, found });
+        }
+        for (i, factor) in builder.space.factors().iter().enumerate() {
+            let len = Erased(&*tables[i]).point_len();
+            for (curve, pair) in offsets.windows(2).enumerate() {
+                let (node, before) = (node(pair), out[i].len());
+                factor.write_ambient(&points[i][node * len..(node + 1) * len], &rows[i], &mut out[i]);
+                let found = out[i].len() - before;
+                if found != len {
+                    let error = Error::PointLength { curve, node: node - pair[0], expected: len, found };
+                    return Err(error.in_factor(&builder.space, i));
+                }
             }
         }
     }

@@ -4,7 +4,7 @@
 
 use crate::error::Error;
 use crate::point::Point;
-use crate::space::{Space, Table};
+use crate::space::{Factor, Table};
 use std::fmt;
 use std::sync::Arc;
 
@@ -25,7 +25,7 @@ impl<M> fmt::Debug for Custom<M> {
     }
 }
 
-impl<M: Model + 'static> Space for Custom<M> {
+impl<M: Model + 'static> Factor for Custom<M> {
     fn table(&self) -> Result<Table, Error> {
         Ok(Arc::new(self.0))
     }

@@ -1,5 +1,6 @@
 //! Errors, with the numbers that they are about.
 
+use crate::space::Space;
 use std::fmt;
 use symspline_engine::fit::{Report, Solver, Status};
 use symspline_engine::space::{Ambient, Erased};
@@ -44,6 +45,26 @@ pub enum Error {
         expected: usize,
         /// The length of the given array.
         found: usize,
+    },
+    /// A point or a vector has another number of factors than the product.
+    FactorCount {
+        /// The curve.
+        curve: usize,
+        /// The node.
+        node: usize,
+        /// The number of factors of the space.
+        expected: usize,
+        /// The number of factors of the point.
+        found: usize,
+    },
+    /// An error in one factor of a product.
+    InFactor {
+        /// The factor, counted from 0.
+        factor: usize,
+        /// The space of this factor.
+        space: String,
+        /// The error.
+        error: Box<Error>,
     },
     /// A time is NaN or infinite.
     TimeNotFinite {
@@ -179,6 +200,21 @@ pub enum Error {
 }
 
 impl Error {
+    /// The error in one factor of a space. Factors have common times, so that errors of times remain as they are.
+    pub(crate) fn in_factor(self, space: &impl Space, factor: usize) -> Self {
+        let of_times = matches!(
+            self,
+            Error::TimeNotFinite { .. } | Error::UnsortedTimes { .. } | Error::TimesTooFarApart { .. }
+        );
+        match &space.factors()[..] {
+            [_] => self,
+            _ if of_times => self,
+            factors => {
+                Error::InFactor { factor, space: format!("{:?}", factors[factor]), error: Box::new(self) }
+            }
+        }
+    }
+
     /// The error of validation.
     pub(crate) fn of_input(invalid: Invalid) -> Self {
         let Invalid { curve, node, reason } = invalid;
@@ -234,6 +270,12 @@ impl fmt::Display for Error {
                 f,
                 "curve {curve}, node {node}: the point has {found} numbers, but points of this space have {expected}"
             ),
+            Error::FactorCount { curve, node, expected, found } => write!(
+                f,
+                "curve {curve}, node {node}: {found} factor(s) were given, but the space has {expected}. Pass one point or \
+                 vector per factor"
+            ),
+            Error::InFactor { factor, space, error } => write!(f, "factor {factor}, {space}: {error}"),
             Error::TimeNotFinite { curve, node, time } => {
                 write!(f, "curve {curve}, node {node}: the time is {time}, but times must be finite")
             }

@@ -44,9 +44,31 @@
 //! # Ok::<(), symspline::Error>(())
 //! ```
 //!
+//! # Products
+//!
+//! A tuple of spaces is their product. Its points, velocities and end vectors are tuples as well. Each factor has the curve
+//! that it has alone, at common times, and the speed in the product is the root of the sum of the squared speeds.
+//!
+//! ```
+//! use symspline::prelude::*;
+//!
+//! let times = [0.0, 1.0, 2.5];
+//! let points = [0.0_f64, 0.4, 1.1].map(|angle| ([angle.cos(), angle.sin()], [angle, 0.0, 1.0]));
+//! let spline = CubicSpline::new((Sphere::<2>, Euclidean::<3>), &times, &points)?;
+//! let (direction, position) = spline.at(0.7);
+//! let (turning, moving) = spline.velocity(0.7);
+//! let speed = turning[0].hypot(turning[1]).hypot(moving[0]);
+//! assert!((spline.speed(0.7) - speed).abs() < 1e-14);
+//! # let _ = (direction, position);
+//! # Ok::<(), Error>(())
+//! ```
+//!
+//! [`Product`] has any number of factors of one type, such as spaces that are named when the program runs.
+//!
 //! # Errors
 //!
-//! Input is validated before any work is done. [`Error`] names the curve, the node and the numbers.
+//! Input is validated before any work is done. [`Error`] names the curve, the node and the numbers,
+//! and the factor of a product.
 //!
 //! ```
 //! use symspline::prelude::*;
@@ -93,6 +115,7 @@ mod mint;
 mod nalgebra;
 mod options;
 mod point;
+mod product;
 mod samples;
 #[cfg(feature = "serde")]
 mod serde;
@@ -106,15 +129,16 @@ pub use error::Error;
 pub use options::{Builder, End, Ends, Extrapolate, Method};
 #[cfg(feature = "rotations")]
 pub use point::Twist;
-pub use point::{Point, Row};
+pub use point::{Point, Row, Rows};
+pub use product::Product;
 pub use samples::Samples;
 #[cfg(feature = "smoothing")]
-pub use smoothing::{Criterion, Loss, Smoothing, SmoothingReport, SmoothingSpline};
+pub use smoothing::{Criterion, FactorValues, Loss, Smoothing, SmoothingReport, SmoothingSpline};
 #[cfg(feature = "subspaces")]
 pub use space::Grassmannian;
 #[cfg(feature = "positive-definite")]
 pub use space::PositiveDefinite;
-pub use space::{AnySpace, Space};
+pub use space::{AnySpace, Factor, Space};
 #[cfg(feature = "rotations")]
 pub use space::{BodyFrame, Se3, So3};
 #[cfg(feature = "vectors")]
@@ -135,7 +159,7 @@ pub mod prelude {
     #[doc(no_inline)]
     pub use crate::options::End::{Natural, NotAKnot};
     #[doc(no_inline)]
-    pub use crate::{AnySpace, Batch, CubicSpline, End, Ends, Error, Extrapolate, Method};
+    pub use crate::{AnySpace, Batch, CubicSpline, End, Ends, Error, Extrapolate, Method, Product};
     #[cfg(feature = "smoothing")]
     #[doc(no_inline)]
     pub use crate::{Criterion, Loss, Smoothing};

@@ -21,10 +21,37 @@ pub trait Row: Sized {
     fn align(&mut self, _before: &Self) {}
 }
 
-/// A type of the points of a space: an array of numbers, or a type of nalgebra, glam or mint.
-pub trait Point<S: Space>: Row {
+/// A value as lists of numbers, one per factor of a space: a [`Row`], or a tuple or `Vec` of rows on a product.
+pub trait Rows: Sized {
+    /// Appends the numbers in each factor. Returns in how many factors the value has numbers.
+    #[doc(hidden)]
+    fn write_rows(&self, factors: &mut [Vec<f64>]) -> usize;
+    /// The value with these numbers.
+    #[doc(hidden)]
+    fn read_rows(rows: &[&[f64]]) -> Self;
+    /// See [`Row::align`].
+    #[doc(hidden)]
+    fn align_rows(&mut self, before: &Self);
+}
+
+impl<R: Row> Rows for R {
+    fn write_rows(&self, factors: &mut [Vec<f64>]) -> usize {
+        self.write(&mut factors[0]);
+        1
+    }
+    fn read_rows(rows: &[&[f64]]) -> Self {
+        R::read(rows[0])
+    }
+    fn align_rows(&mut self, before: &Self) {
+        self.align(before);
+    }
+}
+
+/// A type of the points of a space: an array of numbers, or a type of nalgebra, glam or mint. Points of a product are
+/// tuples of these, or a `Vec` for a [`Product`](crate::Product).
+pub trait Point<S: Space>: Rows {
     /// The type of velocities and accelerations at such points.
-    type Tangent: Row;
+    type Tangent: Rows;
 }
 
 impl<const N: usize> Row for [f64; N] {

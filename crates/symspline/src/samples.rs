@@ -1,6 +1,7 @@
 //! Values at many times.
 
-use crate::point::Row;
+use crate::curves::read;
+use crate::point::Rows;
 use std::ops::Index;
 
 /// Values of many curves at the same times: `samples[curve][time]`.
@@ -10,14 +11,13 @@ pub struct Samples<P> {
     pub(crate) count: usize,
 }
 
-impl<P: Row> Samples<P> {
-    /// Reads rows of numbers. Within a curve, values continue each other.
-    pub(crate) fn read(rows: &[f64], len: usize, count: usize) -> Self {
-        let mut values: Vec<P> = Vec::with_capacity(rows.len() / len);
-        for row in rows.chunks_exact(len) {
-            let mut value = P::read(row);
+impl<P: Rows> Samples<P> {
+    /// Reads the numbers of curves in each factor, at times of equal number. Within a curve, values continue each other.
+    pub(crate) fn read(rows: &[Vec<f64>], curves: usize, count: usize) -> Self {
+        let mut values: Vec<P> = Vec::with_capacity(curves * count);
+        for mut value in read::<P>(rows, curves * count) {
             if let Some(before) = values.last().filter(|_| !values.len().is_multiple_of(count)) {
-                value.align(before);
+                value.align_rows(before);
             }
             values.push(value);
         }

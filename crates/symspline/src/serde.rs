@@ -7,7 +7,8 @@ use crate::space::{AnySpace, Space};
 use crate::spline::{CubicSpline, Report};
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de, ser::SerializeStruct};
 
-/// The contents of a curve: points and velocities as lists of numbers, matrices row by row.
+/// The contents of a curve: points and velocities as lists of numbers, matrices row by row. For a product, these are all
+/// numbers of the first factor, then those of the second one, and so on.
 #[derive(Deserialize)]
 #[serde(rename = "CubicSpline")]
 struct Stored<S> {
@@ -22,8 +23,9 @@ impl<S: Space + Serialize, P: Point<S>> Serialize for CubicSpline<S, P> {
         let mut fields = serializer.serialize_struct("CubicSpline", 4)?;
         fields.serialize_field("space", self.space())?;
         fields.serialize_field("times", self.times())?;
-        fields.serialize_field("points", self.curves.point_rows(0))?;
-        fields.serialize_field("velocities", self.curves.velocity_rows(0))?;
+        let [points, velocities] = self.curves.to_store();
+        fields.serialize_field("points", &points)?;
+        fields.serialize_field("velocities", &velocities)?;
         fields.end()
     }
 }
@@ -32,7 +34,7 @@ impl<'de, S: Space + Deserialize<'de>, P: Point<S>> Deserialize<'de> for CubicSp
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let stored = Stored::deserialize(deserializer)?;
         let builder = CubicSpline::builder(stored.space);
-        Curves::stored(&builder, stored.times, stored.points, stored.velocities)
+        Curves::stored(&builder, stored.times, &stored.points, &stored.velocities)
             .map(|curves| CubicSpline { curves, report: Report::unknown() })
             .map_err(de::Error::custom)
     }

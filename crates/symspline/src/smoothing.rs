@@ -1,12 +1,13 @@
 //! Curves close to noisy data.
 
-use crate::curves::{Curves, rows};
+use crate::curves::{Curves, rows, tables};
 use crate::error::Error;
 use crate::options::{Builder, End, Ends, Extrapolate};
 use crate::point::Point;
 use crate::space::Space;
-use crate::spline::{CubicSpline, Report};
+use crate::spline::CubicSpline;
 use std::ops::Deref;
+use symspline_engine::fit::Status;
 use symspline_engine::monitor::Monitor;
 use symspline_engine::smoothing::{self as engine, Data, EndCondition, Observations, State, Tier};
 use symspline_engine::space::{Ambient, Erased};
@@ -41,6 +42,40 @@ pub enum Loss {
     Cauchy,
 }
 
+/// A value for all factors of a space, or one per factor, of which `None` is chosen from the data.
+#[derive(Clone, Debug, Default)]
+pub struct FactorValues(Vec<Option<f64>>);
+
+impl From<f64> for FactorValues {
+    fn from(value: f64) -> Self {
+        FactorValues(vec![Some(value)])
+    }
+}
+
+impl<T: Into<Option<f64>>, const N: usize> From<[T; N]> for FactorValues {
+    fn from(values: [T; N]) -> Self {
+        FactorValues(values.map(T::into).into())
+    }
+}
+
+impl<T: Into<Option<f64>>> From<Vec<T>> for FactorValues {
+    fn from(values: Vec<T>) -> Self {
+        FactorValues(values.into_iter().map(T::into).collect())
+    }
+}
+
+impl FactorValues {
+    /// One value per factor.
+    fn in_factors(&self, what: &'static str, factors: usize) -> Result<Vec<Option<f64>>, Error> {
+        match self.0[..] {
+            [] => Ok(vec![None; factors]),
+            [value] => Ok(vec![value; factors]),
+            _ if self.0.len() == factors => Ok(self.0.clone()),
+            _ => Err(Error::LengthMismatch { curve: 0, what, expected: factors, found: self.0.len() }),
+        }
+    }
+}
+
 /// The options of smoothing: the curve γ with the smallest `Σ wₖ d(yₖ, γ(tₖ))² + λ ∫ |∇γ'|² dt`.
 ///
 /// # Examples
@@ -69,8 +104,8 @@ pub struct Smoothing {
     criterion: Criterion,
     gamma: f64,
     loss: Loss,
-    lam: Option<f64>,
-    sigma: Option<f64>,
+    lam: FactorValues,
+    sigma: FactorValues,
     weights: Option<Vec<f64>>,
     knots: Option<Vec<f64>>,
     periodic: bool,
@@ -86,8 +121,8 @@ impl Default for Smoothing {
             criterion: Criterion::Gcv,
             gamma: 1.2,
             loss: Loss::Linear,
-            lam: None,
-            sigma: None,
+            lam: FactorValues::default(),
+            sigma: FactorValues::default(),
             weights: None,
             knots: None,
             periodic: false,
@@ -119,20 +154,22 @@ impl Smoothing {
         self
     }
 
-    /// λ; by default it is chosen from the data. 0 is the curve of least squares.
-    pub fn lam(mut self, lam: f64) -> Self {
-        self.lam = Some(lam);
+    /// λ; by default it is chosen from the data, in each factor of a product. 0 is the curve of least squares. An array has
+    /// one value per factor.
+    pub fn lam(mut self, lam: impl Into<FactorValues>) -> Self {
+        self.lam = lam.into();
         self
     }
 
-    /// The standard deviation of the noise in a coordinate at weight one; by default it is estimated.
-    pub fn sigma(mut self, sigma: f64) -> Self {
-        self.sigma = Some(sigma);
+    /// The standard deviation of the noise in a coordinate at weight one; by default it is estimated. An array has one
+    /// value per factor.
+    pub fn sigma(mut self, sigma: impl Into<FactorValues>) -> Self {
+        self.sigma = sigma.into();
         self
     }
 
     /// One weight per point, proportional to the inverse variance of its noise; by default 1. Points with weight 0 are
-    /// ignored, but must be on the space.
+    /// ignored, but must be on the space. All factors of a product have the same weights.
     pub fn weights(mut self, weights: &[f64]) -> Self {
         self.weights = Some(weights.to_vec());
         self
@@ -172,8 +209,10 @@ impl Smoothing {
         times: &[f64],
         points: &[P],
     ) -> Result<SmoothingSpline<S, P>, Error> {
-        for (name, value) in [("lam", self.lam), ("sigma", self.sigma), ("point_tol", Some(self.point_tol))] {
-            if let Some(value) = value.filter(|value| !(*value >= 0.0 && value.is_finite())) {
+        let point_tol = FactorValues::from(self.point_tol);
+        for (name, values) in [("lam", &self.lam), ("sigma", &self.sigma), ("point_tol", &point_tol)] {
+            let mut values = values.0.iter().flatten();
+            if let Some(&value) = values.find(|value| !(**value >= 0.0 && value.is_finite())) {
                 return Err(Error::InvalidOption { name, value, requirement: "a finite number >= 0" });
             }
         }
@@ -181,10 +220,10 @@ impl Smoothing {
             let (name, value) = ("gamma", self.gamma);
             return Err(Error::InvalidOption { name, value, requirement: "a finite number >= 1" });
         }
-        let table = space.table()?;
-        let handle = Erased(&*table);
-        let len = handle.point_len();
-        let (mut numbers, offsets) = rows::<S, P>(len, &[points])?;
+        let tables = tables(&space)?;
+        let lam = self.lam.in_factors("values of lam", tables.len())?;
+        let sigma = self.sigma.in_factors("values of sigma", tables.len())?;
+        let (mut numbers, offsets) = rows(&space, &tables, &[points])?;
         let same_length = |what, found| match found == points.len() {
             true => Ok(()),
             false => Err(Error::LengthMismatch { curve: 0, what, expected: points.len(), found }),
@@ -197,25 +236,72 @@ impl Smoothing {
             return Err(Error::InvalidWeight { index, weight: weights[index] });
         }
         not_decreasing(times)?;
-        validate::points(&handle, &mut numbers, &offsets, self.point_tol).map_err(Error::of_input)?;
+        for (i, (table, numbers)) in tables.iter().zip(&mut numbers).enumerate() {
+            validate::points(&Erased(&**table), numbers, &offsets, self.point_tol)
+                .map_err(|invalid| Error::of_input(invalid).in_factor(&space, i))?;
+        }
         let knots = self.knots_for(times, weights)?;
+        let smooth = |i: usize| {
+            let found =
+                self.smooth(&Erased(&*tables[i]), times, &numbers[i], weights, &knots, lam[i], sigma[i]);
+            failure(found.report.state).map_err(|error| error.in_factor(&space, i))?;
+            Ok(found)
+        };
+        let smoothed = (0..tables.len()).map(smooth).collect::<Result<Vec<_>, Error>>()?;
+        let builder: Builder<S, P> =
+            CubicSpline::builder(space.clone()).ends(natural(self.periodic)).extrapolate(self.extrapolate);
+        let (offsets, mut points, mut noise) = (vec![0, knots.len()], Vec::new(), Vec::new());
+        for (found, sigma) in smoothed.into_iter().zip(sigma) {
+            let report = found.report;
+            points.push(found.points);
+            noise.push(Noise {
+                inverse: found.inverse,
+                // A spline with other knots than the times of the data has no freedom between its knots.
+                between: if self.knots.is_some() { 0.0 } else { report.band_lam },
+                report: SmoothingReport {
+                    lam: report.lam,
+                    df: report.freedom,
+                    sigma: sigma.unwrap_or(report.sigma),
+                    iterations: report.iterations,
+                },
+            });
+        }
+        let (curves, mut reports) = Curves::through(&builder, tables, knots, true, points, offsets)?;
+        let fits = curves.reports(&reports);
+        // Knots that nearly coincide leave a residual of rounding errors, which is small compared with the noise.
+        reports.iter_mut().flatten().filter(|report| report.residual < ENOUGH).for_each(|report| {
+            report.status = Status::Converged;
+        });
+        if let Some(error) = curves.failure(&reports, ENOUGH) {
+            return Err(error);
+        }
+        let spline = CubicSpline { curves, report: fits[0] };
+        Ok(SmoothingSpline { spline, noise, ends: self.ends() })
+    }
+
+    /// Smooths the data in one factor.
+    fn smooth(
+        &self,
+        space: &Erased,
+        times: &[f64],
+        points: &[f64],
+        weights: &[f64],
+        knots: &[f64],
+        lam: Option<f64>,
+        sigma: Option<f64>,
+    ) -> engine::Smooth {
         let period = self.periodic.then(|| knots[knots.len() - 1] - knots[0]);
-        let own = Observations::new(times, &numbers, weights, &[], len, period);
+        let own = Observations::new(times, points, weights, &[], space.point_len(), period);
         let data = Data {
             times: &own.times,
             points: &own.points,
             weights: &own.weights,
             information: &[],
-            knots: &knots,
-            lam: self.lam,
-            sigma: self.sigma,
+            knots,
+            lam,
+            sigma,
             ends: [&[], &[]],
             start: &[],
-        };
-        let ends = if self.periodic {
-            engine::Ends::Periodic
-        } else {
-            engine::Ends::Open([EndCondition::Natural; 2])
         };
         let options = engine::Options {
             criterion: match self.criterion {
@@ -230,37 +316,16 @@ impl Smoothing {
                 Loss::Cauchy => engine::Loss::Cauchy,
             },
             tier: Tier::Auto,
-            ends,
+            ends: self.ends(),
             tol: self.tol,
             max_iter: self.max_iter,
-            raise_lam: self.lam.is_none(),
+            raise_lam: lam.is_none(),
         };
-        let go_on = |_| true;
-        let found = engine::smooth(&handle, &[data], &options, &Monitor::new(&go_on)).remove(0);
-        failure(found.report.state)?;
-        let builder: Builder<S, P> =
-            CubicSpline::builder(space).ends(natural(self.periodic)).extrapolate(self.extrapolate);
-        let offsets = vec![0, found.knots.len()];
-        let (curves, reports) = Curves::through(&builder, table, found.knots, true, found.points, offsets)?;
-        // Knots that nearly coincide leave a residual of rounding errors, which is small compared with the noise.
-        let error = Error::of_fit(0, &reports[0], &curves.table(), ENOUGH);
-        if let Some(error) = error.filter(|_| !(reports[0].residual < ENOUGH)) {
-            return Err(error);
-        }
-        let report = found.report;
-        Ok(SmoothingSpline {
-            spline: CubicSpline { curves, report: Report::new(&reports[0]) },
-            inverse: found.inverse,
-            ends,
-            // A spline with other knots than the times of the data has no freedom between its knots.
-            between: if self.knots.is_some() { 0.0 } else { report.band_lam },
-            report: SmoothingReport {
-                lam: report.lam,
-                df: report.freedom,
-                sigma: self.sigma.unwrap_or(report.sigma),
-                iterations: report.iterations,
-            },
-        })
+        engine::smooth(space, &[data], &options, &Monitor::new(&|_| true)).remove(0)
+    }
+
+    fn ends(&self) -> engine::Ends {
+        if self.periodic { engine::Ends::Periodic } else { engine::Ends::Open([EndCondition::Natural; 2]) }
     }
 
     /// The knots: those given, or all times of data with a weight.
@@ -350,8 +415,14 @@ pub struct SmoothingReport {
 #[derive(Clone, Debug)]
 pub struct SmoothingSpline<S: Space, P: Point<S>> {
     spline: CubicSpline<S, P>,
-    inverse: Vec<f64>,
+    noise: Vec<Noise>,
     ends: engine::Ends,
+}
+
+/// The report and the uncertainty of the curve in one factor.
+#[derive(Clone, Debug)]
+struct Noise {
+    inverse: Vec<f64>,
     between: f64,
     report: SmoothingReport,
 }
@@ -370,22 +441,26 @@ impl<S: Space, P: Point<S>> SmoothingSpline<S, P> {
         self.spline
     }
 
-    /// Report of a smoothing fit.
-    pub fn smoothing_report(&self) -> &SmoothingReport {
-        &self.report
+    /// Report of a smoothing fit, in each factor of a product.
+    pub fn smoothing_report(&self) -> S::PerFactor<SmoothingReport> {
+        S::per_factor(self.noise.iter().map(|noise| noise.report).collect())
     }
 
-    /// The standard deviation of the curve at a time, in one coordinate of an orthonormal frame. Beyond the knots it is
-    /// that of a curve that continues with constant velocity, or periodically. On a sphere and for rotations it is in
-    /// radians. It is NaN if there are too few data to estimate the noise: then pass [`Smoothing::sigma`].
+    /// The standard deviation of the curve at a time, in one coordinate of an orthonormal frame, in each factor of a
+    /// product. Beyond the knots it is that of a curve that continues with constant velocity, or periodically. On a sphere
+    /// and for rotations it is in radians. It is NaN if there are too few data to estimate the noise: then pass
+    /// [`Smoothing::sigma`].
     ///
     /// # Panics
     /// If the time is NaN or infinite.
     #[track_caller]
-    pub fn std(&self, time: f64) -> f64 {
+    pub fn std(&self, time: f64) -> S::PerFactor<f64> {
         assert!(time.is_finite(), "the time is {time}, but times must be finite");
         let knots = self.spline.times();
-        let variance = engine::variance(knots, &self.inverse, self.between, self.ends, &[time], 0);
-        self.report.sigma * variance[0].sqrt()
+        let std = |Noise { inverse, between, report }: &Noise| {
+            let variance = engine::variance(knots, inverse, *between, self.ends, &[time], 0);
+            report.sigma * variance[0].sqrt()
+        };
+        S::per_factor(self.noise.iter().map(std).collect())
     }
 }

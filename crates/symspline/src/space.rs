@@ -8,8 +8,58 @@ use std::sync::Arc;
 use symspline_engine::space::{Ambient, Kernels, Origin};
 use symspline_engine::spaces as engine;
 
-/// A curved space. [`Point`](crate::Point) lists the types of its points.
+/// A curved space, or a product of curved spaces. [`Point`](crate::Point) lists the types of its points.
+///
+/// A tuple of spaces is their product: points of `(So3, Euclidean<3>)` are tuples of a rotation and a vector. Each factor
+/// has a curve of its own, at common times, and squared distances add. [`Product`](crate::Product) has any number of
+/// factors of one type.
 pub trait Space: Clone + fmt::Debug + Send + Sync + 'static {
+    /// One value per factor: an array for a tuple of spaces, a `Vec` for a [`Product`](crate::Product), and `T` itself
+    /// for a space that is not a product.
+    type PerFactor<T>;
+
+    /// The factors, of which a space that is not a product is the only one.
+    #[doc(hidden)]
+    fn factors(&self) -> Vec<&dyn Factor>;
+
+    #[doc(hidden)]
+    fn per_factor<T>(values: Vec<T>) -> Self::PerFactor<T>;
+}
+
+impl<S: Factor + Clone> Space for S {
+    type PerFactor<T> = T;
+
+    fn factors(&self) -> Vec<&dyn Factor> {
+        vec![self]
+    }
+    fn per_factor<T>(mut values: Vec<T>) -> T {
+        values.swap_remove(0)
+    }
+}
+
+/// A space that is not a product. It can be a factor of one, in which products do not nest:
+///
+/// ```
+/// use symspline::{Space, prelude::*};
+///
+/// fn count(space: impl Space) -> usize {
+///     space.factors().len()
+/// }
+/// assert_eq!(count((So3, Euclidean::<3>, Sphere::<3>)), 3);
+/// ```
+///
+/// ```compile_fail,E0277
+/// # use symspline::{Space, prelude::*};
+/// # fn count(space: impl Space) -> usize {
+/// #     space.factors().len()
+/// # }
+/// count(((So3, Euclidean::<3>), Sphere::<3>));
+/// ```
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is not a space, or is a product, which cannot be a factor",
+    note = "a product lists all of its factors: `(A, B, C)`, not `((A, B), C)`"
+)]
+pub trait Factor: fmt::Debug + Send + Sync + 'static {
     /// The operations of the space.
     ///
     /// # Errors
@@ -97,7 +147,7 @@ pub struct PositiveDefinite<const N: usize>;
 pub struct Grassmannian<const K: usize, const N: usize>;
 
 #[cfg(feature = "vectors")]
-impl<const N: usize> Space for Euclidean<N> {
+impl<const N: usize> Factor for Euclidean<N> {
     fn table(&self) -> Result<Table, Error> {
         named("euclidean", &[N])
     }
@@ -105,21 +155,21 @@ impl<const N: usize> Space for Euclidean<N> {
 
 // The name contains the dimension of the space, one less than the number of entries. Dimension 0 is an error.
 #[cfg(feature = "vectors")]
-impl<const N: usize> Space for Sphere<N> {
+impl<const N: usize> Factor for Sphere<N> {
     fn table(&self) -> Result<Table, Error> {
         named("sphere", &[N.saturating_sub(1)])
     }
 }
 
 #[cfg(feature = "vectors")]
-impl<const N: usize> Space for Hyperbolic<N> {
+impl<const N: usize> Factor for Hyperbolic<N> {
     fn table(&self) -> Result<Table, Error> {
         named("hyperbolic", &[N.saturating_sub(1)])
     }
 }
 
 #[cfg(feature = "rotations")]
-impl Space for So3 {
+impl Factor for So3 {
     fn table(&self) -> Result<Table, Error> {
         named("so", &[3])
     }
@@ -132,7 +182,7 @@ impl Space for So3 {
 }
 
 #[cfg(feature = "rotations")]
-impl Space for Se3 {
+impl Factor for Se3 {
     fn table(&self) -> Result<Table, Error> {
         named("se", &[3])
     }
@@ -151,14 +201,14 @@ fn first(x: &[f64]) -> [f64; 3] {
 }
 
 #[cfg(feature = "positive-definite")]
-impl<const N: usize> Space for PositiveDefinite<N> {
+impl<const N: usize> Factor for PositiveDefinite<N> {
     fn table(&self) -> Result<Table, Error> {
         named("spd", &[N])
     }
 }
 
 #[cfg(feature = "subspaces")]
-impl<const K: usize, const N: usize> Space for Grassmannian<K, N> {
+impl<const K: usize, const N: usize> Factor for Grassmannian<K, N> {
     fn table(&self) -> Result<Table, Error> {
         named("gr", &[K, N])
     }
@@ -231,7 +281,7 @@ impl PartialEq for AnySpace {
     }
 }
 
-impl Space for AnySpace {
+impl Factor for AnySpace {
     fn table(&self) -> Result<Table, Error> {
         Ok(self.0.table())
     }

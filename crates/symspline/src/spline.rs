@@ -8,9 +8,10 @@ use crate::point::Point;
 use crate::space::BodyFrame;
 use crate::space::Space;
 use symspline_engine::curve::Quantity;
-use symspline_engine::fit;
+use symspline_engine::fit::{self, Solver};
 
-/// Report of a fit. For a curve that was read from a file, residual and longest step are NaN.
+/// Report of a fit. For a curve that was read from a file, residual and longest step are NaN. For a product, iterations,
+/// residual and solver are the worst of the factors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Report {
@@ -31,13 +32,15 @@ impl Report {
         Report { iterations: 0, residual: f64::NAN, max_step: f64::NAN, solver: "none" }
     }
 
-    pub(crate) fn new(report: &fit::Report) -> Self {
-        Report {
-            iterations: report.iterations,
-            residual: report.residual,
-            max_step: report.max_step,
-            solver: name_of(report.solver),
+    /// The worst of the reports in each factor, with the longest step in the product.
+    pub(crate) fn new<'a>(factors: impl IntoIterator<Item = &'a fit::Report>, max_step: f64) -> Self {
+        let (mut iterations, mut residual, mut solver) = (0, 0.0_f64, Solver::FixedPoint);
+        for report in factors {
+            iterations = iterations.max(report.iterations);
+            residual = residual.max(report.residual);
+            solver = if report.solver as u8 > solver as u8 { report.solver } else { solver };
         }
+        Report { iterations, residual, max_step, solver: name_of(solver) }
     }
 }
 
@@ -48,7 +51,7 @@ impl<S: Space, P: Point<S>> Builder<S, P> {
     /// If the input is invalid, if points are too far apart for a curve, or if the solver does not converge.
     pub fn fit(&self, times: &[f64], points: &[P]) -> Result<CubicSpline<S, P>, Error> {
         let (curves, reports) = Curves::fit(self, &[times], &[points], false)?;
-        Ok(CubicSpline { curves, report: Report::new(&reports[0]) })
+        Ok(CubicSpline { curves, report: reports[0] })
     }
 }
 
@@ -151,7 +154,8 @@ impl<S: Space, P: Point<S>> CubicSpline<S, P> {
     /// # Errors
     /// [`Error::OutsideDomain`] if the time is NaN or infinite, or outside the knots without [`Builder::extrapolate`].
     pub fn try_at(&self, time: f64) -> Result<P, Error> {
-        Ok(P::read(&self.curves.evaluate(&[time], Quantity::Point)?))
+        let rows = self.curves.evaluate(&[time], Quantity::Point)?;
+        Ok(P::read_rows(&rows.iter().map(|row| &row[..]).collect::<Vec<_>>()))
     }
 
     /// The velocity at a time, a tangent vector at the point. For rotations and poses it is that of the body frame.
@@ -178,7 +182,7 @@ impl<S: Space, P: Point<S>> CubicSpline<S, P> {
     /// As [`at`](CubicSpline::at).
     #[track_caller]
     pub fn speed(&self, time: f64) -> f64 {
-        expect(self.curves.evaluate(&[time], Quantity::Speed))[0]
+        expect(self.curves.evaluate(&[time], Quantity::Speed))[0][0]
     }
 
     /// Points at many times, on all cores. Quaternions are aligned: neighbours have the same sign.

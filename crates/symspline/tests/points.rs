@@ -2,7 +2,7 @@
 
 use mint::{ColumnMatrix3, ColumnMatrix4, RowMatrix3, RowMatrix4};
 use nalgebra::{Isometry3, Matrix3, Matrix4, Rotation3, Translation3, UnitQuaternion, UnitVector3, Vector3};
-use symspline::{Point, Space, prelude::*};
+use symspline::{Point, Row, Space, prelude::*};
 
 const T: [f64; 5] = [0.0, 0.3, 1.0, 1.1, 2.0];
 const AT: [f64; 4] = [0.05, 0.3, 0.77, 1.9];
@@ -24,11 +24,10 @@ fn poses() -> [Isometry3<f64>; 5] {
 }
 
 /// Numbers of points and of velocities at some times.
-fn numbers<S: Space, P: Point<S>>(space: S, points: &[P]) -> [Vec<Vec<f64>>; 2]
+fn numbers<S: Space, P: Point<S> + Row>(space: S, points: &[P]) -> [Vec<Vec<f64>>; 2]
 where
-    P::Tangent: symspline::Row,
+    P::Tangent: Row,
 {
-    use symspline::Row;
     let spline = CubicSpline::new(space, &T, points).expect("it is a curve");
     let row = |write: &dyn Fn(&mut Vec<f64>)| {
         let mut row = Vec::new();
