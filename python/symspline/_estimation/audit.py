@@ -37,8 +37,8 @@ def audit(setup: Setup, found: Solution) -> float:
         Ratio of all residuals to their standard deviations, hardly affected by outliers under a robust loss.
     """
     sensors = examined(setup, found)
-    failed = [own for own in sensors if own.finding.failed]
-    complaints = [described(own) for own in failed] + _of_priors(setup, found)
+    failed = [sensor for sensor in sensors if sensor.finding.failed]
+    complaints = [described(sensor) for sensor in failed] + _of_priors(setup, found)
     if complaints:
         remedies = unit_hints(setup.terms) or advice(failed)
         warn(
@@ -46,7 +46,7 @@ def audit(setup: Setup, found: Solution) -> float:
             f"be wrong. {' '.join([*complaints, *remedies])}",
             SmoothingWarning,
         )
-    known = [(own.finding.ratio, own.finding.freedom) for own in sensors if np.isfinite(own.finding.ratio)]
+    known = [(sensor.finding.ratio, sensor.finding.freedom) for sensor in sensors if np.isfinite(sensor.finding.ratio)]
     ratios, freedoms = np.array(known).reshape(-1, 2).T
     freedom = freedoms.sum()
     if found.distance > _DISTANCE:
@@ -167,9 +167,9 @@ def _rates_over_steps(term: RateTerm, points: list[PointTerm]) -> float | None:
     """Return the ratio of the measured rates to those between neighbouring points; None if it is unknown."""
     if not points or not term.body.is_rotation:
         return None
-    times = np.concatenate([own.times for own in points])
+    times = np.concatenate([term.times for term in points])
     order = np.argsort(times, kind="stable")
-    y, t = np.concatenate([own.y for own in points])[order], times[order]
+    y, t = np.concatenate([term.y for term in points])[order], times[order]
     step = np.diff(t)
     used = step > 0
     if not used.any():

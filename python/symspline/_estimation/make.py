@@ -279,9 +279,10 @@ def estimate(
     if not given:
         raise ValidationError("there are no measurements")
     if checked_flag(skipna, "skipna"):
-        given = [measurement_without_missing(own) for own in given]
+        given = [measurement_without_missing(measurement) for measurement in given]
     if penalty is None:
-        penalty = "jerk" if any(isinstance(own, (BodyRates, Velocities)) for own in given) else "acceleration"
+        has_rates = any(isinstance(measurement, (BodyRates, Velocities)) for measurement in given)
+        penalty = "jerk" if has_rates else "acceleration"
     one_of(penalty, "penalty", "acceleration", "jerk")
     if criterion is not None:
         one_of(criterion, "criterion", "gcv", "reml", "cp")

@@ -450,9 +450,9 @@ class Path:
         for share in _SHARES if segments else ():
             problem.limit_bias(share)
             bias = problem.consensus(attitudes)
-            found = [problem.aligned(attitudes.taken(own), bias) for own in segments]
-            counts = np.array([len(own) for own in segments])
-            misfit = float(np.average([own[2] for own in found], weights=counts))
+            found = [problem.aligned(attitudes.taken(segment), bias) for segment in segments]
+            counts = np.array([len(segment) for segment in segments])
+            misfit = float(np.average([result[2] for result in found], weights=counts))
             if misfit < self.misfit:
                 self.bias, self.misfit = found[int(np.argmax(counts))][1], misfit
             if misfit < _BAD:
@@ -508,7 +508,7 @@ def _best_offset(problem: _Problem, attitudes: Attitudes, start: float, low: flo
             return np.inf, offset
         found = [problem.aligned(own.taken(index), bias, more, width) for index in segments]
         counts = np.array([len(index) for index in segments])
-        score, longest = float(np.average([each[2] for each in found], weights=counts)), int(np.argmax(counts))
+        score, longest = float(np.average([result[2] for result in found], weights=counts)), int(np.argmax(counts))
         return score, float(np.clip(offset + found[longest][3], low, high))
 
     score, found = compared(start, 4 * step)

@@ -128,12 +128,13 @@ def _candidates(setup: Setup, part: int, space: Space[Any]) -> list[Callable[[],
 
         def by_vectors() -> Start:
             vectors = [_force_vectors(setup, term) for term in forces]
-            vectors += [(np.repeat(own.times, own.seen.shape[1]), *_rows(own.reference, own.seen)) for own in seen]
+            vectors += [(np.repeat(term.times, term.seen.shape[1]), *_rows(term.reference, term.seen)) for term in seen]
             # The rows of a rotation matrix are the fixed axes in the frame of the body.
-            vectors += [(np.repeat(own.times, 3), *_rows(np.eye(3), body_of(space).matrices(own.y))) for own in points]
+            turned = [(np.repeat(term.times, 3), body_of(space).matrices(term.y)) for term in points]
+            vectors += [(times, *_rows(np.eye(3), matrices)) for times, matrices in turned]
             return _integrated(setup, space, rates[0], vectors)
 
-        several = sum(len(own.attitudes.times) for own in attitudes)
+        several = sum(len(attitude.attitudes.times) for attitude in attitudes)
         found = [aligned] if several else []
         if forces or (seen and several < _FEW) or not several:
             found.insert(0 if several < _FEW else 1, by_vectors)
@@ -231,7 +232,7 @@ def _attitudes(space: Space[Any], points: list[PointTerm], seen: list[DirectionT
     found = [
         _Seen(Attitudes(term.times, body_of(space).matrices(term.y), term.scales), term.time_offset) for term in points
     ]
-    if sum(len(own.attitudes.times) for own in found) >= _FEW:
+    if sum(len(result.attitudes.times) for result in found) >= _FEW:
         return found
     for term in seen:
         profile = np.einsum("nki,nkl->nil", term.reference, term.seen)
@@ -257,10 +258,10 @@ def _with_rates(
     def began(term_offset: str | None) -> float:
         return 0.0 if term_offset is None else float(values[term_offset].start[0])
 
-    names = {own.time_offset for own in attitudes}
     # Of attitudes with different time offsets, use those without an offset, or else the most numerous ones.
-    chosen = None if None in names else max(names, key=lambda one: sum(one == own.time_offset for own in attitudes))
-    own = [each.attitudes for each in attitudes if each.time_offset == chosen]
+    offsets = [attitude.time_offset for attitude in attitudes]
+    chosen = None if None in offsets else max(dict.fromkeys(offsets), key=offsets.count)
+    own = [attitude.attitudes for attitude in attitudes if attitude.time_offset == chosen]
     times = np.concatenate([each.times for each in own]) + began(chosen)
     order = np.argsort(times, kind="stable")
     data = Attitudes(
@@ -367,12 +368,12 @@ def _force_vectors(setup: Setup, term: ForceTerm) -> _Vectors:
     points = [
         own for own in setup.terms if isinstance(own, PointTerm) and own.roots is None and own.parts == [term.parts[1]]
     ]
-    times = np.concatenate([own.times for own in points]) if points else np.empty(0)
+    times = np.concatenate([term.times for term in points]) if points else np.empty(0)
     expected = np.tile(-term.gravity, (len(term.times), 1))
     count = len(np.unique(times))
     if count > 5:
         order = np.argsort(times, kind="stable")
-        y = np.concatenate([own.y for own in points])[order]
+        y = np.concatenate([term.y for term in points])[order]
         with silenced(Warning), np.errstate(all="ignore"):
             path = make_smoothing_spline(
                 times[order], y, "r:3", knots=min(count, 200), penalty="jerk", on_failure="ignore"
@@ -626,7 +627,7 @@ def automatic(
         else:
             if before is not None:
                 sigma, last = (float(own.found.reports[0].sigma) for own in (search, before[2]))
-                at_bound = any(bool(own.at_bound) for own in search.found.reports)
+                at_bound = any(bool(report.at_bound) for report in search.found.reports)
                 few = at_bound or len(now.knots) < _FEW_KNOTS * len(data)
                 in_vain = 0 if sigma < 0.95 * last or few else in_vain + 1
                 misses = _misses(search.found) and in_vain < _IN_VAIN

@@ -248,7 +248,7 @@ class EstimatedSpline(SmoothingSpline[P, Any]):
         return self._inflated(parts, index, x, None, orders, found)
 
     def _made_of(self, radius: float | None = None) -> str:
-        counts = [f"{np.size(own.t)} {type(own).__name__}" for own in self._measurements]
+        counts = [f"{np.size(measurement.t)} {type(measurement).__name__}" for measurement in self._measurements]
         df = " and ".join(f"{own.report.df:.3g}" for own in self._smoothed[:3])
         return ", ".join([*counts, f"{self._times.shape[-1]} knots", f"{df} degrees of freedom"])
 
@@ -257,7 +257,7 @@ class EstimatedSpline(SmoothingSpline[P, Any]):
     def _noise_beside(self, index: tuple[int, ...], x: Doubles) -> UncertaintyBand:
         radii = [own[-1][1] for own in self._radii(index, x)]
         speed = None if is_several(self.space) else self._spread(0, index, x, 1)
-        others = [self._times_of(own) for own in self._measurements if not isinstance(own, Points)]
+        others = [self._times_of(sensor) for sensor in self._measurements if not isinstance(sensor, Points)]
         times, points = zip(*map(self._points_in, range(len(factors_of(self.space)))), strict=True)
         return UncertaintyBand(list(times), list(points), radii, speed, np.concatenate([np.empty(0), *others]))
 
@@ -290,7 +290,7 @@ class EstimatedSpline(SmoothingSpline[P, Any]):
 
     def _panels_below(self, x: Doubles) -> list[SidePanel]:
         panels = super()._panels_below(x)
-        kinds = [type(own).__name__ for own in self._measurements]
+        kinds = [type(measurement).__name__ for measurement in self._measurements]
         for number, (own, kind) in enumerate(zip(self._measurements, kinds, strict=True)):
             if isinstance(own, Points) and not _are_partial(own, factors_of(self.space)[own.factor or 0]):
                 continue
@@ -314,7 +314,7 @@ class EstimatedSpline(SmoothingSpline[P, Any]):
     def _state(self) -> dict[str, Any]:
         posterior: Any = self._smoothed[0].posterior
         return CubicSpline._state(self) | {
-            "noise": [vars(own.report) for own in self._smoothed],
+            "noise": [vars(part.report) for part in self._smoothed],
             "parameters": {name: [own.value.tolist(), own.cov.tolist()] for name, own in self._parameters.items()},
             "matrix": posterior.band,
             "side": posterior.side,

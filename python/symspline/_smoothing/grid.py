@@ -354,7 +354,7 @@ def score_of(rows: Rows, data: Data, criterion: LamCriterion, lam: float) -> flo
 def _some(rows: Rows, data: Data) -> tuple[Rows, Data]:
     """Return as many rows as the choice of λ needs."""
     every = -(-int(rows.counts.sum()) // _NODES)
-    return rows.take(slice(None, None, every)), Data(*(own[::every] for own in data))
+    return rows.take(slice(None, None, every)), Data(*(rows[::every] for rows in data))
 
 
 def _cube(rows: Rows) -> float:
@@ -806,7 +806,7 @@ class SmoothingGridReport(GridReport):
 
     def _per_axis(self, value: Callable[[SmoothedAxis, int], float]) -> PerAxis:
         dims = [space.dim for space in smoothed_spaces(self._space)]
-        of_parts = [[value(own, dim) for own in part.axes] for part, dim in zip(self._smoothed, dims, strict=True)]
+        of_parts = [[value(axis, dim) for axis in part.axes] for part, dim in zip(self._smoothed, dims, strict=True)]
         each = zip(*of_parts, strict=True)
         return tuple(values if is_several(self._space) else values[0] for values in each)
 
@@ -961,7 +961,7 @@ class SmoothingGrid(GridSpline[P], Generic[P]):
     def _state(self) -> dict[str, Any]:
         state = super()._state()
         state["noise"] = [
-            {"axes": [vars(own) for own in part.axes], "df": part.df, "sigma": part.sigma} for part in self._smoothed
+            {"axes": [vars(axis) for axis in part.axes], "df": part.df, "sigma": part.sigma} for part in self._smoothed
         ]
         state["data_weights"] = self._weights
         state |= {"data" + suffix_of(self._space, i): own for i, own in enumerate(self._data)}

@@ -322,7 +322,7 @@ def make_smoothing_spline(
     with missing_named(data):
         noisy, of_factors, chosen, faults = valid_curves(whole, data, of_factors, space, mask, strict)
     if chosen is not None:
-        lams = [own[chosen] for own in lams]
+        lams = [lam[chosen] for lam in lams]
     parts = parts_of(noisy, space, lams, of_factors)
     every = knots_for(whole, knots)
     if knots is None and penalty == "jerk":
@@ -353,7 +353,7 @@ def make_smoothing_spline(
     elif knots is None:
         found, at = with_enough_knots(every, noisy, parts, run, df_of_part, penalty)
         # Knots in gaps are tried before a larger λ, which would affect the whole curve.
-        if NO_CURVE in np.concatenate([own.states for own in found]):
+        if NO_CURVE in np.concatenate([result.states for result in found]):
             at = in_gaps(at, whole)
             found = run(at, raise_lam=True)
     else:
@@ -364,8 +364,8 @@ def make_smoothing_spline(
     if chosen is not None:
         # Points of masked curves are NaN.
         spread = partial(in_batch, batch, chosen)
-        good, found = spread(good.ravel()[chosen]), [own.map(spread) for own in found]
-        whole = whole._replace(points=[spread(own) for own in noisy.points])
+        good, found = spread(good.ravel()[chosen]), [result.map(spread) for result in found]
+        whole = whole._replace(points=[spread(rows) for rows in noisy.points])
         parts = [part.map(spread, noise) for part, noise in zip(parts, whole.noise, strict=True)]
     spline, fitted = _spline_through(whole, space, parts, found, at, good, bc_type, policy)
     faults += [fault if chosen is None else fault._replace(curve=int(chosen[fault.curve])) for fault in failed]
@@ -415,7 +415,7 @@ def _spline_through(
         conditions.append(_joined(factor, ends))
     mask = None if good.all() else good
     fitted = fit(Problem(space, at.times, points, conditions, DEFAULTS, check=False, mask=mask))
-    noise = [own._replace(sigma=np.empty(0)) for own in whole.noise]
+    noise = [noise._replace(sigma=np.empty(0)) for noise in whole.noise]
     noisy, kept = whole._replace(noise=noise), _conditions(bc_type, conditions, space)
     made = whole.time_axis, at.t, fitted.curve, kept, policy, fitted.reports(), noisy, results
     return SmoothingSpline._of(*made), fitted
@@ -534,7 +534,7 @@ def _joined(space: Space, ends: list[list[End] | None]) -> list[End] | None:
     if ends[0] is None or len(ends) == 1 or ends[0] is NATURAL:
         return ends[0]
     joined: list[End] = []
-    for each in zip(*[own or [] for own in ends], strict=True):
+    for each in zip(*[end or [] for end in ends], strict=True):
         pairs = zip(parts_of_factor(space), each, strict=True)
         rows = [part._numbers(vector) for part, (_, vector) in pairs if vector is not None]
         vector = np.ascontiguousarray(space._as_doubles(join(space, rows, 0.0))) if rows else None

@@ -464,18 +464,18 @@ class SmoothingData(NamedTuple):
     @property
     def used(self) -> NDArray[np.bool_]:
         """Which data have a nonzero weight in some factor, shape (N,) or (..., N)."""
-        return reduce(np.logical_or, [own.weights > 0 for own in self.noise])
+        return reduce(np.logical_or, [noise.weights > 0 for noise in self.noise])
 
     def map(self, function: Callable[[Any], Any], batch: tuple[int, ...]) -> SmoothingData:
         """Apply a function to the arrays that have batch axes, such as the selection of some curves."""
         t, times = (x if x.ndim == 1 else function(x) for x in (self.t, self.times))
-        points, noise = [function(own) for own in self.points], [own.map(function) for own in self.noise]
+        points, noise = [function(rows) for rows in self.points], [noise.map(function) for noise in self.noise]
         return self._replace(t=t, times=times, points=points, noise=noise, batch=batch)
 
     def rows(self, index: NDArray[np.intp]) -> SmoothingData:
         """Return some of the data of each curve."""
-        points = [np.take(own, index, axis=len(self.batch)) for own in self.points]
-        noise = [own.rows(index) for own in self.noise]
+        points = [np.take(rows, index, axis=len(self.batch)) for rows in self.points]
+        noise = [noise.rows(index) for noise in self.noise]
         return self._replace(t=self.t[..., index], times=self.times[..., index], points=points, noise=noise)
 
 
@@ -591,7 +591,7 @@ def valid_curves(
     # Only points are checked here. Times may repeat, knots need not be times of the data, and the ends of a closed
     # curve are noisy and differ.
     plain = np.arange(data[0].nodes, dtype=np.float64)
-    points, faults = validated(space, plain, data, [own or NATURAL for own in ends], skip, mask)
+    points, faults = validated(space, plain, data, [end or NATURAL for end in ends], skip, mask)
     noisy = noisy._replace(points=points)
     kept = np.ones(batch, bool) if mask is None else mask.copy()
     kept.flat[[fault.curve for fault in faults]] = False
@@ -610,8 +610,8 @@ def valid_curves(
         return np.ascontiguousarray(array.reshape(-1, *array.shape[len(batch) :])[chosen])
 
     noisy = noisy.map(rows, (len(chosen),))
-    noisy = noisy._replace(noise=[own._replace(sigma=own.sigma[chosen]) for own in noisy.noise])
-    return noisy, [map_ends(own, rows) for own in ends], chosen, faults
+    noisy = noisy._replace(noise=[noise._replace(sigma=noise.sigma[chosen]) for noise in noisy.noise])
+    return noisy, [map_ends(end, rows) for end in ends], chosen, faults
 
 
 def _without_missing(part: Points, weights: list[Doubles]) -> Points:

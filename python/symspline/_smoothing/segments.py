@@ -255,7 +255,7 @@ def check_smooth(smooth: Any, duplicates: str, options: dict[str, Any]) -> None:
 def _used(weight_options: dict[str, Any], points: Any, space: Space) -> NDArray[np.bool_]:
     """Return which points have a nonzero weight."""
     found = read_precision(**weight_options, space=space, data=read_given(points, space))
-    return np.asarray(np.any([own.weights > 0 for own in found], axis=0))
+    return np.asarray(np.any([result.weights > 0 for result in found], axis=0))
 
 
 def _of_rows(value: Any, rows: NDArray[np.intp]) -> Any:
@@ -345,10 +345,13 @@ def cut(
         if np.count_nonzero(new[a:b]) >= least
     ]
     curves = [
-        (Moments(moments[own], zone), tuple(a[own] for a in arrays) if isinstance(space, Product) else arrays[0][own])
-        for own in segments
+        (
+            Moments(moments[segment], zone),
+            tuple(a[segment] for a in arrays) if isinstance(space, Product) else arrays[0][segment],
+        )
+        for segment in segments
     ]
-    return Cut(curves, [rows[own] for own in segments], np.diff(seconds), gap)
+    return Cut(curves, [rows[segment] for segment in segments], np.diff(seconds), gap)
 
 
 def _opposite(space: Space, arrays: list[Array]) -> NDArray[np.bool_]:

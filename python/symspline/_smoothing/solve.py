@@ -182,7 +182,7 @@ def merge_close_knots(knots: Knots, noisy: SmoothingData, lam: float | None, pow
         return knots
     span = times[..., -1] - times[..., 0]
     mean = span / (times.shape[-1] - 1)
-    weight = float(max([np.max(np.mean(own.weights, axis=-1)) for own in noisy.noise]))
+    weight = float(max([np.max(np.mean(noise.weights, axis=-1)) for noise in noisy.noise]))
     # Units of the mean distance prevent overflow.
     ratio = 1.0 if lam is None else lam / weight
     for _ in range(0 if lam is None else power):
@@ -247,7 +247,8 @@ def with_enough_knots(
             if not np.array_equal(fewer.times, at.times) and fewer.times.shape[-1] <= count:
                 at = fewer
                 continue
-        lams, dfs = np.array([(own.smoothed.report.lam, own.smoothed.report.df) for own in found]).swapaxes(0, 1)
+        reports = [result.smoothed.report for result in found]
+        lams, dfs = np.array([(report.lam, report.df) for report in reports]).swapaxes(0, 1)
         apart = merge_close_knots(whole, noisy, _of_all(lams), power, coarser)
         most, enough = apart.times.shape[-1], _n_knots_for_df(dfs)
         if tries == _TRIES - 1 or (count >= most > 0.8 * count and count > 0.8 * min(enough, most)):

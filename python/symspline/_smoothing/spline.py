@@ -147,14 +147,14 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
     @property
     def report(self) -> R:
         """Report of the smoothing fit, a `SmoothingReport` or a tuple of them."""
-        reports: Any = self._each([found.report for found in self._smoothed])
+        reports: Any = self._each([part.report for part in self._smoothed])
         result: R = reports
         return result
 
     @noise_property
     def lam(self) -> Number | tuple[Number, ...]:
         """Weight λ of the bending energy."""
-        return self._each([found.report.lam for found in self._smoothed])
+        return self._each([part.report.lam for part in self._smoothed])
 
     @noise_property
     def df(self) -> Number | tuple[Number, ...]:
@@ -162,7 +162,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
 
         They are 2 for a geodesic, and the number of data for interpolation.
         """
-        return self._each([found.report.df for found in self._smoothed])
+        return self._each([part.report.df for part in self._smoothed])
 
     @noise_property
     def sigma(self) -> Number | tuple[Number, ...]:
@@ -171,7 +171,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         This is the given value, or else the estimate ``sqrt(sum(weights * distance**2) / (dim * (N - df)))``.
         Coordinates refer to an orthonormal frame.
         """
-        return self._each([found.sigma for found in self._smoothed])
+        return self._each([part.sigma for part in self._smoothed])
 
     @property
     def parameters(self) -> Mapping[str, Parameter]:
@@ -826,13 +826,13 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
 
     @property
     def _unconverged(self) -> int:
-        return int(np.sum(~np.all([np.asarray(found.report.converged) for found in self._smoothed], axis=0)))
+        return int(np.sum(~np.all([np.asarray(part.report.converged) for part in self._smoothed], axis=0)))
 
     def _with(self, time_axis: TimeAxis, t: Array, curve: CurveArrays, index: Any) -> Any:
         part = super()._with(time_axis, t, curve, index)
         pick = itemgetter(index)
         noisy = self._noisy.map(pick, curve.batch)._replace(time_axis=time_axis)
-        return self._like(part, noisy, [found.map(pick) for found in self._smoothed])
+        return self._like(part, noisy, [part.map(pick) for part in self._smoothed])
 
     @property
     def _parts(self) -> tuple[SmoothingSpline[Any, Any], ...]:
