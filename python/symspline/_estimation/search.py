@@ -182,7 +182,7 @@ def _smoothed(
     """Return smoothed points, together with those at which velocities are given."""
     scales = [term.scales for term in points]
     typical = float(np.median(np.concatenate(scales))) if scales else 1.0
-    both = [*points, *beside]
+    both: list[PointTerm | VelocityTerm] = [*points, *beside]
     times, y = np.concatenate([term.times for term in both]), np.concatenate([term.y for term in both])
     sigma = np.concatenate([*scales, *[np.full(len(term.times), _BESIDE * typical) for term in beside]])
     order = np.argsort(times, kind="stable")

@@ -556,7 +556,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
     def _covariance(
         self, number: int, index: tuple[int, ...], x: Any, y: Any, orders: list[int], between: bool
     ) -> Doubles:
-        # With `between`, points and velocities include their variances between the knots.
+        """Return the covariance of one part; `between` adds variances of points and velocities between the knots."""
         part, space, kinds = self._smoothed[number], smoothed_spaces(self.space)[number], end_kinds(self._bc_type)
         whole = self._posterior(part).covariance(space, self._knots_of(index), index, kinds, x, y, orders)
         if between and part.between:
