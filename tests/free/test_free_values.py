@@ -166,6 +166,17 @@ def test_control_points_in_a_product_raise():
         raises("Make one curve for each factor", make, "sphere:2 x r:3")
 
 
+def test_calls_take_the_options_of_all_curves():
+    curve = ss.BezierCurve([[[0.0], [1.0]], [[0.0], [2.0]]], "r:1")
+    assert np.isnan(curve([-1.0, 0.5], extrapolate=False)).ravel().tolist() == [True, False] * 2
+    assert curve([[0.5], [0.25]], per_curve=True).ravel().tolist() == [0.5, 0.5]
+    out = np.empty((2, 1))
+    assert curve(0.5, out=out) is out and out.ravel().tolist() == [0.5, 1.0]
+    assert curve.speed(0.5, dtype="float32").dtype == np.float32
+    assert curve.extrapolate is None
+    raises("extrapolate must be None, 'raise' or False, not True, for a BezierCurve", curve, 0.5, extrapolate=True)
+
+
 def test_times_outside():
     curve = ss.BezierCurve(P, "sphere:2")
     for x, match in [
