@@ -583,18 +583,6 @@ class Tridiagonal:
         x = self.solved(self._right[:, :, None] * differences)
         return x if self._periodic is None else self._periodic.corrected(x)
 
-    def largest_step(self, sizes: Doubles) -> Doubles:
-        """Return the longest step at a knot that residuals of these sizes can cause, per curve.
-
-        Open curves have a matrix with positive pivots and positive entries, whose inverse therefore has alternating
-        signs: it is an M-matrix but for the signs of every other row and column. Closed curves have a matrix that is
-        dominant by ``weight`` in every row, since holonomies preserve lengths.
-        """
-        if self._periodic is not None:
-            return np.asarray((self._right * sizes / self.weight).max(axis=1))
-        signs = (-1.0) ** np.arange(sizes.shape[1])
-        return np.asarray(np.abs(self.solved((signs * self._right * sizes)[:, :, None])).max(axis=(1, 2)))
-
     def solved(self, right: Doubles) -> Doubles:
         """The solution without the corners of a closed curve."""
         return solve_tridiagonal(self._rows, np.ascontiguousarray(right))

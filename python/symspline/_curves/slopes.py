@@ -137,7 +137,7 @@ class _Slopes:
     def __init__(self, space: AnySpace, times: Doubles, points: Array, starts: Array, ends: Array) -> None:
         self.space, self.axes = space, len(space.point_shape)
         # The axis of nodes comes first, so that formulas are those of SciPy.
-        self.points, starts, ends = (self._nodes_first(array) for array in (points, starts, ends))
+        self.points, starts, ends = (np.moveaxis(array, -1 - self.axes, 0) for array in (points, starts, ends))
         h = np.moveaxis(np.broadcast_to(np.diff(times), (*points.shape[: -1 - self.axes], len(starts))), -1, 0)
         self.h = wide(h, space)
         n = len(self.points)
@@ -161,7 +161,7 @@ class _Slopes:
         h = self.h
         v = np.empty_like(self.points)
         v[1:-1] = (h[1:] * before[1:-1] + h[:-1] * after[1:-1]) / (h[:-1] + h[1:])
-        v[0], v[-1] = self._parabola_at_ends()
+        v[0], v[-1] = self._end(0)[0], self._end(-1)[0]
         return self._nodes_last(v)
 
     def akima(self) -> Array:
@@ -194,9 +194,6 @@ class _Slopes:
             v[i] = self._limited(end, near, next_, i)
         return self._nodes_last(v)
 
-    def _parabola_at_ends(self) -> tuple[Array, Array]:
-        return self._end(0)[0], self._end(-1)[0]
-
     def _end(self, i: int) -> tuple[Array, Array, Array]:
         """Return the velocity of a parabola at an end, and those of the two nearest segments."""
         near, next_ = (self.m[2, 0], self.m[3, 0]) if i == 0 else (self.m[1, -1], self.m[0, -1])
@@ -223,9 +220,6 @@ class _Slopes:
         if isinstance(self.space, Euclidean):
             return np.sign(v) * np.sign(w)
         return wide(np.asarray(self.space.inner(p, v, w)), self.space)
-
-    def _nodes_first(self, array: Array) -> Array:
-        return np.moveaxis(array, -1 - self.axes, 0)
 
     def _nodes_last(self, array: Array) -> Array:
         return np.ascontiguousarray(np.moveaxis(array, 0, -1 - self.axes))

@@ -250,9 +250,11 @@ class Curve(ABC, Generic[P]):
             a time zone, pass times with any time zone, or ``datetime64`` in UTC; otherwise pass times without one.
         nu : {0, 1, 2, 3}, default 0
             Order of the derivative: 0 for points, 1 for the velocity γ', 2 for the covariant acceleration ∇γ', 3 for
-            the covariant jerk ∇∇γ'. The jerk jumps at knots, where it is that of the segment after the knot.
+            the covariant jerk ∇∇γ'. The jerk jumps at knots, where it is that of the segment after the knot. B-splines
+            have no jerk.
         extrapolate : {None, "raise", True, False, "geodesic", "periodic"}, default None
-            Extrapolation policy for this call. None means the policy of the curve.
+            Extrapolation policy for this call. None means the policy of the curve. B-splines and curves that are made
+            of others have None, ``"raise"`` and False only.
         per_curve : bool, default False
             True if every curve of a batch has its own times. The leading axes of x are then the batch axes.
         dtype : {"float32", "float64"}, optional
