@@ -41,8 +41,7 @@ from ._base.time import knots_of
 from ._base.typing import Extrapolate, Frame, RateInterpolation, RotationOrder, TimesLike
 from ._core import ValidationError
 from ._curves.composed import Joined, Retimed, evaluated
-from ._curves.controlled import ControlledCurve
-from ._curves.curve import CurveArrays
+from ._curves.curve import ControlledCurve, CurveArrays
 from ._curves.fit import curve_of
 from ._curves.missing import missing_times, recounted, refuse_nan_times
 from ._estimation.rates import integrated

@@ -50,8 +50,7 @@ from .._curves.composed import (
     part_of_times,
     smooth_parts,
 )
-from .._curves.controlled import ControlledCurve
-from .._curves.curve import SidePanel, UncertaintyBand
+from .._curves.curve import ControlledCurve, SidePanel, UncertaintyBand
 from .._curves.options import (
     EvaluationOptions,
     check_progress,

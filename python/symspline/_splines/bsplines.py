@@ -14,7 +14,7 @@ from .._base.faults import UNCONVERGED, Fault, between_neighbours, renamed
 from .._base.report import CumulativeReport
 from .._base.typing import OnFailure, P, PointsLike
 from .._core import CutLocusError, ValidationError
-from .._curves.controlled import ControlledCurve
+from .._curves.curve import ControlledCurve
 from .._curves.ends import ends_of
 from .._curves.failures import raise_or_warn, warn_of_far_data
 from .._curves.fit import Points, read_given, unwrapped, validated
