@@ -10,7 +10,7 @@ from hurdat import Storm
 from numpy.typing import NDArray
 
 from symspline import CubicSpline, Sphere, fit_many
-from symspline._splines.jumps import Segments, pairs, segments_of
+from symspline._splines.functional import Segments, pairs, segments_of
 from symspline.geo import compass, from_lonlat, to_lonlat
 
 Array = NDArray[np.float64]

@@ -44,14 +44,13 @@ from ._grid import GridReport, GridSpline
 from ._smoothing import *  # noqa: F403
 from ._smoothing.segments import fit_segments
 from ._spaces import *  # noqa: F403
-from ._splines.base import Curve, Derivative
+from ._splines.base import Curve, Derivative, plot
 from ._splines.bsplines import BezierCurve, BSpline, CumulativeBSpline
-from ._splines.compare import plot
 from ._splines.composed import RetimedCurve, SegmentedCurve
 from ._splines.cubic import CubicSpline
 from ._splines.files import load, save
 from ._splines.functional import evaluate, fit, fit_many
-from ._splines.hermite import HermiteSpline, PiecewiseGeodesic
+from ._splines.piecewise import HermiteSpline, PiecewiseGeodesic
 from ._splines.time_law import TimeLaw, time_law
 from ._statistics import TangentPCA, tangent_pca
 from .manifolds import Manifold, Stiefel

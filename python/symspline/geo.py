@@ -32,8 +32,7 @@ from ._curves.options import require_matplotlib
 from ._estimation.uncertainty import Jacobians, Motion, check_uncertain, standard_errors
 from ._smoothing.segments import check_smooth, cut, smooth_many
 from ._spaces import Sphere
-from ._splines.base import check_timed
-from ._splines.compare import checked_items
+from ._splines.base import check_timed, checked_items
 from ._splines.composed import SegmentedCurve
 from ._splines.cubic import CubicSpline
 from ._splines.functional import fit_many

@@ -41,8 +41,7 @@ from ._base.time import knots_of
 from ._base.typing import Extrapolate, Frame, RateInterpolation, RotationOrder, TimesLike
 from ._core import ValidationError
 from ._curves.composed import Joined, Retimed, evaluated
-from ._curves.controlled import CumulativeCurve
-from ._curves.curve import CurveArrays
+from ._curves.curve import ControlledCurve, CurveArrays
 from ._curves.fit import curve_of
 from ._curves.missing import missing_times, recounted, refuse_nan_times
 from ._estimation.rates import integrated
@@ -53,7 +52,7 @@ from ._spaces.finite_groups import elements, proper_symbol
 from ._splines.base import check_timed
 from ._splines.bsplines import CumulativeBSpline
 from ._splines.cubic import CubicSpline
-from ._splines.hermite import HermiteSpline
+from ._splines.piecewise import HermiteSpline
 from .convert._quaternions import checked_order, converted, matrix_to_quaternion, quaternion_form, quaternion_to_matrix
 
 if TYPE_CHECKING:
@@ -433,7 +432,7 @@ def _rotations_of(curve: Any) -> Any:
         return curve
     if isinstance(curve, (Joined, Retimed)):
         return curve.map(_rotations_of)
-    if isinstance(curve, CumulativeCurve):
+    if isinstance(curve, ControlledCurve):
         return curve.with_control_points(_SO3, curve.control_points[..., :3, :3])
     if curve not in _ATTITUDES:
         # The rotation of a screw motion is a geodesic of SO(3), and so the control points are those of its curve.
@@ -482,7 +481,7 @@ def _lift(curve: Any) -> Any:
         return curve.map(_lift)
     if isinstance(curve, Joined):
         return _without_jumps(curve.map(_lift))
-    if isinstance(curve, CumulativeCurve):
+    if isinstance(curve, ControlledCurve):
         raise TypeError(
             "spline must be a curve of cubic segments, such as a symspline.CubicSpline, not a cumulative B-spline. Use "
             "rotations.as_quaternions of its points; their signs are not continuous."

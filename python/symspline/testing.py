@@ -21,7 +21,7 @@ from ._base.arrays import checked_number, whole_number
 from ._core import ConvergenceError, CutLocusError, ValidationError
 from ._spaces import AnySpace, Array, Doubles, Product, Space, space_named
 from ._splines.cubic import CubicSpline
-from ._splines.jumps import segments_of
+from ._splines.functional import segments_of
 from .manifolds import Manifold
 
 __all__ = ["Conformance", "check"]

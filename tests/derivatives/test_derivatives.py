@@ -156,7 +156,7 @@ def test_products_and_dates():
 def test_invalid_arguments_of_derivatives_raise():
     spline = ss.CubicSpline(None, walk(ss.Sphere(2), 0.5, 4, np.random.default_rng(12)), "sphere:2")
     for change, match in [
-        ({"x": 9.0}, r"x\[0\] = 9.0 is outside the knots \[0.0, 3.0\]"),
+        ({"x": 9.0}, r"x = 9.0 is outside the domain \[0.0, 3.0\] of the curve"),
         ({"nu": 3}, "nu must be 0, 1 or 2"),
         ({"points": np.zeros((3, 3))}, r"points has shape \(3, 3\), but \(4, 3\) is needed"),
         ({"t": [1.0]}, r"t has shape \(1,\), but \(4,\) is needed"),

@@ -106,8 +106,8 @@ def test_invalid_knots_and_degrees_raise():
         (CLAMPED[1:], 2, r"3 control points of degree 2 need 6 knots, got 5"),
         ([], 2, r"need 6 knots, got 0"),
         ([0, 0, 0, 1, 0.5, 1], 2, r"knots\[4\] = 0\.5 is before knots\[3\]"),
-        ([0, 0, NAN, 1, 1, 1], 2, r"knots\[2\] is not finite"),
-        ([0, 0, 0, 1, 1, INF], 2, r"knots\[5\] is not finite"),
+        ([0, 0, NAN, 1, 1, 1], 2, r"knots\[2\] = nan is not finite"),
+        ([0, 0, 0, 1, 1, INF], 2, r"knots\[5\] = inf is not finite"),
         ([CLAMPED, CLAMPED], 2, r"knots must be a one-dimensional array of real numbers, not int64 of shape \(2, 6\)"),
         ([0, 0, 0, 1, 1, 1j], 2, r"knots must be a one-dimensional array of real numbers, not complex128"),
         (list("aaabbb"), 2, r"knots must be a one-dimensional array of real numbers, not <U1"),
@@ -166,6 +166,17 @@ def test_control_points_in_a_product_raise():
         raises("Make one curve for each factor", make, "sphere:2 x r:3")
 
 
+def test_calls_take_the_options_of_all_curves():
+    curve = ss.BezierCurve([[[0.0], [1.0]], [[0.0], [2.0]]], "r:1")
+    assert np.isnan(curve([-1.0, 0.5], extrapolate=False)).ravel().tolist() == [True, False] * 2
+    assert curve([[0.5], [0.25]], per_curve=True).ravel().tolist() == [0.5, 0.5]
+    out = np.empty((2, 1))
+    assert curve(0.5, out=out) is out and out.ravel().tolist() == [0.5, 1.0]
+    assert curve.speed(0.5, dtype="float32").dtype == np.float32
+    assert curve.extrapolate is None
+    raises("extrapolate must be None, 'raise' or False, not True, for a BezierCurve", curve, 0.5, extrapolate=True)
+
+
 def test_times_outside():
     curve = ss.BezierCurve(P, "sphere:2")
     for x, match in [
@@ -174,10 +185,10 @@ def test_times_outside():
         (1 + 2**-48, r"x = 1\.0000000000000036 is outside"),
         (NAN, r"x = nan is not finite"),
         ([[0, 1], [INF, 0]], r"x\[1, 0\] = inf is not finite"),
-        ("a", r"x must be real numbers, not <U1"),
+        ("a", r"x is 'a', not a date"),
         (None, r"x must be an array of numbers, not of object: it is a NoneType"),
-        (1j, r"x must be real numbers, not complex128"),
-        (np.datetime64("2020-01-01"), r"x must be real numbers, not datetime64"),
+        (1j, r"the knots are numbers, so x must be numbers, not complex128"),
+        (np.datetime64("2020-01-01"), r"the knots are numbers, so x must be numbers, not datetime64"),
     ]:
         for call in (curve, curve.speed):
             raises(match, call, x)

@@ -12,7 +12,7 @@ from scipy.interpolate import CubicSpline as FlatSpline
 from stored import restored
 
 import symspline as ss
-from symspline._splines.jumps import segments_of
+from symspline._splines.functional import segments_of
 from symspline.cli._check import _measure
 
 T = np.array([0.0, 0.4, 1.5, 2.0, 2.2, 3.1, 4.5, 5.0, 5.3])

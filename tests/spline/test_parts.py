@@ -63,7 +63,7 @@ def test_batches_with_their_own_knots(rng):
 
 def test_invalid_times_of_parts_raise(rng):
     curve = ss.CubicSpline(None, rng.standard_normal((5, 2)), "r:2")
-    raises(r"b = 9\.0 is outside the knots", curve.restrict, 0, 9)
+    raises(r"b = 9\.0 is outside the domain", curve.restrict, 0, 9)
     raises("b must be after a", curve.restrict, 3, 3)
     raises("a must be a single time", curve.restrict, [0, 1])
     raises("dt must be a finite number", curve.shift, np.inf)

@@ -102,7 +102,7 @@ def test_batches_products_and_large_spaces(rng):
 def test_invalid_vectors_to_transport_raise():
     spline = ss.CubicSpline(None, np.eye(3), "sphere:2", extrapolate="geodesic")
     for x0, x1, v, match in [
-        (0, 2.5, [0, 1.0, 0], r"x\[1\] = 2.5 is outside the knots"),
+        (0, 2.5, [0, 1.0, 0], r"x\[1\] = 2.5 is outside the domain"),
         (-1, 1, [0, 1.0, 0], "vectors are transported between the first"),
         (0, [1, 2], [0, 1.0, 0], "x0 and x1 must be single times"),
         (0, 1, ["a", "b", "c"], "v must be an array of real numbers"),

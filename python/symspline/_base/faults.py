@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
+from .exceptions import SymsplineError
 from .report import Columns
 
 _SUIT = "choose times that suit the distances"
@@ -167,6 +169,41 @@ def from_core(
 
 def _length(x: Any) -> str:
     return f"{x:.3f}" if x < 1e6 else f"{x:.3e}"
+
+
+# ---- errors about samples, which may have other names in the user's data ----
+
+_Error = TypeVar("_Error", bound=SymsplineError)
+# Samples in messages: `points[3]`, `t[0][3]` of the first curve, `measurements[0].y: point 3`.
+_SAMPLE = re.compile(r"\b(t|points|velocities|omega|measurements\[(\d+)\]\.\w+)(?:\[(\d+)\](?=\[))?(\[|: point )(\d+)")
+
+
+class Sample(NamedTuple):
+    """A sample that an error is about, with the numbers of its measurement and of its curve, if any."""
+
+    argument: str
+    measurement: int | None
+    curve: int | None
+    node: int
+
+
+def renamed(error: _Error, name: Callable[[Sample], tuple[str, int | str]]) -> _Error:
+    """Return an error about the same samples by other names: their argument, and their number or index."""
+
+    def text(match: re.Match[str]) -> str:
+        argument, measurement, curve, opening, node = match.groups()
+        numbers = [None if number is None else int(number) for number in (measurement, curve)]
+        argument, index = name(Sample(argument, numbers[0], numbers[1], int(node)))
+        return f"{argument}{'' if curve is None else f'[{curve}]'}{opening}{index}"
+
+    return error._with_message(_SAMPLE.sub(text, str(error)))
+
+
+def between_neighbours(error: _Error, name: str, lead: Sequence[int]) -> _Error:
+    """Return the error of an operation on rows of pairs as that of neighbouring points, whose array has a name."""
+    row, _, problem = str(error).removeprefix("pair ").partition(": the points ")
+    *curve, i = map(int, np.unravel_index(int(row), lead))
+    return error._with_message(f"{name}[{i}] and {name}[{i + 1}]{of_index(curve)} {problem}")
 
 
 # ---- warnings at the line that called the package ----

@@ -289,11 +289,8 @@ def onto_ends(
     if per_curve and x.shape[: len(batch)] != batch:
         # The evaluation raises an error for this shape.
         return x, per_curve
-    if knots.ndim > 1:
-        first, last = (end.reshape(batch + (1,) * len(axes)) for end in ends)
-        shift = np.reshape(origin, batch + (1,) * len(axes)) if np.ndim(origin) else origin
-    else:
-        (first, last), shift = ends, origin
+    first, last = ends_beside(knots, x, batch, per_curve)
+    shift = np.reshape(origin, batch + (1,) * len(axes)) if knots.ndim > 1 and np.ndim(origin) else origin
     size = np.maximum(np.abs(first), np.abs(last))
     if shift is not None:
         size = size + np.abs(np.asarray(shift, np.float64))
@@ -306,6 +303,30 @@ def onto_ends(
         return x, per_curve
     moved = np.where(before, first, np.where(behind, last, x))
     return np.asarray(moved, order="C"), per_curve or moved.ndim > x.ndim
+
+
+def ends_beside(times: Doubles, x: Doubles, batch: tuple[int, ...], per_curve: bool) -> tuple[Any, Any]:
+    """Return the first and the last time of the curves, in shapes that broadcast with times x."""
+    first, last = times[..., 0], times[..., -1]
+    if times.ndim == 1:
+        return first, last
+    ones = (1,) * (x.ndim - len(batch) if per_curve else x.ndim)
+    return first.reshape(batch + ones), last.reshape(batch + ones)
+
+
+def refuse_outside(
+    times: Doubles, batch: tuple[int, ...], x: Doubles, per_curve: bool, name: str = "x", remedy: str = ""
+) -> None:
+    """Raise ValidationError unless all times x are finite and in the domain of the curves."""
+    first, last = ends_beside(times, x, batch, per_curve)
+    wrong = ~((x >= first) & (x <= last))
+
+    def say(i: Any) -> str:
+        time, *ends = (np.broadcast_to(values, wrong.shape)[i] for values in (x, first, last))
+        where = f"outside the domain [{ends[0]}, {ends[1]}] of the curve" if np.isfinite(time) else "not finite"
+        return f"= {time} is {where}{remedy}"
+
+    refuse(wrong, name, say)
 
 
 def _difference(array: NDArray[Any], origin: Any) -> NDArray[np.int64]:

@@ -21,7 +21,7 @@ from .._spaces import POINT_TOL, Array, Doubles, Euclidean, Product, Quotient, S
 from .curve import CurveArrays, FactorArrays, share
 from .ends import End, map_ends
 from .fit import Fit, FitProblem, Points, curve_of, fit, moved_ends, read_ends, solve_tasks, validated, validated_tasks
-from .length import alternative_energy
+from .search import alternative_energy
 from .solve import Solved, Task, without
 
 

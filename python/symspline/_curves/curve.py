@@ -1,4 +1,4 @@
-"""Curves as arrays: knots, and points and velocities in each factor of a space. The compiled core evaluates them.
+"""Curves as arrays, which the compiled core evaluates: points and velocities at knots, or control points of B-splines.
 
 `on_manifold` has further classes of curves, for spaces that are made of functions.
 """
@@ -13,10 +13,13 @@ import numpy as np
 
 from .. import _core
 from .._base.arrays import refuse
+from .._base.faults import of_index
+from .._base.time import refuse_outside
 from .._base.typing import Progress
-from .._core import ValidationError
+from .._core import CutLocusError, ValidationError
 from .._spaces import (
     Affine,
+    AnySpace,
     Array,
     Doubles,
     Product,
@@ -24,14 +27,15 @@ from .._spaces import (
     Space,
     SpecialEuclidean,
     Torus,
+    factors_of,
     parts_of,
     product_norm,
 )
+from .._spaces.statistics import TURN, wrap
 from . import derivatives
 from .derivatives import Gradient, SampleTimes, pair_of
 from .ends import ends_in_factors
-from .handles import with_more_knots
-from .reduced import Span, span_of
+from .reduced import Span, reduced, span_of
 
 NORMS = ("speed", "bend")
 # Relative tolerance of integrals along curves whose derivatives are exact.
@@ -72,11 +76,11 @@ def _can_write_into(out: Array, dtype: Any, read: Array) -> bool:
     return apart and out.dtype == dtype and out.flags.c_contiguous and out.flags.aligned
 
 
-def write_into(out: Any, values: Any, space: Space[Any]) -> Any:
+def write_into(out: Any, values: Any, space: AnySpace) -> Any:
     """Write results in each factor into existing arrays, and return these."""
-    for own, array in zip(parts_of(out, space, "out"), parts_of(values, space, "values"), strict=True):
-        _check_out(own, array.shape, array.dtype)
-        np.copyto(own, array, casting="same_kind")
+    for given, array in zip(parts_of(out, space, "out"), parts_of(values, space, "values"), strict=True):
+        _check_out(given, array.shape, array.dtype)
+        np.copyto(given, array, casting="same_kind")
     return out
 
 
@@ -92,7 +96,7 @@ class FactorArrays(NamedTuple):
         Velocities before the knots, for curves with corners.
     """
 
-    space: Space[Any]
+    space: AnySpace
     points: Array
     velocities: Array
     before: Array | None = None
@@ -127,9 +131,7 @@ class CurveArrays:
     # Whether the core evaluates all factors.
     is_compiled: ClassVar[bool] = True
 
-    def __init__(
-        self, space: Space[Any], times: Doubles, factors: tuple[FactorArrays, ...], fitted: bool = True
-    ) -> None:
+    def __init__(self, space: AnySpace, times: Doubles, factors: tuple[FactorArrays, ...], fitted: bool = True) -> None:
         self.space, self.times, self.factors, self.fitted = space, times, factors, fitted
         for factor in factors:
             # Read-only, in less than half the time of an assignment to `flags.writeable`.
@@ -174,8 +176,8 @@ class CurveArrays:
     @cached_property
     def compiled(self) -> _core.Curve:
         """The curves as an object of the core."""
-        each = zip(self.factors, self._spans, strict=True)
-        return _core.Curve([self._core_arrays(factor, span) for factor, span in each])
+        pairs = zip(self.factors, self._spans, strict=True)
+        return _core.Curve([self._core_arrays(factor, span) for factor, span in pairs])
 
     @cached_property
     def _spans(self) -> list[Span | None]:
@@ -267,16 +269,16 @@ class CurveArrays:
         if self.factors[0].before is None:
             return []
         gaps = [~factor.space._where_finite(factor.velocities) for factor in self.factors]
-        return gaps if any(own.any() for own in gaps) else []
+        return gaps if any(missing.any() for missing in gaps) else []
 
     def _write_nodes(self, values: Any, x: Doubles, per_curve: bool) -> None:
         """Write the points at which a segment that is NaN begins."""
         for factor, gaps, points in zip(self.factors, self._gaps, self._by_factor(values), strict=True):
             for curve in np.argwhere(gaps.any(axis=-1)):
                 index = tuple(curve)
-                t, own = self.times[index] if self.times.ndim > 1 else self.times, x[index] if per_curve else x
-                nodes = np.asarray(np.searchsorted(t[:-2], own))
-                at = (t[nodes] == own) & gaps[index][nodes]
+                t, own_times = self.times[index] if self.times.ndim > 1 else self.times, x[index] if per_curve else x
+                nodes = np.asarray(np.searchsorted(t[:-2], own_times))
+                at = (t[nodes] == own_times) & gaps[index][nodes]
                 points[index][at] = factor.points[index][nodes[at]]
 
     def _evaluate_into(
@@ -334,15 +336,18 @@ class CurveArrays:
         given = parts_of(v, self.space, "v")
         if any(span is not None for span in self._spans):
             return self._joined(
-                [part._transport_in_span(times, outside, own) for part, own in zip(self.parts, given, strict=True)]
+                [
+                    part._transport_in_span(times, outside, vector)
+                    for part, vector in zip(self.parts, given, strict=True)
+                ]
             )
         spaces = [factor.space for factor in self.factors]
         vectors = [
-            np.ascontiguousarray(space._as_doubles(np.asarray(own, space.dtype)))
-            for space, own in zip(spaces, given, strict=True)
+            np.ascontiguousarray(space._as_doubles(np.asarray(vector, space.dtype)))
+            for space, vector in zip(spaces, given, strict=True)
         ]
         moved = self.compiled.transport(times, outside, vectors)
-        return self._joined([space._numbers(own) for space, own in zip(spaces, moved, strict=True)])
+        return self._joined([space._numbers(vector) for space, vector in zip(spaces, moved, strict=True)])
 
     def _transport_in_span(self, times: tuple[float, float], outside: str, v: Any) -> Any:
         if not self.space._is_large:
@@ -362,7 +367,7 @@ class CurveArrays:
         space, h = factor.space, np.diff(self.times)
         third = h.reshape(h.shape + (1,) * len(space.point_shape)) / 3
         before = factor.velocities if factor.before is None else factor.before
-        (p, q), (u, _), (_, w) = (space._neighbours(own) for own in (factor.points, factor.velocities, before))
+        (p, q), (u, _), (_, w) = (space._neighbours(array) for array in (factor.points, factor.velocities, before))
         with np.errstate(all="ignore"):
             handles = third * u, -third * w
         # Control points of curves without a solution are NaN.
@@ -380,15 +385,15 @@ class CurveArrays:
             (None,) * count if end is None else parts_of(end, self.space, "an end vector") for end in pair_of(ends)
         ]
         conditions = ends_in_factors(bc_type, self.space)
-        each = zip(self.parts, conditions, moved, zip(*vectors, strict=True), strict=True)
-        return self._joined([derivatives.jvp(part, at, bc, p, t, pair) for part, bc, p, pair in each])
+        factors = zip(self.parts, conditions, moved, zip(*vectors, strict=True), strict=True)
+        return self._joined([derivatives.jvp(part, at, bc, p, t, pair) for part, bc, p, pair in factors])
 
     def vjp(self, at: SampleTimes, bc_type: Any, cotangent: Any) -> Gradient[Any]:
         """Compute the gradient with respect to the data; see `symspline.CubicSpline.vjp`."""
         self._require_derivatives()
         cotangents = parts_of(cotangent, self.space, "cotangent")
-        each = zip(self.parts, ends_in_factors(bc_type, self.space), cotangents, strict=True)
-        gradients = [derivatives.vjp(part, at, bc, own) for part, bc, own in each]
+        factors = zip(self.parts, ends_in_factors(bc_type, self.space), cotangents, strict=True)
+        gradients = [derivatives.vjp(part, at, bc, vectors) for part, bc, vectors in factors]
         if not isinstance(self.space, Product):
             return gradients[0]
         first, last = (None if gradients[0].ends[e] is None else tuple(g.ends[e] for g in gradients) for e in (0, 1))
@@ -458,25 +463,25 @@ class UncertaintyBand(NamedTuple):
         """Combine the bands of curves one after the other, whose times begin at different offsets."""
         pairs = list(zip(bands, offsets, strict=True))
 
-        def each(arrays: Callable[[UncertaintyBand, float], list[Any]]) -> list[Any]:
-            return [np.concatenate(own) for own in zip(*(arrays(*pair) for pair in pairs), strict=True)]
+        def concatenated(arrays: Callable[[UncertaintyBand, float], list[Any]]) -> list[Any]:
+            return [np.concatenate(band) for band in zip(*(arrays(*pair) for pair in pairs), strict=True)]
 
-        speeds = [own.speed for own in bands if own.speed is not None]
+        speeds = [band.speed for band in bands if band.speed is not None]
         return cls(
-            each(lambda own, offset: [x + offset for x in own.x]),
-            each(lambda own, _: own.points),
-            each(lambda own, _: own.radii),
+            concatenated(lambda band, offset: [x + offset for x in band.x]),
+            concatenated(lambda band, _: band.points),
+            concatenated(lambda band, _: band.radii),
             np.concatenate(speeds) if len(speeds) == len(bands) else None,
-            np.concatenate([own.others + offset for own, offset in pairs]),
+            np.concatenate([band.others + offset for band, offset in pairs]),
         )
 
     def between(self, first: float, last: float, samples: slice) -> Self:
         """Return the data from one time to another, and the band at some of the times."""
         kept = [(x >= first) & (x <= last) for x in self.x]
         return self._replace(
-            x=[x[own] for x, own in zip(self.x, kept, strict=True)],
-            points=[points[own] for points, own in zip(self.points, kept, strict=True)],
-            radii=[own[samples] for own in self.radii],
+            x=[x[chosen] for x, chosen in zip(self.x, kept, strict=True)],
+            points=[points[chosen] for points, chosen in zip(self.points, kept, strict=True)],
+            radii=[chosen[samples] for chosen in self.radii],
             speed=None if self.speed is None else self.speed[samples],
             others=self.others[(self.others >= first) & (self.others <= last)],
         )
@@ -610,3 +615,238 @@ def check_reach(times: Doubles, x: Doubles) -> None:
         "extrapolate='geodesic'"
     )
     refuse((x < low) | (x > high), "x", lambda i: f"= {x[i]} {limit}")
+
+
+# ---- limits of given velocities: handles inside the cut locus, and whole turns on a torus ----
+
+# Handles shorter than this fraction of the injectivity radius are valid without further tests.
+_SHORT = 0.99
+# Relative difference beyond which the logarithm of the end of a handle is another vector than the handle.
+_SAME = 1e-6
+
+
+def require_short_handles(space: AnySpace, times: Doubles, points: Array, velocities: Array) -> None:
+    """Raise ValidationError if a velocity is too fast for a segment next to it.
+
+    The curve is evaluated from its control points. If a handle h u/3 passes the cut locus, its control point is also
+    the end of a shorter handle. The curve would then not have the given velocity, or would lose whole turns. Curves on
+    a `Torus` keep up to 3000 turns per segment.
+    """
+    radius = space.injectivity_radius
+    if not 0 < radius < np.inf:
+        return
+    limit = LONGEST if isinstance(space, Torus) else _SHORT * radius
+    axes = len(space.point_shape)
+    lead = points.shape[: points.ndim - axes]
+    steps = np.broadcast_to(np.diff(times), (*lead[:-1], lead[-1] - 1))
+    ends = np.zeros((*lead[:-1], 1))
+    longest = np.maximum(np.concatenate([steps, ends], -1), np.concatenate([ends, steps], -1))
+    with np.errstate(all="ignore"):
+        square = np.asarray(space._apply("inner", p=points, u=velocities, v=velocities))
+        length = longest / 3 * np.sqrt(np.maximum(square, 0))
+    for index in zip(*np.nonzero(length > limit), strict=True):
+        handle = longest[index] / 3 * velocities[index]
+        try:
+            again = space.log(points[index], space.exp(points[index], handle))
+            lost = np.abs(again - handle).max() > _SAME * np.abs(handle).max()
+        except CutLocusError:
+            lost = True
+        if lost:
+            after = longest[index] == np.append(steps[index[:-1]], 0.0)[index[-1]]
+            _refuse(space, index, index[-1] - (not after), float(length[index]), float(longest[index]))
+
+
+def _refuse(space: AnySpace, index: tuple[Any, ...], segment: int, length: float, step: float) -> None:
+    *batch, node = (int(i) for i in index)
+    of = of_index(batch)
+    other = " Or use `Euclidean` and angles that count turns." if space._has_angles else ""
+    raise ValidationError(
+        f"`velocities[{node}]`{of} has speed {3 * length / step:.6g}, which is too fast for a segment of length "
+        f"{step:.6g}, between t[{segment}] and t[{segment + 1}]: its control handle, a third of the product, has "
+        f"length {length:.4g} and passes the cut locus. The curve would have a different velocity or lose whole turns. "
+        f"Add knots between them, or pass slower velocities.{other}"
+    )
+
+
+# ---- whole turns of curves on a torus, which follow from the velocities at the knots ----
+
+# Segments with a longer handle are fast. C² curves have shorter ones, and take the shorter way between their points.
+_FAST = 0.49995 * TURN
+# Longer handles would need too many knots.
+LONGEST = 1e3 * TURN
+# The largest distance of neighbouring control points with more knots.
+_NEAR = 0.25 * TURN
+
+
+class Turns(NamedTuple):
+    """Fast segments on a torus, over which the core would lose turns.
+
+    Attributes
+    ----------
+    sides : ndarray, shape (..., n - 1)
+        The longest side of the control polygon of fast segments; 0 for others.
+    change : ndarray, shape (..., n - 1, angles)
+        Change of every angle over each segment, with whole turns.
+    """
+
+    sides: Doubles
+    change: Doubles
+
+
+def turns_of(times: Doubles, points: Array, velocities: Array) -> Turns | None:
+    """Return the turns of curves on a torus, or None if no segment is fast.
+
+    Notes
+    -----
+    Points determine the change of an angle over a segment of length h up to whole turns. Among these changes, that
+    nearest to h (u₀ + u₁)/2 gives the cubic with the lowest bending energy. It is used for the fast angles of a
+    segment. For others, the core takes the shorter way between the inner control points, the change nearest to
+    h (u₀ + u₁)/3.
+    """
+    h = np.diff(times)[..., None]
+    u0, u1 = h * velocities[..., :-1, :], h * velocities[..., 1:, :]
+    longest = np.maximum(np.abs(u0), np.abs(u1)) / 3
+    fast = (longest > _FAST) & (longest <= LONGEST)
+    if not fast.any():
+        return None
+    expected = (u0 + u1) / np.where(fast, 2, 3)
+    change = expected + wrap(np.diff(points, axis=-2) - expected)
+    sides = np.where(fast, np.maximum(longest, np.abs(change - (u0 + u1) / 3)), 0.0).max(axis=-1)
+    return Turns(sides, change)
+
+
+def with_more_knots(times: Doubles, points: Array, velocities: Array) -> tuple[Doubles, Array, Array]:
+    """Return knots, points and velocities of the same curves with more knots on segments with several turns."""
+    turns = turns_of(times, points, velocities)
+    if turns is None:
+        return times, points, velocities
+    parts = np.ceil(turns.sides.reshape(-1, turns.sides.shape[-1]).max(axis=0) / _NEAR)
+    parts = np.maximum(parts, 1).astype(int)
+    segment = np.repeat(np.arange(len(parts)), parts)
+    tau = np.concatenate([np.arange(count) / count for count in parts])
+    start, h = times[..., segment], np.diff(times)[..., segment]
+    s, h_wide = tau[:, None], h[..., None]
+    u0, u1 = (h_wide * velocities[..., segment + i, :] for i in (0, 1))
+    change = turns.change[..., segment, :]
+    # The cubic Hermite polynomial and its derivative.
+    square, cube = 3 * change - 2 * u0 - u1, u0 + u1 - 2 * change
+    inner = points[..., segment, :] + s * (u0 + s * (square + s * cube))
+    rates = (u0 + s * (2 * square + 3 * s * cube)) / h_wide
+    # The given nodes remain exact.
+    inner = np.where(s == 0, points[..., segment, :], inner)
+    rates = np.where(s == 0, velocities[..., segment, :], rates)
+    return (
+        np.concatenate([start + tau * h, times[..., -1:]], axis=-1),
+        np.concatenate([inner, points[..., -1:, :]], axis=-2),
+        np.concatenate([rates, velocities[..., -1:, :]], axis=-2),
+    )
+
+
+# ---- curves of control points: B-splines by de Boor's algorithm, and cumulative B-splines on groups ----
+
+
+class ControlledCurve:
+    """Knots, control points and degree of B-spline curves, and evaluation in the core.
+
+    Parameters
+    ----------
+    control : sequence of ndarray
+        Control points in each factor.
+    cumulative : bool
+        Whether it is a cumulative B-spline, on groups.
+
+    Attributes
+    ----------
+    times : ndarray
+        The distinct knots of the domain, between which the curve is smooth.
+    """
+
+    quad_rtol = EXACT
+    max_nu = 2
+
+    def __init__(
+        self, space: AnySpace, knots: Doubles, control: Sequence[Array], degree: int, cumulative: bool = False
+    ) -> None:
+        self.space, self.knots, self.control, self.degree = space, knots, tuple(control), degree
+        self.cumulative = cumulative
+        self.times = np.unique(knots[degree : knots.size - degree])
+        for array in (knots, *control):
+            array.flags.writeable = False
+        axes = control[0].ndim - len(factors_of(space)[0].point_shape)
+        self.batch: tuple[int, ...] = control[0].shape[: axes - 1]
+
+    @property
+    def control_points(self) -> Any:
+        """Control points, on products one array per factor."""
+        return self.control if isinstance(self.space, Product) else self.control[0]
+
+    @cached_property
+    def parts(self) -> tuple[ControlledCurve, ...]:
+        """The curve in each factor."""
+        if not isinstance(self.space, Product):
+            return (self,)
+        factors = zip(self.space.factors, self.control, strict=True)
+        return tuple(self.with_control_points(factor, control) for factor, control in factors)
+
+    def with_control_points(self, space: AnySpace, *control: Array) -> ControlledCurve:
+        """Return the curve with the same knots and other control points."""
+        return ControlledCurve(space, self.knots, [*map(np.ascontiguousarray, control)], self.degree, self.cumulative)
+
+    def take_batch(self, index: Any) -> ControlledCurve:
+        """Return the curves that an index selects from the batch."""
+        return self.with_control_points(self.space, *(control[index] for control in self.control))
+
+    def evaluate(
+        self,
+        x: Doubles,
+        quantity: str,
+        outside: str = "raise",
+        per_curve: bool = False,
+        progress: Progress | None = None,
+    ) -> Any:
+        """Evaluate a quantity at times in the domain; with `per_curve`, the leading axes of x are the batch axes."""
+        if outside == "raise":
+            refuse_outside(self.times, self.batch, x, per_curve)
+        if isinstance(self.space, Product):
+            values = tuple(part.evaluate(x, quantity, "continue", per_curve) for part in self.parts)
+            return product_norm(values) if quantity in NORMS else values
+        if not per_curve:
+            return self._at(x, quantity)
+        rows = x.reshape(-1, *x.shape[len(self.batch) :])
+        if (rows == rows[0]).all():
+            return self._at(np.ascontiguousarray(rows[0]), quantity)
+        # The core evaluates all curves of a batch at the same times.
+        control = self.control[0].reshape(-1, *self.control[0].shape[len(self.batch) :])
+        pairs = zip(control, np.ascontiguousarray(rows), strict=True)
+        values = tuple(self.with_control_points(self.space, points)._at(row, quantity) for points, row in pairs)
+        return np.reshape(values, (*self.batch, *values[0].shape))
+
+    @cached_property
+    def _steps(self) -> Doubles:
+        """The logarithms between neighbouring control points."""
+        return _core.cumulative_steps(self.space._handle, self.space._as_doubles(self.control[0]))
+
+    def _at(self, x: Doubles, quantity: str) -> Any:
+        """Evaluate a quantity of a curve in one factor, at times for all curves of a batch."""
+        if quantity == "motion":
+            return self._motion(x)
+        steps, span = self._steps if self.cumulative else None, None
+        space, control = self.space, self.control[0]
+        if not self.cumulative:
+            space, control, span = reduced(space, control)
+        doubles = space._as_doubles(control)
+        values = _core.evaluate_bspline(space._handle, self.knots, doubles, self.degree, x, quantity, steps)
+        if quantity in REAL:
+            return values
+        return space._numbers(values) if span is None else span.embed_samples(space._numbers(values), self.batch)
+
+    def _motion(self, x: Doubles) -> Any:
+        """Return the twist of a motion, its derivative and the pose, as `CurveArrays.evaluate` does."""
+        g, velocity, acceleration = (self._at(x, name) for name in ("point", "velocity", "acceleration"))
+        turned = np.swapaxes(g[..., :3, :3], -1, -2)
+        rates = []
+        # The acceleration is gξ' for the twist ξ.
+        for vector in (velocity, acceleration):
+            body = turned @ vector[..., :3, :]
+            rates += [body[..., [2, 0, 1], [1, 2, 0]], body[..., 3]]
+        return np.concatenate([*rates, g.reshape(*g.shape[:-2], 16)], axis=-1)

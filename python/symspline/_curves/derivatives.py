@@ -10,7 +10,7 @@ import numpy as np
 
 from .. import _core
 from .._base.arrays import as_array, cast, same_fields, short_repr
-from .._base.time import onto_ends
+from .._base.time import onto_ends, refuse_outside
 from .._base.typing import FloatArray, P
 from .._core import ValidationError
 from .._spaces import Array, Doubles, Space
@@ -97,17 +97,10 @@ def sample_times(knots: Array, batch: tuple[int, ...], x: Array, per_curve: bool
     """
     dtype = x.dtype if x.dtype.kind == "f" else np.dtype(np.float64)
     x, per_curve = onto_ends(cast(x), knots, batch, per_curve, dtype)
+    refuse_outside(knots, batch, x, per_curve, remedy="; derivatives with respect to the data exist only there")
     shape = x.shape if per_curve else batch + x.shape
-    own = np.broadcast_to(x, shape).reshape(math.prod(batch), math.prod(shape[len(batch) :]))
-    rows = _per_curve(knots, batch)
-    outside = ~((own >= rows[:, :1]) & (own <= rows[:, -1:]))
-    if outside.any():
-        curve, index = (int(i) for i in np.argwhere(outside)[0])
-        raise ValidationError(
-            f"x[{index}] = {own[curve, index]} is outside the knots [{rows[curve, 0]}, {rows[curve, -1]}]; "
-            "derivatives with respect to the data exist only between the first and the last knot"
-        )
-    return SampleTimes(np.ascontiguousarray(own), shape, nu)
+    rows = np.broadcast_to(x, shape).reshape(math.prod(batch), math.prod(shape[len(batch) :]))
+    return SampleTimes(np.ascontiguousarray(rows), shape, nu)
 
 
 class _Curves(NamedTuple):

@@ -9,7 +9,7 @@ import numpy as np
 
 from .._base.arrays import short_repr
 from .._core import ValidationError
-from .._spaces import Doubles, Product, Space, factors_of, parts_of
+from .._spaces import AnySpace, Doubles, Product, Space, factors_of, parts_of
 
 # The kind of an end condition and its prescribed vectors.
 End = tuple[str, Doubles | None]
@@ -77,8 +77,10 @@ def split_accelerations(bc_type: Any) -> tuple[Any, Any]:
     doubles = [dict(end) if _is_double(end) else None for end in bc_type]
     if not any(doubles):
         return bc_type, None
-    velocities = tuple((1, own[1]) if own else end for own, end in zip(doubles, bc_type, strict=True))
-    return velocities, tuple((2, own[2]) if own else "natural" for own in doubles)
+    velocities = tuple(
+        (1, conditions[1]) if conditions else end for conditions, end in zip(doubles, bc_type, strict=True)
+    )
+    return velocities, tuple((2, conditions[2]) if conditions else "natural" for conditions in doubles)
 
 
 def _check_pair(bc_type: Any) -> None:
@@ -90,9 +92,9 @@ def _is_double(end: Any) -> bool:
     """Whether an end has the form [(1, velocity), (2, acceleration)], in any order."""
     if not isinstance(end, (tuple, list)) or len(end) != 2:
         return False
-    if not all(isinstance(own, (tuple, list)) and len(own) == 2 for own in end):
+    if not all(isinstance(condition, (tuple, list)) and len(condition) == 2 for condition in end):
         return False
-    orders = [own[0] for own in end]
+    orders = [condition[0] for condition in end]
     return all(isinstance(order, (int, np.integer)) for order in orders) and sorted(orders) == [1, 2]
 
 
@@ -145,13 +147,13 @@ def end_kinds(bc_type: Any) -> list[str] | None:
     return ["velocity" if end == "clamped" else end if isinstance(end, str) else _ORDERS[end[0]] for end in ends]
 
 
-def take_batch(bc_type: Any, index: Any, batch_axes: int, space: Space[Any]) -> Any:
+def take_batch(bc_type: Any, index: Any, batch_axes: int, space: AnySpace) -> Any:
     """Return the end conditions of one curve or a slice of curves along the first batch axis."""
     if isinstance(bc_type, str):
         return bc_type
     if isinstance(space, Product):
-        each = zip(ends_in_factors(bc_type, space), space.factors, strict=True)
-        return _joined([take_batch(ends, index, batch_axes, factor) for ends, factor in each])
+        factors = zip(ends_in_factors(bc_type, space), space.factors, strict=True)
+        return _joined([take_batch(ends, index, batch_axes, factor) for ends, factor in factors])
 
     def pick(end: Any) -> Any:
         if isinstance(end, str):
@@ -170,7 +172,7 @@ def take_batch(bc_type: Any, index: Any, batch_axes: int, space: Space[Any]) -> 
 # ---- products, whose prescribed vectors are tuples ----
 
 
-def ends_in_factors(bc_type: Any, space: Space[Any]) -> list[Any]:
+def ends_in_factors(bc_type: Any, space: AnySpace) -> list[Any]:
     """Return the end conditions of each factor; outside products, a list of one entry."""
     factors = factors_of(space)
     if isinstance(bc_type, str) or len(factors) == 1:

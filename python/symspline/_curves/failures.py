@@ -14,10 +14,10 @@ from .._base.faults import CUT_LOCUS, Fault, of_index, warn
 from .._base.report import MAX_STEP, Columns, ConvergenceWarning, FarPointsWarning, long_gaps
 from .._core import ConvergenceError, CutLocusError, ValidationError
 from .._spaces import (
+    AnySpace,
     Array,
     Doubles,
     Euclidean,
-    Space,
     SpecialEuclidean,
     SpecialOrthogonal,
     Sphere,
@@ -87,10 +87,10 @@ def _explained_by_times(fault: Fault, batch: tuple[int, ...], spline: Any) -> Fa
     h = np.diff(times)
     if len(h) < 2:
         return fault
-    found = _steps(curve._curve.parts, index)
-    if found is None:
+    steps_and_turns = _steps(curve._curve.parts, index)
+    if steps_and_turns is None:
         return fault
-    step, turns = found
+    step, turns = steps_and_turns
     around = np.minimum(np.append(np.inf, h[:-1]), np.append(h[1:], np.inf))
     i, longest = int(np.argmax(around / h)), int(np.argmax(h))
     t = curve._t[index] if curve._t.ndim > 1 else curve._t
@@ -124,13 +124,16 @@ def _steps(parts: Any, index: Any) -> tuple[Array, Array] | None:
         space, points = part.space, part.points[index]
         if isinstance(space, SpecialEuclidean):
             # The cut locus limits rotations only.
-            limited, own = SpecialOrthogonal(space.point_shape[0] - 1), np.ascontiguousarray(points[..., :-1, :-1])
+            limited, rotations = (
+                SpecialOrthogonal(space.point_shape[0] - 1),
+                np.ascontiguousarray(points[..., :-1, :-1]),
+            )
         else:
-            limited, own = space, points
+            limited, rotations = space, points
         with np.errstate(all="ignore"):
             try:
                 steps.append(np.asarray(space.distance(points[:-1], points[1:])))
-                ratios.append(limited.distance(own[:-1], own[1:]) / limited.injectivity_radius)
+                ratios.append(limited.distance(rotations[:-1], rotations[1:]) / limited.injectivity_radius)
             except (CutLocusError, ValidationError):
                 return None
     turns = np.max(ratios, axis=0)
@@ -158,7 +161,7 @@ IN_PYTHON = (
 
 
 def warn_of_representatives(
-    space: Space[Any],
+    space: AnySpace,
     points: Sequence[list[Points] | None],
     curves: Sequence[CurveArrays],
     longest_steps: Sequence[Sequence[Columns | Doubles]],
@@ -170,10 +173,10 @@ def warn_of_representatives(
     points, curves, longest_steps
         As for `warn_of_signs` and `warn_of_far_points`.
     """
-    for curve, each in zip(curves, longest_steps, strict=True):
-        for (factor, *_), own in zip(curve.factors, each, strict=True):
+    for curve, of_factors in zip(curves, longest_steps, strict=True):
+        for (factor, *_), steps in zip(curve.factors, of_factors, strict=True):
             limit = factor.__dict__.get("_longest_near_step") or _longest_near_step(factor)
-            longest = own.numbers[MAX_STEP] if isinstance(own, Columns) else own
+            longest = steps.numbers[MAX_STEP] if isinstance(steps, Columns) else steps
             # Operations on arrays would take longer than the rest of this module's work for one curve.
             if longest.item() > limit if longest.size == 1 else (longest > limit).any():
                 warn_of_signs(space, points)
@@ -186,7 +189,7 @@ def _longest(steps: Columns | Doubles) -> Doubles:
     return steps.numbers[MAX_STEP] if isinstance(steps, Columns) else steps
 
 
-def _longest_near_step(space: Space[Any]) -> float:
+def _longest_near_step(space: AnySpace) -> float:
     """Return the longest step that never leads to a warning, cached for each space."""
     limit = FAR * space.injectivity_radius
     if _has_quaternions(space):
@@ -195,14 +198,14 @@ def _longest_near_step(space: Space[Any]) -> float:
     return limit
 
 
-def _has_quaternions(space: Space[Any]) -> bool:
+def _has_quaternions(space: AnySpace) -> bool:
     return isinstance(space, Sphere) and space._parameters == (3,)
 
 
 # ---- quaternions of opposite sign ----
 
 
-def warn_of_signs(space: Space[Any], curves: Sequence[list[Points] | None]) -> None:
+def warn_of_signs(space: AnySpace, curves: Sequence[list[Points] | None]) -> None:
     """Warn if neighbouring points on S³ are more than a quarter turn apart.
 
     As quaternions they would be closer with the opposite sign. The curve between them turns the long way round.
@@ -212,19 +215,19 @@ def warn_of_signs(space: Space[Any], curves: Sequence[list[Points] | None]) -> N
     curves : sequence of list of Points
         The given points of each curve in every factor. A batch counts as one curve. None for masked curves.
     """
-    found = [
+    pairs = [
         (number, index, part.numbers)
         for number, parts in enumerate(curves)
         for part, factor in zip(parts or (), factors_of(space), strict=parts is not None)
         if _has_quaternions(factor)
         for index in _opposite(part.numbers)
     ]
-    if not found:
+    if not pairs:
         return
-    number, index, points = found[0]
+    number, index, points = pairs[0]
     *batch, i = index.tolist()
     curve = [number] * (len(curves) > 1) + batch
-    of, more = of_index(curve), f" (and {len(found) - 1} more pairs)" if len(found) > 1 else ""
+    of, more = of_index(curve), f" (and {len(pairs) - 1} more pairs)" if len(pairs) > 1 else ""
     product = float(points[(*batch, i)] @ points[(*batch, i + 1)])
     message = (
         f"neighbours of opposite sign on sphere:3: points[{i}] and points[{i + 1}]{of} have inner product "
@@ -252,40 +255,23 @@ def warn_of_far_points(curves: Sequence[CurveArrays], longest_steps: Sequence[Se
     longest_steps : sequence of sequence of Columns or ndarray
         The longest steps of each curve in every factor, or its reports. Points need not be examined if these are short.
     """
-    found: list[_Far] = []
+    far_curves: list[_Far] = []
     for number, curve in enumerate(curves):
-        steps = curve.times.shape[-1] - 1
-        if steps < _LEAST:
-            continue
-        for k, part in enumerate(curve.parts):
-            limit = FAR * part.space.injectivity_radius
-            own = longest_steps[number][k]
+        for part, steps in zip(curve.parts, longest_steps[number], strict=True):
             # The deciding angle never exceeds the distance.
-            if not (_longest(own) > limit).any():
-                continue
-            far = _count_far(part.space, part.points)
-            if isinstance(own, Columns):
+            if (_longest(steps) > FAR * part.space.injectivity_radius).any():
                 # Curves that did not converge are reported elsewhere, according to `on_failure`.
-                far = np.where(own.row("converged").reshape(curve.batch), far, 0)
-            for index in np.argwhere(far > steps / 2).tolist():
-                place = tuple([number] * (len(curves) > 1) + index)
-                found.append(_Far(place, int(far[tuple(index)]), steps, part.space))
-    _warn_of_far(found)
+                valid = steps.row("converged").reshape(curve.batch) if isinstance(steps, Columns) else True
+                far_curves += _far_curves(part.space, part.points, valid, [number] * (len(curves) > 1))
+    _warn_of_far(far_curves)
 
 
-def warn_of_far_data(space: Space[Any], data: Sequence[Points]) -> bool:
+def warn_of_far_data(space: AnySpace, data: Sequence[Points]) -> bool:
     """Warn in the same way about data in every factor that a curve need not pass through, and return whether it did."""
-    found = []
-    for factor, part in zip(factors_of(space), data, strict=True):
-        steps = part.nodes - 1
-        if steps < _LEAST:
-            continue
-        far = _count_far(factor, factor._numbers(part.numbers))
-        found += [
-            _Far(tuple(index), int(far[tuple(index)]), steps, factor) for index in np.argwhere(far > steps / 2).tolist()
-        ]
-    _warn_of_far(found)
-    return bool(found)
+    parts = zip(factors_of(space), data, strict=True)
+    far_curves = [far for factor, part in parts for far in _far_curves(factor, factor._numbers(part.numbers))]
+    _warn_of_far(far_curves)
+    return bool(far_curves)
 
 
 class _Far(NamedTuple):
@@ -294,22 +280,25 @@ class _Far(NamedTuple):
     place: tuple[int, ...]
     far: int
     steps: int
-    space: Space[Any]
+    space: AnySpace
 
 
-def _count_far(space: Space[Any], points: Array) -> NDArray[np.intp]:
-    """Return the number of long steps of every curve."""
-    if isinstance(space, Euclidean):
-        return np.zeros(points.shape[:-2], np.intp)
-    return np.asarray(np.count_nonzero(cut_fractions(space, points) > FAR, axis=-1))
+def _far_curves(space: AnySpace, points: Array, valid: Any = True, number: Sequence[int] = ()) -> list[_Far]:
+    """Return the valid curves of a batch, in one factor, of which more than half of the steps are long."""
+    steps = points.shape[-1 - len(space.point_shape)] - 1
+    if steps < _LEAST or isinstance(space, Euclidean):
+        return []
+    far = np.where(valid, np.count_nonzero(cut_fractions(space, points) > FAR, axis=-1), 0)
+    indices = map(tuple, np.argwhere(far > steps / 2).tolist())
+    return [_Far((*number, *index), int(far[index]), steps, space) for index in indices]
 
 
-def _warn_of_far(found: list[_Far]) -> None:
-    if not found:
+def _warn_of_far(far_curves: list[_Far]) -> None:
+    if not far_curves:
         return
-    place, count, steps, space = found[0]
+    place, count, steps, space = far_curves[0]
     of = of_index(place)
-    others = len({place for place, *_ in found}) - 1
+    others = len({place for place, *_ in far_curves}) - 1
     more = f" (and of {others} more curves)" if others else ""
     # Steps of degrees look like steps at random on a torus.
     angles = " Angles must be in radians." if isinstance(cover_of(space), Torus) else ""
@@ -325,7 +314,7 @@ def _warn_of_far(found: list[_Far]) -> None:
     )
 
 
-def cut_fractions(space: Space[Any], points: Array) -> Doubles:
+def cut_fractions(space: AnySpace, points: Array) -> Doubles:
     """Return the deciding angle between neighbouring points, divided by the angle at which the cut locus is reached.
 
     Parameters
@@ -352,13 +341,13 @@ def cut_fractions(space: Space[Any], points: Array) -> Doubles:
         with suppress(CutLocusError):
             result[good] = space.distance(p, q) / space.injectivity_radius
         return result
-    found = space._apply("cut_fraction", p=p, q=q)
+    fractions = space._apply("cut_fraction", p=p, q=q)
     if isinstance(space, Unitary):
         # A random global phase alone is often below the limit. The root mean square of the angles, doubled, exceeds it
         # more often.
         rms = space.distance(p, q) / math.sqrt(space._parameters[0])
-        found = np.maximum(found, math.sqrt(2) * rms / math.pi)
-    result[good] = found
+        fractions = np.maximum(fractions, math.sqrt(2) * rms / math.pi)
+    result[good] = fractions
     return result
 
 
@@ -404,20 +393,20 @@ def warn_of_held_points(
     axis, nodes = len(batch), times.shape[-1]
     if nodes < FEWEST_HELD or times.dtype.kind not in "iufM":
         return False
-    for own in points:
-        if own.dtype.kind not in "iufc":
+    for array in points:
+        if array.dtype.kind not in "iufc":
             return False
         # Nearly always the first numbers of the points show that few are copies.
-        first = own.reshape(-1)[:: math.prod(own.shape[axis + 1 :]) or 1]
+        first = array.reshape(-1)[:: math.prod(array.shape[axis + 1 :]) or 1]
         if np.count_nonzero(first[1:] == first[:-1]) < _COPIES * (nodes - 1):
             return False
     equal = np.broadcast_to(np.diff(times) > 0, (*batch, times.shape[-1] - 1))
-    for own in points:
-        rows = own.reshape(*own.shape[: axis + 1], -1)
+    for array in points:
+        rows = array.reshape(*array.shape[: axis + 1], -1)
         equal = equal & np.all(rows[..., 1:, :] == rows[..., :-1, :], axis=-1)
     shares = equal.mean(axis=-1)
     for index in map(tuple, np.argwhere(shares >= _COPIES).tolist()):
-        if not _are_held(equal[index], [own[index].reshape(times.shape[-1], -1) for own in points]):
+        if not _are_held(equal[index], [array[index].reshape(times.shape[-1], -1) for array in points]):
             continue
         i = int(np.argmax(equal[index]))
         axes = tuple(range(1, points[0].ndim - axis))
@@ -442,5 +431,5 @@ def _are_held(equal: NDArray[np.bool_], points: list[Array]) -> bool:
     if len(runs) < _RUNS or np.mean(runs > 1) < _REPEATED:
         return False
     regular = np.mean(runs <= 2 * np.median(runs) + 1) >= _REGULAR
-    values = np.concatenate([own[starts] for own in points], axis=1)
+    values = np.concatenate([array[starts] for array in points], axis=1)
     return bool(regular and len(np.unique(values, axis=0)) >= _NEW * len(starts))

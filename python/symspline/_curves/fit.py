@@ -11,19 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
-from .._base.arrays import as_array
+from .._base.arrays import as_array, refuse
 from .._base.faults import INVALID, Fault, of_index
 from .._base.report import Columns, Report, shaped
 from .._base.typing import Progress
 from .._core import ValidationError
-from .._spaces import Array, Doubles, Product, Quotient, Space, Torus, cover_of, factors_of, parts_of
+from .._spaces import AnySpace, Array, Doubles, Product, Quotient, Space, Torus, cover_of, factors_of, parts_of
 from ..manifolds import Manifold
-from .curve import CurveArrays, FactorArrays, share
+from .curve import CurveArrays, FactorArrays, require_short_handles, share, turns_of
 from .ends import NATURAL, End, ends_in_factors, ends_of, is_closed, split_ends
-from .handles import require_short_handles, turns_of
-from .on_manifold.checks import hermite_on_manifold, validate_on_manifold
-from .on_manifold.fit import fit_of_one_length
-from .on_manifold.on_manifold import Mixed, OnManifold
+from .manifold_fit import fit_of_one_length, hermite_on_manifold, validate_on_manifold
+from .on_manifold import Mixed, OnManifold
 from .reduced import solve_in_span
 from .solve import Mask, Options, Solved, Task, faults_of, solve, solve_in_python, solve_single, validate, without
 
@@ -80,7 +78,7 @@ class Problem(NamedTuple, Generic[_Times, _Data]):
         Indices of the nodes in messages; None for 0, 1, ...
     """
 
-    space: Space[Any]
+    space: AnySpace
     times: _Times
     points: _Data
     ends: list[list[End] | None]
@@ -117,19 +115,19 @@ class Fit(NamedTuple):
         """Return the reports in each factor."""
         times, batch = self.curve.times, self.curve.batch
         return [
-            shaped(own, times, batch, part.space, self.method)
-            for part, own in zip(self.curve.parts, self.columns, strict=True)
+            shaped(columns, times, batch, part.space, self.method)
+            for part, columns in zip(self.curve.parts, self.columns, strict=True)
         ]
 
 
-def read(points: Any, space: Space[Any]) -> list[Points]:
+def read(points: Any, space: AnySpace) -> list[Points]:
     """Read points from the user in each factor, in quotients as representatives that are continuous along the curve."""
     if not space._has_quotients:
         return read_given(points, space) if isinstance(space, Product) else [_read(space, points)]
     return [unwrapped(*pair) for pair in zip(factors_of(space), read_given(points, space), strict=True)]
 
 
-def unwrapped(space: Space[Any], part: Points) -> Points:
+def unwrapped(space: AnySpace, part: Points) -> Points:
     """Choose representatives that are continuous along each curve."""
     if not isinstance(space, Quotient):
         return part
@@ -141,18 +139,18 @@ def unwrapped(space: Space[Any], part: Points) -> Points:
     return part._replace(numbers=space._as_doubles(moved), moves=moves)
 
 
-def read_given(points: Any, space: Space[Any]) -> list[Points]:
+def read_given(points: Any, space: AnySpace) -> list[Points]:
     """Read points from the user in each factor, as they are."""
     if not isinstance(space, Product):
         return [_read(space, points)]
-    found = _in_factors(space, _read, parts_of(points, space, "points"))
+    data = _in_factors(space, _read, parts_of(points, space, "points"))
     equal = True
-    for part in found:
-        equal &= part.nodes == found[0].nodes and part.batch == found[0].batch
+    for part in data:
+        equal &= part.nodes == data[0].nodes and part.batch == data[0].batch
     if not equal:
-        described = ", ".join(f"{part.nodes} points, batch axes {part.batch}" for part in found)
+        described = ", ".join(f"{part.nodes} points, batch axes {part.batch}" for part in data)
         raise ValidationError(f"the factors of points have different lengths, or their batch axes differ: {described}")
-    return found
+    return data
 
 
 def _read(space: Space, points: Any) -> Points:
@@ -179,7 +177,25 @@ def _read(space: Space, points: Any) -> Points:
     return Points(doubles, space._tol(array), lead[:-1], lead[-1])
 
 
-def read_ends(bc_type: Any, space: Space[Any], batch: tuple[int, ...]) -> list[list[End] | None]:
+def read_velocities(velocities: Any, space: AnySpace, data: list[Points]) -> list[tuple[Array, float]]:
+    """Return velocities in each factor, and how far they may be from tangent, after checks of shape and numbers."""
+    results = []
+    for factor, part, value in zip(factors_of(space), data, parts_of(velocities, space, "velocities"), strict=True):
+        array = factor._array(value, "velocities")
+        doubles = factor._doubles(array, "velocities")
+        # A view has flags of its own, so that making it read-only leaves the user's array as it is.
+        numbers = factor._numbers(doubles).view()
+        if doubles.shape != part.numbers.shape:
+            shape = factor._numbers(part.numbers).shape
+            raise ValidationError(f"velocities has shape {numbers.shape}, but points {shape}")
+        refuse(~np.isfinite(numbers), "velocities", lambda _: "is not finite")
+        if part.moves is not None and isinstance(factor, Quotient):
+            numbers = np.ascontiguousarray(factor._moved_by(numbers, part.moves))
+        results.append((numbers, factor._tol(array)))
+    return results
+
+
+def read_ends(bc_type: Any, space: AnySpace, batch: tuple[int, ...]) -> list[list[End] | None]:
     """Read end conditions in each factor."""
     if isinstance(bc_type, str) and bc_type == "natural":
         return [NATURAL] * (len(space.factors) if isinstance(space, Product) else 1)
@@ -189,7 +205,7 @@ def read_ends(bc_type: Any, space: Space[Any], batch: tuple[int, ...]) -> list[l
     return _in_factors(space, lambda factor, ends: ends_of(ends, factor, batch), conditions)
 
 
-def moved_ends(bc_type: Any, space: Space[Any], data: list[Points]) -> Any:
+def moved_ends(bc_type: Any, space: AnySpace, data: list[Points]) -> Any:
     """Return end conditions for the chosen representatives.
 
     Vectors at the last point are tangent at the representative that the user gave.
@@ -205,7 +221,7 @@ def moved_ends(bc_type: Any, space: Space[Any], data: list[Points]) -> Any:
     return _moved_ends(bc_type, space, [part.moves if part.moves is None else part.moves[..., -1] for part in data])
 
 
-def moved_ends_of_many(bc_type: Any, space: Space[Any], points: list[list[Points]]) -> Any:
+def moved_ends_of_many(bc_type: Any, space: AnySpace, points: list[list[Points]]) -> Any:
     """Return end conditions for the chosen representatives of single curves of different lengths."""
     for number, parts in enumerate(points):
         try:
@@ -214,14 +230,14 @@ def moved_ends_of_many(bc_type: Any, space: Space[Any], points: list[list[Points
             raise error._of_curve(number) from None
     last: list[NDArray[np.intp] | None] = []
     for i, factor in enumerate(factors_of(space)):
-        own = [each[i].moves for each in points]
-        known = isinstance(factor, Quotient) and any(moves is not None for moves in own)
+        moves_of_curves = [parts_of_curve[i].moves for parts_of_curve in points]
+        known = isinstance(factor, Quotient) and any(moves is not None for moves in moves_of_curves)
         still = factor._group.identity if isinstance(factor, Quotient) else 0
-        last.append(np.array([still if moves is None else moves[-1] for moves in own]) if known else None)
+        last.append(np.array([still if moves is None else moves[-1] for moves in moves_of_curves]) if known else None)
     return _moved_ends(bc_type, space, last)
 
 
-def _check_closed(space: Space[Any], part: Points) -> None:
+def _check_closed(space: AnySpace, part: Points) -> None:
     if not isinstance(space, Quotient):
         return
     numbers = space._numbers(part.numbers)
@@ -237,26 +253,26 @@ def _check_closed(space: Space[Any], part: Points) -> None:
         )
 
 
-def _moved_ends(bc_type: Any, space: Space[Any], last: list[NDArray[np.intp] | None]) -> Any:
-    if isinstance(bc_type, str) or all(own is None for own in last):
+def _moved_ends(bc_type: Any, space: AnySpace, last: list[NDArray[np.intp] | None]) -> Any:
+    if isinstance(bc_type, str) or all(moves is None for moves in last):
         return bc_type
     _, (_, word, vector) = split_ends(bc_type)
     if vector is None:
         return bc_type
     moved = []
-    for factor, own, part in zip(factors_of(space), last, parts_of(vector, space, "an end vector"), strict=True):
-        if own is None or not isinstance(factor, Quotient):
+    for factor, moves, part in zip(factors_of(space), last, parts_of(vector, space, "an end vector"), strict=True):
+        if moves is None or not isinstance(factor, Quotient):
             moved.append(part)
             continue
         numbers = factor._numbers(factor._doubles(part, "an end vector"))
-        lead = factor._leads({"an end vector": numbers.shape}, own.shape)
+        lead = factor._leads({"an end vector": numbers.shape}, moves.shape)
         numbers = np.broadcast_to(numbers, lead + factor.point_shape)
-        moved.append(factor._moved_by(numbers, np.broadcast_to(own, lead)))
+        moved.append(factor._moved_by(numbers, np.broadcast_to(moves, lead)))
     return bc_type[0], (word, tuple(moved) if isinstance(space, Product) else moved[0])
 
 
 def curve_of(
-    space: Space[Any], times: Doubles, arrays: Sequence[tuple[Array, Array]], fitted: bool = True
+    space: AnySpace, times: Doubles, arrays: Sequence[tuple[Array, Array]], fitted: bool = True
 ) -> CurveArrays:
     """Return the curve with given points and velocities in each factor.
 
@@ -270,7 +286,7 @@ def curve_of(
 
 
 def curve_of_factors(
-    space: Space[Any], times: Doubles, factors: tuple[FactorArrays, ...], fitted: bool = True
+    space: AnySpace, times: Doubles, factors: tuple[FactorArrays, ...], fitted: bool = True
 ) -> CurveArrays:
     """Return the curve with given arrays in each factor."""
     kind: type[CurveArrays] = CurveArrays
@@ -301,9 +317,9 @@ def fit(problem: FitProblem, progress: Progress | None = None) -> Fit:
         tol = part.tol if check else None
         tasks.append(Task(cover, times, part.numbers, end, tol, None, mask, check and skip, names))
     solved, faults = solve_tasks(space, tasks, options, progress)
-    for factor, found in zip(factors, solved, strict=True):
-        arrays.append(FactorArrays(factor, found.points, found.velocities))
-        columns.append(found.columns)
+    for factor, solution in zip(factors, solved, strict=True):
+        arrays.append(FactorArrays(factor, solution.points, solution.velocities))
+        columns.append(solution.columns)
     return Fit(curve_of_factors(space, times, tuple(arrays)), columns, options.method, faults)
 
 
@@ -318,16 +334,16 @@ def fit_many(problem: ManyProblem, progress: Progress | None) -> tuple[list[Fit]
         mask = without(mask, invalid, (len(times),))
     tasks = []
     for i, (factor, end) in enumerate(zip(factors_of(space), ends, strict=True)):
-        parts = [own[i] for own in points]
+        parts = [nodes[i] for nodes in points]
         tol = max(part.tol for part in parts) if check else None
         numbers = np.concatenate([part.numbers for part in parts])
         tasks.append(Task(cover_of(factor), row, numbers, end, tol, offsets, mask, check and skip))
     solved, faults = solve_tasks(space, tasks, options, progress)
 
     def one(i: int, start: int, stop: int) -> Fit:
-        own = slice(start, stop)
-        columns = [found.columns.part(slice(i, i + 1)) for found in solved]
-        arrays = [(found.points[own], found.velocities[own]) for found in solved]
+        nodes = slice(start, stop)
+        columns = [solution.columns.part(slice(i, i + 1)) for solution in solved]
+        arrays = [(solution.points[nodes], solution.velocities[nodes]) for solution in solved]
         return Fit(curve_of(space, times[i], arrays), columns, options.method, [])
 
     fits = [one(i, *pair) for i, pair in enumerate(pairwise(offsets))]
@@ -335,7 +351,7 @@ def fit_many(problem: ManyProblem, progress: Progress | None) -> tuple[list[Fit]
 
 
 def validated(
-    space: Space[Any],
+    space: AnySpace,
     times: Doubles,
     points: list[Points],
     ends: list[list[End] | None],
@@ -352,7 +368,7 @@ def validated(
 
 
 def hermite_data(
-    space: Space[Any], times: Doubles, points: list[Points], velocities: list[tuple[Array, float]]
+    space: AnySpace, times: Doubles, points: list[Points], velocities: list[tuple[Array, float]]
 ) -> list[tuple[Array, Array, Array]]:
     """Validate the data of a Hermite spline.
 
@@ -375,8 +391,8 @@ def hermite_data(
         If inner control points of a segment lie at or past each other's cut locus.
     """
 
-    def checked(factor: Space, own: tuple[Points, tuple[Array, float]]) -> tuple[Array, Array, Array]:
-        part, (vectors, tangent_tol) = own
+    def checked(factor: Space, data_of_factor: tuple[Points, tuple[Array, float]]) -> tuple[Array, Array, Array]:
+        part, (vectors, tangent_tol) = data_of_factor
         if isinstance(factor, Manifold):
             task = Task(cover_of(factor), times, part.numbers, NATURAL, part.tol)
             return *hermite_on_manifold(task, vectors), np.full(math.prod(part.batch), np.inf)
@@ -387,12 +403,12 @@ def hermite_data(
             # The curve between these nodes has more knots, so that its control points are not those of the segment.
             slow = doubles.copy()
             slow[..., :-1, :][turns.sides > 0] = slow[..., 1:, :][turns.sides > 0] = np.nan
-        found, tangent, longest = _core.hermite(factor._handle, times, part.numbers, slow, part.tol, tangent_tol)
+        on_space, tangent, longest = _core.hermite(factor._handle, times, part.numbers, slow, part.tol, tangent_tol)
         if turns is not None:
             tangent = doubles
-        found, tangent = factor._numbers(found), factor._numbers(tangent)
-        require_short_handles(factor, times, found, tangent)
-        return found, tangent, longest
+        on_space, tangent = factor._numbers(on_space), factor._numbers(tangent)
+        require_short_handles(factor, times, on_space, tangent)
+        return on_space, tangent, longest
 
     return _in_factors(space, checked, list(zip(points, velocities, strict=True)))
 
@@ -422,20 +438,20 @@ def solve_tasks(
             number = vars(error).pop("_factor", None)
             raise (error if number is None else _in_factor(error, number, tasks[number].space)) from None
     tasks, invalid = validated_tasks(space, tasks, options)
-    each = [_solve(task, options, share(progress, i, len(tasks))) for i, task in enumerate(tasks)]
-    return each, faults_of(each, invalid)
+    solutions = [_solve(task, options, share(progress, i, len(tasks))) for i, task in enumerate(tasks)]
+    return solutions, faults_of(solutions, invalid)
 
 
 def validated_tasks(space: Space, tasks: list[Task], options: Options) -> tuple[list[Task], list[Fault]]:
     """Validate tasks and project their points. A curve that is skipped in one factor is masked in all of them."""
-    each = _in_factors(space, lambda _, task: _validate(task, options), tasks)
-    found = {fault.curve: fault for _, faults in reversed(each) for fault in faults}
-    faults = [found[curve] for curve in sorted(found)]
+    validations = _in_factors(space, lambda _, task: _validate(task, options), tasks)
+    first_faults = {fault.curve: fault for _, faults in reversed(validations) for fault in faults}
+    faults = [first_faults[curve] for curve in sorted(first_faults)]
     mask = without(tasks[0].mask, faults, tasks[0].batch)
-    return [task._replace(mask=mask) for task, _ in each], faults
+    return [task._replace(mask=mask) for task, _ in validations], faults
 
 
-def _in_factors(space: Space[Any], work: Callable[[Space, Any], _T], values: Sequence[Any]) -> list[_T]:
+def _in_factors(space: AnySpace, work: Callable[[Space, Any], _T], values: Sequence[Any]) -> list[_T]:
     """Apply a function to each factor and its value. Errors name the factor."""
     if not isinstance(space, Product):
         return [work(space, values[0])]
@@ -458,13 +474,13 @@ def _check_precision(problem: ManyProblem) -> list[Fault]:
     space, times, points, _, _, _, mask, skip, _ = problem
     faults: dict[int, Fault] = {}
     for i, factor in enumerate(factors_of(space)):
-        most = max(own[i].tol for own in points)
-        for number, own in enumerate(points):
-            if own[i].tol >= most or (mask is not None and not mask[number]):
+        most = max(parts_of_curve[i].tol for parts_of_curve in points)
+        for number, parts_of_curve in enumerate(points):
+            if parts_of_curve[i].tol >= most or (mask is not None and not mask[number]):
                 continue
             # Invalid times are an error in any case, which is raised later.
             knots = np.arange(len(times[number]), dtype=float)
-            task = Task(factor, knots, own[i].numbers, NATURAL, own[i].tol)
+            task = Task(factor, knots, parts_of_curve[i].numbers, NATURAL, parts_of_curve[i].tol)
             try:
                 _validate(task, _ANY)
             except ValidationError as error:

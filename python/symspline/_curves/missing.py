@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import inspect
-import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from typing import Any, ParamSpec, TypeVar
@@ -14,28 +13,23 @@ from numpy.typing import NDArray
 
 from .._base.arrays import as_array, filled, refuse
 from .._base.exceptions import SymsplineError
+from .._base.faults import Sample, renamed
 from .._base.input import times_of
 from .._core import ValidationError
-from .._spaces import Product, Space, factors_of, parts_of, space_named
+from .._spaces import AnySpace, Array, Doubles, Product, factors_of, parts_of, space_named
 from .fit import Points
 
 Mask = NDArray[np.bool_]
-# Parts of the core's messages about times and points that are not finite.
-_NAN_TIME = "is NaN; times must be finite"
-_NOT_FINITE = "No point is close to it; correct it or remove it"
-# Samples in messages: `points[3]`, `t[0][3]` of the first curve, `measurements[0].y: point 3`.
-_SAMPLE = re.compile(r"\b(t|points|velocities|omega|measurements\[(\d+)\]\.\w+)(?:\[(\d+)\](?=\[))?(\[|: point )(\d+)")
-
 _Arguments = ParamSpec("_Arguments")
 _Result = TypeVar("_Result")
 
 
-def missing_times(times: NDArray[Any]) -> Mask:
+def missing_times(times: Array) -> Mask:
     """Return where times are NaN or NaT."""
     return np.isnan(times) if times.dtype.kind in "fmM" else np.zeros(times.shape, bool)
 
 
-def without_missing(t: Any, points: Any, space: Space[Any]) -> tuple[Any, Any, Mask]:
+def without_missing(t: Any, points: Any, space: AnySpace) -> tuple[Any, Any, Mask]:
     """Return times and points without missing samples, and a mask of the samples that are present in each curve.
 
     A sample is missing if its time, or a number of its point in any factor, is NaN, NaT or masked. Samples that are
@@ -51,15 +45,15 @@ def without_missing(t: Any, points: Any, space: Space[Any]) -> tuple[Any, Any, M
         Whether each of the given samples is present.
     """
     parts = [factor._array(filled(p), "points") for factor, p in zip(*_each(points, space), strict=True)]
-    found = [missing_points(factor, part) for factor, part in zip(factors_of(space), parts, strict=True)]
+    masks = [missing_points(factor, part) for factor, part in zip(factors_of(space), parts, strict=True)]
     moments = None if t is None else as_array(times_of(filled(t), "t")[0], "t")
     if moments is not None:
-        found.append(missing_times(moments))
+        masks.append(missing_times(moments))
     try:
-        missing = np.any(np.broadcast_arrays(*found), axis=0)
+        missing = np.any(np.broadcast_arrays(*masks), axis=0)
     except ValueError:
         # The fit raises an error for these shapes.
-        return t, points, ~found[0]
+        return t, points, ~masks[0]
     if missing.ndim == 0 or not missing.any():
         return t, points, ~missing
     kept = ~missing.all(axis=tuple(range(missing.ndim - 1)))
@@ -67,7 +61,7 @@ def without_missing(t: Any, points: Any, space: Space[Any]) -> tuple[Any, Any, M
     return times, _rows_of_points(points, kept, space), ~missing
 
 
-def curves_without_missing(t: Any, points: Any, space: Space[Any]) -> tuple[Any, Any]:
+def curves_without_missing(t: Any, points: Any, space: AnySpace) -> tuple[Any, Any]:
     """Return times and points of interpolating curves without missing samples.
 
     Raises
@@ -75,28 +69,28 @@ def curves_without_missing(t: Any, points: Any, space: Space[Any]) -> tuple[Any,
     ValidationError
         If different samples are missing in the curves of a batch.
     """
-    times, own, present = without_missing(t, points, space)
+    times, present_points, present = without_missing(t, points, space)
     _check_alike(present)
-    return times, own
+    return times, present_points
 
 
-def inner_velocities_of_present(t: Any, points: Any, space: Space[Any], velocities: Any) -> Any:
+def inner_velocities_of_present(t: Any, points: Any, space: AnySpace, velocities: Any) -> Any:
     """Return velocities at some samples, by their indices among the samples that are present."""
     _, _, present = without_missing(t, points, space)
     kept = np.asarray(present.any(axis=tuple(range(present.ndim - 1))))
     if not isinstance(velocities, Mapping) or kept.all():
         return velocities
     place = np.where(kept, np.cumsum(kept) - 1, -1).tolist()
-    found = {}
+    present_velocities = {}
     for i, vector in velocities.items():
         known = isinstance(i, (int, np.integer)) and 0 <= i < len(place)
         if known and place[i] < 0:
             raise ValidationError(f"velocities has the key {i}, but this point is missing (NaN). Remove the key.")
-        found[place[i] if known else i] = vector
-    return found
+        present_velocities[place[i] if known else i] = vector
+    return present_velocities
 
 
-def nodes_without_missing(t: Any, points: Any, velocities: Any, space: Space[Any]) -> tuple[Any, Any, Any]:
+def nodes_without_missing(t: Any, points: Any, velocities: Any, space: AnySpace) -> tuple[Any, Any, Any]:
     """Return times, points and velocities without samples in which any of these is missing."""
     _, vectors, moving = without_missing(None, velocities, space)
     _, places, present = without_missing(t, points, space)
@@ -108,25 +102,23 @@ def nodes_without_missing(t: Any, points: Any, velocities: Any, space: Space[Any
     kept = np.asarray(both.any(axis=tuple(range(both.ndim - 1))))
     count = np.arange(len(kept), dtype=np.float64)
     times = rows_of(count if t is None else filled(t), kept)
-    places, vectors = (_rows_of_points(own, kept, space) for own in (points, velocities))
+    places, vectors = (_rows_of_points(values, kept, space) for values in (points, velocities))
     return times, places, vectors
 
 
-def data_without_missing(
-    t: Any, points: Any, weights: Any, frames: Any, space: Space[Any]
-) -> tuple[Any, Any, Any, Any]:
+def data_without_missing(t: Any, points: Any, weights: Any, frames: Any, space: AnySpace) -> tuple[Any, Any, Any, Any]:
     """Return noisy data without missing samples; samples missing only in some curves get the weight zero."""
-    times, own, present = without_missing(t, points, space)
+    times, present_points, present = without_missing(t, points, space)
     kept = np.asarray(present.any(axis=tuple(range(present.ndim - 1))))
     if kept.all() and present.all():
-        return times, own, weights, frames
+        return times, present_points, weights, frames
     frames = tuple(rows_of(part, kept) for part in frames) if isinstance(frames, tuple) else rows_of(frames, kept)
-    return times, own, _weights(weights, present, kept), frames
+    return times, present_points, _weights(weights, present, kept), frames
 
 
 def _weights(weights: Any, present: Mask, kept: Mask) -> Any:
     if isinstance(weights, tuple):
-        return tuple(_weights(own, present, kept) for own in weights)
+        return tuple(_weights(part, present, kept) for part in weights)
     if weights is None or (present | ~kept).all():
         some = None if (present | ~kept).all() else present[..., kept].astype(np.float64)
         return some if weights is None else rows_of(weights, kept)
@@ -146,13 +138,13 @@ def _check_alike(present: Mask) -> None:
         )
 
 
-def _rows_of_points(points: Any, kept: Mask, space: Space[Any]) -> Any:
-    def rows(factor: Space[Any], part: Any) -> Any:
+def _rows_of_points(points: Any, kept: Mask, space: AnySpace) -> Any:
+    def rows(factor: AnySpace, part: Any) -> Any:
         index: Any = (..., kept, *[slice(None)] * len(factor.point_shape))
         return factor._array(filled(part), "points")[index]
 
-    own = tuple(map(rows, *_each(points, space)))
-    return own if isinstance(space, Product) else own[0]
+    present_parts = tuple(map(rows, *_each(points, space)))
+    return present_parts if isinstance(space, Product) else present_parts[0]
 
 
 def rows_of(value: Any, kept: Mask) -> Any:
@@ -160,7 +152,7 @@ def rows_of(value: Any, kept: Mask) -> Any:
     if value is None or np.ndim(value) == 0:
         return value
     if isinstance(value, (list, tuple)):
-        return [own for own, keep in zip(value, kept, strict=True) if keep] if len(value) == len(kept) else value
+        return [row for row, keep in zip(value, kept, strict=True) if keep] if len(value) == len(kept) else value
     if not isinstance(value, np.ndarray):
         return value[kept] if len(value) == len(kept) else value
     if value.shape[0] == len(kept):
@@ -201,49 +193,54 @@ def _rows_of_recordings(given: dict[str, Any]) -> list[NDArray[np.intp]]:
     vectors = given.get("velocities")
     extra = [] if vectors is None or isinstance(vectors, Mapping) else [(None, vectors)]
     curves = given["curves"] if "curves" in given else [(given["t"], given["points"])]
-    return [_rows_present([own, *extra], given["space"]) for own in curves]
+    return [_rows_present([curve, *extra], given["space"]) for curve in curves]
 
 
 def _rows_present(data: Iterable[tuple[Any, Any]], space: Any) -> NDArray[np.intp]:
     """Return the indices of the samples that are present in all of several recordings with the same times."""
-    found = [without_missing(t, points, space_named(space))[2] for t, points in data]
-    return np.flatnonzero(np.all([own.any(axis=tuple(range(own.ndim - 1))) for own in found], axis=0))
+    masks = [without_missing(t, points, space_named(space))[2] for t, points in data]
+    return np.flatnonzero(np.all([mask.any(axis=tuple(range(mask.ndim - 1))) for mask in masks], axis=0))
 
 
 counts_all_samples = recounting(_rows_of_recordings)
 
 
 def recounted(error: SymsplineError, rows: Sequence[NDArray[np.intp]]) -> SymsplineError:
-    """Return an error about selected rows of recordings with the indices of these rows, given for each recording."""
+    """Return an error whose message counts all samples of the user, including those that were omitted."""
 
-    def index(match: re.Match[str]) -> str:
-        name, measurement, curve, opening, i = match.groups()
-        own = rows[min(int(measurement or curve or (error.curve or [0])[0]), len(rows) - 1)]
-        first = "" if curve is None else f"[{curve}]"
-        return f"{name}{first}{opening}{own[int(i)] if int(i) < len(own) else i}"
+    def name(sample: Sample) -> tuple[str, int]:
+        known = (sample.measurement, sample.curve, *(error.curve or ()), 0)
+        number = next(number for number in known if number is not None)
+        present = rows[min(number, len(rows) - 1)]
+        return sample.argument, int(present[sample.node]) if sample.node < len(present) else sample.node
 
-    return error._with_message(_SAMPLE.sub(index, str(error)))
+    return renamed(error, name)
 
 
 @contextmanager
-def missing_named(data: Iterable[Points]) -> Iterator[None]:
-    """Add the remedy ``skipna=True`` to an error about points that are missing."""
+def missing_named(data: Sequence[Points], times: Doubles | None = None) -> Iterator[None]:
+    """Add to errors about missing samples how they are omitted."""
     try:
         yield
     except ValidationError as error:
-        raise with_remedy(error, data) from None
+        raise with_remedy(error, data, times) from None
 
 
-def with_remedy(error: ValidationError, data: Iterable[Points]) -> ValidationError:
-    """Return the error, with the remedy ``skipna=True`` if points are missing."""
-    if _NAN_TIME in str(error):
+def with_remedy(
+    error: ValidationError, data: Sequence[Points], times: Doubles | None = None, of_many: bool = False
+) -> ValidationError:
+    """Return the error, with a remedy if it is about a sample that is missing.
+
+    Data and times are those of the curves together, or with `of_many` those of the curve that the error is about.
+    """
+    if error.node is None:
+        return error
+    at = (*(() if of_many else error.curve or ()), error.node)
+    if times is not None and np.isnan(times[at if times.ndim > 1 else error.node]):
         return error._with_message(f"{error}. Pass skipna=True to omit missing samples.")
-    if _NOT_FINITE not in str(error):
-        return error
-    missing = sum(int(np.isnan(part.numbers).any(axis=-1).sum()) for part in data)
-    if not missing:
-        return error
-    return error._with_message(f"{error}. Pass skipna=True to omit missing points (NaN).")
+    if any(np.isnan(part.numbers[at]).any() for part in data):
+        return error._with_message(f"{error}. Pass skipna=True to omit missing points (NaN).")
+    return error
 
 
 def refuse_missing(present: Mask, used: Mask | None = None) -> None:
@@ -264,11 +261,11 @@ def refuse_nan_times(times: NDArray[np.float64]) -> None:
     refuse(~np.isfinite(times), "t", described)
 
 
-def _each(points: Any, space: Space[Any]) -> tuple[tuple[Space[Any], ...], tuple[Any, ...]]:
+def _each(points: Any, space: AnySpace) -> tuple[tuple[AnySpace, ...], tuple[Any, ...]]:
     return factors_of(space), parts_of(points, space, "points")
 
 
-def missing_points(factor: Space[Any], array: NDArray[Any]) -> Mask:
+def missing_points(factor: AnySpace, array: Array) -> Mask:
     """Return where a number of a point of a space that is not a product is NaN. Infinite numbers are not missing."""
     axes = tuple(range(max(0, array.ndim - len(factor.point_shape)), array.ndim))
     if array.dtype.kind not in "fc":

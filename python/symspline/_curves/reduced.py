@@ -8,12 +8,12 @@ Curves are fitted and evaluated in these coordinates, and the results are embedd
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from .._base.typing import Progress
-from .._spaces import Array, ComplexGrassmannian, Grassmannian, Hyperbolic, Space, cover_of
+from .._spaces import AnySpace, Array, ComplexGrassmannian, Grassmannian, Hyperbolic, Space, cover_of
 from .ends import map_ends
 from .solve import Options, Solved, Task, solve_single
 
@@ -92,7 +92,7 @@ def _uncolumns(space: Space, time: Array | None, columns: Array, shape: tuple[in
     return np.ascontiguousarray(np.moveaxis(stacked, -2, -3))
 
 
-def reduced(space: Space[Any], points: Array) -> tuple[Space[Any], Array, Span | None]:
+def reduced(space: AnySpace, points: Array) -> tuple[AnySpace, Array, Span | None]:
     """Return the space and the points to compute with, and the span of a low-rank reduction or None."""
     if not space._is_large:
         return space, points, None
@@ -110,5 +110,5 @@ def solve_in_span(task: Task, options: Options, progress: Progress | None) -> So
     span = span_of(space, points, *(vector for _, vector in vectors or [] if vector is not None))
     ends = map_ends(vectors, lambda vector: span.space._as_doubles(span.coordinates(vector).squeeze(axis)))
     small = task._replace(space=span.space, points=span.space._as_doubles(span.coordinates(points)), ends=ends)
-    found = solve_single(small, options, progress)
-    return found._replace(points=points, velocities=span.embed(found.velocities))
+    solution = solve_single(small, options, progress)
+    return solution._replace(points=points, velocities=span.embed(solution.velocities))

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .._base.faults import of_index, warn
+from .._base.faults import between_neighbours, of_index, warn
 from .._base.report import FarPointsWarning
 from .._core import CutLocusError, ValidationError
-from .._spaces import Array, Doubles, Euclidean, Space, cover_of, factors_of
+from .._spaces import AnySpace, Array, Doubles, Euclidean, cover_of, factors_of
 from ..manifolds import Manifold
 from .curve import CurveArrays, FactorArrays
 from .fit import curve_of_factors
@@ -23,7 +23,7 @@ _AKIMA_ROUNDING = 1e-9
 _BEFORE, _AFTER = 1, 2
 
 
-def geodesic_velocities(space: Space[Any], times: Doubles, points: Array) -> tuple[Array, Array]:
+def geodesic_velocities(space: AnySpace, times: Doubles, points: Array) -> tuple[Array, Array]:
     """Return the velocities of the geodesics between neighbouring points, at their starts and at their ends.
 
     They are NaN, with a warning, between two points that no unique geodesic joins.
@@ -53,8 +53,8 @@ def geodesic_velocities(space: Space[Any], times: Doubles, points: Array) -> tup
         *curve, i = (int(k) for k in np.argwhere(~joined)[0])
         pair = f"points[{i}] and points[{i + 1}]{of_index(curve)}"
         if isinstance(cover, Manifold) or not joined.any():
-            what = str(error).partition(": ")[2]
-            raise CutLocusError(f"{pair}: {what}. Put a point between them.") from None
+            located = between_neighbours(error, "points", lead)
+            raise located._with_message(f"{located}. Put a point between them.") from None
         others = np.count_nonzero(~joined) - 1
         more = f" (and {others} more such pairs)" if others else ""
         warn(
@@ -70,18 +70,18 @@ def geodesic_velocities(space: Space[Any], times: Doubles, points: Array) -> tup
         return starts, ends
 
 
-def _are_joined(space: Space[Any], p: Array, q: Array) -> NDArray[np.bool_]:
+def _are_joined(space: AnySpace, p: Array, q: Array) -> NDArray[np.bool_]:
     """Return which rows are points with a unique geodesic between them, by bisection."""
     try:
         space.log(p, q), space.log(q, p)
     except CutLocusError:
         half = len(p) // 2
-        parts = [(p[own], q[own]) for own in (slice(half), slice(half, None))]
+        parts = [(p[half_of_pairs], q[half_of_pairs]) for half_of_pairs in (slice(half), slice(half, None))]
         return np.concatenate([_are_joined(space, *part) for part in parts]) if half else np.zeros(1, bool)
     return np.ones(len(p), bool)
 
 
-def local_velocities(space: Space[Any], times: Doubles, points: Array, method: str) -> Array:
+def local_velocities(space: AnySpace, times: Doubles, points: Array, method: str) -> Array:
     """Return velocities at the nodes that depend on a few neighbouring points only.
 
     Parameters
@@ -106,13 +106,13 @@ def local_velocities(space: Space[Any], times: Doubles, points: Array, method: s
         for first, stop in pairwise([0, *(cuts + 1), len(t)]):
             if stop - first > 1:
                 nodes, segments = slice(first, stop), slice(first, stop - 1)
-                own = points[curve][nodes], starts[curve][segments], ends[curve][segments]
-                result[curve][nodes] = _local(cover, t[nodes], *own, method)
+                arrays = points[curve][nodes], starts[curve][segments], ends[curve][segments]
+                result[curve][nodes] = _local(cover, t[nodes], *arrays, method)
         result[curve][cuts] = result[curve][cuts + 1] = np.nan
     return result
 
 
-def _local(space: Space[Any], times: Doubles, points: Array, starts: Array, ends: Array, method: str) -> Array:
+def _local(space: AnySpace, times: Doubles, points: Array, starts: Array, ends: Array, method: str) -> Array:
     axis = points.ndim - len(space.point_shape) - 1
     if points.shape[axis] == 2:
         # One segment is a geodesic.
@@ -134,10 +134,10 @@ class _Slopes:
         Velocities of `geodesic_velocities`.
     """
 
-    def __init__(self, space: Space[Any], times: Doubles, points: Array, starts: Array, ends: Array) -> None:
+    def __init__(self, space: AnySpace, times: Doubles, points: Array, starts: Array, ends: Array) -> None:
         self.space, self.axes = space, len(space.point_shape)
         # The axis of nodes comes first, so that formulas are those of SciPy.
-        self.points, starts, ends = (self._nodes_first(array) for array in (points, starts, ends))
+        self.points, starts, ends = (np.moveaxis(array, -1 - self.axes, 0) for array in (points, starts, ends))
         h = np.moveaxis(np.broadcast_to(np.diff(times), (*points.shape[: -1 - self.axes], len(starts))), -1, 0)
         self.h = wide(h, space)
         n = len(self.points)
@@ -161,7 +161,7 @@ class _Slopes:
         h = self.h
         v = np.empty_like(self.points)
         v[1:-1] = (h[1:] * before[1:-1] + h[:-1] * after[1:-1]) / (h[:-1] + h[1:])
-        v[0], v[-1] = self._parabola_at_ends()
+        v[0], v[-1] = self._end(0)[0], self._end(-1)[0]
         return self._nodes_last(v)
 
     def akima(self) -> Array:
@@ -179,13 +179,13 @@ class _Slopes:
         """Return velocities by the weighted harmonic mean of Fritsch and Butland."""
         _, before, after, _ = self.m
         v = np.empty_like(self.points)
-        own = [each[1:-1] for each in (before, after)]
-        sizes = [self._size(each, 1) for each in own]
+        neighbours = [velocities[1:-1] for velocities in (before, after)]
+        sizes = [self._size(velocities, 1) for velocities in neighbours]
         # The harmonic mean along the bisector of both directions, where they have equal signs, times the cosine of half
         # the angle between them. Across the bisector signs differ, and the formula for components gives zero. In one
         # dimension, half the sum of the directions is 1, -1 or 0, and this is the formula of SciPy.
         with np.errstate(all="ignore"):
-            units = [np.nan_to_num(each / size) for each, size in zip(own, sizes, strict=True)]
+            units = [np.nan_to_num(velocities / size) for velocities, size in zip(neighbours, sizes, strict=True)]
             sum_of_units = units[0] + units[1]
             w1, w2 = 2 * self.h[1:] + self.h[:-1], self.h[1:] + 2 * self.h[:-1]
             mean = np.nan_to_num((w1 + w2) / (w1 / sizes[0] + w2 / sizes[1]))
@@ -193,9 +193,6 @@ class _Slopes:
         for i, end, near, next_ in ((0, *self._end(0)), (-1, *self._end(-1))):
             v[i] = self._limited(end, near, next_, i)
         return self._nodes_last(v)
-
-    def _parabola_at_ends(self) -> tuple[Array, Array]:
-        return self._end(0)[0], self._end(-1)[0]
 
     def _end(self, i: int) -> tuple[Array, Array, Array]:
         """Return the velocity of a parabola at an end, and those of the two nearest segments."""
@@ -224,9 +221,6 @@ class _Slopes:
             return np.sign(v) * np.sign(w)
         return wide(np.asarray(self.space.inner(p, v, w)), self.space)
 
-    def _nodes_first(self, array: Array) -> Array:
-        return np.moveaxis(array, -1 - self.axes, 0)
-
     def _nodes_last(self, array: Array) -> Array:
         return np.ascontiguousarray(np.moveaxis(array, 0, -1 - self.axes))
 
@@ -237,7 +231,7 @@ def check_method(method: Any) -> None:
         raise ValidationError(f"method must be one of {', '.join(map(repr, METHODS))}, not {method!r}")
 
 
-def wide(values: NDArray[Any], space: Space[Any]) -> NDArray[Any]:
+def wide(values: Array, space: AnySpace) -> Array:
     """Append the axes of a point."""
     return values.reshape(values.shape + (1,) * len(space.point_shape))
 
@@ -261,14 +255,14 @@ def _jumps(factor: FactorArrays) -> Doubles:
     if not p.size:
         return np.zeros(p.shape[: p.ndim - len(space.point_shape)])
     gaps = ~(space._where_finite(before) & space._where_finite(after))
-    before, after = (np.where(wide(gaps, space), 0, own) for own in (before, after))
+    before, after = (np.where(wide(gaps, space), 0, velocities) for velocities in (before, after))
     with np.errstate(all="ignore"):
         jumps: Doubles = np.nan_to_num(space.norm(p, after - before) / space.norm(p, before), nan=0.0)
     jumps[gaps] = np.nan
     return jumps
 
 
-def joined(space: Space[Any], times: Doubles, points: list[Array]) -> CurveArrays:
+def joined(space: AnySpace, times: Doubles, points: list[Array]) -> CurveArrays:
     """Return the curve of geodesics between neighbouring points, given in each factor.
 
     It is a curve of cubic segments with corners at the knots. Between two points that no unique geodesic joins,
@@ -280,10 +274,10 @@ def joined(space: Space[Any], times: Doubles, points: list[Array]) -> CurveArray
         If all neighbouring points lie at or past each other's cut locus.
     """
     factors = []
-    for factor, own in zip(factors_of(space), points, strict=True):
-        starts, ends = geodesic_velocities(factor, times, own)
-        axis = own.ndim - len(factor.point_shape) - 1
+    for factor, nodes in zip(factors_of(space), points, strict=True):
+        starts, ends = geodesic_velocities(factor, times, nodes)
+        axis = nodes.ndim - len(factor.point_shape) - 1
         first, last = np.take(starts, [0], axis=axis), np.take(ends, [-1], axis=axis)
         after, before = np.concatenate([starts, last], axis=axis), np.concatenate([first, ends], axis=axis)
-        factors.append(FactorArrays(factor, own, after, before))
+        factors.append(FactorArrays(factor, nodes, after, before))
     return curve_of_factors(space, times, tuple(factors), fitted=False)

@@ -99,8 +99,10 @@ def solve(
     factors, solved, failed = [], [], False
     for task in tasks:
         factors.append((task.space._handle, task.points, task.ends, task.tol))
-    each = _core.fit(factors, times, *options, offsets, None if mask is None else mask.ravel().tolist(), skip, progress)
-    for task, (points, velocities, tables, raw) in zip(tasks, each, strict=True):
+    results = _core.fit(
+        factors, times, *options, offsets, None if mask is None else mask.ravel().tolist(), skip, progress
+    )
+    for task, (points, velocities, tables, raw) in zip(tasks, results, strict=True):
         space, columns, faults = task.space, Columns(*tables), []
         if raw:
             failed, quaternions = True, space._name == "sphere"
@@ -121,11 +123,11 @@ def faults_of(solved: list[Solved], invalid: list[Fault]) -> list[Fault]:
 
     This is the first factor in which a curve failed. If there is none, it is the first factor with faults.
     """
-    of_points = [*invalid, *(fault for found in solved for fault in found.faults if fault.kind == INVALID)]
+    of_points = [*invalid, *(fault for solution in solved for fault in solution.faults if fault.kind == INVALID)]
     # The first fault of a curve counts.
     skipped = {fault.curve: fault for fault in reversed(of_points)}
-    others = [[fault for fault in found.faults if fault.kind != INVALID] for found in solved]
-    others = sorted(filter(None, others), key=lambda own: not any(fault.failed for fault in own))
+    others = [[fault for fault in solution.faults if fault.kind != INVALID] for solution in solved]
+    others = sorted(filter(None, others), key=lambda faults: not any(fault.failed for fault in faults))
     return sorted([*skipped.values(), *(others[0] if others else [])], key=lambda fault: fault.curve)
 
 
@@ -147,11 +149,11 @@ def validate(task: Task) -> tuple[Task, list[Fault]]:
     space, times, points, ends, tol, offsets, mask, skip, _ = task
     if tol is None:
         return task._replace(points=points.copy()), []
-    found, raw = _core.validate(
+    on_space, raw = _core.validate(
         space._handle, times, points, ends, tol, offsets, None if mask is None else mask.ravel().tolist(), skip
     )
     faults = [from_core(one, Columns.empty(0), 0.0, False) for one in raw]
-    return task._replace(points=found, tol=None, mask=without(mask, faults, task.batch)), faults
+    return task._replace(points=on_space, tol=None, mask=without(mask, faults, task.batch)), faults
 
 
 def without(mask: Mask | None, faults: list[Fault], batch: tuple[int, ...]) -> Mask | None:
@@ -180,10 +182,10 @@ def _one_by_one(task: Task, options: Options, progress: Progress | None, solver:
             continue
         ends = map_ends(task.ends, operator.itemgetter(slice(i, i + 1)))
         one = Task(task.space, task.times[start:stop], task.points[None, start:stop], ends, None)
-        found = solver(one, options, progress and partial(_advance, progress, start, offsets[-1]))
-        velocities[start:stop] = found.velocities[0]
-        columns.put([i], found.columns)
-        faults += [fault._replace(curve=i) for fault in found.faults]
+        solution = solver(one, options, progress and partial(_advance, progress, start, offsets[-1]))
+        velocities[start:stop] = solution.velocities[0]
+        columns.put([i], solution.columns)
+        faults += [fault._replace(curve=i) for fault in solution.faults]
     return Solved(points, velocities, columns, faults)
 
 
@@ -202,10 +204,12 @@ def _unmasked(task: Task, options: Options, progress: Progress | None, solver: S
 
     times = rows(task.times) if task.times.ndim > 1 else task.times
     some = task._replace(times=times, points=rows(task.points), ends=map_ends(task.ends, rows), mask=None)
-    found = solver(some, options, progress)
-    columns.put(chosen, found.columns)
-    points, velocities = (in_batch(batch, chosen, own) for own in (found.points, found.velocities))
-    return Solved(points, velocities, columns, [own._replace(curve=int(chosen[own.curve])) for own in found.faults])
+    solution = solver(some, options, progress)
+    columns.put(chosen, solution.columns)
+    points, velocities = (in_batch(batch, chosen, item) for item in (solution.points, solution.velocities))
+    return Solved(
+        points, velocities, columns, [item._replace(curve=int(chosen[item.curve])) for item in solution.faults]
+    )
 
 
 def in_batch(batch: tuple[int, ...], chosen: NDArray[np.intp] | None, column: Any) -> Any:

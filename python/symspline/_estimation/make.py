@@ -49,6 +49,7 @@ from .._spaces import (
     space_named,
 )
 from .._splines.base import Curve
+from .._splines.cubic import CubicSpline
 from ..manifolds._manifold import refuse_functions
 from ..measure import (
     SKIPNA,
@@ -517,19 +518,14 @@ def _curve(
     parameters = {
         name: Parameter(found.values[name], found.covariance[own, own]) for name, own in setup.columns.items()
     }
-    curve = EstimatedSpline._of(
-        axis,
-        shown,
-        through.curve,
-        setup.bc_type,
-        policy,
-        through.reports(),
-        None,
+    bc_type: Any = setup.bc_type
+    curve: EstimatedSpline[Any] = EstimatedSpline._of(
+        CubicSpline._fitted(axis, shown, through.curve, bc_type, policy, through.reports()),
         in_parts(found.posterior, found.reports, setup.spaces),
         parameters,
+        [long_gaps(setup, found, number) for number in range(len(setup.spaces))],
         tuple(given),
         tuple(_residuals_of(setup, found, f"measurements[{i}]") for i in range(len(given))),
-        [long_gaps(setup, found, number) for number in range(len(setup.spaces))],
     )
     if found.failure:
         hints = unit_hints(setup.terms)

@@ -198,9 +198,23 @@ class EstimatedSpline(SmoothingSpline[P, Any]):
     _residuals: tuple[Doubles | tuple[Doubles, ...], ...]
     _long_gaps: list[LongGaps | None]
 
-    def _fill(self, *parts: Any) -> None:
-        *own, self._parameters, self._measurements, self._residuals, self._long_gaps = parts
-        super()._fill(*own)
+    @classmethod
+    def _of(
+        cls,
+        curve: CubicSpline[Any, Any],
+        smoothed: list[Smoothed],
+        parameters: dict[str, Parameter],
+        long_gaps: list[LongGaps | None],
+        measurements: tuple[Any, ...] = (),
+        residuals: tuple[Doubles | tuple[Doubles, ...], ...] = (),
+    ) -> Self:
+        """Return the result of an estimate, without checks; what files do not hold may be omitted."""
+        # Measurements replace the noisy points of a smoothing fit.
+        noisy: Any = None
+        self = cls._like(curve, noisy, smoothed)
+        self._parameters, self._long_gaps = parameters, long_gaps
+        self._measurements, self._residuals = measurements, residuals
+        return self
 
     @property
     def parameters(self) -> Mapping[str, Parameter]:
@@ -307,7 +321,7 @@ class EstimatedSpline(SmoothingSpline[P, Any]):
 
     @property
     def _parts(self) -> Any:
-        return CubicSpline._of(
+        return CubicSpline._fitted(
             self._time_axis, self._t, self._curve, self._bc_type, self._extrapolate, self._reports
         )._parts
 
@@ -324,8 +338,8 @@ class EstimatedSpline(SmoothingSpline[P, Any]):
 
     @classmethod
     def _from_state(cls, state: Entries) -> Self:
-        parts = read_fitted(state)
-        curve = parts[2]
+        fitted: CubicSpline[Any, Any] = CubicSpline._fitted(*read_fitted(state))
+        curve = fitted._curve
         spaces, knots = smoothed_spaces(curve.space), curve.times.shape[-1]
         m = sum(space.dim for space in spaces)
         with entry("parameters"):
@@ -342,7 +356,7 @@ class EstimatedSpline(SmoothingSpline[P, Any]):
             smoothed = in_parts(Posterior(matrix, np.zeros((0, 0)), m, side, corner), reports, spaces)
         with entry("gaps"):
             gaps = [read_long_gaps(own) for own in state.get("gaps", [None] * len(spaces))]
-        return cls._of(*parts, None, smoothed, parameters, (), (), gaps)
+        return cls._of(fitted, smoothed, parameters, gaps)
 
     def __repr__(self) -> str:
         knots, parameters = self._times.shape[-1], ", ".join(self._parameters) or "no parameters"
@@ -379,12 +393,18 @@ class PointsSpline(SmoothingSpline[P, Any]):
             with np.errstate(divide="ignore", invalid="ignore"):
                 found.append(np.asarray(rows / term.noise / scale))
         residuals = found[0] if len(found) == 1 else tuple(found)
-        parts = (fitted._time_axis, fitted._t, fitted._curve, fitted._bc_type, fitted._extrapolate, fitted._reports)
-        return cls._of(*parts, fitted._noisy, fitted._smoothed, (given,), (residuals,))
+        return cls._of(fitted, (given,), (residuals,))
 
-    def _fill(self, *parts: Any) -> None:
-        *own, self._measurements, self._residuals = parts
-        super()._fill(*own)
+    @classmethod
+    def _of(
+        cls,
+        fitted: SmoothingSpline[Any, Any],
+        measurements: tuple[Any, ...],
+        residuals: tuple[Doubles | tuple[Doubles, ...], ...],
+    ) -> Self:
+        self = super()._like(fitted, fitted._noisy, fitted._smoothed)
+        self._measurements, self._residuals = measurements, residuals
+        return self
 
     @property
     def measurements(self) -> tuple[Any, ...]:
@@ -408,5 +428,4 @@ class PointsSpline(SmoothingSpline[P, Any]):
     @classmethod
     def _from_state(cls, state: Entries) -> Self:
         spline = SmoothingSpline._from_state(state)
-        parts = (spline._time_axis, spline._t, spline._curve, spline._bc_type, spline._extrapolate, spline._reports)
-        return cls._of(*parts, spline._noisy, spline._smoothed, (), ())
+        return cls._of(spline, (), ())

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from .._base.arrays import as_array, filled, refuse, short_repr
-from .._base.faults import warn
+from .._base.faults import renamed, warn
 from .._base.report import FarPointsWarning
 from .._base.time import TimeAxis, time_axis_of
 from .._core import CutLocusError, ValidationError
@@ -16,7 +16,7 @@ from .._curves.ends import NATURAL
 from .._curves.failures import FAR, cut_fractions
 from .._curves.fit import Points, validated
 from .._curves.options import extrapolation_mode
-from .._spaces import Array, Doubles, Quotient, Space, cover_of, factors_of, parts_of
+from .._spaces import AnySpace, Array, Doubles, Quotient, cover_of, factors_of, parts_of
 
 Ends = tuple[str, str] | None
 _WORDS = ("natural", "not-a-knot", "clamped")
@@ -115,7 +115,7 @@ def read_axes(axes: Any, shape: tuple[int, ...] | None, bc_type: Any) -> list[Gr
             f"points has the grid axes {shape}, but there are {dims} axes of knots. Pass one array of knots per axis, "
             "or None for 0, 1, ..., n - 1."
         )
-    return [_axis(k, *each) for k, each in enumerate(zip(axes, shape, conditions, strict=True))]
+    return [_axis(k, *arguments) for k, arguments in enumerate(zip(axes, shape, conditions, strict=True))]
 
 
 def _axis(k: int, t: Any, nodes: int, ends: Ends) -> GridAxis:
@@ -144,7 +144,7 @@ def _conditions(bc_type: Any, dims: int) -> list[Ends]:
         return [_ends(bc_type)] * dims
     if not isinstance(bc_type, (tuple, list)) or len(bc_type) != dims:
         raise ValidationError(f"{_HELP}; got {short_repr(bc_type)} for {dims} axes")
-    return [_ends(each) for each in bc_type]
+    return [_ends(value) for value in bc_type]
 
 
 def _ends(value: Any) -> Ends:
@@ -182,24 +182,24 @@ def coordinates(axes: list[GridAxis], x: Any, outer: bool) -> tuple[list[Doubles
             )
     if len(x) != dims:
         raise ValidationError(f"x has {len(x)} coordinates, but the grid has {dims} axes")
-    own = [axis.time_axis.at(each, (), False, axis.knots)[0] for axis, each in zip(axes, x, strict=True)]
-    for k, each in enumerate(own):
-        refuse(~np.isfinite(each), f"x[{k}]", lambda _: "is not finite; coordinates must be finite")
+    arrays = [axis.time_axis.at(x_k, (), False, axis.knots)[0] for axis, x_k in zip(axes, x, strict=True)]
+    for k, x_k in enumerate(arrays):
+        refuse(~np.isfinite(x_k), f"x[{k}]", lambda _: "is not finite; coordinates must be finite")
     if outer:
-        for k, each in enumerate(own):
-            if each.ndim > 1:
-                raise ValidationError(f"the coordinates along axis {k} have shape {each.shape}, but must be a vector")
-        lead = tuple(size for each in own for size in each.shape)
-        return [np.ascontiguousarray(each.ravel()) for each in own], lead, True
+        for k, x_k in enumerate(arrays):
+            if x_k.ndim > 1:
+                raise ValidationError(f"the coordinates along axis {k} have shape {x_k.shape}, but must be a vector")
+        lead = tuple(size for x_k in arrays for size in x_k.shape)
+        return [np.ascontiguousarray(x_k.ravel()) for x_k in arrays], lead, True
     try:
-        shape = np.broadcast_shapes(*(each.shape for each in own))
+        shape = np.broadcast_shapes(*(x_k.shape for x_k in arrays))
     except ValueError:
-        shapes = ", ".join(str(each.shape) for each in own)
+        shapes = ", ".join(str(x_k.shape) for x_k in arrays)
         raise ValidationError(f"the coordinates do not broadcast: their shapes are {shapes}") from None
-    if dims > 1 and len(shape) == dims and all(each.size == each.shape[k] for k, each in enumerate(_padded(own))):
+    if dims > 1 and len(shape) == dims and all(x_k.size == x_k.shape[k] for k, x_k in enumerate(_padded(arrays))):
         # Each coordinate varies along an axis of its own, as those of an open mesh do.
-        return [np.ascontiguousarray(each.ravel()) for each in own], shape, True
-    return [np.ascontiguousarray(np.broadcast_to(each, shape).ravel()) for each in own], shape, False
+        return [np.ascontiguousarray(x_k.ravel()) for x_k in arrays], shape, True
+    return [np.ascontiguousarray(np.broadcast_to(x_k, shape).ravel()) for x_k in arrays], shape, False
 
 
 def _padded(arrays: list[Doubles]) -> list[Doubles]:
@@ -217,28 +217,28 @@ def sites_of(
     ValidationError
         If the policy is to raise and a coordinate is outside its axis.
     """
-    own, modes, missing = [], [], []
-    for k, (axis, each) in enumerate(zip(axes, x, strict=True)):
+    kept, modes, missing = [], [], []
+    for k, (axis, times) in enumerate(zip(axes, x, strict=True)):
         mode = extrapolation_mode(extrapolate, axis.bc_type)
         first, last = axis.knots[0], axis.knots[-1]
-        outside = ~((each >= first) & (each <= last))
+        outside = ~((times >= first) & (times <= last))
         if mode == "raise" and outside.any():
             i = int(np.flatnonzero(outside)[0])
             message = (
-                f"the coordinate {each[i]} is outside axis {k}, which extends from {first} to {last}; pass "
+                f"the coordinate {times[i]} is outside axis {k}, which extends from {first} to {last}; pass "
                 "extrapolate=True or 'geodesic' to continue the spline there, or False for NaN"
             )
             raise axis.time_axis.explain(ValidationError(message))
         missing.append(outside if mode == "nan" else np.zeros(outside.shape, bool))
-        own.append(np.where(outside, first, each) if mode == "nan" else each)
+        kept.append(np.where(outside, first, times) if mode == "nan" else times)
         modes.append("continue" if mode in ("raise", "nan") else mode)
-    return Sites(own, outer, modes), missing
+    return Sites(kept, outer, modes), missing
 
 
 # ---- points at the nodes of a grid: reading and validation ----
 
 
-def read_nodes(points: Any, space: Space[Any], dims: int) -> tuple[list[Array], list[float], tuple[int, ...]]:
+def read_nodes(points: Any, space: AnySpace, dims: int) -> tuple[list[Array], list[float], tuple[int, ...]]:
     """Read points in each factor, their tolerances, and the numbers of nodes of the grid.
 
     Masked numbers become NaN. In quotients, representatives are chosen that are continuous over the grid.
@@ -257,7 +257,7 @@ def read_nodes(points: Any, space: Space[Any], dims: int) -> tuple[list[Array], 
     return arrays, tols, shapes[0]
 
 
-def _unwrapped(space: Space[Any], array: Array, dims: int) -> Array:
+def _unwrapped(space: AnySpace, array: Array, dims: int) -> Array:
     """Choose representatives that are continuous over the grid."""
     if not isinstance(space, Quotient):
         return array
@@ -265,7 +265,7 @@ def _unwrapped(space: Space[Any], array: Array, dims: int) -> Array:
     return np.ascontiguousarray(space._moved_by(array, moves))
 
 
-def validate_nodes(space: Space[Any], arrays: list[Array], tols: list[float], axes: list[GridAxis]) -> None:
+def validate_nodes(space: AnySpace, arrays: list[Array], tols: list[float], axes: list[GridAxis]) -> None:
     """Validate points and project them onto the space, in place. Nodes that are missing in one factor are NaN in all.
 
     Raises
@@ -277,11 +277,13 @@ def validate_nodes(space: Space[Any], arrays: list[Array], tols: list[float], ax
     lead = tuple(len(axis.knots) for axis in axes)
     missing = np.zeros(lead, bool)
     for factor, array in zip(factors, arrays, strict=True):
-        own = factor._point_axes(array)
+        point_axes = factor._point_axes(array)
         refuse(
-            np.asarray(np.isinf(array).any(axis=own)), "points", lambda _: "is infinite. Mark missing nodes with NaN."
+            np.asarray(np.isinf(array).any(axis=point_axes)),
+            "points",
+            lambda _: "is infinite. Mark missing nodes with NaN.",
         )
-        missing |= np.isnan(array).any(axis=own)
+        missing |= np.isnan(array).any(axis=point_axes)
     if missing.all():
         raise ValidationError("points has no valid node: every node contains NaN")
     for factor, array, tol in zip(factors, arrays, tols, strict=True):
@@ -292,24 +294,21 @@ def validate_nodes(space: Space[Any], arrays: list[Array], tols: list[float], ax
             _close(space, arrays, k)
 
 
-def _on_space(space: Space[Any], points: Array, tol: float, nodes: Array) -> Array:
+def _on_space(space: AnySpace, points: Array, tol: float, nodes: Array) -> Array:
     """Return points projected onto the space."""
     space = cover_of(space)
     single = len(points) == 1
     rows = np.ascontiguousarray(np.repeat(points, 2, axis=0) if single else points)
     data = Points(space._as_doubles(rows), tol, (), len(rows))
     try:
-        (found,), _ = validated(space, np.arange(float(len(rows))), [data], [NATURAL])
+        (on_space,), _ = validated(space, np.arange(float(len(rows))), [data], [NATURAL])
     except ValidationError as error:
-        node: Any = vars(error).get("node")
-        if node is None or (node >= len(nodes) and not single):
-            raise
-        index = nodes[0 if single else node].tolist()
-        raise error._with_message(str(error).replace(f"points[{node}]", f"points{index}", 1)) from None
-    return found[:1] if single else found
+        index = {i: ", ".join(map(str, nodes[0 if single else i])) for i in range(len(rows))}
+        raise renamed(error, lambda sample: (sample.argument, index[sample.node])) from None
+    return on_space[:1] if single else on_space
 
 
-def _close(space: Space[Any], arrays: list[Array], axis: int) -> None:
+def _close(space: AnySpace, arrays: list[Array], axis: int) -> None:
     """Make the first and the last nodes of a periodic axis equal, in place."""
     for factor, array in zip(map(cover_of, factors_of(space)), arrays, strict=True):
         first, last = (np.take(array, i, axis=axis) for i in (0, -1))
@@ -335,7 +334,7 @@ def _close(space: Space[Any], arrays: list[Array], axis: int) -> None:
             array[tuple(edge)] = first
 
 
-def check_steps(space: Space[Any], arrays: list[Array], dims: int, raises: bool) -> None:
+def check_steps(space: AnySpace, arrays: list[Array], dims: int, raises: bool) -> None:
     """Raise an error or warn about neighbouring nodes that are far apart.
 
     Raises

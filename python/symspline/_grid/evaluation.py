@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cached_property
+from functools import cached_property, reduce
 from itertools import groupby
 from typing import Any, NamedTuple
 
@@ -14,9 +14,9 @@ from .._base.faults import CUT_LOCUS, UNCONVERGED, Fault, from_core, imprecise, 
 from .._base.report import Columns, ConvergenceWarning, FarPointsWarning
 from .._base.typing import Extrapolate, Progress
 from .._core import ValidationError
-from .._curves.on_manifold.jerk import differentiation, transported
+from .._curves.on_manifold import Intervals
 from .._curves.reduced import Span, span_of
-from .._spaces import Array, Doubles, Space
+from .._spaces import AnySpace, Array, Doubles
 from .._splines.cubic import CubicSpline
 from ..manifolds import Manifold
 from .axes import GridAxis, Sites
@@ -40,7 +40,7 @@ class FactorGrid:
 
     def __init__(
         self,
-        space: Space[Any],
+        space: AnySpace,
         axes: list[GridAxis],
         points: Array,
         symmetric: bool,
@@ -73,16 +73,16 @@ class FactorGrid:
         """Whether the grid has missing nodes."""
         return not self.space._where_finite(self.points).all()
 
-    def evaluate(self, sites: Sites, nu: tuple[int, ...], progress: Progress | None = None) -> tuple[Array, Found]:
+    def evaluate(self, sites: Sites, nu: tuple[int, ...], progress: Progress | None = None) -> tuple[Array, Outcome]:
         """Evaluate points, or a derivative of first or second order."""
         if sum(nu) < 2 or (nu[-1] and not self.symmetric):
-            points, vectors, found = self._direct(sites, nu, progress)
-            return (points if vectors is None else vectors), found
+            points, vectors, outcome = self._direct(sites, nu, progress)
+            return (points if vectors is None else vectors), outcome
         return self._second(sites, nu)
 
     def gap(self, sites: Sites) -> Doubles:
         """Return the distances between the values in both orders of axes."""
-        p, q = (own[0] for own in self._orders(sites, (0,) * len(self.axes), None))
+        p, q = (evaluated[0] for evaluated in self._orders(sites, (0,) * len(self.axes), None))
         valid = self.space._where_finite(p) & self.space._where_finite(q)
         out = np.full(valid.shape, np.nan)
         out[valid] = self.space.distance(p[valid], q[valid])
@@ -90,28 +90,28 @@ class FactorGrid:
 
     def _direct(
         self, sites: Sites, nu: tuple[int, ...], progress: Progress | None
-    ) -> tuple[Array, Array | None, Found]:
+    ) -> tuple[Array, Array | None, Outcome]:
         """Evaluate what the core computes directly: points, and derivatives there."""
         if not self.symmetric:
             return self.forward.run(sites, *_derivative(nu), progress)
-        (p, v, found), (q, w, others) = self._orders(sites, nu, progress)
+        (p, v, outcome), (q, w, others) = self._orders(sites, nu, progress)
         points, vectors = _midpoint(self.space, (p, q), None if v is None or w is None else (v, w))
-        return points, vectors, found.merged(others)
+        return points, vectors, outcome.merged(others)
 
     def _orders(
         self, sites: Sites, nu: tuple[int, ...], progress: Progress | None
-    ) -> list[tuple[Array, Array | None, Found]]:
+    ) -> list[tuple[Array, Array | None, Outcome]]:
         """Evaluate in both orders of axes."""
         first = self.forward.run(sites, *_derivative(nu), progress)
-        points, vectors, found = self.backward.run(sites.reversed(), *_derivative(nu[::-1]), progress)
+        points, vectors, outcome = self.backward.run(sites.reversed(), *_derivative(nu[::-1]), progress)
         if sites.outer:
             dims = len(self.axes)
             order = (*range(dims)[::-1], *range(dims, points.ndim))
             points = points.transpose(order)
             vectors = None if vectors is None else vectors.transpose(order)
-        return [first, (points, vectors, found)]
+        return [first, (points, vectors, outcome)]
 
-    def _second(self, sites: Sites, nu: tuple[int, ...]) -> tuple[Array, Found]:
+    def _second(self, sites: Sites, nu: tuple[int, ...]) -> tuple[Array, Outcome]:
         """Compute a second derivative from first ones.
 
         The first derivative is smooth on each segment of the other axis. It is evaluated at Chebyshev nodes of the
@@ -121,7 +121,7 @@ class FactorGrid:
         axis = max(k for k, order in enumerate(nu) if order)
         first = min(k for k, order in enumerate(nu) if order)
         order = tuple(int(k == first) for k in range(len(nu)))
-        result, here, found = self._differentiated(sites, axis, order, False)
+        result, here, outcome = self._differentiated(sites, axis, order, False)
         knots = self.axes[axis].knots
         # At the last node of a run, only the segment before it has values.
         at_knot = np.isin(sites.x[axis], knots[1:])
@@ -129,28 +129,26 @@ class FactorGrid:
             missing = self.space._where_finite(here) & ~self.space._where_finite(result)
             other, _, more = self._differentiated(sites, axis, order, True)
             result[missing] = other[missing]
-            found = found.merged(more)
-        return result, found
+            outcome = outcome.merged(more)
+        return result, outcome
 
     def _differentiated(
         self, sites: Sites, axis: int, order: tuple[int, ...], left: bool
-    ) -> tuple[Array, Array, Found]:
+    ) -> tuple[Array, Array, Outcome]:
         """Differentiate the first derivative `order` along an axis. Return it, the points and a report."""
-        here, _, found = self._direct(sites, (0,) * len(order), None)
-        x = sites.x[axis]
-        starts, widths = _segments(self.axes[axis].knots, x, left, sites.modes[axis])
-        nodes = np.cos(np.pi * (np.arange(_NODES) + 0.5) / _NODES)
-        at = starts[:, None] + widths[:, None] * (nodes + 1) / 2
-        weights = differentiation(nodes, 2 * (x - starts) / widths - 1) * (2 / widths)[:, None]
-        result = np.zeros_like(here)
+        here, _, outcome_here = self._direct(sites, (0,) * len(order), None)
+        x, outcomes = sites.x[axis], [outcome_here]
         shape = (1,) * axis + (-1,) if sites.outer else (-1,)
-        lead = len(sites.shape) + len(self.space.point_shape)
-        for k in range(_NODES):
-            points, vectors, own = self._direct(sites.along(axis, np.ascontiguousarray(at[:, k])), order, None)
-            found = found.merged(own)
-            factor = weights[:, k].reshape(shape + (1,) * (lead - len(shape)))
-            result += factor * transported(self.space, points, here, vectors)
-        return result, here, found
+        ones = len(sites.shape) + len(self.space.point_shape) - len(shape)
+
+        def values(at: Doubles) -> tuple[Array, Any]:
+            points, vectors, outcome_there = self._direct(sites.along(axis, at), order, None)
+            outcomes.append(outcome_there)
+            return points, vectors
+
+        segments = Intervals.of(self.axes[axis].knots, x, sites.modes[axis], "left" if left else "right")
+        result = segments.derivative(self.space, here, values, _NODES, shape + (1,) * ones)
+        return result, here, reduce(Outcome.merged, outcomes)
 
 
 def order_of_each(nu: Any, dims: int) -> tuple[int, ...]:
@@ -172,29 +170,14 @@ def _derivative(nu: tuple[int, ...]) -> tuple[int | None, int]:
     return along, nu[-1]
 
 
-def _segments(knots: Doubles, x: Doubles, left: bool, mode: str) -> tuple[Doubles, Doubles]:
-    """Return an interval around each coordinate on which the grid is smooth: its start and its width."""
-    i = np.clip(np.searchsorted(knots, x, side="left" if left else "right") - 1, 0, len(knots) - 2)
-    starts, widths = knots[i], knots[i + 1] - knots[i]
-    if mode == "periodic":
-        period = knots[-1] - knots[0]
-        turns = np.floor((x - knots[0]) / period)
-        inside = x - turns * period
-        i = np.clip(np.searchsorted(knots, inside, side="left" if left else "right") - 1, 0, len(knots) - 2)
-        return knots[i] + turns * period, knots[i + 1] - knots[i]
-    # The first and the last segment continue outside the knots.
-    starts = np.where(x > knots[-1], x, np.where(x < knots[0], x - widths, starts))
-    return starts, widths
-
-
 def _midpoint(
-    space: Space[Any], points: tuple[Array, Array], vectors: tuple[Array, Array] | None
+    space: AnySpace, points: tuple[Array, Array], vectors: tuple[Array, Array] | None
 ) -> tuple[Array, Array | None]:
     """Return midpoints of geodesics, and their derivatives; NaN where a point is missing."""
     valid = space._where_finite(points[0]) & space._where_finite(points[1])
     shape = points[0].shape
     out = np.full(shape, np.nan, space.dtype)
-    p, q = (np.ascontiguousarray(each[valid]) for each in points)
+    p, q = (np.ascontiguousarray(array[valid]) for array in points)
     if isinstance(space, Manifold):
         if vectors is not None:
             raise ValidationError(f"derivatives of symmetric grids are not available on {space!r}")
@@ -213,7 +196,7 @@ def _midpoint(
 # ---- grids in spaces of the compiled core ----
 
 
-class Found(NamedTuple):
+class Outcome(NamedTuple):
     """What the fits of many rows report together.
 
     Attributes
@@ -230,10 +213,10 @@ class Found(NamedTuple):
     fault: Fault | None = None
     residual: float = 0.0
 
-    def merged(self, other: Found) -> Found:
+    def merged(self, other: Outcome) -> Outcome:
         """Return both reports as one."""
         residual = max(self.residual, other.residual)
-        return Found(self.failed + other.failed, self.fault or other.fault, residual)
+        return Outcome(self.failed + other.failed, self.fault or other.fault, residual)
 
 
 class _Arrays(NamedTuple):
@@ -261,7 +244,7 @@ class CompiledGrid:
 
     def __init__(
         self,
-        space: Space[Any],
+        space: AnySpace,
         axes: list[GridAxis],
         points: Array,
         span: Span | None,
@@ -271,11 +254,13 @@ class CompiledGrid:
     ) -> None:
         self.space, self.axes, self.span, self._order = space, axes, span, order
         self.points = points
-        self.found = Found()
+        self.outcome = Outcome()
         self._rows = self._in_rows(points)
         if velocities is None:
-            own, summary = _core.grid_rows(space._handle, self._axis(0, "continue"), self._rows, progress)
-            self._velocities, self.found = own, self._read(summary)
+            velocities_in_rows, summary = _core.grid_rows(
+                space._handle, self._axis(0, "continue"), self._rows, progress
+            )
+            self._velocities, self.outcome = velocities_in_rows, self._read(summary)
         else:
             self._velocities = self._in_rows(velocities)
 
@@ -293,7 +278,7 @@ class CompiledGrid:
 
     def run(
         self, sites: Sites, along: int | None, last: int, progress: Progress | None
-    ) -> tuple[Array, Array | None, Found]:
+    ) -> tuple[Array, Array | None, Outcome]:
         """Evaluate points, and a derivative there.
 
         Parameters
@@ -330,13 +315,13 @@ class CompiledGrid:
         numbers = self.space._numbers(doubles)
         return numbers if self.span is None else self.span.embed_samples(numbers, ())
 
-    def _read(self, summary: Any) -> Found:
+    def _read(self, summary: Any) -> Outcome:
         failed, first, residual, *_ = summary
         if first is None:
-            return Found(0, None, residual)
-        axis, kind, node, value, limit, own = first
+            return Outcome(0, None, residual)
+        axis, kind, node, value, limit, row_residual = first
         number = axis if self._order > 0 else len(self.axes) - 1 - axis
-        return Found(failed, row_fault(number, kind, node, value, limit, own), residual)
+        return Outcome(failed, row_fault(number, kind, node, value, limit, row_residual), residual)
 
 
 def row_fault(
@@ -363,9 +348,9 @@ class ManifoldGrid:
 
     span = None
 
-    def __init__(self, space: Space[Any], axes: list[GridAxis], points: Array) -> None:
+    def __init__(self, space: AnySpace, axes: list[GridAxis], points: Array) -> None:
         self.space, self.axes, self.points = space, axes, points
-        self.found = Found()
+        self.outcome = Outcome()
 
     def backwards(self) -> ManifoldGrid:
         """Return the grid with the order of axes reversed."""
@@ -375,7 +360,7 @@ class ManifoldGrid:
 
     def run(
         self, sites: Sites, along: int | None, last: int, progress: Progress | None
-    ) -> tuple[Array, Array | None, Found]:
+    ) -> tuple[Array, Array | None, Outcome]:
         """Evaluate points, and a derivative there; see `CompiledGrid.run`."""
         if along is not None:
             raise ValidationError(
@@ -384,38 +369,38 @@ class ManifoldGrid:
             )
         if not sites.outer:
             return self._scattered(sites, last, progress)
-        found, nodes, vectors = Found(), self.points, None
+        outcome, nodes, vectors = Outcome(), self.points, None
         for k, (axis, x, mode) in enumerate(zip(self.axes, sites.x, sites.modes, strict=True)):
             rows = np.moveaxis(nodes, k, len(self.axes) - 1)
             orders = [0, last] if k + 1 == len(self.axes) and last else [0]
             *_, values = evaluated = [self._row_values(axis, rows, x, mode, nu, k) for nu in orders]
             nodes = np.moveaxis(evaluated[0][0], len(self.axes) - 1, k)
             vectors = np.moveaxis(values[0], len(self.axes) - 1, k) if len(orders) > 1 else None
-            found = found.merged(evaluated[0][1])
+            outcome = outcome.merged(evaluated[0][1])
             if progress:
                 progress(k + 1, len(self.axes))
-        return nodes, vectors, found
+        return nodes, vectors, outcome
 
-    def _scattered(self, sites: Sites, last: int, progress: Progress | None) -> tuple[Array, Array | None, Found]:
+    def _scattered(self, sites: Sites, last: int, progress: Progress | None) -> tuple[Array, Array | None, Outcome]:
         """Evaluate scattered coordinates one at a time."""
         count = len(sites.x[0])
         points = np.full((count, *self.space.point_shape), np.nan, self.space.dtype)
         vectors = points.copy() if last else None
-        found = Found()
+        outcome = Outcome()
         for i in range(count):
             one = Sites([x[i : i + 1] for x in sites.x], True, sites.modes)
-            p, v, own = self.run(one, None, last, None)
+            p, v, outcome_of_site = self.run(one, None, last, None)
             points[i] = p.reshape(self.space.point_shape)
             if vectors is not None and v is not None:
                 vectors[i] = v.reshape(self.space.point_shape)
-            found = found.merged(own)
+            outcome = outcome.merged(outcome_of_site)
             if progress:
                 progress(i + 1, count)
-        return points, vectors, found
+        return points, vectors, outcome
 
     def _row_values(
         self, axis: GridAxis, rows: Array, x: Doubles, mode: str, nu: int, number: int
-    ) -> tuple[Array, Found]:
+    ) -> tuple[Array, Outcome]:
         """Evaluate all rows at the same coordinates; NaN outside the runs of a row."""
         shape, lead = self.space.point_shape, rows.shape[: len(self.axes) - 1]
         flat = rows.reshape(-1, len(axis.knots), *shape)
@@ -424,11 +409,11 @@ class ManifoldGrid:
             start, period = axis.knots[0], axis.knots[-1] - axis.knots[0]
             x = np.where((x < start) | (x > axis.knots[-1]), start + (x - start) % period, x)
         valid = self.space._where_finite(flat)
-        found = Found()
+        outcome = Outcome()
         order = sorted(range(len(flat)), key=lambda row: valid[row].tobytes())
         for _, same in groupby(order, key=lambda row: valid[row].tobytes()):
-            own = np.array(list(same))
-            for first, stop in _runs(valid[own[0]]):
+            rows_alike = np.array(list(same))
+            for first, stop in _runs(valid[rows_alike[0]]):
                 inside = (x >= axis.knots[first]) & (x <= axis.knots[stop - 1])
                 if stop == len(axis.knots):
                     inside |= x > axis.knots[-1]
@@ -436,18 +421,18 @@ class ManifoldGrid:
                     inside |= x < axis.knots[0]
                 if stop - first == 1:
                     if nu == 0:
-                        out[np.ix_(own, x == axis.knots[first])] = flat[own, first][:, None]
+                        out[np.ix_(rows_alike, x == axis.knots[first])] = flat[rows_alike, first][:, None]
                     continue
                 whole = stop - first == len(axis.knots)
                 bc: Any = axis.bc_type if whole else _beside_gaps(axis, first, stop)
-                points = np.ascontiguousarray(flat[own, first:stop])
+                points = np.ascontiguousarray(flat[rows_alike, first:stop])
                 with silenced(ConvergenceWarning), silenced(FarPointsWarning):
                     spline = CubicSpline(
                         axis.knots[first:stop], points, self.space, bc_type=bc, check=False, on_failure="ignore"
                     )
-                out[np.ix_(own, inside)] = spline(x[inside], nu, extrapolate=_POLICIES[mode])
-                found = found.merged(_found(spline, number))
-        return out.reshape(*lead, len(x), *shape), found
+                out[np.ix_(rows_alike, inside)] = spline(x[inside], nu, extrapolate=_POLICIES[mode])
+                outcome = outcome.merged(_outcome(spline, number))
+        return out.reshape(*lead, len(x), *shape), outcome
 
 
 def _runs(valid: Any) -> list[tuple[int, int]]:
@@ -466,11 +451,11 @@ def _beside_gaps(axis: GridAxis, first: int, stop: int) -> tuple[str, str]:
     return start, end
 
 
-def _found(spline: CubicSpline[Any], number: int) -> Found:
+def _outcome(spline: CubicSpline[Any], number: int) -> Outcome:
     report = spline.report
     failed = ~np.atleast_1d(np.asarray(report.converged))
     residuals = np.atleast_1d(np.asarray(report.residual, np.float64))
     if not failed.any():
-        return Found(0, None, float(residuals.max(initial=0.0)))
+        return Outcome(0, None, float(residuals.max(initial=0.0)))
     first = float(residuals[failed][0])
-    return Found(int(failed.sum()), row_fault(number, "unconverged", None, first, np.nan, first), 0.0)
+    return Outcome(int(failed.sum()), row_fault(number, "unconverged", None, first, np.nan, first), 0.0)

@@ -9,18 +9,27 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, Unpack, overload
 import numpy as np
 
 from .._base.arrays import checked_atol, checked_flag, short_repr, whole_number
-from .._base.faults import CUT_LOCUS, warn
-from .._base.report import ConvergenceWarning
 from .._base.typing import Extrapolate, File, GridLook, OnFailure, P, PointsLike, Progress, TimesLike
-from .._core import ConvergenceError, CutLocusError, ValidationError
+from .._core import ValidationError
+from .._curves.failures import raise_or_warn
 from .._curves.options import check_on_failure, check_progress, checked_extrapolate, require_matplotlib
-from .._spaces import Array, Product, Space, cover_of, factors_of, space_named
-from .._splines import archive
-from .._splines.archive import Entries, entry, read_array, read_space, read_times, suffix_of, times_state
+from .._spaces import AnySpace, Array, Product, Space, cover_of, factors_of, product_norm, space_named
+from .._splines.archive import (
+    FORMATS,
+    Entries,
+    entry,
+    head_of,
+    read_array,
+    read_space,
+    read_times,
+    restore,
+    suffix_of,
+    times_state,
+    write,
+)
 from .._splines.cubic import CubicSpline
 from .axes import GridAxis, Sites, check_steps, coordinates, read_axes, read_nodes, sites_of, validate_nodes
-from .evaluation import CompiledGrid, FactorGrid, Found, order_of_each
-from .report import GridReport
+from .evaluation import CompiledGrid, FactorGrid, Outcome, order_of_each
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -112,9 +121,11 @@ class GridSpline(Generic[P]):
     _symmetric: bool
     _extrapolate: Extrapolate
     _on_failure: OnFailure
+    # A grid is a single function.
+    _batch: ClassVar[tuple[int, ...]] = ()
 
     def __init_subclass__(cls) -> None:
-        archive.FORMATS[cls._format] = cls
+        FORMATS[cls._format] = cls
 
     def __init__(
         self,
@@ -130,7 +141,7 @@ class GridSpline(Generic[P]):
         atol: float | None = None,
         progress: Progress | None = None,
     ) -> None:
-        self._space: Space[Any] = space_named(space)
+        self._space: AnySpace = space_named(space)
         self._symmetric = checked_flag(symmetric, "symmetric")
         self._extrapolate = checked_extrapolate(extrapolate)
         check_on_failure(on_failure)
@@ -144,33 +155,27 @@ class GridSpline(Generic[P]):
             validate_nodes(self._space, arrays, tols if atol is None else [checked_atol(atol)] * len(tols), self._axes)
             check_steps(self._space, arrays, len(shape), on_failure == "raise")
         self._fill(arrays, None, progress)
-        self._handle(self.report._found, "the nodes")
+        self._handle(self.report._outcome, "the nodes")
 
     def _fill(
         self, arrays: list[Array], velocities: list[Array | None] | None, progress: Progress | None = None
     ) -> None:
-        each: list[Array | None] = velocities or [None] * len(arrays)
+        given: list[Array | None] = velocities or [None] * len(arrays)
         self._factors = [
-            FactorGrid(cover_of(factor), self._axes, points, self._symmetric, own, progress)
-            for factor, points, own in zip(factors_of(self._space), arrays, each, strict=True)
+            FactorGrid(cover_of(factor), self._axes, points, self._symmetric, vectors, progress)
+            for factor, points, vectors in zip(factors_of(self._space), arrays, given, strict=True)
         ]
         for array in arrays:
             array.flags.writeable = False
 
-    def _handle(self, found: Found, where: str) -> None:
+    def _handle(self, outcome: Outcome, where: str) -> None:
         """Raise an error or warn about rows that failed."""
-        if found.fault is None or self._on_failure == "ignore":
+        if outcome.fault is None:
             return
-        more = f" ({found.failed} rows failed)" if found.failed > 1 else ""
-        message = f"{found.fault.message(())}{more}, in the evaluation of {where}"
-        if self._on_failure == "warn":
-            warn(message, ConvergenceWarning)
-            return
-        kind = CutLocusError if found.fault.kind == CUT_LOCUS else ConvergenceError
-        error: Any = kind(f"{message}. Pass on_failure='warn' to get the other values.")
-        error.spline, error.node = self, found.fault.node
-        error.value, error.limit = found.fault.value, found.fault.limit
-        raise error
+        more = f" ({outcome.failed} rows failed)" if outcome.failed > 1 else ""
+        what = f"{outcome.fault.message(())}{more}, in the evaluation of {where}"
+        remedy = "pass on_failure='warn' to get the other values" if self._on_failure == "raise" else ""
+        raise_or_warn([outcome.fault._replace(what=what, remedy=remedy)], self._on_failure, self)
 
     # ---- data ----
 
@@ -328,16 +333,16 @@ class GridSpline(Generic[P]):
             raise ValidationError(
                 "extrapolate='geodesic' has derivatives along the last axis only; pass extrapolate=True for others"
             )
-        results, found = [], Found()
+        results, outcome = [], Outcome()
         for factor in self._factors:
-            values, own = factor.evaluate(sites, orders, progress)
+            values, outcome_of_factor = factor.evaluate(sites, orders, progress)
             values = np.asarray(values)
             for k, bad in enumerate(missing):
                 if bad.any():
                     values[(slice(None),) * k + (bad,) if outer else bad] = np.nan
             results.append(values.reshape(*shape, *factor.space.point_shape))
-            found = found.merged(own)
-        self._handle(found, "the grid")
+            outcome = outcome.merged(outcome_of_factor)
+        self._handle(outcome, "the grid")
         return self._joined(results)
 
     def section(self, axis: int, at: Any) -> CubicSpline[P] | GridSpline[P]:
@@ -376,14 +381,14 @@ class GridSpline(Generic[P]):
         number = whole_number(axis, "axis", 0)
         if number >= dims:
             raise ValidationError(f"axis must be less than {dims}, not {short_repr(axis)}")
-        others = [own for k, own in enumerate(self._axes) if k != number]
-        nodes = self.grid(*(at if k == number else own.t for k, own in enumerate(self._axes)))
+        others = [grid_axis for k, grid_axis in enumerate(self._axes) if k != number]
+        nodes = self.grid(*(at if k == number else grid_axis.t for k, grid_axis in enumerate(self._axes)))
         if dims > 2:
             return GridSpline(
-                tuple(own.t for own in others),
+                tuple(grid_axis.t for grid_axis in others),
                 nodes,
                 self._space,
-                bc_type=tuple(own.bc_type for own in others),
+                bc_type=tuple(grid_axis.bc_type for grid_axis in others),
                 symmetric=self._symmetric,
                 extrapolate=self._extrapolate,
                 on_failure=self._on_failure,
@@ -513,19 +518,13 @@ class GridSpline(Generic[P]):
         >>> ss.load(file) == surface
         True
         """
-        archive.write(file, self._state())
+        write(file, self._state())
 
     def _state(self) -> dict[str, Any]:
-        state: dict[str, Any] = {
-            "format": self._format,
-            "version": archive.VERSION,
-            "space": self._space,
+        options = {"symmetric": self._symmetric, "on_failure": self._on_failure}
+        state = head_of(self) | {
             "extrapolate": self._extrapolate,
-            "grid": {
-                "bc_type": [axis.bc_type for axis in self._axes],
-                "symmetric": self._symmetric,
-                "on_failure": self._on_failure,
-            },
+            "grid": {"bc_type": [axis.bc_type for axis in self._axes], **options},
         }
         for k, axis in enumerate(self._axes):
             state |= times_state(f"axis_{k}", axis.t, axis.time_axis)
@@ -540,8 +539,7 @@ class GridSpline(Generic[P]):
     def _from_state(cls, state: Entries) -> Self:
         self = cls.__new__(cls)
         self._space = read_space(state)
-        with entry("extrapolate"):
-            self._extrapolate = checked_extrapolate(state["extrapolate"])
+        self._extrapolate = state.read("extrapolate", checked_extrapolate)
         with entry("grid"):
             options = state["grid"]
             conditions = [word if isinstance(word, str) else tuple(word) for word in options["bc_type"]]
@@ -566,7 +564,7 @@ class GridSpline(Generic[P]):
         return self
 
     def __reduce__(self) -> tuple[object, ...]:
-        return archive.restore, (self._state(),)
+        return restore, (self._state(),)
 
     def __eq__(self, other: object) -> bool:
         if type(other) is not type(self) or not isinstance(other, GridSpline):
@@ -586,4 +584,123 @@ class GridSpline(Generic[P]):
         return f"<{type(self).__name__} on {self._space!r}: {nodes} nodes>"
 
 
-archive.FORMATS[GridSpline._format] = GridSpline
+FORMATS.update({GridSpline._format: GridSpline})
+
+
+# ---- the report of a grid ----
+
+# The number of cell centres at which the two orders of axes are compared.
+_COMPARED = 4096
+
+
+class GridReport:
+    """Report of a `GridSpline`.
+
+    Splines along the first axis are fitted when the grid is made, and those along the other axes when it is evaluated.
+
+    See Also
+    --------
+    GridSpline.report : Report of a grid.
+
+    Examples
+    --------
+    >>> import numpy as np, symspline as ss
+    >>> u, v = np.linspace(0, 1, 9), np.linspace(0, 1, 8)
+    >>> points = np.stack([u[:, None] + 0 * v, u[:, None] * v], axis=-1)
+    >>> report = ss.GridSpline((u, v), points, "r:2").report
+    >>> report.converged, report.missing, report.axis_order_gap < 1e-12
+    (True, 0, True)
+    """
+
+    _axes: list[GridAxis]
+    _factors: list[FactorGrid]
+
+    @classmethod
+    def _of(cls, axes: list[GridAxis], factors: list[FactorGrid]) -> Self:
+        self = cls()
+        self._axes, self._factors = axes, factors
+        return self
+
+    @cached_property
+    def _outcome(self) -> Outcome:
+        outcome = Outcome()
+        for factor in self._factors:
+            outcome = outcome.merged(factor.forward.outcome)
+        return outcome
+
+    @property
+    def converged(self) -> bool:
+        """Whether all splines along the first axis converged."""
+        return self._outcome.failed == 0
+
+    @property
+    def residual(self) -> float:
+        """Largest relative C² residual of the splines along the first axis."""
+        return self._outcome.residual
+
+    @cached_property
+    def missing(self) -> int:
+        """Number of missing nodes.
+
+        Examples
+        --------
+        >>> import numpy as np, symspline as ss
+        >>> u = np.linspace(0, 1, 8)
+        >>> surface = ss.GridSpline((u, u), (u[:, None] * u)[..., None], "r:1")
+        >>> surface.report.missing
+        0
+        """
+        first = self._factors[0]
+        return int(np.count_nonzero(~first.space._where_finite(first.points)))
+
+    @cached_property
+    def max_step(self) -> tuple[float, ...]:
+        """Longest distance between neighbouring nodes along each axis.
+
+        Examples
+        --------
+        >>> import numpy as np, symspline as ss
+        >>> u = np.linspace(0, 1, 8)
+        >>> surface = ss.GridSpline((u, u), (u[:, None] * u)[..., None], "r:1")
+        >>> [round(step, 4) for step in surface.report.max_step]
+        [0.1429, 0.1429]
+        """
+        longest: list[float] = []
+        for k in range(len(self._axes)):
+            steps = []
+            for factor in self._factors:
+                p, q = factor.space._neighbours(np.moveaxis(factor.points, k, len(self._axes) - 1))
+                valid = factor.space._where_finite(p) & factor.space._where_finite(q)
+                steps.append(factor.space.distance(p[valid], q[valid]))
+            longest.append(float(np.max(product_norm(tuple(steps)), initial=0.0)))
+        return tuple(longest)
+
+    @cached_property
+    def axis_order_gap(self) -> float:
+        """Largest distance between the values in the given and in the reverse order of axes.
+
+        It is computed on first access, over the centres of up to 4096 cells. For smooth data it is of order 8 in the
+        spacing; it is large for rough or noisy data, whose interpolant then depends on an arbitrary choice.
+
+        Examples
+        --------
+        >>> import numpy as np, symspline as ss
+        >>> u = np.linspace(0, 1, 8)
+        >>> surface = ss.GridSpline((u, u), (u[:, None] * u)[..., None], "r:1")
+        >>> surface.report.axis_order_gap < 1e-12
+        True
+        """
+        dims = len(self._axes)
+        most = max(1, int(_COMPARED ** (1 / dims)))
+        x = []
+        for axis in self._axes:
+            centres = (axis.knots[1:] + axis.knots[:-1]) / 2
+            chosen = np.linspace(0, len(centres) - 1, min(most, len(centres))).round().astype(int)
+            x.append(centres[chosen])
+        sites = Sites(x, True, ["continue"] * dims)
+        gaps = product_norm(tuple(factor.gap(sites) for factor in self._factors))
+        return float(np.max(gaps, initial=0.0, where=np.isfinite(gaps)))
+
+    def __repr__(self) -> str:
+        state = "converged" if self.converged else "NOT converged"
+        return f"<GridReport: {state}, residual {self.residual:.1e}, {self.missing} missing nodes>"

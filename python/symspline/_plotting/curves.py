@@ -19,8 +19,7 @@ from .._base.time import TimeAxis
 from .._base.typing import AnyArray, FloatArray, Look
 from .._core import ConvergenceError, CutLocusError, ValidationError
 from .._curves.composed import AnyCurve
-from .._curves.controlled import ControlledCurve
-from .._curves.curve import UncertaintyBand
+from .._curves.curve import ControlledCurve, UncertaintyBand
 from .._curves.ends import NATURAL
 from .._curves.fit import FitProblem, fit, read
 from .._curves.solve import DEFAULTS

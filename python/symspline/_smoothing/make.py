@@ -37,6 +37,7 @@ from .._curves.missing import counts_all_samples, data_without_missing, missing_
 from .._curves.options import check_on_failure, check_progress, checked_extrapolate
 from .._curves.solve import DEFAULTS, in_batch
 from .._spaces import Array, Doubles, Product, Space, SpecialEuclidean, factors_of, space_named
+from .._splines.cubic import CubicSpline
 from ..manifolds._manifold import refuse_functions
 from .audit import audit
 from .noise import (
@@ -417,8 +418,8 @@ def _spline_through(
     fitted = fit(Problem(space, at.times, points, conditions, DEFAULTS, check=False, mask=mask))
     noise = [noise._replace(sigma=np.empty(0)) for noise in whole.noise]
     noisy, kept = whole._replace(noise=noise), _conditions(bc_type, conditions, space)
-    made = whole.time_axis, at.t, fitted.curve, kept, policy, fitted.reports(), noisy, results
-    return SmoothingSpline._of(*made), fitted
+    curve = CubicSpline._fitted(whole.time_axis, at.t, fitted.curve, kept, policy, fitted.reports())
+    return SmoothingSpline._like(curve, noisy, results), fitted
 
 
 @overload

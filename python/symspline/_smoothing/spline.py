@@ -131,11 +131,6 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
     _smoothed: list[Smoothed]
     _warned_of: frozenset[str] = frozenset()
 
-    def _fill(self, *parts: Any) -> None:
-        """Set the state of a `CubicSpline`, the noisy data and the results of the smoothing."""
-        *own, self._noisy, self._smoothed = parts
-        super()._fill(*own)
-
     def _each(self, values: list[_T]) -> _T | tuple[_T, ...]:
         """Return one value, or a tuple with one value per space in which data were smoothed."""
         return tuple(values) if is_several(self.space) else values[0]
@@ -853,8 +848,11 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
     @classmethod
     def _like(cls, spline: CubicSpline[Any, Any], noisy: SmoothingData, smoothed: list[Smoothed]) -> Self:
         """Return a smoothing spline from a spline through the smooth points and the properties of the noise."""
-        parts = (spline._time_axis, spline._t, spline._curve, spline._bc_type, spline._extrapolate, spline._reports)
-        return cls._of(*parts, noisy, smoothed)
+        self = cls._fitted(
+            spline._time_axis, spline._t, spline._curve, spline._bc_type, spline._extrapolate, spline._reports
+        )
+        self._noisy, self._smoothed = noisy, smoothed
+        return self
 
     def _state(self) -> dict[str, Any]:
         return super()._state() | noise_state(self.space, self._noisy, self._smoothed)
@@ -862,9 +860,9 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
     @classmethod
     def _from_state(cls, state: Entries) -> Self:
         time_axis, t = read_times(state, "data_t")
-        parts = read_fitted(state, time_axis)
-        _, _, curve, bc_type, *_ = parts
-        return cls._of(*parts, *read_noise(state, time_axis, t, curve, is_closed(bc_type)))
+        self = cls._fitted(*read_fitted(state, time_axis))
+        self._noisy, self._smoothed = read_noise(state, time_axis, t, self._curve, is_closed(self._bc_type))
+        return self
 
     def __repr__(self) -> str:
         data, knots = self._noisy.times.shape[-1], self._times.shape[-1]

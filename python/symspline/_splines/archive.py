@@ -11,13 +11,12 @@ import math
 import os
 import re
 import zipfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import fields
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .._base import VERSION as LIBRARY
 from .._base.arrays import brief, short_repr
@@ -30,7 +29,7 @@ from .._curves.curve import CurveArrays
 from .._curves.ends import freeze_bc_type
 from .._curves.fit import curve_of, read_ends
 from .._curves.options import checked_extrapolate
-from .._spaces import Array, Product, Space, factors_of, space_named
+from .._spaces import AnySpace, Array, Doubles, Product, Space, factors_of, space_named
 from ..manifolds._manifold import refuse_functions
 
 # Raise it when the entries change, and keep reading files of all earlier versions.
@@ -51,6 +50,7 @@ _PART = re.compile(r"(?:\d{1,6}/){1,4}")
 # Compressed entries are at most this much larger than the file, or of this size.
 _RATIO, _SMALL = 100, 2**24
 _Report = TypeVar("_Report")
+_T = TypeVar("_T")
 
 
 # The classes of curves by the name of their format. They have the methods `_state` and `_from_state`.
@@ -62,6 +62,12 @@ class Entries(dict[str, Any]):
 
     def __missing__(self, name: str) -> Any:
         raise ValidationError(f"entry {name!r} is missing")
+
+    def read(self, name: str, check: Callable[[Any], _T]) -> _T:
+        """Return an entry as a function returns it, whose errors then name the entry."""
+        value = self[name]
+        with entry(name):
+            return check(value)
 
 
 class Stored(Entries):
@@ -115,7 +121,7 @@ def _flat(state: Mapping[str, Any]) -> dict[str, Any]:
     arrays: dict[str, Any] = {}
     for name, value in state.items():
         if name.isdigit():
-            arrays |= {f"{name}/{key}": own for key, own in _flat(value).items()}
+            arrays |= {f"{name}/{key}": entry_value for key, entry_value in _flat(value).items()}
         elif _is_text(name) or isinstance(value, np.ndarray):
             arrays[name] = value
         else:
@@ -132,7 +138,7 @@ def _nested(arrays: Mapping[str, Any]) -> Stored:
             parts.setdefault(number, Stored())[rest] = value
         else:
             state[name] = text_in(arrays, name) if _is_text(name) else json_in(arrays, name) if name in _JSON else value
-    return Stored(state | {number: _nested(own) for number, own in parts.items()})
+    return Stored(state | {number: _nested(part) for number, part in parts.items()})
 
 
 def _is_text(name: str) -> bool:
@@ -163,9 +169,9 @@ def read_state(file: Any) -> Stored:
 
 def _is_entry(name: str) -> bool:
     """Whether an array of a file is an entry of a state, or of a curve of which a curve is made."""
-    found = _PART.match(name)
-    own = name[found.end() :] if found else name
-    return _is_text(own) or own in _JSON or _ARRAY.fullmatch(own) is not None
+    prefix = _PART.match(name)
+    entry_name = name[prefix.end() :] if prefix else name
+    return _is_text(entry_name) or entry_name in _JSON or _ARRAY.fullmatch(entry_name) is not None
 
 
 # ---- archives ----
@@ -210,7 +216,7 @@ def read(file: Any, selected: Callable[[str], object]) -> Entries:
         return Entries((name, _array_in(archive, name, member)) for name, member in members.items())
 
 
-def _array_in(archive: zipfile.ZipFile, name: str, member: zipfile.ZipInfo) -> NDArray[Any]:
+def _array_in(archive: zipfile.ZipFile, name: str, member: zipfile.ZipInfo) -> Array:
     with archive.open(member) as entry:
         header = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
         shape, _, dtype = header[np.lib.format.read_magic(entry)](entry)
@@ -224,7 +230,7 @@ def _array_in(archive: zipfile.ZipFile, name: str, member: zipfile.ZipInfo) -> N
         return np.asarray(np.lib.format.read_array(entry, allow_pickle=False))
 
 
-def text_in(arrays: Mapping[str, NDArray[Any]], name: str) -> str:
+def text_in(arrays: Mapping[str, Array], name: str) -> str:
     """Return an entry that is one text.
 
     Raises
@@ -238,7 +244,7 @@ def text_in(arrays: Mapping[str, NDArray[Any]], name: str) -> str:
     return str(array)
 
 
-def json_in(arrays: Mapping[str, NDArray[Any]], name: str) -> Any:
+def json_in(arrays: Mapping[str, Array], name: str) -> Any:
     """Return an entry that is a text in JSON.
 
     Raises
@@ -264,20 +270,22 @@ def entry(name: str) -> Iterator[None]:
         raise ValidationError(f"entry {name!r}: {brief(what, 500)}") from None
 
 
-# ---- curves of cubic segments ----
+# ---- entries of several classes of curves ----
 
 
-def segments_state(
-    format: str, space: Space[Any], t: Array, time_axis: TimeAxis, extrapolate: Any, curve: CurveArrays
-) -> dict[str, Any]:
-    """Return the entries of curves of cubic segments, of any class."""
-    parts = {
-        name + suffix_of(space, i): getattr(part, name)
-        for i, part in enumerate(curve.parts)
-        for name in ("points", "velocities")
-    }
-    head = {"format": format, "version": VERSION, "space": space, "extrapolate": extrapolate}
-    return head | times_state("t", t, time_axis) | parts
+def head_of(curve: Any) -> dict[str, Any]:
+    """Return the entries that all classes have."""
+    return {"format": curve._format, "version": VERSION, "space": curve.space}
+
+
+def by_factor(name: str, space: AnySpace, arrays: Iterable[Array]) -> dict[str, Array]:
+    """Return the entries of arrays in each factor."""
+    return {name + suffix_of(space, i): array for i, array in enumerate(arrays)}
+
+
+def read_by_factor(state: Entries, name: str, space: AnySpace) -> list[Array]:
+    """Return the arrays in each factor, the inverse of `by_factor`."""
+    return [read_array(state, name + suffix_of(space, i), factor) for i, factor in enumerate(factors_of(space))]
 
 
 def read_segments(
@@ -295,8 +303,7 @@ def read_segments(
         Whether the velocities are those of a C² curve.
     """
     space = read_space(state)
-    with entry("extrapolate"):
-        extrapolate = checked_extrapolate(state["extrapolate"])
+    extrapolate = state.read("extrapolate", checked_extrapolate)
     time_axis, knots = read_times(state, "t")
     if counted is not None:
         if counted.dates != time_axis.dates:
@@ -305,7 +312,10 @@ def read_segments(
     times = time_axis.knots(knots)
     if not (np.isfinite(times).all() and (np.diff(times) > 0).all()):
         raise ValidationError("entry 't': the knots do not increase")
-    arrays = [_read_nodes(factor, state, suffix_of(space, i), times) for i, factor in enumerate(factors_of(space))]
+    points, velocities = (read_by_factor(state, name, space) for name in ("points", "velocities"))
+    arrays = list(zip(points, velocities, strict=True))
+    for factor, (p, v) in zip(factors_of(space), arrays, strict=True):
+        _check_nodes(factor, p, v, times)
     return time_axis, knots, curve_of(space, times, arrays, fitted), extrapolate
 
 
@@ -318,34 +328,39 @@ def read_c1_nodes(state: Entries) -> tuple[int, ...]:
     return tuple(nodes)
 
 
-def read_fitted(state: Entries, counted: TimeAxis | None = None, *, fitted: bool = True) -> tuple[Any, ...]:
-    """Return the arguments of `CubicSpline._fill`: the same with end conditions and reports."""
+def read_fitted(
+    state: Entries, counted: TimeAxis | None = None, *, fitted: bool = True
+) -> tuple[TimeAxis, Array, CurveArrays, Any, Any, list[Report]]:
+    """Return the arguments of `CubicSpline._fitted`: the same with end conditions and reports."""
     time_axis, knots, curve, extrapolate = read_segments(state, counted, fitted=fitted)
     space = curve.space
-    with entry("bc_type"):
-        bc_type = freeze_bc_type(_read_bc_type(state["bc_type"], space))
+
+    def read_bc_type(plain: Any) -> Any:
+        bc_type = freeze_bc_type(_read_bc_type(plain, space))
         read_ends(bc_type, space, curve.batch)
-    with entry("report"):
-        plain = state["report"]
+        return bc_type
+
+    def read_reports(plain: Any) -> list[Report]:
         if not isinstance(plain, list) or len(plain) != len(curve.parts):
             raise ValidationError(f"it must be a list with one report for each of {len(curve.parts)} factors")
-        reports = [read_report(Report, own, curve.batch) for own in plain]
+        return [read_report(Report, fields, curve.batch) for fields in plain]
+
+    bc_type, reports = state.read("bc_type", read_bc_type), state.read("report", read_reports)
     check_curves(state, curve, [report.converged for report in reports])
     return time_axis, knots, curve, bc_type, extrapolate, reports
 
 
-def suffix_of(space: Space, i: int) -> str:
+def suffix_of(space: AnySpace, i: int) -> str:
     """Return the suffix of the names of entries of the i-th factor."""
     return f"_{i}" if isinstance(space, Product) else ""
 
 
 def read_space(state: Entries) -> Space:
     """Return the space, which is a name in a file and an object in a pickle."""
-    with entry("space"):
-        return space_named(state["space"])
+    return state.read("space", space_named)
 
 
-def times_state(name: str, t: NDArray[Any], time_axis: TimeAxis) -> dict[str, Any]:
+def times_state(name: str, t: Array, time_axis: TimeAxis) -> dict[str, Any]:
     """Return times as numbers, and their unit.
 
     Examples of units are "ns", "10m" for dates that count in tens of minutes, "ns UTC" for dates with a time zone, and
@@ -358,7 +373,7 @@ def times_state(name: str, t: NDArray[Any], time_axis: TimeAxis) -> dict[str, An
     return {name: t.astype(np.int64), f"{name}_unit": " ".join(words).strip()}
 
 
-def read_times(state: Entries, name: str) -> tuple[TimeAxis, NDArray[Any]]:
+def read_times(state: Entries, name: str) -> tuple[TimeAxis, Array]:
     """Return the time axis, and times as shown."""
     unit, _, zone = state[f"{name}_unit"].partition(" ")
     with entry(f"{name}_unit"):
@@ -375,9 +390,8 @@ def read_times(state: Entries, name: str) -> tuple[TimeAxis, NDArray[Any]]:
         return time_axis_of(Moments(times.astype(kind), zone or None))
 
 
-def _read_nodes(factor: Space, state: Entries, suffix: str, times: NDArray[np.float64]) -> tuple[Array, Array]:
-    """Return points and velocities in a factor."""
-    points, velocities = (read_array(state, name + suffix, factor) for name in ("points", "velocities"))
+def _check_nodes(factor: Space, points: Array, velocities: Array, times: Doubles) -> None:
+    """Raise ValidationError unless points and velocities in one factor belong to the knots."""
     nodes = points.shape[: points.ndim - len(factor.point_shape)]
     if points.shape != velocities.shape or not nodes or times.shape not in ((nodes[-1],), nodes):
         raise ValidationError(
@@ -385,7 +399,6 @@ def _read_nodes(factor: Space, state: Entries, suffix: str, times: NDArray[np.fl
         )
     if nodes[-1] < 2:
         raise ValidationError("a curve needs at least two points")
-    return points, velocities
 
 
 def read_array(state: Entries, name: str, space: Space) -> Array:
@@ -436,10 +449,10 @@ _FORMER = {"velocity_error"}
 
 def read_report(kind: type[_Report], plain: Any, batch: tuple[int, ...]) -> _Report:
     """Return a report from the values of its fields, `vars` of a report."""
-    known = {own.name: own.metadata for own in fields(kind)}  # type: ignore[arg-type]
+    known = {field.name: field.metadata for field in fields(kind)}  # type: ignore[arg-type]
     if unknown := set(plain) - set(known) - _FORMER:
         raise ValidationError(f"there is no field {short_repr(min(unknown))}")
-    return kind(**{name: read_field(name, plain[name], batch, **own) for name, own in known.items()})
+    return kind(**{name: read_field(name, plain[name], batch, **field) for name, field in known.items()})
 
 
 def read_field(

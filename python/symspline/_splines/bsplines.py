@@ -2,108 +2,46 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Self
+from abc import abstractmethod
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import _core
-from .._base.arrays import as_array, cast, checked_number, refuse, short_repr, whole_number
-from .._base.faults import of_index, warn
-from .._base.report import ConvergenceWarning, CumulativeReport
-from .._base.time import TimeAxis, onto_ends
-from .._base.typing import FloatArray, OnFailure, P, PointsLike
-from .._core import ConvergenceError, CutLocusError, ValidationError
-from .._curves.controlled import ControlledCurve, CumulativeCurve, CumulativeProduct, cumulative_of
+from .._base.arrays import as_array, cast, checked_number, refuse, whole_number
+from .._base.faults import UNCONVERGED, Fault, between_neighbours, renamed
+from .._base.report import CumulativeReport
+from .._base.typing import OnFailure, P, PointsLike
+from .._core import CutLocusError, ValidationError
+from .._curves.curve import ControlledCurve
 from .._curves.ends import ends_of
-from .._curves.failures import warn_of_far_data
+from .._curves.failures import raise_or_warn, warn_of_far_data
 from .._curves.fit import Points, read_given, unwrapped, validated
-from .._curves.options import check_on_failure, quantity_of
-from .._spaces import Array, Doubles, Euclidean, Group, Product, Quotient, Space, factors_of, parts_of, space_named
+from .._curves.options import check_on_failure
+from .._spaces import (
+    AnySpace,
+    Array,
+    Doubles,
+    Euclidean,
+    Group,
+    Product,
+    Quotient,
+    Space,
+    factors_of,
+    parts_of,
+    space_named,
+)
 from ..manifolds._manifold import refuse_functions
-from .archive import VERSION, Entries, Stored, entry, read_array, read_report, read_space, suffix_of
+from .archive import Entries, Stored, by_factor, entry, head_of, read_by_factor, read_report
 from .base import Curve
 
 
 class ControlledSpline(Curve[P]):
     """Base class of B-spline curves."""
 
-    _curve: Any
-    _time_axis = TimeAxis()
-
-    def __call__(self, x: ArrayLike, nu: int = 0) -> P:
-        """Evaluate the curve or its derivatives.
-
-        Parameters
-        ----------
-        x : array_like
-            Times between ``knots[degree]`` and ``knots[-degree - 1]``, of any shape and in any order.
-        nu : {0, 1, 2}, default 0
-            Order of the derivative: 0 for points, 1 for the velocity, 2 for the covariant acceleration.
-
-        Returns
-        -------
-        ndarray or tuple of ndarray, shape ``(*batch axes, *x.shape, *point_shape)``
-            Points or tangent vectors. For a `Product`, a tuple with one array per factor.
-
-        Raises
-        ------
-        ValidationError
-            If a time is not finite or lies outside the domain of the curve.
-        """
-        values: P = self._curve.evaluate(self._core_times(x)[0], quantity_of(nu))
-        return values
-
-    def speed(self, x: ArrayLike) -> FloatArray:
-        """Compute the speed of the curve.
-
-        Parameters
-        ----------
-        x : array_like
-            Times in the domain of the curve, of any shape and in any order.
-
-        Returns
-        -------
-        ndarray, shape ``(*batch axes, *x.shape)``
-            The norm of the velocity.
-
-        Raises
-        ------
-        ValidationError
-            If a time is not finite or lies outside the domain of the curve.
-
-        Examples
-        --------
-        >>> import symspline as ss
-        >>> line = ss.BSpline([0, 0, 2, 2], [[0.0], [3.0]], 1, "r:1")
-        >>> line.speed([0.5, 1.0])
-        array([1.5, 1.5])
-        """
-        speeds: FloatArray = self._curve.evaluate(self._core_times(x)[0], "speed")[()]
-        return speeds
-
-    def _core_times(self, x: Any, name: str = "x", per_curve: bool = False) -> tuple[Doubles, bool]:
-        times = as_array(x, name)
-        if times.dtype.kind not in "biuf":
-            raise ValidationError(f"{name} must be real numbers, not {times.dtype}")
-        batch = self._batch
-        if per_curve and times.shape[: len(batch)] != batch:
-            raise ValidationError(
-                f"with per_curve=True the shape of {name} must begin with the batch axes {batch}; got {times.shape}"
-            )
-        start, end = self.domain
-        times, _ = onto_ends(cast(times), np.array([start, end]), (), False, times.dtype)
-        outside = ~((times >= start) & (times <= end))
-
-        def say(i: Any) -> str:
-            where = f"outside the domain [{start}, {end}] of the curve" if np.isfinite(times[i]) else "not finite"
-            return f"= {times[i]} is {where}"
-
-        refuse(outside, name, say)
-        return times, per_curve
-
-    def _shown_times(self, x: Doubles) -> Doubles:
-        return x
+    _curve: ControlledCurve
+    _cumulative: ClassVar[bool] = False
 
     @property
     def domain(self) -> tuple[float, float]:
@@ -113,8 +51,7 @@ class ControlledSpline(Curve[P]):
     @property
     def knots(self) -> Doubles:
         """Knots, shape (n + degree + 1,)."""
-        knots: Doubles = self._curve.knots
-        return knots
+        return self._curve.knots
 
     @property
     def control_points(self) -> P:
@@ -125,54 +62,95 @@ class ControlledSpline(Curve[P]):
     @property
     def degree(self) -> int:
         """Degree of the curve."""
-        degree: int = self._curve.degree
-        return degree
-
-    @property
-    def space(self) -> Space[P]:
-        """Space of the curve."""
-        space: Space[P] = self._curve.space
-        return space
-
-    def _fill(self, *parts: Any) -> None:
-        (self._curve,) = parts
+        return self._curve.degree
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, ControlledSpline):
             return NotImplemented
         return (
-            type(self._curve) is type(other._curve)
+            self._curve.cumulative == other._curve.cumulative
             and self.space == other.space
             and self.degree == other.degree
             and np.array_equal(self.knots, other.knots)
-            and all(
-                np.array_equal(*pair)
-                for pair in zip(*(parts_of(c.control_points, c.space, "") for c in (self, other)), strict=True)
-            )
+            and all(np.array_equal(*factor) for factor in zip(self._curve.control, other._curve.control, strict=True))
         )
+
+    # ---- batches, files ----
+
+    @staticmethod
+    @abstractmethod
+    def _checked_space(space: AnySpace | str) -> AnySpace:
+        """Return the space, on which curves of this class must be defined."""
+
+    @classmethod
+    def _of(cls, curve: ControlledCurve) -> Self:
+        self = cls.__new__(cls)
+        self._curve = curve
+        return self
+
+    def _picked(self, index: Any) -> Self:
+        return self._of(self._curve.take_batch(index))
+
+    def _state(self) -> dict[str, Any]:
+        state = head_of(self) | {"knots": self.knots, "degree": self.degree}
+        return state | by_factor("control_points", self._curve.space, self._curve.control)
+
+    @classmethod
+    def _from_state(cls, state: Entries) -> Self:
+        space = state.read("space", cls._checked_space)
+        degree, knots, control = state["degree"], state["knots"], read_by_factor(state, "control_points", space)
+        if isinstance(state, Stored):
+            # Control points keep the values that they had after projection.
+            points = tuple(control) if isinstance(space, Product) else control[0]
+            with entry("control_points"):
+                curve, _ = _opened(points, space, knots, degree, cls._cumulative)
+            degree, knots = curve.degree, curve.knots
+        return cls._of(ControlledCurve(space, knots, control, degree, cls._cumulative))
+
+    @property
+    def _counts(self) -> str:
+        return f"{self._made_of()}, "
 
     def _made_of(self, radius: float | None = None) -> str:
         return f"{self.knots.size - self.degree - 1} control points, degree {self.degree}"
 
-    def __repr__(self) -> str:
-        count = self.knots.size - self.degree - 1
-        what = f"{self._batch_text}{count} control points, degree {self.degree}, {self._span_text}"
-        return f"<{type(self).__name__} on {self.space!r}: {what}>"
+
+def _opened(
+    control_points: Any, space: AnySpace, knots: Any, degree: Any, cumulative: bool
+) -> tuple[ControlledCurve, list[Points]]:
+    """Return the curve with given control points and knots, after validation, and the points as given."""
+    degree = whole_number(degree, "degree", 1)
+    factors = factors_of(space)
+    data = list(map(_read_factor, parts_of(control_points, space, "control_points"), factors))
+    count = _check_alike(data)
+    if knots is None:
+        knots = np.arange(-degree, count + 1) if degree < count else []
+    knots = checked_knots(knots, count, degree)
+    data = list(map(unwrapped, factors, data))
+    return ControlledCurve(space, knots, list(map(checked_points, factors, data)), degree, cumulative), data
 
 
-def control_array(value: ArrayLike, space: Space[Any], least: int) -> tuple[Doubles, float]:
-    """Return control points as floating-point numbers of the core, and their tolerance."""
+def _read_factor(value: ArrayLike, space: AnySpace) -> Points:
+    """Return the control points of one factor."""
     array = space._array(value, "control_points")
     doubles = space._doubles(array, "control_points") if array.ndim > len(space.point_shape) else None
-    if doubles is None or array.size == 0 or space._lead(doubles)[-1] < least:
+    if doubles is None or array.size == 0 or space._lead(doubles)[-1] < 2:
         shape = ", ".join(map(str, space.point_shape))
         raise ValidationError(
-            f"control_points has shape {array.shape}; a curve needs shape (..., n, {shape}) with n >= {least}"
+            f"control_points has shape {array.shape}; a curve needs shape (..., n, {shape}) with n >= 2"
         )
-    return doubles, space._tol(array)
+    *batch, count = space._lead(doubles)
+    return Points(doubles, space._tol(array), tuple(batch), count)
 
 
-def checked_points(space: Space[Any], doubles: Doubles, tol: float) -> Array:
+def _check_alike(data: list[Points]) -> int:
+    """Return the number of control points, which must be the same in all factors."""
+    if len({(part.batch, part.nodes) for part in data}) > 1:
+        raise ValidationError("the factors of control_points must have the same number of points and batch axes")
+    return data[0].nodes
+
+
+def checked_points(space: AnySpace, data: Points) -> Array:
     """Project control points onto the space.
 
     Raises
@@ -182,39 +160,40 @@ def checked_points(space: Space[Any], doubles: Doubles, tol: float) -> Array:
     CutLocusError
         If two neighbouring control points are not joined by a unique shortest geodesic.
     """
-    *batch, count = space._lead(doubles)
-    data, ends = Points(doubles, tol, tuple(batch), count), ends_of("natural", space, tuple(batch))
+    ends = ends_of("natural", space, data.batch)
     try:
-        (points,), _ = validated(space, np.arange(count, dtype=np.float64), [data], [ends])
+        (points,), _ = validated(space, np.arange(data.nodes, dtype=np.float64), [data], [ends])
     except ValidationError as error:
-        raise ValidationError(str(error).replace("points[", "control_points[")) from None
+        raise renamed(error, lambda sample: ("control_points", sample.node)) from None
     p, q = space._neighbours(points)
     try:
         space._apply("log", p=p, q=q)
     except CutLocusError as error:
-        row, _, why = str(error).removeprefix("pair ").partition(": the points ")
-        *curve, i = map(int, np.unravel_index(int(row), (*batch, count - 1)))
-        raise CutLocusError(f"control_points[{i}] and control_points[{i + 1}]{of_index(curve)} {why}") from None
+        raise between_neighbours(error, "control_points", (*data.batch, data.nodes - 1)) from None
     return points
+
+
+def _ordered(value: ArrayLike, name: str, needed: str, *, least: int = 0, count: int | None = None) -> Doubles:
+    """Return a copy of a vector of finite times that do not decrease."""
+    array = as_array(value, name)
+    if array.ndim != 1 or array.dtype.kind not in "biuf" or array.size < least or count not in (None, array.size):
+        raise ValidationError(f"{name} must be {needed}, not {array.dtype} of shape {array.shape}")
+    times = cast(array.copy())
+    refuse(~np.isfinite(times), name, lambda i: f"= {times[i]} is not finite")
+    falls = np.flatnonzero(times[1:] < times[:-1])
+    if falls.size:
+        i = falls[0] + 1
+        raise ValidationError(f"{name}[{i}] = {times[i]} is before {name}[{i - 1}] = {times[i - 1]}. Sort by time.")
+    return times
 
 
 def checked_knots(knots: ArrayLike, count: int, degree: int) -> Doubles:
     """Return a copy of the knots of a B-spline with `count` control points after validation."""
-    array = as_array(knots, "knots")
-    if array.ndim != 1 or array.dtype.kind not in "biuf":
-        raise ValidationError(
-            f"knots must be a one-dimensional array of real numbers, not {array.dtype} of shape {array.shape}"
-        )
-    needed = count + degree + 1
+    result, needed = _ordered(knots, "knots", "a one-dimensional array of real numbers"), count + degree + 1
     if count <= degree:
         raise ValidationError(f"degree {degree} needs at least {degree + 1} control points, got {count}")
-    if array.size != needed:
-        raise ValidationError(f"{count} control points of degree {degree} need {needed} knots, got {array.size}")
-    result = cast(array.copy())
-    refuse(~np.isfinite(result), "knots", lambda _: "is not finite")
-    falls = np.flatnonzero(result[1:] < result[:-1])
-    if falls.size:
-        raise ValidationError(f"knots[{falls[0] + 1}] = {result[falls[0] + 1]} is before knots[{falls[0]}]")
+    if result.size != needed:
+        raise ValidationError(f"{count} control points of degree {degree} need {needed} knots, got {result.size}")
     if not np.isfinite(float(result[-1]) - float(result[0])):
         raise ValidationError("knots span more than the floating-point range")
     times, repeats = np.unique(result, return_counts=True)
@@ -291,39 +270,20 @@ class BSpline(ControlledSpline[P]):
 
     _format = "symspline-bspline"
     _kind = "B-spline"
-    _curve: ControlledCurve
 
     def __init__(self, knots: ArrayLike, control_points: ArrayLike, degree: int, space: Space[P] | str) -> None:
-        space = _factor(space)
-        degree = whole_number(degree, "degree", 1)
-        doubles, tol = control_array(control_points, space, 2)
-        knots = checked_knots(knots, space._lead(doubles)[-1], degree)
-        *batch, count = space._lead(doubles)
-        data = unwrapped(space, Points(doubles, tol, tuple(batch), count))
-        self._fill(ControlledCurve(space, knots, checked_points(space, data.numbers, tol), degree))
-        warn_of_far_data(space, [data])
+        self._curve, data = _opened(control_points, self._checked_space(space), knots, degree, False)
+        warn_of_far_data(self.space, data)
 
-    def _picked(self, index: Any) -> Self:
-        control = np.ascontiguousarray(self.control_points[index])
-        return self._of(ControlledCurve(self.space, self.knots, control, self.degree))
-
-    def _state(self) -> dict[str, Any]:
-        head = {"format": self._format, "version": VERSION, "space": self.space}
-        return head | {"knots": self.knots, "control_points": self.control_points, "degree": self.degree}
-
-    @classmethod
-    def _from_state(cls, state: Entries) -> Self:
-        space, degree = _factor(read_space(state)), state["degree"]
-        control, knots = read_array(state, "control_points", space), state["knots"]
-        if isinstance(state, Stored):
-            with entry("control_points"):
-                # They keep the values that they had after projection.
-                checked_points(space, *control_array(control, space, 2))
-            with entry("degree"):
-                degree = whole_number(degree, "degree", 1)
-            with entry("knots"):
-                knots = checked_knots(knots, space._lead(space._doubles(control, "control_points"))[-1], degree)
-        return cls._of(ControlledCurve(space, knots, control, degree))
+    @staticmethod
+    def _checked_space(space: AnySpace | str) -> AnySpace:
+        space = space_named(space)
+        if isinstance(space, Product):
+            raise ValidationError(
+                "B-spline and Bézier curves are not defined on a Product. Make one curve for each factor."
+            )
+        refuse_functions(space, "B-spline and Bézier curves are not made")
+        return space
 
 
 class BezierCurve(BSpline[P]):
@@ -377,8 +337,8 @@ class BezierCurve(BSpline[P]):
     _kind = "Bézier curve"
 
     def __init__(self, control_points: ArrayLike, space: Space[P] | str) -> None:
-        space = _factor(space)
-        count = space._lead(control_array(control_points, space, 2)[0])[-1]
+        space = self._checked_space(space)
+        count = _read_factor(control_points, space).nodes
         super().__init__([0.0] * count + [1.0] * count, control_points, count - 1, space)
 
     @classmethod
@@ -390,21 +350,7 @@ class BezierCurve(BSpline[P]):
         return curve
 
 
-def _factor(space: Space[P] | str) -> Space[P]:
-    """Return the space, which must not be a product."""
-    space = space_named(space)
-    if isinstance(space, Product):
-        raise ValidationError(
-            "B-spline and Bézier curves are not defined on a Product. Make one curve for each factor."
-        )
-    refuse_functions(space, "B-spline and Bézier curves are not made")
-    return space
-
-
 # ---- cumulative B-spline curves on Lie groups ----
-
-if TYPE_CHECKING:
-    pass
 
 
 class CumulativeBSpline(ControlledSpline[P]):
@@ -489,29 +435,15 @@ class CumulativeBSpline(ControlledSpline[P]):
 
     _format = "symspline-cumulative"
     _kind = "CumulativeBSpline"
-    _curve: CumulativeCurve | CumulativeProduct
+    _cumulative = True
     report: CumulativeReport | None
 
     def __init__(
         self, knots: ArrayLike | None, control_points: PointsLike, space: Space[P] | str, *, degree: int = 3
     ) -> None:
-        space = _checked_group(space)
-        degree = whole_number(degree, "degree", 1)
-        data = []
-        for factor, value in zip(factors_of(space), parts_of(control_points, space, "control_points"), strict=True):
-            doubles, tol = control_array(value, factor, 2)
-            *batch, count = factor._lead(doubles)
-            data.append(Points(doubles, tol, tuple(batch), count))
-        if len({(part.batch, part.nodes) for part in data}) > 1:
-            raise ValidationError("the factors of control_points must have the same number of points and batch axes")
-        count = data[0].nodes
-        given = np.arange(-degree, count + 1) if knots is None and degree < count else knots
-        found = checked_knots([] if given is None else given, count, degree)
-        points = [
-            checked_points(own, part.numbers, part.tol) for own, part in zip(factors_of(space), data, strict=True)
-        ]
-        self._fill(cumulative_of(space, found, points, degree), None)
-        warn_of_far_data(space, data)
+        self._curve, data = _opened(control_points, self._checked_space(space), knots, degree, True)
+        self.report = None
+        warn_of_far_data(self.space, data)
 
     @classmethod
     def fit(
@@ -592,7 +524,7 @@ class CumulativeBSpline(ControlledSpline[P]):
         >>> ss.rotations.as_rotation_vectors(curve(0.5)).round(3) + 0.0
         array([0.   , 0.   , 0.997])
         """
-        space = _checked_group(space)
+        space = cls._checked_space(space)
         degree = whole_number(degree, "degree", 1)
         tol = checked_number(tol, "tol must be a number from 0 to 1", lambda x: 0 <= x < 1)
         max_iter = whole_number(max_iter, "max_iter", 1)
@@ -611,105 +543,57 @@ class CumulativeBSpline(ControlledSpline[P]):
             )
             control.append(factor._numbers(fitted[0]))
             columns.append([np.reshape(column, batch) for column in fitted[1:]])
-        converged, iterations, step, residual = (np.array(each) for each in zip(*columns, strict=True))
-        each = [converged.all(axis=0), iterations.max(axis=0), step.max(axis=0), residual.sum(axis=0)]
-        report = CumulativeReport(*(own if batch else own.item() for own in each))
-        curve = cls._of(cumulative_of(space, full, control, degree), report)
-        _check_converged(curve, report, on_failure)
+        converged, iterations, step, residual = (np.array(combined) for combined in zip(*columns, strict=True))
+        combined = [converged.all(axis=0), iterations.max(axis=0), step.max(axis=0), residual.sum(axis=0)]
+        report = CumulativeReport(*(value if batch else value.item() for value in combined))
+        curve = cls._of(ControlledCurve(space, full, control, degree, cumulative=True))
+        curve.report = report
+        raise_or_warn(_faults(report, tol), on_failure, curve)
         return curve
 
     @property
     def _unconverged(self) -> int:
         return 0 if self.report is None else int(np.sum(~np.asarray(self.report.converged)))
 
-    def _where(self, extrapolate: Any) -> str:
-        """Return the extrapolation policy. B-splines have no values outside their domain."""
-        if extrapolate is None or (isinstance(extrapolate, str) and extrapolate == "raise"):
-            return "raise"
-        if extrapolate is False:
-            return "nan"
-        raise ValidationError(
-            f"extrapolate must be None, 'raise' or False for a cumulative B-spline, not {short_repr(extrapolate)}"
-        )
-
-    # ---- batches, files ----
-
-    def _fill(self, *parts: Any) -> None:
-        self._curve, self.report = parts
-
     @property
     def t(self) -> Doubles:
         """Distinct knots in the domain of the curve."""
         return self._curve.times
 
+    @staticmethod
+    def _checked_space(space: AnySpace | str) -> AnySpace:
+        """Return the space if all its factors are groups."""
+        space = space_named(space)
+        for factor in factors_of(space):
+            if isinstance(factor, Quotient) or not isinstance(factor, (Group, Euclidean)):
+                raise ValidationError(
+                    f"space: cumulative B-splines are defined on groups, such as so:3, se:3, su:2, gl:3 or r:3, and "
+                    f"on products of groups, but {factor!r} is not a group. Use BSpline, or make_lsq_spline for a fit."
+                )
+        return space
+
     def _picked(self, index: Any) -> Self:
-        report = self.report and self.report.map(lambda column: column[index])
-        return self._of(self._curve.take_batch(index), report)
+        curve = super()._picked(index)
+        curve.report = self.report and self.report.map(lambda column: column[index])
+        return curve
 
     def _state(self) -> dict[str, Any]:
-        space: Space[Any] = self.space
-        report = self.report
-        head = {"format": self._format, "version": VERSION, "space": space, "knots": self.knots, "degree": self.degree}
-        points = {
-            "control_points" + suffix_of(space, i): part.control_points for i, part in enumerate(self._curve.parts)
-        }
-        return head | points | {"report": None if report is None else vars(report)}
+        return super()._state() | {"report": None if self.report is None else vars(self.report)}
 
     @classmethod
     def _from_state(cls, state: Entries) -> Self:
-        with entry("space"):
-            space = _checked_group(read_space(state))
-        degree, knots = state["degree"], state["knots"]
-        names = ["control_points" + suffix_of(space, i) for i in range(len(factors_of(space)))]
-        control = [read_array(state, name, own) for name, own in zip(names, factors_of(space), strict=True)]
-        if isinstance(state, Stored):
-            for name, factor, points in zip(names, factors_of(space), control, strict=True):
-                with entry(name):
-                    # They keep the values that they had after projection.
-                    checked_points(factor, *control_array(points, factor, 2))
-            with entry("degree"):
-                degree = whole_number(degree, "degree", 1)
-            leads = {
-                own._lead(own._doubles(x, "control_points")) for own, x in zip(factors_of(space), control, strict=True)
-            }
-            with entry("knots"):
-                if len(leads) > 1:
-                    raise ValidationError("the factors have different numbers of control points")
-                knots = checked_knots(knots, leads.pop()[-1], degree)
-        curve = cumulative_of(space, knots, control, degree)
-        with entry("report"):
-            plain = state["report"]
-            report = None if plain is None else read_report(CumulativeReport, plain, curve.batch)
-        return cls._of(curve, report)
-
-
-def _checked_group(space: Space[P] | str) -> Space[P]:
-    """Return the space, whose factors must be groups."""
-    space = space_named(space)
-    for factor in factors_of(space):
-        if isinstance(factor, Quotient) or not isinstance(factor, (Group, Euclidean)):
-            raise ValidationError(
-                f"space: cumulative B-splines are defined on groups, such as so:3, se:3, su:2, gl:3 or r:3, and on "
-                f"products of groups, but {factor!r} is not a group. Use BSpline, or make_lsq_spline for a fit."
-            )
-    return space
+        curve = super()._from_state(state)
+        curve.report = state.read(
+            "report", lambda plain: None if plain is None else read_report(CumulativeReport, plain, curve._batch)
+        )
+        return curve
 
 
 def _times_of(t: ArrayLike | None, count: int) -> Doubles:
     """Return the times of data."""
     if t is None:
         return np.arange(count, dtype=np.float64)
-    array = as_array(t, "t")
-    if array.dtype.kind not in "biuf" or array.shape != (count,):
-        raise ValidationError(
-            f"t must be {count} real numbers, one per point, not {array.dtype} of shape {array.shape}"
-        )
-    times = cast(array.copy())
-    refuse(~np.isfinite(times), "t", lambda i: f"= {times[i]} is not finite")
-    falls = np.flatnonzero(times[1:] < times[:-1])
-    if falls.size:
-        i = falls[0] + 1
-        raise ValidationError(f"t[{i}] = {times[i]} is before t[{i - 1}] = {times[i - 1]}. Sort the data by time.")
+    times = _ordered(t, "t", f"{count} real numbers, one per point", count=count)
     if not times[0] < times[-1] or not np.isfinite(times[-1] - times[0]):
         raise ValidationError("t must contain at least two different times, within the floating-point range")
     return times
@@ -717,21 +601,14 @@ def _times_of(t: ArrayLike | None, count: int) -> Doubles:
 
 def _clamped(knots: Any, times: Doubles, degree: int) -> Doubles:
     """Return knots that cover the times, with the first and last one repeated."""
-    array = as_array(knots, "knots")
-    if array.ndim == 0:
+    if np.ndim(knots) == 0:
         number = whole_number(knots, "knots", 2)
         if number > times.size + 1:
             raise ValidationError(f"knots = {number} exceeds the number of data, {times.size}. Use fewer knots.")
         inner = np.linspace(times[0], times[-1], number)
     else:
-        if array.ndim != 1 or array.dtype.kind not in "biuf" or array.size < 2:
-            raise ValidationError(
-                f"knots must be a number of knots, or at least two increasing times, not {array.dtype} of shape "
-                f"{array.shape}"
-            )
-        inner = cast(array.copy())
-        refuse(~np.isfinite(inner), "knots", lambda i: f"= {inner[i]} is not finite")
-        flat = np.flatnonzero(~(inner[1:] > inner[:-1]))
+        inner = _ordered(knots, "knots", "a number of knots, or at least two increasing times", least=2)
+        flat = np.flatnonzero(inner[1:] == inner[:-1])
         if flat.size:
             i = flat[0] + 1
             raise ValidationError(f"knots[{i}] = {inner[i]} is not after knots[{i - 1}] = {inner[i - 1]}")
@@ -758,21 +635,15 @@ def _weights_of(weights: ArrayLike | None, batch: tuple[int, ...], count: int) -
         ) from None
 
 
-def _check_converged(curve: CumulativeBSpline[Any], report: CumulativeReport, on_failure: str) -> None:
-    """Raise an error or warn if a curve of the batch did not converge."""
-    failed = np.argwhere(~np.asarray(report.converged))
-    if not len(failed) or on_failure == "ignore":
-        return
-    index = tuple(failed[0].tolist())
-    step, iterations = np.asarray(report.step)[index], np.asarray(report.iterations)[index]
-    of = f" of curve {list(index)}" if index else ""
-    message = (
-        f"the least-squares fit{of} did not converge: after {iterations} iterations the last step is {step:.1e} of the "
-        "longest step between control points. Use fewer knots, check the data for outliers, or increase max_iter."
-    )
-    if on_failure == "warn":
-        warn(message, ConvergenceWarning, index)
-        return
-    error = ConvergenceError(message)
-    error.spline, error.curve = curve, index
-    raise error
+def _faults(report: CumulativeReport, tol: float) -> list[Fault]:
+    """Return the faults of the fits that did not converge."""
+    remedy = "use fewer knots, check the data for outliers, or increase max_iter"
+    steps, iterations = np.ravel(report.step), np.ravel(report.iterations)
+    faults = []
+    for number in np.flatnonzero(~np.ravel(report.converged)).tolist():
+        what = (
+            f"the least-squares fit{{of}} did not converge: after {iterations[number]} iterations the last step is "
+            f"{steps[number]:.1e} of the longest step between control points"
+        )
+        faults.append(Fault(number, UNCONVERGED, what, remedy, value=float(steps[number]), limit=tol))
+    return faults

@@ -13,14 +13,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from .._base.arrays import short_repr
 from .._base.time import TimeAxis
-from .._base.typing import Extrapolate, FloatArray, P, Time
+from .._base.typing import FloatArray, P, Time
 from .._core import ValidationError
 from .._curves.composed import Affine, Joined, Retimed, TimeMap, part_of_times
 from .._curves.curve import UncertaintyBand
-from .._curves.options import checked_extrapolate, extrapolation_mode
-from .._spaces import Doubles, Space
-from .archive import VERSION, Entries, entry, read_times, restore, times_state
-from .base import Curve, TimedCurve
+from .._spaces import Array, Doubles
+from .archive import Entries, entry, head_of, read_times, restore, times_state
+from .base import Curve
 
 if TYPE_CHECKING:
     from typing_extensions import TypeVar
@@ -39,39 +38,7 @@ _EQUAL = 1e-9
 _ROUNDING = 4
 
 
-class ComposedCurve(TimedCurve[P]):
-    """Base class of curves that are made of other curves."""
-
-    _curve: Joined | Retimed
-
-    def _compose(self, time_axis: TimeAxis, curve: Any, extrapolate: Extrapolate) -> None:
-        self._time_axis, self._curve, self._extrapolate = time_axis, curve, extrapolate
-        self._extrapolation_mode = "raise"
-        self._extrapolation_mode = self._where(extrapolate)
-
-    @property
-    def space(self) -> Space[P]:
-        """Space of the curve."""
-        return self._curve.space
-
-    @property
-    def domain(self) -> tuple[Time, Time]:
-        """First and last time."""
-        first, last = (self._shown_times(np.asarray(self._curve.times[..., i]))[()] for i in (0, -1))
-        return first, last
-
-    def _where(self, extrapolate: Any) -> str:
-        if extrapolate is None:
-            return self._extrapolation_mode
-        mode = extrapolation_mode(checked_extrapolate(extrapolate), "natural")
-        if mode not in ("raise", "nan"):
-            raise ValidationError(
-                f"extrapolate must be None, 'raise' or False, not {extrapolate!r}, for a {type(self).__name__}"
-            )
-        return mode
-
-
-class RetimedCurve(ComposedCurve[P]):
+class RetimedCurve(Curve[P]):
     """A curve at other times.
 
     The methods `Curve.restrict`, `Curve.reverse`, `Curve.shift` and `Curve.retime` return curves of this class. It
@@ -105,12 +72,12 @@ class RetimedCurve(ComposedCurve[P]):
     def __init__(self) -> None:
         raise TypeError("RetimedCurve has no public constructor. Call restrict, reverse, shift or retime of a curve.")
 
-    def _fill(self, *parts: Any) -> None:
-        source: Curve[P]
-        law: TimeMap
-        source, time_axis, law, times = parts
-        self._source = source
-        self._compose(time_axis, Retimed(source._curve, law, times), None)
+    @classmethod
+    def _of(cls, source: Curve[P], time_axis: TimeAxis, law: TimeMap, times: Doubles) -> Self:
+        """Return a curve at times of another time axis, which a law maps to those of the source."""
+        self = cls.__new__(cls)
+        self._source, self._time_axis, self._curve = source, time_axis, Retimed(source._curve, law, times)
+        return self
 
     def _made_of(self, radius: float | None = None) -> str:
         return self._span_text
@@ -145,17 +112,16 @@ class RetimedCurve(ComposedCurve[P]):
         times, law = self._curve.times, self._curve.law
         if isinstance(law, Affine) and np.ndim(law.offset):
             law = Affine(law.sign, law.offset[index])
-        own = times[index] if times.ndim > 1 else times
-        return self._of(self._source[index], self._time_axis.take_batch(index), law, own)
+        own_times = times[index] if times.ndim > 1 else times
+        return self._of(self._source[index], self._time_axis.take_batch(index), law, own_times)
 
     def _state(self) -> dict[str, Any]:
         law: Any = self._curve.law
         if isinstance(law, Affine):
             law = {"sign": law.sign, "offset": np.asarray(law.offset)}
         origin = np.atleast_1d(0.0 if self._time_axis.plain else self._time_axis.origin)
-        head = {"format": self._format, "version": VERSION, "space": self.space}
         axis = {"plain": self._time_axis.plain} | times_state("t", origin, self._time_axis)
-        return head | axis | {"law": law, "knots": self._curve.times, "0": self._source._state()}
+        return head_of(self) | axis | {"law": law, "knots": self._curve.times, "0": self._source._state()}
 
     @classmethod
     def _from_state(cls, state: Entries) -> Self:
@@ -184,11 +150,8 @@ class RetimedCurve(ComposedCurve[P]):
             and np.array_equal(self._curve.times, other._curve.times)
         )
 
-    def __repr__(self) -> str:
-        return f"<RetimedCurve on {self.space!r}: {self._batch_text}{self._span_text}>"
 
-
-class SegmentedCurve(ComposedCurve[P], Generic[P, C]):
+class SegmentedCurve(Curve[P], Generic[P, C]):
     """Curves one after the other, with gaps between them.
 
     This is one function of time and a sequence of its segments. It is NaN in the gaps, where there are no data.
@@ -237,14 +200,12 @@ class SegmentedCurve(ComposedCurve[P], Generic[P, C]):
     def __init__(self, curves: Sequence[C], *, extrapolate: Literal["raise", False] | None = None) -> None:
         segments = _checked_segments(curves)
         time_axis = segments[0]._time_axis
-        offsets = [_offset(own._time_axis, time_axis) for own in segments]
-        joined = Joined([own._curve for own in segments], offsets)
+        offsets = [_offset(segment._time_axis, time_axis) for segment in segments]
+        joined = Joined([segment._curve for segment in segments], offsets)
         _check_order(segments, joined)
-        self._fill(segments, time_axis, joined, extrapolate)
-
-    def _fill(self, *parts: Any) -> None:
-        self._segments: tuple[C, ...] = parts[0]
-        self._compose(*parts[1:])
+        self._segments: tuple[C, ...] = segments
+        self._time_axis, self._curve = time_axis, joined
+        self._extrapolate, self._extrapolation_mode = extrapolate, self._where(extrapolate)
 
     def _in_segments(self) -> Sequence[Curve[P]]:
         return self._segments
@@ -257,33 +218,33 @@ class SegmentedCurve(ComposedCurve[P], Generic[P, C]):
     @property
     def gaps(self) -> list[tuple[Time, Time]]:
         """Pairs of times between which there is no segment."""
-        ends = [own.domain for own in self._segments]
+        ends = [segment.domain for segment in self._segments]
         return [(a[1], b[0]) for a, b in pairwise(ends) if b[0] > a[1]]
 
     def _made_of(self, radius: float | None = None) -> str:
-        kind, *others = {own._kind for own in self._segments}
+        kind, *others = {segment._kind for segment in self._segments}
         # C² spline, B-spline and Bézier curve are names.
         kind = f"{kind[0].lower()}{kind[1:]}" if kind.startswith(("Smoothing", "Piecewise")) else kind
         return f"{len(self)} segments" if others else f"{len(self)} segments ({kind})"
 
     @property
     def _unconverged(self) -> int:
-        return sum(own._unconverged for own in self._segments)
+        return sum(segment._unconverged for segment in self._segments)
 
     @property
     def _node_times(self) -> Doubles:
         pairs = zip(self._segments, self._curve.offsets, strict=True)
-        return np.unique(np.concatenate([own._node_times + offset for own, offset in pairs]))
+        return np.unique(np.concatenate([segment._node_times + offset for segment, offset in pairs]))
 
     def _noise_beside(self, index: tuple[int, ...], x: Doubles) -> UncertaintyBand | None:
         """Return the noisy data of all segments, and the bands at times x outside gaps, in increasing order."""
         offsets = self._curve.offsets
         parts = np.split(x, np.searchsorted(x, self._curve.starts[1:]))
         bands = [
-            own._noise_beside(index, part - offset)
-            for own, part, offset in zip(self._segments, parts, offsets, strict=True)
+            segment._noise_beside(index, part - offset)
+            for segment, part, offset in zip(self._segments, parts, offsets, strict=True)
         ]
-        known = [own for own in bands if own is not None]
+        known = [segment for segment in bands if segment is not None]
         return UncertaintyBand.joined(known, offsets) if len(known) == len(bands) else None
 
     @property
@@ -316,7 +277,7 @@ class SegmentedCurve(ComposedCurve[P], Generic[P, C]):
         self, points: ArrayLike | tuple[ArrayLike, ...], *, per_curve: bool = False
     ) -> tuple[Time, FloatArray | float]:
         # Points in the gaps are not defined.
-        time, distance = (np.array(own) for own in self._segments[0].closest(points, per_curve=per_curve))
+        time, distance = (np.array(values) for values in self._segments[0].closest(points, per_curve=per_curve))
         for segment in self._segments[1:]:
             times, distances = segment.closest(points, per_curve=per_curve)
             nearer = np.asarray((distances < distance) | (np.isnan(distance) & ~np.isnan(distances)))
@@ -332,32 +293,30 @@ class SegmentedCurve(ComposedCurve[P], Generic[P, C]):
         function: Literal["speed", "acceleration"] | Callable[[Any], Any] = "speed",
         *,
         kind: Literal["max", "min"] = "max",
-    ) -> tuple[NDArray[Any], NDArray[np.float64]]:
-        found = [own.extrema(function, kind=kind) for own in self._segments]
-        times = np.concatenate([own[0] for own in found])
-        values = np.concatenate([own[1] for own in found])
+    ) -> tuple[Array, NDArray[np.float64]]:
+        pairs = [segment.extrema(function, kind=kind) for segment in self._segments]
+        times = np.concatenate([segment[0] for segment in pairs])
+        values = np.concatenate([segment[1] for segment in pairs])
         sign = 1 if kind == "max" else -1
         # Where two segments meet, their ends are extrema of the whole only if both are, or if there is a jump.
         kept = np.ones(len(times), bool)
         for t, *beside in self._meetings:
             here = np.arange(*(np.searchsorted(times, t, side) for side in ("left", "right")))
-            value = [np.asarray(_at(own, function, t)) for own in beside]
+            value = [np.asarray(_at(segment, function, t)) for segment in beside]
             if len(here) == 2:
                 kept[here[int(sign * values[here[0]] >= sign * values[here[1]])]] = False
             elif len(here) == 1 and not sign * values[here[0]] > sign * min(value, key=lambda x: sign * x) + _EQUAL:
                 kept[here] = False
         return times[kept], values[kept]
 
-    def solve(
-        self, function: Literal["speed", "acceleration"] | Callable[[Any], Any], value: float = 0.0
-    ) -> NDArray[Any]:
-        found = [own.solve(function, value) for own in self._segments]
+    def solve(self, function: Literal["speed", "acceleration"] | Callable[[Any], Any], value: float = 0.0) -> Array:
+        crossings = [segment.solve(function, value) for segment in self._segments]
         jumps = []
         for t, *beside in self._meetings:
-            left, right = (float(np.asarray(_at(own, function, t))) - value for own in beside)
+            left, right = (float(np.asarray(_at(segment, function, t))) - value for segment in beside)
             if left * right < 0:
                 jumps.append(np.asarray(t)[None])
-        return np.unique(np.concatenate([*found, *jumps]))
+        return np.unique(np.concatenate([*crossings, *jumps]))
 
     @property
     def _meetings(self) -> list[tuple[Any, Curve[Any], Curve[Any]]]:
@@ -366,15 +325,15 @@ class SegmentedCurve(ComposedCurve[P], Generic[P, C]):
         return [(b.domain[0], a, b) for a, b in pairs if b.domain[0] == a.domain[1]]
 
     def _picked(self, index: Any) -> Self:
-        return self._of_segments([own[index] for own in self._segments])
+        return self._of_segments([segment[index] for segment in self._segments])
 
     def _restricted(self, start: Doubles, stop: Doubles) -> Curve[P]:
         kept: list[Any] = []
-        for own, offset in zip(self._segments, self._curve.offsets, strict=True):
-            first, last = own._curve.times[[0, -1]] + offset
+        for segment, offset in zip(self._segments, self._curve.offsets, strict=True):
+            first, last = segment._curve.times[[0, -1]] + offset
             if max(first, start) < min(last, stop):
                 ends = (np.asarray(max(first, start) - offset), np.asarray(min(last, stop) - offset))
-                kept.append(own if start <= first and last <= stop else own._restricted(*ends))
+                kept.append(segment if start <= first and last <= stop else segment._restricted(*ends))
         if not kept:
             raise ValidationError("there is no segment between a and b, which are in one gap")
         return self._of_segments(kept)
@@ -382,31 +341,33 @@ class SegmentedCurve(ComposedCurve[P], Generic[P, C]):
     def _reversed(self) -> Curve[P]:
         first, last = (np.asarray(end)[()] for end in self.domain)
         turned = []
-        for own in reversed(self._segments):
-            start, stop = (np.asarray(end)[()] for end in own.domain)
-            turned.append(own._reversed()._shifted((first - start) + (last - stop)))
+        for segment in reversed(self._segments):
+            start, stop = (np.asarray(end)[()] for end in segment.domain)
+            turned.append(segment._reversed()._shifted((first - start) + (last - stop)))
         return self._of_segments(turned)
 
     def _shifted(self, step: Any) -> Curve[P]:
-        return self._of_segments([own._shifted(step) for own in self._segments])
+        return self._of_segments([segment._shifted(step) for segment in self._segments])
 
     def _state(self) -> dict[str, Any]:
-        head = {"format": self._format, "version": VERSION, "space": self.space, "extrapolate": self._extrapolate}
-        return head | {str(i): own._state() for i, own in enumerate(self._segments)}
+        return (
+            head_of(self)
+            | {"extrapolate": self._extrapolate}
+            | {str(i): segment._state() for i, segment in enumerate(self._segments)}
+        )
 
     @classmethod
     def _from_state(cls, state: Entries) -> Self:
         segments = [restore(state[str(i)]) for i in range(sum(name.isdigit() for name in state))]
-        with entry("extrapolate"):
-            return cls(segments, extrapolate=state["extrapolate"])
+        return state.read("extrapolate", lambda policy: cls(segments, extrapolate=policy))
 
     def __eq__(self, other: object) -> bool:
         """Whether all segments are equal."""
         return self._segments == other._segments if isinstance(other, SegmentedCurve) else NotImplemented
 
-    def __repr__(self) -> str:
-        batch = f"{' x '.join(map(str, self._batch))} curves, " if self._batch else ""
-        return f"<SegmentedCurve on {self.space!r}: {batch}{len(self)} segments, {self._span_text}>"
+    @property
+    def _counts(self) -> str:
+        return f"{len(self)} segments, "
 
 
 def _at(curve: Curve[Any], function: Any, t: Any) -> Any:
@@ -425,18 +386,18 @@ def _checked_segments(curves: Any) -> tuple[Any, ...]:
     if not segments:
         raise ValidationError("curves is empty; pass at least one curve")
     first = segments[0]
-    for i, own in enumerate(segments):
-        if not isinstance(own, Curve):
-            raise TypeError(f"curves[{i}] must be a curve, not {short_repr(own)}")
-        if own.space != first.space:
-            raise ValidationError(f"curves[{i}] is on {own.space!r}, but curves[0] is on {first.space!r}")
-        if own._batch != first._batch:
-            raise ValidationError(f"curves[{i}] has batch axes {own._batch}, but curves[0] has {first._batch}")
-        if own._curve.times.ndim > 1:
+    for i, segment in enumerate(segments):
+        if not isinstance(segment, Curve):
+            raise TypeError(f"curves[{i}] must be a curve, not {short_repr(segment)}")
+        if segment.space != first.space:
+            raise ValidationError(f"curves[{i}] is on {segment.space!r}, but curves[0] is on {first.space!r}")
+        if segment._batch != first._batch:
+            raise ValidationError(f"curves[{i}] has batch axes {segment._batch}, but curves[0] has {first._batch}")
+        if segment._curve.times.ndim > 1:
             raise ValidationError(
                 f"curves[{i}] is a batch whose curves have their own times. Make one SegmentedCurve per curve."
             )
-        if (own._time_axis.dates, own._time_axis.zone) != (first._time_axis.dates, first._time_axis.zone):
+        if (segment._time_axis.dates, segment._time_axis.zone) != (first._time_axis.dates, first._time_axis.zone):
             raise ValidationError(
                 f"curves[{i}] has times of another kind than curves[0]. Use numbers for all, or dates for all, with or "
                 "without a time zone."

@@ -24,11 +24,11 @@ from .._curves.derivatives import Gradient, SampleTimes, sample_times
 from .._curves.ends import ends_in_factors, freeze_bc_type, is_closed, split_accelerations, take_batch
 from .._curves.failures import FEWEST_HELD, raise_or_warn, warn_of_held_points, warn_of_representatives
 from .._curves.fit import Fit, FitProblem, Problem, curve_of, fit, mask_of, moved_ends, read, read_ends
-from .._curves.length import alternative_energy
 from .._curves.missing import counts_all_samples, curves_without_missing, inner_velocities_of_present, with_remedy
 from .._curves.options import fit_options, order_of, with_atol
+from .._curves.search import alternative_energy
 from .._curves.solve import DEFAULTS
-from .._spaces import Array, Doubles, Product, Quotient, Space, factors_of, parts_of, space_named
+from .._spaces import AnySpace, Array, Doubles, Product, Quotient, Space, factors_of, parts_of, space_named
 from .archive import Entries, read_c1_nodes, read_fitted
 from .piecewise import PiecewiseCubic
 
@@ -213,33 +213,46 @@ class CubicSpline(PiecewiseCubic[P], Generic[P, R]):
         problem = Problem(space, times, data, ends, options, bool(check), mask, skip_invalid)
         try:
             if velocities is None and accelerations is None:
-                found = fit(problem, progress)
+                solution = fit(problem, progress)
             else:
-                found, shown_times, self._c1_nodes = fit_with_conditions(
+                solution, shown_times, self._c1_nodes = fit_with_conditions(
                     problem, time_axis, shown_times, velocities, accelerations, progress
                 )
         except ValidationError as error:
-            raise time_axis.explain(with_remedy(error, data)) from None
-        self._fit = found
+            raise time_axis.explain(with_remedy(error, data, times)) from None
+        self._fit = solution
         kept: Any = conditions if isinstance(conditions, str) else freeze_bc_type(conditions)
-        super()._fill(time_axis, shown_times, found.curve, kept, extrapolate)
-        if found.faults:
-            raise_or_warn(found.faults, on_failure, self)
-        warn_of_representatives(space, [data], [found.curve], [found.columns])
+        self._set_nodes(time_axis, shown_times, solution.curve, kept, extrapolate)
+        if solution.faults:
+            raise_or_warn(solution.faults, on_failure, self)
+        warn_of_representatives(space, [data], [solution.curve], [solution.columns])
         if nodes >= FEWEST_HELD:
             warn_of_held_points(times, list(map(attrgetter("numbers"), data)), batch)
 
     # Nodes with a prescribed velocity, where the acceleration may jump.
     _c1_nodes: tuple[int, ...] = ()
 
-    def _fill(self, *parts: Any) -> None:
-        """Set the state of a curve, and its reports or the fit from which they are created."""
-        *own, reports = parts
-        super()._fill(*own)
+    @classmethod
+    def _fitted(
+        cls,
+        time_axis: TimeAxis,
+        t: Array,
+        curve: CurveArrays,
+        bc_type: BCType,
+        extrapolate: Extrapolate,
+        reports: Fit | list[Report],
+        c1_nodes: tuple[int, ...] = (),
+    ) -> Self:
+        """Return a fitted curve; its reports are created from the fit when they are needed."""
+        self = cls.__new__(cls)
+        self._set_nodes(time_axis, t, curve, bc_type, extrapolate)
         if isinstance(reports, Fit):
             self._fit = reports
         else:
             self._reports = reports
+        if c1_nodes:
+            self._c1_nodes = c1_nodes
+        return self
 
     if not TYPE_CHECKING:
         # The report may be omitted at run time, too, although type variables have defaults from Python 3.13 on only.
@@ -310,8 +323,10 @@ class CubicSpline(PiecewiseCubic[P], Generic[P, R]):
                 error._with_message(f"in the part from node {local.kept} on: {error}") if local.kept else error
             )
             raise axis.explain(part_of_curve) from None
-        found = joined(self, part, local) if local.kept else part
-        spline: CubicSpline[P] = CubicSpline._of(axis, local.t, found.curve, self._bc_type, self._extrapolate, found)
+        solution = joined(self, part, local) if local.kept else part
+        spline: CubicSpline[P] = CubicSpline._fitted(
+            axis, local.t, solution.curve, self._bc_type, self._extrapolate, solution
+        )
         if part.faults:
             raise_or_warn(part.faults, "raise", spline)
         warn_of_representatives(self.space, [local.problem.points], [part.curve], [part.columns])
@@ -444,12 +459,12 @@ class CubicSpline(PiecewiseCubic[P], Generic[P, R]):
             )
         if all(np.all(report.converged) for report in self._reports):
             return self._curve
-        found = []
+        arrays = []
         for part, report in zip(self._curve.parts, self._reports, strict=True):
             velocities = np.array(part.velocities)
             velocities[~np.asarray(report.converged)] = np.nan
-            found.append((part.points, velocities))
-        return curve_of(self.space, self._times, found)
+            arrays.append((part.points, velocities))
+        return curve_of(self.space, self._times, arrays)
 
     def _sample_times(self, x: TimesLike, nu: int) -> SampleTimes:
         nu, curve = order_of(nu), self._curve
@@ -494,45 +509,34 @@ class CubicSpline(PiecewiseCubic[P], Generic[P, R]):
         """Splines in the factors of a product; in any other space, the spline itself."""
         if len(self._reports) == 1:
             return (self,)
-        each = zip(self._curve.parts, ends_in_factors(self._bc_type, self.space), self._reports, strict=True)
+        factors = zip(self._curve.parts, ends_in_factors(self._bc_type, self.space), self._reports, strict=True)
         return tuple(
-            self._alike(self._time_axis, self._t, curve, ends, self._extrapolate, [report])
-            for curve, ends, report in each
+            CubicSpline._fitted(self._time_axis, self._t, curve, ends, self._extrapolate, [report], self._c1_nodes)
+            for curve, ends, report in factors
         )
-
-    def _alike(self, *parts: Any) -> CubicSpline[Any, Any]:
-        """Return a spline with the given state whose velocities are prescribed at the same nodes."""
-        found: CubicSpline[Any, Any] = CubicSpline._of(*parts)
-        if self._c1_nodes:
-            found._c1_nodes = self._c1_nodes
-        return found
 
     # ---- batches ----
 
     def _with(self, time_axis: TimeAxis, t: Array, curve: CurveArrays, index: Any) -> Any:
         ends = take_batch(self._bc_type, index, len(self._batch), self.space)
         reports = [report.map(lambda column: column[index]) for report in self._reports]
-        return self._alike(time_axis, t, curve, ends, self._extrapolate, reports)
+        return CubicSpline._fitted(time_axis, t, curve, ends, self._extrapolate, reports, self._c1_nodes)
 
     # ---- files, pickles and text ----
 
     def _state(self) -> dict[str, Any]:
-        own = {"bc_type": self._bc_type, "report": [vars(report) for report in self._reports]}
+        entries = {"bc_type": self._bc_type, "report": [vars(report) for report in self._reports]}
         nodes = {"c1_nodes": list(self._c1_nodes)} if self._c1_nodes else {}
-        return super()._state() | own | nodes
+        return super()._state() | entries | nodes
 
     @classmethod
     def _from_state(cls, state: Entries) -> Self:
         nodes = read_c1_nodes(state)
-        found = cls._of(*read_fitted(state, fitted=not nodes))
-        if nodes:
-            found._c1_nodes = nodes
-        return found
+        return cls._fitted(*read_fitted(state, fitted=not nodes), nodes)
 
     def __repr__(self) -> str:
-        knots = self._times.shape[-1]
         bc = self._bc_type if isinstance(self._bc_type, str) else "custom end conditions"
-        text = f"{self._batch_text}{knots} points, {self._span_text}, {bc}{self._failed_text}"
+        text = f"{self._batch_text}{self._counts}{self._span_text}, {bc}{self._failed_text}"
         return f"<CubicSpline on {self.space!r}: {text}>"
 
     @property
@@ -602,14 +606,16 @@ def local_fit(spline: Any, t: TimesLike, points: Any, lag: int | None) -> Local:
     if kept:
         at = (slice(None),) * len(batch) + (kept,)
         starts = [np.ascontiguousarray(part.space._as_doubles(part.velocities[at])) for part in parts]
-        ends = [own and [("velocity", start), own[1]] for own, start in zip(ends, starts, strict=True)]
+        ends = [
+            conditions and [("velocity", start), conditions[1]] for conditions, start in zip(ends, starts, strict=True)
+        ]
     shown = np.concatenate([spline._t, new_t], axis=-1)
     times = spline._time_axis.knots(shown)
     last, names = np.ascontiguousarray(times[..., kept:]), range(kept, times.shape[-1])
     return Local(shown, times, Problem(space, last, data, ends, DEFAULTS, names=names), kept)
 
 
-def _with_new(space: Space[Any], parts: Any, points: Any, batch: tuple[int, ...], kept: int, count: int | None) -> Any:
+def _with_new(space: AnySpace, parts: Any, points: Any, batch: tuple[int, ...], kept: int, count: int | None) -> Any:
     """Return the last points of a curve and the new ones; without `count`, there is one without an axis."""
     axis = len(batch)
     tail, one = (slice(None),) * axis + (slice(kept, None),), (slice(None),) * axis + (None,)
@@ -650,7 +656,7 @@ def _new_times(spline: Any, t: TimesLike) -> tuple[Array, bool]:
     return array, single
 
 
-def joined(spline: Any, found: Fit, local: Local) -> Fit:
+def joined(spline: Any, solution: Fit, local: Local) -> Fit:
     """Return the first segments of a curve, followed by another curve, with the report of both."""
     curve, kept = spline._curve, local.kept
     axis = len(curve.batch)
@@ -660,10 +666,10 @@ def joined(spline: Any, found: Fit, local: Local) -> Fit:
             np.concatenate([a.points[head], b.points], axis=axis),
             np.concatenate([a.velocities[head], b.velocities], axis=axis),
         )
-        for a, b in zip(curve.parts, found.curve.parts, strict=True)
+        for a, b in zip(curve.parts, solution.curve.parts, strict=True)
     ]
-    columns = [_joined_columns(a, b) for a, b in zip(columns_of(spline), found.columns, strict=True)]
-    return Fit(curve_of(spline.space, local.times, arrays), columns, found.method, found.faults)
+    columns = [_joined_columns(a, b) for a, b in zip(columns_of(spline), solution.columns, strict=True)]
+    return Fit(curve_of(spline.space, local.times, arrays), columns, solution.method, solution.faults)
 
 
 def _joined_columns(first: Columns, second: Columns) -> Columns:
@@ -679,12 +685,12 @@ def columns_of(spline: Any) -> list[Columns]:
     if "_fit" in vars(spline):
         columns: list[Columns] = spline._fit.columns
         return columns
-    found = []
+    columns_of_factors = []
     for report in spline._reports:
-        own = Columns.empty(np.size(report.converged))
-        own.row("converged")[:] = np.ravel(report.converged)
+        of_factor = Columns.empty(np.size(report.converged))
+        of_factor.row("converged")[:] = np.ravel(report.converged)
         for name in _LARGEST:
             value = getattr(report, name)
-            own.row(name)[:] = np.nan if value is None else np.ravel(value)
-        found.append(own)
-    return found
+            of_factor.row(name)[:] = np.nan if value is None else np.ravel(value)
+        columns_of_factors.append(of_factor)
+    return columns_of_factors

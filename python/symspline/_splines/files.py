@@ -146,9 +146,9 @@ def _restored(state: Stored) -> Any:
     if "names" not in state:
         return restore(state)
     curves = {}
-    for name, own in _states(state):
+    for name, part in _states(state):
         try:
-            curves[name] = restore(own)
+            curves[name] = restore(part)
         except ValidationError as error:
             raise ValidationError(f"curve {short_repr(name)}: {error}") from None
     return curves
@@ -175,7 +175,7 @@ def _states(state: Stored) -> Iterator[tuple[str, Entries]]:
             )
     ends = {key: np.cumsum(counts).tolist() for key, counts in rows.items()}
     for i, name in enumerate(names):
-        own = Stored(state)
-        own |= {key: arrays[key][ends[key][i] - counts[i] : ends[key][i]] for key, counts in rows.items()}
-        own |= {key: values[i] for key, values in lists.items()}
-        yield name, own
+        part = Stored(state)
+        part |= {key: arrays[key][ends[key][i] - counts[i] : ends[key][i]] for key, counts in rows.items()}
+        part |= {key: values[i] for key, values in lists.items()}
+        yield name, part

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import Any, Unpack, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._base.arrays import checked_flag, refuse, short_repr
+from .._base.arrays import checked_flag, short_repr
 from .._base.input import in_library, library_of
 from .._base.report import Report
 from .._base.time import TimeAxis, knots_of
@@ -32,7 +33,7 @@ from .._curves.composed import evaluated
 from .._curves.curve import CurveArrays
 from .._curves.ends import freeze_bc_type, take_batch
 from .._curves.failures import raise_or_warn, warn_of_held_points, warn_of_representatives
-from .._curves.missing import counts_all_samples, curves_without_missing, missing_named
+from .._curves.missing import counts_all_samples, curves_without_missing, with_remedy
 from .._curves.options import (
     EvaluationOptions,
     check_progress,
@@ -42,7 +43,8 @@ from .._curves.options import (
     quantity_of,
     with_atol,
 )
-from .._spaces import Array, Product, Quotient, Space, factors_of, parts_of, space_named
+from .._spaces import AnySpace, Array, Doubles, Product, Quotient, Space, factors_of, parts_of, space_named
+from ..manifolds import Manifold
 from .cubic import CubicSpline
 
 # With fewer knots, all of them are read.
@@ -101,12 +103,12 @@ def _at_given(points: Any, spline: CubicSpline[Any]) -> Any:
     if not any(isinstance(factor, Quotient) for factor in factors_of(space)):
         return velocities
     given = fitting.read_given(points, space)
-    each = zip(factors_of(space), given, spline._curve.parts, strict=True)
+    factors = zip(factors_of(space), given, spline._curve.parts, strict=True)
     moved = [
-        own._moved_like(own._numbers(part.numbers), curve.points, curve.velocities)
-        if isinstance(own, Quotient)
+        quotient._moved_like(quotient._numbers(part.numbers), curve.points, curve.velocities)
+        if isinstance(quotient, Quotient)
         else curve.velocities
-        for own, part, curve in each
+        for quotient, part, curve in factors
     ]
     return tuple(moved) if isinstance(space, Product) else moved[0]
 
@@ -130,7 +132,7 @@ def evaluate(
     t: TimesLike | None,
     points: PointsLike,
     velocities: ArrayLike,
-    space: Space[Any] | str,
+    space: AnySpace | str,
     x: TimesLike,
     *,
     nu: int = 0,
@@ -143,7 +145,7 @@ def evaluate(
     t: TimesLike | None,
     points: PointsLike,
     velocities: ArrayLike,
-    space: Space[Any] | str,
+    space: AnySpace | str,
     x: TimesLike,
     *,
     nu: int = 0,
@@ -247,36 +249,18 @@ def _nodes_around(t: TimesLike | None, points: Any, velocities: Any, space: Spac
     return t[start:stop], arrays[0], arrays[1]
 
 
-def given(t: TimesLike | None, points: Any, velocities: Any, space: Space[Any]) -> tuple[TimeAxis, CurveArrays]:
+def given(t: TimesLike | None, points: Any, velocities: Any, space: AnySpace) -> tuple[TimeAxis, CurveArrays]:
     """Return the time axis and the curve with the given knots, points and velocities, after validation."""
     data = fitting.read(points, space)
-    own = read_velocities(velocities, space, data)
+    vectors = fitting.read_velocities(velocities, space, data)
     batch, nodes = data[0].batch, data[0].nodes
     time_axis, _, times = knots_of(t, batch, nodes)
     try:
         on_space, _ = fitting.validated(space, times, data, fitting.read_ends("natural", space, batch))
     except ValidationError as error:
         raise time_axis.explain(error) from None
-    arrays = [(points, numbers) for points, (numbers, _) in zip(on_space, own, strict=True)]
+    arrays = [(points, numbers) for points, (numbers, _) in zip(on_space, vectors, strict=True)]
     return time_axis, fitting.curve_of(space, times, arrays, fitted=False)
-
-
-def read_velocities(velocities: Any, space: Space[Any], data: list[fitting.Points]) -> list[tuple[Array, float]]:
-    """Return velocities in each factor, and how far they may be from tangent, after checks of shape and numbers."""
-    found = []
-    for factor, part, own in zip(factors_of(space), data, parts_of(velocities, space, "velocities"), strict=True):
-        array = factor._array(own, "velocities")
-        doubles = factor._doubles(array, "velocities")
-        # A view has flags of its own, so that making it read-only leaves the user's array as it is.
-        numbers = factor._numbers(doubles).view()
-        if doubles.shape != part.numbers.shape:
-            shape = factor._numbers(part.numbers).shape
-            raise ValidationError(f"velocities has shape {numbers.shape}, but points {shape}")
-        refuse(~np.isfinite(numbers), "velocities", lambda _: "is not finite")
-        if part.moves is not None and isinstance(factor, Quotient):
-            numbers = np.ascontiguousarray(factor._moved_by(numbers, part.moves))
-        found.append((numbers, factor._tol(array)))
-    return found
 
 
 @counts_all_samples
@@ -367,20 +351,118 @@ def fit_many(
     problem = fitting.Problem(
         space, times, points, ends, options, bool(check), mask, skip_invalid=on_failure != "raise"
     )
-    with missing_named([part for own in points for part in own]):
+    try:
         fits, faults = fitting.fit_many(problem, progress)
+    except ValidationError as error:
+        number = error.curve[0] if error.curve else 0
+        raise with_remedy(error, points[number], times[number], of_many=True) from None
     ends_kept = freeze_bc_type(bc_type)
     fitted: list[CubicSpline[P]] = [
-        CubicSpline._of(time_axis, t, found.curve, take_batch(ends_kept, i, 1, space), extrapolate, found)
-        for i, ((time_axis, t, _), found) in enumerate(zip(knots, fits, strict=True))
+        CubicSpline._fitted(time_axis, t, one_fit.curve, take_batch(ends_kept, i, 1, space), extrapolate, one_fit)
+        for i, ((time_axis, t, _), one_fit) in enumerate(zip(knots, fits, strict=True))
     ]
     if faults:
         raise_or_warn(faults, on_failure, fitted)
-    wanted = [own if mask is None or mask[i] else None for i, own in enumerate(points)]
-    warn_of_representatives(space, wanted, [found.curve for found in fits], [found.columns for found in fits])
+    wanted = [data_of_curve if mask is None or mask[i] else None for i, data_of_curve in enumerate(points)]
+    warn_of_representatives(space, wanted, [one_fit.curve for one_fit in fits], [one_fit.columns for one_fit in fits])
     any(
-        warn_of_held_points(times[i], [part.numbers for part in own], (), curve=(i,) * (len(pairs) > 1))
-        for i, own in enumerate(wanted)
-        if own is not None
+        warn_of_held_points(times[i], [part.numbers for part in data_of_curve], (), curve=(i,) * (len(pairs) > 1))
+        for i, data_of_curve in enumerate(wanted)
+        if data_of_curve is not None
     )
     return fitted
+
+
+# ---- segments of a curve as separate curves, and their jumps at the knots ----
+
+
+@dataclass(frozen=True)
+class Jumps:
+    """Jumps of γ, γ' or ∇γ' at the knots where two segments meet.
+
+    Attributes
+    ----------
+    size : ndarray, shape (knots,)
+        Size of each jump.
+    largest : float
+        Largest value at an end of a segment.
+    """
+
+    size: Doubles
+    largest: float
+
+    @property
+    def relative(self) -> float:
+        """Largest jump, relative to the largest value."""
+        most = float(self.size.max(initial=0.0))
+        return most / self.largest if most else 0.0
+
+
+@dataclass(frozen=True)
+class Segments:
+    """Segments as separate curves with two knots each, evaluated without their neighbours.
+
+    Attributes
+    ----------
+    space : Space
+        Their space, not a product.
+    t : ndarray, shape (S, 2)
+        Knots.
+    points, velocities : ndarray, shape (S, 2, *point_shape)
+        Points and velocities at the knots.
+    """
+
+    space: Space
+    t: Array
+    points: Array
+    velocities: Array
+
+    def at(self, x: Array, nu: int = 0) -> Array:
+        """Evaluate every segment at its own times, the rows of x; shape (S, m, *point_shape)."""
+        return np.asarray(evaluate(self.t, self.points, self.velocities, self.space, x, nu=nu, per_curve=True))
+
+    def jumps(self, nu: int, closed: bool = False) -> Jumps:
+        """Return the differences between the ends of segments and the starts of the next ones.
+
+        Parameters
+        ----------
+        nu : {0, 1, 2}
+            Order of the derivative.
+        closed : bool
+            Whether the last segment is compared with the first one as well.
+
+        Notes
+        -----
+        Each value is computed from its segment alone. One point may have several representatives, so vectors are
+        transported in parallel from end to start before they are compared. Their lengths are those of the space.
+        Rounding errors far out in hyperbolic space are then comparable to those near its origin, up to the condition
+        number |p|².
+        """
+        last = None if closed else -1
+        points = self.at(self.t)
+        end, start = points[:last, 1], _next(points)[:last]
+        if nu == 0:
+            flat = points.reshape(*points.shape[:2], -1)
+            return Jumps(self.space.distance(end, start), float(np.linalg.norm(flat, axis=-1).max()))
+        vectors = self.at(self.t, nu)
+        transported = vectors[:last, 1]
+        # A manifold made of functions without `transport` has one representative per point.
+        if not isinstance(self.space, Manifold) or self.space.functions.transport is not None:
+            transported = self.space.transport(end, start, transported)
+        size = self.space.norm(start, transported - _next(vectors)[:last])
+        return Jumps(size, float(self.space.norm(points, vectors).max()))
+
+
+def segments_of(spline: CubicSpline) -> Segments:
+    """Return the segments of a single curve, not in a product."""
+    return Segments(spline.space, pairs(spline.t), pairs(spline.points), pairs(spline.velocities))
+
+
+def pairs(values: Array) -> Array:
+    """Return pairs of neighbours, shape (N, 2, ...)."""
+    return np.stack([values[:-1], values[1:]], axis=1)
+
+
+def _next(values: Array) -> Array:
+    """Return the values at the start of the segment after each; after the last one comes the first."""
+    return np.roll(values[:, 0], -1, axis=0)

@@ -120,8 +120,8 @@ class TimeLaw:
         second = (np.diff(self.rates) / np.diff(self.knots))[k]
         steps = ahead * (rate + ahead * second / 2)
         values = np.clip(self.values[k] + steps, self.values[k], self.values[k + 1])
-        found: Number = (values, rate + second * ahead, second)[order][()]
-        return found
+        result: Number = (values, rate + second * ahead, second)[order][()]
+        return result
 
     def __repr__(self) -> str:
         return f"<TimeLaw: duration {self.duration:.6}>"
@@ -282,9 +282,9 @@ class _Path(NamedTuple):
 
 def _sampled(curve: Curve[Any], size: int) -> _Path:
     knots = curve._curve.times
-    each = max(4, math.ceil(size / (len(knots) - 1)))
+    parts_per_interval = max(4, math.ceil(size / (len(knots) - 1)))
     jumping = _jumps(curve, knots)
-    x = _graded(knots, each, np.concatenate([[True], jumping, [True]]))
+    x = _graded(knots, parts_per_interval, np.concatenate([[True], jumping, [True]]))
     rests = np.isin(x, knots[1:-1][jumping])
     # Derivatives can jump at knots. Those of an interval are evaluated after its start and before its end.
     times = np.ascontiguousarray(np.stack([x[:-1], x[1:] - 1e-9 * np.diff(x)]))
@@ -308,15 +308,15 @@ def _sampled(curve: Curve[Any], size: int) -> _Path:
 def _values(curve: Curve[Any], x: Doubles, quantity: str) -> tuple[Array, ...]:
     """Evaluate the curve in each factor."""
     values = parts_of(curve._curve.evaluate(x, quantity, "continue", False), curve.space, quantity)
-    if not all(np.isfinite(own).all() for own in values):
+    if not all(np.isfinite(array).all() for array in values):
         raise ValidationError("curve is not finite in its whole domain. Pass one segment of a recording with gaps.")
     return values
 
 
-def _graded(knots: Doubles, each: int, rests: Array) -> Doubles:
+def _graded(knots: Doubles, count: int, rests: Array) -> Doubles:
     """Divide every segment into `each` intervals, with shorter ones next to knots at which the traversal rests."""
-    x = np.append((knots[:-1, None] + np.diff(knots)[:, None] * np.arange(each) / each).ravel(), knots[-1])
-    step, at = np.diff(knots) / each, np.flatnonzero(rests)
+    x = np.append((knots[:-1, None] + np.diff(knots)[:, None] * np.arange(count) / count).ravel(), knots[-1])
+    step, at = np.diff(knots) / count, np.flatnonzero(rests)
     parts = 0.5 ** np.arange(1, _HALVINGS + 1)
     after = (knots[at[:-1], None] + step[at[:-1], None] * parts).ravel()
     before = (knots[at[1:], None] - step[at[1:] - 1, None] * parts).ravel()
@@ -364,7 +364,7 @@ class _Problem(NamedTuple):
 
 def _problem(path: _Path, speeds: Doubles, accelerations: Doubles, wanted: tuple[float, float]) -> _Problem:
     limited = np.isfinite(accelerations)
-    p, q, r = (np.ascontiguousarray(own[..., limited]) for own in (path.p, path.q, path.r))
+    p, q, r = (np.ascontiguousarray(coefficients[..., limited]) for coefficients in (path.p, path.q, path.r))
     limits, squares = accelerations[limited] ** 2, path.squares
     with np.errstate(all="ignore"):
         # The largest u with any a, from the determinant of the quadratic form.

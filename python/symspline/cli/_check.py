@@ -34,7 +34,7 @@ from .._base.arrays import brief
 from .._curves.ends import is_closed
 from .._spaces import HermitianPositiveDefinite, SymmetricPositiveDefinite
 from .._splines.cubic import CubicSpline
-from .._splines.jumps import segments_of
+from .._splines.functional import segments_of
 from ..manifolds import Manifold
 from ._curves import read_curves
 from ._messages import Failure, listed

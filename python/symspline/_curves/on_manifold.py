@@ -1,23 +1,23 @@
-"""Curves on manifolds that are made of functions, evaluated in Python."""
+"""Curves on manifolds that are made of functions, which are evaluated in Python."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from functools import cached_property
-from typing import Any, NamedTuple, Never
+from typing import Any, Literal, NamedTuple, Never, Self
 
 import numpy as np
+from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
-from ... import _core
-from ..._base.typing import Progress
-from ..._core import ValidationError
-from ..._spaces import Array, Doubles, Euclidean, parts_of, product_norm
-from ...manifolds._manifold import Manifold
-from ...manifolds._operations import STEPS, Operations, eighth_difference, first_derivative, second_derivative
-from ..curve import NORMS, REAL, CurveArrays, FactorArrays, share
-from .condition import ControlPolygon, control_polygons
-from .jerk import jerk
+from .. import _core
+from .._base.typing import Progress
+from .._core import ValidationError
+from .._spaces import AnySpace, Array, Doubles, Euclidean, parts_of, product_norm
+from ..manifolds._manifold import Manifold
+from ..manifolds._operations import STEPS, Operations, eighth_difference, first_derivative, second_derivative
+from .curve import NORMS, REAL, CurveArrays, FactorArrays, share
 
 # Samples that are computed at a time.
 _AT_ONCE = 1 << 12
@@ -48,13 +48,13 @@ class OnManifold(CurveArrays):
         batch, space = self.batch, self.space
         count = math.prod(batch)
         shape = x.shape if per_curve else batch + x.shape
-        each = math.prod(shape[len(batch) :])
-        own = np.broadcast_to(x, shape).reshape(count, each)
+        samples = math.prod(shape[len(batch) :])
+        times_of_curves = np.broadcast_to(x, shape).reshape(count, samples)
         of_each, dtype = ((), float) if quantity in NORMS else (space.point_shape, space.dtype)
-        values = np.empty((count * each, *of_each), dtype)
+        values = np.empty((count * samples, *of_each), dtype)
         for start in range(0, len(values), _AT_ONCE):
             number = np.arange(start, min(start + _AT_ONCE, len(values)))
-            values[number] = self._at(number // max(each, 1), own.ravel()[number], quantity, outside)
+            values[number] = self._at(number // max(samples, 1), times_of_curves.ravel()[number], quantity, outside)
             if progress is not None:
                 progress(int(number[-1]) + 1, len(values))
         return values.reshape(shape + values.shape[1:])
@@ -148,12 +148,51 @@ class Mixed(CurveArrays):
         progress: Progress | None = None,
     ) -> Any:
         starts = [None] * len(self.parts) if start is None else parts_of(start, self.space, "start")
-        each = zip(self.parts, starts, strict=True)
-        return tuple(part.lift(x, quantity, outside, per_curve, begin, progress) for part, begin in each)
+        pairs = zip(self.parts, starts, strict=True)
+        return tuple(part.lift(x, quantity, outside, per_curve, begin, progress) for part, begin in pairs)
 
     def transport(self, times: tuple[float, float], outside: str, v: Any) -> Any:
-        each = zip(self.parts, parts_of(v, self.space, "v"), strict=True)
-        return tuple(part.transport(times, outside, own) for part, own in each)
+        pairs = zip(self.parts, parts_of(v, self.space, "v"), strict=True)
+        return tuple(part.transport(times, outside, vectors) for part, vectors in pairs)
+
+
+# ---- control polygons ----
+
+
+class ControlPolygon(NamedTuple):
+    """The control polygon of segments: handles v from the points p to the inner control points q, and the logarithm w
+    from each q to the other one. The first axis, of length 2, has the starts and the ends; the shape is
+    (2, curves, N, *point_shape)."""
+
+    p: Array
+    v: Array
+    q: Array
+    w: Array
+
+    def at(self, index: Any) -> ControlPolygon:
+        """Return the control polygons at an index of the axes after the first."""
+        index = index if isinstance(index, tuple) else (index,)
+        return ControlPolygon(*(part[(slice(None), *index)] for part in self))
+
+
+def control_polygons(
+    operations: Operations, h: Doubles, p: Array, u: Array, before: Array | None = None
+) -> ControlPolygon:
+    """The control polygons of curves with points and velocities, and those before the knots if they differ.
+
+    They are NaN where there is no logarithm.
+    """
+    at, v = handles(h, p, u)
+    if before is not None:
+        v[1] = handles(h, p, before)[1][1]
+    q = operations.exp(at, v)
+    return ControlPolygon(at, v, q, operations.log(q, q[::-1]))
+
+
+def handles(h: Doubles, p: Array, u: Array) -> tuple[Array, Array]:
+    """The ends of segments, and the handles there."""
+    third = (h / 3).reshape(*h.shape, *[1] * (p.ndim - 2))
+    return np.stack([p[:, :-1], p[:, 1:]]), np.stack([third * u[:, :-1], -third * u[:, 1:]])
 
 
 # ---- de Casteljau's algorithm with exp and log, and derivatives by differences ----
@@ -237,12 +276,12 @@ def _by_differences(operations: Operations, rows: Rows, nu: int) -> tuple[Array,
     for halvings in range(HALVINGS + 1):
         moved = _around(operations, rows.at(left), here[left], step)
         difference = first_derivative if nu == 1 else second_derivative
-        found = difference(moved, (step * rows.h[left]).reshape(-1, *[1] * (here.ndim - 1)))
+        derivatives = difference(moved, (step * rows.h[left]).reshape(-1, *[1] * (here.ndim - 1)))
         jump, size = (np.abs(x).max(axis=axes) for x in (eighth_difference(moved), here[left]))
         # What the jump may have done to the derivative: where it is noise of the logarithm, longer steps are better.
         harm = jump / step**nu
         better = (harm < least[left]) | (halvings == 0)
-        vectors[left[better]], least[left[better]] = found[better], harm[better]
+        vectors[left[better]], least[left[better]] = derivatives[better], harm[better]
         least[np.isnan(least)] = np.inf
         smooth = jump <= ROUGH * np.abs(moved).max(axis=(0, *(a + 1 for a in axes))) + NOISE * size
         left, step = left[~smooth], step / 2
@@ -267,3 +306,117 @@ def _around(operations: Operations, rows: Rows, here: Array, step: float) -> Arr
         np.tile(rows.straight, len(STEPS)),
     )
     return operations.log(np.broadcast_to(here, shape), points_at(operations, around).reshape(shape))
+
+
+# ---- the covariant derivative of the acceleration on a manifold that is made of functions ----
+
+# Chebyshev nodes of half a segment, on which the acceleration is interpolated.
+_NODES = 16
+
+
+def differentiation(nodes: Doubles, x: Doubles) -> Doubles:
+    """Return the weights of values at nodes in the derivative of their interpolating polynomial at x."""
+    degree = len(nodes) - 1
+    derivatives = np.stack(
+        [chebyshev.chebval(x, chebyshev.chebder(np.eye(degree + 1)[n])) for n in range(degree + 1)], axis=-1
+    )
+    return np.asarray(derivatives @ np.linalg.inv(chebyshev.chebvander(nodes, degree)))
+
+
+class Intervals(NamedTuple):
+    """Intervals in which a curve is smooth, one around each time.
+
+    Attributes
+    ----------
+    x, starts, widths : ndarray
+        The times, and the intervals in which they lie.
+    """
+
+    x: Doubles
+    starts: Doubles
+    widths: Doubles
+
+    @classmethod
+    def of(
+        cls, knots: Doubles, x: Doubles, outside: str, side: Literal["left", "right"] = "right", halves: bool = False
+    ) -> Self:
+        """Return the segments, or the halves of segments, around times; at a knot, that on one side."""
+        first, last = knots[0], knots[-1]
+        turns = np.floor((x - first) / (last - first)) * (last - first) if outside == "periodic" else np.zeros_like(x)
+        i = np.clip(np.searchsorted(knots, x - turns, side=side) - 1, 0, len(knots) - 2)
+        starts, widths = knots[i] + turns, knots[i + 1] - knots[i]
+        if halves:
+            widths = widths / 2
+            starts = np.where(x >= starts + widths, starts + widths, starts)
+        if outside in ("continue", "geodesic"):
+            # The first and the last segment, or the geodesics that follow them.
+            starts = np.where(x > last, x, np.where(x < first, x - widths, starts))
+        return cls(x, starts, widths)
+
+    def derivative(
+        self,
+        space: AnySpace,
+        here: Array,
+        values: Callable[[Doubles], tuple[Array, Array]],
+        nodes: int,
+        shape: tuple[int, ...],
+        progress: Progress | None = None,
+    ) -> Array:
+        """Differentiate vectors along a curve by interpolation at Chebyshev nodes of the intervals.
+
+        The vectors are transported along geodesics. Transport along geodesics and along the curve differ by terms of
+        third order, so that this is the covariant derivative.
+
+        Parameters
+        ----------
+        here : ndarray
+            Points of the curve at the times, to which vectors are transported.
+        values : callable
+            Function of times that returns points of the curve and vectors there.
+        shape : tuple of int
+            Shape of the times that broadcasts with the vectors.
+        """
+        at = np.cos(np.pi * (np.arange(nodes) + 0.5) / nodes)
+        weights = differentiation(at, 2 * (self.x - self.starts) / self.widths - 1) * (2 / self.widths)[..., None]
+        result: Array = np.zeros_like(here)
+        for k in range(nodes):
+            points, vectors = values(np.ascontiguousarray(self.starts + self.widths * (at[k] + 1) / 2))
+            result += weights[..., k].reshape(shape) * transported(space, points, here, vectors)
+            if progress is not None:
+                progress(k + 1, nodes)
+        return result
+
+
+def jerk(part: CurveArrays, x: Doubles, outside: str, per_curve: bool, progress: Progress | None) -> Array:
+    """Return the covariant jerk ∇∇γ' of a curve in one factor, from its acceleration on half a segment."""
+    space, axes = part.space, len(part.batch)
+    if (per_curve and x.ndim == axes) or not x.ndim:
+        # One time per curve.
+        values = jerk(part, x[..., None], outside, per_curve, progress)
+        return np.asarray(np.take(values, 0, axis=axes))
+    # This call validates the times.
+    here = part.evaluate(x, "point", outside, per_curve)
+    if part.times.ndim > 1 and not per_curve:
+        x, per_curve = np.broadcast_to(x, part.batch + x.shape), True
+    knots, rows = part.times, [x]
+    if knots.ndim > 1:
+        knots = np.broadcast_to(knots, (*part.batch, knots.shape[-1])).reshape(-1, knots.shape[-1])
+        rows = list(x.reshape(len(knots), -1))
+    intervals = [Intervals.of(*pair, outside, halves=True) for pair in zip(np.atleast_2d(knots), rows, strict=True)]
+    starts, widths = (np.reshape([getattr(row, name) for row in intervals], x.shape) for name in ("starts", "widths"))
+
+    def values_at(times: Doubles) -> tuple[Array, Array]:
+        points, vectors = (part.evaluate(times, name, outside, per_curve) for name in ("point", "acceleration"))
+        return points, vectors
+
+    shape = x.shape + (1,) * len(space.point_shape)
+    return Intervals(x, starts, widths).derivative(space, here, values_at, _NODES, shape, progress)
+
+
+def transported(space: AnySpace, p: Array, q: Array, vectors: Any) -> Array:
+    """Transport vectors from p to q along geodesics; NaN where anything is missing."""
+    valid = space._where_finite(p) & space._where_finite(q) & space._where_finite(vectors)
+    out = np.full(vectors.shape, np.nan, vectors.dtype)
+    if valid.any():
+        out[valid] = space.transport(p[valid], q[valid], vectors[valid])
+    return out

@@ -1,1 +1,0 @@
-"""Curves on manifolds that consist of Python functions."""
