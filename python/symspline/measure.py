@@ -24,7 +24,7 @@ from ._base.arrays import as_array, cast, filled, one_of, refuse, short_repr, wh
 from ._base.input import times_of
 from ._base.typing import FloatArray, Loss, Numbers, PointsLike, TimesLike
 from ._core import ValidationError
-from ._curves.missing import Mask, missing_times, recounting, rows_of
+from ._curves.missing import Mask, missing_times, rows_of
 from ._curves.options import order_of
 from ._spaces import Doubles
 
@@ -489,7 +489,7 @@ def broadcast(value: ArrayLike, name: str, shape: tuple[int, ...], remedy: str =
 
 def measurement_without_missing(given: Measurement) -> Measurement:
     """Return a measurement without the samples in which a number or the time is NaN, NaT or masked."""
-    present = _present_in(given)
+    present = present_in(given)
     if present.all():
         return given
     found = copy(given)
@@ -507,7 +507,8 @@ def _values(given: Measurement) -> dict[str, Any]:
     }
 
 
-def _present_in(given: Measurement) -> Mask:
+def present_in(given: Measurement) -> Mask:
+    """Return which samples are complete."""
     t = as_array(times_of(filled(given.t), "t")[0], "t")
     present = ~missing_times(t)
     if isinstance(given, Function) or t.ndim != 1:
@@ -516,9 +517,6 @@ def _present_in(given: Measurement) -> Mask:
         if name not in ("sigma", "weights", "frames"):
             present = present & _present(value, len(t))
     return present
-
-
-counts_all_samples = recounting(lambda given: [np.flatnonzero(_present_in(own)) for own in given["measurements"]])
 
 
 def _present(value: Any, count: int) -> Mask:

@@ -30,6 +30,7 @@ from .._core import ValidationError
 from .._curves.failures import raise_or_warn, warn_of_held_points
 from .._curves.fit import FitProblem, fit, read_ends
 from .._curves.fit import Points as CorePoints
+from .._curves.missing import recounting
 from .._curves.options import check_on_failure, check_progress, checked_extrapolate
 from .._curves.solve import DEFAULTS
 from .._smoothing import SmoothingReport, SmoothingSpline, SmoothingWarning, make_smoothing_spline
@@ -58,8 +59,8 @@ from ..measure import (
     Measurement,
     Points,
     Velocities,
-    counts_all_samples,
     measurement_without_missing,
+    present_in,
 )
 from .audit import audit, unit_hints
 from .problem import PointTerm, Setup, Solution, Term, bind
@@ -118,7 +119,7 @@ def estimate(
 ) -> SmoothingSpline[P]: ...
 
 
-@counts_all_samples
+@recounting(lambda given: [np.flatnonzero(present_in(measurement)) for measurement in given["measurements"]])
 def estimate(
     measurements: Sequence[Measurement],
     knots: TimesLike,
