@@ -5,6 +5,7 @@
 
 use crate::positive_definite::PositiveDefinite;
 use std::marker::PhantomData;
+use symspline_core::delegate;
 use symspline_core::matrix::{Dynamic, Matrix, Unary, function_of};
 use symspline_core::scalar::{Dual, Jet, Lane, Scalar, few};
 use symspline_core::space::{Algebra, Ambient, Frame, Origin, Space};
@@ -75,6 +76,9 @@ impl LogEuclidean {
 }
 
 impl Ambient for LogEuclidean {
+    delegate!(space => space.points;
+        longest_handle, project, random_point, violation, rounding);
+
     fn point_len(&self) -> usize {
         self.n * self.n
     }
@@ -83,9 +87,6 @@ impl Ambient for LogEuclidean {
     }
     fn cut_angle(&self) -> f64 {
         f64::INFINITY
-    }
-    fn longest_handle(&self) -> f64 {
-        self.points.longest_handle()
     }
     fn ray<S: Scalar>(&self, p: &[Lane], v: &[Lane], t: S, out: &mut [S]) {
         let (y, w) = (self.log_of(p), self.enter(p, v));
@@ -139,18 +140,6 @@ impl Ambient for LogEuclidean {
     }
     fn inner(&self, p: &[Lane], u: &[Lane], v: &[Lane]) -> Lane {
         self.enter(p, u).inner(&self.enter(p, v))
-    }
-    fn project(&self, x: &mut [Lane]) -> Lane {
-        self.points.project(x)
-    }
-    fn random_point(&self, noise: &mut [Lane]) {
-        self.points.random_point(noise);
-    }
-    fn violation(&self, x: &[f64]) -> String {
-        self.points.violation(x)
-    }
-    fn rounding(&self, p: &[Lane]) -> Lane {
-        self.points.rounding(p)
     }
 }
 

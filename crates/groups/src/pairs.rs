@@ -10,6 +10,7 @@ use crate::rigid::{Quaternion, Vector, conjugate, multiply, rotate};
 use crate::two_spheres::TwoSpheres;
 use crate::unitary::UnitaryGroup;
 use std::f64::consts::{FRAC_1_SQRT_2, PI, SQRT_2};
+use symspline_core::delegate;
 use symspline_core::scalar::{Each, Lane, Scalar, dot, few, lane};
 use symspline_core::space::{Ambient, Covered, Evaluation, Frame, Origin, Space};
 use symspline_core::special::{Trig, theta_over_sin};
@@ -161,15 +162,10 @@ impl<F: Form> Pairs<F> {
 }
 
 impl<F: Form> Ambient for Pairs<F> {
-    fn point_len(&self) -> usize {
-        self.general.point_len()
-    }
-    fn point_shape(&self) -> Vec<usize> {
-        self.general.point_shape()
-    }
-    fn is_complex(&self) -> bool {
-        self.general.is_complex()
-    }
+    delegate!(pairs => pairs.general;
+        point_len, point_shape, is_complex, transvect, inner, project, project_tangent, random_point,
+        violation);
+
     fn cut_angle(&self) -> f64 {
         PI
     }
@@ -190,30 +186,12 @@ impl<F: Form> Ambient for Pairs<F> {
         let (vectors, _) = nearest(Self::between(p, q));
         Self::turned(p, vectors.each(|v| v.each(|x| x * t)), out);
     }
-    fn transvect(&self, p: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]) {
-        self.general.transvect(p, v, x, out);
-    }
     fn velocity(&self, gamma: &[Lane], d: &mut [Lane]) {
         let vectors = Self::vectors(gamma, d);
         Self::tangent(gamma, vectors, d);
     }
     fn acceleration(&self, gamma: &[Lane], _d: &[Lane], dd: &mut [Lane]) {
         self.velocity(gamma, dd);
-    }
-    fn inner(&self, p: &[Lane], u: &[Lane], v: &[Lane]) -> Lane {
-        self.general.inner(p, u, v)
-    }
-    fn project(&self, x: &mut [Lane]) -> Lane {
-        self.general.project(x)
-    }
-    fn project_tangent(&self, p: &[Lane], v: &mut [Lane]) -> Lane {
-        self.general.project_tangent(p, v)
-    }
-    fn random_point(&self, noise: &mut [Lane]) {
-        self.general.random_point(noise);
-    }
-    fn violation(&self, x: &[f64]) -> String {
-        self.general.violation(x)
     }
 }
 

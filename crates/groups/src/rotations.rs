@@ -6,6 +6,7 @@
 use crate::rigid::{Quaternion, Vector, conjugate, cross, multiply, of_matrix, rotate, to_matrix};
 use crate::unitary::UnitaryGroup;
 use std::f64::consts::PI;
+use symspline_core::delegate;
 use symspline_core::scalar::{Each, Lane, Scalar, dot, few, lane};
 use symspline_core::space::{Ambient, Covered, Evaluation, Frame, Origin, Space};
 use symspline_core::special::{Trig, theta_over_sin};
@@ -164,6 +165,9 @@ pub fn nearest(general: &UnitaryGroup<1>, x: &mut [Lane]) -> Lane {
 }
 
 impl Ambient for Rotations {
+    delegate!(rotations => rotations.general;
+        transvect, inner, project_tangent, random_point, violation);
+
     fn point_len(&self) -> usize {
         9
     }
@@ -201,9 +205,6 @@ impl Ambient for Rotations {
         let (omega, _) = log(between(p, q));
         out.copy_from_slice(&times(&matrix(p), &to_matrix(exp(omega.each(|o| o * t)))));
     }
-    fn transvect(&self, p: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]) {
-        self.general.transvect(p, v, x, out);
-    }
     fn velocity(&self, gamma: &[Lane], d: &mut [Lane]) {
         let omega = vector(gamma, d);
         d.copy_from_slice(&times(&matrix(gamma), &skew(omega)));
@@ -211,20 +212,8 @@ impl Ambient for Rotations {
     fn acceleration(&self, gamma: &[Lane], _d: &[Lane], dd: &mut [Lane]) {
         self.velocity(gamma, dd);
     }
-    fn inner(&self, p: &[Lane], u: &[Lane], v: &[Lane]) -> Lane {
-        self.general.inner(p, u, v)
-    }
     fn project(&self, x: &mut [Lane]) -> Lane {
         nearest(&self.general, x)
-    }
-    fn project_tangent(&self, p: &[Lane], v: &mut [Lane]) -> Lane {
-        self.general.project_tangent(p, v)
-    }
-    fn random_point(&self, noise: &mut [Lane]) {
-        self.general.random_point(noise);
-    }
-    fn violation(&self, x: &[f64]) -> String {
-        self.general.violation(x)
     }
 }
 

@@ -35,7 +35,8 @@ impl<const D: usize, A: Storage> Algebra<D, A> {
         Algebra { n, members, basis, storage: PhantomData }
     }
 
-    fn basis(&self) -> &'static [Element] {
+    /// The basis.
+    pub fn basis(&self) -> &'static [Element] {
         self.basis.get_or_init(|| basis(D, self.n, self.members))
     }
 
@@ -158,29 +159,5 @@ fn basis(d: usize, n: usize, members: Members) -> Vec<Element> {
                 .map(|(i, j)| two((i, j), (j, i), if (i < p) == (j < p) { -1.0 } else { 1.0 }))
                 .collect()
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_basis_has_as_many_matrices_as_the_algebra_has_dimensions() {
-        for members in [
-            Members::All,
-            Members::Affine,
-            Members::Similarity,
-            Members::Special,
-            Members::Symplectic,
-            Members::Lorentz,
-            Members::PseudoOrthogonal(2),
-        ] {
-            for n in [4, 6] {
-                let algebra: Algebra<1> = Algebra::new(n, members);
-                assert_eq!(algebra.basis().len(), algebra.dim(), "{members:?}, {n}");
-            }
-        }
-        assert_eq!(Algebra::<2, Dynamic>::new(3, Members::All).basis().len(), 18);
     }
 }

@@ -6,6 +6,8 @@ mod general_linear;
 mod indefinite_grassmannian;
 mod members;
 
+#[doc(hidden)]
+pub use algebra::Algebra;
 pub use general_linear::GeneralLinear;
 pub use indefinite_grassmannian::IndefiniteGrassmannian;
 pub use members::Members;

@@ -2,6 +2,7 @@
 //! spheres.
 
 use super::traits::{Ambient, Covered, Evaluation, Frame, Origin, Space};
+use crate::delegate;
 use crate::scalar::{Each, Lane, Scalar, few, lane};
 
 /// An isometry up to scale, linear in the arrays of points and vectors.
@@ -73,21 +74,10 @@ impl<I: Isometry> Isometric<I> {
 }
 
 impl<I: Isometry> Ambient for Isometric<I> {
-    fn point_len(&self) -> usize {
-        self.0.general().point_len()
-    }
-    fn point_shape(&self) -> Vec<usize> {
-        self.0.general().point_shape()
-    }
-    fn is_complex(&self) -> bool {
-        self.0.general().is_complex()
-    }
-    fn cut_angle(&self) -> f64 {
-        self.0.general().cut_angle()
-    }
-    fn injectivity_radius(&self) -> f64 {
-        self.0.general().injectivity_radius()
-    }
+    delegate!(space => space.0.general();
+        point_len, point_shape, is_complex, cut_angle, injectivity_radius, project, project_tangent,
+        random_point, violation, imprecise_point, rounding);
+
     fn longest_ray(&self) -> f64 {
         self.0.image().longest_ray() * I::ANGLE
     }
@@ -130,24 +120,6 @@ impl<I: Isometry> Ambient for Isometric<I> {
     fn inner(&self, p: &[Lane], u: &[Lane], v: &[Lane]) -> Lane {
         let [p, u, v] = [p, u, v].each(Self::enter);
         self.0.image().inner(&p[..I::LEN], &u[..I::LEN], &v[..I::LEN]) * lane(I::SCALE * I::SCALE)
-    }
-    fn project(&self, x: &mut [Lane]) -> Lane {
-        self.0.general().project(x)
-    }
-    fn project_tangent(&self, p: &[Lane], v: &mut [Lane]) -> Lane {
-        self.0.general().project_tangent(p, v)
-    }
-    fn random_point(&self, noise: &mut [Lane]) {
-        self.0.general().random_point(noise);
-    }
-    fn violation(&self, x: &[f64]) -> String {
-        self.0.general().violation(x)
-    }
-    fn imprecise_point(&self, points: &[f64]) -> Option<(usize, String)> {
-        self.0.general().imprecise_point(points)
-    }
-    fn rounding(&self, p: &[Lane]) -> Lane {
-        self.0.general().rounding(p)
     }
 }
 

@@ -10,6 +10,7 @@
 //! layers: [`Geometry`] contains the formulas, [`Kernels`] adds the loops over knots and samples that use them.
 
 mod algebra;
+mod delegate;
 mod erased;
 mod far_out;
 mod isometric;

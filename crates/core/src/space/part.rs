@@ -4,6 +4,7 @@
 //! implementation provides the points and coordinates of the subspace.
 
 use super::traits::{Ambient, Frame, Origin, Space};
+use crate::delegate;
 use crate::scalar::{Lane, Scalar, dot, lane, max_or_nan};
 
 /// The fixed points of an isometry of order two, the mirror.
@@ -92,35 +93,15 @@ impl<P: Part> Within<P> {
 }
 
 impl<P: Part> Ambient for Within<P> {
-    fn point_len(&self) -> usize {
-        self.0.whole().point_len()
-    }
-    fn point_shape(&self) -> Vec<usize> {
-        self.0.whole().point_shape()
-    }
-    fn is_complex(&self) -> bool {
-        self.0.whole().is_complex()
-    }
-    fn fiber_rank(&self) -> usize {
-        self.0.whole().fiber_rank()
-    }
-    fn cut_angle(&self) -> f64 {
-        self.0.whole().cut_angle()
-    }
-    fn longest_handle(&self) -> f64 {
-        self.0.whole().longest_handle()
-    }
+    delegate!(part => part.0.whole();
+        point_len, point_shape, is_complex, fiber_rank, cut_angle, longest_handle, ray_len, prepare_ray,
+        distance, transvect, parallel_transport, inner, rounding);
+
     fn injectivity_radius(&self) -> f64 {
         self.0.injectivity_radius()
     }
     fn ray<S: Scalar>(&self, p: &[Lane], v: &[Lane], t: S, out: &mut [S]) {
         self.0.whole().ray(p, v, t, out);
-    }
-    fn ray_len(&self) -> usize {
-        self.0.whole().ray_len()
-    }
-    fn prepare_ray(&self, p: &[Lane], v: &[Lane], prepared: &mut [Lane]) {
-        self.0.whole().prepare_ray(p, v, prepared);
     }
     fn prepared_ray<S: Scalar>(&self, p: &[Lane], v: &[Lane], prepared: &[Lane], t: S, out: &mut [S]) {
         self.0.whole().prepared_ray(p, v, prepared, t, out);
@@ -139,17 +120,8 @@ impl<P: Part> Ambient for Within<P> {
         }
         angle
     }
-    fn distance(&self, p: &[Lane], q: &[Lane], log: &[Lane], angle: Lane) -> Lane {
-        self.0.whole().distance(p, q, log, angle)
-    }
     fn geodesic<S: Scalar>(&self, p: &[S], q: &[S], t: S, out: &mut [S]) {
         self.0.whole().geodesic(p, q, t, out);
-    }
-    fn transvect(&self, p: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]) {
-        self.0.whole().transvect(p, v, x, out);
-    }
-    fn parallel_transport(&self, p: &[Lane], q: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]) {
-        self.0.whole().parallel_transport(p, q, v, x, out);
     }
     fn velocity(&self, gamma: &[Lane], d: &mut [Lane]) {
         self.0.whole().velocity(gamma, d);
@@ -158,9 +130,6 @@ impl<P: Part> Ambient for Within<P> {
     fn acceleration(&self, gamma: &[Lane], d: &[Lane], dd: &mut [Lane]) {
         self.0.whole().acceleration(gamma, d, dd);
         self.along(gamma, dd);
-    }
-    fn inner(&self, p: &[Lane], u: &[Lane], v: &[Lane]) -> Lane {
-        self.0.whole().inner(p, u, v)
     }
     fn project(&self, x: &mut [Lane]) -> Lane {
         let off = self.0.whole().project(x);
@@ -178,9 +147,6 @@ impl<P: Part> Ambient for Within<P> {
         } else {
             self.0.whole().violation(x)
         }
-    }
-    fn rounding(&self, p: &[Lane]) -> Lane {
-        self.0.whole().rounding(p)
     }
 }
 
