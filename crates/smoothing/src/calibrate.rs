@@ -14,7 +14,7 @@ use symspline_core::monitor::checkpoint;
 /// of a block, which would hide errors inside.
 const INSIDE: f64 = 2.0;
 /// The coverage for which the factors are calibrated.
-const LEVEL: f64 = 0.95;
+pub const LEVEL: f64 = 0.95;
 /// Largest numbers of blocks of one length, of lengths, and of predicted data per block; the least number of predictions.
 const BLOCKS: usize = 24;
 const LENGTHS: usize = 6;
@@ -462,33 +462,5 @@ impl Gaps<'_> {
             .collect();
         let factor = factor_of(&predicted, evidence.coordinates, disjoint);
         (!factor.is_nan()).then_some((factor, blocks.len()))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Errors of known variance have the factor that they were made with; the F distribution enlarges it for few blocks.
-    #[test]
-    fn the_factor_is_that_of_the_errors() {
-        // Quantiles of the normal distribution in an order without a pattern stand for random numbers.
-        let count = 20_011;
-        for k in [1.0_f64, 2.5, 8.0] {
-            let predicted: Vec<Predicted> = (0..count)
-                .map(|i| {
-                    let part = |step: usize| ((i * step % count) as f64 + 0.5) / count as f64;
-                    let v = 3.0 + 37.0 * part(7919);
-                    // The mean of three squares is χ² with three degrees of freedom divided by three.
-                    let square = chi::quantile(3, part(104_729)) / 3.0;
-                    let whole = v + (k * k - 1.0) * (v - 1.0) + 1.0;
-                    Predicted { square: square * whole, variance: v, at_data: 1.0, distance: 0.0 }
-                })
-                .collect();
-            assert!((factor_of(&predicted, 3, 1e6) / k - 1.0).abs() < 0.02, "{k}");
-            let few = (chi::ratio_quantile(3, 12, LEVEL) / chi::quantile(3, LEVEL)).sqrt();
-            assert!((factor_of(&predicted, 3, 4.0) / (k * few) - 1.0).abs() < 0.03, "{k}");
-            assert!(factor_of(&predicted[..2], 3, 4.0).is_nan());
-        }
     }
 }

@@ -23,7 +23,7 @@ use symspline_core::space::{Ambient, Erased, Origin};
 type Square = Matrix<Lane, 1>;
 
 /// Noisy points of one curve.
-pub struct Samples<'a> {
+pub struct CumulativeData<'a> {
     /// Knots of the curve, as for [`BSpline`].
     pub knots: &'a [f64],
     /// Degree of the curve.
@@ -61,7 +61,7 @@ struct State {
 /// Smallest fraction of a step that the line search tries, as a power of ½.
 const HALVINGS: i32 = 12;
 
-impl Samples<'_> {
+impl CumulativeData<'_> {
     fn count(&self) -> usize {
         self.knots.len() - self.degree - 1
     }
@@ -107,7 +107,7 @@ impl Samples<'_> {
 /// Fits one curve. An error is the first pair of neighbouring control points of the start beyond the cut locus.
 pub fn fit_cumulative(
     space: &Erased,
-    samples: &Samples,
+    samples: &CumulativeData,
     tol: f64,
     max_iter: usize,
     monitor: &Monitor,
@@ -139,7 +139,7 @@ pub fn fit_cumulative(
 
 struct Problem<'a> {
     space: &'a Erased<'a>,
-    samples: &'a Samples<'a>,
+    samples: &'a CumulativeData<'a>,
     monitor: &'a Monitor<'a>,
     group: Multiplication,
     coordinates: Coordinates,
@@ -154,7 +154,7 @@ struct Problem<'a> {
 }
 
 impl<'a> Problem<'a> {
-    fn new(space: &'a Erased<'a>, samples: &'a Samples<'a>, monitor: &'a Monitor<'a>) -> Self {
+    fn new(space: &'a Erased<'a>, samples: &'a CumulativeData<'a>, monitor: &'a Monitor<'a>) -> Self {
         let (group, coordinates, dim) = (Multiplication::of(space), Coordinates::new(space), space.dim());
         let flat = group == Multiplication::Sum;
         let brackets = if flat { Vec::new() } else { brackets(space, group, &coordinates) };

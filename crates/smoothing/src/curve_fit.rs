@@ -8,14 +8,14 @@ use crate::frames::{Frames, curvature_gradient};
 use crate::gauss_newton::{self, Pull};
 use crate::information::{self, Root};
 use crate::jacobi_operator::JacobiOperator;
-use crate::linearized::{Basis, LinearProblem, OVERLAP, Row};
+use crate::linearized::{Basis, LinearProblem, OVERLAP, Stencil};
 use crate::path::{Path, Position, moved, positions};
-use crate::problem::{Data, Ends, Known, Options, Penalty, Report, Selection, Smooth, State};
+use crate::problem::{Data, EndConditions, Known, Options, Penalty, Selection, Smooth, SmoothReport, State};
 use crate::progress::{Progress, larger, length};
 use crate::residuals::Residuals;
 use crate::robust::{AtCurve, Lam, Robust};
 use crate::variance::rows_of;
-use symspline_core::fit::Ends as FitEnds;
+use symspline_core::fit::Ends;
 use symspline_core::monitor::Monitor;
 use symspline_core::scalar::{Lane, lane};
 use symspline_core::space::{Ambient, Erased, Origin};
@@ -33,6 +33,20 @@ const LIGHT: usize = 10;
 /// The relative accuracy of J.
 const ROUNDING: f64 = 1e-12;
 
+/// What follows an evaluation of the curve.
+enum Next {
+    /// The last step is halved, because it increased the objective.
+    Retreat,
+    /// The iteration restarts with full Gauss–Newton.
+    BeginAgain,
+    /// The next stage of a robust fit, from the squares of the residuals.
+    Stage(Vec<f64>),
+    /// The points move by these tangent vectors.
+    Step(Vec<f64>),
+    /// The iteration ends.
+    End(State),
+}
+
 /// A curve, its data, and the state of its iteration.
 pub struct CurveFit<'a> {
     data: Data<'a>,
@@ -46,7 +60,7 @@ pub struct CurveFit<'a> {
     /// Roots of the information matrices.
     roots: Vec<Root>,
     linearized: LinearProblem,
-    ends: Ends,
+    ends: EndConditions,
     robust: Robust,
     /// Initial points at the knots.
     first: Vec<f64>,
@@ -181,7 +195,7 @@ impl<'a> CurveFit<'a> {
     }
 
     /// The report so far.
-    pub fn report(&self) -> Report {
+    pub fn report(&self) -> SmoothReport {
         self.progress.report
     }
 
@@ -253,10 +267,25 @@ impl<'a> CurveFit<'a> {
 
     /// One iteration from the spline through the points, or the end; on all cores if no other curve is active.
     pub fn advance(&mut self, space: &Erased, options: &Options, monitor: &Monitor, alone: bool) {
+        self.progress.report.iterations += 1;
+        match self.next(space, options, monitor, alone) {
+            Next::Retreat => self.retreat(space, options),
+            Next::BeginAgain => self.begin_again(),
+            Next::Stage(squares) => self.go_on(space, &squares),
+            Next::End(state) => self.progress.report.state = state,
+            Next::Step(step) => {
+                let before = self.points.clone();
+                self.go(space, &before, &step);
+                self.before = Some((before, step));
+            }
+        }
+    }
+
+    /// Linearises the problem at the present curve, and determines what follows.
+    fn next(&mut self, space: &Erased, options: &Options, monitor: &Monitor, alone: bool) -> Next {
         let velocities = self.end_velocities(space);
         let (data, linearized) = (&self.data, &self.linearized);
         let (m, spacing) = (space.dim(), linearized.basis.spacing);
-        self.progress.report.iterations += 1;
         let path = Path { t: &self.knots, points: &self.points, velocities: &self.velocities };
         let frames = Frames::new(space, &self.points);
         let mut residuals =
@@ -264,11 +293,10 @@ impl<'a> CurveFit<'a> {
         let factors = self.robust.factors(&residuals.squares);
         if self.progress.settled && self.progress.report.exact {
             let objective = self.value(space, &residuals);
-            let before = std::mem::replace(&mut self.objective, objective);
-            if self.objective > before * (1.0 + ROUNDING) && self.retreats < RETREATS {
-                self.objective = before;
-                return self.retreat(space, options);
+            if objective > self.objective * (1.0 + ROUNDING) && self.retreats < RETREATS {
+                return Next::Retreat;
             }
+            self.objective = objective;
         }
         self.retreats = 0;
         let whole = factors.as_ref().map(|factors| {
@@ -283,7 +311,7 @@ impl<'a> CurveFit<'a> {
         speeds.iter_mut().for_each(|x| *x *= spacing);
         let curvature = curvature_gradient(space, linearized, &speeds, &accelerations);
         let sigma = data.sigma.unwrap_or(f64::NAN);
-        let closed = self.ends == Ends::Periodic;
+        let closed = self.ends == EndConditions::Periodic;
         let periodic = closed.then(|| PeriodicCorrection { overlap: OVERLAP, m, turn: frames.round() });
         let seen_with = |misfit, jacobi| {
             Linear::new(linearized, m, misfit, jacobi, periodic.as_ref(), &accelerations, &curvature, sigma)
@@ -302,8 +330,7 @@ impl<'a> CurveFit<'a> {
         }
         let system = linear.factored(lane(lam));
         if !(system.least_pivot().as_array()[0] > 0.0) {
-            self.progress.report.state = State::Undetermined;
-            return;
+            return Next::End(State::Undetermined);
         }
         let band = system.inverse_band();
         let inverse = system.mean(&band);
@@ -312,7 +339,7 @@ impl<'a> CurveFit<'a> {
 
         let exact = !self.solved && self.progress.takes_gauss_newton(space, options.tier);
         if exact && self.strays > 0 {
-            return self.begin_again();
+            return Next::BeginAgain;
         }
         if exact && !self.progress.report.exact {
             // Earlier steps belong to the other solver.
@@ -351,7 +378,7 @@ impl<'a> CurveFit<'a> {
         let over = taken >= self.robust.most(options.max_iter);
         let left = small && self.robust.leaves(&residuals.squares);
         if self.progress.settled && (left || (!self.robust.last() && (small || over))) {
-            return self.go_on(space, &residuals.squares);
+            return Next::Stage(residuals.squares);
         }
         if self.progress.settled && small {
             if let (Some(mut whole), Some((factors, softness))) =
@@ -373,33 +400,42 @@ impl<'a> CurveFit<'a> {
             }
             (self.progress.report.selection, self.progress.report.rejected) =
                 (self.robust.selection, self.robust.rejected());
-            self.progress.report.state =
-                if self.progress.unsettled { State::Unsettled } else { State::Converged };
-            return;
+            return Next::End(if self.progress.unsettled { State::Unsettled } else { State::Converged });
         }
         // Beyond this distance the estimate is not valid. In a Euclidean space it is exact, and the curve may have a
         // long way to go where there are no data.
         let farthest = residuals.distances.iter().copied().fold(0.0, f64::max).sqrt() + 0.1 * reach;
+        let ambient = ambient.unwrap_or_else(|| frames.tangents(&step));
+        self.limited_step(space, options, over, farthest, &step, ambient)
+    }
+
+    /// The step of the points, at most `farthest` long, or the end of an iteration that diverges or is `over`. `ambient` are
+    /// the tangent vectors of the step.
+    fn limited_step(
+        &mut self,
+        space: &Erased,
+        options: &Options,
+        over: bool,
+        farthest: f64,
+        step: &[f64],
+        mut ambient: Vec<f64>,
+    ) -> Next {
         let flat = space.curvature() == 0.0;
-        let counted = step.chunks_exact(m).zip(&self.supported).filter(|(_, near)| **near || !flat);
+        let counted = step.chunks_exact(space.dim()).zip(&self.supported).filter(|(_, near)| **near || !flat);
         let longest = counted.map(|(x, _)| length(x)).fold(0.0, larger);
         let further =
-            if self.progress.settled { self.progress.further(&step, self.robust.reweighs()) } else { 1.0 };
+            if self.progress.settled { self.progress.further(step, self.robust.reweighs()) } else { 1.0 };
         let limited = longest * further > farthest;
-        self.strays += usize::from(limited && self.progress.settled && !exact);
+        self.strays += usize::from(limited && self.progress.settled && !self.progress.report.exact);
         if self.strays > ASTRAY && self.progress.may_take_gauss_newton(space, options.tier) {
-            return self.begin_again();
+            return Next::BeginAgain;
         }
         if over || self.strays > ASTRAY {
-            self.progress.report.state = State::Unconverged;
-            return;
+            return Next::End(State::Unconverged);
         }
         let factor = if limited { farthest / longest } else { further };
-        let mut ambient = ambient.unwrap_or_else(|| frames.tangents(&step));
         ambient.iter_mut().for_each(|x| *x *= factor);
-        let before = self.points.clone();
-        self.go(space, &before, &ambient);
-        self.before = Some((before, ambient));
+        Next::Step(ambient)
     }
 
     /// Restarts with full Gauss–Newton, which could fail from an iterate where the linearised solver diverged.
@@ -428,7 +464,7 @@ impl<'a> CurveFit<'a> {
     fn gauss_newton_step(
         &self,
         space: &Erased,
-        ends: FitEnds,
+        ends: Ends,
         residuals: &Residuals,
         factors: Option<&[f64]>,
         lam: f64,
@@ -452,7 +488,7 @@ impl<'a> CurveFit<'a> {
     /// Moves the points.
     fn go(&mut self, space: &Erased, from: &[f64], step: &[f64]) {
         self.points = moved(space, from, step);
-        if self.ends == Ends::Periodic {
+        if self.ends == EndConditions::Periodic {
             let (len, last) = (space.point_len(), self.points.len() - space.point_len());
             self.points.copy_within(..len, last);
         }
@@ -460,7 +496,7 @@ impl<'a> CurveFit<'a> {
 
     /// The variances of the curve at the data, divided by those of the data.
     fn leverages(&self) -> Vec<f64> {
-        let leverage = |(row, w): (&Row, &f64)| {
+        let leverage = |(row, w): (&Stencil, &f64)| {
             self.inverse.as_ref().map_or(0.0, |inverse| w * row.square(inverse).as_array()[0])
         };
         self.linearized.data.iter().zip(self.data.weights).map(leverage).collect()

@@ -14,9 +14,9 @@ use crate::banded::{Banded, stride};
 use crate::bordered::{Bordered, Inverse};
 use crate::choice::{Look, STRAIGHT, Scoring, choose};
 use crate::jacobi_operator::JacobiOperator;
-use crate::linearized::{Basis, LinearProblem, Row};
+use crate::linearized::{Basis, LinearProblem, Stencil};
 use crate::path::Position;
-use crate::problem::{Criterion, Ends, Penalty};
+use crate::problem::{Criterion, EndConditions, Penalty};
 use symspline_core::memory;
 use symspline_core::monitor::checkpoint;
 use symspline_core::scalar::{LANES, Lane, lane};
@@ -110,7 +110,7 @@ impl<'a> Estimation<'a> {
     /// Without measurements. `priors` holds the precision of each parameter, and its distance from the prior mean.
     pub fn new(
         knots: &[f64],
-        ends: Ends,
+        ends: EndConditions,
         penalty: Penalty,
         factors: Vec<Factor<'a>>,
         priors: &[(f64, f64)],
@@ -192,8 +192,12 @@ impl<'a> Estimation<'a> {
         for (k, &(segment, position)) in own.positions.iter().enumerate() {
             checkpoint();
             let basis = &self.linearized.basis;
-            let values: [Row; 3] = std::array::from_fn(|nu| {
-                if own.jacobians[nu].is_empty() { Row::default() } else { basis.row(segment, position, nu) }
+            let values: [Stencil; 3] = std::array::from_fn(|nu| {
+                if own.jacobians[nu].is_empty() {
+                    Stencil::default()
+                } else {
+                    basis.row(segment, position, nu)
+                }
             });
             let first = (0..3).find(|&nu| !own.jacobians[nu].is_empty()).map_or(0, |nu| values[nu].first);
             if at.is_some_and(|at| at != first) {

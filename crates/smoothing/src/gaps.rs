@@ -12,7 +12,7 @@ use crate::bordered::Bordered;
 use crate::cyclic::{Factored, PeriodicCorrection};
 use crate::estimation::Matrices;
 use crate::linearized::{Basis, OVERLAP};
-use crate::problem::Ends;
+use crate::problem::EndConditions;
 use symspline_core::monitor::checkpoint;
 use symspline_core::scalar::{LANES, Lane, few};
 
@@ -31,7 +31,7 @@ pub struct System<'a> {
     /// The knots of the curve, and its ends.
     pub knots: &'a [f64],
     /// See `knots`.
-    pub ends: Ends,
+    pub ends: EndConditions,
     count: usize,
     m: usize,
     p: usize,
@@ -49,7 +49,13 @@ pub struct Predictions {
 
 impl<'a> System<'a> {
     /// For a matrix that couples m coordinates.
-    pub fn new(knots: &'a [f64], ends: Ends, m: usize, matrices: &'a Matrices, turn: &[f64]) -> Self {
+    pub fn new(
+        knots: &'a [f64],
+        ends: EndConditions,
+        m: usize,
+        matrices: &'a Matrices,
+        turn: &[f64],
+    ) -> Self {
         let basis = Basis::new(knots, ends);
         let periodic =
             basis.is_closed().then(|| PeriodicCorrection { overlap: OVERLAP, m, turn: turn.to_vec() });
@@ -174,96 +180,4 @@ fn by_columns(rows: &[f64], columns: usize, m: usize, change: impl Fn(&mut Vec<f
         })
         .collect();
     (0..changed[0].len() * columns).map(|at| changed[at % columns][at / columns]).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::linearized::LinearProblem;
-    use crate::path::positions;
-    use crate::problem::{EndCondition, Penalty};
-    use symspline_core::scalar::lane;
-
-    /// The coefficients and the variances at the data of a fit with weights.
-    fn fit(
-        knots: &[f64],
-        t: &[f64],
-        y: &[f64],
-        weights: &[f64],
-        lam: f64,
-        ends: Ends,
-    ) -> (Vec<f64>, Vec<f64>) {
-        let linear =
-            LinearProblem::new(Basis::new(knots, ends), &positions(knots, t), weights, Penalty::Acceleration);
-        let count = linear.basis.count();
-        let periodic = linear.basis.is_closed().then(|| PeriodicCorrection::plain(OVERLAP, 1));
-        let band = Banded::of(count, 3, |at| lane(linear.gram[at] + lam * linear.penalty[at]));
-        let matrix = Factored::new(band, periodic.as_ref());
-        let mut right = vec![0.0; count];
-        linear
-            .data
-            .iter()
-            .zip(weights.iter().zip(y))
-            .for_each(|(row, (w, y))| row.spread(&[w * y], &mut right));
-        periodic.iter().for_each(|periodic| periodic.fold(&mut right));
-        let mut x: Vec<Lane> = right.iter().map(|x| lane(*x)).collect();
-        matrix.solve(1, &mut x);
-        let mut c: Vec<f64> = x.iter().map(|x| x.as_array()[0]).collect();
-        periodic.iter().for_each(|periodic| periodic.extend(&mut c));
-        let inverse = matrix.inverse_band();
-        let values = linear.data.iter().map(|row| {
-            let mut out = [0.0];
-            row.apply(&c, &mut out);
-            out[0]
-        });
-        (values.collect(), linear.data.iter().map(|row| row.square(&inverse).as_array()[0]).collect())
-    }
-
-    #[test]
-    fn omitted_data_have_the_predictions_of_a_fit_without_them() {
-        let n = 40;
-        let knots: Vec<f64> = (0..=20).map(|i| f64::from(i) + 0.3 * (f64::from(i) * 1.7).sin()).collect();
-        let span = knots[20] - knots[0];
-        let t: Vec<f64> = (0..n).map(|i| knots[0] + span * (f64::from(i) + 0.5) / f64::from(n)).collect();
-        let y: Vec<f64> = t.iter().map(|t| (0.7 * t).sin() + 0.3 * (9.0 * t).cos()).collect();
-        let weights: Vec<f64> = t.iter().map(|t| 1.5 + t.cos()).collect();
-        let lam = 0.4;
-        for ends in [Ends::Open([EndCondition::Natural; 2]), Ends::Periodic] {
-            let (values, _) = fit(&knots, &t, &y, &weights, lam, ends);
-            let linear = LinearProblem::new(
-                Basis::new(&knots, ends),
-                &positions(&knots, &t),
-                &weights,
-                Penalty::Acceleration,
-            );
-            let band = (0..linear.gram.len()).map(|at| linear.gram[at] + lam * linear.penalty[at]).collect();
-            let matrices: Matrices = [band, Vec::new(), Vec::new()];
-            let system = System::new(&knots, ends, 1, &matrices, &[1.0]);
-            let firsts: Vec<usize> = linear.data.iter().map(|row| row.first).collect();
-            let rows = |scale: &dyn Fn(usize) -> f64| -> Vec<f64> {
-                linear
-                    .data
-                    .iter()
-                    .enumerate()
-                    .flat_map(|(k, row)| row.factors.map(|x| x * scale(k)))
-                    .collect()
-            };
-            let (weighed, plain) = (rows(&|k| weights[k].sqrt()), rows(&|_| 1.0));
-            let residuals: Vec<f64> = (0..t.len()).map(|k| weights[k].sqrt() * (y[k] - values[k])).collect();
-            // The last block wraps around to the start, and the second one is at an end.
-            let lists: [Vec<usize>; 3] = [(10..17).collect(), (30..40).collect(), vec![37, 38, 39, 0, 1, 2]];
-            for list in &lists {
-                let all = Functionals { firsts: &firsts, factors: &weighed, sides: &[] };
-                let probes = Functionals { firsts: &firsts, factors: &plain, sides: &[] };
-                let found = system.without(&all, &residuals, 1, &probes, &[(list, 0..t.len())]);
-                let fewer: Vec<f64> =
-                    (0..t.len()).map(|k| if list.contains(&k) { 0.0 } else { weights[k] }).collect();
-                let (again, variances) = fit(&knots, &t, &y, &fewer, lam, ends);
-                for k in 0..t.len() {
-                    assert!((values[k] + found.values[k] - again[k]).abs() < 1e-10);
-                    assert!((found.variances[k] - variances[k]).abs() < 1e-9 * variances[k].max(1.0));
-                }
-            }
-        }
-    }
 }

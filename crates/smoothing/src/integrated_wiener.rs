@@ -13,7 +13,7 @@ const ORDER: usize = 3;
 const COLUMNS: usize = 3 * ORDER;
 const BASE: usize = 2 * ORDER;
 
-type Row = [f64; COLUMNS];
+type Equation = [f64; COLUMNS];
 type Square<const N: usize> = [[f64; N]; N];
 
 /// The inverse of the lower Cholesky factor of the covariance of the increments after one unit of time,
@@ -69,9 +69,9 @@ pub fn process_variance(
 struct Chain {
     /// For every state but the last: the time to the next one, and three rows for the increment until then with a
     /// triangle in their first columns.
-    factors: Vec<(f64, [Row; ORDER])>,
+    factors: Vec<(f64, [Equation; ORDER])>,
     /// The rows of the last state; of a closed curve that is the first one.
-    end: Vec<Row>,
+    end: Vec<Equation>,
     /// The number of states by which those of a closed curve were rotated; None for an open one.
     rotated: Option<usize>,
 }
@@ -186,12 +186,12 @@ fn deviations(h: f64) -> [f64; ORDER] {
 }
 
 /// Rows for an increment in units of D.
-fn whitened(root: f64) -> [Row; ORDER] {
+fn whitened(root: f64) -> [Equation; ORDER] {
     WHITEN.map(|entries| std::array::from_fn(|c| entries.get(c).map_or(0.0, |x| x * root)))
 }
 
 /// Rows for the increment from the first state, whose columns are at the end, to the second one.
-fn increment(h: f64, root: f64) -> [Row; ORDER] {
+fn increment(h: f64, root: f64) -> [Equation; ORDER] {
     let (forward, scale) = (taylor(h), deviations(h));
     whitened(root).map(|row| {
         let mut out = [0.0; COLUMNS];
@@ -206,7 +206,7 @@ fn increment(h: f64, root: f64) -> [Row; ORDER] {
 }
 
 /// A row in which the next state in the columns from `next` on and the increment replace a state.
-fn in_increment(row: &Row, h: f64, next: usize) -> Row {
+fn in_increment(row: &Equation, h: f64, next: usize) -> Equation {
     let (back, scale) = (taylor(-h), deviations(h));
     let mut out = *row;
     for b in 0..ORDER {
@@ -220,7 +220,7 @@ fn in_increment(row: &Row, h: f64, next: usize) -> Row {
 /// Transforms rows so that they have zeros below the diagonal that begins in the first of the columns `from..to`, by
 /// reflections (Householder). Rows with large entries come first, so that small ones keep their accuracy (Cox & Higham
 /// 1998).
-fn triangularise(rows: &mut Vec<Row>, from: usize, to: usize) {
+fn triangularise(rows: &mut Vec<Equation>, from: usize, to: usize) {
     let mut top = 0;
     for column in from..to {
         let Some(largest) =
@@ -254,7 +254,7 @@ fn triangularise(rows: &mut Vec<Row>, from: usize, to: usize) {
 }
 
 /// The inverse of the upper triangle in the first columns.
-fn inverse_of_triangle(rows: &[Row]) -> Square<ORDER> {
+fn inverse_of_triangle(rows: &[Equation]) -> Square<ORDER> {
     let mut inverse = [[0.0; ORDER]; ORDER];
     for column in 0..ORDER {
         for a in (0..=column).rev() {

@@ -6,7 +6,7 @@ use crate::estimation::{Estimate, Estimation, Factor, Matrices, Measurements};
 use crate::motion::{BadRow, Motion};
 use crate::path::{moved, positions};
 use crate::posterior::Posterior;
-use crate::problem::{Criterion, EndCondition, Ends, Loss, Penalty};
+use crate::problem::{Criterion, EndCondition, EndConditions, Loss, Penalty};
 use crate::terms::{Columns, Linearised, Term};
 use symspline_core::curve::{Curves, Outside, Quantity, Times, evaluate};
 use symspline_core::fit::{Method, Options as FitOptions, Problem as Fit, Status, fit};
@@ -146,8 +146,8 @@ pub struct Linear {
 
 impl<'a> Problem<'a> {
     /// End conditions of the curves.
-    pub fn ends(&self) -> Ends {
-        Ends::Open(match self.penalty {
+    pub fn ends(&self) -> EndConditions {
+        EndConditions::Open(match self.penalty {
             Penalty::Acceleration => [EndCondition::Natural; 2],
             Penalty::Jerk => [EndCondition::NotAKnot; 2],
         })

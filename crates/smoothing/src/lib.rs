@@ -50,13 +50,21 @@ pub mod terms;
 pub mod turns;
 mod variance;
 
-pub use cumulative::{Outcome, Samples, fit_cumulative};
+/// What the tests of this crate need.
+#[doc(hidden)]
+pub mod private {
+    pub use crate::banded::{Banded, WIDTH};
+    pub use crate::cyclic::{Factored, PeriodicCorrection};
+    pub use crate::linearized::{Basis, LinearProblem, OVERLAP, times_metric};
+}
+
+pub use cumulative::{CumulativeData, Outcome, fit_cumulative};
 pub use integrated_wiener::process_variance;
 pub use observations::Observations;
 pub use path::{Position, positions};
 pub use problem::{
-    Criterion, Data, EndCondition, Ends, Known, Loss, Options, Penalty, Report, Selection, Smooth, State,
-    Tier,
+    Criterion, Data, EndCondition, EndConditions, Known, Loss, Options, Penalty, Selection, Smooth,
+    SmoothReport, State, Tier,
 };
 pub use smooth::smooth;
 pub use variance::{functional_at, inverse_of_weights, variance};

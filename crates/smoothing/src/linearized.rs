@@ -7,7 +7,7 @@
 //! spacing.
 
 use crate::banded::{Banded, WIDTH};
-use crate::problem::{EndCondition, Ends, Penalty};
+use crate::problem::{EndCondition, EndConditions, Penalty};
 use symspline_core::monitor::checkpoint;
 use symspline_core::scalar::{Lane, lane};
 
@@ -17,14 +17,14 @@ pub const OVERLAP: usize = 3;
 
 /// A row of B, P or S: four consecutive entries.
 #[derive(Clone, Copy, Default)]
-pub struct Row {
+pub struct Stencil {
     /// The index of the first coefficient.
     pub first: usize,
     /// The factors of this coefficient and of the next ones.
     pub factors: [f64; 4],
 }
 
-impl Row {
+impl Stencil {
     /// Adds the product of the row with coefficients of `m` numbers each to `out`.
     pub fn apply(&self, c: &[f64], out: &mut [f64]) {
         let m = out.len();
@@ -75,12 +75,12 @@ pub struct Basis {
     /// The mean knot spacing.
     pub spacing: f64,
     /// The end conditions.
-    pub ends: Ends,
+    pub ends: EndConditions,
 }
 
 impl Basis {
     /// Requires at least two increasing knots.
-    pub fn new(knots: &[f64], ends: Ends) -> Self {
+    pub fn new(knots: &[f64], ends: EndConditions) -> Self {
         let last = knots.len() - 1;
         let spacing = (knots[last] - knots[0]) / last as f64;
         Basis { tau: knots.iter().map(|t| (t - knots[0]) / spacing).collect(), spacing, ends }
@@ -99,17 +99,17 @@ impl Basis {
 
     /// Whether the last knot equals the first.
     pub fn is_closed(&self) -> bool {
-        self.ends == Ends::Periodic
+        self.ends == EndConditions::Periodic
     }
 
     /// Whether the second derivative vanishes at an end.
     pub fn is_natural(&self, end: usize) -> bool {
-        matches!(self.ends, Ends::Open(ends) if ends[end] == EndCondition::Natural)
+        matches!(self.ends, EndConditions::Open(ends) if ends[end] == EndCondition::Natural)
     }
 
     /// Whether the velocity at an end is given.
     pub fn has_velocity(&self, end: usize) -> bool {
-        matches!(self.ends, Ends::Open(ends) if ends[end] == EndCondition::Velocity)
+        matches!(self.ends, EndConditions::Open(ends) if ends[end] == EndCondition::Velocity)
     }
 
     /// Length of a segment, divided by the mean.
@@ -136,7 +136,7 @@ impl Basis {
     }
 
     /// Value (`nu` = 0) or derivative of a spline at a position between 0 and 1 in a segment.
-    pub fn row(&self, segment: usize, position: f64, nu: usize) -> Row {
+    pub fn row(&self, segment: usize, position: f64, nu: usize) -> Stencil {
         self.folded(segment, self.unfolded(segment, position, nu))
     }
 
@@ -170,14 +170,14 @@ impl Basis {
     }
 
     /// Eliminates the outermost coefficients, which the end conditions determine.
-    fn folded(&self, segment: usize, factors: [f64; 4]) -> Row {
+    fn folded(&self, segment: usize, factors: [f64; 4]) -> Stencil {
         let n = self.tau.len() - 1;
         if self.is_closed() {
-            return Row { first: segment, factors };
+            return Stencil { first: segment, factors };
         }
         // Coefficients 1 to n + 1 are kept, and numbered from zero.
         let first = segment.saturating_sub(1).min((n + 1).saturating_sub(4));
-        let mut row = Row { first, factors: [0.0; 4] };
+        let mut row = Stencil { first, factors: [0.0; 4] };
         for (j, factor) in factors.into_iter().enumerate() {
             let full = segment + j;
             if full == 0 || full == n + 2 {
@@ -198,14 +198,14 @@ impl Basis {
     fn outermost(&self, end: usize) -> [f64; 4] {
         let n = self.tau.len() - 1;
         match self.ends {
-            Ends::Open(ends) if ends[end] == EndCondition::Natural => {
+            EndConditions::Open(ends) if ends[end] == EndCondition::Natural => {
                 let (h, next) = if end == 0 { (0, 1) } else { (n - 1, n.saturating_sub(2)) };
                 let both = self.h(h) + if n > 1 { self.h(next) } else { 0.0 };
                 let ratio = self.h(h) / both;
                 [1.0 + ratio, -ratio, 0.0, 0.0]
             }
             // The third derivative is the same on the last two segments.
-            Ends::Open(ends) if ends[end] == EndCondition::NotAKnot => {
+            EndConditions::Open(ends) if ends[end] == EndCondition::NotAKnot => {
                 let segments = if end == 0 { [0, 1] } else { [n - 1, n - 2] };
                 let [mut far, mut near] = segments.map(|segment| self.unfolded(segment, 0.0, 3));
                 if end == 1 {
@@ -220,7 +220,7 @@ impl Basis {
     }
 
     /// A derivative at every knot.
-    pub fn at_knots(&self, nu: usize) -> Vec<Row> {
+    pub fn at_knots(&self, nu: usize) -> Vec<Stencil> {
         let n = self.tau.len() - 1;
         (0..=n).map(|i| if i < n { self.row(i, 0.0, nu) } else { self.row(n - 1, 1.0, nu) }).collect()
     }
@@ -250,7 +250,7 @@ pub fn times_metric(basis: &Basis, penalty: Penalty, a: &[f64], m: usize) -> Vec
 }
 
 /// Σ factor · rowᵀ row, as the entries (i, i − d) at i · 4 + d.
-fn gram(count: usize, rows: impl Iterator<Item = (Row, Row, f64)>) -> Vec<f64> {
+fn gram(count: usize, rows: impl Iterator<Item = (Stencil, Stencil, f64)>) -> Vec<f64> {
     let mut out = vec![0.0; count * BAND];
     for (left, right, factor) in rows {
         checkpoint();
@@ -273,11 +273,11 @@ pub struct LinearProblem {
     /// The splines.
     pub basis: Basis,
     /// B: values at the data.
-    pub data: Vec<Row>,
+    pub data: Vec<Stencil>,
     /// P: values at the knots.
-    pub values: Vec<Row>,
+    pub values: Vec<Stencil>,
     /// S: second derivatives at the knots.
-    pub accelerations: Vec<Row>,
+    pub accelerations: Vec<Stencil>,
     /// BᵀWB for scalar weights, as the entries (i, i − d) at i · 4 + d.
     pub gram: Vec<f64>,
     /// Ω, likewise.
@@ -290,7 +290,7 @@ impl LinearProblem {
     /// The problem for data at positions in segments, with their weights.
     pub fn new(basis: Basis, positions: &[(usize, f64)], weights: &[f64], penalised: Penalty) -> Self {
         let count = basis.count();
-        let data: Vec<Row> =
+        let data: Vec<Stencil> =
             positions.iter().map(|&(segment, position)| basis.row(segment, position, 0)).collect();
         let (values, accelerations) = (basis.at_knots(0), basis.at_knots(2));
         let hats = (0..basis.knots() - 1).flat_map(|i| {
@@ -357,109 +357,5 @@ impl LinearProblem {
     pub fn balance(&self) -> f64 {
         self.gram.chunks(BAND).map(|row| row[0]).sum::<f64>()
             / (self.penalised.stiffness() * self.basis.count() as f64)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    const KNOTS: [f64; 6] = [0.0, 0.5, 2.0, 2.25, 4.0, 5.0];
-
-    /// The value of the spline with given coefficients.
-    fn value(basis: &Basis, c: &[f64], segment: usize, position: f64, nu: usize) -> f64 {
-        let mut out = [0.0];
-        basis.row(segment, position, nu).apply(c, &mut out);
-        out[0]
-    }
-
-    #[test]
-    fn is_a_natural_cubic_spline() {
-        for count in 2..=6 {
-            let basis = Basis::new(&KNOTS[..count], Ends::Open([EndCondition::Natural; 2]));
-            let c: Vec<f64> = (0..count).map(|i| (3.0 * i as f64).cos()).collect();
-            let last = count - 2;
-            for (segment, position) in [(0, 0.0), (last, 1.0)] {
-                assert!(value(&basis, &c, segment, position, 2).abs() < 1e-13);
-            }
-            for i in 0..last {
-                for nu in 0..3 {
-                    let [left, right] = [(i, 1.0), (i + 1, 0.0)].map(|(s, p)| value(&basis, &c, s, p, nu));
-                    assert!((left - right).abs() < 1e-13, "{count} {i} {nu}: {left} {right}");
-                }
-            }
-            // Derivatives against differences.
-            let h = 1e-4;
-            for segment in 0..=last {
-                for nu in 0..2 {
-                    let step = 2.0 * h * basis.h(segment);
-                    let [a, b] = [0.4 - h, 0.4 + h].map(|p| value(&basis, &c, segment, p, nu));
-                    assert!(((b - a) / step - value(&basis, &c, segment, 0.4, nu + 1)).abs() < 1e-6);
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn reproduces_straight_lines() {
-        for ends in [EndCondition::Natural, EndCondition::Velocity] {
-            let basis = Basis::new(&KNOTS, Ends::Open([ends; 2]));
-            for segment in 0..5 {
-                let ones = value(&basis, &[1.0; 6], segment, 0.3, 0);
-                assert!((ones - 1.0).abs() < 1e-15);
-            }
-        }
-    }
-
-    #[test]
-    fn energy_matches_the_second_derivative() {
-        let basis = Basis::new(&KNOTS, Ends::Open([EndCondition::Natural; 2]));
-        let linearized = LinearProblem::new(basis, &[(0, 0.0)], &[0.0], Penalty::Acceleration);
-        let c: Vec<f64> = (0..6).map(|i| (2.0 * i as f64).sin()).collect();
-        let mut accelerations = vec![0.0; 6];
-        linearized
-            .accelerations
-            .iter()
-            .zip(&mut accelerations)
-            .for_each(|(row, x)| row.apply(&c, std::slice::from_mut(x)));
-        let mass = times_metric(&linearized.basis, Penalty::Acceleration, &accelerations, 1);
-        let energy: f64 = accelerations.iter().zip(&mass).map(|(a, b)| a * b).sum();
-        let form: f64 = (0..6)
-            .flat_map(|i| (0..=WIDTH.min(i)).map(move |d| (i, d)))
-            .map(|(i, d)| linearized.penalty[i * BAND + d] * c[i] * c[i - d] * if d > 0 { 2.0 } else { 1.0 })
-            .sum();
-        let simpson: f64 = (0..5)
-            .map(|s| {
-                let [a, b, d] = [0.0, 0.5, 1.0].map(|p| value(&linearized.basis, &c, s, p, 2).powi(2));
-                linearized.basis.h(s) * (a + 4.0 * b + d) / 6.0
-            })
-            .sum();
-        assert!((energy / simpson - 1.0).abs() < 1e-13 && (form / simpson - 1.0).abs() < 1e-13);
-    }
-
-    #[test]
-    fn not_a_knot_ends_reproduce_cubics() {
-        let basis = Basis::new(&KNOTS, Ends::Open([EndCondition::NotAKnot; 2]));
-        let linearized = LinearProblem::new(basis, &[(0, 0.0)], &[0.0], Penalty::Jerk);
-        let basis = &linearized.basis;
-        let c: Vec<f64> = (0..6).map(|i| (2.0 * i as f64).sin()).collect();
-        for [outer, inner] in [[0, 1], [4, 3]] {
-            let [a, b] = [outer, inner].map(|segment| value(basis, &c, segment, 0.5, 3));
-            assert!((a - b).abs() < 1e-12, "{a} {b}");
-        }
-        // ∫ x'''² of a function whose third derivative is constant on every segment.
-        let square = |s: usize| value(basis, &c, s, 0.5, 3).powi(2) * basis.h(s);
-        let exact: f64 = (0..5).map(square).sum();
-        let acceleration = |(_, i): (usize, usize)| {
-            let mut x = [0.0];
-            linearized.accelerations[i].apply(&c, &mut x);
-            lane(x[0])
-        };
-        let energy = linearized.energy(false, acceleration).as_array()[0];
-        let form: f64 = (0..6)
-            .flat_map(|i| (0..=WIDTH.min(i)).map(move |d| (i, d)))
-            .map(|(i, d)| linearized.penalty[i * BAND + d] * c[i] * c[i - d] * if d > 0 { 2.0 } else { 1.0 })
-            .sum();
-        assert!((energy / exact - 1.0).abs() < 1e-12 && (form / exact - 1.0).abs() < 1e-11);
     }
 }

@@ -8,7 +8,7 @@ use crate::banded::{Banded, WIDTH, stride};
 use crate::cyclic::{Factored, PeriodicCorrection};
 use crate::information::Seen;
 use crate::jacobi_operator::JacobiOperator;
-use crate::linearized::{LinearProblem, OVERLAP, Row};
+use crate::linearized::{LinearProblem, OVERLAP, Stencil};
 use crate::problem::Known;
 use std::borrow::Cow;
 use symspline_core::monitor::checkpoint;
@@ -181,7 +181,7 @@ impl<'a> Misfit<'a> {
     }
 
     /// The weighted square of the residual of a datum after the coefficients have changed by x.
-    fn square(&self, row: &Row, k: usize, m: usize, x: &[Lane]) -> Lane {
+    fn square(&self, row: &Stencil, k: usize, m: usize, x: &[Lane]) -> Lane {
         let mut sum = Lane::ZERO;
         match self {
             Misfit::Numbers { weights, residuals, .. } => {

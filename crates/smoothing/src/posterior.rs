@@ -3,8 +3,8 @@
 use crate::banded::{Banded, stride};
 use crate::bordered::Bordered;
 use crate::cyclic::{Factored, PeriodicCorrection};
-use crate::linearized::{Basis, OVERLAP, Row};
-use crate::problem::Ends;
+use crate::linearized::{Basis, OVERLAP, Stencil};
+use crate::problem::EndConditions;
 use crate::variance::row_at;
 use symspline_core::memory;
 use symspline_core::monitor::checkpoint;
@@ -23,7 +23,7 @@ pub struct Posterior<'a> {
 
 impl<'a> Posterior<'a> {
     /// From A: its band, side and corner. `turn` is the holonomy of a closed curve, m × m numbers.
-    pub fn new(knots: &'a [f64], ends: Ends, m: usize, matrices: [&[f64]; 3], turn: &[f64]) -> Self {
+    pub fn new(knots: &'a [f64], ends: EndConditions, m: usize, matrices: [&[f64]; 3], turn: &[f64]) -> Self {
         let basis = Basis::new(knots, ends);
         let [band, side, corner] = matrices;
         let p = corner.len().isqrt();
@@ -54,7 +54,8 @@ impl<'a> Posterior<'a> {
         let mut out = Vec::with_capacity(x.len() * size * size);
         for t in x {
             checkpoint();
-            let rows: Vec<Row> = orders.iter().map(|nu| row_at(self.knots, &self.basis, *t, *nu)).collect();
+            let rows: Vec<Stencil> =
+                orders.iter().map(|nu| row_at(self.knots, &self.basis, *t, *nu)).collect();
             for u in 0..size {
                 for v in 0..size {
                     let (r, s) = (rows[u / m], rows[v / m]);
@@ -120,7 +121,7 @@ impl<'a> Posterior<'a> {
     }
 
     /// The number of independent normal numbers that a sample needs, for p parameters.
-    pub fn freedom(knots: &[f64], ends: Ends, m: usize, p: usize) -> usize {
+    pub fn freedom(knots: &[f64], ends: EndConditions, m: usize, p: usize) -> usize {
         freedom(&Basis::new(knots, ends), m, p)
     }
 

@@ -3,7 +3,7 @@
 use crate::banded::stride;
 use crate::cyclic::PeriodicCorrection;
 use std::f64::consts::PI;
-use symspline_core::fit::{End, Ends as FitEnds};
+use symspline_core::fit::{End, Ends};
 use symspline_core::scalar::few;
 
 /// Noisy data of one curve.
@@ -94,19 +94,19 @@ impl Penalty {
 
 /// The end conditions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Ends {
+pub enum EndConditions {
     /// A condition at either end.
     Open([EndCondition; 2]),
     /// The last knot equals the first.
     Periodic,
 }
 
-impl Ends {
+impl EndConditions {
     /// The same conditions for the fit of a spline, with the velocities at its ends.
-    pub(crate) fn of_fit(self, velocities: &[Vec<f64>; 2]) -> FitEnds<'_> {
+    pub(crate) fn of_fit(self, velocities: &[Vec<f64>; 2]) -> Ends<'_> {
         match self {
-            Ends::Periodic => FitEnds::Periodic,
-            Ends::Open(kinds) => FitEnds::Open(few(|e| match kinds[e] {
+            EndConditions::Periodic => Ends::Periodic,
+            EndConditions::Open(kinds) => Ends::Open(few(|e| match kinds[e] {
                 EndCondition::Velocity => End::Velocity(&velocities[e]),
                 EndCondition::NotAKnot => End::NotAKnot,
                 EndCondition::Natural => End::Natural,
@@ -152,7 +152,7 @@ pub struct Options {
     /// The solver.
     pub tier: Tier,
     /// The end conditions.
-    pub ends: Ends,
+    pub ends: EndConditions,
     /// The iteration ends when a step is below this number of standard deviations of the points.
     pub tol: f64,
     /// Maximum number of iterations.
@@ -197,7 +197,7 @@ pub enum Selection {
 
 /// The report of a smoothed curve.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Report {
+pub struct SmoothReport {
     /// The final state.
     pub state: State,
     /// The number of spline fits.
@@ -244,7 +244,7 @@ pub struct Smooth {
     /// The posterior of the coefficients; none if the iteration failed.
     pub known: Option<Known>,
     /// The report.
-    pub report: Report,
+    pub report: SmoothReport,
 }
 
 /// The matrix A of the linearised problem at the end of the iteration, see [`Posterior`](crate::posterior::Posterior).

@@ -3,7 +3,7 @@
 use crate::banded::Banded;
 use crate::choice::Linear;
 use crate::misfit::COUPLED;
-use crate::problem::{Criterion, Penalty, Report, Tier};
+use crate::problem::{Criterion, Penalty, SmoothReport, Tier};
 use crate::robust::{Lam, Robust};
 use symspline_core::space::{Erased, Origin};
 
@@ -48,14 +48,15 @@ pub struct Progress {
     density: f64,
     penalty: Penalty,
     /// The report so far.
-    pub report: Report,
+    pub report: SmoothReport,
 }
 
 impl Progress {
     /// For a given λ, unless it is too large, or for a λ to be chosen. `density` is the weight per knot where data
     /// are sparse.
     pub fn new(lam: Option<f64>, stiffest: f64, density: f64, penalty: Penalty) -> Self {
-        let report = Report { at_bound: lam.is_some_and(|lam| lam > stiffest), ..Report::default() };
+        let report =
+            SmoothReport { at_bound: lam.is_some_and(|lam| lam > stiffest), ..SmoothReport::default() };
         Progress {
             lam: lam.map(|lam| lam.min(stiffest)),
             settled: lam.is_some(),

@@ -5,12 +5,10 @@ use crate::chain::{chain, rounding};
 use crate::curve_fit::CurveFit;
 use crate::information;
 use crate::path::Path;
-use crate::problem::{Data, EndCondition, Ends, Loss, Options, Penalty, Smooth, State};
+use crate::problem::{Data, EndCondition, EndConditions, Loss, Options, Penalty, Smooth, State};
 use crate::robust::Robust;
 use crate::start::{Level, levels};
-use symspline_core::fit::{
-    End, Ends as FitEnds, Method, Options as FitOptions, Problem, Report, Status, fit,
-};
+use symspline_core::fit::{End, Ends, Method, Options as FitOptions, Problem, Report, Status, fit};
 use symspline_core::memory;
 use symspline_core::monitor::Monitor;
 use symspline_core::parallel;
@@ -24,7 +22,7 @@ const FIT: FitOptions = FitOptions { method: Method::Auto, tol: 1e-12, max_iter:
 const LONG_FIT: FitOptions = FitOptions { max_iter: None, ..FIT };
 /// The C² residual that suffices for an intermediate spline.
 const ENOUGH: f64 = 1e-8;
-const NATURAL: FitEnds<'static> = FitEnds::Open([End::Natural; 2]);
+const NATURAL: Ends<'static> = Ends::Open([End::Natural; 2]);
 /// The number of segments in a gap, about. A curve without data is smooth, so that 32 segments represent it with an error
 /// far below its standard error.
 const IN_GAP: f64 = 32.0;
@@ -77,7 +75,7 @@ fn size(space: &Erased, data: &Data) -> usize {
 ///
 /// Data hardly determine the points at other knots, and the iteration would diverge on curved spaces.
 fn knots_near_data(data: &Data, options: &Options) -> Vec<f64> {
-    let Ends::Open(kinds) = options.ends else { return data.knots.to_vec() };
+    let EndConditions::Open(kinds) = options.ends else { return data.knots.to_vec() };
     let [Some(first), Some(last)] = [data.times.first(), data.times.last()] else {
         return data.knots.to_vec();
     };
@@ -188,7 +186,7 @@ fn fit_tracks(
 fn fit_all<'a>(
     space: &Erased,
     curves: impl Iterator<Item = (&'a [f64], &'a [f64])>,
-    ends: FitEnds,
+    ends: Ends,
     how: &FitOptions,
     monitor: &Monitor,
 ) -> Vec<Option<Vec<f64>>> {
@@ -252,9 +250,9 @@ fn beginnings(
         };
         found.levels = match options.ends {
             _ if given => vec![Level::of(data.knots, data.start)],
-            Ends::Open(_) => levels(space, &times, &points, &weights, averaged),
+            EndConditions::Open(_) => levels(space, &times, &points, &weights, averaged),
             // One period before and one after, so that the initial curve closes.
-            Ends::Periodic => {
+            EndConditions::Periodic => {
                 let turns = |x: f64| move |t: &f64| t + x * period;
                 let times =
                     [-1.0, 0.0, 1.0].map(|x| times.iter().map(turns(x)).collect::<Vec<f64>>()).concat();
@@ -303,7 +301,7 @@ fn start<'a>(
             let path = Path { t: &level.times, points: &level.points, velocities: &velocities };
             let knots = data[*c].knots;
             let mut points = path.prolonged(space, knots);
-            if options.ends == Ends::Periodic {
+            if options.ends == EndConditions::Periodic {
                 let (len, last) = (space.point_len(), points.len() - space.point_len());
                 points.copy_within(..len, last);
             }

@@ -2,9 +2,9 @@
 
 use crate::banded::{Banded, WIDTH};
 use crate::cyclic::{Factored, PeriodicCorrection};
-use crate::linearized::{Basis, LinearProblem, OVERLAP, Row};
+use crate::linearized::{Basis, LinearProblem, OVERLAP, Stencil};
 use crate::path::{Position, positions};
-use crate::problem::{EndCondition, Ends, Penalty};
+use crate::problem::{EndCondition, EndConditions, Penalty};
 use symspline_core::monitor::checkpoint;
 use symspline_core::scalar::lane;
 
@@ -25,7 +25,14 @@ pub fn rows_of(inverse: &Banded) -> Vec<f64> {
 /// The points at the knots have the covariance PA⁻¹Pᵀ. An integrated Wiener process through given points has velocities
 /// there with the inverse covariance λT, `vᵀTv` being the part of ∫ x''² in them; and between two knots whose points and
 /// velocities are given it has the variance `h³s³(1 − s)³/(3λ)`, and its velocity `h s(1 − s)(1 − 3s(1 − s))/λ`.
-pub fn variance(knots: &[f64], rows: &[f64], lam: f64, ends: Ends, times: &[f64], nu: usize) -> Vec<f64> {
+pub fn variance(
+    knots: &[f64],
+    rows: &[f64],
+    lam: f64,
+    ends: EndConditions,
+    times: &[f64],
+    nu: usize,
+) -> Vec<f64> {
     let basis = Basis::new(knots, ends);
     let inverse = Banded::of(basis.count(), WIDTH, |at| lane(rows[at]));
     let velocities = velocities_given_points(knots, ends);
@@ -65,7 +72,7 @@ pub fn inverse_of_weights(
     weights: &[f64],
     lam: f64,
     penalty: Penalty,
-    ends: Ends,
+    ends: EndConditions,
 ) -> Vec<f64> {
     let basis = Basis::new(knots, ends);
     let lam = lam / penalty.unit(basis.spacing);
@@ -86,7 +93,7 @@ fn position_of(knots: &[f64], basis: &Basis, t: f64) -> (Position, f64) {
 
 /// The factors of the coefficients in a derivative at any time, in the unit of the knots. Beyond its ends the curve
 /// continues with constant velocity.
-pub fn row_at(knots: &[f64], basis: &Basis, t: f64, nu: usize) -> Row {
+pub fn row_at(knots: &[f64], basis: &Basis, t: f64, nu: usize) -> Stencil {
     let ((segment, s), beyond) = position_of(knots, basis, t);
     let mut row = basis.row(segment, s, nu);
     let unit = basis.spacing.powi(-(nu as i32));
@@ -105,19 +112,19 @@ pub fn row_at(knots: &[f64], basis: &Basis, t: f64, nu: usize) -> Row {
 }
 
 /// The first coefficient and the factors of four coefficients in a derivative at given times: see [`row_at`].
-pub fn functional_at(knots: &[f64], ends: Ends, times: &[f64], nu: usize) -> Vec<(usize, [f64; 4])> {
+pub fn functional_at(knots: &[f64], ends: EndConditions, times: &[f64], nu: usize) -> Vec<(usize, [f64; 4])> {
     let basis = Basis::new(knots, ends);
-    let of_row = |row: Row| (row.first, row.factors);
+    let of_row = |row: Stencil| (row.first, row.factors);
     times.iter().map(|t| of_row(row_at(knots, &basis, *t, nu))).collect()
 }
 
 /// The band of T⁻¹, where vᵀTv is the contribution of the velocities at knots to ∫ x''²: `4(v₀² + v₀v₁ + v₁²)/h` per
 /// segment. Prescribed velocities get a negligible variance.
-fn velocities_given_points(knots: &[f64], ends: Ends) -> Banded {
+fn velocities_given_points(knots: &[f64], ends: EndConditions) -> Banded {
     const FIXED: f64 = 1e12;
     let last = knots.len() - 1;
     let stiffness = |i: usize| 1.0 / (knots[i + 1] - knots[i]);
-    let given = |end: usize| matches!(ends, Ends::Open(ends) if ends[end] == EndCondition::Velocity);
+    let given = |end: usize| matches!(ends, EndConditions::Open(ends) if ends[end] == EndCondition::Velocity);
     let t = Banded::of(last + 1, 1, |at| {
         let (i, beside) = (at / 2, at % 2 == 1);
         let [left, right] = [(i > 0).then(|| stiffness(i - 1)), (i < last).then(|| stiffness(i))];
@@ -128,6 +135,6 @@ fn velocities_given_points(knots: &[f64], ends: Ends) -> Banded {
         lane(4.0 * fixed * (left.unwrap_or(0.0) + right.unwrap_or(0.0)))
     });
     // The last velocity of a closed curve equals the first.
-    let periodic = (ends == Ends::Periodic).then(|| PeriodicCorrection::plain(1, 1));
+    let periodic = (ends == EndConditions::Periodic).then(|| PeriodicCorrection::plain(1, 1));
     Factored::new(t, periodic.as_ref()).inverse_band()
 }

@@ -18,7 +18,7 @@ use symspline_engine::smoothing::iteration::{Constant, Failure, Invalid, Linear,
 use symspline_engine::smoothing::motion::{BadRow, Motion};
 use symspline_engine::smoothing::posterior::Posterior;
 use symspline_engine::smoothing::terms::{Linearised, Residuals, Sensor, Term};
-use symspline_engine::smoothing::{Criterion, EndCondition, Ends, Loss, Penalty};
+use symspline_engine::smoothing::{Criterion, EndCondition, EndConditions, Loss, Penalty};
 use symspline_engine::space::{Ambient, Erased, Origin};
 
 type Array<'py> = PyReadonlyArrayDyn<'py, f64>;
@@ -32,7 +32,7 @@ fn array<'py>(py: Python<'py>, shape: &[usize], numbers: &[f64]) -> PyResult<Out
 }
 
 /// The kind of the ends of a curve: "natural", "not-a-knot" or "periodic", and "velocity" for one with given velocities.
-pub fn ends_named(kinds: Option<[String; 2]>) -> PyResult<Ends> {
+pub fn ends_named(kinds: Option<[String; 2]>) -> PyResult<EndConditions> {
     let one = |name: &String| match name.as_str() {
         "natural" => Ok(EndCondition::Natural),
         "velocity" => Ok(EndCondition::Velocity),
@@ -40,8 +40,8 @@ pub fn ends_named(kinds: Option<[String; 2]>) -> PyResult<Ends> {
         _ => Err(invalid(format!("a smoothing spline cannot have the end condition {name:?}"))),
     };
     Ok(match &kinds {
-        None => Ends::Periodic,
-        Some([a, b]) => Ends::Open([one(a)?, one(b)?]),
+        None => EndConditions::Periodic,
+        Some([a, b]) => EndConditions::Open([one(a)?, one(b)?]),
     })
 }
 
@@ -486,7 +486,7 @@ struct Slices<'a> {
     knots: &'a [f64],
     matrices: [&'a [f64]; 3],
     m: usize,
-    ends: Ends,
+    ends: EndConditions,
     turn: &'a [f64],
 }
 
@@ -515,7 +515,7 @@ impl<'a> Slices<'a> {
 }
 
 /// The band, side and corner of A, the coordinates that it couples, the ends and the holonomy.
-pub fn matrices_of(known: &Known) -> PyResult<(Matrices, usize, Ends, Vec<f64>)> {
+pub fn matrices_of(known: &Known) -> PyResult<(Matrices, usize, EndConditions, Vec<f64>)> {
     let ([band, side, corner], m, kinds, turn) = known;
     let matrices = [in_order(band)?.to_vec(), in_order(side)?.to_vec(), in_order(corner)?.to_vec()];
     Ok((matrices, *m, ends_named(kinds.clone())?, in_order(turn)?.to_vec()))

@@ -15,8 +15,8 @@ use symspline_engine::smoothing::audit::{AtData, Unequal, is_constant};
 use symspline_engine::smoothing::examine::{Complaint, Examined, Finding, Residuals};
 use symspline_engine::smoothing::turns::{Turn, usual_turn};
 use symspline_engine::smoothing::{
-    Data, Ends, Observations, Options, Outcome, Report, Samples, Selection, Smooth, State, Tier, chi,
-    fit_cumulative as fit, inverse_of_weights, process_variance as process, smooth as run,
+    CumulativeData, Data, EndConditions, Observations, Options, Outcome, Selection, Smooth, SmoothReport,
+    State, Tier, chi, fit_cumulative as fit, inverse_of_weights, process_variance as process, smooth as run,
     variance as variance_at,
 };
 use symspline_engine::space::{Ambient, Origin};
@@ -83,7 +83,7 @@ pub fn smooth<'py>(
         tol,
         max_iter,
         raise_lam,
-        ends: Ends::Periodic,
+        ends: EndConditions::Periodic,
     };
     let (t, knots) = (Rows::of(&t)?, Rows::of(&knots)?);
     let parts = factors.len();
@@ -235,9 +235,9 @@ fn gathered<'py>(
 /// state, iterations, lam, band_lam, at_bound, freedom, sigma, step, rate, kappa, exact, selection, rejected,
 /// objective.
 fn columns<'py>(py: Python<'py>, found: &[Smooth]) -> PyResult<Bound<'py, PyTuple>> {
-    let reports: Vec<Report> = found.iter().map(|smooth| smooth.report).collect();
-    let column = |f: fn(&Report) -> f64| PyArray1::from_iter(py, reports.iter().map(f));
-    let flag = |f: fn(&Report) -> bool| PyArray1::from_iter(py, reports.iter().map(f));
+    let reports: Vec<SmoothReport> = found.iter().map(|smooth| smooth.report).collect();
+    let column = |f: fn(&SmoothReport) -> f64| PyArray1::from_iter(py, reports.iter().map(f));
+    let flag = |f: fn(&SmoothReport) -> bool| PyArray1::from_iter(py, reports.iter().map(f));
     let state = reports.iter().map(|r| match r.state {
         State::Converged => 0,
         State::Running | State::Unconverged => 1,
@@ -519,7 +519,7 @@ pub fn fit_cumulative<'py>(
     let (points, weights) = (in_order(&points)?, in_order(&weights)?);
     let (curves, count, size) =
         (batch.iter().product::<usize>(), knots.len() - degree - 1, row.iter().product::<usize>());
-    let samples = |c: usize| Samples {
+    let samples = |c: usize| CumulativeData {
         knots,
         degree,
         t,

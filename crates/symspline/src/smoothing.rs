@@ -141,7 +141,7 @@ impl Smoothing {
         self
     }
 
-    /// The factor of the degrees of freedom in generalised cross-validation, at least 1; by default 1.4, as in Python.
+    /// The factor of the degrees of freedom in generalised cross-validation, at least 1; by default 1.2, as in Python.
     /// With 1 the criterion is the classical one, which smooths too little in some samples.
     pub fn gamma(mut self, gamma: f64) -> Self {
         self.gamma = gamma;
@@ -324,8 +324,12 @@ impl Smoothing {
         engine::smooth(space, &[data], &options, &Monitor::new(&|_| true)).remove(0)
     }
 
-    fn ends(&self) -> engine::Ends {
-        if self.periodic { engine::Ends::Periodic } else { engine::Ends::Open([EndCondition::Natural; 2]) }
+    fn ends(&self) -> engine::EndConditions {
+        if self.periodic {
+            engine::EndConditions::Periodic
+        } else {
+            engine::EndConditions::Open([EndCondition::Natural; 2])
+        }
     }
 
     /// The knots: those given, or all times of data with a weight.
@@ -416,7 +420,7 @@ pub struct SmoothingReport {
 pub struct SmoothingSpline<S: Space, P: Point<S>> {
     spline: CubicSpline<S, P>,
     noise: Vec<Noise>,
-    ends: engine::Ends,
+    ends: engine::EndConditions,
 }
 
 /// The report and the uncertainty of the curve in one factor.
