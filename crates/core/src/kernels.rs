@@ -36,17 +36,17 @@ impl<M: Space> Kernels for M {
         }
     }
     fn samples(&self, job: &Job, out: &mut [f64]) {
-        self.evaluate_with(Samples { job, out });
+        self.evaluate_with(SampleCall { job, out });
     }
 }
 
 /// A block of samples and where its results go.
-struct Samples<'a> {
+struct SampleCall<'a> {
     job: &'a Job<'a>,
     out: &'a mut [f64],
 }
 
-impl Evaluation for Samples<'_> {
+impl Evaluation for SampleCall<'_> {
     fn direct<M: Space>(self, space: &M) {
         if M::HOT && !SMALL {
             self.job.run(space, self.out)

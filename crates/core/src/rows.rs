@@ -57,7 +57,7 @@ impl Operation {
 }
 
 /// A row on which the operation failed: its index and the deciding angle.
-pub type Fault = (usize, f64);
+pub type RowFault = (usize, f64);
 
 /// Applies an operation to every row. All inputs have as many rows as the result.
 pub fn apply(
@@ -67,12 +67,12 @@ pub fn apply(
     t: &[f64],
     monitor: &Monitor,
     out: &mut [f64],
-) -> Result<(), Fault> {
+) -> Result<(), RowFault> {
     let len = space.point_len();
     let size = operation.row_len(len);
     let limit = below(space.cut_angle());
     let parallel = out.len() > PARALLEL;
-    let faults = std::sync::Mutex::new(None::<Fault>);
+    let faults = std::sync::Mutex::new(None::<RowFault>);
     let length = parallel::block(BLOCK, len);
     let blocks: Vec<(usize, &mut [f64])> = out.chunks_mut(length * size).enumerate().collect();
     parallel::for_each(blocks, parallel, monitor, |(block, out)| {

@@ -1,6 +1,6 @@
 //! Validation of curves before a fit: knots, points, closure and end vectors.
 
-use crate::fit::{End, Ends, Problem};
+use crate::fit::{Ends, Problem};
 use crate::monitor::Monitor;
 use crate::rows::{Operation, apply, handle_angle, project_points, tangent_defects};
 use crate::space::{Ambient, Erased};
@@ -182,7 +182,7 @@ fn lengths(space: &Erased, problem: &Problem) -> Result<(), Invalid> {
         return wrong(0, "there must be one knot per point");
     }
     if let Ends::Open(ends) = problem.ends
-        && ends.iter().filter_map(End::values).any(|v| v.len() != (offsets.len() - 1) * len)
+        && ends.iter().any(|end| end.vectors(len).iter().any(|(_, v)| v.len() != (offsets.len() - 1) * len))
     {
         return wrong(0, "end vectors must have one row per curve");
     }
@@ -271,43 +271,44 @@ pub fn ends(space: &Erased, problem: &Problem, tol: f64) -> Result<(), Invalid> 
     let quiet = |_| true;
     let monitor = Monitor::new(&quiet);
     for (e, end) in ends.iter().enumerate() {
-        let Some(v) = end.values() else { continue };
-        let which = Which { start: e == 0, velocity: matches!(end, End::Velocity(_)) };
-        if let Some(i) = v.iter().position(|x| !x.is_finite()) {
-            return fault(i / len, None, Reason::EndNotFinite(which, v[i]));
-        }
-        let node = |pair: &[usize]| if which.start { pair[0] } else { pair[1] - 1 };
-        let p: Vec<f64> = problem
-            .offsets
-            .windows(2)
-            .flat_map(|pair| &problem.points[node(pair) * len..(node(pair) + 1) * len])
-            .copied()
-            .collect();
-        // In units of the segment, so that a vector as small as the rounding of the points passes.
-        let mut scaled = v.to_vec();
-        for (c, v) in scaled.chunks_exact_mut(len).enumerate() {
-            let h = end_segment(problem, c, which);
-            let scale = if which.velocity { 1.0 } else { h };
-            v.iter_mut().for_each(|x| *x = *x * h * scale);
-        }
-        let defects = tangent_defects(space, &p, &scaled);
-        if let Some(c) = defects.iter().position(|d| !(*d <= tol)) {
-            return fault(c, None, Reason::EndNotTangent { which, normal: defects[c] });
-        }
-        if !which.velocity || !space.cut_angle().is_finite() {
-            continue;
-        }
-        // The control handle h u/3, by its deciding angle.
-        for (c, v) in scaled.chunks_exact_mut(len).enumerate() {
-            v.iter_mut().for_each(|x| *x /= 3.0);
-            let (p, limit) = (&p[c * len..(c + 1) * len], space.longest_handle());
-            let angle = handle_angle(space, p, v);
-            if angle >= limit {
-                let mut square = [0.0];
-                let _ = apply(space, Operation::Inner, &[p, &*v, &*v], &[], &monitor, &mut square);
-                let segment = end_segment(problem, c, which);
-                let speed = 3.0 * square[0].sqrt() / segment;
-                return fault(c, None, Reason::EndTooFast { which, speed, segment, angle, limit });
+        for (velocity, v) in end.vectors(len) {
+            let which = Which { start: e == 0, velocity };
+            if let Some(i) = v.iter().position(|x| !x.is_finite()) {
+                return fault(i / len, None, Reason::EndNotFinite(which, v[i]));
+            }
+            let node = |pair: &[usize]| if which.start { pair[0] } else { pair[1] - 1 };
+            let p: Vec<f64> = problem
+                .offsets
+                .windows(2)
+                .flat_map(|pair| &problem.points[node(pair) * len..(node(pair) + 1) * len])
+                .copied()
+                .collect();
+            // In units of the segment, so that a vector as small as the rounding of the points passes.
+            let mut scaled = v.to_vec();
+            for (c, v) in scaled.chunks_exact_mut(len).enumerate() {
+                let h = end_segment(problem, c, which);
+                let scale = if which.velocity { 1.0 } else { h };
+                v.iter_mut().for_each(|x| *x = *x * h * scale);
+            }
+            let defects = tangent_defects(space, &p, &scaled);
+            if let Some(c) = defects.iter().position(|d| !(*d <= tol)) {
+                return fault(c, None, Reason::EndNotTangent { which, normal: defects[c] });
+            }
+            if !which.velocity || !space.cut_angle().is_finite() {
+                continue;
+            }
+            // The control handle h u/3, by its deciding angle.
+            for (c, v) in scaled.chunks_exact_mut(len).enumerate() {
+                v.iter_mut().for_each(|x| *x /= 3.0);
+                let (p, limit) = (&p[c * len..(c + 1) * len], space.longest_handle());
+                let angle = handle_angle(space, p, v);
+                if angle >= limit {
+                    let mut square = [0.0];
+                    let _ = apply(space, Operation::Inner, &[p, &*v, &*v], &[], &monitor, &mut square);
+                    let segment = end_segment(problem, c, which);
+                    let speed = 3.0 * square[0].sqrt() / segment;
+                    return fault(c, None, Reason::EndTooFast { which, speed, segment, angle, limit });
+                }
             }
         }
     }

@@ -35,7 +35,7 @@ pub struct Run {
 
 /// The segment of a coordinate between two nodes. Equal nodes stand for an isolated node.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Segment {
+pub struct Neighbours {
     pub left: usize,
     pub right: usize,
     pub x: f64,
@@ -153,10 +153,10 @@ impl Axis<'_> {
     }
 
     /// The segment from which a coordinate of a row is evaluated, if the row has nodes there.
-    pub fn segment_at(&self, valid: impl Fn(usize) -> bool, x: f64) -> Option<Segment> {
+    pub fn segment_at(&self, valid: impl Fn(usize) -> bool, x: f64) -> Option<Neighbours> {
         let (i, x) = self.locate(x);
-        let segment = |left: usize, x: f64| Segment { left, right: left + 1, x };
-        let isolated = |node: usize| Segment { left: node, right: node, x };
+        let segment = |left: usize, x: f64| Neighbours { left, right: left + 1, x };
+        let isolated = |node: usize| Neighbours { left: node, right: node, x };
         let last = self.nodes() - 1;
         if valid(i) && valid(i + 1) {
             return Some(segment(i, x));

@@ -26,4 +26,4 @@ pub use midpoint::midpoint;
 pub use product::product;
 pub use rows::fit_rows;
 pub use scattered::scattered;
-pub use summary::{Fault, Summary};
+pub use summary::{AxisFault, Summary};

@@ -3,7 +3,7 @@
 use crate::axis::{Axis, Run};
 use crate::batch::{Batch, ends_of};
 use crate::grid::{OPTIONS, is_valid};
-use crate::samples::Samples;
+use crate::samples::GridSamples;
 use crate::summary::Summary;
 use symspline_core::curve::{Curves, Quantity, Times, evaluate};
 use symspline_core::derivative::{Data, Derivative, Of};
@@ -172,7 +172,7 @@ fn evaluate_segments(
     let per_block = (BLOCK * 16 / per_row.max(1)).max(1);
     let blocks = rows.chunks(per_block * n * len).zip(velocities.chunks(per_block * n * len));
     for (k, ((rows, velocities), out)) in blocks.zip(out.chunks_mut(per_block * per_row * len)).enumerate() {
-        let mut samples = Samples::default();
+        let mut samples = GridSamples::default();
         let each = rows.chunks_exact(n * len).zip(velocities.chunks_exact(n * len)).enumerate();
         for (row, (points, velocities)) in each {
             for (i, &x) in x.of(k * per_block + row).iter().enumerate() {
@@ -186,7 +186,7 @@ fn evaluate_segments(
 /// Adds a sample of one row, unless the row has no nodes there.
 fn sample(
     axis: &Axis,
-    samples: &mut Samples,
+    samples: &mut GridSamples,
     owner: usize,
     points: &[f64],
     velocities: &[f64],

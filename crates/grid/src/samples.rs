@@ -6,7 +6,7 @@ use symspline_core::space::Erased;
 
 /// Segments of curves, each with one sample, and where its result goes.
 #[derive(Default)]
-pub struct Samples {
+pub struct GridSamples {
     t: Vec<f64>,
     points: Vec<f64>,
     velocities: Vec<f64>,
@@ -16,7 +16,7 @@ pub struct Samples {
     isolated: Vec<(usize, Vec<f64>)>,
 }
 
-impl Samples {
+impl GridSamples {
     /// Adds a sample of the segment between two nodes with these points and velocities.
     pub fn push(&mut self, owner: usize, t: [f64; 2], points: [&[f64]; 2], velocities: [&[f64]; 2], x: f64) {
         self.owners.push(owner);

@@ -4,7 +4,7 @@ use symspline_core::fit::{Report, Status};
 
 /// The first failed row of an axis.
 #[derive(Clone, Copy, Debug)]
-pub struct Fault {
+pub struct AxisFault {
     /// The axis along which the row runs.
     pub axis: usize,
     /// Why it failed; nodes are counted along the axis.
@@ -19,7 +19,7 @@ pub struct Summary {
     /// The number of rows that failed.
     pub failed: usize,
     /// The failed row of the lowest axis that was found first.
-    pub first: Option<Fault>,
+    pub first: Option<AxisFault>,
     /// The largest residual of rows that did not fail.
     pub residual: f64,
     /// The longest step between neighbouring nodes.
@@ -38,13 +38,13 @@ impl Summary {
                 self.residual = self.residual.max(report.residual);
                 return;
             }
-            Status::Unconverged | Status::Imprecise => report.status,
+            Status::Unconverged | Status::Imprecise | Status::Unattained => report.status,
             Status::CutLocus { index, angle } => Status::CutLocus { index: node(index), angle },
             Status::LongHandle { index, angle } => Status::LongHandle { index: node(index), angle },
             Status::InnerHandle { index, angle } => Status::InnerHandle { index: node(index), angle },
         };
         self.failed += 1;
-        self.first = self.first.or(Some(Fault { axis, status, residual: report.residual }));
+        self.first = self.first.or(Some(AxisFault { axis, status, residual: report.residual }));
     }
 
     /// The reports of both.

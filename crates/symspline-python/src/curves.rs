@@ -7,7 +7,8 @@ use crate::validate::Names;
 use crate::watch::{is_heavy, is_long, watched};
 use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use symspline_engine::fit::{End, Ends, Problem};
+use std::borrow::Cow;
+use symspline_engine::fit::{Both, End, Ends, Problem};
 use symspline_engine::space::{Ambient, Erased};
 use symspline_engine::validate;
 
@@ -17,15 +18,19 @@ pub type EndOf<'py> = (String, Option<Array<'py>>);
 
 /// A fault of one curve: its number in the batch, the kind, the node, the value there, its limit, and for invalid
 /// points a message. `_base/faults.py` describes the other kinds.
-pub type Fault = (usize, &'static str, Option<usize>, f64, f64, Option<String>);
+pub type CurveFault = (usize, &'static str, Option<usize>, f64, f64, Option<String>);
 
 /// Up to this many numbers are copied into a new array.
 const FEW: usize = 1024;
 
 /// Curves to fit. Points are contiguous, with the numbers of one point last.
-pub struct Curves<'a> {
+pub struct CurvesToFit<'a> {
     pub space: Erased<'a>,
-    t: &'a [f64],
+    t: Cow<'a, [f64]>,
+    /// The knots with those that ends with two conditions add.
+    knots: &'a [f64],
+    /// The number of knots that each end adds.
+    added: [usize; 2],
     /// Whether all curves have the same knots.
     pub shared: bool,
     points: &'a [f64],
@@ -38,7 +43,7 @@ pub struct Curves<'a> {
     pub chosen: Option<Vec<usize>>,
 }
 
-impl<'a> Curves<'a> {
+impl<'a> CurvesToFit<'a> {
     pub fn new(
         handle: &'a Handle,
         t: &'a Array<'_>,
@@ -50,18 +55,30 @@ impl<'a> Curves<'a> {
         let space = handle.space.get();
         let nodes = points.len() / space.point_len();
         let different = offsets.is_some();
+        let added = ends.as_ref().map_or([0, 0], |ends| [0, 1].map(|e| usize::from(ends[e].0 == "both")));
         let (offsets, shared) = match offsets {
             Some(offsets) => (offsets, false),
             None => {
-                let n = t.shape()[t.ndim() - 1];
+                let n = t.shape()[t.ndim() - 1] - added[0] - added[1];
                 ((0..=nodes / n).map(|c| c * n).collect(), t.ndim() == 1)
+            }
+        };
+        let knots = in_order(t)?;
+        let own_knots = match added {
+            [0, 0] => Cow::Borrowed(knots),
+            _ => {
+                let (n, last) = (t.shape()[t.ndim() - 1], t.shape()[t.ndim() - 1] - 1);
+                let is_added = |i: usize| (i == 1 && added[0] == 1) || (i + 1 == last && added[1] == 1);
+                (0..knots.len()).filter(|i| !is_added(i % n)).map(|i| knots[i]).collect()
             }
         };
         let curves = offsets.len() - 1;
         let lead = points.ndim() - handle.point_axes() - 1;
-        Ok(Curves {
+        Ok(CurvesToFit {
             space,
-            t: in_order(t)?,
+            t: own_knots,
+            knots,
+            added,
             shared,
             points: in_order(points)?,
             batch: if different { vec![curves] } else { points.shape()[..lead].to_vec() },
@@ -103,35 +120,50 @@ impl<'a> Curves<'a> {
     pub fn gathered(&self) -> Gathered<'a> {
         let Some(chosen) = &self.chosen else {
             return Gathered {
-                t: Part::Whole(self.t),
+                t: self.t.clone(),
                 offsets: self.offsets.clone(),
                 ends: match &self.ends {
                     Ends::Periodic => None,
-                    Ends::Open(ends) => Some(ends.map(|end| parts(end, Part::Whole))),
+                    Ends::Open(ends) => Some(ends.map(|end| parts(end, Cow::Borrowed))),
                 },
             };
         };
-        let len = self.space.point_len();
         let mut offsets = vec![0];
         for &c in chosen {
             offsets.push(offsets[offsets.len() - 1] + self.offsets[c + 1] - self.offsets[c]);
         }
-        let rows = |all: &[f64], size: usize| {
-            chosen.iter().flat_map(|c| &all[c * size..(c + 1) * size]).copied().collect::<Vec<f64>>()
-        };
         let knots = |c: &usize| &self.t[self.offsets[*c]..self.offsets[c + 1]];
         Gathered {
-            t: if self.shared {
-                Part::Whole(self.t)
-            } else {
-                Part::Copy(chosen.iter().flat_map(knots).copied().collect())
-            },
+            t: if self.shared { self.t.clone() } else { chosen.iter().flat_map(knots).copied().collect() },
             offsets,
             ends: match &self.ends {
                 Ends::Periodic => None,
-                Ends::Open(ends) => Some(ends.map(|end| parts(end, |v| Part::Copy(rows(v, len))))),
+                Ends::Open(ends) => Some(ends.map(|end| parts(end, |v| self.rows(v)))),
             },
         }
+    }
+
+    /// The rows of the curves to fit, of an array with one row per curve.
+    pub fn rows(&self, all: &'a [f64]) -> Cow<'a, [f64]> {
+        let Some(chosen) = &self.chosen else { return Cow::Borrowed(all) };
+        let size = all.len() / (self.offsets.len() - 1);
+        chosen.iter().flat_map(|c| &all[c * size..(c + 1) * size]).copied().collect()
+    }
+
+    /// The knots of the curves to fit with the additional ones.
+    pub fn all_knots(&self) -> Cow<'a, [f64]> {
+        if self.shared { Cow::Borrowed(self.knots) } else { self.rows(self.knots) }
+    }
+
+    pub fn has_additional_knots(&self) -> bool {
+        self.added != [0, 0]
+    }
+
+    /// Includes the additional points in the numbers of points; returns their number per curve.
+    pub fn widen(&mut self) -> usize {
+        let more = self.added[0] + self.added[1];
+        self.offsets.iter_mut().enumerate().for_each(|(c, offset)| *offset += c * more);
+        more
     }
 
     /// Their points.
@@ -186,11 +218,11 @@ impl<'a> Curves<'a> {
 
     /// Validates the curves to fit and projects their points onto the space. With `skip`, curves with points off the space
     /// are masked, and their faults are returned.
-    pub fn check(&mut self, points: &mut Vec<f64>, tol: f64, skip: bool) -> Result<Vec<Fault>, Invalid> {
+    pub fn check(&mut self, points: &mut Vec<f64>, tol: f64, skip: bool) -> Result<Vec<CurveFault>, Invalid> {
         let mut own = self.gathered();
-        let knots = |c: usize| &own.t.get()[own.offsets[c]..own.offsets[c + 1]];
+        let knots = |c: usize| &own.t[own.offsets[c]..own.offsets[c + 1]];
         if self.shared {
-            validate::knots(self.t, 0)
+            validate::knots(&self.t, 0)
         } else {
             (0..own.offsets.len() - 1).try_for_each(|c| validate::knots(knots(c), c))
         }
@@ -222,7 +254,7 @@ impl<'a> Curves<'a> {
     }
 
     /// Masks the curves with points off the space, and returns their faults.
-    fn leave_out_invalid(&mut self, tol: f64) -> Vec<Fault> {
+    fn leave_out_invalid(&mut self, tol: f64) -> Vec<CurveFault> {
         let len = self.space.point_len();
         let (mut valid, mut faults) = (Vec::new(), Vec::new());
         let wanted = self.chosen.take().unwrap_or_else(|| (0..self.offsets.len() - 1).collect());
@@ -243,26 +275,11 @@ impl<'a> Curves<'a> {
     }
 }
 
-/// Numbers of all curves, or a copy of those of some.
-pub enum Part<'a> {
-    Whole(&'a [f64]),
-    Copy(Vec<f64>),
-}
-
-impl Part<'_> {
-    fn get(&self) -> &[f64] {
-        match self {
-            Part::Whole(numbers) => numbers,
-            Part::Copy(numbers) => numbers,
-        }
-    }
-}
-
 /// The curves to fit of [`Curves`] without their points.
 pub struct Gathered<'a> {
-    t: Part<'a>,
+    t: Cow<'a, [f64]>,
     offsets: Vec<usize>,
-    ends: Option<[(End<'static>, Part<'a>); 2]>,
+    ends: Option<[(End<'static>, Cow<'a, [f64]>); 2]>,
 }
 
 impl Gathered<'_> {
@@ -270,23 +287,25 @@ impl Gathered<'_> {
         let ends = match &self.ends {
             None => Ends::Periodic,
             Some(ends) => Ends::Open([0, 1].map(|e| match ends[e].0 {
-                End::Velocity(_) => End::Velocity(ends[e].1.get()),
-                End::Acceleration(_) => End::Acceleration(ends[e].1.get()),
+                End::Velocity(_) => End::Velocity(&ends[e].1),
+                End::Acceleration(_) => End::Acceleration(&ends[e].1),
+                End::Both(_) => End::Both(Both { vectors: &ends[e].1, apart: &[] }),
                 End::Natural => End::Natural,
                 End::NotAKnot => End::NotAKnot,
             })),
         };
-        Problem { t: self.t.get(), shared, points, offsets: &self.offsets, ends }
+        Problem { t: &self.t, shared, points, offsets: &self.offsets, ends }
     }
 }
 
 /// The kind of an end, and its vectors.
-fn parts<'a>(end: End<'a>, part: impl Fn(&'a [f64]) -> Part<'a>) -> (End<'static>, Part<'a>) {
+fn parts<'a>(end: End<'a>, part: impl Fn(&'a [f64]) -> Cow<'a, [f64]>) -> (End<'static>, Cow<'a, [f64]>) {
     match end {
         End::Velocity(v) => (End::Velocity(&[]), part(v)),
         End::Acceleration(v) => (End::Acceleration(&[]), part(v)),
-        End::Natural => (End::Natural, Part::Whole(&[])),
-        End::NotAKnot => (End::NotAKnot, Part::Whole(&[])),
+        End::Both(both) => (End::Both(Both { vectors: &[], apart: &[] }), part(both.vectors)),
+        End::Natural => (End::Natural, Cow::Borrowed(&[])),
+        End::NotAKnot => (End::NotAKnot, Cow::Borrowed(&[])),
     }
 }
 
@@ -303,8 +322,8 @@ pub fn check<'py>(
     offsets: Option<Vec<usize>>,
     mask: Option<Vec<bool>>,
     skip_invalid: bool,
-) -> PyResult<(Bound<'py, PyArrayDyn<f64>>, Vec<Fault>)> {
-    let mut curves = Curves::new(handle, &t, &points, &ends, offsets, mask)?;
+) -> PyResult<(Bound<'py, PyArrayDyn<f64>>, Vec<CurveFault>)> {
+    let mut curves = CurvesToFit::new(handle, &t, &points, &ends, offsets, mask)?;
     require_memory_for_checks(handle, &curves)?;
     let mut own = Vec::new();
     curves.gather_points(&mut own)?;
@@ -314,7 +333,7 @@ pub fn check<'py>(
     Ok((curves.points(py, own, points.shape())?, faults))
 }
 
-pub fn require_memory_for_checks(handle: &Handle, curves: &Curves) -> PyResult<()> {
+pub fn require_memory_for_checks(handle: &Handle, curves: &CurvesToFit) -> PyResult<()> {
     let len = handle.space.get().point_len();
     // Copies of ends, and the reports of curves.
     drop(reserve::<f64>(curves.points.len() / len + (curves.offsets.len() - 1) * (64 + 4 * len))?);
@@ -327,6 +346,7 @@ pub fn end<'a>((kind, value): &'a EndOf<'a>) -> PyResult<End<'a>> {
         ("not-a-knot", _) => End::NotAKnot,
         ("velocity", Some(v)) => End::Velocity(in_order(v)?),
         ("acceleration", Some(v)) => End::Acceleration(in_order(v)?),
+        ("both", Some(v)) => End::Both(Both { vectors: in_order(v)?, apart: &[] }),
         _ => return Err(invalid(format!("unknown end condition {kind:?}"))),
     })
 }

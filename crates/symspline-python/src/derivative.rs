@@ -18,7 +18,7 @@ type Array<'py> = PyReadonlyArrayDyn<'py, f64>;
 
 /// Curves with equally many knots and times, all arrays curve after curve.
 #[derive(FromPyObject)]
-pub struct Curves<'py> {
+pub struct CurvesToDifferentiate<'py> {
     t: Array<'py>,
     points: Array<'py>,
     velocities: Array<'py>,
@@ -44,7 +44,7 @@ fn part<T>(array: &[T], curve: usize, curves: usize) -> &[T] {
     &array[curve * size..(curve + 1) * size]
 }
 
-impl<'py> Curves<'py> {
+impl<'py> CurvesToDifferentiate<'py> {
     fn slices(&self) -> PyResult<Slices<'_>> {
         Ok(Slices {
             t: in_order(&self.t)?,
@@ -117,7 +117,7 @@ fn each<T: Send>(items: Vec<(usize, T)>, monitor: &Monitor, work: impl Fn(usize,
 pub fn push<'py>(
     py: Python<'py>,
     handle: &Handle,
-    curves: Curves<'py>,
+    curves: CurvesToDifferentiate<'py>,
     points: Array<'py>,
     knots: Array<'py>,
     ends: [Array<'py>; 2],
@@ -151,7 +151,7 @@ pub fn push<'py>(
 pub fn pull<'py>(
     py: Python<'py>,
     handle: &Handle,
-    curves: Curves<'py>,
+    curves: CurvesToDifferentiate<'py>,
     cotangent: Array<'py>,
 ) -> PyResult<[Bound<'py, PyArray1<f64>>; 4]> {
     let slices = curves.slices()?;

@@ -1,19 +1,24 @@
 //! Fitting, called from Python.
 
-use crate::arrays::{require_memory, reserve, zeros};
-use crate::curves::{Array, Curves, EndOf, Fault, require_memory_for_checks};
+use crate::arrays::{in_order, require_memory, reserve, zeros};
+use crate::curves::{Array, CurveFault, CurvesToFit, EndOf, require_memory_for_checks};
 use crate::errors::{in_factor, invalid};
 use crate::space::Handle;
 use crate::watch::{Progress, is_heavy, is_long, watched};
 use numpy::{PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use symspline_engine::fit::{Method, Options, Report, Solver, Status, fit as solve, memory};
+use symspline_engine::fit::{
+    InnerVelocities, Method, Options, Report, Solver, Status, fit as solve, fit_with_conditions, memory,
+};
 use symspline_engine::space::{Ambient, Erased};
 
 /// Points on the space, velocities, the columns of the report, and faults.
-type Fitted<'py> = (Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>, Columns<'py>, Vec<Fault>);
-/// Curves in one factor of a product: the space, points, ends, and the tolerance of points; None without validation.
-type Factor<'py> = (PyRef<'py, Handle>, Array<'py>, Option<[EndOf<'py>; 2]>, Option<f64>);
+type Fitted<'py> = (Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>, Columns<'py>, Vec<CurveFault>);
+/// Velocities at inner nodes, one per curve.
+type Inner<'py> = Option<Vec<(usize, Array<'py>)>>;
+/// Curves in one factor of a product: the space, points, ends, the tolerance of points (None without validation), and
+/// velocities at inner nodes. The knots include those that ends with two conditions add.
+type Factor<'py> = (PyRef<'py, Handle>, Array<'py>, Option<[EndOf<'py>; 2]>, Option<f64>, Inner<'py>);
 
 /// Fits curves in every factor of a product; a space that is not a product is its only factor. All factors are validated
 /// before the first is solved. `offsets` are the nodes before each curve when they differ in length (then points are one
@@ -38,8 +43,8 @@ pub fn fit<'py>(
     let options = options(method, tol, max_iter)?;
     let count = factors.len();
     let mut tasks = Vec::with_capacity(count);
-    for (i, (handle, points, ends, point_tol)) in factors.iter().enumerate() {
-        let curves = Curves::new(handle, &t, points, ends, offsets.clone(), mask.clone())?;
+    for (i, (handle, points, ends, point_tol, inner)) in factors.iter().enumerate() {
+        let curves = CurvesToFit::new(handle, &t, points, ends, offsets.clone(), mask.clone())?;
         require_memory_for_checks(handle, &curves)?;
         require_memory(memory(&curves.space, curves.longest(), options.method), || {
             let least = match options.method {
@@ -55,7 +60,10 @@ pub fn fit<'py>(
                 least,
             )
         })?;
-        let mut task = Task { curves, points: Vec::new(), faults: Vec::new() };
+        let mut task = Task { curves, points: Vec::new(), faults: Vec::new(), inner: Vec::new() };
+        for (node, velocities) in inner.iter().flatten() {
+            task.inner.push((*node, in_order(velocities)?));
+        }
         task.curves.gather_points(&mut task.points)?;
         if let Some(point_tol) = *point_tol {
             let heavy = is_heavy(&task.curves.space) || is_long(task.points.len());
@@ -86,9 +94,10 @@ pub fn fit<'py>(
 
 /// Curves in one space, their points on it, and the faults of skipped curves.
 struct Task<'a> {
-    curves: Curves<'a>,
+    curves: CurvesToFit<'a>,
     points: Vec<f64>,
-    faults: Vec<Fault>,
+    faults: Vec<CurveFault>,
+    inner: Vec<(usize, &'a [f64])>,
 }
 
 impl Task<'_> {
@@ -99,8 +108,11 @@ impl Task<'_> {
         shape: &[usize],
         progress: Option<Progress>,
     ) -> PyResult<Fitted<'py>> {
-        let Task { curves, points, mut faults } = self;
-        let (space, all) = (curves.space, curves.offsets.len() - 1);
+        if self.curves.has_additional_knots() || !self.inner.is_empty() {
+            return self.solve_with_conditions(py, options, shape, progress);
+        }
+        let Task { curves, points, faults, .. } = self;
+        let space = curves.space;
         let velocities = zeros(py, shape)?;
         let gathered = curves.gathered();
         let problem = gathered.problem(curves.shared, &points);
@@ -123,14 +135,55 @@ impl Task<'_> {
         };
         drop((velocities_write, gathered));
         let out = curves.points(py, points, shape)?;
-        let numbers: Vec<usize> = curves.chosen.clone().unwrap_or_else(|| (0..all).collect());
-        faults
-            .extend(numbers.iter().zip(&found).filter_map(|(&number, report)| fault(&space, number, report)));
-        faults.sort_by_key(|fault| fault.0);
-        let mut reports: Vec<Option<&Report>> = vec![None; all];
-        numbers.iter().zip(&found).for_each(|(&number, report)| reports[number] = Some(report));
-        Ok((out, velocities, columns(py, &reports)?, faults))
+        let (columns, faults) = reported(py, &curves, &found, faults)?;
+        Ok((out, velocities, columns, faults))
     }
+
+    /// Solves curves with velocities at inner nodes, or with two conditions at an end.
+    fn solve_with_conditions<'py>(
+        self,
+        py: Python<'py>,
+        options: &Options,
+        shape: &[usize],
+        progress: Option<Progress>,
+    ) -> PyResult<Fitted<'py>> {
+        let Task { mut curves, points, faults, inner } = self;
+        let (space, gathered, knots) = (curves.space, curves.gathered(), curves.all_knots());
+        let problem = gathered.problem(curves.shared, &points);
+        let rows: Vec<_> = inner.iter().map(|(node, all)| (*node, curves.rows(all))).collect();
+        let inner: Vec<InnerVelocities> =
+            rows.iter().map(|(node, velocities)| InnerVelocities { node: *node, velocities }).collect();
+        let nodes = points.len() / space.point_len();
+        let found = watched(py, progress, nodes, is_heavy(&space), |monitor| {
+            fit_with_conditions(&space, &problem, &knots, &inner, options, monitor)
+        })?;
+        drop((gathered, points));
+        let axis = curves.batch.len();
+        let mut shape = shape.to_vec();
+        shape[axis] += curves.widen();
+        let points = curves.points(py, found.points, &shape)?;
+        let velocities = curves.points(py, found.velocities, &shape)?;
+        let (columns, faults) = reported(py, &curves, &found.reports, faults)?;
+        Ok((points, velocities, columns, faults))
+    }
+}
+
+/// The columns of the report, and faults; `faults` are those of skipped curves.
+fn reported<'py>(
+    py: Python<'py>,
+    curves: &CurvesToFit,
+    found: &[Report],
+    mut faults: Vec<CurveFault>,
+) -> PyResult<(Columns<'py>, Vec<CurveFault>)> {
+    let all = curves.offsets.len() - 1;
+    let numbers: Vec<usize> = curves.chosen.clone().unwrap_or_else(|| (0..all).collect());
+    faults.extend(
+        numbers.iter().zip(found).filter_map(|(&number, report)| fault(&curves.space, number, report)),
+    );
+    faults.sort_by_key(|fault| fault.0);
+    let mut reports: Vec<Option<&Report>> = vec![None; all];
+    numbers.iter().zip(found).for_each(|(&number, report)| reports[number] = Some(report));
+    Ok((columns(py, &reports)?, faults))
 }
 
 fn options(method: &str, tol: f64, max_iter: Option<usize>) -> PyResult<Options> {
@@ -188,11 +241,12 @@ fn columns<'py>(py: Python<'py>, reports: &[Option<&Report>]) -> PyResult<Column
 }
 
 /// The fault of a curve that was solved, if it has one.
-fn fault(space: &Erased, curve: usize, report: &Report) -> Option<Fault> {
+fn fault(space: &Erased, curve: usize, report: &Report) -> Option<CurveFault> {
     let limit = space.cut_angle();
     let at = |kind, (node, angle)| Some((curve, kind, Some(node), angle, limit, None));
     match report.status {
         Status::Stopped => None,
+        Status::Unattained => Some((curve, "unattained", None, f64::NAN, f64::NAN, None)),
         Status::Converged => at("almost-cut", report.almost_cut?),
         Status::CutLocus { index, angle } => at("cut-locus", (index, angle)),
         Status::LongHandle { index, angle } => at("outer-handle", (index, angle)),

@@ -1,7 +1,7 @@
 //! Validation of curves with given velocities, called from Python.
 
 use crate::arrays::{in_order, reserve};
-use crate::curves::{Array, Curves, require_memory_for_checks};
+use crate::curves::{Array, CurvesToFit, require_memory_for_checks};
 use crate::errors::{CutLocusError, Invalid};
 use crate::space::Handle;
 use crate::validate;
@@ -27,7 +27,7 @@ pub fn hermite<'py>(
 ) -> PyResult<[Bound<'py, PyArrayDyn<f64>>; 3]> {
     let natural = || ("natural".to_owned(), None);
     let ends = Some([natural(), natural()]);
-    let mut curves = Curves::new(handle, &t, &points, &ends, None, None)?;
+    let mut curves = CurvesToFit::new(handle, &t, &points, &ends, None, None)?;
     require_memory_for_checks(handle, &curves)?;
     // Points, velocities and control points.
     drop(reserve::<f64>(10 * points.len())?);

@@ -5,7 +5,7 @@ use crate::watch::{is_long, watched};
 use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use symspline_engine::search::{
-    Bracket, Distances, Nearest, Path, Samples, closest as run, roots as run_roots,
+    Bracket, Distances, Nearest, Path, TimeSamples, closest as run, roots as run_roots,
 };
 
 type Array<'py> = PyReadonlyArrayDyn<'py, f64>;
@@ -123,8 +123,8 @@ pub fn indices(array: &PyReadonlyArray1<i64>) -> PyResult<Vec<usize>> {
     Ok(array.as_array().iter().map(|&i| i as usize).collect())
 }
 
-pub fn samples_of<'a>(times: &'a Array, lengths: &'a Array) -> PyResult<Samples<'a>> {
-    Ok(Samples { count: times.shape()[1], times: in_order(times)?, lengths: in_order(lengths)? })
+pub fn samples_of<'a>(times: &'a Array, lengths: &'a Array) -> PyResult<TimeSamples<'a>> {
+    Ok(TimeSamples { count: times.shape()[1], times: in_order(times)?, lengths: in_order(lengths)? })
 }
 
 pub fn columns<'py>(py: Python<'py>, found: &[Nearest]) -> [Numbers<'py>; 2] {

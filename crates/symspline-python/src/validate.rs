@@ -2,7 +2,7 @@
 
 use crate::errors::{Invalid, format_index, number};
 use crate::space::off_space;
-use symspline_engine::validate::{Invalid as Fault, Reason};
+use symspline_engine::validate::{Invalid as InvalidCurve, Reason};
 
 /// The names of curves in messages: their indices in the user's batch, which may contain further curves.
 pub struct Names<'a> {
@@ -26,7 +26,7 @@ pub fn of_curve(curve: usize, batch: &[usize]) -> String {
 
 impl Names<'_> {
     /// The fault with a message that names the argument, its index, its value and the remedy.
-    pub fn describe(&self, fault: Fault) -> Invalid {
+    pub fn describe(&self, fault: InvalidCurve) -> Invalid {
         let curve = self.chosen.map_or(fault.curve, |chosen| chosen[fault.curve]);
         let message = self.message(curve, fault.node.unwrap_or(0), &fault.reason);
         Invalid::new(curve, fault.node, message)

@@ -59,7 +59,7 @@ impl Progress {
     }
 
     fn report(&self, py: Python, finished: usize, total: usize) -> PyResult<()> {
-        self.call.call1(py, (self.part * total + finished, self.parts * total)).map(drop)
+        self.call.call1(py, (self.part * total + finished.min(total), self.parts * total)).map(drop)
     }
 }
 

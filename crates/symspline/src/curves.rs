@@ -9,6 +9,7 @@ use crate::spline::Report;
 use std::fmt;
 use std::marker::PhantomData;
 use std::ops::Range;
+use std::panic::{RefUnwindSafe, UnwindSafe};
 use std::sync::Arc;
 use symspline_engine::curve::{self, Quantity, Times, evaluate_product};
 use symspline_engine::fit::{self, Options, Problem};
@@ -44,6 +45,10 @@ struct Factor {
 
 /// Reports of the fits, by factor and curve.
 pub type Reports = Vec<Vec<fit::Report>>;
+
+// No method changes a curve, so that a panic leaves none half changed.
+impl<S, P> UnwindSafe for Curves<S, P> {}
+impl<S, P> RefUnwindSafe for Curves<S, P> {}
 
 impl<S: Clone, P> Clone for Curves<S, P> {
     fn clone(&self) -> Self {

@@ -188,7 +188,7 @@ pub enum Error {
         /// The reason, and what to do.
         reason: &'static str,
     },
-    /// A time is outside the knots of the curve, and extrapolation was not requested.
+    /// A time is NaN or infinite, or it is outside the knots of the curve, and extrapolation was not requested.
     OutsideDomain {
         /// The time.
         time: f64,
@@ -249,7 +249,7 @@ impl Error {
             Status::InnerHandle { index, angle } => {
                 Some(Error::HandleTooLong { curve, node: index, angle, limit })
             }
-            Status::Unconverged | Status::Imprecise | Status::Stopped => {
+            Status::Unconverged | Status::Imprecise | Status::Unattained | Status::Stopped => {
                 Some(Error::Unconverged { curve, residual: report.residual, tol })
             }
         }
@@ -333,6 +333,9 @@ impl fmt::Display for Error {
                 )
             }
             Error::NotSmoothed { reason } => write!(f, "{reason}"),
+            Error::OutsideDomain { time, .. } if !time.is_finite() => {
+                write!(f, "the time is {time}, but times must be finite")
+            }
             Error::OutsideDomain { time, start, end } => write!(
                 f,
                 "the time {time} is outside the knots [{start}, {end}]. To continue the curve there, call `extrapolate`"

@@ -156,6 +156,10 @@ def from_core(
     elif kind == "imprecise":
         category = UNCONVERGED
         what, remedy = imprecise("{of}", value, tol)
+    elif kind == "unattained":
+        category = UNCONVERGED
+        what = "no convergence{of}: no curve was found with the given velocity and acceleration at one end"
+        remedy = "prescribe only one of them, or values that suit the points next to the end"
     elif kind in ("homotopy", "overflow"):
         category, about_times = UNCONVERGED, kind == "overflow"
         longest, iterations = columns.row("max_step")[number], columns.row("iterations")[number]

@@ -6,13 +6,17 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .._base.arrays import short_repr
 from .._core import ValidationError
 from .._spaces import AnySpace, Doubles, Product, Space, factors_of, parts_of
 
-# The kind of an end condition and its prescribed vectors.
+# The kind of an end condition and its prescribed vectors: for "both", velocities and accelerations along an axis after
+# those of the batch.
 End = tuple[str, Doubles | None]
+
+Index = NDArray[np.intp]
 
 _WORDS = {"natural", "clamped", "not-a-knot"}
 _ORDERS = {1: "velocity", 2: "acceleration"}
@@ -81,6 +85,23 @@ def split_accelerations(bc_type: Any) -> tuple[Any, Any]:
         (1, conditions[1]) if conditions else end for conditions, end in zip(doubles, bc_type, strict=True)
     )
     return velocities, tuple((2, conditions[2]) if conditions else "natural" for conditions in doubles)
+
+
+def both(first: list[End] | None, second: list[End] | None, batch: tuple[int, ...]) -> list[End]:
+    """Combine the velocities at ends with the accelerations there, of which other ends have none."""
+    ends: list[End] = []
+    for own, (_, acceleration) in zip(first or [], second or [], strict=True):
+        if acceleration is not None and own[1] is not None:
+            own = ("both", np.stack([own[1], acceleration], axis=len(batch)))
+        ends.append(own)
+    return ends
+
+
+def original_nodes(ends: list[End] | None, nodes: int) -> Index:
+    """Return the nodes of a curve except those that ends with two conditions add."""
+    kinds = [kind for kind, _ in ends or []]
+    added = [node for node, end in ((1, kinds[:1]), (nodes - 2, kinds[1:])) if end == ["both"]]
+    return np.delete(np.arange(nodes), added)
 
 
 def _check_pair(bc_type: Any) -> None:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
+from types import MappingProxyType
 from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
@@ -28,6 +29,7 @@ from .solve import Mask, Options, Solved, Task, faults_of, solve, solve_in_pytho
 _T = TypeVar("_T")
 _Times = TypeVar("_Times")
 _Data = TypeVar("_Data")
+InnerVelocities = Mapping[int, list[Doubles]]
 # Options for a validation, which has no solver.
 _ANY = Options("auto", 0.0, None)
 
@@ -76,6 +78,8 @@ class Problem(NamedTuple, Generic[_Times, _Data]):
         Whether curves with points off the space are masked instead of raising an error.
     names : sequence of int or None
         Indices of the nodes in messages; None for 0, 1, ...
+    inner : dict
+        Prescribed velocities in each factor, by inner node.
     """
 
     space: AnySpace
@@ -87,6 +91,7 @@ class Problem(NamedTuple, Generic[_Times, _Data]):
     mask: Mask | None = None
     skip_invalid: bool = False
     names: Sequence[int] | None = None
+    inner: InnerVelocities = MappingProxyType({})
 
 
 FitProblem = Problem[Doubles, list[Points]]
@@ -308,24 +313,33 @@ def mask_of(where: Any, batch: tuple[int, ...]) -> Mask | None:
 
 def fit(problem: FitProblem, progress: Progress | None = None) -> Fit:
     """Fit curves with equal numbers of points."""
-    space, times, points, ends, options, check, mask, skip, names = problem
+    space, times, options = problem.space, problem.times, problem.options
     factors = factors_of(space)
-    # Loops take fewer calls of functions than comprehensions, and most fits are short.
-    tasks, arrays, columns = [], [], []
-    for factor, part, end in zip(factors, points, ends, strict=True):
-        cover = factor.cover if isinstance(factor, Quotient) else factor
-        tol = part.tol if check else None
-        tasks.append(Task(cover, times, part.numbers, end, tol, None, mask, check and skip, names))
-    solved, faults = solve_tasks(space, tasks, options, progress)
+    solved, faults = solve_tasks(space, tasks_of(problem, factors), options, progress)
+    arrays, columns = [], []
     for factor, solution in zip(factors, solved, strict=True):
         arrays.append(FactorArrays(factor, solution.points, solution.velocities))
         columns.append(solution.columns)
-    return Fit(curve_of_factors(space, times, tuple(arrays)), columns, options.method, faults)
+    curve = curve_of_factors(space, times, tuple(arrays), not problem.inner)
+    return Fit(curve, columns, options.method, faults)
+
+
+def tasks_of(problem: FitProblem, factors: Sequence[Space]) -> list[Task]:
+    """Return the tasks of all factors."""
+    _, times, points, ends, _, check, mask, skip, names, inner = problem
+    # Loops take fewer calls of functions than comprehensions, and most fits are short.
+    tasks = []
+    for i, (factor, part, end) in enumerate(zip(factors, points, ends, strict=True)):
+        cover = factor.cover if isinstance(factor, Quotient) else factor
+        tol = part.tol if check else None
+        vectors = {node: of_factors[i] for node, of_factors in inner.items()} if inner else None
+        tasks.append(Task(cover, times, part.numbers, end, tol, None, mask, check and skip, names, vectors))
+    return tasks
 
 
 def fit_many(problem: ManyProblem, progress: Progress | None) -> tuple[list[Fit], list[Fault]]:
     """Fit single curves of different lengths in one call of the core per factor. Return the fits and the faults."""
-    space, times, points, ends, options, check, mask, skip, _ = problem
+    space, times, points, ends, options, check, mask, skip, _, _ = problem
     offsets = np.cumsum([0, *map(len, times)]).tolist()
     row = np.concatenate(times)
     invalid: list[Fault] = []
@@ -471,7 +485,7 @@ def _in_factor(error: ValidationError, number: int, factor: Space) -> Validation
 
 def _check_precision(problem: ManyProblem) -> list[Fault]:
     """Validate curves whose tolerance is stricter than the largest one, which the common call applies to all curves."""
-    space, times, points, _, _, _, mask, skip, _ = problem
+    space, times, points, _, _, _, mask, skip, _, _ = problem
     faults: dict[int, Fault] = {}
     for i, factor in enumerate(factors_of(space)):
         most = max(parts_of_curve[i].tol for parts_of_curve in points)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from itertools import pairwise
 from typing import NamedTuple
@@ -11,14 +11,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .._base.faults import CUT_LOCUS, INVALID, Fault, of_curve, unconverged
+from .._base.faults import CUT_LOCUS, INVALID, Fault, from_core, of_curve, unconverged
 from .._base.report import SOLVERS, Columns
 from .._base.typing import Progress
 from .._core import CutLocusError, ValidationError, solve_tridiagonal
 from .._spaces import Array, Doubles, Euclidean
 from ..manifolds._manifold import Manifold
-from ..manifolds._operations import Operations, frames_along, products
-from .ends import map_ends
+from ..manifolds._operations import Operations, basis_at, frames_along, products
+from .ends import End as Condition
+from .ends import map_ends, original_nodes
 from .on_manifold import ControlPolygon, control_polygons, handles
 from .solve import Options, Solved, Task, validate, without
 
@@ -81,14 +82,14 @@ def _check_ends(task: Task, points: Array, tol: float, wanted: NDArray[np.int64]
     assert isinstance(space, Manifold)
     if task.offsets is None:
         at = [np.take(points, i, axis=-1 - axes) for i in (0, -1)]
-        gaps = np.diff(task.times)
+        gaps = np.diff(task.times[..., original_nodes(task.ends, task.times.shape[-1])])
         h = [gaps[..., 0], gaps[..., -1]]
     else:
         first, last = np.array(task.offsets[:-1]), np.array(task.offsets[1:]) - 1
         at = [points[first], points[last]]
         h = [task.times[first + 1] - task.times[first], task.times[last] - task.times[last - 1]]
-    for (kind, value), name, p, width in zip(task.ends or [], ("start", "end"), at, h, strict=False):
-        if value is None or not wanted.size:
+    for kind, value, name, p, width in _prescribed(task, at, h):
+        if not wanted.size:
             continue
         v = np.broadcast_to(space._numbers(value), p.shape)
         rows = [np.ascontiguousarray(x).reshape(-1, *space.point_shape)[wanted] for x in (p, v)]
@@ -109,6 +110,21 @@ def _check_ends(task: Task, points: Array, tol: float, wanted: NDArray[np.int64]
                     "fast for its segment: its control handle would be longer than the injectivity radius; the speed "
                     f"must stay below {most[bad[0]]:.6g}"
                 )
+
+
+def _prescribed(
+    task: Task, points: list[Array], h: list[Doubles]
+) -> Iterator[tuple[str, Doubles, str, Array, Doubles]]:
+    """Yield the kind of each prescribed vector, the vector, the name of its end, the point and the segment's length."""
+    for which, (kind, value) in enumerate(task.ends or []):
+        rest = ("start", "end")[which], points[which], h[which]
+        if value is None:
+            continue
+        if kind != "both":
+            yield kind, value, *rest
+            continue
+        for i, part in enumerate(("velocity", "acceleration")):
+            yield part, np.take(value, i, axis=len(task.batch)), *rest
 
 
 def hermite_on_manifold(task: Task, velocities: Array) -> tuple[Array, Array]:
@@ -144,22 +160,41 @@ def hermite_on_manifold(task: Task, velocities: Array) -> tuple[Array, Array]:
 # ---- the C² condition on any manifold, in the form of Popiel and Noakes (J. Approx. Theory 148, 2007) ----
 
 
+class Joint(NamedTuple):
+    """The segment between an end with two conditions and the additional knot; see `fit/joint.rs` of the core.
+
+    Attributes
+    ----------
+    first, second : ndarray, shape (curves, *point_shape)
+        The control points b₁ and b₂ of this segment, beginning at the end.
+    apart : ndarray, shape (curves,)
+        Its length in time.
+    """
+
+    first: Array
+    second: Array
+    apart: Doubles
+
+
 class End(NamedTuple):
     """A condition at one end of curves.
 
     Attributes
     ----------
-    kind : {"natural", "velocity", "acceleration", "not-a-knot"}
+    kind : {"natural", "velocity", "acceleration", "not-a-knot", "both"}
         Kind of condition.
     vector : ndarray, shape (curves, *point_shape), or None
         Prescribed vector.
     logs : ndarray, shape (2, curves, *point_shape), or None
         For not-a-knot, the logarithms of the end and of the third point, at the point next to the end.
+    joint : Joint or None
+        For a velocity and an acceleration.
     """
 
     kind: str
     vector: Array | None = None
     logs: Array | None = None
+    joint: Joint | None = None
 
     def take_batch(self, chosen: NDArray[np.int64]) -> End:
         """Return the condition for some of the curves."""
@@ -167,6 +202,7 @@ class End(NamedTuple):
             self.kind,
             None if self.vector is None else self.vector[chosen],
             None if self.logs is None else self.logs[:, chosen],
+            None if self.joint is None else Joint(*(part[chosen] for part in self.joint)),
         )
 
 
@@ -185,6 +221,8 @@ class Problem(NamedTuple):
         The frames as linear forms, if the manifold has them.
     ends : list of End, or None
         Conditions at both ends, None for closed curves.
+    given : tuple of int
+        Inner nodes at which the velocity is prescribed instead of the C² condition.
     """
 
     operations: Operations
@@ -193,6 +231,7 @@ class Problem(NamedTuple):
     frames: Array
     forms: Array | None
     ends: list[End] | None
+    given: tuple[int, ...] = ()
 
     def take_batch(self, chosen: NDArray[np.int64]) -> Problem:
         """Return the problem of some of the curves."""
@@ -227,20 +266,75 @@ def c2_residuals(problem: Problem, u: Array) -> Doubles:
     starts, stops = bends / square
     if problem.ends is None:
         jumps = np.concatenate([starts[:, :1] - stops[:, -1:], starts[:, 1:] - stops[:, :-1]], axis=1)
-        return problem.coordinates(jumps, slice(0, h.shape[1]))
+        residual = np.array(problem.coordinates(jumps, slice(0, h.shape[1])))
+        residual[:, problem.given] = 0.0
+        return residual
     jumps = np.concatenate([starts[:, :1], starts[:, 1:] - stops[:, :-1], -stops[:, -1:]], axis=1)
     # A copy: inner products of other libraries may be read-only arrays.
     residual = np.array(problem.coordinates(jumps, slice(None)))
+    residual[:, problem.given] = 0.0
     for which, end in enumerate(problem.ends):
         sign, node = (1, 0) if which == 0 else (-1, h.shape[1])
         if end.kind == "velocity":
             residual[:, node] = 0.0
         elif end.logs is not None:
             residual[:, node] = _not_a_knot(problem, u, which, *end.logs)
+        elif end.joint is not None:
+            residual[:, node] = _joint_residual(problem, u, which, end.joint)
         elif end.vector is not None:
             given = problem.coordinates(end.vector[:, None], slice(node, node + 1))
             residual[:, node] -= sign * given[:, 0] / 6
     return residual
+
+
+def _joint_residual(problem: Problem, u: Array, which: int, joint: Joint) -> Doubles:
+    """Return the C² residual at the additional knot, in the frame at the end.
+
+    The unknown of the end is the first control point after this knot, as its handle from the end.
+    """
+    operations, node, beside = problem.operations, -which, 1 - 3 * which
+    p, apart, h = problem.p[:, node], *(wide(x, u[:, 0]) for x in (joint.apart, problem.h[:, node]))
+    third = (h if which == 0 else -h) / 3
+    after = operations.exp(p, third * u[:, node])
+    a = additional_points(operations, joint, problem.h[:, node], after)
+    q = np.stack([joint.second, after])
+    following = np.stack([joint.first, operations.exp(problem.p[:, beside], -third * u[:, beside])])
+    at = np.stack([a, a])
+    v = operations.log(at, q)
+    before, behind = operations.dlog(at, v, q, operations.log(q, following)) - v
+    jump = operations.dlog(p, operations.log(p, a), a, behind / h**2 - before / apart**2)
+    residual = problem.coordinates(jump[:, None], slice(node, node + 1 or None))[:, 0]
+    return residual if which == 0 else -residual
+
+
+def additional_points(operations: Operations, joint: Joint, h: Doubles, after: Array) -> Array:
+    """Return the points between the control points before and after them; h is the time of the segment after them."""
+    share = wide(joint.apart / (joint.apart + h), after)
+    return operations.exp(joint.second, share * operations.log(joint.second, after))
+
+
+def joint_of(
+    operations: Operations, p: Array, velocity: Array, acceleration: Array, apart: Doubles, which: int
+) -> Joint:
+    """Return the segment that begins with a velocity and an acceleration. At the last point time runs backwards."""
+    h = wide(apart if which == 0 else -apart, p)
+    v = h / 3 * velocity
+    first = operations.exp(p, v)
+    basis = basis_at(operations, first)
+    basis = basis.reshape(*basis.shape[:2], *p.shape[1:])
+    starts, handles, ends = (np.broadcast_to(x[:, None], basis.shape) for x in (p, v, first))
+    images = operations.dlog(starts, handles, ends, basis)
+    right = products(operations, p, images, (v + h**2 / 6 * acceleration)[:, None])
+    weights = np.linalg.solve(products(operations, p, images, images), right)
+    way = np.einsum("ck,ck...->c...", weights[..., 0], basis)
+    # Beyond the cut locus of b₁, the geodesic to b₂ would be another one.
+    way[~(operations.norm(first, way) < operations.injectivity_radius())] = np.nan
+    return Joint(first, operations.exp(first, way), apart)
+
+
+def wide(numbers: Doubles, points: Array) -> Doubles:
+    """Return one number per curve with the axes of points."""
+    return numbers.reshape(-1, *[1] * (points.ndim - 1))
 
 
 def is_parabola(problem: Problem) -> bool:
@@ -278,10 +372,19 @@ def _not_a_knot(problem: Problem, u: Array, which: int, x0: Array, x2: Array) ->
 
 # Rounding of points in residuals of speed, for points that are so near to each other that it is more than `FLOOR`.
 _ROUNDING = 1e3 * np.finfo(float).eps
+# Rounds of alternating fits, and the relative change of a velocity that ends them.
+_ROUNDS, _SAME = 60, 1e-13
 
 
 def fit_of_one_length(task: Task, options: Options, progress: Progress | None) -> Solved:
     """Fit the curves of a validated task, which all have the same length."""
+    if any(kind == "both" for kind, _ in task.ends or []):
+        return _with_additional_knots(task, options, progress)
+    return _fit(task, options, progress, [None, None])
+
+
+def _fit(task: Task, options: Options, progress: Progress | None, joints: list[Joint | None]) -> Solved:
+    """Fit curves of which some ends are joints."""
     space, shape = task.space, task.space.point_shape
     assert isinstance(space, Manifold)
     operations = space.operations
@@ -300,14 +403,18 @@ def fit_of_one_length(task: Task, options: Options, progress: Progress | None) -
     columns.row("residual")[:], columns.row("solver")[:] = np.inf, SOLVERS.index("quasi-newton")
     columns.row("max_step")[good] = lengths[good].max(axis=1)
     if good.size:
-        ends = _ends(task, h, p)
+        ends = _ends(task, h, p, joints)
         frames = frames_along(operations, p)
-        problem = Problem(operations, h, p, frames, operations.forms(p, frames), ends).take_batch(good)
+        given = tuple(task.inner or ())
+        problem = Problem(operations, h, p, frames, operations.forms(p, frames), ends, given).take_batch(good)
         start = np.zeros((good.size, nodes - (ends is None), problem.frames.shape[2]))
         for which, end in enumerate(problem.ends or []):
             if end.kind == "velocity" and end.vector is not None:
                 node = 0 if which == 0 else nodes - 1
                 start[:, node] = problem.coordinates(end.vector[:, None], slice(node, node + 1))[:, 0]
+        for node, vectors in (task.inner or {}).items():
+            rows = space._numbers(vectors).reshape(count, 1, *shape)[good]
+            start[:, node] = problem.coordinates(rows, slice(node, node + 1))[:, 0]
         scale = np.abs(p[good]).reshape(good.size, -1).max(axis=1)
         longest = columns.row("max_step")[good]
         floor = np.maximum(FLOOR, _ROUNDING * scale / np.where(longest > 0, longest, 1.0))
@@ -330,7 +437,125 @@ def _report(progress: Progress, nodes: int, count: int, finished: int) -> object
     return progress(finished * nodes, count * nodes)
 
 
-def _ends(task: Task, h: Doubles, p: Array) -> list[End] | None:
+class _Joined(NamedTuple):
+    """Curves with two conditions at an end.
+
+    Attributes
+    ----------
+    task : Task
+        The task, with the additional knots but without their points.
+    inner : ndarray
+        Knots from one additional knot to the other.
+    joints : list of Joint or None
+        The segments before these knots.
+    """
+
+    task: Task
+    inner: Doubles
+    joints: list[Joint | None]
+
+    @classmethod
+    def of(cls, task: Task) -> _Joined:
+        """Determine the outer segments from the conditions."""
+        space, inner = task.space, task.times
+        assert isinstance(space, Manifold)
+        p, gaps = _rows(task), _gaps(task, task.times)
+        joints: list[Joint | None] = [None, None]
+        for which, (kind, value) in enumerate(task.ends or []):
+            if kind == "both" and value is not None:
+                v, a = np.moveaxis(space._numbers(value).reshape(len(p), 2, *space.point_shape), 1, 0)
+                joints[which] = joint_of(space.operations, p[:, -which], v, a, gaps[:, -which], which)
+                inner = inner[..., 1:] if which == 0 else inner[..., :-1]
+        return cls(task, np.ascontiguousarray(inner), joints)
+
+    def fit(self, ends: list[Condition], options: Options, progress: Progress | None) -> Solved:
+        """Find the additional points, with these conditions at other ends, then the curve through all points."""
+        task, batch = self.task, self.task.batch
+        space, p, gaps = task.space, _rows(task), _gaps(task, self.inner)
+        assert isinstance(space, Manifold)
+        first = _fit(task._replace(times=self.inner, ends=ends), options, progress, self.joints)
+        u, whole = first.velocities.reshape(p.shape), p
+        for which, joint in enumerate(self.joints):
+            if joint is not None:
+                h = gaps[:, -which]
+                third = wide((h if which == 0 else -h) / 3, p[:, 0])
+                after = space.operations.exp(p[:, -which], third * u[:, -which])
+                added = additional_points(space.operations, joint, h, after)
+                # Without a curve, any point will do.
+                lost = ~np.isfinite(added).reshape(len(added), -1).all(axis=1)
+                end, beside = p[:, -which][lost], p[:, 1 - 3 * which][lost]
+                added[lost] = space.operations.exp(end, space.operations.log(end, beside) / 2)
+                whole = np.insert(whole, 1 if which == 0 else whole.shape[1] - 1, added, axis=1)
+        points = space._as_doubles(np.ascontiguousarray(whole).reshape(*batch, whole.shape[1], *space.point_shape))
+        # The velocities at the ends with two conditions.
+        of_all = [
+            ("velocity", np.take(value, 0, axis=len(batch))) if kind == "both" and value is not None else (kind, value)
+            for kind, value in task.ends or []
+        ]
+        shift = int(self.joints[0] is not None)
+        given = {node + shift: vectors for node, vectors in (task.inner or {}).items()}
+        solved = _fit(task._replace(points=points, ends=of_all, inner=given), options, progress, [None, None])
+        solved.columns.row("iterations")[:] += first.columns.row("iterations")
+        return solved._replace(faults=_unattained(first, solved, shift))
+
+
+def _with_additional_knots(task: Task, options: Options, progress: Progress | None) -> Solved:
+    """Fit curves with two conditions at an end."""
+    joined, ends = _Joined.of(task), list(task.ends or [])
+    other = [which for which, (kind, _) in enumerate(ends) if kind == "not-a-knot"]
+    if not other or _rows(task).shape[1] > 3:
+        return joined.fit(ends, options, progress)
+    # This condition depends on the additional point, too: fits with a velocity there alternate with fits of all points,
+    # as in `fit/conditions.rs` of the core.
+    space, which, batch = task.space, other[0], task.batch
+    given, before, factor = np.zeros(0), np.zeros(0), np.ones(0)
+    for round_ in range(_ROUNDS):
+        vector = space._as_doubles(given.reshape(*batch, *space.point_shape)) if round_ else None
+        ends[which] = ("velocity", vector) if round_ else ("natural", None)
+        solved = joined.fit(ends, options, progress)
+        new = np.take(solved.velocities, -which, axis=len(batch)).reshape(math.prod(batch), -1)
+        if round_ == 0:
+            given, factor = new, np.ones((len(new), 1))
+            continue
+        step = new - given
+        if not (np.linalg.norm(step, axis=1) > _SAME * np.linalg.norm(new, axis=1)).any():
+            break
+        if round_ > 1:
+            change = step - before
+            factor = -factor * np.sum(before * change, axis=1, keepdims=True)
+            factor /= np.maximum(np.sum(change * change, axis=1, keepdims=True), np.finfo(float).tiny)
+        given, before = given + factor * step, step
+    return solved
+
+
+def _rows(task: Task) -> Array:
+    """Return points of shape (curves, nodes, *point_shape)."""
+    points = task.space._numbers(task.points)
+    return points.reshape(math.prod(task.batch), points.shape[len(task.batch)], *task.space.point_shape)
+
+
+def _gaps(task: Task, times: Doubles) -> Doubles:
+    """Return the lengths of the segments between knots, shape (curves, segments)."""
+    return np.broadcast_to(np.diff(times), (*task.batch, times.shape[-1] - 1)).reshape(
+        math.prod(task.batch), times.shape[-1] - 1
+    )
+
+
+def _unattained(first: Solved, solved: Solved, shift: int) -> list[Fault]:
+    """Return the faults of curves with additional points, of which the first fit determined these points."""
+    faults = {fault.curve: fault for fault in solved.faults}
+    converged = solved.columns.row("converged")
+    for fault in first.faults:
+        if fault.kind == CUT_LOCUS:
+            faults[fault.curve] = fault._replace(node=fault.node and fault.node + shift)
+        elif converged[fault.curve]:
+            raw = (fault.curve, "unattained", None, math.nan, math.nan, None)
+            faults[fault.curve] = from_core(raw, solved.columns, 0.0, False)
+        converged[fault.curve] = 0
+    return [faults[i] for i in sorted(faults)]
+
+
+def _ends(task: Task, h: Doubles, p: Array, joints: list[Joint | None]) -> list[End] | None:
     """Return end conditions with the numbers of points; with two points not-a-knot is the velocity of the chord."""
     if task.ends is None:
         return None
@@ -338,7 +563,9 @@ def _ends(task: Task, h: Doubles, p: Array) -> list[End] | None:
     assert isinstance(space, Manifold)
     conditions = []
     for which, (kind, value) in enumerate(task.ends):
-        if kind != "not-a-knot":
+        if joints[which] is not None:
+            conditions.append(End(kind, joint=joints[which]))
+        elif kind != "not-a-knot":
             conditions.append(End(kind, None if value is None else space._numbers(value).reshape(p[:, 0].shape)))
         elif p.shape[1] > 2:
             conditions.append(not_a_knot(space.operations, p, which))
@@ -563,6 +790,7 @@ class Tridiagonal:
         self._right = np.full_like(before, 3.0)
         for which, end in enumerate(problem.ends or []):
             self._set_end(problem, which, end.kind)
+        self._rows[:, problem.given] = 0.0, 1.0, 0.0
         self._periodic = _PeriodicCorrection(self, problem, before[:, 0]) if closed else None
 
     def _set_end(self, problem: Problem, which: int, kind: str) -> None:

@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from .._base.typing import Progress
-from .._spaces import AnySpace, Array, ComplexGrassmannian, Grassmannian, Hyperbolic, Space, cover_of
-from .ends import map_ends
+from .._spaces import AnySpace, Array, ComplexGrassmannian, Doubles, Grassmannian, Hyperbolic, Space, cover_of
+from .ends import map_ends, original_nodes
 from .solve import Options, Solved, Task, solve_single
 
 
@@ -104,11 +104,30 @@ def solve_in_span(task: Task, options: Options, progress: Progress | None) -> So
     """Solve a task of curves with equal numbers of points in the span of the points."""
     space = task.space
     points = space._numbers(task.points)
-    # End vectors have shape (..., 1, *point_shape), as arrays with one knot.
-    axis = -1 - len(space.point_shape)
-    vectors = map_ends(task.ends, lambda value: np.expand_dims(space._numbers(value), axis))
-    span = span_of(space, points, *(vector for _, vector in vectors or [] if vector is not None))
-    ends = map_ends(vectors, lambda vector: span.space._as_doubles(span.coordinates(vector).squeeze(axis)))
-    small = task._replace(space=span.space, points=span.space._as_doubles(span.coordinates(points)), ends=ends)
+    batch, inner = task.batch, task.inner or {}
+
+    def as_knots(value: Doubles) -> Array:
+        # Vectors have shape (..., k, *point_shape), as arrays with k knots.
+        numbers = space._numbers(value)
+        single = numbers.ndim == len(batch) + len(space.point_shape)
+        return np.expand_dims(numbers, len(batch)) if single else numbers
+
+    def coordinates(value: Doubles) -> Doubles:
+        reduced = span.space._as_doubles(span.coordinates(as_knots(value)))
+        return reduced.reshape(*value.shape[: value.ndim - len(space._doubles_shape)], *span.space._doubles_shape)
+
+    vectors = [vector for _, vector in task.ends or [] if vector is not None]
+    span = span_of(space, points, *map(as_knots, [*vectors, *inner.values()]))
+    small = task._replace(
+        space=span.space,
+        points=coordinates(task.points),
+        ends=map_ends(task.ends, coordinates),
+        inner={node: coordinates(vector) for node, vector in inner.items()},
+    )
     solution = solve_single(small, options, progress)
+    nodes = task.times.shape[-1]
+    if nodes > points.shape[len(batch)]:
+        whole = span.embed(solution.points)
+        np.moveaxis(whole, len(batch), 0)[original_nodes(task.ends, nodes)] = np.moveaxis(points, len(batch), 0)
+        points = whole
     return solution._replace(points=points, velocities=span.embed(solution.velocities))

@@ -16,7 +16,7 @@ from .. import _core
 from .._base.faults import INVALID, Fault, from_core
 from .._base.report import Columns
 from .._base.typing import Progress
-from .._spaces import Array, Space
+from .._spaces import Array, Doubles, Space
 from .ends import End, map_ends
 
 Mask = NDArray[np.bool_]
@@ -41,7 +41,8 @@ class Task(NamedTuple):
     space : Space
         A space other than a product.
     times : ndarray, shape (N+1,) or (..., N+1)
-        Knots, shared or with one row per curve. With `offsets`, one row for all curves.
+        Knots, shared or with one row per curve, with those that ends with two conditions add. With `offsets`, one row
+        for all curves.
     points : ndarray, shape (..., N+1, *numbers of a point)
         Contiguous floating-point numbers.
     ends : list of End or None
@@ -56,6 +57,8 @@ class Task(NamedTuple):
         Whether curves with points off the space are masked instead of raising an error.
     names : sequence of int or None
         Indices of the nodes in messages; None for 0, 1, ...
+    inner : dict or None
+        Prescribed velocities at inner nodes.
     """
 
     space: Space
@@ -67,6 +70,7 @@ class Task(NamedTuple):
     mask: Mask | None = None
     skip_invalid: bool = False
     names: Sequence[int] | None = None
+    inner: dict[int, Doubles] | None = None
 
     @property
     def batch(self) -> tuple[int, ...]:
@@ -95,10 +99,11 @@ def solve(
 
     Return the solutions and their faults.
     """
-    _, times, _, _, _, offsets, mask, skip, _ = tasks[0]
+    _, times, _, _, _, offsets, mask, skip, _, _ = tasks[0]
     factors, solved, failed = [], [], False
     for task in tasks:
-        factors.append((task.space._handle, task.points, task.ends, task.tol))
+        inner = list(task.inner.items()) if task.inner else None
+        factors.append((task.space._handle, task.points, task.ends, task.tol, inner))
     results = _core.fit(
         factors, times, *options, offsets, None if mask is None else mask.ravel().tolist(), skip, progress
     )
@@ -146,7 +151,7 @@ def validate(task: Task) -> tuple[Task, list[Fault]]:
     ValidationError
         If any other input is invalid.
     """
-    space, times, points, ends, tol, offsets, mask, skip, _ = task
+    space, times, points, ends, tol, offsets, mask, skip, _, _ = task
     if tol is None:
         return task._replace(points=points.copy()), []
     on_space, raw = _core.validate(
@@ -196,14 +201,16 @@ def _unmasked(task: Task, options: Options, progress: Progress | None, solver: S
     batch, chosen = task.batch, np.flatnonzero(task.mask)
     columns = Columns.empty(task.mask.size)
     if not chosen.size:
-        nothing = np.full(task.space._numbers(task.points).shape, np.nan, task.space.dtype)
+        nothing = np.full((*batch, task.times.shape[-1], *task.space.point_shape), np.nan, task.space.dtype)
         return Solved(nothing, nothing.copy(), columns, [])
 
     def rows(array: Array) -> Array:
         return np.ascontiguousarray(array.reshape(-1, *array.shape[len(batch) :])[chosen])
 
     times = rows(task.times) if task.times.ndim > 1 else task.times
-    some = task._replace(times=times, points=rows(task.points), ends=map_ends(task.ends, rows), mask=None)
+    inner = task.inner and {node: rows(vectors) for node, vectors in task.inner.items()}
+    ends = map_ends(task.ends, rows)
+    some = task._replace(times=times, points=rows(task.points), ends=ends, inner=inner, mask=None)
     solution = solver(some, options, progress)
     columns.put(chosen, solution.columns)
     points, velocities = (in_batch(batch, chosen, item) for item in (solution.points, solution.velocities))

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from functools import cached_property
 from operator import attrgetter
 from types import GenericAlias
-from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Self, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -194,7 +194,7 @@ class CubicSpline(PiecewiseCubic[P], Generic[P, R]):
         where: ArrayLike | None = None,
         progress: Progress | None = None,
     ) -> None:
-        space = space_named(space)
+        space = cast("Space[P]", space if isinstance(space, Space) else space_named(space))
         if skipna is not False and checked_flag(skipna, "skipna"):
             velocities = inner_velocities_of_present(t, points, space, velocities)
             t, points = curves_without_missing(t, points, space)

@@ -12,7 +12,7 @@ use crate::space::{Ambient, Erased, Frame, Origin};
 
 /// Maximum number of samples that one thread evaluates at a time.
 const BLOCK: usize = 512;
-/// Samples times numbers from which several threads are certainly faster.
+/// SampleBlock times numbers from which several threads are certainly faster.
 const PARALLEL: usize = 1 << 14;
 
 /// Evaluates every curve at all times x: points or vectors, curve by curve and time by time.
@@ -31,16 +31,16 @@ pub fn evaluate_bspline(
     parallel::for_each(blocks, parallel, monitor, |(block, out)| {
         let first = block * length;
         match quantity.order() {
-            0 => Samples::<Lane>::new(space, curve).write(x, first, quantity, out),
-            1 => Samples::<Dual>::new(space, curve).write(x, first, quantity, out),
-            _ => Samples::<Jet>::new(space, curve).write(x, first, quantity, out),
+            0 => SampleBlock::<Lane>::new(space, curve).write(x, first, quantity, out),
+            1 => SampleBlock::<Dual>::new(space, curve).write(x, first, quantity, out),
+            _ => SampleBlock::<Jet>::new(space, curve).write(x, first, quantity, out),
         }
         monitor.advance(out.len() / size);
     });
 }
 
-/// Samples of curves, eight at a time, and memory for them.
-struct Samples<'a, S> {
+/// SampleBlock of curves, eight at a time, and memory for them.
+struct SampleBlock<'a, S> {
     space: &'a Erased<'a>,
     curve: &'a BSpline<'a>,
     /// The points of de Boor's algorithm; of a cumulative B-spline the first one only.
@@ -53,7 +53,7 @@ struct Samples<'a, S> {
     body: Vec<Lane>,
 }
 
-impl<'a, S: Scalar> Samples<'a, S> {
+impl<'a, S: Scalar> SampleBlock<'a, S> {
     fn new(space: &'a Erased<'a>, curve: &'a BSpline<'a>) -> Self {
         let len = space.point_len();
         let factors = (!curve.steps.is_empty()).then(|| Factors::new(space, curve.degree));
@@ -62,7 +62,7 @@ impl<'a, S: Scalar> Samples<'a, S> {
         let (parts, frame) = ([(); 3].map(|()| lanes(len)), lanes(space.frame_len()));
         let points = (0..points).map(|_| zeros()).collect();
         let (row, body) = (lanes(len), lanes(space.dim()));
-        Samples { space, curve, points, next: zeros(), factors, row, parts, frame, body }
+        SampleBlock { space, curve, points, next: zeros(), factors, row, parts, frame, body }
     }
 
     /// Writes consecutive samples: times x of one curve after another.

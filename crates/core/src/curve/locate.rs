@@ -50,30 +50,3 @@ impl<'a> Locator<'a> {
         from + inner.partition_point(|&knot| knot <= x)
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    proptest! {
-        #[test]
-        fn agrees_with_a_plain_search(
-            gaps in prop::collection::vec(prop_oneof![1e-6..1e-3, 0.1..10.0f64], 1..200),
-            positions in prop::collection::vec(-0.1..1.1f64, 1..50),
-            indexed: bool,
-        ) {
-            let t: Vec<f64> = gaps.iter().scan(-3.0, |s, g| { *s += g; Some(*s) }).collect();
-            prop_assume!(t.len() > 1);
-            let last = t.len() - 2;
-            let locator = Locator::new(&t, indexed);
-            let mut hint = 0;
-            let (a, b) = (t[0], t[last + 1]);
-            for x in positions.iter().map(|p| a + p * (b - a)).chain(t.iter().copied()) {
-                let plain = t.iter().rposition(|&k| k <= x).unwrap_or(0).min(last);
-                hint = locator.find(x, hint);
-                prop_assert_eq!(hint, plain);
-            }
-        }
-    }
-}

@@ -23,5 +23,7 @@ pub use evaluate::evaluate;
 pub use length::{ArcLength, Integrand, energies, lengths};
 #[cfg(feature = "dense")]
 pub use lift::{lift, lift_knots};
+#[doc(hidden)]
+pub use locate::Locator;
 pub use product::{Factor, evaluate_product};
 pub use transport::transport;

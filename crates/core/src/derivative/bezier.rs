@@ -2,7 +2,7 @@
 
 use super::operators::{Few, Matrix, Vector, columns, unit};
 use super::polygon::Node;
-use super::segment::Segment;
+use super::segment::LinearisedSegment;
 use crate::scalar::{Dual, Jet, Lane, Scalar, few, lane};
 use crate::space::{Ambient, Erased, Frame, Origin};
 use smallvec::smallvec;
@@ -18,7 +18,7 @@ pub struct Bezier {
 }
 
 impl Bezier {
-    pub fn new(space: &Erased, nodes: &[Node], segment: &Segment) -> Self {
+    pub fn new(space: &Erased, nodes: &[Node], segment: &LinearisedSegment) -> Self {
         let len = space.point_len();
         let inner = |node: &Node, handle: &Vector, sign: f64| {
             let x: Few<Lane> = handle.iter().map(|&x| lane(sign * x)).collect();

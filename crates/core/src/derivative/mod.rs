@@ -15,9 +15,9 @@ use crate::space::{Ambient, Erased, Origin};
 use bezier::Bezier;
 pub use operators::{Matrix, Vector};
 use polygon::Polygon;
-use segment::Segment;
+use segment::LinearisedSegment;
 use std::collections::BTreeMap;
-pub use system::Row;
+pub use system::Linearised;
 use system::{Change, System};
 
 /// The number of Bézier segments that are stored.
@@ -68,7 +68,7 @@ impl Motion<'_> {
         let m = self.derivative.space.dim();
         let position = Position { segment: self.segment, tau };
         let (columns, _) = self.derivative.columns(&self.bezier, &position, of);
-        let Segment { h, functions, .. } = &self.derivative.system.segments[self.segment];
+        let LinearisedSegment { h, functions, .. } = &self.derivative.system.segments[self.segment];
         let mut out = Matrix::zeros(columns.nrows(), 4 * m);
         for (e, f) in functions.iter().enumerate() {
             let third = if e == 0 { h / 3.0 } else { -h / 3.0 };
@@ -116,6 +116,7 @@ impl<'a> Derivative<'a> {
                     End::NotAKnot => (EndKind::NotAKnot, Vector::zeros(space.dim())),
                     End::Velocity(v) => (EndKind::Velocity, at(v)),
                     End::Acceleration(v) => (EndKind::Acceleration, at(v)),
+                    End::Both(both) => (EndKind::Velocity, at(&both.vectors[..space.point_len()])),
                 }
             })),
         };
@@ -241,7 +242,7 @@ impl<'a> Derivative<'a> {
     }
 
     /// The C² condition at a knot, linearised.
-    pub fn condition(&self, node: usize) -> &Row {
+    pub fn condition(&self, node: usize) -> &Linearised {
         &self.system.rows[node]
     }
 

@@ -26,7 +26,7 @@ pub struct Side {
 }
 
 /// A segment of a curve.
-pub struct Segment {
+pub struct LinearisedSegment {
     pub h: f64,
     /// h u/3 at the two knots.
     pub handles: [Vector; 2],
@@ -36,7 +36,7 @@ pub struct Segment {
     pub sides: [Side; 2],
 }
 
-impl Segment {
+impl LinearisedSegment {
     pub fn new(space: &Erased, h: f64, chord: &Vector, u: [&Vector; 2]) -> Self {
         let m = chord.len();
         let [a, b] = u.map(|u| u * (h / 3.0));
@@ -66,7 +66,7 @@ impl Segment {
             }
         };
         let sides = [side(0), side(1)];
-        Segment { h, handles: [a, b], functions, sides }
+        LinearisedSegment { h, handles: [a, b], functions, sides }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::operators::{Functions, Matrix, Vector, curvature, splat, stretch, stretch_slope, unit};
 use super::polygon::Polygon;
-use super::segment::{Segment, Side};
+use super::segment::{LinearisedSegment, Side};
 use crate::fit::{Blocks, EndKind, NotAKnot};
 use crate::monitor::checkpoint;
 use crate::scalar::{Dual, Lane, lane};
@@ -11,7 +11,7 @@ use crate::space::{Erased, Origin};
 /// The derivatives of the condition at one knot with respect to velocities and points of knots, lengths of segments,
 /// and the prescribed vector at an end.
 #[derive(Default)]
-pub struct Row {
+pub struct Linearised {
     /// With respect to the velocities of knots.
     pub u: Vec<(usize, Matrix)>,
     /// With respect to the points of knots.
@@ -35,8 +35,8 @@ pub struct Change {
 
 /// The linearised conditions of one curve.
 pub struct System {
-    pub segments: Vec<Segment>,
-    pub rows: Vec<Row>,
+    pub segments: Vec<LinearisedSegment>,
+    pub rows: Vec<Linearised>,
     m: usize,
     closed: bool,
     both_not_a_knot: bool,
@@ -46,10 +46,10 @@ impl System {
     /// `ends` are kinds and prescribed vectors in the frames of the ends; None for a closed curve.
     pub fn new(space: &Erased, polygon: &Polygon, h: &[f64], ends: Option<[(EndKind, Vector); 2]>) -> Self {
         let (n, m) = (h.len(), space.dim());
-        let segments: Vec<Segment> = (0..n)
+        let segments: Vec<LinearisedSegment> = (0..n)
             .map(|i| {
                 checkpoint();
-                Segment::new(space, h[i], &polygon.chords[i], [&polygon.u[i], &polygon.u[i + 1]])
+                LinearisedSegment::new(space, h[i], &polygon.chords[i], [&polygon.u[i], &polygon.u[i + 1]])
             })
             .collect();
         let closed = ends.is_none();
@@ -99,13 +99,13 @@ impl System {
     }
 
     /// `S(hᵢ₋₁u/3) right − S(hᵢu/3) left`
-    fn inner(&self, space: &Erased, polygon: &Polygon, i: usize) -> Row {
+    fn inner(&self, space: &Erased, polygon: &Polygon, i: usize) -> Linearised {
         let n = self.segments.len();
         let (l, r) = ((i + n - 1) % n, i);
         let (before, behind) = (&self.segments[l], &self.segments[r]);
         let u = &polygon.u[i];
         let (left, right) = (&before.sides[1], &behind.sides[0]);
-        let mut row = Row::default();
+        let mut row = Linearised::default();
         let handles = [u * (before.h / 3.0), u * (behind.h / 3.0)];
         // The two frames of a closed curve differ by its holonomy.
         let stretched = [
@@ -125,13 +125,19 @@ impl System {
         row
     }
 
-    fn end(&self, space: &Erased, polygon: &Polygon, which: usize, (kind, value): &(EndKind, Vector)) -> Row {
+    fn end(
+        &self,
+        space: &Erased,
+        polygon: &Polygon,
+        which: usize,
+        (kind, value): &(EndKind, Vector),
+    ) -> Linearised {
         let n = self.segments.len();
         let (node, near, far) = if which == 0 { (0, 0, 1.min(n - 1)) } else { (n, n - 1, n.max(2) - 2) };
         let identity = Matrix::identity(self.m, self.m);
-        let mut row = Row { u: vec![(node, identity.clone())], ..Row::default() };
+        let mut row = Linearised { u: vec![(node, identity.clone())], ..Linearised::default() };
         match kind {
-            EndKind::Velocity => row.end = Some((which, -identity)),
+            EndKind::Velocity | EndKind::Both => row.end = Some((which, -identity)),
             EndKind::Acceleration => {
                 // The side of the only segment is S(handle) A/6.
                 let segment = &self.segments[near];
@@ -214,7 +220,7 @@ impl System {
     }
 }
 
-impl Row {
+impl Linearised {
     /// Adds a matrix times a side of a segment between two nodes.
     fn side(&mut self, factor: &Matrix, side: &Side, nodes: [usize; 2], segment: usize) {
         for (e, node) in nodes.into_iter().enumerate() {

@@ -6,6 +6,7 @@
 //!
 //! Eight chains of equal length occupy the lanes: curves of a batch, or sections of a long curve.
 
+use super::joint::Joint;
 use crate::scalar::{LANES, Lane};
 
 /// The data of one lane of a chain: a run of nodes of a curve. In a closed curve the numbering continues around the
@@ -72,6 +73,8 @@ pub struct Chain {
     pub r: Vec<Lane>,
     /// Prescribed end vectors, in the frames of the ends.
     pub end_values: [Vec<Lane>; 2],
+    /// The ends with two conditions.
+    pub(super) joints: [Option<Joint>; 2],
     /// The factor of chords and velocities; see `Ambient::scales`.
     pub(super) scale: Lane,
     /// The factor of times.

@@ -11,6 +11,8 @@ pub enum EndKind {
     Acceleration,
     /// Not-a-knot in normal coordinates at the neighbouring knot.
     NotAKnot,
+    /// Velocity and acceleration are prescribed. The unknown is the control point after the additional knot.
+    Both,
 }
 
 /// The ends of eight chains: closed, or the kind at either end of each lane.

@@ -36,10 +36,11 @@ pub fn row(chain: &Chain, which: usize, kinds: &[EndKind; LANES]) -> (Lane, Lane
     let velocity = of_kind(kinds, EndKind::Velocity);
     let knot = of_kind(kinds, EndKind::NotAKnot);
     let inverse = ONE / h0;
-    (
-        (velocity | knot).select(ONE, TWO * inverse),
-        velocity.select(Lane::ZERO, knot.select(ONE + h0 / h1, inverse)),
-    )
+    let free = match &chain.joints[which] {
+        Some(joint) => of_kind(kinds, EndKind::Both).select(joint.diagonal(h0), TWO * inverse),
+        None => TWO * inverse,
+    };
+    ((velocity | knot).select(ONE, free), velocity.select(Lane::ZERO, knot.select(ONE + h0 / h1, inverse)))
 }
 
 /// The residual at an open end; `all_r` holds the side of its only segment. Returns its squared size.
@@ -53,10 +54,16 @@ pub fn residual<S: Scalar>(
     kinds: &[EndKind; LANES],
 ) -> Lane {
     let (n, m) = (chain.n, chain.m);
-    let NodeVectors { a, b, .. } = work;
     let ChainEnd { node, next, near, far } = ChainEnd::of(which, n);
     let (h0, h1) = (chain.h[near], chain.h[far]);
     let sign = if which == 0 { ONE } else { -ONE };
+    let joined = chain.joints[which].as_ref().map(|joint| {
+        let (u, beside) = (&all_u[node * m..(node + 1) * m], &all_u[next * m..(next + 1) * m]);
+        let mut found = vec![S::constant(Lane::ZERO); m];
+        joint.residual(space, h0, sign, u, beside, work, &mut found);
+        found
+    });
+    let NodeVectors { a, b, .. } = work;
     let u = &all_u[node * m..(node + 1) * m];
     let value = &chain.end_values[which];
     let r = &mut all_r[node * m..(node + 1) * m];
@@ -94,6 +101,13 @@ pub fn residual<S: Scalar>(
         size = knot.select(length2(b) * (weight * weight), size);
         for c in 0..m {
             a[c] = S::select(knot, b[c] * THIRD, a[c]);
+        }
+    }
+    if let Some(joined) = joined {
+        let both = of_kind(kinds, EndKind::Both);
+        size = both.select(length2(&joined) * (h0 * h0), size);
+        for c in 0..m {
+            a[c] = S::select(both, joined[c], a[c]);
         }
     }
     r.copy_from_slice(a);

@@ -12,9 +12,8 @@ use super::end_kind::{ChainEnds, EndKind, of_kind};
 use super::ends::{ChainEnd, NotAKnot};
 use super::node::NodeVectors;
 use super::problem::Solver;
-use super::solve::{Limits, Outcome, Workspace};
+use super::solve::{Lanes, Limits, Outcome};
 use super::vector::stretch_by;
-use crate::monitor::Monitor;
 use crate::scalar::{LANES, Lane, lane};
 use crate::space::{Erased, Origin};
 
@@ -23,15 +22,9 @@ const HALF: Lane = lane(0.5);
 
 /// Iterates on the unknowns of a chain until every lane stops. Lanes in `idle` do not change. The last iterate is
 /// kept even if it did not converge.
-pub fn solve(
-    space: &Erased,
-    chain: &mut Chain,
-    ends: &ChainEnds,
-    limits: Limits,
-    idle: Lane,
-    work: &mut Workspace,
-    monitor: &Monitor,
-) -> Outcome {
+pub fn solve(lanes: &mut Lanes, limits: Limits, idle: Lane) -> Outcome {
+    let (space, ends, monitor) = (lanes.space, lanes.ends, lanes.monitor);
+    let (chain, work) = (&mut *lanes.chain, &mut *lanes.work);
     work.t.build(chain, ends);
     let mut state = Convergence::new(chain, limits.tol, idle);
     // Lanes whose logarithm is undefined: a control point reached the cut locus.
@@ -52,7 +45,12 @@ pub fn solve(
         chain.update(space, |chain, u| {
             let m = chain.m;
             for (i, (u, r)) in u.chunks_exact_mut(m).zip(chain.r.chunks_exact(m)).enumerate() {
-                if matches!(ends, ChainEnds::Open(_)) && (i == 0 || i == chain.n) {
+                let done = match ends {
+                    ChainEnds::Open(kinds) if i == 0 => done | !of_kind(&kinds[0], EndKind::Both),
+                    ChainEnds::Open(kinds) if i == chain.n => done | !of_kind(&kinds[1], EndKind::Both),
+                    _ => done,
+                };
+                if done.all() {
                     continue;
                 }
                 let factor = lane(3.0) / t.diagonal[i];
@@ -137,5 +135,8 @@ fn end_velocity(
             end[c] = knot.select(vectors.b[c], end[c]);
         }
     }
+    // The equation of an end with two conditions is solved like that of an inner node.
+    let both = of_kind(kinds, EndKind::Both);
+    end.iter_mut().zip(own).for_each(|(end, own)| *end = both.select(*own, *end));
     end
 }

@@ -5,10 +5,9 @@
 //! splines; this one is the continuation of the spline through points that are close together.
 
 use super::chain::Chain;
-use super::end_kind::ChainEnds;
+use super::joint::Joint;
 use super::problem::Solver;
-use super::solve::{Limits, Outcome, Workspace, solve};
-use crate::monitor::Monitor;
+use super::solve::{Lanes, Limits, Outcome, solve};
 use crate::scalar::{LANES, Lane, lane, mask_from};
 use crate::space::{Erased, Origin};
 
@@ -21,24 +20,20 @@ const CORRECTIONS: usize = 12;
 const LOOSE: f64 = 1e-8;
 
 /// Solves the lanes that are neither `idle` nor settled, and updates their outcome.
-pub fn follow(
-    space: &Erased,
-    chain: &mut Chain,
-    ends: &ChainEnds,
-    limits: Limits,
-    idle: Lane,
-    work: &mut Workspace,
-    monitor: &Monitor,
-    outcome: &mut Outcome,
-) {
+pub fn follow(lanes: &mut Lanes, limits: Limits, idle: Lane, outcome: &mut Outcome) {
+    let (space, monitor) = (lanes.space, lanes.monitor);
     let idle = outcome.settled(idle);
     // Intermediate curves need not be accurate.
     let within = |used: Lane, most: usize, tol: f64| Limits {
         tol: limits.tol.max(lane(tol)),
         max_iter: (limits.max_iter - used).min(lane(most as f64)),
     };
-    let (chords, values) = (chain.chord.clone(), chain.end_values.clone());
-    let best = chain.unknowns().to_vec();
+    let whole = Polygon {
+        chords: lanes.chain.chord.clone(),
+        values: lanes.chain.end_values.clone(),
+        joints: lanes.chain.joints.clone(),
+    };
+    let best = lanes.chain.unknowns().to_vec();
     // The current and the next λ of each lane, and the last two curves with their λ.
     let (mut at, mut ahead) = (Lane::ZERO, lane(FIRST));
     let mut curves = [vec![Lane::ZERO; best.len()], vec![Lane::ZERO; best.len()]];
@@ -52,14 +47,14 @@ pub fn follow(
             break;
         }
         let goal = (at + ahead).min(Lane::ONE);
-        scale(space, chain, &chords, &values, goal);
-        chain.update(space, |_, u| predict(u, &curves, positions, goal));
+        whole.scale(space, lanes.chain, goal);
+        lanes.update(|_, u| predict(u, &curves, positions, goal));
         let within = within(used, CORRECTIONS, LOOSE);
-        let found = solve(space, chain, ends, Solver::Homotopy, within, done, work, monitor);
+        let found = solve(lanes, Solver::Homotopy, within, done);
         used += done.select(Lane::ZERO, Lane::new(found.iterations.map(|n| n as f64)));
         let reached = mask_from(|l| found.converged[l]) & !done;
         let failed = !reached & !done;
-        for (i, u) in chain.unknowns().iter().enumerate() {
+        for (i, u) in lanes.chain.unknowns().iter().enumerate() {
             curves[0][i] = reached.select(curves[1][i], curves[0][i]);
             curves[1][i] = reached.select(*u, curves[1][i]);
         }
@@ -72,9 +67,9 @@ pub fn follow(
         }
     }
     // The last stage, with the requested tolerance, from the last intermediate curve.
-    scale(space, chain, &chords, &values, Lane::ONE);
+    whole.scale(space, lanes.chain, Lane::ONE);
     let arrived = at.simd_ge(Lane::ONE) & limits.max_iter.simd_gt(used) & !idle;
-    chain.update(space, |_, u| {
+    lanes.update(|_, u| {
         for ((u, b), c) in u.iter_mut().zip(&best).zip(&curves[1]) {
             *u = arrived.select(*c, *b);
         }
@@ -83,28 +78,40 @@ pub fn follow(
         return;
     }
     let within = within(used, 2 * CORRECTIONS, 0.0);
-    let last = solve(space, chain, ends, Solver::Homotopy, within, !arrived, work, monitor);
-    outcome.take(space, chain, &best, &last, arrived);
+    let last = solve(lanes, Solver::Homotopy, within, !arrived);
+    outcome.take(lanes, &best, &last, arrived);
 }
 
-/// Scales the polygon and the prescribed end vectors by λ.
-fn scale(space: &Erased, chain: &mut Chain, chords: &[Lane], values: &[Vec<Lane>; 2], at: Lane) {
-    let (m, keep) = (chain.m, space.chord_len());
-    for (d, c) in chain.chord.iter_mut().zip(chords) {
-        *d = *c * at;
-    }
-    for i in 0..chain.n {
-        space.prepare(&chain.chord[i * m..(i + 1) * m], &mut chain.prepared[i * keep..(i + 1) * keep]);
-    }
-    for (value, all) in chain.end_values.iter_mut().zip(values) {
-        for (v, a) in value.iter_mut().zip(all) {
-            *v = *a * at;
+/// The given polygon and its ends.
+struct Polygon {
+    chords: Vec<Lane>,
+    values: [Vec<Lane>; 2],
+    joints: [Option<Joint>; 2],
+}
+
+impl Polygon {
+    /// Scales the polygon of a chain and its end vectors by λ.
+    fn scale(&self, space: &Erased, chain: &mut Chain, at: Lane) {
+        let (m, keep) = (chain.m, space.chord_len());
+        for (d, c) in chain.chord.iter_mut().zip(&self.chords) {
+            *d = *c * at;
+        }
+        for i in 0..chain.n {
+            space.prepare(&chain.chord[i * m..(i + 1) * m], &mut chain.prepared[i * keep..(i + 1) * keep]);
+        }
+        for (value, all) in chain.end_values.iter_mut().zip(&self.values) {
+            for (v, a) in value.iter_mut().zip(all) {
+                *v = *a * at;
+            }
+        }
+        for (joint, whole) in chain.joints.iter_mut().zip(&self.joints) {
+            *joint = whole.as_ref().map(|whole| whole.scaled(space, at));
         }
     }
 }
 
 /// The secant through the last two curves; u/λ is nearly constant.
-fn predict(u: &mut [Lane], curves: &[Vec<Lane>; 2], positions: [Lane; 2], goal: Lane) {
+pub fn predict(u: &mut [Lane], curves: &[Vec<Lane>; 2], positions: [Lane; 2], goal: Lane) {
     let slope = |i: usize| {
         let started = positions[i].simd_gt(Lane::ZERO);
         started.select(Lane::ONE / positions[i], Lane::ZERO)
@@ -117,29 +124,5 @@ fn predict(u: &mut [Lane], curves: &[Vec<Lane>; 2], positions: [Lane; 2], goal: 
     for (i, u) in u.iter_mut().enumerate() {
         let (b, n) = (curves[0][i] * before, curves[1][i] * now);
         *u = goal * (n + weight * (n - b));
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// The prediction for λ = `goal` from the curves at two values of λ; λ is 0 where no curve exists yet.
-    fn predicted(curve: impl Fn(f64) -> f64, positions: [f64; 2], goal: f64) -> f64 {
-        let mut u = [lane(0.0)];
-        predict(&mut u, &positions.map(|at| vec![lane(curve(at))]), positions.map(lane), lane(goal));
-        u[0].to_array()[0]
-    }
-
-    #[test]
-    fn the_secant_of_velocities_over_lambda_is_followed() {
-        let quadratic = |at: f64| at * (3.0 - 2.0 * at);
-        for (positions, goal) in [([0.25, 0.625], 1.0), ([0.25, 0.3], 0.31), ([0.5, 0.75], 1.0)] {
-            let found = predicted(quadratic, positions, goal);
-            assert!((found - quadratic(goal)).abs() < 1e-14, "{positions:?}, {goal}: {found}");
-        }
-        // One curve predicts a line through zero, and no curve predicts zero.
-        assert!((predicted(quadratic, [0.0, 0.25], 0.625) - 2.5 * quadratic(0.25)).abs() < 1e-15);
-        assert_eq!(predicted(quadratic, [0.0, 0.0], 0.25), 0.0);
     }
 }

@@ -5,9 +5,9 @@ use super::chain::{Chain, Run};
 use super::end_kind::{ChainEnds, EndKind, of_kind};
 use super::ends::few_points;
 use super::handles::noisy_handles;
-use super::problem::{Ends, Options, Problem, Report, Status};
+use super::problem::{End, Ends, Options, Problem, Report, Status};
 use super::section::Section;
-use super::solve::Workspace;
+use super::solve::{Lanes, Workspace};
 use crate::monitor::Monitor;
 use crate::scalar::{LANES, Lane, dot, few, lane, mask_from, scatter};
 use crate::space::{Ambient, Erased};
@@ -78,14 +78,23 @@ fn fit_in(
             })
         })
     });
-    chain.unroll(space, &runs, nodes - 1, &ends, rows);
+    let both = few(|e| match problem.ends {
+        // In lanes of sections that do not reach the end, they are not used.
+        Ends::Open(ends) => match ends[e] {
+            End::Both(both) => Some(both.rows(space.point_len(), few(|l| section(l).curve))),
+            _ => None,
+        },
+        Ends::Periodic => None,
+    });
+    chain.unroll(space, &runs, nodes - 1, &ends, rows, both);
     let ends = few_points(space, chain, ends);
     let (cut, almost_cut) = (chain.cut, chain.almost_cut);
-    let idle = mask_from(|l| cut[l].is_some());
+    let idle = mask_from(|l| cut[l].is_some()) | ends.lost(chain);
     let sections_tol = if whole(0) { options.tol } else { options.tol / 4.0 };
     let options = Options { tol: sections_tol, ..*options };
-    let mut outcome = auto::run(space, chain, &ends, &options, idle, whole(0), work, monitor);
-    outcome.judge(space, chain, &ends, options.tol, idle, work);
+    let mut lanes = Lanes { space, chain, ends: &ends, work, monitor };
+    let mut outcome = auto::run(&mut lanes, &options, idle, whole(0));
+    outcome.judge(&mut lanes, options.tol, idle);
     let alternative = (outcome.alternative * chain.unit_of_energy()).to_array();
     let (residual, rate) = (outcome.residual.to_array(), outcome.rate.to_array());
     let noisy = noisy_handles(space, chain, &runs, outcome.handle);

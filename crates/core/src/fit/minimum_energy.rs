@@ -5,12 +5,10 @@ use super::budget::{
     Costs, ENERGY, FEWEST_STEPS, FEWEST_SWEEPS, NEWTON, PATIENT, SWEEPS, SWEEPS_TO_RESCUE, left,
 };
 use super::chain::Chain;
-use super::end_kind::ChainEnds;
 use super::energy::bending;
 use super::problem::{Options, Solver};
-use super::solve::{Limits, Outcome, Workspace, solve};
+use super::solve::{Lanes, Limits, Outcome, solve};
 use super::{fixed_point, homotopy, trust_region};
-use crate::monitor::Monitor;
 use crate::scalar::{LANES, Lane, few, lane, mask_from};
 use crate::space::{Ambient, Erased};
 
@@ -85,19 +83,16 @@ fn far_apart(space: &Erased, chain: &Chain, outcome: &Outcome) -> Lane {
 /// Runs further solvers on the lanes whose points are far apart or that are not settled, and keeps the minimum-energy
 /// solution. `first` is the work spent on each lane.
 pub fn select(
-    space: &Erased,
-    chain: &mut Chain,
-    ends: &ChainEnds,
+    lanes: &mut Lanes,
     options: &Options,
     costs: &Costs,
     mut first: Lane,
     idle: Lane,
-    work: &mut Workspace,
-    monitor: &Monitor,
     outcome: &mut Outcome,
 ) {
-    let lanes = (far_apart(space, chain, outcome) | !outcome.settled(idle)) & !idle;
-    if lanes.none() {
+    let (space, monitor) = (lanes.space, lanes.monitor);
+    let candidates = (far_apart(space, lanes.chain, outcome) | !outcome.settled(idle)) & !idle;
+    if candidates.none() {
         return;
     }
     let infinity = lane(f64::INFINITY);
@@ -122,14 +117,14 @@ pub fn select(
             break;
         }
         let settled = outcome.settled(idle);
-        let applies = lanes
+        let applies = candidates
             & match way {
                 Way::Homotopy => mask_from(|l| before_homotopy[l] != Solver::Homotopy),
                 // The first solver must have converged quickly.
                 Way::QuasiNewton => mask_from(|l| !quick[l]),
                 Way::FromAlgorithm1 => swept,
                 Way::FromBest => !settled,
-                _ => lanes,
+                _ => candidates,
             };
         let rest = left(options, &outcome.iterations);
         let cost = costs.iteration(way.solver());
@@ -143,12 +138,12 @@ pub fn select(
             continue;
         }
         if least.is_none() {
-            least = Some(energy(chain, settled & lanes));
+            least = Some(energy(lanes.chain, settled & candidates));
         }
-        let before = chain.unknowns().to_vec();
+        let before = lanes.chain.unknowns().to_vec();
         // If handles come close to the cut locus, which line searches avoid, residuals are amplified in the
         // acceleration.
-        let sweeps = if way == Way::Algorithm1 { lanes } else { Lane::ZERO };
+        let sweeps = if way == Way::Algorithm1 { candidates } else { Lane::ZERO };
         // Where Newton's method costs too much, no other solver would find a curve.
         let last = if costs.can_rescue(NEWTON) { Lane::ZERO } else { sweeps & !settled };
         let tol = (sweeps & !last).select(lane(0.1 * options.tol), lane(options.tol));
@@ -156,23 +151,19 @@ pub fn select(
         let limits = Limits { tol, max_iter: rest.min(afforded).min(most) };
         let start = |i: usize| if way == Way::FromAlgorithm1 { sweeps_end[i] } else { Lane::ZERO };
         if way != Way::FromBest {
-            chain.update(space, |_, u| {
+            lanes.update(|_, u| {
                 u.iter_mut().enumerate().for_each(|(i, u)| *u = on.select(start(i), *u));
             });
         }
         let found = match way {
-            Way::Algorithm1 => fixed_point::solve(space, chain, ends, limits, !on, work, monitor),
+            Way::Algorithm1 => fixed_point::solve(lanes, limits, !on),
             Way::Homotopy => {
                 let mut found = outcome.afresh(on);
-                homotopy::follow(space, chain, ends, limits, !on, work, monitor, &mut found);
+                homotopy::follow(lanes, limits, !on, &mut found);
                 found
             }
-            Way::QuasiNewton | Way::Newton => {
-                solve(space, chain, ends, way.solver(), limits, !on, work, monitor)
-            }
-            Way::FromZero | Way::FromAlgorithm1 | Way::FromBest => {
-                trust_region::solve(space, chain, ends, limits, !on, work, monitor)
-            }
+            Way::QuasiNewton | Way::Newton => solve(lanes, way.solver(), limits, !on),
+            Way::FromZero | Way::FromAlgorithm1 | Way::FromBest => trust_region::solve(lanes, limits, !on),
         };
         let iterations = Lane::new(found.iterations.map(|n| n as f64));
         spent += on.select(iterations * lane(cost) + lane(ENERGY), Lane::ZERO);
@@ -181,12 +172,12 @@ pub fn select(
         outcome.leave_out(way.solver(), cut_short);
         if way == Way::Algorithm1 {
             swept = on & !arrived;
-            sweeps_end = chain.unknowns().to_vec();
+            sweeps_end = lanes.chain.unknowns().to_vec();
         }
-        let (bends, around) = energy(chain, arrived);
+        let (bends, around) = energy(lanes.chain, arrived);
         let (known, known_around) = least.unwrap_or((infinity, !Lane::ZERO));
         // The energies of geodesics are rounding errors.
-        let rounding = lane(STRAIGHT) * chain.pace * chain.pace;
+        let rounding = lane(STRAIGHT) * lanes.chain.pace * lanes.chain.pace;
         let other = arrived & !(bends - known).abs().simd_le(lane(SAME) * bends + rounding);
         let better = (known_around & !around) | (!(around & !known_around) & bends.simd_lt(known));
         let lower = other & better;
@@ -197,7 +188,7 @@ pub fn select(
             & !settled
             & found.residual.simd_lt(outcome.residual)
             & mask_from(|l| found.fault[l].is_none());
-        outcome.adopt(space, chain, &before, &found, lower | nearer, on);
+        outcome.adopt(lanes, &before, &found, lower | nearer, on);
         // The work that led to the first curve determines the budget of the search for others.
         let now = outcome.settled(idle) & !settled;
         (first, spent) = (now.select(first + spent, first), now.select(Lane::ZERO, spent));

@@ -14,7 +14,8 @@
 //! - `fixed_point` is Algorithm 1, `homotopy` continues from flat space, and `trust_region` minimises the residual.
 //!
 //! All of them evaluate the C² condition (13) in `condition`, whose end rows are in `ends`. `handles` keeps control
-//! handles inside the cut locus; `rounded` and `certificate` examine the result.
+//! handles inside the cut locus; `rounded` and `certificate` examine the result. `conditions` treats ends with two
+//! conditions, whose equation is in `joint`, and prescribed velocities at inner points.
 
 mod auto;
 mod blocks;
@@ -22,6 +23,7 @@ mod budget;
 mod certificate;
 pub(crate) mod chain;
 mod condition;
+mod conditions;
 mod convergence;
 pub(crate) mod end_kind;
 mod ends;
@@ -29,6 +31,7 @@ mod energy;
 mod fixed_point;
 mod handles;
 mod homotopy;
+mod joint;
 mod lanes;
 mod line_search;
 mod minimum_energy;
@@ -48,10 +51,18 @@ mod vector;
 pub use blocks::Blocks;
 pub use chain::{Chain, Run, Visit};
 pub use condition::{sweep, sweep_by_table};
+pub use conditions::{FittedCurves, InnerVelocities, fit_with_conditions};
 pub use end_kind::{ChainEnds, EndKind};
 pub use ends::NotAKnot;
 pub use node::{C2Residual, NodeVectors};
-pub use problem::{End, Ends, Method, Options, Problem, Report, Solver, SolverSet, Status};
+pub use problem::{Both, End, Ends, Method, Options, Problem, Report, Solver, SolverSet, Status};
+
+/// What the tests of this crate need.
+#[doc(hidden)]
+pub mod private {
+    pub use super::certificate::{contraction_bound, guaranteed_sweeps, invariant_radius};
+    pub use super::homotopy::predict;
+}
 
 use crate::monitor::Monitor;
 use crate::scalar::LANES;

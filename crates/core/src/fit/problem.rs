@@ -3,6 +3,7 @@
 use super::end_kind::EndKind;
 use crate::scalar::{Lane, lane};
 use crate::space::{Ambient, Erased};
+use std::borrow::Cow;
 
 /// Points to interpolate, curve after curve.
 pub struct Problem<'a> {
@@ -38,6 +39,19 @@ pub enum End<'a> {
     Acceleration(&'a [f64]),
     /// The first two segments are one cubic in normal coordinates.
     NotAKnot,
+    /// Given velocity and covariant acceleration, by an additional knot in the outer segment. Such curves are fitted by
+    /// [`fit_with_conditions`](super::fit_with_conditions).
+    Both(Both<'a>),
+}
+
+/// A velocity and a covariant acceleration at one end.
+#[derive(Clone, Copy)]
+pub struct Both<'a> {
+    /// The velocity and the acceleration of each curve, one after the other.
+    pub vectors: &'a [f64],
+    /// The distance in time of the additional knot, one per curve.
+    /// [`fit_with_conditions`](super::fit_with_conditions) sets it.
+    pub apart: &'a [f64],
 }
 
 impl<'a> End<'a> {
@@ -52,14 +66,31 @@ impl<'a> End<'a> {
             End::Natural | End::Acceleration(_) => EndKind::Acceleration,
             End::Velocity(_) => EndKind::Velocity,
             End::NotAKnot => EndKind::NotAKnot,
+            End::Both(_) => EndKind::Both,
         }
     }
 
-    /// The prescribed vectors.
+    /// The prescribed vectors, one per curve, and whether they are velocities.
+    pub fn vectors(&self, len: usize) -> Vec<(bool, Cow<'a, [f64]>)> {
+        let every_other = |which: usize, all: &[f64]| {
+            all.chunks(len).skip(which).step_by(2).flatten().copied().collect::<Vec<f64>>()
+        };
+        match *self {
+            End::Natural | End::NotAKnot => vec![],
+            End::Velocity(v) => vec![(true, v.into())],
+            End::Acceleration(v) => vec![(false, v.into())],
+            End::Both(both) => {
+                let row = |which| every_other(which, both.vectors).into();
+                vec![(true, row(0)), (false, row(1))]
+            }
+        }
+    }
+
+    /// The prescribed vectors, if they are of one kind.
     pub fn values(&self) -> Option<&'a [f64]> {
         match self {
             End::Velocity(v) | End::Acceleration(v) => Some(v),
-            End::Natural | End::NotAKnot => None,
+            End::Natural | End::NotAKnot | End::Both(_) => None,
         }
     }
 }
@@ -147,6 +178,8 @@ pub enum Status {
         /// Deciding angle between the control points.
         angle: f64,
     },
+    /// The velocities are accurate, but a prescribed acceleration is not attained.
+    Unattained,
     /// The work was stopped before this curve was finished.
     Stopped,
 }
@@ -200,6 +233,28 @@ pub struct Report {
     pub skipped: SolverSet,
     /// The growth of rounding errors over the chords of the curve.
     pub(super) condition: f64,
+}
+
+impl Report {
+    /// The report of a curve that consists of two sections: the worst values.
+    pub(super) fn joined(self, other: Self) -> Self {
+        let most = |a: f64, b: f64| if a.is_nan() || a > b { a } else { b };
+        Report {
+            status: if self.status == Status::Converged { other.status } else { self.status },
+            iterations: self.iterations.max(other.iterations),
+            residual: most(self.residual, other.residual),
+            max_step: most(self.max_step, other.max_step),
+            rate: most(self.rate, other.rate),
+            solver: self.solver.max(other.solver),
+            invariant_radius: most(self.invariant_radius, other.invariant_radius),
+            contraction_bound: most(self.contraction_bound, other.contraction_bound),
+            guaranteed_sweeps: most(self.guaranteed_sweeps, other.guaranteed_sweeps),
+            alternative: f64::NAN,
+            almost_cut: self.almost_cut.or(other.almost_cut),
+            skipped: self.skipped.union(other.skipped),
+            condition: most(self.condition, other.condition),
+        }
+    }
 }
 
 impl Default for Report {

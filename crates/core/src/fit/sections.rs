@@ -116,22 +116,9 @@ fn merge(
     let mut differing = Vec::new();
     for same in sections.chunk_by(|a, b| a.curve == b.curve) {
         let curve = same[0].curve;
-        let mut report = same[0].report;
         let mut largest = 0.0_f64;
         let mut mismatch = 0.0_f64;
         for (p, next) in same.iter().zip(same[1..].iter().map(Some).chain([None])) {
-            let r = &p.report;
-            report.iterations = report.iterations.max(r.iterations);
-            report.residual = report.residual.max(r.residual);
-            report.max_step = report.max_step.max(r.max_step);
-            report.rate = report.rate.max(r.rate);
-            report.solver = report.solver.max(r.solver);
-            report.condition = report.condition.max(r.condition);
-            report.almost_cut = report.almost_cut.or(r.almost_cut);
-            report.skipped = report.skipped.union(r.skipped);
-            if report.status == Status::Converged {
-                report.status = r.status;
-            }
             largest = largest.max(p.largest);
             if let Some(next) = next {
                 for (a, b) in p.next_velocity.iter().zip(&next.velocities[..len]) {
@@ -139,6 +126,7 @@ fn merge(
                 }
             }
         }
+        let mut report = same[1..].iter().fold(same[0].report, |report, p| report.joined(p.report));
         if let ([first, .., last], Ends::Periodic) = (same, problem.ends) {
             // The last knot equals the first.
             let transported = problem.across_closure(space, curve, &first.velocities[..len]);

@@ -78,21 +78,14 @@ impl Outcome {
 
     /// Accepts the iterate in the chain on lanes where every solver failed, if it is within the tolerance. A solver aims
     /// far below the tolerance, and its best iterate may not be its last.
-    pub fn judge(
-        &mut self,
-        space: &Erased,
-        chain: &mut Chain,
-        ends: &ChainEnds,
-        tol: f64,
-        idle: Lane,
-        work: &mut Workspace,
-    ) {
+    pub fn judge(&mut self, lanes: &mut Lanes, tol: f64, idle: Lane) {
         let good = mask_from(|l| !self.converged[l] && self.fault[l].is_none());
         let good = good & self.residual.simd_le(lane(tol)) & !idle;
         if good.none() {
             return;
         }
         // The longest handle is that of the last iterate.
+        let Lanes { space, chain, ends, work, .. } = lanes;
         let found = residual(space, chain, ends, &mut work.vectors);
         let fault = long_handles(space, chain, found.handle, good);
         self.handle = good.select(found.handle, self.handle);
@@ -142,26 +135,18 @@ impl Outcome {
     }
 
     /// Accepts the result of a further solver on some lanes, or restores the earlier one where that is better.
-    pub fn take(&mut self, space: &Erased, chain: &mut Chain, before: &[Lane], found: &Outcome, lanes: Lane) {
+    pub fn take(&mut self, lanes: &mut Lanes, before: &[Lane], found: &Outcome, on: Lane) {
         let (old, new) = (self.residual.to_array(), found.residual.to_array());
-        let lanes = mask_bits(lanes);
+        let on_lane = mask_bits(on);
         let better: [bool; LANES] =
-            few(|l| lanes[l] && (found.converged[l] || !(new[l] >= old[l])) && new[l].is_finite());
-        self.adopt(space, chain, before, found, mask_from(|l| better[l]), mask_from(|l| lanes[l]));
+            few(|l| on_lane[l] && (found.converged[l] || !(new[l] >= old[l])) && new[l].is_finite());
+        self.adopt(lanes, before, found, mask_from(|l| better[l]), on);
     }
 
     /// Accepts the result of a further solver on the lanes of a mask, and restores the earlier one on others. The
     /// iterations of both count as work.
-    pub fn adopt(
-        &mut self,
-        space: &Erased,
-        chain: &mut Chain,
-        before: &[Lane],
-        found: &Outcome,
-        mask: Lane,
-        on: Lane,
-    ) {
-        chain.update(space, |_, u| u.iter_mut().zip(before).for_each(|(u, b)| *u = mask.select(*u, *b)));
+    pub fn adopt(&mut self, lanes: &mut Lanes, before: &[Lane], found: &Outcome, mask: Lane, on: Lane) {
+        lanes.update(|_, u| u.iter_mut().zip(before).for_each(|(u, b)| *u = mask.select(*u, *b)));
         let (better, on) = (mask_bits(mask), mask_bits(on));
         self.residual = mask.select(found.residual, self.residual);
         self.rate = mask.select(found.rate, self.rate);
@@ -174,6 +159,22 @@ impl Outcome {
                 self.solver[l] = found.solver[l];
             }
         }
+    }
+}
+
+/// Eight curves to solve, and the memory of the solvers.
+pub struct Lanes<'a> {
+    pub space: &'a Erased<'a>,
+    pub chain: &'a mut Chain,
+    pub ends: &'a ChainEnds,
+    pub work: &'a mut Workspace,
+    pub monitor: &'a Monitor<'a>,
+}
+
+impl Lanes<'_> {
+    /// Updates the unknowns of the chain.
+    pub fn update(&mut self, change: impl FnOnce(&Chain, &mut [Lane])) {
+        self.chain.update(self.space, change);
     }
 }
 
@@ -191,16 +192,9 @@ pub struct Workspace {
 
 /// Iterates on the unknowns of a chain until every lane stops: Newton's method, or with `Solver::QuasiNewton` the
 /// quasi-Newton iteration. Lanes in `idle` do not change.
-pub fn solve(
-    space: &Erased,
-    chain: &mut Chain,
-    ends: &ChainEnds,
-    solver: Solver,
-    limits: Limits,
-    idle: Lane,
-    work: &mut Workspace,
-    monitor: &Monitor,
-) -> Outcome {
+pub fn solve(lanes: &mut Lanes, solver: Solver, limits: Limits, idle: Lane) -> Outcome {
+    let (space, ends, monitor) = (lanes.space, lanes.ends, lanes.monitor);
+    let (chain, work) = (&mut *lanes.chain, &mut *lanes.work);
     let Workspace { t, vectors, anderson, newton, step, next_step, best } = work;
     t.build(chain, ends);
     anderson.restart();

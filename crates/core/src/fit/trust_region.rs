@@ -11,8 +11,7 @@ use super::handles::shorten;
 use super::newton;
 use super::node::C2Residual;
 use super::problem::Solver;
-use super::solve::{Limits, Outcome, Workspace};
-use crate::monitor::Monitor;
+use super::solve::{Lanes, Limits, Outcome, Workspace};
 use crate::scalar::{Lane, dot, lane};
 use crate::space::{Ambient, Erased};
 
@@ -37,15 +36,9 @@ struct Model {
 }
 
 /// Iterates from the unknowns of a chain. Lanes in `idle` do not change.
-pub fn solve(
-    space: &Erased,
-    chain: &mut Chain,
-    ends: &ChainEnds,
-    limits: Limits,
-    idle: Lane,
-    work: &mut Workspace,
-    monitor: &Monitor,
-) -> Outcome {
+pub fn solve(lanes: &mut Lanes, limits: Limits, idle: Lane) -> Outcome {
+    let (space, ends, monitor) = (lanes.space, lanes.ends, lanes.monitor);
+    let (chain, work) = (&mut *lanes.chain, &mut *lanes.work);
     let count = chain.unknowns().len();
     let weights = weights(chain, ends);
     let limit = space.cut_angle() * HANDLE_LIMIT;

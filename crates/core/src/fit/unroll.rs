@@ -2,6 +2,7 @@
 
 use super::chain::{Chain, Run, Visit, Walker};
 use super::end_kind::{ChainEnds, EndKind, of_kind};
+use super::joint::BothRows;
 use crate::scalar::{LANES, Lane, Scalar, dot, few, gather, lane, max_or_nan};
 use crate::space::{Ambient, Erased, Frame, Origin, Space, below};
 use crate::with_size;
@@ -55,7 +56,8 @@ impl Walker {
 }
 
 impl Chain {
-    /// Unrolls `n` segments of eight polygons. `values` are prescribed ambient vectors at the ends.
+    /// Unrolls `n` segments of eight polygons. `values` are prescribed ambient vectors at the ends, and `both` those of ends
+    /// with two conditions.
     pub fn unroll(
         &mut self,
         space: &Erased,
@@ -63,6 +65,7 @@ impl Chain {
         n: usize,
         ends: &ChainEnds,
         values: [Option<[&[f64]; LANES]>; 2],
+        both: [Option<BothRows>; 2],
     ) {
         let (m, len, keep) = (space.dim(), space.point_len(), space.chord_len());
         (self.n, self.m, self.closed) = (n, m, matches!(ends, ChainEnds::Periodic));
@@ -87,11 +90,13 @@ impl Chain {
         self.start.0.clone_from(&self.walker.frame);
         self.start.1.clone_from(&self.walker.p);
         self.read_end(space, 0, ends, values[0]);
+        self.join_end(space, 0, runs, both[0].as_ref());
         space.0.walk(self, runs);
         self.longest = self.longest.sqrt() / self.scale;
         self.max_step = if has_metric(space) { self.longest } else { self.max_step.sqrt() };
         self.pace = self.pace.sqrt();
         self.read_end(space, 1, ends, values[1]);
+        self.join_end(space, 1, runs, both[1].as_ref());
     }
 
     /// Moves along the polygon and stores its chords.

@@ -128,32 +128,3 @@ fn root_minus_one<S: Scalar, const D: usize, A: Storage>(
     }
     x.plus_identity(lane(-1.0))
 }
-
-#[cfg(test)]
-mod tests {
-    use super::{exp_any_minus_one, log_any_one_plus};
-    use crate::matrix::Matrix;
-    use crate::scalar::{Jet, Lane, Scalar, lane};
-
-    #[test]
-    fn the_logarithm_of_an_exponential_has_its_derivatives() {
-        // Small ones need no roots; the largest turns by 2.94 and needs Schur's form. t A has the derivatives A and 0.
-        for size in [0.01, 0.3, 1.0, 1.2] {
-            // Near a rotation by π rounding errors grow with each derivative, by the square of the distance from π.
-            let slack = (std::f64::consts::PI - 2.45 * size).min(1.0);
-            let a = [[0.3, -2.5], [2.4, 0.1]].map(|row| row.map(|x| x * size));
-            let t = Jet::from_parts([Lane::ONE, Lane::ONE, Lane::ZERO]);
-            let ta = Matrix::<Jet, 1>::from_fn(2, 2, |i, j| [t * lane(a[i][j])]);
-            let (log, _) = log_any_one_plus(&exp_any_minus_one(&ta));
-            for i in 0..2 {
-                for j in 0..2 {
-                    let found = log[(i, j)][0].parts().map(|x| x.to_array()[0]);
-                    for (order, expected) in [a[i][j], a[i][j], 0.0].into_iter().enumerate() {
-                        let allowed = 1e-13 * size / slack.powi(2 * order as i32);
-                        assert!((found[order] - expected).abs() < allowed, "{} at {size}", found[order]);
-                    }
-                }
-            }
-        }
-    }
-}

@@ -59,24 +59,3 @@ pub fn scatter_apart(lanes: &[Lane], stride: usize, out: &mut [f64]) {
         c += 1;
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    proptest! {
-        #[test]
-        fn scatter_undoes_gather(len in 1..11_usize, rows in 1..=LANES) {
-            let data: Vec<f64> = (0..LANES * len).map(|i| i as f64).collect();
-            let mut lanes = vec![Lane::ZERO; len];
-            gather(few(|l| &data[l * len..(l + 1) * len]), &mut lanes);
-            for c in 0..len {
-                prop_assert_eq!(lanes[c].to_array(), few(|l| (l * len + c) as f64));
-            }
-            let mut out = vec![0.0; rows * len];
-            scatter(&lanes, &mut out);
-            prop_assert_eq!(&out[..], &data[..rows * len]);
-        }
-    }
-}

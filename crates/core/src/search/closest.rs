@@ -13,7 +13,7 @@ const MARGIN: f64 = 0.25;
 
 /// Samples of curves, with equal numbers for all curves.
 #[derive(Clone, Copy)]
-pub struct Samples<'a> {
+pub struct TimeSamples<'a> {
     /// Number of samples per curve.
     pub count: usize,
     /// Increasing times, curve after curve; between two of them, the squared distance from a point is close to a cubic
@@ -50,7 +50,7 @@ pub struct Nearest {
 /// bound is not below the distance from another sample are excluded, and the others are bisected down to single
 /// intervals between samples. There, minima are roots of the derivative of the squared distance.
 pub fn closest<D: Distances>(
-    samples: Samples,
+    samples: TimeSamples,
     first: usize,
     curve: &[usize],
     distances: &mut D,
@@ -87,7 +87,7 @@ struct Interval {
 }
 
 struct Search<'a, D> {
-    samples: Samples<'a>,
+    samples: TimeSamples<'a>,
     first: usize,
     curve: &'a [usize],
     distances: &'a mut D,
@@ -312,47 +312,5 @@ impl Interval {
         };
         let x = self.ends[0] + if inside { tau } else { 0.5 } * h;
         (x.clamp(self.ends[0], self.ends[1]), lowest)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use std::convert::Infallible;
-    use std::f64::consts::{PI, TAU};
-
-    /// The distance d(x) = 3 + cos(2πx − ½) of one target, whose derivative is unknown before some time.
-    struct Wave {
-        unknown_before: f64,
-    }
-
-    fn distance(x: f64) -> f64 {
-        3.0 + (TAU * x - 0.5).cos()
-    }
-
-    impl Distances for Wave {
-        type Error = Infallible;
-
-        fn of_samples(&mut self, _: &[usize], number: &[usize]) -> Result<Vec<f64>, Infallible> {
-            Ok(number.iter().map(|&i| distance(i as f64)).collect())
-        }
-
-        fn at(&mut self, _: &[usize], x: &[f64]) -> Result<[Vec<f64>; 2], Infallible> {
-            let slope = |&x: &f64| {
-                if x < self.unknown_before { f64::NAN } else { -TAU * (TAU * x - 0.5).sin() * distance(x) }
-            };
-            Ok([x.iter().map(|&x| distance(x)).collect(), x.iter().map(slope).collect()])
-        }
-    }
-
-    /// The distance increases at both ends of the only interval, so that the minimum is found by division.
-    #[test]
-    fn minima_without_a_change_of_sign_at_the_ends_are_found() {
-        for unknown_before in [0.0, 0.1, 0.4] {
-            let samples = Samples { count: 2, times: &[0.0, 1.0], lengths: &[0.0, 20.0] };
-            let found = closest(samples, 0, &[0], &mut Wave { unknown_before }).unwrap();
-            assert!((found[0].distance - 2.0).abs() < 1e-12, "{unknown_before}: {found:?}");
-            assert!((found[0].time - (PI + 0.5) / TAU).abs() < 1e-7, "{unknown_before}: {found:?}");
-        }
     }
 }

@@ -5,7 +5,7 @@ mod on_curves;
 mod roots;
 mod time_law;
 
-pub use closest::{Distances, Nearest, Samples, closest};
+pub use closest::{Distances, Nearest, TimeSamples, closest};
 pub use on_curves::{Targets, closest_on_curves};
 pub use roots::{Bracket, roots};
 pub use time_law::Path;

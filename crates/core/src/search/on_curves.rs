@@ -1,6 +1,6 @@
 //! Distances from curves of the core.
 
-use super::closest::{Distances, Nearest, Samples, closest};
+use super::closest::{Distances, Nearest, TimeSamples, closest};
 use crate::curve::{Curves, Factor, Outside, Quantity, Times, evaluate};
 use crate::monitor::Monitor;
 use crate::parallel;
@@ -25,7 +25,7 @@ pub struct Targets<'a> {
 /// Finds the nearest points of curves to targets, which belong to some curves, in increasing order.
 pub fn closest_on_curves(
     targets: &[Targets],
-    samples: Samples,
+    samples: TimeSamples,
     curve: &[usize],
     monitor: &Monitor,
     out: &mut [Nearest],
@@ -44,7 +44,7 @@ pub fn closest_on_curves(
 
 struct OnCurves<'a> {
     targets: &'a [Targets<'a>],
-    samples: Samples<'a>,
+    samples: TimeSamples<'a>,
     curve: &'a [usize],
     monitor: &'a Monitor<'a>,
 }
