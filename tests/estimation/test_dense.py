@@ -59,9 +59,38 @@ def test_flat_posterior(penalty):
         assert np.abs(curve.cov(x, nu=1) - d @ part @ d.T).max() < 1e-9
         joint = np.concatenate([a, d])
         assert np.abs(curve.cov(x, nu="joint") - joint @ part @ joint.T).max() < 1e-9
+    # The prior is a measurement of the bias.
+    left = whole @ mean - right
+    assert curve.report.sigma == pytest.approx(np.sqrt(left @ left / (39 - np.trace(cov @ whole.T @ whole))), rel=1e-9)
     whole[38] = 0
     freedom = np.diag(cov @ whole.T @ whole)
     assert abs(freedom[:16].sum() / 2 - curve.df) < 1e-9
+
+
+@pytest.mark.parametrize("prior", [None, 0.5])
+def test_the_chosen_lam_has_the_least_restricted_likelihood(prior):
+    rng = np.random.default_rng(3)
+    t, s = (sensors.times(rng, 0, 5, n) for n in (14, 9))
+    y, z = np.sin(2 * t) + 0.1 * rng.standard_normal(14), np.sin(2 * s) + 0.4 + 0.1 * rng.standard_normal(9)
+    bias = measure.Constant(1, sigma=prior)
+    sensor = measure.Function(s, lambda x, p: x + p["b"] - z[:, None], sigma=0.1, parameters={"b": bias})
+    curve = ss.estimate([measure.Points(t, y[:, None], sigma=0.1), sensor], KNOTS, "r:1", tol=1e-10)
+    rows = np.zeros((24, 9))
+    rows[:23, :8] = basis(np.append(t, s), 0, "acceleration") / 0.1
+    rows[14:23, 8], rows[23, 8] = 1 / 0.1, 0 if prior is None else 1 / prior
+    right = np.concatenate([y, z, [0]]) / 0.1
+    energy = np.zeros((9, 9))
+    energy[:8, :8] = stiffness("acceleration")
+
+    def score(lam):
+        matrix = rows.T @ rows + lam * energy
+        x = np.linalg.solve(matrix, rows.T @ right)
+        squares = ((rows @ x - right) ** 2).sum() + lam * x @ energy @ x
+        count = 23 if prior is None else 24
+        return (count - 3) * np.log(squares) + np.linalg.slogdet(matrix)[1] - 6 * np.log(lam)
+
+    near = curve.report.lam * np.exp(np.linspace(-0.2, 0.2, 41))
+    assert abs(int(np.argmin([score(lam) for lam in near])) - 20) <= 1
 
 
 def test_a_time_offset_has_the_variance_of_least_squares():

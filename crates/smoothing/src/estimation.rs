@@ -169,7 +169,8 @@ impl<'a> Estimation<'a> {
             priors: priors.iter().map(|(precision, _)| *precision).collect(),
             pull,
             squares: priors.iter().map(|(precision, off)| precision * off * off).sum(),
-            count: 0,
+            // A prior is a measurement of its parameter.
+            count: priors.iter().filter(|(precision, _)| *precision > 0.0).count(),
             stiffness,
             penalty,
             jacobi,
@@ -320,13 +321,14 @@ impl<'a> Estimation<'a> {
             .map(|(((own, first), stiffness), lam)| (own, first, stiffness, *lam))
     }
 
-    /// A product of an entry of the inverse with ΣLᵀL, ΣLᵀJ or ΣJᵀJ, summed over each row: parameters first.
+    /// A product of an entry of the inverse with ΣLᵀL, ΣLᵀJ or ΣJᵀJ, where priors are rows of J, summed over each row:
+    /// parameters first.
     fn freedoms(&self, inverse: &Inverse) -> Vec<Lane> {
         let (p, stride, size) = (self.p, stride(self.m), inverse.band.size);
         let mut out = vec![Lane::ZERO; p + size];
         for a in 0..p {
             let terms = (0..p).map(|b| inverse.at(a, b) * lane(self.corner[a * p + b]));
-            out[a] = terms.fold(Lane::ZERO, |sum, x| sum + x);
+            out[a] = terms.fold(inverse.at(a, a) * lane(self.priors[a]), |sum, x| sum + x);
         }
         for i in 0..size {
             checkpoint();
@@ -402,9 +404,9 @@ impl<'a> Estimation<'a> {
         }
     }
 
-    /// Degrees of freedom of all coordinates without energy.
+    /// Degrees of freedom without energy: of all coordinates, and parameters.
     fn null(&self) -> f64 {
-        self.linearized.null() * self.m as f64
+        self.linearized.null() * self.m as f64 + self.p as f64
     }
 
     /// Solves the problem. λ that are None are chosen by the criterion, one factor after another, near the guesses if
@@ -505,7 +507,7 @@ impl<'a> Estimation<'a> {
         freedom + STRAIGHT * self.factors[chosen].dim() as f64
     }
 
-    /// The sum of squared residuals and their number.
+    /// The sum of squared residuals and their number, including distances from prior means.
     pub fn residuals(&self) -> (f64, usize) {
         (self.squares, self.count)
     }
