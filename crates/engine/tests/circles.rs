@@ -142,7 +142,7 @@ use symspline_engine::curve::{Curves, Outside, Quantity, Times, evaluate};
 use symspline_engine::fit::{End, Ends, Method, Options, Problem, Status, fit};
 use symspline_engine::laws::check;
 use symspline_engine::monitor::Monitor;
-use symspline_engine::rows::{Fault, Operation, apply, project_points};
+use symspline_engine::rows::{Operation, RowFault, apply, project_points};
 use symspline_engine::space::Erased;
 use symspline_engine::spaces::Euclidean;
 
@@ -186,7 +186,7 @@ fn difference(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).fold(0.0, |most, (a, b)| (a - b).abs().max(most))
 }
 
-fn run(operation: Operation, inputs: &[&[f64]], t: &[f64], len: usize) -> Result<Vec<f64>, Fault> {
+fn run(operation: Operation, inputs: &[&[f64]], t: &[f64], len: usize) -> Result<Vec<f64>, RowFault> {
     let mut out = vec![0.0; len];
     apply(&Erased(&Circles::new(2).unwrap()), operation, inputs, t, &Monitor::new(&ON), &mut out)
         .map(|()| out)
