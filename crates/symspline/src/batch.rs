@@ -1,12 +1,12 @@
 //! Many curves.
 
-use crate::curves::Curves;
+use crate::curves::{Curves, Report};
 use crate::error::Error;
 use crate::options::Builder;
 use crate::point::Point;
 use crate::samples::Samples;
 use crate::space::Space;
-use crate::spline::{CubicSpline, Report};
+use crate::spline::CubicSpline;
 use symspline_engine::curve::Quantity;
 
 impl<S: Space, P: Point<S>> Builder<S, P> {

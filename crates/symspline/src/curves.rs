@@ -1,18 +1,17 @@
 //! Fitted curves as lists of numbers in each factor of their space: validation, fit and evaluation.
 
-use crate::error::Error;
+use crate::error::{Error, name_of};
 use crate::options::{Builder, End, Ends, Extrapolate, Method};
-use crate::point::{Point, Rows};
+use crate::point::{Point, Rows, read};
 use crate::samples::Samples;
 use crate::space::{Space, Table};
-use crate::spline::Report;
 use std::fmt;
 use std::marker::PhantomData;
 use std::ops::Range;
 use std::panic::{RefUnwindSafe, UnwindSafe};
 use std::sync::Arc;
 use symspline_engine::curve::{self, Quantity, Times, evaluate_product};
-use symspline_engine::fit::{self, Options, Problem};
+use symspline_engine::fit::{self, Options, Problem, Solver};
 use symspline_engine::monitor::Monitor;
 #[cfg(feature = "serde")]
 use symspline_engine::rows::tangent_defects;
@@ -41,6 +40,40 @@ struct Factor {
     table: Table,
     points: Vec<f64>,
     velocities: Vec<f64>,
+}
+
+/// Report of a fit. For a curve that was read from a file, residual and longest step are NaN. For a product, iterations,
+/// residual and solver are the worst of the factors.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Report {
+    /// The number of iterations.
+    pub iterations: usize,
+    /// The relative C² residual.
+    pub residual: f64,
+    /// The longest distance between neighbouring points, D of (21) of the paper.
+    pub max_step: f64,
+    /// The name of the solver that found the curve.
+    pub solver: &'static str,
+}
+
+impl Report {
+    /// The report of a curve that was not fitted here.
+    #[cfg(feature = "serde")]
+    pub(crate) fn unknown() -> Self {
+        Report { iterations: 0, residual: f64::NAN, max_step: f64::NAN, solver: "none" }
+    }
+
+    /// The worst of the reports in each factor, with the longest step in the product.
+    pub(crate) fn new<'a>(factors: impl IntoIterator<Item = &'a fit::Report>, max_step: f64) -> Self {
+        let (mut iterations, mut residual, mut solver) = (0, 0.0_f64, Solver::FixedPoint);
+        for report in factors {
+            iterations = iterations.max(report.iterations);
+            residual = residual.max(report.residual);
+            solver = if report.solver as u8 > solver as u8 { report.solver } else { solver };
+        }
+        Report { iterations, residual, max_step, solver: name_of(solver) }
+    }
 }
 
 /// Reports of the fits, by factor and curve.
@@ -88,7 +121,7 @@ pub fn tables(space: &impl Space) -> Result<Vec<Table>, Error> {
         return Err(Error::InvalidSpace { reason: "a product needs at least one factor".into() });
     }
     let table = |(i, factor): (usize, &&dyn crate::space::Factor)| {
-        factor.table().map_err(|error| error.in_factor(space, i))
+        factor.table().map_err(|error| error.in_factor(&space.factors(), i))
     };
     factors.iter().enumerate().map(table).collect()
 }
@@ -113,7 +146,7 @@ pub fn rows<S: Space, P: Point<S>>(
                 let found = row.len() - (offsets[curve] + node) * expected;
                 if found != expected {
                     let error = Error::PointLength { curve, node, expected, found };
-                    return Err(error.in_factor(space, factor));
+                    return Err(error.in_factor(&space.factors(), factor));
                 }
             }
         }
@@ -123,19 +156,6 @@ pub fn rows<S: Space, P: Point<S>>(
         offsets.push(offsets[curve] + points.len());
     }
     Ok((rows, offsets))
-}
-
-/// Values from their numbers in each factor.
-pub fn read<V: Rows>(arrays: &[impl AsRef<[f64]>], count: usize) -> impl Iterator<Item = V> {
-    let mut rows = Vec::with_capacity(arrays.len());
-    (0..count).map(move |i| {
-        rows.clear();
-        rows.extend(arrays.iter().map(|array| {
-            let len = array.as_ref().len() / count;
-            &array.as_ref()[i * len..][..len]
-        }));
-        V::read_rows(&rows)
-    })
 }
 
 impl<S: Space, P: Point<S>> Curves<S, P> {
@@ -201,7 +221,7 @@ impl<S: Space, P: Point<S>> Curves<S, P> {
         for (i, (table, rows)) in tables.into_iter().zip(rows).enumerate() {
             let problem = Problem { t: &t, shared, points: &rows, offsets: &offsets, ends: ends(i) };
             let points = validate(&Erased(&*table), &problem, builder.point_tol)
-                .map_err(|invalid| Error::of_input(invalid).in_factor(&builder.space, i))?;
+                .map_err(|invalid| Error::of_input(invalid).in_factor(&builder.space.factors(), i))?;
             factors.push(Factor { table, velocities: vec![0.0; points.len()], points });
         }
         let method = match builder.method {
@@ -225,7 +245,7 @@ impl<S: Space, P: Point<S>> Curves<S, P> {
     pub fn failure(&self, reports: &Reports, tol: f64) -> Option<Error> {
         let in_factor = |curve: usize, i: usize| {
             let error = Error::of_fit(curve, &reports[i][curve], &self.factors[i].space(), tol)?;
-            Some(error.in_factor(&self.space, i))
+            Some(error.in_factor(&self.space.factors(), i))
         };
         (0..self.count()).find_map(|curve| (0..reports.len()).find_map(|i| in_factor(curve, i)))
     }
@@ -284,12 +304,12 @@ impl<S: Space, P: Point<S>> Curves<S, P> {
             let ends = fit::Ends::Open([fit::End::Natural; 2]);
             let problem = Problem { t: &t, shared: true, points, offsets: &[0, nodes], ends };
             let points = validate(&space, &problem, builder.point_tol)
-                .map_err(|invalid| Error::of_input(invalid).in_factor(&builder.space, i))?;
+                .map_err(|invalid| Error::of_input(invalid).in_factor(&builder.space.factors(), i))?;
             let defects = tangent_defects(&space, &points, &velocities);
             if let Some(node) = defects.iter().position(|d| !(*d <= builder.point_tol)) {
                 let condition = "its velocity is not tangent".into();
                 let error = Error::OffSpace { curve: 0, node, distance: defects[node], condition };
-                return Err(error.in_factor(&builder.space, i));
+                return Err(error.in_factor(&builder.space.factors(), i));
             }
             factors.push(Factor { table, points, velocities });
         }
@@ -508,7 +528,7 @@ fn end_vectors<S: Space, P: Point<S>>(
                 let found = out[i].len() - before;
                 if found != len {
                     let error = Error::PointLength { curve, node: node - pair[0], expected: len, found };
-                    return Err(error.in_factor(&builder.space, i));
+                    return Err(error.in_factor(&builder.space.factors(), i));
                 }
             }
         }

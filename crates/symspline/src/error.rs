@@ -1,6 +1,5 @@
 //! Errors, with the numbers that they are about.
 
-use crate::space::Space;
 use std::fmt;
 use symspline_engine::fit::{Report, Solver, Status};
 use symspline_engine::space::{Ambient, Erased};
@@ -201,18 +200,15 @@ pub enum Error {
 
 impl Error {
     /// The error in one factor of a space. Factors have common times, so that errors of times remain as they are.
-    pub(crate) fn in_factor(self, space: &impl Space, factor: usize) -> Self {
+    pub(crate) fn in_factor(self, factors: &[impl fmt::Debug], factor: usize) -> Self {
         let of_times = matches!(
             self,
             Error::TimeNotFinite { .. } | Error::UnsortedTimes { .. } | Error::TimesTooFarApart { .. }
         );
-        match &space.factors()[..] {
-            [_] => self,
-            _ if of_times => self,
-            factors => {
-                Error::InFactor { factor, space: format!("{:?}", factors[factor]), error: Box::new(self) }
-            }
+        if factors.len() == 1 || of_times {
+            return self;
         }
+        Error::InFactor { factor, space: format!("{:?}", factors[factor]), error: Box::new(self) }
     }
 
     /// The error of validation.

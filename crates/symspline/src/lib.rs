@@ -125,6 +125,7 @@ mod space;
 mod spline;
 
 pub use batch::Batch;
+pub use curves::Report;
 pub use error::Error;
 pub use options::{Builder, End, Ends, Extrapolate, Method};
 #[cfg(feature = "rotations")]
@@ -143,7 +144,7 @@ pub use space::{AnySpace, Factor, Space};
 pub use space::{BodyFrame, Se3, So3};
 #[cfg(feature = "vectors")]
 pub use space::{Euclidean, Hyperbolic, Sphere};
-pub use spline::{CubicSpline, Report};
+pub use spline::CubicSpline;
 
 /// Limits the number of threads; 0 means all cores, which is the default.
 pub use symspline_engine::parallel::set_num_threads;

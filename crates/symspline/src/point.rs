@@ -143,3 +143,16 @@ impl<const N: usize> Point<PositiveDefinite<N>> for [[f64; N]; N] {
 impl<const K: usize, const N: usize> Point<Grassmannian<K, N>> for [[f64; K]; N] {
     type Tangent = [[f64; K]; N];
 }
+
+/// Values from their numbers in each factor.
+pub fn read<V: Rows>(arrays: &[impl AsRef<[f64]>], count: usize) -> impl Iterator<Item = V> {
+    let mut rows = Vec::with_capacity(arrays.len());
+    (0..count).map(move |i| {
+        rows.clear();
+        rows.extend(arrays.iter().map(|array| {
+            let len = array.as_ref().len() / count;
+            &array.as_ref()[i * len..][..len]
+        }));
+        V::read_rows(&rows)
+    })
+}

@@ -1,7 +1,6 @@
 //! Values at many times.
 
-use crate::curves::read;
-use crate::point::Rows;
+use crate::point::{Rows, read};
 use std::ops::Index;
 
 /// Values of many curves at the same times: `samples[curve][time]`.

@@ -1,10 +1,10 @@
 //! Curves in files and messages. What is read is validated.
 
-use crate::curves::Curves;
+use crate::curves::{Curves, Report};
 use crate::error::Error;
 use crate::point::Point;
 use crate::space::{AnySpace, Space};
-use crate::spline::{CubicSpline, Report};
+use crate::spline::CubicSpline;
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de, ser::SerializeStruct};
 
 /// The contents of a curve: points and velocities as lists of numbers, matrices row by row. For a product, these are all

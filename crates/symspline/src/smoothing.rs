@@ -238,13 +238,13 @@ impl Smoothing {
         not_decreasing(times)?;
         for (i, (table, numbers)) in tables.iter().zip(&mut numbers).enumerate() {
             validate::points(&Erased(&**table), numbers, &offsets, self.point_tol)
-                .map_err(|invalid| Error::of_input(invalid).in_factor(&space, i))?;
+                .map_err(|invalid| Error::of_input(invalid).in_factor(&space.factors(), i))?;
         }
         let knots = self.knots_for(times, weights)?;
         let smooth = |i: usize| {
             let found =
                 self.smooth(&Erased(&*tables[i]), times, &numbers[i], weights, &knots, lam[i], sigma[i]);
-            failure(found.report.state).map_err(|error| error.in_factor(&space, i))?;
+            failure(found.report.state).map_err(|error| error.in_factor(&space.factors(), i))?;
             Ok(found)
         };
         let smoothed = (0..tables.len()).map(smooth).collect::<Result<Vec<_>, Error>>()?;

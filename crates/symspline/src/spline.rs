@@ -1,48 +1,13 @@
 //! Spline curves and their fit.
 
-use crate::curves::Curves;
-use crate::error::{Error, name_of};
+use crate::curves::{Curves, Report};
+use crate::error::Error;
 use crate::options::Builder;
 use crate::point::Point;
 #[cfg(feature = "rotations")]
 use crate::space::BodyFrame;
 use crate::space::Space;
 use symspline_engine::curve::Quantity;
-use symspline_engine::fit::{self, Solver};
-
-/// Report of a fit. For a curve that was read from a file, residual and longest step are NaN. For a product, iterations,
-/// residual and solver are the worst of the factors.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
-pub struct Report {
-    /// The number of iterations.
-    pub iterations: usize,
-    /// The relative C² residual.
-    pub residual: f64,
-    /// The longest distance between neighbouring points, D of (21) of the paper.
-    pub max_step: f64,
-    /// The name of the solver that found the curve.
-    pub solver: &'static str,
-}
-
-impl Report {
-    /// The report of a curve that was not fitted here.
-    #[cfg(feature = "serde")]
-    pub(crate) fn unknown() -> Self {
-        Report { iterations: 0, residual: f64::NAN, max_step: f64::NAN, solver: "none" }
-    }
-
-    /// The worst of the reports in each factor, with the longest step in the product.
-    pub(crate) fn new<'a>(factors: impl IntoIterator<Item = &'a fit::Report>, max_step: f64) -> Self {
-        let (mut iterations, mut residual, mut solver) = (0, 0.0_f64, Solver::FixedPoint);
-        for report in factors {
-            iterations = iterations.max(report.iterations);
-            residual = residual.max(report.residual);
-            solver = if report.solver as u8 > solver as u8 { report.solver } else { solver };
-        }
-        Report { iterations, residual, max_step, solver: name_of(solver) }
-    }
-}
 
 impl<S: Space, P: Point<S>> Builder<S, P> {
     /// Fits the curve through points at increasing times.

@@ -60,8 +60,8 @@ pub use problem::{Both, End, Ends, Method, Options, Problem, Report, Solver, Sol
 /// What the tests of this crate need.
 #[doc(hidden)]
 pub mod private {
-    pub use super::certificate::{contraction_bound, guaranteed_sweeps, invariant_radius};
-    pub use super::homotopy::predict;
+    pub use crate::fit::certificate::{contraction_bound, guaranteed_sweeps, invariant_radius};
+    pub use crate::fit::homotopy::predict;
 }
 
 use crate::monitor::Monitor;
