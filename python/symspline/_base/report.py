@@ -15,7 +15,7 @@ from .typing import Number
 _LONG = 10
 
 
-# The most segments of a curve that the compiled core solves as a whole, `LONG` of `fit/mod.rs`.
+# The most segments of a curve that the compiled core solves as a whole, `LONG` of `fit/curves.rs`.
 _WHOLE = 512
 # Several solutions may exist if a step exceeds this fraction of the injectivity radius.
 _FAR, _HALF_WAY, _SLOW = 0.55, 0.4, 16

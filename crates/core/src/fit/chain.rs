@@ -6,8 +6,21 @@
 //!
 //! Eight chains of equal length occupy the lanes: curves of a batch, or sections of a long curve.
 
-use super::joint::Joint;
 use crate::scalar::{LANES, Lane};
+
+/// An end with two conditions, seen from the frame at b₂, which is transported from p₀.
+#[derive(Clone, Default)]
+pub struct Joint {
+    /// The chords from b₂ to p₀ and to the next node, and what `Origin::prepare` computes for them.
+    pub(super) chords: [Vec<Lane>; 2],
+    pub(super) prepared: [Vec<Lane>; 2],
+    /// Coordinates at the next node in its frame of the chain, converted to the frame transported along the second chord.
+    pub(super) turn: Vec<Lane>,
+    /// y
+    pub(super) bend: Vec<Lane>,
+    /// h', in units of the clock of the chain.
+    pub(super) apart: Lane,
+}
 
 /// The data of one lane of a chain: a run of nodes of a curve. In a closed curve the numbering continues around the
 /// curve.

@@ -4,7 +4,7 @@
 //! condition there. The equations on both sides are then independent, so that each section between two such points is a
 //! fit with prescribed end velocities. A closed curve is rotated to begin at the first of these points.
 
-use super::fit;
+use super::curves::fit;
 use super::joint::{BothRows, control_points};
 use super::problem::{Both, End, Ends, Options, Problem, Report, Status};
 use crate::curve::{Curves, Integrand, Outside, Quantity, Times, energies, evaluate};

@@ -4,8 +4,7 @@
 //! λ = 1 it is the requested one, and Newton's method follows it in between. Points that are far apart have several
 //! splines; this one is the continuation of the spline through points that are close together.
 
-use super::chain::Chain;
-use super::joint::Joint;
+use super::chain::{Chain, Joint};
 use super::problem::Solver;
 use super::solve::{Lanes, Limits, Outcome, solve};
 use crate::scalar::{LANES, Lane, lane, mask_from};

@@ -22,7 +22,7 @@
 //!
 //! Its Jacobian is block tridiagonal like that of any other end. All solvers apply.
 
-use super::chain::{Chain, Run};
+use super::chain::{Chain, Joint, Run};
 use super::end_kind::{ChainEnds, EndKind, of_kind};
 use super::ends::ChainEnd;
 use super::node::NodeVectors;
@@ -48,20 +48,6 @@ impl<'a> BothRows<'a> {
         let (velocity, acceleration) = vectors.split_at(vectors.len() / 2);
         BothRows { velocities: [velocity; LANES], accelerations: [acceleration; LANES], apart: lane(apart) }
     }
-}
-
-/// An end with two conditions, seen from the frame at b₂, which is transported from p₀.
-#[derive(Clone, Default)]
-pub struct Joint {
-    /// The chords from b₂ to p₀ and to the next node, and what `Origin::prepare` computes for them.
-    chords: [Vec<Lane>; 2],
-    prepared: [Vec<Lane>; 2],
-    /// Coordinates at the next node in its frame of the chain, converted to the frame transported along the second chord.
-    turn: Vec<Lane>,
-    /// y
-    bend: Vec<Lane>,
-    /// h', in units of the clock of the chain.
-    apart: Lane,
 }
 
 impl Joint {
