@@ -82,6 +82,21 @@ def test_a_run_across_the_ends_of_a_periodic_axis_is_one_run():
     assert np.isnan(grid(rng.uniform(t[3] + 1e-9, t[6] - 1e-9, 9))).all()
 
 
+@pytest.mark.parametrize("gap", [1, -2])
+def test_the_first_node_of_a_periodic_axis_beside_a_gap_belongs_to_the_run_on_its_other_side(gap):
+    rng = np.random.default_rng(2)
+    t = 5 + knots(rng, 9)
+    points = rng.normal(size=(9, 1))
+    points[-1] = points[0]
+    points[gap] = np.nan
+    grid = ss.GridSpline((t,), points, "r:1", bc_type="periodic")
+    run = slice(2, 9) if gap == 1 else slice(0, 7)
+    alone = ss.CubicSpline(t[run], points[run], "r:1", bc_type="not-a-knot")
+    for nu in range(3):
+        expected = alone(t[-1] if gap == 1 else t[0], nu)
+        assert np.abs(grid(t[[0, -1]], nu) - expected).max() < 1e-11 * max(1, abs(expected[0]))
+
+
 @pytest.mark.parametrize("symmetric", [False, True])
 @pytest.mark.parametrize("nu", [(0, 0), (1, 0), (2, 0), (1, 1)])
 def test_the_last_node_before_a_gap_belongs_to_its_run(nu, symmetric):

@@ -267,6 +267,16 @@ def test_dates_and_large_integers():
     assert np.abs(spline(ticks[0], 2) - 1e-12).max() < 1e-20
 
 
+@pytest.mark.parametrize(
+    "t", [np.array([1, 2, 5, 6], "datetime64[ns]"), np.array([1.0, np.nextafter(1, 2), np.nextafter(3, 2), 3.0])]
+)
+def test_knots_without_a_time_between_them(t):
+    y, both = np.arange(4.0)[:, None], [(1, [0.0]), (2, [0.0])]
+    raises("at the first point.*first two knots are too close", ss.CubicSpline, t, y, "r:1", bc_type=(both, "natural"))
+    raises("at the last point.*last two knots are too close", ss.CubicSpline, t, y, "r:1", bc_type=("natural", both))
+    raises("increas", ss.CubicSpline, [0.0, 0.0, 1.0, 2.0], y, "r:1", bc_type=(both, "natural"))
+
+
 def test_files_and_pickles_of_more_conditions(rng):
     p = nine_points(S2, rng)
     v, a = (tangents_at(S2, p[0], seed=s) for s in (1, 2))

@@ -57,6 +57,7 @@ def fit_with_conditions(
         second = read_ends(moved_ends(accelerations, space, data), space, batch)
         which = [end for end, condition in enumerate(accelerations) if not isinstance(condition, str)]
         shown = with_knots(time_axis, shown, problem.times, batch, which)
+        _check_additional(shown, which)
         ends: list[list[End] | None] = [both(*pair, batch) for pair in zip(problem.ends, second, strict=True)]
         problem, shift = problem._replace(times=time_axis.knots(shown), ends=ends), int(0 in which)
     invalid: list[Fault] = []
@@ -92,6 +93,20 @@ def with_knots(
     first, last = between(shown[..., :1], shown[..., 1:2], 1), between(shown[..., -2:-1], shown[..., -1:], parts - 1)
     start, stop = [[first] if 0 in which else [], [last] if 1 in which else []]
     return np.concatenate([shown[..., :1], *start, shown[..., 1:-1], *stop, shown[..., -1:]], axis=-1)
+
+
+def _check_additional(shown: NDArray[Any], which: list[int]) -> None:
+    """Raise ValidationError if there is no time for an additional knot between the knots beside it."""
+    for end in which:
+        before, added, after = np.moveaxis(shown[..., :3] if end == 0 else shown[..., -3:], -1, 0)
+        # Knots that do not increase are another error.
+        if ((before < after) & ~((before < added) & (added < after))).any():
+            name = ("first", "last")[end]
+            raise ValidationError(
+                f"bc_type prescribes a velocity and an acceleration at the {name} point. They need an additional knot, "
+                f"but the {name} two knots are too close for a time between them. Pass times in a finer unit, or "
+                "prescribe only one of the two vectors."
+            )
 
 
 def read_inner(velocities: Any, space: Space[Any], data: list[Points]) -> InnerVelocities:
