@@ -267,6 +267,20 @@ def test_dates_and_large_integers():
     assert np.abs(spline(ticks[0], 2) - 1e-12).max() < 1e-20
 
 
+def test_an_additional_knot_that_does_not_halve_its_segment(rng):
+    """The middle of three nanoseconds is rounded to the first of them."""
+    t = np.array([4, 7, 12, 16, 19], "datetime64[ns]")
+    points = walk(S2, 0.3, 5, rng)
+    v, w = (S2.project_tangent(points[[0, -1]], 0.05 * rng.normal(size=(2, 3))) for _ in range(2))
+    bc_type = ([(1, 1e9 * v[0]), (2, 1e18 * w[0])], [(1, 1e9 * v[1]), (2, 1e18 * w[1])])
+    spline = ss.CubicSpline(t, points, S2, bc_type=bc_type)
+    assert (spline.t - t[0]).astype(int).tolist() == [0, 1, 3, 8, 12, 13, 15]
+    through = ss.CubicSpline((spline.t - t[0]).astype(float), spline.points, S2, bc_type=((1, v[0]), (1, v[1])))
+    for end in (0, -1):
+        assert np.abs(through(through.t[end], 2) - w[end]).max() < 1e-9
+    assert np.abs(through.velocities - 1e-9 * spline.velocities).max() < 1e-12
+
+
 @pytest.mark.parametrize(
     "t", [np.array([1, 2, 5, 6], "datetime64[ns]"), np.array([1.0, np.nextafter(1, 2), np.nextafter(3, 2), 3.0])]
 )
