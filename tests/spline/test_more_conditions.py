@@ -1,10 +1,11 @@
 """Velocities at inner points, and a velocity with an acceleration at one end."""
 
 import pickle
+import warnings
 
 import numpy as np
 import pytest
-from cases import loop_over, walk
+from cases import loop_over, walk, zigzag
 from compare import same, vectors_off
 from curves import S2, at_node, every_kind, tangents_at
 from refused import raises
@@ -340,3 +341,27 @@ def test_accelerations_without_a_curve_raise(rng):
     batch = ss.CubicSpline(T, both, S2, bc_type=ends, on_failure="ignore")
     assert batch.report.converged.tolist() == [True, False]
     assert np.abs(batch[0](0.0, 2) - v).max() < 1e-12
+
+
+def test_another_curve_through_a_section_is_another_curve():
+    """The last section, of long steps, has another solution; the first one is the same in both curves."""
+    far, u = zigzag(2.5), np.zeros(3)
+    near = [S2.exp(far[0], S2.project_tangent(far[0], [0.0, 0.1 * i, 0.2 * i])) for i in (2, 1)]
+    points = np.concatenate([near, far])
+    t = 3 + np.arange(len(points))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ss.FarPointsWarning)
+        whole = ss.CubicSpline(t, points, S2, velocities={2: u})
+        first = ss.CubicSpline(t[:3], points[:3], S2, bc_type=("natural", (1, u)))
+        last = ss.CubicSpline(t[2:], points[2:], S2, bc_type=((1, u), "natural"))
+    assert first.report.alternative_energy is None and last.report.alternative_energy is not None
+    other = first.bending_energy() + last.report.alternative_energy
+    np.testing.assert_allclose(whole.report.alternative_energy, other, rtol=1e-11)
+
+
+def test_points_of_a_fault_are_counted_with_the_additional_ones():
+    points = S2.project([[1, 0, 0], [1, 0.2, 0], [1, 0.5, 0.1], [-1, -0.5, -0.1], [-1, -0.2, 0]])
+    rest = [(1, np.zeros(3)), (2, np.zeros(3))]
+    for bc_type, node in (((rest, "natural"), 3), (("natural", rest), 2), ((rest, rest), 3)):
+        beside = rf"points\[{node}\] and points\[{node + 1}\] lie at"
+        raises(beside, ss.CubicSpline, None, points, S2, bc_type=bc_type, error=ss.CutLocusError)
