@@ -289,7 +289,7 @@ def test_knots_without_a_time_between_them(t):
     y, both = np.arange(4.0)[:, None], [(1, [0.0]), (2, [0.0])]
     raises("at the first point.*first two knots are too close", ss.CubicSpline, t, y, "r:1", bc_type=(both, "natural"))
     raises("at the last point.*last two knots are too close", ss.CubicSpline, t, y, "r:1", bc_type=("natural", both))
-    raises("increas", ss.CubicSpline, [0.0, 0.0, 1.0, 2.0], y, "r:1", bc_type=(both, "natural"))
+    raises("increase", ss.CubicSpline, [0.0, 0.0, 1.0, 2.0], y, "r:1", bc_type=(both, "natural"))
 
 
 def test_files_and_pickles_of_more_conditions(rng):
