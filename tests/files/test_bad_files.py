@@ -35,7 +35,7 @@ def is_good_or_refused(data, kind="interpolating"):
 @kinds
 def test_truncated_files(kind):
     data = stored(KINDS[kind])
-    for n in range(len(data)):
+    for n in [*range(0, len(data), 5), len(data) - 1]:
         raises("the file", load, data[:n])
 
 
@@ -43,7 +43,7 @@ def test_truncated_files(kind):
 def test_files_with_one_bad_byte(kind):
     data = stored(KINDS[kind])
     # Most of the directory, which says where each array is, and some of the numbers.
-    places = {*range(0, len(data), 31), *range(0, 400, 2), *range(len(data) - 1200, len(data), 4)}
+    places = {*range(0, len(data), 61), *range(0, 400, 4), *range(len(data) - 1200, len(data), 8)}
     for k, i in enumerate(sorted(place for place in places if 0 <= place < len(data))):
         mask = (0x01, 0xFF)[k % 2]
         assert is_good_or_refused(data[:i] + bytes([data[i] ^ mask]) + data[i + 1 :], kind)
@@ -57,7 +57,7 @@ def test_compressed_files(method):
             target.writestr(name, source.read(name))
     data = file.getvalue()
     assert load(data) == ss.CubicSpline(None, P, S2)
-    for i in range(0, len(data), 7):
+    for i in range(0, len(data), 31):
         assert is_good_or_refused(data[:i] + bytes([data[i] ^ 0xFF]) + data[i + 1 :])
 
 
@@ -195,8 +195,7 @@ def bomb(name, method, size=2**26, **more):
     return file.getvalue()
 
 
-@pytest.mark.parametrize("name", ["points", "t", "report", "format"])
-@pytest.mark.parametrize("method", [zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2])
+@pytest.mark.parametrize(("name", "method"), [("points", zipfile.ZIP_DEFLATED), ("format", zipfile.ZIP_BZIP2)])
 def test_archives_that_unpack_to_far_more_than_their_size(name, method):
     data = bomb(name, method)
     tracemalloc.start()
