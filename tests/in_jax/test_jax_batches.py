@@ -47,7 +47,8 @@ def some(axes):
     return data, [[a[i] if axis == 0 else a for a, axis in zip(data, axes, strict=True)] for i in range(CURVES)]
 
 
-AXES = [axes for axes in itertools.product((0, None), repeat=4) if any(axis == 0 for axis in axes)]
+# One of them, some, and all.
+AXES = [tuple(0 if i == k else None for i in range(4)) for k in range(4)] + [(None, 0, 0, None), (0, 0, 0, 0)]
 
 
 @pytest.mark.parametrize("axes", AXES)
@@ -84,7 +85,7 @@ def test_directions_of_many_curves_are_those_of_each(axes):
         np.testing.assert_allclose(found[i], pushed(one, own), atol=1e-14)
 
 
-@pytest.mark.parametrize("nu", [0, 1, 2])
+@pytest.mark.parametrize("nu", [0, 2])
 def test_nested_maps_are_one_call(nu, calls):
     """Times along one axis, curves along another, and batch axes of the points."""
     rng = np.random.default_rng(1)

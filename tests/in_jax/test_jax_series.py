@@ -13,6 +13,8 @@ from symspline._autodiff.library import divided_arc, divided_logarithm
 from symspline._autodiff.models import inverse_series
 from symspline.jax._native import LIBRARY
 
+QUICK = True
+
 
 @pytest.fixture(autouse=True)
 def forty_digits():
@@ -32,7 +34,7 @@ def worst(function, exact, at, orders=4):
     return errors
 
 
-@pytest.mark.parametrize("n, sign", [(0, 1), (1, 1), (3, 1), (0, -1), (1, -1)])
+@pytest.mark.parametrize("n, sign", [(0, 1), (3, 1), (1, -1)])
 def test_stumpff_on_both_sides_of_the_switch(n, sign):
     def exact(z):
         return sum((-sign * z) ** k / mp.factorial(2 * k + n) for k in range(80))

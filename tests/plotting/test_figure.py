@@ -24,7 +24,7 @@ SIGNED = {"euclidean:1", "sphere:1", "hyperbolic:1", "rp:1", "gr:1,2", "so:2", "
 def test_every_space_has_figures(name, shape):
     """Alternately one curve and a batch."""
     spline = spline_on(name, shape)
-    figure = rendered(spline.plot())
+    figure = rendered(spline.plot(), layout=True)
     assert isinstance(figure, Figure)
     assert has_title(figure, "C² spline", spline.space)
     curves = spline if len(shape) > 1 else [spline]
