@@ -219,7 +219,7 @@ ROWS = [
         "(22)",
         "K",
         "Space.curvature",
-        "tests/spaces/test_curvature.py::test_curvature_is_the_largest_triple_product",
+        "tests/evidence/test_curvature.py::test_curvature_is_the_largest_triple_product",
         "theory/symmetric_spaces.md",
         source="space/traits.rs::curvature",
     ),
@@ -484,7 +484,7 @@ ROWS = [
         "Appendix D",
         "the authors' package",
         "CubicSpline",
-        "tests/reference/test_authors.py::test_the_authors_package_makes_the_same_curve "
+        "tests/evidence/test_authors.py::test_the_authors_package_makes_the_same_curve "
         "tests/fit/test_c2.py::test_the_three_points_of_the_paper",
         "notation.md#the-package-of-the-paper",
     ),

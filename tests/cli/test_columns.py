@@ -51,7 +51,6 @@ def test_many_curves_of_every_space(run, name):
     found = read_table("c.npz")
     assert found.pop("id").tolist() == [*"aaabbb"] and found.pop("t").tolist() == [0, 1, 2] * 2
     assert_same_columns(found, {key: np.concatenate([rate[key] for rate in rates]) for key in rates[0]})
-    run("plot b.npz --curve b -o b.png")
 
 
 def test_names_of_curves_that_were_made_in_python(run):

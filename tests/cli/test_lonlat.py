@@ -1,9 +1,6 @@
 """Tables of longitudes and latitudes."""
 
-from pathlib import Path
-
 import numpy as np
-import pytest
 from tabular import FIXES, TRACK, numbers, table, write
 
 import symspline as ss
@@ -62,20 +59,3 @@ def test_lonlat_of_a_curve_that_was_made_in_python(run, fails):
     np.testing.assert_allclose(numbers(table("b.csv"), "lon", "lat")[:2], [[0, 0], [90, 0]], atol=1e-13)
     ss.CubicSpline(None, [[0], [1]], "r:1").save("c.npz")
     assert fails("sample c.npz -n 3 --lonlat -o b.csv") == "--lonlat is for sphere:2, not for euclidean:1"
-
-
-@pytest.mark.slow
-def test_tracks_are_drawn_on_the_earth(run, fails):
-    write("a.csv", TRACK)
-    run("fit a.csv --lonlat -o a.npz")
-    run("plot a.npz -o a.svg")
-    # Land, and speeds in km/h; without positions on the Earth there are neither.
-    track = Path("a.svg").read_text(encoding="utf-8")
-    run("fit a.csv --space r:2 -o plane.npz")
-    run("plot plane.npz -o plane.svg")
-    assert "km/h" in track and "km/h" not in Path("plane.svg").read_text(encoding="utf-8")
-    ss.CubicSpline(None, np.eye(3), "s:2").save("b.npz")
-    run("plot b.npz -o plain.svg")
-    run("plot b.npz --lonlat -o earth.svg")
-    assert len(Path("earth.svg").read_bytes()) > 2 * len(Path("plain.svg").read_bytes())
-    assert fails("plot plane.npz --lonlat -o x.svg") == "--lonlat is for sphere:2, not for euclidean:2"

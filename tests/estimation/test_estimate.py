@@ -111,22 +111,6 @@ def test_unknown_attitude_and_large_bias_of_the_gyro():
         assert sensors.rms(SO3.distance(curve(g)[0], turn(g))) < 0.05
 
 
-def test_lever_arm():
-    turn, _, _, s, g, omega, force, y = imu(1)
-    arm = np.array([0.4, -0.3, 0.2])
-    rate, change = ss.rotations.angular_velocity(turn, s), ss.rotations.angular_acceleration(turn, s)
-    force = force + np.cross(change, arm) + np.cross(rate, np.cross(rate, arm))
-    seen = SO3.exp(turn(g), 0.01 * SO3.random_tangent(np.random.default_rng(0), turn(g)))
-    known = [
-        measure.Points(g, (seen, y), sigma=(0.01, 0.3)),
-        measure.BodyRates(s, omega, sigma=0.01, bias=measure.Constant(3)),
-    ]
-    sensor = measure.SpecificForce(s, force, sigma=0.1, bias=measure.Constant(3), lever_arm=measure.Constant(3))
-    curve = ss.estimate([*known, sensor], np.linspace(0, 30, 151), "so:3 x r:3", penalty="jerk")
-    found = curve.parameters["lever arm"]
-    assert np.all(np.abs(found.value - arm) < 4 * found.std) and np.all(found.std < 0.1)
-
-
 def test_stars():
     """Directions alone determine the attitude, also where single stars are seen."""
     rng = np.random.default_rng(2)
@@ -143,37 +127,6 @@ def test_stars():
     on_sphere = ss.estimate([measure.Directions(t, seen, stars, sigma=0.01)], 41, "sphere:3")
     turned = ss.rotations.from_quaternions(on_sphere(x), scalar_first=True)
     assert np.abs(turned - both(x)).max() < 0.01
-
-
-def test_course_and_speed():
-    rng = np.random.default_rng(3)
-    globe = ss.Sphere(2)
-    t = np.linspace(0, 10, 60)
-    path = globe.project(np.stack([np.cos(0.3 * t), np.sin(0.3 * t), 0.5 * np.sin(0.8 * t)], -1))
-    truth = ss.CubicSpline(t, path, globe, bc_type="not-a-knot")
-    s = sensors.times(rng, 0, 10, 40)
-    y = globe.exp(truth(s), 0.02 * globe.random_tangent(rng, truth(s)))
-    v = globe.transport(truth(s), y, truth(s, 1)) + 0.02 * globe.random_tangent(rng, y)
-    given = [measure.Points(s, y, sigma=0.02), measure.Velocities(s, y, v, sigma=0.02)]
-    curve = ss.estimate(given, np.linspace(0, 10, 30), globe)
-    plain = ss.make_smoothing_spline(s, y, globe, knots=30)
-    x = np.linspace(s[0], s[-1], 300)
-    assert sensors.rms(globe.distance(curve(x), truth(x))) < 0.8 * sensors.rms(globe.distance(plain(x), truth(x)))
-
-
-def test_time_offset_of_estimates():
-    """The delay between the recordings of two sensors."""
-    _, t, seen, s, omega = gyro(6, rates=800)
-    late = 0.25
-    inside = (s > 1) & (s < 9)
-    offset = measure.Constant(1)
-    given = [
-        measure.Points(t, seen, sigma=0.05),
-        measure.BodyRates(s[inside] - late, omega[inside] - BIAS, sigma=0.02, time_offset=offset),
-    ]
-    curve = ss.estimate(given, np.linspace(0, 10, 41), "so:3")
-    found = curve.parameters["time offset"]
-    assert abs(found.value[0] - late) < 4 * found.std[0] and found.std[0] < 0.02
 
 
 @pytest.mark.parametrize("loss", ["huber", "cauchy"])
@@ -224,19 +177,6 @@ def test_files_pickles_and_text(tmp_path):
     assert "31 knots, from 0.0215778 to 9.98802, gyro bias" in repr(curve)
     assert [own.shape for own in curve.residuals] == [(51, 3), (501, 3)]
     assert curve.data[1] is seen
-
-
-def test_samples():
-    _, t, seen, s, omega = gyro(14)
-    curve = ss.estimate(fused(t, seen, s, omega), 31, "so:3")
-    drawn = curve.sample(np.random.default_rng(0), 400)
-    x = curve.t[12]
-    logs = SO3.log(curve(x), drawn(x))
-    frames = curve.frames(x)
-    e = np.stack([SO3.inner(curve(x), frames[j], logs) for j in range(3)], -1)
-    assert np.abs(np.cov(e.T) - curve.cov(x)).max() < 0.15 * curve.cov(x).max()
-    lengths = drawn.length()
-    assert lengths.shape == (400,) and 0 < lengths.std() < 0.1 * lengths.mean()
 
 
 def test_samples_of_batches_products_and_closed_curves():

@@ -148,37 +148,6 @@ def test_automatic_knots_follow_the_motion(cycles, least, most):
     check(curve, truth, bias, np.linspace(0, 10, 300))
 
 
-def integrated_walk(rng, end, n):
-    """An integral of a Wiener process, of which the acceleration penalty is the exact prior."""
-    d = np.linspace(0, end, n + 1)
-    v = np.concatenate([[0], np.cumsum(rng.standard_normal(n) * np.sqrt(d[1]))]) + rng.standard_normal()
-    return d, np.concatenate([[0], np.cumsum((v[1:] + v[:-1]) / 2 * d[1])]), v
-
-
-@pytest.mark.parametrize("knots", [60, "auto"])
-def test_bands_in_gaps(knots):
-    inside = []
-    for seed in range(8):
-        rng = np.random.default_rng(seed)
-        d, x, v = integrated_walk(rng, 20, 4000)
-        t, s = np.sort(rng.uniform(0, 20, (2, 200)), axis=1)
-        t, s = t[(t < 7) | (t > 13)], s[(s < 7) | (s > 13)]
-        y = np.interp(t, d, x) + 0.1 * rng.standard_normal(len(t))
-        w = np.interp(s, d, v) + 0.2 * rng.standard_normal(len(s))
-        both = [
-            measure.Points(t, y[:, None], sigma=0.1),
-            measure.Velocities(s, np.zeros((len(s), 1)), w[:, None], sigma=0.2),
-        ]
-        with warnings.catch_warnings():
-            # 60 knots are few for a path without a continuous acceleration, which the residuals show.
-            warnings.simplefilter("ignore", ss.SmoothingWarning)
-            curve = ss.estimate(both, knots, "r:1", penalty="acceleration")
-        gap = np.linspace(7.5, 12.5, 40)
-        inside.append(np.abs(curve(gap)[:, 0] - np.interp(gap, d, x)) < 1.96 * curve.std(gap))
-    # Without knots in the gap, the coverage is 0.3.
-    assert np.mean(inside) > 0.85
-
-
 def test_numerical_failures_are_convergence_errors():
     _, t, seen, s, omega, _ = spinning(9, 20)
     for knots in (31, "auto"):

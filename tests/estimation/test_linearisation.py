@@ -196,26 +196,6 @@ def frames_applied(given, t, vectors):
     return coordinates(own.space, own.p, own.frames, vectors)
 
 
-def test_rates_of_a_moving_rotation():
-    # δω of R exp(ε η) with η' from differences: neither frames nor the curve's spline enter.
-    rng = np.random.default_rng(3)
-    curve = sensors.turning(6, rng)
-    t, h = np.linspace(1, 5, 9), 1e-4
-    eta, change = np.sin(t)[:, None] * [0.3, -0.2, 0.5], np.cos(t)[:, None] * [0.3, -0.2, 0.5]
-
-    def turned(size, at):
-        field = np.sin(at)[:, None] * [0.3, -0.2, 0.5]
-        return curve(at) @ ss.rotations.from_rotation_vectors(size * field)
-
-    def rate(size):
-        d = (turned(size, t + h) - turned(size, t - h)) / (2 * h)
-        return rates(sensors.SO3, turned(size, t), d)
-
-    found = (rate(1e-4) - rate(-1e-4)) / 2e-4
-    omega = ss.rotations.angular_velocity(curve, t)
-    assert np.abs(found - (change + np.cross(omega, eta))).max() < 1e-6
-
-
 @pytest.mark.parametrize("name", ["sphere:2", "h:2", "so:3", "spd:2", "gr:2,4", "cp:2", "r:3"])
 def test_velocities_and_points_move_as_the_curve_does(name):
     """The velocity of exp(ε ξ(t)), transported back, changes by ξ'; its acceleration by ξ'' + R(ξ, γ')γ'."""

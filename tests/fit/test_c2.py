@@ -9,7 +9,6 @@ from cases import (
     LARGE,
     LOOPS,
     POSITIVE,
-    REPRESENTATIVE,
     closed_walk,
     condition,
     grouped,
@@ -39,7 +38,7 @@ KINDS = {case.name: [kind for kind in TURNS if kind[0] is case] for case in CASE
 for case in LARGE:
     KINDS[case.name] = [(case, "quasi-newton", "random", ends) for ends in ENDS]
 for case in CASES:
-    if case.space in REPRESENTATIVE:
+    if case.name in ("euclidean:3", "sphere:2", "cp:2", "so:3"):
         KINDS[case.name] = [
             (case, method, spacing, ends) for method in METHODS for spacing in ("uniform", "random") for ends in ENDS
         ]

@@ -3,12 +3,10 @@
 import numpy as np
 import pytest
 from drawn import lines_of, points_around, rate_axes, rendered, spline_on, texts_of
-from matplotlib.figure import Figure
 from refused import raises
 
 import symspline as ss
 
-NAMES = ["r:1", "r:3", "sphere:2", "so:3", "se:2", "se:3", "spd:2", "gr:2,3", "gr:2,5"]
 T = np.array([0.0, 1.1, 1.9, 3.2, 4.0, 5.3])
 
 
@@ -17,7 +15,7 @@ def pair(name):
     return spline, ss.PiecewiseGeodesic(T, spline.points, name)
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", ["r:1", "sphere:2", "se:3", "spd:2", "gr:2,5"])
 def test_curves_and_data_in_one_picture(name):
     spline, polygon = pair(name)
     figure = rendered(ss.plot([spline, polygon, (T, spline.points)], labels=["spline", "polygon", "measured"]))
@@ -37,25 +35,6 @@ def test_data_of_products_with_missing_points():
         line for axes in figure.axes for line in axes.lines if axes.get_ylabel() == "x" and line.get_label() == "given"
     ]
     np.testing.assert_allclose(dots.get_xdata(), np.delete(T, 2))
-
-
-def test_lists_of_fit_many_and_axes():
-    rng = np.random.default_rng(0)
-    curves = ss.fit_many([(None, rng.normal(size=(n, 2))) for n in (4, 7, 5)], "r:2")
-    ax = Figure().add_subplot()
-    assert ss.plot(curves, ax=ax, labels=list("abc"), colors=["red", "green", "blue"], title="three") is ax
-    lines = [line for line in ax.lines if line.get_gid() == "_curve"]
-    assert [line.get_color() for line in lines] == ["red", "green", "blue"]
-    assert ax.get_legend_handles_labels()[1] == ["a", "start", "b", "c"]
-
-
-def test_times_of_all_curves_have_one_origin():
-    t = 1305031100.0 + T
-    figure = ss.plot([spline_on("r:2", t=t), spline_on("r:2", t=t + 30), (t + 10, np.zeros((6, 2)))])
-    starts = [line[0, 0] for line in lines_of(rate_axes(figure)[0][0])]
-    np.testing.assert_allclose(np.diff(starts), 30)
-    dates = np.datetime64("2024-01-01") + np.arange(6)
-    rendered(ss.plot([spline_on("r:1", t=dates), (dates + 1, np.zeros((6, 1)))]))
 
 
 def test_what_cannot_be_compared_raises():

@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from drawn import axes_named, dots_of, rendered, role, texts_of
+from drawn import axes_named, dots_of, rendered, texts_of
 from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch
 from matplotlib.transforms import Affine2D
@@ -102,21 +102,6 @@ def test_speed_is_in_kilometres_per_hour():
     assert axes_named(bare, "speed").lines[0].get_ydata()[0] == pytest.approx(unit)
 
 
-def test_smoothed_tracks_have_a_band_in_the_same_unit():
-    t = np.datetime64("2024-05-01") + np.arange(60).astype("m8[m]")
-    rng = np.random.default_rng(0)
-    lonlat = np.stack([10 + 0.02 * np.arange(60), 50 + 0.1 * np.sin(np.arange(60) / 9)]) + 0.002 * rng.standard_normal(
-        (2, 60)
-    )
-    spline = ss.make_smoothing_spline(t, geo.from_lonlat(*lonlat), "sphere:2")
-    speed = axes_named(rendered(geo.plot(spline)), "speed")
-    (band,) = [own for own in speed.collections if role(own) == "95 % band"]
-    wanted = speed.lines[0].get_ydata()[600] + 1.96 * 3.6 * geo.EARTH_RADIUS * spline.std(
-        t[0] + (t[-1] - t[0]) / 2, nu=1
-    )
-    assert np.abs(band.get_paths()[0].vertices[:, 1] - wanted).min() < 1e-3 * wanted
-
-
 def test_axes_of_the_user_have_land():
     ax = Figure().add_subplot()
     assert geo.plot(track(5, 40, 12.0), ax=ax, title="Rhône") is ax
@@ -129,14 +114,3 @@ def test_other_curves_are_refused(tmp_path):
     raises("radius must be a number above 0", geo.plot, track(5, 40, 2.0), radius=-1.0)
     geo.plot(track(5, 40, 2.0), tmp_path / "track.svg")
     assert (tmp_path / "track.svg").read_text("utf-8").startswith("<?xml")
-
-
-def test_batches_on_the_earth_have_distances_in_km():
-    rng = np.random.default_rng(4)
-    lon, lat = 10 + np.arange(8.0), 50 + np.sin(np.arange(8.0))
-    tracks = geo.from_lonlat(lon + 0.1 * rng.normal(size=(12, 8)), lat + 0.1 * rng.normal(size=(12, 8)))
-    figure = rendered(geo.plot(ss.CubicSpline(None, tracks, "sphere:2")))
-    axes = axes_named(figure, "distance")
-    (median,) = (line for line in axes.lines if role(line) == "median")
-    # The distance of two normal deviates of 11 km to the north and 7 km to the east, near a mean of twelve.
-    assert axes.get_ylabel().endswith(", km") and 5 < np.median(median.get_ydata()) < 15

@@ -118,19 +118,6 @@ def test_factors_have_their_own_points(dates):
     assert sum(role(own) == "95 % band" for axes in figure.axes[:4] for own in axes.collections) == 4
 
 
-def test_poses_have_a_band_per_part_and_residuals_per_measurement():
-    poses = np.broadcast_to(np.eye(4), (30, 4, 4)).copy()
-    poses[:, :3, :3], poses[:, :2, 3] = noisy_rotations(T), path(T) + 0.1 * noise(30, 2)
-    curve = ss.estimate([measure.Points(T, poses, sigma=(0.03, 0.1)), rates(S)], 20, "se:3", penalty="jerk")
-    turning, moving = curve.residuals[0]
-    assert turning.shape == moving.shape == (30, 3) and curve.residuals[1].shape == (90, 3)
-    figure = rendered(curve.plot())
-    labels = [axes.get_ylabel() for axes in figure.axes]
-    assert [label for label in labels if "95 %" in label] == ["95 % band\nof so:3, rad", "95 % band\nof euclidean:3"]
-    x, y = axes_named(figure, "BodyRates").lines[1].get_data()
-    assert len(x) == len(y) == 90
-
-
 @pytest.mark.filterwarnings("ignore:The residuals:symspline.SmoothingWarning")
 def test_curves_from_files_have_bands_and_no_data(tmp_path):
     attitudes().save(tmp_path / "a.npz")

@@ -7,24 +7,6 @@ from drawn import axes_named, rate_axes, rendered, role, texts_of
 import symspline as ss
 
 
-def test_equal_factors_have_numbers():
-    angles = tuple(ss.Sphere(1).from_angles(np.linspace(k, 2 + k, 5)) for k in range(3))
-    texts = texts_of(ss.CubicSpline(None, angles, "s:1 x s:1 x s:1").plot())
-    assert [f"factor {k}: Sphere(1)" in texts for k in range(3)] == [True] * 3
-    # Rates are below the picture of their factor.
-    assert texts.count("velocity\nγ′, rad/t") == 3
-    texts = texts_of(ss.CubicSpline(None, (*angles, *angles), " x ".join(["s:1"] * 6)).plot())
-    assert {"velocity\nγ′, rad/t of factor 5", "acceleration\n∇γ′, rad/t² of factor 0"} <= set(texts)
-    grid = ss.GridSpline((np.arange(4.0), np.arange(3.0)), (np.zeros((4, 3, 2)),) * 2, "r:2 x r:2")
-    assert "factor 1: Euclidean(2), vectors" in texts_of(grid.plot())
-    texts = texts_of(spline_product().plot())
-    assert "Sphere(1)" in texts and not any("factor" in text for text in texts)
-
-
-def spline_product():
-    return ss.CubicSpline(None, (ss.Sphere(1).from_angles(np.arange(4.0)), np.arange(4.0)[:, None]), "s:1 x r:1")
-
-
 def test_angles_on_a_torus_have_no_jumps():
     angles = np.column_stack([np.linspace(2, 9, 8), np.linspace(-1, 1, 8)])
     spline = ss.CubicSpline(None, (angles + np.pi) % (2 * np.pi) - np.pi, "torus:2")

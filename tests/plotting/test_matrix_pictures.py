@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from drawn import axes_named, lines_of, rendered, role, spline_on, texts_of
 from matplotlib.collections import LineCollection, PolyCollection
-from matplotlib.dates import date2num
 from matplotlib.figure import Figure
 from scipy.spatial.transform import Rotation
 
@@ -14,7 +13,7 @@ import symspline as ss
 VIEW = np.array([[-0.5, 0.866, 0.0], [-0.296, -0.171, 0.940]])
 
 
-@pytest.mark.parametrize("name", ["rp:4", "cp:2", "gr:2,5", "gr:4,5", "cgr:2,3", "cgr:2,5"])
+@pytest.mark.parametrize("name", ["rp:4", "gr:2,5", "cgr:2,3"])
 def test_principal_angles(name):
     """Distance is √(Σ θᵢ²), and the bases do not matter."""
     space = ss.space(name)
@@ -58,7 +57,7 @@ def test_ellipses_are_drawn_to_scale(name):
     np.testing.assert_allclose(found, unit * roots, rtol=1e-2)
 
 
-@pytest.mark.parametrize(("name", "size"), [("so:3", 0.05), ("so:3", 1e-7), ("sphere:3", 0.02), ("su:2", 0.02)])
+@pytest.mark.parametrize(("name", "size"), [("so:3", 1e-7), ("sphere:3", 0.02), ("su:2", 0.02)])
 def test_small_rotations_are_graphs(name, size):
     """Frames would look equal. The graphs, one per axis of space, begin at zero."""
     rng = np.random.default_rng(5)
@@ -112,23 +111,6 @@ def test_covariances_are_standard_deviations_and_correlations():
     assert len([own for own in many.collections if hasattr(own, "get_coordinates")]) == 36
 
 
-def test_slow_rates_have_longer_units():
-    dates = np.datetime64("2024-01-01") + np.array([0, 40, 90, 130, 200])
-    turns = ss.rotations.from_rotation_vectors(np.multiply.outer([0.0, 0.4, 0.6, 1.0, 1.2], [0.6, 0.0, 0.8]))
-    for scale, unit, days in ((0.5, "yr", 365.25), (1, "d", 1), (100, "h", 1 / 24), (200_000, "s", 1 / 86_400)):
-        start = dates[0].astype("datetime64[ms]")
-        t = start + (dates - dates[0]).astype("timedelta64[ms]") / scale
-        spline = ss.CubicSpline(t, turns, "so:3")
-        figure = spline.plot()
-        for name, nu, power in (("speed", 1, 1), ("acceleration", 2, 2)):
-            axes = axes_named(figure, name)
-            assert axes.get_ylabel().endswith(f", rad/{unit}{'²' * (nu == 2)}")
-            expected = spline.speed(t) if nu == 1 else spline.space.norm(spline(t), spline(t, 2))
-            (line,) = lines_of(axes)
-            found = np.interp(date2num(t), *line.T)
-            np.testing.assert_allclose(found, expected * (86_400 * days) ** power, rtol=1e-6, atol=1e-9)
-
-
 def test_graphs_show_nothing_in_a_gap_that_no_data_determine():
     t = np.array([0.0, 1, 2, 3, 20, 21, 22, 23])
     points = np.stack([np.sin(3 * t), 0.1 * t, 5e5 + t], axis=-1)
@@ -145,31 +127,6 @@ def test_graphs_show_nothing_in_a_gap_that_no_data_determine():
     assert np.abs(axes_named(figure, "x₁").get_ylim()).max() < 1.5
 
 
-def test_frames_stand_on_the_path():
-    spline = spline_on("se:3", (5,))
-    axes = rendered(spline.plot()).axes[0]
-    lines = [line for line in axes.lines if line.get_linewidth() == 2.0 and line.get_label().endswith(" axis")]
-    sticks = [np.stack(line.get_data_3d(), axis=1) for line in lines]
-    length = np.linalg.norm(sticks[0][1] - sticks[0][0])
-    for i, stick in enumerate(sticks):
-        ends = stick.reshape(5, 3, 3)
-        np.testing.assert_allclose(ends[:, 0], spline.points[:, :3, 3])
-        np.testing.assert_allclose(ends[:, 1] - ends[:, 0], length * spline.points[:, :3, i])
-
-
-def test_rotation_and_translation_have_panels_of_their_own():
-    labels = [axes.get_ylabel() for axes in spline_on("se:3").plot().axes[1:]]
-    assert labels == [
-        "turning rate\n|ω|, rad/t",
-        "turning accel.\n|ω′|, rad/t²",
-        "speed\n|p′|",
-        "acceleration\n|p″|",
-    ]
-    dates = np.datetime64("2024-01-01") + np.arange(6)
-    labels = [axes.get_ylabel() for axes in spline_on("se:2", t=dates).plot().axes[1:4:2]]
-    assert labels == ["turning rate\nω, rad/h", "speed\n|p′|, 1/h"]
-
-
 def test_columns_of_frames_have_a_panel_each():
     spline = spline_on("stiefel:2,4")
     figure = rendered(spline.plot())
@@ -183,24 +140,6 @@ def test_columns_of_frames_have_a_panel_each():
         np.testing.assert_allclose(dots, spline.points[:, :, j], atol=1e-12)
     assert [text.get_text() for text in panels[0].get_legend().texts] == ["x₁", "x₂", "x₃", "x₄"]
     assert axes_named(spline_on("stiefel:5,7").plot(), "components")
-
-
-@pytest.mark.parametrize(("name", "metric"), [("spd:2", "affine-invariant"), ("logspd:2", "log-Euclidean")])
-def test_the_heading_names_the_metric_of_covariances(name, metric):
-    spline = ss.CubicSpline(None, np.array([1.0, 2.0, 3.0])[:, None, None] * np.eye(2), name)
-    assert f"3 points, natural ends, {metric} metric" in texts_of(spline.plot())
-
-
-def test_given_frames_and_the_curve_have_a_row_each():
-    """The arrows of a rotation are the projections of its columns."""
-    spline = spline_on("so:3", (4,), [0, 1, 2.5, 4])
-    figure = rendered(spline.plot())
-    given, curve = (own for own in figure.axes[0].collections if hasattr(own, "U") and len(own.X) > 3)
-    np.testing.assert_array_equal(np.unique(given.X), spline.t)
-    assert (set(given.Y), set(curve.Y)) == ({0}, {-1}) and {"given", "curve", "view"} <= set(texts_of(figure))
-    arrows = np.stack([given.U, given.V]).reshape(2, -1, 3)
-    lengths, drawn = np.linalg.norm(VIEW @ spline.points, axis=1), np.linalg.norm(arrows, axis=0)
-    np.testing.assert_allclose(np.sort(drawn) / drawn.max(), np.sort(lengths) / lengths.max(), rtol=2e-3)
 
 
 @pytest.mark.parametrize("largest", [2.0, 4.5, 8.0])

@@ -4,7 +4,7 @@ import matplotlib
 import matplotlib.style
 import numpy as np
 import pytest
-from drawn import VIEWS, lines_of, rendered, spline_on
+from drawn import VIEWS, rendered, spline_on
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from refused import raises
@@ -52,15 +52,6 @@ def test_colours_and_legends():
     for line in lines:
         (low, high), x = ax.get_xlim(), line.get_xdata()
         assert low <= x.min() and x.max() <= high
-
-
-def test_times_and_frames_of_the_user_stay():
-    ax = axes_for("r:1")
-    ax.set_xlabel("hours")
-    t = 1305031102.0 + np.arange(6)
-    spline_on("r:1", t=t).plot(ax=ax)
-    assert ax.get_xlabel() == "hours" and ax.spines["top"].get_visible()
-    np.testing.assert_allclose(lines_of(ax)[0][[0, -1], 0], t[[0, -1]])
 
 
 def test_views_that_depend_on_the_curves_are_drawn_once():

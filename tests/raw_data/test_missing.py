@@ -37,15 +37,10 @@ def kept(points, rows=KEPT):
     return found if isinstance(points, tuple) else found[0]
 
 
+# Of all functions see `test_same_data`.
 FUNCTIONS = {
     "CubicSpline": lambda t, p, s, **how: ss.CubicSpline(t, p, s, **how),
-    "HermiteSpline.from_points": lambda t, p, s, **how: ss.HermiteSpline.from_points(t, p, s, **how),
-    "PiecewiseGeodesic": lambda t, p, s, **how: ss.PiecewiseGeodesic(t, p, s, **how),
-    "fit_many": lambda t, p, s, **how: ss.fit_many([(t, p)], s, **how)[0],
-    "fit_segments": lambda t, p, s, **how: ss.fit_segments(t, p, s, max_gap=1.6, **how),
     "fit_segments, smooth": lambda t, p, s, **how: ss.fit_segments(t, p, s, max_gap=9, smooth=True, lam=1e-3, **how),
-    "make_smoothing_spline": lambda t, p, s, **how: ss.make_smoothing_spline(t, p, s, 1e-3, **how),
-    "make_lsq_spline": lambda t, p, s, **how: ss.make_lsq_spline(t, p, 4, s, **how),
     "estimate": lambda t, p, s, **how: ss.estimate([ss.measure.Points(t, p)], 6, s, lam=1e-3, **how),
 }
 

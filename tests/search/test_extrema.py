@@ -33,6 +33,10 @@ def test_roots_and_extrema_of_polynomials(seed):
     np.testing.assert_allclose(inner, turns, rtol=1e-9)
     np.testing.assert_allclose(maxima[1], scipy(maxima[0]), atol=1e-12)
     assert (scipy(maxima[0][1:-1], 2) <= 1e-9).all() and (scipy(minima[0][1:-1], 2) >= -1e-9).all()
+    # Beside the kinks of a distance, which are no knots, there are no maxima: they are turns away from the level.
+    times, _ = ours.extrema(lambda x: np.abs(height(x) - 0.3))
+    outward = turns[(scipy(turns) - 0.3) * scipy(turns, 2) < 0]
+    np.testing.assert_allclose(times[(times > t[0]) & (times < t[-1])], outward, rtol=1e-9)
     # The norm of the acceleration has a kink at the knots. Its maxima are there.
     times, values = ours.extrema("acceleration")
     assert np.abs(times[:, None] - t).min(axis=1).max() < 1e-9

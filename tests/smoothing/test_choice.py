@@ -2,40 +2,9 @@
 
 import numpy as np
 import pytest
-from noisy import beside, rms, truth
+from noisy import beside
 
 import symspline as ss
-
-SEEDS = 12
-T = np.linspace(0, 10, 100)
-
-
-def batch(name, sigma):
-    space = ss.space(name)
-    points = np.array([truth(space, seed)(T) for seed in range(SEEDS)])
-    noisy = np.array([beside(space, points[seed], sigma, seed) for seed in range(SEEDS)])
-    return space, points, noisy
-
-
-@pytest.mark.parametrize(
-    ("name", "sigma"), [("sphere:2", 0.02), ("sphere:2", 0.4), ("so:3", 0.1), ("hyperbolic:2", 0.4), ("spd:3", 0.1)]
-)
-def test_the_chosen_curve_is_nearly_as_good_as_the_best(name, sigma):
-    space, points, noisy = batch(name, sigma)
-    chosen = ss.make_smoothing_spline(T, noisy, space)
-    known = ss.make_smoothing_spline(T, noisy, space, criterion="cp", sigma=sigma)
-    lam = np.median(chosen.lam) * 2.0 ** np.arange(-5, 6)
-    tried = [ss.make_smoothing_spline(T, noisy, space, value, on_failure="ignore")(T) for value in lam]
-    best = np.min([rms(space, curve, points) for curve in tried], axis=0).mean()
-    # Counting degrees of freedom 1.4 times costs a few percent of the error where noise is large.
-    assert rms(space, chosen(T), points).mean() < (1.12 if sigma < 0.2 else 1.15) * best
-    assert rms(space, known(T), points).mean() < (1.05 if sigma < 0.2 else 1.12) * best
-    assert np.all(chosen.report.iterations <= (8 if sigma < 0.2 else 12))
-    covered = space.distance(chosen(T), points) <= chosen.band(T)
-    # Where the noise is a large part of the curvature's radius the bands are a little narrow.
-    # So they are where degrees of freedom count 1.4 times, which makes stiffer curves.
-    assert (0.92 if sigma < 0.2 else 0.75) < covered.mean() < 0.995
-    assert chosen.sigma.mean() == pytest.approx(sigma, rel=0.05)
 
 
 @pytest.mark.parametrize("loss", ["huber", "cauchy"])

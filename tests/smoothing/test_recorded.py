@@ -50,8 +50,9 @@ def recorded(name, kind, n, seed, outliers, sigma=0.05):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "loss"), [("r:2", "huber"), ("sphere:2", "cauchy"), ("so:3", "huber")])
-@pytest.mark.parametrize("outliers", [False, True])
+@pytest.mark.parametrize(
+    ("name", "loss", "outliers"), [("r:2", "huber", True), ("sphere:2", "cauchy", True), ("so:3", "huber", False)]
+)
 def test_robust_losses_at_irregular_times(name, outliers, loss):
     ratios = []
     for kind in ("uniform", "exponential", "bursts", "near copies"):
@@ -209,17 +210,6 @@ def test_missing_samples_are_the_same_alone_and_in_a_batch():
     raises("curve 2", ss.make_smoothing_spline, t, batch, space, weights=weights)
 
 
-def test_long_recordings_with_gaps():
-    rng = np.random.default_rng(4)
-    t = np.sort(rng.uniform(0, 1000, 20_000))
-    t = t[(t < 300) | (t > 340)]
-    space, truth = wave("sphere:2", t / 100, rng)
-    noisy = space.exp(truth, 0.1 * space.random_tangent(rng, truth))
-    for options in ({}, {"loss": "cauchy"}):
-        spline = ss.make_smoothing_spline(t, noisy, space, **options)
-        assert rms(space, spline(t), truth) < 0.02 and spline.sigma == pytest.approx(0.1, rel=0.1)
-
-
 def far_apart():
     """Three bursts of a turning body: between two of them it turns by more than a segment between two knots can."""
     rng = np.random.default_rng([21, 20, 0, 4, 6])
@@ -294,7 +284,7 @@ def vibration(n, cycle, rng):
 @pytest.mark.filterwarnings("ignore:.*the residuals are larger between:symspline.SmoothingWarning")
 @pytest.mark.parametrize(
     ("name", "variant"),
-    [("so:3", "closed"), ("so:3", "batch"), ("sphere:2 x r:3", "gap"), ("sphere:2 x r:3", "weights")],
+    [("so:3", "closed"), ("sphere:2 x r:3", "weights")],
 )
 def test_motion_that_is_fast_for_the_length_of_a_recording_is_no_noise(name, variant):
     """18 000 data with 2600 cycles, which 2000 knots do not resolve."""
@@ -302,8 +292,6 @@ def test_motion_that_is_fast_for_the_length_of_a_recording_is_no_noise(name, var
     t, angle = vibration(18_000, 7, rng)
     if variant == "closed":
         angle *= np.sin(np.linspace(0, np.pi, len(t)))[:, None]
-    if variant == "gap":
-        t[5000:] += 3
     space, noise = ss.space(name), 0.02 * rng.normal(size=(2, *angle.shape))
     rotations = (Rotation.from_rotvec(0.3 * angle) * Rotation.from_rotvec(noise[0])).as_matrix()
     positions = 40 * (angle + noise[1])
@@ -311,8 +299,6 @@ def test_motion_that_is_fast_for_the_length_of_a_recording_is_no_noise(name, var
     options = {"bc_type": "periodic"} if variant == "closed" else {}
     if variant == "weights":
         options["weights"] = np.where(np.arange(len(t)) % 900 < 2, 0.0, 1.0)
-    if variant == "batch":
-        data = tuple(np.stack([own] * 2) for own in data) if isinstance(data, tuple) else np.stack([data] * 2)
     spline = ss.make_smoothing_spline(t, data, space, **options)
     expected = len(t) / 7
     assert np.all(np.ravel(spline.df) > 1.2 * expected), spline
@@ -392,23 +378,6 @@ def test_curves_are_geodesics_before_and_after_their_data(name, loss):
     np.testing.assert_allclose(whole, inside, rtol=1e-4)
     grown = np.asarray(spline.std(t[[849, 1000, 1200, 1499]], calibrated=False))
     assert (np.diff(grown) > 0).all()
-
-
-def test_the_standard_error_of_a_line_grows_as_that_of_its_slope():
-    """Beside the data, positions and velocities are those of least squares for a line."""
-    n = 400
-    t = np.linspace(0, 10, n)
-    x = 0.3 * t + 0.1 * np.random.default_rng(3).normal(size=n)
-    weights = np.where((t > 4) & (t < 5), 1.0, 0.0)
-    line = ss.make_smoothing_spline(t, x[:, None], "r:1", weights=weights, lam=1e6)
-    used = t[weights > 0]
-    spread = np.sum((used - used.mean()) ** 2)
-    far = np.array([0.0, 2.0, 7.0, 10.0])
-    expected = line.sigma * np.sqrt(1 / len(used) + (far - used.mean()) ** 2 / spread)
-    # λ is at its bound, where rounding errors reach the standard error.
-    np.testing.assert_allclose(line.std(far, calibrated=False), expected, rtol=0.02)
-    slope, start = np.polyfit(used, x[weights > 0], 1)
-    np.testing.assert_allclose(line(far)[:, 0], start + slope * far, rtol=1e-3)
 
 
 def with_gap(name, missing, seed, n=1500):

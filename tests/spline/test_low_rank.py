@@ -181,7 +181,7 @@ print(*(line.split()[1] for line in open("/proc/self/status") if line.startswith
 
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="reads the memory used in /proc")
-@pytest.mark.parametrize("name", ["sphere:199999", "gr:3,20000"])
+@pytest.mark.parametrize("name", ["sphere:49999", "gr:2,10000"])
 def test_really_large_spaces(name):
     """Seconds, where an n × n array would be 3 GB at least."""
     peak = run_python(SMOKE, name, timeout=60)

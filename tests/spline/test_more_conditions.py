@@ -10,7 +10,6 @@ from compare import same, vectors_off
 from curves import S2, at_node, every_kind, tangents_at
 from refused import raises
 from scipy.interpolate import CubicSpline as FlatSpline
-from scipy.interpolate import make_interp_spline
 from stored import restored
 
 import symspline as ss
@@ -196,33 +195,6 @@ def test_flat_curves_equal_the_dense_solution(rng):
     x = np.linspace(T[0], T[-1], 100)
     for nu in range(3):
         assert np.abs(spline(x, nu) - dense(x, nu)).max() < 1e-11
-
-
-@loop_over("which", [0, 1])
-def test_flat_curves_equal_those_of_scipy(which, rng):
-    """With the additional point, SciPy's spline with both conditions at one end and none at the other is the same."""
-    y, (v, a) = flat_points(rng), rng.standard_normal((2, 2))
-    pair = [(1, v), (2, a)]
-    spline = ss.CubicSpline(T, y, FLAT, bc_type=(pair, "natural") if which == 0 else ("natural", pair))
-    other = make_interp_spline(spline.t, spline.points, k=3, bc_type=(pair, None) if which == 0 else (None, pair))
-    x = np.linspace(T[0], T[-1], 100)
-    # Errors of an initial value problem grow by 2 + √3 per segment.
-    for nu in range(3):
-        assert np.abs(spline(x, nu) - other(x, nu)).max() < 1e-15 * 10**nu * (2 + 3**0.5) ** len(T)
-
-
-@loop_over("space", [S2, ss.space("so:3")])
-def test_both_conditions_hold_in_finite_differences(space, rng):
-    p = nine_points(space, rng)
-    v, a = (tangents_at(space, p[0], seed=s) for s in (3, 7))
-    spline = ss.CubicSpline(T, p, space, bc_type=([(1, v), (2, a)], "natural"))
-    h = 1e-4
-    # The covariant acceleration is the tangential part of the second derivative of the array.
-    near = [spline(i * h) for i in range(5)]
-    first = (-25 * near[0] + 48 * near[1] - 36 * near[2] + 16 * near[3] - 3 * near[4]) / (12 * h)
-    second = (35 * near[0] - 104 * near[1] + 114 * near[2] - 56 * near[3] + 11 * near[4]) / (12 * h * h)
-    assert np.abs(first - v).max() < 1e-9
-    assert np.abs(space.project_tangent(near[0], second) - a).max() < 1e-5
 
 
 @loop_over("count", [2, 3])

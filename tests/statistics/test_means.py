@@ -68,7 +68,7 @@ def test_no_point_nearby_has_a_smaller_sum_of_distances(space):
                 assert objective(aside) > least * (1 - 1e-9)
 
 
-@pytest.mark.parametrize("space", ["sphere:2", "gr:2,5", "hpd:2", "so:3/432", "sphere:3 x r:2"])
+@pytest.mark.parametrize("space", ["sphere:2", "gr:2,5", "so:3/222", "sphere:3 x r:2"])
 def test_batches_equal_single_calls_bit_for_bit(space):
     space, rng = ss.space(space), np.random.default_rng(3)
     points, weights = cloud(space, rng, (2, 3)), rng.uniform(0.1, 2, (2, 3, 9))

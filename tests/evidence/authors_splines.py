@@ -4,7 +4,7 @@ The package is https://github.com/olivierverdier/bsplinelab (its setup.py says M
 https://github.com/olivierverdier/padexp. Neither is on PyPI. To make the file anew, clone both and run, with the two
 checkouts on the path::
 
-    PYTHONPATH=bsplinelab:padexp python tests/reference/authors_splines.py
+    PYTHONPATH=bsplinelab:padexp python tests/evidence/authors_splines.py
 
 The stored arrays were made with commit b0deb91 of bsplinelab. Nothing of the package is changed but the two numbers at
 which its iteration stops: with a tolerance of 0 it makes ``SWEEPS`` sweeps, so that it ends at rounding.
