@@ -281,7 +281,7 @@ ROWS = [
         "(24), (25)",
         "half sphere and its stereographic projection",
         "CubicSpline.plot",
-        "tests/shapes/test_shapes_page.py::test_equations_24_and_25_draw_the_curve_in_the_unit_disc",
+        "tests/evidence/test_shapes_figures.py::test_equations_24_and_25_draw_the_curve_in_the_unit_disc",
         "shapes.md",
     ),
     Row(
@@ -470,7 +470,7 @@ ROWS = [
         "Figures 7, 8, 9",
         "affine shapes",
         "shapes.from_landmarks",
-        f"{EXAMPLES} tests/shapes/test_shapes_page.py::test_the_figures_of_the_page",
+        f"{EXAMPLES} tests/evidence/test_shapes_figures.py::test_the_figures_of_the_page",
         "figures.md#figures-7-8-and-9-affine-shapes gallery/affine_shapes.rst shapes.md",
     ),
     Row(

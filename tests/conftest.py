@@ -14,23 +14,23 @@
     subspaces    reduced bases over a parameter
     tensors      diffusion tensors in the order of each program
     shapes       affine shapes of landmarks, and their page
-    xarray_dask  curves in xarray objects, in blocks of dask, on workers that die
+    xarray_dask  curves in xarray objects, in blocks of dask
     host         threads, memory, progress, arrays of other libraries
     typing       annotations, as type checkers read them
     docs         the code of the documentation runs
     raw_data     recordings with gaps, duplicates, missing samples and huge offsets, through every entry point
 
 Outside the default run:
-    evidence     formulas of the paper and of the theory, comparisons and tables of pages: `make docs`
+    evidence     formulas of the paper and of the theory, comparisons, tables and figures of pages: `make docs`
     examples, bench, javascript   the recipes and the benchmarks run: `make test-programs`
     fuzz         random input: `make fuzz`
-    timing       what depends on the time or the memory that the machine has left: `make test-timing`
+    timing       what depends on the time or the memory that the machine has left, workers that die: `make test-timing`
     oracles, pytorch   have environments of their own: `make test-oracles`, `make test-torch`
 
 Shared modules: `cases` has the one list of spaces, the one list of end conditions, data on them, and decorators that
-run several values within one case of pytest; `curves` has arrays, `compare` comparisons, `refused` invalid input,
-`limited` scripts with little memory, `pages` code and tables of the documentation, `stored` files of curves and damaged
-copies of them.
+run several values within one case of pytest; `curves` has arrays, `lie` the algebra of each group, `compare` comparisons,
+`refused` invalid input, `limited` scripts with little memory, `pages` code and tables of the documentation, `stored`
+files of curves and damaged copies of them.
 
 A law of spaces runs as one case per family (`cases.every_family`), whatever does not depend on the formulas of a
 space on `cases.REPRESENTATIVE`. Lists that would multiply take turns instead.

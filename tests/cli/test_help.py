@@ -3,13 +3,11 @@
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
-from tabular import AXES, PAIR, TRACK, write
+from tabular import PAIR, TRACK, write
 
-import symspline as ss
 from symspline.cli import main
 
 
@@ -88,14 +86,6 @@ def test_info_of_the_installation(run):
     out = run("info")
     assert "  sphere:2: " in out and "  so:2: " in out and ".geojson" in out and "matplotlib" in out
     assert max(map(len, out.splitlines())) < 100
-
-
-def test_more_or_less_about_the_work(run):
-    write("a.csv", AXES)
-    assert run("fit a.csv --space s:2 -o a.npz -q") == ""
-    out = run("fit a.csv --space s:2 -o a.npz -v")
-    assert "a.csv: csv table, points in columns x, y, z, times in column t" in out and "reading took " in out
-    assert Path("a.npz").exists() and ss.load("a.npz").space == ss.Sphere(2)
 
 
 def test_info_of_gaps_beside_repeated_times(run, fails):

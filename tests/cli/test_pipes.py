@@ -40,8 +40,6 @@ def test_results_are_alone_on_standard_output():
     fitted = process("fit - --from csv --space s:2 -o - -q", AXES.encode())
     assert fitted.stderr == b""
     for line, start in [
-        ("check - -q", b"  points"),
-        ("sample - -n 3 --to json -o - -q", b"[\n{"),
         ("sample - -n 3 --to npz -o - -q", b"PK"),
         ("plot - --to svg -o - -q", b"<?xml"),
     ]:

@@ -227,48 +227,39 @@ def test_closed_curves_with_jerk():
 def test_invalid_measurements_raise():
     _, t, seen, s, omega = gyro(19)
     points, rates = fused(t, seen, s, omega)
-    call = ss.estimate
-    raises(
-        r"measurements\[1\]\.t\[0\] is after the last knot",
-        call,
-        [points, measure.BodyRates([11.0], omega[:1], sigma=1)],
-        [0, 5, 10],
-        "so:3",
-    )
-    raises(r"measurements\[1\] has no sigma", call, [points, measure.BodyRates(s, omega, sigma=None)], 9, "so:3")
-    raises(r"measurements\[0\] has no sigma", call, [measure.Points(t, seen), rates], 9, "so:3")
-    raises(r"omega has shape \(500, 3\)", call, [points, measure.BodyRates(s, omega[1:], sigma=1)], 9, "so:3")
-    broken = omega.copy()
-    broken[7, 1] = np.nan
-    raises(r"omega\[7, 1\] is nan", call, [points, measure.BodyRates(s, broken, sigma=1)], 9, "so:3")
-    off = seen.copy()
-    off[4] *= 1.1
-    raises(r"measurements\[0\]\.y: .*4", call, [measure.Points(t, off, sigma=0.1), rates], 9, "so:3")
-    raises("needs one group", call, [measure.BodyRates(s, omega, sigma=1)], 9, "sphere:2")
-    raises("needs one rotation and one position", call, [measure.SpecificForce(s, omega, sigma=1)], 9, "so:3")
-    raises(
-        "Constant of size 3", call, [points, measure.BodyRates(s, omega, sigma=1, bias=measure.Constant(2))], 9, "so:3"
-    )
-    raises("must be one of symspline.measure", call, [(t, seen)], 9, "so:3")
-    raises("there are no measurements", call, [], 9, "so:3")
-    raises(
-        "dates",
-        call,
-        [points, measure.BodyRates(np.datetime64("2024-01-01") + np.arange(2), omega[:2], sigma=1)],
-        9,
-        "so:3",
-    )
-    raises("factor must be", call, [measure.Points(t, seen, sigma=1, factor=3)], 9, "so:3 x r:3")
-    raises(
-        r"t\[3\] is nan",
-        call,
-        [measure.Points(np.where(np.arange(51) == 3, np.nan, t), seen, sigma=1), rates],
-        9,
-        "so:3",
-    )
-    raises("there is no initial curve", call, [measure.Function(t, lambda p: p[:, 0], sigma=1)], 9, "sphere:2")
-    raises("penalty must be", call, [points], 9, "so:3", penalty="snap")
-    raises("at least 4 knots", call, [points, rates], 3, "so:3", penalty="jerk")
+    broken, off, late = omega.copy(), seen.copy(), np.where(np.arange(51) == 3, np.nan, t)
+    broken[7, 1], off[4] = np.nan, 1.1 * off[4]
+    dates = np.datetime64("2024-01-01") + np.arange(2)
+
+    def turns(omega=omega, t=s, sigma=1, **options):
+        return measure.BodyRates(t, omega, sigma=sigma, **options)
+
+    for match, given, knots, space, options in [
+        (
+            r"measurements\[1\]\.t\[0\] is after the last knot",
+            [points, turns(omega[:1], [11.0])],
+            [0, 5, 10],
+            "so:3",
+            {},
+        ),
+        (r"measurements\[1\] has no sigma", [points, turns(sigma=None)], 9, "so:3", {}),
+        (r"measurements\[0\] has no sigma", [measure.Points(t, seen), rates], 9, "so:3", {}),
+        (r"omega has shape \(500, 3\)", [points, turns(omega[1:])], 9, "so:3", {}),
+        (r"omega\[7, 1\] is nan", [points, turns(broken)], 9, "so:3", {}),
+        (r"measurements\[0\]\.y: .*4", [measure.Points(t, off, sigma=0.1), rates], 9, "so:3", {}),
+        ("needs one group", [turns()], 9, "sphere:2", {}),
+        ("needs one rotation and one position", [measure.SpecificForce(s, omega, sigma=1)], 9, "so:3", {}),
+        ("Constant of size 3", [points, turns(bias=measure.Constant(2))], 9, "so:3", {}),
+        ("must be one of symspline.measure", [(t, seen)], 9, "so:3", {}),
+        ("there are no measurements", [], 9, "so:3", {}),
+        ("dates", [points, turns(omega[:2], dates)], 9, "so:3", {}),
+        ("factor must be", [measure.Points(t, seen, sigma=1, factor=3)], 9, "so:3 x r:3", {}),
+        (r"t\[3\] is nan", [measure.Points(late, seen, sigma=1), rates], 9, "so:3", {}),
+        ("there is no initial curve", [measure.Function(t, lambda p: p[:, 0], sigma=1)], 9, "sphere:2", {}),
+        ("penalty must be", [points], 9, "so:3", {"penalty": "snap"}),
+        ("at least 4 knots", [points, rates], 3, "so:3", {"penalty": "jerk"}),
+    ]:
+        raises(match, ss.estimate, given, knots, space, **options)
 
 
 def test_undetermined_parameters_are_named():

@@ -1,7 +1,6 @@
 """Bands of estimates in gaps in which no sensor measures."""
 
 import numpy as np
-import pytest
 
 import symspline as ss
 from symspline import _core, measure
@@ -56,23 +55,3 @@ def test_no_gap_where_another_sensor_measures():
     every = np.linspace(0, 60, 600)
     curve = ss.estimate(given(t, y, every, path(every, 1) + 0.05 * rng.standard_normal((600, 2))), 120, "r:2")
     assert curve.gaps == []
-
-
-@pytest.mark.filterwarnings("ignore:the 95 % band:symspline.SmoothingWarning")
-def test_gaps_of_attitudes_and_rates():
-    """On rotations, with a bias and a robust loss."""
-    inside = []
-    for seed in range(4):
-        path, t, _, s, _ = recording(seed, (25, 30), m=3)
-        rng = np.random.default_rng(seed)
-        fine = np.linspace(0, 60, 1201)
-        truth = ss.CubicSpline(fine, ss.rotations.from_rotation_vectors(0.5 * path(fine)), "so:3")
-        seen = truth(t) @ ss.rotations.from_rotation_vectors(0.02 * rng.standard_normal((len(t), 3)))
-        seen[[30, 200]] = ss.SpecialOrthogonal(3).random_point(rng, (2,))
-        omega = ss.rotations.angular_velocity(truth, s) + [0.1, 0, -0.1] + 0.05 * rng.standard_normal((len(s), 3))
-        gyro = measure.BodyRates(s, omega, sigma=0.05, bias=measure.Constant(3))
-        curve = ss.estimate([measure.Points(t, seen, sigma=0.02, loss="cauchy"), gyro], 200, "so:3")
-        assert max(own.factor for own in curve.gaps) > 1.05
-        x = np.linspace(25.1, 29.9, 40)
-        inside.append(ss.SpecialOrthogonal(3).distance(curve(x), truth(x)) < np.sqrt(7.815) * curve.std(x))
-    assert np.mean(inside) > 0.85

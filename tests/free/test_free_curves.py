@@ -2,16 +2,7 @@
 
 import numpy as np
 import pytest
-from cases import (
-    EPS,
-    QUOTIENTS,
-    apart,
-    by_differences,
-    condition,
-    every_family,
-    loop_over,
-    walk,
-)
+from cases import EPS, QUOTIENTS, apart, by_differences, condition, every_family, loop_over, walk
 from curves import clamped
 from scipy.interpolate import BSpline as FlatBSpline
 
@@ -154,20 +145,6 @@ def test_corners(case, rng):
             y = curve(1.0)
             bend = here(space, y, alone(0.0), alone(0.0, nu=2)) / h**2
             assert np.abs(curve(1.0, nu=2) - bend).max() <= 300 * allowed
-
-
-@every_family
-def test_curves_that_jump(case, rng):
-    """At a knot repeated once more often than the degree."""
-    space = case.space
-    points = walk(space, 0.4, 6, rng)
-    curve = ss.BSpline(clamped([1.0] * 3, 2), points, 2, space)
-    points = curve.control_points
-    allowed = 100 * EPS * condition(space, points)
-    assert apart(space, curve(1.0), points[3]) <= allowed
-    assert apart(space, backwards(curve)(-1.0), points[2]) <= allowed
-    assert apart(space, curve(np.nextafter(1.0, 0.0)), points[2]) <= allowed
-    assert apart(space, curve(3.0), points[5]) <= allowed
 
 
 def test_a_bspline_that_ends_at_a_knot_that_repeats(rng):

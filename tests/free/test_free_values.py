@@ -155,20 +155,3 @@ def test_calls_take_the_options_of_all_curves():
     assert curve.speed(0.5, dtype="float32").dtype == np.float32
     assert curve.extrapolate is None
     raises("extrapolate must be None, 'raise' or False, not True, for a BezierCurve", curve, 0.5, extrapolate=True)
-
-
-def test_times_outside():
-    curve = ss.BezierCurve(P, "sphere:2")
-    for x, match in [
-        (-0.1, r"x = -0\.1 is outside the domain \[0\.0, 1\.0\] of the curve"),
-        ([0.5, 2], r"x\[1\] = 2\.0 is outside"),
-        (1 + 2**-48, r"x = 1\.0000000000000036 is outside"),
-        (NAN, r"x = nan is not finite"),
-        ([[0, 1], [INF, 0]], r"x\[1, 0\] = inf is not finite"),
-        ("a", r"x is 'a', not a date"),
-        (None, r"x must be an array of numbers, not of object: it is a NoneType"),
-        (1j, r"the knots are numbers, so x must be numbers, not complex128"),
-        (np.datetime64("2020-01-01"), r"the knots are numbers, so x must be numbers, not datetime64"),
-    ]:
-        for call in (curve, curve.speed):
-            raises(match, call, x)

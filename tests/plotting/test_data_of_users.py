@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
-from drawn import axes_named, lines_of, rate_axes, rendered, role, texts_of
+from drawn import axes_named, rendered, role, texts_of
 from matplotlib.figure import Figure
 
 import symspline as ss
@@ -75,14 +75,3 @@ def test_large_coordinates_count_from_round_numbers(name):
 
 
 # ---- fonts and rates ----
-
-
-def test_rates_of_one_angle_have_a_sign():
-    t = np.linspace(0, 6, 20)
-    curve = ss.CubicSpline(t, np.sin(t)[:, None], "torus:1")
-    figure = curve.plot()
-    (axes,) = rate_axes(figure)[0]
-    assert axes.get_ylabel() == "velocity\nγ′, rad/t"
-    (line,) = lines_of(axes)
-    np.testing.assert_allclose(line[:, 1], curve(line[:, 0], 1)[:, 0], atol=1e-12)
-    assert line[:, 1].min() < -0.5

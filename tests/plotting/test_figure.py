@@ -7,10 +7,9 @@ import subprocess
 import sys
 from io import BytesIO
 
-import matplotlib
 import numpy as np
 import pytest
-from drawn import VIEWS, axes_named, has_title, lines_of, points_around, rate_axes, rendered, role, spline_on, texts_of
+from drawn import VIEWS, axes_named, has_title, lines_of, points_around, rate_axes, rendered, spline_on, texts_of
 from matplotlib.dates import date2num
 from matplotlib.figure import Figure
 from refused import raises
@@ -116,22 +115,6 @@ def test_dates_of_figures(name, unit, step):
     assert 2 <= sum(map(bool, labels)) <= 12
 
 
-def test_dates_of_every_curve_and_whole_numbers():
-    t = np.array([["2024-01-01", "2024-01-03"], ["2024-01-02", "2024-01-09"]], "datetime64[D]")
-    lines = lines_of(axes_named(rendered(spline_on("r:2", (2, 2), t).plot()), "speed"))
-    for line, dates in zip(lines, t, strict=True):
-        np.testing.assert_allclose(line[[0, -1], 0], date2num(dates))
-    # Nanoseconds are finer than dates on an axis.
-    t = np.datetime64("2024-01-01", "ns") + np.arange(5) * np.timedelta64(100, "ns")
-    axes = axes_named(rendered(spline_on("r:2", (5,), t).plot()), "acceleration")
-    assert axes.get_xlabel().startswith("seconds since 2024-01-01")
-    np.testing.assert_allclose(axes.lines[0].get_xdata()[[0, -1]], [0, 4e-7], atol=1e-15)
-    t = 1_700_000_000_000_000_000 + 10**9 * np.arange(4)
-    axes = axes_named(rendered(spline_on("r:2", (4,), t).plot()), "acceleration")
-    assert axes.get_xlabel() == "t − 1700000000000000000"
-    np.testing.assert_array_equal(lines_of(axes)[0][[0, -1], 0], [0, 3e9])
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "shape"), [("sphere:3 x r:4", (5,)), ("gr:2,3 x u:3", (3, 5))], ids=str)
 def test_product_has_a_picture_a_factor(name, shape):
@@ -197,20 +180,6 @@ assert "matplotlib.pyplot" not in sys.modules
     subprocess.run([sys.executable, "-c", code], check=True, cwd=tmp_path)
 
 
-@pytest.mark.parametrize("dates", [False, True])
-def test_gaps_far_longer_than_the_rest_are_marked(dates):
-    t = np.concatenate([np.arange(5.0), 18 + np.arange(5.0), [33.0]])
-    if dates:
-        t = np.datetime64("2024-05-01") + t.astype("m8[D]")
-    figure = rendered(spline_on("r:2", (11,), t=t).plot())
-    assert any(text.endswith("natural ends, 2 long gaps") for text in texts_of(figure))
-    for label in ("speed", "acceleration"):
-        (bands,) = [c for c in axes_named(figure, label).collections if role(c) == "gap"]
-        edges = [sorted(set(path.vertices[:, 0])) for path in bands.get_paths()]
-        since = date2num(t[0]) if dates else 0.0
-        assert np.allclose(edges, since + np.array([[4, 18], [22, 33]]))
-
-
 def test_points_at_rest_and_constant_speed():
     """Rounding errors are not magnified: axes of what is constant have a usual range."""
     angle = np.arange(5)
@@ -221,11 +190,3 @@ def test_points_at_rest_and_constant_speed():
         point = ss.space(name).random_point(np.random.default_rng(3))
         figure = rendered(ss.CubicSpline(None, np.stack([point] * 3), name).plot())
         assert rate_axes(figure)[0][0].get_ylim()[1] > 0.5
-
-
-@pytest.mark.parametrize("name", ["sphere:2", "so:3"])
-def test_pages_grow_with_the_font(name):
-    usual = spline_on(name).plot()
-    with matplotlib.rc_context({"font.size": 16}):
-        np.testing.assert_allclose(spline_on(name).plot().get_size_inches(), 1.6 * usual.get_size_inches())
-        assert spline_on(name).plot(figsize=(8, 6)).get_size_inches().tolist() == [8, 6]

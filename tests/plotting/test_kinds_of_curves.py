@@ -2,17 +2,7 @@
 
 import numpy as np
 import pytest
-from drawn import (
-    axes_named,
-    has_title,
-    lines_of,
-    points_around,
-    rate_axes,
-    rendered,
-    role,
-    spline_on,
-    texts_of,
-)
+from drawn import axes_named, has_title, lines_of, points_around, rate_axes, rendered, role, spline_on, texts_of
 
 import symspline as ss
 
@@ -61,22 +51,6 @@ def test_gaps_between_segments_are_shaded_and_lines_stop(name):
     (band,) = [own for own in axes.collections if role(own) == "gap"]
     assert sorted(set(band.get_paths()[0].vertices[:, 0])) == [5.3, 15.0]
     assert [line[[0, -1], 0].tolist() for line in lines_of(axes)] == [[0.0, 5.3], [15.0, 20.3]]
-
-
-@pytest.mark.parametrize(
-    ("t", "name", "ends"),
-    [
-        (1305031102.175 + np.arange(6), "t − 1305031100", [2.175, 7.175]),
-        (1_700_000_000_000_000_001 + np.arange(6), "t − 1700000000000000000", [1.0, 6.0]),
-        (-5e6 + 0.1 * np.arange(6), "t + 5000000", [0.0, 0.5]),
-        (np.arange(6) + 50.0, "t", [50.0, 55.0]),
-        (np.arange(6).astype("m8[s]"), "t, seconds", [0.0, 5.0]),
-    ],
-)
-def test_times_far_from_zero_are_differences_from_a_round_number(t, name, ends):
-    axes = axes_named(rendered(spline_on("r:2", t=t).plot()), "acceleration")
-    assert axes.get_xlabel() == name and axes.xaxis.get_offset_text().get_text() == ""
-    np.testing.assert_allclose(lines_of(axes)[0][[0, -1], 0], ends, atol=1e-6)
 
 
 @pytest.mark.parametrize("name", ["euclidean:1", "sphere:1"])

@@ -111,22 +111,6 @@ def test_covariances_are_standard_deviations_and_correlations():
     assert len([own for own in many.collections if hasattr(own, "get_coordinates")]) == 36
 
 
-def test_graphs_show_nothing_in_a_gap_that_no_data_determine():
-    t = np.array([0.0, 1, 2, 3, 20, 21, 22, 23])
-    points = np.stack([np.sin(3 * t), 0.1 * t, 5e5 + t], axis=-1)
-    turns = np.broadcast_to(np.eye(3), (8, 3, 3))
-    figure = rendered(ss.CubicSpline(t, (turns, points), "so:3 x r:3").plot())
-    assert "gap of 17 without data, rates not drawn" in texts_of(figure)
-    names = "about x₁", "about x₂", "about x₃", "x₁", "x₂", "x₃ − 500000", "speed", "acceleration"
-    drawn = [axes for axes in figure.axes if axes.get_ylabel().split("\n")[0] in names]
-    assert len(drawn) == 10
-    for axes in drawn:
-        xy = np.concatenate([line.get_xydata() for line in axes.lines])
-        xy = xy[np.isfinite(xy[:, 1])]
-        assert len(xy) and not np.any((xy[:, 0] > 3) & (xy[:, 0] < 20))
-    assert np.abs(axes_named(figure, "x₁").get_ylim()).max() < 1.5
-
-
 def test_columns_of_frames_have_a_panel_each():
     spline = spline_on("stiefel:2,4")
     figure = rendered(spline.plot())
@@ -140,27 +124,3 @@ def test_columns_of_frames_have_a_panel_each():
         np.testing.assert_allclose(dots, spline.points[:, :, j], atol=1e-12)
     assert [text.get_text() for text in panels[0].get_legend().texts] == ["x₁", "x₂", "x₃", "x₄"]
     assert axes_named(spline_on("stiefel:5,7").plot(), "components")
-
-
-@pytest.mark.parametrize("largest", [2.0, 4.5, 8.0])
-def test_rotations_beside_positions_are_graphs(largest):
-    """They are counted from the first rotation, or from the middle one if that is too far; frames show all others."""
-    t = np.array([0.0, 0.7, 2, 3, 3.5, 5])
-    turns = Rotation.from_rotvec(np.multiply.outer(largest * t / 5, [0.6, 0.0, 0.8])) * Rotation.from_euler("x", 0.4)
-    spline = ss.CubicSpline(t, (turns.as_matrix(), np.stack([t, t**2, np.sin(t)], axis=1)), "so:3 x r:3")
-    texts = texts_of(rendered(spline.plot()))
-    assert {"SpecialOrthogonal(3), rotations", "Euclidean(3), vectors"} <= set(texts)
-    assert "C² spline of rotations and vectors" in texts
-    name = {2.0: "start of the curve", 4.5: "middle rotation"}.get(largest)
-    assert (f"rotation vector log(R R₀ᵀ) in rad, R₀: {name}" in texts) == (name is not None)
-    assert ("first axis" in texts) == (name is None)
-    if name is not None:
-        figure = spline.plot()
-        dots = [line.get_ydata() for axes in figure.axes[:3] for line in axes.lines if role(line) == "given points"]
-        middle = 0.0 if largest == 2.0 else largest / 2
-        expected = np.multiply.outer([0.6, 0.0, 0.8], largest * t / 5 - middle)
-        np.testing.assert_allclose(dots, expected, atol=1e-9 if largest == 2.0 else 0.03)
-        # Positions are graphs beside them.
-        assert axes_named(figure, "x₁").get_gid() == axes_named(figure, "x₃").get_gid() == "time"
-        spans = [np.ptp(axes.get_ylim()) for axes in figure.axes[:3]]
-        np.testing.assert_allclose(spans, spans[0])

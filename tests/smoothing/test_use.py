@@ -173,3 +173,10 @@ def test_the_same_knots_are_not_fitted_again(monkeypatch):
     y = np.sin(t) + 0.1 * np.random.default_rng(0).standard_normal(n)
     ss.make_smoothing_spline(t, y[:, None], "r:1")
     assert calls.count(n) == 1
+
+
+def test_a_rough_curve_of_a_long_recording_has_three_knots_per_degree_of_freedom():
+    t = np.linspace(0, 10, 9000)
+    y = np.sin(150 * t) + 0.1 * np.random.default_rng(0).standard_normal(len(t))
+    spline = ss.make_smoothing_spline(t, y[:, None], "r:1")
+    assert spline.df > 1000 and len(spline.t) > 3 * spline.df

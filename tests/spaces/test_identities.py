@@ -218,6 +218,30 @@ def test_geometry_agrees(case, length, rng):
         assert np.abs(a - b).max() <= 4 * allowed
 
 
+def end_conditions(space, p, ends, moved):
+    """End conditions of a curve, and those of another one, of which vectors at the i-th point are moved."""
+    if ends not in ("velocity", "acceleration"):
+        return ends, ends
+    order = 1 if ends == "velocity" else 2
+    vectors = {i: 0.7 * space.log(p[i], p[j]) for i, j in ((0, 1), (-1, -2))}
+    return [(order, v) for v in vectors.values()], [(order, moved(v, i)) for i, v in vectors.items()]
+
+
+def assert_same_curves(case, one, other, allowed):
+    here, there = one.space, other.space
+    x = np.concatenate([one.t, np.linspace(one.t[0], one.t[-1], 60)])
+    y, fy = one(x), other(x)
+    image = case.f(y)
+    assert np.abs(plain(there, image) - plain(there, fy)).max() <= allowed
+    for nu in (1, 2):
+        v, w = one(x, nu), other(x, nu)
+        # Accelerations are second differences, with steps from 0.7.
+        if case.scale is not None:
+            assert np.abs(case.scale * here.norm(y, v) - there.norm(fy, w)).max() <= 10**nu * allowed
+        mapped = plain_vector(there, image, case.df(y, v, image))
+        assert np.abs(mapped - plain_vector(there, fy, w)).max() <= 10**nu * allowed
+
+
 @pytest.mark.parametrize("case", IDENTITIES[::3], ids=lambda case: f"{case.source}={case.target}")
 @loop_over(
     "step, ends", [(1e-6, "natural"), (0.1, "not-a-knot"), (0.1, "velocity"), (0.7, "periodic"), (0.7, "acceleration")]
@@ -229,26 +253,10 @@ def test_splines_agree(case, ends, step, rng):
         p[-1] = p[0]
     fp = case.f(p)
     t = np.concatenate([[0.0], np.cumsum(rng.uniform(0.7, 1.3, len(p) - 1))])
-    bc = fbc = ends
-    if ends in ("velocity", "acceleration"):
-        order = 1 if ends == "velocity" else 2
-        v = [0.7 * here.log(p[i], p[j]) for i, j in ((0, 1), (-1, -2))]
-        fv = [case.df(p[i], u, fp[i]) for i, u in zip((0, -1), v, strict=True)]
-        bc, fbc = ([(order, u) for u in w] for w in (v, fv))
+    bc, fbc = end_conditions(here, p, ends, lambda v, i: case.df(p[i], v, fp[i]))
     one, other = (ss.CubicSpline(t, p, here, bc_type=bc, tol=0.0), ss.CubicSpline(t, fp, there, bc_type=fbc, tol=0.0))
-    x = np.concatenate([t, np.linspace(t[0], t[-1], 60)])
-    y, fy = one(x), other(x)
-    image = case.f(y)
     # Rounding of the points, through two solvers and two formulas.
-    allowed = 50 * EPS * condition(here, p) * condition(there, fp)
-    assert np.abs(plain(there, image) - plain(there, fy)).max() <= allowed
-    for nu in (1, 2):
-        v, w = one(x, nu), other(x, nu)
-        # Accelerations are second differences, with steps from 0.7.
-        if case.scale is not None:
-            assert np.abs(case.scale * here.norm(y, v) - there.norm(fy, w)).max() <= 10**nu * allowed
-        mapped = plain_vector(there, image, case.df(y, v, image))
-        assert np.abs(mapped - plain_vector(there, fy, w)).max() <= 10**nu * allowed
+    assert_same_curves(case, one, other, 50 * EPS * condition(here, p) * condition(there, fp))
 
 
 def test_rotations_have_two_quaternions(rng):
@@ -281,28 +289,16 @@ def test_representatives_do_not_matter(name, ends, method, rng):
     def multiply(x, g):
         return x * g if len(space.point_shape) == 1 else x @ g
 
+    same = linear(name, name, 1.0, lambda x: x)
     for step in (1e-6, 0.7, 1.1):
         p = (closed_walk if ends == "periodic" else walk)(space, step, 14, rng)
         g = gauges(space, len(p), rng)
-        moved = multiply(p, g)
         t = np.concatenate([[0.0], np.cumsum(rng.uniform(0.7, 1.3, len(p) - 1))])
-        bc = there = ends
-        if ends in ("velocity", "acceleration"):
-            order = 1 if ends == "velocity" else 2
-            v = [0.7 * space.log(p[i], p[j]) for i, j in ((0, 1), (-1, -2))]
-            bc = [(order, u) for u in v]
-            there = [(order, multiply(u, g[i])) for i, u in zip((0, -1), v, strict=True)]
+        bc = end_conditions(space, p, ends, lambda v, i, g=g: multiply(v, g[i]))
         one, other = (
             ss.CubicSpline(t, points, space, bc_type=end, method=method, tol=0.0)
-            for points, end in ((p, bc), (moved, there))
+            for points, end in zip((p, multiply(p, g)), bc, strict=True)
         )
-        x = np.concatenate([t, np.linspace(t[0], t[-1], 60)])
-        y, z = one(x), other(x)
-        allowed = 100 * EPS
-        assert np.abs(plain(space, y) - plain(space, z)).max() <= allowed
-        for nu in (1, 2):
-            v, w = one(x, nu), other(x, nu)
-            assert np.abs(space.norm(y, v) - space.norm(z, w)).max() <= 10**nu * allowed
-            assert np.abs(plain_vector(space, y, v) - plain_vector(space, z, w)).max() <= 10**nu * allowed
+        assert_same_curves(same, one, other, 100 * EPS)
         if step == 0.7:
             assert one.length() == pytest.approx(other.length(), rel=1e-12)

@@ -1,11 +1,8 @@
 """Curves of high ambient dimension, which are computed in the span of their points."""
 
-import sys
-
 import numpy as np
 import pytest
 from cases import ENDS, QUOTIENTS, apart, closed_walk, end_conditions, loop_over, unit_tangent, walk
-from curves import run_python
 
 import symspline as ss
 
@@ -155,34 +152,3 @@ def test_error_names_the_invalid_curve(rng):
         ss.CubicSpline(None, np.stack([good, far]), space)
     with pytest.raises(ss.ValidationError, match=r"points\[1\] of curve 1 is off the space"):
         ss.fit_many([(None, good), (None, good * [[1.0], [2], [1], [1], [1]])], space)
-
-
-SMOKE = """
-import numpy as np, symspline as ss, sys
-space = ss.space(sys.argv[1])
-rng = np.random.default_rng(0)
-start = np.eye(1, space.point_shape[0])[0] if sys.argv[1][0] == "h" else space.random_point(rng)
-v = space.random_tangent(rng, np.broadcast_to(start, (20, *start.shape)))
-p = space.exp(start, 0.3 / np.sqrt(space.dim) * v)
-w = 0.2 / np.sqrt(space.dim) * space.random_tangent(rng, p[0])
-for bc_type in ("not-a-knot", ((1, w), "natural")):
-    spline = ss.CubicSpline(None, p, space, bc_type=bc_type)
-    assert spline.report.converged
-    for nu in range(3):
-        assert np.isfinite(spline([0.5, 7.3], nu)).all()
-assert space.distance(spline(np.arange(20.0)), p).max() < 1e-12
-assert spline.length() > 1
-many = ss.fit_many([(None, p[:7]), (None, p)], space)
-assert many[1] == ss.CubicSpline(None, p, space)
-assert np.isfinite(ss.BezierCurve(p[:4], space)([0.0, 0.5], nu=2)).all()
-print(*(line.split()[1] for line in open("/proc/self/status") if line.startswith("VmHWM")))
-"""
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(sys.platform != "linux", reason="reads the memory used in /proc")
-@pytest.mark.parametrize("name", ["sphere:49999", "gr:2,10000"])
-def test_really_large_spaces(name):
-    """Seconds, where an n × n array would be 3 GB at least."""
-    peak = run_python(SMOKE, name, timeout=60)
-    assert int(peak) < 1_500_000

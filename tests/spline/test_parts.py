@@ -50,17 +50,6 @@ def test_dates_and_policies(rng):
     assert curve.shift(np.timedelta64(0, "s")).restrict(days[1]).length() == pytest.approx(curve.length(days[1]))
 
 
-def test_batches_with_their_own_knots(rng):
-    t = np.cumsum(rng.uniform(0.1, 2, (3, 6)), axis=-1)
-    curves = ss.CubicSpline(t, np.cumsum(rng.standard_normal((3, 6, 2)), axis=1), "r:2")
-    back, later = curves.reverse(), curves.shift(-100)
-    for i in range(3):
-        x = np.linspace(t[i, 0], t[i, -1], 9)
-        assert close(back[i](x), curves[i](t[i, 0] + t[i, -1] - x, extrapolate=True), 1e-11)
-        assert close(later[i](x - 100, extrapolate=True), curves[i](x), 1e-11)
-    assert curves.restrict().length() == pytest.approx(curves.length())
-
-
 def test_invalid_times_of_parts_raise(rng):
     curve = ss.CubicSpline(None, rng.standard_normal((5, 2)), "r:2")
     raises(r"b = 9\.0 is outside the domain", curve.restrict, 0, 9)

@@ -6,22 +6,12 @@ import numpy as np
 import pytest
 from cases import EPS, loop_over
 from compare import largest_difference, same
-from curves import KNOTS, S2, THREE, points_on
+from curves import S2, THREE, points_on
 from refused import INF, NAN, TWO, P, fit_error, raises
 
 import symspline as ss
 
 EPOCH = 1_700_000_000_000_000_000
-
-
-@pytest.mark.parametrize("own", [False, True])
-def test_curves_share_times_or_have_their_own(own):
-    p = points_on(S2, 6, (2, 3))
-    t = np.cumsum(np.random.default_rng(0).uniform(0.5, 2, (2, 3, 6)), axis=-1) if own else KNOTS
-    spline = ss.CubicSpline(t, p, S2)
-    assert same(spline.t, t)
-    for i in np.ndindex(2, 3):
-        assert same(spline.velocities[i], ss.CubicSpline(t[i] if own else t, p[i], S2).velocities)
 
 
 @pytest.mark.parametrize("dtype", ["i1", "u4", "i8", "u8", ">i4", "f2", "f4", "f8", ">f8"])
