@@ -28,9 +28,9 @@ Outside the default run:
     oracles, pytorch   have environments of their own: `make test-oracles`, `make test-torch`
 
 Shared modules: `cases` has the one list of spaces, the one list of end conditions, data on them, and decorators that
-run several values within one case of pytest; `curves` has arrays, `lie` the algebra of each group, `compare` comparisons,
-`refused` invalid input, `limited` scripts with little memory, `pages` code and tables of the documentation, `stored`
-files of curves and damaged copies of them.
+run several values within one case of pytest; `curves` has arrays, `lie` the algebra of each group, `compare`
+comparisons, `refused` invalid input, `limited` scripts with little memory, `pages` code and tables of the
+documentation, `stored` files of curves and damaged copies of them.
 
 A law of spaces runs as one case per family (`cases.every_family`), whatever does not depend on the formulas of a
 space on `cases.REPRESENTATIVE`. Lists that would multiply take turns instead.

@@ -86,14 +86,3 @@ def test_info_of_the_installation(run):
     out = run("info")
     assert "  sphere:2: " in out and "  so:2: " in out and ".geojson" in out and "matplotlib" in out
     assert max(map(len, out.splitlines())) < 100
-
-
-def test_info_of_gaps_beside_repeated_times(run, fails):
-    write("a.csv", "t,x\n" + "".join(f"{t},{t}\n" for t in (0, 1, 2, 3, 43, 44, 45, 45)))
-    assert "1 repeated time, 1 long gap, up to 40\n" in run("info a.csv")
-    assert fails("info a.csv --time x2") == "a.csv has no column 'x2'; did you mean 'x'?"
-    np.savez("a.npz", t=np.arange(3), points=np.ones((3, 20)))
-    out = run("info a.npz")
-    np.savez("empty.npz", x=np.empty(0))
-    assert "  x: no values\n" in run("info empty.npz")
-    assert "  points_11: 1.0 to 1.0\n  ... points_19: points has 20 columns\n" in out

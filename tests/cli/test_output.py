@@ -2,16 +2,13 @@
 
 import os
 import shlex
-import signal
-import subprocess
 import sys
-import time
+import warnings
 from pathlib import Path
 
 import pytest
 from tabular import AXES, write
 
-from symspline._base.faults import warn
 from symspline.cli import main
 from symspline.cli._curves import read_curves
 
@@ -49,28 +46,6 @@ def test_writing_that_fails_midway(curves, fails, ending):
     assert Path(out).read_text() == "as it was"
 
 
-@pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
-def test_interrupted_by_a_signal(curves, folder):
-    os.mkdir("out")
-    line = [sys.executable, "-m", "symspline", "sample", "a.npz", "-n", "1000000", "-o", "out/out.csv"]
-    with subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-        deadline = time.monotonic() + 20
-        while not any(path.stat().st_size for path in Path("out").iterdir()) and time.monotonic() < deadline:
-            time.sleep(0.01)
-        process.send_signal(signal.SIGINT)
-        out, err = process.communicate(timeout=20)
-    assert (process.returncode, out, err) == (130, "", "symspline: interrupted\n")
-    assert not os.listdir("out")
-
-
-def test_closed_pipe(curves):
-    line = [sys.executable, "-m", "symspline", "check", "a.npz"]
-    with subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-        process.stdout.close()
-        assert process.stderr.read() == ""
-    assert process.returncode == 141
-
-
 def test_not_enough_memory(curves, fails, monkeypatch):
     def too_much(*_):
         raise MemoryError
@@ -83,7 +58,7 @@ def test_not_enough_memory(curves, fails, monkeypatch):
 @pytest.mark.parametrize("line", ["sample a.npz -n 3 -o b.csv", "check a.npz", "info a.npz"])
 def test_warnings_of_the_library_are_messages(curves, run, monkeypatch, line):
     def warned(*arguments):
-        warn("too steep", UserWarning)
+        warnings.warn("too steep", UserWarning, stacklevel=2)
         return read_curves(*arguments)
 
     for verb in ("sample", "check", "info"):

@@ -1,8 +1,6 @@
 """The commands of the command line and their usage errors."""
 
 import re
-import subprocess
-import sys
 from functools import partial
 from pathlib import Path
 
@@ -82,14 +80,6 @@ def test_help_has_examples_and_the_version_is_that_of_the_core(capsys):
         main(["--version"])
     assert capsys.readouterr().out == f"symspline {ss.__version__}\n"
     assert f'version = "{ss.__version__}"' in (ROOT / "Cargo.toml").read_text(encoding="utf-8")
-
-
-def test_as_a_module():
-    write("axes.csv", AXES)
-    line = [sys.executable, "-m", "symspline", "fit", "axes.csv", "--space", "s:2", "-o", "axes.npz"]
-    assert subprocess.run(line, timeout=20).returncode == 0 and Path("axes.npz").exists()
-    done = subprocess.run([*line, "--time", "tt"], capture_output=True, text=True, timeout=20)
-    assert (done.returncode, done.stderr) == (2, "symspline: axes.csv has no column 'tt'; did you mean 't'?\n")
 
 
 def test_samples_at_given_times(run, fails):

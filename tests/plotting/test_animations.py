@@ -67,14 +67,3 @@ def test_invalid_arguments(tmp_path):
     for name in ("a.gif", "a.mp4"):
         raises("is an animation, but plot writes still images", spline_on("r:1").plot, tmp_path / name)
     assert not list(tmp_path.iterdir())
-
-
-def test_frames_of_poses_move():
-    spline = spline_on("se:3")
-    figure = at_time(spline, np.linspace(*spline.domain, 1201)[100])
-    pose = spline(np.linspace(*spline.domain, 1201)[100])
-    sticks = [np.stack(line.get_data_3d(), axis=1) for line in figure.axes[0].lines[-3:]]
-    for i, stick in enumerate(sticks):
-        np.testing.assert_allclose(stick[0], pose[:3, 3], atol=1e-12)
-        along = stick[1] - stick[0]
-        np.testing.assert_allclose(along / np.linalg.norm(along), pose[:3, i], atol=1e-12)

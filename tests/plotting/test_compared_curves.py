@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from drawn import lines_of, points_around, rate_axes, rendered, spline_on, texts_of
+from drawn import lines_of, rate_axes, rendered, spline_on, texts_of
 from refused import raises
 
 import symspline as ss
@@ -22,19 +22,6 @@ def test_curves_and_data_in_one_picture(name):
     assert {"spline", "polygon", "measured", "2 curves, 6 data"} <= set(texts_of(figure))
     for axes in rate_axes(figure)[0]:
         assert len(lines_of(axes)) == 2
-
-
-def test_data_of_products_with_missing_points():
-    space, rng = ss.space("sphere:2 x r:1"), np.random.default_rng(3)
-    points = tuple(points_around(own, rng, (6,)) for own in space.factors)
-    spline = ss.CubicSpline(T, points, space)
-    points[1][2] = np.nan
-    figure = rendered(ss.plot([(T[::-1], tuple(own[::-1] for own in points)), spline], labels=["given", None]))
-    assert "1 curve, 5 data" in texts_of(figure)
-    (dots,) = [
-        line for axes in figure.axes for line in axes.lines if axes.get_ylabel() == "x" and line.get_label() == "given"
-    ]
-    np.testing.assert_allclose(dots.get_xdata(), np.delete(T, 2))
 
 
 def test_what_cannot_be_compared_raises():

@@ -100,24 +100,6 @@ def test_points_of_several_sensors_are_drawn():
     assert not any("95 %" in label for label in labels)
 
 
-@pytest.mark.parametrize("dates", [False, True])
-def test_factors_have_their_own_points(dates):
-    def time(t):
-        return np.datetime64("2024-05-01", "us") + (1e6 * t).astype("m8[us]") if dates else t
-
-    given = [
-        measure.Points(time(T), noisy_rotations(T), sigma=0.03, factor=0),
-        measure.Points(time(S), path(S)[:, :1] + 0.1 * noise(90, 1), sigma=0.1, factor=1),
-    ]
-    given.append(measure.BodyRates(time(S), rates(S).omega, sigma=0.02))
-    curve = ss.estimate(given, 20, "so:3 x r:1")
-    figure = rendered(curve.plot())
-    assert len(dots(axes_named(figure, "x"))) == 90
-    labels = [axes.get_ylabel() for axes in figure.axes]
-    assert "BodyRates\nresidual / σ" in labels and not any("95 %" in label for label in labels)
-    assert sum(role(own) == "95 % band" for axes in figure.axes[:4] for own in axes.collections) == 4
-
-
 @pytest.mark.filterwarnings("ignore:The residuals:symspline.SmoothingWarning")
 def test_curves_from_files_have_bands_and_no_data(tmp_path):
     attitudes().save(tmp_path / "a.npz")

@@ -74,28 +74,6 @@ def check_rates_of_poses(figure, space, curves):
             np.testing.assert_allclose(other[200:-200:50, 1], moved, atol=1e-4)
 
 
-@pytest.mark.slow
-def test_the_heading_counts_curves():
-    figure = spline_on("r:2", (7, 10, 4)).plot()
-    assert len(lines_of(axes_named(figure, "speed"))) == 3
-    assert len(lines_of(figure.axes[0])) == 50
-    texts = texts_of(figure)
-    assert "3 of 70 curves, 4 points each, natural ends" in texts
-    assert {"curve (0, 0)", "curve (6, 9)", "start", "given points", "other curves, 47 of 67"} <= set(texts)
-    assert "5–95 % of 70 curves" in texts
-    good = [[1.0, 0, 0], [0, 1, 0], [0, 0, 1]]
-    points = [good, [[1.0, 0, 0], [-1, 0, 0], [0, 1, 0]], good]
-    figure = rendered(ss.CubicSpline(None, points, "sphere:2", on_failure="ignore").plot())
-    assert len(lines_of(axes_named(figure, "speed"))) == 2
-    assert "2 of 3 curves, 3 points each, natural ends, 1 failed" in texts_of(figure)
-    raises("nothing to plot", ss.CubicSpline(None, points[1], "sphere:2", on_failure="ignore").plot)
-    figure = spline_on("sphere:2", max_iter=1, on_failure="ignore").plot()
-    assert any(text.endswith("not converged") for text in texts_of(figure))
-    spline = ss.CubicSpline(None, (np.arange(4.0)[:, None],) * 7, " x ".join(["r:1"] * 7))
-    figure = rendered(spline.plot())
-    assert "4 points, natural ends, 6 of 7 factors" in texts_of(figure) and len(figure.axes) == 6 + 12
-
-
 @pytest.mark.parametrize(
     "name, unit, step",
     [("r:1", "us", 500), ("r:2", "h", 10), ("r:2", "D", 300)],
@@ -178,15 +156,3 @@ assert settings() == before
 assert "matplotlib.pyplot" not in sys.modules
 """
     subprocess.run([sys.executable, "-c", code], check=True, cwd=tmp_path)
-
-
-def test_points_at_rest_and_constant_speed():
-    """Rounding errors are not magnified: axes of what is constant have a usual range."""
-    angle = np.arange(5)
-    spline = ss.CubicSpline(None, np.stack([np.cos(angle), np.sin(angle)], axis=-1), "sphere:1")
-    ((axes,), (bend,)) = rate_axes(spline.plot())
-    assert bend.get_ylim()[1] > 0.1 and axes.get_ylim()[0] < 0 < 1 < axes.get_ylim()[1]
-    for name in ("euclidean:2", "sphere:2", "so:3", "spd:2", "se:2"):
-        point = ss.space(name).random_point(np.random.default_rng(3))
-        figure = rendered(ss.CubicSpline(None, np.stack([point] * 3), name).plot())
-        assert rate_axes(figure)[0][0].get_ylim()[1] > 0.5

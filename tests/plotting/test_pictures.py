@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from drawn import axes_named, dots_of, lines_of, rendered, role, texts_of
+from drawn import axes_named, dots_of, lines_of, rendered, role
 
 import symspline as ss
 from symspline import geo
@@ -122,15 +122,3 @@ def test_no_line_jumps_across_the_half_sphere(name, points, crosses):
     np.testing.assert_allclose(line[gaps - 1], -line[gaps + 1], atol=1e-12)
     for dot in dots:
         assert np.nanmin(np.linalg.norm(line - dot, axis=1)) < 1e-12
-
-
-@pytest.mark.slow
-def test_closed_curves_have_no_end():
-    turn = np.linspace(0, 2 * np.pi, 9)
-    points = np.stack([np.cos(turn), np.sin(turn), 0.3 * np.sin(turn)], axis=1)
-    points[-1] = points[0]
-    states = np.stack([np.cos(0.5 + 0 * turn), np.sin(0.5) * np.exp(1j * turn)], axis=1) * np.exp(0.7j * turn[:, None])
-    paths = [("r:3", points), ("sphere:2", ss.Sphere(2).project(points)), ("r:2", points[:, :2]), ("cp:1", states)]
-    for name, closed in paths:
-        texts = texts_of(rendered(ss.CubicSpline(None, closed, name, bc_type="periodic").plot()))
-        assert "start" in texts and "end" not in texts

@@ -5,7 +5,6 @@ import pytest
 from cases import EPS, loop_over, walk
 from compare import same
 from refused import raises
-from rounding import rounding
 
 import symspline as ss
 
@@ -52,8 +51,8 @@ def test_lift_is_horizontal_and_projects_to_the_curve(name, rng):
     spline = ss.CubicSpline(KNOTS, points, space)
     x = np.sort(np.append(rng.uniform(0, KNOTS[-1], 200), KNOTS))
     lifted, moving = spline.lift(x), spline.lift(x, nu=1)
-    assert np.max(space.distance(lifted, spline(x))) < 100 * EPS * np.max(rounding(space, lifted))
-    assert np.abs(inner(space, lifted, moving)).max() < 100 * EPS * np.max(rounding(space, lifted))
+    assert np.max(space.distance(lifted, spline(x))) < 100 * EPS * np.max(space._rounding(lifted))
+    assert np.abs(inner(space, lifted, moving)).max() < 100 * EPS * np.max(space._rounding(lifted))
     # nu = 1 is the derivative of the arrays, nu = 2 its horizontal part, by central differences of order four.
     h, x = 1e-3, x[(np.abs(x[:, None] - KNOTS) > 3e-3).all(axis=1)]
     around = [spline.lift(x + i * h, nu=0) for i in (-2, -1, 1, 2)]
@@ -74,7 +73,7 @@ def test_lift_is_continuous_at_knots(name, nu, rng):
     left, right = spline.lift(inner_knots - 1e-13, nu=nu), spline.lift(inner_knots, nu=nu)
     # The jump of a curve within 1e-13 is that times its next derivative.
     size = np.abs(spline.lift(KNOTS, nu=min(nu + 1, 2))).max() + np.abs(spline.lift(KNOTS, nu=2)).max() / 0.4
-    assert np.abs(left - right).max() < 1e-12 * np.max(rounding(space, points)) * size
+    assert np.abs(left - right).max() < 1e-12 * np.max(space._rounding(points)) * size
     # The call itself jumps there, or this test shows nothing.
     if nu == 0:
         assert np.abs(spline(inner_knots - 1e-13) - spline(inner_knots)).max() > 0.1
@@ -89,7 +88,7 @@ def test_lift_does_not_depend_on_representatives(name, rng):
         a, b = (ss.CubicSpline(KNOTS, p, space, extrapolate=outside) for p in (points, other))
         for nu in range(3):
             expected = a.lift(x, nu=nu)
-            size = np.abs(expected).max() * np.max(rounding(space, expected if nu == 0 else points))
+            size = np.abs(expected).max() * np.max(space._rounding(expected if nu == 0 else points))
             np.testing.assert_allclose(b.lift(x, points[0], nu=nu), expected, rtol=0, atol=3e-13 * size)
 
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from cases import EPS, has_metric, unit_tangent, walk
 from refused import raises
-from rounding import rounding
 
 import symspline as ss
 
@@ -42,7 +41,7 @@ def test_transport_is_the_limit_of_short_geodesics(name, rng):
     a, b = 0.3, 3.7
     v = unit_tangent(space, spline(a), rng)
     found = spline.transport(a, b, v)
-    scale = np.abs(found).max() * np.max(rounding(space, spline(np.linspace(a, b, 20))))
+    scale = np.abs(found).max() * np.max(space._rounding(spline(np.linspace(a, b, 20))))
     # Two thousand transports leave some thousand rounding errors.
     np.testing.assert_allclose(found, by_polygons(spline, a, b, v), rtol=0, atol=5e-12 * scale)
     np.testing.assert_allclose(spline.transport(b, a, found), v, rtol=0, atol=500 * EPS * scale)

@@ -2,6 +2,7 @@
 
 import os
 import signal
+import sys
 import time
 
 import dask
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from compare import same
-from curves import S2, points_on
+from curves import S2, points_on, run_python
 from distributed import Client, LocalCluster, as_completed, futures_of
 from refused import raises
 
@@ -80,3 +81,22 @@ def test_a_failure_in_a_worker_comes_here(client):
     da = curves()
     ds = sx.fit(da.chunk(curve=EACH), S2, on_failure="raise")
     raises("of curve 3", ds.compute)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="counts threads in /proc")
+def test_workers_times_threads_do_not_multiply():
+    """Four workers of dask need no threads of the core."""
+    code = """
+import os, threading, dask, numpy as np, xarray as xr, symspline as ss, symspline.xarray as sx
+ss.set_num_threads(3)
+p = ss.Sphere(2).geodesic([1, 0, 0], [0, 1, 0], np.linspace(0, 1, 20))
+da = xr.DataArray(p, dims=("time", "q")).expand_dims(curve=8000)
+def extra():
+    return len(os.listdir("/proc/self/task")) - threading.active_count()
+before = extra()
+sx.fit(da.chunk(curve=1000), "sphere:2").compute(scheduler="threads", num_workers=4)
+print(extra() - before)
+sx.fit(da, "sphere:2")
+print(extra() - before)
+"""
+    assert run_python(code, timeout=60).split() == ["0", "3"]

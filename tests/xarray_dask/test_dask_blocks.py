@@ -1,14 +1,13 @@
 """Blocks of dask: lazy, bit-identical for every scheduler, and one thread per worker."""
 
 import pickle
-import sys
 
 import dask
 import numpy as np
 import pytest
 import xarray as xr
 from compare import same
-from curves import S2, run_python
+from curves import S2
 from fields import field, numbers, point_dims
 
 import symspline as ss
@@ -86,25 +85,6 @@ def test_a_failure_says_that_it_counts_in_its_block():
         ds.compute(scheduler="synchronous")
     sent = pickle.loads(pickle.dumps(caught.value))
     assert type(sent) is ss.CutLocusError and sent.spline is None and sent.__notes__
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="counts threads in /proc")
-def test_workers_times_threads_do_not_multiply():
-    """Four workers of dask need no threads of the core."""
-    code = """
-import os, threading, dask, numpy as np, xarray as xr, symspline as ss, symspline.xarray as sx
-ss.set_num_threads(3)
-p = ss.Sphere(2).geodesic([1, 0, 0], [0, 1, 0], np.linspace(0, 1, 20))
-da = xr.DataArray(p, dims=("time", "q")).expand_dims(curve=8000)
-def extra():
-    return len(os.listdir("/proc/self/task")) - threading.active_count()
-before = extra()
-sx.fit(da.chunk(curve=1000), "sphere:2").compute(scheduler="threads", num_workers=4)
-print(extra() - before)
-sx.fit(da, "sphere:2")
-print(extra() - before)
-"""
-    assert run_python(code, timeout=60).split() == ["0", "3"]
 
 
 @pytest.mark.parametrize("space", ["sphere:2", "cp:2", "so:3"])
