@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ._base.arrays import as_array, same_fields, whole_number
-from ._base.typing import AnyArray, FloatArray, P
+from ._base.typing import Array, FloatArray, P
 from ._core import ValidationError
 from ._spaces import AnySpace, Product, Space, parts_of, require_metric, space_named
 
@@ -217,7 +217,7 @@ def _well_conditioned(space: AnySpace, mean: Any, arrays: list[Any]) -> tuple[An
     return _joined(means), whole, moved, back
 
 
-def _as_given(given: Any, array: AnyArray) -> AnyArray:
+def _as_given(given: Any, array: Array) -> Array:
     """Return numbers of the precision in which they were given, on which the tolerance of points depends."""
     dtype = getattr(given, "dtype", None)
     return array.astype(dtype) if isinstance(dtype, np.dtype) and dtype.kind in "fc" else array

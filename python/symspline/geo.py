@@ -26,7 +26,7 @@ from ._base.arrays import checked_flag, checked_number, short_repr
 from ._base.exceptions import SymsplineError
 from ._base.faults import warn
 from ._base.time import seconds_of
-from ._base.typing import AxesLook, Duplicates, File, FloatArray, PageLook, TimesLike
+from ._base.typing import AxesLook, Duplicates, File, FloatArray, Keywords, PageLook, TimesLike
 from ._core import ValidationError
 from ._curves.options import require_matplotlib
 from ._estimation.uncertainty import Jacobians, Motion, check_uncertain, standard_errors
@@ -34,7 +34,7 @@ from ._smoothing.segments import check_smooth, cut, smooth_many
 from ._spaces import Sphere
 from ._splines.base import check_timed, checked_items
 from ._splines.composed import SegmentedCurve
-from ._splines.cubic import CubicSpline
+from ._splines.cubic import AnyCubicSpline
 from ._splines.functional import fit_many
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ def __dir__() -> list[str]:
 EARTH_RADIUS = 6_371_008.8
 """Mean radius in metres: R₁ of the ellipsoid GRS 80 (Moritz, Geodetic reference system 1980)."""
 
-_Track = CubicSpline[Any, Any] | SegmentedCurve[Any, Any]
+_Track = AnyCubicSpline | SegmentedCurve[Any, Any]
 _SeveralTracks = _Track | Sequence[_Track] | Mapping[str, _Track]
 # Values of the column ``quality`` of resampled tables.
 _QUALITIES = ["good", "lam at bound", "not converged"]
@@ -76,18 +76,18 @@ ZIGZAG = 2.0
 
 @overload
 def sog(
-    spline: CubicSpline[Any, Any], x: TimesLike, *, radius: float = EARTH_RADIUS, return_std: Literal[False] = False
+    spline: AnyCubicSpline, x: TimesLike, *, radius: float = EARTH_RADIUS, return_std: Literal[False] = False
 ) -> FloatArray: ...
 
 
 @overload
 def sog(
-    spline: CubicSpline[Any, Any], x: TimesLike, *, radius: float = EARTH_RADIUS, return_std: Literal[True]
+    spline: AnyCubicSpline, x: TimesLike, *, radius: float = EARTH_RADIUS, return_std: Literal[True]
 ) -> tuple[FloatArray, FloatArray]: ...
 
 
 def sog(
-    spline: CubicSpline[Any, Any], x: TimesLike, *, radius: float = EARTH_RADIUS, return_std: bool = False
+    spline: AnyCubicSpline, x: TimesLike, *, radius: float = EARTH_RADIUS, return_std: bool = False
 ) -> FloatArray | tuple[FloatArray, FloatArray]:
     r"""Compute the speed over ground.
 
@@ -151,15 +151,15 @@ def sog(
 
 
 @overload
-def cog(spline: CubicSpline[Any, Any], x: TimesLike, *, return_std: Literal[False] = False) -> FloatArray: ...
+def cog(spline: AnyCubicSpline, x: TimesLike, *, return_std: Literal[False] = False) -> FloatArray: ...
 
 
 @overload
-def cog(spline: CubicSpline[Any, Any], x: TimesLike, *, return_std: Literal[True]) -> tuple[FloatArray, FloatArray]: ...
+def cog(spline: AnyCubicSpline, x: TimesLike, *, return_std: Literal[True]) -> tuple[FloatArray, FloatArray]: ...
 
 
 def cog(
-    spline: CubicSpline[Any, Any], x: TimesLike, *, return_std: bool = False
+    spline: AnyCubicSpline, x: TimesLike, *, return_std: bool = False
 ) -> FloatArray | tuple[FloatArray, FloatArray]:
     r"""Compute the course over ground.
 
@@ -612,7 +612,7 @@ def _along(
     return values | {"quality": pd.Categorical([quality] * len(at), _QUALITIES)}
 
 
-def _fitted(curves: list[tuple[Any, Any]], names: list[str], smooth: bool, options: dict[str, Any]) -> Any:
+def _fitted(curves: list[tuple[Any, Any]], names: list[str], smooth: bool, options: Keywords) -> Any:
     """Fit the curves, and name them in messages by their names instead of their numbers."""
     if not curves:
         return []
@@ -637,7 +637,7 @@ def _fitted(curves: list[tuple[Any, Any]], names: list[str], smooth: bool, optio
     return splines
 
 
-def _check_globe(spline: CubicSpline[Any, Any] | SegmentedCurve[Any, Any]) -> None:
+def _check_globe(spline: AnyCubicSpline | SegmentedCurve[Any, Any]) -> None:
     check_timed(spline)
     if str(spline.space) != "sphere:2":
         raise ValidationError(f"the curve must be on Sphere(2), not on {spline.space!r}")

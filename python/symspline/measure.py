@@ -13,7 +13,7 @@ Examples
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from copy import copy
 from typing import Any
 
@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike
 
 from ._base.arrays import as_array, cast, filled, one_of, refuse, short_repr, whole_number
 from ._base.input import times_of
-from ._base.typing import FloatArray, Loss, Numbers, PointsLike, TimesLike
+from ._base.typing import AnyFunction, FloatArray, Keywords, Loss, Numbers, PointsLike, TimesLike
 from ._core import ValidationError
 from ._curves.missing import Mask, missing_times, rows_of
 from ._curves.options import order_of
@@ -441,14 +441,14 @@ class Function(Measurement):
     True
     """
 
-    residual: Callable[..., Any]
+    residual: AnyFunction
     nu: int
     parameters: dict[str, Constant]
 
     def __init__(
         self,
         t: TimesLike,
-        residual: Callable[..., Any],
+        residual: AnyFunction,
         *,
         sigma: ArrayLike,
         nu: int = 0,
@@ -498,7 +498,7 @@ def measurement_without_missing(given: Measurement) -> Measurement:
     return found
 
 
-def _values(given: Measurement) -> dict[str, Any]:
+def _values(given: Measurement) -> Keywords:
     """Return the arrays of a measurement besides its times."""
     return {
         name: filled(value)

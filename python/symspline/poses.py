@@ -25,12 +25,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ._base.arrays import as_array, checked_flag, one_of, real_numbers, short_repr
-from ._base.typing import Extrapolate, Frame, TimesLike
+from ._base.typing import Array, Extrapolate, Frame, TimesLike
 from ._core import ValidationError
 from ._curves.composed import AnyCurve, evaluated
 from ._estimation.uncertainty import Jacobians, Motion, check_uncertain, standard_errors
 from ._smoothing.noise import smoothed_spaces
-from ._spaces import Array, Euclidean, SpecialEuclidean, SpecialOrthogonal, cover_of
+from ._spaces import Euclidean, SpecialEuclidean, SpecialOrthogonal, cover_of
 from .convert._pose_files import (
     check_seconds,
     join,

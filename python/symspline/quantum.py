@@ -25,7 +25,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ._base.arrays import (
-    Array,
     adjoint,
     as_array,
     check_symmetric,
@@ -39,13 +38,13 @@ from ._base.arrays import (
 )
 from ._base.input import times_of
 from ._base.time import onto_ends
-from ._base.typing import Extrapolate, Number, TimesLike
+from ._base.typing import Array, Extrapolate, Number, TimesLike
 from ._core import ValidationError
 from ._curves.curve import CurveArrays, in_span
 from ._curves.options import order_of
 from ._curves.reduced import span_of
 from ._spaces import ComplexGrassmannian, ComplexProjective, Doubles, Space, SpecialUnitary, Unitary
-from ._splines.cubic import CubicSpline
+from ._splines.cubic import AnyCubicSpline
 from ._splines.piecewise import check_curve
 
 if TYPE_CHECKING:
@@ -68,7 +67,7 @@ _BLOCK = 2**26
 # ---- Hamiltonians ----
 
 
-def hamiltonian(spline: CubicSpline[Any, Any], x: TimesLike, *, nu: int = 0, extrapolate: Extrapolate = None) -> Array:
+def hamiltonian(spline: AnyCubicSpline, x: TimesLike, *, nu: int = 0, extrapolate: Extrapolate = None) -> Array:
     r"""Compute the Hamiltonian that drives states along a curve, or its derivative.
 
     Parameters
@@ -122,7 +121,7 @@ def hamiltonian(spline: CubicSpline[Any, Any], x: TimesLike, *, nu: int = 0, ext
     return _generator(space, point, vector)
 
 
-def qobjevo(spline: CubicSpline[Any, Any], *, dims: Sequence[int] | None = None) -> QobjEvo:
+def qobjevo(spline: AnyCubicSpline, *, dims: Sequence[int] | None = None) -> QobjEvo:
     """Convert the Hamiltonian of a curve to a ``QobjEvo`` for QuTiP's solvers.
 
     With ħ = 1, times in ns give a Hamiltonian in rad/ns. The solver's states agree with the points of the curve up to a
@@ -217,7 +216,7 @@ def _generator(space: Space, point: Array, vector: Array) -> Array:
 
 
 def pulses(
-    spline: CubicSpline[Any, Any],
+    spline: AnyCubicSpline,
     edges: TimesLike,
     *,
     kind: Literal["exact", "midpoint"] = "exact",
@@ -273,7 +272,7 @@ def pulses(
     return h if basis is None else _coefficients(h, basis)
 
 
-def _pulse_edges(spline: CubicSpline[Any, Any], edges: TimesLike) -> tuple[Array, Array]:
+def _pulse_edges(spline: AnyCubicSpline, edges: TimesLike) -> tuple[Array, Array]:
     """Return the edges in their original type, and the intervals between them."""
     times = as_array(times_of(edges, "edges")[0], "edges")
     if times.ndim != 1 or len(times) < 2:
@@ -332,7 +331,7 @@ def _coefficients(h: Array, basis: Array) -> Array:
 # ---- propagators ----
 
 
-def propagator(spline: CubicSpline[Any, Any], x: TimesLike) -> Array:
+def propagator(spline: AnyCubicSpline, x: TimesLike) -> Array:
     """Compute the unitary U(x) that propagates states from the first knot to time x.
 
     U satisfies iU' = HU, with U = 1 at the first knot. It moves the first point along the curve, and transports the
@@ -395,7 +394,7 @@ def propagator(spline: CubicSpline[Any, Any], x: TimesLike) -> Array:
     return np.asarray(result.reshape(*spline._batch, *times.shape, *result.shape[-2:]))
 
 
-def _in_span(spline: CubicSpline[Any, Any]) -> tuple[CurveArrays, Array | None]:
+def _in_span(spline: AnyCubicSpline) -> tuple[CurveArrays, Array | None]:
     """Express a curve in an orthonormal basis of the span of its points and end vectors, on which the Hamiltonian acts.
 
     Return the curve and the basis; if they span the whole space, return the curve unchanged and None.
@@ -408,7 +407,7 @@ def _in_span(spline: CubicSpline[Any, Any]) -> tuple[CurveArrays, Array | None]:
     return in_span(curve, span), span.basis
 
 
-def _times(spline: CubicSpline[Any, Any], x: TimesLike) -> Doubles:
+def _times(spline: AnyCubicSpline, x: TimesLike) -> Doubles:
     """Return the times in the units of the core, the same for all curves."""
     times, per_curve = spline._time_axis.at(x, spline._batch, False)
     if per_curve:
@@ -495,7 +494,7 @@ def _gauss() -> tuple[Doubles, Doubles, Doubles]:
 # ---- geometric phases ----
 
 
-def berry_phase(spline: CubicSpline[Any, Any]) -> Number:
+def berry_phase(spline: AnyCubicSpline) -> Number:
     r"""Compute the geometric phase that a state acquires along a closed curve.
 
     Parameters

@@ -38,7 +38,7 @@ from ._base.arrays import (
 from ._base.faults import warn
 from ._base.input import times_of
 from ._base.time import knots_of
-from ._base.typing import Extrapolate, Frame, RateInterpolation, RotationOrder, TimesLike
+from ._base.typing import Array, Extrapolate, Frame, Keywords, RateInterpolation, RotationOrder, TimesLike
 from ._core import ValidationError
 from ._curves.composed import Joined, Retimed, evaluated
 from ._curves.curve import ControlledCurve, CurveArrays
@@ -47,11 +47,11 @@ from ._curves.missing import missing_times, recounted, refuse_nan_times
 from ._estimation.rates import integrated
 from ._estimation.uncertainty import Jacobians, Motion, check_uncertain, standard_errors
 from ._smoothing.noise import smoothed_spaces
-from ._spaces import Array, Doubles, SpecialEuclidean, SpecialOrthogonal, Sphere, cover_of
+from ._spaces import Doubles, SpecialEuclidean, SpecialOrthogonal, Sphere, cover_of
 from ._spaces.finite_groups import elements, proper_symbol
 from ._splines.base import check_timed
 from ._splines.bsplines import CumulativeBSpline
-from ._splines.cubic import CubicSpline
+from ._splines.cubic import AnyCubicSpline
 from ._splines.piecewise import HermiteSpline
 from .convert._quaternions import checked_order, converted, matrix_to_quaternion, quaternion_form, quaternion_to_matrix
 
@@ -81,7 +81,7 @@ def __dir__() -> list[str]:
     return __all__
 
 
-Spline = CubicSpline[Any, Any] | HermiteSpline[Any] | CumulativeBSpline[Any]
+Spline = AnyCubicSpline | HermiteSpline[Any] | CumulativeBSpline[Any]
 
 _SO3, _SE3, _S3 = SpecialOrthogonal(3), SpecialEuclidean(3), Sphere(3)
 _SIX = ("columns", "rows", "interleaved")
@@ -670,7 +670,7 @@ def _integrated_present(t: Any, omega: Any, start: Any, frame: Frame, interpolat
     fits = times is None or times.shape in (present.shape, present.shape[-1:])
     if times is not None and fits:
         present = present & ~missing_times(times)
-    options: dict[str, Any] = {"frame": frame, "interpolation": interpolation}
+    options: Keywords = {"frame": frame, "interpolation": interpolation}
     if present.all() or not fits:
         return integrate(t, rates, start, **options)
     turned = np.full((*present.shape, 3, 3), np.nan)

@@ -19,9 +19,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ._base.arrays import check_orthonormal, numbers, refuse, short_repr
+from ._base.typing import FloatArray
 from ._core import ValidationError
 
 __all__ = ["from_landmarks", "to_landmarks"]
@@ -31,13 +32,11 @@ def __dir__() -> list[str]:
     return __all__
 
 
-Array = NDArray[np.float64]
-
 # If landmarks are closer to a hyperplane than this, in units of their largest extent, their shape is a rounding error.
 _FLAT = 1e-10
 
 
-def from_landmarks(x: ArrayLike, *, base: int | None = None) -> Array:
+def from_landmarks(x: ArrayLike, *, base: int | None = None) -> FloatArray:
     """Convert labelled landmarks to affine shapes.
 
     Parameters
@@ -70,7 +69,7 @@ def from_landmarks(x: ArrayLike, *, base: int | None = None) -> Array:
     return _orthonormal(_relative(drawing, base), "x")
 
 
-def to_landmarks(shape: ArrayLike, like: ArrayLike, *, base: int | None = None) -> Array:
+def to_landmarks(shape: ArrayLike, like: ArrayLike, *, base: int | None = None) -> FloatArray:
     """Convert affine shapes to drawings, choosing the affine image closest to a given drawing.
 
     Parameters
@@ -112,7 +111,7 @@ def to_landmarks(shape: ArrayLike, like: ArrayLike, *, base: int | None = None) 
     return _placed(basis @ (np.swapaxes(basis, -1, -2) @ _relative(drawing, base)), _place(drawing, base), base)
 
 
-def _read(x: ArrayLike, name: str, base: Any) -> Array:
+def _read(x: ArrayLike, name: str, base: Any) -> FloatArray:
     """Validate drawings and the base landmark."""
     drawing, _ = numbers(x, name, 2)
     if drawing.dtype.kind == "c":
@@ -131,24 +130,24 @@ def _read(x: ArrayLike, name: str, base: Any) -> Array:
     return drawing
 
 
-def _relative(drawing: Array, base: int | None) -> Array:
+def _relative(drawing: FloatArray, base: int | None) -> FloatArray:
     """Return landmarks measured from their centre, or from one of them, which is dropped."""
     moved = drawing - _place(drawing, base)[..., None, :]
     return moved if base is None else np.delete(moved, base, axis=-2)
 
 
-def _place(drawing: Array, base: int | None) -> Array:
+def _place(drawing: FloatArray, base: int | None) -> FloatArray:
     """Return the centre of drawings, or the landmark ``base``, shape (..., n)."""
     return np.asarray(drawing.mean(axis=-2) if base is None else drawing[..., base, :])
 
 
-def _placed(moved: Array, place: Array, base: int | None) -> Array:
+def _placed(moved: FloatArray, place: FloatArray, base: int | None) -> FloatArray:
     """Compute the inverse of `_relative`."""
     whole = moved if base is None else np.insert(moved, base, 0.0, axis=-2)
     return whole + place[..., None, :]
 
 
-def _orthonormal(moved: Array, name: str) -> Array:
+def _orthonormal(moved: FloatArray, name: str) -> FloatArray:
     """Return the nearest matrices with orthonormal columns, the polar factors."""
     left, sizes, right = np.linalg.svd(moved, full_matrices=False)
     refuse(

@@ -14,16 +14,16 @@ Examples
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._base.arrays import Array, adjoint, as_array, cast, checked_number, numbers, off_one, refuse, whole_number
+from ._base.arrays import adjoint, as_array, cast, checked_number, numbers, off_one, refuse, whole_number
 from ._base.faults import warn
 from ._base.input import times_of
-from ._base.typing import TimesLike
+from ._base.typing import AnyFunction, Array, TimesLike
 from ._core import CutLocusError, ValidationError
 from ._grid import GridSpline
 from ._grid.axes import coordinates
@@ -36,7 +36,7 @@ from ._spaces import (
     SymmetricPositiveDefinite,
     point_tol,
 )
-from ._splines.cubic import CubicSpline
+from ._splines.cubic import AnyCubicSpline, CubicSpline
 from ._splines.piecewise import check_curve
 
 # Numbers closer than this, in units of the largest, are equal but for rounding.
@@ -164,8 +164,8 @@ def align(bases: ArrayLike, reference: ArrayLike | None = None) -> Array:
 
 
 def reduced_operator(
-    spline: CubicSpline[Any, Any] | GridSpline[Any],
-    operator: Any | Callable[..., Any],
+    spline: AnyCubicSpline | GridSpline[Any],
+    operator: Any | AnyFunction,
     x: Any,
     start: ArrayLike | None = None,
 ) -> Array:
@@ -357,7 +357,7 @@ class OperatorSpline:
 # ---- bases ----
 
 
-def _subspaces_of(spline: CubicSpline[Any, Any] | GridSpline[Any]) -> tuple[int, ...]:
+def _subspaces_of(spline: AnyCubicSpline | GridSpline[Any]) -> tuple[int, ...]:
     """Return n and k of a curve or grid of subspaces."""
     space: AnySpace = spline.space
     batch = isinstance(spline, CubicSpline) and spline._batch

@@ -24,10 +24,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ._base.arrays import as_array, largest, refuse, short_repr
-from ._base.typing import TensorOrder
+from ._base.typing import Array, TensorOrder
 from ._core import ValidationError
 from ._spaces import point_tol
 
@@ -37,8 +37,6 @@ __all__ = ["from_vectors", "to_vectors"]
 def __dir__() -> list[str]:
     return __all__
 
-
-Array = NDArray[Any]
 
 _ORDERS = {
     # Lower triangle row by row: dipy.reconst.dti.from_lower_triangular. So are NIfTI files with the intent

@@ -18,8 +18,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ._base.arrays import checked_number, whole_number
+from ._base.typing import Array
 from ._core import ConvergenceError, CutLocusError, ValidationError
-from ._spaces import AnySpace, Array, Doubles, Product, Space, space_named
+from ._spaces import AnySpace, Doubles, Product, Space, space_named
 from ._splines.cubic import CubicSpline
 from ._splines.functional import segments_of
 from .manifolds import Manifold

@@ -9,10 +9,11 @@ import numpy as np
 
 from .._base.arrays import cast
 from .._base.time import onto_ends
+from .._base.typing import Array, CubicBCType, Keywords
 from .._curves.curve import CurveArrays
 from .._curves.derivatives import sample_times
 from .._curves.ends import split_ends
-from .._spaces import Array, Space
+from .._spaces import Space
 from .._splines.cubic import CubicSpline
 
 # End conditions without their vectors: a word, or a pair of words and orders.
@@ -21,7 +22,7 @@ Kinds = str | tuple[str | int, str | int]
 Ends = tuple[Array | None, Array | None]
 
 
-def split(bc_type: Any) -> tuple[Kinds, tuple[object, object]]:
+def split(bc_type: CubicBCType) -> tuple[Kinds, tuple[object, object]]:
     """End conditions as something to hash, and the vectors in them (None where there is none)."""
     if isinstance(bc_type, str):
         return bc_type, (None, None)
@@ -36,7 +37,7 @@ def joined(kinds: Kinds, vectors: tuple[object, object]) -> Any:
     return tuple(kind if isinstance(kind, str) else (kind, vector) for kind, vector in zip(kinds, vectors, strict=True))
 
 
-def fitted(t: Array, points: Array, vectors: Ends, space: Space, kinds: Kinds, options: dict[str, Any]) -> CubicSpline:
+def fitted(t: Array, points: Array, vectors: Ends, space: Space, kinds: Kinds, options: Keywords) -> CubicSpline:
     """The spline through the points of the space beside the given ones: numbers that an optimiser or a
     finite difference makes are a little off it."""
     projected = space.project(points)
@@ -52,7 +53,7 @@ class Movable(NamedTuple):
     """A fitted curve in a space that is not a product, and its end conditions."""
 
     curve: CurveArrays
-    bc_type: Any
+    bc_type: CubicBCType
 
     def jvp(
         self, x: Array, dx: Array | None, points: Array | None, t: Array | None, ends: Sequence[Array | None]

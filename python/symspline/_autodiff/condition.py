@@ -6,9 +6,9 @@ Nodes are along the first axis. Axes of a batch may follow.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from .library import Tensor, adjoint, hermitian
+from .library import Module, Tensor, adjoint, hermitian
 from .models import Curved, Model, Poses, Positive, Rotations, cross_matrix, whitened
 
 # Terms of the series of sinh(ad)/ad. The last is below rounding for handles up to 20 long; a handle has about a third
@@ -228,7 +228,7 @@ class Problem(NamedTuple):
 
 
 def cyclic_reduction(
-    xp: Any, solve: Callable[..., Tensor], below: Tensor, diagonal: Tensor, above: Tensor, rows: Tensor
+    xp: Module, solve: Callable[..., Tensor], below: Tensor, diagonal: Tensor, above: Tensor, rows: Tensor
 ) -> Tensor:
     """Solve block tridiagonal systems by eliminating every second unknown, again and again.
 

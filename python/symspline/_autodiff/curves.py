@@ -6,16 +6,17 @@ length 1 there.
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
 
 from .. import _spaces
 from .._base.arrays import short_repr
+from .._base.typing import CubicBCType
 from .._core import ValidationError
 from .._curves.options import order_of
 from .._spaces import AnySpace, Product, Space, parts_of, refuse_quotients, space_named
 from .compiled import split
 from .condition import Problem, chain_of
-from .library import Library, Tensor, adjoint
+from .library import Library, Module, Tensor, adjoint
 from .models import QUOTIENTS, Model, model_of
 
 
@@ -47,7 +48,9 @@ def evaluate(
     return values.reshape(*points.shape[:axis], *x.shape, *space.point_shape)
 
 
-def problem_of(lib: Library, t: Tensor, points: Tensor, space: AnySpace, bc_type: Any) -> tuple[Problem, Any]:
+def problem_of(
+    lib: Library, t: Tensor, points: Tensor, space: AnySpace, bc_type: CubicBCType
+) -> tuple[Problem, Callable[[Tensor], Tensor]]:
     """Return the C² condition of curves, and a function that converts its solution to velocities for the user."""
     chain = chain_of(model_of(lib, space))
     if chain is None:
@@ -89,7 +92,7 @@ def _knots(lib: Library, t: Tensor, points: Tensor, space: AnySpace) -> Tensor:
     return lib.xp.moveaxis(t.reshape(*(1,) * (lead - t.ndim), *t.shape), -1, 0)
 
 
-def _ends(lib: Library, bc_type: Any, points: Tensor) -> tuple[tuple[bool, bool], list[Any]]:
+def _ends(lib: Library, bc_type: CubicBCType, points: Tensor) -> tuple[tuple[bool, bool], list[Tensor]]:
     """Return which ends have a given velocity, and its value or zero."""
     kinds, vectors = split(bc_type)
     pair = (kinds, kinds) if isinstance(kinds, str) else kinds
@@ -203,7 +206,7 @@ def _horizontal_columns(y: Tensor, first: Tensor, second: Tensor) -> Tensor:
     return change - y @ (adjoint(y) @ change)
 
 
-def second_fundamental_form(xp: Any, space: Space, point: Tensor, vector: Tensor, motion: Tensor) -> Tensor:
+def second_fundamental_form(xp: Module, space: Space, point: Tensor, vector: Tensor, motion: Tensor) -> Tensor:
     """Return the derivative of a field of tangent vectors as arrays, minus its covariant derivative.
 
     Of unit vectors, and of k orthonormal columns X, it is −X Ẋ*V, which keeps X*V = 0 (minus the second fundamental

@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from .._base.typing import AnyFunction
+
 # Series are used up to here, and closed forms from here on. Both are smooth there, so that a library differentiates
 # them as they are; the series have enough terms for derivatives of third order.
 _STUMPFF, _STUMPFF_TERMS = 4.0, 22
@@ -18,6 +20,8 @@ _ARC, _ARC_TERMS = 0.3, 46
 
 Tensor = Any
 """An array of JAX or of PyTorch."""
+Module = Any
+"""The library itself, `jax.numpy` or `torch`."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +62,7 @@ class Library:
     name: str
     module: str
     general: bool
-    xp: Any
+    xp: Module
     array: Callable[[object, str, Tensor], Tensor]
     promote: Callable[..., tuple[Tensor, ...]]
     constant: Callable[[Tensor, Tensor], Tensor]
@@ -66,7 +70,7 @@ class Library:
     exponential: Callable[[Tensor], Tensor]
     arcs: Callable[[Tensor], Tensor] | None
     solve_lower: Callable[[Tensor, Tensor], Tensor]
-    fold: Callable[[Callable[[Tensor, Tensor], Tensor], Any, list[float]], Any]
+    fold: Callable[[Callable[[Tensor, Tensor], Tensor], Tensor, list[float]], Tensor]
     along: Callable[[Callable[[Tensor], Tensor], Tensor], tuple[Tensor, Tensor]]
     search: Callable[[Tensor, Tensor], Tensor]
     take_along: Callable[[Tensor, Tensor, int], Tensor]
@@ -126,7 +130,7 @@ def hermitian(a: Tensor) -> Tensor:
 Divided = Callable[..., Tensor]
 
 
-def matrix_derivative(xp: Any, divided: Divided, values: Tensor, vectors: Tensor, directions: Tensor) -> Tensor:
+def matrix_derivative(xp: Module, divided: Divided, values: Tensor, vectors: Tensor, directions: Tensor) -> Tensor:
     """Return the derivative of order k in k directions at a matrix with these eigenvalues and eigenvectors.
 
     With directions H, in the basis of eigenvectors it is Σ f[λ_i, λ_j, …, λ_l] H_ij … H_ml, over all orders of the
@@ -146,7 +150,7 @@ def matrix_derivative(xp: Any, divided: Divided, values: Tensor, vectors: Tensor
     return vectors @ total @ adjoint(vectors)
 
 
-def divided_logarithm(xp: Any, constant: Tensor, *x: Tensor) -> Tensor:
+def divided_logarithm(xp: Module, constant: Tensor, *x: Tensor) -> Tensor:
     """Return divided differences of log."""
     if len(x) == 1:
         return xp.log(x[0])
@@ -165,7 +169,7 @@ def divided_logarithm(xp: Any, constant: Tensor, *x: Tensor) -> Tensor:
     return (-1.0) ** len(x) * step * total.sum(axis=-1)
 
 
-def divided_arc(xp: Any, constant: Tensor, function: Any, *y: Tensor) -> Tensor:
+def divided_arc(xp: Module, constant: Tensor, function: AnyFunction, *y: Tensor) -> Tensor:
     """Return divided differences of `Library.arc`."""
     if len(y) == 1:
         return function(y[0], 1 - y[0])

@@ -6,8 +6,6 @@ where they are zero.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from .. import _spaces
@@ -158,7 +156,7 @@ class Positive(Model):
         return root @ self.lib.exponential(self.times(t, step)) @ adjoint(root)
 
 
-def identity(lib: Library, like: Any) -> Tensor:
+def identity(lib: Library, like: Tensor) -> Tensor:
     """Return the identity matrix of the size of the last axis."""
     return lib.constant(np.eye(like.shape[-1]), like)
 

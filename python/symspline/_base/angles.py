@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .._core import ValidationError
 from .arrays import as_array, refuse
+from .typing import FloatArray
 
 Rows = tuple[tuple[Any, ...], ...]
 
@@ -49,10 +50,8 @@ def quaternion_rows(matrix: Any) -> Rows:
 
 # ---- positions on a globe: longitude and latitude in degrees, and unit vectors of S² ----
 
-Array = NDArray[np.float64]
 
-
-def from_lonlat(lon: ArrayLike, lat: ArrayLike) -> Array:
+def from_lonlat(lon: ArrayLike, lat: ArrayLike) -> FloatArray:
     """Convert longitude and latitude to unit vectors.
 
     Parameters
@@ -91,7 +90,7 @@ def from_lonlat(lon: ArrayLike, lat: ArrayLike) -> Array:
     return np.stack([np.cos(north) * np.cos(east), np.cos(north) * np.sin(east), np.sin(north)], axis=-1)
 
 
-def to_lonlat(points: ArrayLike) -> tuple[Array, Array]:
+def to_lonlat(points: ArrayLike) -> tuple[FloatArray, FloatArray]:
     """Convert unit vectors to longitude and latitude.
 
     Parameters
@@ -121,7 +120,7 @@ def to_lonlat(points: ArrayLike) -> tuple[Array, Array]:
     return np.degrees(np.arctan2(y, x)), np.degrees(np.arctan2(z, np.hypot(x, y)))
 
 
-def compass(points: ArrayLike) -> tuple[Array, Array]:
+def compass(points: ArrayLike) -> tuple[FloatArray, FloatArray]:
     """Compute the directions east and north at unit vectors.
 
     Parameters
@@ -151,7 +150,7 @@ def compass(points: ArrayLike) -> tuple[Array, Array]:
     return np.stack([-sine, cosine, zero], axis=-1), np.stack([-z * cosine, -z * sine, horizontal], axis=-1)
 
 
-def _degrees(value: ArrayLike, name: str, most: float) -> Array:
+def _degrees(value: ArrayLike, name: str, most: float) -> FloatArray:
     """Convert an angle from degrees to radians."""
     angles = _floats(value, name)
     advice = "Check whether lon and lat are swapped, or whether the value represents a missing one."
@@ -161,14 +160,14 @@ def _degrees(value: ArrayLike, name: str, most: float) -> Array:
     return np.radians(angles)
 
 
-def _vectors(points: ArrayLike) -> Array:
+def _vectors(points: ArrayLike) -> FloatArray:
     array = _floats(points, "points")
     if array.shape[-1:] != (3,):
         raise ValidationError(f"points must be unit vectors of shape (..., 3), not {array.shape}")
     return array
 
 
-def _floats(value: ArrayLike, name: str) -> Array:
+def _floats(value: ArrayLike, name: str) -> FloatArray:
     array = as_array(value, name)
     if array.dtype.kind not in "iuf":
         raise ValidationError(f"{name} must be real numbers, not {array.dtype}")

@@ -12,9 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from .._core import ValidationError
 from .input import refuse_objects, to_numpy
+from .typing import Array
 
 
-def as_array(value: ArrayLike, name: str) -> NDArray[Any]:
+def as_array(value: ArrayLike, name: str) -> Array:
     """The value as an array; ragged nested lists, masked numbers and objects are an error of the caller's."""
     if type(value) is np.ndarray and value.dtype.kind != "O":
         return value
@@ -78,7 +79,7 @@ def brief(text: object, most: int = 150) -> str:
     return line if len(line) <= most else f"{line[:most]}…"
 
 
-def cast(array: NDArray[Any], dtype: Any = np.float64) -> NDArray[Any]:
+def cast(array: Array, dtype: Any = np.float64) -> Array:
     """The numbers in contiguous, aligned memory and of a type; those it cannot hold become infinite or zero."""
     if array.dtype == dtype:
         flags = array.flags
@@ -95,7 +96,7 @@ def cast(array: NDArray[Any], dtype: Any = np.float64) -> NDArray[Any]:
         return np.require(array, dtype, ["C", "ALIGNED"])
 
 
-def read_only(array: NDArray[Any]) -> NDArray[Any]:
+def read_only(array: Array) -> Array:
     """A view that cannot be written to."""
     view = array.view()
     view.flags.writeable = False
@@ -150,12 +151,12 @@ def checked_number(value: Any, requirement: str, is_valid: Callable[[Any], bool]
     return float(value)
 
 
-def adjoint(x: NDArray[Any]) -> NDArray[Any]:
+def adjoint(x: Array) -> Array:
     """Return conjugate transposes."""
     return np.asarray(np.swapaxes(x, -1, -2).conj())
 
 
-def refuse(bad: NDArray[np.bool_], name: str, say: Callable[[Any], str]) -> None:
+def refuse(bad: NDArray[np.bool_] | np.bool_, name: str, say: Callable[[tuple[int, ...]], str]) -> None:
     """Raise ValidationError for the first bad entry, with the message ``say(index)``."""
     if bad.any():
         index = tuple(np.argwhere(bad)[0].tolist())
@@ -205,7 +206,7 @@ _NEAR_SINGLE = 1e-10
 _BITS_SINGLE = 2.0**24
 
 
-def point_tol(numbers: NDArray[Any], size: int | None = None) -> float:
+def point_tol(numbers: Array, size: int | None = None) -> float:
     """Return the largest distance from the manifold of points that consist of these numbers.
 
     Rounding changes every number by at most half a unit in the last decimal. The tolerance for single precision is
@@ -247,7 +248,7 @@ def dtype_tol(dtype: np.dtype[Any]) -> float:
     return POINT_TOL_ROUNDED if dtype in (np.float32, np.complex64) else POINT_TOL
 
 
-def _tol_of_rounded(numbers: NDArray[Any], size: int) -> float:
+def _tol_of_rounded(numbers: Array, size: int) -> float:
     rows = numbers.reshape(-1, size)
     rows = rows[:: len(rows) // _SAMPLE + 1]
     if rows.dtype.kind == "c":
@@ -273,7 +274,6 @@ def _are_whole(x: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 # ---- validation of arrays of numbers, vectors and matrices, and of words ----
 
-Array = NDArray[Any]
 REMOVE = "remove missing values"
 
 

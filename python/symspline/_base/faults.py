@@ -78,7 +78,7 @@ def of_curve(number: int, batch: Sequence[int]) -> str:
     return of_index(np.unravel_index(number, batch)) if batch else ""
 
 
-def of_index(index: Sequence[Any]) -> str:
+def of_index(index: Sequence[int | np.intp]) -> str:
     """Return " of curve ..." for an index in a batch, or an empty text for the index ()."""
     return f" of curve {','.join(map(str, index))}" if index else ""
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._core import ValidationError
+from .typing import Array
 
 _SIMPLE = {bool, int, float, complex, str, np.ndarray, np.float64, np.float32, np.int64, np.complex128}
 # Attributes that convert an object to an array, in the order in which messages suggest them.
@@ -99,7 +100,7 @@ def in_library(library: Any, values: Any) -> Any:
     return tuple(map(library.asarray, values)) if isinstance(values, tuple) else library.asarray(values)
 
 
-def refuse_objects(array: NDArray[Any], name: str) -> None:
+def refuse_objects(array: Array, name: str) -> None:
     """Raise ValidationError that names the first entry other than a number, and suggests a conversion."""
     flat = array.ravel()
     i = next((i for i, entry in enumerate(flat) if not isinstance(entry, (int, float, complex))), None)
@@ -160,7 +161,7 @@ def times_of(value: Any, name: str) -> tuple[Any, str | None]:
     return _moments(array, name)
 
 
-def _moments(array: NDArray[Any], name: str) -> tuple[Any, str | None]:
+def _moments(array: Array, name: str) -> tuple[Any, str | None]:
     """Convert dates, texts and durations of Python to NumPy, and return whether they had a time zone."""
     cells = array.ravel().tolist()
     first = cells[0]
@@ -192,7 +193,7 @@ def shapes_of(cells: list[str]) -> list[str]:
     return shapes if len(shapes) == len(cells) else [cell.translate(_ZEROS) for cell in cells]
 
 
-def _moments_of_texts(cells: list[str]) -> tuple[NDArray[Any], bool] | None:
+def _moments_of_texts(cells: list[str]) -> tuple[Array, bool] | None:
     """Convert texts, all of one form in one step, and return whether they have a time zone.
 
     The result is None if a text is not a date, or only some have a time zone.
@@ -235,7 +236,7 @@ def _short(cell: Any) -> str:
     return text if len(text) <= 80 else f"{text[:80]}…"
 
 
-def _moment(cell: Any, name: str, i: int, array: NDArray[Any]) -> tuple[Any, bool]:
+def _moment(cell: Any, name: str, i: int, array: Array) -> tuple[Any, bool]:
     if isinstance(cell, str):
         match = ISO_DATE.fullmatch(cell.strip())
         try:
@@ -266,5 +267,5 @@ def minutes_of(zone: str) -> int:
     return -minutes if zone[0] == "-" else minutes
 
 
-def _index(i: int, array: NDArray[Any]) -> str:
+def _index(i: int, array: Array) -> str:
     return str([int(k) for k in np.unravel_index(i, array.shape)]) if array.ndim else ""

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .typing import Number
+from .typing import AnyFunction, Array, Keywords, Number
 
 # A gap between points is long if it exceeds the median by this factor.
 _LONG = 10
@@ -63,7 +63,7 @@ class FitReport:
     def __hash__(self) -> int:
         return hash(tuple(vars(self).values()))
 
-    def map(self, function: Callable[[Any], Any]) -> Self:
+    def map(self, function: AnyFunction) -> Self:
         """Apply a function to all fields that have one value per curve.
 
         Parameters
@@ -87,7 +87,7 @@ class FitReport:
         values = {name: getattr(self, name) for name in columns_of(type(self))}
         return self._replaced({name: value if value is None else function(value) for name, value in values.items()})
 
-    def _replaced(self, columns: dict[str, Any]) -> Self:
+    def _replaced(self, columns: Keywords) -> Self:
         return replace(self, **columns)  # type: ignore[type-var]
 
 
@@ -220,7 +220,7 @@ class Report(FitReport):
             return f"<Report of {np.size(self.converged)} curves: {self}>"
         return f"Report({', '.join(f'{entry.name}={getattr(self, entry.name)!r}' for entry in fields(self))})"
 
-    def _replaced(self, columns: dict[str, Any]) -> Self:
+    def _replaced(self, columns: Keywords) -> Self:
         """Replace fields; those of one curve are None instead of NaN, and its number of sweeps is an integer."""
         for name in OPTIONAL:
             if np.ndim(columns[name]) == 0 and columns[name] is not None and np.isnan(columns[name]):
@@ -264,7 +264,7 @@ class Columns(NamedTuple):
     integers: NDArray[np.int64]
     numbers: NDArray[np.float64]
 
-    def row(self, name: str) -> NDArray[Any]:
+    def row(self, name: str) -> Array:
         """Return the values of a field, one per curve, as a writable view."""
         is_integer = name in INTEGERS
         return np.asarray(self.integers[INTEGERS.index(name)] if is_integer else self.numbers[NUMBERS.index(name)])
@@ -290,7 +290,7 @@ def combined(reports: Sequence[Report], max_step: Any, curvature: float, alterna
     """
 
     def largest(name: str) -> Any:
-        result: NDArray[Any] = np.max(np.stack([getattr(report, name) for report in reports]), axis=0)
+        result: Array = np.max(np.stack([getattr(report, name) for report in reports]), axis=0)
         return result.item() if result.ndim == 0 else result
 
     def of_all(name: str, whole: Any) -> Any:
@@ -340,7 +340,7 @@ def long_gaps(times: NDArray[np.float64]) -> NDArray[np.bool_]:
 def shaped(columns: Columns, times: NDArray[np.float64], batch: tuple[int, ...], space: Any, method: str) -> Report:
     """Return the report of curves with these knots from its columns; `method` is the requested one."""
     rows = zip((*INTEGERS, *NUMBERS), (*columns.integers, *columns.numbers), strict=True)
-    values: dict[str, Any] = {name: row.reshape(batch) for name, row in rows}
+    values: Keywords = {name: row.reshape(batch) for name, row in rows}
     _certify(values, space.injectivity_radius)
     if method == "auto" and times.shape[-1] > _WHOLE + 1:
         values["skipped"] = values["skipped"] | _unsearched(values, space.injectivity_radius)
@@ -360,7 +360,7 @@ def shaped(columns: Columns, times: NDArray[np.float64], batch: tuple[int, ...],
     return Report(used, max_gap=max_gap, curvature=space.curvature, skipped=_skipped(skipped), **values)
 
 
-def _unsearched(values: dict[str, Any], injectivity_radius: float) -> NDArray[np.int64]:
+def _unsearched(values: Keywords, injectivity_radius: float) -> NDArray[np.int64]:
     """Return the solvers of the search for the minimum-energy solution that a curve in sections did not run, as bits.
 
     The conditions are those of `far_apart` in `fit/minimum_energy.rs`.
@@ -371,7 +371,7 @@ def _unsearched(values: dict[str, Any], injectivity_radius: float) -> NDArray[np
     return np.where(far & values["converged"], search & ~(1 << values["solver"]), 0)
 
 
-def _certify(values: dict[str, Any], injectivity_radius: float) -> None:
+def _certify(values: Keywords, injectivity_radius: float) -> None:
     """Drop the numbers of Theorem 3.1 where shortest geodesics in its region may not be unique.
 
     By (37) the logarithms of the C² condition have lengths up to D + 2V. Beyond the injectivity radius they jump, and
@@ -426,5 +426,5 @@ class CumulativeReport(FitReport):
     step: Number = field(metadata=FLOAT)
     residual_sum: Number = field(metadata=FLOAT)
 
-    def _replaced(self, columns: dict[str, Any]) -> Self:
+    def _replaced(self, columns: Keywords) -> Self:
         return replace(self, **{name: x if np.ndim(x) else x.item() for name, x in columns.items()})

@@ -19,7 +19,7 @@ from .._core import ValidationError
 from .arrays import as_array, cast, refuse, short_repr
 from .faults import warn
 from .input import NO_ZONE, UTC_ZONE, times_of
-from .typing import TimesLike
+from .typing import Array, TimesLike
 
 Doubles = NDArray[np.float64]
 
@@ -79,7 +79,7 @@ class TimeAxis:
         """Whether times have no origin."""
         return self.origin is None
 
-    def knots(self, knots: NDArray[Any]) -> Doubles:
+    def knots(self, knots: Array) -> Doubles:
         """Convert knots to numbers of the core."""
         return self._doubles(knots, self.origin, "t")
 
@@ -129,7 +129,7 @@ class TimeAxis:
             return times, per_curve
         return onto_ends(times, knots, batch, per_curve, array.dtype, 0.0 if self.dates else self.origin)
 
-    def shown(self, x: Doubles, batch: tuple[int, ...]) -> NDArray[Any]:
+    def shown(self, x: Doubles, batch: tuple[int, ...]) -> Array:
         """Convert numbers of the core to times of the user, the inverse of `at`.
 
         Dates are in nanoseconds, or in the unit of the knots if it is finer, as long as they are in the range of this
@@ -176,7 +176,7 @@ class TimeAxis:
         except ValidationError as error:
             raise self.explain(error) from None
 
-    def _doubles(self, array: NDArray[Any], origin: Any, name: str) -> Doubles:
+    def _doubles(self, array: Array, origin: Any, name: str) -> Doubles:
         if self.dates:
             return _seconds(array, origin, name)
         if origin is not None:
@@ -197,7 +197,7 @@ class TimeAxis:
 _NUMBERS = TimeAxis()
 
 
-def time_axis_of(knots: TimesLike | Moments) -> tuple[TimeAxis, NDArray[Any]]:
+def time_axis_of(knots: TimesLike | Moments) -> tuple[TimeAxis, Array]:
     """Return the time axis of knots, and the knots as in `CubicSpline.t`."""
     given: Any
     given, zone = knots if isinstance(knots, Moments) else times_of(knots, "t")
@@ -219,7 +219,7 @@ def time_axis_of(knots: TimesLike | Moments) -> tuple[TimeAxis, NDArray[Any]]:
     return TimeAxis(), cast(array.copy())
 
 
-def knots_of(t: TimesLike | None, batch: tuple[int, ...], nodes: int) -> tuple[TimeAxis, NDArray[Any], Doubles]:
+def knots_of(t: TimesLike | None, batch: tuple[int, ...], nodes: int) -> tuple[TimeAxis, Array, Doubles]:
     """Return the time axis, the knots as in `CubicSpline.t`, and the knots as numbers of the core."""
     if t is None:
         knots = np.arange(nodes, dtype=np.float64)
@@ -329,13 +329,13 @@ def refuse_outside(
     refuse(wrong, name, say)
 
 
-def _difference(array: NDArray[Any], origin: Any) -> NDArray[np.int64]:
+def _difference(array: Array, origin: Any) -> NDArray[np.int64]:
     """Subtract integers modulo 2**64, which is exact for differences below 2**63 and all integer types."""
     modular = array.astype(np.uint64) - np.asarray(origin).astype(np.uint64)
     return modular.view(np.int64) if modular.ndim else modular.astype(np.int64)
 
 
-def _seconds(array: NDArray[Any], origin: Any, name: str) -> Doubles:
+def _seconds(array: Array, origin: Any, name: str) -> Doubles:
     _refuse_missing(array, name)
     origin = np.asarray(origin)
     fine = np.promote_types(array.dtype, origin.dtype)
@@ -352,12 +352,12 @@ def _seconds(array: NDArray[Any], origin: Any, name: str) -> Doubles:
     return np.asarray(_in_seconds(days[0] - days[1]) + (rest[0] - rest[1]), order="C")
 
 
-def _refuse_missing(array: NDArray[Any], name: str) -> None:
+def _refuse_missing(array: Array, name: str) -> None:
     remedy = "Remove missing entries, or pass skipna=True to a function that has this option."
     refuse(np.isnat(array), name, lambda _: f"is NaT (not a time). {remedy}")
 
 
-def _durations(array: NDArray[Any], name: str) -> Doubles:
+def _durations(array: Array, name: str) -> Doubles:
     _refuse_missing(array, name)
     return _in_seconds(array)
 
@@ -457,7 +457,7 @@ REMEDY = (
 )
 
 
-def warn_of_rounded_times(times: NDArray[Any], name: str = "t", remedy: str = REMEDY) -> None:
+def warn_of_rounded_times(times: Array, name: str = "t", remedy: str = REMEDY) -> None:
     """Warn if the spacing of floating-point numbers is more than 1e-4 of the median time step.
 
     Whole numbers are exact and cause no warning. Accelerations depend on squares of time steps. Times in seconds since

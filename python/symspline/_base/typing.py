@@ -11,16 +11,17 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from datetime import date, timedelta
 from os import PathLike
+from types import EllipsisType
 from typing import IO, TYPE_CHECKING, Any, Literal, Protocol, TypedDict
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-AnyArray = NDArray[Any]
+Array = NDArray[Any]
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 # A point of a product whose factors a type checker does not know.
-AnyArrays = tuple[NDArray[Any], ...]
+AnyArrays = tuple[Array, ...]
 # A number of one curve, or the numbers of a batch.
 Number = float | NDArray[np.float64]
 
@@ -29,11 +30,11 @@ if TYPE_CHECKING:
     from typing_extensions import TypeVar
 
     # The type of a point.
-    P = TypeVar("P", bound=NDArray[Any] | tuple[NDArray[Any], ...], covariant=True, default=NDArray[Any])
+    P = TypeVar("P", bound=Array | tuple[Array, ...], covariant=True, default=Array)
     # The type of a point of a product.
-    PProduct = TypeVar("PProduct", bound=tuple[NDArray[Any], ...], covariant=True, default=tuple[NDArray[Any], ...])
+    PProduct = TypeVar("PProduct", bound=tuple[Array, ...], covariant=True, default=tuple[Array, ...])
     # Arrays that results are written into.
-    Out = TypeVar("Out", bound=NDArray[Any] | tuple[NDArray[Any], ...])
+    Out = TypeVar("Out", bound=Array | tuple[Array, ...])
 else:
     from typing import TypeVar
 
@@ -49,7 +50,11 @@ class _Rotations(Protocol):
 
 
 # A time of a curve, or the times of the curves of a batch.
-Time = float | np.datetime64 | NDArray[Any]
+Time = float | np.datetime64 | Array
+# Selects curves of a batch, or rows of arrays.
+BatchIndex = (
+    int | np.integer[Any] | slice | EllipsisType | NDArray[np.integer[Any]] | NDArray[np.bool_] | tuple[Any, ...]
+)
 # Points, also as rotations of SciPy, or as lists of objects such as quantum states.
 PointsLike = ArrayLike | list[Any] | tuple[Any, ...] | _Rotations
 # Times: numbers, dates or durations, or arrays or lists of one of them.
@@ -57,11 +62,18 @@ TimesLike = ArrayLike | date | timedelta | Sequence[date] | Sequence[timedelta]
 # Called with the finished and the total number of points.
 Progress = Callable[[int, int], object]
 File = str | PathLike[str] | IO[bytes]
+TextFile = File | IO[str]
+# A function of the user, or one whose arguments depend on the space.
+AnyFunction = Callable[..., Any]
 Color = str | tuple[float, ...]
 
 
 # Options of artists of matplotlib.
 Look = dict[str, Any]
+# Keywords that a function passes on as ``**keywords``.
+Keywords = dict[str, Any]
+# What files and pickles hold of an object.
+State = dict[str, Any]
 
 
 class AxesLook(TypedDict, total=False):
@@ -131,7 +143,7 @@ class SolverOptions(TypedDict, total=False):
 class CurveOptions(SolverOptions, total=False):
     """The keywords of the functions for automatic differentiation that do not affect the type of the result."""
 
-    bc_type: Any
+    bc_type: CubicBCType
 
 
 class FitOptions(SolverOptions, total=False):

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from .._base.arrays import as_array, checked_flag, checked_number, short_repr
 from .._base.time import TimeAxis, ends_beside, onto_ends, refuse_outside, seconds_of
-from .._base.typing import Progress, TimesLike
+from .._base.typing import AnyFunction, Progress, TimesLike
 from .._core import ValidationError
 from .._spaces import AnySpace, Doubles, Product, product_norm
 from .curve import NORMS, CurveArrays, write_into
@@ -136,7 +136,7 @@ class Joined:
             Joined(section, self.offsets) for section in zip(*(section.parts for section in self.sections), strict=True)
         )
 
-    def map(self, function: Callable[[Any], Any]) -> Joined:
+    def map(self, function: AnyFunction) -> Joined:
         """Return the curve whose sections are the values of a function of the sections."""
         return Joined([function(section) for section in self.sections], self.offsets)
 
@@ -225,7 +225,7 @@ class Retimed:
             return (self,)
         return tuple(Retimed(part, self.law, self.times) for part in self.source.parts)
 
-    def map(self, function: Callable[[Any], Any]) -> Retimed:
+    def map(self, function: AnyFunction) -> Retimed:
         """Return a function of the source at the same times."""
         return Retimed(function(self.source), self.law, self.times)
 
@@ -292,7 +292,7 @@ def part_of_times(times: Doubles, start: Any, stop: Any, batch: tuple[int, ...])
     return np.concatenate([[start], times[(times > start) & (times < stop)], [stop]])
 
 
-def _by_factor(function: Callable[..., Any], values: Sequence[Any]) -> Any:
+def _by_factor(function: AnyFunction, values: Sequence[Any]) -> Any:
     """Apply a function of arrays to values that are tuples with one array per factor, or arrays."""
     if isinstance(values[0], tuple):
         return tuple(function(*factor_values) for factor_values in zip(*values, strict=True))
@@ -329,7 +329,7 @@ def _acceleration_norm(part: Any, x: Doubles, outside: str, per_curve: bool) -> 
 class Law:
     """A time law, with values that are counted from an origin."""
 
-    function: Callable[..., Any]
+    function: AnyFunction
     origin: float
 
     def __call__(self, x: Any, nu: int = 0, /) -> Any:

@@ -6,14 +6,13 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .._base.arrays import short_repr
 from .._base.faults import INVALID, Fault
 from .._base.time import TimeAxis
-from .._base.typing import Progress
+from .._base.typing import Array, Progress
 from .._core import ValidationError
-from .._spaces import POINT_TOL, Doubles, Product, Quotient, Space, factors_of, parts_of
+from .._spaces import POINT_TOL, AnySpace, Doubles, Product, Quotient, factors_of, parts_of
 from .ends import End, both
 from .fit import Fit, FitProblem, InnerVelocities, Points, fit, moved_ends, read_ends, tasks_of, validated_tasks
 from .solve import Task
@@ -22,11 +21,11 @@ from .solve import Task
 def fit_with_conditions(
     problem: FitProblem,
     time_axis: TimeAxis,
-    shown: NDArray[Any],
+    shown: Array,
     velocities: Any,
     accelerations: Any,
     progress: Progress | None,
-) -> tuple[Fit, NDArray[Any], tuple[int, ...]]:
+) -> tuple[Fit, Array, tuple[int, ...]]:
     """Fit curves with additional conditions.
 
     Parameters
@@ -74,9 +73,7 @@ def fit_with_conditions(
     return found, shown, tuple(node + shift for node in inner)
 
 
-def with_knots(
-    time_axis: TimeAxis, shown: NDArray[Any], times: Doubles, batch: tuple[int, ...], which: list[int]
-) -> NDArray[Any]:
+def with_knots(time_axis: TimeAxis, shown: Array, times: Doubles, batch: tuple[int, ...], which: list[int]) -> Array:
     """Add one knot to the outer segment at some ends: 0 for the first, 1 for the last.
 
     It is the midpoint of the segment. The only segment of a curve with two such ends is divided in thirds.
@@ -87,7 +84,7 @@ def with_knots(
     parts = 3 if len(which) == 2 and shown.shape[-1] == 2 else 2
     whole = shown.dtype.kind != "f"
 
-    def between(a: NDArray[Any], b: NDArray[Any], share: int) -> NDArray[Any]:
+    def between(a: Array, b: Array, share: int) -> Array:
         return np.asarray(a + share * ((b - a) // parts if whole else (b - a) / parts))
 
     first, last = between(shown[..., :1], shown[..., 1:2], 1), between(shown[..., -2:-1], shown[..., -1:], parts - 1)
@@ -95,7 +92,7 @@ def with_knots(
     return np.concatenate([shown[..., :1], *start, shown[..., 1:-1], *stop, shown[..., -1:]], axis=-1)
 
 
-def _check_additional(shown: NDArray[Any], which: list[int]) -> None:
+def _check_additional(shown: Array, which: list[int]) -> None:
     """Raise ValidationError if there is no time for an additional knot between the knots beside it."""
     for end in which:
         before, added, after = np.moveaxis(shown[..., :3] if end == 0 else shown[..., -3:], -1, 0)
@@ -109,7 +106,7 @@ def _check_additional(shown: NDArray[Any], which: list[int]) -> None:
             )
 
 
-def read_inner(velocities: Any, space: Space[Any], data: list[Points]) -> InnerVelocities:
+def read_inner(velocities: Any, space: AnySpace, data: list[Points]) -> InnerVelocities:
     """Read the velocities that are prescribed at inner nodes, and return them in the order of the nodes.
 
     Raises
@@ -133,7 +130,7 @@ def read_inner(velocities: Any, space: Space[Any], data: list[Points]) -> InnerV
     return {int(node): _in_factors(int(node), velocities[node], space, data) for node in sorted(velocities)}
 
 
-def _in_factors(node: int, vector: Any, space: Space[Any], data: list[Points]) -> list[Doubles]:
+def _in_factors(node: int, vector: Any, space: AnySpace, data: list[Points]) -> list[Doubles]:
     name, vectors = f"velocities[{node}]", []
     for factor, part, given in zip(factors_of(space), data, parts_of(vector, space, name), strict=True):
         doubles = factor._doubles(given, name)
@@ -186,7 +183,7 @@ def _segment(tasks: list[Task], vectors: list[Doubles], first: int, given: tuple
     return found
 
 
-def _check_tangent(space: Space[Any], tasks: list[Task], inner: InnerVelocities) -> None:
+def _check_tangent(space: AnySpace, tasks: list[Task], inner: InnerVelocities) -> None:
     """Raise ValidationError unless all vectors are tangent at the points of curves that are fitted."""
     for number, (factor, task) in enumerate(zip(factors_of(space), tasks, strict=True)):
         cover = task.space

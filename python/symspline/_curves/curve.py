@@ -15,12 +15,11 @@ from .. import _core
 from .._base.arrays import refuse
 from .._base.faults import of_index
 from .._base.time import refuse_outside
-from .._base.typing import Progress
+from .._base.typing import Array, Progress
 from .._core import CutLocusError, ValidationError
 from .._spaces import (
     Affine,
     AnySpace,
-    Array,
     Doubles,
     Product,
     Similarity,
@@ -417,7 +416,7 @@ class CurveArrays:
         factors = tuple(factor.map(lambda array: np.ascontiguousarray(array[index])) for factor in self.factors)
         return type(self)(self.space, times, factors, self.fitted)
 
-    def __reduce__(self) -> tuple[Any, ...]:
+    def __reduce__(self) -> tuple[object, ...]:
         return type(self), (self.space, self.times, self.factors, self.fitted)
 
 
@@ -656,7 +655,7 @@ def require_short_handles(space: AnySpace, times: Doubles, points: Array, veloci
             _refuse(space, index, index[-1] - (not after), float(length[index]), float(longest[index]))
 
 
-def _refuse(space: AnySpace, index: tuple[Any, ...], segment: int, length: float, step: float) -> None:
+def _refuse(space: AnySpace, index: tuple[int, ...], segment: int, length: float, step: float) -> None:
     *batch, node = (int(i) for i in index)
     of = of_index(batch)
     other = " Or use `Euclidean` and angles that count turns." if space._has_angles else ""

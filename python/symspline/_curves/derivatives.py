@@ -11,9 +11,9 @@ import numpy as np
 from .. import _core
 from .._base.arrays import as_array, cast, same_fields, short_repr
 from .._base.time import onto_ends, refuse_outside
-from .._base.typing import FloatArray, P
+from .._base.typing import Array, FloatArray, P
 from .._core import ValidationError
-from .._spaces import Array, Doubles, Space
+from .._spaces import Doubles, Space
 from .ends import End, ends_of
 
 

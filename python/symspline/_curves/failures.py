@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from .._base.faults import CUT_LOCUS, Fault, of_index, warn
 from .._base.report import MAX_STEP, Columns, ConvergenceWarning, FarPointsWarning, long_gaps
+from .._base.typing import Array
 from .._core import ConvergenceError, CutLocusError, ValidationError
 from .._spaces import (
     AnySpace,
-    Array,
     Doubles,
     Euclidean,
     SpecialEuclidean,

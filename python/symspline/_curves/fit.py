@@ -15,9 +15,9 @@ from .. import _core
 from .._base.arrays import as_array, refuse
 from .._base.faults import INVALID, Fault, of_index
 from .._base.report import Columns, Report, shaped
-from .._base.typing import Progress
+from .._base.typing import Array, Progress
 from .._core import ValidationError
-from .._spaces import AnySpace, Array, Doubles, Product, Quotient, Space, Torus, cover_of, factors_of, parts_of
+from .._spaces import AnySpace, Doubles, Product, Quotient, Space, Torus, cover_of, factors_of, parts_of
 from ..manifolds import Manifold
 from .curve import CurveArrays, FactorArrays, require_short_handles, share, turns_of
 from .ends import NATURAL, End, ends_in_factors, ends_of, is_closed, split_ends

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from .._base.faults import CUT_LOCUS, INVALID, Fault, from_core, of_curve, unconverged
 from .._base.report import SOLVERS, Columns
-from .._base.typing import Progress
+from .._base.typing import Array, Progress
 from .._core import CutLocusError, ValidationError, solve_tridiagonal
-from .._spaces import Array, Doubles, Euclidean
+from .._spaces import Doubles, Euclidean
 from ..manifolds._manifold import Manifold
 from ..manifolds._operations import Operations, basis_at, frames_along, products
 from .ends import End as Condition

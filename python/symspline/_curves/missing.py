@@ -15,8 +15,9 @@ from .._base.arrays import as_array, filled, refuse
 from .._base.exceptions import SymsplineError
 from .._base.faults import Sample, renamed
 from .._base.input import times_of
+from .._base.typing import Array, Keywords
 from .._core import ValidationError
-from .._spaces import AnySpace, Array, Doubles, Product, factors_of, parts_of, space_named
+from .._spaces import AnySpace, Doubles, Product, factors_of, parts_of, space_named
 from .fit import Points
 
 Mask = NDArray[np.bool_]
@@ -162,7 +163,7 @@ def rows_of(value: Any, kept: Mask) -> Any:
 
 
 def recounting(
-    rows_present: Callable[[dict[str, Any]], list[NDArray[np.intp]]],
+    rows_present: Callable[[Keywords], list[NDArray[np.intp]]],
 ) -> Callable[[Callable[_Arguments, _Result]], Callable[_Arguments, _Result]]:
     """Return a decorator for functions with `skipna`: indices in their errors then also count the missing samples.
 
@@ -189,7 +190,7 @@ def recounting(
     return decorator
 
 
-def _rows_of_recordings(given: dict[str, Any]) -> list[NDArray[np.intp]]:
+def _rows_of_recordings(given: Keywords) -> list[NDArray[np.intp]]:
     vectors = given.get("velocities")
     extra = [] if vectors is None or isinstance(vectors, Mapping) else [(None, vectors)]
     curves = given["curves"] if "curves" in given else [(given["t"], given["points"])]

@@ -12,9 +12,9 @@ from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
 from .. import _core
-from .._base.typing import Progress
+from .._base.typing import Array, Progress
 from .._core import ValidationError
-from .._spaces import AnySpace, Array, Doubles, Euclidean, parts_of, product_norm
+from .._spaces import AnySpace, Doubles, Euclidean, parts_of, product_norm
 from ..manifolds._manifold import Manifold
 from ..manifolds._operations import STEPS, Operations, eighth_difference, first_derivative, second_derivative
 from .curve import NORMS, REAL, CurveArrays, FactorArrays, share

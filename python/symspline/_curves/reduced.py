@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .._base.typing import Progress
-from .._spaces import AnySpace, Array, ComplexGrassmannian, Doubles, Grassmannian, Hyperbolic, Space, cover_of
+from .._base.typing import Array, Progress
+from .._spaces import AnySpace, ComplexGrassmannian, Doubles, Grassmannian, Hyperbolic, Space, cover_of
 from .ends import map_ends, original_nodes
 from .solve import Options, Solved, Task, solve_single
 

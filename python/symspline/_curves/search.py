@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from .. import _core
 from .._base.report import Report
-from .._base.typing import Number
+from .._base.typing import Array, Number
 from .._core import CutLocusError, ValidationError
-from .._spaces import AnySpace, Array, Doubles, Quotient, factors_of, parts_of, product_norm
+from .._spaces import AnySpace, Doubles, Quotient, factors_of, parts_of, product_norm
 from ..manifolds import Manifold
 from .curve import CurveArrays
 from .failures import cut_fractions

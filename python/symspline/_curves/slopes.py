@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from .._base.faults import between_neighbours, of_index, warn
 from .._base.report import FarPointsWarning
+from .._base.typing import Array
 from .._core import CutLocusError, ValidationError
-from .._spaces import AnySpace, Array, Doubles, Euclidean, cover_of, factors_of
+from .._spaces import AnySpace, Doubles, Euclidean, cover_of, factors_of
 from ..manifolds import Manifold
 from .curve import CurveArrays, FactorArrays
 from .fit import curve_of_factors

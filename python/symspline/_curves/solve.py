@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from .. import _core
 from .._base.faults import INVALID, Fault, from_core
 from .._base.report import Columns
-from .._base.typing import Progress
-from .._spaces import Array, Doubles, Space
+from .._base.typing import Array, Progress
+from .._spaces import Doubles, Space
 from .ends import End, map_ends
 
 Mask = NDArray[np.bool_]

@@ -11,12 +11,13 @@ from .._base.arrays import as_array, filled, refuse, short_repr
 from .._base.faults import renamed, warn
 from .._base.report import FarPointsWarning
 from .._base.time import TimeAxis, time_axis_of
+from .._base.typing import Array
 from .._core import CutLocusError, ValidationError
 from .._curves.ends import NATURAL
 from .._curves.failures import FAR, cut_fractions
 from .._curves.fit import Points, validated
 from .._curves.options import extrapolation_mode
-from .._spaces import AnySpace, Array, Doubles, Quotient, cover_of, factors_of, parts_of
+from .._spaces import AnySpace, Doubles, Quotient, cover_of, factors_of, parts_of
 
 Ends = tuple[str, str] | None
 _WORDS = ("natural", "not-a-knot", "clamped")

@@ -12,11 +12,11 @@ from .. import _core
 from .._base.arrays import short_repr
 from .._base.faults import CUT_LOCUS, UNCONVERGED, Fault, from_core, imprecise, silenced
 from .._base.report import Columns, ConvergenceWarning, FarPointsWarning
-from .._base.typing import Extrapolate, Progress
+from .._base.typing import Array, Extrapolate, Progress
 from .._core import ValidationError
 from .._curves.on_manifold import Intervals
 from .._curves.reduced import Span, span_of
-from .._spaces import AnySpace, Array, Doubles
+from .._spaces import AnySpace, Doubles
 from .._splines.cubic import CubicSpline
 from ..manifolds import Manifold
 from .axes import GridAxis, Sites

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, Unpack, overload
 import numpy as np
 
 from .._base.arrays import checked_atol, checked_flag, short_repr, whole_number
-from .._base.typing import Extrapolate, File, GridLook, OnFailure, P, PointsLike, Progress, TimesLike
+from .._base.typing import Array, Extrapolate, File, GridLook, OnFailure, P, PointsLike, Progress, State, TimesLike
 from .._core import ValidationError
 from .._curves.failures import raise_or_warn
 from .._curves.options import check_on_failure, check_progress, checked_extrapolate, require_matplotlib
-from .._spaces import AnySpace, Array, Product, Space, cover_of, factors_of, product_norm, space_named
+from .._spaces import AnySpace, Product, Space, cover_of, factors_of, product_norm, space_named
 from .._splines.archive import (
     FORMATS,
     Entries,
@@ -520,7 +520,7 @@ class GridSpline(Generic[P]):
         """
         write(file, self._state())
 
-    def _state(self) -> dict[str, Any]:
+    def _state(self) -> State:
         options = {"symmetric": self._symmetric, "on_failure": self._on_failure}
         state = head_of(self) | {
             "extrapolate": self._extrapolate,

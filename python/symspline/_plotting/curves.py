@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from .._base.input import UTC_ZONE
 from .._base.report import long_gaps
 from .._base.time import TimeAxis
-from .._base.typing import AnyArray, FloatArray, Look
+from .._base.typing import Array, FloatArray, Look
 from .._core import ConvergenceError, CutLocusError, ValidationError
 from .._curves.composed import AnyCurve
 from .._curves.curve import ControlledCurve, UncertaintyBand
@@ -608,7 +608,7 @@ def _divided(knots: FloatArray) -> FloatArray:
 class _Scatter:
     """Points at given times, with the interface of curves; evaluated at these times only."""
 
-    def __init__(self, space: AnySpace, times: FloatArray, points: AnyArray) -> None:
+    def __init__(self, space: AnySpace, times: FloatArray, points: Array) -> None:
         self.space, self.times, self.points = space, times, points
         self.batch: tuple[int, ...] = ()
         self.quad_rtol, self.max_nu = 0.0, 0
@@ -627,7 +627,7 @@ class _Scatter:
 
 
 def scatter_of(
-    space: AnySpace, first: Any, times: FloatArray, points: AnyArray, axis: Axis, color: ColorType, label: Any
+    space: AnySpace, first: Any, times: FloatArray, points: Array, axis: Axis, color: ColorType, label: Any
 ) -> Curve:
     """Return data as a curve without a line. Times must not decrease."""
     data = _Scatter(space, times, points)

@@ -25,7 +25,7 @@ from matplotlib.path import Path as Outline
 from numpy.typing import NDArray
 
 from .._base.angles import from_lonlat, to_lonlat
-from .._base.typing import AnyArray, FloatArray, Look
+from .._base.typing import Array, FloatArray, Look
 from .._spaces import Euclidean, Space
 from .curves import Curve
 from .panels import (
@@ -402,7 +402,7 @@ def _draw_bloch(panel: Panel, curves: Sequence[Curve]) -> None:
 BLOCH = View(_draw_bloch, has_many=True, is_turned=True)
 
 
-def bloch_vectors(states: AnyArray) -> FloatArray:
+def bloch_vectors(states: Array) -> FloatArray:
     """Return the unit vectors of states of shape (m, 2) or (m, 2, 1). They do not depend on the phase."""
     a, b = states.reshape(-1, 2).T
     across = 2 * a.conj() * b

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MultipleLocator
 
-from .._base.typing import AnyArray, FloatArray, Look
+from .._base.typing import Array, FloatArray, Look
 from .._core import ValidationError
 from .._spaces import Space
 from .curves import Curve, are_compared
@@ -317,7 +317,7 @@ def components(curves: Sequence[Curve]) -> View:
     return _several(curves, "components", [names[i] for i in kept], lambda _, points: real_numbers(points)[:, kept])
 
 
-def real_numbers(points: AnyArray) -> FloatArray:
+def real_numbers(points: Array) -> FloatArray:
     """Return one row per point, in which the real and imaginary parts of complex numbers alternate."""
     flat = np.ascontiguousarray(points.reshape(len(points), -1))
     return flat.view(np.float64) if np.iscomplexobj(flat) else flat
@@ -369,7 +369,7 @@ def angles_to_first(curves: Sequence[Curve]) -> View:
     n, k = np.reshape(curves[0].points[0], (len(curves[0].points[0]), -1)).shape
     names = [f"θ{i + 1}".translate(SUBSCRIPTS) for i in range(min(k, n - k))]
 
-    def numbers(first: Any, points: AnyArray) -> FloatArray:
+    def numbers(first: Any, points: Array) -> FloatArray:
         return principal_angles(points, first)[:, : len(names)]
 
     view = _several(curves, "principal angles to\nfirst point, degrees", names, numbers)
@@ -385,7 +385,7 @@ def angles_to_first(curves: Sequence[Curve]) -> View:
     return view._replace(draw=draw)
 
 
-def principal_angles(points: AnyArray, first: AnyArray) -> FloatArray:
+def principal_angles(points: Array, first: Array) -> FloatArray:
     """Return the principal angles between a subspace and others in degrees, the largest first; shape (m, k).
 
     The sines are accurate for small angles, and the cosines for large ones.

@@ -23,7 +23,7 @@ from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import Affine2D
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-from .._base.typing import AnyArray, FloatArray, Look
+from .._base.typing import Array, FloatArray, Look
 from .._core import ValidationError
 from .._spaces import AnySpace
 from .chart import Box, draw_box, draw_frames, name_axis, positions_of
@@ -413,7 +413,7 @@ def _draw_vectors(axes: Axes, field: Field) -> None:
 def _draw_directions(vectors: Numbers, words: str, axes: Axes, field: Field) -> None:
     """Draw unit vectors: arrows of the first two coordinates, over an image of the angle to the third axis."""
 
-    def polar(points: AnyArray) -> FloatArray:
+    def polar(points: Array) -> FloatArray:
         x, y, z = vectors(points).T
         return np.asarray(np.degrees(np.arctan2(np.hypot(x, y), z)))
 

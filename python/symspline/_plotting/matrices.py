@@ -21,7 +21,7 @@ from matplotlib.colors import to_rgba, to_rgba_array
 from matplotlib.transforms import Affine2DBase
 
 from .._base.angles import matrices_of_quaternions
-from .._base.typing import AnyArray, FloatArray, Look
+from .._base.typing import Array, FloatArray, Look
 from .._core import CutLocusError, convert_rotations
 from .._spaces import SpecialOrthogonal, cover_of
 from .curves import Curve, Mover, are_compared
@@ -220,7 +220,7 @@ MATRICES: dict[str, Numbers] = {
 """Matrices of rotations, shape (..., 3, 3)."""
 
 
-def quaternions(matrices: AnyArray) -> FloatArray:
+def quaternions(matrices: Array) -> FloatArray:
     """Return the unit quaternions w, x, y, z of matrices w − i(xσ₁ + yσ₂ + zσ₃) of SU(2), shape (..., 4)."""
     a, b = matrices[..., 0, 0], matrices[..., 1, 0]
     return np.stack([a.real, -b.imag, b.real, -a.imag], axis=-1)
@@ -259,7 +259,7 @@ def rotations(curves: Sequence[Curve]) -> View:
 def _rotation_vectors(matrices: Numbers, first: FloatArray, name: str) -> View:
     """Return the view of the rotation vectors of rotations from a given one."""
 
-    def numbers(_: Any, points: AnyArray) -> FloatArray:
+    def numbers(_: Any, points: Array) -> FloatArray:
         turned = np.ascontiguousarray(matrices(points) @ first.T)
         vectors = convert_rotations(turned, "matrix", "vector", 1e-7)[0]
         # In long gaps the vector may jump where the angle reaches half a turn.

@@ -20,10 +20,10 @@ from matplotlib.quiver import Quiver
 from matplotlib.typing import ColorType
 from numpy.typing import NDArray
 
-from .._base.typing import AnyArray, FloatArray, Look
+from .._base.typing import Array, FloatArray, Look
 
 Indices = NDArray[np.intp]
-Numbers = Callable[[AnyArray], FloatArray]
+Numbers = Callable[[Array], FloatArray]
 """Takes points, and returns numbers or positions, one row per point."""
 
 DATA = "#7d8f9c"

@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 from .. import _core
 from .._base.arrays import checked_flag, checked_number, one_of, short_repr, whole_number
 from .._base.time import TimeAxis
-from .._base.typing import AnyArray, AnyArrays, CovarianceOrder, FloatArray, Number, P, TimesLike
+from .._base.typing import AnyArrays, Array, CovarianceOrder, FloatArray, Number, P, TimesLike
 from .._core import ValidationError
 from .._curves.curve import CurveArrays, SidePanel, UncertaintyBand
 from .._curves.ends import end_kinds, is_closed
 from .._curves.options import order_of
-from .._spaces import Array, Doubles, Product, Space, SpecialOrthogonal, factors_of, short_name
+from .._spaces import Doubles, Product, Space, SpecialOrthogonal, factors_of, short_name
 from .._splines.archive import (
     Entries,
     Stored,
@@ -174,7 +174,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         return {}
 
     @property
-    def data(self) -> tuple[AnyArray, P]:
+    def data(self) -> tuple[Array, P]:
         """Times and points that were smoothed."""
         return self._noisy.t, self._in_factors(self._noisy.points)
 
@@ -201,7 +201,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         return residuals
 
     @property
-    def gaps(self) -> list[Gap] | tuple[list[Gap], ...] | AnyArray | tuple[AnyArray, ...]:
+    def gaps(self) -> list[Gap] | tuple[list[Gap], ...] | Array | tuple[Array, ...]:
         """Long gaps in the data, and the times before and after the data, with the factors of the bands there.
 
         The result is a list of `Gap` in the order of time. For open curves, the first and the last entry are the times

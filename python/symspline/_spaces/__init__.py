@@ -3,8 +3,9 @@
 """The spaces: points, tangent vectors and their geometry."""
 
 from .._base.arrays import POINT_TOL, point_tol
+from .._base.typing import Array
 from .actions import Group
-from .base import AnySpace, Array, Doubles, Space
+from .base import AnySpace, Doubles, Space
 from .groups import (
     Affine,
     ComplexGeneralLinear,

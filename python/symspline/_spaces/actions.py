@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._base.arrays import adjoint, as_array, cast, point_tol, refuse, short_repr
-from .._base.typing import P
+from .._base.typing import Array, P
 from .._core import CutLocusError, ValidationError
-from .base import AnySpace, Array, Space
+from .base import AnySpace, Space
 
 
 def matrices(space: AnySpace, g: ArrayLike, size: int, dtype: Any) -> tuple[Array, float]:

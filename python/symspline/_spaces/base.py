@@ -13,11 +13,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._base.arrays import as_array, cast, point_tol, refuse, short_repr, whole_number
-from .._base.typing import AnyArray, FloatArray, P
+from .._base.typing import Array, FloatArray, P
 from .._core import Handle, ValidationError
 from .statistics import Groups, Whitening, geometric_median, grouped, groups_of, karcher_mean, require_metric, take
 
-Array = AnyArray
 Doubles = FloatArray
 
 # From this ambient dimension on, frames of the whole tangent space are not computed.
@@ -168,7 +167,7 @@ class Space(Generic[P]):
     def __hash__(self) -> int:
         return hash(str(self))
 
-    def __reduce__(self) -> tuple[Any, ...]:
+    def __reduce__(self) -> tuple[object, ...]:
         return type(self), self._parameters
 
     # ---- geometry ----

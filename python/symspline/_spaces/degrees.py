@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from . import Array, Torus, factors_of, parts_of
+from .._base.typing import Array
+from . import Torus, factors_of, parts_of
 from .base import AnySpace
 
 # Names of the unit in attributes of netCDF files and in column names.

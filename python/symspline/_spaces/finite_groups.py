@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from .._base.angles import matrices_of_quaternions
 from .._base.arrays import as_array, read_only, short_repr
 from .._base.faults import warn
-from .._base.typing import FloatArray
+from .._base.typing import Array, FloatArray
 from .._core import ValidationError
-from .base import AnySpace, Array
+from .base import AnySpace
 
 # ---- the point groups of crystals, by their symbols ----
 
@@ -95,7 +95,7 @@ def elements(symbol: str) -> FloatArray:
     return read_only(np.array(rotations))
 
 
-def recognised(group: NDArray[Any]) -> str | None:
+def recognised(group: Array) -> str | None:
     """Return the symbol of the proper point group with the same elements, in any order, or None."""
     if group.shape[1:] != (3, 3) or group.dtype.kind != "f":
         return None

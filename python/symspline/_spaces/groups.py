@@ -8,10 +8,9 @@ import numpy as np
 
 from .._base.angles import matrices_of_quaternions
 from .._base.arrays import point_tol, refuse
-from .._base.typing import ComplexArray, FloatArray
+from .._base.typing import Array, ComplexArray, FloatArray
 from .._core import ValidationError
 from .actions import DisconnectedGroup, Group
-from .base import Array
 from .statistics import Groups, karcher_mean, scaled
 
 

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._base.arrays import adjoint
-from .._base.typing import FloatArray, P
+from .._base.typing import Array, FloatArray, P
 from .actions import Preserving, matrices, preserves
-from .base import Array, Space
+from .base import Space
 
 
 class Indefinite(Space[P]):

@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 
 from .._base.arrays import adjoint
-from .._base.typing import ComplexArray, FloatArray, P
+from .._base.typing import Array, ComplexArray, FloatArray, P
 from .._core import ValidationError
 from .actions import Congruent, preserves, require
-from .base import Array
 from .statistics import Groups, Whitening, scaled
 
 # Beyond this size, random exponents are scaled so that they do not grow with the size. Otherwise the exponential of a

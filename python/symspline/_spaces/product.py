@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._base.arrays import short_repr
-from .._base.typing import AnyArray, AnyArrays, FloatArray, P, PProduct
+from .._base.typing import AnyArrays, Array, FloatArray, P, PProduct
 from .._core import Handle, ValidationError
 from .base import CLASSES, DERIVED, AnySpace, Space, example_of
 from .groups import names_points, rotations_and_positions
@@ -20,10 +20,10 @@ from .statistics import Groups
 
 Tuple = tuple[Any, ...]
 # Points of factors, which are not products themselves.
-_A = TypeVar("_A", bound=AnyArray)
-_B = TypeVar("_B", bound=AnyArray)
-_C = TypeVar("_C", bound=AnyArray)
-_D = TypeVar("_D", bound=AnyArray)
+_A = TypeVar("_A", bound=Array)
+_B = TypeVar("_B", bound=Array)
+_C = TypeVar("_C", bound=Array)
+_D = TypeVar("_D", bound=Array)
 # Longer parameters are rejected before they are converted to integers.
 _DIGITS = 40
 
@@ -79,7 +79,7 @@ class Product(Space[PProduct]):
         if len(factors) < 2:
             raise ValidationError("a Product needs at least two factors")
         given = [factors_of(f) if isinstance(f, Space) else spaces_named(f) for f in factors]
-        self.factors: tuple[Space[AnyArray], ...] = tuple(part for parts in given for part in parts)
+        self.factors: tuple[Space[Array], ...] = tuple(part for parts in given for part in parts)
         self._has_quotients = any(factor._has_quotients for factor in self.factors)
 
     @property
@@ -207,7 +207,7 @@ class Product(Space[PProduct]):
         return list(zip(*arguments, strict=True))
 
 
-def factors_of(space: AnySpace) -> tuple[Space[AnyArray], ...]:
+def factors_of(space: AnySpace) -> tuple[Space[Array], ...]:
     """Return the factors of a product, or the space itself in a tuple."""
     return space.factors if isinstance(space, Product) else (space,)
 

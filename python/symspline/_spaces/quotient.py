@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._base.arrays import short_repr, whole_number
-from .._base.typing import P
+from .._base.typing import Array, P
 from .._core import CutLocusError, ValidationError
-from .base import DERIVED, AnySpace, Array, Space
+from .base import DERIVED, AnySpace, Space
 from .finite_groups import Factor, FiniteGroup, Indices, Nearest, along_path, nearest_of, over_grid
 from .groups import SpecialOrthogonal, SpecialUnitary, names_points
 from .product import Product, factors_of, space_named
@@ -20,7 +20,7 @@ from .product import Product, factors_of, space_named
 # Operations on two points, of which the second one is replaced by its representative nearest to the first.
 _OF_PAIRS = ("distance", "log", "geodesic", "transport")
 # Classes of quotients by the class of their spaces.
-_CLASSES: dict[type[Any], type[Any]] = {}
+_CLASSES: dict[type, type] = {}
 # Largest number of floating-point numbers of the representatives that are compared at a time.
 _BLOCK = 2**22
 # Errors of transformations that are not isometries are larger than this.
@@ -349,7 +349,7 @@ class Quotient(Space[P]):
     def __hash__(self) -> int:
         return hash((self.cover, self._full_name))
 
-    def __reduce__(self) -> tuple[Any, ...]:
+    def __reduce__(self) -> tuple[object, ...]:
         left, right = (None if factor is None else factor.elements for factor in (self._group.left, self._group.right))
         return _restored, (self.cover, left, right)
 
@@ -361,7 +361,7 @@ def _restored(cover: AnySpace, left: Array | None, right: Array | None) -> Quoti
     return Quotient(cover, right, left=False if left is None else left)
 
 
-def _class_of(kind: type[Any]) -> type[Any]:
+def _class_of(kind: type) -> type:
     """Return the class of quotients of spaces of some class, the same one each time."""
     if kind not in _CLASSES:
         members = {"__module__": __name__, "__doc__": Quotient.__doc__}

@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from .._base.arrays import adjoint, as_array, refuse
 from .._base.faults import warn
+from .._base.typing import Array
 from .._core import ConvergenceError, CutLocusError, ValidationError
 
-Array = NDArray[Any]
 # Points or vectors, one per row; those of a product are a tuple of arrays.
 Rows = Any
 # A `Space`, which is defined in terms of this module.

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._base.arrays import point_tol
-from .._base.typing import ComplexArray, FloatArray, P
+from .._base.typing import Array, ComplexArray, FloatArray, P
 from .._core import ValidationError
 from .actions import Preserving, largest, require
-from .base import LARGE, Array, Space
+from .base import LARGE, Space
 
 # Tolerance for recognising density matrices. It only selects the text of an error message, since rows of density
 # matrices are not unit vectors.

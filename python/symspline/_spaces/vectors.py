@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._base.arrays import as_array, dtype_tol, refuse
-from .._base.typing import FloatArray
+from .._base.typing import Array, FloatArray
 from .._core import ValidationError
 from .actions import Preserving, homogeneous, require
-from .base import Array, Space
+from .base import Space
 
 
 class _Flat(Space[FloatArray]):

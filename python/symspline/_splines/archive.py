@@ -24,12 +24,13 @@ from .._base.input import NO_ZONE, UTC_ZONE
 from .._base.report import Report
 from .._base.system import path_of, replacing
 from .._base.time import Moments, TimeAxis, time_axis_of
+from .._base.typing import Array, State
 from .._core import ValidationError
 from .._curves.curve import CurveArrays
 from .._curves.ends import freeze_bc_type
 from .._curves.fit import curve_of, read_ends
 from .._curves.options import checked_extrapolate
-from .._spaces import AnySpace, Array, Doubles, Product, Space, factors_of, space_named
+from .._spaces import AnySpace, Doubles, Product, Space, factors_of, space_named
 from ..manifolds._manifold import refuse_functions
 
 # Raise it when the entries change, and keep reading files of all earlier versions.
@@ -88,7 +89,7 @@ def check_version(state: Entries) -> None:
         )
 
 
-def restore(state: Mapping[str, Any]) -> Any:
+def restore(state: State) -> Any:
     """Make the curve that a state describes. Pickles refer to this function by its name."""
     entries = state if isinstance(state, Entries) else Entries(state)
     check_version(entries)
@@ -100,7 +101,7 @@ def restore(state: Mapping[str, Any]) -> Any:
     return FORMATS[kind]._from_state(entries)
 
 
-def write(file: Any, state: Mapping[str, Any]) -> None:
+def write(file: Any, state: State) -> None:
     """Write a state to an open file, or replace a file by its name (`_base.system.replacing`)."""
     refuse_functions(
         state["space"],
@@ -116,9 +117,9 @@ def write(file: Any, state: Mapping[str, Any]) -> None:
         np.savez(out, **arrays)
 
 
-def _flat(state: Mapping[str, Any]) -> dict[str, Any]:
+def _flat(state: State) -> State:
     """Return the arrays of a file. Those of the curves of which a curve is made have their number in front."""
-    arrays: dict[str, Any] = {}
+    arrays: State = {}
     for name, value in state.items():
         if name.isdigit():
             arrays |= {f"{name}/{key}": entry_value for key, entry_value in _flat(value).items()}
@@ -129,7 +130,7 @@ def _flat(state: Mapping[str, Any]) -> dict[str, Any]:
     return arrays | {"space": str(state["space"]), "version": state["version"]}
 
 
-def _nested(arrays: Mapping[str, Any]) -> Stored:
+def _nested(arrays: State) -> Stored:
     """Return the state of a curve from the arrays of a file, the inverse of `_flat`."""
     state, parts = Stored(), dict[str, Stored]()
     for name, value in arrays.items():
@@ -273,7 +274,7 @@ def entry(name: str) -> Iterator[None]:
 # ---- entries of several classes of curves ----
 
 
-def head_of(curve: Any) -> dict[str, Any]:
+def head_of(curve: Any) -> State:
     """Return the entries that all classes have."""
     return {"format": curve._format, "version": VERSION, "space": curve.space}
 
@@ -360,7 +361,7 @@ def read_space(state: Entries) -> Space:
     return state.read("space", space_named)
 
 
-def times_state(name: str, t: Array, time_axis: TimeAxis) -> dict[str, Any]:
+def times_state(name: str, t: Array, time_axis: TimeAxis) -> State:
     """Return times as numbers, and their unit.
 
     Examples of units are "ns", "10m" for dates that count in tens of minutes, "ns UTC" for dates with a time zone, and

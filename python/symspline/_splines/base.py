@@ -21,8 +21,9 @@ from numpy.typing import ArrayLike, DTypeLike
 from .._base.arrays import as_array, cast, checked_flag, checked_number, in_single, is_single, refuse, short_repr
 from .._base.time import TimeAxis, refuse_outside
 from .._base.typing import (
-    AnyArray,
     AnyArrays,
+    AnyFunction,
+    Array,
     AxesLook,
     BCType,
     Extrapolate,
@@ -33,6 +34,7 @@ from .._base.typing import (
     P,
     PageLook,
     Progress,
+    State,
     Time,
     TimesLike,
 )
@@ -70,7 +72,7 @@ from .._curves.search import (
     length,
     rounding_noise,
 )
-from .._spaces import AnySpace, Array, Doubles, Space, factors_of, parts_of
+from .._spaces import AnySpace, Doubles, Space, factors_of, parts_of
 from ..manifolds import Manifold
 from . import archive
 
@@ -227,8 +229,8 @@ class Curve(ABC, Generic[P]):
     ) -> AnyArrays: ...
     @overload
     def __call__(
-        self: Curve[AnyArray], x: TimesLike, nu: int = 0, *, dtype: DTypeLike, **options: Unpack[EvaluationOptions]
-    ) -> AnyArray: ...
+        self: Curve[Array], x: TimesLike, nu: int = 0, *, dtype: DTypeLike, **options: Unpack[EvaluationOptions]
+    ) -> Array: ...
     def __call__(
         self,
         x: TimesLike,
@@ -238,7 +240,7 @@ class Curve(ABC, Generic[P]):
         per_curve: bool = False,
         dtype: DTypeLike | None = None,
         progress: Progress | None = None,
-        out: AnyArray | AnyArrays | None = None,
+        out: Array | AnyArrays | None = None,
     ) -> Any:
         """Evaluate the curve or its derivatives.
 
@@ -620,7 +622,7 @@ class Curve(ABC, Generic[P]):
             raise TypeError("this is one curve; only a batch of curves has a length (see also .length())")
         return self._batch[0]
 
-    def __getitem__(self, index: int | np.integer[Any] | slice[Any, Any, Any]) -> Self:
+    def __getitem__(self, index: int | np.integer | slice) -> Self:
         """Return one curve of a batch, or a slice of the batch."""
         if not self._batch:
             raise TypeError("this is one curve; only a batch of curves can be indexed")
@@ -776,13 +778,13 @@ class Curve(ABC, Generic[P]):
         """
         return self._shifted(checked_shift(self._time_axis, dt))
 
-    def retime(self, law: Callable[..., Any], *, domain: ArrayLike | None = None) -> Curve[P]:
+    def retime(self, law: AnyFunction, *, domain: ArrayLike | None = None) -> Curve[P]:
         r"""Return the same path with another time law.
 
         Parameters
         ----------
         law : callable
-            Function σ that takes a time x of the new curve, and as second argument the order of a derivative. It
+            AnyFunction σ that takes a time x of the new curve, and as second argument the order of a derivative. It
             returns a time of this curve: seconds since its start if its times are dates. Pass a result of `time_law`,
             or a SciPy spline such as ``PchipInterpolator``.
         domain : array_like, shape (2,), optional
@@ -1368,17 +1370,21 @@ class Curve(ABC, Generic[P]):
         """
         archive.write(file, self._state())
 
-    def __reduce__(self) -> tuple[Any, ...]:
+    def __reduce__(self) -> tuple[object, ...]:
         return archive.restore, (self._state(),)
 
     @abstractmethod
-    def _state(self) -> dict[str, Any]:
+    def _state(self) -> State:
         """Return the entries of files and pickles."""
 
     @classmethod
     @abstractmethod
     def _from_state(cls, state: archive.Entries) -> Self:
         """Return the curve of a state."""
+
+
+# A curve on any space, also on a product.
+UserCurve = Curve[Any]
 
 
 def _check_batch_axes(shape: tuple[int, ...], batch: tuple[int, ...], name: str) -> None:
@@ -1395,7 +1401,7 @@ def _time_text(x: Any) -> str:
     return f"{float(x):.6g}" if abs(float(x)) < 1e6 else f"{float(x):.13g}"
 
 
-def _check_meeting(first: Curve[Any], second: Curve[Any]) -> None:
+def _check_meeting(first: UserCurve, second: UserCurve) -> None:
     """Raise ValidationError unless the second curve begins at the time and the point at which the first ends."""
     if first.space != second.space:
         raise ValidationError(f"other is on {second.space!r}, but the curve is on {first.space!r}")
@@ -1496,12 +1502,12 @@ def _lead(space: AnySpace, arrays: list[Array]) -> tuple[int, ...]:
 # ---- one picture of several curves and data ----
 
 if TYPE_CHECKING:
-    Item = Curve[Any] | tuple[Any, Any]
+    Item = UserCurve | tuple[Any, Any]
 
 
 @overload
 def plot(
-    curves: Curve[Any] | Iterable[Item],
+    curves: UserCurve | Iterable[Item],
     file: File | None = None,
     *,
     labels: Sequence[str | None] | None = None,
@@ -1513,7 +1519,7 @@ def plot(
 ) -> Figure: ...
 @overload
 def plot(
-    curves: Curve[Any] | Iterable[Item],
+    curves: UserCurve | Iterable[Item],
     file: None = None,
     *,
     labels: Sequence[str | None] | None = None,
@@ -1524,7 +1530,7 @@ def plot(
     show: bool = False,
 ) -> Axes: ...
 def plot(
-    curves: Curve[Any] | Iterable[Item],
+    curves: UserCurve | Iterable[Item],
     file: File | None = None,
     *,
     labels: Sequence[str | None] | None = None,

@@ -12,26 +12,14 @@ from .. import _core
 from .._base.arrays import as_array, cast, checked_number, refuse, whole_number
 from .._base.faults import UNCONVERGED, Fault, between_neighbours, renamed
 from .._base.report import CumulativeReport
-from .._base.typing import OnFailure, P, PointsLike
+from .._base.typing import Array, OnFailure, P, PointsLike, State
 from .._core import CutLocusError, ValidationError
 from .._curves.curve import ControlledCurve
 from .._curves.ends import ends_of
 from .._curves.failures import raise_or_warn, warn_of_far_data
 from .._curves.fit import Points, read_given, unwrapped, validated
 from .._curves.options import check_on_failure
-from .._spaces import (
-    AnySpace,
-    Array,
-    Doubles,
-    Euclidean,
-    Group,
-    Product,
-    Quotient,
-    Space,
-    factors_of,
-    parts_of,
-    space_named,
-)
+from .._spaces import AnySpace, Doubles, Euclidean, Group, Product, Quotient, Space, factors_of, parts_of, space_named
 from ..manifolds._manifold import refuse_functions
 from .archive import Entries, Stored, by_factor, entry, head_of, read_by_factor, read_report
 from .base import Curve
@@ -91,7 +79,7 @@ class ControlledSpline(Curve[P]):
     def _picked(self, index: Any) -> Self:
         return self._of(self._curve.take_batch(index))
 
-    def _state(self) -> dict[str, Any]:
+    def _state(self) -> State:
         state = head_of(self) | {"knots": self.knots, "degree": self.degree}
         return state | by_factor("control_points", self._curve.space, self._curve.control)
 
@@ -577,7 +565,7 @@ class CumulativeBSpline(ControlledSpline[P]):
         curve.report = self.report and self.report.map(lambda column: column[index])
         return curve
 
-    def _state(self) -> dict[str, Any]:
+    def _state(self) -> State:
         return super()._state() | {"report": None if self.report is None else vars(self.report)}
 
     @classmethod

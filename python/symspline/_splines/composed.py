@@ -13,19 +13,19 @@ from numpy.typing import ArrayLike, NDArray
 
 from .._base.arrays import short_repr
 from .._base.time import TimeAxis
-from .._base.typing import FloatArray, P, Time
+from .._base.typing import Array, FloatArray, P, State, Time
 from .._core import ValidationError
 from .._curves.composed import Affine, Joined, Retimed, TimeMap, part_of_times
 from .._curves.curve import UncertaintyBand
-from .._spaces import Array, Doubles
+from .._spaces import Doubles
 from .archive import Entries, entry, head_of, read_times, restore, times_state
-from .base import Curve
+from .base import Curve, UserCurve
 
 if TYPE_CHECKING:
     from typing_extensions import TypeVar
 
     # The class of the segments.
-    C = TypeVar("C", bound=Curve[Any], covariant=True, default=Curve[Any])
+    C = TypeVar("C", bound=UserCurve, covariant=True, default=UserCurve)
 else:
     from typing import TypeVar
 
@@ -115,7 +115,7 @@ class RetimedCurve(Curve[P]):
         own_times = times[index] if times.ndim > 1 else times
         return self._of(self._source[index], self._time_axis.take_batch(index), law, own_times)
 
-    def _state(self) -> dict[str, Any]:
+    def _state(self) -> State:
         law: Any = self._curve.law
         if isinstance(law, Affine):
             law = {"sign": law.sign, "offset": np.asarray(law.offset)}
@@ -260,9 +260,9 @@ class SegmentedCurve(Curve[P], Generic[P, C]):
         return len(self._segments)
 
     @overload  # type: ignore[override]
-    def __getitem__(self, index: int | np.integer[Any]) -> C: ...
+    def __getitem__(self, index: int | np.integer) -> C: ...
     @overload
-    def __getitem__(self, index: slice[Any, Any, Any]) -> SegmentedCurve[P, C]: ...
+    def __getitem__(self, index: slice) -> SegmentedCurve[P, C]: ...
     def __getitem__(self, index: Any) -> Any:
         """Return one segment, or the curve of several consecutive ones."""
         if isinstance(index, slice):
@@ -319,7 +319,7 @@ class SegmentedCurve(Curve[P], Generic[P, C]):
         return np.unique(np.concatenate([*crossings, *jumps]))
 
     @property
-    def _meetings(self) -> list[tuple[Any, Curve[Any], Curve[Any]]]:
+    def _meetings(self) -> list[tuple[Any, UserCurve, UserCurve]]:
         """Times at which a segment begins where the previous one ends, with both segments."""
         pairs = pairwise(self._segments)
         return [(b.domain[0], a, b) for a, b in pairs if b.domain[0] == a.domain[1]]
@@ -349,7 +349,7 @@ class SegmentedCurve(Curve[P], Generic[P, C]):
     def _shifted(self, step: Any) -> Curve[P]:
         return self._of_segments([segment._shifted(step) for segment in self._segments])
 
-    def _state(self) -> dict[str, Any]:
+    def _state(self) -> State:
         return (
             head_of(self)
             | {"extrapolate": self._extrapolate}
@@ -370,7 +370,7 @@ class SegmentedCurve(Curve[P], Generic[P, C]):
         return f"{len(self)} segments, "
 
 
-def _at(curve: Curve[Any], function: Any, t: Any) -> Any:
+def _at(curve: UserCurve, function: Any, t: Any) -> Any:
     """Return a quantity of a segment at a time, as `Curve.extrema` names it."""
     if callable(function):
         return np.asarray(function(np.asarray(t)[None]))[0]

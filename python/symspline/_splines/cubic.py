@@ -16,7 +16,19 @@ from .._base.arrays import as_array, checked_flag, refuse, whole_number
 from .._base.input import times_of
 from .._base.report import INTEGERS, NUMBERS, Columns, Report, combined
 from .._base.time import TimeAxis, knots_of
-from .._base.typing import BCType, CubicBCType, Extrapolate, Method, OnFailure, P, PointsLike, Progress, TimesLike
+from .._base.typing import (
+    Array,
+    BCType,
+    CubicBCType,
+    Extrapolate,
+    Method,
+    OnFailure,
+    P,
+    PointsLike,
+    Progress,
+    State,
+    TimesLike,
+)
 from .._core import ValidationError
 from .._curves.conditions import fit_with_conditions
 from .._curves.curve import CurveArrays, longest_step
@@ -28,7 +40,7 @@ from .._curves.missing import counts_all_samples, curves_without_missing, inner_
 from .._curves.options import fit_options, order_of, with_atol
 from .._curves.search import alternative_energy
 from .._curves.solve import DEFAULTS
-from .._spaces import AnySpace, Array, Doubles, Product, Quotient, Space, factors_of, parts_of, space_named
+from .._spaces import AnySpace, Doubles, Product, Quotient, Space, factors_of, parts_of, space_named
 from .archive import Entries, read_c1_nodes, read_fitted
 from .piecewise import PiecewiseCubic
 
@@ -505,7 +517,7 @@ class CubicSpline(PiecewiseCubic[P], Generic[P, R]):
         return combined(reports, longest_step(curve), curve.space.curvature, other)
 
     @property
-    def _parts(self) -> tuple[CubicSpline[Any, Any], ...]:
+    def _parts(self) -> tuple[AnyCubicSpline, ...]:
         """Splines in the factors of a product; in any other space, the spline itself."""
         if len(self._reports) == 1:
             return (self,)
@@ -524,7 +536,7 @@ class CubicSpline(PiecewiseCubic[P], Generic[P, R]):
 
     # ---- files, pickles and text ----
 
-    def _state(self) -> dict[str, Any]:
+    def _state(self) -> State:
         entries = {"bc_type": self._bc_type, "report": [vars(report) for report in self._reports]}
         nodes = {"c1_nodes": list(self._c1_nodes)} if self._c1_nodes else {}
         return super()._state() | entries | nodes
@@ -557,6 +569,10 @@ class CubicSpline(PiecewiseCubic[P], Generic[P, R]):
     @property
     def _unconverged(self) -> int:
         return int(np.sum(~np.all([np.asarray(report.converged) for report in self._reports], axis=0)))
+
+
+# A spline on any space, also on a product, with any report.
+AnyCubicSpline = CubicSpline[Any, Any]
 
 
 # ---- splines with further points at their end ----

@@ -10,16 +10,16 @@ import numpy as np
 
 from .._base.arrays import short_repr
 from .._base.system import damage, path_of
-from .._base.typing import File
+from .._base.typing import File, State
 from .._core import ValidationError
 from .archive import FORMATS, TEXTS, Entries, Stored, read_state, restore, write
-from .base import Curve
+from .base import Curve, UserCurve
 
 # Entries with one value for all curves of a file.
 _SHARED = (*TEXTS, "version")
 
 
-def save(curves: Curve[Any] | Mapping[str, Curve[Any]], file: File) -> None:
+def save(curves: UserCurve | Mapping[str, UserCurve], file: File) -> None:
     """Write a curve, or several curves by name, to an NPZ file that `load` reads.
 
     Parameters
@@ -104,7 +104,7 @@ def load(file: File) -> Any:
         return _restored(read_state(opened))
 
 
-def _joined(curves: Mapping[str, Curve]) -> dict[str, Any]:
+def _joined(curves: Mapping[str, Curve]) -> State:
     """Return the state of several curves: arrays are concatenated, all else is in lists."""
     if not curves or not all(isinstance(name, str) for name in curves):
         raise ValidationError("curves must be a mapping with at least one curve, whose keys are text")
@@ -121,7 +121,7 @@ def _joined(curves: Mapping[str, Curve]) -> dict[str, Any]:
                     f"curves[{name!r}] and curves[{names[0]!r}] differ in {key!r}, but the curves in one file must be "
                     "of one class and of one space, with times of one type. Save them in separate files."
                 )
-    joined: dict[str, Any] = {"names": names, "rows": {}}
+    joined: State = {"names": names, "rows": {}}
     for key, value in first.items():
         values = [state[key] for state in states]
         if isinstance(value, np.ndarray):
@@ -131,7 +131,7 @@ def _joined(curves: Mapping[str, Curve]) -> dict[str, Any]:
     return joined
 
 
-def _layout(state: Mapping[str, Any]) -> dict[str, Any]:
+def _layout(state: State) -> State:
     """Return the parts of a state that all curves of a file must share."""
 
     def shared(key: str, value: Any) -> Any:

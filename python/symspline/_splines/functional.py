@@ -14,8 +14,8 @@ from .._base.input import in_library, library_of
 from .._base.report import Report
 from .._base.time import TimeAxis, knots_of
 from .._base.typing import (
-    AnyArray,
     AnyArrays,
+    Array,
     BCType,
     Extrapolate,
     FitOptions,
@@ -43,7 +43,7 @@ from .._curves.options import (
     quantity_of,
     with_atol,
 )
-from .._spaces import AnySpace, Array, Doubles, Product, Quotient, Space, factors_of, parts_of, space_named
+from .._spaces import AnySpace, Doubles, Product, Quotient, Space, factors_of, parts_of, space_named
 from ..manifolds import Manifold
 from .cubic import CubicSpline
 
@@ -152,7 +152,7 @@ def evaluate(
     extrapolate: Extrapolate = None,
     per_curve: bool = False,
     progress: Progress | None = None,
-    out: AnyArray | AnyArrays | None = None,
+    out: Array | AnyArrays | None = None,
 ) -> Any:
     """Evaluate a curve that is given by knots, points and velocities.
 

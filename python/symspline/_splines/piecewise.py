@@ -15,7 +15,19 @@ from numpy.typing import ArrayLike, NDArray
 from .._base.arrays import as_array, checked_flag, read_only, short_repr
 from .._base.input import times_of
 from .._base.time import TimeAxis, knots_of, refuse_outside
-from .._base.typing import BCType, Extrapolate, FloatArray, Number, P, PointsLike, Progress, Time, TimesLike
+from .._base.typing import (
+    Array,
+    BCType,
+    Extrapolate,
+    FloatArray,
+    Number,
+    P,
+    PointsLike,
+    Progress,
+    State,
+    Time,
+    TimesLike,
+)
 from .._core import ValidationError
 from .._curves.composed import call_at_times, check_increasing
 from .._curves.curve import CurveArrays
@@ -24,7 +36,7 @@ from .._curves.fit import Points, curve_of, hermite_data, read, read_ends, read_
 from .._curves.missing import counts_all_samples, curves_without_missing, missing_named, nodes_without_missing
 from .._curves.options import check_progress, checked_extrapolate, extrapolation_mode, quantity_of, with_atol
 from .._curves.slopes import check_method, joined, jumps, local_velocities
-from .._spaces import POINT_TOL, AnySpace, Array, Doubles, Product, Space, factors_of, parts_of, space_named
+from .._spaces import POINT_TOL, AnySpace, Doubles, Product, Space, factors_of, parts_of, space_named
 from ..manifolds import Manifold
 from . import archive
 from .base import Curve
@@ -291,7 +303,7 @@ class PiecewiseCubic(Curve[P]):
         t = self._t[index] if self._times.ndim > 1 else self._t
         return self._with(self._time_axis.take_batch(index), t, self._curve.take_batch(index), index)
 
-    def _state(self) -> dict[str, Any]:
+    def _state(self) -> State:
         state = archive.head_of(self) | {"extrapolate": self._extrapolate}
         state |= archive.times_state("t", self._t, self._time_axis)
         for name in ("points", "velocities"):

@@ -11,11 +11,11 @@ from numpy.typing import ArrayLike
 
 from .. import _core
 from .._base.arrays import as_array, cast, checked_number, read_only, refuse, same_fields, short_repr, whole_number
-from .._base.typing import FloatArray, Number
+from .._base.typing import Array, FloatArray, Number
 from .._core import ValidationError
 from .._curves.options import order_of
-from .._spaces import Array, Doubles, factors_of, parts_of, product_norm
-from .base import Curve
+from .._spaces import Doubles, factors_of, parts_of, product_norm
+from .base import Curve, UserCurve
 
 # Velocities before and after a knot that differ by more than this part jump.
 _JUMP = 1e-6
@@ -128,7 +128,7 @@ class TimeLaw:
 
 
 def time_law(
-    curve: Curve[Any],
+    curve: UserCurve,
     *,
     max_acceleration: float | tuple[float | None, ...],
     max_speed: float | tuple[float | None, ...] | None = None,
@@ -280,7 +280,7 @@ class _Path(NamedTuple):
         return np.asarray(np.maximum(after, before))
 
 
-def _sampled(curve: Curve[Any], size: int) -> _Path:
+def _sampled(curve: UserCurve, size: int) -> _Path:
     knots = curve._curve.times
     parts_per_interval = max(4, math.ceil(size / (len(knots) - 1)))
     jumping = _jumps(curve, knots)
@@ -305,7 +305,7 @@ def _sampled(curve: Curve[Any], size: int) -> _Path:
     return _Path(x, np.stack(p, axis=-1), np.stack(q, axis=-1), np.stack(r, axis=-1), rests)
 
 
-def _values(curve: Curve[Any], x: Doubles, quantity: str) -> tuple[Array, ...]:
+def _values(curve: UserCurve, x: Doubles, quantity: str) -> tuple[Array, ...]:
     """Evaluate the curve in each factor."""
     values = parts_of(curve._curve.evaluate(x, quantity, "continue", False), curve.space, quantity)
     if not all(np.isfinite(array).all() for array in values):
@@ -323,7 +323,7 @@ def _graded(knots: Doubles, count: int, rests: Array) -> Doubles:
     return np.unique(np.concatenate([x, after, before]))
 
 
-def _jumps(curve: Curve[Any], knots: Doubles) -> Array:
+def _jumps(curve: UserCurve, knots: Doubles) -> Array:
     """Return the inner knots at which the velocity jumps."""
     times = np.ascontiguousarray(np.stack([knots[1:-1] - 1e-9 * np.diff(knots)[:-1], knots[1:-1]]))
     jumps, sizes = [], []

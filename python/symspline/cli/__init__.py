@@ -27,6 +27,7 @@ from typing import Any, NoReturn
 
 from .._base import VERSION
 from .._base.exceptions import ConvergenceError, SymsplineError
+from .._base.typing import Keywords
 from . import _check, _fit, _info, _plot, _sample
 from ._messages import QUIET, USUAL, VERBOSE, Problem, for_command_line, printed_warnings, say, set_level
 
@@ -173,7 +174,7 @@ def _wrapped(item: str, width: int, hanging: int) -> str:
     return textwrap.fill(item, width, subsequent_indent=" " * hanging, break_long_words=False, break_on_hyphens=False)
 
 
-def _texts_of(doc: str | None) -> dict[str, Any]:
+def _texts_of(doc: str | None) -> Keywords:
     """Return the arguments of a parser with the docstring of a module, which is absent under ``python -OO``."""
     description, _, examples = (doc or "").partition("\nexample")
     return {

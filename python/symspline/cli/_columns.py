@@ -17,13 +17,14 @@ from numpy.typing import NDArray
 
 from .._base.angles import from_lonlat
 from .._base.exceptions import SymsplineError
+from .._base.typing import Array
 from .._core import ValidationError
 from .._spaces import Doubles, LogEuclidean, Product, Space, SymmetricPositiveDefinite, Torus, factors_of, space_named
 from .._spaces.degrees import is_degrees, look_like_degrees
 from ..convert._pose_files import join, rotations_in_rows
 from ..geo import NAMED, are_tracks
 from ._messages import Problem, Source, first_duplicate, for_command_line, listed, refuse, say
-from ._tables import IM, RE, Array, Place, Rows, Table
+from ._tables import IM, RE, Place, Rows, Table
 
 GLOBE, ROTATIONS, POSES = map(space_named, ("sphere:2", "so:3", "se:3"))
 LONLAT = ["lon", "lat"]
@@ -433,7 +434,7 @@ class PointColumns:
             why = f"angles up to {largest:g} look like degrees" if largest else f"the name {named[0]!r} means degrees"
             say(f"{self.path}: {why}, but angles on {torus} are in radians; give --degrees if they are in degrees")
 
-    def _projected(self, factor: Space, points: NDArray[Any], place: Place) -> NDArray[Any]:
+    def _projected(self, factor: Space, points: Array, place: Place) -> Array:
         doubles = factor._doubles(points, "points")
         lead = factor._lead(doubles)
         try:

@@ -55,6 +55,7 @@ from numpy.typing import NDArray
 
 from .._base.exceptions import SymsplineError
 from .._base.time import NANOSECONDS, time_axis_of
+from .._base.typing import Keywords
 from .._core import CutLocusError
 from .._curves.failures import IN_PYTHON
 from .._smoothing import SmoothingSpline, SmoothingWarning
@@ -226,7 +227,7 @@ def _space(options: argparse.Namespace) -> Space:
     return space
 
 
-def _keywords(options: argparse.Namespace, space: Space) -> dict[str, Any]:
+def _keywords(options: argparse.Namespace, space: Space) -> Keywords:
     """Return the arguments of `symspline.fit_many`, or of `symspline.make_smoothing_spline` with --smooth."""
     given = {name: getattr(options, name) for name in (*_THROUGH, *_NEAR)}
     # The defaults of the library contradict nothing.
@@ -274,7 +275,7 @@ def _read(options: argparse.Namespace, space: Space) -> tuple[Recordings, Column
     return data, Columns(*names, options.lonlat, rows.utc, points.quaternion, cut, options.degrees)
 
 
-def _fitted(data: Recordings, options: argparse.Namespace, keywords: dict[str, Any]) -> Sequence[CubicSpline]:
+def _fitted(data: Recordings, options: argparse.Namespace, keywords: Keywords) -> Sequence[CubicSpline]:
     """Fit all curves in one call."""
 
     def text(note: object) -> str:

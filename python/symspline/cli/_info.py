@@ -27,6 +27,7 @@ from .._base.arrays import brief
 from .._base.report import long_gaps
 from .._base.system import damage
 from .._base.time import time_axis_of
+from .._base.typing import Array
 from .._smoothing import SmoothingReport, SmoothingSpline
 from .._smoothing.noise import is_several, smoothed_spaces
 from .._spaces import Doubles
@@ -35,7 +36,7 @@ from .._splines.cubic import CubicSpline
 from ._columns import NUMBERED, column_of_names, time_column
 from ._curves import read_curves
 from ._messages import Problem, Source, counted, listed, refuse
-from ._tables import TABLES, Array, Rows, Table, endings, format_of, open_table
+from ._tables import TABLES, Rows, Table, endings, format_of, open_table
 
 _LIBRARIES = {"pandas": "CSV files", "pyarrow": "Parquet files", "gpxpy": "GPX files", "matplotlib": "symspline plot"}
 _LIBRARIES |= {"shtab": "completion in shells"}

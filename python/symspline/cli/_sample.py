@@ -55,6 +55,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._base.time import NANOSECONDS, onto_ends
+from .._base.typing import Array
 from .._smoothing import SmoothingSpline
 from .._spaces import Doubles, space_named
 from .._splines.cubic import CubicSpline
@@ -94,7 +95,7 @@ _EACH = "{curve}"
 """Replaced by the name of a curve in the name of the output."""
 _MOST = 10**9
 """The largest number of samples of one curve."""
-Times = NDArray[Any]
+Times = Array
 _TUM_NAMES = list(TUM[1:])
 _TUM_SPACES = [space_named(name) for name in ("se:3", "so:3 x r:3", "r:3 x so:3")]
 

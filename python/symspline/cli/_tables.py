@@ -26,12 +26,12 @@ from .._base.arrays import brief
 from .._base.input import ISO_DATE, UTC_ZONE, times_of
 from .._base.system import damage
 from .._base.time import NANOSECONDS, parts_of_duration
+from .._base.typing import Array
 from .._core import ValidationError, number_lines
 from .._splines.archive import read
 from ..convert._pose_files import TUM, tum_rows, write_tum_rows
 from ._messages import STANDARD, Problem, Progress, Source, alternatives, did_you_mean, first_duplicate, refuse, written
 
-Array = NDArray[Any]
 Place = Callable[[int], str]
 
 RE, IM = "_re", "_im"
@@ -147,7 +147,7 @@ class Table:
     """
 
     path: Source
-    columns: dict[str, Any]
+    columns: dict[str, Array]
     place: Place = "row {} (counted from 0)".format
     groups: Mapping[str, list[str]] = field(default_factory=dict)
     is_utc: Mapping[str, bool] = field(default_factory=dict)
@@ -438,7 +438,7 @@ def _read_csv(path: Source) -> Table:
     rows.close()
     missing = [word for text in MISSING for word in (text, text.upper(), text.title(), text.replace("nan", "NaN"))]
     frame = _frame(path, mark, names, head, keep_default_na=False, na_values=missing)
-    columns: dict[str, Any] = {}
+    columns: dict[str, Array] = {}
     for i, name in enumerate(names):
         if name:
             # Words such as true are texts.
@@ -457,7 +457,7 @@ def _read_csv(path: Source) -> Table:
     return Table(path, columns, place, texts=texts, comma=mark == ";")
 
 
-def _converted(name: str, column: Any) -> dict[str, Any]:
+def _converted(name: str, column: Any) -> dict[str, Array]:
     """Return a column of pandas as an array of numbers, as those of its real and imaginary parts, or as texts."""
     if column.dtype.kind in "biufmM":
         return {name: column.to_numpy()}
@@ -559,7 +559,7 @@ def _read_npz(path: Source) -> Table:
     The entries of an array ``a`` with more axes are the columns ``a_0``, ``a_1``, … row by row; complex numbers are
     two columns ``a_0_re`` and ``a_0_im``.
     """
-    columns: dict[str, Any] = {}
+    columns: dict[str, Array] = {}
     groups: dict[str, list[str]] = {}
     with path.open() as file:
         refuse(path, (not zipfile.is_zipfile(file), " is not an NPZ file"))
@@ -602,7 +602,7 @@ def _read_parquet(path: Source) -> Table:
         except ArrowInvalid:
             raise Problem(f"{path} is damaged or not a Parquet file") from None
     zones = {name: getattr(frame[name].dtype, "tz", None) is not None for name in frame}
-    columns: dict[str, Any] = {}
+    columns: dict[str, Array] = {}
     for name, zoned in zones.items():
         columns |= _converted(name, frame[name].dt.tz_convert(None) if zoned else frame[name])
     return Table(path, columns, is_utc=zones)
@@ -697,7 +697,7 @@ def _read_geojson(path: Source) -> Table:
     The name of a line is in the column ``track``, and heights are in the column ``ele``.
     """
     content = _json(path)
-    rows: list[dict[str, Any]] = []
+    rows: list[dict[str, object]] = []
     try:
         features = content["features"] if content["type"] == "FeatureCollection" else [content]
         for number, feature in enumerate(features):
@@ -707,7 +707,7 @@ def _read_geojson(path: Source) -> Table:
     return _table(path, rows)
 
 
-def _feature(feature: Any, number: str, path: Source) -> list[dict[str, Any]]:
+def _feature(feature: Any, number: str, path: Source) -> list[dict[str, object]]:
     properties = dict(feature.get("properties") or {})
     coordinates, kind = feature["geometry"]["coordinates"], feature["geometry"]["type"]
     if kind == "Point":
@@ -720,7 +720,7 @@ def _feature(feature: Any, number: str, path: Source) -> list[dict[str, Any]]:
     return rows if times is None else [{_TIME: time} | row for time, row in zip(times, rows, strict=True)]
 
 
-def _position(coordinates: Any) -> dict[str, Any]:
+def _position(coordinates: Any) -> dict[str, object]:
     lon, lat, *height = coordinates
     return {_LON: lon, _LAT: lat} | ({_HEIGHT: height[0]} if height else {})
 
@@ -775,15 +775,21 @@ def _read_gpx(path: Source) -> Table:
             gpx = gpxpy.parse(file.read().decode("utf-8-sig"))
         except (UnicodeDecodeError, ValueError, gpxpy.gpx.GPXException) as error:
             raise Problem(f"{path} is damaged or not a GPX file: {error}") from None
-    rows: list[dict[str, Any]] = []
+    rows: list[dict[str, object]] = []
     for number, track in enumerate(gpx.tracks, 1):
         for part, segment in enumerate(track.segments, 1):
             name = track.name or str(number)
             label = f"{name}/{part}" if len(track.segments) > 1 else name
             for point in segment.points:
                 time = point.time and point.time.astimezone(UTC).isoformat()
-                row = {_TIME: time, _LON: point.longitude, _LAT: point.latitude, _HEIGHT: point.elevation}
-                rows.append({name: value for name, value in row.items() if value is not None} | {_TRACK: label})
+                row = {
+                    _TIME: time,
+                    _LON: point.longitude,
+                    _LAT: point.latitude,
+                    _HEIGHT: point.elevation,
+                    _TRACK: label,
+                }
+                rows.append({name: value for name, value in row.items() if value is not None})
     refuse(path, (not rows, " has no tracks with points"))
     return _table(path, rows)
 

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._base.arrays import (
-    Array,
     adjoint,
     check_orthonormal,
     check_symmetric,
@@ -25,6 +24,7 @@ from .._base.arrays import (
     unit_vectors,
     unmoved_by_underflow,
 )
+from .._base.typing import Array
 from .._core import ValidationError
 
 

@@ -16,9 +16,9 @@ from .._base.arrays import as_array, brief, cast, checked_flag, length, off_one,
 from .._base.input import times_of
 from .._base.system import path_of, replacing
 from .._base.time import warn_of_rounded_times
-from .._base.typing import PointsLike
+from .._base.typing import Array, PointsLike
 from .._core import ValidationError, number_lines
-from .._spaces import Array, Doubles, SpecialEuclidean, SpecialOrthogonal, point_tol, rotations_and_positions
+from .._spaces import Doubles, SpecialEuclidean, SpecialOrthogonal, point_tol, rotations_and_positions
 from ._quaternions import matrix_to_quaternion, quaternion_to_matrix
 
 # Columns of a TUM trajectory.

@@ -9,7 +9,6 @@ from numpy.typing import ArrayLike
 
 from .._base.arrays import (
     REMOVE,
-    Array,
     as_array,
     check_finite,
     checked_atol,
@@ -22,6 +21,7 @@ from .._base.arrays import (
     unit_vectors,
     unmoved_by_underflow,
 )
+from .._base.typing import Array
 from .._core import ValidationError, convert_rotations
 from .._spaces import point_tol
 

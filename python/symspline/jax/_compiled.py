@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import Any, Unpack, overload
+from typing import Unpack, overload
 
 import jax
 import jax.numpy as jnp
 from jax.custom_derivatives import SymbolicZero
+from numpy.typing import ArrayLike
 
 from .._autodiff.compiled import split
 from .._autodiff.curves import second_fundamental_form
-from .._base.typing import CurveOptions
+from .._autodiff.library import Tensor
+from .._base.typing import CubicBCType, CurveOptions, PointsLike, SolverOptions
 from .._curves.ends import ends_in_factors
 from .._curves.options import order_of
 from .._spaces import AnySpace, Product, Space, parts_of, refuse_quotients, space_named
@@ -23,19 +25,26 @@ Array = jax.Array
 
 @overload
 def curve(
-    x: Any, t: Any, points: Any, space: Space | str, *, nu: int = 0, **options: Unpack[CurveOptions]
+    x: ArrayLike, t: ArrayLike, points: PointsLike, space: Space | str, *, nu: int = 0, **options: Unpack[CurveOptions]
 ) -> Array: ...
 
 
 @overload
 def curve(
-    x: Any, t: Any, points: Any, space: Product, *, nu: int = 0, **options: Unpack[CurveOptions]
+    x: ArrayLike, t: ArrayLike, points: PointsLike, space: Product, *, nu: int = 0, **options: Unpack[CurveOptions]
 ) -> tuple[Array, ...]: ...
 
 
 def curve(
-    x: Any, t: Any, points: Any, space: AnySpace | str, *, nu: int = 0, bc_type: Any = "natural", **options: Any
-) -> Any:
+    x: Tensor,
+    t: Tensor,
+    points: Tensor,
+    space: AnySpace | str,
+    *,
+    nu: int = 0,
+    bc_type: CubicBCType = "natural",
+    **options: Unpack[SolverOptions],
+) -> Tensor:
     """Evaluate a spline through points by the compiled core, with derivatives in JAX.
 
     The result equals ``CubicSpline(t, points, space, ...)(x, nu)``. First derivatives with respect to x, t, points and
@@ -106,12 +115,12 @@ def curve(
 
 
 @partial(jax.custom_jvp, nondiff_argnums=(0, 1))
-def _curve(fixed: Fixed, nu: int, x: Array, t: Array, points: Array, *vectors: Array) -> Any:
+def _curve(fixed: Fixed, nu: int, x: Array, t: Array, points: Array, *vectors: Array) -> Tensor:
     return fit_p.bind(x, t, points, *vectors, fixed=fixed, lead=0, orders=(nu,))[0]
 
 
 @partial(_curve.defjvp, symbolic_zeros=True)
-def _curve_jvp(fixed: Fixed, nu: int, primals: Any, tangents: Any) -> Any:
+def _curve_jvp(fixed: Fixed, nu: int, primals: Tensor, tangents: Tensor) -> Tensor:
     x, *data = primals
     dx, *changes = tangents
     in_time = not isinstance(dx, SymbolicZero)

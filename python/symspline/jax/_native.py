@@ -7,17 +7,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial, wraps
-from typing import Any, ParamSpec, TypeVar, overload
+from typing import ParamSpec, TypeVar, overload
 
 import jax
 import jax.numpy as jnp
 from jax.scipy.linalg import expm, solve_triangular
+from numpy.typing import ArrayLike
 
 from .._autodiff import curves
 from .._autodiff.condition import Chain, PoseChain, PositiveChain, Problem, SphereChain, cyclic_reduction
 from .._autodiff.library import Library, Tensor, adjoint, divided_arc, divided_logarithm, hermitian, matrix_derivative
 from .._autodiff.models import turned
 from .._base.arrays import short_repr
+from .._base.typing import AnyFunction, CubicBCType, PointsLike
 from .._core import ValidationError
 from .._spaces import AnySpace, Product, Space
 
@@ -46,7 +48,7 @@ def promoted(space: Space, *arrays: Tensor) -> tuple[jax.Array, ...]:
     return tuple(array.astype(kind) for array in converted)
 
 
-def _constant(array: Tensor, like: Any) -> Tensor:
+def _constant(array: Tensor, like: Tensor) -> Tensor:
     return jnp.asarray(array, like.dtype)
 
 
@@ -83,7 +85,7 @@ def _next(function: Callable[..., Tensor], primals: Tensor, tangents: Tensor) ->
 # ---- the library ----
 
 
-def _fold(step: Any, start: Tensor, numbers: Tensor) -> Tensor:
+def _fold(step: AnyFunction, start: Tensor, numbers: Tensor) -> Tensor:
     # One compiled step, where a loop of Python would compile as many as there are numbers.
     return jax.lax.scan(
         lambda value, number: (step(value, number), None), start, jnp.asarray(numbers, start.real.dtype)
@@ -113,15 +115,19 @@ LIBRARY: Library = Library(
 
 
 @overload
-def evaluate(t: Any, points: Any, velocities: Any, space: Space | str, x: Any, *, nu: int = 0) -> jax.Array: ...
+def evaluate(
+    t: ArrayLike, points: PointsLike, velocities: PointsLike, space: Space | str, x: ArrayLike, *, nu: int = 0
+) -> jax.Array: ...
 
 
 @overload
-def evaluate(t: Any, points: Any, velocities: Any, space: Product, x: Any, *, nu: int = 0) -> tuple[jax.Array, ...]: ...
+def evaluate(
+    t: ArrayLike, points: PointsLike, velocities: PointsLike, space: Product, x: ArrayLike, *, nu: int = 0
+) -> tuple[jax.Array, ...]: ...
 
 
 @full_precision
-def evaluate(t: Any, points: Any, velocities: Any, space: AnySpace | str, x: Any, *, nu: int = 0) -> Tensor:
+def evaluate(t: Tensor, points: Tensor, velocities: Tensor, space: AnySpace | str, x: Tensor, *, nu: int = 0) -> Tensor:
     """Evaluate curves with given knots, points and velocities, in JAX alone.
 
     This is `symspline.evaluate` written in JAX. It runs on the device of JAX and has derivatives of any order, in
@@ -177,7 +183,7 @@ def evaluate(t: Any, points: Any, velocities: Any, space: AnySpace | str, x: Any
 
 @full_precision
 def fit(
-    t: Any, points: Any, space: Space | str, *, bc_type: Any = "natural", steps: int = 40
+    t: Tensor, points: Tensor, space: Space | str, *, bc_type: CubicBCType = "natural", steps: int = 40
 ) -> tuple[jax.Array, jax.Array]:
     """Compute the velocities of C² splines through points, in JAX alone.
 
@@ -242,7 +248,7 @@ def _velocities(chain: Chain, given: tuple[bool, bool], steps: int, data: Tensor
     problem = Problem(chain, given, *data)
     step = _step_of(problem)
 
-    def further(u: Tensor, _: Any) -> Tensor:
+    def further(u: Tensor, _: Tensor) -> Tensor:
         return u + step(problem.residual(u)), None
 
     start = jnp.zeros((len(problem.p), *problem.first.shape), problem.first.dtype)
@@ -262,7 +268,7 @@ def _velocities_jvp(chain: Chain, given: tuple[bool, bool], steps: int, primals:
     _, linear = jax.linearize(problem.residual, u)
     step = _step_of(problem)
 
-    def further(du: Tensor, _: Any) -> Tensor:
+    def further(du: Tensor, _: Tensor) -> Tensor:
         return du + step(linear(du) + ahead), None
 
     du = jax.lax.scan(further, jnp.zeros_like(u), None, length=steps)[0]

@@ -7,6 +7,7 @@ size one where it does not depend on them, so data shared by all curves are pass
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, NamedTuple
@@ -20,6 +21,7 @@ from jax.interpreters import ad, batching, mlir
 
 from .._autodiff.compiled import Kinds, fitted, joined
 from .._autodiff.library import Tensor
+from .._base.typing import AnyFunction
 from .._curves.curve import CurveArrays
 from .._curves.derivatives import sample_times
 from .._curves.fit import curve_of
@@ -76,7 +78,7 @@ class Layout(NamedTuple):
             return t.reshape(-1)
         return self.data(t, 1)
 
-    def sample_times(self, x: Tensor) -> tuple[Any, bool]:
+    def sample_times(self, x: Tensor) -> tuple[Tensor, bool]:
         """Times, and whether every curve has its own."""
         of_curves, shared, lead = self._own, self._shared, len(self.curves)
         x = np.transpose(x, (*of_curves, *shared, *range(lead, x.ndim)))
@@ -119,7 +121,7 @@ class Fixed:
 
     space: Space
     kinds: Kinds
-    options: tuple[tuple[str, Any], ...]
+    options: tuple[tuple[str, object], ...]
 
 
 # ---- the spline ----
@@ -157,7 +159,7 @@ def _values(fixed: Fixed, lead: int, layout: Layout, x: Tensor, points: Tensor) 
     return ShapedArray(shape, points.dtype)
 
 
-def _ends(kinds: Kinds, vectors: Tensor) -> tuple[Any, Any]:
+def _ends(kinds: Kinds, vectors: Tensor) -> tuple[Tensor, Tensor]:
     """Vectors for both ends, None where none is given."""
     left = iter(vectors)
     first, last = (
@@ -169,7 +171,7 @@ def _ends(kinds: Kinds, vectors: Tensor) -> tuple[Any, Any]:
 # ---- its sensitivity to its data ----
 
 
-def _jvp_shape(change: Tensor, x: Tensor, *data: Tensor, fixed: Fixed, lead: int, **_: Any) -> Tensor:
+def _jvp_shape(change: Tensor, x: Tensor, *data: Tensor, fixed: Fixed, lead: int, **_: object) -> Tensor:
     return _values(fixed, lead, _layout(fixed, lead, x, data, change.shape[:lead]), x, data[1])
 
 
@@ -194,13 +196,15 @@ def _jvp(
     return np.asarray(layout.outward(moved), data[1].dtype)
 
 
-def _vjp_shape(_: Any, x: Tensor, *data: Tensor, lead: int, moving: Any, kept: Shape, **__: Any) -> Tensor:
+def _vjp_shape(
+    _: object, x: Tensor, *data: Tensor, lead: int, moving: tuple[bool, ...], kept: Shape, **__: object
+) -> Tensor:
     sizes = (math.prod(a.shape[lead:]) for a, moves in zip(data, moving, strict=False) if moves)
     return ShapedArray((*kept, sum(sizes)), data[1].dtype)
 
 
 def _vjp(
-    cotangent: Tensor, x: Tensor, *data: Tensor, fixed: Fixed, lead: int, nu: int, moving: Any, kept: Shape
+    cotangent: Tensor, x: Tensor, *data: Tensor, fixed: Fixed, lead: int, nu: int, moving: tuple[bool, ...], kept: Shape
 ) -> Tensor:
     """The transpose. JAX pairs complex numbers without conjugation.
 
@@ -226,7 +230,7 @@ def _cores(fixed: Fixed, data: Tensor) -> list[int]:
     return [1, core + 1, *(core for _ in data[2:])]
 
 
-def _moved(fixed: Fixed, layout: Layout, nu: int, x: Tensor, data: Tensor) -> tuple[CurveArrays, Any, Any]:
+def _moved(fixed: Fixed, layout: Layout, nu: int, x: Tensor, data: Tensor) -> tuple[CurveArrays, Tensor, Tensor]:
     """Return curves with fitted velocities, sampling times, and their end conditions."""
     space, core = fixed.space, len(fixed.space.point_shape)
     t, points, *vectors, velocities = data
@@ -248,15 +252,15 @@ def _like(change: Tensor, array: Tensor) -> Tensor:
 # ---- rules of JAX for these primitives ----
 
 
-def _primitive(name: str, call: Any, shapes: Any, multiple: bool = False) -> Tensor:
+def _primitive(name: str, call: AnyFunction, shapes: AnyFunction, multiple: bool = False) -> Primitive:
     """A primitive that is one call of the core."""
     primitive = Primitive(name)
     primitive.multiple_results = multiple
 
-    def now(*arguments: Tensor, **fixed: Any) -> Tensor:
+    def now(*arguments: Tensor, **fixed: object) -> Tensor:
         return jax.tree.map(jnp.asarray, call(*map(np.asarray, arguments), **fixed))
 
-    def later(*arguments: Tensor, **fixed: Any) -> Tensor:
+    def later(*arguments: Tensor, **fixed: object) -> Tensor:
         def back(*arrays: Tensor) -> Tensor:
             return call(*map(np.asarray, arrays), **fixed)
 
@@ -274,7 +278,7 @@ jvp_p = _primitive("symspline_jvp", _jvp, _jvp_shape)
 vjp_p = _primitive("symspline_vjp", _vjp, _vjp_shape)
 
 
-def _mapped(primitive: Any, arguments: Tensor, axes: Any, *, lead: int, **fixed: Any) -> Tensor:
+def _mapped(primitive: Primitive, arguments: Tensor, axes: Sequence[int | None], *, lead: int, **fixed: Any) -> Tensor:
     """The rule of `jax.vmap`: one more axis in front of every argument, of size one where there is none."""
     pairs = list(zip(arguments, axes, strict=True))
     moved = [jnp.expand_dims(a, 0) if i is None else jnp.moveaxis(a, i, 0) for a, i in pairs]
@@ -290,7 +294,7 @@ def _mapped(primitive: Any, arguments: Tensor, axes: Any, *, lead: int, **fixed:
     return (*values, jnp.squeeze(velocities, 0)), (*(0 for _ in values), None)
 
 
-def _second(*_: Any, **__: Any) -> Tensor:
+def _second(*_: object, **__: object) -> Tensor:
     raise NotImplementedError(
         "symspline.jax.curve has derivatives of first order; symspline.jax.fit and symspline.jax.evaluate have those "
         "of any order"
@@ -302,7 +306,7 @@ for primitive in (fit_p, jvp_p, vjp_p):
     ad.primitive_jvps[primitive] = _second
 
 
-def _transpose(cotangent: Tensor, change: Tensor, *data: Tensor, lead: int, **fixed: Any) -> Tensor:
+def _transpose(cotangent: Tensor, change: Tensor, *data: Tensor, lead: int, **fixed: object) -> Tensor:
     kept = change.aval.shape[:lead]
     return [vjp_p.bind(cotangent, *data, lead=lead, kept=kept, **fixed), *(None for _ in data)]
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from .._base.typing import AnyFunction, Array
 from .._core import ValidationError
-from .._spaces import Array
 from ._manifold import Manifold
 
 
@@ -124,7 +123,7 @@ def _has(manifold: Any, name: str) -> bool:
 class _PointLast:
     """A function whose last argument is the point."""
 
-    function: Callable[..., Any]
+    function: AnyFunction
     real: bool = False
 
     def __call__(self, p: Array, *vectors: Array) -> Any:
@@ -136,7 +135,7 @@ class _PointLast:
 class _OneByOne:
     """A function of single points, called for every row."""
 
-    function: Callable[..., Any]
+    function: AnyFunction
     real: bool = False
 
     def __call__(self, *inputs: Array) -> Array:

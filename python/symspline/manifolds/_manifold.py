@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._base.arrays import checked_number, short_repr, whole_number
+from .._base.typing import AnyFunction, Array
 from .._core import ValidationError
-from .._spaces import AnySpace, Array, Space, factors_of
-from ._operations import Function, Functions, Operations, basis_at, described, dlog_by_differences
+from .._spaces import AnySpace, Space, factors_of
+from ._operations import Functions, Operations, basis_at, described, dlog_by_differences
 
 _NEEDED = ("exp", "log", "project_tangent", "inner")
 
@@ -109,15 +110,15 @@ class Manifold(Space):
     def __init__(
         self,
         *,
-        exp: Function,
-        log: Function,
-        project_tangent: Function,
-        inner: Function,
-        dlog: Function | None = None,
-        transport: Function | None = None,
+        exp: AnyFunction,
+        log: AnyFunction,
+        project_tangent: AnyFunction,
+        inner: AnyFunction,
+        dlog: AnyFunction | None = None,
+        transport: AnyFunction | None = None,
         injectivity_radius: float | None = None,
         point_shape: int | tuple[int, ...],
-        project: Function | None = None,
+        project: AnyFunction | None = None,
         dim: int | None = None,
         dtype: Any = np.float64,
     ) -> None:
@@ -291,7 +292,7 @@ class Manifold(Space):
         # `symspline.space` cannot read a name of functions.
         return repr(self)
 
-    def _key(self) -> tuple[Any, ...]:
+    def _key(self) -> tuple[object, ...]:
         return self.functions, self._radius, self._point_shape, self._dim, self._dtype
 
     def __eq__(self, other: object) -> bool:
@@ -301,7 +302,7 @@ class Manifold(Space):
     def __hash__(self) -> int:
         return hash(self._key())
 
-    def __reduce__(self) -> tuple[Any, ...]:
+    def __reduce__(self) -> tuple[object, ...]:
         radius = None if np.isinf(self._radius) else self._radius
         options = self.functions._asdict() | {"injectivity_radius": radius, "point_shape": self._point_shape}
         return partial(Manifold, **options, dim=self._dim, dtype=self._dtype), ()

@@ -11,22 +11,21 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .._base.arrays import short_repr
+from .._base.typing import AnyFunction, Array
 from .._core import CutLocusError, ValidationError
-from .._spaces import Array, Doubles
-
-Function = Callable[..., Any]
+from .._spaces import Doubles
 
 
 class Functions(NamedTuple):
     """The functions that a manifold is made of, see `symspline.Manifold`."""
 
-    exp: Function
-    log: Function
-    project_tangent: Function
-    inner: Function
-    dlog: Function | None = None
-    transport: Function | None = None
-    project: Function | None = None
+    exp: AnyFunction
+    log: AnyFunction
+    project_tangent: AnyFunction
+    inner: AnyFunction
+    dlog: AnyFunction | None = None
+    transport: AnyFunction | None = None
+    project: AnyFunction | None = None
 
 
 class Operations:
@@ -105,7 +104,7 @@ class Operations:
     def _call(self, name: str, *inputs: Array) -> Array:
         return self._applied(name, self._function(name), inputs)
 
-    def _applied(self, name: str, function: Callable[..., Any], inputs: tuple[Array, ...]) -> Array:
+    def _applied(self, name: str, function: AnyFunction, inputs: tuple[Array, ...]) -> Array:
         """What a function gives for rows of finite numbers, and NaN for others, which decompositions of matrices
         refuse."""
         space = self.space
@@ -123,7 +122,7 @@ class Operations:
         return result.reshape(lead + shape)
 
     def _of_rows(
-        self, name: str, function: Callable[..., Any], rows: list[Array], shape: tuple[int, ...], dtype: Any
+        self, name: str, function: AnyFunction, rows: list[Array], shape: tuple[int, ...], dtype: Any
     ) -> Array:
         """Call a function, and check the shape and the type of its result."""
         with np.errstate(all="ignore"):
@@ -140,8 +139,8 @@ class Operations:
             )
         return np.ascontiguousarray(values, dtype)
 
-    def _function(self, name: str) -> Callable[..., Any]:
-        function: Callable[..., Any] | None = getattr(self.space.functions, name)
+    def _function(self, name: str) -> AnyFunction:
+        function: AnyFunction | None = getattr(self.space.functions, name)
         if function is None:
             raise ValidationError(f"{self.space!r} was made without {name}=, which is needed here")
         return function
@@ -225,7 +224,7 @@ class Operations:
         return np.asarray(np.divide(off, size, out=np.where(np.isfinite(size), 0.0, np.nan), where=size > 0))
 
 
-def rows_or_nan(log: Function, p: Array, q: Array, errors: tuple[type[Exception], ...] = (CutLocusError,)) -> Array:
+def rows_or_nan(log: AnyFunction, p: Array, q: Array, errors: tuple[type[Exception], ...] = (CutLocusError,)) -> Array:
     """Logarithms of rows, NaN where there are none. Functions of this library raise for all rows then."""
     try:
         return np.asarray(log(p, q))

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
 
 from .._base.arrays import short_repr
+from .._base.typing import AnyFunction, Array
 from .._core import ValidationError, stiefel
-from .._spaces import Array, Doubles, Space
+from .._spaces import Doubles, Space
 from ._manifold import Manifold
 from ._operations import Operations
 
@@ -91,7 +89,7 @@ class Stiefel(Manifold):
         self.operations: _Compiled = _Compiled(self)
         self._handle = self.operations
 
-    def _key(self) -> tuple[Any, ...]:
+    def _key(self) -> tuple[object, ...]:
         return self._parameters
 
     # Unlike other manifolds, it has a name.
@@ -101,7 +99,7 @@ class Stiefel(Manifold):
     def __repr__(self) -> str:
         return Space.__repr__(self)
 
-    def __reduce__(self) -> tuple[Any, ...]:
+    def __reduce__(self) -> tuple[object, ...]:
         return Space.__reduce__(self)
 
     def _exp(self, p: Array, v: Array) -> Array:
@@ -130,7 +128,7 @@ class _Compiled(Operations):
         super().__init__(space)
         self.differentiates: bool = space._parameters == (2, 4)
 
-    def _applied(self, name: str, function: Callable[..., Any], inputs: tuple[Array, ...]) -> Array:
+    def _applied(self, name: str, function: AnyFunction, inputs: tuple[Array, ...]) -> Array:
         # Decompositions of NumPy refuse numbers that are not finite.
         return super()._applied(name, function, inputs) if name == "project" else np.asarray(function(*inputs))
 

@@ -2,27 +2,42 @@
 
 from __future__ import annotations
 
-from typing import Any, Unpack, overload
+from typing import Unpack, overload
 
 import numpy as np
 import torch
+from numpy.typing import ArrayLike
 
-from .._autodiff.compiled import fitted, movable, split
-from .._base.typing import CurveOptions
+from .._autodiff.compiled import Kinds, fitted, movable, split
+from .._autodiff.library import Tensor
+from .._base.typing import Array, CubicBCType, CurveOptions, Keywords, PointsLike, SolverOptions
 from .._curves.ends import ends_in_factors
 from .._spaces import AnySpace, Product, Space, parts_of, space_named
 from ..manifolds._manifold import refuse_functions
+from ._native import Context
 
 
 @overload
-def curve(x: Any, t: Any, points: Any, space: Space | str, **options: Unpack[CurveOptions]) -> torch.Tensor: ...
+def curve(
+    x: ArrayLike, t: ArrayLike, points: PointsLike, space: Space | str, **options: Unpack[CurveOptions]
+) -> torch.Tensor: ...
 
 
 @overload
-def curve(x: Any, t: Any, points: Any, space: Product, **options: Unpack[CurveOptions]) -> tuple[torch.Tensor, ...]: ...
+def curve(
+    x: ArrayLike, t: ArrayLike, points: PointsLike, space: Product, **options: Unpack[CurveOptions]
+) -> tuple[torch.Tensor, ...]: ...
 
 
-def curve(x: Any, t: Any, points: Any, space: AnySpace | str, *, bc_type: Any = "natural", **options: Any) -> Any:
+def curve(
+    x: Tensor,
+    t: Tensor,
+    points: Tensor,
+    space: AnySpace | str,
+    *,
+    bc_type: CubicBCType = "natural",
+    **options: Unpack[SolverOptions],
+) -> Tensor:
     """Evaluate a spline through points, with derivatives in PyTorch.
 
     The result equals ``CubicSpline(t, points, space, ...)(x)``. First derivatives with respect to x, t, points and the
@@ -72,37 +87,46 @@ def curve(x: Any, t: Any, points: Any, space: AnySpace | str, *, bc_type: Any = 
 
 class _Curve(torch.autograd.Function):
     @staticmethod
-    def forward(ctx: Any, x: Any, t: Any, points: Any, start: Any, end: Any, fixed: Any) -> Any:
+    def forward(
+        ctx: Context,
+        x: Tensor,
+        t: Tensor,
+        points: Tensor,
+        start: Tensor,
+        end: Tensor,
+        fixed: tuple[Space, Kinds, Keywords],
+    ) -> Tensor:
         space, kinds, options = fixed
-        arrays: list[Any] = [None if a is None else _numpy(a) for a in (t, points, start, end)]
+        ends = tuple(None if a is None else _numpy(a) for a in (start, end))
         # What is rounding beyond the last knot depends on the precision of the times.
         at = _numpy(x)
         ctx.x = at if at.dtype.kind == "f" else at.astype(float)
-        spline = fitted(arrays[0], arrays[1], (arrays[2], arrays[3]), space, kinds, options)
+        spline = fitted(_numpy(t), _numpy(points), (ends[0], ends[1]), space, kinds, options)
         ctx.movable = movable(spline)
         ctx.like = [None if a is None else (a.dtype, a.device, a.shape) for a in (x, t, points, start, end)]
         return torch.as_tensor(spline(ctx.x)).to(points)
 
     @staticmethod
-    def backward(ctx: Any, *cotangents: Any) -> Any:
+    def backward(ctx: Context, *cotangents: Tensor) -> tuple[Tensor, ...]:
         cotangent = _numpy(cotangents[0])
         along, t, points, ends = ctx.movable.vjp(ctx.x, cotangent)
         return *(_tensor(a, like) for a, like in zip((along, t, points, *ends), ctx.like, strict=True)), None
 
     @staticmethod
-    def jvp(ctx: Any, *changes: Any) -> Any:
+    def jvp(ctx: Context, *changes: Tensor) -> Tensor:
         dx, dt, points, *ends = (None if a is None else _numpy(a) for a in changes[:5])
         moved = ctx.movable.jvp(ctx.x, dx, points, dt, ends)
         dtype, device, _ = ctx.like[2]
         return torch.as_tensor(moved).to(device, dtype)
 
 
-def _numpy(value: Any) -> Any:
+def _numpy(value: Tensor) -> Array:
     """Return a tensor of any device as an array."""
-    return value.detach().resolve_conj().cpu().numpy()
+    array: Array = value.detach().resolve_conj().cpu().numpy()
+    return array
 
 
-def _tensor(array: Any, like: Any) -> Any:
+def _tensor(array: Array | None, like: Tensor) -> Tensor:
     """Return a gradient in the type and on the device of its input."""
     if array is None or like is None:
         return None

@@ -10,17 +10,22 @@ from typing import Any, overload
 
 import numpy as np
 import torch
+from numpy.typing import ArrayLike
 
 from .._autodiff import curves
 from .._autodiff.condition import Problem, cyclic_reduction
 from .._autodiff.library import Library, Tensor, divided_logarithm, hermitian, matrix_derivative
 from .._base.arrays import short_repr
+from .._base.typing import AnyFunction, CubicBCType, PointsLike
 from .._core import ConvergenceError, ValidationError
 from .._curves.ends import ends_in_factors
 from .._spaces import AnySpace, Product, Space, parts_of
 
+# What PyTorch passes to the methods of a function; attributes are added to it.
+Context = Any
 
-def tensor(value: Any, name: str, like: torch.Tensor | None = None) -> torch.Tensor:
+
+def tensor(value: Tensor, name: str, like: torch.Tensor | None = None) -> torch.Tensor:
     """Convert an argument to a tensor of real floating-point numbers.
 
     Parameters
@@ -54,7 +59,7 @@ def promoted(space: AnySpace, points: Tensor, *others: Tensor) -> tuple[torch.Te
     return first, *(tensor(other, "velocities", first) for other in others)
 
 
-def constant(array: Tensor, like: Any) -> Tensor:
+def constant(array: Tensor, like: Tensor) -> Tensor:
     """Return an array of NumPy as a tensor, in the precision and on the device of another one."""
     return torch.as_tensor(array, dtype=like.dtype, device=like.device)
 
@@ -77,22 +82,22 @@ class _Logarithm(torch.autograd.Function):
         return matrix_derivative(torch, _divided_logarithm, values, vectors, directions)
 
     @staticmethod
-    def setup_context(ctx: Any, inputs: Tensor, output: Tensor) -> None:
+    def setup_context(ctx: Context, inputs: Tensor, output: Tensor) -> None:
         ctx.save_for_backward(*inputs)
         ctx.save_for_forward(*inputs)
 
     @staticmethod
-    def backward(ctx: Any, *cotangents: Tensor) -> Tensor:
+    def backward(ctx: Context, *cotangents: Tensor) -> Tensor:
         a, *directions = ctx.saved_tensors
         along = hermitian(cotangents[0])
-        gradients: list[Any] = [_Logarithm.apply(a, *directions, along) if ctx.needs_input_grad[0] else None]
+        gradients: list[Tensor] = [_Logarithm.apply(a, *directions, along) if ctx.needs_input_grad[0] else None]
         for i in range(len(directions)):
             others = (*directions[:i], along, *directions[i + 1 :])
             gradients.append(_Logarithm.apply(a, *others) if ctx.needs_input_grad[i + 1] else None)
         return tuple(gradients)
 
     @staticmethod
-    def jvp(ctx: Any, *changes: Tensor) -> Tensor:
+    def jvp(ctx: Context, *changes: Tensor) -> Tensor:
         a, *directions = ctx.saved_tensors
         moved = None
         for i, change in enumerate(changes):
@@ -112,13 +117,13 @@ def _solve_lower(root: Tensor, x: Tensor) -> Tensor:
     return torch.linalg.solve_triangular(root, x, upper=False)
 
 
-def _fold(step: Any, value: Any, numbers: Tensor) -> Tensor:
+def _fold(step: AnyFunction, value: Tensor, numbers: Tensor) -> Tensor:
     for number in numbers:
         value = step(value, number)
     return value
 
 
-def along(function: Any, x: Tensor) -> tuple[Tensor, Tensor]:
+def along(function: AnyFunction, x: Tensor) -> tuple[Tensor, Tensor]:
     """Return values of a function of times, and their derivatives with respect to these.
 
     The derivative in forward mode is that of the derivative in reverse mode with respect to the cotangent, which
@@ -162,16 +167,18 @@ _STEPS_TO_DIFFERENTIATE = 2
 
 
 @overload
-def evaluate(t: Any, points: Any, velocities: Any, space: Space | str, x: Any, *, nu: int = 0) -> torch.Tensor: ...
+def evaluate(
+    t: ArrayLike, points: PointsLike, velocities: PointsLike, space: Space | str, x: ArrayLike, *, nu: int = 0
+) -> torch.Tensor: ...
 
 
 @overload
 def evaluate(
-    t: Any, points: Any, velocities: Any, space: Product, x: Any, *, nu: int = 0
+    t: ArrayLike, points: PointsLike, velocities: PointsLike, space: Product, x: ArrayLike, *, nu: int = 0
 ) -> tuple[torch.Tensor, ...]: ...
 
 
-def evaluate(t: Any, points: Any, velocities: Any, space: AnySpace | str, x: Any, *, nu: int = 0) -> Tensor:
+def evaluate(t: Tensor, points: Tensor, velocities: Tensor, space: AnySpace | str, x: Tensor, *, nu: int = 0) -> Tensor:
     """Evaluate curves with given knots, points and velocities, in PyTorch alone.
 
     This is `symspline.evaluate` written in PyTorch. It runs on the device and in the precision of the points, and is
@@ -231,14 +238,16 @@ def evaluate(t: Any, points: Any, velocities: Any, space: AnySpace | str, x: Any
 
 
 @overload
-def fit(t: Any, points: Any, space: Space | str, *, bc_type: Any = "natural") -> torch.Tensor: ...
+def fit(t: ArrayLike, points: PointsLike, space: Space | str, *, bc_type: CubicBCType = "natural") -> torch.Tensor: ...
 
 
 @overload
-def fit(t: Any, points: Any, space: Product, *, bc_type: Any = "natural") -> tuple[torch.Tensor, ...]: ...
+def fit(
+    t: ArrayLike, points: PointsLike, space: Product, *, bc_type: CubicBCType = "natural"
+) -> tuple[torch.Tensor, ...]: ...
 
 
-def fit(t: Any, points: Any, space: AnySpace | str, *, bc_type: Any = "natural") -> Tensor:
+def fit(t: Tensor, points: Tensor, space: AnySpace | str, *, bc_type: CubicBCType = "natural") -> Tensor:
     """Compute the velocities of C² splines through points, in PyTorch alone.
 
     This is `symspline.fit` written in PyTorch. It runs on the device and in the precision of the points. First and

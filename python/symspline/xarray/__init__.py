@@ -16,7 +16,7 @@ import xarray as xr
 
 from .._base import VERSION
 from .._base.arrays import checked_flag, short_repr
-from .._base.typing import BCType, Extrapolate, Method, OnFailure, SolverOptions
+from .._base.typing import BCType, Extrapolate, Keywords, Method, OnFailure, SolverOptions
 from .._core import ValidationError
 from .._curves.options import checked_extrapolate, extrapolation_mode, quantity_of
 from .._spaces import Space, space_named
@@ -130,7 +130,7 @@ def fit(
     array([[0.65 ,   nan],
            [  nan, 0.707]])
     """
-    options: dict[str, Any] = {"method": method, "tol": tol, "max_iter": max_iter, "extrapolate": extrapolate}
+    options: Keywords = {"method": method, "tol": tol, "max_iter": max_iter, "extrapolate": extrapolate}
     options |= {"atol": atol, "on_failure": on_failure, "time": time, "skipna": checked_flag(skipna, "skipna")}
     da = in_radians(da, space)
     inputs, spec, times = spec_of(da, space, dim, point_dims, where, bc_type, **options)
@@ -350,13 +350,13 @@ def resample(
                 "time and skipna are for curves along one dimension; a grid has the coordinates of its dimensions, and "
                 "skips missing points. Omit them."
             )
-        grid: dict[str, Any] = {"point_dims": point_dims, "where": where, "symmetric": symmetric, "options": options}
+        grid: Keywords = {"point_dims": point_dims, "where": where, "symmetric": symmetric, "options": options}
         return resample_grid(da, space, to, bc_type="not-a-knot" if bc_type is None else bc_type, **grid)
     if checked_flag(symmetric, "symmetric") or isinstance(bc_type, Mapping):
         name = "symmetric=True" if symmetric else "bc_type by dimension"
         raise ValidationError(f"{name} is for grids; pass to as a mapping of dimensions to positions")
     bc_type = "natural" if bc_type is None else bc_type
-    chosen: dict[str, Any] = {"time": time, "skipna": checked_flag(skipna, "skipna"), "on_failure": "ignore", **options}
+    chosen: Keywords = {"time": time, "skipna": checked_flag(skipna, "skipna"), "on_failure": "ignore", **options}
     given, da = da, in_radians(da, space)
     (_, *rest), spec, knots = spec_of(da, space, dim, point_dims, where, bc_type, **chosen)
     curves = [d for d in da.dims if d not in (dim, *point_dims)]
@@ -398,7 +398,7 @@ def _along(ds: xr.Dataset, x: Any, quantity: str, extrapolate: Any, lifted: bool
     core: list[Hashable] = [KNOTS, *point_dims]
     shape = [] if quantity == "speed" else point_dims
     inputs: Inputs = [(bare(points, dim), core), (bare(velocities, dim), core), (times, axes)]
-    fixed: dict[str, Any] = {"space": space, "t": None, "quantity": quantity, "policy": policy, "skipna": skipna}
+    fixed: Keywords = {"space": space, "t": None, "quantity": quantity, "policy": policy, "skipna": skipna}
     if knots is not None and knots.ndim > 1:
         inputs.append((bare(knots, dim), [KNOTS]))
     else:

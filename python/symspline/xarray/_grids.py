@@ -8,10 +8,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
+from .._base.typing import Array, Keywords
 from .._core import ValidationError
 from .._curves.options import checked_extrapolate, extrapolation_mode
 from .._grid import GridSpline
-from .._spaces import AnySpace, Array, space_named
+from .._spaces import AnySpace, space_named
 from ._spec import (
     KNOTS,
     LINE,
@@ -143,7 +144,7 @@ def _window(nodes: Array, x: Array) -> slice:
 
 
 def _joined(
-    da: xr.DataArray, axes: list[_Axis], chosen: list[tuple[slice, slice]], fixed: dict[str, Any], point_dims: list[str]
+    da: xr.DataArray, axes: list[_Axis], chosen: list[tuple[slice, slice]], fixed: Keywords, point_dims: list[str]
 ) -> xr.DataArray:
     """Return the values of all blocks, joined along the dimensions of the grid."""
     if len(chosen) < len(axes):
@@ -165,7 +166,7 @@ def _joined(
 
 
 def _gridded(
-    points: Array, *x: Array, space: AnySpace, how: dict[str, Any], nodes: list[Array | None], offsets: list[int]
+    points: Array, *x: Array, space: AnySpace, how: Keywords, nodes: list[Array | None], offsets: list[int]
 ) -> Array:
     """Values of the splines of a block, one per batch index."""
     first = points.ndim - len(space.point_shape) - len(nodes)

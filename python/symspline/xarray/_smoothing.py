@@ -14,12 +14,12 @@ import xarray as xr
 from .._base.arrays import checked_number
 from .._base.exceptions import SymsplineError
 from .._base.faults import silenced
-from .._base.typing import SmoothOptions
+from .._base.typing import Array, Keywords, SmoothOptions
 from .._curves.missing import missing_points, missing_times
 from .._curves.options import checked_extrapolate, extrapolation_mode
 from .._smoothing import SmoothingWarning, make_smoothing_spline
 from .._smoothing.noise import is_several
-from .._spaces import AnySpace, Array, SpecialOrthogonal, space_named
+from .._spaces import AnySpace, SpecialOrthogonal, space_named
 from ._spec import (
     KNOTS,
     LINE,
@@ -121,10 +121,10 @@ def smooth(
     """
     space = space_named(space)
     da = in_radians(da, space)
-    given: dict[str, Any] = {"on_failure": "ignore", **options}
+    given: Keywords = {"on_failure": "ignore", **options}
     if level is not None:
         level = checked_number(level, "level must lie between 0 and 1", lambda x: 0 < x < 1)
-    chosen: dict[str, Any] = {"time": time, "skipna": True, "on_failure": given["on_failure"]}
+    chosen: Keywords = {"time": time, "skipna": True, "on_failure": given["on_failure"]}
     (_, *rest), spec, knots = spec_of(da, space, dim, point_dims, where, "natural", **chosen)
     own_times, t, label = "t" in spec["names"], spec["t"], dim if knots is None else knots.name
     if knots is not None and t is not None and (gone := missing_times(t)).any():
@@ -156,7 +156,7 @@ def smooth(
     return timed
 
 
-def unit_of(space: AnySpace, da: xr.DataArray, name: str) -> dict[str, Any]:
+def unit_of(space: AnySpace, da: xr.DataArray, name: str) -> Keywords:
     """Return the attributes of a standard deviation or radius: its units, if they are known."""
     if (
         name.endswith("_rotation")
@@ -167,7 +167,7 @@ def unit_of(space: AnySpace, da: xr.DataArray, name: str) -> dict[str, Any]:
     return {"units": da.attrs["units"]} if space._name == "euclidean" and "units" in da.attrs else {}
 
 
-def _rehearse_options(t: Any, count: int, given: dict[str, Any]) -> None:
+def _rehearse_options(t: Any, count: int, given: Keywords) -> None:
     """Raise errors about the options now, before any block is computed."""
     # Tuples are for poses, and end conditions may have vectors of the space.
     shaped = [name for name in ("lam", "sigma", "bc_type") if np.ndim(given.get(name, 0)) != 0]
@@ -185,7 +185,7 @@ class _Wanted(NamedTuple):
     """What is fitted and evaluated in every block."""
 
     space: AnySpace
-    how: dict[str, Any]
+    how: Keywords
     spreads: list[tuple[str, tuple[float, ...]]]
     """Methods of the curve and their arguments."""
 
@@ -197,7 +197,7 @@ def _smoothed(
     space: AnySpace,
     t: Any,
     names: list[str],
-    how: dict[str, Any],
+    how: Keywords,
     x_axes: int,
     std: bool,
     level: float | None,

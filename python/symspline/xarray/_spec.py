@@ -15,10 +15,11 @@ from .._base.faults import warn
 from .._base.input import times_of
 from .._base.report import ConvergenceWarning, Report, columns_of
 from .._base.system import one_thread
+from .._base.typing import Array, Keywords
 from .._core import ConvergenceError, CutLocusError, ValidationError
 from .._curves.composed import call_at_times
 from .._curves.missing import Mask, missing_points, missing_times
-from .._spaces import AnySpace, Array, Euclidean, Product, Space, Torus, space_named
+from .._spaces import AnySpace, Euclidean, Product, Space, Torus, space_named
 from .._spaces.degrees import is_degrees, look_like_degrees
 from .._splines.cubic import CubicSpline
 from .._splines.functional import fit_many, given
@@ -159,7 +160,7 @@ def of_equal_length(
 
 
 def fit_valid(
-    points: Array, t: Array | None, named: dict[str, Array], space: AnySpace, kinds: Any, how: dict[str, Any]
+    points: Array, t: Array | None, named: dict[str, Array], space: AnySpace, kinds: Any, how: Keywords
 ) -> tuple[Array, Array, list[CubicSpline[Any]]]:
     """Fit each curve of a block to its valid samples.
 
@@ -245,7 +246,7 @@ def spec_of(
     time: str | None = None,
     skipna: bool = False,
     **options: Any,
-) -> tuple[Inputs, dict[str, Any], xr.DataArray | None]:
+) -> tuple[Inputs, Keywords, xr.DataArray | None]:
     """Check a fit as far as that is possible without its points.
 
     Returns
@@ -442,7 +443,7 @@ def _block(*arrays: Array, function: Any, alone: bool, **kwargs: Any) -> Any:
 
 
 def spline_of(
-    points: Array, rest: Sequence[Array], space: Space, t: Any, kinds: Any, names: list[str], how: dict[str, Any]
+    points: Array, rest: Sequence[Array], space: Space, t: Any, kinds: Any, names: list[str], how: Keywords
 ) -> CubicSpline:
     """The splines of a block."""
     named = dict(zip(names, rest, strict=True))
@@ -459,7 +460,7 @@ def knots_of_block(t: Array | None, named: dict[str, Array], batch: tuple[int, .
 
 
 def fitted(
-    points: Array, *rest: Array, space: Space, t: Any, kinds: Any, names: list[str], how: dict[str, Any], skipna: bool
+    points: Array, *rest: Array, space: Space, t: Any, kinds: Any, names: list[str], how: Keywords, skipna: bool
 ) -> tuple[Array, ...]:
     """Points, velocities and the columns of the report of a block."""
     if not skipna:
@@ -485,7 +486,7 @@ def resampled(points: Array, x: Array, *rest: Array, x_axes: int, skipna: bool, 
         nodes, velocities, *columns = fitted(points, *rest, skipna=True, **options)
         named = dict(zip(options["names"], rest, strict=True))
         t = knots_of_block(options["t"], named, points.shape[: points.ndim - 1 - len(options["space"].point_shape)])
-        fixed: dict[str, Any] = {"space": options["space"], "quantity": "point", "policy": policy}
+        fixed: Keywords = {"space": options["space"], "quantity": "point", "policy": policy}
         values = values_at(nodes, velocities, x, t=t, x_axes=x_axes, skipna=True, **fixed)
         values[~columns[list(COLUMNS).index("converged")]] = np.nan
         return values
@@ -518,7 +519,7 @@ def values_at(
     x, per_curve = per_curve_times(x, batch, x_axes)
     if knots:
         t = np.broadcast_to(knots[0], (*batch, points.shape[lead]))
-    options: dict[str, Any] = {"space": space, "quantity": quantity, "policy": policy, "lifted": lifted}
+    options: Keywords = {"space": space, "quantity": quantity, "policy": policy, "lifted": lifted}
     if skipna:
         return _values_of_valid(points, velocities, x, t, batch, per_curve, options)
     good = space._where_finite(velocities).all(axis=-1)
@@ -548,7 +549,7 @@ def _values_of_valid(
     t: Array | None,
     batch: tuple[int, ...],
     per_curve: bool,
-    options: dict[str, Any],
+    options: Keywords,
 ) -> Array:
     """A quantity of curves through their valid samples. Missing sampling times of a curve give NaN."""
     space = options["space"]
