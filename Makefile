@@ -8,7 +8,7 @@ INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no
 # Prints the libraries that symspline and some of its extras need.
 REQUIREMENTS = $(BIN)/python -c 'import sys, tomllib; \
 	project = tomllib.load(open("pyproject.toml", "rb"))["project"]; extras = project["optional-dependencies"]; \
-	print(*project["dependencies"], *(own for name in sys.argv[1:] for own in extras[name]), sep="\n")'
+	print(*project["dependencies"], *(requirement for name in sys.argv[1:] for requirement in extras[name]), sep="\n")'
 
 # Python keeps compiled modules, even where the environment forbids it. Otherwise every process compiles its imports anew,
 # which takes three times as long.

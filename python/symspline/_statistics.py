@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ._base.arrays import as_array, same_fields, whole_number
-from ._base.typing import Array, FloatArray, P
+from ._base.typing import Array, FloatArray, P, PointsLike
 from ._core import ValidationError
 from ._spaces import AnySpace, Product, Space, parts_of, require_metric, space_named
 
@@ -106,7 +106,7 @@ class TangentPCA(Generic[P]):
         return moved
 
 
-def tangent_pca(points: Any, space: Space[P] | str, *, n_components: int | None = None) -> TangentPCA[P]:
+def tangent_pca(points: PointsLike, space: Space[P] | str, *, n_components: int | None = None) -> TangentPCA[P]:
     r"""Compute principal components of points or curves in the tangent space at their mean.
 
     Parameters
@@ -176,7 +176,7 @@ def tangent_pca(points: Any, space: Space[P] | str, *, n_components: int | None 
         )
     count, axes = leads[0][0], leads[0][1:]
     wanted = None if n_components is None else whole_number(n_components, "n_components", 1)
-    mean: Any = space.mean(_joined([np.moveaxis(x, 0, len(axes)) for x in map(_as_given, given, arrays)]))
+    mean = space.mean(_joined([np.moveaxis(x, 0, len(axes)) for x in map(_as_given, given, arrays)]))
     at, flat, arrays, back = _well_conditioned(space, mean, arrays)
     vectors = list(parts_of(flat.log(at, _joined(arrays)), flat, "points"))
     gram = _gram(flat, at, vectors, vectors)
@@ -201,7 +201,7 @@ def tangent_pca(points: Any, space: Space[P] | str, *, n_components: int | None 
     return TangentPCA(space, mean, _joined(moved), variance, ratio, scores)
 
 
-def _well_conditioned(space: AnySpace, mean: Any, arrays: list[Any]) -> tuple[Any, AnySpace, list[Any], list[Any]]:
+def _well_conditioned(space: AnySpace, mean: object, arrays: list[Any]) -> tuple[Any, AnySpace, list[Any], list[Any]]:
     """Move points by isometries so that rounding errors do not depend on the units of positive definite matrices.
 
     Returns the moved mean, the space of the moved points, these points by factor, and the maps of tangent vectors back.
@@ -217,7 +217,7 @@ def _well_conditioned(space: AnySpace, mean: Any, arrays: list[Any]) -> tuple[An
     return _joined(means), whole, moved, back
 
 
-def _as_given(given: Any, array: Array) -> Array:
+def _as_given(given: object, array: Array) -> Array:
     """Return numbers of the precision in which they were given, on which the tolerance of points depends."""
     dtype = getattr(given, "dtype", None)
     return array.astype(dtype) if isinstance(dtype, np.dtype) and dtype.kind in "fc" else array

@@ -15,6 +15,7 @@ from __future__ import annotations
 import re
 import warnings
 from collections.abc import Callable, Mapping, Sequence
+from datetime import timedelta
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Unpack, cast, overload
 
@@ -268,13 +269,13 @@ def _courses(motions: list[Motion]) -> Jacobians:
 
 def resample(
     frame: pd.DataFrame,
-    every: Any = "1min",
+    every: str | timedelta | np.timedelta64 = "1min",
     *,
     by: str | Sequence[str] | None = None,
     time: str | None = None,
     columns: tuple[str, str] = ("lon", "lat"),
     interpolate: str | Sequence[str] = (),
-    max_gap: Any,
+    max_gap: float | str | timedelta | np.timedelta64,
     min_points: int = 2,
     duplicates: Duplicates = "raise",
     smooth: bool = False,
@@ -390,8 +391,8 @@ def resample(
                 f"resample does not support {option}, because they belong to rows; use symspline.fit_segments"
             )
     computed = ["sog", "cog", *(["position_std", "sog_std", "cog_std", "lam"] if smooth else []), "quality"]
-    own_names = [*table.keys, table.name, *table.columns]
-    if clash := [name for name in (*own_names, *more) if name in computed]:
+    table_names = [*table.keys, table.name, *table.columns]
+    if clash := [name for name in (*table_names, *more) if name in computed]:
         raise ValidationError(f"the column {clash[0]!r} has the name of a column of the result. Rename it.")
     max_gap = seconds_of(max_gap, "max_gap")
     step = _step(every)
@@ -418,7 +419,7 @@ def resample(
             "seconds; increase max_gap or decrease min_points"
         )
     if not curves:
-        return pd.DataFrame(columns=[*own_names, *computed, *more])
+        return pd.DataFrame(columns=[*table_names, *computed, *more])
     _warn_of_merged(table, by is not None or bool(table.keys))
     angles = [c for c in more if _are_angles(c, frame[c].to_numpy(np.float64, na_value=np.nan))]
     parts = []
@@ -434,10 +435,10 @@ def resample(
     _warn_of_missing(table, set(owners), set(tracks.tolist()), every, min_points)
     if table.zone is not None:
         result[table.name] = result[table.name].dt.tz_localize("UTC").dt.tz_convert(table.zone)
-    constant = table.constant([*own_names, *computed, *more])
+    constant = table.constant([*table_names, *computed, *more])
     for column in (*table.keys, *constant):
         result[column] = table.first_values(column, tracks)
-    return result[[*own_names, *computed, *constant, *more]]
+    return result[[*table_names, *computed, *constant, *more]]
 
 
 def _warn_of_merged(table: _Tracks, named: bool) -> None:
@@ -452,7 +453,7 @@ def _warn_of_merged(table: _Tracks, named: bool) -> None:
         )
 
 
-def _warn_of_missing(table: _Tracks, fitted: set[int], shown: set[int], every: Any, min_points: int) -> None:
+def _warn_of_missing(table: _Tracks, fitted: set[int], shown: set[int], every: object, min_points: int) -> None:
     """Warn about tracks that have no rows in the result."""
     gone = [track for track in range(len(table.rows)) if track not in shown]
     if not gone:
@@ -463,7 +464,7 @@ def _warn_of_missing(table: _Tracks, fitted: set[int], shown: set[int], every: A
     warn(f"{count} not in the result: {names}{more}", UserWarning)
 
 
-def _reason(table: _Tracks, track: int, fitted: bool, every: Any, min_points: int) -> str:
+def _reason(table: _Tracks, track: int, fitted: bool, every: object, min_points: int) -> str:
     rows, of = table.rows[track], table.called(track).rstrip(", ")
     if fitted:
         why = f"no multiple of every={short_repr(every)} lies between its first and last position"
@@ -474,7 +475,7 @@ def _reason(table: _Tracks, track: int, fitted: bool, every: Any, min_points: in
     return f"{of} ({why})" if of else why
 
 
-def _step(every: Any) -> Any:
+def _step(every: object) -> Any:
     """Return the step between the new times."""
     import pandas as pd
 
@@ -617,7 +618,7 @@ def _fitted(curves: list[tuple[Any, Any]], names: list[str], smooth: bool, optio
     if not curves:
         return []
 
-    def renamed(note: Any) -> str:
+    def renamed(note: object) -> str:
         curve = getattr(note, "curve", None)
         return str(note).replace(f"curve {curve[0]}", names[curve[0]]) if curve else str(note)
 
@@ -646,7 +647,7 @@ def _check_globe(spline: AnyCubicSpline | SegmentedCurve[Any, Any]) -> None:
 # ---- tables of tracks in pandas ----
 
 
-def _are_angles(name: Any, values: NDArray[np.float64]) -> bool:
+def _are_angles(name: object, values: NDArray[np.float64]) -> bool:
     """Whether the name and the range of a column suggest angles in degrees, such as headings."""
     text = re.sub(r"[_.-]", " ", str(name))
     inside = np.nanmin(values, initial=0.0) >= -180 and np.nanmax(values, initial=0.0) <= 360
@@ -701,7 +702,7 @@ class _Tracks(NamedTuple):
     columns: tuple[Any, Any]
     name: Any
     times: NDArray[np.datetime64]
-    zone: Any
+    zone: object
     rows: list[NDArray[np.intp]]
 
     def called(self, track: int) -> str:
@@ -723,7 +724,7 @@ class _Tracks(NamedTuple):
                 continue
         return names
 
-    def first_values(self, column: Any, tracks: NDArray[np.intp]) -> pd.Series:
+    def first_values(self, column: object, tracks: NDArray[np.intp]) -> pd.Series:
         """Return the first value of a column that is not missing, for each of these tracks."""
         values = self.frame[column].reset_index(drop=True)
         known = values.notna().to_numpy()
@@ -750,7 +751,7 @@ class _Tracks(NamedTuple):
                     return column
         return None
 
-    def angles(self, column: Any, track: int, x: NDArray[np.datetime64]) -> NDArray[np.float64]:
+    def angles(self, column: object, track: int, x: NDArray[np.datetime64]) -> NDArray[np.float64]:
         """Interpolate angles in degrees along the shorter arc, in [0, 360), or in (-180, 180] if one is negative."""
         rows = self.rows[track]
         values = self.frame[column].to_numpy(np.float64, na_value=np.nan)
@@ -759,7 +760,7 @@ class _Tracks(NamedTuple):
         degrees = self._interpolated(numbers, rows, x) % 360
         return np.where(degrees > 180, degrees - 360, degrees) if np.nanmin(values, initial=0.0) < 0 else degrees
 
-    def linear(self, column: Any, track: int, x: NDArray[np.datetime64]) -> NDArray[np.float64]:
+    def linear(self, column: object, track: int, x: NDArray[np.datetime64]) -> NDArray[np.float64]:
         """Interpolate a column linearly in time. Values at equal times are averaged, and missing ones are omitted."""
         rows = self.rows[track]
         return self._interpolated(self.frame[column].to_numpy(np.float64, na_value=np.nan)[rows], rows, x)
@@ -777,7 +778,7 @@ class _Tracks(NamedTuple):
 
 
 def _read_tracks(
-    frame: Any, by: Any, time: Any, columns: tuple[str, str], interpolate: str | Sequence[str]
+    frame: object, by: object, time: object, columns: tuple[str, str], interpolate: str | Sequence[str]
 ) -> tuple[_Tracks, list[Any]]:
     """Check a table, and return its tracks and the columns to interpolate."""
     import pandas as pd
@@ -829,12 +830,12 @@ def _read_tracks(
     return _Tracks(frame, keys, (lon, lat), name, times, zone, rows), more
 
 
-def _may_be_times(name: Any, values: pd.Series) -> bool:
+def _may_be_times(name: object, values: pd.Series) -> bool:
     """Whether a column seems to contain times: it contains dates, or has a name such as "time"."""
     return values.dtype.kind == "M" or str(name).lower() in _TIME_NAMES
 
 
-def _dates(stamps: pd.Series, name: Any) -> pd.Series:
+def _dates(stamps: pd.Series, name: object) -> pd.Series:
     """Return times as dates. Texts must be in ISO 8601, which has no ambiguous days and months."""
     import pandas as pd
 
@@ -854,7 +855,7 @@ def _dates(stamps: pd.Series, name: Any) -> pd.Series:
     return stamps
 
 
-def _refuse_missing(frame: pd.DataFrame, values: pd.Series, column: Any, keys: list[Any]) -> None:
+def _refuse_missing(frame: pd.DataFrame, values: pd.Series, column: object, keys: list[Any]) -> None:
     missing = np.flatnonzero(values.isna())
     if missing.size:
         of = _called(frame, keys, missing[0]).rstrip(", ")

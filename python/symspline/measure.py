@@ -183,9 +183,9 @@ class Points(Measurement):
 
     def _with_sigma(self, sigma: Numbers) -> Points:
         """Return the same points with other standard deviations."""
-        found = copy(self)
-        found.sigma = sigma
-        return found
+        weighted = copy(self)
+        weighted.sigma = sigma
+        return weighted
 
 
 class Velocities(Measurement):
@@ -461,7 +461,7 @@ class Function(Measurement):
         if not callable(residual):
             raise ValidationError(f"residual must be a function, not {short_repr(residual)}")
         given = {} if parameters is None else parameters
-        if not isinstance(given, Mapping) or not all(isinstance(own, Constant) for own in given.values()):
+        if not isinstance(given, Mapping) or not all(isinstance(constant, Constant) for constant in given.values()):
             raise ValidationError("parameters must be a mapping from names to symspline.measure.Constant")
         self.residual, self.nu, self.parameters = residual, order_of(nu), dict(given)
 
@@ -492,10 +492,10 @@ def measurement_without_missing(given: Measurement) -> Measurement:
     present = present_in(given)
     if present.all():
         return given
-    found = copy(given)
+    kept = copy(given)
     for name, value in {"t": filled(given.t), **_values(given)}.items():
-        setattr(found, name, _rows(value, present))
-    return found
+        setattr(kept, name, _rows(value, present))
+    return kept
 
 
 def _values(given: Measurement) -> Keywords:
@@ -519,7 +519,7 @@ def present_in(given: Measurement) -> Mask:
     return present
 
 
-def _present(value: Any, count: int) -> Mask:
+def _present(value: object, count: int) -> Mask:
     if isinstance(value, tuple):
         return np.asarray(np.all([_present(part, count) for part in map(filled, value)], axis=0))
     array = np.asarray(value)
@@ -528,7 +528,7 @@ def _present(value: Any, count: int) -> Mask:
     return np.asarray(~np.isnan(array).any(axis=tuple(range(1, array.ndim))))
 
 
-def _rows(value: Any, present: Mask) -> Any:
+def _rows(value: object, present: Mask) -> Any:
     return (
         tuple(_rows(filled(part), present) for part in value) if isinstance(value, tuple) else rows_of(value, present)
     )

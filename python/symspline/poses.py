@@ -481,10 +481,10 @@ def _cross(a: Array, b: Array) -> Array:
 class _Motion:
     """Motion of a body at times x, with vectors in a frame."""
 
-    def __init__(self, spline: Spline, x: TimesLike, frame: str, extrapolate: Any, per_curve: bool) -> None:
+    def __init__(self, spline: Spline, x: TimesLike, frame: str, extrapolate: Extrapolate, per_curve: bool) -> None:
         self._in_body = one_of(frame, "frame", "body", "world") == "body"
         self._attitude = attitude(spline)
-        parts: Any = spline._curve.parts
+        parts = spline._curve.parts
         moving = [part for part in parts if cover_of(part.space) in (_SE3, _R3)]
         if len(moving) != 1:
             raise ValidationError(

@@ -38,7 +38,7 @@ from ._base.arrays import (
 )
 from ._base.input import times_of
 from ._base.time import onto_ends
-from ._base.typing import Array, Extrapolate, Number, TimesLike
+from ._base.typing import Array, Extrapolate, Number, PointsLike, TimesLike
 from ._core import ValidationError
 from ._curves.curve import CurveArrays, in_span
 from ._curves.options import order_of
@@ -558,7 +558,7 @@ def berry_phase(spline: AnyCubicSpline) -> Number:
 # ---- states ----
 
 
-def from_kets(kets: Any) -> Array:
+def from_kets(kets: PointsLike) -> Array:
     """Convert kets to points of `ComplexProjective`.
 
     Parameters
@@ -594,7 +594,7 @@ def from_kets(kets: Any) -> Array:
     return unit_vectors(columns[..., 0].astype(complex), tol, "kets", "a state")
 
 
-def _full(kets: Any) -> Any:
+def _full(kets: PointsLike) -> Any:
     """Return the arrays of objects such as ``Qobj``, which are recognised by their method ``full``."""
     if hasattr(kets, "full"):
         return kets.full()

@@ -441,13 +441,13 @@ def _rotations_of(curve: Any) -> Any:
     return _ATTITUDES[curve]
 
 
-def _at(spline: Spline, x: TimesLike, quantity: str, extrapolate: Any, per_curve: bool) -> Array:
+def _at(spline: Spline, x: TimesLike, quantity: str, extrapolate: object, per_curve: bool) -> Array:
     curve, where = attitude(spline), spline._where(extrapolate)
     values: Array = evaluated(curve, spline._time_axis, x, quantity, where, per_curve)
     return values
 
 
-def _rate(spline: Spline, x: TimesLike, quantity: str, frame: str, extrapolate: Any, per_curve: bool) -> Array:
+def _rate(spline: Spline, x: TimesLike, quantity: str, frame: str, extrapolate: object, per_curve: bool) -> Array:
     """Return the angular velocity or acceleration in the given frame."""
     one_of(frame, "frame", "body", "world")
     body = _at(spline, x, f"body {quantity}", extrapolate, per_curve)
@@ -662,7 +662,9 @@ def integrate(
     return np.asarray(_swapped(_integral(times, -rates, interpolation)) @ first)
 
 
-def _integrated_present(t: Any, omega: Any, start: Any, frame: Frame, interpolation: RateInterpolation) -> Array:
+def _integrated_present(
+    t: ArrayLike, omega: Any, start: object, frame: Frame, interpolation: RateInterpolation
+) -> Array:
     """Integrate the samples that are present in each recording. The rotations of the others are NaN."""
     rates, _ = unchecked_numbers(omega, "omega", (None, 3))
     present = np.asarray(~np.isnan(rates).any(axis=-1))
@@ -1034,7 +1036,7 @@ def _hat(v: Array) -> Array:
     return hat
 
 
-def _given(rotations: Any) -> Array:
+def _given(rotations: object) -> Array:
     return _SO3._array(rotations, "rotations")
 
 

@@ -166,7 +166,7 @@ def align(bases: ArrayLike, reference: ArrayLike | None = None) -> Array:
 def reduced_operator(
     spline: AnyCubicSpline | GridSpline[Any],
     operator: Any | AnyFunction,
-    x: Any,
+    x: ArrayLike,
     start: ArrayLike | None = None,
 ) -> Array:
     """Compute the reduced operator X*AX in bases X that vary smoothly along a curve or over a grid.
@@ -366,7 +366,7 @@ def _subspaces_of(spline: AnyCubicSpline | GridSpline[Any]) -> tuple[int, ...]:
     return space.point_shape
 
 
-def _grid_bases(spline: GridSpline[Any], x: Any, start: ArrayLike | None) -> tuple[Array, list[Array]]:
+def _grid_bases(spline: GridSpline[Any], x: object, start: ArrayLike | None) -> tuple[Array, list[Array]]:
     """Return aligned bases at parameters, and the parameters of each axis for every basis."""
     axes, shape, outer = coordinates(spline._axes, x, False)
     parameters = np.meshgrid(*axes, indexing="ij") if outer else axes
@@ -458,7 +458,7 @@ def _are_positive(matrices: Array, tol: float) -> bool:
 # ---- rank and operators ----
 
 
-def _reduced(bases: Array, operator: Any) -> Array:
+def _reduced(bases: Array, operator: object) -> Array:
     """Return X*AX of one operator."""
     n, k = bases.shape[-2:]
     flat = bases.reshape(-1, n, k)
@@ -469,7 +469,7 @@ def _reduced(bases: Array, operator: Any) -> Array:
     return reduced.reshape(*bases.shape[:-2], k, k)
 
 
-def _rank(sizes: Array, energy: Any) -> int:
+def _rank(sizes: Array, energy: object) -> int:
     """Return the smallest rank with which every subspace contains the given fraction of the sum of squares."""
     energy = checked_number(energy, "energy must be a fraction above 0 and at most 1", lambda x: 0 < x <= 1)
     squares = (sizes / np.maximum(sizes[..., :1], np.finfo(float).tiny)) ** 2

@@ -21,8 +21,6 @@ In the gallery, "A DTI volume on finer voxels" reads a volume in a NIfTI file an
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -134,7 +132,7 @@ def to_vectors(matrices: ArrayLike, *, order: TensorOrder) -> Array:
     return array[..., rows, columns]
 
 
-def _pairs(order: Any) -> list[list[int]]:
+def _pairs(order: object) -> list[list[int]]:
     """Return the row and the column of each of the six numbers."""
     if isinstance(order, str) and order in _ORDERS:
         return [["xyz".index(axis) for axis in pair] for pair in _ORDERS[order].split()]

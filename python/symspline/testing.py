@@ -183,7 +183,7 @@ class _Sample:
         v = self.space.random_tangent(self.rng, p)
         return np.asarray(v / self.wide(self.space.norm(p, v)))
 
-    def wide(self, x: Any) -> Array:
+    def wide(self, x: ArrayLike) -> Array:
         """Reshape numbers so that they can be multiplied by points."""
         shape = *np.shape(x), *[1] * len(self.space.point_shape)
         return np.asarray(x).reshape(shape)

@@ -8,7 +8,7 @@ from contextlib import contextmanager, suppress
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from .._core import ValidationError
 from .input import refuse_objects, to_numpy
@@ -37,7 +37,7 @@ def as_array(value: ArrayLike, name: str) -> Array:
     return array
 
 
-def filled(value: Any) -> Any:
+def filled(value: object) -> Any:
     """Replace masked numbers by NaN and masked times by NaT, also within lists."""
     if isinstance(value, np.ma.MaskedArray):
         missing: Any = np.array("NaT", value.dtype)[()] if value.dtype.kind in "mM" else np.nan
@@ -48,7 +48,7 @@ def filled(value: Any) -> Any:
     return value
 
 
-def _first_masked(value: Any) -> tuple[int, ...] | None:
+def _first_masked(value: object) -> tuple[int, ...] | None:
     """The index of the first masked number of an array, or of a list of arrays."""
     if isinstance(value, np.ma.MaskedArray):
         masked = np.argwhere(np.ma.getmaskarray(value))
@@ -61,7 +61,7 @@ def _first_masked(value: Any) -> tuple[int, ...] | None:
     return None
 
 
-def short_repr(value: Any) -> str:
+def short_repr(value: object) -> str:
     """A value in a message: on one line, and not too long."""
     if isinstance(value, np.ndarray) and value.size > 1000:
         # With many short axes NumPy would write out all of it.
@@ -103,7 +103,7 @@ def read_only(array: Array) -> Array:
     return view
 
 
-def whole_number(value: Any, name: str, least: int) -> int:
+def whole_number(value: object, name: str, least: int) -> int:
     """A whole number that fits into a machine word."""
     if isinstance(value, (bool, np.timedelta64)) or not isinstance(value, (int, np.integer)):
         raise ValidationError(f"{name} must be a whole number, not {short_repr(value)}")
@@ -112,14 +112,14 @@ def whole_number(value: Any, name: str, least: int) -> int:
     return int(value)
 
 
-def checked_flag(value: Any, name: str) -> bool:
+def checked_flag(value: object, name: str) -> bool:
     """True or False; of an array neither would be meant."""
     if not isinstance(value, (bool, np.bool_)):
         raise ValidationError(f"{name} must be True or False, not {short_repr(value)}")
     return bool(value)
 
 
-def is_single(dtype: Any) -> bool:
+def is_single(dtype: DTypeLike) -> bool:
     """Whether a type of results is single precision; it may be double precision, too."""
     # NumPy parses texts as Python expressions, which may be invalid.
     with suppress(TypeError, ValueError, SyntaxError):
@@ -137,7 +137,7 @@ def in_single(values: Any) -> Any:
     return cast(values, np.complex64 if values.dtype.kind == "c" else np.float32)
 
 
-def checked_atol(atol: Any) -> float:
+def checked_atol(atol: object) -> float:
     """How far off a space points may be, if that is a number that makes sense."""
     return checked_number(atol, "atol must be a number from 0 to 1", lambda x: 0 <= x < 1)
 
@@ -166,7 +166,7 @@ def refuse(bad: NDArray[np.bool_] | np.bool_, name: str, say: Callable[[tuple[in
 # ---- equality of objects that contain arrays ----
 
 
-def same(first: Any, second: Any) -> bool:
+def same(first: object, second: object) -> bool:
     """Whether two values are equal. Arrays are compared as a whole, and missing numbers are equal.
 
     Examples
@@ -183,7 +183,7 @@ def same(first: Any, second: Any) -> bool:
     return bool(first == second)
 
 
-def same_fields(first: Any, second: Any) -> bool:
+def same_fields(first: object, second: object) -> bool:
     """Whether two objects of one class have equal attributes."""
     return same(tuple(vars(first).values()), tuple(vars(second).values()))
 
@@ -284,7 +284,7 @@ def unmoved_by_underflow() -> Iterator[None]:
         yield
 
 
-def one_of(value: Any, name: str, *choices: str) -> str:
+def one_of(value: object, name: str, *choices: str) -> str:
     """Return a word, or raise ValidationError if it is not one of the choices."""
     if not isinstance(value, str) or value not in choices:
         listed = ", ".join(map(repr, choices[:-1]))
@@ -388,7 +388,7 @@ def hermitian_part(x: Array) -> Array:
     return np.asarray((x + adjoint(x)) / 2)
 
 
-def check_symmetric(x: Array, allowed: Any, name: str, kind: str = "symmetric", advice: str = "") -> None:
+def check_symmetric(x: Array, allowed: object, name: str, kind: str = "symmetric", advice: str = "") -> None:
     """Raise ValidationError for matrices whose entries differ by more than is allowed from those across the diagonal.
 
     For the kind "Hermitian", the entries across the diagonal must be complex conjugates.

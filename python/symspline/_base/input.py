@@ -22,7 +22,7 @@ _ZEROS = str.maketrans("123456789", "0" * 9)
 UTC_ZONE, NO_ZONE = "UTC", "none"
 
 
-def to_numpy(value: Any, name: str) -> Any:
+def to_numpy(value: object, name: str) -> Any:
     """Convert tensors and quantum objects to arrays, also within lists. Other values do not change.
 
     Raises
@@ -62,7 +62,7 @@ def _tensor(value: Any, name: str) -> Any:
         raise ValidationError(f"{name} cannot be converted to an array: {error}; pass {name}.double()") from None
 
 
-def _quantum(value: Any, name: str) -> Any:
+def _quantum(value: Any, name: str) -> Array:
     """Convert a ket to a vector, and an operator to a matrix."""
     array = np.asarray(value.full())
     if value.isket:
@@ -72,7 +72,7 @@ def _quantum(value: Any, name: str) -> Any:
     return array
 
 
-def refuse_blocks(value: Any, name: str) -> None:
+def refuse_blocks(value: object, name: str) -> None:
     """Raise ValidationError for dask arrays that are not computed, which would be loaded as a whole."""
     if hasattr(value, "__dask_graph__") and value.__dask_graph__() is not None:
         raise ValidationError(
@@ -81,7 +81,7 @@ def refuse_blocks(value: Any, name: str) -> None:
         )
 
 
-def library_of(*values: Any) -> Any:
+def library_of(*values: object) -> Any:
     """Return the namespace (array API standard) of the first array that is not from NumPy, or None.
 
     Arrays may be entries of a tuple.
@@ -118,7 +118,7 @@ def refuse_objects(array: Array, name: str) -> None:
 # ---- times ----
 
 
-def times_of(value: Any, name: str) -> tuple[Any, str | None]:
+def times_of(value: object, name: str) -> tuple[Any, str | None]:
     """Convert times to a type of NumPy.
 
     Returns
@@ -230,13 +230,13 @@ def _column(codes: NDArray[np.uint32], span: tuple[int, int]) -> NDArray[np.str_
     return part.view(f"U{part.shape[1]}")[:, 0]
 
 
-def _short(cell: Any) -> str:
+def _short(cell: object) -> str:
     """Return the text of a value, shortened for messages."""
     text = repr(cell) if isinstance(cell, str) else str(cell)
     return text if len(text) <= 80 else f"{text[:80]}…"
 
 
-def _moment(cell: Any, name: str, i: int, array: Array) -> tuple[Any, bool]:
+def _moment(cell: object, name: str, i: int, array: Array) -> tuple[Any, bool]:
     if isinstance(cell, str):
         match = ISO_DATE.fullmatch(cell.strip())
         try:

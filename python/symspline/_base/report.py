@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from .typing import AnyFunction, Array, Keywords, Number
+from .typing import AnyFunction, Array, BatchIndex, Keywords, Number
 
 # A gap between points is long if it exceeds the median by this factor.
 _LONG = 10
@@ -269,7 +269,7 @@ class Columns(NamedTuple):
         is_integer = name in INTEGERS
         return np.asarray(self.integers[INTEGERS.index(name)] if is_integer else self.numbers[NUMBERS.index(name)])
 
-    def part(self, curves: Any) -> Columns:
+    def part(self, curves: BatchIndex) -> Columns:
         """Return the columns of some curves."""
         return Columns(self.integers[:, curves], self.numbers[:, curves])
 

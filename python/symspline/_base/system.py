@@ -16,7 +16,6 @@ import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -31,7 +30,7 @@ _TAIL = 32
 _OLD = 24 * 3600
 
 
-def path_of(file: Any, name: str = "file", *, method: str, text: bool = False) -> Path | None:
+def path_of(file: object, name: str = "file", *, method: str, text: bool = False) -> Path | None:
     """The path that an argument names, or None if it is an open file.
 
     Numbers are refused: Python opens 0, 1 and 2 as the standard streams.

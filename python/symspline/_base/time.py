@@ -329,13 +329,13 @@ def refuse_outside(
     refuse(wrong, name, say)
 
 
-def _difference(array: Array, origin: Any) -> NDArray[np.int64]:
+def _difference(array: Array, origin: object) -> NDArray[np.int64]:
     """Subtract integers modulo 2**64, which is exact for differences below 2**63 and all integer types."""
     modular = array.astype(np.uint64) - np.asarray(origin).astype(np.uint64)
     return modular.view(np.int64) if modular.ndim else modular.astype(np.int64)
 
 
-def _seconds(array: Array, origin: Any, name: str) -> Doubles:
+def _seconds(array: Array, origin: object, name: str) -> Doubles:
     _refuse_missing(array, name)
     origin = np.asarray(origin)
     fine = np.promote_types(array.dtype, origin.dtype)
@@ -408,7 +408,7 @@ def parts_of_duration(text: str) -> tuple[Decimal, str] | None:
     return (Decimal(match[1]), unit) if unit in ("", *NANOSECONDS) else None
 
 
-def seconds_of(value: Any, name: str, dates: bool = True) -> Any:
+def seconds_of(value: object, name: str, dates: bool = True) -> Any:
     """Convert a duration to seconds; numbers do not change.
 
     Parameters

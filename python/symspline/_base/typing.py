@@ -62,7 +62,7 @@ TimesLike = ArrayLike | date | timedelta | Sequence[date] | Sequence[timedelta]
 # Called with the finished and the total number of points.
 Progress = Callable[[int, int], object]
 File = str | PathLike[str] | IO[bytes]
-TextFile = File | IO[str]
+TextFile = str | PathLike[str] | IO[str]
 # A function of the user, or one whose arguments depend on the space.
 AnyFunction = Callable[..., Any]
 Color = str | tuple[float, ...]

@@ -368,7 +368,7 @@ def check_increasing(times: Doubles) -> None:
         raise ValidationError("knots coincide after rounding. Use a smaller dt, or dates.")
 
 
-def domain_of_law(law: Any, domain: Any) -> tuple[float, float]:
+def domain_of_law(law: object, domain: Any) -> tuple[float, float]:
     """Return the first and last time of a law, from the user or from the attributes that laws of SciPy have."""
     if not callable(law):
         raise ValidationError(f"law must be a function law(x, nu), not {short_repr(law)}")

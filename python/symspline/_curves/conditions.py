@@ -10,7 +10,7 @@ import numpy as np
 from .._base.arrays import short_repr
 from .._base.faults import INVALID, Fault
 from .._base.time import TimeAxis
-from .._base.typing import Array, Progress
+from .._base.typing import Array, PointsLike, Progress
 from .._core import ValidationError
 from .._spaces import POINT_TOL, AnySpace, Doubles, Product, Quotient, factors_of, parts_of
 from .ends import End, both
@@ -62,15 +62,15 @@ def fit_with_conditions(
     invalid: list[Fault] = []
     if inner:
         problem, invalid = _checked(problem, inner, shift)
-    found = fit(problem._replace(inner=inner), progress)
+    solution = fit(problem._replace(inner=inner), progress)
     if accelerations is not None:
         counted = "points are counted with the additional knots of bc_type"
-        for i, fault in enumerate(found.faults):
+        for i, fault in enumerate(solution.faults):
             if fault.kind != INVALID:
-                found.faults[i] = fault._replace(remedy="; ".join(filter(None, (fault.remedy, counted))))
+                solution.faults[i] = fault._replace(remedy="; ".join(filter(None, (fault.remedy, counted))))
     if invalid:
-        found = found._replace(faults=sorted([*found.faults, *invalid], key=lambda fault: fault.curve))
-    return found, shown, tuple(node + shift for node in inner)
+        solution = solution._replace(faults=sorted([*solution.faults, *invalid], key=lambda fault: fault.curve))
+    return solution, shown, tuple(node + shift for node in inner)
 
 
 def with_knots(time_axis: TimeAxis, shown: Array, times: Doubles, batch: tuple[int, ...], which: list[int]) -> Array:
@@ -106,7 +106,7 @@ def _check_additional(shown: Array, which: list[int]) -> None:
             )
 
 
-def read_inner(velocities: Any, space: AnySpace, data: list[Points]) -> InnerVelocities:
+def read_inner(velocities: PointsLike, space: AnySpace, data: list[Points]) -> InnerVelocities:
     """Read the velocities that are prescribed at inner nodes, and return them in the order of the nodes.
 
     Raises
@@ -130,7 +130,7 @@ def read_inner(velocities: Any, space: AnySpace, data: list[Points]) -> InnerVel
     return {int(node): _in_factors(int(node), velocities[node], space, data) for node in sorted(velocities)}
 
 
-def _in_factors(node: int, vector: Any, space: AnySpace, data: list[Points]) -> list[Doubles]:
+def _in_factors(node: int, vector: object, space: AnySpace, data: list[Points]) -> list[Doubles]:
     name, vectors = f"velocities[{node}]", []
     for factor, part, given in zip(factors_of(space), data, parts_of(vector, space, name), strict=True):
         doubles = factor._doubles(given, name)
@@ -173,14 +173,14 @@ def _checked(problem: FitProblem, inner: InnerVelocities, shift: int) -> tuple[F
 
 def _segment(tasks: list[Task], vectors: list[Doubles], first: int, given: tuple[int, int], shift: int) -> list[Task]:
     """Return the tasks of one segment with a velocity at one end."""
-    found = []
+    segment_tasks = []
     for task, vector in zip(tasks, vectors, strict=True):
         ends: list[End] = [("velocity", vector) if which else ("natural", None) for which in given]
         points = np.take(task.points, [first, first + 1], axis=len(task.batch))
         start = first + shift if first else 0
         knots = np.take(task.times, [start, first + 1 + shift], axis=-1)
-        found.append(task._replace(times=knots, points=points, ends=ends, tol=POINT_TOL, inner=None))
-    return found
+        segment_tasks.append(task._replace(times=knots, points=points, ends=ends, tol=POINT_TOL, inner=None))
+    return segment_tasks
 
 
 def _check_tangent(space: AnySpace, tasks: list[Task], inner: InnerVelocities) -> None:

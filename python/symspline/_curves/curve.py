@@ -10,12 +10,13 @@ from functools import cached_property, partial
 from typing import Any, ClassVar, NamedTuple, Never, Self
 
 import numpy as np
+from numpy.typing import ArrayLike, DTypeLike
 
 from .. import _core
 from .._base.arrays import refuse
 from .._base.faults import of_index
 from .._base.time import refuse_outside
-from .._base.typing import Array, Progress
+from .._base.typing import Array, CubicBCType, PointsLike, Progress
 from .._core import CutLocusError, ValidationError
 from .._spaces import (
     Affine,
@@ -57,7 +58,7 @@ def _all_nan(space: Space, values: Array) -> Array:
 # ---- results in existing arrays of the user, as for the argument ``out`` of NumPy ----
 
 
-def _check_out(out: Any, shape: tuple[int, ...], dtype: Any) -> None:
+def _check_out(out: Array | tuple[Array, ...] | None, shape: tuple[int, ...], dtype: DTypeLike) -> None:
     """Raise ValidationError if an array cannot hold a result of this shape and type."""
     if not isinstance(out, np.ndarray):
         raise ValidationError(f"out must be a NumPy array, not {type(out).__name__}")
@@ -69,13 +70,13 @@ def _check_out(out: Any, shape: tuple[int, ...], dtype: Any) -> None:
         raise ValidationError("out is read-only")
 
 
-def _can_write_into(out: Array, dtype: Any, read: Array) -> bool:
+def _can_write_into(out: Array, dtype: DTypeLike, read: Array) -> bool:
     """Whether the core can write directly into an array while it reads another one."""
     apart = not np.may_share_memory(out, read)
     return apart and out.dtype == dtype and out.flags.c_contiguous and out.flags.aligned
 
 
-def write_into(out: Any, values: Any, space: AnySpace) -> Any:
+def write_into(out: object, values: object, space: AnySpace) -> Any:
     """Write results in each factor into existing arrays, and return these."""
     for given, array in zip(parts_of(out, space, "out"), parts_of(values, space, "values"), strict=True):
         _check_out(given, array.shape, array.dtype)
@@ -207,7 +208,7 @@ class CurveArrays:
             for factor, span in zip(self.factors, self._spans, strict=True)
         )
 
-    def _finished(self, values: Any) -> Any:
+    def _finished(self, values: object) -> Any:
         """Return points or vectors from results of the core."""
         if not self._finishing:
             return values
@@ -217,7 +218,7 @@ class CurveArrays:
             results.append(numbers if span is None else span.embed_samples(numbers, self.batch))
         return self._joined(results)
 
-    def _by_factor(self, values: Any) -> Any:
+    def _by_factor(self, values: object) -> Any:
         return values if isinstance(self.space, Product) else (values,)
 
     def evaluate(
@@ -270,18 +271,18 @@ class CurveArrays:
         gaps = [~factor.space._where_finite(factor.velocities) for factor in self.factors]
         return gaps if any(missing.any() for missing in gaps) else []
 
-    def _write_nodes(self, values: Any, x: Doubles, per_curve: bool) -> None:
+    def _write_nodes(self, values: object, x: Doubles, per_curve: bool) -> None:
         """Write the points at which a segment that is NaN begins."""
         for factor, gaps, points in zip(self.factors, self._gaps, self._by_factor(values), strict=True):
             for curve in np.argwhere(gaps.any(axis=-1)):
                 index = tuple(curve)
-                t, own_times = self.times[index] if self.times.ndim > 1 else self.times, x[index] if per_curve else x
-                nodes = np.asarray(np.searchsorted(t[:-2], own_times))
-                at = (t[nodes] == own_times) & gaps[index][nodes]
+                t, curve_times = self.times[index] if self.times.ndim > 1 else self.times, x[index] if per_curve else x
+                nodes = np.asarray(np.searchsorted(t[:-2], curve_times))
+                at = (t[nodes] == curve_times) & gaps[index][nodes]
                 points[index][at] = factor.points[index][nodes[at]]
 
     def _evaluate_into(
-        self, out: Any, x: Doubles, quantity: str, outside: str, per_curve: bool, progress: Progress | None
+        self, out: object, x: Doubles, quantity: str, outside: str, per_curve: bool, progress: Progress | None
     ) -> Any:
         shape = x.shape if per_curve else self.batch + x.shape
         arrays = parts_of(out, self.space, "out")
@@ -308,7 +309,7 @@ class CurveArrays:
         quantity: str,
         outside: str,
         per_curve: bool,
-        start: Any = None,
+        start: object = None,
         progress: Progress | None = None,
     ) -> Any:
         """Evaluate the horizontal lift that starts at `start`; see `symspline.CubicSpline.lift`."""
@@ -327,7 +328,7 @@ class CurveArrays:
         # Unitary factors of the lift are the same in the span of the points.
         return self._finished(self.compiled.lift(x, quantity, outside, per_curve, fibers, progress))
 
-    def transport(self, times: tuple[float, float], outside: str, v: Any) -> Any:
+    def transport(self, times: tuple[float, float], outside: str, v: ArrayLike) -> Any:
         """Transport one tangent vector per curve in parallel from one time to another.
 
         See `symspline.CubicSpline.transport`.
@@ -348,7 +349,7 @@ class CurveArrays:
         moved = self.compiled.transport(times, outside, vectors)
         return self._joined([space._numbers(vector) for space, vector in zip(spaces, moved, strict=True)])
 
-    def _transport_in_span(self, times: tuple[float, float], outside: str, v: Any) -> Any:
+    def _transport_in_span(self, times: tuple[float, float], outside: str, v: ArrayLike) -> Any:
         if not self.space._is_large:
             return self.transport(times, outside, v)
         # The span includes the vector, whose component outside the span of the curve is transported, too.
@@ -375,7 +376,7 @@ class CurveArrays:
 
     # ---- derivatives with respect to the data ----
 
-    def jvp(self, at: SampleTimes, bc_type: Any, points: Any, t: Any, ends: Any) -> Any:
+    def jvp(self, at: SampleTimes, bc_type: Any, points: object, t: object, ends: object) -> Any:
         """Compute the change of the curve for a change of its data; see `symspline.CubicSpline.jvp`."""
         self._require_derivatives()
         count = len(self.factors)
@@ -387,7 +388,7 @@ class CurveArrays:
         factors = zip(self.parts, conditions, moved, zip(*vectors, strict=True), strict=True)
         return self._joined([derivatives.jvp(part, at, bc, p, t, pair) for part, bc, p, pair in factors])
 
-    def vjp(self, at: SampleTimes, bc_type: Any, cotangent: Any) -> Gradient[Any]:
+    def vjp(self, at: SampleTimes, bc_type: CubicBCType, cotangent: PointsLike) -> Gradient[Any]:
         """Compute the gradient with respect to the data; see `symspline.CubicSpline.vjp`."""
         self._require_derivatives()
         cotangents = parts_of(cotangent, self.space, "cotangent")
@@ -397,7 +398,7 @@ class CurveArrays:
             return gradients[0]
         first, last = (None if gradients[0].ends[e] is None else tuple(g.ends[e] for g in gradients) for e in (0, 1))
         t = np.sum([g.t for g in gradients], axis=0)
-        points: Any = tuple(g.points for g in gradients)
+        points = tuple(g.points for g in gradients)
         return Gradient(points, t, (first, last))
 
     def _require_derivatives(self) -> None:
@@ -545,7 +546,7 @@ def is_quotient(space: Space) -> bool:
     return space._handle.fibre() > 0
 
 
-def fiber_factors(space: Space, first: Array, start: Any) -> Doubles:
+def fiber_factors(space: Space, first: Array, start: ArrayLike | None) -> Doubles:
     """Return unitary k × k matrices that map first points to their representatives at the start of the lift.
 
     Parameters
@@ -573,12 +574,12 @@ def fiber_factors(space: Space, first: Array, start: Any) -> Doubles:
     return np.stack([g.real, g.imag], axis=-1)
 
 
-def check_start(space: Space, first: Array, start: Any) -> None:
+def check_start(space: Space, first: Array, start: ArrayLike | None) -> None:
     """Raise ValidationError unless a lift starts at the first points, in a space with unique representatives."""
     _check_near(space, first, _given(space, first, start))
 
 
-def _given(space: Space, first: Array, start: Any) -> Array:
+def _given(space: Space, first: Array, start: ArrayLike | None) -> Array:
     given = space._array(start, "start")
     # This raises if an entry is not a number, or if an imaginary part would be discarded.
     space._doubles(given, "start")
@@ -839,7 +840,7 @@ class ControlledCurve:
             return values
         return space._numbers(values) if span is None else span.embed_samples(space._numbers(values), self.batch)
 
-    def _motion(self, x: Doubles) -> Any:
+    def _motion(self, x: Doubles) -> Array:
         """Return the twist of a motion, its derivative and the pose, as `CurveArrays.evaluate` does."""
         g, velocity, acceleration = (self._at(x, name) for name in ("point", "velocity", "acceleration"))
         turned = np.swapaxes(g[..., :3, :3], -1, -2)

@@ -11,7 +11,7 @@ import numpy as np
 from .. import _core
 from .._base.arrays import as_array, cast, same_fields, short_repr
 from .._base.time import onto_ends, refuse_outside
-from .._base.typing import Array, FloatArray, P
+from .._base.typing import Array, CubicBCType, FloatArray, P
 from .._core import ValidationError
 from .._spaces import Doubles, Space
 from .ends import End, ends_of
@@ -135,7 +135,7 @@ def jvp(curve: SplineData, at: SampleTimes, bc_type: Any, points: Any, t: Any, e
     return np.asarray(space._numbers(moved.reshape(*at.shape, *space._doubles_shape)))
 
 
-def vjp(curve: SplineData, at: SampleTimes, bc_type: Any, cotangent: Any) -> Gradient:
+def vjp(curve: SplineData, at: SampleTimes, bc_type: CubicBCType, cotangent: Any) -> Gradient:
     """Compute the gradient with respect to the data; see `symspline.CubicSpline.vjp`."""
     space, batch, nodes = curve.space, curve.batch, curve.times.shape[-1]
     doubles = space._doubles(cotangent, "cotangent")
@@ -151,7 +151,7 @@ def vjp(curve: SplineData, at: SampleTimes, bc_type: Any, cotangent: Any) -> Gra
     )
 
 
-def pair_of(ends: Any) -> tuple[Any, Any]:
+def pair_of(ends: object) -> tuple[Any, Any]:
     """Split a pair of changes of the end vectors; None means no change."""
     if ends is None:
         return None, None
@@ -160,7 +160,7 @@ def pair_of(ends: Any) -> tuple[Any, Any]:
     return ends[0], ends[1]
 
 
-def _curves(curve: SplineData, at: SampleTimes, bc_type: Any) -> _Curves:
+def _curves(curve: SplineData, at: SampleTimes, bc_type: object) -> _Curves:
     space, batch = curve.space, curve.batch
     points, velocities = (space._as_doubles(np.ascontiguousarray(a)) for a in (curve.points, curve.velocities))
     knots, ends = _per_curve(curve.times, batch), ends_of(bc_type, space, batch)
@@ -184,7 +184,7 @@ def _given(bc_type: Any, which: int) -> Array | None:
     return None if isinstance(bc_type, str) or isinstance(bc_type[which], str) else bc_type[which][1]
 
 
-def _end_motion(curve: SplineData, bc_type: Any, value: Any, name: str, which: int) -> Doubles:
+def _end_motion(curve: SplineData, bc_type: object, value: Any, name: str, which: int) -> Doubles:
     space, batch = curve.space, curve.batch
     shape = batch + space._doubles_shape
     if value is None:
@@ -197,7 +197,7 @@ def _end_motion(curve: SplineData, bc_type: Any, value: Any, name: str, which: i
     return space._as_doubles(np.ascontiguousarray(space.project_tangent(at, vectors))).reshape(shape)
 
 
-def _end_gradient(curve: SplineData, bc_type: Any, gradient: Doubles, which: int) -> Any:
+def _end_gradient(curve: SplineData, bc_type: CubicBCType, gradient: Doubles, which: int) -> Any:
     given = _given(bc_type, which)
     if given is None:
         return None

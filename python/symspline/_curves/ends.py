@@ -90,10 +90,10 @@ def split_accelerations(bc_type: Any) -> tuple[Any, Any]:
 def both(first: list[End] | None, second: list[End] | None, batch: tuple[int, ...]) -> list[End]:
     """Combine the velocities at ends with the accelerations there, of which other ends have none."""
     ends: list[End] = []
-    for own, (_, acceleration) in zip(first or [], second or [], strict=True):
-        if acceleration is not None and own[1] is not None:
-            own = ("both", np.stack([own[1], acceleration], axis=len(batch)))
-        ends.append(own)
+    for end, (_, acceleration) in zip(first or [], second or [], strict=True):
+        if acceleration is not None and end[1] is not None:
+            end = ("both", np.stack([end[1], acceleration], axis=len(batch)))
+        ends.append(end)
     return ends
 
 
@@ -104,12 +104,12 @@ def original_nodes(ends: list[End] | None, nodes: int) -> Index:
     return np.delete(np.arange(nodes), added)
 
 
-def _check_pair(bc_type: Any) -> None:
+def _check_pair(bc_type: object) -> None:
     if not isinstance(bc_type, (tuple, list)) or len(bc_type) != 2:
         raise ValidationError(f"{_HELP}; got {short_repr(bc_type)}")
 
 
-def _is_double(end: Any) -> bool:
+def _is_double(end: object) -> bool:
     """Whether an end has the form [(1, velocity), (2, acceleration)], in any order."""
     if not isinstance(end, (tuple, list)) or len(end) != 2:
         return False
@@ -145,7 +145,7 @@ def freeze_bc_type(bc_type: Any) -> Any:
     return tuple(end if isinstance(end, str) else (int(end[0]), _copy(end[1])) for end in bc_type)
 
 
-def _copy(vector: Any) -> Any:
+def _copy(vector: object) -> Any:
     """Return a read-only copy of a vector; for a product, a tuple of copies."""
     if isinstance(vector, tuple):
         return tuple(_copy(part) for part in vector)
@@ -155,7 +155,7 @@ def _copy(vector: Any) -> Any:
     return array
 
 
-def is_closed(bc_type: Any) -> bool:
+def is_closed(bc_type: object) -> bool:
     """Whether the curve is periodic."""
     return isinstance(bc_type, str) and bc_type == "periodic"
 
@@ -168,7 +168,7 @@ def end_kinds(bc_type: Any) -> list[str] | None:
     return ["velocity" if end == "clamped" else end if isinstance(end, str) else _ORDERS[end[0]] for end in ends]
 
 
-def take_batch(bc_type: Any, index: Any, batch_axes: int, space: AnySpace) -> Any:
+def take_batch(bc_type: Any, index: object, batch_axes: int, space: AnySpace) -> Any:
     """Return the end conditions of one curve or a slice of curves along the first batch axis."""
     if isinstance(bc_type, str):
         return bc_type

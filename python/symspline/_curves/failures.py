@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from .._base.faults import CUT_LOCUS, Fault, of_index, warn
 from .._base.report import MAX_STEP, Columns, ConvergenceWarning, FarPointsWarning, long_gaps
-from .._base.typing import Array
+from .._base.typing import Array, BatchIndex
 from .._core import ConvergenceError, CutLocusError, ValidationError
 from .._spaces import (
     AnySpace,
@@ -114,7 +114,7 @@ def _explained_by_times(fault: Fault, batch: tuple[int, ...], spline: Any) -> Fa
     return fault._replace(remedy=remedy, node=i if fault.node is None else fault.node)
 
 
-def _steps(parts: Any, index: Any) -> tuple[Array, Array] | None:
+def _steps(parts: Any, index: BatchIndex) -> tuple[Array, Array] | None:
     """Return the distances between neighbouring points of a curve, and the largest of them in injectivity radii.
 
     The result is None if neighbours are close to a cut locus, which is then the reason of the fault.
@@ -427,7 +427,7 @@ def warn_of_held_points(
 def _are_held(equal: NDArray[np.bool_], points: list[Array]) -> bool:
     """Whether the runs of equal points are like those of a log that is faster than its sensor."""
     starts = np.append(0, np.flatnonzero(~equal) + 1)
-    runs: Any = np.diff(np.append(starts, len(equal) + 1))[1:-1]
+    runs = np.diff(np.append(starts, len(equal) + 1))[1:-1]
     if len(runs) < _RUNS or np.mean(runs > 1) < _REPEATED:
         return False
     regular = np.mean(runs <= 2 * np.median(runs) + 1) >= _REGULAR

@@ -9,13 +9,13 @@ from types import MappingProxyType
 from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from .. import _core
 from .._base.arrays import as_array, refuse
 from .._base.faults import INVALID, Fault, of_index
 from .._base.report import Columns, Report, shaped
-from .._base.typing import Array, Progress
+from .._base.typing import Array, CubicBCType, PointsLike, Progress
 from .._core import ValidationError
 from .._spaces import AnySpace, Doubles, Product, Quotient, Space, Torus, cover_of, factors_of, parts_of
 from ..manifolds import Manifold
@@ -144,7 +144,7 @@ def unwrapped(space: AnySpace, part: Points) -> Points:
     return part._replace(numbers=space._as_doubles(moved), moves=moves)
 
 
-def read_given(points: Any, space: AnySpace) -> list[Points]:
+def read_given(points: object, space: AnySpace) -> list[Points]:
     """Read points from the user in each factor, as they are."""
     if not isinstance(space, Product):
         return [_read(space, points)]
@@ -182,7 +182,7 @@ def _read(space: Space, points: Any) -> Points:
     return Points(doubles, space._tol(array), lead[:-1], lead[-1])
 
 
-def read_velocities(velocities: Any, space: AnySpace, data: list[Points]) -> list[tuple[Array, float]]:
+def read_velocities(velocities: PointsLike | None, space: AnySpace, data: list[Points]) -> list[tuple[Array, float]]:
     """Return velocities in each factor, and how far they may be from tangent, after checks of shape and numbers."""
     results = []
     for factor, part, value in zip(factors_of(space), data, parts_of(velocities, space, "velocities"), strict=True):
@@ -226,7 +226,7 @@ def moved_ends(bc_type: Any, space: AnySpace, data: list[Points]) -> Any:
     return _moved_ends(bc_type, space, [part.moves if part.moves is None else part.moves[..., -1] for part in data])
 
 
-def moved_ends_of_many(bc_type: Any, space: AnySpace, points: list[list[Points]]) -> Any:
+def moved_ends_of_many(bc_type: CubicBCType, space: AnySpace, points: list[list[Points]]) -> Any:
     """Return end conditions for the chosen representatives of single curves of different lengths."""
     for number, parts in enumerate(points):
         try:
@@ -301,7 +301,7 @@ def curve_of_factors(
     return kind(space, times, factors, fitted)
 
 
-def mask_of(where: Any, batch: tuple[int, ...]) -> Mask | None:
+def mask_of(where: ArrayLike | None, batch: tuple[int, ...]) -> Mask | None:
     """Read the argument `where`; None means all curves."""
     if where is None:
         return None

@@ -30,7 +30,7 @@ def missing_times(times: Array) -> Mask:
     return np.isnan(times) if times.dtype.kind in "fmM" else np.zeros(times.shape, bool)
 
 
-def without_missing(t: Any, points: Any, space: AnySpace) -> tuple[Any, Any, Mask]:
+def without_missing(t: object, points: Any, space: AnySpace) -> tuple[Any, Any, Mask]:
     """Return times and points without missing samples, and a mask of the samples that are present in each curve.
 
     A sample is missing if its time, or a number of its point in any factor, is NaN, NaT or masked. Samples that are
@@ -45,7 +45,7 @@ def without_missing(t: Any, points: Any, space: AnySpace) -> tuple[Any, Any, Mas
     present : ndarray of bool, shape (..., n)
         Whether each of the given samples is present.
     """
-    parts = [factor._array(filled(p), "points") for factor, p in zip(*_each(points, space), strict=True)]
+    parts = [factor._array(filled(p), "points") for factor, p in zip(*_factors_and_parts(points, space), strict=True)]
     masks = [missing_points(factor, part) for factor, part in zip(factors_of(space), parts, strict=True)]
     moments = None if t is None else as_array(times_of(filled(t), "t")[0], "t")
     if moments is not None:
@@ -62,7 +62,7 @@ def without_missing(t: Any, points: Any, space: AnySpace) -> tuple[Any, Any, Mas
     return times, _rows_of_points(points, kept, space), ~missing
 
 
-def curves_without_missing(t: Any, points: Any, space: AnySpace) -> tuple[Any, Any]:
+def curves_without_missing(t: object, points: object, space: AnySpace) -> tuple[Any, Any]:
     """Return times and points of interpolating curves without missing samples.
 
     Raises
@@ -75,7 +75,7 @@ def curves_without_missing(t: Any, points: Any, space: AnySpace) -> tuple[Any, A
     return times, present_points
 
 
-def inner_velocities_of_present(t: Any, points: Any, space: AnySpace, velocities: Any) -> Any:
+def inner_velocities_of_present(t: object, points: object, space: AnySpace, velocities: object) -> Any:
     """Return velocities at some samples, by their indices among the samples that are present."""
     _, _, present = without_missing(t, points, space)
     kept = np.asarray(present.any(axis=tuple(range(present.ndim - 1))))
@@ -91,7 +91,7 @@ def inner_velocities_of_present(t: Any, points: Any, space: AnySpace, velocities
     return present_velocities
 
 
-def nodes_without_missing(t: Any, points: Any, velocities: Any, space: AnySpace) -> tuple[Any, Any, Any]:
+def nodes_without_missing(t: object, points: Any, velocities: Any, space: AnySpace) -> tuple[Any, Any, Any]:
     """Return times, points and velocities without samples in which any of these is missing."""
     _, vectors, moving = without_missing(None, velocities, space)
     _, places, present = without_missing(t, points, space)
@@ -107,7 +107,9 @@ def nodes_without_missing(t: Any, points: Any, velocities: Any, space: AnySpace)
     return times, places, vectors
 
 
-def data_without_missing(t: Any, points: Any, weights: Any, frames: Any, space: AnySpace) -> tuple[Any, Any, Any, Any]:
+def data_without_missing(
+    t: object, points: object, weights: Any, frames: Any, space: AnySpace
+) -> tuple[Any, Any, Any, Any]:
     """Return noisy data without missing samples; samples missing only in some curves get the weight zero."""
     times, present_points, present = without_missing(t, points, space)
     kept = np.asarray(present.any(axis=tuple(range(present.ndim - 1))))
@@ -144,7 +146,7 @@ def _rows_of_points(points: Any, kept: Mask, space: AnySpace) -> Any:
         index: Any = (..., kept, *[slice(None)] * len(factor.point_shape))
         return factor._array(filled(part), "points")[index]
 
-    present_parts = tuple(map(rows, *_each(points, space)))
+    present_parts = tuple(map(rows, *_factors_and_parts(points, space)))
     return present_parts if isinstance(space, Product) else present_parts[0]
 
 
@@ -197,7 +199,7 @@ def _rows_of_recordings(given: Keywords) -> list[NDArray[np.intp]]:
     return [_rows_present([curve, *extra], given["space"]) for curve in curves]
 
 
-def _rows_present(data: Iterable[tuple[Any, Any]], space: Any) -> NDArray[np.intp]:
+def _rows_present(data: Iterable[tuple[Any, Any]], space: AnySpace) -> NDArray[np.intp]:
     """Return the indices of the samples that are present in all of several recordings with the same times."""
     masks = [without_missing(t, points, space_named(space))[2] for t, points in data]
     return np.flatnonzero(np.all([mask.any(axis=tuple(range(mask.ndim - 1))) for mask in masks], axis=0))
@@ -262,7 +264,7 @@ def refuse_nan_times(times: NDArray[np.float64]) -> None:
     refuse(~np.isfinite(times), "t", described)
 
 
-def _each(points: Any, space: AnySpace) -> tuple[tuple[AnySpace, ...], tuple[Any, ...]]:
+def _factors_and_parts(points: Any, space: AnySpace) -> tuple[tuple[AnySpace, ...], tuple[Any, ...]]:
     return factors_of(space), parts_of(points, space, "points")
 
 

@@ -9,7 +9,7 @@ from typing import Any, Literal, NamedTuple, Never, Self
 
 import numpy as np
 from numpy.polynomial import chebyshev
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from .. import _core
 from .._base.typing import Array, Progress
@@ -50,8 +50,8 @@ class OnManifold(CurveArrays):
         shape = x.shape if per_curve else batch + x.shape
         samples = math.prod(shape[len(batch) :])
         times_of_curves = np.broadcast_to(x, shape).reshape(count, samples)
-        of_each, dtype = ((), float) if quantity in NORMS else (space.point_shape, space.dtype)
-        values = np.empty((count * samples, *of_each), dtype)
+        value_shape, dtype = ((), float) if quantity in NORMS else (space.point_shape, space.dtype)
+        values = np.empty((count * samples, *value_shape), dtype)
         for start in range(0, len(values), _AT_ONCE):
             number = np.arange(start, min(start + _AT_ONCE, len(values)))
             values[number] = self._at(number // max(samples, 1), times_of_curves.ravel()[number], quantity, outside)
@@ -105,13 +105,13 @@ class OnManifold(CurveArrays):
         flat = np.zeros((*self.batch, self.times.shape[-1], 1))
         _core.Curve([(Euclidean(1)._handle, self.times, flat, flat, None)]).evaluate(x, "point", outside, per_curve)
 
-    def lift(self, *_: Any, **__: Any) -> Never:
+    def lift(self, *_: object, **__: Any) -> Never:
         self._refuse("no horizontal lift is known")
 
-    def transport(self, *_: Any, **__: Any) -> Never:
+    def transport(self, *_: object, **__: Any) -> Never:
         self._refuse("parallel transport along curves is not made")
 
-    def jvp(self, *_: Any, **__: Any) -> Never:
+    def jvp(self, *_: object, **__: Any) -> Never:
         self._refuse("derivatives with respect to the data are not made")
 
     vjp = jvp
@@ -144,14 +144,14 @@ class Mixed(CurveArrays):
         quantity: str,
         outside: str,
         per_curve: bool,
-        start: Any = None,
+        start: object = None,
         progress: Progress | None = None,
     ) -> Any:
         starts = [None] * len(self.parts) if start is None else parts_of(start, self.space, "start")
         pairs = zip(self.parts, starts, strict=True)
         return tuple(part.lift(x, quantity, outside, per_curve, begin, progress) for part, begin in pairs)
 
-    def transport(self, times: tuple[float, float], outside: str, v: Any) -> Any:
+    def transport(self, times: tuple[float, float], outside: str, v: ArrayLike) -> Any:
         pairs = zip(self.parts, parts_of(v, self.space, "v"), strict=True)
         return tuple(part.transport(times, outside, vectors) for part, vectors in pairs)
 

@@ -33,14 +33,14 @@ class EvaluationOptions(TypedDict, total=False):
     progress: Progress | None
 
 
-def quantity_of(nu: Any, most: int = 2) -> str:
+def quantity_of(nu: object, most: int = 2) -> str:
     """The name of the derivative of order `nu`. Those up to the second order are known to the core."""
     if type(nu) is int and 0 <= nu <= most:
         return _QUANTITIES[nu]
     return _QUANTITIES[order_of(nu, most)]
 
 
-def order_of(nu: Any, most: int = 2) -> int:
+def order_of(nu: object, most: int = 2) -> int:
     """Validate the order of a derivative, an integer from 0 to `most`.
 
     Raises
@@ -62,7 +62,7 @@ def with_atol(data: list[Points], atol: float | None) -> list[Points]:
     return [part._replace(tol=tol) for part in data]
 
 
-def checked_extrapolate(extrapolate: Any) -> Any:
+def checked_extrapolate(extrapolate: object) -> Any:
     """Return the extrapolation policy, or raise ValidationError if it is invalid."""
     known = isinstance(extrapolate, str) and extrapolate in _EXTRAPOLATION_MODES
     if extrapolate is not None and not isinstance(extrapolate, bool) and not known:
@@ -72,20 +72,26 @@ def checked_extrapolate(extrapolate: Any) -> Any:
     return extrapolate
 
 
-def extrapolation_mode(policy: Any, bc_type: Any) -> str:
+def extrapolation_mode(policy: Any, bc_type: object) -> str:
     """Return the core's name of an extrapolation policy. Closed curves repeat unless another policy is given."""
     closed = isinstance(bc_type, str) and bc_type == "periodic"
     return "periodic" if policy is None and closed else _EXTRAPOLATION_MODES[policy]
 
 
-def check_progress(progress: Any) -> None:
+def check_progress(progress: Progress | None) -> None:
     """Raise ValidationError unless the argument is callable or None."""
     if progress is not None and not callable(progress):
         raise ValidationError(f"progress must be a function of two numbers, not {short_repr(progress)}")
 
 
 def fit_options(
-    method: str, tol: float, max_iter: int | None, extrapolate: Any, on_failure: Any, check: Any, progress: Any
+    method: str,
+    tol: float,
+    max_iter: int | None,
+    extrapolate: Extrapolate,
+    on_failure: object,
+    check: object,
+    progress: Progress | None,
 ) -> Options:
     """Return the options of the solver, after validation of all options of a fit.
 
@@ -103,7 +109,7 @@ def fit_options(
     return Options(method, tol, None if max_iter is None else whole_number(max_iter, "max_iter", 1))
 
 
-def check_on_failure(on_failure: Any) -> None:
+def check_on_failure(on_failure: object) -> None:
     """Raise ValidationError unless the argument is one of the three policies."""
     if not isinstance(on_failure, str) or on_failure not in ("raise", "warn", "ignore"):
         raise ValidationError(f"on_failure must be 'raise', 'warn' or 'ignore', not {short_repr(on_failure)}")

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from .. import _core
 from .._base.report import Report
-from .._base.typing import Array, Number
+from .._base.typing import Array, BatchIndex, Number
 from .._core import CutLocusError, ValidationError
 from .._spaces import AnySpace, Doubles, Quotient, factors_of, parts_of, product_norm
 from ..manifolds import Manifold
@@ -473,7 +473,7 @@ def _candidates(f: Function, intervals: Intervals, knots: Doubles, sign: float) 
     sign_changes = turns[inside]
     ends = tau[place[sign_changes]], tau[place[sign_changes + 1]]
 
-    def slope(index: Any, x: Doubles) -> Doubles:
+    def slope(index: BatchIndex, x: Doubles) -> Doubles:
         return np.asarray(chebyshev.chebval(x, slopes[:, number[sign_changes[index]]], tensor=False))
 
     starts, stops = (values[number[i], place[i]] for i in (sign_changes, sign_changes + 1))
@@ -523,7 +523,7 @@ def crossings(f: Function, knots: Doubles, value: float, noise: Doubles) -> Doub
     return np.sort(np.concatenate([times[exact], roots]))
 
 
-def checked_values(values: Any, times: Array) -> Doubles:
+def checked_values(values: object, times: Array) -> Doubles:
     """Return the values of a function of the user at some times."""
     array = np.asarray(values)
     if array.shape != times.shape or array.dtype.kind not in "biuf":

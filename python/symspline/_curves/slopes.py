@@ -209,14 +209,14 @@ class _Slopes:
         v = np.where(turns & (size > most), v * (most / np.where(size > 0, size, 1.0)), v)
         return np.where(self._sign(at, v, near) > 0, v, 0.0)
 
-    def _size(self, v: Array, skip: int = 0, at: Array | None = None) -> Any:
+    def _size(self, v: Array, skip: int = 0, at: Array | None = None) -> Array:
         """Return the norms of vectors with the axes of points, or in flat space the size of each component."""
         if isinstance(self.space, Euclidean):
             return np.abs(v)
         p = self.points[skip : len(self.points) - skip] if at is None else at
         return wide(np.asarray(self.space.norm(p, v)), self.space)
 
-    def _sign(self, p: Array, v: Array, w: Array) -> Any:
+    def _sign(self, p: Array, v: Array, w: Array) -> Array:
         """Return numbers with the signs of inner products, or in flat space of products of components."""
         if isinstance(self.space, Euclidean):
             return np.sign(v) * np.sign(w)
@@ -226,7 +226,7 @@ class _Slopes:
         return np.ascontiguousarray(np.moveaxis(array, 0, -1 - self.axes))
 
 
-def check_method(method: Any) -> None:
+def check_method(method: object) -> None:
     """Raise ValidationError unless a formula of `local_velocities` has this name."""
     if not isinstance(method, str) or method not in METHODS:
         raise ValidationError(f"method must be one of {', '.join(map(repr, METHODS))}, not {method!r}")

@@ -219,7 +219,7 @@ def _unmasked(task: Task, options: Options, progress: Progress | None, solver: S
     )
 
 
-def in_batch(batch: tuple[int, ...], chosen: NDArray[np.intp] | None, column: Any) -> Any:
+def in_batch(batch: tuple[int, ...], chosen: NDArray[np.intp] | None, column: object) -> Any:
     """Return values of some curves as an array over the whole batch; the others are NaN, False or zero."""
     if chosen is None:
         return column

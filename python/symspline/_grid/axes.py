@@ -11,7 +11,7 @@ from .._base.arrays import as_array, filled, refuse, short_repr
 from .._base.faults import renamed, warn
 from .._base.report import FarPointsWarning
 from .._base.time import TimeAxis, time_axis_of
-from .._base.typing import Array
+from .._base.typing import Array, PointsLike, TimesLike
 from .._core import CutLocusError, ValidationError
 from .._curves.ends import NATURAL
 from .._curves.failures import FAR, cut_fractions
@@ -91,7 +91,7 @@ class Sites(NamedTuple):
         return self._replace(x=[*self.x[:axis], x, *self.x[axis + 1 :]])
 
 
-def read_axes(axes: Any, shape: tuple[int, ...] | None, bc_type: Any) -> list[GridAxis]:
+def read_axes(axes: object, shape: tuple[int, ...] | None, bc_type: Any) -> list[GridAxis]:
     """Read the axes of a grid.
 
     Parameters
@@ -119,7 +119,7 @@ def read_axes(axes: Any, shape: tuple[int, ...] | None, bc_type: Any) -> list[Gr
     return [_axis(k, *arguments) for k, arguments in enumerate(zip(axes, shape, conditions, strict=True))]
 
 
-def _axis(k: int, t: Any, nodes: int, ends: Ends) -> GridAxis:
+def _axis(k: int, t: TimesLike | None, nodes: int, ends: Ends) -> GridAxis:
     if nodes < 2:
         raise ValidationError(f"axis {k} of points has {nodes} nodes, but a spline needs at least two")
     if t is None:
@@ -140,7 +140,7 @@ def _axis(k: int, t: Any, nodes: int, ends: Ends) -> GridAxis:
     return GridAxis(time_axis, shown, knots, ends)
 
 
-def _conditions(bc_type: Any, dims: int) -> list[Ends]:
+def _conditions(bc_type: object, dims: int) -> list[Ends]:
     if isinstance(bc_type, str):
         return [_ends(bc_type)] * dims
     if not isinstance(bc_type, (tuple, list)) or len(bc_type) != dims:
@@ -148,7 +148,7 @@ def _conditions(bc_type: Any, dims: int) -> list[Ends]:
     return [_ends(value) for value in bc_type]
 
 
-def _ends(value: Any) -> Ends:
+def _ends(value: object) -> Ends:
     if isinstance(value, str) and value == "periodic":
         return None
     pair = (value, value) if isinstance(value, str) else value
@@ -209,7 +209,7 @@ def _padded(arrays: list[Doubles]) -> list[Doubles]:
 
 
 def sites_of(
-    axes: list[GridAxis], x: list[Doubles], outer: bool, extrapolate: Any
+    axes: list[GridAxis], x: list[Doubles], outer: bool, extrapolate: object
 ) -> tuple[Sites, list[np.ndarray[Any, np.dtype[np.bool_]]]]:
     """Return sites under an extrapolation policy, and for each axis which coordinates give NaN.
 
@@ -239,7 +239,7 @@ def sites_of(
 # ---- points at the nodes of a grid: reading and validation ----
 
 
-def read_nodes(points: Any, space: AnySpace, dims: int) -> tuple[list[Array], list[float], tuple[int, ...]]:
+def read_nodes(points: PointsLike, space: AnySpace, dims: int) -> tuple[list[Array], list[float], tuple[int, ...]]:
     """Read points in each factor, their tolerances, and the numbers of nodes of the grid.
 
     Masked numbers become NaN. In quotients, representatives are chosen that are continuous over the grid.

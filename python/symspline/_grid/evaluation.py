@@ -151,7 +151,7 @@ class FactorGrid:
         return result, here, reduce(Outcome.merged, outcomes)
 
 
-def order_of_each(nu: Any, dims: int) -> tuple[int, ...]:
+def orders_of(nu: Any, dims: int) -> tuple[int, ...]:
     """Validate the orders of a derivative along all axes."""
     if nu is None:
         return (0,) * dims
@@ -435,7 +435,7 @@ class ManifoldGrid:
         return out.reshape(*lead, len(x), *shape), outcome
 
 
-def _runs(valid: Any) -> list[tuple[int, int]]:
+def _runs(valid: Array) -> list[tuple[int, int]]:
     """Return the first node and the end of every run of valid nodes."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], valid, [False]]).astype(int)))
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))

@@ -29,7 +29,7 @@ from .._splines.archive import (
 )
 from .._splines.cubic import CubicSpline
 from .axes import GridAxis, Sites, check_steps, coordinates, read_axes, read_nodes, sites_of, validate_nodes
-from .evaluation import CompiledGrid, FactorGrid, Outcome, order_of_each
+from .evaluation import CompiledGrid, FactorGrid, Outcome, orders_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -323,9 +323,15 @@ class GridSpline(Generic[P]):
         return values
 
     def _evaluate(
-        self, x: list[Any], shape: tuple[int, ...], outer: bool, nu: Any, extrapolate: Any, progress: Progress | None
+        self,
+        x: list[Any],
+        shape: tuple[int, ...],
+        outer: bool,
+        nu: object,
+        extrapolate: Extrapolate,
+        progress: Progress | None,
     ) -> Any:
-        orders = order_of_each(nu, len(self._axes))
+        orders = orders_of(nu, len(self._axes))
         check_progress(progress)
         policy = self._extrapolate if extrapolate is None else checked_extrapolate(extrapolate)
         sites, missing = sites_of(self._axes, x, outer, policy)

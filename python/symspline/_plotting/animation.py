@@ -55,7 +55,7 @@ def animate(curve: Any, file: Any = None, frames: int = 60, fps: float = 15, **l
     return moving
 
 
-def _checked_path(file: Any) -> Path:
+def _checked_path(file: object) -> Path:
     """Return the path of an animation whose format can be written."""
     path = path_of(file, method="write")
     if path is None:

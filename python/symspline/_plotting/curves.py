@@ -494,7 +494,7 @@ def curves_of(
     return made, f"{number} curves, " if batch else ""
 
 
-def _drawn(one: Any, noise_beside: Any, index: Any, axis: Axis, look: Look, faint: bool) -> Curve:
+def _drawn(one: Any, noise_beside: Any, index: object, axis: Axis, look: Look, faint: bool) -> Curve:
     """Return one curve with its samples."""
     data = one._curve
     nodes, breaks = one._node_times, one._breaks
@@ -621,7 +621,7 @@ class _Scatter:
         pairs = zip(self.space.factors, self.points, strict=True)
         return tuple(_Scatter(factor, self.times, points) for factor, points in pairs)
 
-    def evaluate(self, x: FloatArray, quantity: str, outside: str, per_curve: bool, progress: Any = None) -> Any:
+    def evaluate(self, x: FloatArray, quantity: str, outside: str, per_curve: bool, progress: object = None) -> Any:
         """Return the points."""
         return self.points
 

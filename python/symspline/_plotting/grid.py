@@ -214,7 +214,7 @@ def _draw_factor(panel: Panel, grid: Any, factor: Any, sides: list[_Side], middl
             show_dates(getattr(axes, f"{letter}axis"), 2, 6)
 
 
-def _draw_nodes(axes: Axes, sides: list[_Side], valid: Any) -> None:
+def _draw_nodes(axes: Axes, sides: list[_Side], valid: Array) -> None:
     """Draw dots at nodes that are not missing, unless they are dense."""
     x, y = (side.on_axis(side.axis.knots) for side in sides)
     spacing = min(side.inches / (len(side.axis.knots) - 1) for side in sides)
@@ -224,7 +224,7 @@ def _draw_nodes(axes: Axes, sides: list[_Side], valid: Any) -> None:
         axes.plot(x[i], y[j], "o", markersize=float(np.clip(14 * spacing, 1.2, 3.6)), label="nodes", **look)
 
 
-def _middle(valid: Any) -> tuple[int, int]:
+def _middle(valid: Array) -> tuple[int, int]:
     """Return the valid node that is closest to the middle."""
     nodes = np.argwhere(valid)
     i, j = nodes[np.abs(nodes / np.maximum(np.array(valid.shape) - 1, 1) - 0.5).sum(axis=1).argmin()]
@@ -309,7 +309,7 @@ _Draw = Callable[[Axes, Field], None]
 def _show(axes: Axes, field: Field, values: FloatArray, **look: Any) -> Any:
     """Draw numbers, shape (m, n), or colours, shape (m, n, 3), as an image that is blank where points are missing."""
     if values.ndim > 2:
-        shown: Any = np.nan_to_num(np.concatenate([values, np.isfinite(values[..., :1])], axis=-1))
+        shown = np.nan_to_num(np.concatenate([values, np.isfinite(values[..., :1])], axis=-1))
     else:
         shown = np.ma.masked_invalid(values)
     shown = shown.swapaxes(0, 1)

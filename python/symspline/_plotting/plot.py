@@ -115,10 +115,10 @@ def _description(spline: Any, curves: Sequence[Curve]) -> str:
 
 def compare(
     items: Sequence[Any],
-    labels: Any,
+    labels: object,
     file: Any = None,
     *,
-    colors: Any = None,
+    colors: object = None,
     ax: Any = None,
     show: bool = False,
     title: str | None = None,
@@ -159,7 +159,7 @@ def compare(
     return finish(draw_page(drawn, title, ", ".join(words), figsize, show), file, show)
 
 
-def _checked_labels(labels: Any, count: int) -> list[str | None]:
+def _checked_labels(labels: object, count: int) -> list[str | None]:
     if labels is None:
         return [None] * count
     if isinstance(labels, str) or not isinstance(labels, Sequence) or len(labels) != count:
@@ -170,7 +170,7 @@ def _checked_labels(labels: Any, count: int) -> list[str | None]:
     return list(labels)
 
 
-def _checked_colors(colors: Any, items: Sequence[Any], space: AnySpace) -> list[Any]:
+def _checked_colors(colors: object, items: Sequence[Any], space: AnySpace) -> list[Any]:
     """Return the colours of the user, or distinct ones for curves and grey ones for data."""
     if colors is not None:
         if isinstance(colors, str) or not isinstance(colors, Sequence) or len(colors) != len(items):
@@ -186,7 +186,7 @@ def _checked_colors(colors: Any, items: Sequence[Any], space: AnySpace) -> list[
     return [next(dots) if isinstance(value, tuple) else next(lines) for value in items]
 
 
-def _data_of(pair: tuple[Any, Any], space: Any, i: int) -> tuple[Any, Any, Any, Any]:
+def _data_of(pair: tuple[Any, Any], space: AnySpace, i: int) -> tuple[Any, Any, Any, Any]:
     """Return first and last time, times on the axis of the core and points, without missing ones and sorted."""
     t, points = pair
     name = f"curves[{i}]"
@@ -230,7 +230,7 @@ def _check_times(items: Sequence[Any], data: Sequence[Any], reference: TimeAxis)
 # ---- axes of the user ----
 
 
-def check_axes(ax: Any, space: Space) -> None:
+def check_axes(ax: Axes, space: Space) -> None:
     """Raise an error unless a picture of the space can be drawn into axes."""
     if not isinstance(ax, Axes):
         raise TypeError(f"ax must be axes of matplotlib, not {short_repr(ax)}")
@@ -362,7 +362,7 @@ def checked_look(
     return look
 
 
-def _checked_color(color: Any, name: str) -> Any:
+def _checked_color(color: object, name: str) -> Any:
     """Return a colour in any form that matplotlib accepts."""
     try:
         valid = is_color_like(color)
@@ -410,7 +410,7 @@ class CurveFigure(Figure):
 
 
 @contextmanager
-def drawing(natural: tuple[float, float], figsize: Any, show: bool) -> Iterator[Figure]:
+def drawing(natural: tuple[float, float], figsize: tuple[float, float] | None, show: bool) -> Iterator[Figure]:
     """Create a figure to draw into, which belongs to pyplot only if a window opens.
 
     Lines, symbols and text are reduced if the figure is smaller than its natural size, in inches. That size is larger

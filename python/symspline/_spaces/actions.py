@@ -126,7 +126,7 @@ class Group(Space[P]):
     def __init__(self, n: int) -> None:
         super().__init__(n)
 
-    def _inverse_times(self, x: Array, y: Array) -> Any:
+    def _inverse_times(self, x: Array, y: Array) -> Array:
         return adjoint(x) @ y if self._unitary else np.linalg.solve(x, y)
 
     def _reflected(self, p: Array, x: Array) -> Any:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._base.arrays import as_array, cast, point_tol, refuse, short_repr, whole_number
-from .._base.typing import Array, FloatArray, P
+from .._base.typing import Array, FloatArray, P, PointsLike
 from .._core import Handle, ValidationError
 from .statistics import Groups, Whitening, geometric_median, grouped, groups_of, karcher_mean, require_metric, take
 
@@ -785,11 +785,11 @@ class Space(Generic[P]):
         if self._is_large:
             raise ValidationError(f"the dimension of {self!r} is too large for frames")
         doubles = self._doubles(p, "p")
-        at_each = np.expand_dims(doubles, len(self._lead(doubles)))
+        base_points = np.expand_dims(doubles, len(self._lead(doubles)))
         size = math.prod(self._doubles_shape)
         units = np.eye(self.dim, size).reshape(-1, *self._doubles_shape)
         # The core combines a frame at p with random coefficients. Unit coefficients give the frame itself.
-        return self._finite("random_tangent", p=self._numbers(at_each), noise=self._numbers(units))
+        return self._finite("random_tangent", p=self._numbers(base_points), noise=self._numbers(units))
 
     # ---- statistics ----
 
@@ -920,7 +920,7 @@ class Space(Generic[P]):
         result: P = self._batched(geometric_median(self, groups), lead[:-1])
         return result
 
-    def _samples(self, points: Any, weights: Any, what: str) -> tuple[tuple[int, ...], Groups]:
+    def _samples(self, points: PointsLike, weights: ArrayLike | None, what: str) -> tuple[tuple[int, ...], Groups]:
         """Return the leading axes of checked points, and the points of positive weight in groups."""
         given = self._array(points, "points")
         array = self._numbers(self._doubles(given, "points"))
@@ -1185,7 +1185,7 @@ def _taking_numbers(cls: type[AnySpace], init: Callable[..., None]) -> Callable[
     names = [*signature(init).parameters][1:]
 
     @wraps(init)
-    def checked(self: AnySpace, *numbers: Any, **named: Any) -> None:
+    def checked(self: AnySpace, *numbers: object, **named: Any) -> None:
         # A check in advance would take longer than the constructor.
         try:
             init(self, *numbers, **named)

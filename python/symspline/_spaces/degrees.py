@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from .._base.typing import Array
+from .._base.typing import Array, PointsLike
 from . import Torus, factors_of, parts_of
 from .base import AnySpace
 
@@ -18,12 +18,12 @@ _TWO_TURNS = 4 * np.pi
 _SHARE = 0.1
 
 
-def is_degrees(unit: Any) -> bool:
+def is_degrees(unit: object) -> bool:
     """Whether the name of a unit means degrees."""
     return str(unit).strip().lower() in _NAMES
 
 
-def look_like_degrees(space: AnySpace, points: Any) -> float | None:
+def look_like_degrees(space: AnySpace, points: PointsLike) -> float | None:
     """Return the largest angle if points on a torus seem to be in degrees, else None.
 
     Angles seem to be in degrees if they are between -180 and 360, their largest size exceeds 4π, and either at least a
@@ -44,7 +44,7 @@ def look_like_degrees(space: AnySpace, points: Any) -> float | None:
     return None
 
 
-def with_angles(space: AnySpace, points: Any, convert: Callable[[Any], Any]) -> Any:
+def with_angles(space: AnySpace, points: PointsLike, convert: Callable[[Any], Any]) -> Any:
     """Return points, or vectors, with the angles of tori converted from or to degrees."""
     pairs = zip(factors_of(space), parts_of(points, space, "points"), strict=True)
     converted = tuple(convert(part) if isinstance(factor, Torus) else part for factor, part in pairs)

@@ -206,7 +206,7 @@ class FiniteGroup:
         return x if self.right is None else self.right.move(x, self._of_right[index], axes)
 
 
-def _read(space: AnySpace, group: Any, size: int) -> tuple[Array, str]:
+def _read(space: AnySpace, group: object, size: int) -> tuple[Array, str]:
     """Return the elements of a group and its name."""
     if isinstance(group, str):
         return _named(space, group, size)
@@ -429,10 +429,10 @@ def over_grid(group: FiniteGroup, points: Array, finite: NDArray[np.bool_], comp
     _warn_ambiguous(in_tree, nodes, (), finite.ndim)
     open_edges = np.flatnonzero(group.table[total[u], nearest.moves] != total[v])
     if open_edges.size:
-        own_u, own_v = u[open_edges], v[open_edges]
+        open_u, open_v = u[open_edges], v[open_edges]
         axes = rows.ndim - 1
-        moved = group.move(rows[own_v], group.table[total[own_u], nearest.moves[open_edges]], axes)
-        off = np.abs(moved - group.move(rows[own_v], total[own_v], axes)).reshape(open_edges.size, -1).max(axis=-1)
+        moved = group.move(rows[open_v], group.table[total[open_u], nearest.moves[open_edges]], axes)
+        off = np.abs(moved - group.move(rows[open_v], total[open_v], axes)).reshape(open_edges.size, -1).max(axis=-1)
         open_edges = open_edges[off > _ZERO]
     if open_edges.size:
         _warn_open(group, shape, pairs, steps, (u[open_edges], v[open_edges]))

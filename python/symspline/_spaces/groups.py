@@ -8,7 +8,7 @@ import numpy as np
 
 from .._base.angles import matrices_of_quaternions
 from .._base.arrays import point_tol, refuse
-from .._base.typing import Array, ComplexArray, FloatArray
+from .._base.typing import Array, ComplexArray, FloatArray, PointsLike
 from .._core import ValidationError
 from .actions import DisconnectedGroup, Group
 from .statistics import Groups, karcher_mean, scaled
@@ -80,7 +80,7 @@ def names_points(name: str) -> bool:
     return name in ("points", "p", "q") or name.endswith(".y")
 
 
-def _are_rotations(value: Any) -> bool:
+def _are_rotations(value: object) -> bool:
     return hasattr(value, "as_matrix") or hasattr(value, "improper")
 
 
@@ -282,7 +282,7 @@ def nearest_rotations(matrices: Array) -> Array:
     return np.asarray(u @ v)
 
 
-def rotations_and_positions(poses: Any, name: str) -> tuple[Array, Array]:
+def rotations_and_positions(poses: object, name: str) -> tuple[Array, Array]:
     """Split poses, shape (..., 4, 4), into rotations and positions.
 
     Raises
@@ -309,7 +309,7 @@ def rotations_and_positions(poses: Any, name: str) -> tuple[Array, Array]:
     return g[..., :3, :3].copy(), g[..., :3, 3].copy()
 
 
-def _are_parts(rotations: Any, positions: Any) -> bool:
+def _are_parts(rotations: PointsLike, positions: object) -> bool:
     """Whether the first of two values looks like rotations or quaternions, and the second like positions."""
     first, second = _shape(rotations), _shape(positions)
     turns = _are_rotations(rotations) or first[-2:] == (3, 3) or first[-1:] == (4,)

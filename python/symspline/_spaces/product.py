@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._base.arrays import short_repr
-from .._base.typing import AnyArrays, Array, FloatArray, P, PProduct
+from .._base.typing import AnyArrays, Array, FloatArray, P, PointsLike, PProduct
 from .._core import Handle, ValidationError
 from .base import CLASSES, DERIVED, AnySpace, Space, example_of
 from .groups import names_points, rotations_and_positions
@@ -126,13 +126,13 @@ class Product(Space[PProduct]):
         return Product, self.factors
 
     def norm(self, p: ArrayLike, v: ArrayLike) -> FloatArray:
-        return product_norm(self._each("norm", p, v))
+        return product_norm(self._by_factor("norm", p, v))
 
     def project(self, x: ArrayLike) -> PProduct:
-        return self._each("project", x)
+        return self._by_factor("project", x)
 
     def symmetry(self, p: ArrayLike, x: ArrayLike) -> PProduct:
-        return self._each("symmetry", p, x)
+        return self._by_factor("symmetry", p, x)
 
     def act(self, g: ArrayLike | tuple[Any, ...], x: ArrayLike) -> PProduct:
         if not isinstance(g, (tuple, list)) or len(g) != len(self.factors):
@@ -140,33 +140,33 @@ class Product(Space[PProduct]):
                 f"g must be a tuple of {len(self.factors)} group elements, one per factor of {self!r}. "
                 "Pass one element for each factor, in the same order."
             )
-        return self._each("act", g, x)
+        return self._by_factor("act", g, x)
 
     def _rounding(self, p: ArrayLike) -> FloatArray:
-        largest: FloatArray = np.max(np.stack(np.broadcast_arrays(*self._each("_rounding", p))), axis=0)[()]
+        largest: FloatArray = np.max(np.stack(np.broadcast_arrays(*self._by_factor("_rounding", p))), axis=0)[()]
         return largest
 
     def check_point(self, p: ArrayLike) -> None:
-        self._each("check_point", p)
+        self._by_factor("check_point", p)
 
     def check_tangent(self, p: ArrayLike, v: ArrayLike) -> None:
-        self._each("check_tangent", p, v)
+        self._by_factor("check_tangent", p, v)
 
     def frame(self, p: ArrayLike) -> PProduct:
-        return self._each("frame", p)
+        return self._by_factor("frame", p)
 
     def random_point(self, rng: np.random.Generator, shape: int | tuple[int, ...] = ()) -> PProduct:
         count = len(self.factors)
-        return self._each("random_point", (rng,) * count, (shape,) * count)
+        return self._by_factor("random_point", (rng,) * count, (shape,) * count)
 
     def random_tangent(self, rng: np.random.Generator, p: ArrayLike) -> PProduct:
-        return self._each("random_tangent", (rng,) * len(self.factors), p)
+        return self._by_factor("random_tangent", (rng,) * len(self.factors), p)
 
     def mean(self, points: ArrayLike, weights: ArrayLike | None = None) -> PProduct:
         # Squared distances add, so that the mean of every factor minimises its own sum.
-        return self._each("mean", points, (weights,) * len(self.factors))
+        return self._by_factor("mean", points, (weights,) * len(self.factors))
 
-    def _samples(self, points: Any, weights: Any, what: str) -> tuple[tuple[int, ...], Groups]:
+    def _samples(self, points: PointsLike, weights: ArrayLike | None, what: str) -> tuple[tuple[int, ...], Groups]:
         groups_of = [
             factor._samples(part, weights, what)
             for factor, (part,) in zip(self.factors, self._split(points), strict=True)
@@ -191,14 +191,14 @@ class Product(Space[PProduct]):
             return product_norm(results)
         return sum(results) if operation == "inner" else results
 
-    def _each(self, method: str, *arguments: Any) -> PProduct:
+    def _by_factor(self, method: str, *arguments: Any) -> PProduct:
         """Call a method of every factor with the entries of the arguments that belong to it."""
         parts = zip(self.factors, self._split(*arguments), strict=True)
         results: Any = tuple(getattr(factor, method)(*part) for factor, part in parts)
         result: PProduct = results
         return result
 
-    def _split(self, *arguments: Any) -> list[Tuple]:
+    def _split(self, *arguments: object) -> list[Tuple]:
         """Return the entries of the arguments that belong to each factor."""
         arguments = tuple(_parts_of_poses(value, self, "points") for value in arguments)
         for value in arguments:
@@ -212,7 +212,7 @@ def factors_of(space: AnySpace) -> tuple[Space[Array], ...]:
     return space.factors if isinstance(space, Product) else (space,)
 
 
-def parts_of(value: Any, space: AnySpace, name: str) -> Tuple:
+def parts_of(value: object, space: AnySpace, name: str) -> Tuple:
     """Return the entries of a value that belong to each factor; in a space that is not a product, the value itself."""
     if not isinstance(space, Product):
         return (value,)
@@ -242,7 +242,7 @@ def _parts_of_poses(value: Any, space: Product[Any], name: str) -> Any:
     return tuple(parts[str(factor)] for factor in space.factors)
 
 
-def _conversion(value: Any, space: Product[Any]) -> str:
+def _conversion(value: object, space: Product[Any]) -> str:
     """Return a sentence that names the conversion of one array to points of the factors."""
     shapes = [factor.point_shape for factor in space.factors]
     if isinstance(value, np.ndarray) and value.ndim and all(len(shape) == 1 for shape in shapes):
@@ -318,7 +318,7 @@ def short_name(space: AnySpace) -> str:
     return str(space).replace("euclidean:", "r:").replace("hyperbolic:", "h:")
 
 
-def spaces_named(name: Any) -> list[Space]:
+def spaces_named(name: object) -> list[Space]:
     """Return the spaces that a name lists, none of them a product.
 
     >>> spaces_named("sphere:3 x r:3")
@@ -336,7 +336,7 @@ def _space_of(name: str) -> AnySpace:
     return factors[0] if len(factors) == 1 else Product(*factors)
 
 
-def _not_a_name(value: Any) -> ValidationError:
+def _not_a_name(value: object) -> ValidationError:
     """Return the error for a value that is neither a space nor a text."""
     if isinstance(value, type) and issubclass(value, Space):
         return ValidationError(f"{value.__name__} is a family of spaces; {_whole(value)}")
@@ -392,7 +392,7 @@ def _named(name: str) -> AnySpace:
         raise ValidationError(
             f"{short_repr(name)}: the parameters after the colon must be integers, as in 'sphere:2'{product}"
         )
-    cls: Any = CLASSES[names[word]]
+    cls = CLASSES[names[word]]
     try:
         made: Space = cls(*map(int, values))
     except TypeError:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._base.arrays import short_repr, whole_number
-from .._base.typing import Array, P
+from .._base.typing import Array, P, PointsLike
 from .._core import CutLocusError, ValidationError
 from .base import DERIVED, AnySpace, Space
 from .finite_groups import Factor, FiniteGroup, Indices, Nearest, along_path, nearest_of, over_grid
@@ -95,7 +95,7 @@ class Quotient(Space[P]):
     cover: Space[P]
     _group: FiniteGroup
 
-    def __new__(cls, space: Space[P] | str, group: Any, *, left: Any = False) -> Quotient[P]:
+    def __new__(cls, space: Space[P] | str, group: object, *, left: bool | PointsLike = False) -> Quotient[P]:
         cover = space_named(space)
         if isinstance(cover, (Product, Quotient)):
             remedy = (
@@ -107,7 +107,7 @@ class Quotient(Space[P]):
         made: Quotient[P] = object.__new__(_class_of(type(cover)))
         return made
 
-    def __init__(self, space: Space[P] | str, group: Any, *, left: Any = False) -> None:
+    def __init__(self, space: Space[P] | str, group: object, *, left: bool | PointsLike = False) -> None:
         self.cover = space_named(space)
         vars(self).update(vars(self.cover))
         self._group = FiniteGroup(*_factors(self.cover, group, left))
@@ -384,7 +384,7 @@ def refuse_quotients(space: AnySpace, what: str) -> None:
             )
 
 
-def _factors(cover: AnySpace, group: Any, left: Any) -> tuple[Factor | None, Factor | None]:
+def _factors(cover: AnySpace, group: object, left: Any) -> tuple[Factor | None, Factor | None]:
     """Return the groups that multiply from the left and from the right."""
     if isinstance(left, (bool, np.bool_)):
         symmetry = getattr(group, "symmetry", None)

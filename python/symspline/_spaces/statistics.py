@@ -237,7 +237,7 @@ def _map(function: Any, *values: Rows) -> Rows:
     return function(*values)
 
 
-def take(rows: Rows, index: Any) -> Rows:
+def take(rows: Rows, index: object) -> Rows:
     return _map(lambda x: x[index], rows)
 
 

@@ -14,7 +14,7 @@ import zipfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import fields
-from typing import Any, TypeVar
+from typing import Any, Never, TypeVar
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from .._base.input import NO_ZONE, UTC_ZONE
 from .._base.report import Report
 from .._base.system import path_of, replacing
 from .._base.time import Moments, TimeAxis, time_axis_of
-from .._base.typing import Array, State
+from .._base.typing import Array, File, State
 from .._core import ValidationError
 from .._curves.curve import CurveArrays
 from .._curves.ends import freeze_bc_type
@@ -61,7 +61,7 @@ FORMATS: dict[str, type[Any]] = {}
 class Entries(dict[str, Any]):
     """The entries of a state by name; a missing entry raises ValidationError."""
 
-    def __missing__(self, name: str) -> Any:
+    def __missing__(self, name: str) -> Never:
         raise ValidationError(f"entry {name!r} is missing")
 
     def read(self, name: str, check: Callable[[Any], _T]) -> _T:
@@ -101,7 +101,7 @@ def restore(state: State) -> Any:
     return FORMATS[kind]._from_state(entries)
 
 
-def write(file: Any, state: State) -> None:
+def write(file: File, state: State) -> None:
     """Write a state to an open file, or replace a file by its name (`_base.system.replacing`)."""
     refuse_functions(
         state["space"],
@@ -146,7 +146,7 @@ def _is_text(name: str) -> bool:
     return name in TEXTS or _AXIS_UNIT.fullmatch(name) is not None
 
 
-def _as_json(value: Any) -> Any:
+def _as_json(value: object) -> Any:
     if isinstance(value, np.ndarray) and value.dtype.kind == "c":
         return {"re": value.real.tolist(), "im": value.imag.tolist()}
     if not hasattr(value, "tolist"):
@@ -156,7 +156,7 @@ def _as_json(value: Any) -> Any:
     return value.tolist()
 
 
-def read_state(file: Any) -> Stored:
+def read_state(file: File) -> Stored:
     """Return the entries of an open file of curves."""
     try:
         arrays = read(file, _is_entry)
@@ -341,7 +341,7 @@ def read_fitted(
         read_ends(bc_type, space, curve.batch)
         return bc_type
 
-    def read_reports(plain: Any) -> list[Report]:
+    def read_reports(plain: object) -> list[Report]:
         if not isinstance(plain, list) or len(plain) != len(curve.parts):
             raise ValidationError(f"it must be a list with one report for each of {len(curve.parts)} factors")
         return [read_report(Report, fields, curve.batch) for fields in plain]
@@ -438,7 +438,7 @@ def _read_bc_type(value: Any, space: Space) -> Any:
     return tuple(end if isinstance(end, str) else (end[0], vectors(end[1])) for end in value)
 
 
-def _vector(plain: Any) -> Any:
+def _vector(plain: object) -> Any:
     if isinstance(plain, dict):
         return np.asarray(plain["re"], np.float64) + 1j * np.asarray(plain["im"], np.float64)
     return plain if isinstance(plain, np.ndarray) else np.asarray(plain, np.float64)

@@ -468,9 +468,9 @@ class Curve(ABC, Generic[P]):
         >>> curve.arc_length([0.0, 0.5, 1.0]).round(12)
         array([0.  , 0.25, 1.  ])
         """
-        times, own_times = self._core_times(x, "x", checked_flag(per_curve, "per_curve"))
+        times, per_curve = self._core_times(x, "x", checked_flag(per_curve, "per_curve"))
         return self._by_columns(
-            ArcLength.at, self._with_batch(times, own_times, times.ndim - len(self._batch) * own_times)
+            ArcLength.at, self._with_batch(times, per_curve, times.ndim - len(self._batch) * per_curve)
         )
 
     def at_length(self, s: ArrayLike, *, per_curve: bool = False) -> Time:
@@ -514,10 +514,10 @@ class Curve(ABC, Generic[P]):
         array = as_array(s, "s")
         if array.dtype.kind not in "biuf":
             raise ValidationError(f"s must be real numbers, not {array.dtype}")
-        batch, own_lengths = self._batch, checked_flag(per_curve, "per_curve")
-        if own_lengths:
+        batch, per_curve = self._batch, checked_flag(per_curve, "per_curve")
+        if per_curve:
             _check_batch_axes(array.shape, batch, "s")
-        wanted = self._with_batch(cast(array), own_lengths, array.ndim - len(batch) * own_lengths)
+        wanted = self._with_batch(cast(array), per_curve, array.ndim - len(batch) * per_curve)
         if 0 in batch:
             return self._shown_times(wanted)
         total = self._arc.lengths[:, -1].reshape(batch + (1,) * (wanted.ndim - len(batch)))
@@ -937,19 +937,19 @@ class Curve(ABC, Generic[P]):
         >>> time.round(8), distance.round(8)
         (np.float64(1.0), np.float64(0.3))
         """
-        space, own_points = self.space, checked_flag(per_curve, "per_curve")
+        space, per_curve = self.space, checked_flag(per_curve, "per_curve")
         _check_metric(space)
         targets = [
             _checked(factor, value)
             for factor, value in zip(factors_of(space), parts_of(points, space, "points"), strict=True)
         ]
         batch, lead = self._curve.batch, _lead(space, targets)
-        if own_points and lead[: len(batch)] != batch:
+        if per_curve and lead[: len(batch)] != batch:
             raise ValidationError(
                 f"with per_curve=True the shape of points must begin with the batch axes {batch}; "
                 f"got leading axes {lead}"
             )
-        shape = lead if own_points else batch + lead
+        shape = lead if per_curve else batch + lead
         if 0 in shape:
             return self._shown_times(np.zeros(shape)), np.zeros(shape)
         inner = shape[len(batch) :]
@@ -1066,7 +1066,7 @@ class Curve(ABC, Generic[P]):
         f = self._function(function)
         return self._shown_times(crossings(f, self._curve.times, number, self._noise(function)))
 
-    def _function(self, function: Any) -> Callable[[Doubles], Doubles]:
+    def _function(self, function: object) -> Callable[[Doubles], Doubles]:
         """Return a function of times of the core, of one curve."""
         if self._curve.batch:
             raise ValidationError(
@@ -1083,7 +1083,7 @@ class Curve(ABC, Generic[P]):
             self._curve.evaluate(np.ascontiguousarray(x), quantity, "continue", False), self._shown_times(x)
         )
 
-    def _noise(self, function: Any) -> Doubles:
+    def _noise(self, function: object) -> Doubles:
         """Return the rounding errors of a quantity between the times of the curve; zero for functions of the user."""
         if callable(function):
             return np.zeros(len(self._curve.times) - 1)

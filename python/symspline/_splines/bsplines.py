@@ -104,7 +104,7 @@ class ControlledSpline(Curve[P]):
 
 
 def _opened(
-    control_points: Any, space: AnySpace, knots: Any, degree: Any, cumulative: bool
+    control_points: PointsLike, space: AnySpace, knots: Any, degree: Any, cumulative: bool
 ) -> tuple[ControlledCurve, list[Points]]:
     """Return the curve with given control points and knots, after validation, and the points as given."""
     degree = whole_number(degree, "degree", 1)

@@ -112,8 +112,8 @@ class RetimedCurve(Curve[P]):
         times, law = self._curve.times, self._curve.law
         if isinstance(law, Affine) and np.ndim(law.offset):
             law = Affine(law.sign, law.offset[index])
-        own_times = times[index] if times.ndim > 1 else times
-        return self._of(self._source[index], self._time_axis.take_batch(index), law, own_times)
+        times_of_picked = times[index] if times.ndim > 1 else times
+        return self._of(self._source[index], self._time_axis.take_batch(index), law, times_of_picked)
 
     def _state(self) -> State:
         law: Any = self._curve.law
@@ -263,7 +263,7 @@ class SegmentedCurve(Curve[P], Generic[P, C]):
     def __getitem__(self, index: int | np.integer) -> C: ...
     @overload
     def __getitem__(self, index: slice) -> SegmentedCurve[P, C]: ...
-    def __getitem__(self, index: Any) -> Any:
+    def __getitem__(self, index: object) -> Any:
         """Return one segment, or the curve of several consecutive ones."""
         if isinstance(index, slice):
             return self._of_segments(self._segments[index])
@@ -370,7 +370,7 @@ class SegmentedCurve(Curve[P], Generic[P, C]):
         return f"{len(self)} segments, "
 
 
-def _at(curve: UserCurve, function: Any, t: Any) -> Any:
+def _at(curve: UserCurve, function: Any, t: ArrayLike) -> Any:
     """Return a quantity of a segment at a time, as `Curve.extrema` names it."""
     if callable(function):
         return np.asarray(function(np.asarray(t)[None]))[0]

@@ -529,7 +529,7 @@ class CubicSpline(PiecewiseCubic[P], Generic[P, R]):
 
     # ---- batches ----
 
-    def _with(self, time_axis: TimeAxis, t: Array, curve: CurveArrays, index: Any) -> Any:
+    def _with(self, time_axis: TimeAxis, t: Array, curve: CurveArrays, index: object) -> Any:
         ends = take_batch(self._bc_type, index, len(self._batch), self.space)
         reports = [report.map(lambda column: column[index]) for report in self._reports]
         return CubicSpline._fitted(time_axis, t, curve, ends, self._extrapolate, reports, self._c1_nodes)
@@ -606,7 +606,7 @@ class Local(NamedTuple):
     kept: int
 
 
-def local_fit(spline: Any, t: TimesLike, points: Any, lag: int | None) -> Local:
+def local_fit(spline: Any, t: TimesLike, points: object, lag: int | None) -> Local:
     """Return the problem of a new fit, after validation of the times, the points and the lag."""
     bc_type, space, curve = spline._bc_type, spline.space, spline._curve
     if is_closed(bc_type):
@@ -631,7 +631,7 @@ def local_fit(spline: Any, t: TimesLike, points: Any, lag: int | None) -> Local:
     return Local(shown, times, Problem(space, last, data, ends, DEFAULTS, names=names), kept)
 
 
-def _with_new(space: AnySpace, parts: Any, points: Any, batch: tuple[int, ...], kept: int, count: int | None) -> Any:
+def _with_new(space: AnySpace, parts: Any, points: object, batch: tuple[int, ...], kept: int, count: int | None) -> Any:
     """Return the last points of a curve and the new ones; without `count`, there is one without an axis."""
     axis = len(batch)
     tail, one = (slice(None),) * axis + (slice(kept, None),), (slice(None),) * axis + (None,)

@@ -57,7 +57,7 @@ def save(curves: UserCurve | Mapping[str, UserCurve], file: File) -> None:
     >>> ss.load(file) == {"long": long, "short": short}
     True
     """
-    state: Any = getattr(curves, "_state", None)
+    state = getattr(curves, "_state", None)
     if state and isinstance(curves, tuple(FORMATS.values())):
         write(file, state())
     elif isinstance(curves, Mapping) and all(isinstance(curve, Curve) for curve in curves.values()):
@@ -134,7 +134,7 @@ def _joined(curves: Mapping[str, Curve]) -> State:
 def _layout(state: State) -> State:
     """Return the parts of a state that all curves of a file must share."""
 
-    def shared(key: str, value: Any) -> Any:
+    def shared(key: str, value: object) -> Any:
         if key in _SHARED:
             return value
         return (value.dtype, value.shape[1:]) if isinstance(value, np.ndarray) else ()

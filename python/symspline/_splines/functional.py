@@ -97,7 +97,7 @@ def fit(
     return velocities, spline.report
 
 
-def _at_given(points: Any, spline: CubicSpline[Any]) -> Any:
+def _at_given(points: object, spline: CubicSpline[Any]) -> Any:
     """Return the velocities of a curve at the points of the user, which may be other representatives."""
     space, velocities = spline.space, spline.velocities
     if not any(isinstance(factor, Quotient) for factor in factors_of(space)):
@@ -215,7 +215,9 @@ def evaluate(
     return values if out is not None else in_library(library_of(*libraries), values)
 
 
-def _nodes_around(t: TimesLike | None, points: Any, velocities: Any, space: Space, x: Any) -> tuple[Any, Any, Any]:
+def _nodes_around(
+    t: TimesLike | None, points: PointsLike, velocities: PointsLike | None, space: Space, x: TimesLike
+) -> tuple[Any, Any, Any]:
     """Return the knots, points and velocities of the segments in which times lie.
 
     All nodes are returned if they are not plain arrays or too few for a gain. Each segment is determined by its two
@@ -249,7 +251,7 @@ def _nodes_around(t: TimesLike | None, points: Any, velocities: Any, space: Spac
     return t[start:stop], arrays[0], arrays[1]
 
 
-def given(t: TimesLike | None, points: Any, velocities: Any, space: AnySpace) -> tuple[TimeAxis, CurveArrays]:
+def given(t: TimesLike | None, points: object, velocities: PointsLike, space: AnySpace) -> tuple[TimeAxis, CurveArrays]:
     """Return the time axis and the curve with the given knots, points and velocities, after validation."""
     data = fitting.read(points, space)
     vectors = fitting.read_velocities(velocities, space, data)

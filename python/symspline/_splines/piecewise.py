@@ -93,7 +93,7 @@ class PiecewiseCubic(Curve[P]):
         """Return the curve with points and velocities at its knots in each factor."""
         return curve_of(space, times, arrays, fitted=False)
 
-    def _with(self, time_axis: TimeAxis, t: Array, curve: CurveArrays, index: Any) -> Self:
+    def _with(self, time_axis: TimeAxis, t: Array, curve: CurveArrays, index: object) -> Self:
         """Return the curves that an index selects from the batch."""
         return self._at_nodes(time_axis, t, curve, self._extrapolate)
 
@@ -400,7 +400,7 @@ class PiecewiseCubic(Curve[P]):
         )
 
 
-def _agree(first: Any, second: Any, axis: int) -> bool:
+def _agree(first: object, second: object, axis: int) -> bool:
     """Whether one curve ends, up to rounding, at the point and with the velocity with which another begins."""
     for name in ("points", "velocities"):
         x, y = np.take(getattr(first, name), -1, axis=axis), np.take(getattr(second, name), 0, axis=axis)
@@ -409,7 +409,7 @@ def _agree(first: Any, second: Any, axis: int) -> bool:
     return True
 
 
-def check_curve(spline: Any, name: str = "spline") -> None:
+def check_curve(spline: object, name: str = "spline") -> None:
     """Raise TypeError unless an argument is a curve of cubic segments."""
     if not isinstance(spline, PiecewiseCubic):
         what = "a curve with knots and velocities, such as a symspline.CubicSpline"
@@ -678,7 +678,7 @@ def _read(
     return _Nodes(space, data, *knots_of(t, data[0].batch, data[0].nodes))
 
 
-def _present(t: Any, points: Any, space: AnySpace, skipna: Any) -> tuple[Any, Any]:
+def _present(t: object, points: object, space: AnySpace, skipna: Any) -> tuple[Any, Any]:
     """Return knots and points, without missing samples if the user wants to omit them."""
     return curves_without_missing(t, points, space) if checked_flag(skipna, "skipna") else (t, points)
 

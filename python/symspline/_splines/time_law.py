@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -232,7 +232,7 @@ def time_law(
     return TimeLaw(read_only(knots), read_only(values), read_only(rates), speeds, accelerations)
 
 
-def _limits(value: Any, count: int, name: str) -> tuple[float, ...]:
+def _limits(value: object, count: int, name: str) -> tuple[float, ...]:
     """Return one limit per factor."""
     if isinstance(value, np.ndarray) and value.ndim == 1:
         value = tuple(value)

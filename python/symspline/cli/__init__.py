@@ -129,7 +129,7 @@ class _Parser(argparse.ArgumentParser):
         close = get_close_matches(argument.partition("=")[0], names, 1) if argument.startswith("-") else []
         return f"; did you mean {close[0]}?" if close else ""
 
-    def _check_value(self, action: argparse.Action, value: Any) -> None:
+    def _check_value(self, action: argparse.Action, value: object) -> None:
         if action.choices is None or value in action.choices:
             return
         names = list(action.choices)
@@ -188,7 +188,9 @@ def _texts_of(doc: str | None) -> Keywords:
 class _Completion(argparse.Action):
     """Prints the completion of a shell, which the package shtab writes."""
 
-    def __call__(self, parser: argparse.ArgumentParser, namespace: Any, value: Any, option: str | None = None) -> None:
+    def __call__(
+        self, parser: argparse.ArgumentParser, namespace: object, value: Any, option: str | None = None
+    ) -> None:
         try:
             import shtab
         except ImportError:

@@ -416,7 +416,7 @@ class PointColumns:
             parts.append(self._projected(factor, part, place))
         return tuple(parts) if isinstance(self.space, Product) else parts[0]
 
-    def _on_globe(self, numbers: Doubles, place: Place) -> Any:
+    def _on_globe(self, numbers: Doubles, place: Place) -> Array:
         for (name, largest), values in zip(_LARGEST.items(), numbers.T, strict=True):
             wild = np.flatnonzero(np.abs(values) > largest)
             if wild.size:

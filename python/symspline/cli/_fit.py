@@ -51,7 +51,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from .._base.exceptions import SymsplineError
 from .._base.time import NANOSECONDS, time_axis_of
@@ -460,7 +460,7 @@ class Recordings:
         """Describe the position of a row in the file."""
         return self._rows.place(row)
 
-    def located(self, note: Any) -> str:
+    def located(self, note: object) -> str:
         """Return the message of an error or a warning with lines of the file and names instead of numbers.
 
         ``note`` has the fields of a `SymsplineError`.
@@ -539,7 +539,7 @@ def _spikes(space: Space, times: Any, points: Any) -> tuple[NDArray[np.bool_], D
     return is_spike, sizes, float(np.median(steps))
 
 
-def _far(space: Space, points: Any, near: Any) -> tuple[NDArray[np.bool_], Doubles, float]:
+def _far(space: Space, points: ArrayLike, near: Any) -> tuple[NDArray[np.bool_], Doubles, float]:
     """Return which points are far from a curve, their distances, and the distance within which most points are."""
     distances = np.asarray(space.distance(points, near))
     usual = float(np.median(distances))

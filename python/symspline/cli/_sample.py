@@ -52,7 +52,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from .._base.time import NANOSECONDS, onto_ends
 from .._base.typing import Array
@@ -415,7 +415,7 @@ def _equidistant(first: Fraction, step: Fraction, count: int) -> NDArray[np.floa
     return np.fromiter(((start + jump * i) / scale for i in range(count)), np.float64, count)
 
 
-def _after(start: int, steps: NDArray[np.uint64], dtype: Any) -> Times:
+def _after(start: int, steps: NDArray[np.uint64], dtype: DTypeLike) -> Times:
     """Return a start plus whole numbers. The sum is exact, as it is computed modulo 2**64."""
     return np.asarray((np.uint64(start % 2**64) + steps).astype(np.int64).astype(dtype))
 

@@ -324,7 +324,7 @@ class Table:
         if far.size:
             place = f"{self.path}, {self.place(int(far[0]))}"
             raise Problem(f"{place}: --unix {unit}: time {times[far[0]]} is too far from 1970; is it in ns?")
-        fraction: Any = 0
+        fraction = 0
         if (whole != times).any():
             if self.texts is not None or _is_text(self.columns[name]):
                 with suppress(InvalidOperation):

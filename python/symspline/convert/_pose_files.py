@@ -16,7 +16,7 @@ from .._base.arrays import as_array, brief, cast, checked_flag, length, off_one,
 from .._base.input import times_of
 from .._base.system import path_of, replacing
 from .._base.time import warn_of_rounded_times
-from .._base.typing import Array, PointsLike
+from .._base.typing import Array, PointsLike, TextFile
 from .._core import ValidationError, number_lines
 from .._spaces import Doubles, SpecialEuclidean, SpecialOrthogonal, point_tol, rotations_and_positions
 from ._quaternions import matrix_to_quaternion, quaternion_to_matrix
@@ -36,14 +36,14 @@ _EUROC = "#timestamp [ns],p_x [m],p_y [m],p_z [m],q_w [],q_x [],q_y [],q_z []"
 
 
 @overload
-def read_tum(file: Any, *, skipna: bool = False, dates: Literal[False] = False) -> tuple[Doubles, Array]: ...
+def read_tum(file: TextFile, *, skipna: bool = False, dates: Literal[False] = False) -> tuple[Doubles, Array]: ...
 
 
 @overload
-def read_tum(file: Any, *, skipna: bool = False, dates: Literal[True]) -> tuple[NDArray[np.datetime64], Array]: ...
+def read_tum(file: TextFile, *, skipna: bool = False, dates: Literal[True]) -> tuple[NDArray[np.datetime64], Array]: ...
 
 
-def read_tum(file: Any, *, skipna: bool = False, dates: bool = False) -> tuple[Array, Array]:
+def read_tum(file: TextFile, *, skipna: bool = False, dates: bool = False) -> tuple[Array, Array]:
     """Read poses in the format of TUM's RGB-D benchmark, lines of ``time x y z qx qy qz qw``.
 
     Parameters
@@ -129,7 +129,7 @@ def _exact_dates(lines: Lines) -> NDArray[np.datetime64]:
     return np.array(counts, np.int64).astype("datetime64[ns]")
 
 
-def tum_rows(file: Any, missing: bool = False) -> tuple[Doubles, Lines]:
+def tum_rows(file: TextFile, missing: bool = False) -> tuple[Doubles, Lines]:
     """Return the numbers of a TUM trajectory, shape (n, 8), and the lines that hold them.
 
     Numbers may be NaN if ``missing`` is True.
@@ -145,7 +145,7 @@ def tum_rows(file: Any, missing: bool = False) -> tuple[Doubles, Lines]:
     return parsed(lines, TUM, f"a line of a TUM trajectory has {len(TUM)}: {' '.join(TUM)}", missing=missing), lines
 
 
-def write_tum(file: Any, t: ArrayLike, poses: Any) -> None:
+def write_tum(file: TextFile, t: ArrayLike, poses: PointsLike) -> None:
     r"""Write poses as lines of ``time x y z qx qy qz qw``, from which `read_tum` restores every number.
 
     Parameters
@@ -182,7 +182,7 @@ def write_tum(file: Any, t: ArrayLike, poses: Any) -> None:
     write_tum_rows(file, times.astype(np.float64), rows)
 
 
-def write_tum_rows(file: Any, t: Array, poses: Doubles, head: str = "") -> None:
+def write_tum_rows(file: TextFile, t: Array, poses: Doubles, head: str = "") -> None:
     """Write times and the seven numbers of each pose; dates with all nanoseconds, as seconds since 1970.
 
     Raises
@@ -206,7 +206,7 @@ def _exact_seconds(dates: Array) -> list[str]:
 # ---- KITTI: r11 r12 r13 x r21 ... ----
 
 
-def read_kitti(file: Any, times: Any = None, *, skipna: bool = False) -> tuple[Doubles, Array]:
+def read_kitti(file: TextFile, times: TextFile | None = None, *, skipna: bool = False) -> tuple[Doubles, Array]:
     """Read poses in the format of KITTI's odometry benchmark, lines with the twelve numbers of [R | x].
 
     Parameters
@@ -266,7 +266,7 @@ def read_kitti(file: Any, times: Any = None, *, skipna: bool = False) -> tuple[D
     return t, join(_SO3.project(r), rows[:, :, 3])
 
 
-def write_kitti(file: Any, poses: Any) -> None:
+def write_kitti(file: TextFile, poses: PointsLike) -> None:
     r"""Write poses as lines with the twelve numbers of [R | x].
 
     KITTI stores times in a separate file.
@@ -296,7 +296,7 @@ def write_kitti(file: Any, poses: Any) -> None:
 # ---- EuRoC: nanoseconds, x, y, z, qw, qx, qy, qz ----
 
 
-def read_euroc(file: Any, *, skipna: bool = False) -> tuple[NDArray[np.datetime64], Array]:
+def read_euroc(file: TextFile, *, skipna: bool = False) -> tuple[NDArray[np.datetime64], Array]:
     """Read poses in the format of the EuRoC data sets, lines of ``nanoseconds,x,y,z,qw,qx,qy,qz``.
 
     Further columns are ignored.
@@ -348,7 +348,7 @@ def read_euroc(file: Any, *, skipna: bool = False) -> tuple[NDArray[np.datetime6
     return ns.astype("datetime64[ns]"), join(rotations_in_rows(rows[:, 3:], lines.file, lines.place), rows[:, :3])
 
 
-def write_euroc(file: Any, t: ArrayLike, poses: Any) -> None:
+def write_euroc(file: TextFile, t: ArrayLike, poses: PointsLike) -> None:
     """Write poses as lines of ``nanoseconds,x,y,z,qw,qx,qy,qz``.
 
     Parameters
@@ -455,7 +455,7 @@ def split(poses: PointsLike) -> tuple[Array, Array]:
     return rotations_and_positions(poses, "poses")
 
 
-def _timed(t: ArrayLike, poses: Any) -> tuple[Array, Array]:
+def _timed(t: ArrayLike, poses: PointsLike) -> tuple[Array, Array]:
     """Return the times and the poses to write, without rows of NaN."""
     array = _joined(poses)
     missing: NDArray[np.bool_] = np.zeros(array.shape[:1], bool)
@@ -466,12 +466,12 @@ def _timed(t: ArrayLike, poses: Any) -> tuple[Array, Array]:
     return times[~missing], checked_poses(array[~missing])
 
 
-def _joined(poses: Any) -> Array:
+def _joined(poses: PointsLike) -> Array:
     """Return poses as matrices, also those that are given as rotations and positions."""
     return join(*poses) if isinstance(poses, tuple) and len(poses) == 2 else _SE3._array(poses, "poses")
 
 
-def checked_poses(poses: Any) -> Array:
+def checked_poses(poses: PointsLike) -> Array:
     """Poses to write, shape (n, 4, 4)."""
     g = _joined(poses)
     _SE3.check_point(g)
@@ -550,7 +550,7 @@ def lines_of(file: Any, name: str = "file") -> Lines:
             raise TypeError(f"{name} must be open as text, without 'b' in its mode; pass its name, or open it so")
         text = text.removeprefix("\ufeff")
     else:
-        opener: Any = gzip.open if path.suffix == ".gz" else open
+        opener = gzip.open if path.suffix == ".gz" else open
         try:
             with opener(path, "rt", encoding="utf-8-sig") as opened:
                 text = opened.read()
@@ -618,7 +618,7 @@ def parsed(
     return rows
 
 
-def _name(file: Any) -> str:
+def _name(file: object) -> str:
     name = getattr(file, "name", file if isinstance(file, (str, os.PathLike)) else "the file")
     return str(name)
 

@@ -52,7 +52,7 @@ class Layout(NamedTuple):
         return np.broadcast_shapes(self.curves, self.times)
 
     @property
-    def _own(self) -> list[int]:
+    def _of_curves(self) -> list[int]:
         return [i for i, size in enumerate(self.curves) if size != 1]
 
     @property
@@ -80,7 +80,7 @@ class Layout(NamedTuple):
 
     def sample_times(self, x: Tensor) -> tuple[Tensor, bool]:
         """Times, and whether every curve has its own."""
-        of_curves, shared, lead = self._own, self._shared, len(self.curves)
+        of_curves, shared, lead = self._of_curves, self._shared, len(self.curves)
         x = np.transpose(x, (*of_curves, *shared, *range(lead, x.ndim)))
         if all(self.times[i] == 1 for i in of_curves):
             return x.reshape(x.shape[len(of_curves) :]), False
@@ -99,7 +99,7 @@ class Layout(NamedTuple):
     def _order(self, axes: int) -> list[int]:
         lead = len(self.curves)
         behind = lead + len(self.batch)
-        return [*self._own, *range(lead, behind), *self._shared, *range(behind, axes)]
+        return [*self._of_curves, *range(lead, behind), *self._shared, *range(behind, axes)]
 
     def gradient(self, array: Tensor, core: int, kept: Shape, shape: Shape) -> Tensor:
         """The transpose of `data`: an array per curve, summed along the axes that curves share.

@@ -112,7 +112,7 @@ def from_pymanopt(manifold: Any, *, injectivity_radius: float | None = None) -> 
     )
 
 
-def _has(manifold: Any, name: str) -> bool:
+def _has(manifold: object, name: str) -> bool:
     """Whether a manifold of pymanopt overrides a method of its base class."""
     bases = [cls for cls in type(manifold).__mro__ if cls.__module__ == "pymanopt.manifolds.manifold"]
     method = getattr(type(manifold), name, None)

@@ -308,14 +308,14 @@ class Manifold(Space):
         return partial(Manifold, **options, dim=self._dim, dtype=self._dtype), ()
 
 
-def _shape(value: Any) -> tuple[int, ...]:
+def _shape(value: object) -> tuple[int, ...]:
     sizes = (value,) if isinstance(value, (int, np.integer)) else value
     if not isinstance(sizes, (tuple, list)) or not sizes:
         raise ValidationError(f"point_shape must be a whole number or a tuple of them, not {short_repr(value)}")
     return tuple(whole_number(size, "point_shape", 1) for size in sizes)
 
 
-def _radius(value: Any) -> float:
+def _radius(value: object) -> float:
     requirement = "injectivity_radius must be a positive number, or None for no limit"
     return math.inf if value is None else checked_number(value, requirement, lambda x: x > 0)
 

@@ -9,11 +9,12 @@ from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import DTypeLike
 
 from .._base.arrays import short_repr
 from .._base.typing import AnyFunction, Array
 from .._core import CutLocusError, ValidationError
-from .._spaces import Doubles
+from .._spaces import AnySpace, Doubles
 
 
 class Functions(NamedTuple):
@@ -35,7 +36,7 @@ class Operations:
     one.
     """
 
-    def __init__(self, space: Any) -> None:
+    def __init__(self, space: AnySpace) -> None:
         # A `Manifold`, which is defined in terms of this class.
         self.space: Any = space
 
@@ -122,7 +123,7 @@ class Operations:
         return result.reshape(lead + shape)
 
     def _of_rows(
-        self, name: str, function: AnyFunction, rows: list[Array], shape: tuple[int, ...], dtype: Any
+        self, name: str, function: AnyFunction, rows: list[Array], shape: tuple[int, ...], dtype: DTypeLike
     ) -> Array:
         """Call a function, and check the shape and the type of its result."""
         with np.errstate(all="ignore"):
@@ -236,7 +237,7 @@ def rows_or_nan(log: AnyFunction, p: Array, q: Array, errors: tuple[type[Excepti
     return logs
 
 
-def described(value: Any) -> str:
+def described(value: object) -> str:
     """A function in the name of a manifold."""
     return str(getattr(value, "__qualname__", None) or short_repr(value))
 

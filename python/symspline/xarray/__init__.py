@@ -16,7 +16,7 @@ import xarray as xr
 
 from .._base import VERSION
 from .._base.arrays import checked_flag, short_repr
-from .._base.typing import BCType, Extrapolate, Keywords, Method, OnFailure, SolverOptions
+from .._base.typing import BCType, Extrapolate, Keywords, Method, OnFailure, SolverOptions, TimesLike
 from .._core import ValidationError
 from .._curves.options import checked_extrapolate, extrapolation_mode, quantity_of
 from .._spaces import Space, space_named
@@ -159,7 +159,9 @@ def fit(
     return ds
 
 
-def evaluate(ds: xr.Dataset, x: Any, *, nu: int = 0, extrapolate: Extrapolate = None) -> xr.DataArray:
+def evaluate(
+    ds: xr.Dataset, x: TimesLike | xr.DataArray, *, nu: int = 0, extrapolate: Extrapolate = None
+) -> xr.DataArray:
     """Evaluate the curves of `fit`.
 
     Parameters
@@ -197,7 +199,7 @@ def evaluate(ds: xr.Dataset, x: Any, *, nu: int = 0, extrapolate: Extrapolate = 
     return _along(ds, x, quantity_of(nu), extrapolate)
 
 
-def lift(ds: xr.Dataset, x: Any, *, nu: int = 0, extrapolate: Extrapolate = None) -> xr.DataArray:
+def lift(ds: xr.Dataset, x: TimesLike | xr.DataArray, *, nu: int = 0, extrapolate: Extrapolate = None) -> xr.DataArray:
     """Evaluate the curves by continuous representatives, see `CubicSpline.lift`.
 
     Parameters
@@ -228,7 +230,7 @@ def lift(ds: xr.Dataset, x: Any, *, nu: int = 0, extrapolate: Extrapolate = None
     return _along(ds, x, quantity_of(nu), extrapolate, lifted=True)
 
 
-def speed(ds: xr.Dataset, x: Any, *, extrapolate: Extrapolate = None) -> xr.DataArray:
+def speed(ds: xr.Dataset, x: TimesLike | xr.DataArray, *, extrapolate: Extrapolate = None) -> xr.DataArray:
     """Compute the speed of the curves, the norm of γ'.
 
     Parameters
@@ -372,7 +374,7 @@ def resample(
     return timed_by(values, times, label).rename(da.name)
 
 
-def _along(ds: xr.Dataset, x: Any, quantity: str, extrapolate: Any, lifted: bool = False) -> xr.DataArray:
+def _along(ds: xr.Dataset, x: object, quantity: str, extrapolate: Any, lifted: bool = False) -> xr.DataArray:
     """A quantity of curves at times x."""
     if not isinstance(ds, xr.Dataset):
         raise ValidationError(f"ds is not what symspline.xarray.fit returns: it is {short_repr(ds)}")

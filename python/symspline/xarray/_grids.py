@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
+from numpy.typing import ArrayLike
 
 from .._base.typing import Array, Keywords
 from .._core import ValidationError
@@ -86,7 +87,7 @@ def resample_grid(
     return values.isel(single).rename(da.name)
 
 
-def _ends(bc_type: Any, dims: list[str]) -> tuple[Any, ...]:
+def _ends(bc_type: object, dims: list[str]) -> tuple[Any, ...]:
     """Return the end conditions of each dimension."""
     if not isinstance(bc_type, Mapping):
         return (bc_type,) * len(dims)
@@ -95,14 +96,14 @@ def _ends(bc_type: Any, dims: list[str]) -> tuple[Any, ...]:
     return tuple(bc_type.get(dim, "not-a-knot") for dim in dims)
 
 
-def _mask(where: Any, da: xr.DataArray, point_dims: Sequence[str]) -> xr.DataArray:
+def _mask(where: ArrayLike | None, da: xr.DataArray, point_dims: Sequence[str]) -> xr.DataArray:
     dims = tuple(d for d in da.dims if d not in point_dims)
     if not isinstance(where, xr.DataArray) or where.dtype != bool or not set(where.dims) <= set(dims):
         raise ValidationError(f"where must be a DataArray of bool whose dimensions are among {dims}")
     return where
 
 
-def _axis(da: xr.DataArray, dim: str, x: Any, point_dims: Sequence[str], policy: str, ends: Any) -> _Axis:
+def _axis(da: xr.DataArray, dim: str, x: ArrayLike, point_dims: Sequence[str], policy: str, ends: object) -> _Axis:
     """Check the positions along one dimension, and divide them into blocks."""
     times = None if dim in da.coords else times_along(da, dim, None, point_dims, f"Make one the coordinate of {dim!r}")
     if times is not None:

@@ -10,11 +10,12 @@ from typing import Any, NamedTuple, Unpack
 
 import numpy as np
 import xarray as xr
+from numpy.typing import ArrayLike
 
 from .._base.arrays import checked_number
 from .._base.exceptions import SymsplineError
 from .._base.faults import silenced
-from .._base.typing import Array, Keywords, SmoothOptions
+from .._base.typing import Array, Keywords, SmoothOptions, TimesLike
 from .._curves.missing import missing_points, missing_times
 from .._curves.options import checked_extrapolate, extrapolation_mode
 from .._smoothing import SmoothingWarning, make_smoothing_spline
@@ -126,7 +127,7 @@ def smooth(
         level = checked_number(level, "level must lie between 0 and 1", lambda x: 0 < x < 1)
     chosen: Keywords = {"time": time, "skipna": True, "on_failure": given["on_failure"]}
     (_, *rest), spec, knots = spec_of(da, space, dim, point_dims, where, "natural", **chosen)
-    own_times, t, label = "t" in spec["names"], spec["t"], dim if knots is None else knots.name
+    has_times, t, label = "t" in spec["names"], spec["t"], dim if knots is None else knots.name
     if knots is not None and t is not None and (gone := missing_times(t)).any():
         knots, t = knots[~gone], t[~gone]
     _rehearse_options(t, da.sizes[dim] if t is None else len(t), given)
@@ -135,7 +136,7 @@ def smooth(
     curves = [d for d in da.dims if d not in (dim, *point_dims)]
     times, axes = times_with_names(to, label, point_dims, curves)
     ends = "periodic" if given.get("bc_type") == "periodic" else "natural"
-    if not own_times:
+    if not has_times:
         policy = extrapolation_mode(checked_extrapolate(given.get("extrapolate")), ends)
         rehearse(times, t, da.sizes[dim] if t is None else len(t), policy)
     inputs: Inputs = [(bare(da, dim), [KNOTS, *point_dims]), (times, axes), *rest]
@@ -167,7 +168,7 @@ def unit_of(space: AnySpace, da: xr.DataArray, name: str) -> Keywords:
     return {"units": da.attrs["units"]} if space._name == "euclidean" and "units" in da.attrs else {}
 
 
-def _rehearse_options(t: Any, count: int, given: Keywords) -> None:
+def _rehearse_options(t: TimesLike | None, count: int, given: Keywords) -> None:
     """Raise errors about the options now, before any block is computed."""
     # Tuples are for poses, and end conditions may have vectors of the space.
     shaped = [name for name in ("lam", "sigma", "bc_type") if np.ndim(given.get(name, 0)) != 0]
@@ -226,13 +227,13 @@ def _smooth_timed(
     """Smooth curves without the samples whose time is missing. Curves with fewer than two samples are NaN."""
     space, nodes = wanted.space, t.shape[-1]
     whole = rows.shape[: rows.ndim - 1 - len(space.point_shape)]
-    own_shape = at.shape[len(whole) :] if per_curve else at.shape
+    times_shape = at.shape[len(whole) :] if per_curve else at.shape
     times = times_of_rows(t, whole, nodes)
     rows = rows.reshape(-1, nodes, *space.point_shape)
     chosen = np.ones(len(rows), bool) if mask is None else mask.reshape(-1)
-    at = at.reshape(-1, *own_shape) if per_curve else at
+    at = at.reshape(-1, *times_shape) if per_curve else at
     parts = 2 if is_several(space) else 1
-    shapes = [(*own_shape, *space.point_shape), *[own_shape] * (len(wanted.spreads) * parts)]
+    shapes = [(*times_shape, *space.point_shape), *[times_shape] * (len(wanted.spreads) * parts)]
     outputs = [np.full((len(rows), *shape), np.nan, space.dtype if i == 0 else float) for i, shape in enumerate(shapes)]
     for dtype in (*(part for part in _COLUMNS.values() for _ in range(parts)), np.bool_):
         outputs.append(np.full(len(rows), np.nan if dtype is np.float64 else False, dtype))
@@ -248,7 +249,9 @@ def _smooth_timed(
     return [part.reshape(*whole, *part.shape[1:]) for part in outputs]
 
 
-def _smooth_rows(rows: Array, t: Any, at: Array, per_curve: bool, mask: Array | None, wanted: _Wanted) -> list[Array]:
+def _smooth_rows(
+    rows: Array, t: ArrayLike, at: Array, per_curve: bool, mask: Array | None, wanted: _Wanted
+) -> list[Array]:
     """Smooth curves whose times are all known: values, spreads, columns of the report, and convergence."""
     space = wanted.space
     whole = rows.shape[: rows.ndim - 1 - len(space.point_shape)]

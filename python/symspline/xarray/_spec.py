@@ -55,14 +55,14 @@ def times_along(
                 f"{short_repr(time)}. Such coordinates are: {names}."
             )
         return cast(xr.DataArray, da.coords[time])
-    has_own = dim in da.coords
+    has_coordinate = dim in da.coords
     others = [name for name in along if name != dim and _are_times(name, da.coords[name])]
-    if has_own and (not others or _are_times(dim, da.coords[dim])):
+    if has_coordinate and (not others or _are_times(dim, da.coords[dim])):
         return cast(xr.DataArray, da.coords[dim])
     if not others:
         return None
-    if has_own or len(others) > 1:
-        named = [dim] * has_own + others
+    if has_coordinate or len(others) > 1:
+        named = [dim] * has_coordinate + others
         names = ", ".join(f"{name!r} with dimensions {da.coords[name].dims}" for name in named)
         raise ValidationError(f"several coordinates could hold the times along {dim!r}: {names}. {remedy}.")
     return cast(xr.DataArray, da.coords[others[0]])
@@ -352,7 +352,7 @@ def _vector(vector: Any, name: str, space: Space, point_dims: Sequence[str], cur
 
 
 def times_with_names(
-    x: Any, dim: Hashable, point_dims: Sequence[str], curves: list[Hashable]
+    x: object, dim: Hashable, point_dims: Sequence[str], curves: list[Hashable]
 ) -> tuple[xr.DataArray, list[Hashable]]:
     """Times with names of their dimensions, and those of them that no curve has.
 
@@ -396,7 +396,7 @@ COLUMNS = columns_of(Report)
 
 
 def apply(
-    function: Any, inputs: Inputs, output_core_dims: list[list[Hashable]], output_dtypes: list[Any], **kwargs: Any
+    function: object, inputs: Inputs, output_core_dims: list[list[Hashable]], output_dtypes: list[Any], **kwargs: Any
 ) -> tuple[xr.DataArray, ...]:
     """The outputs of a function of blocks."""
     arrays = _cut_alike([array for array, _ in inputs])
@@ -554,22 +554,22 @@ def _values_of_valid(
     """A quantity of curves through their valid samples. Missing sampling times of a curve give NaN."""
     space = options["space"]
     nodes, shape = points.shape[len(batch)], () if options["quantity"] == "speed" else space.point_shape
-    own_shape = x.shape[len(batch) :] if per_curve else x.shape
+    times_shape = x.shape[len(batch) :] if per_curve else x.shape
     rows, rates = (array.reshape(-1, nodes, *space.point_shape) for array in (points, velocities))
     times = times_of_rows(t, batch, nodes)
-    at = np.broadcast_to(x, (*batch, *own_shape)).reshape(len(rows), *own_shape) if per_curve else x
-    values = np.full((len(rows), *own_shape, *shape), np.nan, space.dtype if shape else float)
+    at = np.broadcast_to(x, (*batch, *times_shape)).reshape(len(rows), *times_shape) if per_curve else x
+    values = np.full((len(rows), *times_shape, *shape), np.nan, space.dtype if shape else float)
     valid = space._where_finite(rates) & ~missing_times(times)
     for curves, kept, knots, here, gone in of_equal_length(valid, times, at, per_curve):
         chosen = curves[:, None], kept
         try:
-            part = values_at(rows[chosen], rates[chosen], here, t=knots, x_axes=len(own_shape), **options)
+            part = values_at(rows[chosen], rates[chosen], here, t=knots, x_axes=len(times_shape), **options)
         except ValidationError as error:
             raise named_curve(error, batch, curves) from None
         if gone is not None:
             part[gone] = np.nan
         values[curves] = part
-    return values.reshape(*batch, *own_shape, *shape)
+    return values.reshape(*batch, *times_shape, *shape)
 
 
 def per_curve_times(x: Array, batch: tuple[int, ...], axes: int) -> tuple[Array, bool]:
