@@ -183,7 +183,7 @@ def evaluate(t: Tensor, points: Tensor, velocities: Tensor, space: AnySpace | st
 
 @full_precision
 def fit(
-    t: Tensor, points: Tensor, space: Space | str, *, bc_type: CubicBCType = "natural", steps: int = 40
+    t: ArrayLike, points: ArrayLike, space: Space | str, *, bc_type: CubicBCType = "natural", steps: int = 40
 ) -> tuple[jax.Array, jax.Array]:
     """Compute the velocities of C² splines through points, in JAX alone.
 
