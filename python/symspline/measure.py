@@ -183,9 +183,9 @@ class Points(Measurement):
 
     def _with_sigma(self, sigma: Numbers) -> Points:
         """Return the same points with other standard deviations."""
-        weighted = copy(self)
-        weighted.sigma = sigma
-        return weighted
+        points = copy(self)
+        points.sigma = sigma
+        return points
 
 
 class Velocities(Measurement):
@@ -492,10 +492,10 @@ def measurement_without_missing(given: Measurement) -> Measurement:
     present = present_in(given)
     if present.all():
         return given
-    kept = copy(given)
+    measurement = copy(given)
     for name, value in {"t": filled(given.t), **_values(given)}.items():
-        setattr(kept, name, _rows(value, present))
-    return kept
+        setattr(measurement, name, _rows(value, present))
+    return measurement
 
 
 def _values(given: Measurement) -> Keywords:
