@@ -276,9 +276,10 @@ class CurveArrays:
         for factor, gaps, points in zip(self.factors, self._gaps, self._by_factor(values), strict=True):
             for curve in np.argwhere(gaps.any(axis=-1)):
                 index = tuple(curve)
-                t, curve_times = self.times[index] if self.times.ndim > 1 else self.times, x[index] if per_curve else x
-                nodes = np.asarray(np.searchsorted(t[:-2], curve_times))
-                at = (t[nodes] == curve_times) & gaps[index][nodes]
+                t = self.times[index] if self.times.ndim > 1 else self.times
+                sampled = x[index] if per_curve else x
+                nodes = np.asarray(np.searchsorted(t[:-2], sampled))
+                at = (t[nodes] == sampled) & gaps[index][nodes]
                 points[index][at] = factor.points[index][nodes[at]]
 
     def _evaluate_into(

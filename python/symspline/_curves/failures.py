@@ -18,6 +18,7 @@ from .._spaces import (
     AnySpace,
     Doubles,
     Euclidean,
+    Space,
     SpecialEuclidean,
     SpecialOrthogonal,
     Sphere,
@@ -285,7 +286,7 @@ class _Far(NamedTuple):
 
 def _far_curves(space: AnySpace, points: Array, valid: Any = True, number: Sequence[int] = ()) -> list[_Far]:
     """Return the valid curves of a batch, in one factor, of which more than half of the steps are long."""
-    steps = points.shape[-1 - len(space.point_shape)] - 1
+    steps = points.shape[-1 - len(space._point_shape)] - 1
     if steps < _LEAST or isinstance(space, Euclidean):
         return []
     far = np.where(valid, np.count_nonzero(cut_fractions(space, points) > FAR, axis=-1), 0)
@@ -332,6 +333,8 @@ def cut_fractions(space: AnySpace, points: Array) -> Doubles:
     space = cover_of(space)
     finite = space._where_finite(points)
     good = finite[..., :-1] & finite[..., 1:]
+    if not isinstance(space, (Manifold, Unitary)):
+        return np.where(good, cut_fractions_in_core(space, points), np.nan)
     result = np.full(good.shape, np.nan)
     p, q = (x[good] for x in space._neighbours(points))
     if not len(p):
@@ -341,14 +344,18 @@ def cut_fractions(space: AnySpace, points: Array) -> Doubles:
         with suppress(CutLocusError):
             result[good] = space.distance(p, q) / space.injectivity_radius
         return result
-    fractions = space._apply("cut_fraction", p=p, q=q)
-    if isinstance(space, Unitary):
-        # A random global phase alone is often below the limit. The root mean square of the angles, doubled, exceeds it
-        # more often.
-        rms = space.distance(p, q) / math.sqrt(space._parameters[0])
-        fractions = np.maximum(fractions, math.sqrt(2) * rms / math.pi)
-    result[good] = fractions
+    # A random global phase alone is often below the limit. The root mean square of the angles, doubled, exceeds it more
+    # often.
+    rms = space.distance(p, q) / math.sqrt(space._parameters[0])
+    result[good] = np.maximum(cut_fractions_in_core(space, points)[good], math.sqrt(2) * rms / math.pi)
     return result
+
+
+def cut_fractions_in_core(space: Space, points: Array) -> Doubles:
+    """Return the same, as the core computes it on its spaces; arbitrary where a point is not finite."""
+    starts, ends = space._neighbours(space._as_doubles(np.ascontiguousarray(points)))
+    fractions = space._handle.apply("cut_fraction", [np.ascontiguousarray(starts), np.ascontiguousarray(ends)])
+    return fractions.reshape(starts.shape[: -len(space._point_shape)])
 
 
 # ---- recordings in which the last point of a sensor was repeated at new times (sample and hold) ----

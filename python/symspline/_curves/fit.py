@@ -459,10 +459,13 @@ def solve_tasks(
 def validated_tasks(space: Space, tasks: list[Task], options: Options) -> tuple[list[Task], list[Fault]]:
     """Validate tasks and project their points. A curve that is skipped in one factor is masked in all of them."""
     validations = _in_factors(space, lambda _, task: _validate(task, options), tasks)
-    first_faults = {fault.curve: fault for _, faults in reversed(validations) for fault in faults}
+    valid, faults_of_factors = zip(*validations, strict=True)
+    if not any(faults_of_factors):
+        return list(valid), []
+    first_faults = {fault.curve: fault for faults in reversed(faults_of_factors) for fault in faults}
     faults = [first_faults[curve] for curve in sorted(first_faults)]
     mask = without(tasks[0].mask, faults, tasks[0].batch)
-    return [task._replace(mask=mask) for task, _ in validations], faults
+    return [task._replace(mask=mask) for task in valid], faults
 
 
 def _in_factors(space: AnySpace, work: Callable[[Space, Any], _T], values: Sequence[Any]) -> list[_T]:

@@ -627,7 +627,7 @@ FLOOR = 1e-8
 _WILD = 10.0
 
 
-class Found(NamedTuple):
+class IterationResult(NamedTuple):
     """Result of the iteration for every curve.
 
     Attributes:
@@ -712,7 +712,7 @@ def iterate(
     tol: float,
     most: int | None,
     advance: Callable[[int], object] | None,
-) -> Found:
+) -> IterationResult:
     """Solve for the velocities of all curves.
 
     Args:
@@ -748,7 +748,7 @@ def iterate(
     with np.errstate(all="ignore"):
         rate = np.where(counts > 1, (np.maximum(residual, 1e-300) / first) ** (1 / np.maximum(counts - 1, 1)), 0.0)
     converged = np.array([state.converged for state in states])
-    return Found(problem.velocities(best), converged, counts, residual, rate)
+    return IterationResult(problem.velocities(best), converged, counts, residual, rate)
 
 
 def residuals(problem: Problem, matrix: Tridiagonal, u: Array, differences: Doubles, pace: Doubles) -> Doubles:

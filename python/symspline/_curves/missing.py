@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import functools
 import inspect
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
@@ -218,15 +218,6 @@ def recounted(error: SymsplineError, rows: Sequence[NDArray[np.intp]]) -> Symspl
         return sample.argument, int(present[sample.node]) if sample.node < len(present) else sample.node
 
     return renamed(error, name)
-
-
-@contextmanager
-def missing_named(data: Sequence[Points], times: Doubles | None = None) -> Iterator[None]:
-    """Add to errors about missing samples how they are omitted."""
-    try:
-        yield
-    except ValidationError as error:
-        raise with_remedy(error, data, times) from None
 
 
 def with_remedy(

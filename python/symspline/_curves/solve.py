@@ -158,7 +158,7 @@ def validate(task: Task) -> tuple[Task, list[Fault]]:
         space._handle, times, points, ends, tol, offsets, None if mask is None else mask.ravel().tolist(), skip
     )
     faults = [from_core(one, Columns.empty(0), 0.0, False) for one in raw]
-    return task._replace(points=on_space, tol=None, mask=without(mask, faults, task.batch)), faults
+    return task._replace(points=on_space, tol=None, mask=without(mask, faults, task.batch) if faults else mask), faults
 
 
 def without(mask: Mask | None, faults: list[Fault], batch: tuple[int, ...]) -> Mask | None:

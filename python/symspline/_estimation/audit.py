@@ -28,7 +28,7 @@ _SIMILAR = 0.6
 _SPANS = 100.0
 
 
-def audit(setup: Setup, found: Solution) -> float:
+def audit(setup: Setup, solution: Solution) -> float:
     """Issue one warning that names all sensors and constants that do not agree with their standard deviations.
 
     Returns
@@ -36,9 +36,9 @@ def audit(setup: Setup, found: Solution) -> float:
     float
         Ratio of all residuals to their standard deviations, hardly affected by outliers under a robust loss.
     """
-    sensors = examined(setup, found)
+    sensors = examined(setup, solution)
     failed = [sensor for sensor in sensors if sensor.finding.failed]
-    complaints = [described(sensor) for sensor in failed] + _of_priors(setup, found)
+    complaints = [described(sensor) for sensor in failed] + _of_priors(setup, solution)
     if complaints:
         remedies = unit_hints(setup.terms) or advice(failed)
         warn(
@@ -49,25 +49,26 @@ def audit(setup: Setup, found: Solution) -> float:
     known = [(sensor.finding.ratio, sensor.finding.freedom) for sensor in sensors if np.isfinite(sensor.finding.ratio)]
     ratios, freedoms = np.array(known).reshape(-1, 2).T
     freedom = freedoms.sum()
-    if found.distance > _DISTANCE:
+    if solution.distance > _DISTANCE:
         warn(
-            f"The curve is {found.distance:.2g} standard deviations from the minimum of its objective. It turns by up "
-            f"to {found.turn:.2g} rad between two knots, where the linearised problem is inaccurate. Pass more knots.",
+            f"The curve is {solution.distance:.2g} standard deviations from the minimum of its objective. It turns by "
+            f"up to {solution.turn:.2g} rad between two knots, where the linearised problem is inaccurate. Pass more "
+            "knots.",
             SmoothingWarning,
         )
     return float(np.sqrt((ratios**2 * freedoms).sum() / freedom)) if freedom else float("nan")
 
 
-def examined(setup: Setup, found: Solution) -> list[Sensor]:
+def examined(setup: Setup, solution: Solution) -> list[Sensor]:
     """Examine all sensors."""
     sensors = []
-    leverages = _leverages(setup, found)
+    leverages = _leverages(setup, solution)
     labels = [term.label for term in setup.terms]
-    for term, own, (leverage, between) in zip(setup.terms, found.rows, leverages, strict=True):
+    for term, rows_of_term, (leverage, between) in zip(setup.terms, solution.rows, leverages, strict=True):
         order = np.argsort(term.times, kind="stable")
-        rows = term.informative(own.residuals)[order]
+        rows = term.informative(rows_of_term.residuals)[order]
         entries = max(1, int(np.isfinite(rows).sum()))
-        corner = corner_of(term.loss, own.residuals.shape[1])
+        corner = corner_of(term.loss, rows_of_term.residuals.shape[1])
         exact = not isinstance(term, FunctionTerm)
         given = Residuals(rows, leverage / entries, between / entries, term.loss, corner, exact)
         name = f"{term.label} ({type(term.given).__name__})"
@@ -77,27 +78,31 @@ def examined(setup: Setup, found: Solution) -> list[Sensor]:
     return sensors
 
 
-def _leverages(setup: Setup, found: Solution) -> list[tuple[float, float]]:
+def _leverages(setup: Setup, solution: Solution) -> list[tuple[float, float]]:
     """Return the sum of the leverages of each term, and for points the sum of the covariances between neighbours.
 
     The leverage of a measurement is the variance of its fitted value. That of all constants is at most their number.
     """
     # The leverage is that of the curve for known parameters.
-    posterior, kinds = Posterior.of(*found.posterior[:3]), end_kinds(setup.bc_type)
+    posterior, kinds = Posterior.of(*solution.posterior[:3]), end_kinds(setup.bc_type)
     m, result = posterior.size, []
-    for term, own in zip(setup.terms, found.rows, strict=True):
-        orders = [nu for nu, jacobian in enumerate(own.jacobians) if jacobian is not None]
+    for term, rows_of_term in zip(setup.terms, solution.rows, strict=True):
+        orders = [nu for nu, jacobian in enumerate(rows_of_term.jacobians) if jacobian is not None]
         n = len(term.times)
         order = np.argsort(term.times, kind="stable")
         some = np.unique(np.linspace(0, n - 1, min(n, _SAMPLE)).round().astype(int))
-        x = np.clip(term.shifted_times(found.values)[order], setup.knots[0], setup.knots[-1])
+        x = np.clip(term.shifted_times(solution.values)[order], setup.knots[0], setup.knots[-1])
 
-        def rows(at: NDArray[np.intp], orders: list[int], own: Rows = own, order: Any = order) -> Any:
-            jacobians: list[Any] = own.jacobians
+        def rows(
+            at: NDArray[np.intp], orders: list[int], rows_of_term: Rows = rows_of_term, order: NDArray[np.intp] = order
+        ) -> Doubles:
+            jacobians: list[Any] = rows_of_term.jacobians
             whole = np.concatenate([jacobians[nu][order[at]] for nu in orders], axis=-1)
-            return whole if own.roots is None else whole * own.roots[order[at], :, None]
+            return whole if rows_of_term.roots is None else whole * rows_of_term.roots[order[at], :, None]
 
-        def covariance(at: NDArray[np.intp], orders: list[int], others: Any = None, x: Doubles = x) -> Doubles:
+        def covariance(
+            at: NDArray[np.intp], orders: list[int], others: NDArray[np.intp] | None = None, x: Doubles = x
+        ) -> Doubles:
             there = None if others is None else np.ascontiguousarray(x[others])
             return posterior.coupled(setup.knots, (), kinds, np.ascontiguousarray(x[at]), there, orders, np.arange(m))
 
@@ -115,16 +120,16 @@ def _leverages(setup: Setup, found: Solution) -> list[tuple[float, float]]:
     return result
 
 
-def _of_priors(setup: Setup, found: Solution) -> list[str]:
+def _of_priors(setup: Setup, solution: Solution) -> list[str]:
     """Describe constants that are far from their priors."""
     complaints = []
     for name, constant in setup.constants.items():
         if constant.sigma is None:
             continue
-        off = (found.values[name] - constant.start) / constant.sigma
+        off = (solution.values[name] - constant.start) / constant.sigma
         if np.abs(off).max() > _PRIOR:
             complaints.append(
-                f"The constant {name!r} is {found.values[name].round(6).tolist()}, {np.abs(off).max():.2g} standard "
+                f"The constant {name!r} is {solution.values[name].round(6).tolist()}, {np.abs(off).max():.2g} standard "
                 "deviations from its prior. Check the units and the frame of its measurements, or pass a larger sigma "
                 "for the constant."
             )
@@ -145,7 +150,9 @@ def unit_hints(terms: list[Term]) -> list[str]:
     for term in terms:
         if isinstance(term, RateTerm):
             points = [
-                own for own in terms if isinstance(own, PointTerm) and own.roots is None and own.parts == term.parts
+                points_term
+                for points_term in terms
+                if isinstance(points_term, PointTerm) and points_term.roots is None and points_term.parts == term.parts
             ]
             ratio = _rates_over_steps(term, points)
             if ratio is not None and abs(np.log(ratio / DEGREES)) < _SIMILAR:
@@ -154,7 +161,7 @@ def unit_hints(terms: list[Term]) -> list[str]:
                     "radians instead of degrees per unit of time."
                 )
         if isinstance(term, ForceTerm):
-            size, g = (float(np.median(np.linalg.norm(own, axis=-1))) for own in (term.f, term.gravity[None]))
+            size, g = (float(np.median(np.linalg.norm(vectors, axis=-1))) for vectors in (term.f, term.gravity[None]))
             if size > 0 and g > 0 and abs(np.log(size * -GRAVITY[2] / g)) < _SIMILAR:
                 hints.append(
                     f"The specific force of {term.label} is {size:.2g}, but gravity is {g:.3g}: pass it in the units "

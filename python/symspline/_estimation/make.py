@@ -38,7 +38,9 @@ from .._smoothing.audit import warn_of_bounds
 from .._smoothing.noise import grouped, join, per_part, smoothed_spaces
 from .._smoothing.report import Parameter
 from .._smoothing.solve import Knots, thin_knots
+from .._smoothing.spline import AnySmoothingSpline
 from .._spaces import (
+    AnySpace,
     Array,
     Doubles,
     Product,
@@ -50,7 +52,6 @@ from .._spaces import (
     space_named,
 )
 from .._splines.base import Curve
-from .._splines.cubic import CubicSpline
 from ..manifolds._manifold import refuse_functions
 from ..measure import (
     SKIPNA,
@@ -123,7 +124,7 @@ def estimate(
 def estimate(
     measurements: Sequence[Measurement],
     knots: TimesLike,
-    space: Space[Any] | str,
+    space: AnySpace | str,
     *,
     penalty: SmoothingPenalty | None = None,
     lam: Numbers | None = None,
@@ -137,7 +138,7 @@ def estimate(
     on_failure: OnFailure = "raise",
     progress: Progress | None = None,
     skipna: bool = False,
-) -> SmoothingSpline[Any, Any]:
+) -> AnySmoothingSpline:
     r"""Fit a C² curve to measurements of any kind, such as points, rates, directions and accelerations.
 
     The curve minimises the sum of squared residuals of all measurements in standard deviations, plus λ times the
@@ -275,9 +276,9 @@ def estimate(
     if not isinstance(measurements, (list, tuple)):
         raise ValidationError(f"measurements must be a list of symspline.measure, not {short_repr(measurements)}")
     given = list(measurements)
-    for i, own in enumerate(given):
-        if not isinstance(own, Measurement):
-            raise ValidationError(f"measurements[{i}] must be one of symspline.measure, not {short_repr(own)}")
+    for i, measurement in enumerate(given):
+        if not isinstance(measurement, Measurement):
+            raise ValidationError(f"measurements[{i}] must be one of symspline.measure, not {short_repr(measurement)}")
     if not given:
         raise ValidationError("there are no measurements")
     if checked_flag(skipna, "skipna"):
@@ -341,9 +342,9 @@ def _smoothed(
     given: Points,
     axis: TimeAxis,
     shown: Array,
-    knots: Any,
-    space: Space[Any],
-    lam: Any,
+    knots: TimesLike,
+    space: AnySpace,
+    lam: Numbers | None,
     loss: Loss,
     **options: Any,
 ) -> PointsSpline[Any]:
@@ -356,7 +357,7 @@ def _smoothed(
 
     def in_order(value: Any) -> Any:
         if isinstance(value, tuple):
-            return tuple(in_order(own) for own in value)
+            return tuple(in_order(part) for part in value)
         array = None if value is None else as_array(value, "measurements[0]")
         return value if array is None or array.shape[:1] != order.shape else array[order]
 
@@ -369,10 +370,10 @@ def _smoothed(
     weights, frames, sigma = given.weights, given.frames, None
     if given.sigma is not None:
         # The residuals in the objective are in standard deviations, so that their noise has variance one.
-        each = grouped(space, [term.precision(len(order)) for term in terms])
-        of_factors = tuple(own[0] if len(own) == 1 else tuple(own) for own in each)
+        precisions = grouped(space, [term.precision(len(order)) for term in terms])
+        of_factors = tuple(of_factor[0] if len(of_factor) == 1 else tuple(of_factor) for of_factor in precisions)
         weights, frames, sigma = of_factors if isinstance(space, Product) else of_factors[0], None, 1.0
-    found = make_smoothing_spline(
+    fitted = make_smoothing_spline(
         in_order(t),
         in_order(y),
         space,
@@ -384,15 +385,15 @@ def _smoothed(
         loss=given.loss or loss,
         **options,
     )
-    return PointsSpline.of(found, given, terms)
+    return PointsSpline.of(fitted, given, terms)
 
 
-def _knots(knots: Any, given: list[Measurement]) -> tuple[TimeAxis, Array, Doubles]:
+def _knots(knots: TimesLike, given: list[Measurement]) -> tuple[TimeAxis, Array, Doubles]:
     """Return the time axis, the knots as the user sees them, and all times of the measurements."""
-    each, zone = [], None
-    for i, own in enumerate(given):
-        times, own_zone = times_of(own.t, f"measurements[{i}].t")
-        zone = zone or own_zone
+    arrays, zone = [], None
+    for i, measurement in enumerate(given):
+        times, zone_of_times = times_of(measurement.t, f"measurements[{i}].t")
+        zone = zone or zone_of_times
         array = as_array(times, f"measurements[{i}].t")
         if array.ndim != 1 or not len(array):
             raise ValidationError(f"measurements[{i}].t has shape {array.shape}, but shape (n,) is needed")
@@ -403,14 +404,14 @@ def _knots(knots: Any, given: list[Measurement]) -> tuple[TimeAxis, Array, Doubl
             remedy = "" if np.isinf(array[bad[0]]) else SKIPNA
             raise ValidationError(f"measurements[{i}].t[{bad[0]}] is {array[bad[0]]}, but times must be finite{remedy}")
         # For points alone, `make_smoothing_spline` issues this warning.
-        if len(given) > 1 or not isinstance(own, Points) or not _is_plain(own):
+        if len(given) > 1 or not isinstance(measurement, Points) or not _is_plain(measurement):
             warn_of_rounded_times(np.sort(array), f"measurements[{i}].t")
-        each.append(array)
-    if len({array.dtype.kind in "Mm" for array in each}) > 1:
+        arrays.append(array)
+    if len({array.dtype.kind in "Mm" for array in arrays}) > 1:
         raise ValidationError("some measurements have dates and others have numbers as times. Use one of them.")
     if isinstance(knots, str) and knots != "auto":
         raise ValidationError(f"knots must be a number, an array or 'auto', not {short_repr(knots)}")
-    union = np.unique(np.concatenate(each))
+    union = np.unique(np.concatenate(arrays))
     if isinstance(knots, str) or (isinstance(knots, (int, np.integer)) and not isinstance(knots, bool)):
         if len(union) < 2:
             raise ValidationError("the measurements have one time only. A curve needs measurements at two or more.")
@@ -451,32 +452,32 @@ def _even(union: Array, count: int) -> Array:
     fraction = np.linspace(0, 1, count)
     whole = union.dtype.kind in "Mm"
     step = (union[-1] - union[0]).astype(np.float64) * fraction if whole else (union[-1] - union[0]) * fraction
-    found: Array = union[0] + (step.astype(np.int64).astype((union[-1] - union[0]).dtype) if whole else step)
-    return found
+    middle: Array = union[0] + (step.astype(np.int64).astype((union[-1] - union[0]).dtype) if whole else step)
+    return middle
 
 
-def _terms(given: list[Measurement], axis: TimeAxis, space: Space[Any], loss: Loss) -> list[Term]:
+def _terms(given: list[Measurement], axis: TimeAxis, space: AnySpace, loss: Loss) -> list[Term]:
     terms: list[Term] = []
-    for i, own in enumerate(given):
+    for i, measurement in enumerate(given):
         label = f"measurements[{i}]"
         try:
-            times, _ = axis.at(own.t, (), False)
+            times, _ = axis.at(measurement.t, (), False)
         except ValidationError as error:
             raise ValidationError(f"{label}.t: {error}") from None
-        terms += bind(own, label, np.ascontiguousarray(times), space, loss)
+        terms += bind(measurement, label, np.ascontiguousarray(times), space, loss)
     return terms
 
 
 def _constants(terms: list[Term]) -> dict[str, Constant]:
-    found: dict[str, Constant] = {}
+    constants: dict[str, Constant] = {}
     for term in terms:
-        for name, own in term.constants.items():
-            if found.setdefault(name, own) is not own:
+        for name, constant in term.constants.items():
+            if constants.setdefault(name, constant) is not constant:
                 raise ValidationError(
                     f"two different constants have the name {name!r}. Pass Constant(..., name=...), or the same object "
                     "if they are equal."
                 )
-    return found
+    return constants
 
 
 def _check_range(terms: list[Term], times: Doubles) -> None:
@@ -497,52 +498,53 @@ def _curve(
     setup: Setup,
     search: Search,
     given: list[Measurement],
-    space: Space[Any],
+    space: AnySpace,
     axis: TimeAxis,
     shown: Array,
-    policy: Any,
-    on_failure: Any,
-) -> SmoothingSpline[Any, Any]:
-    found = search.found
-    if not found.failure:
-        ratio = audit(setup, found)
+    policy: Extrapolate,
+    on_failure: OnFailure,
+) -> AnySmoothingSpline:
+    solution = search.solution
+    if not solution.failure:
+        ratio = audit(setup, solution)
         if not setup.least_squares:
             # The sum of squares in the iteration contains the weights of the robust loss.
-            found = found._replace(reports=[replace(report, sigma=ratio) for report in found.reports])
+            solution = solution._replace(reports=[replace(report, sigma=ratio) for report in solution.reports])
     factors = factors_of(space)
     parts, ends = [], []
-    for factor, own in zip(factors, grouped(space, found.points), strict=True):
-        doubles = np.ascontiguousarray(factor._as_doubles(join(factor, own)))
+    for factor, points in zip(factors, grouped(space, solution.points), strict=True):
+        doubles = np.ascontiguousarray(factor._as_doubles(join(factor, points)))
         parts.append(CorePoints(doubles, 0.0, (), len(setup.knots)))
         ends.append(read_ends(setup.bc_type, factor, ())[0])
     through = fit(FitProblem(space, setup.knots, parts, ends, DEFAULTS, check=False))
     parameters = {
-        name: Parameter(found.values[name], found.covariance[own, own]) for name, own in setup.columns.items()
+        name: Parameter(solution.values[name], solution.covariance[index, index])
+        for name, index in setup.columns.items()
     }
     bc_type: Any = setup.bc_type
-    curve: EstimatedSpline[Any] = EstimatedSpline._of(
-        CubicSpline._fitted(axis, shown, through.curve, bc_type, policy, through.reports()),
-        in_parts(found.posterior, found.reports, setup.spaces),
+    fitted: EstimatedSpline[Any] = EstimatedSpline._fitted(axis, shown, through.curve, bc_type, policy, through)
+    curve = fitted._with_results(
+        in_parts(solution.posterior, solution.reports, setup.spaces),
         parameters,
-        [long_gaps(setup, found, number) for number in range(len(setup.spaces))],
+        [long_gaps(setup, solution, number) for number in range(len(setup.spaces))],
         tuple(given),
-        tuple(_residuals_of(setup, found, f"measurements[{i}]") for i in range(len(given))),
+        tuple(_residuals_of(setup, solution, f"measurements[{i}]") for i in range(len(given))),
     )
-    if found.failure:
+    if solution.failure:
         hints = unit_hints(setup.terms)
-        raise_or_warn([Fault(0, UNCONVERGED, " ".join([found.failure, *hints]))], on_failure, curve)
+        raise_or_warn([Fault(0, UNCONVERGED, " ".join([solution.failure, *hints]))], on_failure, curve)
     search.warn_of_rival(shown)
     for i, one in enumerate(given):
         if isinstance(one, Points) and not isinstance(one.y, tuple):
             warn_of_held_points(np.asarray(one.t), [np.asarray(one.y)], (), SmoothingWarning, f"measurements[{i}].y")
     # Parabolas have no jerk, so that the largest λ does not need a warning.
-    stiff = [setup.penalty == "jerk" and report.df < _PARABOLA for report in found.reports]
-    chosen = [np.asarray(np.isnan(lam) and not own) for lam, own in zip(setup.lams, stiff, strict=True)]
-    warn_of_bounds(space, list(found.reports), chosen, [np.asarray(np.inf)] * len(setup.spaces))
+    stiff = [setup.penalty == "jerk" and report.df < _PARABOLA for report in solution.reports]
+    chosen = [np.asarray(np.isnan(lam) and not parabola) for lam, parabola in zip(setup.lams, stiff, strict=True)]
+    warn_of_bounds(space, list(solution.reports), chosen, [np.asarray(np.inf)] * len(setup.spaces))
     return curve
 
 
-def _residuals_of(setup: Setup, found: Solution, label: str) -> Doubles | tuple[Doubles, ...]:
+def _residuals_of(setup: Setup, solution: Solution, label: str) -> Doubles | tuple[Doubles, ...]:
     """Return the residuals of one measurement, which has one term per part of the space."""
-    own = [rows.residuals for term, rows in zip(setup.terms, found.rows, strict=True) if term.label == label]
-    return own[0] if len(own) == 1 else tuple(own)
+    of_parts = [rows.residuals for term, rows in zip(setup.terms, solution.rows, strict=True) if term.label == label]
+    return of_parts[0] if len(of_parts) == 1 else tuple(of_parts)

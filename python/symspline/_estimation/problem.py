@@ -9,7 +9,7 @@ from functools import cache, cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from .. import _core
 from .._base.arrays import as_array, refuse
@@ -20,6 +20,7 @@ from .._smoothing.audit import roots_of
 from .._smoothing.noise import grouped, join, parts_of_factor, read_precision, smoothed_spaces, split
 from .._smoothing.report import Posterior, SmoothingReport, coordinates
 from .._spaces import (
+    AnySpace,
     Array,
     Doubles,
     Euclidean,
@@ -115,11 +116,11 @@ class Term:
         self.noise = broadcast(array, f"{self.label}.sigma", (len(self.times), size))
         refuse(~(self.noise > 0), f"{self.label}.sigma", lambda i: f"must be > 0, not {self.noise[i]}")
 
-    def numbers(self, value: Any, name: str, shape: tuple[int, ...]) -> Doubles:
+    def numbers(self, value: ArrayLike, name: str, shape: tuple[int, ...]) -> Doubles:
         """Return finite real numbers of a shape."""
         return broadcast(value, f"{self.label}.{name}", shape, SKIPNA)
 
-    def in_core(self, columns: dict[str, slice]) -> tuple[Any, ...]:
+    def in_core(self, columns: dict[str, slice]) -> tuple[object, ...]:
         """Return the term in the form of the core, for the columns of all parameters."""
         places = [None if name is None else (columns[name].start, self.constants[name].size) for name in self.slots]
         offset = None if self.time_offset is None else columns[self.time_offset].start
@@ -179,11 +180,11 @@ class PointTerm(Term):
 
     def precision(self, n: int) -> Doubles:
         """Return the inverse variances or covariances of all n points; those of points without weight are 0."""
-        own = self.noise[:, 0] ** -2.0
+        precisions = self.noise[:, 0] ** -2.0
         if self.roots is not None:
-            own = np.swapaxes(self.roots, -1, -2) @ self.roots / self.noise[..., None] ** 2
-        whole = np.zeros((n, *own.shape[1:]))
-        whole[self.rows] = own
+            precisions = np.swapaxes(self.roots, -1, -2) @ self.roots / self.noise[..., None] ** 2
+        whole = np.zeros((n, *precisions.shape[1:]))
+        whole[self.rows] = precisions
         return whole
 
     def residuals_at(self, space: Space, p: Array, frames: Array) -> Doubles:
@@ -199,7 +200,9 @@ class VelocityTerm(Term):
 
     sensor = "velocities"
 
-    def __init__(self, label: str, given: Velocities, times: Doubles, part: int, space: Space, y: Any, v: Any) -> None:
+    def __init__(
+        self, label: str, given: Velocities, times: Doubles, part: int, space: Space, y: Array, v: Array
+    ) -> None:
         super().__init__(label, given, times, [part])
         self.y = points_on(space, y, len(times), f"{label}.y")
         vectors = space._numbers(space._doubles(v, f"{label}.v"))
@@ -253,7 +256,7 @@ class DirectionTerm(Term):
         self.arrays = [self.seen, self.reference]
 
     def informative(self, residuals: Doubles) -> Doubles:
-        lengths, known = (np.linalg.norm(own, axis=-1) for own in (self.seen, self.reference))
+        lengths, known = (np.linalg.norm(vectors, axis=-1) for vectors in (self.seen, self.reference))
         sigma = self.noise.reshape(self.seen.shape)[..., 0]
         if np.any(np.abs(lengths - known) > _NORMALISED * sigma) or np.any(lengths == 0):
             return residuals
@@ -262,8 +265,8 @@ class DirectionTerm(Term):
         first = np.cross(self.seen, along)
         first /= np.linalg.norm(first, axis=-1, keepdims=True)
         second = np.cross(self.seen / lengths[..., None], first)
-        each = residuals.reshape(self.seen.shape)
-        flat = np.stack([(each * own).sum(axis=-1) for own in (first, second)], axis=-1)
+        rows = residuals.reshape(self.seen.shape)
+        flat = np.stack([(rows * axis).sum(axis=-1) for axis in (first, second)], axis=-1)
         return flat.reshape(len(residuals), -1)
 
 
@@ -298,29 +301,29 @@ class FunctionTerm(Term):
         self.residual, self.nu = given.residual, given.nu
         # The space of the points that the function receives, and its parts.
         self.space, *self.spaces = spaces
-        self.names = {key: self.name(own, key) for key, own in given.parameters.items()}
+        self.names = {key: self.name(constant, key) for key, constant in given.parameters.items()}
         self.slots = list(self.names.values())
 
     def function(self, columns: dict[str, slice]) -> tuple[Callable[..., Doubles], int]:
         """Return the function that the core calls with the motion and all parameters, and its highest derivative."""
 
         def whitened(states: list[list[Doubles]], values: Doubles) -> Doubles:
-            arguments: list[Any] = [self._joined(state, float(nu == 0)) for nu, state in enumerate(states)]
+            arguments: list[object] = [self._joined(state, float(nu == 0)) for nu, state in enumerate(states)]
             if self.names:
                 arguments.append({key: values[columns[name]].copy() for key, name in self.names.items()})
             return np.ascontiguousarray(self._checked(self.residual(*arguments)) / self.noise)
 
         return whitened, self.nu
 
-    def _checked(self, value: Any) -> Doubles:
+    def _checked(self, value: ArrayLike) -> Doubles:
         n = len(self.times)
-        found = np.asarray(value)
-        if found.dtype.kind not in "iufb" or found.ndim not in (1, 2) or found.shape[0] != n:
+        array = np.asarray(value)
+        if array.dtype.kind not in "iufb" or array.ndim not in (1, 2) or array.shape[0] != n:
             raise ValidationError(
-                f"{self.label}: the function returned {found.dtype} of shape {found.shape}, but real residuals of "
+                f"{self.label}: the function returned {array.dtype} of shape {array.shape}, but real residuals of "
                 f"shape ({n}, k) or ({n},) are needed, one row per time"
             )
-        result = found.reshape(n, -1).astype(np.float64)
+        result = array.reshape(n, -1).astype(np.float64)
         bad = np.flatnonzero(~np.isfinite(result).all(axis=1))
         if len(bad):
             raise ValidationError(
@@ -339,13 +342,13 @@ class FunctionTerm(Term):
 
     def _joined(self, state: list[Doubles], corner: float) -> Any:
         """Combine the arrays of all parts into those of the space."""
-        rest = [space._numbers(own) for space, own in zip(self.spaces, state, strict=True)]
-        found = []
+        rest = [space._numbers(doubles) for space, doubles in zip(self.spaces, state, strict=True)]
+        points_of_factors = []
         for factor in factors_of(self.space):
             count = len(parts_of_factor(factor))
-            found.append(join(factor, rest[:count], corner))
+            points_of_factors.append(join(factor, rest[:count], corner))
             rest = rest[count:]
-        return tuple(found) if isinstance(self.space, Product) else found[0]
+        return tuple(points_of_factors) if isinstance(self.space, Product) else points_of_factors[0]
 
 
 class Body:
@@ -374,7 +377,7 @@ class Body:
         """Return rotation matrices."""
         return p if self.space == _SO3 else quaternion_to_matrix(p, scalar_first=True)
 
-    def components(self, omega: Any, name: str, n: int) -> Doubles:
+    def components(self, omega: ArrayLike, name: str, n: int) -> Doubles:
         """Return components from the user's angular velocities or matrices."""
         if self.is_rotation:
             return broadcast(_exact(omega, name, (n, 3)), name, (n, 3), SKIPNA)
@@ -400,23 +403,24 @@ def _doubles(space: Space, rows: Array) -> Doubles:
     return np.ascontiguousarray(space._as_doubles(rows))
 
 
-def _exact(value: Any, name: str, shape: tuple[int, ...]) -> Any:
+def _exact(value: ArrayLike, name: str, shape: tuple[int, ...]) -> Array:
     array = as_array(value, name)
     if array.shape != shape:
         raise ValidationError(f"{name} has shape {array.shape}, but {shape} is needed: one row per time")
     return array
 
 
-def _of_size(constant: Any, size: int, name: str) -> Constant:
+def _of_size(constant: object, size: int, name: str) -> Constant:
     if not isinstance(constant, Constant) or constant.size != size:
         raise ValidationError(f"{name} must be a Constant of size {size}")
     return constant
 
 
-def points_on(space: Space, y: Any, n: int, name: str) -> Array:
+def points_on(space: Space, y: ArrayLike, n: int, name: str) -> Array:
     """Return n points of a space."""
     array = space._array(y, name)
-    points = space._numbers(space._doubles(array, name))
+    doubles = space._doubles(array, name)
+    points = space._numbers(doubles)
     if points.shape != (n, *space.point_shape):
         raise ValidationError(f"{name} has shape {array.shape}, but {(n, *space.point_shape)} is needed")
     refuse(
@@ -425,13 +429,13 @@ def points_on(space: Space, y: Any, n: int, name: str) -> Array:
         lambda i: f"is not finite. Remove it{', or pass skipna=True' if np.isnan(points[i]).any() else ''}.",
     )
     try:
-        space.check_point(array)
+        space._handle.check_points(space._rows(doubles, (n,)), (n,), space._tol(array))
     except ValidationError as error:
         raise ValidationError(f"{name}: {error}") from None
     return projected(space, points)
 
 
-def bind(measurement: Measurement, label: str, times: Doubles, space: Space[Any], loss: Loss = "linear") -> list[Term]:
+def bind(measurement: Measurement, label: str, times: Doubles, space: AnySpace, loss: Loss = "linear") -> list[Term]:
     """Return the terms of a measurement on a space, after all checks. `loss` is for measurements without their own."""
     terms = _terms_of(measurement, label, times, space)
     for term in terms:
@@ -439,7 +443,7 @@ def bind(measurement: Measurement, label: str, times: Doubles, space: Space[Any]
     return terms
 
 
-def _terms_of(measurement: Measurement, label: str, times: Doubles, space: Space[Any]) -> list[Term]:
+def _terms_of(measurement: Measurement, label: str, times: Doubles, space: AnySpace) -> list[Term]:
     spaces, chosen = smoothed_spaces(space), space
     parts = list(range(len(spaces)))
     number = measurement.factor
@@ -449,7 +453,7 @@ def _terms_of(measurement: Measurement, label: str, times: Doubles, space: Space
             raise ValidationError(f"{label}.factor must be a factor of {space!r}, 0 to {len(factors) - 1}")
         chosen = factors[number]
         parts = grouped(space, parts)[number]
-    own = [spaces[part] for part in parts]
+    spaces_of_parts = [spaces[part] for part in parts]
     if isinstance(measurement, Points):
         y: Any = measurement.y
         if isinstance(chosen, SpecialEuclidean) and not isinstance(y, tuple):
@@ -459,12 +463,14 @@ def _terms_of(measurement: Measurement, label: str, times: Doubles, space: Space
             for part in parts:
                 if shape == spaces[part].point_shape:
                     return _points(measurement, label, times, spaces[part], {part: spaces[part]})
-        return _points(measurement, label, times, chosen, dict(zip(parts, own, strict=True)))
+        return _points(measurement, label, times, chosen, dict(zip(parts, spaces_of_parts, strict=True)))
     if isinstance(measurement, Function):
-        return [FunctionTerm(label, measurement, times, parts, [chosen, *own])]
+        return [FunctionTerm(label, measurement, times, parts, [chosen, *spaces_of_parts])]
     if isinstance(measurement, SpecificForce):
-        turning = [part for part, each in zip(parts, own, strict=True) if each in (_SO3, _S3)]
-        moving = [part for part, each in zip(parts, own, strict=True) if each == _R3]
+        turning = [
+            part for part, space_of_part in zip(parts, spaces_of_parts, strict=True) if space_of_part in (_SO3, _S3)
+        ]
+        moving = [part for part, space_of_part in zip(parts, spaces_of_parts, strict=True) if space_of_part == _R3]
         if len(turning) != 1 or len(moving) != 1:
             raise ValidationError(f"{label} needs one rotation and one position, such as 'so:3 x r:3', not {space!r}")
         return [ForceTerm(label, measurement, times, [turning[0], moving[0]])]
@@ -477,9 +483,11 @@ def _terms_of(measurement: Measurement, label: str, times: Doubles, space: Space
         return [kind(label, measurement, times, part, spaces[part])]
     assert isinstance(measurement, Velocities)
     terms: list[Term] = []
-    each_y = _in_parts(measurement.y, chosen, f"{label}.y")
-    each_v = _in_parts(measurement.v, chosen, f"{label}.v")
-    for part, y, v, sigma in zip(parts, each_y, each_v, _sigmas(measurement, len(parts), label), strict=True):
+    points_of_parts = _in_parts(measurement.y, chosen, f"{label}.y")
+    vectors_of_parts = _in_parts(measurement.v, chosen, f"{label}.v")
+    for part, y, v, sigma in zip(
+        parts, points_of_parts, vectors_of_parts, _sigmas(measurement, len(parts), label), strict=True
+    ):
         term = Velocities(measurement.t, y, v, sigma=sigma, time_offset=measurement.time_offset, loss=measurement.loss)
         terms.append(VelocityTerm(label, term, times, part, spaces[part], y, v))
     return terms
@@ -494,15 +502,15 @@ def is_compact_group(space: Space) -> bool:
     return space == _S3 or (isinstance(space, Group) and space._unitary)
 
 
-def _in_parts(value: Any, space: Space[Any], name: str) -> list[Any]:
+def _in_parts(value: Any, space: AnySpace, name: str) -> list[Array]:
     """Return the points or vectors of each part."""
     values = parts_of(value, space, name) if isinstance(space, Product) else (value,)
-    found: list[Any] = []
-    for factor, own in zip(factors_of(space), values, strict=True):
+    values_of_parts: list[Array] = []
+    for factor, of_factor in zip(factors_of(space), values, strict=True):
         if len(parts_of_factor(factor)) > 1:
-            own = factor._numbers(factor._doubles(own, name))
-        found += split(factor, own)
-    return found
+            of_factor = factor._numbers(factor._doubles(of_factor, name))
+        values_of_parts += split(factor, of_factor)
+    return values_of_parts
 
 
 def _sigmas(measurement: Measurement, count: int, label: str) -> Sequence[Any]:
@@ -517,7 +525,7 @@ def _sigmas(measurement: Measurement, count: int, label: str) -> Sequence[Any]:
     return sigma
 
 
-def _points(given: Points, label: str, times: Doubles, space: Space[Any], parts: dict[int, Space]) -> list[Term]:
+def _points(given: Points, label: str, times: Doubles, space: AnySpace, parts: dict[int, Space]) -> list[Term]:
     """Return the terms of points of a space with these parts, by their numbers."""
     n = len(times)
     precisions = None
@@ -527,7 +535,7 @@ def _points(given: Points, label: str, times: Doubles, space: Space[Any], parts:
         precisions = read_precision(given.weights, given.frames, space, read(given.y, space))
     terms: list[Term] = []
     arrays, sigmas = _in_parts(given.y, space, f"{label}.y"), _sigmas(given, len(parts), label)
-    for k, ((part, own), y, sigma) in enumerate(zip(parts.items(), arrays, sigmas, strict=True)):
+    for k, ((part, space_of_part), y, sigma) in enumerate(zip(parts.items(), arrays, sigmas, strict=True)):
         information = None if precisions is None else precisions[k].information
         if sigma is None:
             if information is None:
@@ -537,16 +545,16 @@ def _points(given: Points, label: str, times: Doubles, space: Space[Any], parts:
         scale = broadcast(sigma, f"{label}.sigma", (n,))
         refuse(~(scale > 0), f"{label}.sigma", lambda i: "must be > 0")
         used = np.ones(n, bool) if precisions is None else precisions[k].weights > 0
-        rows = own._numbers(own._doubles(y, f"{label}.y"))
+        rows = space_of_part._numbers(space_of_part._doubles(y, f"{label}.y"))
         if rows.shape[:1] != (n,):
             raise ValidationError(f"{label}.y has {len(rows)} points, but there are {n} times")
-        good = points_on(own, rows[used], int(used.sum()), f"{label}.y")
+        good = points_on(space_of_part, rows[used], int(used.sum()), f"{label}.y")
         scale = scale[used]
         roots = () if information is None else roots_of(information[used])
         if information is None and precisions is not None:
             scale = scale / np.sqrt(precisions[k].weights[used])
-        noise = np.repeat(scale[:, None], own.dim, axis=1)
-        term = PointTerm(label, given, times[used], part, own, good, noise, *roots)
+        noise = np.repeat(scale[:, None], space_of_part.dim, axis=1)
+        term = PointTerm(label, given, times[used], part, space_of_part, good, noise, *roots)
         term.rows = np.flatnonzero(used)
         terms.append(term)
     return terms
@@ -636,22 +644,22 @@ class Setup:
     def state(self, points: list[Array], values: Values) -> tuple[list[Doubles], Doubles]:
         """Return points and values of parameters in the form of the core; missing values are those of the start."""
         doubles = list(map(_doubles, self.spaces, points))
-        each = [values.get(name, constant.start) for name, constant in self.constants.items()]
-        return doubles, np.concatenate([np.empty(0), *each])
+        starts = [values.get(name, constant.start) for name, constant in self.constants.items()]
+        return doubles, np.concatenate([np.empty(0), *starts])
 
-    def in_core(self) -> tuple[Any, ...]:
+    def in_core(self) -> _core._Problem:
         """Return the problem in the form of the core."""
         handles, groups, priors, terms = self._arrays
         return handles, groups, self.knots, self.penalty, priors, terms
 
     @cached_property
-    def _arrays(self) -> tuple[list[Any], list[Doubles | None], Doubles, list[tuple[Any, ...]]]:
+    def _arrays(self) -> tuple[list[_core.Handle], list[Doubles | None], Doubles, list[tuple[object, ...]]]:
         """The part of `in_core` that does not depend on the knots."""
         priors = [np.empty((0, 2))]
         for constant in self.constants.values():
             precision = np.zeros(constant.size) if constant.sigma is None else constant.sigma**-2.0
             priors.append(np.stack([constant.start, precision], axis=-1))
-        handles: list[Any] = []
+        handles: list[_core.Handle] = []
         groups: list[Doubles | None] = []
         for space in self.spaces:
             handles.append(space._handle)
@@ -727,31 +735,33 @@ def iterate(setup: Setup, points: list[Array], values: Values, progress: Progres
     """Iterate from points at the knots until the step is small."""
     problem, (start, constants) = setup.in_core(), setup.state(points, values)
     lams, criterion, gamma = setup.lams.tolist(), setup.criterion, setup.gamma
-    found = _core.estimate(problem, start, constants, lams, criterion, gamma, setup.tol, setup.max_iter, progress)
-    if isinstance(found, np.ndarray):
-        raise _undetermined(setup, found)
-    failed, number, step = found["failure"], found["iterations"], found["step"]
+    result = _core.estimate(problem, start, constants, lams, criterion, gamma, setup.tol, setup.max_iter, progress)
+    if isinstance(result, np.ndarray):
+        raise _undetermined(setup, result)
+    failed, number, step = result["failure"], result["iterations"], result["step"]
     reports = [
-        SmoothingReport("linearized", failed is None, number, step, found["rate"], lam, bound, df, found["sigma"])
-        for lam, bound, df in zip(found["lams"], found["at_bound"], found["df"], strict=True)
+        SmoothingReport("linearized", failed is None, number, step, result["rate"], lam, bound, df, result["sigma"])
+        for lam, bound, df in zip(result["lams"], result["at_bound"], result["df"], strict=True)
     ]
-    information, covariance = found["information"], np.full_like(found["information"], np.nan)
+    information, covariance = result["information"], np.full_like(result["information"], np.nan)
     if np.isfinite(information).all():
         covariance = np.asarray(np.linalg.pinv(information, hermitian=True), np.float64)
-    distance, (band, side, corner) = 0.0, found["matrices"]
-    if failed is None and found["turn"] > _TURN:
-        normal = np.random.default_rng(0).standard_normal((_SAMPLES, found["variances"].size))
-        distance = _core.distance_from_minimum(problem, found["points"], found["values"], found["lams"], band, normal)
+    distance, (band, side, corner) = 0.0, result["matrices"]
+    if failed is None and result["turn"] > _TURN:
+        normal = np.random.default_rng(0).standard_normal((_SAMPLES, result["variances"].size))
+        distance = _core.distance_from_minimum(
+            problem, result["points"], result["values"], result["lams"], band, normal
+        )
     return Solution(
-        [space._numbers(rows) for space, rows in zip(setup.spaces, found["points"], strict=True)],
-        {name: found["values"][own] for name, own in setup.columns.items()},
+        [space._numbers(rows) for space, rows in zip(setup.spaces, result["points"], strict=True)],
+        {name: result["values"][index] for name, index in setup.columns.items()},
         reports,
         Posterior(band, np.zeros((0, 0)), sum(space.dim for space in setup.spaces), side, corner),
         covariance,
-        [Rows(*rows) for rows in found["terms"]],
-        found["variances"],
-        found["loss"],
-        found["turn"],
+        [Rows(*rows) for rows in result["terms"]],
+        result["variances"],
+        result["loss"],
+        result["turn"],
         distance,
         "" if failed is None else _FAILURES[failed].format(step=step, number=number, tol=setup.tol),
     )
@@ -759,8 +769,8 @@ def iterate(setup: Setup, points: list[Array], values: Values, progress: Progres
 
 def residuals(setup: Setup, points: list[Array], values: Values) -> list[Doubles] | None:
     """Return the residuals of all terms for the spline through points at the knots; None if it does not exist."""
-    found = _core.linearise(setup.in_core(), *setup.state(points, values), False)
-    return None if found is None else [Rows(*rows).residuals for rows in found]
+    of_terms = _core.linearise(setup.in_core(), *setup.state(points, values), False)
+    return None if of_terms is None else [Rows(*rows).residuals for rows in of_terms]
 
 
 def _undetermined(setup: Setup, information: Doubles) -> ValidationError:
@@ -770,8 +780,8 @@ def _undetermined(setup: Setup, information: Doubles) -> ValidationError:
     vectors = np.linalg.eigh(information / unit / unit[:, None])[1]
     vector = vectors[:, 0] / unit if np.all(size > 0) else (size == 0).astype(float)
     vector = vector / vector[np.abs(vector).argmax()]
-    parts = {name: vector[own] for name, own in setup.columns.items()}
-    described = {name: np.round(own, 3).tolist() for name, own in parts.items() if np.abs(own).max() > 1e-3}
+    parts = {name: vector[index] for name, index in setup.columns.items()}
+    described = {name: np.round(part, 3).tolist() for name, part in parts.items() if np.abs(part).max() > 1e-3}
     return ValidationError(
         f"The measurements do not determine {' and '.join(map(repr, described))} in the direction {described}. Pass "
         "a Constant with sigma, which is a prior, or measurements that depend on it."

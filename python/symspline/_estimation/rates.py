@@ -14,7 +14,7 @@ Automation Letters 5 (2020).
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,7 +78,7 @@ def integrated(t: Doubles, omega: Doubles, interpolation: str = "linear") -> Dou
     before, after = omega[..., :-1, :], omega[..., 1:, :]
     zeroth, first = h * (before + after) / 2, h * (after - before) / 12
     if interpolation == "cubic" and omega.shape[-2] > 2:
-        curve: Any = CubicSpline(t, omega, Euclidean(3), bc_type="not-a-knot")
+        curve = CubicSpline(t, omega, Euclidean(3), bc_type="not-a-knot")
         start, end = curve.velocities[..., :-1, :], curve.velocities[..., 1:, :]
         zeroth = zeroth + h * h * (start - end) / 12
         first = h * (after - before) / 10 - h * h * (start + end) / 120
@@ -180,8 +180,8 @@ class Integral:
         # Rates are linear between their times, and constant before the first and after the last.
         inner = np.clip(s, 0.0, h)
         turn = s * self._omega[i] + inner * (s - 0.5 * inner) / h * (self._omega[after] - self._omega[i])
-        found = self._matrices[i] @ _exp(turn)
-        return found, self._sums[i] + 0.5 * s[..., None] * (self._matrices[i] + found)
+        rotations = self._matrices[i] @ _exp(turn)
+        return rotations, self._sums[i] + 0.5 * s[..., None] * (self._matrices[i] + rotations)
 
 
 class _Pairs(NamedTuple):
@@ -305,12 +305,12 @@ class _Problem:
         """Return changes of the bias that explain single turns, also with a whole turn more or less."""
         count = min(len(pairs.rest), most)
         lengths = np.linalg.norm(pairs.derivatives, axis=(-2, -1))
-        each = np.argsort(lengths, kind="stable")[:count]
-        vectors = _log(pairs.rest[each])
+        shortest = np.argsort(lengths, kind="stable")[:count]
+        vectors = _log(pairs.rest[shortest])
         angles = np.linalg.norm(vectors, axis=-1, keepdims=True) + 1e-12
-        turned = np.concatenate([vectors * (1 + 2 * np.pi * own / angles) for own in _TURNS])
-        each = np.tile(each, len(_TURNS))
-        j, weights = pairs.derivatives[each], 1.0 / pairs.variances[each, None]
+        turned = np.concatenate([vectors * (1 + 2 * np.pi * turns / angles) for turns in _TURNS])
+        shortest = np.tile(shortest, len(_TURNS))
+        j, weights = pairs.derivatives[shortest], 1.0 / pairs.variances[shortest, None]
         normal = np.einsum("kij,kil->kjl", j, j) * weights[..., None] + np.diag(self.precision)
         right = -np.einsum("kij,ki->kj", j, turned) * weights
         return np.asarray(np.linalg.solve(normal, right[..., None])[..., 0])
@@ -362,12 +362,12 @@ class _Problem:
         variances = attitudes.sigma**2 + more**2 + drift
         free = self.rates.spread is not None and len(t) > 1
         g, _ = self._since_first(t, bias)
-        each = r @ g.swapaxes(-1, -2)
+        candidates = r @ g.swapaxes(-1, -2)
         # Start from the attitude that agrees best with the others.
         some = np.unique(np.linspace(0, len(t) - 1, min(len(t), _COMPARED)).astype(int))
-        apart = np.linalg.norm(_log(each[some].swapaxes(-1, -2)[:, None] @ each[some][None]), axis=-1)
+        apart = np.linalg.norm(_log(candidates[some].swapaxes(-1, -2)[:, None] @ candidates[some][None]), axis=-1)
         wide = 2 * np.sqrt(variances[some]) + 0.1
-        first = each[some[np.minimum(apart / wide, 3).sum(axis=1).argmin()]]
+        first = candidates[some[np.minimum(apart / wide, 3).sum(axis=1).argmin()]]
         for corner in _CORNERS:
             g, turned = self._since_first(t, bias)
             path = first @ g
@@ -397,8 +397,8 @@ class _Problem:
 
     def rates_at(self, t: Doubles, bias: Doubles) -> Doubles:
         """Return the rates without a bias at times."""
-        own = self.rates
-        return np.stack([np.interp(t, own.times, row) for row in own.omega.T], axis=-1) - bias
+        rates = self.rates
+        return np.stack([np.interp(t, rates.times, row) for row in rates.omega.T], axis=-1) - bias
 
     def _since_first(self, t: Doubles, bias: Doubles) -> tuple[Doubles, Doubles]:
         """Return the rotations since the first time, and minus their derivatives with respect to the bias."""
@@ -450,21 +450,21 @@ class Path:
         for share in _SHARES if segments else ():
             problem.limit_bias(share)
             bias = problem.consensus(attitudes)
-            found = [problem.aligned(attitudes.taken(segment), bias) for segment in segments]
+            alignments = [problem.aligned(attitudes.taken(segment), bias) for segment in segments]
             counts = np.array([len(segment) for segment in segments])
-            misfit = float(np.average([result[2] for result in found], weights=counts))
+            misfit = float(np.average([result[2] for result in alignments], weights=counts))
             if misfit < self.misfit:
-                self.bias, self.misfit = found[int(np.argmax(counts))][1], misfit
+                self.bias, self.misfit = alignments[int(np.argmax(counts))][1], misfit
             if misfit < _BAD:
                 break
         # All segments share the bias of the segment with the most attitudes.
         problem.rates = rates._replace(bias=self.bias, spread=None)
         self._integral = problem.integral = Integral(rates, self.bias)
         times, frames = [], []
-        for own in segments:
-            some = attitudes.taken(own)
+        for segment in segments:
+            some = attitudes.taken(segment)
             frame = problem.aligned(some, self.bias)[0] @ self._integral.at(some.times[:1])[0][0].T
-            times += [problem.first[where[own[0]]], problem.last[where[own[0]]]]
+            times += [problem.first[where[segment[0]]], problem.last[where[segment[0]]]]
             frames += [frame, frame]
         inside = np.flatnonzero(where < 0)
         if len(inside):
@@ -500,20 +500,20 @@ def _best_offset(problem: _Problem, attitudes: Attitudes, start: float, low: flo
 
     def compared(offset: float, width: float) -> tuple[float, float]:
         """Return the score of an offset with an uncertainty `width`, and an improved offset."""
-        own, more = few.later(offset), 0.5 * width * problem.size / np.sqrt(3.0)
-        bias = problem.consensus(own, more)
-        where = problem.segment(own.times)
+        shifted, more = few.later(offset), 0.5 * width * problem.size / np.sqrt(3.0)
+        bias = problem.consensus(shifted, more)
+        where = problem.segment(shifted.times)
         segments = [np.flatnonzero(where == j) for j in np.unique(where[where >= 0])]
         if not segments:
             return np.inf, offset
-        found = [problem.aligned(own.taken(index), bias, more, width) for index in segments]
+        alignments = [problem.aligned(shifted.taken(index), bias, more, width) for index in segments]
         counts = np.array([len(index) for index in segments])
-        score, longest = float(np.average([result[2] for result in found], weights=counts)), int(np.argmax(counts))
-        return score, float(np.clip(offset + found[longest][3], low, high))
+        score, longest = float(np.average([result[2] for result in alignments], weights=counts)), int(np.argmax(counts))
+        return score, float(np.clip(offset + alignments[longest][3], low, high))
 
-    score, found = compared(start, 4 * step)
+    score, best = compared(start, 4 * step)
     if score > 3 + 4 * np.sqrt(6 / len(some)):
         steps = np.arange(-_OFFSETS, _OFFSETS + 1) * step + start
-        tried = [compared(float(own), step) for own in steps[(steps >= low) & (steps <= high)]]
-        found = min(tried)[1] if tried else found
-    return compared(found, step / 4)[1]
+        tried = [compared(float(trial), step) for trial in steps[(steps >= low) & (steps <= high)]]
+        best = min(tried)[1] if tried else best
+    return compared(best, step / 4)[1]

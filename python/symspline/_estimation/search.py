@@ -19,7 +19,16 @@ from .._core import ValidationError
 from .._smoothing import SmoothingWarning, make_smoothing_spline
 from .._smoothing.noise import split
 from .._smoothing.solve import places
-from .._spaces import Array, Doubles, Euclidean, Product, Space, SpecialOrthogonal, factors_of, nearest_rotations
+from .._spaces import (
+    AnySpace,
+    Array,
+    Doubles,
+    Euclidean,
+    Product,
+    SpecialOrthogonal,
+    factors_of,
+    nearest_rotations,
+)
 from .._splines.base import Curve
 from ..convert._quaternions import matrix_to_quaternion
 from ..measure import Points
@@ -30,6 +39,7 @@ from .problem import (
     RateTerm,
     Setup,
     Solution,
+    Term,
     Values,
     VelocityTerm,
     body_of,
@@ -72,47 +82,49 @@ class Start(NamedTuple):
         return [path(knots) for path in self.paths]
 
 
-def starts(setup: Setup, space: Space[Any], axis: TimeAxis, start: Any) -> Iterator[Start]:
+def starts(setup: Setup, space: AnySpace, axis: TimeAxis, start: object) -> Iterator[Start]:
     """Yield initial curves in decreasing order of promise, computed on demand."""
     if start is not None:
         if not isinstance(start, Curve) or start.space != space:
             raise ValidationError(f"start must be a curve on {space!r}, not {short_repr(start)}")
         yield Start([_of_curve(start, axis, part) for part in range(len(setup.spaces))], {})
         return
-    each = [_candidates(setup, part, own) for part, own in enumerate(setup.spaces)]
-    chosen = [own[0]() for own in each]
+    candidates_of_parts = [_candidates(setup, part, space) for part, space in enumerate(setup.spaces)]
+    chosen = [candidates[0]() for candidates in candidates_of_parts]
     yield _joined(chosen)
-    for part, candidates in enumerate(each):
+    for part, candidates in enumerate(candidates_of_parts):
         for candidate in candidates[1:]:
             yield _joined([*chosen[:part], candidate(), *chosen[part + 1 :]])
 
 
 def _joined(parts: list[Start]) -> Start:
     values: Values = {}
-    for own in parts:
-        values |= own.values
-    return Start([path for own in parts for path in own.paths], values)
+    for start in parts:
+        values |= start.values
+    return Start([path for start in parts for path in start.paths], values)
 
 
-def _of_curve(start: Any, axis: TimeAxis, part: int) -> PathOfPart:
+def _of_curve(start: Curve[Any], axis: TimeAxis, part: int) -> PathOfPart:
     """Return the path of one part of a curve passed by the user."""
 
     def path(x: Doubles) -> Array:
         points = start(axis.shown(x, ()), extrapolate="geodesic")
-        each = points if isinstance(start.space, Product) else (points,)
-        return [own for factor, rows in zip(factors_of(start.space), each, strict=True) for own in split(factor, rows)][
-            part
-        ]
+        of_factors = points if isinstance(start.space, Product) else (points,)
+        return [
+            part_points
+            for factor, rows in zip(factors_of(start.space), of_factors, strict=True)
+            for part_points in split(factor, rows)
+        ][part]
 
     return path
 
 
-def _candidates(setup: Setup, part: int, space: Space[Any]) -> list[Callable[[], Start]]:
+def _candidates(setup: Setup, part: int, space: AnySpace) -> list[Callable[[], Start]]:
     """Return functions that compute initial curves of one part, the most promising first."""
     points = [term for term in setup.terms if isinstance(term, PointTerm) and term.parts == [part]]
     rates = [term for term in setup.terms if isinstance(term, RateTerm) and term.parts == [part]]
     seen = [term for term in setup.terms if isinstance(term, DirectionTerm) and term.parts == [part]]
-    found: list[Callable[[], Start]] = []
+    candidates: list[Callable[[], Start]] = []
     times = np.concatenate([term.times for term in points]) if points else np.empty(0)
     spread = len(np.unique(times)) > 1
     if rates and rates[0].body.is_rotation:
@@ -123,8 +135,8 @@ def _candidates(setup: Setup, part: int, space: Space[Any]) -> list[Callable[[],
             return body_of(space).matrices(_smoothed(setup, space, points, []).paths[0](x))
 
         def aligned() -> Start:
-            found = _with_rates(setup, space, rates, attitudes, smoothed if spread else None)
-            return found._replace(paths=[_signed(found.paths[0], points)]) if space != _SO3 else found
+            start = _with_rates(setup, space, rates, attitudes, smoothed if spread else None)
+            return start._replace(paths=[_signed(start.paths[0], points)]) if space != _SO3 else start
 
         def by_vectors() -> Start:
             vectors = [_force_vectors(setup, term) for term in forces]
@@ -135,19 +147,19 @@ def _candidates(setup: Setup, part: int, space: Space[Any]) -> list[Callable[[],
             return _integrated(setup, space, rates[0], vectors)
 
         several = sum(len(attitude.attitudes.times) for attitude in attitudes)
-        found = [aligned] if several else []
+        candidates = [aligned] if several else []
         if forces or (seen and several < _FEW) or not several:
-            found.insert(0 if several < _FEW else 1, by_vectors)
+            candidates.insert(0 if several < _FEW else 1, by_vectors)
         if spread and not setup.automatic and _are_dense(setup, points, rates):
             # The motion between attitudes is so small that attitudes alone suffice, which is faster.
-            return [lambda: _smoothed(setup, space, points, [], _MOST_WITH_RATES), *found]
+            return [lambda: _smoothed(setup, space, points, [], _MOST_WITH_RATES), *candidates]
     beside = [term for term in setup.terms if isinstance(term, VelocityTerm) and term.parts == [part]]
     if beside and not isinstance(space, Euclidean):
-        found.append(lambda: _smoothed(setup, space, points, beside))
+        candidates.append(lambda: _smoothed(setup, space, points, beside))
     if spread:
-        found.append(lambda: _smoothed(setup, space, points, []))
-    if found:
-        return found
+        candidates.append(lambda: _smoothed(setup, space, points, []))
+    if candidates:
+        return candidates
     if seen:
         return [lambda: Start([lambda x: _seen(x, space, seen)], {})]
     if len(times):
@@ -174,7 +186,7 @@ def _are_dense(setup: Setup, points: list[PointTerm], rates: list[RateTerm]) -> 
 
 def _smoothed(
     setup: Setup,
-    space: Space[Any],
+    space: AnySpace,
     points: list[PointTerm],
     beside: list[VelocityTerm],
     most: int = _MOST,
@@ -189,7 +201,7 @@ def _smoothed(
     # Automatic knots are few at first, so they do not limit the number.
     count = None if setup.automatic else min(len(np.unique(times)), max(len(setup.knots), 2), most)
     with silenced(Warning), np.errstate(all="ignore"):
-        curve: Any = make_smoothing_spline(
+        curve = make_smoothing_spline(
             times[order],
             y[order],
             space,
@@ -200,8 +212,8 @@ def _smoothed(
         )
 
     def path(x: Doubles) -> Array:
-        found = np.asarray(curve(x, extrapolate="geodesic"))
-        return found if np.isfinite(found).all() else np.repeat(y[order][:1], len(x), axis=0)
+        points = np.asarray(curve(x, extrapolate="geodesic"))
+        return points if np.isfinite(points).all() else np.repeat(y[order][:1], len(x), axis=0)
 
     return Start([path], {})
 
@@ -213,9 +225,9 @@ def _signed(path: PathOfPart, points: list[PointTerm]) -> PathOfPart:
     """Return a path of unit quaternions with the sign of most of the measured ones."""
 
     def signed(x: Doubles) -> Array:
-        found = path(x)
-        same = [np.sign(np.sum(found[_closest(x, term.times)] * term.y, axis=1)).sum() for term in points]
-        return -found if sum(same) < 0 else found
+        quaternions = path(x)
+        same = [np.sign(np.sum(quaternions[_closest(x, term.times)] * term.y, axis=1)).sum() for term in points]
+        return -quaternions if sum(same) < 0 else quaternions
 
     return signed
 
@@ -227,26 +239,28 @@ class _Seen(NamedTuple):
     time_offset: str | None
 
 
-def _attitudes(space: Space[Any], points: list[PointTerm], seen: list[DirectionTerm]) -> list[_Seen]:
+def _attitudes(space: AnySpace, points: list[PointTerm], seen: list[DirectionTerm]) -> list[_Seen]:
     """Return measured attitudes; if they are few, also attitudes computed from simultaneous directions."""
-    found = [
+    seen_attitudes = [
         _Seen(Attitudes(term.times, body_of(space).matrices(term.y), term.scales), term.time_offset) for term in points
     ]
-    if sum(len(result.attitudes.times) for result in found) >= _FEW:
-        return found
+    if sum(len(result.attitudes.times) for result in seen_attitudes) >= _FEW:
+        return seen_attitudes
     for term in seen:
         profile = np.einsum("nki,nkl->nil", term.reference, term.seen)
         sizes = np.linalg.svd(profile, compute_uv=False)
         good = sizes[:, 1] > _RANK * sizes[:, 0]
         if good.any():
             sigma = np.mean(term.noise[good], axis=1)
-            found.append(_Seen(Attitudes(term.times[good], nearest_rotations(profile[good]), sigma), term.time_offset))
-    return found
+            seen_attitudes.append(
+                _Seen(Attitudes(term.times[good], nearest_rotations(profile[good]), sigma), term.time_offset)
+            )
+    return seen_attitudes
 
 
 def _with_rates(
     setup: Setup,
-    space: Space[Any],
+    space: AnySpace,
     rates: list[RateTerm],
     attitudes: list[_Seen],
     smoothed: Callable[[Doubles], Doubles] | None,
@@ -261,13 +275,13 @@ def _with_rates(
     # Of attitudes with different time offsets, use those without an offset, or else the most numerous ones.
     offsets = [attitude.time_offset for attitude in attitudes]
     chosen = None if None in offsets else max(dict.fromkeys(offsets), key=offsets.count)
-    own = [attitude.attitudes for attitude in attitudes if attitude.time_offset == chosen]
-    times = np.concatenate([each.times for each in own]) + began(chosen)
+    alike = [attitude.attitudes for attitude in attitudes if attitude.time_offset == chosen]
+    times = np.concatenate([some.times for some in alike]) + began(chosen)
     order = np.argsort(times, kind="stable")
     data = Attitudes(
         times[order],
-        np.concatenate([each.matrices for each in own])[order],
-        np.concatenate([each.sigma for each in own])[order],
+        np.concatenate([some.matrices for some in alike])[order],
+        np.concatenate([some.sigma for some in alike])[order],
     )
     given = _rates_of(setup, first, [term for term in rates if term is not first and term.time_offset == name])
     given = given._replace(times=given.times + began(name))
@@ -281,19 +295,19 @@ def _with_rates(
     if offset is not None:
         offset = (0.0, min(offset[1], 0.0), max(offset[2], 0.0))
     path = Path(given, data, offset, smoothed)
-    found: Values = {}
+    constants: Values = {}
     if first.bias is not None:
-        found[first.bias] = path.bias
+        constants[first.bias] = path.bias
     late = 0.0
     if name != chosen and name is not None:
         late = path.offset
-        found[name] = np.array([began(name) - late])
+        constants[name] = np.array([began(name) - late])
     elif name != chosen and chosen is not None:
-        found[chosen] = np.array([began(chosen) + path.offset])
+        constants[chosen] = np.array([began(chosen) + path.offset])
     for term in rates:
-        if term.bias is not None and term.bias not in found:
-            found[term.bias] = _relative(first, term) + (path.bias if first.bias is not None else 0.0)
-    return Start([lambda x: _rotations(space, path(x + late))], found)
+        if term.bias is not None and term.bias not in constants:
+            constants[term.bias] = _relative(first, term) + (path.bias if first.bias is not None else 0.0)
+    return Start([lambda x: _rotations(space, path(x + late))], constants)
 
 
 def _coverage(term: RateTerm) -> float:
@@ -345,9 +359,9 @@ def _without_spikes(setup: Setup, term: RateTerm) -> Doubles:
     usual = np.median(np.lib.stride_tricks.sliding_window_view(padded, 5, axis=0), axis=-1)
     away = np.abs(omega - usual)
     limit = 8 * np.maximum(np.median(away, axis=0), term.noise[order])
-    found = np.empty_like(omega)
-    found[order] = np.where(away > limit, usual, omega)
-    return found
+    filtered = np.empty_like(omega)
+    filtered[order] = np.where(away > limit, usual, omega)
+    return filtered
 
 
 # Vectors in the fixed frame and the same vectors in the frame of the body, at times.
@@ -366,7 +380,9 @@ def _rows(reference: Doubles, seen: Doubles) -> tuple[Doubles, Doubles]:
 def _force_vectors(setup: Setup, term: ForceTerm) -> _Vectors:
     """Return the accelerations without gravity that follow from measured positions, and the specific forces."""
     points = [
-        own for own in setup.terms if isinstance(own, PointTerm) and own.roots is None and own.parts == [term.parts[1]]
+        points_term
+        for points_term in setup.terms
+        if isinstance(points_term, PointTerm) and points_term.roots is None and points_term.parts == [term.parts[1]]
     ]
     times = np.concatenate([term.times for term in points]) if points else np.empty(0)
     expected = np.tile(-term.gravity, (len(term.times), 1))
@@ -384,7 +400,7 @@ def _force_vectors(setup: Setup, term: ForceTerm) -> _Vectors:
     return term.times, expected, term.f
 
 
-def _integrated(setup: Setup, space: Space[Any], rate: RateTerm, vectors: list[_Vectors]) -> Start:
+def _integrated(setup: Setup, space: AnySpace, rate: RateTerm, vectors: list[_Vectors]) -> Start:
     """Return the attitudes that follow from the rates and from vectors known in both frames.
 
     The integral of the rates is aligned with the vectors in windows that become longer, and every alignment yields a
@@ -410,8 +426,8 @@ def _integrated(setup: Setup, space: Space[Any], rate: RateTerm, vectors: list[_
         if not np.all(sizes[:, 1] > _RANK * sizes[:, 0]):
             continue
         # The aligned attitudes turn more slowly than the integrated ones by the remaining bias.
-        aligned = np.stack([nearest_rotations(own) for own in windows]) @ matrices
-        steps = [np.swapaxes(own[:-1], -1, -2) @ own[1:] for own in (aligned, matrices)]
+        aligned = np.stack([nearest_rotations(window) for window in windows]) @ matrices
+        steps = [np.swapaxes(attitudes[:-1], -1, -2) @ attitudes[1:] for attitudes in (aligned, matrices)]
         spin = np.swapaxes(steps[0], -1, -2) @ _SO3.log(steps[0], steps[1])
         vector = np.stack([spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0]], axis=-1)
         bias = bias + np.median(vector / np.diff(grid)[:, None], axis=0)
@@ -428,7 +444,7 @@ def _closest(grid: Doubles, x: Doubles) -> NDArray[np.intp]:
     return np.searchsorted(0.5 * (grid[1:] + grid[:-1]), x)
 
 
-def _seen(knots: Doubles, space: Space[Any], seen: list[DirectionTerm]) -> Array:
+def _seen(knots: Doubles, space: AnySpace, seen: list[DirectionTerm]) -> Array:
     """Return the attitudes at the knots from the directions seen near them (Wahba's problem)."""
     profile = np.zeros((len(knots), 3, 3))
     for term in seen:
@@ -438,11 +454,11 @@ def _seen(knots: Doubles, space: Space[Any], seen: list[DirectionTerm]) -> Array
     if not len(good):
         total = nearest_rotations(profile.sum(axis=0))
         return _rotations(space, np.repeat(total[None], len(knots), axis=0))
-    found = np.stack([nearest_rotations(own) for own in profile[good]])
-    return _rotations(space, found[_closest(good.astype(np.float64), np.arange(float(len(knots))))])
+    rotations = np.stack([nearest_rotations(matrix) for matrix in profile[good]])
+    return _rotations(space, rotations[_closest(good.astype(np.float64), np.arange(float(len(knots))))])
 
 
-def _rotations(space: Space[Any], matrices: Doubles) -> Array:
+def _rotations(space: AnySpace, matrices: Doubles) -> Array:
     if isinstance(space, SpecialOrthogonal):
         return projected(space, matrices)
     quaternions = matrix_to_quaternion(matrices, scalar_first=True)
@@ -489,7 +505,7 @@ _MOST_COMPARED = 200_000
 class Starts:
     """Initial curves in decreasing order of promise, computed on demand and stored."""
 
-    def __init__(self, setup: Setup, space: Space[Any], axis: TimeAxis, start: Any) -> None:
+    def __init__(self, setup: Setup, space: AnySpace, axis: TimeAxis, start: object) -> None:
         self._coming = starts(setup, space, axis, start)
         self._known: list[Start] = []
 
@@ -508,7 +524,7 @@ class Search(NamedTuple):
 
     Attributes
     ----------
-    found : Solution
+    solution : Solution
         The best result.
     rival : float
         Distance in standard deviations to another result that is equally good, or 0.
@@ -516,7 +532,7 @@ class Search(NamedTuple):
         Index of the knot at which that result is farthest away.
     """
 
-    found: Solution
+    solution: Solution
     rival: float = 0.0
     place: int = 0
 
@@ -544,31 +560,31 @@ def solved(setup: Setup, begin: Starts, progress: Progress | None) -> Search:
             break
         number += 1
         try:
-            found = iterate(setup, start.points(setup.knots), start.values, progress)
+            solution = iterate(setup, start.points(setup.knots), start.values, progress)
         except (ValidationError, ConvergenceError) as error:
             refused = refused or error
             continue
         if best is None:
-            best = found
-        elif not found.failure:
-            better = bool(best.failure) or found.loss < best.loss
-            if not best.failure and abs(found.loss - best.loss) < _EQUAL:
-                apart, at = _distance(setup, found, best)
+            best = solution
+        elif not solution.failure:
+            better = bool(best.failure) or solution.loss < best.loss
+            if not best.failure and abs(solution.loss - best.loss) < _EQUAL:
+                apart, at = _distance(setup, solution, best)
                 if apart > _APART:
                     rival, place = apart, at
             else:
                 rival = 0.0 if better else rival
-            best = found if better else best
+            best = solution if better else best
     if best is None:
         assert refused is not None
         raise refused
     return Search(best, rival, place)
 
 
-def _contradicts(setup: Setup, found: Solution) -> bool:
+def _contradicts(setup: Setup, solution: Solution) -> bool:
     """Whether the residuals of a sensor are larger than its noise."""
-    for term, own in zip(setup.terms, found.rows, strict=True):
-        rows = own.residuals
+    for term, rows_of_term in zip(setup.terms, solution.rows, strict=True):
+        rows = rows_of_term.residuals
         squares = np.sum(rows**2, axis=1)
         size = rows.shape[1]
         if term.loss == "linear":
@@ -616,22 +632,22 @@ def automatic(
             search = solved(now, begin, progress)
         except (ValidationError, ConvergenceError) as error:
             refused = error
-        if refused or search.found.failure:
+        if refused or search.solution.failure:
             # With more knots the numerical problem may become too difficult. The last result then remains.
             if before is not None:
-                if _misses(before[2].found):
+                if _misses(before[2].solution):
                     warn(_UNCONFIRMED, SmoothingWarning)
                 return before
             if len(now.knots) > most:
                 break
         else:
             if before is not None:
-                sigma, last = (float(own.found.reports[0].sigma) for own in (search, before[2]))
-                at_bound = any(bool(report.at_bound) for report in search.found.reports)
+                sigma, last = (float(result.solution.reports[0].sigma) for result in (search, before[2]))
+                at_bound = any(bool(report.at_bound) for report in search.solution.reports)
                 few = at_bound or len(now.knots) < _FEW_KNOTS * len(data)
                 in_vain = 0 if sigma < 0.95 * last or few else in_vain + 1
-                misses = _misses(search.found) and in_vain < _IN_VAIN
-                if not misses and _moved(before[1], before[2].found, now, search.found) <= _MOVED:
+                misses = _misses(search.solution) and in_vain < _IN_VAIN
+                if not misses and _moved(before[1], before[2].solution, now, search.solution) <= _MOVED:
                     break
             if len(now.knots) > most:
                 break
@@ -642,25 +658,25 @@ def automatic(
     return shown, now, search
 
 
-def _misses(found: Solution) -> bool:
+def _misses(solution: Solution) -> bool:
     """Whether the residuals are so large that more knots may be needed."""
-    return float(found.reports[0].sigma) > _MISSES
+    return float(solution.reports[0].sigma) > _MISSES
 
 
-def _moved(coarse: Setup, before: Solution, fine: Setup, found: Solution) -> float:
+def _moved(coarse: Setup, before: Solution, fine: Setup, solution: Solution) -> float:
     """Return the largest distance of the curve with fewer knots, in standard deviations."""
     x = np.clip(fine.knots, coarse.knots[0], coarse.knots[-1])
     # The distances are the lengths of the residuals of points.
-    each = enumerate(zip(fine.spaces, found.points, strict=True))
-    points: list[Any] = [
+    parts = enumerate(zip(fine.spaces, solution.points, strict=True))
+    points: list[Term] = [
         PointTerm("", Points(x, y, sigma=1.0), x, part, space, y, np.ones((len(x), space.dim)))
-        for part, (space, y) in each
+        for part, (space, y) in parts
     ]
     apart = residuals(replace(coarse, terms=points), before.points, before.values)
     if apart is None:
         return float("inf")
     squares = sum((rows**2).sum(axis=1) for rows in apart)
-    return float(np.sqrt(np.max(squares / found.variances.sum(axis=1))))
+    return float(np.sqrt(np.max(squares / solution.variances.sum(axis=1))))
 
 
 # ---- knots as dense as the measurements require, and in gaps as dense as next to them ----
@@ -717,15 +733,15 @@ def bisected(knots: Doubles, chosen: NDArray[np.bool_] | None = None) -> Doubles
 
 def shown_times(axis: TimeAxis, ends: Array, x: Doubles) -> Array:
     """Convert times of the core to the form passed by the user; the first and the last one are `ends`."""
-    found: Array
+    times: Array
     if axis.origin is not None and not axis.dates:
         # Large integers cannot be represented as floating-point numbers.
-        found = axis.origin + np.rint(x).astype(np.int64)
+        times = axis.origin + np.rint(x).astype(np.int64)
     else:
-        found = np.array(axis.shown(x, ()))
-        found = found.astype(np.promote_types(found.dtype, ends.dtype))
-    found[[0, -1]] = ends[[0, -1]]
-    return found
+        times = np.array(axis.shown(x, ()))
+        times = times.astype(np.promote_types(times.dtype, ends.dtype))
+    times[[0, -1]] = ends[[0, -1]]
+    return times
 
 
 def first_knots(begin: float, end: float) -> Doubles:
@@ -750,24 +766,26 @@ def that_reproduce(setup: Setup, start: Start, data: Doubles) -> Doubles:
     """
     fine = np.unique(np.concatenate([setup.knots, data]))
     fine = fine[merged(fine, len(fine))]
-    own = None if len(fine) > _MOST_COMPARED else residuals(setup.with_knots(fine), start.points(fine), start.values)
+    of_start = (
+        None if len(fine) > _MOST_COMPARED else residuals(setup.with_knots(fine), start.points(fine), start.values)
+    )
     knots = setup.knots
     values = {name: np.array(constant.start) for name, constant in setup.constants.items()} | start.values
     for _ in range(_ROUNDS):
-        found = residuals(setup.with_knots(knots), start.points(knots), start.values)
-        if found is None:
+        of_spline = residuals(setup.with_knots(knots), start.points(knots), start.values)
+        if of_spline is None:
             bad = np.diff(knots) > 0
         else:
             bad = np.zeros(len(knots) - 1, bool)
-            for k, (term, rows) in enumerate(zip(setup.terms, found, strict=True)):
-                bad |= _exceeding(knots, term.shifted_times(values), rows, None if own is None else own[k])
+            for k, (term, rows) in enumerate(zip(setup.terms, of_spline, strict=True)):
+                bad |= _exceeding(knots, term.shifted_times(values), rows, None if of_start is None else of_start[k])
         if not bad.any() or len(knots) > 2 * len(fine):
             break
         knots = bisected(knots, bad)
     return graded(knots)
 
 
-def _exceeding(knots: Doubles, times: Doubles, rows: Doubles, own: Doubles | None) -> NDArray[np.bool_]:
+def _exceeding(knots: Doubles, times: Doubles, rows: Doubles, of_start: Doubles | None) -> NDArray[np.bool_]:
     """Return the intervals in which residuals are larger than their noise and differ from those of the start."""
     i = np.clip(np.searchsorted(knots, times, side="right") - 1, 0, len(knots) - 2)
     size = rows.shape[1]
@@ -779,8 +797,8 @@ def _exceeding(knots: Doubles, times: Doubles, rows: Doubles, own: Doubles | Non
     count = three(None)
     squares = three(np.sum(rows**2, axis=1)) / np.maximum(size * count, 1)
     large = squares > 1 + _SLACK + 3 * np.sqrt(2 / np.maximum(size * count, 1))
-    if own is not None:
-        apart = three(np.sum((rows - own) ** 2, axis=1)) / np.maximum(size * count, 1)
+    if of_start is not None:
+        apart = three(np.sum((rows - of_start) ** 2, axis=1)) / np.maximum(size * count, 1)
         # More knots would not reduce residuals that the initial curve has as well.
         large &= apart > _SLACK
     # At most about one knot per sample, by the median time step because some samples may be very close together.

@@ -18,8 +18,8 @@ from .._smoothing.gaps import Calibration, Course, SensorEvidence, calibrate
 from .._smoothing.noise import SmoothingData, is_several, smoothed_spaces
 from .._smoothing.report import Parameter, Posterior, SmoothingReport
 from .._smoothing.solve import Smoothed
-from .._smoothing.spline import SmoothingSpline
-from .._spaces import Array, Doubles, Product, Space, SpecialEuclidean, factors_of, parts_of
+from .._smoothing.spline import AnySmoothingSpline, SmoothingSpline
+from .._spaces import AnySpace, Array, Doubles, Product, Space, SpecialEuclidean, factors_of, parts_of
 from .._splines.archive import Entries, entry, read_fitted, read_report
 from .._splines.cubic import CubicSpline
 from ..measure import BodyRates, Measurement, Points, SpecificForce
@@ -58,37 +58,37 @@ def read_long_gaps(entry: Any) -> LongGaps | None:
     if entry is None:
         return None
     gaps, width, at_data = entry
-    each = [(float(start), float(stop), float(factor), int(blocks)) for start, stop, factor, blocks in gaps]
-    return LongGaps(each, float(width), (float(at_data[0]), float(at_data[1])))
+    read = [(float(start), float(stop), float(factor), int(blocks)) for start, stop, factor, blocks in gaps]
+    return LongGaps(read, float(width), (float(at_data[0]), float(at_data[1])))
 
 
 def _course(order: int, lam: float, variance: Variance) -> Course:
     return Course(order, lam, variance, lambda _: np.zeros((2, 2)), 0.0)
 
 
-def long_gaps(setup: Setup, found: Solution, part: int) -> LongGaps | None:
+def long_gaps(setup: Setup, solution: Solution, part: int) -> LongGaps | None:
     """Return the long gaps of a part, or None if there are none or the part has no points that can be predicted."""
     terms = [k for k, term in enumerate(setup.terms) if part in term.parts]
-    own = [setup.terms[k] for k in terms]
-    has_points = PointTerm in map(type, own)
-    lam = float(found.reports[part].lam)
-    if found.failure or not has_points or not 0 < lam < np.inf:
+    of_part = [setup.terms[k] for k in terms]
+    has_points = PointTerm in map(type, of_part)
+    lam = float(solution.reports[part].lam)
+    if solution.failure or not has_points or not 0 < lam < np.inf:
         return None
-    each = [np.clip(term.shifted_times(found.values), setup.knots[0], setup.knots[-1]) for term in own]
+    times_of_terms = [np.clip(term.shifted_times(solution.values), setup.knots[0], setup.knots[-1]) for term in of_part]
     weights = [
         term.scales**-2.0 if isinstance(term, PointTerm) else np.zeros(len(x))
-        for term, x in zip(own, each, strict=True)
+        for term, x in zip(of_part, times_of_terms, strict=True)
     ]
-    order = np.argsort(np.concatenate(each), kind="stable")
-    times, weight = np.concatenate(each)[order], np.concatenate(weights)[order]
+    order = np.argsort(np.concatenate(times_of_terms), kind="stable")
+    times, weight = np.concatenate(times_of_terms)[order], np.concatenate(weights)[order]
     if not np.ptp(times) > 0:
         return None
 
     space, kinds = setup.spaces[part], end_kinds(setup.bc_type)
-    posterior = found.posterior._replace(first=sum(own.dim for own in setup.spaces[:part]))
+    posterior = solution.posterior._replace(first=sum(space.dim for space in setup.spaces[:part]))
 
     def evidence() -> SensorEvidence:
-        return _evidence(setup, found, part, terms, order, times, weight)
+        return _evidence(setup, solution, part, terms, order, times, weight)
 
     def variance(x: Doubles, nu: int) -> Doubles:
         whole = posterior.covariance(space, setup.knots, (), kinds, np.ascontiguousarray(x), None, [nu])
@@ -101,7 +101,7 @@ def long_gaps(setup: Setup, found: Solution, part: int) -> LongGaps | None:
 
 def _evidence(
     setup: Setup,
-    found: Solution,
+    solution: Solution,
     part: int,
     terms: list[int],
     order: NDArray[np.intp],
@@ -109,30 +109,30 @@ def _evidence(
     weights: Doubles,
 ) -> SensorEvidence:
     """Return the linearised measurements of a part, in the order of time."""
-    kinds, size = end_kinds(setup.bc_type), found.posterior.size
+    kinds, size = end_kinds(setup.bc_type), solution.posterior.size
     parameters = sum(constant.size for constant in setup.constants.values())
-    q = max(found.rows[k].residuals.shape[1] for k in terms)
-    known = found.posterior.known((), kinds)
+    q = max(solution.rows[k].residuals.shape[1] for k in terms)
+    known = solution.posterior.known((), kinds)
     factors, sides, residuals, counts = [], [], [], []
     for k in terms:
-        term, own = setup.terms[k], found.rows[k]
-        (n, d), dim = own.residuals.shape, setup.spaces[part].dim
-        x = np.clip(term.shifted_times(found.values), setup.knots[0], setup.knots[-1])
+        term, linearised = setup.terms[k], solution.rows[k]
+        (n, d), dim = linearised.residuals.shape, setup.spaces[part].dim
+        x = np.clip(term.shifted_times(solution.values), setup.knots[0], setup.knots[-1])
         rows = np.zeros((n, q, 4 * size))
-        for nu, columns in enumerate(own.jacobians):
+        for nu, columns in enumerate(linearised.jacobians):
             if columns is not None:
                 of_curve = _core.coefficient_factors(setup.knots, kinds, x, nu)[1]
                 rows[:, :d] += np.einsum("ndm,nk->ndkm", columns, of_curve).reshape(n, d, -1)
         of_parameters, left = np.zeros((n, q, parameters)), np.zeros((n, q))
-        of_parameters[:, :d] = 0.0 if own.parameters is None else own.parameters
-        left[:, :d] = -own.residuals
-        scale = 1.0 if own.roots is None else own.roots
+        of_parameters[:, :d] = 0.0 if linearised.parameters is None else linearised.parameters
+        left[:, :d] = -linearised.residuals
+        scale = 1.0 if linearised.roots is None else linearised.roots
         factors.append(rows * np.asarray(scale)[..., None])
         sides.append(of_parameters * np.asarray(scale)[..., None])
         residuals.append(left * scale)
         near = np.ones(n, bool)
         if term.loss != "linear":
-            near = np.sum(own.residuals**2, axis=1) <= _core.chi_squared(dim, _KEPT)
+            near = np.sum(linearised.residuals**2, axis=1) <= _core.chi_squared(dim, _KEPT)
         counts.append(near & isinstance(term, PointTerm))
     firsts, whitened = _core.coefficient_factors(setup.knots, kinds, times, 0)[0], np.concatenate(residuals)[order]
     return SensorEvidence(
@@ -155,7 +155,7 @@ def _evidence(
 # ---- curves ----
 
 
-def _are_partial(points: Points, factor: Space[Any]) -> bool:
+def _are_partial(points: Points, factor: AnySpace) -> bool:
     """Whether points are positions or rotations of poses only."""
     y: Any = points.y
     partial = isinstance(factor, SpecialEuclidean) and not isinstance(y, tuple)
@@ -169,22 +169,22 @@ def in_parts(posterior: Posterior, reports: Sequence[SmoothingReport], spaces: S
     """
     first, results = 0, []
     for report, space in zip(reports, spaces, strict=True):
-        own = posterior._replace(first=first)
-        results.append(Smoothed(report, np.zeros((0, 4)), report.lam, 1.0, False, own))
+        of_part = posterior._replace(first=first)
+        results.append(Smoothed(report, np.zeros((0, 4)), report.lam, 1.0, False, of_part))
         first += space.dim
     return results
 
 
-def _each(value: Any) -> tuple[Any, ...]:
+def _as_tuple(value: object) -> tuple[Any, ...]:
     return value if isinstance(value, tuple) else (value,)
 
 
-def _are_used(weights: Any, count: int) -> Any:
+def _are_used(weights: object, count: int) -> NDArray[np.bool_]:
     """Return which of some points have a weight, or an information matrix, that is not zero."""
     used = np.ones(count, bool)
-    for own in _each(weights):
-        if own is not None:
-            used &= np.asarray(own).reshape(count, -1).any(axis=-1)
+    for of_factor in _as_tuple(weights):
+        if of_factor is not None:
+            used &= np.asarray(of_factor).reshape(count, -1).any(axis=-1)
     return used
 
 
@@ -194,27 +194,24 @@ class EstimatedSpline(SmoothingSpline[P, Any]):
     _kind = "Estimated spline"
     _format = "symspline-estimate"
     _parameters: dict[str, Parameter]
-    _measurements: tuple[Any, ...]
+    _measurements: tuple[Measurement, ...]
     _residuals: tuple[Doubles | tuple[Doubles, ...], ...]
     _long_gaps: list[LongGaps | None]
 
-    @classmethod
-    def _of(
-        cls,
-        curve: CubicSpline[Any, Any],
+    def _with_results(
+        self,
         smoothed: list[Smoothed],
         parameters: dict[str, Parameter],
         long_gaps: list[LongGaps | None],
-        measurements: tuple[Any, ...] = (),
+        measurements: tuple[Measurement, ...] = (),
         residuals: tuple[Doubles | tuple[Doubles, ...], ...] = (),
     ) -> Self:
-        """Return the result of an estimate, without checks; what files do not hold may be omitted."""
-        # Measurements replace the noisy points of a smoothing fit.
-        noisy: Any = None
-        self = cls._like(curve, noisy, smoothed)
+        """Set the results of an estimate of a new spline, and return it. What files do not hold may be omitted."""
         self._parameters, self._long_gaps = parameters, long_gaps
         self._measurements, self._residuals = measurements, residuals
-        return self
+        # Measurements replace the noisy points of a smoothing fit.
+        noisy: Any = None
+        return self._with_noise(noisy, smoothed)
 
     @property
     def parameters(self) -> Mapping[str, Parameter]:
@@ -222,7 +219,7 @@ class EstimatedSpline(SmoothingSpline[P, Any]):
         return MappingProxyType(self._parameters)
 
     @property
-    def measurements(self) -> tuple[Any, ...]:
+    def measurements(self) -> tuple[Measurement, ...]:
         """Measurements from which the curve was estimated; empty for a curve from a file."""
         return self._measurements
 
@@ -238,9 +235,9 @@ class EstimatedSpline(SmoothingSpline[P, Any]):
     @property
     def data(self) -> Any:
         """Times and points of the first `Points` among the measurements."""
-        for own in self._measurements:
-            if isinstance(own, Points):
-                return own.t, own.y
+        for measurement in self._measurements:
+            if isinstance(measurement, Points):
+                return measurement.t, measurement.y
         raise ValidationError("the curve was estimated without points. See the attribute measurements.")
 
     def _calibration_of(self, number: int) -> Calibration | None:
@@ -249,8 +246,8 @@ class EstimatedSpline(SmoothingSpline[P, Any]):
 
     def _plain_spread(self, number: int, index: tuple[int, ...], x: Doubles, nu: int) -> Doubles:
         space = smoothed_spaces(self.space)[number]
-        found = self._covariance(number, index, np.ascontiguousarray(x), None, [nu], False)
-        return np.asarray(np.sqrt(np.trace(found, axis1=-2, axis2=-1) / space.dim))
+        covariance = self._covariance(number, index, np.ascontiguousarray(x), None, [nu], False)
+        return np.asarray(np.sqrt(np.trace(covariance, axis1=-2, axis2=-1) / space.dim))
 
     def _coupled(self, parts: list[int], index: tuple[int, ...], x: Doubles, orders: list[int]) -> Doubles:
         # The measurements may couple the parts, such as attitude and acceleration by an accelerometer.
@@ -258,18 +255,20 @@ class EstimatedSpline(SmoothingSpline[P, Any]):
         firsts = [self._posterior(self._smoothed[number]).first for number in parts]
         rows = [first + np.arange(spaces[number].dim) for number, first in zip(parts, firsts, strict=True)]
         kinds = end_kinds(self._bc_type)
-        found = posterior.coupled(self._knots_of(index), index, kinds, x, None, orders, np.concatenate(rows))
-        return self._inflated(parts, index, x, None, orders, found)
+        covariance = posterior.coupled(self._knots_of(index), index, kinds, x, None, orders, np.concatenate(rows))
+        return self._inflated(parts, index, x, None, orders, covariance)
 
     def _made_of(self, radius: float | None = None) -> str:
-        counts = [f"{np.size(measurement.t)} {type(measurement).__name__}" for measurement in self._measurements]
-        df = " and ".join(f"{own.report.df:.3g}" for own in self._smoothed[:3])
+        counts = [
+            f"{len(self._times_of(measurement))} {type(measurement).__name__}" for measurement in self._measurements
+        ]
+        df = " and ".join(f"{part.report.df:.3g}" for part in self._smoothed[:3])
         return ", ".join([*counts, f"{self._times.shape[-1]} knots", f"{df} degrees of freedom"])
 
     # ---- plots ----
 
     def _noise_beside(self, index: tuple[int, ...], x: Doubles) -> UncertaintyBand:
-        radii = [own[-1][1] for own in self._radii(index, x)]
+        radii = [radii_of_part[-1][1] for radii_of_part in self._radii(index, x)]
         speed = None if is_several(self.space) else self._spread(0, index, x, 1)
         others = [self._times_of(sensor) for sensor in self._measurements if not isinstance(sensor, Points)]
         times, points = zip(*map(self._points_in, range(len(factors_of(self.space)))), strict=True)
@@ -285,19 +284,19 @@ class EstimatedSpline(SmoothingSpline[P, Any]):
         """Return times and points of all measured points in one factor, in the order of time."""
         factor = factors_of(self.space)[number]
         times, points = [np.empty(0)], [np.empty((0, *factor.point_shape), factor.dtype)]
-        for own in self._measurements:
-            if not isinstance(own, Points) or own.factor not in (None, number):
+        for measurement in self._measurements:
+            if not isinstance(measurement, Points) or measurement.factor not in (None, number):
                 continue
-            y: Any = own.y
-            weights: Any = own.weights
-            if own.factor is None and isinstance(self.space, Product):
+            y: Any = measurement.y
+            weights = measurement.weights
+            if measurement.factor is None and isinstance(self.space, Product):
                 y = parts_of(y, self.space, "y")[number]
                 weights = weights[number] if isinstance(weights, tuple) else weights
-            if _are_partial(own, factor):
+            if _are_partial(measurement, factor):
                 continue
             rows = factor._numbers(factor._doubles(y, "y"))
             used = factor._where_finite(rows) & _are_used(weights, len(rows))
-            times.append(self._times_of(own)[used])
+            times.append(self._times_of(measurement)[used])
             points.append(np.asarray(factor.project(rows[used])) if used.any() else rows[used])
         order = np.argsort(np.concatenate(times), kind="stable")
         return np.concatenate(times)[order], np.concatenate(points)[order]
@@ -305,16 +304,17 @@ class EstimatedSpline(SmoothingSpline[P, Any]):
     def _panels_below(self, x: Doubles) -> list[SidePanel]:
         panels = super()._panels_below(x)
         kinds = [type(measurement).__name__ for measurement in self._measurements]
-        for number, (own, kind) in enumerate(zip(self._measurements, kinds, strict=True)):
-            if isinstance(own, Points) and not _are_partial(own, factors_of(self.space)[own.factor or 0]):
+        for number, (measurement, kind) in enumerate(zip(self._measurements, kinds, strict=True)):
+            factor = factors_of(self.space)[measurement.factor or 0]
+            if isinstance(measurement, Points) and not _are_partial(measurement, factor):
                 continue
             label = kind if kinds.count(kind) == 1 else f"{kind} {kinds[: number + 1].count(kind)}"
             given = self._residuals[number]
             # Velocities on products and for poses have one array per part.
-            values = np.concatenate([each.reshape(len(each), -1) for each in _each(given)], axis=-1)
-            named = isinstance(own, (BodyRates, SpecificForce)) and values.shape[1] == 3
+            values = np.concatenate([array.reshape(len(array), -1) for array in _as_tuple(given)], axis=-1)
+            named = isinstance(measurement, (BodyRates, SpecificForce)) and values.shape[1] == 3
             label = f"{label}\nresidual / σ"
-            panels.append(SidePanel(label, self._times_of(own), values, ("x", "y", "z") if named else ()))
+            panels.append(SidePanel(label, self._times_of(measurement), values, ("x", "y", "z") if named else ()))
         return panels
 
     # ---- batches, files and pickles ----
@@ -326,10 +326,12 @@ class EstimatedSpline(SmoothingSpline[P, Any]):
         )._parts
 
     def _state(self) -> dict[str, Any]:
-        posterior: Any = self._smoothed[0].posterior
+        posterior = self._posterior(self._smoothed[0])
         return CubicSpline._state(self) | {
             "noise": [vars(part.report) for part in self._smoothed],
-            "parameters": {name: [own.value.tolist(), own.cov.tolist()] for name, own in self._parameters.items()},
+            "parameters": {
+                name: [parameter.value.tolist(), parameter.cov.tolist()] for name, parameter in self._parameters.items()
+            },
             "matrix": posterior.band,
             "side": posterior.side,
             "corner": posterior.corner,
@@ -338,25 +340,26 @@ class EstimatedSpline(SmoothingSpline[P, Any]):
 
     @classmethod
     def _from_state(cls, state: Entries) -> Self:
-        fitted: CubicSpline[Any, Any] = CubicSpline._fitted(*read_fitted(state))
-        curve = fitted._curve
-        spaces, knots = smoothed_spaces(curve.space), curve.times.shape[-1]
+        self = cls._fitted(*read_fitted(state))
+        spaces, knots = smoothed_spaces(self.space), self._times.shape[-1]
         m = sum(space.dim for space in spaces)
         with entry("parameters"):
-            parameters = {name: Parameter(*map(np.asarray, own)) for name, own in dict(state["parameters"]).items()}
-            p = sum(len(own.value) for own in parameters.values())
+            parameters = {
+                name: Parameter(*map(np.asarray, arrays)) for name, arrays in dict(state["parameters"]).items()
+            }
+            p = sum(len(parameter.value) for parameter in parameters.values())
             matrix, side, corner = (state[name] for name in ("matrix", "side", "corner"))
             shapes = [(knots * m, 4 * m), (knots * m, p), (p, p)]
             if [matrix.shape, side.shape, corner.shape] != shapes or any(
-                own.cov.shape != 2 * own.value.shape for own in parameters.values()
+                parameter.cov.shape != 2 * parameter.value.shape for parameter in parameters.values()
             ):
                 raise ValidationError("the matrices do not match the parameters and knots")
         with entry("noise"):
             reports = [read_report(SmoothingReport, dict(numbers), ()) for numbers in state["noise"]]
             smoothed = in_parts(Posterior(matrix, np.zeros((0, 0)), m, side, corner), reports, spaces)
         with entry("gaps"):
-            gaps = [read_long_gaps(own) for own in state.get("gaps", [None] * len(spaces))]
-        return cls._of(fitted, smoothed, parameters, gaps)
+            gaps = [read_long_gaps(entries) for entries in state.get("gaps", [None] * len(spaces))]
+        return self._with_results(smoothed, parameters, gaps)
 
     def __repr__(self) -> str:
         knots, parameters = self._times.shape[-1], ", ".join(self._parameters) or "no parameters"
@@ -368,11 +371,11 @@ class PointsSpline(SmoothingSpline[P, Any]):
     """A smoothing spline that `estimate` fitted to points only, with residuals like those of an `EstimatedSpline`."""
 
     _format = "symspline-estimate-points"
-    _measurements: tuple[Any, ...]
+    _measurements: tuple[Measurement, ...]
     _residuals: tuple[Doubles | tuple[Doubles, ...], ...]
 
     @classmethod
-    def of(cls, fitted: SmoothingSpline[Any, Any], given: Points, terms: list[PointTerm]) -> Self:
+    def of(cls, fitted: AnySmoothingSpline, given: Points, terms: list[PointTerm]) -> Self:
         """Return the result of `estimate` from the smoothing spline and the terms of its points.
 
         Parameters
@@ -384,22 +387,22 @@ class PointsSpline(SmoothingSpline[P, Any]):
         terms : list of PointTerm
             The same points in every part, with standard deviations of one if none were given.
         """
-        found = []
+        residuals_of_parts = []
         for term in terms:
             (part,) = term.parts
             p, frames = fitted._frames(term.times, False)[part]
             rows = term.residuals_at(smoothed_spaces(fitted.space)[part], p, frames)
             scale = 1.0 if given.sigma is not None else float(fitted._smoothed[part].sigma)
             with np.errstate(divide="ignore", invalid="ignore"):
-                found.append(np.asarray(rows / term.noise / scale))
-        residuals = found[0] if len(found) == 1 else tuple(found)
+                residuals_of_parts.append(np.asarray(rows / term.noise / scale))
+        residuals = residuals_of_parts[0] if len(residuals_of_parts) == 1 else tuple(residuals_of_parts)
         return cls._of(fitted, (given,), (residuals,))
 
     @classmethod
     def _of(
         cls,
-        fitted: SmoothingSpline[Any, Any],
-        measurements: tuple[Any, ...],
+        fitted: AnySmoothingSpline,
+        measurements: tuple[Measurement, ...],
         residuals: tuple[Doubles | tuple[Doubles, ...], ...],
     ) -> Self:
         self = super()._like(fitted, fitted._noisy, fitted._smoothed)
@@ -407,7 +410,7 @@ class PointsSpline(SmoothingSpline[P, Any]):
         return self
 
     @property
-    def measurements(self) -> tuple[Any, ...]:
+    def measurements(self) -> tuple[Measurement, ...]:
         """Points from which the curve was estimated; empty for a curve loaded from a file."""
         return self._measurements
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from .._core import ValidationError
 from .._curves.composed import call_at_times
 from .._smoothing import SmoothingSpline
 from .._smoothing.noise import smoothed_spaces, split
+from .._smoothing.spline import AnySmoothingSpline
 from .._spaces import Array, Doubles, factors_of
 from .._splines.composed import SegmentedCurve
 
@@ -39,9 +40,9 @@ class Motion(NamedTuple):
     frames: Array
 
 
-def check_uncertain(spline: Any) -> SmoothingSpline[Any, Any]:
+def check_uncertain(spline: object) -> AnySmoothingSpline:
     """Return the curve, or raise ValidationError if it has no covariance."""
-    if isinstance(spline, SegmentedCurve) and all(isinstance(own, SmoothingSpline) for own in spline):
+    if isinstance(spline, SegmentedCurve) and all(isinstance(segment, SmoothingSpline) for segment in spline):
         raise ValidationError(
             "return_std=True needs one smoothing spline, but spline is a SegmentedCurve. Pass its segments one by one, "
             "with times in their domains."
@@ -55,7 +56,7 @@ def check_uncertain(spline: Any) -> SmoothingSpline[Any, Any]:
 
 
 def standard_errors(
-    spline: SmoothingSpline[Any, Any],
+    spline: AnySmoothingSpline,
     x: TimesLike,
     parts: list[int],
     jacobians: Callable[[list[Motion]], Jacobians],
@@ -95,43 +96,41 @@ def standard_errors(
         times, per_curve = _between_knots(spline, times, outside, per_curve)
         motions = _motions(spline, times, parts, per_curve)
         by_order = jacobians(motions)
-        orders = [order for order, own in enumerate(by_order) if own]
+        orders = [order for order, blocks in enumerate(by_order) if blocks]
         pairs = list(zip(parts, motions, strict=True))
         rows = [by_order[order].get(part, _nothing(by_order, motion)) for order in orders for part, motion in pairs]
-        own = times.shape[len(batch) :] if per_curve else times.shape
+        shape = times.shape[len(batch) :] if per_curve else times.shape
         whole = np.concatenate(rows, axis=-1)
-        whole = whole.reshape(*batch, math.prod(own), *whole.shape[1:])
+        whole = whole.reshape(*batch, math.prod(shape), *whole.shape[1:])
         variance = np.empty(whole.shape[:-1])
         for index in np.ndindex(batch):
             at = np.ascontiguousarray(np.ravel(times[index] if per_curve else times))
             for start in range(0, len(at), _TIMES):
                 some = slice(start, start + _TIMES)
                 covariance = spline._coupled(parts, index, at[some], orders)
-                own_rows = whole[index][some]
-                variance[index][some] = ((own_rows @ covariance) * own_rows).sum(axis=-1)
+                jacobian = whole[index][some]
+                variance[index][some] = ((jacobian @ covariance) * jacobian).sum(axis=-1)
         # Rounding may make a vanishing variance negative.
-        return np.asarray(np.sqrt(np.maximum(variance, 0.0)).reshape(*batch, *own, whole.shape[-2]))
+        return np.asarray(np.sqrt(np.maximum(variance, 0.0)).reshape(*batch, *shape, whole.shape[-2]))
 
     return np.asarray(call_at_times(spline._curve, spline._time_axis, x, per_curve, outside, call))
 
 
 def _nothing(by_order: Jacobians, motion: Motion) -> Doubles:
     """Return derivatives of zero for a part on which nothing depends."""
-    known = next(own for each in by_order for own in each.values())
+    known = next(block for blocks in by_order for block in blocks.values())
     return np.zeros((*known.shape[:-1], motion.frames.shape[1]))
 
 
-def _between_knots(
-    spline: SmoothingSpline[Any, Any], times: Doubles, outside: str, per_curve: bool
-) -> tuple[Doubles, bool]:
+def _between_knots(spline: AnySmoothingSpline, times: Doubles, outside: str, per_curve: bool) -> tuple[Doubles, bool]:
     """Move times of closed curves between the knots by whole periods, and raise for others outside the knots."""
     if outside not in ("periodic", "continue"):
         return times, per_curve
     knots, batch = spline._times, spline._batch
     first, last = knots[..., 0], knots[..., -1]
     if knots.ndim > 1:
-        own = times.shape[len(batch) :] if per_curve else times.shape
-        first, last = (end.reshape(batch + (1,) * len(own)) for end in (first, last))
+        shape = times.shape[len(batch) :] if per_curve else times.shape
+        first, last = (end.reshape(batch + (1,) * len(shape)) for end in (first, last))
         per_curve = True
     if outside == "periodic":
         within = (times >= first) & (times <= last)
@@ -144,15 +143,15 @@ def _between_knots(
     return np.broadcast_to(times, np.broadcast_shapes(times.shape, np.shape(first))), per_curve
 
 
-def _motions(spline: SmoothingSpline[Any, Any], times: Doubles, parts: list[int], per_curve: bool) -> list[Motion]:
+def _motions(spline: AnySmoothingSpline, times: Doubles, parts: list[int], per_curve: bool) -> list[Motion]:
     """Return points, velocities and frames of parts, with all batch axes and axes of times in one."""
-    velocities: list[Any] = []
+    velocities: list[Array] = []
     for factor, curve in zip(factors_of(spline.space), spline._curve.parts, strict=True):
         velocities += split(factor, curve.evaluate(times, "velocity", "raise", per_curve))
-    found = spline._frames(times, per_curve)
+    frames_of_parts = spline._frames(times, per_curve)
     spaces, motions = smoothed_spaces(spline.space), []
     for part in parts:
-        space, (p, frames) = spaces[part], found[part]
+        space, (p, frames) = spaces[part], frames_of_parts[part]
         shape = space.point_shape
         rows = frames.reshape(-1, space.dim, *shape)
         motions.append(Motion(p.reshape(-1, *shape), velocities[part].reshape(-1, *shape), rows))

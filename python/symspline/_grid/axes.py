@@ -278,13 +278,12 @@ def validate_nodes(space: AnySpace, arrays: list[Array], tols: list[float], axes
     lead = tuple(len(axis.knots) for axis in axes)
     missing = np.zeros(lead, bool)
     for factor, array in zip(factors, arrays, strict=True):
-        point_axes = factor._point_axes(array)
         refuse(
-            np.asarray(np.isinf(array).any(axis=point_axes)),
+            np.asarray(np.isinf(array).any(axis=factor._point_axes)),
             "points",
             lambda _: "is infinite. Mark missing nodes with NaN.",
         )
-        missing |= np.isnan(array).any(axis=point_axes)
+        missing |= np.isnan(array).any(axis=factor._point_axes)
     if missing.all():
         raise ValidationError("points has no valid node: every node contains NaN")
     for factor, array, tol in zip(factors, arrays, tols, strict=True):

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from .. import _core
 from .._base.arrays import short_repr
 from .._base.faults import is_silent, of_index, warn
-from .._curves.curve import CurveArrays
+from .._base.typing import Number
 from .._curves.ends import end_kinds
-from .._spaces import Array, Doubles, Space, factors_of
+from .._spaces import AnySpace, Array, Doubles, Space, factors_of
 from .noise import Part, SmoothingData, distances_of, grouped, in_part, is_several, smoothed_spaces, split
 from .report import SmoothingReport, SmoothingWarning
-from .solve import FAST, NOISY, TWO, UNIQUE, Found
+from .solve import FAST, NOISY, TWO, UNIQUE, SmoothCurves, SmoothedSpline
 
 # Quantiles of χ² at which the losses begin to grow more slowly, as in `loss.rs`.
 _CORNERS = {"huber": 0.82, "cauchy": 0.95}
@@ -53,7 +53,7 @@ class Fitted(NamedTuple):
     ----------
     part : Part
         Data.
-    result : Found
+    result : SmoothCurves
         Smooth curves.
     report : SmoothingReport
         Report for the user, in which an infinite λ is the one that was given.
@@ -66,7 +66,7 @@ class Fitted(NamedTuple):
     """
 
     part: Part
-    result: Found
+    result: SmoothCurves
     report: SmoothingReport
     at: Array
     converged: NDArray[np.bool_]
@@ -75,9 +75,9 @@ class Fitted(NamedTuple):
 
 
 def audit(
-    spline: Any,
+    spline: SmoothedSpline,
     parts: list[Part],
-    results: list[Found],
+    results: list[SmoothCurves],
     good: NDArray[np.bool_],
     choices: NDArray[np.bool_],
 ) -> None:
@@ -118,13 +118,13 @@ def audit(
     if not is_silent(SmoothingWarning):
         _warn_of_residuals(space, noisy, fits)
         if fits[0].result.smoothed.penalty == "acceleration" and noisy.times.shape[-1] >= _DATA:
-            _warn_of_varying(space, noisy, spline._curve, fits, end_kinds(spline._bc_type))
+            _warn_of_varying(space, noisy, spline, fits)
     _warn_of_spreads(noisy, fits)
 
 
 def _first(space: Space, affected: list[NDArray[np.bool_]], mark: str = "") -> tuple[int, tuple[int, ...], str] | None:
     """Return the first of the affected curves: its part, its index, and words that name it and count the others."""
-    counts = [int(np.count_nonzero(own)) for own in affected]
+    counts = [int(np.count_nonzero(curves)) for curves in affected]
     if not any(counts):
         return None
     number = counts.index(next(filter(None, counts)))
@@ -136,7 +136,7 @@ def _first(space: Space, affected: list[NDArray[np.bool_]], mark: str = "") -> t
 # ---- data that a robust loss rejects ----
 
 
-def _warn_of_outliers(space: Space, fits: list[Fitted], counts: list[Any]) -> None:
+def _warn_of_outliers(space: Space, fits: list[Fitted], counts: list[Array]) -> None:
     """Warn if the data that were rejected from a curve may be the wrong ones."""
     # Data without noise, such as those of a body at rest, contain no outliers.
     bad = [
@@ -211,7 +211,7 @@ _MINIMA = {
 # ---- the choice of λ ----
 
 
-def warn_of_bounds(space: Space, reports: list[SmoothingReport], chosen: list[Any], counts: list[Any]) -> None:
+def warn_of_bounds(space: Space, reports: list[SmoothingReport], chosen: list[Array], counts: list[Array]) -> None:
     """Warn once if a chosen λ is at a bound, or close to it.
 
     Parameters
@@ -225,12 +225,12 @@ def warn_of_bounds(space: Space, reports: list[SmoothingReport], chosen: list[An
     """
     for number, (report, asked, count) in enumerate(zip(reports, chosen, counts, strict=True)):
         rough = (np.asarray(report.df) > _ALL * count) & (np.asarray(count) > 4)
-        found = np.argwhere((np.asarray(report.at_bound) | rough) & np.asarray(report.converged) & asked)
-        if not len(found):
+        at_bound = np.argwhere((np.asarray(report.at_bound) | rough) & np.asarray(report.converged) & asked)
+        if not len(at_bound):
             continue
-        index = tuple(map(int, found[0]))
+        index = tuple(map(int, at_bound[0]))
         of = of_index(index) + in_part(space, number)
-        of += f" (and of {len(found) - 1} more curves)" if len(found) > 1 else ""
+        of += f" (and of {len(at_bound) - 1} more curves)" if len(at_bound) > 1 else ""
         if report.is_stiff(index):
             lam = "the largest lam: the curve is a geodesic"
             advice = (
@@ -304,8 +304,8 @@ class Finding(NamedTuple):
     @property
     def failed(self) -> bool:
         """Whether a test failed."""
-        found = self.large or self.small or self.correlated or self.step is not None
-        return found or bool(self.outliers) or self.rejected > 0 or self.run is not None
+        unlikely = self.large or self.small or self.correlated or self.step is not None
+        return unlikely or bool(self.outliers) or self.rejected > 0 or self.run is not None
 
     @property
     def smooth(self) -> bool:
@@ -372,17 +372,16 @@ def _warn_of_residuals(space: Space, noisy: SmoothingData, fits: list[Fitted]) -
 
     Curves with given λ and estimated σ are not examined, because the user has decided how closely they follow the data.
     """
-    found: list[tuple[tuple[int, ...], str]] = []
+    failures: list[tuple[tuple[int, ...], str]] = []
     for number, fit in enumerate(fits):
         curves = np.flatnonzero(fit.converged & (fit.given | fit.chosen))
-        of_part = in_part(space, number, ",")
         for curve, facts in _complaints(noisy, number, fit, curves) if len(curves) else ():
             index = tuple(map(int, np.unravel_index(curve, noisy.batch)))
-            what = f"The residuals of the smoothing{of_index(index)}{of_part} are not those of independent noise: "
-            found.append((index, what + facts))
-    if found:
-        index, message = found[0]
-        more = f" This holds for {len(found) - 1} more curves or factors." if len(found) > 1 else ""
+            of = of_index(index) + in_part(space, number, ",")
+            failures.append((index, f"The residuals of the smoothing{of} are not those of independent noise: {facts}"))
+    if failures:
+        index, message = failures[0]
+        more = f" This holds for {len(failures) - 1} more curves or factors." if len(failures) > 1 else ""
         warn(message + more, SmoothingWarning, index)
 
 
@@ -390,12 +389,12 @@ def _complaints(noisy: SmoothingData, number: int, fit: Fitted, curves: NDArray[
     """Return the curves that failed a test among the given ones, with descriptions of the tests and their remedies."""
     space, noise, n = fit.part.space, noisy.noise[number], noisy.times.shape[-1]
 
-    def of_curves(array: Any, axes: tuple[int, ...] = ()) -> Array:
+    def of_curves(array: Array, axes: tuple[int, ...] = ()) -> Array:
         rows: Array = np.broadcast_to(array, (*noisy.batch, n, *axes)).reshape(-1, n, *axes)[curves]
         return rows
 
-    points = [space._as_doubles(of_curves(points, space.point_shape)) for points in (fit.at, fit.part.points)]
-    data = [of_curves(noisy.times), *points, of_curves(noise.weights)]
+    at, points = (rows.reshape(-1, n, *space._point_shape)[curves] for rows in (fit.at, fit.part.points))
+    data = [of_curves(noisy.times), space._as_doubles(at), space._as_doubles(points), of_curves(noise.weights)]
     rows, deviations = _core.residuals_at(space._handle, *data)
     if noise.information is None:
         rows *= np.sqrt(data[-1])[..., None]
@@ -408,12 +407,13 @@ def _complaints(noisy: SmoothingData, number: int, fit: Fitted, curves: NDArray[
     loss = fit.part.noise.loss
     corner = None if loss == "linear" else corner_of(loss, space.dim)
     given = np.where(fit.given, fit.result.smoothed.sigma, np.nan).ravel()[curves]
-    found = _core.examine_curves(space._handle, data, rows, deviations, leverage, given, corner)
-    return [(int(curves[k]), _described(np.flatnonzero(observed[k]), *result)) for k, *result in found]
+    failures = _core.examine_curves(space._handle, data, rows, deviations, leverage, given, corner)
+    return [(int(curves[k]), _described(np.flatnonzero(observed[k]), tests)) for k, *tests in failures]
 
 
-def _described(numbers: NDArray[np.intp], bypassed: Any, of_given: Any, of_estimated: Any) -> str:
+def _described(numbers: NDArray[np.intp], tests: list[Any]) -> str:
     """Describe failed tests of one curve, whose rows with information have these numbers."""
+    bypassed, of_given, of_estimated = tests
     if bypassed:
         return _BYPASSED.format(*bypassed)
     if of_given:
@@ -517,8 +517,8 @@ def _of_units(sensor: Sensor, ratio: float) -> str:
     if not ratio > 0:
         return ""
     for factor, text in {DEGREES: "57.3, the ratio of degrees and radians", **_UNITS}.items():
-        for own in (ratio / factor, ratio * factor):
-            if abs(np.log(own)) < _NEAR:
+        for quotient in (ratio / factor, ratio * factor):
+            if abs(np.log(quotient)) < _NEAR:
                 return f"{ratio:.2g} is close to {text}: check the unit of sigma of {sensor.label}."
     return ""
 
@@ -526,13 +526,11 @@ def _of_units(sensor: Sensor, ratio: float) -> str:
 # ---- a motion or noise that varies along the recording, while λ and σ are constant ----
 
 
-def _warn_of_varying(
-    space: Space[Any], noisy: SmoothingData, curve: CurveArrays, fits: list[Fitted], kinds: Any
-) -> None:
+def _warn_of_varying(space: AnySpace, noisy: SmoothingData, spline: SmoothedSpline, fits: list[Fitted]) -> None:
     """Warn if the motion or its noise varies along a curve whose λ was chosen."""
     numbers = iter(range(len(fits)))
-    for factor, part, own in zip(factors_of(space), curve.parts, grouped(space, fits), strict=True):
-        number, *more = (next(numbers) for _ in own)
+    for factor, part, of_factor in zip(factors_of(space), spline._curve.parts, grouped(space, fits), strict=True):
+        number, *more = (next(numbers) for _ in of_factor)
         fit, noise = fits[number], noisy.noise[number]
         # The acceleration of a pose is not that of its rotation and position.
         if more or noise.information is not None:
@@ -543,7 +541,9 @@ def _warn_of_varying(
         if not len(curves):
             continue
 
-        def rows(array: Any, chosen: Any = curves, batch: tuple[int, ...] = noisy.batch, axes: int = 1) -> Any:
+        def rows(
+            array: Array, chosen: NDArray[np.intp] = curves, batch: tuple[int, ...] = noisy.batch, axes: int = 1
+        ) -> Array:
             whole = np.broadcast_to(array, (*batch, *array.shape[array.ndim - axes :]))
             return np.ascontiguousarray(whole.reshape(-1, *array.shape[array.ndim - axes :])[chosen])
 
@@ -552,17 +552,17 @@ def _warn_of_varying(
         middle = 0.5 * (part.times[..., 1:] + part.times[..., :-1])
         bend = part.evaluate(np.ascontiguousarray(middle), "bend", "raise", middle.ndim > 1)
         energy = np.cumsum(np.diff(knots) * rows(bend) ** 2, axis=-1)
-        band, times = rows(fit.result.smoothed.band, axes=2), rows(noisy.times)
+        band, times, kinds = rows(fit.result.smoothed.band, axes=2), rows(noisy.times), end_kinds(spline._bc_type)
         leverage = _core.smoothing_variance(knots, band, np.zeros(len(curves)), times, 0, kinds)
         squares = np.full(fit.at.shape[: len(noisy.batch) + 1], np.nan)
         squares[good] = factor._apply("distance", p=fit.at[good], q=fit.part.points[good]) ** 2
         energy = np.concatenate([np.zeros((len(curves), 1)), energy], axis=-1)
         tests = _core.are_constant(times, rows(noise.weights), leverage, rows(squares), knots, energy, factor.dim)
         failed = []
-        for curve_number, found in zip(curves, tests, strict=True):
+        for curve_number, result in zip(curves, tests, strict=True):
             index = tuple(map(int, np.unravel_index(curve_number, noisy.batch)))
             shown = noisy.t[index] if noisy.t.ndim > 1 else noisy.t
-            if found and (message := varying(shown, found, fit.part.noise.loss != "linear")):
+            if result and (message := varying(shown, result, fit.part.noise.loss != "linear")):
                 failed.append((index, message))
         if failed:
             index, message = failed[0]
@@ -572,7 +572,7 @@ def _warn_of_varying(
             return
 
 
-def varying(t: Array, tests: Any, robust: bool = False) -> str | None:
+def varying(t: Array, tests: list[tuple[float, list[int], float]], robust: bool = False) -> str | None:
     """Describe what varies along a curve, from the results of both tests. Robust losses have no test of the noise."""
     smoothness, noise = tests
     messages = []
@@ -621,7 +621,7 @@ def _warn_of_spreads(noisy: SmoothingData, fits: list[Fitted]) -> None:
 
 
 def warn_of_spread(
-    space: Space, at: Array, points: Array, counts: NDArray[np.bool_], number: Any, df: Any, name: str
+    space: Space, at: Array, points: Array, counts: NDArray[np.bool_], number: Array | int, df: Number, name: str
 ) -> bool:
     """Warn if data are about as far from a smooth fit as random points of a compact space would be.
 
@@ -649,17 +649,17 @@ def warn_of_spread(
     distances[used] = distances_of(space, at[used], points[used])
     # Fits that failed have the distance 0.
     distances[~used.any(axis=-1)] = 0.0
-    found = np.asarray(np.nanmedian(distances, axis=-1))
+    median_distance = np.asarray(np.nanmedian(distances, axis=-1))
     # A fit through all data has no residuals to compare.
-    far = np.argwhere((found**2 * number > _FAR * expected**2 * (number - df)) & (number - df >= 1))
+    far = np.argwhere((median_distance**2 * number > _FAR * expected**2 * (number - df)) & (number - df >= 1))
     if not len(far):
         return False
     index = tuple(map(int, far[0]))
     more = f" (and {len(far) - 1} more curves)" if len(far) > 1 else ""
     warn(
-        f"half of the data{of_index(index)} are {found[index]:.2g} or more away from their smooth {name}{more}. For "
-        f"random points of {space!r} this distance is {expected:.2g}, so the {name} has little meaning. Check the "
-        "units and signs of the data.",
+        f"half of the data{of_index(index)} are {median_distance[index]:.2g} or more away from their smooth "
+        f"{name}{more}. For random points of {space!r} this distance is {expected:.2g}, so the {name} has little "
+        "meaning. Check the units and signs of the data.",
         UserWarning,
         index,
     )

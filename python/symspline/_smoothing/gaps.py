@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,11 +17,13 @@ from numpy.typing import NDArray
 from .. import _core
 from .._base.arrays import short_repr
 from .._base.faults import of_index, warn
+from .._base.typing import Time
 from .._curves.ends import end_kinds, is_closed
-from .._spaces import Array, Doubles, Euclidean, Space, SpecialEuclidean, factors_of
+from .._spaces import AnySpace, Array, Doubles, Euclidean, Space, SpecialEuclidean, factors_of
 from .audit import corner_of
 from .noise import SINGULAR, grouped, in_part, smoothed_spaces, split
-from .report import SmoothingWarning, frames_at
+from .report import Known, SmoothingWarning, frames_at
+from .solve import SmoothedSpline
 
 # A gap is long if the variance in its middle exceeds the first multiple of the median variance at the data, and its
 # length the second multiple of the median time step, so that sparse data have no gaps.
@@ -48,10 +50,16 @@ class Gap(NamedTuple):
         that is longer than any such part. Its factor is then the largest one of all shorter lengths.
     """
 
-    start: Any
-    stop: Any
+    start: Time
+    stop: Time
     factor: float
     blocks: int
+
+
+class CalibratedSpline(SmoothedSpline, Protocol):
+    """A smoothing spline with long gaps between its data."""
+
+    def _gaps_of(self, number: int, index: tuple[int, ...]) -> list[Gap]: ...
 
 
 class Course(NamedTuple):
@@ -85,8 +93,8 @@ class Course(NamedTuple):
         d = np.maximum(distance, 0.0)
         if self.order == 2:
             return d**3 / (3 * self.lam) if nu == 0 else d / self.lam
-        own = d**5 / (20 * self.lam) if nu == 0 else d**3 / (3 * self.lam)
-        return own + self.acceleration * (d**4 / 4 if nu == 0 else d**2)
+        noise = d**5 / (20 * self.lam) if nu == 0 else d**3 / (3 * self.lam)
+        return noise + self.acceleration * (d**4 / 4 if nu == 0 else d**2)
 
 
 class SensorEvidence(NamedTuple):
@@ -122,7 +130,7 @@ class SensorEvidence(NamedTuple):
     """
 
     knots: Doubles
-    known: Any
+    known: Known
     times: Doubles
     firsts: NDArray[np.int64]
     factors: Doubles
@@ -136,7 +144,7 @@ class SensorEvidence(NamedTuple):
     line: list[Doubles]
 
     @property
-    def linearised(self) -> Any:
+    def linearised(self) -> _core._Linearised:
         """The arrays that the core reads."""
         residuals = [np.ascontiguousarray(rows) for rows in (self.pseudo, self.residuals)]
         of_points = self.counts, [self.weights, self.observed], self.coordinates
@@ -289,7 +297,7 @@ def calibrate(
     def at_data(nu: int) -> float:
         return float(np.median(course.variance(times, nu)))
 
-    def width_without(lengths: Any) -> float:
+    def width_without(lengths: Doubles) -> float:
         return float(((apart.sum() - np.sum(lengths)) / weights.sum() * course.lam) ** (0.5 / course.order))
 
     width = width_without(apart[apart > 10 * usual])
@@ -304,7 +312,7 @@ def calibrate(
     if len(spans):
         data, turn = evidence(), period if closed else None
         factors = _core.gap_factors(data.knots, data.known, data.linearised, spans.tolist(), width, at_data(0), turn)
-        gaps = [(float(start), float(stop), *own) for (start, stop), own in zip(spans, factors, strict=True)]
+        gaps = [(float(start), float(stop), *factor) for (start, stop), factor in zip(spans, factors, strict=True)]
     if closed or not ends:
         return Calibration(course, gaps, at_data, width, period=period)
 
@@ -318,7 +326,7 @@ def calibrate(
     return Calibration(course, gaps, at_data, width, outer, beyond=beyond)
 
 
-def calibration_of(spline: Any, number: int) -> Calibration | None:
+def calibration_of(spline: SmoothedSpline, number: int) -> Calibration | None:
     """Return the calibration of one curve in gaps, in the smoothed space with a given number.
 
     The result is None for curves without an estimate of their error: interpolating curves, least squares without a
@@ -326,7 +334,7 @@ def calibration_of(spline: Any, number: int) -> Calibration | None:
     """
     part = spline._smoothed[number]
     space = smoothed_spaces(spline.space)[number]
-    lam, sigma = (float(np.asarray(own)) for own in (part.band_lam, part.sigma))
+    lam, sigma = (float(np.asarray(value)) for value in (part.band_lam, part.sigma))
     known = np.isfinite(part.report.lam) and part.report.converged
     usable = 0 < lam < np.inf and 0 < sigma < np.inf and bool(known)
     noise, times = spline._noisy.noise[number], spline._noisy.times
@@ -339,8 +347,8 @@ def calibration_of(spline: Any, number: int) -> Calibration | None:
     posterior = part.posterior
 
     def line(at: float) -> Doubles:
-        found = posterior.covariance(space, knots, (), kinds, np.array([at]), None, [0, 1])[0].reshape(2, m, 2, m)
-        return np.asarray(np.trace(found, axis1=1, axis2=3) / m)
+        covariance = posterior.covariance(space, knots, (), kinds, np.array([at]), None, [0, 1])[0].reshape(2, m, 2, m)
+        return np.asarray(np.trace(covariance, axis1=1, axis2=3) / m)
 
     def variance(x: Doubles, nu: int) -> Doubles:
         return np.asarray((spline._plain_spread(number, (), x, nu) / sigma) ** 2)
@@ -361,7 +369,7 @@ def calibration_of(spline: Any, number: int) -> Calibration | None:
     return calibrate(t, noise.weights[used], course, period, evidence)
 
 
-def _evidence(spline: Any, number: int, used: Any, sigma: float) -> SensorEvidence:
+def _evidence(spline: SmoothedSpline, number: int, used: NDArray[np.intp], sigma: float) -> SensorEvidence:
     noisy, part = spline._noisy, spline._smoothed[number]
     space, data = smoothed_spaces(spline.space)[number], _in_part(spline.space, noisy.points, number)
     noise, m = noisy.noise[number], space.dim
@@ -419,21 +427,21 @@ def _roots(matrices: Doubles) -> Doubles:
     return np.asarray(np.sqrt(values)[:, :, None] * np.swapaxes(vectors, -1, -2))
 
 
-def _in_part(space: Space[Any], arrays: Sequence[Array], number: int) -> Array:
+def _in_part(space: AnySpace, arrays: Sequence[Array], number: int) -> Array:
     """Return the arrays of one smoothed space from those of all factors."""
     return [rows for pair in zip(factors_of(space), arrays, strict=True) for rows in split(*pair)][number]
 
 
-def _parts_at(spline: Any, number: int, t: Doubles, quantity: str) -> tuple[Any, Array, Array]:
+def _parts_at(spline: SmoothedSpline, number: int, t: Doubles, quantity: str) -> tuple[Space, Array, Array]:
     """Return the factor of a smoothed space, the points at its knots, and a quantity at times."""
-    owners = [i for i, own in enumerate(grouped(spline.space, spline._smoothed)) for _ in own]
+    owners = [i for i, of_factor in enumerate(grouped(spline.space, spline._smoothed)) for _ in of_factor]
     factor, curve = factors_of(spline.space)[owners[number]], spline._curve.parts[owners[number]]
     place = number - owners.index(owners[number])
     values = curve.evaluate(t, quantity, "raise", False)
     return factor, split(factor, curve.points)[place], split(factor, values)[place]
 
 
-def _coordinates(spline: Any, number: int, t: Doubles, quantity: str, y: Array | None = None) -> Doubles:
+def _coordinates(spline: SmoothedSpline, number: int, t: Doubles, quantity: str, y: Array | None = None) -> Doubles:
     """Return coordinates of tangent vectors along the curve: its derivatives, or logarithms of points y."""
     space = smoothed_spaces(spline.space)[number]
     factor, points, vectors = _parts_at(spline, number, t, quantity)
@@ -461,15 +469,15 @@ def _of_frames(space: Space, knots: Doubles, points: Array, t: Doubles, p: Array
     return out
 
 
-def _in_frames(spline: Any, number: int, t: Doubles, y: Array, information: Doubles) -> Doubles:
+def _in_frames(spline: SmoothedSpline, number: int, t: Doubles, y: Array, information: Doubles) -> Doubles:
     """Return information matrices in frames along the curve, to which the frames at the data are transported."""
     space = smoothed_spaces(spline.space)[number]
     _, points, p = _parts_at(spline, number, t, "point")
     frames = np.moveaxis(space.frame(y), 1, 0)
-    moved = np.stack([space._apply("transport", p=y, q=p, v=own) for own in frames], axis=1)
+    moved = np.stack([space._apply("transport", p=y, q=p, v=vectors) for vectors in frames], axis=1)
     # Rows are the transported frame vectors, in coordinates of the frames along the curve.
-    own = np.linalg.inv(_of_frames(space, spline._knots_of(()), points, t, p, moved))
-    return np.asarray(own @ information @ np.swapaxes(own, 1, 2))
+    turn = np.linalg.inv(_of_frames(space, spline._knots_of(()), points, t, p, moved))
+    return np.asarray(turn @ information @ np.swapaxes(turn, 1, 2))
 
 
 # ---- bands in gaps ----
@@ -496,7 +504,7 @@ def widest_band(space: Space, spread: NDArray[np.float64]) -> float:
     return float(np.nanmax(spread, initial=0.0) * np.sqrt(_core.chi_squared(space.dim, 0.95)) / reach)
 
 
-def warn_of_wide_bands(spline: Any, number: int, index: tuple[int, ...], wide: float) -> None:
+def warn_of_wide_bands(spline: SmoothedSpline, number: int, index: tuple[int, ...], wide: float) -> None:
     """Warn of a band so wide that computations in tangent spaces are not valid."""
     of = of_index(index) + in_part(spline.space, number)
     warn(
@@ -508,26 +516,28 @@ def warn_of_wide_bands(spline: Any, number: int, index: tuple[int, ...], wide: f
     )
 
 
-def warn_of_gaps(spline: Any, found: dict[tuple[int, tuple[int, ...]], Any]) -> None:
+def warn_of_gaps(spline: CalibratedSpline, calibrations: dict[tuple[int, tuple[int, ...]], Calibration | None]) -> None:
     """Warn once of the longest gap among those longer than any part of the recording that could be predicted.
 
     Parameters
     ----------
     spline : SmoothingSpline
         Curve.
-    found : dict
+    calibrations : dict
         Calibrations by part and index of the curve; None for curves without any.
     """
     blind = [
         (stop - start, key, place)
-        for key, known in found.items()
-        for place, (start, stop, _, blocks) in enumerate([] if known is None else known.gaps)
+        for key, calibration in calibrations.items()
+        for place, (start, stop, _, blocks) in enumerate([] if calibration is None else calibration.gaps)
         if not blocks
     ]
     if not blind:
         return
     _, (number, index), place = max(blind)
-    gap, count = spline._gaps_of(number, index)[place + len(found[number, index].ends[:1])], len(blind)
+    calibration, count = calibrations[number, index], len(blind)
+    assert calibration is not None
+    gap = spline._gaps_of(number, index)[place + len(calibration.ends[:1])]
     of = of_index(index) + in_part(spline.space, number)
     more = f" (and {count - 1} more gaps)" if count > 1 else ""
     if np.isnan(gap.factor):

@@ -17,11 +17,13 @@ from .._base.typing import (
     Extrapolate,
     FloatArray,
     GridCriterion,
+    Number,
     Numbers,
     OnFailure,
     P,
     PointsLike,
     Progress,
+    SmoothingBCType,
     SmoothingWord,
     TimesLike,
 )
@@ -30,14 +32,14 @@ from .._curves.ends import end_kinds, is_closed
 from .._curves.options import check_on_failure, check_progress, checked_extrapolate
 from .._grid import GridReport, GridSpline
 from .._grid.axes import GridAxis, read_axes, read_nodes, validate_nodes
-from .._spaces import Array, Doubles, Euclidean, Product, Space, cover_of, factors_of, space_named
+from .._spaces import AnySpace, Array, Doubles, Euclidean, Product, Space, cover_of, factors_of, space_named
 from .._splines.archive import Entries, entry, read_array, suffix_of
 from ..manifolds._manifold import refuse_functions
 from .audit import warn_of_spread
 from .make import make_smoothing_spline
 from .noise import grouped, is_several, join, per_part, smoothed_spaces, split
 from .report import SmoothingWarning
-from .spline import SmoothingSpline
+from .spline import AnySmoothingSpline
 
 # Variances do not depend on the space.
 _LINE = Euclidean(1)
@@ -63,17 +65,17 @@ class Rows(NamedTuple):
     t: Doubles
     points: Array
     weights: Doubles
-    space: Space[Any]
-    bc_type: Any
+    space: AnySpace
+    bc_type: SmoothingBCType
 
-    def take(self, chosen: Any) -> Rows:
+    def take(self, chosen: slice | list[int] | NDArray[np.intp]) -> Rows:
         """Return some of the rows."""
         return self._replace(points=self.points[chosen], weights=self.weights[chosen])
 
     def data_of(self, number: int) -> Rows:
         """Return one row without its nodes of weight zero."""
-        used, own = self.weights[number] > 0, self.take([number])
-        return Rows(self.t[used], own.points[:, used], own.weights[:, used], self.space, self.bc_type)
+        used, row = self.weights[number] > 0, self.take([number])
+        return Rows(self.t[used], row.points[:, used], row.weights[:, used], self.space, self.bc_type)
 
     @property
     def counts(self) -> NDArray[np.int64]:
@@ -125,36 +127,44 @@ def smooth(rows: Rows, lam: float) -> SmoothedRows:
     space, count = rows.space, rows.counts
     zeros = np.zeros(len(count))
     blank, none = np.full_like(rows.points, np.nan), np.zeros(len(count), int)
-    found = SmoothedRows(blank, np.minimum(count, 1.0), zeros, none, count < 2)
+    result = SmoothedRows(blank, np.minimum(count, 1.0), zeros, none, count < 2)
     single = (count == 1)[:, None] & (rows.weights > 0)
-    found.points[single] = rows.points[single]
+    result.points[single] = rows.points[single]
     many = np.flatnonzero(count > 1)
     if len(many):
-        own = rows.take(many)
-        spline = _fit(own, lam)
-        _store(found, many, spline, np.where(_lifted(own.inside, own.points), spline(own.t), np.nan))
+        several = rows.take(many)
+        spline = _fit(several, lam)
+        _store(result, many, spline, np.where(_lifted(several.inside, several.points), spline(several.t), np.nan))
     # Nodes without data at small distances make the matrix of a row singular to rounding. Its data alone do not.
-    for number in np.flatnonzero(~found.converged & (count < rows.weights.shape[-1])).tolist():
+    for number in np.flatnonzero(~result.converged & (count < rows.weights.shape[-1])).tolist():
         spline, inside = _fit(rows.data_of(number), lam), rows.take([number]).inside[0]
         filled = np.full_like(rows.points[[number]], np.nan)
         filled[:, inside] = spline(rows.t[inside])
-        _store(found, [number], spline, filled)
-    used = (rows.weights > 0) & space._where_finite(found.points)
+        _store(result, [number], spline, filled)
+    used = (rows.weights > 0) & space._where_finite(result.points)
     squares = np.zeros(used.shape)
-    squares[used] = space._apply("distance", p=found.points[used], q=rows.points[used]) ** 2
-    return found._replace(rss=np.sum(rows.weights * squares, axis=-1))
+    squares[used] = space._apply("distance", p=result.points[used], q=rows.points[used]) ** 2
+    return result._replace(rss=np.sum(rows.weights * squares, axis=-1))
 
 
-def _fit(rows: Rows, lam: Any) -> SmoothingSpline[Any, Any]:
-    options: Any = {"weights": rows.weights, "bc_type": rows.bc_type, "sigma": 1.0}
+def _fit(rows: Rows, lam: Number) -> AnySmoothingSpline:
     with silenced(Warning):
-        return make_smoothing_spline(rows.t, rows.points, rows.space, lam, on_failure="ignore", **options)
+        return make_smoothing_spline(
+            rows.t,
+            rows.points,
+            rows.space,
+            lam,
+            weights=rows.weights,
+            bc_type=rows.bc_type,
+            sigma=1.0,
+            on_failure="ignore",
+        )
 
 
-def _store(found: SmoothedRows, at: Any, spline: SmoothingSpline[Any, Any], points: Array) -> None:
+def _store(result: SmoothedRows, at: list[int] | NDArray[np.intp], spline: AnySmoothingSpline, points: Array) -> None:
     report = spline.report
-    found.points[at], found.df[at] = points, report.df
-    found.iterations[at], found.converged[at] = report.iterations, report.converged
+    result.points[at], result.df[at] = points, report.df
+    result.iterations[at], result.converged[at] = report.iterations, report.converged
 
 
 def _lifted(mask: NDArray[np.bool_], points: Array) -> NDArray[np.bool_]:
@@ -162,7 +172,7 @@ def _lifted(mask: NDArray[np.bool_], points: Array) -> NDArray[np.bool_]:
     return mask.reshape(*mask.shape, *[1] * (points.ndim - mask.ndim))
 
 
-def posterior_variance(t: Doubles, weights: Doubles, lam: float, bc_type: Any) -> Doubles:
+def posterior_variance(t: Doubles, weights: Doubles, lam: float, bc_type: SmoothingBCType) -> Doubles:
     """Return the posterior variance at the nodes of rows with these weights, for noise of variance one.
 
     Parameters
@@ -181,18 +191,18 @@ def posterior_variance(t: Doubles, weights: Doubles, lam: float, bc_type: Any) -
     variance = np.where(kinds > 0, 1 / np.where(kinds > 0, kinds, 1), np.inf)
     many = np.flatnonzero(count > 1)
     if len(many):
-        own = rows.take(many)
+        several = rows.take(many)
         with np.errstate(invalid="ignore"):
-            found = np.where(own.inside, _fit(own, lam).std(t, calibrated=False) ** 2, np.inf)
-        variance[many] = found
+            variances = np.where(several.inside, _fit(several, lam).std(t, calibrated=False) ** 2, np.inf)
+        variance[many] = variances
         # As in `smooth`, the data alone where the whole row is singular to rounding.
-        for number in many[np.isnan(found).any(axis=-1) | ~(found > 0).all(axis=-1)]:
+        for number in many[np.isnan(variances).any(axis=-1) | ~(variances > 0).all(axis=-1)]:
             at = inside[number]
             variance[number, at] = _fit(rows.data_of(number), lam).std(t[at], calibrated=False) ** 2
     return variance[which.reshape(-1)]
 
 
-def complete_variance(t: Doubles, weight: float, lam: float, bc_type: Any, repeats: bool) -> Doubles:
+def complete_variance(t: Doubles, weight: float, lam: float, bc_type: SmoothingBCType, repeats: bool) -> Doubles:
     """Return the posterior variance of `posterior_variance` at the nodes of a row in which all weights are equal.
 
     Parameters
@@ -341,8 +351,8 @@ def common_lam(rows: Rows, data: Data, criterion: LamCriterion, start: float | N
         best = int(np.argmin(scores))
     if bound or seen[at[best]].is_straight or not np.isfinite(scores[best - 1]):
         return Choice(10.0 ** at[best], True, len(seen), float(scores[best]))
-    found = 10.0 ** _vertex(at[best - 1 : best + 2], scores[best - 1 : best + 2])
-    return Choice(found, False, len(seen), float(scores[best]))
+    lam = 10.0 ** _vertex(at[best - 1 : best + 2], scores[best - 1 : best + 2])
+    return Choice(lam, False, len(seen), float(scores[best]))
 
 
 def score_of(rows: Rows, data: Data, criterion: LamCriterion, lam: float) -> float:
@@ -364,10 +374,17 @@ def _cube(rows: Rows) -> float:
 
 def _start(rows: Rows, criterion: LamCriterion) -> float:
     """Return the decimal logarithm of the median of the λ that some of the rows would have alone."""
-    own = rows.take(slice(None, None, -(-len(rows.weights) // _FIRST)))
-    options: Any = {"weights": own.weights, "bc_type": own.bc_type, "gamma": max(criterion.gamma, _GAMMA)}
+    sample = rows.take(slice(None, None, -(-len(rows.weights) // _FIRST)))
     with silenced(Warning):
-        report = make_smoothing_spline(own.t, own.points, own.space, on_failure="ignore", **options).report
+        report = make_smoothing_spline(
+            sample.t,
+            sample.points,
+            sample.space,
+            weights=sample.weights,
+            bc_type=sample.bc_type,
+            gamma=max(criterion.gamma, _GAMMA),
+            on_failure="ignore",
+        ).report
     lam, bound = np.asarray(report.lam), np.asarray(report.at_bound)
     good = np.isfinite(lam) & (lam > 0) & np.asarray(report.converged)
     for mask in (good & ~bound, good):
@@ -377,14 +394,14 @@ def _start(rows: Rows, criterion: LamCriterion) -> float:
 
 
 def _totals(rows: Rows, data: Data, lam: float) -> _Totals:
-    found, space = smooth(rows, lam), rows.space
-    good = found.converged & np.isfinite(found.df)
-    used = (data.weights > 0) & space._where_finite(found.points) & good[:, None]
+    result, space = smooth(rows, lam), rows.space
+    good = result.converged & np.isfinite(result.df)
+    used = (data.weights > 0) & space._where_finite(result.points) & good[:, None]
     n, weights = max(int(np.count_nonzero(used)), 1), data.weights[used]
     variance = data.scale[:, None] * posterior_variance(rows.t, rows.weights, lam, rows.bc_type)
-    distances = space._apply("distance", p=found.points[used], q=data.points[used])
+    distances = space._apply("distance", p=result.points[used], q=data.points[used])
     rss = float(np.sum(weights * distances**2)) / space.dim / n
-    energetic = np.maximum(found.df[good] - np.minimum(rows.null, rows.counts[good]), 0.0)
+    energetic = np.maximum(result.df[good] - np.minimum(rows.null, rows.counts[good]), 0.0)
     return _Totals(
         max(rss, _rounding(rows)),
         float(np.sum(weights * variance[used])) / n,
@@ -402,7 +419,7 @@ def _rounding(rows: Rows) -> float:
 def _scores(seen: dict[float, _Totals], criterion: LamCriterion) -> tuple[list[float], Doubles]:
     """Return the decimal logarithms of λ in increasing order, and the scores."""
     at = sorted(seen)
-    rss, df, known, _ = (np.array(own) for own in zip(*(seen[x] for x in at), strict=True))
+    rss, df, known, _ = (np.array(column) for column in zip(*(seen[x] for x in at), strict=True))
     left = 1 - criterion.gamma * df
     if criterion.sigma is None:
         known = known & (left > 1e-6)
@@ -449,10 +466,10 @@ class Nodes(NamedTuple):
     axes: tuple[Doubles, ...]
     points: Array
     weights: Doubles
-    space: Space[Any]
+    space: AnySpace
     bc_types: tuple[Any, ...]
 
-    def along(self, array: NDArray[Any], k: int) -> NDArray[Any]:
+    def along(self, array: Array, k: int) -> Array:
         """Return the rows along axis k of an array with the axes of the grid."""
         last = len(self.axes) - 1
         moved = np.moveaxis(array, k, last)
@@ -471,7 +488,7 @@ class Nodes(NamedTuple):
         shape = state.weights.shape
         others, t, bc_type = shape[:k] + shape[k + 1 :], self.axes[k], self.bc_types[k]
 
-        def unflat(rows: NDArray[Any]) -> NDArray[Any]:
+        def unflat(rows: Array) -> Array:
             return np.moveaxis(rows.reshape(*others, *rows.shape[1:]), len(others), k)
 
         rows = self.rows(state, k)
@@ -625,8 +642,8 @@ def smooth_axes(
 
     def choose(state: Data, k: int) -> None:
         before = chosen.get(k)
-        found = common_lam(*seen_from(state, k), criterion, before.lam if before else None)
-        chosen[k] = found._replace(evaluations=found.evaluations + (before.evaluations if before else 0))
+        choice = common_lam(*seen_from(state, k), criterion, before.lam if before else None)
+        chosen[k] = choice._replace(evaluations=choice.evaluations + (before.evaluations if before else 0))
 
     def choose_again() -> None:
         nonlocal state
@@ -657,10 +674,10 @@ def smooth_axes(
                     break
             if not chosen[asked[-1]].score < best[asked[-1]].score:
                 chosen.update(best)
-    state, found, first = start, [], None
+    state, smoothed_axes, first = start, [], None
     for k in order:
-        state, own, failed = passed(state, k)
-        found.append(own)
+        state, smoothed_axis, failed = passed(state, k)
+        smoothed_axes.append(smoothed_axis)
         first = first or failed
     there = nodes.space._where_finite(state.points)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -671,7 +688,7 @@ def smooth_axes(
     df = float(np.sum(weights * variance[used]))
     if np.isnan(sigma):
         sigma = noise_level(float(np.sum(weights * distances**2)), weights.size, df, nodes.space.dim)
-    return np.ascontiguousarray(state.points), SmoothedPart(found, variance, df, sigma), first
+    return np.ascontiguousarray(state.points), SmoothedPart(smoothed_axes, variance, df, sigma), first
 
 
 def _best_probe(
@@ -698,9 +715,9 @@ def _best_probe(
         nonlocal best
         if not rest:
             for lam in tried[last]:
-                found = score(state, last, lam)
-                if found < best[1]:
-                    best = {**lams, last: lam}, found
+                value = score(state, last, lam)
+                if value < best[1]:
+                    best = {**lams, last: lam}, value
             return
         k, *rest = rest
         for lam in tried.get(k, [given[k].lam]):
@@ -757,38 +774,38 @@ class SmoothingGridReport(GridReport):
     (True, (False, False), 0.1)
     """
 
-    _space: Space[Any]
+    _space: AnySpace
     _smoothed: list[SmoothedPart]
 
     @property
     def converged(self) -> bool:
         """Whether the smoothing of all rows converged, and the splines along the first axis."""
-        return super().converged and not any(own.failed for part in self._smoothed for own in part.axes)
+        return super().converged and not any(axis.failed for part in self._smoothed for axis in part.axes)
 
     @property
     def lam(self) -> PerAxis:
         """Weight λ of the bending energy."""
-        return self._per_axis(lambda own, _: own.lam)
+        return self._per_axis(lambda axis, _: axis.lam)
 
     @property
     def at_bound(self) -> PerAxis:
         """Whether the chosen λ is at a bound: rows are geodesics, or pass through nearly all nodes."""
-        return self._per_axis(lambda own, _: own.at_bound)
+        return self._per_axis(lambda axis, _: axis.at_bound)
 
     @property
     def evaluations(self) -> PerAxis:
         """Number of values of λ that were tried; 0 if λ was given."""
-        return self._per_axis(lambda own, _: own.evaluations)
+        return self._per_axis(lambda axis, _: axis.evaluations)
 
     @property
     def df(self) -> PerAxis:
         """Effective degrees of freedom per coordinate, summed over all rows along the axis."""
-        return self._per_axis(lambda own, _: own.df)
+        return self._per_axis(lambda axis, _: axis.df)
 
     @property
     def rss(self) -> PerAxis:
         """Weighted sum of squared distances between the nodes before and after the axis was smoothed."""
-        return self._per_axis(lambda own, _: own.rss)
+        return self._per_axis(lambda axis, _: axis.rss)
 
     @property
     def sigma(self) -> PerAxis:
@@ -797,18 +814,18 @@ class SmoothingGridReport(GridReport):
         Along the first axis it is that of the data. Along others it is that of nodes that are already smooth along the
         axes before.
         """
-        return self._per_axis(lambda own, dim: own.sigma(dim))
+        return self._per_axis(lambda axis, dim: axis.sigma(dim))
 
     @property
     def iterations(self) -> PerAxis:
         """Largest number of iterations of a row."""
-        return self._per_axis(lambda own, _: own.iterations)
+        return self._per_axis(lambda axis, _: axis.iterations)
 
     def _per_axis(self, value: Callable[[SmoothedAxis, int], float]) -> PerAxis:
         dims = [space.dim for space in smoothed_spaces(self._space)]
         of_parts = [[value(axis, dim) for axis in part.axes] for part, dim in zip(self._smoothed, dims, strict=True)]
-        each = zip(*of_parts, strict=True)
-        return tuple(values if is_several(self._space) else values[0] for values in each)
+        of_axes = zip(*of_parts, strict=True)
+        return tuple(values if is_several(self._space) else values[0] for values in of_axes)
 
 
 class SmoothingGrid(GridSpline[P], Generic[P]):
@@ -886,7 +903,7 @@ class SmoothingGrid(GridSpline[P], Generic[P]):
     @property
     def df(self) -> float | tuple[float, ...]:
         """Effective degrees of freedom of the surface per coordinate."""
-        df: float | tuple[float, ...] = self._each([part.df for part in self._smoothed])
+        df: float | tuple[float, ...] = self._per_space([part.df for part in self._smoothed])
         return df
 
     @property
@@ -896,7 +913,7 @@ class SmoothingGrid(GridSpline[P], Generic[P]):
         This is the given value, or else the estimate ``sqrt(sum(weights * distance**2) / (dim * (N - df)))`` with the
         distances of the N data from the surface.
         """
-        sigma: float | tuple[float, ...] = self._each([part.sigma for part in self._smoothed])
+        sigma: float | tuple[float, ...] = self._per_space([part.sigma for part in self._smoothed])
         return sigma
 
     @property
@@ -911,13 +928,13 @@ class SmoothingGrid(GridSpline[P], Generic[P]):
 
         They are logarithms at the surface, and their lengths are the distances. They are NaN at nodes without data.
         """
-        found = []
+        residuals_of_factors = []
         for factor, data in zip(self._factors, self._data, strict=True):
             used = (self._weights > 0) & factor.space._where_finite(factor.points)
             vectors = np.full(data.shape, np.nan, data.dtype)
             vectors[used] = factor.space._apply("log", p=factor.points[used], q=data[used])
-            found.append(vectors)
-        residuals: P = self._joined(found)
+            residuals_of_factors.append(vectors)
+        residuals: P = self._joined(residuals_of_factors)
         return residuals
 
     def std(self) -> FloatArray | tuple[FloatArray, ...]:
@@ -949,11 +966,11 @@ class SmoothingGrid(GridSpline[P], Generic[P]):
         >>> bool(std[10, 15] < std[0, 15] < std[0, 0] < 0.1)
         True
         """
-        each = [part.sigma * np.sqrt(part.variance) for part in self._smoothed]
-        std: FloatArray | tuple[FloatArray, ...] = self._each(each)
+        deviations = [part.sigma * np.sqrt(part.variance) for part in self._smoothed]
+        std: FloatArray | tuple[FloatArray, ...] = self._per_space(deviations)
         return std
 
-    def _each(self, values: list[Any]) -> Any:
+    def _per_space(self, values: list[Any]) -> Any:
         return tuple(values) if is_several(self._space) else values[0]
 
     # ---- files and pickles ----
@@ -964,7 +981,7 @@ class SmoothingGrid(GridSpline[P], Generic[P]):
             {"axes": [vars(axis) for axis in part.axes], "df": part.df, "sigma": part.sigma} for part in self._smoothed
         ]
         state["data_weights"] = self._weights
-        state |= {"data" + suffix_of(self._space, i): own for i, own in enumerate(self._data)}
+        state |= {"data" + suffix_of(self._space, i): array for i, array in enumerate(self._data)}
         return state | {f"variance_{i}": part.variance for i, part in enumerate(self._smoothed)}
 
     @classmethod
@@ -972,11 +989,12 @@ class SmoothingGrid(GridSpline[P], Generic[P]):
         self = super()._from_state(state)
         grid = tuple(len(axis.knots) for axis in self._axes)
         self._data = [
-            read_array(state, "data" + suffix_of(self._space, i), own) for i, own in enumerate(factors_of(self._space))
+            read_array(state, "data" + suffix_of(self._space, i), factor)
+            for i, factor in enumerate(factors_of(self._space))
         ]
-        for own, factor in zip(self._data, self._factors, strict=True):
-            if own.shape != factor.points.shape:
-                raise ValidationError(f"entry 'data': the data have shape {own.shape}")
+        for array, factor in zip(self._data, self._factors, strict=True):
+            if array.shape != factor.points.shape:
+                raise ValidationError(f"entry 'data': the data have shape {array.shape}")
         self._weights = _numbers(state, "data_weights", grid)
         with entry("noise"):
             noise = state["noise"]
@@ -984,7 +1002,7 @@ class SmoothingGrid(GridSpline[P], Generic[P]):
                 raise ValidationError("it must have one entry per part of the space")
             self._smoothed = []
             for i, part in enumerate(noise):
-                axes = [SmoothedAxis(**own) for own in part["axes"]]
+                axes = [SmoothedAxis(**fields) for fields in part["axes"]]
                 if len(axes) != len(grid):
                     raise ValidationError(f"there are {len(axes)} axes")
                 variance = _numbers(state, f"variance_{i}", grid)
@@ -1006,7 +1024,7 @@ def make_smoothing_grid(
     points: PointsLike,
     space: Space[P] | str,
     *,
-    lam: Numbers | Sequence[Any] | None = None,
+    lam: Numbers | Sequence[Numbers | None] | None = None,
     weights: Numbers | None = None,
     criterion: GridCriterion = "gcv",
     gamma: float = 1.0,
@@ -1134,7 +1152,7 @@ def make_smoothing_grid(
     if not isinstance(axes, (tuple, list)):
         read_axes(axes, None, bc_type)
     data, tols, shape = read_nodes(points, space, len(axes))
-    own_axes = _checked_ends(read_axes(axes, shape, bc_type))
+    node_axes = _checked_ends(read_axes(axes, shape, bc_type))
     w = _read_weights(weights, shape)
     for array in data:
         array[w == 0] = np.nan
@@ -1143,16 +1161,16 @@ def make_smoothing_grid(
         space,
         data,
         tols if atol is None else [checked_atol(atol)] * len(tols),
-        [axis._replace(ends=("natural", "natural")) for axis in own_axes],
+        [axis._replace(ends=("natural", "natural")) for axis in node_axes],
     )
-    w = _without_copies(np.where(factors_of(space)[0]._where_finite(data[0]), w, 0.0), data, own_axes)
+    w = _without_copies(np.where(factors_of(space)[0]._where_finite(data[0]), w, 0.0), data, node_axes)
     lams, sigmas = _lams(lam, len(shape), space), _in_parts(sigma, "sigma", space)
 
-    bc_types = tuple(axis.bc_type for axis in own_axes)
+    bc_types = tuple(axis.bc_type for axis in node_axes)
     # Representatives in quotients are continuous over the grid, so that they are smoothed in the covering space.
     spaces = tuple(map(cover_of, smoothed_spaces(space)))
-    arrays = [own for pair in zip(factors_of(space), data, strict=True) for own in split(*pair)]
-    size, found, smoothed, failed = int(np.prod(shape)), [], [], None
+    arrays = [rows for pair in zip(factors_of(space), data, strict=True) for rows in split(*pair)]
+    size, points_of_parts, smoothed, failed = int(np.prod(shape)), [], [], None
     for i, (part, array) in enumerate(zip(spaces, arrays, strict=True)):
 
         def advance(done: int, total: int, i: int = i) -> None:
@@ -1160,17 +1178,17 @@ def make_smoothing_grid(
                 progress((i * total + done) * size, len(spaces) * total * size)
 
         used = np.where((w > 0).reshape(*shape, *[1] * len(part.point_shape)), array, np.nan)
-        nodes = Nodes(tuple(axis.knots for axis in own_axes), used, w, part, bc_types)
+        nodes = Nodes(tuple(axis.knots for axis in node_axes), used, w, part, bc_types)
         rule = LamCriterion(1.0, sigmas[i]) if chosen_by == "cp" else LamCriterion(gamma, None)
         smooth_points, properties, first = smooth_axes(nodes, lams[i], rule, sigmas[i], advance)
-        found.append(smooth_points)
+        points_of_parts.append(smooth_points)
         smoothed.append(properties)
         failed = failed or first
 
-    joined = list(map(join, factors_of(space), grouped(space, found)))
+    joined = list(map(join, factors_of(space), grouped(space, points_of_parts)))
     through: Any = tuple(joined) if isinstance(space, Product) else joined[0]
     options = {
-        "bc_type": tuple(axis.bc_type for axis in own_axes),
+        "bc_type": tuple(axis.bc_type for axis in node_axes),
         "extrapolate": extrapolate,
         "on_failure": on_failure,
     }
@@ -1179,9 +1197,9 @@ def make_smoothing_grid(
         _raise_or_warn(failed, surface, on_failure)
     _warn_of_bounds(space, smoothed, lams)
     warn_of_boundaries(list(zip(spaces, arrays, strict=True)), w)
-    for part, array, own, one in zip(spaces, arrays, found, smoothed, strict=True):
-        rows = (own.reshape(-1, *part.point_shape), array.reshape(-1, *part.point_shape), np.ravel(w > 0))
-        count = np.count_nonzero(rows[2] & part._where_finite(rows[0]))
+    for part, array, points_of_part, one in zip(spaces, arrays, points_of_parts, smoothed, strict=True):
+        rows = (points_of_part.reshape(-1, *part.point_shape), array.reshape(-1, *part.point_shape), np.ravel(w > 0))
+        count = int(np.count_nonzero(rows[2] & part._where_finite(rows[0])))
         warn_of_spread(part, *rows, count, one.df, "surface")
     return surface
 
@@ -1206,10 +1224,10 @@ def _read_weights(weights: Any, shape: tuple[int, ...]) -> Doubles:
         raise ValidationError(
             f"weights must be numbers of shape {shape}, one per node, not {array.dtype} of shape {array.shape}"
         )
-    found = array.astype(np.float64)
-    bad = ~(np.isfinite(found) & (found >= 0))
-    refuse(bad, "weights", lambda i: f"is {found[i]}, but must be finite and >= 0. Use 0 for missing nodes.")
-    return found
+    numbers = array.astype(np.float64)
+    bad = ~(np.isfinite(numbers) & (numbers >= 0))
+    refuse(bad, "weights", lambda i: f"is {numbers[i]}, but must be finite and >= 0. Use 0 for missing nodes.")
+    return numbers
 
 
 def _without_copies(weights: Doubles, data: list[Array], axes: list[GridAxis]) -> Doubles:
@@ -1217,7 +1235,7 @@ def _without_copies(weights: Doubles, data: list[Array], axes: list[GridAxis]) -
     for k, axis in enumerate(axes):
         if not axis.is_periodic:
             continue
-        ends = [(np.take(own, 0, axis=k), np.take(own, -1, axis=k)) for own in (*data, weights)]
+        ends = [(np.take(rows, 0, axis=k), np.take(rows, -1, axis=k)) for rows in (*data, weights)]
         if all(np.array_equal(first, last, equal_nan=True) for first, last in ends):
             np.moveaxis(weights, k, 0)[-1] = 0.0
     if not np.any(weights):
@@ -1225,19 +1243,19 @@ def _without_copies(weights: Doubles, data: list[Array], axes: list[GridAxis]) -
     return weights
 
 
-def _lams(lam: Any, dims: int, space: Space[Any]) -> list[tuple[float | None, ...]]:
+def _lams(lam: Any, dims: int, space: AnySpace) -> list[tuple[float | None, ...]]:
     """Return the given λ of every axis for each part of the space."""
     is_sequence = isinstance(lam, (tuple, list)) or (isinstance(lam, np.ndarray) and lam.ndim > 0)
     if is_sequence and len(lam) != dims:
         raise ValidationError(
             f"lam has {len(lam)} entries, but there are {dims} axes. Pass one number for all, or one entry for each."
         )
-    each = [_in_parts(one, f"lam[{k}]", space) for k, one in enumerate(lam)] if is_sequence else None
-    per_axis = each or [_in_parts(lam, "lam", space)] * dims
-    return [tuple(None if np.isnan(x) else x for x in own) for own in zip(*per_axis, strict=True)]
+    of_axes = [_in_parts(one, f"lam[{k}]", space) for k, one in enumerate(lam)] if is_sequence else None
+    per_axis = of_axes or [_in_parts(lam, "lam", space)] * dims
+    return [tuple(None if np.isnan(x) else x for x in of_part) for of_part in zip(*per_axis, strict=True)]
 
 
-def _in_parts(value: Any, name: str, space: Space[Any]) -> list[float]:
+def _in_parts(value: Numbers | None, name: str, space: AnySpace) -> list[float]:
     """Return a number >= 0 for each part of the space; NaN for None."""
     return [float(one[0]) for one in per_part(space, smoothed_spaces(space), value, name, ())]
 
@@ -1260,10 +1278,10 @@ def _raise_or_warn(first: tuple[int, ...], surface: SmoothingGrid[Any], on_failu
     raise error
 
 
-def _warn_of_bounds(space: Space[Any], smoothed: list[SmoothedPart], lams: list[tuple[float | None, ...]]) -> None:
+def _warn_of_bounds(space: AnySpace, smoothed: list[SmoothedPart], lams: list[tuple[float | None, ...]]) -> None:
     """Warn once if a chosen λ is at a bound, or close to it."""
-    for i, (part, own, given) in enumerate(zip(smoothed_spaces(space), smoothed, lams, strict=True)):
-        for k, axis in enumerate(own.axes):
+    for i, (part, smoothed_part, given) in enumerate(zip(smoothed_spaces(space), smoothed, lams, strict=True)):
+        for k, axis in enumerate(smoothed_part.axes):
             rough = axis.df > _ALL * axis.count
             if given[k] is not None or not axis.evaluations or not (axis.at_bound or rough):
                 continue
@@ -1291,7 +1309,7 @@ def _warn_of_bounds(space: Space[Any], smoothed: list[SmoothedPart], lams: list[
 # ---- maps with boundaries, such as those between the grains of a crystal ----
 
 
-def warn_of_boundaries(parts: list[tuple[Space[Any], Array]], weights: Doubles) -> None:
+def warn_of_boundaries(parts: list[tuple[AnySpace, Array]], weights: Doubles) -> None:
     """Warn once if many neighbouring nodes of a map are far apart compared with the nodes beside them.
 
     Parameters
@@ -1325,7 +1343,7 @@ def warn_of_boundaries(parts: list[tuple[Space[Any], Array]], weights: Doubles) 
         return
 
 
-def _steps(space: Space[Any], points: Array, weights: Doubles, k: int) -> Doubles:
+def _steps(space: AnySpace, points: Array, weights: Doubles, k: int) -> Doubles:
     """Return the distances of neighbours along axis k, which becomes the last one; NaN where a node is missing."""
     axis = weights.ndim - 1
     there, rows = np.moveaxis(weights > 0, k, axis), np.moveaxis(points, k, axis)
@@ -1337,7 +1355,7 @@ def _steps(space: Space[Any], points: Array, weights: Doubles, k: int) -> Double
     return steps
 
 
-def _are_jumps(steps: Doubles) -> Any:
+def _are_jumps(steps: Doubles) -> NDArray[np.bool_]:
     """Return a mask of the steps that are much longer than the median step and than the steps next to them."""
     if steps.shape[-1] < 4 or not np.isfinite(steps).any():
         return np.zeros(steps.shape, bool)

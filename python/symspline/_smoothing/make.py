@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from .._base.arrays import checked_flag, checked_number, short_repr, whole_number
 from .._base.faults import is_silent
 from .._base.typing import (
+    BCType,
     ChoiceOptions,
     Criterion,
     Extrapolate,
@@ -33,11 +34,10 @@ from .._core import ValidationError
 from .._curves.ends import NATURAL, End, freeze_bc_type, is_closed
 from .._curves.failures import raise_or_warn, warn_of_far_data, warn_of_far_points, warn_of_held_points, warn_of_signs
 from .._curves.fit import Fit, Points, Problem, fit, mask_of
-from .._curves.missing import counts_all_samples, data_without_missing, missing_named
+from .._curves.missing import counts_all_samples, data_without_missing, with_remedy
 from .._curves.options import check_on_failure, check_progress, checked_extrapolate
 from .._curves.solve import DEFAULTS, in_batch
-from .._spaces import Array, Doubles, Product, Space, SpecialEuclidean, factors_of, space_named
-from .._splines.cubic import CubicSpline
+from .._spaces import AnySpace, Array, Doubles, Product, Space, SpecialEuclidean, factors_of, space_named
 from ..manifolds._manifold import refuse_functions
 from .audit import audit
 from .noise import (
@@ -56,8 +56,8 @@ from .noise import (
 from .report import SmoothingReport, SmoothingWarning
 from .solve import (
     NO_CURVE,
-    Found,
     Knots,
+    SmoothCurves,
     Smoothed,
     SolverOptions,
     faults_of,
@@ -69,7 +69,7 @@ from .solve import (
     smoothed,
     with_enough_knots,
 )
-from .spline import SmoothingSpline
+from .spline import AnySmoothingSpline, SmoothingSpline
 
 # Largest dimension in which the full Gauss–Newton solver is used; its matrices have (2 dim)² entries.
 _LARGE = 64
@@ -109,7 +109,7 @@ def make_smoothing_spline(
 def make_smoothing_spline(
     t: TimesLike | None,
     points: PointsLike,
-    space: Space[Any] | str,
+    space: AnySpace | str,
     lam: Numbers | None = None,
     *,
     weights: Numbers | None = None,
@@ -130,7 +130,7 @@ def make_smoothing_spline(
     where: ArrayLike | None = None,
     progress: Progress | None = None,
     skipna: bool = False,
-) -> SmoothingSpline[Any, Any]:
+) -> AnySmoothingSpline:
     r"""Fit a C² curve close to noisy points.
 
     The curve minimises a weighted sum of squared distances to the data and the integrated squared acceleration or
@@ -304,9 +304,10 @@ def make_smoothing_spline(
     options = SolverOptions(criterion, gamma, penalty, method, tol, whole_number(max_iter, "max_iter", 1), False)
     if checked_flag(skipna, "skipna"):
         t, points, weights, frames = data_without_missing(t, points, weights, frames, space)
-    whole, data, of_factors = read_noisy(t, points, space, weights, frames, sigma, loss, bc_type, atol)
+    spaces = smoothed_spaces(space)
+    whole, data, of_factors = read_noisy(t, points, space, spaces, weights, frames, sigma, loss, bc_type, atol)
     batch = whole.batch
-    lams = per_part(space, smoothed_spaces(space), lam, "lam", batch, infinite=True)
+    lams = per_part(space, spaces, lam, "lam", batch, infinite=True)
     if np.isinf(lams).any():
         for name, value, required in (("penalty", penalty, "acceleration"), ("bc_type", bc_type, "natural")):
             if value != required:
@@ -320,8 +321,10 @@ def make_smoothing_spline(
             "some directions. Pass sigma; it is 1 if the matrices are inverse covariances."
         )
     strict, mask = on_failure == "raise", mask_of(where, batch)
-    with missing_named(data):
+    try:
         noisy, of_factors, chosen, faults = valid_curves(whole, data, of_factors, space, mask, strict)
+    except ValidationError as error:
+        raise with_remedy(error, data) from None
     if chosen is not None:
         lams = [lam[chosen] for lam in lams]
     parts = parts_of(noisy, space, lams, of_factors)
@@ -338,41 +341,43 @@ def make_smoothing_spline(
     geodesics = lams[0].size > 0 and bool(np.isinf(lams).all())
     free = not geodesics and (knots is None or has_all_times(every, noisy))
 
-    def run(at: Knots, raise_lam: bool = False) -> list[Found]:
-        at = at.of_curves(chosen)
-        how = options._replace(raise_lam=raise_lam)
-        return smoothed([_with_lam(part, at) for part in parts], noisy, at, how, free, progress)
+    def run(at: Knots, raise_lam: bool = False) -> list[SmoothCurves]:
+        if chosen is not None:
+            at = at.of_curves(chosen)
+        # There is nothing to choose between two knots.
+        with_lam = parts if at.times.shape[-1] > 2 else [_with_lam(part, at) for part in parts]
+        return smoothed(with_lam, noisy, at, options._replace(raise_lam=raise_lam), free, progress)
 
-    def df_of_part(part: Part, rows: SmoothingData, at: Knots) -> Any:
-        (found,) = smoothed([part], rows, at, options, free, None)
-        return np.ravel(found.smoothed.report.df)
+    def df_of_part(part: Part, rows: SmoothingData, at: Knots) -> Doubles:
+        (result,) = smoothed([part], rows, at, options, free, None)
+        return np.ravel(result.smoothed.report.df)
 
     if geodesics:
-        at = geodesic_knots(every, space, lambda at: [own.points for own in run(at)])
+        at = geodesic_knots(every, space, lambda at: [result.points for result in run(at)])
         options = geodesic_options(space, options)
-        found = run(at)
+        results = run(at)
     elif knots is None:
-        found, at = with_enough_knots(every, noisy, parts, run, df_of_part, penalty)
+        results, at = with_enough_knots(every, noisy, parts, run, df_of_part, penalty)
         # Knots in gaps are tried before a larger λ, which would affect the whole curve.
-        if NO_CURVE in np.concatenate([result.states for result in found]):
+        if NO_CURVE in np.concatenate([result.states for result in results]):
             at = in_gaps(at, whole)
-            found = run(at, raise_lam=True)
+            results = run(at, raise_lam=True)
     else:
-        found, at = run(every), every
+        results, at = run(every), every
 
-    failed = faults_of(parts, found, noisy, at.times.shape[-1], options)
+    failed = faults_of(parts, results, noisy, at.times.shape[-1], options)
     whole, good = whole._replace(points=noisy.points), np.ones(batch, bool)
     if chosen is not None:
         # Points of masked curves are NaN.
         spread = partial(in_batch, batch, chosen)
-        good, found = spread(good.ravel()[chosen]), [result.map(spread) for result in found]
+        good, results = spread(good.ravel()[chosen]), [result.map(spread) for result in results]
         whole = whole._replace(points=[spread(rows) for rows in noisy.points])
         parts = [part.map(spread, noise) for part, noise in zip(parts, whole.noise, strict=True)]
-    spline, fitted = _spline_through(whole, space, parts, found, at, good, bc_type, policy)
+    spline, fitted = _spline_through(whole, space, parts, results, at, good, bc_type, policy)
     faults += [fault if chosen is None else fault._replace(curve=int(chosen[fault.curve])) for fault in failed]
     valid_data = [
-        Points(factor._as_doubles(own), 0.0, batch, whole.times.shape[-1])
-        for factor, own in zip(factors_of(space), spline._noisy.points, strict=True)
+        Points(factor._as_doubles(rows), 0.0, batch, whole.times.shape[-1])
+        for factor, rows in zip(factors_of(space), spline._noisy.points, strict=True)
     ]
     # Errors that this data cause do not show the reason.
     silent = is_silent(UserWarning)
@@ -382,7 +387,7 @@ def make_smoothing_spline(
     if silent:
         return spline
     # Between two knots there is nothing to choose. Masked curves are not examined.
-    audit(spline, parts, found, good, good & (at.times.shape[-1] > 2))
+    audit(spline, parts, results, good, good & (at.times.shape[-1] > 2))
     warn_of_signs(space, [valid_data])
     if whole.used.all():
         warn_of_held_points(whole.times, spline._noisy.points, batch, SmoothingWarning)
@@ -395,22 +400,22 @@ def _spline_through(
     whole: SmoothingData,
     space: Space,
     parts: list[Part],
-    found: list[Found],
+    curves: list[SmoothCurves],
     at: Knots,
     good: NDArray[np.bool_],
-    bc_type: Any,
+    bc_type: SmoothingBCType,
     policy: Extrapolate,
-) -> tuple[SmoothingSpline[Any, Any], Fit]:
+) -> tuple[AnySmoothingSpline, Fit]:
     """Return the spline through smooth points, and its fit. Curves where `good` is False are masked."""
     batch, count, results = whole.batch, at.times.shape[-1], []
     points: list[Points] = []
     conditions: list[list[End] | None] = []
-    for factor, of_factor in zip(factors_of(space), grouped(space, zip(parts, found, strict=True)), strict=True):
+    for factor, of_factor in zip(factors_of(space), grouped(space, zip(parts, curves, strict=True)), strict=True):
         rows, ends = [], []
-        for part, own in of_factor:
-            rows.append(own.points)
-            ends.append(transport_end_velocities(part, own.points))
-            results.append(with_infinite_lam(own.smoothed, part.lam, batch))
+        for part, curves_of_part in of_factor:
+            rows.append(curves_of_part.points)
+            ends.append(transport_end_velocities(part, curves_of_part.points))
+            results.append(with_infinite_lam(curves_of_part.smoothed, part.lam, batch))
         doubles = np.ascontiguousarray(factor._as_doubles(join(factor, rows)))
         points.append(Points(doubles, 0.0, batch, count))
         conditions.append(_joined(factor, ends))
@@ -418,8 +423,8 @@ def _spline_through(
     fitted = fit(Problem(space, at.times, points, conditions, DEFAULTS, check=False, mask=mask))
     noise = [noise._replace(sigma=np.empty(0)) for noise in whole.noise]
     noisy, kept = whole._replace(noise=noise), _conditions(bc_type, conditions, space)
-    curve = CubicSpline._fitted(whole.time_axis, at.t, fitted.curve, kept, policy, fitted.reports())
-    return SmoothingSpline._like(curve, noisy, results), fitted
+    curve: AnySmoothingSpline = SmoothingSpline._fitted(whole.time_axis, at.t, fitted.curve, kept, policy, fitted)
+    return curve._with_noise(noisy, results), fitted
 
 
 @overload
@@ -444,12 +449,12 @@ def make_lsq_spline(
     t: TimesLike | None,
     points: PointsLike,
     knots: TimesLike,
-    space: Space[Any] | str,
+    space: AnySpace | str,
     *,
     weights: Numbers | None = None,
     loss: Loss = "linear",
     **options: Any,
-) -> SmoothingSpline[Any, Any]:
+) -> AnySmoothingSpline:
     """Fit a C² curve with given knots to noisy points by least squares.
 
     The curve minimises the weighted sum of squared distances to the data. There is no penalty on its acceleration; the
@@ -503,12 +508,10 @@ def make_lsq_spline(
 
 
 def _with_lam(part: Part, at: Knots) -> Part:
-    """Return a part with λ, which is the cube of the interval if there are only two knots, unless a λ is given.
+    """Return a part of a curve with two knots with λ, the cube of the interval between them unless it is given.
 
-    The curve is then the nearest geodesic for every λ, and there is nothing to choose.
+    The curve is the nearest geodesic for every λ.
     """
-    if at.times.shape[-1] > 2:
-        return part
     cube = np.ravel(at.times[..., 1] - at.times[..., 0]) ** 3
     return part._replace(lam=np.where(np.isfinite(part.lam), part.lam, cube))
 
@@ -535,28 +538,29 @@ def _joined(space: Space, ends: list[list[End] | None]) -> list[End] | None:
     if ends[0] is None or len(ends) == 1 or ends[0] is NATURAL:
         return ends[0]
     joined: list[End] = []
-    for each in zip(*[end or [] for end in ends], strict=True):
-        pairs = zip(parts_of_factor(space), each, strict=True)
+    for of_parts in zip(*[end or [] for end in ends], strict=True):
+        pairs = zip(parts_of_factor(space), of_parts, strict=True)
         rows = [part._numbers(vector) for part, (_, vector) in pairs if vector is not None]
         vector = np.ascontiguousarray(space._as_doubles(join(space, rows, 0.0))) if rows else None
-        joined.append((each[0][0], vector))
+        joined.append((of_parts[0][0], vector))
     return joined
 
 
-def _conditions(bc_type: Any, transported: list[list[End] | None], space: Space) -> Any:
+def _conditions(bc_type: SmoothingBCType, transported: list[list[End] | None], space: Space) -> BCType:
     """Return end conditions in the form of the argument `bc_type`."""
     if isinstance(bc_type, str):
         return bc_type
 
-    def one(e: int) -> Any:
-        each = [(ends or [])[e] for ends in transported]
-        if each[0][1] is None:
+    def one(e: int) -> object:
+        of_factors = [(ends or [])[e] for ends in transported]
+        if of_factors[0][1] is None:
             return "natural"
-        pairs = zip(factors_of(space), each, strict=True)
+        pairs = zip(factors_of(space), of_factors, strict=True)
         vectors = tuple(factor._numbers(vector) for factor, (_, vector) in pairs if vector is not None)
         return (1, vectors if isinstance(space, Product) else vectors[0])
 
-    return freeze_bc_type((one(0), one(1)))
+    conditions: BCType = freeze_bc_type((one(0), one(1)))
+    return conditions
 
 
 # ---- geodesic regression: an infinite λ ----
@@ -567,7 +571,7 @@ def geodesic_options(space: Space, options: SolverOptions) -> SolverOptions:
 
     The linearised solver is inaccurate for one long segment.
     """
-    if options.method != "auto" or any(own.dim > _LARGE for own in smoothed_spaces(space)):
+    if options.method != "auto" or any(part.dim > _LARGE for part in smoothed_spaces(space)):
         return options
     return options._replace(method="newton")
 

@@ -14,18 +14,19 @@ from itertools import islice
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from .._base.arrays import as_array, cast, one_of, refuse, short_repr
 from .._base.faults import INVALID, Fault
 from .._base.time import TimeAxis, knots_of
-from .._base.typing import TimesLike
+from .._base.typing import Numbers, PointsLike, SmoothingBCType, TimesLike
 from .._core import ValidationError
 from .._curves.ends import NATURAL, End, end_kinds, map_ends, split_ends
 from .._curves.fit import Points, moved_ends, read, read_ends, validated
 from .._curves.missing import refuse_nan_times
 from .._curves.options import with_atol
 from .._spaces import (
+    AnySpace,
     Array,
     Doubles,
     Euclidean,
@@ -56,7 +57,7 @@ def parts_of_factor(space: Space) -> tuple[Space, ...]:
     return (space.cover if isinstance(space, Quotient) else space,)
 
 
-def smoothed_spaces(space: Space[Any]) -> tuple[Space, ...]:
+def smoothed_spaces(space: AnySpace) -> tuple[Space, ...]:
     """Return the spaces in which points are smoothed, each with its own λ.
 
     They are the factors of the space, with rotations and positions in place of poses.
@@ -66,17 +67,17 @@ def smoothed_spaces(space: Space[Any]) -> tuple[Space, ...]:
     return tuple([part for factor in space.factors for part in parts_of_factor(factor)])
 
 
-def is_several(space: Space[Any]) -> bool:
+def is_several(space: AnySpace) -> bool:
     """Whether properties of the noise are tuples."""
     return isinstance(space, (Product, SpecialEuclidean))
 
 
-def in_part(space: Space[Any], number: int, mark: str = "") -> str:
+def in_part(space: AnySpace, number: int, mark: str = "") -> str:
     """Return " in factor ..." and a mark for one of several smoothed spaces, or an empty text."""
     return f" in factor {number}, {smoothed_spaces(space)[number]!r}{mark}" if is_several(space) else ""
 
 
-def grouped(space: Space[Any], values: Iterable[_T]) -> list[list[_T]]:
+def grouped(space: AnySpace, values: Iterable[_T]) -> list[list[_T]]:
     """Group values of the smoothed spaces by factor."""
     if not is_several(space):
         return [list(values)]
@@ -112,8 +113,8 @@ def split_end_vectors(space: Space, ends: list[End] | None) -> list[list[End] | 
     vectors = [None if v is None else split(space, space._numbers(v)) for _, v in ends]
     return [
         [
-            (kind, None if own is None else np.ascontiguousarray(part._as_doubles(own[i])))
-            for (kind, _), own in zip(ends, vectors, strict=True)
+            (kind, None if of_parts is None else np.ascontiguousarray(part._as_doubles(of_parts[i])))
+            for (kind, _), of_parts in zip(ends, vectors, strict=True)
         ]
         for i, part in enumerate(parts)
     ]
@@ -121,17 +122,17 @@ def split_end_vectors(space: Space, ends: list[End] | None) -> list[list[End] | 
 
 def distances_of(space: Space, p: Array, q: Array) -> Doubles:
     """Return the distances of rows of points, without checks."""
-    doubles = [np.ascontiguousarray(space._as_doubles(np.ascontiguousarray(own))) for own in (p, q)]
+    doubles = [np.ascontiguousarray(space._as_doubles(np.ascontiguousarray(points))) for points in (p, q)]
     return space._handle.apply("distance", doubles)
 
 
 def coordinates_in_parts(space: Space, points: Array) -> Array:
     """Return matrices that convert coordinates in ``space.frame(points)`` to those in the frames of the parts."""
     vectors = split(space, space.frame(points))
-    rows: list[Any] = []
-    for part, own, at in zip(parts_of_factor(space), vectors, split(space, points), strict=True):
+    rows: list[Array] = []
+    for part, basis, at in zip(parts_of_factor(space), vectors, split(space, points), strict=True):
         frame = part.frame(at)
-        flat = [x.reshape(*x.shape[: own.ndim - len(part.point_shape)], -1) for x in (own, frame)]
+        flat = [x.reshape(*x.shape[: basis.ndim - len(part.point_shape)], -1) for x in (basis, frame)]
         rows.append(np.linalg.pinv(np.swapaxes(flat[1], -1, -2)) @ np.swapaxes(flat[0], -1, -2))
     return np.concatenate(rows, axis=-2)
 
@@ -168,7 +169,7 @@ class Noise(NamedTuple):
         values = np.linalg.eigvalsh(self.information)
         return bool(np.any((values[..., 0] <= SINGULAR * values[..., -1]) & (values[..., -1] > 0)))
 
-    def map(self, function: Any) -> Noise:
+    def map(self, function: Callable[[Array], Array]) -> Noise:
         """Apply a function to the arrays that have batch axes, such as the selection of some curves."""
         information = self.information
         if information is not None and information.ndim > 3:
@@ -182,7 +183,7 @@ class Noise(NamedTuple):
         return self._replace(weights=np.take(self.weights, index, axis=-1), information=information)
 
 
-def read_precision(weights: Any, frames: Any, space: Space, data: list[Points]) -> list[Noise]:
+def read_precision(weights: Numbers | None, frames: Numbers | None, space: Space, data: list[Points]) -> list[Noise]:
     """Return weights or matrices in every space in which data are smoothed, after all checks.
 
     Parameters
@@ -195,30 +196,30 @@ def read_precision(weights: Any, frames: Any, space: Space, data: list[Points]) 
         tuple. None means ``space.frame``.
     """
     factors, several = factors_of(space), isinstance(space, Product)
-    own = _per_part(weights, "weights", len(factors), several and isinstance(weights, tuple))
-    own_frames = _per_part(frames, "frames", len(factors), several and frames is not None)
-    found: list[Noise] = []
-    for factor, given, frame, part in zip(factors, own, own_frames, data, strict=True):
+    weights_of_factors = _per_part(weights, "weights", len(factors), several and isinstance(weights, tuple))
+    frames_of_factors = _per_part(frames, "frames", len(factors), several and frames is not None)
+    noise: list[Noise] = []
+    for factor, given, frame, part in zip(factors, weights_of_factors, frames_of_factors, data, strict=True):
         spaces = parts_of_factor(factor)
         if len(spaces) > 1 and isinstance(given, tuple):
-            each = _per_part(given, "weights", len(spaces), True)
+            weights_of_parts = _per_part(given, "weights", len(spaces), True)
             frames_of = _per_part(frame, "frames", len(spaces), frame is not None)
             points = split(factor, factor._numbers(part.numbers))
-            for space_of, one, at, rows in zip(spaces, each, frames_of, points, strict=True):
+            for space_of, one, at, rows in zip(spaces, weights_of_parts, frames_of, points, strict=True):
                 doubles = np.ascontiguousarray(space_of._as_doubles(rows))
-                found.append(_in_factor(space_of, one, at, part._replace(numbers=doubles)))
-                if part.moves is not None and found[-1].information is not None:
+                noise.append(_in_factor(space_of, one, at, part._replace(numbers=doubles)))
+                if part.moves is not None and noise[-1].information is not None:
                     raise ValidationError(
                         f"information matrices of {space_of!r} refer to frames at the given representatives, but "
                         "other representatives were chosen. Pass points that `space.unwrap` returned."
                     )
             continue
         precision = _in_factor(factor, given, frame, part)
-        found += [precision] if len(spaces) == 1 else _in_parts(precision, factor, part)
-    return found
+        noise += [precision] if len(spaces) == 1 else _in_parts(precision, factor, part)
+    return noise
 
 
-def _in_factor(space: Space, given: Any, frames: Any, data: Points) -> Noise:
+def _in_factor(space: Space, given: ArrayLike | None, frames: ArrayLike | None, data: Points) -> Noise:
     array = None if given is None else as_array(given, "weights")
     shape, lead = (space.dim, space.dim), (*data.batch, data.nodes)
     if array is None or array.shape in ((data.nodes,), lead) or array.shape[-2:] != shape:
@@ -242,19 +243,19 @@ def _in_parts(precision: Noise, space: Space, data: Points) -> list[Noise]:
     into = np.zeros((*lead, space.dim, space.dim))
     into[good] = np.linalg.inv(coordinates_in_parts(space, space.project(points[good])))
     whole = np.swapaxes(into, -1, -2) @ precision.information @ into
-    found, first = [], 0
+    noise, first = [], 0
     for part in parts:
-        own = np.arange(space.dim)[first : first + part.dim]
-        rest = np.setdiff1d(np.arange(space.dim), own)
-        block = whole[..., own[:, None], own]
-        cross = whole[..., own[:, None], rest]
+        columns = np.arange(space.dim)[first : first + part.dim]
+        rest = np.setdiff1d(np.arange(space.dim), columns)
+        block = whole[..., columns[:, None], columns]
+        cross = whole[..., columns[:, None], rest]
         others = np.linalg.pinv(whole[..., rest[:, None], rest], rcond=SINGULAR, hermitian=True)
-        found.append(_of_matrices(block - cross @ others @ np.swapaxes(cross, -1, -2)))
+        noise.append(_of_matrices(block - cross @ others @ np.swapaxes(cross, -1, -2)))
         first += part.dim
-    return found
+    return noise
 
 
-def _per_part(value: Any, name: str, count: int, is_split: bool) -> list[Any]:
+def _per_part(value: Numbers | None, name: str, count: int, is_split: bool) -> list[Any]:
     """Return one value per part: the entries of a tuple, or the same value for all parts."""
     if not is_split:
         return [value] * count
@@ -266,16 +267,16 @@ def _per_part(value: Any, name: str, count: int, is_split: bool) -> list[Any]:
 def _checked_weights(weights: Array, data: Points, matrix: tuple[int, ...]) -> Doubles:
     """Return weights, one per point. Matrices of the other shape are accepted as well, but elsewhere."""
     batch, count = data.batch, data.nodes
-    found = _numbers(weights)
-    if found.shape not in ((count,), (*batch, count)):
-        own = f" or {(*batch, count)}" if batch else ""
+    numbers = _numbers(weights)
+    if numbers.shape not in ((count,), (*batch, count)):
+        of_batch = f" or {(*batch, count)}" if batch else ""
         raise ValidationError(
-            f"weights has shape {found.shape}, but {count} points need {(count,)}{own}, or as matrices "
+            f"weights has shape {numbers.shape}, but {count} points need {(count,)}{of_batch}, or as matrices "
             f"{(count, *matrix)}"
         )
     negative = "but weights must be >= 0. A weight of 0 excludes a point."
-    refuse(~(np.isfinite(found) & (found >= 0)), "weights", lambda i: f"is {found[i]}, {negative}")
-    return found
+    refuse(~(np.isfinite(numbers) & (numbers >= 0)), "weights", lambda i: f"is {numbers[i]}, {negative}")
+    return numbers
 
 
 def _numbers(array: Array) -> Doubles:
@@ -284,20 +285,20 @@ def _numbers(array: Array) -> Doubles:
     return cast(array)
 
 
-def _with_matrices(given: Array, frames: Any, space: Space, data: Points) -> Noise:
+def _with_matrices(given: Array, frames: ArrayLike | None, space: Space, data: Points) -> Noise:
     matrices, m = _numbers(given), space.dim
     batch, count = data.batch, data.nodes
     if matrices.shape not in ((count, m, m), (*batch, count, m, m)):
-        own = f" or {(*batch, count, m, m)}" if batch else ""
+        of_batch = f" or {(*batch, count, m, m)}" if batch else ""
         raise ValidationError(
             f"weights has shape {matrices.shape}, but matrices for {count} points of {space!r} have the shape "
-            f"{(count, m, m)}{own}"
+            f"{(count, m, m)}{of_batch}"
         )
     if space.point_shape[0] >= LARGE:
         raise ValidationError(
             f"the dimension of {space!r} is too large for information matrices. Pass numbers as weights."
         )
-    _check(_of_each(matrices, lambda own: np.asarray(np.isfinite(own).all(axis=(-2, -1)))), "is not finite")
+    _check(_of_each(matrices, lambda rows: np.asarray(np.isfinite(rows).all(axis=(-2, -1)))), "is not finite")
     _check(_of_each(matrices, _is_symmetric), "is not symmetric")
     least, most = (_of_each(matrices, np.linalg.eigvalsh)[..., i] for i in (0, -1))
     negative = "has a negative eigenvalue, but it must be the inverse of a covariance"
@@ -319,27 +320,28 @@ def _of_each(matrices: Doubles, function: Callable[[Doubles], Array]) -> Array:
     """Return a function of matrices. Python handles signals between blocks of them."""
     rows = matrices.reshape(math.prod(matrices.shape[:-2]), *matrices.shape[-2:])
     block = max(1, _BLOCK // max(1, matrices.shape[-1] ** 3))
-    found = [function(rows[start : start + block]) for start in range(0, max(1, len(rows)), block)]
-    values = np.concatenate(found)
+    blocks = [function(rows[start : start + block]) for start in range(0, max(1, len(rows)), block)]
+    values = np.concatenate(blocks)
     return values.reshape(matrices.shape[:-2] + values.shape[1:])
 
 
-def _moved_frames(frames: Any, space: Quotient[Any], data: Points, moves: Any) -> Array:
+def _moved_frames(frames: ArrayLike | None, space: Quotient[Any], data: Points, moves: NDArray[np.intp]) -> Array:
     """Return the frames at the points of the user, moved with these points to the chosen representatives."""
     numbers, lead = space._numbers(data.numbers), (*data.batch, data.nodes)
     if frames is None:
         given = space._moved_by(numbers, space._group.inverse[moves])
         # Points without weight may be NaN.
         good = space._where_finite(given)
-        found = np.zeros((*lead, space.dim, *space.point_shape), space.dtype)
-        found[good] = space.frame(given[good])
+        vectors = np.zeros((*lead, space.dim, *space.point_shape), space.dtype)
+        vectors[good] = space.frame(given[good])
     else:
-        found = space._numbers(space._doubles(frames, "frames"))
-        if found.shape not in ((lead[-1], space.dim, *space.point_shape), (*lead, space.dim, *space.point_shape)):
+        vectors = space._numbers(space._doubles(frames, "frames"))
+        if vectors.shape not in ((lead[-1], space.dim, *space.point_shape), (*lead, space.dim, *space.point_shape)):
             # Other shapes are rejected with the frames themselves.
-            return found
+            return vectors
     shape = (*lead, space.dim)
-    return space._moved_by(np.broadcast_to(found, shape + space.point_shape), np.broadcast_to(moves[..., None], shape))
+    vectors = np.broadcast_to(vectors, shape + space.point_shape)
+    return space._moved_by(vectors, np.broadcast_to(moves[..., None], shape))
 
 
 def _of_matrices(matrices: Doubles) -> Noise:
@@ -348,13 +350,15 @@ def _of_matrices(matrices: Doubles) -> Noise:
     return Noise(np.trace(matrices, axis1=-2, axis2=-1) / matrices.shape[-1], matrices)
 
 
-def _check(good: Any, complaint: str, name: str = "weights", indices: Any = None) -> None:
+def _check(
+    good: Array | np.bool_, complaint: str, name: str = "weights", indices: NDArray[np.intp] | None = None
+) -> None:
     if not np.all(good):
         bad = np.argwhere(~good)[0]
         raise ValidationError(f"{name}{(bad if indices is None else indices[bad[0]]).tolist()} {complaint}")
 
 
-def _inverse_frames(frames: Any, space: Space, data: Points, used: Any) -> Doubles:
+def _inverse_frames(frames: ArrayLike, space: Space, data: Points, used: Array) -> Doubles:
     """Return matrices that convert coordinates in ``space.frame`` to coordinates in the given frames.
 
     Data that are missing have unit matrices.
@@ -373,29 +377,34 @@ def _inverse_frames(frames: Any, space: Space, data: Points, used: Any) -> Doubl
     vectors = np.broadcast_to(given, (*lead, m, *space.point_shape))[used]
     indices = np.argwhere(used)
     _check(space._where_finite(vectors).all(axis=1), "are not finite", "frames", indices)
-    own = space.frame(space.project(points[used]))
+    basis = space.frame(space.project(points[used]))
 
     def flat(x: Array) -> Doubles:
         rows = space._as_doubles(np.ascontiguousarray(x))
         return np.swapaxes(rows.reshape(*x.shape[: x.ndim - axes], -1), -1, -2)
 
     columns = flat(vectors)
-    coordinates = np.linalg.pinv(flat(own)) @ columns
-    off = np.abs(flat(own) @ coordinates - columns).max(axis=(-2, -1))
+    coordinates = np.linalg.pinv(flat(basis)) @ columns
+    off = np.abs(flat(basis) @ coordinates - columns).max(axis=(-2, -1))
     size = np.abs(columns).max(axis=(-2, -1))
     tangent = "are not tangent at their point. Project them with space.project_tangent."
     _check(off <= 1e-6 * size, tangent, "frames", indices)
     _check(~(np.linalg.cond(coordinates) > 1e8), "do not span the tangent space", "frames", indices)
-    found = np.broadcast_to(np.eye(m), (*lead, m, m)).copy()
-    found[used] = np.linalg.inv(coordinates)
-    return found
+    inverses = np.broadcast_to(np.eye(m), (*lead, m, m)).copy()
+    inverses[used] = np.linalg.inv(coordinates)
+    return inverses
 
 
 # ---- numbers per curve ----
 
 
 def per_part(
-    space: Space, spaces: tuple[Space, ...], value: Any, name: str, batch: tuple[int, ...], infinite: bool = False
+    space: Space,
+    spaces: tuple[Space, ...],
+    value: Any,
+    name: str,
+    batch: tuple[int, ...],
+    infinite: bool = False,
 ) -> list[Doubles]:
     """Return one array with a number per curve for each of the smoothed spaces; NaN for None.
 
@@ -405,6 +414,8 @@ def per_part(
         If the value is not a number >= 0, which may be infinite if `infinite` is True, an array with one per curve, or
         for products and poses a tuple of these.
     """
+    if value is None:
+        return [np.full(math.prod(batch), np.nan)] * len(spaces)
     values = [value]
     if isinstance(value, tuple) and is_several(space):
         if len(value) != len(spaces):
@@ -466,7 +477,7 @@ class SmoothingData(NamedTuple):
         """Which data have a nonzero weight in some factor, shape (N,) or (..., N)."""
         return reduce(np.logical_or, [noise.weights > 0 for noise in self.noise])
 
-    def map(self, function: Callable[[Any], Any], batch: tuple[int, ...]) -> SmoothingData:
+    def map(self, function: Callable[[Array], Array], batch: tuple[int, ...]) -> SmoothingData:
         """Apply a function to the arrays that have batch axes, such as the selection of some curves."""
         t, times = (x if x.ndim == 1 else function(x) for x in (self.t, self.times))
         points, noise = [function(rows) for rows in self.points], [noise.map(function) for noise in self.noise]
@@ -484,18 +495,19 @@ Ends = list[list[End] | None]
 
 def read_noisy(
     t: TimesLike | None,
-    points: Any,
+    points: PointsLike,
     space: Space,
-    weights: Any,
-    frames: Any,
-    sigma: Any,
-    loss: Any,
-    bc_type: Any,
+    spaces: tuple[Space, ...],
+    weights: Numbers | None,
+    frames: Numbers | None,
+    sigma: Numbers | None,
+    loss: str,
+    bc_type: SmoothingBCType,
     atol: float | None,
 ) -> tuple[SmoothingData, list[Points], Ends]:
     """Return the data of a user without points, the points in every factor, and the end conditions.
 
-    The points are not checked.
+    The points are not checked. They are smoothed in `spaces`.
 
     Raises
     ------
@@ -518,24 +530,23 @@ def read_noisy(
         )
     if np.any(times[..., -1] / 2 - times[..., 0] / 2 > _LONGEST):
         raise ValidationError(f"t spans more than {_LONGEST:.0e}, too much for smoothing. Choose another unit of time.")
-    spaces = smoothed_spaces(space)
     given = [Noise(np.ones(count), None)] * len(spaces)
     if weights is not None or frames is not None:
         given = read_precision(weights, frames, space, data)
     if weights is not None:
-        each = zip(data, grouped(space, given), strict=True)
-        data = [_without_missing(part, [one.weights for one in own]) for part, own in each]
+        pairs = zip(data, grouped(space, given), strict=True)
+        data = [_without_missing(part, [one.weights for one in noise_of_factor]) for part, noise_of_factor in pairs]
     if space._has_quotients:
         bc_type = moved_ends(bc_type, space, data)
     ends = read_ends(bc_type, space, batch)
     sigmas = per_part(space, spaces, sigma, "sigma", batch)
     # Two points have no outliers and do not determine the noise level.
     loss = "linear" if count == 2 else loss
-    noise = [Noise(*own[:2], *rest) for own, *rest in zip(given, sigmas, [loss] * len(spaces), strict=True)]
+    noise = [Noise(part.weights, part.information, of_part, loss) for part, of_part in zip(given, sigmas, strict=True)]
     return SmoothingData(time_axis, shown_times, times, [], noise, batch), data, ends
 
 
-def checked_ends(bc_type: Any, penalty: Any, method: Any) -> Any:
+def checked_ends(bc_type: SmoothingBCType | None, penalty: object, method: object) -> SmoothingBCType:
     """Return the end conditions, by default those that belong to the penalty.
 
     Raises
@@ -552,16 +563,17 @@ def checked_ends(bc_type: Any, penalty: Any, method: Any) -> Any:
                 "'not-a-knot' or 'periodic'."
             )
         return bc_type or "not-a-knot"
-    ends = "natural" if bc_type is None else bc_type
-    if not isinstance(ends, str):
-        split_ends(ends)
-    for kind in end_kinds(ends) or []:
+    if bc_type is None:
+        return "natural"
+    if not isinstance(bc_type, str):
+        split_ends(bc_type)
+    for kind in end_kinds(bc_type) or []:
         if kind not in ("natural", "velocity"):
             raise ValidationError(
                 f"bc_type {kind!r} is not available for smoothing splines. Use 'natural', 'clamped', 'periodic' or "
                 "(1, velocity)."
             )
-    return ends
+    return bc_type
 
 
 def valid_curves(
@@ -606,7 +618,7 @@ def valid_curves(
         return noisy, ends, None, faults
     chosen = np.flatnonzero(kept)
 
-    def rows(array: Any) -> Any:
+    def rows(array: Array) -> Array:
         return np.ascontiguousarray(array.reshape(-1, *array.shape[len(batch) :])[chosen])
 
     noisy = noisy.map(rows, (len(chosen),))
@@ -619,31 +631,32 @@ def _without_missing(part: Points, weights: list[Doubles]) -> Points:
 
     Points without such a predecessor become the first point that has a weight.
     """
-    missing = reduce(np.logical_and, [np.broadcast_to(own == 0, (*part.batch, part.nodes)) for own in weights])
+    shape = (*part.batch, part.nodes)
+    missing = reduce(np.logical_and, [np.broadcast_to(of_part == 0, shape) for of_part in weights])
     if not missing.any():
         return part
     order = np.arange(part.nodes)
     last = np.maximum.accumulate(np.where(missing, -1, order), axis=-1)
     first = np.argmin(missing, axis=-1)[..., None]
-    found = np.where(last < 0, first, last)
-    axes = part.numbers.ndim - found.ndim
-    doubles = np.take_along_axis(part.numbers, found.reshape(*found.shape, *[1] * axes), axis=found.ndim - 1)
+    nearest = np.where(last < 0, first, last)
+    axes = part.numbers.ndim - nearest.ndim
+    doubles = np.take_along_axis(part.numbers, nearest.reshape(*nearest.shape, *[1] * axes), axis=nearest.ndim - 1)
     return part._replace(numbers=np.ascontiguousarray(doubles))
 
 
 def _enough(times: Doubles, weights: Doubles, batch: tuple[int, ...]) -> NDArray[np.bool_]:
     """Return which curves have data at two or more different times."""
     shape = (*batch, times.shape[-1])
-    used, own = np.broadcast_to(weights > 0, shape), np.broadcast_to(times, shape)
-    first, last = np.where(used, own, np.inf).min(-1), np.where(used, own, -np.inf).max(-1)
+    used, times_of_curves = np.broadcast_to(weights > 0, shape), np.broadcast_to(times, shape)
+    first, last = np.where(used, times_of_curves, np.inf).min(-1), np.where(used, times_of_curves, -np.inf).max(-1)
     return np.asarray(last > first)
 
 
 def _too_few(weights: Doubles, batch: tuple[int, ...], number: int) -> str:
     index = np.unravel_index(number, batch)
     of = f" of curve {','.join(map(str, index))}" if batch else ""
-    own = weights[index] if weights.ndim > 1 else weights
-    if not np.any(own > 0):
+    weights_of_curve = weights[index] if weights.ndim > 1 else weights
+    if not np.any(weights_of_curve > 0):
         return f"All weights of the data{of} are 0. A curve needs points at two or more times."
     return f"The data{of} have one time only. A curve needs points at two or more times."
 
@@ -676,7 +689,7 @@ class Part(NamedTuple):
         """The axis of the data among those of the points."""
         return self.points.ndim - len(self.space.point_shape) - 1
 
-    def map(self, function: Callable[[Any], Any], noise: Noise) -> Part:
+    def map(self, function: Callable[[Array], Array], noise: Noise) -> Part:
         """Apply a function to the arrays, such as one that adds masked curves, and replace the noise."""
         ends = map_ends(self.ends, function)
         return Part(self.space, function(self.points), noise, function(self.lam), ends)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,10 @@ from .._base.report import BOOL, FLOAT, INT, FitReport
 from .._base.typing import FloatArray, Number
 from .._spaces import Array, Doubles, Space
 
+# Kinds of the ends, as the core names them; None for closed curves.
+Kinds = list[str] | None
+# The arrays of the matrix A, the number of coordinates that it couples, the kinds of the ends, and the holonomy.
+Known = tuple[list[Doubles], int, Kinds, Doubles]
 METHODS: tuple[Literal["linearized", "newton"], ...] = ("linearized", "newton")
 
 
@@ -176,17 +181,24 @@ class Posterior(NamedTuple):
         """Return the posterior of a curve without parameters."""
         return cls(band, turn, size, np.zeros((band.shape[-2], 0)), np.zeros((0, 0)))
 
-    def map(self, function: Any) -> Posterior:
+    def map(self, function: Callable[[Array], Array]) -> Posterior:
         """Apply a function to the arrays with batch axes, such as the selection of some curves."""
         return self._replace(band=function(self.band), turn=function(self.turn))
 
-    def known(self, index: tuple[int, ...], kinds: Any) -> Any:
+    def known(self, index: tuple[int, ...], kinds: Kinds) -> Known:
         """Return the matrix A of one curve and its end conditions, in the form that the core expects."""
         arrays = [np.ascontiguousarray(x) for x in (self.band[index], self.side, self.corner)]
         return arrays, self.size, kinds, np.ascontiguousarray(self.turn[index])
 
     def covariance(
-        self, space: Space, knots: Doubles, index: tuple[int, ...], kinds: Any, x: Doubles, y: Any, orders: list[int]
+        self,
+        space: Space,
+        knots: Doubles,
+        index: tuple[int, ...],
+        kinds: Kinds,
+        x: Doubles,
+        y: Doubles | None,
+        orders: list[int],
     ) -> Doubles:
         """Return covariances of one curve at times x for noise of variance one.
 
@@ -212,24 +224,31 @@ class Posterior(NamedTuple):
         """
         count, m = len(orders), space.dim
         if self.size == 1 and m > 1:
-            found = self.coupled(knots, index, kinds, x, y, orders, np.arange(1))
+            of_coordinate = self.coupled(knots, index, kinds, x, y, orders, np.arange(1))
             whole = np.zeros((len(x), count, m, count, m))
-            each = np.arange(m)
-            whole[:, :, each, :, each] = found
+            index_of_coordinate = np.arange(m)
+            whole[:, :, index_of_coordinate, :, index_of_coordinate] = of_coordinate
             return whole.reshape(len(x), count * m, count * m)
         return self.coupled(knots, index, kinds, x, y, orders, np.arange(self.first, self.first + m))
 
     def coupled(
-        self, knots: Doubles, index: tuple[int, ...], kinds: Any, x: Doubles, y: Any, orders: list[int], rows: Any
+        self,
+        knots: Doubles,
+        index: tuple[int, ...],
+        kinds: Kinds,
+        x: Doubles,
+        y: Doubles | None,
+        orders: list[int],
+        rows: NDArray[np.intp],
     ) -> Doubles:
         """Return the same for some of the coordinates that A couples, given by their numbers `rows`."""
-        found = _core.posterior_covariance(knots, self.known(index, kinds), x, y, orders)
+        covariances = _core.posterior_covariance(knots, self.known(index, kinds), x, y, orders)
         count, d = len(orders), len(orders) * len(rows)
-        square = found.reshape(len(x), count, self.size, count, self.size)[:, :, rows][..., rows]
+        square = covariances.reshape(len(x), count, self.size, count, self.size)[:, :, rows][..., rows]
         return np.ascontiguousarray(square.reshape(len(x), d, d))
 
     def samples(
-        self, space: Space, knots: Doubles, index: tuple[int, ...], kinds: Any, rng: np.random.Generator, n: int
+        self, space: Space, knots: Doubles, index: tuple[int, ...], kinds: Kinds, rng: np.random.Generator, n: int
     ) -> Doubles:
         """Return moves of one curve at its knots, shape (n, knots, size or dim), for noise of variance one."""
         known = self.known(index, kinds)
@@ -238,28 +257,28 @@ class Posterior(NamedTuple):
         # The same numbers as in one call. Python handles signals between the rows.
         for row in normal:
             rng.standard_normal(out=row)
-        found = _core.posterior_samples(knots, known, normal)
+        moves = _core.posterior_samples(knots, known, normal)
         if self.size == 1:
-            return np.moveaxis(found.reshape(n, space.dim, len(knots)), 1, 2)
-        return found.reshape(n, len(knots), self.size)
+            return np.moveaxis(moves.reshape(n, space.dim, len(knots)), 1, 2)
+        return moves.reshape(n, len(knots), self.size)
 
 
 def frames_at(space: Space, knots: Doubles, points: Array, x: Doubles, p: Array) -> Array:
     """Return frames along a curve at the points p for the times x, shape (n, dim, *point_shape)."""
     doubles = [np.ascontiguousarray(space._as_doubles(rows)) for rows in (points, p)]
-    found = _core.frames_along(space._handle, knots, doubles[0], np.ascontiguousarray(x), doubles[1])
-    return space._numbers(found.reshape(len(x), space.dim, *space._doubles_shape))
+    frames = _core.frames_along(space._handle, knots, doubles[0], np.ascontiguousarray(x), doubles[1])
+    return space._numbers(frames.reshape(len(x), space.dim, *space._doubles_shape))
 
 
 def coordinates(space: Space, p: Array, frames: Array, vectors: Array) -> Doubles:
     """Return the coordinates of tangent vectors at p in frames, shape (n, dim)."""
     if not np.isnan(space.curvature):
-        found = space._apply("inner", p=p[:, None], u=frames, v=np.broadcast_to(vectors[:, None], frames.shape))
-        return np.ascontiguousarray(found)
+        products = space._apply("inner", p=p[:, None], u=frames, v=np.broadcast_to(vectors[:, None], frames.shape))
+        return np.ascontiguousarray(products)
     # Groups without a metric have frames that are not orthonormal.
-    flat, own = _flat(space, frames), _flat(space, vectors)
+    flat, rows = _flat(space, frames), _flat(space, vectors)
     gram = flat @ np.swapaxes(flat, -1, -2)
-    return np.ascontiguousarray(np.linalg.solve(gram, flat @ own[..., None])[..., 0])
+    return np.ascontiguousarray(np.linalg.solve(gram, flat @ rows[..., None])[..., 0])
 
 
 def _flat(space: Space, vectors: Array) -> Doubles:
@@ -269,7 +288,14 @@ def _flat(space: Space, vectors: Array) -> Doubles:
 
 
 def process_ratio(
-    times: Doubles, weights: Doubles, knots: Doubles, band: Doubles | None, lam: float, kinds: Any, x: Doubles, nu: int
+    times: Doubles,
+    weights: Doubles,
+    knots: Doubles,
+    band: Doubles | None,
+    lam: float,
+    kinds: Kinds,
+    x: Doubles,
+    nu: int,
 ) -> Doubles:
     """Return the variance of the process divided by that of a cubic spline with the same data and the same λ.
 
@@ -294,7 +320,7 @@ def process_ratio(
         0 for the point, 1 for the velocity.
     """
     used = weights > 0
-    times, weights, knots, x = (np.ascontiguousarray(own) for own in (times[used], weights[used], knots, x))
+    times, weights, knots, x = (np.ascontiguousarray(array) for array in (times[used], weights[used], knots, x))
     if not (lam > 0 and np.isfinite(lam)):
         return np.ones(len(x))
     if band is None:

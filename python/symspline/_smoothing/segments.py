@@ -41,6 +41,7 @@ from .._curves.missing import (
 )
 from .._curves.options import check_on_failure, check_progress
 from .._spaces import (
+    AnySpace,
     Array,
     Groups,
     Product,
@@ -59,7 +60,7 @@ from ..manifolds import Manifold
 from .make import make_smoothing_spline
 from .noise import read_precision
 from .report import SmoothingReport
-from .spline import SmoothingSpline
+from .spline import AnySmoothingSpline, SmoothingSpline
 
 # Neighbours this near to each other's cut locus, as a fraction of the distance to it, have no unique geodesic.
 _AT_CUT_LOCUS = 1e-12
@@ -115,7 +116,7 @@ def fit_segments(
 def fit_segments(
     t: TimesLike,
     points: PointsLike,
-    space: Space[Any] | str,
+    space: AnySpace | str,
     *,
     max_gap: float | str | timedelta | np.timedelta64,
     min_points: int = 2,
@@ -219,23 +220,23 @@ def fit_segments(
             f"no segment has {min_points} points: {np.sum(steps > gap)} of {len(steps)} time steps are longer than "
             f"max_gap={max_gap}, and the median step is {np.median(steps) if len(steps) else 0:.3g}"
         )
-    own = [
+    curves_with_options = [
         (*curve, {key: _of_rows(value, kept) for key, value in weight_options.items()})
         for curve, kept in zip(curves, rows, strict=True)
     ]
     try:
-        fitted = smooth_many(own, space, **options) if smooth else fit_many(curves, space, **options)
+        fitted = smooth_many(curves_with_options, space, **options) if smooth else fit_many(curves, space, **options)
     except SymsplineError as error:
         raise recounted(error, rows) from None
     return SegmentedCurve(fitted, extrapolate=_policy(options))
 
 
-def _policy(options: dict[str, Any]) -> Any:
+def _policy(options: dict[str, Any]) -> Literal[False] | None:
     """Return the extrapolation policy of the whole. Gaps are NaN; other policies apply to single segments only."""
     return False if options.get("extrapolate") is False else None
 
 
-def check_smooth(smooth: Any, duplicates: str, options: dict[str, Any]) -> None:
+def check_smooth(smooth: object, duplicates: str, options: dict[str, Any]) -> None:
     """Raise ValidationError if `smooth` is invalid, or does not agree with the other options."""
     if not isinstance(smooth, (bool, np.bool_)):
         raise ValidationError(
@@ -252,10 +253,10 @@ def check_smooth(smooth: Any, duplicates: str, options: dict[str, Any]) -> None:
         )
 
 
-def _used(weight_options: dict[str, Any], points: Any, space: Space) -> NDArray[np.bool_]:
+def _used(weight_options: dict[str, Any], points: PointsLike, space: Space) -> NDArray[np.bool_]:
     """Return which points have a nonzero weight."""
-    found = read_precision(**weight_options, space=space, data=read_given(points, space))
-    return np.asarray(np.any([result.weights > 0 for result in found], axis=0))
+    noise = read_precision(**weight_options, space=space, data=read_given(points, space))
+    return np.asarray(np.any([of_part.weights > 0 for of_part in noise], axis=0))
 
 
 def _of_rows(value: Any, rows: NDArray[np.intp]) -> Any:
@@ -288,8 +289,8 @@ class Cut(NamedTuple):
 
 def cut(
     t: TimesLike,
-    points: Any,
-    space: Space[Any] | str,
+    points: PointsLike,
+    space: AnySpace | str,
     max_gap: Any,
     min_points: int,
     duplicates: str,
@@ -356,16 +357,16 @@ def cut(
 
 def _opposite(space: Space, arrays: list[Array]) -> NDArray[np.bool_]:
     """Return a mask of the neighbours without a unique shortest geodesic between them, in any factor."""
-    found = np.zeros(max(len(arrays[0]) - 1, 0), bool)
+    opposite = np.zeros(max(len(arrays[0]) - 1, 0), bool)
     for factor, points in zip(factors_of(space), arrays, strict=True):
         if isinstance(factor, (Manifold, Quotient)) or not np.isfinite(factor.injectivity_radius):
             continue
         with np.errstate(all="ignore"):
-            found |= factor._apply("cut_fraction", p=points[:-1], q=points[1:]) >= 1 - _AT_CUT_LOCUS
-    return found
+            opposite |= factor._apply("cut_fraction", p=points[:-1], q=points[1:]) >= 1 - _AT_CUT_LOCUS
+    return opposite
 
 
-def _warn_of_opposite(opposite: NDArray[np.bool_], rows: NDArray[np.intp], moments: Any) -> None:
+def _warn_of_opposite(opposite: NDArray[np.bool_], rows: NDArray[np.intp], moments: Array) -> None:
     if not opposite.any():
         return
     i = int(np.argmax(opposite))
@@ -390,7 +391,7 @@ def _seconds(max_gap: Any, dates: bool) -> float:
     return float(max_gap)
 
 
-def _check_order(times: NDArray[Any], seconds: NDArray[np.float64], duplicates: str) -> None:
+def _check_order(times: Array, seconds: NDArray[np.float64], duplicates: str) -> None:
     refuse_nan_times(seconds)
     steps = np.diff(seconds)
     falls = np.flatnonzero(steps < 0)
@@ -435,12 +436,12 @@ def _at_once(space: Space, points: Array, starts: NDArray[np.intp], duplicates: 
 
 def smooth_many(
     curves: Iterable[tuple[Any, Any, dict[str, Any]]],
-    space: Space[Any],
+    space: AnySpace,
     *,
     on_failure: OnFailure = "raise",
     progress: Progress | None = None,
     **options: Any,
-) -> list[SmoothingSpline[Any, Any]]:
+) -> list[AnySmoothingSpline]:
     """Fit one spline per curve, each with its own λ.
 
     Parameters
@@ -460,16 +461,16 @@ def smooth_many(
     check_on_failure(on_failure)
     check_progress(progress)
     given = list(curves)
-    found: list[SmoothingSpline[Any, Any]] = []
+    splines: list[AnySmoothingSpline] = []
     faults: list[Fault] = []
-    noted: list[tuple[int, Any]] = []
-    for number, (t, points, own) in enumerate(given):
+    noted: list[tuple[int, warnings.WarningMessage]] = []
+    for number, (t, points, options_of_curve) in enumerate(given):
         with warnings.catch_warnings(record=True) as seen:
             warnings.simplefilter("always")
             try:
-                found.append(make_smoothing_spline(t, points, space, **own, **options))
+                splines.append(make_smoothing_spline(t, points, space, **options_of_curve, **options))
             except ConvergenceError as error:
-                found.append(error.spline)
+                splines.append(error.spline)
                 faults.append(Fault(number, UNCONVERGED, f"curve {number}: {error}", node=error.node))
             except ValidationError as error:
                 raise error._of_curve(number) from None
@@ -483,10 +484,10 @@ def smooth_many(
         number, note = first
         warn(f"curve {number}: {note.message}{others}", kind, (number,), getattr(note.message, "node", None))
     if faults:
-        raise_or_warn(faults, on_failure, found)
-    return found
+        raise_or_warn(faults, on_failure, splines)
+    return splines
 
 
-def _kind(note: Any) -> tuple[type[Warning], str]:
-    words = [word for word in str(note.message).split() if not any(own.isdigit() for own in word)]
+def _kind(note: warnings.WarningMessage) -> tuple[type[Warning], str]:
+    words = [word for word in str(note.message).split() if not any(character.isdigit() for character in word)]
     return note.category, " ".join(words[:4])

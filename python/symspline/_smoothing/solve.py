@@ -8,7 +8,7 @@ the iteration may end in a minimum that is not the global one. Further starts ar
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,10 +18,13 @@ from .._base.arrays import as_array, short_repr
 from .._base.faults import UNCONVERGED, Fault
 from .._base.input import times_of
 from .._base.report import long_gaps
-from .._base.typing import Progress
+from .._base.typing import BCType, Number, Progress, TimesLike
 from .._core import ValidationError
-from .._curves.reduced import reduced
+from .._curves.curve import CurveArrays
+from .._curves.failures import cut_fractions_in_core
+from .._curves.reduced import Span, reduced
 from .._spaces import (
+    AnySpace,
     Array,
     ComplexGrassmannian,
     ComplexProjective,
@@ -73,15 +76,15 @@ class Knots(NamedTuple):
     t: Array
     times: Doubles
 
-    def of_curves(self, chosen: NDArray[np.intp] | None) -> Knots:
-        """Return the knots of some curves of a batch; None selects all curves."""
-        if chosen is None or self.times.ndim == 1:
+    def of_curves(self, chosen: NDArray[np.intp]) -> Knots:
+        """Return the knots of some curves of a batch."""
+        if self.times.ndim == 1:
             return self
         t, times = (x.reshape(-1, x.shape[-1])[chosen] for x in (self.t, self.times))
         return Knots(t, np.ascontiguousarray(times))
 
 
-def knots_for(noisy: SmoothingData, knots: Any) -> Knots:
+def knots_for(noisy: SmoothingData, knots: TimesLike | None) -> Knots:
     """Return the knots of a curve from the argument `knots`: None, their number, or the knots themselves."""
     t, times = noisy.t, noisy.times
     if isinstance(knots, (int, np.integer)) and not isinstance(knots, bool):
@@ -95,13 +98,13 @@ def knots_for(noisy: SmoothingData, knots: Any) -> Knots:
         raise ValidationError(
             f"knots has shape {given.shape}, but must have shape (K,). All curves have the same knots."
         )
-    found, _ = noisy.time_axis.at(knots, noisy.batch, False)
-    if found.shape[-1:] < (2,):
+    at, _ = noisy.time_axis.at(knots, noisy.batch, False)
+    if at.shape[-1:] < (2,):
         raise ValidationError("knots must have at least two entries")
-    if not np.all(np.diff(found) > 0):
-        index = int(np.argwhere(~(np.diff(found) > 0))[0][-1])
+    if not np.all(np.diff(at) > 0):
+        index = int(np.argwhere(~(np.diff(at) > 0))[0][-1])
         raise ValidationError(f"knots[{index + 1}] is not after knots[{index}], but knots must increase")
-    ends = np.stack([found[..., 0], found[..., -1]], axis=-1)
+    ends = np.stack([at[..., 0], at[..., -1]], axis=-1)
     data_ends = np.stack([times[..., 0], times[..., -1]], axis=-1)
     size = np.abs(data_ends).max(axis=-1, keepdims=True)
     if noisy.time_axis.origin is not None and not noisy.time_axis.dates:
@@ -109,18 +112,16 @@ def knots_for(noisy: SmoothingData, knots: Any) -> Knots:
     # The last knot of linspace may be a few units in the last place before the last datum.
     beside = (ends != data_ends) & (np.abs(ends - data_ends) <= 4 * np.spacing(size))
     if beside.any():
-        found = np.broadcast_to(
-            found, (*np.broadcast_shapes(found.shape[:-1], ends.shape[:-1]), found.shape[-1])
-        ).copy()
-        found[..., [0, -1]] = np.where(beside, data_ends, ends)
-    if np.any(found[..., 0] > times[..., 0]) or np.any(found[..., -1] < times[..., -1]):
+        at = np.broadcast_to(at, (*np.broadcast_shapes(at.shape[:-1], ends.shape[:-1]), at.shape[-1])).copy()
+        at[..., [0, -1]] = np.where(beside, data_ends, ends)
+    if np.any(at[..., 0] > times[..., 0]) or np.any(at[..., -1] < times[..., -1]):
         raise ValidationError("knots must reach from the first to the last time of the data")
     if noisy.time_axis.dates:
         given = given.astype(np.promote_types(given.dtype, t.dtype))
     elif noisy.time_axis.plain:
-        given = found
+        given = at
     # Curves with an origin of time of their own have one row of knots each.
-    return Knots(np.broadcast_to(given, found.shape).copy(), found)
+    return Knots(np.broadcast_to(given, at.shape).copy(), at)
 
 
 def has_all_times(knots: Knots, noisy: SmoothingData) -> bool:
@@ -182,11 +183,12 @@ def merge_close_knots(knots: Knots, noisy: SmoothingData, lam: float | None, pow
         return knots
     span = times[..., -1] - times[..., 0]
     mean = span / (times.shape[-1] - 1)
-    weight = float(max([np.max(np.mean(noise.weights, axis=-1)) for noise in noisy.noise]))
-    # Units of the mean distance prevent overflow.
-    ratio = 1.0 if lam is None else lam / weight
-    for _ in range(0 if lam is None else power):
-        ratio = ratio / mean
+    ratio = 1.0
+    if lam is not None:
+        ratio = lam / float(max([np.max(np.mean(noise.weights, axis=-1)) for noise in noisy.noise]))
+        # Units of the mean distance prevent overflow.
+        for _ in range(power):
+            ratio = ratio / mean
     least = np.minimum(mean * (coarser * ratio / most) ** (1 / power), span / 15)
     if np.all(np.diff(times).min(axis=-1) >= least):
         return knots
@@ -214,23 +216,23 @@ def _far_apart(times: Doubles, least: float) -> NDArray[np.intp]:
 
 def _moved_apart(t: Array, times: Doubles, kept: NDArray[np.intp]) -> Array:
     """Return the knots that are kept, and new ones in the middle of the longest segments, as many as before in all."""
-    own, at = t[kept].tolist() if t.dtype.kind == "f" else list(t[kept]), times[kept].tolist()
-    while len(own) < len(t):
+    shown, at = t[kept].tolist() if t.dtype.kind == "f" else list(t[kept]), times[kept].tolist()
+    while len(shown) < len(t):
         i = int(np.argmax(np.diff(at)))
-        step = own[i + 1] - own[i]
-        own.insert(i + 1, own[i] + (step / 2 if t.dtype.kind == "f" else step // 2))
+        step = shown[i + 1] - shown[i]
+        shown.insert(i + 1, shown[i] + (step / 2 if t.dtype.kind == "f" else step // 2))
         at.insert(i + 1, 0.5 * (at[i] + at[i + 1]))
-    return np.array(own, t.dtype)
+    return np.array(shown, t.dtype)
 
 
 def with_enough_knots(
     whole: Knots,
     noisy: SmoothingData,
     parts: list[Part],
-    run: Callable[[Knots], list[Found]],
+    run: Callable[[Knots], list[SmoothCurves]],
     df_of_part: DfOfPart,
     penalty: str,
-) -> tuple[list[Found], Knots]:
+) -> tuple[list[SmoothCurves], Knots]:
     """Fit with as many knots as λ and the degrees of freedom require, and return the results and the knots."""
     lams = np.concatenate([part.lam for part in parts])
     given = _of_all(lams) if np.isfinite(lams).all() else None
@@ -239,16 +241,17 @@ def with_enough_knots(
     if at.times.shape[-1] > _MANY:
         at = thin_knots(at, max(_FIRST, _n_knots_for_df(_df_from_parts(noisy, parts, df_of_part, power))))
     for tries in range(_TRIES):
-        found = run(at)
+        results = run(at)
         count = at.times.shape[-1]
-        if tries < _TRIES - 1 and any(map(_may_settle, found, parts)):
+        if tries < _TRIES - 1 and any(map(_may_settle, results, parts)):
             coarser *= _COARSER
             fewer = merge_close_knots(whole, noisy, given, power, coarser)
             if not np.array_equal(fewer.times, at.times) and fewer.times.shape[-1] <= count:
                 at = fewer
                 continue
-        reports = [result.smoothed.report for result in found]
-        lams, dfs = np.array([(report.lam, report.df) for report in reports]).swapaxes(0, 1)
+        lams, dfs = np.array([(result.smoothed.report.lam, result.smoothed.report.df) for result in results]).swapaxes(
+            0, 1
+        )
         apart = merge_close_knots(whole, noisy, _of_all(lams), power, coarser)
         most, enough = apart.times.shape[-1], _n_knots_for_df(dfs)
         if tries == _TRIES - 1 or (count >= most > 0.8 * count and count > 0.8 * min(enough, most)):
@@ -258,14 +261,14 @@ def with_enough_knots(
         if np.array_equal(better.times, at.times):
             break
         at = better
-    return found, at
+    return results, at
 
 
-def _may_settle(found: Found, part: Part) -> bool:
+def _may_settle(result: SmoothCurves, part: Part) -> bool:
     """Whether a curve failed that may converge with fewer knots."""
-    failed = (found.states != CONVERGED) & (found.states != NO_CURVE)
-    if failed.any() and found.smoothed.penalty == "jerk":
-        failed &= (found.states != UNDETERMINED) | (np.sum(part.noise.weights > 0, axis=-1).ravel() >= _FEWEST)
+    failed = (result.states != CONVERGED) & (result.states != NO_CURVE)
+    if failed.any() and result.smoothed.penalty == "jerk":
+        failed &= (result.states != UNDETERMINED) | (np.sum(part.noise.weights > 0, axis=-1).ravel() >= _FEWEST)
     return bool(failed.any())
 
 
@@ -310,7 +313,7 @@ def _starts(space: Space, points: Array, axis: int, length: int) -> list[int]:
     return sorted({*starts, *np.clip(liveliest, 0, total - length).tolist()})
 
 
-def _of_all(lams: Any) -> float:
+def _of_all(lams: Doubles) -> float:
     """Return one λ from which the knots of all curves are selected.
 
     It is the smallest λ, so that the roughest curve has enough knots, but at least 1e-3 of the largest one.
@@ -320,7 +323,7 @@ def _of_all(lams: Any) -> float:
     return float(max(flat.min(), 1e-3 * flat.max())) if flat.size else 0.0
 
 
-def _n_knots_for_df(df: Any) -> int:
+def _n_knots_for_df(df: Doubles | float) -> int:
     """Return a number of knots that is enough for these degrees of freedom.
 
     Three times as many knots would already lose nothing.
@@ -390,9 +393,9 @@ def geodesic_knots(every: Knots, space: Space, run: Callable[[Knots], list[Array
     """
     if any(isinstance(factor, SpecialEuclidean) for factor in factors_of(space)):
         return every
-    found = run(thin_knots(every, _OF_GEODESIC))
+    points = run(thin_knots(every, _OF_GEODESIC))
     ratio = 0.0
-    for part, rows in zip(smoothed_spaces(space), found, strict=True):
+    for part, rows in zip(smoothed_spaces(space), points, strict=True):
         starts, ends = part._neighbours(rows)
         good = part._where_finite(starts) & part._where_finite(ends)
         steps = np.zeros(good.shape)
@@ -447,13 +450,13 @@ class Smoothed(NamedTuple):
 
     report: SmoothingReport
     band: Doubles
-    band_lam: Any
-    sigma: Any
+    band_lam: Number
+    sigma: Number
     between: bool
     posterior: Posterior | None = None
     penalty: str = "acceleration"
 
-    def map(self, function: Any) -> Smoothed:
+    def map(self, function: Callable[[Any], Any]) -> Smoothed:
         """Apply a function to all arrays, such as the selection of some curves."""
         return self._replace(
             report=self.report.map(function),
@@ -462,6 +465,26 @@ class Smoothed(NamedTuple):
             sigma=function(self.sigma),
             posterior=self.posterior and self.posterior.map(function),
         )
+
+
+class SmoothedSpline(Protocol):
+    """What the audit and the bands in gaps read of a smoothing spline."""
+
+    _noisy: SmoothingData
+    _smoothed: list[Smoothed]
+    _curve: CurveArrays
+
+    @property
+    def space(self) -> AnySpace: ...
+
+    @property
+    def _bc_type(self) -> BCType: ...
+
+    def _knots_of(self, index: tuple[int, ...]) -> Doubles: ...
+
+    def _posterior(self, part: Smoothed) -> Posterior: ...
+
+    def _plain_spread(self, number: int, index: tuple[int, ...], x: Doubles, nu: int) -> Doubles: ...
 
 
 class SolverOptions(NamedTuple):
@@ -476,7 +499,7 @@ class SolverOptions(NamedTuple):
     raise_lam: bool
 
 
-class Found(NamedTuple):
+class SmoothCurves(NamedTuple):
     """Smooth curves in one space.
 
     Attributes
@@ -500,10 +523,10 @@ class Found(NamedTuple):
     rejected: NDArray[np.int_]
     minima: NDArray[np.int_]
 
-    def map(self, function: Any) -> Found:
+    def map(self, function: Callable[[Array], Array]) -> SmoothCurves:
         """Apply a function to all arrays, such as one that adds masked curves."""
         columns = map(function, (self.selection, self.rejected, self.minima))
-        return Found(function(self.points), self.smoothed.map(function), self.states, *columns)
+        return SmoothCurves(function(self.points), self.smoothed.map(function), self.states, *columns)
 
 
 def smoothed(
@@ -513,7 +536,7 @@ def smoothed(
     options: SolverOptions,
     between: bool,
     progress: Progress | None,
-) -> list[Found]:
+) -> list[SmoothCurves]:
     """Compute the points of smooth curves at the knots in every space in which data are smoothed."""
     batch, t, at = noisy.batch, np.ascontiguousarray(noisy.times), np.ascontiguousarray(knots.times)
     how = *options[:3], parts[0].noise.loss, *options[3:], progress
@@ -528,31 +551,31 @@ def smoothed(
         y = np.ascontiguousarray(small._as_doubles(points))
         inside.append((small, span))
         factors.append((small._handle, y, noise.weights, matrices, part.lam, noise.sigma, ends, None))
-    found = []
+    results = []
     for part, (small, span), factor, raw in zip(
         parts, inside, factors, _core.smooth(factors, t, at, *how), strict=True
     ):
 
-        def solve(lam: Doubles, start: Doubles, factor: Any = factor) -> Raw:
+        def solve(lam: Doubles, start: Doubles, factor: _core._Smoothable = factor) -> Raw:
             return Raw.of(_core.smooth([(*factor[:4], lam, *factor[5:7], start)], t, at, *how)[0])
 
         points = small._numbers(factor[1])
-        samples = Samples(t, points, part.noise.weights, at, len(small.point_shape), part.ends is None)
+        samples = Samples(t, points, part.noise.weights, at, len(small._point_shape), part.ends is None)
         best, minima = best_of_starts(small, samples, part.lam, Raw.of(raw), solve)
-        found.append(_found(part, noisy, options, between, small, span, best, minima))
-    return found
+        results.append(_smooth_curves(part, noisy, options, between, small, span, best, minima))
+    return results
 
 
-def _found(
+def _smooth_curves(
     part: Part,
     noisy: SmoothingData,
     options: SolverOptions,
     between: bool,
     small: Space,
-    span: Any,
+    span: Span | None,
     raw: Raw,
     minima: NDArray[np.int_],
-) -> Found:
+) -> SmoothCurves:
     batch, sigma = noisy.batch, part.noise.sigma
     columns = [*raw.columns, np.where(np.isnan(sigma), raw.columns.sigma, sigma)]
     shaped = [x.reshape(batch) for x in columns] if batch else [x[0].item() for x in columns]
@@ -565,25 +588,27 @@ def _found(
     # Coordinates in a span of lower dimension are not those of the space.
     posterior = Posterior.of(matrix, turn, size) if span is None or size == 1 else None
     result = Smoothed(report, raw.band, band_lam, scale, between, posterior, options.penalty)
-    return Found(numbers if span is None else span.embed(numbers), result, raw.columns.state, *kinds)
+    return SmoothCurves(numbers if span is None else span.embed(numbers), result, raw.columns.state, *kinds)
 
 
 def faults_of(
-    parts: list[Part], found: list[Found], noisy: SmoothingData, knots: int, options: SolverOptions
+    parts: list[Part], results: list[SmoothCurves], noisy: SmoothingData, knots: int, options: SolverOptions
 ) -> list[Fault]:
     """Return the faults of the curves that failed, with their messages, in the first part in which some failed."""
-    for part, own in zip(parts, found, strict=True):
-        if own.states.any():
+    for part, result in zip(parts, results, strict=True):
+        if result.states.any():
             return [
-                Fault(number, UNCONVERGED, _reason(own, number, part.noise, noisy, knots, options))
-                for number in np.flatnonzero(own.states).tolist()
+                Fault(number, UNCONVERGED, _reason(result, number, part.noise, noisy, knots, options))
+                for number in np.flatnonzero(result.states).tolist()
             ]
     return []
 
 
-def _reason(found: Found, number: int, noise: Noise, noisy: SmoothingData, knots: int, options: SolverOptions) -> str:
+def _reason(
+    result: SmoothCurves, number: int, noise: Noise, noisy: SmoothingData, knots: int, options: SolverOptions
+) -> str:
     """Return the message about a curve that failed."""
-    state, report = found.states[number], found.smoothed.report
+    state, report = result.states[number], result.smoothed.report
     if state == NO_CURVE:
         return (
             "The smoothing{of} led to points that no spline joins: the curve turns too far between two knots. Pass "
@@ -627,8 +652,8 @@ def _reason(found: Found, number: int, noise: Noise, noisy: SmoothingData, knots
 def _longest_gap(number: int, noisy: SmoothingData, noise: Noise) -> str:
     """Describe the longest gap between the data of a curve, if it is far longer than most."""
     t, times, weights = (
-        np.broadcast_to(own, (*noisy.batch, own.shape[-1])).reshape(-1, own.shape[-1])[number]
-        for own in (noisy.t, noisy.times, noise.weights)
+        np.broadcast_to(array, (*noisy.batch, array.shape[-1])).reshape(-1, array.shape[-1])[number]
+        for array in (noisy.t, noisy.times, noise.weights)
     )
     t = t[weights > 0]
     different, index = np.unique(times[weights > 0], return_index=True)
@@ -673,7 +698,7 @@ class Raw(NamedTuple):
     system: tuple[Doubles, Doubles, int]
 
     @classmethod
-    def of(cls, result: tuple[Doubles, Doubles, tuple[NDArray[Any], ...], tuple[Doubles, Doubles, int]]) -> Raw:
+    def of(cls, result: tuple[Doubles, Doubles, tuple[Array, ...], tuple[Doubles, Doubles, int]]) -> Raw:
         """Return the results of one call of the core."""
         points, band, columns, system = result
         return cls(points, band, Columns(*columns), system)
@@ -690,9 +715,9 @@ class Raw(NamedTuple):
         if not chosen.any():
             return self
 
-        def pick(own: Any, its: Any) -> Any:
-            flat = own.reshape(len(chosen), -1), its.reshape(len(chosen), -1)
-            return np.where(chosen[:, None], flat[1], flat[0]).reshape(own.shape)
+        def pick(these: Array, those: Array) -> Array:
+            flat = these.reshape(len(chosen), -1), those.reshape(len(chosen), -1)
+            return np.where(chosen[:, None], flat[1], flat[0]).reshape(these.shape)
 
         columns = Columns(*map(pick, self.columns, other.columns))
         matrix, turn = map(pick, self.system[:2], other.system[:2])
@@ -778,28 +803,27 @@ def _apart(space: Space, p: Doubles, q: Doubles) -> Doubles:
     """Return the largest distance between two curves at their knots."""
     a, b = space._numbers(p), space._numbers(q)
     good = space._where_finite(a) & space._where_finite(b)
-    found = np.zeros(good.shape)
-    found[good] = space._apply("distance", p=a[good], q=b[good])
-    found[~np.isfinite(found)] = space.injectivity_radius
-    rows = found.reshape(-1, p.shape[found.ndim - 1])
+    distances = np.zeros(good.shape)
+    distances[good] = space._apply("distance", p=a[good], q=b[good])
+    distances[~np.isfinite(distances)] = space.injectivity_radius
+    rows = distances.reshape(-1, p.shape[distances.ndim - 1])
     return np.asarray(rows.max(axis=-1))
 
 
 def _median_steps(space: Space, data: Samples) -> Doubles:
     """Return the median step of every curve, as a fraction of the distance to the cut locus."""
-    points, axis = data.points, data.points.ndim - data.axes - 1
-    neighbours = [np.ascontiguousarray(own) for own in space._neighbours(space._as_doubles(points))]
-    rows = space._handle.apply("cut_fraction", neighbours).reshape(-1, points.shape[axis] - 1)
+    fractions = cut_fractions_in_core(space, data.points)
+    rows = fractions.reshape(-1, fractions.shape[-1])
     if data.weights.all() and np.isfinite(rows).all():
         return np.asarray(np.median(rows, axis=-1))
-    weights = np.broadcast_to(data.weights, (*points.shape[:axis], data.weights.shape[-1]))
+    weights = np.broadcast_to(data.weights, (*fractions.shape[:-1], data.weights.shape[-1]))
     used = weights.reshape(len(rows), -1) > 0
     rows = np.where(used[:, 1:] & used[:, :-1], rows, np.nan)
     known = np.isfinite(rows).any(axis=-1)
-    found = np.zeros(len(rows))
+    medians = np.zeros(len(rows))
     if known.any():
-        found[known] = np.nanmedian(rows[known], axis=-1)
-    return found
+        medians[known] = np.nanmedian(rows[known], axis=-1)
+    return medians
 
 
 # ---- consecutive data that are far apart ----
@@ -826,8 +850,8 @@ def _fast_starts(space: Space, data: Samples) -> Iterator[Doubles]:
         slow = np.ascontiguousarray(np.where(fixed, back @ data.points, data.points @ back))
         smooth = _linear(space, data, space._as_doubles(slow), np.full(len(flat), np.nan))
         if smooth is not None:
-            found, turn = space._numbers(smooth), space._numbers(at_knots(turns))
-            whole = np.ascontiguousarray(np.where(fixed, turn @ found, found @ turn))
+            turned, turn = space._numbers(smooth), space._numbers(at_knots(turns))
+            whole = np.ascontiguousarray(np.where(fixed, turn @ turned, turned @ turn))
             yield np.ascontiguousarray(space._as_doubles(whole))
 
 
@@ -835,8 +859,8 @@ def _nearest(data: Samples) -> NDArray[np.intp]:
     """Return the index of the datum nearest to each knot, one row per curve, or one row if all have the same times."""
     times, knots = (x.reshape(-1, x.shape[-1]) for x in (data.times, data.knots))
     curves = max(len(times), len(knots))
-    each = zip(*(np.broadcast_to(x, (curves, x.shape[1])) for x in (times, knots)), strict=True)
-    after = np.stack([np.clip(np.searchsorted(t, at), 1, len(t) - 1) for t, at in each])
+    pairs = zip(*(np.broadcast_to(x, (curves, x.shape[1])) for x in (times, knots)), strict=True)
+    after = np.stack([np.clip(np.searchsorted(t, at), 1, len(t) - 1) for t, at in pairs])
     t = np.broadcast_to(times, (curves, times.shape[1]))
     before, behind = (np.take_along_axis(t, index, axis=-1) for index in (after - 1, after))
     return np.where(knots - before < behind - knots, after - 1, after)
@@ -861,10 +885,10 @@ def _embedded_start(space: Space, data: Samples, lam: Doubles) -> Doubles | None
     flat = np.ascontiguousarray(inside).view(np.float64).reshape(*lead, -1)
     if flat.shape[-1] > _WIDE:
         return None
-    found = _linear(Euclidean(flat.shape[-1]), data, np.ascontiguousarray(flat), lam)
-    if found is None:
+    smooth = _linear(Euclidean(flat.shape[-1]), data, np.ascontiguousarray(flat), lam)
+    if smooth is None:
         return None
-    near = np.ascontiguousarray(found).view(inside.dtype).reshape(*found.shape[:-1], *inside.shape[len(lead) :])
+    near = np.ascontiguousarray(smooth).view(inside.dtype).reshape(*smooth.shape[:-1], *inside.shape[len(lead) :])
     return np.ascontiguousarray(space._as_doubles(np.ascontiguousarray(_projected(space, near))))
 
 
@@ -887,5 +911,5 @@ def _linear(space: Space, data: Samples, points: Doubles, lam: Doubles) -> Doubl
     sigma, closed = np.full(lam.size, np.nan), None if data.closed else [("natural", None)] * 2
     options = "gcv", 1.4, "acceleration", "linear", "auto", 1e-2, 50, False
     factor = space._handle, points, data.weights, None, lam, sigma, closed, None
-    found = _core.smooth([factor], data.times, data.knots, *options, None)[0][0]
-    return found if np.isfinite(found).all() else None
+    smooth = _core.smooth([factor], data.times, data.knots, *options, None)[0][0]
+    return smooth if np.isfinite(smooth).all() else None

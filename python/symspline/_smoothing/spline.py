@@ -9,7 +9,6 @@ from operator import itemgetter
 from typing import TYPE_CHECKING, Any, Concatenate, Generic, ParamSpec, Self, overload
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .. import _core
 from .._base.arrays import checked_flag, checked_number, one_of, short_repr, whole_number
@@ -19,7 +18,7 @@ from .._core import ValidationError
 from .._curves.curve import CurveArrays, SidePanel, UncertaintyBand
 from .._curves.ends import end_kinds, is_closed
 from .._curves.options import order_of
-from .._spaces import Doubles, Product, Space, SpecialOrthogonal, factors_of, short_name
+from .._spaces import AnySpace, Doubles, Product, Space, SpecialOrthogonal, factors_of, short_name
 from .._splines.archive import (
     Entries,
     Stored,
@@ -50,14 +49,14 @@ if TYPE_CHECKING:
         def __init__(self, get: Callable[[Any], Number | tuple[Number, ...]]) -> None: ...
 
         @overload
-        def __get__(self, spline: SmoothingSpline[Any, SmoothingReport], owner: Any = None) -> Number: ...
+        def __get__(self, spline: SmoothingSpline[Any, SmoothingReport], owner: object = None) -> Number: ...
 
         @overload
         def __get__(
-            self, spline: SmoothingSpline[Any, tuple[SmoothingReport, ...]], owner: Any = None
+            self, spline: SmoothingSpline[Any, tuple[SmoothingReport, ...]], owner: object = None
         ) -> tuple[Number, ...]: ...
 
-        def __get__(self, spline: SmoothingSpline[Any, Any], owner: Any = None) -> Any: ...
+        def __get__(self, spline: AnySmoothingSpline, owner: object = None) -> Any: ...
 
     Q = ParamSpec("Q")
 
@@ -68,15 +67,15 @@ if TYPE_CHECKING:
 
         @overload
         def __get__(
-            self, spline: SmoothingSpline[Any, SmoothingReport], owner: Any = None
+            self, spline: SmoothingSpline[Any, SmoothingReport], owner: object = None
         ) -> Callable[Q, FloatArray]: ...
 
         @overload
         def __get__(
-            self, spline: SmoothingSpline[Any, tuple[SmoothingReport, ...]], owner: Any = None
+            self, spline: SmoothingSpline[Any, tuple[SmoothingReport, ...]], owner: object = None
         ) -> Callable[Q, tuple[FloatArray, ...]]: ...
 
-        def __get__(self, spline: SmoothingSpline[Any, Any], owner: Any = None) -> Callable[Q, Any]: ...
+        def __get__(self, spline: AnySmoothingSpline, owner: object = None) -> Callable[Q, Any]: ...
 
 else:
     from typing import TypeVar
@@ -131,25 +130,25 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
     _smoothed: list[Smoothed]
     _warned_of: frozenset[str] = frozenset()
 
-    def _each(self, values: list[_T]) -> _T | tuple[_T, ...]:
+    def _per_space(self, values: list[_T]) -> _T | tuple[_T, ...]:
         """Return one value, or a tuple with one value per space in which data were smoothed."""
         return tuple(values) if is_several(self.space) else values[0]
 
-    def _in_factors(self, values: list[Any]) -> Any:
+    def _in_factors(self, values: list[Array]) -> Any:
         """Return one value, or a tuple with one value per factor."""
         return tuple(values) if isinstance(self.space, Product) else values[0]
 
     @property
     def report(self) -> R:
         """Report of the smoothing fit, a `SmoothingReport` or a tuple of them."""
-        reports: Any = self._each([part.report for part in self._smoothed])
+        reports: Any = self._per_space([part.report for part in self._smoothed])
         result: R = reports
         return result
 
     @noise_property
     def lam(self) -> Number | tuple[Number, ...]:
         """Weight λ of the bending energy."""
-        return self._each([part.report.lam for part in self._smoothed])
+        return self._per_space([part.report.lam for part in self._smoothed])
 
     @noise_property
     def df(self) -> Number | tuple[Number, ...]:
@@ -157,7 +156,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
 
         They are 2 for a geodesic, and the number of data for interpolation.
         """
-        return self._each([part.report.df for part in self._smoothed])
+        return self._per_space([part.report.df for part in self._smoothed])
 
     @noise_property
     def sigma(self) -> Number | tuple[Number, ...]:
@@ -166,7 +165,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         This is the given value, or else the estimate ``sqrt(sum(weights * distance**2) / (dim * (N - df)))``.
         Coordinates refer to an orthonormal frame.
         """
-        return self._each([part.sigma for part in self._smoothed])
+        return self._per_space([part.sigma for part in self._smoothed])
 
     @property
     def parameters(self) -> Mapping[str, Parameter]:
@@ -186,18 +185,18 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         """
         noisy = self._noisy
         at = self._curve.evaluate(noisy.times, "point", "raise", noisy.times.ndim > 1)
-        found = []
+        residuals_of_factors = []
         gammas = at if isinstance(self.space, Product) else (at,)
         for space, gamma, points, noise in zip(
             factors_of(self.space), gammas, noisy.points, grouped(self.space, noisy.noise), strict=True
         ):
-            counts = np.any([own.weights > 0 for own in noise], axis=0)
+            counts = np.any([noise_of_part.weights > 0 for noise_of_part in noise], axis=0)
             used = np.broadcast_to(counts, (*noisy.batch, points.shape[len(noisy.batch)]))
             used = used & space._where_finite(gamma)
             vectors = np.full(points.shape, np.nan, points.dtype)
             vectors[used] = space._apply("log", p=gamma[used], q=points[used])
-            found.append(vectors)
-        residuals: P = self._in_factors(found)
+            residuals_of_factors.append(vectors)
+        residuals: P = self._in_factors(residuals_of_factors)
         return residuals
 
     @property
@@ -225,13 +224,13 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         >>> round(gap.start), round(gap.stop), gap.factor > 2, float(after.stop)
         (25, 30, True, inf)
         """
-        found = []
+        gaps_of_parts = []
         for number in range(len(self._smoothed)):
-            own = np.empty(self._batch, object)
+            gaps_of_curves = np.empty(self._batch, object)
             for index in np.ndindex(self._batch):
-                own[index] = self._gaps_of(number, index)
-            found.append(own[()])
-        return self._each(found)
+                gaps_of_curves[index] = self._gaps_of(number, index)
+            gaps_of_parts.append(gaps_of_curves[()])
+        return self._per_space(gaps_of_parts)
 
     def _gaps_of(self, number: int, index: tuple[int, ...]) -> list[Gap]:
         known = self._calibrations[number, index]
@@ -242,23 +241,23 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         for place in index:
             axis = axis.take_batch(place)
         every = [*before, *known.gaps, *after]
-        ends = np.array([own[:2] for own in every]).reshape(-1, 2)
+        ends = np.array([gap[:2] for gap in every]).reshape(-1, 2)
         # Dates have no infinite times.
         times = axis.shown(np.where(np.isinf(ends), np.nan, ends), ())
         if not axis.dates:
             times = np.where(np.isinf(ends), ends, times)
-        return [Gap(start, stop, *own[2:]) for (start, stop), own in zip(times, every, strict=True)]
+        return [Gap(start, stop, *gap[2:]) for (start, stop), gap in zip(times, every, strict=True)]
 
     @cached_property
     def _calibrations(self) -> dict[tuple[int, tuple[int, ...]], Calibration | None]:
         """Calibrations of the variances in gaps, by part and index of the curve."""
-        found = {}
+        calibrations = {}
         for index in np.ndindex(self._batch):
-            one: SmoothingSpline[Any, Any] = self
+            one: AnySmoothingSpline = self
             for place in index:
                 one = one[place]
-            found.update({(number, index): one._calibration_of(number) for number in range(len(self._smoothed))})
-        return found
+            calibrations.update({(number, index): one._calibration_of(number) for number in range(len(self._smoothed))})
+        return calibrations
 
     def _calibration_of(self, number: int) -> Calibration | None:
         return calibration_of(self, number)
@@ -361,7 +360,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         nu, calibrated = order_of(nu, 1), checked_flag(calibrated, "calibrated")
         times, _, per_curve = self._finite_times(x)
         spreads = [partial(self._spread, number, nu=nu, calibrated=calibrated) for number in range(len(self._smoothed))]
-        return self._each([self._per_curve(times, per_curve, spread)[()] for spread in spreads])
+        return self._per_space([self._per_curve(times, per_curve, spread)[()] for spread in spreads])
 
     def _per_curve(
         self,
@@ -369,7 +368,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         per_curve: bool,
         value: Callable[..., Array],
         tail: tuple[int, ...] = (),
-        dtype: Any = None,
+        dtype: np.dtype[np.float64] | np.dtype[np.complex128] | None = None,
     ) -> Array:
         """Return the values of a function of the index of each curve and of times of the core, with the shape of times.
 
@@ -467,11 +466,11 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         np.float64(1.96)
         """
         level = checked_number(level, "level must lie between 0 and 1", lambda x: 0 < x < 1)
-        whole: SmoothingSpline[Any, Any] = self
+        whole: AnySmoothingSpline = self
         spreads = whole.std(x, calibrated=calibrated)
-        each = spreads if is_several(self.space) else (spreads,)
-        return self._each(
-            [radius(part, level) * spread for part, spread in zip(smoothed_spaces(self.space), each, strict=True)]
+        of_parts = spreads if is_several(self.space) else (spreads,)
+        return self._per_space(
+            [radius(part, level) * spread for part, spread in zip(smoothed_spaces(self.space), of_parts, strict=True)]
         )
 
     @noise_method
@@ -541,15 +540,15 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
 
         def covariance(number: int, index: tuple[int, ...], at: Doubles) -> Doubles:
             to = None if other is None else np.ravel(other[index] if per_curve else other)
-            found = self._covariance(number, index, at, to, orders, to is None and len(orders) == 1)
-            return self._inflated([number], index, at, to, orders, found) if calibrated else found
+            posterior = self._covariance(number, index, at, to, orders, to is None and len(orders) == 1)
+            return self._inflated([number], index, at, to, orders, posterior) if calibrated else posterior
 
         tails = [2 * (len(orders) * space.dim,) for space in smoothed_spaces(self.space)]
-        each = [self._per_curve(x, per_curve, partial(covariance, i), tail) for i, tail in enumerate(tails)]
-        return self._each(each)
+        covariances = [self._per_curve(x, per_curve, partial(covariance, i), tail) for i, tail in enumerate(tails)]
+        return self._per_space(covariances)
 
     def _covariance(
-        self, number: int, index: tuple[int, ...], x: Any, y: Any, orders: list[int], between: bool
+        self, number: int, index: tuple[int, ...], x: Doubles, y: Doubles | None, orders: list[int], between: bool
     ) -> Doubles:
         """Return the covariance of one part; `between` adds variances of points and velocities between the knots."""
         part, space, kinds = self._smoothed[number], smoothed_spaces(self.space)[number], end_kinds(self._bc_type)
@@ -560,27 +559,35 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         return np.asarray(np.asarray(part.sigma)[index].item() ** 2 * whole)
 
     def _inflated(
-        self, parts: list[int], index: tuple[int, ...], x: Doubles, y: Any, orders: list[int], covariance: Doubles
+        self,
+        parts: list[int],
+        index: tuple[int, ...],
+        x: Doubles,
+        y: Doubles | None,
+        orders: list[int],
+        covariance: Doubles,
     ) -> Doubles:
         """Multiply covariances by the calibration factors of both times; accelerations have those of velocities."""
         spaces = smoothed_spaces(self.space)
 
         def factors(at: Doubles) -> Doubles:
-            each = [
+            of_coordinates = [
                 np.repeat(self._inflation(number, index, at, min(nu, 1))[:, None], spaces[number].dim, axis=1)
                 for nu in orders
                 for number in parts
             ]
-            return np.concatenate(each, axis=1)
+            return np.concatenate(of_coordinates, axis=1)
 
         left = factors(x)
         right = left if y is None else factors(y)
         return np.asarray(left[:, :, None] * covariance * right[:, None])
 
-    def _add_between(self, number: int, index: tuple[int, ...], x: Doubles, orders: list[int], found: Doubles) -> None:
+    def _add_between(
+        self, number: int, index: tuple[int, ...], x: Doubles, orders: list[int], covariance: Doubles
+    ) -> None:
         """Add the variance between the knots to covariances of points and velocities, for noise of variance one.
 
-        The shape of ``found`` is ``(len(x), len(orders), m, len(orders), m)``.
+        The shape of `covariance` is ``(len(x), len(orders), m, len(orders), m)``.
         """
         part, knots, kinds = self._smoothed[number], self._knots_of(index), end_kinds(self._bc_type)
         lam = np.atleast_1d(np.asarray(part.band_lam)[index])
@@ -590,11 +597,13 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
                 continue
             if part.penalty == "jerk":
                 root = np.sqrt(self._ratio(number, index, x, nu))[:, None, None, None]
-                found[:, i] *= root
-                found[:, :, :, i] *= root
+                covariance[:, i] *= root
+                covariance[:, :, :, i] *= root
                 continue
-            own, plain = (_core.smoothing_variance(knots, band, each, x, nu, kinds) for each in (lam, np.zeros(1)))
-            found[:, i, :, i] += (own - plain)[:, None, None] * np.eye(found.shape[-1])
+            process, plain = (
+                _core.smoothing_variance(knots, band, weight, x, nu, kinds) for weight in (lam, np.zeros(1))
+            )
+            covariance[:, i, :, i] += (process - plain)[:, None, None] * np.eye(covariance.shape[-1])
 
     def _coupled(self, parts: list[int], index: tuple[int, ...], x: Doubles, orders: list[int]) -> Doubles:
         """Return the covariance of derivatives in several parts at times x, for the propagation of errors.
@@ -615,8 +624,8 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         whole = np.zeros((len(x), count, size, count, size))
         for number, start, end in zip(parts, ends[:-1], ends[1:], strict=True):
             shape = len(x), count, int(end - start), count, int(end - start)
-            own = self._covariance(number, index, x, None, orders, True)
-            whole[:, :, start:end, :, start:end] = own.reshape(shape)
+            of_part = self._covariance(number, index, x, None, orders, True)
+            whole[:, :, start:end, :, start:end] = of_part.reshape(shape)
         return self._inflated(parts, index, x, None, orders, whole.reshape(len(x), count * size, count * size))
 
     def _posterior(self, part: Smoothed) -> Posterior:
@@ -675,7 +684,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         (2, 2, 3)
         """
         times, _, per_curve = self._finite_times(x)
-        return self._each([frames for _, frames in self._frames(times, per_curve)])
+        return self._per_space([frames for _, frames in self._frames(times, per_curve)])
 
     def _frames(self, times: Doubles, per_curve: bool) -> list[tuple[Array, Array]]:
         """Return points and frames along the curve in every part, at times of the core."""
@@ -683,20 +692,20 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         def frames(space: Space, points: Array, p: Array, index: tuple[int, ...], at: Doubles) -> Array:
             return frames_at(space, self._knots_of(index), points[index], at, p[index].reshape(-1, *space.point_shape))
 
-        found = []
+        frames_of_parts = []
         for part in self._in_parts(times, per_curve):
             space, _, p = part
             tail = (space.dim, *space.point_shape)
-            found.append((p, self._per_curve(times, per_curve, partial(frames, *part), tail, space.dtype)))
-        return found
+            frames_of_parts.append((p, self._per_curve(times, per_curve, partial(frames, *part), tail, space.dtype)))
+        return frames_of_parts
 
     def _in_parts(self, times: Doubles, per_curve: bool) -> list[tuple[Space, Array, Array]]:
         """Return every space in which data were smoothed, the points at the knots, and those at times of the core."""
-        found: list[tuple[Space, Array, Array]] = []
+        parts: list[tuple[Space, Array, Array]] = []
         for factor, curve in zip(factors_of(self.space), self._curve.parts, strict=True):
             values = curve.evaluate(times, "point", "raise", per_curve)
-            found += zip(parts_of_factor(factor), split(factor, curve.points), split(factor, values), strict=True)
-        return found
+            parts += zip(parts_of_factor(factor), split(factor, curve.points), split(factor, values), strict=True)
+        return parts
 
     def sample(self, rng: np.random.Generator, n: int) -> CubicSpline[P]:
         """Draw curves from the posterior distribution.
@@ -769,10 +778,10 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
                     # Curves that failed or are masked have no posterior.
                     out[(slice(None), *index)], valid[index] = np.nan, False
                     continue
-                own = drawn[key][..., first : first + space.dim] * np.asarray(part.sigma)[index].item()
-                own = own * self._inflation(number, index, knots, 0)[:, None]
+                coordinates = drawn[key][..., first : first + space.dim] * np.asarray(part.sigma)[index].item()
+                coordinates = coordinates * self._inflation(number, index, knots, 0)[:, None]
                 frames = frames_at(space, knots, points, knots, points)
-                vectors = np.einsum("nkj,kj...->nk...", own, frames)
+                vectors = np.einsum("nkj,kj...->nk...", coordinates, frames)
                 out[(slice(None), *index)] = space.project(space._apply("exp", p=points, v=vectors))
             if kinds is None:
                 axis = len(self._batch) + 1
@@ -793,9 +802,9 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         factors = f" ({spaces})" if 1 < len(self._smoothed) <= _OWN_RANGES else ""
         df = _ranges([part.report.df for part in self._smoothed], 3)
         sigma = _ranges([part.sigma * (radius or 1) for part in self._smoothed], 3 if radius else 2)
-        each = " each" if self._batch else ""
+        of_batch = " each" if self._batch else ""
         unit = " m" if radius else ""
-        return f"{count} data{each}, {df} degrees of freedom, noise {sigma}{unit}{factors}"
+        return f"{count} data{of_batch}, {df} degrees of freedom, noise {sigma}{unit}{factors}"
 
     def _noise_beside(self, index: tuple[int, ...], x: Doubles) -> UncertaintyBand:
         noisy = self._noisy.map(itemgetter(index), ())
@@ -815,8 +824,8 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
     def _panels_below(self, x: Doubles) -> list[SidePanel]:
         return [
             SidePanel(f"95 % band\nof {part}{', rad' if part in _TURNING else ''}", x, values[:, None], factor=number)
-            for number, own in enumerate([] if self._batch else self._radii((), x))
-            for part, values in own
+            for number, radii in enumerate([] if self._batch else self._radii((), x))
+            for part, values in radii
         ]
 
     @property
@@ -830,10 +839,10 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         return self._like(part, noisy, [part.map(pick) for part in self._smoothed])
 
     @property
-    def _parts(self) -> tuple[SmoothingSpline[Any, Any], ...]:
+    def _parts(self) -> tuple[AnySmoothingSpline, ...]:
         """Splines in the factors of a product."""
         noisy = self._noisy
-        each = zip(
+        factors = zip(
             super()._parts,
             noisy.points,
             grouped(self.space, noisy.noise),
@@ -842,15 +851,19 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         )
         return tuple(
             self._like(part, noisy._replace(points=[points], noise=noise), smoothed)
-            for part, points, noise, smoothed in each
+            for part, points, noise, smoothed in factors
         )
 
     @classmethod
     def _like(cls, spline: CubicSpline[Any, Any], noisy: SmoothingData, smoothed: list[Smoothed]) -> Self:
         """Return a smoothing spline from a spline through the smooth points and the properties of the noise."""
-        self = cls._fitted(
+        curve = cls._fitted(
             spline._time_axis, spline._t, spline._curve, spline._bc_type, spline._extrapolate, spline._reports
         )
+        return curve._with_noise(noisy, smoothed)
+
+    def _with_noise(self, noisy: SmoothingData, smoothed: list[Smoothed]) -> Self:
+        """Set the data and the properties of the noise of a new spline, and return it."""
         self._noisy, self._smoothed = noisy, smoothed
         return self
 
@@ -861,8 +874,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
     def _from_state(cls, state: Entries) -> Self:
         time_axis, t = read_times(state, "data_t")
         self = cls._fitted(*read_fitted(state, time_axis))
-        self._noisy, self._smoothed = read_noise(state, time_axis, t, self._curve, is_closed(self._bc_type))
-        return self
+        return self._with_noise(*read_noise(state, time_axis, t, self._curve, is_closed(self._bc_type)))
 
     def __repr__(self) -> str:
         data, knots = self._noisy.times.shape[-1], self._times.shape[-1]
@@ -870,12 +882,16 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         return f"<SmoothingSpline on {self.space!r}: {text}>"
 
 
+AnySmoothingSpline = SmoothingSpline[Any, Any]
+"""A smoothing spline with points and reports of any type."""
+
+
 def radius(space: Space, level: float) -> float:
     """Return the radius of the ball that contains a normal vector with this probability, in standard deviations."""
     return float(np.sqrt(_core.chi_squared(space.dim, level)))
 
 
-def _ranges(factors: list[Any], digits: int) -> str:
+def _ranges(factors: list[Number], digits: int) -> str:
     """Return the range of a number for every factor, or one range for all if there are many factors."""
     if len(factors) > _OWN_RANGES:
         factors = [np.concatenate([np.ravel(values) for values in factors])]
@@ -892,29 +908,29 @@ def _range(values: Doubles, digits: int) -> str:
 # ---- the noisy data of smoothing splines in files and pickles ----
 
 
-def noise_state(space: Space[Any], noisy: SmoothingData, smoothed: list[Smoothed]) -> dict[str, Any]:
+def noise_state(space: AnySpace, noisy: SmoothingData, smoothed: list[Smoothed]) -> dict[str, Any]:
     """Return the entries of a smoothing spline in addition to those of a `CubicSpline`."""
     state: dict[str, Any] = {
         **times_state("data_t", noisy.t, noisy.time_axis),
         "noise": [
-            vars(own.report)
-            | {"band_lam": own.band_lam, "scale": own.sigma, "between": own.between}
-            | {"penalty": own.penalty, "loss": noise.loss}
+            vars(of_part.report)
+            | {"band_lam": of_part.band_lam, "scale": of_part.sigma, "between": of_part.between}
+            | {"penalty": of_part.penalty, "loss": noise.loss}
             # Version 1 has no matrices.
-            | ({} if own.posterior is None else {"posterior": True})
-            for noise, own in zip(noisy.noise, smoothed, strict=True)
+            | ({} if of_part.posterior is None else {"posterior": True})
+            for noise, of_part in zip(noisy.noise, smoothed, strict=True)
         ],
     }
     first, *others = noisy.noise
-    alike = all(np.array_equal(first.weights, own.weights) for own in others)
+    alike = all(np.array_equal(first.weights, of_part.weights) for of_part in others)
     if alike:
         state["data_weights"] = first.weights
     state |= {"data" + suffix_of(space, i): points for i, points in enumerate(noisy.points)}
-    for i, (noise, own) in enumerate(zip(noisy.noise, smoothed, strict=True)):
+    for i, (noise, of_part) in enumerate(zip(noisy.noise, smoothed, strict=True)):
         suffix = _suffix(space, i)
-        state["band" + suffix] = own.band
-        if own.posterior is not None:
-            state |= posterior_state(own.posterior, suffix, noisy.batch)
+        state["band" + suffix] = of_part.band
+        if of_part.posterior is not None:
+            state |= posterior_state(of_part.posterior, suffix, noisy.batch)
         if not alike:
             state["data_weights" + suffix] = noise.weights
         if noise.information is not None:
@@ -939,7 +955,7 @@ def _suffix(space: Space, i: int) -> str:
 
 
 def read_noise(
-    state: Entries, time_axis: TimeAxis, t: NDArray[Any], curve: CurveArrays, closed: bool
+    state: Entries, time_axis: TimeAxis, t: Array, curve: CurveArrays, closed: bool
 ) -> tuple[SmoothingData, list[Smoothed]]:
     """Return the data of a curve and the results of the smoothing.
 
@@ -970,7 +986,7 @@ def read_noise(
             raise ValidationError("the times of the data are not finite, or decrease")
         if np.any(times[..., 0] < curve.times[..., 0]) or np.any(times[..., -1] > curve.times[..., -1]):
             raise ValidationError("there are data before the first or after the last knot")
-    points = [read_array(state, "data" + suffix_of(space, i), own) for i, own in enumerate(factors_of(space))]
+    points = [read_array(state, "data" + suffix_of(space, i), factor) for i, factor in enumerate(factors_of(space))]
     for part, rows in zip(curve.parts, points, strict=True):
         if rows.shape != (*batch, count, *part.space.point_shape):
             raise ValidationError(f"entry 'data': the data have shape {rows.shape}")
@@ -979,13 +995,13 @@ def read_noise(
             part.space.check_point(rows[part.space._where_finite(part.points).all(axis=-1)])
     noise, smoothed = [], []
     with entry("noise"):
-        for i, (own, numbers) in enumerate(zip(smoothed_spaces(space), state["noise"], strict=True)):
+        for i, (space_of_part, numbers) in enumerate(zip(smoothed_spaces(space), state["noise"], strict=True)):
             suffix = _suffix(space, i)
             weights = state["data_weights" + (suffix if "data_weights" + suffix in state else "")]
             information = state.get("data_information" + suffix)
             _check("weights", weights, (count,), (*batch, count))
             if information is not None:
-                shape = (count, own.dim, own.dim)
+                shape = (count, space_of_part.dim, space_of_part.dim)
                 _check("information matrices", information, shape, batch + shape)
             if not (weights >= 0).all():
                 raise ValidationError("the weights must be numbers >= 0")
@@ -1003,13 +1019,13 @@ def read_noise(
             _check("bands", band, (*batch, knots + (2 if closed else 0), 4), finite=good)
             posterior = None
             if known:
-                posterior = read_posterior(state, suffix, own.dim, band.shape[-2], batch, closed, good)
+                posterior = read_posterior(state, suffix, space_of_part.dim, band.shape[-2], batch, closed, good)
             smoothed.append(Smoothed(report, band, lam, scale, between, posterior, penalty))
     return SmoothingData(time_axis, t, times, points, noise, batch), smoothed
 
 
 def read_posterior(
-    state: Entries, suffix: str, m: int, coefficients: int, batch: tuple[int, ...], closed: bool, good: Any
+    state: Entries, suffix: str, m: int, coefficients: int, batch: tuple[int, ...], closed: bool, good: Array
 ) -> Posterior:
     """Return the posterior of a curve with a number of coefficients, each of m coordinates."""
     matrix, turn = state["matrix" + suffix], state["turn" + suffix]
@@ -1019,13 +1035,13 @@ def read_posterior(
     shapes = (*batch, coefficients * size, 4 * size), (*batch, *(2 * (size if closed else 0,)))
     if math.prod(turn.shape) != math.prod(shapes[1]):
         raise ValidationError(f"the matrices have shape {turn.shape}")
-    matrix, turn = (own.reshape(shape) for own, shape in zip((matrix, turn), shapes, strict=True))
+    matrix, turn = (array.reshape(shape) for array, shape in zip((matrix, turn), shapes, strict=True))
     _check("matrices", matrix, shapes[0], finite=good)
     _check("matrices", turn, shapes[1], finite=good)
     return Posterior.of(matrix, turn, size)
 
 
-def _check(what: str, array: NDArray[Any], *shapes: tuple[int, ...], finite: Any = True) -> None:
+def _check(what: str, array: Array, *shapes: tuple[int, ...], finite: Array | bool = True) -> None:
     if array.dtype != np.float64 or array.shape not in shapes:
         raise ValidationError(f"the {what} are {array.dtype} of shape {array.shape}")
     if not np.isfinite(array[np.asarray(finite)]).all():

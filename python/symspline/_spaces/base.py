@@ -94,6 +94,8 @@ class Space(Generic[P]):
     _dtype: np.dtype[np.float64] | np.dtype[np.complex128]
     # Shape of the floating-point numbers of one point; a complex number is two.
     _doubles_shape: tuple[int, ...]
+    # The axes of a point among those of an array, counted from the last one.
+    _point_axes: tuple[int, ...]
 
     def __init__(self, *parameters: int) -> None:
         if not hasattr(type(self), "_name"):
@@ -118,6 +120,7 @@ class Space(Generic[P]):
         self._dtype = np.dtype(np.complex128) if self._complex else np.dtype(np.float64)
         *first, last = self._point_shape
         self._doubles_shape = (*first, 2 * last if self._complex else last)
+        self._point_axes = tuple(range(-len(self._point_shape), 0))
 
     # ---- properties ----
 
@@ -162,10 +165,10 @@ class Space(Generic[P]):
         return f"{type(self).__name__}({', '.join(map(str, self._parameters))})"
 
     def __eq__(self, other: object) -> bool:
-        return self is other or (type(self) is type(other) and str(self) == str(other))
+        return self is other or (isinstance(other, Space) and type(self) is type(other) and self._text == other._text)
 
     def __hash__(self) -> int:
-        return hash(str(self))
+        return hash(self._text)
 
     def __reduce__(self) -> tuple[object, ...]:
         return type(self), self._parameters
@@ -1079,9 +1082,6 @@ class Space(Generic[P]):
             return ""
         return f". A point is an array of one number: pass {name}[..., {', '.join(['None'] * len(self._point_shape))}]."
 
-    def _point_axes(self, array: Array) -> tuple[int, ...]:
-        return tuple(range(array.ndim - len(self.point_shape), array.ndim))
-
     def _neighbours(self, points: Array) -> tuple[Array, Array]:
         """Return the starts and the ends of the segments between points along the last of the leading axes."""
         index = (slice(None),) * (points.ndim - len(self._point_shape) - 1)
@@ -1089,7 +1089,7 @@ class Space(Generic[P]):
 
     def _where_finite(self, points: Array) -> NDArray[np.bool_]:
         """Return which points or vectors are finite."""
-        return np.asarray(np.isfinite(points).all(axis=self._point_axes(points)))
+        return np.asarray(np.isfinite(points).all(axis=self._point_axes))
 
     def _doubles(self, value: ArrayLike, name: str) -> NDArray[np.float64]:
         """Return points as contiguous floating-point numbers of the core.
@@ -1117,11 +1117,12 @@ class Space(Generic[P]):
 
     def _lead(self, array: NDArray[np.float64]) -> tuple[int, ...]:
         """Return the axes before those of a point."""
-        return array.shape[: array.ndim - len(self.point_shape)]
+        return array.shape[: array.ndim - len(self._point_shape)]
 
     def _leads(self, shapes: Mapping[str, tuple[int, ...]], further: tuple[int, ...] = ()) -> tuple[int, ...]:
         """Return the broadcast leading axes of arrays of points with these shapes."""
-        leads = {shape[: len(shape) - len(self.point_shape)] for shape in shapes.values()}
+        axes = len(self._point_shape)
+        leads = {shape[: len(shape) - axes] for shape in shapes.values()}
         if len(leads) == 1 and not further:
             return leads.pop()
         try:
@@ -1155,7 +1156,7 @@ class Space(Generic[P]):
 
     def _require_finite(self, operation: str, result: Array) -> Any:
         if not np.isfinite(result).all():
-            axes = () if operation in _NUMBERS else self._point_axes(result)
+            axes = () if operation in _NUMBERS else self._point_axes
             bad = np.argwhere(~np.isfinite(result).all(axis=axes))[0].tolist()
             raise ValidationError(
                 f"{operation} of row {bad or 0} is not finite: the input is not finite, is too large, or is not a "

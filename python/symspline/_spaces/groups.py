@@ -55,7 +55,8 @@ class SpecialOrthogonal(Group[FloatArray]):
         return np.tensordot(weights, points, 1)[None]
 
     def _array(self, value: Any, name: str) -> Array:
-        return super()._array(_matrices(value) if self.point_shape == (3, 3) else value, name)
+        convertible = type(value) is not np.ndarray and self._point_shape == (3, 3)
+        return super()._array(_matrices(value) if convertible else value, name)
 
     def _conversion(self, shape: tuple[int, ...], name: str) -> str:
         if self.point_shape != (3, 3):

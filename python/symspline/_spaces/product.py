@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from difflib import get_close_matches
-from functools import lru_cache, reduce
+from functools import cached_property, lru_cache, reduce
 from itertools import pairwise
 from typing import Any, TypeVar, overload
 
@@ -116,7 +116,8 @@ class Product(Space[PProduct]):
         """
         return tuple(f.dtype for f in self.factors)
 
-    def __str__(self) -> str:
+    @cached_property
+    def _text(self) -> str:
         return " x ".join(map(str, self.factors))
 
     def __repr__(self) -> str:

@@ -33,7 +33,7 @@ from .._curves.composed import call_at_times, check_increasing
 from .._curves.curve import CurveArrays
 from .._curves.failures import warn_of_representatives
 from .._curves.fit import Points, curve_of, hermite_data, read, read_ends, read_velocities, validated
-from .._curves.missing import counts_all_samples, curves_without_missing, missing_named, nodes_without_missing
+from .._curves.missing import counts_all_samples, curves_without_missing, nodes_without_missing, with_remedy
 from .._curves.options import check_progress, checked_extrapolate, extrapolation_mode, quantity_of, with_atol
 from .._curves.slopes import check_method, joined, jumps, local_velocities
 from .._spaces import POINT_TOL, AnySpace, Doubles, Product, Space, factors_of, parts_of, space_named
@@ -655,8 +655,10 @@ class _Nodes(NamedTuple):
     @contextmanager
     def explained(self) -> Iterator[None]:
         """Add to errors how missing points are omitted, and from when times count."""
-        with missing_named(self.data, self.times), self.time_axis.explained():
+        try:
             yield
+        except ValidationError as error:
+            raise with_remedy(self.time_axis.explain(error), self.data, self.times) from None
 
     def validated(self) -> list[Array]:
         """Return the points in each factor after validation."""

@@ -135,6 +135,7 @@ class Manifold(Space):
         self._complex = self._dtype == np.complex128
         *first, last = self._point_shape
         self._doubles_shape = (*first, 2 * last if self._complex else last)
+        self._point_axes = tuple(range(-len(self._point_shape), 0))
         self.operations: Operations = Operations(self)
         # The counterpart of the operations of the compiled core.
         self._handle: Any = self.operations

@@ -49,7 +49,7 @@ class Operations:
         """NaN where there is no logarithm."""
         logs = self._applied("log", partial(rows_or_nan, self._function("log")), (p, q))
         # Formulas that divide by the distance are undefined at equal points.
-        same = (p == q).all(axis=self.space._point_axes(p))
+        same = (p == q).all(axis=self.space._point_axes)
         if same.any():
             # A copy: logarithms of other libraries may be read-only arrays.
             logs = logs.copy()
