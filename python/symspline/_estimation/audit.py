@@ -12,7 +12,7 @@ from .._curves.ends import end_kinds
 from .._smoothing import SmoothingWarning
 from .._smoothing.audit import DEGREES, Residuals, Sensor, advice, corner_of, described, examine
 from .._smoothing.report import Posterior
-from .._spaces import Doubles
+from .._spaces import Array, Doubles
 from ..measure import GRAVITY
 from .problem import ForceTerm, FunctionTerm, PointTerm, RateTerm, Rows, Setup, Solution, Term
 
@@ -64,11 +64,11 @@ def examined(setup: Setup, solution: Solution) -> list[Sensor]:
     sensors = []
     leverages = _leverages(setup, solution)
     labels = [term.label for term in setup.terms]
-    for term, rows_of_term, (leverage, between) in zip(setup.terms, solution.rows, leverages, strict=True):
+    for term, term_rows, (leverage, between) in zip(setup.terms, solution.rows, leverages, strict=True):
         order = np.argsort(term.times, kind="stable")
-        rows = term.informative(rows_of_term.residuals)[order]
+        rows = term.informative(term_rows.residuals)[order]
         entries = max(1, int(np.isfinite(rows).sum()))
-        corner = corner_of(term.loss, rows_of_term.residuals.shape[1])
+        corner = corner_of(term.loss, term_rows.residuals.shape[1])
         exact = not isinstance(term, FunctionTerm)
         given = Residuals(rows, leverage / entries, between / entries, term.loss, corner, exact)
         name = f"{term.label} ({type(term.given).__name__})"
@@ -86,23 +86,19 @@ def _leverages(setup: Setup, solution: Solution) -> list[tuple[float, float]]:
     # The leverage is that of the curve for known parameters.
     posterior, kinds = Posterior.of(*solution.posterior[:3]), end_kinds(setup.bc_type)
     m, result = posterior.size, []
-    for term, rows_of_term in zip(setup.terms, solution.rows, strict=True):
-        orders = [nu for nu, jacobian in enumerate(rows_of_term.jacobians) if jacobian is not None]
+    for term, term_rows in zip(setup.terms, solution.rows, strict=True):
+        orders = [nu for nu, jacobian in enumerate(term_rows.jacobians) if jacobian is not None]
         n = len(term.times)
         order = np.argsort(term.times, kind="stable")
         some = np.unique(np.linspace(0, n - 1, min(n, _SAMPLE)).round().astype(int))
         x = np.clip(term.shifted_times(solution.values)[order], setup.knots[0], setup.knots[-1])
 
-        def rows(
-            at: NDArray[np.intp], orders: list[int], rows_of_term: Rows = rows_of_term, order: NDArray[np.intp] = order
-        ) -> Doubles:
-            jacobians: list[Any] = rows_of_term.jacobians
+        def rows(at: NDArray[np.intp], orders: list[int], term_rows: Rows = term_rows, order: Array = order) -> Doubles:
+            jacobians: list[Any] = term_rows.jacobians
             whole = np.concatenate([jacobians[nu][order[at]] for nu in orders], axis=-1)
-            return whole if rows_of_term.roots is None else whole * rows_of_term.roots[order[at], :, None]
+            return whole if term_rows.roots is None else whole * term_rows.roots[order[at], :, None]
 
-        def covariance(
-            at: NDArray[np.intp], orders: list[int], others: NDArray[np.intp] | None = None, x: Doubles = x
-        ) -> Doubles:
+        def covariance(at: NDArray[np.intp], orders: list[int], others: Array | None = None, x: Doubles = x) -> Doubles:
             there = None if others is None else np.ascontiguousarray(x[others])
             return posterior.coupled(setup.knots, (), kinds, np.ascontiguousarray(x[at]), there, orders, np.arange(m))
 

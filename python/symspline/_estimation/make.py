@@ -518,8 +518,7 @@ def _curve(
         ends.append(read_ends(setup.bc_type, factor, ())[0])
     through = fit(FitProblem(space, setup.knots, parts, ends, DEFAULTS, check=False))
     parameters = {
-        name: Parameter(solution.values[name], solution.covariance[index, index])
-        for name, index in setup.columns.items()
+        name: Parameter(solution.values[name], solution.covariance[at, at]) for name, at in setup.columns.items()
     }
     bc_type: Any = setup.bc_type
     fitted: EstimatedSpline[Any] = EstimatedSpline._fitted(axis, shown, through.curve, bc_type, policy, through)

@@ -200,9 +200,7 @@ class VelocityTerm(Term):
 
     sensor = "velocities"
 
-    def __init__(
-        self, label: str, given: Velocities, times: Doubles, part: int, space: Space, y: Array, v: Array
-    ) -> None:
+    def __init__(self, label: str, given: Velocities, times: Doubles, part: int, space: Space, y: Any, v: Any) -> None:
         super().__init__(label, given, times, [part])
         self.y = points_on(space, y, len(times), f"{label}.y")
         vectors = space._numbers(space._doubles(v, f"{label}.v"))
@@ -467,10 +465,8 @@ def _terms_of(measurement: Measurement, label: str, times: Doubles, space: AnySp
     if isinstance(measurement, Function):
         return [FunctionTerm(label, measurement, times, parts, [chosen, *spaces_of_parts])]
     if isinstance(measurement, SpecificForce):
-        turning = [
-            part for part, space_of_part in zip(parts, spaces_of_parts, strict=True) if space_of_part in (_SO3, _S3)
-        ]
-        moving = [part for part, space_of_part in zip(parts, spaces_of_parts, strict=True) if space_of_part == _R3]
+        turning = [part for part, one in zip(parts, spaces_of_parts, strict=True) if one in (_SO3, _S3)]
+        moving = [part for part, one in zip(parts, spaces_of_parts, strict=True) if one == _R3]
         if len(turning) != 1 or len(moving) != 1:
             raise ValidationError(f"{label} needs one rotation and one position, such as 'so:3 x r:3', not {space!r}")
         return [ForceTerm(label, measurement, times, [turning[0], moving[0]])]
@@ -483,11 +479,9 @@ def _terms_of(measurement: Measurement, label: str, times: Doubles, space: AnySp
         return [kind(label, measurement, times, part, spaces[part])]
     assert isinstance(measurement, Velocities)
     terms: list[Term] = []
-    points_of_parts = _in_parts(measurement.y, chosen, f"{label}.y")
-    vectors_of_parts = _in_parts(measurement.v, chosen, f"{label}.v")
-    for part, y, v, sigma in zip(
-        parts, points_of_parts, vectors_of_parts, _sigmas(measurement, len(parts), label), strict=True
-    ):
+    points = _in_parts(measurement.y, chosen, f"{label}.y")
+    vectors = _in_parts(measurement.v, chosen, f"{label}.v")
+    for part, y, v, sigma in zip(parts, points, vectors, _sigmas(measurement, len(parts), label), strict=True):
         term = Velocities(measurement.t, y, v, sigma=sigma, time_offset=measurement.time_offset, loss=measurement.loss)
         terms.append(VelocityTerm(label, term, times, part, spaces[part], y, v))
     return terms
@@ -735,33 +729,31 @@ def iterate(setup: Setup, points: list[Array], values: Values, progress: Progres
     """Iterate from points at the knots until the step is small."""
     problem, (start, constants) = setup.in_core(), setup.state(points, values)
     lams, criterion, gamma = setup.lams.tolist(), setup.criterion, setup.gamma
-    result = _core.estimate(problem, start, constants, lams, criterion, gamma, setup.tol, setup.max_iter, progress)
-    if isinstance(result, np.ndarray):
-        raise _undetermined(setup, result)
-    failed, number, step = result["failure"], result["iterations"], result["step"]
+    raw = _core.estimate(problem, start, constants, lams, criterion, gamma, setup.tol, setup.max_iter, progress)
+    if isinstance(raw, np.ndarray):
+        raise _undetermined(setup, raw)
+    failed, number, step = raw["failure"], raw["iterations"], raw["step"]
     reports = [
-        SmoothingReport("linearized", failed is None, number, step, result["rate"], lam, bound, df, result["sigma"])
-        for lam, bound, df in zip(result["lams"], result["at_bound"], result["df"], strict=True)
+        SmoothingReport("linearized", failed is None, number, step, raw["rate"], lam, bound, df, raw["sigma"])
+        for lam, bound, df in zip(raw["lams"], raw["at_bound"], raw["df"], strict=True)
     ]
-    information, covariance = result["information"], np.full_like(result["information"], np.nan)
+    information, covariance = raw["information"], np.full_like(raw["information"], np.nan)
     if np.isfinite(information).all():
         covariance = np.asarray(np.linalg.pinv(information, hermitian=True), np.float64)
-    distance, (band, side, corner) = 0.0, result["matrices"]
-    if failed is None and result["turn"] > _TURN:
-        normal = np.random.default_rng(0).standard_normal((_SAMPLES, result["variances"].size))
-        distance = _core.distance_from_minimum(
-            problem, result["points"], result["values"], result["lams"], band, normal
-        )
+    distance, (band, side, corner) = 0.0, raw["matrices"]
+    if failed is None and raw["turn"] > _TURN:
+        normal = np.random.default_rng(0).standard_normal((_SAMPLES, raw["variances"].size))
+        distance = _core.distance_from_minimum(problem, raw["points"], raw["values"], raw["lams"], band, normal)
     return Solution(
-        [space._numbers(rows) for space, rows in zip(setup.spaces, result["points"], strict=True)],
-        {name: result["values"][index] for name, index in setup.columns.items()},
+        [space._numbers(rows) for space, rows in zip(setup.spaces, raw["points"], strict=True)],
+        {name: raw["values"][index] for name, index in setup.columns.items()},
         reports,
         Posterior(band, np.zeros((0, 0)), sum(space.dim for space in setup.spaces), side, corner),
         covariance,
-        [Rows(*rows) for rows in result["terms"]],
-        result["variances"],
-        result["loss"],
-        result["turn"],
+        [Rows(*rows) for rows in raw["terms"]],
+        raw["variances"],
+        raw["loss"],
+        raw["turn"],
         distance,
         "" if failed is None else _FAILURES[failed].format(step=step, number=number, tol=setup.tol),
     )

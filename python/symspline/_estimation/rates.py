@@ -361,7 +361,7 @@ class _Problem:
         drift = self.rates.noise**2 * self.step * float(np.ptp(t))
         variances = attitudes.sigma**2 + more**2 + drift
         free = self.rates.spread is not None and len(t) > 1
-        g, _ = self._since_first(t, bias)
+        g, turned = self._since_first(t, bias)
         candidates = r @ g.swapaxes(-1, -2)
         # Start from the attitude that agrees best with the others.
         some = np.unique(np.linspace(0, len(t) - 1, min(len(t), _COMPARED)).astype(int))
@@ -369,7 +369,6 @@ class _Problem:
         wide = 2 * np.sqrt(variances[some]) + 0.1
         first = candidates[some[np.minimum(apart / wide, 3).sum(axis=1).argmin()]]
         for corner in _CORNERS:
-            g, turned = self._since_first(t, bias)
             path = first @ g
             rest = _log(path.swapaxes(-1, -2) @ r)
             squares = np.sum(rest**2, axis=-1) / (3 * variances)
@@ -391,7 +390,7 @@ class _Problem:
             if late:
                 offset += float(step[6])
                 t = attitudes.times + offset
-        g, _ = self._since_first(t, bias)
+            g, turned = self._since_first(t, bias)
         squares = np.sum(_log((first @ g).swapaxes(-1, -2) @ r) ** 2, axis=-1) / variances
         return first, bias, float(np.minimum(squares, _LIMIT).mean()), offset
 

@@ -19,16 +19,7 @@ from .._core import ValidationError
 from .._smoothing import SmoothingWarning, make_smoothing_spline
 from .._smoothing.noise import split
 from .._smoothing.solve import places
-from .._spaces import (
-    AnySpace,
-    Array,
-    Doubles,
-    Euclidean,
-    Product,
-    SpecialOrthogonal,
-    factors_of,
-    nearest_rotations,
-)
+from .._spaces import AnySpace, Array, Doubles, Euclidean, Product, SpecialOrthogonal, factors_of, nearest_rotations
 from .._splines.base import Curve
 from ..convert._quaternions import matrix_to_quaternion
 from ..measure import Points
@@ -241,21 +232,19 @@ class _Seen(NamedTuple):
 
 def _attitudes(space: AnySpace, points: list[PointTerm], seen: list[DirectionTerm]) -> list[_Seen]:
     """Return measured attitudes; if they are few, also attitudes computed from simultaneous directions."""
-    seen_attitudes = [
+    known = [
         _Seen(Attitudes(term.times, body_of(space).matrices(term.y), term.scales), term.time_offset) for term in points
     ]
-    if sum(len(result.attitudes.times) for result in seen_attitudes) >= _FEW:
-        return seen_attitudes
+    if sum(len(result.attitudes.times) for result in known) >= _FEW:
+        return known
     for term in seen:
         profile = np.einsum("nki,nkl->nil", term.reference, term.seen)
         sizes = np.linalg.svd(profile, compute_uv=False)
         good = sizes[:, 1] > _RANK * sizes[:, 0]
         if good.any():
             sigma = np.mean(term.noise[good], axis=1)
-            seen_attitudes.append(
-                _Seen(Attitudes(term.times[good], nearest_rotations(profile[good]), sigma), term.time_offset)
-            )
-    return seen_attitudes
+            known.append(_Seen(Attitudes(term.times[good], nearest_rotations(profile[good]), sigma), term.time_offset))
+    return known
 
 
 def _with_rates(
@@ -766,9 +755,7 @@ def that_reproduce(setup: Setup, start: Start, data: Doubles) -> Doubles:
     """
     fine = np.unique(np.concatenate([setup.knots, data]))
     fine = fine[merged(fine, len(fine))]
-    of_start = (
-        None if len(fine) > _MOST_COMPARED else residuals(setup.with_knots(fine), start.points(fine), start.values)
-    )
+    base = None if len(fine) > _MOST_COMPARED else residuals(setup.with_knots(fine), start.points(fine), start.values)
     knots = setup.knots
     values = {name: np.array(constant.start) for name, constant in setup.constants.items()} | start.values
     for _ in range(_ROUNDS):
@@ -778,14 +765,14 @@ def that_reproduce(setup: Setup, start: Start, data: Doubles) -> Doubles:
         else:
             bad = np.zeros(len(knots) - 1, bool)
             for k, (term, rows) in enumerate(zip(setup.terms, of_spline, strict=True)):
-                bad |= _exceeding(knots, term.shifted_times(values), rows, None if of_start is None else of_start[k])
+                bad |= _exceeding(knots, term.shifted_times(values), rows, None if base is None else base[k])
         if not bad.any() or len(knots) > 2 * len(fine):
             break
         knots = bisected(knots, bad)
     return graded(knots)
 
 
-def _exceeding(knots: Doubles, times: Doubles, rows: Doubles, of_start: Doubles | None) -> NDArray[np.bool_]:
+def _exceeding(knots: Doubles, times: Doubles, rows: Doubles, base: Doubles | None) -> NDArray[np.bool_]:
     """Return the intervals in which residuals are larger than their noise and differ from those of the start."""
     i = np.clip(np.searchsorted(knots, times, side="right") - 1, 0, len(knots) - 2)
     size = rows.shape[1]
@@ -797,8 +784,8 @@ def _exceeding(knots: Doubles, times: Doubles, rows: Doubles, of_start: Doubles 
     count = three(None)
     squares = three(np.sum(rows**2, axis=1)) / np.maximum(size * count, 1)
     large = squares > 1 + _SLACK + 3 * np.sqrt(2 / np.maximum(size * count, 1))
-    if of_start is not None:
-        apart = three(np.sum((rows - of_start) ** 2, axis=1)) / np.maximum(size * count, 1)
+    if base is not None:
+        apart = three(np.sum((rows - base) ** 2, axis=1)) / np.maximum(size * count, 1)
         # More knots would not reduce residuals that the initial curve has as well.
         large &= apart > _SLACK
     # At most about one knot per sample, by the median time step because some samples may be very close together.

@@ -259,9 +259,7 @@ class EstimatedSpline(SmoothingSpline[P, Any]):
         return self._inflated(parts, index, x, None, orders, covariance)
 
     def _made_of(self, radius: float | None = None) -> str:
-        counts = [
-            f"{len(self._times_of(measurement))} {type(measurement).__name__}" for measurement in self._measurements
-        ]
+        counts = [f"{len(self._times_of(given))} {type(given).__name__}" for given in self._measurements]
         df = " and ".join(f"{part.report.df:.3g}" for part in self._smoothed[:3])
         return ", ".join([*counts, f"{self._times.shape[-1]} knots", f"{df} degrees of freedom"])
 
@@ -329,9 +327,7 @@ class EstimatedSpline(SmoothingSpline[P, Any]):
         posterior = self._posterior(self._smoothed[0])
         return CubicSpline._state(self) | {
             "noise": [vars(part.report) for part in self._smoothed],
-            "parameters": {
-                name: [parameter.value.tolist(), parameter.cov.tolist()] for name, parameter in self._parameters.items()
-            },
+            "parameters": {name: [one.value.tolist(), one.cov.tolist()] for name, one in self._parameters.items()},
             "matrix": posterior.band,
             "side": posterior.side,
             "corner": posterior.corner,

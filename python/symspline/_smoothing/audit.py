@@ -541,9 +541,7 @@ def _warn_of_varying(space: AnySpace, noisy: SmoothingData, spline: SmoothedSpli
         if not len(curves):
             continue
 
-        def rows(
-            array: Array, chosen: NDArray[np.intp] = curves, batch: tuple[int, ...] = noisy.batch, axes: int = 1
-        ) -> Array:
+        def rows(array: Array, chosen: Array = curves, batch: tuple[int, ...] = noisy.batch, axes: int = 1) -> Array:
             whole = np.broadcast_to(array, (*batch, *array.shape[array.ndim - axes :]))
             return np.ascontiguousarray(whole.reshape(-1, *array.shape[array.ndim - axes :])[chosen])
 

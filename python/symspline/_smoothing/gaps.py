@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,7 @@ from .._curves.ends import end_kinds, is_closed
 from .._spaces import AnySpace, Array, Doubles, Euclidean, Space, SpecialEuclidean, factors_of
 from .audit import corner_of
 from .noise import SINGULAR, grouped, in_part, smoothed_spaces, split
-from .report import Known, SmoothingWarning, frames_at
+from .report import Index, Known, SmoothingWarning, frames_at
 from .solve import SmoothedSpline
 
 # A gap is long if the variance in its middle exceeds the first multiple of the median variance at the data, and its
@@ -54,12 +54,6 @@ class Gap(NamedTuple):
     stop: Time
     factor: float
     blocks: int
-
-
-class CalibratedSpline(SmoothedSpline, Protocol):
-    """A smoothing spline with long gaps between its data."""
-
-    def _gaps_of(self, number: int, index: tuple[int, ...]) -> list[Gap]: ...
 
 
 class Course(NamedTuple):
@@ -516,13 +510,19 @@ def warn_of_wide_bands(spline: SmoothedSpline, number: int, index: tuple[int, ..
     )
 
 
-def warn_of_gaps(spline: CalibratedSpline, calibrations: dict[tuple[int, tuple[int, ...]], Calibration | None]) -> None:
+def warn_of_gaps(
+    space: AnySpace,
+    gaps_of: Callable[[int, Index], list[Gap]],
+    calibrations: dict[tuple[int, Index], Calibration | None],
+) -> None:
     """Warn once of the longest gap among those longer than any part of the recording that could be predicted.
 
     Parameters
     ----------
-    spline : SmoothingSpline
-        Curve.
+    space : Space
+        The space.
+    gaps_of : callable
+        Function that returns the gaps of a part of a curve by their index.
     calibrations : dict
         Calibrations by part and index of the curve; None for curves without any.
     """
@@ -537,8 +537,8 @@ def warn_of_gaps(spline: CalibratedSpline, calibrations: dict[tuple[int, tuple[i
     _, (number, index), place = max(blind)
     calibration, count = calibrations[number, index], len(blind)
     assert calibration is not None
-    gap = spline._gaps_of(number, index)[place + len(calibration.ends[:1])]
-    of = of_index(index) + in_part(spline.space, number)
+    gap = gaps_of(number, index)[place + len(calibration.ends[:1])]
+    of = of_index(index) + in_part(space, number)
     more = f" (and {count - 1} more gaps)" if count > 1 else ""
     if np.isnan(gap.factor):
         known = (

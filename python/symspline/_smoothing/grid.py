@@ -148,17 +148,9 @@ def smooth(rows: Rows, lam: float) -> SmoothedRows:
 
 
 def _fit(rows: Rows, lam: Number) -> AnySmoothingSpline:
+    options: Any = {"weights": rows.weights, "bc_type": rows.bc_type, "sigma": 1.0}
     with silenced(Warning):
-        return make_smoothing_spline(
-            rows.t,
-            rows.points,
-            rows.space,
-            lam,
-            weights=rows.weights,
-            bc_type=rows.bc_type,
-            sigma=1.0,
-            on_failure="ignore",
-        )
+        return make_smoothing_spline(rows.t, rows.points, rows.space, lam, on_failure="ignore", **options)
 
 
 def _store(result: SmoothedRows, at: list[int] | NDArray[np.intp], spline: AnySmoothingSpline, points: Array) -> None:
@@ -375,16 +367,9 @@ def _cube(rows: Rows) -> float:
 def _start(rows: Rows, criterion: LamCriterion) -> float:
     """Return the decimal logarithm of the median of the λ that some of the rows would have alone."""
     sample = rows.take(slice(None, None, -(-len(rows.weights) // _FIRST)))
+    options: Any = {"weights": sample.weights, "bc_type": sample.bc_type, "gamma": max(criterion.gamma, _GAMMA)}
     with silenced(Warning):
-        report = make_smoothing_spline(
-            sample.t,
-            sample.points,
-            sample.space,
-            weights=sample.weights,
-            bc_type=sample.bc_type,
-            gamma=max(criterion.gamma, _GAMMA),
-            on_failure="ignore",
-        ).report
+        report = make_smoothing_spline(sample.t, sample.points, sample.space, on_failure="ignore", **options).report
     lam, bound = np.asarray(report.lam), np.asarray(report.at_bound)
     good = np.isfinite(lam) & (lam > 0) & np.asarray(report.converged)
     for mask in (good & ~bound, good):

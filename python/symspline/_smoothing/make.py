@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 from .._base.arrays import checked_flag, checked_number, short_repr, whole_number
 from .._base.faults import is_silent
 from .._base.typing import (
-    BCType,
     ChoiceOptions,
     Criterion,
     Extrapolate,
@@ -546,7 +545,7 @@ def _joined(space: Space, ends: list[list[End] | None]) -> list[End] | None:
     return joined
 
 
-def _conditions(bc_type: SmoothingBCType, transported: list[list[End] | None], space: Space) -> BCType:
+def _conditions(bc_type: SmoothingBCType, transported: list[list[End] | None], space: Space) -> Any:
     """Return end conditions in the form of the argument `bc_type`."""
     if isinstance(bc_type, str):
         return bc_type
@@ -559,8 +558,7 @@ def _conditions(bc_type: SmoothingBCType, transported: list[list[End] | None], s
         vectors = tuple(factor._numbers(vector) for factor, (_, vector) in pairs if vector is not None)
         return (1, vectors if isinstance(space, Product) else vectors[0])
 
-    conditions: BCType = freeze_bc_type((one(0), one(1)))
-    return conditions
+    return freeze_bc_type((one(0), one(1)))
 
 
 # ---- geodesic regression: an infinite λ ----

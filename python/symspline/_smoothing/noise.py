@@ -350,9 +350,7 @@ def _of_matrices(matrices: Doubles) -> Noise:
     return Noise(np.trace(matrices, axis1=-2, axis2=-1) / matrices.shape[-1], matrices)
 
 
-def _check(
-    good: Array | np.bool_, complaint: str, name: str = "weights", indices: NDArray[np.intp] | None = None
-) -> None:
+def _check(good: Array | np.bool_, complaint: str, name: str = "weights", indices: Array | None = None) -> None:
     if not np.all(good):
         bad = np.argwhere(~good)[0]
         raise ValidationError(f"{name}{(bad if indices is None else indices[bad[0]]).tolist()} {complaint}")
@@ -399,12 +397,7 @@ def _inverse_frames(frames: ArrayLike, space: Space, data: Points, used: Array) 
 
 
 def per_part(
-    space: Space,
-    spaces: tuple[Space, ...],
-    value: Any,
-    name: str,
-    batch: tuple[int, ...],
-    infinite: bool = False,
+    space: Space, spaces: tuple[Space, ...], value: Any, name: str, batch: tuple[int, ...], infinite: bool = False
 ) -> list[Doubles]:
     """Return one array with a number per curve for each of the smoothed spaces; NaN for None.
 

@@ -15,6 +15,8 @@ from .._base.report import BOOL, FLOAT, INT, FitReport
 from .._base.typing import FloatArray, Number
 from .._spaces import Array, Doubles, Space
 
+# Index of a curve in its batch.
+Index = tuple[int, ...]
 # Kinds of the ends, as the core names them; None for closed curves.
 Kinds = list[str] | None
 # The arrays of the matrix A, the number of coordinates that it couples, the kinds of the ends, and the holonomy.
@@ -185,20 +187,13 @@ class Posterior(NamedTuple):
         """Apply a function to the arrays with batch axes, such as the selection of some curves."""
         return self._replace(band=function(self.band), turn=function(self.turn))
 
-    def known(self, index: tuple[int, ...], kinds: Kinds) -> Known:
+    def known(self, index: Index, kinds: Kinds) -> Known:
         """Return the matrix A of one curve and its end conditions, in the form that the core expects."""
         arrays = [np.ascontiguousarray(x) for x in (self.band[index], self.side, self.corner)]
         return arrays, self.size, kinds, np.ascontiguousarray(self.turn[index])
 
     def covariance(
-        self,
-        space: Space,
-        knots: Doubles,
-        index: tuple[int, ...],
-        kinds: Kinds,
-        x: Doubles,
-        y: Doubles | None,
-        orders: list[int],
+        self, space: Space, knots: Doubles, index: Index, kinds: Kinds, x: Doubles, y: Doubles | None, orders: list[int]
     ) -> Doubles:
         """Return covariances of one curve at times x for noise of variance one.
 
@@ -232,14 +227,7 @@ class Posterior(NamedTuple):
         return self.coupled(knots, index, kinds, x, y, orders, np.arange(self.first, self.first + m))
 
     def coupled(
-        self,
-        knots: Doubles,
-        index: tuple[int, ...],
-        kinds: Kinds,
-        x: Doubles,
-        y: Doubles | None,
-        orders: list[int],
-        rows: NDArray[np.intp],
+        self, knots: Doubles, index: Index, kinds: Kinds, x: Doubles, y: Doubles | None, orders: list[int], rows: Array
     ) -> Doubles:
         """Return the same for some of the coordinates that A couples, given by their numbers `rows`."""
         covariances = _core.posterior_covariance(knots, self.known(index, kinds), x, y, orders)
@@ -248,7 +236,7 @@ class Posterior(NamedTuple):
         return np.ascontiguousarray(square.reshape(len(x), d, d))
 
     def samples(
-        self, space: Space, knots: Doubles, index: tuple[int, ...], kinds: Kinds, rng: np.random.Generator, n: int
+        self, space: Space, knots: Doubles, index: Index, kinds: Kinds, rng: np.random.Generator, n: int
     ) -> Doubles:
         """Return moves of one curve at its knots, shape (n, knots, size or dim), for noise of variance one."""
         known = self.known(index, kinds)

@@ -249,9 +249,8 @@ def with_enough_knots(
             if not np.array_equal(fewer.times, at.times) and fewer.times.shape[-1] <= count:
                 at = fewer
                 continue
-        lams, dfs = np.array([(result.smoothed.report.lam, result.smoothed.report.df) for result in results]).swapaxes(
-            0, 1
-        )
+        reports = [result.smoothed.report for result in results]
+        lams, dfs = np.array([(report.lam, report.df) for report in reports]).swapaxes(0, 1)
         apart = merge_close_knots(whole, noisy, _of_all(lams), power, coarser)
         most, enough = apart.times.shape[-1], _n_knots_for_df(dfs)
         if tries == _TRIES - 1 or (count >= most > 0.8 * count and count > 0.8 * min(enough, most)):

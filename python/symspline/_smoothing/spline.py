@@ -34,7 +34,7 @@ from .._splines.archive import (
 from .._splines.cubic import CubicSpline
 from .gaps import Calibration, Gap, calibration_of, warn_of_cubics, warn_of_gaps, warn_of_wide_bands, widest_band
 from .noise import Noise, SmoothingData, grouped, is_several, join, parts_of_factor, smoothed_spaces, split
-from .report import Parameter, Posterior, SmoothingReport, frames_at, process_ratio
+from .report import Index, Parameter, Posterior, SmoothingReport, frames_at, process_ratio
 from .solve import Smoothed
 
 if TYPE_CHECKING:
@@ -232,7 +232,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
             gaps_of_parts.append(gaps_of_curves[()])
         return self._per_space(gaps_of_parts)
 
-    def _gaps_of(self, number: int, index: tuple[int, ...]) -> list[Gap]:
+    def _gaps_of(self, number: int, index: Index) -> list[Gap]:
         known = self._calibrations[number, index]
         if known is None:
             return []
@@ -262,7 +262,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
     def _calibration_of(self, number: int) -> Calibration | None:
         return calibration_of(self, number)
 
-    def _inflation(self, number: int, index: tuple[int, ...], x: Doubles, nu: int) -> Doubles:
+    def _inflation(self, number: int, index: Index, x: Doubles, nu: int) -> Doubles:
         """Return the factors of the standard deviation of one curve in one part, at times x of the core."""
         knots = self._knots_of(index)
         if self._extrapolate is True and not is_closed(self._bc_type) and np.any((x < knots[0]) | (x > knots[-1])):
@@ -272,7 +272,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
             return np.ones(x.shape)
         out = known.inflation(x, nu)
         if np.any(out != 1):
-            self._warn_once("gaps", lambda: warn_of_gaps(self, self._calibrations))
+            self._warn_once("gaps", lambda: warn_of_gaps(self.space, self._gaps_of, self._calibrations))
         return out
 
     def _warn_once(self, subject: str, warn: Callable[[], None]) -> None:
@@ -385,7 +385,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
             out[index] = value(index, np.ravel(times[index] if per_curve else times)).reshape((*shape, *tail))
         return out
 
-    def _spread(self, number: int, index: tuple[int, ...], x: Doubles, nu: int, calibrated: bool = True) -> Doubles:
+    def _spread(self, number: int, index: Index, x: Doubles, nu: int, calibrated: bool = True) -> Doubles:
         """Return the standard deviation of one curve in one part at times x of the core."""
         plain = self._plain_spread(number, index, x, nu)
         if not calibrated:
@@ -396,7 +396,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
             self._warn_once("wide bands", lambda: warn_of_wide_bands(self, number, index, wide))
         return spread
 
-    def _plain_spread(self, number: int, index: tuple[int, ...], x: Doubles, nu: int) -> Doubles:
+    def _plain_spread(self, number: int, index: Index, x: Doubles, nu: int) -> Doubles:
         """Return the standard deviation of the posterior, without calibration."""
         part, knots = self._smoothed[number], self._knots_of(index)
         sigma = np.asarray(part.sigma)[index]
@@ -409,7 +409,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
             variance = variance * self._ratio(number, index, x, nu)
         return np.asarray(sigma * np.sqrt(variance))
 
-    def _ratio(self, number: int, index: tuple[int, ...], x: Doubles, nu: int) -> Doubles:
+    def _ratio(self, number: int, index: Index, x: Doubles, nu: int) -> Doubles:
         """Return the variance of the process that the jerk penalises, relative to that of the spline."""
         part = self._smoothed[number]
         weights, times = self._noisy.noise[number].weights, self._noisy.times
@@ -538,7 +538,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
             if other_shape != shape:
                 raise ValidationError(f"y has shape {other_shape}, but x has shape {shape}")
 
-        def covariance(number: int, index: tuple[int, ...], at: Doubles) -> Doubles:
+        def covariance(number: int, index: Index, at: Doubles) -> Doubles:
             to = None if other is None else np.ravel(other[index] if per_curve else other)
             posterior = self._covariance(number, index, at, to, orders, to is None and len(orders) == 1)
             return self._inflated([number], index, at, to, orders, posterior) if calibrated else posterior
@@ -548,7 +548,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         return self._per_space(covariances)
 
     def _covariance(
-        self, number: int, index: tuple[int, ...], x: Doubles, y: Doubles | None, orders: list[int], between: bool
+        self, number: int, index: Index, x: Doubles, y: Doubles | None, orders: list[int], between: bool
     ) -> Doubles:
         """Return the covariance of one part; `between` adds variances of points and velocities between the knots."""
         part, space, kinds = self._smoothed[number], smoothed_spaces(self.space)[number], end_kinds(self._bc_type)
@@ -559,13 +559,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         return np.asarray(np.asarray(part.sigma)[index].item() ** 2 * whole)
 
     def _inflated(
-        self,
-        parts: list[int],
-        index: tuple[int, ...],
-        x: Doubles,
-        y: Doubles | None,
-        orders: list[int],
-        covariance: Doubles,
+        self, parts: list[int], index: Index, x: Doubles, y: Doubles | None, orders: list[int], covariance: Doubles
     ) -> Doubles:
         """Multiply covariances by the calibration factors of both times; accelerations have those of velocities."""
         spaces = smoothed_spaces(self.space)
@@ -582,9 +576,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         right = left if y is None else factors(y)
         return np.asarray(left[:, :, None] * covariance * right[:, None])
 
-    def _add_between(
-        self, number: int, index: tuple[int, ...], x: Doubles, orders: list[int], covariance: Doubles
-    ) -> None:
+    def _add_between(self, number: int, index: Index, x: Doubles, orders: list[int], covariance: Doubles) -> None:
         """Add the variance between the knots to covariances of points and velocities, for noise of variance one.
 
         The shape of `covariance` is ``(len(x), len(orders), m, len(orders), m)``.
@@ -600,12 +592,10 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
                 covariance[:, i] *= root
                 covariance[:, :, :, i] *= root
                 continue
-            process, plain = (
-                _core.smoothing_variance(knots, band, weight, x, nu, kinds) for weight in (lam, np.zeros(1))
-            )
+            process, plain = (_core.smoothing_variance(knots, band, w, x, nu, kinds) for w in (lam, np.zeros(1)))
             covariance[:, i, :, i] += (process - plain)[:, None, None] * np.eye(covariance.shape[-1])
 
-    def _coupled(self, parts: list[int], index: tuple[int, ...], x: Doubles, orders: list[int]) -> Doubles:
+    def _coupled(self, parts: list[int], index: Index, x: Doubles, orders: list[int]) -> Doubles:
         """Return the covariance of derivatives in several parts at times x, for the propagation of errors.
 
         The parts of a smoothing spline are independent. Points and velocities include their variances between the
@@ -635,7 +625,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
             )
         return part.posterior
 
-    def _knots_of(self, index: tuple[int, ...]) -> Doubles:
+    def _knots_of(self, index: Index) -> Doubles:
         return np.ascontiguousarray(self._times[index] if self._times.ndim > 1 else self._times)
 
     def _finite_times(self, x: TimesLike) -> tuple[Doubles, tuple[int, ...], bool]:
@@ -689,7 +679,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
     def _frames(self, times: Doubles, per_curve: bool) -> list[tuple[Array, Array]]:
         """Return points and frames along the curve in every part, at times of the core."""
 
-        def frames(space: Space, points: Array, p: Array, index: tuple[int, ...], at: Doubles) -> Array:
+        def frames(space: Space, points: Array, p: Array, index: Index, at: Doubles) -> Array:
             return frames_at(space, self._knots_of(index), points[index], at, p[index].reshape(-1, *space.point_shape))
 
         frames_of_parts = []
@@ -806,7 +796,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         unit = " m" if radius else ""
         return f"{count} data{of_batch}, {df} degrees of freedom, noise {sigma}{unit}{factors}"
 
-    def _noise_beside(self, index: tuple[int, ...], x: Doubles) -> UncertaintyBand:
+    def _noise_beside(self, index: Index, x: Doubles) -> UncertaintyBand:
         noisy = self._noisy.map(itemgetter(index), ())
         # The parts of a pose have different units; plots show the band of the position.
         radii = [of_factor[-1][1] for of_factor in self._radii(index, x)]
@@ -814,7 +804,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         points = [rows[noisy.used] for rows in noisy.points]
         return UncertaintyBand([noisy.times[noisy.used]] * len(points), points, radii, speed)
 
-    def _radii(self, index: tuple[int, ...], x: Doubles) -> list[list[tuple[Space, Doubles]]]:
+    def _radii(self, index: Index, x: Doubles) -> list[list[tuple[Space, Doubles]]]:
         """Return the parts of every factor, and the radii of their 95 % bands at times x of the core."""
         parts = enumerate(smoothed_spaces(self.space))
         return grouped(
