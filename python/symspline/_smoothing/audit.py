@@ -528,10 +528,10 @@ def _of_units(sensor: Sensor, ratio: float) -> str:
 
 def _warn_of_varying(space: AnySpace, noisy: SmoothingData, spline: SmoothedSpline, fits: list[Fitted]) -> None:
     """Warn if the motion or its noise varies along a curve whose λ was chosen."""
-    numbers = iter(range(len(fits)))
-    for factor, part, of_factor in zip(factors_of(space), spline._curve.parts, grouped(space, fits), strict=True):
-        number, *more = (next(numbers) for _ in of_factor)
-        fit, noise = fits[number], noisy.noise[number]
+    following = 0
+    for factor, part, (fit, *more) in zip(factors_of(space), spline._curve.parts, grouped(space, fits), strict=True):
+        number, following = following, following + 1 + len(more)
+        noise = noisy.noise[number]
         # The acceleration of a pose is not that of its rotation and position.
         if more or noise.information is not None:
             continue

@@ -364,7 +364,7 @@ def make_smoothing_spline(
     else:
         results, at = run(every), every
 
-    failed = faults_of(parts, results, noisy, at.times.shape[-1], options)
+    faults_of_fit = faults_of(parts, results, noisy, at.times.shape[-1], options)
     whole, good = whole._replace(points=noisy.points), np.ones(batch, bool)
     if chosen is not None:
         # Points of masked curves are NaN.
@@ -372,8 +372,9 @@ def make_smoothing_spline(
         good, results = spread(good.ravel()[chosen]), [result.map(spread) for result in results]
         whole = whole._replace(points=[spread(rows) for rows in noisy.points])
         parts = [part.map(spread, noise) for part, noise in zip(parts, whole.noise, strict=True)]
+        faults_of_fit = [fault._replace(curve=int(chosen[fault.curve])) for fault in faults_of_fit]
+    faults += faults_of_fit
     spline, fitted = _spline_through(whole, space, parts, results, at, good, bc_type, policy)
-    faults += [fault if chosen is None else fault._replace(curve=int(chosen[fault.curve])) for fault in failed]
     valid_data = [
         Points(factor._as_doubles(rows), 0.0, batch, whole.times.shape[-1])
         for factor, rows in zip(factors_of(space), spline._noisy.points, strict=True)
