@@ -49,6 +49,8 @@ pub enum Quantity {
     Motion,
     /// γ and γ', one after the other.
     State,
+    /// γ, the derivative of its array, and ∇γ', one after the other.
+    Jet,
 }
 
 /// The extrapolation policy for times outside the knots.
@@ -104,7 +106,8 @@ impl Quantity {
             | Quantity::Jerk
             | Quantity::AccelerationNorm
             | Quantity::BodyAcceleration
-            | Quantity::Motion => 2,
+            | Quantity::Motion
+            | Quantity::Jet => 2,
         }
     }
 }

@@ -25,6 +25,7 @@ impl Quantity {
             _ if self.is_length() => 1,
             Quantity::Motion => 2 * space.dim() + space.point_len(),
             Quantity::State => 2 * space.point_len(),
+            Quantity::Jet => 3 * space.point_len(),
             _ if self.is_of_body() => space.dim(),
             _ => space.point_len(),
         }
@@ -106,7 +107,9 @@ impl Job<'_> {
                 let (p, vector) = self.sample(space, cursor, segment, gamma, vectors, len);
                 match vector {
                     Some(v) if self.quantity.is_length() => out.write(&[norm(space, p, v)]),
-                    Some(v) if self.quantity == Quantity::State => out.write_both(p, v),
+                    Some(v) if matches!(self.quantity, Quantity::State | Quantity::Jet) => {
+                        out.write_both(p, v)
+                    }
                     vector => out.write(vector.unwrap_or(p)),
                 }
             },
@@ -149,6 +152,12 @@ impl Job<'_> {
                     space.body(p, first, &mut rates[..dim]);
                     space.body(p, second, &mut rates[dim..]);
                     space.leave(segment.side, p, None, point);
+                    return out.write(&result[..self.size]);
+                }
+                if let (Quantity::Jet, Some(w)) = (self.quantity, vector) {
+                    let (first, second) = w.split_at(len);
+                    let rows = result.chunks_mut(ambient).zip([None, Some(first), Some(second)]);
+                    rows.for_each(|(row, vector)| space.leave(segment.side, p, vector, row));
                     return out.write(&result[..self.size]);
                 }
                 let [point, result] = two(&mut result, ambient);
@@ -200,7 +209,8 @@ impl Job<'_> {
         }
     }
 
-    /// Points of eight samples, and vectors there if the quantity requires them; two for [`Quantity::Motion`].
+    /// Points of eight samples, and vectors there if the quantity requires them; two for [`Quantity::Motion`]
+    /// and [`Quantity::Jet`].
     #[inline(always)]
     fn sample<'v, S: Scalar, M: Ambient>(
         &self,
@@ -240,7 +250,7 @@ impl Job<'_> {
         let derivatives = match self.quantity.order() {
             0 => None,
             1 => Some(&derivatives[..len]),
-            _ if self.quantity == Quantity::Motion => Some(&derivatives[..2 * len]),
+            _ if matches!(self.quantity, Quantity::Motion | Quantity::Jet) => Some(&derivatives[..2 * len]),
             _ => Some(&derivatives[len..2 * len]),
         };
         (p, derivatives)

@@ -1,37 +1,36 @@
 //! The covariant jerk ∇∇γ'.
 //!
-//! On half a segment the array w of the acceleration is a smooth function of time. It is interpolated at Chebyshev nodes
+//! On a segment, the array w of the acceleration is a smooth function of time. It is interpolated at Chebyshev nodes
 //! and differentiated. The acceleration is L(γ'') + Q(γ', γ') for arrays γ, with a linear map L and a quadratic form Q that
 //! depend on the space and the point: the connection is symmetric. The covariant derivative of w along γ is therefore
 //! L(w') + Q(γ', w), where polarisation yields Q(γ', w).
 
-use super::bezier::Segment;
-use super::data::{Curves, Outside, Times};
-use super::evaluate::scaled_down;
+use super::chebyshev::{LEVELS, MOST, differentiate, node, sizes};
+use super::data::{Curves, Job, Outside, Quantity, Times};
+use super::evaluate::{evaluate, scaled_down};
 use super::locate::Locator;
 use super::sample_cursor::inside;
 use crate::monitor::Monitor;
 use crate::parallel;
-use crate::scalar::{Jet, LANES, Lane, Scalar, few, lane, scatter};
+use crate::scalar::{LANES, Lane, few, gather, lane, scatter};
 use crate::space::{Ambient, Erased};
-use std::f64::consts::PI;
 
-/// Chebyshev nodes of half a segment.
-const NODES: usize = 16;
-const GROUPS: usize = NODES / LANES;
+/// Coefficients of the highest degrees up to this, relative to the sizes of points and vectors, are rounding errors. An
+/// error of the coefficient of degree n is multiplied by n².
+const ROUNDING: f64 = 8.0 * f64::EPSILON;
+/// Half of the interval around a sample outside the knots.
+const AROUND: f64 = 0.25;
 /// Maximum number of samples that one thread evaluates at a time.
 const BLOCK: usize = 2048;
 /// Samples times numbers from which several threads are certainly faster.
 const PARALLEL: usize = 1 << 12;
 
-/// Where a sample lies: its curve, segment and position in it, and the start of the half segment around it. Times and
-/// lengths are in units of the segment.
+/// Where a sample lies: its curve, the segment, and the position in units of it.
 #[derive(Clone, Copy)]
 struct Place {
     curve: usize,
     segment: usize,
     tau: f64,
-    start: f64,
     /// Whether the curve continues there as a geodesic, whose jerk is zero.
     straight: bool,
 }
@@ -39,107 +38,153 @@ struct Place {
 impl Place {
     fn new(curves: &Curves, curve: usize, x: f64, outside: Outside, hint: usize) -> Self {
         let t = curves.knots(curve);
-        let (found, beyond) = inside(x, t, outside);
-        let segment = Locator::new(t, false).find(found, hint);
-        let tau = (found - t[segment]) / (t[segment + 1] - t[segment]);
-        let start = match tau {
-            _ if tau > 1.0 => tau,
-            _ if tau < 0.0 => tau - 0.5,
-            _ if tau < 0.5 => 0.0,
-            _ => 0.5,
-        };
-        Place { curve, segment, tau, start, straight: beyond != 0.0 }
+        let (x, beyond) = inside(x, t, outside);
+        let segment = Locator::new(t, false).find(x, hint);
+        let tau = (x - t[segment]) / (t[segment + 1] - t[segment]);
+        Place { curve, segment, tau, straight: beyond != 0.0 }
     }
 
-    fn is_beside(&self, other: &Place) -> bool {
-        (self.curve, self.segment) == (other.curve, other.segment) && self.start == other.start
+    /// The segment, if an interpolation on it serves the sample.
+    fn shared(&self) -> Option<(usize, usize)> {
+        (0.0 <= self.tau && self.tau <= 1.0).then_some((self.curve, self.segment))
     }
 }
 
-/// Half a segment: the Chebyshev coefficients of the array of its acceleration.
-struct Half<'a> {
+/// Whether the highest coefficients of every column are rounding errors of entries that are as large as the given ones.
+fn is_resolved(coefficients: &[Lane], entries: &[f64]) -> bool {
+    coefficients.chunks(coefficients.len() / entries.len()).zip(entries).all(|(column, entry)| {
+        let [most, error] = sizes(column);
+        error <= ROUNDING * (entry + most)
+    })
+}
+
+/// Samples that are evaluated together.
+struct Block<'a> {
     space: &'a Erased<'a>,
     curves: &'a Curves<'a>,
-    /// The Chebyshev polynomials at the nodes, which are those of order one.
-    cosines: [[Lane; GROUPS]; NODES],
-    segment: Segment<Jet>,
-    gamma: Vec<Jet>,
-    coefficients: Vec<f64>,
+    len: usize,
+    places: Vec<Place>,
+    monitor: Monitor<'a>,
 }
 
-impl<'a> Half<'a> {
-    fn new(space: &'a Erased<'a>, curves: &'a Curves<'a>) -> Self {
-        let len = space.point_len();
-        Half {
-            space,
-            curves,
-            cosines: few(|n| {
-                let cosine = |k: usize| (PI * n as f64 * (k as f64 + 0.5) / NODES as f64).cos();
-                few(|g| Lane::new(few(|l| cosine(g * LANES + l))))
-            }),
-            segment: Segment::new(len),
-            gamma: vec![Jet::constant(Lane::ZERO); len],
-            coefficients: vec![0.0; NODES * len],
-        }
-    }
-
-    /// Points, first derivatives of their arrays, and accelerations at eight positions.
-    fn at(&mut self, tau: Lane) -> [Vec<Lane>; 3] {
-        self.segment.at(
-            self.space,
-            self.gamma.len(),
-            Jet { v: tau, d: Lane::ONE, dd: Lane::ZERO },
-            &mut self.gamma,
-        );
-        let [p, d, mut dd] =
-            [0, 1, 2].map(|order| self.gamma.iter().map(|x| x.parts()[order]).collect::<Vec<_>>());
-        self.space.acceleration(&p, &d, &mut dd);
-        [p, d, dd]
-    }
-
-    fn enter(&mut self, place: &Place) {
-        let len = self.gamma.len();
-        self.segment.read(self.curves, place.curve, place.segment, len);
-        self.segment.prepare(self.space, len);
-        let accelerations = self.cosines[1].map(|y| {
-            let [_, _, w] = self.at(lane(place.start) + (y + Lane::ONE) * lane(0.25));
-            w
-        });
-        for (row, cosines) in self.coefficients.chunks_mut(len).zip(&self.cosines) {
-            for (j, c) in row.iter_mut().enumerate() {
-                let sum = (0..GROUPS).fold(Lane::ZERO, |sum, g| accelerations[g][j].mul_add(cosines[g], sum));
-                *c = 2.0 / NODES as f64 * sum.reduce_add();
+impl Block<'_> {
+    /// Accelerations at positions in segments, segment by segment.
+    fn accelerations(&self, segments: &[(usize, usize)], x: &[f64]) -> Vec<f64> {
+        let Block { space, curves, len, .. } = *self;
+        let mut points = Vec::with_capacity(segments.len() * 2 * len);
+        let [mut after, mut before] = [0, 1].map(|_| Vec::with_capacity(points.capacity()));
+        for &(curve, segment) in segments {
+            let t = curves.knots(curve);
+            let row = (curve * curves.nodes + segment) * len;
+            points.extend_from_slice(&curves.points[row..row + 2 * len]);
+            for (side, velocities) in [&mut after, &mut before].into_iter().zip(curves.one_sided()) {
+                side.extend(velocities[row..row + 2 * len].iter().map(|u| u * (t[segment + 1] - t[segment])));
             }
         }
+        let single =
+            Curves { t: &[0.0, 1.0], nodes: 2, points: &points, velocities: &after, before: &before };
+        let times = Times { x, count: x.len() };
+        let mut values = vec![0.0; segments.len() * x.len() * len];
+        evaluate(
+            space,
+            &single,
+            &times,
+            Quantity::Acceleration,
+            Outside::Continue,
+            &self.monitor,
+            &mut values,
+        );
+        values
     }
 
-    /// The derivatives of the array of the acceleration at eight positions: Σ n cₙ Uₙ₋₁.
-    fn derivatives(&self, tau: Lane, start: f64) -> Vec<Lane> {
-        let len = self.gamma.len();
-        let y = (tau - lane(start)) * lane(4.0) - Lane::ONE;
-        let (mut before, mut u) = (Lane::ZERO, Lane::ONE);
-        let mut sum = vec![Lane::ZERO; len];
-        for (n, row) in self.coefficients.chunks(len).enumerate().skip(1) {
-            let weight = u * lane(4.0 * n as f64);
-            sum.iter_mut().zip(row).for_each(|(sum, c)| *sum = weight.mul_add(lane(*c), *sum));
-            (before, u) = (u, (y + y).mul_sub(u, before));
+    /// The sizes of the numbers from which the entries of accelerations are computed.
+    fn entries(&self, (curve, segment): (usize, usize)) -> Vec<f64> {
+        let Block { curves, len, .. } = *self;
+        let (t, row) = (curves.knots(curve), (curve * curves.nodes + segment) * len);
+        let h = t[segment + 1] - t[segment];
+        let [after, before] = curves.one_sided();
+        let size = |i: usize| {
+            let next = i + len;
+            curves.points[i].abs().max(curves.points[next].abs()) + h * after[i].abs().max(before[next].abs())
+        };
+        (row..row + len).map(size).collect()
+    }
+
+    /// The coefficients of the accelerations on segments.
+    fn interpolated(&self, segments: &[(usize, usize)]) -> Vec<Vec<Lane>> {
+        let row = (MOST + 1) * self.len;
+        let mut values = vec![0.0; segments.len() * row];
+        let mut coefficients = vec![Vec::new(); segments.len()];
+        let mut rough: Vec<usize> = (0..segments.len()).collect();
+        for level in &*LEVELS {
+            let nodes: Vec<usize> = level.new_nodes().collect();
+            let some: Vec<(usize, usize)> = rough.iter().map(|&i| segments[i]).collect();
+            let more = self.accelerations(&some, &nodes.iter().map(|&k| node(k)).collect::<Vec<_>>());
+            for (&i, more) in rough.iter().zip(more.chunks(nodes.len() * self.len)) {
+                let values = &mut values[i * row..(i + 1) * row];
+                for (k, value) in nodes.iter().zip(more.chunks(self.len)) {
+                    values[k * self.len..][..self.len].copy_from_slice(value);
+                }
+                coefficients[i] = level.coefficients(values, self.len);
+            }
+            rough.retain(|&i| !is_resolved(&coefficients[i], &self.entries(segments[i])));
         }
-        sum
+        coefficients
     }
 
-    /// The jerk at up to eight places in this half segment, row by row.
-    fn write(&mut self, places: &[Place], out: &mut [f64]) {
-        let t = self.curves.knots(places[0].curve);
-        let rate = 1.0 / (t[places[0].segment + 1] - t[places[0].segment]);
-        let at: [&Place; LANES] = few(|l| &places[l.min(places.len() - 1)]);
-        let tau = Lane::new(few(|l| at[l].tau));
-        let [p, d, w] = self.at(tau);
-        let mut jerk = self.derivatives(tau, places[0].start);
-        self.space.acceleration(&p, &vec![Lane::ZERO; p.len()], &mut jerk);
-        let form = self.polarised(&p, &d, &w);
-        let cube = Lane::new(few(|l| if at[l].straight { 0.0 } else { 1.0 })) * lane(rate * rate * rate);
-        jerk.iter_mut().zip(&form).for_each(|(jerk, form)| *jerk = (*jerk + *form) * cube);
-        scatter(&jerk, out);
+    /// The derivatives of the arrays of accelerations, in units of the segments.
+    fn derivatives(&self) -> Vec<f64> {
+        let len = self.len;
+        let mut out = vec![0.0; self.places.len() * len];
+        let mut order: Vec<usize> = (0..self.places.len()).collect();
+        order.sort_by_key(|&i| self.places[i].shared());
+        let (beyond, within) = order.split_at(order.partition_point(|&i| self.places[i].shared().is_none()));
+        let [.., last] = &*LEVELS;
+        for &i in beyond {
+            let Place { curve, segment, tau, straight } = self.places[i];
+            if !straight {
+                let x: Vec<f64> = (0..=MOST).map(|k| tau + (2.0 * node(k) - 1.0) * AROUND).collect();
+                let coefficients = last.coefficients(&self.accelerations(&[(curve, segment)], &x), len);
+                let derivative = &mut out[i * len..][..len];
+                differentiate(&coefficients, 0.5, derivative);
+                derivative.iter_mut().for_each(|x| *x /= 2.0 * AROUND);
+            }
+        }
+        let groups: Vec<&[usize]> =
+            within.chunk_by(|&i, &j| self.places[i].shared() == self.places[j].shared()).collect();
+        let segments: Vec<(usize, usize)> =
+            groups.iter().filter_map(|group| self.places[group[0]].shared()).collect();
+        for (group, coefficients) in groups.into_iter().zip(self.interpolated(&segments)) {
+            group.iter().for_each(|&i| {
+                differentiate(&coefficients, self.places[i].tau, &mut out[i * len..][..len]);
+            });
+        }
+        out
+    }
+
+    /// The jerk at every place, given states: points, derivatives of their arrays, and accelerations.
+    fn write(&self, states: &[f64], out: &mut [f64]) {
+        let len = self.len;
+        let derivatives = self.derivatives();
+        let mut lanes = vec![Lane::ZERO; 3 * len];
+        let mut jerk = vec![Lane::ZERO; len];
+        for (k, out) in out.chunks_mut(LANES * len).enumerate() {
+            let at: [usize; LANES] = few(|l| (k * LANES + l).min(self.places.len() - 1));
+            gather(at.map(|i| &states[i * 3 * len..][..3 * len]), &mut lanes);
+            gather(at.map(|i| &derivatives[i * len..][..len]), &mut jerk);
+            let (p, vectors) = lanes.split_at(len);
+            let (d, w) = vectors.split_at(len);
+            let rate = Lane::new(at.map(|i| {
+                let (t, segment) = (self.curves.knots(self.places[i].curve), self.places[i].segment);
+                1.0 / (t[segment + 1] - t[segment])
+            }));
+            jerk.iter_mut().for_each(|x| *x *= rate * rate * rate);
+            self.space.acceleration(p, &vec![Lane::ZERO; len], &mut jerk);
+            let form = self.polarised(p, d, w);
+            let curved = Lane::new(at.map(|i| if self.places[i].straight { 0.0 } else { 1.0 }));
+            jerk.iter_mut().zip(&form).for_each(|(jerk, form)| *jerk = (*jerk + *form) * curved);
+            scatter(&jerk, out);
+        }
     }
 
     /// Q(d, w), from vectors of equal size.
@@ -167,13 +212,12 @@ pub fn jerk(
     out: &mut [f64],
 ) {
     let len = space.point_len();
-    let parallel = out.len() > PARALLEL;
-    let blocks: Vec<(usize, &mut [f64])> = out.chunks_mut(BLOCK * len).enumerate().collect();
-    parallel::for_each(blocks, parallel, monitor, |(block, out)| {
-        let mut half = Half::new(space, curves);
+    let (block, parallel) = (parallel::block(BLOCK, len), out.len() > PARALLEL);
+    let blocks: Vec<(usize, &mut [f64])> = out.chunks_mut(block * len).enumerate().collect();
+    parallel::for_each(blocks, parallel, monitor, |(k, out)| {
+        let (first, samples) = (k * block, out.len() / len);
         let mut hint = 0;
-        let samples = out.len() / len;
-        let places: Vec<Place> = (block * BLOCK..block * BLOCK + samples)
+        let places: Vec<Place> = (first..first + samples)
             .map(|sample| {
                 let (curve, i) = (sample / times.count, sample % times.count);
                 let x = if times.x.len() == times.count { times.x[i] } else { times.x[sample] };
@@ -182,18 +226,14 @@ pub fn jerk(
                 place
             })
             .collect();
-        let mut rest = out;
-        for group in places.chunk_by(|a, b| a.is_beside(b)) {
-            if monitor.poll() {
-                return;
-            }
-            half.enter(&group[0]);
-            for places in group.chunks(LANES) {
-                let (rows, others) = rest.split_at_mut(places.len() * len);
-                half.write(places, rows);
-                rest = others;
-            }
-            monitor.advance(group.len());
-        }
+        let (quantity, size) = (Quantity::Jet, Quantity::Jet.len(space));
+        let job = Job { curves, times, quantity, outside, locator: None, first, apart: 1, size, len };
+        let mut states = vec![0.0; samples * size];
+        space.0.samples(&job, &mut states);
+        // The monitor counts samples, and nodes are none.
+        let go_on = |_| !monitor.poll();
+        let together = Block { space, curves, len, places, monitor: Monitor::new(&go_on) };
+        together.write(&states, out);
+        monitor.advance(samples);
     });
 }

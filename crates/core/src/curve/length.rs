@@ -1,18 +1,43 @@
 //! Integrals along curves, accurate up to rounding errors: lengths, bending energies, and time as a function of length.
 //!
+//! The speed of a curve is no smooth function of time: it has a kink where the curve stops and turns. Its square is
+//! smooth. It is therefore interpolated by polynomials first, whose roots are then integrated, without further values
+//! of the curve.
+//!
 //! Arrays have one row per curve; all rows of an array are equally long.
 
+use super::chebyshev::{LEVELS, MOST, node, sizes};
 use super::data::Times;
+use crate::scalar::{Lane, few, lane, max_or_nan};
+use std::iter::zip;
+use std::sync::LazyLock;
 
-/// The number of positive nodes of the Gauss–Legendre rule, which is applied to an interval and to its halves.
+/// The number of positive nodes of the Gauss–Legendre rule.
 const PAIRS: usize = 5;
 /// Its nodes and weights on [−1, 1]; the others are symmetric.
 const NODES: [f64; PAIRS] =
     [0.14887433898163122, 0.4333953941292472, 0.6794095682990244, 0.8650633666889845, 0.9739065285171717];
 const WEIGHTS: [f64; PAIRS] =
     [0.29552422471475287, 0.26926671930999635, 0.21908636251598204, 0.1494513491505806, 0.06667134430868814];
-/// Rounds in which the error may fail to halve, before it counts as a rounding error.
-const PATIENCE: usize = 5;
+/// An interval is short enough for the rule if the square varies by no more than this factor. A root of the square, near
+/// which it is (t − z)(t − z̄), is then at least 3.7 halves of the interval away from the middle, so that the error of
+/// the rule is 7⁻²⁰ (Trefethen, *Approximation Theory and Approximation Practice*, 2013, theorem 19.3).
+const VARIATION: f64 = 3.0;
+/// The square of this is about the error if the coefficients of its root for the Legendre polynomials of the highest
+/// degrees are no larger, relative to the root.
+const CONVERGED: f64 = 1e-7;
+/// Integrals and errors up to this are negligible, relative to the largest value on the curve times the longest segment.
+const NEGLIGIBLE: f64 = 2e-16;
+/// Rounding errors of a square, relative to its largest value.
+const NOISE: f64 = 4.0 * f64::EPSILON;
+/// If all values of a square are above this, relative to the largest one, rounding errors of its root are negligible.
+const FAR_FROM_ZERO: f64 = 1e-4;
+/// No tolerance is smaller.
+const ROUNDING: f64 = 8.0 * f64::EPSILON;
+/// Errors up to this, relative to the largest coefficient, are rounding errors if further nodes do not halve them.
+const STALLED: f64 = 1e-11;
+/// Rounds in which the error may fail to halve before the bisection ends.
+const PATIENCE: usize = 3;
 /// Values that are computed in one call.
 const AT_ONCE: usize = 1 << 17;
 /// Bisection alone takes at most this number of steps from any interval to two neighbouring floating-point numbers.
@@ -26,13 +51,105 @@ pub trait Integrand {
     fn at(&mut self, times: Times, values: &mut [f64]) -> Result<(), Self::Error>;
 }
 
-/// Intervals in columns, and the integrals over their two halves.
-struct Panels {
-    a: Vec<f64>,
-    middle: Vec<f64>,
-    b: Vec<f64>,
-    left: Vec<f64>,
-    right: Vec<f64>,
+/// The square of a function on an interval of time, relative to that of its largest value there: a Chebyshev series.
+struct Square {
+    start: f64,
+    width: f64,
+    largest: f64,
+    /// The smallest value of the square at the nodes.
+    low: f64,
+    coefficients: Vec<f64>,
+    /// What is negligible, relative to the largest value times the width.
+    negligible: f64,
+}
+
+/// The functions whose integrals with a function are its coefficients for the Legendre polynomials of degrees 8 and 9, at
+/// the positive nodes, with the weights of the rule; in the lanes of the nodes.
+static LEGENDRE: LazyLock<[Lane; 2]> = LazyLock::new(|| {
+    [8, 9].map(|degree| {
+        pairs(|i| {
+            let (mut before, mut here) = (1.0, NODES[i]);
+            for k in 1..degree {
+                let k = k as f64;
+                (before, here) = (here, ((2.0 * k + 1.0) * NODES[i] * here - k * before) / (k + 1.0));
+            }
+            (degree as f64 + 0.5) * WEIGHTS[i] * here
+        })
+    })
+});
+
+/// Lanes with numbers of the pairs of nodes, and 0.
+fn pairs(value: impl Fn(usize) -> f64) -> Lane {
+    Lane::new(few(|i| if i < PAIRS { value(i) } else { 0.0 }))
+}
+
+impl Square {
+    /// Values at positions in [0, 1], by Clenshaw's algorithm.
+    fn at(&self, positions: [Lane; 2]) -> [Lane; 2] {
+        let y = positions.map(|x| x + x - Lane::ONE);
+        let [mut b, mut c] = [[Lane::ZERO; 2]; 2];
+        for coefficient in self.coefficients[1..].iter().rev() {
+            (b, c) = (few(|e| (y[e] + y[e]).mul_add(b[e], lane(*coefficient) - c[e])), b);
+        }
+        few(|e| max_or_nan(y[e].mul_add(b[e], lane(self.coefficients[0]) - c[e]), Lane::ZERO))
+    }
+
+    /// The integral over the interval.
+    fn integral(&self) -> f64 {
+        let even = self.coefficients.iter().step_by(2).enumerate();
+        let sum: f64 = even.map(|(n, c)| c / (1.0 - 4.0 * (n * n) as f64)).sum();
+        sum * self.width * self.largest * self.largest
+    }
+
+    /// The integral of the root over a part of [0, 1] by the rule, and whether it is accurate.
+    fn rule(&self, [u, v]: [f64; 2]) -> (f64, bool) {
+        let (middle, half) = (0.5 * (u + v), 0.5 * (v - u));
+        // Unused lanes repeat a node.
+        let ahead = Lane::new(few(|i| half * NODES[i.min(PAIRS - 1)]));
+        let squares = self.at([lane(middle) - ahead, lane(middle) + ahead]);
+        let [before, behind] = squares.map(|x| x.sqrt());
+        let (even, odd) = (before + behind, behind - before);
+        let sum = (even * pairs(|i| WEIGHTS[i])).reduce_add();
+        let low = squares[0].min(squares[1]).to_array().into_iter().fold(f64::INFINITY, f64::min);
+        let high = squares[0].max(squares[1]).to_array().into_iter().fold(0.0, f64::max);
+        let [eighth, ninth] = *LEGENDRE;
+        let rest = (even * eighth).reduce_add().abs().max((odd * ninth).reduce_add().abs());
+        let rough = high > VARIATION * low || rest > CONVERGED * sum && half * rest > self.negligible;
+        (half * sum, !rough || half * sum <= self.negligible)
+    }
+
+    /// Parts of [0, 1] in their order, and the integrals of the root over them. There are at least two, since tables of
+    /// arc lengths serve the search for closest points, too.
+    fn parts(&self) -> Vec<([f64; 2], f64)> {
+        let mut parts = Vec::new();
+        let mut rest = vec![[0.5, 1.0], [0.0, 0.5]];
+        while let Some([u, v]) = rest.pop() {
+            let (integral, accurate) = self.rule([u, v]);
+            let middle = 0.5 * (u + v);
+            if accurate {
+                parts.push(([u, v], integral * self.largest * self.width));
+            } else {
+                rest.extend([[middle, v], [u, middle]]);
+            }
+        }
+        parts
+    }
+
+    /// Whether rounding errors of the square are those of its root, too. Errors of a root of size s are 1/(2s) times as
+    /// large, which matters where a curve stops and does not turn at once.
+    fn has_root(&self) -> bool {
+        let error = |([u, v], part): ([f64; 2], f64)| {
+            let root = part / (self.largest * self.width * (v - u));
+            (v - u) * root.min(NOISE / root)
+        };
+        self.low > FAR_FROM_ZERO
+            || self.parts().into_iter().map(error).sum::<f64>() <= ROUNDING.max(64.0 * self.negligible)
+    }
+
+    /// The time at a position.
+    fn time(&self, position: f64) -> f64 {
+        self.start + self.width * position
+    }
 }
 
 /// The columns of an array for which `kept` is true.
@@ -49,7 +166,7 @@ fn beside(first: &[f64], second: &[f64], curves: usize) -> Vec<f64> {
     rows.flat_map(|(first, second)| [first, second].concat()).collect()
 }
 
-/// The integrals over intervals from a to b, in rows of `count`.
+/// The integrals over intervals from a to b, in rows of `count`, by the Gauss–Legendre rule.
 fn rule<F: Integrand + ?Sized>(a: &[f64], b: &[f64], count: usize, f: &mut F) -> Result<Vec<f64>, F::Error> {
     let mut result = vec![0.0; a.len()];
     if a.is_empty() {
@@ -68,9 +185,9 @@ fn rule<F: Integrand + ?Sized>(a: &[f64], b: &[f64], count: usize, f: &mut F) ->
         }
         let mut values = vec![0.0; x.len()];
         f.at(Times { x: &x, count: width * 2 * PAIRS }, &mut values)?;
-        for (k, own) in values.chunks(2 * PAIRS).enumerate() {
+        for (k, values) in values.chunks(2 * PAIRS).enumerate() {
             let i = k / width * count + first + k % width;
-            let sum = WEIGHTS.iter().zip(own.as_chunks::<2>().0).map(|(weight, [x, y])| weight * (x + y));
+            let sum = WEIGHTS.iter().zip(values.as_chunks::<2>().0).map(|(weight, [x, y])| weight * (x + y));
             result[i] = sum.sum::<f64>() * ((b[i] - a[i]) / 2.0);
         }
     }
@@ -85,64 +202,129 @@ fn sum(terms: &[f64]) -> f64 {
     }
 }
 
-/// Calls `f` with intervals that cover all segments, in any order, and integrals to the relative tolerance `rtol`.
-///
-/// Intervals are halved until the integral over them is that over their halves, for all curves if one of them needs it.
-/// The speed of a curve has a kink where the curve stops and turns; bisection then converges to the kink. An error that
-/// does not decrease for several rounds is a rounding error, and ends the bisection.
-fn panels<F: Integrand + ?Sized>(
+/// The interpolation of the squares of functions.
+struct Resolver<'a, F: ?Sized, G> {
+    f: &'a mut F,
+    rtol: f64,
+    /// Whether roots of the squares are integrated.
+    roots: bool,
+    /// Receives squares and their curves. The intervals of a curve are in any order.
+    finished: G,
+    /// For every curve, the largest value so far times the longest segment.
+    scales: Vec<f64>,
+}
+
+impl<F: Integrand + ?Sized, G: FnMut(usize, Square)> Resolver<'_, F, G> {
+    /// Interpolates on intervals that cover all segments.
+    ///
+    /// Segments are halved until polynomials interpolate the square to the relative tolerance `rtol`, for all curves if
+    /// one of them needs it. An error that does not decrease for several rounds ends the bisection.
+    fn segments(&mut self, knots: &[f64]) -> Result<(), F::Error> {
+        let curves = self.scales.len();
+        let nodes = knots.len() / curves;
+        let block = (AT_ONCE / ((MOST + 1) * curves)).max(1);
+        for first in (0..nodes - 1).step_by(block) {
+            let last = (first + block).min(nodes - 1);
+            let rows =
+                |shift: usize| knots.chunks(nodes).flat_map(move |row| &row[first + shift..last + shift]);
+            let (mut a, mut b): (Vec<f64>, Vec<f64>) =
+                (rows(0).copied().collect(), rows(1).copied().collect());
+            let (mut before, mut stalled) = (f64::INFINITY, 0);
+            loop {
+                let (rough, error) = self.intervals(&a, &b, stalled > PATIENCE)?;
+                if !rough.contains(&true) {
+                    break;
+                }
+                stalled += usize::from(error > before / 2.0);
+                before = error;
+                let [start, stop] = [&a, &b].map(|x| columns(x, &rough));
+                let middle: Vec<f64> = zip(&start, &stop).map(|(a, b)| a / 2.0 + b / 2.0).collect();
+                a = beside(&start, &middle, curves);
+                b = beside(&middle, &stop, curves);
+            }
+        }
+        Ok(())
+    }
+
+    /// Interpolates on intervals from a to b, with a row of them per curve, at the nodes of more and more levels. Returns
+    /// the columns that are still rough, unless the last level is `accepted` for them, and their error.
+    fn intervals(&mut self, a: &[f64], b: &[f64], accepted: bool) -> Result<(Vec<bool>, f64), F::Error> {
+        let curves = self.scales.len();
+        let count = a.len() / curves;
+        let mut values = vec![0.0; a.len() * (MOST + 1)];
+        let mut errors = vec![f64::INFINITY; a.len()];
+        let mut rough = vec![true; count];
+        for level in &*LEVELS {
+            let open: Vec<usize> = (0..count).filter(|j| rough[*j]).collect();
+            if open.is_empty() {
+                break;
+            }
+            let places: Vec<usize> =
+                (0..curves).flat_map(|c| open.iter().map(move |j| c * count + j)).collect();
+            let nodes: Vec<usize> = level.new_nodes().collect();
+            // At the ends, the speed may be that of the next or the previous segment.
+            let time = |i: usize, k: usize| match k {
+                0 => b[i].next_down().max(a[i]),
+                MOST => a[i].next_up().min(b[i]),
+                _ => a[i] + (b[i] - a[i]) * node(k),
+            };
+            let x: Vec<f64> = places.iter().flat_map(|&i| nodes.iter().map(move |&k| time(i, k))).collect();
+            let mut more = vec![0.0; x.len()];
+            self.f.at(Times { x: &x, count: open.len() * nodes.len() }, &mut more)?;
+            for (&place, more) in places.iter().zip(more.chunks(nodes.len())) {
+                let scale = &mut self.scales[place / count];
+                for (k, value) in nodes.iter().zip(more) {
+                    values[place * (MOST + 1) + k] = *value;
+                    *scale = scale.max(value * (b[place] - a[place]));
+                }
+            }
+            rough.fill(false);
+            let mut squares = Vec::with_capacity(places.len());
+            for place in places {
+                let row = &values[place * (MOST + 1)..(place + 1) * (MOST + 1)];
+                let largest = row.iter().fold(0.0, |most: f64, x| most.max(*x));
+                let largest = if largest > 0.0 { largest } else { 1.0 };
+                let row: Vec<f64> = row.iter().map(|x| (x / largest) * (x / largest)).collect();
+                let (constant, others) = (level.constant(&row), level.coefficients(&row, 1));
+                let [most, error] = sizes(&others);
+                let noise = error > errors[place] / 2.0 && error < STALLED * constant.max(most);
+                errors[place] = error;
+                let width = b[place] - a[place];
+                let relative = self.scales[place / count] / (largest * width);
+                // The root of a square below the square of the tolerance is below the tolerance.
+                let tol = (self.rtol * constant.max(most)).max((self.rtol * relative).powi(2));
+                let mut coefficients = vec![constant];
+                coefficients.extend(others.iter().flat_map(|x| x.to_array()));
+                let low = level.values(&row).fold(f64::INFINITY, f64::min);
+                let negligible = NEGLIGIBLE * relative.max(1.0);
+                let square = Square { start: a[place], width, largest, low, coefficients, negligible };
+                rough[place % count] |= !noise && error > tol || self.roots && !square.has_root();
+                squares.push((place, square));
+            }
+            if accepted && level.is_last() {
+                rough.fill(false);
+            }
+            for (place, square) in squares.into_iter().filter(|(place, _)| !rough[place % count]) {
+                (self.finished)(place / count, square);
+            }
+        }
+        let error = (0..a.len()).filter(|i| rough[i % count]).map(|i| errors[i] * (b[i] - a[i]));
+        Ok((rough.clone(), error.sum()))
+    }
+}
+
+/// Calls `finished` with the squares of functions on intervals that cover all segments, and their curves. Where `roots`
+/// of the squares are integrated, the intervals are short enough for these.
+fn resolve<F: Integrand + ?Sized>(
     knots: &[f64],
     curves: usize,
     rtol: f64,
     f: &mut F,
-    mut finished: impl FnMut(&Panels),
+    roots: bool,
+    finished: impl FnMut(usize, Square),
 ) -> Result<(), F::Error> {
-    let nodes = knots.len() / curves;
-    let mut a: Vec<f64> = knots.chunks(nodes).flat_map(|row| &row[..nodes - 1]).copied().collect();
-    let mut b: Vec<f64> = knots.chunks(nodes).flat_map(|row| &row[1..]).copied().collect();
-    let mut whole = rule(&a, &b, nodes - 1, f)?;
-    let absolute = |row: &[f64]| sum(&row.iter().map(|x| x.abs()).collect::<Vec<_>>());
-    let scale: Vec<f64> = whole.chunks(nodes - 1).map(absolute).collect();
-    let (mut before, mut stalled) = (vec![f64::INFINITY; curves], vec![0; curves]);
-    loop {
-        let count = a.len() / curves;
-        let middle: Vec<f64> = a.iter().zip(&b).map(|(a, b)| a / 2.0 + b / 2.0).collect();
-        // Both halves in one call.
-        let halves = rule(&beside(&a, &middle, curves), &beside(&middle, &b, curves), 2 * count, f)?;
-        let half =
-            |e: usize| halves.chunks(2 * count).flat_map(|row| &row[e * count..][..count]).copied().collect();
-        let [left, right]: [Vec<f64>; 2] = [half(0), half(1)];
-        let mut rough = vec![false; count];
-        for c in 0..curves {
-            let row = c * count..(c + 1) * count;
-            let errors: Vec<f64> = row.map(|i| (left[i] + right[i] - whole[i]).abs()).collect();
-            let error = sum(&errors);
-            stalled[c] +=
-                usize::from(error.partial_cmp(&(before[c] / 2.0)).is_none_or(|order| order.is_gt()));
-            before[c] = error;
-            if stalled[c] <= PATIENCE {
-                rough.iter_mut().zip(&errors).for_each(|(rough, error)| *rough |= *error > rtol * scale[c]);
-            }
-        }
-        let found = Panels { a, middle, b, left, right };
-        if !rough.contains(&true) {
-            finished(&found);
-            return Ok(());
-        }
-        let smooth: Vec<bool> = rough.iter().map(|rough| !rough).collect();
-        let some = |kept: &[bool]| {
-            let [a, middle, b, left, right] =
-                [&found.a, &found.middle, &found.b, &found.left, &found.right].map(|x| columns(x, kept));
-            Panels { a, middle, b, left, right }
-        };
-        if smooth.contains(&true) {
-            finished(&some(&smooth));
-        }
-        let split = some(&rough);
-        a = beside(&split.a, &split.middle, curves);
-        b = beside(&split.middle, &split.b, curves);
-        whole = beside(&split.left, &split.right, curves);
-    }
+    let rtol = rtol.max(ROUNDING);
+    Resolver { f, rtol, roots, finished, scales: vec![0.0; curves] }.segments(knots)
 }
 
 /// The integrals of a function over all segments of every curve, to the relative tolerance `rtol`.
@@ -152,34 +334,11 @@ pub fn lengths<F: Integrand + ?Sized>(
     rtol: f64,
     f: &mut F,
 ) -> Result<Vec<f64>, F::Error> {
-    let mut total = vec![0.0; curves];
-    panels(knots, curves, rtol, f, |own| {
-        let count = own.a.len() / total.len();
-        let halves: Vec<f64> = own.left.iter().zip(&own.right).map(|(left, right)| left + right).collect();
-        total.iter_mut().zip(halves.chunks(count)).for_each(|(total, row)| *total += sum(row));
+    let mut parts = vec![Vec::new(); curves];
+    resolve(knots, curves, rtol, f, true, |curve, square| {
+        parts[curve].push(sum(&square.parts().into_iter().map(|(_, part)| part).collect::<Vec<_>>()));
     })?;
-    Ok(total)
-}
-
-/// The square of a function, in units of the domain, in which it neither overflows nor underflows.
-struct Power<'a, F: ?Sized> {
-    root: &'a mut F,
-    units: &'a [f64],
-}
-
-impl<F: Integrand + ?Sized> Integrand for Power<'_, F> {
-    type Error = F::Error;
-
-    fn at(&mut self, times: Times, values: &mut [f64]) -> Result<(), F::Error> {
-        self.root.at(times, values)?;
-        for (row, unit) in values.chunks_mut(times.count).zip(self.units) {
-            for x in row {
-                let bend = *x * unit * unit;
-                *x = bend * bend / unit;
-            }
-        }
-        Ok(())
-    }
+    Ok(parts.iter().map(|parts| sum(parts)).collect())
 }
 
 /// The bending energies ∫ |∇γ'|² dt, (1), given |∇γ'|.
@@ -189,10 +348,9 @@ pub fn energies<F: Integrand + ?Sized>(
     rtol: f64,
     f: &mut F,
 ) -> Result<Vec<f64>, F::Error> {
-    let nodes = knots.len() / curves;
-    let units: Vec<f64> = knots.chunks(nodes).map(|row| row[nodes - 1] - row[0]).collect();
-    let found = lengths(knots, curves, rtol, &mut Power { root: f, units: &units })?;
-    Ok(found.iter().zip(&units).map(|(energy, unit)| energy / unit / unit / unit).collect())
+    let mut parts = vec![Vec::new(); curves];
+    resolve(knots, curves, rtol, f, false, |curve, square| parts[curve].push(square.integral()))?;
+    Ok(parts.iter().map(|parts| sum(parts)).collect())
 }
 
 /// The arc length of curves, from a table of its values at the ends of short intervals.
@@ -215,28 +373,42 @@ impl ArcLength {
         rtol: f64,
         speed: &mut F,
     ) -> Result<Self, F::Error> {
-        let mut rows: Vec<Vec<(f64, f64)>> = vec![Vec::new(); curves];
-        panels(knots, curves, rtol, speed, |own| {
-            let count = own.a.len() / curves;
-            for (c, row) in rows.iter_mut().enumerate() {
-                let row_of = c * count..(c + 1) * count;
-                row.extend(row_of.flat_map(|i| [(own.a[i], own.left[i]), (own.middle[i], own.right[i])]));
-            }
-        })?;
+        let mut squares: Vec<Vec<Square>> = (0..curves).map(|_| Vec::new()).collect();
+        resolve(knots, curves, rtol, speed, true, |curve, square| squares[curve].push(square))?;
+        let starts = |square: &Square| -> Vec<f64> {
+            square.parts().into_iter().map(|([start, _], _)| square.time(start)).collect()
+        };
+        let mut rows: Vec<Vec<f64>> =
+            squares.iter().map(|row| row.iter().flat_map(starts).collect()).collect();
+        let count = rows.iter().map(Vec::len).max().unwrap_or(0);
         let nodes = knots.len() / curves;
-        let (mut times, mut lengths) = (Vec::new(), Vec::new());
-        for (row, knots) in rows.iter_mut().zip(knots.chunks(nodes)) {
-            row.sort_by(|x, y| x.0.total_cmp(&y.0));
-            let mut length = 0.0;
-            for (start, part) in row {
-                times.push(*start);
-                lengths.push(length);
-                length += *part;
+        let (mut times, mut stops) = (Vec::new(), Vec::new());
+        for (row, knots) in zip(&mut rows, knots.chunks(nodes)) {
+            row.sort_by(f64::total_cmp);
+            row.push(knots[nodes - 1]);
+            for (i, [a, b]) in row.array_windows().enumerate() {
+                // Other curves may have more intervals: some of these are divided, too.
+                let pieces = count / (row.len() - 1) + usize::from(i < count % (row.len() - 1));
+                times.extend((0..pieces).map(|k| a + (b - a) * (k as f64 / pieces as f64)));
             }
-            times.push(knots[nodes - 1]);
+            stops.extend_from_slice(&times[stops.len() + 1..]);
+            stops.push(knots[nodes - 1]);
+        }
+        // Close to a place where the curve stops, the speed has smaller relative errors than the root of its square.
+        let parts = rule(&times, &stops, count, speed)?;
+        let (mut ends, mut lengths) = (Vec::new(), Vec::new());
+        for ((times, parts), knots) in zip(times.chunks(count), parts.chunks(count)).zip(knots.chunks(nodes))
+        {
+            let mut length = 0.0;
+            for (time, part) in zip(times, parts) {
+                ends.push(*time);
+                lengths.push(length);
+                length += part;
+            }
+            ends.push(knots[nodes - 1]);
             lengths.push(length);
         }
-        Ok(ArcLength { curves, times, lengths })
+        Ok(ArcLength { curves, times: ends, lengths })
     }
 
     /// The number of curves.
@@ -329,7 +501,7 @@ impl ArcLength {
             let starts: Vec<f64> = places
                 .iter()
                 .zip(&at)
-                .map(|(&i, x)| sought[i].as_ref().map_or(*x, |own| own.start))
+                .map(|(&i, x)| sought[i].as_ref().map_or(*x, |bracket| bracket.start))
                 .collect();
             let lengths = rule(&starts, &at, active.len(), speed)?;
             let mut rates = vec![0.0; at.len()];

@@ -2,6 +2,7 @@
 
 mod bezier;
 mod bspline;
+mod chebyshev;
 mod collocation;
 mod cumulative;
 pub(crate) mod data;
