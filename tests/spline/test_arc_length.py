@@ -7,6 +7,7 @@ import pytest
 from curves import KNOTS, every_batch, every_kind, points_on
 from refused import raises
 from scipy.integrate import quad
+from scipy.interpolate import CubicSpline
 
 import symspline as ss
 
@@ -65,6 +66,20 @@ def test_a_curve_that_rests_and_turns_back():
     assert np.abs(turning.arc_length(turning.at_length(s)) - s).max() < 1e-14
     still = ss.CubicSpline(None, np.ones((3, 2)), "r:2")
     assert still.length(0, 1) == 0 and still.at_length(0) == 0
+
+
+def test_lengths_of_curves_that_turn_are_total_variations(rng):
+    curves = ss.CubicSpline(np.arange(12.0) + 3, rng.standard_normal((300, 12, 1)), "r:1")
+    # On the two-sphere, along a great circle.
+    angles = 0.3 * curves.points
+    points = np.concatenate([np.cos(angles), np.sin(angles), 0 * angles], axis=-1)
+    circles = ss.CubicSpline(np.arange(12.0) + 3, points, S2)
+    for curve, lengths, circle in zip(curves, curves.length(), circles.length(), strict=True):
+        flat = CubicSpline(curve.t, curve.points[:, 0], bc_type="natural")
+        turns = np.sort(np.r_[curve.t, flat.derivative().roots(extrapolate=False)])
+        exact = np.abs(np.diff(flat(turns))).sum()
+        assert lengths == pytest.approx(exact, rel=1e-12)
+        assert circle == pytest.approx(0.3 * exact, rel=1e-12)
 
 
 def test_dates_of_arc_lengths(rng):

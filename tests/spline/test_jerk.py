@@ -1,5 +1,7 @@
 """The covariant derivative of the acceleration."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from compare import each, largest_difference, parts
@@ -33,6 +35,16 @@ def test_jerk_is_the_derivative_of_the_acceleration(space):
     curve = ss.CubicSpline(KNOTS, points_on(space, 6, step=0.4), space)
     expected = differences(curve, X)
     assert np.abs(curve(X, nu=3) - expected).max() < 1e-9 * max(1, np.abs(expected).max())
+
+
+@pytest.mark.parametrize("name", ["cp:2", "gr:2,5", "cgr:2,4"])
+def test_jerk_of_uneven_and_wide_segments(name, rng):
+    space = ss.space(name)
+    t = 3 + np.cumsum([0, 1.9, 0.4, 1.2, 0.3, 1.6])
+    curve = ss.CubicSpline(t, points_on(space, 6, step=0.7), space)
+    x = np.concatenate([np.linspace(a, b, 9)[1:-1] for a, b in pairwise(t)])
+    expected = differences(curve, x, step=0.002)
+    assert np.abs(curve(x, nu=3) - expected).max() < 1e-8 * np.abs(expected).max()
 
 
 def test_flat_space_of_the_jerk_is_scipys():

@@ -386,10 +386,10 @@ impl ArcLength {
         for (row, knots) in zip(&mut rows, knots.chunks(nodes)) {
             row.sort_by(f64::total_cmp);
             row.push(knots[nodes - 1]);
-            for (i, [a, b]) in row.array_windows().enumerate() {
+            for (i, ends) in row.windows(2).enumerate() {
                 // Other curves may have more intervals: some of these are divided, too.
                 let pieces = count / (row.len() - 1) + usize::from(i < count % (row.len() - 1));
-                times.extend((0..pieces).map(|k| a + (b - a) * (k as f64 / pieces as f64)));
+                times.extend((0..pieces).map(|k| ends[0] + (ends[1] - ends[0]) * (k as f64 / pieces as f64)));
             }
             stops.extend_from_slice(&times[stops.len() + 1..]);
             stops.push(knots[nodes - 1]);
