@@ -176,13 +176,19 @@ class CurveArrays:
     @cached_property
     def compiled(self) -> _core.Curve:
         """The curves as an object of the core."""
-        pairs = zip(self.factors, self._spans, strict=True)
-        return _core.Curve([self._core_arrays(factor, span) for factor, span in pairs])
+        # Loops take fewer calls of functions than comprehensions, and most curves are short.
+        arrays = []
+        for factor, span in zip(self.factors, self._spans, strict=True):
+            arrays.append(self._core_arrays(factor, span))
+        return _core.Curve(arrays)
 
     @cached_property
     def _spans(self) -> list[Span | None]:
         """The spans of the points of factors in large spaces, in which the core computes."""
-        return [self._span_of(factor) if factor.space._is_large else None for factor in self.factors]
+        spans: list[Span | None] = []
+        for factor in self.factors:
+            spans.append(self._span_of(factor) if factor.space._is_large else None)
+        return spans
 
     def _span_of(self, factor: FactorArrays) -> Span:
         vectors = factor.velocities
@@ -198,15 +204,17 @@ class CurveArrays:
             return factor.space._handle, times, *map(np.ascontiguousarray, arrays), None
         if span is not None:
             factor = FactorArrays(span.space, *factor.map(span.coordinates)[1:])
-        return factor.space._handle, self.times, *factor.map(factor.space._as_doubles)[1:]
+        if factor.space._complex:
+            factor = factor.map(factor.space._as_doubles)
+        return factor.space._handle, self.times, *factor[1:]
 
     @cached_property
     def _finishing(self) -> bool:
         """Whether results of the core are not yet those of all factors."""
-        return any(
-            factor.space._complex or isinstance(factor.space, _CONSTANT_ROW) or span is not None
-            for factor, span in zip(self.factors, self._spans, strict=True)
-        )
+        for factor, span in zip(self.factors, self._spans, strict=True):
+            if factor.space._complex or isinstance(factor.space, _CONSTANT_ROW) or span is not None:
+                return True
+        return False
 
     def _finished(self, values: object) -> Any:
         """Return points or vectors from results of the core."""

@@ -171,8 +171,10 @@ def warn_of_representatives(
 
     Parameters
     ----------
-    points, curves, longest_steps
-        As for `warn_of_signs` and `warn_of_far_points`.
+    points : sequence of list of Points
+        The given points of each curve in every factor. A batch counts as one curve. None for masked curves.
+    curves, longest_steps
+        As for `warn_of_far_points`.
     """
     for curve, of_factors in zip(curves, longest_steps, strict=True):
         for (factor, *_), steps in zip(curve.factors, of_factors, strict=True):
@@ -180,14 +182,9 @@ def warn_of_representatives(
             longest = steps.numbers[MAX_STEP] if isinstance(steps, Columns) else steps
             # Operations on arrays would take longer than the rest of this module's work for one curve.
             if longest.item() > limit if longest.size == 1 else (longest > limit).any():
-                warn_of_signs(space, points)
+                warn_of_signs(space, [None if parts is None else [part.numbers for part in parts] for parts in points])
                 warn_of_far_points(curves, longest_steps)
                 return
-
-
-def _longest(steps: Columns | Doubles) -> Doubles:
-    """Return the longest step of every curve."""
-    return steps.numbers[MAX_STEP] if isinstance(steps, Columns) else steps
 
 
 def _longest_near_step(space: AnySpace) -> float:
@@ -206,23 +203,22 @@ def _has_quaternions(space: AnySpace) -> bool:
 # ---- quaternions of opposite sign ----
 
 
-def warn_of_signs(space: AnySpace, curves: Sequence[list[Points] | None]) -> None:
+def warn_of_signs(space: AnySpace, curves: Sequence[list[Array] | None]) -> None:
     """Warn if neighbouring points on S³ are more than a quarter turn apart.
 
     As quaternions they would be closer with the opposite sign. The curve between them turns the long way round.
 
     Parameters
     ----------
-    curves : sequence of list of Points
+    curves : sequence of list of ndarray
         The given points of each curve in every factor. A batch counts as one curve. None for masked curves.
     """
-    pairs = [
-        (number, index, part.numbers)
-        for number, parts in enumerate(curves)
-        for part, factor in zip(parts or (), factors_of(space), strict=parts is not None)
-        if _has_quaternions(factor)
-        for index in _opposite(part.numbers)
-    ]
+    pairs = []
+    for number, parts in enumerate(curves):
+        for points, factor in zip(parts or (), factors_of(space), strict=parts is not None):
+            if _has_quaternions(factor):
+                for index in _opposite(points):
+                    pairs.append((number, index, points))
     if not pairs:
         return
     number, index, points = pairs[0]
@@ -259,19 +255,23 @@ def warn_of_far_points(curves: Sequence[CurveArrays], longest_steps: Sequence[Se
     far_curves: list[_Far] = []
     for number, curve in enumerate(curves):
         for part, steps in zip(curve.parts, longest_steps[number], strict=True):
+            longest = steps.numbers[MAX_STEP] if isinstance(steps, Columns) else steps
             # The deciding angle never exceeds the distance.
-            if (_longest(steps) > FAR * part.space.injectivity_radius).any():
+            if (longest > FAR * part.space.injectivity_radius).any():
                 # Curves that did not converge are reported elsewhere, according to `on_failure`.
                 valid = steps.row("converged").reshape(curve.batch) if isinstance(steps, Columns) else True
                 far_curves += _far_curves(part.space, part.points, valid, [number] * (len(curves) > 1))
-    _warn_of_far(far_curves)
+    if far_curves:
+        _warn_of_far(far_curves)
 
 
-def warn_of_far_data(space: AnySpace, data: Sequence[Points]) -> bool:
+def warn_of_far_data(space: AnySpace, data: Sequence[Array]) -> bool:
     """Warn in the same way about data in every factor that a curve need not pass through, and return whether it did."""
-    parts = zip(factors_of(space), data, strict=True)
-    far_curves = [far for factor, part in parts for far in _far_curves(factor, factor._numbers(part.numbers))]
-    _warn_of_far(far_curves)
+    far_curves: list[_Far] = []
+    for factor, points in zip(factors_of(space), data, strict=True):
+        far_curves += _far_curves(factor, points)
+    if far_curves:
+        _warn_of_far(far_curves)
     return bool(far_curves)
 
 
@@ -295,8 +295,6 @@ def _far_curves(space: AnySpace, points: Array, valid: Any = True, number: Seque
 
 
 def _warn_of_far(far_curves: list[_Far]) -> None:
-    if not far_curves:
-        return
     place, count, steps, space = far_curves[0]
     of = of_index(place)
     others = len({place for place, *_ in far_curves}) - 1

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from itertools import pairwise
 from types import MappingProxyType
 from typing import Any, Generic, NamedTuple, TypeVar
@@ -373,11 +374,8 @@ def validated(
     mask: Mask | None = None,
 ) -> tuple[list[Array], list[Fault]]:
     """Validate points and project them onto the space. Return them in each factor, and the faults of skipped curves."""
-    tasks = [
-        Task(cover_of(factor), times, part.numbers, end, part.tol, mask=mask, skip_invalid=skip_invalid)
-        for factor, part, end in zip(factors_of(space), points, ends, strict=True)
-    ]
-    tasks, faults = validated_tasks(space, tasks, _ANY)
+    problem = Problem(space, times, points, ends, _ANY, mask=mask, skip_invalid=skip_invalid)
+    tasks, faults = validated_tasks(space, tasks_of(problem, factors_of(space)), _ANY)
     return [task.space._numbers(task.points) for task in tasks], faults
 
 
@@ -427,7 +425,7 @@ def hermite_data(
     return _in_factors(space, checked, list(zip(points, velocities, strict=True)))
 
 
-def _validate(task: Task, options: Options) -> tuple[Task, list[Fault]]:
+def _validate(_: Space, task: Task, options: Options) -> tuple[Task, list[Fault]]:
     return validate_on_manifold(task, options) if isinstance(task.space, Manifold) else validate(task)
 
 
@@ -458,7 +456,7 @@ def solve_tasks(
 
 def validated_tasks(space: Space, tasks: list[Task], options: Options) -> tuple[list[Task], list[Fault]]:
     """Validate tasks and project their points. A curve that is skipped in one factor is masked in all of them."""
-    validations = _in_factors(space, lambda _, task: _validate(task, options), tasks)
+    validations = _in_factors(space, partial(_validate, options=options), tasks)
     valid, faults_of_factors = zip(*validations, strict=True)
     if not any(faults_of_factors):
         return list(valid), []
@@ -499,7 +497,7 @@ def _check_precision(problem: ManyProblem) -> list[Fault]:
             knots = np.arange(len(times[number]), dtype=float)
             task = Task(factor, knots, parts_of_curve[i].numbers, NATURAL, parts_of_curve[i].tol)
             try:
-                _validate(task, _ANY)
+                _validate(factor, task, _ANY)
             except ValidationError as error:
                 if not skip:
                     raise error._of_curve(number) from None

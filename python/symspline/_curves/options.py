@@ -97,16 +97,22 @@ def fit_options(
 
     The compiled core validates ``method`` and ``tol``. The usual defaults take no further function call.
     """
+    if extrapolate is not None or on_failure is not _RAISE or progress is not None:
+        check_policies(extrapolate, on_failure, progress)
+    if check is not True:
+        checked_flag(check, "check")
+    return Options(method, tol, None if max_iter is None else whole_number(max_iter, "max_iter", 1))
+
+
+def check_policies(extrapolate: object, on_failure: object, progress: Progress | None) -> None:
+    """Validate the options that fits of all kinds have."""
     if extrapolate is not None:
         checked_extrapolate(extrapolate)
     # == would compare every element of an array.
     if on_failure is not _RAISE:
         check_on_failure(on_failure)
-    if check is not True:
-        checked_flag(check, "check")
     if progress is not None:
         check_progress(progress)
-    return Options(method, tol, None if max_iter is None else whole_number(max_iter, "max_iter", 1))
 
 
 def check_on_failure(on_failure: object) -> None:

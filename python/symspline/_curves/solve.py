@@ -157,8 +157,11 @@ def validate(task: Task) -> tuple[Task, list[Fault]]:
     on_space, raw = _core.validate(
         space._handle, times, points, ends, tol, offsets, None if mask is None else mask.ravel().tolist(), skip
     )
+    task = task._replace(points=on_space, tol=None)
+    if not raw:
+        return task, []
     faults = [from_core(one, Columns.empty(0), 0.0, False) for one in raw]
-    return task._replace(points=on_space, tol=None, mask=without(mask, faults, task.batch) if faults else mask), faults
+    return task._replace(mask=without(mask, faults, task.batch)), faults
 
 
 def without(mask: Mask | None, faults: list[Fault], batch: tuple[int, ...]) -> Mask | None:

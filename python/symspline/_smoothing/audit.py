@@ -12,9 +12,10 @@ from .. import _core
 from .._base.arrays import short_repr
 from .._base.faults import is_silent, of_index, warn
 from .._base.typing import Number
+from .._curves.curve import CurveArrays
 from .._curves.ends import end_kinds
-from .._spaces import AnySpace, Array, Doubles, Space, factors_of
-from .noise import Part, SmoothingData, distances_of, grouped, in_part, is_several, smoothed_spaces, split
+from .._spaces import AnySpace, Array, Doubles, Space, SpecialEuclidean
+from .noise import Part, SmoothingData, distances_of, in_part, is_several, smoothed_spaces, split
 from .report import SmoothingReport, SmoothingWarning
 from .solve import FAST, NOISY, TWO, UNIQUE, SmoothCurves, SmoothedSpline
 
@@ -56,7 +57,9 @@ class Fitted(NamedTuple):
     result : SmoothCurves
         Smooth curves.
     report : SmoothingReport
-        Report for the user, in which an infinite λ is the one that was given.
+        Their report.
+    curve : CurveArrays
+        The curves in the factor of the space to which the part belongs.
     at : ndarray, shape (..., N, *point_shape)
         Points of the curves at the times of the data.
     converged : ndarray of bool
@@ -68,6 +71,7 @@ class Fitted(NamedTuple):
     part: Part
     result: SmoothCurves
     report: SmoothingReport
+    curve: CurveArrays
     at: Array
     converged: NDArray[np.bool_]
     chosen: NDArray[np.bool_]
@@ -94,17 +98,18 @@ def audit(
     choices : ndarray of bool
         Which curves have a λ to choose.
     """
-    space, noisy, batch = spline.space, spline._noisy, spline._noisy.batch
-    at_data: list[Array] = []
-    for factor, curve in zip(factors_of(space), spline._curve.parts, strict=True):
-        at_data += split(factor, curve.evaluate(noisy.times, "point", "raise", noisy.times.ndim > 1))
+    space, noisy, batch = spline._curve.space, spline._noisy, spline._noisy.batch
+    at_data: list[tuple[CurveArrays, Array]] = []
+    for curve in spline._curve.parts:
+        for rows in split(curve.space, curve.evaluate(noisy.times, "point", "raise", noisy.times.ndim > 1)):
+            at_data.append((curve, rows))
     fits, reports, trusted, counts, selected, unique = [], [], [], [], True, True
-    for part, result, rows, smoothed in zip(parts, results, at_data, spline._smoothed, strict=True):
-        report = smoothed.report
+    for part, result, (curve, rows) in zip(parts, results, at_data, strict=True):
+        report = result.smoothed.report
         converged = np.asarray(report.converged)
         chosen = np.isnan(part.lam).reshape(batch) & choices
         given = np.isfinite(part.noise.sigma).reshape(batch) & good
-        fits.append(Fitted(part, result, report, rows, converged, chosen, given))
+        fits.append(Fitted(part, result, report, curve, rows, converged, chosen, given))
         reports.append(report)
         selected &= not result.selection.any()
         unique &= not result.minima.any()
@@ -393,7 +398,8 @@ def _complaints(noisy: SmoothingData, number: int, fit: Fitted, curves: NDArray[
         rows: Array = np.broadcast_to(array, (*noisy.batch, n, *axes)).reshape(-1, n, *axes)[curves]
         return rows
 
-    at, points = (rows.reshape(-1, n, *space._point_shape)[curves] for rows in (fit.at, fit.part.points))
+    at = fit.at.reshape(-1, n, *space._point_shape)[curves]
+    points = fit.part.points.reshape(-1, n, *space._point_shape)[curves]
     data = [of_curves(noisy.times), space._as_doubles(at), space._as_doubles(points), of_curves(noise.weights)]
     rows, deviations = _core.residuals_at(space._handle, *data)
     if noise.information is None:
@@ -408,7 +414,10 @@ def _complaints(noisy: SmoothingData, number: int, fit: Fitted, curves: NDArray[
     corner = None if loss == "linear" else corner_of(loss, space.dim)
     given = np.where(fit.given, fit.result.smoothed.sigma, np.nan).ravel()[curves]
     failures = _core.examine_curves(space._handle, data, rows, deviations, leverage, given, corner)
-    return [(int(curves[k]), _described(np.flatnonzero(observed[k]), tests)) for k, *tests in failures]
+    complaints = []
+    for k, *tests in failures:
+        complaints.append((int(curves[k]), _described(np.flatnonzero(observed[k]), tests)))
+    return complaints
 
 
 def _described(numbers: NDArray[np.intp], tests: list[Any]) -> str:
@@ -528,12 +537,10 @@ def _of_units(sensor: Sensor, ratio: float) -> str:
 
 def _warn_of_varying(space: AnySpace, noisy: SmoothingData, spline: SmoothedSpline, fits: list[Fitted]) -> None:
     """Warn if the motion or its noise varies along a curve whose λ was chosen."""
-    following = 0
-    for factor, part, (fit, *more) in zip(factors_of(space), spline._curve.parts, grouped(space, fits), strict=True):
-        number, following = following, following + 1 + len(more)
-        noise = noisy.noise[number]
+    for number, (fit, noise) in enumerate(zip(fits, noisy.noise, strict=True)):
+        part, factor = fit.curve, fit.curve.space
         # The acceleration of a pose is not that of its rotation and position.
-        if more or noise.information is not None:
+        if isinstance(factor, SpecialEuclidean) or noise.information is not None:
             continue
         df = np.asarray(fit.report.df)
         good = fit.converged & ~np.asarray(fit.report.at_bound) & (df > _FREEDOM) & fit.chosen

@@ -34,7 +34,7 @@ from .._curves.ends import NATURAL, End, freeze_bc_type, is_closed
 from .._curves.failures import raise_or_warn, warn_of_far_data, warn_of_far_points, warn_of_held_points, warn_of_signs
 from .._curves.fit import Fit, Points, Problem, fit, mask_of
 from .._curves.missing import counts_all_samples, data_without_missing, with_remedy
-from .._curves.options import check_on_failure, check_progress, checked_extrapolate
+from .._curves.options import check_policies
 from .._curves.solve import DEFAULTS, in_batch
 from .._spaces import AnySpace, Array, Doubles, Product, Space, SpecialEuclidean, factors_of, space_named
 from ..manifolds._manifold import refuse_functions
@@ -57,7 +57,6 @@ from .solve import (
     NO_CURVE,
     Knots,
     SmoothCurves,
-    Smoothed,
     SolverOptions,
     faults_of,
     geodesic_knots,
@@ -289,9 +288,7 @@ def make_smoothing_spline(
     """
     space = space_named(space)
     refuse_functions(space, "smoothing splines are not made")
-    policy = checked_extrapolate(extrapolate)
-    check_on_failure(on_failure)
-    check_progress(progress)
+    check_policies(extrapolate, on_failure, progress)
     if criterion == "cp" and sigma is None:
         raise ValidationError("criterion='cp' needs the standard deviation of the noise. Pass sigma.")
     bc_type = checked_ends(bc_type, penalty, method)
@@ -307,7 +304,8 @@ def make_smoothing_spline(
     whole, data, of_factors = read_noisy(t, points, space, spaces, weights, frames, sigma, loss, bc_type, atol)
     batch = whole.batch
     lams = per_part(space, spaces, lam, "lam", batch, infinite=True)
-    if np.isinf(lams).any():
+    has_infinite = np.isinf(lams).any()
+    if has_infinite:
         for name, value, required in (("penalty", penalty, "acceleration"), ("bc_type", bc_type, "natural")):
             if value != required:
                 raise ValidationError(
@@ -326,7 +324,7 @@ def make_smoothing_spline(
         raise with_remedy(error, data) from None
     if chosen is not None:
         lams = [lam[chosen] for lam in lams]
-    parts = parts_of(noisy, space, lams, of_factors)
+    parts = parts_of(noisy, space, spaces, lams, of_factors)
     every = knots_for(whole, knots)
     if knots is None and penalty == "jerk":
         every = in_long_gaps(every, whole)
@@ -356,9 +354,12 @@ def make_smoothing_spline(
         options = geodesic_options(space, options)
         results = run(at)
     elif knots is None:
-        results, at = with_enough_knots(every, noisy, parts, run, df_of_part, penalty)
+        results, at = with_enough_knots(every, noisy, parts, lams, run, df_of_part, penalty)
+        fails = False
+        for result in results:
+            fails |= NO_CURVE in result.states
         # Knots in gaps are tried before a larger λ, which would affect the whole curve.
-        if NO_CURVE in np.concatenate([result.states for result in results]):
+        if fails:
             at = in_gaps(at, whole)
             results = run(at, raise_lam=True)
     else:
@@ -373,24 +374,22 @@ def make_smoothing_spline(
         whole = whole._replace(points=[spread(rows) for rows in noisy.points])
         parts = [part.map(spread, noise) for part, noise in zip(parts, whole.noise, strict=True)]
         faults_of_fit = [fault._replace(curve=int(chosen[fault.curve])) for fault in faults_of_fit]
+    if has_infinite:
+        results = [with_infinite_lam(result, part.lam, batch) for result, part in zip(results, parts, strict=True)]
     faults += faults_of_fit
-    spline, fitted = _spline_through(whole, space, parts, results, at, good, bc_type, policy)
-    valid_data = [
-        Points(factor._as_doubles(rows), 0.0, batch, whole.times.shape[-1])
-        for factor, rows in zip(factors_of(space), spline._noisy.points, strict=True)
-    ]
+    spline, fitted = _spline_through(whole, space, parts, results, at, good, bc_type, extrapolate)
     # Errors that this data cause do not show the reason.
     silent = is_silent(UserWarning)
-    far_data = not silent and warn_of_far_data(space, valid_data)
+    far_data = not silent and warn_of_far_data(space, whole.points)
     if faults:
         raise_or_warn(sorted(faults, key=lambda fault: fault.curve), on_failure, spline)
     if silent:
         return spline
     # Between two knots there is nothing to choose. Masked curves are not examined.
     audit(spline, parts, results, good, good & (at.times.shape[-1] > 2))
-    warn_of_signs(space, [valid_data])
+    warn_of_signs(space, [whole.points])
     if whole.used.all():
-        warn_of_held_points(whole.times, spline._noisy.points, batch, SmoothingWarning)
+        warn_of_held_points(whole.times, whole.points, batch, SmoothingWarning)
     if not far_data:
         warn_of_far_points([fitted.curve], [fitted.columns])
     return spline
@@ -400,31 +399,32 @@ def _spline_through(
     whole: SmoothingData,
     space: Space,
     parts: list[Part],
-    curves: list[SmoothCurves],
+    results: list[SmoothCurves],
     at: Knots,
     good: NDArray[np.bool_],
     bc_type: SmoothingBCType,
     policy: Extrapolate,
 ) -> tuple[AnySmoothingSpline, Fit]:
     """Return the spline through smooth points, and its fit. Curves where `good` is False are masked."""
-    batch, count, results = whole.batch, at.times.shape[-1], []
     points: list[Points] = []
     conditions: list[list[End] | None] = []
-    for factor, of_factor in zip(factors_of(space), grouped(space, zip(parts, curves, strict=True)), strict=True):
+    # Loops take fewer calls of functions than comprehensions, and most fits are short.
+    noise, smoothed = [], []
+    for factor, of_factor in zip(factors_of(space), grouped(space, zip(parts, results, strict=True)), strict=True):
         rows, ends = [], []
-        for part, curves_of_part in of_factor:
-            rows.append(curves_of_part.points)
-            ends.append(transport_end_velocities(part, curves_of_part.points))
-            results.append(with_infinite_lam(curves_of_part.smoothed, part.lam, batch))
+        for part, result in of_factor:
+            rows.append(result.points)
+            ends.append(transport_end_velocities(part, result.points))
+            noise.append(part.noise._replace(sigma=np.empty(0)))
+            smoothed.append(result.smoothed)
         doubles = np.ascontiguousarray(factor._as_doubles(join(factor, rows)))
-        points.append(Points(doubles, 0.0, batch, count))
+        points.append(Points(doubles, 0.0, whole.batch, at.times.shape[-1]))
         conditions.append(_joined(factor, ends))
     mask = None if good.all() else good
     fitted = fit(Problem(space, at.times, points, conditions, DEFAULTS, check=False, mask=mask))
-    noise = [noise._replace(sigma=np.empty(0)) for noise in whole.noise]
-    noisy, kept = whole._replace(noise=noise), _conditions(bc_type, conditions, space)
+    kept = _conditions(bc_type, conditions, space)
     curve: AnySmoothingSpline = SmoothingSpline._fitted(whole.time_axis, at.t, fitted.curve, kept, policy, fitted)
-    return curve._with_noise(noisy, results), fitted
+    return curve._with_noise(whole._replace(noise=noise), smoothed), fitted
 
 
 @overload
@@ -575,14 +575,15 @@ def geodesic_options(space: Space, options: SolverOptions) -> SolverOptions:
     return options._replace(method="newton")
 
 
-def with_infinite_lam(part: Smoothed, lam: Doubles, batch: tuple[int, ...]) -> Smoothed:
-    """Return the properties of a fit, whose report has the λ that was given where it is infinite."""
+def with_infinite_lam(result: SmoothCurves, lam: Doubles, batch: tuple[int, ...]) -> SmoothCurves:
+    """Return smooth curves whose report has the λ that was given where it is infinite."""
     if not np.isinf(lam).any():
-        return part
-    given = lam.reshape(batch) if batch else lam[0]
+        return result
+    report, given = result.smoothed.report, lam.reshape(batch) if batch else lam[0]
     infinite = np.isinf(given)
-    lams: Any = np.where(infinite, given, part.report.lam)
-    bound: Any = part.report.at_bound & ~infinite
+    lams: Any = np.where(infinite, given, report.lam)
+    bound: Any = report.at_bound & ~infinite
     if not batch:
         lams, bound = float(lams), bool(bound)
-    return part._replace(report=replace(part.report, lam=lams, at_bound=bound))
+    smoothed = result.smoothed._replace(report=replace(report, lam=lams, at_bound=bound))
+    return result._replace(smoothed=smoothed)

@@ -79,10 +79,10 @@ def in_part(space: AnySpace, number: int, mark: str = "") -> str:
 
 def grouped(space: AnySpace, values: Iterable[_T]) -> list[list[_T]]:
     """Group values of the smoothed spaces by factor."""
-    if not is_several(space):
-        return [list(values)]
-    rest = iter(values)
-    return [list(islice(rest, 2 if isinstance(factor, SpecialEuclidean) else 1)) for factor in factors_of(space)]
+    rest, groups = iter(values), []
+    for factor in factors_of(space):
+        groups.append(list(islice(rest, 2 if isinstance(factor, SpecialEuclidean) else 1)))
+    return groups
 
 
 def split(space: Space, points: Array) -> list[Array]:
@@ -122,8 +122,8 @@ def split_end_vectors(space: Space, ends: list[End] | None) -> list[list[End] | 
 
 def distances_of(space: Space, p: Array, q: Array) -> Doubles:
     """Return the distances of rows of points, without checks."""
-    doubles = [np.ascontiguousarray(space._as_doubles(np.ascontiguousarray(points))) for points in (p, q)]
-    return space._handle.apply("distance", doubles)
+    starts, ends = np.ascontiguousarray(p), np.ascontiguousarray(q)
+    return space._handle.apply("distance", [space._as_doubles(starts), space._as_doubles(ends)])
 
 
 def coordinates_in_parts(space: Space, points: Array) -> Array:
@@ -468,7 +468,10 @@ class SmoothingData(NamedTuple):
     @property
     def used(self) -> NDArray[np.bool_]:
         """Which data have a nonzero weight in some factor, shape (N,) or (..., N)."""
-        return reduce(np.logical_or, [noise.weights > 0 for noise in self.noise])
+        used = self.noise[0].weights > 0
+        for noise in self.noise[1:]:
+            used = used | (noise.weights > 0)
+        return used
 
     def map(self, function: Callable[[Array], Array], batch: tuple[int, ...]) -> SmoothingData:
         """Apply a function to the arrays that have batch axes, such as the selection of some curves."""
@@ -535,7 +538,9 @@ def read_noisy(
     sigmas = per_part(space, spaces, sigma, "sigma", batch)
     # Two points have no outliers and do not determine the noise level.
     loss = "linear" if count == 2 else loss
-    noise = [Noise(part.weights, part.information, of_part, loss) for part, of_part in zip(given, sigmas, strict=True)]
+    noise = []
+    for part, of_part in zip(given, sigmas, strict=True):
+        noise.append(part._replace(sigma=of_part, loss=loss))
     return SmoothingData(time_axis, shown_times, times, [], noise, batch), data, ends
 
 
@@ -596,10 +601,12 @@ def valid_curves(
     # Only points are checked here. Times may repeat, knots need not be times of the data, and the ends of a closed
     # curve are noisy and differ.
     plain = np.arange(data[0].nodes, dtype=np.float64)
-    points, faults = validated(space, plain, data, [end or NATURAL for end in ends], skip, mask)
+    conditions: Ends = [NATURAL] * len(ends) if ends[0] is None else ends
+    points, faults = validated(space, plain, data, conditions, skip, mask)
     noisy = noisy._replace(points=points)
     kept = np.ones(batch, bool) if mask is None else mask.copy()
-    kept.flat[[fault.curve for fault in faults]] = False
+    for fault in faults:
+        kept.flat[fault.curve] = False
     for noise in noisy.noise:
         for number in np.flatnonzero(kept & ~_enough(noisy.times, noise.weights, batch)).tolist():
             too_few = _too_few(noise.weights, batch, number)
@@ -693,13 +700,13 @@ class Part(NamedTuple):
         return self._replace(points=points, noise=noise, ends=NATURAL)
 
 
-def parts_of(noisy: SmoothingData, space: Space, lams: list[Doubles], ends: Ends) -> list[Part]:
+def parts_of(
+    noisy: SmoothingData, space: Space, spaces: tuple[Space, ...], lams: list[Doubles], ends: Ends
+) -> list[Part]:
     """Return the data in every space in which they are smoothed, with their λ and the end conditions of the factors."""
-    spaces: list[Space] = []
     arrays: list[Array] = []
     conditions: list[list[End] | None] = []
     for factor, points, of_factor in zip(factors_of(space), noisy.points, ends, strict=True):
-        spaces += parts_of_factor(factor)
         arrays += split(factor, points)
         conditions += split_end_vectors(factor, of_factor)
     return list(map(Part, spaces, arrays, noisy.noise, lams, conditions))

@@ -189,7 +189,7 @@ class Posterior(NamedTuple):
 
     def known(self, index: Index, kinds: Kinds) -> Known:
         """Return the matrix A of one curve and its end conditions, in the form that the core expects."""
-        arrays = [np.ascontiguousarray(x) for x in (self.band[index], self.side, self.corner)]
+        arrays = list(map(np.ascontiguousarray, (self.band[index], self.side, self.corner)))
         return arrays, self.size, kinds, np.ascontiguousarray(self.turn[index])
 
     def covariance(

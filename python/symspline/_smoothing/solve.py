@@ -185,7 +185,10 @@ def merge_close_knots(knots: Knots, noisy: SmoothingData, lam: float | None, pow
     mean = span / (times.shape[-1] - 1)
     ratio = 1.0
     if lam is not None:
-        ratio = lam / float(max([np.max(np.mean(noise.weights, axis=-1)) for noise in noisy.noise]))
+        heaviest = 0.0
+        for noise in noisy.noise:
+            heaviest = max(heaviest, float(np.max(np.mean(noise.weights, axis=-1))))
+        ratio = lam / heaviest
         # Units of the mean distance prevent overflow.
         for _ in range(power):
             ratio = ratio / mean
@@ -229,13 +232,13 @@ def with_enough_knots(
     whole: Knots,
     noisy: SmoothingData,
     parts: list[Part],
+    lams: list[Doubles],
     run: Callable[[Knots], list[SmoothCurves]],
     df_of_part: DfOfPart,
     penalty: str,
 ) -> tuple[list[SmoothCurves], Knots]:
     """Fit with as many knots as λ and the degrees of freedom require, and return the results and the knots."""
-    lams = np.concatenate([part.lam for part in parts])
-    given = _of_all(lams) if np.isfinite(lams).all() else None
+    given = _of_all(np.concatenate(lams)) if np.isfinite(lams).all() else None
     power, coarser = (3 if penalty == "acceleration" else 5), 1.0
     at = merge_close_knots(whole, noisy, given, power)
     if at.times.shape[-1] > _MANY:
@@ -249,10 +252,13 @@ def with_enough_knots(
             if not np.array_equal(fewer.times, at.times) and fewer.times.shape[-1] <= count:
                 at = fewer
                 continue
-        reports = [result.smoothed.report for result in results]
-        lams, dfs = np.array([(report.lam, report.df) for report in reports]).swapaxes(0, 1)
-        apart = merge_close_knots(whole, noisy, _of_all(lams), power, coarser)
-        most, enough = apart.times.shape[-1], _n_knots_for_df(dfs)
+        chosen, dfs = [], []
+        for result in results:
+            report = result.smoothed.report
+            chosen.append(report.lam)
+            dfs.append(report.df)
+        apart = merge_close_knots(whole, noisy, _of_all(np.array(chosen)), power, coarser)
+        most, enough = apart.times.shape[-1], _n_knots_for_df(np.array(dfs))
         if tries == _TRIES - 1 or (count >= most > 0.8 * count and count > 0.8 * min(enough, most)):
             break
         # A stiff curve needs fewer knots than it had, and a rough curve more.
@@ -547,18 +553,19 @@ def smoothed(
             raise ValidationError(f"the dimension of {part.space!r} is too large for end velocities. Use natural ends.")
         if matrices is not None:
             matrices = np.ascontiguousarray(np.broadcast_to(matrices, (*batch, *matrices.shape[-3:])))
-        y = np.ascontiguousarray(small._as_doubles(points))
-        inside.append((small, span))
-        factors.append((small._handle, y, noise.weights, matrices, part.lam, noise.sigma, ends, None))
+        points = np.ascontiguousarray(points)
+        inside.append((small, points, span))
+        factors.append(
+            (small._handle, small._as_doubles(points), noise.weights, matrices, part.lam, noise.sigma, ends, None)
+        )
     results = []
-    for part, (small, span), factor, raw in zip(
+    for part, (small, points, span), factor, raw in zip(
         parts, inside, factors, _core.smooth(factors, t, at, *how), strict=True
     ):
 
         def solve(lam: Doubles, start: Doubles, factor: _core._Smoothable = factor) -> Raw:
             return Raw.of(_core.smooth([(*factor[:4], lam, *factor[5:7], start)], t, at, *how)[0])
 
-        points = small._numbers(factor[1])
         samples = Samples(t, points, part.noise.weights, at, len(small._point_shape), part.ends is None)
         best, minima = best_of_starts(small, samples, part.lam, Raw.of(raw), solve)
         results.append(_smooth_curves(part, noisy, options, between, small, span, best, minima))
@@ -576,10 +583,11 @@ def _smooth_curves(
     minima: NDArray[np.int_],
 ) -> SmoothCurves:
     batch, sigma = noisy.batch, part.noise.sigma
-    columns = [*raw.columns, np.where(np.isnan(sigma), raw.columns.sigma, sigma)]
-    shaped = [x.reshape(batch) for x in columns] if batch else [x[0].item() for x in columns]
+    shaped: list[Any] = []
+    for column in (*raw.columns, np.where(np.isnan(sigma), raw.columns.sigma, sigma)):
+        shaped.append(column.reshape(batch) if batch else column[0].item())
     state, iterations, lam, band_lam, at_bound, df, estimated, step, rate, _, exact, _, _, _, scale = shaped
-    kinds = [x.reshape(batch) for x in (raw.columns.selection, raw.columns.rejected, minima)]
+    selection, rejected = raw.columns.selection.reshape(batch), raw.columns.rejected.reshape(batch)
     method = METHODS[int(np.any(exact))]
     report = SmoothingReport(method, state == 0, iterations, step, rate, lam, at_bound, df, estimated)
     numbers = small._numbers(raw.points)
@@ -587,7 +595,8 @@ def _smooth_curves(
     # Coordinates in a span of lower dimension are not those of the space.
     posterior = Posterior.of(matrix, turn, size) if span is None or size == 1 else None
     result = Smoothed(report, raw.band, band_lam, scale, between, posterior, options.penalty)
-    return SmoothCurves(numbers if span is None else span.embed(numbers), result, raw.columns.state, *kinds)
+    points = numbers if span is None else span.embed(numbers)
+    return SmoothCurves(points, result, raw.columns.state, selection, rejected, minima.reshape(batch))
 
 
 def faults_of(

@@ -91,7 +91,7 @@ class ControlledSpline(Curve[P]):
             # Control points keep the values that they had after projection.
             points = tuple(control) if isinstance(space, Product) else control[0]
             with entry("control_points"):
-                curve, _ = _opened(points, space, knots, degree, cls._cumulative)
+                curve = _opened(points, space, knots, degree, cls._cumulative)
             degree, knots = curve.degree, curve.knots
         return cls._of(ControlledCurve(space, knots, control, degree, cls._cumulative))
 
@@ -103,10 +103,8 @@ class ControlledSpline(Curve[P]):
         return f"{self.knots.size - self.degree - 1} control points, degree {self.degree}"
 
 
-def _opened(
-    control_points: PointsLike, space: AnySpace, knots: Any, degree: Any, cumulative: bool
-) -> tuple[ControlledCurve, list[Points]]:
-    """Return the curve with given control points and knots, after validation, and the points as given."""
+def _opened(control_points: PointsLike, space: AnySpace, knots: Any, degree: Any, cumulative: bool) -> ControlledCurve:
+    """Return the curve with given control points and knots, after validation."""
     degree = whole_number(degree, "degree", 1)
     factors = factors_of(space)
     data = list(map(_read_factor, parts_of(control_points, space, "control_points"), factors))
@@ -115,7 +113,7 @@ def _opened(
         knots = np.arange(-degree, count + 1) if degree < count else []
     knots = checked_knots(knots, count, degree)
     data = list(map(unwrapped, factors, data))
-    return ControlledCurve(space, knots, list(map(checked_points, factors, data)), degree, cumulative), data
+    return ControlledCurve(space, knots, list(map(checked_points, factors, data)), degree, cumulative)
 
 
 def _read_factor(value: ArrayLike, space: AnySpace) -> Points:
@@ -260,8 +258,8 @@ class BSpline(ControlledSpline[P]):
     _kind = "B-spline"
 
     def __init__(self, knots: ArrayLike, control_points: ArrayLike, degree: int, space: Space[P] | str) -> None:
-        self._curve, data = _opened(control_points, self._checked_space(space), knots, degree, False)
-        warn_of_far_data(self.space, data)
+        self._curve = _opened(control_points, self._checked_space(space), knots, degree, False)
+        warn_of_far_data(self.space, self._curve.control)
 
     @staticmethod
     def _checked_space(space: AnySpace | str) -> AnySpace:
@@ -429,9 +427,9 @@ class CumulativeBSpline(ControlledSpline[P]):
     def __init__(
         self, knots: ArrayLike | None, control_points: PointsLike, space: Space[P] | str, *, degree: int = 3
     ) -> None:
-        self._curve, data = _opened(control_points, self._checked_space(space), knots, degree, True)
+        self._curve = _opened(control_points, self._checked_space(space), knots, degree, True)
         self.report = None
-        warn_of_far_data(self.space, data)
+        warn_of_far_data(self.space, self._curve.control)
 
     @classmethod
     def fit(
