@@ -218,8 +218,6 @@ class CurveArrays:
 
     def _finished(self, values: object) -> Any:
         """Return points or vectors from results of the core."""
-        if not self._finishing:
-            return values
         results = []
         for factor, span, doubles in zip(self.factors, self._spans, self._by_factor(values), strict=True):
             numbers = _all_nan(factor.space, factor.space._numbers(doubles))
@@ -269,7 +267,7 @@ class CurveArrays:
     def _evaluate(self, x: Doubles, quantity: str, outside: str, per_curve: bool, progress: Progress | None) -> Any:
         """Evaluate a quantity into new arrays."""
         values = self.compiled.evaluate(x, quantity, outside, per_curve, progress)
-        return values if quantity in REAL else self._finished(values)
+        return self._finished(values) if self._finishing and quantity not in REAL else values
 
     @cached_property
     def _gaps(self) -> list[Any]:
@@ -335,7 +333,8 @@ class CurveArrays:
         if outside == "continue" and any(fiber is not None for fiber in fibers):
             check_reach(self.times, x)
         # Unitary factors of the lift are the same in the span of the points.
-        return self._finished(self.compiled.lift(x, quantity, outside, per_curve, fibers, progress))
+        values = self.compiled.lift(x, quantity, outside, per_curve, fibers, progress)
+        return self._finished(values) if self._finishing else values
 
     def transport(self, times: tuple[float, float], outside: str, v: ArrayLike) -> Any:
         """Transport one tangent vector per curve in parallel from one time to another.

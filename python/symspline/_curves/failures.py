@@ -290,8 +290,10 @@ def _far_curves(space: AnySpace, points: Array, valid: Any = True, number: Seque
     if steps < _LEAST or isinstance(space, Euclidean):
         return []
     far = np.where(valid, np.count_nonzero(cut_fractions(space, points) > FAR, axis=-1), 0)
-    indices = map(tuple, np.argwhere(far > steps / 2).tolist())
-    return [_Far((*number, *index), int(far[index]), steps, space) for index in indices]
+    far_curves = []
+    for index in map(tuple, np.argwhere(far > steps / 2).tolist()):
+        far_curves.append(_Far((*number, *index), int(far[index]), steps, space))
+    return far_curves
 
 
 def _warn_of_far(far_curves: list[_Far]) -> None:

@@ -376,7 +376,10 @@ def validated(
     """Validate points and project them onto the space. Return them in each factor, and the faults of skipped curves."""
     problem = Problem(space, times, points, ends, _ANY, mask=mask, skip_invalid=skip_invalid)
     tasks, faults = validated_tasks(space, tasks_of(problem, factors_of(space)), _ANY)
-    return [task.space._numbers(task.points) for task in tasks], faults
+    on_space = []
+    for task in tasks:
+        on_space.append(task.space._numbers(task.points))
+    return on_space, faults
 
 
 def hermite_data(

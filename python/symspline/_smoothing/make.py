@@ -30,7 +30,7 @@ from .._base.typing import (
     TimesLike,
 )
 from .._core import ValidationError
-from .._curves.ends import NATURAL, End, freeze_bc_type, is_closed
+from .._curves.ends import NATURAL, End, freeze_bc_type
 from .._curves.failures import raise_or_warn, warn_of_far_data, warn_of_far_points, warn_of_held_points, warn_of_signs
 from .._curves.fit import Fit, Points, Problem, fit, mask_of
 from .._curves.missing import counts_all_samples, data_without_missing, with_remedy
@@ -330,7 +330,7 @@ def make_smoothing_spline(
         every = in_long_gaps(every, whole)
     for needs, what, remedy in (
         (penalty == "jerk", "penalty='jerk'", "Pass more data, or use penalty='acceleration'."),
-        (is_closed(bc_type), "A closed curve", "Pass more data or knots."),
+        (parts[0].ends is None, "A closed curve", "Pass more data or knots."),
     ):
         if needs and every.times.shape[-1] < 4:
             raise ValidationError(f"{what} needs at least 4 knots, but there are {every.times.shape[-1]}. {remedy}")
@@ -411,18 +411,17 @@ def _spline_through(
     # Loops take fewer calls of functions than comprehensions, and most fits are short.
     noise, smoothed = [], []
     for factor, of_factor in zip(factors_of(space), grouped(space, zip(parts, results, strict=True)), strict=True):
-        rows, ends = [], []
+        rows = []
         for part, result in of_factor:
             rows.append(result.points)
-            ends.append(transport_end_velocities(part, result.points))
             noise.append(part.noise._replace(sigma=np.empty(0)))
             smoothed.append(result.smoothed)
         doubles = np.ascontiguousarray(factor._as_doubles(join(factor, rows)))
         points.append(Points(doubles, 0.0, whole.batch, at.times.shape[-1]))
-        conditions.append(_joined(factor, ends))
+        conditions.append(_ends_of_curve(factor, of_factor))
     mask = None if good.all() else good
     fitted = fit(Problem(space, at.times, points, conditions, DEFAULTS, check=False, mask=mask))
-    kept = _conditions(bc_type, conditions, space)
+    kept = bc_type if isinstance(bc_type, str) else _conditions(conditions, space)
     curve: AnySmoothingSpline = SmoothingSpline._fitted(whole.time_axis, at.t, fitted.curve, kept, policy, fitted)
     return curve._with_noise(whole._replace(noise=noise), smoothed), fitted
 
@@ -516,13 +515,11 @@ def _with_lam(part: Part, at: Knots) -> Part:
     return part._replace(lam=np.where(np.isfinite(part.lam), part.lam, cube))
 
 
-def transport_end_velocities(part: Part, curve_points: Array) -> list[End] | None:
+def transport_end_velocities(part: Part, ends: list[End], curve_points: Array) -> list[End]:
     """Transport velocities at the first and the last datum to the ends of the curve."""
-    if part.ends is None or part.ends is NATURAL:
-        return part.ends
     space, axis = part.space, part.axis
     result: list[End] = []
-    for (kind, vector), index in zip(part.ends, (0, -1), strict=True):
+    for (kind, vector), index in zip(ends, (0, -1), strict=True):
         if vector is not None:
             y, x = (np.take(rows, index, axis=axis) for rows in (part.points, curve_points))
             good = space._where_finite(x)
@@ -533,12 +530,17 @@ def transport_end_velocities(part: Part, curve_points: Array) -> list[End] | Non
     return result
 
 
-def _joined(space: Space, ends: list[list[End] | None]) -> list[End] | None:
-    """Combine the end conditions of the parts of a factor."""
-    if ends[0] is None or len(ends) == 1 or ends[0] is NATURAL:
+def _ends_of_curve(space: Space, of_factor: list[tuple[Part, SmoothCurves]]) -> list[End] | None:
+    """Combine the end conditions of the parts of a factor, with velocities at the ends of the curve."""
+    ends: list[list[End]] = []
+    for part, result in of_factor:
+        if part.ends is None or part.ends is NATURAL:
+            return part.ends
+        ends.append(transport_end_velocities(part, part.ends, result.points))
+    if len(ends) == 1:
         return ends[0]
     joined: list[End] = []
-    for of_parts in zip(*[end or [] for end in ends], strict=True):
+    for of_parts in zip(*ends, strict=True):
         pairs = zip(parts_of_factor(space), of_parts, strict=True)
         rows = [part._numbers(vector) for part, (_, vector) in pairs if vector is not None]
         vector = np.ascontiguousarray(space._as_doubles(join(space, rows, 0.0))) if rows else None
@@ -546,10 +548,8 @@ def _joined(space: Space, ends: list[list[End] | None]) -> list[End] | None:
     return joined
 
 
-def _conditions(bc_type: SmoothingBCType, transported: list[list[End] | None], space: Space) -> Any:
-    """Return end conditions in the form of the argument `bc_type`."""
-    if isinstance(bc_type, str):
-        return bc_type
+def _conditions(transported: list[list[End] | None], space: Space) -> Any:
+    """Return end conditions with velocities in the form of the argument `bc_type`."""
 
     def one(e: int) -> object:
         of_factors = [(ends or [])[e] for ends in transported]
