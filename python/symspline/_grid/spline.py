@@ -12,7 +12,7 @@ from .._base.arrays import checked_atol, checked_flag, short_repr, whole_number
 from .._base.typing import Array, Extrapolate, File, GridLook, OnFailure, P, PointsLike, Progress, State, TimesLike
 from .._core import ValidationError
 from .._curves.failures import raise_or_warn
-from .._curves.options import check_on_failure, check_progress, checked_extrapolate, require_matplotlib
+from .._curves.options import check_on_failure, check_policies, check_progress, checked_extrapolate, require_matplotlib
 from .._spaces import AnySpace, Product, Space, cover_of, factors_of, product_norm, space_named
 from .._splines.archive import (
     FORMATS,
@@ -143,10 +143,8 @@ class GridSpline(Generic[P]):
     ) -> None:
         self._space: AnySpace = space_named(space)
         self._symmetric = checked_flag(symmetric, "symmetric")
-        self._extrapolate = checked_extrapolate(extrapolate)
-        check_on_failure(on_failure)
-        check_progress(progress)
-        self._on_failure = on_failure
+        check_policies(extrapolate, on_failure, progress)
+        self._extrapolate, self._on_failure = extrapolate, on_failure
         if not isinstance(axes, (tuple, list)):
             read_axes(axes, None, bc_type)
         arrays, tols, shape = read_nodes(points, self._space, len(axes))

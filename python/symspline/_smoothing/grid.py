@@ -29,7 +29,7 @@ from .._base.typing import (
 )
 from .._core import ConvergenceError, ValidationError
 from .._curves.ends import end_kinds, is_closed
-from .._curves.options import check_on_failure, check_progress, checked_extrapolate
+from .._curves.options import check_policies
 from .._grid import GridReport, GridSpline
 from .._grid.axes import GridAxis, read_axes, read_nodes, validate_nodes
 from .._spaces import AnySpace, Array, Doubles, Euclidean, Product, Space, cover_of, factors_of, space_named
@@ -1127,9 +1127,7 @@ def make_smoothing_grid(
     """
     space = space_named(space)
     refuse_functions(space, "smoothing grids are not made")
-    checked_extrapolate(extrapolate)
-    check_on_failure(on_failure)
-    check_progress(progress)
+    check_policies(extrapolate, on_failure, progress)
     chosen_by = one_of(criterion, "criterion", "gcv", "cp")
     if chosen_by == "cp" and sigma is None:
         raise ValidationError("criterion='cp' needs the standard deviation of the noise. Pass sigma.")
