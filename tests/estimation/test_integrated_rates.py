@@ -17,12 +17,12 @@ def test_turns_at_a_shifted_bias(apart):
     omega = np.stack([0.2 + 0.3 * np.sin(s), 0.4 + 0.3 * np.cos(1.3 * s), 3.0 + 0 * s], axis=-1)
     rates = Rates(s, omega, 1e-3, np.zeros(3), np.ones(3))
     attitudes = attitudes_of(rates, [0.02, -0.03, 0.01], np.linspace(0.5, 9.5, 13))
-    shifted = np.array([0.006, -0.004, 0.005])
-    pairs = _Problem(rates).pairs(attitudes, shifted, apart, 0.0)
-    fresh = _Problem(rates._replace(bias=shifted)).pairs(attitudes, shifted, apart, 0.0)
+    shifted, where = np.array([0.006, -0.004, 0.005]), np.zeros(13, int)
+    pairs = _Problem(rates).pairs(attitudes, where, shifted, apart, 0.0)
+    fresh = _Problem(rates._replace(bias=shifted)).pairs(attitudes, where, shifted, apart, 0.0)
     # The change is of first order, and its error about the square of 0.006 rad/s times 2 s.
     np.testing.assert_allclose(pairs.rest, fresh.rest, atol=2e-4)
-    assert np.abs(_Problem(rates).pairs(attitudes, np.zeros(3), apart, 0.0).rest - fresh.rest).max() > 2e-3
+    assert np.abs(_Problem(rates).pairs(attitudes, where, np.zeros(3), apart, 0.0).rest - fresh.rest).max() > 2e-3
 
 
 @pytest.mark.parametrize(("spread", "turns"), [(1.0, 0), (100.0, 1)])

@@ -36,9 +36,14 @@ def audit(setup: Setup, solution: Solution) -> float:
     float
         Ratio of all residuals to their standard deviations, hardly affected by outliers under a robust loss.
     """
-    sensors = examined(setup, solution)
-    failed = [sensor for sensor in sensors if sensor.finding.failed]
-    complaints = [described(sensor) for sensor in failed] + _of_priors(setup, solution)
+    failed, known = [], []
+    for sensor in examined(setup, solution):
+        finding = sensor.finding
+        if finding.failed:
+            failed.append(sensor)
+        if np.isfinite(finding.ratio):
+            known.append((finding.ratio, finding.freedom))
+    complaints = [*map(described, failed), *_of_priors(setup, solution)]
     if complaints:
         remedies = unit_hints(setup.terms) or advice(failed)
         warn(
@@ -46,7 +51,6 @@ def audit(setup: Setup, solution: Solution) -> float:
             f"be wrong. {' '.join([*complaints, *remedies])}",
             SmoothingWarning,
         )
-    known = [(sensor.finding.ratio, sensor.finding.freedom) for sensor in sensors if np.isfinite(sensor.finding.ratio)]
     ratios, freedoms = np.array(known).reshape(-1, 2).T
     freedom = freedoms.sum()
     if solution.distance > _DISTANCE:
@@ -87,7 +91,13 @@ def _leverages(setup: Setup, solution: Solution) -> list[tuple[float, float]]:
     posterior, kinds = Posterior.of(*solution.posterior[:3]), end_kinds(setup.bc_type)
     m, result = posterior.size, []
     for term, term_rows in zip(setup.terms, solution.rows, strict=True):
-        orders = [nu for nu, jacobian in enumerate(term_rows.jacobians) if jacobian is not None]
+        orders, constants = [], 0
+        for nu, jacobian in enumerate(term_rows.jacobians):
+            if jacobian is not None:
+                orders.append(nu)
+        for constant in term.constants.values():
+            if constant.sigma is None:
+                constants += constant.size
         n = len(term.times)
         order = np.argsort(term.times, kind="stable")
         some = np.unique(np.linspace(0, n - 1, min(n, _SAMPLE)).round().astype(int))
@@ -102,7 +112,6 @@ def _leverages(setup: Setup, solution: Solution) -> list[tuple[float, float]]:
             there = None if others is None else np.ascontiguousarray(x[others])
             return posterior.coupled(setup.knots, (), kinds, np.ascontiguousarray(x[at]), there, orders, np.arange(m))
 
-        constants = sum(constant.size for constant in term.constants.values() if constant.sigma is None)
         if not orders:
             result.append((float(constants), 0.0))
             continue

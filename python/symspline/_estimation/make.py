@@ -31,7 +31,7 @@ from .._curves.failures import raise_or_warn, warn_of_held_points
 from .._curves.fit import FitProblem, fit, read_ends
 from .._curves.fit import Points as CorePoints
 from .._curves.missing import recounting
-from .._curves.options import check_on_failure, check_progress, checked_extrapolate
+from .._curves.options import check_policies
 from .._curves.solve import DEFAULTS
 from .._smoothing import SmoothingReport, SmoothingSpline, SmoothingWarning, make_smoothing_spline
 from .._smoothing.audit import warn_of_bounds
@@ -268,23 +268,21 @@ def estimate(
     space = space_named(space)
     refuse_functions(space, "curves are not estimated")
     refuse_quotients(space, "curves are not estimated")
-    policy = checked_extrapolate(extrapolate)
-    check_on_failure(on_failure)
-    check_progress(progress)
+    check_policies(extrapolate, on_failure, progress)
     if isinstance(measurements, Measurement):
         measurements = [measurements]
     if not isinstance(measurements, (list, tuple)):
         raise ValidationError(f"measurements must be a list of symspline.measure, not {short_repr(measurements)}")
-    given = list(measurements)
+    given, has_rates = list(measurements), False
     for i, measurement in enumerate(given):
         if not isinstance(measurement, Measurement):
             raise ValidationError(f"measurements[{i}] must be one of symspline.measure, not {short_repr(measurement)}")
+        has_rates |= isinstance(measurement, (BodyRates, Velocities))
     if not given:
         raise ValidationError("there are no measurements")
     if checked_flag(skipna, "skipna"):
         given = [measurement_without_missing(measurement) for measurement in given]
     if penalty is None:
-        has_rates = any(isinstance(measurement, (BodyRates, Velocities)) for measurement in given)
         penalty = "jerk" if has_rates else "acceleration"
     one_of(penalty, "penalty", "acceleration", "jerk")
     if criterion is not None:
@@ -310,7 +308,7 @@ def estimate(
             penalty=penalty,
             tol=tol,
             max_iter=most,
-            extrapolate=policy,
+            extrapolate=extrapolate,
             on_failure=on_failure,
             progress=progress,
         )
@@ -330,7 +328,7 @@ def estimate(
         search = solved(setup, begin, progress)
         warn_of_turns(setup, shown)
         warn_of_gaps(shown, times, data)
-    return _curve(setup, search, given, space, axis, shown, policy, on_failure)
+    return _curve(setup, search, given, space, axis, shown, extrapolate, on_failure)
 
 
 def _is_plain(points: Points) -> bool:
@@ -512,23 +510,23 @@ def _curve(
             solution = solution._replace(reports=[replace(report, sigma=ratio) for report in solution.reports])
     factors = factors_of(space)
     parts, ends = [], []
+    bc_type: Any = setup.bc_type
     for factor, points in zip(factors, grouped(space, solution.points), strict=True):
         doubles = np.ascontiguousarray(factor._as_doubles(join(factor, points)))
         parts.append(CorePoints(doubles, 0.0, (), len(setup.knots)))
-        ends.append(read_ends(setup.bc_type, factor, ())[0])
+        ends.append(read_ends(bc_type, factor, ())[0])
     through = fit(FitProblem(space, setup.knots, parts, ends, DEFAULTS, check=False))
     parameters = {
         name: Parameter(solution.values[name], solution.covariance[at, at]) for name, at in setup.columns.items()
     }
-    bc_type: Any = setup.bc_type
     fitted: EstimatedSpline[Any] = EstimatedSpline._fitted(axis, shown, through.curve, bc_type, policy, through)
-    curve = fitted._with_results(
-        in_parts(solution.posterior, solution.reports, setup.spaces),
-        parameters,
-        [long_gaps(setup, solution, number) for number in range(len(setup.spaces))],
-        tuple(given),
-        tuple(_residuals_of(setup, solution, f"measurements[{i}]") for i in range(len(given))),
-    )
+    gaps, residuals = [], []
+    for number in range(len(setup.spaces)):
+        gaps.append(long_gaps(setup, solution, number))
+    for i in range(len(given)):
+        residuals.append(_residuals_of(setup, solution, f"measurements[{i}]"))
+    smoothed = in_parts(solution.posterior, solution.reports, setup.spaces)
+    curve = fitted._with_results(smoothed, parameters, gaps, tuple(given), tuple(residuals))
     if solution.failure:
         hints = unit_hints(setup.terms)
         raise_or_warn([Fault(0, UNCONVERGED, " ".join([solution.failure, *hints]))], on_failure, curve)
@@ -537,8 +535,10 @@ def _curve(
         if isinstance(one, Points) and not isinstance(one.y, tuple):
             warn_of_held_points(np.asarray(one.t), [np.asarray(one.y)], (), SmoothingWarning, f"measurements[{i}].y")
     # Parabolas have no jerk, so that the largest λ does not need a warning.
-    stiff = [setup.penalty == "jerk" and report.df < _PARABOLA for report in solution.reports]
-    chosen = [np.asarray(np.isnan(lam) and not parabola) for lam, parabola in zip(setup.lams, stiff, strict=True)]
+    chosen = []
+    for lam, report in zip(setup.lams, solution.reports, strict=True):
+        is_parabola = setup.penalty == "jerk" and report.df < _PARABOLA
+        chosen.append(np.asarray(np.isnan(lam) and not is_parabola))
     warn_of_bounds(space, list(solution.reports), chosen, [np.asarray(np.inf)] * len(setup.spaces))
     return curve
 

@@ -6,6 +6,8 @@ from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass
 from functools import cache, cached_property
+from itertools import starmap
+from operator import itemgetter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -122,7 +124,9 @@ class Term:
 
     def in_core(self, columns: dict[str, slice]) -> tuple[object, ...]:
         """Return the term in the form of the core, for the columns of all parameters."""
-        places = [None if name is None else (columns[name].start, self.constants[name].size) for name in self.slots]
+        places: list[tuple[int, int] | None] = []
+        for name in self.slots:
+            places.append(None if name is None else (columns[name].start, self.constants[name].size))
         offset = None if self.time_offset is None else columns[self.time_offset].start
         function = self.function(columns)
         # Functions return residuals in standard deviations.
@@ -443,15 +447,14 @@ def bind(measurement: Measurement, label: str, times: Doubles, space: AnySpace, 
 
 def _terms_of(measurement: Measurement, label: str, times: Doubles, space: AnySpace) -> list[Term]:
     spaces, chosen = smoothed_spaces(space), space
-    parts = list(range(len(spaces)))
+    parts, spaces_of_parts = list(range(len(spaces))), list(spaces)
     number = measurement.factor
     if number is not None:
         factors = factors_of(space)
         if isinstance(number, bool) or not isinstance(number, (int, np.integer)) or not 0 <= number < len(factors):
             raise ValidationError(f"{label}.factor must be a factor of {space!r}, 0 to {len(factors) - 1}")
         chosen = factors[number]
-        parts = grouped(space, parts)[number]
-    spaces_of_parts = [spaces[part] for part in parts]
+        parts, spaces_of_parts = grouped(space, parts)[number], grouped(space, spaces)[number]
     if isinstance(measurement, Points):
         y: Any = measurement.y
         if isinstance(chosen, SpecialEuclidean) and not isinstance(y, tuple):
@@ -633,18 +636,19 @@ class Setup:
     @cached_property
     def least_squares(self) -> bool:
         """Whether no loss is robust."""
-        return all(term.loss == "linear" for term in self.terms)
+        return {term.loss for term in self.terms} <= {"linear"}
 
-    def state(self, points: list[Array], values: Values) -> tuple[list[Doubles], Doubles]:
-        """Return points and values of parameters in the form of the core; missing values are those of the start."""
-        doubles = list(map(_doubles, self.spaces, points))
-        starts = [values.get(name, constant.start) for name, constant in self.constants.items()]
-        return doubles, np.concatenate([np.empty(0), *starts])
+    def in_core(self, points: list[Array], values: Values) -> tuple[_core._Problem, list[Doubles], Doubles]:
+        """Return the problem, and points and values of parameters, in the form of the core.
 
-    def in_core(self) -> _core._Problem:
-        """Return the problem in the form of the core."""
+        Missing values are those of the start.
+        """
         handles, groups, priors, terms = self._arrays
-        return handles, groups, self.knots, self.penalty, priors, terms
+        starts = [np.empty(0)]
+        for name, constant in self.constants.items():
+            starts.append(values.get(name, constant.start))
+        problem = handles, groups, self.knots, self.penalty, priors, terms
+        return problem, list(map(_doubles, self.spaces, points)), np.concatenate(starts)
 
     @cached_property
     def _arrays(self) -> tuple[list[_core.Handle], list[Doubles | None], Doubles, list[tuple[object, ...]]]:
@@ -658,7 +662,10 @@ class Setup:
         for space in self.spaces:
             handles.append(space._handle)
             groups.append(np.ascontiguousarray(body_of(space).inverse) if is_compact_group(space) else None)
-        return handles, groups, np.concatenate(priors), [term.in_core(self.columns) for term in self.terms]
+        terms = []
+        for term in self.terms:
+            terms.append(term.in_core(self.columns))
+        return handles, groups, np.concatenate(priors), terms
 
 
 class Rows(NamedTuple):
@@ -727,16 +734,21 @@ class Solution(NamedTuple):
 
 def iterate(setup: Setup, points: list[Array], values: Values, progress: Progress | None) -> Solution:
     """Iterate from points at the knots until the step is small."""
-    problem, (start, constants) = setup.in_core(), setup.state(points, values)
+    problem, start, constants = setup.in_core(points, values)
     lams, criterion, gamma = setup.lams.tolist(), setup.criterion, setup.gamma
     raw = _core.estimate(problem, start, constants, lams, criterion, gamma, setup.tol, setup.max_iter, progress)
     if isinstance(raw, np.ndarray):
         raise _undetermined(setup, raw)
     failed, number, step = raw["failure"], raw["iterations"], raw["step"]
-    reports = [
-        SmoothingReport("linearized", failed is None, number, step, raw["rate"], lam, bound, df, raw["sigma"])
-        for lam, bound, df in zip(raw["lams"], raw["at_bound"], raw["df"], strict=True)
-    ]
+    reports, solved_points = [], []
+    solved_values: Values = {}
+    for lam, bound, df in zip(raw["lams"], raw["at_bound"], raw["df"], strict=True):
+        report = SmoothingReport("linearized", failed is None, number, step, raw["rate"], lam, bound, df, raw["sigma"])
+        reports.append(report)
+    for space, rows in zip(setup.spaces, raw["points"], strict=True):
+        solved_points.append(space._numbers(rows))
+    for name, index in setup.columns.items():
+        solved_values[name] = raw["values"][index]
     information, covariance = raw["information"], np.full_like(raw["information"], np.nan)
     if np.isfinite(information).all():
         covariance = np.asarray(np.linalg.pinv(information, hermitian=True), np.float64)
@@ -745,12 +757,12 @@ def iterate(setup: Setup, points: list[Array], values: Values, progress: Progres
         normal = np.random.default_rng(0).standard_normal((_SAMPLES, raw["variances"].size))
         distance = _core.distance_from_minimum(problem, raw["points"], raw["values"], raw["lams"], band, normal)
     return Solution(
-        [space._numbers(rows) for space, rows in zip(setup.spaces, raw["points"], strict=True)],
-        {name: raw["values"][index] for name, index in setup.columns.items()},
+        solved_points,
+        solved_values,
         reports,
-        Posterior(band, np.zeros((0, 0)), sum(space.dim for space in setup.spaces), side, corner),
+        Posterior(band, np.zeros((0, 0)), raw["variances"].shape[1], side, corner),
         covariance,
-        [Rows(*rows) for rows in raw["terms"]],
+        list(starmap(Rows, raw["terms"])),
         raw["variances"],
         raw["loss"],
         raw["turn"],
@@ -761,8 +773,9 @@ def iterate(setup: Setup, points: list[Array], values: Values, progress: Progres
 
 def residuals(setup: Setup, points: list[Array], values: Values) -> list[Doubles] | None:
     """Return the residuals of all terms for the spline through points at the knots; None if it does not exist."""
-    of_terms = _core.linearise(setup.in_core(), *setup.state(points, values), False)
-    return None if of_terms is None else [Rows(*rows).residuals for rows in of_terms]
+    of_terms = _core.linearise(*setup.in_core(points, values), False)
+    # The first entry of the rows of each term.
+    return None if of_terms is None else list(map(itemgetter(0), of_terms))
 
 
 def _undetermined(setup: Setup, information: Doubles) -> ValidationError:

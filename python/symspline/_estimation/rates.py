@@ -166,12 +166,16 @@ class Integral:
         self._matrices = _core.convert_rotations(quaternions, "scalar first", "matrix", np.inf)[0]
         steps = 0.5 * np.diff(self._t)[:, None, None] * (self._matrices[1:] + self._matrices[:-1])
         self._sums = np.concatenate([np.zeros((1, 3, 3)), np.cumsum(steps, axis=0)])
+        # The last times with their result: searches for a bias ask for the same ones again and again.
+        self._known: tuple[Doubles, tuple[Doubles, Doubles]] | None = None
 
     def at(self, x: Doubles) -> tuple[Doubles, Doubles]:
         """Return the rotations G at times x, and ∫G dt.
 
         If the bias changes by b, G changes to G exp(−Gᵀ∫G dt b) in the first order.
         """
+        if self._known is not None and x is self._known[0]:
+            return self._known[1]
         last = max(len(self._t) - 2, 0)
         i = np.clip(np.searchsorted(self._t, x, side="right") - 1, 0, last)
         s = (x - self._t[i])[:, None]
@@ -181,7 +185,9 @@ class Integral:
         inner = np.clip(s, 0.0, h)
         turn = s * self._omega[i] + inner * (s - 0.5 * inner) / h * (self._omega[after] - self._omega[i])
         rotations = self._matrices[i] @ _exp(turn)
-        return rotations, self._sums[i] + 0.5 * s[..., None] * (self._matrices[i] + rotations)
+        result = rotations, self._sums[i] + 0.5 * s[..., None] * (self._matrices[i] + rotations)
+        self._known = x, result
+        return result
 
 
 class _Pairs(NamedTuple):
@@ -238,13 +244,15 @@ class _Problem:
         self.integral = Integral(self.rates, bias)
         return self.integral
 
-    def pairs(self, attitudes: Attitudes, bias: Doubles, apart: int, more: float) -> _Pairs:
+    def pairs(self, attitudes: Attitudes, where: NDArray[np.intp], bias: Doubles, apart: int, more: float) -> _Pairs:
         """Return the turns between attitudes whose indices differ by a given number.
 
         Parameters
         ----------
         attitudes : Attitudes
             Attitudes.
+        where : ndarray of int
+            Numbers of the segments that contain them.
         bias : ndarray
             Bias about which the turns are linearised.
         apart : int
@@ -253,7 +261,7 @@ class _Problem:
             Additional standard deviation of every attitude.
         """
         integral = self.integrate(bias)
-        t, where = attitudes.times, self.segment(attitudes.times)
+        t = attitudes.times
         i = np.arange(len(t) - apart)
         i = i[(where[i] >= 0) & (where[i] == where[i + apart]) & (t[i + apart] > t[i])]
         j = i + apart
@@ -278,8 +286,9 @@ class _Problem:
         most, proposals = (_COMPARED_OFFSETS, _PROPOSED_OFFSETS) if more else (_COMPARED, _PROPOSALS)
         index = np.linspace(0, len(attitudes.times) - 1, min(len(attitudes.times), most)).astype(int)
         some = attitudes.taken(np.unique(index))
+        where = self.segment(some.times)
         for number in range(3):
-            pairs = self.pairs(some, bias, 1, more)
+            pairs = self.pairs(some, where, bias, 1, more)
             if not len(pairs.rest):
                 return bias
             changes = np.zeros((1, 3))
@@ -295,7 +304,7 @@ class _Problem:
         # make the bias precise.
         apart = 2
         while apart < len(some.times):
-            pairs = self.pairs(some, bias, apart, more)
+            pairs = self.pairs(some, where, bias, apart, more)
             if len(pairs.rest):
                 bias = bias + self._improved(pairs, bias, np.zeros(3))
             apart *= 2
@@ -390,7 +399,8 @@ class _Problem:
             if late:
                 offset += float(step[6])
                 t = attitudes.times + offset
-            g, turned = self._since_first(t, bias)
+            if free or late:
+                g, turned = self._since_first(t, bias)
         squares = np.sum(_log((first @ g).swapaxes(-1, -2) @ r) ** 2, axis=-1) / variances
         return first, bias, float(np.minimum(squares, _LIMIT).mean()), offset
 
@@ -450,10 +460,11 @@ class Path:
             problem.limit_bias(share)
             bias = problem.consensus(attitudes)
             alignments = [problem.aligned(attitudes.taken(segment), bias) for segment in segments]
-            counts = np.array([len(segment) for segment in segments])
-            misfit = float(np.average([result[2] for result in alignments], weights=counts))
+            _, biases, misfits, _ = zip(*alignments, strict=True)
+            counts = list(map(len, segments))
+            misfit = float(np.average(misfits, weights=counts))
             if misfit < self.misfit:
-                self.bias, self.misfit = alignments[int(np.argmax(counts))][1], misfit
+                self.bias, self.misfit = biases[int(np.argmax(counts))], misfit
             if misfit < _BAD:
                 break
         # All segments share the bias of the segment with the most attitudes.
@@ -506,9 +517,10 @@ def _best_offset(problem: _Problem, attitudes: Attitudes, start: float, low: flo
         if not segments:
             return np.inf, offset
         alignments = [problem.aligned(shifted.taken(index), bias, more, width) for index in segments]
-        counts = np.array([len(index) for index in segments])
-        score, longest = float(np.average([result[2] for result in alignments], weights=counts)), int(np.argmax(counts))
-        return score, float(np.clip(offset + alignments[longest][3], low, high))
+        _, _, misfits, later = zip(*alignments, strict=True)
+        counts = list(map(len, segments))
+        improved = offset + later[int(np.argmax(counts))]
+        return float(np.average(misfits, weights=counts)), float(np.clip(improved, low, high))
 
     score, best = compared(start, 4 * step)
     if score > 3 + 4 * np.sqrt(6 / len(some)):

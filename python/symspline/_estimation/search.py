@@ -70,7 +70,11 @@ class Start(NamedTuple):
 
     def points(self, knots: Doubles) -> list[Array]:
         """Return points at the knots in every part."""
-        return [path(knots) for path in self.paths]
+        # Loops take fewer calls of functions than comprehensions; most spaces have few parts.
+        points = []
+        for path in self.paths:
+            points.append(path(knots))
+        return points
 
 
 def starts(setup: Setup, space: AnySpace, axis: TimeAxis, start: object) -> Iterator[Start]:
@@ -137,7 +141,7 @@ def _candidates(setup: Setup, part: int, space: AnySpace) -> list[Callable[[], S
             vectors += [(times, *_rows(np.eye(3), matrices)) for times, matrices in turned]
             return _integrated(setup, space, rates[0], vectors)
 
-        several = sum(len(attitude.attitudes.times) for attitude in attitudes)
+        several = sum([len(attitude.attitudes.times) for attitude in attitudes])
         candidates = [aligned] if several else []
         if forces or (seen and several < _FEW) or not several:
             candidates.insert(0 if several < _FEW else 1, by_vectors)
@@ -232,18 +236,21 @@ class _Seen(NamedTuple):
 
 def _attitudes(space: AnySpace, points: list[PointTerm], seen: list[DirectionTerm]) -> list[_Seen]:
     """Return measured attitudes; if they are few, also attitudes computed from simultaneous directions."""
-    known = [
-        _Seen(Attitudes(term.times, body_of(space).matrices(term.y), term.scales), term.time_offset) for term in points
-    ]
-    if sum(len(result.attitudes.times) for result in known) >= _FEW:
+    known, count = [], 0
+    for term in points:
+        attitudes = Attitudes(term.times, body_of(space).matrices(term.y), term.scales)
+        known.append(_Seen(attitudes, term.time_offset))
+        count += len(term.times)
+    if count >= _FEW:
         return known
-    for term in seen:
-        profile = np.einsum("nki,nkl->nil", term.reference, term.seen)
+    for direction in seen:
+        profile = np.einsum("nki,nkl->nil", direction.reference, direction.seen)
         sizes = np.linalg.svd(profile, compute_uv=False)
         good = sizes[:, 1] > _RANK * sizes[:, 0]
         if good.any():
-            sigma = np.mean(term.noise[good], axis=1)
-            known.append(_Seen(Attitudes(term.times[good], nearest_rotations(profile[good]), sigma), term.time_offset))
+            sigma = np.mean(direction.noise[good], axis=1)
+            attitudes = Attitudes(direction.times[good], nearest_rotations(profile[good]), sigma)
+            known.append(_Seen(attitudes, direction.time_offset))
     return known
 
 
@@ -265,13 +272,8 @@ def _with_rates(
     offsets = [attitude.time_offset for attitude in attitudes]
     chosen = None if None in offsets else max(dict.fromkeys(offsets), key=offsets.count)
     alike = [attitude.attitudes for attitude in attitudes if attitude.time_offset == chosen]
-    times = np.concatenate([some.times for some in alike]) + began(chosen)
-    order = np.argsort(times, kind="stable")
-    data = Attitudes(
-        times[order],
-        np.concatenate([some.matrices for some in alike])[order],
-        np.concatenate([some.sigma for some in alike])[order],
-    )
+    data = Attitudes(*map(np.concatenate, zip(*alike, strict=True))).later(began(chosen))
+    data = data.taken(np.argsort(data.times, kind="stable"))
     given = _rates_of(setup, first, [term for term in rates if term is not first and term.time_offset == name])
     given = given._replace(times=given.times + began(name))
     low, high = float(setup.knots[0]), float(setup.knots[-1])
@@ -631,8 +633,9 @@ def automatic(
                 break
         else:
             if before is not None:
-                sigma, last = (float(result.solution.reports[0].sigma) for result in (search, before[2]))
-                at_bound = any(bool(report.at_bound) for report in search.solution.reports)
+                reports, reports_before = search.solution.reports, before[2].solution.reports
+                sigma, last = float(reports[0].sigma), float(reports_before[0].sigma)
+                at_bound = any(bool(report.at_bound) for report in reports)
                 few = at_bound or len(now.knots) < _FEW_KNOTS * len(data)
                 in_vain = 0 if sigma < 0.95 * last or few else in_vain + 1
                 misses = _misses(search.solution) and in_vain < _IN_VAIN
@@ -656,15 +659,16 @@ def _moved(coarse: Setup, before: Solution, fine: Setup, solution: Solution) -> 
     """Return the largest distance of the curve with fewer knots, in standard deviations."""
     x = np.clip(fine.knots, coarse.knots[0], coarse.knots[-1])
     # The distances are the lengths of the residuals of points.
-    parts = enumerate(zip(fine.spaces, solution.points, strict=True))
-    points: list[Term] = [
-        PointTerm("", Points(x, y, sigma=1.0), x, part, space, y, np.ones((len(x), space.dim)))
-        for part, (space, y) in parts
-    ]
+    points: list[Term] = []
+    for part, (space, y) in enumerate(zip(fine.spaces, solution.points, strict=True)):
+        noise = np.ones((len(x), space.dim))
+        points.append(PointTerm("", Points(x, y, sigma=1.0), x, part, space, y, noise))
     apart = residuals(replace(coarse, terms=points), before.points, before.values)
     if apart is None:
         return float("inf")
-    squares = sum((rows**2).sum(axis=1) for rows in apart)
+    squares = np.zeros(len(x))
+    for rows in apart:
+        squares += (rows**2).sum(axis=1)
     return float(np.sqrt(np.max(squares / solution.variances.sum(axis=1))))
 
 

@@ -68,17 +68,16 @@ def _course(order: int, lam: float, variance: Variance) -> Course:
 
 def long_gaps(setup: Setup, solution: Solution, part: int) -> LongGaps | None:
     """Return the long gaps of a part, or None if there are none or the part has no points that can be predicted."""
-    terms = [k for k, term in enumerate(setup.terms) if part in term.parts]
-    of_part = [setup.terms[k] for k in terms]
-    has_points = PointTerm in map(type, of_part)
+    terms, times_of_terms, weights, has_points = [], [], [], False
+    for k, term in enumerate(setup.terms):
+        if part in term.parts:
+            terms.append(k)
+            times_of_terms.append(np.clip(term.shifted_times(solution.values), setup.knots[0], setup.knots[-1]))
+            weights.append(term.scales**-2.0 if isinstance(term, PointTerm) else np.zeros(len(term.times)))
+            has_points |= isinstance(term, PointTerm)
     lam = float(solution.reports[part].lam)
     if solution.failure or not has_points or not 0 < lam < np.inf:
         return None
-    times_of_terms = [np.clip(term.shifted_times(solution.values), setup.knots[0], setup.knots[-1]) for term in of_part]
-    weights = [
-        term.scales**-2.0 if isinstance(term, PointTerm) else np.zeros(len(x))
-        for term, x in zip(of_part, times_of_terms, strict=True)
-    ]
     order = np.argsort(np.concatenate(times_of_terms), kind="stable")
     times, weight = np.concatenate(times_of_terms)[order], np.concatenate(weights)[order]
     if not np.ptp(times) > 0:
