@@ -97,14 +97,18 @@ pub fn sizes(column: &[Lane]) -> [f64; 2] {
 pub fn differentiate(coefficients: &[Lane], position: f64, out: &mut [f64]) {
     let lanes = coefficients.len() / out.len();
     let y = 2.0 * position - 1.0;
+    let mut first = [1.0; LANES];
+    for n in 1..LANES {
+        first[n] = 2.0 * y * first[n - 1] - if n > 1 { first[n - 2] } else { 0.0 };
+    }
+    // Uₙ₊ₖ = 2 Tₖ Uₙ − Uₙ₋ₖ for the number k of lanes, a power of two, with U₋₁ = 0 and U₋ₙ = −Uₙ₋₂.
+    let turn = lane(2.0 * (0..LANES.ilog2()).fold(y, |t, _| 2.0 * t * t - 1.0));
+    let mut before = Lane::new(few(|l| if l + 1 < LANES { -first[LANES - 2 - l] } else { 0.0 }));
+    let mut u = Lane::new(first);
     let mut weights = [Lane::ZERO; MOST / LANES];
-    let (mut before, mut u) = (0.0, 1.0);
     for (block, weights) in weights[..lanes].iter_mut().enumerate() {
-        *weights = Lane::new(few(|l| {
-            let weight = 2.0 * (block * LANES + l + 1) as f64 * u;
-            (before, u) = (u, 2.0 * y * u - before);
-            weight
-        }));
+        *weights = u * Lane::new(few(|l| 2.0 * (block * LANES + l + 1) as f64));
+        (before, u) = (u, turn.mul_sub(u, before));
     }
     for (sum, column) in out.iter_mut().zip(coefficients.chunks(lanes)) {
         let terms = column.iter().zip(&weights);

@@ -115,6 +115,7 @@ impl Block<'_> {
         let row = (MOST + 1) * self.len;
         let mut values = vec![0.0; segments.len() * row];
         let mut coefficients = vec![Vec::new(); segments.len()];
+        let entries: Vec<Vec<f64>> = segments.iter().map(|segment| self.entries(*segment)).collect();
         let mut rough: Vec<usize> = (0..segments.len()).collect();
         for level in &*LEVELS {
             let nodes: Vec<usize> = level.new_nodes().collect();
@@ -127,7 +128,7 @@ impl Block<'_> {
                 }
                 coefficients[i] = level.coefficients(values, self.len);
             }
-            rough.retain(|&i| !is_resolved(&coefficients[i], &self.entries(segments[i])));
+            rough.retain(|&i| !is_resolved(&coefficients[i], &entries[i]));
         }
         coefficients
     }
