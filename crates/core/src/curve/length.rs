@@ -31,7 +31,7 @@ const NEGLIGIBLE: f64 = 2e-16;
 /// Rounding errors of a square, relative to its largest value.
 const NOISE: f64 = 4.0 * f64::EPSILON;
 /// If all values of a square are above this, relative to the largest one, rounding errors of its root are negligible.
-const FAR_FROM_ZERO: f64 = 1e-4;
+const FAR_FROM_ZERO: f64 = 1e-2;
 /// No tolerance is smaller.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
 /// Errors up to this, relative to the largest coefficient, are rounding errors if further nodes do not halve them.
