@@ -9,7 +9,7 @@ attained only for short steps, so that their factors are tested there, but hardl
 import numpy as np
 import pytest
 from cases import base_point, loop_over, unit_tangent
-from spaces.lie import Lie, bracket
+from lie import Lie, bracket
 
 import symspline as ss
 
