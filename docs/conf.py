@@ -61,7 +61,7 @@ nitpicky = True
 nitpick_ignore = [("py:obj", "spline")]
 # Other projects' names cannot be looked up without a network, and types of arrays stand for what they take.
 nitpick_ignore_regex = [
-    ("py:class", r"ndarray|array_like|optional|value|str to float|bool|max_speed|\d+|[A-Za-z]|\*\w+"),
+    ("py:class", r"ndarray|shape|array_like|optional|value|str to float|bool|max_speed|\d+|[A-Za-z]|\*\w+"),
     ("py:obj", "transvection"),
     (
         "py:.*",
