@@ -260,3 +260,11 @@ def test_other_times_beyond_the_last_knot():
     curve = ss.BezierCurve(THREE, S2)
     assert np.array_equal(curve(1 + 2**-52), curve(1.0))
     raises("outside", curve, 1 + 10 * 2**-52)
+
+
+def test_a_batch_without_curves_has_checked_knots():
+    for knots in ([0, 1, 1], [0, np.nan, 1]):
+        for call in (ss.CubicSpline, ss.PiecewiseGeodesic, ss.fit):
+            raises(r"t\[[12]\]", call, knots, np.zeros((0, 3, 3)), "sphere:2")
+        empty = np.zeros((0, 3, 3))
+        raises(r"t\[[12]\]", ss.HermiteSpline, knots, empty, empty, "sphere:2")

@@ -2,12 +2,8 @@
 
 import sys
 
-import numpy as np
 import pytest
 from limited import run
-from refused import raises
-
-import symspline as ss
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="limits of memory as Linux has them")
 
@@ -111,14 +107,6 @@ def test_little_address_space_never_aborts():
     print(failed)
     """
     assert run(script, 200).strip() == "[]"
-
-
-def test_a_batch_without_curves_has_checked_knots():
-    for knots in ([0, 1, 1], [0, np.nan, 1]):
-        for call in (ss.CubicSpline, ss.PiecewiseGeodesic, ss.fit):
-            raises(r"t\[[12]\]", call, knots, np.zeros((0, 3, 3)), "sphere:2")
-        empty = np.zeros((0, 3, 3))
-        raises(r"t\[[12]\]", ss.HermiteSpline, knots, empty, empty, "sphere:2")
 
 
 def test_pools_of_other_sizes_end():

@@ -232,7 +232,8 @@ def with_remedy(
     at = (*(() if of_many else error.curve or ()), error.node)
     if times is not None and np.isnan(times[at if times.ndim > 1 else error.node]):
         return error._with_message(f"{error}. Pass skipna=True to omit missing samples.")
-    if any(np.isnan(part.numbers[at]).any() for part in data):
+    # A batch without curves has knots, and no points.
+    if any(part.numbers.size and np.isnan(part.numbers[at]).any() for part in data):
         return error._with_message(f"{error}. Pass skipna=True to omit missing points (NaN).")
     return error
 
