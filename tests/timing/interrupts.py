@@ -258,7 +258,10 @@ CALLS = {
     ),
     "geo.resample": ("d = table_of_tracks(500000)", "ss.geo.resample(d, '1min', time='time', by='by', max_gap='1h')"),
     "read_tum": ("f = written(1000000)", "ss.poses.read_tum(f)"),
-    "save": ("c = [spline('so:3', 100)] * 20000", "ss.save(c, Path(tempfile.mkdtemp()) / 'a.npz')"),
+    "save": (
+        "c = {str(i): spline('so:3', 100) for i in range(20000)}",
+        "ss.save(c, Path(tempfile.mkdtemp()) / 'a.npz')",
+    ),
 }
 
 
