@@ -82,6 +82,16 @@ def test_lengths_of_curves_that_turn_are_total_variations(rng):
         assert circle == pytest.approx(0.3 * exact, rel=1e-12)
 
 
+@pytest.mark.parametrize(("origin", "unit"), [(0.1, 1.0), (1e6, 1e-3)])
+def test_the_whole_length_is_an_arc_length(rng, origin, unit):
+    # Rounding errors are large beside the steps between points, and between times.
+    for _ in range(50):
+        t = origin + unit * np.cumsum(rng.uniform(0.1, 2, 5))
+        curve = ss.CubicSpline(t, 1 + 1e-6 * rng.standard_normal((5, 3)), "r:3")
+        assert curve.at_length(curve.length()) == pytest.approx(t[-1], abs=1e-6 * (t[-1] - t[0]))
+    raises("is not an arc length", curve.at_length, 1.001 * curve.length())
+
+
 def test_dates_of_arc_lengths(rng):
     t = np.datetime64("2024-02-28T23:59", "s") + np.cumsum(rng.integers(1, 90, 40))
     points = walk(rng)

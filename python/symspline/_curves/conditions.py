@@ -93,7 +93,7 @@ def with_knots(time_axis: TimeAxis, shown: Array, times: Doubles, batch: tuple[i
 
 
 def _check_additional(shown: Array, which: list[int]) -> None:
-    """Raise ValidationError if there is no time for an additional knot between the knots beside it."""
+    """Raise ValidationError if no number lies between two knots that need an additional knot between them."""
     for end in which:
         before, added, after = np.moveaxis(shown[..., :3] if end == 0 else shown[..., -3:], -1, 0)
         # Knots that do not increase are another error.

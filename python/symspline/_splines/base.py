@@ -520,9 +520,13 @@ class Curve(ABC, Generic[P]):
         wanted = self._with_batch(cast(array), per_curve, array.ndim - len(batch) * per_curve)
         if 0 in batch:
             return self._shown_times(wanted)
-        total = self._arc.lengths[:, -1].reshape(batch + (1,) * (wanted.ndim - len(batch)))
-        # An arc length that exceeds the length by rounding is the length, such as the last of np.linspace.
+        shape = batch + (1,) * (wanted.ndim - len(batch))
+        total = self._arc.lengths[:, -1].reshape(shape)
+        # An arc length that exceeds the length by rounding is the length, such as the last of np.linspace. `length`
+        # sums other intervals, and the sums differ by more where rounding errors are large beside steps of time.
         reach = _ROUNDING * total
+        if (wanted > total + reach).any():
+            reach += np.abs(np.reshape(length(self._curve), shape) - total)
         wrong = ~((wanted >= -reach) & (wanted <= total + reach)) & ~np.isnan(total)
         refuse(
             wrong | np.isnan(wanted),
