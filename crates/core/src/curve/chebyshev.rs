@@ -13,6 +13,8 @@ const FIRST: usize = LANES;
 pub const MOST: usize = FIRST << (COUNT - 1);
 /// The number of coefficients of highest degree that are compared with rounding errors.
 const HIGHEST: usize = 3;
+/// Rounding errors of [`HIGHEST`] coefficients are hardly ever all smaller than this part of those of a lane.
+const FLAT: f64 = 0.05;
 
 /// The interpolation by polynomials of degree N at N + 1 nodes.
 pub struct Level {
@@ -91,6 +93,12 @@ pub fn sizes(column: &[Lane]) -> [f64; 2] {
     let most = |x: &[f64]| x.iter().fold(0.0, |most: f64, c| most.max(c.abs()));
     let all = column.iter().fold(Lane::ZERO, |most, c| most.max(c.abs()));
     [most(&all.to_array()), most(&column[column.len() - 1].to_array()[LANES - HIGHEST..])]
+}
+
+/// Whether the coefficients of the highest degrees do not decrease, as those of rounding errors.
+pub fn is_flat(column: &[Lane]) -> bool {
+    let [most, highest] = sizes(&column[column.len() - 1..]);
+    column.len() > 1 && highest > FLAT * most
 }
 
 /// The derivatives of columns at a position: Σ 2n cₙ Uₙ₋₁.

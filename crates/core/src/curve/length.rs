@@ -6,7 +6,7 @@
 //!
 //! Arrays have one row per curve; all rows of an array are equally long.
 
-use super::chebyshev::{LEVELS, MOST, node, sizes};
+use super::chebyshev::{LEVELS, MOST, is_flat, node, sizes};
 use super::data::Times;
 use crate::scalar::{Lane, few, lane, max_or_nan};
 use std::iter::zip;
@@ -34,8 +34,9 @@ const NOISE: f64 = 4.0 * f64::EPSILON;
 const FAR_FROM_ZERO: f64 = 1e-2;
 /// No tolerance is smaller.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
-/// Errors up to this, relative to the largest coefficient, are rounding errors if further nodes do not halve them.
-const STALLED: f64 = 1e-11;
+/// Errors up to this, relative to the largest coefficient, are rounding errors if the coefficients do not decrease: those
+/// of a function that converges so slowly would be larger.
+const UNCERTAIN: f64 = 1e-10;
 /// Rounds in which the error may fail to halve before the bisection ends.
 const PATIENCE: usize = 3;
 /// Values that are computed in one call.
@@ -287,7 +288,7 @@ impl<F: Integrand + ?Sized, G: FnMut(usize, Square)> Resolver<'_, F, G> {
                 let row: Vec<f64> = row.iter().map(|x| (x / largest) * (x / largest)).collect();
                 let (constant, others) = (level.constant(&row), level.coefficients(&row, 1));
                 let [most, error] = sizes(&others);
-                let noise = error > errors[place] / 2.0 && error < STALLED * constant.max(most);
+                let noise = is_flat(&others) && error < UNCERTAIN * constant.max(most);
                 errors[place] = error;
                 let width = b[place] - a[place];
                 let relative = self.scales[place / count] / (largest * width);
