@@ -1,6 +1,6 @@
 //! The loops over knots and samples, for every space: the layer above `fit` and `curve`.
 
-use crate::curve::Job;
+use crate::curve::{Job, Moving};
 use crate::fit::{C2Residual, Chain, ChainEnds, NodeVectors, Run, Visit, sweep, sweep_by_table};
 use crate::scalar::{LANES, Lane};
 use crate::space::{Covered, Erased, Evaluation, Kernels, Space};
@@ -38,6 +38,12 @@ impl<M: Space> Kernels for M {
     fn samples(&self, job: &Job, out: &mut [f64]) {
         self.evaluate_with(SampleCall { job, out });
     }
+    fn push(&self, moving: &Moving, motions: &[f64], out: &mut [f64]) {
+        self.evaluate_with(PushCall { moving, motions, out });
+    }
+    fn pull(&self, moving: &Moving, cotangents: &[f64], out: &mut [f64]) {
+        self.evaluate_with(PullCall { moving, cotangents, out });
+    }
 }
 
 /// A block of samples and where its results go.
@@ -61,5 +67,45 @@ impl Evaluation for SampleCall<'_> {
             return self.job.run_by_table(&Erased(space), self.out);
         }
         self.job.run_covered(space, self.out);
+    }
+}
+
+/// Motions of the control points, and where the motions of samples go.
+struct PushCall<'a> {
+    moving: &'a Moving<'a>,
+    motions: &'a [f64],
+    out: &'a mut [f64],
+}
+
+impl Evaluation for PushCall<'_> {
+    fn direct<M: Space>(self, space: &M) {
+        if M::HOT && !SMALL {
+            self.moving.push(space, self.motions, self.out)
+        } else {
+            self.moving.push_by_table(&Erased(space), self.motions, self.out)
+        }
+    }
+    fn covered<C: Covered>(self, space: &C) {
+        self.moving.push_covered(space, self.motions, self.out);
+    }
+}
+
+/// Cotangent vectors of samples, and where those of the control points go.
+struct PullCall<'a> {
+    moving: &'a Moving<'a>,
+    cotangents: &'a [f64],
+    out: &'a mut [f64],
+}
+
+impl Evaluation for PullCall<'_> {
+    fn direct<M: Space>(self, space: &M) {
+        if M::HOT && !SMALL {
+            self.moving.pull(space, self.cotangents, self.out)
+        } else {
+            self.moving.pull_by_table(&Erased(space), self.cotangents, self.out)
+        }
+    }
+    fn covered<C: Covered>(self, space: &C) {
+        self.moving.pull_covered(space, self.cotangents, self.out);
     }
 }

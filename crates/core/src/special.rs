@@ -9,7 +9,7 @@
 //! Small arguments use the Taylor series, others the library functions. The choice for a lane depends on its own
 //! argument only, so that a result never depends on its neighbours.
 
-use crate::scalar::{Lane, Scalar, few, lane};
+use crate::scalar::{Dual, Jet, Lane, Scalar, few, lane};
 
 /// Largest |x| for which [`Trig`] uses its Taylor series: 12 terms leave less than 1e-19 there.
 const TRIG_SERIES: f64 = 2.5;
@@ -238,6 +238,47 @@ pub fn slerp<S: Scalar>(t: S, y: S, rest: impl Fn() -> Lane) -> [S; 2] {
     let theta2 = y.compose([f[0] * f[0] * yv * rest, two * f[0], two * f[1]]);
     let f = y.compose(f);
     [f * sine(-t + Lane::ONE, theta2), f * sine(t, theta2)]
+}
+
+/// The weights of a geodesic between two points, and their partial derivatives.
+pub struct Weights<S> {
+    /// sin((1−t)θ)/sin θ and sin(tθ)/sin θ
+    pub at: [S; 2],
+    /// ∂/∂y
+    pub by_y: [S; 2],
+    /// ∂/∂t
+    pub by_t: [S; 2],
+}
+
+impl<S: Scalar> Weights<S> {
+    /// The same as [`slerp`], with derivatives. Numbers with two derivatives are not supported.
+    #[inline(always)]
+    pub fn new(t: S, y: S, rest: impl Fn() -> Lane) -> Self {
+        let yv = y.value();
+        // F = θ/sin θ with one derivative more than S has.
+        let f = if S::ORDER == 0 { arc::<Dual>(yv, &rest) } else { arc::<Jet>(yv, &rest) };
+        let far = yv.simd_gt(Lane::ONE);
+        let two = lane(2.0);
+        let rest = if far.any() { far.select(rest(), two - yv) } else { two - yv };
+        let theta2 = y.compose([f[0] * f[0] * yv * rest, two * f[0], two * f[1]]);
+        let (factor, slope) = (y.compose(f), y.compose([f[1], f[2], Lane::ZERO]));
+        let weight = |t: S| {
+            let square = t * t;
+            let z = square * theta2;
+            let (_, [j, j1, j2]) =
+                if S::ORDER == 0 { defects::<Dual>(z.value()) } else { defects::<Jet>(z.value()) };
+            // s = sin√z/√z = 1 − z j
+            let zv = z.value();
+            let (s, s1, s2) = (j.mul_neg_add(zv, Lane::ONE), -zv.mul_add(j1, j), -zv.mul_add(j2, j1 + j1));
+            let (s, s1) = (z.compose([s, s1, s2]), z.compose([s1, s2, Lane::ZERO]));
+            let h = t * s;
+            // θ² has the derivative 2F.
+            let by_y = slope * h + (factor * factor) * (square * t) * s1 * two;
+            [factor * h, by_y, factor * (z * s1 * two + s)]
+        };
+        let [from, to] = [weight(-t + Lane::ONE), weight(t)];
+        Weights { at: [from[0], to[0]], by_y: [from[1], to[1]], by_t: [-from[2], to[2]] }
+    }
 }
 
 /// h = sin(tθ)/θ as a function of t and θ² = x. With s(z) = sin√z/√z at z = t²x it is t s, and its derivatives are

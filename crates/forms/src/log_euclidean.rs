@@ -141,6 +141,12 @@ impl Ambient for LogEuclidean {
     fn inner(&self, p: &[Lane], u: &[Lane], v: &[Lane]) -> Lane {
         self.enter(p, u).inner(&self.enter(p, v))
     }
+    fn raise(&self, p: &[Lane], gradient: &mut [Lane]) {
+        // The derivative of the exponential is symmetric.
+        let y = self.log_of(p);
+        let by_log = self.derivative(&EXP, &y, &self.read(gradient).hermitian_part());
+        self.leave(&y, &by_log, gradient);
+    }
 }
 
 impl Frame for LogEuclidean {

@@ -259,6 +259,12 @@ impl<const D: usize, A: Storage> Ambient for PositiveDefinite<D, A> {
         let l = cholesky(&self.read(p));
         whiten(&l, &self.read(u)).inner(&whiten(&l, &self.read(v)))
     }
+    fn raise(&self, p: &[Lane], gradient: &mut [Lane]) {
+        // p λ p
+        let x = self.read(p);
+        let v = x.times(&self.read(gradient).hermitian_part()).times(&x).hermitian_part();
+        self.tangential(p, v).write(gradient);
+    }
     fn project(&self, x: &mut [Lane]) -> Lane {
         let before = self.read(x);
         let p = before.hermitian_part();

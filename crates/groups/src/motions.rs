@@ -1,9 +1,10 @@
 //! Rigid motions as a unit quaternion and a translation: the double cover of SE(3), in which curves are evaluated.
 
-use crate::rigid::{Motion, Twist, conjugate, cross, multiply, rotate};
+use crate::rigid::{Motion, Quaternion, Twist, conjugate, cross, multiply, rotate};
 use crate::rotations::{angular, times_pure};
-use symspline_core::scalar::{Each, Lane, Scalar, dot, few, lane};
+use symspline_core::scalar::{Dual, Each, Lane, Scalar, dot, few, lane};
 use symspline_core::space::Ambient;
+use symspline_vectors::constant_curvature as cc;
 
 /// The group of unit quaternions q and translations t; a point is (q, t), seven numbers.
 #[derive(Clone, Copy, Debug)]
@@ -42,6 +43,14 @@ fn between<S: Scalar>(g: &Motion<S>, h: &Motion<S>) -> Motion<S> {
     Motion { q: multiply(back, h.q), t: rotate(back, few(|i| h.t[i] - g.t[i])) }
 }
 
+/// The dual quaternion of a motion.
+#[inline(always)]
+fn dual(y: &[Lane]) -> Quaternion<Dual> {
+    let g = read(y);
+    let d = multiply([Lane::ZERO, g.t[0], g.t[1], g.t[2]], g.q);
+    few(|i| Dual { v: g.q[i], d: d[i] * lane(0.5) })
+}
+
 impl Ambient for Motions {
     fn point_len(&self) -> usize {
         7
@@ -77,10 +86,60 @@ impl Ambient for Motions {
         let (xi, _) = between(&g, &read(q)).log();
         write(&g.times(&Motion::exp(xi.each(|x| x.each(|x| x * t)))), out);
     }
+    /// Cotangent vectors are gradients with respect to the array.
+    fn pairing(&self, _p: &[Lane], u: &[Lane], v: &[Lane]) -> Lane {
+        dot(u, v)
+    }
+    #[inline(always)]
+    fn raise(&self, _p: &[Lane], _gradient: &mut [Lane]) {}
+    /// With ε² = 0, rigid motions are the dual quaternions q + ε t q/2 of length one, and their geodesics are those of the
+    /// sphere over dual numbers (Clifford 1873; Kavan et al., *Geometric skinning with approximate dual quaternion
+    /// blending*, 2008). A cotangent vector (λ, μ) of a dual number is the number μ + ελ: the ε part of its product is the
+    /// pairing.
+    #[inline(always)]
+    fn pull_back(
+        &self,
+        p: &[Lane],
+        q: &[Lane],
+        t: Lane,
+        cotangent: &[Lane],
+        to_p: &mut [Lane],
+        to_q: &mut [Lane],
+    ) -> Lane {
+        let [x, y] = [dual(p), dual(q)];
+        let mut here = [Dual::constant(Lane::ZERO); 4];
+        let at = Dual::constant(t);
+        cc::geodesic::<1, false, Dual>(&x, &y, at, &mut here);
+        // With t = 2 d q̄: gradients 2μq with respect to d, and λ − 2μd with respect to q.
+        let mu = [Lane::ZERO, cotangent[4], cotangent[5], cotangent[6]].each(|x| x + x);
+        let [by_d, turn] = [here.each(|x| x.v), here.each(|x| x.d)].each(|x| multiply(mu, x));
+        let lifted: Quaternion<Dual> = few(|i| Dual { v: by_d[i], d: cotangent[i] - turn[i] });
+        let [mut to_x, mut to_y] = [[Dual::constant(Lane::ZERO); 4]; 2];
+        let rate = cc::pull_back::<1, false, Dual>(&x, &y, at, &lifted, &mut to_x, &mut to_y);
+        for (y, gradient, sum) in [(p, to_x, to_p), (q, to_y, to_q)] {
+            // With d = t q/2.
+            let (g, by_d) = (read(y), gradient.each(|x| x.v * lane(0.5)));
+            let turn = multiply([Lane::ZERO, g.t[0], g.t[1], g.t[2]], by_d);
+            let by_t = multiply(by_d, conjugate(g.q));
+            for i in 0..4 {
+                sum[i] += gradient[i].d - turn[i];
+            }
+            for i in 0..3 {
+                sum[4 + i] += by_t[1 + i];
+            }
+        }
+        rate.d
+    }
     fn transvect(&self, p: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]) {
         let g = read(p);
         let half = Motion::exp(twist(&g, v).each(|x| x.each(|x| x * lane(0.5))));
         write(&g.times(&half).times(&between(&g, &read(x))).times(&half), out);
+    }
+    /// With p' = pξ, the vector q Ad(e^{−Ω/2}) ξ.
+    fn parallel_transport(&self, p: &[Lane], q: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]) {
+        let g = read(p);
+        let back = Motion::exp(twist(&g, v).each(|x| x.each(|x| x * lane(-0.5))));
+        write_vector(&read(q), back.adjoint(twist(&g, x)), out);
     }
     #[inline(always)]
     fn velocity(&self, gamma: &[Lane], d: &mut [Lane]) {

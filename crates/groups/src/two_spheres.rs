@@ -33,6 +33,26 @@ impl Ambient for TwoSpheres {
             cc::geodesic::<1, false, S>(&p[k..k + 4], &q[k..k + 4], t, &mut out[k..k + 4]);
         }
     }
+    #[inline(always)]
+    fn raise(&self, _p: &[Lane], _gradient: &mut [Lane]) {}
+    #[inline(always)]
+    fn pull_back(
+        &self,
+        p: &[Lane],
+        q: &[Lane],
+        t: Lane,
+        cotangent: &[Lane],
+        to_p: &mut [Lane],
+        to_q: &mut [Lane],
+    ) -> Lane {
+        let mut rate = Lane::ZERO;
+        for (((p, q), x), (to_p, to_q)) in (p.chunks_exact(4).zip(q.chunks_exact(4)).zip(cotangent.chunks_exact(4)))
+            .zip(to_p.chunks_exact_mut(4).zip(to_q.chunks_exact_mut(4)))
+        {
+            rate += cc::pull_back::<1, false, Lane>(p, q, t, x, to_p, to_q);
+        }
+        rate
+    }
     fn transvect(&self, p: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]) {
         for k in [0, 4] {
             cc::transvect::<1, false>(&p[k..k + 4], &v[k..k + 4], &x[k..k + 4], &mut out[k..k + 4]);

@@ -193,6 +193,10 @@ impl<const D: usize, A: Storage> Ambient for UnitaryGroup<D, A> {
     fn inner(&self, _p: &[Lane], u: &[Lane], v: &[Lane]) -> Lane {
         self.read(u).inner(&self.read(v)) * Self::metric()
     }
+    fn raise(&self, p: &[Lane], gradient: &mut [Lane]) {
+        self.velocity(p, gradient);
+        gradient.iter_mut().for_each(|x| *x *= lane(1.0) / Self::metric());
+    }
     fn project(&self, x: &mut [Lane]) -> Lane {
         let mut p = self.read(x);
         let defect = p.adjoint_times(&p).plus_identity(lane(-1.0));

@@ -15,7 +15,7 @@ use symspline_core::matrix::{
     log_any_one_plus,
 };
 use symspline_core::scalar::{Lane, Scalar, lane, max_or_nan};
-use symspline_core::space::{Ambient, Frame, Origin, Space};
+use symspline_core::space::{Ambient, Frame, Origin, Space, pull_back_by_transport};
 
 /// Invertible matrices: real for D = 1, complex for D = 2.
 #[derive(Clone, Copy)]
@@ -143,6 +143,34 @@ impl<const D: usize, A: Storage> Ambient for GeneralLinear<D, A> {
     fn inner(&self, p: &[Lane], u: &[Lane], v: &[Lane]) -> Lane {
         self.generator(p, u).inner(&self.generator(p, v))
     }
+    /// Re tr p⁻¹u p⁻¹v, which is invariant under the group.
+    fn pairing(&self, p: &[Lane], u: &[Lane], v: &[Lane]) -> Lane {
+        let back = self.inverse(&self.read(p));
+        back.times(&self.read(u)).adjoint().inner(&back.times(&self.read(v)))
+    }
+    fn raise(&self, p: &[Lane], gradient: &mut [Lane]) {
+        // p λ* p, which is not in the algebra of a subgroup.
+        let p = self.read(p);
+        p.times(&self.read(gradient).adjoint()).times(&p).write(gradient);
+    }
+    /// Subgroups use the whole group, since the form may be degenerate on their algebras.
+    fn pull_back(
+        &self,
+        p: &[Lane],
+        q: &[Lane],
+        t: Lane,
+        cotangent: &[Lane],
+        to_p: &mut [Lane],
+        to_q: &mut [Lane],
+    ) -> Lane {
+        let algebra = if self.members == Members::All {
+            self.algebra
+        } else {
+            Algebra::new(self.n, Members::All)
+        };
+        let whole = GeneralLinear { n: self.n, members: Members::All, algebra };
+        pull_back_by_transport(&whole, p, q, t, cotangent, to_p, to_q)
+    }
     fn project(&self, x: &mut [Lane]) -> Lane {
         let mut p = self.read(x).stored();
         let off = self.members.project(&mut p);
@@ -194,6 +222,11 @@ impl<const D: usize, A: Storage> Frame for GeneralLinear<D, A> {
     fn coordinates(&self, frame: &[Lane], p: &[Lane], v: &[Lane], x: &mut [Lane]) {
         let [r, back] = self.frame(frame);
         self.algebra.coordinates(&back.times(&self.generator(p, v)).times(&r), x);
+    }
+    fn products(&self, frame: &[Lane], p: &[Lane], cotangent: &[Lane], x: &mut [Lane]) {
+        let [r, back] = self.frame(frame);
+        let omega = self.inverse(&self.read(p)).times(&self.read(cotangent));
+        self.algebra.coordinates(&back.times(&omega).times(&r).adjoint(), x);
     }
     fn tangent(&self, frame: &[Lane], p: &[Lane], x: &[Lane], v: &mut [Lane]) {
         let [r, back] = self.frame(frame);

@@ -126,6 +126,12 @@ impl<const E: usize, const C: usize, const K: i32> Ambient for Lines<E, C, K> {
     fn inner(&self, _p: &[Lane], u: &[Lane], v: &[Lane]) -> Lane {
         lines::real_product::<Lane, E, C, K>(u, v) * lane(Self::COLUMNS as f64)
     }
+    fn raise(&self, p: &[Lane], gradient: &mut [Lane]) {
+        if K < 0 {
+            gradient[..C].iter_mut().for_each(|x| *x = -*x);
+        }
+        self.velocity(p, gradient);
+    }
     fn project(&self, x: &mut [Lane]) -> Lane {
         if Self::COLUMNS > 1 {
             return quaternionic::project(x);

@@ -10,7 +10,7 @@
 //! them; without it nothing is added to the loops of the sphere and of hyperbolic space.
 
 use symspline_core::scalar::{Lane, Scalar, dot, lane};
-use symspline_core::special::{Trig, slerp, theta_over_sin};
+use symspline_core::special::{Trig, Weights, slerp, theta_over_sin};
 
 /// κ as a lane.
 const fn kappa<const K: i32>() -> Lane {
@@ -104,6 +104,39 @@ pub fn geodesic<const K: i32, const L: bool, S: Scalar>(p: &[S], q: &[S], t: S, 
     for i in 0..p.len() {
         out[i] = to.fma(q[i], from * p[i]);
     }
+}
+
+/// Vectors that represent cotangent vectors by ⟨λ, ·⟩, from gradients with respect to arrays.
+#[inline(always)]
+pub fn raise<const K: i32, const L: bool>(gradient: &mut [Lane]) {
+    for i in 0..heads::<L>() {
+        if negative::<K, L>(i) {
+            gradient[i] = -gradient[i];
+        }
+    }
+}
+
+/// The derivative of [p, q]_t, transposed: with the weights f₀, f₁ as functions of y = κ⟨q−p, q−p⟩/2 and
+/// s = κ(⟨λ,p⟩ ∂f₀/∂y + ⟨λ,q⟩ ∂f₁/∂y), λ ↦ f₀λ − s(q−p) at p and f₁λ + s(q−p) at q. This is exact in the ambient space.
+#[inline(always)]
+pub fn pull_back<const K: i32, const L: bool, S: Scalar>(
+    p: &[S],
+    q: &[S],
+    t: S,
+    cotangent: &[S],
+    to_p: &mut [S],
+    to_q: &mut [S],
+) -> S {
+    let weights = Weights::new(t, versine::<K, L, S>(p, q), || versine_rest::<K, L, S>(p, q));
+    let at_p = product::<K, L, S>(cotangent, p);
+    let at_q = product::<K, L, S>(cotangent, q);
+    let slope = at_p.fma(weights.by_y[0], at_q * weights.by_y[1]) * kappa::<K>();
+    for i in 0..p.len() {
+        let along = slope * (q[i] - p[i]);
+        to_p[i] = weights.at[0].fma(cotangent[i], to_p[i] - along);
+        to_q[i] = weights.at[1].fma(cotangent[i], to_q[i] + along);
+    }
+    at_p.fma(weights.by_t[0], at_q * weights.by_t[1])
 }
 
 /// θ from y = 1 − cos θ and 2 − y; also where sin θ = 0.

@@ -89,6 +89,25 @@ impl<const K: i32, const L: bool> Ambient for Curved<K, L> {
     fn geodesic<S: Scalar>(&self, p: &[S], q: &[S], t: S, out: &mut [S]) {
         cc::geodesic::<K, L, S>(p, q, t, out);
     }
+    fn pairing(&self, _p: &[Lane], u: &[Lane], v: &[Lane]) -> Lane {
+        cc::product::<K, L, Lane>(u, v)
+    }
+    #[inline(always)]
+    fn raise(&self, _p: &[Lane], gradient: &mut [Lane]) {
+        cc::raise::<K, L>(gradient);
+    }
+    #[inline(always)]
+    fn pull_back(
+        &self,
+        p: &[Lane],
+        q: &[Lane],
+        t: Lane,
+        cotangent: &[Lane],
+        to_p: &mut [Lane],
+        to_q: &mut [Lane],
+    ) -> Lane {
+        cc::pull_back::<K, L, Lane>(p, q, t, cotangent, to_p, to_q)
+    }
     fn transvect(&self, p: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]) {
         cc::transvect::<K, L>(p, v, x, out);
     }
@@ -161,6 +180,13 @@ impl<const K: i32, const L: bool> Frame for Curved<K, L> {
     #[inline(always)]
     fn coordinates(&self, frame: &[Lane], _p: &[Lane], v: &[Lane], x: &mut [Lane]) {
         cc::coordinates::<K, L>(frame, v, x);
+    }
+    #[inline(always)]
+    fn products(&self, frame: &[Lane], _p: &[Lane], cotangent: &[Lane], x: &mut [Lane]) {
+        cc::coordinates::<K, L>(frame, cotangent, x);
+        if L {
+            x[0] = -x[0];
+        }
     }
     #[inline(always)]
     fn tangent(&self, frame: &[Lane], _p: &[Lane], x: &[Lane], v: &mut [Lane]) {

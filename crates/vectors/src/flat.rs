@@ -85,6 +85,25 @@ impl<const WRAPPED: bool> Ambient for Flat<WRAPPED> {
             out[i] = Self::wrapped(t.fma(Self::wrapped(q[i] - p[i]), p[i]));
         }
     }
+    #[inline(always)]
+    fn pull_back(
+        &self,
+        p: &[Lane],
+        q: &[Lane],
+        t: Lane,
+        cotangent: &[Lane],
+        to_p: &mut [Lane],
+        to_q: &mut [Lane],
+    ) -> Lane {
+        let mut rate = Lane::ZERO;
+        for i in 0..self.n {
+            let x = cotangent[i];
+            to_p[i] += (Lane::ONE - t) * x;
+            to_q[i] += t * x;
+            rate = x.mul_add(Self::wrapped(q[i] - p[i]), rate);
+        }
+        rate
+    }
     fn transvect(&self, _p: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]) {
         for i in 0..self.n {
             out[i] = Self::wrapped(x[i] + v[i]);

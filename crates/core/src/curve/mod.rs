@@ -12,6 +12,7 @@ mod length;
 #[cfg(feature = "dense")]
 mod lift;
 mod locate;
+mod motion;
 mod product;
 mod sample_cursor;
 mod transport;
@@ -26,5 +27,6 @@ pub use length::{ArcLength, Integrand, energies, lengths};
 pub use lift::{lift, lift_knots};
 #[doc(hidden)]
 pub use locate::Locator;
+pub use motion::{Moving, motion_len};
 pub use product::{Factor, evaluate_product};
 pub use transport::transport;

@@ -9,6 +9,7 @@ mod polygon;
 mod segment;
 mod system;
 
+use crate::curve::{Curves, Moving, Times, motion_len};
 use crate::fit::{End, EndKind, Ends};
 use crate::monitor::checkpoint;
 use crate::space::{Ambient, Erased, Origin};
@@ -49,6 +50,8 @@ pub enum Of {
 pub struct Derivative<'a> {
     space: &'a Erased<'a>,
     t: &'a [f64],
+    points: &'a [f64],
+    velocities: &'a [f64],
     polygon: Polygon,
     system: System,
     beziers: BTreeMap<usize, Bezier>,
@@ -102,7 +105,13 @@ struct Position {
 impl<'a> Derivative<'a> {
     /// The derivative of the spline with these knots, points and velocities. Vectors in `ends` are those of this
     /// curve.
-    pub fn new(space: &'a Erased<'a>, t: &'a [f64], points: &[f64], velocities: &[f64], ends: &Ends) -> Self {
+    pub fn new(
+        space: &'a Erased<'a>,
+        t: &'a [f64],
+        points: &'a [f64],
+        velocities: &'a [f64],
+        ends: &Ends,
+    ) -> Self {
         let closed = matches!(ends, Ends::Periodic);
         let polygon = Polygon::new(space, points, velocities, closed);
         let h: Vec<f64> = t.windows(2).map(|t| t[1] - t[0]).collect();
@@ -121,7 +130,7 @@ impl<'a> Derivative<'a> {
             })),
         };
         let system = System::new(space, &polygon, &h, kinds);
-        Derivative { space, t, polygon, system, beziers: BTreeMap::new() }
+        Derivative { space, t, points, velocities, polygon, system, beziers: BTreeMap::new() }
     }
 
     fn segments(&self) -> usize {
@@ -157,6 +166,28 @@ impl<'a> Derivative<'a> {
         }
     }
 
+    /// The curve with its frames, for samples at times x.
+    fn moving<'m>(&'m self, x: &'m [f64], frames: &'m [f64]) -> Moving<'m> {
+        Moving {
+            curve: Curves {
+                t: self.t,
+                nodes: self.t.len(),
+                points: self.points,
+                velocities: self.velocities,
+                before: &[],
+            },
+            times: Times { x, count: x.len() },
+            frames,
+            run: usize::MAX,
+            dim: self.space.dim(),
+            len: self.space.point_len(),
+        }
+    }
+
+    fn frames(&self) -> Vec<f64> {
+        self.polygon.nodes.iter().flat_map(|node| node.frame.iter().map(|x| x.as_array()[0])).collect()
+    }
+
     /// Forward mode: the motion of the curve at times x for given changes of the data; `out` receives one tangent
     /// vector per time.
     pub fn push(&mut self, x: &[f64], of: Of, change: &Data, out: &mut [f64]) {
@@ -164,23 +195,35 @@ impl<'a> Derivative<'a> {
         let mut u = self.system.velocities(&change);
         self.close(&mut u);
         let m = self.space.dim();
+        let mut motions = Vec::with_capacity(self.segments() * motion_len(m));
+        for (i, segment) in self.system.segments.iter().enumerate() {
+            let (dh, dt) = (change.lengths[i], change.knots[i]);
+            let inner = |e: usize| {
+                // q⁺ = exp(h u/3), q⁻ = exp(−h u/3)
+                let sign = if e == 0 { 1.0 } else { -1.0 } / 3.0;
+                let handle = &u[i + e] * (segment.h * sign) + &self.polygon.u[i + e] * (dh * sign);
+                let f = &segment.functions[e];
+                &f.cosh * &change.points[i + e] + &f.stretch * handle
+            };
+            motions.extend_from_slice(change.points[i].as_slice());
+            motions.extend_from_slice(inner(0).as_slice());
+            motions.extend_from_slice(inner(1).as_slice());
+            motions.extend_from_slice(change.points[i + 1].as_slice());
+            motions.extend([dt, dh]);
+        }
+        if of == Of::Point {
+            let frames = self.frames();
+            return self.space.0.push(&self.moving(x, &frames), &motions, out);
+        }
         for (&x, out) in x.iter().zip(out.chunks_mut(self.space.point_len())) {
             checkpoint();
             let position = self.position(x);
             let (columns, by_h) = self.kept(&position, of);
             let Position { segment: i, tau } = position;
-            let segment = &self.system.segments[i];
-            let (dh, dt) = (change.lengths[i], change.knots[i]);
-            let mut z = Vector::zeros(4 * m + 1);
-            for e in 0..2 {
-                let (xi, f) = (&change.points[i + e], &segment.functions[e]);
-                // q⁺ = exp(h u/3), q⁻ = exp(−h u/3)
-                let sign = if e == 0 { 1.0 } else { -1.0 } / 3.0;
-                let handle = &u[i + e] * (segment.h * sign) + &self.polygon.u[i + e] * (dh * sign);
-                z.rows_mut(3 * e * m, m).copy_from(xi);
-                z.rows_mut((1 + e) * m, m).copy_from(&(&f.cosh * xi + &f.stretch * handle));
-            }
-            z[4 * m] = -(dt + tau * dh) / segment.h;
+            let row = &motions[i * motion_len(m)..][..motion_len(m)];
+            let (dt, dh) = (row[4 * m], row[4 * m + 1]);
+            let mut z = Vector::from_column_slice(&row[..4 * m + 1]);
+            z[4 * m] = -(dt + tau * dh) / self.system.segments[i].h;
             let moved = columns * z + by_h * dh;
             out.copy_from_slice(moved.as_slice());
         }
@@ -190,6 +233,26 @@ impl<'a> Derivative<'a> {
     /// ends.
     pub fn pull(&mut self, x: &[f64], of: Of, cotangent: &[f64]) -> Data {
         let (n, m, len) = (self.segments(), self.space.dim(), self.space.point_len());
+        let size = motion_len(m);
+        let mut products = vec![0.0; n * size];
+        if of == Of::Point {
+            let frames = self.frames();
+            self.space.0.pull(&self.moving(x, &frames), cotangent, &mut products);
+        } else {
+            for (&x, cotangent) in x.iter().zip(cotangent.chunks(len)) {
+                checkpoint();
+                let position = self.position(x);
+                let (columns, by_h) = self.kept(&position, of);
+                let Position { segment: i, tau } = position;
+                let cotangent = Vector::from_column_slice(cotangent);
+                let z = columns.tr_mul(&cotangent);
+                let row = &mut products[i * size..][..size];
+                row.iter_mut().zip(&z.as_slice()[..4 * m]).for_each(|(sum, x)| *sum += x);
+                let rate = z[4 * m] / self.system.segments[i].h;
+                row[4 * m] -= rate;
+                row[4 * m + 1] += by_h.dot(&cotangent) - tau * rate;
+            }
+        }
         let zero = || vec![Vector::zeros(m); n + 1];
         let mut gradient = Change {
             points: zero(),
@@ -198,25 +261,19 @@ impl<'a> Derivative<'a> {
             knots: vec![0.0; n + 1],
         };
         let mut u = zero();
-        for (&x, cotangent) in x.iter().zip(cotangent.chunks(len)) {
-            checkpoint();
-            let position = self.position(x);
-            let (columns, by_h) = self.kept(&position, of);
-            let Position { segment: i, tau } = position;
-            let segment = &self.system.segments[i];
-            let cotangent = Vector::from_column_slice(cotangent);
-            let z = columns.tr_mul(&cotangent);
+        for (i, (segment, row)) in self.system.segments.iter().zip(products.chunks(size)).enumerate() {
             for e in 0..2 {
                 let f = &segment.functions[e];
                 let sign = if e == 0 { 1.0 } else { -1.0 } / 3.0;
-                let inner = z.rows((1 + e) * m, m);
-                gradient.points[i + e] += z.rows(3 * e * m, m) + f.cosh.tr_mul(&inner);
+                let inner = Vector::from_column_slice(&row[(1 + e) * m..][..m]);
+                let knot = Vector::from_column_slice(&row[3 * e * m..][..m]);
+                gradient.points[i + e] += knot + f.cosh.tr_mul(&inner);
                 let handle = f.stretch.tr_mul(&inner) * sign;
                 gradient.lengths[i] += handle.dot(&self.polygon.u[i + e]);
                 u[i + e] += handle * segment.h;
             }
-            gradient.knots[i] -= z[4 * m] / segment.h;
-            gradient.lengths[i] += by_h.dot(&cotangent) - tau * z[4 * m] / segment.h;
+            gradient.knots[i] += row[4 * m];
+            gradient.lengths[i] += row[4 * m + 1];
         }
         self.fold(&mut u);
         self.system.pull_back(u, &mut gradient);

@@ -41,6 +41,17 @@ macro_rules! delegate {
     (@ distance $space:ident $to:expr) => {
         $crate::delegate!(@ $space $to; distance(p: &[Lane], q: &[Lane], log: &[Lane], angle: Lane) -> Lane);
     };
+    (@ pairing $space:ident $to:expr) => {
+        $crate::delegate!(@ $space $to; pairing(p: &[Lane], u: &[Lane], v: &[Lane]) -> Lane);
+    };
+    (@ raise $space:ident $to:expr) => {
+        $crate::delegate!(@ $space $to; raise(p: &[Lane], gradient: &mut [Lane]) -> ());
+    };
+    (@ pull_back $space:ident $to:expr) => {
+        $crate::delegate!(@ $space $to; pull_back(
+            p: &[Lane], q: &[Lane], t: Lane, cotangent: &[Lane], to_p: &mut [Lane], to_q: &mut [Lane]
+        ) -> Lane);
+    };
     (@ transvect $space:ident $to:expr) => {
         $crate::delegate!(@ $space $to; transvect(p: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]) -> ());
     };

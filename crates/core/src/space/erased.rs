@@ -1,6 +1,7 @@
 //! A space as a table of its operations.
 
 use super::traits::{Ambient, Frame, Origin, Space};
+use crate::curve::Moving;
 use crate::curve::data::Job;
 use crate::fit::chain::{Chain, Run, Visit};
 use crate::fit::end_kind::ChainEnds;
@@ -28,6 +29,10 @@ pub trait Kernels: Geometry {
     ) -> C2Residual;
     /// Evaluates a block of samples.
     fn samples(&self, job: &Job, out: &mut [f64]);
+    /// See `Moving::push`.
+    fn push(&self, moving: &Moving, motions: &[f64], out: &mut [f64]);
+    /// See `Moving::pull`.
+    fn pull(&self, moving: &Moving, cotangents: &[f64], out: &mut [f64]);
 }
 
 /// A space that is represented by its table of operations.
@@ -162,6 +167,9 @@ table! {
         fn prepare_ray(&self, p: &[Lane], v: &[Lane], prepared: &mut [Lane]);
         fn log(&self, p: &[Lane], q: &[Lane], out: &mut [Lane]) -> Lane;
         fn distance(&self, p: &[Lane], q: &[Lane], log: &[Lane], angle: Lane) -> Lane;
+        fn pairing(&self, p: &[Lane], u: &[Lane], v: &[Lane]) -> Lane;
+        fn raise(&self, p: &[Lane], gradient: &mut [Lane]);
+        fn pull_back(&self, p: &[Lane], q: &[Lane], t: Lane, cotangent: &[Lane], to_p: &mut [Lane], to_q: &mut [Lane]) -> Lane;
         fn transvect(&self, p: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]);
         fn parallel_transport(&self, p: &[Lane], q: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]);
         fn velocity(&self, gamma: &[Lane], d: &mut [Lane]);
@@ -180,6 +188,7 @@ table! {
         fn step(&self, frame: &mut [Lane], p: &[Lane], q: &[Lane], chord: &mut [Lane]) -> Lane;
         fn reorthonormalize(&self, frame: &mut [Lane], p: &[Lane]);
         fn coordinates(&self, frame: &[Lane], p: &[Lane], v: &[Lane], x: &mut [Lane]);
+        fn products(&self, frame: &[Lane], p: &[Lane], cotangent: &[Lane], x: &mut [Lane]);
         fn tangent(&self, frame: &[Lane], p: &[Lane], x: &[Lane], v: &mut [Lane]);
     }
     Origin {

@@ -3,7 +3,7 @@
 
 use super::traits::{Ambient, Covered, Evaluation, Frame, Origin, Space};
 use crate::delegate;
-use crate::scalar::{Each, Lane, Scalar, few, lane};
+use crate::scalar::{Each, Lane, Scalar, dot, few, lane};
 
 /// An isometry up to scale, linear in the arrays of points and vectors.
 ///
@@ -117,6 +117,39 @@ impl<I: Isometry> Ambient for Isometric<I> {
         self.0.image().acceleration(&gamma[..I::LEN], &d[..I::LEN], &mut image[..I::LEN]);
         I::leave(&image[..I::LEN], dd);
     }
+    fn raise(&self, p: &[Lane], gradient: &mut [Lane]) {
+        // The transpose of `leave`, entry by entry.
+        let mut image: Image<Lane> = few(|k| {
+            let mut column = gradient.to_vec();
+            I::leave(&few::<_, MOST>(|i| if i == k { Lane::ONE } else { Lane::ZERO })[..I::LEN], &mut column);
+            dot(&column, gradient)
+        });
+        self.0.image().raise(&Self::enter(p)[..I::LEN], &mut image[..I::LEN]);
+        I::leave(&scaled(&image[..I::LEN], 1.0 / (I::SCALE * I::SCALE))[..I::LEN], gradient);
+    }
+    #[inline(always)]
+    fn pull_back(
+        &self,
+        p: &[Lane],
+        q: &[Lane],
+        t: Lane,
+        cotangent: &[Lane],
+        to_p: &mut [Lane],
+        to_q: &mut [Lane],
+    ) -> Lane {
+        let [p, q, cotangent] = [p, q, cotangent].each(Self::enter);
+        let [mut by_p, mut by_q] = [[Lane::ZERO; MOST]; 2];
+        let (x, y) = (&mut by_p[..I::LEN], &mut by_q[..I::LEN]);
+        let rate = self.0.image().pull_back(&p[..I::LEN], &q[..I::LEN], t, &cotangent[..I::LEN], x, y);
+        let sum = |x: &[Lane], to: &mut [Lane]| {
+            let mut out = to.to_vec();
+            I::leave(&x[..I::LEN], &mut out);
+            to.iter_mut().zip(&out).for_each(|(to, x)| *to += *x);
+        };
+        sum(&by_p, to_p);
+        sum(&by_q, to_q);
+        rate * lane(I::SCALE * I::SCALE)
+    }
     fn inner(&self, p: &[Lane], u: &[Lane], v: &[Lane]) -> Lane {
         let [p, u, v] = [p, u, v].each(Self::enter);
         self.0.image().inner(&p[..I::LEN], &u[..I::LEN], &v[..I::LEN]) * lane(I::SCALE * I::SCALE)
@@ -143,6 +176,11 @@ impl<I: Isometry> Frame for Isometric<I> {
     fn coordinates(&self, frame: &[Lane], p: &[Lane], v: &[Lane], x: &mut [Lane]) {
         let [p, v] = [p, v].each(Self::enter);
         Self::coordinates(x, |x| self.0.image().coordinates(frame, &p[..I::LEN], &v[..I::LEN], x));
+    }
+    #[inline(always)]
+    fn products(&self, frame: &[Lane], p: &[Lane], cotangent: &[Lane], x: &mut [Lane]) {
+        let [p, v] = [p, cotangent].each(Self::enter);
+        Self::coordinates(x, |x| self.0.image().products(frame, &p[..I::LEN], &v[..I::LEN], x));
     }
     #[inline(always)]
     fn tangent(&self, frame: &[Lane], p: &[Lane], x: &[Lane], v: &mut [Lane]) {

@@ -1,5 +1,6 @@
 //! A space from few formulas: the simplest implementation of a new space.
 
+use super::reverse::raise_by_frame;
 use super::traits::{Ambient, Frame, Origin, ROUNDING_SIZE, Space, make_tangent};
 use crate::scalar::{Lane, Scalar, lane, max_or_nan};
 
@@ -167,6 +168,9 @@ impl<M: Model> Ambient for M {
     }
     fn inner(&self, p: &[Lane], u: &[Lane], v: &[Lane]) -> Lane {
         Model::inner(self, p, u, v)
+    }
+    fn raise(&self, p: &[Lane], gradient: &mut [Lane]) {
+        raise_by_frame(self, p, gradient);
     }
     fn project(&self, x: &mut [Lane]) -> Lane {
         Model::project(self, x)

@@ -95,7 +95,7 @@ impl<P: Part> Within<P> {
 impl<P: Part> Ambient for Within<P> {
     delegate!(part => part.0.whole();
         point_len, point_shape, is_complex, fiber_rank, cut_angle, longest_handle, ray_len, prepare_ray,
-        distance, transvect, parallel_transport, inner, rounding);
+        distance, pairing, raise, pull_back, transvect, parallel_transport, inner, rounding);
 
     fn injectivity_radius(&self) -> f64 {
         self.0.injectivity_radius()
@@ -169,6 +169,11 @@ impl<P: Part> Frame for Within<P> {
     fn coordinates(&self, frame: &[Lane], p: &[Lane], v: &[Lane], x: &mut [Lane]) {
         let mut wide = self.zeros();
         self.0.whole().coordinates(frame, p, v, &mut wide);
+        self.0.narrow(&wide, x);
+    }
+    fn products(&self, frame: &[Lane], p: &[Lane], cotangent: &[Lane], x: &mut [Lane]) {
+        let mut wide = self.zeros();
+        self.0.whole().products(frame, p, cotangent, &mut wide);
         self.0.narrow(&wide, x);
     }
     fn tangent(&self, frame: &[Lane], p: &[Lane], x: &[Lane], v: &mut [Lane]) {

@@ -1,6 +1,7 @@
 //! The traits of a symmetric space.
 
 use super::algebra::stretch_series;
+use super::reverse::pull_back_by_transport;
 use crate::matrix::Matrix;
 use crate::scalar::{Lane, Scalar, dot, lane, max_or_nan};
 
@@ -82,6 +83,29 @@ pub trait Ambient: Copy + Send + Sync {
     }
     /// `[p, q]_t`, (7), between points that may move with t.
     fn geodesic<S: Scalar>(&self, p: &[S], q: &[S], t: S, out: &mut [S]);
+    /// The form in which cotangent vectors are represented by tangent vectors: that of [`inner`](Ambient::inner), or where
+    /// this is not invariant under the group, one that is.
+    fn pairing(&self, p: &[Lane], u: &[Lane], v: &[Lane]) -> Lane {
+        self.inner(p, u, v)
+    }
+    /// Turns the gradient with respect to an array at p into the vector λ that represents it: [`pairing`](Ambient::pairing)
+    /// with λ is the derivative. By default, for spaces whose arrays are isometric.
+    fn raise(&self, p: &[Lane], gradient: &mut [Lane]) {
+        self.velocity(p, gradient);
+    }
+    /// The derivative of `[p, q]_t`, transposed: adds the cotangent vectors at p and q for one at the point of the geodesic;
+    /// returns the derivative in t. Components of a representing vector that are normal to the space do not matter.
+    fn pull_back(
+        &self,
+        p: &[Lane],
+        q: &[Lane],
+        t: Lane,
+        cotangent: &[Lane],
+        to_p: &mut [Lane],
+        to_q: &mut [Lane],
+    ) -> Lane {
+        pull_back_by_transport(self, p, q, t, cotangent, to_p, to_q)
+    }
     /// The transvection `E_p(v)` of (10) applied to a point x.
     fn transvect(&self, p: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]);
     /// Parallel transport of a tangent vector x from p to q = `exp_p(v)`: `E_p(v)` applied to it, at the
@@ -131,6 +155,10 @@ pub trait Frame: Ambient + Origin {
     fn reorthonormalize(&self, _frame: &mut [Lane], _p: &[Lane]) {}
     /// Coordinates of a tangent vector at p.
     fn coordinates(&self, frame: &[Lane], p: &[Lane], v: &[Lane], x: &mut [Lane]);
+    /// The products of a cotangent vector λ at p with the vectors of a frame.
+    fn products(&self, frame: &[Lane], p: &[Lane], cotangent: &[Lane], x: &mut [Lane]) {
+        self.coordinates(frame, p, cotangent, x);
+    }
     /// The tangent vector at p with given coordinates.
     fn tangent(&self, frame: &[Lane], p: &[Lane], x: &[Lane], v: &mut [Lane]);
 }
