@@ -150,9 +150,8 @@ pub fn step(
     }
     let mut out = vec![0.0; (n + 1) * len];
     let found = if closed { system.solve_cyclic() } else { system.solve() };
-    for (i, x) in found.iter().enumerate() {
-        derivative.tangent(i, &x.as_slice()[..m], &mut out[i * len..][..len]);
-    }
+    let coordinates: Vec<f64> = found.iter().flat_map(|x| &x.as_slice()[..m]).copied().collect();
+    out[..nodes * len].copy_from_slice(&derivative.tangents(&coordinates));
     if closed {
         let (first, last) = out.split_at_mut(n * len);
         last.copy_from_slice(&first[..len]);

@@ -27,8 +27,8 @@ pub struct Moving<'a> {
     pub times: Times<'a>,
     /// The frames of the knots. Where a run of segments ends, the knot has two: that of the run comes first.
     pub frames: &'a [f64],
-    /// Segments per run; frames are transported in parallel within a run.
-    pub run: usize,
+    /// The number of runs, of almost equal length; frames are transported in parallel within a run.
+    pub runs: usize,
     /// The dimension of the space.
     pub dim: usize,
     /// The numbers of a point.
@@ -276,7 +276,7 @@ impl Controls {
 impl Moving<'_> {
     /// The index of the frame at an end of a segment.
     fn slot(&self, segment: usize, end: usize) -> usize {
-        segment + segment / self.run + end
+        segment + ((segment + 1) * self.runs - 1) / (self.curve.nodes - 1) + end
     }
 
     fn job<'j>(&'j self, locator: &'j Locator) -> Job<'j> {

@@ -1,11 +1,24 @@
 //! A Bézier segment and the derivatives of its points with respect to its control points.
 
-use super::operators::{Few, Matrix, Vector, columns, unit};
-use super::polygon::Node;
-use super::segment::LinearisedSegment;
+use super::operators::{Few, Matrix, columns, unit};
 use crate::scalar::{Dual, Jet, Lane, Scalar, few, lane};
 use crate::space::{Ambient, Erased, Frame, Origin};
 use smallvec::smallvec;
+
+/// A knot: its point, its frame, and the handle there that points into the segment, in the frame.
+pub struct Knot {
+    pub p: Few<Lane>,
+    pub frame: Few<Lane>,
+    pub handle: Few<Lane>,
+}
+
+impl Knot {
+    /// Vectors of the frame on the lanes, from the k-th on.
+    fn tangent(&self, space: &Erased, k: usize, out: &mut [Lane]) {
+        let x: Few<Lane> = (0..space.dim()).map(|r| unit(r, k)).collect();
+        space.tangent(&self.frame, &self.p, &x, out);
+    }
+}
 
 /// Four control points, and a frame at each.
 pub struct Bezier {
@@ -18,32 +31,30 @@ pub struct Bezier {
 }
 
 impl Bezier {
-    pub fn new(space: &Erased, nodes: &[Node], segment: &LinearisedSegment) -> Self {
+    pub fn new(space: &Erased, knots: [Knot; 2]) -> Self {
         let len = space.point_len();
-        let inner = |node: &Node, handle: &Vector, sign: f64| {
-            let x: Few<Lane> = handle.iter().map(|&x| lane(sign * x)).collect();
+        let inner = |knot: &Knot| {
             let zero: Few<Lane> = smallvec![Lane::ZERO; len];
             let (mut v, mut q, mut w) = (zero.clone(), zero.clone(), zero);
-            space.tangent(&node.frame, &node.p, &x, &mut v);
-            space.ray(&node.p, &v, Lane::ONE, &mut q);
+            space.tangent(&knot.frame, &knot.p, &knot.handle, &mut v);
+            space.ray(&knot.p, &v, Lane::ONE, &mut q);
             let basis = columns(len, space.dim(), |k, out| {
-                node.tangent(space, k, &mut w);
-                space.parallel_transport(&node.p, &q, &v, &w, out);
+                knot.tangent(space, k, &mut w);
+                space.parallel_transport(&knot.p, &q, &v, &w, out);
             });
             (q, basis)
         };
-        let [p0, p1] = [&nodes[0], &nodes[1]];
-        let (q0, b0) = inner(p0, &segment.handles[0], 1.0);
-        let (q1, b1) = inner(p1, &segment.handles[1], -1.0);
-        Bezier {
-            points: [p0.p.clone(), q0, q1, p1.p.clone()],
-            bases: [p0.basis(space), b0, b1, p1.basis(space)],
-            reach: if space.scales() {
-                segment.handles.iter().map(Vector::norm).fold(0.0, f64::max).max(1.0)
-            } else {
-                1.0
-            },
-        }
+        let [first, last] = &knots;
+        let (q0, b0) = inner(first);
+        let (q1, b1) = inner(last);
+        let basis = |knot: &Knot| columns(len, space.dim(), |k, out| knot.tangent(space, k, out));
+        let reach = if space.scales() {
+            let square = |knot: &Knot| knot.handle.iter().map(|x| x.as_array()[0].powi(2)).sum::<f64>();
+            knots.iter().map(square).fold(1.0, f64::max).sqrt()
+        } else {
+            1.0
+        };
+        Bezier { points: [first.p.clone(), q0, q1, last.p.clone()], bases: [basis(first), b0, b1, basis(last)], reach }
     }
 
     /// De Casteljau's algorithm (8) with control points that may move.

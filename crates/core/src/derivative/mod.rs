@@ -12,11 +12,12 @@ mod system;
 use crate::curve::{Curves, Moving, Times, motion_len};
 use crate::fit::{End, EndKind, Ends};
 use crate::monitor::checkpoint;
-use crate::space::{Ambient, Erased, Origin};
-use bezier::Bezier;
+use crate::scalar::{Lane, lane};
+use crate::space::{Ambient, Erased, Frame, Origin};
+use bezier::{Bezier, Knot};
+use operators::{Few, of_lane};
 pub use operators::{Matrix, Vector};
 use polygon::Polygon;
-use segment::LinearisedSegment;
 use std::collections::BTreeMap;
 pub use system::Linearised;
 use system::{Change, System};
@@ -71,19 +72,21 @@ impl Motion<'_> {
         let m = self.derivative.space.dim();
         let position = Position { segment: self.segment, tau };
         let (columns, _) = self.derivative.columns(&self.bezier, &position, of);
-        let LinearisedSegment { h, functions, .. } = &self.derivative.system.segments[self.segment];
+        let h = self.derivative.system.h[self.segment];
         let mut out = Matrix::zeros(columns.nrows(), 4 * m);
-        for (e, f) in functions.iter().enumerate() {
+        for e in 0..2 {
             let third = if e == 0 { h / 3.0 } else { -h / 3.0 };
+            let [cosh, stretch] = [0, 1].map(|k| self.derivative.function(self.segment, e, k));
             let inner = columns.columns((1 + e) * m, m);
-            out.columns_mut(2 * e * m, m).copy_from(&(columns.columns(3 * e * m, m) + inner * &f.cosh));
-            out.columns_mut((2 * e + 1) * m, m).copy_from(&(inner * &f.stretch * third));
+            out.columns_mut(2 * e * m, m).copy_from(&(columns.columns(3 * e * m, m) + inner * cosh));
+            out.columns_mut((2 * e + 1) * m, m).copy_from(&(inner * stretch * third));
         }
-        if let (Some(holonomy), true) =
-            (&self.derivative.polygon.holonomy, self.segment + 1 == self.derivative.segments())
-        {
+        let Polygon { runs, turns, .. } = &self.derivative.polygon;
+        let run = runs.slot(self.segment, 0) - self.segment;
+        if runs.first(run + 1) == self.segment + 1 && runs.joint(run).is_some() {
+            let turn = of_lane(&turns[0], run);
             for from in [2 * m, 3 * m] {
-                let turned = out.columns(from, m) * holonomy;
+                let turned = out.columns(from, m) * &turn;
                 out.columns_mut(from, m).copy_from(&turned);
             }
         }
@@ -118,8 +121,7 @@ impl<'a> Derivative<'a> {
         let kinds = match ends {
             Ends::Periodic => None,
             Ends::Open(ends) => Some(std::array::from_fn(|e| {
-                let node = &polygon.nodes[e * h.len()];
-                let at = |v: &[f64]| node.coordinates(space, v);
+                let at = |v: &[f64]| polygon.coordinates_at(space, points, e * h.len(), v);
                 match &ends[e] {
                     End::Natural => (EndKind::Acceleration, Vector::zeros(space.dim())),
                     End::NotAKnot => (EndKind::NotAKnot, Vector::zeros(space.dim())),
@@ -143,12 +145,37 @@ impl<'a> Derivative<'a> {
     }
 
     fn bezier(&self, segment: usize) -> Bezier {
-        Bezier::new(self.space, &self.polygon.nodes[segment..segment + 2], &self.system.segments[segment])
+        Bezier::new(self.space, [0, 1].map(|e| self.knot(segment, e)))
+    }
+
+    /// A knot as an end of a segment.
+    fn knot(&self, segment: usize, e: usize) -> Knot {
+        let (m, len, size) = (self.space.dim(), self.space.point_len(), self.space.frame_len());
+        let lanes = |x: &[f64]| -> Few<Lane> { x.iter().map(|&x| lane(x)).collect() };
+        let slot = self.polygon.runs.slot(segment, e);
+        let third = lane(self.system.h[segment] * if e == 0 { 1.0 } else { -1.0 } / 3.0);
+        let u = &self.polygon.u[slot * m..][..m];
+        Knot {
+            p: lanes(&self.points[(segment + e) * len..][..len]),
+            frame: lanes(&self.polygon.frames[slot * size..][..size]),
+            handle: u.iter().map(|u| lane(*u) * third).collect(),
+        }
+    }
+
+    /// cosh(ad) or S of the handle at an end of a segment.
+    fn function(&self, segment: usize, e: usize, which: usize) -> Matrix {
+        let m = self.space.dim();
+        Matrix::from_row_slice(m, m, self.function_row(segment, e, which))
+    }
+
+    fn function_row(&self, segment: usize, e: usize, which: usize) -> &[f64] {
+        let square = self.space.dim().pow(2);
+        &self.system.functions[(4 * segment + 2 * e + which) * square..][..square]
     }
 
     /// The derivatives of a sample: columns for the four control points and τ, and separately a factor for h.
     fn columns(&self, bezier: &Bezier, &Position { segment, tau }: &Position, of: Of) -> (Matrix, Vector) {
-        let (space, inverse) = (self.space, 1.0 / self.system.segments[segment].h);
+        let (space, inverse) = (self.space, 1.0 / self.system.h[segment]);
         // The last column, after those of the control points, is the derivative in τ.
         let along = |columns: Matrix, factor: f64| columns.column(columns.ncols() - 1) * factor;
         match of {
@@ -167,7 +194,7 @@ impl<'a> Derivative<'a> {
     }
 
     /// The curve with its frames, for samples at times x.
-    fn moving<'m>(&'m self, x: &'m [f64], frames: &'m [f64]) -> Moving<'m> {
+    fn moving<'m>(&'m self, x: &'m [f64]) -> Moving<'m> {
         Moving {
             curve: Curves {
                 t: self.t,
@@ -177,43 +204,42 @@ impl<'a> Derivative<'a> {
                 before: &[],
             },
             times: Times { x, count: x.len() },
-            frames,
-            run: usize::MAX,
+            frames: &self.polygon.frames,
+            runs: self.polygon.runs.count,
             dim: self.space.dim(),
             len: self.space.point_len(),
         }
-    }
-
-    fn frames(&self) -> Vec<f64> {
-        self.polygon.nodes.iter().flat_map(|node| node.frame.iter().map(|x| x.as_array()[0])).collect()
     }
 
     /// Forward mode: the motion of the curve at times x for given changes of the data; `out` receives one tangent
     /// vector per time.
     pub fn push(&mut self, x: &[f64], of: Of, change: &Data, out: &mut [f64]) {
         let change = self.in_frames(change);
-        let mut u = self.system.velocities(&change);
-        self.close(&mut u);
         let m = self.space.dim();
+        let u = self.polygon.unfold(&self.system.velocities(&change), m);
+        let points = self.polygon.unfold(&change.points, m);
         let mut motions = Vec::with_capacity(self.segments() * motion_len(m));
-        for (i, segment) in self.system.segments.iter().enumerate() {
+        let mut handle = vec![0.0; m];
+        for (i, &h) in self.system.h.iter().enumerate() {
             let (dh, dt) = (change.lengths[i], change.knots[i]);
-            let inner = |e: usize| {
+            let at = |e: usize| self.polygon.runs.slot(i, e) * m;
+            motions.extend_from_slice(&points[at(0)..][..m]);
+            for e in 0..2 {
                 // q⁺ = exp(h u/3), q⁻ = exp(−h u/3)
                 let sign = if e == 0 { 1.0 } else { -1.0 } / 3.0;
-                let handle = &u[i + e] * (segment.h * sign) + &self.polygon.u[i + e] * (dh * sign);
-                let f = &segment.functions[e];
-                &f.cosh * &change.points[i + e] + &f.stretch * handle
-            };
-            motions.extend_from_slice(change.points[i].as_slice());
-            motions.extend_from_slice(inner(0).as_slice());
-            motions.extend_from_slice(inner(1).as_slice());
-            motions.extend_from_slice(change.points[i + 1].as_slice());
+                for (r, x) in handle.iter_mut().enumerate() {
+                    *x = (u[at(e) + r] * h + self.polygon.u[at(e) + r] * dh) * sign;
+                }
+                let xi = &points[at(e)..][..m];
+                let [cosh, stretch] = [0, 1].map(|which| self.function_row(i, e, which).chunks(m));
+                let product = |row: &[f64], x: &[f64]| row.iter().zip(x).map(|(a, x)| a * x).sum::<f64>();
+                motions.extend(cosh.zip(stretch).map(|(c, s)| product(c, xi) + product(s, &handle)));
+            }
+            motions.extend_from_slice(&points[at(1)..][..m]);
             motions.extend([dt, dh]);
         }
         if of == Of::Point {
-            let frames = self.frames();
-            return self.space.0.push(&self.moving(x, &frames), &motions, out);
+            return self.space.0.push(&self.moving(x), &motions, out);
         }
         for (&x, out) in x.iter().zip(out.chunks_mut(self.space.point_len())) {
             checkpoint();
@@ -223,7 +249,7 @@ impl<'a> Derivative<'a> {
             let row = &motions[i * motion_len(m)..][..motion_len(m)];
             let (dt, dh) = (row[4 * m], row[4 * m + 1]);
             let mut z = Vector::from_column_slice(&row[..4 * m + 1]);
-            z[4 * m] = -(dt + tau * dh) / self.system.segments[i].h;
+            z[4 * m] = -(dt + tau * dh) / self.system.h[i];
             let moved = columns * z + by_h * dh;
             out.copy_from_slice(moved.as_slice());
         }
@@ -236,8 +262,7 @@ impl<'a> Derivative<'a> {
         let size = motion_len(m);
         let mut products = vec![0.0; n * size];
         if of == Of::Point {
-            let frames = self.frames();
-            self.space.0.pull(&self.moving(x, &frames), cotangent, &mut products);
+            self.space.0.pull(&self.moving(x), cotangent, &mut products);
         } else {
             for (&x, cotangent) in x.iter().zip(cotangent.chunks(len)) {
                 checkpoint();
@@ -248,36 +273,40 @@ impl<'a> Derivative<'a> {
                 let z = columns.tr_mul(&cotangent);
                 let row = &mut products[i * size..][..size];
                 row.iter_mut().zip(&z.as_slice()[..4 * m]).for_each(|(sum, x)| *sum += x);
-                let rate = z[4 * m] / self.system.segments[i].h;
+                let rate = z[4 * m] / self.system.h[i];
                 row[4 * m] -= rate;
                 row[4 * m + 1] += by_h.dot(&cotangent) - tau * rate;
             }
         }
-        let zero = || vec![Vector::zeros(m); n + 1];
+        let slots = self.polygon.runs.slots() * m;
+        let (mut points, mut u) = (vec![0.0; slots], vec![0.0; slots]);
         let mut gradient = Change {
-            points: zero(),
+            points: Vec::new(),
             lengths: vec![0.0; n],
             ends: [Vector::zeros(m), Vector::zeros(m)],
             knots: vec![0.0; n + 1],
         };
-        let mut u = zero();
-        for (i, (segment, row)) in self.system.segments.iter().zip(products.chunks(size)).enumerate() {
+        for (i, (&h, row)) in self.system.h.iter().zip(products.chunks(size)).enumerate() {
             for e in 0..2 {
-                let f = &segment.functions[e];
+                let at = self.polygon.runs.slot(i, e) * m;
                 let sign = if e == 0 { 1.0 } else { -1.0 } / 3.0;
-                let inner = Vector::from_column_slice(&row[(1 + e) * m..][..m]);
-                let knot = Vector::from_column_slice(&row[3 * e * m..][..m]);
-                gradient.points[i + e] += knot + f.cosh.tr_mul(&inner);
-                let handle = f.stretch.tr_mul(&inner) * sign;
-                gradient.lengths[i] += handle.dot(&self.polygon.u[i + e]);
-                u[i + e] += handle * segment.h;
+                let inner = &row[(1 + e) * m..][..m];
+                let [cosh, stretch] = [0, 1].map(|which| self.function_row(i, e, which).chunks(m));
+                points[at..][..m].iter_mut().zip(&row[3 * e * m..]).for_each(|(sum, x)| *sum += x);
+                for ((x, cosh), stretch) in inner.iter().zip(cosh).zip(stretch) {
+                    for r in 0..m {
+                        points[at + r] += cosh[r] * x;
+                        let handle = stretch[r] * x * sign;
+                        gradient.lengths[i] += handle * self.polygon.u[at + r];
+                        u[at + r] += handle * h;
+                    }
+                }
             }
             gradient.knots[i] += row[4 * m];
             gradient.lengths[i] += row[4 * m + 1];
         }
-        self.fold(&mut u);
-        self.system.pull_back(u, &mut gradient);
-        self.fold(&mut gradient.points);
+        gradient.points = self.polygon.fold(&points, m);
+        self.system.pull_back(&self.polygon.fold(&u, m), &mut gradient);
         self.ambient(&gradient)
     }
 
@@ -299,64 +328,51 @@ impl<'a> Derivative<'a> {
     }
 
     /// The C² condition at a knot, linearised.
-    pub fn condition(&self, node: usize) -> &Linearised {
-        &self.system.rows[node]
+    pub fn condition(&self, node: usize) -> Linearised {
+        self.system.condition(node)
     }
 
-    /// The tangent vector at a knot with given coordinates in its frame.
-    pub fn tangent(&self, node: usize, x: &[f64], v: &mut [f64]) {
-        let v_at = self.polygon.nodes[node].basis(self.space) * Vector::from_column_slice(x);
-        v.copy_from_slice(v_at.as_slice());
+    /// The tangent vectors at all nodes with given coordinates in their frames, node after node.
+    pub fn tangents(&self, x: &[f64]) -> Vec<f64> {
+        self.polygon.tangents(self.space, self.points, x)
     }
 
     /// Converts changes to the frames of the linear system.
     fn in_frames(&self, change: &Data) -> Change {
-        let (n, len) = (self.segments(), self.space.point_len());
-        let at = |i: usize, v: &[f64]| self.polygon.nodes[i].coordinates(self.space, v);
-        let mut points: Vec<Vector> = change.points.chunks(len).enumerate().map(|(i, v)| at(i, v)).collect();
-        self.close(&mut points);
+        let n = self.segments();
         let end = |e: usize| {
             let v = &change.ends[e];
-            if v.is_empty() { Vector::zeros(self.space.dim()) } else { at(e * n, v) }
+            if v.is_empty() {
+                Vector::zeros(self.space.dim())
+            } else {
+                self.polygon.coordinates_at(self.space, self.points, e * n, v)
+            }
         };
         Change {
-            points,
+            points: self.polygon.coordinates(self.space, self.points, &change.points),
             lengths: change.knots.windows(2).map(|t| t[1] - t[0]).collect(),
             ends: [end(0), end(1)],
             knots: change.knots.clone(),
         }
     }
 
-    /// The last node of a closed curve moves with the first.
-    fn close(&self, x: &mut Vec<Vector>) {
-        if let Some(holonomy) = &self.polygon.holonomy {
-            x.resize(self.segments() + 1, Vector::zeros(self.space.dim()));
-            let last = holonomy * &x[0];
-            x[self.segments()] = last;
-        }
-    }
-
-    /// The transpose of [`close`](Self::close).
-    fn fold(&self, x: &mut [Vector]) {
-        if let Some(holonomy) = &self.polygon.holonomy {
-            let last = std::mem::replace(&mut x[self.segments()], Vector::zeros(self.space.dim()));
-            x[0] += holonomy.tr_mul(&last);
-        }
-    }
-
     /// Converts a gradient to ambient arrays.
     fn ambient(&self, gradient: &Change) -> Data {
-        let n = self.segments();
-        let at = |i: usize, x: &Vector| self.polygon.nodes[i].gradient(self.space, x).as_slice().to_vec();
+        let (n, len) = (self.segments(), self.space.point_len());
         let mut knots = gradient.knots.clone();
         for (i, g) in gradient.lengths.iter().enumerate() {
             knots[i] -= g;
             knots[i + 1] += g;
         }
+        let mut points = self.polygon.gradients(self.space, self.points, &gradient.points);
+        // That of a closed curve's last knot is the first.
+        points.resize((n + 1) * len, 0.0);
         Data {
-            points: gradient.points.iter().enumerate().flat_map(|(i, x)| at(i, x)).collect(),
+            points,
             knots,
-            ends: std::array::from_fn(|e| at(e * n, &gradient.ends[e])),
+            ends: std::array::from_fn(|e| {
+                self.polygon.gradient_at(self.space, self.points, e * n, gradient.ends[e].as_slice())
+            }),
         }
     }
 }
