@@ -15,7 +15,7 @@ use crate::monitor::checkpoint;
 use crate::scalar::{Lane, lane};
 use crate::space::{Ambient, Erased, Frame, Origin};
 use bezier::{Bezier, Knot};
-use operators::{Few, of_lane};
+use operators::Few;
 pub use operators::{Matrix, Vector};
 use polygon::Polygon;
 use std::collections::BTreeMap;
@@ -84,7 +84,7 @@ impl Motion<'_> {
         let Polygon { runs, turns, .. } = &self.derivative.polygon;
         let run = runs.slot(self.segment, 0) - self.segment;
         if runs.first(run + 1) == self.segment + 1 && runs.joint(run).is_some() {
-            let turn = of_lane(&turns[0], run);
+            let turn = turns[0].of_lane(run);
             for from in [2 * m, 3 * m] {
                 let turned = out.columns(from, m) * &turn;
                 out.columns_mut(from, m).copy_from(&turned);

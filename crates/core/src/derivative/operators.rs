@@ -3,8 +3,8 @@
 //! All functions are computed from `S(v) = sinh(ad_v)/ad_v` and the triple product `[a, [b, c]]`, which every space
 //! provides. Hyperbolic identities give the other even functions of ad_v.
 
-use crate::matrix::inverse;
-use crate::scalar::{Dual, LANES, Lane, Scalar, few, lane};
+use crate::fit::eliminate;
+use crate::scalar::{Dual, LANES, Lane, Scalar, dot, few, lane};
 use crate::space::{Erased, Origin};
 use nalgebra::{DMatrix, DVector};
 use smallvec::{SmallVec, smallvec};
@@ -13,8 +13,6 @@ use smallvec::{SmallVec, smallvec};
 pub type Matrix = DMatrix<f64>;
 /// A vector of any size.
 pub type Vector = DVector<f64>;
-/// A matrix on each lane.
-pub type Square = crate::matrix::Matrix<Lane, 1>;
 /// A few numbers on the stack: allocating aligned lanes on the heap would cost more than the computation.
 pub type Few<S> = SmallVec<[S; 12]>;
 
@@ -38,19 +36,150 @@ pub fn unit(row: usize, first: usize) -> Lane {
     Lane::new(few(|l| if row == first + l { 1.0 } else { 0.0 }))
 }
 
-/// One number of the k-th unit vector on every lane.
-pub fn axis(row: usize, k: usize) -> Lane {
-    if row == k { Lane::ONE } else { Lane::ZERO }
-}
-
 /// Copies a vector to every lane.
 pub fn splat(v: &Vector) -> Few<Lane> {
     v.iter().map(|&x| lane(x)).collect()
 }
 
-/// The matrix of one lane.
-pub fn of_lane(x: &Square, l: usize) -> Matrix {
-    Matrix::from_fn(x.rows(), x.cols(), |r, c| x[(r, c)][0].as_array()[l])
+/// An m × m matrix on each lane, row by row.
+#[derive(Clone)]
+pub struct Square {
+    m: usize,
+    x: Vec<Lane>,
+}
+
+impl Square {
+    pub fn zeros(m: usize) -> Self {
+        Square { m, x: vec![Lane::ZERO; m * m] }
+    }
+
+    pub fn identity(m: usize) -> Self {
+        let mut out = Square::zeros(m);
+        out.add_identity(Lane::ONE);
+        out
+    }
+
+    /// The numbers, row by row.
+    pub fn numbers(&self) -> &[Lane] {
+        &self.x
+    }
+
+    pub fn numbers_mut(&mut self) -> &mut [Lane] {
+        &mut self.x
+    }
+
+    /// The matrix of one lane.
+    pub fn of_lane(&self, l: usize) -> Matrix {
+        Matrix::from_fn(self.m, self.m, |r, c| self.x[r * self.m + c].as_array()[l])
+    }
+
+    pub fn set(&mut self, other: &Square) {
+        self.x.copy_from_slice(&other.x);
+    }
+
+    pub fn scale(&mut self, factor: Lane) {
+        self.x.iter_mut().for_each(|x| *x *= factor);
+    }
+
+    pub fn add(&mut self, factor: Lane, other: &Square) {
+        self.x.iter_mut().zip(&other.x).for_each(|(x, y)| *x = factor.mul_add(*y, *x));
+    }
+
+    pub fn add_identity(&mut self, factor: Lane) {
+        self.x.iter_mut().step_by(self.m + 1).for_each(|x| *x += factor);
+    }
+
+    /// A B
+    pub fn set_product(&mut self, a: &Square, b: &Square) {
+        self.x.fill(Lane::ZERO);
+        self.add_product(Lane::ONE, a, b);
+    }
+
+    /// Adds a multiple of A B.
+    pub fn add_product(&mut self, factor: Lane, a: &Square, b: &Square) {
+        let m = self.m;
+        for (out, a) in self.x.chunks_exact_mut(m).zip(a.x.chunks_exact(m)) {
+            for (a, b) in a.iter().zip(b.x.chunks_exact(m)) {
+                let a = *a * factor;
+                out.iter_mut().zip(b).for_each(|(out, b)| *out = a.mul_add(*b, *out));
+            }
+        }
+    }
+
+    /// Adds a multiple of A x to a vector.
+    pub fn act(&self, factor: Lane, x: &[Lane], out: &mut [Lane]) {
+        for (out, row) in out.iter_mut().zip(self.x.chunks_exact(self.m)) {
+            *out = dot(row, x).mul_add(factor, *out);
+        }
+    }
+
+    /// Computes the columns one by one.
+    fn set_columns(&mut self, mut f: impl FnMut(usize, &mut [Lane])) {
+        let mut column: Few<Lane> = smallvec![Lane::ZERO; self.m];
+        for k in 0..self.m {
+            f(k, &mut column);
+            self.x[k..].iter_mut().step_by(self.m).zip(&column).for_each(|(out, x)| *out = *x);
+        }
+    }
+
+    /// S(v).
+    pub fn set_stretch(&mut self, space: &Erased, v: &[Lane]) {
+        self.set_columns(|k, x| {
+            x.fill(Lane::ZERO);
+            x[k] = Lane::ONE;
+            space.stretch(v, x);
+        });
+    }
+
+    /// The derivative of S(v)x in v.
+    pub fn set_stretch_slope(&mut self, space: &Erased, v: &[Lane], x: &[Lane]) {
+        let mut v: Few<Dual> = v.iter().map(|&v| Dual::constant(v)).collect();
+        let x: Few<Dual> = x.iter().map(|&x| Dual::constant(x)).collect();
+        let mut y = x.clone();
+        self.set_columns(|k, out| {
+            v[k].d = Lane::ONE;
+            y.copy_from_slice(&x);
+            space.stretch(&v, &mut y);
+            v[k].d = Lane::ZERO;
+            out.iter_mut().zip(&y).for_each(|(out, y)| *out = y.d);
+        });
+    }
+
+    /// `z ↦ [[a, z], w]`, which is `[w, [z, a]]`.
+    pub fn set_curvature(&mut self, space: &Erased, a: &[Lane], w: &[Lane]) {
+        let mut z: Few<Lane> = smallvec![Lane::ZERO; self.m];
+        self.set_columns(|k, out| {
+            z[k] = Lane::ONE;
+            space.triple(w, &z, a, out);
+            z[k] = Lane::ZERO;
+        });
+    }
+
+    /// ad_v²
+    fn set_ad_squared(&mut self, space: &Erased, v: &[Lane]) {
+        let mut x: Few<Lane> = smallvec![Lane::ZERO; self.m];
+        self.set_columns(|k, out| {
+            x[k] = Lane::ONE;
+            space.triple(v, v, &x, out);
+            x[k] = Lane::ZERO;
+        });
+    }
+
+    /// A⁻¹ times several matrices, in place.
+    pub fn divide(&self, right: &mut [&mut Square]) {
+        let (m, width) = (self.m, self.m * (1 + right.len()));
+        let mut rows: Vec<Lane> = Vec::with_capacity(m * width);
+        for r in 0..m {
+            rows.extend_from_slice(&self.x[r * m..][..m]);
+            right.iter().for_each(|b| rows.extend_from_slice(&b.x[r * m..][..m]));
+        }
+        eliminate(&mut rows, m, width);
+        for (r, row) in rows.chunks_exact(width).enumerate() {
+            for (b, row) in right.iter_mut().zip(row[m..].chunks_exact(m)) {
+                b.x[r * m..][..m].copy_from_slice(row);
+            }
+        }
+    }
 }
 
 /// The vector of one lane.
@@ -58,82 +187,39 @@ pub fn vector_of_lane(x: &[Lane], l: usize) -> Vector {
     Vector::from_iterator(x.len(), x.iter().map(|x| x.as_array()[l]))
 }
 
-/// A x
-pub fn act(a: &Square, x: &[Lane]) -> Few<Lane> {
-    (0..a.rows())
-        .map(|r| x.iter().enumerate().fold(Lane::ZERO, |sum, (c, x)| a[(r, c)][0].mul_add(*x, sum)))
-        .collect()
-}
-
-/// The square matrix whose columns `f` computes one by one, on all lanes.
-fn by_columns(m: usize, mut f: impl FnMut(usize, &mut [Lane])) -> Square {
-    let mut out = Square::zeros(m, m);
-    let mut column: Few<Lane> = smallvec![Lane::ZERO; m];
-    for k in 0..m {
-        f(k, &mut column);
-        column.iter().enumerate().for_each(|(r, x)| out[(r, k)] = [*x]);
-    }
-    out
-}
-
-/// S(v).
-pub fn stretch(space: &Erased, v: &[Lane]) -> Square {
-    by_columns(v.len(), |k, x| {
-        x.iter_mut().enumerate().for_each(|(r, x)| *x = axis(r, k));
-        space.stretch(v, x);
-    })
-}
-
-/// The derivative of S(v)x in v.
-pub fn stretch_slope(space: &Erased, v: &[Lane], x: &[Lane]) -> Square {
-    by_columns(v.len(), |k, out| {
-        let v: Few<Dual> = v.iter().enumerate().map(|(r, &v)| Dual { v, d: axis(r, k) }).collect();
-        let mut y: Few<Dual> = x.iter().map(|&x| Dual::constant(x)).collect();
-        space.stretch(&v, &mut y);
-        out.iter_mut().zip(&y).for_each(|(out, y)| *out = y.d);
-    })
-}
-
-/// `z ↦ [[a, z], w]`, which is `[w, [z, a]]`.
-pub fn curvature(space: &Erased, a: &[Lane], w: &[Lane]) -> Square {
-    by_columns(a.len(), |k, out| {
-        let z: Few<Lane> = (0..a.len()).map(|r| axis(r, k)).collect();
-        space.triple(w, &z, a, out);
-    })
-}
-
-/// ad_v²
-fn ad_squared(space: &Erased, v: &[Lane]) -> Square {
-    by_columns(v.len(), |k, out| {
-        let x: Few<Lane> = (0..v.len()).map(|r| axis(r, k)).collect();
-        space.triple(v, v, &x, out);
-    })
-}
-
 /// Even functions of ad_v for one v.
 #[derive(Clone)]
 pub struct Functions {
     /// S = sinh(ad)/ad
     pub stretch: Square,
-    /// S⁻¹
-    pub shrink: Square,
     /// cosh(ad)
     pub cosh: Square,
     /// ad coth(ad)
     pub coth: Square,
     /// tanh(ad/2)/ad
     pub tanh: Square,
+    half: Square,
 }
 
 impl Functions {
-    pub fn of(space: &Erased, v: &[Lane]) -> Self {
-        let half: Few<Lane> = v.iter().map(|x| *x * lane(0.5)).collect();
-        let (full, half) = (stretch(space, v), stretch(space, &half));
-        let square = half.times(&half);
+    pub fn new(m: usize) -> Self {
+        let zeros = || Square::zeros(m);
+        Functions { stretch: zeros(), cosh: zeros(), coth: zeros(), tanh: zeros(), half: zeros() }
+    }
+
+    pub fn set(&mut self, space: &Erased, v: &[Lane]) {
+        let middle: Few<Lane> = v.iter().map(|x| *x * lane(0.5)).collect();
+        let Functions { stretch, cosh, coth, tanh, half } = self;
+        stretch.set_stretch(space, v);
+        half.set_stretch(space, &middle);
+        tanh.set_product(half, half);
         // cosh x − 1 = 2 sinh²(x/2), tanh(x/2) sinh x = 2 sinh²(x/2)
-        let cosh = ad_squared(space, v).times(&square).scaled(lane(0.5)).plus_identity(Lane::ONE);
-        let shrink = inverse(&full);
-        let (coth, tanh) = (shrink.times(&cosh), shrink.times(&square).scaled(lane(0.5)));
-        Functions { stretch: full, shrink, cosh, coth, tanh }
+        half.set_ad_squared(space, v);
+        cosh.set_product(half, tanh);
+        cosh.scale(lane(0.5));
+        cosh.add_identity(Lane::ONE);
+        tanh.scale(lane(0.5));
+        coth.set(cosh);
+        stretch.divide(&mut [coth, tanh]);
     }
 }

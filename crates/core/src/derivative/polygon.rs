@@ -4,8 +4,7 @@
 //! therefore has two frames; the *nodes* use that of the run which begins there, the *slots* are the ends of all segments
 //! of all runs.
 
-use super::operators::{Few, Square, Vector, axis};
-use crate::matrix::inverse;
+use super::operators::{Few, Square, Vector};
 use crate::monitor::checkpoint;
 use crate::scalar::{LANES, Lane, dot, few, gather, lane, scatter};
 use crate::space::{Ambient, Erased, Frame, Origin};
@@ -156,14 +155,17 @@ impl Polygon {
             let still = zeros(len);
             let (mut from, mut to) = (zeros(len), zeros(len));
             for k in 0..m {
-                x.iter_mut().enumerate().for_each(|(r, x)| *x = axis(r, k));
+                x.fill(Lane::ZERO);
+                x[k] = Lane::ONE;
                 space.tangent(&next_frame, &there, &x, &mut from);
                 // The same point, possibly another array.
                 space.parallel_transport(&there, &end.0, &still, &from, &mut to);
                 space.coordinates(&end.1, &end.0, &to, &mut x);
-                x.iter().enumerate().for_each(|(r, x)| out.turns[0][(r, k)] = [*x]);
+                let column = out.turns[0].numbers_mut()[k..].iter_mut().step_by(m);
+                column.zip(&x).for_each(|(out, x)| *out = *x);
             }
-            out.turns[1] = inverse(&out.turns[0]);
+            let [turn, back] = &mut out.turns;
+            turn.divide(&mut [back]);
         }
         out
     }
@@ -177,7 +179,7 @@ impl Polygon {
 
     /// The numbers of the turn at the end of a run, row by row.
     fn turn(&self, run: usize) -> impl Iterator<Item = f64> {
-        self.turns[0].entries().iter().map(move |[x]| x.as_array()[run])
+        self.turns[0].numbers().iter().map(move |x| x.as_array()[run])
     }
 
     /// Coordinates at the nodes in the frames of the slots.
@@ -288,7 +290,8 @@ impl Polygon {
         let mut x: Few<Lane> = smallvec![Lane::ZERO; m];
         self.at_nodes(space, points, nodes, (gradient, m, len), |p, frame, gradient, out| {
             for (k, e) in basis.chunks_mut(len).enumerate() {
-                x.iter_mut().enumerate().for_each(|(r, x)| *x = axis(r, k));
+                x.fill(Lane::ZERO);
+                x[k] = Lane::ONE;
                 space.tangent(frame, p, &x, e);
             }
             solve_transposed(&mut basis, gradient, out);

@@ -1,11 +1,8 @@
 //! The linearised C² condition of a whole curve: the sensitivity of velocities to points, knots and end vectors.
 
-use super::operators::{
-    Few, Functions, Matrix, Square, Vector, act, curvature, of_lane, splat, stretch, stretch_slope, unit,
-    vector_of_lane,
-};
+use super::operators::{Functions, Matrix, Square, Vector, splat, unit, vector_of_lane};
 use super::polygon::{Polygon, Runs};
-use super::segment::{SegmentEnd, Side, linearised, turn_last};
+use super::segment::{SegmentEnd, linearise, turn_last};
 use crate::fit::{Blocks, EndKind, NotAKnot};
 use crate::monitor::checkpoint;
 use crate::scalar::{Dual, LANES, Lane, few, lane};
@@ -68,32 +65,33 @@ impl System {
         let lanes = runs.lanes();
         let [turn, back] = &polygon.turns;
         let u = |k: usize| &polygon.velocities[k * m..][..m];
-        let (mut first, mut last, mut before): (Option<SegmentEnd>, Option<SegmentEnd>, Option<SegmentEnd>) =
-            (None, None, None);
+        let new = || SegmentEnd::new(m);
+        let (mut ends_here, mut before, mut first, mut last) = ([new(), new()], new(), new(), new());
+        let mut row = Row::new(m);
         for k in 0..runs.longest() {
             checkpoint();
             let length = Lane::new(lanes.map(|run| h[runs.first(run) + k.min(runs.len(run) - 1)]));
             let chord = &polygon.chords[k * m..][..m];
-            let mut ends = linearised(space, length, chord, [u(k), u(k + 1)]);
-            system.write_functions(k, &ends);
+            linearise(space, length, chord, [u(k), u(k + 1)], &mut ends_here);
+            system.write_functions(k, &ends_here);
             let ending = runs.ending(k);
             if ending.any() && (runs.closed || runs.count > 1) {
                 // The end of an open curve has one frame only.
                 let joints: [f64; LANES] = few(|l| f64::from(runs.joint(lanes[l]).is_some()));
-                turn_last(&mut ends, ending & Lane::new(joints).simd_gt(Lane::ZERO), turn, back);
+                turn_last(&mut ends_here, ending & Lane::new(joints).simd_gt(Lane::ZERO), turn, back);
             }
-            let [start, end] = ends;
-            if let Some(before) = &before {
-                let row = Row::inner(space, before, &start, &before.stretch, u(k));
+            let [start, end] = &mut ends_here;
+            if k == 0 {
+                first = start.clone();
+            } else {
+                row.set(space, &before, start, &before.functions.stretch, u(k));
                 runs.have(k).for_each(|run| system.write_row(runs.first(run) + k, &row, run));
             }
             if ending.any() {
-                last = Some(last.map_or_else(|| end.clone(), |last| end.select(ending, &last)));
+                last.replace(ending, end);
             }
-            first = first.or(Some(start));
-            before = Some(end);
+            std::mem::swap(&mut before, end);
         }
-        let (Some(first), Some(last)) = (first, last) else { return system };
         if let Some(ends) = &ends {
             let both = ends.iter().all(|(kind, _)| *kind == EndKind::NotAKnot);
             for (which, (segment, l)) in [(&first, 0), (&last, runs.count - 1)].into_iter().enumerate() {
@@ -103,8 +101,10 @@ impl System {
         if nodes > 0 && (runs.closed || runs.count > 1) {
             // The first nodes of runs follow the last segments of the runs before.
             let before = last.permuted(lanes.map(|run| (run + runs.count - 1) % runs.count));
-            let handle: Few<Lane> = u(0).iter().map(|u| *u * before.h * lane(1.0 / 3.0)).collect();
-            let row = Row::inner(space, &before, &first, &stretch(space, &handle), u(0));
+            let handle: Vec<Lane> = u(0).iter().map(|u| *u * before.h * lane(1.0 / 3.0)).collect();
+            let mut stretched = Square::zeros(m);
+            stretched.set_stretch(space, &handle);
+            row.set(space, &before, &first, &stretched, u(0));
             let from = usize::from(!runs.closed);
             (from..runs.count).for_each(|run| system.write_row(runs.first(run), &row, run));
         }
@@ -115,8 +115,9 @@ impl System {
         let (square, runs) = (self.m * self.m, self.runs);
         for run in runs.have(k) {
             let out = &mut self.functions[(runs.first(run) + k) * 4 * square..][..4 * square];
-            let all = ends.iter().flat_map(|end| [&end.cosh, &end.stretch]).flat_map(Square::entries);
-            out.iter_mut().zip(all).for_each(|(out, [x])| *out = x.as_array()[run]);
+            let squares = ends.iter().flat_map(|end| [&end.functions.cosh, &end.functions.stretch]);
+            let all = squares.flat_map(Square::numbers);
+            out.iter_mut().zip(all).for_each(|(out, x)| *out = x.as_array()[run]);
         }
     }
 
@@ -127,7 +128,7 @@ impl System {
 
     fn write_row(&mut self, node: usize, row: &Row, l: usize) {
         let size = 6 * self.m * self.m + 2 * self.m;
-        let blocks = row.u.iter().chain(&row.points).flat_map(Square::entries).map(|[x]| x);
+        let blocks = row.u.iter().chain(&row.points).flat_map(Square::numbers);
         let all = blocks.chain(row.lengths.iter().flatten());
         self.rows[node * size..][..size].iter_mut().zip(all).for_each(|(out, x)| *out = x.as_array()[l]);
     }
@@ -190,10 +191,10 @@ impl System {
                 row.u = vec![(node, &slope * (-self.h[near] / 3.0))];
                 row.lengths.push((near, &slope * u / -3.0 + vector_of_lane(&segment.side.length, l)));
                 for (e, node) in [near, near + 1].into_iter().enumerate() {
-                    row.u.push((node, of_lane(&segment.side.u[e], l)));
-                    row.points.push((node, of_lane(&segment.side.points[e], l)));
+                    row.u.push((node, segment.side.u[e].of_lane(l)));
+                    row.points.push((node, segment.side.points[e].of_lane(l)));
                 }
-                row.end = Some((which, of_lane(&segment.stretch, l) / -6.0));
+                row.end = Some((which, segment.functions.stretch.of_lane(l) / -6.0));
             }
             EndKind::NotAKnot => {
                 // Differentiated with respect to the lengths of the two segments, one per lane.
@@ -315,53 +316,64 @@ impl System {
 struct Row {
     u: [Square; 3],
     points: [Square; 3],
-    lengths: [Few<Lane>; 2],
+    lengths: [Vec<Lane>; 2],
+    slopes: [Square; 2],
 }
 
 impl Row {
+    fn new(m: usize) -> Self {
+        let (square, vector) = (|| Square::zeros(m), || vec![Lane::ZERO; m]);
+        Row {
+            u: [square(), square(), square()],
+            points: [square(), square(), square()],
+            lengths: [vector(), vector()],
+            slopes: [square(), square()],
+        }
+    }
+
     /// `S(hᵢ₋₁u/3) right − S(hᵢu/3) left`; `stretched` is S(hᵢ₋₁u/3).
-    fn inner(
+    fn set(
+        &mut self,
         space: &Erased,
         before: &SegmentEnd,
         behind: &SegmentEnd,
         stretched: &Square,
         u: &[Lane],
-    ) -> Self {
+    ) {
         let third = lane(1.0 / 3.0);
-        let handles = [before.h, behind.h].map(|h| -> Few<Lane> { u.iter().map(|u| *u * h * third).collect() });
-        let (left, right) = (&before.side, &behind.side);
-        let factors = [stretched.clone(), -behind.stretch.clone()];
-        let slopes = [
-            stretch_slope(space, &handles[0], &right.value),
-            -stretch_slope(space, &handles[1], &left.value),
-        ];
-        let middle = |by_right: &Square, by_left: &Square| {
-            &factors[0].times(by_right) + &factors[1].times(by_left)
-        };
-        let by_handle = &slopes[0].scaled(before.h * third) + &slopes[1].scaled(behind.h * third);
-        let length = |factor: &Square, side: &Side, slope: &Square| -> Few<Lane> {
-            let (direct, turned) = (act(factor, &side.length), act(slope, u));
-            direct.iter().zip(&turned).map(|(x, y)| *x + *y * third).collect()
-        };
-        Row {
-            u: [
-                factors[1].times(&left.u[0]),
-                &middle(&right.u[0], &left.u[1]) + &by_handle,
-                factors[0].times(&right.u[1]),
-            ],
-            points: [
-                factors[1].times(&left.points[0]),
-                middle(&right.points[0], &left.points[1]),
-                factors[0].times(&right.points[1]),
-            ],
-            lengths: [length(&factors[1], left, &slopes[0]), length(&factors[0], right, &slopes[1])],
+        let Row { u: by_u, points, lengths, slopes } = self;
+        let mut handle = u.to_vec();
+        handle.iter_mut().for_each(|x| *x *= before.h * third);
+        slopes[0].set_stretch_slope(space, &handle, &behind.side.value);
+        slopes[1].set_stretch_slope(space, &behind.handle, &before.side.value);
+        slopes[1].scale(-Lane::ONE);
+        by_u.iter_mut().chain(&mut *points).for_each(|x| x.scale(Lane::ZERO));
+        let factors = [(&behind.functions.stretch, -Lane::ONE, before), (stretched, Lane::ONE, behind)];
+        for (k, (factor, sign, end)) in factors.into_iter().enumerate() {
+            for e in 0..2 {
+                by_u[k + e].add_product(sign, factor, &end.side.u[e]);
+                points[k + e].add_product(sign, factor, &end.side.points[e]);
+            }
+            by_u[1].add(end.h * third, &slopes[k]);
+            lengths[k].fill(Lane::ZERO);
+            factor.act(sign, &end.side.length, &mut lengths[k]);
+            slopes[k].act(third, u, &mut lengths[k]);
         }
     }
 }
 
 /// The derivative of S(v)x in v, for one v.
 fn slope_of(space: &Erased, v: &Vector, x: &Vector) -> Matrix {
-    of_lane(&stretch_slope(space, &splat(v), &splat(x)), 0)
+    let mut slope = Square::zeros(v.len());
+    slope.set_stretch_slope(space, &splat(v), &splat(x));
+    slope.of_lane(0)
+}
+
+/// `z ↦ [[a, z], w]`, for one a.
+fn turned_by(space: &Erased, a: &Vector, w: &Vector) -> Matrix {
+    let mut curvature = Square::zeros(a.len());
+    curvature.set_curvature(space, &splat(a), &splat(w));
+    curvature.of_lane(0)
 }
 
 /// Functions of ad_v as matrices of one lane.
@@ -374,8 +386,12 @@ struct OfChord {
 
 impl OfChord {
     fn of(space: &Erased, v: &Vector) -> Self {
-        let Functions { stretch, shrink, coth, tanh, .. } = Functions::of(space, &splat(v));
-        let [stretch, shrink, coth, tanh] = [stretch, shrink, coth, tanh].map(|x| of_lane(&x, 0));
+        let mut functions = Functions::new(v.len());
+        functions.set(space, &splat(v));
+        let mut shrink = Square::identity(v.len());
+        functions.stretch.divide(&mut [&mut shrink]);
+        let Functions { stretch, coth, tanh, .. } = functions;
+        let [stretch, shrink, coth, tanh] = [stretch, shrink, coth, tanh].map(|x| x.of_lane(0));
         OfChord { stretch, shrink, coth, tanh }
     }
 }
@@ -408,7 +424,7 @@ impl Linearised {
         let target = &first.stretch * &c;
         // In the frame of the neighbour.
         let slope = slope_of(space, d0, &c) + &first.stretch * near_by[0];
-        let turn = of_lane(&curvature(space, &splat(d0), &splat(&target)), 0) * &first.tanh * sign;
+        let turn = turned_by(space, d0, &target) * &first.tanh * sign;
         let own = &slope * &first.shrink * -sign + &turn;
         let mut neighbour = &slope * &first.coth * sign + &turn;
         if far_by[0] != 0.0 {
@@ -417,7 +433,7 @@ impl Linearised {
             let by_third = &far_slope * &second.shrink * -sign;
             // Where the first run ends with the second segment, the node has another frame.
             let turned = which == 0 && polygon.runs.len(0) == 2 && polygon.runs.joint(0).is_some();
-            let turn = of_lane(&polygon.turns[0], 0);
+            let turn = polygon.turns[0].of_lane(0);
             self.points.push((third, if turned { by_third * turn } else { by_third }));
         }
         self.points.push((end, -own));

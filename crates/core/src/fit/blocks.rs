@@ -157,7 +157,7 @@ fn subtract_product(a: &[Lane], b: &[Lane], c: &mut [Lane], m: usize, columns: u
 }
 
 /// Gauss–Jordan elimination of the first m columns of m rows, with row exchanges lane by lane.
-fn eliminate(a: &mut [Lane], m: usize, width: usize) {
+pub fn eliminate(a: &mut [Lane], m: usize, width: usize) {
     for k in 0..m {
         checkpoint();
         for i in k + 1..m {

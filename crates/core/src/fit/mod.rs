@@ -49,7 +49,7 @@ mod trust_region;
 mod unroll;
 mod vector;
 
-pub use blocks::Blocks;
+pub use blocks::{Blocks, eliminate};
 pub use chain::{Chain, Run, Visit};
 pub use condition::{sweep, sweep_by_table};
 pub use conditions::{FittedCurves, InnerVelocities, fit_with_conditions};
