@@ -3,7 +3,7 @@
 //!
 //! | module | content |
 //! |---|---|
-//! | [`scalar`] | numbers: eight lanes of a SIMD register, with one derivative or two |
+//! | [`scalar`] | numbers: the lanes of a SIMD register, with one derivative or two |
 //! | [`special`], [`matrix`], [`tridiagonal`] | special functions, small matrices and their functions, tridiagonal systems |
 //! | [`space`] | the traits of a symmetric space, and spaces made of others |
 //! | [`rows`], [`validate`] | operations on arrays of points; validation of curves before a fit |

@@ -1,4 +1,4 @@
-//! Operations of a space on arrays of points and tangent vectors, eight rows at a time.
+//! Operations of a space on arrays of points and tangent vectors, one row per SIMD lane.
 
 use crate::monitor::{Monitor, checkpoint};
 use crate::parallel;
@@ -145,7 +145,7 @@ pub fn apply(
     faults.into_inner().ok().flatten().map_or(Ok(()), Err)
 }
 
-/// Applies a function of eight rows to arrays with the same number of rows each, for a result with rows of `len` numbers.
+/// Applies a function of a row per lane to arrays with the same number of rows each, for a result with rows of `len` numbers.
 pub fn map(
     len: usize,
     inputs: &[&[f64]],

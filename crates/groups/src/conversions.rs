@@ -1,4 +1,4 @@
-//! Conversion of many rotations between matrices, unit quaternions and rotation vectors, eight at a time.
+//! Conversion of many rotations between matrices, unit quaternions and rotation vectors, one per SIMD lane.
 
 use crate::rigid::{Quaternion, multiply, of_matrix, to_matrix};
 use crate::rotations::{exp, log};

@@ -22,7 +22,7 @@ const TOLERANCE: Lane = lane(1e-14);
 /// The largest number of iterations of the logarithm.
 const MOST: usize = 60;
 
-/// The operations of a manifold, on eight points at once.
+/// The operations of a manifold, on one point per lane.
 pub trait Stiefel: Send + Sync {
     /// n and k
     fn size(&self) -> (usize, usize);

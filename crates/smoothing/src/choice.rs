@@ -2,7 +2,7 @@
 //!
 //! At a curve with residuals r and accelerations a, the smoothing problem in frames is a linear problem. Its solution
 //! changes the coefficients by `δ(λ) = A⁻¹(BᵀWr − λ(SᵀMa + Pᵀg))` with the contribution g of curvature, or, with the
-//! energy of [`JacobiOperator`], by the same with `(S + RP)ᵀMa`. Residuals and degrees of freedom for eight λ at a time
+//! energy of [`JacobiOperator`], by the same with `(S + RP)ᵀMa`. Residuals and degrees of freedom for several λ at a time
 //! cost one banded solve.
 
 use crate::cyclic::PeriodicCorrection;
@@ -83,12 +83,12 @@ impl<'a> Linear<'a> {
         self.misfit.matrix(self.linearized, self.m, self.jacobi, self.periodic, lane(lam))
     }
 
-    /// A for eight λ, factored.
+    /// A for the λ of all lanes, factored.
     pub fn factored(&self, lam: Lane) -> Factors {
         self.misfit.factored(self.linearized, self.m, self.jacobi, self.periodic, lam)
     }
 
-    /// The scores and their components for eight λ.
+    /// The scores and their components for the λ of all lanes.
     pub fn look(&self, lam: Lane) -> Look {
         let (m, linearized) = (self.m, self.linearized);
         let factors = self.factored(lam);
@@ -172,7 +172,8 @@ pub fn choose(
     /// segments are unequal), and the range around a guess.
     const RANGE: (f64, f64) = (-9.0, 12.5);
     const NEAR: f64 = 0.6;
-    /// The range in decades that the first eight evaluations cover.
+    /// The number of evaluations in a range, and the decades that those of the first ranges cover.
+    const AT_ONCE: usize = 8;
     const DECADES: f64 = 7.5;
     let straight = scoring.straight;
     let start = scoring.balance.log10();
@@ -187,12 +188,15 @@ pub fn choose(
     let passes = if guess.is_some() { 1 } else { ((to - from) / DECADES).ceil() as usize };
     let mut seen: Vec<(f64, f64, f64)> = Vec::new();
     let look = |seen: &mut Vec<(f64, f64, f64)>, from: f64, to: f64, part: usize, parts: usize| {
-        let at: [f64; LANES] =
-            few(|l| from + (to - from) * (l * parts + part) as f64 / (LANES * parts - 1) as f64);
-        let found = look_at(Lane::new(at.map(|x| 10f64.powf(x))));
-        let scores = scoring.score(Lane::new(at.map(|x| 10f64.powf(x))), &found).to_array();
-        let freedom = found.sound.select(found.freedom, lane(f64::NAN)).to_array();
-        (0..LANES).for_each(|l| seen.push((at[l], scores[l], freedom[l])));
+        let at: [f64; AT_ONCE] =
+            few(|k| from + (to - from) * (k * parts + part) as f64 / (AT_ONCE * parts - 1) as f64);
+        for at in at.as_chunks::<LANES>().0 {
+            let lam = Lane::new(at.map(|x| 10f64.powf(x)));
+            let found = look_at(lam);
+            let scores = scoring.score(lam, &found).to_array();
+            let freedom = found.sound.select(found.freedom, lane(f64::NAN)).to_array();
+            (0..LANES).for_each(|l| seen.push((at[l], scores[l], freedom[l])));
+        }
     };
     (0..passes).for_each(|part| look(&mut seen, from, to, part, passes));
     // The score may have a minimum between the roughest curve that has a score and its neighbours.

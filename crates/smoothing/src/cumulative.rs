@@ -192,7 +192,7 @@ impl<'a> Problem<'a> {
         if cost.is_finite() { Ok(State { control, steps, residuals, cost }) } else { Err(0) }
     }
 
-    /// A function of two arrays of points, eight rows at a time; it writes `size` numbers per row.
+    /// A function of two arrays of points, a row per lane; it writes `size` numbers per row.
     fn rows(
         &self,
         [a, b]: [&[f64]; 2],
@@ -308,7 +308,7 @@ impl<'a> Problem<'a> {
         (delta, decrease)
     }
 
-    /// The derivatives of the residuals of eight data with respect to the control points of their intervals.
+    /// The derivatives of the residuals of a datum per lane with respect to the control points of their intervals.
     fn jacobians(&self, state: &State, pairs: &[f64], at: [usize; LANES]) -> Vec<Square> {
         let (samples, k) = (self.samples, self.coupled);
         let (degree, square) = (samples.degree, k * k);

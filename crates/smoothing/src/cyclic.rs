@@ -42,7 +42,7 @@ impl PeriodicCorrection {
         }
     }
 
-    /// The same for eight λ.
+    /// The same for the λ of all lanes.
     pub fn extend_lanes(&self, x: &mut Vec<Lane>) {
         for k in 0..self.overlap * self.m {
             let (block, row) = (k / self.m, k % self.m);

@@ -118,7 +118,7 @@ impl<'a> Estimation<'a> {
         let linearized = LinearProblem::new(Basis::new(knots, ends), &[], &[], penalty);
         let m = factors.iter().map(Factor::dim).sum();
         let (p, size) = (priors.len(), linearized.basis.count() * m);
-        // The matrix, its factors and its inverse for eight λ; at most two blocks of each exist at the same time.
+        // The matrix, its factors and its inverse for the λ of all lanes; at most two blocks of each exist at the same time.
         let entries = (size * stride(m)) as f64 + 3.0 * p as f64 * (size as f64 + p as f64);
         memory::require(
             3.0 * LANES as f64 * entries,
@@ -348,7 +348,7 @@ impl<'a> Estimation<'a> {
         out
     }
 
-    /// Σ|r + Lc + Jδθ|² for eight λ.
+    /// Σ|r + Lc + Jδθ|² for the λ of all lanes.
     fn squares_at(&self, x: &[Lane]) -> Lane {
         let (p, stride) = (self.p, stride(self.m));
         let pulled = x.iter().zip(&self.pull).fold(Lane::ZERO, |sum, (x, pull)| x.mul_add(lane(*pull), sum));

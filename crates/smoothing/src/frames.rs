@@ -1,6 +1,6 @@
 //! One frame at every knot of a curve, transported along the polygon of its points.
 //!
-//! The polygon is divided into eight runs, one per SIMD lane. At the start of each run, the transformation from its
+//! The polygon is divided into runs, one per SIMD lane. At the start of each run, the transformation from its
 //! frame to the frame at the end of the preceding run is stored, so that coordinates refer to one frame transported
 //! along the whole polygon.
 
@@ -227,7 +227,7 @@ pub fn triples(space: &Erased, arrays: [&[f64]; 3]) -> Vec<f64> {
     out
 }
 
-/// The members of a group of eight; missing members repeat the last one. Every loop over groups calls this function, which
+/// The members of a group, one per lane; missing members repeat the last one. Every loop over groups calls this function, which
 /// stops if the work was cancelled.
 pub fn lanes_of(group: usize, count: usize) -> [usize; LANES] {
     checkpoint();

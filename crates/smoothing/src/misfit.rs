@@ -127,7 +127,7 @@ impl<'a> Misfit<'a> {
         pull
     }
 
-    /// A for eight λ, factored.
+    /// A for the λ of all lanes, factored.
     pub fn factored(
         &self,
         linearized: &LinearProblem,
@@ -140,7 +140,7 @@ impl<'a> Misfit<'a> {
         Factors { matrix: Factored::new(matrix, periodic.as_ref()), coupled }
     }
 
-    /// A for eight λ. The holonomy of a closed curve couples the coordinates, too.
+    /// A for the λ of all lanes. The holonomy of a closed curve couples the coordinates, too.
     pub fn matrix(
         &self,
         linearized: &LinearProblem,

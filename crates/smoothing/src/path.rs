@@ -57,7 +57,7 @@ impl Path<'_> {
         moved(space, &points, &beyond)
     }
 
-    /// Evaluates positions eight at a time: `visit` receives the group, and the point with derivatives in units of
+    /// Evaluates positions in groups: `visit` receives the group, and the point with derivatives in units of
     /// the segment.
     fn each<S: Scalar>(
         &self,

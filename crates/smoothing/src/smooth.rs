@@ -61,7 +61,7 @@ pub fn smooth(space: &Erased, data: &[Data], options: &Options, monitor: &Monito
     tracks.into_iter().map(CurveFit::finish).collect()
 }
 
-/// The approximate count of floating-point numbers in memory while a curve is smoothed: band matrices of eight λ, and
+/// The approximate count of floating-point numbers in memory while a curve is smoothed: band matrices of several λ, and
 /// several vectors per knot and per datum. Those of full Gauss–Newton are not included.
 fn size(space: &Erased, data: &Data) -> usize {
     let (knots, count) = (data.knots.len(), data.times.len());

@@ -8,6 +8,7 @@ use numpy::{
 };
 use pyo3::prelude::*;
 use std::ops::Range;
+use symspline_engine::scalar::LANES;
 use symspline_engine::smoothing::calibrate::{Calibration, Course, Evidence};
 use symspline_engine::smoothing::gaps::{Functionals, System};
 use symspline_engine::smoothing::{chi, functional_at};
@@ -62,7 +63,7 @@ pub fn predictions_without<'py>(
         blocks.iter().map(|&[a, b, c, d]| (&omitted[a..b], c..d)).collect();
     let residuals = in_order(&residuals)?;
     let columns = residuals.len() / of_data.len().max(1);
-    let work = blocks.len().div_ceil(8) * matrices[0].len();
+    let work = blocks.len().div_ceil(LANES) * matrices[0].len();
     let found =
         watched(py, None, work, false, |_| system.without(&data, residuals, columns, &probes, &blocks))?;
     let (values, variances) = (zeros(py, &[of_probes.len(), columns])?, zeros(py, &[of_probes.len()])?);

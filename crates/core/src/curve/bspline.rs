@@ -39,7 +39,7 @@ pub fn evaluate_bspline(
     });
 }
 
-/// SampleBlock of curves, eight at a time, and memory for them.
+/// SampleBlock of curves, one per lane, and memory for them.
 struct SampleBlock<'a, S> {
     space: &'a Erased<'a>,
     curve: &'a BSpline<'a>,
@@ -82,7 +82,7 @@ impl<'a, S: Scalar> SampleBlock<'a, S> {
         }
     }
 
-    /// The points of eight samples in any intervals of any curves.
+    /// The points of a sample per lane, in any intervals of any curves.
     fn points(&mut self, curves: [usize; LANES], interval: [usize; LANES], times: [f64; LANES]) {
         let (space, curve) = (self.space, self.curve);
         let (len, degree, t) = (space.point_len(), curve.degree, curve.knots);

@@ -7,13 +7,14 @@ use std::sync::LazyLock;
 
 /// The number of [`LEVELS`].
 const COUNT: usize = 3;
-/// The degree of the first level.
-const FIRST: usize = LANES;
+/// The degree of the first level, and the number of coefficients of highest degree that are compared with each other.
+const FIRST: usize = 8;
 /// The degree of the last level.
 pub const MOST: usize = FIRST << (COUNT - 1);
 /// The number of coefficients of highest degree that are compared with rounding errors.
 const HIGHEST: usize = 3;
-/// Rounding errors of [`HIGHEST`] coefficients are hardly ever all smaller than this part of those of a lane.
+const _: () = assert!(FIRST.is_multiple_of(LANES) && HIGHEST <= LANES);
+/// Rounding errors of [`HIGHEST`] coefficients are hardly ever all smaller than this part of those of [`FIRST`].
 const FLAT: f64 = 0.05;
 
 /// The interpolation by polynomials of degree N at N + 1 nodes.
@@ -97,8 +98,9 @@ pub fn sizes(column: &[Lane]) -> [f64; 2] {
 
 /// Whether the coefficients of the highest degrees do not decrease, as those of rounding errors.
 pub fn is_flat(column: &[Lane]) -> bool {
-    let [most, highest] = sizes(&column[column.len() - 1..]);
-    column.len() > 1 && highest > FLAT * most
+    let first = FIRST / LANES;
+    let [most, highest] = sizes(&column[column.len() - first..]);
+    column.len() > first && highest > FLAT * most
 }
 
 /// The derivatives of columns at a position: Σ 2n cₙ Uₙ₋₁.

@@ -134,7 +134,7 @@ pub fn cumulative_steps(
     Ok(())
 }
 
-/// The basis functions of the intervals of eight times that are not zero there, by the recursion of Cox and de Boor
+/// The basis functions of the intervals of a time per lane that are not zero there, by the recursion of Cox and de Boor
 /// (Piegl & Tiller, The NURBS Book, algorithm A2.2), and sums of them: entry j ≥ 1 becomes `λ_j`, entry 0 one.
 pub fn cumulative_basis<S: Scalar>(
     curve: &BSpline,
@@ -164,7 +164,7 @@ pub fn cumulative_basis<S: Scalar>(
     basis[0] = S::constant(Lane::ONE);
 }
 
-/// Memory for the evaluation of eight samples.
+/// Memory for the evaluation of a sample per lane.
 pub(super) struct Factors<S> {
     group: Multiplication,
     one: Vec<Lane>,
@@ -182,7 +182,7 @@ impl<S: Scalar> Factors<S> {
         Factors { group, one, omega, basis: zeros(degree + 1), factor: zeros(len), work: zeros(len) }
     }
 
-    /// γ at eight times of the intervals of eight curves, from their first control points p in `gamma`.
+    /// γ at a time per lane, of an interval of a curve each, from their first control points p in `gamma`.
     pub fn evaluate(
         &mut self,
         space: &Erased,

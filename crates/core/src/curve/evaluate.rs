@@ -13,7 +13,7 @@ use std::ops::DerefMut;
 
 /// Maximum number of samples that one thread evaluates at a time.
 const BLOCK: usize = 2048;
-/// The factor by which a block may be longer if it contains eight curves.
+/// The factor by which a block may be longer if it contains a curve per lane.
 const TOGETHER: usize = 4;
 /// Samples times numbers from which several threads are certainly faster.
 const PARALLEL: usize = 1 << 16;
@@ -53,7 +53,7 @@ pub fn evaluate(
     let shared = curves.t.len() == curves.nodes;
     let locator = shared.then(|| Locator::new(curves.t, samples > 8 && samples >= curves.nodes / 4));
     let length = parallel::block(BLOCK, len);
-    // Eight curves with common knots and times are evaluated together, segment by segment.
+    // As many curves with common knots and times as there are lanes are evaluated together, segment by segment.
     let together = LANES * times.count;
     let groups = if shared && times.x.len() == times.count && together <= TOGETHER * length {
         samples / together
@@ -76,7 +76,7 @@ pub fn evaluate(
 }
 
 impl Job<'_> {
-    /// Evaluates the block, eight samples at a time, in any segments.
+    /// Evaluates the block, a sample per lane, in any segments.
     pub fn run<M: Space>(&self, space: &M, out: &mut [f64]) {
         match self.quantity.order() {
             0 => self.run_with::<Lane, M>(space, out),
@@ -177,7 +177,7 @@ impl Job<'_> {
         );
     }
 
-    /// Iterates over the samples: `enter` reads a segment, `write` evaluates eight samples.
+    /// Iterates over the samples: `enter` reads a segment, `write` evaluates a sample per lane.
     #[inline(always)]
     fn each<S: Scalar>(
         &self,
@@ -209,7 +209,7 @@ impl Job<'_> {
         }
     }
 
-    /// Points of eight samples, and vectors there if the quantity requires them; two for [`Quantity::Motion`]
+    /// Points of a sample per lane, and vectors there if the quantity requires them; two for [`Quantity::Motion`]
     /// and [`Quantity::Jet`].
     #[inline(always)]
     fn sample<'v, S: Scalar, M: Ambient>(
@@ -256,7 +256,7 @@ impl Job<'_> {
         (p, derivatives)
     }
 
-    /// Gathers the ends of eight segments, and the handles there: h/3 times the velocities.
+    /// Gathers the ends of a segment per lane, and the handles there: h/3 times the velocities.
     #[inline(always)]
     fn read(
         &self,
@@ -276,7 +276,7 @@ impl Job<'_> {
     }
 }
 
-/// The output of eight samples.
+/// The output of a sample per lane.
 struct Rows<'a> {
     stride: usize,
     out: &'a mut [f64],

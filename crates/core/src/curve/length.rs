@@ -8,12 +8,14 @@
 
 use super::chebyshev::{LEVELS, MOST, is_flat, node, sizes};
 use super::data::Times;
-use crate::scalar::{Lane, few, lane, max_or_nan};
+use crate::scalar::{LANES, Lane, few, lane, max_or_nan};
 use std::iter::zip;
 use std::sync::LazyLock;
 
 /// The number of positive nodes of the Gauss–Legendre rule.
 const PAIRS: usize = 5;
+/// The number of [`Lane`]s that contain them.
+const PARTS: usize = PAIRS.div_ceil(LANES);
 /// Its nodes and weights on [−1, 1]; the others are symmetric.
 const NODES: [f64; PAIRS] =
     [0.14887433898163122, 0.4333953941292472, 0.6794095682990244, 0.8650633666889845, 0.9739065285171717];
@@ -66,7 +68,7 @@ struct Square {
 
 /// The functions whose integrals with a function are its coefficients for the Legendre polynomials of degrees 8 and 9, at
 /// the positive nodes, with the weights of the rule; in the lanes of the nodes.
-static LEGENDRE: LazyLock<[Lane; 2]> = LazyLock::new(|| {
+static LEGENDRE: LazyLock<[[Lane; PARTS]; 2]> = LazyLock::new(|| {
     [8, 9].map(|degree| {
         pairs(|i| {
             let (mut before, mut here) = (1.0, NODES[i]);
@@ -80,15 +82,21 @@ static LEGENDRE: LazyLock<[Lane; 2]> = LazyLock::new(|| {
 });
 
 /// Lanes with numbers of the pairs of nodes, and 0.
-fn pairs(value: impl Fn(usize) -> f64) -> Lane {
-    Lane::new(few(|i| if i < PAIRS { value(i) } else { 0.0 }))
+fn pairs(value: impl Fn(usize) -> f64) -> [Lane; PARTS] {
+    let value = |i: usize| if i < PAIRS { value(i) } else { 0.0 };
+    few(|part| Lane::new(few(|l| value(part * LANES + l))))
+}
+
+/// The sum of products.
+fn product(a: [Lane; PARTS], b: [Lane; PARTS]) -> f64 {
+    zip(a, b).map(|(a, b)| (a * b).reduce_add()).sum()
 }
 
 impl Square {
     /// Values at positions in [0, 1], by Clenshaw's algorithm.
-    fn at(&self, positions: [Lane; 2]) -> [Lane; 2] {
+    fn at<const N: usize>(&self, positions: [Lane; N]) -> [Lane; N] {
         let y = positions.map(|x| x + x - Lane::ONE);
-        let [mut b, mut c] = [[Lane::ZERO; 2]; 2];
+        let [mut b, mut c] = [[Lane::ZERO; N]; 2];
         for coefficient in self.coefficients[1..].iter().rev() {
             (b, c) = (few(|e| (y[e] + y[e]).mul_add(b[e], lane(*coefficient) - c[e])), b);
         }
@@ -106,15 +114,18 @@ impl Square {
     fn rule(&self, [u, v]: [f64; 2]) -> (f64, bool) {
         let (middle, half) = (0.5 * (u + v), 0.5 * (v - u));
         // Unused lanes repeat a node.
-        let ahead = Lane::new(few(|i| half * NODES[i.min(PAIRS - 1)]));
-        let squares = self.at([lane(middle) - ahead, lane(middle) + ahead]);
-        let [before, behind] = squares.map(|x| x.sqrt());
-        let (even, odd) = (before + behind, behind - before);
-        let sum = (even * pairs(|i| WEIGHTS[i])).reduce_add();
-        let low = squares[0].min(squares[1]).to_array().into_iter().fold(f64::INFINITY, f64::min);
-        let high = squares[0].max(squares[1]).to_array().into_iter().fold(0.0, f64::max);
+        let node = |i: usize| half * NODES[i.min(PAIRS - 1)];
+        let ahead: [Lane; PARTS] = few(|part| Lane::new(few(|l| node(part * LANES + l))));
+        let squares: [Lane; 2 * PARTS] =
+            self.at(few(|i| lane(middle) + if i < PARTS { -ahead[i] } else { ahead[i - PARTS] }));
+        let roots = squares.map(|x| x.sqrt());
+        let (even, odd) = (few(|i| roots[i] + roots[PARTS + i]), few(|i| roots[PARTS + i] - roots[i]));
+        let sum = product(even, pairs(|i| WEIGHTS[i]));
+        let all = squares.iter().flat_map(|x| x.to_array());
+        let (low, high) =
+            all.fold((f64::INFINITY, 0.0), |(low, high): (f64, f64), x| (low.min(x), high.max(x)));
         let [eighth, ninth] = *LEGENDRE;
-        let rest = (even * eighth).reduce_add().abs().max((odd * ninth).reduce_add().abs());
+        let rest = product(even, eighth).abs().max(product(odd, ninth).abs());
         let rough = high > VARIATION * low || rest > CONVERGED * sum && half * rest > self.negligible;
         (half * sum, !rough || half * sum <= self.negligible)
     }

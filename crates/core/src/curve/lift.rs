@@ -63,7 +63,7 @@ impl<'a> LiftedSegment<'a> {
         self.segment.at(self.space, self.len, Dual { v: t, d: Lane::ONE }, &mut self.gamma);
     }
 
-    /// A at eight positions.
+    /// A at several positions, one per lane.
     fn vertical(&mut self, t: [f64; LANES]) -> [Factor; LANES] {
         self.at(Lane::new(t));
         let y: Vec<Lane> = self.gamma.iter().map(|x| x.v).collect();

@@ -1,11 +1,11 @@
-//! The segments of eight samples at a time.
+//! The segments of several samples at a time, one per lane.
 
 use super::data::{Job, Outside, Times};
 use super::locate::Locator;
 use crate::scalar::{LANES, Lane, few, lane};
 
-/// The segments and parameters of eight samples. The cursor iterates over the samples of a block in their order, or
-/// over the times of eight curves at once.
+/// The segments and parameters of a sample per lane. The cursor iterates over the samples of a block in their order, or
+/// over the times of a curve per lane at once.
 pub struct SampleCursor<'a> {
     job: &'a Job<'a>,
     /// The next sample: the i-th time of a curve.
@@ -46,7 +46,7 @@ impl<'a> SampleCursor<'a> {
         }
     }
 
-    /// Advances to the next eight samples; unused lanes repeat the last one. Returns whether the segments have
+    /// Advances to the next samples; unused lanes repeat the last one. Returns whether the segments have
     /// changed.
     #[inline(always)]
     pub fn advance(&mut self) -> bool {
@@ -70,7 +70,7 @@ impl<'a> SampleCursor<'a> {
         self.search()
     }
 
-    /// The next time of eight curves with common knots and times.
+    /// The next time of all curves, with common knots and times.
     fn advance_together(&mut self) -> bool {
         let Job { curves, times, outside, locator, len, .. } = self.job;
         let begins = self.i == 0;

@@ -51,7 +51,7 @@ impl<'a> Transport<'a> {
         Transport { space, segment: Segment::new(len), gamma, position: lanes(), vector: lanes() }
     }
 
-    /// Points and velocities at eight positions of the segment.
+    /// Points and velocities at several positions of the segment.
     fn at(&mut self, t: Lane) -> [Vec<Lane>; 2] {
         self.segment.at(self.space, self.position.len(), Dual { v: t, d: Lane::ONE }, &mut self.gamma);
         let y: Vec<Lane> = self.gamma.iter().map(|x| x.v).collect();

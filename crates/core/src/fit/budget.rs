@@ -33,6 +33,9 @@ const SEARCH: f64 = 25_600.0;
 const RESCUE: f64 = 2e10;
 /// Bytes that the Jacobian may occupy in `auto`.
 const MEMORY: f64 = 1e9;
+/// The number of curves whose work and memory is counted. It is the largest number of lanes, whatever that of the
+/// processor is: budgets, and thus results, do not depend on it.
+const TOGETHER: f64 = 8.0;
 /// A bending energy costs about as much as this many evaluations.
 pub const ENERGY: f64 = 10.0;
 
@@ -66,8 +69,8 @@ impl Costs {
             step: 1.0 + 2.5 * colours * m + 5.0 * m * m * m / node,
             steps: (STEPS * part).max(FEWEST_STEPS),
             search: SEARCH * part,
-            rescue: RESCUE / (LANES as f64 * n * node),
-            fits: 3.0 * (n + 1.0) * m * m * (8 * LANES) as f64 <= MEMORY,
+            rescue: RESCUE / (TOGETHER * n * node),
+            fits: 3.0 * (n + 1.0) * m * m * 8.0 * TOGETHER <= MEMORY,
         }
     }
 

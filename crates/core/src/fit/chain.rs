@@ -4,7 +4,7 @@
 //! every node is the origin, the polygon is its chords dᵢ (coordinates of `log_{pᵢ}(pᵢ₊₁)`), velocities
 //! are coordinate vectors, and transport between neighbours is the identity.
 //!
-//! Eight chains of equal length occupy the lanes: curves of a batch, or sections of a long curve.
+//! Chains of equal length occupy the lanes: curves of a batch, or sections of a long curve.
 
 use crate::scalar::{LANES, Lane};
 
@@ -65,7 +65,7 @@ pub struct Walker {
     pub(super) node: usize,
 }
 
-/// Eight unrolled polygons with the data of the solvers. Reused between fits.
+/// Unrolled polygons, one per lane, with the data of the solvers. Reused between fits.
 #[derive(Default)]
 pub struct Chain {
     /// Number of segments.

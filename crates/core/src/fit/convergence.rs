@@ -20,7 +20,7 @@ const PATIENCE: f64 = 8.0;
 /// From this iteration on, the best iterate is stored in case the iteration fails.
 const EASY: usize = 8;
 
-/// The residuals of eight iterations, and the conclusions from them.
+/// The residuals of the iterations of all lanes, and the conclusions from them.
 pub struct Convergence {
     tol: Lane,
     aim: Lane,

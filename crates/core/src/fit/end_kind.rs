@@ -15,7 +15,7 @@ pub enum EndKind {
     Both,
 }
 
-/// The ends of eight chains: closed, or the kind at either end of each lane.
+/// The ends of the chains of all lanes: closed, or the kind at either end of each lane.
 #[derive(Clone, Copy)]
 pub enum ChainEnds {
     /// The last node equals the first.

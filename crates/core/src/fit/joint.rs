@@ -33,7 +33,7 @@ use crate::space::{Ambient, Erased, Frame, Origin, Space, below};
 
 const THIRD: Lane = lane(1.0 / 3.0);
 
-/// The vectors that are prescribed at one end of eight chains, and the distance in time of the additional knot.
+/// The vectors that are prescribed at one end of the chains, and the distance in time of the additional knot.
 #[derive(Clone, Copy)]
 pub struct BothRows<'a> {
     velocities: [&'a [f64]; LANES],

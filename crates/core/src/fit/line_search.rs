@@ -7,7 +7,7 @@ const GROWTH_MIXED: f64 = 2.0;
 /// The maximum number of halvings of a step; then the step is accepted.
 const MAX_TRIES: f64 = 6.0;
 
-/// Eight line searches, one per lane.
+/// Line searches, one per lane.
 pub struct LineSearch {
     /// The residual that must not be exceeded.
     last: Lane,

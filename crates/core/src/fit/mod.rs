@@ -3,8 +3,8 @@
 //! A fit runs through the modules in this order:
 //!
 //! 1. `fit`, in `curves`, calls `sections`, which cuts long curves and distributes the work over threads.
-//! 2. `lanes` fits up to eight curves, or parts of curves, of equal length, one in each lane of a SIMD register.
-//! 3. `unroll` transports a frame along the eight polygons and writes their chords into a `chain`.
+//! 2. `lanes` fits several curves, or parts of curves, of equal length, one in each lane of a SIMD register.
+//! 3. `unroll` transports a frame along their polygons and writes their chords into a `chain`.
 //! 4. `auto` dispatches to the solver of the requested method, or runs several solvers in turn.
 //! 5. `minimum_energy` runs further solvers if points are far apart, and keeps the curve with the lowest `energy`.
 //!

@@ -34,7 +34,7 @@ impl Limits {
     }
 }
 
-/// The outcome of eight iterations.
+/// The outcome of the iterations of all lanes.
 #[derive(Clone)]
 pub struct Outcome {
     /// Residual evaluations.
@@ -162,7 +162,7 @@ impl Outcome {
     }
 }
 
-/// Eight curves to solve, and the memory of the solvers.
+/// Curves to solve, one per lane, and the memory of the solvers.
 pub struct Lanes<'a> {
     pub space: &'a Erased<'a>,
     pub chain: &'a mut Chain,

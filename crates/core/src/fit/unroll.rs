@@ -56,7 +56,7 @@ impl Walker {
 }
 
 impl Chain {
-    /// Unrolls `n` segments of eight polygons. `values` are prescribed ambient vectors at the ends, and `both` those of ends
+    /// Unrolls `n` segments of the polygons. `values` are prescribed ambient vectors at the ends, and `both` those of ends
     /// with two conditions.
     pub fn unroll(
         &mut self,

@@ -330,10 +330,15 @@ pub fn not_finite(space: &Erased, draw: &mut Draw) -> Verdict {
 }
 
 pub fn lanes(space: &Erased, draw: &mut Draw) -> Verdict {
-    // Eight steps of very different lengths, and each beside seven copies of itself.
+    (0..STEPS.len()).step_by(LANES).try_for_each(|first| lanes_from(space, draw, first))
+}
+
+/// Steps of very different lengths in the lanes, and each beside copies of itself.
+fn lanes_from(space: &Erased, draw: &mut Draw, first: usize) -> Verdict {
     let p = draw.point(space);
     let x = draw.coordinates(space, 1.0);
-    let parts = Lane::new(std::array::from_fn(|l| STEPS[l % STEPS.len()]));
+    // The next step is in a distant part of the list.
+    let parts = Lane::new(std::array::from_fn(|l| STEPS[(first + 3 * l) % STEPS.len()]));
     let x: Vec<Lane> = x.iter().map(|x| *x * parts).collect();
     let v = tangent_at(space, &p, &x);
     let q = exp(space, &p, &v);

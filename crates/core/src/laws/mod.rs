@@ -1,7 +1,7 @@
 //! The laws that every symmetric space obeys, for the tests of a new one: [`check`] runs all of them. They require
 //! the feature `laws`.
 //!
-//! They use only the operations of a space. Every law draws its data at random, with eight cases in the lanes, over
+//! They use only the operations of a space. Every law draws its data at random, with a case in every lane, over
 //! decades of step lengths up to just before the cut locus and with random representatives of points. It returns the
 //! error that it found if that exceeds `allowed` rounding errors (times the condition reported by the space).
 
@@ -14,6 +14,7 @@ mod verdict;
 pub use draw::Draw;
 pub use verdict::Verdict;
 
+use crate::scalar::LANES;
 use crate::space::Erased;
 
 /// One law.
@@ -46,11 +47,15 @@ pub static LAWS: &[(&str, Law)] = &[
     ("acceleration does not see how a representative turns", ambient::turning),
 ];
 
+/// The number of cases of every law.
+const CASES: usize = 8;
+
 /// Runs all laws; returns the violations.
 pub fn check(space: &Erased, seed: u64) -> Vec<String> {
     let run = |(i, (name, law)): (usize, &(&str, Law))| {
         let mut draw = Draw::new(seed.wrapping_mul(1_000_003).wrapping_add(i as u64));
-        law(space, &mut draw).err().map(|why| format!("{name}: {why}"))
+        let found = (0..CASES / LANES).try_for_each(|_| law(space, &mut draw));
+        found.err().map(|why| format!("{name}: {why}"))
     };
     LAWS.iter().enumerate().filter_map(run).collect()
 }

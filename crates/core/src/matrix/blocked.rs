@@ -5,7 +5,7 @@ use super::entry::{Entry, mul_add};
 use crate::monitor::checkpoint;
 use crate::scalar::{Lane, Scalar, few};
 
-/// From this size on, one matrix at a time is faster than Jacobi's method on eight SIMD lanes, and products benefit
+/// From this size on, one matrix at a time is faster than Jacobi's method on SIMD lanes, and products benefit
 /// from blocks.
 pub(super) const LARGE: usize = 11;
 /// Bytes of the first cache that a block of columns may fill.

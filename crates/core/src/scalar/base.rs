@@ -4,7 +4,7 @@ use super::few::few;
 use super::types::{LANES, Lane, Row, RowMut};
 use std::ops::{Add, Mul, Neg, Sub};
 
-/// A number, or a number with derivatives, on eight lanes.
+/// A number, or a number with derivatives, on all lanes.
 pub trait Scalar:
     Copy
     + 'static

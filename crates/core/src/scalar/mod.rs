@@ -1,7 +1,7 @@
 //! The number types of formulas.
 //!
-//! Every formula is written once, generic over [`Scalar`]. A [`Lane`] consists of eight floating-point numbers (eight
-//! samples, curves or sections of a curve) in SIMD lanes, a [`Jet`] has two derivatives in t, and a [`Dual`] one
+//! Every formula is written once, generic over [`Scalar`]. A [`Lane`] consists of [`LANES`] floating-point numbers (of
+//! as many samples, curves or sections of a curve) in SIMD lanes, a [`Jet`] has two derivatives in t, and a [`Dual`] one
 //! derivative in any direction. A single number is padded to a lane, so that one curve and a batch of curves give
 //! bit-identical results.
 

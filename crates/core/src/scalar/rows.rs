@@ -1,11 +1,14 @@
-//! Conversion between eight rows of numbers in memory and SIMD lanes.
+//! Conversion between rows of numbers in memory, one per lane, and SIMD lanes.
 
 use super::few::few;
 use super::types::{LANES, Lane};
 use wide::bytemuck::cast;
 use wide::f64x4;
 
-/// Reads one row of numbers from each of eight arrays: `out[c]` receives column c.
+/// The number of squares of four rows and four columns that are transposed in registers.
+const PARTS: usize = LANES / 4;
+
+/// Reads one row of numbers from each of several arrays: `out[c]` receives column c.
 #[inline(always)]
 pub fn gather(rows: [&[f64]; LANES], out: &mut [Lane]) {
     let len = out.len();
@@ -14,10 +17,10 @@ pub fn gather(rows: [&[f64]; LANES], out: &mut [Lane]) {
     // Four columns at a time are transposed in registers.
     while c + 4 <= len {
         let row = |l: usize| f64x4::new([rows[l][c], rows[l][c + 1], rows[l][c + 2], rows[l][c + 3]]);
-        let low = f64x4::transpose([row(0), row(1), row(2), row(3)]);
-        let high = f64x4::transpose([row(4), row(5), row(6), row(7)]);
+        let parts: [[f64x4; 4]; PARTS] = few(|part| f64x4::transpose(few(|i| row(4 * part + i))));
         for k in 0..4 {
-            out[c + k] = cast([low[k], high[k]]);
+            let column: [f64x4; PARTS] = few(|part| parts[part][k]);
+            out[c + k] = cast(column);
         }
         c += 4;
     }
@@ -27,7 +30,7 @@ pub fn gather(rows: [&[f64]; LANES], out: &mut [Lane]) {
     }
 }
 
-/// Writes lanes as consecutive rows; `out` may contain fewer than eight.
+/// Writes lanes as consecutive rows; `out` may contain fewer rows than there are lanes.
 #[inline(always)]
 pub fn scatter(lanes: &[Lane], out: &mut [f64]) {
     scatter_apart(lanes, lanes.len(), out);
@@ -40,13 +43,12 @@ pub fn scatter_apart(lanes: &[Lane], stride: usize, out: &mut [f64]) {
     let mut c = 0;
     if out.len() >= (LANES - 1) * stride + len {
         while c + 4 <= len {
-            let [[a, b], [d, e], [f, g], [h, i]]: [[f64x4; 2]; 4] =
-                [cast(lanes[c]), cast(lanes[c + 1]), cast(lanes[c + 2]), cast(lanes[c + 3])];
-            let low = f64x4::transpose([a, d, f, h]);
-            let high = f64x4::transpose([b, e, g, i]);
-            for l in 0..4 {
-                out[l * stride + c..][..4].copy_from_slice(low[l].as_array());
-                out[(l + 4) * stride + c..][..4].copy_from_slice(high[l].as_array());
+            let columns: [[f64x4; PARTS]; 4] = few(|k| cast(lanes[c + k]));
+            for part in 0..PARTS {
+                let rows = f64x4::transpose(few(|k| columns[k][part]));
+                for l in 0..4 {
+                    out[(4 * part + l) * stride + c..][..4].copy_from_slice(rows[l].as_array());
+                }
             }
             c += 4;
         }

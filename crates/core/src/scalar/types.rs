@@ -1,10 +1,15 @@
 //! The kinds of numbers, and slices of any of them, with which generic formulas pass through a table of functions.
 
-/// Eight floating-point numbers in SIMD lanes.
+/// Several floating-point numbers in SIMD lanes: one register of AVX-512 or AVX2. Wider numbers would take two registers
+/// each, and code that is a quarter longer to compile.
+#[cfg(target_feature = "avx512f")]
 pub type Lane = wide::f64x8;
+/// Several floating-point numbers in SIMD lanes.
+#[cfg(not(target_feature = "avx512f"))]
+pub type Lane = wide::f64x4;
 
-/// The number of floating-point numbers in a [`Lane`].
-pub const LANES: usize = 8;
+/// The number of floating-point numbers in a [`Lane`], four or eight.
+pub const LANES: usize = size_of::<Lane>() / size_of::<f64>();
 
 /// A number `v + d ε` with `ε² = 0`.
 #[derive(Clone, Copy, Debug)]

@@ -196,7 +196,7 @@ impl Rows {
 }
 
 impl Targets<'_> {
-    /// Calls `f` for eight pairs of rows of numbers and targets at a time, with an array for a logarithm, the number of
+    /// Calls `f` for a pair of rows of numbers and targets per lane, with an array for a logarithm, the number of
     /// pairs, which is smaller for the last ones, and the first of them.
     fn pairs<'a>(
         &self,
