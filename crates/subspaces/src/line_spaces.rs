@@ -3,7 +3,7 @@
 use crate::{lines, quaternionic};
 use std::f64::consts::{FRAC_PI_2, SQRT_2};
 use symspline_core::scalar::{Lane, Scalar, dot, lane};
-use symspline_core::space::{Ambient, Frame, Origin, Space, far_out};
+use symspline_core::space::{Ambient, Frame, Origin, Space, far_out, pull_back_by_transport};
 use symspline_core::special::Trig;
 
 /// Lines over R (E = C = 1), C (E = C = 2) or H (E = 4, C = 8), where E and C count the numbers of a row and of a
@@ -125,6 +125,21 @@ impl<const E: usize, const C: usize, const K: i32> Ambient for Lines<E, C, K> {
     }
     fn inner(&self, _p: &[Lane], u: &[Lane], v: &[Lane]) -> Lane {
         lines::real_product::<Lane, E, C, K>(u, v) * lane(Self::COLUMNS as f64)
+    }
+    fn pull_back(
+        &self,
+        p: &[Lane],
+        q: &[Lane],
+        t: Lane,
+        cotangent: &[Lane],
+        to_p: &mut [Lane],
+        to_q: &mut [Lane],
+    ) -> Lane {
+        if K > 0 && E < 4 {
+            lines::pull_back::<E, C>(p, q, t, cotangent, to_p, to_q)
+        } else {
+            pull_back_by_transport(self, p, q, t, cotangent, to_p, to_q)
+        }
     }
     fn raise(&self, p: &[Lane], gradient: &mut [Lane]) {
         if K < 0 {

@@ -10,8 +10,10 @@
 //! All formulas are those of the sphere and of hyperbolic space with factors for numbers; ⟨p,q⟩ = κ cos θ · u with a
 //! unitary factor u, the phase of the two representatives.
 
+use smallvec::{SmallVec, smallvec};
 use symspline_core::scalar::{Each, Lane, Scalar, dot, few, lane};
 use symspline_core::special::{Trig, theta_over_sin};
+use symspline_vectors::constant_curvature as cc;
 
 /// A k × k matrix.
 pub type Factor<S, const C: usize> = [S; C];
@@ -381,6 +383,42 @@ pub fn geodesic<S: Scalar, const E: usize, const C: usize, const K: i32>(
     for ((out, p), q) in out.chunks_exact_mut(E).zip(p.chunks_exact(E)).zip(q.chunks_exact(E)) {
         out.copy_from_slice(&times_row::<S, E, C>(q, &to_q, few(|i| p[i] * to_p)));
     }
+}
+
+/// The derivative of `[p, q]_t`, transposed, over R and C: that of the sphere between p and q' = q ū, for ⟨p,q⟩ = cos θ · u,
+/// whose phase moves by δφ cos θ = ⟨ip, δq ū⟩ − ⟨iq', δp⟩.
+#[inline(always)]
+pub fn pull_back<const E: usize, const C: usize>(
+    p: &[Lane],
+    q: &[Lane],
+    t: Lane,
+    cotangent: &[Lane],
+    to_p: &mut [Lane],
+    to_q: &mut [Lane],
+) -> Lane {
+    let c = product::<Lane, E, C, 1>(p, q);
+    let u = phase::<E, C>(&c);
+    let zeros = |len: usize| -> SmallVec<[Lane; 12]> { smallvec![Lane::ZERO; len] };
+    let (mut aligned, mut by_q) = (zeros(q.len()), zeros(q.len()));
+    times::<Lane, E, C>(q, &adjoint::<Lane, E, C>(&u), &mut aligned);
+    let rate = cc::pull_back::<1, false, Lane>(p, &aligned, t, cotangent, to_p, &mut by_q);
+    if E == 2 {
+        let turned = |[a, b]: [Lane; 2]| [-b, a];
+        let along = |x: &[Lane], y: &[Lane]| {
+            let rows = x.as_chunks::<2>().0.iter().zip(y.as_chunks::<2>().0);
+            rows.fold(Lane::ZERO, |sum, (x, y)| sum + dot(x, &turned(*y)))
+        };
+        let factor = along(&by_q, &aligned) / square::<Lane, E, C>(&c).sqrt();
+        for (k, (p, q)) in p.as_chunks::<2>().0.iter().zip(aligned.as_chunks::<2>().0).enumerate() {
+            let (p, q) = (turned(*p), turned(*q));
+            for i in 0..2 {
+                by_q[2 * k + i] -= factor * p[i];
+                to_p[2 * k + i] += factor * q[i];
+            }
+        }
+    }
+    add_times::<Lane, E, C>(to_q, &by_q, &u);
+    rate
 }
 
 /// `E_p(v)` x.

@@ -2,6 +2,7 @@
 
 use super::draw::{Draw, combined, exp, length, log, minus, norm, rounding, scaled, tangent_at};
 use super::verdict::{Verdict, within};
+use crate::curve::{self, Curves, Times, motion_len};
 use crate::scalar::{Dual, Lane, lane};
 use crate::space::{Ambient, Erased, Frame, Origin};
 
@@ -145,6 +146,44 @@ pub fn inner_handles(space: &Erased, draw: &mut Draw) -> Verdict {
             let allowed = rounding(space, 500.0, &[&p, &q, &control, &moved], &d);
             within(norm(&minus(w, &expected)), allowed, &format!("w at {part} of the largest step"))?;
         }
+    }
+    Ok(())
+}
+
+/// ⟨λ, motion of the samples⟩ = ⟨transpose of λ, motion of the control points⟩.
+pub fn transposed_motion(space: &Erased, draw: &mut Draw) -> Verdict {
+    let (m, len) = (space.dim(), space.point_len());
+    let first = |x: &[Lane]| x.iter().map(|x| x.as_array()[0]).collect::<Vec<f64>>();
+    for part in [1e-6, 0.1, 0.4] {
+        let p = draw.point(space);
+        let d = draw.coordinates(space, part);
+        let start = Moving::at(space, &p);
+        let q = exp(space, &p, &start.tangent(&d));
+        let mut end = Moving::at(space, &p);
+        end.step(&q);
+        // Velocities that differ from the chord by a fifth of its length.
+        let size = norm(&d) * lane(0.2);
+        let mut velocity = |at: &Moving| {
+            let bend: Vec<Lane> = draw.unit(space).iter().zip(&d).map(|(x, d)| *x * size + *d).collect();
+            at.tangent(&scaled(&bend, 0.5))
+        };
+        let velocities = [first(&velocity(&start)), first(&velocity(&end))].concat();
+        let (points, frames) = ([first(&p), first(&q)].concat(), [first(&start.frame), first(&end.frame)].concat());
+        let (t, x) = ([1.0, 3.0], [1.0, 1.3, 1.9, 2.5, 2.9, 3.0]);
+        let curve = Curves { t: &t, nodes: 2, points: &points, velocities: &velocities, before: &[] };
+        let times = Times { x: &x, count: x.len() };
+        let moving = curve::Moving { curve, times, frames: &frames, runs: 1, dim: m, len };
+        let motions = first(&draw.noise(motion_len(m)));
+        let cotangents = first(&draw.noise(x.len() * len));
+        let (mut moved, mut products) = (vec![0.0; x.len() * len], vec![0.0; motion_len(m)]);
+        space.0.push(&moving, &motions, &mut moved);
+        space.0.pull(&moving, &cotangents, &mut products);
+        let sums = |a: &[f64], b: &[f64]| {
+            a.iter().zip(b).fold((0.0, 0.0), |(sum, size), (a, b)| (sum + a * b, size + (a * b).abs()))
+        };
+        let ((forth, size), (back, _)) = (sums(&cotangents, &moved), sums(&products, &motions));
+        let allowed = rounding(space, 500.0, &[&p, &q], &d) * lane(size);
+        within(lane((forth - back).abs()), allowed, &format!("transpose at {part} of the largest step"))?;
     }
     Ok(())
 }

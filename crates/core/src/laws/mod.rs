@@ -35,6 +35,7 @@ pub static LAWS: &[(&str, Law)] = &[
     ("a frame moves in parallel", frame::parallel),
     ("a frame stays one for 600 knots", frame::long_walk),
     ("handles are the logarithms of the C2 condition", frame::inner_handles),
+    ("the motion of samples has a transpose", frame::transposed_motion),
     ("duals contain the derivatives of the handles", frame::duals),
     ("the deciding angle is that of the logarithm", frame::angle),
     ("the condition bounds the growth of errors", frame::condition),

@@ -11,7 +11,7 @@
 //! itself between two transports: λ ↦ P_{c→q} D_q[p, q]_t P_{c→q} λ for q, and the same for p.
 
 use super::traits::{Ambient, Frame};
-use crate::scalar::{Dual, Lane, Scalar};
+use crate::scalar::{Dual, Lane, Scalar, dot};
 use smallvec::{SmallVec, smallvec};
 
 /// A few numbers on the stack: allocating aligned lanes on the heap would cost more than the computation.
@@ -62,7 +62,7 @@ pub fn raise_by_frame<M: Frame>(space: &M, p: &[Lane], gradient: &mut [Lane]) {
         x[k] = Lane::ONE;
         space.tangent(&frame, p, &x, &mut e);
         x[k] = Lane::ZERO;
-        let product = crate::scalar::dot(&e, gradient);
+        let product = dot(&e, gradient);
         sum.iter_mut().zip(&e).for_each(|(sum, e)| *sum = product.mul_add(*e, *sum));
     }
     gradient.copy_from_slice(&sum);
