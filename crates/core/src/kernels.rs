@@ -38,11 +38,15 @@ impl<M: Space> Kernels for M {
     fn samples(&self, job: &Job, out: &mut [f64]) {
         self.evaluate_with(SampleCall { job, out });
     }
-    fn push(&self, moving: &Moving, motions: &[f64], out: &mut [f64]) {
-        self.evaluate_with(PushCall { moving, motions, out });
+    fn push(&self, moving: &Moving, motions: &[f64], out: &mut [f64]) -> bool {
+        let mut done = true;
+        self.evaluate_with(PushCall { moving, motions, out, done: &mut done });
+        done
     }
-    fn pull(&self, moving: &Moving, cotangents: &[f64], out: &mut [f64]) {
-        self.evaluate_with(PullCall { moving, cotangents, out });
+    fn pull(&self, moving: &Moving, cotangents: &[f64], out: &mut [f64]) -> bool {
+        let mut done = true;
+        self.evaluate_with(PullCall { moving, cotangents, out, done: &mut done });
+        done
     }
 }
 
@@ -75,18 +79,19 @@ struct PushCall<'a> {
     moving: &'a Moving<'a>,
     motions: &'a [f64],
     out: &'a mut [f64],
+    done: &'a mut bool,
 }
 
 impl Evaluation for PushCall<'_> {
     fn direct<M: Space>(self, space: &M) {
         if M::HOT && !SMALL {
-            self.moving.push(space, self.motions, self.out)
+            *self.done = self.moving.push(space, self.motions, self.out);
         } else {
-            self.moving.push_by_table(&Erased(space), self.motions, self.out)
+            *self.done = self.moving.push_by_table(&Erased(space), self.motions, self.out);
         }
     }
     fn covered<C: Covered>(self, space: &C) {
-        self.moving.push_covered(space, self.motions, self.out);
+        *self.done = self.moving.push_covered(space, self.motions, self.out);
     }
 }
 
@@ -95,17 +100,18 @@ struct PullCall<'a> {
     moving: &'a Moving<'a>,
     cotangents: &'a [f64],
     out: &'a mut [f64],
+    done: &'a mut bool,
 }
 
 impl Evaluation for PullCall<'_> {
     fn direct<M: Space>(self, space: &M) {
         if M::HOT && !SMALL {
-            self.moving.pull(space, self.cotangents, self.out)
+            *self.done = self.moving.pull(space, self.cotangents, self.out);
         } else {
-            self.moving.pull_by_table(&Erased(space), self.cotangents, self.out)
+            *self.done = self.moving.pull_by_table(&Erased(space), self.cotangents, self.out);
         }
     }
     fn covered<C: Covered>(self, space: &C) {
-        self.moving.pull_covered(space, self.cotangents, self.out);
+        *self.done = self.moving.pull_covered(space, self.cotangents, self.out);
     }
 }

@@ -9,7 +9,7 @@
 //! Small arguments use the Taylor series, others the library functions. The choice for a lane depends on its own
 //! argument only, so that a result never depends on its neighbours.
 
-use crate::scalar::{Dual, Jet, Lane, Scalar, few, lane};
+use crate::scalar::{Lane, Scalar, few, lane};
 
 /// Largest |x| for which [`Trig`] uses its Taylor series: 12 terms leave less than 1e-19 there.
 const TRIG_SERIES: f64 = 2.5;
@@ -57,21 +57,27 @@ pub(crate) const ARC: [f64; 46] = {
     c
 };
 
-/// The polynomial `Σ cᵢ xⁱ` with as many derivatives as S has.
+/// A function at x with its derivatives, of which only those up to a given order are computed.
+type Derivatives = [Lane; 4];
+
+/// The polynomial `Σ cᵢ xⁱ` with its derivatives.
 #[inline(always)]
-fn polynomial<S: Scalar>(c: &[f64], x: Lane) -> [Lane; 3] {
+fn polynomial(order: usize, c: &[f64], x: Lane) -> Derivatives {
     let (others, last) = c.split_at(c.len() - 1);
-    horner::<S>([lane(last[0]), Lane::ZERO, Lane::ZERO], others, x)
+    horner(order, [lane(last[0]), Lane::ZERO, Lane::ZERO, Lane::ZERO], others, x)
 }
 
 /// `p xⁿ + Σ cᵢ xⁱ` with n coefficients, where p is a number with its derivatives.
 #[inline(always)]
-fn horner<S: Scalar>(mut p: [Lane; 3], c: &[f64], x: Lane) -> [Lane; 3] {
+fn horner(order: usize, mut p: Derivatives, c: &[f64], x: Lane) -> Derivatives {
     for &coefficient in c.iter().rev() {
-        if S::ORDER > 1 {
+        if order > 2 {
+            p[3] = p[3].mul_add(x, lane(3.0) * p[2]);
+        }
+        if order > 1 {
             p[2] = p[2].mul_add(x, p[1] + p[1]);
         }
-        if S::ORDER > 0 {
+        if order > 0 {
             p[1] = p[1].mul_add(x, p[0]);
         }
         p[0] = p[0].mul_add(x, lane(coefficient));
@@ -82,19 +88,21 @@ fn horner<S: Scalar>(mut p: [Lane; 3], c: &[f64], x: Lane) -> [Lane; 3] {
 /// The same with the first `few` terms on the lanes of a mask, and with all terms on the others. The higher terms are
 /// dropped before the lower ones are added, so that a result is bit-identical to that of a shorter polynomial.
 #[inline(always)]
-fn graded<S: Scalar>(c: &[f64], few: usize, mask: Lane, x: Lane) -> [Lane; 3] {
-    let higher = polynomial::<S>(&c[few..], x);
-    horner::<S>(select::<S>(mask, [Lane::ZERO; 3], higher), &c[..few], x)
+fn graded(order: usize, c: &[f64], few: usize, mask: Lane, x: Lane) -> Derivatives {
+    let higher = polynomial(order, &c[few..], x);
+    horner(order, select(order, mask, [Lane::ZERO; 4], higher), &c[..few], x)
 }
 
 #[inline(always)]
-fn select<S: Scalar>(mask: Lane, a: [Lane; 3], b: [Lane; 3]) -> [Lane; 3] {
-    // Derivatives that S does not have are never read.
-    [
-        mask.select(a[0], b[0]),
-        if S::ORDER > 0 { mask.select(a[1], b[1]) } else { Lane::ZERO },
-        if S::ORDER > 1 { mask.select(a[2], b[2]) } else { Lane::ZERO },
-    ]
+fn select(order: usize, mask: Lane, a: Derivatives, b: Derivatives) -> Derivatives {
+    // Derivatives of higher order are never read.
+    few(|k| if k <= order { mask.select(a[k], b[k]) } else { Lane::ZERO })
+}
+
+/// The first three, for numbers with at most two derivatives.
+#[inline(always)]
+pub(crate) fn two([a, b, c, _]: Derivatives) -> [Lane; 3] {
+    [a, b, c]
 }
 
 /// The entire functions of x = θ² that occur in exponential and transvection.
@@ -114,33 +122,33 @@ impl<S: Scalar> Trig<S> {
     /// All four at x, which may have either sign: at x < 0 they are cosh√−x, sinh√−x/√−x, …
     #[inline(always)]
     pub fn new(x: S) -> Self {
-        let (versine, defect) = defects::<S>(x.value());
-        let k = -x.compose(versine);
-        let j = x.compose(defect);
+        let (versine, defect) = defects(S::ORDER, x.value());
+        let k = -x.compose(two(versine));
+        let j = x.compose(two(defect));
         Trig { c: k.fma(x, S::constant(Lane::ONE)), s: (-j).fma(x, S::constant(Lane::ONE)), k, j }
     }
 }
 
 /// (1 − cos√x)/x and (1 − sin√x/√x)/x, with derivatives in x.
 #[inline(always)]
-fn defects<S: Scalar>(x: Lane) -> ([Lane; 3], [Lane; 3]) {
-    let n = 6 + S::ORDER;
+fn defects(order: usize, x: Lane) -> (Derivatives, Derivatives) {
+    let n = 6 + order;
     let ax = x.abs();
     let (short, series) = (ax.simd_le(lane(TRIG_SHORT)), ax.simd_le(lane(TRIG_SERIES)));
     if short.all() {
-        return (polynomial::<S>(&VERSINE[..n], x), polynomial::<S>(&SINC_DEFECT[..n], x));
+        return (polynomial(order, &VERSINE[..n], x), polynomial(order, &SINC_DEFECT[..n], x));
     }
-    let near = (graded::<S>(&VERSINE, n, short, x), graded::<S>(&SINC_DEFECT, n, short, x));
+    let near = (graded(order, &VERSINE, n, short, x), graded(order, &SINC_DEFECT, n, short, x));
     if series.all() {
         return near;
     }
     let far = full_range(x);
-    (select::<S>(series, near.0, far.0), select::<S>(series, near.1, far.1))
+    (select(order, series, near.0, far.0), select(order, series, near.1, far.1))
 }
 
 /// The same away from 0.
 #[inline(never)]
-fn full_range(x: Lane) -> ([Lane; 3], [Lane; 3]) {
+fn full_range(x: Lane) -> (Derivatives, Derivatives) {
     let r = x.abs().sqrt();
     let (sin, cos) = r.sin_cos();
     let (e, positive) = (r.exp(), x.simd_gt(Lane::ZERO));
@@ -152,11 +160,14 @@ fn full_range(x: Lane) -> ([Lane; 3], [Lane; 3]) {
     // c' = −s/2, s' = (c − s)/(2x); the quotient rule gives the rest.
     let s1 = half * (c - s) / x;
     let s2 = (-half * s - lane(3.0) * s1) * half / x;
+    let s3 = (lane(-0.25) * s1 - lane(2.5) * s2) / x;
     let v1 = (half * s - v) / x;
     let v2 = (half * s1 - lane(2.0) * v1) / x;
+    let v3 = (half * s2 - lane(3.0) * v2) / x;
     let d1 = (-s1 - d) / x;
     let d2 = (-s2 - lane(2.0) * d1) / x;
-    ([v, v1, v2], [d, d1, d2])
+    let d3 = (-s3 - lane(3.0) * d2) / x;
+    ([v, v1, v2, v3], [d, d1, d2, d3])
 }
 
 /// θ/sin θ as a function of y = 1 − cos θ; at y < 0 it is d/sinh d with y = 1 − cosh d.
@@ -165,23 +176,23 @@ fn full_range(x: Lane) -> ([Lane; 3], [Lane; 3]) {
 /// represents it. It is called only where it matters.
 #[inline(always)]
 pub fn theta_over_sin<S: Scalar>(y: S, rest: impl FnOnce() -> Lane) -> S {
-    y.compose(arc::<S>(y.value(), rest))
+    y.compose(two(arc(S::ORDER, y.value(), rest)))
 }
 
 /// The same with its derivatives in y.
 #[inline(always)]
-fn arc<S: Scalar>(y: Lane, rest: impl FnOnce() -> Lane) -> [Lane; 3] {
+fn arc(order: usize, y: Lane, rest: impl FnOnce() -> Lane) -> Derivatives {
     let ay = y.abs();
     let within: [Lane; ARC_TIERS.len()] = few(|i| ay.simd_le(lane(ARC_TIERS[i].0)));
-    let terms: [usize; ARC_TIERS.len()] = few(|i| ARC_TIERS[i].1 + S::ORDER);
+    let terms: [usize; ARC_TIERS.len()] = few(|i| ARC_TIERS[i].1 + order);
     if within[0].all() {
-        return polynomial::<S>(&ARC[..terms[0]], y);
+        return polynomial(order, &ARC[..terms[0]], y);
     }
-    let mut f = graded::<S>(&ARC[..terms[1]], terms[0], within[0], y);
+    let mut f = graded(order, &ARC[..terms[1]], terms[0], within[0], y);
     if !within[1].all() {
-        f = select::<S>(within[1], f, polynomial::<S>(&ARC[..terms[2]], y));
+        f = select(order, within[1], f, polynomial(order, &ARC[..terms[2]], y));
         if !within[2].all() {
-            f = select::<S>(within[2], f, arc_full_range(y, rest()));
+            f = select(order, within[2], f, arc_full_range(y, rest()));
         }
     }
     f
@@ -193,36 +204,38 @@ pub fn arc_defect<S: Scalar>(y: S) -> S {
     let yv = y.value();
     let limits = [0.0075, 0.09, 0.3];
     let terms = [7, 14, 22];
-    let series = |tier: usize| polynomial::<S>(&ARC[1..1 + terms[tier] + S::ORDER], yv);
+    let order = S::ORDER;
+    let series = |tier: usize| polynomial(order, &ARC[1..1 + terms[tier] + order], yv);
     let within: [Lane; 3] = few(|i| yv.abs().simd_le(lane(limits[i])));
     let top = (0..3).find(|&i| within[i].all()).unwrap_or(3);
     let mut e = if top < 3 {
         series(top)
     } else {
-        let [f, f1, f2] = arc_full_range(yv, lane(2.0) - yv);
+        let [f, f1, f2, _] = arc_full_range(yv, lane(2.0) - yv);
         let e = (f - Lane::ONE) / yv;
         let e1 = (f1 - e) / yv;
-        [e, e1, (f2 - lane(2.0) * e1) / yv]
+        [e, e1, (f2 - lane(2.0) * e1) / yv, Lane::ZERO]
     };
     for i in (0..top).rev() {
         if within[i].any() {
-            e = select::<S>(within[i], series(i), e);
+            e = select(order, within[i], series(i), e);
         }
     }
-    y.compose(e)
+    y.compose(two(e))
 }
 
 #[inline(never)]
-pub(crate) fn arc_full_range(y: Lane, rest: Lane) -> [Lane; 3] {
+pub(crate) fn arc_full_range(y: Lane, rest: Lane) -> [Lane; 4] {
     let cos = y.simd_lt(Lane::ONE).select(Lane::ONE - y, rest - Lane::ONE);
     let sin2 = y * rest;
     let sin = sin2.abs().sqrt();
     let theta = y.simd_gt(Lane::ZERO).select(sin.atan2(cos), (cos + sin).ln());
     let f = theta / sin;
-    // f sin θ = θ with dy = sin θ dθ gives f' sin²θ = 1 − f cos θ, and once more for f''.
+    // f sin θ = θ with dy = sin θ dθ gives f' sin²θ = 1 − f cos θ, and so on for f'' and f'''.
     let f1 = (Lane::ONE - f * cos) / sin2;
     let f2 = (f - lane(3.0) * cos * f1) / sin2;
-    [f, f1, f2]
+    let f3 = (lane(4.0) * f1 - lane(5.0) * cos * f2) / sin2;
+    [f, f1, f2, f3]
 }
 
 /// sin((1−t)θ)/sin θ and sin(tθ)/sin θ, the weights of a geodesic between two points whose
@@ -230,7 +243,7 @@ pub(crate) fn arc_full_range(y: Lane, rest: Lane) -> [Lane; 3] {
 #[inline(always)]
 pub fn slerp<S: Scalar>(t: S, y: S, rest: impl Fn() -> Lane) -> [S; 2] {
     let yv = y.value();
-    let f = arc::<S>(yv, &rest);
+    let f = two(arc(S::ORDER, yv, &rest));
     let far = yv.simd_gt(Lane::ONE);
     let two = lane(2.0);
     let rest = if far.any() { far.select(rest(), two - yv) } else { two - yv };
@@ -251,30 +264,30 @@ pub struct Weights<S> {
 }
 
 impl<S: Scalar> Weights<S> {
-    /// The same as [`slerp`], with derivatives. Numbers with two derivatives are not supported.
+    /// The same as [`slerp`], with derivatives.
     #[inline(always)]
     pub fn new(t: S, y: S, rest: impl Fn() -> Lane) -> Self {
         let yv = y.value();
         // F = θ/sin θ with one derivative more than S has.
-        let f = if S::ORDER == 0 { arc::<Dual>(yv, &rest) } else { arc::<Jet>(yv, &rest) };
+        let f = arc(S::ORDER + 1, yv, &rest);
         let far = yv.simd_gt(Lane::ONE);
-        let two = lane(2.0);
-        let rest = if far.any() { far.select(rest(), two - yv) } else { two - yv };
-        let theta2 = y.compose([f[0] * f[0] * yv * rest, two * f[0], two * f[1]]);
-        let (factor, slope) = (y.compose(f), y.compose([f[1], f[2], Lane::ZERO]));
+        let double = lane(2.0);
+        let rest = if far.any() { far.select(rest(), double - yv) } else { double - yv };
+        let theta2 = y.compose([f[0] * f[0] * yv * rest, double * f[0], double * f[1]]);
+        let (factor, slope) = (y.compose(two(f)), y.compose([f[1], f[2], f[3]]));
         let weight = |t: S| {
             let square = t * t;
             let z = square * theta2;
-            let (_, [j, j1, j2]) =
-                if S::ORDER == 0 { defects::<Dual>(z.value()) } else { defects::<Jet>(z.value()) };
-            // s = sin√z/√z = 1 − z j
             let zv = z.value();
-            let (s, s1, s2) = (j.mul_neg_add(zv, Lane::ONE), -zv.mul_add(j1, j), -zv.mul_add(j2, j1 + j1));
-            let (s, s1) = (z.compose([s, s1, s2]), z.compose([s1, s2, Lane::ZERO]));
+            let (_, [j, j1, j2, j3]) = defects(S::ORDER + 1, zv);
+            // s = sin√z/√z = 1 − z j
+            let (s, s1) = (j.mul_neg_add(zv, Lane::ONE), -zv.mul_add(j1, j));
+            let (s2, s3) = (-zv.mul_add(j2, double * j1), -zv.mul_add(j3, lane(3.0) * j2));
+            let (s, s1) = (z.compose([s, s1, s2]), z.compose([s1, s2, s3]));
             let h = t * s;
             // θ² has the derivative 2F.
-            let by_y = slope * h + (factor * factor) * (square * t) * s1 * two;
-            [factor * h, by_y, factor * (z * s1 * two + s)]
+            let by_y = slope * h + (factor * factor) * (square * t) * s1 * double;
+            [factor * h, by_y, factor * (z * s1 * double + s)]
         };
         let [from, to] = [weight(-t + Lane::ONE), weight(t)];
         Weights { at: [from[0], to[0]], by_y: [from[1], to[1]], by_t: [-from[2], to[2]] }
@@ -293,7 +306,7 @@ fn sine<S: Scalar>(t: S, x: S) -> S {
     let ([t, t1, t2], [x, x1, x2]) = (t.parts(), x.parts());
     let square = t * t;
     let z = square * x;
-    let (_, [j, j1, j2]) = defects::<S>(z);
+    let (_, [j, j1, j2, _]) = defects(S::ORDER, z);
     // s = 1 − z j
     let s = j.mul_neg_add(z, Lane::ONE);
     let h = t * s;

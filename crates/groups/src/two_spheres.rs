@@ -1,6 +1,6 @@
 //! The product of two spheres of three dimensions, in which curves of pairs of unit quaternions are evaluated.
 
-use symspline_core::scalar::{Each, Lane, Scalar, dot, max_or_nan};
+use symspline_core::scalar::{Each, Lane, Scalar, dot, few, max_or_nan};
 use symspline_core::space::Ambient;
 use symspline_vectors::{Sphere, constant_curvature as cc};
 
@@ -45,13 +45,40 @@ impl Ambient for TwoSpheres {
         to_p: &mut [Lane],
         to_q: &mut [Lane],
     ) -> Lane {
-        let mut rate = Lane::ZERO;
+        self.pull_back_along(p, q, t, cotangent, to_p, to_q)
+    }
+    const SMOOTH: bool = true;
+    #[inline(always)]
+    fn pull_back_along<S: Scalar>(
+        &self,
+        p: &[S],
+        q: &[S],
+        t: S,
+        cotangent: &[S],
+        to_p: &mut [S],
+        to_q: &mut [S],
+    ) -> S {
+        let mut rate = S::constant(Lane::ZERO);
         for (((p, q), x), (to_p, to_q)) in (p.chunks_exact(4).zip(q.chunks_exact(4)).zip(cotangent.chunks_exact(4)))
             .zip(to_p.chunks_exact_mut(4).zip(to_q.chunks_exact_mut(4)))
         {
-            rate += cc::pull_back::<1, false, Lane>(p, q, t, x, to_p, to_q);
+            rate = rate + cc::pull_back::<1, false, S>(p, q, t, x, to_p, to_q);
         }
         rate
+    }
+#[inline(always)]
+    fn push_along<S: Scalar>(&self, pq: [&[S]; 2], t: S, changes: [&[S]; 2], dt: S, out: &mut [S]) {
+        for k in [0, 4] {
+            let of = |x: [&[S]; 2]| -> [[S; 4]; 2] { x.map(|x| few(|i| x[k + i])) };
+            let ([p, q], [dp, dq]) = (of(pq), of(changes));
+            cc::push::<1, false, S>([&p, &q], t, [&dp, &dq], dt, &mut out[k..k + 4]);
+        }
+    }
+    fn bend(&self, v: &[Lane], cotangent: &[Lane], out: &mut [Lane]) {
+        for k in [0, 4] {
+            let square = dot(&v[k..k + 4], &v[k..k + 4]);
+            (k..k + 4).for_each(|i| out[i] = cotangent[i] * square);
+        }
     }
     fn transvect(&self, p: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]) {
         for k in [0, 4] {

@@ -7,7 +7,7 @@
 
 use crate::information::{self, Root};
 use crate::path::{Path, Position};
-use symspline_core::derivative::{Derivative, Matrix, Of, Vector};
+use symspline_core::derivative::{Derivative, Matrix, Vector};
 use symspline_core::fit::Ends;
 use symspline_core::memory;
 use symspline_core::monitor::{Monitor, checkpoint};
@@ -89,9 +89,11 @@ pub fn step(
     parallel::for_each(parts.iter_mut().collect(), threads, monitor, |(segment, square, right)| {
         checkpoint();
         let motion = derivative.motion(*segment);
-        let at = |kind: usize, k: usize, of: Of, vectors: &[f64]| {
+        // The data are points, the samples between them accelerations.
+        let at = |kind: usize, k: usize, vectors: &[f64]| {
             let ((_, tau), p) = (samples[kind].0[k], &samples[kind].1[k * len..][..len]);
-            in_coordinates(space, &motion.point(tau), &motion.at(tau, of), p, vectors)
+            let columns = if kind == 0 { motion.point(tau) } else { motion.acceleration(tau) };
+            in_coordinates(space, &motion.gamma(tau), &columns, p, vectors)
         };
         // With rows N of a weight: |N x|² and its cotangent with respect to x.
         let mut add = |mut matrix: Matrix, rows: Option<&Matrix>, pull: Vector, weight: f64| {
@@ -109,18 +111,18 @@ pub fn step(
             let factor = pull.factors.map_or(1.0, |factors| factors[k]);
             if let Some((roots, frames)) = pull.information {
                 let frame = &frames[k * m * len..][..m * len];
-                let (matrix, all) = at(0, k, Of::Point, &[r, frame].concat());
+                let (matrix, all) = at(0, k, &[r, frame].concat());
                 let (r, frame) = (all.column(0).into_owned(), all.columns(1, m).into_owned());
                 let (rows, _, own) = information::at(space, &roots[k].matrix, &frame, &r);
                 add(matrix, Some(&rows), own, factor);
             } else {
-                let (matrix, r) = at(0, k, Of::Point, r);
+                let (matrix, r) = at(0, k, r);
                 add(matrix, None, r.column(0).into_owned(), pull.weights[k] * factor);
             }
         }
         let h = path.t[*segment + 1] - path.t[*segment];
         for k in 2 * *segment..2 * *segment + 2 {
-            let (matrix, bend) = at(1, k, Of::Acceleration, &accelerations[k * len..][..len]);
+            let (matrix, bend) = at(1, k, &accelerations[k * len..][..len]);
             add(matrix, None, -bend.column(0), lam * h / 2.0);
         }
     });

@@ -116,6 +116,30 @@ pub fn raise<const K: i32, const L: bool>(gradient: &mut [Lane]) {
     }
 }
 
+/// The derivative of [p, q]_t for changes δp, δq and δt: with the weights f₀, f₁ as functions of y = κ⟨q−p, q−p⟩/2,
+/// f₀δp + f₁δq + (p ∂f₀/∂y + q ∂f₁/∂y) κ⟨q−p, δq−δp⟩ + (p ∂f₀/∂t + q ∂f₁/∂t) δt.
+#[inline(always)]
+pub fn push<const K: i32, const L: bool, S: Scalar>(
+    [p, q]: [&[S]; 2],
+    t: S,
+    [dp, dq]: [&[S]; 2],
+    dt: S,
+    out: &mut [S],
+) {
+    let weights = Weights::new(t, versine::<K, L, S>(p, q), || versine_rest::<K, L, S>(p, q));
+    let mut dy = S::constant(Lane::ZERO);
+    for i in 0..p.len() {
+        let product = (q[i] - p[i]) * (dq[i] - dp[i]);
+        dy = if negative::<K, L>(i) { dy - product } else { dy + product };
+    }
+    let dy = dy * kappa::<K>();
+    let [by_p, by_q] = [0, 1].map(|k| weights.by_y[k].fma(dy, weights.by_t[k] * dt));
+    for i in 0..p.len() {
+        let moved = weights.at[0].fma(dp[i], weights.at[1] * dq[i]);
+        out[i] = by_p.fma(p[i], by_q.fma(q[i], moved));
+    }
+}
+
 /// The derivative of [p, q]_t, transposed: with the weights f₀, f₁ as functions of y = κ⟨q−p, q−p⟩/2 and
 /// s = κ(⟨λ,p⟩ ∂f₀/∂y + ⟨λ,q⟩ ∂f₁/∂y), λ ↦ f₀λ − s(q−p) at p and f₁λ + s(q−p) at q. This is exact in the ambient space.
 #[inline(always)]

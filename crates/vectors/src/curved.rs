@@ -108,6 +108,27 @@ impl<const K: i32, const L: bool> Ambient for Curved<K, L> {
     ) -> Lane {
         cc::pull_back::<K, L, Lane>(p, q, t, cotangent, to_p, to_q)
     }
+    const SMOOTH: bool = !L;
+    #[inline(always)]
+    fn pull_back_along<S: Scalar>(
+        &self,
+        p: &[S],
+        q: &[S],
+        t: S,
+        cotangent: &[S],
+        to_p: &mut [S],
+        to_q: &mut [S],
+    ) -> S {
+        cc::pull_back::<K, L, S>(p, q, t, cotangent, to_p, to_q)
+    }
+#[inline(always)]
+    fn push_along<S: Scalar>(&self, pq: [&[S]; 2], t: S, changes: [&[S]; 2], dt: S, out: &mut [S]) {
+        cc::push::<K, L, S>(pq, t, changes, dt, out);
+    }
+    fn bend(&self, v: &[Lane], cotangent: &[Lane], out: &mut [Lane]) {
+        let square = cc::product::<K, L, Lane>(v, v) * lane(K.into());
+        out.iter_mut().zip(cotangent).for_each(|(out, x)| *out = *x * square);
+    }
     fn transvect(&self, p: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]) {
         cc::transvect::<K, L>(p, v, x, out);
     }

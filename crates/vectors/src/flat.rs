@@ -95,14 +95,38 @@ impl<const WRAPPED: bool> Ambient for Flat<WRAPPED> {
         to_p: &mut [Lane],
         to_q: &mut [Lane],
     ) -> Lane {
-        let mut rate = Lane::ZERO;
+        self.pull_back_along(p, q, t, cotangent, to_p, to_q)
+    }
+    const SMOOTH: bool = true;
+    #[inline(always)]
+    fn pull_back_along<S: Scalar>(
+        &self,
+        p: &[S],
+        q: &[S],
+        t: S,
+        cotangent: &[S],
+        to_p: &mut [S],
+        to_q: &mut [S],
+    ) -> S {
+        let mut rate = S::constant(Lane::ZERO);
         for i in 0..self.n {
-            let x = cotangent[i];
-            to_p[i] += (Lane::ONE - t) * x;
-            to_q[i] += t * x;
-            rate = x.mul_add(Self::wrapped(q[i] - p[i]), rate);
+            let (x, part) = (cotangent[i], t * cotangent[i]);
+            to_p[i] = to_p[i] + (x - part);
+            to_q[i] = to_q[i] + part;
+            rate = x.fma(Self::wrapped(q[i] - p[i]), rate);
         }
         rate
+    }
+#[inline(always)]
+    fn push_along<S: Scalar>(&self, pq: [&[S]; 2], t: S, changes: [&[S]; 2], dt: S, out: &mut [S]) {
+        let ([p, q], [dp, dq]) = (pq, changes);
+        for i in 0..self.n {
+            let moved = t.fma(dq[i] - dp[i], dp[i]);
+            out[i] = dt.fma(Self::wrapped(q[i] - p[i]), moved);
+        }
+    }
+    fn bend(&self, _v: &[Lane], _cotangent: &[Lane], out: &mut [Lane]) {
+        out.fill(Lane::ZERO);
     }
     fn transvect(&self, _p: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]) {
         for i in 0..self.n {

@@ -180,26 +180,31 @@ impl Block<'_> {
                 1.0 / (t[segment + 1] - t[segment])
             }));
             jerk.iter_mut().for_each(|x| *x *= rate * rate * rate);
-            self.space.acceleration(p, &vec![Lane::ZERO; len], &mut jerk);
-            let form = self.polarised(p, d, w);
             let curved = Lane::new(at.map(|i| if self.places[i].straight { 0.0 } else { 1.0 }));
-            jerk.iter_mut().zip(&form).for_each(|(jerk, form)| *jerk = (*jerk + *form) * curved);
+            let found = connection(self.space, p, d, w, &jerk);
+            jerk.iter_mut().zip(&found).for_each(|(jerk, found)| *jerk = *found * curved);
             scatter(&jerk, out);
         }
     }
+}
 
-    /// Q(d, w), from vectors of equal size.
-    fn polarised(&self, p: &[Lane], d: &[Lane], w: &[Lane]) -> Vec<Lane> {
-        let ((u, a), (v, b)) = (scaled_down(d), scaled_down(w));
-        let form = |sign: f64| {
-            let sum: Vec<Lane> = u.iter().zip(&v).map(|(u, v)| v.mul_add(lane(sign), *u)).collect();
-            let mut form = vec![Lane::ZERO; p.len()];
-            self.space.acceleration(p, &sum, &mut form);
-            form
-        };
-        let size = a * b * lane(0.25);
-        form(1.0).iter().zip(form(-1.0)).map(|(plus, minus)| (*plus - minus) * size).collect()
+/// L(w') + Q(γ', w), the covariant derivative of a vector field along a curve, from arrays. The form is computed from
+/// vectors of equal size.
+pub fn connection(space: &Erased, p: &[Lane], d: &[Lane], w: &[Lane], slope: &[Lane]) -> Vec<Lane> {
+    let mut out = slope.to_vec();
+    space.acceleration(p, &vec![Lane::ZERO; p.len()], &mut out);
+    let ((u, a), (v, b)) = (scaled_down(d), scaled_down(w));
+    let form = |sign: f64| {
+        let sum: Vec<Lane> = u.iter().zip(&v).map(|(u, v)| v.mul_add(lane(sign), *u)).collect();
+        let mut form = vec![Lane::ZERO; p.len()];
+        space.acceleration(p, &sum, &mut form);
+        form
+    };
+    let size = a * b * lane(0.25);
+    for (out, (plus, minus)) in out.iter_mut().zip(form(1.0).iter().zip(form(-1.0))) {
+        *out += (*plus - minus) * size;
     }
+    out
 }
 
 /// The jerk of every curve at its times, as in [`evaluate`](super::evaluate()). At a knot it is that of the segment

@@ -22,6 +22,8 @@ pub use bspline::evaluate_bspline;
 pub use cumulative::{Coordinates, Multiplication, cumulative_basis, cumulative_steps};
 pub use data::{BSpline, Curves, Job, Outside, Quantity, Times};
 pub use evaluate::evaluate;
+#[cfg(feature = "dense")]
+pub use jerk::connection;
 pub use length::{ArcLength, Integrand, energies, lengths};
 #[cfg(feature = "dense")]
 pub use lift::{lift, lift_knots};

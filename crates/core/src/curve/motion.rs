@@ -10,7 +10,7 @@ use super::data::{Curves, Job, Outside, Quantity, Times};
 use super::locate::Locator;
 use super::sample_cursor::SampleCursor;
 use crate::monitor::checkpoint;
-use crate::scalar::{Dual, LANES, Lane, Scalar, few, gather, lane, scatter};
+use crate::scalar::{Dual, Jet, LANES, Lane, Row, RowMut, Scalar, dot, few, gather, lane, scatter};
 use crate::space::{Ambient, Covered, Erased, Frame, Space};
 use crate::with_size;
 
@@ -29,6 +29,8 @@ pub struct Moving<'a> {
     pub frames: &'a [f64],
     /// The number of runs, of almost equal length; frames are transported in parallel within a run.
     pub runs: usize,
+    /// The order ν of the derivative in time that is differentiated.
+    pub nu: usize,
     /// The dimension of the space.
     pub dim: usize,
     /// The numbers of a point.
@@ -297,19 +299,42 @@ impl Moving<'_> {
         Locator::new(self.curve.t, self.times.count > 8 && self.times.count >= self.curve.nodes / 4)
     }
 
-    /// Forward mode: tangent vectors at the samples for motions of the control points of all segments.
-    pub fn push<M: Space>(&self, space: &M, motions: &[f64], out: &mut [f64]) {
+    /// Forward mode: changes of the samples, tangent vectors, for motions of the control points of all segments. For ν = 1
+    /// and 2 they are covariant derivatives of γ' and ∇γ'. Returns whether it exists: derivatives in time need a space that
+    /// is [`SMOOTH`](Ambient::SMOOTH).
+    pub fn push<M: Space>(&self, space: &M, motions: &[f64], out: &mut [f64]) -> bool {
+        if self.nu > 0 {
+            return self.push_derivatives(&Direct(space), self.len, motions, out);
+        }
         with_size!(M::VECTORS, self.len, len => self.push_in(&Direct(space), len, len, motions, out));
+        true
     }
 
     /// The same, compiled once.
-    pub fn push_by_table(&self, space: &Erased, motions: &[f64], out: &mut [f64]) {
-        self.push(space, motions, out);
+    pub fn push_by_table(&self, space: &Erased, motions: &[f64], out: &mut [f64]) -> bool {
+        self.push(space, motions, out)
     }
 
     /// The same in a space that covers this one.
-    pub fn push_covered<C: Covered>(&self, space: &C, motions: &[f64], out: &mut [f64]) {
-        self.push_in(&Lifted(space, space.cover()), C::LEN, self.len, motions, out);
+    pub fn push_covered<C: Covered>(&self, space: &C, motions: &[f64], out: &mut [f64]) -> bool {
+        let place = Lifted(space, space.cover());
+        if self.nu > 0 {
+            return self.push_derivatives(&place, C::LEN, motions, out);
+        }
+        self.push_in(&place, C::LEN, self.len, motions, out);
+        true
+    }
+
+    fn push_derivatives<P: Place>(&self, place: &P, len: usize, motions: &[f64], out: &mut [f64]) -> bool {
+        if !P::Inside::SMOOTH {
+            return false;
+        }
+        if self.nu == 1 {
+            self.push_along::<Dual, _>(place, len, motions, out);
+        } else {
+            self.push_along::<Jet, _>(place, len, motions, out);
+        }
+        true
     }
 
     #[inline(always)]
@@ -319,10 +344,8 @@ impl Moving<'_> {
         let job = self.job(&locator);
         let mut cursor = SampleCursor::new(&job, self.times.count);
         let mut controls = Controls::new(len, ambient, m, place.base().frame_len());
-        let fixed = || vec![Dual::constant(Lane::ZERO); len];
-        let mut points = [fixed(), fixed(), fixed(), fixed()];
-        let mut level = [fixed(), fixed(), fixed(), fixed()];
-        let mut next = fixed();
+        let mut points = fixed::<Dual>(len);
+        let mut casteljau = Casteljau::new(len);
         let mut x = zeros(size);
         let [mut value, mut d, mut result] = [zeros(len), zeros(len), zeros(ambient)];
         for out in out.chunks_mut(LANES * ambient) {
@@ -334,16 +357,9 @@ impl Moving<'_> {
             }
             let tau = (cursor.x - cursor.knot) / cursor.h;
             let t = Dual { v: tau, d: -x[4 * m + 1].mul_add(tau, x[4 * m]) / cursor.h };
-            level.iter_mut().zip(&points).for_each(|(to, from)| to[..len].copy_from_slice(&from[..len]));
-            for above in (1..4).rev() {
-                for i in 0..above {
-                    let (a, b) = level.split_at_mut(i + 1);
-                    inside.geodesic(&a[i][..len], &b[0][..len], t, &mut next[..len]);
-                    a[i][..len].copy_from_slice(&next[..len]);
-                }
-            }
+            let gamma = casteljau.at(inside, &points, t, len);
             for i in 0..len {
-                (value[i], d[i]) = (level[0][i].v, level[0][i].d);
+                (value[i], d[i]) = (gamma[i].v, gamma[i].d);
             }
             inside.velocity(&value[..len], &mut d[..len]);
             place.leave(controls.side, &value[..len], &d[..len], &mut result[..ambient]);
@@ -351,128 +367,291 @@ impl Moving<'_> {
         }
     }
 
+    /// For ν = 1 and 2: De = D_ε γ_τ and D²e + R(e, γ_τ)γ_τ = D_ε ∇γ_τ for the motion e of the curve in units of the segment, by
+    /// numbers with derivatives in τ. A projected derivative of arrays is a covariant one in these spaces.
+    fn push_along<S: Scalar, P: Place>(&self, place: &P, len: usize, motions: &[f64], out: &mut [f64]) {
+        let (m, size, ambient) = (self.dim, motion_len(self.dim), self.len);
+        let (locator, inside) = (self.locator(), place.inside());
+        let job = self.job(&locator);
+        let mut cursor = SampleCursor::new(&job, self.times.count);
+        let mut controls = Controls::new(len, ambient, m, place.base().frame_len());
+        let mut moved = fixed::<Dual>(len);
+        let [mut points, mut changes] = [fixed::<S>(len), fixed::<S>(len)];
+        let [mut level, mut moving] = [fixed::<S>(len), fixed::<S>(len)];
+        let zero = S::constant(Lane::ZERO);
+        let (mut next, mut step) = (vec![zero; len], vec![zero; len]);
+        let mut x = zeros(size);
+        let [mut result, mut bent, mut change, mut rate] =
+            [zeros(ambient), zeros(len), zeros(len), zeros(len)];
+        for out in out.chunks_mut(LANES * ambient) {
+            checkpoint();
+            if cursor.advance() {
+                controls.read(place, self, &cursor);
+                gather(cursor.at.map(|i| &motions[i / ambient * size..][..size]), &mut x);
+                controls.motions(place, &x[..4 * m], &mut moved);
+                for k in 0..4 {
+                    for i in 0..len {
+                        points[k][i] = S::constant(moved[k][i].v);
+                        changes[k][i] = S::constant(moved[k][i].d);
+                    }
+                }
+            }
+            let tau = (cursor.x - cursor.knot) / cursor.h;
+            let t = S::from_parts([tau, Lane::ONE, Lane::ZERO]);
+            let shift = S::constant(-x[4 * m + 1].mul_add(tau, x[4 * m]) / cursor.h);
+            level.clone_from(&points);
+            moving.clone_from(&changes);
+            for above in (1..4).rev() {
+                for i in 0..above {
+                    inside.geodesic(&level[i], &level[i + 1], t, &mut next);
+                    inside.push_along(
+                        [&level[i], &level[i + 1]],
+                        t,
+                        [&moving[i], &moving[i + 1]],
+                        shift,
+                        &mut step,
+                    );
+                    level[i].copy_from_slice(&next);
+                    moving[i].copy_from_slice(&step);
+                }
+            }
+            let (gamma, e) = (&level[0], &moving[0]);
+            let p: Vec<Lane> = gamma.iter().map(|x| x.value()).collect();
+            for i in 0..len {
+                change[i] = e[i].parts()[S::ORDER];
+                rate[i] = gamma[i].parts()[S::ORDER];
+            }
+            if S::ORDER > 1 {
+                let (velocity, value): (Vec<Lane>, Vec<Lane>) =
+                    gamma.iter().zip(e).map(|(x, e)| (x.parts()[1], e.value())).unzip();
+                inside.bend(&velocity, &value, &mut bent);
+                change.iter_mut().zip(&bent).for_each(|(x, y)| *x += *y);
+            }
+            // Of the factor h^−ν.
+            let by_h = x[4 * m + 1] / cursor.h * lane(S::ORDER as f64);
+            change.iter_mut().zip(&rate).for_each(|(x, rate)| *x = by_h.mul_neg_add(*rate, *x));
+            inside.velocity(&p, &mut change);
+            place.leave(controls.side, &p, &change, &mut result);
+            let scale = (0..S::ORDER).fold(Lane::ONE, |scale, _| scale * cursor.rate);
+            result.iter_mut().for_each(|x| *x *= scale);
+            scatter(&result, out);
+        }
+    }
+
     /// Reverse mode: adds the products of cotangent vectors at the samples, as gradients with respect to arrays, with
-    /// motions of all segments.
-    pub fn pull<M: Space>(&self, space: &M, cotangents: &[f64], out: &mut [f64]) {
-        with_size!(M::VECTORS, self.len, len => self.pull_in(&Direct(space), len, len, cotangents, out));
+    /// motions of all segments. Returns whether it exists, as [`push`](Self::push).
+    pub fn pull<M: Space>(&self, space: &M, cotangents: &[f64], out: &mut [f64]) -> bool {
+        if self.nu > 0 {
+            return self.pull_derivatives(&Direct(space), self.len, cotangents, out);
+        }
+        with_size!(M::VECTORS, self.len, len => {
+            self.pull_in::<Lane, _>(&Direct(space), len, len, cotangents, out);
+        });
+        true
     }
 
     /// The same, compiled once.
-    pub fn pull_by_table(&self, space: &Erased, cotangents: &[f64], out: &mut [f64]) {
-        self.pull(space, cotangents, out);
+    pub fn pull_by_table(&self, space: &Erased, cotangents: &[f64], out: &mut [f64]) -> bool {
+        self.pull(space, cotangents, out)
     }
 
     /// The same in a space that covers this one.
-    pub fn pull_covered<C: Covered>(&self, space: &C, cotangents: &[f64], out: &mut [f64]) {
-        self.pull_in(&Lifted(space, space.cover()), C::LEN, self.len, cotangents, out);
+    pub fn pull_covered<C: Covered>(&self, space: &C, cotangents: &[f64], out: &mut [f64]) -> bool {
+        let place = Lifted(space, space.cover());
+        if self.nu > 0 {
+            return self.pull_derivatives(&place, C::LEN, cotangents, out);
+        }
+        self.pull_in::<Lane, _>(&place, C::LEN, self.len, cotangents, out);
+        true
     }
 
+    fn pull_derivatives<P: Place>(&self, place: &P, len: usize, cotangents: &[f64], out: &mut [f64]) -> bool {
+        if !P::Inside::SMOOTH {
+            return false;
+        }
+        if self.nu == 1 {
+            self.pull_in::<Dual, _>(place, len, self.len, cotangents, out);
+        } else {
+            self.pull_in::<Jet, _>(place, len, self.len, cotangents, out);
+        }
+        true
+    }
+
+    /// ⟨λ, D_ε γ_τ⟩ is the derivative in τ of ⟨λ, e⟩ for a parallel λ, and ⟨λ, D_ε ∇γ_τ⟩ the second one where the second
+    /// derivative of λ is R(λ, γ_τ)γ_τ: the pass of ν = 0 on numbers with derivatives in τ.
     #[inline(always)]
-    fn pull_in<P: Place>(&self, place: &P, len: usize, ambient: usize, cotangents: &[f64], out: &mut [f64]) {
+    fn pull_in<S: Scalar, P: Place>(
+        &self,
+        place: &P,
+        len: usize,
+        ambient: usize,
+        cotangents: &[f64],
+        out: &mut [f64],
+    ) {
         let (m, size, count) = (self.dim, motion_len(self.dim), self.times.count);
         let (locator, inside) = (self.locator(), place.inside());
         let job = self.job(&locator);
         let mut cursor = SampleCursor::new(&job, count);
         let mut controls = Controls::new(len, ambient, m, place.base().frame_len());
-        let points = || [zeros(len), zeros(len), zeros(len), zeros(len)];
-        // Levels 1 and 2 and the sample, their cotangent vectors, and those of the control points.
-        let (mut first, mut second, mut gamma) = (points(), points(), zeros(len));
-        let (mut back_first, mut back_second, mut back) = (points(), points(), points());
-        let [mut cotangent, mut lifted, mut unit] = [zeros(ambient), zeros(len), zeros(len)];
-        let mut image = zeros(ambient);
+        // Levels 0 to 2 and the sample, and their cotangent vectors.
+        let [mut level, mut first, mut second] = [fixed::<S>(len), fixed::<S>(len), fixed::<S>(len)];
+        let [mut back, mut back_first, mut back_second] = [fixed::<S>(len), fixed::<S>(len), fixed::<S>(len)];
+        let zero = S::constant(Lane::ZERO);
+        let (mut gamma, mut top) = (vec![zero; len], vec![zero; len]);
+        let [mut cotangent, mut image] = [zeros(ambient), zeros(ambient)];
+        let [mut p, mut lifted, mut unit, mut bent] = [(); 4].map(|()| zeros(len));
         let (mut sums, mut products) = ([Lane::ZERO; 2], zeros(size));
         let rest = vec![0.0; ambient];
         let mut at = None;
+        let mut scale = Lane::ONE;
+        let flush = |controls: &mut Controls, back: &[Vec<S>; 4], sums: [Lane; 2], scale: Lane, products: &mut [Lane]| {
+            let part = |x: &Vec<S>| x.iter().map(|x| x.parts()[S::ORDER] * scale).collect::<Vec<Lane>>();
+            let [a, b, c, d] = back;
+            controls.products(place, &[part(a), part(b), part(c), part(d)], products);
+            products[size - 2..].copy_from_slice(&sums);
+        };
         for start in (0..count).step_by(LANES) {
             checkpoint();
             if cursor.advance() {
                 if let Some(at) = at {
-                    add(&mut controls, place, &back, sums, &mut products, at, out);
+                    flush(&mut controls, &back, sums, scale, &mut products);
+                    add(&products, at, out);
                 }
                 controls.read(place, self, &cursor);
-                back.iter_mut().for_each(|x| x.fill(Lane::ZERO));
+                for (level, p) in level.iter_mut().zip(&controls.points) {
+                    level.iter_mut().zip(p).for_each(|(x, p)| *x = S::constant(*p));
+                }
+                back.iter_mut().for_each(|x| x.fill(zero));
                 sums = [Lane::ZERO; 2];
+                scale = (0..S::ORDER).fold(Lane::ONE, |scale, _| scale * cursor.rate);
                 at = Some(cursor.at.map(|i| i / ambient * size));
             }
             // Lanes beyond the last sample repeat it, without a cotangent vector.
             let rows: [&[f64]; LANES] =
                 few(|l| if start + l < count { &cotangents[(start + l) * ambient..][..ambient] } else { &rest });
             gather(rows, &mut cotangent[..ambient]);
-            let t = (cursor.x - cursor.knot) / cursor.h;
-            let [y0, q0, q1, y1] = &controls.points;
-            let ends = [(y0, q0), (q0, q1), (q1, y1)];
-            for (i, (p, q)) in ends.into_iter().enumerate() {
-                inside.geodesic(&p[..len], &q[..len], t, &mut first[i][..len]);
+            let tau = (cursor.x - cursor.knot) / cursor.h;
+            let t = S::from_parts([tau, Lane::ONE, Lane::ZERO]);
+            for i in 0..3 {
+                inside.geodesic(&level[i][..len], &level[i + 1][..len], t, &mut first[i][..len]);
             }
             for i in 0..2 {
                 inside.geodesic(&first[i][..len], &first[i + 1][..len], t, &mut second[i][..len]);
             }
             inside.geodesic(&second[0][..len], &second[1][..len], t, &mut gamma[..len]);
+            p[..len].iter_mut().zip(&gamma).for_each(|(p, x)| *p = x.value());
             if P::COVERED {
                 for k in 0..len {
                     unit[k] = Lane::ONE;
-                    place.leave(controls.side, &gamma[..len], &unit[..len], &mut image[..ambient]);
+                    place.leave(controls.side, &p[..len], &unit[..len], &mut image[..ambient]);
                     unit[k] = Lane::ZERO;
-                    lifted[k] = crate::scalar::dot(&image[..ambient], &cotangent[..ambient]);
+                    lifted[k] = dot(&image[..ambient], &cotangent[..ambient]);
                 }
             } else {
                 lifted[..len].copy_from_slice(&cotangent[..len]);
             }
-            inside.raise(&gamma[..len], &mut lifted[..len]);
-            back_first.iter_mut().chain(&mut back_second).for_each(|x| x.fill(Lane::ZERO));
-            let [x, y, ..] = &second;
+            inside.raise(&p[..len], &mut lifted[..len]);
+            if S::ORDER > 0 {
+                inside.velocity(&p[..len], &mut lifted[..len]);
+            }
+            if S::ORDER > 1 {
+                let velocity: Vec<Lane> = gamma.iter().map(|x| x.parts()[1]).collect();
+                inside.bend(&velocity, &lifted, &mut bent);
+            }
+            for i in 0..len {
+                top[i] = S::from_parts([lifted[i], Lane::ZERO, bent[i]]);
+            }
+            back_first.iter_mut().chain(&mut back_second).for_each(|x| x.fill(zero));
             let [to_x, to_y, ..] = &mut back_second;
-            let mut rate = inside.pull_back(
-                &x[..len],
-                &y[..len],
-                t,
-                &lifted[..len],
-                &mut to_x[..len],
-                &mut to_y[..len],
-            );
+            let mut rate = transposed(inside, &second[0], &second[1], t, &top, to_x, to_y, len);
             for i in 0..2 {
                 let (a, b) = back_first.split_at_mut(i + 1);
-                let (x, y) = (&first[i][..len], &first[i + 1][..len]);
-                rate +=
-                    inside.pull_back(x, y, t, &back_second[i][..len], &mut a[i][..len], &mut b[0][..len]);
+                let (x, y) = (&first[i], &first[i + 1]);
+                rate = rate + transposed(inside, x, y, t, &back_second[i], &mut a[i], &mut b[0], len);
             }
-            for (i, (p, q)) in ends.into_iter().enumerate() {
+            for i in 0..3 {
                 let (a, b) = back.split_at_mut(i + 1);
-                rate += inside.pull_back(
-                    &p[..len],
-                    &q[..len],
-                    t,
-                    &back_first[i][..len],
-                    &mut a[i][..len],
-                    &mut b[0][..len],
-                );
+                let (x, y) = (&level[i], &level[i + 1]);
+                rate = rate + transposed(inside, x, y, t, &back_first[i], &mut a[i], &mut b[0], len);
             }
-            let rate = rate / cursor.h;
+            let rate = rate.parts()[S::ORDER] * scale * cursor.rate;
             sums[0] -= rate;
-            sums[1] -= rate * t;
+            sums[1] -= rate * tau;
+            if S::ORDER > 0 {
+                // Of the factor h^−ν.
+                let derivative: Vec<Lane> = gamma.iter().map(|x| x.parts()[S::ORDER]).collect();
+                let along = inside.pairing(&p[..len], &lifted[..len], &derivative[..len]);
+                sums[1] -= along * scale * cursor.rate * lane(S::ORDER as f64);
+            }
         }
         if let Some(at) = at {
-            add(&mut controls, place, &back, sums, &mut products, at, out);
+            flush(&mut controls, &back, sums, scale, &mut products);
+            add(&products, at, out);
         }
+    }
+}
+
+fn fixed<S: Scalar>(len: usize) -> [Vec<S>; 4] {
+    let points = || vec![S::constant(Lane::ZERO); len];
+    [points(), points(), points(), points()]
+}
+
+/// De Casteljau's algorithm (8) with control points that may move.
+struct Casteljau<S> {
+    level: [Vec<S>; 4],
+    next: Vec<S>,
+}
+
+impl<S: Scalar> Casteljau<S> {
+    fn new(len: usize) -> Self {
+        Casteljau { level: fixed(len), next: vec![S::constant(Lane::ZERO); len] }
+    }
+
+    #[inline(always)]
+    fn at<M: Ambient>(&mut self, space: &M, points: &[Vec<S>; 4], t: S, len: usize) -> &[S] {
+        let Casteljau { level, next } = self;
+        level.iter_mut().zip(points).for_each(|(to, from)| to[..len].copy_from_slice(&from[..len]));
+        for above in (1..4).rev() {
+            for i in 0..above {
+                let (a, b) = level.split_at_mut(i + 1);
+                space.geodesic(&a[i][..len], &b[0][..len], t, &mut next[..len]);
+                a[i][..len].copy_from_slice(&next[..len]);
+            }
+        }
+        &level[0]
+    }
+}
+
+/// The transpose of a geodesic, for any kind of number where the space has it, see [`Ambient::pull_back`].
+#[inline(always)]
+fn transposed<M: Ambient, S: Scalar>(
+    space: &M,
+    p: &[S],
+    q: &[S],
+    t: S,
+    cotangent: &[S],
+    to_p: &mut [S],
+    to_q: &mut [S],
+    len: usize,
+) -> S {
+    let (p, q, cotangent) = (&p[..len], &q[..len], &cotangent[..len]);
+    let (to_p, to_q) = (&mut to_p[..len], &mut to_q[..len]);
+    if M::SMOOTH {
+        return space.pull_back_along(p, q, t, cotangent, to_p, to_q);
+    }
+    match (S::row(p), S::row(q), S::row(cotangent), S::row_mut(to_p), S::row_mut(to_q)) {
+        (Row::Lane(p), Row::Lane(q), Row::Lane(cotangent), RowMut::Lane(to_p), RowMut::Lane(to_q)) => {
+            S::constant(space.pull_back(p, q, t.value(), cotangent, to_p, to_q))
+        }
+        _ => unreachable!("the space has no transposes for points that move"),
     }
 }
 
 /// Adds the products of the lanes to those of their segments.
 #[inline(always)]
-fn add<P: Place>(
-    controls: &mut Controls,
-    place: &P,
-    cotangents: &[Vec<Lane>; 4],
-    sums: [Lane; 2],
-    products: &mut [Lane],
-    at: [usize; LANES],
-    out: &mut [f64],
-) {
-    let size = products.len();
-    controls.products(place, cotangents, products);
-    products[size - 2..].copy_from_slice(&sums);
+fn add(products: &[Lane], at: [usize; LANES], out: &mut [f64]) {
     for l in 0..LANES {
-        for (sum, x) in out[at[l]..][..size].iter_mut().zip(&*products) {
+        for (sum, x) in out[at[l]..][..products.len()].iter_mut().zip(products) {
             *sum += x.as_array()[l];
         }
     }

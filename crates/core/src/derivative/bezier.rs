@@ -75,7 +75,7 @@ impl Bezier {
         Self::at(space, self.points.clone(), lane(tau)).iter().map(|x| x.as_array()[0]).collect()
     }
 
-    /// Motions of the k-th control point in eight columns from `first` on.
+    /// Motions of the k-th control point in as many columns as there are lanes, from `first` on.
     fn motion(&self, k: usize, row: usize, first: usize) -> Lane {
         let m = self.bases[k].ncols();
         Lane::new(few(|l| {
@@ -84,52 +84,17 @@ impl Bezier {
         }))
     }
 
-    /// ∂γ for motions of the four control points along their frames, and in the last column for τ.
+    /// ∂γ for motions of the four control points along their frames.
     pub fn point(&self, space: &Erased, tau: f64) -> Matrix {
         let (len, count) = (space.point_len(), self.count());
         columns(len, count, |first, out| {
             let points = std::array::from_fn(|k| {
                 (0..len).map(|r| Dual { v: self.points[k][r], d: self.motion(k, r, first) }).collect()
             });
-            let gamma = Self::at(space, points, Dual { v: lane(tau), d: unit(count - 1, first) });
+            let gamma = Self::at(space, points, Dual::constant(lane(tau)));
             let (value, d): (Few<Lane>, Few<Lane>) = gamma.iter().map(|g| (g.v, g.d)).unzip();
             out.copy_from_slice(&d);
             space.velocity(&value, out);
-        })
-    }
-
-    /// The same for the velocity ∂γ/∂τ, with covariant derivatives.
-    ///
-    /// Along the line (τ + r, ε = sr) of a family of curves the covariant acceleration is
-    /// `γ_ττ + 2s γ_τε + s² γ_εε`: a quarter of the difference of s = 1 and s = −1 is the mixed derivative.
-    pub fn velocity(&self, space: &Erased, tau: f64) -> Matrix {
-        let (len, count) = (space.point_len(), self.count());
-        columns(len, count, |first, out| {
-            let along = |s: f64| {
-                let points = std::array::from_fn(|k| {
-                    let v: Few<Lane> =
-                        (0..len).map(|r| self.motion(k, r, first) * lane(self.reach)).collect();
-                    let mut moving: Few<Jet> = smallvec![Jet::constant(Lane::ZERO); len];
-                    space.ray(
-                        &self.points[k],
-                        &v,
-                        Jet { v: Lane::ZERO, d: lane(s), dd: Lane::ZERO },
-                        &mut moving,
-                    );
-                    moving
-                });
-                let rate = Lane::ONE + unit(count - 1, first) * lane(s);
-                let gamma = Self::at(space, points, Jet { v: lane(tau), d: rate, dd: Lane::ZERO });
-                let [value, d, mut dd] = parts(&gamma);
-                space.acceleration(&value, &d, &mut dd);
-                dd
-            };
-            let (forth, back) = (along(1.0), along(-1.0));
-            let time = unit(count - 1, first).simd_gt(Lane::ZERO);
-            let factor = time.select(lane(0.25), lane(0.25 / self.reach));
-            for (out, (x, y)) in out.iter_mut().zip(forth.iter().zip(&back)) {
-                *out = (*x - *y) * factor;
-            }
         })
     }
 
@@ -148,8 +113,7 @@ impl Bezier {
                 let r = lane(sign * STEP * (k + 1) as f64);
                 let points =
                     self.moved(space, first, r).map(|p| p.iter().map(|&x| Jet::constant(x)).collect());
-                let v = lane(tau) + unit(count - 1, first) * r;
-                let gamma = Self::at(space, points, Jet { v, d: Lane::ONE, dd: Lane::ZERO });
+                let gamma = Self::at(space, points, Jet { v: lane(tau), d: Lane::ONE, dd: Lane::ZERO });
                 let [value, d, mut dd] = parts(&gamma);
                 space.acceleration(&value, &d, &mut dd);
                 space.log(&value, &here, &mut way);
@@ -157,9 +121,6 @@ impl Bezier {
                 let weight = lane(sign * WEIGHTS[k] / (STEP * self.reach));
                 out.iter_mut().zip(&back).for_each(|(out, x)| *out += *x * weight);
             }
-            // The step in time does not depend on the unit of the points.
-            let time = unit(count - 1, first).simd_gt(Lane::ZERO);
-            out.iter_mut().for_each(|x| *x = time.select(*x * lane(self.reach), *x));
         })
     }
 
@@ -176,7 +137,7 @@ impl Bezier {
 
     /// Columns of the derivatives.
     fn count(&self) -> usize {
-        4 * self.bases[0].ncols() + 1
+        4 * self.bases[0].ncols()
     }
 }
 

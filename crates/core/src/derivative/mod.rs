@@ -6,24 +6,21 @@
 mod bezier;
 mod operators;
 mod polygon;
+mod rates;
 mod segment;
 mod system;
 
 use crate::curve::{Curves, Moving, Times, motion_len};
 use crate::fit::{End, EndKind, Ends};
-use crate::monitor::checkpoint;
 use crate::scalar::{Lane, lane};
 use crate::space::{Ambient, Erased, Frame, Origin};
 use bezier::{Bezier, Knot};
 use operators::Few;
 pub use operators::{Matrix, Vector};
 use polygon::Polygon;
-use std::collections::BTreeMap;
+use rates::Rates;
 pub use system::Linearised;
 use system::{Change, System};
-
-/// The number of Bézier segments that are stored.
-const KEPT: usize = 256;
 
 /// The data of a curve, small changes of them, or a gradient with respect to them.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -55,7 +52,6 @@ pub struct Derivative<'a> {
     velocities: &'a [f64],
     polygon: Polygon,
     system: System,
-    beziers: BTreeMap<usize, Bezier>,
 }
 
 /// Derivatives of samples of one segment with respect to points and velocities of its two knots.
@@ -66,12 +62,21 @@ pub struct Motion<'a> {
 }
 
 impl Motion<'_> {
-    /// The derivatives of a sample, in the frames of the knots: columns for ξ, υ of the first and ξ, υ of the last
-    /// knot. The last knot of a closed curve equals the first, in its frame.
-    pub fn at(&self, tau: f64, of: Of) -> Matrix {
+    /// The derivatives of a point, in the frames of the knots: columns for ξ, υ of the first and ξ, υ of the last knot.
+    /// The last knot of a closed curve equals the first, in its frame.
+    pub fn point(&self, tau: f64) -> Matrix {
+        self.at_knots(&self.bezier.point(self.derivative.space, tau))
+    }
+
+    /// The same for ∇γ'.
+    pub fn acceleration(&self, tau: f64) -> Matrix {
+        let h = self.derivative.system.h[self.segment];
+        self.at_knots(&(self.bezier.acceleration(self.derivative.space, tau) / (h * h)))
+    }
+
+    /// From columns for the four control points to columns for the knots.
+    fn at_knots(&self, columns: &Matrix) -> Matrix {
         let m = self.derivative.space.dim();
-        let position = Position { segment: self.segment, tau };
-        let (columns, _) = self.derivative.columns(&self.bezier, &position, of);
         let h = self.derivative.system.h[self.segment];
         let mut out = Matrix::zeros(columns.nrows(), 4 * m);
         for e in 0..2 {
@@ -94,15 +99,9 @@ impl Motion<'_> {
     }
 
     /// The array of the point at which the motions are tangent.
-    pub fn point(&self, tau: f64) -> Vec<f64> {
+    pub fn gamma(&self, tau: f64) -> Vec<f64> {
         self.bezier.gamma(self.derivative.space, tau)
     }
-}
-
-/// The segment of a time, and the parameter there.
-struct Position {
-    segment: usize,
-    tau: f64,
 }
 
 impl<'a> Derivative<'a> {
@@ -132,16 +131,11 @@ impl<'a> Derivative<'a> {
             })),
         };
         let system = System::new(space, &polygon, &h, kinds);
-        Derivative { space, t, points, velocities, polygon, system, beziers: BTreeMap::new() }
+        Derivative { space, t, points, velocities, polygon, system }
     }
 
     fn segments(&self) -> usize {
         self.t.len() - 1
-    }
-
-    fn position(&self, x: f64) -> Position {
-        let segment = self.t[1..self.segments()].partition_point(|&t| t <= x);
-        Position { segment, tau: (x - self.t[segment]) / (self.t[segment + 1] - self.t[segment]) }
     }
 
     fn bezier(&self, segment: usize) -> Bezier {
@@ -173,28 +167,8 @@ impl<'a> Derivative<'a> {
         &self.system.functions[(4 * segment + 2 * e + which) * square..][..square]
     }
 
-    /// The derivatives of a sample: columns for the four control points and τ, and separately a factor for h.
-    fn columns(&self, bezier: &Bezier, &Position { segment, tau }: &Position, of: Of) -> (Matrix, Vector) {
-        let (space, inverse) = (self.space, 1.0 / self.system.h[segment]);
-        // The last column, after those of the control points, is the derivative in τ.
-        let along = |columns: Matrix, factor: f64| columns.column(columns.ncols() - 1) * factor;
-        match of {
-            Of::Point => (bezier.point(space, tau), Vector::zeros(space.point_len())),
-            // γ' = γ_τ/h
-            Of::Velocity => {
-                let by_h = along(bezier.point(space, tau), -inverse * inverse);
-                (bezier.velocity(space, tau) * inverse, by_h)
-            }
-            // ∇γ' = ∇γ_τ/h²
-            Of::Acceleration => {
-                let by_h = along(bezier.velocity(space, tau), -2.0 * inverse * inverse * inverse);
-                (bezier.acceleration(space, tau) * (inverse * inverse), by_h)
-            }
-        }
-    }
-
     /// The curve with its frames, for samples at times x.
-    fn moving<'m>(&'m self, x: &'m [f64]) -> Moving<'m> {
+    fn moving<'m>(&'m self, x: &'m [f64], of: Of) -> Moving<'m> {
         Moving {
             curve: Curves {
                 t: self.t,
@@ -206,6 +180,7 @@ impl<'a> Derivative<'a> {
             times: Times { x, count: x.len() },
             frames: &self.polygon.frames,
             runs: self.polygon.runs.count,
+            nu: of as usize,
             dim: self.space.dim(),
             len: self.space.point_len(),
         }
@@ -213,7 +188,7 @@ impl<'a> Derivative<'a> {
 
     /// Forward mode: the motion of the curve at times x for given changes of the data; `out` receives one tangent
     /// vector per time.
-    pub fn push(&mut self, x: &[f64], of: Of, change: &Data, out: &mut [f64]) {
+    pub fn push(&self, x: &[f64], of: Of, change: &Data, out: &mut [f64]) {
         let change = self.in_frames(change);
         let m = self.space.dim();
         let u = self.polygon.unfold(&self.system.velocities(&change), m);
@@ -238,45 +213,21 @@ impl<'a> Derivative<'a> {
             motions.extend_from_slice(&points[at(1)..][..m]);
             motions.extend([dt, dh]);
         }
-        if of == Of::Point {
-            return self.space.0.push(&self.moving(x), &motions, out);
-        }
-        for (&x, out) in x.iter().zip(out.chunks_mut(self.space.point_len())) {
-            checkpoint();
-            let position = self.position(x);
-            let (columns, by_h) = self.kept(&position, of);
-            let Position { segment: i, tau } = position;
-            let row = &motions[i * motion_len(m)..][..motion_len(m)];
-            let (dt, dh) = (row[4 * m], row[4 * m + 1]);
-            let mut z = Vector::from_column_slice(&row[..4 * m + 1]);
-            z[4 * m] = -(dt + tau * dh) / self.system.h[i];
-            let moved = columns * z + by_h * dh;
-            out.copy_from_slice(moved.as_slice());
+        let moving = self.moving(x, of);
+        if !self.space.0.push(&moving, &motions, out) {
+            Rates { space: self.space, moving: &moving, of }.push(&motions, out);
         }
     }
 
     /// Reverse mode: the gradient of `Σ cotangent · curve` with respect to the data, tangent vectors at points and
     /// ends.
-    pub fn pull(&mut self, x: &[f64], of: Of, cotangent: &[f64]) -> Data {
-        let (n, m, len) = (self.segments(), self.space.dim(), self.space.point_len());
+    pub fn pull(&self, x: &[f64], of: Of, cotangent: &[f64]) -> Data {
+        let (n, m) = (self.segments(), self.space.dim());
         let size = motion_len(m);
         let mut products = vec![0.0; n * size];
-        if of == Of::Point {
-            self.space.0.pull(&self.moving(x), cotangent, &mut products);
-        } else {
-            for (&x, cotangent) in x.iter().zip(cotangent.chunks(len)) {
-                checkpoint();
-                let position = self.position(x);
-                let (columns, by_h) = self.kept(&position, of);
-                let Position { segment: i, tau } = position;
-                let cotangent = Vector::from_column_slice(cotangent);
-                let z = columns.tr_mul(&cotangent);
-                let row = &mut products[i * size..][..size];
-                row.iter_mut().zip(&z.as_slice()[..4 * m]).for_each(|(sum, x)| *sum += x);
-                let rate = z[4 * m] / self.system.h[i];
-                row[4 * m] -= rate;
-                row[4 * m + 1] += by_h.dot(&cotangent) - tau * rate;
-            }
+        let moving = self.moving(x, of);
+        if !self.space.0.pull(&moving, cotangent, &mut products) {
+            Rates { space: self.space, moving: &moving, of }.pull(cotangent, &mut products);
         }
         let slots = self.polygon.runs.slots() * m;
         let (mut points, mut u) = (vec![0.0; slots], vec![0.0; slots]);
@@ -308,18 +259,6 @@ impl<'a> Derivative<'a> {
         gradient.points = self.polygon.fold(&points, m);
         self.system.pull_back(&self.polygon.fold(&u, m), &mut gradient);
         self.ambient(&gradient)
-    }
-
-    /// The same, with some Bézier segments stored for repeated use.
-    fn kept(&mut self, position: &Position, of: Of) -> (Matrix, Vector) {
-        let bezier = self.beziers.remove(&position.segment).unwrap_or_else(|| self.bezier(position.segment));
-        let found = self.columns(&bezier, position, of);
-        // Times usually increase, so that few segments are in use at any time.
-        if self.beziers.len() == KEPT {
-            self.beziers.clear();
-        }
-        self.beziers.insert(position.segment, bezier);
-        found
     }
 
     /// The derivatives of samples of a segment with respect to its two knots.

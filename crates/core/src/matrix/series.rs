@@ -10,7 +10,7 @@ use super::entry::{inner_add, mul_add};
 use super::function::{Unary, function_of};
 use super::select::{Select, by_size};
 use crate::scalar::{LANES, Lane, Scalar, few, lane};
-use crate::special::{ARC, SINC, VERSINE, arc_full_range};
+use crate::special::{ARC, SINC, VERSINE, arc_full_range, two};
 
 /// The common data of the series in one matrix.
 pub(super) struct Powers<'a, S: Scalar, const D: usize, A: Storage> {
@@ -544,7 +544,7 @@ pub(super) fn arc_here<S: Scalar, const D: usize, A: Storage>(y: &Matrix<S, D, A
                 return function_of(
                     y,
                     &Unary {
-                        f: |y: Lane| arc_full_range(y, lane(2.0) - y),
+                        f: |y: Lane| two(arc_full_range(y, lane(2.0) - y)),
                         pole_distance: |y: Lane| (lane(2.0) - y).abs().min(Lane::ONE),
                     },
                 );

@@ -30,9 +30,9 @@ pub trait Kernels: Geometry {
     /// Evaluates a block of samples.
     fn samples(&self, job: &Job, out: &mut [f64]);
     /// See `Moving::push`.
-    fn push(&self, moving: &Moving, motions: &[f64], out: &mut [f64]);
+    fn push(&self, moving: &Moving, motions: &[f64], out: &mut [f64]) -> bool;
     /// See `Moving::pull`.
-    fn pull(&self, moving: &Moving, cotangents: &[f64], out: &mut [f64]);
+    fn pull(&self, moving: &Moving, cotangents: &[f64], out: &mut [f64]) -> bool;
 }
 
 /// A space that is represented by its table of operations.

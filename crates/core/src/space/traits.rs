@@ -106,6 +106,29 @@ pub trait Ambient: Copy + Send + Sync {
     ) -> Lane {
         pull_back_by_transport(self, p, q, t, cotangent, to_p, to_q)
     }
+    /// Whether [`pull_back_along`](Ambient::pull_back_along) exists: where a cotangent vector that is constant as an array moves
+    /// in parallel, up to components normal to the space.
+    const SMOOTH: bool = false;
+    /// [`pull_back`](Ambient::pull_back) for points that move with t.
+    fn pull_back_along<S: Scalar>(
+        &self,
+        _p: &[S],
+        _q: &[S],
+        _t: S,
+        _cotangent: &[S],
+        _to_p: &mut [S],
+        _to_q: &mut [S],
+    ) -> S {
+        unreachable!("the space is not smooth in this sense")
+    }
+    /// For these spaces, the derivative of `[p, q]_t` for changes of p, q and t that may move with t.
+    fn push_along<S: Scalar>(&self, _pq: [&[S]; 2], _t: S, _changes: [&[S]; 2], _dt: S, _out: &mut [S]) {
+        unreachable!("the space is not smooth in this sense")
+    }
+    /// For these spaces, R(λ, v)v without the component that a constant array gains by projection.
+    fn bend(&self, _v: &[Lane], _cotangent: &[Lane], _out: &mut [Lane]) {
+        unreachable!("the space is not smooth in this sense")
+    }
     /// The transvection `E_p(v)` of (10) applied to a point x.
     fn transvect(&self, p: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]);
     /// Parallel transport of a tangent vector x from p to q = `exp_p(v)`: `E_p(v)` applied to it, at the

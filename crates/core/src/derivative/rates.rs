@@ -1,0 +1,400 @@
+//! Derivatives in time of the motion of a curve, and the transpose, where the formulas of a space do not give them.
+//!
+//! With the motion e(τ) of the curve in units of a segment, D_ε γ_τ = De and D_ε ∇γ_τ = D²e + R(e, γ_τ)γ_τ. On a segment, e is a
+//! smooth function of τ, which is interpolated at Chebyshev nodes (Trefethen, *Approximation Theory and Approximation
+//! Practice*, 2013, chapters 2 and 21). For arrays γ the acceleration is L(γ'') + Q(γ', γ') with a linear map L and a quadratic
+//! form Q that depend on the point, so that De = L(e') + Q(γ', e). The transpose takes the same steps in reverse order.
+
+use super::Of;
+use crate::curve::{Moving, Outside, Quantity, Times, connection, evaluate, motion_len};
+use crate::monitor::{Monitor, checkpoint};
+use crate::scalar::{LANES, Lane, dot, few, gather, lane, scatter};
+use crate::space::{Ambient, Erased, Frame, Origin};
+use std::f64::consts::PI;
+use std::sync::LazyLock;
+
+/// The degrees of interpolations: the second one serves segments that the first one does not resolve.
+const DEGREES: [usize; 2] = [16, 32];
+/// The error of the interpolated velocity, relative to its size, up to which a segment is resolved.
+const RESOLVED: f64 = 1e-12;
+/// Segments whose nodes are stored at the same time.
+const TOGETHER: usize = 64;
+
+/// Interpolation at the zeros of a Chebyshev polynomial, none of which is a knot.
+struct Nodes {
+    /// In [0, 1].
+    at: Vec<f64>,
+    /// By node, the Chebyshev coefficients of its cardinal function.
+    coefficients: Vec<Vec<f64>>,
+    /// By node, the derivatives of the cardinal functions there.
+    slopes: Vec<Vec<f64>>,
+}
+
+static NODES: LazyLock<[Nodes; 2]> = LazyLock::new(|| DEGREES.map(|degree| Nodes::new(degree + 1)));
+
+impl Nodes {
+    fn new(count: usize) -> Self {
+        let cosine = |n: usize, k: usize| (PI * (n * (2 * k + 1)) as f64 / (2 * count) as f64).cos();
+        let coefficient = |n: usize, k: usize| cosine(n, k) * if n == 0 { 1.0 } else { 2.0 } / count as f64;
+        let mut nodes = Nodes {
+            at: (0..count).map(|k| 0.5 + 0.5 * cosine(1, k)).collect(),
+            coefficients: (0..count).map(|k| (0..count).map(|n| coefficient(n, k)).collect()).collect(),
+            slopes: Vec::new(),
+        };
+        nodes.slopes = nodes.at.iter().map(|&tau| nodes.weights(tau)[1].clone()).collect();
+        nodes
+    }
+
+    /// The cardinal functions at τ, and their derivatives.
+    fn weights(&self, tau: f64) -> [Vec<f64>; 2] {
+        let y = 2.0 * tau - 1.0;
+        // Tₙ, and its derivative in τ, 2n Uₙ₋₁.
+        let (mut t, mut u) = ([1.0, y], [1.0, 2.0 * y]);
+        let (mut values, mut slopes) = (vec![1.0], vec![0.0]);
+        for n in 1..self.at.len() {
+            values.push(t[1]);
+            slopes.push(2.0 * n as f64 * u[0]);
+            t = [t[1], 2.0 * y * t[1] - t[0]];
+            u = [u[1], 2.0 * y * u[1] - u[0]];
+        }
+        [values, slopes].map(|x| self.coefficients.iter().map(|c| c.iter().zip(&x).map(|(c, x)| c * x).sum()).collect())
+    }
+}
+
+/// One curve, and the order of the derivative.
+pub struct Rates<'a> {
+    pub space: &'a Erased<'a>,
+    pub moving: &'a Moving<'a>,
+    pub of: Of,
+}
+
+/// Samples of one segment, by their numbers, and the weights of the nodes at each.
+struct Group {
+    segment: usize,
+    samples: Vec<usize>,
+    weights: Vec<[Vec<f64>; 2]>,
+}
+
+impl Group {
+    /// Rows of values at the nodes, interpolated at samples, and the derivatives.
+    fn interpolate(&self, samples: &[usize; LANES], values: &[f64], len: usize) -> [Vec<Lane>; 2] {
+        [0, 1].map(|k| {
+            let at = samples.map(|i| &self.weights[i][k]);
+            let mut sum = vec![Lane::ZERO; len];
+            for (j, row) in values.chunks_exact(len).enumerate() {
+                let weight = Lane::new(at.map(|weights| weights[j]));
+                sum.iter_mut().zip(row).for_each(|(sum, x)| *sum = weight.mul_add(lane(*x), *sum));
+            }
+            sum
+        })
+    }
+
+    /// The samples on the lanes, by their places in the group; the last one is repeated.
+    fn lanes(&self) -> impl Iterator<Item = [usize; LANES]> {
+        let count = self.samples.len();
+        (0..count).step_by(LANES).map(move |first| few(|l| (first + l).min(count - 1)))
+    }
+}
+
+/// Segments that one interpolation resolves.
+struct Resolved<'c> {
+    nodes: &'static Nodes,
+    groups: Vec<&'c Group>,
+    /// The times of the nodes, and the states there.
+    x: Vec<f64>,
+    states: Vec<f64>,
+}
+
+/// On the lanes, a point, the derivative of its array and ∇γ_τ, in units of the segment.
+struct State {
+    p: Vec<Lane>,
+    d: Vec<Lane>,
+    w: Vec<Lane>,
+}
+
+impl State {
+    fn read(states: &[f64], len: usize, at: [usize; LANES]) -> Self {
+        let part = |k: usize| {
+            let mut lanes = vec![Lane::ZERO; len];
+            gather(at.map(|i| &states[(3 * i + k) * len..][..len]), &mut lanes);
+            lanes
+        };
+        State { p: part(0), d: part(1), w: part(2) }
+    }
+}
+
+impl Rates<'_> {
+    fn h(&self, segment: usize) -> f64 {
+        let t = self.moving.curve.t;
+        t[segment + 1] - t[segment]
+    }
+
+    fn segment(&self, x: f64) -> usize {
+        let t = self.moving.curve.t;
+        t[1..t.len() - 1].partition_point(|&t| t <= x)
+    }
+
+    fn tau(&self, segment: usize, x: f64) -> f64 {
+        (x - self.moving.curve.t[segment]) / self.h(segment)
+    }
+
+    /// Points, derivatives of their arrays and ∇γ_τ at times, in units of the segment of each.
+    fn states(&self, x: &[f64], segment: impl Fn(usize) -> usize) -> Vec<f64> {
+        let len = self.moving.len;
+        let mut states = vec![0.0; 3 * len * x.len()];
+        let go_on = |_| true;
+        let (times, monitor) = (Times { x, count: x.len() }, Monitor::new(&go_on));
+        let (quantity, outside) = (Quantity::Jet, Outside::Continue);
+        evaluate(self.space, &self.moving.curve, &times, quantity, outside, &monitor, &mut states);
+        for (i, state) in states.chunks_mut(3 * len).enumerate() {
+            let h = self.h(segment(i));
+            state[len..2 * len].iter_mut().for_each(|x| *x *= h);
+            state[2 * len..].iter_mut().for_each(|x| *x *= h * h);
+        }
+        states
+    }
+
+    /// Whether the derivative of the interpolated curve is that of the curve.
+    fn is_resolved(&self, group: &Group, nodes: &[f64], samples: &[f64]) -> bool {
+        let len = self.moving.len;
+        group.samples.iter().zip(&group.weights).all(|(&i, [_, slopes])| {
+            (0..len).all(|c| {
+                let [p, d] = [0, 1].map(|k| samples[(3 * i + k) * len + c]);
+                let slope: f64 = slopes.iter().zip(nodes.chunks(3 * len)).map(|(w, state)| w * state[c]).sum();
+                let size = samples[3 * i * len..][..2 * len].iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+                // NaN remains NaN at every degree.
+                !((slope - d).abs() > RESOLVED * size) || p.is_nan()
+            })
+        })
+    }
+
+    /// Passes the samples to a function, some segments at a time, with the states of all samples.
+    fn for_each(&self, mut work: impl FnMut(&Resolved, &[f64])) {
+        let (x, len) = (self.moving.times.x, self.moving.len);
+        let samples = self.states(x, |i| self.segment(x[i]));
+        let mut order: Vec<usize> = (0..x.len()).collect();
+        order.sort_by_key(|&i| self.segment(x[i]));
+        let mut rest: Vec<Vec<usize>> =
+            order.chunk_by(|&i, &j| self.segment(x[i]) == self.segment(x[j])).map(<[usize]>::to_vec).collect();
+        for (level, nodes) in NODES.iter().enumerate() {
+            let (mut rough, count) = (Vec::new(), nodes.at.len());
+            for some in rest.chunks(TOGETHER) {
+                checkpoint();
+                let group = |samples: &Vec<usize>| {
+                    let segment = self.segment(x[samples[0]]);
+                    let weights = samples.iter().map(|&i| nodes.weights(self.tau(segment, x[i]))).collect();
+                    Group { segment, samples: samples.clone(), weights }
+                };
+                let groups: Vec<Group> = some.iter().map(group).collect();
+                let times = |group: &Group| {
+                    let (from, h) = (self.moving.curve.t[group.segment], self.h(group.segment));
+                    nodes.at.iter().map(move |tau| from + tau * h)
+                };
+                let times: Vec<f64> = groups.iter().flat_map(times).collect();
+                let states = self.states(&times, |i| groups[i / count].segment);
+                let (good, bad): (Vec<usize>, Vec<usize>) = (0..groups.len()).partition(|&g| {
+                    let last = level + 1 == NODES.len();
+                    last || self.is_resolved(&groups[g], &states[g * count * 3 * len..][..count * 3 * len], &samples)
+                });
+                rough.extend(bad.iter().map(|&g| some[g].clone()));
+                let pick = |all: &[f64], size: usize| -> Vec<f64> {
+                    good.iter().flat_map(|&g| &all[g * size..(g + 1) * size]).copied().collect()
+                };
+                let groups = good.iter().map(|&g| &groups[g]).collect();
+                let resolved = Resolved { nodes, groups, x: pick(&times, count), states: pick(&states, count * 3 * len) };
+                work(&resolved, &samples);
+            }
+            rest = rough;
+        }
+    }
+
+    /// De = L(e') + Q(γ', e) on the lanes.
+    fn covariant(&self, State { p, d, .. }: &State, [e, slope]: &[Vec<Lane>; 2]) -> Vec<Lane> {
+        connection(self.space, p, d, e, slope)
+    }
+
+    /// De at the nodes of a segment.
+    fn at_nodes(&self, nodes: &Nodes, states: &[f64], field: &[f64]) -> Vec<f64> {
+        let (len, count) = (self.moving.len, nodes.at.len());
+        let mut out = vec![0.0; field.len()];
+        for (first, out) in out.chunks_mut(LANES * len).enumerate() {
+            let at: [usize; LANES] = few(|l| (first * LANES + l).min(count - 1));
+            let state = State::read(states, len, at);
+            let mut both = [vec![Lane::ZERO; len], vec![Lane::ZERO; len]];
+            gather(at.map(|j| &field[j * len..][..len]), &mut both[0]);
+            for (k, row) in field.chunks_exact(len).enumerate() {
+                let weight = Lane::new(at.map(|j| nodes.slopes[j][k]));
+                both[1].iter_mut().zip(row).for_each(|(sum, x)| *sum = weight.mul_add(lane(*x), *sum));
+            }
+            scatter(&self.covariant(&state, &both), out);
+        }
+        out
+    }
+
+    /// The rows of a matrix that represents a linear map of arrays, times λ: its transpose.
+    fn transpose(&self, cotangent: &[Lane], mut map: impl FnMut(&[Lane]) -> Vec<Lane>) -> Vec<Lane> {
+        let mut unit = vec![Lane::ZERO; cotangent.len()];
+        (0..cotangent.len())
+            .map(|i| {
+                unit[i] = Lane::ONE;
+                let product = dot(&map(&unit), cotangent);
+                unit[i] = Lane::ZERO;
+                product
+            })
+            .collect()
+    }
+
+    /// The transpose of De: cotangent vectors for e and e'.
+    fn covariant_transposed(&self, State { p, d, .. }: &State, cotangent: &[Lane]) -> [Vec<Lane>; 2] {
+        let none = vec![Lane::ZERO; p.len()];
+        [
+            self.transpose(cotangent, |e| connection(self.space, p, d, e, &none)),
+            self.transpose(cotangent, |slope| connection(self.space, p, d, &none, slope)),
+        ]
+    }
+
+    /// `e ↦ R(e, γ_τ)γ_τ`, which is [γ_τ, [e, γ_τ]], in a frame.
+    fn curvature(&self, State { p, d, .. }: &State) -> impl Fn(&[Lane]) -> Vec<Lane> {
+        let (space, m) = (self.space, self.moving.dim);
+        let (mut frame, mut v, mut velocity) = (vec![Lane::ZERO; space.frame_len()], vec![Lane::ZERO; m], d.clone());
+        space.velocity(p, &mut velocity);
+        space.lift(p, &mut frame);
+        space.coordinates(&frame, p, &velocity, &mut v);
+        move |e| {
+            let (mut x, mut bent, mut out) = (vec![Lane::ZERO; m], vec![Lane::ZERO; m], vec![Lane::ZERO; p.len()]);
+            space.coordinates(&frame, p, e, &mut x);
+            space.triple(&v, &x, &v, &mut bent);
+            space.tangent(&frame, p, &bent, &mut out);
+            out
+        }
+    }
+
+    /// γ_τ for ν = 1 and ∇γ_τ for ν = 2, and its derivative along the curve, at samples.
+    fn rates(&self, group: &Group, at: &[usize; LANES], nodes: &[f64], state: &State) -> [Vec<Lane>; 2] {
+        if self.of == Of::Velocity {
+            let mut velocity = state.d.clone();
+            self.space.velocity(&state.p, &mut velocity);
+            return [velocity, state.w.clone()];
+        }
+        let len = self.moving.len;
+        let bends: Vec<f64> = nodes.chunks(3 * len).flat_map(|state| &state[2 * len..]).copied().collect();
+        [state.w.clone(), self.covariant(state, &group.interpolate(at, &bends, len))]
+    }
+
+    /// See [`Moving::push`].
+    pub fn push(&self, motions: &[f64], out: &mut [f64]) {
+        let (len, m, x) = (self.moving.len, self.moving.dim, self.moving.times.x);
+        let nu = self.of as i32;
+        let (size, mut still) = (motion_len(m), motions.to_vec());
+        // Only the motion at fixed parameters.
+        still.chunks_mut(size).for_each(|row| row[4 * m..].fill(0.0));
+        self.for_each(|Resolved { nodes, groups, x: at_nodes, states }, samples| {
+            let mut fields = vec![0.0; at_nodes.len() * len];
+            let moving = Moving { times: Times { x: at_nodes, count: at_nodes.len() }, nu: 0, ..*self.moving };
+            self.space.0.push(&moving, &still, &mut fields);
+            let row = nodes.at.len() * len;
+            for ((group, states), field) in groups.iter().zip(states.chunks(3 * row)).zip(fields.chunks(row)) {
+                let h = self.h(group.segment);
+                let [dt, dh] = [0, 1].map(|k| motions[group.segment * size + 4 * m + k]);
+                let moved = if nu == 1 { field.to_vec() } else { self.at_nodes(nodes, states, field) };
+                for at in group.lanes() {
+                    let state = State::read(samples, len, at.map(|i| group.samples[i]));
+                    let mut change = self.covariant(&state, &group.interpolate(&at, &moved, len));
+                    if nu == 2 {
+                        let bent = self.curvature(&state)(&group.interpolate(&at, field, len)[0]);
+                        change.iter_mut().zip(&bent).for_each(|(x, y)| *x += *y);
+                    }
+                    let [rate, next] = self.rates(group, &at, states, &state);
+                    for (l, &i) in at.iter().enumerate() {
+                        let i = group.samples[i];
+                        let shift = -(dt + self.tau(group.segment, x[i]) * dh) / h;
+                        for c in 0..len {
+                            let [change, rate, next] = [&change, &rate, &next].map(|v| v[c].as_array()[l]);
+                            out[i * len + c] = (change + shift * next - nu as f64 * dh / h * rate) / h.powi(nu);
+                        }
+                    }
+                }
+            }
+        });
+    }
+
+    /// See [`Moving::pull`].
+    pub fn pull(&self, cotangents: &[f64], out: &mut [f64]) {
+        let (len, m, x) = (self.moving.len, self.moving.dim, self.moving.times.x);
+        let (nu, size) = (self.of as i32, motion_len(m));
+        let segments = self.moving.curve.nodes - 1;
+        let mut products = vec![0.0; segments * size];
+        self.for_each(|Resolved { nodes, groups, x: at_nodes, states }, samples| {
+            let row = nodes.at.len() * len;
+            let mut sources = vec![0.0; at_nodes.len() * len];
+            for ((group, states), source) in groups.iter().zip(states.chunks(3 * row)).zip(sources.chunks_mut(row)) {
+                let h = self.h(group.segment);
+                let mut direct = vec![0.0; row];
+                for (first, at) in group.lanes().enumerate() {
+                    let used = (group.samples.len() - first * LANES).min(LANES);
+                    let numbers = at.map(|i| group.samples[i]);
+                    let state = State::read(samples, len, numbers);
+                    let mut cotangent = vec![Lane::ZERO; len];
+                    gather(numbers.map(|i| &cotangents[i * len..][..len]), &mut cotangent);
+                    cotangent.iter_mut().for_each(|x| *x *= lane(h.powi(-nu)));
+                    let [by_e, by_slope] = self.covariant_transposed(&state, &cotangent);
+                    let bent = if nu == 2 {
+                        self.transpose(&cotangent, self.curvature(&state))
+                    } else {
+                        Vec::new()
+                    };
+                    let [rate, next] = self.rates(group, &at, states, &state);
+                    let [rate, next] = [rate, next].map(|v| dot(&v, &cotangent));
+                    for l in 0..used {
+                        let [values, slopes] = &group.weights[at[l]];
+                        for j in 0..nodes.at.len() {
+                            for c in 0..len {
+                                let [e, slope] = [&by_e, &by_slope].map(|v| v[c].as_array()[l]);
+                                source[j * len + c] += values[j] * e + slopes[j] * slope;
+                                if nu == 2 {
+                                    direct[j * len + c] += values[j] * bent[c].as_array()[l];
+                                }
+                            }
+                        }
+                        let [rate, next] = [rate, next].map(|x| x.as_array()[l] / h);
+                        let sums = &mut out[group.segment * size + 4 * m..][..2];
+                        sums[0] -= next;
+                        sums[1] -= next * self.tau(group.segment, x[numbers[l]]) + nu as f64 * rate;
+                    }
+                }
+                if nu == 2 {
+                    let moved = self.at_nodes_transposed(nodes, states, source);
+                    source.iter_mut().zip(moved.iter().zip(&direct)).for_each(|(x, (y, z))| *x = y + z);
+                }
+            }
+            let moving = Moving { times: Times { x: at_nodes, count: at_nodes.len() }, nu: 0, ..*self.moving };
+            self.space.0.pull(&moving, &sources, &mut products);
+        });
+        for (out, products) in out.chunks_mut(size).zip(products.chunks(size)) {
+            out[..4 * m].iter_mut().zip(products).for_each(|(sum, x)| *sum += x);
+        }
+    }
+
+    /// The transpose of [`at_nodes`](Self::at_nodes).
+    fn at_nodes_transposed(&self, nodes: &Nodes, states: &[f64], cotangents: &[f64]) -> Vec<f64> {
+        let (len, count) = (self.moving.len, nodes.at.len());
+        let mut out = vec![0.0; cotangents.len()];
+        for first in (0..count).step_by(LANES) {
+            let at: [usize; LANES] = few(|l| (first + l).min(count - 1));
+            let state = State::read(states, len, at);
+            let mut cotangent = vec![Lane::ZERO; len];
+            gather(at.map(|j| &cotangents[j * len..][..len]), &mut cotangent);
+            let [by_e, by_slope] = self.covariant_transposed(&state, &cotangent);
+            for l in 0..LANES.min(count - first) {
+                let j = at[l];
+                for c in 0..len {
+                    out[j * len + c] += by_e[c].as_array()[l];
+                    for (k, weight) in nodes.slopes[j].iter().enumerate() {
+                        out[k * len + c] += weight * by_slope[c].as_array()[l];
+                    }
+                }
+            }
+        }
+        out
+    }
+}
