@@ -1,5 +1,6 @@
 //! Fits of all curves of a problem, long ones in sections, and what counts as converged after rounding.
 
+use super::minimum_energy::HALF_WAY;
 use super::problem::{Ends, Method, Options, Problem, Report, Status};
 use super::rounded;
 use super::sections::{OVERLAP, fit_cut};
@@ -9,8 +10,11 @@ use crate::space::{Ambient, Erased, Frame, Origin};
 
 /// Curves with more segments than this are divided into sections.
 const LONG: usize = 512;
+/// A single curve with more segments than this is divided, too, if its points are near each other. In a batch, other
+/// curves occupy the lanes, and the overlap of sections would cost more than the division gains.
+const ALONE: usize = 128;
 
-/// The approximate number of eight-byte numbers that the fit of eight curves occupies at a time.
+/// The approximate number of eight-byte numbers that the fit of a curve per lane occupies at a time.
 pub fn memory(space: &Erased, nodes: usize, method: Method) -> f64 {
     let (nodes, m) = (nodes.min(LONG) as f64, space.dim() as f64);
     // Chords, velocities, residuals and steps at every node, and the history of Anderson mixing.
@@ -23,6 +27,11 @@ pub fn memory(space: &Erased, nodes: usize, method: Method) -> f64 {
     chain + jacobian + crate::rows::memory(space, None)
 }
 
+/// Whether the sections of a curve have been solved, and its points are so near each other that it is the only curve.
+fn is_easy(space: &Erased, report: &Report) -> bool {
+    report.status == Status::Converged && report.widest <= HALF_WAY * space.cut_angle()
+}
+
 /// Fits all curves of a problem. Velocities have the layout of the points; curves that cannot be fitted are NaN.
 pub fn fit(
     space: &Erased,
@@ -33,13 +42,23 @@ pub fn fit(
 ) -> Vec<Report> {
     let curves = problem.offsets.len() - 1;
     let mut reports = vec![Report::default(); curves];
-    let whole: Vec<usize> = (0..curves).filter(|&c| problem.segments(c) <= LONG).collect();
-    let mut rest: Vec<usize> = (0..curves).filter(|&c| problem.segments(c) > LONG).collect();
+    let mut longest_whole = if curves == 1 { ALONE } else { LONG };
+    let (whole, mut rest): (Vec<usize>, Vec<usize>) =
+        (0..curves).partition(|&c| problem.segments(c) <= longest_whole);
     fit_cut(space, problem, options, monitor, velocities, &whole, None, &mut reports);
     let mut overlap = OVERLAP;
     while !rest.is_empty() && !monitor.cancelled() {
-        rest = fit_cut(space, problem, options, monitor, velocities, &rest, Some(overlap), &mut reports);
+        let cut = std::mem::take(&mut rest);
+        rest = fit_cut(space, problem, options, monitor, velocities, &cut, Some(overlap), &mut reports);
         overlap *= 2;
+        let longest = problem.segments(cut[0]);
+        if longest_whole < longest
+            && longest <= LONG
+            && !(rest.is_empty() && is_easy(space, &reports[cut[0]]))
+        {
+            // No section is shorter than the curve. Only for a whole one, `auto` searches for further solutions.
+            (longest_whole, overlap, rest) = (LONG, longest, cut);
+        }
     }
     let len = space.point_len();
     for (curve, report) in reports.iter_mut().enumerate() {
@@ -50,7 +69,7 @@ pub fn fit(
         }
         if report.status.is_fault() {
             own.fill(f64::NAN);
-        } else if matches!(problem.ends, Ends::Periodic) && problem.segments(curve) > LONG {
+        } else if matches!(problem.ends, Ends::Periodic) && problem.segments(curve) > longest_whole {
             // Sections agree up to the tolerance; the first and the last velocity are equal.
             let transported = problem.across_closure(space, curve, &own[..len]);
             own[problem.segments(curve) * len..].copy_from_slice(&transported);

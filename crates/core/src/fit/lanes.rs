@@ -1,4 +1,4 @@
-//! Eight curves, or sections of curves, in SIMD lanes.
+//! Curves, or sections of curves, in SIMD lanes.
 
 use super::auto;
 use super::chain::{Chain, Run};
@@ -23,7 +23,7 @@ thread_local! {
     static THREAD: Cell<Option<Box<Thread>>> = const { Cell::new(None) };
 }
 
-/// Fits up to eight sections of equal length.
+/// Fits sections of equal length, at most one per lane.
 pub fn fit_lanes(
     space: &Erased,
     problem: &Problem,
@@ -100,7 +100,7 @@ fn fit_in(
     let noisy = noisy_handles(space, chain, &runs, outcome.handle);
     let steps = chain.max_step.to_array();
     let given = given_handles(chain, &ends);
-    let condition = chain.condition.to_array();
+    let (condition, widest) = (chain.condition.to_array(), chain.widest.to_array());
     for (l, p) in group.iter_mut().enumerate() {
         let status = if let Some((index, angle)) = cut[l] {
             Status::CutLocus { index, angle }
@@ -125,6 +125,7 @@ fn fit_in(
             almost_cut: almost_cut[l].map(|(index, angle)| (p.first + index, angle)),
             skipped: outcome.skipped[l],
             condition: condition[l],
+            widest: widest[l],
             ..Report::default()
         };
         p.end_handle = given[l];

@@ -18,7 +18,7 @@ const FAR: f64 = 0.55;
 /// spheres, SO(3), CPⁿ and Gr(2, 4) with steps of 0.3 to 0.6, 60 have a curve of lower bending energy than the first
 /// one that was found. Their steps are at least 0.44 and their iterations at least 20. Of 1000 other sets, one with a
 /// step of 0.58 needed 17.
-const HALF_WAY: f64 = 0.4;
+pub const HALF_WAY: f64 = 0.4;
 const SLOW: usize = 16;
 /// A curve goes around the space if a segment is longer than the distance to the cut locus by this factor, as on the
 /// longer way around a sphere between points that are near each other: less than 0.3 of this distance. It is an alternative

@@ -233,6 +233,8 @@ pub struct Report {
     pub skipped: SolverSet,
     /// The growth of rounding errors over the chords of the curve.
     pub(super) condition: f64,
+    /// The largest deciding angle of a step, or an upper bound.
+    pub(super) widest: f64,
 }
 
 impl Report {
@@ -253,6 +255,7 @@ impl Report {
             almost_cut: self.almost_cut.or(other.almost_cut),
             skipped: self.skipped.union(other.skipped),
             condition: most(self.condition, other.condition),
+            widest: most(self.widest, other.widest),
         }
     }
 }
@@ -273,6 +276,7 @@ impl Default for Report {
             almost_cut: None,
             skipped: SolverSet::default(),
             condition: 1.0,
+            widest: 0.0,
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Long curves in sections, on all cores.
+//! Long curves in sections, in SIMD lanes and on all cores.
 //!
 //! A long curve is divided into overlapping sections with artificial natural ends. The influence of a knot decays by
 //! a factor of 0.27 per node on equal knots, and of ½ in the worst case, so that a section is accurate to rounding a
