@@ -45,11 +45,11 @@ fn vector(space: &Erased, p: &[Lane], length: f64, next: &mut impl FnMut() -> f6
 }
 
 /// Points at a given distance from each other, in random directions.
-fn walk(space: &Erased, step: f64, next: &mut impl FnMut() -> f64) -> Vec<f64> {
+fn walk(space: &Erased, count: usize, step: f64, next: &mut impl FnMut() -> f64) -> Vec<f64> {
     let mut p: Vec<Lane> = (0..space.point_len()).map(|_| lane(next())).collect();
     space.random_point(&mut p);
     let mut out = numbers(&p);
-    for _ in 1..KNOTS.len() {
+    for _ in 1..count {
         let v = vector(space, &p, step, next);
         let mut q = p.clone();
         space.ray(&p, &v, Lane::ONE, &mut q);
@@ -65,6 +65,49 @@ fn distance(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, largest)
 }
 
+/// The velocities of some equal curves with given ends.
+fn velocities_of(space: &Erased, points: &[f64], copies: usize, ends: Ends) -> Vec<f64> {
+    let go_on = |_| true;
+    let count = points.len() / space.point_len();
+    let t: Vec<f64> = (0..count).map(|i| i as f64).collect();
+    let offsets: Vec<usize> = (0..=copies).map(|curve| curve * count).collect();
+    let points = points.repeat(copies);
+    let mut velocities = vec![0.0; points.len()];
+    let problem = Problem { t: &t, shared: true, points: &points, offsets: &offsets, ends };
+    let options = Options { method: Method::Auto, tol: 1e-12, max_iter: None };
+    let reports = fit(space, &problem, &options, &Monitor::new(&go_on), &mut velocities);
+    assert!(reports.iter().all(|report| report.status == Status::Converged));
+    velocities
+}
+
+#[test]
+fn a_curve_in_sections_is_that_of_a_batch() {
+    let any = AnySpace::new("so", &[3]).unwrap();
+    let (space, mut next) = (any.get(), noise(5));
+    let natural = Ends::Open([End::Natural, End::Natural]);
+    let not_a_knot = Ends::Open([End::NotAKnot, End::NotAKnot]);
+    // The limits of what is divided, and a multiple of neither the number of sections nor that of lanes.
+    for (count, step) in [129, 130, 255, 513].into_iter().flat_map(|count| [(count, 0.2), (count, 1.3)]) {
+        let mut points = walk(&space, count, step, &mut next);
+        let size = points.len() / count;
+        for ends in [natural, not_a_knot, Ends::Periodic] {
+            if matches!(ends, Ends::Periodic) {
+                for i in 0..count / 2 {
+                    points.copy_within(i * size..(i + 1) * size, (count - 1 - i) * size);
+                }
+            }
+            let alone = velocities_of(&space, &points, 1, ends);
+            let batch = velocities_of(&space, &points, 2, ends);
+            let largest = batch.iter().fold(0.0_f64, |most, u| most.max(u.abs()));
+            let off = distance(&alone, &batch[..alone.len()]);
+            // Points that are far apart, and short curves, are fitted as in a batch.
+            let allowed = if count > 129 && step < 1.0 { 1e-14 * largest } else { 0.0 };
+            assert!(off <= allowed, "{count} knots at {step}: {off:.1e}");
+            assert!((off > 0.0) == (allowed > 0.0), "{count} knots at {step} are in sections");
+        }
+    }
+}
+
 #[test]
 fn fitted_curves_are_c2_splines() {
     let go_on = |_| true;
@@ -76,7 +119,7 @@ fn fitted_curves_are_c2_splines() {
             METHODS.iter().flat_map(|&method| KINDS.map(|kind| (method, kind))).enumerate()
         {
             let mut next = noise(case as u64);
-            let mut points = walk(&space, *step, &mut next);
+            let mut points = walk(&space, KNOTS.len(), *step, &mut next);
             if kind == "periodic" {
                 // The points return, so that the curve is closed.
                 for (i, j) in [(4, 2), (5, 1), (6, 0)] {
