@@ -74,6 +74,29 @@ fn evaluate_anywhere(bencher: Bencher, quantity: Quantity) {
     evaluate_at(bencher, quantity, |i| (i as f64 * 618.033_988_749_895) % 999.0);
 }
 
+/// One time per call of the crate for Rust users, at increasing times.
+#[divan::bench]
+fn at_one_time(bencher: Bencher) {
+    let (t, p) = (knots(1000), points(1000));
+    let spline = symspline::CubicSpline::new(symspline::Sphere::<4>, &t, p.as_chunks::<4>().0).unwrap();
+    call_at(bencher, |x| black_box(spline.at(x))[0]);
+}
+
+/// The same in a product of two spheres.
+#[divan::bench]
+fn at_one_time_of_a_product(bencher: Bencher) {
+    let (t, p) = (knots(1000), points(1000));
+    let pairs: Vec<_> = p.as_chunks::<4>().0.iter().map(|p| (*p, *p)).collect();
+    let space = (symspline::Sphere::<4>, symspline::Sphere::<4>);
+    let spline = symspline::CubicSpline::new(space, &t, &pairs).unwrap();
+    call_at(bencher, |x| black_box(spline.at(x)).0[0]);
+}
+
+fn call_at(bencher: Bencher, at: impl Fn(f64) -> f64) {
+    let times: Vec<f64> = (0..10_000).map(|i| i as f64 * 0.0999).collect();
+    bencher.counter(ItemsCount::new(times.len())).bench_local(|| times.iter().map(|x| at(*x)).sum::<f64>());
+}
+
 fn evaluate_at(bencher: Bencher, quantity: Quantity, time: impl Fn(usize) -> f64) {
     const SAMPLES: usize = 100_000;
     let (t, points, velocities) = fitted(1000);

@@ -443,6 +443,39 @@ impl<S: Space, P: Point<S>> Curves<S, P> {
         Ok(out)
     }
 
+    /// The point of the first curve at a time, without arrays for several curves and times.
+    pub fn point(&self, time: f64) -> Result<P, Error> {
+        let domain = self.domain(0);
+        let x = match self.extrapolate {
+            Extrapolate::Error => inside(time, domain)?,
+            _ => finite(&[time], domain)?[0],
+        };
+        let (times, go_on) = (Times { x: &[x], count: 1 }, |_| true);
+        let (t, nodes) = (self.knots(0), self.nodes(0));
+        let lens = || self.factors.iter().map(|factor| factor.space().point_len());
+        let mut numbers = vec![0.0; lens().sum()];
+        let mut rest = &mut numbers[..];
+        for factor in &*self.factors {
+            let space = factor.space();
+            let (out, others) = rest.split_at_mut(space.point_len());
+            rest = others;
+            let (points, velocities) = (&factor.points, &factor.velocities);
+            let curves = curve::Curves { t, nodes: nodes.len(), points, velocities, before: &[] };
+            let outside = self.extrapolate.policy();
+            curve::evaluate(&space, &curves, &times, Quantity::Point, outside, &Monitor::new(&go_on), out);
+        }
+        if let [_] = &*self.factors {
+            return Ok(P::read_rows(&[&numbers]));
+        }
+        let mut rest = &numbers[..];
+        let rows = lens().map(|len| {
+            let (row, others) = rest.split_at(len);
+            rest = others;
+            row
+        });
+        Ok(P::read_rows(&rows.collect::<Vec<_>>()))
+    }
+
     /// Points at times of all curves.
     pub fn sample(&self, times: &[f64]) -> Result<Samples<P>, Error> {
         let rows = self.evaluate(times, Quantity::Point)?;
@@ -455,13 +488,9 @@ impl<S: Space, P: Point<S>> Curves<S, P> {
             curves.end = curves.start + 1;
         }
         let mut x = times.to_vec();
-        for (start, end) in curves.map(|c| self.domain(c)) {
-            let reach = ROUNDING * f64::EPSILON * start.abs().max(end.abs());
+        for domain in curves.map(|c| self.domain(c)) {
             for x in &mut x {
-                if !(*x >= start - reach && *x <= end + reach) {
-                    return Err(Error::OutsideDomain { time: *x, start, end });
-                }
-                *x = x.clamp(start, end);
+                *x = inside(*x, domain)?;
             }
         }
         Ok(x)
@@ -493,6 +522,15 @@ impl<S: Space, P: Point<S>> Curves<S, P> {
         }
         read(&vectors, count).collect()
     }
+}
+
+/// A time that is inside the knots, up to rounding.
+fn inside(time: f64, (start, end): (f64, f64)) -> Result<f64, Error> {
+    let reach = ROUNDING * f64::EPSILON * start.abs().max(end.abs());
+    if !(time >= start - reach && time <= end + reach) {
+        return Err(Error::OutsideDomain { time, start, end });
+    }
+    Ok(time.clamp(start, end))
 }
 
 /// Times that are finite.

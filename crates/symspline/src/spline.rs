@@ -119,8 +119,7 @@ impl<S: Space, P: Point<S>> CubicSpline<S, P> {
     /// # Errors
     /// [`Error::OutsideDomain`] if the time is NaN or infinite, or outside the knots without [`Builder::extrapolate`].
     pub fn try_at(&self, time: f64) -> Result<P, Error> {
-        let rows = self.curves.evaluate(&[time], Quantity::Point)?;
-        Ok(P::read_rows(&rows.iter().map(|row| &row[..]).collect::<Vec<_>>()))
+        self.curves.point(time)
     }
 
     /// The velocity at a time, a tangent vector at the point. For rotations and poses it is that of the body frame.

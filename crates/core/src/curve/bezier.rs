@@ -26,22 +26,35 @@ pub struct Segment<S> {
     level: [Vec<S>; 3],
 }
 
-impl<S: Scalar> Segment<S> {
-    /// Reserves memory for points of `len` numbers.
-    pub fn new(len: usize) -> Self {
-        let lanes = || vec![Lane::ZERO; len];
-        let points = || vec![S::constant(Lane::ZERO); len];
+impl<S> Default for Segment<S> {
+    fn default() -> Self {
         Segment {
-            ends: [lanes(), lanes()],
-            handles: [lanes(), lanes()],
-            controls: [lanes(), lanes()],
-            middle: lanes(),
+            ends: Default::default(),
+            handles: Default::default(),
+            controls: Default::default(),
+            middle: Vec::new(),
             rays: Default::default(),
             long: Lane::ZERO,
             straight: Lane::ZERO,
             side: Lane::ONE,
-            level: [points(), points(), points()],
+            level: [Vec::new(), Vec::new(), Vec::new()],
         }
+    }
+}
+
+impl<S: Scalar> Segment<S> {
+    /// Reserves memory for points of `len` numbers.
+    pub fn new(len: usize) -> Self {
+        let mut segment = Segment::default();
+        segment.resize(len);
+        segment
+    }
+
+    /// Changes the size of the memory to points of `len` numbers.
+    pub fn resize(&mut self, len: usize) {
+        let Segment { ends: [p0, p1], handles: [a, b], controls: [q0, q1], middle, .. } = self;
+        [p0, p1, a, b, q0, q1, middle].into_iter().for_each(|lanes| lanes.resize(len, Lane::ZERO));
+        self.level.iter_mut().for_each(|points| points.resize(len, S::constant(Lane::ZERO)));
     }
 
     /// Reads a segment of a curve into all lanes.

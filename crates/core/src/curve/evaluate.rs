@@ -9,12 +9,16 @@ use crate::parallel;
 use crate::scalar::{Dual, Jet, LANES, Lane, Scalar, gather, lane, max_or_nan, scatter, scatter_apart};
 use crate::space::{Ambient, Covered, Erased, Origin, Space};
 use crate::with_size;
+use std::any::Any;
+use std::cell::Cell;
 use std::ops::DerefMut;
 
 /// Maximum number of samples that one thread evaluates at a time.
 const BLOCK: usize = 2048;
 /// The factor by which a block may be longer if it contains a curve per lane.
 const TOGETHER: usize = 4;
+/// The memory of an evaluation of points of at most this many numbers is kept.
+const MOST_KEPT: usize = 128;
 /// Samples times numbers from which several threads are certainly faster.
 const PARALLEL: usize = 1 << 16;
 
@@ -186,27 +190,21 @@ impl Job<'_> {
         mut enter: impl FnMut(&SampleCursor, &mut Segment<S>),
         mut write: impl FnMut(&SampleCursor, &mut Segment<S>, &mut [S], &mut [Lane], Rows),
     ) {
-        let mut segment = Segment::<S>::new(len);
-        let mut gamma = vec![S::constant(Lane::ZERO); len];
-        let mut vectors = vec![Lane::ZERO; 3 * len];
+        let mut memory = Memory::<S>::take(len);
+        let Memory { segment, gamma, vectors } = &mut *memory;
         let mut cursor = SampleCursor::new(self, out.len() / self.size);
         let stride = self.apart * self.size;
         for out in out.chunks_mut(LANES * stride) {
             let mut first = 0;
             while first < stride {
                 if cursor.advance() {
-                    enter(&cursor, &mut segment);
+                    enter(&cursor, segment);
                 }
-                write(
-                    &cursor,
-                    &mut segment,
-                    &mut gamma,
-                    &mut vectors,
-                    Rows { stride, out: &mut out[first..] },
-                );
+                write(&cursor, segment, gamma, vectors, Rows { stride, out: &mut out[first..] });
                 first += self.size;
             }
         }
+        memory.put_back();
     }
 
     /// Points of a sample per lane, and vectors there if the quantity requires them; two for [`Quantity::Motion`]
@@ -272,6 +270,38 @@ impl Job<'_> {
             gather(at.map(|i| &p[i + e * len..][..len]), &mut ends[e][..len]);
             gather(at.map(|i| &u[e][i + e * len..][..len]), &mut handles[e][..len]);
             handles[e].iter_mut().for_each(|u| *u *= third);
+        }
+    }
+}
+
+/// The memory of an evaluation, which a thread keeps: for a single sample, its allocation would take a third of the time.
+struct Memory<S> {
+    segment: Segment<S>,
+    gamma: Vec<S>,
+    vectors: Vec<Lane>,
+}
+
+thread_local! {
+    /// By the number of derivatives.
+    static KEPT: [Cell<Option<Box<dyn Any>>>; 3] = const { [const { Cell::new(None) }; 3] };
+}
+
+impl<S: Scalar> Memory<S> {
+    /// Takes it out of its place, because evaluations may contain others.
+    fn take(len: usize) -> Box<Self> {
+        let kept = KEPT.with(|kept| kept[S::ORDER].take()).and_then(|kept| kept.downcast::<Self>().ok());
+        let mut memory = kept.unwrap_or_else(|| {
+            Box::new(Memory { segment: Segment::default(), gamma: Vec::new(), vectors: Vec::new() })
+        });
+        memory.segment.resize(len);
+        memory.gamma.resize(len, S::constant(Lane::ZERO));
+        memory.vectors.resize(3 * len, Lane::ZERO);
+        memory
+    }
+
+    fn put_back(self: Box<Self>) {
+        if self.gamma.len() <= MOST_KEPT {
+            KEPT.with(|kept| kept[S::ORDER].set(Some(self)));
         }
     }
 }
