@@ -59,14 +59,15 @@ impl Ambient for TwoSpheres {
         to_q: &mut [S],
     ) -> S {
         let mut rate = S::constant(Lane::ZERO);
-        for (((p, q), x), (to_p, to_q)) in (p.chunks_exact(4).zip(q.chunks_exact(4)).zip(cotangent.chunks_exact(4)))
-            .zip(to_p.chunks_exact_mut(4).zip(to_q.chunks_exact_mut(4)))
+        for (((p, q), x), (to_p, to_q)) in
+            (p.chunks_exact(4).zip(q.chunks_exact(4)).zip(cotangent.chunks_exact(4)))
+                .zip(to_p.chunks_exact_mut(4).zip(to_q.chunks_exact_mut(4)))
         {
             rate = rate + cc::pull_back::<1, false, S>(p, q, t, x, to_p, to_q);
         }
         rate
     }
-#[inline(always)]
+    #[inline(always)]
     fn push_along<S: Scalar>(&self, pq: [&[S]; 2], t: S, changes: [&[S]; 2], dt: S, out: &mut [S]) {
         for k in [0, 4] {
             let of = |x: [&[S]; 2]| -> [[S; 4]; 2] { x.map(|x| few(|i| x[k + i])) };

@@ -163,11 +163,8 @@ impl<const D: usize, A: Storage> Ambient for GeneralLinear<D, A> {
         to_p: &mut [Lane],
         to_q: &mut [Lane],
     ) -> Lane {
-        let algebra = if self.members == Members::All {
-            self.algebra
-        } else {
-            Algebra::new(self.n, Members::All)
-        };
+        let algebra =
+            if self.members == Members::All { self.algebra } else { Algebra::new(self.n, Members::All) };
         let whole = GeneralLinear { n: self.n, members: Members::All, algebra };
         pull_back_by_transport(&whole, p, q, t, cotangent, to_p, to_q)
     }

@@ -14,6 +14,11 @@ use symspline_engine::parallel;
 use symspline_engine::scalar::LANES;
 use symspline_engine::space::{Ambient, Erased, Frame, Origin};
 
+/// The motions that a derivative in time takes for a few samples of a segment.
+const NODES: usize = 16;
+/// The numbers of matrices that are computed in the time of one number of other work.
+const OPERATIONS: usize = 8;
+
 type Array<'py> = PyReadonlyArrayDyn<'py, f64>;
 
 /// Curves with equally many knots and times, all arrays curve after curve.
@@ -81,22 +86,25 @@ impl Slices<'_> {
         Derivative::new(space, own(self.t), own(self.points), own(self.velocities), &ends)
     }
 
-    /// Raises MemoryError unless memory is available for the matrices of the curves that run at the same time: about
-    /// fifty per knot, of which each has a header.
+    /// Raises MemoryError unless memory is available for the matrices of the curves that run at the same time: ten per
+    /// knot, the blocks of the solver on all lanes, and frames.
     fn require_memory(&self, space: &Erased) -> PyResult<()> {
         let at_once = parallel::num_threads().min(self.curves).max(1);
         let knots = self.t.len() / self.curves.max(1) * at_once;
         let (dim, frame) = (space.dim(), space.frame_len());
-        let numbers = knots as f64 * (50.0 * (dim * dim + 16) as f64 + (LANES * frame) as f64);
+        let numbers = knots as f64 * ((10 + 3 * LANES) * dim * (dim + 1) + frame) as f64;
         require_memory(numbers + 4.0 * self.points.len() as f64, || {
             ("the derivatives of the curves".into(), "Use fewer knots, or curves on fewer threads")
         })
     }
 
-    /// Whether the derivatives of one curve may take a long time.
+    /// Whether the derivatives of one curve may take a long time: no signal is handled before its end.
     fn is_heavy(&self, space: &Erased) -> bool {
-        let own = (self.t.len() + self.x.len()) / self.curves.max(1);
-        is_heavy(space) || is_long(own.saturating_mul(space.dim().pow(2)))
+        let (dim, knots) = (space.dim(), (self.t.len() + self.x.len()) / self.curves.max(1));
+        // Derivatives in time need many motions of nodes per segment.
+        let passes = if self.of == Of::Point { 1 } else { NODES };
+        let numbers = knots.saturating_mul(dim * space.point_len() * passes);
+        is_heavy(space) || is_long(numbers / OPERATIONS)
     }
 
     fn times(&self, c: usize) -> &[f64] {

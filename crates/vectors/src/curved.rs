@@ -121,7 +121,7 @@ impl<const K: i32, const L: bool> Ambient for Curved<K, L> {
     ) -> S {
         cc::pull_back::<K, L, S>(p, q, t, cotangent, to_p, to_q)
     }
-#[inline(always)]
+    #[inline(always)]
     fn push_along<S: Scalar>(&self, pq: [&[S]; 2], t: S, changes: [&[S]; 2], dt: S, out: &mut [S]) {
         cc::push::<K, L, S>(pq, t, changes, dt, out);
     }

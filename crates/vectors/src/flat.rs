@@ -117,7 +117,7 @@ impl<const WRAPPED: bool> Ambient for Flat<WRAPPED> {
         }
         rate
     }
-#[inline(always)]
+    #[inline(always)]
     fn push_along<S: Scalar>(&self, pq: [&[S]; 2], t: S, changes: [&[S]; 2], dt: S, out: &mut [S]) {
         let ([p, q], [dp, dq]) = (pq, changes);
         for i in 0..self.n {

@@ -99,7 +99,8 @@ def sample_times(knots: Array, batch: tuple[int, ...], x: Array, per_curve: bool
     x, per_curve = onto_ends(cast(x), knots, batch, per_curve, dtype)
     refuse_outside(knots, batch, x, per_curve, remedy="; derivatives with respect to the data exist only there")
     shape = x.shape if per_curve else batch + x.shape
-    rows = np.broadcast_to(x, shape).reshape(math.prod(batch), math.prod(shape[len(batch) :]))
+    rows = x if x.shape == shape else np.broadcast_to(x, shape)
+    rows = rows.reshape(math.prod(batch), math.prod(shape[len(batch) :]))
     return SampleTimes(np.ascontiguousarray(rows), shape, nu)
 
 
@@ -169,9 +170,9 @@ def _curves(curve: SplineData, at: SampleTimes, bc_type: object) -> _Curves:
 
 def _per_curve(knots: Array, batch: tuple[int, ...]) -> Doubles:
     """Return one row of knots per curve."""
-    nodes = knots.shape[-1]
-    rows = np.broadcast_to(knots, (*batch, nodes)).reshape(math.prod(batch), nodes)
-    return np.ascontiguousarray(rows, dtype=np.float64)
+    shape = (*batch, knots.shape[-1])
+    rows = knots if knots.shape == shape else np.broadcast_to(knots, shape)
+    return np.ascontiguousarray(rows.reshape(-1, shape[-1]), dtype=np.float64)
 
 
 def _same_shape(array: Array, shape: tuple[int, ...], name: str) -> None:

@@ -223,7 +223,13 @@ impl Controls {
                     &self.inside[e]
                 } else {
                     let (from, to) = (&self.points[3 * e], &self.points[1 + e]);
-                    place.inside().parallel_transport(from, to, &self.inwards[e], &self.inside[e], &mut carried);
+                    place.inside().parallel_transport(
+                        from,
+                        to,
+                        &self.inwards[e],
+                        &self.inside[e],
+                        &mut carried,
+                    );
                     &carried
                 };
                 let point = &self.points[at[e]];
@@ -504,7 +510,11 @@ impl Moving<'_> {
         let rest = vec![0.0; ambient];
         let mut at = None;
         let mut scale = Lane::ONE;
-        let flush = |controls: &mut Controls, back: &[Vec<S>; 4], sums: [Lane; 2], scale: Lane, products: &mut [Lane]| {
+        let flush = |controls: &mut Controls,
+                     back: &[Vec<S>; 4],
+                     sums: [Lane; 2],
+                     scale: Lane,
+                     products: &mut [Lane]| {
             let part = |x: &Vec<S>| x.iter().map(|x| x.parts()[S::ORDER] * scale).collect::<Vec<Lane>>();
             let [a, b, c, d] = back;
             controls.products(place, &[part(a), part(b), part(c), part(d)], products);
@@ -528,7 +538,15 @@ impl Moving<'_> {
             }
             // Lanes beyond the last sample repeat it, without a cotangent vector.
             let rows: [&[f64]; LANES] =
-                few(|l| if start + l < count { &cotangents[(start + l) * ambient..][..ambient] } else { &rest });
+                few(
+                    |l| {
+                        if start + l < count {
+                            &cotangents[(start + l) * ambient..][..ambient]
+                        } else {
+                            &rest
+                        }
+                    },
+                );
             gather(rows, &mut cotangent[..ambient]);
             let tau = (cursor.x - cursor.knot) / cursor.h;
             let t = S::from_parts([tau, Lane::ONE, Lane::ZERO]);

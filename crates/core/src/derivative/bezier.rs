@@ -54,7 +54,11 @@ impl Bezier {
         } else {
             1.0
         };
-        Bezier { points: [first.p.clone(), q0, q1, last.p.clone()], bases: [basis(first), b0, b1, basis(last)], reach }
+        Bezier {
+            points: [first.p.clone(), q0, q1, last.p.clone()],
+            bases: [basis(first), b0, b1, basis(last)],
+            reach,
+        }
     }
 
     /// De Casteljau's algorithm (8) with control points that may move.

@@ -255,7 +255,13 @@ impl Polygon {
         Vector::from_vec(self.coordinates_in(space, points, knot..knot + 1, vector))
     }
 
-    fn coordinates_in(&self, space: &Erased, points: &[f64], nodes: std::ops::Range<usize>, v: &[f64]) -> Vec<f64> {
+    fn coordinates_in(
+        &self,
+        space: &Erased,
+        points: &[f64],
+        nodes: std::ops::Range<usize>,
+        v: &[f64],
+    ) -> Vec<f64> {
         let sizes = (v, space.point_len(), space.dim());
         self.at_nodes(space, points, nodes, sizes, |p, frame, v, x| space.coordinates(frame, p, v, x))
     }
@@ -263,7 +269,9 @@ impl Polygon {
     /// The tangent vectors at the nodes with given coordinates.
     pub fn tangents(&self, space: &Erased, points: &[f64], x: &[f64]) -> Vec<f64> {
         let sizes = (x, space.dim(), space.point_len());
-        self.at_nodes(space, points, 0..self.runs.nodes(), sizes, |p, frame, x, v| space.tangent(frame, p, x, v))
+        self.at_nodes(space, points, 0..self.runs.nodes(), sizes, |p, frame, x, v| {
+            space.tangent(frame, p, x, v)
+        })
     }
 
     /// The tangent vectors g with `Σ g δ = gradient · coordinates(δ)` for all tangent vectors δ: the shortest solutions of

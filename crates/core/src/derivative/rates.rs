@@ -13,51 +13,67 @@ use crate::space::{Ambient, Erased, Frame, Origin};
 use std::f64::consts::PI;
 use std::sync::LazyLock;
 
-/// The degrees of interpolations: the second one serves segments that the first one does not resolve.
-const DEGREES: [usize; 2] = [16, 32];
-/// The error of the interpolated velocity, relative to its size, up to which a segment is resolved.
-const RESOLVED: f64 = 1e-12;
-/// Segments whose nodes are stored at the same time.
+/// The number of nodes.
+const NODES: usize = 17;
+/// Coefficients of the highest degrees up to this, relative to the largest, are rounding errors.
+const ROUNDING: f64 = 16.0 * f64::EPSILON;
+/// The number of coefficients of highest degree that are compared with rounding errors.
+const HIGHEST: usize = 3;
+/// A segment is halved until its parts are resolved, up to this number of times.
+const HALVINGS: usize = 7;
+/// Parts of segments whose nodes are stored at the same time.
 const TOGETHER: usize = 64;
 
-/// Interpolation at the zeros of a Chebyshev polynomial, none of which is a knot.
-struct Nodes {
-    /// In [0, 1].
-    at: Vec<f64>,
+/// Interpolation on [0, 1] at the zeros of a Chebyshev polynomial, none of which is an end.
+struct Interpolation {
+    nodes: Vec<f64>,
     /// By node, the Chebyshev coefficients of its cardinal function.
     coefficients: Vec<Vec<f64>>,
     /// By node, the derivatives of the cardinal functions there.
     slopes: Vec<Vec<f64>>,
 }
 
-static NODES: LazyLock<[Nodes; 2]> = LazyLock::new(|| DEGREES.map(|degree| Nodes::new(degree + 1)));
+static INTERPOLATION: LazyLock<Interpolation> = LazyLock::new(Interpolation::new);
 
-impl Nodes {
-    fn new(count: usize) -> Self {
-        let cosine = |n: usize, k: usize| (PI * (n * (2 * k + 1)) as f64 / (2 * count) as f64).cos();
-        let coefficient = |n: usize, k: usize| cosine(n, k) * if n == 0 { 1.0 } else { 2.0 } / count as f64;
-        let mut nodes = Nodes {
-            at: (0..count).map(|k| 0.5 + 0.5 * cosine(1, k)).collect(),
-            coefficients: (0..count).map(|k| (0..count).map(|n| coefficient(n, k)).collect()).collect(),
+impl Interpolation {
+    fn new() -> Self {
+        let cosine = |n: usize, k: usize| (PI * (n * (2 * k + 1)) as f64 / (2 * NODES) as f64).cos();
+        let coefficient = |n: usize, k: usize| cosine(n, k) * if n == 0 { 1.0 } else { 2.0 } / NODES as f64;
+        let mut found = Interpolation {
+            nodes: (0..NODES).map(|k| 0.5 + 0.5 * cosine(1, k)).collect(),
+            coefficients: (0..NODES).map(|k| (0..NODES).map(|n| coefficient(n, k)).collect()).collect(),
             slopes: Vec::new(),
         };
-        nodes.slopes = nodes.at.iter().map(|&tau| nodes.weights(tau)[1].clone()).collect();
-        nodes
+        found.slopes = found.nodes.iter().map(|&x| found.weights(x)[1].clone()).collect();
+        found
     }
 
-    /// The cardinal functions at τ, and their derivatives.
-    fn weights(&self, tau: f64) -> [Vec<f64>; 2] {
-        let y = 2.0 * tau - 1.0;
-        // Tₙ, and its derivative in τ, 2n Uₙ₋₁.
+    /// The cardinal functions at a position, and their derivatives.
+    fn weights(&self, x: f64) -> [Vec<f64>; 2] {
+        let y = 2.0 * x - 1.0;
+        // Tₙ, and its derivative in x, 2n Uₙ₋₁.
         let (mut t, mut u) = ([1.0, y], [1.0, 2.0 * y]);
         let (mut values, mut slopes) = (vec![1.0], vec![0.0]);
-        for n in 1..self.at.len() {
+        for n in 1..NODES {
             values.push(t[1]);
             slopes.push(2.0 * n as f64 * u[0]);
             t = [t[1], 2.0 * y * t[1] - t[0]];
             u = [u[1], 2.0 * y * u[1] - u[0]];
         }
-        [values, slopes].map(|x| self.coefficients.iter().map(|c| c.iter().zip(&x).map(|(c, x)| c * x).sum()).collect())
+        let sum = |c: &Vec<f64>, x: &[f64]| c.iter().zip(x).map(|(c, x)| c * x).sum();
+        [values, slopes].map(|x| self.coefficients.iter().map(|c| sum(c, &x)).collect())
+    }
+
+    /// Whether the coefficients of the highest degrees of rows of values at the nodes are rounding errors.
+    fn resolves(&self, values: &[f64], len: usize) -> bool {
+        let coefficient = |n: usize, c: usize| {
+            let terms = values.chunks_exact(len).zip(&self.coefficients);
+            terms.map(|(row, coefficients)| row[c] * coefficients[n]).sum::<f64>()
+        };
+        let largest = values.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+        let highest = (NODES - HIGHEST..NODES).flat_map(|n| (0..len).map(move |c| (n, c)));
+        // NaN stays NaN in every part.
+        highest.fold(0.0, |most: f64, (n, c)| most.max(coefficient(n, c).abs())) <= ROUNDING * largest
     }
 }
 
@@ -68,9 +84,13 @@ pub struct Rates<'a> {
     pub of: Of,
 }
 
-/// Samples of one segment, by their numbers, and the weights of the nodes at each.
+/// Samples in a part of one segment, by their numbers, and the weights of the nodes at each; derivatives are with respect to
+/// τ.
 struct Group {
     segment: usize,
+    /// The part begins at `part` times its width.
+    part: usize,
+    width: f64,
     samples: Vec<usize>,
     weights: Vec<[Vec<f64>; 2]>,
 }
@@ -96,9 +116,8 @@ impl Group {
     }
 }
 
-/// Segments that one interpolation resolves.
+/// Parts of segments that are resolved.
 struct Resolved<'c> {
-    nodes: &'static Nodes,
     groups: Vec<&'c Group>,
     /// The times of the nodes, and the states there.
     x: Vec<f64>,
@@ -154,58 +173,80 @@ impl Rates<'_> {
         states
     }
 
-    /// Whether the derivative of the interpolated curve is that of the curve.
-    fn is_resolved(&self, group: &Group, nodes: &[f64], samples: &[f64]) -> bool {
-        let len = self.moving.len;
-        group.samples.iter().zip(&group.weights).all(|(&i, [_, slopes])| {
-            (0..len).all(|c| {
-                let [p, d] = [0, 1].map(|k| samples[(3 * i + k) * len + c]);
-                let slope: f64 = slopes.iter().zip(nodes.chunks(3 * len)).map(|(w, state)| w * state[c]).sum();
-                let size = samples[3 * i * len..][..2 * len].iter().fold(0.0, |most: f64, x| most.max(x.abs()));
-                // NaN remains NaN at every degree.
-                !((slope - d).abs() > RESOLVED * size) || p.is_nan()
-            })
-        })
-    }
-
-    /// Passes the samples to a function, some segments at a time, with the states of all samples.
+    /// Passes the samples to a function, some parts of segments at a time, with the states of all samples. A part is resolved
+    /// if the motion for an arbitrary motion of the control points is.
     fn for_each(&self, mut work: impl FnMut(&Resolved, &[f64])) {
-        let (x, len) = (self.moving.times.x, self.moving.len);
+        let (x, len, m) = (self.moving.times.x, self.moving.len, self.moving.dim);
         let samples = self.states(x, |i| self.segment(x[i]));
+        let size = motion_len(m);
+        let probe: Vec<f64> = (0..(self.moving.curve.nodes - 1) * size)
+            .map(|i| if i % size < 4 * m { ((i % size) as f64 * 2.399_963).cos() } else { 0.0 })
+            .collect();
+        // Segment, part, and samples.
+        let mut rest: Vec<(usize, usize, Vec<usize>)> = vec![];
         let mut order: Vec<usize> = (0..x.len()).collect();
         order.sort_by_key(|&i| self.segment(x[i]));
-        let mut rest: Vec<Vec<usize>> =
-            order.chunk_by(|&i, &j| self.segment(x[i]) == self.segment(x[j])).map(<[usize]>::to_vec).collect();
-        for (level, nodes) in NODES.iter().enumerate() {
-            let (mut rough, count) = (Vec::new(), nodes.at.len());
+        for samples in order.chunk_by(|&i, &j| self.segment(x[i]) == self.segment(x[j])) {
+            rest.push((self.segment(x[samples[0]]), 0, samples.to_vec()));
+        }
+        for halvings in 0..=HALVINGS {
+            let (mut rough, width) = (Vec::new(), 0.5_f64.powi(halvings as i32));
             for some in rest.chunks(TOGETHER) {
                 checkpoint();
-                let group = |samples: &Vec<usize>| {
-                    let segment = self.segment(x[samples[0]]);
-                    let weights = samples.iter().map(|&i| nodes.weights(self.tau(segment, x[i]))).collect();
-                    Group { segment, samples: samples.clone(), weights }
+                let group = |(segment, part, samples): &(usize, usize, Vec<usize>)| {
+                    let weights = samples.iter().map(|&i| {
+                        let position = self.tau(*segment, x[i]) / width - *part as f64;
+                        let [values, mut slopes] = INTERPOLATION.weights(position);
+                        slopes.iter_mut().for_each(|x| *x /= width);
+                        [values, slopes]
+                    });
+                    Group {
+                        segment: *segment,
+                        part: *part,
+                        width,
+                        weights: weights.collect(),
+                        samples: samples.clone(),
+                    }
                 };
                 let groups: Vec<Group> = some.iter().map(group).collect();
                 let times = |group: &Group| {
                     let (from, h) = (self.moving.curve.t[group.segment], self.h(group.segment));
-                    nodes.at.iter().map(move |tau| from + tau * h)
+                    let (part, width) = (group.part as f64, group.width);
+                    INTERPOLATION.nodes.iter().map(move |x| from + (part + x) * width * h)
                 };
                 let times: Vec<f64> = groups.iter().flat_map(times).collect();
-                let states = self.states(&times, |i| groups[i / count].segment);
-                let (good, bad): (Vec<usize>, Vec<usize>) = (0..groups.len()).partition(|&g| {
-                    let last = level + 1 == NODES.len();
-                    last || self.is_resolved(&groups[g], &states[g * count * 3 * len..][..count * 3 * len], &samples)
-                });
-                rough.extend(bad.iter().map(|&g| some[g].clone()));
-                let pick = |all: &[f64], size: usize| -> Vec<f64> {
-                    good.iter().flat_map(|&g| &all[g * size..(g + 1) * size]).copied().collect()
+                let probes = self.motions(&times, &probe);
+                let row = NODES * len;
+                let is_good = |g: &usize| {
+                    halvings == HALVINGS || INTERPOLATION.resolves(&probes[g * row..][..row], len)
                 };
-                let groups = good.iter().map(|&g| &groups[g]).collect();
-                let resolved = Resolved { nodes, groups, x: pick(&times, count), states: pick(&states, count * 3 * len) };
-                work(&resolved, &samples);
+                let (good, bad): (Vec<usize>, Vec<usize>) = (0..groups.len()).partition(is_good);
+                for g in bad {
+                    let (segment, part, samples) = &some[g];
+                    let (right, left): (Vec<usize>, Vec<usize>) = samples
+                        .iter()
+                        .partition(|&&i| self.tau(*segment, x[i]) / width - *part as f64 >= 0.5);
+                    for (half, samples) in [left, right].into_iter().enumerate() {
+                        if !samples.is_empty() {
+                            rough.push((*segment, 2 * part + half, samples));
+                        }
+                    }
+                }
+                let x: Vec<f64> = good.iter().flat_map(|&g| &times[g * NODES..][..NODES]).copied().collect();
+                let groups: Vec<&Group> = good.iter().map(|&g| &groups[g]).collect();
+                let states = self.states(&x, |i| groups[i / NODES].segment);
+                work(&Resolved { groups, x, states }, &samples);
             }
             rest = rough;
         }
+    }
+
+    /// The motion of the curve at times.
+    fn motions(&self, x: &[f64], motions: &[f64]) -> Vec<f64> {
+        let mut out = vec![0.0; x.len() * self.moving.len];
+        let moving = Moving { times: Times { x, count: x.len() }, nu: 0, ..*self.moving };
+        self.space.0.push(&moving, motions, &mut out);
+        out
     }
 
     /// De = L(e') + Q(γ', e) on the lanes.
@@ -213,17 +254,17 @@ impl Rates<'_> {
         connection(self.space, p, d, e, slope)
     }
 
-    /// De at the nodes of a segment.
-    fn at_nodes(&self, nodes: &Nodes, states: &[f64], field: &[f64]) -> Vec<f64> {
-        let (len, count) = (self.moving.len, nodes.at.len());
+    /// De at the nodes of a part.
+    fn at_nodes(&self, width: f64, states: &[f64], field: &[f64]) -> Vec<f64> {
+        let len = self.moving.len;
         let mut out = vec![0.0; field.len()];
         for (first, out) in out.chunks_mut(LANES * len).enumerate() {
-            let at: [usize; LANES] = few(|l| (first * LANES + l).min(count - 1));
+            let at: [usize; LANES] = few(|l| (first * LANES + l).min(NODES - 1));
             let state = State::read(states, len, at);
             let mut both = [vec![Lane::ZERO; len], vec![Lane::ZERO; len]];
             gather(at.map(|j| &field[j * len..][..len]), &mut both[0]);
             for (k, row) in field.chunks_exact(len).enumerate() {
-                let weight = Lane::new(at.map(|j| nodes.slopes[j][k]));
+                let weight = Lane::new(at.map(|j| INTERPOLATION.slopes[j][k] / width));
                 both[1].iter_mut().zip(row).for_each(|(sum, x)| *sum = weight.mul_add(lane(*x), *sum));
             }
             scatter(&self.covariant(&state, &both), out);
@@ -256,12 +297,14 @@ impl Rates<'_> {
     /// `e ↦ R(e, γ_τ)γ_τ`, which is [γ_τ, [e, γ_τ]], in a frame.
     fn curvature(&self, State { p, d, .. }: &State) -> impl Fn(&[Lane]) -> Vec<Lane> {
         let (space, m) = (self.space, self.moving.dim);
-        let (mut frame, mut v, mut velocity) = (vec![Lane::ZERO; space.frame_len()], vec![Lane::ZERO; m], d.clone());
+        let (mut frame, mut v, mut velocity) =
+            (vec![Lane::ZERO; space.frame_len()], vec![Lane::ZERO; m], d.clone());
         space.velocity(p, &mut velocity);
         space.lift(p, &mut frame);
         space.coordinates(&frame, p, &velocity, &mut v);
         move |e| {
-            let (mut x, mut bent, mut out) = (vec![Lane::ZERO; m], vec![Lane::ZERO; m], vec![Lane::ZERO; p.len()]);
+            let (mut x, mut bent, mut out) =
+                (vec![Lane::ZERO; m], vec![Lane::ZERO; m], vec![Lane::ZERO; p.len()]);
             space.coordinates(&frame, p, e, &mut x);
             space.triple(&v, &x, &v, &mut bent);
             space.tangent(&frame, p, &bent, &mut out);
@@ -288,15 +331,14 @@ impl Rates<'_> {
         let (size, mut still) = (motion_len(m), motions.to_vec());
         // Only the motion at fixed parameters.
         still.chunks_mut(size).for_each(|row| row[4 * m..].fill(0.0));
-        self.for_each(|Resolved { nodes, groups, x: at_nodes, states }, samples| {
-            let mut fields = vec![0.0; at_nodes.len() * len];
-            let moving = Moving { times: Times { x: at_nodes, count: at_nodes.len() }, nu: 0, ..*self.moving };
-            self.space.0.push(&moving, &still, &mut fields);
-            let row = nodes.at.len() * len;
-            for ((group, states), field) in groups.iter().zip(states.chunks(3 * row)).zip(fields.chunks(row)) {
+        self.for_each(|Resolved { groups, x: at_nodes, states }, samples| {
+            let fields = self.motions(at_nodes, &still);
+            let row = NODES * len;
+            for ((group, states), field) in groups.iter().zip(states.chunks(3 * row)).zip(fields.chunks(row))
+            {
                 let h = self.h(group.segment);
                 let [dt, dh] = [0, 1].map(|k| motions[group.segment * size + 4 * m + k]);
-                let moved = if nu == 1 { field.to_vec() } else { self.at_nodes(nodes, states, field) };
+                let moved = if nu == 1 { field.to_vec() } else { self.at_nodes(group.width, states, field) };
                 for at in group.lanes() {
                     let state = State::read(samples, len, at.map(|i| group.samples[i]));
                     let mut change = self.covariant(&state, &group.interpolate(&at, &moved, len));
@@ -310,7 +352,8 @@ impl Rates<'_> {
                         let shift = -(dt + self.tau(group.segment, x[i]) * dh) / h;
                         for c in 0..len {
                             let [change, rate, next] = [&change, &rate, &next].map(|v| v[c].as_array()[l]);
-                            out[i * len + c] = (change + shift * next - nu as f64 * dh / h * rate) / h.powi(nu);
+                            out[i * len + c] =
+                                (change + shift * next - nu as f64 * dh / h * rate) / h.powi(nu);
                         }
                     }
                 }
@@ -324,10 +367,12 @@ impl Rates<'_> {
         let (nu, size) = (self.of as i32, motion_len(m));
         let segments = self.moving.curve.nodes - 1;
         let mut products = vec![0.0; segments * size];
-        self.for_each(|Resolved { nodes, groups, x: at_nodes, states }, samples| {
-            let row = nodes.at.len() * len;
+        self.for_each(|Resolved { groups, x: at_nodes, states }, samples| {
+            let row = NODES * len;
             let mut sources = vec![0.0; at_nodes.len() * len];
-            for ((group, states), source) in groups.iter().zip(states.chunks(3 * row)).zip(sources.chunks_mut(row)) {
+            for ((group, states), source) in
+                groups.iter().zip(states.chunks(3 * row)).zip(sources.chunks_mut(row))
+            {
                 let h = self.h(group.segment);
                 let mut direct = vec![0.0; row];
                 for (first, at) in group.lanes().enumerate() {
@@ -338,16 +383,13 @@ impl Rates<'_> {
                     gather(numbers.map(|i| &cotangents[i * len..][..len]), &mut cotangent);
                     cotangent.iter_mut().for_each(|x| *x *= lane(h.powi(-nu)));
                     let [by_e, by_slope] = self.covariant_transposed(&state, &cotangent);
-                    let bent = if nu == 2 {
-                        self.transpose(&cotangent, self.curvature(&state))
-                    } else {
-                        Vec::new()
-                    };
+                    let bent =
+                        if nu == 2 { self.transpose(&cotangent, self.curvature(&state)) } else { Vec::new() };
                     let [rate, next] = self.rates(group, &at, states, &state);
                     let [rate, next] = [rate, next].map(|v| dot(&v, &cotangent));
                     for l in 0..used {
                         let [values, slopes] = &group.weights[at[l]];
-                        for j in 0..nodes.at.len() {
+                        for j in 0..NODES {
                             for c in 0..len {
                                 let [e, slope] = [&by_e, &by_slope].map(|v| v[c].as_array()[l]);
                                 source[j * len + c] += values[j] * e + slopes[j] * slope;
@@ -363,11 +405,12 @@ impl Rates<'_> {
                     }
                 }
                 if nu == 2 {
-                    let moved = self.at_nodes_transposed(nodes, states, source);
+                    let moved = self.at_nodes_transposed(group.width, states, source);
                     source.iter_mut().zip(moved.iter().zip(&direct)).for_each(|(x, (y, z))| *x = y + z);
                 }
             }
-            let moving = Moving { times: Times { x: at_nodes, count: at_nodes.len() }, nu: 0, ..*self.moving };
+            let moving =
+                Moving { times: Times { x: at_nodes, count: at_nodes.len() }, nu: 0, ..*self.moving };
             self.space.0.pull(&moving, &sources, &mut products);
         });
         for (out, products) in out.chunks_mut(size).zip(products.chunks(size)) {
@@ -376,21 +419,21 @@ impl Rates<'_> {
     }
 
     /// The transpose of [`at_nodes`](Self::at_nodes).
-    fn at_nodes_transposed(&self, nodes: &Nodes, states: &[f64], cotangents: &[f64]) -> Vec<f64> {
-        let (len, count) = (self.moving.len, nodes.at.len());
+    fn at_nodes_transposed(&self, width: f64, states: &[f64], cotangents: &[f64]) -> Vec<f64> {
+        let len = self.moving.len;
         let mut out = vec![0.0; cotangents.len()];
-        for first in (0..count).step_by(LANES) {
-            let at: [usize; LANES] = few(|l| (first + l).min(count - 1));
+        for first in (0..NODES).step_by(LANES) {
+            let at: [usize; LANES] = few(|l| (first + l).min(NODES - 1));
             let state = State::read(states, len, at);
             let mut cotangent = vec![Lane::ZERO; len];
             gather(at.map(|j| &cotangents[j * len..][..len]), &mut cotangent);
             let [by_e, by_slope] = self.covariant_transposed(&state, &cotangent);
-            for l in 0..LANES.min(count - first) {
+            for l in 0..LANES.min(NODES - first) {
                 let j = at[l];
                 for c in 0..len {
                     out[j * len + c] += by_e[c].as_array()[l];
-                    for (k, weight) in nodes.slopes[j].iter().enumerate() {
-                        out[k * len + c] += weight * by_slope[c].as_array()[l];
+                    for (k, weight) in INTERPOLATION.slopes[j].iter().enumerate() {
+                        out[k * len + c] += weight / width * by_slope[c].as_array()[l];
                     }
                 }
             }

@@ -95,7 +95,8 @@ impl System {
         if let Some(ends) = &ends {
             let both = ends.iter().all(|(kind, _)| *kind == EndKind::NotAKnot);
             for (which, (segment, l)) in [(&first, 0), (&last, runs.count - 1)].into_iter().enumerate() {
-                system.ends[which] = Some(system.end(space, polygon, which, &ends[which], (segment, l), both));
+                system.ends[which] =
+                    Some(system.end(space, polygon, which, &ends[which], (segment, l), both));
             }
         }
         if nodes > 0 && (runs.closed || runs.count > 1) {

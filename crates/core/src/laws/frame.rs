@@ -168,7 +168,8 @@ pub fn transposed_motion(space: &Erased, draw: &mut Draw) -> Verdict {
             at.tangent(&scaled(&bend, 0.5))
         };
         let velocities = [first(&velocity(&start)), first(&velocity(&end))].concat();
-        let (points, frames) = ([first(&p), first(&q)].concat(), [first(&start.frame), first(&end.frame)].concat());
+        let (points, frames) =
+            ([first(&p), first(&q)].concat(), [first(&start.frame), first(&end.frame)].concat());
         let (t, x) = ([1.0, 3.0], [1.0, 1.3, 1.9, 2.5, 2.9, 3.0]);
         let curve = Curves { t: &t, nodes: 2, points: &points, velocities: &velocities, before: &[] };
         let times = Times { x: &x, count: x.len() };
