@@ -205,6 +205,11 @@ impl Ambient for Rotations {
         let (omega, _) = log(between(p, q));
         out.copy_from_slice(&times(&matrix(p), &to_matrix(exp(omega.each(|o| o * t)))));
     }
+    fn parallel_transport(&self, p: &[Lane], q: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]) {
+        // With v = pΩ and x = pX, p e^{Ω/2} X e^{Ω/2} = q e^{−Ω/2} X e^{Ω/2}.
+        let half = exp(vector(p, v).each(|o| o * HALF));
+        out.copy_from_slice(&times(&matrix(q), &skew(rotate(conjugate(half), vector(p, x)))));
+    }
     fn velocity(&self, gamma: &[Lane], d: &mut [Lane]) {
         let omega = vector(gamma, d);
         d.copy_from_slice(&times(&matrix(gamma), &skew(omega)));
