@@ -7,7 +7,7 @@
 
 use crate::information::{self, Root};
 use crate::path::{Path, Position};
-use symspline_core::derivative::{Derivative, Matrix, Vector};
+use symspline_core::derivative::{Derivative, Matrix, Of, Vector};
 use symspline_core::fit::Ends;
 use symspline_core::memory;
 use symspline_core::monitor::{Monitor, checkpoint};
@@ -84,14 +84,30 @@ pub fn step(
     let between = path.at(space, &positions);
     let samples = [(pull.positions, pull.points), (&positions, &between)];
     let accelerations = path.accelerations(space, &positions);
+    // Derivatives by reverse mode where it has those of accelerations, otherwise segment by segment.
+    let rows = [
+        rows(&derivative, pull.positions, Of::Point, monitor, threads),
+        rows(&derivative, &positions, Of::Acceleration, monitor, threads),
+    ];
+    let rows = match rows {
+        [Some(points), Some(bends)] => Some([points, bends]),
+        _ => None,
+    };
     let mut parts: Vec<(usize, Matrix, Vector)> =
         (0..n).map(|i| (i, Matrix::zeros(4 * m, 4 * m), Vector::zeros(4 * m))).collect();
     parallel::for_each(parts.iter_mut().collect(), threads, monitor, |(segment, square, right)| {
         checkpoint();
-        let motion = derivative.motion(*segment);
+        let motion = rows.is_none().then(|| derivative.motion(*segment));
         // The data are points, the samples between them accelerations.
         let at = |kind: usize, k: usize, vectors: &[f64]| {
             let ((_, tau), p) = (samples[kind].0[k], &samples[kind].1[k * len..][..len]);
+            if let (Some(rows), None) = (&rows, &motion) {
+                let (matrices, points) = &rows[kind][k / BLOCK];
+                let (at, none) = (k % BLOCK, Matrix::zeros(len, 0));
+                let (_, vectors) = in_coordinates(space, &points[at * len..][..len], &none, p, vectors);
+                return (matrices[at].clone(), vectors);
+            }
+            let Some(motion) = &motion else { unreachable!("either of them exists") };
             let columns = if kind == 0 { motion.point(tau) } else { motion.acceleration(tau) };
             in_coordinates(space, &motion.gamma(tau), &columns, p, vectors)
         };
@@ -159,6 +175,27 @@ pub fn step(
         last.copy_from_slice(&first[..len]);
     }
     out
+}
+
+/// Samples of one task.
+const BLOCK: usize = 512;
+
+/// Matrices and points of [`Derivative::rows`], block by block.
+type Rows = Vec<(Vec<Matrix>, Vec<f64>)>;
+
+fn rows(
+    derivative: &Derivative,
+    positions: &[Position],
+    of: Of,
+    monitor: &Monitor,
+    threads: bool,
+) -> Option<Rows> {
+    let mut blocks: Vec<(&[Position], Option<_>)> =
+        positions.chunks(BLOCK).map(|block| (block, None)).collect();
+    parallel::for_each(blocks.iter_mut().collect(), threads, monitor, |(block, rows)| {
+        *rows = derivative.rows(block, of);
+    });
+    blocks.into_iter().map(|(_, rows)| rows).collect()
 }
 
 /// The columns of a matrix, tangent at q, and vectors at p in coordinates of one frame. The arrays p and q represent

@@ -31,6 +31,8 @@ pub struct Moving<'a> {
     pub runs: usize,
     /// The order ν of the derivative in time that is differentiated.
     pub nu: usize,
+    /// Whether reverse mode keeps samples apart: its result then has a row per sample in place of one per segment.
+    pub apart: bool,
     /// The dimension of the space.
     pub dim: usize,
     /// The numbers of a point.
@@ -522,19 +524,28 @@ impl Moving<'_> {
         };
         for start in (0..count).step_by(LANES) {
             checkpoint();
-            if cursor.advance() {
+            let changed = cursor.advance();
+            if changed || self.apart {
                 if let Some(at) = at {
                     flush(&mut controls, &back, sums, scale, &mut products);
                     add(&products, at, out);
                 }
+            }
+            if changed {
                 controls.read(place, self, &cursor);
                 for (level, p) in level.iter_mut().zip(&controls.points) {
                     level.iter_mut().zip(p).for_each(|(x, p)| *x = S::constant(*p));
                 }
+            }
+            if changed || self.apart {
                 back.iter_mut().for_each(|x| x.fill(zero));
                 sums = [Lane::ZERO; 2];
                 scale = (0..S::ORDER).fold(Lane::ONE, |scale, _| scale * cursor.rate);
-                at = Some(cursor.at.map(|i| i / ambient * size));
+                at = Some(if self.apart {
+                    few(|l| (start + l).min(count - 1) * size)
+                } else {
+                    cursor.at.map(|i| i / ambient * size)
+                });
             }
             // Lanes beyond the last sample repeat it, without a cotangent vector.
             let rows: [&[f64]; LANES] =

@@ -10,9 +10,10 @@ mod rates;
 mod segment;
 mod system;
 
-use crate::curve::{Curves, Moving, Times, motion_len};
+use crate::curve::{Curves, Moving, Outside, Quantity, Times, evaluate, motion_len};
 use crate::fit::{End, EndKind, Ends};
-use crate::scalar::{Lane, lane};
+use crate::monitor::Monitor;
+use crate::scalar::{LANES, Lane, few, gather, lane};
 use crate::space::{Ambient, Erased, Frame, Origin};
 use bezier::{Bezier, Knot};
 use operators::Few;
@@ -65,37 +66,14 @@ impl Motion<'_> {
     /// The derivatives of a point, in the frames of the knots: columns for ξ, υ of the first and ξ, υ of the last knot.
     /// The last knot of a closed curve equals the first, in its frame.
     pub fn point(&self, tau: f64) -> Matrix {
-        self.at_knots(&self.bezier.point(self.derivative.space, tau))
+        self.derivative.at_knots(self.segment, &self.bezier.point(self.derivative.space, tau))
     }
 
     /// The same for ∇γ'.
     pub fn acceleration(&self, tau: f64) -> Matrix {
         let h = self.derivative.system.h[self.segment];
-        self.at_knots(&(self.bezier.acceleration(self.derivative.space, tau) / (h * h)))
-    }
-
-    /// From columns for the four control points to columns for the knots.
-    fn at_knots(&self, columns: &Matrix) -> Matrix {
-        let m = self.derivative.space.dim();
-        let h = self.derivative.system.h[self.segment];
-        let mut out = Matrix::zeros(columns.nrows(), 4 * m);
-        for e in 0..2 {
-            let third = if e == 0 { h / 3.0 } else { -h / 3.0 };
-            let [cosh, stretch] = [0, 1].map(|k| self.derivative.function(self.segment, e, k));
-            let inner = columns.columns((1 + e) * m, m);
-            out.columns_mut(2 * e * m, m).copy_from(&(columns.columns(3 * e * m, m) + inner * cosh));
-            out.columns_mut((2 * e + 1) * m, m).copy_from(&(inner * stretch * third));
-        }
-        let Polygon { runs, turns, .. } = &self.derivative.polygon;
-        let run = runs.slot(self.segment, 0) - self.segment;
-        if runs.first(run + 1) == self.segment + 1 && runs.joint(run).is_some() {
-            let turn = turns[0].of_lane(run);
-            for from in [2 * m, 3 * m] {
-                let turned = out.columns(from, m) * &turn;
-                out.columns_mut(from, m).copy_from(&turned);
-            }
-        }
-        out
+        let columns = self.bezier.acceleration(self.derivative.space, tau) / (h * h);
+        self.derivative.at_knots(self.segment, &columns)
     }
 
     /// The array of the point at which the motions are tangent.
@@ -167,6 +145,76 @@ impl<'a> Derivative<'a> {
         &self.system.functions[(4 * segment + 2 * e + which) * square..][..square]
     }
 
+    /// From columns for the four control points to columns for the knots.
+    fn at_knots(&self, segment: usize, columns: &Matrix) -> Matrix {
+        let m = self.space.dim();
+        let h = self.system.h[segment];
+        let mut out = Matrix::zeros(columns.nrows(), 4 * m);
+        for e in 0..2 {
+            let third = if e == 0 { h / 3.0 } else { -h / 3.0 };
+            let [cosh, stretch] = [0, 1].map(|k| self.function(segment, e, k));
+            let inner = columns.columns((1 + e) * m, m);
+            out.columns_mut(2 * e * m, m).copy_from(&(columns.columns(3 * e * m, m) + inner * cosh));
+            out.columns_mut((2 * e + 1) * m, m).copy_from(&(inner * stretch * third));
+        }
+        let Polygon { runs, turns, .. } = &self.polygon;
+        let run = runs.slot(segment, 0) - segment;
+        if runs.first(run + 1) == segment + 1 && runs.joint(run).is_some() {
+            let turn = turns[0].of_lane(run);
+            for from in [2 * m, 3 * m] {
+                let turned = out.columns(from, m) * &turn;
+                out.columns_mut(from, m).copy_from(&turned);
+            }
+        }
+        out
+    }
+
+    /// The derivatives of samples, in the frames to which their points are lifted, as the matrices of [`Motion::point`] or
+    /// [`Motion::acceleration`], and the arrays of the points; None if reverse mode does not have them. A sample must lie
+    /// within its segment.
+    pub fn rows(&self, samples: &[(usize, f64)], of: Of) -> Option<(Vec<Matrix>, Vec<f64>)> {
+        let (m, len, size) = (self.space.dim(), self.space.point_len(), motion_len(self.space.dim()));
+        let inner = &self.t[1..self.segments()];
+        let x: Vec<f64> = samples.iter().map(|&(i, tau)| self.t[i] + tau * self.system.h[i]).collect();
+        if samples.iter().zip(&x).any(|((i, _), x)| inner.partition_point(|t| t <= x) != *i) {
+            return None;
+        }
+        let mut points = vec![0.0; x.len() * len];
+        let go_on = |_| true;
+        let (times, monitor) = (Times { x: &x, count: x.len() }, Monitor::new(&go_on));
+        let curve = self.moving(&x, of).curve;
+        let outside = Outside::Continue;
+        evaluate(self.space, &curve, &times, Quantity::Point, outside, &monitor, &mut points);
+        // The gradients of coordinates with respect to arrays.
+        let mut gradients = vec![0.0; x.len() * m * len];
+        let zeros = |len: usize| vec![Lane::ZERO; len];
+        let (mut p, mut frame) = (zeros(len), zeros(self.space.frame_len()));
+        let (mut unit, mut coordinates) = (zeros(len), zeros(m));
+        for first in (0..x.len()).step_by(LANES) {
+            let at: [usize; LANES] = few(|l| (first + l).min(x.len() - 1));
+            gather(at.map(|i| &points[i * len..][..len]), &mut p);
+            self.space.lift(&p, &mut frame);
+            for c in 0..len {
+                unit[c] = Lane::ONE;
+                self.space.coordinates(&frame, &p, &unit, &mut coordinates);
+                unit[c] = Lane::ZERO;
+                for (k, x) in coordinates.iter().enumerate() {
+                    at.iter().zip(x.as_array()).for_each(|(i, x)| gradients[(i * m + k) * len + c] = *x);
+                }
+            }
+        }
+        let repeated: Vec<f64> = x.iter().flat_map(|&x| std::iter::repeat_n(x, m)).collect();
+        let mut products = vec![0.0; repeated.len() * size];
+        let moving = Moving { apart: true, ..self.moving(&repeated, of) };
+        if !self.space.0.pull(&moving, &gradients, &mut products) {
+            return None;
+        }
+        let matrix = |(i, rows): (usize, &[f64])| {
+            self.at_knots(samples[i].0, &Matrix::from_fn(m, 4 * m, |r, c| rows[r * size + c]))
+        };
+        Some((products.chunks(m * size).enumerate().map(matrix).collect(), points))
+    }
+
     /// The curve with its frames, for samples at times x.
     fn moving<'m>(&'m self, x: &'m [f64], of: Of) -> Moving<'m> {
         Moving {
@@ -181,6 +229,7 @@ impl<'a> Derivative<'a> {
             frames: &self.polygon.frames,
             runs: self.polygon.runs.count,
             nu: of as usize,
+            apart: false,
             dim: self.space.dim(),
             len: self.space.point_len(),
         }

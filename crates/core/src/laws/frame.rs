@@ -173,7 +173,8 @@ pub fn transposed_motion(space: &Erased, draw: &mut Draw) -> Verdict {
         let (t, x) = ([1.0, 3.0], [1.0, 1.3, 1.9, 2.5, 2.9, 3.0]);
         let curve = Curves { t: &t, nodes: 2, points: &points, velocities: &velocities, before: &[] };
         let times = Times { x: &x, count: x.len() };
-        let moving = curve::Moving { curve, times, frames: &frames, runs: 1, nu: 0, dim: m, len };
+        let moving =
+            curve::Moving { curve, times, frames: &frames, runs: 1, nu: 0, apart: false, dim: m, len };
         let motions = first(&draw.noise(motion_len(m)));
         let cotangents = first(&draw.noise(x.len() * len));
         let (mut moved, mut products) = (vec![0.0; x.len() * len], vec![0.0; motion_len(m)]);
