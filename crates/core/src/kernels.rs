@@ -40,12 +40,16 @@ impl<M: Space> Kernels for M {
     }
     fn push(&self, moving: &Moving, motions: &[f64], out: &mut [f64]) -> bool {
         let mut done = true;
-        self.evaluate_with(PushCall { moving, motions, out, done: &mut done });
+        if moving.times.count > 0 {
+            self.evaluate_with(PushCall { moving, motions, out, done: &mut done });
+        }
         done
     }
     fn pull(&self, moving: &Moving, cotangents: &[f64], out: &mut [f64]) -> bool {
         let mut done = true;
-        self.evaluate_with(PullCall { moving, cotangents, out, done: &mut done });
+        if moving.times.count > 0 {
+            self.evaluate_with(PullCall { moving, cotangents, out, done: &mut done });
+        }
         done
     }
 }
