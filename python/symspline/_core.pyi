@@ -216,7 +216,7 @@ def usual_turns(handle: Handle, points: _Doubles) -> tuple[_Doubles, list[bool]]
 def frames_along(handle: Handle, knots: _Doubles, points: _Doubles, x: _Doubles, gammas: _Doubles) -> _Doubles: ...
 
 # The sensor, parts, times, standard deviations, loss, column of the time offset, arrays, columns of the parameters with
-# their numbers, and the function with its highest derivative.
+# their numbers, and the function with its highest derivative and the function that returns its derivatives.
 _Term = tuple[Any, ...]
 # Parts of the space, matrices of groups, knots, penalty, means and precisions of the parameters, and terms.
 _Problem = tuple[Sequence[Handle], Sequence[_Doubles | None], _Doubles, str, _Doubles, Sequence[_Term]]
@@ -228,6 +228,7 @@ def estimate(
     points: Sequence[_Doubles],
     values: _Doubles,
     lams: Sequence[float],
+    near: Sequence[float],
     criterion: str,
     gamma: float,
     tol: float,

@@ -15,7 +15,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from copy import copy
-from typing import Any
+from importlib.util import find_spec
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -415,16 +416,32 @@ class Function(Measurement):
         Function that returns the residuals, shape (n, k) or (n,): what the sensor would read minus what it reads. It
         is called with the points, shape (n, *point_shape), then with the velocities if ``nu >= 1`` and the covariant
         accelerations if ``nu == 2``, and last with a dict of the values of `parameters` if there are any. On a product
-        without `factor`, points and vectors are tuples. Arrays contain all n samples; one iteration calls the function
-        a few times per coordinate, for central differences.
+        without `factor`, points and vectors are tuples. Arrays contain all n samples. Without `jacobian`, one iteration
+        calls the function a few times per coordinate.
     sigma : float or array_like
         Standard deviation of one residual, of shape (), (n,) or (n, k).
     nu : {0, 1, 2}, default 0
         Highest derivative that the function needs.
     parameters : Mapping of str to Constant, optional
         Unknown constants by the name under which the function receives them.
+    jacobian : callable, "jax" or None, default None
+        Derivatives of `residual`. A function receives the same arguments, and returns the partial derivatives with
+        respect to each of them: an array if there is one argument, otherwise a tuple. The derivative with respect to an
+        array of shape (n, ...) has shape (n, k, ...), or (n, ...) if `residual` returns shape (n,): row i of the
+        residuals depends on row i of the points only. All entries of the points count as independent, also those of
+        matrices and unit vectors. The derivative with respect to the dict of parameters is a dict of arrays of shape
+        (n, k, size), or (n, size). None stands for zero, and a product has a tuple of arrays per argument. With
+        respect to complex entries x + iy, return ∂r/∂x + i ∂r/∂y. The first result is compared with differences.
+        ``"jax"`` differentiates `residual`, which must be written with ``jax.numpy``, by ``jax.jacfwd``. None selects
+        central differences.
     factor, time_offset, loss : optional
         As for `Points`.
+
+    Raises
+    ------
+    ValidationError
+        If `jacobian` is ``"jax"`` and JAX is not installed. `estimate` raises it if a derivative has the wrong shape or
+        differs from that of `residual`.
 
     Examples
     --------
@@ -439,11 +456,21 @@ class Function(Measurement):
     ... )
     >>> bool(np.all(np.abs(ss.estimate([measured], 6, "r:2", lam=1e-6)(0.5) - [0.5, 0.25]) < 0.02))
     True
+
+    With the derivatives of the ranges, which are unit vectors, the estimate is the same:
+
+    >>> def directions(x):
+    ...     away = x[:, None] - beacons
+    ...     return away / np.linalg.norm(away, axis=-1, keepdims=True)
+    >>> measured = ss.measure.Function(t, measured.residual, sigma=0.01, jacobian=directions)
+    >>> bool(np.all(np.abs(ss.estimate([measured], 6, "r:2", lam=1e-6)(0.5) - [0.5, 0.25]) < 0.02))
+    True
     """
 
     residual: AnyFunction
     nu: int
     parameters: dict[str, Constant]
+    jacobian: AnyFunction | Literal["jax"] | None
 
     def __init__(
         self,
@@ -453,6 +480,7 @@ class Function(Measurement):
         sigma: ArrayLike,
         nu: int = 0,
         parameters: Mapping[str, Constant] | None = None,
+        jacobian: AnyFunction | Literal["jax"] | None = None,
         factor: int | None = None,
         time_offset: Constant | None = None,
         loss: Loss | None = None,
@@ -463,7 +491,15 @@ class Function(Measurement):
         given = {} if parameters is None else parameters
         if not isinstance(given, Mapping) or not all(isinstance(constant, Constant) for constant in given.values()):
             raise ValidationError("parameters must be a mapping from names to symspline.measure.Constant")
+        if not (jacobian is None or callable(jacobian) or (isinstance(jacobian, str) and jacobian == "jax")):
+            raise ValidationError(f"jacobian must be a function, 'jax' or None, not {short_repr(jacobian)}")
+        if isinstance(jacobian, str) and find_spec("jax") is None:
+            raise ValidationError(
+                "jacobian='jax' needs JAX, which is not installed. Run `pip install symspline[jax]`, pass a function "
+                "that returns the derivatives, or omit jacobian for central differences."
+            )
         self.residual, self.nu, self.parameters = residual, order_of(nu), dict(given)
+        self.jacobian = jacobian
 
 
 # Remedy in messages about missing samples.

@@ -4,7 +4,7 @@ use crate::frames::{Frames, lanes_of};
 use crate::path::{Path, nearest, positions};
 use symspline_core::memory;
 use symspline_core::scalar::{LANES, Lane, gather, scatter};
-use symspline_core::space::{Ambient, Erased, Origin};
+use symspline_core::space::{Ambient, Erased, Frame, Origin};
 
 /// Velocities and accelerations at the knots, in coordinates of the frames there and in units of the mean knot spacing.
 pub struct Bending {
@@ -37,19 +37,18 @@ impl<'a> Along<'a> {
         );
         let near: Vec<usize> = positions(self.path.t, x).into_iter().map(nearest).collect();
         let mut out = vec![0.0; x.len() * m * len];
-        let [mut p, mut q, mut v, mut way, mut there] = [(); 5].map(|_| vec![Lane::ZERO; len]);
+        let [mut p, mut q, mut v] = [(); 3].map(|_| vec![Lane::ZERO; len]);
+        let (mut frame, mut chord) = (vec![Lane::ZERO; self.space.frame_len()], vec![Lane::ZERO; m]);
+        let mut coordinates = vec![Lane::ZERO; m * m];
         let mut rows = vec![0.0; LANES * len];
-        let unit = |j: usize| (0..self.path.t.len() * m).map(|i| f64::from(i % m == j)).collect::<Vec<f64>>();
-        let at_knots: Vec<Vec<f64>> = (0..m).map(|j| self.frames.tangents(&unit(j))).collect();
         for group in 0..x.len().div_ceil(LANES) {
             let at = lanes_of(group, x.len());
-            gather(at.map(|i| &self.path.points[near[i] * len..][..len]), &mut p);
+            self.frames.at(at.map(|i| near[i]), &mut frame, &mut p, &mut coordinates);
             gather(at.map(|i| &points[i * len..][..len]), &mut q);
-            self.space.log(&p, &q, &mut way);
-            for (j, vectors) in at_knots.iter().enumerate() {
-                gather(at.map(|i| &vectors[near[i] * len..][..len]), &mut v);
-                self.space.parallel_transport(&p, &q, &way, &v, &mut there);
-                scatter(&there, &mut rows);
+            self.space.step(&mut frame, &p, &q, &mut chord);
+            for (j, x) in coordinates.chunks_exact(m).enumerate() {
+                self.space.tangent(&frame, &q, x, &mut v);
+                scatter(&v, &mut rows);
                 for (i, row) in at.iter().zip(rows.chunks_exact(len)) {
                     out[(i * m + j) * len..][..len].copy_from_slice(row);
                 }

@@ -1,7 +1,77 @@
-//! Symmetric banded matrices, one per SIMD lane.
+//! Symmetric banded matrices: a single one, or one per SIMD lane.
 
+use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 use symspline_core::monitor::checkpoint;
-use symspline_core::scalar::Lane;
+use symspline_core::scalar::{Lane, lane};
+
+/// The entries of a matrix: numbers, or lanes of them for several matrices at once.
+pub trait Number:
+    Copy
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+    + AddAssign
+    + SubAssign
+    + MulAssign
+    + DivAssign
+{
+    /// Zero.
+    const ZERO: Self;
+    /// One.
+    const ONE: Self;
+    /// A number, on every lane.
+    fn of(x: f64) -> Self;
+    /// `self · b + c`.
+    fn mul_add(self, b: Self, c: Self) -> Self;
+    /// The square root.
+    fn sqrt(self) -> Self;
+    /// The natural logarithm.
+    fn ln(self) -> Self;
+    /// The smaller of the two; `other` if `self` is NaN.
+    fn least(self, other: Self) -> Self;
+}
+
+impl Number for f64 {
+    const ZERO: f64 = 0.0;
+    const ONE: f64 = 1.0;
+    fn of(x: f64) -> f64 {
+        x
+    }
+    fn mul_add(self, b: f64, c: f64) -> f64 {
+        self.mul_add(b, c)
+    }
+    fn sqrt(self) -> f64 {
+        self.sqrt()
+    }
+    fn ln(self) -> f64 {
+        self.ln()
+    }
+    fn least(self, other: f64) -> f64 {
+        if self < other { self } else { other }
+    }
+}
+
+impl Number for Lane {
+    const ZERO: Lane = Lane::ZERO;
+    const ONE: Lane = Lane::ONE;
+    fn of(x: f64) -> Lane {
+        lane(x)
+    }
+    fn mul_add(self, b: Lane, c: Lane) -> Lane {
+        self.mul_add(b, c)
+    }
+    fn sqrt(self) -> Lane {
+        self.sqrt()
+    }
+    fn ln(self) -> Lane {
+        self.ln()
+    }
+    fn least(self, other: Lane) -> Lane {
+        self.simd_lt(other).select(self, other)
+    }
+}
 
 /// Bandwidth of BᵀWB and Ω.
 pub const WIDTH: usize = 3;
@@ -13,23 +83,23 @@ pub fn stride(coupled: usize) -> usize {
 
 /// Entries on the diagonal and `width` entries left of it, row by row; after [`factor`](Banded::factor) those of L
 /// and D with A = L D Lᵀ.
-#[derive(Clone, Default)]
-pub struct Banded {
+#[derive(Clone)]
+pub struct Banded<T = Lane> {
     /// The number of rows and columns.
     pub size: usize,
     /// The bandwidth: the number of subdiagonals.
     pub width: usize,
-    entries: Vec<Lane>,
+    entries: Vec<T>,
 }
 
-impl Banded {
+impl<T: Number> Banded<T> {
     /// The zero matrix.
     pub fn zeros(size: usize, width: usize) -> Self {
-        Banded { size, width, entries: vec![Lane::ZERO; size * (width + 1)] }
+        Banded { size, width, entries: vec![T::ZERO; size * (width + 1)] }
     }
 
     /// The matrix whose entries (i, i − d) are `entry(i (width + 1) + d)`.
-    pub fn of(size: usize, width: usize, entry: impl Fn(usize) -> Lane) -> Self {
+    pub fn of(size: usize, width: usize, entry: impl Fn(usize) -> T) -> Self {
         Banded { size, width, entries: (0..size * (width + 1)).map(entry).collect() }
     }
 
@@ -39,20 +109,20 @@ impl Banded {
     }
 
     /// The index of an entry inside the band.
-    pub fn entry(&mut self, i: usize, j: usize) -> &mut Lane {
+    pub fn entry(&mut self, i: usize, j: usize) -> &mut T {
         let position = self.position(i, j);
         &mut self.entries[position]
     }
 
     /// An entry inside the band.
-    pub fn at(&self, i: usize, j: usize) -> Lane {
+    pub fn at(&self, i: usize, j: usize) -> T {
         self.entries[self.position(i, j)]
     }
 
     /// Factors the matrix in place; positive definite matrices need no pivoting.
     pub fn factor(&mut self) {
         let (w, stride) = (self.width, self.width + 1);
-        let mut scaled = vec![Lane::ZERO; stride];
+        let mut scaled = vec![T::ZERO; stride];
         for i in 0..self.size {
             checkpoint();
             let most = w.min(i);
@@ -78,19 +148,19 @@ impl Banded {
     }
 
     /// The smallest pivot of a factored matrix.
-    pub fn least_pivot(&self) -> Lane {
+    pub fn least_pivot(&self) -> T {
         (0..self.size)
             .map(|i| self.entries[i * (self.width + 1)])
-            .fold(Lane::splat(f64::INFINITY), |least, d| d.simd_lt(least).select(d, least))
+            .fold(T::of(f64::INFINITY), |least, d| d.least(least))
     }
 
     /// ln det A of a factored matrix.
-    pub fn log_det(&self) -> Lane {
-        (0..self.size).fold(Lane::ZERO, |sum, i| sum + self.entries[i * (self.width + 1)].ln())
+    pub fn log_det(&self) -> T {
+        (0..self.size).fold(T::ZERO, |sum, i| sum + self.entries[i * (self.width + 1)].ln())
     }
 
     /// A⁻¹x of a factored matrix, in place, for rows of several numbers.
-    pub fn solve(&self, columns: usize, x: &mut [Lane]) {
+    pub fn solve(&self, columns: usize, x: &mut [T]) {
         let (w, stride) = (self.width, self.width + 1);
         for i in 0..self.size {
             checkpoint();
@@ -104,7 +174,7 @@ impl Banded {
         for i in (0..self.size).rev() {
             checkpoint();
             let (here, behind) = x[i * columns..].split_at_mut(columns);
-            let inverse = Lane::ONE / self.entries[i * stride];
+            let inverse = T::ONE / self.entries[i * stride];
             here.iter_mut().for_each(|x| *x *= inverse);
             for d in 1..=w.min(self.size - 1 - i) {
                 let l = self.entries[(i + d) * stride + d];
@@ -116,7 +186,7 @@ impl Banded {
 
     /// L⁻ᵀD^{−1/2}x of a factored matrix, in place: for independent normal numbers x, a sample of the normal distribution
     /// with covariance A⁻¹.
-    pub fn sample(&self, x: &mut [Lane]) {
+    pub fn sample(&self, x: &mut [T]) {
         let stride = self.width + 1;
         for i in (0..self.size).rev() {
             checkpoint();
@@ -130,7 +200,7 @@ impl Banded {
 
     /// The entries of A⁻¹ inside the band, of a factored matrix, by Takahashi's recursion (Erisman & Tinney 1975) `Z
     /// = D⁻¹L⁻¹ + (1 − Lᵀ)Z`.
-    pub fn inverse_band(&self) -> Banded {
+    pub fn inverse_band(&self) -> Self {
         let (n, w, stride) = (self.size, self.width, self.width + 1);
         let mut z = Banded::zeros(n, w);
         for i in (0..n).rev() {
@@ -138,7 +208,7 @@ impl Banded {
             let most = w.min(n - 1 - i);
             for d in (0..=most).rev() {
                 let j = i + d;
-                let mut sum = if d == 0 { Lane::ONE / self.entries[i * stride] } else { Lane::ZERO };
+                let mut sum = if d == 0 { T::ONE / self.entries[i * stride] } else { T::ZERO };
                 for k in 1..=most {
                     sum -= self.entries[(i + k) * stride + k] * z.at(i + k, j);
                 }

@@ -4,25 +4,25 @@
 //! A = (C Wᵀ; W B),    A⁻¹ = (S⁻¹, −S⁻¹Vᵀ; −VS⁻¹, B⁻¹ + VS⁻¹Vᵀ),    V = B⁻¹W,    S = C − WᵀV.
 //! ```
 
-use crate::banded::Banded;
+use crate::banded::{Banded, Number};
 use symspline_core::monitor::checkpoint;
 use symspline_core::scalar::Lane;
 
 /// A factored matrix.
-pub struct Bordered {
+pub struct Bordered<T = Lane> {
     /// B, factored.
-    band: Banded,
+    band: Banded<T>,
     /// W and V, row by row.
-    sides: [Vec<Lane>; 2],
+    sides: [Vec<T>; 2],
     /// S, row by row, ...
-    schur: Vec<Lane>,
+    schur: Vec<T>,
     /// ... and factored.
-    corner: Banded,
+    corner: Banded<T>,
 }
 
-impl Bordered {
+impl<T: Number> Bordered<T> {
     /// Factors a matrix. `side` is W, row by row, and `corner` is C; both are empty without a border.
-    pub fn new(mut band: Banded, side: Vec<Lane>, mut corner: Banded) -> Self {
+    pub fn new(mut band: Banded<T>, side: Vec<T>, mut corner: Banded<T>) -> Self {
         band.factor();
         let size = corner.size;
         let mut v = side.clone();
@@ -43,28 +43,28 @@ impl Bordered {
     }
 
     /// S, row by row.
-    pub fn schur(&self) -> Vec<Lane> {
+    pub fn schur(&self) -> Vec<T> {
         self.schur.clone()
     }
 
     /// The smallest pivot of B.
-    pub fn band_pivot(&self) -> Lane {
+    pub fn band_pivot(&self) -> T {
         self.band.least_pivot()
     }
 
     /// The smallest pivot.
-    pub fn least_pivot(&self) -> Lane {
+    pub fn least_pivot(&self) -> T {
         let [band, corner] = [&self.band, &self.corner].map(Banded::least_pivot);
-        corner.simd_lt(band).select(corner, band)
+        corner.least(band)
     }
 
     /// ln det.
-    pub fn log_det(&self) -> Lane {
+    pub fn log_det(&self) -> T {
         self.band.log_det() + self.corner.log_det()
     }
 
     /// Multiplies rows of several numbers by the inverse, in place.
-    pub fn solve(&self, columns: usize, x: &mut [Lane]) {
+    pub fn solve(&self, columns: usize, x: &mut [T]) {
         let size = self.corner.size;
         let (first, rest) = x.split_at_mut(size * columns);
         self.band.solve(columns, rest);
@@ -89,7 +89,7 @@ impl Bordered {
 
     /// Replaces independent normal numbers by a sample of the normal distribution whose covariance is A⁻¹: that of the
     /// border has the covariance S⁻¹, and the others have the mean −V times the border and the covariance B⁻¹.
-    pub fn sample(&self, x: &mut [Lane]) {
+    pub fn sample(&self, x: &mut [T]) {
         let size = self.corner.size;
         let (first, rest) = x.split_at_mut(size);
         self.corner.sample(first);
@@ -102,13 +102,13 @@ impl Bordered {
     }
 
     /// The entries of the inverse in the border and inside the band.
-    pub fn inverse(&self) -> Inverse {
+    pub fn inverse(&self) -> Inverse<T> {
         let size = self.corner.size;
         let mut band = self.band.inverse_band();
-        let mut corner = vec![Lane::ZERO; size * size];
-        let mut side = vec![Lane::ZERO; band.size * size];
+        let mut corner = vec![T::ZERO; size * size];
+        let mut side = vec![T::ZERO; band.size * size];
         if size > 0 {
-            (0..size).for_each(|a| corner[a * size + a] = Lane::ONE);
+            (0..size).for_each(|a| corner[a * size + a] = T::ONE);
             self.corner.solve(size, &mut corner);
             let v = &self.sides[1];
             for (row, out) in v.chunks_exact(size).zip(side.chunks_exact_mut(size)) {
@@ -121,7 +121,7 @@ impl Bordered {
                 checkpoint();
                 for j in i.saturating_sub(band.width)..=i {
                     let rows = v[j * size..][..size].iter().zip(&side[i * size..][..size]);
-                    *band.entry(i, j) -= rows.fold(Lane::ZERO, |sum, (v, x)| v.mul_add(*x, sum));
+                    *band.entry(i, j) -= rows.fold(T::ZERO, |sum, (v, x)| v.mul_add(*x, sum));
                 }
             }
         }
@@ -130,23 +130,23 @@ impl Bordered {
 }
 
 /// Entries of A⁻¹.
-pub struct Inverse {
+pub struct Inverse<T = Lane> {
     /// S⁻¹, row by row.
-    pub corner: Vec<Lane>,
+    pub corner: Vec<T>,
     /// −VS⁻¹, row by row.
-    pub side: Vec<Lane>,
+    pub side: Vec<T>,
     /// B⁻¹ + VS⁻¹Vᵀ inside the band.
-    pub band: Banded,
+    pub band: Banded<T>,
 }
 
-impl Inverse {
+impl<T: Number> Inverse<T> {
     /// The number of unknowns in the border.
     pub fn border(&self) -> usize {
         self.corner.len().isqrt()
     }
 
     /// An entry, which must lie in the border or inside the band.
-    pub fn at(&self, i: usize, j: usize) -> Lane {
+    pub fn at(&self, i: usize, j: usize) -> T {
         let (size, i, j) = (self.border(), i.max(j), i.min(j));
         if i < size {
             self.corner[i * size + j]

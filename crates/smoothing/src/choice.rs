@@ -5,6 +5,7 @@
 //! energy of [`JacobiOperator`], by the same with `(S + RP)ᵀMa`. Residuals and degrees of freedom for several λ at a time
 //! cost one banded solve.
 
+use crate::banded::Number;
 use crate::cyclic::PeriodicCorrection;
 use crate::jacobi_operator::JacobiOperator;
 use crate::linearized::LinearProblem;
@@ -62,10 +63,10 @@ impl<'a> Linear<'a> {
     }
 
     /// The step of the coefficients for one λ, given the factors of A.
-    pub fn step(&self, lam: f64, factors: &Factors) -> Vec<f64> {
-        let right: Vec<f64> =
+    pub fn step(&self, lam: f64, factors: &Factors<f64>) -> Vec<f64> {
+        let mut step: Vec<f64> =
             self.pull.iter().zip(&self.stiffness).map(|(pull, stiffness)| pull - lam * stiffness).collect();
-        let mut step = factors.solve_one(self.m, &right);
+        factors.solve(self.m, &mut step);
         if let Some(periodic) = self.periodic {
             periodic.extend(&mut step);
         }
@@ -79,12 +80,12 @@ impl<'a> Linear<'a> {
     }
 
     /// A for one λ.
-    pub fn matrix(&self, lam: f64) -> Whole {
-        self.misfit.matrix(self.linearized, self.m, self.jacobi, self.periodic, lane(lam))
+    pub fn matrix(&self, lam: f64) -> Whole<f64> {
+        self.misfit.matrix(self.linearized, self.m, self.jacobi, self.periodic, lam)
     }
 
-    /// A for the λ of all lanes, factored.
-    pub fn factored(&self, lam: Lane) -> Factors {
+    /// A, factored.
+    pub fn factored<T: Number>(&self, lam: T) -> Factors<T> {
         self.misfit.factored(self.linearized, self.m, self.jacobi, self.periodic, lam)
     }
 
@@ -129,13 +130,21 @@ impl<'a> Linear<'a> {
             free: linearized.free() as f64,
             null: linearized.null(),
             energies: linearized.null(),
-            straight: linearized.null() + STRAIGHT,
+            straight: Straight::At(linearized.null() + STRAIGHT),
             balance: linearized.balance(),
             most: f64::INFINITY,
             sigma: self.sigma,
         };
-        choose(linearized, &scoring, |lam| self.look(lam), guess)
+        choose(linearized, &scoring, |lam, _| self.look(lam), guess)
     }
+}
+
+/// The degrees of freedom below which every λ is equally good.
+pub enum Straight {
+    /// A number.
+    At(f64),
+    /// So many more than with the largest λ.
+    Above(f64),
 }
 
 /// What a score depends on besides λ.
@@ -153,7 +162,7 @@ pub struct Scoring {
     /// ... and of those to which λ applies.
     pub energies: f64,
     /// The degrees of freedom below which every λ is equally good.
-    pub straight: f64,
+    pub straight: Straight,
     /// The λ at which data and energy have about the same weight, and the largest one that may be chosen.
     pub balance: f64,
     pub most: f64,
@@ -161,10 +170,49 @@ pub struct Scoring {
     pub sigma: f64,
 }
 
-/// The λ with the lowest score, near a guess or in the whole range, and whether it lies at a bound.
+/// The λ with the lowest score, near a guess or in the whole range, and whether it lies at a bound. `look` receives
+/// whether degrees of freedom are needed; otherwise, those that it returns may be NaN.
 pub fn choose(
     linearized: &LinearProblem,
     scoring: &Scoring,
+    look: impl Fn(Lane, bool) -> Look,
+    guess: Option<f64>,
+) -> (f64, bool) {
+    /// The first step of the logarithm of λ on both sides of the best one in the last check.
+    const STEP: f64 = 0.05;
+    let freedoms = |lams: [f64; LANES]| {
+        let found = look(Lane::new(lams), true);
+        found.sound.select(found.freedom, lane(f64::NAN)).to_array()
+    };
+    if let Criterion::Reml = scoring.criterion {
+        // The score does not depend on the degrees of freedom, of which most are the more expensive part. They show
+        // whether the lowest score is sound and whether it is at a bound.
+        let (lam, bound) = search(linearized, scoring, f64::NEG_INFINITY, |lam| look(lam, false), guess);
+        let [own, stiffer, most, ..] = freedoms(few(|l| match l {
+            0 => lam,
+            1 => lam * (1.0 + STEP),
+            _ => scoring.most,
+        }));
+        let straight = match scoring.straight {
+            Straight::At(freedom) => freedom,
+            Straight::Above(more) => most + more,
+        };
+        if !bound && stiffer > straight && own < scoring.count * (1.0 - 1e-6) {
+            return (lam, false);
+        }
+    }
+    let straight = match scoring.straight {
+        Straight::At(freedom) => freedom,
+        Straight::Above(more) => freedoms([scoring.most; LANES])[0] + more,
+    };
+    search(linearized, scoring, straight, |lam| look(lam, true), guess)
+}
+
+/// The search for the lowest score, with the degrees of freedom below which every λ is equally good.
+fn search(
+    linearized: &LinearProblem,
+    scoring: &Scoring,
+    straight: f64,
     look_at: impl Fn(Lane) -> Look,
     guess: Option<f64>,
 ) -> (f64, bool) {
@@ -175,7 +223,6 @@ pub fn choose(
     /// The number of evaluations in a range, and the decades that those of the first ranges cover.
     const AT_ONCE: usize = 8;
     const DECADES: f64 = 7.5;
-    let straight = scoring.straight;
     let start = scoring.balance.log10();
     let (mut from, mut to) = (
         start + RANGE.0 + f64::from(linearized.penalised.power()) * linearized.basis.short().log10(),
@@ -234,7 +281,7 @@ impl Scoring {
     fn score(&self, lam: Lane, look: &Look) -> Lane {
         let (n, m) = (self.count, self.coordinates);
         // Without degrees of freedom, or if rounding errors make the matrix singular, there is no score.
-        let known = (lane(n * (1.0 - 1e-6)) - look.freedom).simd_gt(Lane::ZERO) & look.sound;
+        let known = look.freedom.simd_ge(lane(n * (1.0 - 1e-6))).select(Lane::ZERO, look.sound);
         let per = look.rss / lane(m);
         let score = match self.criterion {
             Criterion::Gcv { gamma } => {
@@ -254,7 +301,7 @@ impl Scoring {
 
 /// The quantities that belong to one λ.
 pub struct Look {
-    /// Degrees of freedom per coordinate: tr A⁻¹BᵀWB.
+    /// Degrees of freedom per coordinate: tr A⁻¹BᵀWB. NaN if they are unknown.
     pub freedom: Lane,
     /// Σ w|r − Bδ|².
     pub rss: Lane,

@@ -299,11 +299,10 @@ impl<'a> Problem<'a> {
                 }
             }
         }
-        let mut matrix = Banded::of(size, stride - 1, |at| lane(band[at]));
+        let mut matrix = Banded::of(size, stride - 1, |at| band[at]);
         matrix.factor();
-        let mut x: Vec<Lane> = right.iter().map(|&x| lane(x)).collect();
-        matrix.solve(columns, &mut x);
-        let delta: Vec<f64> = x.iter().map(|x| x.as_array()[0]).collect();
+        let mut delta = right.clone();
+        matrix.solve(columns, &mut delta);
         let decrease = delta.iter().zip(&right).map(|(x, g)| x * g).sum();
         (delta, decrease)
     }

@@ -77,7 +77,7 @@ pub struct CurveFit<'a> {
     /// J in full Gauss–Newton, at the last λ.
     objective: f64,
     /// The final band of A⁻¹, and A.
-    inverse: Option<Banded>,
+    inverse: Option<Banded<f64>>,
     known: Option<Known>,
     progress: Progress,
 }
@@ -320,16 +320,16 @@ impl<'a> CurveFit<'a> {
         jacobi = self
             .progress
             .with_curvature
-            .then(|| JacobiOperator::new(space, linearized, &speeds, &accelerations));
+            .then(|| JacobiOperator::new(space, linearized, &speeds, &accelerations).with_matrix(linearized));
         let mut linear = seen_with(misfit, jacobi.as_ref());
         let mut lam = self.progress.weigh(space, &linear, &speeds, &self.robust, options.criterion);
         if self.progress.with_curvature && linear.jacobi.is_none() {
-            later = JacobiOperator::new(space, linearized, &speeds, &accelerations);
+            later = JacobiOperator::new(space, linearized, &speeds, &accelerations).with_matrix(linearized);
             linear = seen_with(misfit, Some(&later));
             lam = self.progress.weigh(space, &linear, &speeds, &self.robust, options.criterion);
         }
-        let system = linear.factored(lane(lam));
-        if !(system.least_pivot().as_array()[0] > 0.0) {
+        let system = linear.factored(lam);
+        if !(system.least_pivot() > 0.0) {
             return Next::End(State::Undetermined);
         }
         let band = system.inverse_band();
@@ -364,11 +364,8 @@ impl<'a> CurveFit<'a> {
             }
             (step, None)
         };
-        let deviations: Vec<f64> = linearized
-            .values
-            .iter()
-            .map(|row| (row.square(&inverse).as_array()[0] * m as f64).sqrt())
-            .collect();
+        let deviations: Vec<f64> =
+            linearized.values.iter().map(|row| (row.square(&inverse) * m as f64).sqrt()).collect();
         let reach = speeds.chunks_exact(m).map(length).sum::<f64>();
         let tol = self.robust.tol(options.tol);
         let small = self.progress.judge(&step, &deviations, reach, tol, self.robust.reweighs());
@@ -387,7 +384,7 @@ impl<'a> CurveFit<'a> {
                 // Degrees of freedom and deviations of the M-estimator are those of its pseudo-data (Cox 1983).
                 whole.soften(&factors, m);
                 let linear = seen_with(&whole, linear.jacobi);
-                let system = linear.factored(lane(lam / softness));
+                let system = linear.factored(lam / softness);
                 let band = system.inverse_band();
                 self.inverse = Some(system.mean(&band));
                 self.known = Some(linear.matrix(lam / softness).known());
@@ -496,9 +493,8 @@ impl<'a> CurveFit<'a> {
 
     /// The variances of the curve at the data, divided by those of the data.
     fn leverages(&self) -> Vec<f64> {
-        let leverage = |(row, w): (&Stencil, &f64)| {
-            self.inverse.as_ref().map_or(0.0, |inverse| w * row.square(inverse).as_array()[0])
-        };
+        let leverage =
+            |(row, w): (&Stencil, &f64)| self.inverse.as_ref().map_or(0.0, |inverse| w * row.square(inverse));
         self.linearized.data.iter().zip(self.data.weights).map(leverage).collect()
     }
 

@@ -4,7 +4,7 @@
 //! of the curve. A matrix A that is banded in the coefficients with `overlap` of them repeated at the end becomes
 //! EᵀAE, where E repeats and transforms them. The first coefficients border the others, which are banded.
 
-use crate::banded::Banded;
+use crate::banded::{Banded, Number};
 use crate::bordered::{Bordered, Inverse};
 use symspline_core::scalar::{Lane, lane};
 
@@ -63,37 +63,37 @@ impl PeriodicCorrection {
 }
 
 /// The factored matrix of an open or a closed curve.
-pub struct Factored {
-    matrix: Bordered,
+pub struct Factored<T = Lane> {
+    matrix: Bordered<T>,
     /// H of a closed curve.
     turn: Option<Vec<f64>>,
 }
 
-impl Factored {
+impl<T: Number> Factored<T> {
     /// Factors a matrix in coefficients of `coupled` numbers. The correction of a closed curve must have as many
     /// coordinates.
-    pub fn new(whole: Banded, periodic: Option<&PeriodicCorrection>) -> Self {
+    pub fn new(whole: Banded<T>, periodic: Option<&PeriodicCorrection>) -> Self {
         let Some(periodic) = periodic else {
-            return Factored::open(Bordered::new(whole, Vec::new(), Banded::default()));
+            return Factored::open(Bordered::new(whole, Vec::new(), Banded::zeros(0, 0)));
         };
         let (m, width) = (periodic.m, whole.width);
         let size = periodic.overlap * m;
         // The number of coefficients without repetitions, and of those in the border.
         let count = whole.size - size;
         let inner = count - size;
-        let near = |i: usize, j: usize| if i.abs_diff(j) <= width { whole.at(i, j) } else { Lane::ZERO };
+        let near = |i: usize, j: usize| if i.abs_diff(j) <= width { whole.at(i, j) } else { T::ZERO };
         // A[i, repeated] H: the contribution of a repeated coefficient to the first one.
         let again = |i: usize, b: usize| {
             let (block, c) = (b / m, b % m);
-            (0..m).fold(Lane::ZERO, |sum, row| {
-                sum + near(i, count + block * m + row) * lane(periodic.turn[row * m + c])
+            (0..m).fold(T::ZERO, |sum, row| {
+                sum + near(i, count + block * m + row) * T::of(periodic.turn[row * m + c])
             })
         };
         let band = Banded::of(inner, width, |at| {
             let (i, d) = (at / (width + 1), at % (width + 1));
-            if d <= i { whole.at(size + i, size + i - d) } else { Lane::ZERO }
+            if d <= i { whole.at(size + i, size + i - d) } else { T::ZERO }
         });
-        let mut w = vec![Lane::ZERO; inner * size];
+        let mut w = vec![T::ZERO; inner * size];
         for i in 0..inner {
             for b in 0..size {
                 if i < width || i + width + size >= inner {
@@ -106,8 +106,8 @@ impl Factored {
             for b in 0..=a {
                 let (block, c) = (a / m, a % m);
                 // HᵀA[repeated, repeated]H.
-                let twice = (0..m).fold(Lane::ZERO, |sum, row| {
-                    sum + again(count + block * m + row, b) * lane(periodic.turn[row * m + c])
+                let twice = (0..m).fold(T::ZERO, |sum, row| {
+                    sum + again(count + block * m + row, b) * T::of(periodic.turn[row * m + c])
                 });
                 *corner.entry(a, b) = near(a, b) + again(a, b) + again(b, a) + twice;
             }
@@ -116,33 +116,33 @@ impl Factored {
     }
 
     /// The matrix of an open curve, with a border of parameters.
-    pub fn open(matrix: Bordered) -> Self {
+    pub fn open(matrix: Bordered<T>) -> Self {
         Factored { matrix, turn: None }
     }
 
     /// Replaces independent normal numbers by a sample of the normal distribution whose covariance is the inverse.
-    pub fn sample(&self, x: &mut [Lane]) {
+    pub fn sample(&self, x: &mut [T]) {
         self.matrix.sample(x);
     }
 
     /// The smallest pivot.
-    pub fn least_pivot(&self) -> Lane {
+    pub fn least_pivot(&self) -> T {
         self.matrix.least_pivot()
     }
 
     /// ln det.
-    pub fn log_det(&self) -> Lane {
+    pub fn log_det(&self) -> T {
         self.matrix.log_det()
     }
 
     /// Multiplies rows of several numbers by the inverse, in place.
-    pub fn solve(&self, columns: usize, x: &mut [Lane]) {
+    pub fn solve(&self, columns: usize, x: &mut [T]) {
         self.matrix.solve(columns, x);
     }
 
     /// The entries of the inverse in the border of parameters and inside the band; for a closed curve those of
     /// E(EᵀAE)⁻¹Eᵀ.
-    pub fn inverse(&self) -> Inverse {
+    pub fn inverse(&self) -> Inverse<T> {
         if self.turn.is_some() {
             return Inverse { corner: Vec::new(), side: Vec::new(), band: self.inverse_band() };
         }
@@ -150,21 +150,21 @@ impl Factored {
     }
 
     /// The band of the inverse; for a closed curve that of E(EᵀAE)⁻¹Eᵀ.
-    pub fn inverse_band(&self) -> Banded {
+    pub fn inverse_band(&self) -> Banded<T> {
         let inverse = self.matrix.inverse();
         let Some(turn) = &self.turn else { return inverse.band };
         let m = (turn.len() as f64).sqrt() as usize;
         let (size, width) = (inverse.border(), inverse.band.width);
         let count = size + inverse.band.size;
         let plain = |i: usize, j: usize| inverse.at(i, j);
-        let turned = |i: usize, j: &dyn Fn(usize) -> Lane| {
+        let turned = |i: usize, j: &dyn Fn(usize) -> T| {
             let (block, row) = ((i - count) / m, (i - count) % m);
-            (0..m).fold(Lane::ZERO, |sum, c| sum + j(block * m + c) * lane(turn[row * m + c]))
+            (0..m).fold(T::ZERO, |sum, c| sum + j(block * m + c) * T::of(turn[row * m + c]))
         };
         Banded::of(count + size, width, |at| {
             let (i, d) = (at / (width + 1), at % (width + 1));
             if d > i {
-                return Lane::ZERO;
+                return T::ZERO;
             }
             let j = i - d;
             if i < count {

@@ -12,14 +12,15 @@
 
 use crate::banded::{Banded, stride};
 use crate::bordered::{Bordered, Inverse};
-use crate::choice::{Look, STRAIGHT, Scoring, choose};
+use crate::choice::{Look, STRAIGHT, Scoring, Straight, choose};
+use crate::elimination::eliminate;
 use crate::jacobi_operator::JacobiOperator;
 use crate::linearized::{Basis, LinearProblem, Stencil};
 use crate::path::Position;
 use crate::problem::{Criterion, EndConditions, Penalty};
 use symspline_core::memory;
 use symspline_core::monitor::checkpoint;
-use symspline_core::scalar::{LANES, Lane, lane};
+use symspline_core::scalar::{Dual, Lane, Scalar, lane};
 use symspline_core::space::{Erased, Origin};
 
 /// Measurements of one kind, whitened: their noise has variance one.
@@ -61,8 +62,6 @@ impl Factor<'_> {
 pub struct Estimation<'a> {
     linearized: LinearProblem,
     factors: Vec<Factor<'a>>,
-    /// Jacobi's operators of curved factors.
-    jacobi: Vec<Option<JacobiOperator>>,
     /// The first coordinate of each factor.
     first: Vec<usize>,
     /// The number of coordinates, and of parameters.
@@ -81,8 +80,11 @@ pub struct Estimation<'a> {
     /// Σ|r|² and the number of residuals.
     squares: f64,
     count: usize,
-    /// Half the gradients of the energies of all factors.
-    stiffness: Vec<Vec<f64>>,
+    /// Half the gradients of the energies of all factors, one number per coefficient: of the curve, and of the quadratic
+    /// function that approximates them. They agree up to the distance of the knots.
+    stiffness: [Vec<f64>; 2],
+    /// These energies.
+    energies: Vec<f64>,
 }
 
 /// The solution of the linear problem.
@@ -118,47 +120,40 @@ impl<'a> Estimation<'a> {
         let linearized = LinearProblem::new(Basis::new(knots, ends), &[], &[], penalty);
         let m = factors.iter().map(Factor::dim).sum();
         let (p, size) = (priors.len(), linearized.basis.count() * m);
-        // The matrix, its factors and its inverse for the λ of all lanes; at most two blocks of each exist at the same time.
+        // The matrices of measurements and energies, their sum, and its inverse.
         let entries = (size * stride(m)) as f64 + 3.0 * p as f64 * (size as f64 + p as f64);
         memory::require(
-            3.0 * LANES as f64 * entries,
+            5.0 * entries,
             "the linear system of the estimation",
             "Use fewer knots, or estimate fewer constants",
         );
         let first: Vec<usize> =
             (0..factors.len()).map(|f| factors[..f].iter().map(Factor::dim).sum()).collect();
-        let jacobi: Vec<Option<JacobiOperator>> = factors
-            .iter()
-            .map(|own| {
-                let curved = own.space.curvature() != 0.0;
-                curved.then(|| JacobiOperator::new(own.space, &linearized, own.speeds, own.accelerations))
-            })
-            .collect();
-        let stiffness = factors
-            .iter()
-            .zip(&jacobi)
-            .map(|(own, jacobi)| {
-                let Some(jacobi) = jacobi else {
-                    let flat = vec![0.0; own.accelerations.len()];
-                    return linearized.stiffness(own.accelerations, &flat, own.dim());
-                };
-                jacobi.pull(&linearized, own.accelerations)
-            })
-            .collect();
-        // The gradient of the energy does not depend on the frame.
-        let jacobi: Vec<Option<JacobiOperator>> = factors
-            .iter()
-            .zip(jacobi)
-            .map(|(own, jacobi)| match jacobi {
-                Some(jacobi) if !own.halves.is_empty() => {
-                    Some(jacobi.in_moving_frame(&linearized, own.accelerations, own.halves))
+        let mut penalty = vec![0.0; size * stride(m)];
+        let mut stiffness = [(); 2].map(|_| vec![0.0; size]);
+        let mut energies = Vec::with_capacity(factors.len());
+        for (own, first) in factors.iter().zip(&first) {
+            let dim = own.dim();
+            let jacobi = (own.space.curvature() != 0.0)
+                .then(|| JacobiOperator::new(own.space, &linearized, own.speeds, own.accelerations));
+            let gradient = |jacobi: Option<&JacobiOperator>| match jacobi {
+                Some(jacobi) => jacobi.pull(&linearized, own.accelerations),
+                None => linearized.stiffness(own.accelerations, &vec![0.0; own.accelerations.len()], dim),
+            };
+            // The gradient of the energy does not depend on the frame, but its matrix does.
+            let moving = jacobi.clone().filter(|_| !own.halves.is_empty());
+            let moving =
+                moving.map(|jacobi| jacobi.in_moving_frame(&linearized, own.accelerations, own.halves));
+            let gradients = [gradient(jacobi.as_ref()), gradient(moving.as_ref().or(jacobi.as_ref()))];
+            for (stiffness, gradient) in stiffness.iter_mut().zip(gradients) {
+                for (row, own) in stiffness.chunks_exact_mut(m).zip(gradient.chunks_exact(dim)) {
+                    row[*first..first + dim].copy_from_slice(own);
                 }
-                other => other,
-            })
-            .collect();
-        let mut penalty = vec![0.0; linearized.basis.count() * m * stride(m)];
-        for ((own, first), jacobi) in factors.iter().zip(&first).zip(&jacobi) {
-            add_penalty(&linearized, own.dim(), *first, jacobi.as_ref(), m, &mut penalty);
+            }
+            let energy = |c: usize| linearized.energy(false, |at| lane(own.accelerations[at.1 * dim + c]));
+            energies.push((0..dim).map(|c| energy(c).as_array()[0]).sum());
+            let jacobi = moving.or(jacobi).map(|jacobi| jacobi.with_matrix(&linearized));
+            add_penalty(&linearized, dim, *first, jacobi.as_ref(), m, &mut penalty);
         }
         let mut pull = vec![0.0; p + size];
         priors.iter().zip(&mut pull).for_each(|((precision, off), pull)| *pull = -precision * off);
@@ -172,8 +167,8 @@ impl<'a> Estimation<'a> {
             // A prior is a measurement of its parameter.
             count: priors.iter().filter(|(precision, _)| *precision > 0.0).count(),
             stiffness,
+            energies,
             penalty,
-            jacobi,
             linearized,
             factors,
             first,
@@ -272,73 +267,54 @@ impl<'a> Estimation<'a> {
         sum / (self.linearized.penalised.stiffness() * (count * dim) as f64)
     }
 
-    /// A for the λ of all factors, in units of the mean knot spacing.
-    fn matrix(&self, lams: &[Lane]) -> (Banded, Vec<Lane>, Banded) {
-        let (m, stride) = (self.m, stride(self.m));
-        let of: Vec<usize> = (0..m).map(|c| self.factor_of(c)).collect();
+    /// The factor of each coordinate.
+    fn factors_of_coordinates(&self) -> Vec<usize> {
+        (0..self.m).map(|c| self.factor_of(c)).collect()
+    }
+
+    /// An entry of ΣJᵀJ with the priors.
+    fn corner(&self, a: usize, b: usize) -> f64 {
+        self.corner[a * self.p + b] + if a == b { self.priors[a] } else { 0.0 }
+    }
+
+    /// A for the λ of all factors, in units of the mean knot spacing: band, side and corner.
+    fn matrix(&self, lams: &[f64]) -> (Banded<f64>, Banded<f64>) {
+        let (m, stride, of) = (self.m, stride(self.m), self.factors_of_coordinates());
         let band = Banded::of(self.gram.len() / stride, stride - 1, |at| {
-            lams[of[at / stride % m]].mul_add(lane(self.penalty[at]), lane(self.gram[at]))
+            lams[of[at / stride % m]].mul_add(self.penalty[at], self.gram[at])
         });
         let mut corner = Banded::zeros(self.p, self.p.saturating_sub(1));
         for a in 0..self.p {
-            for b in 0..=a {
-                let prior = if a == b { self.priors[a] } else { 0.0 };
-                *corner.entry(a, b) = lane(self.corner[a * self.p + b] + prior);
-            }
+            (0..=a).for_each(|b| *corner.entry(a, b) = self.corner(a, b));
         }
-        (band, self.side.iter().map(|x| lane(*x)).collect(), corner)
-    }
-
-    fn factored(&self, lams: &[Lane]) -> Bordered {
-        let (band, side, corner) = self.matrix(lams);
-        Bordered::new(band, side, corner)
+        (band, corner)
     }
 
     /// The right-hand side: parameters first.
-    fn right(&self, lams: &[Lane]) -> Vec<Lane> {
-        let mut right: Vec<Lane> = self.pull.iter().map(|x| lane(*x)).collect();
-        for (own, first, stiffness, lam) in self.each(lams) {
-            for (k, row) in stiffness.chunks_exact(own.dim()).enumerate() {
-                for (c, x) in row.iter().enumerate() {
-                    right[self.p + k * self.m + first + c] -= lam * lane(*x);
-                }
-            }
-        }
+    fn right(&self, lams: &[f64]) -> Vec<f64> {
+        let (m, of, mut right) = (self.m, self.factors_of_coordinates(), self.pull.clone());
+        let coefficients = right[self.p..].iter_mut().zip(&self.stiffness[0]).enumerate();
+        coefficients.for_each(|(at, (x, stiffness))| *x -= lams[of[at % m]] * stiffness);
         right
-    }
-
-    /// Factors with their first coordinates, gradients and λ.
-    fn each<'b>(
-        &'b self,
-        lams: &'b [Lane],
-    ) -> impl Iterator<Item = (&'b Factor<'a>, usize, &'b [f64], Lane)> {
-        let stiffness = self.stiffness.iter().map(|x| &x[..]);
-        self.factors
-            .iter()
-            .zip(self.first.iter().copied())
-            .zip(stiffness)
-            .zip(lams)
-            .map(|(((own, first), stiffness), lam)| (own, first, stiffness, *lam))
     }
 
     /// A product of an entry of the inverse with ΣLᵀL, ΣLᵀJ or ΣJᵀJ, where priors are rows of J, summed over each row:
     /// parameters first.
-    fn freedoms(&self, inverse: &Inverse) -> Vec<Lane> {
+    fn freedoms(&self, inverse: &Inverse<f64>) -> Vec<f64> {
         let (p, stride, size) = (self.p, stride(self.m), inverse.band.size);
-        let mut out = vec![Lane::ZERO; p + size];
+        let mut out = vec![0.0; p + size];
         for a in 0..p {
-            let terms = (0..p).map(|b| inverse.at(a, b) * lane(self.corner[a * p + b]));
-            out[a] = terms.fold(inverse.at(a, a) * lane(self.priors[a]), |sum, x| sum + x);
+            out[a] = (0..p).map(|b| inverse.at(a, b) * self.corner(a, b)).sum();
         }
         for i in 0..size {
             checkpoint();
             for b in 0..p {
-                let term = inverse.at(p + i, b) * lane(self.side[i * p + b]);
+                let term = inverse.at(p + i, b) * self.side[i * p + b];
                 out[b] += term;
                 out[p + i] += term;
             }
             for d in 0..stride.min(i + 1) {
-                let term = inverse.band.at(i, i - d) * lane(self.gram[i * stride + d]);
+                let term = inverse.band.at(i, i - d) * self.gram[i * stride + d];
                 out[p + i] += term;
                 if d > 0 {
                     out[p + i - d] += term;
@@ -348,60 +324,57 @@ impl<'a> Estimation<'a> {
         out
     }
 
-    /// Σ|r + Lc + Jδθ|² for the λ of all lanes.
-    fn squares_at(&self, x: &[Lane]) -> Lane {
-        let (p, stride) = (self.p, stride(self.m));
-        let pulled = x.iter().zip(&self.pull).fold(Lane::ZERO, |sum, (x, pull)| x.mul_add(lane(*pull), sum));
-        let mut form = Lane::ZERO;
+    /// The scores and their components for the λ of all lanes of the factor `chosen`.
+    ///
+    /// The measurements are multiplied by a number g = 1. The derivative of the minimum of the objective with respect
+    /// to g is the sum of squared residuals, and that of ln det A is the number of degrees of freedom. Without
+    /// derivatives, only the sum of residuals and penalties is known, as `rss`.
+    fn look<S: Scalar>(&self, chosen: usize, lams: &[(f64, bool)], lam: Lane) -> Look {
+        let (m, p, stride, border) = (self.m, self.p, stride(self.m), self.p + 2);
+        let lams: Vec<Lane> =
+            (0..lams.len()).map(|f| if f == chosen { lam } else { lane(lams[f].0) }).collect();
+        let of: Vec<Lane> = self.factors_of_coordinates().into_iter().map(|f| lams[f]).collect();
+        // Of measurements, and of the energies.
+        let number = |seen: f64, energy: Lane| S::from_parts([energy + lane(seen), lane(seen), Lane::ZERO]);
+        let mut corner = vec![S::constant(Lane::ZERO); border * border];
         for a in 0..p {
-            for b in 0..p {
-                let prior = if a == b { self.priors[a] } else { 0.0 };
-                form += x[a] * x[b] * lane(self.corner[a * p + b] + prior);
+            (0..=a).for_each(|b| corner[a * border + b] = number(self.corner(a, b), Lane::ZERO));
+            for row in p..border {
+                corner[row * border + a] = number(self.pull[a], Lane::ZERO);
             }
         }
-        for (i, own) in x[p..].iter().enumerate() {
-            let mut sum = *own * lane(self.gram[i * stride]);
-            for d in 1..stride.min(i + 1) {
-                sum += x[p + i - d] * lane(2.0 * self.gram[i * stride + d]);
+        let zero = S::constant(Lane::ZERO);
+        let found = eliminate(self.stiffness[0].len(), stride - 1, corner, 2, |i, row| {
+            let (lam, at) = (of[i % m], i * stride);
+            let (band, side) = row.split_at_mut(stride);
+            for (d, x) in band.iter_mut().rev().enumerate() {
+                *x = if d <= i { number(self.gram[at + d], lam * lane(self.penalty[at + d])) } else { zero };
             }
-            for b in 0..p {
-                sum += x[b] * lane(2.0 * self.side[i * p + b]);
+            for (x, seen) in side.iter_mut().zip(&self.side[i * p..][..p]) {
+                *x = number(*seen, Lane::ZERO);
             }
-            form = sum.mul_add(*own, form);
+            for (x, stiffness) in side[p..].iter_mut().zip(self.stiffness.iter().rev()) {
+                *x = number(self.pull[p + i], -lam * lane(stiffness[i]));
+            }
+        });
+        // The objective c − 2b'ᵀx + xᵀAx at x = A⁻¹b.
+        let energy = lams.iter().zip(&self.energies).fold(Lane::ZERO, |sum, (lam, x)| sum + *lam * lane(*x));
+        let [_, crossed, own] = [0, 1, 2].map(|at| found.rest[at].parts());
+        let whole = lane(self.squares) + energy + lane(2.0) * crossed[0] - own[0];
+        let positive = found.least.simd_gt(Lane::ZERO);
+        let [log_det, freedom, _] = found.log_det.parts();
+        if S::ORDER == 0 {
+            return Look {
+                freedom: lane(f64::NAN),
+                rss: whole,
+                energy: Lane::ZERO,
+                sound: positive,
+                log_det,
+            };
         }
-        lane(self.squares) - lane(2.0) * pulled + form
-    }
-
-    /// The penalty, λ times the energy, of the factor `chosen` at changed coefficients.
-    fn penalty_at(&self, chosen: usize, lam: Lane, x: &[Lane]) -> Lane {
-        let (own, first, dim) = (self.factors[chosen], self.first[chosen], self.factors[chosen].dim());
-        let (x, rows) = (&x[self.p..], &self.linearized.accelerations);
-        let jacobi = self.jacobi[chosen].as_ref();
-        let turned = |at: (usize, usize), c: usize| {
-            jacobi.map_or(Lane::ZERO, |jacobi| jacobi.of_lanes(&self.linearized, at, x, c, (first, self.m)))
-        };
-        let bend = |at: (usize, usize), c: usize| {
-            let i = at.1;
-            lane(own.accelerations[i * dim + c]) + rows[i].of_lanes(x, self.m, first + c) + turned(at, c)
-        };
-        let differ = jacobi.is_some_and(JacobiOperator::differs);
-        let energy = |c: usize| self.linearized.energy(differ, |at| bend(at, c));
-        lam * (0..dim).fold(Lane::ZERO, |sum, c| sum + energy(c))
-    }
-
-    fn look(&self, chosen: usize, lams: &[Lane]) -> Look {
-        let factors = self.factored(lams);
-        let mut x = self.right(lams);
-        factors.solve(1, &mut x);
-        let freedom = self.freedoms(&factors.inverse()).into_iter().fold(Lane::ZERO, |sum, x| sum + x);
-        let energy = self.penalty_at(chosen, lams[chosen], &x);
-        Look {
-            freedom,
-            rss: self.squares_at(&x),
-            energy,
-            sound: factors.least_pivot().simd_gt(Lane::ZERO) & freedom.simd_gt(lane(0.9 * self.null())),
-            log_det: factors.log_det(),
-        }
+        let rss = lane(self.squares) + own[1];
+        let sound = positive & freedom.simd_gt(lane(0.9 * self.null()));
+        Look { freedom, rss, energy: whole - rss, sound, log_det }
     }
 
     /// Degrees of freedom without energy: of all coordinates, and parameters.
@@ -433,35 +406,32 @@ impl<'a> Estimation<'a> {
                     free: self.linearized.free() as f64 * dim,
                     null: self.null(),
                     energies: self.linearized.null() * dim,
-                    straight: self.straight(f, &lams),
+                    straight: Straight::Above(STRAIGHT * dim),
                     balance: self.balance(f),
                     most: self.most(f),
                     sigma: 1.0,
                 };
-                let at = |lam: Lane| {
-                    let mut all: Vec<Lane> = lams.iter().map(|(lam, _)| lane(*lam)).collect();
-                    all[f] = lam;
-                    self.look(f, &all)
+                let look = |lam: Lane, freedom: bool| {
+                    if freedom { self.look::<Dual>(f, &lams, lam) } else { self.look::<Lane>(f, &lams, lam) }
                 };
                 let near = (sweep > 0).then_some(lams[f].0).or(guesses[f].map(|lam| lam / unit));
-                let chosen = choose(&self.linearized, &scoring, at, near);
+                let chosen = choose(&self.linearized, &scoring, look, near);
                 lams[f] = chosen;
             }
         }
-        let lanes: Vec<Lane> = lams.iter().map(|(lam, _)| lane(*lam)).collect();
-        let factors = self.factored(&lanes);
-        let mut x = self.right(&lanes);
+        let numbers: Vec<f64> = lams.iter().map(|(lam, _)| *lam).collect();
+        let (band, corner) = self.matrix(&numbers);
+        let factors = Bordered::new(band, self.side.clone(), corner);
+        let mut x = self.right(&numbers);
         factors.solve(1, &mut x);
-        let first = |x: Lane| x.as_array()[0];
         let inverse = factors.inverse();
-        let freedoms: Vec<f64> = self.freedoms(&inverse).into_iter().map(first).collect();
+        let freedoms = self.freedoms(&inverse);
         let mut of_factors = vec![0.0; self.factors.len()];
         for (i, freedom) in freedoms[self.p..].iter().enumerate() {
             let f = self.factor_of(i % self.m);
             of_factors[f] += freedom / self.factors[f].dim() as f64;
         }
-        let numbers: Vec<f64> = x.into_iter().map(first).collect();
-        let (parameters, coefficients) = numbers.split_at(self.p);
+        let (parameters, coefficients) = x.split_at(self.p);
         let values = &self.linearized.values;
         let mut step = vec![0.0; values.len() * self.m];
         values.iter().zip(step.chunks_exact_mut(self.m)).for_each(|(row, x)| row.apply(coefficients, x));
@@ -469,7 +439,7 @@ impl<'a> Estimation<'a> {
             let (row, c) = (values[at / self.m], at % self.m);
             let entry = |a: usize, b: usize| {
                 let (i, j) = ((row.first + a) * self.m + c, (row.first + b) * self.m + c);
-                row.factors[a] * row.factors[b] * first(inverse.band.at(i, j))
+                row.factors[a] * row.factors[b] * inverse.band.at(i, j)
             };
             let count = values.len().min(4);
             (0..count).flat_map(|a| (0..count).map(move |b| (a, b))).map(|(a, b)| entry(a, b)).sum()
@@ -479,12 +449,12 @@ impl<'a> Estimation<'a> {
             parameters: parameters.to_vec(),
             variances: [
                 (0..step.len()).map(variance).collect(),
-                (0..self.p).map(|a| first(inverse.at(a, a))).collect(),
+                (0..self.p).map(|a| inverse.at(a, a)).collect(),
             ],
             step,
             freedom: (of_factors, freedoms.iter().sum()),
-            information: factors.schur().into_iter().map(first).collect(),
-            determined: first(factors.band_pivot()) > 0.0,
+            information: factors.schur(),
+            determined: factors.band_pivot() > 0.0,
         }
     }
 
@@ -497,16 +467,6 @@ impl<'a> Estimation<'a> {
         if self.p > 0 { WITH_PARAMETERS * most } else { most }
     }
 
-    /// The degrees of freedom below which λ of a factor hardly matters: those of the other factors, and of its curves
-    /// without energy.
-    fn straight(&self, chosen: usize, lams: &[(f64, bool)]) -> f64 {
-        let mut lanes: Vec<Lane> = lams.iter().map(|(lam, _)| lane(*lam)).collect();
-        lanes[chosen] = lane(self.most(chosen));
-        let inverse = self.factored(&lanes).inverse();
-        let freedom: f64 = self.freedoms(&inverse).into_iter().map(|x| x.as_array()[0]).sum();
-        freedom + STRAIGHT * self.factors[chosen].dim() as f64
-    }
-
     /// The sum of squared residuals and their number, including distances from prior means.
     pub fn residuals(&self) -> (f64, usize) {
         (self.squares, self.count)
@@ -515,22 +475,14 @@ impl<'a> Estimation<'a> {
     /// A for given λ, in the unit of the times.
     pub fn matrices(&self, lams: &[f64]) -> Matrices {
         let unit = self.linearized.penalised.unit(self.linearized.basis.spacing);
-        let lanes: Vec<Lane> = lams.iter().map(|lam| lane(lam / unit)).collect();
-        let (band, side, corner) = self.matrix(&lanes);
-        let first = |x: &Lane| x.as_array()[0];
+        let lams: Vec<f64> = lams.iter().map(|lam| lam / unit).collect();
+        let (band, corner) = self.matrix(&lams);
         let rows = stride(self.m);
-        let band =
-            (0..self.gram.len())
-                .map(|at| {
-                    if at % rows <= at / rows {
-                        first(&band.at(at / rows, at / rows - at % rows))
-                    } else {
-                        0.0
-                    }
-                })
-                .collect();
-        let corner = (0..self.p * self.p).map(|at| first(&corner.at(at / self.p, at % self.p))).collect();
-        [band, side.iter().map(first).collect(), corner]
+        let entry =
+            |at: usize| if at % rows <= at / rows { band.at(at / rows, at / rows - at % rows) } else { 0.0 };
+        let band = (0..self.gram.len()).map(entry).collect();
+        let corner = (0..self.p * self.p).map(|at| corner.at(at / self.p, at % self.p)).collect();
+        [band, self.side.clone(), corner]
     }
 }
 

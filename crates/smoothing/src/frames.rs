@@ -122,6 +122,22 @@ impl<'a> Frames<'a> {
         gather(knots.map(|k| &self.points[k * len..][..len]), p);
     }
 
+    /// The frames of some knots and their points, and the coordinates in them of the vectors of the frame that is
+    /// transported from the first knot: m numbers for each vector.
+    pub fn at(&self, knots: [usize; LANES], frame: &mut [Lane], p: &mut [Lane], vectors: &mut [Lane]) {
+        self.frame_rows(knots, frame, p);
+        let m = self.space.dim();
+        let turns = knots.map(|knot| self.turn(knot));
+        for (j, vector) in vectors.chunks_exact_mut(m).enumerate() {
+            for (row, x) in vector.iter_mut().enumerate() {
+                let entry = |turn: Option<&[Vec<f64>; 2]>| {
+                    turn.map_or(f64::from(row == j), |turn| turn[1][row * m + j])
+                };
+                *x = Lane::new(turns.map(entry));
+            }
+        }
+    }
+
     /// Coordinates of vectors, of which the i-th is tangent at the knot `knots(i)`.
     pub fn coordinates(&self, vectors: &[f64], knots: impl Fn(usize) -> usize) -> Vec<f64> {
         let (len, m) = (self.len(), self.space.dim());

@@ -61,6 +61,8 @@ pub struct Problem<'a> {
 pub struct Options<'a> {
     /// λ of each part; None to choose it.
     pub lams: &'a [Option<f64>],
+    /// If the initial curve is close to the result, the λ near which the result has its λ; otherwise None.
+    pub near: &'a [Option<f64>],
     /// The criterion that chooses λ.
     pub criterion: Criterion,
     /// The iteration ends when a step is below this number of standard deviations.
@@ -203,14 +205,13 @@ impl<'a> Problem<'a> {
         out
     }
 
-    /// The motion of a part at times x, with derivatives up to an order.
+    /// The motion of a part at times x, with derivatives up to an order, and with or without frames.
     fn motion(
         &'a self,
         state: &State,
         along: &[Along],
         x: &[f64],
-        part: usize,
-        nu: usize,
+        (part, nu, with_frames): (usize, usize, bool),
         monitor: &Monitor,
     ) -> Result<Motion<'a>, Invalid> {
         let (begin, end) = (self.knots[0], self.knots[self.knots.len() - 1]);
@@ -222,7 +223,7 @@ impl<'a> Problem<'a> {
         };
         let p = derivative(0, Quantity::Point);
         let (v, a) = (derivative(1, Quantity::Velocity), derivative(2, Quantity::Acceleration));
-        let frames = along[part].frames(x, &p);
+        let frames = if with_frames { along[part].frames(x, &p) } else { Vec::new() };
         Ok(Motion { space: &self.spaces[part], p, v, a, frames })
     }
 
@@ -235,7 +236,7 @@ impl<'a> Problem<'a> {
     ) -> Result<Vec<Linearised>, Invalid> {
         let first = self.first();
         let columns = Columns { first: &first, parameters: self.constants.len() };
-        let motion_at = |x: &[f64], part: usize, nu: usize| self.motion(state, along, x, part, nu, monitor);
+        let motion_at = |x: &[f64], asked| self.motion(state, along, x, asked, monitor);
         let linearised =
             |term: &Term| term.linearised(&motion_at, &state.values, self.spacing(), &columns, monitor);
         self.terms.iter().map(linearised).collect()
@@ -250,7 +251,7 @@ impl<'a> Problem<'a> {
     ) -> Result<Vec<Linearised>, Invalid> {
         let along = self.along(state);
         let (begin, end) = (self.knots[0], self.knots[self.knots.len() - 1]);
-        let motion_at = |x: &[f64], part: usize, nu: usize| self.motion(state, &along, x, part, nu, monitor);
+        let motion_at = |x: &[f64], asked| self.motion(state, &along, x, asked, monitor);
         let residuals = |term: &Term| {
             let mut times = term.shifted(&state.values);
             if clipped {
@@ -382,11 +383,12 @@ impl<'a> Problem<'a> {
         progress: &dyn Fn(usize),
         monitor: &Monitor,
     ) -> Result<Solution, Invalid> {
-        let mut choice = Choice::new(options.lams);
+        let mut choice = Choice::new(options.lams, options.near);
         let mut relaxation = Relaxation::default();
         let mut before: Option<Step> = None;
         let (mut objective, mut retreats) = (f64::INFINITY, 0);
-        let (mut last, mut rate, mut size) = (f64::INFINITY, f64::NAN, f64::INFINITY);
+        let (mut last, mut rate) = (f64::INFINITY, f64::NAN);
+        let mut size = if options.near.contains(&None) { f64::INFINITY } else { NEAR };
         let mut state = self.fitted(points, values, monitor).ok_or(Invalid::Start)?;
         for number in 1.. {
             let along = self.along(&state);
@@ -551,9 +553,9 @@ struct Choice {
 }
 
 impl Choice {
-    fn new(lams: &[Option<f64>]) -> Self {
+    fn new(lams: &[Option<f64>], near: &[Option<f64>]) -> Self {
         let settled = lams.iter().all(Option::is_some);
-        Choice { lams: lams.to_vec(), found: vec![None; lams.len()], settled, rounds: 0 }
+        Choice { lams: lams.to_vec(), found: near.to_vec(), settled, rounds: 0 }
     }
 
     /// The λ that are fixed and those near which the others are chosen, after a step of a size.
@@ -563,7 +565,7 @@ impl Choice {
             return (self.lams.iter().zip(&self.found).map(|(lam, found)| lam.or(*found)).collect(), nothing);
         }
         // Far from the solution, λ is chosen from its whole range.
-        (self.lams.clone(), if size < NEAR { self.found.clone() } else { nothing })
+        (self.lams.clone(), if size <= NEAR { self.found.clone() } else { nothing })
     }
 
     /// Records the λ that were chosen after a step of a size.

@@ -16,15 +16,21 @@ use crate::banded::stride;
 use crate::frames::{curvature_terms, triples};
 use crate::linearized::{LinearProblem, of_segment};
 use crate::problem::Penalty;
+use symspline_core::monitor::checkpoint;
 use symspline_core::scalar::{Lane, lane};
 use symspline_core::space::{Erased, Origin};
 
+/// The number of coefficients on which the accelerations at both ends of a segment depend.
+const REACH: usize = 5;
+
 /// Jacobi's operator along a curve, in coordinates of frames.
+#[derive(Clone)]
 pub struct JacobiOperator {
     m: usize,
     /// R at every knot as the first end of a segment, and as its last end: m × m numbers row by row.
     turns: [Vec<f64>; 2],
-    /// (S + RP)ᵀM(S + RP), as the entries (i, i − d) at i · 4m + d; coordinates of a coefficient are adjacent.
+    /// (S + RP)ᵀM(S + RP), as the entries (i, i − d) at i · 4m + d; coordinates of a coefficient are adjacent. Empty before
+    /// [`with_matrix`](JacobiOperator::with_matrix).
     pub penalty: Vec<f64>,
 }
 
@@ -54,9 +60,7 @@ impl JacobiOperator {
                 turns.iter_mut().for_each(|turns| turns[knot * m * m..][..m * m].fill(0.0));
             }
         }
-        let mut jacobi = JacobiOperator { m, turns, penalty: Vec::new() };
-        jacobi.sum(linearized);
-        jacobi
+        JacobiOperator { m, turns, penalty: Vec::new() }
     }
 
     /// The operator for changes in the moving frame of a group. `halves` are the matrices of ξ ↦ [e, ξ]/2 for the m
@@ -85,21 +89,57 @@ impl JacobiOperator {
                 }
             }
         }
-        self.sum(linearized);
         self
     }
 
     /// Computes the matrix of the energy.
-    fn sum(&mut self, linearized: &LinearProblem) {
-        let basis = &linearized.basis;
-        self.penalty = vec![0.0; basis.count() * self.m * stride(self.m)];
+    pub fn with_matrix(mut self, linearized: &LinearProblem) -> Self {
+        let (m, basis, stride) = (self.m, &linearized.basis, stride(self.m));
+        let count = basis.count();
+        let mut out = vec![0.0; count * m * stride];
+        // The rows of S + RP at both ends of a segment have at most five coefficients.
+        let wide = REACH * m;
+        let mut rows = [(); 2].map(|_| vec![0.0; m * wide]);
         for i in 0..basis.knots() - 1 {
+            checkpoint();
+            let first = linearized.values[i].first;
+            for (end, rows) in rows.iter_mut().enumerate() {
+                self.rows(linearized, (end, i + end), first, rows);
+            }
+            // With the sum x and the difference y of both, the energy is (a + b) |x|²/2 + (a − b) |y|²/2.
+            let [left, right] = &mut rows;
+            for (x, y) in left.iter_mut().zip(right) {
+                (*x, *y) = (*x + *y, *x - *y);
+            }
             let (own, other) = of_segment(linearized.penalised, basis.h(i));
-            let (left, right) = ((0, i), (1, i + 1));
-            for (x, y, factor) in
-                [(left, left, own), (right, right, own), (left, right, other), (right, left, other)]
-            {
-                self.add(linearized, x, y, factor);
+            for (rows, factor) in rows.iter().zip([0.5 * (own + other), 0.5 * (own - other)]) {
+                if factor == 0.0 {
+                    continue;
+                }
+                for row in rows.chunks_exact(wide) {
+                    for (a, x) in row[..wide.min((count - first) * m)].iter().enumerate() {
+                        let (x, from) = (factor * x, (a + 1).saturating_sub(stride));
+                        let band = &mut out[(first * m + a) * stride..][..=a - from];
+                        let others = band.iter_mut().rev().zip(&row[from..=a]);
+                        others.for_each(|(sum, y)| *sum = x.mul_add(*y, *sum));
+                    }
+                }
+            }
+        }
+        self.penalty = out;
+        self
+    }
+
+    /// The rows of S + RP at an end of a segment, for the coefficients from `first` on.
+    fn rows(&self, linearized: &LinearProblem, at: (usize, usize), first: usize, out: &mut [f64]) {
+        let (m, turn) = (self.m, self.turn(at));
+        let (values, accelerations) = (&linearized.values[at.1], &linearized.accelerations[at.1]);
+        out.fill(0.0);
+        for (row, (out, turn)) in out.chunks_exact_mut(REACH * m).zip(turn.chunks_exact(m)).enumerate() {
+            for (k, (value, acceleration)) in values.factors.iter().zip(accelerations.factors).enumerate() {
+                let out = &mut out[(values.first - first + k) * m..][..m];
+                out.iter_mut().zip(turn).for_each(|(x, r)| *x += value * r);
+                out[row] += acceleration;
             }
         }
     }
@@ -111,51 +151,6 @@ impl JacobiOperator {
 
     fn turn(&self, (end, knot): (usize, usize)) -> &[f64] {
         &self.turns[end][knot * self.m * self.m..][..self.m * self.m]
-    }
-
-    /// Adds `factor · (row of one knot)ᵀ(row of another)`: with s and v of the rows of S and P the blocks
-    /// `s s' + s v' R' + v s' Rᵀ + v v' RᵀR'`.
-    fn add(&mut self, linearized: &LinearProblem, left: (usize, usize), right: (usize, usize), factor: f64) {
-        let (m, stride) = (self.m, stride(self.m));
-        let (r, other) = (self.turn(left), self.turn(right));
-        let mut square = vec![0.0; m * m];
-        for row in 0..m {
-            for a in 0..m {
-                for b in 0..m {
-                    square[a * m + b] += r[row * m + a] * other[row * m + b];
-                }
-            }
-        }
-        let (transposed, other): (Vec<f64>, Vec<f64>) =
-            ((0..m * m).map(|at| r[at % m * m + at / m]).collect(), other.to_vec());
-        let rows = |knot: usize| [(&linearized.accelerations[knot], false), (&linearized.values[knot], true)];
-        for (x, turns) in rows(left.1) {
-            for (y, turns_too) in rows(right.1) {
-                for (p, f) in x.factors.iter().enumerate() {
-                    for (q, g) in y.factors.iter().enumerate() {
-                        let product = factor * f * g;
-                        if product == 0.0 {
-                            continue;
-                        }
-                        for a in 0..m {
-                            for b in 0..m {
-                                let (i, j) = ((x.first + p) * m + a, (y.first + q) * m + b);
-                                if i < j {
-                                    continue;
-                                }
-                                let block = match (turns, turns_too) {
-                                    (false, false) => f64::from(a == b),
-                                    (false, true) => other[a * m + b],
-                                    (true, false) => transposed[a * m + b],
-                                    (true, true) => square[a * m + b],
-                                };
-                                self.penalty[i * stride + i - j] += product * block;
-                            }
-                        }
-                    }
-                }
-            }
-        }
     }
 
     /// (S + RP)ᵀMa: half the gradient of the energy at accelerations a.

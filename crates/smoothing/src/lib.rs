@@ -24,6 +24,7 @@ mod choice;
 mod cumulative;
 mod curve_fit;
 mod cyclic;
+mod elimination;
 pub mod estimation;
 pub mod examine;
 mod frames;
@@ -55,6 +56,7 @@ mod variance;
 pub mod private {
     pub use crate::banded::{Banded, WIDTH};
     pub use crate::cyclic::{Factored, PeriodicCorrection};
+    pub use crate::elimination::eliminate;
     pub use crate::linearized::{Basis, LinearProblem, OVERLAP, times_metric};
 }
 

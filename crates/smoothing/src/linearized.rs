@@ -6,7 +6,7 @@
 //! matrix, because the third derivative is a difference of second derivatives. Times are divided by the mean knot
 //! spacing.
 
-use crate::banded::{Banded, WIDTH};
+use crate::banded::{Banded, Number, WIDTH};
 use crate::problem::{EndCondition, EndConditions, Penalty};
 use symspline_core::monitor::checkpoint;
 use symspline_core::scalar::{Lane, lane};
@@ -53,14 +53,14 @@ impl Stencil {
     }
 
     /// row · Z · rowᵀ for a matrix of which the band is known.
-    pub fn square(&self, z: &Banded) -> Lane {
-        let mut sum = Lane::ZERO;
+    pub fn square<T: Number>(&self, z: &Banded<T>) -> T {
+        let mut sum = T::ZERO;
         let count = 4.min(z.size);
         for a in 0..count {
             for b in 0..count {
                 let factor = self.factors[a] * self.factors[b];
                 if factor != 0.0 {
-                    sum += z.at(self.first + a, self.first + b) * lane(factor);
+                    sum += z.at(self.first + a, self.first + b) * T::of(factor);
                 }
             }
         }

@@ -4,7 +4,7 @@
 //! the coordinates, so that A is one matrix for all of them, with a band of blocks. The curvature of the space
 //! couples them, too, if it is included: see [`JacobiOperator`].
 
-use crate::banded::{Banded, WIDTH, stride};
+use crate::banded::{Banded, Number, WIDTH, stride};
 use crate::cyclic::{Factored, PeriodicCorrection};
 use crate::information::Seen;
 use crate::jacobi_operator::JacobiOperator;
@@ -12,7 +12,7 @@ use crate::linearized::{LinearProblem, OVERLAP, Stencil};
 use crate::problem::Known;
 use std::borrow::Cow;
 use symspline_core::monitor::checkpoint;
-use symspline_core::scalar::{LANES, Lane, few, lane};
+use symspline_core::scalar::{Lane, lane};
 
 /// Residuals at a curve, in coordinates of frames along it, and their weights.
 #[derive(Clone)]
@@ -38,30 +38,30 @@ pub enum Misfit<'a> {
 /// Coordinates are coupled only if the number of coefficients times the cube of the dimension does not exceed this.
 pub const COUPLED: usize = 10_000_000;
 
-/// The factored matrix A, for another λ on each lane.
-pub struct Factors {
-    matrix: Factored,
+/// The factored matrix A, for one λ or another one on each lane.
+pub struct Factors<T = Lane> {
+    matrix: Factored<T>,
     /// The number of coupled coordinates: m, or one if a single matrix serves all of them.
     coupled: usize,
 }
 
 /// The matrix A, before it is factored.
-pub struct Whole {
+pub struct Whole<T = Lane> {
     /// Its band; of a closed curve that with repeated coefficients.
-    pub matrix: Banded,
+    pub matrix: Banded<T>,
     /// The number of coupled coordinates.
     pub coupled: usize,
     /// The continuation of a closed curve, for the coupled coordinates.
     pub periodic: Option<PeriodicCorrection>,
 }
 
-impl Whole {
-    /// The matrix of the first lane as plain numbers.
+impl Whole<f64> {
+    /// The matrix as plain numbers.
     pub fn known(&self) -> Known {
         let rows = stride(self.coupled);
         let entry = |at: usize| {
             let (i, d) = (at / rows, at % rows);
-            if d <= i { self.matrix.at(i, i - d).as_array()[0] } else { 0.0 }
+            if d <= i { self.matrix.at(i, i - d) } else { 0.0 }
         };
         let turn = self.periodic.as_ref().map_or_else(Vec::new, |periodic| periodic.turn.clone());
         Known { coupled: self.coupled, matrix: (0..self.matrix.size * rows).map(entry).collect(), turn }
@@ -127,28 +127,28 @@ impl<'a> Misfit<'a> {
         pull
     }
 
-    /// A for the λ of all lanes, factored.
-    pub fn factored(
+    /// A, factored.
+    pub fn factored<T: Number>(
         &self,
         linearized: &LinearProblem,
         m: usize,
         jacobi: Option<&JacobiOperator>,
         periodic: Option<&PeriodicCorrection>,
-        lam: Lane,
-    ) -> Factors {
+        lam: T,
+    ) -> Factors<T> {
         let Whole { matrix, coupled, periodic } = self.matrix(linearized, m, jacobi, periodic, lam);
         Factors { matrix: Factored::new(matrix, periodic.as_ref()), coupled }
     }
 
-    /// A for the λ of all lanes. The holonomy of a closed curve couples the coordinates, too.
-    pub fn matrix(
+    /// A. The holonomy of a closed curve couples the coordinates, too.
+    pub fn matrix<T: Number>(
         &self,
         linearized: &LinearProblem,
         m: usize,
         jacobi: Option<&JacobiOperator>,
         periodic: Option<&PeriodicCorrection>,
-        lam: Lane,
-    ) -> Whole {
+        lam: T,
+    ) -> Whole<T> {
         let count = linearized.basis.count();
         // If the coupled matrix would be too large, the holonomy is omitted in the matrix, but not in its right-hand
         // side.
@@ -159,7 +159,7 @@ impl<'a> Misfit<'a> {
         let entry = |at: usize| {
             let stiff =
                 jacobi.map_or_else(|| of_each(&linearized.penalty, coupled, at), |jacobi| jacobi.penalty[at]);
-            lam.mul_add(lane(stiff), lane(self.gram(coupled, at)))
+            lam.mul_add(T::of(stiff), T::of(self.gram(coupled, at)))
         };
         let matrix = Banded::of(count * coupled, stride(coupled) - 1, entry);
         let periodic = periodic.map(|given| {
@@ -227,16 +227,16 @@ impl<'a> Misfit<'a> {
     }
 
     /// tr A⁻¹BᵀWB divided by the number of coordinates, given the band of A⁻¹: the degrees of freedom per coordinate.
-    pub fn freedom(&self, linearized: &LinearProblem, inverse: &Banded) -> Lane {
+    pub fn freedom<T: Number>(&self, linearized: &LinearProblem, inverse: &Banded<T>) -> T {
         let (stride, coupled) = (inverse.width + 1, inverse.size / linearized.basis.count());
-        let mut sum = Lane::ZERO;
+        let mut sum = T::ZERO;
         for i in 0..inverse.size {
             checkpoint();
             for j in i.saturating_sub(inverse.width)..(i + stride).min(inverse.size) {
-                sum += inverse.at(i, j) * lane(self.gram(coupled, i.max(j) * stride + i.abs_diff(j)));
+                sum += inverse.at(i, j) * T::of(self.gram(coupled, i.max(j) * stride + i.abs_diff(j)));
             }
         }
-        sum * lane(1.0 / coupled as f64)
+        sum * T::of(1.0 / coupled as f64)
     }
 }
 
@@ -283,57 +283,37 @@ fn of_each(band: &[f64], coupled: usize, at: usize) -> f64 {
     if d % coupled == 0 { band[i / coupled * (WIDTH + 1) + d / coupled] } else { 0.0 }
 }
 
-impl Factors {
+impl<T: Number> Factors<T> {
     /// A⁻¹x in place, for coefficients of m numbers.
-    pub fn solve(&self, m: usize, x: &mut [Lane]) {
+    pub fn solve(&self, m: usize, x: &mut [T]) {
         self.matrix.solve(m / self.coupled, x);
     }
 
-    /// The same for one λ, which is on all lanes.
-    pub fn solve_one(&self, m: usize, right: &[f64]) -> Vec<f64> {
-        if self.coupled > 1 {
-            let mut x: Vec<Lane> = right.iter().map(|&x| lane(x)).collect();
-            self.solve(m, &mut x);
-            return x.iter().map(|x| x.as_array()[0]).collect();
-        }
-        // Coordinates in the lanes.
-        let columns = m.div_ceil(LANES);
-        let mut x = vec![Lane::ZERO; right.len() / m * columns];
-        for (right, x) in right.chunks_exact(m).zip(x.chunks_exact_mut(columns)) {
-            for (k, x) in x.iter_mut().enumerate() {
-                *x = Lane::new(few(|l| right.get(k * LANES + l).copied().unwrap_or(0.0)));
-            }
-        }
-        self.matrix.solve(columns, &mut x);
-        let number = |i: usize, c: usize| x[i * columns + c / LANES].as_array()[c % LANES];
-        (0..right.len()).map(|at| number(at / m, at % m)).collect()
-    }
-
     /// The smallest pivot. It is not positive if A is not numerically positive definite.
-    pub fn least_pivot(&self) -> Lane {
+    pub fn least_pivot(&self) -> T {
         self.matrix.least_pivot()
     }
 
     /// ln det A per coordinate.
-    pub fn log_det(&self) -> Lane {
-        self.matrix.log_det() * lane(1.0 / self.coupled as f64)
+    pub fn log_det(&self) -> T {
+        self.matrix.log_det() * T::of(1.0 / self.coupled as f64)
     }
 
     /// The band of A⁻¹.
-    pub fn inverse_band(&self) -> Banded {
+    pub fn inverse_band(&self) -> Banded<T> {
         self.matrix.inverse_band()
     }
 
     /// The band of A⁻¹ of one coordinate: the mean over all coordinates.
-    pub fn mean(&self, inverse: &Banded) -> Banded {
+    pub fn mean(&self, inverse: &Banded<T>) -> Banded<T> {
         let m = self.coupled;
         let entry = |at: usize| {
             let (i, d) = (at / (WIDTH + 1), at % (WIDTH + 1));
             if d > i {
-                return Lane::ZERO;
+                return T::ZERO;
             }
-            let sum = (0..m).fold(Lane::ZERO, |sum, c| sum + inverse.at(i * m + c, (i - d) * m + c));
-            sum * lane(1.0 / m as f64)
+            let sum = (0..m).fold(T::ZERO, |sum, c| sum + inverse.at(i * m + c, (i - d) * m + c));
+            sum * T::of(1.0 / m as f64)
         };
         Banded::of(inverse.size / m, WIDTH, entry)
     }

@@ -92,6 +92,22 @@ impl Motion<'_> {
         Ok(Motion { space, p, v, a, frames: Vec::new() })
     }
 
+    /// The derivatives of points, velocities and accelerations if that of order `nu` moves along the j-th vectors of the
+    /// frames; empty where they vanish.
+    pub fn change(&self, j: usize, nu: usize, monitor: &Monitor) -> Result<Vec<Vec<f64>>, BadRow> {
+        let mut changes = [(); 3].map(|_| Vec::new());
+        changes[nu] = self.vectors(j);
+        if nu == 0 && !self.v.is_empty() {
+            let [after, before] = [STEP, -STEP].map(|step| self.moved(j, 0, step, monitor));
+            let (after, before) = (after?, before?);
+            for (order, change) in changes.iter_mut().enumerate().skip(1) {
+                let both = after.derivative(order).iter().zip(before.derivative(order));
+                *change = both.map(|(a, b)| (a - b) / (2.0 * STEP)).collect();
+            }
+        }
+        Ok(changes.into())
+    }
+
     /// R(ξ, γ')γ' for the j-th vectors ξ of the frames.
     fn curvature(&self, j: usize) -> Vec<f64> {
         let (m, len) = (self.space.dim(), self.space.point_len());

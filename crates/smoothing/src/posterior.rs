@@ -8,7 +8,9 @@ use crate::problem::EndConditions;
 use crate::variance::row_at;
 use symspline_core::memory;
 use symspline_core::monitor::checkpoint;
-use symspline_core::scalar::{LANES, Lane, lane};
+
+/// The number of pairs of times whose covariances are computed at once.
+const PAIRS: usize = 8;
 
 /// The posterior of a curve with noise of variance one.
 pub struct Posterior<'a> {
@@ -17,7 +19,7 @@ pub struct Posterior<'a> {
     /// The number of coordinates that A couples, and of parameters in its border.
     m: usize,
     p: usize,
-    matrix: Factored,
+    matrix: Factored<f64>,
     periodic: Option<PeriodicCorrection>,
 }
 
@@ -28,19 +30,19 @@ impl<'a> Posterior<'a> {
         let [band, side, corner] = matrices;
         let p = corner.len().isqrt();
         memory::require(
-            2.0 * LANES as f64 * (band.len() + 2 * side.len() + 2 * corner.len()) as f64,
+            3.0 * (band.len() + 2 * side.len() + 2 * corner.len()) as f64,
             "the posterior distribution of the curve",
             "Use fewer knots or parameters",
         );
-        let band = Banded::of(basis.count() * m, stride(m) - 1, |at| lane(band[at]));
+        let band = Banded::of(basis.count() * m, stride(m) - 1, |at| band[at]);
         let periodic =
             basis.is_closed().then(|| PeriodicCorrection { overlap: OVERLAP, m, turn: turn.to_vec() });
         let matrix = if periodic.is_some() {
             Factored::new(band, periodic.as_ref())
         } else {
             let mut square = Banded::zeros(p, p.saturating_sub(1));
-            (0..p).for_each(|a| (0..=a).for_each(|b| *square.entry(a, b) = lane(corner[a * p + b])));
-            Factored::open(Bordered::new(band, side.iter().map(|x| lane(*x)).collect(), square))
+            (0..p).for_each(|a| (0..=a).for_each(|b| *square.entry(a, b) = corner[a * p + b]));
+            Factored::open(Bordered::new(band, side.to_vec(), square))
         };
         Posterior { knots, basis, m, p, matrix, periodic }
     }
@@ -66,7 +68,7 @@ impl<'a> Posterior<'a> {
                             let factor = r.factors[a] * s.factors[b];
                             if factor != 0.0 {
                                 let (i, j) = ((r.first + a) * m + u % m, (s.first + b) * m + v % m);
-                                sum += factor * inverse.at(i, j).as_array()[0];
+                                sum += factor * inverse.at(i, j);
                             }
                         }
                     }
@@ -83,26 +85,35 @@ impl<'a> Posterior<'a> {
         let at = |t: f64| row_at(self.knots, &self.basis, t, 0);
         require_result(x.len(), m);
         let mut out = Vec::with_capacity(x.len() * m * m);
-        for (x, y) in x.iter().zip(y) {
+        let unit: Vec<f64> = (0..m * m).map(|at| f64::from(at / m == at % m)).collect();
+        // Several pairs share a pass through the matrix: rows of coefficients, with one column per pair and coordinate.
+        for (x, y) in x.chunks(PAIRS).zip(y.chunks(PAIRS)) {
             checkpoint();
-            let (r, s) = (at(*x), at(*y));
-            // Rows of coefficients, with one column per coordinate of y.
-            let unit: Vec<f64> = (0..m * m).map(|at| f64::from(at / m == at % m)).collect();
-            let mut right = vec![0.0; self.basis.count() * m * m];
-            s.spread(&unit, &mut right);
-            if let Some(periodic) = &self.periodic {
-                right = self.by_columns(right, |column| periodic.fold(column));
+            let columns = x.len() * m;
+            let mut rows = vec![0.0; self.p * columns];
+            let mut rights: Vec<Vec<f64>> = Vec::with_capacity(x.len());
+            for y in y {
+                let mut right = vec![0.0; self.basis.count() * m * m];
+                at(*y).spread(&unit, &mut right);
+                rights.push(match &self.periodic {
+                    Some(periodic) => self.by_columns(right, |column| periodic.fold(column)),
+                    None => right,
+                });
             }
-            let mut lanes = vec![Lane::ZERO; self.p * m];
-            lanes.extend(right.iter().map(|x| lane(*x)));
-            self.matrix.solve(m, &mut lanes);
-            let mut found: Vec<f64> = lanes[self.p * m..].iter().map(|x| x.as_array()[0]).collect();
-            if let Some(periodic) = &self.periodic {
-                found = self.by_columns(found, |column| periodic.extend(column));
+            for i in 0..rights[0].len() / m {
+                rights.iter().for_each(|right| rows.extend(&right[i * m..][..m]));
             }
-            let mut value = vec![0.0; m * m];
-            r.apply(&found, &mut value);
-            out.extend(value);
+            self.matrix.solve(columns, &mut rows);
+            for (k, x) in x.iter().enumerate() {
+                let solved = rows[self.p * columns..].chunks_exact(columns);
+                let mut found: Vec<f64> = solved.flat_map(|row| &row[k * m..][..m]).copied().collect();
+                if let Some(periodic) = &self.periodic {
+                    found = self.by_columns(found, |column| periodic.extend(column));
+                }
+                let mut value = vec![0.0; m * m];
+                at(*x).apply(&found, &mut value);
+                out.extend(value);
+            }
         }
         out
     }
@@ -137,9 +148,9 @@ impl<'a> Posterior<'a> {
         );
         let mut out = Vec::with_capacity(size);
         for normal in normal.chunks_exact(freedom) {
-            let mut x: Vec<Lane> = normal.iter().map(|x| lane(*x)).collect();
+            let mut x = normal.to_vec();
             self.matrix.sample(&mut x);
-            let mut x: Vec<f64> = x[self.p..].iter().map(|x| x.as_array()[0]).collect();
+            x.drain(..self.p);
             if let Some(periodic) = &self.periodic {
                 periodic.extend(&mut x);
             }

@@ -176,11 +176,11 @@ impl Progress {
     /// Records λ, degrees of freedom and noise of the present curve.
     ///
     /// `softness` is the slope of a robust loss: λ of its pseudo-data is λ of the curve divided by it.
-    pub fn note(&mut self, linear: &Linear, inverse: &Banded, lam: f64, softness: f64) {
+    pub fn note(&mut self, linear: &Linear, inverse: &Banded<f64>, lam: f64, softness: f64) {
         let Linear { linearized, m, misfit, .. } = linear;
         let (count, rss) = (misfit.count(*m), misfit.rss_now(*m));
         let unit = self.penalty.unit(linearized.basis.spacing);
-        let freedom = misfit.freedom(linearized, inverse).as_array()[0];
+        let freedom = misfit.freedom(linearized, inverse);
         // If λ hardly affects the curve, as for a geodesic, its best value fluctuates.
         self.settled |= self.report.rounds > 1 && (freedom - self.report.freedom).abs() < SETTLED * freedom;
         self.report.freedom = freedom;

@@ -14,6 +14,13 @@ pub type Residuals = (Vec<f64>, usize);
 /// A function of the motion of some parts and of all parameters that returns whitened residuals.
 pub type Function<'a> = &'a (dyn Fn(&[Motion], &[f64]) -> Residuals + Sync);
 
+/// A change of the motion along one coordinate: the part of the term that changes, and the derivatives of its points,
+/// velocities and accelerations; empty where they vanish.
+pub type Change = (usize, Vec<Vec<f64>>);
+/// A function of the motion, all parameters and changes of the motion that returns the derivatives of whitened residuals:
+/// for each residual one per change, and then one per parameter of the term.
+pub type Derivatives<'a> = &'a (dyn Fn(&[Motion], &[f64], Vec<Change>) -> Vec<f64> + Sync);
+
 /// What a sensor reports.
 #[derive(Clone, Copy)]
 pub enum Sensor<'a> {
@@ -79,6 +86,8 @@ pub enum Sensor<'a> {
         call: Function<'a>,
         /// The highest derivative that it needs.
         nu: usize,
+        /// Its derivatives; None to compute them by differences.
+        derivatives: Option<Derivatives<'a>>,
     },
 }
 
@@ -141,6 +150,11 @@ impl Term<'_> {
             Sensor::Force { .. } => 2,
             Sensor::Function { nu, .. } => nu,
         }
+    }
+
+    /// Whether the residuals are coordinates in frames along the curve.
+    fn has_frames(&self) -> bool {
+        matches!(self.sensor, Sensor::Points { .. })
     }
 
     /// The times with their offset.
@@ -262,10 +276,54 @@ impl Term<'_> {
                     rows.for_each(|(at, (row, x))| row[body_first + j] = x * whitened(at));
                 }
             }
+            Sensor::Function { derivatives: Some(call), .. } => {
+                self.given(call, motion, values, columns, monitor, &mut found)?;
+                return Ok(found);
+            }
             _ => self.differences(motion, values, columns, monitor, &mut found)?,
         }
         self.of_parameters(motion, values, p, monitor, &mut found)?;
         Ok(found)
+    }
+
+    /// Computes derivatives by the function of the user.
+    fn given(
+        &self,
+        call: Derivatives,
+        motion: &[Motion],
+        values: &[f64],
+        columns: &Columns,
+        monitor: &Monitor,
+        found: &mut Linearised,
+    ) -> Result<(), BadRow> {
+        let (m, p, parameters) =
+            (columns.count(), columns.parameters, self.parameters.iter().cloned().flatten());
+        let (mut changes, mut targets) = (Vec::new(), Vec::new());
+        for (i, (part, own)) in self.parts.iter().zip(motion).enumerate() {
+            for nu in 0..=self.order() {
+                for j in 0..own.space.dim() {
+                    checkpoint();
+                    changes.push((i, own.change(j, nu, monitor)?));
+                    targets.push((nu, columns.first[*part] + j));
+                }
+            }
+        }
+        let parameters: Vec<usize> = parameters.collect();
+        let derivatives = call(motion, values, changes);
+        for nu in 0..=self.order() {
+            found.jacobians[nu] = vec![0.0; found.residuals.len() * m];
+        }
+        if !parameters.is_empty() {
+            found.parameters = vec![0.0; found.residuals.len() * p];
+        }
+        for (at, row) in derivatives.chunks_exact(targets.len() + parameters.len()).enumerate() {
+            let (of_changes, of_parameters) = row.split_at(targets.len());
+            for ((nu, column), x) in targets.iter().zip(of_changes) {
+                found.jacobians[*nu][at * m + column] = *x;
+            }
+            parameters.iter().zip(of_parameters).for_each(|(k, x)| found.parameters[at * p + k] = *x);
+        }
+        Ok(())
     }
 
     /// Computes derivatives with respect to the motion by central differences.
@@ -324,7 +382,7 @@ impl Term<'_> {
         Ok(())
     }
 
-    /// Linearises the measurements. `motion_at` returns the motion of a part at times, with derivatives up to an order.
+    /// Linearises the measurements. `motion_at` returns the motion of a part.
     pub fn linearised<'m, E: From<BadRow>>(
         &self,
         motion_at: &MotionAt<'_, 'm, E>,
@@ -334,15 +392,16 @@ impl Term<'_> {
         monitor: &Monitor,
     ) -> Result<Linearised, E> {
         let times = self.shifted(values);
-        let at = |times: &[f64]| {
-            self.parts.iter().map(|part| motion_at(times, *part, self.order())).collect::<Result<Vec<_>, E>>()
+        let at = |times: &[f64], frames: bool| {
+            let of_part = |part: &usize| motion_at(times, (*part, self.order(), frames));
+            self.parts.iter().map(of_part).collect::<Result<Vec<_>, E>>()
         };
-        let mut found = self.derivatives(&at(&times)?, values, columns, monitor)?;
+        let mut found = self.derivatives(&at(&times, true)?, values, columns, monitor)?;
         if let Some(offset) = self.offset {
             let step = STEP * spacing;
             let side = |step: f64| {
                 let times: Vec<f64> = times.iter().map(|t| t + step).collect();
-                Ok::<_, E>(self.residuals(&at(&times)?, values, monitor)?.0)
+                Ok::<_, E>(self.residuals(&at(&times, self.has_frames())?, values, monitor)?.0)
             };
             let (after, before) = (side(step)?, side(-step)?);
             found.set_parameter(offset, columns.parameters, step, &after, &before);
@@ -358,14 +417,14 @@ impl Term<'_> {
         times: &[f64],
         monitor: &Monitor,
     ) -> Result<Linearised, E> {
-        let at = self.parts.iter().map(|part| motion_at(times, *part, self.order()));
+        let at = self.parts.iter().map(|part| motion_at(times, (*part, self.order(), self.has_frames())));
         let (residuals, size) = self.residuals(&at.collect::<Result<Vec<_>, E>>()?, values, monitor)?;
         Ok(Linearised { size, residuals, ..Linearised::default() })
     }
 }
 
-/// The motion of a part at times, with derivatives up to an order.
-pub type MotionAt<'a, 'm, E> = dyn Fn(&[f64], usize, usize) -> Result<Motion<'m>, E> + 'a;
+/// The motion of a part at times, with derivatives up to an order, and with frames if asked for.
+pub type MotionAt<'a, 'm, E> = dyn Fn(&[f64], (usize, usize, bool)) -> Result<Motion<'m>, E> + 'a;
 
 impl Linearised {
     /// Sets the column of parameter k of p from residuals on both sides.

@@ -6,15 +6,14 @@ use crate::linearized::{Basis, LinearProblem, OVERLAP, Stencil};
 use crate::path::{Position, positions};
 use crate::problem::{EndCondition, EndConditions, Penalty};
 use symspline_core::monitor::checkpoint;
-use symspline_core::scalar::lane;
 
 const BAND: usize = WIDTH + 1;
 
 /// The rows of the band of A⁻¹ as plain numbers, four per coefficient.
-pub fn rows_of(inverse: &Banded) -> Vec<f64> {
+pub fn rows_of(inverse: &Banded<f64>) -> Vec<f64> {
     let entry = |at: usize| {
         let (i, d) = (at / BAND, at % BAND);
-        if d <= i { inverse.at(i, i - d).as_array()[0] } else { 0.0 }
+        if d <= i { inverse.at(i, i - d) } else { 0.0 }
     };
     (0..inverse.size * BAND).map(entry).collect()
 }
@@ -34,7 +33,7 @@ pub fn variance(
     nu: usize,
 ) -> Vec<f64> {
     let basis = Basis::new(knots, ends);
-    let inverse = Banded::of(basis.count(), WIDTH, |at| lane(rows[at]));
+    let inverse = Banded::of(basis.count(), WIDTH, |at| rows[at]);
     let velocities = velocities_given_points(knots, ends);
     let one = |t: &f64| {
         checkpoint();
@@ -49,7 +48,7 @@ pub fn variance(
         if nu == 0 && beyond != 0.0 {
             hermite[s as usize] += beyond;
         }
-        let known = row.square(&inverse).as_array()[0];
+        let known = row.square(&inverse);
         if lam == 0.0 {
             return known;
         }
@@ -58,7 +57,7 @@ pub fn variance(
             0 => h.powi(3) * both.powi(3) / 3.0,
             _ => h * both * (1.0 - 3.0 * both),
         };
-        let v = |a: usize, b: usize| velocities.at(segment + a, segment + b).as_array()[0];
+        let v = |a: usize, b: usize| velocities.at(segment + a, segment + b);
         let [a, b] = hermite;
         known + (a * a * v(0, 0) + 2.0 * a * b * v(0, 1) + b * b * v(1, 1) + between) / lam
     };
@@ -77,7 +76,7 @@ pub fn inverse_of_weights(
     let basis = Basis::new(knots, ends);
     let lam = lam / penalty.unit(basis.spacing);
     let linearized = LinearProblem::new(basis, &positions(knots, times), weights, penalty);
-    let entry = |at: usize| lane(lam.mul_add(linearized.penalty[at], linearized.gram[at]));
+    let entry = |at: usize| lam.mul_add(linearized.penalty[at], linearized.gram[at]);
     let matrix = Banded::of(linearized.basis.count(), WIDTH, entry);
     let periodic = linearized.basis.is_closed().then(|| PeriodicCorrection::plain(OVERLAP, 1));
     rows_of(&Factored::new(matrix, periodic.as_ref()).inverse_band())
@@ -120,7 +119,7 @@ pub fn functional_at(knots: &[f64], ends: EndConditions, times: &[f64], nu: usiz
 
 /// The band of T⁻¹, where vᵀTv is the contribution of the velocities at knots to ∫ x''²: `4(v₀² + v₀v₁ + v₁²)/h` per
 /// segment. Prescribed velocities get a negligible variance.
-fn velocities_given_points(knots: &[f64], ends: EndConditions) -> Banded {
+fn velocities_given_points(knots: &[f64], ends: EndConditions) -> Banded<f64> {
     const FIXED: f64 = 1e12;
     let last = knots.len() - 1;
     let stiffness = |i: usize| 1.0 / (knots[i + 1] - knots[i]);
@@ -129,10 +128,10 @@ fn velocities_given_points(knots: &[f64], ends: EndConditions) -> Banded {
         let (i, beside) = (at / 2, at % 2 == 1);
         let [left, right] = [(i > 0).then(|| stiffness(i - 1)), (i < last).then(|| stiffness(i))];
         if beside {
-            return lane(2.0 * left.unwrap_or(0.0));
+            return 2.0 * left.unwrap_or(0.0);
         }
         let fixed = if (i == 0 && given(0)) || (i == last && given(1)) { FIXED } else { 1.0 };
-        lane(4.0 * fixed * (left.unwrap_or(0.0) + right.unwrap_or(0.0)))
+        4.0 * fixed * (left.unwrap_or(0.0) + right.unwrap_or(0.0))
     });
     // The last velocity of a closed curve equals the first.
     let periodic = (ends == EndConditions::Periodic).then(|| PeriodicCorrection::plain(1, 1));

@@ -39,6 +39,73 @@ mod banded {
     }
 }
 
+mod elimination {
+    use symspline_core::scalar::{Dual, Lane, Scalar, lane};
+    use symspline_smoothing::private::eliminate;
+
+    /// The matrix g G + P of lane 0 for diagonally dominant matrices G and P, the border last.
+    fn entry(i: usize, j: usize, size: usize, g: f64) -> f64 {
+        let (row, column) = (i.max(j), i.min(j));
+        let [x, y] = [3.0, 5.0].map(|k| (k * (row * 7 + column * 3) as f64).sin());
+        if row == column {
+            (4.0 + x) * g + 8.0 + if row < size { 0.0 } else { 9.0 }
+        } else {
+            0.4 * (x * g + y)
+        }
+    }
+
+    /// ln det of the leading rows, and the last pivot, by dense elimination.
+    fn dense(size: usize, width: usize, border: usize, g: f64) -> (f64, f64) {
+        let n = size + border;
+        let mut a: Vec<Vec<f64>> = (0..n)
+            .map(|i| {
+                let near = |j: usize| i.max(j) >= size || i.abs_diff(j) <= width;
+                (0..n).map(|j| if near(j) { entry(i, j, size, g) } else { 0.0 }).collect()
+            })
+            .collect();
+        let mut log_det = 0.0;
+        for k in 0..n - 1 {
+            log_det += a[k][k].ln();
+            for i in k + 1..n {
+                let factor = a[i][k] / a[k][k];
+                for j in k..n {
+                    a[i][j] -= factor * a[k][j];
+                }
+            }
+        }
+        (log_det, a[n - 1][n - 1])
+    }
+
+    #[test]
+    fn agrees_with_dense_elimination_and_its_derivative() {
+        for (size, width, border) in [(1, 3, 1), (2, 3, 3), (9, 3, 1), (20, 7, 4), (5, 7, 2), (30, 4, 3)] {
+            let number = |i: usize, j: usize| {
+                let value = entry(i, j, size, 1.0);
+                Dual::from_parts([lane(value), lane(value - entry(i, j, size, 0.0)), Lane::ZERO])
+            };
+            let corner =
+                (0..border * border).map(|at| number(size + at / border, size + at % border)).collect();
+            let found = eliminate(size, width, corner, 1, |i, row: &mut [Dual]| {
+                for (c, x) in row.iter_mut().enumerate() {
+                    *x = match (i + c).checked_sub(width) {
+                        _ if c > width => number(size + c - width - 1, i),
+                        Some(j) => number(i, j),
+                        None => Dual::constant(Lane::ZERO),
+                    };
+                }
+            });
+            let h = 1e-4;
+            let [before, at, after] = [1.0 - h, 1.0, 1.0 + h].map(|g| dense(size, width, border, g));
+            let first = |x: Lane| x.as_array()[0];
+            assert!((first(found.log_det.v) - at.0).abs() < 1e-12 * at.0.abs());
+            assert!((first(found.rest[0].v) - at.1).abs() < 1e-12 * at.1.abs());
+            assert!((first(found.log_det.d) - (after.0 - before.0) / (2.0 * h)).abs() < 1e-6);
+            assert!((first(found.rest[0].d) - (after.1 - before.1) / (2.0 * h)).abs() < 1e-6);
+            assert!(found.least.simd_gt(Lane::ZERO).all());
+        }
+    }
+}
+
 mod gaps {
     use symspline_core::scalar::{Lane, lane};
     use symspline_smoothing::estimation::Matrices;

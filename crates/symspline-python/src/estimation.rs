@@ -17,7 +17,7 @@ use symspline_engine::smoothing::estimation::Matrices;
 use symspline_engine::smoothing::iteration::{Constant, Failure, Invalid, Linear, Options, Problem};
 use symspline_engine::smoothing::motion::{BadRow, Motion};
 use symspline_engine::smoothing::posterior::Posterior;
-use symspline_engine::smoothing::terms::{Linearised, Residuals, Sensor, Term};
+use symspline_engine::smoothing::terms::{Change, Derivatives, Linearised, Residuals, Sensor, Term};
 use symspline_engine::smoothing::{Criterion, EndCondition, EndConditions, Loss, Penalty};
 use symspline_engine::space::{Ambient, Erased, Origin};
 
@@ -98,7 +98,7 @@ pub fn frames_along<'py>(
 
 /// Measurements of one kind: the sensor, the parts of the space, times, standard deviations (n, d) or none, the loss, the
 /// parameter that is added to the times, the arrays of the sensor, its other parameters (first and number), and the
-/// function of the user with the highest derivative that it needs.
+/// function of the user with the highest derivative that it needs and the function that returns its derivatives, if any.
 type TermOf<'py> = (
     String,
     Vec<usize>,
@@ -108,7 +108,7 @@ type TermOf<'py> = (
     Option<usize>,
     Vec<Array<'py>>,
     Vec<Option<(usize, usize)>>,
-    Option<(Py<PyAny>, usize)>,
+    Option<(Py<PyAny>, usize, Option<Py<PyAny>>)>,
 );
 
 /// A problem: the parts of the space; for those that are groups with a metric that is invariant on both sides, the array
@@ -122,6 +122,8 @@ enum Request {
     Progress(usize),
     /// The function of a term: points, velocities and accelerations of its parts, and all parameters.
     Residuals { term: usize, states: Vec<Vec<Vec<f64>>>, values: Vec<f64> },
+    /// The derivatives of that function with respect to changes of the motion and to its parameters.
+    Derivatives { term: usize, states: Vec<Vec<Vec<f64>>>, values: Vec<f64>, changes: Vec<Change> },
 }
 
 /// Makes calls of Python in the thread of the user, which waits while another thread computes.
@@ -188,8 +190,10 @@ fn with_problem<T: Send>(
     let (knots, penalty) = (in_order(knots)?, penalty_named(penalty)?);
     let spaces: Vec<Erased> = handles.iter().map(|handle| handle.space.get()).collect();
     let shapes: Vec<Vec<usize>> = spaces.iter().map(shape_of).collect();
-    let functions: Vec<Option<&Py<PyAny>>> =
-        terms.iter().map(|term| term.8.as_ref().map(|own| &own.0)).collect();
+    let functions: Vec<[Option<&Py<PyAny>>; 2]> = terms
+        .iter()
+        .map(|term| term.8.as_ref().map_or([None; 2], |own| [Some(&own.0), own.2.as_ref()]))
+        .collect();
     let parts: Vec<&[usize]> = terms.iter().map(|term| &term.1[..]).collect();
     let call = |py: Python, request: Request| match request {
         Request::Progress(number) => {
@@ -197,31 +201,45 @@ fn with_problem<T: Send>(
             Ok((Vec::new(), 0))
         }
         Request::Residuals { term, states, values } => {
-            let arrays = |numbers: &Vec<Vec<f64>>| {
-                numbers.iter().zip(parts[term]).map(|(x, part)| of_points(py, &shapes[*part], x)).collect()
-            };
-            let states = states.iter().map(arrays).collect::<PyResult<Vec<Vec<Out>>>>()?;
-            let function = functions[term].ok_or_else(|| invalid("the measurement has no function"))?;
+            let states = motions(py, &shapes, parts[term], &states)?;
+            let function = functions[term][0].ok_or_else(|| invalid("the measurement has no function"))?;
             let found = function.call1(py, (states, array(py, &[values.len()], &values)?))?;
+            let found: Array = found.extract(py)?;
+            Ok((in_order(&found)?.to_vec(), found.shape()[1]))
+        }
+        Request::Derivatives { term, states, values, changes } => {
+            let states = motions(py, &shapes, parts[term], &states)?;
+            let of_change = |(part, arrays): &Change| {
+                let shape = &shapes[parts[term][*part]];
+                let arrays =
+                    arrays.iter().map(|x| of_points(py, shape, x)).collect::<PyResult<Vec<Out>>>()?;
+                Ok((*part, arrays))
+            };
+            let changes = changes.iter().map(of_change).collect::<PyResult<Vec<_>>>()?;
+            let function = functions[term][1].ok_or_else(|| invalid("the measurement has no derivatives"))?;
+            let found = function.call1(py, (states, array(py, &[values.len()], &values)?, changes))?;
             let found: Array = found.extract(py)?;
             Ok((in_order(&found)?.to_vec(), found.shape()[1]))
         }
     };
     let desk = Desk::new(&call);
-    let residuals_of = |term: usize| {
-        let desk = &desk;
-        move |motion: &[Motion], values: &[f64], order: usize| {
-            let state = |nu: usize| motion.iter().map(|own| own.derivative(nu).to_vec()).collect();
-            let states = (0..=order).map(state).collect();
-            desk.ask(Request::Residuals { term, states, values: values.to_vec() })
-        }
+    let states = |motion: &[Motion], order: usize| -> Vec<Vec<Vec<f64>>> {
+        (0..=order).map(|nu| motion.iter().map(|own| own.derivative(nu).to_vec()).collect()).collect()
     };
-    let calls: Vec<Box<ResidualsOf<'_>>> = terms
+    let calls: Vec<(Box<ResidualsOf<'_>>, Box<DerivativesOf<'_>>)> = terms
         .iter()
         .enumerate()
-        .map(|(number, term)| -> Box<ResidualsOf<'_>> {
-            let (order, residuals) = (term.8.as_ref().map_or(0, |own| own.1), residuals_of(number));
-            Box::new(move |motion, values| residuals(motion, values, order))
+        .map(|(number, term)| -> (Box<ResidualsOf<'_>>, Box<DerivativesOf<'_>>) {
+            let (desk, order) = (&desk, term.8.as_ref().map_or(0, |own| own.1));
+            let residuals = move |motion: &[Motion], values: &[f64]| {
+                let (states, values) = (states(motion, order), values.to_vec());
+                desk.ask(Request::Residuals { term: number, states, values })
+            };
+            let derivatives = move |motion: &[Motion], values: &[f64], changes: Vec<Change>| {
+                let (states, values) = (states(motion, order), values.to_vec());
+                desk.ask(Request::Derivatives { term: number, states, values, changes }).0
+            };
+            (Box::new(residuals), Box::new(derivatives))
         })
         .collect();
     let each = terms.iter().zip(&calls).map(|(term, call)| read_term(term, &spaces, call));
@@ -257,6 +275,19 @@ fn with_problem<T: Send>(
     }
 }
 
+/// The arrays of all derivatives of a motion, for each part of a term.
+fn motions<'py>(
+    py: Python<'py>,
+    shapes: &[Vec<usize>],
+    parts: &[usize],
+    states: &[Vec<Vec<f64>>],
+) -> PyResult<Vec<Vec<Out<'py>>>> {
+    let arrays = |numbers: &Vec<Vec<f64>>| {
+        numbers.iter().zip(parts).map(|(x, part)| of_points(py, &shapes[*part], x)).collect()
+    };
+    states.iter().map(arrays).collect()
+}
+
 /// The shape of the floating-point array of a point.
 fn shape_of(space: &Erased) -> Vec<usize> {
     let mut shape = space.point_shape();
@@ -276,7 +307,7 @@ fn of_points<'py>(py: Python<'py>, shape: &[usize], numbers: &[f64]) -> PyResult
 fn read_term<'a>(
     term: &'a TermOf,
     spaces: &'a [Erased<'a>],
-    call: &'a (dyn Fn(&[Motion], &[f64]) -> Residuals + Sync),
+    (call, derivatives): &'a (Box<ResidualsOf<'a>>, Box<DerivativesOf<'a>>),
 ) -> PyResult<Term<'a>> {
     let (kind, parts, times, noise, loss, offset, arrays, constants, function) = term;
     let given = |at: usize| arrays.get(at).map_or(Ok(&[][..]), in_order);
@@ -300,7 +331,14 @@ fn read_term<'a>(
             bias: first(0),
             unknown_arm: first(1),
         },
-        _ => Sensor::Function { call, nu: function.as_ref().map_or(0, |own| own.1) },
+        _ => Sensor::Function {
+            call,
+            nu: function.as_ref().map_or(0, |own| own.1),
+            derivatives: function
+                .as_ref()
+                .and_then(|own| own.2.as_ref())
+                .map(|_| &**derivatives as Derivatives),
+        },
     };
     Ok(Term {
         sensor,
@@ -353,6 +391,8 @@ pub struct Solved<'py> {
 
 /// Residuals of a term, from the motion of its parts and values of the parameters.
 type ResidualsOf<'a> = dyn Fn(&[Motion], &[f64]) -> Residuals + Sync + 'a;
+/// Their derivatives.
+type DerivativesOf<'a> = dyn Fn(&[Motion], &[f64], Vec<Change>) -> Vec<f64> + Sync + 'a;
 
 /// The result of the iteration, or the information about parameters that the measurements do not determine.
 #[derive(IntoPyObject)]
@@ -363,15 +403,16 @@ pub enum Estimated<'py> {
 }
 
 /// Estimates a curve through initial points at the knots, in every part, with initial values of the parameters. λ that
-/// are NaN are chosen.
+/// are NaN are chosen, near those in `near` if all of these are given.
 #[pyfunction]
-#[pyo3(signature = (problem, points, values, lams, criterion, gamma, tol, max_iter, progress=None))]
+#[pyo3(signature = (problem, points, values, lams, near, criterion, gamma, tol, max_iter, progress=None))]
 pub fn estimate<'py>(
     py: Python<'py>,
     problem: ProblemOf<'py>,
     points: Vec<Array<'py>>,
     values: Array<'py>,
     lams: Vec<f64>,
+    near: Vec<f64>,
     criterion: &str,
     gamma: f64,
     tol: f64,
@@ -379,8 +420,12 @@ pub fn estimate<'py>(
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Estimated<'py>> {
     let (points, values) = (owned(&points)?, in_order(&values)?.to_vec());
-    let lams: Vec<Option<f64>> = lams.iter().map(|x| Some(*x).filter(|x| !x.is_nan())).collect();
-    let options = Options { lams: &lams, criterion: criterion_named(criterion, gamma)?, tol, max_iter };
+    let [lams, near] = [lams, near].map(|lams| {
+        let known = |x: &f64| Some(*x).filter(|x| !x.is_nan());
+        lams.iter().map(known).collect::<Vec<Option<f64>>>()
+    });
+    let options =
+        Options { lams: &lams, near: &near, criterion: criterion_named(criterion, gamma)?, tol, max_iter };
     let found = with_problem(py, &problem, true, progress.as_ref(), max_iter, |problem, report, monitor| {
         problem.solved(points, values, &options, report, monitor)
     })?;

@@ -14,7 +14,17 @@ from .._smoothing.audit import DEGREES, Residuals, Sensor, advice, corner_of, de
 from .._smoothing.report import Posterior
 from .._spaces import Array, Doubles
 from ..measure import GRAVITY
-from .problem import ForceTerm, FunctionTerm, PointTerm, RateTerm, Rows, Setup, Solution, Term
+from .problem import (
+    ForceTerm,
+    FunctionTerm,
+    PointTerm,
+    RateTerm,
+    Rows,
+    Setup,
+    Solution,
+    Term,
+    distance_from_minimum,
+)
 
 # Number of measurements of a sensor in the estimate of its mean leverage.
 _SAMPLE = 64
@@ -53,9 +63,10 @@ def audit(setup: Setup, solution: Solution) -> float:
         )
     ratios, freedoms = np.array(known).reshape(-1, 2).T
     freedom = freedoms.sum()
-    if solution.distance > _DISTANCE:
+    distance = distance_from_minimum(setup, solution)
+    if distance > _DISTANCE:
         warn(
-            f"The curve is {solution.distance:.2g} standard deviations from the minimum of its objective. It turns by "
+            f"The curve is {distance:.2g} standard deviations from the minimum of its objective. It turns by "
             f"up to {solution.turn:.2g} rad between two knots, where the linearised problem is inaccurate. Pass more "
             "knots.",
             SmoothingWarning,

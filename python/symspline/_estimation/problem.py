@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cache, cached_property
 from itertools import starmap
 from operator import itemgetter
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -48,6 +48,7 @@ from ..measure import (
     Velocities,
     broadcast,
 )
+from .functions import Arguments, UserFunction
 
 _SO3, _S3, _R3 = SpecialOrthogonal(3), Sphere(3), Euclidean(3)
 # Directions count as normalised if their lengths differ from those of the references by less than this fraction of σ.
@@ -134,8 +135,10 @@ class Term:
         times, noise, *others = map(np.ascontiguousarray, arrays)
         return self.sensor, self.parts, times, noise, self.loss, offset, others, places, function
 
-    def function(self, columns: dict[str, slice]) -> tuple[Callable[..., Doubles], int] | None:
-        """Return the function of the user with its highest derivative; None for sensors of the core."""
+    def function(
+        self, columns: dict[str, slice]
+    ) -> tuple[Callable[..., Doubles], int, Callable[..., Doubles] | None] | None:
+        """Return the function of the user, its highest derivative and its derivatives; None for sensors of the core."""
         return None
 
 
@@ -300,22 +303,37 @@ class FunctionTerm(Term):
 
     def __init__(self, label: str, given: Function, times: Doubles, parts: list[int], spaces: Sequence[Space]) -> None:
         super().__init__(label, given, times, parts)
-        self.residual, self.nu = given.residual, given.nu
+        self.nu = given.nu
         # The space of the points that the function receives, and its parts.
         self.space, *self.spaces = spaces
         self.names = {key: self.name(constant, key) for key, constant in given.parameters.items()}
         self.slots = list(self.names.values())
+        self.user = UserFunction(label, given)
 
-    def function(self, columns: dict[str, slice]) -> tuple[Callable[..., Doubles], int]:
-        """Return the function that the core calls with the motion and all parameters, and its highest derivative."""
+    def function(self, columns: dict[str, slice]) -> tuple[Callable[..., Doubles], int, Callable[..., Doubles] | None]:
+        """Return the function that the core calls with the motion and all parameters, with its derivatives."""
+
+        def arguments(states: list[list[Doubles]], values: Doubles) -> Arguments:
+            motion = [self._joined(state, float(nu == 0)) for nu, state in enumerate(states)]
+            return Arguments(motion, {key: values[columns[name]].copy() for key, name in self.names.items()})
 
         def whitened(states: list[list[Doubles]], values: Doubles) -> Doubles:
-            arguments: list[object] = [self._joined(state, float(nu == 0)) for nu, state in enumerate(states)]
-            if self.names:
-                arguments.append({key: values[columns[name]].copy() for key, name in self.names.items()})
-            return np.ascontiguousarray(self._checked(self.residual(*arguments)) / self.noise)
+            return np.ascontiguousarray(self._checked(self.user(arguments(states, values))) / self.noise)
 
-        return whitened, self.nu
+        def derivatives(
+            states: list[list[Doubles]], values: Doubles, changes: list[tuple[int, list[Doubles]]]
+        ) -> Doubles:
+            at, directions = arguments(states, values), []
+            for part, arrays in changes:
+                moved = [[np.zeros_like(rows) for rows in state] for state in states]
+                for state, rows in zip(moved, arrays, strict=False):
+                    # Empty arrays vanish.
+                    state[part] = rows if rows.size else state[part]
+                directions.append([self._joined(state, 0.0) for state in moved])
+            found = self.user.derivatives(at, directions)
+            return np.ascontiguousarray((found / self.noise[..., None]).reshape(-1, found.shape[-1]))
+
+        return whitened, self.nu, None if self.user.given.jacobian is None else derivatives
 
     def _checked(self, value: ArrayLike) -> Doubles:
         n = len(self.times)
@@ -612,7 +630,7 @@ class Setup:
     automatic: bool = False
 
     @property
-    def bc_type(self) -> str:
+    def bc_type(self) -> Literal["natural", "not-a-knot"]:
         """End conditions of the curves."""
         return "natural" if self.penalty == "acceleration" else "not-a-knot"
 
@@ -713,8 +731,6 @@ class Solution(NamedTuple):
         Sum of the losses of all measurements and of the priors.
     turn : float
         Largest distance that the curve covers between two knots, in units of the radius of curvature of its space.
-    distance : float
-        Distance from the minimum in standard deviations; 0 if `turn` is so small that it is not computed.
     failure : str
         Description of a failure, or "".
     """
@@ -728,15 +744,17 @@ class Solution(NamedTuple):
     variances: Doubles
     loss: float
     turn: float
-    distance: float
     failure: str
 
 
-def iterate(setup: Setup, points: list[Array], values: Values, progress: Progress | None) -> Solution:
-    """Iterate from points at the knots until the step is small."""
+def iterate(
+    setup: Setup, points: list[Array], values: Values, progress: Progress | None, near: list[float] | None = None
+) -> Solution:
+    """Iterate from points at the knots until the step is small; `near` are λ of a curve close to the result."""
     problem, start, constants = setup.in_core(points, values)
-    lams, criterion, gamma = setup.lams.tolist(), setup.criterion, setup.gamma
-    raw = _core.estimate(problem, start, constants, lams, criterion, gamma, setup.tol, setup.max_iter, progress)
+    lams = setup.lams.tolist()
+    options = setup.criterion, setup.gamma, setup.tol, setup.max_iter
+    raw = _core.estimate(problem, start, constants, lams, near or [np.nan] * len(lams), *options, progress)
     if isinstance(raw, np.ndarray):
         raise _undetermined(setup, raw)
     failed, number, step = raw["failure"], raw["iterations"], raw["step"]
@@ -752,10 +770,7 @@ def iterate(setup: Setup, points: list[Array], values: Values, progress: Progres
     information, covariance = raw["information"], np.full_like(raw["information"], np.nan)
     if np.isfinite(information).all():
         covariance = np.asarray(np.linalg.pinv(information, hermitian=True), np.float64)
-    distance, (band, side, corner) = 0.0, raw["matrices"]
-    if failed is None and raw["turn"] > _TURN:
-        normal = np.random.default_rng(0).standard_normal((_SAMPLES, raw["variances"].size))
-        distance = _core.distance_from_minimum(problem, raw["points"], raw["values"], raw["lams"], band, normal)
+    band, side, corner = raw["matrices"]
     return Solution(
         solved_points,
         solved_values,
@@ -766,9 +781,18 @@ def iterate(setup: Setup, points: list[Array], values: Values, progress: Progres
         raw["variances"],
         raw["loss"],
         raw["turn"],
-        distance,
         "" if failed is None else _FAILURES[failed].format(step=step, number=number, tol=setup.tol),
     )
+
+
+def distance_from_minimum(setup: Setup, solution: Solution) -> float:
+    """Return the distance of a solution from the minimum in standard deviations; 0 if it turns little between knots."""
+    if solution.turn <= _TURN:
+        return 0.0
+    lams = [float(report.lam) for report in solution.reports]
+    normal = np.random.default_rng(0).standard_normal((_SAMPLES, solution.variances.size))
+    problem = setup.in_core(solution.points, solution.values)
+    return _core.distance_from_minimum(*problem, lams, solution.posterior.band, normal)
 
 
 def residuals(setup: Setup, points: list[Array], values: Values) -> list[Doubles] | None:

@@ -21,6 +21,7 @@ from .._smoothing.noise import split
 from .._smoothing.solve import places
 from .._spaces import AnySpace, Array, Doubles, Euclidean, Product, SpecialOrthogonal, factors_of, nearest_rotations
 from .._splines.base import Curve
+from .._splines.cubic import CubicSpline
 from ..convert._quaternions import matrix_to_quaternion
 from ..measure import Points
 from .problem import (
@@ -538,20 +539,29 @@ class Search(NamedTuple):
             )
 
 
-def solved(setup: Setup, begin: Starts, progress: Progress | None) -> Search:
-    """Iterate from the first initial curve, and from further ones while a sensor contradicts the best result."""
+def solved(
+    setup: Setup, begin: Starts, progress: Progress | None, coarse: tuple[Setup, Solution] | None = None
+) -> Search:
+    """Iterate from the first initial curve, and from further ones while a sensor contradicts the best result.
+
+    A result with fewer knots comes before the initial curves if no sensor contradicts it.
+    """
     best: Solution | None = None
     refused: SymsplineError | None = None
     rival, place = 0.0, 0
-    number = 0
+    number = 0 if coarse is None or _contradicts(*coarse) else -1
     while best is None or best.failure or _contradicts(setup, best):
+        near = None
         try:
-            start = begin[number]
+            if number < 0 and coarse is not None:
+                start, near = _of_solution(*coarse), [float(report.lam) for report in coarse[1].reports]
+            else:
+                start = begin[number]
         except IndexError:
             break
         number += 1
         try:
-            solution = iterate(setup, start.points(setup.knots), start.values, progress)
+            solution = iterate(setup, start.points(setup.knots), start.values, progress, near)
         except (ValidationError, ConvergenceError) as error:
             refused = refused or error
             continue
@@ -570,6 +580,14 @@ def solved(setup: Setup, begin: Starts, progress: Progress | None) -> Search:
         assert refused is not None
         raise refused
     return Search(best, rival, place)
+
+
+def _of_solution(setup: Setup, solution: Solution) -> Start:
+    """Return the curve of a solution as an initial curve."""
+    paths: list[PathOfPart] = []
+    for space, points in zip(setup.spaces, solution.points, strict=True):
+        paths.append(CubicSpline(setup.knots, points, space, bc_type=setup.bc_type))
+    return Start(paths, solution.values)
 
 
 def _contradicts(setup: Setup, solution: Solution) -> bool:
@@ -620,7 +638,7 @@ def automatic(
     for _ in range(_HALVINGS):
         refused: SymsplineError | None = None
         try:
-            search = solved(now, begin, progress)
+            search = solved(now, begin, progress, None if before is None else (before[1], before[2].solution))
         except (ValidationError, ConvergenceError) as error:
             refused = error
         if refused or search.solution.failure:
