@@ -430,7 +430,7 @@ class Function(Measurement):
         array of shape (n, ...) has shape (n, k, ...), or (n, ...) if `residual` returns shape (n,): row i of the
         residuals depends on row i of the points only. All entries of the points count as independent, also those of
         matrices and unit vectors. The derivative with respect to the dict of parameters is a dict of arrays of shape
-        (n, k, size), or (n, size). None stands for zero, and a product has a tuple of arrays per argument. With
+        (n, k, size), or (n, size). Return None where all vanish. A product has a tuple of arrays per argument. With
         respect to complex entries x + iy, return ∂r/∂x + i ∂r/∂y. The first result is compared with differences.
         ``"jax"`` differentiates `residual`, which must be written with ``jax.numpy``, by ``jax.jacfwd``. None selects
         central differences.

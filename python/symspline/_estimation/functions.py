@@ -7,7 +7,9 @@ from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from .._base.arrays import as_array
 from .._core import ValidationError
 from .._spaces import Array, Doubles
 from ..measure import Function
@@ -121,13 +123,13 @@ class UserFunction:
             blocks.append(absent if derivative is None else self._read(derivative, residuals, values.shape, repr(name)))
         return np.concatenate(blocks, axis=-1)
 
-    def _read(self, derivative: object, residuals: Array, shape: tuple[int, ...], what: str) -> Array:
+    def _read(self, derivative: ArrayLike, residuals: Array, shape: tuple[int, ...], what: str) -> Array:
         """Return derivatives, shape (n, k, numbers)."""
-        array, wanted = np.asarray(derivative), (*residuals.shape, *shape)
+        name = f"{self.label}.jacobian: the derivative with respect to {what}"
+        array, wanted = as_array(derivative, name), (*residuals.shape, *shape)
         if array.shape != wanted or array.dtype.kind not in "iufbc":
             raise ValidationError(
-                f"{self.label}.jacobian: the derivative with respect to {what} is {array.dtype} of shape {array.shape}"
-                f", but numbers of shape {wanted} are needed"
+                f"{name} is {array.dtype} of shape {array.shape}, but numbers of shape {wanted} are needed"
             )
         bad = np.argwhere(~np.isfinite(array))
         if len(bad):
