@@ -10,7 +10,7 @@ from pathlib import Path
 
 import symspline as ss
 
-from . import cost, data, every_space, grids, limits, machine, side_by_side
+from . import cost, data, every_space, grids, limits, machine, multiples, side_by_side
 from .data import FULL, QUICK, Sizes
 from .tables import table
 from .timing import Effort
@@ -26,6 +26,9 @@ def main() -> None:
     parser.add_argument("--spaces", action="store_true", help="only the tables of every space")
     parser.add_argument("--grids", action="store_true", help="only the tables of grids")
     parser.add_argument(
+        "--multiples", action="store_true", help="only the table of derivatives, smoothing and others"
+    )
+    parser.add_argument(
         "--large", action="store_true", help=f"with a curve in {every_space.LARGE.space} among the spaces"
     )
     given = parser.parse_args()
@@ -35,10 +38,15 @@ def main() -> None:
             print("A smoke test: it shows that the benchmarks run; its numbers mean nothing.\n", flush=True)
         threads = ss.num_threads()
         sizes, effort = (QUICK, Effort(2, 0, 0.1)) if given.quick else (FULL, Effort(7, 0.02, 10))
-        if not given.spaces:
+        if not given.spaces and not given.multiples:
             grid_sizes = grids.QUICK if given.quick else grids.FULL
             _write(folder, "grids", grids.pieces(grid_sizes, threads, effort))
         if given.grids:
+            return
+        if not given.spaces:
+            of_multiples = multiples.QUICK if given.quick else multiples.FULL
+            _write(folder, "multiples", _multiples(of_multiples, threads, effort))
+        if given.multiples:
             return
         if not given.spaces:
             _write(folder, "measured", _pieces(folder, sizes, threads, effort))
@@ -86,6 +94,12 @@ def _pieces(folder: Path, sizes: Sizes, threads: int, effort: Effort) -> Iterato
     yield limits.cores_text(walk, sizes, effort)
     yield "## How far from the limit"
     yield limits.limits_text(walk, sizes, effort)
+
+
+def _multiples(sizes: multiples.Sizes, threads: int, effort: Effort) -> Iterator[str]:
+    yield "## Beside a fit or an evaluation"
+    yield table(("", ""), machine.description(threads, PACKAGES).items())
+    yield multiples.text(sizes, effort)
 
 
 def _spaces(plan: every_space.Plan, threads: int) -> Iterator[str]:

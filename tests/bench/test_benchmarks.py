@@ -33,7 +33,7 @@ def test_smoke_test_runs_and_keeps_nothing():
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith("A smoke test")
     assert "goal for" not in done.stdout.lower() and "reached" not in done.stdout
-    assert done.stdout.count("\n## ") == 7
+    assert done.stdout.count("\n## ") == 8
     failed = [line for line in done.stdout.splitlines() if "fails" in line]
     assert all("Unsupported n: 2" in line for line in failed), failed
     assert kept == {file: file.read_bytes() for file in (ROOT / "benchmarks").glob("*.*")}
