@@ -468,9 +468,10 @@ _MISSES = 1.2
 # Two results are equally good if their losses differ by less than the first number. They are different if they are
 # farther apart than the second number of standard deviations.
 _EQUAL, _APART = 10.0, 5.0
-# Points move by more than this number of standard deviations if there are too few knots.
-_MOVED = 0.5
-# Largest number of times that all intervals are divided, and that this is repeated without an effect.
+# Points move by more than this number of standard deviations if there are too few knots. Intervals are then divided
+# where points move by more than the second number, and at so many knots on both sides.
+_MOVED, _MOVING, _BESIDES = 0.5, 0.2, 4
+# Largest number of times that intervals are divided, and that this is repeated without an effect.
 _HALVINGS, _IN_VAIN = 14, 2
 # With fewer knots per datum than this, the motion may be so fast that dividing intervals has no effect at first.
 _FEW_KNOTS = 0.1
@@ -619,8 +620,8 @@ def automatic(
 ) -> tuple[Array, Setup, Search]:
     """Choose the knots, and estimate.
 
-    The first knots reproduce the initial curve. All intervals are then divided until no point moves by more than half
-    of its standard deviation and the residuals do not decrease.
+    The first knots reproduce the initial curve. All intervals are then divided until the residuals do not decrease, and
+    those where points move until none of them moves by more than half of its standard deviation.
     """
 
     def with_knots(knots: Doubles) -> tuple[Array, Setup]:
@@ -637,6 +638,7 @@ def automatic(
     in_vain = 0
     for _ in range(_HALVINGS):
         refused: SymsplineError | None = None
+        divided: NDArray[np.bool_] | None = None
         try:
             search = solved(now, begin, progress, None if before is None else (before[1], before[2].solution))
         except (ValidationError, ConvergenceError) as error:
@@ -656,13 +658,16 @@ def automatic(
                 at_bound = any(bool(report.at_bound) for report in reports)
                 few = at_bound or len(now.knots) < _FEW_KNOTS * len(data)
                 in_vain = 0 if sigma < 0.95 * last or few else in_vain + 1
-                misses = _misses(search.solution) and in_vain < _IN_VAIN
-                if not misses and _moved(before[1], before[2].solution, now, search.solution) <= _MOVED:
-                    break
+                moved = _moved(before[1], before[2].solution, now, search.solution)
+                if not _misses(search.solution) or in_vain >= _IN_VAIN:
+                    if moved.max() <= _MOVED:
+                        break
+                    # The curve has enough knots where it hardly moved.
+                    divided = _around(moved > _MOVING)
             if len(now.knots) > most:
                 break
             before = (shown, now, search)
-        shown, now = with_knots(bisected(now.knots))
+        shown, now = with_knots(graded(bisected(now.knots, divided)))
     if refused:
         raise refused
     return shown, now, search
@@ -673,8 +678,14 @@ def _misses(solution: Solution) -> bool:
     return float(solution.reports[0].sigma) > _MISSES
 
 
-def _moved(coarse: Setup, before: Solution, fine: Setup, solution: Solution) -> float:
-    """Return the largest distance of the curve with fewer knots, in standard deviations."""
+def _around(chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return the intervals at most `_BESIDES` knots away from chosen knots."""
+    near = np.convolve(chosen, np.ones(2 * _BESIDES + 1), "same") > 0
+    return np.asarray(near[1:] | near[:-1])
+
+
+def _moved(coarse: Setup, before: Solution, fine: Setup, solution: Solution) -> Doubles:
+    """Return the distances of the curve with fewer knots at the knots, in standard deviations."""
     x = np.clip(fine.knots, coarse.knots[0], coarse.knots[-1])
     # The distances are the lengths of the residuals of points.
     points: list[Term] = []
@@ -683,11 +694,11 @@ def _moved(coarse: Setup, before: Solution, fine: Setup, solution: Solution) -> 
         points.append(PointTerm("", Points(x, y, sigma=1.0), x, part, space, y, noise))
     apart = residuals(replace(coarse, terms=points), before.points, before.values)
     if apart is None:
-        return float("inf")
+        return np.full(len(x), np.inf)
     squares = np.zeros(len(x))
     for rows in apart:
         squares += (rows**2).sum(axis=1)
-    return float(np.sqrt(np.max(squares / solution.variances.sum(axis=1))))
+    return np.sqrt(squares / solution.variances.sum(axis=1))
 
 
 # ---- knots as dense as the measurements require, and in gaps as dense as next to them ----
