@@ -698,7 +698,7 @@ def _moved(coarse: Setup, before: Solution, fine: Setup, solution: Solution) -> 
     squares = np.zeros(len(x))
     for rows in apart:
         squares += (rows**2).sum(axis=1)
-    return np.sqrt(squares / solution.variances.sum(axis=1))
+    return np.asarray(np.sqrt(squares / solution.variances.sum(axis=1)))
 
 
 # ---- knots as dense as the measurements require, and in gaps as dense as next to them ----
