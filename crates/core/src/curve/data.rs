@@ -129,6 +129,31 @@ pub struct Job<'a> {
     pub(super) len: usize,
 }
 
+/// The numbers of a motion: four coordinate vectors, and the changes of the first knot and of the length of the segment.
+pub const fn motion_len(dim: usize) -> usize {
+    4 * dim + 2
+}
+
+/// One curve, the frames of its knots, and the times of samples.
+pub struct Moving<'a> {
+    /// The curve.
+    pub curve: Curves<'a>,
+    /// The times.
+    pub times: Times<'a>,
+    /// The frames of the knots. Where a run of segments ends, the knot has two: that of the run comes first.
+    pub frames: &'a [f64],
+    /// The number of runs, of almost equal length; frames are transported in parallel within a run.
+    pub runs: usize,
+    /// The order ν of the derivative in time that is differentiated.
+    pub nu: usize,
+    /// Whether reverse mode keeps samples apart: its result then has a row per sample in place of one per segment.
+    pub apart: bool,
+    /// The dimension of the space.
+    pub dim: usize,
+    /// The numbers of a point.
+    pub len: usize,
+}
+
 /// A B-spline curve: `knots.len() = control points + degree + 1`, as in SciPy.
 pub struct BSpline<'a> {
     /// Non-decreasing knots, possibly repeated.

@@ -20,7 +20,7 @@ mod transport;
 pub use bezier::Segment;
 pub use bspline::evaluate_bspline;
 pub use cumulative::{Coordinates, Multiplication, cumulative_basis, cumulative_steps};
-pub use data::{BSpline, Curves, Job, Outside, Quantity, Times};
+pub use data::{BSpline, Curves, Job, Moving, Outside, Quantity, Times, motion_len};
 pub use evaluate::evaluate;
 #[cfg(feature = "dense")]
 pub use jerk::connection;
@@ -29,6 +29,5 @@ pub use length::{ArcLength, Integrand, energies, lengths};
 pub use lift::{lift, lift_knots};
 #[doc(hidden)]
 pub use locate::Locator;
-pub use motion::{Moving, motion_len};
 pub use product::{Factor, evaluate_product};
 pub use transport::transport;

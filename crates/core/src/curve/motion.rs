@@ -6,38 +6,13 @@
 //! six geodesics in reverse order (Bergmann and Gousenbourger, *A variational model for data fitting on manifolds by
 //! minimizing the acceleration of a Bézier curve*, 2018, section 4).
 
-use super::data::{Curves, Job, Outside, Quantity, Times};
+use super::data::{Job, Moving, Outside, Quantity, motion_len};
 use super::locate::Locator;
 use super::sample_cursor::SampleCursor;
 use crate::monitor::checkpoint;
 use crate::scalar::{Dual, Jet, LANES, Lane, Row, RowMut, Scalar, dot, few, gather, lane, scatter};
 use crate::space::{Ambient, Covered, Erased, Frame, Space};
 use crate::with_size;
-
-/// The numbers of a motion: four coordinate vectors, and the changes of the first knot and of the length of the segment.
-pub const fn motion_len(dim: usize) -> usize {
-    4 * dim + 2
-}
-
-/// One curve, the frames of its knots, and the times of samples.
-pub struct Moving<'a> {
-    /// The curve.
-    pub curve: Curves<'a>,
-    /// The times.
-    pub times: Times<'a>,
-    /// The frames of the knots. Where a run of segments ends, the knot has two: that of the run comes first.
-    pub frames: &'a [f64],
-    /// The number of runs, of almost equal length; frames are transported in parallel within a run.
-    pub runs: usize,
-    /// The order ν of the derivative in time that is differentiated.
-    pub nu: usize,
-    /// Whether reverse mode keeps samples apart: its result then has a row per sample in place of one per segment.
-    pub apart: bool,
-    /// The dimension of the space.
-    pub dim: usize,
-    /// The numbers of a point.
-    pub len: usize,
-}
 
 /// Where the geodesics of a space are computed: in the space itself or in one that covers it.
 trait Place {
@@ -525,11 +500,9 @@ impl Moving<'_> {
         for start in (0..count).step_by(LANES) {
             checkpoint();
             let changed = cursor.advance();
-            if changed || self.apart {
-                if let Some(at) = at {
-                    flush(&mut controls, &back, sums, scale, &mut products);
-                    add(&products, at, out);
-                }
+            if let (true, Some(at)) = (changed || self.apart, at) {
+                flush(&mut controls, &back, sums, scale, &mut products);
+                add(&products, at, out);
             }
             if changed {
                 controls.read(place, self, &cursor);

@@ -1,8 +1,7 @@
 //! A space as a table of its operations.
 
 use super::traits::{Ambient, Frame, Origin, Space};
-use crate::curve::Moving;
-use crate::curve::data::Job;
+use crate::curve::data::{Job, Moving};
 use crate::fit::chain::{Chain, Run, Visit};
 use crate::fit::end_kind::ChainEnds;
 use crate::fit::node::{C2Residual, NodeVectors};
