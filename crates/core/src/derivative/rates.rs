@@ -19,6 +19,11 @@ const NODES: usize = 17;
 const ROUNDING: f64 = 16.0 * f64::EPSILON;
 /// The number of coefficients of highest degree that are compared with rounding errors.
 const HIGHEST: usize = 3;
+/// Larger ones are rounding errors as well if they are below this, relative to the largest, and do not decrease: the highest
+/// are above this part of the last ones.
+const NOISE: f64 = 1e-9;
+const FLAT: f64 = 0.05;
+const LAST: usize = 8;
 /// A segment is halved until its parts are resolved, up to this number of times.
 const HALVINGS: usize = 7;
 /// Parts of segments whose nodes are stored at the same time.
@@ -71,9 +76,13 @@ impl Interpolation {
             terms.map(|(row, coefficients)| row[c] * coefficients[n]).sum::<f64>()
         };
         let largest = values.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
-        let highest = (NODES - HIGHEST..NODES).flat_map(|n| (0..len).map(move |c| (n, c)));
+        let most = |last: usize| {
+            let columns = (NODES - last..NODES).flat_map(|n| (0..len).map(move |c| (n, c)));
+            columns.fold(0.0, |most: f64, (n, c)| most.max(coefficient(n, c).abs())) / largest
+        };
+        let highest = most(HIGHEST);
         // NaN stays NaN in every part.
-        highest.fold(0.0, |most: f64, (n, c)| most.max(coefficient(n, c).abs())) <= ROUNDING * largest
+        !(highest > ROUNDING) || (highest <= NOISE && highest > FLAT * most(LAST))
     }
 }
 
