@@ -43,7 +43,8 @@ def assert_transpose(spline, change, x, rng, orders=(0, 1, 2)):
         pairs += [(g, e) for g, e in zip(gradient.ends, ends, strict=True) if e is not None]
         left, *right = [np.vdot(a, b).real for a, b in pairs]
         scale = sum(np.linalg.norm(a) * np.linalg.norm(b) for a, b in pairs)
-        assert abs(left - sum(right)) <= 1e-12 * scale, nu
+        # Rounding errors of interpolated motions grow with the fourth power of the degree in the second derivative.
+        assert abs(left - sum(right)) <= (1e-11 if nu == 2 else 1e-12) * scale, nu
         spline.space.check_tangent(spline.points, gradient.points)
 
 
@@ -188,6 +189,46 @@ def test_derivatives_of_a_loop(name, rng):
     spline = ss.CubicSpline(t, p, space, bc_type="periodic")
     assert_differences(spline, (space, t, p, "periodic"), change, x, (0, 1))
     assert_transpose(spline, change, x, rng, (0, 1))
+
+
+@loop_over("end", ["not-a-knot", "mixed", "natural", "periodic"])
+@pytest.mark.parametrize("name", ["r:2", "hyperbolic:2", "so:3", "so:4", "se:3", "gr:2,5", "cp:2", "spd:2", "aff:2"])
+def test_derivatives_of_curves_of_many_points(name, end):
+    """The knots are divided into runs, whose lengths differ here; some segments have many samples, some none."""
+    rng = np.random.default_rng(15)
+    space, t, points, bc = data(Case(name), end, n=24, step=0.25)
+    t = 5.0 + np.cumsum(rng.uniform(0.3, 2.0, len(t)))
+    given = space, t, points, bc
+    change = motion(*given, rng)
+    x = np.concatenate([inside(t, rng, 5), rng.uniform(t[7] + 0.05, t[8] - 0.05, 11)])
+    spline = moved(*given, change, 0.0)
+    assert_differences(spline, given, change, x, (0,))
+    assert_transpose(spline, change, x, rng)
+    assert_transpose(spline, change, t[[0, 3, -1]], rng)
+
+
+def test_accelerations_of_lines_move_with_the_data(rng):
+    """Against their lengths, which do not depend on the signs of arrays: real lines are a sphere up to sign."""
+    line, sphere = ss.RealProjective(2), ss.Sphere(2)
+    t, points = np.cumsum(rng.uniform(0.3, 2.0, 20)), walk(sphere, 0.5, 20, rng)
+    signs = rng.choice([-1.0, 1.0], 20)[:, None]
+    vectors, x = sphere.random_tangent(rng, points), rng.uniform(t[0], t[-1], 30)
+    expected = ss.CubicSpline(t, points, sphere)
+    found = ss.CubicSpline(t, signs * points, line)
+    sign = np.sign(np.sum(found(x) * expected(x), axis=1))[:, None]
+    for nu in (0, 1, 2):
+        changes = expected.jvp(x, vectors, nu=nu)
+        np.testing.assert_allclose(sign * found.jvp(x, signs * vectors, nu=nu), changes, atol=1e-9)
+        cotangent = sphere.random_tangent(rng, expected(x))
+        gradient = expected.vjp(x, cotangent, nu=nu).points
+        np.testing.assert_allclose(signs * found.vjp(x, sign * cotangent, nu=nu).points, gradient, atol=1e-8)
+
+
+def test_no_times_have_no_derivatives():
+    spline = ss.CubicSpline(None, walk(ss.Sphere(2), 0.5, 4, np.random.default_rng(12)), "sphere:2")
+    for nu in (0, 1, 2):
+        assert spline.jvp([], points=np.zeros((4, 3)), nu=nu).shape == (0, 3)
+        assert not spline.vjp([], np.zeros((0, 3)), nu=nu).points.any()
 
 
 @pytest.mark.parametrize("name", ["rp:2", "cp:2", "gr:2,5", "cgr:2,4"])
