@@ -264,7 +264,7 @@ impl<'a> Derivative<'a> {
         }
         let moving = self.moving(x, of);
         if !self.space.0.push(&moving, &motions, out) {
-            Rates { space: self.space, moving: &moving, of }.push(&motions, out);
+            Rates { space: self.space, moving: &moving }.push(&motions, out);
         }
     }
 
@@ -276,7 +276,7 @@ impl<'a> Derivative<'a> {
         let mut products = vec![0.0; n * size];
         let moving = self.moving(x, of);
         if !self.space.0.pull(&moving, cotangent, &mut products) {
-            Rates { space: self.space, moving: &moving, of }.pull(cotangent, &mut products);
+            Rates { space: self.space, moving: &moving }.pull(cotangent, &mut products);
         }
         let slots = self.polygon.runs.slots() * m;
         let (mut points, mut u) = (vec![0.0; slots], vec![0.0; slots]);

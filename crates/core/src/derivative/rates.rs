@@ -5,7 +5,6 @@
 //! Practice*, 2013, chapters 2 and 21). For arrays γ the acceleration is L(γ'') + Q(γ', γ') with a linear map L and a quadratic
 //! form Q that depend on the point, so that De = L(e') + Q(γ', e). The transpose takes the same steps in reverse order.
 
-use super::Of;
 use crate::curve::{Moving, Outside, Quantity, Times, connection, evaluate, motion_len};
 use crate::monitor::{Monitor, checkpoint};
 use crate::scalar::{LANES, Lane, dot, few, gather, lane, scatter};
@@ -86,11 +85,10 @@ impl Interpolation {
     }
 }
 
-/// One curve, and the order of the derivative.
+/// One curve.
 pub struct Rates<'a> {
     pub space: &'a Erased<'a>,
     pub moving: &'a Moving<'a>,
-    pub of: Of,
 }
 
 /// Samples in a part of one segment, by their numbers, and the weights of the nodes at each; derivatives are with respect to
@@ -323,7 +321,7 @@ impl Rates<'_> {
 
     /// γ_τ for ν = 1 and ∇γ_τ for ν = 2, and its derivative along the curve, at samples.
     fn rates(&self, group: &Group, at: &[usize; LANES], nodes: &[f64], state: &State) -> [Vec<Lane>; 2] {
-        if self.of == Of::Velocity {
+        if self.moving.nu == 1 {
             let mut velocity = state.d.clone();
             self.space.velocity(&state.p, &mut velocity);
             return [velocity, state.w.clone()];
@@ -336,7 +334,7 @@ impl Rates<'_> {
     /// See [`Moving::push`].
     pub fn push(&self, motions: &[f64], out: &mut [f64]) {
         let (len, m, x) = (self.moving.len, self.moving.dim, self.moving.times.x);
-        let nu = self.of as i32;
+        let nu = self.moving.nu as i32;
         let (size, mut still) = (motion_len(m), motions.to_vec());
         // Only the motion at fixed parameters.
         still.chunks_mut(size).for_each(|row| row[4 * m..].fill(0.0));
@@ -373,7 +371,7 @@ impl Rates<'_> {
     /// See [`Moving::pull`].
     pub fn pull(&self, cotangents: &[f64], out: &mut [f64]) {
         let (len, m, x) = (self.moving.len, self.moving.dim, self.moving.times.x);
-        let (nu, size) = (self.of as i32, motion_len(m));
+        let (nu, size) = (self.moving.nu as i32, motion_len(m));
         let segments = self.moving.curve.nodes - 1;
         let mut products = vec![0.0; segments * size];
         self.for_each(|Resolved { groups, x: at_nodes, states }, samples| {

@@ -17,7 +17,6 @@ mod isometric;
 mod model;
 mod part;
 mod registry;
-mod reverse;
 mod traits;
 
 pub use algebra::{Algebra, stretch_series};
@@ -27,5 +26,6 @@ pub use isometric::{Isometric, Isometry};
 pub use model::Model;
 pub use part::{Part, Within};
 pub use registry::{Entry, Made, table};
-pub use reverse::{pull_back_by_transport, raise_by_frame};
-pub use traits::{Ambient, Covered, Evaluation, Frame, Origin, ROUNDING_SIZE, Space, below};
+pub use traits::{
+    Ambient, Covered, Evaluation, Frame, Origin, ROUNDING_SIZE, Space, below, pull_back_by_transport,
+};

@@ -1,8 +1,7 @@
 //! A space from few formulas: the simplest implementation of a new space.
 
-use super::reverse::raise_by_frame;
 use super::traits::{Ambient, Frame, Origin, ROUNDING_SIZE, Space, make_tangent};
-use crate::scalar::{Lane, Scalar, lane, max_or_nan};
+use crate::scalar::{Lane, Scalar, dot, lane, max_or_nan};
 
 /// A space whose exponential, logarithm and transvection are implemented at any point and for any numbers. All three
 /// traits follow: geodesics are exponentials of logarithms, a frame is a basis moved by transvections, and
@@ -117,6 +116,22 @@ fn parallel_transport<M: Model>(space: &M, p: &[Lane], q: &[Lane], v: &[Lane], x
     space.transvect(p, v, x);
     space.exp(p, v, &mut there);
     space.turn(&there, q, x);
+}
+
+/// [`Ambient::raise`] by an orthonormal frame.
+fn raise_by_frame<M: Frame>(space: &M, p: &[Lane], gradient: &mut [Lane]) {
+    let (m, len) = (space.dim(), p.len());
+    let mut frame = vec![Lane::ZERO; space.frame_len()];
+    space.lift(p, &mut frame);
+    let (mut x, mut e, mut sum) = (vec![Lane::ZERO; m], vec![Lane::ZERO; len], vec![Lane::ZERO; len]);
+    for k in 0..m {
+        x[k] = Lane::ONE;
+        space.tangent(&frame, p, &x, &mut e);
+        x[k] = Lane::ZERO;
+        let product = dot(&e, gradient);
+        sum.iter_mut().zip(&e).for_each(|(sum, e)| *sum = product.mul_add(*e, *sum));
+    }
+    gradient.copy_from_slice(&sum);
 }
 
 impl<M: Model> Ambient for M {

@@ -1,9 +1,9 @@
 //! The traits of a symmetric space.
 
 use super::algebra::stretch_series;
-use super::reverse::pull_back_by_transport;
 use crate::matrix::Matrix;
-use crate::scalar::{Lane, Scalar, dot, lane, max_or_nan};
+use crate::scalar::{Dual, Lane, Scalar, dot, lane, max_or_nan};
+use smallvec::{SmallVec, smallvec};
 
 /// The directions of vectors up to this size, at points of size one, may be rounding errors. Residuals of smaller
 /// vectors are relative to this size.
@@ -306,4 +306,52 @@ pub(super) fn make_tangent<M: Ambient>(space: &M, p: &[Lane], v: &mut [Lane]) ->
 /// `angle` less the rounding error of angles: angles within that of the cut locus count as on it.
 pub fn below(angle: f64) -> Lane {
     lane(angle * (1.0 - 4.0 * f64::EPSILON))
+}
+
+/// A few numbers on the stack: allocating aligned lanes on the heap would cost more than the computation.
+type Few<S> = SmallVec<[S; 16]>;
+
+/// [`Ambient::pull_back`] by transports and derivatives in one direction.
+///
+/// On a symmetric space, Jacobi fields along the geodesic c = [p, q]_t solve J'' = ad_v² J in parallel frames (do Carmo,
+/// *Riemannian Geometry*, 1992, chapter 5), so that with v = log_p q
+///
+/// ```text
+/// δc = P_{p→c}(A(1−t) δp + A(t) P_{q→p} δq + v δt),   A(s) = sinh(s ad_v)/sinh(ad_v).
+/// ```
+///
+/// A(s) is self-adjoint and P orthogonal in every form that ad leaves invariant. The transpose is therefore the derivative
+/// itself between two transports: λ ↦ P_{c→q} D_q[p, q]_t P_{c→q} λ for q, and the same for p.
+#[inline(never)]
+pub fn pull_back_by_transport<M: Ambient>(
+    space: &M,
+    p: &[Lane],
+    q: &[Lane],
+    t: Lane,
+    cotangent: &[Lane],
+    to_p: &mut [Lane],
+    to_q: &mut [Lane],
+) -> Lane {
+    let len = p.len();
+    let constant = |x: &[Lane]| -> Few<Dual> { x.iter().map(|&x| Dual::constant(x)).collect() };
+    let [fixed_p, fixed_q] = [constant(p), constant(q)];
+    let mut out = fixed_p.clone();
+    space.geodesic(&fixed_p, &fixed_q, Dual { v: t, d: Lane::ONE }, &mut out);
+    let (c, mut velocity): (Few<Lane>, Few<Lane>) = out.iter().map(|x| (x.v, x.d)).unzip();
+    space.velocity(&c, &mut velocity);
+    let mut way: Few<Lane> = smallvec![Lane::ZERO; len];
+    let (mut there, mut moved) = (way.clone(), way.clone());
+    let mut moving = fixed_p.clone();
+    for (end, to_end, part) in [(p, to_p, -t), (q, to_q, Lane::ONE - t)] {
+        way.iter_mut().zip(&velocity).for_each(|(way, v)| *way = *v * part);
+        space.parallel_transport(&c, end, &way, cotangent, &mut there);
+        moving.iter_mut().zip(end.iter().zip(&there)).for_each(|(x, (&v, &d))| *x = Dual { v, d });
+        let (from, to) = if std::ptr::eq(end, p) { (&moving, &fixed_q) } else { (&fixed_p, &moving) };
+        space.geodesic(from, to, Dual::constant(t), &mut out);
+        moved.iter_mut().zip(&out).for_each(|(moved, x)| *moved = x.d);
+        space.velocity(&c, &mut moved);
+        space.parallel_transport(&c, end, &way, &moved, &mut there);
+        to_end.iter_mut().zip(&there).for_each(|(sum, x)| *sum += *x);
+    }
+    space.pairing(&c, &velocity, cotangent)
 }
