@@ -275,5 +275,5 @@ fn push_curve(space: &Erased, axis: &Axis, run: Run, curve: [&[f64]; 4], x: &[f6
     let ends = ends_of(axis.conditions(run), &rest);
     let change =
         Data { points: tangents.to_vec(), knots: vec![0.0; t.len()], ends: [Vec::new(), Vec::new()] };
-    Derivative::new(space, t, points, velocities, &ends).push(x, of, &change, out);
+    Derivative::new(space, t, points, velocities, &ends).push(x, &[of], &change, out);
 }

@@ -197,6 +197,13 @@ impl<const D: usize, A: Storage> Ambient for UnitaryGroup<D, A> {
         self.velocity(p, gradient);
         gradient.iter_mut().for_each(|x| *x *= lane(1.0) / Self::metric());
     }
+    /// The momentum of v at p is vp*.
+    fn conserve(&self, p: &[Lane], c: [&[Lane]; 2], q: [&[Lane]; 2], to_p: &mut [Lane]) -> bool {
+        let p = self.read(p);
+        let [at_c, at_q] = [c, q].map(|[x, v]| self.read(v).times(&self.read(x).adjoint_times(&p)));
+        (&self.read(to_p) + &(&at_c - &at_q)).write(to_p);
+        true
+    }
     fn project(&self, x: &mut [Lane]) -> Lane {
         let mut p = self.read(x);
         let defect = p.adjoint_times(&p).plus_identity(lane(-1.0));

@@ -206,6 +206,16 @@ impl<const D: usize, A: Storage> Ambient for Subspaces<D, A> {
     fn inner(&self, _p: &[Lane], u: &[Lane], v: &[Lane]) -> Lane {
         self.read(u).inner(&self.read(v))
     }
+    /// The momentum of a horizontal v at Y is vY* − Yv*.
+    fn conserve(&self, p: &[Lane], c: [&[Lane]; 2], q: [&[Lane]; 2], to_p: &mut [Lane]) -> bool {
+        let p = self.read(p);
+        let [at_c, at_q] = [c, q].map(|pair| {
+            let [x, v] = pair.map(|x| self.read(x));
+            &v.times(&x.adjoint_times(&p)) - &x.times(&v.adjoint_times(&p))
+        });
+        (&self.read(to_p) + &(&at_c - &at_q)).write(to_p);
+        true
+    }
     fn project(&self, x: &mut [Lane]) -> Lane {
         let y = self.read(x);
         let off = y.adjoint_times(&y).plus_identity(lane(-1.0)).size() * lane(0.5);

@@ -30,7 +30,7 @@ pub struct CurvesToDifferentiate<'py> {
     ends: Option<[EndOf<'py>; 2]>,
     x: Array<'py>,
     curves: usize,
-    nu: usize,
+    orders: Vec<usize>,
 }
 
 struct Slices<'a> {
@@ -40,13 +40,22 @@ struct Slices<'a> {
     ends: Ends<'a>,
     x: &'a [f64],
     curves: usize,
-    of: Of,
+    quantities: Vec<Of>,
 }
 
 /// The part of an array that belongs to one of equally many curves.
 fn part<T>(array: &[T], curve: usize, curves: usize) -> &[T] {
     let size = array.len() / curves;
     &array[curve * size..(curve + 1) * size]
+}
+
+fn quantity(nu: usize) -> PyResult<Of> {
+    match nu {
+        0 => Ok(Of::Point),
+        1 => Ok(Of::Velocity),
+        2 => Ok(Of::Acceleration),
+        nu => Err(invalid(format!("nu must be 0, 1 or 2, not {nu}"))),
+    }
 }
 
 impl<'py> CurvesToDifferentiate<'py> {
@@ -61,12 +70,7 @@ impl<'py> CurvesToDifferentiate<'py> {
             },
             x: in_order(&self.x)?,
             curves: self.curves,
-            of: match self.nu {
-                0 => Of::Point,
-                1 => Of::Velocity,
-                2 => Of::Acceleration,
-                nu => return Err(invalid(format!("nu must be 0, 1 or 2, not {nu}"))),
-            },
+            quantities: self.orders.iter().map(|&nu| quantity(nu)).collect::<PyResult<_>>()?,
         })
     }
 }
@@ -102,7 +106,7 @@ impl Slices<'_> {
     fn is_heavy(&self, space: &Erased) -> bool {
         let (dim, knots) = (space.dim(), (self.t.len() + self.x.len()) / self.curves.max(1));
         // Derivatives in time need many motions of nodes per segment.
-        let passes = if self.of == Of::Point { 1 } else { NODES };
+        let passes = if self.quantities == [Of::Point] { 1 } else { NODES };
         let numbers = knots.saturating_mul(dim * space.point_len() * passes);
         is_heavy(space) || is_long(numbers / OPERATIONS)
     }
@@ -120,7 +124,8 @@ fn each<T: Send>(items: Vec<(usize, T)>, monitor: &Monitor, work: impl Fn(usize,
     });
 }
 
-/// Forward mode: tangent vectors of curves for changes of points, knots and end vectors (empty for none).
+/// Forward mode: tangent vectors of curves for changes of points, knots and end vectors (empty for none), curve after curve
+/// and order after order.
 #[pyfunction]
 pub fn push<'py>(
     py: Python<'py>,
@@ -136,7 +141,7 @@ pub fn push<'py>(
     let ends = [in_order(&ends[0])?, in_order(&ends[1])?];
     slices.require_memory(&handle.space.get())?;
     let heavy = slices.is_heavy(&handle.space.get());
-    let out = zeros(py, &[slices.x.len() * len])?;
+    let out = zeros(py, &[slices.x.len() * slices.quantities.len() * len])?;
     let mut write = out.readwrite();
     let result = write.as_slice_mut()?;
     if !result.is_empty() {
@@ -146,7 +151,9 @@ pub fn push<'py>(
             each(items, monitor, |c, out| {
                 let own = |array| part(array, c, slices.curves).to_vec();
                 let change = Data { points: own(points), knots: own(knots), ends: ends.map(own) };
-                slices.derivative(&handle.space.get(), c).push(slices.times(c), slices.of, &change, out);
+                let space = handle.space.get();
+                let derivative = slices.derivative(&space, c);
+                derivative.push(slices.times(c), &slices.quantities, &change, out);
             });
         })?;
     }
@@ -171,7 +178,7 @@ pub fn pull<'py>(
     watched(py, None, slices.curves, heavy, |monitor| {
         each(items, monitor, |c, out| {
             let own = part(cotangent, c, slices.curves);
-            *out = slices.derivative(&handle.space.get(), c).pull(slices.times(c), slices.of, own);
+            *out = slices.derivative(&handle.space.get(), c).pull(slices.times(c), &slices.quantities, own);
         });
     })?;
     let column =

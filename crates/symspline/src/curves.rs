@@ -5,12 +5,13 @@ use crate::options::{Builder, End, Ends, Extrapolate, Method};
 use crate::point::{Point, Rows, read};
 use crate::samples::Samples;
 use crate::space::{Space, Table};
+use smallvec::{SmallVec, smallvec};
 use std::fmt;
 use std::marker::PhantomData;
 use std::ops::Range;
 use std::panic::{RefUnwindSafe, UnwindSafe};
 use std::sync::Arc;
-use symspline_engine::curve::{self, Quantity, Times, evaluate_product};
+use symspline_engine::curve::{self, LastSegment, Quantity, Times, evaluate_product};
 use symspline_engine::fit::{self, Options, Problem, Solver};
 use symspline_engine::monitor::Monitor;
 #[cfg(feature = "serde")]
@@ -443,26 +444,25 @@ impl<S: Space, P: Point<S>> Curves<S, P> {
         Ok(out)
     }
 
-    /// The point of the first curve at a time, without arrays for several curves and times.
-    pub fn point(&self, time: f64) -> Result<P, Error> {
+    /// The point of the first curve at a time, without arrays for several curves and times. `last` has a segment per factor, or
+    /// is empty.
+    pub fn point(&self, time: f64, last: &[LastSegment]) -> Result<P, Error> {
         let domain = self.domain(0);
         let x = match self.extrapolate {
             Extrapolate::Error => inside(time, domain)?,
             _ => finite(&[time], domain)?[0],
         };
-        let (times, go_on) = (Times { x: &[x], count: 1 }, |_| true);
         let (t, nodes) = (self.knots(0), self.nodes(0));
         let lens = || self.factors.iter().map(|factor| factor.space().point_len());
-        let mut numbers = vec![0.0; lens().sum()];
+        let mut numbers: SmallVec<[f64; 32]> = smallvec![0.0; lens().sum()];
         let mut rest = &mut numbers[..];
-        for factor in &*self.factors {
+        for (i, factor) in self.factors.iter().enumerate() {
             let space = factor.space();
             let (out, others) = rest.split_at_mut(space.point_len());
             rest = others;
             let (points, velocities) = (&factor.points, &factor.velocities);
             let curves = curve::Curves { t, nodes: nodes.len(), points, velocities, before: &[] };
-            let outside = self.extrapolate.policy();
-            curve::evaluate(&space, &curves, &times, Quantity::Point, outside, &Monitor::new(&go_on), out);
+            curve::evaluate_point(&space, &curves, x, self.extrapolate.policy(), last.get(i), out);
         }
         if let [_] = &*self.factors {
             return Ok(P::read_rows(&[&numbers]));
@@ -474,6 +474,11 @@ impl<S: Space, P: Point<S>> Curves<S, P> {
             row
         });
         Ok(P::read_rows(&rows.collect::<Vec<_>>()))
+    }
+
+    /// No segment yet, for each factor.
+    pub fn last_segments(&self) -> Vec<LastSegment> {
+        self.factors.iter().map(|_| LastSegment::default()).collect()
     }
 
     /// Points at times of all curves.

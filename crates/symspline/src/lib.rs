@@ -144,7 +144,7 @@ pub use space::{AnySpace, Factor, Space};
 pub use space::{BodyFrame, Se3, So3};
 #[cfg(feature = "vectors")]
 pub use space::{Euclidean, Hyperbolic, Sphere};
-pub use spline::CubicSpline;
+pub use spline::{CubicSpline, Evaluator};
 
 /// Limits the number of threads; 0 means all cores, which is the default.
 pub use symspline_engine::parallel::set_num_threads;

@@ -64,13 +64,13 @@ class SampleTimes(NamedTuple):
         Times of each curve.
     shape : tuple of int
         Shape of a result, without the axes of a point.
-    nu : {0, 1, 2}
-        Order of the derivative in time.
+    orders : tuple of {0, 1, 2}
+        Orders of the derivatives in time.
     """
 
     x: Doubles
     shape: tuple[int, ...]
-    nu: int
+    orders: tuple[int, ...]
 
 
 class SplineData(Protocol):
@@ -87,8 +87,10 @@ class SplineData(Protocol):
     def batch(self) -> tuple[int, ...]: ...
 
 
-def sample_times(knots: Array, batch: tuple[int, ...], x: Array, per_curve: bool, nu: int) -> SampleTimes:
-    """Return the sampling times of each curve.
+def sample_times(
+    knots: Array, batch: tuple[int, ...], x: Array, per_curve: bool, nu: int | tuple[int, ...]
+) -> SampleTimes:
+    """Return the sampling times of each curve. Results of several orders have an axis for them behind those of a batch.
 
     Raises
     ------
@@ -101,7 +103,9 @@ def sample_times(knots: Array, batch: tuple[int, ...], x: Array, per_curve: bool
     shape = x.shape if per_curve else batch + x.shape
     rows = x if x.shape == shape else np.broadcast_to(x, shape)
     rows = rows.reshape(math.prod(batch), math.prod(shape[len(batch) :]))
-    return SampleTimes(np.ascontiguousarray(rows), shape, nu)
+    if isinstance(nu, tuple):
+        return SampleTimes(np.ascontiguousarray(rows), (*batch, len(nu), *shape[len(batch) :]), nu)
+    return SampleTimes(np.ascontiguousarray(rows), shape, (nu,))
 
 
 class _Curves(NamedTuple):
@@ -113,7 +117,7 @@ class _Curves(NamedTuple):
     ends: list[End] | None
     x: Doubles
     curves: int
-    nu: int
+    orders: tuple[int, ...]
 
 
 def jvp(curve: SplineData, at: SampleTimes, bc_type: Any, points: Any, t: Any, ends: Any) -> Array:
@@ -165,7 +169,7 @@ def _curves(curve: SplineData, at: SampleTimes, bc_type: object) -> _Curves:
     space, batch = curve.space, curve.batch
     points, velocities = (space._as_doubles(np.ascontiguousarray(a)) for a in (curve.points, curve.velocities))
     knots, ends = _per_curve(curve.times, batch), ends_of(bc_type, space, batch)
-    return _Curves(knots, points, velocities, ends, at.x, math.prod(batch), at.nu)
+    return _Curves(knots, points, velocities, ends, at.x, math.prod(batch), at.orders)
 
 
 def _per_curve(knots: Array, batch: tuple[int, ...]) -> Doubles:

@@ -141,10 +141,11 @@ def _curve_jvp(fixed: Fixed, nu: int, primals: Tensor, tangents: Tensor) -> Tens
     if any(moving):
         # One vector: its transpose is asked for as a whole.
         parts = [jnp.ravel(c).astype(value.dtype) for c, m in zip(changes, moving, strict=True) if m]
-        jvp = partial(jvp_p.bind, jnp.concatenate(parts), x, *data, velocities)
-        moved += jvp(fixed=fixed, lead=0, nu=nu, moving=moving)
+        orders = (nu, 0) if nu else (0,)
+        steps = jvp_p.bind(
+            jnp.concatenate(parts), x, *data, velocities, fixed=fixed, lead=0, orders=orders, moving=moving
+        )
+        moved += steps[..., 0]
         if nu:
-            moved += second_fundamental_form(
-                jnp, fixed.space, point, value, jvp(fixed=fixed, lead=0, nu=0, moving=moving)
-            )
+            moved += second_fundamental_form(jnp, fixed.space, point, value, steps[..., 1])
     return value, moved

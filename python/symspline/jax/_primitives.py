@@ -171,21 +171,22 @@ def _ends(kinds: Kinds, vectors: Tensor) -> tuple[Tensor, Tensor]:
 # ---- its sensitivity to its data ----
 
 
-def _jvp_shape(change: Tensor, x: Tensor, *data: Tensor, fixed: Fixed, lead: int, **_: object) -> Tensor:
-    return _values(fixed, lead, _layout(fixed, lead, x, data, change.shape[:lead]), x, data[1])
+def _jvp_shape(change: Tensor, x: Tensor, *data: Tensor, fixed: Fixed, lead: int, orders: Shape, **_: object) -> Tensor:
+    values = _values(fixed, lead, _layout(fixed, lead, x, data, change.shape[:lead]), x, data[1])
+    return ShapedArray((*values.shape, len(orders)), values.dtype)
 
 
 def _jvp(
-    change: Tensor, x: Tensor, *data: Tensor, fixed: Fixed, lead: int, nu: int, moving: tuple[bool, ...]
+    change: Tensor, x: Tensor, *data: Tensor, fixed: Fixed, lead: int, orders: Shape, moving: tuple[bool, ...]
 ) -> Tensor:
-    """The change of γ, or of a derivative of it seen from the moving point, with the data.
+    """The change of γ, or of a derivative of it seen from the moving point, with the data, orders on the last axis.
 
     Args:
         change: of those of t, points and vectors that move, all in one vector.
         data: t, points, vectors, and the velocities that a fit found.
     """
     layout = _layout(fixed, lead, x, data, change.shape[:lead])
-    curve, at, bc_type = _moved(fixed, layout, nu, x, data)
+    curve, at, bc_type = _moved(fixed, layout, orders, x, data)
     sizes = [math.prod(a.shape[lead:]) * moves for a, moves in zip(data, moving, strict=False)]
     rows = zip(np.split(change, np.cumsum(sizes)[:-1], axis=-1), data, _cores(fixed, data), moving, strict=False)
     knots, steps, *ends = (
@@ -193,7 +194,7 @@ def _jvp(
         for part, array, core, moves in rows
     )
     moved = curve.jvp(at, bc_type, steps, knots, _ends(fixed.kinds, ends))
-    return np.asarray(layout.outward(moved), data[1].dtype)
+    return np.asarray(layout.outward(np.moveaxis(moved, len(curve.batch), -1)), data[1].dtype)
 
 
 def _vjp_shape(
@@ -204,7 +205,14 @@ def _vjp_shape(
 
 
 def _vjp(
-    cotangent: Tensor, x: Tensor, *data: Tensor, fixed: Fixed, lead: int, nu: int, moving: tuple[bool, ...], kept: Shape
+    cotangent: Tensor,
+    x: Tensor,
+    *data: Tensor,
+    fixed: Fixed,
+    lead: int,
+    orders: Shape,
+    moving: tuple[bool, ...],
+    kept: Shape,
 ) -> Tensor:
     """The transpose. JAX pairs complex numbers without conjugation.
 
@@ -212,9 +220,9 @@ def _vjp(
         kept: sizes of the axes of `jax.vmap` along which gradients are kept separate; 1 along those that are summed.
     """
     layout = _layout(fixed, lead, x, data, kept)
-    curve, at, bc_type = _moved(fixed, layout, nu, x, data)
+    curve, at, bc_type = _moved(fixed, layout, orders, x, data)
     wide = np.broadcast_to(cotangent, (*layout.full, *cotangent.shape[lead:]))
-    gradient = curve.vjp(at, bc_type, np.conj(layout.inward(wide)))
+    gradient = curve.vjp(at, bc_type, np.conj(np.moveaxis(layout.inward(wide), -1, len(curve.batch))))
     parts = (gradient.t, gradient.points, *(end for end in gradient.ends if end is not None))
     rows = [
         layout.gradient(np.conj(part), core, kept, array.shape[lead:]).reshape(*kept, -1)
@@ -230,7 +238,7 @@ def _cores(fixed: Fixed, data: Tensor) -> list[int]:
     return [1, core + 1, *(core for _ in data[2:])]
 
 
-def _moved(fixed: Fixed, layout: Layout, nu: int, x: Tensor, data: Tensor) -> tuple[CurveArrays, Tensor, Tensor]:
+def _moved(fixed: Fixed, layout: Layout, orders: Shape, x: Tensor, data: Tensor) -> tuple[CurveArrays, Tensor, Tensor]:
     """Return curves with fitted velocities, sampling times, and their end conditions."""
     space, core = fixed.space, len(fixed.space.point_shape)
     t, points, *vectors, velocities = data
@@ -241,7 +249,7 @@ def _moved(fixed: Fixed, layout: Layout, nu: int, x: Tensor, data: Tensor) -> tu
     curve = curve_of(space, knots, [(points, rates)])
     batch = points.shape[: points.ndim - core - 1]
     bc_type = joined(fixed.kinds, _ends(fixed.kinds, [layout.data(v, core) for v in vectors]))
-    return curve, sample_times(knots, batch, at, per_curve, nu), bc_type
+    return curve, sample_times(knots, batch, at, per_curve, orders), bc_type
 
 
 def _like(change: Tensor, array: Tensor) -> Tensor:

@@ -1,6 +1,8 @@
 //! The input of an evaluation: curves, times, quantities, and a block of samples.
 
 use super::locate::Locator;
+use std::any::Any;
+use std::cell::Cell;
 
 /// Spline curves with equally many knots: the triple (t, p, u).
 #[derive(Clone, Copy)]
@@ -16,6 +18,10 @@ pub struct Curves<'a> {
     /// Velocities before the knots, for curves with corners; otherwise empty.
     pub before: &'a [f64],
 }
+
+/// The last segment in which the points of one curve were evaluated.
+#[derive(Default)]
+pub struct LastSegment(pub(super) Cell<Option<Box<dyn Any + Send>>>);
 
 /// Times to evaluate at.
 #[derive(Clone, Copy)]
@@ -127,6 +133,8 @@ pub struct Job<'a> {
     /// Numbers in a row of the result, and of a point.
     pub(super) size: usize,
     pub(super) len: usize,
+    /// The segment of the job before, where it is kept.
+    pub(super) last: Option<&'a LastSegment>,
 }
 
 /// The numbers of a motion: four coordinate vectors, and the changes of the first knot and of the length of the segment.

@@ -1,7 +1,7 @@
 //! Values and derivatives of spline curves at many times.
 
 use super::bezier::Segment;
-use super::data::{Curves, Job, Outside, Quantity, Times};
+use super::data::{Curves, Job, LastSegment, Outside, Quantity, Times};
 use super::locate::Locator;
 use super::sample_cursor::SampleCursor;
 use crate::monitor::Monitor;
@@ -73,10 +73,36 @@ pub fn evaluate(
     let parallel = samples * len > PARALLEL;
     parallel::for_each(blocks, parallel, monitor, |(first, apart, out)| {
         let locator = locator.as_ref();
-        let job = Job { curves, times, quantity, outside, locator, first, apart, size, len };
+        let job = Job { curves, times, quantity, outside, locator, first, apart, size, len, last: None };
         space.0.samples(&job, out);
         monitor.advance(out.len() / size);
     });
+}
+
+/// Evaluates the point of one curve at a time. `last` belongs to the curve.
+pub fn evaluate_point(
+    space: &Erased,
+    curve: &Curves,
+    x: f64,
+    outside: Outside,
+    last: Option<&LastSegment>,
+    out: &mut [f64],
+) {
+    let (times, len) = (Times { x: &[x], count: 1 }, space.point_len());
+    let quantity = Quantity::Point;
+    let job = Job {
+        curves: curve,
+        times: &times,
+        quantity,
+        outside,
+        locator: None,
+        first: 0,
+        apart: 1,
+        size: len,
+        len,
+        last,
+    };
+    space.0.samples(&job, out);
 }
 
 impl Job<'_> {
@@ -190,21 +216,27 @@ impl Job<'_> {
         mut enter: impl FnMut(&SampleCursor, &mut Segment<S>),
         mut write: impl FnMut(&SampleCursor, &mut Segment<S>, &mut [S], &mut [Lane], Rows),
     ) {
-        let mut memory = Memory::<S>::take(len);
-        let Memory { segment, gamma, vectors } = &mut *memory;
+        let kept =
+            self.last.and_then(|last| last.0.take()).and_then(|last| last.downcast::<Memory<S>>().ok());
+        let mut memory = kept.unwrap_or_else(|| Memory::take(len));
+        let Memory { segment, at, gamma, vectors } = &mut *memory;
         let mut cursor = SampleCursor::new(self, out.len() / self.size);
         let stride = self.apart * self.size;
         for out in out.chunks_mut(LANES * stride) {
             let mut first = 0;
             while first < stride {
-                if cursor.advance() {
+                if cursor.advance() && *at != cursor.at {
                     enter(&cursor, segment);
+                    *at = cursor.at;
                 }
                 write(&cursor, segment, gamma, vectors, Rows { stride, out: &mut out[first..] });
                 first += self.size;
             }
         }
-        memory.put_back();
+        match self.last {
+            Some(last) => last.0.set(Some(memory)),
+            None => memory.put_back(),
+        }
     }
 
     /// Points of a sample per lane, and vectors there if the quantity requires them; two for [`Quantity::Motion`]
@@ -274,16 +306,21 @@ impl Job<'_> {
     }
 }
 
+/// The index of no segment.
+const NOWHERE: [usize; LANES] = [usize::MAX; LANES];
+
 /// The memory of an evaluation, which a thread keeps: for a single sample, its allocation would take a third of the time.
 struct Memory<S> {
     segment: Segment<S>,
+    /// The index of the data of each lane's segment.
+    at: [usize; LANES],
     gamma: Vec<S>,
     vectors: Vec<Lane>,
 }
 
 thread_local! {
     /// By the number of derivatives.
-    static KEPT: [Cell<Option<Box<dyn Any>>>; 3] = const { [const { Cell::new(None) }; 3] };
+    static KEPT: [Cell<Option<Box<dyn Any + Send>>>; 3] = const { [const { Cell::new(None) }; 3] };
 }
 
 impl<S: Scalar> Memory<S> {
@@ -291,8 +328,14 @@ impl<S: Scalar> Memory<S> {
     fn take(len: usize) -> Box<Self> {
         let kept = KEPT.with(|kept| kept[S::ORDER].take()).and_then(|kept| kept.downcast::<Self>().ok());
         let mut memory = kept.unwrap_or_else(|| {
-            Box::new(Memory { segment: Segment::default(), gamma: Vec::new(), vectors: Vec::new() })
+            Box::new(Memory {
+                segment: Segment::default(),
+                at: NOWHERE,
+                gamma: Vec::new(),
+                vectors: Vec::new(),
+            })
         });
+        memory.at = NOWHERE;
         memory.segment.resize(len);
         memory.gamma.resize(len, S::constant(Lane::ZERO));
         memory.vectors.resize(3 * len, Lane::ZERO);

@@ -233,7 +233,8 @@ pub fn jerk(
             })
             .collect();
         let (quantity, size) = (Quantity::Jet, Quantity::Jet.len(space));
-        let job = Job { curves, times, quantity, outside, locator: None, first, apart: 1, size, len };
+        let job =
+            Job { curves, times, quantity, outside, locator: None, first, apart: 1, size, len, last: None };
         let mut states = vec![0.0; samples * size];
         space.0.samples(&job, &mut states);
         // The monitor counts samples, and nodes are none.

@@ -20,8 +20,8 @@ mod transport;
 pub use bezier::Segment;
 pub use bspline::evaluate_bspline;
 pub use cumulative::{Coordinates, Multiplication, cumulative_basis, cumulative_steps};
-pub use data::{BSpline, Curves, Job, Moving, Outside, Quantity, Times, motion_len};
-pub use evaluate::evaluate;
+pub use data::{BSpline, Curves, Job, LastSegment, Moving, Outside, Quantity, Times, motion_len};
+pub use evaluate::{evaluate, evaluate_point};
 #[cfg(feature = "dense")]
 pub use jerk::connection;
 pub use length::{ArcLength, Integrand, energies, lengths};

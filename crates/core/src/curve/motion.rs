@@ -275,6 +275,7 @@ impl Moving<'_> {
             apart: 1,
             size: self.len,
             len: self.len,
+            last: None,
         }
     }
 

@@ -236,8 +236,8 @@ impl<'a> Derivative<'a> {
     }
 
     /// Forward mode: the motion of the curve at times x for given changes of the data; `out` receives one tangent
-    /// vector per time.
-    pub fn push(&self, x: &[f64], of: Of, change: &Data, out: &mut [f64]) {
+    /// vector per quantity and time.
+    pub fn push(&self, x: &[f64], quantities: &[Of], change: &Data, out: &mut [f64]) {
         let change = self.in_frames(change);
         let m = self.space.dim();
         let u = self.polygon.unfold(&self.system.velocities(&change), m);
@@ -262,21 +262,28 @@ impl<'a> Derivative<'a> {
             motions.extend_from_slice(&points[at(1)..][..m]);
             motions.extend([dt, dh]);
         }
-        let moving = self.moving(x, of);
-        if !self.space.0.push(&moving, &motions, out) {
-            Rates { space: self.space, moving: &moving }.push(&motions, out);
+        let size = (out.len() / quantities.len()).max(1);
+        for (&of, out) in quantities.iter().zip(out.chunks_mut(size)) {
+            let moving = self.moving(x, of);
+            if !self.space.0.push(&moving, &motions, out) {
+                Rates { space: self.space, moving: &moving }.push(&motions, out);
+            }
         }
     }
 
     /// Reverse mode: the gradient of `Σ cotangent · curve` with respect to the data, tangent vectors at points and
-    /// ends.
-    pub fn pull(&self, x: &[f64], of: Of, cotangent: &[f64]) -> Data {
+    /// ends. There is one cotangent vector per quantity and time.
+    pub fn pull(&self, x: &[f64], quantities: &[Of], cotangents: &[f64]) -> Data {
         let (n, m) = (self.segments(), self.space.dim());
         let size = motion_len(m);
         let mut products = vec![0.0; n * size];
-        let moving = self.moving(x, of);
-        if !self.space.0.pull(&moving, cotangent, &mut products) {
-            Rates { space: self.space, moving: &moving }.pull(cotangent, &mut products);
+        for (&of, cotangents) in
+            quantities.iter().zip(cotangents.chunks((x.len() * self.space.point_len()).max(1)))
+        {
+            let moving = self.moving(x, of);
+            if !self.space.0.pull(&moving, cotangents, &mut products) {
+                Rates { space: self.space, moving: &moving }.pull(cotangents, &mut products);
+            }
         }
         let slots = self.polygon.runs.slots() * m;
         let (mut points, mut u) = (vec![0.0; slots], vec![0.0; slots]);

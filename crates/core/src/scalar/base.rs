@@ -7,6 +7,7 @@ use std::ops::{Add, Mul, Neg, Sub};
 /// A number, or a number with derivatives, on all lanes.
 pub trait Scalar:
     Copy
+    + Send
     + 'static
     + Add<Output = Self>
     + Sub<Output = Self>

@@ -106,6 +106,11 @@ pub trait Ambient: Copy + Send + Sync {
     ) -> Lane {
         pull_back_by_transport(self, p, q, t, cotangent, to_p, to_q)
     }
+    /// Adds to `to_p` the cotangent vector at p whose momentum is that of a vector at c less that of one at q, where a formula
+    /// gives it: returns whether. Both are pairs of a point and a tangent vector.
+    fn conserve(&self, _p: &[Lane], _c: [&[Lane]; 2], _q: [&[Lane]; 2], _to_p: &mut [Lane]) -> bool {
+        false
+    }
     /// Whether [`pull_back_along`](Ambient::pull_back_along) exists: where a cotangent vector that is constant as an array moves
     /// in parallel, up to components normal to the space.
     const SMOOTH: bool = false;
@@ -321,7 +326,9 @@ type Few<S> = SmallVec<[S; 16]>;
 /// ```
 ///
 /// A(s) is self-adjoint and P orthogonal in every form that ad leaves invariant. The transpose is therefore the derivative
-/// itself between two transports: λ ↦ P_{c→q} D_q[p, q]_t P_{c→q} λ for q, and the same for p.
+/// itself between two transports: λ ↦ P_{c→q} D_q[p, q]_t P_{c→q} λ for q, and the same for p. Since [gp, gq]_t = g[p, q]_t, the
+/// momentum of λ is the sum of those at p and q (Noether), which gives the vector at p where the group moves it in all
+/// directions and [`Ambient::conserve`] knows how.
 #[inline(never)]
 pub fn pull_back_by_transport<M: Ambient>(
     space: &M,
@@ -339,12 +346,17 @@ pub fn pull_back_by_transport<M: Ambient>(
     space.geodesic(&fixed_p, &fixed_q, Dual { v: t, d: Lane::ONE }, &mut out);
     let (c, mut velocity): (Few<Lane>, Few<Lane>) = out.iter().map(|x| (x.v, x.d)).unzip();
     space.velocity(&c, &mut velocity);
+    let mut tangent: Few<Lane> = cotangent.iter().copied().collect();
+    space.velocity(&c, &mut tangent);
     let mut way: Few<Lane> = smallvec![Lane::ZERO; len];
     let (mut there, mut moved) = (way.clone(), way.clone());
     let mut moving = fixed_p.clone();
-    for (end, to_end, part) in [(p, to_p, -t), (q, to_q, Lane::ONE - t)] {
+    for (end, to_end, part) in [(q, to_q, Lane::ONE - t), (p, to_p, -t)] {
+        if std::ptr::eq(end, p) && space.conserve(p, [&c, &tangent], [q, &there], to_end) {
+            break;
+        }
         way.iter_mut().zip(&velocity).for_each(|(way, v)| *way = *v * part);
-        space.parallel_transport(&c, end, &way, cotangent, &mut there);
+        space.parallel_transport(&c, end, &way, &tangent, &mut there);
         moving.iter_mut().zip(end.iter().zip(&there)).for_each(|(x, (&v, &d))| *x = Dual { v, d });
         let (from, to) = if std::ptr::eq(end, p) { (&moving, &fixed_q) } else { (&fixed_p, &moving) };
         space.geodesic(from, to, Dual::constant(t), &mut out);
