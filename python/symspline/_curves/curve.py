@@ -411,11 +411,7 @@ class CurveArrays:
 
     def _require_derivatives(self) -> None:
         for factor in self.factors:
-            if factor.space._is_large:
-                raise ValidationError(
-                    f"derivatives with respect to the data are not available, because the dimension of {factor.space} "
-                    "is too large: the curve is computed in the span of its points, which motions of the points leave"
-                )
+            derivatives.require_derivatives(factor.space)
 
     # ---- batches ----
 

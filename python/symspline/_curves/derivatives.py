@@ -13,7 +13,7 @@ from .._base.arrays import as_array, cast, same_fields, short_repr
 from .._base.time import onto_ends, refuse_outside
 from .._base.typing import Array, CubicBCType, FloatArray, P
 from .._core import ValidationError
-from .._spaces import Doubles, Space
+from .._spaces import AnySpace, Doubles, Space
 from .ends import End, ends_of
 
 
@@ -143,8 +143,7 @@ def jvp(curve: SplineData, at: SampleTimes, bc_type: Any, points: Any, t: Any, e
 def vjp(curve: SplineData, at: SampleTimes, bc_type: CubicBCType, cotangent: Any) -> Gradient:
     """Compute the gradient with respect to the data; see `symspline.CubicSpline.vjp`."""
     space, batch, nodes = curve.space, curve.batch, curve.times.shape[-1]
-    doubles = space._doubles(cotangent, "cotangent")
-    _same_shape(space._numbers(doubles), (*at.shape, *space.point_shape), "cotangent")
+    doubles = space._as_doubles(read_cotangent(space, cotangent, at.shape))
     points, knots, *ends = _core.pull(space._handle, _curves(curve, at, bc_type), np.ascontiguousarray(doubles))
     knots = knots.reshape(*batch, nodes)
     if curve.times.ndim == 1:
@@ -154,6 +153,22 @@ def vjp(curve: SplineData, at: SampleTimes, bc_type: CubicBCType, cotangent: Any
         knots,
         (_end_gradient(curve, bc_type, ends[0], 0), _end_gradient(curve, bc_type, ends[1], 1)),
     )
+
+
+def read_cotangent(space: Space, cotangent: Any, shape: tuple[int, ...]) -> Array:
+    """Return the weights of the numbers of values, whose shape without the axes of a point is `shape`."""
+    numbers = space._numbers(space._doubles(cotangent, "cotangent"))
+    _same_shape(numbers, (*shape, *space.point_shape), "cotangent")
+    return numbers
+
+
+def require_derivatives(space: AnySpace) -> None:
+    """Raise ValidationError if curves in the space have no derivatives with respect to their data."""
+    if space._is_large:
+        raise ValidationError(
+            f"derivatives with respect to the data are not available, because the dimension of {space} is too large: "
+            "the curve is computed in the span of its points, which motions of the points leave"
+        )
 
 
 def pair_of(ends: object) -> tuple[Any, Any]:

@@ -21,6 +21,8 @@ from .._spaces import AnySpace, Doubles, Quotient, cover_of, factors_of, parts_o
 
 Ends = tuple[str, str] | None
 _WORDS = ("natural", "not-a-knot", "clamped")
+# Remedy for coordinates outside their axis.
+CONTINUE = "pass extrapolate=True or 'geodesic' to continue the spline there, or False for NaN"
 _HELP = (
     "bc_type must be 'natural', 'not-a-knot', 'clamped' or 'periodic', or a sequence with one entry per axis, each of "
     "these or a pair of 'natural', 'not-a-knot' or 'clamped' for the start and the end of the axis"
@@ -59,6 +61,12 @@ class GridAxis(NamedTuple):
         """Whether the axis repeats."""
         return self.ends is None
 
+    def wrapped(self, x: Doubles) -> Doubles:
+        """Return the coordinates inside the axis of which those outside are repetitions."""
+        first, last = self.knots[0], self.knots[-1]
+        inside = np.minimum(first + (x - first) % (last - first), last)
+        return np.where((x < first) | (x > last), inside, x)
+
 
 class Sites(NamedTuple):
     """Coordinates at which a grid is evaluated.
@@ -85,6 +93,10 @@ class Sites(NamedTuple):
     def reversed(self) -> Self:
         """Return the same coordinates with the order of axes reversed."""
         return self._replace(x=self.x[::-1], modes=self.modes[::-1])
+
+    def block(self, chosen: slice) -> Self:
+        """Return some of the coordinates: along the first axis in an outer product, and otherwise along all axes."""
+        return self._replace(x=[x if k and self.outer else x[chosen] for k, x in enumerate(self.x)])
 
     def along(self, axis: int, x: Doubles) -> Self:
         """Return these coordinates with others along one axis."""
@@ -209,9 +221,14 @@ def _padded(arrays: list[Doubles]) -> list[Doubles]:
 
 
 def sites_of(
-    axes: list[GridAxis], x: list[Doubles], outer: bool, extrapolate: object
+    axes: list[GridAxis], x: list[Doubles], outer: bool, extrapolate: object, remedy: str = CONTINUE
 ) -> tuple[Sites, list[np.ndarray[Any, np.dtype[np.bool_]]]]:
     """Return sites under an extrapolation policy, and for each axis which coordinates give NaN.
+
+    Parameters
+    ----------
+    remedy : str
+        Remedy for coordinates outside their axis, for messages.
 
     Raises
     ------
@@ -225,10 +242,7 @@ def sites_of(
         outside = ~((times >= first) & (times <= last))
         if mode == "raise" and outside.any():
             i = int(np.flatnonzero(outside)[0])
-            message = (
-                f"the coordinate {times[i]} is outside axis {k}, which extends from {first} to {last}; pass "
-                "extrapolate=True or 'geodesic' to continue the spline there, or False for NaN"
-            )
+            message = f"the coordinate {times[i]} is outside axis {k}, which extends from {first} to {last}; {remedy}"
             raise axis.time_axis.explain(ValidationError(message))
         missing.append(outside if mode == "nan" else np.zeros(outside.shape, bool))
         kept.append(np.where(outside, first, times) if mode == "nan" else times)

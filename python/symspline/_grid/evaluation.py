@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from functools import cached_property, reduce
-from itertools import groupby
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
@@ -14,12 +14,14 @@ from .._base.faults import CUT_LOCUS, UNCONVERGED, Fault, from_core, imprecise, 
 from .._base.report import Columns, ConvergenceWarning, FarPointsWarning
 from .._base.typing import Array, Extrapolate, Progress
 from .._core import ValidationError
+from .._curves.derivatives import require_derivatives
 from .._curves.on_manifold import Intervals
 from .._curves.reduced import Span, span_of
 from .._spaces import AnySpace, Doubles
 from .._splines.cubic import CubicSpline
 from ..manifolds import Manifold
 from .axes import GridAxis, Sites
+from .rows import RowSplines, beside_gaps, rows_alike, runs_of
 
 # Chebyshev nodes of a segment, on which a derivative is interpolated to be differentiated once more.
 _NODES = 12
@@ -80,6 +82,29 @@ class FactorGrid:
             return (points if vectors is None else vectors), outcome
         return self._second(sites, nu)
 
+    def gradient(self, sites: Sites, cotangent: Array) -> tuple[Array, Outcome]:
+        """Compute the gradient of ``sum(cotangent * values)`` with respect to the points at the nodes.
+
+        Raises
+        ------
+        ValidationError
+            If the sensitivity of splines to their points is not available.
+        """
+        if isinstance(self.forward, ManifoldGrid):
+            raise ValidationError(
+                "the gradient with respect to the nodes needs the sensitivity of splines to their points, which is not "
+                f"available on {self.space!r}. Use differences of grids with nodes that moved."
+            )
+        require_derivatives(self.space)
+        if not self.symmetric:
+            return self.forward.pull(sites, cotangent)
+        dims, backward = len(self.axes), cast(CompiledGrid, self.backward)
+        (p, *_), (q, *_) = self._orders(sites, (0,) * dims, None)
+        of_p, of_q = _pull_midpoint(self.space, p, q, cotangent)
+        gradient, outcome = self.forward.pull(sites, of_p)
+        other, others = backward.pull(sites.reversed(), _axes_reversed(of_q, dims) if sites.outer else of_q)
+        return gradient + _axes_reversed(other, dims), outcome.merged(others)
+
     def gap(self, sites: Sites) -> Doubles:
         """Return the distances between the values in both orders of axes."""
         p, q = (evaluated[0] for evaluated in self._orders(sites, (0,) * len(self.axes), None))
@@ -105,10 +130,8 @@ class FactorGrid:
         first = self.forward.run(sites, *_derivative(nu), progress)
         points, vectors, outcome = self.backward.run(sites.reversed(), *_derivative(nu[::-1]), progress)
         if sites.outer:
-            dims = len(self.axes)
-            order = (*range(dims)[::-1], *range(dims, points.ndim))
-            points = points.transpose(order)
-            vectors = None if vectors is None else vectors.transpose(order)
+            points = _axes_reversed(points, len(self.axes))
+            vectors = None if vectors is None else _axes_reversed(vectors, len(self.axes))
         return [first, (points, vectors, outcome)]
 
     def _second(self, sites: Sites, nu: tuple[int, ...]) -> tuple[Array, Outcome]:
@@ -149,6 +172,11 @@ class FactorGrid:
         segments = Intervals.of(self.axes[axis].knots, x, sites.modes[axis], "left" if left else "right")
         result = segments.derivative(self.space, here, values, _NODES, shape + (1,) * ones)
         return result, here, reduce(Outcome.merged, outcomes)
+
+
+def _axes_reversed(array: Array, dims: int) -> Array:
+    """Reverse the order of the first `dims` axes of an array."""
+    return array.transpose(*range(dims)[::-1], *range(dims, array.ndim))
 
 
 def orders_of(nu: Any, dims: int) -> tuple[int, ...]:
@@ -193,7 +221,22 @@ def _midpoint(
     return out, derivative
 
 
+def _pull_midpoint(space: AnySpace, p: Array, q: Array, cotangent: Array) -> tuple[Array, Array]:
+    """Return the gradients of ``sum(cotangent * midpoints)`` with respect to p and q; zero where one is missing."""
+    valid = space._where_finite(p) & space._where_finite(q)
+    gradients = np.zeros((2, *p.shape), space.dtype)
+    # The midpoint is that of a natural spline through two points.
+    pairs = np.stack([p[valid], q[valid]], axis=1)
+    with silenced(FarPointsWarning):
+        geodesics = CubicSpline((0.0, 1.0), pairs, space, check=False, on_failure="ignore")
+    gradients[:, valid] = np.moveaxis(geodesics.vjp(0.5, cotangent[valid]).points, 1, 0)
+    return gradients[0], gradients[1]
+
+
 # ---- grids in spaces of the compiled core ----
+
+# The most numbers of an array between two axes in the gradient with respect to the nodes: 16 MB.
+_MOST = 1 << 21
 
 
 class Outcome(NamedTuple):
@@ -257,10 +300,7 @@ class CompiledGrid:
         self.outcome = Outcome()
         self._rows = self._in_rows(points)
         if velocities is None:
-            velocities_in_rows, summary = _core.grid_rows(
-                space._handle, self._axis(0, "continue"), self._rows, progress
-            )
-            self._velocities, self.outcome = velocities_in_rows, self._read(summary)
+            self._velocities, self.outcome = self._fit(0, self._rows, progress)
         else:
             self._velocities = self._in_rows(velocities)
 
@@ -271,9 +311,7 @@ class CompiledGrid:
 
     def backwards(self) -> CompiledGrid:
         """Return the grid with the order of axes reversed."""
-        dims = len(self.axes)
-        order = (*range(dims)[::-1], *range(dims, self.points.ndim))
-        points = np.ascontiguousarray(self.points.transpose(order))
+        points = np.ascontiguousarray(_axes_reversed(self.points, len(self.axes)))
         return CompiledGrid(self.space, self.axes[::-1], points, self.span, order=-self._order)
 
     def run(
@@ -302,6 +340,59 @@ class CompiledGrid:
             points, vectors, summary = _core.grid_scattered(self.space._handle, arrays, x, along, last, progress)
         return self._shown(points), None if vectors is None else self._shown(vectors), self._read(summary)
 
+    def pull(self, sites: Sites, cotangent: Array) -> tuple[Array, Outcome]:
+        """Compute the gradient of ``sum(cotangent * values)`` with respect to the points at the nodes.
+
+        Coordinates along the first axis, or scattered coordinates, are divided into blocks to bound the memory.
+        """
+        gradient, outcome = np.zeros(self.points.shape, self.space.dtype), Outcome()
+        if cotangent.size == 0:
+            return gradient, outcome
+        counts = [len(x) if sites.outer else 1 for x in sites.x]
+        nodes = [len(axis.knots) for axis in self.axes]
+        largest = max(math.prod(counts[1 : k + 1]) * math.prod(nodes[k + 1 :]) for k in range(len(nodes)))
+        size = max(_MOST // max(largest * math.prod(self.space.point_shape), 1), 1)
+        for start in range(0, len(cotangent), size):
+            block = slice(start, start + size)
+            part, outcome_of_block = self._pull_block(sites.block(block), cotangent[block])
+            gradient += part
+            outcome = outcome.merged(outcome_of_block)
+        return gradient, outcome
+
+    def _pull_block(self, sites: Sites, cotangent: Array) -> tuple[Array, Outcome]:
+        """Compute the gradient axis after axis: forward for the points at the nodes of each axis, and back."""
+        last, outcome, splines = len(self.axes) - 1, Outcome(), []
+        points, velocities = self.points, self.space._numbers(self._velocities)
+        if not sites.outer:
+            # Each scattered coordinate is an outer product of its own, along the first axis.
+            cotangent = cotangent.reshape(len(cotangent), *(1,) * last, *self.space.point_shape)
+        for k, axis in enumerate(self.axes):
+            rows, x = np.moveaxis(points, k, last), axis.wrapped(sites.x[k])
+            own = x.reshape(-1, *(1,) * last) if k and not sites.outer else x
+            own = np.broadcast_to(own, (*rows.shape[:last], own.shape[-1]))
+            if k:
+                velocities, outcome_of_axis = self._velocities_for(k, rows, own)
+                outcome = outcome.merged(outcome_of_axis)
+            splines.append(RowSplines(self.space, axis, rows, velocities, own))
+            if k < last:
+                points = np.moveaxis(splines[k].values(), last, k)
+        for k, own_splines in reversed(list(enumerate(splines))):
+            cotangent = np.moveaxis(own_splines.pull(np.moveaxis(cotangent, k, last)), last, k)
+        return cotangent, outcome
+
+    def _velocities_for(self, k: int, rows: Array, x: Doubles) -> tuple[Array, Outcome]:
+        """Fit the rows along axis k that are evaluated between nodes; points at nodes need no spline."""
+        needed = ~np.isin(x, self.axes[k].knots).all(axis=-1)
+        velocities = np.full(rows.shape, np.nan, self.space.dtype)
+        fitted, outcome = self._fit(k, self.space._as_doubles(np.ascontiguousarray(rows[needed])))
+        velocities[needed] = self.space._numbers(fitted)
+        return velocities, outcome
+
+    def _fit(self, k: int, rows: Doubles, progress: Progress | None = None) -> tuple[Doubles, Outcome]:
+        """Compute velocities at the nodes of rows along axis k."""
+        velocities, summary = _core.grid_rows(self.space._handle, self._axis(k, "continue"), rows, progress)
+        return velocities, self._read(summary, k)
+
     def _axis(self, k: int, mode: str) -> tuple[Doubles, list[str] | None, str]:
         axis = self.axes[k]
         return axis.knots, None if axis.ends is None else list(axis.ends), mode
@@ -315,12 +406,13 @@ class CompiledGrid:
         numbers = self.space._numbers(doubles)
         return numbers if self.span is None else self.span.embed_samples(numbers, ())
 
-    def _read(self, summary: Any) -> Outcome:
+    def _read(self, summary: Any, start: int = 0) -> Outcome:
+        """Read the report of rows. Axis `start` is the first one that the core was given."""
         failed, first, residual, *_ = summary
         if first is None:
             return Outcome(0, None, residual)
         axis, kind, node, value, limit, row_residual = first
-        number = axis if self._order > 0 else len(self.axes) - 1 - axis
+        number = start + axis if self._order > 0 else len(self.axes) - 1 - start - axis
         return Outcome(failed, row_fault(number, kind, node, value, limit, row_residual), residual)
 
 
@@ -354,9 +446,7 @@ class ManifoldGrid:
 
     def backwards(self) -> ManifoldGrid:
         """Return the grid with the order of axes reversed."""
-        dims = len(self.axes)
-        order = (*range(dims)[::-1], *range(dims, self.points.ndim))
-        return ManifoldGrid(self.space, self.axes[::-1], self.points.transpose(order))
+        return ManifoldGrid(self.space, self.axes[::-1], _axes_reversed(self.points, len(self.axes)))
 
     def run(
         self, sites: Sites, along: int | None, last: int, progress: Progress | None
@@ -406,14 +496,11 @@ class ManifoldGrid:
         flat = rows.reshape(-1, len(axis.knots), *shape)
         out = np.full((len(flat), len(x), *shape), np.nan, self.space.dtype)
         if mode == "periodic":
-            start, period = axis.knots[0], axis.knots[-1] - axis.knots[0]
-            x = np.where((x < start) | (x > axis.knots[-1]), start + (x - start) % period, x)
+            x = axis.wrapped(x)
         valid = self.space._where_finite(flat)
         outcome = Outcome()
-        order = sorted(range(len(flat)), key=lambda row: valid[row].tobytes())
-        for _, same in groupby(order, key=lambda row: valid[row].tobytes()):
-            rows_alike = np.array(list(same))
-            for first, stop in _runs(valid[rows_alike[0]]):
+        for same in rows_alike(valid):
+            for first, stop in runs_of(valid[same[0]]):
                 inside = (x >= axis.knots[first]) & (x <= axis.knots[stop - 1])
                 if stop == len(axis.knots):
                     inside |= x > axis.knots[-1]
@@ -421,34 +508,18 @@ class ManifoldGrid:
                     inside |= x < axis.knots[0]
                 if stop - first == 1:
                     if nu == 0:
-                        out[np.ix_(rows_alike, x == axis.knots[first])] = flat[rows_alike, first][:, None]
+                        out[np.ix_(same, x == axis.knots[first])] = flat[same, first][:, None]
                     continue
                 whole = stop - first == len(axis.knots)
-                bc: Any = axis.bc_type if whole else _beside_gaps(axis, first, stop)
-                points = np.ascontiguousarray(flat[rows_alike, first:stop])
+                bc: Any = axis.bc_type if whole else beside_gaps(axis, first, stop)
+                points = np.ascontiguousarray(flat[same, first:stop])
                 with silenced(ConvergenceWarning), silenced(FarPointsWarning):
                     spline = CubicSpline(
                         axis.knots[first:stop], points, self.space, bc_type=bc, check=False, on_failure="ignore"
                     )
-                out[np.ix_(rows_alike, inside)] = spline(x[inside], nu, extrapolate=_POLICIES[mode])
+                out[np.ix_(same, inside)] = spline(x[inside], nu, extrapolate=_POLICIES[mode])
                 outcome = outcome.merged(_outcome(spline, number))
         return out.reshape(*lead, len(x), *shape), outcome
-
-
-def _runs(valid: Array) -> list[tuple[int, int]]:
-    """Return the first node and the end of every run of valid nodes."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], valid, [False]]).astype(int)))
-    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
-
-
-def _beside_gaps(axis: GridAxis, first: int, stop: int) -> tuple[str, str]:
-    """Return the end conditions of a run: natural on natural axes, and otherwise not-a-knot beside a gap."""
-    ends = axis.ends or ("not-a-knot", "not-a-knot")
-    at_end = first == 0, stop == len(axis.knots)
-    start, end = (
-        "not-a-knot" if word == "clamped" and not there else word for word, there in zip(ends, at_end, strict=True)
-    )
-    return start, end
 
 
 def _outcome(spline: CubicSpline[Any], number: int) -> Outcome:

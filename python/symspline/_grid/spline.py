@@ -11,9 +11,10 @@ import numpy as np
 from .._base.arrays import checked_atol, checked_flag, short_repr, whole_number
 from .._base.typing import Array, Extrapolate, File, GridLook, OnFailure, P, PointsLike, Progress, State, TimesLike
 from .._core import ValidationError
+from .._curves.derivatives import read_cotangent
 from .._curves.failures import raise_or_warn
 from .._curves.options import check_on_failure, check_policies, check_progress, checked_extrapolate, require_matplotlib
-from .._spaces import AnySpace, Product, Space, cover_of, factors_of, product_norm, space_named
+from .._spaces import AnySpace, Product, Space, cover_of, factors_of, parts_of, product_norm, space_named
 from .._splines.archive import (
     FORMATS,
     Entries,
@@ -348,6 +349,83 @@ class GridSpline(Generic[P]):
             outcome = outcome.merged(outcome_of_factor)
         self._handle(outcome, "the grid")
         return self._joined(results)
+
+    def vjp(self, x: Any, cotangent: PointsLike, *, grid: bool = False) -> P:
+        """Compute the gradient of a function of the values with respect to the nodes.
+
+        The function is ``sum(cotangent * values)``, where the values are those of `GridSpline.__call__` or of
+        `GridSpline.grid`. This is reverse mode: the transpose of the evaluation.
+
+        Parameters
+        ----------
+        x : tuple of array_like, or array_like of shape (..., D)
+            Coordinates inside the axes, as for `GridSpline.__call__`. Periodic axes repeat.
+        cotangent : array_like, shape of the values
+            Weights of the numbers of the values. For a `Product`, a tuple with one array per factor. Weights of values
+            that are NaN have no effect. For complex numbers, real and imaginary parts are multiplied separately.
+        grid : bool, default False
+            Whether `x` is a tuple with the coordinates along each axis, numbers or vectors, whose outer product is
+            evaluated as by `GridSpline.grid`.
+
+        Returns
+        -------
+        ndarray or tuple of ndarray, shape of `points`
+            Tangent vectors at the nodes, with the convention of `CubicSpline.vjp`: if the nodes move with the tangent
+            vectors v, ``sum(cotangent * values)`` changes by ``sum(gradient * v)``. Vectors are zero at missing nodes,
+            and at the last nodes of periodic axes, which move with the first ones.
+
+        Raises
+        ------
+        ValidationError
+            If the input does not meet the requirements above, the space is a `Manifold` that is made of functions, or
+            its dimension is too large.
+        CutLocusError, ConvergenceError
+            If a spline fails; see `on_failure` in `GridSpline`.
+
+        See Also
+        --------
+        CubicSpline.vjp : Compute the gradient of a function of a curve.
+
+        Notes
+        -----
+        The splines along all axes are evaluated first. Their gradients follow in the reverse order of the axes. Splines
+        that did not converge, kept by `on_failure`, are differentiated as if they had. The working memory is bounded.
+        Outer products are much faster than the same coordinates scattered, whose splines use all nodes here.
+
+        Examples
+        --------
+        Weights of the nodes in one value:
+
+        >>> import numpy as np, symspline as ss
+        >>> u = np.linspace(0, 1, 4)
+        >>> surface = ss.GridSpline((u, u), (u[:, None] * u)[..., None], "r:1")
+        >>> weights = surface.vjp((0.5, 0.0), [1.0])
+        >>> weights.shape
+        (4, 4, 1)
+        >>> weights[:, 0, 0].round(6)
+        array([-0.0625,  0.5625,  0.5625, -0.0625])
+        """
+        outer = checked_flag(grid, "grid")
+        if outer and not isinstance(x, (tuple, list)):
+            raise ValidationError(
+                f"x must be a tuple with the coordinates along each axis, such as (u, v), not {short_repr(x)}. Pass "
+                "grid=False for scattered coordinates."
+            )
+        numbers, shape, outer = coordinates(self._axes, x, outer)
+        remedy = "derivatives with respect to the nodes exist only inside. Remove the coordinate."
+        sites, _ = sites_of(self._axes, numbers, outer, None, remedy)
+        gradients, outcome = [], Outcome()
+        cotangents = parts_of(cotangent, self._space, "cotangent")
+        for factor, own in zip(self._factors, cotangents, strict=True):
+            weights = read_cotangent(factor.space, own, shape)
+            gradient, outcome_of_factor = factor.gradient(
+                sites, weights.reshape(*sites.shape, *factor.space.point_shape)
+            )
+            gradients.append(gradient)
+            outcome = outcome.merged(outcome_of_factor)
+        self._handle(outcome, "the grid")
+        joined: P = self._joined(gradients)
+        return joined
 
     def section(self, axis: int, at: Any) -> CubicSpline[P] | GridSpline[P]:
         """Return the section at a fixed coordinate along one axis.

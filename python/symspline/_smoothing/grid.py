@@ -817,7 +817,8 @@ class SmoothingGrid(GridSpline[P], Generic[P]):
     """A C² surface close to noisy points on a grid.
 
     `make_smoothing_grid` returns objects of this class; it has no public constructor. All methods of `GridSpline` are
-    available. `points` are those of the smooth surface at the nodes. Files keep the data.
+    available. `points` are those of the smooth surface at the nodes, and `vjp` differentiates with respect to them, not
+    to the data. Files keep the data.
 
     For a `Product`, and for poses, `df`, `sigma` and `std` are tuples with one entry per factor or part.
 
