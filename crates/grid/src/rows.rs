@@ -6,7 +6,7 @@ use crate::grid::{OPTIONS, is_valid};
 use crate::samples::GridSamples;
 use crate::summary::Summary;
 use symspline_core::curve::{Curves, Quantity, Times, evaluate};
-use symspline_core::derivative::{Data, Derivative, Of};
+use symspline_core::derivative::{Data, Derivative, MOST_CURVES, Of};
 use symspline_core::fit::{Problem, Status, fit};
 use symspline_core::monitor::Monitor;
 use symspline_core::parallel;
@@ -216,64 +216,81 @@ pub fn push_rows(
     monitor: &Monitor,
     out: &mut [f64],
 ) {
-    let (n, len) = (axis.nodes(), space.point_len());
-    let row_len = n * len;
-    let items: Vec<_> = rows
-        .chunks_exact(row_len)
-        .zip(velocities.chunks_exact(row_len))
-        .zip(tangents.chunks_exact(row_len))
-        .zip(out.chunks_exact_mut(x.per_row() * len))
-        .enumerate()
-        .collect();
-    parallel::for_each(items, false, monitor, |(row, (((points, velocities), tangents), out))| {
-        out.fill(f64::NAN);
+    let len = space.point_len();
+    let row_len = axis.nodes() * len;
+    out.fill(f64::NAN);
+    let mut curves = Vec::new();
+    for (k, out) in out.chunks_exact_mut(x.per_row() * len).enumerate() {
+        let [points, velocities, tangents] =
+            [rows, velocities, tangents].map(|x| &x[k * row_len..][..row_len]);
+        let is_finite = |run: Run| {
+            let mut nodes = (run.first..run.first + run.nodes).map(|i| axis.index(i) * len);
+            nodes.all(|at| {
+                velocities[at..at + len].iter().chain(&tangents[at..at + len]).all(|v| v.is_finite())
+            })
+        };
         for run in axis.runs(|i| is_valid(points, i, len)) {
             // The coordinates in this run, and their numbers.
-            let inside: Vec<(usize, f64)> = x
-                .of(row)
-                .iter()
-                .enumerate()
-                .filter_map(|(k, &x)| {
-                    let (segment, x) = axis.locate(x);
-                    Some((k, axis.coordinate_in(run, segment, x)?))
-                })
-                .collect();
-            if inside.is_empty() {
-                continue;
-            }
-            let nodes = run.first..run.first + run.nodes;
-            let gather = |array: &[f64]| -> Vec<f64> {
-                nodes.clone().flat_map(|i| &array[axis.index(i) * len..][..len]).copied().collect()
-            };
-            let tangents = gather(tangents);
+            let located = x.of(k).iter().enumerate().filter_map(|(i, &x)| {
+                let (segment, x) = axis.locate(x);
+                Some((i, axis.coordinate_in(run, segment, x)?))
+            });
+            let (numbers, x): (Vec<usize>, Vec<f64>) = located.unzip();
             if run.nodes == 1 {
                 if of == Of::Point {
-                    inside.iter().for_each(|(k, _)| out[k * len..][..len].copy_from_slice(&tangents));
+                    let tangent = &tangents[axis.index(run.first) * len..][..len];
+                    numbers.iter().for_each(|i| out[i * len..][..len].copy_from_slice(tangent));
                 }
-                continue;
-            }
-            let t: Vec<f64> = nodes.clone().map(|i| axis.knot(i)).collect();
-            let (points, velocities) = (gather(points), gather(velocities));
-            let times: Vec<f64> = inside.iter().map(|(_, x)| *x).collect();
-            let mut found = vec![0.0; times.len() * len];
-            push_curve(space, axis, run, [&t, &points, &velocities, &tangents], &times, of, &mut found);
-            for ((k, _), v) in inside.iter().zip(found.chunks_exact(len)) {
-                out[k * len..][..len].copy_from_slice(v);
+            } else if !numbers.is_empty() && is_finite(run) {
+                curves.push(Pushed { row: k, run, numbers, x });
             }
         }
+    }
+    // Curves that are alike are computed together.
+    let kind = |curve: &Pushed| (curve.run.first, curve.run.nodes, curve.run.closed, curve.x.len());
+    curves.sort_by_key(kind);
+    let mut groups: Vec<(&[Pushed], Vec<f64>)> = curves
+        .chunk_by(|a, b| kind(a) == kind(b))
+        .flat_map(|alike| alike.chunks(MOST_CURVES))
+        .map(|group| (group, Vec::new()))
+        .collect();
+    parallel::for_each(groups.iter_mut().collect(), false, monitor, |(group, moved)| {
+        let run = group[0].run;
+        let gather = |array: &[f64]| -> Vec<f64> {
+            let of_curve = |curve: &Pushed| {
+                let nodes = curve.row * row_len;
+                (run.first..run.first + run.nodes).flat_map(move |i| {
+                    let at = nodes + axis.index(i) * len;
+                    at..at + len
+                })
+            };
+            group.iter().flat_map(of_curve).map(|i| array[i]).collect()
+        };
+        let t: Vec<f64> = (run.first..run.first + run.nodes).map(|i| axis.knot(i)).collect();
+        let t = t.repeat(group.len());
+        let x: Vec<f64> = group.iter().flat_map(|curve| &curve.x).copied().collect();
+        let [points, velocities, tangents] = [rows, velocities, tangents].map(gather);
+        let rest = vec![0.0; group.len() * len];
+        let ends = ends_of(axis.conditions(run), &rest);
+        let change = Data { points: tangents, knots: vec![0.0; t.len()], ends: [Vec::new(), Vec::new()] };
+        moved.resize(x.len() * len, 0.0);
+        Derivative::new(space, &t, &points, &velocities, &ends, group.len()).push(&x, &[of], &change, moved);
     });
+    for (group, moved) in &groups {
+        let size = moved.len() / group.len();
+        for (curve, moved) in group.iter().zip(moved.chunks_exact(size)) {
+            let out = &mut out[curve.row * x.per_row() * len..][..x.per_row() * len];
+            for (i, v) in curve.numbers.iter().zip(moved.chunks_exact(len)) {
+                out[i * len..][..len].copy_from_slice(v);
+            }
+        }
+    }
 }
 
-/// Carries tangent vectors at the nodes of one curve to the coordinates x. `curve` contains knots, points, velocities and
-/// tangent vectors.
-fn push_curve(space: &Erased, axis: &Axis, run: Run, curve: [&[f64]; 4], x: &[f64], of: Of, out: &mut [f64]) {
-    let [t, points, velocities, tangents] = curve;
-    if velocities.iter().chain(tangents).any(|v| !v.is_finite()) {
-        return out.fill(f64::NAN);
-    }
-    let rest = vec![0.0; space.point_len()];
-    let ends = ends_of(axis.conditions(run), &rest);
-    let change =
-        Data { points: tangents.to_vec(), knots: vec![0.0; t.len()], ends: [Vec::new(), Vec::new()] };
-    Derivative::new(space, t, points, velocities, &ends).push(x, &[of], &change, out);
+/// A run of a row, and the coordinates there at which it is differentiated.
+struct Pushed {
+    row: usize,
+    run: Run,
+    numbers: Vec<usize>,
+    x: Vec<f64>,
 }

@@ -29,6 +29,12 @@ pub trait Form: Copy + Send + Sync + 'static {
     fn vectors(omega: &[Lane; 16]) -> [Vector<Lane>; 2];
     /// The matrix of a pair: bilinear in a and b.
     fn matrix<S: Scalar>(a: Quaternion<S>, b: Quaternion<S>) -> [S; 16];
+    /// The derivatives in the products aᵢ bₖ of a function of the matrix with a given gradient.
+    #[inline(always)]
+    fn by_products(gradient: &[Lane; 16]) -> [[Lane; 4]; 4] {
+        let unit = |i: usize| few(|k| if i == k { Lane::ONE } else { Lane::ZERO });
+        few(|i| few(|k| dot(&Self::matrix(unit(i), unit(k)), gradient)))
+    }
 }
 
 /// Rotations of four dimensions.
@@ -108,6 +114,10 @@ impl Form for FourDimensional {
             };
             (term(0) + term(1)) + (term(2) + term(3))
         })
+    }
+    #[inline(always)]
+    fn by_products(gradient: &[Lane; 16]) -> [[Lane; 4]; 4] {
+        few(|i| few(|k| component(gradient, i, k) * lane(4.0)))
     }
 }
 

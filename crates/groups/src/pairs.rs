@@ -336,4 +336,14 @@ impl<F: Form> Covered for Pairs<F> {
         };
         out.copy_from_slice(&x[..out.len()]);
     }
+    #[inline(always)]
+    fn lower(&self, _side: Lane, y: &[Lane], gradient: &[Lane], _image: &mut [Lane], out: &mut [Lane]) {
+        let [a, b] = Self::frame(y);
+        let all = few(|i| if i < gradient.len() { gradient[i] } else { Lane::ZERO });
+        let by_products = F::by_products(&all);
+        for k in 0..4 {
+            out[k] = dot(&by_products[k], &b);
+            out[4 + k] = dot(&by_products.each(|row| row[k]), &a);
+        }
+    }
 }

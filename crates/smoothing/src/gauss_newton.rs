@@ -72,7 +72,7 @@ pub fn step(
         "smoothing by full Gauss–Newton",
         "Pass method='linearized', use fewer knots, or smooth the data in parts",
     );
-    let derivative = Derivative::new(space, path.t, path.points, path.velocities, &ends);
+    let derivative = Derivative::new(space, path.t, path.points, path.velocities, &ends, 1);
     // Velocities in units of the mean knot spacing, so that all unknowns have a similar size.
     let unit = (path.t[n] - path.t[0]) / n as f64;
     // The last knot of a closed curve equals the first.

@@ -141,6 +141,15 @@ impl<const E: usize, const C: usize, const K: i32> Ambient for Lines<E, C, K> {
             pull_back_by_transport(self, p, q, t, cotangent, to_p, to_q)
         }
     }
+    /// The momentum of a horizontal v at p is vp* − pv*.
+    fn conserve(&self, p: &[Lane], c: [&[Lane]; 2], q: [&[Lane]; 2], to_p: &mut [Lane]) -> bool {
+        if K > 0 {
+            for ([x, v], sign) in [(c, Lane::ONE), (q, -Lane::ONE)] {
+                lines::add_momentum::<E, C>(p, x, v, sign, to_p);
+            }
+        }
+        K > 0
+    }
     fn raise(&self, p: &[Lane], gradient: &mut [Lane]) {
         if K < 0 {
             gradient[..C].iter_mut().for_each(|x| *x = -*x);

@@ -421,6 +421,18 @@ pub fn pull_back<const E: usize, const C: usize>(
     rate
 }
 
+/// Adds a multiple of (vx* − xv*)p.
+pub fn add_momentum<const E: usize, const C: usize>(
+    p: &[Lane],
+    x: &[Lane],
+    v: &[Lane],
+    factor: Lane,
+    out: &mut [Lane],
+) {
+    add_times::<Lane, E, C>(out, v, &scaled(&product::<Lane, E, C, 1>(x, p), factor));
+    add_times::<Lane, E, C>(out, x, &scaled(&product::<Lane, E, C, 1>(v, p), -factor));
+}
+
 /// `E_p(v)` x.
 #[inline(always)]
 pub fn transvect<const E: usize, const C: usize, const K: i32>(p: &[Lane], v: &[Lane], x: &mut [Lane]) {

@@ -7,7 +7,8 @@ use crate::space::Handle;
 use crate::watch::{is_heavy, is_long, watched};
 use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn};
 use pyo3::prelude::*;
-use symspline_engine::derivative::{Data, Derivative, Of};
+use std::ops::Range;
+use symspline_engine::derivative::{Data, Derivative, MOST_CURVES, Of};
 use symspline_engine::fit::{End, Ends};
 use symspline_engine::monitor::Monitor;
 use symspline_engine::parallel;
@@ -43,10 +44,22 @@ struct Slices<'a> {
     quantities: Vec<Of>,
 }
 
-/// The part of an array that belongs to one of equally many curves.
-fn part<T>(array: &[T], curve: usize, curves: usize) -> &[T] {
+/// The part of an array that belongs to some of the curves.
+fn part<'a, T>(array: &'a [T], some: &Range<usize>, curves: usize) -> &'a [T] {
     let size = array.len() / curves;
-    &array[curve * size..(curve + 1) * size]
+    &array[some.start * size..some.end * size]
+}
+
+/// Curves whose derivatives are computed together: alone where few would fill the lanes.
+fn groups(curves: usize) -> Vec<Range<usize>> {
+    let full = curves / MOST_CURVES * MOST_CURVES;
+    let mut groups: Vec<_> = (0..full).step_by(MOST_CURVES).map(|first| first..first + MOST_CURVES).collect();
+    if 2 * (curves - full) > MOST_CURVES {
+        groups.push(full..curves);
+    } else {
+        groups.extend((full..curves).map(|curve| curve..curve + 1));
+    }
+    groups
 }
 
 fn quantity(nu: usize) -> PyResult<Of> {
@@ -76,51 +89,56 @@ impl<'py> CurvesToDifferentiate<'py> {
 }
 
 impl Slices<'_> {
-    fn derivative<'a>(&'a self, space: &'a Erased<'a>, c: usize) -> Derivative<'a> {
-        let one = |end: End<'a>| match end {
-            End::Velocity(v) => End::Velocity(part(v, c, self.curves)),
-            End::Acceleration(v) => End::Acceleration(part(v, c, self.curves)),
+    fn derivative<'a>(&'a self, space: &'a Erased<'a>, some: &Range<usize>) -> Derivative<'a> {
+        let of_some = |array| part(array, some, self.curves);
+        let of_end = |end: End<'a>| match end {
+            End::Velocity(v) => End::Velocity(of_some(v)),
+            End::Acceleration(v) => End::Acceleration(of_some(v)),
             other => other,
         };
         let ends = match self.ends {
             Ends::Periodic => Ends::Periodic,
-            Ends::Open(ends) => Ends::Open(ends.map(one)),
+            Ends::Open(ends) => Ends::Open(ends.map(of_end)),
         };
-        let own = |array| part(array, c, self.curves);
-        Derivative::new(space, own(self.t), own(self.points), own(self.velocities), &ends)
+        let [t, points, velocities] = [self.t, self.points, self.velocities].map(of_some);
+        Derivative::new(space, t, points, velocities, &ends, some.len())
     }
 
-    /// Raises MemoryError unless memory is available for the matrices of the curves that run at the same time: ten per
-    /// knot, the blocks of the solver on all lanes, and frames.
+    /// Raises MemoryError unless memory is available for the matrices of the curves that are computed at the same time: ten
+    /// per knot, the blocks of the solver on all lanes, and frames.
     fn require_memory(&self, space: &Erased) -> PyResult<()> {
-        let at_once = parallel::num_threads().min(self.curves).max(1);
+        let groups = groups(self.curves);
+        let most = groups.first().map_or(0, Range::len);
+        let at_once = parallel::num_threads().min(groups.len());
         let knots = self.t.len() / self.curves.max(1) * at_once;
         let (dim, frame) = (space.dim(), space.frame_len());
-        let numbers = knots as f64 * ((10 + 3 * LANES) * dim * (dim + 1) + frame) as f64;
+        let of_knot = (10 * most + 3 * LANES) * dim * (dim + 1) + most * frame;
+        let numbers = knots as f64 * of_knot as f64;
         require_memory(numbers + 4.0 * self.points.len() as f64, || {
             ("the derivatives of the curves".into(), "Use fewer knots, or curves on fewer threads")
         })
     }
 
-    /// Whether the derivatives of one curve may take a long time: no signal is handled before its end.
+    /// Whether the derivatives of the curves of a group may take a long time: no signal is handled before its end.
     fn is_heavy(&self, space: &Erased) -> bool {
-        let (dim, knots) = (space.dim(), (self.t.len() + self.x.len()) / self.curves.max(1));
+        let knots = (self.t.len() + self.x.len()) / self.curves.max(1) * self.curves.min(MOST_CURVES);
+        let dim = space.dim();
         // Derivatives in time need many motions of nodes per segment.
         let passes = if self.quantities == [Of::Point] { 1 } else { NODES };
         let numbers = knots.saturating_mul(dim * space.point_len() * passes);
         is_heavy(space) || is_long(numbers / OPERATIONS)
     }
 
-    fn times(&self, c: usize) -> &[f64] {
-        part(self.x, c, self.curves)
+    fn times(&self, some: &Range<usize>) -> &[f64] {
+        part(self.x, some, self.curves)
     }
 }
 
-/// Runs `work` on every curve and its part of a result.
-fn each<T: Send>(items: Vec<(usize, T)>, monitor: &Monitor, work: impl Fn(usize, T) + Sync) {
-    parallel::for_each(items, true, monitor, |(curve, item)| {
-        work(curve, item);
-        monitor.advance(1);
+/// Runs `work` on groups of curves and their parts of a result.
+fn each<T: Send>(items: Vec<(Range<usize>, T)>, monitor: &Monitor, work: impl Fn(&Range<usize>, T) + Sync) {
+    parallel::for_each(items, true, monitor, |(curves, item)| {
+        work(&curves, item);
+        monitor.advance(curves.len());
     });
 }
 
@@ -145,20 +163,41 @@ pub fn push<'py>(
     let mut write = out.readwrite();
     let result = write.as_slice_mut()?;
     if !result.is_empty() {
-        let size = result.len() / slices.curves;
-        let items = result.chunks_mut(size).enumerate().collect();
+        let (size, orders) = (result.len() / slices.curves, slices.quantities.len());
+        let mut rest = result;
+        let mut items = Vec::new();
+        for some in groups(slices.curves) {
+            let (out, others) = rest.split_at_mut(some.len() * size);
+            rest = others;
+            items.push((some, out));
+        }
         watched(py, None, slices.curves, heavy, |monitor| {
-            each(items, monitor, |c, out| {
-                let own = |array| part(array, c, slices.curves).to_vec();
-                let change = Data { points: own(points), knots: own(knots), ends: ends.map(own) };
+            each(items, monitor, |some, out| {
+                let of_some = |array| part(array, some, slices.curves).to_vec();
+                let change = Data { points: of_some(points), knots: of_some(knots), ends: ends.map(of_some) };
                 let space = handle.space.get();
-                let derivative = slices.derivative(&space, c);
-                derivative.push(slices.times(c), &slices.quantities, &change, out);
+                let derivative = slices.derivative(&space, some);
+                if orders == 1 {
+                    return derivative.push(slices.times(some), &slices.quantities, &change, out);
+                }
+                let mut by_order = vec![0.0; out.len()];
+                derivative.push(slices.times(some), &slices.quantities, &change, &mut by_order);
+                transpose(&by_order, orders, some.len(), out);
             });
         })?;
     }
     drop(write);
     Ok(out)
+}
+
+/// Exchanges the first two axes of an array.
+fn transpose(x: &[f64], rows: usize, columns: usize, out: &mut [f64]) {
+    let size = x.len() / (rows * columns).max(1);
+    for i in 0..rows {
+        for j in 0..columns {
+            out[(j * rows + i) * size..][..size].copy_from_slice(&x[(i * columns + j) * size..][..size]);
+        }
+    }
 }
 
 /// Reverse mode: gradients of Σ cotangent · curve with respect to points, knots and the vectors at the ends.
@@ -173,12 +212,16 @@ pub fn pull<'py>(
     let cotangent = in_order(&cotangent)?;
     slices.require_memory(&handle.space.get())?;
     let heavy = slices.is_heavy(&handle.space.get());
-    let mut gradients = vec![Data::default(); slices.curves];
-    let items = gradients.iter_mut().enumerate().collect();
+    let groups = groups(slices.curves);
+    let mut gradients = vec![Data::default(); groups.len()];
+    let items = groups.into_iter().zip(&mut gradients).collect();
     watched(py, None, slices.curves, heavy, |monitor| {
-        each(items, monitor, |c, out| {
-            let own = part(cotangent, c, slices.curves);
-            *out = slices.derivative(&handle.space.get(), c).pull(slices.times(c), &slices.quantities, own);
+        each(items, monitor, |some, out| {
+            let cotangents = part(cotangent, some, slices.curves);
+            let mut by_order = vec![0.0; cotangents.len()];
+            transpose(cotangents, some.len(), slices.quantities.len(), &mut by_order);
+            let space = handle.space.get();
+            *out = slices.derivative(&space, some).pull(slices.times(some), &slices.quantities, &by_order);
         });
     })?;
     let column =

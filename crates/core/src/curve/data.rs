@@ -142,15 +142,16 @@ pub const fn motion_len(dim: usize) -> usize {
     4 * dim + 2
 }
 
-/// One curve, the frames of its knots, and the times of samples.
+/// Curves, the frames of their knots, and the times of samples. Motions of a segment stand in the row of the knot where it
+/// begins.
 pub struct Moving<'a> {
-    /// The curve.
+    /// The curves.
     pub curve: Curves<'a>,
     /// The times.
     pub times: Times<'a>,
     /// The frames of the knots. Where a run of segments ends, the knot has two: that of the run comes first.
     pub frames: &'a [f64],
-    /// The number of runs, of almost equal length; frames are transported in parallel within a run.
+    /// The number of runs of a curve, of almost equal length; frames are transported in parallel within a run.
     pub runs: usize,
     /// The order ν of the derivative in time that is differentiated.
     pub nu: usize,

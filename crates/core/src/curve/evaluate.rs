@@ -391,7 +391,7 @@ fn scaled_norm<M: Ambient>(space: &M, p: &[Lane], v: &[Lane]) -> Lane {
 }
 
 /// Numbers divided by their largest absolute value, and this value.
-pub(super) fn scaled_down(v: &[Lane]) -> (Vec<Lane>, Lane) {
+fn scaled_down(v: &[Lane]) -> (Vec<Lane>, Lane) {
     let largest = v.iter().fold(Lane::ZERO, |most, v| max_or_nan(most, v.abs()));
     let zero = largest.simd_eq(Lane::ZERO);
     let unit = zero.select(Lane::ONE, largest);

@@ -7,12 +7,12 @@
 
 use super::chebyshev::{LEVELS, MOST, differentiate, node, sizes};
 use super::data::{Curves, Job, Outside, Quantity, Times};
-use super::evaluate::{evaluate, scaled_down};
+use super::evaluate::evaluate;
 use super::locate::Locator;
 use super::sample_cursor::inside;
 use crate::monitor::Monitor;
 use crate::parallel;
-use crate::scalar::{LANES, Lane, few, gather, lane, scatter};
+use crate::scalar::{LANES, Lane, few, gather, lane, max_or_nan, scatter};
 use crate::space::{Ambient, Erased};
 
 /// Coefficients of the highest degrees up to this, relative to the sizes of points and vectors, are rounding errors. An
@@ -168,7 +168,8 @@ impl Block<'_> {
         let len = self.len;
         let derivatives = self.derivatives();
         let mut lanes = vec![Lane::ZERO; 3 * len];
-        let mut jerk = vec![Lane::ZERO; len];
+        let [mut jerk, mut result] = [(); 2].map(|()| vec![Lane::ZERO; len]);
+        let mut connection = Connection::new(len);
         for (k, out) in out.chunks_mut(LANES * len).enumerate() {
             let at: [usize; LANES] = few(|l| (k * LANES + l).min(self.places.len() - 1));
             gather(at.map(|i| &states[i * 3 * len..][..3 * len]), &mut lanes);
@@ -181,30 +182,67 @@ impl Block<'_> {
             }));
             jerk.iter_mut().for_each(|x| *x *= rate * rate * rate);
             let curved = Lane::new(at.map(|i| if self.places[i].straight { 0.0 } else { 1.0 }));
-            let found = connection(self.space, p, d, w, &jerk);
-            jerk.iter_mut().zip(&found).for_each(|(jerk, found)| *jerk = *found * curved);
-            scatter(&jerk, out);
+            connection.along(self.space, p, d, w, &jerk, &mut result);
+            result.iter_mut().for_each(|x| *x *= curved);
+            scatter(&result, out);
         }
     }
 }
 
-/// L(w') + Q(γ', w), the covariant derivative of a vector field along a curve, from arrays. The form is computed from
-/// vectors of equal size.
-pub fn connection(space: &Erased, p: &[Lane], d: &[Lane], w: &[Lane], slope: &[Lane]) -> Vec<Lane> {
-    let mut out = slope.to_vec();
-    space.acceleration(p, &vec![Lane::ZERO; p.len()], &mut out);
-    let ((u, a), (v, b)) = (scaled_down(d), scaled_down(w));
-    let form = |sign: f64| {
-        let sum: Vec<Lane> = u.iter().zip(&v).map(|(u, v)| v.mul_add(lane(sign), *u)).collect();
-        let mut form = vec![Lane::ZERO; p.len()];
-        space.acceleration(p, &sum, &mut form);
-        form
-    };
-    let size = a * b * lane(0.25);
-    for (out, (plus, minus)) in out.iter_mut().zip(form(1.0).iter().zip(form(-1.0))) {
-        *out += (*plus - minus) * size;
+/// L(w') + Q(γ', w), the covariant derivative of a vector field along a curve, from arrays; and memory for it.
+pub struct Connection {
+    zero: Vec<Lane>,
+    sum: Vec<Lane>,
+    form: Vec<Lane>,
+}
+
+impl Connection {
+    /// For arrays of `len` numbers.
+    pub fn new(len: usize) -> Self {
+        let zeros = || vec![Lane::ZERO; len];
+        Connection { zero: zeros(), sum: zeros(), form: zeros() }
     }
-    out
+
+    /// The derivative of w, whose array has the derivative `slope`, along a curve with the derivative d.
+    pub fn along(
+        &mut self,
+        space: &Erased,
+        p: &[Lane],
+        d: &[Lane],
+        w: &[Lane],
+        slope: &[Lane],
+        out: &mut [Lane],
+    ) {
+        out.copy_from_slice(slope);
+        self.linear(space, p, out);
+        self.add_form(space, p, d, w, out);
+    }
+
+    /// L of an array.
+    pub fn linear(&self, space: &Erased, p: &[Lane], out: &mut [Lane]) {
+        space.acceleration(p, &self.zero, out);
+    }
+
+    /// Adds Q(d, w). The form is computed from vectors of equal size.
+    pub fn add_form(&mut self, space: &Erased, p: &[Lane], d: &[Lane], w: &[Lane], out: &mut [Lane]) {
+        let [(a, by_a), (b, by_b)] = [d, w].map(size);
+        for sign in [1.0, -1.0] {
+            for (sum, (u, v)) in self.sum.iter_mut().zip(d.iter().zip(w)) {
+                *sum = (*v * by_b).mul_add(lane(sign), *u * by_a);
+            }
+            self.form.fill(Lane::ZERO);
+            space.acceleration(p, &self.sum, &mut self.form);
+            let size = a * b * lane(0.25 * sign);
+            out.iter_mut().zip(&self.form).for_each(|(out, x)| *out = x.mul_add(size, *out));
+        }
+    }
+}
+
+/// The largest absolute value of some numbers and its reciprocal; 1 where that overflows.
+fn size(v: &[Lane]) -> (Lane, Lane) {
+    let largest = v.iter().fold(Lane::ZERO, |most, v| max_or_nan(most, v.abs()));
+    let size = largest.simd_lt(lane(f64::MIN_POSITIVE)).select(Lane::ONE, largest);
+    (size, Lane::ONE / size)
 }
 
 /// The jerk of every curve at its times, as in [`evaluate`](super::evaluate()). At a knot it is that of the segment

@@ -23,7 +23,7 @@ pub use cumulative::{Coordinates, Multiplication, cumulative_basis, cumulative_s
 pub use data::{BSpline, Curves, Job, LastSegment, Moving, Outside, Quantity, Times, motion_len};
 pub use evaluate::{evaluate, evaluate_point};
 #[cfg(feature = "dense")]
-pub use jerk::connection;
+pub use jerk::Connection;
 pub use length::{ArcLength, Integrand, energies, lengths};
 #[cfg(feature = "dense")]
 pub use lift::{lift, lift_knots};

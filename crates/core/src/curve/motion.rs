@@ -6,11 +6,11 @@
 //! six geodesics in reverse order (Bergmann and Gousenbourger, *A variational model for data fitting on manifolds by
 //! minimizing the acceleration of a Bézier curve*, 2018, section 4).
 
-use super::data::{Job, Moving, Outside, Quantity, motion_len};
+use super::data::{Curves, Job, Moving, Outside, Quantity, Times, motion_len};
 use super::locate::Locator;
 use super::sample_cursor::SampleCursor;
 use crate::monitor::checkpoint;
-use crate::scalar::{Dual, Jet, LANES, Lane, Row, RowMut, Scalar, dot, few, gather, lane, scatter};
+use crate::scalar::{Dual, Jet, LANES, Lane, Row, RowMut, Scalar, few, gather, lane, scatter};
 use crate::space::{Ambient, Covered, Erased, Frame, Space};
 use crate::with_size;
 
@@ -27,6 +27,7 @@ trait Place {
     fn choose(&self, from: &[Lane], qyw: [&mut [Lane]; 3]);
     fn side(&self, p: &[Lane]) -> Lane;
     fn leave(&self, side: Lane, y: &[Lane], w: &[Lane], out: &mut [Lane]);
+    fn lower(&self, side: Lane, y: &[Lane], gradient: &[Lane], image: &mut [Lane], out: &mut [Lane]);
 }
 
 struct Direct<'a, M>(&'a M);
@@ -54,6 +55,10 @@ impl<M: Space> Place for Direct<'_, M> {
     #[inline(always)]
     fn leave(&self, _side: Lane, _y: &[Lane], w: &[Lane], out: &mut [Lane]) {
         out.copy_from_slice(w);
+    }
+    #[inline(always)]
+    fn lower(&self, _side: Lane, _y: &[Lane], gradient: &[Lane], _image: &mut [Lane], out: &mut [Lane]) {
+        out.copy_from_slice(gradient);
     }
 }
 
@@ -84,6 +89,10 @@ impl<C: Covered> Place for Lifted<'_, C> {
     #[inline(always)]
     fn leave(&self, side: Lane, y: &[Lane], w: &[Lane], out: &mut [Lane]) {
         self.0.leave(side, y, Some(w), out);
+    }
+    #[inline(always)]
+    fn lower(&self, side: Lane, y: &[Lane], gradient: &[Lane], image: &mut [Lane], out: &mut [Lane]) {
+        self.0.lower(side, y, gradient, image, out);
     }
 }
 
@@ -259,18 +268,48 @@ impl Controls {
 }
 
 impl Moving<'_> {
-    /// The index of the frame at an end of a segment.
-    fn slot(&self, segment: usize, end: usize) -> usize {
-        segment + ((segment + 1) * self.runs - 1) / (self.curve.nodes - 1) + end
+    /// The index of the frame at an end of the segment that begins at a knot.
+    pub fn slot(&self, knot: usize, end: usize) -> usize {
+        let (curve, segment) = (knot / self.curve.nodes, knot % self.curve.nodes);
+        let segments = self.curve.nodes - 1;
+        curve * (segments + self.runs) + segment + ((segment + 1) * self.runs - 1) / segments + end
     }
 
-    fn job<'j>(&'j self, locator: &'j Locator) -> Job<'j> {
+    /// One of the curves.
+    pub fn one(&self, curve: usize) -> Moving<'_> {
+        let Curves { t, nodes, points, velocities, .. } = self.curve;
+        let part = |array: &'_ [f64], size: usize| -> std::ops::Range<usize> {
+            let size = size.min(array.len());
+            if array.len() == size { 0..size } else { curve * size..(curve + 1) * size }
+        };
+        let (count, row) = (self.times.count, nodes * self.len);
+        let frames = self.frames.len() / (points.len() / row);
+        Moving {
+            curve: Curves {
+                t: &t[part(t, nodes)],
+                nodes,
+                points: &points[part(points, row)],
+                velocities: &velocities[part(velocities, row)],
+                before: &[],
+            },
+            times: Times { x: &self.times.x[part(self.times.x, count)], count },
+            frames: &self.frames[part(self.frames, frames)],
+            ..*self
+        }
+    }
+
+    /// The number of samples of all curves.
+    fn samples(&self) -> usize {
+        self.curve.points.len() / (self.curve.nodes * self.len) * self.times.count
+    }
+
+    fn job<'j>(&'j self, locator: &'j Option<Locator>) -> Job<'j> {
         Job {
             quantity: Quantity::Point,
             curves: &self.curve,
             times: &self.times,
             outside: Outside::Continue,
-            locator: Some(locator),
+            locator: locator.as_ref(),
             first: 0,
             apart: 1,
             size: self.len,
@@ -279,8 +318,9 @@ impl Moving<'_> {
         }
     }
 
-    fn locator(&self) -> Locator<'_> {
-        Locator::new(self.curve.t, self.times.count > 8 && self.times.count >= self.curve.nodes / 4)
+    fn locator(&self) -> Option<Locator<'_>> {
+        let index = self.times.count > 8 && self.times.count >= self.curve.nodes / 4;
+        (self.curve.t.len() == self.curve.nodes).then(|| Locator::new(self.curve.t, index))
     }
 
     /// Forward mode: changes of the samples, tangent vectors, for motions of the control points of all segments. For ν = 1
@@ -326,7 +366,7 @@ impl Moving<'_> {
         let (m, size) = (self.dim, motion_len(self.dim));
         let (locator, inside) = (self.locator(), place.inside());
         let job = self.job(&locator);
-        let mut cursor = SampleCursor::new(&job, self.times.count);
+        let mut cursor = SampleCursor::new(&job, self.samples());
         let mut controls = Controls::new(len, ambient, m, place.base().frame_len());
         let mut points = fixed::<Dual>(len);
         let mut casteljau = Casteljau::new(len);
@@ -357,7 +397,7 @@ impl Moving<'_> {
         let (m, size, ambient) = (self.dim, motion_len(self.dim), self.len);
         let (locator, inside) = (self.locator(), place.inside());
         let job = self.job(&locator);
-        let mut cursor = SampleCursor::new(&job, self.times.count);
+        let mut cursor = SampleCursor::new(&job, self.samples());
         let mut controls = Controls::new(len, ambient, m, place.base().frame_len());
         let mut moved = fixed::<Dual>(len);
         let [mut points, mut changes] = [fixed::<S>(len), fixed::<S>(len)];
@@ -472,7 +512,7 @@ impl Moving<'_> {
         cotangents: &[f64],
         out: &mut [f64],
     ) {
-        let (m, size, count) = (self.dim, motion_len(self.dim), self.times.count);
+        let (m, size, count) = (self.dim, motion_len(self.dim), self.samples());
         let (locator, inside) = (self.locator(), place.inside());
         let job = self.job(&locator);
         let mut cursor = SampleCursor::new(&job, count);
@@ -483,7 +523,7 @@ impl Moving<'_> {
         let zero = S::constant(Lane::ZERO);
         let (mut gamma, mut top) = (vec![zero; len], vec![zero; len]);
         let [mut cotangent, mut image] = [zeros(ambient), zeros(ambient)];
-        let [mut p, mut lifted, mut unit, mut bent] = [(); 4].map(|()| zeros(len));
+        let [mut p, mut lifted, mut bent] = [(); 3].map(|()| zeros(len));
         let (mut sums, mut products) = ([Lane::ZERO; 2], zeros(size));
         let rest = vec![0.0; ambient];
         let mut at = None;
@@ -543,16 +583,8 @@ impl Moving<'_> {
             }
             inside.geodesic(&second[0][..len], &second[1][..len], t, &mut gamma[..len]);
             p[..len].iter_mut().zip(&gamma).for_each(|(p, x)| *p = x.value());
-            if P::COVERED {
-                for k in 0..len {
-                    unit[k] = Lane::ONE;
-                    place.leave(controls.side, &p[..len], &unit[..len], &mut image[..ambient]);
-                    unit[k] = Lane::ZERO;
-                    lifted[k] = dot(&image[..ambient], &cotangent[..ambient]);
-                }
-            } else {
-                lifted[..len].copy_from_slice(&cotangent[..len]);
-            }
+            let (image, lowered) = (&mut image[..ambient], &mut lifted[..len]);
+            place.lower(controls.side, &p[..len], &cotangent[..ambient], image, lowered);
             inside.raise(&p[..len], &mut lifted[..len]);
             if S::ORDER > 0 {
                 inside.velocity(&p[..len], &mut lifted[..len]);

@@ -1,4 +1,4 @@
-//! Sensitivity of a spline to its data: derivatives with respect to points, knots and end vectors.
+//! Sensitivity of splines to their data: derivatives with respect to points, knots and end vectors.
 //!
 //! The velocities are defined by the C² condition F(u, data) = 0, so that their derivative is −F_u⁻¹ F_data (implicit
 //! differentiation). All quantities are expressed in frames that move with the points.
@@ -18,7 +18,7 @@ use crate::space::{Ambient, Erased, Frame, Origin};
 use bezier::{Bezier, Knot};
 use operators::Few;
 pub use operators::{Matrix, Vector};
-use polygon::Polygon;
+use polygon::{Polygon, Runs};
 use rates::Rates;
 pub use system::Linearised;
 use system::{Change, System};
@@ -45,7 +45,10 @@ pub enum Of {
     Acceleration,
 }
 
-/// The derivative of one spline curve with respect to its data.
+/// The largest number of curves whose derivatives are computed together, one per lane.
+pub const MOST_CURVES: usize = LANES;
+
+/// The derivatives of spline curves with respect to their data. All arrays contain the numbers curve after curve.
 pub struct Derivative<'a> {
     space: &'a Erased<'a>,
     t: &'a [f64],
@@ -83,28 +86,34 @@ impl Motion<'_> {
 }
 
 impl<'a> Derivative<'a> {
-    /// The derivative of the spline with these knots, points and velocities. Vectors in `ends` are those of this
-    /// curve.
+    /// The derivative of the splines with these knots, points and velocities, which have equally many knots: one curve, or at
+    /// most [`MOST_CURVES`].
     pub fn new(
         space: &'a Erased<'a>,
         t: &'a [f64],
         points: &'a [f64],
         velocities: &'a [f64],
         ends: &Ends,
+        curves: usize,
     ) -> Self {
-        let closed = matches!(ends, Ends::Periodic);
-        let polygon = Polygon::new(space, points, velocities, closed);
-        let h: Vec<f64> = t.windows(2).map(|t| t[1] - t[0]).collect();
+        let (m, knots) = (space.dim(), t.len() / curves);
+        let runs = Runs::new(knots - 1, curves, matches!(ends, Ends::Periodic));
+        let polygon = Polygon::new(space, points, velocities, runs);
+        let h: Vec<f64> = t.chunks(knots).flat_map(|t| t.windows(2).map(|t| t[1] - t[0])).collect();
         let kinds = match ends {
             Ends::Periodic => None,
             Ends::Open(ends) => Some(std::array::from_fn(|e| {
-                let at = |v: &[f64]| polygon.coordinates_at(space, points, e * h.len(), v);
+                let at = |v: &[f64]| {
+                    let x = coordinates_at_ends(space, &polygon, points, e, v);
+                    let row = runs.curve_of_lanes().map(|curve| curve * m);
+                    (0..m).map(|c| Lane::new(row.map(|row| x[row + c]))).collect()
+                };
                 match &ends[e] {
-                    End::Natural => (EndKind::Acceleration, Vector::zeros(space.dim())),
-                    End::NotAKnot => (EndKind::NotAKnot, Vector::zeros(space.dim())),
+                    End::Natural => (EndKind::Acceleration, vec![Lane::ZERO; m]),
+                    End::NotAKnot => (EndKind::NotAKnot, vec![Lane::ZERO; m]),
                     End::Velocity(v) => (EndKind::Velocity, at(v)),
                     End::Acceleration(v) => (EndKind::Acceleration, at(v)),
-                    End::Both(both) => (EndKind::Velocity, at(&both.vectors[..space.point_len()])),
+                    End::Both(both) => (EndKind::Velocity, at(&both.vectors[..curves * space.point_len()])),
                 }
             })),
         };
@@ -112,8 +121,13 @@ impl<'a> Derivative<'a> {
         Derivative { space, t, points, velocities, polygon, system }
     }
 
+    fn curves(&self) -> usize {
+        self.polygon.runs.curves()
+    }
+
+    /// The segments of a curve.
     fn segments(&self) -> usize {
-        self.t.len() - 1
+        self.polygon.runs.segments_each()
     }
 
     fn bezier(&self, segment: usize) -> Bezier {
@@ -169,7 +183,7 @@ impl<'a> Derivative<'a> {
         out
     }
 
-    /// The derivatives of samples, in the frames to which their points are lifted, as the matrices of [`Motion::point`] or
+    /// The derivatives of samples of one curve, in the frames to which their points are lifted, as the matrices of [`Motion::point`] or
     /// [`Motion::acceleration`], and the arrays of the points; None if reverse mode does not have them. A sample must lie
     /// within its segment.
     pub fn rows(&self, samples: &[(usize, f64)], of: Of) -> Option<(Vec<Matrix>, Vec<f64>)> {
@@ -215,19 +229,20 @@ impl<'a> Derivative<'a> {
         Some((products.chunks(m * size).enumerate().map(matrix).collect(), points))
     }
 
-    /// The curve with its frames, for samples at times x.
+    /// The curves with their frames, for samples at times x.
     fn moving<'m>(&'m self, x: &'m [f64], of: Of) -> Moving<'m> {
+        let Polygon { runs, frames, .. } = &self.polygon;
         Moving {
             curve: Curves {
                 t: self.t,
-                nodes: self.t.len(),
+                nodes: self.segments() + 1,
                 points: self.points,
                 velocities: self.velocities,
                 before: &[],
             },
-            times: Times { x, count: x.len() },
-            frames: &self.polygon.frames,
-            runs: self.polygon.runs.count,
+            times: Times { x, count: x.len() / self.curves() },
+            frames,
+            runs: runs.count / self.curves(),
             nu: of as usize,
             apart: false,
             dim: self.space.dim(),
@@ -242,10 +257,14 @@ impl<'a> Derivative<'a> {
         let m = self.space.dim();
         let u = self.polygon.unfold(&self.system.velocities(&change), m);
         let points = self.polygon.unfold(&change.points, m);
-        let mut motions = Vec::with_capacity(self.segments() * motion_len(m));
+        let (runs, size) = (self.polygon.runs, motion_len(m));
+        let mut motions = Vec::with_capacity(self.t.len() * size);
         let mut handle = vec![0.0; m];
         for (i, &h) in self.system.h.iter().enumerate() {
-            let (dh, dt) = (change.lengths[i], change.knots[i]);
+            let knot = runs.knot(i, 0);
+            // No segment begins at the last knot of a curve.
+            motions.resize(knot * size, 0.0);
+            let (dh, dt) = (change.lengths[i], change.knots[knot]);
             let at = |e: usize| self.polygon.runs.slot(i, e) * m;
             motions.extend_from_slice(&points[at(0)..][..m]);
             for e in 0..2 {
@@ -262,11 +281,16 @@ impl<'a> Derivative<'a> {
             motions.extend_from_slice(&points[at(1)..][..m]);
             motions.extend([dt, dh]);
         }
+        motions.resize(self.t.len() * size, 0.0);
         let size = (out.len() / quantities.len()).max(1);
         for (&of, out) in quantities.iter().zip(out.chunks_mut(size)) {
             let moving = self.moving(x, of);
             if !self.space.0.push(&moving, &motions, out) {
-                Rates { space: self.space, moving: &moving }.push(&motions, out);
+                let parts =
+                    motions.chunks(motions.len() / self.curves()).zip(out.chunks_mut(size / self.curves()));
+                for (curve, (motions, out)) in parts.enumerate() {
+                    Rates { space: self.space, moving: &moving.one(curve) }.push(motions, out);
+                }
             }
         }
     }
@@ -274,26 +298,31 @@ impl<'a> Derivative<'a> {
     /// Reverse mode: the gradient of `Σ cotangent · curve` with respect to the data, tangent vectors at points and
     /// ends. There is one cotangent vector per quantity and time.
     pub fn pull(&self, x: &[f64], quantities: &[Of], cotangents: &[f64]) -> Data {
-        let (n, m) = (self.segments(), self.space.dim());
+        let (runs, m) = (self.polygon.runs, self.space.dim());
         let size = motion_len(m);
-        let mut products = vec![0.0; n * size];
+        let mut products = vec![0.0; self.t.len() * size];
         for (&of, cotangents) in
             quantities.iter().zip(cotangents.chunks((x.len() * self.space.point_len()).max(1)))
         {
             let moving = self.moving(x, of);
             if !self.space.0.pull(&moving, cotangents, &mut products) {
-                Rates { space: self.space, moving: &moving }.pull(cotangents, &mut products);
+                let size = products.len() / self.curves();
+                let parts = cotangents.chunks((cotangents.len() / self.curves()).max(1));
+                for (curve, (cotangents, products)) in parts.zip(products.chunks_mut(size)).enumerate() {
+                    Rates { space: self.space, moving: &moving.one(curve) }.pull(cotangents, products);
+                }
             }
         }
         let slots = self.polygon.runs.slots() * m;
         let (mut points, mut u) = (vec![0.0; slots], vec![0.0; slots]);
         let mut gradient = Change {
             points: Vec::new(),
-            lengths: vec![0.0; n],
-            ends: [Vector::zeros(m), Vector::zeros(m)],
-            knots: vec![0.0; n + 1],
+            lengths: vec![0.0; runs.segments],
+            ends: [0, 1].map(|_| vec![0.0; self.curves() * m]),
+            knots: vec![0.0; self.t.len()],
         };
-        for (i, (&h, row)) in self.system.h.iter().zip(products.chunks(size)).enumerate() {
+        for (i, &h) in self.system.h.iter().enumerate() {
+            let row = &products[runs.knot(i, 0) * size..][..size];
             for e in 0..2 {
                 let at = self.polygon.runs.slot(i, e) * m;
                 let sign = if e == 0 { 1.0 } else { -1.0 } / 3.0;
@@ -309,7 +338,7 @@ impl<'a> Derivative<'a> {
                     }
                 }
             }
-            gradient.knots[i] += row[4 * m];
+            gradient.knots[runs.knot(i, 0)] += row[4 * m];
             gradient.lengths[i] += row[4 * m + 1];
         }
         gradient.points = self.polygon.fold(&points, m);
@@ -327,47 +356,74 @@ impl<'a> Derivative<'a> {
         self.system.condition(node)
     }
 
-    /// The tangent vectors at all nodes with given coordinates in their frames, node after node.
+    /// The tangent vectors at all nodes of one curve with given coordinates in their frames, node after node.
     pub fn tangents(&self, x: &[f64]) -> Vec<f64> {
         self.polygon.tangents(self.space, self.points, x)
     }
 
     /// Converts changes to the frames of the linear system.
     fn in_frames(&self, change: &Data) -> Change {
-        let n = self.segments();
-        let end = |e: usize| {
+        let (Derivative { space, points, polygon, .. }, len) = (self, self.space.point_len());
+        let mut of_nodes = Vec::new();
+        let mut vectors = &change.points;
+        if self.curves() > 1 && polygon.runs.closed {
+            let nodes = polygon.runs.nodes_each() * len;
+            change.points.chunks(nodes + len).for_each(|x| of_nodes.extend_from_slice(&x[..nodes]));
+            vectors = &of_nodes;
+        }
+        let knots = change.knots.chunks(self.segments() + 1);
+        let ends = [0, 1].map(|e| {
             let v = &change.ends[e];
-            if v.is_empty() {
-                Vector::zeros(self.space.dim())
-            } else {
-                self.polygon.coordinates_at(self.space, self.points, e * n, v)
-            }
-        };
+            let given = !v.is_empty() && !polygon.runs.closed;
+            if given { coordinates_at_ends(space, polygon, points, e, v) } else { Vec::new() }
+        });
         Change {
-            points: self.polygon.coordinates(self.space, self.points, &change.points),
-            lengths: change.knots.windows(2).map(|t| t[1] - t[0]).collect(),
-            ends: [end(0), end(1)],
+            points: polygon.coordinates(space, points, vectors),
+            lengths: knots.flat_map(|t| t.windows(2).map(|t| t[1] - t[0])).collect(),
+            ends,
             knots: change.knots.clone(),
         }
     }
 
     /// Converts a gradient to ambient arrays.
     fn ambient(&self, gradient: &Change) -> Data {
-        let (n, len) = (self.segments(), self.space.point_len());
+        let (Derivative { space, points, polygon, .. }, len) = (self, self.space.point_len());
+        let (runs, m) = (polygon.runs, space.dim());
         let mut knots = gradient.knots.clone();
         for (i, g) in gradient.lengths.iter().enumerate() {
-            knots[i] -= g;
-            knots[i + 1] += g;
+            knots[runs.knot(i, 0)] -= g;
+            knots[runs.knot(i, 1)] += g;
         }
-        let mut points = self.polygon.gradients(self.space, self.points, &gradient.points);
-        // That of a closed curve's last knot is the first.
-        points.resize((n + 1) * len, 0.0);
-        Data {
-            points,
-            knots,
-            ends: std::array::from_fn(|e| {
-                self.polygon.gradient_at(self.space, self.points, e * n, gradient.ends[e].as_slice())
-            }),
+        let of_nodes = polygon.gradients(space, points, &gradient.points);
+        let nodes = runs.nodes_each() * len;
+        let mut by_points = Vec::with_capacity(points.len());
+        for of_curve in of_nodes.chunks(nodes) {
+            by_points.extend_from_slice(of_curve);
+            // That of a closed curve's last knot is the first.
+            by_points.resize(by_points.len() + (self.segments() + 1) * len - nodes, 0.0);
         }
+        let ends = [0, 1].map(|e| {
+            let curves = if runs.closed { 0 } else { self.curves() };
+            let nodes = (0..curves).map(|curve| curve * runs.nodes_each() + e * self.segments());
+            let rows = nodes.zip(gradient.ends[e].chunks(m));
+            rows.flat_map(|(node, x)| polygon.gradient_at(space, points, node, x)).collect()
+        });
+        Data { points: by_points, knots, ends }
     }
+}
+
+/// The coordinates of a vector at one end of every open curve.
+fn coordinates_at_ends(
+    space: &Erased,
+    polygon: &Polygon,
+    points: &[f64],
+    e: usize,
+    vectors: &[f64],
+) -> Vec<f64> {
+    let runs = polygon.runs;
+    let of_curve = |(curve, v): (usize, &[f64])| {
+        let node = curve * runs.nodes_each() + e * runs.segments_each();
+        polygon.coordinates_at(space, points, node, v)
+    };
+    vectors.chunks(space.point_len()).enumerate().flat_map(of_curve).collect()
 }

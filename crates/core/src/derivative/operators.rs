@@ -36,11 +36,6 @@ pub fn unit(row: usize, first: usize) -> Lane {
     Lane::new(few(|l| if row == first + l { 1.0 } else { 0.0 }))
 }
 
-/// Copies a vector to every lane.
-pub fn splat(v: &Vector) -> Few<Lane> {
-    v.iter().map(|&x| lane(x)).collect()
-}
-
 /// An m × m matrix on each lane, row by row.
 #[derive(Clone)]
 pub struct Square {
@@ -71,6 +66,33 @@ impl Square {
     /// The matrix of one lane.
     pub fn of_lane(&self, l: usize) -> Matrix {
         Matrix::from_fn(self.m, self.m, |r, c| self.x[r * self.m + c].as_array()[l])
+    }
+
+    /// The matrices of other lanes.
+    pub fn permuted(&self, from: [usize; LANES]) -> Self {
+        let x = self.x.iter().map(|x| Lane::new(from.map(|l| x.as_array()[l]))).collect();
+        Square { m: self.m, x }
+    }
+
+    /// Subtracts A x for the matrix A of one lane.
+    pub fn subtract_of_lane(&self, l: usize, x: &[f64], out: &mut [f64]) {
+        for (out, row) in out.iter_mut().zip(self.x.chunks_exact(self.m)) {
+            *out -= row.iter().zip(x).map(|(a, x)| a.as_array()[l] * x).sum::<f64>();
+        }
+    }
+
+    /// Subtracts Aᵀ x.
+    pub fn subtract_transposed_of_lane(&self, l: usize, x: &[f64], out: &mut [f64]) {
+        for (x, row) in x.iter().zip(self.x.chunks_exact(self.m)) {
+            out.iter_mut().zip(row).for_each(|(out, a)| *out -= a.as_array()[l] * x);
+        }
+    }
+
+    /// A B
+    pub fn times(&self, b: &Square) -> Self {
+        let mut out = Square::zeros(self.m);
+        out.set_product(self, b);
+        out
     }
 
     pub fn set(&mut self, other: &Square) {
@@ -180,11 +202,6 @@ impl Square {
             }
         }
     }
-}
-
-/// The vector of one lane.
-pub fn vector_of_lane(x: &[Lane], l: usize) -> Vector {
-    Vector::from_iterator(x.len(), x.iter().map(|x| x.as_array()[l]))
 }
 
 /// Even functions of ad_v for one v.

@@ -2,15 +2,16 @@
 //!
 //! Each lane walks along one *run* of segments, and each run begins with a frame of its own. A knot between two runs
 //! therefore has two frames; the *nodes* use that of the run which begins there, the *slots* are the ends of all segments
-//! of all runs.
+//! of all runs. Alternatively each run is a curve of its own.
 
-use super::operators::{Few, Square, Vector};
+use super::operators::{Few, Square};
 use crate::monitor::checkpoint;
 use crate::scalar::{LANES, Lane, dot, few, gather, lane, scatter};
 use crate::space::{Ambient, Erased, Frame, Origin};
 use smallvec::smallvec;
 
-/// How the segments of a curve are divided into runs of almost equal length, two segments or more if there are as many.
+/// How segments are divided into runs of almost equal length: those of one curve into two segments or more if there are as
+/// many, those of several curves into the curves.
 #[derive(Clone, Copy)]
 pub struct Runs {
     /// Segments.
@@ -18,11 +19,60 @@ pub struct Runs {
     /// Runs.
     pub count: usize,
     pub closed: bool,
+    /// Whether the runs are curves of their own.
+    apart: bool,
 }
 
 impl Runs {
-    pub fn new(segments: usize, closed: bool) -> Self {
-        Runs { segments, count: (segments / 2).clamp(1, LANES), closed }
+    /// For curves of equally many segments, at most one per lane.
+    pub fn new(segments: usize, curves: usize, closed: bool) -> Self {
+        let apart = curves > 1;
+        let count = if apart { curves } else { (segments / 2).clamp(1, LANES) };
+        Runs { segments: curves * segments, count, closed, apart }
+    }
+
+    /// The number of curves.
+    pub fn curves(&self) -> usize {
+        if self.apart { self.count } else { 1 }
+    }
+
+    /// The curve of each lane.
+    pub fn curve_of_lanes(&self) -> [usize; LANES] {
+        few(|l| if self.apart && l < self.count { l } else { 0 })
+    }
+
+    /// Segments and nodes of a curve.
+    pub fn segments_each(&self) -> usize {
+        self.segments / self.curves()
+    }
+
+    pub fn nodes_each(&self) -> usize {
+        self.segments_each() + usize::from(!self.closed)
+    }
+
+    /// The node at the start of the k-th segment of a run.
+    pub fn node(&self, run: usize, k: usize) -> usize {
+        if self.apart { run * self.nodes_each() + k } else { self.first(run) + k }
+    }
+
+    /// The knot at an end of a segment. Of the knots of a closed curve, the last is no node.
+    pub fn knot(&self, segment: usize, end: usize) -> usize {
+        segment + segment / self.segments_each() + end
+    }
+
+    /// The knot of a node.
+    pub fn knot_of(&self, node: usize) -> usize {
+        node + if self.closed { node / self.nodes_each() } else { 0 }
+    }
+
+    /// The run before and behind a run, whose frames meet.
+    pub fn neighbours(&self, run: usize) -> [usize; 2] {
+        if self.apart { [run, run] } else { [(run + self.count - 1) % self.count, (run + 1) % self.count] }
+    }
+
+    /// Whether a node has two frames, or one segment follows the last.
+    pub fn has_joints(&self) -> bool {
+        self.closed || (self.count > 1 && !self.apart)
     }
 
     /// The first segment of a run.
@@ -41,7 +91,7 @@ impl Runs {
 
     /// The nodes: the last knot of a closed curve is its first.
     pub fn nodes(&self) -> usize {
-        if self.closed { self.segments } else { self.segments + 1 }
+        self.curves() * self.nodes_each()
     }
 
     pub fn slots(&self) -> usize {
@@ -55,11 +105,18 @@ impl Runs {
 
     /// The slot of a node.
     pub fn slot_of(&self, node: usize) -> usize {
-        if node < self.segments { self.slot(node, 0) } else { self.slots() - 1 }
+        match self.apart {
+            true => self.knot_of(node),
+            false if node < self.segments => self.slot(node, 0),
+            false => self.slots() - 1,
+        }
     }
 
     /// The node at the end of a run, if its slot there has another frame.
     pub fn joint(&self, run: usize) -> Option<usize> {
+        if self.apart {
+            return self.closed.then(|| self.node(run, 0));
+        }
         let end = self.first(run + 1);
         match end < self.segments {
             true => Some(end),
@@ -85,7 +142,7 @@ impl Runs {
     }
 }
 
-/// Knots, chords and velocities of one curve.
+/// Knots, chords and velocities of curves.
 pub struct Polygon {
     pub runs: Runs,
     /// Frames, slot by slot.
@@ -100,13 +157,12 @@ pub struct Polygon {
 }
 
 impl Polygon {
-    pub fn new(space: &Erased, points: &[f64], velocities: &[f64], closed: bool) -> Self {
+    pub fn new(space: &Erased, points: &[f64], velocities: &[f64], runs: Runs) -> Self {
         let (m, len, size) = (space.dim(), space.point_len(), space.frame_len());
-        let runs = Runs::new(points.len() / len - 1, closed);
         let lanes = runs.lanes();
         let zeros = |len: usize| -> Few<Lane> { smallvec![Lane::ZERO; len] };
         // Shorter runs stay at their last node.
-        let row = |k: usize| lanes.map(|run| (runs.first(run) + k.min(runs.len(run))) * len);
+        let row = |k: usize| lanes.map(|run| (runs.knot(runs.first(run), 0) + k.min(runs.len(run))) * len);
         let (mut p, mut q, mut v) = (zeros(len), zeros(len), zeros(len));
         let (mut frame, mut chord, mut x) = (zeros(size), zeros(m), zeros(m));
         gather(row(0).map(|i| &points[i..i + len]), &mut p);
@@ -147,9 +203,9 @@ impl Polygon {
                 }
             }
         }
-        if closed || runs.count > 1 {
+        if runs.has_joints() {
             let next = |x: &[Lane]| -> Few<Lane> {
-                x.iter().map(|x| Lane::new(few(|l| x.as_array()[lanes[(l + 1) % runs.count]]))).collect()
+                x.iter().map(|x| Lane::new(lanes.map(|run| x.as_array()[runs.neighbours(run)[1]]))).collect()
             };
             let (there, next_frame) = (next(&start.0), next(&start.1));
             let still = zeros(len);
@@ -170,11 +226,19 @@ impl Polygon {
         out
     }
 
-    /// A chord, for the lane of its run.
-    pub fn chord(&self, segment: usize, m: usize) -> Vec<f64> {
-        let run = self.runs.slot(segment, 0) - segment;
-        let k = segment - self.runs.first(run);
-        self.chords[k * m..][..m].iter().map(|x| x.as_array()[run]).collect()
+    /// The chords of segments on the lanes.
+    pub fn chords_of(&self, segments: [usize; LANES], m: usize) -> Vec<Lane> {
+        let at = segments.map(|segment| {
+            let run = self.runs.slot(segment, 0) - segment;
+            ((segment - self.runs.first(run)) * m, run)
+        });
+        (0..m).map(|c| Lane::new(at.map(|(row, run)| self.chords[row + c].as_array()[run]))).collect()
+    }
+
+    /// The velocities at nodes on the lanes.
+    pub fn velocities_of(&self, nodes: [usize; LANES], m: usize) -> Vec<Lane> {
+        let at = nodes.map(|node| self.runs.slot_of(node) * m);
+        (0..m).map(|c| Lane::new(at.map(|row| self.u[row + c]))).collect()
     }
 
     /// The numbers of the turn at the end of a run, row by row.
@@ -236,7 +300,7 @@ impl Polygon {
             checkpoint();
             let at: [usize; LANES] = few(|l| (group * LANES + l).min(count - 1));
             let slot = |i: usize| self.runs.slot_of((nodes.start + i).min(self.runs.nodes() - 1));
-            gather(at.map(|i| &points[(nodes.start + i) * len..][..len]), &mut p);
+            gather(at.map(|i| &points[self.runs.knot_of(nodes.start + i) * len..][..len]), &mut p);
             gather(at.map(|i| &self.frames[slot(i) * size..][..size]), &mut frame);
             gather(at.map(|i| &x[i * from..][..from]), &mut row);
             f(&p, &frame, &row, &mut result);
@@ -250,9 +314,9 @@ impl Polygon {
         self.coordinates_in(space, points, 0..self.runs.nodes(), vectors)
     }
 
-    /// The same at one knot of an open curve.
-    pub fn coordinates_at(&self, space: &Erased, points: &[f64], knot: usize, vector: &[f64]) -> Vector {
-        Vector::from_vec(self.coordinates_in(space, points, knot..knot + 1, vector))
+    /// The same at one node.
+    pub fn coordinates_at(&self, space: &Erased, points: &[f64], knot: usize, vector: &[f64]) -> Vec<f64> {
+        self.coordinates_in(space, points, knot..knot + 1, vector)
     }
 
     fn coordinates_in(
@@ -281,7 +345,7 @@ impl Polygon {
         self.gradients_in(space, points, 0..self.runs.nodes(), gradient)
     }
 
-    /// The same at one knot of an open curve.
+    /// The same at one node.
     pub fn gradient_at(&self, space: &Erased, points: &[f64], knot: usize, gradient: &[f64]) -> Vec<f64> {
         self.gradients_in(space, points, knot..knot + 1, gradient)
     }

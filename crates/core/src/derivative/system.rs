@@ -1,26 +1,33 @@
 //! The linearised C² condition of a whole curve: the sensitivity of velocities to points, knots and end vectors.
 
-use super::operators::{Functions, Matrix, Square, Vector, splat, unit, vector_of_lane};
+use super::operators::{Functions, Matrix, Square};
 use super::polygon::{Polygon, Runs};
 use super::segment::{SegmentEnd, linearise, turn_last};
 use crate::fit::{Blocks, EndKind, NotAKnot};
 use crate::monitor::checkpoint;
-use crate::scalar::{Dual, LANES, Lane, few, lane};
+use crate::scalar::{Dual, LANES, Lane, few, gather, lane};
 use crate::space::{Erased, Origin};
 
-/// The derivatives of the condition at one knot with respect to velocities and points of knots, lengths of segments,
-/// and the prescribed vector at an end.
+/// The derivatives of the condition at one knot with respect to velocities and points of knots.
 #[derive(Default)]
 pub struct Linearised {
     /// With respect to the velocities of knots.
     pub u: Vec<(usize, Matrix)>,
     /// With respect to the points of knots.
     pub points: Vec<(usize, Matrix)>,
-    lengths: Vec<(usize, Vector)>,
-    end: Option<(usize, Matrix)>,
 }
 
-/// Small changes, in the frames of the nodes, or a gradient with respect to them.
+/// The derivatives of the condition at an end with respect to velocities and points of nodes, lengths of segments, and the
+/// prescribed vector, with a curve per lane. Nodes and segments are numbered within a curve.
+#[derive(Default)]
+struct EndRow {
+    u: Vec<(usize, Square)>,
+    points: Vec<(usize, Square)>,
+    lengths: Vec<(usize, Vec<Lane>)>,
+    vector: Option<Square>,
+}
+
+/// Small changes, in the frames of the nodes, or a gradient with respect to them; curve after curve.
 #[derive(Clone)]
 pub struct Change {
     /// Changes of points, node after node.
@@ -28,12 +35,12 @@ pub struct Change {
     /// Changes of the lengths of segments.
     pub lengths: Vec<f64>,
     /// Changes of the vectors at the ends.
-    pub ends: [Vector; 2],
+    pub ends: [Vec<f64>; 2],
     /// Changes of the times at which segments begin and the last one ends. In a gradient, lengths are held fixed.
     pub knots: Vec<f64>,
 }
 
-/// The linearised conditions of one curve.
+/// The linearised conditions of curves.
 pub struct System {
     pub runs: Runs,
     /// Lengths of segments.
@@ -43,17 +50,22 @@ pub struct System {
     /// By node, the derivatives with respect to the velocities and points of its left neighbour, itself and its right
     /// neighbour, and the lengths of the two segments; zero at the ends of an open curve.
     rows: Vec<f64>,
-    /// The rows at the ends of an open curve.
-    ends: [Option<Linearised>; 2],
+    /// The rows at the ends of open curves.
+    ends: [Option<EndRow>; 2],
     m: usize,
 }
 
 impl System {
-    /// `ends` are kinds and prescribed vectors in the frames of the ends; None for a closed curve.
-    pub fn new(space: &Erased, polygon: &Polygon, h: &[f64], ends: Option<[(EndKind, Vector); 2]>) -> Self {
+    /// `ends` are kinds and prescribed vectors in the frames of the ends, with a curve per lane; None for closed curves.
+    pub fn new(
+        space: &Erased,
+        polygon: &Polygon,
+        h: &[f64],
+        ends: Option<[(EndKind, Vec<Lane>); 2]>,
+    ) -> Self {
         let (runs, m) = (polygon.runs, space.dim());
         // One segment from a point to itself is a constant curve for all changes.
-        let nodes = if runs.closed && h.len() == 1 { 0 } else { runs.nodes() };
+        let nodes = if runs.closed && runs.segments_each() == 1 { 0 } else { runs.nodes() };
         let mut system = System {
             runs,
             h: h.to_vec(),
@@ -75,7 +87,7 @@ impl System {
             linearise(space, length, chord, [u(k), u(k + 1)], &mut ends_here);
             system.write_functions(k, &ends_here);
             let ending = runs.ending(k);
-            if ending.any() && (runs.closed || runs.count > 1) {
+            if ending.any() && runs.has_joints() {
                 // The end of an open curve has one frame only.
                 let joints: [f64; LANES] = few(|l| f64::from(runs.joint(lanes[l]).is_some()));
                 turn_last(&mut ends_here, ending & Lane::new(joints).simd_gt(Lane::ZERO), turn, back);
@@ -85,7 +97,7 @@ impl System {
                 first = start.clone();
             } else {
                 row.set(space, &before, start, &before.functions.stretch, u(k));
-                runs.have(k).for_each(|run| system.write_row(runs.first(run) + k, &row, run));
+                runs.have(k).for_each(|run| system.write_row(runs.node(run, k), &row, run));
             }
             if ending.any() {
                 last.replace(ending, end);
@@ -94,20 +106,23 @@ impl System {
         }
         if let Some(ends) = &ends {
             let both = ends.iter().all(|(kind, _)| *kind == EndKind::NotAKnot);
-            for (which, (segment, l)) in [(&first, 0), (&last, runs.count - 1)].into_iter().enumerate() {
-                system.ends[which] =
-                    Some(system.end(space, polygon, which, &ends[which], (segment, l), both));
+            for (which, segment) in [&first, &last].into_iter().enumerate() {
+                // One curve begins in the first run and ends in the last one.
+                let run = if which == 0 { 0 } else { runs.count - 1 };
+                let of_curves = (runs.curves() == 1).then(|| segment.permuted([run; LANES]));
+                let segment = of_curves.as_ref().unwrap_or(segment);
+                system.ends[which] = Some(system.end(space, polygon, which, &ends[which], segment, both));
             }
         }
-        if nodes > 0 && (runs.closed || runs.count > 1) {
+        if nodes > 0 && runs.has_joints() {
             // The first nodes of runs follow the last segments of the runs before.
-            let before = last.permuted(lanes.map(|run| (run + runs.count - 1) % runs.count));
+            let before = last.permuted(lanes.map(|run| runs.neighbours(run)[0]));
             let handle: Vec<Lane> = u(0).iter().map(|u| *u * before.h * lane(1.0 / 3.0)).collect();
             let mut stretched = Square::zeros(m);
             stretched.set_stretch(space, &handle);
             row.set(space, &before, &first, &stretched, u(0));
             let from = usize::from(!runs.closed);
-            (from..runs.count).for_each(|run| system.write_row(runs.first(run), &row, run));
+            (from..runs.count).for_each(|run| system.write_row(runs.node(run, 0), &row, run));
         }
         system
     }
@@ -134,31 +149,38 @@ impl System {
         self.rows[node * size..][..size].iter_mut().zip(all).for_each(|(out, x)| *out = x.as_array()[l]);
     }
 
+    /// The curve of a node, and its number there.
+    fn place(&self, node: usize) -> (usize, usize) {
+        (node / self.runs.nodes_each(), node % self.runs.nodes_each())
+    }
+
     /// The nodes of a row of an inner node.
     fn neighbours(&self, node: usize) -> [usize; 3] {
-        let nodes = self.runs.nodes();
-        [(node + nodes - 1) % nodes, node, (node + 1) % nodes]
+        let (nodes, (curve, i)) = (self.runs.nodes_each(), self.place(node));
+        [(i + nodes - 1) % nodes, i, (i + 1) % nodes].map(|i| curve * nodes + i)
     }
 
     /// The two segments of an inner node.
     fn segments(&self, node: usize) -> [usize; 2] {
-        let n = self.h.len();
-        [(node + n - 1) % n, node]
+        let (n, (curve, i)) = (self.runs.segments_each(), self.place(node));
+        [(i + n - 1) % n, i].map(|i| curve * n + i)
     }
 
-    /// The end of an open curve that a node is.
-    fn end_of(&self, node: usize) -> Option<&Linearised> {
-        match node {
-            0 => self.ends[0].as_ref(),
-            i if i == self.h.len() => self.ends[1].as_ref(),
-            _ => None,
-        }
+    /// The end of open curves that a node is.
+    fn end_of(&self, node: usize) -> Option<(usize, &EndRow)> {
+        let which = match self.place(node).1 {
+            0 => 0,
+            i if i == self.runs.segments_each() => 1,
+            _ => return None,
+        };
+        self.ends[which].as_ref().map(|end| (which, end))
     }
 
-    /// The condition at a node.
+    /// The condition at a node of one curve.
     pub fn condition(&self, node: usize) -> Linearised {
-        if let Some(end) = self.end_of(node) {
-            return Linearised { u: end.u.clone(), points: end.points.clone(), ..Linearised::default() };
+        if let Some((_, end)) = self.end_of(node) {
+            let matrices = |list: &[(usize, Square)]| list.iter().map(|(k, a)| (*k, a.of_lane(0))).collect();
+            return Linearised { u: matrices(&end.u), points: matrices(&end.points) };
         }
         let (m, row) = (self.m, self.row(node));
         let block = |k: usize| Matrix::from_row_slice(m, m, &row[k * m * m..][..m * m]);
@@ -166,7 +188,6 @@ impl System {
         Linearised {
             u: (0..3).map(|k| (at[k], block(k))).collect(),
             points: (0..3).map(|k| (at[k], block(3 + k))).collect(),
-            ..Linearised::default()
         }
     }
 
@@ -175,58 +196,82 @@ impl System {
         space: &Erased,
         polygon: &Polygon,
         which: usize,
-        (kind, value): &(EndKind, Vector),
-        (segment, l): (&SegmentEnd, usize),
+        (kind, value): &(EndKind, Vec<Lane>),
+        segment: &SegmentEnd,
         both_not_a_knot: bool,
-    ) -> Linearised {
-        let (n, m) = (self.h.len(), self.m);
+    ) -> EndRow {
+        let (n, m) = (self.runs.segments_each(), self.m);
         let (node, near, far) = if which == 0 { (0, 0, 1.min(n - 1)) } else { (n, n - 1, n.max(2) - 2) };
-        let identity = Matrix::identity(m, m);
-        let mut row = Linearised { u: vec![(node, identity.clone())], ..Linearised::default() };
+        let scaled = |square: &Square, factor: Lane| {
+            let mut out = square.clone();
+            out.scale(factor);
+            out
+        };
+        let identity = Square::identity(m);
+        let mut row = EndRow { u: vec![(node, identity.clone())], ..EndRow::default() };
         match kind {
-            EndKind::Velocity | EndKind::Both => row.end = Some((which, -identity)),
+            EndKind::Velocity | EndKind::Both => row.vector = Some(scaled(&identity, -Lane::ONE)),
             EndKind::Acceleration => {
                 // The side of the only segment is S(handle) A/6.
-                let slope = slope_of(space, &vector_of_lane(&segment.handle, l), &(value / 6.0));
-                let u = self.velocity(polygon, node);
-                row.u = vec![(node, &slope * (-self.h[near] / 3.0))];
-                row.lengths.push((near, &slope * u / -3.0 + vector_of_lane(&segment.side.length, l)));
+                let mut slope = Square::zeros(m);
+                let sixth: Vec<Lane> = value.iter().map(|x| *x * lane(1.0 / 6.0)).collect();
+                slope.set_stretch_slope(space, &segment.handle, &sixth);
+                let mut length = segment.side.length.clone();
+                slope.act(lane(-1.0 / 3.0), &self.velocities_at(polygon, node), &mut length);
+                slope.scale(segment.h * lane(-1.0 / 3.0));
+                row.u = vec![(node, slope)];
+                row.lengths.push((near, length));
                 for (e, node) in [near, near + 1].into_iter().enumerate() {
-                    row.u.push((node, segment.side.u[e].of_lane(l)));
-                    row.points.push((node, segment.side.points[e].of_lane(l)));
+                    row.u.push((node, segment.side.u[e].clone()));
+                    row.points.push((node, segment.side.points[e].clone()));
                 }
-                row.end = Some((which, segment.functions.stretch.of_lane(l) / -6.0));
+                row.vector = Some(scaled(&segment.functions.stretch, lane(-1.0 / 6.0)));
             }
             EndKind::NotAKnot => {
-                // Differentiated with respect to the lengths of the two segments, one per lane.
-                let h = |segment: usize, k| Dual { v: lane(self.h[segment]), d: unit(k, 0) };
-                let weights = NotAKnot::of(h(near, 0), h(far, 1), n, both_not_a_knot);
-                row.not_a_knot(space, polygon, which, [near, far], &weights);
+                let [near_h, far_h] = [near, far].map(|k| Lane::new(self.segments_at(k).map(|i| self.h[i])));
+                // Differentiated with respect to the lengths of the two segments.
+                let weights = [[Lane::ONE, Lane::ZERO], [Lane::ZERO, Lane::ONE]].map(|[d_near, d_far]| {
+                    let (near, far) = (Dual { v: near_h, d: d_near }, Dual { v: far_h, d: d_far });
+                    NotAKnot::of(near, far, n, both_not_a_knot)
+                });
+                self.not_a_knot(space, polygon, which, [near, far], &weights, &mut row);
             }
         }
         row
     }
 
-    /// The velocity at a node, in its frame.
-    fn velocity(&self, polygon: &Polygon, node: usize) -> Vector {
-        Vector::from_column_slice(&polygon.u[self.runs.slot_of(node) * self.m..][..self.m])
+    /// The k-th segments of the curves on the lanes.
+    fn segments_at(&self, k: usize) -> [usize; LANES] {
+        self.runs.curve_of_lanes().map(|curve| curve * self.runs.segments_each() + k)
+    }
+
+    /// The velocities at the k-th nodes, in their frames.
+    fn velocities_at(&self, polygon: &Polygon, k: usize) -> Vec<Lane> {
+        let nodes = self.runs.curve_of_lanes().map(|curve| curve * self.runs.nodes_each() + k);
+        polygon.velocities_of(nodes, self.m)
     }
 
     /// The changes of velocities for given changes, node after node.
     pub fn velocities(&self, change: &Change) -> Vec<f64> {
-        let (m, nodes) = (self.m, self.runs.nodes());
-        let mut right = vec![0.0; nodes * m];
+        let m = self.m;
+        let mut right = vec![0.0; self.runs.nodes() * m];
         if self.rows.is_empty() {
             return right;
         }
         for (node, right) in right.chunks_mut(m).enumerate() {
             let point = |k: usize| &change.points[k * m..][..m];
-            if let Some(end) = self.end_of(node) {
-                let mut sum = Vector::zeros(m);
-                end.points.iter().for_each(|(k, a)| sum -= a * Vector::from_column_slice(point(*k)));
-                end.lengths.iter().for_each(|(k, a)| sum -= a * change.lengths[*k]);
-                end.end.iter().for_each(|(k, a)| sum -= a * &change.ends[*k]);
-                right.copy_from_slice(sum.as_slice());
+            if let Some((which, end)) = self.end_of(node) {
+                let curve = self.place(node).0;
+                let (nodes, segments) = (curve * self.runs.nodes_each(), curve * self.runs.segments_each());
+                end.points.iter().for_each(|(k, a)| a.subtract_of_lane(curve, point(nodes + k), right));
+                end.lengths.iter().for_each(|(k, a)| {
+                    let length = change.lengths[segments + k];
+                    right.iter_mut().zip(a).for_each(|(right, a)| *right -= a.as_array()[curve] * length);
+                });
+                let vector = &change.ends[which];
+                if let (Some(a), false) = (&end.vector, vector.is_empty()) {
+                    a.subtract_of_lane(curve, &vector[curve * m..][..m], right);
+                }
                 continue;
             }
             let (blocks, lengths) = self.row(node)[3 * m * m..].split_at(3 * m * m);
@@ -250,14 +295,19 @@ impl System {
         }
         let multipliers = self.solve(velocities, true);
         for (node, x) in multipliers.chunks(m).enumerate() {
-            if let Some(end) = self.end_of(node) {
-                let x = Vector::from_column_slice(x);
+            if let Some((which, end)) = self.end_of(node) {
+                let curve = self.place(node).0;
+                let (nodes, segments) = (curve * self.runs.nodes_each(), curve * self.runs.segments_each());
                 for (k, a) in &end.points {
-                    let by_point = a.tr_mul(&x);
-                    gradient.points[k * m..][..m].iter_mut().zip(&by_point).for_each(|(g, x)| *g -= x);
+                    a.subtract_transposed_of_lane(curve, x, &mut gradient.points[(nodes + k) * m..][..m]);
                 }
-                end.lengths.iter().for_each(|(k, a)| gradient.lengths[*k] -= a.dot(&x));
-                end.end.iter().for_each(|(k, a)| gradient.ends[*k] -= a.tr_mul(&x));
+                for (k, a) in &end.lengths {
+                    let by_length = x.iter().zip(a).map(|(x, a)| a.as_array()[curve] * x).sum::<f64>();
+                    gradient.lengths[segments + k] -= by_length;
+                }
+                if let Some(a) = &end.vector {
+                    a.subtract_transposed_of_lane(curve, x, &mut gradient.ends[which][curve * m..][..m]);
+                }
                 continue;
             }
             let (blocks, lengths) = self.row(node)[3 * m * m..].split_at(3 * m * m);
@@ -273,12 +323,13 @@ impl System {
         }
     }
 
-    /// J⁻¹ x, or J⁻ᵀ x.
+    /// J⁻¹ x, or J⁻ᵀ x, with a curve per lane.
     fn solve(&self, x: &[f64], transposed: bool) -> Vec<f64> {
-        let (nodes, m, closed) = (self.runs.nodes(), self.m, self.runs.closed);
+        let (nodes, m, closed) = (self.runs.nodes_each(), self.m, self.runs.closed);
+        let curves = self.runs.curve_of_lanes();
         let mut blocks = Blocks::default();
         blocks.clear(nodes, m);
-        let mut add = |i: usize, j: usize, a: &dyn Fn(usize, usize) -> f64| {
+        let mut add = |i: usize, j: usize, a: &[Lane]| {
             let (row, column) = if transposed { (j, i) } else { (i, j) };
             let side = if row == column {
                 1
@@ -290,26 +341,29 @@ impl System {
             let block = &mut blocks.sides[side][row * m * m..][..m * m];
             for r in 0..m {
                 for c in 0..m {
-                    block[r * m + c] += lane(if transposed { a(c, r) } else { a(r, c) });
+                    block[r * m + c] += a[if transposed { c * m + r } else { r * m + c }];
                 }
             }
         };
+        let mut row = vec![Lane::ZERO; 3 * m * m];
         for i in 0..nodes {
-            if let Some(end) = self.end_of(i) {
-                end.u.iter().for_each(|(j, a)| add(i, *j, &|r, c| a[(r, c)]));
+            if let Some((_, end)) = self.end_of(i) {
+                end.u.iter().for_each(|(j, a)| add(i, *j, a.numbers()));
                 continue;
             }
-            for (block, j) in self.row(i).chunks(m * m).zip(self.neighbours(i)) {
-                add(i, j, &|r, c| block[r * m + c]);
+            gather(curves.map(|curve| &self.row(curve * nodes + i)[..3 * m * m]), &mut row);
+            for (block, j) in row.chunks(m * m).zip(self.neighbours(i)) {
+                add(i, j, block);
             }
         }
-        let mut lanes: Vec<Lane> = x.iter().map(|&x| lane(x)).collect();
+        let mut lanes = vec![Lane::ZERO; nodes * m];
+        gather(curves.map(|curve| &x[curve * nodes * m..][..nodes * m]), &mut lanes);
         if closed {
             blocks.solve_cyclic(nodes, m, &mut lanes);
         } else {
             blocks.solve(nodes, m, 1, &mut lanes);
         }
-        lanes.iter().map(|x| x.as_array()[0]).collect()
+        (0..self.runs.curves()).flat_map(|l| lanes.iter().map(move |x| x.as_array()[l])).collect()
     }
 }
 
@@ -363,88 +417,90 @@ impl Row {
     }
 }
 
-/// The derivative of S(v)x in v, for one v.
-fn slope_of(space: &Erased, v: &Vector, x: &Vector) -> Matrix {
-    let mut slope = Square::zeros(v.len());
-    slope.set_stretch_slope(space, &splat(v), &splat(x));
-    slope.of_lane(0)
-}
-
-/// `z ↦ [[a, z], w]`, for one a.
-fn turned_by(space: &Erased, a: &Vector, w: &Vector) -> Matrix {
-    let mut curvature = Square::zeros(a.len());
-    curvature.set_curvature(space, &splat(a), &splat(w));
-    curvature.of_lane(0)
-}
-
-/// Functions of ad_v as matrices of one lane.
+/// Functions of ad_v for the chord of a segment.
 struct OfChord {
-    stretch: Matrix,
-    shrink: Matrix,
-    coth: Matrix,
-    tanh: Matrix,
+    functions: Functions,
+    /// S⁻¹
+    shrink: Square,
 }
 
 impl OfChord {
-    fn of(space: &Erased, v: &Vector) -> Self {
+    fn of(space: &Erased, v: &[Lane]) -> Self {
         let mut functions = Functions::new(v.len());
-        functions.set(space, &splat(v));
+        functions.set(space, v);
         let mut shrink = Square::identity(v.len());
         functions.stretch.divide(&mut [&mut shrink]);
-        let Functions { stretch, coth, tanh, .. } = functions;
-        let [stretch, shrink, coth, tanh] = [stretch, shrink, coth, tanh].map(|x| x.of_lane(0));
-        OfChord { stretch, shrink, coth, tanh }
+        OfChord { functions, shrink }
     }
 }
 
-impl Linearised {
-    /// Adds minus the velocity of the not-a-knot condition: `S(x₀) c'(t₀)`, in the frame of the end.
+impl System {
+    /// Adds minus the velocity of the not-a-knot condition: `S(x₀) c'(t₀)`, in the frame of the end. `weights` are
+    /// differentiated with respect to the lengths of the near and of the far segment.
     ///
     /// The chord d from p₀ to p₁ changes by `−ad coth ξ + S⁻¹η` in the frame of p₀ and by `−S⁻¹ξ + ad coth η` in that
     /// of p₁, and the frames rotate by `tanh(ad_d/2)(ξ + η)` relative to each other along it.
     fn not_a_knot(
-        &mut self,
+        &self,
         space: &Erased,
         polygon: &Polygon,
         which: usize,
         [near, far]: [usize; 2],
-        weights: &NotAKnot<Dual>,
+        weights: &[NotAKnot<Dual>; 2],
+        row: &mut EndRow,
     ) {
-        let m = space.dim();
-        let [d0, d1] = [near, far].map(|segment| Vector::from_vec(polygon.chord(segment, m)));
-        let (d0, d1) = (&d0, &d1);
-        // Value, and derivatives.
-        let [u, near_by, far_by] = [weights.u, weights.near, weights.far]
-            .map(|w| [w.v.as_array()[0], w.d.as_array()[0], w.d.as_array()[1]]);
-        let (first, second) = (OfChord::of(space, d0), OfChord::of(space, d1));
+        let m = self.m;
+        let [d0, d1] = [near, far].map(|k| polygon.chords_of(self.segments_at(k), m));
+        let (first, second) = (OfChord::of(space, &d0), OfChord::of(space, &d1));
         // The end, its neighbour, and the next node; all vectors change sign at the right end.
         let [end, next, third] = if which == 0 { [near, near + 1, far + 1] } else { [near + 1, near, far] };
-        let next_u = Vector::from_column_slice(&polygon.u[polygon.runs.slot_of(next) * m..][..m]);
-        let sign = if which == 0 { 1.0 } else { -1.0 };
-        let c = &next_u * u[0] + d0 * near_by[0] + d1 * far_by[0];
-        let target = &first.stretch * &c;
+        let next_u = self.velocities_at(polygon, next);
+        let sign = lane(if which == 0 { 1.0 } else { -1.0 });
+        // c'(t₀) for the weights, or its change with them.
+        let velocity = |[u, near, far]: [Lane; 3]| -> Vec<Lane> {
+            let terms = next_u.iter().zip(d0.iter().zip(&d1));
+            terms.map(|(x, (d0, d1))| u.mul_add(*x, near.mul_add(*d0, far * *d1))).collect()
+        };
+        let NotAKnot { u, near: near_by, far: far_by } = &weights[0];
+        let (u, near_by, far_by) = (u.v, near_by.v, far_by.v);
+        let c = velocity([u, near_by, far_by]);
+        let stretch = &first.functions.stretch;
+        let mut target = vec![Lane::ZERO; m];
+        stretch.act(Lane::ONE, &c, &mut target);
         // In the frame of the neighbour.
-        let slope = slope_of(space, d0, &c) + &first.stretch * near_by[0];
-        let turn = turned_by(space, d0, &target) * &first.tanh * sign;
-        let own = &slope * &first.shrink * -sign + &turn;
-        let mut neighbour = &slope * &first.coth * sign + &turn;
-        if far_by[0] != 0.0 {
-            let far_slope = &first.stretch * far_by[0];
-            neighbour -= &far_slope * &second.coth * sign;
-            let by_third = &far_slope * &second.shrink * -sign;
-            // Where the first run ends with the second segment, the node has another frame.
-            let turned = which == 0 && polygon.runs.len(0) == 2 && polygon.runs.joint(0).is_some();
-            let turn = polygon.turns[0].of_lane(0);
-            self.points.push((third, if turned { by_third * turn } else { by_third }));
+        let [mut slope, mut curvature, mut turn] = [(); 3].map(|()| Square::zeros(m));
+        slope.set_stretch_slope(space, &d0, &c);
+        slope.add(near_by, stretch);
+        curvature.set_curvature(space, &d0, &target);
+        turn.add_product(sign, &curvature, &first.functions.tanh);
+        let [mut at_end, mut at_next] = [turn.clone(), turn];
+        [&mut at_end, &mut at_next].into_iter().for_each(|x| x.scale(-Lane::ONE));
+        at_end.add_product(sign, &slope, &first.shrink);
+        at_next.add_product(-sign, &slope, &first.functions.coth);
+        if far_by.simd_ne(Lane::ZERO).any() {
+            at_next.add_product(far_by * sign, stretch, &second.functions.coth);
+            let mut by_third = Square::zeros(m);
+            by_third.add_product(-(far_by * sign), stretch, &second.shrink);
+            // Where the first run of a curve ends with the second segment, the node has another frame.
+            if which == 0 && self.runs.curves() == 1 && self.runs.len(0) == 2 && self.runs.joint(0).is_some()
+            {
+                let turn = polygon.turns[0].permuted([0; LANES]);
+                by_third = by_third.times(&turn);
+            }
+            row.points.push((third, by_third));
         }
-        self.points.push((end, -own));
-        self.points.push((next, -neighbour));
-        if u[0] != 0.0 {
-            self.u.push((next, &first.stretch * -u[0]));
+        row.points.push((end, at_end));
+        row.points.push((next, at_next));
+        if u.simd_ne(Lane::ZERO).any() {
+            let mut by_u = stretch.clone();
+            by_u.scale(-u);
+            row.u.push((next, by_u));
         }
-        for (k, segment) in [near, far].into_iter().enumerate() {
-            let change = &next_u * u[1 + k] + d0 * near_by[1 + k] + d1 * far_by[1 + k];
-            self.lengths.push((segment, &first.stretch * change * -1.0));
+        for (k, weights) in [near, far].into_iter().zip(weights) {
+            let mut by_length = vec![Lane::ZERO; m];
+            let change = velocity([weights.u.d, weights.near.d, weights.far.d]);
+            stretch.act(-Lane::ONE, &change, &mut by_length);
+            row.lengths.push((k, by_length));
         }
     }
 }

@@ -298,6 +298,17 @@ pub trait Covered: Space {
     /// Projects a point of the cover and, if given, a tangent vector there to a component of the space: writes the
     /// point or the vector.
     fn leave(&self, side: Lane, y: &[Lane], w: Option<&[Lane]>, out: &mut [Lane]);
+    /// The transpose of [`leave`](Covered::leave) for vectors w; `image` is memory for one.
+    #[inline(always)]
+    fn lower(&self, side: Lane, y: &[Lane], gradient: &[Lane], image: &mut [Lane], out: &mut [Lane]) {
+        let mut unit: Few<Lane> = smallvec![Lane::ZERO; out.len()];
+        for (k, out) in out.iter_mut().enumerate() {
+            unit[k] = Lane::ONE;
+            self.leave(side, y, Some(&unit), image);
+            unit[k] = Lane::ZERO;
+            *out = dot(image, gradient);
+        }
+    }
 }
 
 /// Replaces v by its tangential component at p; returns the size of the normal component, and of v, as arrays.
