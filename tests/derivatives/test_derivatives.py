@@ -99,31 +99,51 @@ def test_derivatives_are_finite_at_coinciding_points(case, end):
         assert np.isfinite(spline.vjp(x, np.ones(spline(x).shape), nu=nu).points).all()
 
 
-def test_batch_derivatives_match_single_curves():
-    space, rng = ss.Sphere(2), np.random.default_rng(8)
-    t = np.array([0.0, 1.0, 2.5, 3.0])
-    points = np.array([[walk(space, 0.5, 4, rng) for _ in range(3)] for _ in range(2)])
-    vector = 0.3 * np.array([unit_tangent(space, p, rng) for p in points[:, :, 0].reshape(-1, 3)]).reshape(2, 3, 3)
-    bc = ((1, vector), "natural")
-    spline = ss.CubicSpline(t, points, space, bc_type=bc)
-    x = rng.uniform(0, 3, (2, 2))
-    cotangent = rng.normal(size=(2, 3, 2, 2, 3))
-    found = spline.vjp(x, cotangent)
-    knots = np.zeros(4)
-    for i in np.ndindex(2, 3):
-        one = ss.CubicSpline(t, points[i], space, bc_type=((1, vector[i]), "natural"))
-        expected = one.vjp(x, cotangent[i])
-        np.testing.assert_array_equal(found.points[i], expected.points)
-        np.testing.assert_array_equal(found.ends[0][i], expected.ends[0])
-        np.testing.assert_array_equal(
-            spline.jvp(x, points=vector[:, :, None] * np.ones((4, 1)))[i],
-            one.jvp(x, points=vector[i] * np.ones((4, 1))),
-        )
-        knots += expected.t
-    np.testing.assert_allclose(found.t, knots, atol=1e-13)
-    own = ss.CubicSpline(np.broadcast_to(t, (2, 3, 4)), points, space)
-    assert own.vjp(x, cotangent).t.shape == (2, 3, 4)
-    assert found.ends[1] is None
+def one_of(bc, i):
+    """The end conditions of a curve of a batch."""
+    return bc if isinstance(bc, str) else tuple(end if isinstance(end, str) else (end[0], end[1][i]) for end in bc)
+
+
+@pytest.mark.parametrize("nodes", [2, 3, 9])
+@pytest.mark.parametrize("end", ["natural", "not-a-knot", "periodic", "vectors"])
+@pytest.mark.parametrize("name", ["so:3", "rp:2", "spd:2", "gr:2,4", "aff:1"])
+def test_derivatives_of_batches_are_those_of_single_curves(name, end, nodes):
+    """Eleven curves fill some lanes and leave others; knots are shared or not."""
+    space, rng = ss.space(name), np.random.default_rng(8)
+    points = np.array([walk(space, 0.5, nodes, rng) for _ in range(11)])
+    t = 3 + np.cumsum(rng.uniform(0.7, 1.3, (11, nodes) if nodes == 9 else nodes), axis=-1)
+    t = (t - t[..., :1]) / (t[..., -1:] - t[..., :1])
+    bc = end
+    if end == "periodic":
+        points[:, -1] = -points[:, 0] if name == "rp:2" else points[:, 0]
+    if end == "vectors":
+        vectors = 0.3 * np.array([[unit_tangent(space, p, rng) for p in row] for row in points[:, [0, -1]]])
+        bc = ((1, vectors[:, 0]), (2, vectors[:, 1]))
+    spline = ss.CubicSpline(t, points, space, bc_type=bc, check=False)
+    x = rng.uniform(0, 1, (2, 3))
+    steps = np.array([[unit_tangent(space, p, rng) for p in row] for row in points])
+    if end == "periodic":
+        steps[:, -1] = -steps[:, 0] if name == "rp:2" else steps[:, 0]
+    later = 0.1 * rng.standard_normal(t.shape)
+    for nu in (0, 1, 2):
+        push = spline.jvp(x, steps, later, nu=nu)
+        cotangent = rng.standard_normal(push.shape)
+        gradient, by_t = spline.vjp(x, cotangent, nu=nu), []
+        for i in range(11):
+            own = t[i] if t.ndim == 2 else t
+            one = ss.CubicSpline(own, points[i], space, bc_type=one_of(bc, i), check=False)
+            size = np.abs(push[i]).max()
+            shift = later[i] if t.ndim == 2 else later
+            np.testing.assert_allclose(push[i], one.jvp(x, steps[i], shift, nu=nu), atol=1e-11 * size)
+            expected = one.vjp(x, cotangent[i], nu=nu)
+            size = np.abs(expected.points).max() + np.abs(expected.t).max()
+            np.testing.assert_allclose(gradient.points[i], expected.points, atol=1e-10 * size)
+            by_t.append(expected.t)
+            if end == "vectors":
+                for found, wanted in zip(gradient.ends, expected.ends, strict=True):
+                    np.testing.assert_allclose(found[i], wanted, atol=1e-11 * size)
+        wanted = np.array(by_t) if t.ndim == 2 else np.sum(by_t, axis=0)
+        np.testing.assert_allclose(gradient.t, wanted, atol=1e-10 * np.abs(wanted).max())
 
 
 def test_shared_end_vector_sums_the_gradients():

@@ -49,6 +49,26 @@ fn cubics_of_flat_space_are_exact_and_continue() {
 }
 
 #[test]
+fn an_evaluator_returns_the_points_of_the_curve() {
+    let factor = |name, size| AnySpace::new(name, &[size]).expect("it is a space");
+    let space = Product(vec![factor("sphere", 2), factor("so", 3)]);
+    let turn = |t: f64| vec![t.cos(), -t.sin(), 0.0, t.sin(), t.cos(), 0.0, 0.0, 0.0, 1.0];
+    let points: Vec<Vec<Vec<f64>>> =
+        T.iter().map(|&t| vec![vec![(t * t).cos(), (t * t).sin(), 0.0], turn(t * t)]).collect();
+    let spline = CubicSpline::builder(space)
+        .extrapolate(Extrapolate::Geodesic)
+        .fit(&T, &points)
+        .expect("it is a curve");
+    let mut evaluator = spline.evaluator();
+    // Within a segment, to others and back, at knots, and beyond them.
+    for t in [0.1, 0.2, 0.4, 0.5, 1.4, 0.3, 1.5, 1.6, 1.7, -0.1, -0.2, 0.0, 0.05] {
+        assert_eq!(evaluator.at(t), spline.at(t));
+    }
+    assert!(evaluator.try_at(f64::NAN).is_err());
+    assert_eq!(evaluator.at(0.7), spline.at(0.7));
+}
+
+#[test]
 fn the_limit_of_the_cut_locus_is_pi_on_the_sphere() {
     let found =
         CubicSpline::new(Sphere::<2>, &T[..2], &[[1.0, 0.0], [-1.0, 0.0]]).expect_err("they are opposite");
