@@ -109,7 +109,7 @@ def _grids() -> Iterator[Pair]:
 
 def _lengths(sizes: Sizes) -> Iterator[Pair]:
     """Lengths beside fits, and jerks beside accelerations."""
-    for name in ("so:3", "sphere:2", "spd:3"):
+    for name in ("so:3", "sphere:2", "cp:2"):
         space, knots = ss.space(name), sizes.short[-1]
         points = walks(space, 1, knots)[0]
         curve = ss.CubicSpline(None, points, space)
