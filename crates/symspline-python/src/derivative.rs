@@ -105,14 +105,15 @@ impl Slices<'_> {
     }
 
     /// Raises MemoryError unless memory is available for the matrices of the curves that are computed at the same time: ten
-    /// per knot, the blocks of the solver on all lanes, and frames.
+    /// per knot, six in the solver, for several curves on all lanes, and frames.
     fn require_memory(&self, space: &Erased) -> PyResult<()> {
         let groups = groups(self.curves);
         let most = groups.first().map_or(0, Range::len);
         let at_once = parallel::num_threads().min(groups.len());
         let knots = self.t.len() / self.curves.max(1) * at_once;
         let (dim, frame) = (space.dim(), space.frame_len());
-        let of_knot = (10 * most + 3 * LANES) * dim * (dim + 1) + most * frame;
+        let solver = 6 * if most > 1 { LANES } else { 1 };
+        let of_knot = (10 * most + solver) * dim * (dim + 1) + most * frame;
         let numbers = knots as f64 * of_knot as f64;
         require_memory(numbers + 4.0 * self.points.len() as f64, || {
             ("the derivatives of the curves".into(), "Use fewer knots, or curves on fewer threads")

@@ -8,6 +8,7 @@ mod operators;
 mod polygon;
 mod rates;
 mod segment;
+mod solve;
 mod system;
 
 use crate::curve::{Curves, Moving, Outside, Quantity, Times, evaluate, motion_len};

@@ -3,9 +3,10 @@
 use super::operators::{Functions, Matrix, Square};
 use super::polygon::{Polygon, Runs};
 use super::segment::{SegmentEnd, linearise, turn_last};
-use crate::fit::{Blocks, EndKind, NotAKnot};
+use super::solve::{Jacobian, solve};
+use crate::fit::{EndKind, NotAKnot};
 use crate::monitor::checkpoint;
-use crate::scalar::{Dual, LANES, Lane, few, gather, lane};
+use crate::scalar::{Dual, LANES, Lane, few, lane};
 use crate::space::{Erased, Origin};
 
 /// The derivatives of the condition at one knot with respect to velocities and points of knots.
@@ -135,6 +136,22 @@ impl System {
             let all = squares.flat_map(Square::numbers);
             out.iter_mut().zip(all).for_each(|(out, x)| *out = x.as_array()[run]);
         }
+    }
+
+    /// The derivatives of the conditions with respect to velocities.
+    fn jacobian(&self) -> Jacobian<'_> {
+        let m = self.m;
+        let ends = self.ends.each_ref().map(|end| {
+            let end = end.as_ref()?;
+            let mut rows = vec![Lane::ZERO; 3 * m * m];
+            let at = end.u[0].0;
+            for (node, block) in &end.u {
+                let sum = &mut rows[(node + 1 - at) * m * m..][..m * m];
+                sum.iter_mut().zip(block.numbers()).for_each(|(sum, x)| *sum += *x);
+            }
+            Some(rows)
+        });
+        Jacobian { runs: self.runs, m, rows: &self.rows, ends }
     }
 
     fn row(&self, node: usize) -> &[f64] {
@@ -284,7 +301,7 @@ impl System {
                 right.iter_mut().zip(column).for_each(|(right, a)| *right -= a * change.lengths[k]);
             }
         }
-        self.solve(&right, false)
+        solve(&self.jacobian(), &right, false)
     }
 
     /// Adds the contribution of a gradient with respect to velocities to a gradient with respect to changes.
@@ -293,7 +310,7 @@ impl System {
         if self.rows.is_empty() {
             return;
         }
-        let multipliers = self.solve(velocities, true);
+        let multipliers = solve(&self.jacobian(), velocities, true);
         for (node, x) in multipliers.chunks(m).enumerate() {
             if let Some((which, end)) = self.end_of(node) {
                 let curve = self.place(node).0;
@@ -321,49 +338,6 @@ impl System {
                 gradient.lengths[k] -= column.iter().zip(x).map(|(a, x)| a * x).sum::<f64>();
             }
         }
-    }
-
-    /// J⁻¹ x, or J⁻ᵀ x, with a curve per lane.
-    fn solve(&self, x: &[f64], transposed: bool) -> Vec<f64> {
-        let (nodes, m, closed) = (self.runs.nodes_each(), self.m, self.runs.closed);
-        let curves = self.runs.curve_of_lanes();
-        let mut blocks = Blocks::default();
-        blocks.clear(nodes, m);
-        let mut add = |i: usize, j: usize, a: &[Lane]| {
-            let (row, column) = if transposed { (j, i) } else { (i, j) };
-            let side = if row == column {
-                1
-            } else if column + 1 == row || (closed && row == 0 && column + 1 == nodes) {
-                0
-            } else {
-                2
-            };
-            let block = &mut blocks.sides[side][row * m * m..][..m * m];
-            for r in 0..m {
-                for c in 0..m {
-                    block[r * m + c] += a[if transposed { c * m + r } else { r * m + c }];
-                }
-            }
-        };
-        let mut row = vec![Lane::ZERO; 3 * m * m];
-        for i in 0..nodes {
-            if let Some((_, end)) = self.end_of(i) {
-                end.u.iter().for_each(|(j, a)| add(i, *j, a.numbers()));
-                continue;
-            }
-            gather(curves.map(|curve| &self.row(curve * nodes + i)[..3 * m * m]), &mut row);
-            for (block, j) in row.chunks(m * m).zip(self.neighbours(i)) {
-                add(i, j, block);
-            }
-        }
-        let mut lanes = vec![Lane::ZERO; nodes * m];
-        gather(curves.map(|curve| &x[curve * nodes * m..][..nodes * m]), &mut lanes);
-        if closed {
-            blocks.solve_cyclic(nodes, m, &mut lanes);
-        } else {
-            blocks.solve(nodes, m, 1, &mut lanes);
-        }
-        (0..self.runs.curves()).flat_map(|l| lanes.iter().map(move |x| x.as_array()[l])).collect()
     }
 }
 
