@@ -30,8 +30,9 @@ def test_matrices_of_condition_1e9_converge_to_their_rounding():
 
 
 def test_rounding_errors_that_spoil_a_curve_are_an_error():
-    """The velocities of condition 1e11 are accurate, but the curve misses its points by 4 % of its speed."""
-    with pytest.raises(ss.ConvergenceError, match=r"rounding errors of the curve are 3\..e-02 .*put points") as e:
+    """The velocities of condition 1e11 are accurate, but the curve misses its points by 1e-5 to 4 % of its speed: the
+    rounding of the points, which is that of the processor, decides."""
+    with pytest.raises(ss.ConvergenceError, match=r"rounding errors of the curve are \d\..e-0\d .*put points") as e:
         ss.CubicSpline(None, ellipsoids(1e11), "spd:3", tol=1e-6)
     assert not e.value.spline.report.converged and e.value.value == e.value.spline.report.residual
     with pytest.raises(ss.ConvergenceError, match=r"between points\[\d\] and points\[\d\] has no significant digits"):
