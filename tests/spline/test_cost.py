@@ -2,6 +2,7 @@
 
 import gc
 import sys
+import weakref
 
 import numpy as np
 import pytest
@@ -44,3 +45,20 @@ def test_fits_and_evaluations_take_few_calls_of_python_functions(name, most):
     assert calls(lambda: curve(x)) <= EVALUATION
     assert calls(lambda: curve(x, 2)) <= EVALUATION
     assert calls(curve.length) <= LENGTH
+
+
+@pytest.mark.parametrize("name", ["sphere:2", "so:3 x r:3"])
+def test_arrays_of_a_curve_go_with_it(name):
+    """Not when the garbage collector comes: large curves would fill the memory before."""
+    space = ss.space(name)
+    spline = ss.CubicSpline(None, points_on(space, 8), space)
+    spline.vjp(1.5, spline(1.5))
+    spline.length()
+    arrays = weakref.ref(spline._solved())
+    gc.collect()
+    gc.disable()
+    try:
+        del spline
+        assert arrays() is None
+    finally:
+        gc.enable()

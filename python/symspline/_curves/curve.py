@@ -150,11 +150,14 @@ class CurveArrays:
         """Velocities at the knots; at corners those after the knot."""
         return self._joined([factor.velocities for factor in self.factors])
 
-    @cached_property
+    @property
     def parts(self) -> tuple[CurveArrays, ...]:
         """One curve per factor of a product; the curve itself on other spaces."""
-        if not isinstance(self.space, Product):
-            return (self,)
+        # A curve that kept itself would wait for the garbage collector.
+        return self._of_factors if isinstance(self.space, Product) else (self,)
+
+    @cached_property
+    def _of_factors(self) -> tuple[CurveArrays, ...]:
         return tuple(self._of_factor(factor) for factor in self.factors)
 
     def _of_factor(self, factor: FactorArrays) -> CurveArrays:
@@ -784,12 +787,14 @@ class ControlledCurve:
         """Control points, on products one array per factor."""
         return self.control if isinstance(self.space, Product) else self.control[0]
 
-    @cached_property
+    @property
     def parts(self) -> tuple[ControlledCurve, ...]:
         """The curve in each factor."""
-        if not isinstance(self.space, Product):
-            return (self,)
-        factors = zip(self.space.factors, self.control, strict=True)
+        return self._of_factors if isinstance(self.space, Product) else (self,)
+
+    @cached_property
+    def _of_factors(self) -> tuple[ControlledCurve, ...]:
+        factors = zip(factors_of(self.space), self.control, strict=True)
         return tuple(self.with_control_points(factor, control) for factor, control in factors)
 
     def with_control_points(self, space: AnySpace, *control: Array) -> ControlledCurve:
