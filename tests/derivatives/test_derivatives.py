@@ -279,3 +279,35 @@ def test_derivatives_of_an_empty_batch(own_knots):
     # What all curves share has the gradient of a sum over none.
     assert np.array_equal(gradient.t, np.zeros((0, 3) if own_knots else 3))
     assert np.array_equal(gradient.ends[0], np.zeros(3))
+
+
+@pytest.mark.parametrize("name", ["so:3", "spd:2", "cp:2", "gl:2", "gr:2,4"])
+def test_derivatives_do_not_depend_on_the_origin_of_time(name):
+    """Seconds of today's clocks are of the order of 2³¹; these times are exact there."""
+    space, rng, late = ss.space(name), np.random.default_rng(3), 2.0**31
+    t = np.cumsum(rng.integers(2, 9, 6)) / 8
+    x = rng.integers(64 * t[0], 64 * t[-1], 12) / 64
+    points = walk(space, 0.4, 6, rng)
+    steps = np.array([unit_tangent(space, p, rng) for p in points])
+    early, moved = (ss.CubicSpline(t + origin, points, space) for origin in (0.0, late))
+    for nu in (0, 1, 2):
+        push = early.jvp(x, steps, 0.1 * t, nu=nu)
+        np.testing.assert_array_equal(moved.jvp(x + late, steps, 0.1 * t, nu=nu), push)
+        ones = np.ones(push.shape)
+        np.testing.assert_array_equal(moved.vjp(x + late, ones, nu=nu).points, early.vjp(x, ones, nu=nu).points)
+
+
+@pytest.mark.parametrize("name", ["gl:2", "aff:2"])
+def test_derivatives_exist_wherever_the_curve_does(name):
+    """Segments of far points do not continue far beyond their ends."""
+    space, rng = ss.space(name), np.random.default_rng(7)
+    points = np.array([walk(space, 0.8, 8, rng) for _ in range(60)])
+    t = np.cumsum(np.exp(rng.uniform(-1.5, 1.5, 8)))
+    spline = ss.CubicSpline(t, points, space, on_failure="ignore")
+    x = np.linspace(t[0], t[-1], 43)
+    steps = np.array([[unit_tangent(space, p, rng) for p in row] for row in points])
+    for nu in (1, 2):
+        values = np.isfinite(spline(x, nu)).all(axis=(1, 2, 3)) & spline.report.converged
+        push = spline.jvp(x, steps, nu=nu)
+        assert values.any() and np.isfinite(push[values]).all()
+        assert np.isfinite(spline.vjp(x, np.ones(push.shape), nu=nu).points[values]).all()

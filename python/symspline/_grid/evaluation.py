@@ -368,12 +368,12 @@ class CompiledGrid:
             cotangent = cotangent.reshape(len(cotangent), *(1,) * last, *self.space.point_shape)
         for k, axis in enumerate(self.axes):
             rows, x = np.moveaxis(points, k, last), axis.wrapped(sites.x[k])
-            own = x.reshape(-1, *(1,) * last) if k and not sites.outer else x
-            own = np.broadcast_to(own, (*rows.shape[:last], own.shape[-1]))
+            times = x.reshape(-1, *(1,) * last) if k and not sites.outer else x
+            times = np.broadcast_to(times, (*rows.shape[:last], times.shape[-1]))
             if k:
-                velocities, outcome_of_axis = self._velocities_for(k, rows, own)
+                velocities, outcome_of_axis = self._velocities_for(k, rows, times)
                 outcome = outcome.merged(outcome_of_axis)
-            splines.append(RowSplines(self.space, axis, rows, velocities, own))
+            splines.append(RowSplines(self.space, axis, rows, velocities, times))
             if k < last:
                 points = np.moveaxis(splines[k].values(), last, k)
         for k, own_splines in reversed(list(enumerate(splines))):

@@ -113,8 +113,8 @@ class RowSplines:
         row, node, at = self._bare_nodes
         np.add.at(gradient, (row, node), _tangent_gradient(self.space, self._points[row, node], weights[at]))
         for run in self._runs:
-            own = np.where(self._over_points(run.inside), weights[run.rows], 0.0)
-            gradient[np.ix_(run.rows, run.nodes)] += _pull(run.curve, run.x, run.bc_type, own)
+            within = np.where(self._over_points(run.inside), weights[run.rows], 0.0)
+            gradient[np.ix_(run.rows, run.nodes)] += _pull(run.curve, run.x, run.bc_type, within)
         return gradient.reshape(*self._shape[:-1], *gradient.shape[1:])
 
     def _over_points(self, mask: Mask) -> Mask:
@@ -139,22 +139,22 @@ class RowSplines:
     @cached_property
     def _runs(self) -> list[_Run]:
         """The splines of all rows."""
-        found = []
+        runs = []
         for rows in rows_alike(self._has_spline):
             valid, x, knots = self._has_spline[rows[0]], self._x[rows], self.axis.knots
             nodes, closed = np.arange(len(knots)), self.axis.is_periodic and bool(valid.all())
             if self.axis.is_periodic and not closed:
                 nodes, knots, x = self._from_gap(valid, x)
             for first, stop in runs_of(valid[nodes]):
-                own, times = nodes[first:stop], np.ascontiguousarray(knots[first:stop])
+                of_run, times = nodes[first:stop], np.ascontiguousarray(knots[first:stop])
                 inside = (x >= times[0]) & (x <= times[-1])
                 if not inside.any():
                     continue
-                at = np.ix_(rows, own)
+                at = np.ix_(rows, of_run)
                 curve = curve_of(self.space, times, [(self._points[at], self._velocities[at])])
                 bc_type = "periodic" if closed else beside_gaps(self.axis, first, stop)
-                found.append(_Run(rows, own, curve, bc_type, np.where(inside, x, times[0]), inside))
-        return found
+                runs.append(_Run(rows, of_run, curve, bc_type, np.where(inside, x, times[0]), inside))
+        return runs
 
     def _from_gap(self, valid: Mask, x: Doubles) -> tuple[NDArray[np.intp], Doubles, Doubles]:
         """Number the nodes of periodic rows from one after a gap on, so that the ends of the axis divide no run.

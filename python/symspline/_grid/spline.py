@@ -416,8 +416,8 @@ class GridSpline(Generic[P]):
         sites, _ = sites_of(self._axes, numbers, outer, None, remedy)
         gradients, outcome = [], Outcome()
         cotangents = parts_of(cotangent, self._space, "cotangent")
-        for factor, own in zip(self._factors, cotangents, strict=True):
-            weights = read_cotangent(factor.space, own, shape)
+        for factor, of_factor in zip(self._factors, cotangents, strict=True):
+            weights = read_cotangent(factor.space, of_factor, shape)
             gradient, outcome_of_factor = factor.gradient(
                 sites, weights.reshape(*sites.shape, *factor.space.point_shape)
             )

@@ -61,13 +61,14 @@ impl Interpolation {
     fn new(terms: usize) -> Self {
         let coefficient = |n: usize, k: usize| cosine(n, k) * if n == 0 { 1.0 } else { 2.0 } / NODES as f64;
         let coefficients = (0..terms).map(|n| std::array::from_fn(|k| coefficient(n, k))).collect();
-        let mut found = Interpolation { coefficients, at_nodes: Vec::new() };
+        let mut interpolation = Interpolation { coefficients, at_nodes: Vec::new() };
         let nodes: Vec<f64> = nodes().collect();
         for first in (0..NODES).step_by(LANES) {
             let at = few(|l| (first + l).min(NODES - 1));
-            found.at_nodes.push((at, found.weights(Lane::new(at.map(|j| nodes[j])))));
+            let weights = interpolation.weights(Lane::new(at.map(|j| nodes[j])));
+            interpolation.at_nodes.push((at, weights));
         }
-        found
+        interpolation
     }
 
     fn weights(&self, x: Lane) -> Weights {
@@ -91,8 +92,7 @@ impl Interpolation {
     }
 }
 
-/// The number of coefficients of an interpolation of rows of values at the nodes up to rounding errors; None if there are too
-/// many.
+/// How many coefficients interpolate rows of values at the nodes up to rounding errors; None if all of them do not.
 fn resolved(values: &[f64], len: usize) -> Option<usize> {
     let all = &INTERPOLATIONS[NODES].coefficients;
     let mut sizes = [0.0_f64; NODES];
@@ -104,8 +104,8 @@ fn resolved(values: &[f64], len: usize) -> Option<usize> {
         }
         *size = sums.iter().fold(0.0, |most, x| x.abs().max(most));
         if sums.iter().any(|x| x.is_nan()) {
-            // It stays NaN in every part.
-            return Some(NODES);
+            // The curve may not continue as far as the nodes: those of shorter parts are nearer.
+            return None;
         }
     }
     let most = |last: usize| sizes[NODES - last..].iter().fold(0.0, |most: f64, x| most.max(*x));
@@ -332,14 +332,15 @@ impl Rates<'_> {
         for group in groups {
             let Group { segment, part, width, .. } = *group;
             let ends = segment * len..(segment + 2) * len;
-            parts.t.extend_from_slice(&curve.t[segment..segment + 2]);
+            // Times begin at 0, since nodes at late times would be rounded.
+            let h = self.h(segment);
+            parts.t.extend([0.0, h]);
             parts.points.extend_from_slice(&curve.points[ends.clone()]);
             parts.velocities.extend_from_slice(&curve.velocities[ends]);
             for e in 0..2 {
                 parts.frames.extend_from_slice(&frames[self.moving.slot(segment, e) * frame..][..frame]);
             }
-            let (from, h) = (curve.t[segment], self.h(segment));
-            parts.x.extend(nodes().map(|x| from + (part as f64 + x) * width * h));
+            parts.x.extend(nodes().map(|x| (part as f64 + x) * width * h));
         }
         parts
     }

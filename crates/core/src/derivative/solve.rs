@@ -118,9 +118,9 @@ fn solve_in_sections(jacobian: &Jacobian, x: &[f64], transposed: bool) -> Vec<f6
             for r in 0..m {
                 set(&mut inside, run, (k * m + r) * columns, x[i * m + r]);
                 for c in 0..m {
-                    let [before, own, behind] = few(|side| row[side * square + r * m + c]);
+                    let [before, here, behind] = few(|side| row[side * square + r * m + c]);
                     let at = k * square + r * m + c;
-                    set(&mut blocks.sides[1], run, at, own);
+                    set(&mut blocks.sides[1], run, at, here);
                     let column = (k * m + r) * columns + 1 + c;
                     if k == 0 {
                         set(&mut inside, run, column, before);
@@ -152,8 +152,8 @@ fn solve_in_sections(jacobian: &Jacobian, x: &[f64], transposed: bool) -> Vec<f6
         for r in 0..m {
             right[(run * m + r, 0)] += x[start(run) * m + r];
             for c in 0..m {
-                let [left, own, next] = few(|side| row[side * square + r * m + c]);
-                system[(run * m + r, run * m + c)] += own;
+                let [left, here, next] = few(|side| row[side * square + r * m + c]);
+                system[(run * m + r, run * m + c)] += here;
                 // The neighbours are inner nodes, or separators themselves.
                 for (factor, of, is_left) in [(left, before, true), (next, run, false)] {
                     if inner(of).is_empty() {
