@@ -1,6 +1,8 @@
 """Derivatives of curves with respect to their data: against finite differences, and both directions against
 each other."""
 
+import warnings
+
 import numpy as np
 import pytest
 from cases import CASES, ENDS, LARGE, LOOPS, Case, grouped, loop, loop_over, unit_tangent, walk
@@ -311,3 +313,29 @@ def test_derivatives_exist_wherever_the_curve_does(name):
         push = spline.jvp(x, steps, nu=nu)
         assert values.any() and np.isfinite(push[values]).all()
         assert np.isfinite(spline.vjp(x, np.ones(push.shape), nu=nu).points[values]).all()
+
+
+def test_singular_derivatives_are_nan_with_a_warning():
+    """Uneven times and long steps lead to a curve from which others branch."""
+    space, rng = ss.space("hp:1"), np.random.default_rng(1397)
+    rng.choice(7), rng.choice(7), rng.choice(4), rng.choice(4)
+    curves = []
+    for _ in range(8):
+        points = [space.random_point(rng)]
+        for _ in range(59):
+            v = space.random_tangent(rng, points[-1])
+            length = 0.5 * rng.choice([0, 1, 1, 1])
+            points.append(space.exp(points[-1], length / max(space.norm(points[-1], v), 1e-9) * v))
+        curves.append(points)
+    t = np.cumsum(np.append(0.0, np.exp(rng.uniform(-1.5, 1.5, 59))))
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", ".*exact copies of the point before")
+        spline = ss.CubicSpline(t, np.array(curves)[[7, 6]], space)
+    x = 0.5 * (t[1:] + t[:-1])
+    with pytest.warns(ss.ConvergenceWarning, match="of curve 0 are NaN: its linear system is singular") as seen:
+        push = spline.jvp(x, np.ones(spline.points.shape))
+    assert len(seen) == 1 and seen[0].filename == __file__
+    assert np.isnan(push[0]).all() and np.isfinite(push[1]).all()
+    with pytest.warns(ss.ConvergenceWarning, match="of curve 0 are NaN"):
+        pull = spline.vjp(x, np.ones(push.shape)).points
+    assert np.isnan(pull[0]).any() and np.isfinite(pull[1]).all()

@@ -30,7 +30,7 @@ _MAYBE = FLOAT | {"optional": True}
 
 
 class ConvergenceWarning(UserWarning):
-    """Warning that a curve did not converge or meets a cut locus, if ``on_failure="warn"``."""
+    """Warning that a curve did not converge or meets a cut locus, if ``on_failure="warn"``, or has no derivatives."""
 
 
 class FarPointsWarning(UserWarning):

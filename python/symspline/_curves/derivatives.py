@@ -10,6 +10,8 @@ import numpy as np
 
 from .. import _core
 from .._base.arrays import as_array, cast, same_fields, short_repr
+from .._base.faults import of_index, warn
+from .._base.report import ConvergenceWarning
 from .._base.time import onto_ends, refuse_outside
 from .._base.typing import Array, CubicBCType, FloatArray, P
 from .._core import ValidationError
@@ -137,6 +139,7 @@ def jvp(curve: SplineData, at: SampleTimes, bc_type: Any, points: Any, t: Any, e
     ]
     motion, knots = np.ascontiguousarray(motion), _per_curve(knots, curve.batch)
     moved = _core.push(space._handle, _curves(curve, at, bc_type), motion, knots, vectors)
+    _warn_of_singular(curve, moved)
     return np.asarray(space._numbers(moved.reshape(*at.shape, *space._doubles_shape)))
 
 
@@ -145,6 +148,8 @@ def vjp(curve: SplineData, at: SampleTimes, bc_type: CubicBCType, cotangent: Any
     space, batch, nodes = curve.space, curve.batch, curve.times.shape[-1]
     doubles = space._as_doubles(read_cotangent(space, cotangent, at.shape))
     points, knots, *ends = _core.pull(space._handle, _curves(curve, at, bc_type), np.ascontiguousarray(doubles))
+    if np.isfinite(doubles).all():
+        _warn_of_singular(curve, points)
     knots = knots.reshape(*batch, nodes)
     if curve.times.ndim == 1:
         knots = knots.reshape(-1, nodes).sum(axis=0)
@@ -153,6 +158,24 @@ def vjp(curve: SplineData, at: SampleTimes, bc_type: CubicBCType, cotangent: Any
         knots,
         (_end_gradient(curve, bc_type, ends[0], 0), _end_gradient(curve, bc_type, ends[1], 1)),
     )
+
+
+def _warn_of_singular(curve: SplineData, result: Array) -> None:
+    """Warn of curves whose derivatives are NaN although the curves exist."""
+    if np.isfinite(result).all():
+        return
+    rows = (np.isfinite(x.reshape(math.prod(curve.batch), -1)).all(axis=-1) for x in (result, curve.velocities))
+    finite, exists = rows
+    singular = np.flatnonzero(exists & ~finite)
+    if len(singular):
+        index = tuple(int(i) for i in np.unravel_index(singular[0], curve.batch))
+        more = f" (and of {len(singular) - 1} more curves)" if len(singular) > 1 else ""
+        warn(
+            f"the derivatives{of_index(index)}{more} are NaN: its linear system is singular. A tiny change of the data "
+            "leads to another curve. Put more points where steps are long or times uneven.",
+            ConvergenceWarning,
+            index,
+        )
 
 
 def read_cotangent(space: Space, cotangent: Any, shape: tuple[int, ...]) -> Array:

@@ -380,12 +380,18 @@ class CubicSpline(PiecewiseCubic[P], Generic[P, R]):
         -------
         ndarray, shape ``(*batch axes, *x.shape, *point_shape)``
             Tangent vectors at the points of the curve. For `nu` 1 and 2 they are covariant derivatives of γ' and ∇γ'.
-            Curves that did not converge give NaN.
+            Curves that did not converge give NaN, and so do those whose linear system is singular.
 
         Raises
         ------
         ValidationError
             If the input does not meet the requirements above, or the dimension of the space is too large.
+
+        Warns
+        -----
+        ConvergenceWarning
+            If the linear system of a curve that converged is singular to rounding: a tiny change of the data leads to
+            another curve.
 
         See Also
         --------
@@ -431,12 +437,19 @@ class CubicSpline(PiecewiseCubic[P], Generic[P, R]):
         Gradient
             A gradient g such that ``sum(cotangent * spline.jvp(x, points, t, ends, nu=nu))`` equals ``sum(g.points *
             points) + sum(g.t * t)`` plus the same sums for the end vectors. Its vectors are tangent. The last point of
-            a closed curve has no separate gradient. Curves that did not converge give NaN.
+            a closed curve has no separate gradient. Curves that did not converge give NaN, and so do those whose linear
+            system is singular.
 
         Raises
         ------
         ValidationError
             If the input does not meet the requirements above, or the dimension of the space is too large.
+
+        Warns
+        -----
+        ConvergenceWarning
+            If the linear system of a curve that converged is singular to rounding: a tiny change of the data leads to
+            another curve.
 
         See Also
         --------

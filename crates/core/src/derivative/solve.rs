@@ -1,9 +1,19 @@
 //! The linear system for the changes of velocities: block tridiagonal, of one curve in sections or of a curve per lane.
 
-use super::operators::Matrix;
+use super::operators::{Matrix, Vector};
 use super::polygon::Runs;
 use crate::fit::Blocks;
 use crate::scalar::{LANES, Lane, few, gather};
+use std::collections::BTreeMap;
+
+/// A row of blocks is solved if its residual is at most this part of the sum of its terms. Elimination leaves 1e-15, unless
+/// a block on the diagonal is nearly singular although the system is not.
+const SOLVED: f64 = 1e-12;
+/// Below this ratio of numbers on the diagonal of a triangular factor, the solution would be rounding errors: the data do
+/// not determine the curve near them.
+const SINGULAR: f64 = 1e-12;
+/// A solution that exceeds the right-hand side by this factor may be one of them.
+const GROWN: f64 = 1e8;
 
 /// The blocks of the system. A row contains those of the left neighbour, the node itself and the right neighbour first.
 pub struct Jacobian<'a> {
@@ -16,6 +26,15 @@ pub struct Jacobian<'a> {
 }
 
 impl Jacobian<'_> {
+    /// The sides of a node on which blocks are, and the nodes there.
+    fn neighbours(&self, i: usize) -> impl Iterator<Item = (usize, usize)> {
+        let (nodes, closed) = (self.runs.nodes_each(), self.runs.closed);
+        (0..3).filter_map(move |side| {
+            let j = (i + nodes + side - 1) % nodes;
+            (closed || j + 1 == i + side).then_some((side, j))
+        })
+    }
+
     /// The three blocks of a node of a curve.
     fn row(&self, curve: usize, i: usize, out: &mut [f64]) {
         let nodes = self.runs.nodes_each();
@@ -30,14 +49,11 @@ impl Jacobian<'_> {
 
     /// The same of the transpose.
     fn column(&self, curve: usize, i: usize, work: &mut [f64], out: &mut [f64]) {
-        let (nodes, m) = (self.runs.nodes_each(), self.m);
+        let m = self.m;
         out.fill(0.0);
-        for (side, out) in out.chunks_exact_mut(m * m).enumerate() {
-            // The node i − 1, i or i + 1, in whose row the block is on the other side.
-            let row = (i + nodes + side - 1) % nodes;
-            if !self.runs.closed && row + 1 != i + side {
-                continue;
-            }
+        // In the row of the neighbour the block is on the other side.
+        for (side, row) in self.neighbours(i) {
+            let out = &mut out[side * m * m..][..m * m];
             self.row(curve, row, work);
             let block = &work[(2 - side) * m * m..][..m * m];
             for (r, row) in block.chunks_exact(m).enumerate() {
@@ -51,13 +67,113 @@ impl Jacobian<'_> {
     }
 }
 
-/// J⁻¹ x, or J⁻ᵀ x, node after node.
+/// J⁻¹ x, or J⁻ᵀ x, node after node. NaN for curves with a singular system.
 pub fn solve(jacobian: &Jacobian, x: &[f64], transposed: bool) -> Vec<f64> {
-    if jacobian.runs.curves() > 1 {
+    let mut out = if jacobian.runs.curves() > 1 {
         solve_together(jacobian, x, transposed)
     } else {
         solve_in_sections(jacobian, x, transposed)
+    };
+    let size = jacobian.runs.nodes_each() * jacobian.m;
+    for (curve, (x, out)) in x.chunks_exact(size).zip(out.chunks_exact_mut(size)).enumerate() {
+        if !is_solution(jacobian, curve, x, transposed, out) {
+            out.copy_from_slice(&solve_by_rotations(jacobian, curve, x, transposed));
+        }
     }
+    out
+}
+
+/// Whether y solves the system of a curve, up to rounding errors of each row of blocks (Oettli and Prager 1964), and is not
+/// suspiciously large.
+fn is_solution(jacobian: &Jacobian, curve: usize, x: &[f64], transposed: bool, y: &[f64]) -> bool {
+    let (m, nodes) = (jacobian.m, jacobian.runs.nodes_each());
+    let (mut work, mut row) = (vec![0.0; 3 * m * m], vec![0.0; 3 * m * m]);
+    let most = |x: &[f64]| x.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+    if most(y) > GROWN * most(x) {
+        return false;
+    }
+    (0..nodes).all(|i| {
+        jacobian.read(curve, i, transposed, &mut work, &mut row);
+        let (mut largest, mut residual) = (f64::MIN_POSITIVE, 0.0_f64);
+        for r in 0..m {
+            let (mut sum, mut size) = (x[i * m + r], x[i * m + r].abs());
+            for (side, j) in jacobian.neighbours(i) {
+                for (block, y) in row[(side * m + r) * m..][..m].iter().zip(&y[j * m..][..m]) {
+                    sum -= block * y;
+                    size += (block * y).abs();
+                }
+            }
+            (largest, residual) = (largest.max(size), residual.max(sum.abs()));
+            if sum.is_nan() {
+                return false;
+            }
+        }
+        residual <= SOLVED * largest
+    })
+}
+
+/// Solves the system of a curve by orthogonal transformations of two or three rows of blocks at a time. Other than
+/// elimination of blocks, this needs no assumption on the blocks of the diagonal.
+fn solve_by_rotations(jacobian: &Jacobian, curve: usize, x: &[f64], transposed: bool) -> Vec<f64> {
+    let (m, nodes) = (jacobian.m, jacobian.runs.nodes_each());
+    let (mut work, mut row) = (vec![0.0; 3 * m * m], vec![0.0; 3 * m * m]);
+    // The blocks by their columns, with x behind them.
+    let mut rows: Vec<BTreeMap<usize, Matrix>> = Vec::with_capacity(nodes);
+    for i in 0..nodes {
+        jacobian.read(curve, i, transposed, &mut work, &mut row);
+        let mut blocks = BTreeMap::from([(nodes, Matrix::from_column_slice(m, 1, &x[i * m..][..m]))]);
+        for (side, j) in jacobian.neighbours(i) {
+            let block = Matrix::from_row_slice(m, m, &row[side * m * m..][..m * m]);
+            *blocks.entry(j).or_insert_with(|| Matrix::zeros(m, m)) += block;
+        }
+        rows.push(blocks);
+    }
+    if rows.iter().flat_map(BTreeMap::values).flatten().any(|number| !number.is_finite()) {
+        return vec![f64::NAN; nodes * m];
+    }
+    for i in 0..nodes {
+        let mut involved = vec![i];
+        let below = [i + 1, nodes - 1].into_iter().filter(|&k| k > i && k < nodes);
+        involved.extend(below.filter(|&k| rows[k].contains_key(&i)));
+        involved.dedup();
+        let height = involved.len() * m;
+        let mut columns: Vec<usize> = involved.iter().flat_map(|&k| rows[k].keys().copied()).collect();
+        columns.sort_unstable();
+        columns.dedup();
+        let width = |j: usize| if j == nodes { 1 } else { m };
+        let mut stacks: Vec<Matrix> = columns.iter().map(|&j| Matrix::zeros(height, width(j))).collect();
+        for (at, &k) in involved.iter().enumerate() {
+            for (stack, j) in stacks.iter_mut().zip(&columns) {
+                if let Some(block) = rows[k].remove(j) {
+                    stack.rows_mut(at * m, m).copy_from(&block);
+                }
+            }
+        }
+        let factor = stacks.remove(0).qr();
+        rows[i].insert(i, factor.r());
+        for (mut stack, &j) in stacks.into_iter().zip(&columns[1..]) {
+            factor.q_tr_mul(&mut stack);
+            for (at, &k) in involved.iter().enumerate() {
+                rows[k].insert(j, stack.rows(at * m, m).into_owned());
+            }
+        }
+    }
+    let diagonal = |i: usize| rows[i][&i].diagonal().map(f64::abs);
+    let largest = (0..nodes).map(|i| diagonal(i).max()).fold(0.0, f64::max);
+    let smallest = (0..nodes).map(|i| diagonal(i).min()).fold(f64::INFINITY, f64::min);
+    if smallest <= SINGULAR * largest {
+        return vec![f64::NAN; nodes * m];
+    }
+    let mut out = Vector::zeros(nodes * m);
+    for i in (0..nodes).rev() {
+        let mut right = rows[i][&nodes].column(0).into_owned();
+        for (&j, block) in rows[i].range(i + 1..nodes) {
+            right -= block * out.rows(j * m, m);
+        }
+        let solved = rows[i][&i].solve_upper_triangular(&right);
+        out.rows_mut(i * m, m).copy_from(&solved.unwrap_or_else(|| Vector::repeat(m, f64::NAN)));
+    }
+    out.as_slice().to_vec()
 }
 
 /// With a curve per lane.
