@@ -153,8 +153,24 @@ def fit_cumulative(
 def push(handle: Handle, curves: object, points: _Doubles, knots: _Doubles, ends: list[_Doubles]) -> _Doubles: ...
 def pull(handle: Handle, curves: object, cotangent: _Doubles) -> tuple[_Doubles, _Doubles, _Doubles, _Doubles]: ...
 
-# Space, points, weights, information matrices, λ, σ, ends and initial points at the knots.
-_Smoothable = tuple[Handle, _Doubles, _Doubles, _Doubles | None, _Doubles, _Doubles, _Ends, _Doubles | None]
+# Space, points, weights, information matrices, λ, σ, ends, initial points at the knots, λ of the segments divided by λ,
+# and whether λ and σ vary.
+_Smoothable = tuple[
+    Handle,
+    _Doubles,
+    _Doubles,
+    _Doubles | None,
+    _Doubles,
+    _Doubles,
+    _Ends,
+    _Doubles | None,
+    _Doubles | None,
+    tuple[bool, bool],
+]
+# Points, bands, columns of the report, systems, and λ, ln σ² and gains if they vary.
+_SmoothResult = tuple[
+    _Doubles, _Doubles, tuple[NDArray[Any], ...], tuple[_Doubles, _Doubles, int], list[_Doubles] | None
+]
 
 def smooth(
     factors: Sequence[_Smoothable],
@@ -169,15 +185,33 @@ def smooth(
     max_iter: int,
     raise_lam: bool,
     progress: _Progress | None,
-) -> list[tuple[_Doubles, _Doubles, tuple[NDArray[Any], ...], tuple[_Doubles, _Doubles, int]]]: ...
+) -> list[_SmoothResult]: ...
 def smoothing_variance(
-    knots: _Doubles, band: _Doubles, lam: _Doubles, x: _Doubles, nu: int, kinds: Sequence[str] | None
+    knots: _Doubles,
+    band: _Doubles,
+    lam: _Doubles,
+    profile: _Doubles | None,
+    x: _Doubles,
+    nu: int,
+    kinds: Sequence[str] | None,
 ) -> _Doubles: ...
 def smoothing_inverse(
-    knots: _Doubles, times: _Doubles, weights: _Doubles, lam: float, penalty: str, kinds: Sequence[str] | None
+    knots: _Doubles,
+    times: _Doubles,
+    weights: _Doubles,
+    lam: float,
+    profile: _Doubles | None,
+    penalty: str,
+    kinds: Sequence[str] | None,
 ) -> _Doubles: ...
 def process_variance(
-    times: _Doubles, weights: _Doubles, lam: float, period: float | None, x: _Doubles, nu: int
+    times: _Doubles,
+    weights: _Doubles,
+    lam: float,
+    profile: list[_Doubles] | None,
+    period: float | None,
+    x: _Doubles,
+    nu: int,
 ) -> _Doubles: ...
 def residuals_at(
     handle: Handle, times: _Doubles, at: _Doubles, points: _Doubles, weights: _Doubles
@@ -290,6 +324,7 @@ def gap_factors(
     width: float,
     at_data: float,
     period: float | None,
+    changes: tuple[_Doubles, _Doubles, str] | None,
 ) -> list[tuple[float, int]]: ...
 def end_factors(
     knots: _Doubles,

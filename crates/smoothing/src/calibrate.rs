@@ -5,7 +5,7 @@
 //! data; the errors of these predictions determine the factors.
 
 use crate::chi;
-use crate::gaps::{Functionals, Predictions, System};
+use crate::gaps::{Block, Functionals, Predictions, System};
 use crate::variance::functional_at;
 use std::ops::Range;
 use symspline_core::monitor::checkpoint;
@@ -155,8 +155,8 @@ fn interpolated(x: f64, points: &[(f64, f64)]) -> f64 {
     (from + (to - from) * (x.ln() - a) / (b - a)).exp()
 }
 
-/// Indices of omitted data, and of data that are predicted without them.
-type Block = (Vec<usize>, Vec<usize>);
+/// Indices of omitted data, of data that are predicted without them, and of segments in which λ is not known without them.
+type Part = (Vec<usize>, Vec<usize>, Range<usize>);
 
 /// A recording and its linear system.
 pub struct Calibration<'a> {
@@ -207,24 +207,24 @@ impl Calibration<'_> {
 
     /// Predicts probes, which belong to data in the order of the blocks, without the omitted data. Returns the means of the
     /// squared differences from `errors` and of the variances over the coordinates that each datum observes.
-    fn without(&self, blocks: &[Block], probes: &Functionals, errors: &[f64]) -> Vec<[f64; 2]> {
+    fn without(&self, blocks: &[Part], probes: &Functionals, errors: &[f64]) -> Vec<[f64; 2]> {
         let own = self.evidence;
         let columns = own.residuals.len() / (own.times.len() * own.count);
-        let omitted: Vec<Vec<usize>> = blocks.iter().map(|(omitted, _)| self.rows(omitted)).collect();
+        let omitted: Vec<Vec<usize>> = blocks.iter().map(|(omitted, ..)| self.rows(omitted)).collect();
         let mut first = 0;
-        let lists: Vec<(&[usize], Range<usize>)> = blocks
+        let lists: Vec<Block> = blocks
             .iter()
             .zip(&omitted)
-            .map(|((_, probed), omitted)| {
-                let range = first..first + probed.len() * own.count;
-                first = range.end;
-                (&omitted[..], range)
+            .map(|((_, probed, segments), omitted)| {
+                let probes = first..first + probed.len() * own.count;
+                first = probes.end;
+                Block { omitted, probes, segments: segments.clone() }
             })
             .collect();
         let Predictions { values, variances } =
             self.system.without(&own.rows, own.residuals, columns, probes, &lists);
         let squares: Vec<f64> = errors.iter().zip(&values).map(|(x, y)| (x - y).powi(2)).collect();
-        let data = blocks.iter().flat_map(|(_, probed)| probed);
+        let data = blocks.iter().flat_map(|(_, probed, _)| probed);
         let of_rows = squares.chunks_exact(own.count * columns).zip(variances.chunks_exact(own.count));
         data.zip(of_rows)
             .map(|(&k, (squares, variances))| {
@@ -244,7 +244,7 @@ impl Calibration<'_> {
         let (t, n) = (own.times, own.times.len());
         let span = t[n - 1] - t[0];
         let reach = AHEAD * span;
-        let mut blocks: Vec<Block> = Vec::new();
+        let mut blocks: Vec<Part> = Vec::new();
         let mut lines: Vec<(usize, usize)> = Vec::new();
         for direction in [1.0, -1.0] {
             let index: Vec<usize> = if direction > 0.0 { (0..n).collect() } else { (0..n).rev().collect() };
@@ -265,7 +265,8 @@ impl Calibration<'_> {
                 let probed: Vec<usize> =
                     some(&ahead, PREDICTED).into_iter().chain([cut - 1]).map(|i| index[i]).collect();
                 lines.extend(probed.iter().map(|&k| (index[cut - 1], k)));
-                blocks.push((index[cut..].to_vec(), probed));
+                // Beyond the end, the curve is a line for every λ.
+                blocks.push((index[cut..].to_vec(), probed, 0..0));
             }
         }
         if blocks.is_empty() {
@@ -275,7 +276,7 @@ impl Calibration<'_> {
         let found = self.without(&blocks, &probes.as_functionals(), &errors);
         let mut first = 0;
         let mut predicted = Vec::new();
-        for (_, probed) in &blocks {
+        for (_, probed, _) in &blocks {
             let end = first + probed.len() - 1;
             let at_end = found[end][1] / own.weights[probed[probed.len() - 1]];
             for (&[square, variance], &(at, ahead)) in found[first..=end].iter().zip(&lines[first..=end]) {
@@ -335,6 +336,20 @@ impl Calibration<'_> {
         }
         (rows, errors)
     }
+}
+
+/// The segments between two times. Those of a closed curve, whose times may be beyond its ends, have numbers of the next turn.
+fn segments_between(knots: &[f64], [from, to]: [f64; 2]) -> Range<usize> {
+    let (count, period) = (knots.len() - 1, knots[knots.len() - 1] - knots[0]);
+    let place = |t: f64| {
+        let turn = ((t - knots[0]) / period).floor().max(0.0);
+        let inside = t - turn * period;
+        (turn as usize * count, inside)
+    };
+    let ((before, first), (behind, last)) = (place(from), place(to));
+    let first = before + knots.partition_point(|knot| *knot <= first).saturating_sub(1);
+    let last = behind + knots.partition_point(|knot| *knot < last).min(count);
+    first..last.max(first)
 }
 
 /// Rows without parameters.
@@ -412,6 +427,14 @@ impl Gaps<'_> {
         self.of(starts, length).unwrap_or((f64::NAN, 0))
     }
 
+    /// The times of the data before and after a block. In a closed curve, they may be those of the next turn.
+    fn around(&self, a: usize, b: usize) -> [f64; 2] {
+        let count = self.recording.evidence.times.len();
+        let period = self.recording.period.unwrap_or(0.0);
+        let at = |k: usize| self.times.get(k).copied().unwrap_or_else(|| self.times[k - count] + period);
+        if a > 0 { [at(a - 1), at(b)] } else { [at(count - 1), at(b + count)] }
+    }
+
     fn of(&self, starts: Vec<f64>, length: f64) -> Option<(f64, usize)> {
         let evidence = self.recording.evidence;
         let count = evidence.times.len();
@@ -432,15 +455,16 @@ impl Gaps<'_> {
         if ranges.is_empty() {
             return None;
         }
-        let blocks: Vec<Block> = some(&ranges, BLOCKS)
+        let knots = self.recording.system.knots;
+        let blocks: Vec<Part> = some(&ranges, BLOCKS)
             .into_iter()
             .map(|[a, b]| {
                 let own: Vec<usize> = (a..b).map(|k| k % count).collect();
                 let counting: Vec<usize> = own.iter().copied().filter(|&k| evidence.counts[k]).collect();
-                (own, some(&counting, PREDICTED))
+                (own, some(&counting, PREDICTED), segments_between(knots, self.around(a, b)))
             })
             .collect();
-        let probed: Vec<usize> = blocks.iter().flat_map(|(_, probed)| probed.iter().copied()).collect();
+        let probed: Vec<usize> = blocks.iter().flat_map(|(_, probed, _)| probed.iter().copied()).collect();
         let rows = self.recording.rows(&probed);
         let columns = evidence.residuals.len() / (count * evidence.count);
         let picked = |all: &[f64], size: usize| -> Vec<f64> {

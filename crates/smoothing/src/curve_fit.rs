@@ -1,5 +1,6 @@
 //! One curve during the iteration to the smoothing spline.
 
+use crate::adaptive::{Adaptive, Profile, at_times};
 use crate::banded::Banded;
 use crate::chain::deviations;
 use crate::choice::Linear;
@@ -9,12 +10,16 @@ use crate::gauss_newton::{self, Pull};
 use crate::information::{self, Root};
 use crate::jacobi_operator::JacobiOperator;
 use crate::linearized::{Basis, LinearProblem, OVERLAP, Stencil};
+use crate::misfit::Misfit;
 use crate::path::{Path, Position, moved, positions};
-use crate::problem::{Data, EndConditions, Known, Options, Penalty, Selection, Smooth, SmoothReport, State};
+use crate::problem::{
+    Adapt, Data, EndConditions, Known, Options, Penalty, Selection, Smooth, SmoothReport, State,
+};
 use crate::progress::{Progress, larger, length};
 use crate::residuals::Residuals;
-use crate::robust::{AtCurve, Lam, Robust};
+use crate::robust::{AtCurve, Lam, Robust, Stage};
 use crate::variance::rows_of;
+use std::borrow::Cow;
 use symspline_core::fit::Ends;
 use symspline_core::monitor::Monitor;
 use symspline_core::scalar::{Lane, lane};
@@ -30,6 +35,8 @@ const STIFFER: f64 = 10.0;
 const STIFFENINGS: usize = 4;
 /// The quantile of the weights that determines the stiffness of a curve with unequal weights.
 const LIGHT: usize = 10;
+/// The number of times that the way in which λ and σ vary is found.
+const ADAPTATIONS: usize = 2;
 /// The relative accuracy of J.
 const ROUNDING: f64 = 1e-12;
 
@@ -41,6 +48,8 @@ enum Next {
     BeginAgain,
     /// The next stage of a robust fit, from the squares of the residuals.
     Stage(Vec<f64>),
+    /// λ and σ vary like this.
+    Profile(Profile),
     /// The points move by these tangent vectors.
     Step(Vec<f64>),
     /// The iteration ends.
@@ -57,8 +66,13 @@ pub struct CurveFit<'a> {
     supported: Vec<bool>,
     /// Whether the points are already those of the result, so that only A and its inverse are computed.
     solved: bool,
+    /// The weights of the data, with the factors of a noise level that varies.
+    weights: Vec<f64>,
     /// Roots of the information matrices.
     roots: Vec<Root>,
+    /// How λ and σ vary, once it is known, and the number of times that it is still to be found.
+    profile: Option<Profile>,
+    adaptations: usize,
     linearized: LinearProblem,
     ends: EndConditions,
     robust: Robust,
@@ -101,7 +115,10 @@ impl<'a> CurveFit<'a> {
         }
         let basis = Basis::new(&knots, ends);
         let unit = penalty.unit(basis.spacing);
-        let linearized = LinearProblem::new(basis, &positions, data.weights, penalty);
+        let mut linearized = LinearProblem::new(basis, &positions, data.weights, penalty);
+        if !data.profile.is_empty() {
+            linearized.set_profile(data.profile);
+        }
         let lam = data.lam;
         let balance = linearized.balance();
         let stiffest = balance * penalty.stiffest(knots.len());
@@ -113,8 +130,12 @@ impl<'a> CurveFit<'a> {
         let count = weights.len();
         let light = *weights.select_nth_unstable_by(count / LIGHT, f64::total_cmp).1;
         let density = light * count as f64 / (knots.len() - 1) as f64;
+        let adaptations = if options.adapt == Adapt::default() { 0 } else { ADAPTATIONS };
         CurveFit {
+            weights: data.weights.to_vec(),
             roots,
+            profile: None,
+            adaptations,
             data,
             positions,
             supported,
@@ -149,7 +170,11 @@ impl<'a> CurveFit<'a> {
         };
         let lam = data.lam.or(Some(report.lam));
         let given = Data { lam, ..data };
+        let profile = self.profile.map(|profile| profile.at_knots(&self.knots, data.knots));
         let mut long = CurveFit::new(given, space.dim(), data.knots.to_vec(), points, options, self.robust);
+        if let Some(profile) = profile {
+            long.vary(space.dim(), profile);
+        }
         (long.solved, long.progress.report) = (true, report);
         long
     }
@@ -190,6 +215,7 @@ impl<'a> CurveFit<'a> {
             velocities: self.velocities,
             inverse,
             known: self.known,
+            profile: self.profile,
             report,
         }
     }
@@ -273,6 +299,7 @@ impl<'a> CurveFit<'a> {
             Next::BeginAgain => self.begin_again(),
             Next::Stage(squares) => self.go_on(space, &squares),
             Next::End(state) => self.progress.report.state = state,
+            Next::Profile(profile) => self.adapt(space, profile),
             Next::Step(step) => {
                 let before = self.points.clone();
                 self.go(space, &before, &step);
@@ -284,7 +311,7 @@ impl<'a> CurveFit<'a> {
     /// Linearises the problem at the present curve, and determines what follows.
     fn next(&mut self, space: &Erased, options: &Options, monitor: &Monitor, alone: bool) -> Next {
         let velocities = self.end_velocities(space);
-        let (data, linearized) = (&self.data, &self.linearized);
+        let (data, linearized) = (&Data { weights: &self.weights, ..self.data }, &self.linearized);
         let (m, spacing) = (space.dim(), linearized.basis.spacing);
         let path = Path { t: &self.knots, points: &self.points, velocities: &self.velocities };
         let frames = Frames::new(space, &self.points);
@@ -371,6 +398,17 @@ impl<'a> CurveFit<'a> {
         let small = self.progress.judge(&step, &deviations, reach, tol, self.robust.reweighs());
         self.inverse = Some(inverse);
         self.known = Some(linear.matrix(lam).known());
+        if self.progress.settled && small && self.is_to_adapt() {
+            let (misfit, along) = (&residuals.misfit, (&accelerations[..], periodic.as_ref()));
+            return Next::Profile(self.found_profile(
+                misfit,
+                factors.as_deref(),
+                m,
+                along,
+                lam,
+                options.adapt,
+            ));
+        }
         let taken = self.progress.report.iterations - self.progress.begun;
         let over = taken >= self.robust.most(options.max_iter);
         let left = small && self.robust.leaves(&residuals.squares);
@@ -450,7 +488,8 @@ impl<'a> CurveFit<'a> {
     fn value(&self, space: &Erased, residuals: &Residuals) -> f64 {
         let lam =
             self.progress.lam.unwrap_or(0.0) * Penalty::Acceleration.unit(self.linearized.basis.spacing);
-        self.robust.misfit(&residuals.squares) + lam * gauss_newton::energy(space, &self.path())
+        self.robust.misfit(&residuals.squares)
+            + lam * gauss_newton::energy(space, &self.path(), &self.linearized.profile)
     }
 
     fn path(&self) -> Path<'_> {
@@ -473,12 +512,13 @@ impl<'a> CurveFit<'a> {
             points: &residuals.gammas,
             vectors: &residuals.vectors,
             factors,
-            weights: self.data.weights,
+            weights: &self.weights,
             information: residuals
                 .transported
                 .as_ref()
                 .map(|transported| (&self.roots[..], &transported[..])),
         };
+        let lam = (lam, &self.linearized.profile[..]);
         gauss_newton::step(space, &self.path(), ends, &pull, lam, monitor, alone)
     }
 
@@ -491,11 +531,103 @@ impl<'a> CurveFit<'a> {
         }
     }
 
+    /// Whether it is time to find how λ and σ vary: at a curve with one λ, and again at one where they vary. For a robust
+    /// loss, the first time is that before data are rejected, because with one λ those of a burst would be outliers.
+    fn is_to_adapt(&self) -> bool {
+        let first = self.adaptations == ADAPTATIONS;
+        self.adaptations > 0
+            && !self.solved
+            && match self.robust.stage {
+                Stage::Plain | Stage::Chosen => true,
+                Stage::Rejecting => first,
+                Stage::Final => false,
+            }
+    }
+
+    /// How λ and σ vary, from the residuals at the present curve.
+    fn found_profile(
+        &self,
+        misfit: &Misfit,
+        factors: Option<&[f64]>,
+        m: usize,
+        (accelerations, periodic): (&[f64], Option<&PeriodicCorrection>),
+        lam: f64,
+        vary: Adapt,
+    ) -> Profile {
+        let mut linearized = Cow::Borrowed(&self.linearized);
+        let mut misfit = Cow::Borrowed(misfit);
+        if self.profile.as_ref().is_some_and(Profile::varies) {
+            let ones = vec![1.0; self.linearized.profile.len()];
+            let base = if self.data.profile.is_empty() || vary.lam { &ones } else { self.data.profile };
+            linearized.to_mut().set_profile(base);
+            let back: Vec<f64> =
+                self.data.weights.iter().zip(&self.weights).map(|(w, own)| w / own).collect();
+            misfit.to_mut().reweigh(&linearized, &back, m);
+        }
+        let mut weights = self.data.weights.to_vec();
+        if let Some(factors) = factors {
+            weights.iter_mut().zip(factors).for_each(|(w, factor)| *w *= factor);
+        }
+        let penalty = linearized.penalised;
+        let lam: Vec<f64> = self.linearized.profile.iter().map(|profile| lam * profile).collect();
+        Adaptive {
+            m,
+            misfit: &misfit,
+            weights: &weights,
+            positions: &self.positions,
+            periodic,
+            accelerations,
+            lam: &lam,
+            stiffest: linearized.balance() * penalty.stiffest(self.knots.len()),
+            given: self.data.lam.is_some(),
+            linearized: &linearized,
+        }
+        .profile(vary)
+    }
+
+    /// Continues with λ and σ that vary, or with one of each.
+    fn adapt(&mut self, space: &Erased, profile: Profile) {
+        let before = self.profile.as_ref().is_some_and(Profile::varies);
+        self.adaptations -= 1;
+        // The linear problem of a flat space does not depend on the curve.
+        if self.robust.stage == Stage::Plain && (space.curvature() == 0.0 || !profile.varies()) {
+            self.adaptations = 0;
+        }
+        if !profile.varies() && !before {
+            self.profile = Some(profile);
+            return;
+        }
+        self.vary(space.dim(), profile);
+        self.progress.restart(if self.data.lam.is_some() { Lam::Same } else { Lam::Anew });
+        (self.strays, self.before, self.retreats, self.objective) = (0, None, 0, f64::INFINITY);
+    }
+
+    /// Sets λ of the segments and the noise of the data.
+    fn vary(&mut self, m: usize, profile: Profile) {
+        if !profile.lam.is_empty() {
+            self.linearized.set_profile(&profile.lam);
+        } else if self.data.profile.is_empty() {
+            self.linearized.set_profile(&vec![1.0; self.knots.len() - 1]);
+        }
+        self.weights = self.data.weights.to_vec();
+        let mut information = self.data.information.to_vec();
+        if !profile.noise.is_empty() {
+            let noise = at_times(&self.knots, &profile.noise, self.data.times);
+            let factors: Vec<f64> = noise.iter().map(|noise| (-noise).exp()).collect();
+            self.weights.iter_mut().zip(&factors).for_each(|(w, factor)| *w *= factor);
+            let matrices = information.chunks_exact_mut(m * m).zip(&factors);
+            matrices.for_each(|(matrix, factor)| matrix.iter_mut().for_each(|x| *x *= factor));
+        }
+        self.roots = information::roots(&information, m);
+        self.linearized.gram = self.linearized.gram_of(&self.weights);
+        self.profile = Some(profile);
+    }
+
     /// The variances of the curve at the data, divided by those of the data.
     fn leverages(&self) -> Vec<f64> {
         let leverage =
             |(row, w): (&Stencil, &f64)| self.inverse.as_ref().map_or(0.0, |inverse| w * row.square(inverse));
-        self.linearized.data.iter().zip(self.data.weights).map(leverage).collect()
+        self.linearized.data.iter().zip(&self.weights).map(leverage).collect()
     }
 
     /// Starts the next stage of a robust fit.

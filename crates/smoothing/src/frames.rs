@@ -4,7 +4,7 @@
 //! frame to the frame at the end of the preceding run is stored, so that coordinates refer to one frame transported
 //! along the whole polygon.
 
-use crate::linearized::{LinearProblem, times_metric};
+use crate::linearized::LinearProblem;
 use crate::problem::Penalty;
 use symspline_core::monitor::checkpoint;
 use symspline_core::scalar::{LANES, Lane, few, gather, scatter};
@@ -209,9 +209,9 @@ pub fn curvature_gradient(
 ) -> Vec<f64> {
     let (m, basis, penalty) = (space.dim(), &linearized.basis, linearized.penalised);
     if penalty == Penalty::Acceleration {
-        return times_metric(basis, penalty, &curvature_terms(space, speeds, accelerations), m);
+        return linearized.times_metric(&curvature_terms(space, speeds, accelerations), m);
     }
-    let mut out = curvature_terms(space, speeds, &times_metric(basis, penalty, accelerations, m));
+    let mut out = curvature_terms(space, speeds, &linearized.times_metric(accelerations, m));
     let segments = basis.knots() - 1;
     let jerk = |at: usize| (accelerations[at + m] - accelerations[at]) / basis.h(at / m);
     let jerks: Vec<f64> = (0..segments * m).map(jerk).collect();
@@ -220,7 +220,7 @@ pub fn curvature_gradient(
         let at = |x: &[f64]| x[end * m..][..segments * m].to_vec();
         let terms = triples(space, [&at(speeds), &jerks, &at(accelerations)]);
         for (i, x) in terms.iter().enumerate() {
-            out[end * m + i] += 0.5 * basis.h(i / m) * x;
+            out[end * m + i] += 0.5 * linearized.profile[i / m] * basis.h(i / m) * x;
         }
     }
     out

@@ -6,13 +6,19 @@
 //! The errors are the deleted residuals of neighbourhood cross-validation (Wood 2024, arXiv 2404.16490). Each lane
 //! computes another neighbourhood. On curved spaces, coordinates in frames along the curve make the problem linear up
 //! to terms of the curvature.
+//!
+//! If λ varies along the curve, nobody would know it in the omitted part. It is then replaced there by the same λ as in gaps,
+//! which adds `Σ Δ_g Ω_g` to A and `−Σ Δ_g Ω_g c` to the right-hand side, with the changes Δ_g of λ in the segments.
 
 use crate::banded::{Banded, stride};
 use crate::bordered::Bordered;
 use crate::cyclic::{Factored, PeriodicCorrection};
 use crate::estimation::Matrices;
+use crate::linearized::of_segment;
 use crate::linearized::{Basis, OVERLAP};
 use crate::problem::EndConditions;
+use crate::problem::Penalty;
+use std::ops::Range;
 use symspline_core::monitor::checkpoint;
 use symspline_core::scalar::{LANES, Lane, few};
 
@@ -37,6 +43,30 @@ pub struct System<'a> {
     p: usize,
     matrices: &'a Matrices,
     periodic: Option<PeriodicCorrection>,
+    changes: Option<Changes<'a>>,
+}
+
+/// The changes of λ where data are omitted.
+#[derive(Clone, Copy)]
+pub struct Changes<'a> {
+    /// Changes of λ by segment, in the unit of the times.
+    pub lam: &'a [f64],
+    /// Accelerations at the knots, in the coordinates of the residuals.
+    pub accelerations: &'a [f64],
+    /// The derivative whose square is penalised.
+    pub penalised: Penalty,
+}
+
+/// Data that are omitted, functions that are predicted without them, and segments in which λ changes. The segments of a
+/// closed curve may continue beyond the last one.
+#[derive(Clone)]
+pub struct Block<'a> {
+    /// Indices of the data.
+    pub omitted: &'a [usize],
+    /// The functions.
+    pub probes: Range<usize>,
+    /// The segments.
+    pub segments: Range<usize>,
 }
 
 /// Predictions without some of the data: values and variances of linear functions, for noise of variance one.
@@ -59,18 +89,24 @@ impl<'a> System<'a> {
         let basis = Basis::new(knots, ends);
         let periodic =
             basis.is_closed().then(|| PeriodicCorrection { overlap: OVERLAP, m, turn: turn.to_vec() });
-        System { knots, ends, count: basis.count(), m, p: matrices[2].len().isqrt(), matrices, periodic }
+        let p = matrices[2].len().isqrt();
+        System { knots, ends, count: basis.count(), m, p, matrices, periodic, changes: None }
     }
 
-    /// Predicts `probes` without the data `omitted`, for each of several pairs of index lists. The residuals are those
-    /// of all data, `columns` numbers each; rows and residuals are divided by standard deviations.
+    /// With changes of λ where data are omitted.
+    pub fn with_changes(self, changes: Option<Changes<'a>>) -> Self {
+        System { changes, ..self }
+    }
+
+    /// Predicts the functions of each block without its data. The residuals are those of all data, `columns` numbers each;
+    /// rows and residuals are divided by standard deviations.
     pub fn without(
         &self,
         data: &Functionals,
         residuals: &[f64],
         columns: usize,
         probes: &Functionals,
-        blocks: &[(&[usize], std::ops::Range<usize>)],
+        blocks: &[Block],
     ) -> Predictions {
         let total = probes.firsts.len();
         let mut found = Predictions { values: vec![0.0; total * columns], variances: vec![f64::NAN; total] };
@@ -81,13 +117,48 @@ impl<'a> System<'a> {
         found
     }
 
+    /// Adds the changes of λ in segments to a matrix and a right-hand side.
+    fn change(
+        &self,
+        changes: &Changes,
+        segments: Range<usize>,
+        columns: usize,
+        matrix: &mut [f64],
+        right: &mut [f64],
+    ) {
+        let basis = Basis::new(self.knots, self.ends);
+        let unit = changes.penalised.unit(basis.spacing);
+        let (m, rows, count) = (self.m, stride(self.m), self.knots.len() - 1);
+        let d = m * columns;
+        for i in segments.map(|i| i % count) {
+            let lam = changes.lam[i] / unit;
+            let [l, r] = [0.0, 1.0].map(|s| basis.row(i, s, 2));
+            let (own, other) = of_segment(changes.penalised, basis.h(i));
+            for a in 0..self.count.min(4) {
+                let at = l.first + a;
+                for b in 0..=a {
+                    let entry = own * (l.factors[a] * l.factors[b] + r.factors[a] * r.factors[b])
+                        + other * (l.factors[a] * r.factors[b] + r.factors[a] * l.factors[b]);
+                    for c in 0..m {
+                        matrix[(at * m + c) * rows + (a - b) * m] += lam * entry;
+                    }
+                }
+                for c in 0..d {
+                    let [x, y] = [i, i + 1].map(|k| changes.accelerations[k * d + c] * basis.spacing.powi(2));
+                    let pull = l.factors[a] * (own * x + other * y) + r.factors[a] * (other * x + own * y);
+                    right[at * d + c] -= lam * pull;
+                }
+            }
+        }
+    }
+
     fn of_lanes(
         &self,
         data: &Functionals,
         residuals: &[f64],
         columns: usize,
         probes: &Functionals,
-        group: &[(&[usize], std::ops::Range<usize>)],
+        group: &[Block],
         found: &mut Predictions,
     ) {
         let (m, p, width) = (self.m, self.p, 4 * self.m);
@@ -100,7 +171,7 @@ impl<'a> System<'a> {
         for l in 0..LANES {
             let mut own = self.matrices.clone();
             let (mut right, mut border) = (vec![0.0; size * columns], vec![0.0; p * columns]);
-            for &k in of_lane(l).0 {
+            for &k in of_lane(l).omitted {
                 let (start, factors) = (data.firsts[k] * m, &data.factors[k * width..][..width]);
                 let side = &data.sides[k * p..][..p];
                 let residual = &residuals[k * columns..][..columns];
@@ -117,6 +188,9 @@ impl<'a> System<'a> {
                     let to = &mut border[a * columns..][..columns];
                     to.iter_mut().zip(residual).for_each(|(to, r)| *to -= x * r);
                 }
+            }
+            if let Some(changes) = &self.changes {
+                self.change(changes, of_lane(l).segments.clone(), columns, &mut own[0], &mut right);
             }
             if let Some(periodic) = &self.periodic {
                 right = by_columns(&right, columns, m, |column| periodic.fold(column));
@@ -141,13 +215,13 @@ impl<'a> System<'a> {
         matrix.solve(columns, &mut x);
         let inverse = matrix.inverse();
         let pivots = matrix.least_pivot().to_array();
-        for (l, (_, probed)) in group.iter().enumerate().filter(|(l, _)| pivots[*l] > 0.0) {
+        for (l, block) in group.iter().enumerate().filter(|(l, _)| pivots[*l] > 0.0) {
             let border: Vec<f64> = x[..p * columns].iter().map(|x| x.as_array()[l]).collect();
             let mut solved: Vec<f64> = x[p * columns..].iter().map(|x| x.as_array()[l]).collect();
             if let Some(periodic) = &self.periodic {
                 solved = by_columns(&solved, columns, m, |column| periodic.extend(column));
             }
-            for k in probed.clone() {
+            for k in block.probes.clone() {
                 let (start, factors) = (probes.firsts[k] * m, &probes.factors[k * width..][..width]);
                 let side = &probes.sides[k * p..][..p];
                 // The unknowns on which the function depends. Parameters come first.

@@ -34,8 +34,8 @@ pub struct Pull<'a> {
     pub information: Option<(&'a [Root], &'a [f64])>,
 }
 
-/// ∫ |∇γ'|² dt, with two points per segment.
-pub fn energy(space: &Erased, path: &Path) -> f64 {
+/// ∫ |∇γ'|² dt, with two points per segment, and a factor of each segment.
+pub fn energy(space: &Erased, path: &Path, profile: &[f64]) -> f64 {
     let len = space.point_len();
     let positions = quadrature(path.t.len() - 1);
     let (points, accelerations) = (path.at(space, &positions), path.accelerations(space, &positions));
@@ -43,8 +43,9 @@ pub fn energy(space: &Erased, path: &Path) -> f64 {
         let [p, a] = [&points, &accelerations].map(|x| lanes(&x[i * len..][..len]));
         space.inner(&p, &a, &a).as_array()[0]
     };
-    let h = |i: usize| path.t[positions[i].0 + 1] - path.t[positions[i].0];
-    (0..positions.len()).map(|i| 0.5 * h(i) * square(i)).sum()
+    let h = |i: usize| path.t[i + 1] - path.t[i];
+    let weight = |i: usize| 0.5 * profile[positions[i].0] * h(positions[i].0);
+    (0..positions.len()).map(|i| weight(i) * square(i)).sum()
 }
 
 fn quadrature(segments: usize) -> Vec<Position> {
@@ -55,13 +56,13 @@ fn lanes(row: &[f64]) -> Vec<Lane> {
     row.iter().map(|&x| lane(x)).collect()
 }
 
-/// The step of the points as tangent vectors. λ is in the units of the knots.
+/// The step of the points as tangent vectors. λ is in the units of the knots, with a factor of each segment.
 pub fn step(
     space: &Erased,
     path: &Path,
     ends: Ends,
     pull: &Pull,
-    lam: f64,
+    (lam, profile): (f64, &[f64]),
     monitor: &Monitor,
     threads: bool,
 ) -> Vec<f64> {
@@ -139,7 +140,7 @@ pub fn step(
         let h = path.t[*segment + 1] - path.t[*segment];
         for k in 2 * *segment..2 * *segment + 2 {
             let (matrix, bend) = at(1, k, &accelerations[k * len..][..len]);
-            add(matrix, None, -bend.column(0), lam * h / 2.0);
+            add(matrix, None, -bend.column(0), lam * profile[*segment] * h / 2.0);
         }
     });
     for (segment, square, right) in &parts {

@@ -23,7 +23,8 @@ const WHITEN: Square<ORDER> = [
     [-17.320_508_075_688_775, 6.928_203_230_275_509, 0.0],
     [20.0, -12.0, 3.0],
 ];
-/// The variance of a coordinate at given times, for noise of variance one: of the value (`nu` = 0) or the velocity (1).
+/// The variance of a coordinate at given times, for noise of variance one: of the value (`nu` = 0) or the velocity (1). λ is a
+/// function of time, which is constant between data and the given times.
 ///
 /// Times of the data must not decrease, and must lie within the period of a closed curve. Outside the data of an open
 /// curve, the process continues with constant velocity. At least three data at different times are required, or two in
@@ -31,7 +32,7 @@ const WHITEN: Square<ORDER> = [
 pub fn process_variance(
     times: &[f64],
     weights: &[f64],
-    lam: f64,
+    lam: impl Fn(f64) -> f64,
     period: Option<f64>,
     x: &[f64],
     nu: usize,
@@ -51,7 +52,8 @@ pub fn process_variance(
         kept.1 += if same { next.1 } else { 0.0 };
         same
     });
-    let chain = Chain::new(&sites, (lam / unit.powi(5)).sqrt(), period.map(|period| period / unit));
+    let root = |t: f64| (lam(first + t * unit) / unit.powi(5)).sqrt();
+    let chain = Chain::new(&sites, root, period.map(|period| period / unit));
     let covariances = chain.covariances();
     let variance = |t: &f64| {
         let at = sites.partition_point(|site| site.0 < inside(*t));
@@ -77,13 +79,14 @@ struct Chain {
 }
 
 impl Chain {
-    /// For different times with their weights, and the root of λ.
-    fn new(sites: &[(f64, f64)], root: f64, period: Option<f64>) -> Self {
+    /// For different times with their weights, and the root of λ as a function of time.
+    fn new(sites: &[(f64, f64)], root: impl Fn(f64) -> f64, period: Option<f64>) -> Self {
         let count = sites.len();
         let step = |i: usize| match (sites.get(i + 1), period) {
             (Some(next), _) => next.0 - sites[i].0,
             (None, period) => sites[0].0 + period.unwrap_or(0.0) - sites[i].0,
         };
+        let root_after = |i: usize| root(sites[i].0 + 0.5 * step(i));
         // The first increment of a closed curve is not eliminated. It is the longest, so that its rows are not large.
         let longest = (0..count).max_by(|a, b| step(*a).total_cmp(&step(*b))).unwrap_or(0);
         let rotated = period.map(|_| longest);
@@ -98,12 +101,12 @@ impl Chain {
         if rotated.is_some() {
             // The first state has its columns at the end.
             known = vec![observation(0, BASE)];
-            known.extend(increment(step(first), root));
+            known.extend(increment(step(first), root_after(first)));
             known.push(observation(1, 0));
         }
         for i in usize::from(rotated.is_some())..count - usize::from(rotated.is_none()) {
             checkpoint();
-            let h = step((first + i) % count);
+            let (h, root) = (step((first + i) % count), root_after((first + i) % count));
             let next = if rotated.is_some() && i + 1 == count { BASE } else { ORDER };
             let mut rows = whitened(root).to_vec();
             rows.extend(known.iter().map(|row| in_increment(row, h, next)));

@@ -14,7 +14,7 @@
 
 use crate::banded::stride;
 use crate::frames::{curvature_terms, triples};
-use crate::linearized::{LinearProblem, of_segment};
+use crate::linearized::LinearProblem;
 use crate::problem::Penalty;
 use symspline_core::monitor::checkpoint;
 use symspline_core::scalar::{Lane, lane};
@@ -111,7 +111,7 @@ impl JacobiOperator {
             for (x, y) in left.iter_mut().zip(right) {
                 (*x, *y) = (*x + *y, *x - *y);
             }
-            let (own, other) = of_segment(linearized.penalised, basis.h(i));
+            let (own, other) = linearized.of_segment(i);
             for (rows, factor) in rows.iter().zip([0.5 * (own + other), 0.5 * (own - other)]) {
                 if factor == 0.0 {
                     continue;
@@ -158,7 +158,7 @@ impl JacobiOperator {
         let m = self.m;
         let mut out = vec![0.0; linearized.basis.count() * m];
         for i in 0..linearized.basis.knots() - 1 {
-            let (own, other) = of_segment(linearized.penalised, linearized.basis.h(i));
+            let (own, other) = linearized.of_segment(i);
             let [a, b] = [i, i + 1].map(|knot| &accelerations[knot * m..][..m]);
             for (end, [own, other]) in [[own, other], [other, own]].into_iter().enumerate() {
                 let x: Vec<f64> = a.iter().zip(b).map(|(a, b)| own * a + other * b).collect();

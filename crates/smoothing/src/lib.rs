@@ -12,6 +12,7 @@
 //! costs little more than the fit; otherwise curvature enters the matrix, too. The other solver is *full
 //! Gauss–Newton*.
 
+mod adaptive;
 pub mod along;
 pub mod audit;
 mod banded;
@@ -57,15 +58,16 @@ pub mod private {
     pub use crate::banded::{Banded, WIDTH};
     pub use crate::cyclic::{Factored, PeriodicCorrection};
     pub use crate::elimination::eliminate;
-    pub use crate::linearized::{Basis, LinearProblem, OVERLAP, times_metric};
+    pub use crate::linearized::{Basis, LinearProblem, OVERLAP};
 }
 
+pub use adaptive::Profile;
 pub use cumulative::{CumulativeData, Outcome, fit_cumulative};
 pub use integrated_wiener::process_variance;
 pub use observations::Observations;
 pub use path::{Position, positions};
 pub use problem::{
-    Criterion, Data, EndCondition, EndConditions, Known, Loss, Options, Penalty, Selection, Smooth,
+    Adapt, Criterion, Data, EndCondition, EndConditions, Known, Loss, Options, Penalty, Selection, Smooth,
     SmoothReport, State, Tier,
 };
 pub use smooth::smooth;

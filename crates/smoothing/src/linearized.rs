@@ -69,6 +69,7 @@ impl Stencil {
 }
 
 /// The splines on given knots.
+#[derive(Clone)]
 pub struct Basis {
     /// Knots, divided by their mean spacing.
     tau: Vec<f64>,
@@ -235,20 +236,6 @@ pub fn of_segment(penalty: Penalty, h: f64) -> (f64, f64) {
     }
 }
 
-/// The product of M with vectors at the knots.
-pub fn times_metric(basis: &Basis, penalty: Penalty, a: &[f64], m: usize) -> Vec<f64> {
-    let mut out = vec![0.0; a.len()];
-    for i in 0..basis.knots() - 1 {
-        let (own, other) = of_segment(penalty, basis.h(i));
-        for c in 0..m {
-            let (left, right) = (a[i * m + c], a[(i + 1) * m + c]);
-            out[i * m + c] += own * left + other * right;
-            out[(i + 1) * m + c] += other * left + own * right;
-        }
-    }
-    out
-}
-
 /// Σ factor · rowᵀ row, as the entries (i, i − d) at i · 4 + d.
 fn gram(count: usize, rows: impl Iterator<Item = (Stencil, Stencil, f64)>) -> Vec<f64> {
     let mut out = vec![0.0; count * BAND];
@@ -269,6 +256,7 @@ fn gram(count: usize, rows: impl Iterator<Item = (Stencil, Stencil, f64)>) -> Ve
 }
 
 /// The linearised smoothing problem: the same linear problem for every coordinate.
+#[derive(Clone)]
 pub struct LinearProblem {
     /// The splines.
     pub basis: Basis,
@@ -284,6 +272,8 @@ pub struct LinearProblem {
     pub penalty: Vec<f64>,
     /// The derivative whose square Ω integrates.
     pub penalised: Penalty,
+    /// λ of each segment, divided by λ. M contains these factors, and with it the energy.
+    pub profile: Vec<f64>,
 }
 
 impl LinearProblem {
@@ -293,16 +283,48 @@ impl LinearProblem {
         let data: Vec<Stencil> =
             positions.iter().map(|&(segment, position)| basis.row(segment, position, 0)).collect();
         let (values, accelerations) = (basis.at_knots(0), basis.at_knots(2));
-        let hats = (0..basis.knots() - 1).flat_map(|i| {
-            let (l, r) = (accelerations[i], accelerations[i + 1]);
-            let (own, other) = of_segment(penalised, basis.h(i));
+        let profile = vec![1.0; basis.knots() - 1];
+        let [gram, penalty] = [Vec::new(), Vec::new()];
+        let mut linearized =
+            LinearProblem { data, values, accelerations, gram, penalty, penalised, profile, basis };
+        linearized.gram = linearized.gram_of(weights);
+        linearized.penalty = linearized.energy_matrix(count);
+        linearized
+    }
+
+    /// Sets λ of each segment, divided by λ.
+    pub fn set_profile(&mut self, profile: &[f64]) {
+        self.profile.copy_from_slice(profile);
+        self.penalty = self.energy_matrix(self.basis.count());
+    }
+
+    fn energy_matrix(&self, count: usize) -> Vec<f64> {
+        let hats = (0..self.profile.len()).flat_map(|i| {
+            let (l, r) = (self.accelerations[i], self.accelerations[i + 1]);
+            let (own, other) = self.of_segment(i);
             [(l, l, own), (r, r, own), (l, r, other), (r, l, other)]
         });
-        let penalty = gram(count, hats);
-        let mut linearized =
-            LinearProblem { data, values, accelerations, gram: Vec::new(), penalty, penalised, basis };
-        linearized.gram = linearized.gram_of(weights);
-        linearized
+        gram(count, hats)
+    }
+
+    /// The entries of M that belong to a segment: on the diagonal and beside it.
+    pub fn of_segment(&self, i: usize) -> (f64, f64) {
+        let (own, other) = of_segment(self.penalised, self.basis.h(i));
+        (self.profile[i] * own, self.profile[i] * other)
+    }
+
+    /// The product of M with vectors at the knots.
+    pub fn times_metric(&self, a: &[f64], m: usize) -> Vec<f64> {
+        let mut out = vec![0.0; a.len()];
+        for i in 0..self.profile.len() {
+            let (own, other) = self.of_segment(i);
+            for c in 0..m {
+                let (left, right) = (a[i * m + c], a[(i + 1) * m + c]);
+                out[i * m + c] += own * left + other * right;
+                out[(i + 1) * m + c] += other * left + own * right;
+            }
+        }
+        out
     }
 
     /// BᵀWB for other weights.
@@ -314,7 +336,7 @@ impl LinearProblem {
     /// SᵀMa + Pᵀg, with the contribution g of curvature.
     pub fn stiffness(&self, accelerations: &[f64], curvature: &[f64], m: usize) -> Vec<f64> {
         let mut out = vec![0.0; self.basis.count() * m];
-        let metric = times_metric(&self.basis, self.penalised, accelerations, m);
+        let metric = self.times_metric(accelerations, m);
         for (rows, vectors) in [(&self.accelerations, &metric[..]), (&self.values, curvature)] {
             rows.iter().zip(vectors.chunks_exact(m)).for_each(|(row, x)| row.spread(x, &mut out));
         }
@@ -329,7 +351,7 @@ impl LinearProblem {
         for i in 0..self.basis.knots() - 1 {
             checkpoint();
             let right = acceleration((1, i + 1));
-            let (own, other) = of_segment(self.penalised, self.basis.h(i));
+            let (own, other) = self.of_segment(i);
             energy += (left * left + right * right) * lane(own) + left * right * lane(2.0 * other);
             left = if differ { acceleration((0, i + 1)) } else { right };
         }

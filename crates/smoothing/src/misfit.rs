@@ -55,6 +55,13 @@ pub struct Whole<T = Lane> {
     pub periodic: Option<PeriodicCorrection>,
 }
 
+impl<T: Number> Whole<T> {
+    /// The factored matrix.
+    pub fn factored(self) -> Factors<T> {
+        Factors { matrix: Factored::new(self.matrix, self.periodic.as_ref()), coupled: self.coupled }
+    }
+}
+
 impl Whole<f64> {
     /// The matrix as plain numbers.
     pub fn known(&self) -> Known {
@@ -136,8 +143,7 @@ impl<'a> Misfit<'a> {
         periodic: Option<&PeriodicCorrection>,
         lam: T,
     ) -> Factors<T> {
-        let Whole { matrix, coupled, periodic } = self.matrix(linearized, m, jacobi, periodic, lam);
-        Factors { matrix: Factored::new(matrix, periodic.as_ref()), coupled }
+        self.matrix(linearized, m, jacobi, periodic, lam).factored()
     }
 
     /// A. The holonomy of a closed curve couples the coordinates, too.
@@ -149,19 +155,30 @@ impl<'a> Misfit<'a> {
         periodic: Option<&PeriodicCorrection>,
         lam: T,
     ) -> Whole<T> {
+        self.whole(linearized, m, jacobi.is_some(), periodic, |coupled, at| {
+            let stiff =
+                jacobi.map_or_else(|| of_each(&linearized.penalty, coupled, at), |jacobi| jacobi.penalty[at]);
+            lam.mul_add(T::of(stiff), T::of(self.gram(coupled, at)))
+        })
+    }
+
+    /// The matrix with given entries, for a number of coupled coordinates and a position in the band. The coordinates are
+    /// coupled if `together` is true.
+    pub fn whole<T: Number>(
+        &self,
+        linearized: &LinearProblem,
+        m: usize,
+        together: bool,
+        periodic: Option<&PeriodicCorrection>,
+        entry: impl Fn(usize, usize) -> T,
+    ) -> Whole<T> {
         let count = linearized.basis.count();
         // If the coupled matrix would be too large, the holonomy is omitted in the matrix, but not in its right-hand
         // side.
         let few = m.saturating_pow(3).saturating_mul(count) <= COUPLED;
         let turns = few && periodic.is_some_and(|correction| !correction.is_plain());
-        let coupled =
-            if jacobi.is_some() || turns || matches!(self, Misfit::Matrices { .. }) { m } else { 1 };
-        let entry = |at: usize| {
-            let stiff =
-                jacobi.map_or_else(|| of_each(&linearized.penalty, coupled, at), |jacobi| jacobi.penalty[at]);
-            lam.mul_add(T::of(stiff), T::of(self.gram(coupled, at)))
-        };
-        let matrix = Banded::of(count * coupled, stride(coupled) - 1, entry);
+        let coupled = if together || turns || matches!(self, Misfit::Matrices { .. }) { m } else { 1 };
+        let matrix = Banded::of(count * coupled, stride(coupled) - 1, |at| entry(coupled, at));
         let periodic = periodic.map(|given| {
             if given.m == coupled && few {
                 given.clone()
@@ -173,7 +190,7 @@ impl<'a> Misfit<'a> {
     }
 
     /// An entry of BᵀWB, either for each coordinate separately or for all of them.
-    fn gram(&self, coupled: usize, at: usize) -> f64 {
+    pub fn gram(&self, coupled: usize, at: usize) -> f64 {
         match self {
             Misfit::Numbers { gram, .. } => of_each(gram, coupled, at),
             Misfit::Matrices { gram, .. } => gram[at],
@@ -181,7 +198,7 @@ impl<'a> Misfit<'a> {
     }
 
     /// The weighted square of the residual of a datum after the coefficients have changed by x.
-    fn square(&self, row: &Stencil, k: usize, m: usize, x: &[Lane]) -> Lane {
+    pub fn square(&self, row: &Stencil, k: usize, m: usize, x: &[Lane]) -> Lane {
         let mut sum = Lane::ZERO;
         match self {
             Misfit::Numbers { weights, residuals, .. } => {
@@ -207,6 +224,33 @@ impl<'a> Misfit<'a> {
         match self {
             Misfit::Numbers { weights, .. } => weights.iter().filter(|w| **w > 0.0).count() as f64,
             Misfit::Matrices { seen, .. } => seen.ranks.iter().sum::<usize>() as f64 / m as f64,
+        }
+    }
+
+    /// The leverage of a datum per coordinate, given the band of A⁻¹ and its mean over the coordinates.
+    pub fn leverage(
+        &self,
+        row: &Stencil,
+        k: usize,
+        m: usize,
+        inverse: &Banded<Lane>,
+        mean: &Banded<Lane>,
+    ) -> Lane {
+        match self {
+            Misfit::Numbers { weights, .. } => row.square(mean) * lane(weights[k]),
+            Misfit::Matrices { seen, .. } => {
+                let mut sum = Lane::ZERO;
+                for n in seen.rows[k * m * m..][..m * m].chunks_exact(m) {
+                    let count = 4.min(inverse.size / m);
+                    let wide: Vec<f64> = (0..count * m).map(|u| row.factors[u / m] * n[u % m]).collect();
+                    for (u, x) in wide.iter().enumerate().filter(|(_, x)| **x != 0.0) {
+                        for (v, y) in wide.iter().enumerate() {
+                            sum += inverse.at(row.first * m + u, row.first * m + v) * lane(x * y);
+                        }
+                    }
+                }
+                sum * lane(1.0 / m as f64)
+            }
         }
     }
 
@@ -278,9 +322,9 @@ fn coupled_gram(linearized: &LinearProblem, m: usize, rows: &[f64]) -> Vec<f64> 
 }
 
 /// The entry `at` of a matrix that is the same for every coordinate and does not couple them.
-fn of_each(band: &[f64], coupled: usize, at: usize) -> f64 {
+pub fn of_each<T: Number>(band: &[T], coupled: usize, at: usize) -> T {
     let (i, d) = (at / stride(coupled), at % stride(coupled));
-    if d % coupled == 0 { band[i / coupled * (WIDTH + 1) + d / coupled] } else { 0.0 }
+    if d % coupled == 0 { band[i / coupled * (WIDTH + 1) + d / coupled] } else { T::ZERO }
 }
 
 impl<T: Number> Factors<T> {

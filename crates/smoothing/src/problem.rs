@@ -1,5 +1,6 @@
 //! The smoothing problem, its options and its report.
 
+use crate::adaptive::Profile;
 use crate::banded::stride;
 use crate::cyclic::PeriodicCorrection;
 use std::f64::consts::PI;
@@ -22,6 +23,8 @@ pub struct Data<'a> {
     pub knots: &'a [f64],
     /// λ, or None to choose it from the data.
     pub lam: Option<f64>,
+    /// λ of every segment divided by λ; empty for one λ.
+    pub profile: &'a [f64],
     /// The standard deviation of the noise in a coordinate at weight one, if it is known.
     pub sigma: Option<f64>,
     /// Velocities at the ends that have [`EndCondition::Velocity`]: tangent at the first and at the last data point,
@@ -140,6 +143,15 @@ pub enum Loss {
     Cauchy,
 }
 
+/// Which functions vary along the curve if the data require it: λ(t) and σ(t).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Adapt {
+    /// λ.
+    pub lam: bool,
+    /// The standard deviation σ of the noise.
+    pub noise: bool,
+}
+
 /// The options of smoothing.
 #[derive(Clone, Copy)]
 pub struct Options {
@@ -159,6 +171,8 @@ pub struct Options {
     pub max_iter: usize,
     /// Whether a larger λ than the criterion chooses is tried if no spline joins the smoothed points.
     pub raise_lam: bool,
+    /// What varies along the curve.
+    pub adapt: Adapt,
 }
 
 /// The final state of a curve.
@@ -243,6 +257,8 @@ pub struct Smooth {
     pub inverse: Vec<f64>,
     /// The posterior of the coefficients; none if the iteration failed.
     pub known: Option<Known>,
+    /// How λ and σ vary, if that was asked for.
+    pub profile: Option<Profile>,
     /// The report.
     pub report: SmoothReport,
 }

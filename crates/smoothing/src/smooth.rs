@@ -1,5 +1,6 @@
 //! Smoothing of many curves at a time: every iteration advances all curves that have not converged.
 
+use crate::adaptive::on_segments;
 use crate::banded::stride;
 use crate::chain::{chain, rounding};
 use crate::curve_fit::CurveFit;
@@ -36,10 +37,19 @@ pub fn smooth(space: &Erased, data: &[Data], options: &Options, monitor: &Monito
     let knots: Vec<Vec<f64>> = data.iter().map(|data| knots_near_data(data, options)).collect();
     let starts: Vec<Vec<f64>> =
         data.iter().zip(&knots).map(|(data, knots)| at_knots(data, knots, space.point_len())).collect();
+    let profiles: Vec<Vec<f64>> = data
+        .iter()
+        .zip(&knots)
+        .map(|(data, knots)| match data.profile {
+            [] => Vec::new(),
+            profile => on_segments(data.knots, profile, knots),
+        })
+        .collect();
     let near: Vec<Data> = data
         .iter()
-        .zip(knots.iter().zip(&starts))
-        .map(|(data, (knots, start))| Data { knots, start, ..*data })
+        .zip(&knots)
+        .zip(starts.iter().zip(&profiles))
+        .map(|((data, knots), (start, profile))| Data { knots, start, profile, ..*data })
         .collect();
     let mut tracks: Vec<CurveFit> = solve(space, &near, options, monitor)
         .into_iter()

@@ -23,18 +23,19 @@ pub fn rows_of(inverse: &Banded<f64>) -> Vec<f64> {
 ///
 /// The points at the knots have the covariance PA⁻¹Pᵀ. An integrated Wiener process through given points has velocities
 /// there with the inverse covariance λT, `vᵀTv` being the part of ∫ x''² in them; and between two knots whose points and
-/// velocities are given it has the variance `h³s³(1 − s)³/(3λ)`, and its velocity `h s(1 − s)(1 − 3s(1 − s))/λ`.
+/// velocities are given it has the variance `h³s³(1 − s)³/(3λ)`, and its velocity `h s(1 − s)(1 − 3s(1 − s))/λ`. If λ varies,
+/// `profile` has λ of each segment, divided by λ; otherwise it is empty.
 pub fn variance(
     knots: &[f64],
     rows: &[f64],
-    lam: f64,
+    (lam, profile): (f64, &[f64]),
     ends: EndConditions,
     times: &[f64],
     nu: usize,
 ) -> Vec<f64> {
     let basis = Basis::new(knots, ends);
     let inverse = Banded::of(basis.count(), WIDTH, |at| rows[at]);
-    let velocities = velocities_given_points(knots, ends);
+    let velocities = velocities_given_points(knots, profile, ends);
     let one = |t: &f64| {
         checkpoint();
         let ((segment, s), beyond) = position_of(knots, &basis, *t);
@@ -53,10 +54,11 @@ pub fn variance(
             return known;
         }
         let both = s * (1.0 - s);
-        let between = match nu {
+        let of_process = match nu {
             0 => h.powi(3) * both.powi(3) / 3.0,
             _ => h * both * (1.0 - 3.0 * both),
         };
+        let between = of_process / profile.get(segment).unwrap_or(&1.0);
         let v = |a: usize, b: usize| velocities.at(segment + a, segment + b);
         let [a, b] = hermite;
         known + (a * a * v(0, 0) + 2.0 * a * b * v(0, 1) + b * b * v(1, 1) + between) / lam
@@ -64,18 +66,22 @@ pub fn variance(
     times.iter().map(one).collect()
 }
 
-/// The band of A⁻¹ for scalar weights and a given λ, as [`rows_of`] returns it. The data are between the knots.
+/// The band of A⁻¹ for scalar weights and a given λ, as [`rows_of`] returns it. The data are between the knots. The profile is
+/// that of [`variance`].
 pub fn inverse_of_weights(
     knots: &[f64],
     times: &[f64],
     weights: &[f64],
-    lam: f64,
+    (lam, profile): (f64, &[f64]),
     penalty: Penalty,
     ends: EndConditions,
 ) -> Vec<f64> {
     let basis = Basis::new(knots, ends);
     let lam = lam / penalty.unit(basis.spacing);
-    let linearized = LinearProblem::new(basis, &positions(knots, times), weights, penalty);
+    let mut linearized = LinearProblem::new(basis, &positions(knots, times), weights, penalty);
+    if !profile.is_empty() {
+        linearized.set_profile(profile);
+    }
     let entry = |at: usize| lam.mul_add(linearized.penalty[at], linearized.gram[at]);
     let matrix = Banded::of(linearized.basis.count(), WIDTH, entry);
     let periodic = linearized.basis.is_closed().then(|| PeriodicCorrection::plain(OVERLAP, 1));
@@ -118,11 +124,11 @@ pub fn functional_at(knots: &[f64], ends: EndConditions, times: &[f64], nu: usiz
 }
 
 /// The band of T⁻¹, where vᵀTv is the contribution of the velocities at knots to ∫ x''²: `4(v₀² + v₀v₁ + v₁²)/h` per
-/// segment. Prescribed velocities get a negligible variance.
-fn velocities_given_points(knots: &[f64], ends: EndConditions) -> Banded<f64> {
+/// segment, times its number in the profile. Prescribed velocities get a negligible variance.
+fn velocities_given_points(knots: &[f64], profile: &[f64], ends: EndConditions) -> Banded<f64> {
     const FIXED: f64 = 1e12;
     let last = knots.len() - 1;
-    let stiffness = |i: usize| 1.0 / (knots[i + 1] - knots[i]);
+    let stiffness = |i: usize| profile.get(i).unwrap_or(&1.0) / (knots[i + 1] - knots[i]);
     let given = |end: usize| matches!(ends, EndConditions::Open(ends) if ends[end] == EndCondition::Velocity);
     let t = Banded::of(last + 1, 1, |at| {
         let (i, beside) = (at / 2, at % 2 == 1);

@@ -109,7 +109,7 @@ mod elimination {
 mod gaps {
     use symspline_core::scalar::{Lane, lane};
     use symspline_smoothing::estimation::Matrices;
-    use symspline_smoothing::gaps::{Functionals, System};
+    use symspline_smoothing::gaps::{Block, Functionals, System};
     use symspline_smoothing::private::{Banded, Basis, Factored, LinearProblem, OVERLAP, PeriodicCorrection};
     use symspline_smoothing::{EndCondition, EndConditions, Penalty, positions};
 
@@ -184,7 +184,13 @@ mod gaps {
             for list in &lists {
                 let all = Functionals { firsts: &firsts, factors: &weighed, sides: &[] };
                 let probes = Functionals { firsts: &firsts, factors: &plain, sides: &[] };
-                let found = system.without(&all, &residuals, 1, &probes, &[(list, 0..t.len())]);
+                let found = system.without(
+                    &all,
+                    &residuals,
+                    1,
+                    &probes,
+                    &[Block { omitted: list, probes: 0..t.len(), segments: 0..0 }],
+                );
                 let fewer: Vec<f64> =
                     (0..t.len()).map(|k| if list.contains(&k) { 0.0 } else { weights[k] }).collect();
                 let (again, variances) = fit(&knots, &t, &y, &fewer, lam, ends);
@@ -199,7 +205,7 @@ mod gaps {
 
 mod linearized {
     use symspline_core::scalar::lane;
-    use symspline_smoothing::private::{Basis, LinearProblem, WIDTH, times_metric};
+    use symspline_smoothing::private::{Basis, LinearProblem, WIDTH};
     use symspline_smoothing::{EndCondition, EndConditions, Penalty};
 
     const BAND: usize = WIDTH + 1;
@@ -262,7 +268,7 @@ mod linearized {
             .iter()
             .zip(&mut accelerations)
             .for_each(|(row, x)| row.apply(&c, std::slice::from_mut(x)));
-        let mass = times_metric(&linearized.basis, Penalty::Acceleration, &accelerations, 1);
+        let mass = linearized.times_metric(&accelerations, 1);
         let energy: f64 = accelerations.iter().zip(&mass).map(|(a, b)| a * b).sum();
         let form: f64 = (0..6)
             .flat_map(|i| (0..=WIDTH.min(i)).map(move |d| (i, d)))

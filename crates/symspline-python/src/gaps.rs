@@ -1,16 +1,15 @@
 //! Predictions without some of the data, called from Python.
 
 use crate::arrays::{in_order, zeros};
-use crate::estimation::{Known, matrices_of};
+use crate::estimation::{Known, matrices_of, penalty_named};
 use crate::watch::{is_long, watched};
 use numpy::{
     PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArray1, PyReadonlyArrayDyn, PyUntypedArrayMethods,
 };
 use pyo3::prelude::*;
-use std::ops::Range;
 use symspline_engine::scalar::LANES;
 use symspline_engine::smoothing::calibrate::{Calibration, Course, Evidence};
-use symspline_engine::smoothing::gaps::{Functionals, System};
+use symspline_engine::smoothing::gaps::{Block, Changes, Functionals, System};
 use symspline_engine::smoothing::{chi, functional_at};
 
 type Array<'py> = PyReadonlyArrayDyn<'py, f64>;
@@ -59,8 +58,8 @@ pub fn predictions_without<'py>(
     let probes =
         Functionals { firsts: &of_probes, factors: in_order(&probes.1)?, sides: in_order(&probes.2)? };
     let omitted = index(&omitted)?;
-    let blocks: Vec<(&[usize], Range<usize>)> =
-        blocks.iter().map(|&[a, b, c, d]| (&omitted[a..b], c..d)).collect();
+    let block = |&[a, b, c, d]: &[usize; 4]| Block { omitted: &omitted[a..b], probes: c..d, segments: 0..0 };
+    let blocks: Vec<Block> = blocks.iter().map(block).collect();
     let residuals = in_order(&residuals)?;
     let columns = residuals.len() / of_data.len().max(1);
     let work = blocks.len().div_ceil(LANES) * matrices[0].len();
@@ -91,11 +90,11 @@ fn calibrated<T: Send>(
     knots: &Array,
     known: &Known,
     evidence: &Linearised,
-    period: Option<f64>,
+    (changes, period): (Option<Changes>, Option<f64>),
     work: impl FnOnce(&Calibration) -> T + Send,
 ) -> PyResult<T> {
     let (matrices, m, ends, turn) = matrices_of(known)?;
-    let system = System::new(in_order(knots)?, ends, m, &matrices, &turn);
+    let system = System::new(in_order(knots)?, ends, m, &matrices, &turn).with_changes(changes);
     let (times, firsts, [factors, sides], [residuals, errors], counts, [weights, observed], coordinates) =
         evidence;
     let count = factors.shape()[1];
@@ -116,7 +115,8 @@ fn calibrated<T: Send>(
     watched(py, None, 1, heavy, |_| work(&Calibration { system: &system, evidence: &evidence, period }))
 }
 
-/// The factor and the number of blocks for every gap (G, 2): see [`Calibration::factors_in_gaps`].
+/// The factor and the number of blocks for every gap (G, 2): see [`Calibration::factors_in_gaps`]. If λ varies, `changes` are
+/// those of λ in omitted segments (K − 1,), accelerations at the knots (K, m), and the penalty.
 #[pyfunction]
 #[allow(clippy::too_many_arguments)]
 pub fn gap_factors<'py>(
@@ -128,8 +128,18 @@ pub fn gap_factors<'py>(
     width: f64,
     at_data: f64,
     period: Option<f64>,
+    changes: Option<(Array<'py>, Array<'py>, String)>,
 ) -> PyResult<Vec<(f64, usize)>> {
-    calibrated(py, &knots, &known, &evidence, period, |own| own.factors_in_gaps(&gaps, width, at_data))
+    let changes = match &changes {
+        None => None,
+        Some((lam, accelerations, penalty)) => Some(Changes {
+            lam: in_order(lam)?,
+            accelerations: in_order(accelerations)?,
+            penalised: penalty_named(penalty)?,
+        }),
+    };
+    let how = (changes, period);
+    calibrated(py, &knots, &known, &evidence, how, |own| own.factors_in_gaps(&gaps, width, at_data))
 }
 
 /// Distances beyond the ends with their factors, and the number of predictions: see [`Calibration::factors_beyond`]. The
@@ -153,7 +163,7 @@ pub fn end_factors<'py>(
         lam: *lam,
         acceleration: *acceleration,
     };
-    calibrated(py, &knots, &known, &evidence, None, |own| own.factors_beyond(&course, usual))
+    calibrated(py, &knots, &known, &evidence, (None, None), |own| own.factors_beyond(&course, usual))
 }
 
 /// The quantile of the ratio of χ² with m degrees of freedom to the mean square of n independent normal numbers.

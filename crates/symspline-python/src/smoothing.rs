@@ -15,9 +15,9 @@ use symspline_engine::smoothing::audit::{AtData, Unequal, is_constant};
 use symspline_engine::smoothing::examine::{Complaint, Examined, Finding, Residuals};
 use symspline_engine::smoothing::turns::{Turn, usual_turn};
 use symspline_engine::smoothing::{
-    CumulativeData, Data, EndConditions, Observations, Options, Outcome, Selection, Smooth, SmoothReport,
-    State, Tier, chi, fit_cumulative as fit, inverse_of_weights, process_variance as process, smooth as run,
-    variance as variance_at,
+    Adapt, CumulativeData, Data, EndConditions, Observations, Options, Outcome, Profile, Selection, Smooth,
+    SmoothReport, State, Tier, chi, fit_cumulative as fit, inverse_of_weights, process_variance as process,
+    smooth as run, variance as variance_at,
 };
 use symspline_engine::space::{Ambient, Origin};
 
@@ -26,16 +26,22 @@ const HEAVY_FACTORS: usize = 1_000_000;
 
 type Array<'py> = PyReadonlyArrayDyn<'py, f64>;
 
-/// Points at the knots, the band of A⁻¹, the columns of the report, and A: its band, the holonomy of closed curves, and
-/// the number of coordinates that it couples.
-type Smoothed<'py> =
-    (Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyTuple>, Systems<'py>);
+/// Points at the knots, the band of A⁻¹, the columns of the report, A (its band, the holonomy of closed curves, and the
+/// number of coordinates that it couples), and how λ and σ vary.
+type Smoothed<'py> = (
+    Bound<'py, PyArrayDyn<f64>>,
+    Bound<'py, PyArrayDyn<f64>>,
+    Bound<'py, PyTuple>,
+    Systems<'py>,
+    Option<[Bound<'py, PyArrayDyn<f64>>; 3]>,
+);
 
 type Systems<'py> = (Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>, usize);
 
 /// One factor of a product: space, points (..., N, point), weights (N,) or (..., N), information matrices (..., N, m, m)
 /// whose mean diagonals are the weights, λ and σ with one value per curve, of which NaN requests that it is chosen, ends,
-/// and initial points at the knots.
+/// initial points at the knots, λ of the segments (K − 1,) or (..., K − 1) divided by λ, and whether λ and σ vary if the data
+/// require it.
 type Factor<'py> = (
     PyRef<'py, Handle>,
     Array<'py>,
@@ -45,6 +51,8 @@ type Factor<'py> = (
     Array<'py>,
     Option<[EndOf<'py>; 2]>,
     Option<Array<'py>>,
+    Option<Array<'py>>,
+    (bool, bool),
 );
 
 /// Smooths curves in the factors of a product. `t` contains the times of all data, (N,) or (..., N); `knots` is (K,) or
@@ -84,6 +92,7 @@ pub fn smooth<'py>(
         max_iter,
         raise_lam,
         ends: EndConditions::Periodic,
+        adapt: Adapt::default(),
     };
     let (t, knots) = (Rows::of(&t)?, Rows::of(&knots)?);
     let parts = factors.len();
@@ -114,14 +123,15 @@ impl<'a> Rows<'a> {
 
 fn smooth_factor<'py>(
     py: Python<'py>,
-    (handle, points, weights, information, lam, sigma, ends, start): &Factor<'py>,
+    (handle, points, weights, information, lam, sigma, ends, start, profile, adapt): &Factor<'py>,
     t: Rows,
     knots: Rows,
     options: Options,
     progress: Option<Progress>,
 ) -> PyResult<Smoothed<'py>> {
     let kinds = ends.as_ref().map(|kinds| [0, 1].map(|e| kinds[e].0.clone()));
-    let options = Options { ends: ends_named(kinds)?, ..options };
+    let adapt = Adapt { lam: adapt.0, noise: adapt.1 };
+    let options = Options { ends: ends_named(kinds)?, adapt, ..options };
     let none: &[f64] = &[];
     let vectors: [&[f64]; 2] = match ends {
         None => [none; 2],
@@ -137,6 +147,7 @@ fn smooth_factor<'py>(
     let (lam, sigma) = (in_order(lam)?, in_order(sigma)?);
     let first = start.as_ref().map_or(Ok(none), in_order)?;
     let matrices = information.as_ref().map_or(Ok(none), in_order)?;
+    let profile = profile.as_ref().map(Rows::of).transpose()?;
     let entries = if matrices.is_empty() { 0 } else { space.dim() * space.dim() };
     drop(reserve::<f64>(p.len() + 2 * curves * n + matrices.len() + curves * count * (2 * len + 8))?);
     let data: Vec<Observations> = (0..curves)
@@ -162,6 +173,7 @@ fn smooth_factor<'py>(
             information: &data.information,
             knots: knots.of_curve(c),
             lam: Some(lam[c]).filter(|lam| !lam.is_nan()),
+            profile: profile.map_or(none, |rows| rows.of_curve(c)),
             sigma: Some(sigma[c]).filter(|sigma| !sigma.is_nan()),
             ends: vectors.map(|v| if v.is_empty() { none } else { &v[c * len..][..len] }),
             start: if first.is_empty() { none } else { &first[c * count * len..][..count * len] },
@@ -179,7 +191,36 @@ fn smooth_factor<'py>(
         gathered(py, &[batch, &[coefficients, 4]].concat(), &found, |smooth| &smooth.inverse)?,
         columns(py, &found)?,
         systems(py, batch, coefficients, space.dim(), ends.is_none(), &found)?,
+        if adapt == Adapt::default() { None } else { Some(profiles(py, batch, count, &found)?) },
     ))
+}
+
+/// λ of the segments divided by their geometric mean, ln σ² at the knots, and the gain, for all curves.
+fn profiles<'py>(
+    py: Python<'py>,
+    batch: &[usize],
+    knots: usize,
+    found: &[Smooth],
+) -> PyResult<[Bound<'py, PyArrayDyn<f64>>; 3]> {
+    let column = |tail: &[usize], usual: f64, of: fn(&Profile) -> &[f64]| {
+        let out = zeros(py, &[batch, tail].concat())?;
+        let mut write = out.readwrite();
+        let rows = write.as_slice_mut()?;
+        rows.fill(usual);
+        let size = tail.iter().product::<usize>();
+        for (row, smooth) in rows.chunks_exact_mut(size.max(1)).zip(found) {
+            if let Some(numbers) = smooth.profile.as_ref().map(of).filter(|numbers| !numbers.is_empty()) {
+                row.copy_from_slice(numbers);
+            }
+        }
+        drop(write);
+        PyResult::Ok(out)
+    };
+    Ok([
+        column(&[knots - 1], 1.0, |profile| &profile.lam)?,
+        column(&[knots], 0.0, |profile| &profile.noise)?,
+        column(&[], f64::NAN, |profile| std::slice::from_ref(&profile.gain))?,
+    ])
 }
 
 /// A of all curves. It couples all coordinates if it does so for any of the curves.
@@ -270,8 +311,8 @@ fn columns<'py>(py: Python<'py>, found: &[Smooth]) -> PyResult<Bound<'py, PyTupl
 }
 
 /// Variances (..., n) of a coordinate of smoothed curves at given times, for noise of variance one. Knots (K,) and times x
-/// (n,) are shared, or have one row per curve as the bands (..., K, 4); λ has one number per curve. `kinds` are the kinds of
-/// the ends; None for closed curves.
+/// (n,) are shared, or have one row per curve as the bands (..., K, 4); λ has one number per curve, and the profile (..., K −
+/// 1) its factors for the segments. `kinds` are the kinds of the ends; None for closed curves.
 #[pyfunction]
 #[allow(clippy::too_many_arguments)]
 pub fn smoothing_variance<'py>(
@@ -279,6 +320,7 @@ pub fn smoothing_variance<'py>(
     knots: Array<'py>,
     band: Array<'py>,
     lam: Array<'py>,
+    profile: Option<Array<'py>>,
     x: Array<'py>,
     nu: usize,
     kinds: Option<[String; 2]>,
@@ -290,8 +332,11 @@ pub fn smoothing_variance<'py>(
     let (knots, x) = (Rows::of(&knots)?, Rows::of(&x)?);
     let shape = [batch, &[x.size]].concat();
     let (band, lam) = (in_order(&band)?, in_order(&lam)?);
-    let of =
-        |c: usize| variance_at(knots.of_curve(c), &band[c * size..][..size], lam[c], ends, x.of_curve(c), nu);
+    let profile = profile.as_ref().map(Rows::of).transpose()?;
+    let of = |c: usize| {
+        let lam = (lam[c], profile.map_or(&[][..], |rows| rows.of_curve(c)));
+        variance_at(knots.of_curve(c), &band[c * size..][..size], lam, ends, x.of_curve(c), nu)
+    };
     let heavy = is_long(curves * (knots.size + x.size));
     let found = watched(py, None, curves, heavy, |_| (0..curves).flat_map(of).collect::<Vec<f64>>())?;
     let out = zeros(py, &shape)?;
@@ -307,27 +352,42 @@ pub fn smoothing_inverse<'py>(
     times: Array<'py>,
     weights: Array<'py>,
     lam: f64,
+    profile: Option<Array<'py>>,
     penalty: &str,
     kinds: Option<[String; 2]>,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
     let (penalty, ends) = (penalty_named(penalty)?, ends_named(kinds)?);
     let (knots, times, weights) = (in_order(&knots)?, in_order(&times)?, in_order(&weights)?);
-    Ok(PyArray1::from_vec(py, inverse_of_weights(knots, times, weights, lam, penalty, ends)))
+    let profile = profile.as_ref().map_or(Ok(&[][..]), in_order)?;
+    Ok(PyArray1::from_vec(py, inverse_of_weights(knots, times, weights, (lam, profile), penalty, ends)))
 }
 
-/// The variance of a coordinate of the process that the jerk penalises, for noise of variance one.
+/// The variance of a coordinate of the process that the jerk penalises, for noise of variance one. The profile has knots and the
+/// factors of λ between them.
 #[pyfunction]
+#[allow(clippy::too_many_arguments)]
 pub fn process_variance<'py>(
     py: Python<'py>,
     times: Array<'py>,
     weights: Array<'py>,
     lam: f64,
+    profile: Option<[Array<'py>; 2]>,
     period: Option<f64>,
     x: Array<'py>,
     nu: usize,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
     let (times, weights, x) = (in_order(&times)?, in_order(&weights)?, in_order(&x)?);
-    Ok(PyArray1::from_vec(py, process(times, weights, lam, period, x, nu)))
+    let none = &[][..];
+    let [knots, profile] = match &profile {
+        Some([knots, profile]) => [in_order(knots)?, in_order(profile)?],
+        None => [none, none],
+    };
+    let factor = |t: f64| {
+        let inner = knots.get(1..knots.len().saturating_sub(1)).unwrap_or(none);
+        let turn = period.map_or(0.0, |period| ((t - times[0]) / period).floor() * period);
+        profile.get(inner.partition_point(|knot| *knot <= t - turn)).copied().unwrap_or(1.0)
+    };
+    Ok(PyArray1::from_vec(py, process(times, weights, |t| lam * factor(t), period, x, nu)))
 }
 
 /// The quantile of χ² with m degrees of freedom.

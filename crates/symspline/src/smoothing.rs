@@ -299,6 +299,7 @@ impl Smoothing {
             information: &[],
             knots,
             lam,
+            profile: &[],
             sigma,
             ends: [&[], &[]],
             start: &[],
@@ -320,6 +321,7 @@ impl Smoothing {
             tol: self.tol,
             max_iter: self.max_iter,
             raise_lam: lam.is_none(),
+            adapt: engine::Adapt::default(),
         };
         engine::smooth(space, &[data], &options, &Monitor::new(&|_| true)).remove(0)
     }
@@ -462,7 +464,7 @@ impl<S: Space, P: Point<S>> SmoothingSpline<S, P> {
         assert!(time.is_finite(), "the time is {time}, but times must be finite");
         let knots = self.spline.times();
         let std = |Noise { inverse, between, report }: &Noise| {
-            let variance = engine::variance(knots, inverse, *between, self.ends, &[time], 0);
+            let variance = engine::variance(knots, inverse, (*between, &[]), self.ends, &[time], 0);
             report.sigma * variance[0].sqrt()
         };
         S::per_factor(self.noise.iter().map(std).collect())

@@ -119,6 +119,7 @@ CovarianceOrder = Literal[0, 1, "joint"]
 Criterion = Literal["gcv", "reml", "cp"]
 GridCriterion = Literal["gcv", "cp"]
 Loss = Literal["linear", "huber", "cauchy"]
+SmoothingNoise = Literal["constant", "adaptive"]
 # One number, one for each curve of a batch, or a tuple with one of these for each factor of a product.
 Numbers = ArrayLike | tuple[ArrayLike | None, ...]
 
@@ -162,6 +163,7 @@ class SmoothingSolver(TypedDict, total=False):
     loss: Loss
     penalty: SmoothingPenalty
     sigma: Numbers | None
+    noise: SmoothingNoise | tuple[SmoothingNoise, ...]
     bc_type: SmoothingBCType | None
     method: SmoothingMethod
     tol: float

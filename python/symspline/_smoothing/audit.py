@@ -558,7 +558,7 @@ def _warn_of_varying(space: AnySpace, noisy: SmoothingData, spline: SmoothedSpli
         bend = part.evaluate(np.ascontiguousarray(middle), "bend", "raise", middle.ndim > 1)
         energy = np.cumsum(np.diff(knots) * rows(bend) ** 2, axis=-1)
         band, times, kinds = rows(fit.result.smoothed.band, axes=2), rows(noisy.times), end_kinds(spline._bc_type)
-        leverage = _core.smoothing_variance(knots, band, np.zeros(len(curves)), times, 0, kinds)
+        leverage = _core.smoothing_variance(knots, band, np.zeros(len(curves)), None, times, 0, kinds)
         squares = np.full(fit.at.shape[: len(noisy.batch) + 1], np.nan)
         squares[good] = factor._apply("distance", p=fit.at[good], q=fit.part.points[good]) ** 2
         energy = np.concatenate([np.zeros((len(curves), 1)), energy], axis=-1)
@@ -567,7 +567,7 @@ def _warn_of_varying(space: AnySpace, noisy: SmoothingData, spline: SmoothedSpli
         for curve_number, result in zip(curves, tests, strict=True):
             index = tuple(map(int, np.unravel_index(curve_number, noisy.batch)))
             shown = noisy.t[index] if noisy.t.ndim > 1 else noisy.t
-            if result and (message := varying(shown, result, fit.part.noise.loss != "linear")):
+            if result and (message := varying(shown, result, fit.part.noise.loss != "linear", fit.part.adapts)):
                 failed.append((index, message))
         if failed:
             index, message = failed[0]
@@ -577,30 +577,37 @@ def _warn_of_varying(space: AnySpace, noisy: SmoothingData, spline: SmoothedSpli
             return
 
 
-def varying(t: Array, tests: list[tuple[float, list[int], float]], robust: bool = False) -> str | None:
-    """Describe what varies along a curve, from the results of both tests. Robust losses have no test of the noise."""
+def varying(
+    t: Array,
+    tests: list[tuple[float, list[int], float]],
+    robust: bool = False,
+    adapts: tuple[bool, bool] = (False, False),
+) -> str | None:
+    """Describe what varies along a curve, from the results of both tests. Robust losses have no test of the noise.
+
+    λ and σ that may vary are not tested.
+    """
     smoothness, noise = tests
     messages = []
     score, (first, last), ratio = smoothness
-    if score > _SMOOTHNESS and ratio > _FASTER:
+    if score > _SMOOTHNESS and ratio > _FASTER and not adapts[0]:
         # A robust loss may have selected a run of outliers.
         remedy = (
             ", or the curve follows outliers. Plot the data, and pass weights of 0 for outliers. If there are none, "
             "fit this part and the others separately"
             if robust
-            else ". The curve is too smooth there, and follows the noise elsewhere. Fit this part and the others "
-            "separately, or pass a smaller lam"
+            else ". The curve is too smooth there, and follows the noise elsewhere. Pass lam='adaptive'"
         )
         between = f"t = {short_repr(t[first])} and {short_repr(t[last])}"
         what = f"the motion is faster between {between} than one lam for the whole recording allows{remedy}"
         messages.append((score / _SMOOTHNESS, what))
     score, (first, last), _ = noise
-    if score > _NOISE and not robust:
+    if score > _NOISE and not robust and not adapts[1]:
         between = f"t = {short_repr(t[first])} and {short_repr(t[last])}"
         what = (
             f"the residuals are larger between {between} than elsewhere: the noise is larger there, or the curve does "
-            "not follow the motion. Pass weights= with the inverse variances of the data, loss='huber' if only some "
-            "data are worse, or a smaller lam"
+            "not follow the motion. Pass noise='adaptive' and lam='adaptive', weights= with the inverse variances of "
+            "the data, or loss='huber' if only some data are worse"
         )
         messages.append((score / _NOISE, what))
     return max(messages)[1] if messages else None

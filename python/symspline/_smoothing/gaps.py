@@ -28,6 +28,8 @@ from .solve import SmoothedSpline
 # A gap is long if the variance in its middle exceeds the first multiple of the median variance at the data, and its
 # length the second multiple of the median time step, so that sparse data have no gaps.
 _WIDE, _SPARSE = 4.0, 3.0
+# The same number if λ varies: in shorter gaps, λ is that of the data beside them.
+_SPARSE_IF_VARYING = 10.0
 # Largest number of entries of the frames that are computed in one call.
 _TOGETHER = 1 << 22
 # Data of a robust fit beyond this quantile of the noise do not count as evidence, as in the fit.
@@ -64,7 +66,7 @@ class Course(NamedTuple):
     order : int
         The order of the derivative that is penalised, 2 or 3.
     lam : float
-        Its weight λ.
+        Its weight λ; if that varies, the harmonic mean, which has the mean variance of the process.
     variance : callable
         Variance of a coordinate for noise of variance one, for times and the order of a derivative, 0 or 1.
     line : callable
@@ -121,6 +123,9 @@ class SensorEvidence(NamedTuple):
     line : list of ndarray
         Roots of the weights (n, q, m), and the curve and its velocity at the data in coordinates of frames along the
         curve, divided by the standard deviation of the noise. It is only needed beyond the data.
+    changes : tuple or None
+        If λ varies: its changes in segments where data are omitted, from which it would not be known, the accelerations
+        at the knots in the coordinates of the residuals, and the penalty.
     """
 
     knots: Doubles
@@ -136,6 +141,7 @@ class SensorEvidence(NamedTuple):
     pseudo: Doubles
     observed: Doubles
     line: list[Doubles]
+    changes: tuple[Doubles, Doubles, str] | None = None
 
     @property
     def linearised(self) -> _core._Linearised:
@@ -260,6 +266,7 @@ def calibrate(
     period: float,
     evidence: Callable[[], SensorEvidence],
     ends: bool = True,
+    sparse: float = _SPARSE,
 ) -> Calibration:
     """Find the long gaps of a curve and the factors of its standard deviations in them.
 
@@ -275,6 +282,8 @@ def calibrate(
         Function that returns the linearised data. It is called only if there are gaps, or for times beyond the data.
     ends : bool
         Whether variances beyond the data change as well. This needs the `line` of the evidence.
+    sparse : float
+        Shortest length of a long gap in median time steps.
 
     References
     ----------
@@ -295,7 +304,7 @@ def calibrate(
         return float(((apart.sum() - np.sum(lengths)) / weights.sum() * course.lam) ** (0.5 / course.order))
 
     width = width_without(apart[apart > 10 * usual])
-    candidates = np.flatnonzero(apart > max(2 * width, _SPARSE * usual))
+    candidates = np.flatnonzero(apart > max(2 * width, sparse * usual))
     long = candidates[:0]
     if len(candidates):
         middles = whole[candidates] + 0.5 * apart[candidates]
@@ -305,7 +314,8 @@ def calibrate(
     gaps = []
     if len(spans):
         data, turn = evidence(), period if closed else None
-        factors = _core.gap_factors(data.knots, data.known, data.linearised, spans.tolist(), width, at_data(0), turn)
+        known = data.knots, data.known, data.linearised
+        factors = _core.gap_factors(*known, spans.tolist(), width, at_data(0), turn, data.changes)
         gaps = [(float(start), float(stop), *factor) for (start, stop), factor in zip(spans, factors, strict=True)]
     if closed or not ends:
         return Calibration(course, gaps, at_data, width, period=period)
@@ -329,6 +339,9 @@ def calibration_of(spline: SmoothedSpline, number: int) -> Calibration | None:
     part = spline._smoothed[number]
     space = smoothed_spaces(spline.space)[number]
     lam, sigma = (float(np.asarray(value)) for value in (part.band_lam, part.sigma))
+    if part.profile is not None:
+        h = np.diff(spline._knots_of(()))
+        lam *= float(h.sum() / np.sum(h / part.profile))
     known = np.isfinite(part.report.lam) and part.report.converged
     usable = 0 < lam < np.inf and 0 < sigma < np.inf and bool(known)
     noise, times = spline._noisy.noise[number], spline._noisy.times
@@ -360,7 +373,8 @@ def calibration_of(spline: SmoothedSpline, number: int) -> Calibration | None:
         acceleration = float(np.mean((vectors / sigma) ** 2))
     course = Course(order, lam, variance, line, acceleration)
     period = float(knots[-1] - knots[0]) if is_closed(spline._bc_type) else np.nan
-    return calibrate(t, noise.weights[used], course, period, evidence)
+    sparse = _SPARSE if part.profile is None else _SPARSE_IF_VARYING
+    return calibrate(t, noise.weights[used], course, period, evidence, sparse=sparse)
 
 
 def _evidence(spline: SmoothedSpline, number: int, used: NDArray[np.intp], sigma: float) -> SensorEvidence:
@@ -396,9 +410,16 @@ def _evidence(spline: SmoothedSpline, number: int, used: NDArray[np.intp], sigma
     knots, kinds = spline._knots_of(()), end_kinds(spline._bc_type)
     firsts, factors = _core.coefficient_factors(knots, kinds, t, 0)
     rows = np.ascontiguousarray(np.einsum("nqc,nk->nqkc", roots, factors).reshape(n, roots.shape[1], -1))
+    changes = None
+    if part.profile is not None:
+        lam = float(np.asarray(part.band_lam)) * part.profile
+        h = np.diff(knots)
+        bends = np.ascontiguousarray(_coordinates(spline, number, knots, "acceleration") / sigma)
+        changes = np.ascontiguousarray(h.sum() / np.sum(h / lam) - lam), bends, part.penalty
     known, line = posterior.known((), kinds), [np.ascontiguousarray(x) for x in (roots, positions, velocities)]
     none = np.zeros((n, roots.shape[1], 0))
-    return SensorEvidence(knots, known, t, firsts, rows, none, whitened, counts, weights, m, pseudo, observed, line)
+    of_points = counts, weights, m, pseudo, observed, line
+    return SensorEvidence(knots, known, t, firsts, rows, none, whitened, *of_points, changes)
 
 
 def _soft(loss: str, squares: Doubles, m: int) -> Doubles:

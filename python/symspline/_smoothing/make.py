@@ -26,6 +26,7 @@ from .._base.typing import (
     Progress,
     SmoothingBCType,
     SmoothingMethod,
+    SmoothingNoise,
     SmoothingPenalty,
     TimesLike,
 )
@@ -42,13 +43,15 @@ from .audit import audit
 from .noise import (
     Part,
     SmoothingData,
+    at_times,
     checked_ends,
     grouped,
     join,
     parts_of,
     parts_of_factor,
-    per_part,
+    read_adaptive_noise,
     read_noisy,
+    read_smoothness,
     smoothed_spaces,
     valid_curves,
 )
@@ -117,6 +120,7 @@ def make_smoothing_spline(
     gamma: float = 1.2,
     penalty: SmoothingPenalty = "acceleration",
     sigma: Numbers | None = None,
+    noise: SmoothingNoise | tuple[SmoothingNoise, ...] = "constant",
     bc_type: SmoothingBCType | None = None,
     loss: Loss = "linear",
     method: SmoothingMethod = "auto",
@@ -146,11 +150,12 @@ def make_smoothing_spline(
         A space or its name. Points of `SpecialEuclidean` are smoothed as rotations and positions, each with its own λ
         and noise level, because rigid motions have no invariant metric. The curve is the spline of the space through
         the smoothed poses.
-    lam : float, array_like or tuple, optional
+    lam : float, "adaptive", array_like or tuple, optional
         Weight λ ≥ 0 of the penalty, in units of weight · time³, or weight · time⁵ for the jerk. With 0 the curve is as
-        close to the data as its knots allow; ``numpy.inf`` gives a geodesic, see Notes. For a batch also an array with
-        one value per curve; for products and poses also a tuple with one entry per part. By default `criterion`
-        chooses λ.
+        close to the data as its knots allow; ``numpy.inf`` gives a geodesic, see Notes. ``"adaptive"`` lets λ vary
+        along the curve if the data require it, for motion that rests and bursts; see Notes. For a batch also an array
+        with one value per curve; for products and poses also a tuple with one entry per part. An array with one more
+        axis has one value per segment between knots. By default `criterion` chooses λ.
     weights : array_like or tuple, optional
         Weights ≥ 0 of the data, shape (N,) or (..., N): the inverse variances of their noise up to a common factor.
         Points of weight 0 are ignored and may be NaN. Alternatively information matrices W, shape (N, m, m) or (...,
@@ -179,6 +184,9 @@ def make_smoothing_spline(
     sigma : float, array_like or tuple, optional
         Standard deviation of the noise in one coordinate for weight one, as a length in the space: radians on the unit
         sphere. Also an array with one value per curve, or a tuple for products and poses.
+    noise : {"constant", "adaptive"} or tuple, default "constant"
+        ``"adaptive"`` lets the standard deviation of the noise vary along the curve if the data require it, for sensors
+        that are quiet and noisy by turns. For products and poses also a tuple with one entry per part.
     bc_type : {"natural", "clamped", "periodic", "not-a-knot"} or pair, optional
         End conditions, or ``(1, velocity)`` at either end, as for `CubicSpline`. The default is ``"natural"``, and
         ``"not-a-knot"`` for the jerk, for which only this and ``"periodic"`` are available. Velocities must be tangent
@@ -232,7 +240,7 @@ def make_smoothing_spline(
         - The residuals are not those of independent noise: they are more than 1.75 times as large as the noise
           estimated from neighbouring data, they are correlated, there are outliers under least squares, or `sigma` is
           wrong. With a given λ, residuals are examined only if `sigma` is given.
-        - The motion or the noise varies along the recording.
+        - The motion or the noise varies along the recording, and `lam` or `noise` is not ``"adaptive"``.
         - A robust loss may have rejected the wrong data, or an outlier in a gap moves the curve.
         - Another curve may fit better, because the noise is large or consecutive data are far apart.
         - Many points are exact copies of the point before at a later time, as in a log that is faster than its sensor.
@@ -265,12 +273,23 @@ def make_smoothing_spline(
     Ends are natural and the penalty is the acceleration. Poses of `SpecialEuclidean` are regressed as rotations and
     positions, so that the curve passes through poses on a geodesic of ``"so:3 x r:3"`` at the times of the data.
 
+    With ``lam="adaptive"`` every segment has a λ of its own. Its logarithm is linear between up to 64 nodes and a
+    random walk there, whose variance is estimated as well. The restricted likelihood is maximised by Fisher scoring
+    from two starts, the λ that `criterion` chooses and one so small that every burst shows. λ varies only if this
+    increases twice the logarithm of the likelihood by more than 6, ``report.gain``; otherwise the result is that of one
+    λ. `criterion` then chooses the level. The same holds for σ with ``noise="adaptive"``. With both, the data decide
+    which of the two varies: each mistakes the other for itself. In gaps between data that are long, λ is the harmonic
+    mean, because nothing shows whether there was a burst. See `SmoothingSpline.lam_at` and `SmoothingSpline.sigma_at`.
+
     References
     ----------
     P. T. Fletcher, Geodesic regression and the theory of least squares on Riemannian manifolds, Int. J. Comput. Vis.
     105 (2013).
 
     P. Craven, G. Wahba, Smoothing noisy data with spline functions, Numer. Math. 31 (1979).
+
+    T. Krivobokova, C. M. Crainiceanu, G. Kauermann, Fast adaptive penalized splines, J. Comput. Graph. Statist. 17
+    (2008).
 
     C. Gu, Smoothing Spline ANOVA Models, 2nd ed., Springer (2013), Section 3.2.
 
@@ -303,7 +322,9 @@ def make_smoothing_spline(
     spaces = smoothed_spaces(space)
     whole, data, of_factors = read_noisy(t, points, space, spaces, weights, frames, sigma, loss, bc_type, atol)
     batch = whole.batch
-    lams = per_part(space, spaces, lam, "lam", batch, infinite=True)
+    smoothness = read_smoothness(space, spaces, lam, batch)
+    noise_adapts = read_adaptive_noise(space, spaces, noise)
+    lams = [given.lam for given in smoothness]
     has_infinite = np.isinf(lams).any()
     if has_infinite:
         for name, value, required in (("penalty", penalty, "acceleration"), ("bc_type", bc_type, "natural")):
@@ -323,9 +344,11 @@ def make_smoothing_spline(
     except ValidationError as error:
         raise with_remedy(error, data) from None
     if chosen is not None:
-        lams = [lam[chosen] for lam in lams]
-    parts = parts_of(noisy, space, spaces, lams, of_factors)
+        smoothness = [given.of_curves(chosen) for given in smoothness]
+        lams = [given.lam for given in smoothness]
+    parts = parts_of(noisy, space, spaces, smoothness, noise_adapts, of_factors)
     every = knots_for(whole, knots)
+    has_profile = check_profiles(parts, every, knots is None)
     if knots is None and penalty == "jerk":
         every = in_long_gaps(every, whole)
     for needs, what, remedy in (
@@ -338,12 +361,13 @@ def make_smoothing_spline(
     geodesics = lams[0].size > 0 and bool(np.isinf(lams).all())
     free = not geodesics and (knots is None or has_all_times(every, noisy))
 
-    def run(at: Knots, raise_lam: bool = False) -> list[SmoothCurves]:
+    def run(at: Knots, raise_lam: bool = False, adapt: bool = False) -> list[SmoothCurves]:
         if chosen is not None:
             at = at.of_curves(chosen)
         # There is nothing to choose between two knots.
         with_lam = parts if at.times.shape[-1] > 2 else [_with_lam(part, at) for part in parts]
-        return smoothed(with_lam, noisy, at, options._replace(raise_lam=raise_lam), free, progress)
+        how = options._replace(raise_lam=raise_lam)
+        return smoothed(with_lam, noisy, at, how, free, progress, adapt)
 
     def df_of_part(part: Part, rows: SmoothingData, at: Knots) -> Doubles:
         (result,) = smoothed([part], rows, at, options, free, None)
@@ -353,7 +377,7 @@ def make_smoothing_spline(
         at = geodesic_knots(every, space, lambda at: [result.points for result in run(at)])
         options = geodesic_options(space, options)
         results = run(at)
-    elif knots is None:
+    elif knots is None and not has_profile:
         results, at = with_enough_knots(every, noisy, parts, lams, run, df_of_part, penalty)
         fails = False
         for result in results:
@@ -361,9 +385,9 @@ def make_smoothing_spline(
         # Knots in gaps are tried before a larger λ, which would affect the whole curve.
         if fails:
             at = in_gaps(at, whole)
-            results = run(at, raise_lam=True)
+            results = run(at, raise_lam=True, adapt=True)
     else:
-        results, at = run(every), every
+        results, at = run(every, adapt=True), every
 
     faults_of_fit = faults_of(parts, results, noisy, at.times.shape[-1], options)
     whole, good = whole._replace(points=noisy.points), np.ones(batch, bool)
@@ -374,6 +398,7 @@ def make_smoothing_spline(
         whole = whole._replace(points=[spread(rows) for rows in noisy.points])
         parts = [part.map(spread, noise) for part, noise in zip(parts, whole.noise, strict=True)]
         faults_of_fit = [fault._replace(curve=int(chosen[fault.curve])) for fault in faults_of_fit]
+    parts, whole = with_adapted_noise(parts, whole, results, at)
     if has_infinite:
         results = [with_infinite_lam(result, part.lam, batch) for result, part in zip(results, parts, strict=True)]
     faults += faults_of_fit
@@ -393,6 +418,46 @@ def make_smoothing_spline(
     if not far_data:
         warn_of_far_points([fitted.curve], [fitted.columns])
     return spline
+
+
+def check_profiles(parts: list[Part], knots: Knots, all_times: bool) -> bool:
+    """Return whether λ of segments is given.
+
+    Raises
+    ------
+    ValidationError
+        If the number of segments differs from that of the knots.
+    """
+    segments, given = knots.times.shape[-1] - 1, False
+    for part in parts:
+        if part.profile is not None:
+            given = True
+            if part.profile.shape[-1] != segments:
+                which = "the times of the data, which are the knots," if all_times else "the knots"
+                raise ValidationError(
+                    f"lam has {part.profile.shape[-1]} numbers per curve, one per segment, but {which} have {segments} "
+                    "segments. To repeat a fit, pass knots=curve.t and lam=curve.lam_at(x) with the middles x of its "
+                    "segments."
+                )
+    return given
+
+
+def with_adapted_noise(
+    parts: list[Part], whole: SmoothingData, results: list[SmoothCurves], at: Knots
+) -> tuple[list[Part], SmoothingData]:
+    """Return the data with the noise that was found to vary along the curves."""
+    if all(result.smoothed.noise_profile is None for result in results):
+        return parts, whole
+    noise = []
+    for of_part, result in zip(whole.noise, results, strict=True):
+        profile = result.smoothed.noise_profile
+        if profile is not None:
+            # Masked curves have no profile.
+            of_part = of_part.divided(np.exp(at_times(at.times, np.nan_to_num(profile), whole.times)))
+        noise.append(of_part)
+    pairs = zip(parts, noise, strict=True)
+    parts = [part._replace(noise=of_part._replace(sigma=part.noise.sigma)) for part, of_part in pairs]
+    return parts, whole._replace(noise=noise)
 
 
 def _spline_through(

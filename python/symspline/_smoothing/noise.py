@@ -177,10 +177,27 @@ class Noise(NamedTuple):
         weights = function(self.weights) if self.weights.ndim > 1 else self.weights
         return self._replace(weights=weights, information=information)
 
+    def divided(self, variances: Doubles) -> Noise:
+        """Return the noise for variances of the data, shape (..., N), that multiply those of the weights."""
+        information = self.information
+        if information is not None:
+            information = information / variances[..., None, None]
+        return self._replace(weights=np.ascontiguousarray(self.weights / variances), information=information)
+
     def rows(self, index: NDArray[np.intp]) -> Noise:
         """Return the weights of some of the data of each curve."""
         information = None if self.information is None else np.take(self.information, index, axis=-3)
         return self._replace(weights=np.take(self.weights, index, axis=-1), information=information)
+
+
+def at_times(knots: Doubles, values: Doubles, times: Doubles) -> Doubles:
+    """Return functions that are linear between knots at times of each curve; all arrays are (n,) or (..., n)."""
+    batch = np.broadcast_shapes(knots.shape[:-1], values.shape[:-1], times.shape[:-1])
+    knots, values, times = (np.broadcast_to(x, (*batch, x.shape[-1])) for x in (knots, values, times))
+    out = np.empty(times.shape)
+    for index in np.ndindex(batch):
+        out[index] = np.interp(times[index], knots[index], values[index])
+    return out
 
 
 def read_precision(weights: Numbers | None, frames: Numbers | None, space: Space, data: list[Points]) -> list[Noise]:
@@ -409,16 +426,81 @@ def per_part(
     """
     if value is None:
         return [np.full(math.prod(batch), np.nan)] * len(spaces)
-    values = [value]
-    if isinstance(value, tuple) and is_several(space):
-        if len(value) != len(spaces):
+    if not (isinstance(value, tuple) and is_several(space)):
+        return [_one_per_curve(value, name, batch, infinite)] * len(spaces)
+    return [_one_per_curve(entry, name, batch, infinite) for entry in _entries(space, spaces, value, name)]
+
+
+def _entries(space: Space, spaces: tuple[Space, ...], value: Any, name: str) -> list[Any]:
+    """Return the entries of an argument: those of a tuple, or the same for every smoothed space."""
+    if not (isinstance(value, tuple) and is_several(space)):
+        return [value] * len(spaces)
+    if len(value) != len(spaces):
+        raise ValidationError(
+            f"`{name}` has {len(value)} entries, but there are {len(spaces)} parts to smooth: "
+            f"{', '.join(map(repr, spaces))}. Pass one entry per part."
+        )
+    return list(value)
+
+
+class Smoothness(NamedTuple):
+    """How much the data in one of the smoothed spaces are smoothed.
+
+    Attributes
+    ----------
+    lam : ndarray, shape (curves,)
+        λ, infinite for geodesics and NaN where it is chosen.
+    profile : ndarray or None, shape (K - 1,) or (curves, K - 1)
+        Given λ of the segments, divided by `lam`; None for one λ.
+    adapts : bool
+        Whether λ varies along the curve if the data require it.
+    """
+
+    lam: Doubles
+    profile: Doubles | None = None
+    adapts: bool = False
+
+    def of_curves(self, chosen: NDArray[np.intp]) -> Smoothness:
+        """Return the same for some curves of a batch."""
+        profile = None if self.profile is None else np.ascontiguousarray(self.profile[chosen])
+        return self._replace(lam=self.lam[chosen], profile=profile)
+
+
+def read_smoothness(space: Space, spaces: tuple[Space, ...], lam: Any, batch: tuple[int, ...]) -> list[Smoothness]:
+    """Return the argument `lam` for each of the smoothed spaces.
+
+    Raises
+    ------
+    ValidationError
+        If it is not None, a number >= 0, "adaptive", an array with one number per curve or per segment of each curve,
+        or for products and poses a tuple of these.
+    """
+    given = []
+    for entry in _entries(space, spaces, lam, "lam"):
+        if isinstance(entry, str):
+            if entry != "adaptive":
+                raise ValidationError(f"lam must be a number, an array or 'adaptive', not {short_repr(entry)}")
+            given.append(Smoothness(np.full(math.prod(batch), np.nan), adapts=True))
+            continue
+        array = np.asarray(entry)
+        if entry is None or array.dtype.kind not in "iuf" or array.ndim != len(batch) + 1:
+            given.append(Smoothness(_one_per_curve(entry, "lam", batch, True)))
+            continue
+        if array.shape[:-1] != batch or not array.shape[-1]:
             raise ValidationError(
-                f"`{name}` has {len(value)} entries, but there are {len(spaces)} parts to smooth: "
-                f"{', '.join(map(repr, spaces))}. Pass one entry per part."
+                f"lam has shape {array.shape}, but {(*batch, 'K - 1')} is needed for one number per segment"
             )
-        values = list(value)
-    arrays = [_one_per_curve(one, name, batch, infinite) for one in values]
-    return arrays if len(arrays) == len(spaces) else arrays * len(spaces)
+        refuse(~((array > 0) & np.isfinite(array)), "lam", lambda i: "must be finite and > 0 in every segment")
+        logarithms = np.log(array.reshape(-1, array.shape[-1]).astype(np.float64))
+        mean = logarithms.mean(axis=-1)
+        given.append(Smoothness(np.exp(mean), np.ascontiguousarray(np.exp(logarithms - mean[:, None]))))
+    return given
+
+
+def read_adaptive_noise(space: Space, spaces: tuple[Space, ...], noise: Any) -> list[bool]:
+    """Return for each of the smoothed spaces whether the noise varies along the curve if the data require it."""
+    entries = _entries(space, spaces, noise, "noise")
+    return [one_of(entry, "noise", "constant", "adaptive") == "adaptive" for entry in entries]
 
 
 def _one_per_curve(value: Any, name: str, batch: tuple[int, ...], infinite: bool) -> Doubles:
@@ -676,6 +758,10 @@ class Part(NamedTuple):
         λ, infinite for geodesics and NaN where it is chosen.
     ends : list of End or None
         End conditions; None for closed curves.
+    profile : ndarray or None, shape (curves, K - 1)
+        Given λ of the segments, divided by `lam`.
+    adapts : tuple of bool
+        Whether λ and σ vary along the curve if the data require it.
     """
 
     space: Space
@@ -683,6 +769,8 @@ class Part(NamedTuple):
     noise: Noise
     lam: Doubles
     ends: list[End] | None
+    profile: Doubles | None = None
+    adapts: tuple[bool, bool] = (False, False)
 
     @property
     def axis(self) -> int:
@@ -692,21 +780,34 @@ class Part(NamedTuple):
     def map(self, function: Callable[[Array], Array], noise: Noise) -> Part:
         """Apply a function to the arrays, such as one that adds masked curves, and replace the noise."""
         ends = map_ends(self.ends, function)
-        return Part(self.space, function(self.points), noise, function(self.lam), ends)
+        return self._replace(points=function(self.points), noise=noise, lam=function(self.lam), ends=ends)
 
     def rows(self, index: NDArray[np.intp]) -> Part:
         """Return some of the data of each curve, with natural ends."""
         points, noise = np.take(self.points, index, axis=self.axis), self.noise.rows(index)
-        return self._replace(points=points, noise=noise, ends=NATURAL)
+        return self._replace(points=points, noise=noise, ends=NATURAL, adapts=(False, False))
 
 
 def parts_of(
-    noisy: SmoothingData, space: Space, spaces: tuple[Space, ...], lams: list[Doubles], ends: Ends
+    noisy: SmoothingData,
+    space: Space,
+    spaces: tuple[Space, ...],
+    smoothness: list[Smoothness],
+    adapts: list[bool],
+    ends: Ends,
 ) -> list[Part]:
-    """Return the data in every space in which they are smoothed, with their λ and the end conditions of the factors."""
+    """Return the data in every space in which they are smoothed, with the end conditions of the factors.
+
+    The noise may vary in the spaces where `adapts` is True.
+    """
     arrays: list[Array] = []
     conditions: list[list[End] | None] = []
     for factor, points, of_factor in zip(factors_of(space), noisy.points, ends, strict=True):
         arrays += split(factor, points)
         conditions += split_end_vectors(factor, of_factor)
-    return list(map(Part, spaces, arrays, noisy.noise, lams, conditions))
+    return [
+        Part(space_of_part, points, noise, given.lam, ends_of_part, given.profile, (given.adapts, noise_adapts))
+        for space_of_part, points, noise, given, noise_adapts, ends_of_part in zip(
+            spaces, arrays, noisy.noise, smoothness, adapts, conditions, strict=True
+        )
+    ]

@@ -62,6 +62,9 @@ class SmoothingReport(FitReport):
     sigma : float or ndarray
         Estimated standard deviation of the noise in one coordinate, for weight one. For `estimate` with given standard
         deviations, the ratio of the residuals and these.
+    gain : float, ndarray or None
+        Increase of twice the logarithm of the restricted likelihood if λ or σ varies. It is accepted if it exceeds 6
+        for each of the functions that vary. None if it was not asked for, see `make_smoothing_spline`.
 
     See Also
     --------
@@ -87,6 +90,7 @@ class SmoothingReport(FitReport):
     at_bound: bool | NDArray[np.bool_] = field(metadata=BOOL)
     df: Number = field(metadata=FLOAT)
     sigma: Number = field(metadata=FLOAT)
+    gain: Number | None = field(default=None, metadata=FLOAT | {"optional": True})
 
     def __str__(self) -> str:
         good = np.asarray(self.converged)
@@ -281,6 +285,7 @@ def process_ratio(
     knots: Doubles,
     band: Doubles | None,
     lam: float,
+    profile: Doubles | None,
     kinds: Kinds,
     x: Doubles,
     nu: int,
@@ -300,6 +305,8 @@ def process_ratio(
         Band of A⁻¹. None if coordinates are coupled; the ratio is then that of uncoupled coordinates.
     lam : float
         Weight of the penalty.
+    profile : ndarray or None, shape (knots - 1,)
+        Factors of λ in the segments.
     kinds : list of str or None
         Kinds of the ends; None for a closed curve.
     x : ndarray, shape (n,)
@@ -312,7 +319,8 @@ def process_ratio(
     if not (lam > 0 and np.isfinite(lam)):
         return np.ones(len(x))
     if band is None:
-        band = _core.smoothing_inverse(knots, times, weights, lam, "jerk", kinds).reshape(-1, 4)
+        band = _core.smoothing_inverse(knots, times, weights, lam, profile, "jerk", kinds).reshape(-1, 4)
     period = knots[-1] - knots[0] if kinds is None else None
-    spline = _core.smoothing_variance(knots, np.ascontiguousarray(band), np.zeros(1), x, nu, kinds)
-    return np.asarray(_core.process_variance(times, weights, lam, period, x, nu) / spline)
+    spline = _core.smoothing_variance(knots, np.ascontiguousarray(band), np.zeros(1), None, x, nu, kinds)
+    factors = None if profile is None else [knots, profile]
+    return np.asarray(_core.process_variance(times, weights, lam, factors, period, x, nu) / spline)

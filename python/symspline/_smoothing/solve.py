@@ -233,11 +233,15 @@ def with_enough_knots(
     noisy: SmoothingData,
     parts: list[Part],
     lams: list[Doubles],
-    run: Callable[[Knots], list[SmoothCurves]],
+    run: Callable[..., list[SmoothCurves]],
     df_of_part: DfOfPart,
     penalty: str,
 ) -> tuple[list[SmoothCurves], Knots]:
-    """Fit with as many knots as λ and the degrees of freedom require, and return the results and the knots."""
+    """Fit with as many knots as λ and the degrees of freedom require, and return the results and the knots.
+
+    If λ or σ may vary, the knots are those of a fit with one λ, but at least as many as the liveliest part requires.
+    """
+    adapts = any(any(part.adapts) for part in parts)
     given = _of_all(np.concatenate(lams)) if np.isfinite(lams).all() else None
     power, coarser = (3 if penalty == "acceleration" else 5), 1.0
     at = merge_close_knots(whole, noisy, given, power)
@@ -263,9 +267,15 @@ def with_enough_knots(
             break
         # A stiff curve needs fewer knots than it had, and a rough curve more.
         better = thin_knots(apart, max(_FIRST, 2 * enough)) if most > max(_MANY, 2 * enough) else apart
-        if np.array_equal(better.times, at.times):
+        if np.array_equal(better.times, at.times) or (adapts and better.times.shape[-1] <= count):
             break
         at = better
+    if adapts:
+        results = run(at, adapt=True)
+        enough = _n_knots_for_df(np.concatenate([np.ravel(result.smoothed.report.df) for result in results]))
+        if at.times.shape[-1] < min(enough, apart.times.shape[-1]):
+            at = thin_knots(apart, 2 * enough)
+            results = run(at, adapt=True)
     return results, at
 
 
@@ -451,6 +461,10 @@ class Smoothed(NamedTuple):
         curve is then the mean of a process. With other knots it is a spline, which has no such freedom.
     penalty : str
         Penalty of the fit.
+    profile : ndarray or None, shape (..., K - 1)
+        λ of the segments divided by λ of the report, their geometric mean; None for one λ.
+    noise_profile : ndarray or None, shape (..., K)
+        ln σ² at the knots minus that of `sigma`, linear between them; None for one σ.
     """
 
     report: SmoothingReport
@@ -460,6 +474,8 @@ class Smoothed(NamedTuple):
     between: bool
     posterior: Posterior | None = None
     penalty: str = "acceleration"
+    profile: Doubles | None = None
+    noise_profile: Doubles | None = None
 
     def map(self, function: Callable[[Any], Any]) -> Smoothed:
         """Apply a function to all arrays, such as the selection of some curves."""
@@ -469,7 +485,13 @@ class Smoothed(NamedTuple):
             band_lam=function(self.band_lam),
             sigma=function(self.sigma),
             posterior=self.posterior and self.posterior.map(function),
+            profile=None if self.profile is None else function(self.profile),
+            noise_profile=None if self.noise_profile is None else function(self.noise_profile),
         )
+
+    def profile_of(self, index: tuple[int, ...]) -> Doubles | None:
+        """Return λ of the segments of one curve divided by λ."""
+        return None if self.profile is None else np.ascontiguousarray(self.profile[index])
 
 
 class SmoothedSpline(Protocol):
@@ -541,8 +563,12 @@ def smoothed(
     options: SolverOptions,
     between: bool,
     progress: Progress | None,
+    adapt: bool = False,
 ) -> list[SmoothCurves]:
-    """Compute the points of smooth curves at the knots in every space in which data are smoothed."""
+    """Compute the points of smooth curves at the knots in every space in which data are smoothed.
+
+    λ and σ vary where the parts allow it, but only if `adapt` is True.
+    """
     batch, t, at = noisy.batch, np.ascontiguousarray(noisy.times), np.ascontiguousarray(knots.times)
     how = *options[:3], parts[0].noise.loss, *options[3:], progress
     inside, factors = [], []
@@ -556,7 +582,10 @@ def smoothed(
         points = np.ascontiguousarray(points)
         inside.append((small, points, span))
         factors.append(
-            (small._handle, small._as_doubles(points), noise.weights, matrices, part.lam, noise.sigma, ends, None)
+            (
+                *(small._handle, small._as_doubles(points), noise.weights, matrices, part.lam, noise.sigma, ends),
+                *(None, part.profile, (False, False)),
+            )
         )
     results = []
     for part, (small, points, span), factor, raw in zip(
@@ -564,10 +593,13 @@ def smoothed(
     ):
 
         def solve(lam: Doubles, start: Doubles, factor: _core._Smoothable = factor) -> Raw:
-            return Raw.of(_core.smooth([(*factor[:4], lam, *factor[5:7], start)], t, at, *how)[0])
+            return Raw.of(_core.smooth([(*factor[:4], lam, *factor[5:7], start, *factor[8:])], t, at, *how)[0])
 
         samples = Samples(t, points, part.noise.weights, at, len(small._point_shape), part.ends is None)
         best, minima = best_of_starts(small, samples, part.lam, Raw.of(raw), solve)
+        if adapt and any(part.adapts) and at.shape[-1] > 2:
+            varying = (*factor[:7], np.ascontiguousarray(best.points), part.profile, part.adapts)
+            best = Raw.of(_core.smooth([varying], t, at, *how)[0])
         results.append(_smooth_curves(part, noisy, options, between, small, span, best, minima))
     return results
 
@@ -589,12 +621,18 @@ def _smooth_curves(
     state, iterations, lam, band_lam, at_bound, df, estimated, step, rate, _, exact, _, _, _, scale = shaped
     selection, rejected = raw.columns.selection.reshape(batch), raw.columns.rejected.reshape(batch)
     method = METHODS[int(np.any(exact))]
-    report = SmoothingReport(method, state == 0, iterations, step, rate, lam, at_bound, df, estimated)
+    profile, noise_profile, gains = raw.profiles or (part.profile, None, None)
+    if profile is not None:
+        profile = profile.reshape(*batch, -1) if np.any(profile != 1) else None
+    if noise_profile is not None and not noise_profile.any():
+        noise_profile = None
+    gain = gains if batch or gains is None else gains.item()
+    report = SmoothingReport(method, state == 0, iterations, step, rate, lam, at_bound, df, estimated, gain)
     numbers = small._numbers(raw.points)
     matrix, turn, size = raw.system
     # Coordinates in a span of lower dimension are not those of the space.
     posterior = Posterior.of(matrix, turn, size) if span is None or size == 1 else None
-    result = Smoothed(report, raw.band, band_lam, scale, between, posterior, options.penalty)
+    result = Smoothed(report, raw.band, band_lam, scale, between, posterior, options.penalty, profile, noise_profile)
     points = numbers if span is None else span.embed(numbers)
     return SmoothCurves(points, result, raw.columns.state, selection, rejected, minima.reshape(batch))
 
@@ -698,18 +736,22 @@ class Columns(NamedTuple):
 
 
 class Raw(NamedTuple):
-    """Results of the core for a batch of curves: points at the knots, the band of A⁻¹, columns of the report, A."""
+    """Results of the core for a batch of curves: points at the knots, the band of A⁻¹, columns of the report, A.
+
+    If λ or σ may vary, `profiles` has λ of the segments and ln σ² at the knots, and the gains.
+    """
 
     points: Doubles
     band: Doubles
     columns: Columns
     system: tuple[Doubles, Doubles, int]
+    profiles: list[Doubles] | None = None
 
     @classmethod
-    def of(cls, result: tuple[Doubles, Doubles, tuple[Array, ...], tuple[Doubles, Doubles, int]]) -> Raw:
+    def of(cls, result: _core._SmoothResult) -> Raw:
         """Return the results of one call of the core."""
-        points, band, columns, system = result
-        return cls(points, band, Columns(*columns), system)
+        points, band, columns, system, profiles = result
+        return cls(points, band, Columns(*columns), system, profiles)
 
     @property
     def converged(self) -> NDArray[np.bool_]:
@@ -918,6 +960,6 @@ def _linear(space: Space, data: Samples, points: Doubles, lam: Doubles) -> Doubl
     """Return the points at the knots of a curve that is smoothed by least squares; None if it does not exist."""
     sigma, closed = np.full(lam.size, np.nan), None if data.closed else [("natural", None)] * 2
     options = "gcv", 1.4, "acceleration", "linear", "auto", 1e-2, 50, False
-    factor = space._handle, points, data.weights, None, lam, sigma, closed, None
+    factor = space._handle, points, data.weights, None, lam, sigma, closed, None, None, (False, False)
     smooth = _core.smooth([factor], data.times, data.knots, *options, None)[0][0]
     return smooth if np.isfinite(smooth).all() else None

@@ -167,6 +167,109 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         """
         return self._per_space([part.sigma for part in self._smoothed])
 
+    @noise_method
+    def lam_at(self, x: TimesLike) -> FloatArray | tuple[FloatArray, ...]:
+        """Return the weight λ of the bending energy at some times.
+
+        Parameters
+        ----------
+        x : array_like of float or datetime64
+            Times, of any shape. Beyond the knots, λ is that of the first or the last segment, or repeats if the curve
+            is closed.
+
+        Returns
+        -------
+        ndarray, float or tuple, shape ``(*batch axes, *x.shape)``
+            Weights of the segments at these times, for products and poses a tuple with one entry per part. `lam` is
+            their geometric mean.
+
+        Raises
+        ------
+        ValidationError
+            If a time is not finite.
+
+        See Also
+        --------
+        SmoothingSpline.sigma_at : Return the standard deviation of the noise at some times.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import symspline as ss
+        >>> t = np.linspace(0, 60, 600)
+        >>> y = np.exp(-((t - 30) ** 2) / 4) * np.sin(6 * t) + 0.05 * np.random.default_rng(0).standard_normal(600)
+        >>> s = ss.make_smoothing_spline(t, y[:, None], "r:1", lam="adaptive")
+        >>> bool(s.lam_at(10.0) > 100 * s.lam_at(30.0)), bool(s.report.gain > 6)
+        (True, True)
+        """
+        times, _, per_curve = self._finite_times(x)
+
+        def lam(number: int, index: Index, at: Doubles) -> Doubles:
+            part, knots = self._smoothed[number], self._knots_of(index)
+            mean = np.full(at.shape, np.asarray(part.report.lam)[index])
+            profile = part.profile_of(index)
+            return (
+                mean
+                if profile is None
+                else mean * profile[np.searchsorted(knots[1:-1], self._turned(knots, at), "right")]
+            )
+
+        return self._per_space(
+            [self._per_curve(times, per_curve, partial(lam, number))[()] for number in range(len(self._smoothed))]
+        )
+
+    @noise_method
+    def sigma_at(self, x: TimesLike) -> FloatArray | tuple[FloatArray, ...]:
+        """Return the standard deviation of the noise in one coordinate at some times.
+
+        Parameters
+        ----------
+        x : array_like of float or datetime64
+            Times, of any shape. Beyond the knots, it is that at the first or the last knot, or repeats if the curve is
+            closed.
+
+        Returns
+        -------
+        ndarray, float or tuple, shape ``(*batch axes, *x.shape)``
+            Standard deviations for the weight one that was passed to `make_smoothing_spline`, for products and poses a
+            tuple with one entry per part. `sigma` is the geometric mean over the data.
+
+        Raises
+        ------
+        ValidationError
+            If a time is not finite.
+
+        See Also
+        --------
+        SmoothingSpline.lam_at : Return the weight of the bending energy at some times.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import symspline as ss
+        >>> t = np.linspace(0, 60, 600)
+        >>> noise = np.where((t > 20) & (t < 40), 0.2, 0.04) * np.random.default_rng(0).standard_normal(600)
+        >>> s = ss.make_smoothing_spline(t, (np.sin(t) + noise)[:, None], "r:1", noise="adaptive")
+        >>> s.sigma_at([5.0, 30.0]).round(2)
+        array([0.04, 0.21])
+        """
+        times, _, per_curve = self._finite_times(x)
+
+        def sigma(number: int, index: Index, at: Doubles) -> Doubles:
+            part, knots = self._smoothed[number], self._knots_of(index)
+            mean = np.full(at.shape, np.asarray(part.sigma)[index])
+            if part.noise_profile is not None:
+                mean *= np.exp(0.5 * np.interp(self._turned(knots, at), knots, part.noise_profile[index]))
+            return mean
+
+        return self._per_space(
+            [self._per_curve(times, per_curve, partial(sigma, number))[()] for number in range(len(self._smoothed))]
+        )
+
+    def _turned(self, knots: Doubles, x: Doubles) -> Doubles:
+        """Return times of a closed curve within its period."""
+        return knots[0] + np.mod(x - knots[0], knots[-1] - knots[0]) if is_closed(self._bc_type) else x
+
     @property
     def parameters(self) -> Mapping[str, Parameter]:
         """Unknown constants that `estimate` found, by name, each with ``value``, ``std`` and ``cov``."""
@@ -404,7 +507,8 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         is_jerk = part.penalty == "jerk"
         lam = np.atleast_1d(np.asarray(part.band_lam)[index]) if part.between and not is_jerk else np.zeros(1)
         band, x = np.ascontiguousarray(part.band[index]), np.ascontiguousarray(x)
-        variance = _core.smoothing_variance(knots, band, lam, x, nu, end_kinds(self._bc_type))
+        profile = part.profile_of(index)
+        variance = _core.smoothing_variance(knots, band, lam, profile, x, nu, end_kinds(self._bc_type))
         if part.between and is_jerk:
             variance = variance * self._ratio(number, index, x, nu)
         return np.asarray(sigma * np.sqrt(variance))
@@ -417,7 +521,8 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         coupled = part.posterior is not None and part.posterior.size > 1
         band = None if coupled else part.band[index]
         lam = np.asarray(part.band_lam)[index].item()
-        return process_ratio(times, weights, self._knots_of(index), band, lam, end_kinds(self._bc_type), x, nu)
+        knots, kinds = self._knots_of(index), end_kinds(self._bc_type)
+        return process_ratio(times, weights, knots, band, lam, part.profile_of(index), kinds, x, nu)
 
     @noise_method
     def band(
@@ -592,7 +697,10 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
                 covariance[:, i] *= root
                 covariance[:, :, :, i] *= root
                 continue
-            process, plain = (_core.smoothing_variance(knots, band, w, x, nu, kinds) for w in (lam, np.zeros(1)))
+            profile = part.profile_of(index)
+            process, plain = (
+                _core.smoothing_variance(knots, band, w, profile, x, nu, kinds) for w in (lam, np.zeros(1))
+            )
             covariance[:, i, :, i] += (process - plain)[:, None, None] * np.eye(covariance.shape[-1])
 
     def _coupled(self, parts: list[int], index: Index, x: Doubles, orders: list[int]) -> Doubles:
@@ -925,6 +1033,9 @@ def noise_state(space: AnySpace, noisy: SmoothingData, smoothed: list[Smoothed])
             state["data_weights" + suffix] = noise.weights
         if noise.information is not None:
             state["data_information" + suffix] = noise.information
+        for name, profile in (("profile", of_part.profile), ("noise_profile", of_part.noise_profile)):
+            if profile is not None:
+                state[name + suffix] = profile
     return state
 
 
@@ -1010,7 +1121,11 @@ def read_noise(
             posterior = None
             if known:
                 posterior = read_posterior(state, suffix, space_of_part.dim, band.shape[-2], batch, closed, good)
-            smoothed.append(Smoothed(report, band, lam, scale, between, posterior, penalty))
+            profile, noise_profile = (state.get(name + suffix) for name in ("profile", "noise_profile"))
+            for array, size in ((profile, knots - 1), (noise_profile, knots)):
+                if array is not None:
+                    _check("profiles", array, (*batch, size), finite=good)
+            smoothed.append(Smoothed(report, band, lam, scale, between, posterior, penalty, profile, noise_profile))
     return SmoothingData(time_axis, t, times, points, noise, batch), smoothed
 
 

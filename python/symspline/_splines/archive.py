@@ -43,8 +43,8 @@ _JSON = (
     *("plain", "gaps"),
 )
 _ARRAY = re.compile(
-    r"(?:version|t|data_t|knots|axis_\d{1,2})|(?:points|velocities|control_points|data|data_weights|data_information|band|matrix|turn|side|corner|variance)"
-    r"(?:_\d{1,9})?"
+    r"(?:version|t|data_t|knots|axis_\d{1,2})|(?:points|velocities|control_points|data|data_weights|data_information"
+    r"|band|matrix|turn|side|corner|variance|profile|noise_profile)(?:_\d{1,9})?"
 )
 # At most four levels of curves that are made of others.
 _PART = re.compile(r"(?:\d{1,6}/){1,4}")
@@ -453,7 +453,9 @@ def read_report(kind: type[_Report], plain: Any, batch: tuple[int, ...]) -> _Rep
     known = {field.name: field.metadata for field in fields(kind)}  # type: ignore[arg-type]
     if unknown := set(plain) - set(known) - _FORMER:
         raise ValidationError(f"there is no field {short_repr(min(unknown))}")
-    return kind(**{name: read_field(name, plain[name], batch, **field) for name, field in known.items()})
+    # Files of older versions do not have all of the optional fields.
+    given = {name: plain.get(name) if field.get("optional") else plain[name] for name, field in known.items()}
+    return kind(**{name: read_field(name, given[name], batch, **field) for name, field in known.items()})
 
 
 def read_field(

@@ -1,0 +1,717 @@
+//! Smoothing λ(t) and noise σ(t) that vary along a curve.
+//!
+//! The penalty is Σ λ_g |…|² with one λ per segment. ln λ is linear between a few nodes, and so is ln σ². At the nodes,
+//! both are random walks, whose steps have a variance τ² that is estimated as well, so that there is no tuning parameter.
+//! The restricted likelihood is maximised by Fisher scoring, in the linearised problem at a curve. For a node with the
+//! hat function N, the energies E_g = λ_g|s_g c|² and d_g = (K − p)/S − λ_g s_gᵀA⁻¹s_g, the local degrees of freedom of the
+//! process, its gradient with respect to ln λ is `(m/2) Σ N (d_g − E_g/(mσ²))`. That with respect to ln σ² is the same with
+//! squared residuals and `1 − h`, with the leverages h of the data.
+//!
+//! One start is not enough: where one λ takes a burst for noise, the curve of this λ does not show the burst. The second
+//! start is so rough that it shows every burst. The better result is taken if its likelihood is sufficiently larger than
+//! that of one λ; otherwise λ does not vary.
+//!
+//! Others estimate a few free values (Wood 2011; Rodríguez-Álvarez et al. 2019) or a spline with a penalty (Krivobokova et
+//! al. 2008).
+
+use crate::choice::Linear;
+use crate::cyclic::PeriodicCorrection;
+use crate::linearized::{LinearProblem, Stencil, of_segment};
+use crate::misfit::{Misfit, of_each};
+use crate::path::{Position, positions};
+use crate::problem::{Adapt, Criterion, Penalty};
+use std::borrow::Cow;
+use symspline_core::monitor::checkpoint;
+use symspline_core::scalar::{LANES, Lane, few, lane};
+
+/// Twice the logarithm of the likelihood must increase by more than this for each function that varies.
+const GAIN: f64 = 6.0;
+/// The standard deviations of a step between nodes with which the two starts begin.
+const STEPS: [f64; 2] = [0.5, 2.0];
+/// Scoring steps with nodes at equal numbers of data, and with nodes at equal degrees of freedom; changes that end them, and
+/// the largest change of a step.
+const ROUNDS: [usize; 2] = [8, 12];
+const SETTLED: f64 = 0.05;
+const LONGEST: f64 = 2.5;
+/// Data per node, and the smallest and largest number of intervals between nodes; likewise for degrees of freedom.
+const DATA: (f64, f64, f64) = (8.0, 4.0, 64.0);
+const FREEDOM: (f64, f64, f64) = (3.0, 8.0, 64.0);
+/// The range of ln λ around the start.
+const RANGE: f64 = 25.0;
+/// The least variance of a step between nodes.
+const LEAST_STEP: f64 = 1e-6;
+/// Gaps longer than this multiple of the width of the smoother, and of the median time step, are long. There, λ is the
+/// harmonic mean: that of two rests would promise another rest. Random times hardly ever have longer gaps than ten steps.
+const GAP: (f64, f64) = (3.3, 10.0);
+const GAP_OF_JERK: f64 = 3.0;
+
+/// A curve with one λ, linearised.
+pub struct Adaptive<'a> {
+    /// The problem with one λ for all segments.
+    pub linearized: &'a LinearProblem,
+    /// The dimension of the space.
+    pub m: usize,
+    /// Residuals, and their weights for one noise level.
+    pub misfit: &'a Misfit<'a>,
+    /// The weight of a coordinate of each datum.
+    pub weights: &'a [f64],
+    /// The positions of the data.
+    pub positions: &'a [Position],
+    /// The periodic continuation of a closed curve.
+    pub periodic: Option<&'a PeriodicCorrection>,
+    /// Accelerations at the knots.
+    pub accelerations: &'a [f64],
+    /// λ of every segment, and the largest λ that may be chosen.
+    pub lam: &'a [f64],
+    /// See `lam`.
+    pub stiffest: f64,
+    /// Whether λ was given.
+    pub given: bool,
+}
+
+/// How λ and σ vary.
+#[derive(Clone, Debug)]
+pub struct Profile {
+    /// The increase of twice the logarithm of the likelihood by the functions that vary, or that by the best functions if
+    /// none of them was accepted.
+    pub gain: f64,
+    /// λ of every segment divided by their geometric mean; empty for one λ.
+    pub lam: Vec<f64>,
+    /// ln σ² at every knot, with the mean zero over the data; empty for one σ.
+    pub noise: Vec<f64>,
+}
+
+/// Nodes at some of the knots, and hat functions: the nodes before segments and data, and their shares in the next one.
+#[derive(Clone, Default)]
+struct Nodes {
+    knots: Vec<usize>,
+    of_segments: Vec<(usize, f64)>,
+    of_data: Vec<(usize, f64)>,
+}
+
+impl Nodes {
+    fn new(knots: Vec<usize>, problem: &Adaptive) -> Self {
+        let basis = &problem.linearized.basis;
+        let hat = |segment: usize, s: f64| {
+            let j = knots.partition_point(|knot| *knot <= segment) - 1;
+            let length = |from: usize, to: usize| (from..to).map(|i| basis.h(i)).sum::<f64>();
+            let before = length(knots[j], segment) + s * basis.h(segment);
+            (j, before / length(knots[j], knots[j + 1]))
+        };
+        let of_segments = (0..basis.knots() - 1).map(|i| hat(i, 0.5)).collect();
+        let of_data = problem.positions.iter().map(|&(segment, s)| hat(segment, s)).collect();
+        Nodes { knots, of_segments, of_data }
+    }
+
+    fn sums(&self, hats: &[(usize, f64)], values: impl Iterator<Item = f64>) -> Vec<f64> {
+        let mut sums = vec![0.0; self.knots.len()];
+        for ((j, share), x) in hats.iter().zip(values) {
+            sums[*j] += (1.0 - share) * x;
+            sums[*j + 1] += share * x;
+        }
+        sums
+    }
+}
+
+/// The values on the segments between other knots: those at their middles.
+pub fn on_segments(knots: &[f64], values: &[f64], others: &[f64]) -> Vec<f64> {
+    let at = |t: f64| values[knots.partition_point(|knot| *knot <= t).clamp(1, values.len()) - 1];
+    others.windows(2).map(|ends| at(0.5 * (ends[0] + ends[1]))).collect()
+}
+
+/// Values at knots, interpolated linearly at other times, and constant beyond them.
+pub fn at_times(knots: &[f64], values: &[f64], times: &[f64]) -> Vec<f64> {
+    let value = |&(segment, s): &Position| at(values, &(segment, s));
+    positions(knots, times).iter().map(value).collect()
+}
+
+impl Profile {
+    /// The same for other knots.
+    pub fn at_knots(&self, knots: &[f64], others: &[f64]) -> Self {
+        let lam = if self.lam.is_empty() { Vec::new() } else { on_segments(knots, &self.lam, others) };
+        let noise = if self.noise.is_empty() { Vec::new() } else { at_times(knots, &self.noise, others) };
+        Profile { gain: self.gain, lam, noise }
+    }
+
+    /// Whether λ or σ varies.
+    pub fn varies(&self) -> bool {
+        !(self.lam.is_empty() && self.noise.is_empty())
+    }
+}
+
+fn at(values: &[f64], &(j, share): &(usize, f64)) -> f64 {
+    (1.0 - share) * values[j] + share * values[j + 1]
+}
+
+/// A function at the nodes, and the variance of its steps.
+#[derive(Clone, Default)]
+struct Walk {
+    x: Vec<f64>,
+    variance: f64,
+}
+
+impl Walk {
+    /// Moves along a gradient with a given information, and updates the variance (expectation maximisation). Returns the
+    /// largest change.
+    fn step(&mut self, gradient: &[f64], information: &[f64], [least, most]: [f64; 2]) -> f64 {
+        let precision = 1.0 / self.variance;
+        let pull = self.second_differences();
+        let right: Vec<f64> = gradient.iter().zip(pull).map(|(g, d)| g - precision * d).collect();
+        let factor = Tridiagonal::new(information, precision);
+        let moves = factor.solve(right);
+        let mut largest: f64 = 0.0;
+        for (x, step) in self.x.iter_mut().zip(moves) {
+            let moved = (*x + step.clamp(-LONGEST, LONGEST)).clamp(least, most);
+            largest = largest.max((moved - *x).abs());
+            *x = moved;
+        }
+        let steps = self.x.windows(2).map(|x| (x[1] - x[0]).powi(2));
+        let squares = steps.zip(factor.variances_of_steps()).map(|(square, variance)| square + variance);
+        self.variance = (squares.sum::<f64>() / (self.x.len() - 1) as f64).max(LEAST_STEP);
+        largest
+    }
+
+    /// DᵀDx, with the differences D of neighbours.
+    fn second_differences(&self) -> Vec<f64> {
+        let mut out = vec![0.0; self.x.len()];
+        for (j, x) in self.x.windows(2).enumerate() {
+            out[j] -= x[1] - x[0];
+            out[j + 1] += x[1] - x[0];
+        }
+        out
+    }
+
+    /// Minus twice the logarithm of the likelihood of the walk, with its posterior (Laplace's approximation).
+    fn score(&self, information: &[f64]) -> f64 {
+        let steps: f64 = self.x.windows(2).map(|x| (x[1] - x[0]).powi(2)).sum();
+        let count = (self.x.len() - 1) as f64;
+        steps / self.variance
+            + count * self.variance.ln()
+            + Tridiagonal::new(information, 1.0 / self.variance).log_det()
+    }
+}
+
+/// The factored matrix H + DᵀD/τ².
+struct Tridiagonal {
+    pivots: Vec<f64>,
+    below: f64,
+}
+
+impl Tridiagonal {
+    fn new(information: &[f64], precision: f64) -> Self {
+        let last = information.len() - 1;
+        let mut pivots: Vec<f64> = Vec::with_capacity(last + 1);
+        for (j, h) in information.iter().enumerate() {
+            let neighbours = if j == 0 || j == last { 1.0 } else { 2.0 };
+            let before = pivots.last().map_or(0.0, |pivot| precision * precision / pivot);
+            pivots.push(h + neighbours * precision + 1e-9 - before);
+        }
+        Tridiagonal { pivots, below: -precision }
+    }
+
+    fn solve(&self, mut x: Vec<f64>) -> Vec<f64> {
+        for j in 1..x.len() {
+            x[j] -= self.below / self.pivots[j - 1] * x[j - 1];
+        }
+        for j in (0..x.len()).rev() {
+            let behind = if j + 1 < x.len() { self.below * x[j + 1] } else { 0.0 };
+            x[j] = (x[j] - behind) / self.pivots[j];
+        }
+        x
+    }
+
+    fn log_det(&self) -> f64 {
+        self.pivots.iter().map(|x| x.ln()).sum()
+    }
+
+    /// The posterior variances of the steps between nodes.
+    fn variances_of_steps(&self) -> Vec<f64> {
+        let mut behind = 1.0 / self.pivots[self.pivots.len() - 1];
+        let mut out = Vec::with_capacity(self.pivots.len() - 1);
+        for pivot in self.pivots.iter().rev().skip(1) {
+            let ratio = self.below / pivot;
+            let cross = -ratio * behind;
+            let here = 1.0 / pivot + ratio * ratio * behind;
+            out.push(here + behind - 2.0 * cross);
+            behind = here;
+        }
+        out.reverse();
+        out
+    }
+}
+
+/// What the scoring of one lane needs of a linear problem.
+struct Sums {
+    /// Energies times λ, and local degrees of freedom, by segment.
+    energies: Vec<f64>,
+    freedoms: Vec<f64>,
+    /// Weighted squared residuals, and leverages per coordinate, by datum. Leverages may be zero where they are not needed.
+    squares: Vec<f64>,
+    leverages: Vec<f64>,
+    log_det: f64,
+    sound: bool,
+}
+
+/// The phase of a start.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Phase {
+    /// The number of steps with nodes at equal numbers of data, and at equal degrees of freedom.
+    Steps(usize, usize),
+    Done,
+}
+
+/// The scoring from one start for some of the functions.
+struct Track {
+    vary: Adapt,
+    phase: Phase,
+    nodes: Nodes,
+    start: usize,
+    lam: Walk,
+    noise: Walk,
+    /// The middle of the range of ln λ.
+    middle: f64,
+    /// λ of all segments, and the factors of the weights of all data.
+    lams: Vec<f64>,
+    factors: Vec<f64>,
+    score: f64,
+    settled: bool,
+}
+
+impl Track {
+    /// Whether the next step places nodes.
+    fn is_to_place(&self) -> bool {
+        matches!(self.phase, Phase::Steps(0, steps) if steps == ROUNDS[0] || self.settled)
+    }
+
+    fn functions(&self) -> f64 {
+        f64::from(u8::from(self.vary.lam)) + f64::from(u8::from(self.vary.noise))
+    }
+
+    /// Places the nodes, with the functions at them unchanged.
+    fn place(&mut self, nodes: Nodes, problem: &Adaptive) {
+        let segments = problem.linearized.profile.len();
+        let ln = |i: usize| self.lams[i].ln();
+        // Between the middles of segments.
+        let of_knot = |&knot: &usize| {
+            if knot == 0 || knot == segments {
+                ln(knot.min(segments - 1))
+            } else {
+                0.5 * (ln(knot - 1) + ln(knot))
+            }
+        };
+        let x = nodes.knots.iter().map(of_knot).collect();
+        let noise = self.noise_at_knots(problem);
+        let variance = STEPS[self.start].powi(2);
+        self.noise = Walk { x: nodes.knots.iter().map(|knot| noise[*knot]).collect(), variance };
+        self.lam = Walk { x, variance };
+        self.nodes = nodes;
+    }
+
+    /// ln σ² at the knots.
+    fn noise_at_knots(&self, problem: &Adaptive) -> Vec<f64> {
+        let basis = &problem.linearized.basis;
+        let mut out = vec![0.0; basis.knots()];
+        if self.noise.x.is_empty() {
+            return out;
+        }
+        for (j, ends) in self.nodes.knots.windows(2).enumerate() {
+            let length: f64 = (ends[0]..ends[1]).map(|i| basis.h(i)).sum();
+            let mut before = 0.0;
+            for i in ends[0]..=ends[1] {
+                out[i] = at(&self.noise.x, &(j, before / length));
+                before += if i < ends[1] { basis.h(i) } else { 0.0 };
+            }
+        }
+        out
+    }
+
+    /// One step, or the score at the end.
+    fn advance(&mut self, problem: &Adaptive, sums: &Sums) {
+        let Phase::Steps(mut stage, mut steps) = self.phase else { return };
+        if !sums.sound {
+            self.phase = Phase::Done;
+            return;
+        }
+        if self.is_to_place() {
+            self.place(problem.nodes_of_freedom(&sums.leverages), problem);
+            (stage, steps, self.settled) = (1, 0, false);
+        }
+        let (count, m) = (problem.misfit.count(problem.m), problem.m as f64);
+        let null = problem.linearized.null();
+        let whole = sums.squares.iter().chain(&sums.energies).sum::<f64>();
+        let variance = whole / m / (count - null);
+        let nodes = &self.nodes;
+        let of_segments = |x: &[f64]| nodes.sums(&nodes.of_segments, x.iter().copied());
+        let (energies, freedoms) = (of_segments(&sums.energies), of_segments(&sums.freedoms));
+        let gradient =
+            energies.iter().zip(&freedoms).map(|(e, d)| 0.5 * m * (d.max(1e-6) - e / (m * variance)));
+        let gradient: Vec<f64> = gradient.collect();
+        let ratio = problem.ratio();
+        let information: Vec<f64> = freedoms.iter().map(|d| 0.5 * m * ratio * d.max(1e-6)).collect();
+        let used = |k: usize| problem.weights[k] > 0.0;
+        let of_data = |f: &dyn Fn(usize) -> f64| {
+            nodes.sums(&nodes.of_data, (0..problem.weights.len()).map(|k| if used(k) { f(k) } else { 0.0 }))
+        };
+        let of_noise: Vec<f64> = of_data(&|k| 1.0 - (2.0 - ratio) * sums.leverages[k])
+            .iter()
+            .map(|x| 0.5 * m * x.max(1e-3))
+            .collect();
+        if stage == 1 && (steps == ROUNDS[1] || self.settled) {
+            self.score =
+                m * ((count - null) * (whole / m).ln() + sums.log_det) - m * problem.log_penalty(&self.lams);
+            if self.vary.lam {
+                self.score += self.lam.score(&information);
+            }
+            if self.vary.noise {
+                self.score -= m
+                    * (0..self.factors.len()).filter(|k| used(*k)).map(|k| self.factors[k].ln()).sum::<f64>();
+                self.score += self.noise.score(&of_noise);
+            }
+            self.phase = Phase::Done;
+            return;
+        }
+        let mut largest: f64 = 0.0;
+        if self.vary.noise {
+            let squares = of_data(&|k| sums.squares[k]);
+            let left = of_data(&|k| 1.0 - sums.leverages[k]);
+            let gradient: Vec<f64> =
+                squares.iter().zip(left).map(|(r, d)| 0.5 * m * (r / (m * variance) - d)).collect();
+            largest = largest.max(self.noise.step(&gradient, &of_noise, [-RANGE, RANGE]));
+            let mean = self.noise.x.iter().sum::<f64>() / self.noise.x.len() as f64;
+            self.noise.x.iter_mut().for_each(|x| *x -= mean);
+            self.factors = self.nodes.of_data.iter().map(|hat| (-at(&self.noise.x, hat)).exp()).collect();
+        }
+        if self.vary.lam {
+            let bounds = [self.middle - RANGE, (self.middle + RANGE).min(problem.stiffest.ln())];
+            largest = largest.max(self.lam.step(&gradient, &information, bounds));
+        } else if !problem.given {
+            let step = gradient.iter().sum::<f64>() / information.iter().sum::<f64>();
+            let step = step.clamp(-LONGEST, LONGEST);
+            self.lam.x.iter_mut().for_each(|x| *x += step);
+            largest = largest.max(step.abs());
+        }
+        self.lams = self.nodes.of_segments.iter().map(|hat| at(&self.lam.x, hat).exp()).collect();
+        self.settled = largest < SETTLED;
+        self.phase = Phase::Steps(stage, steps + 1);
+    }
+}
+
+impl Adaptive<'_> {
+    /// The functions that are wanted, as far as they are accepted.
+    pub fn profile(&self, vary: Adapt) -> Profile {
+        let none = Profile { gain: 0.0, lam: Vec::new(), noise: Vec::new() };
+        if self.lam.len() < 2 || !self.lam.iter().all(|lam| lam.is_finite() && *lam > 0.0) {
+            return none;
+        }
+        let kinds = [(true, false), (false, true), (true, true)].map(|(lam, noise)| Adapt { lam, noise });
+        let kinds = kinds.into_iter().filter(|kind| (vary.lam || !kind.lam) && (vary.noise || !kind.noise));
+        let starts = if self.given { 1 } else { 2 };
+        let mut tracks: Vec<Track> = kinds
+            .flat_map(|kind| (0..starts).map(move |start| (kind, start)))
+            .map(|(k, s)| self.track(k, s))
+            .collect();
+        for group in tracks.chunks_mut(LANES) {
+            while group.iter().any(|track| track.phase != Phase::Done) {
+                checkpoint();
+                let sums = self.sums(group);
+                group.iter_mut().zip(&sums).for_each(|(track, sums)| track.advance(self, sums));
+            }
+        }
+        let alone = self.score_of_one();
+        let gain = |track: &Track| alone - track.score;
+        let surplus = |track: &Track| gain(track) - GAIN * track.functions();
+        let Some(best) = tracks.iter().max_by(|a, b| surplus(a).total_cmp(&surplus(b))) else { return none };
+        if !gain(best).is_finite() {
+            return none;
+        }
+        if surplus(best) <= 0.0 {
+            return Profile { gain: gain(best), ..none };
+        }
+        let noise = if best.vary.noise { self.centred(best) } else { Vec::new() };
+        let lam = if best.vary.lam { self.with_gaps(&best.lams) } else { Vec::new() };
+        Profile { gain: gain(best), lam, noise }
+    }
+
+    /// ln σ² at the knots, with the mean zero over the data.
+    fn centred(&self, track: &Track) -> Vec<f64> {
+        let used = track.factors.iter().zip(self.weights).filter(|(_, w)| **w > 0.0);
+        let (sum, count) = used.fold((0.0, 0.0), |(sum, count), (x, _)| (sum - x.ln(), count + 1.0));
+        let mean = sum / count;
+        track.noise_at_knots(self).into_iter().map(|x| x - mean).collect()
+    }
+
+    /// λ of all segments, divided by its geometric mean, with the harmonic mean in long gaps.
+    fn with_gaps(&self, lams: &[f64]) -> Vec<f64> {
+        let (basis, order) = (&self.linearized.basis, self.order());
+        let used = (0..self.weights.len()).filter(|k| self.weights[*k] > 0.0);
+        let places: Vec<Position> = used.map(|k| self.positions[k]).collect();
+        let starts: Vec<f64> = [0.0]
+            .into_iter()
+            .chain((0..lams.len()).scan(0.0, |sum, i| {
+                *sum += basis.h(i);
+                Some(*sum)
+            }))
+            .collect();
+        let time = |&(segment, s): &Position| starts[segment] + s * basis.h(segment);
+        let mut apart: Vec<f64> = places.windows(2).map(|pair| time(&pair[1]) - time(&pair[0])).collect();
+        let mut lams = lams.to_vec();
+        let weight: f64 = self.weights.iter().sum();
+        let mut sorted: Vec<f64> = apart.iter().copied().filter(|x| *x > 0.0).collect();
+        sorted.sort_by(f64::total_cmp);
+        let usual = sorted.get(sorted.len() / 2).copied().unwrap_or(f64::INFINITY);
+        let factor = if order == 2 { GAP.0 } else { GAP_OF_JERK };
+        let mut is_gap = vec![false; lams.len()];
+        // The mean of 1/λ is that of the variance of the process, in the parts with data.
+        for _ in 0..2 {
+            let recorded = || (0..is_gap.len()).filter(|i| !is_gap[*i]);
+            let length: f64 = recorded().map(|i| basis.h(i)).sum();
+            let mean = length / recorded().map(|i| basis.h(i) / lams[i]).sum::<f64>();
+            let width = (mean * length / weight).powf(0.5 / order as f64);
+            for (pair, apart) in places.windows(2).zip(&mut apart) {
+                if *apart > factor * width && *apart > GAP.1 * usual {
+                    let first = pair[0].0 + usize::from(pair[0].1 > 0.5);
+                    let last = pair[1].0 + usize::from(pair[1].1 > 0.5);
+                    is_gap[first..last].fill(true);
+                }
+            }
+            lams.iter_mut().zip(&is_gap).filter(|(_, gap)| **gap).for_each(|(lam, _)| *lam = mean);
+        }
+        let mean = lams.iter().map(|lam| lam.ln()).sum::<f64>() / lams.len() as f64;
+        lams.iter().map(|lam| (lam.ln() - mean).exp()).collect()
+    }
+
+    fn order(&self) -> usize {
+        match self.linearized.penalised {
+            Penalty::Acceleration => 2,
+            Penalty::Jerk => 3,
+        }
+    }
+
+    /// ∫(1 + x²ᵖ)⁻² / ∫(1 + x²ᵖ)⁻¹: the information of a degree of freedom.
+    fn ratio(&self) -> f64 {
+        1.0 - 0.5 / self.order() as f64
+    }
+
+    /// ln det of the penalty per coordinate, up to a constant.
+    fn log_penalty(&self, lams: &[f64]) -> f64 {
+        let free = self.linearized.free() as f64 - self.linearized.null();
+        free * lams.iter().map(|lam| lam.ln()).sum::<f64>() / lams.len() as f64
+    }
+
+    fn track(&self, vary: Adapt, start: usize) -> Track {
+        let used = self.weights.iter().filter(|w| **w > 0.0).count() as f64;
+        let rough = || {
+            let time = self.linearized.basis.knots() as f64 - 1.0;
+            let density = self.weights.iter().sum::<f64>() / time;
+            density * (time / used).powi(2 * self.order() as i32)
+        };
+        let mean = self.lam.iter().map(|lam| lam.ln()).sum::<f64>() / self.lam.len() as f64;
+        let lams = match (start, vary.lam) {
+            (0, true) => self.lam.to_vec(),
+            (0, false) => vec![mean.exp(); self.lam.len()],
+            _ => vec![rough().min(self.stiffest); self.lam.len()],
+        };
+        let middle = lams.iter().map(|lam| lam.ln()).sum::<f64>() / lams.len() as f64;
+        let mut track = Track {
+            vary,
+            phase: Phase::Steps(0, 0),
+            nodes: Nodes::default(),
+            start,
+            lam: Walk::default(),
+            noise: Walk::default(),
+            middle,
+            lams,
+            factors: vec![1.0; self.weights.len()],
+            score: f64::INFINITY,
+            settled: false,
+        };
+        let ones: Vec<f64> = self.weights.iter().map(|w| f64::from(*w > 0.0)).collect();
+        track.place(self.nodes_at(&ones, used, DATA), self);
+        track
+    }
+
+    fn nodes_of_freedom(&self, leverages: &[f64]) -> Nodes {
+        let freedom = leverages.iter().sum();
+        self.nodes_at(leverages, freedom, FREEDOM)
+    }
+
+    /// Nodes at knots, with about equal shares of the values of the data between them.
+    fn nodes_at(&self, values: &[f64], total: f64, (per, least, most): (f64, f64, f64)) -> Nodes {
+        let last = self.lam.len();
+        let count = (total / per).clamp(least, most).floor();
+        let whole: f64 = values.iter().sum();
+        let (mut knots, mut sum) = (vec![0], 0.0);
+        for (&(segment, s), x) in self.positions.iter().zip(values) {
+            sum += x;
+            if sum >= whole * knots.len() as f64 / count {
+                let knot = segment + usize::from(s > 0.5);
+                if knot > knots[knots.len() - 1] && knot < last {
+                    knots.push(knot);
+                }
+            }
+        }
+        knots.push(last);
+        Nodes::new(knots, self)
+    }
+
+    /// The score with one λ, by restricted maximum likelihood, or with the λ that was given.
+    fn score_of_one(&self) -> f64 {
+        let nothing = vec![0.0; self.accelerations.len()];
+        let lam = if self.given {
+            self.lam[0]
+        } else {
+            let (linearized, misfit) = (self.linearized, self.misfit);
+            let linear = Linear::new(
+                linearized,
+                self.m,
+                misfit,
+                None,
+                self.periodic,
+                self.accelerations,
+                &nothing,
+                f64::NAN,
+            );
+            linear.choose(Criterion::Reml, None).0
+        };
+        let mut track = self.track(Adapt { lam: false, noise: false }, 0);
+        track.lams.fill(lam);
+        let sums = &self.sums(std::slice::from_ref(&track))[0];
+        let (count, null, m) = (self.misfit.count(self.m), self.linearized.null(), self.m as f64);
+        let whole = sums.squares.iter().chain(&sums.energies).sum::<f64>();
+        m * ((count - null) * (whole / m).ln() + sums.log_det - self.log_penalty(&track.lams))
+    }
+
+    /// The sums of at most as many tracks as there are lanes.
+    fn sums(&self, tracks: &[Track]) -> Vec<Sums> {
+        let (linearized, m) = (self.linearized, self.m);
+        let (basis, penalised) = (&linearized.basis, linearized.penalised);
+        let (segments, count) = (self.lam.len(), basis.count());
+        let of_lane = |l: usize| &tracks[l.min(tracks.len() - 1)];
+        let noisy = tracks.iter().any(|track| track.vary.noise);
+        let misfits: Vec<Cow<Misfit>> = (0..LANES)
+            .map(|l| {
+                let track = of_lane(l);
+                if !track.vary.noise || l >= tracks.len() {
+                    return Cow::Borrowed(self.misfit);
+                }
+                let mut own = self.misfit.clone();
+                own.reweigh(linearized, &track.factors, m);
+                Cow::Owned(own)
+            })
+            .collect();
+        let lams: Vec<Lane> = (0..segments).map(|i| Lane::new(few(|l| of_lane(l).lams[i]))).collect();
+        // Both ends of a segment depend on the same four coefficients.
+        let ends: Vec<[Stencil; 2]> = (0..segments).map(|i| [0.0, 1.0].map(|s| basis.row(i, s, 2))).collect();
+        let mut penalty = vec![Lane::ZERO; count * 4];
+        let metrics: Vec<(f64, f64)> = (0..segments).map(|i| of_segment(penalised, basis.h(i))).collect();
+        let entry = |i: usize, a: usize, b: usize| {
+            let [l, r] = &ends[i];
+            let (own, other) = metrics[i];
+            own * (l.factors[a] * l.factors[b] + r.factors[a] * r.factors[b])
+                + other * (l.factors[a] * r.factors[b] + r.factors[a] * l.factors[b])
+        };
+        let wide = count.min(4);
+        for (i, lam) in lams.iter().enumerate() {
+            let first = ends[i][0].first;
+            for a in 0..wide {
+                for b in 0..=a {
+                    penalty[(first + a) * 4 + a - b] += *lam * lane(entry(i, a, b));
+                }
+            }
+        }
+        let whole = self.misfit.whole(linearized, m, false, self.periodic, |coupled, at| {
+            let seen = if noisy {
+                Lane::new(few(|l| misfits[l].gram(coupled, at)))
+            } else {
+                lane(self.misfit.gram(coupled, at))
+            };
+            seen + of_each(&penalty, coupled, at)
+        });
+        let factors = whole.factored();
+        let pulls: Vec<Vec<f64>> = if noisy {
+            misfits.iter().map(|misfit| misfit.pull(linearized, m)).collect()
+        } else {
+            vec![self.misfit.pull(linearized, m)]
+        };
+        let pull = |k: usize| {
+            if noisy { Lane::new(few(|l| pulls[l][k])) } else { lane(pulls[0][k]) }
+        };
+        // Half the gradient of the energy at the accelerations a.
+        let mut x: Vec<Lane> = (0..count * m).map(pull).collect();
+        for (i, lam) in lams.iter().enumerate() {
+            let ([l, r], (own, other)) = (&ends[i], metrics[i]);
+            for c in 0..m {
+                let [a, b] = [i, i + 1].map(|knot| self.accelerations[knot * m + c]);
+                let (left, right) = (own * a + other * b, other * a + own * b);
+                for k in 0..wide {
+                    x[(l.first + k) * m + c] -= *lam * lane(l.factors[k] * left + r.factors[k] * right);
+                }
+            }
+        }
+        if let Some(periodic) = self.periodic {
+            x = fold_lanes(periodic, &x);
+        }
+        factors.solve(m, &mut x);
+        if let Some(periodic) = self.periodic {
+            periodic.extend_lanes(&mut x);
+        }
+        let inverse = factors.inverse_band();
+        let mean = factors.mean(&inverse);
+        let process = (linearized.free() as f64 - linearized.null()) / segments as f64;
+        let mut energies = vec![Lane::ZERO; segments];
+        let mut freedoms = vec![Lane::ZERO; segments];
+        for (i, lam) in lams.iter().enumerate() {
+            let ([l, r], (own, other)) = (&ends[i], metrics[i]);
+            let mut energy = Lane::ZERO;
+            for c in 0..m {
+                let a = l.of_lanes(&x, m, c) + lane(self.accelerations[i * m + c]);
+                let b = r.of_lanes(&x, m, c) + lane(self.accelerations[(i + 1) * m + c]);
+                energy += (a * a + b * b) * lane(own) + a * b * lane(2.0 * other);
+            }
+            energies[i] = *lam * energy;
+            let mut trace = Lane::ZERO;
+            for a in 0..wide {
+                for b in 0..=a {
+                    let twice = if a == b { 1.0 } else { 2.0 };
+                    trace += mean.at(l.first + a, l.first + b) * lane(twice * entry(i, a, b));
+                }
+            }
+            freedoms[i] = lane(process) - *lam * trace;
+        }
+        let data = &linearized.data;
+        let mut squares: Vec<Lane> =
+            (0..data.len()).map(|k| self.misfit.square(&data[k], k, m, &x)).collect();
+        let known = noisy || tracks.iter().any(Track::is_to_place);
+        let leverage = |k: usize| self.misfit.leverage(&data[k], k, m, &inverse, &mean);
+        let mut leverages: Vec<Lane> =
+            (0..data.len()).map(|k| if known { leverage(k) } else { Lane::ZERO }).collect();
+        if noisy {
+            for k in 0..data.len() {
+                let factor = Lane::new(few(|l| of_lane(l).factors[k]));
+                squares[k] *= factor;
+                leverages[k] *= factor;
+            }
+        }
+        let (log_det, least) = (factors.log_det(), factors.least_pivot());
+        let lane_of = |x: &[Lane], l: usize| x.iter().map(|x| x.as_array()[l]).collect::<Vec<f64>>();
+        let of = |l: usize| Sums {
+            energies: lane_of(&energies, l),
+            freedoms: lane_of(&freedoms, l),
+            squares: lane_of(&squares, l),
+            leverages: lane_of(&leverages, l),
+            log_det: log_det.as_array()[l],
+            sound: least.as_array()[l] > 0.0 && log_det.as_array()[l].is_finite(),
+        };
+        (0..tracks.len()).map(of).collect()
+    }
+}
+
+/// [`PeriodicCorrection::fold`] for all lanes.
+fn fold_lanes(periodic: &PeriodicCorrection, x: &[Lane]) -> Vec<Lane> {
+    let columns: [Vec<f64>; LANES] = std::array::from_fn(|l| {
+        let mut column: Vec<f64> = x.iter().map(|x| x.as_array()[l]).collect();
+        periodic.fold(&mut column);
+        column
+    });
+    (0..columns[0].len()).map(|k| Lane::new(few(|l| columns[l][k]))).collect()
+}
