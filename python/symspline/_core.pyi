@@ -253,7 +253,15 @@ def frames_along(handle: Handle, knots: _Doubles, points: _Doubles, x: _Doubles,
 # their numbers, and the function with its highest derivative and the function that returns its derivatives.
 _Term = tuple[Any, ...]
 # Parts of the space, matrices of groups, knots, penalty, means and precisions of the parameters, and terms.
-_Problem = tuple[Sequence[Handle], Sequence[_Doubles | None], _Doubles, str, _Doubles, Sequence[_Term]]
+_Problem = tuple[
+    Sequence[Handle],
+    Sequence[_Doubles | None],
+    _Doubles,
+    str,
+    _Doubles,
+    Sequence[_Term],
+    Sequence[_Doubles | None],
+]
 # Whitened residuals, their derivatives by the motion and by the parameters, and the roots of robust weights.
 _TermRows = tuple[_Doubles, list[_Doubles | None], _Doubles | None, _Doubles | None]
 
@@ -272,6 +280,9 @@ def estimate(
 def linearise(
     problem: _Problem, points: Sequence[_Doubles], values: _Doubles, derivatives: bool
 ) -> list[_TermRows] | None: ...
+def varying_lams(
+    problem: _Problem, points: list[_Doubles], values: _Doubles, lams: list[float], parts: list[int]
+) -> list[tuple[float, _Doubles | None]]: ...
 def distance_from_minimum(
     problem: _Problem,
     points: Sequence[_Doubles],

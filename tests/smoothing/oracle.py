@@ -18,9 +18,11 @@ class Dense:
         Times and weights of the data.
     knots : ndarray, shape (K,)
     ends : {"natural", "clamped", "periodic"} or pair of the first two
+    factors : float or ndarray, shape (K - 1,)
+        Factors of the penalty in the segments.
     """
 
-    def __init__(self, t, w, knots, ends="natural"):
+    def __init__(self, t, w, knots, ends="natural", factors=1.0):
         self.t, self.w, self.knots = t, w, knots
         self.closed = ends == "periodic"
         count = len(knots) - self.closed
@@ -37,7 +39,7 @@ class Dense:
         h = np.diff(knots)
         at = (knots[:-1, None] + 0.5 * h[:, None] * (1 + x)).ravel()
         second = self.curve(at, 2)
-        self.penalty = second.T @ ((0.5 * h[:, None] * weights).ravel()[:, None] * second)
+        self.penalty = second.T @ ((0.5 * (factors * h)[:, None] * weights).ravel()[:, None] * second)
         self.gram = self.values.T @ (w[:, None] * self.values)
 
     def rows(self, x, nu=0):
@@ -92,8 +94,10 @@ class Dense:
         return np.exp(found.x)
 
 
-def process_variance(t, w, lam, x, nu=0, ends="natural", span=None):
+def process_variance(t, w, lam, x, nu=0, ends="natural", span=None, knots=None):
     """Of an integrated Wiener process with a flat prior for straight lines, seen at times t: Wahba (1978).
+
+    λ may be that of the segments between knots; these are among t and x.
 
     As a linear regression on values and slopes at t and x: an exact Markov representation, without any spline. Slopes
     that are given at the ends are seen exactly; a closed process goes on at the start of ``span`` where it ends.
@@ -104,7 +108,12 @@ def process_variance(t, w, lam, x, nu=0, ends="natural", span=None):
     precision = np.zeros((size, size))
     steps = np.append(np.diff(grid), span - grid[-1] + grid[0]) if closed else np.diff(grid)
     for i, h in enumerate(steps):
-        noise = np.array([[h**3 / 3, h**2 / 2], [h**2 / 2, h]]) / lam
+        here = lam
+        if knots is not None:
+            middle = grid[i] + 0.5 * h
+            turned = knots[0] + np.mod(middle - knots[0], span) if closed else middle
+            here = lam[np.searchsorted(knots[1:-1], turned, "right")]
+        noise = np.array([[h**3 / 3, h**2 / 2], [h**2 / 2, h]]) / here
         step = np.hstack([-np.array([[1, h], [0, 1]]), np.eye(2)])
         at = np.arange(2 * i, 2 * i + 4) % size
         precision[np.ix_(at, at)] += step.T @ np.linalg.solve(noise, step)

@@ -14,15 +14,11 @@
 //! Others estimate a few free values (Wood 2011; Rodríguez-Álvarez et al. 2019) or a spline with a penalty (Krivobokova et
 //! al. 2008).
 
-use crate::choice::Linear;
-use crate::cyclic::PeriodicCorrection;
-use crate::linearized::{LinearProblem, Stencil, of_segment};
-use crate::misfit::{Misfit, of_each};
+use crate::linearized::Basis;
 use crate::path::{Position, positions};
-use crate::problem::{Adapt, Criterion, Penalty};
-use std::borrow::Cow;
+use crate::problem::{Adapt, Penalty};
 use symspline_core::monitor::checkpoint;
-use symspline_core::scalar::{LANES, Lane, few, lane};
+use symspline_core::scalar::LANES;
 
 /// Twice the logarithm of the likelihood must increase by more than this for each function that varies.
 const GAIN: f64 = 6.0;
@@ -45,28 +41,32 @@ const LEAST_STEP: f64 = 1e-6;
 const GAP: (f64, f64) = (3.3, 10.0);
 const GAP_OF_JERK: f64 = 3.0;
 
-/// A curve with one λ, linearised.
+/// A linear problem at a curve, in which λ and σ may vary.
 pub struct Adaptive<'a> {
-    /// The problem with one λ for all segments.
-    pub linearized: &'a LinearProblem,
-    /// The dimension of the space.
+    /// The knots.
+    pub basis: &'a Basis,
+    /// The derivative whose square is penalised.
+    pub penalised: Penalty,
+    /// The number of coordinates.
     pub m: usize,
-    /// Residuals, and their weights for one noise level.
-    pub misfit: &'a Misfit<'a>,
-    /// The weight of a coordinate of each datum.
-    pub weights: &'a [f64],
-    /// The positions of the data.
+    /// The degrees of freedom of the residuals, from which the variance of the noise is estimated; None if it is one.
+    pub left: Option<f64>,
+    /// The degrees of freedom per coordinate of the coefficients with energy.
+    pub process: f64,
+    /// The positions of the data, and the weight of a coordinate of each.
     pub positions: &'a [Position],
-    /// The periodic continuation of a closed curve.
-    pub periodic: Option<&'a PeriodicCorrection>,
-    /// Accelerations at the knots.
-    pub accelerations: &'a [f64],
+    /// See `positions`.
+    pub weights: &'a [f64],
+    /// The positions of everything that was measured, in the order of time, between which there may be gaps.
+    pub measured: &'a [Position],
     /// λ of every segment, and the largest λ that may be chosen.
     pub lam: &'a [f64],
     /// See `lam`.
     pub stiffest: f64,
     /// Whether λ was given.
     pub given: bool,
+    /// Solves the linear problem for at most as many tracks as there are lanes.
+    pub sums: &'a dyn Fn(&[Track]) -> Vec<Sums>,
 }
 
 /// How λ and σ vary.
@@ -91,7 +91,7 @@ struct Nodes {
 
 impl Nodes {
     fn new(knots: Vec<usize>, problem: &Adaptive) -> Self {
-        let basis = &problem.linearized.basis;
+        let basis = problem.basis;
         let hat = |segment: usize, s: f64| {
             let j = knots.partition_point(|knot| *knot <= segment) - 1;
             let length = |from: usize, to: usize| (from..to).map(|i| basis.h(i)).sum::<f64>();
@@ -240,16 +240,23 @@ impl Tridiagonal {
     }
 }
 
-/// What the scoring of one lane needs of a linear problem.
-struct Sums {
-    /// Energies times λ, and local degrees of freedom, by segment.
-    energies: Vec<f64>,
-    freedoms: Vec<f64>,
-    /// Weighted squared residuals, and leverages per coordinate, by datum. Leverages may be zero where they are not needed.
-    squares: Vec<f64>,
-    leverages: Vec<f64>,
-    log_det: f64,
-    sound: bool,
+/// The solution of a linear problem, as far as the scoring needs it.
+pub struct Sums {
+    /// Energies times λ, and local degrees of freedom of the process per coordinate, by segment.
+    pub energies: Vec<f64>,
+    /// See `energies`.
+    pub freedoms: Vec<f64>,
+    /// Weighted squared residuals, and leverages per coordinate, by datum. Squares are needed for the noise only, and
+    /// leverages also where nodes are placed.
+    pub squares: Vec<f64>,
+    /// See `squares`.
+    pub leverages: Vec<f64>,
+    /// The sum of all weighted squared residuals and energies.
+    pub whole: f64,
+    /// ln det A per coordinate, and whether A is positive definite.
+    pub log_det: f64,
+    /// See `log_det`.
+    pub sound: bool,
 }
 
 /// The phase of a start.
@@ -261,8 +268,9 @@ enum Phase {
 }
 
 /// The scoring from one start for some of the functions.
-struct Track {
-    vary: Adapt,
+pub struct Track {
+    /// What varies.
+    pub vary: Adapt,
     phase: Phase,
     nodes: Nodes,
     start: usize,
@@ -271,15 +279,16 @@ struct Track {
     /// The middle of the range of ln λ.
     middle: f64,
     /// λ of all segments, and the factors of the weights of all data.
-    lams: Vec<f64>,
-    factors: Vec<f64>,
+    pub lams: Vec<f64>,
+    /// See `lams`.
+    pub factors: Vec<f64>,
     score: f64,
     settled: bool,
 }
 
 impl Track {
     /// Whether the next step places nodes.
-    fn is_to_place(&self) -> bool {
+    pub fn is_to_place(&self) -> bool {
         matches!(self.phase, Phase::Steps(0, steps) if steps == ROUNDS[0] || self.settled)
     }
 
@@ -289,7 +298,7 @@ impl Track {
 
     /// Places the nodes, with the functions at them unchanged.
     fn place(&mut self, nodes: Nodes, problem: &Adaptive) {
-        let segments = problem.linearized.profile.len();
+        let segments = problem.lam.len();
         let ln = |i: usize| self.lams[i].ln();
         // Between the middles of segments.
         let of_knot = |&knot: &usize| {
@@ -309,7 +318,7 @@ impl Track {
 
     /// ln σ² at the knots.
     fn noise_at_knots(&self, problem: &Adaptive) -> Vec<f64> {
-        let basis = &problem.linearized.basis;
+        let basis = problem.basis;
         let mut out = vec![0.0; basis.knots()];
         if self.noise.x.is_empty() {
             return out;
@@ -336,10 +345,8 @@ impl Track {
             self.place(problem.nodes_of_freedom(&sums.leverages), problem);
             (stage, steps, self.settled) = (1, 0, false);
         }
-        let (count, m) = (problem.misfit.count(problem.m), problem.m as f64);
-        let null = problem.linearized.null();
-        let whole = sums.squares.iter().chain(&sums.energies).sum::<f64>();
-        let variance = whole / m / (count - null);
+        let m = problem.m as f64;
+        let variance = problem.left.map_or(1.0, |left| sums.whole / left);
         let nodes = &self.nodes;
         let of_segments = |x: &[f64]| nodes.sums(&nodes.of_segments, x.iter().copied());
         let (energies, freedoms) = (of_segments(&sums.energies), of_segments(&sums.freedoms));
@@ -357,8 +364,8 @@ impl Track {
             .map(|x| 0.5 * m * x.max(1e-3))
             .collect();
         if stage == 1 && (steps == ROUNDS[1] || self.settled) {
-            self.score =
-                m * ((count - null) * (whole / m).ln() + sums.log_det) - m * problem.log_penalty(&self.lams);
+            let misfit = problem.left.map_or(sums.whole, |left| left * (sums.whole / m).ln());
+            self.score = misfit + m * (sums.log_det - problem.log_penalty(&self.lams));
             if self.vary.lam {
                 self.score += self.lam.score(&information);
             }
@@ -390,7 +397,9 @@ impl Track {
             self.lam.x.iter_mut().for_each(|x| *x += step);
             largest = largest.max(step.abs());
         }
-        self.lams = self.nodes.of_segments.iter().map(|hat| at(&self.lam.x, hat).exp()).collect();
+        if self.vary.lam || !problem.given {
+            self.lams = self.nodes.of_segments.iter().map(|hat| at(&self.lam.x, hat).exp()).collect();
+        }
         self.settled = largest < SETTLED;
         self.phase = Phase::Steps(stage, steps + 1);
     }
@@ -403,8 +412,9 @@ impl Adaptive<'_> {
         if self.lam.len() < 2 || !self.lam.iter().all(|lam| lam.is_finite() && *lam > 0.0) {
             return none;
         }
-        let kinds = [(true, false), (false, true), (true, true)].map(|(lam, noise)| Adapt { lam, noise });
-        let kinds = kinds.into_iter().filter(|kind| (vary.lam || !kind.lam) && (vary.noise || !kind.noise));
+        let kinds = [(false, false), (true, false), (false, true), (true, true)];
+        let kinds = kinds.map(|(lam, noise)| Adapt { lam, noise }).into_iter();
+        let kinds = kinds.filter(|kind| (vary.lam || !kind.lam) && (vary.noise || !kind.noise));
         let starts = if self.given { 1 } else { 2 };
         let mut tracks: Vec<Track> = kinds
             .flat_map(|kind| (0..starts).map(move |start| (kind, start)))
@@ -413,11 +423,13 @@ impl Adaptive<'_> {
         for group in tracks.chunks_mut(LANES) {
             while group.iter().any(|track| track.phase != Phase::Done) {
                 checkpoint();
-                let sums = self.sums(group);
+                let sums = (self.sums)(group);
                 group.iter_mut().zip(&sums).for_each(|(track, sums)| track.advance(self, sums));
             }
         }
-        let alone = self.score_of_one();
+        let (constant, tracks): (Vec<_>, Vec<_>) =
+            tracks.into_iter().partition(|track| track.vary == Adapt::default());
+        let alone = constant.iter().map(|track| track.score).fold(f64::INFINITY, f64::min);
         let gain = |track: &Track| alone - track.score;
         let surplus = |track: &Track| gain(track) - GAIN * track.functions();
         let Some(best) = tracks.iter().max_by(|a, b| surplus(a).total_cmp(&surplus(b))) else { return none };
@@ -442,9 +454,8 @@ impl Adaptive<'_> {
 
     /// λ of all segments, divided by its geometric mean, with the harmonic mean in long gaps.
     fn with_gaps(&self, lams: &[f64]) -> Vec<f64> {
-        let (basis, order) = (&self.linearized.basis, self.order());
-        let used = (0..self.weights.len()).filter(|k| self.weights[*k] > 0.0);
-        let places: Vec<Position> = used.map(|k| self.positions[k]).collect();
+        let (basis, order) = (self.basis, self.order());
+        let places = self.measured;
         let starts: Vec<f64> = [0.0]
             .into_iter()
             .chain((0..lams.len()).scan(0.0, |sum, i| {
@@ -481,7 +492,7 @@ impl Adaptive<'_> {
     }
 
     fn order(&self) -> usize {
-        match self.linearized.penalised {
+        match self.penalised {
             Penalty::Acceleration => 2,
             Penalty::Jerk => 3,
         }
@@ -494,14 +505,13 @@ impl Adaptive<'_> {
 
     /// ln det of the penalty per coordinate, up to a constant.
     fn log_penalty(&self, lams: &[f64]) -> f64 {
-        let free = self.linearized.free() as f64 - self.linearized.null();
-        free * lams.iter().map(|lam| lam.ln()).sum::<f64>() / lams.len() as f64
+        self.process * lams.iter().map(|lam| lam.ln()).sum::<f64>() / lams.len() as f64
     }
 
     fn track(&self, vary: Adapt, start: usize) -> Track {
         let used = self.weights.iter().filter(|w| **w > 0.0).count() as f64;
         let rough = || {
-            let time = self.linearized.basis.knots() as f64 - 1.0;
+            let time = self.lam.len() as f64;
             let density = self.weights.iter().sum::<f64>() / time;
             density * (time / used).powi(2 * self.order() as i32)
         };
@@ -553,165 +563,4 @@ impl Adaptive<'_> {
         knots.push(last);
         Nodes::new(knots, self)
     }
-
-    /// The score with one λ, by restricted maximum likelihood, or with the λ that was given.
-    fn score_of_one(&self) -> f64 {
-        let nothing = vec![0.0; self.accelerations.len()];
-        let lam = if self.given {
-            self.lam[0]
-        } else {
-            let (linearized, misfit) = (self.linearized, self.misfit);
-            let linear = Linear::new(
-                linearized,
-                self.m,
-                misfit,
-                None,
-                self.periodic,
-                self.accelerations,
-                &nothing,
-                f64::NAN,
-            );
-            linear.choose(Criterion::Reml, None).0
-        };
-        let mut track = self.track(Adapt { lam: false, noise: false }, 0);
-        track.lams.fill(lam);
-        let sums = &self.sums(std::slice::from_ref(&track))[0];
-        let (count, null, m) = (self.misfit.count(self.m), self.linearized.null(), self.m as f64);
-        let whole = sums.squares.iter().chain(&sums.energies).sum::<f64>();
-        m * ((count - null) * (whole / m).ln() + sums.log_det - self.log_penalty(&track.lams))
-    }
-
-    /// The sums of at most as many tracks as there are lanes.
-    fn sums(&self, tracks: &[Track]) -> Vec<Sums> {
-        let (linearized, m) = (self.linearized, self.m);
-        let (basis, penalised) = (&linearized.basis, linearized.penalised);
-        let (segments, count) = (self.lam.len(), basis.count());
-        let of_lane = |l: usize| &tracks[l.min(tracks.len() - 1)];
-        let noisy = tracks.iter().any(|track| track.vary.noise);
-        let misfits: Vec<Cow<Misfit>> = (0..LANES)
-            .map(|l| {
-                let track = of_lane(l);
-                if !track.vary.noise || l >= tracks.len() {
-                    return Cow::Borrowed(self.misfit);
-                }
-                let mut own = self.misfit.clone();
-                own.reweigh(linearized, &track.factors, m);
-                Cow::Owned(own)
-            })
-            .collect();
-        let lams: Vec<Lane> = (0..segments).map(|i| Lane::new(few(|l| of_lane(l).lams[i]))).collect();
-        // Both ends of a segment depend on the same four coefficients.
-        let ends: Vec<[Stencil; 2]> = (0..segments).map(|i| [0.0, 1.0].map(|s| basis.row(i, s, 2))).collect();
-        let mut penalty = vec![Lane::ZERO; count * 4];
-        let metrics: Vec<(f64, f64)> = (0..segments).map(|i| of_segment(penalised, basis.h(i))).collect();
-        let entry = |i: usize, a: usize, b: usize| {
-            let [l, r] = &ends[i];
-            let (own, other) = metrics[i];
-            own * (l.factors[a] * l.factors[b] + r.factors[a] * r.factors[b])
-                + other * (l.factors[a] * r.factors[b] + r.factors[a] * l.factors[b])
-        };
-        let wide = count.min(4);
-        for (i, lam) in lams.iter().enumerate() {
-            let first = ends[i][0].first;
-            for a in 0..wide {
-                for b in 0..=a {
-                    penalty[(first + a) * 4 + a - b] += *lam * lane(entry(i, a, b));
-                }
-            }
-        }
-        let whole = self.misfit.whole(linearized, m, false, self.periodic, |coupled, at| {
-            let seen = if noisy {
-                Lane::new(few(|l| misfits[l].gram(coupled, at)))
-            } else {
-                lane(self.misfit.gram(coupled, at))
-            };
-            seen + of_each(&penalty, coupled, at)
-        });
-        let factors = whole.factored();
-        let pulls: Vec<Vec<f64>> = if noisy {
-            misfits.iter().map(|misfit| misfit.pull(linearized, m)).collect()
-        } else {
-            vec![self.misfit.pull(linearized, m)]
-        };
-        let pull = |k: usize| {
-            if noisy { Lane::new(few(|l| pulls[l][k])) } else { lane(pulls[0][k]) }
-        };
-        // Half the gradient of the energy at the accelerations a.
-        let mut x: Vec<Lane> = (0..count * m).map(pull).collect();
-        for (i, lam) in lams.iter().enumerate() {
-            let ([l, r], (own, other)) = (&ends[i], metrics[i]);
-            for c in 0..m {
-                let [a, b] = [i, i + 1].map(|knot| self.accelerations[knot * m + c]);
-                let (left, right) = (own * a + other * b, other * a + own * b);
-                for k in 0..wide {
-                    x[(l.first + k) * m + c] -= *lam * lane(l.factors[k] * left + r.factors[k] * right);
-                }
-            }
-        }
-        if let Some(periodic) = self.periodic {
-            x = fold_lanes(periodic, &x);
-        }
-        factors.solve(m, &mut x);
-        if let Some(periodic) = self.periodic {
-            periodic.extend_lanes(&mut x);
-        }
-        let inverse = factors.inverse_band();
-        let mean = factors.mean(&inverse);
-        let process = (linearized.free() as f64 - linearized.null()) / segments as f64;
-        let mut energies = vec![Lane::ZERO; segments];
-        let mut freedoms = vec![Lane::ZERO; segments];
-        for (i, lam) in lams.iter().enumerate() {
-            let ([l, r], (own, other)) = (&ends[i], metrics[i]);
-            let mut energy = Lane::ZERO;
-            for c in 0..m {
-                let a = l.of_lanes(&x, m, c) + lane(self.accelerations[i * m + c]);
-                let b = r.of_lanes(&x, m, c) + lane(self.accelerations[(i + 1) * m + c]);
-                energy += (a * a + b * b) * lane(own) + a * b * lane(2.0 * other);
-            }
-            energies[i] = *lam * energy;
-            let mut trace = Lane::ZERO;
-            for a in 0..wide {
-                for b in 0..=a {
-                    let twice = if a == b { 1.0 } else { 2.0 };
-                    trace += mean.at(l.first + a, l.first + b) * lane(twice * entry(i, a, b));
-                }
-            }
-            freedoms[i] = lane(process) - *lam * trace;
-        }
-        let data = &linearized.data;
-        let mut squares: Vec<Lane> =
-            (0..data.len()).map(|k| self.misfit.square(&data[k], k, m, &x)).collect();
-        let known = noisy || tracks.iter().any(Track::is_to_place);
-        let leverage = |k: usize| self.misfit.leverage(&data[k], k, m, &inverse, &mean);
-        let mut leverages: Vec<Lane> =
-            (0..data.len()).map(|k| if known { leverage(k) } else { Lane::ZERO }).collect();
-        if noisy {
-            for k in 0..data.len() {
-                let factor = Lane::new(few(|l| of_lane(l).factors[k]));
-                squares[k] *= factor;
-                leverages[k] *= factor;
-            }
-        }
-        let (log_det, least) = (factors.log_det(), factors.least_pivot());
-        let lane_of = |x: &[Lane], l: usize| x.iter().map(|x| x.as_array()[l]).collect::<Vec<f64>>();
-        let of = |l: usize| Sums {
-            energies: lane_of(&energies, l),
-            freedoms: lane_of(&freedoms, l),
-            squares: lane_of(&squares, l),
-            leverages: lane_of(&leverages, l),
-            log_det: log_det.as_array()[l],
-            sound: least.as_array()[l] > 0.0 && log_det.as_array()[l].is_finite(),
-        };
-        (0..tracks.len()).map(of).collect()
-    }
-}
-
-/// [`PeriodicCorrection::fold`] for all lanes.
-fn fold_lanes(periodic: &PeriodicCorrection, x: &[Lane]) -> Vec<Lane> {
-    let columns: [Vec<f64>; LANES] = std::array::from_fn(|l| {
-        let mut column: Vec<f64> = x.iter().map(|x| x.as_array()[l]).collect();
-        periodic.fold(&mut column);
-        column
-    });
-    (0..columns[0].len()).map(|k| Lane::new(few(|l| columns[l][k]))).collect()
 }

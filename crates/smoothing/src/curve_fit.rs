@@ -1,6 +1,6 @@
 //! One curve during the iteration to the smoothing spline.
 
-use crate::adaptive::{Adaptive, Profile, at_times};
+use crate::adaptive::{Adaptive, Profile, Track, at_times};
 use crate::banded::Banded;
 use crate::chain::deviations;
 use crate::choice::Linear;
@@ -10,6 +10,7 @@ use crate::gauss_newton::{self, Pull};
 use crate::information::{self, Root};
 use crate::jacobi_operator::JacobiOperator;
 use crate::linearized::{Basis, LinearProblem, OVERLAP, Stencil};
+use crate::local::Local;
 use crate::misfit::Misfit;
 use crate::path::{Path, Position, moved, positions};
 use crate::problem::{
@@ -570,17 +571,22 @@ impl<'a> CurveFit<'a> {
         }
         let penalty = linearized.penalised;
         let lam: Vec<f64> = self.linearized.profile.iter().map(|profile| lam * profile).collect();
+        let used = self.positions.iter().zip(&weights).filter(|(_, w)| **w > 0.0);
+        let measured: Vec<Position> = used.map(|(position, _)| *position).collect();
+        let local = Local { linearized: &linearized, m, misfit: &misfit, periodic, accelerations };
         Adaptive {
+            basis: &linearized.basis,
+            penalised: penalty,
             m,
-            misfit: &misfit,
-            weights: &weights,
+            left: Some(m as f64 * (misfit.count(m) - linearized.null())),
+            process: linearized.free() as f64 - linearized.null(),
             positions: &self.positions,
-            periodic,
-            accelerations,
+            weights: &weights,
+            measured: &measured,
             lam: &lam,
             stiffest: linearized.balance() * penalty.stiffest(self.knots.len()),
             given: self.data.lam.is_some(),
-            linearized: &linearized,
+            sums: &|tracks: &[Track]| local.sums(tracks),
         }
         .profile(vary)
     }

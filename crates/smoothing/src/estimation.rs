@@ -10,14 +10,16 @@
 //! for coefficients c of all coordinates together. Its matrix is banded, with a border of one row per parameter. Each
 //! factor of a product has its own λ.
 
+use crate::adaptive::{Adaptive, Profile, Sums, Track};
 use crate::banded::{Banded, stride};
 use crate::bordered::{Bordered, Inverse};
 use crate::choice::{Look, STRAIGHT, Scoring, Straight, choose};
 use crate::elimination::eliminate;
 use crate::jacobi_operator::JacobiOperator;
-use crate::linearized::{Basis, LinearProblem, Stencil};
+use crate::linearized::{Basis, LinearProblem, Stencil, of_segment};
 use crate::path::Position;
-use crate::problem::{Criterion, EndConditions, Penalty};
+use crate::problem::{Adapt, Criterion, EndConditions, Penalty};
+use std::borrow::Cow;
 use symspline_core::memory;
 use symspline_core::monitor::checkpoint;
 use symspline_core::scalar::{Dual, Lane, Scalar, lane};
@@ -47,6 +49,8 @@ pub struct Factor<'a> {
     pub speeds: &'a [f64],
     /// The accelerations, likewise.
     pub accelerations: &'a [f64],
+    /// λ of every segment divided by λ; empty for one λ.
+    pub profile: &'a [f64],
     /// On a group whose moving frame the measurements refer to, the matrices of ξ ↦ [e, ξ]/2 for the vectors e of the
     /// frames; otherwise empty.
     pub halves: &'a [f64],
@@ -132,18 +136,24 @@ impl<'a> Estimation<'a> {
         let mut penalty = vec![0.0; size * stride(m)];
         let mut stiffness = [(); 2].map(|_| vec![0.0; size]);
         let mut energies = Vec::with_capacity(factors.len());
+        let one = &linearized;
         for (own, first) in factors.iter().zip(&first) {
             let dim = own.dim();
+            let mut linearized = Cow::Borrowed(one);
+            if !own.profile.is_empty() {
+                linearized.to_mut().set_profile(own.profile);
+            }
+            let linearized = &*linearized;
             let jacobi = (own.space.curvature() != 0.0)
-                .then(|| JacobiOperator::new(own.space, &linearized, own.speeds, own.accelerations));
+                .then(|| JacobiOperator::new(own.space, linearized, own.speeds, own.accelerations));
             let gradient = |jacobi: Option<&JacobiOperator>| match jacobi {
-                Some(jacobi) => jacobi.pull(&linearized, own.accelerations),
+                Some(jacobi) => jacobi.pull(linearized, own.accelerations),
                 None => linearized.stiffness(own.accelerations, &vec![0.0; own.accelerations.len()], dim),
             };
             // The gradient of the energy does not depend on the frame, but its matrix does.
             let moving = jacobi.clone().filter(|_| !own.halves.is_empty());
             let moving =
-                moving.map(|jacobi| jacobi.in_moving_frame(&linearized, own.accelerations, own.halves));
+                moving.map(|jacobi| jacobi.in_moving_frame(linearized, own.accelerations, own.halves));
             let gradients = [gradient(jacobi.as_ref()), gradient(moving.as_ref().or(jacobi.as_ref()))];
             for (stiffness, gradient) in stiffness.iter_mut().zip(gradients) {
                 for (row, own) in stiffness.chunks_exact_mut(m).zip(gradient.chunks_exact(dim)) {
@@ -152,8 +162,8 @@ impl<'a> Estimation<'a> {
             }
             let energy = |c: usize| linearized.energy(false, |at| lane(own.accelerations[at.1 * dim + c]));
             energies.push((0..dim).map(|c| energy(c).as_array()[0]).sum());
-            let jacobi = moving.or(jacobi).map(|jacobi| jacobi.with_matrix(&linearized));
-            add_penalty(&linearized, dim, *first, jacobi.as_ref(), m, &mut penalty);
+            let jacobi = moving.or(jacobi).map(|jacobi| jacobi.with_matrix(linearized));
+            add_penalty(linearized, dim, *first, jacobi.as_ref(), m, &mut penalty);
         }
         let mut pull = vec![0.0; p + size];
         priors.iter().zip(&mut pull).for_each(|((precision, off), pull)| *pull = -precision * off);
@@ -455,6 +465,111 @@ impl<'a> Estimation<'a> {
             freedom: (of_factors, freedoms.iter().sum()),
             information: factors.schur(),
             determined: factors.band_pivot() > 0.0,
+        }
+    }
+
+    /// How λ of a factor varies, given the λ of all factors in the unit of the times, and the positions at which it is
+    /// measured.
+    pub fn profile(&self, factor: usize, lams: &[f64], measured: &[Position]) -> Profile {
+        let basis = &self.linearized.basis;
+        let unit = self.linearized.penalised.unit(basis.spacing);
+        let lams: Vec<f64> = lams.iter().map(|lam| lam / unit).collect();
+        let segments = basis.knots() - 1;
+        // In place of the data, whose number is not that of their coordinates, the knots have the degrees of freedom.
+        let positions: Vec<Position> =
+            (0..=segments).map(|i| if i < segments { (i, 0.0) } else { (i - 1, 1.0) }).collect();
+        Adaptive {
+            basis,
+            penalised: self.linearized.penalised,
+            m: self.factors[factor].dim(),
+            left: None,
+            process: self.linearized.free() as f64 - self.linearized.null(),
+            positions: &positions,
+            weights: &vec![self.balance(factor); positions.len()],
+            measured,
+            lam: &vec![lams[factor]; segments],
+            stiffest: self.most(factor),
+            given: false,
+            sums: &|tracks: &[Track]| tracks.iter().map(|track| self.sums(factor, &lams, track)).collect(),
+        }
+        .profile(Adapt { lam: true, noise: false })
+    }
+
+    /// The solution of the linear problem with another λ on every segment of a factor, whose curvature is neglected.
+    fn sums(&self, factor: usize, lams: &[f64], track: &Track) -> Sums {
+        let (m, p, linearized) = (self.m, self.p, &self.linearized);
+        let (first, own) = (self.first[factor], &self.factors[factor]);
+        let (dim, basis, penalised) = (own.dim(), &linearized.basis, linearized.penalised);
+        let (count, segments) = (basis.count(), basis.knots() - 1);
+        let (wide, rows) = (count.min(4), stride(m));
+        let others: Vec<f64> = (0..lams.len()).map(|f| if f == factor { 0.0 } else { lams[f] }).collect();
+        let (mut band, corner) = self.matrix(&others);
+        let mut right = self.right(&others);
+        let ends: Vec<[Stencil; 2]> = (0..segments).map(|i| [0.0, 1.0].map(|s| basis.row(i, s, 2))).collect();
+        let metric = |i: usize| of_segment(penalised, basis.h(i));
+        let entry = |i: usize, a: usize, b: usize| {
+            let ([l, r], (own, other)) = (&ends[i], metric(i));
+            own * (l.factors[a] * l.factors[b] + r.factors[a] * r.factors[b])
+                + other * (l.factors[a] * r.factors[b] + r.factors[a] * l.factors[b])
+        };
+        let at = |i: usize, c: usize| own.accelerations[i * dim + c];
+        let mut energy = 0.0;
+        for (i, lam) in track.lams.iter().enumerate() {
+            let ([l, r], (on, beside)) = (&ends[i], metric(i));
+            for a in 0..wide {
+                for c in 0..dim {
+                    let row = (l.first + a) * m + first + c;
+                    for b in 0..=a {
+                        *band.entry(row, row - (a - b) * m) += lam * entry(i, a, b);
+                    }
+                    let (x, y) = (at(i, c), at(i + 1, c));
+                    let pull = l.factors[a] * (on * x + beside * y) + r.factors[a] * (beside * x + on * y);
+                    right[p + row] -= lam * pull;
+                }
+            }
+            for c in 0..dim {
+                let (x, y) = (at(i, c), at(i + 1, c));
+                energy += lam * (on * (x * x + y * y) + 2.0 * beside * x * y);
+            }
+        }
+        debug_assert_eq!(rows, band.width + 1);
+        let factors = Bordered::new(band, self.side.clone(), corner);
+        let mut x = right.clone();
+        factors.solve(1, &mut x);
+        let inverse = factors.inverse();
+        let fixed: f64 = others.iter().zip(&self.energies).map(|(lam, energy)| lam * energy).sum();
+        let gained: f64 = right.iter().zip(&x).map(|(b, x)| b * x).sum();
+        let (mut energies, mut freedoms) = (vec![0.0; segments], vec![0.0; segments]);
+        let process = (linearized.free() as f64 - linearized.null()) / segments as f64;
+        for (i, lam) in track.lams.iter().enumerate() {
+            let ([l, r], (on, beside)) = (&ends[i], metric(i));
+            for c in 0..dim {
+                let moved = |row: &Stencil| -> f64 {
+                    (0..wide).map(|a| row.factors[a] * x[p + (row.first + a) * m + first + c]).sum()
+                };
+                let (a, b) = (at(i, c) + moved(l), at(i + 1, c) + moved(r));
+                energies[i] += lam * (on * (a * a + b * b) + 2.0 * beside * a * b);
+                for a in 0..wide {
+                    for b in 0..=a {
+                        let twice = if a == b { 1.0 } else { 2.0 };
+                        let row = (l.first + a) * m + first + c;
+                        let value = inverse.band.at(row, row - (a - b) * m);
+                        freedoms[i] -= lam * twice * entry(i, a, b) * value / dim as f64;
+                    }
+                }
+            }
+            freedoms[i] += process;
+        }
+        let freedom = self.freedoms(&inverse);
+        let of_knot = |i: usize| freedom[p + i * m + first..][..dim].iter().sum::<f64>() / dim as f64;
+        Sums {
+            energies,
+            freedoms,
+            squares: Vec::new(),
+            leverages: (0..count).map(of_knot).collect(),
+            whole: self.squares + fixed + energy - gained,
+            log_det: factors.log_det() / dim as f64,
+            sound: factors.least_pivot() > 0.0,
         }
     }
 

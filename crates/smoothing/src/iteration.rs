@@ -1,5 +1,6 @@
 //! The iteration of an estimate: linearise all measurements, solve the banded problem, move the curve.
 
+use crate::adaptive::Profile;
 use crate::along::{Along, Bending};
 use crate::body::Body;
 use crate::estimation::{Estimate, Estimation, Factor, Matrices, Measurements};
@@ -54,6 +55,8 @@ pub struct Problem<'a> {
     pub constants: &'a [Constant],
     /// The derivative whose square is penalised.
     pub penalty: Penalty,
+    /// λ of every segment divided by λ, for each part; empty for one λ.
+    pub profiles: &'a [Vec<f64>],
 }
 
 /// How to iterate.
@@ -280,16 +283,24 @@ impl<'a> Problem<'a> {
 
     /// The integral of the squared acceleration or jerk of a part.
     fn energy(&self, state: &State, part: usize, bending: &Bending, monitor: &Monitor) -> f64 {
-        let h = self.knots.windows(2).map(|t| t[1] - t[0]);
+        let profile = &self.profiles[part];
+        let weight = |(i, t): (usize, &[f64])| profile.get(i).unwrap_or(&1.0) * (t[1] - t[0]);
+        let h = self.knots.windows(2).enumerate().map(weight);
         if self.penalty == Penalty::Jerk {
             let m = self.spaces[part].dim();
             let unit = self.spacing().powi(2);
             let jumps = bending.accelerations.windows(m + 1).map(|x| ((x[m] - x[0]) / unit).powi(2));
-            return jumps.zip(h.flat_map(|h| std::iter::repeat_n(h, m))).map(|(square, h)| square / h).sum();
+            let lengths = self.knots.windows(2).map(|t| t[1] - t[0]);
+            // The integral of the squared difference quotient.
+            let factors = h.zip(lengths).map(|(weight, h)| weight / (h * h));
+            return jumps
+                .zip(factors.flat_map(|x| std::iter::repeat_n(x, m)))
+                .map(|(square, x)| square * x)
+                .sum();
         }
         // Two points per segment.
         let root = 0.5 / 3f64.sqrt();
-        let inner = self.knots.iter().zip(h.clone());
+        let inner = self.knots.windows(2).map(|t| (t[0], t[1] - t[0]));
         let x: Vec<f64> = inner.flat_map(|(t, h)| [t + h * (0.5 - root), t + h * (0.5 + root)]).collect();
         let norms = self.evaluated(state, part, &x, Quantity::AccelerationNorm, monitor);
         norms.chunks_exact(2).zip(h).map(|(x, h)| 0.5 * h * (x[0] * x[0] + x[1] * x[1])).sum()
@@ -303,14 +314,14 @@ impl<'a> Problem<'a> {
         Ok(loss + lams.iter().enumerate().map(|(part, lam)| lam * energy(part)).sum::<f64>())
     }
 
-    /// Solves the linear problem at a curve.
-    fn solve(
+    /// The linear problem at a curve, which is passed to a function.
+    fn with_linear<T>(
         &self,
         (state, along, bending): (&State, &[Along], &[Bending]),
         (linear, weights): (&[Linearised], &[Vec<f64>]),
-        (given, near): (&[Option<f64>], &[Option<f64>]),
-        (criterion, monitor): (Criterion, &Monitor),
-    ) -> Linear {
+        monitor: &Monitor,
+        work: impl FnOnce(&Estimation) -> T,
+    ) -> T {
         let half_brackets = |part: usize| {
             let Some(body) = &self.bodies[part] else { return Vec::new() };
             let point = &state.points[part][..body.space.point_len()];
@@ -318,10 +329,12 @@ impl<'a> Problem<'a> {
             body.half_brackets(point, &along[part].frames(&self.knots[..1], point), monitor)
         };
         let halves: Vec<Vec<f64>> = (0..self.spaces.len()).map(half_brackets).collect();
-        let factors = self.spaces.iter().zip(bending).zip(&halves).map(|((space, bending), halves)| Factor {
+        let parts = self.spaces.iter().zip(bending).zip(&halves).zip(self.profiles);
+        let factors = parts.map(|(((space, bending), halves), profile)| Factor {
             space,
             speeds: &bending.speeds,
             accelerations: &bending.accelerations,
+            profile,
             halves,
         });
         let priors: Vec<(f64, f64)> =
@@ -339,9 +352,48 @@ impl<'a> Problem<'a> {
                 parameters: &own.parameters,
             });
         }
-        let found = problem.solve(given, near, criterion);
-        let lams: Vec<f64> = found.lams.iter().map(|(lam, _)| *lam).collect();
-        Linear { matrices: problem.matrices(&lams), squares: problem.residuals(), found }
+        work(&problem)
+    }
+
+    /// Solves the linear problem at a curve.
+    fn solve(
+        &self,
+        at: (&State, &[Along], &[Bending]),
+        measured: (&[Linearised], &[Vec<f64>]),
+        (given, near): (&[Option<f64>], &[Option<f64>]),
+        (criterion, monitor): (Criterion, &Monitor),
+    ) -> Linear {
+        self.with_linear(at, measured, monitor, |problem| {
+            let found = problem.solve(given, near, criterion);
+            let lams: Vec<f64> = found.lams.iter().map(|(lam, _)| *lam).collect();
+            Linear { matrices: problem.matrices(&lams), squares: problem.residuals(), found }
+        })
+    }
+
+    /// How λ varies in some parts, at a curve with one λ in each part.
+    pub fn varying(
+        &'a self,
+        state: &State,
+        lams: &[f64],
+        parts: &[usize],
+        monitor: &Monitor,
+    ) -> Result<Vec<Profile>, Invalid> {
+        let along = self.along(state);
+        let linear = self.linearised(state, &along, monitor)?;
+        let (weights, _) = self.weighted(&linear, &state.values);
+        let bending: Vec<Bending> = along.iter().map(Along::bending).collect();
+        let at = (state, &along[..], &bending[..]);
+        let (begin, end) = (self.knots[0], self.knots[self.knots.len() - 1]);
+        let measured = |part: usize| {
+            let terms = self.terms.iter().filter(|term| term.parts.contains(&part));
+            let times = terms.flat_map(|term| term.shifted(&state.values)).map(|t| t.clamp(begin, end));
+            let mut times: Vec<f64> = times.collect();
+            times.sort_by(f64::total_cmp);
+            positions(self.knots, &times)
+        };
+        Ok(self.with_linear(at, (&linear, &weights), monitor, |problem| {
+            parts.iter().map(|&part| problem.profile(part, lams, &measured(part))).collect()
+        }))
     }
 
     /// The step at the knots, m numbers each, as tangent vectors in every part.

@@ -36,6 +36,7 @@ mod integrated_wiener;
 pub mod iteration;
 mod jacobi_operator;
 mod linearized;
+mod local;
 mod loss;
 mod misfit;
 pub mod motion;
@@ -58,7 +59,7 @@ pub mod private {
     pub use crate::banded::{Banded, WIDTH};
     pub use crate::cyclic::{Factored, PeriodicCorrection};
     pub use crate::elimination::eliminate;
-    pub use crate::linearized::{Basis, LinearProblem, OVERLAP};
+    pub use crate::linearized::{Basis, LinearProblem, OVERLAP, Stencil};
 }
 
 pub use adaptive::Profile;

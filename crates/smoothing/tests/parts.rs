@@ -109,21 +109,24 @@ mod elimination {
 mod gaps {
     use symspline_core::scalar::{Lane, lane};
     use symspline_smoothing::estimation::Matrices;
-    use symspline_smoothing::gaps::{Block, Functionals, System};
-    use symspline_smoothing::private::{Banded, Basis, Factored, LinearProblem, OVERLAP, PeriodicCorrection};
+    use symspline_smoothing::gaps::{Block, Changes, Functionals, System};
+    use symspline_smoothing::private::{
+        Banded, Basis, Factored, LinearProblem, OVERLAP, PeriodicCorrection, Stencil,
+    };
     use symspline_smoothing::{EndCondition, EndConditions, Penalty, positions};
 
-    /// The coefficients and the variances at the data of a fit with weights.
+    /// The values and their variances at the data of a fit with weights and λ of the segments, and the accelerations at the
+    /// knots.
     fn fit(
         knots: &[f64],
         t: &[f64],
         y: &[f64],
         weights: &[f64],
-        lam: f64,
+        (lam, profile, penalty): (f64, &[f64], Penalty),
         ends: EndConditions,
-    ) -> (Vec<f64>, Vec<f64>) {
-        let linear =
-            LinearProblem::new(Basis::new(knots, ends), &positions(knots, t), weights, Penalty::Acceleration);
+    ) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
+        let mut linear = LinearProblem::new(Basis::new(knots, ends), &positions(knots, t), weights, penalty);
+        linear.set_profile(profile);
         let count = linear.basis.count();
         let periodic = linear.basis.is_closed().then(|| PeriodicCorrection::plain(OVERLAP, 1));
         let band = Banded::of(count, 3, |at| lane(linear.gram[at] + lam * linear.penalty[at]));
@@ -140,12 +143,16 @@ mod gaps {
         let mut c: Vec<f64> = x.iter().map(|x| x.as_array()[0]).collect();
         periodic.iter().for_each(|periodic| periodic.extend(&mut c));
         let inverse = matrix.inverse_band();
-        let values = linear.data.iter().map(|row| {
-            let mut out = [0.0];
-            row.apply(&c, &mut out);
-            out[0]
-        });
-        (values.collect(), linear.data.iter().map(|row| row.square(&inverse).as_array()[0]).collect())
+        let of_rows = |rows: &[Stencil]| -> Vec<f64> {
+            let value = |row: &Stencil| {
+                let mut out = [0.0];
+                row.apply(&c, &mut out);
+                out[0]
+            };
+            rows.iter().map(value).collect()
+        };
+        let variances = linear.data.iter().map(|row| row.square(&inverse).as_array()[0]).collect();
+        (of_rows(&linear.data), variances, of_rows(&linear.accelerations))
     }
 
     #[test]
@@ -157,17 +164,31 @@ mod gaps {
         let y: Vec<f64> = t.iter().map(|t| (0.7 * t).sin() + 0.3 * (9.0 * t).cos()).collect();
         let weights: Vec<f64> = t.iter().map(|t| 1.5 + t.cos()).collect();
         let lam = 0.4;
-        for ends in [EndConditions::Open([EndCondition::Natural; 2]), EndConditions::Periodic] {
-            let (values, _) = fit(&knots, &t, &y, &weights, lam, ends);
-            let linear = LinearProblem::new(
-                Basis::new(&knots, ends),
-                &positions(&knots, &t),
-                &weights,
-                Penalty::Acceleration,
-            );
+        let natural = EndConditions::Open([EndCondition::Natural; 2]);
+        let free = EndConditions::Open([EndCondition::NotAKnot; 2]);
+        let constant = [1.0; 20];
+        let varying: Vec<f64> = (0..20).map(|i| f64::from(i).sin().exp()).collect();
+        for (ends, penalty, profile) in [
+            (natural, Penalty::Acceleration, &constant[..]),
+            (EndConditions::Periodic, Penalty::Acceleration, &constant),
+            (natural, Penalty::Acceleration, &varying),
+            (EndConditions::Periodic, Penalty::Acceleration, &varying),
+            (free, Penalty::Jerk, &varying),
+        ] {
+            let how = (lam, profile, penalty);
+            let (values, _, accelerations) = fit(&knots, &t, &y, &weights, how, ends);
+            let mut linear =
+                LinearProblem::new(Basis::new(&knots, ends), &positions(&knots, &t), &weights, penalty);
+            linear.set_profile(profile);
+            let spacing = linear.basis.spacing;
+            let accelerations: Vec<f64> = accelerations.iter().map(|a| a / (spacing * spacing)).collect();
             let band = (0..linear.gram.len()).map(|at| linear.gram[at] + lam * linear.penalty[at]).collect();
             let matrices: Matrices = [band, Vec::new(), Vec::new()];
-            let system = System::new(&knots, ends, 1, &matrices, &[1.0]);
+            // λ is 0.7 in the segments of a block.
+            let changes: Vec<f64> = profile.iter().map(|x| (0.7 - lam * x) * penalty.unit(spacing)).collect();
+            let changes = Changes { lam: &changes, accelerations: &accelerations, penalised: penalty };
+            let plain_system = System::new(&knots, ends, 1, &matrices, &[1.0]);
+            let system = System::new(&knots, ends, 1, &matrices, &[1.0]).with_changes(Some(changes));
             let firsts: Vec<usize> = linear.data.iter().map(|row| row.first).collect();
             let rows = |scale: &dyn Fn(usize) -> f64| -> Vec<f64> {
                 linear
@@ -181,22 +202,22 @@ mod gaps {
             let residuals: Vec<f64> = (0..t.len()).map(|k| weights[k].sqrt() * (y[k] - values[k])).collect();
             // The last block wraps around to the start, and the second one is at an end.
             let lists: [Vec<usize>; 3] = [(10..17).collect(), (30..40).collect(), vec![37, 38, 39, 0, 1, 2]];
-            for list in &lists {
+            for (list, segments) in lists.iter().zip([4..8, 14..20, 18..22]) {
                 let all = Functionals { firsts: &firsts, factors: &weighed, sides: &[] };
                 let probes = Functionals { firsts: &firsts, factors: &plain, sides: &[] };
-                let found = system.without(
-                    &all,
-                    &residuals,
-                    1,
-                    &probes,
-                    &[Block { omitted: list, probes: 0..t.len(), segments: 0..0 }],
-                );
                 let fewer: Vec<f64> =
                     (0..t.len()).map(|k| if list.contains(&k) { 0.0 } else { weights[k] }).collect();
-                let (again, variances) = fit(&knots, &t, &y, &fewer, lam, ends);
-                for k in 0..t.len() {
-                    assert!((values[k] + found.values[k] - again[k]).abs() < 1e-10);
-                    assert!((found.variances[k] - variances[k]).abs() < 1e-9 * variances[k].max(1.0));
+                let mut changed = profile.to_vec();
+                segments.clone().for_each(|i| changed[i % 20] = 0.7 / lam);
+                for (system, profile) in [(&plain_system, profile), (&system, &changed)] {
+                    let block = Block { omitted: list, probes: 0..t.len(), segments: segments.clone() };
+                    let found = system.without(&all, &residuals, 1, &probes, &[block]);
+                    let how = (lam, profile, penalty);
+                    let (again, variances, _) = fit(&knots, &t, &y, &fewer, how, ends);
+                    for k in 0..t.len() {
+                        assert!((values[k] + found.values[k] - again[k]).abs() < 1e-9);
+                        assert!((found.variances[k] - variances[k]).abs() < 1e-8 * variances[k].max(1.0));
+                    }
                 }
             }
         }

@@ -18,7 +18,7 @@ use symspline_engine::smoothing::iteration::{Constant, Failure, Invalid, Linear,
 use symspline_engine::smoothing::motion::{BadRow, Motion};
 use symspline_engine::smoothing::posterior::Posterior;
 use symspline_engine::smoothing::terms::{Change, Derivatives, Linearised, Residuals, Sensor, Term};
-use symspline_engine::smoothing::{Criterion, EndCondition, EndConditions, Loss, Penalty};
+use symspline_engine::smoothing::{Criterion, EndCondition, EndConditions, Loss, Penalty, Profile};
 use symspline_engine::space::{Ambient, Erased, Origin};
 
 type Array<'py> = PyReadonlyArrayDyn<'py, f64>;
@@ -112,9 +112,17 @@ type TermOf<'py> = (
 );
 
 /// A problem: the parts of the space; for those that are groups with a metric that is invariant on both sides, the array
-/// `Body::inverse`; the knots; the penalty; the means and precisions (p, 2) of the parameters; and the measurements.
-type ProblemOf<'py> =
-    (Vec<PyRef<'py, Handle>>, Vec<Option<Array<'py>>>, Array<'py>, String, Array<'py>, Vec<TermOf<'py>>);
+/// `Body::inverse`; the knots; the penalty; the means and precisions (p, 2) of the parameters; the measurements; and for
+/// each part λ of the segments (K − 1,) divided by λ, or None for one λ.
+type ProblemOf<'py> = (
+    Vec<PyRef<'py, Handle>>,
+    Vec<Option<Array<'py>>>,
+    Array<'py>,
+    String,
+    Array<'py>,
+    Vec<TermOf<'py>>,
+    Vec<Option<Array<'py>>>,
+);
 
 /// A call of Python that an estimate needs.
 enum Request {
@@ -186,7 +194,7 @@ fn with_problem<T: Send>(
     max_iter: usize,
     work: impl FnOnce(&Problem, &dyn Fn(usize), &Monitor) -> Result<T, Invalid> + Send,
 ) -> PyResult<Result<T, Vec<f64>>> {
-    let (handles, groups, knots, penalty, constants, terms) = given;
+    let (handles, groups, knots, penalty, constants, terms, profiles) = given;
     let (knots, penalty) = (in_order(knots)?, penalty_named(penalty)?);
     let spaces: Vec<Erased> = handles.iter().map(|handle| handle.space.get()).collect();
     let shapes: Vec<Vec<usize>> = spaces.iter().map(shape_of).collect();
@@ -250,8 +258,18 @@ fn with_problem<T: Send>(
     let bodies = bodies.collect::<PyResult<Vec<_>>>()?;
     let constants: Vec<Constant> =
         in_order(constants)?.chunks_exact(2).map(|x| Constant { mean: x[0], precision: x[1] }).collect();
-    let problem =
-        Problem { spaces: &spaces, bodies: &bodies, knots, terms: &read, constants: &constants, penalty };
+    let profile =
+        |array: &Option<Array>| array.as_ref().map_or(Ok(Vec::new()), |x| Ok(in_order(x)?.to_vec()));
+    let profiles = profiles.iter().map(profile).collect::<PyResult<Vec<Vec<f64>>>>()?;
+    let problem = Problem {
+        spaces: &spaces,
+        bodies: &bodies,
+        knots,
+        terms: &read,
+        constants: &constants,
+        penalty,
+        profiles: &profiles,
+    };
     let report = |number: usize| {
         if progress.is_some() {
             desk.ask(Request::Progress(number));
@@ -500,6 +518,30 @@ pub fn linearise<'py>(
     })?;
     let found = found.ok().flatten();
     found.map(|found| found.iter().map(|own| rows(py, own, &[])).collect()).transpose()
+}
+
+/// How λ varies in some parts, at the spline through points with one λ in each part: gains, and λ of the segments divided by
+/// their geometric mean, or None if λ does not vary.
+#[pyfunction]
+pub fn varying_lams<'py>(
+    py: Python<'py>,
+    problem: ProblemOf<'py>,
+    points: Vec<Array<'py>>,
+    values: Array<'py>,
+    lams: Vec<f64>,
+    parts: Vec<usize>,
+) -> PyResult<Vec<(f64, Option<Out<'py>>)>> {
+    let (points, values) = (owned(&points)?, in_order(&values)?.to_vec());
+    let found = with_problem(py, &problem, true, None, 0, |problem, _, monitor| {
+        let state = problem.fitted(points, values, monitor).ok_or(Invalid::Start)?;
+        problem.varying(&state, &lams, &parts, monitor)
+    })?;
+    let profiles = found.unwrap_or_default();
+    let of = |profile: &Profile| {
+        let lam = &profile.lam;
+        Ok((profile.gain, (!lam.is_empty()).then(|| array(py, &[lam.len()], lam)).transpose()?))
+    };
+    profiles.iter().map(of).collect()
 }
 
 /// The distance of an estimate from the minimum in standard deviations, from the band of A and rows of normal numbers.

@@ -110,6 +110,7 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     guarded(m, wrap_pyfunction!(estimation::frames_along, m)?)?;
     guarded(m, wrap_pyfunction!(estimation::estimate, m)?)?;
     guarded(m, wrap_pyfunction!(estimation::linearise, m)?)?;
+    guarded(m, wrap_pyfunction!(estimation::varying_lams, m)?)?;
     guarded(m, wrap_pyfunction!(estimation::distance_from_minimum, m)?)?;
     guarded(m, wrap_pyfunction!(estimation::posterior_covariance, m)?)?;
     guarded(m, wrap_pyfunction!(estimation::posterior_freedom, m)?)?;

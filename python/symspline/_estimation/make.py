@@ -35,7 +35,7 @@ from .._curves.options import check_policies
 from .._curves.solve import DEFAULTS
 from .._smoothing import SmoothingReport, SmoothingSpline, SmoothingWarning, make_smoothing_spline
 from .._smoothing.audit import warn_of_bounds
-from .._smoothing.noise import grouped, join, per_part, smoothed_spaces
+from .._smoothing.noise import check_profiles, grouped, join, read_smoothness, smoothed_spaces
 from .._smoothing.report import Parameter
 from .._smoothing.solve import Knots, thin_knots
 from .._smoothing.spline import AnySmoothingSpline
@@ -64,7 +64,7 @@ from ..measure import (
     present_in,
 )
 from .audit import audit, unit_hints
-from .problem import PointTerm, Setup, Solution, Term, bind
+from .problem import PointTerm, Setup, Solution, Term, bind, with_varying_lams
 from .search import (
     Search,
     Starts,
@@ -160,9 +160,11 @@ def estimate(
     penalty : {"acceleration", "jerk"}, optional
         The derivative whose squared integral is the penalty. The default is ``"jerk"`` if `BodyRates` or `Velocities`
         are among the measurements, and ``"acceleration"`` otherwise. Use ``"jerk"`` for vehicles and accelerometers.
-    lam : float or tuple, optional
+    lam : float, "adaptive", array_like or tuple, optional
         Weight λ ≥ 0 of the penalty, for products and poses also a tuple with one entry per part. None, the default,
-        lets `criterion` choose λ.
+        lets `criterion` choose λ. With ``"adaptive"``, λ varies along the curve if the measurements require it, as for
+        `make_smoothing_spline`. The standard deviations of the sensors are then taken as known. An array has one value
+        per segment between given knots.
     criterion : {"reml", "gcv", "cp"}, optional
         Criterion for λ, as for `make_smoothing_spline`. The default is ``"reml"``, and ``"gcv"`` for a single `Points`
         term. Cross-validation smooths slow effects such as biases away where sensors differ in number and accuracy,
@@ -292,7 +294,8 @@ def estimate(
     tol = checked_number(tol, "tol must be a number > 0", lambda x: 0 < x < np.inf)
     most = whole_number(max_iter, "max_iter", 1)
     spaces = smoothed_spaces(space)
-    lams = np.concatenate(per_part(space, spaces, lam, "lam", ()))
+    smoothness = read_smoothness(space, spaces, lam, ())
+    lams = np.concatenate([given_lam.lam for given_lam in smoothness])
     axis, shown, data = _knots(knots, given)
     if len(given) == 1 and isinstance(given[0], Points) and _is_plain(given[0]) and start is None:
         return _smoothed(
@@ -318,8 +321,23 @@ def estimate(
     _check_range(terms, times)
     if penalty == "jerk" and len(times) < 4:
         raise ValidationError(f"penalty='jerk' needs at least 4 knots, but there are {len(times)}")
+    check_profiles(smoothness, len(times) - 1, "the knots")
     setup = Setup(
-        spaces, times, terms, constants, penalty, criterion or "reml", gamma, tol, lams, most, isinstance(knots, str)
+        *(
+            spaces,
+            times,
+            terms,
+            constants,
+            penalty,
+            criterion or "reml",
+            gamma,
+            tol,
+            lams,
+            most,
+            isinstance(knots, str),
+        ),
+        adapts=tuple(given_lam.adapts for given_lam in smoothness),
+        profiles=tuple(None if part.profile is None else part.profile[0] for part in smoothness),
     )
     begin = Starts(setup, space, axis, start)
     if isinstance(knots, str):
@@ -328,6 +346,8 @@ def estimate(
         search = solved(setup, begin, progress)
         warn_of_turns(setup, shown)
         warn_of_gaps(shown, times, data)
+    setup, solution = with_varying_lams(setup, search.solution, progress)
+    search = search._replace(solution=solution)
     return _curve(setup, search, given, space, axis, shown, extrapolate, on_failure)
 
 
@@ -525,7 +545,7 @@ def _curve(
         gaps.append(long_gaps(setup, solution, number))
     for i in range(len(given)):
         residuals.append(_residuals_of(setup, solution, f"measurements[{i}]"))
-    smoothed = in_parts(solution.posterior, solution.reports, setup.spaces)
+    smoothed = in_parts(solution.posterior, solution.reports, setup.spaces, setup.profiles)
     curve = fitted._with_results(smoothed, parameters, gaps, tuple(given), tuple(residuals))
     if solution.failure:
         hints = unit_hints(setup.terms)

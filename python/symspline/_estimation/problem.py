@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from itertools import starmap
 from operator import itemgetter
@@ -580,6 +580,8 @@ def _points(given: Points, label: str, times: Doubles, space: AnySpace, parts: d
 # If the curve turns by more than this angle between two knots, the solution of the linear problem may differ from the
 # minimum. The difference is then estimated from this number of samples.
 _TURN, _SAMPLES = 0.9, 6
+# Number of times that the way in which λ varies is found.
+_ADAPTATIONS = 2
 _FAILURES = {
     "undetermined": "The measurements do not determine the curve: no measurement depends on one of its factors, or on "
     "one of its knots. Pass fewer knots, a larger lam, or more measurements.",
@@ -615,6 +617,10 @@ class Setup:
         Largest number of iterations.
     automatic : bool
         Whether the knots are still to be chosen.
+    adapts : tuple of bool
+        Whether λ varies along the curve if the measurements require it, for each part.
+    profiles : tuple of ndarray or None, shape (knots - 1,)
+        λ of the segments divided by λ, for each part; None for one λ.
     """
 
     spaces: tuple[Space, ...]
@@ -628,6 +634,8 @@ class Setup:
     lams: Doubles
     max_iter: int
     automatic: bool = False
+    adapts: tuple[bool, ...] = ()
+    profiles: tuple[Doubles | None, ...] = ()
 
     @property
     def bc_type(self) -> Literal["natural", "not-a-knot"]:
@@ -640,6 +648,13 @@ class Setup:
         _ = self._arrays
         other = copy(self)
         other.knots = knots
+        return other
+
+    def with_profiles(self, profiles: Sequence[Doubles | None]) -> Setup:
+        """Return the same problem with λ of the segments of each part."""
+        _ = self._arrays
+        other = copy(self)
+        other.profiles = tuple(profiles)
         return other
 
     @cached_property
@@ -665,7 +680,8 @@ class Setup:
         starts = [np.empty(0)]
         for name, constant in self.constants.items():
             starts.append(values.get(name, constant.start))
-        problem = handles, groups, self.knots, self.penalty, priors, terms
+        profiles = list(self.profiles) or [None] * len(self.spaces)
+        problem = handles, groups, self.knots, self.penalty, priors, terms, profiles
         return problem, list(map(_doubles, self.spaces, points)), np.concatenate(starts)
 
     @cached_property
@@ -783,6 +799,29 @@ def iterate(
         raw["turn"],
         "" if failed is None else _FAILURES[failed].format(step=step, number=number, tol=setup.tol),
     )
+
+
+def with_varying_lams(setup: Setup, solution: Solution, progress: Progress | None) -> tuple[Setup, Solution]:
+    """Let λ vary along the curve where the measurements require it, from a solution with one λ in each part."""
+    parts = [part for part, adapts in enumerate(setup.adapts) if adapts]
+    if not parts or solution.failure:
+        return setup, solution
+    varied, best = setup, solution
+    for _ in range(_ADAPTATIONS):
+        lams = [float(report.lam) for report in best.reports]
+        gains: list[float | None] = [None] * len(setup.spaces)
+        profiles: list[Doubles | None] = list(setup.profiles) or [None] * len(setup.spaces)
+        varying = _core.varying_lams(*setup.in_core(best.points, best.values), lams, parts)
+        for part, (gain, profile) in zip(parts, varying, strict=True):
+            gains[part], profiles[part] = gain, profile
+        varied = setup.with_profiles(profiles)
+        constant = not any(profile is not None for _, profile in varying)
+        best = solution if constant else iterate(varied, best.points, best.values, progress)
+        pairs = zip(best.reports, gains, strict=True)
+        best = best._replace(reports=[replace(report, gain=gain) for report, gain in pairs])
+        if best.failure or constant:
+            break
+    return varied, best
 
 
 def distance_from_minimum(setup: Setup, solution: Solution) -> float:

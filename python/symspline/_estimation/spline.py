@@ -76,6 +76,9 @@ def long_gaps(setup: Setup, solution: Solution, part: int) -> LongGaps | None:
             weights.append(term.scales**-2.0 if isinstance(term, PointTerm) else np.zeros(len(term.times)))
             has_points |= isinstance(term, PointTerm)
     lam = float(solution.reports[part].lam)
+    if setup.profiles and (profile := setup.profiles[part]) is not None:
+        h = np.diff(setup.knots)
+        lam *= float(h.sum() / np.sum(h / profile))
     if solution.failure or not has_points or not 0 < lam < np.inf:
         return None
     order = np.argsort(np.concatenate(times_of_terms), kind="stable")
@@ -161,15 +164,20 @@ def _are_partial(points: Points, factor: AnySpace) -> bool:
     return partial and np.shape(y)[1:] != factor.point_shape
 
 
-def in_parts(posterior: Posterior, reports: Sequence[SmoothingReport], spaces: Sequence[Space]) -> list[Smoothed]:
-    """Return the result in each part.
+def in_parts(
+    posterior: Posterior,
+    reports: Sequence[SmoothingReport],
+    spaces: Sequence[Space],
+    profiles: Sequence[Doubles | None] = (),
+) -> list[Smoothed]:
+    """Return the result in each part. Profiles are λ of the segments divided by λ, if it varies.
 
     Given standard deviations are trusted, as with ``absolute_sigma`` of SciPy's ``curve_fit``.
     """
     first, results = 0, []
-    for report, space in zip(reports, spaces, strict=True):
+    for report, space, profile in zip(reports, spaces, profiles or [None] * len(spaces), strict=True):
         of_part = posterior._replace(first=first)
-        results.append(Smoothed(report, np.zeros((0, 4)), report.lam, 1.0, False, of_part))
+        results.append(Smoothed(report, np.zeros((0, 4)), report.lam, 1.0, False, of_part, profile=profile))
         first += space.dim
     return results
 
@@ -331,6 +339,7 @@ class EstimatedSpline(SmoothingSpline[P, Any]):
             "side": posterior.side,
             "corner": posterior.corner,
             "gaps": self._long_gaps,
+            **{f"profile_{i}": part.profile for i, part in enumerate(self._smoothed) if part.profile is not None},
         }
 
     @classmethod
@@ -351,7 +360,10 @@ class EstimatedSpline(SmoothingSpline[P, Any]):
                 raise ValidationError("the matrices do not match the parameters and knots")
         with entry("noise"):
             reports = [read_report(SmoothingReport, dict(numbers), ()) for numbers in state["noise"]]
-            smoothed = in_parts(Posterior(matrix, np.zeros((0, 0)), m, side, corner), reports, spaces)
+            profiles = [state.get(f"profile_{i}") for i in range(len(spaces))]
+            if any(profile is not None and profile.shape != (knots - 1,) for profile in profiles):
+                raise ValidationError("the profiles do not match the knots")
+            smoothed = in_parts(Posterior(matrix, np.zeros((0, 0)), m, side, corner), reports, spaces, profiles)
         with entry("gaps"):
             gaps = [read_long_gaps(entries) for entries in state.get("gaps", [None] * len(spaces))]
         return self._with_results(smoothed, parameters, gaps)

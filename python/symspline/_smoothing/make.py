@@ -44,6 +44,7 @@ from .noise import (
     Part,
     SmoothingData,
     at_times,
+    check_profiles,
     checked_ends,
     grouped,
     join,
@@ -348,7 +349,8 @@ def make_smoothing_spline(
         lams = [given.lam for given in smoothness]
     parts = parts_of(noisy, space, spaces, smoothness, noise_adapts, of_factors)
     every = knots_for(whole, knots)
-    has_profile = check_profiles(parts, every, knots is None)
+    which = "the times of the data, which are the knots," if knots is None else "the knots"
+    has_profile = check_profiles(smoothness, every.times.shape[-1] - 1, which)
     if knots is None and penalty == "jerk":
         every = in_long_gaps(every, whole)
     for needs, what, remedy in (
@@ -418,28 +420,6 @@ def make_smoothing_spline(
     if not far_data:
         warn_of_far_points([fitted.curve], [fitted.columns])
     return spline
-
-
-def check_profiles(parts: list[Part], knots: Knots, all_times: bool) -> bool:
-    """Return whether λ of segments is given.
-
-    Raises
-    ------
-    ValidationError
-        If the number of segments differs from that of the knots.
-    """
-    segments, given = knots.times.shape[-1] - 1, False
-    for part in parts:
-        if part.profile is not None:
-            given = True
-            if part.profile.shape[-1] != segments:
-                which = "the times of the data, which are the knots," if all_times else "the knots"
-                raise ValidationError(
-                    f"lam has {part.profile.shape[-1]} numbers per curve, one per segment, but {which} have {segments} "
-                    "segments. To repeat a fit, pass knots=curve.t and lam=curve.lam_at(x) with the middles x of its "
-                    "segments."
-                )
-    return given
 
 
 def with_adapted_noise(

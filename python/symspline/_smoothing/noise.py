@@ -492,9 +492,29 @@ def read_smoothness(space: Space, spaces: tuple[Space, ...], lam: Any, batch: tu
             )
         refuse(~((array > 0) & np.isfinite(array)), "lam", lambda i: "must be finite and > 0 in every segment")
         logarithms = np.log(array.reshape(-1, array.shape[-1]).astype(np.float64))
-        mean = logarithms.mean(axis=-1)
+        # The mean of equal numbers has a rounding error.
+        mean = np.where(np.ptp(logarithms, axis=-1) == 0, logarithms[:, 0], logarithms.mean(axis=-1))
         given.append(Smoothness(np.exp(mean), np.ascontiguousarray(np.exp(logarithms - mean[:, None]))))
     return given
+
+
+def check_profiles(smoothness: list[Smoothness], segments: int, which: str) -> bool:
+    """Return whether λ of segments is given. `which` describes the knots.
+
+    Raises
+    ------
+    ValidationError
+        If the number of segments differs from that of the knots.
+    """
+    profiles = [given.profile for given in smoothness if given.profile is not None]
+    for profile in profiles:
+        if profile.shape[-1] != segments:
+            raise ValidationError(
+                f"lam has {profile.shape[-1]} numbers per curve, one per segment, but {which} have {segments} "
+                "segments. To repeat a fit, pass knots=curve.t and lam=curve.lam_at(x) with the middles x of its "
+                "segments."
+            )
+    return bool(profiles)
 
 
 def read_adaptive_noise(space: Space, spaces: tuple[Space, ...], noise: Any) -> list[bool]:
