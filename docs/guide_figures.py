@@ -21,6 +21,7 @@ PAGES = (
     "smoothing",
     "start",
     "xarray",
+    "guide/adaptive",
     "guide/batches",
     "guide/bsplines",
     "guide/ends",

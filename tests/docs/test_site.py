@@ -16,6 +16,7 @@ import many_curves
 import paths_figures
 import pytest
 import smoothing
+import smoothing_adaptive
 from pages import blocks, run, with_output
 
 import symspline as ss
@@ -29,6 +30,7 @@ PAGES = [path for path in PAGES if not {"gallery", "generated", "backreferences"
 GALLERY = (ROOT / "examples/index.rst").read_text(encoding="utf-8")
 # Their own tests run or compare what they quote.
 OTHERS = {
+    "adaptive.md",
     "adding-a-space.md",
     "array_api.md",
     "from_geomstats.md",
@@ -152,7 +154,9 @@ def test_pages_show_the_figures_of_their_code():
         assert page.with_suffix(".png").exists() and f"]({page.stem}.png)" in page.read_text("utf-8"), name
 
 
-@pytest.mark.parametrize("module", [estimation, manifolds, many_curves, smoothing], ids=lambda module: module.__name__)
+@pytest.mark.parametrize(
+    "module", [estimation, manifolds, many_curves, smoothing, smoothing_adaptive], ids=lambda module: module.__name__
+)
 def test_a_page_has_a_place_for_every_table(module):
     text = module.PAGE.read_text(encoding="utf-8")
     for part in module.PARTS:

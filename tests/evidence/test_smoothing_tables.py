@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import smoothing
+import smoothing_adaptive
 import smoothing_others as others
 from pages import cells
 
@@ -36,3 +37,16 @@ def test_other_programs_are_compared_on_the_same_data():
     assert others.HEAD.splitlines()[0].count("|") == str(found).count("|") == 7
     straight, _, line = others.path(space, 50, 0.1, straight=True)
     assert np.ptp(space.distance(line[1:], line[:-1])) < 1e-14 and len(straight) == 50
+
+
+def test_tables_of_adaptive_smoothing(monkeypatch):
+    monkeypatch.setattr(smoothing_adaptive, "SEEDS", 2)
+    burst, sine = cells(smoothing_adaptive.lam_table((200,), ("burst between rests", "one sine")))
+    one, adaptive = (float(burst[1].replace("→", ",").split(",")[i]) for i in (0, 2))
+    assert adaptive < 0.7 * one and burst[2] == "2"
+    assert sine[2:4] == ["0", "1.00"]
+    (row,) = cells(smoothing_adaptive.noise_table(("one sine",)))
+    assert row[0] == "one sine" and len(row) == 7
+    burst, slow = cells(smoothing_adaptive.space_table(("S²",), 500))
+    assert float(burst[1]) < 0.7 and burst[2] == "2" and slow[1:3] == ["1.00", "0"]
+    assert len(cells(smoothing_adaptive.time_table((100,), 1))) == 2
