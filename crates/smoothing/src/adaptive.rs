@@ -9,7 +9,9 @@
 //!
 //! One start is not enough: where one λ takes a burst for noise, the curve of this λ does not show the burst. The second
 //! start is so rough that it shows every burst. The better result is taken if its likelihood is sufficiently larger than
-//! that of one λ; otherwise λ does not vary.
+//! that of one λ; otherwise λ does not vary. If both functions vary, each may take the other for itself. Further starts
+//! are then the solutions with one of them, and noise estimated from the deviations of data from their neighbours, in which
+//! motion hardly shows.
 //!
 //! Others estimate a few free values (Wood 2011; Rodríguez-Álvarez et al. 2019) or a spline with a penalty (Krivobokova et
 //! al. 2008).
@@ -57,6 +59,9 @@ pub struct Adaptive<'a> {
     pub positions: &'a [Position],
     /// See `positions`.
     pub weights: &'a [f64],
+    /// For noise that varies: squared deviations of the data from their neighbours per coordinate, in units of the variance
+    /// for one σ; NaN without neighbours.
+    pub deviations: &'a [f64],
     /// The positions of everything that was measured, in the order of time, between which there may be gaps.
     pub measured: &'a [Position],
     /// λ of every segment, and the largest λ that may be chosen.
@@ -79,6 +84,8 @@ pub struct Profile {
     pub lam: Vec<f64>,
     /// ln σ² at every knot, with the mean zero over the data; empty for one σ.
     pub noise: Vec<f64>,
+    /// Whether λ varies although only σ was asked for, so that σ takes motion for noise.
+    pub moves: bool,
 }
 
 /// Nodes at some of the knots, and hat functions: the nodes before segments and data, and their shares in the next one.
@@ -130,7 +137,7 @@ impl Profile {
     pub fn at_knots(&self, knots: &[f64], others: &[f64]) -> Self {
         let lam = if self.lam.is_empty() { Vec::new() } else { on_segments(knots, &self.lam, others) };
         let noise = if self.noise.is_empty() { Vec::new() } else { at_times(knots, &self.noise, others) };
-        Profile { gain: self.gain, lam, noise }
+        Profile { gain: self.gain, lam, noise, moves: self.moves }
     }
 
     /// Whether λ or σ varies.
@@ -268,6 +275,7 @@ enum Phase {
 }
 
 /// The scoring from one start for some of the functions.
+#[derive(Clone)]
 pub struct Track {
     /// What varies.
     pub vary: Adapt,
@@ -314,6 +322,22 @@ impl Track {
         self.noise = Walk { x: nodes.knots.iter().map(|knot| noise[*knot]).collect(), variance };
         self.lam = Walk { x, variance };
         self.nodes = nodes;
+    }
+
+    /// Sets the noise to the deviations of data from their neighbours.
+    fn start_noise(&mut self, deviations: &[f64]) {
+        let known = |k: usize| deviations.get(k).copied().filter(|x| x.is_finite());
+        let count = self.nodes.of_data.len();
+        let sum = |f: &dyn Fn(usize) -> f64| self.nodes.sums(&self.nodes.of_data, (0..count).map(f));
+        let squares = sum(&|k| known(k).unwrap_or(0.0));
+        let counts = sum(&|k| known(k).map_or(0.0, |_| 1.0));
+        if squares.iter().zip(&counts).any(|(square, count)| !(*square > 0.0 && *count > 0.0)) {
+            return;
+        }
+        self.noise.x = squares.iter().zip(counts).map(|(square, count)| (square / count).ln()).collect();
+        let mean = self.noise.x.iter().sum::<f64>() / self.noise.x.len() as f64;
+        self.noise.x.iter_mut().for_each(|x| *x -= mean);
+        self.factors = self.nodes.of_data.iter().map(|hat| (-at(&self.noise.x, hat)).exp()).collect();
     }
 
     /// ln σ² at the knots.
@@ -408,18 +432,51 @@ impl Track {
 impl Adaptive<'_> {
     /// The functions that are wanted, as far as they are accepted.
     pub fn profile(&self, vary: Adapt) -> Profile {
-        let none = Profile { gain: 0.0, lam: Vec::new(), noise: Vec::new() };
+        let none = Profile { gain: 0.0, lam: Vec::new(), noise: Vec::new(), moves: false };
         if self.lam.len() < 2 || !self.lam.iter().all(|lam| lam.is_finite() && *lam > 0.0) {
             return none;
         }
         let kinds = [(false, false), (true, false), (false, true), (true, true)];
         let kinds = kinds.map(|(lam, noise)| Adapt { lam, noise }).into_iter();
-        let kinds = kinds.filter(|kind| (vary.lam || !kind.lam) && (vary.noise || !kind.noise));
+        // Whether noise is motion shows only if both may vary.
+        let kinds = kinds.filter(|kind| (vary.noise || !kind.noise) && !(self.given && kind.lam));
         let starts = if self.given { 1 } else { 2 };
         let mut tracks: Vec<Track> = kinds
             .flat_map(|kind| (0..starts).map(move |start| (kind, start)))
             .map(|(k, s)| self.track(k, s))
             .collect();
+        self.run(&mut tracks);
+        if vary.noise {
+            // Both together may take one for the other from a start at which neither varies.
+            let mut again: Vec<Track> =
+                [(true, false), (false, true)].iter().filter_map(|kind| Self::best(&tracks, *kind)).collect();
+            self.run(&mut again);
+            tracks.extend(again);
+        }
+        let (constant, tracks): (Vec<_>, Vec<_>) =
+            tracks.into_iter().partition(|track| track.vary == Adapt::default());
+        let alone = constant.iter().map(|track| track.score).fold(f64::INFINITY, f64::min);
+        let gain = |track: &Track| alone - track.score;
+        let surplus = |track: &Track| gain(track) - GAIN * track.functions();
+        let best_of = |wanted: bool| {
+            let allowed = tracks.iter().filter(|track| (vary.lam || !track.vary.lam) == wanted);
+            allowed.max_by(|a, b| surplus(a).total_cmp(&surplus(b)))
+        };
+        let Some(best) = best_of(true) else { return none };
+        if !gain(best).is_finite() {
+            return none;
+        }
+        let moves = best_of(false).is_some_and(|other| surplus(other) > surplus(best).max(0.0));
+        if surplus(best) <= 0.0 {
+            return Profile { gain: gain(best), moves, ..none };
+        }
+        let noise = if best.vary.noise { self.centred(best) } else { Vec::new() };
+        let lam = if best.vary.lam { self.with_gaps(&best.lams) } else { Vec::new() };
+        Profile { gain: gain(best), lam, noise, moves }
+    }
+
+    /// Moves tracks until all are done.
+    fn run(&self, tracks: &mut [Track]) {
         for group in tracks.chunks_mut(LANES) {
             while group.iter().any(|track| track.phase != Phase::Done) {
                 checkpoint();
@@ -427,21 +484,17 @@ impl Adaptive<'_> {
                 group.iter_mut().zip(&sums).for_each(|(track, sums)| track.advance(self, sums));
             }
         }
-        let (constant, tracks): (Vec<_>, Vec<_>) =
-            tracks.into_iter().partition(|track| track.vary == Adapt::default());
-        let alone = constant.iter().map(|track| track.score).fold(f64::INFINITY, f64::min);
-        let gain = |track: &Track| alone - track.score;
-        let surplus = |track: &Track| gain(track) - GAIN * track.functions();
-        let Some(best) = tracks.iter().max_by(|a, b| surplus(a).total_cmp(&surplus(b))) else { return none };
-        if !gain(best).is_finite() {
-            return none;
-        }
-        if surplus(best) <= 0.0 {
-            return Profile { gain: gain(best), ..none };
-        }
-        let noise = if best.vary.noise { self.centred(best) } else { Vec::new() };
-        let lam = if best.vary.lam { self.with_gaps(&best.lams) } else { Vec::new() };
-        Profile { gain: gain(best), lam, noise }
+    }
+
+    /// The best track in which one of the functions varies, as a start for both.
+    fn best(tracks: &[Track], (lam, noise): (bool, bool)) -> Option<Track> {
+        let alike =
+            tracks.iter().filter(|track| track.vary == Adapt { lam, noise } && track.score.is_finite());
+        let best = alike.min_by(|a, b| a.score.total_cmp(&b.score))?;
+        let mut both = best.clone();
+        both.vary = Adapt { lam: true, noise: true };
+        (both.phase, both.settled, both.score) = (Phase::Steps(1, 0), false, f64::INFINITY);
+        Some(both)
     }
 
     /// ln σ² at the knots, with the mean zero over the data.
@@ -537,6 +590,9 @@ impl Adaptive<'_> {
         };
         let ones: Vec<f64> = self.weights.iter().map(|w| f64::from(*w > 0.0)).collect();
         track.place(self.nodes_at(&ones, used, DATA), self);
+        if vary.lam && vary.noise {
+            track.start_noise(self.deviations);
+        }
         track
     }
 

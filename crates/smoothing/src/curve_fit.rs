@@ -573,6 +573,8 @@ impl<'a> CurveFit<'a> {
         let lam: Vec<f64> = self.linearized.profile.iter().map(|profile| lam * profile).collect();
         let used = self.positions.iter().zip(&weights).filter(|(_, w)| **w > 0.0);
         let measured: Vec<Position> = used.map(|(position, _)| *position).collect();
+        let deviations =
+            if vary.noise { misfit.deviations(&weights, self.data.times, m) } else { Vec::new() };
         let local = Local { linearized: &linearized, m, misfit: &misfit, periodic, accelerations };
         Adaptive {
             basis: &linearized.basis,
@@ -582,6 +584,7 @@ impl<'a> CurveFit<'a> {
             process: linearized.free() as f64 - linearized.null(),
             positions: &self.positions,
             weights: &weights,
+            deviations: &deviations,
             measured: &measured,
             lam: &lam,
             stiffest: linearized.balance() * penalty.stiffest(self.knots.len()),
@@ -604,6 +607,8 @@ impl<'a> CurveFit<'a> {
             return;
         }
         self.vary(space.dim(), profile);
+        // The iteration begins here if it has to begin again.
+        self.first.clone_from(&self.points);
         self.progress.restart(if self.data.lam.is_some() { Lam::Same } else { Lam::Anew });
         (self.strays, self.before, self.retreats, self.objective) = (0, None, 0, f64::INFINITY);
     }

@@ -486,6 +486,7 @@ impl<'a> Estimation<'a> {
             process: self.linearized.free() as f64 - self.linearized.null(),
             positions: &positions,
             weights: &vec![self.balance(factor); positions.len()],
+            deviations: &[],
             measured,
             lam: &vec![lams[factor]; segments],
             stiffest: self.most(factor),

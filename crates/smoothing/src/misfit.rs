@@ -259,6 +259,37 @@ impl<'a> Misfit<'a> {
         (0..linearized.data.len()).fold(Lane::ZERO, |sum, k| sum + self.square(&linearized.data[k], k, m, x))
     }
 
+    /// Squared deviations of residuals from those of the data before and after them, interpolated in time, per coordinate and
+    /// in units of their variance; NaN at the ends and without weight.
+    pub fn deviations(&self, weights: &[f64], times: &[f64], m: usize) -> Vec<f64> {
+        let residuals = match self {
+            Misfit::Numbers { residuals, .. } => residuals,
+            Misfit::Matrices { seen, .. } => &seen.residuals,
+        };
+        let of_weights = |k: usize| match self {
+            Misfit::Numbers { .. } => weights[k],
+            // Whitened residuals have variance one.
+            Misfit::Matrices { .. } => 1.0,
+        };
+        let used: Vec<usize> = (0..weights.len()).filter(|&k| weights[k] > 0.0).collect();
+        let mut out = vec![f64::NAN; weights.len()];
+        for near in used.windows(3) {
+            let [a, b, c] = [0, 1, 2].map(|i| near[i]);
+            let whole = times[c] - times[a];
+            if whole > 0.0 {
+                let share = (times[b] - times[a]) / whole;
+                let at = |k: usize, i: usize| residuals[k * m + i];
+                let deviation = |i: usize| at(b, i) - share * at(c, i) - (1.0 - share) * at(a, i);
+                let square = (0..m).map(|i| deviation(i).powi(2)).sum::<f64>() / m as f64;
+                let variance = 1.0 / of_weights(b)
+                    + share.powi(2) / of_weights(c)
+                    + (1.0 - share).powi(2) / of_weights(a);
+                out[b] = square / variance;
+            }
+        }
+        out
+    }
+
     /// The present weighted sum of squares.
     pub fn rss_now(&self, m: usize) -> f64 {
         let square = |r: &[f64]| r.iter().map(|x| x * x).sum::<f64>();

@@ -137,7 +137,7 @@ impl Progress {
             self.choose(linear, robust.criterion(asked));
         }
         let lam = self.lam.unwrap_or(0.0);
-        self.expect(space, speeds, lam);
+        self.expect(space, speeds, lam, &linear.linearized.profile);
         lam
     }
 
@@ -160,14 +160,19 @@ impl Progress {
 
     /// The expected contraction of the linearised solver without curvature in its matrix: `K²|γ'|²√(λ/w)`, with the
     /// mean squared speed and the weight w per time where data are sparse. √(λ/w) is the square of the time over which
-    /// the data are averaged; for the jerk it is the cube root.
-    fn expect(&mut self, space: &Erased, speeds: &[f64], lam: f64) {
+    /// the data are averaged; for the jerk it is the cube root. If λ varies, the largest contraction of a segment counts.
+    fn expect(&mut self, space: &Erased, speeds: &[f64], lam: f64, profile: &[f64]) {
         let m = space.dim();
         let knots = speeds.len() / m;
-        let square = speeds.iter().map(|u| u * u).sum::<f64>() / knots as f64;
         // Groups without a metric have no curvature bound K.
         let k = if space.curvature().is_nan() { 1.0 } else { space.curvature() };
         let exponent = 2.0 / f64::from(self.penalty.power() + 1);
+        let square = if profile.iter().all(|x| *x == 1.0) {
+            speeds.iter().map(|u| u * u).sum::<f64>() / knots as f64
+        } else {
+            let of_segment = |(u, x): (&[f64], &f64)| u.iter().map(|u| u * u).sum::<f64>() * x.powf(exponent);
+            speeds.chunks_exact(m).zip(profile).map(of_segment).fold(0.0, larger)
+        };
         self.report.kappa = k * k * square * (lam / self.density).powf(exponent);
         self.with_curvature |=
             self.report.kappa > SLOW && m.saturating_pow(3).saturating_mul(knots) <= COUPLED;

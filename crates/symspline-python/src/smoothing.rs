@@ -33,7 +33,7 @@ type Smoothed<'py> = (
     Bound<'py, PyArrayDyn<f64>>,
     Bound<'py, PyTuple>,
     Systems<'py>,
-    Option<[Bound<'py, PyArrayDyn<f64>>; 3]>,
+    Option<[Bound<'py, PyArrayDyn<f64>>; 4]>,
 );
 
 type Systems<'py> = (Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>, usize);
@@ -195,14 +195,15 @@ fn smooth_factor<'py>(
     ))
 }
 
-/// λ of the segments divided by their geometric mean, ln σ² at the knots, and the gain, for all curves.
+/// λ of the segments divided by their geometric mean, ln σ² at the knots, the gain, and one if noise may be motion, for all
+/// curves.
 fn profiles<'py>(
     py: Python<'py>,
     batch: &[usize],
     knots: usize,
     found: &[Smooth],
-) -> PyResult<[Bound<'py, PyArrayDyn<f64>>; 3]> {
-    let column = |tail: &[usize], usual: f64, of: fn(&Profile) -> &[f64]| {
+) -> PyResult<[Bound<'py, PyArrayDyn<f64>>; 4]> {
+    let column = |tail: &[usize], usual: f64, of: fn(&Profile) -> Vec<f64>| {
         let out = zeros(py, &[batch, tail].concat())?;
         let mut write = out.readwrite();
         let rows = write.as_slice_mut()?;
@@ -210,16 +211,17 @@ fn profiles<'py>(
         let size = tail.iter().product::<usize>();
         for (row, smooth) in rows.chunks_exact_mut(size.max(1)).zip(found) {
             if let Some(numbers) = smooth.profile.as_ref().map(of).filter(|numbers| !numbers.is_empty()) {
-                row.copy_from_slice(numbers);
+                row.copy_from_slice(&numbers);
             }
         }
         drop(write);
         PyResult::Ok(out)
     };
     Ok([
-        column(&[knots - 1], 1.0, |profile| &profile.lam)?,
-        column(&[knots], 0.0, |profile| &profile.noise)?,
-        column(&[], f64::NAN, |profile| std::slice::from_ref(&profile.gain))?,
+        column(&[knots - 1], 1.0, |profile| profile.lam.clone())?,
+        column(&[knots], 0.0, |profile| profile.noise.clone())?,
+        column(&[], f64::NAN, |profile| vec![profile.gain])?,
+        column(&[], 0.0, |profile| vec![f64::from(u8::from(profile.moves))])?,
     ])
 }
 

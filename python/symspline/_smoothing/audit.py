@@ -120,6 +120,7 @@ def audit(
     if not unique:
         _warn_of_minima(space, fits)
     warn_of_bounds(space, reports, trusted, counts)
+    _warn_of_adaptation(space, fits)
     if not is_silent(SmoothingWarning):
         _warn_of_residuals(space, noisy, fits)
         if fits[0].result.smoothed.penalty == "acceleration" and noisy.times.shape[-1] >= _DATA:
@@ -211,6 +212,27 @@ _MINIMA = {
         "velocity is known, remove this rotation from the data first."
     ),
 }
+
+
+def _warn_of_adaptation(space: Space, fits: list[Fitted]) -> None:
+    """Warn if λ and σ should vary in another way along a curve."""
+    gains = [np.asarray(0.0 if fit.report.gain is None else fit.report.gain, np.float64) for fit in fits]
+    if first := _first(space, [np.isnan(gain) & fit.converged for gain, fit in zip(gains, fits, strict=True)]):
+        _, index, of = first
+        warn(
+            f"The smoothing{of} did not converge with a lam or a noise level that varies along the curve. The result "
+            "has one of each. Pass method='newton', or more knots where the motion is fast.",
+            SmoothingWarning,
+            index,
+        )
+    if first := _first(space, [fit.result.moves & fit.converged for fit in fits]):
+        _, index, of = first
+        warn(
+            f"The noise of the data{of} may be motion: the data are far more likely if lam varies along the curve, "
+            "too. Pass lam='adaptive' with noise='adaptive'.",
+            SmoothingWarning,
+            index,
+        )
 
 
 # ---- the choice of λ ----
@@ -589,12 +611,15 @@ def varying(
     """
     smoothness, noise = tests
     messages = []
+    if t.dtype.kind == "f":
+        # A thousandth of the recording is accurate enough for a message.
+        t = np.round(t, max(0, 3 - int(np.floor(np.log10(np.ptp(t))))))
     score, (first, last), ratio = smoothness
     if score > _SMOOTHNESS and ratio > _FASTER and not adapts[0]:
         # A robust loss may have selected a run of outliers.
         remedy = (
             ", or the curve follows outliers. Plot the data, and pass weights of 0 for outliers. If there are none, "
-            "fit this part and the others separately"
+            "pass lam='adaptive'"
             if robust
             else ". The curve is too smooth there, and follows the noise elsewhere. Pass lam='adaptive'"
         )

@@ -541,6 +541,8 @@ class SmoothCurves(NamedTuple):
         Kind of the selection of a robust loss, which is 0 if it can be trusted, and the number of rejected data.
     minima : ndarray of int
         Kinds of the minima, see `best_of_starts`.
+    moves : ndarray of bool
+        Whether λ varies although only σ may do so.
     """
 
     points: Array
@@ -549,10 +551,11 @@ class SmoothCurves(NamedTuple):
     selection: NDArray[np.int_]
     rejected: NDArray[np.int_]
     minima: NDArray[np.int_]
+    moves: NDArray[np.bool_]
 
     def map(self, function: Callable[[Array], Array]) -> SmoothCurves:
         """Apply a function to all arrays, such as one that adds masked curves."""
-        columns = map(function, (self.selection, self.rejected, self.minima))
+        columns = map(function, (self.selection, self.rejected, self.minima, self.moves))
         return SmoothCurves(function(self.points), self.smoothed.map(function), self.states, *columns)
 
 
@@ -598,8 +601,9 @@ def smoothed(
         samples = Samples(t, points, part.noise.weights, at, len(small._point_shape), part.ends is None)
         best, minima = best_of_starts(small, samples, part.lam, Raw.of(raw), solve)
         if adapt and any(part.adapts) and at.shape[-1] > 2:
-            varying = (*factor[:7], np.ascontiguousarray(best.points), part.profile, part.adapts)
-            best = Raw.of(_core.smooth([varying], t, at, *how)[0])
+            start = np.ascontiguousarray(best.points)
+            varying = Raw.of(_core.smooth([(*factor[:7], start, part.profile, part.adapts)], t, at, *how)[0])
+            best = best.or_varying(varying)
         results.append(_smooth_curves(part, noisy, options, between, small, span, best, minima))
     return results
 
@@ -621,7 +625,9 @@ def _smooth_curves(
     state, iterations, lam, band_lam, at_bound, df, estimated, step, rate, _, exact, _, _, _, scale = shaped
     selection, rejected = raw.columns.selection.reshape(batch), raw.columns.rejected.reshape(batch)
     method = METHODS[int(np.any(exact))]
-    profile, noise_profile, gains = raw.profiles or (part.profile, None, None)
+    profile, noise_profile, gains, moves = raw.profiles or (part.profile, None, None, np.zeros(batch))
+    if part.profile is not None:
+        profile = part.profile
     if profile is not None:
         profile = profile.reshape(*batch, -1) if np.any(profile != 1) else None
     if noise_profile is not None and not noise_profile.any():
@@ -634,7 +640,8 @@ def _smooth_curves(
     posterior = Posterior.of(matrix, turn, size) if span is None or size == 1 else None
     result = Smoothed(report, raw.band, band_lam, scale, between, posterior, options.penalty, profile, noise_profile)
     points = numbers if span is None else span.embed(numbers)
-    return SmoothCurves(points, result, raw.columns.state, selection, rejected, minima.reshape(batch))
+    moves = moves.reshape(batch) != 0
+    return SmoothCurves(points, result, raw.columns.state, selection, rejected, minima.reshape(batch), moves)
 
 
 def faults_of(
@@ -752,6 +759,23 @@ class Raw(NamedTuple):
         """Return the results of one call of the core."""
         points, band, columns, system, profiles = result
         return cls(points, band, Columns(*columns), system, profiles)
+
+    def or_varying(self, other: Raw) -> Raw:
+        """Return other curves, whose λ or σ may vary, where they vary and converged, and otherwise these.
+
+        The gain of curves that vary but did not converge is NaN.
+        """
+        if other.profiles is None:
+            return other
+        lams, noises, gains, moves = other.profiles
+        count = len(self.columns.state)
+        varies = (lams.reshape(count, -1) != 1).any(axis=-1) | (noises.reshape(count, -1) != 0).any(axis=-1)
+        lost = varies & self.converged & ~other.converged
+        taken = varies & ~lost
+        rows = taken.reshape(gains.shape)[..., None]
+        profiles = [np.where(rows, lams, 1.0), np.where(rows, noises, 0.0)]
+        profiles += [np.where(lost.reshape(gains.shape), np.nan, gains), moves]
+        return self.where(taken, other)._replace(profiles=profiles)
 
     @property
     def converged(self) -> NDArray[np.bool_]:
