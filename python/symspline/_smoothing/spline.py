@@ -34,7 +34,7 @@ from .._splines.archive import (
 from .._splines.cubic import CubicSpline
 from .gaps import Calibration, Gap, calibration_of, warn_of_cubics, warn_of_gaps, warn_of_wide_bands, widest_band
 from .noise import Noise, SmoothingData, grouped, is_several, join, parts_of_factor, smoothed_spaces, split
-from .report import Index, Parameter, Posterior, SmoothingReport, frames_at, process_ratio
+from .report import Index, Parameter, Posterior, SmoothingReport, fields_of, frames_at, process_ratio
 from .solve import Smoothed
 
 if TYPE_CHECKING:
@@ -1011,7 +1011,7 @@ def noise_state(space: AnySpace, noisy: SmoothingData, smoothed: list[Smoothed])
     state: dict[str, Any] = {
         **times_state("data_t", noisy.t, noisy.time_axis),
         "noise": [
-            vars(of_part.report)
+            fields_of(of_part.report, of_part.profile is not None or of_part.noise_profile is not None)
             | {"band_lam": of_part.band_lam, "scale": of_part.sigma, "between": of_part.between}
             | {"penalty": of_part.penalty, "loss": noise.loss}
             # Version 1 has no matrices.
