@@ -12,7 +12,7 @@ OF_CURVES = {
     "Construct": "from_points fit",
     "Evaluate": "__call__ derivative grid section arc_length at_length speed transport lift frames",
     "Measure": "length bending_energy closest extrema solve",
-    "Uncertainty": "std cov band sample sigma residuals",
+    "Uncertainty": "std cov band sample sigma sigma_at lam_at residuals",
     "Cut and join": "restrict concatenate append reverse shift retime",
     "Differentiate by the data": "jvp vjp",
     "Plot and save": "plot animate save",
