@@ -324,7 +324,7 @@ def resample(
         The columns ``by``, the times, longitude and latitude under their names, ``sog`` in m/s, and ``cog`` in degrees
         clockwise from north. Times keep their time zone. With ``smooth=True`` there are the standard errors
         ``position_std`` (of each of the two coordinates, in metres), ``sog_std`` and ``cog_std``, and the smoothing
-        parameter ``lam``.
+        parameter ``lam`` at these times, which varies along a track with the option ``lam="adaptive"``.
 
         The column ``quality`` is categorical: ``"good"``; ``"lam at bound"`` for a smoothing spline whose λ is at a
         bound, so that the track is a great circle or is not smoothed; or ``"not converged"``, with
@@ -604,7 +604,7 @@ def _along(
         speed, speed_std = sog(spline, at, radius=radius, return_std=True)
         course, course_std = cog(spline, at, return_std=True)
         values |= {"sog": speed, "cog": course, "position_std": radius * spline.std(at)}
-        values |= {"sog_std": speed_std, "cog_std": course_std, "lam": spline.lam}
+        values |= {"sog_std": speed_std, "cog_std": course_std, "lam": spline.lam_at(at)}
         quality = "lam at bound" if spline.report.at_bound else quality
     else:
         values |= {"sog": sog(spline, at, radius=radius), "cog": cog(spline, at)}

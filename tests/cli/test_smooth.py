@@ -124,6 +124,10 @@ def test_contradicting_options(fails):
         ("--criterion reml", "--criterion is for noisy data; give --smooth, too"),
         ("--lam 1", "--lam is for noisy data; give --smooth, too"),
         ("--smooth b.csv", "unrecognized arguments: b.csv"),
+        ("--smooth adaptive b.csv", "unrecognized arguments: b.csv"),
+        ("--smooth=adaptve", "argument --smooth: invalid choice: 'adaptve'; did you mean adaptive?"),
+        ("--smooth adaptive --lam 1", "--lam gives one λ, and --smooth adaptive lets it vary; omit one of them"),
+        ("--noise adaptive", "--noise is for noisy data; give --smooth, too"),
         ("--smooth --criterion gvc", "invalid choice: 'gvc'; did you mean gcv?"),
         ("--smooth --criterion cp", "--criterion cp needs the noise; give it with --sigma"),
         ("--smooth --criterion gcv --lam 2", "--lam gives λ, which --criterion would choose; omit one of them"),
@@ -210,3 +214,68 @@ def test_motions_that_are_quick_are_no_outliers(run):
     x = np.concatenate([0.01 * np.arange(15), [5.0], 10 + 0.01 * np.arange(15)])
     write_table("a.csv", {"t": np.arange(31), "x": x + 0.001 * np.cos(np.arange(31))})
     assert "outlier" not in run("fit a.csv --space r:1 -o a.npz")
+
+
+def burst(kind):
+    """A slow motion with a burst, without one, or with a part of larger noise."""
+    rng = np.random.default_rng(0)
+    t = np.sort(rng.uniform(0, 60, 300))
+    y = 0.3 * np.sin(0.1 * np.pi * t)
+    if kind == "burst":
+        y += np.exp(-(((t - 30) / 1.8) ** 2) / 2) * np.sin(np.pi * (t - 30))
+    return t, y + np.where((t > 20) & (t < 40) & (kind == "noise"), 0.2, 0.02) * rng.standard_normal(300)
+
+
+ADAPTIVE = {"lam": "adaptive", "noise": "adaptive"}
+
+
+def test_smoothness_that_varies(run):
+    t, y = burst("burst")
+    write_table("b.csv", {"t": t, "x": y})
+    expected = ss.make_smoothing_spline(t, y[:, None], "r:1", lam="adaptive")
+    report = expected.report
+    for line in ("b.csv --smooth adaptive", "--smooth adaptive b.csv", "--smooth=adaptive b.csv"):
+        out = run(f"fit {line} --space r:1 -o b.npz")
+        near(ss.load("b.npz"), expected)
+        assert out.endswith(
+            f"converged: λ {report.lam:.3g} (varies), {report.df:.3g} degrees of freedom, noise {report.sigma:.3g}, "
+            f"gain {report.gain:.3g}\n"
+        )
+    assert f"λ {report.lam:.3g} (varies), " in run("info b.npz")
+    run("fit b.csv --space r:1 --smooth adaptive --criterion reml --penalty jerk --sigma 0.02 -o b.npz")
+    options = {"criterion": "reml", "penalty": "jerk", "sigma": 0.02}
+    near(ss.load("b.npz"), ss.make_smoothing_spline(t, y[:, None], "r:1", "adaptive", **options))
+
+
+def test_noise_that_varies_is_not_taken_for_outliers(run):
+    t, y = burst("noise")
+    write_table("b.csv", {"t": t, "x": y})
+    out = run("fit b.csv --space r:1 --smooth --noise adaptive -o b.npz")
+    expected = ss.make_smoothing_spline(t, y[:, None], "r:1", noise="adaptive")
+    near(ss.load("b.npz"), expected)
+    assert f"noise {expected.sigma:.3g} (varies), gain {expected.report.gain:.3g}\n" in out
+    y[150] += 3
+    write_table("b.csv", {"t": t, "x": y})
+    out = run("fit b.csv --space r:1 --smooth --noise adaptive -o b.npz", notes=True)
+    assert "b.csv, line 152: the point is probably an outlier, " in out
+
+
+def test_curves_of_which_some_vary_are_in_one_file(run):
+    curves = {kind: burst(kind) for kind in ("burst", "slow", "noise")}
+    rows = "".join(f"{kind},{s},{x}\n" for kind, (t, y) in curves.items() for s, x in zip(t, y, strict=True))
+    write("b.csv", "id,t,x\n" + rows)
+    out = run("fit b.csv --space r:1 --curve id --smooth adaptive --noise adaptive -o b.npz")
+    alone = {kind: ss.make_smoothing_spline(t, y[:, None], "r:1", **ADAPTIVE) for kind, (t, y) in curves.items()}
+    loaded = ss.load("b.npz")
+    for kind, curve in alone.items():
+        near(loaded[kind], curve)
+        assert np.array_equal(loaded[kind].lam_at(curve.t), curve.lam_at(curve.t))
+        assert np.array_equal(loaded[kind].sigma_at(curve.t), curve.sigma_at(curve.t))
+    assert " (varies in 1), " in out and "degrees of freedom" in out
+    run("check b.npz")
+
+
+def test_constant_smoothness_is_the_default(run):
+    out = run("fit a.csv --lonlat --smooth -o a.npz")
+    for line in ("--smooth a.csv", "a.csv --smooth constant --noise constant", "--smooth -- a.csv"):
+        assert run(f"fit --lonlat -o a.npz {line}") == out

@@ -74,6 +74,21 @@ def test_noisy_tracks_are_smoothed():
     assert len(geo.resample(twice, "10min", max_gap=3600, smooth=True)) == 200
 
 
+@pytest.mark.filterwarnings("ignore::symspline.SmoothingWarning")
+def test_smoothness_that_varies_along_a_track():
+    rng = np.random.default_rng(0)
+    t = np.sort(rng.uniform(0, 60, 300))
+    lat = 40 + 0.3 * np.sin(0.1 * np.pi * t) + np.exp(-(((t - 30) / 1.8) ** 2) / 2) * np.sin(np.pi * (t - 30))
+    when = np.datetime64("2026-01-01T00:00", "s") + (60 * t).astype("m8[s]")
+    track = pd.DataFrame({"time": when, "lon": 0.02 * rng.standard_normal(300), "lat": lat})
+    options = {"max_gap": 3600, "duplicates": "first", "smooth": True, "lam": "adaptive"}
+    table = geo.resample(track, "1min", time="time", **options)
+    points = geo.from_lonlat(track["lon"], track["lat"])
+    (curve,) = ss.fit_segments(when, points, "sphere:2", **options)
+    assert np.array_equal(table["lam"], curve.lam_at(table["time"].to_numpy()))
+    assert table["lam"].max() > 100 * table["lam"].min()
+
+
 def test_invalid_resampling_raises():
     for change, what in [
         (lambda t: {"by": "ship"}, "column 'ship' does not exist; the columns are mmsi, when, lon, lat"),

@@ -93,3 +93,74 @@ def test_dates_and_repeated_times():
     np.testing.assert_allclose(data_of(axes)[:, 0], date2num(dates), rtol=0, atol=2e-11)
     assert any(text.endswith("band 95 %, 1 long gap") for text in texts_of(figure))
     assert any(text.endswith("without data, acceleration not drawn") for text in texts_of(figure))
+
+
+def varying(kind, times=None, m=1):
+    """A slow motion in m coordinates and a burst or a part of larger noise, or both."""
+    rng = np.random.default_rng(0)
+    t = np.sort(rng.uniform(0, 60, 300))
+    y = np.outer(0.3 * np.sin(0.1 * np.pi * t), np.ones(m))
+    if kind != "noise":
+        y[:, 0] += np.exp(-(((t - 50) / 1.2) ** 2) / 2) * np.sin(1.5 * np.pi * (t - 50))
+    sigma = np.where((t > 20) & (t < 40) & (kind != "burst"), 0.2, 0.02)
+    return t, y + sigma[:, None] * rng.standard_normal((300, m))
+
+
+ADAPTIVE = {"lam": "adaptive", "noise": "adaptive"}
+
+
+def panels_of(figure, *names):
+    """Axes whose label begins with one of these names, in the order of the page."""
+    return [axes for axes in figure.axes if axes.get_ylabel().startswith(names)]
+
+
+def test_smoothness_and_noise_that_vary_have_panels():
+    t, y = varying("both")
+    spline = ss.make_smoothing_spline(t, y, "r:1", **ADAPTIVE)
+    figure = rendered(spline.plot())
+    lam, sigma = panels_of(figure, "λ", "noise σ")
+    assert (lam.get_ylabel(), sigma.get_ylabel()) == ("λ", "noise σ")
+    assert lam.get_yscale() == "log" and sigma.get_ylim()[0] == 0
+    assert lam.lines[0].get_drawstyle() == "steps-post"
+    x, values = lam.lines[0].get_data()
+    np.testing.assert_allclose(x, spline.t, rtol=1e-14)
+    np.testing.assert_allclose(values[:-1], spline.lam_at((spline.t[1:] + spline.t[:-1]) / 2), rtol=1e-15)
+    x, values = sigma.lines[0].get_data()
+    np.testing.assert_allclose(values, spline.sigma_at(x), rtol=1e-10)
+
+
+def test_constant_numbers_have_no_panels():
+    t, y = varying("burst")
+    assert not panels_of(ss.make_smoothing_spline(t, y, "r:1", 1.0, noise="adaptive").plot(), "λ")
+    (lam,) = panels_of(ss.make_smoothing_spline(t, y, "r:1", **ADAPTIVE).plot(), "λ", "noise σ")
+    assert lam.get_ylabel() == "λ"
+    t, y = varying("noise")
+    spline = ss.make_smoothing_spline(t, y, "r:1", **ADAPTIVE)
+    (sigma,) = panels_of(spline.plot(), "λ", "noise σ")
+    assert sigma.get_ylabel() == "noise σ"
+    batch = ss.make_smoothing_spline(t, np.stack([y, y - y.mean() + 0.1 * np.cos(t)[:, None]]), "r:1", **ADAPTIVE)
+    assert not panels_of(batch.plot(), "λ", "noise σ") and panels_of(batch[0].plot(), "noise σ")
+
+
+@pytest.mark.filterwarnings("ignore::symspline.SmoothingWarning")
+def test_panels_of_factors_and_units():
+    t, y = varying("both", m=3)
+    dates = np.datetime64("2024-05-01", "ns") + (1e9 * t).astype("m8[ns]")
+    rotations = ss.rotations.from_rotation_vectors(y)
+    spline = ss.make_smoothing_spline(dates, (rotations, y), "so:3 x r:3", **ADAPTIVE)
+    figure = rendered(spline.plot())
+    labels = [axes.get_ylabel() for axes in panels_of(figure, "λ", "noise σ")]
+    assert labels == [
+        *("λ\nof so:3, s³", "λ\nof euclidean:3, s³"),
+        *("noise σ\nof so:3, rad", "noise σ\nof euclidean:3"),
+    ]
+    sphere = ss.Sphere(2)
+    points = sphere.exp([1.0, 0, 0], 0.1 * y[:, :2] @ np.array([[0.0, 1, 0], [0, 0, 1]]))
+    spline = ss.make_smoothing_spline(dates, points, sphere, **ADAPTIVE)
+    (sigma,) = panels_of(rendered(spline.plot()), "noise σ")
+    assert sigma.get_ylabel() == "noise σ, rad"
+    (sigma,) = panels_of(rendered(ss.geo.plot(spline)), "noise σ")
+    assert sigma.get_ylabel() == "noise σ, m"
+    x = spline.t[[100, 200]]
+    height = np.interp(date2num(x), *sigma.lines[0].get_data())
+    np.testing.assert_allclose(height / ss.geo.EARTH_RADIUS, spline.sigma_at(x), rtol=1e-2)

@@ -133,3 +133,74 @@ def test_curves_at_a_bound_are_marked_without_a_warning():
         assert sx.smooth(own, "r:1").at_bound.values.any()
     with pytest.warns(ss.SmoothingWarning):
         ss.make_smoothing_spline(None, da.values, "r:1")
+
+
+def bursts(chunks=None):
+    """A run with a burst of motion, one without, and one with a part of larger noise."""
+    rng = np.random.default_rng(0)
+    t = np.sort(rng.uniform(0, 60, 300))
+    burst = np.exp(-(((t - 30) / 1.8) ** 2) / 2) * np.sin(np.pi * (t - 30))
+    sigma = np.full((3, 300), 0.02)
+    sigma[2, (t > 20) & (t < 40)] = 0.2
+    y = 0.3 * np.sin(0.1 * np.pi * t) + np.outer([1, 0, 0], burst) + sigma * rng.standard_normal((3, 300))
+    coords = {"time": dates(t)}
+    da = xr.DataArray(y[..., None], dims=("run", "time", "q"), coords=coords, attrs={"units": "m"})
+    return da if chunks is None else da.chunk(chunks)
+
+
+@pytest.mark.filterwarnings("ignore::symspline.SmoothingWarning")
+@pytest.mark.parametrize(
+    "options", [{"lam": "adaptive"}, {"noise": "adaptive"}, {"lam": "adaptive", "noise": "adaptive"}]
+)
+@pytest.mark.parametrize("chunks", [None, {"run": 1}])
+def test_numbers_that_vary_are_those_of_the_spline(options, chunks):
+    da = bursts(chunks)
+    x = da.time.values[10:290:20] + np.timedelta64(1, "ms")
+    ds = sx.smooth(da, "r:1", x, std=True, **options)
+    expected = ss.make_smoothing_spline(da.time.values, da.values, "r:1", **options)
+    methods = [{"lam": "lam_at", "noise": "sigma_at"}[name] for name in options]
+    assert set(ds.data_vars) == {
+        *("points", "std", "lam", "df", "sigma", "at_bound", "converged", "gain"),
+        *methods,
+    }
+    for name in methods:
+        assert ds[name].dims == ("run", "time")
+        np.testing.assert_array_equal(ds[name], getattr(expected, name)(x))
+    np.testing.assert_array_equal(ds.gain, expected.report.gain)
+    np.testing.assert_array_equal(ds["std"], expected.std(x))
+    if "noise" in options:
+        assert ds.sigma_at.attrs == {"units": "m"}
+
+
+def test_numbers_that_vary_in_masked_curves_and_at_times_per_curve():
+    da = bursts().isel(q=0).expand_dims("q", -1)
+    x = xr.DataArray(da.time.values[30:270:20].reshape(3, 4), dims=("run", "instant"))
+    where = xr.DataArray([True, False, True], dims="run")
+    ds = sx.smooth(da, "r:1", x, where=where, lam="adaptive", noise="adaptive")
+    assert np.isnan(ds.lam_at[1]).all() and np.isnan(ds.sigma_at[1]).all() and np.isnan(ds.gain[1])
+    for i in (0, 2):
+        alone = ss.make_smoothing_spline(da.time.values, da.values[i], "r:1", lam="adaptive", noise="adaptive")
+        np.testing.assert_array_equal(ds.lam_at[i], alone.lam_at(x.values[i]))
+        np.testing.assert_array_equal(ds.sigma_at[i], alone.sigma_at(x.values[i]))
+        assert ds.gain[i] == alone.report.gain
+
+
+def test_samples_without_times_have_no_numbers_that_vary():
+    da = bursts()
+    times = np.tile(da.time.values, (3, 1))
+    times[1, 100:] = np.datetime64("NaT")
+    da = da.drop_vars("time").assign_coords(time=(("run", "time"), times))
+    ds = sx.smooth(da, "r:1", da.time, dim="time", lam="adaptive")
+    assert np.isnan(ds.lam_at[1, 100:]).all() and np.isfinite(ds.lam_at[1, :100]).all()
+    alone = ss.make_smoothing_spline(times[0], da.values[0], "r:1", lam="adaptive")
+    np.testing.assert_array_equal(ds.lam_at[0], alone.lam_at(times[0]))
+
+
+def test_one_part_of_poses_varies():
+    options = {"lam": ("adaptive", None)}
+    ds = sx.smooth(poses(), "se:3", X, point_dims=("row", "column"), **options)
+    expected = ss.make_smoothing_spline(T, poses().values, "se:3", **options)
+    for ending, lam in zip(("_rotation", "_position"), expected.lam_at(X), strict=True):
+        np.testing.assert_array_equal(ds[f"lam_at{ending}"], lam)
+    assert float(ds.gain_rotation) == expected.report[0].gain and np.isnan(ds.gain_position)
+    assert "sigma_at_rotation" not in ds

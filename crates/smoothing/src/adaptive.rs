@@ -446,10 +446,11 @@ impl Adaptive<'_> {
             .map(|(k, s)| self.track(k, s))
             .collect();
         self.run(&mut tracks);
-        if vary.noise {
+        if vary.noise && !self.given {
             // Both together may take one for the other from a start at which neither varies.
             let mut again: Vec<Track> =
                 [(true, false), (false, true)].iter().filter_map(|kind| Self::best(&tracks, *kind)).collect();
+            again.extend((0..starts).map(|start| self.from_neighbours(start)));
             self.run(&mut again);
             tracks.extend(again);
         }
@@ -484,6 +485,13 @@ impl Adaptive<'_> {
                 group.iter_mut().zip(&sums).for_each(|(track, sums)| track.advance(self, sums));
             }
         }
+    }
+
+    /// A start for both functions with the noise of neighbouring data.
+    fn from_neighbours(&self, start: usize) -> Track {
+        let mut track = self.track(Adapt { lam: true, noise: true }, start);
+        track.start_noise(self.deviations);
+        track
     }
 
     /// The best track in which one of the functions varies, as a start for both.
@@ -590,9 +598,6 @@ impl Adaptive<'_> {
         };
         let ones: Vec<f64> = self.weights.iter().map(|w| f64::from(*w > 0.0)).collect();
         track.place(self.nodes_at(&ones, used, DATA), self);
-        if vary.lam && vary.noise {
-            track.start_noise(self.deviations);
-        }
         track
     }
 

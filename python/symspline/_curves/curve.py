@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cached_property, partial
-from typing import Any, ClassVar, NamedTuple, Never, Self
+from typing import Any, ClassVar, Literal, NamedTuple, Never, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike
@@ -500,7 +500,7 @@ class UncertaintyBand(NamedTuple):
 
 
 class SidePanel(NamedTuple):
-    """Numbers of one curve against time, which a plot shows in a panel of their own.
+    """Numbers of one curve against time, which a plot shows in a panel below the others.
 
     Attributes
     ----------
@@ -509,11 +509,16 @@ class SidePanel(NamedTuple):
     x : ndarray, shape (n,)
         Times as numbers of the core.
     values : ndarray, shape (n, k)
-        Residuals in standard deviations, or radii of the 95 % band.
+        Residuals in standard deviations, radii of the 95 % band, or weights λ or standard deviations of the noise,
+        which have one column. λ belongs to the segments that begin at these times.
     names : tuple of str
         Names of the components; empty if they have none.
     factor : int or None
-        Factor of the space in which a band has these radii; None for residuals.
+        Factor of the space in which a band has these radii; None for other numbers.
+    kind : {"residuals", "radii", "lam", "sigma"}
+        Kind of the numbers.
+    space : Space or None
+        Space in which the noise has this standard deviation; None for other numbers.
     """
 
     label: str
@@ -521,6 +526,8 @@ class SidePanel(NamedTuple):
     values: Doubles
     names: tuple[str, ...] = ()
     factor: int | None = None
+    kind: Literal["residuals", "radii", "lam", "sigma"] = "residuals"
+    space: AnySpace | None = None
 
 
 def share(progress: Progress | None, i: int, count: int) -> Progress | None:

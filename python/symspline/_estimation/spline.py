@@ -16,7 +16,7 @@ from .._curves.curve import SidePanel, UncertaintyBand
 from .._curves.ends import end_kinds
 from .._smoothing.gaps import Calibration, Course, SensorEvidence, calibrate
 from .._smoothing.noise import SmoothingData, is_several, smoothed_spaces
-from .._smoothing.report import Parameter, Posterior, SmoothingReport
+from .._smoothing.report import Parameter, Posterior, SmoothingReport, fields_of
 from .._smoothing.solve import Smoothed
 from .._smoothing.spline import AnySmoothingSpline, SmoothingSpline
 from .._spaces import AnySpace, Array, Doubles, Product, Space, SpecialEuclidean, factors_of, parts_of
@@ -333,7 +333,7 @@ class EstimatedSpline(SmoothingSpline[P, Any]):
     def _state(self) -> dict[str, Any]:
         posterior = self._posterior(self._smoothed[0])
         return CubicSpline._state(self) | {
-            "noise": [vars(part.report) for part in self._smoothed],
+            "noise": [fields_of(part.report) for part in self._smoothed],
             "parameters": {name: [one.value.tolist(), one.cov.tolist()] for name, one in self._parameters.items()},
             "matrix": posterior.band,
             "side": posterior.side,

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
+from matplotlib.ticker import LogLocator, NullLocator
 
 from .._base.typing import FloatArray, Look
 from .._curves.curve import SidePanel
@@ -314,10 +315,10 @@ def residuals_of(spline: Any, curve: Curve, has_band: Sequence[bool]) -> list[Si
 
 
 def draw_residuals(axes: list[Axes], curve: Curve, panels: Sequence[SidePanel]) -> None:
-    """Draw radii of bands, and residuals in standard deviations."""
+    """Draw radii of bands, residuals in standard deviations, and λ and the noise where they vary."""
     time_axes(Panel(axes, mine=True), [curve], [panel.label for panel in panels], marked=False)
     for one, panel in zip(axes, panels, strict=True):
-        words = (_draw_deviations if panel.factor is None else _draw_radii)(one, curve, panel)
+        words = _DRAWN[panel.kind](one, curve, panel)
         one.set_title(words, loc="right", fontsize="small", weight="normal", pad=3)
 
 
@@ -328,6 +329,32 @@ def _draw_radii(axes: Axes, curve: Curve, panel: SidePanel) -> str:
     axes.plot(curve.times, radii, color=curve.color, linewidth=1.2)
     axes.set_ylim(0, 1.15 * radii.max())
     return "radius of the ball that contains the true point with 95 % probability"
+
+
+def _draw_lam(axes: Axes, curve: Curve, panel: SidePanel) -> str:
+    """Draw the weight of every segment on a logarithmic axis."""
+    lam = panel.values[:, 0]
+    axes.set_yscale("log")
+    axes.plot(curve.on_axis(panel.x), lam, color=curve.color, linewidth=1.2, drawstyle="steps-post")
+    # At least two decades, so that the axis has numbers.
+    low, high = np.log10(lam.min()), np.log10(lam.max())
+    margin = max(0.06 * (high - low), 0.5 * (2.2 - (high - low)))
+    axes.set_ylim(10 ** (low - margin), 10 ** (high + margin))
+    axes.yaxis.set_major_locator(LogLocator(numticks=5))
+    axes.yaxis.set_minor_locator(NullLocator())
+    return "weight of the penalty, per segment"
+
+
+def _draw_noise(axes: Axes, curve: Curve, panel: SidePanel) -> str:
+    """Draw the standard deviation of the noise against time, in metres on the Earth."""
+    sigma = panel.values[:, 0] * (curve.radius or 1)
+    axes.plot(curve.on_axis(panel.x), sigma, color=curve.color, linewidth=1.2)
+    axes.set_ylim(0, 1.15 * sigma.max())
+    if curve.radius is not None:
+        axes.set_ylabel(f"{panel.label}, m")
+    elif panel.space is not None and is_angular(panel.space):
+        axes.set_ylabel(f"{panel.label}, rad")
+    return "standard deviation of the noise in one coordinate"
 
 
 def _draw_deviations(axes: Axes, curve: Curve, panel: SidePanel) -> str:
@@ -356,3 +383,11 @@ def _draw_deviations(axes: Axes, curve: Curve, panel: SidePanel) -> str:
     words = f"{100 * np.mean(sizes > NORMAL):.1f} % beyond ±{NORMAL} (5 % expected)"
     beyond = int((sizes > top).sum())
     return words + (f"; {beyond} beyond the axis (triangles)" if beyond else "")
+
+
+_DRAWN: dict[str, Callable[[Axes, Curve, SidePanel], str]] = {
+    "residuals": _draw_deviations,
+    "radii": _draw_radii,
+    "lam": _draw_lam,
+    "sigma": _draw_noise,
+}

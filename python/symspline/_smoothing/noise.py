@@ -483,7 +483,8 @@ def read_smoothness(space: Space, spaces: tuple[Space, ...], lam: Any, batch: tu
             given.append(Smoothness(np.full(math.prod(batch), np.nan), adapts=True))
             continue
         array = np.asarray(entry)
-        if entry is None or array.dtype.kind not in "iuf" or array.ndim != len(batch) + 1:
+        # A tuple has one entry per part, which a single space does not have.
+        if entry is None or isinstance(entry, tuple) or array.dtype.kind not in "iuf" or array.ndim != len(batch) + 1:
             given.append(Smoothness(_one_per_curve(entry, "lam", batch, True)))
             continue
         if array.shape[:-1] != batch or not array.shape[-1]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -124,6 +124,17 @@ class SmoothingReport(FitReport):
         True
         """
         return bool(np.asarray(self.df)[index] < 2.5)
+
+
+def fields_of(report: SmoothingReport, varies: bool = False) -> dict[str, Any]:
+    """Return the fields of a report for files.
+
+    Older versions refuse a report with a gain, as they should if λ or σ `varies`. They read all other curves.
+    """
+    fields = dict(vars(report))
+    if report.gain is None and not varies:
+        del fields["gain"]
+    return fields
 
 
 # ---- posterior ----

@@ -478,20 +478,28 @@ class Smoothed(NamedTuple):
     noise_profile: Doubles | None = None
 
     def map(self, function: Callable[[Any], Any]) -> Smoothed:
-        """Apply a function to all arrays, such as the selection of some curves."""
+        """Apply a function to all arrays, such as the selection of some curves.
+
+        Profiles that are constant in all of the curves are omitted, as if these curves had been fitted alone.
+        """
         return self._replace(
             report=self.report.map(function),
             band=function(self.band),
             band_lam=function(self.band_lam),
             sigma=function(self.sigma),
             posterior=self.posterior and self.posterior.map(function),
-            profile=None if self.profile is None else function(self.profile),
-            noise_profile=None if self.noise_profile is None else function(self.noise_profile),
+            profile=None if self.profile is None else if_varying(function(self.profile)),
+            noise_profile=None if self.noise_profile is None else if_varying(function(self.noise_profile)),
         )
 
     def profile_of(self, index: tuple[int, ...]) -> Doubles | None:
-        """Return λ of the segments of one curve divided by λ."""
-        return None if self.profile is None else np.ascontiguousarray(self.profile[index])
+        """Return λ of the segments of one curve divided by λ; None if they are equal."""
+        return None if self.profile is None else if_varying(np.ascontiguousarray(self.profile[index]))
+
+
+def if_varying(profile: Doubles) -> Doubles | None:
+    """Return a profile, or None if it is constant in every curve. Failed and masked curves have NaN."""
+    return profile if np.any(np.abs(np.diff(profile, axis=-1)) > 0) else None
 
 
 class SmoothedSpline(Protocol):
@@ -629,9 +637,9 @@ def _smooth_curves(
     if part.profile is not None:
         profile = part.profile
     if profile is not None:
-        profile = profile.reshape(*batch, -1) if np.any(profile != 1) else None
-    if noise_profile is not None and not noise_profile.any():
-        noise_profile = None
+        profile = if_varying(profile.reshape(*batch, -1))
+    if noise_profile is not None:
+        noise_profile = if_varying(noise_profile)
     gain = gains if batch or gains is None else gains.item()
     report = SmoothingReport(method, state == 0, iterations, step, rate, lam, at_bound, df, estimated, gain)
     numbers = small._numbers(raw.points)

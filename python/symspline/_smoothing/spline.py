@@ -34,7 +34,7 @@ from .._splines.archive import (
 from .._splines.cubic import CubicSpline
 from .gaps import Calibration, Gap, calibration_of, warn_of_cubics, warn_of_gaps, warn_of_wide_bands, widest_band
 from .noise import Noise, SmoothingData, grouped, is_several, join, parts_of_factor, smoothed_spaces, split
-from .report import Index, Parameter, Posterior, SmoothingReport, frames_at, process_ratio
+from .report import Index, Parameter, Posterior, SmoothingReport, fields_of, frames_at, process_ratio
 from .solve import Smoothed
 
 if TYPE_CHECKING:
@@ -254,17 +254,16 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         array([0.04, 0.21])
         """
         times, _, per_curve = self._finite_times(x)
+        sigmas = [partial(self._sigma_at, number) for number in range(len(self._smoothed))]
+        return self._per_space([self._per_curve(times, per_curve, sigma)[()] for sigma in sigmas])
 
-        def sigma(number: int, index: Index, at: Doubles) -> Doubles:
-            part, knots = self._smoothed[number], self._knots_of(index)
-            mean = np.full(at.shape, np.asarray(part.sigma)[index])
-            if part.noise_profile is not None:
-                mean *= np.exp(0.5 * np.interp(self._turned(knots, at), knots, part.noise_profile[index]))
-            return mean
-
-        return self._per_space(
-            [self._per_curve(times, per_curve, partial(sigma, number))[()] for number in range(len(self._smoothed))]
-        )
+    def _sigma_at(self, number: int, index: Index, x: Doubles) -> Doubles:
+        """Return the standard deviation of the noise of one curve in one part at times x of the core."""
+        part, knots = self._smoothed[number], self._knots_of(index)
+        sigma = np.full(x.shape, np.asarray(part.sigma)[index])
+        if part.noise_profile is not None:
+            sigma *= np.exp(0.5 * np.interp(self._turned(knots, x), knots, part.noise_profile[index]))
+        return sigma
 
     def _turned(self, knots: Doubles, x: Doubles) -> Doubles:
         """Return times of a closed curve within its period."""
@@ -920,11 +919,33 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         )
 
     def _panels_below(self, x: Doubles) -> list[SidePanel]:
-        return [
-            SidePanel(f"95 % band\nof {part}{', rad' if part in _TURNING else ''}", x, values[:, None], factor=number)
-            for number, radii in enumerate([] if self._batch else self._radii((), x))
+        if self._batch:
+            return []
+        panels = [
+            SidePanel(
+                f"95 % band\nof {part}{', rad' if part in _TURNING else ''}", x, values[:, None], (), number, "radii"
+            )
+            for number, radii in enumerate(self._radii((), x))
             for part, values in radii
         ]
+        return panels + self._panels_of_varying(x)
+
+    def _panels_of_varying(self, x: Doubles) -> list[SidePanel]:
+        """Return λ of the segments and the standard deviation of the noise at times x, where they vary."""
+        knots, spaces = self._knots_of(()), smoothed_spaces(self.space)
+        names = [f"\nof {space}" if len(spaces) > 1 else "" for space in spaces]
+        power = "⁵" if self._smoothed[0].penalty == "jerk" else "³"
+        unit = "" if self._time_axis.plain else f", s{power}"
+        panels = []
+        for name, part in zip(names, self._smoothed, strict=True):
+            if part.profile is not None:
+                lam = part.report.lam * np.append(part.profile, part.profile[-1])
+                panels.append(SidePanel(f"λ{name}{unit}", knots, lam[:, None], kind="lam"))
+        for number, (space, name, part) in enumerate(zip(spaces, names, self._smoothed, strict=True)):
+            if part.noise_profile is not None:
+                sigma = self._sigma_at(number, (), x)
+                panels.append(SidePanel(f"noise σ{name}", x, sigma[:, None], kind="sigma", space=space))
+        return panels
 
     @property
     def _unconverged(self) -> int:
@@ -1011,7 +1032,7 @@ def noise_state(space: AnySpace, noisy: SmoothingData, smoothed: list[Smoothed])
     state: dict[str, Any] = {
         **times_state("data_t", noisy.t, noisy.time_axis),
         "noise": [
-            vars(of_part.report)
+            fields_of(of_part.report, of_part.profile is not None or of_part.noise_profile is not None)
             | {"band_lam": of_part.band_lam, "scale": of_part.sigma, "between": of_part.between}
             | {"penalty": of_part.penalty, "loss": noise.loss}
             # Version 1 has no matrices.

@@ -46,6 +46,8 @@ _ARRAY = re.compile(
     r"(?:version|t|data_t|knots|axis_\d{1,2})|(?:points|velocities|control_points|data|data_weights|data_information"
     r"|band|matrix|turn|side|corner|variance|profile|noise_profile)(?:_\d{1,9})?"
 )
+# Arrays that not all curves of a file have.
+OPTIONAL = re.compile(r"(?:data_weights|profile|noise_profile)(?:_\d{1,9})?")
 # At most four levels of curves that are made of others.
 _PART = re.compile(r"(?:\d{1,6}/){1,4}")
 # Compressed entries are at most this much larger than the file, or of this size.

@@ -12,7 +12,7 @@ from .._base.arrays import short_repr
 from .._base.system import damage, path_of
 from .._base.typing import File, State
 from .._core import ValidationError
-from .archive import FORMATS, TEXTS, Entries, Stored, read_state, restore, write
+from .archive import FORMATS, OPTIONAL, TEXTS, Entries, Stored, read_state, restore, write
 from .base import Curve, UserCurve
 
 # Entries with one value for all curves of a file.
@@ -112,7 +112,16 @@ def _joined(curves: Mapping[str, Curve]) -> State:
         if curve._batch:
             raise ValidationError(f"curves[{name!r}] is a batch. Save it by itself, or pass its curves one by one.")
     states = [curve._state() for curve in curves.values()]
-    names, first = list(curves), states[0]
+    names = list(curves)
+    # Optional arrays that a curve lacks have no rows.
+    optional = {
+        key: value[:0]
+        for state in states
+        for key, value in state.items()
+        if OPTIONAL.fullmatch(key) and isinstance(value, np.ndarray)
+    }
+    states = [state | {key: none for key, none in optional.items() if key not in state} for state in states]
+    first = states[0]
     for name, state in zip(names, states, strict=True):
         ours, theirs = _layout(first), _layout(state)
         for key in ours.keys() | theirs.keys():
@@ -176,6 +185,9 @@ def _states(state: Stored) -> Iterator[tuple[str, Entries]]:
     ends = {key: np.cumsum(counts).tolist() for key, counts in rows.items()}
     for i, name in enumerate(names):
         part = Stored(state)
-        part |= {key: arrays[key][ends[key][i] - counts[i] : ends[key][i]] for key, counts in rows.items()}
+        for key, counts in rows.items():
+            part[key] = arrays[key][ends[key][i] - counts[i] : ends[key][i]]
+            if not counts[i] and OPTIONAL.fullmatch(key):
+                del part[key]
         part |= {key: values[i] for key, values in lists.items()}
         yield name, part

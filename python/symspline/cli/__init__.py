@@ -118,10 +118,29 @@ class _Parser(argparse.ArgumentParser):
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         """Parse, and raise `Problem` for arguments that are not known."""
+        args = self._with_words(sys.argv[1:] if args is None else args)
         known, unknown = super().parse_known_args(args, namespace)
         if unknown:
             self.error(f"unrecognized arguments: {' '.join(unknown)}{self._suggestion(unknown[0])}")
         return known, unknown
+
+    def _with_words(self, args: Sequence[str]) -> list[str]:
+        """Join options and their optional words, so that options without one do not take the next argument."""
+        words = {
+            name: (action.choices, action.const)
+            for action in self._actions
+            if action.nargs == "?" and action.choices
+            for name in action.option_strings
+        }
+        end = [*args, "--"].index("--")
+        joined: list[str] = []
+        for argument in args[:end]:
+            if joined and joined[-1] in words and argument in words[joined[-1]][0]:
+                joined[-1] += f"={argument}"
+            else:
+                joined.append(argument)
+        joined = [f"{argument}={words[argument][1]}" if argument in words else argument for argument in joined]
+        return [*joined, *args[end:]]
 
     def _suggestion(self, argument: str) -> str:
         """Return the option that was probably meant."""

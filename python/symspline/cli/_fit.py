@@ -25,7 +25,8 @@ tracks and lines have their name in the column track, and points their height in
 without a point are omitted.
 
 Curves pass through the points. --smooth is for noisy points: the curve passes near them, as smooth as the data
-suggest, and symspline sample also writes its standard deviation.
+suggest, and symspline sample also writes its standard deviation. With --smooth adaptive, the smoothness varies along
+the curve if the data require it, for motion that rests and bursts.
 
 examples:
   symspline fit track.csv --lonlat -o track.npz
@@ -33,6 +34,7 @@ examples:
   symspline fit attitude.parquet --space so:3 --columns w,x,y,z --bc-type not-a-knot -o attitude.npz
   symspline fit states.csv --space cp:1 --columns up,down -o states.npz
   symspline fit gps.csv --lonlat --smooth -o gps.npz
+  symspline fit hand.csv --space r:3 --smooth adaptive --noise adaptive -o hand.npz
 
 symspline.load reads the curve in Python. With --curve, it returns a dictionary of all curves by name, and with
 --max-gap alone a SegmentedCurve.
@@ -59,6 +61,7 @@ from .._base.typing import Keywords
 from .._core import CutLocusError
 from .._curves.failures import IN_PYTHON
 from .._smoothing import SmoothingSpline, SmoothingWarning
+from .._smoothing.noise import grouped, is_several
 from .._smoothing.segments import cut, smooth_many
 from .._spaces import Doubles, Product, Space, Torus, factors_of, space_named
 from .._splines.cubic import CubicSpline
@@ -120,6 +123,14 @@ _MAX_GAP = (
     "segments are curves 1, 2, ... or, with --curve, NAME/1, NAME/2, ...; single points are omitted"
 )
 _CRITERION = "how λ is chosen: gcv (default), reml, or cp, Mallows' C_p, which needs --sigma and is the default with it"
+_SMOOTH = (
+    "fit curves near the points, with one λ (constant, the default) or, for motion that rests and bursts, one that "
+    "varies along the curve if the data require it (adaptive)"
+)
+_NOISE = (
+    "constant (default), or adaptive: the standard deviation of the noise varies along the curve if the data require it"
+)
+_ADAPTIVE = ("constant", "adaptive")
 _LAM = "a number λ >= 0 instead, in a product perhaps one per factor with commas"
 _SIGMA = (
     "known standard deviation of the noise in a coordinate: in the unit of distances, radians for rotations, degrees "
@@ -133,7 +144,8 @@ _HEIGHTS = ("ele", "elevation", "alt", "altitude", "height", "height-above-ellip
 _FOR_ROTATIONS = "For rotations give --space so:3, or rp:3, where signs do not count"
 # Options of the library for curves through points and for curves near them.
 _THROUGH = {"bc_type": "--bc-type", "method": "--method", "tol": "--tol"}
-_NEAR = {"criterion": "--criterion", "lam": "--lam", "sigma": "--sigma", "loss": "--robust", "penalty": "--penalty"}
+_NEAR = {"criterion": "--criterion", "lam": "--lam", "sigma": "--sigma", "noise": "--noise", "loss": "--robust"}
+_NEAR |= {"penalty": "--penalty"}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -160,10 +172,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     out = "file of curves to write: .npz, or - for standard output"
     add("-o", dest="output", type=Path, metavar="OUT", required=True, help=out)
     add = parser.add_argument_group("noisy data").add_argument
-    add("--smooth", action="store_true", help="fit curves near the points")
+    add("--smooth", nargs="?", const="constant", choices=_ADAPTIVE, help=_SMOOTH)
     add("--criterion", choices=("gcv", "cp", "reml"), help=_CRITERION)
     add("--lam", type=_numbers, metavar="L", help=_LAM)
     add("--sigma", type=_deviations, metavar="S", help=_SIGMA)
+    add("--noise", choices=_ADAPTIVE, help=_NOISE)
     robust = "reduce the influence of outliers (loss 'cauchy')"
     add("--robust", dest="loss", action="store_const", const="cauchy", help=robust)
     add("--penalty", choices=("acceleration", "jerk"), help="derivative that is kept small (default: acceleration)")
@@ -233,6 +246,7 @@ def _keywords(options: argparse.Namespace, space: Space) -> Keywords:
     # The defaults of the library contradict nothing.
     given = {name: value for name, value in given.items() if value not in (None, "natural", "auto")}
     other, remedy = _NEAR, "is for noisy data; give --smooth, too"
+    adapts = options.smooth == "adaptive"
     if options.smooth:
         other, remedy = _THROUGH, "is for curves through the points; omit it with --smooth"
     wrong = next((option for name, option in other.items() if name in given), None)
@@ -240,11 +254,14 @@ def _keywords(options: argparse.Namespace, space: Space) -> Keywords:
         "",
         (wrong, f"{wrong} {remedy}"),
         (options.smooth and options.dedup == "mean", "with --smooth all points of one time count; omit --dedup mean"),
+        (adapts and "lam" in given, "--lam gives one λ, and --smooth adaptive lets it vary; omit one of them"),
         ({"lam", "criterion"} <= {*given}, "--lam gives λ, which --criterion would choose; omit one of them"),
         (options.criterion == "cp" and not options.sigma, "--criterion cp needs the noise; give it with --sigma"),
     )
     if "sigma" in given and "lam" not in given:
         given.setdefault("criterion", "cp")
+    if adapts:
+        given["lam"] = "adaptive"
     angles = options.lonlat or (options.degrees and isinstance(space, Torus))
     if angles and isinstance(options.sigma, float):
         given["sigma"] = math.radians(options.sigma)
@@ -374,7 +391,7 @@ class Recordings:
 
     def _segments(self, index: Index, of: str) -> list[tuple[tuple[Any, Any], Index]]:
         """Return the curves in the rows of one name, and the rows of each."""
-        options, smooth = self._options, self._options.smooth
+        options, smooth = self._options, self._options.smooth is not None
         times = self._rows.times[index] if self.has_times else None
         again = np.zeros(len(index), bool)
         if times is not None:
@@ -410,7 +427,7 @@ class Recordings:
             raise Problem(f"{self.path}{where}: this is the only point{of}; a curve needs two")
         if not self.has_times:
             return
-        times, smooth = self._rows.times[index], self._options.smooth
+        times, smooth = self._rows.times[index], self._options.smooth is not None
         bad = np.flatnonzero(~((times[1:] > times[:-1]) | (smooth & (times[1:] == times[:-1]))))
         if bad.size:
             i = bad[0]
@@ -491,7 +508,7 @@ def outliers(data: Recordings, curves: Sequence[CubicSpline] | None, lonlat: boo
     their neighbours.
     """
     spikes: list[tuple[int, float, float]] = []
-    smooth = curves if curves is not None and isinstance(curves[0], SmoothingSpline) else None
+    smooth = [curve for curve in curves or () if isinstance(curve, SmoothingSpline)] or None
     for i, (index, (times, points)) in enumerate(zip(data.groups.values(), data.curves, strict=True)):
         if len(index) < _FEWEST:
             continue
@@ -501,8 +518,9 @@ def outliers(data: Recordings, curves: Sequence[CubicSpline] | None, lonlat: boo
             several = isinstance(data.space, Product)
             parts = points if several else (points,)
             beside = [None] * len(parts) if near is None else near if several else (near,)
-            for space, part, curve in zip(factors_of(data.space), parts, beside, strict=True):
-                far, sizes, usual = _spikes(space, times, part) if curve is None else _far(space, part, curve)
+            noise = [None] * len(parts) if smooth is None else _relative_noise(smooth[i], times)
+            for space, part, curve, sigma in zip(factors_of(data.space), parts, beside, noise, strict=True):
+                far, sizes, usual = _spikes(space, times, part) if curve is None else _far(space, part, curve, sigma)
                 spikes += [(int(index[k]), float(sizes[k]), usual) for k in np.flatnonzero(far)]
     if not spikes:
         return ""
@@ -539,8 +557,16 @@ def _spikes(space: Space, times: Any, points: Any) -> tuple[NDArray[np.bool_], D
     return is_spike, sizes, float(np.median(steps))
 
 
-def _far(space: Space, points: ArrayLike, near: Any) -> tuple[NDArray[np.bool_], Doubles, float]:
+def _relative_noise(curve: SmoothingSpline[Any, Any], times: Any) -> list[Any]:
+    """Return the standard deviation of the noise in every factor, relative to its mean; 1 for poses."""
+    several = is_several(curve.space)
+    varying, mean = (value if several else (value,) for value in (curve.sigma_at(times), curve.sigma))
+    relative = [at / sigma if sigma > 0 else 1.0 for at, sigma in zip(varying, mean, strict=True)]
+    return [of_factor[0] if len(of_factor) == 1 else 1.0 for of_factor in grouped(curve.space, relative)]
+
+
+def _far(space: Space, points: ArrayLike, near: Any, noise: Any) -> tuple[NDArray[np.bool_], Doubles, float]:
     """Return which points are far from a curve, their distances, and the distance within which most points are."""
     distances = np.asarray(space.distance(points, near))
-    usual = float(np.median(distances))
-    return distances > max(_FAR * usual, _ROUNDING * np.abs(points).max()), distances, usual
+    farthest = np.maximum(_FAR * noise * np.median(distances / noise), _ROUNDING * np.abs(points).max())
+    return distances > farthest, distances, float(np.median(distances))

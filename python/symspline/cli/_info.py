@@ -28,8 +28,9 @@ from .._base.report import long_gaps
 from .._base.system import damage
 from .._base.time import time_axis_of
 from .._base.typing import Array
-from .._smoothing import SmoothingReport, SmoothingSpline
+from .._smoothing import SmoothingSpline
 from .._smoothing.noise import is_several, smoothed_spaces
+from .._smoothing.solve import Smoothed
 from .._spaces import Doubles
 from .._spaces.base import CLASSES, example_of
 from .._splines.cubic import CubicSpline
@@ -44,6 +45,7 @@ _LIBRARIES |= {"shtab": "completion in shells"}
 
 _ROUGH = 2.5
 """Degrees of freedom from which on a curve is not a geodesic."""
+_PROFILES = "profile", "noise_profile"
 _LONGEST = 1000
 _COLUMNS = 12
 """Columns of an array that are described."""
@@ -200,12 +202,17 @@ def _smoothed(splines: Sequence[SmoothingSpline[Any, Any]], lonlat: bool) -> str
     """Describe λ, the degrees of freedom and the noise for every space in which the curves were smoothed."""
     space = splines[0].space
     several = is_several(space)
-    reports = zip(*(spline.report if several else (spline.report,) for spline in splines), strict=True)
+    parts = zip(*(spline._smoothed for spline in splines), strict=True)
     names = [f"{part}: " if several else "" for part in smoothed_spaces(space)]
-    return "; ".join(_chosen(name, of_space, lonlat) for name, of_space in zip(names, reports, strict=True))
+    return "; ".join(_chosen(name, of_space, lonlat) for name, of_space in zip(names, parts, strict=True))
 
 
-def _chosen(name: str, reports: Sequence[SmoothingReport], lonlat: bool) -> str:
+def _chosen(name: str, parts: Sequence[Smoothed], lonlat: bool) -> str:
+    reports = [part.report for part in parts]
+    lam_varies, noise_varies = (_varying([getattr(part, name) for part in parts]) for name in _PROFILES)
+    varying = [part.report for part in parts if part.profile is not None or part.noise_profile is not None]
+    gains = [report.gain for report in varying if report.gain is not None]
+    gain = f", gain {_spread(gains)}" if gains else ""
     bound = sum(bool(report.at_bound) for report in reports)
     at_bound = "" if not bound else " (at its bound)" if len(reports) == 1 else f" ({bound} at a bound)"
     rough = sum(bool(report.at_bound) and report.df > _ROUGH for report in reports)
@@ -213,9 +220,16 @@ def _chosen(name: str, reports: Sequence[SmoothingReport], lonlat: bool) -> str:
     advice = f" (no noise was found: {through} through the points; give --sigma or a λ)" if rough else ""
     noise = _spread([np.degrees(report.sigma) if lonlat else report.sigma for report in reports])
     return (
-        f"{name}λ {_spread([report.lam for report in reports])}{at_bound}, "
-        f"{_spread([report.df for report in reports])} degrees of freedom, noise {noise}{'°' if lonlat else ''}{advice}"
+        f"{name}λ {_spread([report.lam for report in reports])}{lam_varies}{at_bound}, "
+        f"{_spread([report.df for report in reports])} degrees of freedom, noise {noise}{'°' if lonlat else ''}"
+        f"{noise_varies}{advice}{gain}"
     )
+
+
+def _varying(profiles: Sequence[Doubles | None]) -> str:
+    """Describe in how many of the curves a number varies."""
+    count = sum(profile is not None for profile in profiles)
+    return "" if not count else " (varies)" if len(profiles) == 1 else f" (varies in {count})"
 
 
 def bridged(splines: Sequence[CubicSpline]) -> str:

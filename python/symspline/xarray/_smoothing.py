@@ -39,8 +39,11 @@ from ._spec import (
     times_with_names,
 )
 
-# Columns of the report of a smoothing fit, per part of the space.
+# Columns of the report of a smoothing fit, per part of the space; the last one if λ or the noise may vary.
 _COLUMNS: dict[str, type] = {"lam": np.float64, "df": np.float64, "sigma": np.float64, "at_bound": np.bool_}
+_GAIN: dict[str, type] = {"gain": np.float64}
+# Options that let a number vary along the curve, and the methods that return it.
+_VARYING = {"lam": "lam_at", "noise": "sigma_at"}
 
 
 def smooth(
@@ -84,16 +87,17 @@ def smooth(
     level : float, optional
         Probability, such as 0.95. The result then has the radius of the band, as `SmoothingSpline.band`.
     **options
-        Keyword arguments of `make_smoothing_spline`, such as ``penalty="jerk"``, `lam`, `criterion`, `sigma`, `knots`
-        and `loss`. The default of `on_failure` is ``"ignore"``.
+        Keyword arguments of `make_smoothing_spline`, such as ``penalty="jerk"``, `lam`, `noise`, `criterion`, `sigma`,
+        `knots` and `loss`. The default of `on_failure` is ``"ignore"``.
 
     Returns
     -------
     xarray.Dataset
         ``points`` with the dimensions of `evaluate` and the attributes of `da`; ``std`` and ``band`` if requested; and
-        ``lam``, ``df``, ``sigma``, ``at_bound`` and ``converged`` for every curve. For poses, all but ``points`` and
-        ``converged`` have the endings ``_rotation`` and ``_position``. Curves that do not exist or did not converge are
-        NaN.
+        ``lam``, ``df``, ``sigma``, ``at_bound`` and ``converged`` for every curve. With ``lam="adaptive"`` or
+        ``noise="adaptive"`` also ``lam_at`` or ``sigma_at`` at the times of ``points``, and ``gain`` for every curve.
+        For poses, all but ``points`` and ``converged`` have the endings ``_rotation`` and ``_position``. Curves that do
+        not exist or did not converge are NaN.
 
     Raises
     ------
@@ -141,18 +145,21 @@ def smooth(
         rehearse(times, t, da.sizes[dim] if t is None else len(t), policy)
     inputs: Inputs = [(bare(da, dim), [KNOTS, *point_dims]), (times, axes), *rest]
     endings = ["_rotation", "_position"] if is_several(space) else [""]
-    asked = [name for name, wanted in (("std", std), ("band", level is not None)) if wanted]
-    spreads = [name + ending for name in asked for ending in endings]
-    columns = [name + ending for name in _COLUMNS for ending in endings]
+    methods: list[tuple[str, tuple[float, ...]]] = [("std", ())] * std + ([] if level is None else [("band", (level,))])
+    varying = [(method, ()) for name, method in _VARYING.items() if _is_adaptive(given.get(name))]
+    methods += varying
+    of_report = _COLUMNS | _GAIN if varying else _COLUMNS
+    spreads = [name + ending for name, _ in methods for ending in endings]
+    columns = [name + ending for name in of_report for ending in endings]
     dims: list[list[Hashable]] = [[*axes, *point_dims], *([*axes] for _ in spreads), *([] for _ in (*columns, "one"))]
     dtypes: list[Any] = [space.dtype, *(np.float64 for _ in spreads)]
-    dtypes += [dtype for dtype in _COLUMNS.values() for _ in endings] + [np.bool_]
-    fixed = {"space": space, "t": spec["t"], "names": spec["names"], "how": given, "std": std, "level": level}
+    dtypes += [dtype for dtype in of_report.values() for _ in endings] + [np.bool_]
+    fixed = {"t": spec["t"], "names": spec["names"], "wanted": _Wanted(space, given, methods, of_report)}
     variables = apply(_smoothed, inputs, dims, dtypes, x_axes=len(axes), **fixed)
     ds = xr.Dataset(dict(zip(["points", *spreads, *columns, "converged"], variables, strict=True)))
     ds["points"].attrs = dict(da.attrs)
     for name in spreads:
-        ds[name].attrs = unit_of(space, da, name)
+        ds[name].attrs = {} if name.startswith("lam_at") else unit_of(space, da, name)
     timed: xr.Dataset = timed_by(ds, times, label)
     return timed
 
@@ -168,14 +175,20 @@ def unit_of(space: AnySpace, da: xr.DataArray, name: str) -> Keywords:
     return {"units": da.attrs["units"]} if space._name == "euclidean" and "units" in da.attrs else {}
 
 
+def _is_adaptive(value: object) -> bool:
+    """Whether a number may vary along the curve, in a part of it at least."""
+    entries = value if isinstance(value, tuple) else (value,)
+    return any(isinstance(entry, str) and entry == "adaptive" for entry in entries)
+
+
 def _rehearse_options(t: TimesLike | None, count: int, given: Keywords) -> None:
     """Raise errors about the options now, before any block is computed."""
     # Tuples are for poses, and end conditions may have vectors of the space.
-    shaped = [name for name in ("lam", "sigma", "bc_type") if np.ndim(given.get(name, 0)) != 0]
+    shaped = [name for name in ("lam", "sigma", "noise", "bc_type") if np.ndim(given.get(name, 0)) != 0]
     plain = {name: value for name, value in given.items() if name not in shaped}
     if given.get("criterion") == "cp" and given.get("sigma") is not None:
         plain.setdefault("sigma", 1.0)
-    if plain.get("lam") is None:
+    if plain.get("lam") in (None, "adaptive"):
         plain["lam"] = 1.0
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -189,26 +202,25 @@ class _Wanted(NamedTuple):
     how: Keywords
     spreads: list[tuple[str, tuple[float, ...]]]
     """Methods of the curve and their arguments."""
+    columns: dict[str, type]
+    """Columns of the report and their types."""
 
 
 def _smoothed(
     points: Array,
     x: Array,
     *rest: Array,
-    space: AnySpace,
     t: Any,
     names: list[str],
-    how: Keywords,
+    wanted: _Wanted,
     x_axes: int,
-    std: bool,
-    level: float | None,
 ) -> tuple[Array, ...]:
     """Smooth the curves of a block."""
+    space = wanted.space
     named = dict(zip(names, rest, strict=True))
     batch = points.shape[: points.ndim - 1 - len(space.point_shape)]
     x, per_curve = per_curve_times(x, batch, x_axes)
     t = knots_of_block(t, named, batch)
-    wanted = _Wanted(space, how, [("std", ())] * std + ([] if level is None else [("band", (level,))]))
     # A single curve is a batch of one, whose failure does not raise unless that is requested.
     whole = batch or (1,)
     mask = np.broadcast_to(named["where"], batch).reshape(whole) if "where" in named else None
@@ -235,7 +247,7 @@ def _smooth_timed(
     parts = 2 if is_several(space) else 1
     shapes = [(*times_shape, *space.point_shape), *[times_shape] * (len(wanted.spreads) * parts)]
     outputs = [np.full((len(rows), *shape), np.nan, space.dtype if i == 0 else float) for i, shape in enumerate(shapes)]
-    for dtype in (*(part for part in _COLUMNS.values() for _ in range(parts)), np.bool_):
+    for dtype in (*(part for part in wanted.columns.values() for _ in range(parts)), np.bool_):
         outputs.append(np.full(len(rows), np.nan if dtype is np.float64 else False, dtype))
     for curves, kept, knots, here, gone in of_equal_length(~missing_times(times), times, at, per_curve):
         try:
@@ -278,6 +290,9 @@ def _smooth_rows(
         numbers = getattr(curve, name)
         columns += [np.broadcast_to(entry, whole) for entry in (numbers if several else (numbers,))]
     columns += [np.asarray(entry.at_bound) for entry in reports]
+    if "gain" in wanted.columns:
+        # Parts whose λ and noise are constant by request have none.
+        columns += [np.full(whole, np.nan) if entry.gain is None else np.asarray(entry.gain) for entry in reports]
     for entry in (values, *spreads):
         entry[~converged] = np.nan
     return [values, *spreads, *columns, converged]
