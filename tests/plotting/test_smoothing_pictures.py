@@ -129,13 +129,14 @@ def test_smoothness_and_noise_that_vary_have_panels():
     np.testing.assert_allclose(values, spline.sigma_at(x), rtol=1e-10)
 
 
+@pytest.mark.filterwarnings("ignore::symspline.SmoothingWarning")
 def test_constant_numbers_have_no_panels():
     t, y = varying("burst")
     assert not panels_of(ss.make_smoothing_spline(t, y, "r:1", 1.0, noise="adaptive").plot(), "λ")
     (lam,) = panels_of(ss.make_smoothing_spline(t, y, "r:1", **ADAPTIVE).plot(), "λ", "noise σ")
     assert lam.get_ylabel() == "λ"
     t, y = varying("noise")
-    spline = ss.make_smoothing_spline(t, y, "r:1", **ADAPTIVE)
+    spline = ss.make_smoothing_spline(t, y, "r:1", noise="adaptive")
     (sigma,) = panels_of(spline.plot(), "λ", "noise σ")
     assert sigma.get_ylabel() == "noise σ"
     batch = ss.make_smoothing_spline(t, np.stack([y, y - y.mean() + 0.1 * np.cos(t)[:, None]]), "r:1", **ADAPTIVE)

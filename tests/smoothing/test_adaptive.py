@@ -1,11 +1,14 @@
 """λ(t) and σ(t) that vary along the curve: see `oracle` for the references."""
 
+import warnings
+
 import numpy as np
 import pytest
 from cases import loop_over
 from oracle import Dense, process_variance
 
 import symspline as ss
+from symspline import _core
 
 # One λ for motion that bursts is what these tests compare with; it issues a warning.
 pytestmark = pytest.mark.filterwarnings("ignore::symspline.SmoothingWarning")
@@ -341,3 +344,51 @@ def test_estimates_vary(kind):
     assert inside[np.abs(s - 30) < 3].mean() > 0.8
     again = ss.estimate(sensors, curve.t, space, penalty="acceleration", lam=curve.lam_at(middles(curve)))
     assert space.distance(again(s), curve(s)).max() < 0.05 * curve.std(s).min()
+
+
+# ---- warnings ----
+
+
+def warned(*words, **options):
+    """The data of a burst or a steady motion, with noise that varies or not, and the warnings of their fit."""
+    rng = np.random.default_rng(0)
+    t, y, *_ = burst(9, 1000, noise=0)
+    if "steady" in words:
+        y = np.sin(0.5 * t)[:, None]
+    loud = (t > 30) & (t < 48) & ("loud" in words)
+    data = y + np.where(loud, 0.1, 0.02)[:, None] * rng.standard_normal(y.shape)
+    with warnings.catch_warnings(record=True) as seen:
+        warnings.simplefilter("always")
+        ss.make_smoothing_spline(t, data, "r:1", **options)
+    return " ".join(str(note.message) for note in seen)
+
+
+@pytest.mark.parametrize("words", [(), ("steady",), ("loud",), ("steady", "loud")], ids=str)
+def test_no_warning_if_both_may_vary(words):
+    assert warned(*words, lam="adaptive", noise="adaptive") == ""
+
+
+def test_one_that_takes_the_other_for_itself():
+    assert "takes for noise may be motion: lam varies" in warned(noise="adaptive")
+    assert "takes for motion may be noise: noise varies" in warned("steady", "loud", lam="adaptive")
+    assert warned(lam="adaptive") == warned("steady", lam="adaptive") == ""
+    assert warned("steady", "loud", noise="adaptive") == warned("steady", noise="adaptive") == ""
+    assert "Pass lam='adaptive'" in warned()
+
+
+def test_curves_that_do_not_converge_keep_one_lam(monkeypatch):
+    t, y, *_ = burst(5)
+    one = ss.make_smoothing_spline(t, y, "r:1")
+    run = _core.smooth
+
+    def failing(factors, *rest):
+        (smooth,) = run(factors, *rest)
+        if any(factors[0][-1]):
+            smooth[2][0][:] = 1
+        return [smooth]
+
+    monkeypatch.setattr(_core, "smooth", failing)
+    with pytest.warns(ss.SmoothingWarning, match="did not converge with a lam or a noise level that varies"):
+        curve = ss.make_smoothing_spline(t, y, "r:1", "adaptive")
+    assert np.isnan(curve.report.gain) and curve.report.converged
+    np.testing.assert_array_equal(curve(t), one(t))

@@ -16,14 +16,16 @@
 //! Others estimate a few free values (Wood 2011; Rodríguez-Álvarez et al. 2019) or a spline with a penalty (Krivobokova et
 //! al. 2008).
 
+use crate::audit::noise_varies;
 use crate::linearized::Basis;
 use crate::path::{Position, positions};
 use crate::problem::{Adapt, Penalty};
 use symspline_core::monitor::checkpoint;
 use symspline_core::scalar::LANES;
 
-/// Twice the logarithm of the likelihood must increase by more than this for each function that varies.
-const GAIN: f64 = 6.0;
+/// Twice the logarithm of the likelihood must increase by more than this if one function varies, or both. A second function
+/// gains a little from the jumps that the first one cannot follow.
+const GAINS: [f64; 3] = [0.0, 6.0, 18.0];
 /// The standard deviations of a step between nodes with which the two starts begin.
 const STEPS: [f64; 2] = [0.5, 2.0];
 /// Scoring steps with nodes at equal numbers of data, and with nodes at equal degrees of freedom; changes that end them, and
@@ -38,9 +40,10 @@ const FREEDOM: (f64, f64, f64) = (3.0, 8.0, 64.0);
 const RANGE: f64 = 25.0;
 /// The least variance of a step between nodes.
 const LEAST_STEP: f64 = 1e-6;
-/// Gaps longer than this multiple of the width of the smoother, and of the median time step, are long. There, λ is the
-/// harmonic mean: that of two rests would promise another rest. Random times hardly ever have longer gaps than ten steps.
-const GAP: (f64, f64) = (3.3, 10.0);
+/// Gaps longer than this multiple of the width of the smoother, of the median time step, and of the mean duration of a burst
+/// are long. There, λ is the harmonic mean: that of two rests would promise another rest. Random times hardly ever have longer
+/// gaps than ten steps, and a burst shows beside a gap that is shorter than an eighth of it.
+const GAP: [f64; 3] = [3.3, 10.0, 0.125];
 const GAP_OF_JERK: f64 = 3.0;
 
 /// A linear problem at a curve, in which λ and σ may vary.
@@ -59,8 +62,8 @@ pub struct Adaptive<'a> {
     pub positions: &'a [Position],
     /// See `positions`.
     pub weights: &'a [f64],
-    /// For noise that varies: squared deviations of the data from their neighbours per coordinate, in units of the variance
-    /// for one σ; NaN without neighbours.
+    /// Squared deviations of the data from their neighbours per coordinate, in units of the variance for one σ; NaN without
+    /// neighbours. Empty if they are not known.
     pub deviations: &'a [f64],
     /// The positions of everything that was measured, in the order of time, between which there may be gaps.
     pub measured: &'a [Position],
@@ -84,8 +87,8 @@ pub struct Profile {
     pub lam: Vec<f64>,
     /// ln σ² at every knot, with the mean zero over the data; empty for one σ.
     pub noise: Vec<f64>,
-    /// Whether λ varies although only σ was asked for, so that σ takes motion for noise.
-    pub moves: bool,
+    /// Whether the other function varies as well, although it was not asked for: one takes the other for itself.
+    pub other: bool,
 }
 
 /// Nodes at some of the knots, and hat functions: the nodes before segments and data, and their shares in the next one.
@@ -137,7 +140,7 @@ impl Profile {
     pub fn at_knots(&self, knots: &[f64], others: &[f64]) -> Self {
         let lam = if self.lam.is_empty() { Vec::new() } else { on_segments(knots, &self.lam, others) };
         let noise = if self.noise.is_empty() { Vec::new() } else { at_times(knots, &self.noise, others) };
-        Profile { gain: self.gain, lam, noise, moves: self.moves }
+        Profile { gain: self.gain, lam, noise, other: self.other }
     }
 
     /// Whether λ or σ varies.
@@ -300,8 +303,9 @@ impl Track {
         matches!(self.phase, Phase::Steps(0, steps) if steps == ROUNDS[0] || self.settled)
     }
 
-    fn functions(&self) -> f64 {
-        f64::from(u8::from(self.vary.lam)) + f64::from(u8::from(self.vary.noise))
+    /// The number of functions that vary.
+    fn functions(&self) -> usize {
+        usize::from(self.vary.lam) + usize::from(self.vary.noise)
     }
 
     /// Places the nodes, with the functions at them unchanged.
@@ -432,7 +436,7 @@ impl Track {
 impl Adaptive<'_> {
     /// The functions that are wanted, as far as they are accepted.
     pub fn profile(&self, vary: Adapt) -> Profile {
-        let none = Profile { gain: 0.0, lam: Vec::new(), noise: Vec::new(), moves: false };
+        let none = Profile { gain: 0.0, lam: Vec::new(), noise: Vec::new(), other: false };
         if self.lam.len() < 2 || !self.lam.iter().all(|lam| lam.is_finite() && *lam > 0.0) {
             return none;
         }
@@ -450,7 +454,7 @@ impl Adaptive<'_> {
             // Both together may take one for the other from a start at which neither varies.
             let mut again: Vec<Track> =
                 [(true, false), (false, true)].iter().filter_map(|kind| Self::best(&tracks, *kind)).collect();
-            again.extend((0..starts).map(|start| self.from_neighbours(start)));
+            again.extend((0..starts).map(|start| self.beside_neighbours(start)));
             self.run(&mut again);
             tracks.extend(again);
         }
@@ -458,7 +462,7 @@ impl Adaptive<'_> {
             tracks.into_iter().partition(|track| track.vary == Adapt::default());
         let alone = constant.iter().map(|track| track.score).fold(f64::INFINITY, f64::min);
         let gain = |track: &Track| alone - track.score;
-        let surplus = |track: &Track| gain(track) - GAIN * track.functions();
+        let surplus = |track: &Track| gain(track) - GAINS[track.functions()];
         let best_of = |wanted: bool| {
             let allowed = tracks.iter().filter(|track| (vary.lam || !track.vary.lam) == wanted);
             allowed.max_by(|a, b| surplus(a).total_cmp(&surplus(b)))
@@ -467,13 +471,20 @@ impl Adaptive<'_> {
         if !gain(best).is_finite() {
             return none;
         }
-        let moves = best_of(false).is_some_and(|other| surplus(other) > surplus(best).max(0.0));
+        let mut others: Vec<Track> = Vec::new();
+        if !vary.noise && !self.given && noise_varies(self.deviations, self.m) {
+            others.extend((0..starts).map(|start| self.beside_neighbours(start)));
+            others.extend((0..starts).map(|start| self.track(Adapt { lam: false, noise: true }, start)));
+            self.run(&mut others);
+        }
+        let more = best_of(false).into_iter().chain(&others).map(&surplus).fold(0.0, f64::max);
+        let other = more > surplus(best).max(0.0);
         if surplus(best) <= 0.0 {
-            return Profile { gain: gain(best), moves, ..none };
+            return Profile { gain: gain(best), other, ..none };
         }
         let noise = if best.vary.noise { self.centred(best) } else { Vec::new() };
         let lam = if best.vary.lam { self.with_gaps(&best.lams) } else { Vec::new() };
-        Profile { gain: gain(best), lam, noise, moves }
+        Profile { gain: gain(best), lam, noise, other }
     }
 
     /// Moves tracks until all are done.
@@ -488,7 +499,7 @@ impl Adaptive<'_> {
     }
 
     /// A start for both functions with the noise of neighbouring data.
-    fn from_neighbours(&self, start: usize) -> Track {
+    fn beside_neighbours(&self, start: usize) -> Track {
         let mut track = self.track(Adapt { lam: true, noise: true }, start);
         track.start_noise(self.deviations);
         track
@@ -525,22 +536,31 @@ impl Adaptive<'_> {
             }))
             .collect();
         let time = |&(segment, s): &Position| starts[segment] + s * basis.h(segment);
-        let mut apart: Vec<f64> = places.windows(2).map(|pair| time(&pair[1]) - time(&pair[0])).collect();
+        let apart: Vec<f64> = places.windows(2).map(|pair| time(&pair[1]) - time(&pair[0])).collect();
         let mut lams = lams.to_vec();
         let weight: f64 = self.weights.iter().sum();
         let mut sorted: Vec<f64> = apart.iter().copied().filter(|x| *x > 0.0).collect();
         sorted.sort_by(f64::total_cmp);
         let usual = sorted.get(sorted.len() / 2).copied().unwrap_or(f64::INFINITY);
-        let factor = if order == 2 { GAP.0 } else { GAP_OF_JERK };
+        let factor = if order == 2 { GAP[0] } else { GAP_OF_JERK };
         let mut is_gap = vec![false; lams.len()];
         // The mean of 1/λ is that of the variance of the process, in the parts with data.
         for _ in 0..2 {
             let recorded = || (0..is_gap.len()).filter(|i| !is_gap[*i]);
             let length: f64 = recorded().map(|i| basis.h(i)).sum();
             let mean = length / recorded().map(|i| basis.h(i) / lams[i]).sum::<f64>();
+            // λ is below its harmonic mean in bursts.
+            let bursts = || (0..lams.len()).map(|i| lams[i] < mean && !is_gap[i]);
+            let starts =
+                bursts().scan(false, |before, burst| Some(burst && !std::mem::replace(before, burst)));
+            let count = starts.filter(|start| *start).count().max(1) as f64;
+            let duration: f64 =
+                bursts().enumerate().filter(|(_, burst)| *burst).map(|(i, _)| basis.h(i)).sum::<f64>()
+                    / count;
             let width = (mean * length / weight).powf(0.5 / order as f64);
-            for (pair, apart) in places.windows(2).zip(&mut apart) {
-                if *apart > factor * width && *apart > GAP.1 * usual {
+            let longest = (factor * width).max(GAP[1] * usual).max(GAP[2] * duration);
+            for (pair, apart) in places.windows(2).zip(&apart) {
+                if *apart > longest {
                     let first = pair[0].0 + usize::from(pair[0].1 > 0.5);
                     let last = pair[1].0 + usize::from(pair[1].1 > 0.5);
                     is_gap[first..last].fill(true);

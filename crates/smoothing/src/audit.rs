@@ -308,6 +308,28 @@ impl Recording<'_> {
     }
 }
 
+/// Whether the noise varies, from squared deviations of data from their neighbours in m coordinates, in which motion hardly
+/// shows; NaN for unknown ones.
+pub fn noise_varies(deviations: &[f64], m: usize) -> bool {
+    /// The least number of squares of a bin, the limit of the score, and the ratio below which the noise hardly varies.
+    const LEAST: f64 = 60.0;
+    const SCORE: f64 = 4.75;
+    const RATIO: f64 = 2.0;
+    /// The variance of a mean of these squares, in units of that of independent ones: 1 + 2 Σ ρ² with the correlations −2/3 and
+    /// 1/6 of deviations at equal steps.
+    const CORRELATED: f64 = 1.0 + 2.0 * (4.0 / 9.0 + 1.0 / 36.0);
+    if deviations.is_empty() {
+        return false;
+    }
+    let known: Vec<f64> = deviations.iter().map(|x| f64::from(x.is_finite())).collect();
+    let squares: Vec<f64> = deviations.iter().map(|x| if x.is_finite() { *x } else { 0.0 }).collect();
+    let ends = bins(&known, LEAST / m as f64);
+    let counts = sums(&known, &ends);
+    let information: Vec<f64> = counts.iter().map(|count| m as f64 * count / CORRELATED).collect();
+    let found = unequal(&sums(&squares, &ends), &counts, &information, &ends, 0);
+    found.score > SCORE && found.ratio > RATIO
+}
+
 /// The last datum of each bin of at least so many degrees of freedom.
 fn bins(freedom: &[f64], least: f64) -> Vec<usize> {
     let total: f64 = freedom.iter().sum();

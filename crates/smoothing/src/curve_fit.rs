@@ -573,8 +573,7 @@ impl<'a> CurveFit<'a> {
         let lam: Vec<f64> = self.linearized.profile.iter().map(|profile| lam * profile).collect();
         let used = self.positions.iter().zip(&weights).filter(|(_, w)| **w > 0.0);
         let measured: Vec<Position> = used.map(|(position, _)| *position).collect();
-        let deviations =
-            if vary.noise { misfit.deviations(&weights, self.data.times, m) } else { Vec::new() };
+        let deviations = misfit.deviations(&weights, self.data.times, m);
         let local = Local { linearized: &linearized, m, misfit: &misfit, periodic, accelerations };
         Adaptive {
             basis: &linearized.basis,

@@ -195,8 +195,8 @@ fn smooth_factor<'py>(
     ))
 }
 
-/// λ of the segments divided by their geometric mean, ln σ² at the knots, the gain, and one if noise may be motion, for all
-/// curves.
+/// λ of the segments divided by their geometric mean, ln σ² at the knots, the gain, and one if the other function varies as
+/// well, for all curves.
 fn profiles<'py>(
     py: Python<'py>,
     batch: &[usize],
@@ -221,7 +221,7 @@ fn profiles<'py>(
         column(&[knots - 1], 1.0, |profile| profile.lam.clone())?,
         column(&[knots], 0.0, |profile| profile.noise.clone())?,
         column(&[], f64::NAN, |profile| vec![profile.gain])?,
-        column(&[], 0.0, |profile| vec![f64::from(u8::from(profile.moves))])?,
+        column(&[], 0.0, |profile| vec![f64::from(u8::from(profile.other))])?,
     ])
 }
 

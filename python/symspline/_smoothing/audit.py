@@ -225,11 +225,12 @@ def _warn_of_adaptation(space: Space, fits: list[Fitted]) -> None:
             SmoothingWarning,
             index,
         )
-    if first := _first(space, [fit.result.moves & fit.converged for fit in fits]):
-        _, index, of = first
+    if first := _first(space, [fit.result.both & fit.converged for fit in fits]):
+        number, index, of = first
+        words = ("motion", "noise", "noise") if fits[number].part.adapts[0] else ("noise", "motion", "lam")
         warn(
-            f"The noise of the data{of} may be motion: the data are far more likely if lam varies along the curve, "
-            "too. Pass lam='adaptive' with noise='adaptive'.",
+            f"What the smoothing{of} takes for {words[0]} may be {words[1]}: {words[2]} varies along the curve, too. "
+            "Pass lam='adaptive' with noise='adaptive'.",
             SmoothingWarning,
             index,
         )

@@ -30,6 +30,8 @@ from .solve import SmoothedSpline
 _WIDE, _SPARSE = 4.0, 3.0
 # The same number if λ varies: in shorter gaps, λ is that of the data beside them.
 _SPARSE_IF_VARYING = 10.0
+# Relative size of the changes of λ that are rounding errors.
+_SAME = 1e-9
 # Largest number of entries of the frames that are computed in one call.
 _TOGETHER = 1 << 22
 # Data of a robust fit beyond this quantile of the noise do not count as evidence, as in the fit.
@@ -314,8 +316,13 @@ def calibrate(
     gaps = []
     if len(spans):
         data, turn = evidence(), period if closed else None
-        known = data.knots, data.known, data.linearised
-        factors = _core.gap_factors(*known, spans.tolist(), width, at_data(0), turn, data.changes)
+        known, changes = (data.knots, data.known, data.linearised), data.changes
+        if changes is not None:
+            # Beside gaps that are too short for a burst, λ is that of the data, and so it is where data are omitted.
+            place = np.searchsorted(data.knots[1:-1], middles[np.isin(candidates, long)], "right")
+            if np.abs(changes[0][place]).max() > _SAME * np.abs(changes[0]).max():
+                changes = None
+        factors = _core.gap_factors(*known, spans.tolist(), width, at_data(0), turn, changes)
         gaps = [(float(start), float(stop), *factor) for (start, stop), factor in zip(spans, factors, strict=True)]
     if closed or not ends:
         return Calibration(course, gaps, at_data, width, period=period)

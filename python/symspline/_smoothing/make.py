@@ -279,8 +279,9 @@ def make_smoothing_spline(
     from two starts, the λ that `criterion` chooses and one so small that every burst shows. λ varies only if this
     increases twice the logarithm of the likelihood by more than 6, ``report.gain``; otherwise the result is that of one
     λ. `criterion` then chooses the level. The same holds for σ with ``noise="adaptive"``. With both, the data decide
-    which of the two varies: each mistakes the other for itself. In gaps between data that are long, λ is the harmonic
-    mean, because nothing shows whether there was a burst. See `SmoothingSpline.lam_at` and `SmoothingSpline.sigma_at`.
+    which of the two varies, because each takes the other for itself; both vary if the gain exceeds 18. In gaps between
+    data that are long, λ is the harmonic mean, because nothing shows whether there was a burst. See
+    `SmoothingSpline.lam_at` and `SmoothingSpline.sigma_at`.
 
     References
     ----------

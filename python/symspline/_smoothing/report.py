@@ -63,8 +63,9 @@ class SmoothingReport(FitReport):
         Estimated standard deviation of the noise in one coordinate, for weight one. For `estimate` with given standard
         deviations, the ratio of the residuals and these.
     gain : float, ndarray or None
-        Increase of twice the logarithm of the restricted likelihood if λ or σ varies. It is accepted if it exceeds 6
-        for each of the functions that vary. None if it was not asked for, see `make_smoothing_spline`.
+        Increase of twice the logarithm of the restricted likelihood if λ or σ varies, which they do if it exceeds 6,
+        and 18 for both. NaN if the curve then does not converge, so that neither varies. None if it was not asked for,
+        see `make_smoothing_spline`.
 
     See Also
     --------

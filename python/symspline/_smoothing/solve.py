@@ -549,8 +549,8 @@ class SmoothCurves(NamedTuple):
         Kind of the selection of a robust loss, which is 0 if it can be trusted, and the number of rejected data.
     minima : ndarray of int
         Kinds of the minima, see `best_of_starts`.
-    moves : ndarray of bool
-        Whether λ varies although only σ may do so.
+    both : ndarray of bool
+        Whether λ and σ vary although only one of them may do so.
     """
 
     points: Array
@@ -559,11 +559,11 @@ class SmoothCurves(NamedTuple):
     selection: NDArray[np.int_]
     rejected: NDArray[np.int_]
     minima: NDArray[np.int_]
-    moves: NDArray[np.bool_]
+    both: NDArray[np.bool_]
 
     def map(self, function: Callable[[Array], Array]) -> SmoothCurves:
         """Apply a function to all arrays, such as one that adds masked curves."""
-        columns = map(function, (self.selection, self.rejected, self.minima, self.moves))
+        columns = map(function, (self.selection, self.rejected, self.minima, self.both))
         return SmoothCurves(function(self.points), self.smoothed.map(function), self.states, *columns)
 
 
@@ -633,7 +633,7 @@ def _smooth_curves(
     state, iterations, lam, band_lam, at_bound, df, estimated, step, rate, _, exact, _, _, _, scale = shaped
     selection, rejected = raw.columns.selection.reshape(batch), raw.columns.rejected.reshape(batch)
     method = METHODS[int(np.any(exact))]
-    profile, noise_profile, gains, moves = raw.profiles or (part.profile, None, None, np.zeros(batch))
+    profile, noise_profile, gains, both = raw.profiles or (part.profile, None, None, np.zeros(batch))
     if part.profile is not None:
         profile = part.profile
     if profile is not None:
@@ -648,8 +648,8 @@ def _smooth_curves(
     posterior = Posterior.of(matrix, turn, size) if span is None or size == 1 else None
     result = Smoothed(report, raw.band, band_lam, scale, between, posterior, options.penalty, profile, noise_profile)
     points = numbers if span is None else span.embed(numbers)
-    moves = moves.reshape(batch) != 0
-    return SmoothCurves(points, result, raw.columns.state, selection, rejected, minima.reshape(batch), moves)
+    both = both.reshape(batch) != 0
+    return SmoothCurves(points, result, raw.columns.state, selection, rejected, minima.reshape(batch), both)
 
 
 def faults_of(
@@ -775,14 +775,14 @@ class Raw(NamedTuple):
         """
         if other.profiles is None:
             return other
-        lams, noises, gains, moves = other.profiles
+        lams, noises, gains, both = other.profiles
         count = len(self.columns.state)
         varies = (lams.reshape(count, -1) != 1).any(axis=-1) | (noises.reshape(count, -1) != 0).any(axis=-1)
         lost = varies & self.converged & ~other.converged
         taken = varies & ~lost
         rows = taken.reshape(gains.shape)[..., None]
         profiles = [np.where(rows, lams, 1.0), np.where(rows, noises, 0.0)]
-        profiles += [np.where(lost.reshape(gains.shape), np.nan, gains), moves]
+        profiles += [np.where(lost.reshape(gains.shape), np.nan, gains), both]
         return self.where(taken, other)._replace(profiles=profiles)
 
     @property
