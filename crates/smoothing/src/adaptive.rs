@@ -19,7 +19,7 @@
 use crate::audit::noise_varies;
 use crate::linearized::Basis;
 use crate::path::{Position, positions};
-use crate::problem::{Adapt, Penalty};
+use crate::problem::{Adapt, Penalty, Profile};
 use symspline_core::monitor::checkpoint;
 use symspline_core::scalar::LANES;
 
@@ -77,20 +77,6 @@ pub struct Adaptive<'a> {
     pub sums: &'a dyn Fn(&[Track]) -> Vec<Sums>,
 }
 
-/// How λ and σ vary.
-#[derive(Clone, Debug)]
-pub struct Profile {
-    /// The increase of twice the logarithm of the likelihood by the functions that vary, or that by the best functions if
-    /// none of them was accepted.
-    pub gain: f64,
-    /// λ of every segment divided by their geometric mean; empty for one λ.
-    pub lam: Vec<f64>,
-    /// ln σ² at every knot, with the mean zero over the data; empty for one σ.
-    pub noise: Vec<f64>,
-    /// Whether the other function varies as well, although it was not asked for: one takes the other for itself.
-    pub other: bool,
-}
-
 /// Nodes at some of the knots, and hat functions: the nodes before segments and data, and their shares in the next one.
 #[derive(Clone, Default)]
 struct Nodes {
@@ -135,18 +121,11 @@ pub fn at_times(knots: &[f64], values: &[f64], times: &[f64]) -> Vec<f64> {
     positions(knots, times).iter().map(value).collect()
 }
 
-impl Profile {
-    /// The same for other knots.
-    pub fn at_knots(&self, knots: &[f64], others: &[f64]) -> Self {
-        let lam = if self.lam.is_empty() { Vec::new() } else { on_segments(knots, &self.lam, others) };
-        let noise = if self.noise.is_empty() { Vec::new() } else { at_times(knots, &self.noise, others) };
-        Profile { gain: self.gain, lam, noise, other: self.other }
-    }
-
-    /// Whether λ or σ varies.
-    pub fn varies(&self) -> bool {
-        !(self.lam.is_empty() && self.noise.is_empty())
-    }
+/// How λ and σ vary, for other knots.
+pub fn at_knots(profile: &Profile, knots: &[f64], others: &[f64]) -> Profile {
+    let lam = if profile.lam.is_empty() { Vec::new() } else { on_segments(knots, &profile.lam, others) };
+    let noise = if profile.noise.is_empty() { Vec::new() } else { at_times(knots, &profile.noise, others) };
+    Profile { lam, noise, ..*profile }
 }
 
 fn at(values: &[f64], &(j, share): &(usize, f64)) -> f64 {

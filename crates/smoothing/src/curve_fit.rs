@@ -1,6 +1,6 @@
 //! One curve during the iteration to the smoothing spline.
 
-use crate::adaptive::{Adaptive, Profile, Track, at_times};
+use crate::adaptive::{Adaptive, Track, at_knots, at_times};
 use crate::banded::Banded;
 use crate::chain::deviations;
 use crate::choice::Linear;
@@ -14,7 +14,7 @@ use crate::local::Local;
 use crate::misfit::Misfit;
 use crate::path::{Path, Position, moved, positions};
 use crate::problem::{
-    Adapt, Data, EndConditions, Known, Options, Penalty, Selection, Smooth, SmoothReport, State,
+    Adapt, Data, EndConditions, Known, Options, Penalty, Profile, Selection, Smooth, SmoothReport, State,
 };
 use crate::progress::{Progress, larger, length};
 use crate::residuals::Residuals;
@@ -171,7 +171,7 @@ impl<'a> CurveFit<'a> {
         };
         let lam = data.lam.or(Some(report.lam));
         let given = Data { lam, ..data };
-        let profile = self.profile.map(|profile| profile.at_knots(&self.knots, data.knots));
+        let profile = self.profile.map(|profile| at_knots(&profile, &self.knots, data.knots));
         let mut long = CurveFit::new(given, space.dim(), data.knots.to_vec(), points, options, self.robust);
         if let Some(profile) = profile {
             long.vary(space.dim(), profile);

@@ -10,15 +10,15 @@
 //! for coefficients c of all coordinates together. Its matrix is banded, with a border of one row per parameter. Each
 //! factor of a product has its own λ.
 
-use crate::adaptive::{Adaptive, Profile, Sums, Track};
+use crate::adaptive::{Adaptive, Sums, Track};
 use crate::banded::{Banded, stride};
 use crate::bordered::{Bordered, Inverse};
 use crate::choice::{Look, STRAIGHT, Scoring, Straight, choose};
 use crate::elimination::eliminate;
 use crate::jacobi_operator::JacobiOperator;
-use crate::linearized::{Basis, LinearProblem, Stencil, of_segment};
+use crate::linearized::{Basis, LinearProblem, SegmentEnergy, Stencil};
 use crate::path::Position;
-use crate::problem::{Adapt, Criterion, EndConditions, Penalty};
+use crate::problem::{Adapt, Criterion, EndConditions, Penalty, Profile};
 use std::borrow::Cow;
 use symspline_core::memory;
 use symspline_core::monitor::checkpoint;
@@ -502,73 +502,55 @@ impl<'a> Estimation<'a> {
         let (first, own) = (self.first[factor], &self.factors[factor]);
         let (dim, basis, penalised) = (own.dim(), &linearized.basis, linearized.penalised);
         let (count, segments) = (basis.count(), basis.knots() - 1);
-        let (wide, rows) = (count.min(4), stride(m));
+        let wide = count.min(4);
         let others: Vec<f64> = (0..lams.len()).map(|f| if f == factor { 0.0 } else { lams[f] }).collect();
         let (mut band, corner) = self.matrix(&others);
         let mut right = self.right(&others);
-        let ends: Vec<[Stencil; 2]> = (0..segments).map(|i| [0.0, 1.0].map(|s| basis.row(i, s, 2))).collect();
-        let metric = |i: usize| of_segment(penalised, basis.h(i));
-        let entry = |i: usize, a: usize, b: usize| {
-            let ([l, r], (own, other)) = (&ends[i], metric(i));
-            own * (l.factors[a] * l.factors[b] + r.factors[a] * r.factors[b])
-                + other * (l.factors[a] * r.factors[b] + r.factors[a] * l.factors[b])
-        };
-        let at = |i: usize, c: usize| own.accelerations[i * dim + c];
-        let mut energy = 0.0;
-        for (i, lam) in track.lams.iter().enumerate() {
-            let ([l, r], (on, beside)) = (&ends[i], metric(i));
-            for a in 0..wide {
-                for c in 0..dim {
-                    let row = (l.first + a) * m + first + c;
-                    for b in 0..=a {
-                        *band.entry(row, row - (a - b) * m) += lam * entry(i, a, b);
-                    }
-                    let (x, y) = (at(i, c), at(i + 1, c));
-                    let pull = l.factors[a] * (on * x + beside * y) + r.factors[a] * (beside * x + on * y);
-                    right[p + row] -= lam * pull;
-                }
-            }
+        let energies: Vec<SegmentEnergy> =
+            (0..segments).map(|i| SegmentEnergy::new(basis, penalised, i)).collect();
+        let bends = |i: usize, c: usize| [i, i + 1].map(|knot| own.accelerations[knot * dim + c]);
+        let mut before = 0.0;
+        for (i, (energy, lam)) in energies.iter().zip(&track.lams).enumerate() {
             for c in 0..dim {
-                let (x, y) = (at(i, c), at(i + 1, c));
-                energy += lam * (on * (x * x + y * y) + 2.0 * beside * x * y);
+                for a in 0..wide {
+                    let row = (energy.first() + a) * m + first + c;
+                    for b in 0..=a {
+                        *band.entry(row, row - (a - b) * m) += lam * energy.entry(a, b);
+                    }
+                    right[p + row] -= lam * energy.pull(a, bends(i, c));
+                }
+                before += lam * energy.value(bends(i, c));
             }
         }
-        debug_assert_eq!(rows, band.width + 1);
         let factors = Bordered::new(band, self.side.clone(), corner);
         let mut x = right.clone();
         factors.solve(1, &mut x);
         let inverse = factors.inverse();
         let fixed: f64 = others.iter().zip(&self.energies).map(|(lam, energy)| lam * energy).sum();
         let gained: f64 = right.iter().zip(&x).map(|(b, x)| b * x).sum();
-        let (mut energies, mut freedoms) = (vec![0.0; segments], vec![0.0; segments]);
         let process = (linearized.free() as f64 - linearized.null()) / segments as f64;
-        for (i, lam) in track.lams.iter().enumerate() {
-            let ([l, r], (on, beside)) = (&ends[i], metric(i));
-            for c in 0..dim {
-                let moved = |row: &Stencil| -> f64 {
-                    (0..wide).map(|a| row.factors[a] * x[p + (row.first + a) * m + first + c]).sum()
-                };
-                let (a, b) = (at(i, c) + moved(l), at(i + 1, c) + moved(r));
-                energies[i] += lam * (on * (a * a + b * b) + 2.0 * beside * a * b);
-                for a in 0..wide {
-                    for b in 0..=a {
-                        let twice = if a == b { 1.0 } else { 2.0 };
-                        let row = (l.first + a) * m + first + c;
-                        let value = inverse.band.at(row, row - (a - b) * m);
-                        freedoms[i] -= lam * twice * entry(i, a, b) * value / dim as f64;
-                    }
-                }
-            }
-            freedoms[i] += process;
-        }
+        let moved = |row: &Stencil, c: usize| -> f64 {
+            (0..wide).map(|a| row.factors[a] * x[p + (row.first + a) * m + first + c]).sum()
+        };
+        let value = |(i, energy): (usize, &SegmentEnergy)| -> f64 {
+            let bend = |c: usize, e: usize| bends(i, c)[e] + moved(&energy.ends[e], c);
+            (0..dim).map(|c| track.lams[i] * energy.value([bend(c, 0), bend(c, 1)])).sum()
+        };
+        let freedom_of = |(i, energy): (usize, &SegmentEnergy)| {
+            let trace = |c: usize| {
+                let at = |a: usize| a * m + first + c;
+                energy.trace(count, |a, b| inverse.band.at(at(a), at(b)))
+            };
+            process - track.lams[i] * (0..dim).map(trace).sum::<f64>() / dim as f64
+        };
         let freedom = self.freedoms(&inverse);
         let of_knot = |i: usize| freedom[p + i * m + first..][..dim].iter().sum::<f64>() / dim as f64;
         Sums {
-            energies,
-            freedoms,
+            energies: energies.iter().enumerate().map(value).collect(),
+            freedoms: energies.iter().enumerate().map(freedom_of).collect(),
             squares: Vec::new(),
             leverages: (0..count).map(of_knot).collect(),
-            whole: self.squares + fixed + energy - gained,
+            whole: self.squares + fixed + before - gained,
             log_det: factors.log_det() / dim as f64,
             sound: factors.least_pivot() > 0.0,
         }

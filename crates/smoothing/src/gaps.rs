@@ -14,8 +14,7 @@ use crate::banded::{Banded, stride};
 use crate::bordered::Bordered;
 use crate::cyclic::{Factored, PeriodicCorrection};
 use crate::estimation::Matrices;
-use crate::linearized::of_segment;
-use crate::linearized::{Basis, OVERLAP};
+use crate::linearized::{Basis, OVERLAP, SegmentEnergy};
 use crate::problem::EndConditions;
 use crate::problem::Penalty;
 use std::ops::Range;
@@ -132,21 +131,17 @@ impl<'a> System<'a> {
         let d = m * columns;
         for i in segments.map(|i| i % count) {
             let lam = changes.lam[i] / unit;
-            let [l, r] = [0.0, 1.0].map(|s| basis.row(i, s, 2));
-            let (own, other) = of_segment(changes.penalised, basis.h(i));
+            let energy = SegmentEnergy::new(&basis, changes.penalised, i);
             for a in 0..self.count.min(4) {
-                let at = l.first + a;
+                let at = energy.first() + a;
                 for b in 0..=a {
-                    let entry = own * (l.factors[a] * l.factors[b] + r.factors[a] * r.factors[b])
-                        + other * (l.factors[a] * r.factors[b] + r.factors[a] * l.factors[b]);
                     for c in 0..m {
-                        matrix[(at * m + c) * rows + (a - b) * m] += lam * entry;
+                        matrix[(at * m + c) * rows + (a - b) * m] += lam * energy.entry(a, b);
                     }
                 }
                 for c in 0..d {
-                    let [x, y] = [i, i + 1].map(|k| changes.accelerations[k * d + c] * basis.spacing.powi(2));
-                    let pull = l.factors[a] * (own * x + other * y) + r.factors[a] * (other * x + own * y);
-                    right[at * d + c] -= lam * pull;
+                    let bends = [i, i + 1].map(|k| changes.accelerations[k * d + c] * basis.spacing.powi(2));
+                    right[at * d + c] -= lam * energy.pull(a, bends);
                 }
             }
         }

@@ -1,13 +1,12 @@
 //! The iteration of an estimate: linearise all measurements, solve the banded problem, move the curve.
 
-use crate::adaptive::Profile;
 use crate::along::{Along, Bending};
 use crate::body::Body;
 use crate::estimation::{Estimate, Estimation, Factor, Matrices, Measurements};
 use crate::motion::{BadRow, Motion};
 use crate::path::{moved, positions};
 use crate::posterior::Posterior;
-use crate::problem::{Criterion, EndCondition, EndConditions, Loss, Penalty};
+use crate::problem::{Criterion, EndCondition, EndConditions, Loss, Penalty, Profile};
 use crate::terms::{Columns, Linearised, Term};
 use symspline_core::curve::{Curves, Outside, Quantity, Times, evaluate};
 use symspline_core::fit::{Method, Options as FitOptions, Problem as Fit, Status, fit};

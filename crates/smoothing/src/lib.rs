@@ -62,14 +62,13 @@ pub mod private {
     pub use crate::linearized::{Basis, LinearProblem, OVERLAP, Stencil};
 }
 
-pub use adaptive::Profile;
 pub use cumulative::{CumulativeData, Outcome, fit_cumulative};
 pub use integrated_wiener::process_variance;
 pub use observations::Observations;
 pub use path::{Position, positions};
 pub use problem::{
-    Adapt, Criterion, Data, EndCondition, EndConditions, Known, Loss, Options, Penalty, Selection, Smooth,
-    SmoothReport, State, Tier,
+    Adapt, Criterion, Data, EndCondition, EndConditions, Known, Loss, Options, Penalty, Profile, Selection,
+    Smooth, SmoothReport, State, Tier,
 };
 pub use smooth::smooth;
 pub use variance::{functional_at, inverse_of_weights, variance};

@@ -236,6 +236,59 @@ pub fn of_segment(penalty: Penalty, h: f64) -> (f64, f64) {
     }
 }
 
+/// The energy of one segment with λ one: a quadratic function of the second derivatives at its ends, which depend on the
+/// same four coefficients.
+pub struct SegmentEnergy {
+    /// Second derivatives at both ends.
+    pub ends: [Stencil; 2],
+    /// The entries of M: see [`of_segment`].
+    metric: (f64, f64),
+}
+
+impl SegmentEnergy {
+    /// For a segment.
+    pub fn new(basis: &Basis, penalised: Penalty, segment: usize) -> Self {
+        let ends = [0.0, 1.0].map(|position| basis.row(segment, position, 2));
+        SegmentEnergy { ends, metric: of_segment(penalised, basis.h(segment)) }
+    }
+
+    /// The index of the first coefficient.
+    pub fn first(&self) -> usize {
+        self.ends[0].first
+    }
+
+    /// The entry of the matrix of the energy for two of the four coefficients.
+    pub fn entry(&self, a: usize, b: usize) -> f64 {
+        let ([l, r], (own, other)) = (&self.ends, self.metric);
+        own * (l.factors[a] * l.factors[b] + r.factors[a] * r.factors[b])
+            + other * (l.factors[a] * r.factors[b] + r.factors[a] * l.factors[b])
+    }
+
+    /// Half the derivative of the energy by a coefficient, for the second derivatives at both ends.
+    pub fn pull(&self, a: usize, [left, right]: [f64; 2]) -> f64 {
+        let ([l, r], (own, other)) = (&self.ends, self.metric);
+        l.factors[a] * (own * left + other * right) + r.factors[a] * (other * left + own * right)
+    }
+
+    /// The energy for the second derivatives at both ends.
+    pub fn value<T: Number>(&self, [left, right]: [T; 2]) -> T {
+        let (own, other) = self.metric;
+        (left * left + right * right) * T::of(own) + left * right * T::of(2.0 * other)
+    }
+
+    /// The trace of the matrix of the energy times a symmetric matrix, whose entries of four coefficients are given.
+    pub fn trace<T: Number>(&self, count: usize, entry: impl Fn(usize, usize) -> T) -> T {
+        let mut sum = T::ZERO;
+        for a in 0..count.min(4) {
+            for b in 0..=a {
+                let twice = if a == b { 1.0 } else { 2.0 };
+                sum += entry(self.first() + a, self.first() + b) * T::of(twice * self.entry(a, b));
+            }
+        }
+        sum
+    }
+}
+
 /// Σ factor · rowᵀ row, as the entries (i, i − d) at i · 4 + d.
 fn gram(count: usize, rows: impl Iterator<Item = (Stencil, Stencil, f64)>) -> Vec<f64> {
     let mut out = vec![0.0; count * BAND];

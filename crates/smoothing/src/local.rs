@@ -2,7 +2,7 @@
 
 use crate::adaptive::{Sums, Track};
 use crate::cyclic::PeriodicCorrection;
-use crate::linearized::{LinearProblem, Stencil, of_segment};
+use crate::linearized::{LinearProblem, SegmentEnergy};
 use crate::misfit::{Misfit, of_each};
 use std::borrow::Cow;
 use symspline_core::scalar::{LANES, Lane, few, lane};
@@ -25,7 +25,7 @@ impl Local<'_> {
     /// The solutions for at most as many tracks as there are lanes.
     pub fn sums(&self, tracks: &[Track]) -> Vec<Sums> {
         let (linearized, m) = (self.linearized, self.m);
-        let (basis, penalised) = (&linearized.basis, linearized.penalised);
+        let basis = &linearized.basis;
         let (segments, count) = (basis.knots() - 1, basis.count());
         let of_lane = |l: usize| &tracks[l.min(tracks.len() - 1)];
         let noisy = tracks.iter().any(|track| track.vary.noise);
@@ -41,22 +41,14 @@ impl Local<'_> {
             })
             .collect();
         let lams: Vec<Lane> = (0..segments).map(|i| Lane::new(few(|l| of_lane(l).lams[i]))).collect();
-        // Both ends of a segment depend on the same four coefficients.
-        let ends: Vec<[Stencil; 2]> = (0..segments).map(|i| [0.0, 1.0].map(|s| basis.row(i, s, 2))).collect();
-        let mut penalty = vec![Lane::ZERO; count * 4];
-        let metrics: Vec<(f64, f64)> = (0..segments).map(|i| of_segment(penalised, basis.h(i))).collect();
-        let entry = |i: usize, a: usize, b: usize| {
-            let [l, r] = &ends[i];
-            let (own, other) = metrics[i];
-            own * (l.factors[a] * l.factors[b] + r.factors[a] * r.factors[b])
-                + other * (l.factors[a] * r.factors[b] + r.factors[a] * l.factors[b])
-        };
+        let parts: Vec<SegmentEnergy> =
+            (0..segments).map(|i| SegmentEnergy::new(basis, linearized.penalised, i)).collect();
         let wide = count.min(4);
-        for (i, lam) in lams.iter().enumerate() {
-            let first = ends[i][0].first;
+        let mut penalty = vec![Lane::ZERO; count * 4];
+        for (part, lam) in parts.iter().zip(&lams) {
             for a in 0..wide {
                 for b in 0..=a {
-                    penalty[(first + a) * 4 + a - b] += *lam * lane(entry(i, a, b));
+                    penalty[(part.first() + a) * 4 + a - b] += *lam * lane(part.entry(a, b));
                 }
             }
         }
@@ -79,13 +71,11 @@ impl Local<'_> {
         };
         // Half the gradient of the energy at the accelerations a.
         let mut x: Vec<Lane> = (0..count * m).map(pull).collect();
-        for (i, lam) in lams.iter().enumerate() {
-            let ([l, r], (own, other)) = (&ends[i], metrics[i]);
+        let bends = |i: usize, c: usize| [i, i + 1].map(|knot| self.accelerations[knot * m + c]);
+        for (i, (part, lam)) in parts.iter().zip(&lams).enumerate() {
             for c in 0..m {
-                let [a, b] = [i, i + 1].map(|knot| self.accelerations[knot * m + c]);
-                let (left, right) = (own * a + other * b, other * a + own * b);
-                for k in 0..wide {
-                    x[(l.first + k) * m + c] -= *lam * lane(l.factors[k] * left + r.factors[k] * right);
+                for a in 0..wide {
+                    x[(part.first() + a) * m + c] -= *lam * lane(part.pull(a, bends(i, c)));
                 }
             }
         }
@@ -101,23 +91,11 @@ impl Local<'_> {
         let process = (linearized.free() as f64 - linearized.null()) / segments as f64;
         let mut energies = vec![Lane::ZERO; segments];
         let mut freedoms = vec![Lane::ZERO; segments];
-        for (i, lam) in lams.iter().enumerate() {
-            let ([l, r], (own, other)) = (&ends[i], metrics[i]);
-            let mut energy = Lane::ZERO;
-            for c in 0..m {
-                let a = l.of_lanes(&x, m, c) + lane(self.accelerations[i * m + c]);
-                let b = r.of_lanes(&x, m, c) + lane(self.accelerations[(i + 1) * m + c]);
-                energy += (a * a + b * b) * lane(own) + a * b * lane(2.0 * other);
-            }
-            energies[i] = *lam * energy;
-            let mut trace = Lane::ZERO;
-            for a in 0..wide {
-                for b in 0..=a {
-                    let twice = if a == b { 1.0 } else { 2.0 };
-                    trace += mean.at(l.first + a, l.first + b) * lane(twice * entry(i, a, b));
-                }
-            }
-            freedoms[i] = lane(process) - *lam * trace;
+        for (i, (part, lam)) in parts.iter().zip(&lams).enumerate() {
+            let moved = |end: usize, c: usize| part.ends[end].of_lanes(&x, m, c) + lane(bends(i, c)[end]);
+            let energy = (0..m).map(|c| part.value([moved(0, c), moved(1, c)]));
+            energies[i] = *lam * energy.fold(Lane::ZERO, |sum, x| sum + x);
+            freedoms[i] = lane(process) - *lam * part.trace(count, |a, b| mean.at(a, b));
         }
         let data = &linearized.data;
         let mut squares: Vec<Lane> =

@@ -1,6 +1,5 @@
 //! The smoothing problem, its options and its report.
 
-use crate::adaptive::Profile;
 use crate::banded::stride;
 use crate::cyclic::PeriodicCorrection;
 use std::f64::consts::PI;
@@ -242,6 +241,27 @@ pub struct SmoothReport {
     pub selection: Selection,
     /// The number of rejected data.
     pub rejected: usize,
+}
+
+/// How λ and σ vary.
+#[derive(Clone, Debug)]
+pub struct Profile {
+    /// The increase of twice the logarithm of the likelihood by the functions that vary, or that by the best functions if
+    /// none of them was accepted.
+    pub gain: f64,
+    /// λ of every segment divided by their geometric mean; empty for one λ.
+    pub lam: Vec<f64>,
+    /// ln σ² at every knot, with the mean zero over the data; empty for one σ.
+    pub noise: Vec<f64>,
+    /// Whether the other function varies as well, although it was not asked for: one takes the other for itself.
+    pub other: bool,
+}
+
+impl Profile {
+    /// Whether λ or σ varies.
+    pub fn varies(&self) -> bool {
+        !(self.lam.is_empty() && self.noise.is_empty())
+    }
 }
 
 /// A smoothed curve.
