@@ -14,6 +14,7 @@ from symspline import _core
 pytestmark = pytest.mark.filterwarnings("ignore::symspline.SmoothingWarning")
 
 TIGHT = {"tol": 1e-9, "max_iter": 200}
+BOTH = {"lam": "adaptive", "noise": "adaptive"}
 
 
 def middles(curve):
@@ -374,6 +375,41 @@ def test_one_that_takes_the_other_for_itself():
     assert warned(lam="adaptive") == warned("steady", lam="adaptive") == ""
     assert warned("steady", "loud", noise="adaptive") == warned("steady", noise="adaptive") == ""
     assert "Pass lam='adaptive'" in warned()
+
+
+@pytest.mark.parametrize("n", [60, 600])
+@loop_over("seed", range(5))
+def test_an_outlier_is_no_burst(n, seed):
+    rng = np.random.default_rng(seed)
+    t = np.linspace(0, 60, n)
+    k = rng.integers(5, n - 5)
+    y = np.sin(t / 8)[:, None] + 0.02 * rng.standard_normal((n, 1))
+    y[k] += 0.6
+    with warnings.catch_warnings(record=True) as seen:
+        warnings.simplefilter("always")
+        curve = ss.make_smoothing_spline(t, y, "r:1", "adaptive")
+    text = " ".join(str(note.message) for note in seen)
+    # Otherwise the residuals show it, as with one λ.
+    assert f"points[{k}]" in text or "outlier" in text
+    assert np.ptp(curve.lam_at(t)) == 0 or f"follow an outlier: points[{k}]" in text
+
+
+def test_noise_does_not_vanish_where_rounded_data_repeat():
+    rng, t = np.random.default_rng(2), np.linspace(0, 60, 600)
+    truth = 0.3 * np.sin(t / 8) + 0.4 * np.exp(-((t - 30) ** 2) / 4) * np.sin(3 * t)
+    y = np.round((truth + 0.01 * rng.standard_normal(600)) / 0.05) * 0.05
+    one, curve = (ss.make_smoothing_spline(t, y[:, None], "r:1", **how) for how in ({}, BOTH))
+    sigma = curve.sigma_at(t)
+    assert sigma.max() < 101 * sigma.min()
+    assert np.abs(curve(t)[:, 0] - truth).max() < 1.5 * np.abs(one(t)[:, 0] - truth).max()
+
+
+def test_few_data_hardly_decide():
+    """In 40 data, a burst and a noisy part look alike."""
+    rng, t = np.random.default_rng(0), np.linspace(0, 60, 40)
+    y = 0.2 * np.sin(t / 10) + 0.4 * np.exp(-((t - 30) ** 2) / 30) * np.sin(0.8 * t) + 0.02 * rng.standard_normal(40)
+    with pytest.warns(ss.SmoothingWarning, match="hardly decide whether their noise or the motion varies"):
+        ss.make_smoothing_spline(t, y[:, None], "r:1", **BOTH)
 
 
 def test_curves_that_do_not_converge_keep_one_lam(monkeypatch):

@@ -38,6 +38,11 @@ const DATA: (f64, f64, f64) = (8.0, 4.0, 64.0);
 const FREEDOM: (f64, f64, f64) = (3.0, 8.0, 64.0);
 /// The range of ln λ around the start.
 const RANGE: f64 = 25.0;
+/// The range of ln σ² around its mean: noise varies by at most ten times. Rounded data repeat, and without a limit their noise
+/// would vanish.
+const NOISE_RANGE: f64 = 4.6;
+/// Likelihoods of one function and the other that differ by less than this hardly decide between them.
+const TIE: f64 = 10.0;
 /// The least variance of a step between nodes.
 const LEAST_STEP: f64 = 1e-6;
 /// Gaps longer than this multiple of the width of the smoother, of the median time step, and of the mean duration of a burst
@@ -390,7 +395,7 @@ impl Track {
             let left = of_data(&|k| 1.0 - sums.leverages[k]);
             let gradient: Vec<f64> =
                 squares.iter().zip(left).map(|(r, d)| 0.5 * m * (r / (m * variance) - d)).collect();
-            largest = largest.max(self.noise.step(&gradient, &of_noise, [-RANGE, RANGE]));
+            largest = largest.max(self.noise.step(&gradient, &of_noise, [-NOISE_RANGE, NOISE_RANGE]));
             let mean = self.noise.x.iter().sum::<f64>() / self.noise.x.len() as f64;
             self.noise.x.iter_mut().for_each(|x| *x -= mean);
             self.factors = self.nodes.of_data.iter().map(|hat| (-at(&self.noise.x, hat)).exp()).collect();
@@ -415,7 +420,14 @@ impl Track {
 impl Adaptive<'_> {
     /// The functions that are wanted, as far as they are accepted.
     pub fn profile(&self, vary: Adapt) -> Profile {
-        let none = Profile { gain: 0.0, lam: Vec::new(), noise: Vec::new(), other: false };
+        let none = Profile {
+            gain: 0.0,
+            lam: Vec::new(),
+            noise: Vec::new(),
+            other: false,
+            tie: false,
+            outlier: f64::NAN,
+        };
         if self.lam.len() < 2 || !self.lam.iter().all(|lam| lam.is_finite() && *lam > 0.0) {
             return none;
         }
@@ -461,9 +473,17 @@ impl Adaptive<'_> {
         if surplus(best) <= 0.0 {
             return Profile { gain: gain(best), other, ..none };
         }
+        let alone_by = |lam: bool, noise: bool| {
+            let alike = tracks.iter().filter(|track| track.vary == Adapt { lam, noise });
+            alike.map(&surplus).fold(f64::NEG_INFINITY, f64::max)
+        };
+        let tie = vary.lam
+            && vary.noise
+            && best.functions() == 1
+            && alone_by(true, false).min(alone_by(false, true)) > (surplus(best) - TIE).max(0.0);
         let noise = if best.vary.noise { self.centred(best) } else { Vec::new() };
         let lam = if best.vary.lam { self.with_gaps(&best.lams) } else { Vec::new() };
-        Profile { gain: gain(best), lam, noise, other }
+        Profile { gain: gain(best), lam, noise, other, tie, outlier: f64::NAN }
     }
 
     /// Moves tracks until all are done.

@@ -308,6 +308,50 @@ impl Recording<'_> {
     }
 }
 
+/// An isolated outlier, given the residuals of data of m coordinates in the order of time: it is far from its neighbours, which
+/// agree without it.
+pub fn isolated_outlier(times: &[f64], residuals: &[f64], deviations: &[f64], m: usize) -> Option<usize> {
+    /// Data on either side that determine the noise, and the squared limits for the outlier and for its neighbours, in
+    /// standard deviations of a coordinate.
+    const BESIDE: usize = 20;
+    const FAR: f64 = 64.0;
+    const AGREE: f64 = 12.0;
+    let used: Vec<usize> = (0..times.len()).filter(|&k| deviations[k].is_finite()).collect();
+    let row = |k: usize| &residuals[k * m..][..m];
+    // The squared deviation of b from the line through a and c, per coordinate and in the unit of the deviations.
+    let off = |a: usize, b: usize, c: usize| {
+        let whole = times[c] - times[a];
+        let share = if whole > 0.0 { (times[b] - times[a]) / whole } else { 0.5 };
+        let rest = row(b).iter().zip(row(a)).zip(row(c)).map(|((b, a), c)| b - share * c - (1.0 - share) * a);
+        let variance = 1.0 + share * share + (1.0 - share) * (1.0 - share);
+        rest.map(|x| x * x).sum::<f64>() / (m as f64 * variance)
+    };
+    let usual = median_of_chi_squared(m) / m as f64;
+    let mut squares: Vec<f64> = vec![f64::NAN; used.len()];
+    for i in 1..used.len().saturating_sub(1) {
+        squares[i] = off(used[i - 1], used[i], used[i + 1]);
+    }
+    (3..used.len().saturating_sub(3))
+        .find(|&i| {
+            checkpoint();
+            let near = &squares[i.saturating_sub(BESIDE)..(i + BESIDE + 1).min(squares.len())];
+            let scale = median(near.to_vec()) / usual;
+            let k = |offset: isize| used[i.wrapping_add_signed(offset)];
+            let extra = 1.0 / m as f64;
+            scale > 0.0
+                && squares[i] > FAR * (1.0 + extra) / 2.0 * scale
+                && off(k(-2), k(-1), k(1)) < AGREE * scale
+                && off(k(-1), k(1), k(2)) < AGREE * scale
+        })
+        .map(|i| used[i])
+}
+
+/// The median of χ² with m degrees of freedom (Wilson and Hilferty 1931).
+fn median_of_chi_squared(m: usize) -> f64 {
+    let m = m as f64;
+    m * (1.0 - 2.0 / (9.0 * m)).powi(3)
+}
+
 /// Whether the noise varies, from squared deviations of data from their neighbours in m coordinates, in which motion hardly
 /// shows; NaN for unknown ones.
 pub fn noise_varies(deviations: &[f64], m: usize) -> bool {

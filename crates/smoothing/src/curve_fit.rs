@@ -575,7 +575,7 @@ impl<'a> CurveFit<'a> {
         let measured: Vec<Position> = used.map(|(position, _)| *position).collect();
         let deviations = misfit.deviations(&weights, self.data.times, m);
         let local = Local { linearized: &linearized, m, misfit: &misfit, periodic, accelerations };
-        Adaptive {
+        let mut profile = Adaptive {
             basis: &linearized.basis,
             penalised: penalty,
             m,
@@ -590,7 +590,12 @@ impl<'a> CurveFit<'a> {
             given: self.data.lam.is_some(),
             sums: &|tracks: &[Track]| local.sums(tracks),
         }
-        .profile(vary)
+        .profile(vary);
+        if self.robust.stage == Stage::Plain {
+            let outlier = misfit.isolated_outlier(self.data.times, &deviations, m);
+            profile.outlier = outlier.map_or(f64::NAN, |k| self.data.times[k]);
+        }
+        profile
     }
 
     /// Continues with λ and σ that vary, or with one of each.

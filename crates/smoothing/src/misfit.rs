@@ -4,6 +4,7 @@
 //! the coordinates, so that A is one matrix for all of them, with a band of blocks. The curvature of the space
 //! couples them, too, if it is included: see [`JacobiOperator`].
 
+use crate::audit;
 use crate::banded::{Banded, Number, WIDTH, stride};
 use crate::cyclic::{Factored, PeriodicCorrection};
 use crate::information::Seen;
@@ -288,6 +289,18 @@ impl<'a> Misfit<'a> {
             }
         }
         out
+    }
+
+    /// An isolated outlier: see [`audit::isolated_outlier`]. Weights are assumed to be nearly equal there.
+    pub fn isolated_outlier(&self, times: &[f64], deviations: &[f64], m: usize) -> Option<usize> {
+        let residuals = match self {
+            Misfit::Numbers { weights, residuals, .. } => {
+                let rows = residuals.chunks_exact(m).zip(weights.iter());
+                rows.flat_map(|(row, w)| row.iter().map(|x| x * w.sqrt())).collect()
+            }
+            Misfit::Matrices { seen, .. } => seen.residuals.clone(),
+        };
+        audit::isolated_outlier(times, &residuals, deviations, m)
     }
 
     /// The present weighted sum of squares.

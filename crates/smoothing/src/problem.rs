@@ -255,6 +255,10 @@ pub struct Profile {
     pub noise: Vec<f64>,
     /// Whether the other function varies as well, although it was not asked for: one takes the other for itself.
     pub other: bool,
+    /// Whether both may vary, and the data hardly decide which of them does.
+    pub tie: bool,
+    /// The time of an isolated outlier, which λ of its own would follow; NaN without one.
+    pub outlier: f64,
 }
 
 impl Profile {

@@ -33,7 +33,7 @@ type Smoothed<'py> = (
     Bound<'py, PyArrayDyn<f64>>,
     Bound<'py, PyTuple>,
     Systems<'py>,
-    Option<[Bound<'py, PyArrayDyn<f64>>; 4]>,
+    Option<[Bound<'py, PyArrayDyn<f64>>; 6]>,
 );
 
 type Systems<'py> = (Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>, usize);
@@ -195,14 +195,14 @@ fn smooth_factor<'py>(
     ))
 }
 
-/// λ of the segments divided by their geometric mean, ln σ² at the knots, the gain, and one if the other function varies as
-/// well, for all curves.
+/// λ of the segments divided by their geometric mean, ln σ² at the knots, the gain, one if the other function varies as well,
+/// one if the data hardly decide which of them varies, and the time of an outlier, for all curves.
 fn profiles<'py>(
     py: Python<'py>,
     batch: &[usize],
     knots: usize,
     found: &[Smooth],
-) -> PyResult<[Bound<'py, PyArrayDyn<f64>>; 4]> {
+) -> PyResult<[Bound<'py, PyArrayDyn<f64>>; 6]> {
     let column = |tail: &[usize], usual: f64, of: fn(&Profile) -> Vec<f64>| {
         let out = zeros(py, &[batch, tail].concat())?;
         let mut write = out.readwrite();
@@ -222,6 +222,8 @@ fn profiles<'py>(
         column(&[knots], 0.0, |profile| profile.noise.clone())?,
         column(&[], f64::NAN, |profile| vec![profile.gain])?,
         column(&[], 0.0, |profile| vec![f64::from(u8::from(profile.other))])?,
+        column(&[], 0.0, |profile| vec![f64::from(u8::from(profile.tie))])?,
+        column(&[], f64::NAN, |profile| vec![profile.outlier])?,
     ])
 }
 

@@ -120,7 +120,7 @@ def audit(
     if not unique:
         _warn_of_minima(space, fits)
     warn_of_bounds(space, reports, trusted, counts)
-    _warn_of_adaptation(space, fits)
+    _warn_of_adaptation(space, noisy, fits)
     if not is_silent(SmoothingWarning):
         _warn_of_residuals(space, noisy, fits)
         if fits[0].result.smoothed.penalty == "acceleration" and noisy.times.shape[-1] >= _DATA:
@@ -214,23 +214,47 @@ _MINIMA = {
 }
 
 
-def _warn_of_adaptation(space: Space, fits: list[Fitted]) -> None:
+def _warn_of_adaptation(space: Space, noisy: SmoothingData, fits: list[Fitted]) -> None:
     """Warn if λ and σ should vary in another way along a curve."""
     gains = [np.asarray(0.0 if fit.report.gain is None else fit.report.gain, np.float64) for fit in fits]
     if first := _first(space, [np.isnan(gain) & fit.converged for gain, fit in zip(gains, fits, strict=True)]):
-        _, index, of = first
+        number, index, of = first
+        other = "" if fits[number].result.smoothed.penalty == "jerk" else "method='newton', or "
         warn(
             f"The smoothing{of} did not converge with a lam or a noise level that varies along the curve. The result "
-            "has one of each. Pass method='newton', or more knots where the motion is fast.",
+            f"has one of each. Pass {other}more knots where the motion is fast.",
             SmoothingWarning,
             index,
         )
-    if first := _first(space, [fit.result.both & fit.converged for fit in fits]):
+    if first := _first(space, [(fit.result.doubts[..., 0] > 0) & fit.converged for fit in fits]):
         number, index, of = first
         words = ("motion", "noise", "noise") if fits[number].part.adapts[0] else ("noise", "motion", "lam")
         warn(
             f"What the smoothing{of} takes for {words[0]} may be {words[1]}: {words[2]} varies along the curve, too. "
             "Pass lam='adaptive' with noise='adaptive'.",
+            SmoothingWarning,
+            index,
+        )
+    if first := _first(space, [(fit.result.doubts[..., 1] > 0) & fit.converged for fit in fits]):
+        _, index, of = first
+        warn(
+            f"The data{of} hardly decide whether their noise or the motion varies. Plot the curve, and pass only one "
+            "of lam='adaptive' and noise='adaptive' if you know which.",
+            SmoothingWarning,
+            index,
+        )
+    varies = [fit.result.smoothed.profile is not None for fit in fits]
+    outliers = [
+        np.isfinite(fit.result.doubts[..., 2]) & fit.converged & changes
+        for fit, changes in zip(fits, varies, strict=True)
+    ]
+    if first := _first(space, outliers):
+        number, index, of = first
+        times = noisy.times[index] if noisy.times.ndim > 1 else noisy.times
+        at = int(np.searchsorted(times, fits[number].result.doubts[(*index, 2)]))
+        warn(
+            f"The curve{of} may follow an outlier: points[{at}] is far from its neighbours, which agree without it, "
+            "and lam varies. Pass loss='cauchy', or weights of 0 for outliers.",
             SmoothingWarning,
             index,
         )

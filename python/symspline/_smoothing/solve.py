@@ -549,8 +549,9 @@ class SmoothCurves(NamedTuple):
         Kind of the selection of a robust loss, which is 0 if it can be trusted, and the number of rejected data.
     minima : ndarray of int
         Kinds of the minima, see `best_of_starts`.
-    both : ndarray of bool
-        Whether λ and σ vary although only one of them may do so.
+    doubts : ndarray, shape (..., 3)
+        Of λ and σ that vary: 1 if both of them do although only one may, 1 if the data hardly decide which of them
+        does, and the time of an isolated outlier or NaN.
     """
 
     points: Array
@@ -559,11 +560,11 @@ class SmoothCurves(NamedTuple):
     selection: NDArray[np.int_]
     rejected: NDArray[np.int_]
     minima: NDArray[np.int_]
-    both: NDArray[np.bool_]
+    doubts: Doubles
 
     def map(self, function: Callable[[Array], Array]) -> SmoothCurves:
         """Apply a function to all arrays, such as one that adds masked curves."""
-        columns = map(function, (self.selection, self.rejected, self.minima, self.both))
+        columns = map(function, (self.selection, self.rejected, self.minima, self.doubts))
         return SmoothCurves(function(self.points), self.smoothed.map(function), self.states, *columns)
 
 
@@ -633,7 +634,10 @@ def _smooth_curves(
     state, iterations, lam, band_lam, at_bound, df, estimated, step, rate, _, exact, _, _, _, scale = shaped
     selection, rejected = raw.columns.selection.reshape(batch), raw.columns.rejected.reshape(batch)
     method = METHODS[int(np.any(exact))]
-    profile, noise_profile, gains, both = raw.profiles or (part.profile, None, None, np.zeros(batch))
+    profile, noise_profile, gains = part.profile, None, None
+    doubts = [np.zeros(batch), np.zeros(batch), np.full(batch, np.nan)]
+    if raw.profiles is not None:
+        profile, noise_profile, gains, *doubts = raw.profiles
     if part.profile is not None:
         profile = part.profile
     if profile is not None:
@@ -648,8 +652,8 @@ def _smooth_curves(
     posterior = Posterior.of(matrix, turn, size) if span is None or size == 1 else None
     result = Smoothed(report, raw.band, band_lam, scale, between, posterior, options.penalty, profile, noise_profile)
     points = numbers if span is None else span.embed(numbers)
-    both = both.reshape(batch) != 0
-    return SmoothCurves(points, result, raw.columns.state, selection, rejected, minima.reshape(batch), both)
+    of_curves = np.stack([np.reshape(doubt, batch) for doubt in doubts], axis=-1)
+    return SmoothCurves(points, result, raw.columns.state, selection, rejected, minima.reshape(batch), of_curves)
 
 
 def faults_of(
@@ -775,14 +779,14 @@ class Raw(NamedTuple):
         """
         if other.profiles is None:
             return other
-        lams, noises, gains, both = other.profiles
+        lams, noises, gains, *doubts = other.profiles
         count = len(self.columns.state)
         varies = (lams.reshape(count, -1) != 1).any(axis=-1) | (noises.reshape(count, -1) != 0).any(axis=-1)
         lost = varies & self.converged & ~other.converged
         taken = varies & ~lost
         rows = taken.reshape(gains.shape)[..., None]
         profiles = [np.where(rows, lams, 1.0), np.where(rows, noises, 0.0)]
-        profiles += [np.where(lost.reshape(gains.shape), np.nan, gains), both]
+        profiles += [np.where(lost.reshape(gains.shape), np.nan, gains), *doubts]
         return self.where(taken, other)._replace(profiles=profiles)
 
     @property

@@ -250,7 +250,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         >>> t = np.linspace(0, 60, 600)
         >>> noise = np.where((t > 20) & (t < 40), 0.2, 0.04) * np.random.default_rng(0).standard_normal(600)
         >>> s = ss.make_smoothing_spline(t, (np.sin(t) + noise)[:, None], "r:1", noise="adaptive")
-        >>> s.sigma_at([5.0, 30.0]).round(2)
+        >>> s.sigma_at([5.0, 35.0]).round(2)
         array([0.04, 0.21])
         """
         times, _, per_curve = self._finite_times(x)
