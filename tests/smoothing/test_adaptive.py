@@ -428,3 +428,12 @@ def test_curves_that_do_not_converge_keep_one_lam(monkeypatch):
         curve = ss.make_smoothing_spline(t, y, "r:1", "adaptive")
     assert np.isnan(curve.report.gain) and curve.report.converged
     np.testing.assert_array_equal(curve(t), one(t))
+
+
+def test_noise_does_not_vary_without_a_penalty():
+    t, y, *_ = burst(0, 50)
+    for lam in (0.0, np.inf):
+        with pytest.raises(ss.ValidationError, match="noise='adaptive' needs a penalty"):
+            ss.make_smoothing_spline(t, y, "r:1", lam, knots=10, noise="adaptive")
+    with pytest.raises(ss.ValidationError, match=r"lam has shape \(2, 49\), but must be a number"):
+        ss.make_smoothing_spline(t, y, "r:1", np.ones((2, 49)))

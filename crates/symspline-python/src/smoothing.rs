@@ -180,7 +180,9 @@ fn smooth_factor<'py>(
         })
         .collect();
     // One iteration factors banded matrices of three blocks for every knot.
-    let heavy = is_heavy(&space) || count * space.dim().pow(3) > HEAVY_FACTORS;
+    let heavy = is_heavy(&space)
+        || count * space.dim().pow(3) > HEAVY_FACTORS
+        || (adapt != Adapt::default() && is_long(p.len()));
     let found =
         watched(py, progress, curves * count, heavy, |monitor| run(&space, &data, &options, monitor))?;
 

@@ -327,6 +327,12 @@ def make_smoothing_spline(
     smoothness = read_smoothness(space, spaces, lam, batch)
     noise_adapts = read_adaptive_noise(space, spaces, noise)
     lams = [given.lam for given in smoothness]
+    for given_lam, adapts in zip(lams, noise_adapts, strict=True):
+        if adapts and np.any((given_lam == 0) | np.isinf(given_lam)):
+            raise ValidationError(
+                "noise='adaptive' needs a penalty: pass a lam other than 0 and inf, or omit lam. If you know the "
+                "noise, pass weights."
+            )
     has_infinite = np.isinf(lams).any()
     if has_infinite:
         for name, value, required in (("penalty", penalty, "acceleration"), ("bc_type", bc_type, "natural")):

@@ -485,6 +485,12 @@ def read_smoothness(space: Space, spaces: tuple[Space, ...], lam: Any, batch: tu
         array = np.asarray(entry)
         # A tuple has one entry per part, which a single space does not have.
         if entry is None or isinstance(entry, tuple) or array.dtype.kind not in "iuf" or array.ndim != len(batch) + 1:
+            if entry is not None and array.dtype.kind in "iuf" and array.shape not in ((), batch):
+                per_curve = f", an array of shape {batch} with one per curve" if batch else ""
+                raise ValidationError(
+                    f"lam has shape {array.shape}, but must be a number{per_curve}, or an array with one number per "
+                    f"segment of shape {(*batch, 'K - 1')}".replace("'", "")
+                )
             given.append(Smoothness(_one_per_curve(entry, "lam", batch, True)))
             continue
         if array.shape[:-1] != batch or not array.shape[-1]:

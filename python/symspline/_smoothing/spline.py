@@ -202,21 +202,16 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         >>> bool(s.lam_at(10.0) > 100 * s.lam_at(30.0)), bool(s.report.gain > 6)
         (True, True)
         """
-        times, _, per_curve = self._finite_times(x)
+        return self._in_parts_at(x, self._lam_at)
 
-        def lam(number: int, index: Index, at: Doubles) -> Doubles:
-            part, knots = self._smoothed[number], self._knots_of(index)
-            mean = np.full(at.shape, np.asarray(part.report.lam)[index])
-            profile = part.profile_of(index)
-            return (
-                mean
-                if profile is None
-                else mean * profile[np.searchsorted(knots[1:-1], self._turned(knots, at), "right")]
-            )
-
-        return self._per_space(
-            [self._per_curve(times, per_curve, partial(lam, number))[()] for number in range(len(self._smoothed))]
-        )
+    def _lam_at(self, number: int, index: Index, x: Doubles) -> Doubles:
+        """Return λ of one curve in one part at times x of the core."""
+        part, knots = self._smoothed[number], self._knots_of(index)
+        lam = np.full(x.shape, np.asarray(part.report.lam)[index])
+        profile = part.profile_of(index)
+        if profile is not None:
+            lam *= profile[np.searchsorted(knots[1:-1], self._turned(knots, x), "right")]
+        return lam
 
     @noise_method
     def sigma_at(self, x: TimesLike) -> FloatArray | tuple[FloatArray, ...]:
@@ -253,9 +248,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         >>> s.sigma_at([5.0, 35.0]).round(2)
         array([0.04, 0.21])
         """
-        times, _, per_curve = self._finite_times(x)
-        sigmas = [partial(self._sigma_at, number) for number in range(len(self._smoothed))]
-        return self._per_space([self._per_curve(times, per_curve, sigma)[()] for sigma in sigmas])
+        return self._in_parts_at(x, self._sigma_at)
 
     def _sigma_at(self, number: int, index: Index, x: Doubles) -> Doubles:
         """Return the standard deviation of the noise of one curve in one part at times x of the core."""
@@ -460,9 +453,13 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         True
         """
         nu, calibrated = order_of(nu, 1), checked_flag(calibrated, "calibrated")
+        return self._in_parts_at(x, partial(self._spread, nu=nu, calibrated=calibrated))
+
+    def _in_parts_at(self, x: TimesLike, value: Callable[..., Doubles]) -> FloatArray | tuple[FloatArray, ...]:
+        """Return the values of a function of a part, the index of a curve and times, for every part and curve."""
         times, _, per_curve = self._finite_times(x)
-        spreads = [partial(self._spread, number, nu=nu, calibrated=calibrated) for number in range(len(self._smoothed))]
-        return self._per_space([self._per_curve(times, per_curve, spread)[()] for spread in spreads])
+        parts = [partial(value, number) for number in range(len(self._smoothed))]
+        return self._per_space([self._per_curve(times, per_curve, of_part)[()] for of_part in parts])
 
     def _per_curve(
         self,
