@@ -238,7 +238,7 @@ ROWS = [
         "Report.invariant_radius Report.contraction_bound",
         "tests/evidence/test_theorem_3_1.py::test_algorithm_1_stays_within",
         "theory/convergence.md convergence.md",
-        source="fit/certificate.rs::invariant_radius fit/certificate.rs::contraction_bound",
+        source="fit/theorem.rs::invariant_radius fit/theorem.rs::contraction_bound",
     ),
     Row(
         "Section 4.1, (23)",
@@ -393,7 +393,7 @@ ROWS = [
         "Report.invariant_radius",
         f"{CERTIFICATE}test_radius_is_the_smallest_of_38",
         f"theory/convergence.md {REGION}",
-        source="fit/certificate.rs::invariant_radius",
+        source="fit/theorem.rs::invariant_radius",
     ),
     Row(
         "Proposition C.1",

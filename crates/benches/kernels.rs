@@ -16,7 +16,7 @@ fn main() {
 }
 
 const ON: fn(usize) -> bool = |_| true;
-const OPTIONS: Options = Options { method: Method::Auto, tol: 1e-12, max_iter: None };
+const OPTIONS: Options = Options { method: Method::Auto, tol: 1e-12, max_iter: None, certify: None };
 
 /// A smooth curve on S³ with steps of about 0.3 rad.
 fn points(n: usize) -> Vec<f64> {

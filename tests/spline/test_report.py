@@ -10,7 +10,7 @@ import symspline as ss
 
 FIELDS = [
     "method", "converged", "iterations", "residual", "max_step", "max_gap", "curvature", "invariant_radius", "rate",
-    "alternative_energy", "contraction_bound", "guaranteed_sweeps", "skipped",
+    "alternative_energy", "contraction_bound", "guaranteed_sweeps", "existence_radius", "uniqueness_radius", "skipped",
 ]  # fmt: skip
 
 

@@ -194,7 +194,7 @@ fn run(operation: Operation, inputs: &[&[f64]], t: &[f64], len: usize) -> Result
 
 /// The velocities of the spline through points.
 fn spline(space: &Erased, points: &[f64], ends: [End; 2]) -> Result<Vec<f64>, Status> {
-    let options = Options { method: Method::Auto, tol: 1e-13, max_iter: None };
+    let options = Options { method: Method::Auto, tol: 1e-13, max_iter: None, certify: None };
     let problem =
         Problem { t: &KNOTS, shared: true, points, offsets: &[0, KNOTS.len()], ends: Ends::Open(ends) };
     let mut velocities = vec![0.0; points.len()];

@@ -74,7 +74,7 @@ fn velocities_of(space: &Erased, points: &[f64], copies: usize, ends: Ends) -> V
     let points = points.repeat(copies);
     let mut velocities = vec![0.0; points.len()];
     let problem = Problem { t: &t, shared: true, points: &points, offsets: &offsets, ends };
-    let options = Options { method: Method::Auto, tol: 1e-12, max_iter: None };
+    let options = Options { method: Method::Auto, tol: 1e-12, max_iter: None, certify: None };
     let reports = fit(space, &problem, &options, &Monitor::new(&go_on), &mut velocities);
     assert!(reports.iter().all(|report| report.status == Status::Converged));
     velocities
@@ -138,7 +138,7 @@ fn fitted_curves_are_c2_splines() {
             let offsets = [0, KNOTS.len()];
             let problem = Problem { t: &KNOTS, shared: true, points: &points, offsets: &offsets, ends };
             let mut velocities = vec![0.0; points.len()];
-            let options = Options { method, tol: 1e-13, max_iter: Some(1000) };
+            let options = Options { method, tol: 1e-13, max_iter: Some(1000), certify: None };
             let report = &fit(&space, &problem, &options, &monitor, &mut velocities)[0];
             let what = format!("{name} {parameters:?}, {method:?}, {kind}");
             assert_eq!(report.status, Status::Converged, "{what}");

@@ -5,7 +5,7 @@ use symspline_core::fit::{Method, Options};
 use symspline_core::space::{Ambient, Erased};
 
 /// The options of all fits.
-pub const OPTIONS: Options = Options { method: Method::Auto, tol: 1e-12, max_iter: None };
+pub const OPTIONS: Options = Options { method: Method::Auto, tol: 1e-12, max_iter: None, certify: None };
 
 /// Nodes of a grid, and the splines along its first axis.
 pub struct Grid<'a> {

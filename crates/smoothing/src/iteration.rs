@@ -29,7 +29,7 @@ const SINGULAR: f64 = 1e-12;
 /// The steps of differences of the objective, as a fraction of a standard deviation.
 const SMALL: f64 = 0.05;
 /// The tolerance of the splines through the points.
-const FIT: FitOptions = FitOptions { method: Method::Auto, tol: 1e-12, max_iter: None };
+const FIT: FitOptions = FitOptions { method: Method::Auto, tol: 1e-12, max_iter: None, certify: None };
 
 /// An unknown constant number.
 #[derive(Clone, Copy)]

@@ -18,7 +18,7 @@ use symspline_core::space::{Ambient, Erased, Frame, Origin};
 
 /// The maximum number of iterations of an intermediate fit. If it does not converge, a shorter step is better than
 /// more iterations ...
-const FIT: FitOptions = FitOptions { method: Method::Auto, tol: 1e-12, max_iter: Some(200) };
+const FIT: FitOptions = FitOptions { method: Method::Auto, tol: 1e-12, max_iter: Some(200), certify: None };
 /// ... unless the step is already short.
 const LONG_FIT: FitOptions = FitOptions { max_iter: None, ..FIT };
 /// The C² residual that suffices for an intermediate spline.

@@ -16,9 +16,11 @@ use symspline_engine::space::{Ambient, Erased};
 type Fitted<'py> = (Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>, Columns<'py>, Vec<CurveFault>);
 /// Velocities at inner nodes, one per curve.
 type Inner<'py> = Option<Vec<(usize, Array<'py>)>>;
-/// Curves in one factor of a product: the space, points, ends, the tolerance of points (None without validation), and
-/// velocities at inner nodes. The knots include those that ends with two conditions add.
-type Factor<'py> = (PyRef<'py, Handle>, Array<'py>, Option<[EndOf<'py>; 2]>, Option<f64>, Inner<'py>);
+/// Curves in one factor of a product: the space, points, ends, the tolerance of points (None without validation),
+/// velocities at inner nodes, and the injectivity radius of a quotient. The knots include those that ends with two
+/// conditions add.
+type Factor<'py> =
+    (PyRef<'py, Handle>, Array<'py>, Option<[EndOf<'py>; 2]>, Option<f64>, Inner<'py>, Option<f64>);
 
 /// Fits curves in every factor of a product; a space that is not a product is its only factor. All factors are validated
 /// before the first is solved. `offsets` are the nodes before each curve when they differ in length (then points are one
@@ -43,7 +45,7 @@ pub fn fit<'py>(
     let options = options(method, tol, max_iter)?;
     let count = factors.len();
     let mut tasks = Vec::with_capacity(count);
-    for (i, (handle, points, ends, point_tol, inner)) in factors.iter().enumerate() {
+    for (i, (handle, points, ends, point_tol, inner, _)) in factors.iter().enumerate() {
         let curves = CurvesToFit::new(handle, &t, points, ends, offsets.clone(), mask.clone())?;
         require_memory_for_checks(handle, &curves)?;
         require_memory(memory(&curves.space, curves.longest(), options.method), || {
@@ -87,6 +89,8 @@ pub fn fit<'py>(
         .map(|(i, (task, factor))| {
             let progress =
                 progress.as_ref().map(|p| Progress { call: p.clone_ref(py), part: i, parts: count });
+            let radius = factor.5.unwrap_or_else(|| factor.0.space.get().injectivity_radius());
+            let options = Options { certify: Some(radius), ..options };
             task.solve(py, &options, factor.1.shape(), progress)
         })
         .collect()
@@ -155,7 +159,14 @@ impl Task<'_> {
             rows.iter().map(|(node, velocities)| InnerVelocities { node: *node, velocities }).collect();
         let nodes = points.len() / space.point_len();
         let found = watched(py, progress, nodes, is_heavy(&space), |monitor| {
-            fit_with_conditions(&space, &problem, &knots, &inner, options, monitor)
+            fit_with_conditions(
+                &space,
+                &problem,
+                &knots,
+                &inner,
+                &Options { certify: None, ..*options },
+                monitor,
+            )
         })?;
         drop((gathered, points));
         let axis = curves.batch.len();
@@ -205,7 +216,7 @@ fn options(method: &str, tol: f64, max_iter: Option<usize>) -> PyResult<Options>
     if max_iter == Some(0) {
         return Err(invalid("max_iter must be at least 1"));
     }
-    Ok(Options { method, tol, max_iter })
+    Ok(Options { method, tol, max_iter, certify: None })
 }
 
 /// The report as two tables with a row for each field, in the order of `INTEGERS` and `NUMBERS` in _base/report.py, and a column
@@ -219,7 +230,7 @@ fn columns<'py>(py: Python<'py>, reports: &[Option<&Report>]) -> PyResult<Column
         |r| r.solver as i64,
         |r| i64::from(r.skipped.0),
     ];
-    const NUMBERS: [fn(&Report) -> f64; 7] = [
+    const NUMBERS: [fn(&Report) -> f64; 9] = [
         |r| r.residual,
         |r| r.max_step,
         |r| r.rate,
@@ -227,6 +238,8 @@ fn columns<'py>(py: Python<'py>, reports: &[Option<&Report>]) -> PyResult<Column
         |r| r.contraction_bound,
         |r| r.guaranteed_sweeps,
         |r| r.alternative,
+        |r| r.existence_radius,
+        |r| r.uniqueness_radius,
     ];
     let integer = |f: &fn(&Report) -> i64, r: &Option<&Report>| r.map_or(0, f);
     let number = |f: &fn(&Report) -> f64, r: &Option<&Report>| r.map_or(f64::NAN, f);

@@ -233,7 +233,7 @@ impl<S: Space, P: Point<S>> Curves<S, P> {
             Method::Homotopy => fit::Method::Homotopy,
         };
         let go_on = |_| true;
-        let options = Options { method, tol: builder.tol, max_iter: builder.max_iter };
+        let options = Options { method, tol: builder.tol, max_iter: builder.max_iter, certify: None };
         let solve = |(i, Factor { table, points, velocities }): (usize, &mut Factor)| {
             let problem = Problem { t: &t, shared, points, offsets: &offsets, ends: ends(i) };
             fit::fit(&Erased(&**table), &problem, &options, &Monitor::new(&go_on), velocities)

@@ -45,6 +45,33 @@ def columns_of(kind: type) -> dict[str, type]:
     return {entry.name: entry.metadata["dtype"] for entry in fields(kind) if "dtype" in entry.metadata}
 
 
+class Certificate(NamedTuple):
+    """Proof that a C² spline exists near computed velocities, and that no other one does.
+
+    Attributes
+    ----------
+    r : float, tuple of float or ndarray
+        A C² spline exists whose velocities differ from the computed ones by at most r, in length. It includes the
+        rounding errors of the fit.
+    R : float, tuple of float or ndarray
+        It is the only one whose velocities differ from the computed ones by at most R. Infinite in flat space.
+
+    See Also
+    --------
+    Report : Report of a fit, with the conditions of the certificate.
+
+    Examples
+    --------
+    >>> import symspline as ss
+    >>> certificate = ss.CubicSpline(None, [[1, 0, 0], [0.8, 0.6, 0], [0.8, 0, 0.6]], "sphere:2").report.certificate
+    >>> certificate.r < 1e-11, round(certificate.R, 1)
+    (True, 0.4)
+    """
+
+    r: Any
+    R: Any
+
+
 class FitReport:
     """Base of reports, dataclasses whose fields have one value per curve or describe all curves."""
 
@@ -137,6 +164,8 @@ class Report(FitReport):
     guaranteed_sweeps : int, ndarray or None
         Number of sweeps of Algorithm 1 after which, by this bound, all h u/3 are within ``tol`` times
         `invariant_radius` of those of the curve. None, or NaN in a batch, if there is no bound.
+    existence_radius, uniqueness_radius : float, tuple of float, ndarray or None
+        The two numbers of `certificate`. None, or NaN in a batch, without one.
     skipped : tuple of str
         Solvers that ``method="auto"`` omitted or stopped early because they would have exceeded its budget. Curves of
         more than 512 segments are solved in sections, without the search for a solution of lower energy: if points are
@@ -160,6 +189,11 @@ class Report(FitReport):
     Algorithm 1 converges to it from zero velocities. Splines with longer handles may exist however close the points
     are: a great circle can be traversed the long way round. In a product, the handles in each factor must not be
     longer than the V of that factor.
+
+    `certificate` holds at steps that are about four times as long as those of the theorem, and for all ends except those
+    with a velocity and an acceleration, on any knots. It follows from a theorem of Newton and Kantorovich at the computed
+    velocities. It does not exclude splines with other velocities, and in quotients holds for the representatives of the
+    points that were given.
 
     The theorem needs D + 2V below the injectivity radius. Otherwise the nearest of several geodesics may change, as on
     tori, circles and projective spaces, and two splines with handles no longer than V may exist.
@@ -190,7 +224,24 @@ class Report(FitReport):
     alternative_energy: Number | None = field(default=None, metadata=_MAYBE)
     contraction_bound: Number | None = field(default=None, metadata=_MAYBE)
     guaranteed_sweeps: Number | None = field(default=None, metadata=_MAYBE)
+    existence_radius: Number | tuple[float, ...] | None = field(default=None, metadata=_MAYBE)
+    uniqueness_radius: Number | tuple[float, ...] | None = field(default=None, metadata=_MAYBE)
     skipped: tuple[str, ...] = ()
+
+    @property
+    def certificate(self) -> Certificate | None:
+        """Proof that a C² spline exists near the computed velocities, and that no other one does.
+
+        Returns
+        -------
+        Certificate or None
+            Its numbers ``r`` and ``R`` are arrays for a batch, with NaN for curves without a certificate, and have one
+            value per factor for a product, as `invariant_radius`. None if no curve has a certificate: steps are then too
+            long, or the space has no metric.
+        """
+        if self.existence_radius is None or self.uniqueness_radius is None:
+            return None
+        return Certificate(self.existence_radius, self.uniqueness_radius)
 
     def __str__(self) -> str:
         converged = np.asarray(self.converged)
@@ -244,7 +295,7 @@ def _place_of_worst(values: Any) -> str:
 INTEGERS = ("converged", "iterations", "solver", "skipped")
 NUMBERS = (
     *("residual", "max_step", "rate", "invariant_radius", "contraction_bound"),
-    *("guaranteed_sweeps", "alternative_energy"),
+    *("guaranteed_sweeps", "alternative_energy", "existence_radius", "uniqueness_radius"),
 )
 OPTIONAL = tuple(entry.name for entry in fields(Report) if entry.metadata.get("optional"))
 MAX_STEP = NUMBERS.index("max_step")
@@ -313,6 +364,8 @@ def combined(reports: Sequence[Report], max_step: Any, curvature: float, alterna
         alternative_energy=alternative_energy,
         contraction_bound=of_all("contraction_bound", lambda bounds: np.max(bounds, axis=0)),
         guaranteed_sweeps=_count(of_all("guaranteed_sweeps", lambda bounds: np.max(bounds, axis=0))),
+        existence_radius=_per_factor(of_all("existence_radius", np.array)),
+        uniqueness_radius=_per_factor(of_all("uniqueness_radius", np.array)),
         skipped=tuple(name for name in SOLVERS if name in skipped),
     )
 

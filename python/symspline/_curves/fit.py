@@ -331,10 +331,12 @@ def tasks_of(problem: FitProblem, factors: Sequence[Space]) -> list[Task]:
     # Loops take fewer calls of functions than comprehensions, and most fits are short.
     tasks = []
     for i, (factor, part, end) in enumerate(zip(factors, points, ends, strict=True)):
-        cover = factor.cover if isinstance(factor, Quotient) else factor
+        cover, radius = factor, None
+        if isinstance(factor, Quotient):
+            cover, radius = factor.cover, factor.injectivity_radius
         tol = part.tol if check else None
         vectors = {node: of_factors[i] for node, of_factors in inner.items()} if inner else None
-        tasks.append(Task(cover, times, part.numbers, end, tol, None, mask, check and skip, names, vectors))
+        tasks.append(Task(cover, times, part.numbers, end, tol, None, mask, check and skip, names, vectors, radius))
     return tasks
 
 
@@ -352,7 +354,9 @@ def fit_many(problem: ManyProblem, progress: Progress | None) -> tuple[list[Fit]
         parts = [nodes[i] for nodes in points]
         tol = max(part.tol for part in parts) if check else None
         numbers = np.concatenate([part.numbers for part in parts])
-        tasks.append(Task(cover_of(factor), row, numbers, end, tol, offsets, mask, check and skip))
+        radius = factor.injectivity_radius if isinstance(factor, Quotient) else None
+        cover = cover_of(factor)
+        tasks.append(Task(cover, row, numbers, end, tol, offsets, mask, check and skip, radius=radius))
     solved, faults = solve_tasks(space, tasks, options, progress)
 
     def one(i: int, start: int, stop: int) -> Fit:

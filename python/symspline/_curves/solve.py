@@ -59,6 +59,8 @@ class Task(NamedTuple):
         Indices of the nodes in messages; None for 0, 1, ...
     inner : dict or None
         Prescribed velocities at inner nodes.
+    radius : float or None
+        Injectivity radius of a quotient of the space.
     """
 
     space: Space
@@ -71,6 +73,7 @@ class Task(NamedTuple):
     skip_invalid: bool = False
     names: Sequence[int] | None = None
     inner: dict[int, Doubles] | None = None
+    radius: float | None = None
 
     @property
     def batch(self) -> tuple[int, ...]:
@@ -99,11 +102,11 @@ def solve(
 
     Return the solutions and their faults.
     """
-    _, times, _, _, _, offsets, mask, skip, _, _ = tasks[0]
+    _, times, _, _, _, offsets, mask, skip, *_ = tasks[0]
     factors, solved, failed = [], [], False
     for task in tasks:
         inner = list(task.inner.items()) if task.inner else None
-        factors.append((task.space._handle, task.points, task.ends, task.tol, inner))
+        factors.append((task.space._handle, task.points, task.ends, task.tol, inner, task.radius))
     results = _core.fit(
         factors, times, *options, offsets, None if mask is None else mask.ravel().tolist(), skip, progress
     )
@@ -151,7 +154,7 @@ def validate(task: Task) -> tuple[Task, list[Fault]]:
     ValidationError
         If any other input is invalid.
     """
-    space, times, points, ends, tol, offsets, mask, skip, _, _ = task
+    space, times, points, ends, tol, offsets, mask, skip, *_ = task
     if tol is None:
         return task._replace(points=points.copy()), []
     on_space, raw = _core.validate(

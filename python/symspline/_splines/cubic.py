@@ -592,7 +592,7 @@ AnyCubicSpline = CubicSpline[Any, Any]
 
 # Adjacent rows of reports that a local fit does not determine for the whole curve, those of which the largest value
 # counts, and the one of which the value of the last part counts.
-_UNKNOWN = slice(NUMBERS.index("invariant_radius"), NUMBERS.index("alternative_energy") + 1)
+_UNKNOWN = slice(NUMBERS.index("invariant_radius"), None)
 _LARGEST = ("residual", "max_step")
 _MAXIMA = np.array([[name != "rate"] for name in NUMBERS])
 _CONVERGED = INTEGERS.index("converged")

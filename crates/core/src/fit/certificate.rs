@@ -1,85 +1,568 @@
-//! Theorem 3.1 in numbers: a region that Algorithm 1 does not leave, and its contraction there.
+//! A certificate at real steps, after Newton and Kantorovich: a C² spline exists within r of the computed velocities, and
+//! it is the only one within R.
 //!
-//! `docs/convergence.md` derives both bounds. They use the curvature alone and hold only where D + 2V is less than the
-//! injectivity radius. `_base/report.py` checks this, because only the Python package has the radius of quotients.
+//! `docs/theory/certificate.md` derives all bounds. The map `u ↦ u − 3 T⁻¹F(u)` with the matrix T of flat space and the
+//! residual F contracts by q < 1 where the blocks of −3 ∂F differ from those of T by less than T is diagonally dominant. In
+//! these bounds only lengths enter: those of the handles, of the middle sides of the control polygons, and of the chords.
+//! They cost one evaluation of the middle sides.
 
-/// Spacings whose quotients differ from one by at most this much are equal.
-const EQUAL: f64 = 1e-9;
+use super::chain::Chain;
+use super::end_kind::{ChainEnds, EndKind, of_kind};
+use super::node::NodeVectors;
+use super::vector::length2;
+use crate::scalar::{LANES, Lane, few, lane, mask_from};
+use crate::space::{Erased, Origin};
+use crate::special::Trig;
+use std::f64::consts::PI;
+use std::ops::Range;
 
-/// Whether knots are equally spaced, as the theorem requires.
-pub fn equally_spaced(t: &[f64]) -> bool {
-    let h = t[1] - t[0];
-    t.windows(2).all(|t| (t[1] - t[0] - h).abs() <= EQUAL * h)
+/// The scale of the velocity next to a not-a-knot end, in the norm in which the map contracts.
+const BESIDE: Lane = lane(1.25);
+/// Rounding errors of a sweep, in units of those of the points and velocities.
+const ROUNDING: f64 = 32.0 * f64::EPSILON;
+/// Where the longest chord and handle prove a contraction by this or less, no other bounds are needed.
+const NEAR: f64 = 0.15;
+/// The radii that are tried decrease by this factor.
+const SHRINK: f64 = 0.75;
+const TRIES: usize = 24;
+
+/// What the certificate needs of a curve or of a section of it.
+#[derive(Clone, Copy, Debug)]
+pub struct Bounds {
+    /// The contraction at the computed velocities.
+    contraction: f64,
+    /// The longest handle, and the longest middle side of a control polygon.
+    handle: f64,
+    middle: f64,
+    /// The largest `K h₋³|w − v|/(h₊(h₋ + h₊))` on both sides of a knot together, where its segments differ.
+    bend: f64,
+    /// Whether S remains in the condition.
+    uneven: bool,
+    /// The largest scale of a velocity in the norm, and how much less than in flat space T is diagonally dominant in it.
+    scale: f64,
+    weakness: f64,
+    /// The factor by which an error of the velocity at a not-a-knot end counts.
+    step: f64,
+    /// The largest speed at a knot or between neighbours.
+    speed: f64,
+    /// The longest and the shortest segment.
+    longest: f64,
+    shortest: f64,
+    /// The growth of rounding errors over chords.
+    condition: f64,
 }
 
-/// The smallest V of (38) that also bounds the given end velocities `v` = h|u|/3, for steps up to D and the curvature
-/// K of (22); `None` where the theorem does not apply.
-pub fn invariant_radius(step: f64, curvature: f64, v: f64) -> Option<f64> {
-    if curvature == 0.0 {
-        // ½ (D + V) ≤ V
-        return Some(step.max(v));
+impl Default for Bounds {
+    /// No certificate.
+    fn default() -> Self {
+        Bounds { contraction: f64::INFINITY, ..Bounds::EMPTY }
     }
-    let (d, v) = (curvature * step, curvature * v);
-    // The radius is at least that of flat space.
-    let smallest = root(d, d, 1.0)?;
-    if v <= smallest {
-        return Some(smallest / curvature);
+}
+
+impl Bounds {
+    const EMPTY: Bounds = Bounds {
+        contraction: 0.0,
+        handle: 0.0,
+        middle: 0.0,
+        bend: 0.0,
+        uneven: false,
+        scale: 1.0,
+        weakness: 1.0,
+        step: 0.0,
+        speed: 0.0,
+        longest: 0.0,
+        shortest: f64::INFINITY,
+        condition: 1.0,
+    };
+
+    /// The bounds of a curve that consists of two sections.
+    pub fn joined(self, other: Self) -> Self {
+        Bounds {
+            contraction: self.contraction.max(other.contraction),
+            handle: self.handle.max(other.handle),
+            middle: self.middle.max(other.middle),
+            bend: self.bend.max(other.bend),
+            uneven: self.uneven | other.uneven,
+            scale: self.scale.max(other.scale),
+            weakness: self.weakness.max(other.weakness),
+            step: self.step.max(other.step),
+            speed: self.speed.max(other.speed),
+            longest: self.longest.max(other.longest),
+            shortest: self.shortest.min(other.shortest),
+            condition: self.condition.max(other.condition),
+        }
     }
-    let largest = root(d, 0.5 * (std::f64::consts::PI - d) * (1.0 - 1e-9), -1.0)?;
-    (v <= largest).then_some(v / curvature)
-}
 
-/// A bound α < 1 of the contraction of Algorithm 1 per sweep, in the largest length of a velocity, on the region ‖v‖
-/// ≤ V for steps up to D and the curvature K of (22); `None` where no bound is known.
-///
-/// With K = 1 and U = D + 2V ≥ ‖ω‖, (37), the derivatives of φᵢ by its two neighbours are at most
-/// ½ (U/sin U)(sinh V/V) together (Proposition C.3). By Lemma C.5 those by ξᵢ are the two operators
-/// ¼ (1 − ad_ω coth(ad_ω) sinh(ad_ξ)/ad_ξ − ad_ω (cosh(ad_ξ) − 1)/ad_ξ), and the series with the absolute values of the
-/// coefficients of x coth x is 2 − x cot x. Natural ends (20) have ½ (2V/sin 2V)(sinh V/V), which is less.
-pub fn contraction_bound(step: f64, curvature: f64, radius: f64) -> Option<f64> {
-    let (v, u) = (curvature * radius, curvature * (step + 2.0 * radius));
-    if u >= std::f64::consts::PI {
-        return None;
-    }
-    // x/sin x and x cot x; sinh x/x and (cosh x − 1)/x.
-    let (over_sin, cot) = if u == 0.0 { (1.0, 1.0) } else { (u / u.sin(), u / u.tan()) };
-    let (sinh, cosh) = if v == 0.0 { (1.0, 0.0) } else { (v.sinh() / v, 2.0 * (0.5 * v).sinh().powi(2) / v) };
-    let neighbours = over_sin * sinh;
-    let own = (2.0 - cot) * sinh - 1.0 + u * cosh;
-    Some(0.5 * (neighbours + own)).filter(|&alpha| alpha < 1.0)
-}
-
-/// The number of sweeps of Algorithm 1, from zero velocities, after which all handles are within `tol` · V of those
-/// of the spline. Handles are at most V long, so this is the first k with αᵏ ≤ `tol`, where `tol` is at least the
-/// rounding error.
-pub fn guaranteed_sweeps(alpha: f64, tol: f64) -> f64 {
-    (tol.clamp(f64::EPSILON, 1.0).ln() / alpha.ln()).ceil()
-}
-
-/// A root x = KV of ½ u/sin u (d + x) − x with u = d + 2x, by Newton's method. The function is convex: from the left
-/// (`side` = 1) the iteration converges to the smallest root, from the right (−1) to the largest. If its tangent
-/// points away, there is no root.
-fn root(d: f64, mut x: f64, side: f64) -> Option<f64> {
-    for _ in 0..200 {
-        let u = d + 2.0 * x;
-        if !(x >= 0.0 && u < std::f64::consts::PI) {
+    /// r and R for the curvature K of (22), the injectivity radius, the relative residual, and the rounding errors of points,
+    /// in units of ε.
+    pub fn certify(
+        &self,
+        curvature: f64,
+        injectivity: f64,
+        residual: f64,
+        rounding: f64,
+    ) -> Option<[f64; 2]> {
+        if !(self.contraction < 1.0 && residual.is_finite()) {
             return None;
         }
-        let (sin, cos) = u.sin_cos();
-        let f = if u == 0.0 { 1.0 } else { u / sin };
-        let df = if u == 0.0 { 0.0 } else { (1.0 - f * cos) / sin };
-        let (value, slope) = (0.5 * f * (d + x) - x, df * (d + x) + 0.5 * f - 1.0);
-        if value <= 1e-15 * x {
-            return Some(x);
+        let size = if curvature > 0.0 { 1.0 / curvature } else { 1.0 };
+        let errors = self.condition * (self.speed + rounding * size / self.shortest);
+        let residual = residual * self.speed + ROUNDING * errors;
+        let defect = (3.0 * self.weakness + 2.0 * self.step) * residual;
+        // From velocities to handles.
+        let third = self.longest / 3.0;
+        let limit = injectivity.min(PI / curvature);
+        if curvature == 0.0 {
+            let room = (limit - self.middle) * (1.0 - 1e-9) / (2.0 * self.scale);
+            return (room > 0.0).then_some([defect, room / third]);
         }
-        if !(side * slope < 0.0) {
+        let room = (1.0 - self.contraction) / (self.scale * self.scale * self.weakness);
+        let mut handle = 0.25 * room / curvature;
+        for _ in 0..TRIES {
+            if let Some(slope) = self.slope(handle, curvature, limit)
+                && slope * handle < room
+            {
+                // In a ball of twice the distance that is expected.
+                let expected = defect / (1.0 - self.contraction);
+                let ball = (2.0 * expected * third).min(handle);
+                let error = expected / (1.0 - slope * ball / room);
+                let (r, radius) = (error * self.scale + self.step * residual, handle / third);
+                return (error * third <= ball && r < radius).then_some([r, radius]);
+            }
+            handle *= SHRINK;
+        }
+        None
+    }
+
+    /// The change of the derivative of the condition within a distance, per unit of distance, where handles change by up to
+    /// `change`.
+    fn slope(&self, change: f64, curvature: f64, limit: f64) -> Option<f64> {
+        let change = self.scale * change;
+        let handle = Even::new(curvature * (self.handle + change));
+        let middle = self.middle + 2.0 * handle.s * change;
+        if !(middle < limit) {
             return None;
         }
-        let next = x - value / slope;
-        if next == x {
-            return Some(x);
+        let second = Second::new(&handle, curvature * middle);
+        if !self.uneven {
+            return Some(curvature * second.sum);
         }
-        x = next;
+        let first = second.by_a + second.by_b + 1.0;
+        let bend = self.bend / self.longest + first * curvature * change;
+        Some(curvature * (handle.s * second.sum + 2.0 * handle.ds * first + handle.dds * bend))
     }
-    None
+}
+
+/// sinh x/x with two derivatives, and (cosh x − 1)/x with one.
+struct Even {
+    s: f64,
+    ds: f64,
+    dds: f64,
+    c: f64,
+    dc: f64,
+}
+
+impl Even {
+    fn new(x: f64) -> Self {
+        let square = x * x;
+        if x < 0.1 {
+            // Terms of order eight are below rounding errors.
+            let series = |a: [f64; 4]| a.iter().rev().fold(0.0, |sum, a| sum * square + a);
+            return Even {
+                s: series([1.0, 1.0 / 6.0, 1.0 / 120.0, 1.0 / 5040.0]),
+                ds: x * series([1.0 / 3.0, 1.0 / 30.0, 1.0 / 840.0, 1.0 / 45360.0]),
+                dds: series([1.0 / 3.0, 0.1, 1.0 / 168.0, 1.0 / 6480.0]),
+                c: x * series([0.5, 1.0 / 24.0, 1.0 / 720.0, 1.0 / 40320.0]),
+                dc: series([0.5, 0.125, 1.0 / 144.0, 1.0 / 5760.0]),
+            };
+        }
+        let (sinh, cosh) = (x.sinh(), x.cosh());
+        Even {
+            s: sinh / x,
+            ds: (cosh - sinh / x) / x,
+            dds: (sinh - 2.0 * (cosh - sinh / x) / x) / x,
+            c: (cosh - 1.0) / x,
+            dc: (sinh - (cosh - 1.0) / x) / x,
+        }
+    }
+}
+
+/// Bounds of the derivatives of the logarithm w of the C² condition by the handles a and b at both ends of a segment.
+struct Second {
+    /// Of the first derivatives.
+    by_a: f64,
+    by_b: f64,
+    /// Of the second derivatives, together.
+    sum: f64,
+}
+
+impl Second {
+    /// For handles up to a length, by the functions of it, and the middle side w.
+    fn new(handle: &Even, w: f64) -> Self {
+        let Even { s, ds, c, dc, .. } = *handle;
+        // x/sin x and 2 − x cot x with derivatives, and tan(x/2).
+        let (sin, cos) = w.sin_cos();
+        let small = w < 1e-3;
+        let t = if small { 1.0 + w * w / 6.0 } else { w / sin };
+        let dt = if small { w / 3.0 } else { (1.0 - t * cos) / sin };
+        let e = 2.0 - t * cos;
+        let de = if small { 2.0 * w / 3.0 } else { (t - cos) / sin };
+        let turn = c + (0.5 * w).tan() * s;
+        let (by_a, by_b) = (e * s + w * c, t * s);
+        let aa = de * by_a * s + e * ds + c * by_a + w * dc;
+        let ab = s * (dt * by_a + t * turn);
+        let bb = s * (dt * by_b + t * turn) + t * ds;
+        Second { by_a, by_b, sum: aa + 2.0 * ab + bb }
+    }
+}
+
+/// One end of a segment.
+#[derive(Clone, Copy)]
+struct Side {
+    /// Bounds of the derivatives of its logarithm w by its own handle, and by that at the other end.
+    near: Lane,
+    far: Lane,
+    /// |w − v|
+    bend: Lane,
+    /// S of the handle: its norm, and the derivative.
+    stretch: Lane,
+    slope: Lane,
+    /// The norm of S of the chord.
+    chord: Lane,
+}
+
+const NONE: Side = Side {
+    near: Lane::ZERO,
+    far: Lane::ZERO,
+    bend: Lane::ZERO,
+    stretch: Lane::ONE,
+    slope: Lane::ZERO,
+    chord: Lane::ONE,
+};
+
+/// The two ends of a segment, for squares of lengths times K², and |w − v| times K.
+#[inline(always)]
+fn sides(handles: [Lane; 2], middle: Lane, chord: Lane, bends: [Lane; 2]) -> [Side; 2] {
+    let [a, b] = handles.map(|square| Trig::new(-square));
+    let [x, y] = handles.map(|square| square.sqrt());
+    // (cosh x − 1)/x
+    let (ca, cb) = (-(a.k * x), -(b.k * y));
+    let (w, d) = (middle.sqrt(), chord.sqrt());
+    let of_middle = Trig::new(middle);
+    // Between the chord and the middle side the distance of the two geodesics is at most this.
+    let between = (w + d + x + y) * lane(0.5);
+    let tan = |x: Lane, of: &Trig<Lane>| -(of.k * x) / of.s;
+    let half = [tan(d, &Trig::new(chord)), tan(between, &Trig::new(between * between)), tan(w, &of_middle)];
+    let way = x + y;
+    let part = way.simd_gt(Lane::ZERO).select((between - d) / way, Lane::ZERO).min(Lane::ONE);
+    let mean = (half[1] + part * half[0] + (Lane::ONE - part) * half[2]) * lane(0.5);
+    let turn = (ca * x + cb * y) * lane(0.5) + mean * (a.s * x + b.s * y);
+    let turn = Lane::ONE + turn.min(lane(2.0));
+    let shrink = Lane::ONE / of_middle.s;
+    let coth = lane(2.0) - of_middle.c * shrink;
+    let stretch_of_chord = Trig::new(-chord).s;
+    let valid = between.simd_lt(lane(PI));
+    let side = |here: &Trig<Lane>, x: Lane, c: Lane, there: &Trig<Lane>, bend: Lane| Side {
+        near: valid.select(coth.mul_add(here.s, w * c), lane(f64::INFINITY)),
+        far: shrink * there.s * turn,
+        bend,
+        stretch: here.s,
+        slope: -(here.k + here.j) * x,
+        chord: stretch_of_chord,
+    };
+    [side(&a, x, ca, &b, bends[0]), side(&b, y, cb, &a, bends[1])]
+}
+
+/// The bounds for points so near each other that the longest chord and the longest handle are enough.
+fn of_near_points(space: &Erased, chain: &Chain, ends: &ChainEnds, handle: Lane) -> [Bounds; LANES] {
+    let free = |which: usize, kinds: &[EndKind; LANES]| {
+        let still = !length2(&chain.end_values[which]).simd_gt(Lane::ZERO);
+        of_kind(kinds, EndKind::Velocity) | (of_kind(kinds, EndKind::Acceleration) & still)
+    };
+    let known = match ends {
+        ChainEnds::Periodic => mask_from(|_| true),
+        ChainEnds::Open([first, last]) => free(0, first) & free(1, last),
+    };
+    if known.none() {
+        return [Bounds::default(); LANES];
+    }
+    let (mut longest, mut shortest, mut ratio) = (chain.h[0], chain.h[0], Lane::ONE);
+    let mut before = if chain.closed { chain.h[chain.n - 1] } else { chain.h[0] };
+    for &h in &chain.h[..chain.n] {
+        (longest, shortest) = (longest.max(h), shortest.min(h));
+        ratio = ratio.max(h / before).max(before / h);
+        before = h;
+    }
+    let uneven = ratio.simd_gt(lane(1.0 + 4.0 * f64::EPSILON));
+    let (length, time) = (Lane::ONE / chain.scale, Lane::ONE / chain.clock);
+    few(|l| {
+        let of = |x: Lane| x.as_array()[l];
+        let (handle, chord) = (of(handle * length), of(chain.longest));
+        let middle = chord + 2.0 * handle;
+        let k = space.curvature();
+        let even = Even::new(k * handle);
+        let Second { by_a, by_b, .. } = Second::new(&even, k * middle);
+        let turn = k * handle * (even.c + 2.0 * (0.5 * k * middle).tan() * even.s);
+        let (uneven, bend) = (of(uneven).to_bits() != 0, k * (middle + handle) * of(ratio));
+        let (stretch, slope) = if uneven { (even.s, even.ds * bend) } else { (1.0, 0.0) };
+        let contraction = stretch * (by_a + 1.0 + by_b * (1.0 + turn)) - 3.0 + 2.0 * slope;
+        let near = of(known).to_bits() != 0 && k * middle < 1.0 && contraction <= NEAR;
+        Bounds {
+            contraction: if near { contraction } else { f64::INFINITY },
+            handle,
+            middle,
+            bend: 2.0 * bend * of(longest * time),
+            uneven,
+            speed: (3.0 * handle / of(shortest * time)).max(of(chain.pace * length / time)),
+            longest: of(longest * time),
+            shortest: of(shortest * time),
+            condition: of(chain.condition),
+            ..Bounds::EMPTY
+        }
+    })
+}
+
+/// The bounds of the cores of sections, one per lane. `handle` is the longest handle.
+pub fn bounds(
+    space: &Erased,
+    chain: &Chain,
+    ends: &ChainEnds,
+    handle: Lane,
+    work: &mut NodeVectors<Lane>,
+    cores: [Range<usize>; LANES],
+) -> [Bounds; LANES] {
+    // A lane does not depend on others: curves of a batch have the certificates of single curves.
+    let near = of_near_points(space, chain, ends, handle);
+    if near.iter().all(|bounds| bounds.contraction < 1.0) {
+        return near;
+    }
+    work.resize(chain.m);
+    let mut walk = Walk::new(chain, ends, cores);
+    measure(space, chain, &mut walk, work);
+    let all = walk.finish(chain);
+    few(|l| if near[l].contraction < 1.0 { near[l] } else { all[l] })
+}
+
+fn measure(space: &Erased, chain: &Chain, walk: &mut Walk, work: &mut NodeVectors<Lane>) {
+    let (m, keep, u) = (chain.m, space.chord_len(), chain.velocities());
+    let k = lane(space.curvature()) / chain.scale;
+    let square = k * k;
+    let NodeVectors { a, b, left, right, .. } = work;
+    let (a, b, left, right) = (&mut a[..m], &mut b[..m], &mut left[..m], &mut right[..m]);
+    let (mut before, mut first) = (NONE, NONE);
+    for i in 0..chain.n {
+        let third = chain.h[i] * lane(1.0 / 3.0);
+        for c in 0..m {
+            a[c] = u[i * m + c] * third;
+            b[c] = u[(i + 1) * m + c] * third;
+        }
+        let chord = &chain.chord[i * m..][..m];
+        space.inner_handles(chord, &chain.prepared[i * keep..][..keep], a, b, right, left);
+        let (handles, middle) = ([length2(a), length2(b)], length2(right));
+        for c in 0..m {
+            right[c] -= a[c];
+            left[c] += b[c];
+        }
+        let bends = [length2(right), length2(left)].map(|square| square.sqrt() * k);
+        walk.measure(i, handles, middle, length2(&u[i * m..][..m]).max(length2(&u[(i + 1) * m..][..m])));
+        let [start, end] =
+            sides(handles.map(|x| x * square), middle * square, length2(chord) * square, bends);
+        if i == 0 {
+            first = start;
+        } else {
+            walk.node(chain, i, &before, &start);
+        }
+        before = end;
+    }
+    if chain.closed {
+        walk.node(chain, 0, &before, &first);
+    } else {
+        walk.end(chain, 0, &first, k);
+        walk.end(chain, 1, &before, k);
+    }
+}
+
+/// The largest values so far.
+struct Walk<'a> {
+    ends: &'a ChainEnds,
+    cores: [Range<usize>; LANES],
+    contraction: Lane,
+    handle: Lane,
+    middle: Lane,
+    bend: Lane,
+    uneven: Lane,
+    scale: Lane,
+    weakness: Lane,
+    step: Lane,
+    speed: Lane,
+}
+
+impl<'a> Walk<'a> {
+    fn new(chain: &Chain, ends: &'a ChainEnds, cores: [Range<usize>; LANES]) -> Self {
+        let pace = chain.pace * chain.pace;
+        Walk {
+            ends,
+            cores,
+            contraction: Lane::ZERO,
+            handle: Lane::ZERO,
+            middle: Lane::ZERO,
+            bend: Lane::ZERO,
+            uneven: Lane::ZERO,
+            scale: Lane::ONE,
+            weakness: Lane::ONE,
+            step: Lane::ZERO,
+            speed: pace,
+        }
+    }
+
+    /// The lanes whose core contains one of some nodes.
+    fn has(&self, nodes: Range<usize>) -> Lane {
+        mask_from(|l| self.cores[l].start < nodes.end && nodes.start < self.cores[l].end)
+    }
+
+    /// The lanes with a kind of condition at an end.
+    fn kind(&self, which: usize, kind: EndKind) -> Lane {
+        match self.ends {
+            ChainEnds::Periodic => Lane::ZERO,
+            ChainEnds::Open(kinds) => of_kind(&kinds[which], kind),
+        }
+    }
+
+    fn measure(&mut self, segment: usize, handles: [Lane; 2], middle: Lane, speed: Lane) {
+        let here = self.has(segment..segment + 2);
+        let most = |old: Lane, new: Lane| here.select(old.max(new), old);
+        self.handle = most(self.handle, handles[0].max(handles[1]));
+        self.middle = most(self.middle, middle);
+        self.speed = most(self.speed, speed);
+    }
+
+    /// The row of T and of its differences to the derivatives, both for velocities with their scales.
+    fn row(&mut self, nodes: Range<usize>, differences: Lane, dominance: Lane, flat: Lane) {
+        let here = self.has(nodes);
+        let ratio = differences / dominance;
+        // Comparisons with NaN are false.
+        let valid = ratio.simd_ge(Lane::ZERO) & dominance.simd_gt(Lane::ZERO);
+        let ratio = valid.select(ratio, lane(f64::INFINITY));
+        self.contraction = here.select(self.contraction.max(ratio), self.contraction);
+        self.weakness = here.select(self.weakness.max(flat / dominance), self.weakness);
+    }
+
+    /// The scale of the velocity at a node that is not next to the one whose row is considered.
+    fn scale_at(&self, chain: &Chain, node: usize) -> Lane {
+        if chain.closed {
+            return Lane::ONE;
+        }
+        let mut scale = Lane::ONE;
+        for (which, (end, beside)) in [(0, 1), (chain.n, chain.n - 1)].into_iter().enumerate() {
+            if node == end {
+                scale = self.kind(which, EndKind::Velocity).select(Lane::ZERO, scale);
+            } else if node == beside {
+                scale = self.kind(which, EndKind::NotAKnot).select(BESIDE, scale);
+            }
+        }
+        scale
+    }
+
+    /// The condition at a node between two segments. The velocity at a not-a-knot end depends on that beside it alone, and is
+    /// eliminated.
+    #[inline(always)]
+    fn node(&mut self, chain: &Chain, i: usize, left: &Side, right: &Side) {
+        let n = chain.n;
+        let segments = [if i == 0 { n - 1 } else { i - 1 }, i];
+        let [h_left, h_right] = segments.map(|k| chain.h[k]);
+        let (one, two) = (Lane::ONE, lane(2.0));
+        let inverse = [one / h_left, one / h_right];
+        let equal = (h_left - h_right).abs().simd_le(h_right * lane(4.0 * f64::EPSILON));
+        let plain = chain.closed || (i > 1 && i + 1 < n);
+        let scales = if plain { [one; 3] } else { [i - 1, i, i + 1].map(|node| self.scale_at(chain, node)) };
+        let mut differences = Lane::ZERO;
+        let mut dominance = two * (inverse[0] + inverse[1]) * scales[1];
+        let pairs = [(left, right, h_right, scales[0], 0), (right, left, h_left, scales[2], 1)];
+        for (side, other, other_h, neighbour, which) in pairs {
+            let (h, w) = (if which == 0 { h_left } else { h_right }, inverse[which]);
+            let stretch = equal.select(one, other.stretch);
+            let near = stretch * (side.near + one) - two;
+            let far = stretch * side.far - one;
+            let slope = equal.select(Lane::ZERO, other.slope * other_h * side.bend * w * w);
+            differences += (near * w + slope) * scales[1];
+            let knot = if plain { Lane::ZERO } else { self.eliminated(chain, i, which) };
+            if knot.none() {
+                differences += far * neighbour * w;
+                dominance -= neighbour * w;
+                continue;
+            }
+            let step = one + h / other_h;
+            let through = step * ((one + far) * side.chord - one) * scales[1];
+            differences += knot.select(through, far * neighbour) * w;
+            dominance -= knot.select(step * scales[1], neighbour) * w;
+            let here = knot & self.has(i..i + 1);
+            self.scale = here.select(self.scale.max(step * side.chord * scales[1]), self.scale);
+            self.step = here.select(self.step.max(step), self.step);
+        }
+        self.row(if i == 0 { 0..1 } else { i..i + 1 }, differences, dominance, inverse[0] + inverse[1]);
+        if !equal.all() {
+            let bend = h_left * h_left * h_left * right.bend * inverse[1]
+                + h_right * h_right * h_right * left.bend * inverse[0];
+            let here = self.has(i..i + 1) & !equal;
+            self.bend = here.select(self.bend.max(bend / (h_left + h_right)), self.bend);
+            self.uneven |= here;
+        }
+    }
+
+    /// The lanes in which the neighbour of a node on one side is a not-a-knot end.
+    fn eliminated(&self, chain: &Chain, i: usize, which: usize) -> Lane {
+        let at_end = if which == 0 { i == 1 } else { i + 1 == chain.n };
+        if at_end { self.kind(which, EndKind::NotAKnot) } else { Lane::ZERO }
+    }
+
+    /// The condition at an open end.
+    fn end(&mut self, chain: &Chain, which: usize, side: &Side, k: Lane) {
+        let (node, next, segment) = if which == 0 { (0, 1, 0) } else { (chain.n, chain.n - 1, chain.n - 1) };
+        let (h, one) = (chain.h[segment], Lane::ONE);
+        let w = one / h;
+        let pull = length2(&chain.end_values[which]).sqrt() * k * lane(1.0 / 6.0);
+        let acceleration = self.kind(which, EndKind::Acceleration);
+        let beside = self.scale_at(chain, next);
+        let differences = (side.near - one + (side.far - one) * beside) * w + h * side.slope * pull;
+        let dominance = (lane(2.0) - beside) * w;
+        self.row(
+            node..node + 1,
+            acceleration.select(differences, Lane::ZERO),
+            acceleration.select(dominance, w),
+            w,
+        );
+        let here = self.has(node..node + 1);
+        let pulled = here & acceleration & pull.simd_gt(Lane::ZERO);
+        self.bend = pulled.select(self.bend.max(h * h * h * pull), self.bend);
+        self.uneven |= pulled;
+        let both = here & self.kind(which, EndKind::Both);
+        self.contraction = both.select(lane(f64::INFINITY), self.contraction);
+    }
+
+    /// In the units of the points and knots; K is that of the space.
+    fn finish(self, chain: &Chain) -> [Bounds; LANES] {
+        let (length, time) = (Lane::ONE / chain.scale, Lane::ONE / chain.clock);
+        let cores = self.cores.clone();
+        let segments = |f: fn(f64, f64) -> f64, start: f64, l: usize| {
+            let (from, to) = (cores[l].start.max(1) - 1, cores[l].end.min(chain.n));
+            chain.h[from..to].iter().fold(start, |most, h| f(most, h.as_array()[l]))
+        };
+        few(|l| {
+            let of = |x: Lane| x.as_array()[l];
+            Bounds {
+                contraction: of(self.contraction),
+                handle: of(self.handle.sqrt() * length),
+                middle: of(self.middle.sqrt() * length),
+                bend: of(self.bend * time),
+                uneven: of(self.uneven).to_bits() != 0,
+                scale: of(self.scale),
+                weakness: of(self.weakness),
+                step: of(self.step),
+                speed: of(self.speed.sqrt() * length / time),
+                longest: segments(f64::max, 0.0, l) * of(time),
+                shortest: segments(f64::min, f64::INFINITY, l) * of(time),
+                condition: of(chain.condition),
+            }
+        })
+    }
 }

@@ -91,6 +91,11 @@ pub fn fit(
                 report.residual = missed;
             }
         }
+        if let (Some(injectivity), Status::Converged) = (options.certify, report.status) {
+            let rounding = rounded::of_points(space, problem, curve);
+            let found = report.bounds.certify(space.curvature(), injectivity, report.residual, rounding);
+            [report.existence_radius, report.uniqueness_radius] = found.unwrap_or([f64::NAN; 2]);
+        }
     }
     reports
 }

@@ -1,6 +1,7 @@
 //! Curves, or sections of curves, in SIMD lanes.
 
 use super::auto;
+use super::certificate::{Bounds, bounds};
 use super::chain::{Chain, Run};
 use super::end_kind::{ChainEnds, EndKind, of_kind};
 use super::ends::few_points;
@@ -100,6 +101,13 @@ fn fit_in(
     let noisy = noisy_handles(space, chain, &runs, outcome.handle);
     let steps = chain.max_step.to_array();
     let given = given_handles(chain, &ends);
+    let bounds = match options.certify {
+        Some(_) => {
+            let cores = std::array::from_fn(|l| section(l).core.clone());
+            bounds(space, chain, &ends, outcome.handle, &mut work.vectors, cores)
+        }
+        None => [Bounds::default(); LANES],
+    };
     let (condition, widest) = (chain.condition.to_array(), chain.widest.to_array());
     for (l, p) in group.iter_mut().enumerate() {
         let status = if let Some((index, angle)) = cut[l] {
@@ -124,6 +132,7 @@ fn fit_in(
             alternative: alternative[l],
             almost_cut: almost_cut[l].map(|(index, angle)| (p.first + index, angle)),
             skipped: outcome.skipped[l],
+            bounds: bounds[l],
             condition: condition[l],
             widest: widest[l],
             ..Report::default()

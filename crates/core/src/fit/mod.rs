@@ -14,7 +14,7 @@
 //! - `fixed_point` is Algorithm 1, `homotopy` continues from flat space, and `trust_region` minimises the residual.
 //!
 //! All of them evaluate the C² condition (13) in `condition`, whose end rows are in `ends`. `handles` keeps control
-//! handles inside the cut locus; `rounded` and `certificate` examine the result. `conditions` treats ends with two
+//! handles inside the cut locus; `rounded`, `theorem` and `certificate` examine the result. `conditions` treats ends with two
 //! conditions, whose equation is in `joint`, and prescribed velocities at inner points.
 
 mod auto;
@@ -44,6 +44,7 @@ mod rounded;
 mod section;
 mod sections;
 mod solve;
+mod theorem;
 mod tridiagonal;
 mod trust_region;
 mod unroll;
@@ -62,6 +63,6 @@ pub use problem::{Both, End, Ends, Method, Options, Problem, Report, Solver, Sol
 /// What the tests of this crate need.
 #[doc(hidden)]
 pub mod private {
-    pub use crate::fit::certificate::{contraction_bound, guaranteed_sweeps, invariant_radius};
     pub use crate::fit::homotopy::predict;
+    pub use crate::fit::theorem::{contraction_bound, guaranteed_sweeps, invariant_radius};
 }

@@ -1,5 +1,6 @@
 //! The problem of a fit, its options and its report.
 
+use super::certificate::Bounds;
 use super::end_kind::EndKind;
 use crate::scalar::{Lane, lane};
 use crate::space::{Ambient, Erased};
@@ -146,6 +147,8 @@ pub struct Options {
     pub tol: f64,
     /// Largest number of residual evaluations; `None` for the default of the method.
     pub max_iter: Option<usize>,
+    /// The distance below which geodesics are unique, if converged curves shall be certified.
+    pub certify: Option<f64>,
 }
 
 /// Whether a fit converged, or why it failed.
@@ -231,6 +234,12 @@ pub struct Report {
     pub almost_cut: Option<(usize, f64)>,
     /// Solvers that `auto` skipped because they would have cost too much.
     pub skipped: SolverSet,
+    /// A C² spline exists within this distance of the velocities, NaN without a certificate.
+    pub existence_radius: f64,
+    /// It is the only one within this distance, NaN without a certificate.
+    pub uniqueness_radius: f64,
+    /// What the certificate needs.
+    pub(super) bounds: Bounds,
     /// The growth of rounding errors over the chords of the curve.
     pub(super) condition: f64,
     /// The largest deciding angle of a step, or an upper bound.
@@ -254,6 +263,9 @@ impl Report {
             alternative: f64::NAN,
             almost_cut: self.almost_cut.or(other.almost_cut),
             skipped: self.skipped.union(other.skipped),
+            existence_radius: f64::NAN,
+            uniqueness_radius: f64::NAN,
+            bounds: self.bounds.joined(other.bounds),
             condition: most(self.condition, other.condition),
             widest: most(self.widest, other.widest),
         }
@@ -275,6 +287,9 @@ impl Default for Report {
             alternative: f64::NAN,
             almost_cut: None,
             skipped: SolverSet::default(),
+            existence_radius: f64::NAN,
+            uniqueness_radius: f64::NAN,
+            bounds: Bounds::default(),
             condition: 1.0,
             widest: 0.0,
         }

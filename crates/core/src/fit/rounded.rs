@@ -101,3 +101,19 @@ pub fn missed(
     let missed = most(max_or_nan(far, off)) / most(speed);
     (!(missed <= SMALLEST.max(tol))).then_some(missed)
 }
+
+/// The largest growth of rounding errors at the points of a curve.
+pub fn of_points(space: &Erased, problem: &Problem, curve: usize) -> f64 {
+    let len = space.point_len();
+    let points = &problem.points[problem.offsets[curve] * len..problem.offsets[curve + 1] * len];
+    let count = points.len() / len;
+    let (mut p, mut most) = (vec![Lane::ZERO; len], Lane::ZERO);
+    for first in (0..count).step_by(LANES) {
+        gather(
+            few::<usize, LANES>(|l| (first + l).min(count - 1)).map(|i| &points[i * len..][..len]),
+            &mut p,
+        );
+        most = max_or_nan(most, space.rounding(&p));
+    }
+    most.to_array().into_iter().fold(0.0, f64::max)
+}

@@ -4,10 +4,10 @@
 //! a factor of 0.27 per node on equal knots, and of ½ in the worst case, so that a section is accurate to rounding a
 //! few dozen nodes from its ends. Neighbouring sections are compared; if they do not agree, the overlap grows.
 
-use super::certificate::{contraction_bound, equally_spaced, guaranteed_sweeps, invariant_radius};
 use super::lanes::fit_lanes;
 use super::problem::{End, Ends, Options, Problem, Report, Status};
 use super::section::Section;
+use super::theorem::{contraction_bound, equally_spaced, guaranteed_sweeps, invariant_radius};
 use crate::monitor::Monitor;
 use crate::parallel;
 use crate::scalar::LANES;
