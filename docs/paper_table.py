@@ -270,6 +270,13 @@ ROWS = [
         "gallery/qubit_control.rst",
     ),
     Row(
+        "Section 4.2, footnote",
+        "the Hamiltonian of least change",
+        "quantum.LeastChangeHamiltonian",
+        "tests/quantum/test_least_change.py::test_no_other_hamiltonian_varies_less",
+        "guide/quantum.md#the-hamiltonian-of-least-change",
+    ),
+    Row(
         "Section 4.3",
         "affine shapes as points of a Grassmannian",
         "shapes.from_landmarks",

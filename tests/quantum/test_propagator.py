@@ -96,7 +96,7 @@ def test_times_outside_the_knots():
         raises(r"between the first and last knots, 1.0 and 4.0", propagator, own, x)
     dates = np.datetime64("2024-01-01") + np.array([[0, 1, 2], [1, 2, 4]])
     own = ss.CubicSpline(dates, spline.points[:6].reshape(2, 3, 2), "cp:1")
-    raises(r"one curve at a time: propagator\(spline\[i\], x\)", propagator, own, dates[0])
+    raises(r"one curve at a time: spline\[i\]", propagator, own, dates[0])
 
 
 def edge_states(spline, edges, h):
