@@ -176,7 +176,8 @@ class LeastChangeHamiltonian:
     geodesic the result is therefore the constant Hamiltonian of least norm.
 
     H drives the path up to rounding errors, and is continuously differentiable up to the error of the polynomials. The
-    problem is that of [1]_ for a fixed curve; [2]_ studies curves of least change in the group and on the manifold.
+    change of H is the cost of [1]_, where the path between given states is free as well. [2]_ characterises the
+    Riemannian cubics whose horizontal lifts are cubics in the group.
     On `Unitary` and `SpecialUnitary` :math:`H = iU'U^*` is the only Hamiltonian, and is returned.
 
     Construction for states in n dimensions solves systems of :math:`10 ((n - 1)^2 + 1)` unknowns per interval. If the
