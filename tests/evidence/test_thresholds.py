@@ -70,3 +70,18 @@ def test_two_splines_beyond_the_threshold():
         accelerations = [spline(np.arange(1, 40) + side * 1e-9, 2) for side in (-1, 1)]
         np.testing.assert_allclose(*accelerations, atol=1e-7)
     assert loops.bending_energy() < 0.98 * symmetric.bending_energy()
+
+
+def test_the_second_solution_grows_from_the_threshold():
+    """Alternating vectors ±x n solve (13) at steps that increase with x from the threshold on."""
+    space, n = ss.Sphere(2), np.array([0.0, 0.0, 1.0])
+
+    def excess(step, x):
+        a, b = (np.array([np.cos(step / 2), s * np.sin(step / 2), 0.0]) for s in (-1, 1))
+        w = space.log(a, space.transvection(a, -x * n, space.exp(b, x * n)))
+        w -= space.log(a, space.transvection(a, x * n, space.exp(b, -x * n)))
+        assert np.abs(w[:2]).max() < 1e-14
+        return w[2] / x - 2
+
+    for x, step in ((1e-3, 1.3065), (0.1, 1.3124), (0.3, 1.3609)):
+        assert brentq(excess, 1, 1.9, args=(x,)) == pytest.approx(step, abs=6e-5)
