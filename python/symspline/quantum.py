@@ -180,8 +180,8 @@ class LeastChangeHamiltonian:
     Riemannian cubics whose horizontal lifts are cubics in the group.
     On `Unitary` and `SpecialUnitary` :math:`H = iU'U^*` is the only Hamiltonian, and is returned.
 
-    Construction for states in n dimensions solves systems of :math:`10 ((n - 1)^2 + 1)` unknowns per interval. If the
-    points span a subspace, n is its dimension.
+    The cost of construction grows with the sixth power of the dimension of the span of the points. On one core it takes
+    0.3 s for 100 states in 4 dimensions, and 0.7 s for 12 states in 10 dimensions.
 
     References
     ----------
@@ -323,74 +323,84 @@ def _basis_functions(share: Doubles, lengths: Doubles) -> tuple[Doubles, Doubles
 
 
 def _least_change(path: _Path) -> tuple[Doubles, Doubles]:
-    """Return c at the start of every interval, and its coefficients in the basis functions of the interval.
+    """Return c at the start of every interval, and its coefficients a in the basis functions of the interval.
 
-    The integral is the squared norm of an affine function of these numbers. Intervals are eliminated from left to right
-    by QR, so that the condition number is not squared. The term ‖c'‖² makes every elimination regular; only the last
-    block may be singular, by constants that commute with the whole path.
+    The integral is a sum of |Fa + Gc − w|² + |a|² over the intervals, where c is the value at their ends. Intervals are
+    eliminated from left to right. The minimum over a is |L⁻¹(Gc − w)|² with LL* = 1 + FF*, whose condition number is
+    small for short intervals, and QR reduces its rows. So the condition number of the problem is not squared. Only the
+    last block may be singular, by constants that commute with the whole path.
     """
     curves, d = len(path.edges), len(path.commuting)
-    lengths, inner = np.diff(path.edges), _DEGREE * d
+    lengths = np.diff(path.edges)
     triangle, right = np.zeros((curves, d, d)), np.zeros((curves, d, 1))
-    size, eliminated = np.zeros(curves), []
+    block, change = _off_diagonal(path)
+    upper, lower = path.commuting[:, : path.width, : path.width], path.commuting[:, path.width :, path.width :]
+    nodes = np.broadcast_to(_nodes()[0], (curves, _DEGREE))
+    eliminated = []
     for j in range(lengths.shape[1]):
         root = np.sqrt(lengths[:, j])[:, None, None]
-        turned, change, squared = _off_diagonal(path, j)
-        size += squared
-        nodes = np.broadcast_to(_nodes()[0], (curves, _DEGREE))
         value = _basis_functions(nodes, lengths[:, j, None])[0]
-        # The unknowns are the coefficients, and c at the end of the interval: at its start c is less by √h rates₀.
+        # At the start of the interval, c is less by √h a₀ than at its end.
         value[..., :1] -= root
-        value = np.concatenate([value, np.ones((curves, _DEGREE, 1))], axis=-1)
-        before, derivative = np.zeros((curves, d, inner + d)), np.zeros((curves, inner, inner + d))
-        before[:, :, :d], before[:, :, inner:] = -root * triangle, triangle
-        derivative[:, :, :inner] = np.eye(inner)
-        off_diagonal = np.einsum("cqj,cqrd->cqrjd", value, turned).reshape(curves, -1, inner + d)
-        system = np.concatenate([before, derivative, off_diagonal], axis=1)
-        wanted = np.concatenate([right, np.zeros((curves, inner, 1)), -change.reshape(curves, -1, 1)], axis=1)
-        reduced: Array = np.asarray(np.linalg.qr(np.concatenate([system, wanted], axis=-1), mode="r"))
-        eliminated.append(reduced[:, :inner])
-        triangle, right = reduced[:, inner : inner + d, inner:-1], reduced[:, inner : inner + d, -1:]
+        # −i[m, c] for every c of the basis.
+        turned = _rows(
+            -1j * (np.einsum("cqab,dbe->cqaed", block[:, j], upper) - np.einsum("dab,cqbe->cqaed", lower, block[:, j]))
+        )
+        before = np.concatenate([-root * triangle, np.zeros((curves, d, (_DEGREE - 1) * d))], axis=-1)
+        spread = np.einsum("cqj,cqrd->cqrjd", value, turned).reshape(curves, -1, _DEGREE * d)
+        f = np.concatenate([before, spread], axis=1)
+        outer = np.concatenate(
+            [
+                np.concatenate([triangle, turned.reshape(curves, -1, d)], axis=1),
+                np.concatenate([right, -_rows(change[:, j, ..., None]).reshape(curves, -1, 1)], axis=1),
+            ],
+            axis=-1,
+        )
+        factor = np.linalg.cholesky(np.eye(f.shape[1]) + f @ adjoint(f))
+        outer = np.linalg.solve(factor, outer)
+        eliminated.append(adjoint(f) @ np.linalg.solve(adjoint(factor), outer))
+        reduced: Array = np.asarray(np.linalg.qr(outer, mode="r"))
+        triangle, right = reduced[:, :d, :d], reduced[:, :d, d:]
     u, s, vt = np.linalg.svd(triangle)
-    floor = np.maximum(_COMMUTING * np.sqrt(size), 1e-12 / np.sqrt(lengths.min(axis=1)))[:, None]
+    size = np.sqrt(np.sum(np.abs(block) ** 2, axis=(1, 2, 3, 4)))
+    floor = np.maximum(_COMMUTING * size, 1e-12 / np.sqrt(lengths.min(axis=1)))[:, None]
     inverse = np.where(s > floor, 1 / np.maximum(s, floor), 0)
-    end = np.swapaxes(vt, -1, -2) @ (inverse[..., None] * (np.swapaxes(u, -1, -2) @ right))
+    c = np.swapaxes(vt, -1, -2) @ (inverse[..., None] * (np.swapaxes(u, -1, -2) @ right))
     left, rates = [], []
     for j in reversed(range(lengths.shape[1])):
-        own, coupling, wanted = np.split(eliminated[j], [inner, inner + d], axis=-1)
-        rates.append(np.linalg.solve(own, wanted - coupling @ end).reshape(curves, _DEGREE, d))
-        end = end - np.sqrt(lengths[:, j])[:, None, None] * rates[-1][:, 0, :, None]
-        left.append(end[..., 0])
+        rates.append((eliminated[j][..., d] - (eliminated[j][..., :d] @ c)[..., 0]).reshape(curves, _DEGREE, d))
+        c = c - np.sqrt(lengths[:, j])[:, None, None] * rates[-1][:, 0, :, None]
+        left.append(c[..., 0])
     return np.stack(left[::-1], axis=1), np.stack(rates[::-1], axis=1)
 
 
-def _off_diagonal(path: _Path, j: int) -> tuple[Doubles, Doubles, Doubles]:
-    """Return −i[m, c] for the basis of c, m', and the integral of ‖m‖², on interval j.
+def _off_diagonal(path: _Path) -> tuple[Array, Array]:
+    """Return lower left blocks of m and m' at the quadrature nodes, shape (curves, intervals, nodes, n − k, k).
 
-    The matrices are real rows at the quadrature nodes, with the weights of the nodes.
+    The sum of squares of m is its integral: nodes have their weights, and the upper right blocks count as well.
     """
-    k, curves, length = path.width, len(path.edges), np.diff(path.edges)[:, j, None]
+    curves, intervals, k = len(path.edges), path.edges.shape[1] - 1, path.width
     nodes, weights = _nodes()
-    times = path.edges[:, j, None] + length * nodes
+    lengths = np.diff(path.edges)[..., None]
+    times = (path.edges[:, :-1, None] + lengths * nodes).reshape(curves, -1)
     frame = path.propagators(times)[0] @ path.start
     point, velocity, acceleration = (
         path.curve.evaluate(times.reshape(*path.curve.batch, -1), quantity, "raise", True)
         for quantity in ("point", "velocity", "acceleration")
     )
-    # The lower left blocks of m and m'; the upper right ones are their adjoints.
+    scale = np.sqrt(2 * lengths * weights)[..., None, None]
     block, change = (
         (adjoint(frame) @ _generator(path.curve.space, point, vector).reshape(frame.shape) @ frame)[..., k:, :k]
         for vector in (velocity, acceleration)
     )
-    upper, lower = path.commuting[:, :k, :k], path.commuting[:, k:, k:]
-    turned = -1j * (np.einsum("cqab,dbe->cqaed", block, upper) - np.einsum("dab,cqbe->cqaed", lower, block))
-    scale = np.sqrt(2 * length * weights)[..., None, None]
-    rows = [
-        scale * np.concatenate([part.real, part.imag], axis=-2)
-        for part in (m.reshape(curves, len(nodes), k * (frame.shape[-1] - k), -1) for m in (turned, change[..., None]))
-    ]
-    squared = 2 * np.sum(length * weights * np.sum(np.abs(block) ** 2, axis=(-2, -1)), axis=1)
-    return rows[0], rows[1], squared
+    shape = (curves, intervals, len(nodes), *block.shape[-2:])
+    return scale * block.reshape(shape), scale * change.reshape(shape)
+
+
+def _rows(matrices: Array) -> Doubles:
+    """Return the real and imaginary parts of (curves, nodes, n − k, k, m) arrays as rows, (curves, nodes, rows, m)."""
+    flat = matrices.reshape(*matrices.shape[:2], -1, matrices.shape[-1])
+    return np.concatenate([flat.real, flat.imag], axis=-2)
 
 
 @cache
