@@ -13,7 +13,7 @@ SPACES = {
     "SO(3)": ss.SpecialOrthogonal(3),
     "Gr(2, 4)": ss.Grassmannian(2, 4),
 }
-# Theorem 3.1 ends at the first step, and no theorem can go beyond the second one.
+# Theorem 3.1 ends at the first step. At the second one the equations of zigzags on S² become singular.
 THEOREM, THRESHOLD = 0.26058, 1.30654
 
 
@@ -49,7 +49,7 @@ def main() -> None:
             left.plot(steps, 100 * fractions, style, color=f"C{color}")
             right.semilogy(steps, radii, style, color=f"C{color}", label=label)
     for axes in (left, right):
-        for step, text in ((THEOREM, "Theorem 3.1"), (THRESHOLD, "no theorem")):
+        for step, text in ((THEOREM, "Theorem 3.1"), (THRESHOLD, "zigzags")):
             axes.axvline(step, color="0.4", linewidth=0.8, linestyle="--")
             axes.annotate(
                 text, (step, 0.02), xycoords=("data", "axes fraction"), rotation=90, ha="right", color="0.3"

@@ -274,7 +274,12 @@ fn sides(handles: [Lane; 2], middle: Lane, chord: Lane, bends: [Lane; 2]) -> [Si
 }
 
 /// The bounds for points so near each other that the longest chord and the longest handle are enough.
-fn of_near_points(space: &Erased, chain: &Chain, ends: &ChainEnds, handle: Lane) -> [Bounds; LANES] {
+fn of_near_points(
+    space: &Erased,
+    chain: &Chain,
+    ends: &ChainEnds,
+    (injectivity, handle): (f64, Lane),
+) -> [Bounds; LANES] {
     let free = |which: usize, kinds: &[EndKind; LANES]| {
         let still = !length2(&chain.end_values[which]).simd_gt(Lane::ZERO);
         of_kind(kinds, EndKind::Velocity) | (of_kind(kinds, EndKind::Acceleration) & still)
@@ -306,7 +311,8 @@ fn of_near_points(space: &Erased, chain: &Chain, ends: &ChainEnds, handle: Lane)
         let (uneven, bend) = (of(uneven).to_bits() != 0, k * (middle + handle) * of(ratio));
         let (stretch, slope) = if uneven { (even.s, even.ds * bend) } else { (1.0, 0.0) };
         let contraction = stretch * (by_a + 1.0 + by_b * (1.0 + turn)) - 3.0 + 2.0 * slope;
-        let near = of(known).to_bits() != 0 && k * middle < 1.0 && contraction <= NEAR;
+        let inside = k * middle < 1.0 && 2.0 * middle < injectivity;
+        let near = of(known).to_bits() != 0 && inside && contraction <= NEAR;
         Bounds {
             contraction: if near { contraction } else { f64::INFINITY },
             handle,
@@ -322,17 +328,17 @@ fn of_near_points(space: &Erased, chain: &Chain, ends: &ChainEnds, handle: Lane)
     })
 }
 
-/// The bounds of the cores of sections, one per lane. `handle` is the longest handle.
+/// The bounds of the cores of sections, one per lane, for an injectivity radius and the longest handle.
 pub fn bounds(
     space: &Erased,
     chain: &Chain,
     ends: &ChainEnds,
-    handle: Lane,
+    (injectivity, handle): (f64, Lane),
     work: &mut NodeVectors<Lane>,
     cores: [Range<usize>; LANES],
 ) -> [Bounds; LANES] {
     // A lane does not depend on others: curves of a batch have the certificates of single curves.
-    let near = of_near_points(space, chain, ends, handle);
+    let near = of_near_points(space, chain, ends, (injectivity, handle));
     if near.iter().all(|bounds| bounds.contraction < 1.0) {
         return near;
     }

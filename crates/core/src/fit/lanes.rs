@@ -102,9 +102,9 @@ fn fit_in(
     let steps = chain.max_step.to_array();
     let given = given_handles(chain, &ends);
     let bounds = match options.certify {
-        Some(_) => {
+        Some(injectivity) => {
             let cores = std::array::from_fn(|l| section(l).core.clone());
-            bounds(space, chain, &ends, outcome.handle, &mut work.vectors, cores)
+            bounds(space, chain, &ends, (injectivity, outcome.handle), &mut work.vectors, cores)
         }
         None => [Bounds::default(); LANES],
     };
