@@ -47,8 +47,9 @@ ROWS = [
     Row(
         "(1)",
         "energy that Riemannian cubics minimise",
-        "CubicSpline.bending_energy",
+        "CubicSpline.bending_energy riemannian_cubic",
         "tests/spline/test_lengths.py::test_length_and_energy_by_quadrature "
+        "tests/spline/test_riemannian_cubics.py::test_energy_is_stationary_and_a_minimum "
         "tests/evidence/test_comparisons.py::test_spline_is_close_to_the_cubic_and_bends_more",
         "comparisons.md#how-close-to-riemannian-cubics",
         source="fit/energy.rs::bending",

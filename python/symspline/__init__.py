@@ -51,6 +51,7 @@ from ._splines.cubic import CubicSpline
 from ._splines.files import load, save
 from ._splines.functional import evaluate, fit, fit_many
 from ._splines.piecewise import HermiteSpline, PiecewiseGeodesic
+from ._splines.riemannian import RiemannianCubic, riemannian_cubic
 from ._splines.time_law import TimeLaw, time_law
 from ._statistics import TangentPCA, tangent_pca
 from .manifolds import Manifold, Stiefel
@@ -76,6 +77,7 @@ __all__ = [
     "PiecewiseGeodesic",
     "Report",
     "RetimedCurve",
+    "RiemannianCubic",
     "SegmentedCurve",
     "Stiefel",
     "SymsplineError",
@@ -96,6 +98,7 @@ __all__ = [
     "plot",
     "poses",
     "quantum",
+    "riemannian_cubic",
     "rotations",
     "save",
     "set_num_threads",

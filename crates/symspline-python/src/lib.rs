@@ -13,6 +13,7 @@ mod gaps;
 mod grid;
 mod hermite;
 mod length;
+mod riemannian;
 mod search;
 mod smoothing;
 mod space;
@@ -88,6 +89,7 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<space::Handle>()?;
     m.add_class::<curve::Curve>()?;
     m.add_class::<length::ArcLength>()?;
+    m.add_class::<riemannian::CurvatureTensor>()?;
     guarded(m, wrap_pyfunction!(length::integrals, m)?)?;
     guarded(m, wrap_pyfunction!(fit::fit, m)?)?;
     guarded(m, wrap_pyfunction!(curves::check, m)?)?;

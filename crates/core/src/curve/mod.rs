@@ -14,6 +14,8 @@ mod lift;
 mod locate;
 mod motion;
 mod product;
+#[cfg(feature = "dense")]
+mod riemannian;
 mod sample_cursor;
 mod transport;
 
@@ -30,4 +32,6 @@ pub use lift::{lift, lift_knots};
 #[doc(hidden)]
 pub use locate::Locator;
 pub use product::{Factor, evaluate_product};
+#[cfg(feature = "dense")]
+pub use riemannian::{CubicRule, Curvature, Segments};
 pub use transport::transport;
