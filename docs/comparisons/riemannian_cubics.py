@@ -2,7 +2,7 @@
 
 python docs/comparisons/riemannian_cubics.py [--write]
 
-Half a minute. SO(3) needs ``pip install interpolatepy`` and is left out without it.
+Half a minute. The solver that SO(3) is compared with needs ``pip install interpolatepy``, and is left out without it.
 """
 
 from __future__ import annotations
@@ -20,30 +20,32 @@ from figure import loglog
 from motions import Array, between, knots, track, tumble
 from page import HERE, insert, parser, table, versions
 from threadpoolctl import threadpool_limits
-from variations import Variation, defect, nodes, vary
+from variations import Variation, defect, nodes, slopes, vary
 
 import symspline as ss
 
 SIZES = (3, 6, 12, 24, 48)
 VARIED = 6
 """Number of points of the curves that are tested for being critical."""
+FINE = 64
+"""Refinement of these curves, whose derivatives are used."""
 
 
 class Case(NamedTuple):
-    """A space, a smooth curve in it, and what finds Riemannian cubics."""
+    """A space, a smooth curve in it, and another solver of Riemannian cubics."""
 
     space: ss.Space
     motion: Callable[[Array], Array]
-    cubic: Callable[[ss.CubicSpline], Any]
+    other: Callable[[ss.CubicSpline], Any]
     solver: str
 
 
-SPHERE = Case(ss.Sphere(2), track, cubic_s2.RiemannianCubic, "SciPy's solve_bvp")
-ROTATIONS = Case(ss.SpecialOrthogonal(3), tumble, cubic_so3.RiemannianCubic, "interpolatepy's shooting")
+SPHERE = Case(ss.Sphere(2), track, cubic_s2.RiemannianCubic, "solve_bvp")
+ROTATIONS = Case(ss.SpecialOrthogonal(3), tumble, cubic_so3.RiemannianCubic, "interpolatepy")
 
 
 class Row(NamedTuple):
-    """What is found with n points."""
+    """What is found with n points, and by the other solver if it is installed."""
 
     n: int
     step: float
@@ -53,25 +55,30 @@ class Row(NamedTuple):
     error: float
     spline_time: float
     cubic_time: float
+    energy_of_other: float | None
+    time_of_other: float | None
 
 
-def compare(case: Case, n: int) -> Row:
+def compare(case: Case, n: int, others: bool = True) -> Row:
     """Spline and Riemannian cubic through the same n points of the motion."""
     t = knots(n)
     points = case.motion(t)
     spline, spline_time = _timed(lambda: ss.CubicSpline(t, points, case.space))
-    cubic, cubic_time = _timed(lambda: case.cubic(spline))
+    cubic, cubic_time = _timed(lambda: ss.riemannian_cubic(spline))
+    other, other_time = _timed(lambda: case.other(spline)) if others else (None, None)
     x = between(t)
-    curve, energy = cubic(x), cubic.energy()
+    curve = cubic.curve(x)
     return Row(
         n,
         float(case.space.distance(points[:-1], points[1:]).max()),
-        energy,
-        spline.bending_energy() / energy - 1,
-        float(case.space.distance(curve, spline(x)).max()),
+        cubic.energy,
+        spline.bending_energy() / cubic.energy - 1,
+        cubic.distance,
         float(case.space.distance(case.motion(x), curve).max()),
         spline_time,
         cubic_time,
+        other and other.energy(),
+        other_time,
     )
 
 
@@ -79,7 +86,7 @@ def variations(case: Case, n: int = VARIED, fields: int = 20) -> tuple[list[Vari
     """The same random variations of the Riemannian cubic and of the spline."""
     t = knots(n)
     spline = ss.CubicSpline(t, case.motion(t), case.space)
-    cubic = case.cubic(spline)
+    cubic = ss.riemannian_cubic(spline, refinement=FINE).curve
     rngs = np.random.default_rng(1), np.random.default_rng(1)
     cubics, splines = (
         [vary(case.space, t, curve, rng) for _ in range(fields)]
@@ -89,19 +96,25 @@ def variations(case: Case, n: int = VARIED, fields: int = 20) -> tuple[list[Vari
 
 
 def residual(n: int = VARIED) -> float:
-    """How well the equation of Riemannian cubics is satisfied on S²."""
+    """How well the equation of Riemannian cubics is satisfied on S², by points alone."""
     t = knots(n)
-    cubic = cubic_s2.RiemannianCubic(ss.CubicSpline(t, track(t), SPHERE.space))
-    return defect(t, *cubic.ambient(nodes()))
+    cubic = ss.riemannian_cubic(ss.CubicSpline(t, track(t), SPHERE.space), refinement=512).curve
+    x = cubic(t[:-1, None] + np.diff(t)[:, None] * nodes())
+    v = slopes(t, x, x)
+    a = slopes(t, x, v)
+    return defect(t, x, v, a, slopes(t, x, a))
 
 
-def text(rows: Sequence[Row]) -> str:
+def text(rows: Sequence[Row], solver: str) -> str:
     """The table; orders from one row to the next."""
     cells = []
     for before, row in zip((None, *rows), rows, strict=False):
         order = None
         if before is not None:
             order = f"{np.log(before.distance / row.distance) / np.log((row.n - 1) / (before.n - 1)):.1f}"
+        others = []
+        if row.energy_of_other is not None and row.time_of_other is not None:
+            others = [f"{row.energy_of_other / row.energy - 1:.0e}", _seconds(row.time_of_other)]
         cells.append(
             [
                 row.n,
@@ -113,9 +126,10 @@ def text(rows: Sequence[Row]) -> str:
                 f"{row.error:.1e}",
                 _seconds(row.spline_time),
                 _seconds(row.cubic_time),
+                *others,
             ]
         )
-    head = (
+    head = [
         "points",
         "step, rad",
         "energy",
@@ -125,7 +139,9 @@ def text(rows: Sequence[Row]) -> str:
         "to motion, rad",
         "spline",
         "cubic",
-    )
+    ]
+    if rows[0].energy_of_other is not None:
+        head += [f"{solver}: energy", f"{solver}: time"]
     return table(head, cells)
 
 
@@ -138,6 +154,22 @@ def words(cubics: Sequence[Variation], splines: Sequence[Variation]) -> str:
         f"relative to the energy, is at most {slopes[0]:.0e} for the cubic and {slopes[1]:.0e} for the spline; "
         f"moved either way, the energy of the cubic grows, by {rise:.0e} or more."
     )
+
+
+def times(sizes: Sequence[int] = (6, 30, 100, 300, 1000)) -> str:
+    """How long spline and cubic take."""
+    rows = []
+    for n in sizes:
+        t = knots(n)
+        row: list[object] = [n]
+        for case in (SPHERE, ROTATIONS):
+            points = case.motion(t)
+            spline, spline_time = _timed(lambda p=points, s=case.space, t=t: ss.CubicSpline(t, p, s))
+            _, cubic_time = _timed(lambda spline=spline: ss.riemannian_cubic(spline))
+            row += [_seconds(spline_time), _seconds(cubic_time), f"{cubic_time / spline_time:.0f}"]
+        rows.append(row)
+    head = [f"{space}: {what}" for space in ("S²", "SO(3)") for what in ("spline", "cubic", "ratio")]
+    return table(["points", *head], rows)
 
 
 def draw(found: dict[str, list[Row]], file: str = "riemannian_cubics.png") -> None:
@@ -171,16 +203,15 @@ def _seconds(value: float) -> str:
 
 def main() -> None:
     given = parser(__doc__).parse_args()
-    cases, packages = {"S²": SPHERE}, ["symspline", "scipy"]
-    if find_spec("interpolatepy"):
-        cases["SO(3)"] = ROTATIONS
-        packages.append("interpolatepy")
+    has_interpolatepy = find_spec("interpolatepy") is not None
+    packages = ["symspline", "scipy"] + ["interpolatepy"] * has_interpolatepy
     found, parts = {}, []
-    for name, case in cases.items():
-        found[name] = [compare(case, n) for n in SIZES]
-        parts += [f"**{name}**, cubics from {case.solver}:", text(found[name]), words(*variations(case))]
+    for name, case in {"S²": SPHERE, "SO(3)": ROTATIONS}.items():
+        found[name] = [compare(case, n, case is SPHERE or has_interpolatepy) for n in SIZES]
+        parts += [f"**{name}**:", text(found[name], case.solver), words(*variations(case))]
         if case is SPHERE:
             parts[-1] += f" The differential equation is satisfied to {residual():.0e}."
+    parts += ["**Many points**:", times()]
     parts.append(versions(*packages))
     whole = "\n\n".join(parts)
     print(whole)

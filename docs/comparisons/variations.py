@@ -69,14 +69,18 @@ def vary(
 def defect(t: Array, x: Array, v: Array, a: Array, j: Array) -> float:
     """How badly x' = v, ∇v = a, ∇a = j, ∇j = −R(a, v)v are satisfied on S² at the nodes, the largest of the
     four relative to the largest value of what is on the right. Arrays have shape (N, len(nodes), 3)."""
-    h = np.diff(t)[:, None, None]
     force = np.sum(a * v, axis=-1, keepdims=True) * v - np.sum(v * v, axis=-1, keepdims=True) * a
     worst = 0.0
     for left, right in ((x, v), (v, a), (a, j), (j, force)):
-        slope = np.einsum("ij,kjn->kin", _derivative(nodes()), left) / h
-        slope -= np.sum(slope * x, axis=-1, keepdims=True) * x
-        worst = max(worst, float(np.abs(slope - right).max() / np.abs(right).max()))
+        worst = max(worst, float(np.abs(slopes(t, x, left) - right).max() / np.abs(right).max()))
     return worst
+
+
+def slopes(t: Array, x: Array, v: Array) -> Array:
+    """Covariant derivatives on S² of vectors v at the points x of the nodes, which have shape (N, len(nodes), 3)."""
+    slope = np.einsum("ij,kjn->kin", _derivative(nodes()), v) / np.diff(t)[:, None, None]
+    projected: Array = slope - np.sum(slope * x, axis=-1, keepdims=True) * x
+    return projected
 
 
 def nodes() -> Array:

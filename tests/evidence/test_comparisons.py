@@ -17,10 +17,7 @@ SCRIPTS = ("order", "cubics", "reconstruct", "ends", "bases")
 
 @pytest.fixture(params=["S²", "SO(3)"])
 def case(request):
-    if request.param == "S²":
-        return cubics.SPHERE
-    pytest.importorskip("interpolatepy", minversion="3.3")
-    return cubics.ROTATIONS
+    return cubics.SPHERE if request.param == "S²" else cubics.ROTATIONS
 
 
 def test_errors_fall_with_the_orders_of_the_end_conditions():
@@ -37,11 +34,24 @@ def test_errors_fall_with_the_orders_of_the_end_conditions():
 
 
 def test_spline_is_close_to_the_cubic_and_bends_more(case):
-    rows = [cubics.compare(case, n) for n in (6, 12)]
+    rows = [cubics.compare(case, n, case is cubics.SPHERE) for n in (6, 12)]
     assert all(0 < row.excess < 1e-3 and row.distance < row.error for row in rows)
     falls = np.log(rows[0].distance / rows[1].distance) / np.log(11 / 5)
     assert 3 < falls < 5
-    assert cubics.text(rows).count("\n") == 3
+    assert cubics.text(rows, case.solver).count("\n") == 3
+    # SciPy's solver of boundary value problems finds the same curve.
+    assert all(row.energy_of_other in (None, pytest.approx(row.energy, rel=1e-6)) for row in rows)
+
+
+def test_cubics_satisfy_the_differential_equation_and_cannot_be_improved(case):
+    moved, moved_splines = cubics.variations(case, fields=5)
+    assert min(one.rise for one in moved) > 0
+    assert max(abs(one.slope) for one in moved) < 1e-4 * max(abs(one.slope) for one in moved_splines)
+    assert case is cubics.ROTATIONS or cubics.residual() < 1e-4
+
+
+def test_times_are_listed_for_both_spaces():
+    assert cubics.times((6,)).count("|") == 3 * 8
 
 
 def test_bicubic_bases_are_equally_good_near_a_reference_and_the_spline_is_better_elsewhere():
