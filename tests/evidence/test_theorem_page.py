@@ -10,6 +10,7 @@ from scipy.optimize import root
 
 import symspline as ss
 
+REDUCTIVE = ["stiefel:2,4", "stiefel:2,5", "stiefel:3,4", "se:2", "aff:2", "so:3"]
 NAMES = ["sphere:2", "so:3", "ds:3", "ads:2", "igr:0,1,1,2", "gl:2"]
 
 
@@ -62,6 +63,36 @@ class Group:
         return np.tensordot(x, self.basis, 1)
 
 
+class Reductive(Group):
+    """𝔪 at a point of a Stiefel manifold, or of a group of matrices with left translations: matrices that multiply
+    points from the left."""
+
+    def element(self, v):
+        p = self.p
+        if p.shape[0] == p.shape[1]:
+            return v @ np.linalg.inv(p)
+        half = v - p @ (p.T @ v) / 2
+        return half @ p.T - p @ half.T
+
+    def vector(self, xi):
+        return xi @ self.p
+
+    def move(self, g, x):
+        return g @ x
+
+    def project(self, x):
+        """π: elements of 𝔥 do not move p."""
+        return self.element(self.vector(x))
+
+    def stretch(self, xi, eta):
+        """D(ξ)η by the series of dexp."""
+        total, term = eta, eta
+        for j in range(1, 40):
+            term = -(xi @ term - term @ xi) / (j + 1)
+            total = total + term
+        return self.project(total)
+
+
 def difference(f, order=1, step=0.02):
     """A derivative of f at 0, by central differences of order eight."""
     if order == 1:
@@ -77,6 +108,15 @@ def setting(request):
     space, rng = ss.space(request.param), np.random.default_rng(5)
     o = space.random_point(rng)
     return Group(space, o), [space.exp(o, 0.35 * space.random_tangent(rng, o)) for _ in range(6)]
+
+
+@pytest.fixture(params=REDUCTIVE)
+def reductive(request):
+    """The same with left translations only."""
+    space, rng = ss.space(request.param), np.random.default_rng(5)
+    o = space.random_point(rng)
+    points = [space.exp(o, 0.25 * space.random_tangent(rng, o)) for _ in range(6)]
+    return Reductive(space, o), points
 
 
 def casteljau(space, points, t):
@@ -125,13 +165,26 @@ def test_normal_coordinates_give_the_covariant_acceleration(setting):
 
 
 def test_the_proof_of_the_proposition(setting):
-    group, (q0, q1, p1, *_) = setting
+    group, (_, q1, *_) = setting
+    _check_proof(*setting)
+    v = group.space.log(group.p, group.space.exp(group.p, 0.5 * group.space.log(group.p, q1)))
+    moved = group.move(expm(-group.element(v)), q1)
+    close(group.space.transvection(group.p, -v, q1), moved, 1e-12)
+
+
+def test_the_proof_on_reductive_spaces(reductive):
+    """With D in place of S."""
+    _check_proof(*reductive)
+
+
+def _check_proof(group, points):
+    q0, q1, p1, *_ = points
     space, p = group.space, group.p
     xi = group.log(q0)
     there, back = expm(xi), expm(-xi)
     omega = group.log(group.move(back, q1))
     v, w = group.vector(xi), group.vector(omega)
-    close(space.log(p, space.transvection(p, -v, q1)), w, 1e-12)
+    close(3 * v, difference(lambda t: space.log(p, casteljau(space, [p, q0, q1, p1], t))))
     alpha = group.unstretch(xi, omega - xi)
 
     def level(t):
@@ -164,6 +217,75 @@ def test_the_proof_of_the_proposition(setting):
 
     close(difference(x), 3 * xi)
     close(difference(x, 2), 6 * alpha, 1e-8)
+
+
+def test_the_derivative_on_reductive_spaces(reductive):
+    """(a*), that D has an odd part, that it is invariant and that the projection π[v, ·] is its first-order part."""
+    group, (q, x, *_) = reductive
+    space, p = group.space, group.p
+    xi, eta = group.log(q), group.log(x)
+    close(group.move(expm(xi), p), q, 1e-12)
+    close(group.project(xi), xi, 1e-13)
+    s = group.stretch(xi, eta)
+    close(difference(lambda t: group.move(expm(xi + t * eta), p)), group.move(expm(xi), group.vector(s)))
+    bracket = group.project(xi @ eta - eta @ xi)
+    odd = group.stretch(xi, eta) - group.stretch(-xi, eta)
+    assert np.abs(odd).max() > 1e-3
+    close(difference(lambda t: group.stretch(t * xi, eta) - group.stretch(-t * xi, eta)), -bracket)
+    close(difference(lambda t: group.unstretch(t * xi, eta) - group.unstretch(-t * xi, eta)), bracket)
+    # Ad_g maps 𝔪 at p to 𝔪 at g·p.
+    g = expm(xi) @ expm(eta)
+    moved = Reductive(space, group.move(g, p))
+    close(moved.project(g @ eta @ np.linalg.inv(g)), g @ eta @ np.linalg.inv(g), 1e-12)
+
+
+def test_stiefel_manifolds_are_naturally_reductive():
+    """⟨π[X, Y], Z⟩ + ⟨Y, π[X, Z]⟩ = 0 in the canonical metric, and the parallel fields along a geodesic."""
+    space, rng = ss.Stiefel(2, 5), np.random.default_rng(3)
+    p = space.random_point(rng)
+    group = Reductive(space, p)
+    u, v, w = (0.4 * space.random_tangent(rng, p) for _ in range(3))
+    x, y, z = (group.element(a) for a in (u, v, w))
+    close(-np.trace(x @ y) / 2, space.inner(p, u, v), 1e-13)
+    left, right = (group.vector(group.project(x @ a - a @ x)) for a in (y, z))
+    assert abs(space.inner(p, left, w)) > 1e-3
+    close(space.inner(p, left, w), -space.inner(p, v, right), 1e-13)
+
+    basis = np.array(group.basis)
+    ad = np.array([group.project(x @ e - e @ x) for e in basis])
+    ad = np.einsum("aij,bij->ba", ad, basis) / 2
+
+    def field(t):
+        turned = expm(-t / 2 * ad) @ (np.einsum("ij,bij->b", y, basis) / 2)
+        return expm(t * x) @ group.vector(np.tensordot(turned, basis, 1))
+
+    # Christoffel's form of the canonical metric (Edelman, Arias & Smith 1998, equation 2.41) on two arguments.
+    t = 0.3
+    q, velocity, value = expm(t * x) @ p, expm(t * x) @ u, field(t)
+    normal = np.eye(5) - q @ q.T
+    form = (velocity @ value.T + value @ velocity.T) @ q + q @ (
+        velocity.T @ normal @ value + value.T @ normal @ velocity
+    )
+    rate = difference(lambda s: field(t + s))
+    assert np.abs(rate).max() > 1e-2
+    close(rate + form / 2, np.zeros((5, 2)))
+
+
+def test_left_translations_turn_the_formulas_of_both(reductive):
+    """D(ξ) = e^{−ad/2} S(v), ω_S = e^{ad/2} ω, and that both give the same acceleration."""
+    group, (q0, q1, *_) = reductive
+    space, p = group.space, group.p
+    if p.shape[0] != p.shape[1]:
+        return
+    xi = group.log(q0)
+    half, v = expm(xi / 2), group.vector(xi)
+    omega = group.log(group.move(expm(-xi), q1))
+    both = group.element(space.log(p, space.transvection(p, -v, q1)))
+    close(both, half @ omega @ np.linalg.inv(half), 1e-12)
+    even = Group.stretch(group, xi / 2, omega - xi)
+    close(group.stretch(xi, omega - xi), np.linalg.inv(half) @ even @ half, 1e-12)
+    alpha = group.unstretch(xi, omega - xi)
+    close(Group.stretch(group, xi / 2, alpha), both - xi, 1e-12)
 
 
 def test_condition_13_on_equal_knots(setting):
@@ -208,6 +330,29 @@ def test_the_condition_on_any_knots(setting):
                 ),
                 2,
             )
+            close(found, 6 * side, 1e-6)
+            sides.append(side)
+        close(sides[0], sides[1], 1e-10)
+
+
+def test_the_condition_on_reductive_spaces(reductive):
+    """(e*): the accelerations of both sides, and that the library's splines satisfy it."""
+    group, points = reductive
+    space = group.space
+    t = np.array([0.0, 0.4, 1.5, 1.9, 3.0, 4.1])
+    centre = points[0]
+    near = np.array([space.exp(centre, 0.5 * space.log(centre, q)) for q in points])
+    spline = ss.CubicSpline(t, near, space)
+    third = spline.velocities / 3
+    for i in range(1, 5):
+        here, sides = Reductive(space, near[i]), []
+        for h, j in ((t[i + 1] - t[i], i + 1), (t[i - 1] - t[i], i - 1)):
+            v = h * third[i]
+            handle, other = space.exp(near[i], v), space.exp(near[j], -h * third[j])
+            omega = here.log(here.move(expm(-here.element(v)), other))
+            side = here.vector(here.unstretch(here.element(v), omega - here.element(v))) / h**2
+            controls = [near[i], handle, other, near[j]]
+            found = difference(lambda s, h=h, c=controls, i=i: space.log(near[i], casteljau(space, c, s / h)), 2)
             close(found, 6 * side, 1e-6)
             sides.append(side)
         close(sides[0], sides[1], 1e-10)
