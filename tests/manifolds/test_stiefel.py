@@ -10,6 +10,7 @@ from scipy.linalg import expm
 
 import symspline as ss
 from symspline.manifolds import from_pymanopt
+from symspline.manifolds._operations import frames_along
 
 SIZES = [(1, 2), (1, 4), (2, 3), (2, 4), (2, 5), (3, 4), (3, 5), (3, 6), (2, 20)]
 every = pytest.mark.parametrize(("k", "n"), SIZES)
@@ -149,3 +150,40 @@ def test_adapters_are_values_and_invalid_ones_raise():
     ]:
         raises(what, from_pymanopt, theirs)
     raises("has no metric", ss.manifolds.from_geomstats, object())
+
+
+@pytest.mark.parametrize(("k", "n"), [(1, 3), (2, 4), (2, 5), (3, 6)])
+def test_frames_are_transported_in_parallel(k, n):
+    """∇X = X' + Γ(γ', X) = 0 for the vectors X of the frames along a geodesic, where Γ is the polarised form of
+    equation 2.41 of Edelman, Arias & Smith (1998)."""
+    space = ss.Stiefel(k, n)
+    p, v = steps(space, 1.0, 3)
+
+    def frames(t):
+        path = np.stack([p, space.exp(p, t * v)], axis=1)
+        return frames_along(space.operations, path).reshape(3, 2, space.dim, n, k)
+
+    points = np.stack([p, space.exp(p, 0.9 * v)], axis=1).reshape(-1, n, k)
+    for x, at in zip(frames(0.9).reshape(-1, space.dim, n, k), points, strict=True):
+        gram = [[space.inner(at, a, b) for a in x] for b in x]
+        assert np.abs(gram - np.eye(space.dim)).max() <= 5e-15
+        space.check_tangent(np.broadcast_to(at, x.shape), x)
+    start, h = frames(0.5)[:, 0], 1e-3
+    assert np.abs(frames(0.0)[:, 1] - start).max() <= 5e-15
+    rate = (frames(h) - frames(-h))[:, 1] / (2 * h)
+    normal = (np.eye(n) - p @ np.swapaxes(p, 1, 2))[:, None]
+    p, v = p[:, None], v[:, None]
+    square = v @ np.swapaxes(start, -1, -2) @ p + p @ np.swapaxes(v, -1, -2) @ normal @ start
+    other = start @ np.swapaxes(v, -1, -2) @ p + p @ np.swapaxes(start, -1, -2) @ normal @ v
+    assert np.abs(rate).max() > 0.1
+    assert np.abs(rate + (square + other) / 2).max() <= 1e-6
+
+
+def test_curves_of_a_batch_are_those_fitted_alone():
+    space = ss.Stiefel(2, 4)
+    p = np.stack([walk(space, step, 9, seed) for seed, step in enumerate([0.2, 1.4, 0.7, 2.0])])
+    batch = ss.CubicSpline(None, p, space)
+    for i, points in enumerate(p):
+        alone = ss.CubicSpline(None, points, space)
+        assert np.abs(batch.velocities[i] - alone.velocities).max() <= 1e-14
+        assert batch.report.iterations[i] == alone.report.iterations

@@ -8,7 +8,7 @@
 
 use crate::pair_forms::Pair;
 use crate::pairs::{arc, exp, exp_minus_one};
-use crate::rigid::{Quaternion, Vector, conjugate, inverse_sqrt, multiply};
+use crate::rigid::{Quaternion, Vector, conjugate, cross, inverse_sqrt, multiply};
 use crate::stiefel::Stiefel;
 use std::f64::consts::PI;
 use symspline_core::scalar::{Dual, Each, Jet, Lane, Scalar, dot, few, lane};
@@ -215,14 +215,26 @@ fn log_of<S: Scalar>(pair: Pair<S>) -> Vectors<S> {
     leveled(turned(pair, total.each(S::constant)), slope)
 }
 
-/// The derivative of the logarithm at the frame of e^v in the direction w there.
+/// D(v)⁻¹w for the vectors w of a tangent vector at the frame of e^v, where D(v) = π ∘ dexp₋ᵥ: with the inverse C of
+/// dexp₋ᵥ and the vertical direction e, the horizontal one of the vectors C(w + γe).
 #[inline(always)]
 fn dlog(v: Vectors<Lane>, w: Vectors<Lane>) -> Vectors<Lane> {
-    let pair = v.each(exp);
-    let slope = slope(pair, vertical(pair).0);
-    let along: Pair<Lane> = few(|i| multiply(pair[i], [Lane::ZERO, w[i][0], w[i][1], w[i][2]]));
-    let moving: Pair<Dual> = few(|i| few(|c| Dual::from_parts([pair[i][c], along[i][c], Lane::ZERO])));
-    leveled(moving, slope).each(|x| x.each(|x| x.parts()[1]))
+    let axis = [Lane::ONE, Lane::ZERO, Lane::ZERO];
+    let back: [[Vector<Lane>; 2]; 2] = few(|i| [w[i], axis].each(|w| inverse_of_dexp(v[i], w)));
+    let [of_w, of_axis]: [Lane; 2] = few(|j| back[0][j][0] + back[1][j][0]);
+    let gamma = -of_w / of_axis;
+    few(|i| few(|c| back[i][1][c].mul_add(gamma, back[i][0][c])))
+}
+
+/// `ad/(1 − e^{−ad})` of w, where `ad` is twice the cross product with v: w + v × w + (1 − θ cot θ) v × (v × w)/θ².
+#[inline(always)]
+fn inverse_of_dexp(v: Vector<Lane>, w: Vector<Lane>) -> Vector<Lane> {
+    let square = dot(&v, &v);
+    let Trig { c, s, .. } = Trig::new(square);
+    let cot = c / s;
+    let along = square.simd_gt(Lane::ZERO).select((Lane::ONE - cot) * dot(&v, &w) / square, Lane::ZERO);
+    let cross = cross(v, w);
+    few(|i| cot.mul_add(w[i], along.mul_add(v[i], cross[i])))
 }
 
 /// The frame at the end of a geodesic minus the frame (1, i) at its start, without cancellation.
@@ -308,6 +320,16 @@ impl Stiefel for FramePairs {
             let found = dlog(v, along);
             tangent(&basis, few(|i| few(|c| found[i][c] - v[i][c])), out);
         }
+    }
+
+    fn transvect(&self, p: &[Lane], v: &[Lane], x: &mut [Lane]) {
+        let start = lifted(p);
+        let basis = rotation(p, start);
+        let stop = moved(start, vectors(&basis, v));
+        let mut q = [Lane::ZERO; 8];
+        write(frame(stop), &mut q);
+        let moved = rotation(&q, stop);
+        x.chunks_exact_mut(8).for_each(|x| write(outside(&moved, inside(&basis, x)), x));
     }
 
     fn curve(&self, order: usize, x: &[Vec<Lane>], out: &mut [Lane]) {

@@ -10,9 +10,9 @@ use std::marker::PhantomData;
 use std::sync::Arc;
 use symspline_core::matrix::{
     Dynamic, Matrix, Select, Small, Storage, determinant, diagonalize, exp_skew_minus_one, inverse, polar,
-    sort_columns, trig,
+    sort_columns,
 };
-use symspline_core::scalar::{Dual, Lane, Scalar, dot, lane};
+use symspline_core::scalar::{Lane, dot, lane};
 use symspline_core::space::{Ambient, Erased, Kernels, below};
 
 type Real<A> = Matrix<Lane, 1, A>;
@@ -21,6 +21,15 @@ type Real<A> = Matrix<Lane, 1, A>;
 const TOLERANCE: Lane = lane(1e-14);
 /// The largest number of iterations of the logarithm.
 const MOST: usize = 60;
+/// Nodes below ½ and weights of the rule of Gauss and Legendre with ten points on [0, 1] (Abramowitz & Stegun, 1964, table
+/// 25.4). For vectors up to the injectivity radius, its error for `exp(s ad)` is below 1e-18.
+const GAUSS: [[f64; 2]; 5] = [
+    [0.01304673574141414, 0.03333567215434407],
+    [0.06746831665550775, 0.0747256745752903],
+    [0.1602952158504878, 0.10954318125799102],
+    [0.2833023029353764, 0.13463335965499817],
+    [0.4255628305091844, 0.14776211235737644],
+];
 
 /// The operations of a manifold, on one point per lane.
 pub trait Stiefel: Send + Sync {
@@ -45,19 +54,43 @@ pub trait Stiefel: Send + Sync {
         sum
     }
 
-    /// D log of the vector to the other inner control point minus the handle, at both ends of a segment with the points
-    /// and handles p, v, q, w: h²/6 times the accelerations.
-    fn bends(&self, x: &[Vec<Lane>], out: &mut [Lane]) {
+    /// D(v)⁻¹w − v at both ends of a segment with the points and handles p, v, q, w: h²/6 times the accelerations. Here
+    /// w is the logarithm from the inner control point to the other one, moved to p by the transvection E_p(−v).
+    fn bends(&self, x: &[Vec<Lane>], out: &mut [Lane]);
+    /// The transvection E_p(v) = exp(Ω) on n × k matrices, one after the other.
+    fn transvect(&self, p: &[Lane], v: &[Lane], x: &mut [Lane]);
+
+    /// Orthonormal tangent vectors at a point.
+    fn basis(&self, p: &[Lane], out: &mut [Lane]) {
         let (n, k) = self.size();
-        let [mut inner, mut other, mut between] = [(); 3].map(|()| vec![Lane::ZERO; n * k]);
-        self.exp(&x[0], &x[1], &mut inner);
-        self.exp(&x[2], &x[3], &mut other);
-        for (x, out) in x.chunks_exact(2).zip(out.chunks_exact_mut(n * k)) {
-            self.log(&inner, &other, &mut between);
-            self.dlog(&x[0], &x[1], &between, out);
-            out.iter_mut().zip(&x[1]).for_each(|(x, v)| *x -= *v);
-            std::mem::swap(&mut inner, &mut other);
-        }
+        tangents(&Real::read(n, k, p))
+            .iter()
+            .zip(out.chunks_exact_mut(n * k))
+            .for_each(|(x, out)| x.write(out));
+    }
+
+    /// The matrix of a parallel transport from p to q along their geodesic, in the bases at both points, up to terms of
+    /// third order: exp(Ω) exp(−½ ad_Ω) (Kobayashi & Nomizu, Foundations of Differential Geometry II, 1969, theorem
+    /// X.2.10), with Cayley's orthogonal approximation of the second factor.
+    fn turn(&self, p: &[Lane], q: &[Lane], out: &mut [Lane]) {
+        let (n, k) = self.size();
+        let mut v = vec![Lane::ZERO; n * k];
+        self.log(p, q, &mut v);
+        let read = |x: &[Lane]| Real::<Dynamic>::read(n, k, x);
+        let (here, there) = (tangents(&read(p)), tangents(&read(q)));
+        let dim = here.len();
+        let mut moved: Vec<Lane> = here.iter().flat_map(numbers).collect();
+        self.transvect(p, &v, &mut moved);
+        let forms = |at: &[Lane], x: &[Real<Dynamic>], y: &[Real<Dynamic>]| {
+            let (x, y) =
+                (x.iter().map(numbers).collect::<Vec<_>>(), y.iter().map(numbers).collect::<Vec<_>>());
+            Real::<Dynamic>::from_fn(dim, dim, |a, b| [self.inner(at, &x[a], &y[b])])
+        };
+        let brackets: Vec<_> = here.iter().map(|x| bracket(&read(p), &read(&v), x)).collect();
+        let quarter = forms(p, &here, &brackets).scaled(lane(0.25));
+        let [plus, minus] = [1.0, -1.0].map(|sign| quarter.scaled(lane(sign)).plus_identity(Lane::ONE));
+        let moved: Vec<_> = moved.chunks_exact(n * k).map(read).collect();
+        forms(q, &there, &moved).times(&inverse(&plus).times(&minus)).write(out);
     }
 
     /// De Casteljau's algorithm for a segment p, v, q, w, p, v, t: points, handles, and between the inner control points
@@ -99,10 +132,11 @@ struct Frames<A> {
     storage: PhantomData<A>,
 }
 
-/// A basis of the span of p and v whose first columns are p, and the generator Ω of v.
+/// A basis of the span of p and v whose first columns are p, the generator Ω of v, and exp(Ω).
 struct Span<A: Storage> {
     basis: Real<A>,
     generator: Real<A>,
+    turn: Real<A>,
 }
 
 impl<A: Storage> Frames<A> {
@@ -141,34 +175,25 @@ impl<A: Storage> Frames<A> {
             (true, false) => [-parts[(j, i)][0]],
             (false, false) => [Lane::ZERO],
         });
-        Span { basis, generator }
+        let turn = exp_skew_minus_one(&generator).plus_identity(Lane::ONE);
+        Span { basis, generator, turn }
     }
 
     /// The first k columns of Q x.
     fn columns(&self, basis: &Real<A>, x: &Real<A>) -> Real<A> {
         basis.times(&x.some_cols(0, self.k))
     }
-}
 
-impl<A: Storage> Stiefel for Frames<A> {
-    fn size(&self) -> (usize, usize) {
-        (self.n, self.k)
-    }
-
-    fn exp(&self, p: &[Lane], v: &[Lane], out: &mut [Lane]) {
-        let Span { basis, generator } = self.span(p, v);
-        let turn = exp_skew_minus_one(&generator).plus_identity(Lane::ONE);
-        self.columns(&basis, &turn).write(out);
-    }
-
+    /// The logarithm of q at p, and that of p at q.
+    ///
     /// Rotations with the same first k columns differ by a rotation of the last columns. The block C of the logarithm
     /// that must vanish is removed by exp(Γ), where SΓ + ΓS = C with S = BBᵀ/12 − 1/2 accounts for the first terms of
     /// the series of Baker, Campbell and Hausdorff (Zimmermann & Hüper, Computing the Riemannian logarithm on the
     /// Stiefel manifold, 2022, Algorithm 4).
-    fn log(&self, p: &[Lane], q: &[Lane], out: &mut [Lane]) {
-        let (p, q, k) = (self.read(p), self.read(q), self.k);
-        let basis = self.basis(&p, &q);
-        let mut turn = completed(&basis.adjoint_times(&q));
+    fn logs(&self, p: &Real<A>, q: &Real<A>) -> [Real<A>; 2] {
+        let k = self.k;
+        let basis = self.basis(p, q);
+        let mut turn = completed(&basis.adjoint_times(q));
         let m = turn.rows();
         let (rotations, identity) = (Erased(&*self.rotations), numbers(&Real::<A>::identity(m)));
         let limit = below(rotations.cut_angle());
@@ -196,51 +221,109 @@ impl<A: Storage> Stiefel for Frames<A> {
                 }
             }
         }
-        self.columns(&basis, &Real::<A>::read(m, m, &found)).write(out);
+        let generator = Real::<A>::read(m, m, &found);
+        [self.columns(&basis, &generator), -self.columns(&basis, &turn.times(&generator))]
     }
 
-    /// The inverse of the derivative of `exp_p` at v.
-    fn dlog(&self, p: &[Lane], v: &[Lane], w: &[Lane], out: &mut [Lane]) {
-        let Span { basis, generator } = self.span(p, v);
-        let (w, m, k) = (self.read(w), generator.rows(), self.k);
-        let turn = exp_skew_minus_one(&generator).plus_identity(Lane::ONE);
-        let dim = self.positions().count();
-        // The columns of exp(−Ω) D exp(Ω) E for the basis matrices E.
-        let mut derivative = Matrix::<Lane, 1>::zeros(dim, dim);
-        for (b, (row, col)) in self.positions().enumerate() {
-            let moving: Matrix<Dual, 1, A> = Matrix::from_fn(m, m, |i, j| {
-                let rate = match (i, j) {
-                    at if at == (row, col) => Lane::ONE,
-                    at if at == (col, row) => lane(-1.0),
-                    _ => Lane::ZERO,
-                };
-                [Dual::from_parts([generator[(i, j)][0], rate, Lane::ZERO])]
-            });
-            let rate = exp_skew_minus_one(&moving).map(|x| x.parts()[1]);
-            let column = turn.adjoint_times(&rate);
-            for (a, at) in self.positions().enumerate() {
-                derivative[(a, b)] = column[at];
+    /// D(v)⁻¹ of E_p(−v)w for a vector w at `exp_p(v)`. The map D(v) = π ∘ dexp₋ᵥ is the mean of π ∘ exp(−sΩ) over s
+    /// from 0 to 1. exp(−sΩ) acts on skew-symmetric matrices by minors of order two, and on the part of w that is
+    /// orthogonal to the span by its adjoint.
+    fn dlog_of(&self, Span { basis, generator, turn }: &Span<A>, w: &Real<A>) -> Real<A> {
+        let (m, k) = (generator.rows(), self.k);
+        let positions: Vec<_> = self.positions().collect();
+        let dim = positions.len();
+        let (mut derivative, mut mean) = (Matrix::<Lane, 1>::zeros(dim, dim), Real::<A>::zeros(m, m));
+        for [s, weight] in GAUSS {
+            let near = exp_skew_minus_one(&generator.scaled(lane(-s))).plus_identity(Lane::ONE);
+            // exp(−(1 − s)Ω)
+            let far = near.times(turn).adjoint();
+            for u in [near, far] {
+                let of = |i: usize, j: usize| u[(i, j)][0];
+                for (a, &(r, c)) in positions.iter().enumerate() {
+                    for (b, &(i, j)) in positions.iter().enumerate() {
+                        let minor = of(r, i) * of(c, j) - of(r, j) * of(c, i);
+                        derivative[(a, b)][0] += lane(weight) * minor;
+                    }
+                }
+                mean = &mean + &u.scaled(lane(weight));
             }
         }
-        let (along, inside) = (basis.adjoint_times(&w), turn.adjoint_times(&basis.adjoint_times(&w)));
-        let right =
-            Matrix::from_fn(dim, 1, |a, _| self.positions().nth(a).map_or([Lane::ZERO], |at| inside[at]));
+        let along = basis.adjoint_times(w);
+        let inside = turn.adjoint_times(&along);
+        let right = Matrix::from_fn(dim, 1, |a, _| inside[positions[a]]);
         let solved = inverse(&derivative).times(&right);
         let mut change = Real::<A>::zeros(m, m);
-        for (a, (i, j)) in self.positions().enumerate() {
+        for (a, &(i, j)) in positions.iter().enumerate() {
             let x = solved[(a, 0)][0];
             (change[(i, j)], change[(j, i)]) = ([x], [-x]);
         }
-        let mut result = self.columns(&basis, &change);
-        if m < self.n {
-            // The part orthogonal to the span is multiplied by the mean of exp(sΩ), sin√G/√G + Ω (1 − cos√G)/G.
-            let [s, c] = trig(&generator.adjoint_times(&generator));
-            let mean = &s - &generator.times(&c);
-            let outside = &w - &basis.times(&along);
-            result = &result + &outside.times(&inverse(&mean.some_rows(0, k).some_cols(0, k)));
+        let result = self.columns(basis, &change);
+        if m == self.n {
+            return result;
         }
-        result.write(out);
+        let outside = w - &basis.times(&along);
+        &result + &outside.times(&inverse(&mean.adjoint().some_rows(0, k).some_cols(0, k)))
     }
+}
+
+impl<A: Storage> Stiefel for Frames<A> {
+    fn size(&self) -> (usize, usize) {
+        (self.n, self.k)
+    }
+
+    fn exp(&self, p: &[Lane], v: &[Lane], out: &mut [Lane]) {
+        let Span { basis, turn, .. } = self.span(p, v);
+        self.columns(&basis, &turn).write(out);
+    }
+
+    fn log(&self, p: &[Lane], q: &[Lane], out: &mut [Lane]) {
+        self.logs(&self.read(p), &self.read(q))[0].write(out);
+    }
+
+    fn dlog(&self, p: &[Lane], v: &[Lane], w: &[Lane], out: &mut [Lane]) {
+        self.dlog_of(&self.span(p, v), &self.read(w)).write(out);
+    }
+
+    fn bends(&self, x: &[Vec<Lane>], out: &mut [Lane]) {
+        let spans = [0, 2].map(|i| self.span(&x[i], &x[i + 1]));
+        let [inner, other] = [0, 1].map(|i| self.columns(&spans[i].basis, &spans[i].turn));
+        let logs = self.logs(&inner, &other);
+        for (i, out) in out.chunks_exact_mut(self.n * self.k).enumerate() {
+            (&self.dlog_of(&spans[i], &logs[i]) - &self.read(&x[2 * i + 1])).write(out);
+        }
+    }
+
+    fn transvect(&self, p: &[Lane], v: &[Lane], x: &mut [Lane]) {
+        let Span { basis, turn, .. } = self.span(p, v);
+        let change = turn.plus_identity(lane(-1.0));
+        for x in x.chunks_exact_mut(self.n * self.k) {
+            let old = self.read(x);
+            (&old + &basis.times(&change.times(&basis.adjoint_times(&old)))).write(x);
+        }
+    }
+}
+
+/// Vectors at p that are orthonormal in the canonical metric: two columns of p that turn into each other, or one that
+/// turns into a direction orthogonal to all.
+fn tangents(p: &Real<Dynamic>) -> Vec<Real<Dynamic>> {
+    let (n, k) = (p.rows(), p.cols());
+    let (others, _) = columns_of_q(p.clone(), k, n);
+    // Column j becomes x.
+    let one = |j: usize, x: &dyn Fn(usize) -> Lane| {
+        Real::from_fn(n, k, |r, c| [if c == j { x(r) } else { Lane::ZERO }])
+    };
+    let pairs = (0..k).flat_map(|i| (0..i).map(move |j| (i, j)));
+    let inside = pairs.map(|(i, j)| &one(j, &|r| p[(r, i)][0]) - &one(i, &|r| p[(r, j)][0]));
+    let outside = (0..n - k).flat_map(|i| (0..k).map(move |j| (i, j)));
+    inside.chain(outside.map(|(i, j)| one(j, &|r| others[(r, i)][0]))).collect()
+}
+
+/// π[v, w], for v and w at p as elements of 𝔪.
+fn bracket(p: &Real<Dynamic>, v: &Real<Dynamic>, w: &Real<Dynamic>) -> Real<Dynamic> {
+    let [a, b] = [v, w].map(|x| p.adjoint_times(x));
+    let [c, d] = [(v, &a), (w, &b)].map(|(x, a)| x - &p.times(a));
+    let inside = (&a.times(&b) - &c.adjoint_times(&d)).skew_part().scaled(lane(2.0));
+    &(&p.times(&inside) + &c.times(&b)) - &d.times(&a)
 }
 
 fn numbers<A: Storage>(x: &Real<A>) -> Vec<Lane> {

@@ -12,6 +12,7 @@ use symspline_engine::rows::map;
 /// - "log" of p, q: log_p(q), NaN where there is none;
 /// - "dlog" of p, v, w: the derivative of log_p at exp_p(v) in the direction w;
 /// - "inner" of p, u, v: inner products;
+/// - "basis" of p: an orthonormal basis, and "turn" of p, q: see the methods of these names of the core;
 /// - "bends" of p, v, q, w and "point", "velocity" and "acceleration" of p, v, q, w, p, v, t: see the methods `bends` and
 ///   `curve` of the core; where these give two vectors, a row has both.
 #[pyfunction]
@@ -25,8 +26,11 @@ pub fn stiefel<'py>(
     let manifold = symspline_engine::spaces::stiefel(k, n).map_err(invalid)?;
     let slices = inputs.iter().map(in_order).collect::<PyResult<Vec<_>>>()?;
     let rows = slices[0].len() / (n * k);
+    let dim = n * k - k * (k + 1) / 2;
     let len = match operation {
         "inner" => 1,
+        "basis" => dim * n * k,
+        "turn" => dim * dim,
         "bends" | "velocity" | "acceleration" => 2 * n * k,
         _ => n * k,
     };
@@ -38,6 +42,8 @@ pub fn stiefel<'py>(
         "log" => map(len, &slices, monitor, result, |x, out| manifold.log(&x[0], &x[1], out)),
         "dlog" => map(len, &slices, monitor, result, |x, out| manifold.dlog(&x[0], &x[1], &x[2], out)),
         "inner" => map(len, &slices, monitor, result, |x, out| out[0] = manifold.inner(&x[0], &x[1], &x[2])),
+        "basis" => map(len, &slices, monitor, result, |x, out| manifold.basis(&x[0], out)),
+        "turn" => map(len, &slices, monitor, result, |x, out| manifold.turn(&x[0], &x[1], out)),
         "bends" => map(len, &slices, monitor, result, |x, out| manifold.bends(x, out)),
         "point" => map(len, &slices, monitor, result, |x, out| manifold.curve(0, x, out)),
         "velocity" => map(len, &slices, monitor, result, |x, out| manifold.curve(1, x, out)),

@@ -619,6 +619,8 @@ def _unfit(
 
 # How many steps back are mixed.
 _DEPTH = 5
+# Added to their normal equations, which makes the weights of dependent steps small.
+_RIDGE = 1e-13
 _MOST = 200
 # A residual that has not been halved in so many evaluations is where exp, log and dlog leave it, if it is below this.
 _PATIENCE = 5
@@ -642,66 +644,61 @@ class IterationResult(NamedTuple):
     rate: Doubles
 
 
-class _State:
-    """The iteration of one curve, in coordinates of its velocities."""
+class _Iteration:
+    """The iteration of curves, in coordinates of their velocities. The first axis of every array has the curves."""
 
     def __init__(self, start: Doubles) -> None:
-        self.x = self.best_x = start
-        self.best_step = np.zeros_like(start)
-        self.best = self.first = np.inf
-        self.count = 0
-        self.converged = False
-        self.done = False
-        self._halvings = 0
-        self._since, self._mark = 0, np.inf
-        self._steps: list[Doubles] = []
-        self._moves: list[Doubles] = []
-        self._last: tuple[Doubles, Doubles] | None = None
+        count = len(start)
+        self.x, self.best_x, self.best_step = start.copy(), start.copy(), np.zeros_like(start)
+        self.best, self.first, self._mark = (np.full(count, np.inf) for _ in range(3))
+        self.count, self._since = (np.zeros(count, np.int64) for _ in range(2))
+        self._halvings = np.zeros(count)
+        self.converged, self.done, self._mixed = (np.zeros(count, bool) for _ in range(3))
+        # The last step and the last x plus step, and differences of these; those of a curve without them are zero.
+        self._last, self._round = np.zeros((2, count, start[0].size)), 0
+        self._changes = np.zeros((2, count, _DEPTH, start[0].size))
 
-    def advance(self, step: Doubles, residual: float, tol: float, floor: float) -> None:
-        """Take the step and the residual at x, and go on to the next x, or end."""
-        self.count += 1
-        if self.count == 1:
-            self.first = residual
-        bad = not np.isfinite(residual)
-        if residual < self.best:
-            self.best, self.best_x, self.best_step = residual, self.x, step
-        if self.best <= tol:
-            self.converged = self.done = True
-            return
-        if self.best <= self._mark / 2:
-            self._since, self._mark, self._halvings = 0, self.best, 0
-        else:
-            self._since += 1
-        if self._since >= _PATIENCE and self.best <= floor:
-            self.converged = self.done = True
-        elif bad or residual > _WILD * self.best:
-            self._go_back()
-        else:
-            self._mix(step)
+    def advance(self, i: NDArray[np.int64], step: Doubles, residual: Doubles, tol: float, floor: Doubles) -> None:
+        """Take the steps and the residuals at x of curves i, and go on to the next x, or end."""
+        self.first[i] = np.where(self.count[i] == 0, residual, self.first[i])
+        self.count[i] += 1
+        better = residual < self.best[i]
+        new = i[better]
+        self.best[new], self.best_x[new], self.best_step[new] = residual[better], self.x[new], step[better]
+        best = self.best[i]
+        halved = best <= self._mark[i] / 2
+        self._since[i] = np.where(halved, 0, self._since[i] + 1)
+        self._mark[i] = np.where(halved, best, self._mark[i])
+        self._halvings[i] = np.where(halved, 0.0, self._halvings[i])
+        resting = (self._since[i] >= _PATIENCE) & (best <= floor)
+        self.converged[i] = self.done[i] = done = (best <= tol) | resting
+        back = ~done & ~(np.isfinite(residual) & (residual <= _WILD * best))
+        self._go_back(i[back])
+        self._mix(i[~done & ~back], step[~done & ~back])
 
-    def _go_back(self) -> None:
+    def _go_back(self, i: NDArray[np.int64]) -> None:
         """Return to the best velocities, and halve the step from there."""
-        self._halvings += 1
-        self._steps, self._moves, self._last = [], [], None
-        self.x = self.best_x + 0.5**self._halvings * self.best_step
+        self._halvings[i] += 1
+        self._changes[:, i], self._mixed[i] = 0.0, False
+        self.x[i] = self.best_x[i] + wide(0.5 ** self._halvings[i], self.x) * self.best_step[i]
         # Zero velocities may not have a finite step.
-        self.done = not np.isfinite(self.best) or self._halvings > 20
+        self.done[i] = ~np.isfinite(self.best[i]) | (self._halvings[i] > 20)
 
-    def _mix(self, step: Doubles) -> None:
+    def _mix(self, i: NDArray[np.int64], step: Doubles) -> None:
         """Anderson's mixing (J. ACM 12, 1965): the combination of the last steps that is least."""
-        x = self.x
-        if self._last is not None:
-            self._moves.append(x - self._last[0])
-            self._steps.append(step - self._last[1])
-            del self._moves[:-_DEPTH], self._steps[:-_DEPTH]
-        self._last = x, step
-        self.x = x + step
-        if self._steps:
-            changes = np.stack([s.ravel() for s in self._steps], axis=1)
-            weights = np.linalg.lstsq(changes, step.ravel(), rcond=1e-10)[0]
-            for weight, move, change in zip(weights, self._moves, self._steps, strict=True):
-                self.x = self.x - weight * (move + change)
+        now = np.stack([step, self.x[i] + step]).reshape(2, len(i), self._changes.shape[-1])
+        self._changes[:, i, self._round] = np.where(self._mixed[i, None], now - self._last[:, i], 0.0)
+        self._last[:, i], self._mixed[i] = now, True
+        self._round = (self._round + 1) % _DEPTH
+        steps, moves = self._changes if len(i) == len(self.x) else self._changes[:, i]
+        # Normal equations for columns of length one.
+        gram = steps @ np.swapaxes(steps, 1, 2)
+        size = np.sqrt(np.einsum("cii->ci", gram))
+        size = np.where(size > 0, size, 1.0)
+        size = size[:, :, None]
+        gram = gram / (size * np.swapaxes(size, 1, 2)) + _RIDGE * np.eye(_DEPTH)
+        weights = np.linalg.solve(gram, steps @ now[0, :, :, None] / size) / size
+        self.x[i] = (now[1] - (np.swapaxes(weights, 1, 2) @ moves)[:, 0]).reshape(step.shape)
 
 
 def iterate(
@@ -721,34 +718,30 @@ def iterate(
         floor: residuals at which a curve may rest.
         advance: called with the number of finished curves.
     """
-    states = [_State(x) for x in start]
-    chosen = np.arange(len(states))
+    state = _Iteration(start)
+    chosen = np.arange(len(start))
     part, matrix = problem, Tridiagonal(problem)
     for _ in range(_MOST if most is None else most):
-        left = np.array([not states[i].done for i in chosen], bool)
+        left = ~state.done[chosen]
         if not left.any():
             break
         if not left.all():
             chosen = chosen[left]
             part = problem.take_batch(chosen)
             matrix = Tridiagonal(part)
-        u = part.velocities(np.stack([states[i].x for i in chosen]))
+        u = part.velocities(state.x[chosen])
         differences = c2_residuals(part, u)
         rest = residuals(part, matrix, u, differences, pace[chosen])
         with np.errstate(all="ignore"):
             steps = matrix.step(np.where(np.isfinite(differences), differences, 0.0))
-        for i, step, residual_of_curve in zip(chosen, steps, rest, strict=True):
-            states[i].advance(step, float(residual_of_curve), tol, float(floor[i]))
+            state.advance(chosen, steps, rest, tol, floor[chosen])
         if advance is not None:
-            advance(sum(state.done for state in states))
-    best = np.stack([state.best_x for state in states])
-    counts = np.array([state.count for state in states])
-    residual = np.array([state.best for state in states])
-    first = np.array([state.first for state in states])
+            advance(int(np.count_nonzero(state.done)))
+    counts, residual = state.count, state.best
     with np.errstate(all="ignore"):
-        rate = np.where(counts > 1, (np.maximum(residual, 1e-300) / first) ** (1 / np.maximum(counts - 1, 1)), 0.0)
-    converged = np.array([state.converged for state in states])
-    return IterationResult(problem.velocities(best), converged, counts, residual, rate)
+        rates = (np.maximum(residual, 1e-300) / state.first) ** (1 / np.maximum(counts - 1, 1))
+    rate = np.where(counts > 1, rates, 0.0)
+    return IterationResult(problem.velocities(state.best_x), state.converged, counts, residual, rate)
 
 
 def residuals(problem: Problem, matrix: Tridiagonal, u: Array, differences: Doubles, pace: Doubles) -> Doubles:

@@ -68,6 +68,14 @@ class Operations:
     def inner(self, p: Array, u: Array, v: Array) -> Doubles:
         return self._call("inner", p, u, v)
 
+    def basis(self, p: Array) -> Array:
+        """Orthonormal tangent vectors at points: shape (..., dim, numbers of a point)."""
+        return basis_at(self, p)
+
+    def turns(self, p: Array, basis: Array) -> Doubles:
+        """See `turns_between`."""
+        return turns_between(self, p, basis)
+
     def forms(self, p: Array, frames: Array) -> Array | None:
         """Vectors whose scalar products with the numbers of tangent vectors are the inner products of `frames`, of
         shape (curves, nodes, dim, numbers of a point), with them; None if they are not known."""
@@ -360,10 +368,22 @@ def frames_along(operations: Operations, p: Array) -> Array:
     Returns:
         Shape (curves, nodes, dim, numbers of a point).
     """
-    space = operations.space
     curves, nodes = p.shape[:2]
-    basis = basis_at(operations, p)
+    basis = operations.basis(p)
+    turns = operations.turns(p, basis)
     dim = basis.shape[2]
+    total = np.empty((curves, nodes, dim, dim))
+    total[:, 0] = np.eye(dim)
+    for i in range(nodes - 1):
+        np.matmul(total[:, i], turns[:, i], out=total[:, i + 1])
+    return np.asarray(total @ basis)
+
+
+def turns_between(operations: Operations, p: Array, basis: Array) -> Doubles:
+    """Rotations between the bases at neighbouring points, shape (curves, nodes - 1, dim, dim): row i has the components
+    of the transported vector i in the basis at the next point."""
+    space = operations.space
+    curves, nodes, dim = basis.shape[:3]
     tangents = basis.reshape(curves, nodes, dim, *space.point_shape)
     shape = (curves, nodes - 1, dim, *space.point_shape)
     here, there = (np.broadcast_to(x[:, :, None], shape) for x in (p[:, :-1], p[:, 1:]))
@@ -380,9 +400,4 @@ def frames_along(operations: Operations, p: Array) -> Array:
     ).reshape(curves, nodes - 1, dim, dim)
     # The rotation nearest to the map between tangent spaces: transport is one, projection nearly.
     u, _, v = np.linalg.svd(np.where(np.isfinite(maps), maps, np.eye(dim)))
-    turns = u @ v
-    total = np.empty((curves, nodes, dim, dim))
-    total[:, 0] = np.eye(dim)
-    for i in range(nodes - 1):
-        np.matmul(total[:, i], turns[:, i], out=total[:, i + 1])
-    return np.asarray(total @ basis)
+    return np.asarray(u @ v)

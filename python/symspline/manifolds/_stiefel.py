@@ -136,6 +136,14 @@ class _Compiled(Operations):
         values = _run(self.space, "bends", p[0], v[0], p[1], v[1])
         return values.reshape(*p.shape[1:3], 2, *p.shape[3:]).transpose(2, 0, 1, 3, 4)
 
+    def basis(self, p: Array) -> Array:
+        return _run(self.space, "basis", p).reshape(*p.shape[:-2], self.dim(), -1)
+
+    def turns(self, p: Array, basis: Array) -> Doubles:
+        dim = self.dim()
+        values = _run(self.space, "turn", p[:, :-1], p[:, 1:]).reshape(len(p), -1, dim, dim)
+        return np.where(np.isfinite(values), np.swapaxes(values, -1, -2), np.eye(dim))
+
     def forms(self, p: Array, frames: Array) -> Array:
         half = frames.reshape(*frames.shape[:-1], *p.shape[-2:]) / 2
         p = p[:, :, None]
