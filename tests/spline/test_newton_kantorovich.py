@@ -1,5 +1,7 @@
 """`report.certificate`: a C² spline exists within r of the velocities, and it is the only one within R."""
 
+import itertools
+
 import numpy as np
 import pytest
 from cases import closed_walk, unit_tangent, walk
@@ -32,7 +34,7 @@ def test_no_other_curve_within_the_radius(name, bc_type, rng):
 @pytest.mark.parametrize("name", ["sphere:2", "so:3", "cp:2", "gr:2,4", "spd:3"])
 def test_walks_with_long_steps_are_certified(name, rng):
     space = ss.space(name)
-    for kd, most in ((0.8, 0.95), (1.0, 0.8)):
+    for kd, most in ((0.8, 0.95), (1.0, 0.95), (1.25, 0.8)):
         reports = [ss.CubicSpline(None, long_walk(space, kd, rng), space).report for _ in range(20)]
         assert np.mean([report.certificate is not None for report in reports]) >= most
         assert all(report.contraction_bound is None for report in reports)
@@ -121,7 +123,7 @@ def test_a_product_has_one_per_factor(rng):
     r, R = ss.CubicSpline(None, (p, q, line), space).report.certificate
     alone = [ss.CubicSpline(None, x, s).report.certificate for x, s in ((p, S2), (q, S2), (line, ss.Euclidean(2)))]
     assert [*zip(r, R, strict=True)] == alone
-    far = long_walk(S2, 1.4, rng)
+    far = long_walk(S2, 1.9, rng)
     assert ss.CubicSpline(None, (far, q, line), space, on_failure="ignore").report.certificate is None
     batch = ss.CubicSpline(
         None, (np.stack([p, far]), np.stack([q, q]), np.stack([line, line])), space, on_failure="ignore"
@@ -131,7 +133,7 @@ def test_a_product_has_one_per_factor(rng):
 
 
 def test_curves_of_a_batch_have_those_of_single_curves(rng):
-    points = np.array([long_walk(S2, kd, rng) for kd in (0.05, 0.8, 1.5, 0.3, 0.1)])
+    points = np.array([long_walk(S2, kd, rng) for kd in (0.05, 0.8, 1.9, 0.3, 0.1)])
     batch = ss.CubicSpline(None, points, S2, on_failure="ignore")
     r, R = batch.report.certificate
     assert np.isnan(R).tolist() == [False, False, True, False, False]
@@ -163,3 +165,99 @@ def test_files_and_pickles_keep_it(rng, tmp_path):
     spline = ss.CubicSpline(None, long_walk(S2, 0.5, rng), S2)
     spline.save(tmp_path / "curve.json")
     assert ss.load(tmp_path / "curve.json").report.certificate == spline.report.certificate
+
+
+def transcribed(spline, ends, radius):
+    """(cb) and (cg) of the page, row by row in plain numbers, within a radius; natural and not-a-knot ends."""
+    space, t, p, u = spline.space, spline.t, spline.points, spline.velocities
+    K, n, h = space.curvature, len(t) - 1, np.diff(t)
+    g = np.ones(n + 1)
+    for which, beside in ((0, 1), (1, n - 1)):
+        g[beside] = 1.25 if ends[which] == "not-a-knot" else g[beside]
+    s, c = (lambda x: np.sinh(x) / x), (lambda x: (np.cosh(x) - 1) / x)
+    ds, dc = (lambda x: (np.cosh(x) - s(x)) / x), (lambda x: (np.sinh(x) - c(x)) / x)
+    (dds,) = (lambda x: (np.sinh(x) - 2 * ds(x)) / x,)
+    # By segment and end: lengths of the handle and of w − v; by segment, of the middle side and the chord.
+    handle, bend = np.empty((n, 2)), np.empty((n, 2))
+    for i in range(n):
+        a, b = h[i] / 3 * u[i], -h[i] / 3 * u[i + 1]
+        for e, (here, v, there, w) in enumerate(((i, a, i + 1, b), (i + 1, b, i, a))):
+            far = space.transvection(p[here], -v, space.exp(p[there], w))
+            handle[i, e] = K * space.norm(p[here], v)
+            bend[i, e] = K * space.norm(p[here], space.log(p[here], far) - v)
+    points = spline.control_points
+    middle, chord = K * space.distance(points[:, 1], points[:, 2]), K * space.distance(p[:-1], p[1:])
+    scale = max(
+        [1.25 * (1 + h[i] / h[j]) * s(chord[i]) for i, j, e in ((0, 1, 0), (-1, -2, 1)) if ends[e] == "not-a-knot"]
+        + [1]
+    )
+    eta = K * radius * h.max() / 3
+    longest = handle.max() + scale * eta
+    w = middle.max() + 2 * s(longest) * scale * eta
+    tw, ew = w / np.sin(w), 2 - w / np.tan(w)
+    dt, de = (1 - tw * np.cos(w)) / np.sin(w), (tw - np.cos(w)) / np.sin(w)
+    A, B, turn = ew * s(longest) + w * c(longest), tw * s(longest), c(longest) + np.tan(w / 2) * s(longest)
+    aa = de * A * s(longest) + ew * ds(longest) + c(longest) * A + w * dc(longest)
+    ab = s(longest) * (dt * A + tw * turn)
+    bb = s(longest) * (dt * B + tw * turn) + tw * ds(longest)
+    worst, weakness, kappa, uneven = 0.0, 1.0, 0.0, False
+    weights = np.zeros(3)
+    for i in range(n + 1):
+        sides = [(j, e) for j, e in ((i - 1, 1), (i, 0)) if 0 <= j < n]
+        if len(sides) == 1 and ends[min(i, 1)] == "not-a-knot":
+            continue
+        equal = len(sides) == 1 or np.isclose(h[i - 1], h[i], rtol=1e-12)
+        row = dominance = total = squares = 0.0
+        for (j, e), other in zip(sides, sides[::-1], strict=True):
+            x, y, m = handle[j, e], handle[j, 1 - e], middle[j]
+            near = (2 - m / np.tan(m)) * s(x) + m * c(x)
+            far = m / np.sin(m) * s(y)
+            stretch = 1.0 if equal else s(handle[other])
+            neighbour = i + 1 if e == 0 else i - 1
+            row += g[i] * (stretch * (near + 1) - 2) / h[j]
+            dominance += 2 * g[i] / h[j]
+            if not equal:
+                row += g[i] * ds(handle[other]) * h[other[0]] * bend[j, e] / h[j] ** 2
+            if neighbour in (0, n) and ends[min(neighbour, 1)] == "not-a-knot":
+                step = 1 + h[j] / h[other[0]]
+                row += g[i] * step * (stretch * far * s(chord[j]) - 1) / h[j]
+                dominance -= g[i] * step / h[j]
+                beside = g[i] * step * s(chord[j])
+            else:
+                row += g[neighbour] * (stretch * far - 1) / h[j]
+                dominance -= g[neighbour] / h[j]
+                beside = g[neighbour]
+            total, squares = total + beside, squares + beside**2
+        worst = max(worst, row / dominance)
+        weakness = max(weakness, sum(1 / h[j] for j, _ in sides) / dominance)
+        weights = np.maximum(weights, np.array([len(sides) * g[i] ** 2, g[i] * total, squares]) / dominance)
+        if not equal:
+            uneven, (left, right) = True, (h[i - 1], h[i])
+            kappa = max(kappa, (left**3 * bend[i, 0] / right + right**3 * bend[i - 1, 1] / left) / (left + right))
+    second = weights @ [aa, 2 * ab, bb] / h.max()
+    if uneven:
+        first = A + B + 1
+        stretched = 2 * ds(longest) * first + dds(longest) * (kappa / h.max() + first * scale * eta)
+        second = s(longest) * second + scale**2 * weakness * stretched
+    return worst, worst + eta * second
+
+
+@pytest.mark.parametrize("name", ["sphere:2", "hyperbolic:2", "so:3", "gr:2,4"])
+def test_radii_are_those_of_the_page(name, rng):
+    space = ss.space(name)
+    found = 0
+    for ends in (("natural", "natural"), ("not-a-knot", "not-a-knot"), ("natural", "not-a-knot")):
+        for n, kd, even in itertools.product((3, 4, 5, 7), (0.3, 0.7, 1.1), (True, False)):
+            p = long_walk(space, kd, rng, n + 1)
+            t = 3 + np.arange(n + 1.0) if even else np.cumsum(rng.uniform(0.5, 2, n + 1))
+            spline = ss.CubicSpline(t, p, space, bc_type=ends, on_failure="ignore")
+            certificate = spline.report.certificate
+            worst, _ = transcribed(spline, ends, 1e-9)
+            assert certificate is not None or worst > 0.999 or n == 3
+            if certificate is not None:
+                found += 1
+                assert worst < 1 and transcribed(spline, ends, certificate.R * (1 - 1e-9))[1] < 1
+                # The next larger radius was rejected, or the first one that was tried is accepted.
+                start = 3 * 0.35 * (1 - worst) / space.curvature / np.diff(t).max()
+                assert transcribed(spline, ends, certificate.R / 0.8)[1] > 1 or 0.15 * start < certificate.R
+    assert found > 40

@@ -190,7 +190,7 @@ class Report(FitReport):
     are: a great circle can be traversed the long way round. In a product, the handles in each factor must not be
     longer than the V of that factor.
 
-    `certificate` holds at steps that are about four times as long as those of the theorem, and for all ends except those
+    `certificate` holds at steps that are about five times as long as those of the theorem, and for all ends except those
     with a velocity and an acceleration, on any knots. It follows from a theorem of Newton and Kantorovich at the computed
     velocities. It does not exclude splines with other velocities, and in quotients holds for the representatives of the
     points that were given.

@@ -1,7 +1,7 @@
 //! A certificate at real steps, after Newton and Kantorovich: a C² spline exists within r of the computed velocities, and
 //! it is the only one within R.
 //!
-//! `docs/theory/certificate.md` derives all bounds. The map `u ↦ u − 3 T⁻¹F(u)` with the matrix T of flat space and the
+//! `docs/theory/certificate.md` derives all bounds. The map `u ↦ u + 3 T⁻¹F(u)` with the matrix T of flat space and the
 //! residual F contracts by q < 1 where the blocks of −3 ∂F differ from those of T by less than T is diagonally dominant. In
 //! these bounds only lengths enter: those of the handles, of the middle sides of the control polygons, and of the chords.
 //! They cost one evaluation of the middle sides.
@@ -21,10 +21,10 @@ const BESIDE: Lane = lane(1.25);
 /// Rounding errors of a sweep, in units of those of the points and velocities.
 const ROUNDING: f64 = 32.0 * f64::EPSILON;
 /// Where the longest chord and handle prove a contraction by this or less, no other bounds are needed.
-const NEAR: f64 = 0.15;
+const NEAR: f64 = 0.05;
 /// The radii that are tried decrease by this factor.
-const SHRINK: f64 = 0.75;
-const TRIES: usize = 24;
+const SHRINK: f64 = 0.8;
+const TRIES: usize = 32;
 
 /// What the certificate needs of a curve or of a section of it.
 #[derive(Clone, Copy, Debug)]
@@ -41,6 +41,9 @@ pub struct Bounds {
     /// The largest scale of a velocity in the norm, and how much less than in flat space T is diagonally dominant in it.
     scale: f64,
     weakness: f64,
+    /// With the scales g of the velocities at a knot and g' beside it, and the dominance σ there, the largest 2g²/σ,
+    /// gΣg'/σ and Σg'²/σ.
+    weights: [f64; 3],
     /// The factor by which an error of the velocity at a not-a-knot end counts.
     step: f64,
     /// The largest speed at a knot or between neighbours.
@@ -68,6 +71,7 @@ impl Bounds {
         uneven: false,
         scale: 1.0,
         weakness: 1.0,
+        weights: [0.0; 3],
         step: 0.0,
         speed: 0.0,
         longest: 0.0,
@@ -85,6 +89,7 @@ impl Bounds {
             uneven: self.uneven | other.uneven,
             scale: self.scale.max(other.scale),
             weakness: self.weakness.max(other.weakness),
+            weights: few(|i| self.weights[i].max(other.weights[i])),
             step: self.step.max(other.step),
             speed: self.speed.max(other.speed),
             longest: self.longest.max(other.longest),
@@ -116,16 +121,15 @@ impl Bounds {
             let room = (limit - self.middle) * (1.0 - 1e-9) / (2.0 * self.scale);
             return (room > 0.0).then_some([defect, room / third]);
         }
-        let room = (1.0 - self.contraction) / (self.scale * self.scale * self.weakness);
-        let mut handle = 0.25 * room / curvature;
+        let room = 1.0 - self.contraction;
+        let mut handle = 0.35 * room / (self.scale * curvature);
         for _ in 0..TRIES {
             if let Some(slope) = self.slope(handle, curvature, limit)
                 && slope * handle < room
             {
                 // In a ball of twice the distance that is expected.
-                let expected = defect / (1.0 - self.contraction);
-                let ball = (2.0 * expected * third).min(handle);
-                let error = expected / (1.0 - slope * ball / room);
+                let ball = (2.0 * defect / room * third).min(handle);
+                let error = defect / (room - slope * ball);
                 let (r, radius) = (error * self.scale + self.step * residual, handle / third);
                 return (error * third <= ball && r < radius).then_some([r, radius]);
             }
@@ -134,8 +138,7 @@ impl Bounds {
         None
     }
 
-    /// The change of the derivative of the condition within a distance, per unit of distance, where handles change by up to
-    /// `change`.
+    /// The growth of the contraction with the change of handles, up to a change.
     fn slope(&self, change: f64, curvature: f64, limit: f64) -> Option<f64> {
         let change = self.scale * change;
         let handle = Even::new(curvature * (self.handle + change));
@@ -143,13 +146,17 @@ impl Bounds {
         if !(middle < limit) {
             return None;
         }
-        let second = Second::new(&handle, curvature * middle);
+        let Second { by_a, by_b, aa, ab, bb } = Second::new(&handle, curvature * middle);
+        let [own, mixed, other] = self.weights;
+        let second = (own * aa + 2.0 * mixed * ab + other * bb) / self.longest;
         if !self.uneven {
-            return Some(curvature * second.sum);
+            return Some(curvature * second);
         }
-        let first = second.by_a + second.by_b + 1.0;
+        let first = by_a + by_b + 1.0;
         let bend = self.bend / self.longest + first * curvature * change;
-        Some(curvature * (handle.s * second.sum + 2.0 * handle.ds * first + handle.dds * bend))
+        let stretched =
+            self.scale * self.scale * self.weakness * (2.0 * handle.ds * first + handle.dds * bend);
+        Some(curvature * (handle.s * second + stretched))
     }
 }
 
@@ -165,8 +172,8 @@ struct Even {
 impl Even {
     fn new(x: f64) -> Self {
         let square = x * x;
-        if x < 0.1 {
-            // Terms of order eight are below rounding errors.
+        if x < 0.03 {
+            // The next terms are rounding errors.
             let series = |a: [f64; 4]| a.iter().rev().fold(0.0, |sum, a| sum * square + a);
             return Even {
                 s: series([1.0, 1.0 / 6.0, 1.0 / 120.0, 1.0 / 5040.0]),
@@ -192,8 +199,10 @@ struct Second {
     /// Of the first derivatives.
     by_a: f64,
     by_b: f64,
-    /// Of the second derivatives, together.
-    sum: f64,
+    /// Of the second derivatives.
+    aa: f64,
+    ab: f64,
+    bb: f64,
 }
 
 impl Second {
@@ -212,7 +221,7 @@ impl Second {
         let aa = de * by_a * s + e * ds + c * by_a + w * dc;
         let ab = s * (dt * by_a + t * turn);
         let bb = s * (dt * by_b + t * turn) + t * ds;
-        Second { by_a, by_b, sum: aa + 2.0 * ab + bb }
+        Second { by_a, by_b, aa, ab, bb }
     }
 }
 
@@ -227,7 +236,7 @@ struct Side {
     /// S of the handle: its norm, and the derivative.
     stretch: Lane,
     slope: Lane,
-    /// The norm of S of the chord.
+    /// The square of the length of the chord times K².
     chord: Lane,
 }
 
@@ -237,7 +246,7 @@ const NONE: Side = Side {
     bend: Lane::ZERO,
     stretch: Lane::ONE,
     slope: Lane::ZERO,
-    chord: Lane::ONE,
+    chord: Lane::ZERO,
 };
 
 /// The two ends of a segment, for squares of lengths times K², and |w − v| times K.
@@ -247,28 +256,17 @@ fn sides(handles: [Lane; 2], middle: Lane, chord: Lane, bends: [Lane; 2]) -> [Si
     let [x, y] = handles.map(|square| square.sqrt());
     // (cosh x − 1)/x
     let (ca, cb) = (-(a.k * x), -(b.k * y));
-    let (w, d) = (middle.sqrt(), chord.sqrt());
-    let of_middle = Trig::new(middle);
-    // Between the chord and the middle side the distance of the two geodesics is at most this.
-    let between = (w + d + x + y) * lane(0.5);
-    let tan = |x: Lane, of: &Trig<Lane>| -(of.k * x) / of.s;
-    let half = [tan(d, &Trig::new(chord)), tan(between, &Trig::new(between * between)), tan(w, &of_middle)];
-    let way = x + y;
-    let part = way.simd_gt(Lane::ZERO).select((between - d) / way, Lane::ZERO).min(Lane::ONE);
-    let mean = (half[1] + part * half[0] + (Lane::ONE - part) * half[2]) * lane(0.5);
-    let turn = (ca * x + cb * y) * lane(0.5) + mean * (a.s * x + b.s * y);
-    let turn = Lane::ONE + turn.min(lane(2.0));
+    let (w, of_middle) = (middle.sqrt(), Trig::new(middle));
     let shrink = Lane::ONE / of_middle.s;
     let coth = lane(2.0) - of_middle.c * shrink;
-    let stretch_of_chord = Trig::new(-chord).s;
-    let valid = between.simd_lt(lane(PI));
+    let valid = w.simd_lt(lane(PI));
     let side = |here: &Trig<Lane>, x: Lane, c: Lane, there: &Trig<Lane>, bend: Lane| Side {
         near: valid.select(coth.mul_add(here.s, w * c), lane(f64::INFINITY)),
-        far: shrink * there.s * turn,
+        far: shrink * there.s,
         bend,
         stretch: here.s,
         slope: -(here.k + here.j) * x,
-        chord: stretch_of_chord,
+        chord,
     };
     [side(&a, x, ca, &b, bends[0]), side(&b, y, cb, &a, bends[1])]
 }
@@ -307,11 +305,12 @@ fn of_near_points(
         let k = space.curvature();
         let even = Even::new(k * handle);
         let Second { by_a, by_b, .. } = Second::new(&even, k * middle);
-        let turn = k * handle * (even.c + 2.0 * (0.5 * k * middle).tan() * even.s);
         let (uneven, bend) = (of(uneven).to_bits() != 0, k * (middle + handle) * of(ratio));
         let (stretch, slope) = if uneven { (even.s, even.ds * bend) } else { (1.0, 0.0) };
-        let contraction = stretch * (by_a + 1.0 + by_b * (1.0 + turn)) - 3.0 + 2.0 * slope;
-        let inside = k * middle < 1.0 && 2.0 * middle < injectivity;
+        let contraction = stretch * (by_a + 1.0 + by_b) - 3.0 + 2.0 * slope;
+        // In flat space the radius depends on the middle side alone.
+        let inside =
+            if k == 0.0 { injectivity.is_infinite() } else { k * middle < 1.0 && 2.0 * middle < injectivity };
         let near = of(known).to_bits() != 0 && inside && contraction <= NEAR;
         Bounds {
             contraction: if near { contraction } else { f64::INFINITY },
@@ -319,6 +318,7 @@ fn of_near_points(
             middle,
             bend: 2.0 * bend * of(longest * time),
             uneven,
+            weights: [of(longest * time); 3],
             speed: (3.0 * handle / of(shortest * time)).max(of(chain.pace * length / time)),
             longest: of(longest * time),
             shortest: of(shortest * time),
@@ -337,7 +337,7 @@ pub fn bounds(
     work: &mut NodeVectors<Lane>,
     cores: [Range<usize>; LANES],
 ) -> [Bounds; LANES] {
-    // A lane does not depend on others: curves of a batch have the certificates of single curves.
+    // Curves of a batch have the certificates of single curves.
     let near = of_near_points(space, chain, ends, (injectivity, handle));
     if near.iter().all(|bounds| bounds.contraction < 1.0) {
         return near;
@@ -399,6 +399,7 @@ struct Walk<'a> {
     uneven: Lane,
     scale: Lane,
     weakness: Lane,
+    weights: [Lane; 3],
     step: Lane,
     speed: Lane,
 }
@@ -416,6 +417,7 @@ impl<'a> Walk<'a> {
             uneven: Lane::ZERO,
             scale: Lane::ONE,
             weakness: Lane::ONE,
+            weights: [Lane::ZERO; 3],
             step: Lane::ZERO,
             speed: pace,
         }
@@ -442,15 +444,27 @@ impl<'a> Walk<'a> {
         self.speed = most(self.speed, speed);
     }
 
-    /// The row of T and of its differences to the derivatives, both for velocities with their scales.
-    fn row(&mut self, nodes: Range<usize>, differences: Lane, dominance: Lane, flat: Lane) {
-        let here = self.has(nodes);
+    /// The row of T and of its differences to the derivatives, both for velocities with their scales: that of the knot, and
+    /// the sum of those beside it and of their squares. An inner knot has two `sides`.
+    fn row(
+        &mut self,
+        node: usize,
+        differences: Lane,
+        [dominance, flat]: [Lane; 2],
+        [scale, sum, squares]: [Lane; 3],
+        sides: f64,
+    ) {
+        let here = self.has(node..node + 1);
         let ratio = differences / dominance;
         // Comparisons with NaN are false.
         let valid = ratio.simd_ge(Lane::ZERO) & dominance.simd_gt(Lane::ZERO);
         let ratio = valid.select(ratio, lane(f64::INFINITY));
         self.contraction = here.select(self.contraction.max(ratio), self.contraction);
         self.weakness = here.select(self.weakness.max(flat / dominance), self.weakness);
+        for (most, weight) in self.weights.iter_mut().zip([scale * scale * lane(sides), scale * sum, squares])
+        {
+            *most = here.select(most.max(weight / dominance), *most);
+        }
     }
 
     /// The scale of the velocity at a node that is not next to the one whose row is considered.
@@ -479,10 +493,11 @@ impl<'a> Walk<'a> {
         let (one, two) = (Lane::ONE, lane(2.0));
         let inverse = [one / h_left, one / h_right];
         let equal = (h_left - h_right).abs().simd_le(h_right * lane(4.0 * f64::EPSILON));
-        let plain = chain.closed || (i > 1 && i + 1 < n);
+        let plain = chain.closed || (i > 2 && i + 2 < n);
         let scales = if plain { [one; 3] } else { [i - 1, i, i + 1].map(|node| self.scale_at(chain, node)) };
         let mut differences = Lane::ZERO;
         let mut dominance = two * (inverse[0] + inverse[1]) * scales[1];
+        let (mut sum, mut squares) = (Lane::ZERO, Lane::ZERO);
         let pairs = [(left, right, h_right, scales[0], 0), (right, left, h_left, scales[2], 1)];
         for (side, other, other_h, neighbour, which) in pairs {
             let (h, w) = (if which == 0 { h_left } else { h_right }, inverse[which]);
@@ -492,20 +507,22 @@ impl<'a> Walk<'a> {
             let slope = equal.select(Lane::ZERO, other.slope * other_h * side.bend * w * w);
             differences += (near * w + slope) * scales[1];
             let knot = if plain { Lane::ZERO } else { self.eliminated(chain, i, which) };
-            if knot.none() {
-                differences += far * neighbour * w;
-                dominance -= neighbour * w;
-                continue;
+            let (mut through, mut opposite, mut scale) = (far * neighbour, neighbour, neighbour);
+            if knot.any() {
+                let (step, chord) = (one + h / other_h, Trig::new(-side.chord).s);
+                through = knot.select(step * ((one + far) * chord - one) * scales[1], through);
+                opposite = knot.select(step * scales[1], opposite);
+                scale = knot.select(step * chord * scales[1], scale);
+                let here = knot & self.has(i..i + 1);
+                self.scale = here.select(self.scale.max(scale), self.scale);
+                self.step = here.select(self.step.max(step), self.step);
             }
-            let step = one + h / other_h;
-            let through = step * ((one + far) * side.chord - one) * scales[1];
-            differences += knot.select(through, far * neighbour) * w;
-            dominance -= knot.select(step * scales[1], neighbour) * w;
-            let here = knot & self.has(i..i + 1);
-            self.scale = here.select(self.scale.max(step * side.chord * scales[1]), self.scale);
-            self.step = here.select(self.step.max(step), self.step);
+            differences += through * w;
+            dominance -= opposite * w;
+            sum += scale;
+            squares = scale.mul_add(scale, squares);
         }
-        self.row(if i == 0 { 0..1 } else { i..i + 1 }, differences, dominance, inverse[0] + inverse[1]);
+        self.row(i, differences, [dominance, inverse[0] + inverse[1]], [scales[1], sum, squares], 2.0);
         if !equal.all() {
             let bend = h_left * h_left * h_left * right.bend * inverse[1]
                 + h_right * h_right * h_right * left.bend * inverse[0];
@@ -531,12 +548,9 @@ impl<'a> Walk<'a> {
         let beside = self.scale_at(chain, next);
         let differences = (side.near - one + (side.far - one) * beside) * w + h * side.slope * pull;
         let dominance = (lane(2.0) - beside) * w;
-        self.row(
-            node..node + 1,
-            acceleration.select(differences, Lane::ZERO),
-            acceleration.select(dominance, w),
-            w,
-        );
+        let [differences, beside] = [differences, beside].map(|x| acceleration.select(x, Lane::ZERO));
+        let scales = [acceleration.select(one, Lane::ZERO), beside, beside * beside];
+        self.row(node, differences, [acceleration.select(dominance, w), w], scales, 1.0);
         let here = self.has(node..node + 1);
         let pulled = here & acceleration & pull.simd_gt(Lane::ZERO);
         self.bend = pulled.select(self.bend.max(h * h * h * pull), self.bend);
@@ -563,6 +577,7 @@ impl<'a> Walk<'a> {
                 uneven: of(self.uneven).to_bits() != 0,
                 scale: of(self.scale),
                 weakness: of(self.weakness),
+                weights: self.weights.map(|weight| of(weight * time)),
                 step: of(self.step),
                 speed: of(self.speed.sqrt() * length / time),
                 longest: segments(f64::max, 0.0, l) * of(time),
