@@ -95,9 +95,7 @@ _Ends = Sequence[tuple[str, _Doubles | None]] | None
 _Fault = tuple[int, str, int | None, float, float, str | None]
 
 def fit(
-    factors: Sequence[
-        tuple[Handle, _Doubles, _Ends, float | None, list[tuple[int, _Doubles]] | None, float | None]
-    ],
+    factors: Sequence[tuple[Handle, _Doubles, _Ends, float | None, list[tuple[int, _Doubles]] | None, float | None]],
     t: _Doubles,
     method: str,
     tol: float,

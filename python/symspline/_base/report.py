@@ -190,10 +190,10 @@ class Report(FitReport):
     are: a great circle can be traversed the long way round. In a product, the handles in each factor must not be
     longer than the V of that factor.
 
-    `certificate` holds at steps that are about five times as long as those of the theorem, and for all ends except those
-    with a velocity and an acceleration, on any knots. It follows from a theorem of Newton and Kantorovich at the computed
-    velocities. It does not exclude splines with other velocities, and in quotients holds for the representatives of the
-    points that were given.
+    `certificate` holds at steps that are about five times as long as those of the theorem, on any knots, and for all
+    ends except those with a velocity and an acceleration. It follows from a theorem of Newton and Kantorovich at the
+    computed velocities. It does not exclude splines with other velocities, and in quotients holds for the
+    representatives of the points that were given.
 
     The theorem needs D + 2V below the injectivity radius. Otherwise the nearest of several geodesics may change, as on
     tori, circles and projective spaces, and two splines with handles no longer than V may exist.
@@ -236,8 +236,8 @@ class Report(FitReport):
         -------
         Certificate or None
             Its numbers ``r`` and ``R`` are arrays for a batch, with NaN for curves without a certificate, and have one
-            value per factor for a product, as `invariant_radius`. None if no curve has a certificate: steps are then too
-            long, or the space has no metric.
+            value per factor for a product, as `invariant_radius`. None if no curve has a certificate: steps are then
+            too long, or the space has no metric.
         """
         if self.existence_radius is None or self.uniqueness_radius is None:
             return None
