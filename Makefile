@@ -17,8 +17,8 @@ unexport PYTHONDONTWRITEBYTECODE
 unexport MAKEFLAGS MFLAGS
 
 .PHONY: demo check check-lints check-rust check-types check-python test test-oracles test-torch test-programs \
-	test-aarch64 test-timing fuzz bench size docs wheel sdist test-wheel crate crate-msrv crate-semver publish-wheels publish-crates \
-	publish-npm check-tools clean docs-check wasm test-wasm
+	test-aarch64 test-timing fuzz bench size docs wheel sdist test-wheel test-packages package-files crate crate-msrv \
+	crate-semver publish-wheels publish-crates publish-npm check-tools clean docs-check wasm test-wasm
 
 demo: .venv/built .venv/plot
 	$(BIN)/python examples/storms/demo.py --out demo-output
@@ -42,12 +42,12 @@ check-python: .venv/built .venv/tools
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/codespell *.md Makefile benchmarks crates docs examples packaging python tests
-	$(BIN)/python -m pytest tests/test_docstrings.py tests/test_language.py
+	$(BIN)/python -m pytest tests/test_docstrings.py tests/test_language.py tests/release
 
 # Workers on all cores with a thread of BLAS per core each would wait for each other.
 test: check
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --dist worksteal --doctest-modules python tests \
-		--ignore tests/test_docstrings.py --ignore tests/test_language.py
+		--ignore tests/test_docstrings.py --ignore tests/test_language.py --ignore tests/release
 
 # Compares with evo and geomstats, which runs with no NumPy of today, and so in an environment of its own, beside the
 # compiled module of .venv, which every Python from 3.11 on can load. Needs .5 GB; not part of `test`.
@@ -125,6 +125,18 @@ NUMPY ?= numpy
 test-wheel: .venv/maturin
 	$(BIN)/python packaging/test_wheel.py '$(NUMPY)'
 
+# The wheel of dist/, the crates and the npm package of build/npm, each installed in an empty folder, where the examples of
+# its README run. `make wheel` and `make wasm` come first. PACKAGES=python tests one of them.
+PACKAGES ?= python rust javascript
+test-packages: .venv/maturin
+	$(BIN)/python packaging/test_packages.py $(PACKAGES)
+
+# Files that packages contain and that are derived from others: the licences of the crates in the compiled module, and the
+# README for package indexes. `make check-python` compares them with their sources.
+package-files: .venv/maturin
+	$(BIN)/python packaging/licenses.py
+	$(BIN)/python packaging/index_readme.py
+
 # What Rust users get: documentation without warnings, examples and interface, every feature by itself, and packages with
 # licence and README.
 CRATES := --workspace --exclude symspline-python --exclude symspline-benches
@@ -169,8 +181,10 @@ WASM_VERSION = $(shell sed -n 's/^wasm-bindgen = "=\(.*\)"/\1/p' crates/symsplin
 wasm: build/node/built
 	@$(WASM_BINDGEN) --version | grep -q ' $(WASM_VERSION)$$' || { echo "the npm package needs wasm-bindgen $(WASM_VERSION): \
 	cargo install --locked wasm-bindgen-cli --version $(WASM_VERSION)"; exit 1; }
-	cd crates/symspline-wasm && cargo build --quiet --release --target-dir $(CURDIR)/target/wasm
+	cd crates/symspline-wasm && cargo build --quiet --release --locked --target-dir $(CURDIR)/target/wasm --config \
+		"target.wasm32-unknown-unknown.rustflags = ['--remap-path-prefix=$${CARGO_HOME:-$$HOME/.cargo}/registry/src=crates']"
 	node packaging/npm/build.mjs target/wasm/wasm32-unknown-unknown/release/symspline_wasm.wasm $(WASM_BINDGEN)
+	$(PYTHON) packaging/licenses.py crates/symspline-wasm build/npm/THIRD-PARTY-LICENSES.txt
 
 build/node/built: packaging/npm/package.json
 	@command -v node >/dev/null || { echo "the npm package needs Node.js 18 or newer"; exit 1; }

@@ -18,6 +18,7 @@
     host         threads, memory, progress, arrays of other libraries
     typing       annotations, as type checkers read them
     docs         the code of the documentation runs
+    release      licences, README and metadata of the packages agree with their sources
     raw_data     recordings with gaps, duplicates, missing samples and huge offsets, through every entry point
 
 Outside the default run:
