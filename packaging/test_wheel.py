@@ -1,6 +1,6 @@
 """Tests the wheel of dist/: its content, and in a new environment with nothing but NumPy, from a copy of the tests.
 
-It must contain the licence of every crate that its SBOM requires, and no path of the machine that built it.
+The wheel must contain the licence of every crate that its SBOM requires, and no path of the machine that built it.
 """
 
 import json
@@ -47,11 +47,11 @@ def without_licence(wheel: zipfile.ZipFile) -> list[str]:
     return [name for name in names if not re.search(rf"^(.*, )?{re.escape(name)}(,|$)", text, re.M)]
 
 
-def paths(module: bytes) -> list[str]:
-    """Return strings in a compiled module that begin with a folder of the machine that built it, if it was this one."""
+def paths(content: bytes) -> list[str]:
+    """Return strings in a file that begin with a folder of the machine that built it, if it was this one."""
     folders = {Path.home(), ROOT, Path(os.environ.get("CARGO_HOME", Path.home() / ".cargo"))}
     starts = b"|".join(re.escape(str(folder).encode()) + rb"[/\\\\]" for folder in folders)
-    return [match.decode() for match in re.findall(rb"(?:" + starts + rb")[ -~]{0,60}", module)]
+    return [match.decode() for match in re.findall(rb"(?:" + starts + rb")[ -~]{0,60}", content)]
 
 
 def newest_wheel() -> Path:
@@ -70,7 +70,7 @@ def main() -> None:
                 f"{made.name} lacks the licences of {', '.join(missing)}: run `make package-files`, then `make wheel`"
             )
         for name in wheel.namelist():
-            if name.endswith((".so", ".pyd")) and (found := paths(wheel.read(name))):
+            if found := paths(wheel.read(name)):
                 sys.exit(f"{name} contains {len(found)} paths of this machine, such as {found[0]}")
     environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
     with tempfile.TemporaryDirectory() as temporary:

@@ -10,7 +10,6 @@ import base64
 import hashlib
 import os
 import platform
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -21,9 +20,17 @@ ROOT = Path(__file__).parent.parent
 TARGET = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
 
 
-def build(folder: Path, target: Path, flags: str | None) -> Path:
+def without_paths() -> list[str]:
+    """Return flags that keep folders of this machine out of the compiled module, where messages name source files."""
+    cargo = Path(os.environ.get("CARGO_HOME", Path.home() / ".cargo"))
+    return [f"--remap-path-prefix={cargo / 'registry' / 'src'}=crates", f"--remap-path-prefix={ROOT}=."]
+
+
+def build(folder: Path, target: Path, flags: list[str]) -> Path:
     """A wheel in ``folder`` by maturin, with these flags of the compiler."""
     environment = {name: value for name, value in os.environ.items() if name != "RUSTFLAGS"}
+    # With this separator, flags may contain spaces, as folders do.
+    environment["CARGO_ENCODED_RUSTFLAGS"] = "\x1f".join([*flags, *without_paths()])
     # Flags for a named target are not those of build scripts, which this processor must be able to run.
     version = subprocess.run(["rustc", "-vV"], capture_output=True, encoding="utf-8", check=True).stdout
     host = next(line.removeprefix("host: ") for line in version.splitlines() if line.startswith("host: "))
@@ -42,7 +49,7 @@ def build(folder: Path, target: Path, flags: str | None) -> Path:
     subprocess.run(
         [*command, "--target-dir", str(target), "--out", str(folder)],
         cwd=ROOT,
-        env=environment | ({"RUSTFLAGS": flags} if flags else {}),
+        env=environment,
         check=True,
     )
     (wheel,) = folder.glob("*.whl")
@@ -51,7 +58,13 @@ def build(folder: Path, target: Path, flags: str | None) -> Path:
 
 def join(plain: Path, others: dict[str, Path], out: Path) -> Path:
     """Write the wheel ``plain`` with the compiled modules of other wheels, which are for these levels."""
-    modules = []
+    entries, metadata = [], []
+    with zipfile.ZipFile(plain) as source:
+        for info in source.infolist():
+            # The folder .dist-info comes last, as the format recommends.
+            where = metadata if ".dist-info/" in info.filename else entries
+            # The list of crates names their folders on this machine.
+            where.append((info, source.read(info).replace(ROOT.as_uri().encode(), b"file:///symspline")))
     for level, wheel in others.items():
         with zipfile.ZipFile(wheel) as archive:
             (name,) = [
@@ -59,18 +72,18 @@ def join(plain: Path, others: dict[str, Path], out: Path) -> Path:
             ]
             info, module = archive.getinfo(name), archive.read(name)
         info.filename = name.replace("_core", f"_core_{level}", 1)
-        modules.append((info, module))
+        entries.append((info, module))
     made = out / plain.name
-    with zipfile.ZipFile(plain) as source, zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED) as wheel:
-        for entry in source.infolist():
-            content = source.read(entry)
-            if entry.filename.endswith(".dist-info/RECORD"):
-                # The folder .dist-info comes last, as the format recommends.
-                for info, module in modules:
-                    wheel.writestr(info, module)
-                    digest = base64.urlsafe_b64encode(hashlib.sha256(module).digest()).rstrip(b"=").decode()
-                    content += f"{info.filename},sha256={digest},{len(module)}\n".encode()
-            wheel.writestr(entry, content)
+    lines = []
+    with zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED) as wheel:
+        for info, content in [*entries, *metadata]:
+            if info.filename.endswith(".dist-info/RECORD"):
+                record = info
+                continue
+            wheel.writestr(info, content)
+            digest = base64.urlsafe_b64encode(hashlib.sha256(content).digest()).rstrip(b"=").decode()
+            lines.append(f"{info.filename},sha256={digest},{len(content)}\n")
+        wheel.writestr(record, "".join([*lines, f"{record.filename},,\n"]))
     return made
 
 
@@ -79,10 +92,10 @@ def main() -> None:
     out.mkdir(exist_ok=True)
     with tempfile.TemporaryDirectory() as temporary:
         if platform.machine().lower() not in ("x86_64", "amd64"):
-            print(shutil.copy(build(Path(temporary), TARGET, None), out))
+            print(join(build(Path(temporary), TARGET, []), {}, out))
             return
         plain, *others = (
-            build(Path(temporary) / level, TARGET / level, f"-C target-cpu={cpu}")
+            build(Path(temporary) / level, TARGET / level, [f"-Ctarget-cpu={cpu}"])
             for level, cpu in (("plain", "x86-64"), ("v3", "x86-64-v3"), ("v4", "x86-64-v4"))
         )
         print(join(plain, dict(zip(("v3", "v4"), others, strict=True)), out))

@@ -1,8 +1,12 @@
 """Licences, README, metadata, extras and citation of the packages agree with their sources."""
 
 import ast
+import base64
+import csv
+import hashlib
 import json
 import re
+import runpy
 import sys
 import tomllib
 import zipfile
@@ -11,7 +15,6 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-# Last, since a module in this folder has the name of a library.
 sys.path.append(str(ROOT / "packaging"))
 
 import index_readme  # noqa: E402
@@ -75,6 +78,29 @@ def test_a_wheel_without_a_licence_is_refused(tmp_path):
             "a.dist-info/licenses/THIRD-PARTY-LICENSES.txt", "x 1, nalgebra 0.3.0, y 2\nmy-numpy 0.3.0, numpy 0.3.01\n"
         )
         assert test_wheel.without_licence(wheel) == ["numpy 0.3.0"]
+
+
+def test_a_joined_wheel_has_all_modules_their_hashes_and_no_path(tmp_path):
+    # The name of this module is also that of a library.
+    join = runpy.run_path(str(ROOT / "packaging/wheel.py"))["join"]
+    made = {}
+    for level in ("plain", "v3"):
+        made[level] = tmp_path / f"{level}.whl"
+        with zipfile.ZipFile(made[level], "w") as wheel:
+            wheel.writestr("symspline/_core.abi3.so", level)
+            wheel.writestr("symspline/_core.pyi", "")
+            wheel.writestr("symspline-1.dist-info/sboms/a.cyclonedx.json", f"path+{ROOT.as_uri()}/crates/core")
+            wheel.writestr("symspline-1.dist-info/RECORD", "of one module")
+    (tmp_path / "dist").mkdir()
+    with zipfile.ZipFile(join(made["plain"], {"v3": made["v3"]}, tmp_path / "dist")) as wheel:
+        rows = list(csv.reader(wheel.read("symspline-1.dist-info/RECORD").decode().splitlines()))
+        assert [name for name, *_ in rows] == wheel.namelist() and rows[-1][1:] == ["", ""]
+        for name, digest, size in rows[:-1]:
+            content = wheel.read(name)
+            found = base64.urlsafe_b64encode(hashlib.sha256(content).digest()).decode().rstrip("=")
+            assert (digest, int(size)) == (f"sha256={found}", len(content))
+        assert wheel.read("symspline/_core.abi3.so") == b"plain" and wheel.read("symspline/_core_v3.abi3.so") == b"v3"
+        assert [name for name in wheel.namelist() if test_wheel.paths(wheel.read(name))] == []
 
 
 def test_paths_of_this_machine_are_found_in_a_module():
