@@ -183,8 +183,8 @@ wasm: build/node/built
 	cargo install --locked wasm-bindgen-cli --version $(WASM_VERSION)"; exit 1; }
 	cd crates/symspline-wasm && cargo build --quiet --release --locked --target-dir $(CURDIR)/target/wasm --config \
 		"target.wasm32-unknown-unknown.rustflags = ['--remap-path-prefix=$${CARGO_HOME:-$$HOME/.cargo}/registry/src=crates']"
+	$(PYTHON) packaging/licenses.py crates/symspline-wasm build/node/THIRD-PARTY-LICENSES.txt
 	node packaging/npm/build.mjs target/wasm/wasm32-unknown-unknown/release/symspline_wasm.wasm $(WASM_BINDGEN)
-	$(PYTHON) packaging/licenses.py crates/symspline-wasm build/npm/THIRD-PARTY-LICENSES.txt
 
 build/node/built: packaging/npm/package.json
 	@command -v node >/dev/null || { echo "the npm package needs Node.js 18 or newer"; exit 1; }

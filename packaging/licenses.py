@@ -76,14 +76,14 @@ def text_of(package: dict, licence: str) -> str:
 
 def collected(module: Path) -> str:
     """Return the content of the file: each text once, after the names of its crates."""
-    texts: dict[tuple[str, str], list[str]] = {}
+    # The standard library offers the same choice as most crates. The terms are those of this project.
+    own = (ROOT / "LICENSE").read_text("utf-8").strip()
+    standard = re.sub(r"Copyright .*", "Copyright (c) The Rust Project Developers", own)
+    texts: dict[tuple[str, str], list[str]] = {("MIT", standard): ["the Rust standard library"]}
     for package in required(module):
         for licence in chosen(package["license"]):
             names = texts.setdefault((licence, text_of(package, licence)), [])
             names.append(f"{package['name']} {package['version']}")
-            if package["name"] == "libc":
-                # The standard library has the same choice of licences and the same authors.
-                names.append("the Rust standard library")
     parts = [
         f"{', '.join(names)}\nLicence: {licence}\n\n{text}\n" for (licence, text), names in texts.items()
     ]

@@ -13,6 +13,7 @@ const at = (...names) => join(ROOT, ...names);
 const [module, bindgen] = process.argv.slice(2);
 const { build } = createRequire(at("build/node/"))("esbuild");
 const PACKAGE = at("build/npm");
+const LICENCES = "THIRD-PARTY-LICENSES.txt";
 const LIMITS = { module: 600e3, page: 1e6 };
 
 /** Refuses files that are too large as servers transfer them today, with Brotli; prints the size with gzip as well. */
@@ -36,6 +37,7 @@ function makePackage() {
     cpSync(at("packaging/npm", name), join(PACKAGE, name));
   }
   cpSync(at("LICENSE"), join(PACKAGE, "LICENSE"));
+  cpSync(at("build/node", LICENCES), join(PACKAGE, LICENCES));
   check("module", [wasm], LIMITS.module);
 }
 
@@ -66,7 +68,9 @@ async function makePage() {
   // The site finds them here.
   const site = at("docs/_static/play");
   mkdirSync(site, { recursive: true });
-  for (const name of ["play.js", "play.css"]) cpSync(join(out, name), join(site, name));
+  // The page contains the compiled module.
+  cpSync(join(PACKAGE, LICENCES), join(out, LICENCES));
+  for (const name of ["play.js", "play.css", LICENCES]) cpSync(join(out, name), join(site, name));
   check("page", ["play.js", "play.css", "index.html"].map((name) => join(out, name)), LIMITS.page);
 }
 

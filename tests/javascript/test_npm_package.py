@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 from pathlib import Path
 from typing import Any
@@ -203,6 +204,14 @@ def test_types_fit_a_program(tmp_path: Path) -> None:
     (tmp_path / "node_modules/symspline").symlink_to(PACKAGE)
     done = subprocess.run([*compiler, *modules, str(program)], capture_output=True, text=True, cwd=tmp_path)
     assert done.returncode == 0, done.stdout
+
+
+def test_licences_are_in_the_package_and_paths_of_this_machine_are_not() -> None:
+    crates = (PACKAGE / "THIRD-PARTY-LICENSES.txt").read_text("utf-8")
+    assert "wasm-bindgen 0." in crates and "the Rust standard library" in crates
+    assert "THIRD-PARTY-LICENSES.txt" in json.loads((PACKAGE / "package.json").read_text("utf-8"))["files"]
+    module = (PACKAGE / "symspline_bg.wasm").read_bytes()
+    assert str(Path.home()).encode() + b"/" not in module and b"/registry/src/" not in module
 
 
 def test_example_of_the_readme_runs() -> None:
