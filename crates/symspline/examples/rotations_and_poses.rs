@@ -34,7 +34,7 @@ fn main() -> Result<(), Error> {
     // A rotation and a position with a curve each: a product.
     let parts =
         times.map(|t| (UnitQuaternion::from_axis_angle(&axis, 0.8 * t), Vector3::new(3.0 * t, t * t, 0.0)));
-    let apart = CubicSpline::new((So3, Euclidean::<3>), &times, &parts)?;
+    let apart = CubicSpline::builder((So3, Euclidean::<3>)).ends(NotAKnot).fit(&times, &parts)?;
     let (rotation, position) = apart.at(0.7);
     println!(
         "angle {:.6}, position {:.6?}, speed {:.6}",

@@ -7,10 +7,11 @@ use symspline_engine::curve::Outside;
 /// The condition at one end of a curve. `T` is the type of its velocities.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum End<T> {
-    /// The covariant acceleration is zero.
-    Natural,
-    /// The first two segments, at the other end the last two, are one cubic. A curve through two points is a geodesic.
+    /// The covariant acceleration is zero: the condition of the paper, which converges also for points that are far apart.
     #[default]
+    Natural,
+    /// The first two segments, at the other end the last two, are one cubic. A curve through two points is a geodesic. More
+    /// accurate than [`Natural`](End::Natural) ends for dense samples of a smooth motion.
     NotAKnot,
     /// The velocity is given. It is tangent at the point; for rotations and poses it is that of the body frame.
     Velocity(T),
@@ -29,7 +30,7 @@ pub enum Ends<T> {
 
 impl<T> Default for Ends<T> {
     fn default() -> Self {
-        Ends::Open([End::NotAKnot, End::NotAKnot])
+        Ends::Open([End::Natural, End::Natural])
     }
 }
 
@@ -113,15 +114,18 @@ impl<S: Space, P: Point<S>> Builder<S, P> {
         }
     }
 
-    /// The end conditions; by default [`End::NotAKnot`] at both ends.
+    /// The end conditions; by default [`End::Natural`] at both ends, as in the Python package. SciPy's default is
+    /// [`End::NotAKnot`].
     ///
     /// # Examples
     /// ```
     /// use symspline::prelude::*;
     ///
     /// let (times, points) = ([0.0, 1.0, 3.0], [[0.0], [1.0], [0.0]]);
-    /// let natural = CubicSpline::builder(Euclidean::<1>).ends(End::Natural).fit(&times, &points)?;
+    /// let natural = CubicSpline::builder(Euclidean::<1>).fit(&times, &points)?;
     /// assert!(natural.acceleration(0.0)[0].abs() < 1e-14);
+    /// let parabola = CubicSpline::builder(Euclidean::<1>).ends(End::NotAKnot).fit(&times, &points)?;
+    /// assert!((parabola.acceleration(0.0)[0] + 1.0).abs() < 1e-14);
     /// let ends = [End::Velocity([2.0]), End::Velocity([0.0])];
     /// let clamped = CubicSpline::builder(Euclidean::<1>).ends(ends).fit(&times, &points)?;
     /// assert_eq!(clamped.velocity(0.0), [2.0]);

@@ -67,7 +67,7 @@ impl<S: Space, P: Point<S>> Evaluator<'_, S, P> {
 }
 
 impl<S: Space, P: Point<S>> CubicSpline<S, P> {
-    /// Fits the curve through points at increasing times, with [`End::NotAKnot`](crate::End::NotAKnot) at both ends.
+    /// Fits the curve through points at increasing times, with [`End::Natural`](crate::End::Natural) at both ends.
     ///
     /// # Errors
     /// As [`Builder::fit`].

@@ -27,6 +27,14 @@ fn points_of_a_geodesic_give_that_geodesic() {
 }
 
 #[test]
+fn ends_are_natural_by_default() {
+    let spline = CubicSpline::new(Euclidean::<1>, &T, &T.map(|t| [t * t])).expect("it is a curve");
+    near(spline.acceleration(T[0]), [0.0]);
+    near(spline.acceleration(T[T.len() - 1]), [0.0]);
+    assert!(spline.acceleration(1.0)[0] > 1.0);
+}
+
+#[test]
 fn cubics_of_flat_space_are_exact_and_continue() {
     let cubic = |t: f64| [t * t * t - 2.0 * t, 3.0 - t * t];
     let rate = |t: f64| [3.0 * t * t - 2.0, -2.0 * t];

@@ -117,7 +117,7 @@ fn curves_equal_those_of_the_factors_for_all_end_conditions() {
     let rest = End::Velocity(([0.0; 3], [0.0; 2], [0.0; 3]));
     for ends in [
         Ends::default(),
-        End::Natural.into(),
+        End::NotAKnot.into(),
         rest.into(),
         [End::Velocity(at(0.0)), End::Natural].into(),
         [End::NotAKnot, End::Acceleration(bend(2.7))].into(),
