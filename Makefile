@@ -99,9 +99,13 @@ bench: .venv/built .venv/tools
 	$(BIN)/python -m benchmarks
 
 # The site, in build/docs: its gallery is run, and what is wrong with a page or a link to another one is an error. First,
-# the formulas of the theory are checked, and small tables of the pages made.
+# the formulas of the theory are checked, and small tables of the pages made. Where the tools of `make wasm` are, the site
+# has the page "Drag the points".
 docs: .venv/built .venv/tools
 	$(INSTALL) $$($(REQUIREMENTS) docs)
+	@if command -v node >/dev/null && rustup target list --installed 2>/dev/null | grep -qx wasm32-unknown-unknown && \
+		$(WASM_BINDGEN) --version 2>/dev/null | grep -q ' $(WASM_VERSION)$$'; then $(MAKE) wasm; \
+		else echo 'The site will have no page "Drag the points": `make wasm` names the tools that it needs.'; fi
 	$(BIN)/python -m pytest --numprocesses auto tests/evidence
 	SYMSPLINE_NUM_THREADS=1 $(BIN)/python -m sphinx -j auto -W --keep-going -q -b html -d build/doctrees docs build/docs
 	$(BIN)/python docs/links.py build/docs
@@ -174,7 +178,7 @@ publish-npm: wasm
 crate-semver:
 	cargo semver-checks --package symspline
 
-# The npm package in build/npm and the page of figures in build/play; `make docs` shows the page if it has been built.
+# The npm package in build/npm and the page of figures in build/play, which `make docs` builds as well.
 # Needs Node.js, the Rust target wasm32-unknown-unknown, and wasm-bindgen of the version in crates/symspline-wasm.
 WASM_BINDGEN ?= wasm-bindgen
 WASM_VERSION = $(shell sed -n 's/^wasm-bindgen = "=\(.*\)"/\1/p' crates/symspline-wasm/Cargo.toml)

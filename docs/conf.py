@@ -42,9 +42,12 @@ extensions = [
     "typeset",
 ]
 exclude_patterns = ["gallery/*.ipynb", "gallery/*.py"]
-# `make wasm` puts the figures of the page "Drag the points" there; without them the site has pictures instead.
-if (HERE / "_static/play/play.js").exists():
+# `make wasm` puts the figures of the page "Drag the points" there. Without them the site has no such page.
+PLAY = (HERE / "_static/play/play.js").exists()
+if PLAY:
     tags.add("play")  # type: ignore[name-defined]  # noqa: F821
+else:
+    exclude_patterns.append("play.md")
 templates_path = ["_templates"]
 
 # ---- pages ----
@@ -141,6 +144,7 @@ html_theme = "pydata_sphinx_theme"
 html_title = f"symspline {release}"
 html_static_path = ["_static"]
 html_css_files = ["symspline.css"]
+html_js_files = ["members.js"]
 html_logo = "_static/logo.svg"
 html_favicon = "_static/favicon.svg"
 # These have nothing beside them.
@@ -240,8 +244,11 @@ def _public(app: Any, env: Any, node: Any, contnode: nodes.Node) -> nodes.Node |
 
 
 def _links(app: Any, docname: str, source: list[str]) -> None:
-    """On the site a page outside `docs` is the page that includes it."""
+    """On the site a page outside `docs` is the page that includes it, and there may be no page to play."""
     source[0] = source[0].replace("](../benchmarks/README.md)", "](benchmarks.md)")
+    if not PLAY:
+        source[0] = re.sub(r"^:::\{only\} play\n.*?^:::\n", "", source[0], flags=re.M | re.S)
+        source[0] = re.sub(r"^play\n(?=```$)", "", source[0], flags=re.M)
 
 
 def _with_source(app: Any) -> list[Any]:

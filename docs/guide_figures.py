@@ -1,12 +1,14 @@
-"""Makes the pictures of pages from their own code: the variable ``figure``, saved beside the page under its name.
+"""Makes the pictures of pages from their own code.
 
-``python docs/guide_figures.py [PAGE ...]`` runs the first blocks of a page, until one of them has made a figure.
+``python docs/guide_figures.py [PAGE ...]`` runs the code of a page. Where a block makes a new variable ``figure``, the
+figure is saved under the name of the picture that the page shows after this block.
 """
 
 import os
 import re
 import shutil
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -53,14 +55,23 @@ PAGES = (
 STYLE = DOCS.parent / "examples/gallery.mplstyle"
 
 
-def figure_of(page: Path) -> Figure:
-    """Run the code of the page, in the present folder, until there is a figure."""
+def code_of(page: Path) -> list[str]:
+    """The blocks of Python of a page."""
+    return re.findall(r"^```python\n(.*?)^```$", page.read_text(encoding="utf-8"), re.M | re.S)
+
+
+def figures_of(page: Path) -> Iterator[tuple[str, Figure]]:
+    """Run the code of the page, in the present folder, up to its last picture: names of pictures, and figures."""
     names: dict[str, Any] = {}
-    for code in re.findall(r"^```python\n(.*?)^```$", page.read_text(encoding="utf-8"), re.M | re.S):
+    text = page.read_text(encoding="utf-8")
+    blocks = re.findall(r"^```python\n(.*?)^```$(.*?)(?=^```python$|\Z)", text, re.M | re.S)
+    makes = [bool(re.search(r"^figure = ", code, re.M)) for code, _ in blocks]
+    for code, after in blocks[: len(makes) - makes[::-1].index(True)]:
+        names.pop("figure", None)
         exec(compile(code, page.name, "exec"), names)
-        if isinstance(figure := names.get("figure"), Figure):
-            return figure
-    raise ValueError(f"the code of {page} makes no variable `figure`")
+        picture = re.search(r"\]\((\w+\.png)\)", after)
+        if isinstance(figure := names.get("figure"), Figure) and picture:
+            yield picture[1], figure
 
 
 def main() -> None:
@@ -73,7 +84,8 @@ def main() -> None:
             os.chdir(folder)
             try:
                 with matplotlib.style.context(STYLE.resolve()):
-                    figure_of(page).savefig(page.with_suffix(".png"), dpi=85, bbox_inches="tight")
+                    for picture, figure in figures_of(page):
+                        figure.savefig(page.with_name(picture), dpi=85, bbox_inches="tight")
             finally:
                 os.chdir(here)
 

@@ -40,7 +40,7 @@ ISOMETRY = "tests/spaces/test_actions.py::test_elements_are_isometries"
 EXAMPLES = "tests/examples/test_examples.py::test_a_recipe_draws_a_picture"
 CERTIFICATE = "tests/spline/test_certificate.py::"
 SPACES = f"{ISOMETRY} {LAWS}test_exp_and_log_are_inverse {C2}"
-REGION = "solvers.md#theorem-31-and-measurements"
+REGION = "solvers_tables.md#theorem-31-and-measurements"
 
 ROWS = [
     Row("Problem 1.1", "C² curve through points", "CubicSpline", C2, "start.md#a-first-curve"),

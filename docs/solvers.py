@@ -1,4 +1,4 @@
-"""Which solver converges where, in how many iterations and how fast: the tables and figures of ``solvers.md``.
+"""Which solver converges where, in how many iterations and how fast: the tables and figures of ``solvers_tables.md``.
 
 python docs/solvers.py [--write]
 
@@ -25,7 +25,7 @@ import symspline as ss
 Array = NDArray[np.float64]
 
 HERE = Path(__file__).parent
-PAGE = HERE / "solvers.md"
+PAGE = HERE / "solvers_tables.md"
 METHODS = ("fixed-point", "quasi-newton", "newton", "auto")
 ENDED = ("quasi-newton", "newton", "homotopy")
 S2, S3, ROTATIONS = ss.Sphere(2), ss.Sphere(3), ss.SpecialOrthogonal(3)

@@ -1,4 +1,4 @@
-"""Of several C² curves through points far apart, which one is found: two tables of ``solvers.md``."""
+"""Of several C² curves through points far apart, which one is found: two tables of ``solvers_tables.md``."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The figures of ``solvers.md``."""
+"""The figures of ``solvers_tables.md``."""
 
 from __future__ import annotations
 

@@ -9,8 +9,9 @@ few poses of the arm, and want the fastest smooth motion through them.
 # %%
 # Angles as numbers
 # -----------------
-# Joint angles jump from 180° to −180°. If you interpolate the numbers, a joint that crosses this jump turns the long
-# way round: here the last joint moves by 20°, and the numbers move by 340°.
+# The last joint, which holds the tool, has no stops: its angle jumps from 180° to −180°. If you interpolate the
+# numbers, it turns the long way round: the joint moves by 20°, and the numbers move by 340°. The other six joints have
+# stops, and cannot pass 180°: their angles are numbers.
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -29,12 +30,12 @@ angles = np.radians(degrees)
 naive = CubicSpline(np.arange(5), degrees)
 
 # %%
-# A path on the torus
-# -------------------
-# The points of ``"torus:7"`` are seven angles. Neighbouring points are joined the short way round. For limits of single
-# joints, use a product of seven circles: every factor then has its own limits.
+# Lines and a circle
+# ------------------
+# Joints with stops are points of ``"r:1"``, and a joint without stops is one of ``"torus:1"``, where neighbouring
+# points are joined the short way round. Every factor of the product has its own limits.
 
-joints = ss.space(" x ".join(["torus:1"] * 7))
+joints = ss.space(" x ".join(["r:1"] * 6 + ["torus:1"]))
 path = ss.CubicSpline(None, np.split(angles, 7, axis=1), joints)
 
 # %%

@@ -32,13 +32,13 @@ GALLERY = (ROOT / "examples/index.rst").read_text(encoding="utf-8")
 OTHERS = {
     "adaptive.md",
     "adding-a-space.md",
-    "array_api.md",
     "from_geomstats.md",
     "jax.md",
+    "pytorch.md",
     "manifolds.md",
     "shapes.md",
     "smoothing.md",
-    "solvers.md",
+    "solvers_tables.md",
     "xarray.md",
 }
 

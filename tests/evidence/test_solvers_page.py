@@ -1,4 +1,4 @@
-"""The tables and figures of ``docs/solvers.md`` can be made and agree with theory."""
+"""The tables and figures of ``docs/solvers_tables.md`` can be made and agree with theory."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,7 @@
 """Poses of other libraries and 4 × 4 matrices as points of so:3 x r:3, wherever points are taken."""
 
+import re
+
 import numpy as np
 import pytest
 from refused import raises
@@ -93,3 +95,15 @@ def test_gates_that_are_known_up_to_a_phase():
             given * np.where(np.arange(8) == 2, 1.1, 1)[:, None, None],
             space,
         )
+
+
+def test_tables_of_poses_name_their_conversion():
+    turns = transform.Rotation.from_rotvec(np.outer(np.arange(4), [0.1, 0.2, 0.3]))
+    positions = np.arange(12.0).reshape(4, 3)
+    a = np.concatenate([positions, turns.as_quat()], axis=1)
+    with pytest.raises(ss.ValidationError, match=r"columns of your array a are x, y, z, qx") as caught:
+        ss.CubicSpline(None, a, "so:3 x r:3")
+    # What the message says to pass.
+    given = re.search(r"pass (\(.*\))\.$", str(caught.value))[1]
+    curve = ss.CubicSpline(None, eval(given, {"symspline": ss, "a": a}), "so:3 x r:3")
+    assert np.abs(curve.points[0] - turns.as_matrix()).max() < 1e-15 and (curve.points[1] == positions).all()

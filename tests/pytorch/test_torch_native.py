@@ -228,7 +228,7 @@ def test_examples_of_docstrings(module):
 
 
 def test_the_example_of_the_guide():
-    page = (Path(__file__).parents[2] / "docs/array_api.md").read_text("utf-8")
+    page = (Path(__file__).parents[2] / "docs/pytorch.md").read_text("utf-8")
     (code,) = re.findall(r"^```python\n(.*?)^```$", page, re.M | re.S)
     names = {}
     exec(code, names)

@@ -164,8 +164,10 @@ class Report(FitReport):
     guaranteed_sweeps : int, ndarray or None
         Number of sweeps of Algorithm 1 after which, by this bound, all h u/3 are within ``tol`` times
         `invariant_radius` of those of the curve. None, or NaN in a batch, if there is no bound.
-    existence_radius, uniqueness_radius : float, tuple of float, ndarray or None
-        The two numbers of `certificate`. None, or NaN in a batch, without one.
+    existence_radius : float, tuple of float, ndarray or None
+        The first number of `certificate`. None, or NaN in a batch, without one.
+    uniqueness_radius : float, tuple of float, ndarray or None
+        The second number of `certificate`. None, or NaN in a batch, without one.
     skipped : tuple of str
         Solvers that ``method="auto"`` omitted or stopped early because they would have exceeded its budget. Curves of
         more than 512 segments are solved in sections, without the search for a solution of lower energy: if points are

@@ -147,7 +147,7 @@ def _more(faults: list[Fault], what: str) -> str:
 
 # ---- warnings about neighbouring points in inconsistent representations ----
 
-# The fraction of the cut angle from which several C² curves are common, see docs/solvers.md.
+# The fraction of the cut angle from which several C² curves are common, see docs/solvers_tables.md.
 FAR = 0.6
 # Fewer steps are too few to show a pattern.
 _LEAST = 4

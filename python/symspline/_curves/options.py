@@ -67,7 +67,8 @@ def checked_extrapolate(extrapolate: object) -> Any:
     known = isinstance(extrapolate, str) and extrapolate in _EXTRAPOLATION_MODES
     if extrapolate is not None and not isinstance(extrapolate, bool) and not known:
         raise ValidationError(
-            f"extrapolate must be None, 'raise', True, False, 'geodesic' or 'periodic', not {short_repr(extrapolate)}"
+            f"extrapolate must be None, 'raise', True, False, 'geodesic' or 'periodic', not {short_repr(extrapolate)}. "
+            "To hold the first and the last point, evaluate at np.clip(x, *curve.domain)."
         )
     return extrapolate
 

@@ -251,6 +251,11 @@ def _conversion(value: object, space: Product[Any]) -> str:
         if value.shape[-1] == ends[-1]:
             parts = ", ".join(f"x[..., {a}:{b}]" for a, b in pairwise(ends))
             return f". If x is your array, pass ({parts})."
+    if isinstance(value, np.ndarray) and value.ndim == 2 and value.shape[1] == 7 and shapes == [(3, 3), (3,)]:
+        return (
+            ". If the columns of your array a are x, y, z, qx, qy, qz, qw, pass "
+            "(symspline.rotations.from_quaternions(a[:, 3:], scalar_first=False), a[:, :3])."
+        )
     poses = hasattr(value, "translation") or (isinstance(value, np.ndarray) and value.shape[-2:] == (4, 4))
     if not poses or not any(factor.point_shape == (3, 3) for factor in space.factors):
         return ""

@@ -59,7 +59,8 @@ class CubicSpline(PiecewiseCubic[P], Generic[P, R]):
     r"""Interpolate points on a space by a C² cubic spline.
 
     Each segment is a cubic Bézier curve built from geodesics. At every knot the values, velocities and covariant
-    accelerations of adjacent segments agree. On a Euclidean space the result equals SciPy's ``CubicSpline``.
+    accelerations of adjacent segments agree. Ends are natural by default, as in the paper; SciPy's default is
+    ``"not-a-knot"``. On a Euclidean space the result equals SciPy's ``CubicSpline`` with the same `bc_type`.
 
     Parameters
     ----------
@@ -73,8 +74,9 @@ class CubicSpline(PiecewiseCubic[P], Generic[P, R]):
     space : Space or str
         A space or its name, such as ``Sphere(2)`` or ``"sphere:2"``.
     bc_type : {"natural", "not-a-knot", "clamped", "periodic"} or pair, default "natural"
-        End conditions. Use ``"not-a-knot"`` for samples of a smooth motion; its error is of fourth order up to the
-        ends, while natural ends are of second order there.
+        End conditions. Natural ends converge also for points that are far apart, where not-a-knot ends may not. Use
+        ``"not-a-knot"`` for dense samples of a smooth motion; its error is of fourth order up to the ends, while
+        natural ends are of second order there.
 
         - ``"natural"``: the covariant acceleration at both ends is zero.
         - ``"not-a-knot"``: the outer two segments at each end form one cubic, in the sense of flat space.
