@@ -232,6 +232,14 @@ def _link_types(app: Any, doctree: nodes.document) -> None:
             shown.parent.replace(shown, new)
 
 
+def _cards(app: Any, doctree: nodes.document) -> None:
+    """On a telephone, a row of a wide table of words becomes a list; tables of numbers scroll."""
+    for table in doctree.findall(nodes.table):
+        cells = [cell.astext() for body in table.findall(nodes.tbody) for cell in body.findall(nodes.entry)]
+        if table[0]["cols"] > 3 and sum(map(len, cells)) > 15 * len(cells):
+            table["classes"].append("cards")
+
+
 def _public(app: Any, env: Any, node: Any, contnode: nodes.Node) -> nodes.Node | None:
     """`CubicSpline` is ``symspline.CubicSpline``, in the docstrings of every module."""
     if node.get("refdomain") != "py" or node["reftarget"].startswith("symspline."):
@@ -265,6 +273,7 @@ def setup(app: Any) -> None:
     app.connect("autodoc-process-docstring", _restore, priority=900)
     app.connect("builder-inited", gallery_pictures.put_thumbnails, priority=900)
     app.connect("doctree-read", _link_types)
+    app.connect("doctree-read", _cards)
     app.connect("missing-reference", _public)
     app.connect("source-read", _links)
     app.connect("html-collect-pages", _with_source, priority=100)

@@ -67,7 +67,7 @@ def covariances(names: dict[str, Any]) -> Figure:
     circle = np.stack([np.cos(a := np.linspace(0, 2 * np.pi, 60)), np.sin(a)])
     months = np.arange(0, 48, 4) + 1
     for row, color, matrices in (
-        (1, "0.45", names["matrices"][months]),
+        (1, "0.45", names["covariances"][months]),
         (0, "C0", names["smooth"](np.clip(months, *names["smooth"].domain))),
     ):
         for month, matrix in zip(months, matrices, strict=True):
@@ -88,7 +88,7 @@ def crystals(names: dict[str, Any]) -> Figure:
     grain = names["grain"]
     middle = grain.points[25, 15]
     for axes, points, title in zip(
-        panels, (names["measured"].reshape(50, 30, 3, 3), grain.points), ("measured", "smooth"), strict=True
+        panels, (names["matrices"], grain.points), ("measured", "smooth"), strict=True
     ):
         angles = np.degrees(grain.space.distance(points, middle))
         image = axes.imshow(angles.T, origin="lower", cmap="viridis", vmin=0, vmax=20, aspect="auto")
@@ -156,7 +156,8 @@ def batch(names: dict[str, Any]) -> Figure:
     )
     for i, curve in enumerate(names["samples"][:60]):
         axes.plot(*(1.01 * curve.T), color=f"C{i % 6}", linewidth=0.7)
-    axes.set_box_aspect((1, 1, 1), zoom=1.55)
+    axes.set(xlim=(-1, 1), ylim=(-1, 1), zlim=(-1, 1))
+    axes.set_box_aspect((1, 1, 1), zoom=1.6)
     axes.view_init(15, 10)
     axes.set_axis_off()
     return figure

@@ -1,5 +1,7 @@
 """The tasks on ``docs/index.md`` solve what they promise, and their pictures can be made."""
 
+import operator
+import re
 from pathlib import Path
 
 import home_figures
@@ -35,7 +37,7 @@ def test_covariances_in_the_gap_are_within_their_band(names):
 def test_the_crystal_map_is_closer_to_the_truth_than_the_data(names):
     bunge = names["Rotation"].from_euler("ZXZ", names["bunge"].reshape(-1, 3), degrees=True).as_matrix()
     space, truth = names["grain"].space, bunge.reshape(50, 30, 3, 3)
-    smooth, noisy = (space.distance(p, truth) for p in (names["grain"].points, names["measured"].reshape(truth.shape)))
+    smooth, noisy = (space.distance(p, truth) for p in (names["grain"].points, names["matrices"]))
     assert np.sqrt(np.mean(smooth**2)) < 0.4 * np.sqrt(np.mean(noisy**2))
 
 
@@ -58,6 +60,14 @@ def test_the_bias_is_found(names):
 def test_ten_thousand_curves_stay_on_the_sphere(names):
     assert names["samples"].shape == (10_000, 100, 3)
     assert np.abs(np.linalg.norm(names["samples"], axis=-1) - 1).max() < 1e-14
+
+
+def test_names_on_the_way_in_exist():
+    root = home_figures.PAGE.parents[1]
+    for page in ("README.md", "docs/index.md", "docs/start.md", "docs/guide/which_function.md"):
+        found = re.findall(r"\bss\.([a-z_]+(?:\.\w+)*)", (root / page).read_text(encoding="utf-8"))
+        for name in found:
+            assert operator.attrgetter(name)(ss), name
 
 
 @pytest.mark.parametrize("draw", home_figures.PICTURES, ids=lambda draw: draw.__name__)

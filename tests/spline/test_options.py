@@ -30,7 +30,8 @@ def test_tol_and_max_iter_bound_the_work():
         ({"max_iter": 0}, r"max_iter must be at least 1"),
         (
             {"extrapolate": "foo"},
-            r"extrapolate must be None, 'raise', True, False, 'geodesic' or 'periodic', not 'foo'\. To hold .* np\.clip\(x, \*curve\.domain\)",
+            r"extrapolate must be None, 'raise', True, False, 'geodesic' or 'periodic', not 'foo'\. "
+            r"To hold .* np\.clip\(x, \*curve\.domain\)",
         ),
         ({"on_failure": "foo"}, r"on_failure must be 'raise', 'warn' or 'ignore', not 'foo'"),
         ({"on_failure": None}, r"on_failure must be .*, not None"),
