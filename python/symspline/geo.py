@@ -31,8 +31,9 @@ from ._base.typing import AxesLook, Duplicates, File, FloatArray, Keywords, Page
 from ._core import ValidationError
 from ._curves.options import require_matplotlib
 from ._estimation.uncertainty import Jacobians, Motion, check_uncertain, standard_errors
+from ._smoothing.noise import grouped, smoothed_spaces
 from ._smoothing.segments import check_smooth, cut, smooth_many
-from ._spaces import Sphere
+from ._spaces import Sphere, factors_of
 from ._splines.base import check_timed, checked_items
 from ._splines.composed import SegmentedCurve
 from ._splines.cubic import AnyCubicSpline
@@ -95,8 +96,9 @@ def sog(
     Parameters
     ----------
     spline : CubicSpline
-        Curve on ``Sphere(2)``. If its times are dates or seconds, the speed is in metres per second; for other times it
-        is in metres per unit of time.
+        Curve on ``Sphere(2)``, or on a product with one ``Sphere(2)``, such as positions with heights on
+        ``"sphere:2 x r:1"``. If its times are dates or seconds, the speed is in metres per second; for other times it
+        is in metres per unit of time. Heights do not count.
     x : array_like
         Times, as for ``spline(x)``.
     radius : float, default EARTH_RADIUS
@@ -145,10 +147,12 @@ def sog(
     >>> bool(0 < std < 0.3), bool(abs(speed - 11.12) < 3 * std)
     (True, True)
     """
-    _check_globe(spline)
+    number = _globe_in(spline)
     size = checked_number(radius, "radius must be a number above 0", lambda r: 0 < r < np.inf)
-    speed: FloatArray = size * spline.speed(x)
-    return (speed, size * _standard_errors(spline, x, _speeds)) if checked_flag(return_std, "return_std") else speed
+    speed: FloatArray = size * np.sqrt((_part(spline(x, nu=1), number) ** 2).sum(-1))[()]
+    if not checked_flag(return_std, "return_std"):
+        return speed
+    return speed, size * _standard_errors(spline, x, number, _speeds)
 
 
 @overload
@@ -222,20 +226,25 @@ def cog(
     >>> bool(0 < std < 1), bool(abs((course + 180) % 360 - 180) < 3 * std)
     (True, True)
     """
-    _check_globe(spline)
-    east, north = compass(spline(x))
-    velocity = spline(x, nu=1)
+    number = _globe_in(spline)
+    east, north = compass(_part(spline(x), number))
+    velocity = _part(spline(x, nu=1), number)
     eastward, northward = (velocity * east).sum(-1), (velocity * north).sum(-1)
     # By rounding a tiny negative angle becomes 360 itself.
     degrees = np.degrees(np.arctan2(eastward, northward)) % 360 % 360
     course: FloatArray = np.where((eastward == 0) & (northward == 0), np.nan, degrees)[()]
     if not checked_flag(return_std, "return_std"):
         return course
-    return course, np.degrees(_standard_errors(spline, x, _courses))
+    return course, np.degrees(_standard_errors(spline, x, number, _courses))
 
 
-def _standard_errors(spline: Any, x: TimesLike, jacobians: Any) -> FloatArray:
-    errors = standard_errors(check_uncertain(spline), x, [0], jacobians, spline._where(None))
+def _standard_errors(spline: Any, x: TimesLike, number: int | None, jacobians: Any) -> FloatArray:
+    part = 0 if number is None else sum(map(len, grouped(spline.space, smoothed_spaces(spline.space))[:number]))
+
+    def of_part(motions: list[Motion]) -> Jacobians:
+        return [{part: blocks[0]} if blocks else {} for blocks in jacobians(motions)]
+
+    errors = standard_errors(check_uncertain(spline), x, [part], of_part, spline._where(None))
     std: FloatArray = errors[..., 0][()]
     return std
 
@@ -528,8 +537,8 @@ def plot(
     Parameters
     ----------
     spline : CubicSpline, SegmentedCurve, or a list or dict of them
-        Curve on ``Sphere(2)``, or a batch of curves. The tracks in a list have different colours, and those in a dict
-        also their keys as labels.
+        Curve on ``Sphere(2)``, or on a product with one ``Sphere(2)`` such as positions with heights, or a batch of
+        curves. The tracks in a list have different colours, and those in a dict also their keys as labels.
     file : str, path or file object, optional
         File to which the figure is saved, such as ``"track.pdf"``.
     radius : float, default EARTH_RADIUS
@@ -581,11 +590,11 @@ def plot(
         tracks = checked_items(list(spline.values()) if isinstance(spline, dict) else spline, "spline")
         for track in tracks:
             if not isinstance(track, tuple):
-                _check_globe(track)
+                _globe_in(track)
         several = checked_look(file, ax, None, None, title, figsize, show)
         compared: Figure | Axes = compare(tracks, names, file, colors=color, ax=ax, show=show, radius=size, **several)
         return compared
-    _check_globe(cast(Any, spline))
+    _globe_in(cast(Any, spline))
     look = checked_look(file, ax, color, label, title, figsize, show)
     drawn: Figure | Axes = draw(spline, file, ax=ax, show=show, radius=size, **look)
     return drawn
@@ -638,10 +647,22 @@ def _fitted(curves: list[tuple[Any, Any]], names: list[str], smooth: bool, optio
     return splines
 
 
-def _check_globe(spline: AnyCubicSpline | SegmentedCurve[Any, Any]) -> None:
+def _globe_in(spline: AnyCubicSpline | SegmentedCurve[Any, Any]) -> int | None:
+    """Return the factor of a product space that is Sphere(2), or None if the space itself is Sphere(2)."""
     check_timed(spline)
-    if str(spline.space) != "sphere:2":
-        raise ValidationError(f"the curve must be on Sphere(2), not on {spline.space!r}")
+    space = spline.space
+    if space == Sphere(2):
+        return None
+    globes = [i for i, factor in enumerate(factors_of(space)) if factor == Sphere(2)]
+    if len(globes) != 1:
+        raise ValidationError(f"the curve must be on Sphere(2), or on a product with one Sphere(2), not on {space!r}")
+    return globes[0]
+
+
+def _part(values: Any, number: int | None) -> FloatArray:
+    """Return the part of a point or vector in a factor; None for a space that is not a product."""
+    part: FloatArray = values if number is None else values[number]
+    return part
 
 
 # ---- tables of tracks in pandas ----

@@ -46,6 +46,7 @@ def test_invalid_tables(fails):
     write("a.csv", "t,lon,lat\n0,deg,deg\n0,1,2\n")
     problem = "line 2: column 'lon' holds 'deg', which is not a number; if this"
     assert problem in fails("fit a.csv --lonlat -o a.npz")
+    write("a.csv", "t,x,y\n0,1,2\n0,1,2\n")
     problem = "say which space the points are on: --lonlat for longitude and latitude, or --space, such as --space"
     assert problem in fails("fit a.csv -o a.npz")
 

@@ -1,6 +1,5 @@
 """Tables in CSV, NPZ and Parquet."""
 
-import json
 import sys
 from pathlib import Path
 
@@ -167,12 +166,6 @@ def test_comments_above_the_names_of_columns(fails):
     write("a.csv", "# a comment\nt,x\n0,1\n1,2\n")
     problem = fails("fit a.csv --space r:1 -o a.npz")
     assert problem.endswith("but the first line names 1 column; remove lines above the names, such as comments")
-
-
-def test_lines_in_several_parts_raise(fails):
-    parts = {"type": "MultiLineString", "coordinates": [[[178, 10], [179, 11]], [[-179, 12], [-178, 13]]]}
-    write("a.geojson", json.dumps({"type": "Feature", "properties": {}, "geometry": parts}))
-    assert "not MultiLineString; make one LineString of its parts" in fails("fit a.geojson --lonlat -o a.npz")
 
 
 def test_one_curve_has_no_name(run, fails):

@@ -87,10 +87,3 @@ def test_tracks_that_follow_each_other_in_one_table_warn(run):
     # States along one track.
     write("c.csv", "time,state,lon,lat\n" + "\n".join(f"{i},{'ab'[i // 3 % 2]},{i},50" for i in range(12)) + "\n")
     run("fit c.csv --lonlat -o c.npz")
-
-
-def test_heights_beside_positions(run, fails):
-    write("a.csv", "t,lon,lat,ele\n0,7,46,500\n1,7.1,46.1,900\n2,7.2,46.1,700\n")
-    assert "heights in column ele are not used" in run("fit a.csv --lonlat -o a.npz")
-    assert "--space r:1 --columns ele" in fails("fit a.csv --lonlat --space 'sphere:2 x r:1' -o b.npz")
-    run("fit a.csv --space r:1 --columns ele --time t -o c.npz")

@@ -133,7 +133,7 @@ def test_contradicting_options(fails):
         ("--smooth --criterion gcv --lam 2", "--lam gives λ, which --criterion would choose; omit one of them"),
         ("--smooth --lam 1_0", "argument --lam: 1_0: give a finite number >= 0, such as 0.1"),
         ("--smooth --lam=-1", "argument --lam: -1: give a finite number >= 0"),
-        ("--smooth --lam 1,2", "lam must be a number, not (1.0, 2.0)"),
+        ("--smooth --lam 1,2", "lam has shape (2,), but must be a number"),
         ("--smooth --sigma small", "argument --sigma: small: give a finite number >= 0"),
         ("--smooth --sigma 0", "argument --sigma: 0: the standard deviation must be greater than 0"),
     ]:

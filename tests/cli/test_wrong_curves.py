@@ -40,7 +40,7 @@ def test_tracks_without_times_are_reported(run):
     write("ships.csv", "lon,lat,ship\n" + "\n".join(rows) + "\n")
     out = run("fit ships.csv --lonlat -o a.npz", notes=True)
     assert "; no column of times: the points are at 0, 1, 2, ...\n" in out
-    assert "column 'ship' has one block of rows for each of its texts" in out
+    assert "column 'ship' has one block of rows for each of its values" in out
     assert "fit each of them with --curve ship\n" in out
     assert "--curve ship fits one curve per ship\n" in run("info ships.csv")
     assert "no column of times" not in run("fit ships.csv --lonlat --curve ship --time none -o a.npz")

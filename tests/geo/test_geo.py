@@ -79,7 +79,7 @@ def test_batches_of_tracks():
 def test_other_spaces():
     spline = ss.CubicSpline(None, np.eye(4), "sphere:3")
     for call in (sog, cog):
-        raises(r"must be on Sphere\(2\), not on Sphere\(3\)", call, spline, 0.5)
+        raises(r"product with one Sphere\(2\), not on Sphere\(3\)", call, spline, 0.5)
 
 
 def test_invalid_angles_raise():
@@ -100,3 +100,21 @@ def test_latitudes_and_directions_near_a_pole_keep_their_digits():
     east, north = compass(from_lonlat([90, 180], [90 - 1e-6, -90 + 1e-6]))
     assert np.abs(east - [[-1, 0, 0], [0, -1, 0]]).max() < 1e-7
     assert np.abs(north - [[0, -1, 0], [-1, 0, 0]]).max() < 1e-7
+
+
+def test_heights_do_not_count():
+    t = np.arange(30.0)
+    ground = from_lonlat(5 + 0.01 * t, 50 + 1e-4 * np.sin(7 * t))
+    height = np.sin(t)[:, None]
+    alone, fitted = ss.make_smoothing_spline(t, ground, "sphere:2", lam=1.0), []
+    for points, space in (((ground, height), "sphere:2 x r:1"), ((height, ground), "r:1 x sphere:2")):
+        curve = ss.make_smoothing_spline(t, points, space, lam=1.0)
+        for function in (ss.geo.sog, ss.geo.cog):
+            found, expected = (function(spline, t, return_std=True) for spline in (curve, alone))
+            np.testing.assert_allclose(found, expected, rtol=1e-12)
+        fitted.append(ss.geo.plot(curve))
+    for figure in fitted:
+        labels = [axes.get_ylabel() for axes in figure.axes]
+        assert "speed\nkm per unit of t" in labels, labels
+    with pytest.raises(ss.ValidationError, match="product with one Sphere"):
+        ss.geo.sog(ss.CubicSpline(t, (ground, ground), "sphere:2 x sphere:2"), 1.0)

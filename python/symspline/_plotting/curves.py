@@ -23,7 +23,7 @@ from .._curves.curve import ControlledCurve, UncertaintyBand
 from .._curves.ends import NATURAL
 from .._curves.fit import FitProblem, fit, read
 from .._curves.solve import DEFAULTS
-from .._spaces import AmbiguousMeanWarning, AnySpace, Product, Space, SpecialEuclidean
+from .._spaces import AmbiguousMeanWarning, AnySpace, Product, Space, SpecialEuclidean, Sphere
 from .style import DATA, DATES, Indices, Numbers, colors, evenly, ink, named_from, round_start, spline_color
 
 SECOND = np.timedelta64(1, "s")
@@ -197,10 +197,12 @@ class Curve:
 
     def part(self, number: int) -> Curve:
         """Return the curve in one factor of a product space."""
+        data = self.data.parts[number]
         return replace(
             self,
             is_factor=True,
-            data=self.data.parts[number],
+            data=data,
+            radius=self.radius if data.space == Sphere(2) else None,
             noise=self.noise and self.noise.part(number),
             segments=tuple(segment.part(number) for segment in self.segments),
             reference=None if self.reference is None else self.reference[number],

@@ -12,7 +12,7 @@ from matplotlib.ticker import LogLocator, NullLocator
 
 from .._base.typing import FloatArray, Look
 from .._curves.curve import SidePanel
-from .._spaces import AnySpace, Product, SpecialEuclidean, Sphere, Torus, cover_of, factors_of, short_name
+from .._spaces import AnySpace, Euclidean, Product, SpecialEuclidean, Sphere, Torus, cover_of, factors_of, short_name
 from .curves import Curve
 from .panels import ALPHA, FEW_KNOTS, LINE, Panel, fill_band, fresh, plot_line, shade_quantiles, time_axes
 from .style import DATA, MARK, axes_size, distinct, ink, legend
@@ -166,7 +166,7 @@ def columns_of(curve: Curve, seconds: bool, most: int, wide: bool) -> list[list[
     of them have one for velocities and one for accelerations.
     """
     space = curve.space
-    if curve.radius is not None:
+    if curve.radius is not None and not isinstance(space, Product):
         return [[(None, rate) for rate in _on_earth(curve, seconds)]]
     if not isinstance(space, Product):
         rates: list[tuple[int | None, Rate]] = [(None, rate) for rate in rates_of(space, seconds)]
@@ -175,7 +175,8 @@ def columns_of(curve: Curve, seconds: bool, most: int, wide: bool) -> list[list[
             return [rates]
         return [rates[:2], rates[2:]] if wide and len(rates) > 2 else [rates]
     factors = factors_of(space)
-    by_factor = [rates_of(factor, seconds) for factor in factors[:most]]
+    parts = [curve.part(i) for i in range(min(most, len(factors)))]
+    by_factor = [rates_of(part.space, seconds) if part.radius is None else _on_earth(part, seconds) for part in parts]
     if wide and len(by_factor) <= IN_ROW:
         return [[(i, rate) for rate in group] for i, group in enumerate(by_factor)]
     names = [_cut(short_name(factor)) for factor in factors]
@@ -347,10 +348,11 @@ def _draw_lam(axes: Axes, curve: Curve, panel: SidePanel) -> str:
 
 def _draw_noise(axes: Axes, curve: Curve, panel: SidePanel) -> str:
     """Draw the standard deviation of the noise against time, in metres on the Earth."""
-    sigma = panel.values[:, 0] * (curve.radius or 1)
+    radius = None if isinstance(panel.space, Euclidean) else curve.radius
+    sigma = panel.values[:, 0] * (radius or 1)
     axes.plot(curve.on_axis(panel.x), sigma, color=curve.color, linewidth=1.2)
     axes.set_ylim(0, 1.15 * sigma.max())
-    if curve.radius is not None:
+    if radius is not None:
         axes.set_ylabel(f"{panel.label}, m")
     elif panel.space is not None and is_angular(panel.space):
         axes.set_ylabel(f"{panel.label}, rad")

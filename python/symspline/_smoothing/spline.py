@@ -18,7 +18,7 @@ from .._core import ValidationError
 from .._curves.curve import CurveArrays, SidePanel, UncertaintyBand
 from .._curves.ends import end_kinds, is_closed
 from .._curves.options import order_of
-from .._spaces import AnySpace, Doubles, Product, Space, SpecialOrthogonal, factors_of, short_name
+from .._spaces import AnySpace, Doubles, Product, Space, SpecialOrthogonal, Sphere, factors_of, short_name
 from .._splines.archive import (
     Entries,
     Stored,
@@ -895,7 +895,9 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         spaces = " and ".join(short_name(part) for part in smoothed_spaces(self.space))
         factors = f" ({spaces})" if 1 < len(self._smoothed) <= _OWN_RANGES else ""
         df = _ranges([part.report.df for part in self._smoothed], 3)
-        sigma = _ranges([part.sigma * (radius or 1) for part in self._smoothed], 3 if radius else 2)
+        scales = [radius or 1 if part == Sphere(2) else 1 for part in smoothed_spaces(self.space)]
+        sigmas = [part.sigma * scale for part, scale in zip(self._smoothed, scales, strict=True)]
+        sigma = _ranges(sigmas, 3 if radius else 2)
         of_batch = " each" if self._batch else ""
         unit = " m" if radius else ""
         return f"{count} data{of_batch}, {df} degrees of freedom, noise {sigma}{unit}{factors}"

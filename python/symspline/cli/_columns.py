@@ -27,16 +27,21 @@ from ._messages import Problem, Source, first_duplicate, for_command_line, liste
 from ._tables import IM, RE, Place, Rows, Table
 
 GLOBE, ROTATIONS, POSES = map(space_named, ("sphere:2", "so:3", "se:3"))
+WITH_HEIGHT = space_named("sphere:2 x r:1")
 LONLAT = ["lon", "lat"]
 NUMBERED = "none"
 """The value of --time that numbers the points of every curve, unless a column has this name."""
+JOINED = "none"
+"""The value of --curve that makes one curve of all tracks of a file, unless a column has this name."""
 ORDERS = ("wxyz", "xyzw")
 _LON, _LAT = ("lon", "lng", "longitude", "location-long"), ("lat", "latitude", "location-lat")
+_HEIGHTS = ("ele", "elevation", "alt", "altitude", "height", "height-above-ellipsoid", "height-above-msl")
 # Longitudes may start at -180 or at 0, or continue across the date line. 400 is an error, and 999 a missing value.
 _LARGEST = {"longitude": 360, "latitude": 90}
 _IN_BRACKETS = re.compile(r"[(\[].*?[)\]]")
 # Everything except the unit in names such as heading_deg or "heading (deg)".
 _UNIT = re.compile(r".*[\[(_ ]|[\])]")
+_DEGREES = re.compile(r"[ _.-]*(degs?|degrees?|°)$")
 
 # Names of times without blanks and marks: "BaseDateTime", "#timestamp [ns]", "ISO_TIME", "header.stamp".
 _TIME = re.compile(
@@ -190,6 +195,18 @@ def column_of_names(table: Table, time: str | None, used: Sequence[str | None]) 
     return _first_of(table, [*used, *(table.numeric if time is None else [])], fits)
 
 
+def column_of_blocks(table: Table, used: Sequence[str | None]) -> str | None:
+    """Return an unused column that may hold the names of tracks which follow each other in time.
+
+    It has one block of at least two rows for each of its values, and is a text or has a name such as id.
+    """
+    unnamed = [name for name in table.numeric if not NAMED.search(name)]
+    return _first_of(
+        table, [*used, *unnamed], lambda codes: codes.max(initial=0) > 0 and bool(np.bincount(codes).min() > 1)
+        and np.count_nonzero(np.diff(codes)) == codes.max()
+    )  # fmt: skip
+
+
 def column_of_tracks(table: Table, used: Sequence[str | None], space: Space, points: Any) -> str | None:
     """Return an unused column whose values seem to be the names of several tracks, in rows that are one curve.
 
@@ -220,10 +237,26 @@ def _first_of(table: Table, used: Sequence[str | None], fits: Callable[[NDArray[
 
 
 def require_globe(space: Space) -> None:
-    """Raise `Problem` unless the points of a space have longitude and latitude."""
-    heights = GLOBE in factors_of(space)
-    advice = "; fit the other columns by themselves, such as heights by --space r:1 --columns ele" if heights else ""
-    refuse("--lonlat is for sphere:2, ", (space != GLOBE, f"not for {space}{advice}"))
+    """Raise `Problem` unless the points of a space have longitude and latitude, and perhaps a height."""
+    what = f"--lonlat is for sphere:2, and for {WITH_HEIGHT} with a height, "
+    refuse(what, (space not in (GLOBE, WITH_HEIGHT), f"not for {space}"))
+
+
+def in_degrees(factor: Space, lonlat: bool, degrees: bool) -> bool:
+    """Whether distances on a factor of a space are in degrees, on the command line and in tables."""
+    return (lonlat and factor == GLOBE) or (degrees and isinstance(factor, Torus))
+
+
+def suggested(table: Table) -> str:
+    """Suggest the space of the points in a table by the names of its columns."""
+    with suppress(Problem):
+        return f"columns {' and '.join(positions_in(table))} look like positions on the Earth: give --lonlat"
+    names = [name for name in table.numeric if not _TIME.fullmatch(_letters(name))]
+    for space, what in (("so:3", "a unit quaternion"), ("so:3 x r:3", "a position and a unit quaternion")):
+        known = space_named(space)
+        if len(names) == count_with_quaternion(known) and quaternion_by_names(names, known):
+            return f"the columns look like {what}: give --space {quote(space)}"
+    return ""
 
 
 def complex_numbers(space: Space) -> list[bool]:
@@ -416,15 +449,16 @@ class PointColumns:
             parts.append(self._projected(factor, part, place))
         return tuple(parts) if isinstance(self.space, Product) else parts[0]
 
-    def _on_globe(self, numbers: Doubles, place: Place) -> Array:
-        for (name, largest), values in zip(_LARGEST.items(), numbers.T, strict=True):
+    def _on_globe(self, numbers: Doubles, place: Place) -> Any:
+        for (name, largest), values in zip(_LARGEST.items(), numbers[:, :2].T, strict=True):
             wild = np.flatnonzero(np.abs(values) > largest)
             if wild.size:
                 raise Problem(
                     f"{self.path}, {place(int(wild[0]))}: {name} {values[wild[0]]:g} is not between -{largest} and "
                     f"{largest} degrees; omit missing values, or say with --columns LON,LAT which is which"
                 )
-        return from_lonlat(*numbers.T)
+        positions = from_lonlat(*numbers[:, :2].T)
+        return (positions, np.ascontiguousarray(numbers[:, 2:])) if self.space == WITH_HEIGHT else positions
 
     def _warn_of_degrees(self, torus: Space, angles: Array, names: Sequence[str]) -> None:
         """Warn if angles in radians look like degrees, by their values or the names of their columns."""
@@ -451,9 +485,12 @@ def point_columns(
     table: Table, given: list[str], others: list[str | None], space: Space, lonlat: bool, order: str | None
 ) -> PointColumns:
     """Return the given columns of a point, or all other columns; ``order`` is that of a quaternion."""
-    swapped = lonlat and len(given) == 2 and given[0].lower() in _LAT and given[1].lower() in _LON
-    refuse(f"--columns {','.join(given)}: ", (swapped, f"longitude comes first: --columns {','.join(given[::-1])}"))
-    groups = [table.expand(name) for name in given] or [_lonlat(table) if lonlat else table.points(others)]
+    swapped = lonlat and len(given) >= 2 and _bare(given[0]) in _LAT and _bare(given[1]) in _LON
+    right = ",".join([*given[1::-1], *given[2:]])
+    refuse(f"--columns {','.join(given)}: ", (swapped, f"longitude comes first: --columns {right}"))
+    groups = [table.expand(name) for name in given]
+    if not given:
+        groups = [_on_earth(table, space) if lonlat else table.points(others)]
     columns = [column for group in groups for column in group]
     # In a real space A_re and A_im are two numbers if both are named.
     groups = [columns] if any(complex_numbers(space)) else groups
@@ -496,16 +533,34 @@ def split_names(text: str | None) -> list[str]:
     return [name.strip() for name in names]
 
 
-def _lonlat(table: Table) -> list[str]:
-    """The first column of each pair of names, whatever their case."""
-    lower = {name.lower(): name for name in reversed(table.names)}
-    columns = [next(filter(None, map(lower.get, names)), None) for names in (_LON, _LAT)]
+def _bare(name: str) -> str:
+    """Return the name of a column in lower case without its unit, such as of ``"Longitude (deg)"`` or ``lon_deg``."""
+    return _DEGREES.sub("", _IN_BRACKETS.sub("", name).strip().lower())
+
+
+def positions_in(table: Table) -> list[str]:
+    """Return the columns of longitude and latitude, the first one of each pair of names."""
+    names = {_bare(name): name for name in reversed(table.names)}
+    columns = [next(filter(None, map(names.get, known)), None) for known in (_LON, _LAT)]
     if None in columns:
         raise Problem(
             f"{table.path}: --lonlat needs columns {' or '.join(_LON)}, and {' or '.join(_LAT)}, or two --columns; "
             f"there are {listed(table.names)}"
         )
     return [name for name in columns if name]
+
+
+def height_in(table: Table) -> str | None:
+    """Return the column of heights, if there is one."""
+    names = {_bare(name): name for name in reversed(table.names) if name in table.numeric}
+    return next(filter(None, map(names.get, _HEIGHTS)), None)
+
+
+def _on_earth(table: Table, space: Space) -> list[str]:
+    height = height_in(table)
+    needs = f": {space} needs a column of heights, called {' or '.join(_HEIGHTS)}, or three --columns"
+    refuse(table.path, (space == WITH_HEIGHT and height is None, needs))
+    return [*positions_in(table), *([height] if height is not None and space == WITH_HEIGHT else [])]
 
 
 def _check_halves(table: Table, entries: list[Entry], space: Space, given: bool) -> None:
@@ -533,7 +588,8 @@ def _check_halves(table: Table, entries: list[Entry], space: Space, given: bool)
 def _check_count(
     table: Table, entries: list[Entry], others: list[str | None], space: Space, lonlat: bool, given: bool
 ) -> None:
-    if len(entries) == (2 if lonlat else len(complex_numbers(space))):
+    on_earth = 3 if space == WITH_HEIGHT else 2
+    if len(entries) == (on_earth if lonlat else len(complex_numbers(space))):
         return
     symmetric = isinstance(space, (SymmetricPositiveDefinite, LogEuclidean))
     symmetric = symmetric and 2 * len(entries) == space.point_shape[0] * (space.point_shape[0] + 1)
@@ -545,7 +601,8 @@ def _check_count(
         advice += f" (no numbers in the first row of {listed(other)})"
     turned = count_with_quaternion(space)
     either = f", or {turned} numbers with a quaternion" if turned else ""
-    point = "longitude and latitude are 2 numbers" if lonlat else f"a point of {space} has {_described(space)}{either}"
+    earth = "longitude and latitude are 2 numbers" + ("" if space == GLOBE else ", and a height is the third")
+    point = earth if lonlat else f"a point of {space} has {_described(space)}{either}"
     kind = "numbers" if any(len(entry) > 2 for entry in entries) else "columns"
     present = f"{len(entries)} {kind}: {listed([name for name, *_ in entries])}" if entries else "no columns"
     raise Problem(f"{table.path}: {point}, and there are {present}{advice}")

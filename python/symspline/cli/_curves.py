@@ -17,7 +17,7 @@ from .._base.angles import compass, to_lonlat
 from .._base.arrays import brief
 from .._grid import GridSpline
 from .._smoothing import SmoothingSpline
-from .._spaces import Doubles, Space, Torus, factors_of, parts_of
+from .._spaces import Doubles, Space, factors_of, parts_of
 from .._spaces.degrees import with_angles
 from .._splines.archive import json_in, read
 from .._splines.composed import SegmentedCurve
@@ -29,9 +29,11 @@ from ._columns import (
     LONLAT,
     POSES,
     ROTATIONS,
+    WITH_HEIGHT,
     Columns,
     complex_numbers,
     count_with_quaternion,
+    in_degrees,
     labels,
     require_globe,
     width,
@@ -137,7 +139,7 @@ def read_curves(path: Path, lonlat: bool = False) -> Curves:
             require_globe(space)
         columns = _columns(source, file, space)
     if lonlat and not columns.lonlat:
-        columns = replace(columns, points=LONLAT, lonlat=True)
+        columns = replace(columns, points=LONLAT if space == GLOBE else [*LONLAT, "ele"], lonlat=True)
     return Curves(splines, named, columns, segmented, source)
 
 
@@ -163,7 +165,8 @@ def _suit(columns: Columns, space: Space) -> bool:
     if not all(isinstance(flag, bool) for flag in flags) or columns.utc not in (True, False, None):
         return False
     if order is None:
-        return len(names) == len(LONLAT) and space == GLOBE if columns.lonlat else len(names) == len(labels(space))
+        on_earth = {GLOBE: 2, WITH_HEIGHT: 3}.get(space)
+        return len(names) == (on_earth if columns.lonlat else len(labels(space)))
     whole = isinstance(order, list) and all(type(i) is int for i in order)
     return whole and sorted(order) == list(range(len(names))) and len(names) == count_with_quaternion(space)
 
@@ -184,10 +187,12 @@ def samples_of(spline: CubicSpline, x: Any, nu: int, columns: Columns) -> Sample
     """
     values, end = spline(x, nu), f"_d{nu}" if nu else ""
     if columns.lonlat:
+        positions, *heights = parts_of(values, spline.space, "values")
+        above = [(columns.points[2] + end, part[:, 0]) for part in heights]
         if not nu:
-            return list(zip(columns.points, to_lonlat(values), strict=True))
-        axes = zip(("east", "north"), compass(spline(x)), strict=True)
-        return [(name + end, np.degrees((values * axis).sum(axis=-1))) for name, axis in axes]
+            return [*zip(columns.points, to_lonlat(positions), strict=False), *above]
+        axes = zip(("east", "north"), compass(parts_of(spline(x), spline.space, "values")[0]), strict=True)
+        return [*((name + end, np.degrees((positions * axis).sum(axis=-1))) for name, axis in axes), *above]
     values = with_angles(spline.space, values, np.degrees) if columns.degrees else values
     parts = parts_of(values, spline.space, "values")
     if columns.quaternion is not None:
@@ -239,8 +244,8 @@ def deviations_of(spline: SmoothingSpline, x: Any, nu: int, columns: Columns) ->
             samples.append((f"{name}_position{end}", std[1]))
             name, std = f"{name}_rotation", std[0]
         if columns.quaternion is None or factor not in (ROTATIONS, POSES):
-            in_degrees = columns.lonlat or (columns.degrees and isinstance(factor, Torus))
-            samples.append((name + end, np.degrees(std) if in_degrees else std))
+            degrees = in_degrees(factor, columns.lonlat, columns.degrees)
+            samples.append((name + end, np.degrees(std) if degrees else std))
         elif nu:
             deviations = angular_velocity(spline, x, return_std=True)[1].T
             samples += [(f"std_{rate}", column) for rate, column in zip(_RATES, deviations, strict=True)]

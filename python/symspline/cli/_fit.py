@@ -20,9 +20,10 @@ the column of times have no unit; with --unix ns they are nanoseconds since 1970
 CSV files, which pandas reads, name the columns in their first line; blank lines are skipped. Cells are separated by
 commas, semicolons or tabs, and between semicolons numbers may have decimal commas. In an NPZ file columns are arrays
 with one entry per row, which may be complex, or vectors or matrices; an array `points` may hold all numbers of the
-points. A .tum or .txt file is a trajectory of the TUM benchmark: time tx ty tz qx qy qz qw. In GPX and GeoJSON files,
-tracks and lines have their name in the column track, and points their height in the column ele. With --skipna, rows
-without a point are omitted.
+points. A .tum or .txt file is a trajectory of the TUM benchmark: time tx ty tz qx qy qz qw, on so:3 x r:3. GPX and
+GeoJSON files imply --lonlat, and each of their tracks, segments and lines is a curve of its own, whose name is in the
+column track; --curve none makes one curve of all. Positions with a column of heights, such as ele, are on
+sphere:2 x r:1; --space sphere:2 omits the heights. With --skipna, rows without a point are omitted.
 
 Curves pass through the points. --smooth is for noisy points: the curve passes near them, as smooth as the data
 suggest, and symspline sample also writes its standard deviation. With --smooth adaptive, the smoothness varies along
@@ -61,7 +62,7 @@ from .._base.typing import Keywords
 from .._core import CutLocusError
 from .._curves.failures import IN_PYTHON
 from .._smoothing import SmoothingSpline, SmoothingWarning
-from .._smoothing.noise import grouped, is_several
+from .._smoothing.noise import grouped, is_several, smoothed_spaces
 from .._smoothing.segments import cut, smooth_many
 from .._spaces import Doubles, Product, Space, Torus, factors_of, space_named
 from .._splines.cubic import CubicSpline
@@ -69,15 +70,21 @@ from .._splines.functional import fit_many
 from ..geo import ZIGZAG
 from ._columns import (
     GLOBE,
+    JOINED,
     ORDERS,
+    WITH_HEIGHT,
     Columns,
     PointColumns,
     check_days,
+    column_of_blocks,
     column_of_names,
     column_of_tracks,
+    height_in,
+    in_degrees,
     point_columns,
     require_globe,
     split_names,
+    suggested,
     time_column,
     with_stamps,
 )
@@ -136,11 +143,14 @@ _SIGMA = (
     "known standard deviation of the noise in a coordinate: in the unit of distances, radians for rotations, degrees "
     "with --lonlat or --degrees; in a product perhaps one per factor with commas"
 )
+_CURVE = (
+    "column of names: the rows with one name are one curve (default: the tracks of GPX and GeoJSON files; none for one "
+    "curve of all)"
+)
 _TIME = (
     "column of times, none for 0, 1, 2, ..., or two columns with a comma, whole seconds and nanoseconds since 1970; "
     "see above for the default"
 )
-_HEIGHTS = ("ele", "elevation", "alt", "altitude", "height", "height-above-ellipsoid", "height-above-msl")
 _FOR_ROTATIONS = "For rotations give --space so:3, or rp:3, where signs do not count"
 # Options of the library for curves through points and for curves near them.
 _THROUGH = {"bc_type": "--bc-type", "method": "--method", "tol": "--tol"}
@@ -157,8 +167,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--time", metavar="COL", help=_TIME)
     add("--unix", choices=UNITS, help="times are numbers that count this unit since 1970-01-01 in UTC")
     add("--columns", metavar="A,B,...", help="columns of a point (default: all other numeric columns)")
-    add("--curve", metavar="COL", help="column of names: the rows with one name are one curve")
-    add("--lonlat", action="store_true", help="points on sphere:2 are longitude and latitude in degrees")
+    add("--curve", metavar="COL", help=_CURVE)
+    add("--lonlat", action="store_true", help="points are longitude and latitude in degrees, and perhaps a height")
     add("--degrees", action="store_true", help="angles of torus:n are in degrees, also in the samples of the curve")
     add("--quaternion", choices=ORDERS, help="order of a quaternion, if the names do not show it")
     add("--sort", action="store_true", help="put the rows of every curve in the order of their times")
@@ -208,16 +218,18 @@ def run(options: argparse.Namespace) -> int:
     """Read, fit and write."""
     format_of(options.output, None, CURVES, "a file of curves")
     check_target(options.output, options.input, binary=True)
-    space = _space(options)
+    if options.space is not None:
+        space_named(options.space)
+    table = open_table(options.input, options.format)
+    space = _space(options, table)
     keywords = _keywords(options, space)
-    data, columns = _read(options, space)
-    curves = _fitted(data, options, keywords)
-    far = outliers(data, curves, options.lonlat) if options.loss is None else ""
+    data, columns = _read(options, table, space)
+    curves = _fitted(data, columns, options, keywords)
+    far = outliers(data, curves, columns) if options.loss is None else ""
     segmented = options.max_gap is not None and options.curve is None
     named = dict(zip(data.groups, curves, strict=True))
     write_curves(options.output, Curves(named, data.named, columns, segmented))
-    in_degrees = options.lonlat or (options.degrees and isinstance(space, Torus))
-    words = f"{fitted(curves, in_degrees)}{data.changes()}{bridged(curves)}"
+    words = f"{fitted(curves, columns)}{data.changes()}{bridged(curves)}"
     if not data.has_times and options.time is None:
         words += "; no column of times: the points are at 0, 1, 2, ..."
     tell(f"{called(options.output)}: {words}")
@@ -226,18 +238,56 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _space(options: argparse.Namespace) -> Space:
-    if options.space is None and not options.lonlat:
+def _space(options: argparse.Namespace, table: Table) -> Space:
+    """Return the space of the points, and set the option --lonlat for files of positions."""
+    space = None if options.space is None else space_named(options.space)
+    if table.holds == "positions" and options.columns is None and space in (None, GLOBE, WITH_HEIGHT):
+        options.lonlat = True
+    if space is None and table.holds == "poses" and not options.lonlat:
+        space = space_named("so:3 x r:3")
+    if space is None and options.lonlat:
+        space = WITH_HEIGHT if _has_heights(options, table) else GLOBE
+    if space is None:
+        advice = suggested(table) if options.columns is None else ""
         raise Problem(
-            "say which space the points are on: --lonlat for longitude and latitude, or --space, such as --space "
+            f"{table.path}: {advice}"
+            if advice
+            else "say which space the points are on: --lonlat for longitude and latitude, or --space, such as --space "
             "sphere:2 for unit vectors and --space so:3 for rotations"
         )
-    space = GLOBE if options.space is None else space_named(options.space)
     if options.lonlat:
         require_globe(space)
     on_torus = any(isinstance(factor, Torus) for factor in factors_of(space))
     refuse("--degrees", (options.degrees and not on_torus, f" is for torus:n and products with it, not for {space}"))
     return space
+
+
+def _in_radians(options: argparse.Namespace, space: Space) -> Any:
+    """Return the standard deviations of --sigma, those in degrees in radians."""
+    parts, given = smoothed_spaces(space), options.sigma
+    several = isinstance(given, tuple)
+    heights = (
+        f"--sigma {given} is one number, but positions with heights need two: degrees and the unit of the heights, "
+        f"such as --sigma {given},5; --space sphere:2 fits positions without heights"
+    )
+    refuse("", (options.lonlat and space == WITH_HEIGHT and not several, heights))
+    degrees = [in_degrees(part, options.lonlat, options.degrees) for part in parts]
+    if several and len(given) == len(parts):
+        return tuple(math.radians(sigma) if part else sigma for sigma, part in zip(given, degrees, strict=True))
+    return math.radians(given) if all(degrees) and not several else given
+
+
+def _has_heights(options: argparse.Namespace, table: Table) -> bool:
+    """Whether positions have a height: three columns are given, or a column of heights is complete."""
+    if options.columns is not None:
+        return len(split_names(options.columns)) == 3
+    height = height_in(table)
+    if height is None or height == options.time:
+        return False
+    missing = int(table.missing(height).sum())
+    if missing:
+        tell(f"{table.path}: heights in column {height} are not used, as {missing} of {table.height} are missing")
+    return not missing
 
 
 def _keywords(options: argparse.Namespace, space: Space) -> Keywords:
@@ -262,16 +312,20 @@ def _keywords(options: argparse.Namespace, space: Space) -> Keywords:
         given.setdefault("criterion", "cp")
     if adapts:
         given["lam"] = "adaptive"
-    angles = options.lonlat or (options.degrees and isinstance(space, Torus))
-    if angles and isinstance(options.sigma, float):
-        given["sigma"] = math.radians(options.sigma)
+    if options.sigma is not None:
+        given["sigma"] = _in_radians(options, space)
     return given | {"extrapolate": _POLICIES.get(options.extrapolate)}
 
 
-def _read(options: argparse.Namespace, space: Space) -> tuple[Recordings, Columns]:
+def _read(options: argparse.Namespace, whole: Table, space: Space) -> tuple[Recordings, Columns]:
     """Return the curves in the table, and the names of their columns."""
-    whole = open_table(options.input, options.format)
     table, time = with_stamps(whole, options.time, options.skipna)
+    if options.curve is None and table.tracks is not None:
+        count = len(set(table.labels(table.tracks)))
+        tell(f"{table.path}: {count} tracks, each of which becomes a curve; --curve {JOINED} makes one curve of them")
+        options.curve = table.tracks
+    elif options.curve == JOINED and JOINED not in table.names:
+        options.curve = None
     curve = table.require(options.curve) if options.curve is not None else None
     given = split_names(options.columns)
     time = time_column(table, time, [curve, *given], options.unix is not None)
@@ -284,15 +338,14 @@ def _read(options: argparse.Namespace, space: Space) -> tuple[Recordings, Column
     at = "times 0, 1, 2, ..." if time is None else f"times in column {time}"
     tell(f"{table.path}: {table.path.format} table, points in columns {listed(points.names)}, {at}", VERBOSE)
     data = Recordings(table, rows, time, points, options, whole.height - table.height)
-    heights = [name for name in table.names if options.lonlat and name.lower() in _HEIGHTS and name not in needed]
-    if heights:
-        tell(f"{table.path}: heights in column {heights[0]} are not used; --space r:1 --columns {heights[0]} fits them")
     cut = options.max_gap is not None and curve is not None
     names = points.names, time or "time", curve or "curve"
     return data, Columns(*names, options.lonlat, rows.utc, points.quaternion, cut, options.degrees)
 
 
-def _fitted(data: Recordings, options: argparse.Namespace, keywords: Keywords) -> Sequence[CubicSpline]:
+def _fitted(
+    data: Recordings, columns: Columns, options: argparse.Namespace, keywords: Keywords
+) -> Sequence[CubicSpline]:
     """Fit all curves in one call."""
 
     def text(note: object) -> str:
@@ -308,7 +361,7 @@ def _fitted(data: Recordings, options: argparse.Namespace, keywords: Keywords) -
             else:
                 curves = fit_many(data.curves, data.space, progress=progress, **keywords)
     except SymsplineError as error:
-        far = outliers(data, None, options.lonlat)
+        far = outliers(data, None, columns)
         raise error._with_message("; ".join(filter(None, (data.located(error), far)))) from None
     return curves
 
@@ -317,6 +370,8 @@ def _fitted(data: Recordings, options: argparse.Namespace, keywords: Keywords) -
 
 Index = NDArray[np.int64]
 
+_JUMP = 30.0
+"""Multiple of the median step and speed that a step from one track to another exceeds."""
 _FAST, _FAR = 10.0, 10.0
 """Multiples of the median speed and of the median distance from a smooth curve that outliers exceed."""
 _ROUNDING = 1e-9
@@ -449,18 +504,46 @@ class Recordings:
         """Describe why rows that became one curve may be several; empty without a reason."""
         same = self.merged or self.repeated
         column = self._names() if same or not self.has_times else None
-        if column is not None:
+        if column is not None and same:
             what = f"{same} rows have a time that another row has, and column {column!r} distinguishes them"
-            what = what if same else f"column {column!r} has one block of rows for each of its texts"
             return f"{what}: if the table holds several tracks, fit each of them with --curve {column}"
+        if column is None and self._rows.labels is None:
+            column = column_of_blocks(self._table, self._used)
+        if column is not None:
+            what = f"column {column!r} has one block of rows for each of its values"
+            return f"{self.path}: {what}: if the table holds several tracks, fit each of them with --curve {column}"
         if self._rows.labels is None:
             column = column_of_tracks(self._table, self._used, self.space, self._points)
         if column is None:
-            return ""
+            return self._jump() if self._rows.labels is None else ""
         return (
             f"{self.path}: the path through all rows is more than {ZIGZAG:g} times as long as the paths of each "
             f"{column!r}; if the table holds several tracks, fit each of them with --curve {column}"
         )
+
+    def _jump(self) -> str:
+        """Describe a single step that is far longer and faster than the others; empty if there is none."""
+        for index, (times, points) in zip(self.groups.values(), self.curves, strict=True):
+            if len(index) < _FEWEST:
+                continue
+            space = factors_of(self.space)[0]
+            part = points[0] if isinstance(points, tuple) else points
+            with suppress(SymsplineError):
+                steps = np.asarray(space.distance(part[1:], part[:-1]))
+                speeds = steps / _lengths_of(times, len(steps))
+                usual = np.median(steps)
+                far = (steps > _JUMP * usual) & (speeds > _JUMP * np.median(speeds)) & (usual > 0)
+                # An outlier has two such steps, there and back, and a flight between two rests has several.
+                beside = np.maximum(np.r_[0, speeds[:-1]], np.r_[speeds[1:], 0])
+                alone = np.flatnonzero(far & (beside < speeds / _FAST))
+                if alone.size:
+                    i = int(alone[0])
+                    before, after = self.place(int(index[i])), self.place(int(index[i + 1]))
+                    return (
+                        f"{self.path}: the step from {before} to {after} is {steps[i] / usual:.0f} times as long as "
+                        "most; if the table holds several tracks, give a column of their names with --curve"
+                    )
+        return ""
 
     def changes(self) -> str:
         """Describe the rows that were merged or omitted, which the curves do not show."""
@@ -501,13 +584,13 @@ class Recordings:
 # ---- outliers ----
 
 
-def outliers(data: Recordings, curves: Sequence[CubicSpline] | None, lonlat: bool) -> str:
+def outliers(data: Recordings, curves: Sequence[CubicSpline] | None, columns: Columns) -> str:
     """Describe the rows that are probably outliers, with a remedy; empty if there are none.
 
     ``curves`` are those that were fitted, or None if the fit failed. Points are compared with a smooth curve, or with
     their neighbours.
     """
-    spikes: list[tuple[int, float, float]] = []
+    spikes: list[tuple[int, float, float, bool]] = []
     smooth = [curve for curve in curves or () if isinstance(curve, SmoothingSpline)] or None
     for i, (index, (times, points)) in enumerate(zip(data.groups.values(), data.curves, strict=True)):
         if len(index) < _FEWEST:
@@ -521,11 +604,12 @@ def outliers(data: Recordings, curves: Sequence[CubicSpline] | None, lonlat: boo
             noise = [None] * len(parts) if smooth is None else _relative_noise(smooth[i], times)
             for space, part, curve, sigma in zip(factors_of(data.space), parts, beside, noise, strict=True):
                 far, sizes, usual = _spikes(space, times, part) if curve is None else _far(space, part, curve, sigma)
-                spikes += [(int(index[k]), float(sizes[k]), usual) for k in np.flatnonzero(far)]
+                by_angle = in_degrees(space, columns.lonlat, columns.degrees)
+                spikes += [(int(index[k]), float(sizes[k]), usual, by_angle) for k in np.flatnonzero(far)]
     if not spikes:
         return ""
-    row, *lengths = spikes[0]
-    scale, unit = (180 / np.pi, "°") if lonlat and data.space == GLOBE else (1.0, "")
+    row, *lengths, degrees = spikes[0]
+    scale, unit = (180 / np.pi, "°") if degrees else (1.0, "")
     size, usual_size = (f"{scale * length:.3g}{unit}" for length in lengths)
     where = f"{size} from its neighbours, and most steps are {usual_size}"
     remedy = "omit outliers, or fit near the points with --smooth --robust"
@@ -540,13 +624,9 @@ def outliers(data: Recordings, curves: Sequence[CubicSpline] | None, lonlat: boo
 def _spikes(space: Space, times: Any, points: Any) -> tuple[NDArray[np.bool_], Doubles, float]:
     """Return which points are far from both neighbours, which are closer to each other, and the usual step."""
     steps = np.asarray(space.distance(points[1:], points[:-1]))
-    lengths = np.ones(len(steps))
-    if times is not None:
-        axis, knots = time_axis_of(times)
-        lengths = np.diff(axis.knots(knots))
-        lengths = np.maximum(lengths, 1e-3 * lengths.mean())
+    lengths = _lengths_of(times, len(steps))
     is_spike = np.zeros(len(points), bool)
-    if not lengths.min() > 0:
+    if not lengths.min(initial=1.0) > 0:
         return is_spike, is_spike.astype(np.float64), 0.0
     speeds = steps / lengths
     sizes, slowest = (np.r_[0.0, np.minimum(both[1:], both[:-1]), 0.0] for both in (steps, speeds))
@@ -555,6 +635,15 @@ def _spikes(space: Space, times: Any, points: Any) -> tuple[NDArray[np.bool_], D
     around = space.distance(points[fast + 1], points[fast - 1])
     is_spike[fast] = sizes[fast] > np.maximum(around, _ROUNDING * np.abs(points).max())
     return is_spike, sizes, float(np.median(steps))
+
+
+def _lengths_of(times: Any, count: int) -> Doubles:
+    """Return the lengths of time steps, none of which is tiny beside the others; 1 without times."""
+    if times is None:
+        return np.ones(count)
+    axis, knots = time_axis_of(times)
+    lengths = np.diff(axis.knots(knots))
+    return np.asarray(np.maximum(lengths, 1e-3 * lengths.mean()))
 
 
 def _relative_noise(curve: SmoothingSpline[Any, Any], times: Any) -> list[Any]:

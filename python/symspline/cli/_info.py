@@ -34,7 +34,7 @@ from .._smoothing.solve import Smoothed
 from .._spaces import Doubles
 from .._spaces.base import CLASSES, example_of
 from .._splines.cubic import CubicSpline
-from ._columns import NUMBERED, column_of_names, time_column
+from ._columns import JOINED, NUMBERED, Columns, column_of_blocks, column_of_names, in_degrees, time_column
 from ._curves import read_curves
 from ._messages import Problem, Source, counted, listed, refuse
 from ._tables import TABLES, Rows, Table, endings, format_of, open_table
@@ -115,7 +115,10 @@ def _table(table: Table, given: str | None) -> list[str]:
     axis, knots = time_axis_of(rows.times)
     seconds = axis.knots(knots)
     lines.append(f"times in column {time!r}: {_times(rows, seconds)}")
+    if table.tracks is not None:
+        return [*lines, f"fit makes one curve per {table.tracks}; --curve {JOINED} makes one curve of all"]
     names = column_of_names(table, time, [time]) if (np.diff(seconds) <= 0).any() else None
+    names = names or column_of_blocks(table, [time])
     return lines if names is None else [*lines, f"--curve {names} fits one curve per {names}"]
 
 
@@ -161,7 +164,7 @@ def _curves(path: Path) -> list[str]:
         zone = " UTC" if curves.columns.utc else ""
         parts = [f"{len(spline.t)} nodes, {spline.t[0]} to {spline.t[-1]}{zone}"]
         if isinstance(spline, SmoothingSpline):
-            parts += [_smoothed([spline], curves.columns.lonlat), *_parameters_of(spline)]
+            parts += [_smoothed([spline], curves.columns), *_parameters_of(spline)]
         else:
             ends = spline.bc_type if isinstance(spline.bc_type, str) else ", ".join(map(str, spline.bc_type))
             parts.append(f"{ends} ends, residual {spline.report.residual:.1e}")
@@ -184,30 +187,32 @@ def gaps_in(recordings: Iterable[Doubles], unit: str) -> str:
     return f"{counted(gaps.size, 'long gap')}, up to {gaps.max():.6g}{unit}" if gaps.size else ""
 
 
-def fitted(splines: Sequence[CubicSpline], lonlat: bool) -> str:
+def fitted(splines: Sequence[CubicSpline], columns: Columns) -> str:
     """Describe curves through points, or near them."""
     smooth = [spline for spline in splines if isinstance(spline, SmoothingSpline)]
     points = sum(len(spline.data[0]) for spline in smooth) or sum(len(spline.t) for spline in splines)
     where = "near" if smooth else "through"
     words = f"{counted(len(splines), 'curve')} {where} {points} points of {splines[0].space}, converged: "
     if smooth:
-        return words + _smoothed(smooth, lonlat)
+        return words + _smoothed(smooth, columns)
     reports = [spline.report for spline in splines]
     most = "at most " if len(splines) > 1 else ""
     iterations, residual = max(r.iterations for r in reports), max(r.residual for r in reports)
     return f"{words}{reports[0].method}, {most}{iterations} iterations, residual {most}{residual:.1e}"
 
 
-def _smoothed(splines: Sequence[SmoothingSpline[Any, Any]], lonlat: bool) -> str:
+def _smoothed(splines: Sequence[SmoothingSpline[Any, Any]], columns: Columns) -> str:
     """Describe λ, the degrees of freedom and the noise for every space in which the curves were smoothed."""
     space = splines[0].space
     several = is_several(space)
     parts = zip(*(spline._smoothed for spline in splines), strict=True)
-    names = [f"{part}: " if several else "" for part in smoothed_spaces(space)]
-    return "; ".join(_chosen(name, of_space, lonlat) for name, of_space in zip(names, parts, strict=True))
+    return "; ".join(
+        _chosen(f"{part}: " if several else "", of_space, in_degrees(part, columns.lonlat, columns.degrees))
+        for part, of_space in zip(smoothed_spaces(space), parts, strict=True)
+    )
 
 
-def _chosen(name: str, parts: Sequence[Smoothed], lonlat: bool) -> str:
+def _chosen(name: str, parts: Sequence[Smoothed], degrees: bool) -> str:
     reports = [part.report for part in parts]
     lam_varies, noise_varies = (_varying([getattr(part, name) for part in parts]) for name in _PROFILES)
     varying = [part.report for part in parts if part.profile is not None or part.noise_profile is not None]
@@ -218,10 +223,10 @@ def _chosen(name: str, parts: Sequence[Smoothed], lonlat: bool) -> str:
     rough = sum(bool(report.at_bound) and report.df > _ROUGH for report in reports)
     through = "the curve passes" if len(reports) == 1 else f"{rough} curves pass"
     advice = f" (no noise was found: {through} through the points; give --sigma or a λ)" if rough else ""
-    noise = _spread([np.degrees(report.sigma) if lonlat else report.sigma for report in reports])
+    noise = _spread([np.degrees(report.sigma) if degrees else report.sigma for report in reports])
     return (
         f"{name}λ {_spread([report.lam for report in reports])}{lam_varies}{at_bound}, "
-        f"{_spread([report.df for report in reports])} degrees of freedom, noise {noise}{'°' if lonlat else ''}"
+        f"{_spread([report.df for report in reports])} degrees of freedom, noise {noise}{'°' if degrees else ''}"
         f"{noise_varies}{advice}{gain}"
     )
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 from datetime import UTC
 from decimal import Decimal, InvalidOperation
 from importlib import import_module
-from itertools import islice
+from itertools import chain, count, islice
 from pathlib import Path, PurePath
 from typing import Any, BinaryIO, NamedTuple
 
@@ -30,7 +30,20 @@ from .._base.typing import Array
 from .._core import ValidationError, number_lines
 from .._splines.archive import read
 from ..convert._pose_files import TUM, tum_rows, write_tum_rows
-from ._messages import STANDARD, Problem, Progress, Source, alternatives, did_you_mean, first_duplicate, refuse, written
+from ._messages import (
+    STANDARD,
+    Problem,
+    Progress,
+    Source,
+    alternatives,
+    counted,
+    did_you_mean,
+    first_duplicate,
+    listed,
+    refuse,
+    say,
+    written,
+)
 
 Place = Callable[[int], str]
 
@@ -144,6 +157,10 @@ class Table:
         Returns the texts of a column of numbers as they stand in the file. None for files that are not text.
     comma : bool
         Whether numbers may have a decimal comma.
+    tracks : str or None
+        Column of the names of the tracks, if the format has tracks and the file has several.
+    holds : {"", "positions", "poses"}
+        Content of all files of this format: longitudes and latitudes, or poses.
     """
 
     path: Source
@@ -153,6 +170,8 @@ class Table:
     is_utc: Mapping[str, bool] = field(default_factory=dict)
     texts: Callable[[str], list[str]] | None = None
     comma: bool = False
+    tracks: str | None = None
+    holds: str = ""
 
     def __post_init__(self) -> None:
         """Find the columns of numbers and of dates."""
@@ -392,7 +411,7 @@ class Layout(NamedTuple):
     curve : str or None
         Column of the names of curves.
     lonlat : tuple of str or None
-        Columns of longitude and latitude in degrees.
+        Columns of longitude and latitude in degrees, and perhaps of the height.
     utc : bool
         Whether dates are in UTC.
     """
@@ -637,7 +656,7 @@ def _read_tum(path: Source) -> Table:
             raise Problem(f"{path} is not text in UTF-8") from None
     text.name = str(path)
     rows, lines = tum_rows(text, missing=True)
-    return Table(path, dict(zip(TUM, rows.T, strict=True)), lines.place)
+    return Table(path, dict(zip(TUM, rows.T, strict=True)), lines.place, holds="poses")
 
 
 def _write_tum(file: BinaryIO, columns: Mapping[str, Array], layout: Layout) -> None:
@@ -655,7 +674,11 @@ def _write_tum(file: BinaryIO, columns: Mapping[str, Array], layout: Layout) -> 
 _TIME, _LON, _LAT, _HEIGHT, _TRACK = "time", "lon", "lat", "ele", "track"
 # Properties of lines that hold the times of their points.
 _LINE_TIMES = ("coordTimes", "times")
+_LINES = "LineString", "MultiLineString"
 _KINDS = "GeoJSON must be a collection of features that are points or lines"
+_CUT = 10
+"""Degrees of longitude up to which two segments, one on each side of the date line, are one track."""
+_Row = dict[str, Any]
 
 
 def _read_json(path: Source) -> Table:
@@ -697,30 +720,75 @@ def _read_geojson(path: Source) -> Table:
     The name of a line is in the column ``track``, and heights are in the column ``ele``.
     """
     content = _json(path)
-    rows: list[dict[str, object]] = []
+    points: list[_Row] = []
+    lines: list[tuple[str, list[list[_Row]]]] = []
     try:
         features = content["features"] if content["type"] == "FeatureCollection" else [content]
         for number, feature in enumerate(features):
-            rows += _feature(feature, str(number), path)
+            properties = dict(feature.get("properties") or {})
+            geometry = feature["geometry"]
+            if geometry["type"] == "Point":
+                points.append(_position(geometry["coordinates"]) | properties)
+            else:
+                refuse(path, (geometry["type"] not in _LINES, f": {_KINDS}, not {geometry['type']}"))
+                lines.append((str(properties.get("name", number)), _parts(geometry, properties)))
     except (KeyError, TypeError, ValueError, AttributeError):
         raise Problem(f"{path}: {_KINDS}") from None
-    return _table(path, rows)
+    return _with_tracks(path, points, lines)
 
 
-def _feature(feature: Any, number: str, path: Source) -> list[dict[str, object]]:
-    properties = dict(feature.get("properties") or {})
-    coordinates, kind = feature["geometry"]["coordinates"], feature["geometry"]["type"]
-    if kind == "Point":
-        return [_position(coordinates) | properties]
-    remedy = "; make one LineString of its parts" if kind == "MultiLineString" else ""
-    refuse(path, (kind != "LineString", f": {_KINDS}, not {kind}{remedy}"))
-    times = next((properties.pop(name) for name in _LINE_TIMES if name in properties), None)
-    label = {_TRACK: str(properties.get("name", number))}
-    rows = [_position(place) | label for place in coordinates]
-    return rows if times is None else [{_TIME: time} | row for time, row in zip(times, rows, strict=True)]
+def _parts(geometry: Any, properties: Mapping[str, Any]) -> list[list[_Row]]:
+    """Return the points of a line, or of all parts of a MultiLineString, whose times may be one list per part."""
+    whole = geometry["type"] == "LineString"
+    parts = [list(map(_position, part)) for part in ([geometry["coordinates"]] if whole else geometry["coordinates"])]
+    times = next((properties[name] for name in _LINE_TIMES if name in properties), None)
+    if times is None:
+        return parts
+    times = times if whole or not isinstance(times[0], list) else [time for part in times for time in part]
+    stamps = iter([{_TIME: time} for time, _ in zip(times, [row for part in parts for row in part], strict=True)])
+    return [[next(stamps) | row for row in part] for part in parts]
 
 
-def _position(coordinates: Any) -> dict[str, object]:
+def _with_tracks(path: Source, points: list[_Row], tracks: Sequence[tuple[str, list[list[_Row]]]]) -> Table:
+    """Return the table of single points and of the points of tracks, with names that distinguish the tracks.
+
+    Every segment of a track is a track of its own, except that tracks which were cut at the date line, as RFC 7946
+    recommends, are whole again. Segments of one point, which is not a curve, are omitted.
+    """
+    named = []
+    for name, parts in tracks:
+        segments: list[list[_Row]] = []
+        for part in filter(None, parts):
+            if segments and _across_date_line(segments[-1][-1], part[0]):
+                # The point on the date line may belong to both parts.
+                segments[-1] += part[1:] if _same_place(segments[-1][-1], part[0]) else part
+            else:
+                segments.append(list(part))
+        names = [name] if len(segments) == 1 else [f"{name}/{i}" for i in range(1, len(segments) + 1)]
+        named += list(zip(names, segments, strict=True))
+    single = [name for name, segment in named if len(segment) == 1]
+    if 0 < len(single) < len(named):
+        say(f"{path}: {counted(len(single), 'track')} of one point omitted: {listed(single)}")
+        named = [pair for pair in named if len(pair[1]) > 1]
+    rows, taken = list(points), set[str]()
+    for name, segment in named:
+        label = next(text for text in chain([name], map(f"{name} ({{}})".format, count(2))) if text not in taken)
+        taken.add(label)
+        rows += [row | {_TRACK: label} for row in segment]
+    refuse(path, (not rows, " has no tracks with points"))
+    return replace(_table(path, rows), tracks=_TRACK if len(named) > 1 else None, holds="positions")
+
+
+def _across_date_line(last: _Row, first: _Row) -> bool:
+    """Whether the shorter way from one position to another crosses the date line, and is short."""
+    return abs(abs(float(last[_LON]) - float(first[_LON])) - 360) <= _CUT
+
+
+def _same_place(last: _Row, first: _Row) -> bool:
+    return abs(last[_LON]) == abs(first[_LON]) == 180 and last == first | {_LON: last[_LON]}
+
+
+def _position(coordinates: Any) -> _Row:
     lon, lat, *height = coordinates
     return {_LON: lon, _LAT: lat} | ({_HEIGHT: height[0]} if height else {})
 
@@ -743,9 +811,9 @@ def _write_json(file: BinaryIO, columns: Mapping[str, Array], layout: Layout) ->
 
 def _write_geojson(file: BinaryIO, columns: Mapping[str, Array], layout: Layout) -> None:
     """Write a collection of points, one per row and line, whose other columns are properties."""
-    lon, lat = _lonlat(columns, layout, "GeoJSON")
+    names = _lonlat(columns, layout, "GeoJSON")
     values = _lists(columns, layout)
-    places = zip(values.pop(lon), values.pop(lat), strict=True)
+    places = zip(*map(values.pop, names), strict=True)
     features = []
     for place, *others in zip(places, *values.values(), strict=True):
         geometry = {"type": "Point", "coordinates": place}
@@ -775,23 +843,18 @@ def _read_gpx(path: Source) -> Table:
             gpx = gpxpy.parse(file.read().decode("utf-8-sig"))
         except (UnicodeDecodeError, ValueError, gpxpy.gpx.GPXException) as error:
             raise Problem(f"{path} is damaged or not a GPX file: {error}") from None
-    rows: list[dict[str, object]] = []
+    tracks = []
     for number, track in enumerate(gpx.tracks, 1):
-        for part, segment in enumerate(track.segments, 1):
-            name = track.name or str(number)
-            label = f"{name}/{part}" if len(track.segments) > 1 else name
-            for point in segment.points:
-                time = point.time and point.time.astimezone(UTC).isoformat()
-                row = {
-                    _TIME: time,
-                    _LON: point.longitude,
-                    _LAT: point.latitude,
-                    _HEIGHT: point.elevation,
-                    _TRACK: label,
-                }
-                rows.append({name: value for name, value in row.items() if value is not None})
-    refuse(path, (not rows, " has no tracks with points"))
-    return _table(path, rows)
+        parts = [[_gpx_row(point) for point in segment.points] for segment in track.segments]
+        tracks.append((track.name or str(number), parts))
+    return _with_tracks(path, [], tracks)
+
+
+def _gpx_row(point: Any) -> _Row:
+    # Times of GPX are in UTC, also those without a Z.
+    time = point.time and (point.time if point.time.tzinfo else point.time.replace(tzinfo=UTC)).astimezone(UTC)
+    row = {_TIME: time and time.isoformat(), _LON: point.longitude, _LAT: point.latitude, _HEIGHT: point.elevation}
+    return {name: value for name, value in row.items() if value is not None}
 
 
 def _write_gpx(file: BinaryIO, columns: Mapping[str, Array], layout: Layout) -> None:
@@ -799,7 +862,7 @@ def _write_gpx(file: BinaryIO, columns: Mapping[str, Array], layout: Layout) -> 
     _require("GPX files", "gpx", "gpxpy")
     from gpxpy import gpx
 
-    lon, lat = _lonlat(columns, layout, "GPX")
+    lon, lat, *height = _lonlat(columns, layout, "GPX")
     rates = [name for name in columns if name.endswith(("_d1", "_d2"))]
     dates = columns[layout.time]
     refuse(
@@ -810,13 +873,15 @@ def _write_gpx(file: BinaryIO, columns: Mapping[str, Array], layout: Layout) -> 
     times = dates.astype("datetime64[us]").tolist()
     names = columns[layout.curve].tolist() if layout.curve is not None else [None] * len(times)
     whole, tracks = gpx.GPX(), {}
-    for name, time, x, y in zip(names, times, columns[lon].tolist(), columns[lat].tolist(), strict=True):
+    heights = columns[height[0]].tolist() if height else [None] * len(times)
+    positions = zip(columns[lon].tolist(), columns[lat].tolist(), heights, strict=True)
+    for name, time, (x, y, z) in zip(names, times, positions, strict=True):
         if name not in tracks:
             track, segment = gpx.GPXTrack(name=name), gpx.GPXTrackSegment()
             track.segments.append(segment)
             whole.tracks.append(track)
             tracks[name] = segment
-        tracks[name].points.append(gpx.GPXTrackPoint(y, x, time=time.replace(tzinfo=UTC)))
+        tracks[name].points.append(gpx.GPXTrackPoint(y, x, z, time.replace(tzinfo=UTC)))
     file.write(whole.to_xml().encode())
 
 
